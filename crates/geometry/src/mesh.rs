@@ -1,0 +1,111 @@
+//! Indexed triangle meshes and the textures painted on them.
+
+use std::sync::Arc;
+
+use nalgebra::{Isometry3, Point3, Vector3};
+
+/// An indexed triangle mesh in metres, with optional per-vertex attributes.
+///
+/// Attribute vectors, where present, have one entry a vertex; a position on a texture seam is stored
+/// once for each of its UVs (weld by position before asking topological questions).
+#[derive(Clone, Debug, Default)]
+pub struct TriMesh {
+    /// Vertex positions \[m\].
+    pub vertices: Vec<Point3<f64>>,
+    /// Vertex indices of each triangle, counter-clockwise seen from outside.
+    pub faces: Vec<[u32; 3]>,
+    /// Unit normals, one a vertex.
+    pub normals: Option<Vec<Vector3<f64>>>,
+    /// Texture coordinates, one a vertex; (0, 0) is the lower-left corner of the image, v points up.
+    pub uvs: Option<Vec<[f32; 2]>>,
+    /// Colours in 0..=1 as stored in files (sRGB-encoded), one a vertex.
+    pub colors: Option<Vec<[f32; 3]>>,
+    /// The image that `uvs` refer to.
+    pub texture: Option<Arc<Texture>>,
+}
+
+impl TriMesh {
+    /// A mesh of positions and faces without attributes.
+    pub fn new(vertices: Vec<Point3<f64>>, faces: Vec<[u32; 3]>) -> Self {
+        Self { vertices, faces, ..Self::default() }
+    }
+
+    /// The corner positions of face `face` \[m\].
+    #[inline]
+    pub fn triangle(&self, face: usize) -> [Point3<f64>; 3] {
+        self.faces[face].map(|v| self.vertices[v as usize])
+    }
+
+    /// Twice the area of face `face` times its unit normal \[m²\].
+    #[inline]
+    pub fn area_vector(&self, face: usize) -> Vector3<f64> {
+        let [a, b, c] = self.triangle(face);
+        (b - a).cross(&(c - a))
+    }
+
+    /// Surface area \[m²\].
+    pub fn area(&self) -> f64 {
+        (0..self.faces.len()).map(|f| 0.5 * self.area_vector(f).norm()).sum()
+    }
+
+    /// Smallest and largest corner of the axis-aligned bounding box \[m\]; `None` without vertices.
+    pub fn bounds(&self) -> Option<(Point3<f64>, Point3<f64>)> {
+        let first = *self.vertices.first()?;
+        Some(self.vertices.iter().fold((first, first), |(lo, hi), v| (lo.inf(v), hi.sup(v))))
+    }
+
+    /// Moves every vertex and normal by `t_new_mesh`, which maps mesh coordinates into the new frame.
+    pub fn transformed(&self, t_new_mesh: &Isometry3<f64>) -> Self {
+        let mut mesh = self.clone();
+        mesh.vertices.iter_mut().for_each(|v| *v = t_new_mesh * *v);
+        if let Some(normals) = &mut mesh.normals {
+            normals.iter_mut().for_each(|n| *n = t_new_mesh * *n);
+        }
+        mesh
+    }
+
+    /// Multiplies every coordinate by `factor` (0.001 brings millimetres to metres).
+    pub fn scaled(mut self, factor: f64) -> Self {
+        self.vertices.iter_mut().for_each(|v| v.coords *= factor);
+        self
+    }
+
+    /// Appends the geometry of `other`; attributes that only one side has are dropped.
+    pub fn append(&mut self, other: &TriMesh) {
+        fn join<T: Clone>(own: &mut Option<Vec<T>>, other: &Option<Vec<T>>) {
+            match (own.as_mut(), other) {
+                (Some(a), Some(b)) => a.extend_from_slice(b),
+                _ => *own = None,
+            }
+        }
+        if self.vertices.is_empty() {
+            *self = other.clone();
+            return;
+        }
+        let offset = self.vertices.len() as u32;
+        self.vertices.extend_from_slice(&other.vertices);
+        self.faces.extend(other.faces.iter().map(|f| f.map(|v| v + offset)));
+        join(&mut self.normals, &other.normals);
+        join(&mut self.uvs, &other.uvs);
+        join(&mut self.colors, &other.colors);
+        let same_texture = match (&self.texture, &other.texture) {
+            (Some(a), Some(b)) => Arc::ptr_eq(a, b),
+            (None, None) => true,
+            _ => false,
+        };
+        if !same_texture {
+            (self.uvs, self.texture) = (None, None);
+        }
+    }
+}
+
+/// An 8-bit RGB image, row-major from the top.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Texture {
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// sRGB-encoded pixels, `width * height` of them, row-major from the top-left.
+    pub pixels: Vec<[u8; 3]>,
+}
