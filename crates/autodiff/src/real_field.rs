@@ -1,0 +1,500 @@
+//! `RealField` and its supertraits for every differentiable scalar, derived from [`Chain`].
+//!
+//! Conventions at points without a derivative: `abs` has slope 0 at 0, `min`/`max` follow the first
+//! operand on a tie, rounding has slope 0. Comparisons look at values alone.
+
+/// Implements nalgebra's scalar traits for a type that implements [`Chain`](crate::chain::Chain).
+macro_rules! impl_real_field {
+    ([$($generics:tt)*] $t:ty) => {
+        impl<$($generics)*> std::ops::Add for $t {
+            type Output = Self;
+            #[inline]
+            fn add(self, o: Self) -> Self {
+                self.binary(o, self.primal() + o.primal(), [1.0, 1.0])
+            }
+        }
+        impl<$($generics)*> std::ops::Sub for $t {
+            type Output = Self;
+            #[inline]
+            fn sub(self, o: Self) -> Self {
+                self.binary(o, self.primal() - o.primal(), [1.0, -1.0])
+            }
+        }
+        impl<$($generics)*> std::ops::Mul for $t {
+            type Output = Self;
+            #[inline]
+            fn mul(self, o: Self) -> Self {
+                let (a, b) = (self.primal(), o.primal());
+                self.binary(o, a * b, [b, a])
+            }
+        }
+        impl<$($generics)*> std::ops::Div for $t {
+            type Output = Self;
+            #[inline]
+            fn div(self, o: Self) -> Self {
+                let inverse = 1.0 / o.primal();
+                let value = self.primal() / o.primal();
+                self.binary(o, value, [inverse, -value * inverse])
+            }
+        }
+        impl<$($generics)*> std::ops::Rem for $t {
+            type Output = Self;
+            #[inline]
+            fn rem(self, o: Self) -> Self {
+                let (a, b) = (self.primal(), o.primal());
+                self.binary(o, a % b, [1.0, -(a / b).trunc()])
+            }
+        }
+        impl<$($generics)*> std::ops::Neg for $t {
+            type Output = Self;
+            #[inline]
+            fn neg(self) -> Self {
+                self.unary(-self.primal(), -1.0)
+            }
+        }
+        impl_real_field!(@assign [$($generics)*] $t,
+            AddAssign add_assign +, SubAssign sub_assign -, MulAssign mul_assign *,
+            DivAssign div_assign /, RemAssign rem_assign %);
+
+        impl<$($generics)*> PartialEq for $t {
+            #[inline]
+            fn eq(&self, o: &Self) -> bool {
+                self.primal() == o.primal()
+            }
+        }
+        impl<$($generics)*> PartialOrd for $t {
+            #[inline]
+            fn partial_cmp(&self, o: &Self) -> Option<std::cmp::Ordering> {
+                self.primal().partial_cmp(&o.primal())
+            }
+        }
+        impl<$($generics)*> Default for $t {
+            #[inline]
+            fn default() -> Self {
+                Self::lift(0.0)
+            }
+        }
+        impl<$($generics)*> From<f64> for $t {
+            #[inline]
+            fn from(value: f64) -> Self {
+                Self::lift(value)
+            }
+        }
+        impl<$($generics)*> std::fmt::Display for $t {
+            fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                std::fmt::Display::fmt(&self.primal(), f)
+            }
+        }
+
+        impl<$($generics)*> num_traits::Zero for $t {
+            #[inline]
+            fn zero() -> Self {
+                Self::lift(0.0)
+            }
+            #[inline]
+            fn is_zero(&self) -> bool {
+                self.primal() == 0.0
+            }
+        }
+        impl<$($generics)*> num_traits::One for $t {
+            #[inline]
+            fn one() -> Self {
+                Self::lift(1.0)
+            }
+        }
+        impl<$($generics)*> num_traits::Num for $t {
+            type FromStrRadixErr = <f64 as num_traits::Num>::FromStrRadixErr;
+            fn from_str_radix(text: &str, radix: u32) -> Result<Self, Self::FromStrRadixErr> {
+                <f64 as num_traits::Num>::from_str_radix(text, radix).map(Self::lift)
+            }
+        }
+        impl<$($generics)*> num_traits::FromPrimitive for $t {
+            #[inline]
+            fn from_i64(n: i64) -> Option<Self> {
+                Some(Self::lift(n as f64))
+            }
+            #[inline]
+            fn from_u64(n: u64) -> Option<Self> {
+                Some(Self::lift(n as f64))
+            }
+            #[inline]
+            fn from_f64(n: f64) -> Option<Self> {
+                Some(Self::lift(n))
+            }
+        }
+        impl<$($generics)*> num_traits::Signed for $t {
+            #[inline]
+            fn abs(&self) -> Self {
+                let v = self.primal();
+                let slope = if v == 0.0 { 0.0 } else { v.signum() };
+                self.unary(v.abs(), slope)
+            }
+            #[inline]
+            fn abs_sub(&self, o: &Self) -> Self {
+                if self <= o { Self::lift(0.0) } else { *self - *o }
+            }
+            #[inline]
+            fn signum(&self) -> Self {
+                Self::lift(num_traits::Signed::signum(&self.primal()))
+            }
+            #[inline]
+            fn is_positive(&self) -> bool {
+                num_traits::Signed::is_positive(&self.primal())
+            }
+            #[inline]
+            fn is_negative(&self) -> bool {
+                num_traits::Signed::is_negative(&self.primal())
+            }
+        }
+
+        impl<$($generics)*> approx::AbsDiffEq for $t {
+            type Epsilon = Self;
+            fn default_epsilon() -> Self {
+                Self::lift(f64::EPSILON)
+            }
+            fn abs_diff_eq(&self, o: &Self, epsilon: Self) -> bool {
+                self.primal().abs_diff_eq(&o.primal(), epsilon.primal())
+            }
+        }
+        impl<$($generics)*> approx::RelativeEq for $t {
+            fn default_max_relative() -> Self {
+                Self::lift(f64::default_max_relative())
+            }
+            fn relative_eq(&self, o: &Self, epsilon: Self, max_relative: Self) -> bool {
+                self.primal().relative_eq(&o.primal(), epsilon.primal(), max_relative.primal())
+            }
+        }
+        impl<$($generics)*> approx::UlpsEq for $t {
+            fn default_max_ulps() -> u32 {
+                f64::default_max_ulps()
+            }
+            fn ulps_eq(&self, o: &Self, epsilon: Self, max_ulps: u32) -> bool {
+                self.primal().ulps_eq(&o.primal(), epsilon.primal(), max_ulps)
+            }
+        }
+
+        impl<$($generics)*> simba::scalar::Field for $t {}
+        impl<$($generics)*> simba::simd::SimdValue for $t {
+            const LANES: usize = 1;
+            type Element = Self;
+            type SimdBool = bool;
+            #[inline]
+            fn splat(value: Self) -> Self {
+                value
+            }
+            #[inline]
+            fn extract(&self, _: usize) -> Self {
+                *self
+            }
+            // The trait declares these two `unsafe fn`; the bodies contain no unsafe operation.
+            #[allow(unsafe_code)]
+            #[inline]
+            unsafe fn extract_unchecked(&self, _: usize) -> Self {
+                *self
+            }
+            #[inline]
+            fn replace(&mut self, _: usize, value: Self) {
+                *self = value;
+            }
+            #[allow(unsafe_code)]
+            #[inline]
+            unsafe fn replace_unchecked(&mut self, _: usize, value: Self) {
+                *self = value;
+            }
+            #[inline]
+            fn select(self, condition: bool, other: Self) -> Self {
+                if condition { self } else { other }
+            }
+        }
+
+        impl<$($generics)*> simba::scalar::SubsetOf<$t> for $t {
+            #[inline]
+            fn to_superset(&self) -> Self {
+                *self
+            }
+            #[inline]
+            fn from_superset_unchecked(element: &Self) -> Self {
+                *element
+            }
+            #[inline]
+            fn is_in_subset(_: &Self) -> bool {
+                true
+            }
+        }
+        impl_real_field!(@subset [$($generics)*] $t, f32);
+        impl_real_field!(@subset [$($generics)*] $t, f64);
+
+        impl<$($generics)*> simba::scalar::ComplexField for $t {
+            type RealField = Self;
+            #[inline]
+            fn from_real(re: Self) -> Self {
+                re
+            }
+            #[inline]
+            fn real(self) -> Self {
+                self
+            }
+            #[inline]
+            fn imaginary(self) -> Self {
+                Self::lift(0.0)
+            }
+            #[inline]
+            fn modulus(self) -> Self {
+                num_traits::Signed::abs(&self)
+            }
+            #[inline]
+            fn modulus_squared(self) -> Self {
+                self * self
+            }
+            #[inline]
+            fn argument(self) -> Self {
+                Self::lift(if self.primal() >= 0.0 { 0.0 } else { std::f64::consts::PI })
+            }
+            #[inline]
+            fn norm1(self) -> Self {
+                num_traits::Signed::abs(&self)
+            }
+            #[inline]
+            fn scale(self, factor: Self) -> Self {
+                self * factor
+            }
+            #[inline]
+            fn unscale(self, factor: Self) -> Self {
+                self / factor
+            }
+            #[inline]
+            fn to_exp(self) -> (Self, Self) {
+                let one = Self::lift(1.0);
+                if self.primal() >= 0.0 { (self, one) } else { (-self, -one) }
+            }
+            #[inline]
+            fn signum(self) -> Self {
+                num_traits::Signed::signum(&self)
+            }
+            impl_real_field!(@flat floor ceil round trunc);
+            #[inline]
+            fn fract(self) -> Self {
+                self.unary(self.primal().fract(), 1.0)
+            }
+            #[inline]
+            fn mul_add(self, a: Self, b: Self) -> Self {
+                self * a + b
+            }
+            #[inline]
+            fn abs(self) -> Self {
+                num_traits::Signed::abs(&self)
+            }
+            #[inline]
+            fn hypot(self, other: Self) -> Self {
+                let (a, b) = (self.primal(), other.primal());
+                let value = a.hypot(b);
+                let inverse = if value == 0.0 { 0.0 } else { 1.0 / value };
+                self.binary(other, value, [a * inverse, b * inverse])
+            }
+            #[inline]
+            fn recip(self) -> Self {
+                let value = 1.0 / self.primal();
+                self.unary(value, -value * value)
+            }
+            #[inline]
+            fn conjugate(self) -> Self {
+                self
+            }
+            #[inline]
+            fn sin_cos(self) -> (Self, Self) {
+                let (s, c) = self.primal().sin_cos();
+                (self.unary(s, c), self.unary(c, -s))
+            }
+            #[inline]
+            fn sin(self) -> Self {
+                self.sin_cos().0
+            }
+            #[inline]
+            fn cos(self) -> Self {
+                self.sin_cos().1
+            }
+            #[inline]
+            fn sinh_cosh(self) -> (Self, Self) {
+                (self.sinh(), self.cosh())
+            }
+            impl_real_field!(@smooth
+                tan |_x, y| 1.0 + y * y;
+                asin |x, _y| 1.0 / (1.0 - x * x).sqrt();
+                acos |x, _y| -1.0 / (1.0 - x * x).sqrt();
+                atan |x, _y| 1.0 / (1.0 + x * x);
+                sinh |x, _y| x.cosh();
+                cosh |x, _y| x.sinh();
+                tanh |_x, y| 1.0 - y * y;
+                asinh |x, _y| 1.0 / (x * x + 1.0).sqrt();
+                acosh |x, _y| 1.0 / (x * x - 1.0).sqrt();
+                atanh |x, _y| 1.0 / (1.0 - x * x);
+                log2 |x, _y| std::f64::consts::LOG2_E / x;
+                log10 |x, _y| std::f64::consts::LOG10_E / x;
+                ln |x, _y| 1.0 / x;
+                ln_1p |x, _y| 1.0 / (1.0 + x);
+                sqrt |_x, y| 0.5 / y;
+                cbrt |_x, y| 1.0 / (3.0 * y * y);
+                exp |_x, y| y;
+                exp2 |_x, y| y * std::f64::consts::LN_2;
+                exp_m1 |_x, y| y + 1.0
+            );
+            #[inline]
+            fn log(self, base: Self) -> Self {
+                self.ln() / base.ln()
+            }
+            #[inline]
+            fn powi(self, n: i32) -> Self {
+                if n == 0 {
+                    return Self::lift(1.0);
+                }
+                let x = self.primal();
+                self.unary(x.powi(n), f64::from(n) * x.powi(n - 1))
+            }
+            #[inline]
+            fn powf(self, n: Self) -> Self {
+                let (x, e) = (self.primal(), n.primal());
+                let value = x.powf(e);
+                // Partials of inactive operands may be NaN (a logarithm of a negative base), so they
+                // are not computed rather than multiplied by zero.
+                let by_base =
+                    if self.is_constant() || e == 0.0 { 0.0 } else { e * x.powf(e - 1.0) };
+                let by_exponent =
+                    if n.is_constant() || value == 0.0 { 0.0 } else { value * x.ln() };
+                self.binary(n, value, [by_base, by_exponent])
+            }
+            #[inline]
+            fn powc(self, n: Self) -> Self {
+                self.powf(n)
+            }
+            #[inline]
+            fn is_finite(&self) -> bool {
+                self.primal().is_finite()
+            }
+            #[inline]
+            fn try_sqrt(self) -> Option<Self> {
+                (self.primal() >= 0.0).then(|| self.sqrt())
+            }
+        }
+
+        impl<$($generics)*> simba::scalar::RealField for $t {
+            #[inline]
+            fn is_sign_positive(&self) -> bool {
+                self.primal().is_sign_positive()
+            }
+            #[inline]
+            fn is_sign_negative(&self) -> bool {
+                self.primal().is_sign_negative()
+            }
+            #[inline]
+            fn copysign(self, sign: Self) -> Self {
+                if self.primal().is_sign_negative() == sign.primal().is_sign_negative() {
+                    self
+                } else {
+                    -self
+                }
+            }
+            #[inline]
+            fn max(self, other: Self) -> Self {
+                if other.primal() > self.primal() || self.primal().is_nan() { other } else { self }
+            }
+            #[inline]
+            fn min(self, other: Self) -> Self {
+                if other.primal() < self.primal() || self.primal().is_nan() { other } else { self }
+            }
+            #[inline]
+            fn clamp(self, min: Self, max: Self) -> Self {
+                if self < min {
+                    min
+                } else if self > max {
+                    max
+                } else {
+                    self
+                }
+            }
+            #[inline]
+            fn atan2(self, other: Self) -> Self {
+                let (y, x) = (self.primal(), other.primal());
+                let scale = 1.0 / (x * x + y * y);
+                self.binary(other, y.atan2(x), [x * scale, -y * scale])
+            }
+            #[inline]
+            fn min_value() -> Option<Self> {
+                Some(Self::lift(f64::MIN))
+            }
+            #[inline]
+            fn max_value() -> Option<Self> {
+                Some(Self::lift(f64::MAX))
+            }
+            impl_real_field!(@constants
+                pi PI, two_pi TAU, frac_pi_2 FRAC_PI_2, frac_pi_3 FRAC_PI_3, frac_pi_4 FRAC_PI_4,
+                frac_pi_6 FRAC_PI_6, frac_pi_8 FRAC_PI_8, frac_1_pi FRAC_1_PI, frac_2_pi FRAC_2_PI,
+                frac_2_sqrt_pi FRAC_2_SQRT_PI, e E, log2_e LOG2_E, log10_e LOG10_E, ln_2 LN_2,
+                ln_10 LN_10);
+        }
+
+        impl<$($generics)*> crate::Scalar for $t {
+            #[inline]
+            fn constant(value: f64) -> Self {
+                Self::lift(value)
+            }
+            #[inline]
+            fn value(self) -> f64 {
+                self.primal()
+            }
+        }
+    };
+
+    (@assign [$($generics:tt)*] $t:ty, $($trait:ident $method:ident $op:tt),*) => {
+        impl_real_field!(@assign_each [[$($generics)*] $t] $([$trait $method $op])*);
+    };
+    (@assign_each $head:tt $($each:tt)*) => {
+        $(impl_real_field!(@assign_one $head $each);)*
+    };
+    (@assign_one [[$($generics:tt)*] $t:ty] [$trait:ident $method:ident $op:tt]) => {
+        impl<$($generics)*> std::ops::$trait for $t {
+            #[inline]
+            fn $method(&mut self, o: Self) {
+                *self = *self $op o;
+            }
+        }
+    };
+    (@subset [$($generics:tt)*] $t:ty, $plain:ty) => {
+        impl<$($generics)*> simba::scalar::SubsetOf<$t> for $plain {
+            #[inline]
+            fn to_superset(&self) -> $t {
+                <$t>::lift(f64::from(*self))
+            }
+            #[inline]
+            fn from_superset_unchecked(element: &$t) -> $plain {
+                element.primal() as $plain
+            }
+            #[inline]
+            fn is_in_subset(_: &$t) -> bool {
+                true
+            }
+        }
+    };
+    (@flat $($name:ident)*) => {
+        $(#[inline]
+        fn $name(self) -> Self {
+            Self::lift(self.primal().$name())
+        })*
+    };
+    (@smooth $($name:ident |$x:ident, $y:ident| $slope:expr);*) => {
+        $(#[inline]
+        fn $name(self) -> Self {
+            let $x = self.primal();
+            let $y = $x.$name();
+            // A constant stays one: an infinite slope must not meet a zero derivative.
+            if self.is_constant() { Self::lift($y) } else { self.unary($y, $slope) }
+        })*
+    };
+    (@constants $($name:ident $value:ident),*) => {
+        $(#[inline]
+        fn $name() -> Self {
+            Self::lift(std::f64::consts::$value)
+        })*
+    };
+}
+
+pub(crate) use impl_real_field;
