@@ -1,0 +1,156 @@
+//! Objects and robots of a dataset, each loaded once and shared by all frames.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use prehend_geometry::TriMesh;
+use prehend_geometry::hand::{Taxel, load_taxels};
+use prehend_geometry::robot::Robot as KinematicTree;
+
+use crate::bop::{Dataset, DatasetError, Frame, ModelInfo, Models};
+use crate::{HandReading, Inertial, Object, Observation, RefineError, Robot};
+
+/// Meshes and robots change millimetres to metres here: BOP models are in millimetres.
+const MILLIMETRE: f64 = 1e-3;
+
+/// Why an asset of a dataset, or a frame made of them, could not be had.
+#[derive(Debug, thiserror::Error)]
+pub enum AssetError {
+    /// A file of the dataset is at fault.
+    #[error(transparent)]
+    Dataset(#[from] DatasetError),
+    /// A mesh file is at fault.
+    #[error(transparent)]
+    Mesh(#[from] prehend_geometry::MeshError),
+    /// A robot description or its joints are at fault.
+    #[error(transparent)]
+    Robot(#[from] prehend_geometry::robot::RobotError),
+    /// A taxel layout is at fault.
+    #[error(transparent)]
+    Taxels(#[from] prehend_geometry::hand::TaxelError),
+    /// The refinement itself.
+    #[error(transparent)]
+    Refine(#[from] RefineError),
+    /// A frame of several robots: which one holds the object is not said.
+    #[error("{file}: image {image} has {count} bodies; exactly one hand is supported")]
+    Bodies {
+        /// The file that lists the bodies.
+        file: String,
+        /// The image.
+        image: u32,
+        /// How many bodies it lists.
+        count: usize,
+    },
+}
+
+/// The objects and robots of a dataset.
+pub struct Assets<'a> {
+    dataset: &'a Dataset,
+    objects: HashMap<u32, Arc<Object>>,
+    robots: HashMap<(PathBuf, Option<PathBuf>), Arc<Robot>>,
+}
+
+impl<'a> Assets<'a> {
+    /// Nothing loaded yet.
+    pub fn new(dataset: &'a Dataset) -> Self {
+        Self { dataset, objects: HashMap::new(), robots: HashMap::new() }
+    }
+
+    /// The model of object `id`, in metres.
+    ///
+    /// # Errors
+    /// If the model is missing or broken.
+    pub fn object(&mut self, id: u32) -> Result<Arc<Object>, AssetError> {
+        if let Some(object) = self.objects.get(&id) {
+            return Ok(Arc::clone(object));
+        }
+        let object = Arc::new(load_object(self.dataset.models(), id)?);
+        self.objects.insert(id, Arc::clone(&object));
+        Ok(object)
+    }
+
+    /// The frame as an [`Observation`], and its robot if `with_robot`.
+    ///
+    /// # Errors
+    /// If a file that is needed is missing or broken.
+    pub fn observation(
+        &mut self,
+        frame: &Frame<'_>,
+        instance: usize,
+        with_robot: bool,
+        with_touch: bool,
+    ) -> Result<(Observation, Option<Arc<Robot>>), AssetError> {
+        let mut observation = frame.observation(instance)?;
+        if !with_robot {
+            return Ok((observation, None));
+        }
+        let bodies = frame.bodies()?;
+        let [body] = bodies.bodies.as_slice() else {
+            return Err(AssetError::Bodies {
+                file: frame.scene_dir().join("scene_bodies.json").display().to_string(),
+                image: frame.im_id(),
+                count: bodies.bodies.len(),
+            });
+        };
+        let tactile = if with_touch { Some(frame.tactile()?) } else { None };
+        let robot = self.robot(&body.urdf, tactile.as_ref().map(|t| t.taxels.as_path()))?;
+        observation.gravity = Some(bodies.gravity);
+        observation.hand = Some(HandReading {
+            t_cam_hand: body.t_cam_base,
+            joints: robot.tree.joint_vector(&body.joints)?,
+            forces: tactile.map_or_else(Vec::new, |t| t.force),
+        });
+        Ok((observation, Some(robot)))
+    }
+
+    /// The robot of `urdf` with the skin of `taxels`, both relative to the dataset.
+    ///
+    /// # Errors
+    /// If a file is missing or broken.
+    pub fn robot(
+        &mut self,
+        urdf: &Path,
+        taxels: Option<&Path>,
+    ) -> Result<Arc<Robot>, AssetError> {
+        let key = (urdf.to_owned(), taxels.map(Path::to_owned));
+        if let Some(robot) = self.robots.get(&key) {
+            return Ok(Arc::clone(robot));
+        }
+        let root = self.dataset.root();
+        let tree = KinematicTree::from_urdf_file(&root.join(urdf))?;
+        let skin: Vec<Taxel> = match taxels {
+            Some(file) => load_taxels(&root.join(file))?,
+            None => Vec::new(),
+        };
+        let robot = Arc::new(Robot::new(tree, skin)?);
+        self.robots.insert(key, Arc::clone(&robot));
+        Ok(robot)
+    }
+}
+
+/// The object `id` of `models`, in metres.
+///
+/// # Errors
+/// If the model is missing or broken.
+pub fn load_object(models: &Models, id: u32) -> Result<Object, AssetError> {
+    let mesh = load_mesh(models, id)?;
+    let inertial = models.info(id).ok().and_then(|info| inertial(&info));
+    Ok(Object::new(&format!("obj_{id:06}"), &mesh, inertial)?)
+}
+
+/// The surface of object `id` of `models`, in metres.
+///
+/// # Errors
+/// If the model is missing or broken.
+pub fn load_mesh(models: &Models, id: u32) -> Result<TriMesh, AssetError> {
+    Ok(TriMesh::load(&models.mesh_path(id)?)?.scaled(MILLIMETRE))
+}
+
+fn inertial(info: &ModelInfo) -> Option<Inertial> {
+    Some(Inertial {
+        mass: info.mass?,
+        center_of_mass: info.center_of_mass?,
+        inertia: info.inertia?,
+    })
+}

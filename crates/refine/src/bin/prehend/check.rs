@@ -1,0 +1,60 @@
+//! `prehend check`.
+
+use std::path::PathBuf;
+
+use anyhow::Context;
+use clap::Args;
+use prehend_refine::bop::ResultRow;
+use prehend_refine::report::{Report, outline_picture};
+use prehend_refine::{AssetError, Assets, inspect};
+
+use crate::options::{Input, Job, label};
+use crate::outcome::Outcome;
+use crate::progress;
+
+#[derive(Args)]
+pub struct Arguments {
+    #[command(flatten)]
+    input: Input,
+    /// Where to write the pictures and an index.html.
+    #[arg(long, value_name = "DIR", default_value = "out/check")]
+    report: PathBuf,
+}
+
+pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
+    let dataset = arguments.input.open()?;
+    let (jobs, mut failures) = arguments.input.jobs()?;
+    let mut assets = Assets::new(&dataset, 0);
+    let mut report = Report::create(&arguments.report)?;
+    let mut done = 0;
+    let bar = progress::bar(jobs.len() as u64, "drawing");
+    for job in &jobs {
+        match check(&mut assets, job) {
+            Ok((picture, warnings)) => {
+                for warning in &warnings {
+                    bar.suspend(|| eprintln!("warning: {}: {warning}", label(&job.row)));
+                }
+                report.add_picture(&label(&job.row), &picture, &warnings).context("writing")?;
+                done += 1;
+            }
+            Err(error) => failures.push(format!("{}: {error:#}", label(&job.row))),
+        }
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    let index = report.finish().context("writing the report")?;
+    println!("{done} pictures; open {}", index.display());
+    Ok(Outcome { done, failures })
+}
+
+fn check(
+    assets: &mut Assets<'_>,
+    job: &Job,
+) -> Result<(prehend_render::RgbImage, Vec<String>), AssetError> {
+    let ResultRow { scene_id, im_id, obj_id, t_cam_model, .. } = &job.row;
+    let object = assets.object(*obj_id)?;
+    let frame = assets.dataset().frame(*scene_id, *im_id)?;
+    let (observation, robot) = assets.observation(&frame, job.instance, true, true)?;
+    let warnings = inspect(&observation, &object, robot.as_deref(), t_cam_model);
+    Ok((outline_picture(&observation, &object, robot.as_deref(), t_cam_model), warnings))
+}

@@ -1,0 +1,43 @@
+//! `prehend eval`.
+
+use clap::Args;
+use prehend_refine::Scorer;
+use prehend_refine::metrics::summarize;
+use serde_json::json;
+
+use crate::options::{Input, label};
+use crate::outcome::Outcome;
+use crate::progress;
+
+#[derive(Args)]
+pub struct Arguments {
+    #[command(flatten)]
+    input: Input,
+    /// Print JSON, with every pose's score, instead of tables.
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
+    let dataset = arguments.input.open()?;
+    let (jobs, mut failures) = arguments.input.jobs()?;
+    let mut scorer = Scorer::new(&dataset);
+    let mut rows = Vec::new();
+    let bar = progress::bar(jobs.len() as u64, "scoring");
+    for job in &jobs {
+        match scorer.score(&job.row) {
+            Ok(row) => rows.push(row),
+            Err(error) => failures.push(format!("{}: {error:#}", label(&job.row))),
+        }
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    let summary = summarize(&rows);
+    if arguments.json {
+        let document = json!({ "poses": rows, "summary": summary, "failures": failures });
+        println!("{}", serde_json::to_string_pretty(&document)?);
+    } else {
+        println!("{}", summary.text(|id| format!("object {id}")));
+    }
+    Ok(Outcome { done: rows.len(), failures })
+}

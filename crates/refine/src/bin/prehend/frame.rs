@@ -1,0 +1,48 @@
+//! `prehend refine --frame`: one frame described by a JSON file (docs/FRAME.md).
+
+use std::path::Path;
+use std::sync::Arc;
+
+use prehend_refine::{frame_file, refine_with};
+use serde_json::json;
+
+use crate::outcome::Outcome;
+use crate::progress;
+use crate::refine::{Method, deliver};
+
+pub fn run(file: &Path, method: &Method, out: Option<&Path>) -> anyhow::Result<Outcome> {
+    let input = frame_file::load(file, method.seed())?;
+    let mut config = method.config();
+    // A frame brings what it has: terms whose evidence is absent drop out unless they were asked for.
+    if !method.terms_given() {
+        config.terms.retain(|&t| input.offers(t));
+    }
+    let object = Arc::new(input.object);
+    let bar = progress::bar(config.heuristic.iterations as u64, "refining");
+    let refined = refine_with(
+        &input.observation,
+        &object,
+        input.robot.as_ref(),
+        &input.t_cam_object,
+        &config,
+        |p| {
+            bar.set_position(p.iteration as u64);
+            true
+        },
+    )?;
+    bar.finish_and_clear();
+    let pose = &refined.t_cam_object;
+    let q = pose.rotation.quaternion();
+    let matrix = pose.to_homogeneous();
+    let rows: Vec<Vec<f64>> = matrix.row_iter().map(|r| r.iter().copied().collect()).collect();
+    let document = json!({
+        "t_cam_object": rows,
+        "translation_m": pose.translation.vector.as_slice(),
+        "quaternion_wxyz": [q.w, q.i, q.j, q.k],
+        "terms": config.terms.iter().map(|t| t.name()).collect::<Vec<_>>(),
+        "iteration": refined.iteration,
+        "trace": refined.trace,
+    });
+    deliver(&document, out)?;
+    Ok(Outcome { done: 1, failures: Vec::new() })
+}

@@ -1,0 +1,25 @@
+//! What went wrong along the way, said once at the end.
+
+use std::process::ExitCode;
+
+/// How a run over many frames ended.
+pub struct Outcome {
+    /// Frames that succeeded.
+    pub done: usize,
+    /// What failed, one line each.
+    pub failures: Vec<String>,
+}
+
+impl Outcome {
+    /// Prints the summary to standard error; the exit code is 2 if anything failed.
+    pub fn exit_code(self) -> ExitCode {
+        if self.failures.is_empty() {
+            return ExitCode::SUCCESS;
+        }
+        eprintln!("\n{} done, {} failed:", self.done, self.failures.len());
+        for failure in &self.failures {
+            eprintln!("  {failure}");
+        }
+        ExitCode::from(2)
+    }
+}

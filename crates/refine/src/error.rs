@@ -1,0 +1,63 @@
+//! Why a refinement could not be done.
+
+use prehend_geometry::robot::RobotError;
+use thiserror::Error;
+
+/// Why a pose could not be refined.
+#[derive(Debug, Error)]
+pub enum RefineError {
+    /// The object model cannot be used.
+    #[error("object {object}: {reason}")]
+    Object {
+        /// Name of the object.
+        object: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// The mask selects nothing.
+    #[error("the object's mask is empty")]
+    EmptyMask,
+    /// No depth where the object is.
+    #[error("no pixel of the object's mask has a depth")]
+    NoDepth,
+    /// A term needs something that was not observed.
+    #[error("the {term} term needs the {what}, which the observation lacks")]
+    Missing {
+        /// What is missing.
+        what: &'static str,
+        /// The term that needs it.
+        term: &'static str,
+    },
+    /// Forces and taxels do not match.
+    #[error("{forces} taxel forces were given for {taxels} taxels")]
+    TaxelCount {
+        /// Number of forces.
+        forces: usize,
+        /// Number of taxels.
+        taxels: usize,
+    },
+    /// A taxel sits on a link that the robot lacks.
+    #[error("a taxel is on link {link}, which the robot lacks")]
+    TaxelLink {
+        /// Name of the link.
+        link: String,
+    },
+    /// The initial pose is unusable.
+    #[error("the initial pose puts the object's centre at depth {depth:.3} m, behind the camera")]
+    BehindCamera {
+        /// Depth of the centre \[m\].
+        depth: f64,
+    },
+    /// The initial pose is not finite.
+    #[error("the initial pose is not finite")]
+    NotFinite,
+    /// No term was asked for.
+    #[error("no term to refine by")]
+    NoTerms,
+    /// Kinematics failed.
+    #[error(transparent)]
+    Robot(#[from] RobotError),
+    /// The images of the observation do not fit each other.
+    #[error("the images of the observation do not fit: {0}")]
+    Images(String),
+}

@@ -1,0 +1,69 @@
+//! What looks wrong with an input before any refinement.
+
+use nalgebra::Isometry3;
+use prehend_render::depth_map;
+
+use crate::refine::hand_depth;
+use crate::{Object, Observation, Robot};
+
+/// Sizes between which an object's extent is believed to be in metres \[m\].
+const PLAUSIBLE_EXTENT: std::ops::Range<f64> = 5e-3..5.0;
+
+/// Warnings about units and frames, in plain sentences; empty if all looks well.
+pub fn inspect(
+    observation: &Observation,
+    object: &Object,
+    robot: Option<&Robot>,
+    t_cam_object: &Isometry3<f64>,
+) -> Vec<String> {
+    let mut warnings = Vec::new();
+    let extent = 2.0 * object.radius;
+    if !PLAUSIBLE_EXTENT.contains(&extent) {
+        warnings.push(format!(
+            "the mesh is {extent:.4} m across: is it in metres, or in millimetres as BOP has it?"
+        ));
+    }
+    if object.inertial_assumed {
+        warnings.push(format!(
+            "the object's mass is unknown: {:.3} kg was assumed from 500 kg/m³",
+            object.inertial.mass
+        ));
+    }
+    if !object.report.watertight {
+        warnings.push(format!("the mesh is not watertight: {} open edges", object.report.open_edges));
+    }
+    let centre = t_cam_object * object.centre;
+    if centre.z <= 0.0 {
+        warnings.push(format!("the object is behind the camera (z = {:.3} m)", centre.z));
+        return warnings;
+    }
+    let rendered = depth_map(&observation.camera, &[(&object.model, *t_cam_object)]);
+    let hand = hand_depth(observation, robot);
+    let mut ratios = Vec::new();
+    let (mut overlap, mut union) = (0_usize, 0_usize);
+    let pixels = rendered.pixels().iter().zip(hand.pixels());
+    let observed = observation.depth.pixels().iter().zip(observation.mask.pixels());
+    for ((&object_z, &hand_z), (&sensor_z, &masked)) in pixels.zip(observed) {
+        let visible = object_z > 0.0 && (hand_z == 0.0 || object_z < hand_z);
+        overlap += usize::from(visible && masked);
+        union += usize::from(visible || masked);
+        if visible && masked && sensor_z > 0.0 {
+            ratios.push(sensor_z / object_z);
+        }
+    }
+    if overlap == 0 {
+        warnings.push("the object at this pose does not touch its mask: wrong frame or pose?".into());
+    } else if (overlap as f64) < 0.3 * union as f64 {
+        let share = 100.0 * overlap as f64 / union as f64;
+        warnings.push(format!("the object at this pose overlaps its mask by only {share:.0} %"));
+    }
+    ratios.sort_by(f32::total_cmp);
+    if let Some(&ratio) = ratios.get(ratios.len() / 2) {
+        if !(0.5..2.0).contains(&ratio) {
+            warnings.push(format!(
+                "sensor depth is {ratio:.3} times the depth at this pose: check depth_scale and units"
+            ));
+        }
+    }
+    warnings
+}

@@ -1,0 +1,55 @@
+//! What was sensed in one frame.
+
+use std::sync::Arc;
+
+use nalgebra::{Isometry3, Vector3};
+use prehend_geometry::hand::Taxel;
+use prehend_geometry::robot::{PosedRobot, Robot as KinematicTree, RobotShape};
+use prehend_render::{Camera, DepthImage, Mask, RgbImage};
+
+/// A robot hand: kinematics, shape and skin. Prepared once, shared by all frames.
+pub struct Robot {
+    /// Joints and links.
+    pub tree: KinematicTree,
+    /// Collision geometry with one cached distance grid a link.
+    pub shape: Arc<RobotShape>,
+    /// Tactile sensors, in link frames; empty without a skin.
+    pub taxels: Vec<Taxel>,
+}
+
+/// Where the hand is said to be, and what it feels.
+#[derive(Clone, Debug)]
+pub struct HandReading {
+    /// Hand base coordinates → camera coordinates \[m\].
+    pub t_cam_hand: Isometry3<f64>,
+    /// Joint positions in the order of the robot's joints \[rad\].
+    pub joints: Vec<f64>,
+    /// Force of the object on each taxel, in the taxel's link frame \[N\]; empty without a skin.
+    pub forces: Vec<Vector3<f64>>,
+}
+
+/// One segmented RGB-D frame, with the hand's state where it is known. All in the camera frame.
+#[derive(Clone, Debug)]
+pub struct Observation {
+    /// Intrinsics.
+    pub camera: Camera,
+    /// Colour image.
+    pub color: RgbImage,
+    /// Depth image \[m\], 0 where missing.
+    pub depth: DepthImage,
+    /// Pixels on the visible part of the object.
+    pub mask: Mask,
+    /// Gravitational acceleration \[m/s²\], where known.
+    pub gravity: Option<Vector3<f64>>,
+    /// The hand, where known.
+    pub hand: Option<HandReading>,
+}
+
+impl Robot {
+    /// The robot with its links where `joints` \[rad\] put them and its base at `t_cam_hand`.
+    pub fn posed(&self, t_cam_hand: &Isometry3<f64>, joints: &[f64]) -> PosedRobot {
+        let links = self.tree.forward_kinematics(joints);
+        let t_cam_links = links.iter().map(|t_hand_link| t_cam_hand * t_hand_link).collect();
+        PosedRobot::new(Arc::clone(&self.shape), t_cam_links)
+    }
+}

@@ -1,0 +1,57 @@
+//! Loss curves.
+
+use plotters::prelude::*;
+
+use crate::trace::Trace;
+
+/// Each term's value, relative to its first one, over the iterations, as an SVG document.
+///
+/// Empty if there is nothing to draw.
+pub(crate) fn loss_curves(trace: &Trace) -> String {
+    let mut svg = String::new();
+    // Drawing into memory fails only for a degenerate range; the page then goes without the chart.
+    if draw(trace, &mut svg).is_err() {
+        svg.clear();
+    }
+    svg
+}
+
+fn draw(trace: &Trace, svg: &mut String) -> Result<(), Box<dyn std::error::Error>> {
+    let last = trace.iterations.len().saturating_sub(1).max(1);
+    let curve = |term: usize| -> Vec<(f64, f64)> {
+        let first = trace.iterations.first().map_or(1.0, |i| i.values[term]);
+        let scale = 1.0 / first.max(f64::MIN_POSITIVE);
+        trace.iterations.iter().map(|i| (i.index as f64, i.values[term] * scale)).collect()
+    };
+    let curves: Vec<_> = (0..trace.terms.len()).map(curve).collect();
+    let top = curves.iter().flatten().map(|p| p.1).fold(1.0, f64::max).min(3.0);
+    let root = SVGBackend::with_string(svg, (640, 300)).into_drawing_area();
+    root.fill(&WHITE)?;
+    let mut chart = ChartBuilder::on(&root)
+        .margin(10)
+        .x_label_area_size(34)
+        .y_label_area_size(48)
+        .build_cartesian_2d(0.0..last as f64, 0.0..top * 1.05)?;
+    chart
+        .configure_mesh()
+        .light_line_style(WHITE)
+        .x_desc("iteration")
+        .y_desc("loss / initial loss")
+        .draw()?;
+    let colors = [RGBColor(31, 119, 180), RGBColor(214, 39, 40), RGBColor(44, 160, 44), RGBColor(148, 103, 189)];
+    for (i, (name, points)) in trace.terms.iter().zip(curves).enumerate() {
+        let color = colors[i % colors.len()];
+        chart
+            .draw_series(LineSeries::new(points, color.stroke_width(2)))?
+            .label(name)
+            .legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], color.stroke_width(2)));
+    }
+    chart
+        .configure_series_labels()
+        .position(SeriesLabelPosition::UpperRight)
+        .background_style(WHITE.mix(0.8))
+        .border_style(BLACK.mix(0.3))
+        .draw()?;
+    root.present()?;
+    Ok(())
+}

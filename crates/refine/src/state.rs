@@ -1,0 +1,59 @@
+//! What a solve may move: named blocks of parameters.
+
+use nalgebra::{Isometry3, Point3, Vector3, Vector6};
+use prehend_autodiff::lie::perturb_about;
+use prehend_render::Light;
+
+/// A named block of a [`State`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Block {
+    /// The object's pose: a left twist about its centre, in the camera frame \[m; rad\].
+    ObjectPose,
+    /// The hand's base pose: a left twist about the object's centre, in the camera frame \[m; rad\].
+    ///
+    /// About the object's centre because that is where an error of the camera–hand calibration acts.
+    HandPose,
+}
+
+impl Block {
+    /// Number of parameters.
+    pub fn dimension(self) -> usize {
+        match self {
+            Self::ObjectPose | Self::HandPose => 6,
+        }
+    }
+}
+
+/// A point in the space that terms are functions of.
+#[derive(Clone, Debug)]
+pub struct State {
+    /// Object coordinates → camera coordinates \[m\].
+    pub t_cam_object: Isometry3<f64>,
+    /// Centre of the object's bounding box, in object coordinates \[m\].
+    pub object_centre: Point3<f64>,
+    /// Hand base coordinates → camera coordinates \[m\].
+    pub t_cam_hand: Isometry3<f64>,
+    /// Light on the object, in the camera frame. Not a block: [`Term::refresh`](crate::Term::refresh)
+    /// solves for it in closed form.
+    pub light: Light,
+}
+
+impl State {
+    /// The object's centre in the camera frame \[m\]: the point that twists turn about.
+    pub fn centre(&self) -> Vector3<f64> {
+        (self.t_cam_object * self.object_centre).coords
+    }
+
+    /// The state with `block` moved by the left twist `delta` about [`centre`](Self::centre).
+    pub fn moved(&self, block: Block, delta: &Vector6<f64>) -> Self {
+        let mut state = self.clone();
+        let pose = match block {
+            Block::ObjectPose => &mut state.t_cam_object,
+            Block::HandPose => &mut state.t_cam_hand,
+        };
+        *pose = perturb_about(pose, &self.centre(), delta);
+        // Thousands of small steps must not let the quaternion drift off the unit sphere.
+        pose.rotation.renormalize();
+        state
+    }
+}

@@ -1,0 +1,128 @@
+//! The paper's heuristic: a candidate step along every gradient, weighed by what each one achieves.
+
+use nalgebra::{Matrix6, Vector6};
+
+use crate::trace::{Iteration, Trace};
+use crate::{Block, Normal, State, Term};
+
+/// Settings of the heuristic.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HeuristicSettings {
+    /// Iterations at most.
+    pub iterations: usize,
+    /// Length of the first candidate steps \[m\]; a rotation counts by how far it moves the object's surface.
+    pub first_step: f64,
+    /// The search ends when candidate steps have shrunk to this \[m\].
+    pub last_step: f64,
+    /// Always run all the iterations, even after nothing improves.
+    pub exhaustive: bool,
+}
+
+impl Default for HeuristicSettings {
+    fn default() -> Self {
+        Self { iterations: 400, first_step: 5e-3, last_step: 2e-6, exhaustive: false }
+    }
+}
+
+/// The paper's heuristic.
+///
+/// Each iteration takes one candidate step along the gradient of every term, measures the change ΔLᵢ of
+/// that term's own value, weighs it αᵢ ∝ max(0, −ΔLᵢ), Σαᵢ = 1, and applies the weighted sum of the steps.
+/// Three things that the paper leaves open are settled so:
+///
+/// - *Scales of the gradients.* A step is −(Hᵢ + μ)⁻¹ gᵢ with the term's own Gauss–Newton matrix Hᵢ, so
+///   translations and rotations of any term come out in the right proportion.
+/// - *Scales of the losses.* Terms are in nats ([`Term`]), so that ΔLᵢ of different terms compare.
+/// - *Step lengths.* Steps are at most a common length that grows by a little while the sum of the terms
+///   falls and shrinks when it rises. Without it the terms take turns in pulling the pose all the way to
+///   their own optimum, and the weights, which always sum to one, never let it rest.
+pub struct Heuristic {
+    /// Settings.
+    pub settings: HeuristicSettings,
+}
+
+impl Heuristic {
+    /// Walks from `state`, calling `visit` at every pose; `radius` is the object's \[m\].
+    ///
+    /// Ends when `visit` returns false.
+    pub fn run(
+        &self,
+        terms: &[Box<dyn Term>],
+        mut state: State,
+        radius: f64,
+        mut visit: impl FnMut(&State, &Iteration) -> bool,
+    ) -> Trace {
+        let settings = &self.settings;
+        let mut trace = Trace::new(terms.iter().map(|t| t.name()));
+        let mut length = settings.first_step;
+        let mut last_total = f64::INFINITY;
+        for index in 0..=settings.iterations {
+            terms.iter().for_each(|t| t.refresh(&mut state));
+            let candidates: Vec<Candidate> =
+                terms.iter().map(|t| Candidate::of(t.as_ref(), &state, radius, length)).collect();
+            let total: f64 = candidates.iter().map(|c| c.value).sum();
+            let gain: f64 = candidates.iter().map(Candidate::gain).sum();
+            let weights = candidates.iter().map(|c| if gain > 0.0 { c.gain() / gain } else { 0.0 });
+            let iteration = Iteration {
+                index,
+                values: candidates.iter().map(|c| c.value).collect(),
+                weights: weights.collect(),
+                step: length,
+            };
+            let go_on = visit(&state, &iteration);
+            let step: Vector6<f64> =
+                iteration.weights.iter().zip(&candidates).map(|(&a, c)| c.step * a).sum();
+            trace.iterations.push(iteration);
+            let done = gain <= 0.0 || length < settings.last_step;
+            if !go_on || (done && !settings.exhaustive) {
+                break;
+            }
+            length *= if total < last_total { 1.1 } else { 0.7 };
+            length = length.clamp(0.5 * settings.last_step, settings.first_step);
+            last_total = total;
+            state = state.moved(Block::ObjectPose, &step);
+        }
+        trace
+    }
+}
+
+/// A step along one term's gradient and what it does to that term.
+struct Candidate {
+    value: f64,
+    value_after: f64,
+    step: Vector6<f64>,
+}
+
+impl Candidate {
+    fn of(term: &dyn Term, state: &State, radius: f64, length: f64) -> Self {
+        let mut normal = Normal::new(&[Block::ObjectPose]);
+        let value = term.linearise(state, &mut normal);
+        let step = preconditioned_step(&normal, radius, length);
+        let value_after = term.value(&state.moved(Block::ObjectPose, &step));
+        Self { value, value_after, step }
+    }
+
+    /// How much the step improves the term's own value; 0 if it does not.
+    fn gain(&self) -> f64 {
+        let gain = self.value - self.value_after;
+        if gain.is_finite() { gain.max(0.0) } else { 0.0 }
+    }
+}
+
+/// −(H + μ diag)⁻¹ g in units where a radian counts `radius` metres, no longer than `length`.
+fn preconditioned_step(normal: &Normal, radius: f64, length: f64) -> Vector6<f64> {
+    let unit = Vector6::new(1.0, 1.0, 1.0, 1.0 / radius, 1.0 / radius, 1.0 / radius);
+    let gradient = Vector6::from_column_slice(normal.gradient().as_slice()).component_mul(&unit);
+    let hessian = Matrix6::from_column_slice(normal.hessian().as_slice());
+    let hessian = Matrix6::from_fn(|r, c| unit[r] * hessian[(r, c)] * unit[c]);
+    // Directions that the term says nothing about (a cylinder's spin) must not become long steps.
+    let damping = 1e-3 * hessian.trace() / 6.0 + f64::MIN_POSITIVE;
+    let step = (hessian + Matrix6::identity() * damping)
+        .cholesky()
+        .map_or_else(Vector6::zeros, |factor| -factor.solve(&gradient));
+    let norm = step.norm();
+    if !norm.is_finite() {
+        return Vector6::zeros();
+    }
+    (step * (length / norm).min(1.0)).component_mul(&unit)
+}

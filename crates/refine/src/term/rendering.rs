@@ -1,0 +1,130 @@
+//! Rendering: the difference between the segmented image and the object rendered at the pose.
+
+use std::sync::Arc;
+
+use nalgebra::Point3;
+use prehend_render::{ContourOptions, ContourRenderer, DepthImage, Light, Robust, Target};
+
+use super::Term;
+use crate::{Block, Normal, Object, Observation, RefineError, State};
+
+/// Settings of the rendering term.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RenderingSettings {
+    /// The image is made smaller by this factor.
+    pub downsample: usize,
+    /// Standard deviation of a colour, relative to the object's brightness in the image: exposure is
+    /// unknown, and a dark image is no better evidence than a bright one.
+    pub sigma: f64,
+    /// Standard deviation of the silhouette's coverage of a pixel (0..=1).
+    pub mask_sigma: f64,
+    /// Colour residual beyond which an outlier is forgiven, in standard deviations.
+    pub outlier: f64,
+    /// How many independent measurements the pixels amount to: the errors of shading, texture and
+    /// segmentation reach over whole patches.
+    pub effective_pixels: f64,
+    /// Pull of the estimated light towards the same from everywhere; see [`Light::fit`].
+    pub light_ridge: f64,
+}
+
+impl Default for RenderingSettings {
+    fn default() -> Self {
+        Self {
+            downsample: 2,
+            sigma: 0.15,
+            mask_sigma: 0.3,
+            outlier: 2.0,
+            effective_pixels: 200.0,
+            light_ridge: 1e-2,
+        }
+    }
+}
+
+/// The paper's L_DR with what it leaves open filled in.
+///
+/// Light: solved for in closed form at every pose ([`Term::refresh`]), because it is unknown. Hand: where
+/// it hides the object there is no residual. Silhouette: coverage is compared with the mask, so that an
+/// object as dark as the black outside the mask still has an outline.
+pub struct RenderingTerm {
+    object: Arc<Object>,
+    target: Target,
+    renderer: ContourRenderer,
+    /// Nats per unit of the renderer's loss.
+    scale: f64,
+    light_ridge: f64,
+}
+
+impl RenderingTerm {
+    /// Prepares the segmented image of `observation`; `hand` is the depth image of the hand alone.
+    ///
+    /// # Errors
+    /// If the images do not fit the camera or the mask is empty.
+    pub fn new(
+        observation: &Observation,
+        object: Arc<Object>,
+        hand: &DepthImage,
+        settings: RenderingSettings,
+    ) -> Result<Self, RefineError> {
+        let images = |e: prehend_render::TargetError| RefineError::Images(e.to_string());
+        let target = Target::new(observation.camera, &observation.color, &observation.mask)
+            .and_then(|t| t.with_occluder(hand.clone()))
+            .and_then(|t| t.downsampled(settings.downsample))
+            .map_err(images)?;
+        let sigma = settings.sigma * brightness(observation);
+        let options = ContourOptions {
+            mask_weight: (sigma / settings.mask_sigma).powi(2),
+            robust: Robust::Cauchy(settings.outlier * sigma),
+            ..ContourOptions::default()
+        };
+        Ok(Self {
+            object,
+            target,
+            renderer: ContourRenderer::new(options),
+            scale: 0.5 * settings.effective_pixels / (sigma * sigma),
+            light_ridge: settings.light_ridge,
+        })
+    }
+}
+
+/// Root mean square of the colours under the mask; never zero.
+fn brightness(observation: &Observation) -> f64 {
+    let pixels = observation.color.pixels().iter().zip(observation.mask.pixels());
+    let (sum, count) = pixels.filter(|(_, m)| **m).flat_map(|(c, _)| c).fold((0.0, 0.0), |(s, n), &v| {
+        (s + f64::from(v).powi(2), n + 1.0)
+    });
+    (sum / f64::max(count, 1.0)).sqrt().max(0.02)
+}
+
+impl Term for RenderingTerm {
+    fn name(&self) -> &'static str {
+        "rendering"
+    }
+
+    fn blocks(&self) -> &'static [Block] {
+        &[Block::ObjectPose]
+    }
+
+    fn value(&self, state: &State) -> f64 {
+        let model = &self.object.model;
+        let loss = self.renderer.evaluate(model, &state.t_cam_object, &state.light, &self.target);
+        self.scale * loss.total
+    }
+
+    fn linearise(&self, state: &State, normal: &mut Normal) -> f64 {
+        let centre = Point3::from(state.centre());
+        let model = &self.object.model;
+        let pose = &state.t_cam_object;
+        let at = self.renderer.linearise(model, pose, &centre, &state.light, &self.target);
+        normal.add(self.blocks(), &(at.gradient * self.scale), &(at.jtj * (2.0 * self.scale)));
+        self.scale * at.loss.total
+    }
+
+    fn refresh(&self, state: &mut State) {
+        let samples =
+            self.renderer.light_samples(&self.object.model, &state.t_cam_object, &self.target);
+        // With too little in view the light stays what it was.
+        if let Ok(light) = Light::fit(&samples, self.light_ridge) {
+            state.light = light;
+        }
+    }
+}
