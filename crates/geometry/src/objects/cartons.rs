@@ -31,7 +31,7 @@ pub(super) fn sugar(canvas: &mut Canvas, form: &Form) {
     canvas.ellipse(part(front, [0.04, 0.37, 0.96, 0.76]), NAVY);
     canvas.ellipse(part(front, [0.07, 0.385, 0.93, 0.745]), 0xffffff);
     canvas.text(part(front, [0.13, 0.50, 0.87, 0.64]), "SUGAR", NAVY);
-    canvas.text(part(front, [0.22, 0.665, 0.78, 0.71]), "PURE CANE", 0xd2232a);
+    canvas.text(part(front, [0.28, 0.655, 0.72, 0.695]), "PURE CANE", 0xd2232a);
     canvas.rectangle(part(front, [0.25, 0.455, 0.75, 0.465]), 0xd2232a);
     canvas.text(part(front, [0.12, 0.885, 0.88, 0.965]), "GOLDEN", 0xd2232a);
     for (k, color) in [0xffffff, 0xf4f0e6, 0xffffff].into_iter().enumerate() {
@@ -111,10 +111,10 @@ pub(super) fn gelatin(canvas: &mut Canvas, form: &Form) {
     const RED: u32 = 0xd3133a;
     let top = form.face(BoxFace::Top);
     let [x0, y0, x1, y1] = top;
-    canvas.shape(top, PINK, |x, y| (x - x0) / (x1 - x0) + (y - y0) / (y1 - y0) < 0.95);
+    canvas.shape(top, PINK, |x, y| (x - x0) / (x1 - x0) + (y - y0) / (y1 - y0) < 1.2);
     canvas.plate(part(top, [0.05, 0.66, 0.95, 0.94]), 3.0, 0xffffff);
     canvas.text(part(top, [0.1, 0.71, 0.9, 0.89]), "GELATIN", RED);
-    canvas.text(part(top, [0.5, 0.1, 0.94, 0.2]), "STRAWBERRY", 0xffffff);
+    canvas.text(part(top, [0.47, 0.06, 0.96, 0.16]), "STRAWBERRY", RED);
     for (fx, fy, r) in [(0.24, 0.36, 13.0), (0.55, 0.46, 9.0), (0.36, 0.12, 6.5)] {
         let (cx, cy) = (x0 + fx * (x1 - x0), y0 + fy * (y1 - y0));
         canvas.shape([cx - r, cy - 1.3 * r, cx + r, cy + r], 0xb30c2c, |x, y| {

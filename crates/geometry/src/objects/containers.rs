@@ -38,15 +38,15 @@ pub(super) fn soup(canvas: &mut Canvas, form: &Form) {
 
     let [girth, middle] = [form.sheet()[0], 0.5 * (label[1] + label[3])];
     let front = girth / 4.0;
-    canvas.text(part(label, [0.05, 0.72, 0.45, 0.94]), "TOMATO", 0xffffff);
+    canvas.text(part(label, [0.11, 0.72, 0.39, 0.92]), "TOMATO", 0xffffff);
     canvas.star([front, middle + 2.0], [14.5, 16.0], 28, GOLD);
     canvas.disc([front, middle + 2.0], 13.0, CREAM);
     canvas.disc([front, middle + 1.0], 9.0, 0xdf2b20);
     canvas.disc([front - 3.0, middle + 4.0], 2.2, 0xf37a5f);
     canvas.star([front, middle + 9.0], [1.6, 6.5], 5, 0x2e8b3d);
-    canvas.text(part(label, [0.09, 0.1, 0.41, 0.3]), "SOUP", RED);
+    canvas.text(part(label, [0.13, 0.1, 0.37, 0.3]), "SOUP", RED);
 
-    canvas.text(part(label, [0.58, 0.74, 0.9, 0.86]), "KITCHEN", CREAM);
+    canvas.text(part(label, [0.62, 0.75, 0.88, 0.88]), "KITCHEN", CREAM);
     canvas.small_print(part(label, [0.55, 0.1, 0.72, 0.46]), 9, 21, 0x5a1512);
     facts(canvas, part(label, [0.75, 0.09, 0.93, 0.47]), 0x3a1010, 22);
     canvas.bar_code(part(label, [0.63, 0.57, 0.85, 0.7]), 23);
@@ -63,10 +63,10 @@ pub(super) fn tuna(canvas: &mut Canvas, form: &Form) {
     canvas.rectangle(part(label, [0.0, 0.92, 1.0, 1.0]), 0xf6d34c);
     let girth = form.sheet()[0];
     let middle = 0.5 * (label[1] + label[3]);
-    canvas.plate(part(label, [0.10, 0.14, 0.32, 0.88]), 3.0, 0xffffff);
-    canvas.text(part(label, [0.12, 0.24, 0.30, 0.8]), "TUNA", BLUE);
+    canvas.plate(part(label, [0.13, 0.14, 0.33, 0.88]), 3.0, 0xffffff);
+    canvas.text(part(label, [0.145, 0.24, 0.315, 0.8]), "TUNA", BLUE);
     // A fish beside the name.
-    let x = 0.42 * girth;
+    let x = 0.43 * girth;
     canvas.ellipse([x - 15.0, middle - 5.0, x + 15.0, middle + 6.5], 0xe8eef2);
     canvas.shape([x + 11.0, middle - 6.0, x + 23.0, middle + 7.5], 0xe8eef2, |px, py| {
         (py - middle - 0.7).abs() < 0.55 * (px - x - 10.0)
@@ -94,7 +94,7 @@ pub(super) fn potted_meat(canvas: &mut Canvas, form: &Form) {
     canvas.rectangle(part(label, [0.0, 0.0, 1.0, 0.10]), YELLOW);
     canvas.rectangle(part(label, [0.0, 0.10, 1.0, 0.125]), 0xc4202c);
 
-    canvas.text(part(label, [0.05, 0.62, 0.45, 0.92]), "LUNCH", YELLOW);
+    canvas.text(part(label, [0.09, 0.62, 0.41, 0.92]), "LUNCH", YELLOW);
     canvas.plate(part(label, [0.07, 0.18, 0.43, 0.56]), 5.0, 0xf7e9d2);
     let plate = part(label, [0.07, 0.18, 0.43, 0.56]);
     let (x, y) = (0.5 * (plate[0] + plate[2]), 0.5 * (plate[1] + plate[3]));
@@ -107,7 +107,7 @@ pub(super) fn potted_meat(canvas: &mut Canvas, form: &Form) {
     canvas.star([x + 6.0, y - 6.0], [2.0, 7.0], 6, 0x3a9a43);
     canvas.text([x + 15.0, y - 5.0, plate[2] - 2.0, y + 6.0], "MEAT", 0xc4202c);
 
-    canvas.text(part(label, [0.56, 0.72, 0.80, 0.88]), "CLASSIC", 0xffffff);
+    canvas.text(part(label, [0.57, 0.72, 0.755, 0.88]), "CLASSIC", 0xffffff);
     canvas.small_print(part(label, [0.56, 0.2, 0.74, 0.64]), 9, 27, 0xdfe5ff);
     facts(canvas, part(label, [0.78, 0.2, 0.93, 0.88]), BLUE, 28);
     canvas.bar_code(part(label, [0.465, 0.3, 0.535, 0.7]), 29);
@@ -124,7 +124,7 @@ pub(super) fn mustard(canvas: &mut Canvas, form: &Form) {
     canvas.plate(part(front, [0.05, 0.05, 0.95, 0.95]), 9.0, YELLOW);
     canvas.plate(part(front, [0.05, 0.46, 0.95, 0.78]), 4.0, RED);
     canvas.text(part(front, [0.1, 0.52, 0.9, 0.72]), "MUSTARD", 0xffffff);
-    canvas.text(part(front, [0.2, 0.81, 0.8, 0.91]), "CLASSIC", GREEN);
+    canvas.text(part(front, [0.24, 0.81, 0.76, 0.91]), "CLASSIC", GREEN);
     // A flag-like pennant and a mustard flower.
     canvas.rectangle(part(front, [0.05, 0.39, 0.95, 0.43]), GREEN);
     let (x, y) = (front[0] + 0.3 * (front[2] - front[0]), front[1] + 0.22 * (front[3] - front[1]));
@@ -168,7 +168,7 @@ pub(super) fn bleach(canvas: &mut Canvas, form: &Form) {
         let edge = 0.30 + 0.14 * (4.0 * u).sin();
         v < edge + 0.03 && v > edge && u > 0.03 && u < 0.97
     });
-    canvas.text(part(front, [0.08, 0.56, 0.92, 0.78]), "BLEACH", 0xffffff);
+    canvas.text(part(front, [0.15, 0.57, 0.85, 0.77]), "BLEACH", 0xffffff);
     canvas.text(part(front, [0.2, 0.83, 0.8, 0.93]), "CLEANSER", 0xffe14a);
     let star = [front[0] + 0.73 * (front[2] - front[0]), front[1] + 0.2 * (front[3] - front[1])];
     canvas.star(star, [11.0, 17.0], 14, 0xffe14a);

@@ -105,10 +105,15 @@ impl Canvas {
         let x0 = 0.5 * (area[0] + area[2] - columns * block);
         let top = 0.5 * (area[1] + area[3] + 7.0 * block);
         let cells: Vec<[u8; 7]> = text.chars().map(glyph).collect();
-        self.shape([x0, top - 7.0 * block, x0 + columns * block, top], color, |x, y| {
-            let (column, row) = (((x - x0) / block) as usize, ((top - y) / block) as usize);
+        let set = |x: f64, y: f64| {
+            let (column, row) = ((x / block).floor() as usize, (y / block).floor() as usize);
             let bits = cells.get(column / 6).and_then(|g| g.get(row)).copied().unwrap_or(0);
-            column % 6 < 5 && bits >> (4 - column % 6) & 1 == 1
+            x >= 0.0 && column % 6 < 5 && bits >> (4 - column % 6) & 1 == 1
+        };
+        // Strokes are drawn a little wider than their blocks, as in a bold type.
+        let bold = 0.4 * block;
+        self.shape([x0, top - 7.0 * block, x0 + columns * block + bold, top], color, |x, y| {
+            set(x - x0, top - y) || set(x - x0 - bold, top - y)
         });
     }
 
@@ -207,7 +212,7 @@ mod tests {
         let mut canvas = Canvas::new([11.0, 7.0], 11, 0x000000);
         canvas.text([0.0, 0.0, 11.0, 7.0], "LT", 0xffffff);
         let rows: Vec<String> = (canvas.into_texture().pixels.chunks(11))
-            .map(|row| row.iter().map(|p| if p[0] > 0 { '#' } else { '.' }).collect())
+            .map(|row| row.iter().map(|p| if p[0] > 127 { '#' } else { '.' }).collect())
             .collect();
         assert_eq!((rows[0].as_str(), rows[6].as_str()), ("#.....#####", "#####...#.."));
     }

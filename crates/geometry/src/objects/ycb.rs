@@ -47,7 +47,7 @@ struct Entry {
 }
 
 /// Pixels along the longer side of a texture.
-const TEXTURE_PIXELS: usize = 640;
+const TEXTURE_PIXELS: usize = 768;
 
 impl YcbObject {
     /// Every built-in object.
@@ -292,11 +292,7 @@ mod tests {
             }
             let cm3 = closed_volume(&mesh) * 1e6;
             assert!((cm3 / volume - 1.0).abs() < 0.04, "{name}: {cm3} cm³, measured {volume}");
-            assert!(
-                (400..8_000).contains(&mesh.faces.len()),
-                "{name}: {} faces",
-                mesh.faces.len()
-            );
+            assert!((400..8_000).contains(&mesh.faces.len()), "{name}: {} faces", mesh.faces.len());
         }
     }
 
