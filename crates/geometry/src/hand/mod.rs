@@ -4,9 +4,13 @@
 //! towards the index finger. Joints 0–3 move the index finger, 4–7 the middle, 8–11 the ring, 12–15 the thumb.
 
 mod allegro;
+mod grasp;
+#[cfg(test)]
+mod posed;
 mod taxel_csv;
 mod taxels;
 
 pub use allegro::{JOINT_COUNT, JOINT_NAMES, allegro_xela_urdf};
+pub use grasp::{Grasp, default_grasp};
 pub use taxel_csv::{TaxelError, load_taxels};
 pub use taxels::{Taxel, taxels};
