@@ -4,6 +4,7 @@ mod cartons;
 mod containers;
 mod forms;
 mod lettering;
+mod outlines;
 mod paint;
 mod ycb;
 

@@ -132,7 +132,7 @@ pub fn rounded_box(shape: &RoundedBox) -> TriMesh {
 /// Coordinates of the grid lines on one axis, symmetric about zero.
 fn axis_stops(half: f64, radius: f64, arc_steps: usize, cell: f64) -> Vec<f64> {
     let inner = half - radius;
-    let cells = (2.0 * inner / cell).ceil().clamp(1.0, 1e4) as usize;
+    let cells = ((2.0 * inner / cell).ceil() as usize).clamp(1, 10_000);
     let steps = if radius > 0.0 { arc_steps.max(1) } else { 0 };
     // Equal angles across the rounding: a point at tan(a)·radius beyond the flat part is bent to angle a.
     let bend = |k: usize| match k {

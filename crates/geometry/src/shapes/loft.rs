@@ -128,7 +128,7 @@ pub fn subdivided(sections: &[Section], step: f64) -> Vec<Section> {
     let mut rows = Vec::from_iter(sections.first().copied());
     for pair in sections.windows(2) {
         let length = (pair[1].z - pair[0].z).hypot(pair[1].radius() - pair[0].radius());
-        let parts = (length / step).ceil().clamp(1.0, 1e4) as usize;
+        let parts = ((length / step).ceil() as usize).clamp(1, 10_000);
         rows.extend((1..=parts).map(|i| pair[0].mix(&pair[1], i as f64 / parts as f64)));
     }
     rows
