@@ -1,7 +1,10 @@
 //! Meshes, closest points, signed distance grids, kinematics and exact volumes.
 
 mod field;
+pub mod hand;
 mod mesh;
+pub mod objects;
+pub mod shapes;
 
 mod clean;
 mod io;
