@@ -1,0 +1,82 @@
+//! What can be wrong with a mesh file.
+
+use std::path::{Path, PathBuf};
+
+/// Why a mesh could not be read or written; every variant names the file.
+#[derive(Debug, thiserror::Error)]
+pub enum MeshError {
+    /// The file could not be opened or read.
+    #[error("{path}: cannot be read: {source}")]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The file could not be written; nothing was left behind.
+    #[error("{path}: cannot be written: {source}")]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The extension is none of ply, obj, stl, gltf, glb.
+    #[error("{path}: not a known mesh format (expected .ply, .obj, .stl, .gltf or .glb)")]
+    UnknownFormat {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The file contradicts its format or itself.
+    #[error("{path}: {element}: {reason}")]
+    Malformed {
+        /// The file.
+        path: PathBuf,
+        /// The element or field, such as `vertex 12` or `header`.
+        element: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// The file uses a part of its format that is not read here.
+    #[error("{path}: {feature} not supported")]
+    Unsupported {
+        /// The file.
+        path: PathBuf,
+        /// The feature.
+        feature: String,
+    },
+    /// A texture that the mesh names is missing, outside its folder or not an image.
+    #[error("{path}: texture {texture}: {reason}")]
+    Texture {
+        /// The mesh file.
+        path: PathBuf,
+        /// The texture as the mesh names it.
+        texture: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// The file holds no triangles.
+    #[error("{path}: the mesh is empty: {vertices} vertices, {faces} faces")]
+    Empty {
+        /// The file.
+        path: PathBuf,
+        /// Vertices found.
+        vertices: usize,
+        /// Triangles found.
+        faces: usize,
+    },
+}
+
+impl MeshError {
+    pub(super) fn malformed(
+        path: &Path,
+        element: impl Into<String>,
+        reason: impl ToString,
+    ) -> Self {
+        Self::Malformed { path: path.into(), element: element.into(), reason: reason.to_string() }
+    }
+
+    pub(super) fn texture(path: &Path, texture: impl Into<String>, reason: impl ToString) -> Self {
+        Self::Texture { path: path.into(), texture: texture.into(), reason: reason.to_string() }
+    }
+}

@@ -1,0 +1,476 @@
+//! glTF 2.0 and GLB: triangles, node transforms, base-colour textures (embedded or beside the file).
+//!
+//! The colour factor of a textured material is not applied. Accessors are decoded here, since the `gltf` crate's own readers panic on malformed ones.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+use std::sync::Arc;
+
+use ::gltf::accessor::DataType;
+use ::gltf::mesh::Mode;
+use ::gltf::{Accessor, Gltf, Node, Primitive, Semantic, buffer, image};
+use nalgebra::{Matrix4, Point3, Vector3};
+
+use super::parts::{Part, join};
+use super::{MeshError, base64, companion, texture};
+use crate::{Texture, TriMesh};
+
+pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshError> {
+    check_container(bytes).map_err(|e| MeshError::malformed(path, "glb header", e))?;
+    let mut gltf =
+        Gltf::from_slice(bytes).map_err(|e| MeshError::malformed(path, "document", e))?;
+    if let Some(required) = gltf.extensions_required().find(|e| !e.starts_with("KHR_materials_")) {
+        return Err(MeshError::Unsupported {
+            path: path.into(),
+            feature: format!("extension {required}"),
+        });
+    }
+    let blob = gltf.blob.take();
+    let buffers =
+        gltf.buffers().map(|b| load_buffer(&b, blob.as_deref(), path)).collect::<Result<_, _>>()?;
+    let mut reader = Reader {
+        path,
+        buffers,
+        images: BTreeMap::new(),
+        parts: Vec::new(),
+        visited: BTreeSet::new(),
+    };
+    let scene = gltf.default_scene().or_else(|| gltf.scenes().next());
+    let scene =
+        scene.ok_or_else(|| MeshError::malformed(path, "scenes", "the file has no scene"))?;
+    for node in scene.nodes() {
+        reader.node(&node, &Matrix4::identity())?;
+    }
+    join(reader.parts, path)
+}
+
+/// The crate trusts the length field of a GLB header to be at least that of the header.
+fn check_container(bytes: &[u8]) -> Result<(), &'static str> {
+    if !bytes.starts_with(b"glTF") {
+        return Ok(());
+    }
+    let length = bytes
+        .get(8..12)
+        .and_then(|b| b.try_into().ok())
+        .map(u32::from_le_bytes)
+        .ok_or("truncated")?;
+    if length < 12 || length as usize > bytes.len() {
+        Err("length does not fit the file")
+    } else {
+        Ok(())
+    }
+}
+
+/// The bytes behind `uri`: a `data:` URI or a file in the folder of the mesh.
+fn fetch(uri: &str, path: &Path) -> Result<Vec<u8>, String> {
+    if let Some(data) = uri.strip_prefix("data:") {
+        let (_, text) = data.split_once(";base64,").ok_or("a data URI that is not base64")?;
+        return base64::decode(text).ok_or_else(|| "broken base64".into());
+    }
+    let file = companion(path, &percent_decoded(uri))?;
+    std::fs::read(file).map_err(|e| e.to_string())
+}
+
+fn percent_decoded(uri: &str) -> String {
+    let (mut out, mut rest) = (Vec::new(), uri.as_bytes());
+    while let Some((&first, tail)) = rest.split_first() {
+        let hex = tail
+            .get(..2)
+            .and_then(|h| std::str::from_utf8(h).ok())
+            .and_then(|h| u8::from_str_radix(h, 16).ok());
+        match (first, hex) {
+            (b'%', Some(byte)) => {
+                out.push(byte);
+                rest = &tail[2..];
+            }
+            _ => {
+                out.push(first);
+                rest = tail;
+            }
+        }
+    }
+    String::from_utf8_lossy(&out).into_owned()
+}
+
+fn load_buffer(
+    buffer: &buffer::Buffer,
+    blob: Option<&[u8]>,
+    path: &Path,
+) -> Result<Vec<u8>, MeshError> {
+    let bad =
+        |reason: String| MeshError::malformed(path, format!("buffer {}", buffer.index()), reason);
+    let bytes = match buffer.source() {
+        buffer::Source::Bin => blob.ok_or_else(|| bad("no binary chunk".into()))?.to_vec(),
+        buffer::Source::Uri(uri) => fetch(uri, path).map_err(|e| {
+            let shown: String = uri.chars().take(64).collect();
+            bad(format!("{shown}: {e}"))
+        })?,
+    };
+    if bytes.len() < buffer.length() {
+        return Err(bad(format!("{} bytes of {}", bytes.len(), buffer.length())));
+    }
+    Ok(bytes)
+}
+
+struct Reader<'a> {
+    path: &'a Path,
+    buffers: Vec<Vec<u8>>,
+    images: BTreeMap<usize, Arc<Texture>>,
+    parts: Vec<Part>,
+    visited: BTreeSet<usize>,
+}
+
+impl Reader<'_> {
+    fn node(&mut self, node: &Node, t_scene_parent: &Matrix4<f64>) -> Result<(), MeshError> {
+        let bad = |reason: &str| {
+            MeshError::malformed(self.path, format!("node {}", node.index()), reason)
+        };
+        // Nodes form a tree; a cycle would recurse without end. The bound keeps the stack small.
+        if !self.visited.insert(node.index()) {
+            return Err(bad("reached twice"));
+        }
+        if self.visited.len() > 100_000 {
+            return Err(bad("too many nodes"));
+        }
+        let local = Matrix4::from(node.transform().matrix()).map(f64::from);
+        let t_scene_node = t_scene_parent * local;
+        for primitive in node.mesh().iter().flat_map(|m| m.primitives()) {
+            self.primitive(&primitive, &t_scene_node)?;
+        }
+        node.children().try_for_each(|child| self.node(&child, &t_scene_node))
+    }
+
+    fn primitive(
+        &mut self,
+        primitive: &Primitive,
+        t_scene_node: &Matrix4<f64>,
+    ) -> Result<(), MeshError> {
+        let Some(positions) = primitive.get(&Semantic::Positions) else { return Ok(()) };
+        let positions = self.floats::<3>(&positions)?;
+        let indices = match primitive.indices() {
+            Some(accessor) => self.floats_as(&accessor, 1, |v| v[0] as u32)?,
+            None => (0..positions.len() as u32).collect(),
+        };
+        let mut faces = match primitive.mode() {
+            Mode::Triangles => {
+                indices.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect::<Vec<_>>()
+            }
+            // Every other triangle of a strip runs the other way round.
+            Mode::TriangleStrip => {
+                let alternate = |(k, w): (usize, &[u32])| {
+                    if k % 2 == 0 { [w[0], w[1], w[2]] } else { [w[1], w[0], w[2]] }
+                };
+                indices.windows(3).enumerate().map(alternate).collect()
+            }
+            Mode::TriangleFan => {
+                indices.windows(2).skip(1).map(|w| [indices[0], w[0], w[1]]).collect()
+            }
+            Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip => return Ok(()),
+        };
+        let linear = t_scene_node.fixed_view::<3, 3>(0, 0).into_owned();
+        let mirrored = linear.determinant() < 0.0;
+        if mirrored {
+            faces.iter_mut().for_each(|f| f.swap(1, 2));
+        }
+        let place = |p: &[f32; 3]| t_scene_node.transform_point(&Point3::from(p.map(f64::from)));
+        let mut mesh = TriMesh::new(positions.iter().map(place).collect(), faces);
+        // A primitive's indices count from its own first vertex: check before it joins the others.
+        let n = positions.len();
+        if let Some(face) = mesh.faces.iter().position(|f| f.iter().any(|&v| v as usize >= n)) {
+            let element = format!("face {face} of part {}", self.parts.len());
+            return Err(MeshError::malformed(
+                self.path,
+                element,
+                format!("vertex index out of range ({n} vertices)"),
+            ));
+        }
+        if let (Some(accessor), Some(inverse)) =
+            (primitive.get(&Semantic::Normals), linear.try_inverse())
+        {
+            // Normals turn by the inverse transpose; the caller brings them back to unit length.
+            let turn = inverse.transpose();
+            let normals = self.floats::<3>(&accessor)?;
+            let normals = normals.iter().map(|n| turn * Vector3::from(n.map(f64::from))).collect();
+            mesh.normals = self.one_each(normals, n, "NORMAL")?;
+        }
+        if let Some(accessor) = primitive.get(&Semantic::Colors(0)) {
+            mesh.colors = self.one_each(self.floats::<3>(&accessor)?, n, "COLOR_0")?;
+        }
+        let pbr = primitive.material().pbr_metallic_roughness();
+        let [r, g, b, _] = pbr.base_color_factor();
+        let mut part = Part { mesh, texture: None, color: [r, g, b] };
+        if let Some(info) = pbr.base_color_texture() {
+            let image = info.texture().source();
+            part.texture = Some(self.image(&image)?);
+            if let Some(accessor) = primitive.get(&Semantic::TexCoords(info.tex_coord())) {
+                // glTF measures v from the top of the image.
+                let uvs = self.floats::<2>(&accessor)?.iter().map(|[u, v]| [*u, 1.0 - v]).collect();
+                part.mesh.uvs = self.one_each(uvs, n, "TEXCOORD")?;
+            }
+        }
+        self.parts.push(part);
+        Ok(())
+    }
+
+    fn one_each<T>(
+        &self,
+        values: Vec<T>,
+        vertices: usize,
+        name: &str,
+    ) -> Result<Option<Vec<T>>, MeshError> {
+        if values.len() != vertices {
+            let reason = format!("{} values for {vertices} vertices", values.len());
+            return Err(MeshError::malformed(
+                self.path,
+                format!("{name} of part {}", self.parts.len()),
+                reason,
+            ));
+        }
+        Ok(Some(values))
+    }
+
+    fn image(&mut self, image: &image::Image) -> Result<Arc<Texture>, MeshError> {
+        if let Some(known) = self.images.get(&image.index()) {
+            return Ok(known.clone());
+        }
+        let texture = match image.source() {
+            image::Source::View { view, .. } => {
+                let name = format!("image {}", image.index());
+                let bytes = self
+                    .view(&view)
+                    .ok_or_else(|| MeshError::texture(self.path, &name, "outside its buffer"))?;
+                texture::decode(bytes, self.path, &name)?
+            }
+            image::Source::Uri { uri, .. } => {
+                let name: String = uri.chars().take(64).collect();
+                let bytes =
+                    fetch(uri, self.path).map_err(|e| MeshError::texture(self.path, &name, e))?;
+                texture::decode(&bytes, self.path, &name)?
+            }
+        };
+        let texture = Arc::new(texture);
+        self.images.insert(image.index(), texture.clone());
+        Ok(texture)
+    }
+
+    fn view(&self, view: &buffer::View) -> Option<&[u8]> {
+        let end = view.offset().checked_add(view.length())?;
+        self.buffers.get(view.buffer().index())?.get(view.offset()..end)
+    }
+
+    fn floats<const N: usize>(&self, accessor: &Accessor) -> Result<Vec<[f32; N]>, MeshError> {
+        self.floats_as(accessor, N, |v| {
+            let mut out = [0.0; N];
+            out.iter_mut().zip(v).for_each(|(o, c)| *o = *c as f32);
+            out
+        })
+    }
+
+    /// The accessor's elements, each of at least `width` components, normalised integers in 0..=1 or −1..=1.
+    fn floats_as<T>(
+        &self,
+        accessor: &Accessor,
+        width: usize,
+        f: impl Fn(&[f64]) -> T,
+    ) -> Result<Vec<T>, MeshError> {
+        let bad = |reason: &str| {
+            MeshError::malformed(self.path, format!("accessor {}", accessor.index()), reason)
+        };
+        if accessor.sparse().is_some() {
+            return Err(MeshError::Unsupported {
+                path: self.path.into(),
+                feature: "sparse accessors".into(),
+            });
+        }
+        let components = accessor.dimensions().multiplicity();
+        if components < width {
+            return Err(bad("too few components"));
+        }
+        let number = accessor.data_type();
+        let (size, element) = (number.size(), number.size() * components);
+        let view = accessor.view().ok_or_else(|| bad("no buffer view"))?;
+        let stride = view.stride().unwrap_or(element);
+        let bytes = self
+            .view(&view)
+            .and_then(|v| v.get(accessor.offset()..))
+            .ok_or_else(|| bad("outside its buffer"))?;
+        let needed = match accessor.count() {
+            0 => Some(0),
+            n => (n - 1).checked_mul(stride).and_then(|b| b.checked_add(element)),
+        };
+        if needed.is_none_or(|n| n > bytes.len()) {
+            return Err(bad("outside its buffer view"));
+        }
+        let mut values = vec![0.0; components];
+        let read = |i: usize| {
+            for (k, value) in values.iter_mut().enumerate() {
+                let at = i * stride + k * size;
+                *value = component(&bytes[at..at + size], number, accessor.normalized());
+            }
+            f(&values)
+        };
+        Ok((0..accessor.count()).map(read).collect())
+    }
+}
+
+fn component(bytes: &[u8], number: DataType, normalized: bool) -> f64 {
+    let at = |k: usize| bytes.get(k).copied().unwrap_or_default();
+    let (value, full) = match number {
+        DataType::I8 => (f64::from(at(0) as i8), 127.0),
+        DataType::U8 => (f64::from(at(0)), 255.0),
+        DataType::I16 => (f64::from(i16::from_le_bytes([at(0), at(1)])), 32767.0),
+        DataType::U16 => (f64::from(u16::from_le_bytes([at(0), at(1)])), 65535.0),
+        DataType::U32 => {
+            (f64::from(u32::from_le_bytes([at(0), at(1), at(2), at(3)])), f64::from(u32::MAX))
+        }
+        DataType::F32 => (f64::from(f32::from_le_bytes([at(0), at(1), at(2), at(3)])), 1.0),
+    };
+    if normalized { (value / full).max(-1.0) } else { value }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A triangle under a node that doubles, mirrors in x and moves; `image` as its base colour.
+    fn document(image: &str, buffer_uri: &str, buffer_length: usize) -> String {
+        let uri = if buffer_uri.is_empty() {
+            String::new()
+        } else {
+            format!(r#""uri": "{buffer_uri}","#)
+        };
+        format!(
+            r#"{{"asset": {{"version": "2.0"}}, "scene": 0, "scenes": [{{"nodes": [0]}}],
+            "nodes": [{{"children": [1], "translation": [10, 0, 0]}}, {{"mesh": 0, "scale": [-2, 2, 2]}}],
+            "meshes": [{{"primitives": [
+                {{"attributes": {{"POSITION": 0, "TEXCOORD_0": 1}}, "indices": 2, "material": 0}},
+                {{"attributes": {{"POSITION": 0, "TEXCOORD_0": 1}}, "mode": 5, "material": 0}}]}}],
+            "materials": [{{"pbrMetallicRoughness": {{"baseColorTexture": {{"index": 0}}}}}}],
+            "textures": [{{"source": 0}}], "images": [{image}],
+            "buffers": [{{{uri} "byteLength": {buffer_length}}}],
+            "bufferViews": [{{"buffer": 0, "byteLength": 36}}, {{"buffer": 0, "byteOffset": 36, "byteLength": 12}},
+                {{"buffer": 0, "byteOffset": 48, "byteLength": 6}},
+                {{"buffer": 0, "byteOffset": 56, "byteLength": {}}}],
+            "accessors": [
+                {{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0,0,0], "max": [1,1,0]}},
+                {{"bufferView": 1, "componentType": 5123, "normalized": true, "count": 3, "type": "VEC2"}},
+                {{"bufferView": 2, "componentType": 5123, "count": 3, "type": "SCALAR"}}]}}"#,
+            buffer_length.saturating_sub(56)
+        )
+    }
+
+    fn payload() -> Vec<u8> {
+        let mut bytes = Vec::new();
+        [0.0_f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]
+            .iter()
+            .for_each(|c| bytes.extend(c.to_le_bytes()));
+        [0_u16, 0, 65535, 0, 0, 65535].iter().for_each(|c| bytes.extend(c.to_le_bytes()));
+        [0_u16, 1, 2, 0].iter().for_each(|c| bytes.extend(c.to_le_bytes()));
+        bytes.extend(texture().encode_png().unwrap());
+        bytes
+    }
+
+    fn texture() -> Texture {
+        Texture { width: 2, height: 1, pixels: vec![[1, 2, 3], [200, 100, 50]] }
+    }
+
+    fn glb(json: &str, bin: &[u8]) -> Vec<u8> {
+        let (mut json, mut bin) = (json.as_bytes().to_vec(), bin.to_vec());
+        json.resize(json.len().next_multiple_of(4), b' ');
+        bin.resize(bin.len().next_multiple_of(4), 0);
+        let mut out = b"glTF\x02\0\0\0".to_vec();
+        out.extend((28 + json.len() as u32 + bin.len() as u32).to_le_bytes());
+        for (kind, chunk) in [(b"JSON", &json), (b"BIN\0", &bin)] {
+            out.extend((chunk.len() as u32).to_le_bytes());
+            out.extend(kind);
+            out.extend(chunk);
+        }
+        out
+    }
+
+    fn embedded() -> Vec<u8> {
+        let bin = payload();
+        glb(&document(r#"{"bufferView": 3, "mimeType": "image/png"}"#, "", bin.len()), &bin)
+    }
+
+    fn check(mesh: &TriMesh) {
+        assert_eq!(
+            mesh.vertices[..3],
+            [Point3::new(10.0, 0.0, 0.0), Point3::new(8.0, 0.0, 0.0), Point3::new(10.0, 2.0, 0.0)]
+        );
+        // The mirror reverses the winding, so that the face still looks along +z.
+        assert_eq!(mesh.faces, [[0, 2, 1], [3, 5, 4]]);
+        assert!(mesh.area_vector(0).z > 0.0);
+        assert_eq!(mesh.uvs.as_ref().unwrap()[..3], [[0.0, 1.0], [1.0, 1.0], [0.0, 0.0]]);
+        assert_eq!(**mesh.texture.as_ref().unwrap(), texture());
+    }
+
+    #[test]
+    fn glb_with_embedded_image() {
+        check(&TriMesh::from_bytes(&embedded(), Path::new("m.glb")).unwrap());
+    }
+
+    #[test]
+    fn gltf_with_files_beside_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("m.gltf");
+        let bin = payload();
+        let json = document(r#"{"uri": "my%20tex.png"}"#, "b.bin", bin.len());
+        let error = TriMesh::from_bytes(json.as_bytes(), &path).unwrap_err().to_string();
+        assert!(error.contains("buffer 0: b.bin"), "{error}");
+        std::fs::write(folder.path().join("b.bin"), &bin).unwrap();
+        let error = TriMesh::from_bytes(json.as_bytes(), &path).unwrap_err().to_string();
+        assert!(error.contains("texture my%20tex.png"), "{error}");
+        std::fs::write(folder.path().join("my tex.png"), texture().encode_png().unwrap()).unwrap();
+        check(&TriMesh::from_bytes(json.as_bytes(), &path).unwrap());
+        std::fs::write(folder.path().join("b.bin"), &bin[..40]).unwrap();
+        assert!(
+            TriMesh::from_bytes(json.as_bytes(), &path)
+                .unwrap_err()
+                .to_string()
+                .contains("buffer 0: 40 bytes")
+        );
+    }
+
+    #[test]
+    fn malformed_files_are_errors() {
+        let path = Path::new("m.glb");
+        let good = embedded();
+        for n in (0..good.len() - 4).step_by(7) {
+            assert!(TriMesh::from_bytes(&good[..n], path).is_err(), "{n}");
+        }
+        let mut short = good.clone();
+        short[8..12].copy_from_slice(&3_u32.to_le_bytes());
+        assert!(TriMesh::from_bytes(&short, path).unwrap_err().to_string().contains("glb header"));
+        let bin = payload();
+        let json = document(r#"{"bufferView": 3, "mimeType": "image/png"}"#, "", bin.len());
+        let broken = |from: &str, to: &str, says: &str| {
+            assert!(json.contains(from), "{from}");
+            let error = TriMesh::from_bytes(&glb(&json.replace(from, to), &bin), path)
+                .unwrap_err()
+                .to_string();
+            assert!(error.contains(says), "{error} / {says}");
+        };
+        broken(
+            r#""count": 3, "type": "VEC3""#,
+            r#""count": 4, "type": "VEC3""#,
+            "accessor 0: outside",
+        );
+        broken(
+            r#""count": 3, "type": "VEC3""#,
+            r#""count": 18446744073709551615, "type": "VEC3""#,
+            "accessor 0: outside",
+        );
+        broken(r#""children": [1]"#, r#""children": [1, 0]"#, "reached twice");
+        broken(r#""scenes": [{"nodes": [0]}]"#, r#""scenes": [{"nodes": [7]}]"#, "document");
+        broken(
+            r#""byteOffset": 36, "byteLength": 12"#,
+            r#""byteOffset": 4000, "byteLength": 12"#,
+            "accessor 1: outside",
+        );
+        let mut far = bin.clone();
+        far[48] = 9;
+        let error = TriMesh::from_bytes(&glb(&json, &far), path).unwrap_err().to_string();
+        assert!(error.contains("face 0 of part 0: vertex index out of range"), "{error}");
+    }
+}

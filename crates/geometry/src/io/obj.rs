@@ -1,0 +1,177 @@
+//! Wavefront OBJ with MTL materials, through `tobj` (coordinates in single precision).
+
+use std::collections::BTreeMap;
+use std::io::Cursor;
+use std::path::Path;
+use std::sync::Arc;
+
+use nalgebra::{Point3, Vector3};
+use tobj::{LoadError, LoadOptions, Material, Mesh};
+
+use super::parts::{Part, join};
+use super::{MeshError, companion, texture};
+use crate::{Texture, TriMesh};
+
+pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshError> {
+    let options = LoadOptions {
+        single_index: true,
+        triangulate: true,
+        ignore_points: true,
+        ignore_lines: true,
+    };
+    let material_file = std::cell::RefCell::new(String::new());
+    let (models, materials) = tobj::load_obj_buf(&mut Cursor::new(bytes), &options, |name| {
+        *material_file.borrow_mut() = name.display().to_string();
+        let file =
+            companion(path, &name.to_string_lossy()).map_err(|_| LoadError::OpenFileFailed)?;
+        let content = std::fs::read(file).map_err(|_| LoadError::OpenFileFailed)?;
+        tobj::load_mtl_buf(&mut Cursor::new(content))
+    })
+    .map_err(|e| MeshError::malformed(path, "content", e))?;
+    let textured = models.iter().any(|m| !m.mesh.texcoords.is_empty());
+    let materials = match materials {
+        Ok(materials) => materials,
+        // Collision meshes often name materials that were never shipped; without UVs nothing is lost.
+        Err(_) if !textured => Vec::new(),
+        Err(e) => {
+            return Err(MeshError::malformed(
+                path,
+                format!("mtllib {}", material_file.borrow()),
+                e,
+            ));
+        }
+    };
+    let mut images = BTreeMap::new();
+    let mut parts = Vec::new();
+    for model in &models {
+        let material = model.mesh.material_id.and_then(|id| materials.get(id));
+        let image = match material.and_then(image_name) {
+            Some(name) if !model.mesh.texcoords.is_empty() => {
+                Some(load_image(path, name, &mut images)?)
+            }
+            _ => None,
+        };
+        let color = material.and_then(|m| m.diffuse).unwrap_or([1.0; 3]);
+        parts.push(Part { mesh: geometry(&model.mesh), texture: image, color });
+    }
+    // A group of nothing but points or lines leaves a part without faces.
+    parts.retain(|p| !p.mesh.faces.is_empty());
+    join(parts, path)
+}
+
+/// The file of `map_Kd`, which may follow options such as `-s 1 1 1`.
+fn image_name(material: &Material) -> Option<&str> {
+    let name = material.diffuse_texture.as_deref()?.trim();
+    if name.starts_with('-') { name.split_whitespace().last() } else { Some(name) }
+}
+
+fn load_image(
+    path: &Path,
+    name: &str,
+    images: &mut BTreeMap<String, Arc<Texture>>,
+) -> Result<Arc<Texture>, MeshError> {
+    if let Some(image) = images.get(name) {
+        return Ok(image.clone());
+    }
+    let image = Arc::new(texture::load_companion(path, name)?);
+    images.insert(name.into(), image.clone());
+    Ok(image)
+}
+
+fn geometry(mesh: &Mesh) -> TriMesh {
+    let n = mesh.positions.len() / 3;
+    let triple = |values: &[f32]| -> Vec<[f32; 3]> {
+        values.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect()
+    };
+    // An attribute that only some vertices have is no attribute of the mesh.
+    let whole = |values: &[f32], width: usize| n > 0 && values.len() == width * n;
+    let mut out = TriMesh::new(
+        triple(&mesh.positions).into_iter().map(|p| Point3::from(p.map(f64::from))).collect(),
+        mesh.indices.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect(),
+    );
+    if whole(&mesh.normals, 3) {
+        out.normals = Some(
+            triple(&mesh.normals).into_iter().map(|v| Vector3::from(v.map(f64::from))).collect(),
+        );
+    }
+    if whole(&mesh.vertex_color, 3) {
+        out.colors = Some(triple(&mesh.vertex_color));
+    }
+    if whole(&mesh.texcoords, 2) {
+        out.uvs = Some(mesh.texcoords.chunks_exact(2).map(|c| [c[0], c[1]]).collect());
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CUBE_CORNER: &str = "mtllib m.mtl\no a\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n\
+        vt 0.5 0.5\nusemtl painted\nf 1/1 2/2 3/3\nf -4/5 -2/3 -1/4\n";
+
+    fn load(text: &str, path: &Path) -> Result<TriMesh, MeshError> {
+        TriMesh::from_bytes(text.as_bytes(), path)
+    }
+
+    #[test]
+    fn texture_and_seams() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("m.obj");
+        let error = load(CUBE_CORNER, &path).unwrap_err().to_string();
+        assert!(error.contains("mtllib m.mtl"), "{error}");
+        std::fs::write(
+            folder.path().join("m.mtl"),
+            "newmtl painted\nKd 1 1 1\nmap_Kd -s 1 1 1 t.png\n",
+        )
+        .unwrap();
+        let error = load(CUBE_CORNER, &path).unwrap_err();
+        assert!(
+            matches!(&error, MeshError::Texture { texture, .. } if texture == "t.png"),
+            "{error}"
+        );
+        image::RgbImage::from_raw(1, 2, vec![9, 9, 9, 7, 7, 7])
+            .unwrap()
+            .save(folder.path().join("t.png"))
+            .unwrap();
+        let mesh = load(CUBE_CORNER, &path).unwrap();
+        // Corner 1 has two texture coordinates and is stored twice; corner 3 is shared.
+        assert_eq!((mesh.vertices.len(), mesh.faces.len()), (5, 2));
+        let uvs = mesh.uvs.as_ref().unwrap();
+        let at = |f: usize, k: usize| {
+            (mesh.vertices[mesh.faces[f][k] as usize], uvs[mesh.faces[f][k] as usize])
+        };
+        assert_eq!(at(0, 0), (Point3::origin(), [0.0, 0.0]));
+        assert_eq!(at(1, 0), (Point3::origin(), [0.5, 0.5]));
+        assert_eq!(at(0, 2), at(1, 1));
+        assert_eq!(mesh.texture.unwrap().pixels.len(), 2);
+    }
+
+    #[test]
+    fn plain_geometry_needs_no_material() {
+        let text = "mtllib gone.mtl\nv 0 0 0 1 0 0.5\nv 1 0 0 1 0 0\nv 1 1 0 1 0 0\nv 0 1 0 1 0 0\nusemtl x\nf 1 2 3 4\n";
+        let mesh = load(text, Path::new("m.obj")).unwrap();
+        assert_eq!((mesh.faces.len(), mesh.colors.unwrap()[0]), (2, [1.0, 0.0, 0.5]));
+    }
+
+    #[test]
+    fn malformed_input() {
+        let path = Path::new("m.obj");
+        let triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+        for bad in [
+            "f 1 2 4\n",
+            "f 1 2 0\n",
+            "f 1 2 -9\n",
+            "f 1 2 99999999999999999999\n",
+            "v 0 0\n",
+            "f a b c\n",
+        ] {
+            assert!(load(&format!("{triangle}{bad}"), path).is_err(), "{bad}");
+        }
+        assert!(matches!(load("", path), Err(MeshError::Empty { .. })));
+        assert!(matches!(load(triangle, path), Err(MeshError::Empty { .. })));
+        let error = load("v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n", path).unwrap_err().to_string();
+        assert!(error.contains("m.obj: vertex 1: coordinate is not finite"), "{error}");
+        assert!(TriMesh::from_bytes(&[0xff, 0xfe, b'\n', 0x80], path).is_err());
+    }
+}

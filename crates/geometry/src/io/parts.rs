@@ -1,0 +1,169 @@
+//! Joins the differently coloured parts of one file into a mesh with a single texture.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use super::MeshError;
+use crate::{Texture, TriMesh};
+
+/// Geometry under one material.
+pub(super) struct Part {
+    /// Geometry and, where the file has them, UVs and vertex colours.
+    pub(super) mesh: TriMesh,
+    /// The image that the UVs of `mesh` refer to.
+    pub(super) texture: Option<Arc<Texture>>,
+    /// The colour of the material where it has no image, a factor on vertex colours.
+    pub(super) color: [f32; 3],
+}
+
+/// One mesh of all `parts`. A texture that all share stays as it is; several become one image, in which a plain
+/// colour is a tile too; without any, plain colours become vertex colours.
+pub(super) fn join(parts: Vec<Part>, path: &Path) -> Result<TriMesh, MeshError> {
+    let first = parts.iter().find_map(|p| p.texture.clone());
+    let Some(first) = first else { return Ok(join_plain(parts)) };
+    let shared = parts.iter().all(|p| {
+        p.mesh.uvs.is_some() && p.texture.as_ref().is_some_and(|t| Arc::ptr_eq(t, &first))
+    });
+    let parts = if shared { parts } else { into_atlas(parts, path)? };
+    let mut whole = TriMesh::default();
+    for Part { mut mesh, texture, .. } in parts {
+        mesh.texture = texture;
+        whole.append(&mesh);
+    }
+    Ok(whole)
+}
+
+fn join_plain(mut parts: Vec<Part>) -> TriMesh {
+    if parts.iter().any(|p| p.mesh.colors.is_some() || p.color != [1.0; 3]) {
+        for Part { mesh, color, .. } in &mut parts {
+            let n = mesh.vertices.len();
+            let colors = mesh.colors.get_or_insert_with(|| vec![[1.0; 3]; n]);
+            colors.iter_mut().for_each(|c| (0..3).for_each(|k| c[k] *= color[k]));
+        }
+    }
+    let mut whole = TriMesh::default();
+    parts.iter().for_each(|p| whole.append(&p.mesh));
+    whole
+}
+
+/// Stacks the images of `parts` from the top down, each within a border of repeated pixels so that filtering does
+/// not mix neighbours, and moves the UVs along.
+fn into_atlas(mut parts: Vec<Part>, path: &Path) -> Result<Vec<Part>, MeshError> {
+    let mut tiles: Vec<Arc<Texture>> = Vec::new();
+    let mut tile_of = Vec::new();
+    for part in &mut parts {
+        let texture = match (&part.texture, &part.mesh.uvs) {
+            (Some(texture), Some(_)) => texture.clone(),
+            _ => {
+                part.mesh.uvs = Some(vec![[0.5; 2]; part.mesh.vertices.len()]);
+                let pixel = part.color.map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8);
+                Arc::new(Texture { width: 1, height: 1, pixels: vec![pixel] })
+            }
+        };
+        let known = tiles.iter().position(|t| Arc::ptr_eq(t, &texture));
+        tile_of.push(known.unwrap_or_else(|| {
+            tiles.push(texture);
+            tiles.len() - 1
+        }));
+    }
+    let width = tiles.iter().map(|t| t.width + 2).max().unwrap_or(0);
+    let height: usize = tiles.iter().map(|t| t.height + 2).sum();
+    let mut pixels = Vec::with_capacity(width * height);
+    let mut top = Vec::new();
+    for tile in &tiles {
+        top.push(pixels.len() / width);
+        for y in 0..tile.height + 2 {
+            let row = y.saturating_sub(1).min(tile.height - 1) * tile.width;
+            pixels.extend(
+                (0..width).map(|x| tile.pixels[row + x.saturating_sub(1).min(tile.width - 1)]),
+            );
+        }
+    }
+    let atlas = Arc::new(Texture { width, height, pixels });
+    for (part, tile) in parts.iter_mut().zip(tile_of) {
+        let (w, h) = (tiles[tile].width as f32, tiles[tile].height as f32);
+        for uv in part.mesh.uvs.iter_mut().flatten() {
+            if uv.iter().any(|c| !(-1e-3..=1.001).contains(c)) {
+                let feature =
+                    "texture coordinates outside 0..1 in a mesh with several materials".into();
+                return Err(MeshError::Unsupported { path: path.into(), feature });
+            }
+            let from_top = top[tile] as f32 + 1.0 + (1.0 - uv[1]) * h;
+            *uv = [(1.0 + uv[0] * w) / width as f32, 1.0 - from_top / height as f32];
+        }
+        (part.mesh.colors, part.texture) = (None, Some(atlas.clone()));
+    }
+    Ok(parts)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Point3;
+
+    fn part(uvs: Option<[[f32; 2]; 3]>, texture: Option<&Arc<Texture>>, color: [f32; 3]) -> Part {
+        let mut mesh = TriMesh::new(vec![Point3::origin(); 3], vec![[0, 1, 2]]);
+        mesh.uvs = uvs.map(Vec::from);
+        Part { mesh, texture: texture.cloned(), color }
+    }
+
+    /// The pixel under `uv`, as the convention of `TriMesh::uvs` has it.
+    fn pixel(texture: &Texture, uv: [f32; 2]) -> [u8; 3] {
+        let (x, y) = (uv[0] * texture.width as f32, (1.0 - uv[1]) * texture.height as f32);
+        texture.pixels[y as usize * texture.width + x as usize]
+    }
+
+    #[test]
+    fn several_textures_become_one_image_with_the_same_colours() {
+        let path = Path::new("m.glb");
+        let image = |w: usize, h: usize, k: u8| {
+            Arc::new(Texture {
+                width: w,
+                height: h,
+                pixels: (0..w * h).map(|i| [i as u8, k, 0]).collect(),
+            })
+        };
+        let (a, b) = (image(4, 2, 1), image(3, 5, 2));
+        let uvs = [[0.1, 0.1], [0.9, 0.3], [0.4, 0.95]];
+        let parts = vec![
+            part(Some(uvs), Some(&a), [1.0; 3]),
+            part(None, None, [1.0, 0.0, 0.2]),
+            part(Some(uvs), Some(&b), [1.0; 3]),
+            part(Some(uvs), Some(&a), [1.0; 3]),
+        ];
+        let mesh = join(parts, path).unwrap();
+        let (texture, atlas_uvs) = (mesh.texture.unwrap(), mesh.uvs.unwrap());
+        for (k, uv) in uvs.into_iter().enumerate() {
+            assert_eq!(pixel(&texture, atlas_uvs[k]), pixel(&a, uv));
+            assert_eq!(pixel(&texture, atlas_uvs[3 + k]), [255, 0, 51]);
+            assert_eq!(pixel(&texture, atlas_uvs[6 + k]), pixel(&b, uv));
+            assert_eq!(atlas_uvs[9 + k], atlas_uvs[k]);
+        }
+        let repeated =
+            vec![part(Some([[0.0, 2.0]; 3]), Some(&a), [1.0; 3]), part(None, None, [1.0; 3])];
+        assert!(matches!(join(repeated, path), Err(MeshError::Unsupported { .. })));
+    }
+
+    #[test]
+    fn a_shared_texture_stays_and_plain_colours_reach_the_vertices() {
+        let a = Arc::new(Texture { width: 1, height: 1, pixels: vec![[1, 2, 3]] });
+        let repeated = [[0.0, 2.0]; 3];
+        let mesh = join(
+            vec![
+                part(Some(repeated), Some(&a), [1.0; 3]),
+                part(Some(repeated), Some(&a), [1.0; 3]),
+            ],
+            Path::new("m"),
+        );
+        let mesh = mesh.unwrap();
+        assert!(Arc::ptr_eq(mesh.texture.as_ref().unwrap(), &a));
+        assert_eq!(mesh.uvs.unwrap(), [[0.0, 2.0]; 6]);
+        let mesh = join(
+            vec![part(None, None, [1.0; 3]), part(None, None, [0.5, 0.0, 1.0])],
+            Path::new("m"),
+        )
+        .unwrap();
+        assert_eq!(mesh.colors.unwrap()[2..4], [[1.0; 3], [0.5, 0.0, 1.0]]);
+        assert!(join(vec![part(None, None, [1.0; 3])], Path::new("m")).unwrap().colors.is_none());
+    }
+}

@@ -1,0 +1,63 @@
+//! Files that appear whole or not at all.
+
+use std::fs::{File, OpenOptions};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Content written under a temporary name in the target's folder; dropped without [`WholeFile::commit`],
+/// it vanishes.
+pub(super) struct WholeFile {
+    temporary: PathBuf,
+    target: PathBuf,
+}
+
+impl WholeFile {
+    /// Writes `content` beside `target` and brings it to disk.
+    pub(super) fn write(target: &Path, content: &[u8]) -> io::Result<Self> {
+        static NEXT: AtomicU64 = AtomicU64::new(0);
+        let name = target
+            .file_name()
+            .ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "no file name"))?;
+        let unique =
+            format!(".{}-{}.tmp", std::process::id(), NEXT.fetch_add(1, Ordering::Relaxed));
+        let mut hidden = std::ffi::OsString::from(".");
+        hidden.push(name);
+        hidden.push(unique);
+        let temporary = target.with_file_name(hidden);
+        let mut file: File = OpenOptions::new().write(true).create_new(true).open(&temporary)?;
+        let whole = Self { temporary, target: target.into() };
+        file.write_all(content)?;
+        file.sync_all()?;
+        Ok(whole)
+    }
+
+    /// Gives the file its name, replacing what was there.
+    pub(super) fn commit(self) -> io::Result<()> {
+        std::fs::rename(&self.temporary, &self.target)
+    }
+}
+
+impl Drop for WholeFile {
+    fn drop(&mut self) {
+        // After a commit the temporary name is gone and this finds nothing to remove.
+        let _ = std::fs::remove_file(&self.temporary);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_is_left_without_a_commit() {
+        let folder = tempfile::tempdir().unwrap();
+        let target = folder.path().join("a.bin");
+        drop(WholeFile::write(&target, b"x").unwrap());
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+        WholeFile::write(&target, b"y").unwrap().commit().unwrap();
+        assert_eq!(std::fs::read(&target).unwrap(), b"y");
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+        assert!(WholeFile::write(&folder.path().join("no/a.bin"), b"y").is_err());
+    }
+}

@@ -1,0 +1,129 @@
+//! Joining vertices that share a position.
+
+use std::collections::HashMap;
+
+use nalgebra::{Point3, Vector3};
+
+use crate::TriMesh;
+
+/// Positions closer than this fraction of the bounding box's diagonal count as one.
+const RELATIVE_TOLERANCE: f64 = 1e-9;
+
+/// The distinct positions of a mesh, in the order of their first appearance.
+pub(crate) struct Weld {
+    pub(crate) positions: Vec<Point3<f64>>,
+    /// For each vertex of the mesh, its entry in `positions`.
+    pub(crate) index: Vec<u32>,
+}
+
+impl Weld {
+    /// Joins vertices within `tolerance` \[m\] of the first vertex of a cluster.
+    pub(crate) fn new(vertices: &[Point3<f64>], tolerance: f64) -> Self {
+        let low = vertices.iter().fold(Point3::from([f64::INFINITY; 3]), |low, v| low.inf(v));
+        // Cells much larger than the tolerance: most vertices then look into one cell only.
+        let cell = 8.0 * tolerance.max(f64::MIN_POSITIVE);
+        let cell_of = |v: Vector3<f64>| v.map(|c| (c / cell).floor() as i64);
+        let mut cells: HashMap<Vector3<i64>, Vec<u32>> = HashMap::new();
+        let mut weld = Self { positions: Vec::new(), index: Vec::with_capacity(vertices.len()) };
+        for v in vertices {
+            let offset = v - low;
+            let reach = Vector3::repeat(tolerance);
+            let (from, to) = (cell_of(offset - reach), cell_of(offset + reach));
+            let mut found = None;
+            'search: for x in from.x..=to.x {
+                for y in from.y..=to.y {
+                    for z in from.z..=to.z {
+                        let near = cells.get(&Vector3::new(x, y, z)).into_iter().flatten();
+                        found = near
+                            .copied()
+                            .find(|&i| (weld.positions[i as usize] - v).norm() <= tolerance);
+                        if found.is_some() {
+                            break 'search;
+                        }
+                    }
+                }
+            }
+            weld.index.push(found.unwrap_or_else(|| {
+                let new = weld.positions.len() as u32;
+                weld.positions.push(*v);
+                cells.entry(cell_of(offset)).or_default().push(new);
+                new
+            }));
+        }
+        weld
+    }
+
+    pub(crate) fn of(mesh: &TriMesh) -> Self {
+        let diagonal = mesh.bounds().map_or(0.0, |(low, high)| (high - low).norm());
+        Self::new(&mesh.vertices, RELATIVE_TOLERANCE * diagonal)
+    }
+
+    pub(crate) fn faces(&self, mesh: &TriMesh) -> Vec<[u32; 3]> {
+        mesh.faces.iter().map(|f| f.map(|v| self.index[v as usize])).collect()
+    }
+}
+
+impl TriMesh {
+    /// The mesh with one vertex a position (to 1e-9 of the bounding box's diagonal) and without attributes:
+    /// what topological questions and distance queries need where texture seams store vertices several times.
+    ///
+    /// Faces keep their number and order; one whose corners fall together is kept as a degenerate face.
+    pub fn welded(&self) -> TriMesh {
+        let weld = Weld::of(self);
+        let faces = weld.faces(self);
+        TriMesh::new(weld.positions, faces)
+    }
+
+    /// As [`TriMesh::welded`], joining vertices within `tolerance` \[m\].
+    pub fn welded_within(&self, tolerance: f64) -> TriMesh {
+        let weld = Weld::new(&self.vertices, tolerance.max(0.0));
+        let faces = weld.faces(self);
+        TriMesh::new(weld.positions, faces)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn near_positions_join_whatever_cell_they_fall_in() {
+        // Pairs 0.9 tolerances apart on a line, at every phase of the cells.
+        let tolerance = 1e-3;
+        let mut vertices = Vec::new();
+        for k in 0..1000 {
+            let x = f64::from(k) * 3.17 * tolerance;
+            vertices.push(Point3::new(x, -x, 0.5 * x));
+            vertices.push(Point3::new(
+                x + 0.5 * tolerance,
+                -x + 0.5 * tolerance,
+                0.5 * x + 0.5 * tolerance,
+            ));
+        }
+        let weld = Weld::new(&vertices, tolerance);
+        assert_eq!(weld.positions.len(), 1000);
+        assert!(weld.index.chunks(2).enumerate().all(|(k, pair)| pair == [k as u32; 2]));
+        assert_eq!(Weld::new(&vertices, 0.8 * tolerance).positions.len(), 2000);
+    }
+
+    #[test]
+    fn exact_duplicates_join_without_tolerance_and_faces_keep_their_order() {
+        let p = Point3::new;
+        let mesh = TriMesh::new(
+            vec![
+                p(0., 0., 0.),
+                p(1., 0., 0.),
+                p(0., 1., 0.),
+                p(1., 0., 0.),
+                p(0., 1., 0.),
+                p(1., 1., 0.),
+            ],
+            vec![[0, 1, 2], [1, 3, 2], [3, 5, 4]],
+        );
+        for welded in [mesh.welded(), mesh.welded_within(0.0)] {
+            assert_eq!(welded.vertices.len(), 4);
+            assert_eq!(welded.faces, [[0, 1, 2], [1, 1, 2], [1, 3, 2]]);
+        }
+        assert!(TriMesh::default().welded().vertices.is_empty());
+    }
+}
