@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use nalgebra::Point3;
+use prehend_geometry::TriMesh;
 use prehend_refine::bop::{Dataset, GroundTruth, JsonFile, read_results, write_results};
 use prehend_refine::metrics::{PoseScore, ScoredModel, ScoredRow, summarize};
 
@@ -18,32 +18,8 @@ fn data(name: &str) -> PathBuf {
     root.join(name)
 }
 
-/// The vertices \[m\] of a binary little-endian PLY file in millimetres whose vertices are floats (x, y, z first) and
-/// bytes.
-fn vertices(file: &Path) -> Vec<Point3<f64>> {
-    let bytes = fs::read(file).unwrap();
-    let end = b"end_header\n";
-    let header_len = bytes.windows(end.len()).position(|w| w == end).unwrap() + end.len();
-    let header = std::str::from_utf8(&bytes[..header_len]).unwrap();
-    let (_, vertex_part) = header.split_once("element vertex ").unwrap();
-    let (vertex_part, _) = vertex_part.split_once("element face").unwrap();
-    let count: usize = vertex_part.lines().next().unwrap().trim().parse().unwrap();
-    let size = |line: &str| match line.split_whitespace().nth(1).unwrap() {
-        "float" => 4,
-        "double" => 8,
-        "uchar" => 1,
-        other => panic!("{other}"),
-    };
-    let properties: Vec<&str> = vertex_part.lines().filter(|l| l.starts_with("property")).collect();
-    assert_eq!(properties[..3], ["property float x", "property float y", "property float z"]);
-    let stride: usize = properties.iter().map(|l| size(l)).sum();
-    let records = bytes[header_len..].chunks_exact(stride).take(count);
-    let at = |r: &[u8], i: usize| {
-        f64::from(f32::from_le_bytes(r[4 * i..4 * i + 4].try_into().unwrap())) / 1000.0
-    };
-    let points: Vec<_> = records.map(|r| Point3::new(at(r, 0), at(r, 1), at(r, 2))).collect();
-    assert_eq!(points.len(), count);
-    points
+fn mesh(file: &Path) -> TriMesh {
+    TriMesh::load(file).unwrap().scaled(1e-3)
 }
 
 /// Golden values to 1e-5. The vertices of `models/` and `models_eval/` are the same here, and no pose is so far off that
@@ -73,7 +49,7 @@ fn golden_values_of_the_inhand_frames() {
                 r.rows.iter().find(|r| r.im_id == im_id && r.obj_id == obj_id).unwrap().t_cam_model
             });
             let model = models.entry(obj_id).or_insert_with(|| {
-                let points = vertices(&truth.models().mesh_path(obj_id).unwrap());
+                let points = mesh(&truth.models().mesh_path(obj_id).unwrap()).vertices;
                 ScoredModel::new(points, truth.models().info(obj_id).unwrap().symmetries)
             });
             let camera = dataset.frame(1, im_id).unwrap().intrinsics;
@@ -179,7 +155,7 @@ fn initial_poses_are_as_noisy_as_they_are_said_to_be() {
         let mut scored = Vec::new();
         for row in read_results(&data("mujoco").join(poses)).unwrap().rows {
             let model = ScoredModel::new(
-                vertices(&truth.models().mesh_path(row.obj_id).unwrap()),
+                mesh(&truth.models().mesh_path(row.obj_id).unwrap()).vertices,
                 Default::default(),
             );
             let t_true = truth.pose(row.scene_id, row.im_id, row.obj_id, &row.t_cam_model).unwrap();
