@@ -83,7 +83,9 @@ impl<'a> Frame<'a> {
             return Err(DatasetError::Missing { file: expected });
         };
         let mut masks = listing.flatten().map(|f| f.path()).filter(|p| {
-            p.file_name().and_then(|n| n.to_str()).is_some_and(|n| n.starts_with(&prefix))
+            p.file_name()
+                .and_then(|n| n.to_str())
+                .is_some_and(|n| n.starts_with(&prefix) && n.ends_with(".png"))
         });
         match (masks.next(), masks.next()) {
             (Some(only), None) => Ok(only),

@@ -61,10 +61,13 @@ pub struct RowError {
 /// be absent. A rotation that is off by rounding only (1e-3) is replaced by the nearest rotation.
 ///
 /// # Errors
-/// When the file cannot be read at all; malformed rows are listed in [`ReadResults::errors`] and the
+/// When the file cannot be read at all or is empty; malformed rows are listed in [`ReadResults::errors`] and the
 /// others still returned.
 pub fn read_results(file: &Path) -> Result<ReadResults, DatasetError> {
     let bytes = fs::read(file).map_err(|e| DatasetError::reading(file, &e))?;
+    if bytes.trim_ascii().is_empty() {
+        return Err(DatasetError::malformed(file, "the file is empty"));
+    }
     let mut reader = csv::ReaderBuilder::new()
         .has_headers(false)
         .flexible(true)
@@ -304,10 +307,15 @@ mod tests {
     }
 
     #[test]
-    fn an_absent_file_and_a_row_that_is_not_finite_are_errors() {
+    fn absent_and_empty_files_and_rows_that_are_not_finite_are_errors() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("none.csv");
         assert!(matches!(read_results(&path), Err(DatasetError::Missing { file }) if file == path));
+        fs::write(&path, "\n").unwrap();
+        assert!(
+            matches!(read_results(&path), Err(DatasetError::Malformed { file, .. }) if file == path)
+        );
+        fs::remove_file(&path).unwrap();
         let mut bad = row(1);
         bad.score = f64::NAN;
         let error = write_results(&path, &[row(0), bad]).unwrap_err();
