@@ -1,0 +1,183 @@
+//! A BOP dataset as an estimator may see it.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::error::DatasetError;
+use super::frame::Frame;
+use super::json::LazyJson;
+use super::models::Models;
+
+/// One split of a BOP dataset, without anything that tells the true poses: neither `scene_gt*.json`,
+/// `scene_bodies_gt.json`, `mask/` and `models_eval/`, nor the cameras' world poses are ever opened.
+/// Those belong to [`super::GroundTruth`].
+#[derive(Debug)]
+pub struct Dataset {
+    root: PathBuf,
+    split_dir: PathBuf,
+    scenes: BTreeMap<u32, Scene>,
+    models: Models,
+}
+
+/// One scene of a split; its files are read when first needed.
+#[derive(Debug)]
+pub struct Scene {
+    id: u32,
+    dir: PathBuf,
+    root: PathBuf,
+    pub(crate) camera: LazyJson,
+    pub(crate) bodies: LazyJson,
+    pub(crate) tactile: LazyJson,
+}
+
+impl Dataset {
+    /// Opens the split `test`, or the only one there is.
+    ///
+    /// # Errors
+    /// When the folder is absent, holds no scenes, or holds several splits of which none is `test`.
+    pub fn open(root: &Path) -> Result<Self, DatasetError> {
+        let splits: Vec<String> = subfolders(root)?
+            .into_iter()
+            .filter(|name| {
+                subfolders(&root.join(name))
+                    .is_ok_and(|inner| inner.iter().any(|s| scene_id(s).is_some()))
+            })
+            .collect();
+        match splits.as_slice() {
+            [] => Err(DatasetError::NoScenes { dir: root.to_path_buf() }),
+            [only] => Self::open_split(root, only),
+            _ if splits.iter().any(|s| s == "test") => Self::open_split(root, "test"),
+            _ => Err(DatasetError::AmbiguousSplit { dir: root.to_path_buf(), splits }),
+        }
+    }
+
+    /// Opens the split in the subfolder `split`.
+    ///
+    /// # Errors
+    /// When that folder is absent or holds no scenes.
+    pub fn open_split(root: &Path, split: &str) -> Result<Self, DatasetError> {
+        let split_dir = root.join(split);
+        let scenes: BTreeMap<u32, Scene> = subfolders(&split_dir)?
+            .iter()
+            .filter_map(|name| Some((scene_id(name)?, split_dir.join(name))))
+            .map(|(id, dir)| (id, Scene::new(id, dir, root)))
+            .collect();
+        if scenes.is_empty() {
+            return Err(DatasetError::NoScenes { dir: split_dir });
+        }
+        Ok(Self {
+            root: root.to_path_buf(),
+            split_dir,
+            scenes,
+            models: Models::new(root.join("models")),
+        })
+    }
+
+    /// The dataset's folder.
+    pub fn root(&self) -> &Path {
+        &self.root
+    }
+
+    /// The split's folder.
+    pub fn split_dir(&self) -> &Path {
+        &self.split_dir
+    }
+
+    /// The models that estimators use (`models/`).
+    pub fn models(&self) -> &Models {
+        &self.models
+    }
+
+    /// All scenes in ascending order of their ids.
+    pub fn scenes(&self) -> impl Iterator<Item = &Scene> {
+        self.scenes.values()
+    }
+
+    /// The scene `scene_id`.
+    ///
+    /// # Errors
+    /// [`DatasetError::UnknownScene`].
+    pub fn scene(&self, scene_id: u32) -> Result<&Scene, DatasetError> {
+        self.scenes
+            .get(&scene_id)
+            .ok_or_else(|| DatasetError::UnknownScene { dir: self.split_dir.clone(), scene_id })
+    }
+
+    /// The image `im_id` of the scene `scene_id`.
+    ///
+    /// # Errors
+    /// Those of [`Dataset::scene`] and [`Scene::frame`].
+    pub fn frame(&self, scene_id: u32, im_id: u32) -> Result<Frame<'_>, DatasetError> {
+        self.scene(scene_id)?.frame(im_id)
+    }
+}
+
+impl Scene {
+    fn new(id: u32, dir: PathBuf, root: &Path) -> Self {
+        Self {
+            id,
+            root: root.to_path_buf(),
+            camera: LazyJson::new(dir.join("scene_camera.json")),
+            bodies: LazyJson::new(dir.join("scene_bodies.json")),
+            tactile: LazyJson::new(dir.join("scene_tactile.json")),
+            dir,
+        }
+    }
+
+    /// The scene's id.
+    pub fn id(&self) -> u32 {
+        self.id
+    }
+
+    /// The scene's folder.
+    pub fn dir(&self) -> &Path {
+        &self.dir
+    }
+
+    /// The dataset's folder, which paths inside the scene's files are relative to.
+    pub(crate) fn root(&self) -> &Path {
+        &self.root
+    }
+
+    /// The images that `scene_camera.json` lists, ascending.
+    ///
+    /// # Errors
+    /// When that file is absent or broken, or one of its keys is no image id.
+    pub fn images(&self) -> Result<Vec<u32>, DatasetError> {
+        let file = self.camera.get()?;
+        let id = |key: &str| {
+            key.parse().map_err(|_| {
+                DatasetError::malformed(file.path(), format!("{key:?} is not an image id"))
+            })
+        };
+        let mut ids = file.keys().map(id).collect::<Result<Vec<u32>, _>>()?;
+        ids.sort_unstable();
+        Ok(ids)
+    }
+
+    /// The image `im_id`.
+    ///
+    /// # Errors
+    /// When `scene_camera.json` is absent or broken, or does not describe the image.
+    pub fn frame(&self, im_id: u32) -> Result<Frame<'_>, DatasetError> {
+        Frame::new(self, im_id)
+    }
+}
+
+fn scene_id(name: &str) -> Option<u32> {
+    // `parse` alone would also take "+4".
+    name.bytes().all(|b| b.is_ascii_digit()).then(|| name.parse().ok())?
+}
+
+/// The names of the folders in `dir`, sorted.
+fn subfolders(dir: &Path) -> Result<Vec<String>, DatasetError> {
+    let listing = fs::read_dir(dir).map_err(|e| DatasetError::reading(dir, &e))?;
+    let mut names: Vec<String> = listing
+        .flatten()
+        .filter(|f| f.path().is_dir())
+        .filter_map(|f| f.file_name().into_string().ok())
+        .collect();
+    names.sort_unstable();
+    Ok(names)
+}

@@ -1,0 +1,142 @@
+//! The truth about a dataset, for scoring only.
+
+use std::collections::BTreeMap;
+
+use nalgebra::Isometry3;
+
+use super::dataset::Dataset;
+use super::error::DatasetError;
+use super::json::{Entry, LazyJson};
+use super::models::Models;
+use super::scene::SceneBodies;
+
+/// What scorers may read and estimators must not: `scene_gt.json`, `scene_gt_info.json`,
+/// `scene_bodies_gt.json` and `models_eval/`.
+#[derive(Debug)]
+pub struct GroundTruth<'a> {
+    dataset: &'a Dataset,
+    scenes: BTreeMap<u32, TrueScene>,
+    models: Models,
+}
+
+#[derive(Debug)]
+struct TrueScene {
+    objects: LazyJson,
+    info: LazyJson,
+    bodies: LazyJson,
+}
+
+/// An object where it truly is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TrueObject {
+    /// Which object.
+    pub obj_id: u32,
+    /// Maps model coordinates into the camera frame \[m\].
+    pub t_cam_model: Isometry3<f64>,
+}
+
+impl<'a> GroundTruth<'a> {
+    /// The truth about the split that `dataset` shows; nothing is read yet.
+    pub fn new(dataset: &'a Dataset) -> Self {
+        let scene = |dir: &std::path::Path| TrueScene {
+            objects: LazyJson::new(dir.join("scene_gt.json")),
+            info: LazyJson::new(dir.join("scene_gt_info.json")),
+            bodies: LazyJson::new(dir.join("scene_bodies_gt.json")),
+        };
+        let eval = dataset.root().join("models_eval");
+        let models = if eval.is_dir() { eval } else { dataset.models().dir().to_path_buf() };
+        Self {
+            dataset,
+            scenes: dataset.scenes().map(|s| (s.id(), scene(s.dir()))).collect(),
+            models: Models::new(models),
+        }
+    }
+
+    /// The models to score with: `models_eval/` where the dataset has it, else `models/`.
+    pub fn models(&self) -> &Models {
+        &self.models
+    }
+
+    /// The objects of an image, in the order that numbers its masks.
+    ///
+    /// # Errors
+    /// When `scene_gt.json` is absent or broken, or lacks the image or one of its fields.
+    pub fn objects(&self, scene_id: u32, im_id: u32) -> Result<Vec<TrueObject>, DatasetError> {
+        let entry = self.scene(scene_id)?.objects.get()?.entry(im_id)?;
+        entry.items()?.iter().map(TrueObject::parse).collect()
+    }
+
+    /// The true pose of the object `obj_id`; among several such objects, of the one nearest to `estimate`.
+    ///
+    /// # Errors
+    /// Those of [`GroundTruth::objects`], and [`DatasetError::UnknownObject`] when the image shows no such
+    /// object.
+    pub fn pose(
+        &self,
+        scene_id: u32,
+        im_id: u32,
+        obj_id: u32,
+        estimate: &Isometry3<f64>,
+    ) -> Result<Isometry3<f64>, DatasetError> {
+        let distance = |o: &TrueObject| {
+            (o.t_cam_model.translation.vector - estimate.translation.vector).norm()
+        };
+        self.objects(scene_id, im_id)?
+            .into_iter()
+            .filter(|o| o.obj_id == obj_id)
+            .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+            .map(|o| o.t_cam_model)
+            .ok_or_else(|| DatasetError::UnknownObject {
+                file: self.scene_file(scene_id, "scene_gt.json"),
+                obj_id,
+            })
+    }
+
+    /// The visible fraction of each object of an image, or `None` where the dataset does not give it.
+    ///
+    /// # Errors
+    /// When `scene_gt_info.json` exists and is broken, or lacks the image or one of its fields.
+    pub fn visible_fractions(
+        &self,
+        scene_id: u32,
+        im_id: u32,
+    ) -> Result<Option<Vec<f64>>, DatasetError> {
+        let info = &self.scene(scene_id)?.info;
+        if !info.exists() {
+            return Ok(None);
+        }
+        let items = info.get()?.entry(im_id)?.items()?;
+        items.iter().map(|e| e.get("visib_fract")?.number()).collect::<Result<_, _>>().map(Some)
+    }
+
+    /// The robots where they truly are: `scene_bodies_gt.json` where the scene has it, else what
+    /// estimators are told.
+    ///
+    /// # Errors
+    /// When the file is absent or broken, or lacks the image or one of its fields.
+    pub fn bodies(&self, scene_id: u32, im_id: u32) -> Result<SceneBodies, DatasetError> {
+        let own = &self.scene(scene_id)?.bodies;
+        let file = if own.exists() { own } else { &self.dataset.scene(scene_id)?.bodies };
+        SceneBodies::parse(&file.get()?.entry(im_id)?, self.dataset.root())
+    }
+
+    fn scene(&self, scene_id: u32) -> Result<&TrueScene, DatasetError> {
+        let dir = || self.dataset.split_dir().to_path_buf();
+        self.scenes
+            .get(&scene_id)
+            .ok_or_else(|| DatasetError::UnknownScene { dir: dir(), scene_id })
+    }
+
+    fn scene_file(&self, scene_id: u32, name: &str) -> std::path::PathBuf {
+        self.dataset.scene(scene_id).map_or_else(|_| name.into(), |s| s.dir().join(name))
+    }
+}
+
+impl TrueObject {
+    fn parse(entry: &Entry<'_>) -> Result<Self, DatasetError> {
+        Ok(Self {
+            obj_id: entry.get("obj_id")?.id()?,
+            t_cam_model: entry.pose("cam_R_m2c", "cam_t_m2c")?,
+        })
+    }
+}

@@ -1,0 +1,38 @@
+//! BOP datasets: what an estimator may read ([`Dataset`]), the truth a scorer may read
+//! ([`GroundTruth`]), and results files ([`read_results`], [`write_results`]).
+//!
+//! Files are in millimetres; everything these modules return is in metres. Two files extend the
+//! BOP layout: `scene_bodies.json` (gravity, and the known robot with its joint angles) and
+//! `scene_tactile.json` (taxel forces). A file is read when something of it is first asked for, so
+//! a missing or broken one disturbs only what needs it.
+
+mod atomic;
+mod dataset;
+mod error;
+mod frame;
+mod ground_truth;
+mod json;
+mod models;
+mod pixels;
+mod pose;
+mod results;
+mod scene;
+mod taxels;
+
+pub use atomic::write_atomically;
+pub use dataset::{Dataset, Scene};
+pub use error::DatasetError;
+pub use frame::{Frame, Observation};
+pub use ground_truth::{GroundTruth, TrueObject};
+pub use json::{Entry, JsonFile};
+pub use models::{ModelInfo, Models};
+pub use pixels::{DepthPixels, MaskPixels, RgbPixels};
+pub use pose::{
+    PoseFault, ROTATION_TOLERANCE, pose_from_bop, rotation_from_row_major, rotation_to_row_major,
+    translation_from_mm, translation_to_mm,
+};
+pub use results::{
+    ReadResults, ResultRow, RowError, read_results, share_image_times, write_results,
+};
+pub use scene::{Body, Intrinsics, SceneBodies, Tactile, UNITS_PER_NEWTON};
+pub use taxels::{Taxel, read_taxels};

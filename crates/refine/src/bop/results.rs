@@ -1,0 +1,325 @@
+//! Results files of the BOP challenge: one estimated pose a row.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use nalgebra::Isometry3;
+use thiserror::Error;
+
+use super::atomic::write_atomically;
+use super::error::DatasetError;
+use super::pose::{parse_numbers, pose_from_bop, rotation_to_row_major, translation_to_mm};
+
+const COLUMNS: [&str; 7] = ["scene_id", "im_id", "obj_id", "score", "R", "t", "time"];
+
+/// One estimated pose.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ResultRow {
+    /// Scene of the split.
+    pub scene_id: u32,
+    /// Image of the scene.
+    pub im_id: u32,
+    /// Object whose pose this is.
+    pub obj_id: u32,
+    /// Confidence; higher is better, the scale is the method's own.
+    pub score: f64,
+    /// Maps model coordinates into the camera frame \[m\].
+    pub t_cam_model: Isometry3<f64>,
+    /// Seconds spent on the whole image, the same on all its rows; −1 if unknown.
+    pub time: f64,
+}
+
+/// What one results file holds: the rows that could be read, and what is wrong with the others.
+#[derive(Clone, Debug, Default)]
+pub struct ReadResults {
+    /// The well-formed rows in file order.
+    pub rows: Vec<ResultRow>,
+    /// For each of `rows`, its index from 0 among all the file's rows of the same image, malformed
+    /// ones included: the instance that [`super::Frame::mask`] asks for.
+    pub instances: Vec<usize>,
+    /// One error a malformed row, in file order.
+    pub errors: Vec<RowError>,
+}
+
+/// A malformed row of a results file.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[error("{}: line {line}: {field}: {problem}", file.display())]
+pub struct RowError {
+    /// The results file.
+    pub file: PathBuf,
+    /// Line number from 1, the header included.
+    pub line: u64,
+    /// The column at fault, or `row` when the columns themselves are wrong in number.
+    pub field: &'static str,
+    /// What is wrong with it.
+    pub problem: String,
+}
+
+/// Reads a results file (`scene_id,im_id,obj_id,score,R,t,time`; R row-major, t in mm). The header may
+/// be absent. A rotation that is off by rounding only (1e-3) is replaced by the nearest rotation.
+///
+/// # Errors
+/// When the file cannot be read at all or is empty; malformed rows are listed in [`ReadResults::errors`] and the
+/// others still returned.
+pub fn read_results(file: &Path) -> Result<ReadResults, DatasetError> {
+    let bytes = fs::read(file).map_err(|e| DatasetError::reading(file, &e))?;
+    if bytes.trim_ascii().is_empty() {
+        return Err(DatasetError::malformed(file, "the file is empty"));
+    }
+    let mut reader = csv::ReaderBuilder::new()
+        .has_headers(false)
+        .flexible(true)
+        .quoting(false)
+        .from_reader(bytes.as_slice());
+    let mut results = ReadResults::default();
+    let mut rows_of_image: BTreeMap<(u32, u32), usize> = BTreeMap::new();
+    let mut record = csv::ByteRecord::new();
+    let mut first = true;
+    while reader.read_byte_record(&mut record).map_err(|e| DatasetError::malformed(file, e))? {
+        let line = record.position().map_or(0, csv::Position::line);
+        let fields: Vec<String> =
+            record.iter().map(|f| String::from_utf8_lossy(f).trim().to_owned()).collect();
+        let is_header =
+            std::mem::take(&mut first) && fields.first().is_some_and(|f| f.ends_with("scene_id"));
+        if is_header {
+            continue;
+        }
+        let instance = image_of(&fields).map(|image| {
+            let count = rows_of_image.entry(image).or_default();
+            *count += 1;
+            *count - 1
+        });
+        match parse_row(&fields) {
+            Ok(row) => {
+                results.rows.push(row);
+                results.instances.push(instance.unwrap_or(0));
+            }
+            Err((field, problem)) => {
+                results.errors.push(RowError { file: file.to_path_buf(), line, field, problem });
+            }
+        }
+    }
+    Ok(results)
+}
+
+fn image_of(fields: &[String]) -> Option<(u32, u32)> {
+    Some((fields.first()?.parse().ok()?, fields.get(1)?.parse().ok()?))
+}
+
+type Fault = (&'static str, String);
+
+fn parse_row(fields: &[String]) -> Result<ResultRow, Fault> {
+    let [scene_id, im_id, obj_id, score, r, t, time] = fields else {
+        return Err(("row", format!("expected {} columns, found {}", COLUMNS.len(), fields.len())));
+    };
+    let id =
+        |field, text: &str| text.parse().map_err(|_| (field, format!("{text:?} is not an id")));
+    let number = |field, text: &str| {
+        parse_numbers::<1>(text).map(|[v]| v).map_err(|e| (field, e.to_string()))
+    };
+    let r = parse_numbers::<9>(r).map_err(|e| ("R", e.to_string()))?;
+    let t_mm = parse_numbers::<3>(t).map_err(|e| ("t", e.to_string()))?;
+    Ok(ResultRow {
+        scene_id: id("scene_id", scene_id)?,
+        im_id: id("im_id", im_id)?,
+        obj_id: id("obj_id", obj_id)?,
+        score: number("score", score)?,
+        t_cam_model: pose_from_bop(&r, &t_mm).map_err(|e| ("R", e.to_string()))?,
+        time: number("time", time)?,
+    })
+}
+
+/// Gives all rows of an image the sum of their times, or −1 where one is unknown: BOP wants the time spent
+/// on the whole image on each of its rows.
+pub fn share_image_times(rows: &mut [ResultRow]) {
+    let mut times: BTreeMap<(u32, u32), f64> = BTreeMap::new();
+    for row in rows.iter() {
+        let sum = times.entry((row.scene_id, row.im_id)).or_default();
+        *sum = if *sum < 0.0 || row.time < 0.0 { -1.0 } else { *sum + row.time };
+    }
+    for row in rows {
+        row.time = times.get(&(row.scene_id, row.im_id)).copied().unwrap_or(-1.0);
+    }
+}
+
+/// Writes rows with every digit of their values, atomically: the file appears whole or not at all.
+///
+/// # Errors
+/// [`DatasetError::Field`] for a row with a value that is not finite (nothing is written), and
+/// [`DatasetError::Write`].
+pub fn write_results(file: &Path, rows: &[ResultRow]) -> Result<(), DatasetError> {
+    let mut text = COLUMNS.join(",");
+    text.push('\n');
+    for (i, row) in rows.iter().enumerate() {
+        let r = rotation_to_row_major(&row.t_cam_model.rotation);
+        let t_mm = translation_to_mm(&row.t_cam_model.translation);
+        for (field, values) in
+            [("score", &[row.score][..]), ("R", &r), ("t", &t_mm), ("time", &[row.time])]
+        {
+            if values.iter().any(|v| !v.is_finite()) {
+                return Err(DatasetError::Field {
+                    file: file.to_path_buf(),
+                    field: format!(
+                        "row {i} (scene {}, image {}): {field}",
+                        row.scene_id, row.im_id
+                    ),
+                    problem: "not finite".into(),
+                });
+            }
+        }
+        let ResultRow { scene_id, im_id, obj_id, score, time, .. } = row;
+        // Writing to a string cannot fail.
+        let _ = writeln!(
+            text,
+            "{scene_id},{im_id},{obj_id},{score},{},{},{time}",
+            spaced(&r),
+            spaced(&t_mm)
+        );
+    }
+    write_atomically(file, text.as_bytes())
+}
+
+/// Shortest decimals that read back as the same numbers, separated by spaces.
+fn spaced(values: &[f64]) -> String {
+    values.iter().map(f64::to_string).collect::<Vec<_>>().join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Translation3, UnitQuaternion, Vector3};
+
+    const IDENTITY: &str = "1 0 0 0 1 0 0 0 1";
+
+    fn read(text: &str) -> ReadResults {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("poses.csv");
+        fs::write(&path, text).unwrap();
+        read_results(&path).unwrap()
+    }
+
+    fn row(i: u32) -> ResultRow {
+        let f = f64::from(i);
+        ResultRow {
+            scene_id: 4,
+            im_id: i,
+            obj_id: 7,
+            score: 1.0 / (1.0 + f),
+            t_cam_model: Isometry3::from_parts(
+                Translation3::new(0.1 / (f + 3.0), -0.02 * f, 0.4379152083),
+                UnitQuaternion::from_scaled_axis(Vector3::new(0.3 * f, 1.0, -0.7)),
+            ),
+            time: 0.125,
+        }
+    }
+
+    #[test]
+    fn written_rows_read_back_to_the_last_digits() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("out.csv");
+        let rows: Vec<_> = (0..5).map(row).collect();
+        write_results(&path, &rows).unwrap();
+        let back = read_results(&path).unwrap();
+        assert!(back.errors.is_empty());
+        assert_eq!(back.rows.len(), 5);
+        for (a, b) in rows.iter().zip(&back.rows) {
+            assert_eq!(
+                (a.scene_id, a.im_id, a.obj_id, a.score, a.time),
+                (b.scene_id, b.im_id, b.obj_id, b.score, b.time)
+            );
+            assert!(
+                (a.t_cam_model.translation.vector - b.t_cam_model.translation.vector).norm()
+                    < 1e-15
+            );
+            assert!(a.t_cam_model.rotation.angle_to(&b.t_cam_model.rotation) < 1e-14);
+        }
+        assert!(
+            fs::read_to_string(&path)
+                .unwrap()
+                .starts_with("scene_id,im_id,obj_id,score,R,t,time\n4,0,7,1,")
+        );
+    }
+
+    #[test]
+    fn malformed_rows_are_named_and_the_others_returned() {
+        let good = format!("4,0,7,1,{IDENTITY},1 2 300,-1");
+        let text = format!(
+            "scene_id,im_id,obj_id,score,R,t,time\n{good}\n\
+             4,1,7,1,{IDENTITY},1 2 300\n\
+             4,2,7,1,1 0 0 0 1 0 0 0 nan,1 2 300,-1\n\
+             4,3,7,1,2 0 0 0 1 0 0 0 1,1 2 300,-1\n\
+             4,4,7,1,{IDENTITY},1 2,-1\n\
+             4,5,seven,1,{IDENTITY},1 2 300,-1\n\
+             4,6,7,inf,{IDENTITY},1 2 300,-1\n\
+             4,7,7,1,{IDENTITY},1 2 300,soon\n\
+             4,8,7,1,-1 0 0 0 1 0 0 0 1,1 2 300,-1\n\
+             {good}\n4,9,7,1,1 0 0"
+        );
+        let results = read(&text);
+        assert_eq!(results.rows.len(), 2);
+        let named: Vec<_> = results.errors.iter().map(|e| (e.line, e.field)).collect();
+        let expected = [
+            (3, "row"),
+            (4, "R"),
+            (5, "R"),
+            (6, "t"),
+            (7, "obj_id"),
+            (8, "score"),
+            (9, "time"),
+            (10, "R"),
+            (12, "row"),
+        ];
+        assert_eq!(named, expected);
+        let message = results.errors[0].to_string();
+        assert!(
+            message.contains("poses.csv: line 3: row: expected 7 columns, found 6"),
+            "{message}"
+        );
+    }
+
+    #[test]
+    fn rounded_rotations_are_made_orthonormal() {
+        let c = std::f64::consts::FRAC_1_SQRT_2;
+        let results = read("4,0,7,1,0.7071 -0.7071 0 0.7071 0.7071 0 0 0 1,0 0 500,-1\n");
+        let m = results.rows[0].t_cam_model.rotation.to_rotation_matrix();
+        assert!((m[(0, 0)] - c).abs() < 1e-15 && (m[(1, 0)] - c).abs() < 1e-15);
+        assert!((results.rows[0].t_cam_model.translation.vector.z - 0.5).abs() < 1e-16);
+    }
+
+    #[test]
+    fn instances_count_malformed_rows_too() {
+        let results = read(&format!(
+            "1,0,7,1,{IDENTITY},0 0 500,-1\n1,0,8,1,{IDENTITY},0 0,-1\n1,1,7,1,{IDENTITY},0 0 500,-1\n1,0,9,1,{IDENTITY},0 0 500,-1\n"
+        ));
+        assert_eq!(results.instances, [0, 0, 2]);
+        assert_eq!(results.rows.iter().map(|r| r.obj_id).collect::<Vec<_>>(), [7, 7, 9]);
+    }
+
+    #[test]
+    fn rows_of_an_image_share_its_time() {
+        let mut rows = [row(0), row(1), row(0), row(1), row(2)];
+        rows[3].time = -1.0;
+        rows[2].time = 1.0;
+        share_image_times(&mut rows);
+        assert_eq!(rows.map(|r| r.time), [1.125, -1.0, 1.125, -1.0, 0.125]);
+    }
+
+    #[test]
+    fn absent_and_empty_files_and_rows_that_are_not_finite_are_errors() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("none.csv");
+        assert!(matches!(read_results(&path), Err(DatasetError::Missing { file }) if file == path));
+        fs::write(&path, "\n").unwrap();
+        assert!(
+            matches!(read_results(&path), Err(DatasetError::Malformed { file, .. }) if file == path)
+        );
+        fs::remove_file(&path).unwrap();
+        let mut bad = row(1);
+        bad.score = f64::NAN;
+        let error = write_results(&path, &[row(0), bad]).unwrap_err();
+        assert!(error.to_string().contains("row 1 (scene 4, image 1): score"), "{error}");
+        assert!(!path.exists());
+    }
+}

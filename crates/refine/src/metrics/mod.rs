@@ -1,0 +1,25 @@
+//! Metrics: how far a pose is from the truth, how it touches the hand, and tables of such numbers.
+//!
+//! Distances are in metres unless a name ends in its unit. Definitions: PE, OE, CA and IV of the paper
+//! this project follows; ADD and ADI of Hinterstoisser et al. (ACCV 2012); MSSD and MSPD of the BOP
+//! challenge (Hodaň et al., ECCVW 2020).
+
+mod add;
+mod contact;
+mod nearest;
+mod pose_error;
+mod score;
+mod summary;
+mod surface_distance;
+mod symmetry;
+mod table;
+
+pub use add::{add, adi};
+pub use contact::{CONTACT_DISTANCE, CONTACT_SAMPLES, ContactModel, contact_area_cm2};
+pub use nearest::NearestPoint;
+pub use pose_error::{oe_deg, oe_symmetric_deg, pe_cm};
+pub use score::{COLUMNS, PoseScore, ScoredModel};
+pub use summary::{Average, ScoredRow, Statistic, Statistics, Summary, summarize};
+pub use surface_distance::{mspd, mssd};
+pub use symmetry::{CONTINUOUS_STEPS, ContinuousSymmetry, Symmetries};
+pub use table::Table;
