@@ -1,0 +1,214 @@
+//! The outline of a posed mesh: silhouette edges that separate it from the background.
+
+use crate::model::NONE;
+use crate::posed::{Posed, Region};
+
+/// Longest piece of an edge that is judged as a whole \[px\].
+const PIECE: f32 = 4.0;
+/// How far outside an edge it is probed for other parts of the object \[px\]: small against a pixel, large against
+/// the rounding of coordinates.
+const PROBE: f32 = 0.02;
+
+/// A piece of the outline.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Piece {
+    /// The visible face at the edge, and the corners between which the edge runs.
+    pub(crate) face: u32,
+    pub(crate) corners: [u8; 2],
+    /// Screen positions of the whole edge's ends \[px\].
+    pub(crate) a: [f32; 2],
+    pub(crate) b: [f32; 2],
+    /// The part of the edge (share of its screen length) that belongs to the outline.
+    pub(crate) range: [f32; 2],
+    /// Unit normal in the image, away from the object.
+    pub(crate) outward: [f32; 2],
+}
+
+/// The point of a piece next to a pixel.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Foot {
+    /// Share of the edge's screen length.
+    pub(crate) t: f32,
+    /// From the foot to the pixel \[px\].
+    pub(crate) offset: [f32; 2],
+    pub(crate) distance_squared: f32,
+}
+
+impl Piece {
+    #[inline]
+    pub(crate) fn foot(&self, x: f32, y: f32) -> Foot {
+        let d = [self.b[0] - self.a[0], self.b[1] - self.a[1]];
+        let r = [x - self.a[0], y - self.a[1]];
+        let t = ((r[0] * d[0] + r[1] * d[1]) / (d[0] * d[0] + d[1] * d[1]))
+            .max(self.range[0])
+            .min(self.range[1]);
+        let offset = [r[0] - t * d[0], r[1] - t * d[1]];
+        Foot { t, offset, distance_squared: offset[0] * offset[0] + offset[1] * offset[1] }
+    }
+}
+
+/// A silhouette edge: where the number of surface layers changes.
+struct Segment {
+    a: [f32; 2],
+    b: [f32; 2],
+    /// Layers gained by crossing from the side where a→b runs up the rows.
+    layers: f32,
+}
+
+/// The pieces of the outline that come within `margin` pixels of `region`.
+///
+/// An edge is a silhouette where exactly one of its faces is drawn, or one is seen from outside and the
+/// other from inside. The oriented silhouette is the boundary of the drawn faces, so its winding number about an image
+/// point is the number of layers there; a piece is part of the outline if there are none just outside it. Where
+/// the object hides parts of itself there is no background to uncover, and those inner contours are left out.
+pub(crate) fn outline(posed: &Posed, region: &Region, margin: f32) -> Vec<Piece> {
+    let mut segments = Vec::new();
+    let mut candidates = Vec::new();
+    for edge in &posed.model.edges {
+        let own = posed.facing[edge.face as usize];
+        let other = if edge.other == NONE { 0 } else { posed.facing[edge.other as usize] };
+        if own == other {
+            continue;
+        }
+        let screen = edge.vertices.map(|v| posed.screen[v as usize]);
+        // A drawn face has all its corners in front of the camera.
+        let (a, b) = ([screen[0][0], screen[0][1]], [screen[1][0], screen[1][1]]);
+        let layers = f32::from(other) - f32::from(own);
+        segments.push(Segment { a, b, layers });
+        let use_own = own == 1 || other == 0;
+        let (face, corner) =
+            if use_own { (edge.face, edge.corner) } else { (edge.other, edge.other_corner) };
+        let (a, b) = if use_own { (a, b) } else { (b, a) };
+        let sign = f32::from(posed.facing[face as usize]);
+        let corners = [corner, (corner + 1) % 3];
+        let d = [b[0] - a[0], b[1] - a[1]];
+        let length = d[0].hypot(d[1]);
+        // Shorter edges are spanned by their neighbours' ends.
+        if length > 1e-4 && length.is_finite() {
+            let outward = [-sign * d[1] / length, sign * d[0] / length];
+            candidates.push((Piece { face, corners, a, b, range: [0.0, 1.0], outward }, length));
+        }
+    }
+    let layers = Layers::new(segments, region, margin + 1.0);
+    let mut pieces = Vec::new();
+    for (edge, length) in candidates {
+        let Some([start, end]) = clip(&edge, region, margin) else { continue };
+        let count = ((end - start) * length / PIECE).ceil().max(1.0);
+        for i in 0..count as usize {
+            let at = |j: f32| start + (end - start) * j / count;
+            let range = [at(i as f32), at(i as f32 + 1.0)];
+            let middle = 0.5 * (range[0] + range[1]);
+            let probe = |k: usize| {
+                edge.a[k] + middle * (edge.b[k] - edge.a[k]) + PROBE * edge.outward[k]
+            };
+            if layers.at(probe(0), probe(1)) < 0.5 {
+                pieces.push(Piece { range, ..edge });
+            }
+        }
+    }
+    pieces
+}
+
+/// The share of an edge within `margin` of `region`.
+fn clip(edge: &Piece, region: &Region, margin: f32) -> Option<[f32; 2]> {
+    let (mut start, mut end) = (0.0f32, 1.0f32);
+    let bounds = [(region.x0, region.x1), (region.y0, region.y1)];
+    for (k, (low, high)) in bounds.into_iter().enumerate() {
+        let (low, high) = (low as f32 - margin, high as f32 - 1.0 + margin);
+        let d = edge.b[k] - edge.a[k];
+        if d.abs() < 1e-6 {
+            if edge.a[k] < low || edge.a[k] > high {
+                return None;
+            }
+            continue;
+        }
+        let (t0, t1) = ((low - edge.a[k]) / d, (high - edge.a[k]) / d);
+        start = start.max(t0.min(t1));
+        end = end.min(t0.max(t1));
+    }
+    (start < end).then_some([start, end])
+}
+
+/// Counts surface layers at image points, from the silhouette sorted into rows.
+struct Layers {
+    segments: Vec<Segment>,
+    first_row: f32,
+    rows: Vec<Vec<u32>>,
+}
+
+impl Layers {
+    fn new(segments: Vec<Segment>, region: &Region, margin: f32) -> Self {
+        let first_row = (region.y0 as f32 - margin).floor();
+        let count = ((region.y1 as f32 + margin).ceil() - first_row) as usize + 1;
+        let mut rows = vec![Vec::new(); count];
+        for (index, s) in segments.iter().enumerate() {
+            let low = s.a[1].min(s.b[1]).floor() - first_row;
+            let high = s.a[1].max(s.b[1]).floor() - first_row;
+            if high < 0.0 || low >= count as f32 {
+                continue;
+            }
+            let last = (high as usize).min(count - 1);
+            rows[low.max(0.0) as usize..=last].iter_mut().for_each(|r| r.push(index as u32));
+        }
+        Self { segments, first_row, rows }
+    }
+
+    fn at(&self, x: f32, y: f32) -> f32 {
+        let row = y.floor() - self.first_row;
+        if row < 0.0 || row >= self.rows.len() as f32 {
+            return 0.0;
+        }
+        let mut layers = 0.0;
+        for &index in &self.rows[row as usize] {
+            let s = &self.segments[index as usize];
+            // Half-open in y, so that a shared vertex counts once.
+            let up = s.a[1] <= y;
+            if up == (s.b[1] <= y) {
+                continue;
+            }
+            let crossing = s.a[0] + (y - s.a[1]) / (s.b[1] - s.a[1]) * (s.b[0] - s.a[0]);
+            if crossing > x {
+                layers += if up { s.layers } else { -s.layers };
+            }
+        }
+        layers
+    }
+}
+
+/// For each pixel of some rows, the nearest piece of the outline, if within the band.
+pub(crate) struct Band {
+    pub(crate) distance_squared: Vec<f32>,
+    pub(crate) piece: Vec<u32>,
+}
+
+impl Band {
+    pub(crate) fn new(pieces: &[Piece], rows: &Region, half_width: f32) -> Self {
+        let width = rows.width();
+        let count = width * (rows.y1 - rows.y0);
+        let limit = half_width * half_width;
+        let mut band = Self { distance_squared: vec![limit; count], piece: vec![NONE; count] };
+        for (index, piece) in pieces.iter().enumerate() {
+            let end = |t: f32, k: usize| piece.a[k] + t * (piece.b[k] - piece.a[k]);
+            let span = |k: usize, first: usize, last: usize| {
+                let (p, q) = (end(piece.range[0], k), end(piece.range[1], k));
+                let low = (p.min(q) - half_width).ceil().max(first as f32);
+                let high = (p.max(q) + half_width).floor().min(last as f32 - 1.0);
+                (low <= high).then(|| low as usize..high as usize + 1)
+            };
+            let Some(ys) = span(1, rows.y0, rows.y1) else { continue };
+            let Some(xs) = span(0, rows.x0, rows.x1) else { continue };
+            for y in ys {
+                let row = (y - rows.y0) * width;
+                for x in xs.clone() {
+                    let d = piece.foot(x as f32, y as f32).distance_squared;
+                    let at = row + x - rows.x0;
+                    if d < band.distance_squared[at] {
+                        band.distance_squared[at] = d;
+                        band.piece[at] = index as u32;
+                    }
+                }
+            }
+        }
+        band
+    }
+}

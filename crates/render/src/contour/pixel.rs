@@ -1,0 +1,290 @@
+//! The blended value of one pixel and its derivatives by the pose.
+
+use nalgebra::Vector3;
+
+use super::outline::{Foot, Piece};
+use super::sums::Row;
+use super::surface::{Lighting, Shaded, shade};
+use crate::posed::Posed;
+
+/// What a pixel shows of the object: colour and coverage after blending with the black background, the
+/// depth of the surface there, and their derivatives by the twist.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Pixel {
+    /// α C.
+    pub(crate) color: [f32; 3],
+    /// α: one inside, one half on the outline, zero outside.
+    pub(crate) coverage: f32,
+    /// Z of the surface, or outside of the nearest outline point \[m\].
+    pub(crate) z: f32,
+    /// Weight of the depth here: one inside, falling to zero at the outline, where depth says little.
+    pub(crate) depth_weight: f32,
+    pub(crate) color_rows: [Row; 3],
+    pub(crate) coverage_row: Row,
+    pub(crate) z_row: Row,
+    pub(crate) depth_weight_row: Row,
+}
+
+/// A posed, lit model, and the point about which twists turn (camera frame).
+pub(crate) struct Scene<'a> {
+    pub(crate) posed: &'a Posed<'a>,
+    pub(crate) lighting: &'a Lighting,
+    pub(crate) half_width: f32,
+    pub(crate) twist_center: Vector3<f32>,
+}
+
+/// The smooth step from 1 at −w to 0 at +w, and its derivative.
+#[inline]
+fn falling_step(s: f32, w: f32) -> (f32, f32) {
+    let x = ((w - s) / (2.0 * w)).clamp(0.0, 1.0);
+    (x * x * (3.0 - 2.0 * x), -3.0 * x * (1.0 - x) / w)
+}
+
+#[inline]
+fn row(linear: Vector3<f32>, angular: Vector3<f32>) -> Row {
+    [linear.x, linear.y, linear.z, angular.x, angular.y, angular.z]
+}
+
+#[inline]
+fn add_scaled(to: &mut Row, from: &Row, factor: f32) {
+    to.iter_mut().zip(from).for_each(|(a, b)| *a += factor * b);
+}
+
+impl Scene<'_> {
+    /// A pixel that `face` covers; `edge` is the outline piece within the band, if any.
+    #[inline]
+    pub(crate) fn inside<const DERIVATIVES: bool>(
+        &self,
+        x: f32,
+        y: f32,
+        face: u32,
+        inverse_z: f32,
+        edge: Option<&Piece>,
+    ) -> Pixel {
+        let face = face as usize;
+        let b = self.barycentric(face, x, y);
+        let shaded = shade::<DERIVATIVES>(self.posed, self.lighting, face, b);
+        let z = 1.0 / inverse_z;
+        let mut pixel =
+            Pixel { color: shaded.color, coverage: 1.0, z, depth_weight: 1.0, ..Pixel::default() };
+        if DERIVATIVES {
+            self.interior_rows(face, self.posed.ray(x, y) * z, &shaded, &mut pixel);
+        }
+        if let Some(piece) = edge {
+            let foot = piece.foot(x, y);
+            self.blend::<DERIVATIVES>(piece, &foot, -1.0, &mut pixel);
+        }
+        pixel
+    }
+
+    /// A pixel that no face covers, next to the outline: it shows the colour of the nearest outline point.
+    #[inline]
+    pub(crate) fn outside<const DERIVATIVES: bool>(&self, x: f32, y: f32, piece: &Piece) -> Pixel {
+        let foot = piece.foot(x, y);
+        let (b, point, ends) = self.on_edge(piece, foot.t);
+        let shaded = shade::<DERIVATIVES>(self.posed, self.lighting, piece.face as usize, b);
+        let mut pixel =
+            Pixel { color: shaded.color, coverage: 1.0, z: point.z, ..Pixel::default() };
+        if DERIVATIVES {
+            let slide = self.slide(piece, &foot, &point, &ends);
+            self.foot_rows(piece, &shaded, &slide, &mut pixel);
+        }
+        self.blend::<DERIVATIVES>(piece, &foot, 1.0, &mut pixel);
+        pixel
+    }
+
+    /// Colour of a face at pixel (x, y), unblended.
+    pub(crate) fn color(&self, face: u32, x: f32, y: f32) -> [f32; 3] {
+        let b = self.barycentric(face as usize, x, y);
+        shade::<false>(self.posed, self.lighting, face as usize, b).color
+    }
+
+    /// Perspective-correct barycentric coordinates of pixel (x, y) on a face.
+    #[inline]
+    pub(crate) fn barycentric(&self, face: usize, x: f32, y: f32) -> [f32; 3] {
+        let [a, b, c] = self.posed.corners(face);
+        let cross = |p: [f32; 3], q: [f32; 3]| (p[0] - x) * (q[1] - y) - (p[1] - y) * (q[0] - x);
+        let weights = [cross(b, c) * a[2], cross(c, a) * b[2], cross(a, b) * c[2]];
+        let sum = weights[0] + weights[1] + weights[2];
+        if sum == 0.0 {
+            return [1.0, 0.0, 0.0];
+        }
+        weights.map(|w| w / sum)
+    }
+
+    /// Rows of colour and depth at surface point `point` (camera frame), seen through a fixed pixel.
+    ///
+    /// A twist with velocity v(X) = t + ω × (X − c) moves the surface; the pixel then sees another material point.
+    /// With the colour gradient g along the surface and normal n this changes the colour by −h·v,
+    /// h = g − n (g·X)/(n·X), and the depth by n·v/(n·d), d = X/Z.
+    #[inline]
+    fn interior_rows(&self, face: usize, point: Vector3<f32>, shaded: &Shaded, pixel: &mut Pixel) {
+        let [p0, p1, p2] =
+            self.posed.model.faces[face].map(|v| self.posed.position[v as usize]);
+        let (e1, e2) = (p1 - p0, p2 - p0);
+        let n = e1.cross(&e2);
+        let inverse = 1.0 / n.norm_squared();
+        // Of the corner, where rounding disturbs the plane's offset least.
+        let facing = n.dot(&p0);
+        let arm = point - self.twist_center;
+        let moving = [e2.cross(&n), n.cross(&e1)].map(|gradient| {
+            let g = gradient * inverse;
+            let h = g - n * (g.dot(&point) / facing);
+            row(-h, -arm.cross(&h))
+        });
+        self.color_rows(shaded, &moving, pixel);
+        let n = n * (point.z / facing);
+        pixel.z_row = row(n, arm.cross(&n));
+    }
+
+    /// Rows of the colour of an outline point, whose material point slides along the edge by `slide`.
+    #[inline]
+    fn foot_rows(&self, piece: &Piece, shaded: &Shaded, slide: &Row, pixel: &mut Pixel) {
+        // Moving along the edge by dt changes the coordinates of its two corners by -dt and +dt.
+        let moving = [1, 2].map(|corner| {
+            let sign = match () {
+                () if piece.corners[0] == corner => -1.0,
+                () if piece.corners[1] == corner => 1.0,
+                () => 0.0,
+            };
+            slide.map(|v| sign * v)
+        });
+        self.color_rows(shaded, &moving, pixel);
+    }
+
+    /// Colour rows from those of the barycentric coordinates of corners 1 and 2.
+    #[inline]
+    fn color_rows(&self, shaded: &Shaded, moving: &[Row; 2], pixel: &mut Pixel) {
+        let center = self.posed.center - self.twist_center;
+        for k in 0..3 {
+            let [first, second] = [shaded.along[0][k], shaded.along[1][k]];
+            let turning = shaded.turning[k];
+            let out = &mut pixel.color_rows[k];
+            for i in 0..6 {
+                out[i] = first * moving[0][i] + second * moving[1][i];
+            }
+            (0..3).for_each(|i| out[i + 3] += turning[i]);
+            // The texture's level follows the depth of the model's centre: (0, 0, 1) and center × (0, 0, 1).
+            let level = shaded.level[k] * self.posed.level_dz;
+            out[2] += level;
+            out[3] += level * center.y;
+            out[4] -= level * center.x;
+        }
+    }
+
+    /// Fades the pixel by its signed distance to the outline (`side` is −1 inside, 1 outside).
+    #[inline]
+    fn blend<const DERIVATIVES: bool>(
+        &self,
+        piece: &Piece,
+        foot: &Foot,
+        side: f32,
+        pixel: &mut Pixel,
+    ) {
+        let distance = foot.distance_squared.sqrt();
+        let s = side * distance;
+        let w = self.half_width;
+        let (alpha, slope) = falling_step(s, w);
+        // The same step, compressed to the inner half of the band.
+        let (outer, outer_slope) = falling_step(2.0 * s + w, w);
+        let color = pixel.color;
+        pixel.color = color.map(|c| alpha * c);
+        pixel.coverage = alpha;
+        pixel.depth_weight = outer;
+        if !DERIVATIVES {
+            return;
+        }
+        let outward = if distance > 1e-3 {
+            foot.offset.map(|o| o * side / distance)
+        } else {
+            piece.outward
+        };
+        let (_, point, _) = self.on_edge(piece, foot.t);
+        // The foot moves by J v along the outward normal, and the signed distance shrinks by as much.
+        let ds = self.image_motion(outward, &point).map(|v| -v);
+        for (rows, c) in pixel.color_rows.iter_mut().zip(color) {
+            rows.iter_mut().for_each(|v| *v *= alpha);
+            add_scaled(rows, &ds, slope * c);
+        }
+        pixel.coverage_row = ds.map(|v| slope * v);
+        pixel.depth_weight_row = ds.map(|v| 2.0 * outer_slope * v);
+    }
+
+    /// Barycentric coordinates and camera-frame position at screen share `t` of an edge, and its ends.
+    #[inline]
+    fn on_edge(&self, piece: &Piece, t: f32) -> ([f32; 3], Vector3<f32>, [Vector3<f32>; 2]) {
+        let face = self.posed.model.faces[piece.face as usize];
+        let ids = piece.corners.map(|c| face[c as usize] as usize);
+        let ends = ids.map(|v| self.posed.position[v]);
+        let (wa, wb) =
+            ((1.0 - t) * self.posed.screen[ids[0]][2], t * self.posed.screen[ids[1]][2]);
+        let share = wb / (wa + wb);
+        let mut b = [0.0; 3];
+        b[piece.corners[0] as usize] = 1.0 - share;
+        b[piece.corners[1] as usize] = share;
+        (b, ends[0] + (ends[1] - ends[0]) * share, ends)
+    }
+
+    /// Motion of the image of `point` along the image direction `direction` \[px\] by the twist.
+    #[inline]
+    fn image_motion(&self, direction: [f32; 2], point: &Vector3<f32>) -> Row {
+        let a = self.image_gradient(direction, point);
+        row(a, (point - self.twist_center).cross(&a))
+    }
+
+    /// Gradient by the point of its image position along `direction`.
+    #[inline]
+    fn image_gradient(&self, direction: [f32; 2], point: &Vector3<f32>) -> Vector3<f32> {
+        let x = self.posed.focal[0] * direction[0];
+        let y = self.posed.focal[1] * direction[1];
+        Vector3::new(x, y, -(x * point.x + y * point.y) / point.z) / point.z
+    }
+
+    /// How far the material point under the foot slides along its edge (share of the edge in space).
+    ///
+    /// The foot stays where (π(E) − p)·τ = 0 with the edge's image direction τ; differentiating this gives
+    /// dt = (−τ·dπ(E) + s n·(dπ(B) − dπ(A))/ℓ) / (τ·J(B − A)), and zero at an end of the edge.
+    #[inline]
+    fn slide(
+        &self,
+        piece: &Piece,
+        foot: &Foot,
+        point: &Vector3<f32>,
+        ends: &[Vector3<f32>; 2],
+    ) -> Row {
+        if foot.t <= piece.range[0] || foot.t >= piece.range[1] {
+            return [0.0; 6];
+        }
+        let d = [piece.b[0] - piece.a[0], piece.b[1] - piece.a[1]];
+        let length = d[0].hypot(d[1]);
+        let tau = d.map(|v| v / length);
+        let speed = self.image_gradient(tau, point).dot(&(ends[1] - ends[0]));
+        let along = self.image_motion(tau, point);
+        // The offset from foot to pixel is s n, and perpendicular to τ.
+        let turn_a = self.image_motion(foot.offset, &ends[0]);
+        let turn_b = self.image_motion(foot.offset, &ends[1]);
+        let mut out = [0.0; 6];
+        for i in 0..6 {
+            out[i] = (-along[i] + (turn_b[i] - turn_a[i]) / length) / speed;
+        }
+        out
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_step_falls_smoothly_over_the_band() {
+        let w = 1.3;
+        assert_eq!(falling_step(-w, w), (1.0, 0.0));
+        assert_eq!(falling_step(w, w).0, 0.0);
+        assert_eq!(falling_step(0.0, w).0, 0.5);
+        for s in [-1.1f32, -0.3, 0.0, 0.9] {
+            let d = 1e-2;
+            let difference = (falling_step(s + d, w).0 - falling_step(s - d, w).0) / (2.0 * d);
+            assert!((difference - falling_step(s, w).1).abs() < 1e-3);
+        }
+    }
+}

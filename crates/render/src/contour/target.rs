@@ -1,0 +1,210 @@
+//! What the rendered object is compared with.
+
+use crate::camera::Camera;
+use crate::image::{DepthImage, Mask, RgbImage};
+use crate::posed::Region;
+
+/// A segmented image: colour where the object is, black elsewhere, with optional depth and the depth of
+/// known bodies that may hide the object.
+#[derive(Clone, Debug)]
+pub struct Target {
+    pub(crate) camera: Camera,
+    /// Observed colour inside the mask, zero outside.
+    pub(crate) color: Vec<[f32; 3]>,
+    /// Share of the pixel that the mask covers, 0..=1.
+    pub(crate) coverage: Vec<f32>,
+    /// Z \[m\], zero where missing or outside the mask.
+    pub(crate) depth: Option<DepthImage>,
+    pub(crate) occluder: Option<DepthImage>,
+    /// Around all covered pixels.
+    pub(crate) bounds: Region,
+    /// One over three times the covered area; pose-independent.
+    pub(crate) normalisation: f64,
+}
+
+/// Why images make no target.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum TargetError {
+    /// An image does not have the camera's size.
+    #[error("{image} is {width} x {height}, the camera {camera_width} x {camera_height}")]
+    Size {
+        /// `"image"`, `"mask"`, `"depth"` or `"occluder"`.
+        image: &'static str,
+        /// Columns.
+        width: usize,
+        /// Rows.
+        height: usize,
+        /// Columns of the camera.
+        camera_width: usize,
+        /// Rows of the camera.
+        camera_height: usize,
+    },
+    /// The mask is empty: there is nothing to compare with.
+    #[error("mask has no pixel set")]
+    EmptyMask,
+}
+
+impl Target {
+    /// The object's colours: `image` where `mask` is set, black elsewhere.
+    ///
+    /// # Errors
+    /// When a size differs from the camera's or no pixel of the mask is set.
+    pub fn new(camera: Camera, image: &RgbImage, mask: &Mask) -> Result<Self, TargetError> {
+        check(&camera, "image", image.width(), image.height())?;
+        check(&camera, "mask", mask.width(), mask.height())?;
+        let coverage = mask.pixels().iter().map(|&m| if m { 1.0 } else { 0.0 }).collect();
+        let segmented = image.pixels().iter().zip(mask.pixels());
+        let color = segmented.map(|(c, &m)| if m { *c } else { [0.0; 3] }).collect();
+        Self::assemble(camera, color, coverage)
+    }
+
+    /// Adds measured depth; only what lies inside the mask is used.
+    ///
+    /// # Errors
+    /// When its size differs from the camera's.
+    pub fn with_depth(mut self, depth: &DepthImage) -> Result<Self, TargetError> {
+        check(&self.camera, "depth", depth.width(), depth.height())?;
+        let mut depth = depth.clone();
+        for (z, coverage) in depth.pixels_mut().iter_mut().zip(&self.coverage) {
+            // A NaN is not above zero and so becomes missing.
+            if !(*z > 0.0 && z.is_finite() && *coverage > 0.5) {
+                *z = 0.0;
+            }
+        }
+        self.depth = Some(depth);
+        Ok(self)
+    }
+
+    /// Adds the z-buffer of known bodies (see [`crate::depth_map`]). Where they are nearer than the object
+    /// there is no residual and no contour.
+    ///
+    /// # Errors
+    /// When its size differs from the camera's.
+    pub fn with_occluder(mut self, occluder: DepthImage) -> Result<Self, TargetError> {
+        check(&self.camera, "occluder", occluder.width(), occluder.height())?;
+        self.occluder = Some(occluder);
+        Ok(self)
+    }
+
+    /// The target with one pixel for every block of `factor` by `factor`: means of colour and coverage, medians
+    /// of depth.
+    ///
+    /// # Errors
+    /// When nothing of the mask is left.
+    pub fn downsampled(&self, factor: usize) -> Result<Self, TargetError> {
+        let factor = factor.max(1);
+        let camera = self.camera.scaled(1.0 / factor as f64);
+        let (mut color, mut coverage) = (Vec::new(), Vec::new());
+        let share = 1.0 / (factor * factor) as f32;
+        for y in 0..camera.height {
+            for x in 0..camera.width {
+                let (mut c, mut a) = ([0.0f32; 3], 0.0);
+                // A block is incomplete only if the whole image is smaller than one.
+                for sy in (y * factor..(y + 1) * factor).filter(|v| *v < self.camera.height) {
+                    for sx in (x * factor..(x + 1) * factor).filter(|v| *v < self.camera.width) {
+                        let at = sy * self.camera.width + sx;
+                        (0..3).for_each(|k| c[k] += share * self.color[at][k]);
+                        a += share * self.coverage[at];
+                    }
+                }
+                color.push(c);
+                coverage.push(a);
+            }
+        }
+        let mut target = Self::assemble(camera, color, coverage)?;
+        if let Some(depth) = &self.depth {
+            target = target.with_depth(&depth.downsampled(factor))?;
+        }
+        if let Some(occluder) = &self.occluder {
+            target = target.with_occluder(occluder.downsampled(factor))?;
+        }
+        Ok(target)
+    }
+
+    /// The camera.
+    pub fn camera(&self) -> &Camera {
+        &self.camera
+    }
+
+    /// Area of the mask \[px\].
+    pub fn area(&self) -> f64 {
+        1.0 / (3.0 * self.normalisation)
+    }
+
+    fn assemble(
+        camera: Camera,
+        color: Vec<[f32; 3]>,
+        coverage: Vec<f32>,
+    ) -> Result<Self, TargetError> {
+        let mut bounds = Region { x0: usize::MAX, y0: usize::MAX, x1: 0, y1: 0 };
+        let mut area = 0.0f64;
+        for (at, &a) in coverage.iter().enumerate().filter(|(_, a)| **a > 0.0) {
+            let (x, y) = (at % camera.width, at / camera.width);
+            bounds.x0 = bounds.x0.min(x);
+            bounds.y0 = bounds.y0.min(y);
+            bounds.x1 = bounds.x1.max(x + 1);
+            bounds.y1 = bounds.y1.max(y + 1);
+            area += a as f64;
+        }
+        if area == 0.0 {
+            return Err(TargetError::EmptyMask);
+        }
+        let normalisation = 1.0 / (3.0 * area);
+        Ok(Self { camera, color, coverage, depth: None, occluder: None, bounds, normalisation })
+    }
+}
+
+fn check(
+    camera: &Camera,
+    image: &'static str,
+    width: usize,
+    height: usize,
+) -> Result<(), TargetError> {
+    if (width, height) == (camera.width, camera.height) {
+        return Ok(());
+    }
+    Err(TargetError::Size {
+        image,
+        width,
+        height,
+        camera_width: camera.width,
+        camera_height: camera.height,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CAMERA: Camera = Camera { fx: 9.0, fy: 9.0, cx: 1.5, cy: 0.5, width: 4, height: 2 };
+
+    #[test]
+    fn sizes_and_empty_masks_are_checked() {
+        let image = RgbImage::filled(4, 2, [0.5; 3]);
+        let mask = Mask::filled(4, 2, true);
+        assert!(Target::new(CAMERA, &image, &mask).is_ok());
+        let wrong = Target::new(CAMERA, &image, &Mask::filled(2, 2, true)).unwrap_err();
+        assert_eq!(wrong.to_string(), "mask is 2 x 2, the camera 4 x 2");
+        let empty = Target::new(CAMERA, &image, &Mask::filled(4, 2, false)).unwrap_err();
+        assert_eq!(empty, TargetError::EmptyMask);
+        let target = Target::new(CAMERA, &image, &mask).unwrap();
+        assert!(target.clone().with_depth(&DepthImage::filled(4, 3, 1.0)).is_err());
+        assert!(target.with_occluder(DepthImage::filled(3, 2, 1.0)).is_err());
+    }
+
+    #[test]
+    fn downsampling_keeps_the_total_of_colour_and_coverage() {
+        let image = RgbImage::filled(4, 2, [0.5, 0.25, 1.0]);
+        let mut mask = Mask::filled(4, 2, false);
+        mask.pixels_mut()[1] = true;
+        let depth = DepthImage::filled(4, 2, 0.7);
+        let target = Target::new(CAMERA, &image, &mask).unwrap().with_depth(&depth).unwrap();
+        assert_eq!(target.bounds, Region { x0: 1, y0: 0, x1: 2, y1: 1 });
+        let half = target.downsampled(2).unwrap();
+        assert_eq!(half.coverage, [0.25, 0.0]);
+        assert_eq!(half.color[0], [0.125, 0.0625, 0.25]);
+        assert!((half.area() - 0.25).abs() < 1e-12);
+        // A lone depth among four pixels is no evidence for the block.
+        assert_eq!(half.depth.unwrap().pixels(), [0.0, 0.0]);
+    }
+}

@@ -1,0 +1,348 @@
+//! Colour, depth and mask images, and their files.
+
+use std::io::Cursor;
+use std::path::{Path, PathBuf};
+
+use image::{DynamicImage, ImageFormat};
+
+/// Why an image could not be read, written or built.
+#[derive(Debug, thiserror::Error)]
+pub enum ImageError {
+    /// The file cannot be read or written.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The file's contents are no image this crate reads, or cannot be encoded.
+    #[error("{}: {source}", path.display())]
+    Codec {
+        /// The file.
+        path: PathBuf,
+        /// What the codec said.
+        source: image::ImageError,
+    },
+    /// The file holds another kind of pixel.
+    #[error("{}: expected {expected}, found {found}", path.display())]
+    Kind {
+        /// The file.
+        path: PathBuf,
+        /// The pixel type this image needs.
+        expected: &'static str,
+        /// The pixel type of the file.
+        found: String,
+    },
+    /// The number of pixels does not match the size.
+    #[error("{found} pixels given for an image of {width} x {height}")]
+    Size {
+        /// Columns.
+        width: usize,
+        /// Rows.
+        height: usize,
+        /// Pixels given.
+        found: usize,
+    },
+    /// A depth scale is zero, negative or not finite.
+    #[error("{}: depth scale {scale} m per unit, expected a finite number above zero", path.display())]
+    Scale {
+        /// The file.
+        path: PathBuf,
+        /// Metres per unit.
+        scale: f64,
+    },
+}
+
+macro_rules! image_type {
+    ($(#[$doc:meta])* $name:ident, $pixel:ty, $zero:expr) => {
+        $(#[$doc])*
+        #[derive(Clone, Debug, PartialEq)]
+        pub struct $name {
+            width: usize,
+            height: usize,
+            pixels: Vec<$pixel>,
+        }
+
+        impl $name {
+            /// An image of `width * height` pixels, row-major from the top-left.
+            ///
+            /// # Errors
+            /// [`ImageError::Size`] when the number of pixels is another.
+            pub fn new(width: usize, height: usize, pixels: Vec<$pixel>) -> Result<Self, ImageError> {
+                if width.checked_mul(height) != Some(pixels.len()) {
+                    return Err(ImageError::Size { width, height, found: pixels.len() });
+                }
+                Ok(Self { width, height, pixels })
+            }
+
+            /// An image of one value.
+            pub fn filled(width: usize, height: usize, value: $pixel) -> Self {
+                Self { width, height, pixels: vec![value; width * height] }
+            }
+
+            /// Columns.
+            pub fn width(&self) -> usize {
+                self.width
+            }
+
+            /// Rows.
+            pub fn height(&self) -> usize {
+                self.height
+            }
+
+            /// Pixels, row-major from the top-left.
+            pub fn pixels(&self) -> &[$pixel] {
+                &self.pixels
+            }
+
+            /// Pixels, row-major from the top-left.
+            pub fn pixels_mut(&mut self) -> &mut [$pixel] {
+                &mut self.pixels
+            }
+
+            /// The pixel in column `x` and row `y`; `None` outside the image.
+            pub fn get(&self, x: usize, y: usize) -> Option<$pixel> {
+                (x < self.width && y < self.height).then(|| self.pixels[y * self.width + x])
+            }
+
+            /// Makes one pixel of every block of `factor` by `factor`, dropping incomplete blocks.
+            fn blocks(&self, factor: usize, mut reduce: impl FnMut(&[$pixel]) -> $pixel) -> Self {
+                let factor = factor.max(1);
+                let (width, height) = (self.width / factor, self.height / factor);
+                let mut block = vec![$zero; factor * factor];
+                let mut pixels = Vec::with_capacity(width * height);
+                for y in 0..height {
+                    for x in 0..width {
+                        for (dy, row) in block.chunks_mut(factor).enumerate() {
+                            let start = (y * factor + dy) * self.width + x * factor;
+                            row.copy_from_slice(&self.pixels[start..start + factor]);
+                        }
+                        pixels.push(reduce(&block));
+                    }
+                }
+                Self { width, height, pixels }
+            }
+        }
+    };
+}
+
+image_type! {
+    /// A colour image, row-major from the top-left; channels in 0..=1 as stored in files.
+    RgbImage, [f32; 3], [0.0; 3]
+}
+image_type! {
+    /// A depth image: Z in the camera frame \[m\], 0 where nothing was measured; row-major from the top-left.
+    DepthImage, f32, 0.0
+}
+image_type! {
+    /// A binary image, row-major from the top-left.
+    Mask, bool, false
+}
+
+impl RgbImage {
+    /// Reads a PNG or JPEG file; grey becomes three equal channels and alpha is dropped.
+    ///
+    /// # Errors
+    /// When the file cannot be read or decoded.
+    pub fn load(path: &Path) -> Result<Self, ImageError> {
+        let image = decode(path)?.into_rgb32f();
+        let (width, height) = (image.width() as usize, image.height() as usize);
+        Self::new(width, height, image.pixels().map(|p| p.0).collect())
+    }
+
+    /// Writes 8 bits a channel as PNG or JPEG, by the extension; values are clamped to 0..=1. The file appears
+    /// whole or not at all.
+    ///
+    /// # Errors
+    /// When the format is unknown or the file cannot be written.
+    pub fn save(&self, path: &Path) -> Result<(), ImageError> {
+        let byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0).round() as u8;
+        let bytes = self.pixels.iter().flat_map(|p| p.map(byte)).collect();
+        let image = image::RgbImage::from_raw(self.width as u32, self.height as u32, bytes);
+        encode(path, image.map(DynamicImage::ImageRgb8))
+    }
+
+    /// The mean of every block of `factor` by `factor` pixels.
+    pub fn downsampled(&self, factor: usize) -> Self {
+        self.blocks(factor, |block| {
+            let mut sum = [0.0f32; 3];
+            block.iter().for_each(|p| (0..3).for_each(|c| sum[c] += p[c]));
+            sum.map(|s| s / block.len() as f32)
+        })
+    }
+}
+
+impl DepthImage {
+    /// Reads a 16-bit grey PNG file whose unit is `scale` metres (BOP: `depth_scale * 0.001`).
+    ///
+    /// # Errors
+    /// When the file cannot be read, is not 16-bit grey, or `scale` is not positive.
+    pub fn load(path: &Path, scale: f64) -> Result<Self, ImageError> {
+        check_scale(path, scale)?;
+        let image = match decode(path)? {
+            DynamicImage::ImageLuma16(image) => image,
+            other => {
+                return Err(ImageError::Kind {
+                    path: path.into(),
+                    expected: "16-bit grey",
+                    found: format!("{:?}", other.color()),
+                });
+            }
+        };
+        let (width, height) = (image.width() as usize, image.height() as usize);
+        Self::new(width, height, image.pixels().map(|p| (p.0[0] as f64 * scale) as f32).collect())
+    }
+
+    /// Writes a 16-bit grey PNG file whose unit is `scale` metres; depths beyond 65535 units saturate. The file
+    /// appears whole or not at all.
+    ///
+    /// # Errors
+    /// When `scale` is not positive or the file cannot be written.
+    pub fn save(&self, path: &Path, scale: f64) -> Result<(), ImageError> {
+        check_scale(path, scale)?;
+        let units = |z: &f32| (*z as f64 / scale).round().clamp(0.0, 65535.0) as u16;
+        let data = self.pixels.iter().map(units).collect();
+        let image = image::ImageBuffer::from_raw(self.width as u32, self.height as u32, data);
+        encode(path, image.map(DynamicImage::ImageLuma16))
+    }
+
+    /// The lower median of the valid depths of every block of `factor` by `factor` pixels (a mean would
+    /// invent surfaces between foreground and background); 0 where fewer than half are valid.
+    pub fn downsampled(&self, factor: usize) -> Self {
+        let mut valid = Vec::new();
+        self.blocks(factor, |block| {
+            valid.clear();
+            valid.extend(block.iter().copied().filter(|z| *z > 0.0));
+            if valid.is_empty() || valid.len() * 2 < block.len() {
+                return 0.0;
+            }
+            valid.sort_by(f32::total_cmp);
+            valid[(valid.len() - 1) / 2]
+        })
+    }
+}
+
+impl Mask {
+    /// Reads an 8-bit mask: a pixel is set where its grey value is above 127.
+    ///
+    /// # Errors
+    /// When the file cannot be read or decoded.
+    pub fn load(path: &Path) -> Result<Self, ImageError> {
+        let image = decode(path)?.into_luma8();
+        let (width, height) = (image.width() as usize, image.height() as usize);
+        Self::new(width, height, image.pixels().map(|p| p.0[0] > 127).collect())
+    }
+
+    /// Writes an 8-bit grey file, 255 where set. The file appears whole or not at all.
+    ///
+    /// # Errors
+    /// When the format is unknown or the file cannot be written.
+    pub fn save(&self, path: &Path) -> Result<(), ImageError> {
+        let bytes = self.pixels.iter().map(|&m| if m { 255 } else { 0 }).collect();
+        let image = image::GrayImage::from_raw(self.width as u32, self.height as u32, bytes);
+        encode(path, image.map(DynamicImage::ImageLuma8))
+    }
+
+    /// Set where at least half of a block of `factor` by `factor` pixels is set.
+    pub fn downsampled(&self, factor: usize) -> Self {
+        self.blocks(factor, |block| block.iter().filter(|m| **m).count() * 2 >= block.len())
+    }
+
+    /// Number of set pixels.
+    pub fn count(&self) -> usize {
+        self.pixels.iter().filter(|m| **m).count()
+    }
+}
+
+fn check_scale(path: &Path, scale: f64) -> Result<(), ImageError> {
+    if scale.is_finite() && scale > 0.0 {
+        return Ok(());
+    }
+    Err(ImageError::Scale { path: path.into(), scale })
+}
+
+fn decode(path: &Path) -> Result<DynamicImage, ImageError> {
+    let io = |source| ImageError::Io { path: path.into(), source };
+    let reader = image::ImageReader::open(path).map_err(io)?.with_guessed_format().map_err(io)?;
+    reader.decode().map_err(|source| ImageError::Codec { path: path.into(), source })
+}
+
+/// Encodes in memory, writes beside the target and renames, so that no reader ever sees half a file.
+fn encode(path: &Path, image: Option<DynamicImage>) -> Result<(), ImageError> {
+    let codec = |source| ImageError::Codec { path: path.into(), source };
+    let io = |source| ImageError::Io { path: path.into(), source };
+    let format = ImageFormat::from_path(path).map_err(codec)?;
+    let mut bytes = Cursor::new(Vec::new());
+    if let Some(image) = image {
+        image.write_to(&mut bytes, format).map_err(codec)?;
+    }
+    let mut name = std::ffi::OsString::from(".");
+    name.push(path.file_name().unwrap_or_default());
+    name.push(format!(".{}.partial", std::process::id()));
+    let partial = path.with_file_name(name);
+    let written = std::fs::write(&partial, bytes.into_inner());
+    if let Err(source) = written.and_then(|()| std::fs::rename(&partial, path)) {
+        // The first failure is the one worth reporting; the leftover may not even exist.
+        let _ = std::fs::remove_file(&partial);
+        return Err(io(source));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn images_survive_a_round_trip_through_files() {
+        let dir = tempfile::tempdir().unwrap();
+        let color: Vec<[f32; 3]> =
+            (0..6).map(|i| [i as f32 / 255.0, 0.2, 1.0 - i as f32 / 255.0]).collect();
+        let color = RgbImage::new(3, 2, color).unwrap();
+        color.save(&dir.path().join("c.png")).unwrap();
+        let back = RgbImage::load(&dir.path().join("c.png")).unwrap();
+        for (a, b) in color.pixels().iter().zip(back.pixels()) {
+            (0..3).for_each(|c| assert!((a[c] - b[c]).abs() < 1e-6));
+        }
+        let depth = DepthImage::new(2, 2, vec![0.0, 0.4567, 1.0, 9.0]).unwrap();
+        depth.save(&dir.path().join("d.png"), 1e-4).unwrap();
+        let back = DepthImage::load(&dir.path().join("d.png"), 1e-4).unwrap();
+        assert_eq!(back.pixels()[..3], [0.0, 0.4567, 1.0]);
+        assert!((back.pixels()[3] - 6.5535).abs() < 1e-6);
+        let mask = Mask::new(3, 1, vec![true, false, true]).unwrap();
+        mask.save(&dir.path().join("m.png")).unwrap();
+        assert_eq!(Mask::load(&dir.path().join("m.png")).unwrap(), mask);
+        // Only the finished files are left.
+        assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 3);
+    }
+
+    #[test]
+    fn errors_name_the_file() {
+        let dir = tempfile::tempdir().unwrap();
+        let missing = dir.path().join("absent.png");
+        assert!(RgbImage::load(&missing).unwrap_err().to_string().contains("absent.png"));
+        let broken = dir.path().join("broken.png");
+        std::fs::write(&broken, b"no picture").unwrap();
+        assert!(Mask::load(&broken).unwrap_err().to_string().contains("broken.png"));
+        let eight_bit = dir.path().join("eight.png");
+        Mask::filled(2, 2, true).save(&eight_bit).unwrap();
+        assert!(matches!(DepthImage::load(&eight_bit, 1e-3), Err(ImageError::Kind { .. })));
+        let color = RgbImage::filled(1, 1, [0.0; 3]);
+        assert!(color.save(&dir.path().join("x.unknown")).is_err());
+        assert!(color.save(&dir.path().join("no/folder.png")).is_err());
+        assert!(matches!(Mask::new(2, 2, vec![true]), Err(ImageError::Size { found: 1, .. })));
+        assert!(matches!(DepthImage::load(&eight_bit, 0.0), Err(ImageError::Scale { .. })));
+    }
+
+    #[test]
+    fn downsampling_reduces_blocks() {
+        let color = RgbImage::new(2, 2, vec![[0.0; 3], [1.0; 3], [0.5; 3], [0.5; 3]]).unwrap();
+        assert_eq!(color.downsampled(2).pixels(), [[0.5; 3]]);
+        let depth = DepthImage::new(2, 2, vec![0.0, 1.0, 2.0, 5.0]).unwrap();
+        assert_eq!(depth.downsampled(2).pixels(), [2.0]);
+        let mask = Mask::new(3, 2, vec![true, false, true, false, true, true]).unwrap();
+        assert_eq!(mask.downsampled(2).pixels(), [true]);
+        assert_eq!(mask.downsampled(2).width(), 1);
+    }
+}

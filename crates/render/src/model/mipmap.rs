@@ -1,0 +1,182 @@
+//! Texture lookup: bilinear inside a level, linear between levels of a box-filtered pyramid.
+
+use prehend_geometry::Texture;
+
+/// A texture with its pyramid of halved copies.
+#[derive(Clone, Debug)]
+pub(crate) struct Mipmap {
+    levels: Vec<Level>,
+}
+
+#[derive(Clone, Debug)]
+struct Level {
+    width: usize,
+    height: usize,
+    texels: Vec<[f32; 3]>,
+}
+
+/// A filtered colour and its derivatives, per channel.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Texel {
+    /// Colour.
+    pub(crate) color: [f32; 3],
+    /// By the first texture coordinate.
+    pub(crate) du: [f32; 3],
+    /// By the second texture coordinate.
+    pub(crate) dv: [f32; 3],
+    /// By the pyramid level.
+    pub(crate) dlevel: [f32; 3],
+}
+
+impl Mipmap {
+    /// The pyramid of `texture`; `None` when it has no pixels or the wrong number of them.
+    pub(crate) fn new(texture: &Texture) -> Option<Self> {
+        let (width, height) = (texture.width, texture.height);
+        if width == 0 || height == 0 || texture.pixels.len() != width * height {
+            return None;
+        }
+        let texels = texture.pixels.iter().map(|p| p.map(|v| v as f32 / 255.0)).collect();
+        let mut levels = vec![Level { width, height, texels }];
+        while let Some(next) = levels.last().and_then(Level::halved) {
+            levels.push(next);
+        }
+        Some(Self { levels })
+    }
+
+    /// Columns and rows of the finest level.
+    pub(crate) fn size(&self) -> (usize, usize) {
+        (self.levels[0].width, self.levels[0].height)
+    }
+
+    /// The coarsest level.
+    pub(crate) fn last_level(&self) -> f32 {
+        (self.levels.len() - 1) as f32
+    }
+
+    /// Colour at texture coordinates (`u`, `v`) (v up, repeating) on pyramid level `level` (0 the finest,
+    /// fractions blend).
+    #[inline]
+    pub(crate) fn sample(&self, u: f32, v: f32, level: f32) -> Texel {
+        let level = level.clamp(0.0, self.last_level());
+        let fine = level.floor();
+        let blend = level - fine;
+        let a = self.levels[fine as usize].sample(u, v);
+        if blend == 0.0 {
+            return a;
+        }
+        let b = self.levels[fine as usize + 1].sample(u, v);
+        let mix = |x: [f32; 3], y: [f32; 3]| [0, 1, 2].map(|c| x[c] + blend * (y[c] - x[c]));
+        Texel {
+            color: mix(a.color, b.color),
+            du: mix(a.du, b.du),
+            dv: mix(a.dv, b.dv),
+            dlevel: [0, 1, 2].map(|c| b.color[c] - a.color[c]),
+        }
+    }
+}
+
+impl Level {
+    fn halved(&self) -> Option<Self> {
+        if self.width == 1 && self.height == 1 {
+            return None;
+        }
+        let (width, height) = (self.width.div_ceil(2), self.height.div_ceil(2));
+        let mut texels = Vec::with_capacity(width * height);
+        for y in 0..height {
+            for x in 0..width {
+                let mut sum = [0.0f32; 3];
+                for (dx, dy) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+                    // Odd sizes repeat their last row and column.
+                    let (sx, sy) =
+                        ((2 * x + dx).min(self.width - 1), (2 * y + dy).min(self.height - 1));
+                    let texel = self.texels[sy * self.width + sx];
+                    (0..3).for_each(|c| sum[c] += 0.25 * texel[c]);
+                }
+                texels.push(sum);
+            }
+        }
+        Some(Self { width, height, texels })
+    }
+
+    /// Bilinear colour, and derivatives by (u, v) with no entry for the level.
+    #[inline]
+    fn sample(&self, u: f32, v: f32) -> Texel {
+        // Coordinates within 0..=1 stay (an edge at exactly 1 must not wrap to 0); others repeat.
+        let wrap = |t: f32| if (0.0..=1.0).contains(&t) { t } else { t - t.floor() };
+        let (x, x0, x1) = cell(wrap(u), self.width);
+        let (y, y0, y1) = cell(1.0 - wrap(v), self.height);
+        let texel = |x: usize, y: usize| self.texels[y * self.width + x];
+        let (a, b, c, d) = (texel(x0, y0), texel(x1, y0), texel(x0, y1), texel(x1, y1));
+        let mut out = Texel::default();
+        for k in 0..3 {
+            let (top, bottom) = (b[k] - a[k], d[k] - c[k]);
+            let (left, right) = (c[k] - a[k], d[k] - b[k]);
+            out.color[k] = a[k] + x * top + y * (left + x * (bottom - top));
+            out.du[k] = (top + y * (bottom - top)) * self.width as f32;
+            // Rows run down while v runs up.
+            out.dv[k] = -(left + x * (right - left)) * self.height as f32;
+        }
+        out
+    }
+}
+
+/// Offset within the cell, and the cell's two texel indices, clamped at the borders.
+#[inline]
+fn cell(t: f32, size: usize) -> (f32, usize, usize) {
+    let position = t * size as f32 - 0.5;
+    let base = position.floor();
+    let index = |i: f32| (i.max(0.0) as usize).min(size - 1);
+    (position - base, index(base), index(base + 1.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn texture() -> Texture {
+        let pixels = (0..13 * 8).map(|i| [(i * 37 % 251) as u8, (i * 91 % 253) as u8, i as u8]);
+        Texture { width: 13, height: 8, pixels: pixels.collect() }
+    }
+
+    #[test]
+    fn the_lower_left_corner_is_the_origin() {
+        let map = Mipmap::new(&texture()).unwrap();
+        let texel = map.sample(0.5 / 13.0, 0.5 / 8.0, 0.0);
+        let lower_left = texture().pixels[7 * 13];
+        (0..3).for_each(|c| assert!((texel.color[c] - lower_left[c] as f32 / 255.0).abs() < 1e-6));
+    }
+
+    #[test]
+    fn derivatives_match_finite_differences() {
+        let map = Mipmap::new(&texture()).unwrap();
+        let step = 1e-3;
+        for (u, v, level) in [(0.31, 0.77, 0.0), (0.62, 0.2, 0.6), (1.43, -0.3, 1.3), (0.5, 0.45, 2.2)] {
+            let texel = map.sample(u, v, level);
+            for (axis, derivative) in [(0, texel.du), (1, texel.dv), (2, texel.dlevel)] {
+                if level == 0.0 && axis == 2 {
+                    continue;
+                }
+                let at = |sign: f32| {
+                    let d = |i: i32| if i == axis { sign * step } else { 0.0 };
+                    map.sample(u + d(0), v + d(1), level + d(2)).color
+                };
+                let (high, low) = (at(1.0), at(-1.0));
+                for c in 0..3 {
+                    let difference = (high[c] - low[c]) / (2.0 * step);
+                    assert!((difference - derivative[c]).abs() < 2e-3 * (1.0 + difference.abs()));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_coarsest_level_is_one_texel() {
+        let even = Texture { width: 4, height: 4, ..texture() };
+        let even = Texture { pixels: even.pixels[..16].to_vec(), ..even };
+        let map = Mipmap::new(&even).unwrap();
+        assert_eq!(map.last_level(), 2.0);
+        let mean = even.pixels.iter().map(|p| p[0] as f32 / 255.0).sum::<f32>() / 16.0;
+        assert!((map.sample(0.2, 0.9, 9.0).color[0] - mean).abs() < 1e-6);
+        assert!(Mipmap::new(&Texture { width: 5, ..even }).is_none());
+    }
+}

@@ -1,0 +1,265 @@
+//! A triangle mesh prepared for rendering.
+
+mod mipmap;
+mod topology;
+
+use nalgebra::{Matrix3, Point3, Vector3};
+use prehend_geometry::TriMesh;
+
+pub(crate) use mipmap::Mipmap;
+pub(crate) use topology::{Edge, NONE};
+
+/// Faces that meet at less than this angle share a smooth normal \[rad\] (37.5 degrees).
+const CREASE: f64 = 0.6545;
+
+/// Why a mesh cannot be rendered.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum ModelError {
+    /// No face has an area.
+    #[error("mesh has no face with an area ({faces} faces, {vertices} vertices)")]
+    Empty {
+        /// Faces of the mesh.
+        faces: usize,
+        /// Vertices of the mesh.
+        vertices: usize,
+    },
+    /// A face refers to a vertex that does not exist.
+    #[error("face {face} refers to vertex {index}, but there are {vertices}")]
+    Index {
+        /// The face.
+        face: usize,
+        /// The index it holds.
+        index: u32,
+        /// Vertices of the mesh.
+        vertices: usize,
+    },
+    /// A vertex position is infinite or not a number.
+    #[error("vertex {vertex} has a position that is not finite")]
+    NotFinite {
+        /// The vertex.
+        vertex: usize,
+    },
+    /// An attribute does not have one entry a vertex.
+    #[error("{found} {attribute} given for {vertices} vertices")]
+    Attribute {
+        /// `"uvs"` or `"colors"`.
+        attribute: &'static str,
+        /// Entries given.
+        found: usize,
+        /// Vertices of the mesh.
+        vertices: usize,
+    },
+    /// The texture has no pixels or not as many as its size says.
+    #[error("texture of {width} x {height} has {found} pixels")]
+    Texture {
+        /// Columns.
+        width: usize,
+        /// Rows.
+        height: usize,
+        /// Pixels it holds.
+        found: usize,
+    },
+}
+
+/// Where the unlit colours come from.
+#[derive(Clone, Debug)]
+pub(crate) enum Albedo {
+    /// One colour.
+    Uniform([f32; 3]),
+    /// A colour for each corner of each face.
+    Corners(Vec<[[f32; 3]; 3]>),
+    /// A texture, and its coordinates for each corner of each face.
+    Texture(Mipmap, Vec<[[f32; 2]; 3]>),
+}
+
+/// A triangle mesh prepared for rendering: welded topology for contours, crease-aware smooth normals, a
+/// mip-mapped texture.
+///
+/// Immutable; share it by reference or `Arc` between threads and poses.
+#[derive(Clone, Debug)]
+pub struct RenderModel {
+    /// Welded positions, mesh frame, relative to `center` \[m\].
+    pub(crate) positions: Vec<Vector3<f32>>,
+    /// Welded vertex indices of each face.
+    pub(crate) faces: Vec<[u32; 3]>,
+    /// Unit normals of each face's corners, mesh frame.
+    pub(crate) normals: Vec<[Vector3<f32>; 3]>,
+    pub(crate) edges: Vec<Edge>,
+    pub(crate) albedo: Albedo,
+    /// Every edge has two faces: what faces away from the camera cannot be seen.
+    pub(crate) closed: bool,
+    /// Texels a metre of surface, 0 without a texture.
+    pub(crate) texel_density: f64,
+    center: Point3<f64>,
+    radius: f64,
+}
+
+impl RenderModel {
+    /// Prepares `mesh` (metres). Colour comes from the texture if there is one with coordinates, else from
+    /// the vertex colours, else it is mid-grey. Normals are computed, smooth across edges flatter than 37.5
+    /// degrees; those of the mesh are not used. Faces without an area are dropped. A mesh whose edges all have two
+    /// faces is drawn from outside only, any other from both sides.
+    ///
+    /// # Errors
+    /// When no face has an area, or indices, positions, attributes or the texture are inconsistent.
+    pub fn new(mesh: &TriMesh) -> Result<Self, ModelError> {
+        check(mesh)?;
+        let empty = ModelError::Empty { faces: mesh.faces.len(), vertices: mesh.vertices.len() };
+        let (low, high) = mesh.bounds().ok_or(empty)?;
+        let center = nalgebra::center(&low, &high);
+        let extent = (high - low).norm();
+        let (positions, map) = topology::weld(&mesh.vertices, (1e-6 * extent).max(1e-300));
+        let kept: Vec<usize> = (0..mesh.faces.len())
+            .filter(|&f| {
+                let [a, b, c] = mesh.faces[f].map(|v| map[v as usize]);
+                a != b && b != c && c != a && mesh.area_vector(f).norm() > 1e-14 * extent * extent
+            })
+            .collect();
+        if kept.is_empty() {
+            return Err(empty);
+        }
+        let faces: Vec<[u32; 3]> =
+            kept.iter().map(|&f| mesh.faces[f].map(|v| map[v as usize])).collect();
+        let face_normals: Vec<Vector3<f64>> =
+            kept.iter().map(|&f| mesh.area_vector(f).normalize()).collect();
+        let normals = topology::corner_normals(&positions, &faces, &face_normals, CREASE);
+        let edges = topology::edges(&faces);
+        let (albedo, texel_density) = albedo(mesh, &kept)?;
+        let radius = mesh.vertices.iter().map(|v| (v - center).norm()).fold(0.0, f64::max);
+        Ok(Self {
+            positions: positions.iter().map(|p| (p - center).cast()).collect(),
+            faces,
+            normals: normals.iter().map(|n| n.map(|v| v.cast())).collect(),
+            closed: edges.iter().all(|e| e.other != NONE),
+            edges,
+            albedo,
+            texel_density,
+            center,
+            radius,
+        })
+    }
+
+    /// The same shape in one colour (0..=1).
+    pub fn with_uniform_color(mut self, color: [f32; 3]) -> Self {
+        self.albedo = Albedo::Uniform(color);
+        self.texel_density = 0.0;
+        self
+    }
+
+    /// Centre of the bounding box, mesh frame \[m\].
+    pub fn center(&self) -> Point3<f64> {
+        self.center
+    }
+
+    /// Largest distance of a vertex from [`Self::center`] \[m\].
+    pub fn radius(&self) -> f64 {
+        self.radius
+    }
+
+    /// Number of faces drawn.
+    pub fn face_count(&self) -> usize {
+        self.faces.len()
+    }
+
+    /// Whether every edge has exactly two faces.
+    pub fn is_closed(&self) -> bool {
+        self.closed
+    }
+}
+
+fn check(mesh: &TriMesh) -> Result<(), ModelError> {
+    let vertices = mesh.vertices.len();
+    for (face, indices) in mesh.faces.iter().enumerate() {
+        if let Some(&index) = indices.iter().find(|&&i| i as usize >= vertices) {
+            return Err(ModelError::Index { face, index, vertices });
+        }
+    }
+    let finite = |p: &Point3<f64>| p.iter().all(|v| v.is_finite());
+    if let Some(vertex) = mesh.vertices.iter().position(|p| !finite(p)) {
+        return Err(ModelError::NotFinite { vertex });
+    }
+    for (attribute, found) in [
+        ("uvs", mesh.uvs.as_ref().map(Vec::len)),
+        ("colors", mesh.colors.as_ref().map(Vec::len)),
+    ] {
+        if let Some(found) = found.filter(|&n| n != vertices) {
+            return Err(ModelError::Attribute { attribute, found, vertices });
+        }
+    }
+    Ok(())
+}
+
+fn albedo(mesh: &TriMesh, kept: &[usize]) -> Result<(Albedo, f64), ModelError> {
+    if let (Some(texture), Some(uvs)) = (&mesh.texture, &mesh.uvs) {
+        let map = Mipmap::new(texture).ok_or(ModelError::Texture {
+            width: texture.width,
+            height: texture.height,
+            found: texture.pixels.len(),
+        })?;
+        let corners: Vec<[[f32; 2]; 3]> =
+            kept.iter().map(|&f| mesh.faces[f].map(|v| uvs[v as usize])).collect();
+        let (width, height) = map.size();
+        let (mut texels, mut area) = (0.0, 0.0);
+        for (&f, [a, b, c]) in kept.iter().zip(&corners) {
+            let edges = Matrix3::from_fn(|i, j| match (i, j) {
+                (0 | 1, 0 | 1) => ([b, c][i][j] - a[j]) as f64,
+                (2, 2) => 1.0,
+                _ => 0.0,
+            });
+            texels += 0.5 * edges.determinant().abs() * (width * height) as f64;
+            area += 0.5 * mesh.area_vector(f).norm();
+        }
+        return Ok((Albedo::Texture(map, corners), (texels / area).sqrt()));
+    }
+    if let Some(colors) = &mesh.colors {
+        let corners = kept.iter().map(|&f| mesh.faces[f].map(|v| colors[v as usize])).collect();
+        return Ok((Albedo::Corners(corners), 0.0));
+    }
+    Ok((Albedo::Uniform([0.5; 3]), 0.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::Arc;
+
+    fn triangle() -> TriMesh {
+        let vertices = vec![Point3::origin(), Point3::new(1.0, 0.0, 0.0), Point3::new(0.0, 1.0, 0.0)];
+        TriMesh::new(vertices, vec![[0, 1, 2]])
+    }
+
+    #[test]
+    fn texel_density_is_texels_a_metre() {
+        let mut mesh = triangle();
+        mesh.uvs = Some(vec![[0.0, 0.0], [0.5, 0.0], [0.0, 0.5]]);
+        mesh.texture =
+            Some(Arc::new(prehend_geometry::Texture { width: 8, height: 8, pixels: vec![[9; 3]; 64] }));
+        let model = RenderModel::new(&mesh).unwrap();
+        assert!((model.texel_density - 4.0).abs() < 1e-9);
+        assert!(!model.is_closed());
+        assert_eq!(model.face_count(), 1);
+        assert!((model.center() - Point3::new(0.5, 0.5, 0.0)).norm() < 1e-15);
+    }
+
+    #[test]
+    fn inconsistent_meshes_are_errors() {
+        assert!(matches!(RenderModel::new(&TriMesh::default()), Err(ModelError::Empty { .. })));
+        let mut mesh = triangle();
+        mesh.faces[0][1] = 7;
+        assert!(matches!(RenderModel::new(&mesh), Err(ModelError::Index { face: 0, index: 7, .. })));
+        let mut mesh = triangle();
+        mesh.vertices[2].y = f64::NAN;
+        assert_eq!(RenderModel::new(&mesh).unwrap_err(), ModelError::NotFinite { vertex: 2 });
+        let mut mesh = triangle();
+        mesh.vertices[2] = Point3::new(2.0, 0.0, 0.0);
+        assert!(matches!(RenderModel::new(&mesh), Err(ModelError::Empty { faces: 1, .. })));
+        let mut mesh = triangle();
+        mesh.colors = Some(vec![[0.0; 3]]);
+        assert!(matches!(RenderModel::new(&mesh), Err(ModelError::Attribute { found: 1, .. })));
+        let mut mesh = triangle();
+        mesh.uvs = Some(vec![[0.0; 2]; 3]);
+        mesh.texture =
+            Some(Arc::new(prehend_geometry::Texture { width: 2, height: 2, pixels: Vec::new() }));
+        assert!(matches!(RenderModel::new(&mesh), Err(ModelError::Texture { found: 0, .. })));
+    }
+}

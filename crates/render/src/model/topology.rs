@@ -1,0 +1,172 @@
+//! Welding, edge adjacency and crease-aware normals.
+
+use std::collections::HashMap;
+
+use nalgebra::{Point3, Vector3};
+
+/// Marks an absent neighbour in [`Edge`].
+pub(crate) const NONE: u32 = u32::MAX;
+
+/// An edge of the welded mesh, directed as its first face runs through it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Edge {
+    /// First vertex, then second vertex as seen by `face`.
+    pub(crate) vertices: [u32; 2],
+    /// The face that runs through the edge in this direction.
+    pub(crate) face: u32,
+    /// Corner of `face` at which the edge starts.
+    pub(crate) corner: u8,
+    /// The face that runs through it the other way, or [`NONE`] on a boundary.
+    pub(crate) other: u32,
+    /// Corner of `other` at which it starts the edge (in its own, opposite direction).
+    pub(crate) other_corner: u8,
+}
+
+/// Gives vertices at the same position (within `tolerance`) the same index; returns the representative
+/// positions and each vertex's index among them.
+pub(crate) fn weld(vertices: &[Point3<f64>], tolerance: f64) -> (Vec<Point3<f64>>, Vec<u32>) {
+    let cell = |v: f64| (v / tolerance).round() as i64;
+    let mut positions = Vec::new();
+    let mut index_of = HashMap::new();
+    let map = vertices.iter().map(|p| {
+        *index_of.entry([cell(p.x), cell(p.y), cell(p.z)]).or_insert_with(|| {
+            positions.push(*p);
+            positions.len() as u32 - 1
+        })
+    });
+    let map = map.collect();
+    (positions, map)
+}
+
+/// Pairs up the half-edges of `faces`. A half-edge without an opposite is a boundary; where more than two
+/// faces meet, they are paired in order of appearance.
+pub(crate) fn edges(faces: &[[u32; 3]]) -> Vec<Edge> {
+    let mut half: Vec<(u32, u32, bool, u32, u8)> = Vec::with_capacity(faces.len() * 3);
+    for (f, face) in faces.iter().enumerate() {
+        for k in 0..3u8 {
+            let (a, b) = (face[k as usize], face[(k as usize + 1) % 3]);
+            half.push((a.min(b), a.max(b), a > b, f as u32, k));
+        }
+    }
+    half.sort_unstable();
+    let mut out = Vec::with_capacity(half.len() / 2);
+    for group in half.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
+        let split = group.partition_point(|h| !h.2);
+        let (ahead, back) = group.split_at(split);
+        for i in 0..ahead.len().max(back.len()) {
+            let edge = match (ahead.get(i), back.get(i)) {
+                (Some(h), Some(o)) => Edge {
+                    vertices: [h.0, h.1],
+                    face: h.3,
+                    corner: h.4,
+                    other: o.3,
+                    other_corner: o.4,
+                },
+                (Some(h), None) => Edge {
+                    vertices: [h.0, h.1],
+                    face: h.3,
+                    corner: h.4,
+                    other: NONE,
+                    other_corner: 0,
+                },
+                (None, Some(h)) => Edge {
+                    vertices: [h.1, h.0],
+                    face: h.3,
+                    corner: h.4,
+                    other: NONE,
+                    other_corner: 0,
+                },
+                (None, None) => continue,
+            };
+            out.push(edge);
+        }
+    }
+    out
+}
+
+/// A unit normal for each corner of each face: the mean of the normals of the faces around the vertex that
+/// lie within `crease` \[rad\] of the face's own, weighted by their angles at the vertex.
+pub(crate) fn corner_normals(
+    positions: &[Point3<f64>],
+    faces: &[[u32; 3]],
+    face_normals: &[Vector3<f64>],
+    crease: f64,
+) -> Vec<[Vector3<f64>; 3]> {
+    let mut around: Vec<Vec<(u32, f64)>> = vec![Vec::new(); positions.len()];
+    for (f, face) in faces.iter().enumerate() {
+        let p = face.map(|v| positions[v as usize]);
+        for k in 0..3 {
+            let angle = (p[(k + 1) % 3] - p[k]).angle(&(p[(k + 2) % 3] - p[k]));
+            around[face[k] as usize].push((f as u32, angle));
+        }
+    }
+    let limit = crease.cos();
+    let corner = |own: &Vector3<f64>, vertex: u32| {
+        let mut sum = Vector3::zeros();
+        for &(g, angle) in &around[vertex as usize] {
+            let normal = face_normals[g as usize];
+            if normal.dot(own) >= limit {
+                sum += normal * angle;
+            }
+        }
+        sum.try_normalize(1e-12).unwrap_or(*own)
+    };
+    faces.iter().zip(face_normals).map(|(face, own)| face.map(|v| corner(own, v))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two triangles over a common edge, folded by `angle` about the x axis, the edge stored twice.
+    fn fold(angle: f64) -> (Vec<Point3<f64>>, Vec<[u32; 3]>) {
+        let vertices = vec![
+            Point3::new(0.0, 0.0, 0.0),
+            Point3::new(1.0, 0.0, 0.0),
+            Point3::new(0.5, 1.0, 0.0),
+            Point3::new(0.0, 0.0, 0.0),
+            Point3::new(1.0, 0.0, 0.0),
+            Point3::new(0.5, -angle.cos(), -angle.sin()),
+        ];
+        (vertices, vec![[0, 1, 2], [4, 3, 5]])
+    }
+
+    #[test]
+    fn seams_weld_and_pair_up() {
+        let (vertices, faces) = fold(0.3);
+        let (positions, map) = weld(&vertices, 1e-9);
+        assert_eq!(positions.len(), 4);
+        let faces: Vec<[u32; 3]> = faces.iter().map(|f| f.map(|v| map[v as usize])).collect();
+        let edges = edges(&faces);
+        assert_eq!(edges.len(), 5);
+        let inner: Vec<&Edge> = edges.iter().filter(|e| e.other != NONE).collect();
+        assert_eq!(inner.len(), 1);
+        assert_eq!(inner[0].vertices, [0, 1]);
+        // Every edge starts at the named corner of its face.
+        for e in &edges {
+            assert_eq!(faces[e.face as usize][e.corner as usize], e.vertices[0]);
+            if e.other != NONE {
+                assert_eq!(faces[e.other as usize][e.other_corner as usize], e.vertices[1]);
+            }
+        }
+    }
+
+    #[test]
+    fn normals_smooth_below_the_crease_angle_only() {
+        for (angle, smooth) in [(0.3f64, true), (1.2, false)] {
+            let (vertices, faces) = fold(angle);
+            let (positions, map) = weld(&vertices, 1e-9);
+            let faces: Vec<[u32; 3]> = faces.iter().map(|f| f.map(|v| map[v as usize])).collect();
+            let normals: Vec<_> = faces
+                .iter()
+                .map(|f| {
+                    let p = f.map(|v| positions[v as usize]);
+                    (p[1] - p[0]).cross(&(p[2] - p[0])).normalize()
+                })
+                .collect();
+            let corners = corner_normals(&positions, &faces, &normals, 0.65);
+            let tilt = corners[0][0].angle(&normals[0]);
+            assert!((tilt - if smooth { angle / 2.0 } else { 0.0 }).abs() < 1e-9);
+        }
+    }
+}

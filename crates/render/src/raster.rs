@@ -1,0 +1,238 @@
+//! The hard z-buffer.
+
+use nalgebra::Isometry3;
+use rayon::prelude::*;
+
+use crate::camera::Camera;
+use crate::image::DepthImage;
+use crate::model::RenderModel;
+use crate::posed::{Posed, Region, signed_area};
+
+/// Rows of the image that one task renders; results do not depend on it.
+pub(crate) const BAND: usize = 16;
+
+/// No face.
+pub(crate) const MISS: u32 = u32::MAX;
+
+/// Visible faces of a block of rows.
+pub(crate) struct Visible {
+    pub(crate) region: Region,
+    /// Nearest face per pixel, or [`MISS`].
+    pub(crate) face: Vec<u32>,
+    /// Its 1/Z \[1/m\].
+    pub(crate) inverse_z: Vec<f32>,
+}
+
+impl Visible {
+    pub(crate) fn new(region: Region) -> Self {
+        let count = region.width() * (region.y1 - region.y0);
+        Self { region, face: vec![MISS; count], inverse_z: vec![0.0; count] }
+    }
+
+    /// Column and row of the pixel with index `i`.
+    #[inline]
+    pub(crate) fn position(&self, i: usize) -> (usize, usize) {
+        let width = self.region.width();
+        (self.region.x0 + i % width, self.region.y0 + i / width)
+    }
+
+    /// Draws one face where it is nearer than what is there; of equals the first stays.
+    #[inline]
+    pub(crate) fn draw(&mut self, posed: &Posed, face: u32) {
+        let corners = posed.corners(face as usize);
+        let region = &self.region;
+        let low = |i: usize| corners[0][i].min(corners[1][i]).min(corners[2][i]);
+        let high = |i: usize| corners[0][i].max(corners[1][i]).max(corners[2][i]);
+        let (x0, y0) =
+            (low(0).ceil().max(region.x0 as f32), low(1).ceil().max(region.y0 as f32));
+        let (x1, y1) =
+            (high(0).min(region.x1 as f32 - 1.0), high(1).min(region.y1 as f32 - 1.0));
+        if x0 > x1 || y0 > y1 {
+            return;
+        }
+        let area = signed_area(&corners);
+        let sign = if area < 0.0 { -1.0 } else { 1.0 };
+        let ids = posed.model.faces[face as usize];
+        let edges = [(1, 2), (2, 0), (0, 1)].map(|(i, j)| {
+            // Both faces of an edge evaluate the same expression, so that none of its pixels is lost.
+            let (a, b, s) = if ids[i] < ids[j] { (i, j, sign) } else { (j, i, -sign) };
+            let (a, b) = (corners[a], corners[b]);
+            [a[0], a[1], s * (b[0] - a[0]), s * (b[1] - a[1])]
+        });
+        let (x0, y0, x1, y1) = (x0 as usize, y0 as usize, x1 as usize, y1 as usize);
+        for y in y0..=y1 {
+            let py = y as f32;
+            let row = (y - region.y0) * region.width();
+            for x in x0..=x1 {
+                let px = x as f32;
+                let e = edges.map(|[ax, ay, dx, dy]| dx * (py - ay) - dy * (px - ax));
+                if e[0] < 0.0 || e[1] < 0.0 || e[2] < 0.0 {
+                    continue;
+                }
+                let sum = e[0] + e[1] + e[2];
+                if sum <= 0.0 {
+                    continue;
+                }
+                let inverse_z =
+                    (e[0] * corners[0][2] + e[1] * corners[1][2] + e[2] * corners[2][2]) / sum;
+                let at = row + x - region.x0;
+                if inverse_z > self.inverse_z[at] {
+                    self.inverse_z[at] = inverse_z;
+                    self.face[at] = face;
+                }
+            }
+        }
+    }
+}
+
+/// The faces of a posed model that touch each block of [`BAND`] rows of `region`, in ascending order.
+pub(crate) fn bin(posed: &Posed, region: &Region) -> Vec<Vec<u32>> {
+    let mut bins = vec![Vec::new(); (region.y1 - region.y0).div_ceil(BAND)];
+    if bins.is_empty() {
+        return bins;
+    }
+    let (first, last) = (region.y0 as f32, region.y1 as f32 - 1.0);
+    for (f, _) in posed.facing.iter().enumerate().filter(|(_, facing)| **facing != 0) {
+        let [a, b, c] = posed.corners(f);
+        let low = a[1].min(b[1]).min(c[1]).ceil().max(first);
+        let high = a[1].max(b[1]).max(c[1]).floor().min(last);
+        if low > high {
+            continue;
+        }
+        let band = |y: f32| (y as usize - region.y0) / BAND;
+        for bin in &mut bins[band(low)..=band(high)] {
+            bin.push(f as u32);
+        }
+    }
+    bins
+}
+
+/// The rows of band `index` of `region`.
+pub(crate) fn band(region: &Region, index: usize) -> Region {
+    let y0 = region.y0 + index * BAND;
+    Region { y0, y1: (y0 + BAND).min(region.y1), ..*region }
+}
+
+/// Visible faces of one posed model over `region`, band by band, in parallel.
+pub(crate) fn rasterise(posed: &Posed, region: &Region) -> Vec<Visible> {
+    bin(posed, region)
+        .par_iter()
+        .enumerate()
+        .map(|(index, faces)| {
+            let mut visible = Visible::new(band(region, index));
+            faces.iter().for_each(|&f| visible.draw(posed, f));
+            visible
+        })
+        .collect()
+}
+
+/// Depth of the nearest surface of several posed models per pixel centre: Z in the camera frame \[m\], 0 where
+/// there is none.
+///
+/// Each body is given with `t_cam_body`. Bodies behind the camera, or with a pose that is not finite, are not
+/// drawn. Meant for what is known and does not move during a refinement, such as the hand.
+pub fn depth_map(camera: &Camera, bodies: &[(&RenderModel, Isometry3<f64>)]) -> DepthImage {
+    let mut inverse = vec![0.0f32; camera.width * camera.height];
+    for (model, pose) in bodies {
+        let posed = Posed::new(model, camera, pose, 0.0);
+        for part in rasterise(&posed, &posed.region) {
+            let width = part.region.width();
+            for (row, values) in part.inverse_z.chunks(width.max(1)).enumerate() {
+                let start = (part.region.y0 + row) * camera.width + part.region.x0;
+                for (old, new) in inverse[start..start + width].iter_mut().zip(values) {
+                    *old = old.max(*new);
+                }
+            }
+        }
+    }
+    let mut depth = DepthImage::filled(camera.width, camera.height, 0.0);
+    for (z, w) in depth.pixels_mut().iter_mut().zip(inverse) {
+        *z = if w > 0.0 { 1.0 / w } else { 0.0 };
+    }
+    depth
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shapes_for_tests::{cuboid, sphere};
+    use nalgebra::{Translation3, UnitQuaternion, Vector3};
+
+    fn camera() -> Camera {
+        Camera { fx: 200.0, fy: 210.0, cx: 63.5, cy: 47.5, width: 128, height: 96 }
+    }
+
+    fn at(x: f64, y: f64, z: f64) -> Isometry3<f64> {
+        Isometry3::from_parts(
+            Translation3::new(x, y, z),
+            UnitQuaternion::from_scaled_axis(Vector3::new(0.3, -0.5, 0.2)),
+        )
+    }
+
+    #[test]
+    fn a_sphere_has_the_depth_of_a_sphere() {
+        let model = RenderModel::new(&sphere(0.08, 200)).unwrap();
+        let pose = at(0.01, -0.02, 0.5);
+        let depth = depth_map(&camera(), &[(&model, pose)]);
+        let center = pose.translation.vector;
+        let mut worst = 0.0f64;
+        let mut count = 0;
+        for y in 0..96 {
+            for x in 0..128 {
+                let ray = camera().ray(x as f64, y as f64);
+                // Nearest root of |z ray - center| = radius.
+                let (a, b) = (ray.norm_squared(), ray.dot(&center));
+                let c = center.norm_squared() - 0.08 * 0.08;
+                let discriminant = b * b - a * c;
+                let z = depth.get(x, y).unwrap() as f64;
+                if discriminant > 1e-4 {
+                    worst = worst.max(((b - discriminant.sqrt()) / a - z).abs());
+                    count += 1;
+                } else if discriminant < 0.0 {
+                    assert_eq!(z, 0.0);
+                }
+            }
+        }
+        assert!(count > 2500 && worst < 1e-4, "{count} {worst}");
+    }
+
+    #[test]
+    fn no_pixel_is_lost_between_faces() {
+        let model = RenderModel::new(&sphere(0.08, 200)).unwrap();
+        let depth = depth_map(&camera(), &[(&model, at(0.0, 0.0, 0.4))]);
+        for y in 1..95 {
+            for x in 1..127 {
+                let z = |dx: usize, dy: usize| depth.get(x + dx - 1, y + dy - 1).unwrap();
+                let lone = z(0, 1) > 0.0 && z(2, 1) > 0.0 && z(1, 0) > 0.0 && z(1, 2) > 0.0;
+                assert!(!lone || z(1, 1) > 0.0, "hole at {x}, {y}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_nearer_body_wins_and_what_is_behind_is_not_drawn() {
+        let model = RenderModel::new(&cuboid(Vector3::new(0.05, 0.05, 0.05))).unwrap();
+        let upright = |z: f64| Isometry3::translation(0.0, 0.0, z);
+        let both = depth_map(&camera(), &[(&model, upright(0.4)), (&model, upright(0.7))]);
+        assert!((both.get(63, 47).unwrap() - 0.35).abs() < 1e-5);
+        for pose in [upright(-0.5), upright(0.0), upright(f64::NAN), upright(f64::INFINITY)] {
+            let depth = depth_map(&camera(), &[(&model, pose)]);
+            assert!(depth.pixels().iter().all(|z| *z == 0.0 || *z > 0.0));
+        }
+        let behind = depth_map(&camera(), &[(&model, upright(-0.5))]);
+        assert!(behind.pixels().iter().all(|z| *z == 0.0));
+    }
+
+    #[test]
+    fn open_meshes_are_seen_from_both_sides() {
+        let mut mesh = cuboid(Vector3::new(0.05, 0.05, 0.05));
+        // Without its two near faces one looks at the inside of the far ones.
+        let nearest = |f: &[u32; 3]| f.iter().all(|v| mesh.vertices[*v as usize].z < 0.0);
+        let open: Vec<[u32; 3]> = mesh.faces.iter().copied().filter(|f| !nearest(f)).collect();
+        assert_eq!(open.len(), mesh.faces.len() - 2);
+        mesh.faces = open;
+        let model = RenderModel::new(&mesh).unwrap();
+        let depth = depth_map(&camera(), &[(&model, Isometry3::translation(0.0, 0.0, 0.4))]);
+        assert!((depth.get(63, 47).unwrap() - 0.45).abs() < 1e-5);
+    }
+}
