@@ -3,7 +3,9 @@
 pub mod closest;
 mod field;
 mod mesh;
+pub mod sdf;
 
 pub use closest::ClosestPoints;
 pub use field::{DistanceField, FieldSample};
 pub use mesh::{Texture, TriMesh};
+pub use sdf::SdfGrid;
