@@ -1,25 +1,27 @@
 //! Meshes, closest points, signed distance grids, kinematics and exact volumes.
 
+mod clean;
+pub mod closest;
 mod field;
 pub mod hand;
-mod mesh;
-pub mod objects;
-pub mod shapes;
-
-mod clean;
 mod io;
 pub mod mass;
+mod mesh;
 mod normals;
+pub mod objects;
 pub mod sample;
+pub mod sdf;
+pub mod shapes;
 mod topology;
 pub mod volume;
 mod weld;
 
-pub use field::{DistanceField, FieldSample};
-pub use mesh::{Texture, TriMesh};
-
 pub use clean::MeshReport;
+pub use closest::ClosestPoints;
+pub use field::{DistanceField, FieldSample};
 pub use io::MeshError;
 pub use mass::{MassError, MassProperties};
+pub use mesh::{Texture, TriMesh};
 pub use sample::SurfaceSample;
+pub use sdf::SdfGrid;
 pub use volume::{UnionBody, VolumeError};

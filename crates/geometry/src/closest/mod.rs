@@ -1,0 +1,302 @@
+//! Closest points of a mesh and signed distance to it.
+
+mod bvh;
+mod topology;
+mod triangle;
+mod winding;
+
+use nalgebra::{Point3, Vector3};
+use rayon::prelude::*;
+
+use self::bvh::{Bvh, MAX_FACES};
+use self::topology::PseudoNormals;
+use self::winding::Winding;
+use crate::TriMesh;
+
+/// Why closest points of a mesh cannot be prepared.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ClosestError {
+    /// Nothing to be close to.
+    #[error("the mesh has no faces")]
+    Empty,
+    /// A face refers to a vertex that does not exist.
+    #[error("face {face} refers to vertex {vertex}, but the mesh has {count} vertices")]
+    VertexIndex {
+        /// The face.
+        face: usize,
+        /// Its vertex index.
+        vertex: u32,
+        /// Vertices of the mesh.
+        count: usize,
+    },
+    /// A coordinate is NaN, infinite, or beyond 1e9 m.
+    #[error("vertex {vertex} of the mesh is not finite or farther than 1e9 m from the origin")]
+    Coordinate {
+        /// The vertex.
+        vertex: usize,
+    },
+    /// More faces than the tree can address.
+    #[error("the mesh has {faces} faces, more than the limit of {limit}")]
+    TooManyFaces {
+        /// Faces of the mesh.
+        faces: usize,
+        /// The limit.
+        limit: usize,
+    },
+}
+
+/// The part of a triangle a closest point lies on, by the triangle's own corner numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Feature {
+    /// Corner 0, 1 or 2.
+    Vertex(u8),
+    /// The edge from corner i to corner i + 1 (modulo 3).
+    Edge(u8),
+    /// The interior.
+    Face,
+}
+
+/// A closest point of a mesh.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Closest {
+    /// The point on the mesh \[m\].
+    pub point: Point3<f64>,
+    /// Its distance from the query point, never negative \[m\].
+    pub distance: f64,
+    /// The face it lies on.
+    pub face: u32,
+    /// Weights of that face's corners, summing to one.
+    pub barycentric: [f64; 3],
+    /// The part of the face it lies on.
+    pub feature: Feature,
+}
+
+/// How inside is told from outside.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SignMethod {
+    /// Angle-weighted pseudo-normals: exact on a closed two-manifold that does not cross itself.
+    PseudoNormal,
+    /// Generalised winding number above one half: for open, non-manifold or self-overlapping meshes.
+    WindingNumber,
+}
+
+/// Closest points of, and signed distances to, one triangle mesh.
+///
+/// A four-wide tree over single-precision boxes that bound from outside, with exact double-precision
+/// triangle distances at the leaves: the answer is the true closest point up to `f64` rounding.
+///
+/// The distance is differentiable wherever the closest point is unique and the point is off the
+/// surface: its gradient by the query point `p` is the unit vector `(p - closest.point) / distance`, and
+/// that of the signed distance is the same vector times the sign.
+#[derive(Clone, Debug)]
+pub struct ClosestPoints {
+    bvh: Bvh,
+    sign: Sign,
+    bounds: (Point3<f64>, Point3<f64>),
+}
+
+#[derive(Clone, Debug)]
+enum Sign {
+    /// With the factor that makes the enclosed side negative: -1 on a mesh turned inside out.
+    PseudoNormal(PseudoNormals, f64),
+    Winding(Winding),
+}
+
+impl ClosestPoints {
+    /// Prepares queries, telling inside from outside by pseudo-normals where the mesh, welded by
+    /// position, is a closed two-manifold, and by winding number otherwise ([`Self::sign_method`] says which).
+    ///
+    /// A closed mesh that is turned inside out still has its enclosed side inside. Pseudo-normals
+    /// presume that the surface does not cross itself: for overlapping bodies in one mesh, use
+    /// [`Self::with_winding_sign`] or query the bodies one by one.
+    ///
+    /// # Errors
+    /// [`ClosestError`] for a mesh without faces, with wrong indices or coordinates, or too many faces.
+    pub fn new(mesh: &TriMesh) -> Result<Self, ClosestError> {
+        let bvh = build(mesh)?;
+        let sign = match PseudoNormals::new(mesh) {
+            Some(normals) => Sign::PseudoNormal(normals, orientation(mesh)),
+            None => Sign::Winding(Winding::new(&bvh)),
+        };
+        Ok(Self::from_parts(bvh, sign))
+    }
+
+    /// As [`Self::new`], with the winding number in any case.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn with_winding_sign(mesh: &TriMesh) -> Result<Self, ClosestError> {
+        let bvh = build(mesh)?;
+        let sign = Sign::Winding(Winding::new(&bvh));
+        Ok(Self::from_parts(bvh, sign))
+    }
+
+    fn from_parts(bvh: Bvh, sign: Sign) -> Self {
+        let mut lo = Vector3::repeat(f64::INFINITY);
+        let mut hi = -lo;
+        for t in &bvh.triangles {
+            for corner in [t.a, t.a + t.ab, t.a + t.ac] {
+                (lo, hi) = (lo.inf(&corner), hi.sup(&corner));
+            }
+        }
+        Self { bvh, sign, bounds: (lo.into(), hi.into()) }
+    }
+
+    /// How this mesh's inside is told from its outside.
+    pub fn sign_method(&self) -> SignMethod {
+        match self.sign {
+            Sign::PseudoNormal(..) => SignMethod::PseudoNormal,
+            Sign::Winding(_) => SignMethod::WindingNumber,
+        }
+    }
+
+    /// Smallest and largest corner of the box around the faces \[m\].
+    pub fn bounds(&self) -> (Point3<f64>, Point3<f64>) {
+        self.bounds
+    }
+
+    /// Number of faces.
+    pub fn face_count(&self) -> usize {
+        self.bvh.triangles.len()
+    }
+
+    /// The point of the mesh closest to `point`, or `None` beyond `max_distance` \[m\] (which may be
+    /// infinite) or for a point that is not finite.
+    #[inline]
+    pub fn closest(&self, point: &Point3<f64>, max_distance: f64) -> Option<Closest> {
+        self.search(point, max_distance, None)
+    }
+
+    /// As [`Self::closest`], trying `face` first: the answer for a nearby point, or for this point a
+    /// moment ago, spares most of the search. The distance does not depend on the hint; among points
+    /// at exactly equal distance the hinted face wins.
+    #[inline]
+    pub fn closest_from(
+        &self,
+        point: &Point3<f64>,
+        max_distance: f64,
+        face: u32,
+    ) -> Option<Closest> {
+        self.search(point, max_distance, Some(face))
+    }
+
+    /// Closest points of many points, in their order, in parallel.
+    pub fn closest_many(&self, points: &[Point3<f64>], max_distance: f64) -> Vec<Option<Closest>> {
+        points.par_iter().with_min_len(256).map(|p| self.closest(p, max_distance)).collect()
+    }
+
+    /// Signed distance \[m\], negative inside, and the closest point; NaN for a point that is not finite.
+    pub fn signed_distance(&self, point: &Point3<f64>) -> (f64, Closest) {
+        self.signed_distance_within(point, f64::INFINITY).unwrap_or((
+            f64::NAN,
+            Closest {
+                point: Point3::new(f64::NAN, f64::NAN, f64::NAN),
+                distance: f64::NAN,
+                face: 0,
+                barycentric: [f64::NAN; 3],
+                feature: Feature::Face,
+            },
+        ))
+    }
+
+    /// As [`Self::signed_distance`], or `None` where the surface is farther than `max_distance` \[m\],
+    /// inside or outside.
+    pub fn signed_distance_within(
+        &self,
+        point: &Point3<f64>,
+        max_distance: f64,
+    ) -> Option<(f64, Closest)> {
+        let closest = self.closest(point, max_distance)?;
+        let inside = closest.distance > 0.0 && self.is_inside(point, &closest);
+        Some((if inside { -closest.distance } else { closest.distance }, closest))
+    }
+
+    /// Signed distances of many points, in their order, in parallel.
+    pub fn signed_distance_many(&self, points: &[Point3<f64>]) -> Vec<(f64, Closest)> {
+        points.par_iter().with_min_len(256).map(|p| self.signed_distance(p)).collect()
+    }
+
+    #[inline]
+    fn search(&self, point: &Point3<f64>, max_distance: f64, hint: Option<u32>) -> Option<Closest> {
+        if !(max_distance >= 0.0 && point.iter().all(|x| x.is_finite())) {
+            return None;
+        }
+        // The next number up makes the limit inclusive.
+        let limit = (max_distance * max_distance).next_up();
+        let (slot, foot) = self.bvh.closest(&point.coords, limit, hint)?;
+        let t = &self.bvh.triangles[slot];
+        Some(Closest {
+            point: (t.a + t.ab * foot.v + t.ac * foot.w).into(),
+            distance: foot.distance_squared.sqrt(),
+            face: t.face,
+            barycentric: [1.0 - foot.v - foot.w, foot.v, foot.w],
+            feature: foot.feature,
+        })
+    }
+
+    fn is_inside(&self, point: &Point3<f64>, closest: &Closest) -> bool {
+        match &self.sign {
+            Sign::Winding(winding) => winding.at(&self.bvh, &point.coords).abs() > 0.5,
+            Sign::PseudoNormal(normals, orientation) => {
+                let offset = point - closest.point;
+                let face = closest.face as usize;
+                let normal = match closest.feature {
+                    Feature::Vertex(i) => normals.vertex(face, i as usize),
+                    Feature::Edge(i) => normals.edge(face, i as usize),
+                    Feature::Face => {
+                        let own = self.bvh.face_normal(closest.face);
+                        // An interior closest point lies along the normal; one that does not is on the
+                        // border but for rounding, where only the pseudo-normal can tell.
+                        if offset.dot(&own).abs() < 0.9 * closest.distance {
+                            normals.edge(face, nearest_edge(&closest.barycentric))
+                        } else {
+                            own
+                        }
+                    }
+                };
+                offset.dot(&normal) * orientation < 0.0
+            }
+        }
+    }
+}
+
+/// The edge opposite the corner of smallest weight.
+fn nearest_edge(barycentric: &[f64; 3]) -> usize {
+    let smallest = (0..3).min_by(|&i, &j| barycentric[i].total_cmp(&barycentric[j])).unwrap_or(0);
+    (smallest + 1) % 3
+}
+
+fn build(mesh: &TriMesh) -> Result<Bvh, ClosestError> {
+    if mesh.faces.is_empty() {
+        return Err(ClosestError::Empty);
+    }
+    if mesh.faces.len() >= MAX_FACES {
+        return Err(ClosestError::TooManyFaces { faces: mesh.faces.len(), limit: MAX_FACES });
+    }
+    let count = mesh.vertices.len();
+    for (face, corners) in mesh.faces.iter().enumerate() {
+        if let Some(&vertex) = corners.iter().find(|&&v| v as usize >= count) {
+            return Err(ClosestError::VertexIndex { face, vertex, count });
+        }
+    }
+    // Beyond 1e9 m the squares of box sizes would leave single precision.
+    match mesh.vertices.iter().position(|v| !v.iter().all(|x| x.abs() <= 1e9)) {
+        Some(vertex) => Err(ClosestError::Coordinate { vertex }),
+        None => Ok(Bvh::new(mesh)),
+    }
+}
+
+/// 1 where the mesh encloses a positive volume, -1 where it is turned inside out.
+fn orientation(mesh: &TriMesh) -> f64 {
+    let origin = mesh.triangle(0)[0];
+    let six_volumes: f64 = (0..mesh.faces.len())
+        .map(|f| {
+            let [a, b, c] = mesh.triangle(f).map(|v| v - origin);
+            a.dot(&b.cross(&c))
+        })
+        .sum();
+    if six_volumes < 0.0 { -1.0 } else { 1.0 }
+}
+
+#[cfg(test)]
+mod tests;

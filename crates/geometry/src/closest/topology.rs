@@ -1,0 +1,135 @@
+//! Is a mesh a closed surface, and which way does it face at its edges and corners?
+
+use std::collections::HashMap;
+
+use nalgebra::Vector3;
+
+use crate::TriMesh;
+
+/// Angle-weighted pseudo-normals of a mesh welded by position.
+///
+/// Baerentzen and Aanaes, Signed distance computation using the angle weighted pseudonormal, 2005: on a
+/// closed two-manifold the sign of `(p - c) · n` tells inside from outside at every closest point `c`.
+#[derive(Clone, Debug)]
+pub(super) struct PseudoNormals {
+    /// Welded corner indices of each face.
+    corners: Vec<[u32; 3]>,
+    /// Pseudo-normals of the welded vertices.
+    vertices: Vec<Vector3<f64>>,
+    /// Pseudo-normals of the edges from corner i to corner i + 1 of each face.
+    edges: Vec<[Vector3<f64>; 3]>,
+}
+
+impl PseudoNormals {
+    /// Pseudo-normals, or `None` unless the welded mesh is a closed, consistently oriented two-manifold.
+    pub(super) fn new(mesh: &TriMesh) -> Option<Self> {
+        let (corners, vertex_count) = weld(mesh);
+        let partners = partners(&corners)?;
+        if !fans_are_single(&corners, &partners, vertex_count) {
+            return None;
+        }
+        let unit: Vec<Vector3<f64>> = (0..corners.len())
+            .map(|f| {
+                let area = mesh.area_vector(f);
+                let norm = area.norm();
+                if norm > 0.0 { area / norm } else { Vector3::zeros() }
+            })
+            .collect();
+        let mut vertices = vec![Vector3::zeros(); vertex_count];
+        for (f, corner) in corners.iter().enumerate() {
+            let t = mesh.triangle(f);
+            for i in 0..3 {
+                let (u, v) = (t[(i + 1) % 3] - t[i], t[(i + 2) % 3] - t[i]);
+                // atan2 keeps the small angles of slivers that acos would lose.
+                let angle = u.cross(&v).norm().atan2(u.dot(&v));
+                vertices[corner[i] as usize] += unit[f] * angle;
+            }
+        }
+        let edges = (0..corners.len())
+            .map(|f| {
+                [0, 1, 2].map(|i| partners[3 * f + i].map_or(unit[f], |g| unit[f] + unit[g / 3]))
+            })
+            .collect();
+        Some(Self { corners, vertices, edges })
+    }
+
+    /// Pseudo-normal of corner `i` of `face`.
+    pub(super) fn vertex(&self, face: usize, i: usize) -> Vector3<f64> {
+        self.vertices[self.corners[face][i] as usize]
+    }
+
+    /// Pseudo-normal of the edge from corner `i` to the next of `face`.
+    pub(super) fn edge(&self, face: usize, i: usize) -> Vector3<f64> {
+        self.edges[face][i]
+    }
+}
+
+/// Welded corner indices of each face and the number of distinct positions.
+///
+/// Texture seams store a position once for each of its UVs: equal coordinates are one vertex.
+fn weld(mesh: &TriMesh) -> (Vec<[u32; 3]>, usize) {
+    let mut index: HashMap<[u64; 3], u32> = HashMap::with_capacity(mesh.vertices.len());
+    let welded: Vec<u32> = mesh
+        .vertices
+        .iter()
+        .map(|v| {
+            let next = index.len() as u32;
+            // Adding zero makes -0 and +0 one position.
+            *index.entry([v.x, v.y, v.z].map(|x| (x + 0.0).to_bits())).or_insert(next)
+        })
+        .collect();
+    (mesh.faces.iter().map(|f| f.map(|v| welded[v as usize])).collect(), index.len())
+}
+
+/// Whether two corners of a face coincide: such a face has no surface and bounds nothing.
+fn collapsed(c: &[u32; 3]) -> bool {
+    c[0] == c[1] || c[1] == c[2] || c[2] == c[0]
+}
+
+/// For each half-edge `3 f + i` its opposite one (`None` on collapsed faces); `None` altogether if an
+/// edge is open, shared by more than two faces, or run through twice in one direction.
+fn partners(corners: &[[u32; 3]]) -> Option<Vec<Option<usize>>> {
+    let mut half_edges: HashMap<(u32, u32), usize> = HashMap::with_capacity(3 * corners.len());
+    for (f, c) in corners.iter().enumerate().filter(|(_, c)| !collapsed(c)) {
+        for i in 0..3 {
+            if half_edges.insert((c[i], c[(i + 1) % 3]), 3 * f + i).is_some() {
+                return None;
+            }
+        }
+    }
+    let mut partners = vec![None; 3 * corners.len()];
+    for (f, c) in corners.iter().enumerate().filter(|(_, c)| !collapsed(c)) {
+        for i in 0..3 {
+            partners[3 * f + i] = Some(*half_edges.get(&(c[(i + 1) % 3], c[i]))?);
+        }
+    }
+    (!half_edges.is_empty()).then_some(partners)
+}
+
+/// Whether the faces around every vertex form one fan: a vertex where two bodies touch has two.
+fn fans_are_single(corners: &[[u32; 3]], partners: &[Option<usize>], vertex_count: usize) -> bool {
+    let mut degree = vec![0usize; vertex_count];
+    let mut start = vec![None; vertex_count];
+    for (f, c) in corners.iter().enumerate().filter(|(_, c)| !collapsed(c)) {
+        for i in 0..3 {
+            degree[c[i] as usize] += 1;
+            start[c[i] as usize] = Some(3 * f + i);
+        }
+    }
+    (0..vertex_count).all(|v| {
+        let Some(first) = start[v] else { return true };
+        let mut half_edge = first;
+        for turned in 1..=degree[v] {
+            // The half-edge that enters the vertex, seen from the neighbouring face, leaves it.
+            let entering = half_edge - half_edge % 3 + (half_edge % 3 + 2) % 3;
+            match partners[entering] {
+                Some(next) => half_edge = next,
+                None => return false,
+            }
+            if half_edge == first {
+                return turned == degree[v];
+            }
+        }
+        false
+    })
+}

@@ -1,0 +1,136 @@
+use super::*;
+use crate::sdf::SdfError;
+use crate::{ClosestPoints, TriMesh};
+
+fn sphere(radius: f64, spacing: f64, margin: f64) -> SdfGrid {
+    let corner = Point3::new(radius, radius, radius);
+    SdfGrid::from_fn((-corner, corner), spacing, margin, |p, _| p.coords.norm() - radius).unwrap()
+}
+
+fn cube(half: f64) -> TriMesh {
+    let vertices = (0..8)
+        .map(|i| {
+            let sign = |bit: usize| if i >> bit & 1 == 1 { half } else { -half };
+            Point3::new(sign(0), sign(1), sign(2))
+        })
+        .collect();
+    let quads =
+        [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    TriMesh::new(vertices, quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect())
+}
+
+#[test]
+fn a_sphere_is_reproduced_with_both_derivatives() {
+    let (radius, spacing) = (0.03, 0.002);
+    let grid = sphere(radius, spacing, 0.012);
+    let mut directions = 0;
+    for i in 0..200 {
+        let a = i as f64;
+        let n = Vector3::new(a.sin(), (1.7 * a).cos(), (2.3 * a).sin()).normalize();
+        for height in [-0.008, 0.0, 0.005] {
+            let r = radius + height;
+            let s = grid.sample(&(n * r).into(), 0.012).unwrap();
+            assert!((s.distance - height).abs() < 2e-7, "{}", s.distance - height);
+            assert!((s.gradient - n).norm() < 2e-4);
+            let hessian = (Matrix3::identity() - n * n.transpose()) / r;
+            assert!((s.hessian - hessian).norm() < 0.03 * hessian.norm(), "{height}");
+        }
+        directions += 1;
+    }
+    assert_eq!(directions, 200);
+}
+
+#[test]
+fn a_box_is_exact_away_from_its_edges() {
+    let mesh = ClosestPoints::new(&cube(0.02)).unwrap();
+    let grid = SdfGrid::build(&mesh, 0.001, 0.01).unwrap();
+    for (x, expected) in [(0.0256, 0.0056), (0.0203, 0.0003), (0.0191, -0.0009)] {
+        let s = grid.sample(&Point3::new(x, 0.0031, -0.0042), 0.01).unwrap();
+        assert!((s.distance - expected).abs() < 1e-9, "{}", s.distance);
+        assert!((s.gradient - Vector3::x()).norm() < 1e-6);
+        assert!(s.hessian.norm() < 1e-3);
+    }
+    assert!(grid.evaluate(&Point3::origin()).distance < -0.018);
+    // Every sample is the exact distance, near the edges too.
+    let (origin, _) = grid.extent();
+    for i in 0..300 {
+        let d = grid.dims();
+        let index = [i * 7 % d[0], i * 13 % d[1], i * 29 % d[2]].map(|k| k as f64);
+        let p = origin + Vector3::from(index) * grid.spacing();
+        assert!((grid.evaluate(&p).distance - mesh.signed_distance(&p).0).abs() < 1e-13);
+    }
+}
+
+/// Compares the derivatives at `p` with central differences. The gradient is quadratic within a cell, so
+/// its difference is exact there. Across a cell face the third derivative jumps, at a kink of the
+/// distance by a few times 1 / spacing², which leaves an error of that times the step (4e-4 here); a
+/// jump of the second derivative itself would leave one of order 1 / spacing (10).
+fn check_derivatives(grid: &SdfGrid, p: &Point3<f64>, on_face: bool) {
+    let step = 1e-6;
+    let tolerance = if on_face { 4.0 * step / grid.spacing().powi(2) } else { 1e-6 };
+    let s = grid.evaluate(p);
+    for i in 0..3 {
+        let mut e = Vector3::zeros();
+        e[i] = step;
+        let (plus, minus) = (grid.evaluate(&(p + e)), grid.evaluate(&(p - e)));
+        let slope = (plus.distance - minus.distance) / (2.0 * step);
+        assert!((slope - s.gradient[i]).abs() < 1e-6, "{p}: {slope} {}", s.gradient[i]);
+        let bend = (plus.gradient - minus.gradient) / (2.0 * step);
+        assert!((bend - s.hessian.column(i)).norm() < tolerance, "{p}: {bend} {}", s.hessian);
+    }
+    assert_eq!(s.hessian, s.hessian.transpose());
+}
+
+#[test]
+fn derivatives_match_differences_inside_cells_and_across_their_faces() {
+    let mesh = ClosestPoints::new(&cube(0.5)).unwrap();
+    let grid = SdfGrid::build(&mesh, 0.1, 0.3).unwrap();
+    let (origin, end) = grid.extent();
+    for i in 0..100 {
+        let a = i as f64;
+        let cell = Vector3::new(a % 13.0 + 1.0, (a * 3.0) % 11.0 + 1.0, (a * 5.0) % 12.0 + 1.0);
+        let at = |x, y, z| origin + (cell + Vector3::new(x, y, z)) * grid.spacing();
+        check_derivatives(&grid, &at(0.0, 0.0, 0.0), true);
+        check_derivatives(&grid, &at(0.0, 0.3, 0.6), true);
+        check_derivatives(&grid, &at(0.2, 0.5, 0.9), false);
+    }
+    // On the border of the grid and beyond it, where straight lines continue the spline.
+    let mid = nalgebra::center(&origin, &end);
+    check_derivatives(&grid, &Point3::new(end.x, mid.y + 0.07, mid.z + 0.03), true);
+    check_derivatives(&grid, &Point3::new(end.x + 0.05, mid.y + 0.07, end.z), true);
+    check_derivatives(&grid, &Point3::new(origin.x - 0.05, mid.y + 0.07, mid.z + 0.02), false);
+}
+
+#[test]
+fn the_reach_decides_what_is_answered() {
+    let grid = sphere(0.03, 0.002, 0.012);
+    let at = |x: f64, reach: f64| grid.sample(&Point3::new(x, 0.0, 0.0), reach);
+    assert!(at(0.035, 0.004).is_none());
+    assert!(at(0.035, 0.006).is_some());
+    assert!(at(0.0, 0.0).is_some_and(|s| s.distance < -0.025));
+    assert!(at(0.06, 0.012).is_none());
+    assert!(at(f64::NAN, 0.012).is_none());
+    assert!(at(f64::INFINITY, 0.012).is_none());
+    // Beyond the margin the straight continuation of a straight distance is right.
+    assert!(at(0.06, 0.1).is_some_and(|s| (s.distance - 0.03).abs() < 1e-6));
+}
+
+#[test]
+fn senseless_grids_are_refused() {
+    let mesh = ClosestPoints::new(&cube(1.0)).unwrap();
+    assert!(matches!(
+        SdfGrid::build(&mesh, 0.0, 0.1),
+        Err(SdfError::Length { name: "spacing", .. })
+    ));
+    assert!(matches!(
+        SdfGrid::build(&mesh, f64::NAN, 0.1),
+        Err(SdfError::Length { name: "spacing", .. })
+    ));
+    assert!(matches!(
+        SdfGrid::build(&mesh, 0.1, -1.0),
+        Err(SdfError::Length { name: "margin", .. })
+    ));
+    assert!(matches!(SdfGrid::build(&mesh, 1e-4, 0.1), Err(SdfError::TooLarge { .. })));
+    let wrong = (Point3::origin(), Point3::new(-1.0, 0.0, 0.0));
+    assert_eq!(SdfGrid::from_fn(wrong, 0.1, 0.1, |_, _| 0.0).unwrap_err(), SdfError::Bounds);
+}

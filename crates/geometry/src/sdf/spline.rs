@@ -1,0 +1,145 @@
+//! Cubic B-splines on a uniform grid: prefilter and closed-form basis.
+//!
+//! Unser, Splines: a perfect fit for signal and image processing, 1999. The ends are natural (second
+//! derivative zero), which makes the coefficient there the sample itself and lets the spline be
+//! continued by straight lines without losing a derivative.
+
+use rayon::prelude::*;
+
+/// Basis values and derivatives of the four coefficients around a point, with respect to the grid
+/// coordinate in units of the spacing.
+pub(super) struct Basis {
+    /// Index of the first of the four coefficients, in the array with one coefficient added at each end.
+    pub(super) first: usize,
+    /// Weights of the value, first and second derivative.
+    pub(super) weights: [[f64; 4]; 3],
+}
+
+impl Basis {
+    /// At grid coordinate `x`, sample `i` being at `x = i`, of `samples` >= 2 along the axis. Outside
+    /// 0..=samples - 1 the spline goes on as a straight line.
+    #[inline]
+    pub(super) fn at(x: f64, samples: usize) -> Self {
+        let last = (samples - 1) as f64;
+        let inside = x.clamp(0.0, last);
+        let first = (inside as usize).min(samples - 2);
+        let t = inside - first as f64;
+        let s = 1.0 - t;
+        let (tt, ss) = (t * t, s * s);
+        let mut value = [
+            ss * s / 6.0,
+            (4.0 - 3.0 * tt * (1.0 + s)) / 6.0,
+            (4.0 - 3.0 * ss * (1.0 + t)) / 6.0,
+            tt * t / 6.0,
+        ];
+        let slope = [-0.5 * ss, 0.5 * (3.0 * tt - 4.0 * t), 0.5 * (4.0 * s - 3.0 * ss), 0.5 * tt];
+        let mut curvature = [s, 3.0 * t - 2.0, 3.0 * s - 2.0, t];
+        let beyond = x - inside;
+        if beyond != 0.0 {
+            for i in 0..4 {
+                value[i] += beyond * slope[i];
+            }
+            curvature = [0.0; 4];
+        }
+        Self { first, weights: [value, slope, curvature] }
+    }
+}
+
+/// Coefficients of the spline through `samples`, an array of `dims` with the last index fastest.
+///
+/// The result has one more coefficient at both ends of each axis. Every axis has at least two samples.
+pub(super) fn prefilter(samples: &[f64], dims: [usize; 3]) -> Vec<f64> {
+    let [nx, ny, nz] = dims;
+    let (sy, sz) = (ny + 2, nz + 2);
+    let mut c = vec![0.0; (nx + 2) * sy * sz];
+    let slab = sy * sz;
+    // Along z and y within each slab of constant x.
+    c[slab..(nx + 1) * slab].par_chunks_mut(slab).enumerate().for_each(|(i, out)| {
+        for j in 0..ny {
+            let line = &mut out[(j + 1) * sz..(j + 2) * sz];
+            line[1..=nz].copy_from_slice(&samples[(i * ny + j) * nz..(i * ny + j + 1) * nz]);
+            solve(line, nz, 1);
+        }
+        solve(out, ny, sz);
+    });
+    solve(&mut c, nx, slab);
+    c
+}
+
+/// Turns `n` samples, each a row of `width` numbers with a spare row before and after, into coefficients.
+///
+/// Thomas elimination of `c[i-1] + 4 c[i] + c[i+1] = 6 f[i]` with `c = f` at both ends.
+fn solve(rows: &mut [f64], n: usize, width: usize) {
+    let mut factor = vec![0.0; n];
+    for i in 1..n - 1 {
+        factor[i] = 1.0 / (4.0 - factor[i - 1]);
+        let (before, from) = rows.split_at_mut((i + 1) * width);
+        let previous = &before[i * width..];
+        for (c, &p) in from[..width].iter_mut().zip(previous) {
+            *c = (6.0 * *c - p) * factor[i];
+        }
+    }
+    for i in (1..n - 1).rev() {
+        let (before, after) = rows.split_at_mut((i + 2) * width);
+        for (c, &next) in before[(i + 1) * width..].iter_mut().zip(&after[..width]) {
+            *c -= factor[i] * next;
+        }
+    }
+    for k in 0..width {
+        rows[k] = 2.0 * rows[width + k] - rows[2 * width + k];
+        rows[(n + 1) * width + k] = 2.0 * rows[n * width + k] - rows[(n - 1) * width + k];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn weights_are_a_partition_of_unity_with_matching_derivatives() {
+        let step = 1e-5;
+        for x in [-0.7, 0.3, 1.0, 1.999, 2.5, 4.0, 4.6] {
+            let at = |x: f64| Basis::at(x, 5);
+            let b = at(x);
+            assert!((b.weights[0].iter().sum::<f64>() - 1.0).abs() < 1e-14);
+            assert!(b.weights[1].iter().sum::<f64>().abs() < 1e-14);
+            // A spline of arbitrary coefficients, natural at the ends, differentiated numerically.
+            let mut c = [0.0, 2.0, -1.0, 0.5, 3.0, 1.0, 0.0];
+            (c[0], c[6]) = (2.0 * c[1] - c[2], 2.0 * c[5] - c[4]);
+            let eval = |x: f64, d: usize| {
+                let b = at(x);
+                (0..4).map(|i| c[b.first + i] * b.weights[d][i]).sum::<f64>()
+            };
+            for d in 0..2 {
+                let difference = (eval(x + step, d) - eval(x - step, d)) / (2.0 * step);
+                assert!(
+                    (difference - eval(x, d + 1)).abs() < 2e-4 * step.sqrt() + 4.0 * step,
+                    "{x} {d}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn the_spline_passes_through_every_sample() {
+        let dims = [4, 2, 7];
+        let samples: Vec<f64> = (0..56).map(|i| ((i * i) as f64 * 0.7).sin()).collect();
+        let c = prefilter(&samples, dims);
+        for i in 0..4 {
+            for j in 0..2 {
+                for k in 0..7 {
+                    let b =
+                        [Basis::at(i as f64, 4), Basis::at(j as f64, 2), Basis::at(k as f64, 7)];
+                    let mut value = 0.0;
+                    for p in 0..64 {
+                        let o = [p / 16, p / 4 % 4, p % 4];
+                        let index =
+                            ((b[0].first + o[0]) * 4 + b[1].first + o[1]) * 9 + b[2].first + o[2];
+                        value += c[index] * (0..3).map(|a| b[a].weights[0][o[a]]).product::<f64>();
+                    }
+                    assert!((value - samples[(i * 2 + j) * 7 + k]).abs() < 1e-14);
+                }
+            }
+        }
+    }
+}
