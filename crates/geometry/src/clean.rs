@@ -20,6 +20,8 @@ pub struct MeshReport {
     pub degenerate_faces: usize,
     /// Faces removed because an earlier one has the same corners.
     pub duplicate_faces: usize,
+    /// Faces removed because they stand off an edge that other faces already share, ending in the open.
+    pub fin_faces: usize,
     /// Components removed as stray.
     pub stray_components: usize,
     /// Faces of those.
@@ -39,8 +41,8 @@ pub struct MeshReport {
 }
 
 impl TriMesh {
-    /// The welded mesh (see [`TriMesh::welded`]) without degenerate, duplicate and stray faces, consistently oriented
-    /// and facing outward; attributes are dropped.
+    /// The welded mesh (see [`TriMesh::welded`]) without degenerate, duplicate, fin and stray faces, consistently
+    /// oriented and facing outward; attributes are dropped.
     ///
     /// A component is stray if it has less than 1 % of the faces of the largest and is open or encloses no volume:
     /// scans carry a few such faces. Faces of no area whose corners differ are kept, since their neighbours need
@@ -63,6 +65,7 @@ impl TriMesh {
             seen.insert(key)
         });
         report.duplicate_faces = distinct - faces.len();
+        drop_fins(&mut faces, &mut report);
         drop_stray(&weld.positions, &mut faces, &mut report);
         orient(&weld.positions, &mut faces, &mut report);
 
@@ -81,6 +84,27 @@ impl TriMesh {
 fn wedge(positions: &[Point3<f64>], face: &[u32; 3], origin: &Point3<f64>) -> f64 {
     let [a, b, c] = face.map(|v| positions[v as usize] - origin);
     a.dot(&b.cross(&c))
+}
+
+/// A fin has an open edge and one that more than two faces share; removing it may leave another behind it.
+fn drop_fins(faces: &mut Vec<[u32; 3]>, report: &mut MeshReport) {
+    loop {
+        let (mut open, mut crowded) = (vec![false; faces.len()], vec![false; faces.len()]);
+        for edge in edges(faces) {
+            match edge.uses.as_slice() {
+                [(f, _)] => open[*f as usize] = true,
+                [_, _] => {}
+                uses => uses.iter().for_each(|(f, _)| crowded[*f as usize] = true),
+            }
+        }
+        let before = faces.len();
+        let mut fin = open.iter().zip(&crowded).map(|(o, c)| *o && *c);
+        faces.retain(|_| !fin.next().unwrap_or(false));
+        if faces.len() == before {
+            return;
+        }
+        report.fin_faces += before - faces.len();
+    }
 }
 
 fn drop_stray(positions: &[Point3<f64>], faces: &mut Vec<[u32; 3]>, report: &mut MeshReport) {
@@ -241,7 +265,7 @@ mod tests {
     }
 
     #[test]
-    fn holes_and_fins_are_reported_and_second_bodies_kept() {
+    fn fins_go_holes_are_reported_and_second_bodies_stay() {
         let mut two = cuboid([1.0; 3], [0.0; 3]);
         two.append(
             &icosphere(0.1, 1).transformed(&nalgebra::Isometry3::translation(5.0, 0.0, 0.0)),
@@ -256,10 +280,18 @@ mod tests {
         fin.vertices.push(Point3::new(3.0, 3.0, 3.0));
         let tip = fin.vertices.len() as u32 - 1;
         fin.faces.push([fin.faces[0][0], fin.faces[0][1], tip]);
-        let (_, report) = fin.cleaned();
+        let (clean, report) = fin.cleaned();
+        assert_eq!(
+            (report.fin_faces, report.watertight, clean.vertices.len()),
+            (1, true, two.vertices.len())
+        );
+        // Two boxes that share an edge contradict the surface's topology, but no face of theirs is to blame.
+        let mut hinge = cuboid([1.0; 3], [0.0; 3]);
+        hinge.append(&cuboid([1.0; 3], [1.0, 1.0, 0.0]));
+        let (_, report) = hinge.cleaned();
         assert_eq!(
             (report.open_edges, report.non_manifold_edges, report.watertight),
-            (2, 1, false)
+            (0, 1, false)
         );
         let (nothing, report) = TriMesh::default().cleaned();
         assert!(nothing.faces.is_empty() && !report.watertight);

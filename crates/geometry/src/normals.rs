@@ -68,14 +68,19 @@ mod tests {
 
     #[test]
     fn a_split_sphere_is_smooth() {
-        let whole = icosphere(2.0, 4);
-        let smooth = whole.vertex_normals();
-        // All copies of a position see the same faces, whichever of them they belong to.
-        let corners = whole.faces.iter().flatten().map(|&v| v as usize);
-        for (n, v) in split(&whole).vertex_normals().iter().zip(corners) {
-            assert!((n - whole.vertices[v].coords / 2.0).norm() < 0.01);
-            assert!((n - smooth[v]).norm() < 1e-12);
-        }
+        // Where triangles shrink unevenly around a vertex the mean is off in the first order of the edge.
+        let worst = [3, 4, 5].map(|level| {
+            let whole = icosphere(2.0, level);
+            let smooth = whole.vertex_normals();
+            // All copies of a position see the same faces, whichever of them they belong to.
+            let corners = whole.faces.iter().flatten().map(|&v| v as usize);
+            let error = |(n, v): (&Vector3<f64>, usize)| {
+                assert!((n - smooth[v]).norm() < 1e-12);
+                (n - whole.vertices[v].coords / 2.0).norm()
+            };
+            split(&whole).vertex_normals().iter().zip(corners).map(error).fold(0.0, f64::max)
+        });
+        assert!(worst[0] < 0.05 && worst.windows(2).all(|w| w[1] < 0.6 * w[0]), "{worst:?}");
     }
 
     #[test]
