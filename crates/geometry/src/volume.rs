@@ -274,6 +274,8 @@ fn rounded(value: f64) -> f64 {
 
 #[cfg(test)]
 pub(crate) mod tests {
+    use std::slice::from_ref;
+
     use super::*;
     use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 
@@ -319,16 +321,16 @@ pub(crate) mod tests {
     #[test]
     fn boxes_of_known_overlap() {
         let a = cuboid([1.0; 3], [0.0; 3]);
-        check(&[a.clone()], &cuboid([1.0; 3], [0.5, 0.25, 0.1]), 0.5 * 0.75 * 0.9);
+        check(from_ref(&a), &cuboid([1.0; 3], [0.5, 0.25, 0.1]), 0.5 * 0.75 * 0.9);
         // Nested either way, identical, and with coplanar sides.
-        check(&[a.clone()], &cuboid([0.2; 3], [0.1; 3]), 0.008);
+        check(from_ref(&a), &cuboid([0.2; 3], [0.1; 3]), 0.008);
         check(&[cuboid([0.2; 3], [0.1; 3])], &a, 0.008);
-        check(&[a.clone()], &a, 1.0);
-        check(&[a.clone()], &cuboid([1.0; 3], [0.5, 0.0, 0.0]), 0.5);
-        check(&[a.clone()], &cuboid([0.5, 0.5, 1.0], [0.25, 0.25, 0.0]), 0.25);
+        check(from_ref(&a), &a, 1.0);
+        check(from_ref(&a), &cuboid([1.0; 3], [0.5, 0.0, 0.0]), 0.5);
+        check(from_ref(&a), &cuboid([0.5, 0.5, 1.0], [0.25, 0.25, 0.0]), 0.25);
         // Apart, and touching in a face, an edge and a corner.
         for center in [[3.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [1.0; 3]] {
-            check(&[a.clone()], &cuboid([1.0; 3], center), 0.0);
+            check(from_ref(&a), &cuboid([1.0; 3], center), 0.0);
         }
         assert_eq!(intersection_volume(&[], &a), Ok(0.0));
     }
@@ -397,7 +399,7 @@ pub(crate) mod tests {
         let mut inverted = good.clone();
         inverted.faces.iter_mut().for_each(|f| f.swap(0, 1));
         assert!(matches!(
-            intersection_volume(&[good.clone()], &inverted),
+            intersection_volume(from_ref(&good), &inverted),
             Err(VolumeError::NoVolume { .. })
         ));
         let mut broken = good.clone();

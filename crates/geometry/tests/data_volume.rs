@@ -3,6 +3,8 @@
 //! The golden hand is the union of the primitives of `hands/allegro_xela_right.json`: exact boxes, and capsules whose
 //! hemispheres have 12 rows and 24 columns of facets, inscribed, the first column at +x.
 
+#![allow(clippy::unwrap_used)] // a test fails by panicking
+
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 

@@ -17,8 +17,11 @@ use crate::{Texture, TriMesh};
 
 pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshError> {
     check_container(bytes).map_err(|e| MeshError::malformed(path, "glb header", e))?;
-    let mut gltf =
-        Gltf::from_slice(bytes).map_err(|e| MeshError::malformed(path, "document", e))?;
+    // The crate's validation indexes what it is about to validate: a panic there is a malformed document.
+    let mut gltf = std::panic::catch_unwind(|| Gltf::from_slice(bytes))
+        .map_err(|_| "an index refers to nothing".to_owned())
+        .and_then(|read| read.map_err(|e| e.to_string()))
+        .map_err(|e| MeshError::malformed(path, "document", e))?;
     if let Some(required) = gltf.extensions_required().find(|e| !e.starts_with("KHR_materials_")) {
         return Err(MeshError::Unsupported {
             path: path.into(),

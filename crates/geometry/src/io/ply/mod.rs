@@ -1,0 +1,337 @@
+//! PLY, ASCII and binary of either byte order (Turk, "The PLY Polygon File Format", 1994).
+//!
+//! Beyond positions and faces this reads normals, vertex colours, texture coordinates of vertices
+//! (`texture_u`/`texture_v`, `s`/`t`, `u`/`v`) or of face corners (`texcoord`), and
+//! `comment TextureFile NAME`. Unknown elements and properties are skipped.
+
+mod body;
+mod header;
+
+use std::collections::HashMap;
+use std::path::Path;
+use std::sync::Arc;
+
+use nalgebra::{Point3, Vector3};
+
+use self::body::Body;
+use self::header::Element;
+use super::{MeshError, texture};
+use crate::TriMesh;
+
+/// Which properties of the vertex element hold what.
+struct VertexLayout {
+    position: [usize; 3],
+    normal: Option<[usize; 3]>,
+    color: Option<[usize; 3]>,
+    uv: Option<[usize; 2]>,
+}
+
+impl VertexLayout {
+    fn of(element: &Element, path: &Path) -> Result<Self, MeshError> {
+        let find = |name: &str| {
+            element.properties.iter().position(|p| p.count.is_none() && p.name == name)
+        };
+        fn all<const N: usize>(
+            find: impl Fn(&str) -> Option<usize>,
+            names: [&str; N],
+        ) -> Option<[usize; N]> {
+            let found = names.map(find);
+            found.iter().all(Option::is_some).then(|| found.map(Option::unwrap_or_default))
+        }
+        let position = all(find, ["x", "y", "z"])
+            .ok_or_else(|| MeshError::malformed(path, "element vertex", "no properties x, y, z"))?;
+        let uv = [["texture_u", "texture_v"], ["s", "t"], ["u", "v"]]
+            .into_iter()
+            .find_map(|names| all(find, names));
+        let color = all(find, ["red", "green", "blue"]).or_else(|| all(find, ["r", "g", "b"]));
+        Ok(Self { position, normal: all(find, ["nx", "ny", "nz"]), color, uv })
+    }
+}
+
+pub(in crate::io) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshError> {
+    let header = header::parse(bytes, path)?;
+    let mut body = Body::new(bytes, &header, path);
+    let mut mesh = TriMesh::default();
+    let mut corner_uvs = None;
+    for element in &header.elements {
+        match element.name.as_str() {
+            "vertex" => read_vertices(&mut body, element, &mut mesh)?,
+            "face" => corner_uvs = read_faces(&mut body, element, &mut mesh)?,
+            _ => body.rows(element, |_, _| Ok(()))?,
+        }
+    }
+    if let (None, Some(corners)) = (&mesh.uvs, corner_uvs) {
+        mesh = split_seams(mesh, &corners);
+    }
+    if let (Some(name), true) = (&header.texture, mesh.uvs.is_some()) {
+        mesh.texture = Some(Arc::new(texture::load_companion(path, name)?));
+    }
+    Ok(mesh)
+}
+
+fn read_vertices(body: &mut Body, element: &Element, mesh: &mut TriMesh) -> Result<(), MeshError> {
+    let layout = VertexLayout::of(element, body.path)?;
+    mesh.normals = layout.normal.map(|_| Vec::new());
+    mesh.colors = layout.color.map(|_| Vec::new());
+    mesh.uvs = layout.uv.map(|_| Vec::new());
+    body.rows(element, |_, row| {
+        mesh.vertices.push(Point3::from(layout.position.map(|p| row[p][0])));
+        if let (Some(at), Some(normals)) = (layout.normal, &mut mesh.normals) {
+            normals.push(Vector3::from(at.map(|p| row[p][0])));
+        }
+        if let (Some(at), Some(colors)) = (layout.color, &mut mesh.colors) {
+            colors.push(at.map(|p| element.properties[p].item.color(row[p][0])));
+        }
+        if let (Some(at), Some(uvs)) = (layout.uv, &mut mesh.uvs) {
+            uvs.push(at.map(|p| row[p][0] as f32));
+        }
+        Ok(())
+    })
+}
+
+/// Texture coordinates of the corners of each triangle.
+type CornerUvs = Vec<[[f32; 2]; 3]>;
+
+fn read_faces(
+    body: &mut Body,
+    element: &Element,
+    mesh: &mut TriMesh,
+) -> Result<Option<CornerUvs>, MeshError> {
+    let list = |names: &[&str]| {
+        element
+            .properties
+            .iter()
+            .position(|p| p.count.is_some() && names.contains(&p.name.as_str()))
+    };
+    let indices = list(&["vertex_indices", "vertex_index"])
+        .ok_or_else(|| MeshError::malformed(body.path, "element face", "no list vertex_indices"))?;
+    let texcoord = list(&["texcoord"]);
+    let mut corner_uvs = texcoord.map(|_| Vec::new());
+    body.rows(element, |_, row| {
+        let polygon = polygon(&row[indices])?;
+        let fan = 1..polygon.len() - 1;
+        mesh.faces.extend(fan.clone().map(|k| [polygon[0], polygon[k], polygon[k + 1]]));
+        if let (Some(at), Some(corners)) = (texcoord, &mut corner_uvs) {
+            let uv = &row[at];
+            // MeshLab writes an empty list for a face without texture.
+            if !uv.is_empty() && uv.len() != 2 * polygon.len() {
+                return Err(format!(
+                    "texcoord has {} values for {} corners",
+                    uv.len(),
+                    polygon.len()
+                ));
+            }
+            let corner = |k: usize| match uv.get(2 * k..2 * k + 2) {
+                Some(&[u, v]) => [u as f32, v as f32],
+                _ => [0.0; 2],
+            };
+            corners.extend(fan.map(|k| [corner(0), corner(k), corner(k + 1)]));
+        }
+        Ok(())
+    })?;
+    Ok(corner_uvs)
+}
+
+fn polygon(values: &[f64]) -> Result<Vec<u32>, String> {
+    if values.len() < 3 {
+        return Err(format!("{} corners", values.len()));
+    }
+    let index = |&v: &f64| {
+        let fits = v >= 0.0 && v < f64::from(u32::MAX) && v.fract() == 0.0;
+        if fits { Ok(v as u32) } else { Err(format!("vertex index out of range: {v}")) }
+    };
+    values.iter().map(index).collect()
+}
+
+/// Stores a vertex once for each texture coordinate its corners have.
+fn split_seams(mesh: TriMesh, corners: &[[[f32; 2]; 3]]) -> TriMesh {
+    let mut split = TriMesh { uvs: Some(Vec::new()), ..TriMesh::default() };
+    let mut source = Vec::new();
+    let mut known = HashMap::new();
+    for (face, uvs) in mesh.faces.iter().zip(corners) {
+        let mut new_face = [0; 3];
+        for k in 0..3 {
+            let key = (face[k], uvs[k].map(f32::to_bits));
+            new_face[k] = *known.entry(key).or_insert_with(|| {
+                source.push(face[k] as usize);
+                split.uvs.iter_mut().for_each(|u| u.push(uvs[k]));
+                source.len() as u32 - 1
+            });
+        }
+        split.faces.push(new_face);
+    }
+    // An index out of range is reported by the caller's check, on the unsplit mesh.
+    if source.iter().any(|&v| v >= mesh.vertices.len()) {
+        return mesh;
+    }
+    split.vertices = source.iter().map(|&v| mesh.vertices[v]).collect();
+    split.normals = mesh.normals.map(|n| source.iter().map(|&v| n[v]).collect());
+    split.colors = mesh.colors.map(|c| source.iter().map(|&v| c[v]).collect());
+    split
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HEADER: &str = "element vertex 4\nproperty float x\nproperty double y\nproperty float z\n\
+        property uchar red\nproperty uchar green\nproperty uchar blue\nproperty uchar alpha\n\
+        property float texture_u\nproperty float texture_v\nelement extra 2\nproperty list uchar short junk\n\
+        property int8 k\nelement face 1\nproperty list uint8 int32 vertex_indices\nproperty int flags\nend_header\n";
+
+    fn load(bytes: &[u8]) -> Result<TriMesh, MeshError> {
+        TriMesh::from_bytes(bytes, Path::new("m.ply"))
+    }
+
+    fn binary(big_endian: bool) -> Vec<u8> {
+        let name = if big_endian { "big" } else { "little" };
+        let mut bytes =
+            format!("ply\nformat binary_{name}_endian 1.0\ncomment hi\n{HEADER}").into_bytes();
+        let mut put = |le: &[u8]| {
+            let mut v = le.to_vec();
+            if big_endian {
+                v.reverse();
+            }
+            bytes.extend(v);
+        };
+        for [x, y] in [[0.0_f32, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]] {
+            put(&x.to_le_bytes());
+            put(&f64::from(y).to_le_bytes());
+            put(&0.5_f32.to_le_bytes());
+            [255_u8, 51, 0, 9].iter().for_each(|c| put(&[*c]));
+            put(&x.to_le_bytes());
+            put(&(1.0 - y).to_le_bytes());
+        }
+        for n in [2_u8, 0] {
+            put(&[n]);
+            (0..n).for_each(|k| put(&i16::from(k).to_le_bytes()));
+            put(&[7]);
+        }
+        put(&[4]);
+        (0..4).for_each(|k: i32| put(&k.to_le_bytes()));
+        put(&5_i32.to_le_bytes());
+        bytes
+    }
+
+    fn ascii() -> String {
+        let mut text = format!("ply\nformat ascii 1.0\n{HEADER}");
+        for [x, y] in [[0, 0], [1, 0], [1, 1], [0, 1]] {
+            text += &format!("{x} {y} 0.5 255 51 0 9 {x} {}\n", 1 - y);
+        }
+        text + "2 0 1 7\n\n0 7\n4 0 1 2 3 5\n"
+    }
+
+    #[test]
+    fn all_three_encodings_give_the_same_mesh() {
+        for mesh in [load(ascii().as_bytes()), load(&binary(false)), load(&binary(true))] {
+            let mesh = mesh.unwrap();
+            assert_eq!(mesh.faces, [[0, 1, 2], [0, 2, 3]]);
+            assert_eq!(mesh.vertices[2], Point3::new(1.0, 1.0, 0.5));
+            assert_eq!(mesh.colors.unwrap()[3], [1.0, 0.2, 0.0]);
+            assert_eq!(mesh.uvs.unwrap()[1], [1.0, 1.0]);
+            assert!(mesh.normals.is_none() && mesh.texture.is_none());
+        }
+    }
+
+    #[test]
+    fn truncation_anywhere_is_an_error_and_never_a_panic() {
+        for bytes in [binary(false), binary(true), ascii().into_bytes()] {
+            // The last newline of an ASCII file, or its last digit, may go unnoticed.
+            for n in 0..bytes.len() - 3 {
+                assert!(load(&bytes[..n]).is_err(), "{n} of {}", bytes.len());
+            }
+        }
+        let full = binary(false);
+        let error = load(&full[..full.len() - 1]).unwrap_err().to_string();
+        assert!(error.starts_with("m.ply: face 0: the file ends"), "{error}");
+    }
+
+    #[test]
+    fn hostile_counts_cost_nothing() {
+        for (from, to) in
+            [("vertex 4", "vertex 4000000000000"), ("face 1", "face 18446744073709551615")]
+        {
+            for bytes in [binary(false), ascii().into_bytes()] {
+                let end = bytes.windows(10).position(|w| w == b"end_header").unwrap();
+                let text = String::from_utf8_lossy(&bytes[..end]).replace(from, to).into_bytes();
+                assert!(load(&[&text, &bytes[end..]].concat()).is_err());
+            }
+        }
+        let list = "ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty float x\nproperty float y\n\
+            property float z\nelement face 1\nproperty list uint float vertex_indices\nend_header\n";
+        let bytes = [list.as_bytes(), &[0; 12], &u32::MAX.to_le_bytes()].concat();
+        assert!(load(&bytes).unwrap_err().to_string().starts_with("m.ply: face 0: the file ends"));
+        let empty = "ply\nformat ascii 1.0\nelement nothing 18446744073709551615\nend_header\n";
+        assert!(matches!(load(empty.as_bytes()), Err(MeshError::Empty { .. })));
+    }
+
+    #[test]
+    fn malformed_input_names_its_element() {
+        let text = ascii();
+        let says = |text: &str, what: &str| {
+            let error = load(text.as_bytes()).unwrap_err().to_string();
+            assert!(error.starts_with("m.ply: ") && error.contains(what), "{error} / {what}");
+        };
+        says(&text.replacen("0 0 0.5", "0 nan 0.5", 1), "vertex 0: coordinate is not finite");
+        says(&text.replace("4 0 1 2 3 5", "4 0 1 2 4 5"), "face 1: vertex index out of range");
+        says(&text.replace("4 0 1 2 3 5", "4 0 1 2 -1 5"), "face 0: vertex index out of range");
+        says(&text.replace("4 0 1 2 3 5", "2 0 1 5"), "face 0: 2 corners");
+        says(&text.replace("element vertex 4", "element vertex 3"), "extra 0: ");
+        says(&text.replace("element vertex 4", "element vertex 5"), "vertex 4: ");
+        says(
+            &text.replace("element vertex 4", "element vertex -4"),
+            "header: element vertex: count",
+        );
+        says(&text.replace("property double y", "property quad y"), "header: type");
+        says(
+            &text.replace("property double y", "property double q"),
+            "element vertex: no properties x, y, z",
+        );
+        says(&text.replace("format ascii", "format morse"), "unknown format");
+        says(&text.replacen("ply", "plx", 1), "first line");
+        says(&text.replace("element extra 2", "element vertex 2"), "element vertex declared twice");
+        says(&text.replace("4 0 1 2 3 5", "0.5 0 1 2 3 5"), "face 0: a list length");
+        says("ply\nformat ascii 1.0\nproperty int x\nend_header\n", "before any element");
+    }
+
+    #[test]
+    fn texture_is_read_beside_the_file_and_a_missing_one_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("m.ply");
+        let text = ascii().replacen(
+            "format ascii 1.0",
+            "format ascii 1.0\ncomment TextureFile my tex.png",
+            1,
+        );
+        let error = TriMesh::from_bytes(text.as_bytes(), &path).unwrap_err();
+        assert!(
+            matches!(&error, MeshError::Texture { texture, .. } if texture == "my tex.png"),
+            "{error}"
+        );
+        image::RgbImage::from_raw(2, 1, vec![1, 2, 3, 4, 5, 6])
+            .unwrap()
+            .save(folder.path().join("my tex.png"))
+            .unwrap();
+        let mesh = TriMesh::from_bytes(text.as_bytes(), &path).unwrap();
+        assert_eq!(mesh.texture.unwrap().pixels, [[1, 2, 3], [4, 5, 6]]);
+        let escaping = text.replace("my tex.png", "../tex.png");
+        assert!(matches!(
+            TriMesh::from_bytes(escaping.as_bytes(), &path),
+            Err(MeshError::Texture { .. })
+        ));
+    }
+
+    #[test]
+    fn corner_texture_coordinates_split_seams_only() {
+        let text = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
+            element face 2\nproperty list uchar int vertex_index\nproperty list uchar float texcoord\nend_header\n\
+            0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2 6 0 0 1 0 1 1\n3 0 2 3 6 0 0 0.5 0.5 0 1\n";
+        let mesh = load(text.as_bytes()).unwrap();
+        // Vertex 0 agrees across the diagonal, vertex 2 does not.
+        assert_eq!(mesh.faces, [[0, 1, 2], [0, 3, 4]]);
+        assert_eq!(mesh.vertices[3], mesh.vertices[2]);
+        assert_eq!(mesh.uvs.unwrap()[3], [0.5, 0.5]);
+        let short = text.replace("6 0 0 1 0 1 1", "4 0 0 1 0");
+        assert!(load(short.as_bytes()).unwrap_err().to_string().contains("face 0: texcoord"));
+    }
+}

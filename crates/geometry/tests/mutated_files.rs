@@ -1,0 +1,148 @@
+//! Whatever a file holds, reading it ends in a mesh or an error.
+
+#![allow(clippy::unwrap_used)] // a test fails by panicking
+
+use std::path::Path;
+
+use nalgebra::{Point3, Vector3};
+use prehend_geometry::TriMesh;
+
+fn tetrahedron() -> TriMesh {
+    let p = Point3::new;
+    let vertices = vec![p(0., 0., 0.), p(1., 0., 0.), p(0., 1., 0.), p(0., 0., 1.)];
+    let mut mesh = TriMesh::new(vertices, vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]);
+    mesh.normals = Some(vec![Vector3::x(); 4]);
+    mesh.uvs = Some(vec![[0.25, 0.5]; 4]);
+    mesh.colors = Some(vec![[0.25, 0.5, 1.0]; 4]);
+    mesh
+}
+
+/// Reads `original` with bytes replaced, removed and repeated at places chosen by a fixed sequence.
+fn mutate(original: &[u8], name: &str) -> (usize, usize) {
+    let path = Path::new(name);
+    assert!(TriMesh::from_bytes(original, path).is_ok(), "{name}");
+    let mut state = 1_u64;
+    let mut next = |below: usize| {
+        state =
+            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) as usize % below.max(1)
+    };
+    let (mut read, mut refused) = (0, 0);
+    for _ in 0..3000 {
+        let mut bytes = original.to_vec();
+        for _ in 0..=next(3) {
+            let at = next(bytes.len());
+            match next(5) {
+                0 => bytes[at] = next(256) as u8,
+                1 => bytes[at] = b"0129-. \n/ex#"[next(12)],
+                2 => drop(bytes.drain(at..(at + next(20)).min(bytes.len()))),
+                3 => bytes.truncate(at.max(1)),
+                _ => {
+                    let piece = bytes[at..(at + next(40)).min(bytes.len())].to_vec();
+                    bytes.splice(at..at, piece);
+                }
+            }
+            if bytes.is_empty() {
+                bytes.push(0);
+            }
+        }
+        match TriMesh::from_bytes(&bytes, path) {
+            Ok(mesh) => {
+                assert!(mesh.faces.iter().flatten().all(|&v| (v as usize) < mesh.vertices.len()));
+                assert!(mesh.uvs.as_ref().is_none_or(|u| u.len() == mesh.vertices.len()));
+                assert!(mesh.normals.as_ref().is_none_or(|n| n.len() == mesh.vertices.len()));
+                assert!(mesh.colors.as_ref().is_none_or(|c| c.len() == mesh.vertices.len()));
+                // What was read is fit for the next steps, too.
+                let (clean, _) = mesh.cleaned();
+                prehend_geometry::mass::mass_properties(&clean, 1.0).ok();
+                read += 1;
+            }
+            Err(error) => {
+                assert!(error.to_string().starts_with(name), "{error}");
+                refused += 1;
+            }
+        }
+    }
+    (read, refused)
+}
+
+fn check(original: &[u8], name: &str) {
+    let (read, refused) = mutate(original, name);
+    // Both ends were met, or the mutations say nothing.
+    assert!(read > 50 && refused > 50, "{name}: {read} read, {refused} refused");
+}
+
+#[test]
+fn ply() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("m.ply");
+    tetrahedron().save_ply(&path).unwrap();
+    check(&std::fs::read(&path).unwrap(), "m.ply");
+    let ascii = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
+        element face 3\nproperty list uchar int vertex_indices\nproperty list uchar float texcoord\nend_header\n\
+        0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1 6 0 0 1 0 0 1\n3 0 1 3 6 0 0 1 0 0 1\n3 0 3 2 0\n";
+    check(ascii.as_bytes(), "m.ply");
+}
+
+#[test]
+fn obj() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("m.obj");
+    tetrahedron().save_obj(&path).unwrap();
+    check(&std::fs::read(&path).unwrap(), "m.obj");
+}
+
+#[test]
+fn stl() {
+    let mut bytes = vec![b' '; 80];
+    bytes.extend(4_u32.to_le_bytes());
+    let mesh = tetrahedron();
+    for f in 0..4 {
+        bytes.extend([0; 12]);
+        mesh.triangle(f)
+            .iter()
+            .flat_map(|p| p.iter())
+            .for_each(|c| bytes.extend((*c as f32).to_le_bytes()));
+        bytes.extend([0; 2]);
+    }
+    check(&bytes, "m.stl");
+}
+
+#[test]
+fn glb() {
+    let mut bin = Vec::new();
+    let mesh = tetrahedron();
+    mesh.vertices.iter().flat_map(|p| p.iter()).for_each(|c| bin.extend((*c as f32).to_le_bytes()));
+    mesh.faces.iter().flatten().for_each(|v| bin.extend((*v as u16).to_le_bytes()));
+    let mut json = r#"{"asset":{"version":"2.0"},"scenes":[{"nodes":[0,1]}],"nodes":[{"mesh":0},
+        {"mesh":0,"rotation":[0,0,1,0],"scale":[2,1,1],"translation":[1,2,3]}],
+        "meshes":[{"primitives":[{"attributes":{"POSITION":0,"COLOR_0":0},"indices":1}]}],
+        "buffers":[{"byteLength":72}],
+        "bufferViews":[{"buffer":0,"byteLength":48,"byteStride":12},{"buffer":0,"byteOffset":48,"byteLength":24}],
+        "accessors":[{"bufferView":0,"componentType":5126,"count":4,"type":"VEC3","min":[0,0,0],"max":[1,1,1]},
+        {"bufferView":1,"componentType":5123,"count":12,"type":"SCALAR"}]}"#
+        .to_owned()
+        .into_bytes();
+    json.resize(json.len().next_multiple_of(4), b' ');
+    let mut bytes = b"glTF\x02\0\0\0".to_vec();
+    bytes.extend((28 + json.len() as u32 + bin.len() as u32).to_le_bytes());
+    for (kind, chunk) in [(b"JSON", &json), (b"BIN\0", &bin)] {
+        bytes.extend((chunk.len() as u32).to_le_bytes());
+        bytes.extend(kind);
+        bytes.extend(chunk);
+    }
+    mutate(&bytes, "m.glb");
+    check(&json_with_data_uri(&json, &bin), "m.gltf");
+}
+
+/// The same document with its buffer in a base64 data URI.
+fn json_with_data_uri(json: &[u8], bin: &[u8]) -> Vec<u8> {
+    const SYMBOLS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let mut text = String::new();
+    for chunk in bin.chunks_exact(3) {
+        let bits = u32::from(chunk[0]) << 16 | u32::from(chunk[1]) << 8 | u32::from(chunk[2]);
+        (0..4).rev().for_each(|k| text.push(SYMBOLS[(bits >> (6 * k) & 63) as usize] as char));
+    }
+    let uri = format!(r#"{{"uri":"data:application/octet-stream;base64,{text}","byteLength":72}}"#);
+    String::from_utf8_lossy(json).replace(r#"{"byteLength":72}"#, &uri).into_bytes()
+}
