@@ -160,7 +160,9 @@ mod tests {
         let (fine, coarse) = (camera.ray(639.5, 479.5), half.ray(319.5, 239.5));
         assert!((fine - coarse).norm() < 1e-12);
         // Pixel (u, v) tripled has its centre in the middle sample of three.
-        assert!((camera.scaled(3.0).ray(3.0 * 10.0 + 1.0, 1.0) - camera.ray(10.0, 0.0)).norm() < 1e-12);
+        assert!(
+            (camera.scaled(3.0).ray(3.0 * 10.0 + 1.0, 1.0) - camera.ray(10.0, 0.0)).norm() < 1e-12
+        );
     }
 
     #[test]

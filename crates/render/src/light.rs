@@ -114,7 +114,10 @@ fn fit_channel(samples: &[LightSample], channel: usize, ridge: f64) -> Option<Ve
         let mut magnitudes: Vec<f64> = residuals.iter().map(|r| r.abs()).collect();
         magnitudes.sort_by(f64::total_cmp);
         let scale = (2.4 * magnitudes[magnitudes.len() / 2]).max(1e-4);
-        weights.iter_mut().zip(&residuals).for_each(|(w, r)| *w = 1.0 / (1.0 + (r / scale).powi(2)));
+        weights
+            .iter_mut()
+            .zip(&residuals)
+            .for_each(|(w, r)| *w = 1.0 / (1.0 + (r / scale).powi(2)));
     }
     solution.iter().all(|v| v.is_finite()).then_some(solution)
 }
@@ -127,10 +130,11 @@ mod tests {
         (0..400)
             .map(|i| {
                 let a = i as f64 * 0.7;
-                let normal = Vector3::new(a.cos(), a.sin(), -1.2 - 0.002 * i as f64).normalize();
+                let normal =
+                    Vector3::new(a.cos(), a.sin(), -0.3 - 0.005 * (i * 7 % 400) as f64).normalize();
                 let albedo = [0, 1, 2].map(|c| 0.3 + 0.6 * ((i * (c + 3)) % 17) as f64 / 17.0);
                 let mut observed = [0, 1, 2].map(|c| albedo[c] * light.factor(c, &normal));
-                if i < outliers {
+                if outliers > 0 && i % (400 / outliers.max(1)) == 0 {
                     observed = [1.0; 3];
                 }
                 LightSample {

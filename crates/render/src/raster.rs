@@ -43,10 +43,8 @@ impl Visible {
         let region = &self.region;
         let low = |i: usize| corners[0][i].min(corners[1][i]).min(corners[2][i]);
         let high = |i: usize| corners[0][i].max(corners[1][i]).max(corners[2][i]);
-        let (x0, y0) =
-            (low(0).ceil().max(region.x0 as f32), low(1).ceil().max(region.y0 as f32));
-        let (x1, y1) =
-            (high(0).min(region.x1 as f32 - 1.0), high(1).min(region.y1 as f32 - 1.0));
+        let (x0, y0) = (low(0).ceil().max(region.x0 as f32), low(1).ceil().max(region.y0 as f32));
+        let (x1, y1) = (high(0).min(region.x1 as f32 - 1.0), high(1).min(region.y1 as f32 - 1.0));
         if x0 > x1 || y0 > y1 {
             return;
         }

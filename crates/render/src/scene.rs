@@ -118,7 +118,8 @@ mod tests {
     fn the_light_shades_by_the_normal() {
         let camera = Camera { fx: 100.0, fy: 100.0, cx: 15.5, cy: 15.5, width: 32, height: 32 };
         let model = RenderModel::new(&cuboid(Vector3::new(0.05, 0.05, 0.05))).unwrap();
-        let object = SceneObject { model: &model, t_cam_model: Isometry3::translation(0.0, 0.0, 0.6) };
+        let object =
+            SceneObject { model: &model, t_cam_model: Isometry3::translation(0.0, 0.0, 0.6) };
         let light = Light::headlight(0.25, 0.5);
         let picture = render_scene(&camera, &[object], &light, [0.0; 3], 1);
         // Mid-grey faces the camera: 0.5 (0.25 + 0.5).

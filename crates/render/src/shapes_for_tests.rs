@@ -9,7 +9,8 @@ pub(crate) fn cuboid(half: Vector3<f64>) -> TriMesh {
     let vertices = (0..8)
         .map(|i| Point3::new(sign(i, 0) * half.x, sign(i, 1) * half.y, sign(i, 2) * half.z))
         .collect();
-    let quads = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    let quads =
+        [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
     let faces = quads.iter().flat_map(|q: &[u32; 4]| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]]);
     TriMesh::new(vertices, faces.collect())
 }
@@ -70,8 +71,7 @@ fn grid(nu: usize, nv: usize, at: impl Fn(f64, f64) -> Vector3<f64>) -> TriMesh 
     let mut faces = Vec::new();
     for j in 0..nv {
         for i in 0..nu {
-            let (a, b, c, d) =
-                (index(i, j), index(i + 1, j), index(i + 1, j + 1), index(i, j + 1));
+            let (a, b, c, d) = (index(i, j), index(i + 1, j), index(i + 1, j + 1), index(i, j + 1));
             faces.extend([[a, b, c], [a, c, d]]);
         }
     }

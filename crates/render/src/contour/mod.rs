@@ -80,6 +80,15 @@ pub struct ContourImage {
     pub depth: DepthImage,
 }
 
+/// What a pixel sees of the object.
+struct Seen {
+    pixel: Pixel,
+    /// A face covers the pixel's centre.
+    hit: bool,
+    /// The centre lies within the contour band.
+    near_outline: bool,
+}
+
 /// Everything about a pose that its pixels share.
 struct Frame<'a> {
     posed: Posed<'a>,
@@ -137,9 +146,9 @@ impl ContourRenderer {
             depth: DepthImage::filled(camera.width, camera.height, 0.0),
         };
         for index in 0..frame.bins.len() {
-            self.visit::<false>(&frame, &scene, index, |x, y, hit, pixel| {
+            self.visit::<false>(&frame, &scene, index, |x, y, seen| {
                 let at = y * camera.width + x;
-                if let Some(pixel) = pixel {
+                if let Some(Seen { pixel, hit, .. }) = seen {
                     image.color.pixels_mut()[at] = pixel.color;
                     image.coverage[at] = pixel.coverage;
                     image.depth.pixels_mut()[at] = if hit { pixel.z } else { 0.0 };
@@ -223,14 +232,14 @@ impl ContourRenderer {
         (self.options.half_width as f32).clamp(0.05, 64.0)
     }
 
-    /// Calls `each(x, y, hit, pixel)` for every pixel of one block of rows, in order; `pixel` is none where
-    /// nothing of the object is seen.
+    /// Calls `each` for every pixel of one block of rows, in order, with its column and row and what is seen
+    /// of the object there, if anything.
     fn visit<const DERIVATIVES: bool>(
         &self,
         frame: &Frame,
         scene: &Scene,
         index: usize,
-        mut each: impl FnMut(usize, usize, bool, Option<Pixel>),
+        mut each: impl FnMut(usize, usize, Option<Seen>),
     ) {
         let visible = frame.visible(index);
         let band = Band::new(&frame.pieces, &visible.region, scene.half_width);
@@ -238,15 +247,16 @@ impl ContourRenderer {
             let (x, y) = visible.position(i);
             let edge = frame.pieces.get(band.piece[i] as usize);
             let (u, v) = (x as f32, y as f32);
-            let hit = face != MISS;
-            let pixel = match edge {
-                edge if hit => {
-                    Some(scene.inside::<DERIVATIVES>(u, v, face, visible.inverse_z[i], edge))
-                }
-                Some(piece) => Some(scene.outside::<DERIVATIVES>(u, v, piece)),
-                None => None,
+            let seen = if face != MISS {
+                let pixel = scene.inside::<DERIVATIVES>(u, v, face, visible.inverse_z[i], edge);
+                Some(Seen { pixel, hit: true, near_outline: edge.is_some() })
+            } else {
+                edge.map(|piece| {
+                    let pixel = scene.outside::<DERIVATIVES>(u, v, piece);
+                    Seen { pixel, hit: false, near_outline: true }
+                })
             };
-            each(x, y, hit, pixel);
+            each(x, y, seen);
         }
     }
 
@@ -265,9 +275,9 @@ impl ContourRenderer {
             .map(|index| {
                 let mut sums = Sums::new();
                 let last = frame.region.x1 - 1;
-                self.visit::<DERIVATIVES>(&frame, &scene, index, |x, y, hit, pixel| {
+                self.visit::<DERIVATIVES>(&frame, &scene, index, |x, y, seen| {
                     let at = y * target.camera.width + x;
-                    self.add::<DERIVATIVES>(&mut sums, target, at, hit, pixel);
+                    self.add::<DERIVATIVES>(&mut sums, target, at, seen);
                     if DERIVATIVES && x == last {
                         sums.end_row();
                     }
@@ -287,12 +297,11 @@ impl ContourRenderer {
         sums: &mut Sums,
         target: &Target,
         at: usize,
-        hit: bool,
-        pixel: Option<Pixel>,
+        seen: Option<Seen>,
     ) {
         let (observed, coverage) = (target.color[at], target.coverage[at]);
         let mask_weight = self.options.mask_weight as f32;
-        let Some(pixel) = pixel else {
+        let Some(Seen { pixel, hit, near_outline }) = seen else {
             if coverage > 0.0 {
                 observed.iter().for_each(|c| sums.color += self.options.robust.cost(*c).0 as f64);
                 sums.mask += (mask_weight * coverage * coverage) as f64;
@@ -305,7 +314,7 @@ impl ContourRenderer {
             return;
         }
         sums.counts.covered += usize::from(hit);
-        sums.counts.contour += usize::from(pixel.depth_weight < 1.0 || !hit);
+        sums.counts.contour += usize::from(near_outline);
         for k in 0..3 {
             let r = pixel.color[k] - observed[k];
             let (cost, weight) = self.options.robust.cost(r);

@@ -98,9 +98,8 @@ pub(crate) fn outline(posed: &Posed, region: &Region, margin: f32) -> Vec<Piece>
             let at = |j: f32| start + (end - start) * j / count;
             let range = [at(i as f32), at(i as f32 + 1.0)];
             let middle = 0.5 * (range[0] + range[1]);
-            let probe = |k: usize| {
-                edge.a[k] + middle * (edge.b[k] - edge.a[k]) + PROBE * edge.outward[k]
-            };
+            let probe =
+                |k: usize| edge.a[k] + middle * (edge.b[k] - edge.a[k]) + PROBE * edge.outward[k];
             if layers.at(probe(0), probe(1)) < 0.5 {
                 pieces.push(Piece { range, ..edge });
             }

@@ -119,8 +119,7 @@ impl Scene<'_> {
     /// h = g − n (g·X)/(n·X), and the depth by n·v/(n·d), d = X/Z.
     #[inline]
     fn interior_rows(&self, face: usize, point: Vector3<f32>, shaded: &Shaded, pixel: &mut Pixel) {
-        let [p0, p1, p2] =
-            self.posed.model.faces[face].map(|v| self.posed.position[v as usize]);
+        let [p0, p1, p2] = self.posed.model.faces[face].map(|v| self.posed.position[v as usize]);
         let (e1, e2) = (p1 - p0, p2 - p0);
         let n = e1.cross(&e2);
         let inverse = 1.0 / n.norm_squared();
@@ -194,11 +193,8 @@ impl Scene<'_> {
         if !DERIVATIVES {
             return;
         }
-        let outward = if distance > 1e-3 {
-            foot.offset.map(|o| o * side / distance)
-        } else {
-            piece.outward
-        };
+        let outward =
+            if distance > 1e-3 { foot.offset.map(|o| o * side / distance) } else { piece.outward };
         let (_, point, _) = self.on_edge(piece, foot.t);
         // The foot moves by J v along the outward normal, and the signed distance shrinks by as much.
         let ds = self.image_motion(outward, &point).map(|v| -v);
@@ -216,8 +212,7 @@ impl Scene<'_> {
         let face = self.posed.model.faces[piece.face as usize];
         let ids = piece.corners.map(|c| face[c as usize] as usize);
         let ends = ids.map(|v| self.posed.position[v]);
-        let (wa, wb) =
-            ((1.0 - t) * self.posed.screen[ids[0]][2], t * self.posed.screen[ids[1]][2]);
+        let (wa, wb) = ((1.0 - t) * self.posed.screen[ids[0]][2], t * self.posed.screen[ids[1]][2]);
         let share = wb / (wa + wb);
         let mut b = [0.0; 3];
         b[piece.corners[0] as usize] = 1.0 - share;

@@ -41,7 +41,11 @@ pub(crate) struct Shaded {
 
 /// Unlit colour with its derivatives by two barycentric coordinates and the pyramid level.
 #[inline]
-pub(crate) fn albedo(posed: &Posed, face: usize, b: [f32; 3]) -> ([f32; 3], [[f32; 3]; 2], [f32; 3]) {
+pub(crate) fn albedo(
+    posed: &Posed,
+    face: usize,
+    b: [f32; 3],
+) -> ([f32; 3], [[f32; 3]; 2], [f32; 3]) {
     match &posed.model.albedo {
         Albedo::Uniform(color) => (*color, [[0.0; 3]; 2], [0.0; 3]),
         Albedo::Corners(corners) => {

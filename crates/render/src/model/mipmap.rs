@@ -150,7 +150,9 @@ mod tests {
     fn derivatives_match_finite_differences() {
         let map = Mipmap::new(&texture()).unwrap();
         let step = 1e-3;
-        for (u, v, level) in [(0.31, 0.77, 0.0), (0.62, 0.2, 0.6), (1.43, -0.3, 1.3), (0.5, 0.45, 2.2)] {
+        for (u, v, level) in
+            [(0.31, 0.77, 0.0), (0.62, 0.2, 0.6), (1.43, -0.3, 1.3), (0.5, 0.45, 2.2)]
+        {
             let texel = map.sample(u, v, level);
             for (axis, derivative) in [(0, texel.du), (1, texel.dv), (2, texel.dlevel)] {
                 if level == 0.0 && axis == 2 {

@@ -178,10 +178,9 @@ fn check(mesh: &TriMesh) -> Result<(), ModelError> {
     if let Some(vertex) = mesh.vertices.iter().position(|p| !finite(p)) {
         return Err(ModelError::NotFinite { vertex });
     }
-    for (attribute, found) in [
-        ("uvs", mesh.uvs.as_ref().map(Vec::len)),
-        ("colors", mesh.colors.as_ref().map(Vec::len)),
-    ] {
+    for (attribute, found) in
+        [("uvs", mesh.uvs.as_ref().map(Vec::len)), ("colors", mesh.colors.as_ref().map(Vec::len))]
+    {
         if let Some(found) = found.filter(|&n| n != vertices) {
             return Err(ModelError::Attribute { attribute, found, vertices });
         }
@@ -224,7 +223,8 @@ mod tests {
     use std::sync::Arc;
 
     fn triangle() -> TriMesh {
-        let vertices = vec![Point3::origin(), Point3::new(1.0, 0.0, 0.0), Point3::new(0.0, 1.0, 0.0)];
+        let vertices =
+            vec![Point3::origin(), Point3::new(1.0, 0.0, 0.0), Point3::new(0.0, 1.0, 0.0)];
         TriMesh::new(vertices, vec![[0, 1, 2]])
     }
 
@@ -232,8 +232,11 @@ mod tests {
     fn texel_density_is_texels_a_metre() {
         let mut mesh = triangle();
         mesh.uvs = Some(vec![[0.0, 0.0], [0.5, 0.0], [0.0, 0.5]]);
-        mesh.texture =
-            Some(Arc::new(prehend_geometry::Texture { width: 8, height: 8, pixels: vec![[9; 3]; 64] }));
+        mesh.texture = Some(Arc::new(prehend_geometry::Texture {
+            width: 8,
+            height: 8,
+            pixels: vec![[9; 3]; 64],
+        }));
         let model = RenderModel::new(&mesh).unwrap();
         assert!((model.texel_density - 4.0).abs() < 1e-9);
         assert!(!model.is_closed());
@@ -246,7 +249,10 @@ mod tests {
         assert!(matches!(RenderModel::new(&TriMesh::default()), Err(ModelError::Empty { .. })));
         let mut mesh = triangle();
         mesh.faces[0][1] = 7;
-        assert!(matches!(RenderModel::new(&mesh), Err(ModelError::Index { face: 0, index: 7, .. })));
+        assert!(matches!(
+            RenderModel::new(&mesh),
+            Err(ModelError::Index { face: 0, index: 7, .. })
+        ));
         let mut mesh = triangle();
         mesh.vertices[2].y = f64::NAN;
         assert_eq!(RenderModel::new(&mesh).unwrap_err(), ModelError::NotFinite { vertex: 2 });
