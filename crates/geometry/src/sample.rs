@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::TriMesh;
+use crate::{SplitMix64, TriMesh};
 
 /// A point on a mesh's surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,7 +30,7 @@ pub fn surface_samples(mesh: &TriMesh, n: usize, seed: u64) -> Vec<SurfaceSample
     }
     // Rounding may carry the last slice past the end: the last face with area takes it.
     let last = areas.iter().rposition(|a| *a > 0.0).unwrap_or(0);
-    let mut random = SplitMix64(seed);
+    let mut random = SplitMix64::new(seed);
     let (mut face, mut before) = (0, 0.0);
     let mut samples = Vec::with_capacity(n);
     for i in 0..n {
@@ -56,21 +56,6 @@ pub fn surface_samples(mesh: &TriMesh, n: usize, seed: u64) -> Vec<SurfaceSample
         });
     }
     samples
-}
-
-/// Steele, Lea and Flood, "Fast splittable pseudorandom number generators" (2014).
-struct SplitMix64(u64);
-
-impl SplitMix64 {
-    /// Uniform in 0..1, 1 excluded.
-    fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^= z >> 31;
-        (z >> 11) as f64 * (1.0 / (1_u64 << 53) as f64)
-    }
 }
 
 #[cfg(test)]

@@ -11,7 +11,7 @@ use prehend_geometry::robot::Robot as KinematicTree;
 use crate::bop::{Dataset, DatasetError, Frame, ModelInfo, Models};
 use crate::{HandReading, Inertial, Object, Observation, RefineError, Robot};
 
-/// Meshes and robots change millimetres to metres here: BOP models are in millimetres.
+/// BOP models are in millimetres \[m\].
 const MILLIMETRE: f64 = 1e-3;
 
 /// Why an asset of a dataset, or a frame made of them, could not be had.
@@ -29,14 +29,20 @@ pub enum AssetError {
     /// A taxel layout is at fault.
     #[error(transparent)]
     Taxels(#[from] prehend_geometry::hand::TaxelError),
+    /// A hand's volume cannot be computed.
+    #[error(transparent)]
+    Volume(#[from] prehend_geometry::VolumeError),
+    /// A surface cannot be searched.
+    #[error(transparent)]
+    Closest(#[from] prehend_geometry::closest::ClosestError),
     /// The refinement itself.
     #[error(transparent)]
     Refine(#[from] RefineError),
     /// A frame of several robots: which one holds the object is not said.
-    #[error("{file}: image {image} has {count} bodies; exactly one hand is supported")]
+    #[error("scene_bodies.json of scene {scene}: image {image} has {count} bodies, not one hand")]
     Bodies {
-        /// The file that lists the bodies.
-        file: String,
+        /// The scene.
+        scene: u32,
         /// The image.
         image: u32,
         /// How many bodies it lists.
@@ -47,14 +53,20 @@ pub enum AssetError {
 /// The objects and robots of a dataset.
 pub struct Assets<'a> {
     dataset: &'a Dataset,
+    seed: u64,
     objects: HashMap<u32, Arc<Object>>,
     robots: HashMap<(PathBuf, Option<PathBuf>), Arc<Robot>>,
 }
 
 impl<'a> Assets<'a> {
-    /// Nothing loaded yet.
-    pub fn new(dataset: &'a Dataset) -> Self {
-        Self { dataset, objects: HashMap::new(), robots: HashMap::new() }
+    /// Nothing loaded yet; `seed` decides where objects' surfaces are sampled.
+    pub fn new(dataset: &'a Dataset, seed: u64) -> Self {
+        Self { dataset, seed, objects: HashMap::new(), robots: HashMap::new() }
+    }
+
+    /// The dataset.
+    pub fn dataset(&self) -> &'a Dataset {
+        self.dataset
     }
 
     /// The model of object `id`, in metres.
@@ -65,7 +77,7 @@ impl<'a> Assets<'a> {
         if let Some(object) = self.objects.get(&id) {
             return Ok(Arc::clone(object));
         }
-        let object = Arc::new(load_object(self.dataset.models(), id)?);
+        let object = Arc::new(load_object(self.dataset.models(), id, self.seed)?);
         self.objects.insert(id, Arc::clone(&object));
         Ok(object)
     }
@@ -88,7 +100,7 @@ impl<'a> Assets<'a> {
         let bodies = frame.bodies()?;
         let [body] = bodies.bodies.as_slice() else {
             return Err(AssetError::Bodies {
-                file: frame.scene_dir().join("scene_bodies.json").display().to_string(),
+                scene: frame.scene_id(),
                 image: frame.im_id(),
                 count: bodies.bodies.len(),
             });
@@ -104,7 +116,7 @@ impl<'a> Assets<'a> {
         Ok((observation, Some(robot)))
     }
 
-    /// The robot of `urdf` with the skin of `taxels`, both relative to the dataset.
+    /// The robot of `urdf` with the skin of `taxels`.
     ///
     /// # Errors
     /// If a file is missing or broken.
@@ -117,10 +129,9 @@ impl<'a> Assets<'a> {
         if let Some(robot) = self.robots.get(&key) {
             return Ok(Arc::clone(robot));
         }
-        let root = self.dataset.root();
-        let tree = KinematicTree::from_urdf_file(&root.join(urdf))?;
+        let tree = KinematicTree::from_urdf_file(urdf)?;
         let skin: Vec<Taxel> = match taxels {
-            Some(file) => load_taxels(&root.join(file))?,
+            Some(file) => load_taxels(file)?,
             None => Vec::new(),
         };
         let robot = Arc::new(Robot::new(tree, skin)?);
@@ -133,10 +144,10 @@ impl<'a> Assets<'a> {
 ///
 /// # Errors
 /// If the model is missing or broken.
-pub fn load_object(models: &Models, id: u32) -> Result<Object, AssetError> {
+pub fn load_object(models: &Models, id: u32, seed: u64) -> Result<Object, AssetError> {
     let mesh = load_mesh(models, id)?;
     let inertial = models.info(id).ok().and_then(|info| inertial(&info));
-    Ok(Object::new(&format!("obj_{id:06}"), &mesh, inertial)?)
+    Ok(Object::new(&format!("obj_{id:06}"), mesh, inertial, seed)?)
 }
 
 /// The surface of object `id` of `models`, in metres.

@@ -1,6 +1,39 @@
-//! In-hand object pose refinement: dataset input and output, and the metrics that score a pose.
+//! Refines the 6-DoF pose of an object held in a robot hand, from RGB-D, touch and physics.
+//!
+//! [`refine`] takes an [`Observation`], an [`Object`], a [`Robot`] and an initial pose, and returns a
+//! [`RefinedPose`]. The evidence comes from [`Term`]s over a common [`State`]; [`strategy`] walks downhill.
+//! [`bop`] reads and writes datasets, [`Scorer`] and [`metrics`] measure poses, [`report`] draws them.
 
-#![cfg_attr(test, allow(clippy::unwrap_used))] // a test may panic
-
+mod assets;
 pub mod bop;
+mod config;
+mod error;
+pub mod frame_file;
+mod inspect;
 pub mod metrics;
+mod normal;
+mod object;
+mod observation;
+mod refine;
+pub mod report;
+mod robot;
+mod robust;
+mod scoring;
+mod state;
+pub mod strategy;
+pub mod term;
+pub mod trace;
+
+pub use assets::{AssetError, Assets, load_mesh, load_object};
+pub use config::{Config, TermKind};
+pub use error::RefineError;
+pub use inspect::inspect;
+pub use normal::Normal;
+pub use object::{DEFAULT_DENSITY, Inertial, Object};
+pub use observation::{HandReading, Observation};
+pub use refine::{Progress, RefinedPose, refine, refine_with};
+pub use robot::Robot;
+pub use robust::Cauchy;
+pub use scoring::Scorer;
+pub use state::{Block, State};
+pub use term::Term;

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Point3};
 use prehend_geometry::closest::ClosestPoints;
-use prehend_geometry::mass::mass_properties;
+use prehend_geometry::mass::{MassError, MassProperties, mass_properties};
 use prehend_geometry::sample::{SurfaceSample, surface_samples};
 use prehend_geometry::{MeshReport, TriMesh};
 use prehend_render::RenderModel;
@@ -30,7 +30,7 @@ pub struct Inertial {
 pub struct Object {
     /// Name for messages.
     pub name: String,
-    /// The surface in metres, as loaded: with its texture seams, without its stray faces.
+    /// The mesh in metres, as loaded.
     pub mesh: TriMesh,
     /// What cleaning found and did.
     pub report: MeshReport,
@@ -42,45 +42,84 @@ pub struct Object {
     pub centre: Point3<f64>,
     /// Half the diagonal of the bounding box \[m\]: turns radians into metres of surface motion.
     pub radius: f64,
+    /// Surface area \[m²\].
+    pub area: f64,
     pub(crate) surface: ClosestPoints,
     pub(crate) samples: Vec<SurfaceSample>,
     pub(crate) model: RenderModel,
 }
 
 impl Object {
-    /// Prepares `mesh` (metres); without `inertial`, a uniform density is assumed.
+    /// Prepares `mesh` (metres); without `inertial`, a uniform density is assumed. `seed` decides where
+    /// the surface is sampled.
     ///
     /// # Errors
     /// If the mesh has no area, or is open where a mass has to be assumed.
-    pub fn new(name: &str, mesh: &TriMesh, inertial: Option<Inertial>) -> Result<Self, RefineError> {
+    pub fn new(
+        name: &str,
+        mesh: TriMesh,
+        inertial: Option<Inertial>,
+        seed: u64,
+    ) -> Result<Self, RefineError> {
+        Self::build(name, mesh, seed, |uniform| match inertial {
+            Some(given) => Ok((given, false)),
+            None => Ok((uniform()?.into(), true)),
+        })
+    }
+
+    /// Prepares `mesh` (metres) of uniform density and mass `mass` \[kg\], or of an assumed density.
+    ///
+    /// # Errors
+    /// If the mesh is open or has no area, or the mass is not positive.
+    pub fn with_mass(
+        name: &str,
+        mesh: TriMesh,
+        mass: Option<f64>,
+        seed: u64,
+    ) -> Result<Self, RefineError> {
+        Self::build(name, mesh, seed, |uniform| {
+            let uniform = uniform()?;
+            match mass {
+                Some(mass) => Ok((uniform.with_mass(mass)?.into(), false)),
+                None => Ok((uniform.into(), true)),
+            }
+        })
+    }
+
+    fn build(
+        name: &str,
+        mesh: TriMesh,
+        seed: u64,
+        weigh: impl FnOnce(
+            &dyn Fn() -> Result<MassProperties, MassError>,
+        ) -> Result<(Inertial, bool), MassError>,
+    ) -> Result<Self, RefineError> {
         let fail = |reason: String| RefineError::Object { object: name.to_owned(), reason };
-        let (mesh, report) = mesh.cleaned();
-        let (low, high) = mesh.bounds().ok_or_else(|| fail("the mesh has no vertices".into()))?;
-        let inertial_assumed = inertial.is_none();
-        let inertial = match inertial {
-            Some(given) => given,
-            None if !report.watertight => {
-                return Err(fail("the mesh is open and no mass was given".into()));
-            }
-            None => {
-                let m = mass_properties(&mesh, DEFAULT_DENSITY);
-                Inertial { mass: m.mass, center_of_mass: m.center_of_mass, inertia: m.inertia }
-            }
-        };
+        let (solid, report) = mesh.cleaned();
+        let (low, high) = solid.bounds().ok_or_else(|| fail("the mesh has no faces".into()))?;
+        let uniform = || mass_properties(&solid, DEFAULT_DENSITY);
+        let (inertial, inertial_assumed) = weigh(&uniform).map_err(|e| fail(e.to_string()))?;
         if !(inertial.mass.is_finite() && inertial.mass > 0.0) {
             return Err(fail(format!("the mass {} kg is not positive", inertial.mass)));
         }
         Ok(Self {
             name: name.to_owned(),
-            surface: ClosestPoints::new(&mesh).map_err(|e| fail(e.to_string()))?,
-            samples: surface_samples(&mesh, SURFACE_SAMPLES, 0),
-            model: RenderModel::new(&mesh),
+            surface: ClosestPoints::new(&solid).map_err(|e| fail(e.to_string()))?,
+            samples: surface_samples(&solid, SURFACE_SAMPLES, seed),
+            model: RenderModel::new(&mesh).map_err(|e| fail(e.to_string()))?,
             centre: nalgebra::center(&low, &high),
             radius: 0.5 * (high - low).norm(),
+            area: solid.area(),
             mesh,
             report,
             inertial,
             inertial_assumed,
         })
+    }
+}
+
+impl From<MassProperties> for Inertial {
+    fn from(m: MassProperties) -> Self {
+        Self { mass: m.mass, center_of_mass: m.center_of_mass, inertia: m.inertia }
     }
 }

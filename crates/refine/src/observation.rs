@@ -1,21 +1,7 @@
 //! What was sensed in one frame.
 
-use std::sync::Arc;
-
 use nalgebra::{Isometry3, Vector3};
-use prehend_geometry::hand::Taxel;
-use prehend_geometry::robot::{PosedRobot, Robot as KinematicTree, RobotShape};
 use prehend_render::{Camera, DepthImage, Mask, RgbImage};
-
-/// A robot hand: kinematics, shape and skin. Prepared once, shared by all frames.
-pub struct Robot {
-    /// Joints and links.
-    pub tree: KinematicTree,
-    /// Collision geometry with one cached distance grid a link.
-    pub shape: Arc<RobotShape>,
-    /// Tactile sensors, in link frames; empty without a skin.
-    pub taxels: Vec<Taxel>,
-}
 
 /// Where the hand is said to be, and what it feels.
 #[derive(Clone, Debug)]
@@ -43,13 +29,4 @@ pub struct Observation {
     pub gravity: Option<Vector3<f64>>,
     /// The hand, where known.
     pub hand: Option<HandReading>,
-}
-
-impl Robot {
-    /// The robot with its links where `joints` \[rad\] put them and its base at `t_cam_hand`.
-    pub fn posed(&self, t_cam_hand: &Isometry3<f64>, joints: &[f64]) -> PosedRobot {
-        let links = self.tree.forward_kinematics(joints);
-        let t_cam_links = links.iter().map(|t_hand_link| t_cam_hand * t_hand_link).collect();
-        PosedRobot::new(Arc::clone(&self.shape), t_cam_links)
-    }
 }

@@ -157,8 +157,7 @@ pub(crate) fn hand_depth(observation: &Observation, robot: Option<&Robot>) -> De
     let camera = &observation.camera;
     match (robot, &observation.hand) {
         (Some(robot), Some(hand)) => {
-            let mesh = robot.posed(&hand.t_cam_hand, &hand.joints).mesh();
-            depth_map(camera, &[(&mesh, Isometry3::identity())])
+            depth_map(camera, &robot.render_bodies(&hand.t_cam_hand, &hand.joints))
         }
         _ => DepthImage::filled(camera.width, camera.height, 0.0),
     }

@@ -1,31 +1,24 @@
 //! Scoring poses of a dataset against its truth.
 
 use std::collections::HashMap;
-use std::path::PathBuf;
 
-use nalgebra::{Isometry3, Point3};
-use prehend_geometry::robot::PosedRobot;
-use prehend_geometry::sample::surface_samples;
-use prehend_geometry::{TriMesh, UnionBody};
+use nalgebra::Point3;
+use prehend_geometry::{ClosestPoints, UnionBody};
 
 use crate::assets::{AssetError, Assets, load_mesh};
 use crate::bop::{Dataset, GroundTruth, ResultRow};
-use crate::metrics::{
-    CONTACT_DISTANCE, CONTACT_SAMPLES, PoseScore, ScoredModel, ScoredRow, contact_area_cm2,
-};
+use crate::metrics::{CONTACT_DISTANCE, ContactModel, ScoredModel, ScoredRow};
 
 /// An evaluation model, prepared once.
 struct Model {
     scored: ScoredModel,
-    /// Cleaned surface \[m\].
-    surface: TriMesh,
-    samples: Vec<Point3<f64>>,
+    contact: ContactModel,
 }
 
-/// The hand where it truly is in one image, and how the object truly touches it.
-struct TrueGrasp {
-    hand: PosedRobot,
+/// The hand where it truly is in one image, as one body: its parts overlap each other.
+struct TrueHand {
     body: UnionBody,
+    surface: ClosestPoints,
 }
 
 /// Scores poses of one dataset.
@@ -54,12 +47,23 @@ impl<'a> Scorer<'a> {
     pub fn score(&mut self, row: &ResultRow) -> Result<ScoredRow, AssetError> {
         let (scene, image) = (row.scene_id, row.im_id);
         let truth = self.truth.pose(scene, image, row.obj_id, &row.t_cam_model)?;
-        let grasp = self.grasp(scene, image)?;
+        let hand = self.hand(scene, image)?;
         let camera = self.dataset.frame(scene, image)?.intrinsics;
         let model = self.model(row.obj_id)?;
         let mut score = model.scored.score(&row.t_cam_model, &truth, &camera);
-        if let Some(grasp) = grasp {
-            score = with_contact(score, model, &grasp, &row.t_cam_model, &truth)?;
+        if let Some(hand) = hand {
+            let distance = |p: &Point3<f64>| {
+                hand.surface.closest(p, CONTACT_DISTANCE).map_or(f64::INFINITY, |c| c.distance)
+            };
+            let area = |pose| model.contact.contact_area_cm2(pose, &distance);
+            let volume = |pose| model.contact.intersection_volume_cm3(pose, &hand.body);
+            let estimate = &row.t_cam_model;
+            score = score.with_contact(
+                area(estimate),
+                volume(estimate)?,
+                area(&truth),
+                volume(&truth)?,
+            );
         }
         Ok(ScoredRow { scene_id: scene, im_id: image, obj_id: row.obj_id, score })
     }
@@ -68,24 +72,15 @@ impl<'a> Scorer<'a> {
         if !self.models.contains_key(&id) {
             let mesh = load_mesh(self.truth.models(), id)?;
             let symmetries = self.truth.models().info(id).map(|i| i.symmetries);
-            let surface = mesh.cleaned().0;
-            let samples = surface_samples(&surface, CONTACT_SAMPLES, 0);
-            let model = Model {
-                scored: ScoredModel::new(mesh.vertices, symmetries.unwrap_or_default()),
-                samples: samples.iter().map(|s| s.point).collect(),
-                surface,
-            };
-            self.models.insert(id, model);
+            let contact = ContactModel::new(&mesh);
+            let scored = ScoredModel::new(mesh.vertices, symmetries.unwrap_or_default());
+            self.models.insert(id, Model { scored, contact });
         }
         Ok(&self.models[&id])
     }
 
-    fn grasp(&mut self, scene: u32, image: u32) -> Result<Option<TrueGrasp>, AssetError> {
-        let bodies_exist = ["scene_bodies.json", "scene_bodies_gt.json"].iter().any(|name| {
-            let dir: Option<PathBuf> = self.dataset.scene(scene).ok().map(|s| s.dir().join(name));
-            dir.is_some_and(|file| file.is_file())
-        });
-        if !bodies_exist {
+    fn hand(&mut self, scene: u32, image: u32) -> Result<Option<TrueHand>, AssetError> {
+        if !self.truth.has_bodies(scene)? {
             return Ok(None);
         }
         let bodies = self.truth.bodies(scene, image)?;
@@ -93,24 +88,7 @@ impl<'a> Scorer<'a> {
         let robot = self.assets.robot(&body.urdf, None)?;
         let hand = robot.posed(&body.t_cam_base, &robot.tree.joint_vector(&body.joints)?);
         let body = UnionBody::new(&hand.mesh_parts())?;
-        Ok(Some(TrueGrasp { hand, body }))
+        let surface = ClosestPoints::new(&body.mesh())?;
+        Ok(Some(TrueHand { body, surface }))
     }
-}
-
-fn with_contact(
-    score: PoseScore,
-    model: &Model,
-    grasp: &TrueGrasp,
-    estimate: &Isometry3<f64>,
-    truth: &Isometry3<f64>,
-) -> Result<PoseScore, AssetError> {
-    let distance = |p: &Point3<f64>| {
-        grasp.hand.surface_distance(p, CONTACT_DISTANCE).unwrap_or(f64::INFINITY)
-    };
-    let area = model.surface.area();
-    let contact = |pose: &Isometry3<f64>| contact_area_cm2(&model.samples, area, pose, &distance);
-    let volume = |pose: &Isometry3<f64>| {
-        grasp.body.intersection_volume(&model.surface.transformed(pose)).map(|v| v * 1e6)
-    };
-    Ok(score.with_contact(contact(estimate), volume(estimate)?, contact(truth), volume(truth)?))
 }

@@ -115,9 +115,9 @@ fn reads_everything_in_metres_and_newtons() {
     let k = frame.intrinsics;
     assert_eq!((k.fx, k.fy, k.cx, k.cy, frame.depth_scale), (500.0, 510.0, 1.5, 1.0, 0.5));
     let seen = frame.observation(0).unwrap();
-    assert_eq!((seen.rgb.width, seen.rgb.height, seen.rgb.data[0]), (4, 3, [1.0, 0.0, 0.2]));
-    assert_eq!(seen.depth.data, [0.5; 12]);
-    assert_eq!(seen.mask.data.iter().filter(|&&m| m).count(), 1);
+    assert_eq!((seen.color.width(), seen.color.height(), seen.color.pixels()[0]), (4, 3, [1.0, 0.0, 0.2]));
+    assert_eq!(seen.depth.pixels(), [0.5; 12]);
+    assert_eq!(seen.mask.count(), 1);
     let bodies = frame.bodies().unwrap();
     assert_eq!(bodies.gravity, Vector3::new(0.0, 9.81, 0.0));
     let hand = bodies.body("hand").unwrap();
@@ -138,7 +138,7 @@ fn the_only_mask_serves_any_row_and_several_go_by_row() {
     let fixture = Fixture::new();
     let dataset = fixture.open();
     let count = |im: u32, instance: usize| {
-        dataset.frame(4, im).unwrap().mask(instance).map(|m| m.data.iter().filter(|&&m| m).count())
+        dataset.frame(4, im).unwrap().mask(instance).map(|m| m.count())
     };
     // Files of other kinds do not count.
     fixture.scene("mask_visib/000000_000005.txt", "notes");
@@ -316,20 +316,6 @@ fn robot_touch_and_truth_fields_are_named() {
         message(truth.objects(4, 0).unwrap_err())
             .contains("scene_gt.json: 0[0].obj_id: is missing")
     );
-}
-
-#[test]
-fn taxels_and_forces_must_be_equally_many() {
-    let fixture = Fixture::new();
-    let table = fixture.write("hand/taxels.csv", "link,x_m,y_m,z_m,nx,ny,nz\na,0,0,0,0,0,1\n");
-    let tactile = fixture.open().frame(4, 0).unwrap().tactile().unwrap();
-    let error = tactile.read_taxels().unwrap_err();
-    assert!(
-        error.to_string().ends_with("taxels.csv: 1 taxels, but the scene has forces for 2"),
-        "{error}"
-    );
-    fs::write(&table, "link,x_m,y_m,z_m,nx,ny,nz\na,0,0,0,0,0,1\nb,0,0,0.5,0,0,1\n").unwrap();
-    assert_eq!(tactile.read_taxels().unwrap()[1].position.z, 0.5);
 }
 
 #[test]

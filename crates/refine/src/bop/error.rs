@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use prehend_render::ImageError;
 use thiserror::Error;
 
 /// A fault of one file of a dataset. Every variant names the file, and the field where there is one.
@@ -126,5 +127,18 @@ impl DatasetError {
     /// A [`DatasetError::Malformed`] from anything that can be printed.
     pub(crate) fn malformed(file: &Path, problem: impl ToString) -> Self {
         Self::Malformed { file: file.to_path_buf(), problem: problem.to_string() }
+    }
+}
+
+impl From<ImageError> for DatasetError {
+    fn from(error: ImageError) -> Self {
+        match &error {
+            ImageError::Io { path, source } => Self::reading(path, source),
+            ImageError::Codec { path, source } => Self::malformed(path, source),
+            ImageError::Kind { path, .. } | ImageError::Scale { path, .. } => {
+                Self::malformed(path, error.to_string())
+            }
+            ImageError::Size { .. } => Self::malformed(Path::new(""), error.to_string()),
+        }
     }
 }

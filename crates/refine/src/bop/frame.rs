@@ -5,8 +5,9 @@ use std::path::PathBuf;
 
 use super::dataset::Scene;
 use super::error::DatasetError;
-use super::pixels::{DepthPixels, MaskPixels, RgbPixels};
 use super::scene::{Intrinsics, SceneBodies, Tactile};
+use crate::Observation;
+use prehend_render::{DepthImage, Mask, RgbImage};
 
 /// One image: its camera, and access to everything else an estimator may know about it. Each part is
 /// read when asked for and fails on its own.
@@ -18,17 +19,6 @@ pub struct Frame<'a> {
     pub intrinsics: Intrinsics,
     /// Millimetres per stored depth value.
     pub depth_scale: f64,
-}
-
-/// The pixels of one object in one image, all of one size.
-#[derive(Clone, Debug)]
-pub struct Observation {
-    /// Colour.
-    pub rgb: RgbPixels,
-    /// Depth \[m\].
-    pub depth: DepthPixels,
-    /// The visible part of the object.
-    pub mask: MaskPixels,
 }
 
 impl<'a> Frame<'a> {
@@ -98,18 +88,18 @@ impl<'a> Frame<'a> {
     ///
     /// # Errors
     /// When it is absent or does not decode.
-    pub fn rgb(&self) -> Result<RgbPixels, DatasetError> {
-        RgbPixels::load(&self.rgb_path()?)
+    pub fn rgb(&self) -> Result<RgbImage, DatasetError> {
+        RgbImage::load(&self.rgb_path()?).map_err(DatasetError::from)
     }
 
     /// Reads the depth image.
     ///
     /// # Errors
     /// When it is absent or does not decode, and [`DatasetError::NoDepth`] when it measures nothing.
-    pub fn depth(&self) -> Result<DepthPixels, DatasetError> {
+    pub fn depth(&self) -> Result<DepthImage, DatasetError> {
         let file = self.depth_path();
-        let depth = DepthPixels::load(&file, self.depth_scale)?;
-        if depth.data.iter().all(|&z| z == 0.0) {
+        let depth = DepthImage::load(&file, self.depth_scale * 1e-3)?;
+        if depth.pixels().iter().all(|&z| z == 0.0) {
             Err(DatasetError::NoDepth { file })
         } else {
             Ok(depth)
@@ -120,29 +110,30 @@ impl<'a> Frame<'a> {
     ///
     /// # Errors
     /// When it is absent or does not decode, and [`DatasetError::EmptyMask`] when no pixel is set.
-    pub fn mask(&self, instance: usize) -> Result<MaskPixels, DatasetError> {
+    pub fn mask(&self, instance: usize) -> Result<Mask, DatasetError> {
         let file = self.mask_path(instance)?;
-        let mask = MaskPixels::load(&file)?;
-        if mask.data.contains(&true) { Ok(mask) } else { Err(DatasetError::EmptyMask { file }) }
+        let mask = Mask::load(&file)?;
+        if mask.count() > 0 { Ok(mask) } else { Err(DatasetError::EmptyMask { file }) }
     }
 
-    /// Reads colour, depth and mask and checks that they agree in size.
+    /// The image as an [`Observation`] of camera, colour, depth and mask; gravity and the hand are left out.
     ///
     /// # Errors
     /// The first of those of [`Frame::rgb`], [`Frame::depth`] and [`Frame::mask`], and
     /// [`DatasetError::ImageSize`].
     pub fn observation(&self, instance: usize) -> Result<Observation, DatasetError> {
         let (rgb, depth, mask) = (self.rgb()?, self.depth()?, self.mask(instance)?);
-        let other_size = (rgb.width, rgb.height);
+        let other_size = (rgb.width(), rgb.height());
         let check = |file: PathBuf, size: (usize, usize)| {
             if size == other_size {
                 return Ok(());
             }
             Err(DatasetError::ImageSize { file, size, other: self.rgb_path()?, other_size })
         };
-        check(self.depth_path(), (depth.width, depth.height))?;
-        check(self.mask_path(instance)?, (mask.width, mask.height))?;
-        Ok(Observation { rgb, depth, mask })
+        check(self.depth_path(), (depth.width(), depth.height()))?;
+        check(self.mask_path(instance)?, (mask.width(), mask.height()))?;
+        let camera = self.intrinsics.camera(rgb.width(), rgb.height());
+        Ok(Observation { camera, color: rgb, depth, mask, gravity: None, hand: None })
     }
 
     /// Gravity and the known robots, from `scene_bodies.json`.

@@ -109,6 +109,15 @@ impl<'a> GroundTruth<'a> {
         items.iter().map(|e| e.get("visib_fract")?.number()).collect::<Result<_, _>>().map(Some)
     }
 
+    /// Whether a scene says where its robots are.
+    ///
+    /// # Errors
+    /// When there is no such scene.
+    pub fn has_bodies(&self, scene_id: u32) -> Result<bool, DatasetError> {
+        let told = &self.dataset.scene(scene_id)?.bodies;
+        Ok(self.scene(scene_id)?.bodies.exists() || told.exists())
+    }
+
     /// The robots where they truly are: `scene_bodies_gt.json` where the scene has it, else what
     /// estimators are told.
     ///

@@ -13,20 +13,17 @@ mod frame;
 mod ground_truth;
 mod json;
 mod models;
-mod pixels;
 mod pose;
 mod results;
 mod scene;
-mod taxels;
 
 pub use atomic::write_atomically;
 pub use dataset::{Dataset, Scene};
 pub use error::DatasetError;
-pub use frame::{Frame, Observation};
+pub use frame::Frame;
 pub use ground_truth::{GroundTruth, TrueObject};
 pub use json::{Entry, JsonFile};
 pub use models::{ModelInfo, Models};
-pub use pixels::{DepthPixels, MaskPixels, RgbPixels};
 pub use pose::{
     PoseFault, ROTATION_TOLERANCE, pose_from_bop, rotation_from_row_major, rotation_to_row_major,
     translation_from_mm, translation_to_mm,
@@ -35,4 +32,3 @@ pub use results::{
     ReadResults, ResultRow, RowError, read_results, share_image_times, write_results,
 };
 pub use scene::{Body, Intrinsics, SceneBodies, Tactile, UNITS_PER_NEWTON};
-pub use taxels::{Taxel, read_taxels};

@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::error::DatasetError;
 use super::json::Entry;
-use super::taxels::{Taxel, read_taxels};
+use prehend_render::Camera;
 
 /// Force units of `scene_tactile.json` per newton.
 pub const UNITS_PER_NEWTON: f64 = 1000.0;
@@ -26,6 +26,11 @@ pub struct Intrinsics {
 }
 
 impl Intrinsics {
+    /// The camera of an image of `width` by `height` pixels.
+    pub fn camera(&self, width: usize, height: usize) -> Camera {
+        Camera { fx: self.fx, fy: self.fy, cx: self.cx, cy: self.cy, width, height }
+    }
+
     /// The pixel (column, row) of a point of the camera frame (x right, y down, z forward) \[m\];
     /// meaningless unless the point lies before the camera (z > 0).
     #[inline]
@@ -100,7 +105,7 @@ impl SceneBodies {
 pub struct Tactile {
     /// Name of the body that carries the taxels.
     pub body: String,
-    /// The table of taxel positions (see [`Tactile::read_taxels`]), in the order of `force`.
+    /// The table of taxel positions (see [`prehend_geometry::hand::load_taxels`]), in the order of `force`.
     pub taxels: PathBuf,
     /// Force of the object on the hand at each taxel, in the frame of the taxel's link \[N\].
     pub force: Vec<Vector3<f64>>,
@@ -118,20 +123,5 @@ impl Tactile {
                 .map(|f| Ok(f.vector()? / UNITS_PER_NEWTON))
                 .collect::<Result<_, DatasetError>>()?,
         })
-    }
-
-    /// Reads the table of taxel positions.
-    ///
-    /// # Errors
-    /// Those of [`read_taxels`], and [`DatasetError::Malformed`] when the table has more or fewer rows than
-    /// there are forces.
-    pub fn read_taxels(&self) -> Result<Vec<Taxel>, DatasetError> {
-        let taxels = read_taxels(&self.taxels)?;
-        if taxels.len() == self.force.len() {
-            return Ok(taxels);
-        }
-        let problem =
-            format!("{} taxels, but the scene has forces for {}", taxels.len(), self.force.len());
-        Err(DatasetError::malformed(&self.taxels, problem))
     }
 }
