@@ -1,0 +1,227 @@
+//! Collision tags of a URDF link as triangle meshes in the link frame.
+
+use std::path::{Component, Path, PathBuf};
+
+use nalgebra::{Point3, Vector3};
+use urdf_rs::Geometry;
+
+use super::{RobotError, primitive, urdf};
+use crate::TriMesh;
+
+/// One mesh a collision tag of `link`, in the link frame \[m\].
+pub(super) fn parts(
+    link: &urdf_rs::Link,
+    asset_dir: Option<&Path>,
+) -> Result<Vec<TriMesh>, RobotError> {
+    let owner = || format!("link '{}'", link.name);
+    link.collision
+        .iter()
+        .map(|collision| {
+            let mesh = geometry(&link.name, &collision.geometry, asset_dir)?;
+            Ok(mesh.transformed(&urdf::isometry(&owner, &collision.origin)?))
+        })
+        .collect()
+}
+
+fn geometry(
+    link: &str,
+    geometry: &Geometry,
+    asset_dir: Option<&Path>,
+) -> Result<TriMesh, RobotError> {
+    let positive = |field: &'static str, sizes: &[f64]| {
+        if sizes.iter().all(|s| s.is_finite() && *s > 0.0) {
+            return Ok(());
+        }
+        let owner = format!("link '{link}'");
+        Err(RobotError::Number { owner, field, requirement: "must be finite and positive" })
+    };
+    match geometry {
+        Geometry::Box { size } => {
+            positive("box size", &size.0)?;
+            Ok(primitive::cuboid(&Vector3::from(size.0)))
+        }
+        Geometry::Cylinder { radius, length } => {
+            positive("cylinder size", &[*radius, *length])?;
+            Ok(primitive::cylinder(*radius, *length))
+        }
+        Geometry::Capsule { radius, length } => {
+            positive("capsule size", &[*radius, *length])?;
+            Ok(primitive::capsule(*radius, *length))
+        }
+        Geometry::Sphere { radius } => {
+            positive("sphere radius", &[*radius])?;
+            Ok(primitive::sphere(*radius))
+        }
+        Geometry::Mesh { filename, scale } => {
+            let error = |reason: String| RobotError::Mesh {
+                link: link.into(),
+                file: filename.clone(),
+                reason,
+            };
+            let path = resolve(filename, asset_dir).map_err(error)?;
+            let mut mesh = load_collision_mesh(&path).map_err(error)?;
+            let scale = scale.map_or([1.0; 3], |s| s.0);
+            if !scale.iter().all(|s| s.is_finite() && *s != 0.0) {
+                return Err(error("scale must be finite and not zero".into()));
+            }
+            for v in &mut mesh.vertices {
+                *v = Point3::from(v.coords.component_mul(&Vector3::from(scale)));
+            }
+            // An odd number of reflections turns the surface inside out.
+            if scale.iter().product::<f64>() < 0.0 {
+                mesh.faces.iter_mut().for_each(|f| f.swap(1, 2));
+            }
+            Ok(mesh)
+        }
+    }
+}
+
+/// The file a mesh name stands for: inside `asset_dir`, whatever the name.
+///
+/// `package://name/path` is `path` or `name/path` within the folder, whichever exists.
+fn resolve(file: &str, asset_dir: Option<&Path>) -> Result<PathBuf, String> {
+    let Some(folder) = asset_dir else {
+        return Err("mesh files need a folder to be looked for in".into());
+    };
+    let candidates: Vec<&str> = match file.strip_prefix("package://") {
+        Some(rest) => {
+            rest.split_once('/').map(|(_, path)| path).into_iter().chain([rest]).collect()
+        }
+        None if file.contains("://") => {
+            return Err("only package:// and relative paths are read".into());
+        }
+        None => vec![file],
+    };
+    for name in &candidates {
+        let inside = |c: Component<'_>| matches!(c, Component::Normal(_) | Component::CurDir);
+        if !Path::new(name).components().all(inside) {
+            return Err("the path leaves the folder of the description".into());
+        }
+    }
+    let Some(path) = candidates.iter().map(|name| folder.join(name)).find(|p| p.is_file()) else {
+        return Err(format!("no such file in {}", folder.display()));
+    };
+    // A link in the folder may still point out of it.
+    let real = |p: &Path| p.canonicalize().map_err(|e| format!("{}: {e}", p.display()));
+    if !real(&path)?.starts_with(real(folder)?) {
+        return Err("the path leaves the folder of the description".into());
+    }
+    Ok(path)
+}
+
+/// Loads the geometry of a mesh file, in the units of the file.
+fn load_collision_mesh(path: &Path) -> Result<TriMesh, String> {
+    let extension =
+        path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
+    match extension.as_str() {
+        "stl" => {
+            let file = std::fs::File::open(path).map_err(|e| e.to_string())?;
+            let stl =
+                stl_io::read_stl(&mut std::io::BufReader::new(file)).map_err(|e| e.to_string())?;
+            let vertices = stl
+                .vertices
+                .iter()
+                .map(|v| Point3::new(f64::from(v[0]), f64::from(v[1]), f64::from(v[2])))
+                .collect();
+            Ok(TriMesh::new(
+                vertices,
+                stl.faces.iter().map(|f| f.vertices.map(|v| v as u32)).collect(),
+            ))
+        }
+        "obj" => {
+            let options = tobj::LoadOptions { triangulate: true, ..Default::default() };
+            let (models, _) = tobj::load_obj(path, &options).map_err(|e| e.to_string())?;
+            let mut mesh = TriMesh::default();
+            for model in &models {
+                let positions = &model.mesh.positions;
+                let vertices = positions
+                    .chunks_exact(3)
+                    .map(|v| Point3::new(f64::from(v[0]), f64::from(v[1]), f64::from(v[2])))
+                    .collect();
+                let faces =
+                    model.mesh.indices.chunks_exact(3).map(|f| [f[0], f[1], f[2]]).collect();
+                mesh.append(&TriMesh::new(vertices, faces));
+            }
+            Ok(mesh)
+        }
+        _ => Err(format!("unknown mesh format '.{extension}'")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Robot;
+
+    fn link(geometry: &str) -> String {
+        format!(
+            "<robot name=\"r\"><link name=\"l\"><collision><geometry>{geometry}</geometry></collision></link></robot>"
+        )
+    }
+
+    #[test]
+    fn meshes_come_from_the_folder_and_nowhere_else() {
+        let root = tempfile::tempdir().unwrap();
+        let folder = root.path().join("robot");
+        std::fs::create_dir_all(folder.join("meshes")).unwrap();
+        let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
+        std::fs::write(folder.join("meshes/a.obj"), obj).unwrap();
+        std::fs::write(root.path().join("b.obj"), obj).unwrap();
+        let read = |file: &str| {
+            let xml = link(&format!("<mesh filename=\"{file}\" scale=\"1 -2 1\"/>"));
+            Robot::from_urdf_str(&xml, Some(&folder)).map_err(|e| e.to_string())
+        };
+        for file in [
+            "meshes/a.obj",
+            "./meshes/a.obj",
+            "package://robot/meshes/a.obj",
+            "package://meshes/a.obj",
+        ] {
+            let robot = read(file).unwrap();
+            let part = &robot.links()[0].parts[0];
+            assert_eq!((part.faces.len(), part.bounds().unwrap().0.y), (4, -2.0));
+            // Reflected, but still facing outwards.
+            let six_volumes: f64 = part
+                .faces
+                .iter()
+                .map(|f| {
+                    let [a, b, c] = f.map(|v| part.vertices[v as usize].coords);
+                    a.dot(&b.cross(&c))
+                })
+                .sum();
+            assert!((six_volumes - 2.0).abs() < 1e-12);
+        }
+        for file in ["../b.obj", "meshes/../../b.obj", "package://x/../../b.obj", "/etc/passwd"] {
+            assert!(read(file).unwrap_err().contains("leaves the folder"), "{file}");
+        }
+        let missing = read("meshes/c.obj").unwrap_err();
+        assert!(missing.contains("link 'l'") && missing.contains("meshes/c.obj"), "{missing}");
+        assert!(read("http://x/a.obj").unwrap_err().contains("only package://"));
+        assert!(Robot::from_urdf_str(&link("<mesh filename=\"a.obj\"/>"), None).is_err());
+        #[cfg(unix)]
+        {
+            std::os::unix::fs::symlink(root.path().join("b.obj"), folder.join("out.obj")).unwrap();
+            assert!(read("out.obj").unwrap_err().contains("leaves the folder"));
+        }
+        // A binary STL that promises five triangles and ends after less than one.
+        let mut stl = vec![0u8; 100];
+        stl[80] = 5;
+        std::fs::write(folder.join("cut.stl"), stl).unwrap();
+        assert!(read("cut.stl").unwrap_err().contains("collision mesh 'cut.stl'"));
+    }
+
+    #[test]
+    fn primitives_need_positive_sizes() {
+        for (geometry, faces) in
+            [("<box size=\"1 2 3\"/>", 12), ("<cylinder radius=\"1\" length=\"2\"/>", 192)]
+        {
+            let robot = Robot::from_urdf_str(&link(geometry), None).unwrap();
+            assert_eq!(robot.links()[0].parts[0].faces.len(), faces);
+        }
+        for geometry in
+            ["<box size=\"1 0 3\"/>", "<sphere radius=\"-1\"/>", "<sphere radius=\"NaN\"/>"]
+        {
+            let message = Robot::from_urdf_str(&link(geometry), None).unwrap_err().to_string();
+            assert!(message.contains("link 'l'") && message.contains("positive"), "{message}");
+        }
+    }
+}

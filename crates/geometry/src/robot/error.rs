@@ -1,0 +1,128 @@
+//! What can be wrong with a robot description or a joint state.
+
+use std::path::PathBuf;
+
+/// Why a robot could not be read or posed.
+#[derive(Debug, thiserror::Error)]
+pub enum RobotError {
+    /// The description file cannot be read.
+    #[error("cannot read robot description {path}: {source}")]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The description is not valid URDF.
+    #[error("invalid URDF: {message}")]
+    Urdf {
+        /// What the parser said.
+        message: String,
+    },
+    /// An error in the description that was read from a file.
+    #[error("{path}: {source}")]
+    InFile {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong in it.
+        source: Box<RobotError>,
+    },
+    /// Two links or two joints share a name.
+    #[error("more than one {kind} is named '{name}'")]
+    Duplicate {
+        /// "link" or "joint".
+        kind: &'static str,
+        /// The name.
+        name: String,
+    },
+    /// A joint refers to a link that does not exist.
+    #[error("joint '{joint}' refers to link '{link}', which does not exist")]
+    UnknownLink {
+        /// The joint.
+        joint: String,
+        /// The missing link.
+        link: String,
+    },
+    /// A joint that does not exist is named by a mimic tag or a joint state.
+    #[error("joint '{joint}', named by {by}, does not exist")]
+    UnknownJoint {
+        /// The missing joint.
+        joint: String,
+        /// Who names it.
+        by: String,
+    },
+    /// A link hangs on two joints.
+    #[error("link '{link}' is the child of both joint '{first}' and joint '{second}'")]
+    TwoParents {
+        /// The link.
+        link: String,
+        /// One joint.
+        first: String,
+        /// The other.
+        second: String,
+    },
+    /// The joints do not form one tree.
+    #[error("expected one root link, found {}: {}", .roots.len(), .roots.join(", "))]
+    Roots {
+        /// The links without a parent.
+        roots: Vec<String>,
+    },
+    /// Links or mimic joints that depend on each other in a circle.
+    #[error("{kind} '{name}' is part of a cycle")]
+    Cycle {
+        /// "link" or "mimic joint".
+        kind: &'static str,
+        /// One of its members.
+        name: String,
+    },
+    /// A joint of a kind that has no place in a tree of single-axis joints.
+    #[error("joint '{joint}' is of the unsupported kind {kind}")]
+    UnsupportedJoint {
+        /// The joint.
+        joint: String,
+        /// Its kind.
+        kind: String,
+    },
+    /// A number that is NaN, infinite, or out of its range.
+    #[error("{owner}: {field} is not valid ({requirement})")]
+    Number {
+        /// "link 'name'" or "joint 'name'".
+        owner: String,
+        /// Which number.
+        field: &'static str,
+        /// What it must be.
+        requirement: &'static str,
+    },
+    /// A joint has no value in a joint state.
+    #[error("joint '{joint}' is missing from the joint state")]
+    MissingJoint {
+        /// The joint.
+        joint: String,
+    },
+    /// A collision mesh cannot be used.
+    #[error("link '{link}': collision mesh '{file}': {reason}")]
+    Mesh {
+        /// The link.
+        link: String,
+        /// The file as the description names it.
+        file: String,
+        /// Why not.
+        reason: String,
+    },
+    /// A distance field of a link cannot be built.
+    #[error("link '{link}': {reason}")]
+    Shape {
+        /// The link.
+        link: String,
+        /// Why not.
+        reason: String,
+    },
+    /// A pose list that does not fit the robot.
+    #[error("{given} link poses were given for a robot of {expected} links")]
+    PoseCount {
+        /// Poses given.
+        given: usize,
+        /// Links of the robot.
+        expected: usize,
+    },
+}

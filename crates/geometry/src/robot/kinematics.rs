@@ -1,0 +1,166 @@
+//! Forward kinematics over any scalar, and the geometric Jacobian.
+
+use nalgebra::{Isometry3, Matrix6xX, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
+use prehend_autodiff::Scalar;
+
+use super::{Drive, Joint, Motion, Robot};
+
+impl Robot {
+    /// Pose `t_base_link` of every link in the frame of the root link, in the order of [`Robot::links`].
+    ///
+    /// `joints` are the positions \[rad or m\] in the order of [`Robot::joint_names`]; limits are not enforced.
+    /// Derivatives pass through exactly, at zero too.
+    ///
+    /// # Panics
+    /// If `joints` has not one entry a name ([`Robot::joint_vector`] makes one that has).
+    pub fn forward_kinematics<S: Scalar>(&self, joints: &[S]) -> Vec<Isometry3<S>> {
+        assert_eq!(joints.len(), self.variables.len(), "one position a joint name");
+        let mut poses = vec![Isometry3::identity(); self.links.len()];
+        for &j in &self.order {
+            let joint = &self.joints[j];
+            poses[joint.child] = poses[joint.parent] * t_parent_child(joint, joints);
+        }
+        poses
+    }
+
+    /// Velocity of a point fixed to a link by each joint position: rows are the linear velocity of the
+    /// point \[m/rad or 1\] and the angular velocity of the link \[1 or rad/m\], in the base frame; columns
+    /// are the entries of the joint vector. `point` is in the link frame \[m\].
+    ///
+    /// The geometric Jacobian: Siciliano et al., Robotics, 2009, section 3.1.
+    ///
+    /// # Panics
+    /// If `joints` has not one entry a name, or there is no such link.
+    pub fn jacobian(&self, joints: &[f64], link: usize, point: &Point3<f64>) -> Matrix6xX<f64> {
+        let poses = self.forward_kinematics(joints);
+        let tip = poses[link] * point;
+        let mut jacobian = Matrix6xX::zeros(joints.len());
+        let mut current = link;
+        while let Some(joint) = self.joints.iter().find(|j| j.child == current) {
+            if let Drive::Variable { index, multiplier, .. } = joint.drive {
+                let t_base_joint = poses[joint.parent] * joint.t_parent_joint;
+                let axis = t_base_joint.rotation * joint.axis.into_inner() * multiplier;
+                let (linear, angular) = match joint.motion {
+                    Motion::Revolute => {
+                        (axis.cross(&(tip.coords - t_base_joint.translation.vector)), axis)
+                    }
+                    Motion::Prismatic => (axis, Vector3::zeros()),
+                    Motion::Fixed => (Vector3::zeros(), Vector3::zeros()),
+                };
+                for i in 0..3 {
+                    jacobian[(i, index)] += linear[i];
+                    jacobian[(i + 3, index)] += angular[i];
+                }
+            }
+            current = joint.parent;
+        }
+        jacobian
+    }
+}
+
+fn t_parent_child<S: Scalar>(joint: &Joint, joints: &[S]) -> Isometry3<S> {
+    let fixed = constant(&joint.t_parent_joint);
+    let Drive::Variable { index, multiplier, offset } = joint.drive else { return fixed };
+    let position = joints[index] * S::constant(multiplier) + S::constant(offset);
+    let axis = joint.axis.into_inner().map(S::constant);
+    match joint.motion {
+        Motion::Fixed => fixed,
+        Motion::Prismatic => fixed * Translation3::from(axis * position),
+        // Half-angle form about a constant unit axis: smooth everywhere, unlike a rotation vector at zero.
+        Motion::Revolute => {
+            let (sin, cos) = (position * S::constant(0.5)).sin_cos();
+            fixed
+                * UnitQuaternion::new_unchecked(
+                    Quaternion::from_imag(axis * sin) + Quaternion::from_real(cos),
+                )
+        }
+    }
+}
+
+fn constant<S: Scalar>(t: &Isometry3<f64>) -> Isometry3<S> {
+    Isometry3::from_parts(
+        Translation3::from(t.translation.vector.map(S::constant)),
+        UnitQuaternion::new_unchecked(Quaternion::from(t.rotation.coords.map(S::constant))),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A finger: yaw, pitch, a slide, and a last phalanx that bends with the second joint.
+    const FINGER: &str = r#"<robot name="finger">
+        <link name="base"/><link name="l0"/><link name="l1"/><link name="l2"/><link name="l3"/><link name="tip"/>
+        <joint name="tip" type="fixed"><parent link="l3"/><child link="tip"/><origin xyz="0 0 0.0267" rpy="0.1 0.2 0.3"/></joint>
+        <joint name="q0" type="revolute"><parent link="base"/><child link="l0"/><origin xyz="0 0.0435 -0.0015" rpy="-0.087 0.3 1.2"/><axis xyz="0 0 1"/><limit lower="-0.47" upper="0.47" velocity="1" effort="1"/></joint>
+        <joint name="q1" type="continuous"><parent link="l0"/><child link="l1"/><origin xyz="0 0 0.02"/><axis xyz="0 2 0.5"/></joint>
+        <joint name="q2" type="prismatic"><parent link="l1"/><child link="l2"/><origin xyz="0.01 0 0.054"/><axis xyz="-1 0 1"/><limit lower="0" upper="0.01" velocity="1" effort="1"/></joint>
+        <joint name="q3" type="revolute"><parent link="l2"/><child link="l3"/><origin xyz="0 0 0.0384"/><axis xyz="0 1 0"/><mimic joint="q1" multiplier="0.7" offset="0.1"/><limit lower="0" upper="2" velocity="1" effort="1"/></joint>
+        </robot>"#;
+
+    fn finger() -> Robot {
+        Robot::from_urdf_str(FINGER, None).unwrap()
+    }
+
+    #[test]
+    fn a_planar_chain_has_its_textbook_pose() {
+        let robot = Robot::from_urdf_str(
+            r#"<robot name="two"><link name="a"/><link name="b"/><link name="c"/>
+            <joint name="p" type="continuous"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/></joint>
+            <joint name="q" type="continuous"><parent link="b"/><child link="c"/><origin xyz="2 0 0"/><axis xyz="0 0 1"/></joint></robot>"#,
+            None,
+        )
+        .unwrap();
+        let poses = robot.forward_kinematics(&[0.4, -1.1]);
+        let tip = poses[robot.link_index("c").unwrap()] * Point3::new(1.0, 0.0, 0.0);
+        let expected =
+            [2.0 * 0.4f64.cos() + (-0.7f64).cos(), 2.0 * 0.4f64.sin() + (-0.7f64).sin(), 0.0];
+        assert!((tip - Point3::from(expected)).norm() < 1e-15);
+        assert_eq!(robot.root(), 0);
+    }
+
+    #[test]
+    fn fixed_axis_angles_turn_about_x_first() {
+        let robot = finger();
+        let tip = &robot.joints()[0];
+        let x = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), 0.1);
+        let y = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), 0.2);
+        let z = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 0.3);
+        assert!(tip.t_parent_joint.rotation.angle_to(&(z * y * x)) < 1e-15);
+    }
+
+    #[test]
+    fn the_jacobian_matches_differences_at_zero_and_elsewhere() {
+        let robot = finger();
+        let tip = robot.link_index("tip").unwrap();
+        let point = Point3::new(0.003, -0.002, 0.012);
+        let step = 1e-6;
+        for q in [[0.0, 0.0, 0.0], [0.3, -0.8, 0.004], [-2.0, 3.0, 0.01]] {
+            let jacobian = robot.jacobian(&q, tip, &point);
+            assert_eq!(jacobian.ncols(), robot.joint_names().len());
+            for i in 0..3 {
+                let at = |sign: f64| {
+                    let mut moved = q;
+                    moved[i] += sign * step;
+                    robot.forward_kinematics(&moved)[tip]
+                };
+                let (plus, minus) = (at(1.0), at(-1.0));
+                let linear = (plus * point - minus * point) / (2.0 * step);
+                let angular =
+                    (plus.rotation * minus.rotation.inverse()).scaled_axis() / (2.0 * step);
+                assert!((jacobian.fixed_view::<3, 1>(0, i) - linear).norm() < 1e-9);
+                assert!((jacobian.fixed_view::<3, 1>(3, i) - angular).norm() < 1e-9);
+            }
+        }
+    }
+
+    #[test]
+    fn single_precision_follows_double() {
+        let robot = finger();
+        let double = robot.forward_kinematics(&[0.3f64, -0.8, 0.004]);
+        let single = robot.forward_kinematics(&[0.3f32, -0.8, 0.004]);
+        for (d, s) in double.iter().zip(&single) {
+            assert!((d.translation.vector - s.translation.vector.map(f64::from)).norm() < 1e-6);
+        }
+    }
+}

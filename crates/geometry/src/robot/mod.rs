@@ -1,0 +1,153 @@
+//! Robots: kinematic trees with collision shapes, read from URDF.
+
+mod collision;
+mod error;
+mod kinematics;
+mod posed;
+mod primitive;
+mod shape;
+mod tree;
+mod urdf;
+
+use std::collections::BTreeMap;
+
+use nalgebra::{Isometry3, Unit, Vector3};
+
+pub use error::RobotError;
+pub use posed::PosedRobot;
+pub use primitive::{cuboid, cylinder, sphere};
+pub use shape::{LinkShape, RobotShape};
+
+use crate::TriMesh;
+
+/// A rigid body of a robot.
+#[derive(Clone, Debug)]
+pub struct Link {
+    /// Its name.
+    pub name: String,
+    /// Collision bodies in the link frame \[m\], one a collision tag; they may overlap each other.
+    pub parts: Vec<TriMesh>,
+}
+
+/// How a joint lets its child link move.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Motion {
+    /// Not at all.
+    Fixed,
+    /// By turning about the axis \[rad\].
+    Revolute,
+    /// By sliding along the axis \[m\].
+    Prismatic,
+}
+
+/// Where the position of a joint comes from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Drive {
+    /// It has none (a fixed joint).
+    None,
+    /// `multiplier * joints[index] + offset` of the joint vector; (1, 0) unless it mimics another joint.
+    Variable {
+        /// Index in the joint vector.
+        index: usize,
+        /// Factor \[1\].
+        multiplier: f64,
+        /// Offset \[rad or m\].
+        offset: f64,
+    },
+}
+
+/// A connection between two links.
+#[derive(Clone, Debug)]
+pub struct Joint {
+    /// Its name.
+    pub name: String,
+    /// How it moves.
+    pub motion: Motion,
+    /// Index of the link it is mounted on.
+    pub parent: usize,
+    /// Index of the link it moves.
+    pub child: usize,
+    /// The joint frame at position zero in the parent link frame \[m\].
+    pub t_parent_joint: Isometry3<f64>,
+    /// The axis in the joint frame.
+    pub axis: Unit<Vector3<f64>>,
+    /// Smallest and largest position \[rad or m\], where the joint has limits.
+    pub limits: Option<(f64, f64)>,
+    /// Where its position comes from.
+    pub drive: Drive,
+}
+
+/// A tree of links and joints with one root, the base.
+#[derive(Clone, Debug)]
+pub struct Robot {
+    name: String,
+    links: Vec<Link>,
+    joints: Vec<Joint>,
+    /// Joints, every parent before its children.
+    order: Vec<usize>,
+    root: usize,
+    /// Names of the entries of the joint vector.
+    variables: Vec<String>,
+}
+
+impl Robot {
+    /// Name of the robot.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The links in the order of the description: link poses come in this order.
+    pub fn links(&self) -> &[Link] {
+        &self.links
+    }
+
+    /// All joints in the order of the description, fixed ones included.
+    pub fn joints(&self) -> &[Joint] {
+        &self.joints
+    }
+
+    /// Names of the joints that a joint vector holds, in its order: those that are neither fixed nor
+    /// mimic another, in the order of the description.
+    pub fn joint_names(&self) -> &[String] {
+        &self.variables
+    }
+
+    /// Index of the base: the link that no joint moves.
+    pub fn root(&self) -> usize {
+        self.root
+    }
+
+    /// Index of the link of that name.
+    pub fn link_index(&self, name: &str) -> Option<usize> {
+        self.links.iter().position(|l| l.name == name)
+    }
+
+    /// The joint vector of a state given by name \[rad or m\].
+    ///
+    /// Values of fixed and mimicking joints, which some sources list, are ignored.
+    ///
+    /// # Errors
+    /// [`RobotError::MissingJoint`], [`RobotError::UnknownJoint`] or [`RobotError::Number`].
+    pub fn joint_vector(&self, state: &BTreeMap<String, f64>) -> Result<Vec<f64>, RobotError> {
+        for name in state.keys() {
+            if !self.joints.iter().any(|j| j.name == *name) {
+                return Err(RobotError::UnknownJoint {
+                    joint: name.clone(),
+                    by: "the joint state".into(),
+                });
+            }
+        }
+        self.variables
+            .iter()
+            .map(|name| match state.get(name) {
+                None => Err(RobotError::MissingJoint { joint: name.clone() }),
+                Some(q) if !q.is_finite() => Err(RobotError::Number {
+                    owner: format!("joint '{name}'"),
+                    field: "position",
+                    requirement: "must be finite",
+                }),
+                Some(&q) => Ok(q),
+            })
+            .collect()
+    }
+}

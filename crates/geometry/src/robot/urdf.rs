@@ -1,0 +1,280 @@
+//! From URDF text to a [`Robot`].
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
+use urdf_rs::JointType;
+
+use super::{Drive, Joint, Link, Motion, Robot, RobotError, collision, tree};
+
+impl Robot {
+    /// Reads a URDF file; mesh files are looked for in its folder.
+    ///
+    /// # Errors
+    /// [`RobotError`], naming this file.
+    pub fn from_urdf_file(path: impl AsRef<Path>) -> Result<Self, RobotError> {
+        let path = path.as_ref();
+        let text = std::fs::read_to_string(path)
+            .map_err(|source| RobotError::Read { path: path.into(), source })?;
+        let folder = match path.parent() {
+            Some(p) if !p.as_os_str().is_empty() => p,
+            _ => Path::new("."),
+        };
+        Self::from_urdf_str(&text, Some(folder))
+            .map_err(|source| RobotError::InFile { path: path.into(), source: Box::new(source) })
+    }
+
+    /// Reads URDF text. Relative and `package://` mesh files are looked for in `asset_dir` and never
+    /// outside of it; visual shapes are not read.
+    ///
+    /// Mimicking joints follow the joint they name; `continuous` joints are revolute ones without limits.
+    ///
+    /// # Errors
+    /// [`RobotError`], naming the link, joint or mesh file.
+    pub fn from_urdf_str(xml: &str, asset_dir: Option<&Path>) -> Result<Self, RobotError> {
+        let urdf = urdf_rs::read_from_string(xml)
+            .map_err(|error| RobotError::Urdf { message: error.to_string() })?;
+        if urdf.links.is_empty() {
+            return Err(RobotError::Urdf { message: "the robot has no links".into() });
+        }
+        unique("link", urdf.links.iter().map(|l| &l.name))?;
+        unique("joint", urdf.joints.iter().map(|j| &j.name))?;
+        let links = urdf
+            .links
+            .iter()
+            .map(|l| Ok(Link { name: l.name.clone(), parts: collision::parts(l, asset_dir)? }))
+            .collect::<Result<Vec<_>, RobotError>>()?;
+        let variables: Vec<String> = urdf
+            .joints
+            .iter()
+            .filter(|j| j.joint_type != JointType::Fixed && j.mimic.is_none())
+            .map(|j| j.name.clone())
+            .collect();
+        let by_name: BTreeMap<&str, &urdf_rs::Joint> =
+            urdf.joints.iter().map(|j| (j.name.as_str(), j)).collect();
+        let link_index = |joint: &urdf_rs::Joint, link: &str| {
+            links.iter().position(|l| l.name == link).ok_or_else(|| RobotError::UnknownLink {
+                joint: joint.name.clone(),
+                link: link.to_owned(),
+            })
+        };
+        let joints = urdf
+            .joints
+            .iter()
+            .map(|j| {
+                let owner = || format!("joint '{}'", j.name);
+                let motion = motion(j)?;
+                let axis = Vector3::from(j.axis.xyz.0);
+                let axis = if motion == Motion::Fixed {
+                    Vector3::x_axis()
+                } else {
+                    finite(&owner, "axis", &j.axis.xyz.0)?;
+                    Unit::try_new(axis, 1e-9).ok_or_else(|| RobotError::Number {
+                        owner: owner(),
+                        field: "axis",
+                        requirement: "must not be zero",
+                    })?
+                };
+                let limits = match j.joint_type {
+                    JointType::Revolute | JointType::Prismatic => {
+                        if j.limit.lower.is_nan() || j.limit.upper.is_nan() {
+                            return Err(RobotError::Number {
+                                owner: owner(),
+                                field: "limit",
+                                requirement: "must be a number",
+                            });
+                        }
+                        Some((j.limit.lower, j.limit.upper))
+                    }
+                    _ => None,
+                };
+                Ok(Joint {
+                    name: j.name.clone(),
+                    motion,
+                    parent: link_index(j, &j.parent.link)?,
+                    child: link_index(j, &j.child.link)?,
+                    t_parent_joint: isometry(&owner, &j.origin)?,
+                    axis,
+                    limits,
+                    drive: drive(j, &by_name, &variables)?,
+                })
+            })
+            .collect::<Result<Vec<_>, RobotError>>()?;
+        let (order, root) = tree::order(&links, &joints)?;
+        Ok(Self { name: urdf.name, links, joints, order, root, variables })
+    }
+}
+
+fn unique<'a>(
+    kind: &'static str,
+    names: impl Iterator<Item = &'a String>,
+) -> Result<(), RobotError> {
+    let mut seen = BTreeSet::new();
+    for name in names {
+        if !seen.insert(name) {
+            return Err(RobotError::Duplicate { kind, name: name.clone() });
+        }
+    }
+    Ok(())
+}
+
+fn motion(joint: &urdf_rs::Joint) -> Result<Motion, RobotError> {
+    match joint.joint_type {
+        JointType::Fixed => Ok(Motion::Fixed),
+        JointType::Revolute | JointType::Continuous => Ok(Motion::Revolute),
+        JointType::Prismatic => Ok(Motion::Prismatic),
+        JointType::Floating | JointType::Planar | JointType::Spherical => {
+            Err(RobotError::UnsupportedJoint {
+                joint: joint.name.clone(),
+                kind: format!("{:?}", joint.joint_type).to_lowercase(),
+            })
+        }
+    }
+}
+
+/// Follows mimic tags to the joint that moves on its own, multiplying and adding along the way.
+fn drive(
+    joint: &urdf_rs::Joint,
+    by_name: &BTreeMap<&str, &urdf_rs::Joint>,
+    variables: &[String],
+) -> Result<Drive, RobotError> {
+    if joint.joint_type == JointType::Fixed {
+        return Ok(Drive::None);
+    }
+    let (mut multiplier, mut offset) = (1.0, 0.0);
+    let mut current = joint;
+    for _ in 0..=by_name.len() {
+        let Some(mimic) = &current.mimic else {
+            return match variables.iter().position(|v| *v == current.name) {
+                Some(index) => Ok(Drive::Variable { index, multiplier, offset }),
+                // What a fixed joint is copied from is no motion at all, surely by mistake.
+                None => Err(RobotError::UnsupportedJoint {
+                    joint: joint.name.clone(),
+                    kind: "mimic of a fixed joint".into(),
+                }),
+            };
+        };
+        let (m, o) = (mimic.multiplier.unwrap_or(1.0), mimic.offset.unwrap_or(0.0));
+        finite(&|| format!("joint '{}'", current.name), "mimic", &[m, o])?;
+        offset += multiplier * o;
+        multiplier *= m;
+        current = by_name.get(mimic.joint.as_str()).ok_or_else(|| RobotError::UnknownJoint {
+            joint: mimic.joint.clone(),
+            by: format!("the mimic tag of joint '{}'", current.name),
+        })?;
+    }
+    Err(RobotError::Cycle { kind: "mimic joint", name: joint.name.clone() })
+}
+
+fn finite(
+    owner: &dyn Fn() -> String,
+    field: &'static str,
+    numbers: &[f64],
+) -> Result<(), RobotError> {
+    if numbers.iter().all(|x| x.is_finite()) {
+        return Ok(());
+    }
+    Err(RobotError::Number { owner: owner(), field, requirement: "must be finite" })
+}
+
+/// An origin tag: URDF's roll, pitch and yaw turn about the fixed axes x, y and z in this order.
+pub(super) fn isometry(
+    owner: &dyn Fn() -> String,
+    pose: &urdf_rs::Pose,
+) -> Result<Isometry3<f64>, RobotError> {
+    finite(owner, "origin xyz", &pose.xyz.0)?;
+    finite(owner, "origin rpy", &pose.rpy.0)?;
+    let [roll, pitch, yaw] = pose.rpy.0;
+    Ok(Isometry3::from_parts(
+        Translation3::from(Vector3::from(pose.xyz.0)),
+        UnitQuaternion::from_euler_angles(roll, pitch, yaw),
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn arm(joints: &str) -> Result<Robot, RobotError> {
+        let links: String = "abc".chars().map(|c| format!("<link name=\"{c}\"/>")).collect();
+        Robot::from_urdf_str(&format!("<robot name=\"arm\">{links}{joints}</robot>"), None)
+    }
+
+    fn joint(name: &str, kind: &str, parent: &str, child: &str, more: &str) -> String {
+        format!(
+            "<joint name=\"{name}\" type=\"{kind}\"><parent link=\"{parent}\"/><child link=\"{child}\"/>{more}</joint>"
+        )
+    }
+
+    #[test]
+    fn mimic_chains_resolve_to_the_joint_that_moves() {
+        let robot = arm(&(joint(
+            "p",
+            "continuous",
+            "a",
+            "b",
+            "<mimic joint=\"q\" multiplier=\"-2\" offset=\"0.5\"/>",
+        ) + &joint("q", "continuous", "b", "c", "")))
+        .unwrap();
+        assert_eq!(robot.joint_names(), ["q"]);
+        assert_eq!(
+            robot.joints()[0].drive,
+            Drive::Variable { index: 0, multiplier: -2.0, offset: 0.5 }
+        );
+        let state = BTreeMap::from([("q".to_owned(), 0.25)]);
+        assert_eq!(robot.joint_vector(&state).unwrap(), [0.25]);
+    }
+
+    #[test]
+    fn every_broken_tree_is_named() {
+        let fixed = |n, p, c| joint(n, "fixed", p, c, "");
+        let message = |joints: String| arm(&joints).unwrap_err().to_string();
+        assert_eq!(message(fixed("p", "a", "b")), "expected one root link, found 2: a, c");
+        assert!(message(fixed("p", "b", "c") + &fixed("q", "c", "b")).contains("cycle"));
+        assert!(
+            message(fixed("p", "a", "b") + &fixed("q", "b", "c") + &fixed("r", "c", "a"))
+                .contains("cycle")
+        );
+        assert!(
+            message(fixed("p", "a", "b") + &fixed("q", "c", "b"))
+                .contains("both joint 'p' and joint 'q'")
+        );
+        assert!(
+            message(fixed("p", "a", "b") + &fixed("p", "b", "c"))
+                .contains("more than one joint is named 'p'")
+        );
+        assert!(message(fixed("p", "a", "x")).contains("joint 'p' refers to link 'x'"));
+        assert!(
+            message(joint("p", "floating", "a", "b", "")).contains("unsupported kind floating")
+        );
+        let turning = |more| joint("p", "continuous", "a", "b", more) + &fixed("q", "b", "c");
+        assert!(message(turning("<axis xyz=\"0 0 0\"/>")).contains("joint 'p': axis"));
+        assert!(message(turning("<axis xyz=\"0 NaN 0\"/>")).contains("must be finite"));
+        assert!(message(turning("<origin xyz=\"0 inf 0\"/>")).contains("origin xyz"));
+        assert!(
+            message(turning("<mimic joint=\"x\"/>"))
+                .contains("joint 'x', named by the mimic tag of joint 'p'")
+        );
+        assert!(message(turning("<mimic joint=\"q\"/>")).contains("mimic of a fixed joint"));
+        assert!(
+            message(turning("<mimic joint=\"p\"/>")).contains("mimic joint 'p' is part of a cycle")
+        );
+        assert!(matches!(Robot::from_urdf_str("<robot", None), Err(RobotError::Urdf { .. })));
+        assert!(matches!(Robot::from_urdf_str("", None), Err(RobotError::Urdf { .. })));
+        assert!(matches!(Robot::from_urdf_file("/nowhere/x.urdf"), Err(RobotError::Read { .. })));
+    }
+
+    #[test]
+    fn joint_states_are_checked() {
+        let robot =
+            arm(&(joint("p", "continuous", "a", "b", "") + &joint("q", "fixed", "b", "c", "")))
+                .unwrap();
+        let vector =
+            |name: &str, q: f64| robot.joint_vector(&BTreeMap::from([(name.to_owned(), q)]));
+        assert_eq!(vector("p", 1.5).unwrap(), [1.5]);
+        assert!(matches!(vector("x", 1.0), Err(RobotError::UnknownJoint { .. })));
+        assert!(matches!(vector("q", 1.0), Err(RobotError::MissingJoint { .. })));
+        assert!(matches!(vector("p", f64::NAN), Err(RobotError::Number { .. })));
+    }
+}
