@@ -19,9 +19,12 @@ pub(crate) struct Weld {
 impl Weld {
     /// Joins vertices within `tolerance` \[m\] of the first vertex of a cluster.
     pub(crate) fn new(vertices: &[Point3<f64>], tolerance: f64) -> Self {
-        let low = vertices.iter().fold(Point3::from([f64::INFINITY; 3]), |low, v| low.inf(v));
-        // Cells much larger than the tolerance: most vertices then look into one cell only.
-        let cell = 8.0 * tolerance.max(f64::MIN_POSITIVE);
+        let everywhere = Point3::from([f64::INFINITY; 3]);
+        let (low, high) =
+            vertices.iter().fold((everywhere, -everywhere), |(l, h), v| (l.inf(v), h.sup(v)));
+        // Cells much larger than the tolerance, so that most vertices look into one cell only; and not so small
+        // that their numbers overflow.
+        let cell = (8.0 * tolerance).max(1e-7 * (high - low).norm()).max(f64::MIN_POSITIVE);
         let cell_of = |v: Vector3<f64>| v.map(|c| (c / cell).floor() as i64);
         let mut cells: HashMap<Vector3<i64>, Vec<u32>> = HashMap::new();
         let mut weld = Self { positions: Vec::new(), index: Vec::with_capacity(vertices.len()) };

@@ -81,7 +81,9 @@ fn correlation(pairs: &[(f64, f64)]) -> f64 {
 #[test]
 #[ignore = "reads PREHEND_DATA"]
 fn texture_rows_run_against_v() {
-    for object in ["000004", "000005", "000008", "000009", "000010", "000061"] {
+    for object in
+        ["000004", "000005", "000006", "000007", "000008", "000009", "000010", "000021", "000061"]
+    {
         let mesh = TriMesh::load(&data(&format!("mujoco/models/obj_{object}.ply"))).unwrap();
         let (uvs, texture, normals) =
             (mesh.uvs.as_ref().unwrap(), mesh.texture.as_ref().unwrap(), mesh.vertex_normals());

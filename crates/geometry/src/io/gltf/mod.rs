@@ -1,16 +1,18 @@
 //! glTF 2.0 and GLB: triangles, node transforms, base-colour textures (embedded or beside the file).
 //!
-//! The colour factor of a textured material is not applied. Accessors are decoded here, since the `gltf` crate's own readers panic on malformed ones.
+//! The colour factor of a textured material is not applied.
+
+mod accessor;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::Arc;
 
-use ::gltf::accessor::DataType;
 use ::gltf::mesh::Mode;
-use ::gltf::{Accessor, Gltf, Node, Primitive, Semantic, buffer, image};
+use ::gltf::{Gltf, Node, Primitive, Semantic, buffer, image};
 use nalgebra::{Matrix4, Point3, Vector3};
 
+use self::accessor::Buffers;
 use super::parts::{Part, join};
 use super::{MeshError, base64, companion, texture};
 use crate::{Texture, TriMesh};
@@ -29,20 +31,27 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshError> {
         });
     }
     let blob = gltf.blob.take();
-    let buffers =
+    let content =
         gltf.buffers().map(|b| load_buffer(&b, blob.as_deref(), path)).collect::<Result<_, _>>()?;
     let mut reader = Reader {
         path,
-        buffers,
+        buffers: Buffers { path, content },
         images: BTreeMap::new(),
         parts: Vec::new(),
+        size: 0,
         visited: BTreeSet::new(),
     };
     let scene = gltf.default_scene().or_else(|| gltf.scenes().next());
     let scene =
         scene.ok_or_else(|| MeshError::malformed(path, "scenes", "the file has no scene"))?;
-    for node in scene.nodes() {
-        reader.node(&node, &Matrix4::identity())?;
+    // The last comes first off the stack: push in reverse to keep the order of the file.
+    let mut pending: Vec<_> = scene.nodes().map(|n| (n, Matrix4::identity())).collect();
+    pending.reverse();
+    while let Some((node, t_scene_parent)) = pending.pop() {
+        let t_scene_node = reader.node(&node, &t_scene_parent)?;
+        let first = pending.len();
+        pending.extend(node.children().map(|child| (child, t_scene_node)));
+        pending[first..].reverse();
     }
     join(reader.parts, path)
 }
@@ -115,32 +124,39 @@ fn load_buffer(
     Ok(bytes)
 }
 
+/// Triangles and vertices that a file may ask for.
+const MOST: usize = 50_000_000;
+
 struct Reader<'a> {
     path: &'a Path,
-    buffers: Vec<Vec<u8>>,
+    buffers: Buffers<'a>,
     images: BTreeMap<usize, Arc<Texture>>,
     parts: Vec<Part>,
+    size: usize,
     visited: BTreeSet<usize>,
 }
 
 impl Reader<'_> {
-    fn node(&mut self, node: &Node, t_scene_parent: &Matrix4<f64>) -> Result<(), MeshError> {
-        let bad = |reason: &str| {
-            MeshError::malformed(self.path, format!("node {}", node.index()), reason)
-        };
-        // Nodes form a tree; a cycle would recurse without end. The bound keeps the stack small.
+    /// Reads what hangs on `node` itself; returns its frame.
+    fn node(
+        &mut self,
+        node: &Node,
+        t_scene_parent: &Matrix4<f64>,
+    ) -> Result<Matrix4<f64>, MeshError> {
+        // Nodes form a tree; a cycle would never end.
         if !self.visited.insert(node.index()) {
-            return Err(bad("reached twice"));
-        }
-        if self.visited.len() > 100_000 {
-            return Err(bad("too many nodes"));
+            return Err(MeshError::malformed(
+                self.path,
+                format!("node {}", node.index()),
+                "reached twice",
+            ));
         }
         let local = Matrix4::from(node.transform().matrix()).map(f64::from);
         let t_scene_node = t_scene_parent * local;
         for primitive in node.mesh().iter().flat_map(|m| m.primitives()) {
             self.primitive(&primitive, &t_scene_node)?;
         }
-        node.children().try_for_each(|child| self.node(&child, &t_scene_node))
+        Ok(t_scene_node)
     }
 
     fn primitive(
@@ -149,9 +165,9 @@ impl Reader<'_> {
         t_scene_node: &Matrix4<f64>,
     ) -> Result<(), MeshError> {
         let Some(positions) = primitive.get(&Semantic::Positions) else { return Ok(()) };
-        let positions = self.floats::<3>(&positions)?;
+        let positions = self.buffers.floats::<3>(&positions)?;
         let indices = match primitive.indices() {
-            Some(accessor) => self.floats_as(&accessor, 1, |v| v[0] as u32)?,
+            Some(accessor) => self.buffers.floats_as(&accessor, 1, |v| v[0] as u32)?,
             None => (0..positions.len() as u32).collect(),
         };
         let mut faces = match primitive.mode() {
@@ -192,12 +208,12 @@ impl Reader<'_> {
         {
             // Normals turn by the inverse transpose; the caller brings them back to unit length.
             let turn = inverse.transpose();
-            let normals = self.floats::<3>(&accessor)?;
+            let normals = self.buffers.floats::<3>(&accessor)?;
             let normals = normals.iter().map(|n| turn * Vector3::from(n.map(f64::from))).collect();
             mesh.normals = self.one_each(normals, n, "NORMAL")?;
         }
         if let Some(accessor) = primitive.get(&Semantic::Colors(0)) {
-            mesh.colors = self.one_each(self.floats::<3>(&accessor)?, n, "COLOR_0")?;
+            mesh.colors = self.one_each(self.buffers.floats::<3>(&accessor)?, n, "COLOR_0")?;
         }
         let pbr = primitive.material().pbr_metallic_roughness();
         let [r, g, b, _] = pbr.base_color_factor();
@@ -207,9 +223,20 @@ impl Reader<'_> {
             part.texture = Some(self.image(&image)?);
             if let Some(accessor) = primitive.get(&Semantic::TexCoords(info.tex_coord())) {
                 // glTF measures v from the top of the image.
-                let uvs = self.floats::<2>(&accessor)?.iter().map(|[u, v]| [*u, 1.0 - v]).collect();
+                let uvs = self
+                    .buffers
+                    .floats::<2>(&accessor)?
+                    .iter()
+                    .map(|[u, v]| [*u, 1.0 - v])
+                    .collect();
                 part.mesh.uvs = self.one_each(uvs, n, "TEXCOORD")?;
             }
+        }
+        // Nodes and primitives may share data, so that a small file can ask for any number of triangles.
+        self.size += part.mesh.faces.len() + n;
+        if self.size > MOST {
+            let feature = format!("more than {MOST} triangles and vertices");
+            return Err(MeshError::Unsupported { path: self.path.into(), feature });
         }
         self.parts.push(part);
         Ok(())
@@ -240,6 +267,7 @@ impl Reader<'_> {
             image::Source::View { view, .. } => {
                 let name = format!("image {}", image.index());
                 let bytes = self
+                    .buffers
                     .view(&view)
                     .ok_or_else(|| MeshError::texture(self.path, &name, "outside its buffer"))?;
                 texture::decode(bytes, self.path, &name)?
@@ -255,80 +283,6 @@ impl Reader<'_> {
         self.images.insert(image.index(), texture.clone());
         Ok(texture)
     }
-
-    fn view(&self, view: &buffer::View) -> Option<&[u8]> {
-        let end = view.offset().checked_add(view.length())?;
-        self.buffers.get(view.buffer().index())?.get(view.offset()..end)
-    }
-
-    fn floats<const N: usize>(&self, accessor: &Accessor) -> Result<Vec<[f32; N]>, MeshError> {
-        self.floats_as(accessor, N, |v| {
-            let mut out = [0.0; N];
-            out.iter_mut().zip(v).for_each(|(o, c)| *o = *c as f32);
-            out
-        })
-    }
-
-    /// The accessor's elements, each of at least `width` components, normalised integers in 0..=1 or −1..=1.
-    fn floats_as<T>(
-        &self,
-        accessor: &Accessor,
-        width: usize,
-        f: impl Fn(&[f64]) -> T,
-    ) -> Result<Vec<T>, MeshError> {
-        let bad = |reason: &str| {
-            MeshError::malformed(self.path, format!("accessor {}", accessor.index()), reason)
-        };
-        if accessor.sparse().is_some() {
-            return Err(MeshError::Unsupported {
-                path: self.path.into(),
-                feature: "sparse accessors".into(),
-            });
-        }
-        let components = accessor.dimensions().multiplicity();
-        if components < width {
-            return Err(bad("too few components"));
-        }
-        let number = accessor.data_type();
-        let (size, element) = (number.size(), number.size() * components);
-        let view = accessor.view().ok_or_else(|| bad("no buffer view"))?;
-        let stride = view.stride().unwrap_or(element);
-        let bytes = self
-            .view(&view)
-            .and_then(|v| v.get(accessor.offset()..))
-            .ok_or_else(|| bad("outside its buffer"))?;
-        let needed = match accessor.count() {
-            0 => Some(0),
-            n => (n - 1).checked_mul(stride).and_then(|b| b.checked_add(element)),
-        };
-        if needed.is_none_or(|n| n > bytes.len()) {
-            return Err(bad("outside its buffer view"));
-        }
-        let mut values = vec![0.0; components];
-        let read = |i: usize| {
-            for (k, value) in values.iter_mut().enumerate() {
-                let at = i * stride + k * size;
-                *value = component(&bytes[at..at + size], number, accessor.normalized());
-            }
-            f(&values)
-        };
-        Ok((0..accessor.count()).map(read).collect())
-    }
-}
-
-fn component(bytes: &[u8], number: DataType, normalized: bool) -> f64 {
-    let at = |k: usize| bytes.get(k).copied().unwrap_or_default();
-    let (value, full) = match number {
-        DataType::I8 => (f64::from(at(0) as i8), 127.0),
-        DataType::U8 => (f64::from(at(0)), 255.0),
-        DataType::I16 => (f64::from(i16::from_le_bytes([at(0), at(1)])), 32767.0),
-        DataType::U16 => (f64::from(u16::from_le_bytes([at(0), at(1)])), 65535.0),
-        DataType::U32 => {
-            (f64::from(u32::from_le_bytes([at(0), at(1), at(2), at(3)])), f64::from(u32::MAX))
-        }
-        DataType::F32 => (f64::from(f32::from_le_bytes([at(0), at(1), at(2), at(3)])), 1.0),
-    };
-    if normalized { (value / full).max(-1.0) } else { value }
 }
 
 #[cfg(test)]
