@@ -9,7 +9,7 @@ use prehend_geometry::hand::{Taxel, load_taxels};
 use prehend_geometry::robot::Robot as KinematicTree;
 
 use crate::bop::{Dataset, DatasetError, Frame, ModelInfo, Models};
-use crate::{HandReading, Inertial, Object, Observation, RefineError, Robot};
+use crate::{HandReading, Inertial, Object, Observation, RefineError, Robot, TermKind};
 
 /// BOP models are in millimetres \[m\].
 const MILLIMETRE: f64 = 1e-3;
@@ -82,7 +82,9 @@ impl<'a> Assets<'a> {
         Ok(object)
     }
 
-    /// The frame as an [`Observation`], and its robot if `with_robot`.
+    /// The frame as an [`Observation`] with what `terms` need, and the robot if the frame says where it is.
+    ///
+    /// A hand that no term needs is still known to hide the object, so it is taken along where it is given.
     ///
     /// # Errors
     /// If a file that is needed is missing or broken.
@@ -90,14 +92,14 @@ impl<'a> Assets<'a> {
         &mut self,
         frame: &Frame<'_>,
         instance: usize,
-        with_robot: bool,
-        with_touch: bool,
+        terms: &[TermKind],
     ) -> Result<(Observation, Option<Arc<Robot>>), AssetError> {
         let mut observation = frame.observation(instance)?;
-        if !with_robot {
-            return Ok((observation, None));
-        }
-        let bodies = frame.bodies()?;
+        let needed = terms.iter().any(|t| matches!(t, TermKind::Physics | TermKind::Tactile));
+        let bodies = match frame.bodies() {
+            Err(DatasetError::Missing { .. }) if !needed => return Ok((observation, None)),
+            bodies => bodies?,
+        };
         let [body] = bodies.bodies.as_slice() else {
             return Err(AssetError::Bodies {
                 scene: frame.scene_id(),
@@ -105,7 +107,8 @@ impl<'a> Assets<'a> {
                 count: bodies.bodies.len(),
             });
         };
-        let tactile = if with_touch { Some(frame.tactile()?) } else { None };
+        let touch = terms.contains(&TermKind::Tactile);
+        let tactile = touch.then(|| frame.tactile()).transpose()?;
         let robot = self.robot(&body.urdf, tactile.as_ref().map(|t| t.taxels.as_path()))?;
         observation.gravity = Some(bodies.gravity);
         observation.hand = Some(HandReading {
@@ -120,11 +123,7 @@ impl<'a> Assets<'a> {
     ///
     /// # Errors
     /// If a file is missing or broken.
-    pub fn robot(
-        &mut self,
-        urdf: &Path,
-        taxels: Option<&Path>,
-    ) -> Result<Arc<Robot>, AssetError> {
+    pub fn robot(&mut self, urdf: &Path, taxels: Option<&Path>) -> Result<Arc<Robot>, AssetError> {
         let key = (urdf.to_owned(), taxels.map(Path::to_owned));
         if let Some(robot) = self.robots.get(&key) {
             return Ok(Arc::clone(robot));

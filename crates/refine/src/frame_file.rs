@@ -178,7 +178,8 @@ pub fn load(file: &Path, seed: u64) -> Result<FrameInput, FrameFileError> {
     let mesh = TriMesh::load(&folder.join(&layout.mesh)).map_err(|e| asset(e.into()))?;
     let mesh = mesh.scaled(layout.mesh_unit.metres());
     let name = layout.mesh.display().to_string();
-    let object = Object::with_mass(&name, mesh, layout.mass_kg, seed).map_err(|e| asset(e.into()))?;
+    let object =
+        Object::with_mass(&name, mesh, layout.mass_kg, seed).map_err(|e| asset(e.into()))?;
     let t_cam_object = layout.pose.isometry().map_err(|reason| field("pose", reason))?;
     let (robot, hand) = match &layout.robot {
         None => (None, None),
@@ -196,7 +197,7 @@ pub fn load(file: &Path, seed: u64) -> Result<FrameInput, FrameFileError> {
                 joints,
                 forces: r.forces.iter().flatten().map(|&f| Vector3::from(f)).collect(),
             };
-            (Some(Robot::new(tree, skin).map_err(asset)?), Some(hand))
+            (Some(Robot::new(tree, skin).map_err(|e| asset(e.into()))?), Some(hand))
         }
     };
     let gravity = layout.gravity.map(Vector3::from);

@@ -30,7 +30,8 @@ pub fn inspect(
         ));
     }
     if !object.report.watertight {
-        warnings.push(format!("the mesh is not watertight: {} open edges", object.report.open_edges));
+        warnings
+            .push(format!("the mesh is not watertight: {} open edges", object.report.open_edges));
     }
     let centre = t_cam_object * object.centre;
     if centre.z <= 0.0 {
@@ -52,7 +53,8 @@ pub fn inspect(
         }
     }
     if overlap == 0 {
-        warnings.push("the object at this pose does not touch its mask: wrong frame or pose?".into());
+        warnings
+            .push("the object at this pose does not touch its mask: wrong frame or pose?".into());
     } else if (overlap as f64) < 0.3 * union as f64 {
         let share = 100.0 * overlap as f64 / union as f64;
         warnings.push(format!("the object at this pose overlaps its mask by only {share:.0} %"));

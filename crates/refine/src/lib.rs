@@ -21,6 +21,7 @@ mod robust;
 mod scoring;
 mod state;
 pub mod strategy;
+pub mod synth;
 pub mod term;
 pub mod trace;
 

@@ -16,11 +16,7 @@ impl Normal {
     /// Empty equations over `blocks`, in that order.
     pub fn new(blocks: &[Block]) -> Self {
         let n = blocks.iter().map(|b| b.dimension()).sum();
-        Self {
-            blocks: blocks.to_vec(),
-            gradient: DVector::zeros(n),
-            hessian: DMatrix::zeros(n, n),
-        }
+        Self { blocks: blocks.to_vec(), gradient: DVector::zeros(n), hessian: DMatrix::zeros(n, n) }
     }
 
     /// Where the parameters of `block` begin, or `None` if it was not requested.

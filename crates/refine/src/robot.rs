@@ -25,7 +25,11 @@ impl Robot {
     /// # Errors
     /// If the geometry of a link cannot be used.
     pub fn new(tree: KinematicTree, taxels: Vec<Taxel>) -> Result<Self, RobotError> {
-        let shape = Arc::new(RobotShape::new(&tree)?);
+        let shape = Arc::new(RobotShape::new(
+            &tree,
+            RobotShape::DEFAULT_SPACING,
+            RobotShape::DEFAULT_MARGIN,
+        )?);
         let links = tree.links().iter().enumerate();
         let bodies = links
             .flat_map(|(index, link)| link.parts.iter().map(move |part| (index, part)))
@@ -35,7 +39,14 @@ impl Robot {
     }
 
     /// The hand with its base at `t_cam_hand` and its joints at `joints` \[rad\].
-    pub fn posed(&self, t_cam_hand: &Isometry3<f64>, joints: &[f64]) -> PosedRobot {
+    ///
+    /// # Errors
+    /// If a pose is not finite.
+    pub fn posed(
+        &self,
+        t_cam_hand: &Isometry3<f64>,
+        joints: &[f64],
+    ) -> Result<PosedRobot, RobotError> {
         PosedRobot::new(Arc::clone(&self.shape), self.link_poses(t_cam_hand, joints))
     }
 

@@ -86,7 +86,7 @@ impl<'a> Scorer<'a> {
         let bodies = self.truth.bodies(scene, image)?;
         let [body] = bodies.bodies.as_slice() else { return Ok(None) };
         let robot = self.assets.robot(&body.urdf, None)?;
-        let hand = robot.posed(&body.t_cam_base, &robot.tree.joint_vector(&body.joints)?);
+        let hand = robot.posed(&body.t_cam_base, &robot.tree.joint_vector(&body.joints)?)?;
         let body = UnionBody::new(&hand.mesh_parts())?;
         let surface = ClosestPoints::new(&body.mesh())?;
         Ok(Some(TrueHand { body, surface }))

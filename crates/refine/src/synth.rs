@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3, Vector6};
 use prehend_autodiff::lie::perturb_about;
+use prehend_geometry::SplitMix64;
 use prehend_geometry::hand::{JOINT_NAMES, Taxel, allegro_xela_urdf, default_grasp, taxels};
 use prehend_geometry::robot::Robot as KinematicTree;
-use prehend_geometry::sample::SplitMix64;
 use prehend_render::{Camera, DepthImage, Light, Mask, RgbImage, SceneObject, render_scene};
 
 use crate::{AssetError, HandReading, Object, Observation, Robot};
@@ -52,7 +52,8 @@ pub fn default_scene(seed: u64) -> Result<Scene, AssetError> {
     let t_cam_hand = look_at(&Point3::new(0.42, 0.12, 0.24), &Point3::new(0.04, 0.02, 0.03));
     let truth = t_cam_hand * grasp.t_base_object;
     let mut noise = SplitMix64::new(seed);
-    let (color, depth, mask) = photograph(&camera, &object, &robot, &truth, &t_cam_hand, &joints, &mut noise);
+    let (color, depth, mask) =
+        photograph(&camera, &object, &robot, &truth, &t_cam_hand, &joints, &mut noise);
     let forces = feel(&object, &robot, &truth, &t_cam_hand, &joints);
     let observation = Observation {
         camera,
@@ -74,13 +75,9 @@ fn look_at(eye: &Point3<f64>, target: &Point3<f64>) -> Isometry3<f64> {
     let forward = (target - eye).normalize();
     let right = forward.cross(&Vector3::z()).normalize();
     let down = forward.cross(&right);
-    let rows = nalgebra::Matrix3::from_rows(&[
-        right.transpose(),
-        down.transpose(),
-        forward.transpose(),
-    ]);
-    let rotation =
-        UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rows));
+    let rows =
+        nalgebra::Matrix3::from_rows(&[right.transpose(), down.transpose(), forward.transpose()]);
+    let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rows));
     Isometry3::from_parts(Translation3::from(-(rotation * eye.coords)), rotation)
 }
 

@@ -115,7 +115,10 @@ fn reads_everything_in_metres_and_newtons() {
     let k = frame.intrinsics;
     assert_eq!((k.fx, k.fy, k.cx, k.cy, frame.depth_scale), (500.0, 510.0, 1.5, 1.0, 0.5));
     let seen = frame.observation(0).unwrap();
-    assert_eq!((seen.color.width(), seen.color.height(), seen.color.pixels()[0]), (4, 3, [1.0, 0.0, 0.2]));
+    assert_eq!(
+        (seen.color.width(), seen.color.height(), seen.color.pixels()[0]),
+        (4, 3, [1.0, 0.0, 0.2])
+    );
     assert_eq!(seen.depth.pixels(), [0.5; 12]);
     assert_eq!(seen.mask.count(), 1);
     let bodies = frame.bodies().unwrap();
@@ -137,9 +140,8 @@ fn reads_everything_in_metres_and_newtons() {
 fn the_only_mask_serves_any_row_and_several_go_by_row() {
     let fixture = Fixture::new();
     let dataset = fixture.open();
-    let count = |im: u32, instance: usize| {
-        dataset.frame(4, im).unwrap().mask(instance).map(|m| m.count())
-    };
+    let count =
+        |im: u32, instance: usize| dataset.frame(4, im).unwrap().mask(instance).map(|m| m.count());
     // Files of other kinds do not count.
     fixture.scene("mask_visib/000000_000005.txt", "notes");
     assert_eq!((count(0, 0), count(0, 2)), (Ok(1), Ok(1)));

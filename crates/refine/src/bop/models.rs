@@ -89,7 +89,7 @@ impl ModelInfo {
             mass: entry.find("mass_kg")?.map(|e| e.positive()).transpose()?,
             center_of_mass: entry
                 .find("com_mm")?
-                .map(|e| Ok(Point3::from(e.vector()? / 1000.0)))
+                .map(|e| Ok::<_, DatasetError>(Point3::from(e.vector()? / 1000.0)))
                 .transpose()?,
             inertia: entry.find("inertia_kg_m2")?.map(|e| inertia(&e)).transpose()?,
         })

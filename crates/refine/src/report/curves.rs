@@ -38,7 +38,12 @@ fn draw(trace: &Trace, svg: &mut String) -> Result<(), Box<dyn std::error::Error
         .x_desc("iteration")
         .y_desc("loss / initial loss")
         .draw()?;
-    let colors = [RGBColor(31, 119, 180), RGBColor(214, 39, 40), RGBColor(44, 160, 44), RGBColor(148, 103, 189)];
+    let colors = [
+        RGBColor(31, 119, 180),
+        RGBColor(214, 39, 40),
+        RGBColor(44, 160, 44),
+        RGBColor(148, 103, 189),
+    ];
     for (i, (name, points)) in trace.terms.iter().zip(curves).enumerate() {
         let color = colors[i % colors.len()];
         chart

@@ -134,7 +134,8 @@ impl Term for DepthTerm {
 
     fn value(&self, state: &State) -> f64 {
         let cauchy = Cauchy { scale: self.settings.outlier };
-        let losses = self.sum(state, |pair| cauchy.loss((pair.cloud - pair.surface).norm_squared()));
+        let losses =
+            self.sum(state, |pair| cauchy.loss((pair.cloud - pair.surface).norm_squared()));
         let mean = |side: &[f64]| side.iter().sum::<f64>() / side.len().max(1) as f64;
         self.scale() * (mean(&losses.0) + mean(&losses.1))
     }

@@ -89,9 +89,10 @@ impl RenderingTerm {
 /// Root mean square of the colours under the mask; never zero.
 fn brightness(observation: &Observation) -> f64 {
     let pixels = observation.color.pixels().iter().zip(observation.mask.pixels());
-    let (sum, count) = pixels.filter(|(_, m)| **m).flat_map(|(c, _)| c).fold((0.0, 0.0), |(s, n), &v| {
-        (s + f64::from(v).powi(2), n + 1.0)
-    });
+    let (sum, count) = pixels
+        .filter(|(_, m)| **m)
+        .flat_map(|(c, _)| c)
+        .fold((0.0, 0.0), |(s, n), &v| (s + f64::from(v).powi(2), n + 1.0));
     (sum / f64::max(count, 1.0)).sqrt().max(0.02)
 }
 

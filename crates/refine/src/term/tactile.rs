@@ -63,7 +63,10 @@ impl TactileTerm {
         robot: &Robot,
         settings: TactileSettings,
     ) -> Result<Self, RefineError> {
-        let hand = observation.hand.as_ref().ok_or(RefineError::Missing { what: "hand state", term: "tactile" })?;
+        let hand = observation
+            .hand
+            .as_ref()
+            .ok_or(RefineError::Missing { what: "hand state", term: "tactile" })?;
         if hand.forces.len() != robot.taxels.len() {
             return Err(RefineError::TaxelCount {
                 forces: hand.forces.len(),
@@ -77,7 +80,8 @@ impl TactileTerm {
             .zip(&hand.forces)
             .map(|(taxel, force)| {
                 let link = robot.tree.link_index(&taxel.link).and_then(|i| links.get(i));
-                let link = link.ok_or_else(|| RefineError::TaxelLink { link: taxel.link.clone() })?;
+                let link =
+                    link.ok_or_else(|| RefineError::TaxelLink { link: taxel.link.clone() })?;
                 Ok(Touch {
                     position: link * taxel.position,
                     touched: force.norm() > settings.touch_force,
@@ -109,7 +113,8 @@ impl TactileTerm {
                 return None;
             }
             let along = (local - closest.point) * distance.signum();
-            let gradient = along.try_normalize(1e-12).map_or_else(Vector3::zeros, |n| state.t_cam_object * n);
+            let gradient =
+                along.try_normalize(1e-12).map_or_else(Vector3::zeros, |n| state.t_cam_object * n);
             let weight = if touch.touched { touch_weight } else { quiet_weight };
             Some(Residual { distance, gradient, arm: point.coords - centre, weight })
         })

@@ -6,14 +6,14 @@ use anyhow::Context;
 use clap::Args;
 use prehend_refine::bop::ResultRow;
 use prehend_refine::report::{Report, outline_picture};
-use prehend_refine::{AssetError, Assets, inspect};
+use prehend_refine::{AssetError, Assets, TermKind, inspect};
 
 use crate::options::{Input, Job, label};
 use crate::outcome::Outcome;
 use crate::progress;
 
 #[derive(Args)]
-pub struct Arguments {
+pub(crate) struct Arguments {
     #[command(flatten)]
     input: Input,
     /// Where to write the pictures and an index.html.
@@ -21,7 +21,7 @@ pub struct Arguments {
     report: PathBuf,
 }
 
-pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let dataset = arguments.input.open()?;
     let (jobs, mut failures) = arguments.input.jobs()?;
     let mut assets = Assets::new(&dataset, 0);
@@ -54,7 +54,7 @@ fn check(
     let ResultRow { scene_id, im_id, obj_id, t_cam_model, .. } = &job.row;
     let object = assets.object(*obj_id)?;
     let frame = assets.dataset().frame(*scene_id, *im_id)?;
-    let (observation, robot) = assets.observation(&frame, job.instance, true, true)?;
+    let (observation, robot) = assets.observation(&frame, job.instance, &TermKind::ALL)?;
     let warnings = inspect(&observation, &object, robot.as_deref(), t_cam_model);
     Ok((outline_picture(&observation, &object, robot.as_deref(), t_cam_model), warnings))
 }

@@ -10,7 +10,7 @@ use crate::outcome::Outcome;
 use crate::progress;
 
 #[derive(Args)]
-pub struct Arguments {
+pub(crate) struct Arguments {
     #[command(flatten)]
     input: Input,
     /// Print JSON, with every pose's score, instead of tables.
@@ -18,7 +18,7 @@ pub struct Arguments {
     json: bool,
 }
 
-pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let dataset = arguments.input.open()?;
     let (jobs, mut failures) = arguments.input.jobs()?;
     let mut scorer = Scorer::new(&dataset);

@@ -10,7 +10,7 @@ use crate::outcome::Outcome;
 use crate::progress;
 use crate::refine::{Method, deliver};
 
-pub fn run(file: &Path, method: &Method, out: Option<&Path>) -> anyhow::Result<Outcome> {
+pub(crate) fn run(file: &Path, method: &Method, out: Option<&Path>) -> anyhow::Result<Outcome> {
     let input = frame_file::load(file, method.seed())?;
     let mut config = method.config();
     // A frame brings what it has: terms whose evidence is absent drop out unless they were asked for.

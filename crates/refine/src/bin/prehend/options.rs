@@ -7,43 +7,43 @@ use prehend_refine::bop::{Dataset, DatasetError, ReadResults, ResultRow, read_re
 
 /// A dataset and poses on it.
 #[derive(Args)]
-pub struct Input {
+pub(crate) struct Input {
     /// BOP dataset: the folder that holds models/ and test/.
     #[arg(long, value_name = "DIR")]
-    pub dataset: PathBuf,
+    pub(crate) dataset: PathBuf,
     /// Split to use, if the dataset has several.
     #[arg(long, value_name = "NAME")]
-    pub split: Option<String>,
+    pub(crate) split: Option<String>,
     /// Poses, as a BOP results file.
     #[arg(long, value_name = "FILE")]
-    pub poses: PathBuf,
+    pub(crate) poses: PathBuf,
     #[command(flatten)]
-    pub filter: Filter,
+    pub(crate) filter: Filter,
 }
 
 /// Which rows of a results file to use.
 #[derive(Args)]
-pub struct Filter {
+pub(crate) struct Filter {
     /// Only this scene; may be repeated.
     #[arg(long, value_name = "ID")]
-    pub scene: Vec<u32>,
+    pub(crate) scene: Vec<u32>,
     /// Only this image; may be repeated.
     #[arg(long, value_name = "ID")]
-    pub image: Vec<u32>,
+    pub(crate) image: Vec<u32>,
     /// Only this object; may be repeated.
     #[arg(long, value_name = "ID")]
-    pub object: Vec<u32>,
+    pub(crate) object: Vec<u32>,
 }
 
 /// A row of the results file and which of the image's rows it is.
-pub struct Job {
-    pub row: ResultRow,
-    pub instance: usize,
+pub(crate) struct Job {
+    pub(crate) row: ResultRow,
+    pub(crate) instance: usize,
 }
 
 impl Input {
     /// The dataset.
-    pub fn open(&self) -> Result<Dataset, DatasetError> {
+    pub(crate) fn open(&self) -> Result<Dataset, DatasetError> {
         match &self.split {
             Some(split) => Dataset::open_split(&self.dataset, split),
             None => Dataset::open(&self.dataset),
@@ -51,7 +51,7 @@ impl Input {
     }
 
     /// The rows that pass the filter, and what is wrong with the others.
-    pub fn jobs(&self) -> Result<(Vec<Job>, Vec<String>), DatasetError> {
+    pub(crate) fn jobs(&self) -> Result<(Vec<Job>, Vec<String>), DatasetError> {
         let ReadResults { rows, instances, errors } = read_results(&self.poses)?;
         let jobs = rows
             .into_iter()
@@ -73,6 +73,6 @@ impl Filter {
 }
 
 /// How messages name a row.
-pub fn label(row: &ResultRow) -> String {
+pub(crate) fn label(row: &ResultRow) -> String {
     format!("scene {} image {} object {}", row.scene_id, row.im_id, row.obj_id)
 }

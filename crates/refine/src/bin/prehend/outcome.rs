@@ -3,16 +3,16 @@
 use std::process::ExitCode;
 
 /// How a run over many frames ended.
-pub struct Outcome {
+pub(crate) struct Outcome {
     /// Frames that succeeded.
-    pub done: usize,
+    pub(crate) done: usize,
     /// What failed, one line each.
-    pub failures: Vec<String>,
+    pub(crate) failures: Vec<String>,
 }
 
 impl Outcome {
     /// Prints the summary to standard error; the exit code is 2 if anything failed.
-    pub fn exit_code(self) -> ExitCode {
+    pub(crate) fn exit_code(self) -> ExitCode {
         if self.failures.is_empty() {
             return ExitCode::SUCCESS;
         }

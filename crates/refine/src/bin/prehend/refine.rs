@@ -15,7 +15,7 @@ use crate::outcome::Outcome;
 use crate::{frame, progress};
 
 #[derive(Args)]
-pub struct Arguments {
+pub(crate) struct Arguments {
     /// BOP dataset: the folder that holds models/ and test/.
     #[arg(long, value_name = "DIR", requires = "poses", required_unless_present = "frame")]
     dataset: Option<PathBuf>,
@@ -48,7 +48,7 @@ pub struct Arguments {
 
 /// How to refine.
 #[derive(Args)]
-pub struct Method {
+pub(crate) struct Method {
     /// How candidate steps become a pose: the paper's heuristic.
     #[arg(long, value_name = "NAME", default_value = "heuristic", value_parser = ["heuristic"])]
     strategy: String,
@@ -58,14 +58,10 @@ pub struct Method {
     /// Run all the iterations even after nothing improves.
     #[arg(long)]
     exhaustive: bool,
-    /// Evidence to use.
-    #[arg(
-        long,
-        value_name = "LIST",
-        value_delimiter = ',',
-        default_value = "physics,rendering,depth,tactile"
-    )]
-    terms: Vec<TermKind>,
+    /// Evidence to use, of physics, rendering, depth and tactile. [default: all; with --frame, all that
+    /// the frame brings]
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    terms: Option<Vec<TermKind>>,
     /// Return the last pose instead of the one whose rendering fits best.
     #[arg(long)]
     no_checkpoint: bool,
@@ -75,28 +71,27 @@ pub struct Method {
 }
 
 impl Method {
-    pub fn config(&self) -> Config {
-        let mut config = Config { terms: self.terms.clone(), ..Config::default() };
+    pub(crate) fn config(&self) -> Config {
+        let mut config = Config::default();
+        if let Some(terms) = &self.terms {
+            config.terms.clone_from(terms);
+        }
         config.checkpoint = !self.no_checkpoint;
         config.heuristic.iterations = self.iterations;
         config.heuristic.exhaustive = self.exhaustive;
         config
     }
 
-    pub fn seed(&self) -> u64 {
+    pub(crate) fn seed(&self) -> u64 {
         self.seed
     }
 
-    fn needs_robot(&self) -> bool {
-        self.terms.iter().any(|t| matches!(t, TermKind::Physics | TermKind::Tactile))
-    }
-
-    fn needs_touch(&self) -> bool {
-        self.terms.contains(&TermKind::Tactile)
+    pub(crate) fn terms_given(&self) -> bool {
+        self.terms.is_some()
     }
 }
 
-pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     if let Some(threads) = arguments.threads {
         rayon::ThreadPoolBuilder::new().num_threads(threads).build_global()?;
     }
@@ -132,7 +127,7 @@ fn dataset_run(arguments: &Arguments, input: &Input, out: &Path) -> anyhow::Resu
     let mut outcomes = Vec::new();
     let bar = progress::bar(jobs.len() as u64, "refining");
     for job in &jobs {
-        match refine_job(&mut assets, job, method, &config, report.is_some()) {
+        match refine_job(&mut assets, job, &config, report.is_some()) {
             Ok(done) => {
                 outcomes.push(summary(job, &done));
                 if let (Some(report), Some(frame)) = (&mut report, &done.report) {
@@ -174,15 +169,13 @@ struct Done {
 fn refine_job(
     assets: &mut Assets<'_>,
     job: &Job,
-    method: &Method,
     config: &Config,
     with_report: bool,
 ) -> Result<Done, AssetError> {
     let row = &job.row;
     let object = assets.object(row.obj_id)?;
     let frame = assets.dataset().frame(row.scene_id, row.im_id)?;
-    let (observation, robot) =
-        assets.observation(&frame, job.instance, method.needs_robot(), method.needs_touch())?;
+    let (observation, robot) = assets.observation(&frame, job.instance, &config.terms)?;
     let start = Instant::now();
     let pose =
         refine_with(&observation, &object, robot.as_deref(), &row.t_cam_model, config, |_| true)?;
@@ -221,7 +214,7 @@ fn share_time(rows: &mut [ResultRow]) {
 }
 
 /// Writes `document` to `out`, or prints it.
-pub fn deliver(document: &serde_json::Value, out: Option<&Path>) -> anyhow::Result<()> {
+pub(crate) fn deliver(document: &serde_json::Value, out: Option<&Path>) -> anyhow::Result<()> {
     let text = serde_json::to_string_pretty(document)? + "\n";
     match out {
         Some(file) => write_atomically(file, text.as_bytes())?,
