@@ -315,12 +315,12 @@ impl ContourRenderer {
         }
         sums.counts.covered += usize::from(hit);
         sums.counts.contour += usize::from(near_outline);
-        for k in 0..3 {
-            let r = pixel.color[k] - observed[k];
+        for ((color, observed), row) in pixel.color.iter().zip(observed).zip(&pixel.color_rows) {
+            let r = color - observed;
             let (cost, weight) = self.options.robust.cost(r);
             sums.color += cost as f64;
             if DERIVATIVES {
-                sums.add(&pixel.color_rows[k], r, weight);
+                sums.add(row, r, weight);
             }
         }
         if mask_weight > 0.0 {

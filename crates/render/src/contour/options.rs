@@ -4,7 +4,8 @@
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContourOptions {
     /// Half-width of the contour band \[px\]: over this distance on both sides of the outline the object fades
-    /// into the background. One pixel resembles a camera's own blur; more widens the basin of attraction.
+    /// into the background. 0.645 (the square root of 5/12) blurs as much as a pixel that averages over its square; one adds
+    /// a camera's own blur; more widens the basin of attraction.
     pub half_width: f64,
     /// Weight of the squared difference between the object's coverage (0..=1) and the mask, relative to one
     /// colour channel. Zero leaves it out.

@@ -3,6 +3,7 @@
 use super::*;
 use crate::image::Mask;
 use crate::raster::depth_map;
+use crate::scene::{SceneObject, render_scene};
 use crate::shapes_for_tests::{cuboid, lump, painted, sphere, torus};
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 use prehend_geometry::{Texture, TriMesh};
@@ -443,5 +444,70 @@ fn light_is_recovered_from_its_samples() {
     for k in 0..3 {
         assert!((fitted.ambient[k] - light.ambient[k]).abs() < 1e-3, "{fitted:?}");
         assert!((fitted.directional[k] - light.directional[k]).norm() < 1e-3, "{fitted:?}");
+    }
+}
+
+/// The mean squared error of a picture with 9 x 9 hard samples a pixel.
+fn supersampled_error(
+    model: &RenderModel,
+    pose: &Isometry3<f64>,
+    light: &Light,
+    target: &Target,
+) -> f64 {
+    let object = SceneObject { model, t_cam_model: *pose };
+    let picture = render_scene(target.camera(), &[object], light, [0.0; 3], 9);
+    let mut sum = 0.0;
+    for (ours, theirs) in picture.color.pixels().iter().zip(&target.color) {
+        (0..3).for_each(|k| sum += f64::from(ours[k] - theirs[k]).powi(2));
+    }
+    sum * target.normalisation
+}
+
+#[test]
+fn gradients_match_differences_of_supersampled_pictures() {
+    let scenes = [
+        (textured_box(), Light::ambient(0.9)),
+        (painted(lump(0.045, 120), 0.05), lamp()),
+        (painted(sphere(0.045, 120), 0.04), lamp()),
+    ];
+    for (i, (mesh, light)) in scenes.into_iter().enumerate() {
+        let model = RenderModel::new(&mesh).unwrap();
+        for seed in 0..2 {
+            let mut noise = Noise(70 + seed);
+            let truth = pose(&mut noise);
+            let center = truth * model.center();
+            let object = SceneObject { model: &model, t_cam_model: truth };
+            let picture = render_scene(&camera(), &[object], &light, [0.0; 3], 9);
+            let mask = picture.color.pixels().iter().map(|c| *c != [0.0; 3]).collect();
+            let mask = Mask::new(160, 120, mask).unwrap();
+            let target = Target::new(camera(), &picture.color, &mask).unwrap();
+            let twist = [0, 1, 2, 3, 4, 5].map(|i| noise.next() * if i < 3 { 0.004 } else { 0.08 });
+            let guess = twisted(&truth, &center, &twist);
+            let difference = Vector6::from_fn(|axis, _| {
+                let step = if axis < 3 { 2e-4 } else { 5e-3 };
+                let value = |s: f64| {
+                    let pose = twisted(&guess, &center, &unit(axis, s * step));
+                    supersampled_error(&model, &pose, &light, &target)
+                };
+                (value(1.0) - value(-1.0)) / (2.0 * step)
+            });
+            let scale = Vector6::new(1.0, 1.0, 1.0, 25.0, 25.0, 25.0);
+            let b = difference.component_mul(&scale);
+            // A step of half-width 0.645 blurs as much as a pixel's box; one pixel is the default.
+            for (half_width, limit) in [(0.645, 0.03), (1.0, 0.035)] {
+                let renderer = ContourRenderer::new(ContourOptions {
+                    half_width,
+                    ..ContourOptions::default()
+                });
+                let at = renderer.linearise(&model, &guess, &center, &light, &target);
+                let a = at.gradient.component_mul(&scale);
+                let cosine = a.dot(&b) / (a.norm() * b.norm());
+                let error = (a - b).norm() / b.norm();
+                assert!(
+                    cosine > 0.999 && error < limit,
+                    "{i} {seed} {half_width}: {cosine} {error}"
+                );
+            }
+        }
     }
 }
