@@ -299,6 +299,12 @@ impl ContourRenderer {
         total
     }
 
+    /// Adds the cost of a pixel of the mask that shows nothing of the object.
+    fn miss(&self, sums: &mut Sums, observed: [f32; 3], coverage: f32) {
+        observed.iter().for_each(|c| sums.color += self.options.robust.cost(*c).0 as f64);
+        sums.mask += self.options.mask_weight * (coverage * coverage) as f64;
+    }
+
     /// Adds the residuals of one pixel.
     #[inline]
     fn add<const DERIVATIVES: bool>(
@@ -312,14 +318,16 @@ impl ContourRenderer {
         let mask_weight = self.options.mask_weight as f32;
         let Some(Seen { pixel, hit, near_outline }) = seen else {
             if coverage > 0.0 {
-                observed.iter().for_each(|c| sums.color += self.options.robust.cost(*c).0 as f64);
-                sums.mask += (mask_weight * coverage * coverage) as f64;
+                self.miss(sums, observed, coverage);
                 sums.counts.missed += 1;
             }
             return;
         };
         if target.hides(at, pixel.z) {
             sums.counts.hidden += 1;
+            if self.options.hidden_is_missed && coverage > 0.0 {
+                self.miss(sums, observed, coverage);
+            }
             return;
         }
         sums.counts.covered += usize::from(hit);

@@ -14,12 +14,22 @@ pub struct ContourOptions {
     pub depth: Option<DepthOptions>,
     /// Treatment of large colour residuals.
     pub robust: Robust,
+    /// What becomes of a pixel of the mask where a known body lies in front of the rendered object: `false`
+    /// gives it no residual; `true` counts it as missed, like a pixel that the object does not cover, so that hiding
+    /// behind the body does not lower the loss. Neither has a derivative.
+    pub hidden_is_missed: bool,
 }
 
 impl Default for ContourOptions {
     /// The mean squared error of the colour alone, with a band of one pixel.
     fn default() -> Self {
-        Self { half_width: 1.0, mask_weight: 0.0, depth: None, robust: Robust::None }
+        Self {
+            half_width: 1.0,
+            mask_weight: 0.0,
+            depth: None,
+            robust: Robust::None,
+            hidden_is_missed: false,
+        }
     }
 }
 

@@ -169,7 +169,6 @@ fn interior_rows_of_a_texture_match_differences() {
     for seed in 1..5 {
         let (cosine, error, count) =
             compare_rows(&model, &Light::ambient(0.9), seed, interior_colors);
-        println!("texture {cosine} {error} {count}");
         assert!(cosine > 0.9995 && error < 0.03 && count > 10_000, "{cosine} {error} {count}");
     }
 }
@@ -179,7 +178,6 @@ fn interior_rows_of_shading_match_differences() {
     let model = RenderModel::new(&lump(0.045, 120)).unwrap().with_uniform_color([0.8, 0.6, 0.7]);
     for seed in 1..5 {
         let (cosine, error, count) = compare_rows(&model, &lamp(), seed, interior_colors);
-        println!("shading {cosine} {error} {count}");
         assert!(cosine > 0.999 && error < 0.05 && count > 10_000, "{cosine} {error} {count}");
     }
 }
@@ -191,7 +189,6 @@ fn depth_rows_match_differences() {
         let (cosine, error, count) = compare_rows(&model, &lamp(), 3, |p| {
             (p.hit && p.pixel.depth_weight == 1.0).then(|| vec![(p.pixel.z, p.pixel.z_row)])
         });
-        println!("depth {name} {cosine} {error} {count}");
         assert!(cosine > 0.999 && error < 0.05 && count > 3000, "{name} {cosine} {error} {count}");
     }
 }
@@ -206,13 +203,11 @@ fn contour_rows_match_differences() {
             (p.pixel.coverage < 1.0).then(|| vec![(p.pixel.coverage, p.pixel.coverage_row)])
         };
         let (cosine, error, count) = compare_rows(&model, &lamp(), 4, coverage);
-        println!("coverage {i} {cosine} {error} {count}");
         assert!(cosine > 0.999 && error < 0.05 && count > 1000, "{i} {cosine} {error} {count}");
         let outside = |p: &Sample| {
             (!p.hit).then(|| (0..3).map(|k| (p.pixel.color[k], p.pixel.color_rows[k])).collect())
         };
         let (cosine, error, count) = compare_rows(&model, &lamp(), 4, outside);
-        println!("outside {i} {cosine} {error} {count}");
         assert!(cosine > 0.999 && error < 0.05 && count > 1000, "{i} {cosine} {error} {count}");
     }
 }
@@ -298,7 +293,6 @@ fn gradients_match_differences_of_the_value() {
             let guess = twisted(&truth, &(truth * model.center()), &twist);
             let renderer = ContourRenderer::new(*options);
             let (cosine, error) = compare_gradient(&renderer, &model, &guess, &light, &target);
-            println!("{name} {seed}: {cosine} {error}");
             assert!(cosine > 0.999 && error < 0.02, "{name} {seed}: {cosine} {error}");
         }
     }
@@ -343,7 +337,6 @@ fn gauss_newton_steps_find_the_pose() {
         }
         let shift = (guess * model.center() - center).norm();
         let turn = guess.rotation.angle_to(&truth.rotation);
-        println!("{shift} {turn}");
         assert!(shift < 1e-6 && turn < 1e-5, "{seed}: {shift} {turn}");
     }
 }
@@ -372,6 +365,15 @@ fn a_known_occluder_silences_what_it_hides() {
     let nothing = renderer.linearise(&model, &guess, &Point3::origin(), &lamp(), &wall);
     assert_eq!(nothing.gradient, Vector6::zeros());
     assert_eq!(nothing.loss.counts.covered, 0);
+    // Hidden pixels of the mask cost nothing, or as much as if the object were not there at all.
+    let counting =
+        ContourRenderer::new(ContourOptions { hidden_is_missed: true, ..full_options() });
+    let away = Isometry3::translation(9.0, 0.0, 0.4);
+    let missed = counting.evaluate(&model, &away, &lamp(), &wall).total;
+    let hidden = counting.linearise(&model, &guess, &Point3::origin(), &lamp(), &wall);
+    assert!((hidden.loss.total - missed).abs() < 1e-9 && missed > 0.1);
+    assert!(nothing.loss.total < 0.2 * missed, "{nothing:?}");
+    assert_eq!(hidden.gradient, Vector6::zeros());
 }
 
 #[test]
@@ -388,7 +390,6 @@ fn an_object_partly_outside_the_image_has_the_right_gradient() {
         let guess =
             twisted(&truth, &(truth * model.center()), &[0.002, 0.001, -0.003, 0.05, -0.04, 0.05]);
         let (cosine, error) = compare_gradient(&renderer, &model, &guess, &lamp(), &target);
-        println!("{cosine} {error}");
         assert!(cosine > 0.998 && error < 0.05, "{shift}: {cosine} {error}");
     }
 }
