@@ -27,8 +27,8 @@ pub fn draw_outline(
     if region == Region::EMPTY {
         return;
     }
-    let pieces = outline(&posed, &region, reach);
-    let band = Band::new(&pieces, &region, reach);
+    let pieces = outline(&posed, &region, reach).outline;
+    let band = Band::new(pieces.iter(), &region, reach);
     let columns = image.width();
     let rows = image.height();
     for (i, _) in band.piece.iter().enumerate().filter(|(_, p)| **p != NONE) {

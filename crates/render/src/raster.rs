@@ -14,6 +14,13 @@ pub(crate) const BAND: usize = 16;
 /// No face.
 pub(crate) const MISS: u32 = u32::MAX;
 
+/// The smallest whole number not below `v` ≥ 0 (`f32::ceil` is a function call on baseline x86-64).
+#[inline]
+fn ceil(v: f32) -> usize {
+    let whole = v as usize;
+    whole + usize::from((whole as f32) < v)
+}
+
 /// Visible faces of a block of rows.
 pub(crate) struct Visible {
     pub(crate) region: Region,
@@ -43,13 +50,18 @@ impl Visible {
         let region = &self.region;
         let low = |i: usize| corners[0][i].min(corners[1][i]).min(corners[2][i]);
         let high = |i: usize| corners[0][i].max(corners[1][i]).max(corners[2][i]);
-        let (x0, y0) = (low(0).ceil().max(region.x0 as f32), low(1).ceil().max(region.y0 as f32));
-        let (x1, y1) = (high(0).min(region.x1 as f32 - 1.0), high(1).min(region.y1 as f32 - 1.0));
-        if x0 > x1 || y0 > y1 {
+        let (left, top) = (low(0).max(region.x0 as f32), low(1).max(region.y0 as f32));
+        let right = high(0).min(region.x1 as f32 - 1.0);
+        let bottom = high(1).min(region.y1 as f32 - 1.0);
+        let (x0, y0) = (ceil(left), ceil(top));
+        // Most faces of a fine mesh lie between pixel centres.
+        if left > right || top > bottom || x0 as f32 > right || y0 as f32 > bottom {
             return;
         }
+        let (x1, y1) = (right as usize, bottom as usize);
         let area = signed_area(&corners);
         let sign = if area < 0.0 { -1.0 } else { 1.0 };
+        let scale = 1.0 / area.abs();
         let ids = posed.model.faces[face as usize];
         let edges = [(1, 2), (2, 0), (0, 1)].map(|(i, j)| {
             // Both faces of an edge evaluate the same expression, so that none of its pixels is lost.
@@ -57,7 +69,6 @@ impl Visible {
             let (a, b) = (corners[a], corners[b]);
             [a[0], a[1], s * (b[0] - a[0]), s * (b[1] - a[1])]
         });
-        let (x0, y0, x1, y1) = (x0 as usize, y0 as usize, x1 as usize, y1 as usize);
         for y in y0..=y1 {
             let py = y as f32;
             let row = (y - region.y0) * region.width();
@@ -67,12 +78,8 @@ impl Visible {
                 if e[0] < 0.0 || e[1] < 0.0 || e[2] < 0.0 {
                     continue;
                 }
-                let sum = e[0] + e[1] + e[2];
-                if sum <= 0.0 {
-                    continue;
-                }
                 let inverse_z =
-                    (e[0] * corners[0][2] + e[1] * corners[1][2] + e[2] * corners[2][2]) / sum;
+                    (e[0] * corners[0][2] + e[1] * corners[1][2] + e[2] * corners[2][2]) * scale;
                 let at = row + x - region.x0;
                 if inverse_z > self.inverse_z[at] {
                     self.inverse_z[at] = inverse_z;
@@ -92,13 +99,16 @@ pub(crate) fn bin(posed: &Posed, region: &Region) -> Vec<Vec<u32>> {
     let (first, last) = (region.y0 as f32, region.y1 as f32 - 1.0);
     for (f, _) in posed.facing.iter().enumerate().filter(|(_, facing)| **facing != 0) {
         let [a, b, c] = posed.corners(f);
-        let low = a[1].min(b[1]).min(c[1]).ceil().max(first);
-        let high = a[1].max(b[1]).max(c[1]).floor().min(last);
+        let low = a[1].min(b[1]).min(c[1]).max(first);
+        let high = a[1].max(b[1]).max(c[1]).min(last);
         if low > high {
             continue;
         }
-        let band = |y: f32| (y as usize - region.y0) / BAND;
-        for bin in &mut bins[band(low)..=band(high)] {
+        let (top, bottom) = (ceil(low), high as usize);
+        if top > bottom {
+            continue;
+        }
+        for bin in &mut bins[(top - region.y0) / BAND..=(bottom - region.y0) / BAND] {
             bin.push(f as u32);
         }
     }
@@ -215,7 +225,7 @@ mod tests {
         assert!((both.get(63, 47).unwrap() - 0.35).abs() < 1e-5);
         for pose in [upright(-0.5), upright(0.0), upright(f64::NAN), upright(f64::INFINITY)] {
             let depth = depth_map(&camera(), &[(&model, pose)]);
-            assert!(depth.pixels().iter().all(|z| *z == 0.0 || *z > 0.0));
+            assert!(depth.pixels().iter().all(|z| *z >= 0.0));
         }
         let behind = depth_map(&camera(), &[(&model, upright(-0.5))]);
         assert!(behind.pixels().iter().all(|z| *z == 0.0));

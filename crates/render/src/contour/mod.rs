@@ -2,9 +2,10 @@
 //!
 //! A pixel shows α C with the colour C of the surface and a coverage α that falls smoothly from one to zero over a narrow
 //! band around the object's outline (the background of a segmented image is black). All derivatives by the pose are in
-//! closed form. Contours where the object hides parts of itself are left out: their colour step is
-//! part of the value, but not of the derivative.
+//! closed form. Where the object hides farther parts of itself, the two surfaces are blended likewise
+//! (α C_near + (1−α) C_far). Jumps of colour at creases and texture seams are part of the value, but not of the derivative.
 
+mod inner;
 mod options;
 mod outline;
 mod pixel;
@@ -25,7 +26,8 @@ use crate::light::{Light, LightSample};
 use crate::model::{NONE, RenderModel};
 use crate::posed::{Posed, Region};
 use crate::raster::{self, MISS, Visible};
-pub(crate) use outline::{Band, Piece, outline};
+use inner::{Inner, inner_contours};
+pub(crate) use outline::{Band, Piece, Silhouette, outline};
 use pixel::Pixel;
 pub(crate) use pixel::Scene;
 use sums::Sums;
@@ -95,7 +97,8 @@ struct Frame<'a> {
     lighting: Lighting,
     region: Region,
     pieces: Vec<Piece>,
-    bins: Vec<Vec<u32>>,
+    inner: Vec<Inner>,
+    visible: Vec<Visible>,
 }
 
 impl ContourRenderer {
@@ -145,7 +148,7 @@ impl ContourRenderer {
             coverage: vec![0.0; camera.width * camera.height],
             depth: DepthImage::filled(camera.width, camera.height, 0.0),
         };
-        for index in 0..frame.bins.len() {
+        for index in 0..frame.visible.len() {
             self.visit::<false>(&frame, &scene, index, |x, y, seen| {
                 let at = y * camera.width + x;
                 if let Some(Seen { pixel, hit, .. }) = seen {
@@ -170,9 +173,9 @@ impl ContourRenderer {
         let frame = self.frame(model, t_cam_object, &target.camera, &light, Region::EMPTY);
         let scene = self.scene(&frame, &Point3::origin());
         let mut samples = Vec::new();
-        for index in 0..frame.bins.len() {
-            let visible = frame.visible(index);
-            let band = Band::new(&frame.pieces, &visible.region, scene.half_width);
+        for index in 0..frame.visible.len() {
+            let visible = &frame.visible[index];
+            let band = Band::new(frame.pieces.iter(), &visible.region, scene.half_width);
             for (i, &face) in visible.face.iter().enumerate() {
                 if face == MISS || band.piece[i] != NONE {
                     continue;
@@ -210,12 +213,13 @@ impl ContourRenderer {
         let posed = Posed::new(model, camera, pose, half_width);
         let lighting = Lighting::new(light, &posed.rotation);
         let region = posed.region.union(&also);
-        let pieces = match posed.region == Region::EMPTY {
-            true => Vec::new(),
+        let visible = raster::rasterise(&posed, &region);
+        let silhouette = match posed.region == Region::EMPTY {
+            true => Silhouette::default(),
             false => outline(&posed, &region, half_width),
         };
-        let bins = raster::bin(&posed, &region);
-        Frame { posed, lighting, region, pieces, bins }
+        let inner = inner_contours(&posed, &visible, silhouette.covered);
+        Frame { posed, lighting, region, pieces: silhouette.outline, inner, visible }
     }
 
     fn scene<'a>(&self, frame: &'a Frame<'a>, center: &Point3<f64>) -> Scene<'a> {
@@ -241,14 +245,19 @@ impl ContourRenderer {
         index: usize,
         mut each: impl FnMut(usize, usize, Option<Seen>),
     ) {
-        let visible = frame.visible(index);
-        let band = Band::new(&frame.pieces, &visible.region, scene.half_width);
+        let visible = &frame.visible[index];
+        let band = Band::new(frame.pieces.iter(), &visible.region, scene.half_width);
+        let inner_pieces = frame.inner.iter().map(|inner| &inner.piece);
+        let inner_band = (!frame.inner.is_empty())
+            .then(|| Band::new(inner_pieces, &visible.region, scene.half_width));
         for (i, &face) in visible.face.iter().enumerate() {
             let (x, y) = visible.position(i);
+            let inner = inner_band.as_ref().and_then(|b| frame.inner.get(b.piece[i] as usize));
             let edge = frame.pieces.get(band.piece[i] as usize);
             let (u, v) = (x as f32, y as f32);
             let seen = if face != MISS {
-                let pixel = scene.inside::<DERIVATIVES>(u, v, face, visible.inverse_z[i], edge);
+                let pixel =
+                    scene.inside::<DERIVATIVES>(u, v, face, visible.inverse_z[i], edge, inner);
                 Some(Seen { pixel, hit: true, near_outline: edge.is_some() })
             } else {
                 edge.map(|piece| {
@@ -270,7 +279,7 @@ impl ContourRenderer {
     ) -> Sums {
         let frame = self.frame(model, pose, &target.camera, light, target.bounds);
         let scene = self.scene(&frame, center);
-        let blocks: Vec<Sums> = (0..frame.bins.len())
+        let blocks: Vec<Sums> = (0..frame.visible.len())
             .into_par_iter()
             .map(|index| {
                 let mut sums = Sums::new();
@@ -290,6 +299,12 @@ impl ContourRenderer {
         total
     }
 
+    /// Adds the cost of a pixel of the mask that shows nothing of the object.
+    fn miss(&self, sums: &mut Sums, observed: [f32; 3], coverage: f32) {
+        observed.iter().for_each(|c| sums.color += self.options.robust.cost(*c).0 as f64);
+        sums.mask += self.options.mask_weight * (coverage * coverage) as f64;
+    }
+
     /// Adds the residuals of one pixel.
     #[inline]
     fn add<const DERIVATIVES: bool>(
@@ -303,24 +318,26 @@ impl ContourRenderer {
         let mask_weight = self.options.mask_weight as f32;
         let Some(Seen { pixel, hit, near_outline }) = seen else {
             if coverage > 0.0 {
-                observed.iter().for_each(|c| sums.color += self.options.robust.cost(*c).0 as f64);
-                sums.mask += (mask_weight * coverage * coverage) as f64;
+                self.miss(sums, observed, coverage);
                 sums.counts.missed += 1;
             }
             return;
         };
         if target.hides(at, pixel.z) {
             sums.counts.hidden += 1;
+            if self.options.hidden_is_missed && coverage > 0.0 {
+                self.miss(sums, observed, coverage);
+            }
             return;
         }
         sums.counts.covered += usize::from(hit);
         sums.counts.contour += usize::from(near_outline);
-        for k in 0..3 {
-            let r = pixel.color[k] - observed[k];
+        for ((color, observed), row) in pixel.color.iter().zip(observed).zip(&pixel.color_rows) {
+            let r = color - observed;
             let (cost, weight) = self.options.robust.cost(r);
             sums.color += cost as f64;
             if DERIVATIVES {
-                sums.add(&pixel.color_rows[k], r, weight);
+                sums.add(row, r, weight);
             }
         }
         if mask_weight > 0.0 {
@@ -349,14 +366,6 @@ impl ContourRenderer {
                 sums.add(&row, r, weight);
             }
         }
-    }
-}
-
-impl Frame<'_> {
-    fn visible(&self, index: usize) -> Visible {
-        let mut visible = Visible::new(raster::band(&self.region, index));
-        self.bins[index].iter().for_each(|&f| visible.draw(&self.posed, f));
-        visible
     }
 }
 

@@ -4,7 +4,8 @@
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContourOptions {
     /// Half-width of the contour band \[px\]: over this distance on both sides of the outline the object fades
-    /// into the background. One pixel resembles a camera's own blur; more widens the basin of attraction.
+    /// into the background. 0.645 (the square root of 5/12) blurs as much as a pixel that averages over its square; one adds
+    /// a camera's own blur; more widens the basin of attraction.
     pub half_width: f64,
     /// Weight of the squared difference between the object's coverage (0..=1) and the mask, relative to one
     /// colour channel. Zero leaves it out.
@@ -13,12 +14,22 @@ pub struct ContourOptions {
     pub depth: Option<DepthOptions>,
     /// Treatment of large colour residuals.
     pub robust: Robust,
+    /// What becomes of a pixel of the mask where a known body lies in front of the rendered object: `false`
+    /// gives it no residual; `true` counts it as missed, like a pixel that the object does not cover, so that hiding
+    /// behind the body does not lower the loss. Neither has a derivative.
+    pub hidden_is_missed: bool,
 }
 
 impl Default for ContourOptions {
     /// The mean squared error of the colour alone, with a band of one pixel.
     fn default() -> Self {
-        Self { half_width: 1.0, mask_weight: 0.0, depth: None, robust: Robust::None }
+        Self {
+            half_width: 1.0,
+            mask_weight: 0.0,
+            depth: None,
+            robust: Robust::None,
+            hidden_is_missed: false,
+        }
     }
 }
 

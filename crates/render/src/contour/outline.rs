@@ -55,13 +55,21 @@ struct Segment {
     layers: f32,
 }
 
-/// The pieces of the outline that come within `margin` pixels of `region`.
+/// Pieces of silhouette edges.
+#[derive(Default)]
+pub(crate) struct Silhouette {
+    /// With nothing of the object just outside.
+    pub(crate) outline: Vec<Piece>,
+    /// All others, hidden or not.
+    pub(crate) covered: Vec<Piece>,
+}
+
+/// The pieces of the silhouette that come within `margin` pixels of `region`.
 ///
 /// An edge is a silhouette where exactly one of its faces is drawn, or one is seen from outside and the
 /// other from inside. The oriented silhouette is the boundary of the drawn faces, so its winding number about an image
-/// point is the number of layers there; a piece is part of the outline if there are none just outside it. Where
-/// the object hides parts of itself there is no background to uncover, and those inner contours are left out.
-pub(crate) fn outline(posed: &Posed, region: &Region, margin: f32) -> Vec<Piece> {
+/// point is the number of layers there; a piece is part of the outline if there are none just outside it.
+pub(crate) fn outline(posed: &Posed, region: &Region, margin: f32) -> Silhouette {
     let mut segments = Vec::new();
     let mut candidates = Vec::new();
     for edge in &posed.model.edges {
@@ -90,7 +98,7 @@ pub(crate) fn outline(posed: &Posed, region: &Region, margin: f32) -> Vec<Piece>
         }
     }
     let layers = Layers::new(segments, region, margin + 1.0);
-    let mut pieces = Vec::new();
+    let mut silhouette = Silhouette::default();
     for (edge, length) in candidates {
         let Some([start, end]) = clip(&edge, region, margin) else { continue };
         let count = ((end - start) * length / PIECE).ceil().max(1.0);
@@ -100,12 +108,12 @@ pub(crate) fn outline(posed: &Posed, region: &Region, margin: f32) -> Vec<Piece>
             let middle = 0.5 * (range[0] + range[1]);
             let probe =
                 |k: usize| edge.a[k] + middle * (edge.b[k] - edge.a[k]) + PROBE * edge.outward[k];
-            if layers.at(probe(0), probe(1)) < 0.5 {
-                pieces.push(Piece { range, ..edge });
-            }
+            let free = layers.at(probe(0), probe(1)) < 0.5;
+            let list = if free { &mut silhouette.outline } else { &mut silhouette.covered };
+            list.push(Piece { range, ..edge });
         }
     }
-    pieces
+    silhouette
 }
 
 /// The share of an edge within `margin` of `region`.
@@ -181,12 +189,16 @@ pub(crate) struct Band {
 }
 
 impl Band {
-    pub(crate) fn new(pieces: &[Piece], rows: &Region, half_width: f32) -> Self {
+    pub(crate) fn new<'a>(
+        pieces: impl Iterator<Item = &'a Piece>,
+        rows: &Region,
+        half_width: f32,
+    ) -> Self {
         let width = rows.width();
         let count = width * (rows.y1 - rows.y0);
         let limit = half_width * half_width;
         let mut band = Self { distance_squared: vec![limit; count], piece: vec![NONE; count] };
-        for (index, piece) in pieces.iter().enumerate() {
+        for (index, piece) in pieces.enumerate() {
             let end = |t: f32, k: usize| piece.a[k] + t * (piece.b[k] - piece.a[k]);
             let span = |k: usize, first: usize, last: usize| {
                 let (p, q) = (end(piece.range[0], k), end(piece.range[1], k));

@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 
+use super::inner::Inner;
 use super::outline::{Foot, Piece};
 use super::sums::Row;
 use super::surface::{Lighting, Shaded, shade};
@@ -35,7 +36,7 @@ pub(crate) struct Scene<'a> {
 
 /// The smooth step from 1 at −w to 0 at +w, and its derivative.
 #[inline]
-fn falling_step(s: f32, w: f32) -> (f32, f32) {
+pub(crate) fn falling_step(s: f32, w: f32) -> (f32, f32) {
     let x = ((w - s) / (2.0 * w)).clamp(0.0, 1.0);
     (x * x * (3.0 - 2.0 * x), -3.0 * x * (1.0 - x) / w)
 }
@@ -45,13 +46,15 @@ fn row(linear: Vector3<f32>, angular: Vector3<f32>) -> Row {
     [linear.x, linear.y, linear.z, angular.x, angular.y, angular.z]
 }
 
+/// `p a + q b`.
 #[inline]
-fn add_scaled(to: &mut Row, from: &Row, factor: f32) {
-    to.iter_mut().zip(from).for_each(|(a, b)| *a += factor * b);
+pub(crate) fn scaled_sum(p: f32, a: &Row, q: f32, b: &Row) -> Row {
+    std::array::from_fn(|i| p * a[i] + q * b[i])
 }
 
 impl Scene<'_> {
-    /// A pixel that `face` covers; `edge` is the outline piece within the band, if any.
+    /// A pixel that `face` covers; `edge` is the outline piece and `inner` the inner contour within the band, if
+    /// any.
     #[inline]
     pub(crate) fn inside<const DERIVATIVES: bool>(
         &self,
@@ -60,15 +63,11 @@ impl Scene<'_> {
         face: u32,
         inverse_z: f32,
         edge: Option<&Piece>,
+        inner: Option<&Inner>,
     ) -> Pixel {
-        let face = face as usize;
-        let b = self.barycentric(face, x, y);
-        let shaded = shade::<DERIVATIVES>(self.posed, self.lighting, face, b);
-        let z = 1.0 / inverse_z;
-        let mut pixel =
-            Pixel { color: shaded.color, coverage: 1.0, z, depth_weight: 1.0, ..Pixel::default() };
-        if DERIVATIVES {
-            self.interior_rows(face, self.posed.ray(x, y) * z, &shaded, &mut pixel);
+        let mut pixel = self.interior::<DERIVATIVES>(x, y, face, inverse_z);
+        if let Some(inner) = inner {
+            pixel = self.cross::<DERIVATIVES>(x, y, pixel, inner);
         }
         if let Some(piece) = edge {
             let foot = piece.foot(x, y);
@@ -81,15 +80,48 @@ impl Scene<'_> {
     #[inline]
     pub(crate) fn outside<const DERIVATIVES: bool>(&self, x: f32, y: f32, piece: &Piece) -> Pixel {
         let foot = piece.foot(x, y);
+        let mut pixel = self.at_foot::<DERIVATIVES>(piece, &foot);
+        self.blend::<DERIVATIVES>(piece, &foot, 1.0, &mut pixel);
+        pixel
+    }
+
+    /// The unblended pixel (x, y) of a face.
+    #[inline]
+    pub(crate) fn interior<const DERIVATIVES: bool>(
+        &self,
+        x: f32,
+        y: f32,
+        face: u32,
+        inverse_z: f32,
+    ) -> Pixel {
+        let face = face as usize;
+        let b = self.barycentric(face, x, y);
+        let shaded = shade::<DERIVATIVES>(self.posed, self.lighting, face, b);
+        let z = 1.0 / inverse_z;
+        let mut pixel =
+            Pixel { color: shaded.color, coverage: 1.0, z, depth_weight: 1.0, ..Pixel::default() };
+        if DERIVATIVES {
+            self.interior_rows(face, self.posed.ray(x, y) * z, &shaded, &mut pixel);
+        }
+        pixel
+    }
+
+    /// The unblended colour of the foot on a contour.
+    #[inline]
+    pub(crate) fn at_foot<const DERIVATIVES: bool>(&self, piece: &Piece, foot: &Foot) -> Pixel {
         let (b, point, ends) = self.on_edge(piece, foot.t);
         let shaded = shade::<DERIVATIVES>(self.posed, self.lighting, piece.face as usize, b);
-        let mut pixel =
-            Pixel { color: shaded.color, coverage: 1.0, z: point.z, ..Pixel::default() };
+        let mut pixel = Pixel {
+            color: shaded.color,
+            coverage: 1.0,
+            z: point.z,
+            depth_weight: 1.0,
+            ..Pixel::default()
+        };
         if DERIVATIVES {
-            let slide = self.slide(piece, &foot, &point, &ends);
+            let slide = self.slide(piece, foot, &point, &ends);
             self.foot_rows(piece, &shaded, &slide, &mut pixel);
         }
-        self.blend::<DERIVATIVES>(piece, &foot, 1.0, &mut pixel);
         pixel
     }
 
@@ -189,21 +221,29 @@ impl Scene<'_> {
         let color = pixel.color;
         pixel.color = color.map(|c| alpha * c);
         pixel.coverage = alpha;
-        pixel.depth_weight = outer;
+        let weight = pixel.depth_weight;
+        pixel.depth_weight = outer * weight;
         if !DERIVATIVES {
             return;
         }
+        let ds = self.distance_row(piece, foot, side);
+        for (rows, c) in pixel.color_rows.iter_mut().zip(color) {
+            *rows = scaled_sum(alpha, rows, slope * c, &ds);
+        }
+        pixel.coverage_row = ds.map(|v| slope * v);
+        pixel.depth_weight_row =
+            scaled_sum(outer, &pixel.depth_weight_row, 2.0 * outer_slope * weight, &ds);
+    }
+
+    /// Row of the signed distance to a contour at its foot (`side` is −1 inside, 1 outside).
+    #[inline]
+    pub(crate) fn distance_row(&self, piece: &Piece, foot: &Foot, side: f32) -> Row {
+        let distance = foot.distance_squared.sqrt();
         let outward =
             if distance > 1e-3 { foot.offset.map(|o| o * side / distance) } else { piece.outward };
         let (_, point, _) = self.on_edge(piece, foot.t);
         // The foot moves by J v along the outward normal, and the signed distance shrinks by as much.
-        let ds = self.image_motion(outward, &point).map(|v| -v);
-        for (rows, c) in pixel.color_rows.iter_mut().zip(color) {
-            rows.iter_mut().for_each(|v| *v *= alpha);
-            add_scaled(rows, &ds, slope * c);
-        }
-        pixel.coverage_row = ds.map(|v| slope * v);
-        pixel.depth_weight_row = ds.map(|v| 2.0 * outer_slope * v);
+        self.image_motion(outward, &point).map(|v| -v)
     }
 
     /// Barycentric coordinates and camera-frame position at screen share `t` of an edge, and its ends.

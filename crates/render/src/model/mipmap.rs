@@ -58,13 +58,13 @@ impl Mipmap {
     #[inline]
     pub(crate) fn sample(&self, u: f32, v: f32, level: f32) -> Texel {
         let level = level.clamp(0.0, self.last_level());
-        let fine = level.floor();
-        let blend = level - fine;
-        let a = self.levels[fine as usize].sample(u, v);
+        let fine = level as usize;
+        let blend = level - fine as f32;
+        let a = self.levels[fine].sample(u, v);
         if blend == 0.0 {
             return a;
         }
-        let b = self.levels[fine as usize + 1].sample(u, v);
+        let b = self.levels[fine + 1].sample(u, v);
         let mix = |x: [f32; 3], y: [f32; 3]| [0, 1, 2].map(|c| x[c] + blend * (y[c] - x[c]));
         Texel {
             color: mix(a.color, b.color),
@@ -124,9 +124,10 @@ impl Level {
 #[inline]
 fn cell(t: f32, size: usize) -> (f32, usize, usize) {
     let position = t * size as f32 - 0.5;
-    let base = position.floor();
-    let index = |i: f32| (i.max(0.0) as usize).min(size - 1);
-    (position - base, index(base), index(base + 1.0))
+    // Truncation rounds down once nothing is negative (`f32::floor` is a function call on baseline x86-64).
+    let above = (position + 1.0).max(0.0) as usize;
+    let offset = position - (above as f32 - 1.0);
+    (offset, above.saturating_sub(1).min(size - 1), above.min(size - 1))
 }
 
 #[cfg(test)]

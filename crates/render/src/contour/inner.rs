@@ -1,0 +1,97 @@
+//! Inner contours: where the object hides farther parts of itself.
+
+use super::outline::Piece;
+use super::pixel::{Pixel, Scene, falling_step, scaled_sum};
+use crate::posed::Posed;
+use crate::raster::{MISS, Visible};
+
+/// Depth steps below this share of the model's radius are folds of the surface, not contours.
+const LEAST_STEP: f32 = 0.02;
+
+/// A piece of a visible inner contour.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Inner {
+    pub(crate) piece: Piece,
+    /// The pixel next to it on the far side, the face seen there and its 1/Z \[1/m\].
+    behind: (f32, f32, u32, f32),
+    /// Half-way between the near and the far surface \[m\].
+    split: f32,
+}
+
+/// Picks the visible inner contours among silhouette pieces that are not part of the outline: the surface seen one
+/// pixel outside is farther than the edge, and one pixel inside it is not.
+pub(crate) fn inner_contours(posed: &Posed, visible: &[Visible], pieces: Vec<Piece>) -> Vec<Inner> {
+    let least = LEAST_STEP * posed.model.radius() as f32;
+    let seen = |x: f32, y: f32| {
+        let (x, y) = (x.round(), y.round());
+        if x < 0.0 || y < 0.0 {
+            return None;
+        }
+        let (column, row) = (x as usize, y as usize);
+        let part = visible.iter().find(|v| (v.region.y0..v.region.y1).contains(&row))?;
+        if !(part.region.x0..part.region.x1).contains(&column) {
+            return None;
+        }
+        let at = (row - part.region.y0) * part.region.width() + column - part.region.x0;
+        (part.face[at] != MISS).then(|| (x, y, part.face[at], part.inverse_z[at]))
+    };
+    let select = |piece: Piece| {
+        let t = 0.5 * (piece.range[0] + piece.range[1]);
+        let face = posed.model.faces[piece.face as usize];
+        let [wa, wb] = piece.corners.map(|c| posed.screen[face[c as usize] as usize][2]);
+        let z = 1.0 / (wa + t * (wb - wa));
+        let beside = |distance: f32| {
+            let at =
+                |k: usize| piece.a[k] + t * (piece.b[k] - piece.a[k]) + distance * piece.outward[k];
+            seen(at(0), at(1))
+        };
+        let (behind, front) = (beside(1.0)?, beside(-1.0)?);
+        let step = 1.0 / behind.3 - z;
+        let split = z + 0.5 * step;
+        (step > least && 1.0 / front.3 < split).then_some(Inner { piece, behind, split })
+    };
+    pieces.into_iter().filter_map(select).collect()
+}
+
+impl Scene<'_> {
+    /// Blends the near and the far surface across an inner contour, at pixel (x, y) that shows `own`.
+    ///
+    /// On the far side the near surface has the colour of the foot; on the near side the far surface has the
+    /// colour of the pixel beyond the contour.
+    pub(crate) fn cross<const DERIVATIVES: bool>(
+        &self,
+        x: f32,
+        y: f32,
+        own: Pixel,
+        inner: &Inner,
+    ) -> Pixel {
+        let foot = inner.piece.foot(x, y);
+        let side = if own.z > inner.split { 1.0 } else { -1.0 };
+        let (near, far) = if side > 0.0 {
+            (self.at_foot::<DERIVATIVES>(&inner.piece, &foot), own)
+        } else {
+            let (u, v, face, inverse_z) = inner.behind;
+            (own, self.interior::<DERIVATIVES>(u, v, face, inverse_z))
+        };
+        let distance = foot.distance_squared.sqrt();
+        let (alpha, slope) = falling_step(side * distance, self.half_width);
+        // Depth counts for nothing at the step itself.
+        let (weight, weight_slope) =
+            falling_step(self.half_width - 2.0 * distance, self.half_width);
+        let mut out = own;
+        for k in 0..3 {
+            out.color[k] = alpha * near.color[k] + (1.0 - alpha) * far.color[k];
+        }
+        out.depth_weight = weight;
+        if DERIVATIVES {
+            let ds = self.distance_row(&inner.piece, &foot, side);
+            for k in 0..3 {
+                let mixed = scaled_sum(alpha, &near.color_rows[k], 1.0 - alpha, &far.color_rows[k]);
+                let step = slope * (near.color[k] - far.color[k]);
+                out.color_rows[k] = scaled_sum(1.0, &mixed, step, &ds);
+            }
+            out.depth_weight_row = ds.map(|v| -2.0 * side * weight_slope * v);
+        }
+        out
+    }
+}
