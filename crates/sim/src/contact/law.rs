@@ -32,7 +32,7 @@ pub struct Response<S: Scalar> {
 
 /// What a contact-model author writes: one function, generic over the scalar.
 ///
-/// Branch with [`Scalar::select`]. A response must vanish where the gap equals [`reach`](Self::reach)
+/// A response must vanish where the gap equals [`reach`](Self::reach)
 /// and its rate is zero.
 pub trait ContactLaw: Send + Sync {
     /// Parameters that may carry derivatives (stiffness, friction, ...), passed back as `p`.

@@ -67,11 +67,7 @@ impl IsotropicLaw for KelvinVoigt {
         let &[stiffness, damping, ..] = p else { return S::zero() };
         let pressure = -(stiffness * contact.gap + damping * contact.normal_speed);
         // Zero counts as active: a leaky onset differentiates a contact of exactly zero force.
-        <S as Scalar>::select(
-            pressure.value() >= 0.0,
-            pressure * S::constant(contact.area),
-            S::zero(),
-        )
+        if pressure.value() >= 0.0 { pressure * S::constant(contact.area) } else { S::zero() }
     }
 
     #[inline]
