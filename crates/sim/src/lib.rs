@@ -1,1 +1,33 @@
-//! Under construction.
+//! Differentiable penalty-based rigid contact simulation.
+//!
+//! A rigid [`RigidBody`] carries surface samples ([`SurfacePoint`]) that touch a
+//! [`DistanceField`](prehend_geometry::DistanceField). A [`ContactLaw`], written once over a generic scalar, turns gap and slip into
+//! force; an [`Onset`] says how contact begins. Forces and their derivatives are gathered into one
+//! wrench a step ([`contact::wrench`]), so that a [`Simulation`] carries exact derivatives with respect
+//! to its initial pose. [`StabilityLoss`] measures by such rollouts how far an object is from resting.
+//!
+//! World-frame conventions: a pose perturbation is the left twist (translation, rotation) about the
+//! centre of mass, velocities are those of the centre of mass, in the world frame.
+
+mod body;
+#[cfg(test)]
+mod canonical;
+pub mod contact;
+#[cfg(test)]
+mod fields;
+mod integrator;
+mod rollout;
+mod stability;
+mod state;
+
+pub use body::{BodyError, RigidBody, SurfacePoint};
+pub use contact::friction::regularised_coulomb;
+pub use contact::graspd::GraspD;
+pub use contact::law::{Contact, ContactLaw, Isotropic, IsotropicLaw, LocalLaw, Response};
+pub use contact::onset::{LeakSteps, Onset, OnsetSample};
+pub use contact::penalty::{KelvinVoigt, LawError, Penalty};
+pub use contact::registry::LawRegistry;
+pub use integrator::{Matrix12, Vector12, step, step_transition};
+pub use rollout::{Matrix12x6, Simulation};
+pub use stability::{Averaging, Perturbation, StabilityLoss, StabilityWeights};
+pub use state::State;

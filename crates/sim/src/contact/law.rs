@@ -1,0 +1,226 @@
+//! What a contact-model author writes, and the object-safe form that the simulator calls.
+
+use nalgebra::Vector3;
+use prehend_autodiff::{Fwd, Scalar};
+
+use super::friction::{regularised_coulomb, regularised_speed};
+
+/// One contact point, as a law sees it.
+#[derive(Clone, Copy, Debug)]
+pub struct Contact<S: Scalar> {
+    /// Effective gap after the [`Onset`](super::onset::Onset) \[m\], at most the law's reach; negative is penetration.
+    pub gap: S,
+    /// Rate of the effective gap \[m/s\], negative while approaching. The onset scales it too, so that
+    /// damping fades in with contact and is zero without.
+    pub normal_speed: S,
+    /// Velocity of the body's point across the normal, world frame \[m/s\].
+    pub slip: Vector3<S>,
+    /// Unit normal, out of the surroundings towards the body, world frame.
+    pub normal: Vector3<S>,
+    /// Surface area the point stands for \[m²\].
+    pub area: f64,
+}
+
+/// Force on the body at one contact point.
+#[derive(Clone, Copy, Debug)]
+pub struct Response<S: Scalar> {
+    /// Force along the normal \[N\], positive pushes the body out.
+    pub normal: S,
+    /// Force across the normal, world frame \[N\].
+    pub tangential: Vector3<S>,
+}
+
+/// What a contact-model author writes: one function, generic over the scalar.
+///
+/// A response must vanish where the gap equals [`reach`](Self::reach)
+/// and its rate is zero.
+pub trait ContactLaw: Send + Sync {
+    /// Parameters that may carry derivatives (stiffness, friction, ...), passed back as `p`.
+    fn params(&self) -> &[f64] {
+        &[]
+    }
+
+    /// Force of one contact.
+    fn law<S: Scalar>(&self, p: &[S], contact: &Contact<S>) -> Response<S>;
+
+    /// Beyond this gap both value and derivative are zero \[m\].
+    fn reach(&self) -> f64;
+}
+
+/// An isotropic law: friction opposes slip, with a coefficient that may depend on its speed.
+///
+/// [`Isotropic`] makes a [`ContactLaw`] of it, with friction regularised and never outside the cone.
+pub trait IsotropicLaw: Send + Sync {
+    /// Parameters that may carry derivatives.
+    fn params(&self) -> &[f64] {
+        &[]
+    }
+
+    /// Normal force \[N\], never negative.
+    fn normal_force<S: Scalar>(&self, p: &[S], contact: &Contact<S>) -> S;
+
+    /// Friction coefficient at a (regularised) slip speed \[m/s\].
+    fn friction_coefficient<S: Scalar>(&self, p: &[S], slip_speed: S) -> S;
+
+    /// Slip speed v_s at which friction has reached 1/√2 of its bound \[m/s\], positive.
+    fn slip_scale(&self) -> f64;
+
+    /// Beyond this gap both value and derivative are zero \[m\].
+    fn reach(&self) -> f64 {
+        0.0
+    }
+}
+
+/// Adapter from an [`IsotropicLaw`] to a [`ContactLaw`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Isotropic<L>(
+    /// The isotropic law.
+    pub L,
+);
+
+impl<L: IsotropicLaw> ContactLaw for Isotropic<L> {
+    #[inline]
+    fn params(&self) -> &[f64] {
+        self.0.params()
+    }
+
+    #[inline]
+    fn law<S: Scalar>(&self, p: &[S], contact: &Contact<S>) -> Response<S> {
+        let normal = self.0.normal_force(p, contact);
+        let speed = regularised_speed(&contact.slip, self.0.slip_scale());
+        let coefficient = self.0.friction_coefficient(p, speed);
+        let tangential =
+            regularised_coulomb(coefficient, normal, &contact.slip, self.0.slip_scale());
+        Response { normal, tangential }
+    }
+
+    #[inline]
+    fn reach(&self) -> f64 {
+        self.0.reach()
+    }
+}
+
+mod sealed {
+    pub trait Sealed {}
+    impl<L: super::ContactLaw> Sealed for L {}
+    impl Sealed for Box<dyn super::LocalLaw> {}
+}
+
+/// The object-safe twin of [`ContactLaw`], implemented for every law: its value, and its derivatives
+/// along six local directions by forward mode.
+pub trait LocalLaw: Send + Sync + sealed::Sealed {
+    /// See [`ContactLaw::params`].
+    fn parameters(&self) -> &[f64];
+
+    /// See [`ContactLaw::reach`] \[m\].
+    fn cutoff(&self) -> f64;
+
+    /// Force at one contact, with parameters `p`.
+    fn response(&self, p: &[f64], contact: &Contact<f64>) -> Response<f64>;
+
+    /// Force at one contact with its derivatives along the directions that `contact` and `p` carry.
+    fn response_with_derivative(&self, p: &[Fwd<6>], contact: &Contact<Fwd<6>>)
+    -> Response<Fwd<6>>;
+}
+
+impl<L: ContactLaw> LocalLaw for L {
+    #[inline]
+    fn parameters(&self) -> &[f64] {
+        self.params()
+    }
+
+    #[inline]
+    fn cutoff(&self) -> f64 {
+        self.reach()
+    }
+
+    #[inline]
+    fn response(&self, p: &[f64], contact: &Contact<f64>) -> Response<f64> {
+        self.law(p, contact)
+    }
+
+    #[inline]
+    fn response_with_derivative(
+        &self,
+        p: &[Fwd<6>],
+        contact: &Contact<Fwd<6>>,
+    ) -> Response<Fwd<6>> {
+        self.law(p, contact)
+    }
+}
+
+impl LocalLaw for Box<dyn LocalLaw> {
+    fn parameters(&self) -> &[f64] {
+        (**self).parameters()
+    }
+
+    fn cutoff(&self) -> f64 {
+        (**self).cutoff()
+    }
+
+    fn response(&self, p: &[f64], contact: &Contact<f64>) -> Response<f64> {
+        (**self).response(p, contact)
+    }
+
+    fn response_with_derivative(
+        &self,
+        p: &[Fwd<6>],
+        contact: &Contact<Fwd<6>>,
+    ) -> Response<Fwd<6>> {
+        (**self).response_with_derivative(p, contact)
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use prehend_autodiff::check::{compare_gradients, finite_difference_jacobian};
+
+    use super::*;
+    use crate::{GraspD, Penalty};
+
+    fn contact<S: Scalar>(x: [S; 6]) -> Contact<S> {
+        // Only a law's dependence on gap, rate, slip and one more direction is probed: the normal is
+        // left alone, since isotropic laws ignore it.
+        let slip = Vector3::new(x[2], x[3], x[4]);
+        let normal = Vector3::new(x[5], S::zero(), S::one());
+        Contact { gap: x[0], normal_speed: x[1], slip, normal, area: 2e-5 }
+    }
+
+    fn assert_partials<L: ContactLaw>(law: &L, x: [f64; 6]) {
+        let p: Vec<Fwd<6>> = law.params().iter().map(|&v| Fwd::constant(v)).collect();
+        let exact = law.response_with_derivative(&p, &contact(Fwd::<6>::variables(x)));
+        let rows = [exact.normal, exact.tangential.x, exact.tangential.y, exact.tangential.z];
+        let differences = finite_difference_jacobian(
+            |x| {
+                let x: [f64; 6] = std::array::from_fn(|i| x[i]);
+                let r = law.law(law.params(), &contact(x));
+                vec![r.normal, r.tangential.x, r.tangential.y, r.tangential.z]
+            },
+            &x,
+            1e-7,
+        );
+        for (row, reference) in rows.iter().zip(&differences) {
+            let error = compare_gradients(&row.derivative, reference);
+            let both_zero = reference.iter().all(|v| v.abs() < 1e-9)
+                && row.derivative.iter().all(|v| v.abs() < 1e-9);
+            assert!(both_zero || error.relative < 1e-6, "{x:?}: {error:?}");
+        }
+    }
+
+    #[test]
+    fn partials_match_differences() {
+        let penalty = Penalty::new(3e7, 2e5, 0.7, 1e-2).unwrap();
+        let graspd = GraspD { offset: 1e-3, ..GraspD::default() };
+        for i in 0..20 {
+            let t = f64::from(i);
+            let slip = [0.03 * (1.3 * t).sin(), 0.02 * (0.7 * t).cos(), 0.01 * (2.1 * t).sin()];
+            let gap = -2e-4 - 1e-4 * t;
+            let x = [gap, 0.01 * (t - 10.2), slip[0], slip[1], slip[2], 0.1];
+            assert_partials(&penalty, x);
+            assert_partials(&graspd, x);
+        }
+        // Singular point of friction: no slip at all.
+        assert_partials(&penalty, [-1e-3, -0.01, 0.0, 0.0, 0.0, 0.0]);
+        assert_partials(&graspd, [-1e-3, -0.01, 0.0, 0.0, 0.0, 0.0]);
+    }
+}
