@@ -1,37 +1,182 @@
-//! TEMP
+//! Physics: an object held in a hand stays where it is. Measured by simulating.
+
+use nalgebra::{Isometry3, Matrix6, Point3, Vector3, Vector6};
+use prehend_geometry::{DistanceField, PosedRobot};
+use prehend_sim::contact::stiffness::{damping_per_area, stiffness_per_area};
+use prehend_sim::{
+    LeakSteps, Onset, Penalty, Perturbation, RigidBody, StabilityLoss, StabilityWeights,
+};
+
 use super::Term;
 use crate::{Block, Normal, Object, Observation, RefineError, Robot, State};
-use nalgebra::*;
-/// x
-#[derive(Clone, Debug, PartialEq, Default)]
-pub struct PhysicsSettings {}
-/// x
-pub struct PhysicsTerm {
-    c: Vector3<f64>,
+
+/// Settings of the physics term.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PhysicsSettings {
+    /// Nats per unit of ln(1 + L_DP), where L_DP is 1 for an object in free fall.
+    pub weight: f64,
+    /// Standard deviation of the object's displacement from the initial pose \[m\]: λ = 1/(2σ²).
+    pub displacement_sigma: f64,
+    /// Depth to which the object's weight presses it in \[m\]; sets the contact stiffness.
+    pub penetration: f64,
+    /// Area that is assumed to carry the weight \[m²\]; sets the contact stiffness.
+    pub contact_area: f64,
+    /// Damping ratio of the contact.
+    pub damping_ratio: f64,
+    /// Coefficient of friction.
+    pub friction: f64,
+    /// Slip speed that regularises friction \[m/s\].
+    pub slip_scale: f64,
+    /// Time step \[s\].
+    pub dt: f64,
+    /// Steps of a rollout.
+    pub steps: usize,
+    /// Speed of the perturbed starts \[m/s\].
+    pub perturbation: f64,
+    /// Derivative of contacts not yet made, and the distance up to which they are felt \[m\].
+    pub leak: (f64, f64),
 }
-impl PhysicsTerm {
-    /// x
-    pub fn new(
-        _: &Observation,
-        _: &Object,
-        _: &Robot,
-        s: &State,
-        _: PhysicsSettings,
-    ) -> Result<Self, RefineError> {
-        Ok(Self { c: s.centre() })
+
+impl Default for PhysicsSettings {
+    fn default() -> Self {
+        Self {
+            weight: 4.0,
+            displacement_sigma: 0.05,
+            penetration: 5e-4,
+            contact_area: 5e-4,
+            damping_ratio: 0.5,
+            friction: 0.5,
+            slip_scale: 1e-2,
+            dt: 1e-3,
+            steps: 10,
+            perturbation: 0.01,
+            leak: (0.1, 2e-3),
+        }
     }
 }
+
+/// The paper's L_phys = L_DP + λ‖Δt‖².
+///
+/// L_DP is how fast and how far the object has moved after a short rollout under gravity and penalty
+/// contact with the hand, from rest and from two small pushes, relative to free fall. It enters through
+/// a logarithm: one centimetre of penetration throws the object out at hundreds of g, and must count as
+/// wrong, not as a thousand times more wrong than everything the camera says.
+pub struct PhysicsTerm {
+    stability: StabilityLoss<Penalty>,
+    hand: PosedRobot,
+    initial_centre: Vector3<f64>,
+    settings: PhysicsSettings,
+}
+
+impl PhysicsTerm {
+    /// Prepares rollouts of `object` in the hand of `observation`; displacement is from `initial`.
+    ///
+    /// # Errors
+    /// If gravity or the hand is unknown, or the object cannot be simulated.
+    pub fn new(
+        observation: &Observation,
+        object: &Object,
+        robot: &Robot,
+        initial: &State,
+        settings: PhysicsSettings,
+    ) -> Result<Self, RefineError> {
+        let missing = |what| RefineError::Missing { what, term: "physics" };
+        let gravity = observation.gravity.ok_or_else(|| missing("gravity"))?;
+        let hand = observation.hand.as_ref().ok_or_else(|| missing("hand state"))?;
+        let fail =
+            |reason: String| RefineError::Object { object: object.name.clone(), reason };
+        let inertial = &object.inertial;
+        let body = RigidBody::new(inertial.mass, inertial.inertia, inertial.center_of_mass)
+            .map_err(|e| fail(e.to_string()))?;
+        let positions: Vec<Point3<f64>> = object.samples.iter().map(|s| s.point).collect();
+        let areas = vec![object.area / positions.len().max(1) as f64; positions.len()];
+        let points = body.surface_points(&positions, &areas).map_err(|e| fail(e.to_string()))?;
+        let g = gravity.norm();
+        let area = settings.contact_area;
+        let stiffness = stiffness_per_area(inertial.mass, g, settings.penetration, area);
+        let damping = damping_per_area(inertial.mass, stiffness, area, settings.damping_ratio);
+        let law = Penalty::new(stiffness, damping, settings.friction, settings.slip_scale)
+            .map_err(|e| fail(e.to_string()))?;
+        let (alpha, band) = settings.leak;
+        let time = settings.dt * settings.steps as f64;
+        let stability = StabilityLoss {
+            body,
+            points,
+            gravity,
+            law,
+            onset: Onset::Leaky { alpha, band, steps: LeakSteps::All },
+            dt: settings.dt,
+            steps: settings.steps,
+            perturbations: Perturbation::rest_and_diagonal(settings.perturbation),
+            weights: StabilityWeights::relative_to_fall(g, time, object.radius),
+        };
+        let hand = robot.posed(&hand.t_cam_hand, &hand.joints)?;
+        Ok(Self { stability, hand, initial_centre: initial.centre(), settings })
+    }
+
+    /// The rollouts with only those surface points that can touch the hand within them.
+    fn near(&self, pose: &Isometry3<f64>) -> StabilityLoss<Penalty> {
+        let s = &self.settings;
+        let time = s.dt * s.steps as f64;
+        // Twice what a push and free fall cover, so that what approaches faster was pushed by contacts
+        // that are in the set.
+        let travel = 2.0 * (s.perturbation * time + 5.0 * time * time);
+        let reach = s.leak.1 + travel;
+        let t_cam_com = self.stability.body.com_pose(pose);
+        let points = &self.stability.points;
+        let touches = |p: &&prehend_sim::SurfacePoint| {
+            self.hand.sample(&(t_cam_com * Point3::from(p.position)), reach).is_some()
+        };
+        StabilityLoss {
+            points: points.iter().filter(touches).cloned().collect(),
+            ..self.stability.clone()
+        }
+    }
+
+    fn displacement(&self, state: &State) -> (Vector3<f64>, f64) {
+        let precision = self.settings.displacement_sigma.powi(-2);
+        (state.centre() - self.initial_centre, precision)
+    }
+
+    /// Nats of a stability loss; where the rollout blew up, those of a very large one.
+    fn nats(&self, loss: f64) -> f64 {
+        let loss = if loss.is_finite() { loss } else { f64::MAX };
+        self.settings.weight * loss.ln_1p()
+    }
+}
+
 impl Term for PhysicsTerm {
     fn name(&self) -> &'static str {
         "physics"
     }
+
     fn blocks(&self) -> &'static [Block] {
         &[Block::ObjectPose]
     }
-    fn value(&self, s: &State) -> f64 {
-        0.0 * (s.centre() - self.c).norm_squared()
+
+    fn value(&self, state: &State) -> f64 {
+        let pose = &state.t_cam_object;
+        let (moved, precision) = self.displacement(state);
+        let loss = self.near(pose).value(pose, &self.hand);
+        self.nats(loss) + 0.5 * precision * moved.norm_squared()
     }
-    fn linearise(&self, s: &State, _n: &mut Normal) -> f64 {
-        self.value(s)
+
+    fn linearise(&self, state: &State, normal: &mut Normal) -> f64 {
+        let pose = &state.t_cam_object;
+        let centre = Point3::from(state.centre());
+        let (loss, gradient, jtj) = self.near(pose).linearise(pose, &self.hand, &centre);
+        let (moved, precision) = self.displacement(state);
+        let slope = self.settings.weight / (1.0 + loss);
+        let usable = slope.is_finite() && gradient.iter().chain(jtj.iter()).all(|v| v.is_finite());
+        let (mut gradient, mut hessian) = match usable {
+            true => (gradient * slope, jtj * (2.0 * slope)),
+            false => (Vector6::zeros(), Matrix6::zeros()),
+        };
+        for k in 0..3 {
+            gradient[k] += precision * moved[k];
+            hessian[(k, k)] += precision;
+        }
+        normal.add(self.blocks(), &gradient, &hessian);
+        self.nats(loss) + 0.5 * precision * moved.norm_squared()
     }
 }

@@ -27,6 +27,9 @@ pub struct RenderingSettings {
     pub light_ridge: f64,
 }
 
+/// Half-width of the contour band \[px\] that is nearest to how a box-filtered edge fades.
+const HALF_WIDTH: f64 = 0.645;
+
 impl Default for RenderingSettings {
     fn default() -> Self {
         Self {
@@ -72,7 +75,10 @@ impl RenderingTerm {
             .map_err(images)?;
         let sigma = settings.sigma * brightness(observation);
         let options = ContourOptions {
+            half_width: HALF_WIDTH,
             mask_weight: (sigma / settings.mask_sigma).powi(2),
+            // Or a pose could lower its loss by hiding behind the hand.
+            hidden_is_missed: true,
             robust: Robust::Cauchy(settings.outlier * sigma),
             ..ContourOptions::default()
         };
