@@ -8,6 +8,8 @@ use rayon::prelude::*;
 use crate::body::{RigidBody, SurfacePoint};
 use crate::contact::law::LocalLaw;
 use crate::contact::onset::Onset;
+use crate::contact::stiffness::{StepError, check_time_step};
+use crate::contact::wrench::contact_wrench_jacobian;
 use crate::integrator::Vector12;
 use crate::rollout::{Matrix12x6, Simulation};
 use crate::state::State;
@@ -99,8 +101,7 @@ type Sums = (f64, Vector6<f64>, Matrix6<f64>);
 
 impl<L: LocalLaw> StabilityLoss<L> {
     /// The loss at `pose` (`t_world_model`) against the fixed `field` (world frame); dimensionless.
-    /// Not finite where the simulation blows up: see
-    /// [`check_time_step`](crate::contact::stiffness::check_time_step).
+    /// Not finite where the simulation blows up: see [`Self::check`].
     pub fn value(&self, pose: &Isometry3<f64>, field: &dyn DistanceField) -> f64 {
         let rollouts: Vec<f64> = self
             .perturbations
@@ -159,6 +160,17 @@ impl<L: LocalLaw> StabilityLoss<L> {
         let count = self.count();
         let gradient = chain.tr_mul(&total.1) * (2.0 / count);
         (total.0 / count, gradient, chain.transpose() * total.2 * chain / count)
+    }
+
+    /// Whether `dt` resolves the contacts at `pose`, at rest.
+    ///
+    /// # Errors
+    /// With the longest step that does: see [`check_time_step`].
+    pub fn check(&self, pose: &Isometry3<f64>, field: &dyn DistanceField) -> Result<(), StepError> {
+        let state = State::at_rest(&self.body, pose);
+        let contact =
+            contact_wrench_jacobian(&self.law, self.onset, self.points.iter(), &state, field);
+        check_time_step(&self.body, &state.pose.rotation, &contact, self.dt)
     }
 
     fn count(&self) -> f64 {
@@ -236,7 +248,7 @@ mod tests {
 
     use super::*;
     use crate::fields::{HalfSpace, SphereCavity};
-    use crate::{LeakSteps, Penalty};
+    use crate::{LawRegistry, LeakSteps, Penalty};
 
     fn loss(onset: Onset, averaging: Averaging) -> StabilityLoss<Penalty> {
         let inertia = Matrix3::from_diagonal(&Vector3::new(6e-5, 9e-5, 5e-5));
@@ -315,6 +327,43 @@ mod tests {
             }
         }
         assert!(now < 0.1 * before, "{before} {now}");
+    }
+
+    #[test]
+    fn too_long_a_step_is_refused_with_one_that_passes() {
+        let (floor, pose) = (HalfSpace::floor(), pose());
+        let mut loss = loss(Onset::Hard, Averaging::Final);
+        assert_eq!(loss.check(&pose, &floor), Ok(()));
+        loss.dt = 1.0;
+        let error = loss.check(&pose, &floor).unwrap_err();
+        assert!(error.limit > 1e-3 && error.limit < 1.0, "{error}");
+        loss.dt = 0.999 * error.limit;
+        assert_eq!(loss.check(&pose, &floor), Ok(()));
+    }
+
+    #[test]
+    fn a_law_by_name_gives_the_same_loss() {
+        let named = loss(Onset::Softplus { width: 3e-4 }, Averaging::Mean);
+        let law =
+            LawRegistry::default().create("penalty", &[2e7, 5e4, 0.5, 1e-2]).unwrap().unwrap();
+        let StabilityLoss {
+            body, points, gravity, onset, dt, steps, perturbations, weights, ..
+        } = named.clone();
+        let boxed =
+            StabilityLoss { body, points, gravity, law, onset, dt, steps, perturbations, weights };
+        let (floor, center) = (HalfSpace::floor(), Point3::origin());
+        let expected = named.linearise(&pose(), &floor, &center);
+        assert_eq!(boxed.linearise(&pose(), &floor, &center), expected);
+    }
+
+    #[test]
+    fn results_are_identical_on_any_number_of_threads() {
+        let loss = loss(Onset::Softplus { width: 3e-4 }, Averaging::Mean);
+        let run = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| loss.linearise(&pose(), &HalfSpace::floor(), &Point3::origin()))
+        };
+        assert_eq!(run(1), run(3));
     }
 
     #[test]

@@ -33,7 +33,34 @@ pub struct Response<S: Scalar> {
 /// What a contact-model author writes: one function, generic over the scalar.
 ///
 /// A response must vanish where the gap equals [`reach`](Self::reach)
-/// and its rate is zero.
+/// and its rate is zero. A frictionless law whose pressure grows with the square of the depth:
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use prehend_autodiff::Scalar;
+/// use prehend_sim::{Contact, ContactLaw, Response};
+///
+/// struct Quadratic([f64; 1]);
+///
+/// impl ContactLaw for Quadratic {
+///     fn params(&self) -> &[f64] {
+///         &self.0
+///     }
+///     fn law<S: Scalar>(&self, p: &[S], contact: &Contact<S>) -> Response<S> {
+///         let normal = p[0] * contact.gap * contact.gap * S::constant(contact.area);
+///         Response { normal, tangential: Vector3::zeros() }
+///     }
+///     fn reach(&self) -> f64 {
+///         0.0
+///     }
+/// }
+///
+/// let (gap, area) = (-1e-3, 1e-4);
+/// let contact =
+///     Contact { gap, normal_speed: 0.0, slip: Vector3::zeros(), normal: Vector3::z(), area };
+/// let law = Quadratic([1e10]);
+/// assert!((law.law(law.params(), &contact).normal - 1.0).abs() < 1e-12);
+/// ```
 pub trait ContactLaw: Send + Sync {
     /// Parameters that may carry derivatives (stiffness, friction, ...), passed back as `p`.
     fn params(&self) -> &[f64] {

@@ -113,10 +113,10 @@ pub fn contact_wrench_jacobian<'a, L: LocalLaw + ?Sized>(
     let spin = cross_matrix(&state.angular);
     let mut total = WrenchJacobian::zero();
     for touch in touches(points, state, field, onset, cutoff) {
-        let response = law.response_with_derivative(&params, &lift(&touch, cutoff));
-        let normal = lifted_normal(&touch);
+        let contact = lift(&touch, cutoff);
+        let response = law.response_with_derivative(&params, &contact);
         let force: Vector3<Fwd<6>> =
-            Vector3::from_fn(|i, _| normal[i] * response.normal + response.tangential[i]);
+            Vector3::from_fn(|i, _| contact.normal[i] * response.normal + response.tangential[i]);
         let f = force.map(|x| x.value);
         let by_position = Matrix3::from_fn(|i, j| force[i].derivative[j]);
         let by_velocity = Matrix3::from_fn(|i, j| force[i].derivative[3 + j]);
