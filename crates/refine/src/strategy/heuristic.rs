@@ -34,7 +34,7 @@ impl Default for HeuristicSettings {
 ///   translations and rotations of any term come out in the right proportion.
 /// - *Scales of the losses.* Terms are in nats ([`Term`]), so that ΔLᵢ of different terms compare.
 /// - *Step lengths.* Steps are at most a common length that grows by a little while the sum of the terms
-///   falls and shrinks when it rises. Without it the terms take turns in pulling the pose all the way to
+///   falls and shrinks when it rises or nothing improves. Without it the terms take turns in pulling the pose all the way to
 ///   their own optimum, and the weights, which always sum to one, never let it rest.
 pub struct Heuristic {
     /// Settings.
@@ -73,11 +73,14 @@ impl Heuristic {
             let step: Vector6<f64> =
                 iteration.weights.iter().zip(&candidates).map(|(&a, c)| c.step * a).sum();
             trace.iterations.push(iteration);
-            let done = gain <= 0.0 || length < settings.last_step;
-            if !go_on || (done && !settings.exhaustive) {
+            if !go_on || (length < settings.last_step && !settings.exhaustive) {
                 break;
             }
-            length *= if total < last_total { 1.1 } else { 0.7 };
+            length *= match gain > 0.0 {
+                true if total < last_total => 1.1,
+                true => 0.7,
+                false => 0.5,
+            };
             length = length.clamp(0.5 * settings.last_step, settings.first_step);
             last_total = total;
             state = state.moved(Block::ObjectPose, &step);

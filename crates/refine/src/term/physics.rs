@@ -1,7 +1,7 @@
 //! Physics: an object held in a hand stays where it is. Measured by simulating.
 
-use nalgebra::{Isometry3, Matrix6, Point3, Vector3, Vector6};
-use prehend_geometry::{DistanceField, PosedRobot};
+use nalgebra::{Matrix6, Point3, Vector3, Vector6};
+use prehend_geometry::PosedRobot;
 use prehend_sim::contact::stiffness::{damping_per_area, stiffness_per_area};
 use prehend_sim::{
     LeakSteps, Onset, Penalty, Perturbation, RigidBody, StabilityLoss, StabilityWeights,
@@ -83,8 +83,7 @@ impl PhysicsTerm {
         let missing = |what| RefineError::Missing { what, term: "physics" };
         let gravity = observation.gravity.ok_or_else(|| missing("gravity"))?;
         let hand = observation.hand.as_ref().ok_or_else(|| missing("hand state"))?;
-        let fail =
-            |reason: String| RefineError::Object { object: object.name.clone(), reason };
+        let fail = |reason: String| RefineError::Object { object: object.name.clone(), reason };
         let inertial = &object.inertial;
         let body = RigidBody::new(inertial.mass, inertial.inertia, inertial.center_of_mass)
             .map_err(|e| fail(e.to_string()))?;
@@ -114,25 +113,6 @@ impl PhysicsTerm {
         Ok(Self { stability, hand, initial_centre: initial.centre(), settings })
     }
 
-    /// The rollouts with only those surface points that can touch the hand within them.
-    fn near(&self, pose: &Isometry3<f64>) -> StabilityLoss<Penalty> {
-        let s = &self.settings;
-        let time = s.dt * s.steps as f64;
-        // Twice what a push and free fall cover, so that what approaches faster was pushed by contacts
-        // that are in the set.
-        let travel = 2.0 * (s.perturbation * time + 5.0 * time * time);
-        let reach = s.leak.1 + travel;
-        let t_cam_com = self.stability.body.com_pose(pose);
-        let points = &self.stability.points;
-        let touches = |p: &&prehend_sim::SurfacePoint| {
-            self.hand.sample(&(t_cam_com * Point3::from(p.position)), reach).is_some()
-        };
-        StabilityLoss {
-            points: points.iter().filter(touches).cloned().collect(),
-            ..self.stability.clone()
-        }
-    }
-
     fn displacement(&self, state: &State) -> (Vector3<f64>, f64) {
         let precision = self.settings.displacement_sigma.powi(-2);
         (state.centre() - self.initial_centre, precision)
@@ -157,14 +137,14 @@ impl Term for PhysicsTerm {
     fn value(&self, state: &State) -> f64 {
         let pose = &state.t_cam_object;
         let (moved, precision) = self.displacement(state);
-        let loss = self.near(pose).value(pose, &self.hand);
+        let loss = self.stability.value(pose, &self.hand);
         self.nats(loss) + 0.5 * precision * moved.norm_squared()
     }
 
     fn linearise(&self, state: &State, normal: &mut Normal) -> f64 {
         let pose = &state.t_cam_object;
         let centre = Point3::from(state.centre());
-        let (loss, gradient, jtj) = self.near(pose).linearise(pose, &self.hand, &centre);
+        let (loss, gradient, jtj) = self.stability.linearise(pose, &self.hand, &centre);
         let (moved, precision) = self.displacement(state);
         let slope = self.settings.weight / (1.0 + loss);
         let usable = slope.is_finite() && gradient.iter().chain(jtj.iter()).all(|v| v.is_finite());
