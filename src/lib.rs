@@ -1,1 +1,15 @@
-//! Façade.
+//! Differentiable physics and rendering, and in-hand object pose refinement built on them.
+//!
+//! This package re-exports the five crates of the workspace:
+//!
+//! - [`autodiff`]: one scalar trait over nalgebra's `RealField`, forward and reverse mode, Lie groups;
+//! - [`geometry`]: meshes, closest points, distance grids, robots from URDF, exact volumes;
+//! - [`sim`]: rigid bodies under penalty contact, differentiable;
+//! - [`render`]: a rasterizer with closed-form pose derivatives;
+//! - [`refine`](mod@refine): refining the 6-DoF pose of an object held in a robot hand.
+
+pub use prehend_autodiff as autodiff;
+pub use prehend_geometry as geometry;
+pub use prehend_refine as refine;
+pub use prehend_render as render;
+pub use prehend_sim as sim;

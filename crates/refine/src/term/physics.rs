@@ -48,7 +48,7 @@ impl Default for PhysicsSettings {
             friction: 0.5,
             slip_scale: 1e-2,
             dt: 1e-3,
-            steps: 10,
+            steps: 5,
             perturbation: 0.01,
             leak: (0.1, 2e-3),
         }
