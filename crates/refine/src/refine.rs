@@ -123,7 +123,7 @@ pub fn refine_with(
     Ok(RefinedPose { t_cam_object: best.2, iteration: best.1, trace })
 }
 
-fn initial_state(
+pub(crate) fn initial_state(
     observation: &Observation,
     object: &Object,
     initial: &Isometry3<f64>,

@@ -129,3 +129,85 @@ fn preconditioned_step(normal: &Normal, radius: f64, length: f64) -> Vector6<f64
     }
     (step * (length / norm).min(1.0)).component_mul(&unit)
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Isometry3, Point3, Vector3};
+    use prehend_render::Light;
+
+    use super::*;
+
+    /// Half the squared distance of the object from a place, over a variance.
+    struct Spring {
+        place: Vector3<f64>,
+        precision: f64,
+    }
+
+    impl Term for Spring {
+        fn name(&self) -> &'static str {
+            "spring"
+        }
+
+        fn blocks(&self) -> &'static [Block] {
+            &[Block::ObjectPose]
+        }
+
+        fn value(&self, state: &State) -> f64 {
+            0.5 * self.precision * (state.centre() - self.place).norm_squared()
+        }
+
+        fn linearise(&self, state: &State, normal: &mut Normal) -> f64 {
+            let offset = (state.centre() - self.place) * self.precision;
+            let mut gradient = Vector6::zeros();
+            gradient.fixed_rows_mut::<3>(0).copy_from(&offset);
+            let mut hessian = Matrix6::zeros();
+            (0..3).for_each(|k| hessian[(k, k)] = self.precision);
+            normal.add(self.blocks(), &gradient, &hessian);
+            self.value(state)
+        }
+    }
+
+    fn spring(x: f64, sigma: f64) -> Box<dyn Term> {
+        Box::new(Spring { place: Vector3::new(x, 0.0, 0.5), precision: sigma.powi(-2) })
+    }
+
+    fn run(terms: &[Box<dyn Term>], settings: HeuristicSettings) -> (State, Trace) {
+        let start = State {
+            t_cam_object: Isometry3::translation(0.03, 0.01, 0.5),
+            object_centre: Point3::origin(),
+            t_cam_hand: Isometry3::identity(),
+            light: Light::ambient(1.0),
+        };
+        let mut last = start.clone();
+        let trace = Heuristic { settings }.run(terms, start, 0.1, |state, _| {
+            last = state.clone();
+            true
+        });
+        (last, trace)
+    }
+
+    #[test]
+    fn one_term_is_minimised() {
+        let (state, trace) = run(&[spring(0.0, 1e-3)], HeuristicSettings::default());
+        assert!((state.centre() - Vector3::new(0.0, 0.0, 0.5)).norm() < 1e-5);
+        assert!(trace.iterations.len() < 60);
+        assert_eq!(trace.iterations[0].weights, [1.0]);
+    }
+
+    #[test]
+    fn terms_that_disagree_come_to_rest_near_the_minimum_of_their_sum() {
+        // The sum is least at 0.01 · (1/3²) / (1/1² + 1/3²) = 1 mm.
+        let terms = [spring(0.0, 1e-3), spring(0.01, 3e-3)];
+        let (state, trace) = run(&terms, HeuristicSettings::default());
+        assert!((state.centre().x - 1e-3).abs() < 1e-4, "{}", state.centre().x);
+        let sum: f64 = trace.iterations.iter().map(|i| i.weights.iter().sum::<f64>()).sum();
+        assert!((sum - trace.iterations.len() as f64).abs() < 1.0);
+    }
+
+    #[test]
+    fn exhaustive_runs_use_every_iteration() {
+        let settings =
+            HeuristicSettings { iterations: 80, exhaustive: true, ..HeuristicSettings::default() };
+        assert_eq!(run(&[spring(0.0, 1e-3)], settings).1.iterations.len(), 81);
+    }
+}

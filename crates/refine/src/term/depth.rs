@@ -189,3 +189,41 @@ fn back_project(observation: &Observation, limit: usize) -> Vec<Point3<f64>> {
         .flat_map(|y| (0..depth.width()).step_by(step).filter_map(move |x| at(x, y)))
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::gradient_check::{assert_gradient, fixture};
+    use super::*;
+
+    #[test]
+    fn gradient_matches_differences() {
+        for seed in 0..3 {
+            let (scene, state, hand) = fixture(seed);
+            let object = Arc::clone(&scene.object);
+            let settings = DepthSettings::default();
+            let term = DepthTerm::new(&scene.observation, object, hand, settings).unwrap();
+            // So short a step that hardly any point changes its match or its visibility.
+            assert_gradient(&term, &state, Block::ObjectPose, 1e-8, 2e-3);
+        }
+    }
+
+    #[test]
+    fn the_truth_is_near_the_minimum() {
+        let (scene, state, hand) = fixture(0);
+        let object = Arc::clone(&scene.object);
+        let settings = DepthSettings::default();
+        let term = DepthTerm::new(&scene.observation, object, hand, settings).unwrap();
+        let truth = State { t_cam_object: scene.truth, ..state.clone() };
+        assert!(term.value(&truth) < 0.3 * term.value(&state));
+    }
+
+    #[test]
+    fn no_depth_is_an_error() {
+        let (scene, _, hand) = fixture(0);
+        let mut observation = scene.observation.clone();
+        observation.depth.pixels_mut().fill(0.0);
+        let object = Arc::clone(&scene.object);
+        let term = DepthTerm::new(&observation, object, hand, DepthSettings::default());
+        assert!(matches!(term, Err(RefineError::NoDepth)));
+    }
+}

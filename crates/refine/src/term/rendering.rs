@@ -135,3 +135,39 @@ impl Term for RenderingTerm {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::gradient_check::{assert_gradient, fixture};
+    use super::*;
+
+    #[test]
+    fn gradient_matches_differences() {
+        for seed in 0..3 {
+            let (scene, mut state, hand) = fixture(seed);
+            let object = Arc::clone(&scene.object);
+            let settings = RenderingSettings::default();
+            let term = RenderingTerm::new(&scene.observation, object, &hand, settings).unwrap();
+            term.refresh(&mut state);
+            // Pixels are in single precision and texture has kinks: a step of some hundredths of a pixel.
+            assert_gradient(&term, &state, Block::ObjectPose, 5e-5, 0.03);
+        }
+    }
+
+    #[test]
+    fn the_light_is_found_and_the_truth_fits_best() {
+        let (scene, state, hand) = fixture(0);
+        let object = Arc::clone(&scene.object);
+        let settings = RenderingSettings::default();
+        let term = RenderingTerm::new(&scene.observation, object, &hand, settings).unwrap();
+        let lit = |mut state: State| {
+            term.refresh(&mut state);
+            state
+        };
+        let truth = State { t_cam_object: scene.truth, ..state.clone() };
+        let unlit = term.value(&truth);
+        let (truth, off) = (lit(truth), lit(state));
+        assert!(term.value(&truth) < 0.5 * term.value(&off));
+        assert!(term.value(&truth) < unlit);
+    }
+}

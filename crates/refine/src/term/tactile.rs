@@ -171,3 +171,39 @@ impl Term for TactileTerm {
         value
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::gradient_check::{assert_gradient, fixture};
+    use super::*;
+
+    fn term(observation: &Observation) -> Result<TactileTerm, RefineError> {
+        let (scene, _, _) = fixture(0);
+        let object = Arc::clone(&scene.object);
+        TactileTerm::new(observation, object, &scene.robot, TactileSettings::default())
+    }
+
+    #[test]
+    fn gradients_by_object_and_hand_match_differences() {
+        for seed in 0..3 {
+            let (scene, state, _) = fixture(seed);
+            let term = term(&scene.observation).unwrap();
+            for block in [Block::ObjectPose, Block::HandPose] {
+                assert_gradient(&term, &state, block, 1e-7, 1e-4);
+            }
+        }
+    }
+
+    #[test]
+    fn forces_must_fit_the_skin() {
+        let (scene, _, _) = fixture(0);
+        let mut observation = scene.observation.clone();
+        if let Some(hand) = &mut observation.hand {
+            hand.forces.pop();
+        }
+        let error = term(&observation).err().unwrap().to_string();
+        assert_eq!(error, "367 taxel forces were given for 368 taxels");
+        observation.hand = None;
+        assert!(matches!(term(&observation), Err(RefineError::Missing { .. })));
+    }
+}
