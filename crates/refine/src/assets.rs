@@ -8,7 +8,7 @@ use prehend_geometry::TriMesh;
 use prehend_geometry::hand::{Taxel, load_taxels};
 use prehend_geometry::robot::Robot as KinematicTree;
 
-use crate::bop::{Dataset, DatasetError, Frame, ModelInfo, Models};
+use crate::bop::{Dataset, DatasetError, Frame, Models, Tactile};
 use crate::{HandReading, Inertial, Object, Observation, RefineError, Robot, TermKind};
 
 /// BOP models are in millimetres \[m\].
@@ -38,16 +38,6 @@ pub enum AssetError {
     /// The refinement itself.
     #[error(transparent)]
     Refine(#[from] RefineError),
-    /// A frame of several robots: which one holds the object is not said.
-    #[error("scene_bodies.json of scene {scene}: image {image} has {count} bodies, not one hand")]
-    Bodies {
-        /// The scene.
-        scene: u32,
-        /// The image.
-        image: u32,
-        /// How many bodies it lists.
-        count: usize,
-    },
 }
 
 /// The objects and robots of a dataset.
@@ -101,19 +91,29 @@ impl<'a> Assets<'a> {
             bodies => bodies?,
         };
         let [body] = bodies.bodies.as_slice() else {
-            return Err(AssetError::Bodies {
-                scene: frame.scene_id(),
-                image: frame.im_id(),
-                count: bodies.bodies.len(),
-            });
+            let found = bodies.bodies.len();
+            return Err(frame
+                .bodies_fault("bodies", format!("expected one hand, found {found}"))
+                .into());
         };
         let touch = terms.contains(&TermKind::Tactile);
         let tactile = touch.then(|| frame.tactile()).transpose()?;
         let robot = self.robot(&body.urdf, tactile.as_ref().map(|t| t.taxels.as_path()))?;
+        if let Some(Tactile { taxels, force, .. }) = &tactile
+            && force.len() != robot.taxels.len()
+        {
+            let (expected, found) = (robot.taxels.len(), force.len());
+            let file = taxels.display();
+            let problem =
+                format!("expected {expected} forces, one a taxel of {file}, found {found}");
+            return Err(frame.tactile_fault("force", problem).into());
+        }
+        let joints = robot.tree.joint_vector(&body.joints);
+        let joints = joints.map_err(|e| frame.bodies_fault("bodies[0].joints", e))?;
         observation.gravity = Some(bodies.gravity);
         observation.hand = Some(HandReading {
             t_cam_hand: body.t_cam_base,
-            joints: robot.tree.joint_vector(&body.joints)?,
+            joints,
             forces: tactile.map_or_else(Vec::new, |t| t.force),
         });
         Ok((observation, Some(robot)))
@@ -141,12 +141,28 @@ impl<'a> Assets<'a> {
 
 /// The object `id` of `models`, in metres.
 ///
+/// Mass properties come from `models_info.json`. With a mass alone the density is taken as uniform, without
+/// one it is [`crate::DEFAULT_DENSITY`]; both need a closed mesh.
+///
 /// # Errors
-/// If the model is missing or broken.
+/// If the model is missing or broken, or `models_info.json` is.
 pub fn load_object(models: &Models, id: u32, seed: u64) -> Result<Object, AssetError> {
     let mesh = load_mesh(models, id)?;
-    let inertial = models.info(id).ok().and_then(|info| inertial(&info));
-    Ok(Object::new(&format!("obj_{id:06}"), mesh, inertial, seed)?)
+    let name = models.mesh_path(id)?.display().to_string();
+    let info = match models.info(id) {
+        Ok(info) => Some(info),
+        // BOP does not require the list of an estimator's models.
+        Err(DatasetError::Missing { .. } | DatasetError::UnknownObject { .. }) => None,
+        Err(broken) => return Err(broken.into()),
+    };
+    let mass = info.as_ref().and_then(|i| i.mass);
+    let place = info.and_then(|i| Some((i.center_of_mass?, i.inertia?)));
+    Ok(match (mass, place) {
+        (Some(mass), Some((center_of_mass, inertia))) => {
+            Object::new(&name, mesh, Some(Inertial { mass, center_of_mass, inertia }), seed)?
+        }
+        (mass, _) => Object::with_mass(&name, mesh, mass, seed)?,
+    })
 }
 
 /// The surface of object `id` of `models`, in metres.
@@ -155,12 +171,4 @@ pub fn load_object(models: &Models, id: u32, seed: u64) -> Result<Object, AssetE
 /// If the model is missing or broken.
 pub fn load_mesh(models: &Models, id: u32) -> Result<TriMesh, AssetError> {
     Ok(TriMesh::load(&models.mesh_path(id)?)?.scaled(MILLIMETRE))
-}
-
-fn inertial(info: &ModelInfo) -> Option<Inertial> {
-    Some(Inertial {
-        mass: info.mass?,
-        center_of_mass: info.center_of_mass?,
-        inertia: info.inertia?,
-    })
 }

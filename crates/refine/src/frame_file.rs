@@ -177,7 +177,7 @@ pub fn load(file: &Path, seed: u64) -> Result<FrameInput, FrameFileError> {
         .map_err(|e| field("K", e.to_string()))?;
     let mesh = TriMesh::load(&folder.join(&layout.mesh)).map_err(|e| asset(e.into()))?;
     let mesh = mesh.scaled(layout.mesh_unit.metres());
-    let name = layout.mesh.display().to_string();
+    let name = folder.join(&layout.mesh).display().to_string();
     let object =
         Object::with_mass(&name, mesh, layout.mass_kg, seed).map_err(|e| asset(e.into()))?;
     let t_cam_object = layout.pose.isometry().map_err(|reason| field("pose", reason))?;
@@ -186,16 +186,24 @@ pub fn load(file: &Path, seed: u64) -> Result<FrameInput, FrameFileError> {
         Some(r) => {
             let tree = KinematicTree::from_urdf_file(&folder.join(&r.urdf));
             let tree = tree.map_err(|e| asset(e.into()))?;
-            let joints = tree.joint_vector(&r.joints).map_err(|e| asset(e.into()))?;
+            let joints = tree.joint_vector(&r.joints);
+            let joints = joints.map_err(|e| field("robot.joints", e.to_string()))?;
             let skin: Vec<Taxel> = match &r.taxels {
                 Some(csv) => load_taxels(&folder.join(csv)).map_err(|e| asset(e.into()))?,
                 None => Vec::new(),
             };
+            let forces = r.forces.as_deref().unwrap_or_default();
+            if !forces.is_empty() && forces.len() != skin.len() {
+                let (expected, found) = (skin.len(), forces.len());
+                let reason =
+                    format!("expected one force for each of {expected} taxels, found {found}");
+                return Err(field("robot.forces", reason));
+            }
             let t_cam_hand = r.base_pose.isometry();
             let hand = HandReading {
                 t_cam_hand: t_cam_hand.map_err(|reason| field("robot.base_pose", reason))?,
                 joints,
-                forces: r.forces.iter().flatten().map(|&f| Vector3::from(f)).collect(),
+                forces: forces.iter().map(|&f| Vector3::from(f)).collect(),
             };
             (Some(Robot::new(tree, skin).map_err(|e| asset(e.into()))?), Some(hand))
         }

@@ -9,13 +9,8 @@ use crate::{Object, Observation, Robot};
 /// Sizes between which an object's extent is believed to be in metres \[m\].
 const PLAUSIBLE_EXTENT: std::ops::Range<f64> = 5e-3..5.0;
 
-/// Warnings about units and frames, in plain sentences; empty if all looks well.
-pub fn inspect(
-    observation: &Observation,
-    object: &Object,
-    robot: Option<&Robot>,
-    t_cam_object: &Isometry3<f64>,
-) -> Vec<String> {
+/// Warnings about an object's model, in plain sentences; empty if all looks well.
+pub fn inspect_object(object: &Object) -> Vec<String> {
     let mut warnings = Vec::new();
     let extent = 2.0 * object.radius;
     if !PLAUSIBLE_EXTENT.contains(&extent) {
@@ -30,9 +25,22 @@ pub fn inspect(
         ));
     }
     if !object.report.watertight {
-        warnings
-            .push(format!("the mesh is not watertight: {} open edges", object.report.open_edges));
+        warnings.push(format!(
+            "the mesh is not closed ({} open edges): what is inside it is a guess",
+            object.report.open_edges
+        ));
     }
+    warnings
+}
+
+/// Warnings about units and frames, in plain sentences; empty if all looks well.
+pub fn inspect(
+    observation: &Observation,
+    object: &Object,
+    robot: Option<&Robot>,
+    t_cam_object: &Isometry3<f64>,
+) -> Vec<String> {
+    let mut warnings = inspect_object(object);
     let centre = t_cam_object * object.centre;
     if centre.z <= 0.0 {
         warnings.push(format!("the object is behind the camera (z = {:.3} m)", centre.z));

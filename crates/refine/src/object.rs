@@ -54,7 +54,8 @@ impl Object {
     /// the surface is sampled.
     ///
     /// # Errors
-    /// If the mesh has no area, or is open where a mass has to be assumed.
+    /// If the mesh has no area, or is open where a mass has to be assumed. With `inertial`, an open mesh
+    /// serves: inside is then where its winding number is above one half.
     pub fn new(
         name: &str,
         mesh: TriMesh,
@@ -98,7 +99,16 @@ impl Object {
         let (solid, report) = mesh.cleaned();
         let (low, high) = solid.bounds().ok_or_else(|| fail("the mesh has no faces".into()))?;
         let uniform = || mass_properties(&solid, DEFAULT_DENSITY);
-        let (inertial, inertial_assumed) = weigh(&uniform).map_err(|e| fail(e.to_string()))?;
+        if solid.area() <= 1e-12 * (high - low).norm_squared() {
+            return Err(fail("the mesh is degenerate: its faces have no area".into()));
+        }
+        let (inertial, inertial_assumed) = weigh(&uniform).map_err(|e| match e {
+            MassError::NotClosed { edges } => fail(format!(
+                "the mesh is not closed ({edges} edges do not join two faces), so its mass, centre of \
+                 mass and inertia must all be given"
+            )),
+            other => fail(other.to_string()),
+        })?;
         if !(inertial.mass.is_finite() && inertial.mass > 0.0) {
             return Err(fail(format!("the mass {} kg is not positive", inertial.mass)));
         }

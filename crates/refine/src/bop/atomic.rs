@@ -27,10 +27,28 @@ pub fn write_atomically(path: &Path, contents: &[u8]) -> Result<(), DatasetError
     })
 }
 
+/// Whether [`write_atomically`] could write `path` now, to know before long work; leaves nothing behind.
+///
+/// # Errors
+/// [`DatasetError::Write`] naming `path`.
+pub fn check_writable(path: &Path) -> Result<(), DatasetError> {
+    let fail =
+        |e: io::Error| DatasetError::Write { file: path.to_path_buf(), problem: e.to_string() };
+    if path.is_dir() {
+        return Err(fail(io::Error::other("is a folder")));
+    }
+    let (_, temporary) = create_beside(path).map_err(fail)?;
+    fs::remove_file(temporary).map_err(fail)
+}
+
 /// A new hidden file in the folder of `path`: a rename is atomic only within one file system.
 fn create_beside(path: &Path) -> io::Result<(File, PathBuf)> {
     static SERIAL: AtomicU32 = AtomicU32::new(0);
     let name = path.file_name().ok_or_else(|| io::Error::other("the path names no file"))?;
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
+    if let Some(folder) = folder.filter(|p| !p.is_dir()) {
+        return Err(io::Error::other(format!("there is no folder {}", folder.display())));
+    }
     let mut hidden = std::ffi::OsString::from(".");
     hidden.push(name);
     hidden.push(format!(".{}-{}.tmp", std::process::id(), SERIAL.fetch_add(1, Ordering::Relaxed)));
@@ -61,6 +79,10 @@ mod tests {
             matches!(write_atomically(&path, b"x"), Err(DatasetError::Write { file, .. }) if file == path)
         );
         assert!(matches!(write_atomically(dir.path(), b"x"), Err(DatasetError::Write { .. })));
+        let told = check_writable(&path).unwrap_err();
+        assert_eq!(Err(told), write_atomically(&path, b"x"));
+        assert!(check_writable(dir.path()).is_err());
+        assert_eq!(check_writable(&dir.path().join("new.csv")), Ok(()));
         assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 0);
     }
 }

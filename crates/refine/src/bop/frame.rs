@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use super::dataset::Scene;
 use super::error::DatasetError;
+use super::json::LazyJson;
 use super::scene::{Intrinsics, SceneBodies, Tactile};
 use crate::Observation;
 use prehend_render::{DepthImage, Mask, RgbImage};
@@ -150,5 +151,23 @@ impl<'a> Frame<'a> {
     /// When the file is absent or broken, or lacks the image or one of its fields.
     pub fn tactile(&self) -> Result<Tactile, DatasetError> {
         Tactile::parse(&self.scene.tactile.get()?.entry(self.im_id)?, self.scene.root())
+    }
+
+    /// An error about `field` of this image's entry of `scene_bodies.json`.
+    pub(crate) fn bodies_fault(&self, field: &str, problem: impl ToString) -> DatasetError {
+        self.fault(&self.scene.bodies, field, problem)
+    }
+
+    /// An error about `field` of this image's entry of `scene_tactile.json`.
+    pub(crate) fn tactile_fault(&self, field: &str, problem: impl ToString) -> DatasetError {
+        self.fault(&self.scene.tactile, field, problem)
+    }
+
+    fn fault(&self, file: &LazyJson, field: &str, problem: impl ToString) -> DatasetError {
+        DatasetError::Field {
+            file: file.path().to_owned(),
+            field: format!("{}.{field}", self.im_id),
+            problem: problem.to_string(),
+        }
     }
 }

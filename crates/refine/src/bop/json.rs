@@ -104,6 +104,10 @@ impl LazyJson {
         self.content.get_or_init(|| JsonFile::read(&self.path)).as_ref().map_err(Clone::clone)
     }
 
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
     /// Whether the file is there, readable or not.
     pub(crate) fn exists(&self) -> bool {
         self.path.exists()

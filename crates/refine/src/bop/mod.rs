@@ -17,7 +17,7 @@ mod pose;
 mod results;
 mod scene;
 
-pub use atomic::write_atomically;
+pub use atomic::{check_writable, write_atomically};
 pub use dataset::{Dataset, Scene};
 pub use error::DatasetError;
 pub use frame::Frame;

@@ -2,7 +2,6 @@
 
 use std::path::PathBuf;
 
-use anyhow::Context;
 use clap::Args;
 use prehend_refine::bop::ResultRow;
 use prehend_refine::report::{Report, outline_picture};
@@ -16,8 +15,8 @@ use crate::progress;
 pub(crate) struct Arguments {
     #[command(flatten)]
     input: Input,
-    /// Where to write the pictures and an index.html.
-    #[arg(long, value_name = "DIR", default_value = "out/check")]
+    /// Write the pictures and a web page of them here
+    #[arg(long, value_name = "DIR", default_value = "out/check", help_heading = "Output")]
     report: PathBuf,
 }
 
@@ -34,16 +33,17 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
                 for warning in &warnings {
                     bar.suspend(|| eprintln!("warning: {}: {warning}", label(&job.row)));
                 }
-                report.add_picture(&label(&job.row), &picture, &warnings).context("writing")?;
+                report.add_picture(&label(&job.row), &picture, &warnings)?;
                 done += 1;
             }
-            Err(error) => failures.push(format!("{}: {error:#}", label(&job.row))),
+            Err(error) => failures.push(format!("{}: {error}", label(&job.row))),
         }
         bar.inc(1);
     }
     bar.finish_and_clear();
-    let index = report.finish().context("writing the report")?;
-    println!("{done} pictures; open {}", index.display());
+    if done > 0 {
+        println!("{done} pictures; open {}", report.finish()?.display());
+    }
     Ok(Outcome { done, failures })
 }
 

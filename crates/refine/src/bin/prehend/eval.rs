@@ -13,8 +13,8 @@ use crate::progress;
 pub(crate) struct Arguments {
     #[command(flatten)]
     input: Input,
-    /// Print JSON, with every pose's score, instead of tables.
-    #[arg(long)]
+    /// Print JSON, with the score of every pose, instead of tables
+    #[arg(long, help_heading = "Output")]
     json: bool,
 }
 
@@ -27,7 +27,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     for job in &jobs {
         match scorer.score(&job.row) {
             Ok(row) => rows.push(row),
-            Err(error) => failures.push(format!("{}: {error:#}", label(&job.row))),
+            Err(error) => failures.push(format!("{}: {error}", label(&job.row))),
         }
         bar.inc(1);
     }
@@ -35,8 +35,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let summary = summarize(&rows);
     if arguments.json {
         let document = json!({ "poses": rows, "summary": summary, "failures": failures });
-        println!("{}", serde_json::to_string_pretty(&document)?);
-    } else {
+        println!("{document:#}");
+    } else if !rows.is_empty() {
         println!("{}", summary.text(|id| format!("object {id}")));
     }
     Ok(Outcome { done: rows.len(), failures })

@@ -3,14 +3,21 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use prehend_refine::{frame_file, refine_with};
+use prehend_refine::bop::write_atomically;
+use prehend_refine::{frame_file, inspect_object, refine_with};
 use serde_json::json;
 
 use crate::outcome::Outcome;
 use crate::progress;
-use crate::refine::{Method, deliver};
+use crate::refine::Method;
 
-pub(crate) fn run(file: &Path, method: &Method, out: Option<&Path>) -> anyhow::Result<Outcome> {
+/// Refines the frame of `file`; the pose goes to `out`, and to standard output without it or if `print`.
+pub(crate) fn run(
+    file: &Path,
+    method: &Method,
+    out: Option<&Path>,
+    print: bool,
+) -> anyhow::Result<Outcome> {
     let input = frame_file::load(file, method.seed())?;
     let mut config = method.config();
     // A frame brings what it has: terms whose evidence is absent drop out unless they were asked for.
@@ -18,6 +25,9 @@ pub(crate) fn run(file: &Path, method: &Method, out: Option<&Path>) -> anyhow::R
         config.terms.retain(|&t| input.offers(t));
     }
     let object = Arc::new(input.object);
+    for warning in inspect_object(&object) {
+        eprintln!("warning: {}: {warning}", object.name);
+    }
     let bar = progress::bar(config.heuristic.iterations as u64, "refining");
     let refined = refine_with(
         &input.observation,
@@ -43,6 +53,12 @@ pub(crate) fn run(file: &Path, method: &Method, out: Option<&Path>) -> anyhow::R
         "iteration": refined.iteration,
         "trace": refined.trace,
     });
-    deliver(&document, out)?;
+    let text = format!("{document:#}\n");
+    if let Some(out) = out {
+        write_atomically(out, text.as_bytes())?;
+    }
+    if out.is_none() || print {
+        print!("{text}");
+    }
     Ok(Outcome { done: 1, failures: Vec::new() })
 }

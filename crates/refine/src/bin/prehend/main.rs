@@ -12,13 +12,26 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-/// Refines the poses of objects held in a robot hand, from RGB-D, touch and physics.
+/// Refine the poses of objects held in a robot hand, from RGB-D, touch and physics
 ///
-/// Datasets are in BOP format (https://bop.felk.cvut.cz), extended by scene_bodies.json (gravity, the
-/// hand's URDF, pose and joints) and scene_tactile.json (taxel forces). Poses are BOP results files:
-/// scene_id,im_id,obj_id,score,R,t,time with t in millimetres.
+/// A vision system says where an object in a hand is, and is off by centimetres. Given that pose, the
+/// segmented RGB-D image, the object's mesh, the hand's joint angles and, if there are, its tactile
+/// sensors, `prehend refine` finds the pose that agrees with all of them.
+///
+/// Datasets are in BOP format (https://bop.felk.cvut.cz), extended by scene_bodies.json (gravity, and
+/// the hand's URDF, pose and joints) and scene_tactile.json (taxel forces). Poses are BOP results files
+/// with the columns scene_id,im_id,obj_id,score,R,t,time: R row-major, t in millimetres, object to
+/// camera (x right, y down, z forward).
+///
+/// A first session:
+///
+///   prehend check  --dataset DIR --poses init.csv
+///   prehend refine --dataset DIR --poses init.csv --out refined.csv --report out
+///   prehend eval   --dataset DIR --poses refined.csv
+///
+/// Exit codes: 0 all done; 1 nothing could be done; 2 some frames failed and the output has the others.
 #[derive(Parser)]
-#[command(name = "prehend", version)]
+#[command(name = "prehend", version, verbatim_doc_comment)]
 struct Arguments {
     #[command(subcommand)]
     command: Command,
@@ -26,16 +39,28 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Refine initial poses: all those of a dataset, or one described by a JSON file.
-    Refine(refine::Arguments),
-    /// Score poses against a dataset's ground truth.
+    /// Refine initial poses: all those of a dataset, or one described by a JSON file
+    Refine(Box<refine::Arguments>),
+    /// Score poses against a dataset's ground truth
+    ///
+    /// Prints means and medians, overall and by object, of PE and OE (position and rotation error), of
+    /// ADD, ADI, MSSD and MSPD, and of CA and IV (contact area and intersection volume with the hand).
+    /// Where the dataset has models_eval/ or scene_bodies_gt.json, those count as the truth.
     Eval(eval::Arguments),
-    /// Draw poses over their images and warn about units and frames, before refining anything.
+    /// Draw poses over their images, and warn about units and frames, before refining anything
     Check(check::Arguments),
 }
 
 fn main() -> ExitCode {
-    let outcome = match Arguments::parse().command {
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(error) => {
+            // A closed pipe is no reason to complain.
+            let _ = error.print();
+            return ExitCode::from(u8::from(error.use_stderr()));
+        }
+    };
+    let outcome = match arguments.command {
         Command::Refine(arguments) => refine::run(&arguments),
         Command::Eval(arguments) => eval::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
@@ -43,7 +68,8 @@ fn main() -> ExitCode {
     match outcome {
         Ok(outcome) => outcome.exit_code(),
         Err(error) => {
-            eprintln!("error: {error:#}");
+            // The messages of our errors contain those of their causes.
+            eprintln!("error: {error}");
             ExitCode::from(1)
         }
     }

@@ -2,36 +2,30 @@
 
 use std::path::PathBuf;
 
+use anyhow::bail;
 use clap::Args;
 use prehend_refine::bop::{Dataset, DatasetError, ReadResults, ResultRow, read_results};
 
 /// A dataset and poses on it.
 #[derive(Args)]
 pub(crate) struct Input {
-    /// BOP dataset: the folder that holds models/ and test/.
-    #[arg(long, value_name = "DIR")]
+    /// BOP dataset: the folder that holds models/ and the split (such as test/)
+    #[arg(long, value_name = "DIR", help_heading = "Input")]
     pub(crate) dataset: PathBuf,
-    /// Split to use, if the dataset has several.
-    #[arg(long, value_name = "NAME")]
-    pub(crate) split: Option<String>,
-    /// Poses, as a BOP results file.
-    #[arg(long, value_name = "FILE")]
+    /// Poses on the dataset's images, as a BOP results file
+    #[arg(long, value_name = "FILE", help_heading = "Input")]
     pub(crate) poses: PathBuf,
-    #[command(flatten)]
-    pub(crate) filter: Filter,
-}
-
-/// Which rows of a results file to use.
-#[derive(Args)]
-pub(crate) struct Filter {
-    /// Only this scene; may be repeated.
-    #[arg(long, value_name = "ID")]
+    /// Split of the dataset [default: test, or the only one]
+    #[arg(long, value_name = "NAME", requires = "dataset", help_heading = "Input")]
+    pub(crate) split: Option<String>,
+    /// Use only the poses of this scene; may be repeated
+    #[arg(long, value_name = "ID", requires = "dataset", help_heading = "Input")]
     pub(crate) scene: Vec<u32>,
-    /// Only this image; may be repeated.
-    #[arg(long, value_name = "ID")]
+    /// Use only the poses of this image; may be repeated
+    #[arg(long, value_name = "ID", requires = "dataset", help_heading = "Input")]
     pub(crate) image: Vec<u32>,
-    /// Only this object; may be repeated.
-    #[arg(long, value_name = "ID")]
+    /// Use only the poses of this object; may be repeated
+    #[arg(long, value_name = "ID", requires = "dataset", help_heading = "Input")]
     pub(crate) object: Vec<u32>,
 }
 
@@ -51,19 +45,24 @@ impl Input {
     }
 
     /// The rows that pass the filter, and what is wrong with the others.
-    pub(crate) fn jobs(&self) -> Result<(Vec<Job>, Vec<String>), DatasetError> {
+    pub(crate) fn jobs(&self) -> anyhow::Result<(Vec<Job>, Vec<String>)> {
         let ReadResults { rows, instances, errors } = read_results(&self.poses)?;
-        let jobs = rows
+        let file = self.poses.display();
+        if rows.is_empty() && errors.is_empty() {
+            bail!("{file}: no poses: there is nothing but a header");
+        }
+        let jobs: Vec<Job> = rows
             .into_iter()
             .zip(instances)
-            .filter(|(row, _)| self.filter.admits(row))
+            .filter(|(row, _)| self.admits(row))
             .map(|(row, instance)| Job { row, instance })
             .collect();
+        if jobs.is_empty() && errors.is_empty() {
+            bail!("{file}: no pose is of the scenes, images and objects asked for");
+        }
         Ok((jobs, errors.iter().map(ToString::to_string).collect()))
     }
-}
 
-impl Filter {
     fn admits(&self, row: &ResultRow) -> bool {
         let admits = |list: &[u32], id: u32| list.is_empty() || list.contains(&id);
         admits(&self.scene, row.scene_id)

@@ -11,7 +11,8 @@ pub(crate) struct Outcome {
 }
 
 impl Outcome {
-    /// Prints the summary to standard error; the exit code is 2 if anything failed.
+    /// Prints the summary to standard error; the exit code is 0 if nothing failed, 2 if some frames did and
+    /// 1 if nothing succeeded.
     pub(crate) fn exit_code(self) -> ExitCode {
         if self.failures.is_empty() {
             return ExitCode::SUCCESS;
@@ -20,6 +21,6 @@ impl Outcome {
         for failure in &self.failures {
             eprintln!("  {failure}");
         }
-        ExitCode::from(2)
+        ExitCode::from(if self.done > 0 { 2 } else { 1 })
     }
 }

@@ -1,72 +1,82 @@
 //! `prehend refine`.
 
+use std::collections::BTreeSet;
+use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use anyhow::{Context, bail};
+use anyhow::bail;
 use clap::Args;
-use prehend_refine::bop::{ResultRow, write_atomically, write_results};
+use prehend_refine::bop::{ResultRow, check_writable, share_image_times, write_results};
 use prehend_refine::report::{FrameReport, Report};
-use prehend_refine::{AssetError, Assets, Config, RefinedPose, TermKind, refine_with};
+use prehend_refine::{
+    AssetError, Assets, Config, RefinedPose, TermKind, inspect_object, refine_with,
+};
 use serde_json::json;
 
-use crate::options::{Filter, Input, Job, label};
+use crate::options::{Input, Job, label};
 use crate::outcome::Outcome;
 use crate::{frame, progress};
 
 #[derive(Args)]
+#[command(
+    override_usage = "prehend refine --dataset <DIR> --poses <FILE> --out <FILE> [OPTIONS]\n       \
+                            prehend refine --frame <FILE> [OPTIONS]"
+)]
+#[command(mut_arg("dataset", |a| a.required(false).required_unless_present("frame")))]
+#[command(mut_arg("poses", |a| a.required(false).required_unless_present("frame")))]
 pub(crate) struct Arguments {
-    /// BOP dataset: the folder that holds models/ and test/.
-    #[arg(long, value_name = "DIR", requires = "poses", required_unless_present = "frame")]
-    dataset: Option<PathBuf>,
-    /// Initial poses, as a BOP results file.
-    #[arg(long, value_name = "FILE", requires = "dataset")]
-    poses: Option<PathBuf>,
-    /// One frame, described by a JSON file (see docs/FRAME.md), instead of a dataset.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["dataset", "poses", "report"])]
-    frame: Option<PathBuf>,
-    /// Split to use, if the dataset has several.
-    #[arg(long, value_name = "NAME")]
-    split: Option<String>,
-    /// Where to write the refined poses (BOP results file; JSON for --frame). It appears whole or not at all.
-    #[arg(long, value_name = "FILE", required_unless_present = "frame")]
-    out: Option<PathBuf>,
     #[command(flatten)]
-    filter: Filter,
+    input: Option<Input>,
+    /// Instead of a dataset, one frame described by a JSON file (see docs/FRAME.md)
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["Input", "report"], help_heading = "Input")]
+    frame: Option<PathBuf>,
+    /// Write the refined poses here: a BOP results file, or JSON with --frame (then optional)
+    ///
+    /// The file appears whole or not at all, once all frames are done; an existing one is replaced.
+    #[arg(long, value_name = "FILE", required_unless_present = "frame", help_heading = "Output")]
+    out: Option<PathBuf>,
+    /// Write a web page here, with pictures of the poses before and after and loss curves
+    #[arg(long, value_name = "DIR", help_heading = "Output")]
+    report: Option<PathBuf>,
+    /// Print JSON on standard output: poses, times, loss curves and failures
+    #[arg(long, help_heading = "Output")]
+    json: bool,
     #[command(flatten)]
     method: Method,
-    /// Worker threads; the poses are the same for any number. [default: all cores]
-    #[arg(long, value_name = "N")]
-    threads: Option<usize>,
-    /// Write pictures before and after, loss curves and an index.html here.
-    #[arg(long, value_name = "DIR")]
-    report: Option<PathBuf>,
-    /// Also print the outcome as JSON on standard output.
-    #[arg(long)]
-    json: bool,
+    /// Worker threads; the poses are the same for any number [default: all cores]
+    #[arg(long, value_name = "N", help_heading = "Method")]
+    threads: Option<NonZeroUsize>,
 }
 
 /// How to refine.
 #[derive(Args)]
 pub(crate) struct Method {
-    /// How candidate steps become a pose: the paper's heuristic.
-    #[arg(long, value_name = "NAME", default_value = "heuristic", value_parser = ["heuristic"])]
+    /// How evidence moves the pose: `heuristic` weighs one step along each term's gradient by its success
+    #[arg(
+        long,
+        value_name = "NAME",
+        default_value = "heuristic",
+        value_parser = ["heuristic"],
+        hide_possible_values = true,
+        help_heading = "Method"
+    )]
     strategy: String,
-    /// Iterations at most; it ends earlier when nothing improves.
-    #[arg(long, value_name = "N", default_value_t = 400)]
+    /// Iterations at most; the search ends earlier when nothing improves
+    #[arg(long, value_name = "N", default_value_t = 400, help_heading = "Method")]
     iterations: usize,
-    /// Run all the iterations even after nothing improves.
-    #[arg(long)]
+    /// Run all the iterations even after nothing improves
+    #[arg(long, help_heading = "Method")]
     exhaustive: bool,
-    /// Evidence to use, of physics, rendering, depth and tactile. [default: all; with --frame, all that
-    /// the frame brings]
-    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    /// Evidence to use, a list of physics, rendering, depth and tactile such as "rendering,depth"
+    /// [default: all; with --frame, what the frame brings]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = "Method")]
     terms: Option<Vec<TermKind>>,
-    /// Return the last pose instead of the one whose rendering fits best.
-    #[arg(long)]
+    /// Return the last pose instead of the one whose rendering fits best
+    #[arg(long, help_heading = "Method")]
     no_checkpoint: bool,
-    /// Seed of the surface samples.
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    /// Seed of the points sampled on the object's surface
+    #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Method")]
     seed: u64,
 }
 
@@ -92,28 +102,20 @@ impl Method {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
+    // What cannot be written must be known before the work, not after it.
+    if let Some(out) = &arguments.out {
+        check_writable(out)?;
+    }
     if let Some(threads) = arguments.threads {
-        rayon::ThreadPoolBuilder::new().num_threads(threads).build_global()?;
+        rayon::ThreadPoolBuilder::new().num_threads(threads.get()).build_global()?;
     }
-    if let Some(file) = &arguments.frame {
-        return frame::run(file, &arguments.method, arguments.out.as_deref());
+    match (&arguments.frame, &arguments.input, &arguments.out) {
+        (Some(file), ..) => {
+            frame::run(file, &arguments.method, arguments.out.as_deref(), arguments.json)
+        }
+        (None, Some(input), Some(out)) => dataset_run(arguments, input, out),
+        _ => bail!("give --dataset, --poses and --out, or --frame"),
     }
-    let (Some(dataset), Some(poses), Some(out)) =
-        (&arguments.dataset, &arguments.poses, &arguments.out)
-    else {
-        bail!("give --dataset, --poses and --out, or --frame");
-    };
-    let input = Input {
-        dataset: dataset.clone(),
-        split: arguments.split.clone(),
-        poses: poses.clone(),
-        filter: Filter {
-            scene: arguments.filter.scene.clone(),
-            image: arguments.filter.image.clone(),
-            object: arguments.filter.object.clone(),
-        },
-    };
-    dataset_run(arguments, &input, out)
 }
 
 fn dataset_run(arguments: &Arguments, input: &Input, out: &Path) -> anyhow::Result<Outcome> {
@@ -125,13 +127,22 @@ fn dataset_run(arguments: &Arguments, input: &Input, out: &Path) -> anyhow::Resu
     let mut report = arguments.report.as_deref().map(Report::create).transpose()?;
     let mut rows = Vec::new();
     let mut outcomes = Vec::new();
+    let mut introduced = BTreeSet::new();
     let bar = progress::bar(jobs.len() as u64, "refining");
     for job in &jobs {
         match refine_job(&mut assets, job, &config, report.is_some()) {
             Ok(done) => {
+                if introduced.insert(job.row.obj_id) {
+                    for warning in &done.warnings {
+                        bar.suspend(|| eprintln!("warning: object {}: {warning}", job.row.obj_id));
+                    }
+                }
                 outcomes.push(summary(job, &done));
                 if let (Some(report), Some(frame)) = (&mut report, &done.report) {
-                    report.add(&label(&job.row), frame).context("writing the report")?;
+                    // A full disk must not cost the poses.
+                    if let Err(error) = report.add(&label(&job.row), frame) {
+                        failures.push(format!("{}: report: {error}", label(&job.row)));
+                    }
                 }
                 rows.push(ResultRow {
                     t_cam_model: done.pose.t_cam_object,
@@ -139,31 +150,42 @@ fn dataset_run(arguments: &Arguments, input: &Input, out: &Path) -> anyhow::Resu
                     ..job.row.clone()
                 });
             }
-            Err(error) => failures.push(format!("{}: {error:#}", label(&job.row))),
+            Err(error) => failures.push(format!("{}: {error}", label(&job.row))),
         }
         bar.inc(1);
     }
     bar.finish_and_clear();
-    share_time(&mut rows);
-    write_results(out, &rows)?;
-    if let Some(report) = report {
-        report.finish().context("writing the report")?;
+    let done = rows.len();
+    if done > 0 {
+        let seconds: f64 = rows.iter().map(|r| r.time).sum();
+        share_image_times(&mut rows);
+        write_results(out, &rows)?;
+        if !arguments.json {
+            let mean = seconds / done as f64;
+            println!("{done} poses refined in {mean:.2} s each, written to {}", out.display());
+        }
+        if let Some(report) = report {
+            match report.finish() {
+                Ok(index) if !arguments.json => println!("report: open {}", index.display()),
+                Ok(_) => {}
+                Err(error) => failures.push(format!("report: {error}")),
+            }
+        }
+    } else {
+        failures.push(format!("no pose could be refined, {} was not written", out.display()));
     }
     if arguments.json {
         let document = json!({ "frames": outcomes, "failures": failures });
-        println!("{}", serde_json::to_string_pretty(&document)?);
-    } else {
-        let seconds: f64 = outcomes.iter().filter_map(|o| o["seconds"].as_f64()).sum();
-        let mean = seconds / rows.len().max(1) as f64;
-        println!("{} poses refined in {mean:.2} s each, written to {}", rows.len(), out.display());
+        println!("{document:#}");
     }
-    Ok(Outcome { done: rows.len(), failures })
+    Ok(Outcome { done, failures })
 }
 
 struct Done {
     pose: RefinedPose,
     seconds: f64,
     report: Option<FrameReport>,
+    warnings: Vec<String>,
 }
 
 fn refine_job(
@@ -182,7 +204,7 @@ fn refine_job(
     let seconds = start.elapsed().as_secs_f64();
     let report =
         with_report.then(|| FrameReport::draw(&observation, &object, &row.t_cam_model, &pose));
-    Ok(Done { pose, seconds, report })
+    Ok(Done { pose, seconds, report, warnings: inspect_object(&object) })
 }
 
 fn summary(job: &Job, done: &Done) -> serde_json::Value {
@@ -199,26 +221,4 @@ fn summary(job: &Job, done: &Done) -> serde_json::Value {
         "quaternion_wxyz": [q.w, q.i, q.j, q.k],
         "trace": done.pose.trace,
     })
-}
-
-/// BOP wants the time of the whole image on each of its rows.
-fn share_time(rows: &mut [ResultRow]) {
-    let times: Vec<f64> = rows
-        .iter()
-        .map(|r| {
-            let same = rows.iter().filter(|o| (o.scene_id, o.im_id) == (r.scene_id, r.im_id));
-            same.map(|o| o.time).sum()
-        })
-        .collect();
-    rows.iter_mut().zip(times).for_each(|(row, time)| row.time = time);
-}
-
-/// Writes `document` to `out`, or prints it.
-pub(crate) fn deliver(document: &serde_json::Value, out: Option<&Path>) -> anyhow::Result<()> {
-    let text = serde_json::to_string_pretty(document)? + "\n";
-    match out {
-        Some(file) => write_atomically(file, text.as_bytes())?,
-        None => print!("{text}"),
-    }
-    Ok(())
 }

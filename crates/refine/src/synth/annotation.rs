@@ -1,0 +1,136 @@
+//! What the JSON files of a dataset say of made-up scenes. Lengths in millimetres, as BOP has them.
+
+use nalgebra::{Isometry3, Point3};
+use prehend_render::Mask;
+use serde_json::{Map, Value, json};
+
+use super::Scene;
+use crate::bop::{UNITS_PER_NEWTON, rotation_to_row_major, translation_to_mm};
+use crate::{HandReading, Object};
+
+/// Millimetres of one unit of the depth images.
+pub(super) const DEPTH_SCALE: f64 = 0.1;
+/// Forces are clipped at this many units, as sensors do.
+const FORCE_LIMIT: f64 = 10_000.0;
+
+/// Entry of `scene_camera.json`; the world is the hand's base where there is a hand.
+pub(super) fn camera(scene: &Scene) -> Value {
+    let k = scene.observation.camera.k();
+    let mut entry = Map::from_iter([
+        ("cam_K".to_owned(), json!(k)),
+        ("depth_scale".to_owned(), json!(DEPTH_SCALE)),
+    ]);
+    if let Some(hand) = &scene.observation.hand {
+        entry.extend(pose("w2c", &hand.t_cam_hand));
+    }
+    Value::Object(entry)
+}
+
+/// Entry of `scene_gt.json`.
+pub(super) fn truth(scene: &Scene) -> Value {
+    let mut object = pose("m2c", &scene.truth);
+    object.insert("obj_id".into(), json!(scene.obj_id));
+    json!([object])
+}
+
+/// Entry of `scene_gt_info.json`; `whole` is the silhouette that nothing hides.
+pub(super) fn visibility(scene: &Scene, whole: &Mask) -> Value {
+    let (visible, depth) = (&scene.observation.mask, &scene.observation.depth);
+    let measured = whole.pixels().iter().zip(depth.pixels()).filter(|(m, z)| **m && **z > 0.0);
+    json!([{
+        "bbox_obj": bounding_box(whole),
+        "bbox_visib": bounding_box(visible),
+        "px_count_all": whole.count(),
+        "px_count_valid": measured.count(),
+        "px_count_visib": visible.count(),
+        "visib_fract": visible.count() as f64 / whole.count().max(1) as f64,
+    }])
+}
+
+/// Entry of `scene_bodies.json`.
+pub(super) fn bodies(scene: &Scene, hand: &HandReading, urdf: &str) -> Value {
+    let names = scene.robot.tree.joint_names().iter().cloned();
+    let joints: Map<String, Value> = names.zip(hand.joints.iter().map(|&q| json!(q))).collect();
+    let mut body = pose("b2c", &hand.t_cam_hand);
+    body.insert("name".into(), json!("hand"));
+    body.insert("urdf".into(), json!(urdf));
+    body.insert("joints".into(), Value::Object(joints));
+    let gravity = scene.observation.gravity.unwrap_or_default();
+    json!({ "gravity": gravity.as_slice(), "bodies": [body] })
+}
+
+/// Entry of `scene_tactile.json`.
+pub(super) fn touch(hand: &HandReading, taxels: &str) -> Value {
+    let units = |f: f64| (f * UNITS_PER_NEWTON).clamp(-FORCE_LIMIT, FORCE_LIMIT);
+    let force: Vec<[f64; 3]> = hand.forces.iter().map(|f| [f.x, f.y, f.z].map(units)).collect();
+    json!({ "body": "hand", "taxels": taxels, "force": force })
+}
+
+/// Entry of `models_info.json`.
+pub(super) fn model(object: &Object) -> Value {
+    let mm = |p: Point3<f64>| [p.x, p.y, p.z].map(|v| v * 1e3);
+    let (low, high) = object.mesh.bounds().unwrap_or_default();
+    let ([x, y, z], size) = (mm(low), mm(Point3::from(high - low)));
+    let inertial = &object.inertial;
+    let rows = inertial.inertia.row_iter().map(|r| r.iter().copied().collect());
+    json!({
+        "diameter": diameter(&object.mesh.vertices) * 1e3,
+        "min_x": x, "min_y": y, "min_z": z,
+        "size_x": size[0], "size_y": size[1], "size_z": size[2],
+        "mass_kg": inertial.mass,
+        "com_mm": mm(inertial.center_of_mass),
+        "inertia_kg_m2": rows.collect::<Vec<Vec<f64>>>(),
+    })
+}
+
+/// `cam_R_…` and `cam_t_…` of a pose into the camera frame.
+fn pose(suffix: &str, pose: &Isometry3<f64>) -> Map<String, Value> {
+    Map::from_iter([
+        (format!("cam_R_{suffix}"), json!(rotation_to_row_major(&pose.rotation))),
+        (format!("cam_t_{suffix}"), json!(translation_to_mm(&pose.translation))),
+    ])
+}
+
+/// Left, top, width and height of what is set, BOP's all −1 if nothing is.
+fn bounding_box(mask: &Mask) -> [i64; 4] {
+    let width = mask.width().max(1);
+    let set = mask.pixels().iter().enumerate().filter(|(_, set)| **set);
+    let bounds = set.map(|(i, _)| ((i % width) as i64, (i / width) as i64)).fold(
+        None,
+        |bounds: Option<[i64; 4]>, (x, y)| {
+            let [l, t, r, b] = bounds.unwrap_or([x, y, x, y]);
+            Some([l.min(x), t.min(y), r.max(x), b.max(y)])
+        },
+    );
+    bounds.map_or([-1; 4], |[l, t, r, b]| [l, t, r - l + 1, b - t + 1])
+}
+
+/// Largest distance between two of `points`.
+fn diameter(points: &[Point3<f64>]) -> f64 {
+    let from = |(i, p): (usize, &Point3<f64>)| {
+        points[i + 1..].iter().map(|q| (q - p).norm_squared()).fold(0.0, f64::max)
+    };
+    points.iter().enumerate().map(from).fold(0.0, f64::max).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn boxes_are_left_top_width_height() {
+        let mut mask = Mask::filled(5, 4, false);
+        assert_eq!(bounding_box(&mask), [-1; 4]);
+        for (x, y) in [(1, 3), (3, 2)] {
+            mask.pixels_mut()[y * 5 + x] = true;
+        }
+        assert_eq!(bounding_box(&mask), [1, 2, 3, 2]);
+    }
+
+    #[test]
+    fn the_diameter_is_the_longest_distance() {
+        let points = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [-2.0, 4.0, 0.0], [0.0, 0.0, 3.0]];
+        assert_eq!(diameter(&points.map(Point3::from)), 29f64.sqrt());
+        assert_eq!(diameter(&[]), 0.0);
+    }
+}

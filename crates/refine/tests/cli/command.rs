@@ -1,0 +1,208 @@
+//! What the commands do when all is well.
+
+use std::fs;
+
+use serde_json::{Value, json};
+
+use crate::fixture::Workplace;
+
+const REFINE: &str = "refine --dataset ds --poses ds/init.csv --iterations 10";
+
+#[test]
+fn refined_poses_are_nearer_the_truth() {
+    let place = Workplace::new();
+    let told = place.succeed(&format!("{REFINE} --out refined.csv"));
+    assert!(told.starts_with("2 poses refined in ") && told.contains("refined.csv"), "{told}");
+    let rows = place.poses("refined.csv");
+    let ids: Vec<_> = rows.iter().map(|r| (r.scene_id, r.im_id, r.obj_id)).collect();
+    assert_eq!(ids, [(1, 0, 5), (1, 1, 5)]);
+    assert!(rows.iter().all(|r| r.time > 0.0));
+    let scores = |poses: &str| -> Value {
+        let text = place.succeed(&format!("eval --dataset ds --poses {poses} --json"));
+        serde_json::from_str(&text).unwrap()
+    };
+    let (before, after) = (scores("ds/init.csv"), scores("refined.csv"));
+    for k in 0..2 {
+        for field in ["pe_cm", "add_mm"] {
+            let of = |all: &Value| all["poses"][k]["score"][field].as_f64().unwrap();
+            assert!(of(&after) < 0.7 * of(&before), "{field}: {} {}", of(&before), of(&after));
+        }
+    }
+    let table = place.succeed("eval --dataset ds --poses refined.csv");
+    assert!(table.contains("object 5") && table.contains("|ΔIV|"), "{table}");
+}
+
+#[test]
+fn any_number_of_threads_gives_the_same_bytes() {
+    let place = Workplace::new();
+    let poses = |threads: u32| {
+        place.succeed(&format!("{REFINE} --threads {threads} --out {threads}.csv"));
+        let text = place.read(&format!("{threads}.csv"));
+        let without_time = |line: &str| line.rsplit_once(',').map(|(row, _)| row.to_owned());
+        text.lines().map(without_time).collect::<Option<Vec<_>>>().unwrap()
+    };
+    let one = poses(1);
+    assert_eq!(one.len(), 3);
+    assert_eq!(one, poses(2));
+    assert_eq!(one, poses(3));
+}
+
+#[test]
+fn filters_choose_rows() {
+    let place = Workplace::new();
+    place.succeed(&format!("{REFINE} --image 1 --out one.csv"));
+    let one = place.poses("one.csv");
+    assert_eq!(one.iter().map(|r| r.im_id).collect::<Vec<_>>(), [1]);
+    place.succeed(&format!("{REFINE} --scene 1 --object 5 --image 0 --image 1 --out all.csv"));
+    let all = place.poses("all.csv");
+    assert_eq!(all.len(), 2);
+    assert_eq!(all[1].t_cam_model, one[0].t_cam_model);
+}
+
+#[test]
+fn json_and_report_tell_the_whole_run() {
+    let place = Workplace::new();
+    let out = place.succeed(&format!("{REFINE} --out r.csv --json --report pictures"));
+    let told: Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(told["failures"], json!([]));
+    let rows = place.poses("r.csv");
+    for (row, frame) in rows.iter().zip(told["frames"].as_array().unwrap()) {
+        assert_eq!(frame["im_id"], json!(row.im_id));
+        let z = frame["t_cam_model_mm"][2].as_f64().unwrap();
+        assert!((z - 1e3 * row.t_cam_model.translation.z).abs() < 1e-9);
+        let iterations = frame["trace"]["iterations"].as_array().unwrap();
+        assert_eq!(iterations.len(), 11);
+    }
+    let page = place.read("pictures/index.html");
+    assert_eq!(page.matches("<section>").count(), 2);
+    let named: Vec<&str> =
+        page.split("src=\"").skip(1).map(|rest| rest.split('"').next().unwrap()).collect();
+    assert_eq!(named, ["0000.png", "0000.svg", "0001.png", "0001.svg"]);
+    for name in named {
+        let file = place.path("pictures").join(name);
+        if name.ends_with(".png") {
+            let picture = prehend_render::RgbImage::load(&file).unwrap();
+            assert!(picture.width() > 100 && picture.pixels().iter().any(|p| p[0] != p[1]));
+        } else {
+            let text = fs::read_to_string(file).unwrap();
+            assert!(text.starts_with("<svg") && text.trim_end().ends_with("</svg>"));
+        }
+    }
+}
+
+#[test]
+fn check_draws_every_pose_and_warns() {
+    let place = Workplace::new();
+    let told = place.succeed("check --dataset ds --poses ds/init.csv --report look");
+    assert!(told.contains("2 pictures; open look/index.html"), "{told}");
+    assert!(place.path("look/0001.png").is_file());
+    place.edit_json("ds/models/models_info.json", |info| {
+        info["5"].as_object_mut().unwrap().remove("mass_kg");
+    });
+    place.replace(
+        "ds/test/000001/scene_camera.json",
+        "\"depth_scale\": 0.1",
+        "\"depth_scale\": 100",
+    );
+    let said = place.prehend("check --dataset ds --poses ds/init.csv --report look");
+    assert_eq!(said.code, 0, "{}", said.err);
+    for warning in [
+        "scene 1 image 0 object 5: sensor depth is 1",
+        "scene 1 image 1 object 5: the object's mass is unknown",
+    ] {
+        assert!(said.err.contains(warning), "{}", said.err);
+    }
+    assert!(place.read("look/index.html").contains("check depth_scale and units"));
+}
+
+#[test]
+fn a_mesh_with_a_hole_serves_where_its_mass_is_given() {
+    let place = Workplace::new();
+    let file = place.path("ds/models/obj_000005.ply");
+    let mut mesh = prehend_geometry::TriMesh::load(&file).unwrap();
+    mesh.faces.truncate(mesh.faces.len() - 1);
+    mesh.save_ply(&file).unwrap();
+    let said = place.prehend(&format!("{REFINE} --out r.csv"));
+    assert_eq!((said.code, place.poses("r.csv").len()), (0, 2), "{}", said.err);
+    assert_eq!(said.err.matches("warning: object 5: the mesh is not closed").count(), 1);
+}
+
+/// The same evidence as a dataset and as a frame file gives the same pose.
+#[test]
+fn a_frame_file_is_as_good_as_a_dataset() {
+    let place = Workplace::new();
+    let scene = "ds/test/000001";
+    let entry = |file: &str| place.json(&format!("{scene}/{file}"))["0"].clone();
+    let (camera, bodies) = (entry("scene_camera.json"), entry("scene_bodies.json"));
+    let hand = &bodies["bodies"][0];
+    let initial = &place.poses("ds/init.csv")[0].t_cam_model;
+    let rows = |r: &Value, t: &Value| {
+        let row = |k: usize| json!([r[3 * k], r[3 * k + 1], r[3 * k + 2], t[k]]);
+        json!([row(0), row(1), row(2), [0, 0, 0, 1]])
+    };
+    let forces: Vec<Vec<f64>> = entry("scene_tactile.json")["force"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|f| f.as_array().unwrap().iter().map(|v| v.as_f64().unwrap() / 1e3).collect())
+        .collect();
+    let q = initial.rotation.quaternion();
+    let frame = json!({
+        "K": camera["cam_K"],
+        "rgb": "test/000001/rgb/000000.png",
+        "depth": "test/000001/depth/000000.png",
+        "depth_unit_m": 1e-4,
+        "mask": "test/000001/mask_visib/000000_000000.png",
+        "mesh": "models/obj_000005.ply",
+        "mesh_unit": "mm",
+        "mass_kg": 0.603,
+        "pose": {
+            "unit": "m",
+            "quaternion_xyzw": [q.i, q.j, q.k, q.w],
+            "translation": initial.translation.vector.as_slice(),
+        },
+        "gravity": bodies["gravity"],
+        "robot": {
+            "urdf": "hand/hand.urdf",
+            "base_pose": { "unit": "mm", "matrix": rows(&hand["cam_R_b2c"], &hand["cam_t_b2c"]) },
+            "joints": hand["joints"],
+            "taxels": "hand/taxels.csv",
+            "forces": forces,
+        },
+    });
+    place.write("ds/frame.json", &frame.to_string());
+    let printed = place.succeed("refine --frame ds/frame.json --iterations 10");
+    let told: Value = serde_json::from_str(&printed).unwrap();
+    assert_eq!(told["terms"], json!(["physics", "rendering", "depth", "tactile"]));
+    place.succeed(&format!("{REFINE} --image 0 --out r.csv"));
+    let expected = &place.poses("r.csv")[0].t_cam_model;
+    for k in 0..3 {
+        let found = told["translation_m"][k].as_f64().unwrap();
+        assert!((found - expected.translation.vector[k]).abs() < 1e-6);
+        assert_eq!(told["t_cam_object"][k][3].as_f64(), Some(found));
+    }
+    assert_eq!(place.succeed("refine --frame ds/frame.json --iterations 10 --out pose.json"), "");
+    assert_eq!(place.json("pose.json"), told);
+
+    // Without the hand there is no physics and no touch.
+    let mut bare = frame;
+    bare.as_object_mut().unwrap().remove("robot");
+    place.write("ds/bare.json", &bare.to_string());
+    let told: Value =
+        serde_json::from_str(&place.succeed("refine --frame ds/bare.json --iterations 2")).unwrap();
+    assert_eq!(told["terms"], json!(["rendering", "depth"]));
+}
+
+#[test]
+fn help_names_what_is_needed() {
+    let place = Workplace::new();
+    let help = place.succeed("--help");
+    assert!(
+        ["refine", "eval", "check", "millimetres", "Exit codes"].iter().all(|w| help.contains(w))
+    );
+    let help = place.succeed("refine --help");
+    assert!(help.contains("prehend refine --dataset <DIR> --poses <FILE> --out <FILE> [OPTIONS]"));
+    assert!(help.contains("prehend refine --frame <FILE> [OPTIONS]"));
+    let said = place.prehend("refine --dataset ds --out r.csv");
+    assert!(said.code == 1 && said.err.contains("--poses <FILE>"), "{}", said.err);
+}
