@@ -135,8 +135,11 @@ impl From<ImageError> for DatasetError {
         match &error {
             ImageError::Io { path, source } => Self::reading(path, source),
             ImageError::Codec { path, source } => Self::malformed(path, source),
-            ImageError::Kind { path, .. } | ImageError::Scale { path, .. } => {
-                Self::malformed(path, error.to_string())
+            ImageError::Kind { path, expected, found } => {
+                Self::malformed(path, format!("expected {expected}, found {found}"))
+            }
+            ImageError::Scale { path, scale } => {
+                Self::malformed(path, format!("{scale} m per depth unit: must be above zero"))
             }
             ImageError::Size { .. } => Self::malformed(Path::new(""), error.to_string()),
         }

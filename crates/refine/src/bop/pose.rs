@@ -31,7 +31,7 @@ pub enum PoseFault {
     },
     /// RᵀR differs from the identity by more than [`ROTATION_TOLERANCE`].
     #[error(
-        "not orthonormal: RᵀR differs from the identity by {deviation:.3e} (at most {ROTATION_TOLERANCE} allowed)"
+        "not orthonormal: RᵀR differs from the identity by {deviation:.4} (at most {ROTATION_TOLERANCE} allowed)"
     )]
     NotOrthonormal {
         /// Largest entry of |RᵀR − I|.

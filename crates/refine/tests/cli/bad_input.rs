@@ -38,7 +38,6 @@ fn table(faults: &[Fault], survivors: &[(u32, u32)]) {
         let before = place.listing();
         let said = place.prehend(REFINE);
         let (name, err) = (fault.name, &said.err);
-        eprintln!("@@ {name}{err}");
         assert_eq!(said.code, 2, "{name}: {err}");
         let failed = 3 - survivors.len();
         assert!(
@@ -124,7 +123,7 @@ fn images() {
                     let file = p.path(DEPTH);
                     Mask::filled(640, 480, true).save(&file).unwrap();
                 },
-                expected: &["ds/test/000001/depth/000000.png: expected 16-bit grey"],
+                expected: &["object 5: ds/test/000001/depth/000000.png: expected 16-bit grey"],
             },
             Fault {
                 name: "no depth",

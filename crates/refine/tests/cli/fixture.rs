@@ -35,9 +35,13 @@ pub(crate) struct Said {
 
 impl Workplace {
     pub(crate) fn new() -> Self {
-        let dir = tempfile::tempdir().unwrap();
-        copy(sample(), &dir.path().join("ds"));
-        Self { dir }
+        let place = Self::empty();
+        copy(sample(), &place.path("ds"));
+        place
+    }
+
+    pub(crate) fn empty() -> Self {
+        Self { dir: tempfile::tempdir().unwrap() }
     }
 
     pub(crate) fn path(&self, name: &str) -> PathBuf {
