@@ -9,6 +9,7 @@ use prehend_geometry::hand::{Taxel, load_taxels};
 use prehend_geometry::robot::Robot as KinematicTree;
 
 use crate::bop::{Dataset, DatasetError, Frame, Models, Tactile};
+use crate::observation::check_gravity;
 use crate::{HandReading, Inertial, Object, Observation, RefineError, Robot, TermKind};
 
 /// BOP models are in millimetres \[m\].
@@ -96,6 +97,9 @@ impl<'a> Assets<'a> {
                 .bodies_fault("bodies", format!("expected one hand, found {found}"))
                 .into());
         };
+        if terms.contains(&TermKind::Physics) {
+            check_gravity(&bodies.gravity).map_err(|e| frame.bodies_fault("gravity", e))?;
+        }
         let touch = terms.contains(&TermKind::Tactile);
         let tactile = touch.then(|| frame.tactile()).transpose()?;
         let robot = self.robot(&body.urdf, tactile.as_ref().map(|t| t.taxels.as_path()))?;

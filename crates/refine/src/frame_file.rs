@@ -14,6 +14,7 @@ use prehend_render::{Camera, DepthImage, Mask, RgbImage};
 use serde::Deserialize;
 
 use crate::bop::rotation_from_row_major;
+use crate::observation::check_gravity;
 use crate::{AssetError, HandReading, Object, Observation, Robot, TermKind};
 
 /// Why a frame file could not be used.
@@ -209,6 +210,7 @@ pub fn load(file: &Path, seed: u64) -> Result<FrameInput, FrameFileError> {
         }
     };
     let gravity = layout.gravity.map(Vector3::from);
+    gravity.map_or(Ok(()), |g| check_gravity(&g)).map_err(|reason| field("gravity", reason))?;
     let observation = Observation { camera, color, depth, mask, gravity, hand };
     Ok(FrameInput { observation, object, robot, t_cam_object })
 }

@@ -33,14 +33,15 @@ pub fn inspect_object(object: &Object) -> Vec<String> {
     warnings
 }
 
-/// Warnings about units and frames, in plain sentences; empty if all looks well.
-pub fn inspect(
+/// Warnings about units and frames at a pose (object → camera), in plain sentences; empty if all looks
+/// well. Those about the object alone are [`inspect_object`]'s.
+pub fn inspect_pose(
     observation: &Observation,
     object: &Object,
     robot: Option<&Robot>,
     t_cam_object: &Isometry3<f64>,
 ) -> Vec<String> {
-    let mut warnings = inspect_object(object);
+    let mut warnings = Vec::new();
     let centre = t_cam_object * object.centre;
     if centre.z <= 0.0 {
         warnings.push(format!("the object is behind the camera (z = {:.3} m)", centre.z));

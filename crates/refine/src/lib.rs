@@ -28,7 +28,7 @@ pub mod trace;
 pub use assets::{AssetError, Assets, load_mesh, load_object};
 pub use config::{Config, TermKind};
 pub use error::RefineError;
-pub use inspect::{inspect, inspect_object};
+pub use inspect::{inspect_object, inspect_pose};
 pub use normal::Normal;
 pub use object::{DEFAULT_DENSITY, Inertial, Object};
 pub use observation::{HandReading, Observation};

@@ -30,3 +30,15 @@ pub struct Observation {
     /// The hand, where known.
     pub hand: Option<HandReading>,
 }
+
+/// Magnitudes of gravity on solid ground, from small moons up, with room to spare \[m/s²\].
+const PLAUSIBLE_GRAVITY: std::ops::Range<f64> = 1e-2..1e3;
+
+/// Refuses a gravity that cannot be in m/s² or that presses nothing into the hand.
+pub(crate) fn check_gravity(gravity: &Vector3<f64>) -> Result<(), String> {
+    let norm = gravity.norm();
+    if PLAUSIBLE_GRAVITY.contains(&norm) {
+        return Ok(());
+    }
+    Err(format!("{norm:.3e} m/s² is no gravity"))
+}

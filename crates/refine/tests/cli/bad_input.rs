@@ -283,6 +283,11 @@ fn entries_of_an_image() {
                 expected: &["scene_bodies.json: 0.bodies[0].cam_R_b2c: not orthonormal"],
             },
             Fault {
+                name: "no gravity",
+                make: |p| entry(p, "scene_bodies.json", |e| e["gravity"] = json!([0, 0, 0])),
+                expected: &["scene_bodies.json: 0.gravity: 0.000e0 m/s² is no gravity"],
+            },
+            Fault {
                 name: "two hands",
                 make: |p| {
                     entry(p, "scene_bodies.json", |e| {
@@ -500,7 +505,8 @@ fn files_of_a_scene() {
 /// Nothing can be done: exit code 1, no output file, and an older one stays.
 #[test]
 fn hopeless_runs() {
-    let cases: [(&str, fn(&Workplace), &str, &str); 10] = [
+    type Case = (&'static str, fn(&Workplace), &'static str, &'static str);
+    let cases: [Case; 10] = [
         ("no poses", |p| p.remove("init.csv"), REFINE, "error: init.csv: no such file"),
         ("empty poses", |p| p.write("init.csv", ""), REFINE, "error: init.csv: the file is empty"),
         (

@@ -1,5 +1,7 @@
 //! The `prehend` program, run as its users run it, on a made-up dataset.
 
+#![allow(clippy::unwrap_used)] // a test may panic; helpers outside test functions count as code to the lint
+
 mod bad_input;
 mod command;
 mod fixture;

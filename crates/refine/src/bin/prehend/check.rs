@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use prehend_refine::bop::ResultRow;
 use prehend_refine::report::{Report, outline_picture};
-use prehend_refine::{AssetError, Assets, TermKind, inspect};
+use prehend_refine::{AssetError, Assets, TermKind, inspect_object, inspect_pose};
 
 use crate::options::{Input, Job, label};
 use crate::outcome::Outcome;
@@ -55,6 +55,7 @@ fn check(
     let object = assets.object(*obj_id)?;
     let frame = assets.dataset().frame(*scene_id, *im_id)?;
     let (observation, robot) = assets.observation(&frame, job.instance, &TermKind::ALL)?;
-    let warnings = inspect(&observation, &object, robot.as_deref(), t_cam_model);
+    let mut warnings = inspect_object(&object);
+    warnings.extend(inspect_pose(&observation, &object, robot.as_deref(), t_cam_model));
     Ok((outline_picture(&observation, &object, robot.as_deref(), t_cam_model), warnings))
 }

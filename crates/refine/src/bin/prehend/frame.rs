@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use prehend_refine::bop::write_atomically;
-use prehend_refine::{frame_file, inspect_object, refine_with};
+use prehend_refine::{frame_file, inspect_object, inspect_pose, refine_with};
 use serde_json::json;
 
 use crate::outcome::Outcome;
@@ -25,21 +25,16 @@ pub(crate) fn run(
         config.terms.retain(|&t| input.offers(t));
     }
     let object = Arc::new(input.object);
-    for warning in inspect_object(&object) {
-        eprintln!("warning: {}: {warning}", object.name);
-    }
+    let robot = input.robot.as_ref();
+    let mut warnings = inspect_object(&object);
+    warnings.extend(inspect_pose(&input.observation, &object, robot, &input.t_cam_object));
+    warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
     let bar = progress::bar(config.heuristic.iterations as u64, "refining");
-    let refined = refine_with(
-        &input.observation,
-        &object,
-        input.robot.as_ref(),
-        &input.t_cam_object,
-        &config,
-        |p| {
+    let refined =
+        refine_with(&input.observation, &object, robot, &input.t_cam_object, &config, |p| {
             bar.set_position(p.iteration as u64);
             true
-        },
-    )?;
+        })?;
     bar.finish_and_clear();
     let pose = &refined.t_cam_object;
     let q = pose.rotation.quaternion();
@@ -51,6 +46,7 @@ pub(crate) fn run(
         "quaternion_wxyz": [q.w, q.i, q.j, q.k],
         "terms": config.terms.iter().map(|t| t.name()).collect::<Vec<_>>(),
         "iteration": refined.iteration,
+        "warnings": warnings,
         "trace": refined.trace,
     });
     let text = format!("{document:#}\n");

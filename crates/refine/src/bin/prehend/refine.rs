@@ -10,7 +10,7 @@ use clap::Args;
 use prehend_refine::bop::{ResultRow, check_writable, share_image_times, write_results};
 use prehend_refine::report::{FrameReport, Report};
 use prehend_refine::{
-    AssetError, Assets, Config, RefinedPose, TermKind, inspect_object, refine_with,
+    AssetError, Assets, Config, RefinedPose, TermKind, inspect_object, inspect_pose, refine_with,
 };
 use serde_json::json;
 
@@ -132,10 +132,13 @@ fn dataset_run(arguments: &Arguments, input: &Input, out: &Path) -> anyhow::Resu
     for job in &jobs {
         match refine_job(&mut assets, job, &config, report.is_some()) {
             Ok(done) => {
-                if introduced.insert(job.row.obj_id) {
-                    for warning in &done.warnings {
-                        bar.suspend(|| eprintln!("warning: object {}: {warning}", job.row.obj_id));
-                    }
+                let id = job.row.obj_id;
+                if introduced.insert(id) {
+                    let warnings = done.object_warnings.iter();
+                    warnings.for_each(|w| bar.suspend(|| eprintln!("warning: object {id}: {w}")));
+                }
+                for warning in &done.warnings {
+                    bar.suspend(|| eprintln!("warning: {}: {warning}", label(&job.row)));
                 }
                 outcomes.push(summary(job, &done));
                 if let (Some(report), Some(frame)) = (&mut report, &done.report) {
@@ -185,6 +188,7 @@ struct Done {
     pose: RefinedPose,
     seconds: f64,
     report: Option<FrameReport>,
+    object_warnings: Vec<String>,
     warnings: Vec<String>,
 }
 
@@ -204,12 +208,15 @@ fn refine_job(
     let seconds = start.elapsed().as_secs_f64();
     let report =
         with_report.then(|| FrameReport::draw(&observation, &object, &row.t_cam_model, &pose));
-    Ok(Done { pose, seconds, report, warnings: inspect_object(&object) })
+    let object_warnings = inspect_object(&object);
+    let warnings = inspect_pose(&observation, &object, robot.as_deref(), &row.t_cam_model);
+    Ok(Done { pose, seconds, report, object_warnings, warnings })
 }
 
 fn summary(job: &Job, done: &Done) -> serde_json::Value {
     let pose = &done.pose.t_cam_object;
     let q = pose.rotation.quaternion();
+    let warnings: Vec<&String> = done.object_warnings.iter().chain(&done.warnings).collect();
     json!({
         "scene_id": job.row.scene_id,
         "im_id": job.row.im_id,
@@ -219,6 +226,7 @@ fn summary(job: &Job, done: &Done) -> serde_json::Value {
         "iterations": done.pose.trace.iterations.len().saturating_sub(1),
         "t_cam_model_mm": (pose.translation.vector * 1e3).as_slice(),
         "quaternion_wxyz": [q.w, q.i, q.j, q.k],
+        "warnings": warnings,
         "trace": done.pose.trace,
     })
 }
