@@ -9,6 +9,7 @@ use prehend_refine::{AssetError, Assets, TermKind, inspect_object, inspect_pose}
 
 use crate::options::{Input, Job, label};
 use crate::outcome::Outcome;
+use crate::output::say;
 use crate::progress;
 
 #[derive(Args)]
@@ -42,7 +43,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     }
     bar.finish_and_clear();
     if done > 0 {
-        println!("{done} pictures; open {}", report.finish()?.display());
+        say(format!("{done} pictures; open {}", report.finish()?.display()))?;
     }
     Ok(Outcome { done, failures })
 }

@@ -7,6 +7,7 @@ use serde_json::json;
 
 use crate::options::{Input, label};
 use crate::outcome::Outcome;
+use crate::output::say;
 use crate::progress;
 
 #[derive(Args)]
@@ -35,9 +36,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let summary = summarize(&rows);
     if arguments.json {
         let document = json!({ "poses": rows, "summary": summary, "failures": failures });
-        println!("{document:#}");
+        say(format!("{document:#}"))?;
     } else if !rows.is_empty() {
-        println!("{}", summary.text(|id| format!("object {id}")));
+        say(summary.text(|id| format!("object {id}")))?;
     }
     Ok(Outcome { done: rows.len(), failures })
 }

@@ -8,6 +8,7 @@ use prehend_refine::{frame_file, inspect_object, inspect_pose, refine_with};
 use serde_json::json;
 
 use crate::outcome::Outcome;
+use crate::output::say;
 use crate::progress;
 use crate::refine::Method;
 
@@ -49,12 +50,12 @@ pub(crate) fn run(
         "warnings": warnings,
         "trace": refined.trace,
     });
-    let text = format!("{document:#}\n");
+    let text = format!("{document:#}");
     if let Some(out) = out {
-        write_atomically(out, text.as_bytes())?;
+        write_atomically(out, format!("{text}\n").as_bytes())?;
     }
     if out.is_none() || print {
-        print!("{text}");
+        say(&text)?;
     }
     Ok(Outcome { done: 1, failures: Vec::new() })
 }

@@ -5,6 +5,7 @@ mod eval;
 mod frame;
 mod options;
 mod outcome;
+mod output;
 mod progress;
 mod refine;
 

@@ -16,6 +16,7 @@ use serde_json::json;
 
 use crate::options::{Input, Job, label};
 use crate::outcome::Outcome;
+use crate::output::say;
 use crate::{frame, progress};
 
 #[derive(Args)]
@@ -165,11 +166,12 @@ fn dataset_run(arguments: &Arguments, input: &Input, out: &Path) -> anyhow::Resu
         write_results(out, &rows)?;
         if !arguments.json {
             let mean = seconds / done as f64;
-            println!("{done} poses refined in {mean:.2} s each, written to {}", out.display());
+            let file = out.display();
+            say(format!("{done} poses refined in {mean:.2} s each, written to {file}"))?;
         }
         if let Some(report) = report {
             match report.finish() {
-                Ok(index) if !arguments.json => println!("report: open {}", index.display()),
+                Ok(index) if !arguments.json => say(format!("report: open {}", index.display()))?,
                 Ok(_) => {}
                 Err(error) => failures.push(format!("report: {error}")),
             }
@@ -179,7 +181,7 @@ fn dataset_run(arguments: &Arguments, input: &Input, out: &Path) -> anyhow::Resu
     }
     if arguments.json {
         let document = json!({ "frames": outcomes, "failures": failures });
-        println!("{document:#}");
+        say(format!("{document:#}"))?;
     }
     Ok(Outcome { done, failures })
 }

@@ -1,0 +1,12 @@
+//! Standard output.
+
+use std::io::{ErrorKind, Write};
+
+/// Prints `text` and a line break. That the reader has gone away (`prehend … | head`) is no error.
+pub(crate) fn say(text: impl std::fmt::Display) -> anyhow::Result<()> {
+    let mut out = std::io::stdout().lock();
+    match writeln!(out, "{text}").and_then(|()| out.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(error.into()),
+        _ => Ok(()),
+    }
+}
