@@ -1,6 +1,7 @@
 //! What the commands do when all is well.
 
 use std::fs;
+use std::process::Stdio;
 
 use serde_json::{Value, json};
 
@@ -205,4 +206,14 @@ fn help_names_what_is_needed() {
     assert!(help.contains("prehend refine --frame <FILE> [OPTIONS]"));
     let said = place.prehend("refine --dataset ds --out r.csv");
     assert!(said.code == 1 && said.err.contains("--poses <FILE>"), "{}", said.err);
+}
+
+#[test]
+fn nobody_need_read_the_output() {
+    let place = Workplace::new();
+    let mut command = place.command("eval --dataset ds --poses ds/init.csv --json");
+    let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    drop(child.stdout.take());
+    let ended = child.wait_with_output().unwrap();
+    assert_eq!((ended.status.code(), ended.stderr.as_slice()), (Some(0), &b""[..]));
 }

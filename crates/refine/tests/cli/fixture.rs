@@ -104,13 +104,16 @@ impl Workplace {
         names
     }
 
+    /// `prehend` with the words of `arguments`, to be run here.
+    pub(crate) fn command(&self, arguments: &str) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_prehend"));
+        command.args(arguments.split_whitespace()).current_dir(self.dir.path());
+        command
+    }
+
     /// Runs `prehend` here with the words of `arguments`.
     pub(crate) fn prehend(&self, arguments: &str) -> Said {
-        let Output { status, stdout, stderr } = Command::new(env!("CARGO_BIN_EXE_prehend"))
-            .args(arguments.split_whitespace())
-            .current_dir(self.dir.path())
-            .output()
-            .unwrap();
+        let Output { status, stdout, stderr } = self.command(arguments).output().unwrap();
         let text = |bytes| String::from_utf8(bytes).unwrap();
         let said = Said { code: status.code().unwrap(), out: text(stdout), err: text(stderr) };
         assert!(!said.err.contains("panicked"), "{}", said.err);
