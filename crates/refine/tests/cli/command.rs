@@ -117,6 +117,32 @@ fn check_draws_every_pose_and_warns() {
 }
 
 #[test]
+fn a_plain_bop_dataset_can_be_checked_and_refined() {
+    let place = Workplace::new();
+    place.remove("ds/test/000001/scene_tactile.json");
+    let check = || place.prehend("check --dataset ds --poses ds/init.csv --image 0 --report look");
+    let said = check();
+    let expected =
+        "no ds/test/000001/scene_tactile.json: refine with --terms physics,rendering,depth";
+    assert!(said.code == 0 && said.err.contains(expected), "{}", said.err);
+    place.succeed(&format!("{REFINE} --terms physics,rendering,depth --out r.csv"));
+    place.remove("ds/test/000001/scene_bodies.json");
+    place.remove("ds/hand");
+    place.remove("ds/models/models_info.json");
+    let said = check();
+    let expected = "no ds/test/000001/scene_bodies.json: refine with --terms rendering,depth";
+    assert!(said.code == 0 && said.err.contains(expected), "{}", said.err);
+    let said = place.prehend(&format!("{REFINE} --terms rendering,depth --out r.csv"));
+    assert_eq!((said.code, place.poses("r.csv").len()), (0, 2), "{}", said.err);
+    assert!(
+        said.err.starts_with("warning: object 5: the object's mass is unknown"),
+        "{}",
+        said.err
+    );
+    assert_eq!(said.err.lines().count(), 1);
+}
+
+#[test]
 fn a_mesh_with_a_hole_serves_where_its_mass_is_given() {
     let place = Workplace::new();
     let file = place.path("ds/models/obj_000005.ply");

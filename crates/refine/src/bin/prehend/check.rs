@@ -1,11 +1,14 @@
 //! `prehend check`.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use clap::Args;
-use prehend_refine::bop::ResultRow;
+use prehend_refine::bop::{DatasetError, Frame, ResultRow};
 use prehend_refine::report::{Report, outline_picture};
-use prehend_refine::{AssetError, Assets, TermKind, inspect_object, inspect_pose};
+use prehend_refine::{
+    AssetError, Assets, Observation, Robot, TermKind, inspect_object, inspect_pose,
+};
 
 use crate::options::{Input, Job, label};
 use crate::outcome::Outcome;
@@ -55,8 +58,36 @@ fn check(
     let ResultRow { scene_id, im_id, obj_id, t_cam_model, .. } = &job.row;
     let object = assets.object(*obj_id)?;
     let frame = assets.dataset().frame(*scene_id, *im_id)?;
-    let (observation, robot) = assets.observation(&frame, job.instance, &TermKind::ALL)?;
-    let mut warnings = inspect_object(&object);
+    let (observation, robot, mut warnings) = sensed(assets, &frame, job.instance)?;
+    warnings.extend(inspect_object(&object));
     warnings.extend(inspect_pose(&observation, &object, robot.as_deref(), t_cam_model));
     Ok((outline_picture(&observation, &object, robot.as_deref(), t_cam_model), warnings))
+}
+
+/// The frame with all that it brings; a warning where it has no hand or no touch, as plain BOP datasets.
+fn sensed(
+    assets: &mut Assets<'_>,
+    frame: &Frame<'_>,
+    instance: usize,
+) -> Result<(Observation, Option<Arc<Robot>>, Vec<String>), AssetError> {
+    use TermKind::{Depth, Physics, Rendering};
+    let all = assets.observation(frame, instance, &TermKind::ALL);
+    let Some(absent) = absent_extension(&all) else {
+        return all.map(|(observation, robot)| (observation, robot, Vec::new()));
+    };
+    let without_touch = assets.observation(frame, instance, &[Physics, Rendering, Depth]);
+    let (rest, terms) = match absent_extension(&without_touch) {
+        None => (without_touch, "physics,rendering,depth"),
+        Some(_) => (assets.observation(frame, instance, &[Rendering, Depth]), "rendering,depth"),
+    };
+    let (observation, robot) = rest?;
+    let warning = format!("there is no {absent}: refine with --terms {terms}");
+    Ok((observation, robot, vec![warning]))
+}
+
+/// The file beyond BOP's own whose absence is the fault.
+fn absent_extension<T>(result: &Result<T, AssetError>) -> Option<String> {
+    let Err(AssetError::Dataset(DatasetError::Missing { file })) = result else { return None };
+    let extension = ["scene_bodies.json", "scene_tactile.json"].iter().any(|n| file.ends_with(n));
+    extension.then(|| file.display().to_string())
 }
