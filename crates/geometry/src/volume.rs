@@ -7,7 +7,7 @@ use nalgebra::{Point3, Vector3};
 
 use crate::TriMesh;
 use crate::mass::{closedness, signed_volume};
-use crate::weld::Weld;
+use crate::topology::is_collapsed;
 
 /// Shifts, as fractions of the smaller solid's extent, under which a failed boolean is tried again.
 /// The largest moves a surface of 100 cm² by 1e-6 cm³ at an extent of 10 cm.
@@ -147,9 +147,9 @@ impl Solid {
         if volume <= 1e-12 * (high - low).norm().powi(3) {
             return Err(VolumeError::NoVolume { what: what.into(), volume });
         }
-        let weld = Weld::of(mesh);
+        let weld = mesh.weld();
         let mut faces = weld.faces(mesh);
-        faces.retain(|[a, b, c]| a != b && b != c && c != a);
+        faces.retain(|f| !is_collapsed(f));
         let positions: Vec<f64> = weld.positions.iter().flat_map(|p| [p.x, p.y, p.z]).collect();
         let manifold =
             to_manifold(&positions, &faces).map_err(|reason| VolumeError::Boolean { reason })?;

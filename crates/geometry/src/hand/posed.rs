@@ -72,7 +72,7 @@ pub(super) fn surface(part: &Part) -> TriMesh {
     let (mesh, center) = match *part {
         Part::Box { size, center } => (cuboid(size.into()), center.into()),
         Part::Capsule { low, high, radius } => (
-            capsule(radius, 0.5 * (high[2] - low[2]), 24),
+            capsule(radius, 0.5 * (high[2] - low[2]), 24, 12),
             0.5 * (Vector3::from(low) + Vector3::from(high)),
         ),
     };
