@@ -12,7 +12,7 @@ pub struct HeuristicSettings {
     pub iterations: usize,
     /// Length of the first candidate steps \[m\]; a rotation counts by how far it moves the object's surface.
     pub first_step: f64,
-    /// The search ends when candidate steps have shrunk to this \[m\].
+    /// The search ends when candidate steps are shorter than this \[m\].
     pub last_step: f64,
     /// Always run all the iterations, even after nothing improves.
     pub exhaustive: bool,
@@ -73,7 +73,9 @@ impl Heuristic {
             let step: Vector6<f64> =
                 iteration.weights.iter().zip(&candidates).map(|(&a, c)| c.step * a).sum();
             trace.iterations.push(iteration);
-            if !go_on || (length < settings.last_step && !settings.exhaustive) {
+            let longest = candidates.iter().map(|c| c.length).fold(0.0, f64::max);
+            let done = length.min(longest) < settings.last_step;
+            if !go_on || (done && !settings.exhaustive) {
                 break;
             }
             length *= match gain > 0.0 {
@@ -94,15 +96,17 @@ struct Candidate {
     value: f64,
     value_after: f64,
     step: Vector6<f64>,
+    /// Length of `step`, where a rotation counts by how far it moves the object's surface \[m\].
+    length: f64,
 }
 
 impl Candidate {
     fn of(term: &dyn Term, state: &State, radius: f64, length: f64) -> Self {
         let mut normal = Normal::new(&[Block::ObjectPose]);
         let value = term.linearise(state, &mut normal);
-        let step = preconditioned_step(&normal, radius, length);
+        let (step, length) = preconditioned_step(&normal, radius, length);
         let value_after = term.value(&state.moved(Block::ObjectPose, &step));
-        Self { value, value_after, step }
+        Self { value, value_after, step, length }
     }
 
     /// How much the step improves the term's own value; 0 if it does not.
@@ -112,8 +116,9 @@ impl Candidate {
     }
 }
 
-/// −(H + μ diag)⁻¹ g in units where a radian counts `radius` metres, no longer than `length`.
-fn preconditioned_step(normal: &Normal, radius: f64, length: f64) -> Vector6<f64> {
+/// −(H + μ)⁻¹ g in units where a radian counts `radius` metres, no longer than `limit`; and its length
+/// in these units \[m\].
+fn preconditioned_step(normal: &Normal, radius: f64, limit: f64) -> (Vector6<f64>, f64) {
     let unit = Vector6::new(1.0, 1.0, 1.0, 1.0 / radius, 1.0 / radius, 1.0 / radius);
     let gradient = Vector6::from_column_slice(normal.gradient().as_slice()).component_mul(&unit);
     let hessian = Matrix6::from_column_slice(normal.hessian().as_slice());
@@ -124,10 +129,11 @@ fn preconditioned_step(normal: &Normal, radius: f64, length: f64) -> Vector6<f64
         .cholesky()
         .map_or_else(Vector6::zeros, |factor| -factor.solve(&gradient));
     let norm = step.norm();
-    if !norm.is_finite() {
-        return Vector6::zeros();
+    if !(norm.is_finite() && norm > 0.0) {
+        return (Vector6::zeros(), 0.0);
     }
-    (step * (length / norm).min(1.0)).component_mul(&unit)
+    let length = norm.min(limit);
+    (step.component_mul(&unit) * (length / norm), length)
 }
 
 #[cfg(test)]
