@@ -276,17 +276,13 @@ pub(crate) mod tests {
     use std::slice::from_ref;
 
     use super::*;
+    use crate::shapes;
     use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 
     /// A closed box of `size` about `center`, with eight vertices.
     pub(crate) fn cuboid(size: [f64; 3], center: [f64; 3]) -> TriMesh {
-        let corner = |k: usize| {
-            Point3::from([0, 1, 2].map(|a| center[a] + size[a] * ((k >> a & 1) as f64 - 0.5)))
-        };
-        let quads =
-            [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-        let faces = quads.iter().flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]]).collect();
-        TriMesh::new((0..8).map(corner).collect(), faces)
+        let place = Isometry3::from(Vector3::from(center));
+        shapes::cuboid(size.into()).welded().transformed(&place)
     }
 
     /// A sphere about the origin by subdividing an octahedron `levels` times.
