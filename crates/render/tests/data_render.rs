@@ -1,6 +1,6 @@
 //! Renders a real scan at its true pose and compares it with an independent renderer's picture.
 
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used)] // a test may panic; helpers outside test functions count as code to the lint
 
 use std::path::{Path, PathBuf};
 
