@@ -13,3 +13,8 @@ pub use prehend_geometry as geometry;
 pub use prehend_refine as refine;
 pub use prehend_render as render;
 pub use prehend_sim as sim;
+
+/// The README's Rust code, compiled as a test.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

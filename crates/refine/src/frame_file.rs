@@ -184,7 +184,7 @@ pub fn load(file: &Path, seed: u64) -> Result<FrameInput, FrameFileError> {
     let (robot, hand) = match &layout.robot {
         None => (None, None),
         Some(r) => {
-            let tree = KinematicTree::from_urdf_file(&folder.join(&r.urdf));
+            let tree = KinematicTree::from_urdf_file(folder.join(&r.urdf));
             let tree = tree.map_err(|e| asset(e.into()))?;
             let joints = tree.joint_vector(&r.joints).map_err(|e| asset(e.into()))?;
             let skin: Vec<Taxel> = match &r.taxels {

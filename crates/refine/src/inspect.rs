@@ -60,12 +60,11 @@ pub fn inspect(
         warnings.push(format!("the object at this pose overlaps its mask by only {share:.0} %"));
     }
     ratios.sort_by(f32::total_cmp);
-    if let Some(&ratio) = ratios.get(ratios.len() / 2) {
-        if !(0.5..2.0).contains(&ratio) {
-            warnings.push(format!(
-                "sensor depth is {ratio:.3} times the depth at this pose: check depth_scale and units"
-            ));
-        }
+    let median = ratios.get(ratios.len() / 2).copied();
+    if let Some(ratio) = median.filter(|r| !(0.5..2.0).contains(r)) {
+        warnings.push(format!(
+            "sensor depth is {ratio:.3} times the depth at this pose: check depth_scale and units"
+        ));
     }
     warnings
 }

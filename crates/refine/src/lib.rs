@@ -32,7 +32,7 @@ pub use inspect::inspect;
 pub use normal::Normal;
 pub use object::{DEFAULT_DENSITY, Inertial, Object};
 pub use observation::{HandReading, Observation};
-pub use refine::{Progress, RefinedPose, refine, refine_with};
+pub use refine::{Progress, RefinedPose, refine, refine_with, standard_terms};
 pub use robot::Robot;
 pub use robust::Cauchy;
 pub use scoring::Scorer;

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, UnitQuaternion};
-use prehend_render::{DepthImage, Light, depth_map};
+use nalgebra::Isometry3;
+use prehend_render::{DepthImage, depth_map};
 
 use crate::strategy::Heuristic;
 use crate::term::{DepthTerm, PhysicsTerm, RenderingTerm, TactileTerm, Term};
@@ -59,63 +59,34 @@ pub fn refine_with(
     config: &Config,
     mut observe: impl FnMut(Progress) -> bool,
 ) -> Result<RefinedPose, RefineError> {
-    let state = initial_state(observation, object, initial)?;
-    let hand = Arc::new(hand_depth(observation, robot));
-    let rendering = || {
-        let settings = config.rendering.clone();
-        RenderingTerm::new(observation, Arc::clone(object), &hand, settings)
-    };
-    let terms = config
-        .terms
-        .iter()
-        .map(|kind| -> Result<Box<dyn Term>, RefineError> {
-            let missing = || RefineError::Missing { what: "hand", term: kind.name() };
-            let robot = || robot.ok_or_else(missing);
-            Ok(match kind {
-                TermKind::Physics => Box::new(PhysicsTerm::new(
-                    observation,
-                    object,
-                    robot()?,
-                    &state,
-                    config.physics.clone(),
-                )?),
-                TermKind::Rendering => Box::new(rendering()?),
-                TermKind::Depth => Box::new(DepthTerm::new(
-                    observation,
-                    Arc::clone(object),
-                    Arc::clone(&hand),
-                    config.depth.clone(),
-                )?),
-                TermKind::Tactile => Box::new(TactileTerm::new(
-                    observation,
-                    Arc::clone(object),
-                    robot()?,
-                    config.tactile.clone(),
-                )?),
-            })
-        })
-        .collect::<Result<Vec<_>, _>>()?;
+    let state = State::new(observation, object, initial)?;
+    let terms = standard_terms(observation, object, robot, &state, config)?;
     if terms.is_empty() {
         return Err(RefineError::NoTerms);
     }
 
     // The judge of checkpoints: the rendering term among the terms, or one of its own.
     let judge_index = config.terms.iter().position(|&k| k == TermKind::Rendering);
-    let judge = (config.checkpoint && judge_index.is_none()).then(rendering).transpose()?;
+    let own_judge = config.checkpoint && judge_index.is_none();
+    let judge = own_judge
+        .then(|| {
+            let hand = hand_depth(observation, robot);
+            RenderingTerm::new(observation, Arc::clone(object), &hand, config.rendering.clone())
+        })
+        .transpose()?;
     let mut best = (f64::INFINITY, 0, state.t_cam_object);
     let heuristic = Heuristic { settings: config.heuristic.clone() };
     let trace = heuristic.run(&terms, state, object.radius, |state, iteration| {
         let score = match (&judge, judge_index) {
-            _ if !config.checkpoint => f64::NEG_INFINITY,
             (Some(judge), _) => {
                 let mut lit = state.clone();
                 judge.refresh(&mut lit);
                 judge.value(&lit)
             }
             (None, Some(index)) => iteration.values[index],
-            (None, None) => f64::NEG_INFINITY,
+            (None, None) => f64::INFINITY,
         };
-        if score < best.0 || score == f64::NEG_INFINITY {
+        if !config.checkpoint || score < best.0 {
             best = (score, iteration.index, state.t_cam_object);
         }
         observe(Progress { iteration: iteration.index, iterations: config.heuristic.iterations })
@@ -123,33 +94,43 @@ pub fn refine_with(
     Ok(RefinedPose { t_cam_object: best.2, iteration: best.1, trace })
 }
 
-pub(crate) fn initial_state(
+/// The terms that `config` asks for, in its order; add your own to them and hand all to a
+/// [`Heuristic`].
+///
+/// # Errors
+/// If the observation lacks what a term needs.
+pub fn standard_terms(
     observation: &Observation,
-    object: &Object,
-    initial: &Isometry3<f64>,
-) -> Result<State, RefineError> {
-    let rotation = initial.rotation.coords.iter().copied();
-    if !rotation.chain(initial.translation.vector.iter().copied()).all(f64::is_finite) {
-        return Err(RefineError::NotFinite);
-    }
-    if observation.mask.count() == 0 {
-        return Err(RefineError::EmptyMask);
-    }
-    let hand = observation.hand.as_ref();
-    let state = State {
-        t_cam_object: Isometry3::from_parts(
-            initial.translation,
-            UnitQuaternion::new_normalize(*initial.rotation.quaternion()),
-        ),
-        object_centre: object.centre,
-        t_cam_hand: hand.map_or_else(Isometry3::identity, |h| h.t_cam_hand),
-        light: Light::ambient(1.0),
+    object: &Arc<Object>,
+    robot: Option<&Robot>,
+    initial: &State,
+    config: &Config,
+) -> Result<Vec<Box<dyn Term>>, RefineError> {
+    let hand = Arc::new(hand_depth(observation, robot));
+    let term = |kind: &TermKind| -> Result<Box<dyn Term>, RefineError> {
+        let missing = || RefineError::Missing { what: "hand", term: kind.name() };
+        let robot = || robot.ok_or_else(missing);
+        let object = Arc::clone(object);
+        Ok(match kind {
+            TermKind::Physics => {
+                let settings = config.physics.clone();
+                Box::new(PhysicsTerm::new(observation, &object, robot()?, initial, settings)?)
+            }
+            TermKind::Rendering => {
+                let settings = config.rendering.clone();
+                Box::new(RenderingTerm::new(observation, object, &hand, settings)?)
+            }
+            TermKind::Depth => {
+                let (hand, settings) = (Arc::clone(&hand), config.depth.clone());
+                Box::new(DepthTerm::new(observation, object, hand, settings)?)
+            }
+            TermKind::Tactile => {
+                let settings = config.tactile.clone();
+                Box::new(TactileTerm::new(observation, object, robot()?, settings)?)
+            }
+        })
     };
-    let depth = state.centre().z;
-    if depth <= 0.0 {
-        return Err(RefineError::BehindCamera { depth });
-    }
-    Ok(state)
+    config.terms.iter().map(term).collect()
 }
 
 /// Depth image of the hand alone \[m\], 0 where it is not.

@@ -1,8 +1,10 @@
 //! What a solve may move: named blocks of parameters.
 
-use nalgebra::{Isometry3, Point3, Vector3, Vector6};
+use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3, Vector6};
 use prehend_autodiff::lie::perturb_about;
 use prehend_render::Light;
+
+use crate::{Object, Observation, RefineError};
 
 /// A named block of a [`State`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -39,6 +41,39 @@ pub struct State {
 }
 
 impl State {
+    /// The state that a refinement of `initial` (object → camera \[m\]) begins with.
+    ///
+    /// # Errors
+    /// If the pose is not finite or behind the camera, or the object's mask is empty.
+    pub fn new(
+        observation: &Observation,
+        object: &Object,
+        initial: &Isometry3<f64>,
+    ) -> Result<Self, RefineError> {
+        let rotation = initial.rotation.coords.iter();
+        if !rotation.chain(initial.translation.vector.iter()).all(|v| v.is_finite()) {
+            return Err(RefineError::NotFinite);
+        }
+        if observation.mask.count() == 0 {
+            return Err(RefineError::EmptyMask);
+        }
+        let hand = observation.hand.as_ref();
+        let state = Self {
+            t_cam_object: Isometry3::from_parts(
+                initial.translation,
+                UnitQuaternion::new_normalize(*initial.rotation.quaternion()),
+            ),
+            object_centre: object.centre,
+            t_cam_hand: hand.map_or_else(Isometry3::identity, |h| h.t_cam_hand),
+            light: Light::ambient(1.0),
+        };
+        let depth = state.centre().z;
+        if depth <= 0.0 {
+            return Err(RefineError::BehindCamera { depth });
+        }
+        Ok(state)
+    }
+
     /// The object's centre in the camera frame \[m\]: the point that twists turn about.
     pub fn centre(&self) -> Vector3<f64> {
         (self.t_cam_object * self.object_centre).coords

@@ -55,11 +55,11 @@ impl Report {
         let curves = format!("{}.svg", name.trim_end_matches(".png"));
         write_atomically(&self.folder.join(&curves), frame.curves.as_bytes())?;
         let (title, caption) = (escape(title), escape(&frame.caption));
-        let _ = write!(
+        let _ = writeln!(
             self.body,
             "<section><h2>{title}</h2><p>{caption}</p><div><figure><img src=\"{name}\" alt=\"\">\
              <figcaption><b class=before>initial</b> and <b class=after>refined</b> \
-             outline</figcaption></figure><img src=\"{curves}\" alt=\"loss curves\"></div></section>\n"
+             outline</figcaption></figure><img src=\"{curves}\" alt=\"loss curves\"></div></section>"
         );
         Ok(())
     }
@@ -77,9 +77,9 @@ impl Report {
         let name = self.picture(picture)?;
         let remarks: String = remarks.iter().map(|r| format!("<li>{}</li>", escape(r))).collect();
         let title = escape(title);
-        let _ = write!(
+        let _ = writeln!(
             self.body,
-            "<section><h2>{title}</h2><ul>{remarks}</ul><img src=\"{name}\" alt=\"\"></section>\n"
+            "<section><h2>{title}</h2><ul>{remarks}</ul><img src=\"{name}\" alt=\"\"></section>"
         );
         Ok(())
     }

@@ -41,7 +41,7 @@ mod gradient_check {
     use prehend_autodiff::check::{compare_gradients, finite_difference_gradient};
 
     use super::*;
-    use crate::refine::{hand_depth, initial_state};
+    use crate::refine::hand_depth;
     use crate::synth::{Scene, default_scene};
 
     static SCENE: LazyLock<Scene> = LazyLock::new(|| default_scene(1).unwrap());
@@ -50,7 +50,7 @@ mod gradient_check {
     pub(super) fn fixture(seed: usize) -> (&'static Scene, State, Arc<prehend_render::DepthImage>) {
         let scene = &*SCENE;
         let hand = Arc::new(hand_depth(&scene.observation, Some(&scene.robot)));
-        let mut state = initial_state(&scene.observation, &scene.object, &scene.truth).unwrap();
+        let mut state = State::new(&scene.observation, &scene.object, &scene.truth).unwrap();
         let turn = [0.05, -0.08, 0.06, 0.02, -0.03, 0.01];
         let delta = Vector6::from_fn(|k, _| {
             let scale = if k < 3 { 0.05 } else { 1.0 };

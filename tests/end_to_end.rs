@@ -1,0 +1,82 @@
+//! The whole system on the built-in scene.
+
+use std::sync::LazyLock;
+
+use prehend::refine::metrics::{oe_deg, pe_cm};
+use prehend::refine::synth::{Scene, default_scene};
+use prehend::refine::{Config, RefineError, RefinedPose, TermKind, refine};
+
+static SCENE: LazyLock<Scene> = LazyLock::new(|| default_scene(1).expect("the built-in scene"));
+
+fn run(config: &Config) -> Result<RefinedPose, RefineError> {
+    refine(&SCENE.observation, &SCENE.object, Some(&SCENE.robot), &SCENE.initial, config)
+}
+
+#[test]
+fn all_terms_together_find_the_pose() {
+    let refined = run(&Config::default()).unwrap();
+    let (pe, oe) =
+        (pe_cm(&refined.t_cam_object, &SCENE.truth), oe_deg(&refined.t_cam_object, &SCENE.truth));
+    assert!(pe < 0.1 && oe < 1.5, "{pe} cm, {oe}°");
+}
+
+#[test]
+fn every_term_lowers_its_own_value() {
+    for kind in TermKind::ALL {
+        let mut config = Config { terms: vec![kind], checkpoint: false, ..Config::default() };
+        config.heuristic.iterations = 40;
+        let trace = run(&config).unwrap().trace;
+        let value = |i: usize| trace.iterations[i].values[0];
+        let last = trace.iterations.len() - 1;
+        assert!(value(last) < 0.99 * value(0), "{kind}: {} to {}", value(0), value(last));
+    }
+}
+
+#[test]
+fn the_checkpoint_is_the_pose_of_lowest_rendering_value() {
+    let refined = run(&Config::default()).unwrap();
+    let rendering = refined.trace.terms.iter().position(|t| t == "rendering").unwrap();
+    let value = |i: &prehend::refine::trace::Iteration| i.values[rendering];
+    let lowest = refined.trace.iterations.iter().map(value).fold(f64::INFINITY, f64::min);
+    assert_eq!(value(&refined.trace.iterations[refined.iteration]), lowest);
+}
+
+#[test]
+fn poses_are_the_same_for_any_number_of_threads() {
+    let mut config = Config::default();
+    config.heuristic.iterations = 12;
+    let poses = [1, 2, 5].map(|threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let pose = pool.install(|| run(&config)).unwrap().t_cam_object;
+        (pose.translation.vector, *pose.rotation.quaternion())
+    });
+    assert_eq!(poses[0], poses[1]);
+    assert_eq!(poses[0], poses[2]);
+}
+
+#[test]
+fn without_a_hand_vision_alone_still_works() {
+    let mut observation = SCENE.observation.clone();
+    (observation.hand, observation.gravity) = (None, None);
+    let vision = vec![TermKind::Rendering, TermKind::Depth];
+    let config = Config { terms: vision, ..Config::default() };
+    let refined = refine(&observation, &SCENE.object, None, &SCENE.initial, &config).unwrap();
+    assert!(pe_cm(&refined.t_cam_object, &SCENE.truth) < 0.5);
+    let all = refine(&observation, &SCENE.object, None, &SCENE.initial, &Config::default());
+    assert!(matches!(all, Err(RefineError::Missing { .. })));
+}
+
+#[test]
+fn unusable_poses_are_refused() {
+    let refuse = |initial| {
+        let config = Config::default();
+        refine(&SCENE.observation, &SCENE.object, Some(&SCENE.robot), &initial, &config)
+            .unwrap_err()
+    };
+    let mut behind = SCENE.initial;
+    behind.translation.z = -0.4;
+    assert!(matches!(refuse(behind), RefineError::BehindCamera { .. }));
+    let mut broken = SCENE.initial;
+    broken.translation.x = f64::NAN;
+    assert!(matches!(refuse(broken), RefineError::NotFinite));
+}
