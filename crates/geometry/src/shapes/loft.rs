@@ -168,13 +168,8 @@ fn equal_arcs(rows: &[Section], parts: usize) -> Vec<[f64; 2]> {
         .map(|k| match k {
             0 => at(0),
             k if k == parts => at(fine),
-            // The nearest: the first beyond would be one too far where rounding leaves a length short of it.
-            k => {
-                let target = k as f64 * step;
-                let beyond = lengths.partition_point(|l| *l < target).clamp(1, fine);
-                let before = target - lengths[beyond - 1] < lengths[beyond] - target;
-                at(if before { beyond - 1 } else { beyond })
-            }
+            // Rounding may leave a length just short of its goal, where the next would be a whole step too far.
+            k => at(lengths.partition_point(|l| *l < (k as f64 - 1e-9) * step)),
         })
         .collect()
 }
