@@ -4,7 +4,8 @@ use plotters::prelude::*;
 
 use crate::trace::Trace;
 
-/// Each term's value, relative to its first one, over the iterations, as an SVG document.
+/// Each term's value, relative to its first one, over the iterations, on a logarithmic scale, as an SVG
+/// document.
 ///
 /// Empty if there is nothing to draw.
 pub(crate) fn loss_curves(trace: &Trace) -> String {
@@ -24,17 +25,22 @@ fn draw(trace: &Trace, svg: &mut String) -> Result<(), Box<dyn std::error::Error
         trace.iterations.iter().map(|i| (i.index as f64, i.values[term] * scale)).collect()
     };
     let curves: Vec<_> = (0..trace.terms.len()).map(curve).collect();
-    let top = curves.iter().flatten().map(|p| p.1).fold(1.0, f64::max).min(3.0);
+    let values = || curves.iter().flatten().map(|p| p.1).filter(|v| *v > 0.0);
+    let top = values().fold(1.0, f64::max).min(10.0) * 1.2;
+    let bottom = values().fold(1.0, f64::min).max(1e-4) * 0.8;
     let root = SVGBackend::with_string(svg, (640, 300)).into_drawing_area();
     root.fill(&WHITE)?;
     let mut chart = ChartBuilder::on(&root)
         .margin(10)
+        .margin_right(24)
         .x_label_area_size(34)
-        .y_label_area_size(48)
-        .build_cartesian_2d(0.0..last as f64, 0.0..top * 1.05)?;
+        .y_label_area_size(56)
+        .build_cartesian_2d(0.0..last as f64, (bottom..top).log_scale())?;
     chart
         .configure_mesh()
         .light_line_style(WHITE)
+        .x_label_formatter(&|x| format!("{x:.0}"))
+        .y_label_formatter(&|y| format!("{y}"))
         .x_desc("iteration")
         .y_desc("loss / initial loss")
         .draw()?;

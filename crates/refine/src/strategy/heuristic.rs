@@ -33,9 +33,10 @@ impl Default for HeuristicSettings {
 /// - *Scales of the gradients.* A step is −(Hᵢ + μ)⁻¹ gᵢ with the term's own Gauss–Newton matrix Hᵢ, so
 ///   translations and rotations of any term come out in the right proportion.
 /// - *Scales of the losses.* Terms are in nats ([`Term`]), so that ΔLᵢ of different terms compare.
-/// - *Step lengths.* Steps are at most a common length that grows by a little while the sum of the terms
-///   falls and shrinks when it rises or nothing improves. Without it the terms take turns in pulling the pose all the way to
-///   their own optimum, and the weights, which always sum to one, never let it rest.
+/// - *Step lengths.* Steps are at most a common length that grows by a tenth while the sum of the terms
+///   reaches new lows, shrinks by a tenth when it does not, and by half when nothing improves. Without it
+///   the terms take turns in pulling the pose all the way to their own optimum, and the weights, which
+///   always sum to one, never let it rest.
 pub struct Heuristic {
     /// Settings.
     pub settings: HeuristicSettings,
@@ -55,7 +56,7 @@ impl Heuristic {
         let settings = &self.settings;
         let mut trace = Trace::new(terms.iter().map(|t| t.name()));
         let mut length = settings.first_step;
-        let mut last_total = f64::INFINITY;
+        let mut least = f64::INFINITY;
         for index in 0..=settings.iterations {
             terms.iter().for_each(|t| t.refresh(&mut state));
             let candidates: Vec<Candidate> =
@@ -79,12 +80,12 @@ impl Heuristic {
                 break;
             }
             length *= match gain > 0.0 {
-                true if total < last_total => 1.1,
-                true => 0.7,
+                true if total < least => 1.1,
+                true => 0.9,
                 false => 0.5,
             };
             length = length.clamp(0.5 * settings.last_step, settings.first_step);
-            last_total = total;
+            least = least.min(total);
             state = state.moved(Block::ObjectPose, &step);
         }
         trace
