@@ -3,8 +3,7 @@
 use nalgebra::{Point3, Vector3};
 
 use crate::TriMesh;
-use crate::topology::{Edge, components, edges};
-use crate::weld::Weld;
+use crate::topology::{Edge, EdgeUse, components, edges, is_collapsed};
 
 /// Components with fewer faces than this fraction of the largest are stray if open or hollow.
 const STRAY_FRACTION: f64 = 0.01;
@@ -48,14 +47,14 @@ impl TriMesh {
     /// scans carry a few such faces. Faces of no area whose corners differ are kept, since their neighbours need
     /// them. Holes are not filled: the report says whether the result is watertight.
     pub fn cleaned(&self) -> (TriMesh, MeshReport) {
-        let weld = Weld::of(self);
+        let weld = self.weld();
         let mut report = MeshReport {
             welded_vertices: self.vertices.len() - weld.positions.len(),
             ..Default::default()
         };
         let mut faces = weld.faces(self);
         let given = faces.len();
-        faces.retain(|[a, b, c]| a != b && b != c && c != a);
+        faces.retain(|f| !is_collapsed(f));
         report.degenerate_faces = given - faces.len();
         let distinct = faces.len();
         let mut seen = std::collections::HashSet::with_capacity(distinct);
@@ -92,9 +91,9 @@ fn drop_fins(faces: &mut Vec<[u32; 3]>, report: &mut MeshReport) {
         let (mut open, mut crowded) = (vec![false; faces.len()], vec![false; faces.len()]);
         for edge in edges(faces) {
             match edge.uses.as_slice() {
-                [(f, _)] => open[*f as usize] = true,
+                [only] => open[only.face as usize] = true,
                 [_, _] => {}
-                uses => uses.iter().for_each(|(f, _)| crowded[*f as usize] = true),
+                uses => uses.iter().for_each(|u| crowded[u.face as usize] = true),
             }
         }
         let before = faces.len();
@@ -126,7 +125,7 @@ fn drop_stray(positions: &[Point3<f64>], faces: &mut Vec<[u32; 3]>, report: &mut
     edges
         .iter()
         .filter(|e| e.uses.len() == 1)
-        .for_each(|e| open[of[e.uses[0].0 as usize] as usize] = true);
+        .for_each(|e| open[of[e.uses[0].face as usize] as usize] = true);
     let largest = size.iter().copied().max().unwrap_or(0) as f64;
     let fullest = volume.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
     let stray: Vec<bool> = (0..count)
@@ -150,9 +149,9 @@ fn orient(positions: &[Point3<f64>], faces: &mut [[u32; 3]], report: &mut MeshRe
     if pairs.iter().any(|e| !e.is_manifold()) {
         let mut neighbours: Vec<Vec<(u32, bool)>> = vec![Vec::new(); faces.len()];
         for edge in &pairs {
-            let [(f, along_f), (g, along_g)] = [edge.uses[0], edge.uses[1]];
-            neighbours[f as usize].push((g, along_f == along_g));
-            neighbours[g as usize].push((f, along_f == along_g));
+            let [EdgeUse { face: f, forward, .. }, other] = [edge.uses[0], edge.uses[1]];
+            neighbours[f as usize].push((other.face, forward == other.forward));
+            neighbours[other.face as usize].push((f, forward == other.forward));
         }
         let mut reached = vec![false; faces.len()];
         for start in 0..faces.len() {

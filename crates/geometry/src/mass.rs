@@ -4,7 +4,6 @@ use nalgebra::{Matrix3, Point3, Vector3};
 
 use crate::TriMesh;
 use crate::topology::edges;
-use crate::weld::Weld;
 
 /// Mass properties of a solid of uniform density, in the frame of its mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -88,9 +87,8 @@ impl MassProperties {
 
 /// How many edges, after welding, do not join two faces of one orientation; an empty mesh counts one.
 pub(crate) fn closedness(mesh: &TriMesh) -> usize {
-    let mut faces = Weld::of(mesh).faces(mesh);
-    faces.retain(|[a, b, c]| a != b && b != c && c != a);
-    if faces.is_empty() { 1 } else { edges(&faces).iter().filter(|e| !e.is_manifold()).count() }
+    let edges = edges(&mesh.weld().faces(mesh));
+    if edges.is_empty() { 1 } else { edges.iter().filter(|e| !e.is_manifold()).count() }
 }
 
 /// Volume, first and second moments about the returned origin, which lies near the mesh for accuracy.

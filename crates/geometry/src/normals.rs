@@ -3,7 +3,6 @@
 use nalgebra::Vector3;
 
 use crate::TriMesh;
-use crate::weld::Weld;
 
 /// Faces that meet at a larger angle than this are shaded apart [rad].
 const CREASE_ANGLE: f64 = 40.0 * std::f64::consts::PI / 180.0;
@@ -22,7 +21,7 @@ impl TriMesh {
     /// (Thürmer and Wüthrich, "Computing vertex normals from polygonal facets", 1998). Nothing is split: a vertex
     /// shared by both sides of a sharp edge has a normal between them. Where no direction is defined it is +z.
     pub fn vertex_normals_within(&self, crease_angle: f64) -> Vec<Vector3<f64>> {
-        let weld = Weld::of(self);
+        let weld = self.weld();
         // Angle-weighted corner normals, once by stored vertex and listed by position.
         let mut reference = vec![Vector3::zeros(); self.vertices.len()];
         let mut corners: Vec<Vec<(Vector3<f64>, f64)>> = vec![Vec::new(); weld.positions.len()];

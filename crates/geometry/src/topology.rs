@@ -1,32 +1,53 @@
 //! Which faces of an indexed mesh share edges.
 
-/// The faces at one undirected edge.
-pub(crate) struct Edge {
-    /// Face, and whether it runs along the edge from the smaller to the larger vertex index.
-    pub(crate) uses: Vec<(u32, bool)>,
+/// A side of a face.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct EdgeUse {
+    /// Whether the face runs along the edge from the smaller to the larger vertex index.
+    pub forward: bool,
+    /// The face.
+    pub face: u32,
+    /// The corner of the face at which this side of it starts.
+    pub corner: u8,
+}
+
+/// An undirected edge and the faces at it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Edge {
+    /// The vertices, the smaller index first.
+    pub vertices: [u32; 2],
+    /// The sides of faces that lie on it, ordered by direction, then by face.
+    pub uses: Vec<EdgeUse>,
 }
 
 impl Edge {
     /// Two faces that run along the edge in opposite directions.
-    pub(crate) fn is_manifold(&self) -> bool {
-        matches!(self.uses.as_slice(), [(_, a), (_, b)] if a != b)
+    pub fn is_manifold(&self) -> bool {
+        matches!(self.uses.as_slice(), [a, b] if a.forward != b.forward)
     }
 }
 
-/// Every undirected edge of `faces`, ordered by its vertices.
-pub(crate) fn edges(faces: &[[u32; 3]]) -> Vec<Edge> {
-    let mut sides: Vec<(u32, u32, u32, bool)> = Vec::with_capacity(3 * faces.len());
-    for (f, face) in faces.iter().enumerate() {
+/// Whether two corners of a face are one: such a face has no surface and bounds nothing.
+pub fn is_collapsed([a, b, c]: &[u32; 3]) -> bool {
+    a == b || b == c || c == a
+}
+
+/// Every undirected edge of `faces` but of the collapsed ones, ordered by its vertices.
+///
+/// Weld a mesh before asking ([`TriMesh::weld`](crate::TriMesh::weld)): vertices stored twice part its edges.
+pub fn edges(faces: &[[u32; 3]]) -> Vec<Edge> {
+    let mut sides: Vec<([u32; 2], EdgeUse)> = Vec::with_capacity(3 * faces.len());
+    for (f, face) in faces.iter().enumerate().filter(|(_, face)| !is_collapsed(face)) {
         for k in 0..3 {
             let (a, b) = (face[k], face[(k + 1) % 3]);
-            sides.push((a.min(b), a.max(b), f as u32, a < b));
+            let side = EdgeUse { forward: a < b, face: f as u32, corner: k as u8 };
+            sides.push(([a.min(b), a.max(b)], side));
         }
     }
     sides.sort_unstable();
-    let same = |x: &(u32, u32, u32, bool), y: &(u32, u32, u32, bool)| (x.0, x.1) == (y.0, y.1);
     sides
-        .chunk_by(same)
-        .map(|uses| Edge { uses: uses.iter().map(|u| (u.2, u.3)).collect() })
+        .chunk_by(|x, y| x.0 == y.0)
+        .map(|uses| Edge { vertices: uses[0].0, uses: uses.iter().map(|u| u.1).collect() })
         .collect()
 }
 
@@ -42,7 +63,7 @@ pub(crate) fn components(edges: &[Edge], faces: usize) -> (Vec<u32>, usize) {
     }
     for edge in edges {
         for pair in edge.uses.windows(2) {
-            let (a, b) = (root(&mut parent, pair[0].0), root(&mut parent, pair[1].0));
+            let (a, b) = (root(&mut parent, pair[0].face), root(&mut parent, pair[1].face));
             parent[a.max(b) as usize] = a.min(b);
         }
     }
@@ -68,11 +89,15 @@ mod tests {
     #[test]
     fn two_triangles_and_one_apart() {
         let faces = [[0, 1, 2], [5, 6, 7], [2, 1, 3]];
+        let shared = |forward, face, corner| EdgeUse { forward, face, corner };
         let edges = edges(&faces);
         assert_eq!(edges.len(), 8);
-        assert_eq!(edges.iter().filter(|e| e.is_manifold()).count(), 1);
+        let inner: Vec<_> = edges.iter().filter(|e| e.is_manifold()).collect();
+        assert_eq!((inner.len(), inner[0].vertices), (1, [1, 2]));
+        assert_eq!(inner[0].uses, [shared(false, 2, 0), shared(true, 0, 1)]);
         assert_eq!(edges.iter().filter(|e| e.uses.len() == 1).count(), 7);
         assert_eq!(components(&edges, 3), (vec![0, 1, 0], 2));
+        assert!(super::edges(&[[0, 1, 1]]).is_empty());
         // The same edge in the same direction is a contradiction of orientations.
         assert!(super::edges(&[[0, 1, 2], [1, 2, 3]]).iter().all(|e| !e.is_manifold()));
     }

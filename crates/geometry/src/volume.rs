@@ -7,7 +7,7 @@ use nalgebra::{Point3, Vector3};
 
 use crate::TriMesh;
 use crate::mass::{closedness, signed_volume};
-use crate::weld::Weld;
+use crate::topology::is_collapsed;
 
 /// Shifts, as fractions of the smaller solid's extent, under which a failed boolean is tried again.
 /// The largest moves a surface of 100 cm² by 1e-6 cm³ at an extent of 10 cm.
@@ -147,9 +147,9 @@ impl Solid {
         if volume <= 1e-12 * (high - low).norm().powi(3) {
             return Err(VolumeError::NoVolume { what: what.into(), volume });
         }
-        let weld = Weld::of(mesh);
+        let weld = mesh.weld();
         let mut faces = weld.faces(mesh);
-        faces.retain(|[a, b, c]| a != b && b != c && c != a);
+        faces.retain(|f| !is_collapsed(f));
         let positions: Vec<f64> = weld.positions.iter().flat_map(|p| [p.x, p.y, p.z]).collect();
         let manifold =
             to_manifold(&positions, &faces).map_err(|reason| VolumeError::Boolean { reason })?;
@@ -276,17 +276,13 @@ pub(crate) mod tests {
     use std::slice::from_ref;
 
     use super::*;
+    use crate::shapes;
     use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 
     /// A closed box of `size` about `center`, with eight vertices.
     pub(crate) fn cuboid(size: [f64; 3], center: [f64; 3]) -> TriMesh {
-        let corner = |k: usize| {
-            Point3::from([0, 1, 2].map(|a| center[a] + size[a] * ((k >> a & 1) as f64 - 0.5)))
-        };
-        let quads =
-            [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-        let faces = quads.iter().flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]]).collect();
-        TriMesh::new((0..8).map(corner).collect(), faces)
+        let place = Isometry3::from(Vector3::from(center));
+        shapes::cuboid(size.into()).welded().transformed(&place)
     }
 
     /// A sphere about the origin by subdividing an octahedron `levels` times.

@@ -10,15 +10,16 @@ use crate::TriMesh;
 const RELATIVE_TOLERANCE: f64 = 1e-9;
 
 /// The distinct positions of a mesh, in the order of their first appearance.
-pub(crate) struct Weld {
-    pub(crate) positions: Vec<Point3<f64>>,
+#[derive(Clone, Debug)]
+pub struct Weld {
+    /// The positions \[m\].
+    pub positions: Vec<Point3<f64>>,
     /// For each vertex of the mesh, its entry in `positions`.
-    pub(crate) index: Vec<u32>,
+    pub index: Vec<u32>,
 }
 
 impl Weld {
-    /// Joins vertices within `tolerance` \[m\] of the first vertex of a cluster.
-    pub(crate) fn new(vertices: &[Point3<f64>], tolerance: f64) -> Self {
+    fn new(vertices: &[Point3<f64>], tolerance: f64) -> Self {
         let everywhere = Point3::from([f64::INFINITY; 3]);
         let (low, high) =
             vertices.iter().fold((everywhere, -everywhere), |(l, h), v| (l.inf(v), h.sup(v)));
@@ -56,30 +57,33 @@ impl Weld {
         weld
     }
 
-    pub(crate) fn of(mesh: &TriMesh) -> Self {
-        let diagonal = mesh.bounds().map_or(0.0, |(low, high)| (high - low).norm());
-        Self::new(&mesh.vertices, RELATIVE_TOLERANCE * diagonal)
-    }
-
-    pub(crate) fn faces(&self, mesh: &TriMesh) -> Vec<[u32; 3]> {
+    /// The faces of `mesh`, which must be the welded one, between the distinct positions.
+    ///
+    /// # Panics
+    /// If a face refers to a vertex that the welded mesh has not.
+    pub fn faces(&self, mesh: &TriMesh) -> Vec<[u32; 3]> {
         mesh.faces.iter().map(|f| f.map(|v| self.index[v as usize])).collect()
     }
 }
 
 impl TriMesh {
-    /// The mesh with one vertex a position (to 1e-9 of the bounding box's diagonal) and without attributes:
-    /// what topological questions and distance queries need where texture seams store vertices several times.
+    /// Which vertices share a position, to 1e-9 of the bounding box's diagonal: what topological questions need
+    /// where texture seams store vertices several times.
+    pub fn weld(&self) -> Weld {
+        let diagonal = self.bounds().map_or(0.0, |(low, high)| (high - low).norm());
+        self.weld_within(RELATIVE_TOLERANCE * diagonal)
+    }
+
+    /// As [`TriMesh::weld`], joining vertices within `tolerance` \[m\] of the first of a cluster; 0 joins equal ones.
+    pub fn weld_within(&self, tolerance: f64) -> Weld {
+        Weld::new(&self.vertices, tolerance.max(0.0))
+    }
+
+    /// The mesh with one vertex a position (see [`TriMesh::weld`]) and without attributes.
     ///
     /// Faces keep their number and order; one whose corners fall together is kept as a degenerate face.
     pub fn welded(&self) -> TriMesh {
-        let weld = Weld::of(self);
-        let faces = weld.faces(self);
-        TriMesh::new(weld.positions, faces)
-    }
-
-    /// As [`TriMesh::welded`], joining vertices within `tolerance` \[m\].
-    pub fn welded_within(&self, tolerance: f64) -> TriMesh {
-        let weld = Weld::new(&self.vertices, tolerance.max(0.0));
+        let weld = self.weld();
         let faces = weld.faces(self);
         TriMesh::new(weld.positions, faces)
     }
@@ -123,10 +127,11 @@ mod tests {
             ],
             vec![[0, 1, 2], [1, 3, 2], [3, 5, 4]],
         );
-        for welded in [mesh.welded(), mesh.welded_within(0.0)] {
-            assert_eq!(welded.vertices.len(), 4);
-            assert_eq!(welded.faces, [[0, 1, 2], [1, 1, 2], [1, 3, 2]]);
+        for weld in [mesh.weld(), mesh.weld_within(0.0)] {
+            assert_eq!(weld.index, [0, 1, 2, 1, 2, 3]);
+            assert_eq!(weld.faces(&mesh), [[0, 1, 2], [1, 1, 2], [1, 3, 2]]);
         }
+        assert_eq!(mesh.welded().vertices, mesh.weld().positions);
         assert!(TriMesh::default().welded().vertices.is_empty());
     }
 }

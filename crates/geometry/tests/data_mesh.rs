@@ -1,6 +1,6 @@
 //! Reading and cleaning the meshes of the test data.
 
-#![allow(clippy::unwrap_used)] // a test fails by panicking
+#![allow(clippy::unwrap_used)] // a test may panic; helpers outside test functions count as code to the lint
 
 use std::path::{Path, PathBuf};
 

@@ -1,5 +1,5 @@
 //! Forward kinematics and taxel distances against values computed by independent tools.
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used)] // a test may panic; helpers outside test functions count as code to the lint
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -7,6 +7,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use nalgebra::{Isometry3, Matrix4, Point3, Vector3};
+use prehend_geometry::hand::{Taxel, load_taxels};
 use prehend_geometry::{ClosestPoints, DistanceField, PosedRobot, Robot, RobotShape, TriMesh};
 use serde_json::Value;
 
@@ -62,82 +63,16 @@ fn forward_kinematics_match_the_golden_poses() {
     assert!(worst <= 1e-9 + 0.5e-9);
 }
 
-/// Vertices and faces of a binary little-endian PLY; every property but x, y, z and the face list is skipped.
-fn ply(path: &str) -> TriMesh {
-    let bytes = std::fs::read(data(path)).unwrap();
-    let end = bytes.windows(11).position(|w| w == b"end_header\n").unwrap() + 11;
-    let header = std::str::from_utf8(&bytes[..end]).unwrap();
-    assert!(header.contains("binary_little_endian"));
-    let size = |kind: &str| match kind {
-        "char" | "uchar" | "int8" | "uint8" => 1,
-        "short" | "ushort" | "int16" | "uint16" => 2,
-        "double" | "float64" => 8,
-        _ => 4,
-    };
-    let (mut counts, mut stride, mut offsets, mut count_size) = (Vec::new(), 0, BTreeMap::new(), 1);
-    for line in header.lines() {
-        let words: Vec<&str> = line.split_whitespace().collect();
-        match words[..] {
-            ["element", _, n] => counts.push(n.parse::<usize>().unwrap()),
-            ["property", "list", n, _, "vertex_indices" | "vertex_index"] => count_size = size(n),
-            ["property", kind, name] if counts.len() == 1 => {
-                offsets.insert(name.to_owned(), (stride, size(kind)));
-                stride += size(kind);
-            }
-            _ => {}
-        }
-    }
-    let float = |at: usize, size: usize| {
-        if size == 8 {
-            f64::from_le_bytes(bytes[at..at + 8].try_into().unwrap())
-        } else {
-            f64::from(f32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()))
-        }
-    };
-    let vertices = (0..counts[0])
-        .map(|i| {
-            let [x, y, z] = ["x", "y", "z"].map(|axis| {
-                let (offset, size) = offsets[axis];
-                float(end + i * stride + offset, size)
-            });
-            Point3::new(x, y, z)
-        })
-        .collect();
-    let mut at = end + counts[0] * stride;
-    let mut faces = Vec::new();
-    for _ in 0..counts[1] {
-        assert_eq!(bytes[at], 3);
-        at += count_size;
-        faces
-            .push([0, 1, 2].map(|i| {
-                u32::from_le_bytes(bytes[at + 4 * i..at + 4 * i + 4].try_into().unwrap())
-            }));
-        at += 12;
-    }
-    assert_eq!(at, bytes.len());
-    TriMesh::new(vertices, faces)
-}
-
 /// Link of each taxel and the skin above it, which the golden distances are measured from: taxels of
 /// the 4x4 pads lie 0.4 mm under the pad's face, those of the palm on it. `None` for the taxels of the
 /// curved tips: the data does not say where their skin is.
 fn taxels() -> Vec<Option<(String, Point3<f64>)>> {
-    let text = std::fs::read_to_string(data("hands/taxels_368.csv")).unwrap();
-    text.lines()
-        .skip(1)
-        .map(|line| {
-            let cells: Vec<&str> = line.split(',').collect();
-            let x = |i: usize| cells[i].parse::<f64>().unwrap();
-            let (position, normal) =
-                (Point3::new(x(5), x(6), x(7)), Vector3::new(x(8), x(9), x(10)));
-            let skin = match cells[2] {
-                "uSPa44" => position + normal * 4e-4,
-                "uSPa46" => position,
-                _ => return None,
-            };
-            Some((cells[3].to_owned(), skin))
-        })
-        .collect()
+    let skin = |t: Taxel| match t.patch.as_str() {
+        "03" | "13" | "23" | "33" => None,
+        "51" | "52" | "53" => Some((t.link, t.position)),
+        _ => Some((t.link, t.position + t.normal * 4e-4)),
+    };
+    load_taxels(&data("hands/taxels_368.csv")).unwrap().into_iter().map(skin).collect()
 }
 
 #[test]
@@ -151,7 +86,8 @@ fn taxel_distances_match_the_golden_ones() {
     for frame in frames["frames"].as_array().unwrap() {
         let model =
             format!("bop/inhand/models_eval/obj_{:06}.ply", frame["obj_id"].as_u64().unwrap());
-        let object = ClosestPoints::new(&ply(&model).scaled(1e-3)).unwrap();
+        let object =
+            ClosestPoints::new(&TriMesh::load(&data(&model)).unwrap().scaled(1e-3)).unwrap();
         let t_base_model = matrix(&frame["T_base_model"]);
         let t_model_base = t_base_model.try_inverse().unwrap();
         let poses = robot.forward_kinematics(&joints(&robot, &frame["q"]));
@@ -214,7 +150,7 @@ fn a_hand_is_built_and_queried_quickly() {
 #[test]
 #[ignore = "reads PREHEND_DATA"]
 fn closest_points_are_found_quickly() {
-    let mesh = ply("objects/006_mustard_bottle/5000.ply");
+    let mesh = TriMesh::load(&data("objects/006_mustard_bottle/5000.ply")).unwrap();
     let start = Instant::now();
     let tree = ClosestPoints::new(&mesh).unwrap();
     println!("built {} faces in {:.1} ms", mesh.faces.len(), start.elapsed().as_secs_f64() * 1e3);

@@ -1,11 +1,9 @@
 //! Whatever a file holds, reading it ends in a mesh or an error.
 
-#![allow(clippy::unwrap_used)] // a test fails by panicking
-
 use std::path::Path;
 
 use nalgebra::{Point3, Vector3};
-use prehend_geometry::TriMesh;
+use prehend_geometry::{SplitMix64, TriMesh};
 
 fn tetrahedron() -> TriMesh {
     let p = Point3::new;
@@ -21,12 +19,8 @@ fn tetrahedron() -> TriMesh {
 fn mutate(original: &[u8], name: &str) -> (usize, usize) {
     let path = Path::new(name);
     assert!(TriMesh::from_bytes(original, path).is_ok(), "{name}");
-    let mut state = 1_u64;
-    let mut next = |below: usize| {
-        state =
-            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 33) as usize % below.max(1)
-    };
+    let mut random = SplitMix64::new(1);
+    let mut next = |below: usize| (random.unit() * below as f64) as usize;
     let (mut read, mut refused) = (0, 0);
     for _ in 0..3000 {
         let mut bytes = original.to_vec();

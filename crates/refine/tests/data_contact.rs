@@ -3,13 +3,12 @@
 
 #![allow(clippy::unwrap_used)] // a test may panic; helpers outside test functions count as code to the lint
 
-use std::collections::{BTreeMap, HashMap};
-use std::f64::consts::{FRAC_PI_2, TAU};
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
-use prehend_geometry::{TriMesh, UnionBody};
+use prehend_geometry::shapes::{capsule, cuboid};
+use prehend_geometry::{ClosestPoints, Robot, TriMesh, UnionBody};
 use prehend_refine::bop::{Dataset, GroundTruth, read_results};
 use prehend_refine::metrics::{CONTACT_DISTANCE, CONTACT_SAMPLES, ContactModel};
 use serde_json::Value;
@@ -39,136 +38,36 @@ fn motion(v: &Value) -> Isometry3<f64> {
     Isometry3::from_parts(Translation3::from(t), UnitQuaternion::from_matrix(&r))
 }
 
-fn cuboid(size: Vector3<f64>) -> TriMesh {
-    let corner = |i: u32| {
-        Vector3::new(f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2)).add_scalar(-0.5)
-    };
-    let vertices = (0..8).map(|i| Point3::from(corner(i).component_mul(&size))).collect();
-    let quads =
-        [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-    TriMesh::new(vertices, quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect())
-}
-
-/// The points within `radius` of the segment from the origin to (0, 0, `length`).
-fn capsule(radius: f64, length: f64) -> TriMesh {
-    const COLUMNS: u32 = 24;
-    const ROWS: i32 = 12;
-    // Rings from the lower to the upper pole; both ends of the cylinder have one of their own.
-    let lower = (1 - ROWS..=0).map(|i| (i, 0.0));
-    let rings: Vec<_> = lower.chain((0..ROWS).map(|i| (i, length))).collect();
-    let mut vertices = vec![Point3::new(0.0, 0.0, -radius)];
-    for (i, z) in &rings {
-        let (sin, cos) = (FRAC_PI_2 * f64::from(*i) / f64::from(ROWS)).sin_cos();
-        let around = (0..COLUMNS).map(|k| (TAU * f64::from(k) / f64::from(COLUMNS)).sin_cos());
-        vertices.extend(
-            around.map(|(s, c)| Point3::new(radius * cos * c, radius * cos * s, z + radius * sin)),
-        );
-    }
-    vertices.push(Point3::new(0.0, 0.0, length + radius));
-    let top = vertices.len() as u32 - 1;
-    let at = |ring: u32, k: u32| 1 + ring * COLUMNS + k % COLUMNS;
-    let last = rings.len() as u32 - 1;
-    let mut faces = Vec::new();
-    for k in 0..COLUMNS {
-        faces.extend([[0, at(0, k + 1), at(0, k)], [at(last, k), at(last, k + 1), top]]);
-        for r in 0..last {
-            faces.push([at(r, k), at(r, k + 1), at(r + 1, k + 1)]);
-            faces.push([at(r, k), at(r + 1, k + 1), at(r + 1, k)]);
-        }
-    }
-    TriMesh::new(vertices, faces)
-}
-
 /// The hand's primitives in the camera frame.
-fn hand_parts(hand: &Value, frame: &Value) -> Vec<TriMesh> {
-    let names = list(&frame["joint_names"]).iter().map(|n| n.as_str().unwrap());
-    let q: BTreeMap<&str, f64> =
-        names.zip(list(&frame["q"]).iter().map(|v| v.as_f64().unwrap())).collect();
-    let mut t_cam_link = BTreeMap::from([("base_link", motion(&frame["T_cam_base"]))]);
-    for joint in list(&hand["joints"]) {
-        let text = |field: &str| joint[field].as_str().unwrap();
-        let rpy = vector(&joint["rpy"]);
-        let rotation = UnitQuaternion::from_euler_angles(rpy.x, rpy.y, rpy.z);
-        let origin = Isometry3::from_parts(Translation3::from(vector(&joint["xyz"])), rotation);
-        let turn = Isometry3::rotation(vector(&joint["axis"]) * q[text("name")]);
-        t_cam_link.insert(text("child"), t_cam_link[text("parent")] * origin * turn);
-    }
+fn hand_parts(robot: &Robot, hand: &Value, frame: &Value) -> Vec<TriMesh> {
+    let names = list(&frame["joint_names"]).iter().map(|n| n.as_str().unwrap().to_owned());
+    let q = names.zip(list(&frame["q"]).iter().map(|v| v.as_f64().unwrap())).collect();
+    let t_base_link = robot.forward_kinematics(&robot.joint_vector(&q).unwrap());
+    let t_cam_base = motion(&frame["T_cam_base"]);
     let mut parts = Vec::new();
-    for (link, shapes) in hand["links"].as_object().unwrap() {
-        for shape in list(&shapes["primitives"]) {
-            let (mesh, place) = match shape["type"].as_str().unwrap() {
-                "box" => (cuboid(vector(&shape["size"])), vector(&shape["center"])),
+    for (link, content) in hand["links"].as_object().unwrap() {
+        let t_cam_link = t_cam_base * t_base_link[robot.link_index(link).unwrap()];
+        for primitive in list(&content["primitives"]) {
+            let (mesh, center) = match primitive["type"].as_str().unwrap() {
+                "box" => (cuboid(vector(&primitive["size"])), vector(&primitive["center"])),
                 // All capsules lie along z.
-                _ => (
-                    capsule(
-                        shape["r"].as_f64().unwrap(),
-                        shape["p1"][2].as_f64().unwrap() - shape["p0"][2].as_f64().unwrap(),
-                    ),
-                    vector(&shape["p0"]),
-                ),
+                _ => {
+                    let (low, high) = (vector(&primitive["p0"]), vector(&primitive["p1"]));
+                    let radius = primitive["r"].as_f64().unwrap();
+                    (capsule(radius, 0.5 * (high - low).z, 24, 12), 0.5 * (low + high))
+                }
             };
-            parts.push(mesh.transformed(&(t_cam_link[link.as_str()] * Translation3::from(place))));
+            parts.push(mesh.transformed(&(t_cam_link * Translation3::from(center))));
         }
     }
     parts
-}
-
-/// Distances to a surface up to [`CONTACT_DISTANCE`], by a grid that lists each triangle in every cell near it.
-struct NearSurface {
-    triangles: Vec<[Point3<f64>; 3]>,
-    cells: HashMap<[i32; 3], Vec<usize>>,
-}
-
-const CELL: f64 = 0.01;
-
-fn cell(p: &Point3<f64>) -> [i32; 3] {
-    [p.x, p.y, p.z].map(|v| (v / CELL).floor() as i32)
-}
-
-impl NearSurface {
-    fn new(mesh: &TriMesh) -> Self {
-        let triangles: Vec<_> = (0..mesh.faces.len()).map(|f| mesh.triangle(f)).collect();
-        let mut cells: HashMap<[i32; 3], Vec<usize>> = HashMap::new();
-        for (i, [a, b, c]) in triangles.iter().enumerate() {
-            let margin = Vector3::repeat(CONTACT_DISTANCE);
-            let (lo, hi) = (cell(&(a.inf(b).inf(c) - margin)), cell(&(a.sup(b).sup(c) + margin)));
-            for x in lo[0]..=hi[0] {
-                for y in lo[1]..=hi[1] {
-                    for z in lo[2]..=hi[2] {
-                        cells.entry([x, y, z]).or_default().push(i);
-                    }
-                }
-            }
-        }
-        Self { triangles, cells }
-    }
-
-    fn distance(&self, p: &Point3<f64>) -> f64 {
-        let near = self.cells.get(&cell(p)).into_iter().flatten();
-        near.map(|&i| triangle_distance(p, &self.triangles[i])).fold(f64::INFINITY, f64::min)
-    }
-}
-
-fn triangle_distance(p: &Point3<f64>, [a, b, c]: &[Point3<f64>; 3]) -> f64 {
-    let (ab, ac, ap) = (b - a, c - a, p - a);
-    let normal = ab.cross(&ac);
-    let squared = normal.norm_squared();
-    let (u, v) = (ap.cross(&ac).dot(&normal) / squared, ab.cross(&ap).dot(&normal) / squared);
-    if u >= 0.0 && v >= 0.0 && u + v <= 1.0 {
-        return ap.dot(&normal).abs() / squared.sqrt();
-    }
-    let edge = |from: &Point3<f64>, to: &Point3<f64>| {
-        let d = to - from;
-        let s = ((p - from).dot(&d) / d.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-        (p - (from + s * d)).norm()
-    };
-    edge(a, b).min(edge(b, c)).min(edge(c, a))
 }
 
 #[test]
 #[ignore = "reads PREHEND_DATA"]
 fn golden_contact_of_the_inhand_frames() {
     let hand = json(&data("hands/allegro_xela_right.json"));
+    let robot = Robot::from_urdf_file(data("hands/allegro_xela_right.urdf")).unwrap();
     let root = data("bop/inhand");
     let dataset = Dataset::open(&root).unwrap();
     let truth = GroundTruth::new(&dataset);
@@ -182,8 +81,11 @@ fn golden_contact_of_the_inhand_frames() {
         let (im_id, obj_id) = (id("im_id"), id("obj_id"));
         let mesh = TriMesh::load(&truth.models().mesh_path(obj_id).unwrap()).unwrap().scaled(1e-3);
         let model = ContactModel::new(&mesh);
-        let body = UnionBody::new(&hand_parts(&hand, frame)).unwrap();
-        let surface = NearSurface::new(&body.mesh());
+        let body = UnionBody::new(&hand_parts(&robot, &hand, frame)).unwrap();
+        let surface = ClosestPoints::new(&body.mesh()).unwrap();
+        let distance = |p: &Point3<f64>| {
+            surface.closest(p, CONTACT_DISTANCE).map_or(f64::INFINITY, |c| c.distance)
+        };
         for (set, rows) in sets.iter().zip(&results) {
             let row = rows.iter().find(|r| r.im_id == im_id);
             let pose = row
@@ -193,15 +95,12 @@ fn golden_contact_of_the_inhand_frames() {
 
             let (iv, expected) =
                 (model.intersection_volume_cm3(&pose, &body).unwrap(), golden("IV_cm3"));
-            assert!(
-                (iv - expected).abs() < 1e-4_f64.max(1e-3 * expected),
-                "{set} {im_id}: {iv} instead of {expected}"
-            );
+            assert!((iv - expected).abs() <= 1e-4, "{set} {im_id}: {iv} instead of {expected}");
             worst = worst.max((iv - expected).abs());
 
             // Both numbers are estimates from as many samples: their difference in standard errors.
             let (ca, expected) =
-                (model.contact_area_cm2(&pose, &|p| surface.distance(p)), golden("CA_cm2_eps5mm"));
+                (model.contact_area_cm2(&pose, &distance), golden("CA_cm2_eps5mm"));
             let area = 1e4 * mesh.area();
             let fraction = expected / area;
             let sigma = area * (2.0 * fraction * (1.0 - fraction) / CONTACT_SAMPLES as f64).sqrt();

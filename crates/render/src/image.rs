@@ -4,6 +4,7 @@ use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
 use image::{DynamicImage, ImageFormat};
+use prehend_geometry::write_whole;
 
 /// Why an image could not be read, written or built.
 #[derive(Debug, thiserror::Error)]
@@ -268,26 +269,16 @@ fn decode(path: &Path) -> Result<DynamicImage, ImageError> {
     reader.decode().map_err(|source| ImageError::Codec { path: path.into(), source })
 }
 
-/// Encodes in memory, writes beside the target and renames, so that no reader ever sees half a file.
+/// Encodes in memory, so that the file appears whole or not at all.
 fn encode(path: &Path, image: Option<DynamicImage>) -> Result<(), ImageError> {
     let codec = |source| ImageError::Codec { path: path.into(), source };
-    let io = |source| ImageError::Io { path: path.into(), source };
     let format = ImageFormat::from_path(path).map_err(codec)?;
     let mut bytes = Cursor::new(Vec::new());
     if let Some(image) = image {
         image.write_to(&mut bytes, format).map_err(codec)?;
     }
-    let mut name = std::ffi::OsString::from(".");
-    name.push(path.file_name().unwrap_or_default());
-    name.push(format!(".{}.partial", std::process::id()));
-    let partial = path.with_file_name(name);
-    let written = std::fs::write(&partial, bytes.into_inner());
-    if let Err(source) = written.and_then(|()| std::fs::rename(&partial, path)) {
-        // The first failure is the one worth reporting; the leftover may not even exist.
-        let _ = std::fs::remove_file(&partial);
-        return Err(io(source));
-    }
-    Ok(())
+    write_whole(path, bytes.get_ref())
+        .map_err(|source| ImageError::Io { path: path.into(), source })
 }
 
 #[cfg(test)]

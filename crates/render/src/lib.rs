@@ -7,8 +7,6 @@
 //! Cameras follow OpenCV (x right, y down, z forward; pixel centres at integers); lengths are in metres; colours
 //! are in 0..=1 as stored in files.
 
-#![cfg_attr(test, allow(clippy::unwrap_used))]
-
 pub mod camera;
 pub mod contour;
 pub mod image;

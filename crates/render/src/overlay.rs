@@ -45,12 +45,12 @@ pub fn draw_outline(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shapes_for_tests::sphere;
+    use prehend_geometry::shapes::sphere;
 
     #[test]
     fn the_line_follows_the_outline() {
         let camera = Camera { fx: 100.0, fy: 100.0, cx: 31.5, cy: 23.5, width: 64, height: 48 };
-        let model = RenderModel::new(&sphere(0.1, 60)).unwrap();
+        let model = RenderModel::new(&sphere(0.1, 120)).unwrap();
         let pose = Isometry3::translation(0.0, 0.0, 0.6);
         let mut image = RgbImage::filled(64, 48, [0.0; 3]);
         draw_outline(&mut image, &camera, &model, &pose, [1.0, 0.5, 0.0], 1.0);

@@ -163,8 +163,8 @@ pub fn depth_map(camera: &Camera, bodies: &[(&RenderModel, Isometry3<f64>)]) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shapes_for_tests::{cuboid, sphere};
     use nalgebra::{Translation3, UnitQuaternion, Vector3};
+    use prehend_geometry::shapes::{cuboid, sphere};
 
     fn camera() -> Camera {
         Camera { fx: 200.0, fy: 210.0, cx: 63.5, cy: 47.5, width: 128, height: 96 }
@@ -179,7 +179,7 @@ mod tests {
 
     #[test]
     fn a_sphere_has_the_depth_of_a_sphere() {
-        let model = RenderModel::new(&sphere(0.08, 200)).unwrap();
+        let model = RenderModel::new(&sphere(0.08, 400)).unwrap();
         let pose = at(0.01, -0.02, 0.5);
         let depth = depth_map(&camera(), &[(&model, pose)]);
         let center = pose.translation.vector;
@@ -206,7 +206,7 @@ mod tests {
 
     #[test]
     fn no_pixel_is_lost_between_faces() {
-        let model = RenderModel::new(&sphere(0.08, 200)).unwrap();
+        let model = RenderModel::new(&sphere(0.08, 400)).unwrap();
         let depth = depth_map(&camera(), &[(&model, at(0.0, 0.0, 0.4))]);
         for y in 1..95 {
             for x in 1..127 {
@@ -219,7 +219,7 @@ mod tests {
 
     #[test]
     fn the_nearer_body_wins_and_what_is_behind_is_not_drawn() {
-        let model = RenderModel::new(&cuboid(Vector3::new(0.05, 0.05, 0.05))).unwrap();
+        let model = RenderModel::new(&cuboid(Vector3::repeat(0.1))).unwrap();
         let upright = |z: f64| Isometry3::translation(0.0, 0.0, z);
         let both = depth_map(&camera(), &[(&model, upright(0.4)), (&model, upright(0.7))]);
         assert!((both.get(63, 47).unwrap() - 0.35).abs() < 1e-5);
@@ -233,7 +233,7 @@ mod tests {
 
     #[test]
     fn open_meshes_are_seen_from_both_sides() {
-        let mut mesh = cuboid(Vector3::new(0.05, 0.05, 0.05));
+        let mut mesh = cuboid(Vector3::repeat(0.1));
         // Without its two near faces one looks at the inside of the far ones.
         let nearest = |f: &[u32; 3]| f.iter().all(|v| mesh.vertices[*v as usize].z < 0.0);
         let open: Vec<[u32; 3]> = mesh.faces.iter().copied().filter(|f| !nearest(f)).collect();

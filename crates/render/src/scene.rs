@@ -83,13 +83,13 @@ pub fn render_scene(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shapes_for_tests::cuboid;
+    use prehend_geometry::shapes::cuboid;
 
     #[test]
     fn bodies_hide_each_other_and_edges_are_averaged() {
         let camera = Camera { fx: 100.0, fy: 100.0, cx: 31.5, cy: 23.5, width: 64, height: 48 };
         let body = |half: f64, color: [f32; 3]| {
-            let mesh = cuboid(Vector3::new(half, half, half));
+            let mesh = cuboid(Vector3::repeat(2.0 * half));
             RenderModel::new(&mesh).unwrap().with_uniform_color(color)
         };
         let (near, far) = (body(0.0505, [1.0, 0.0, 0.0]), body(0.2, [0.0, 1.0, 0.0]));
@@ -117,7 +117,7 @@ mod tests {
     #[test]
     fn the_light_shades_by_the_normal() {
         let camera = Camera { fx: 100.0, fy: 100.0, cx: 15.5, cy: 15.5, width: 32, height: 32 };
-        let model = RenderModel::new(&cuboid(Vector3::new(0.05, 0.05, 0.05))).unwrap();
+        let model = RenderModel::new(&cuboid(Vector3::repeat(0.1))).unwrap();
         let object =
             SceneObject { model: &model, t_cam_model: Isometry3::translation(0.0, 0.0, 0.6) };
         let light = Light::headlight(0.25, 0.5);

@@ -1,32 +1,14 @@
-//! Small watertight shapes for this crate's tests.
+//! Watertight shapes for this crate's tests, beside those of `prehend_geometry::shapes`.
+
+use std::f64::consts::{PI, TAU};
 
 use nalgebra::{Point3, Vector3};
 use prehend_geometry::TriMesh;
 
-/// An axis-aligned box with the given half extents \[m\].
-pub(crate) fn cuboid(half: Vector3<f64>) -> TriMesh {
-    let sign = |i: usize, bit: usize| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };
-    let vertices = (0..8)
-        .map(|i| Point3::new(sign(i, 0) * half.x, sign(i, 1) * half.y, sign(i, 2) * half.z))
-        .collect();
-    let quads =
-        [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
-    let faces = quads.iter().flat_map(|q: &[u32; 4]| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]]);
-    TriMesh::new(vertices, faces.collect())
-}
-
-/// A sphere of `rings` rings \[m\].
-pub(crate) fn sphere(radius: f64, rings: usize) -> TriMesh {
-    grid(rings, rings, |u, v| {
-        let (phi, theta) = (std::f64::consts::TAU * u, std::f64::consts::PI * v);
-        Vector3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), -theta.cos()) * radius
-    })
-}
-
 /// A torus around z \[m\].
 pub(crate) fn torus(major: f64, minor: f64, rings: usize) -> TriMesh {
     grid(2 * rings, rings, |u, v| {
-        let (phi, theta) = (std::f64::consts::TAU * u, std::f64::consts::TAU * v);
+        let (phi, theta) = (TAU * u, TAU * v);
         let r = major - minor * theta.cos();
         Vector3::new(r * phi.cos(), r * phi.sin(), -minor * theta.sin())
     })
@@ -34,17 +16,17 @@ pub(crate) fn torus(major: f64, minor: f64, rings: usize) -> TriMesh {
 
 /// A smooth lump without symmetry, about `radius` large \[m\].
 pub(crate) fn lump(radius: f64, rings: usize) -> TriMesh {
-    let mut mesh = sphere(1.0, rings);
-    for p in &mut mesh.vertices {
+    grid(rings, rings, |u, v| {
+        let (phi, theta) = (TAU * u, PI * v);
+        let p = Vector3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), -theta.cos());
         let r = 1.0 + 0.15 * (2.0 * p.x + 1.0).sin() + 0.12 * (3.0 * p.y - p.z).cos();
-        *p = Point3::new(p.x * 0.7 * r, p.y * r, p.z * 1.3 * r) * radius;
-    }
-    mesh
+        Vector3::new(p.x * 0.7 * r, p.y * r, p.z * 1.3 * r) * radius
+    })
 }
 
 /// Paints vertex colours that vary smoothly over about `period` \[m\].
 pub(crate) fn painted(mut mesh: TriMesh, period: f64) -> TriMesh {
-    let k = std::f64::consts::TAU / period;
+    let k = TAU / period;
     let color = |p: &Point3<f64>| {
         [
             0.5 + 0.35 * (k * (p.x + 0.5 * p.y)).sin(),

@@ -1,12 +1,11 @@
 //! Renders a real scan at its true pose and compares it with an independent renderer's picture.
 
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used)] // a test may panic; helpers outside test functions count as code to the lint
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
-use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
-use prehend_geometry::{Texture, TriMesh};
+use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use prehend_geometry::TriMesh;
 use prehend_render::{
     Camera, ContourOptions, ContourRenderer, DepthImage, DepthOptions, Light, Mask, RenderModel,
     RgbImage, Target, draw_outline,
@@ -18,39 +17,6 @@ fn data() -> PathBuf {
         || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"),
         PathBuf::from,
     )
-}
-
-/// The PLY files of this data set: little-endian x y z u v vertices in millimetres, then triangles.
-fn scan(folder: &Path, name: &str) -> TriMesh {
-    let bytes = std::fs::read(folder.join(name).with_extension("ply")).unwrap();
-    let end = b"end_header\n";
-    let body = bytes.windows(end.len()).position(|w| w == end).unwrap() + end.len();
-    let header = std::str::from_utf8(&bytes[..body]).unwrap();
-    let count = |what: &str| -> usize {
-        let line = header.lines().find_map(|l| l.strip_prefix(&format!("element {what} ")));
-        line.unwrap().parse().unwrap()
-    };
-    let word = |at: usize| <[u8; 4]>::try_from(&bytes[at..at + 4]).unwrap();
-    let mut mesh = TriMesh::default();
-    let mut uvs = Vec::new();
-    for v in 0..count("vertex") {
-        let at = |i: usize| f32::from_le_bytes(word(body + 20 * v + 4 * i));
-        mesh.vertices.push(Point3::new(at(0), at(1), at(2)).cast::<f64>() * 1e-3);
-        uvs.push([at(3), at(4)]);
-    }
-    let faces = body + 20 * count("vertex");
-    for f in 0..count("face") {
-        let at = |i: usize| u32::from_le_bytes(word(faces + 13 * f + 1 + 4 * i));
-        mesh.faces.push([at(0), at(1), at(2)]);
-    }
-    let image = RgbImage::load(&folder.join(name).with_extension("png")).unwrap();
-    mesh.uvs = Some(uvs);
-    mesh.texture = Some(Arc::new(Texture {
-        width: image.width(),
-        height: image.height(),
-        pixels: image.pixels().iter().map(|p| p.map(|v| (v * 255.0).round() as u8)).collect(),
-    }));
-    mesh
 }
 
 fn json(path: &Path) -> Value {
@@ -72,7 +38,7 @@ struct View {
 }
 
 fn view(object: &str, image: usize) -> View {
-    let models = data().join("mujoco/models");
+    let model = TriMesh::load(&data().join(format!("mujoco/models/obj_{object}.ply"))).unwrap();
     let scene = data().join("mujoco/test").join(object);
     let gt = &json(&scene.join("scene_gt.json"))[image.to_string()][0];
     let camera = &json(&scene.join("scene_camera.json"))[image.to_string()];
@@ -83,7 +49,7 @@ fn view(object: &str, image: usize) -> View {
     let file = |folder: &str, name: String| scene.join(folder).join(name);
     let color = RgbImage::load(&file("rgb", format!("{image:06}.png"))).unwrap();
     View {
-        model: RenderModel::new(&scan(&models, &format!("obj_{object}"))).unwrap(),
+        model: RenderModel::new(&model.scaled(1e-3)).unwrap(),
         truth: Isometry3::from_parts(
             Translation3::from(shift),
             UnitQuaternion::from_rotation_matrix(&rotation),

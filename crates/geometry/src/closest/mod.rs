@@ -12,6 +12,7 @@ use self::bvh::{Bvh, MAX_FACES};
 use self::topology::PseudoNormals;
 use self::winding::Winding;
 use crate::TriMesh;
+use crate::mass::signed_volume;
 
 /// Why closest points of a mesh cannot be prepared.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -288,14 +289,7 @@ fn build(mesh: &TriMesh) -> Result<Bvh, ClosestError> {
 
 /// 1 where the mesh encloses a positive volume, -1 where it is turned inside out.
 fn orientation(mesh: &TriMesh) -> f64 {
-    let origin = mesh.triangle(0)[0];
-    let six_volumes: f64 = (0..mesh.faces.len())
-        .map(|f| {
-            let [a, b, c] = mesh.triangle(f).map(|v| v - origin);
-            a.dot(&b.cross(&c))
-        })
-        .sum();
-    if six_volumes < 0.0 { -1.0 } else { 1.0 }
+    if signed_volume(mesh) < 0.0 { -1.0 } else { 1.0 }
 }
 
 #[cfg(test)]

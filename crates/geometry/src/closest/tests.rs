@@ -1,17 +1,9 @@
 use super::*;
+use crate::SplitMix64;
 
-/// A reproducible stream of numbers in -0.5..0.5.
-struct Numbers(u64);
-
-impl Numbers {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (self.0 >> 11) as f64 / (1u64 << 53) as f64 - 0.5
-    }
-
-    fn point(&mut self) -> Point3<f64> {
-        Point3::new(self.next(), self.next(), self.next())
-    }
+/// Within half a metre of the origin along each axis.
+fn point(random: &mut SplitMix64) -> Point3<f64> {
+    Point3::from([(); 3].map(|()| random.unit() - 0.5))
 }
 
 /// A closed bumpy ball of `2 n (n - 1)` faces, seams and poles shared.
@@ -57,9 +49,9 @@ fn agrees_with_every_triangle_in_turn() {
         let shift = Vector3::repeat(offset);
         let mesh = mesh.transformed(&nalgebra::Isometry3::translation(offset, offset, offset));
         let tree = ClosestPoints::new(&mesh).unwrap();
-        let mut numbers = Numbers(7);
+        let mut random = SplitMix64::new(7);
         for _ in 0..500 {
-            let p = Point3::from(numbers.point().coords * 4.0 + shift);
+            let p = Point3::from(point(&mut random).coords * 4.0 + shift);
             let expected = brute_force(&mesh, &p);
             let found = tree.closest(&p, f64::INFINITY).unwrap();
             assert_eq!(found.distance, expected);
@@ -82,24 +74,26 @@ fn agrees_with_every_triangle_in_turn() {
 #[test]
 fn batches_keep_the_order_whatever_the_threads() {
     let tree = ClosestPoints::new(&ball(16)).unwrap();
-    let mut numbers = Numbers(3);
-    let points: Vec<_> = (0..3000).map(|_| numbers.point() * 3.0).collect();
+    let mut random = SplitMix64::new(3);
+    let points: Vec<_> = (0..3000).map(|_| point(&mut random) * 3.0).collect();
     let alone: Vec<_> = points.iter().map(|p| tree.closest(p, 0.5)).collect();
+    let signed: Vec<_> = points.iter().map(|p| tree.signed_distance(p)).collect();
     assert!(alone.iter().any(Option::is_some) && alone.iter().any(Option::is_none));
     for threads in [1, 3] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         assert_eq!(pool.install(|| tree.closest_many(&points, 0.5)), alone);
+        assert_eq!(pool.install(|| tree.signed_distance_many(&points)), signed);
     }
 }
 
 #[test]
 fn the_gradient_is_the_unit_direction() {
     let tree = ClosestPoints::new(&ball(16)).unwrap();
-    let mut numbers = Numbers(5);
+    let mut random = SplitMix64::new(5);
     let step = 1e-6;
     let mut checked = 0;
     for _ in 0..200 {
-        let p = numbers.point() * 3.0;
+        let p = point(&mut random) * 3.0;
         let (signed, closest) = tree.signed_distance(&p);
         let direction = (p - closest.point) / signed;
         let difference = Vector3::from_fn(|i, _| {
@@ -130,10 +124,10 @@ fn seams_and_inverted_faces_do_not_hide_the_inside() {
     let split = ClosestPoints::new(&split).unwrap();
     mesh.faces.iter_mut().for_each(|f| f.swap(0, 1));
     let inverted = ClosestPoints::new(&mesh).unwrap();
-    let mut numbers = Numbers(11);
+    let mut random = SplitMix64::new(11);
     let mut inside = 0;
     for _ in 0..1000 {
-        let p = numbers.point() * 2.5;
+        let p = point(&mut random) * 2.5;
         let expected = reference.signed_distance(&p).0;
         inside += usize::from(expected < 0.0);
         assert_eq!(split.signed_distance(&p).0, expected);
@@ -151,9 +145,9 @@ fn an_open_mesh_uses_the_winding_number_and_says_so() {
     mesh.faces.truncate(mesh.faces.len() - 6);
     let open = ClosestPoints::new(&mesh).unwrap();
     assert_eq!(open.sign_method(), SignMethod::WindingNumber);
-    let mut numbers = Numbers(13);
+    let mut random = SplitMix64::new(13);
     for _ in 0..1000 {
-        let p = numbers.point() * 2.5;
+        let p = point(&mut random) * 2.5;
         let (expected, _) = closed.signed_distance(&p);
         // Near the surface, closest points may differ where the hole is.
         if expected.abs() > 0.15 {
@@ -168,9 +162,9 @@ fn far_groups_hardly_change_the_winding_number() {
     mesh.faces.truncate(mesh.faces.len() / 2);
     let tree = Bvh::new(&mesh);
     let winding = Winding::new(&tree);
-    let mut numbers = Numbers(17);
+    let mut random = SplitMix64::new(17);
     for _ in 0..200 {
-        let p = numbers.point() * 3.0;
+        let p = point(&mut random) * 3.0;
         let exact: f64 = (0..mesh.faces.len())
             .map(|f| {
                 let [a, b, c] = mesh.triangle(f).map(|v| v - p);
@@ -196,16 +190,16 @@ fn outside_tetrahedron(corners: &[Point3<f64>; 4], p: &Point3<f64>) -> bool {
 
 #[test]
 fn the_sign_holds_on_thin_tetrahedra() {
-    let mut numbers = Numbers(19);
+    let mut random = SplitMix64::new(19);
     for thickness in [1.0, 1e-1, 1e-2, 1e-3, 1e-4, 1e-5] {
         for _ in 0..50 {
             let flat = |p: Point3<f64>| Point3::new(p.x, p.y, p.z * thickness);
             let turn = nalgebra::Rotation3::from_euler_angles(
-                numbers.next(),
-                numbers.next(),
-                numbers.next(),
+                random.unit() - 0.5,
+                random.unit() - 0.5,
+                random.unit() - 0.5,
             );
-            let corners = [(); 4].map(|()| turn * flat(numbers.point()));
+            let corners = [(); 4].map(|()| turn * flat(point(&mut random)));
             let volume = (corners[1] - corners[0])
                 .cross(&(corners[2] - corners[0]))
                 .dot(&(corners[3] - corners[0]));
@@ -217,7 +211,7 @@ fn the_sign_holds_on_thin_tetrahedra() {
             assert_eq!(tree.sign_method(), SignMethod::PseudoNormal);
             for k in 0..400 {
                 let spread = if k % 2 == 0 { 1.0 } else { 1.5 };
-                let p = turn * flat(numbers.point() * spread);
+                let p = turn * flat(point(&mut random) * spread);
                 let (signed, _) = tree.signed_distance(&p);
                 // Within rounding of the surface the reference itself cannot tell.
                 if signed.abs() > 1e-12 {

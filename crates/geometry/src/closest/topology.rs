@@ -1,10 +1,9 @@
 //! Is a mesh a closed surface, and which way does it face at its edges and corners?
 
-use std::collections::HashMap;
-
 use nalgebra::Vector3;
 
 use crate::TriMesh;
+use crate::topology::{edges, is_collapsed};
 
 /// Angle-weighted pseudo-normals of a mesh welded by position.
 ///
@@ -23,7 +22,9 @@ pub(super) struct PseudoNormals {
 impl PseudoNormals {
     /// Pseudo-normals, or `None` unless the welded mesh is a closed, consistently oriented two-manifold.
     pub(super) fn new(mesh: &TriMesh) -> Option<Self> {
-        let (corners, vertex_count) = weld(mesh);
+        // Exactly: a face collapsed by a tolerance would still have an area, and count in its corners' normals.
+        let weld = mesh.weld_within(0.0);
+        let (corners, vertex_count) = (weld.faces(mesh), weld.positions.len());
         let partners = partners(&corners)?;
         if !fans_are_single(&corners, &partners, vertex_count) {
             return None;
@@ -64,53 +65,26 @@ impl PseudoNormals {
     }
 }
 
-/// Welded corner indices of each face and the number of distinct positions.
-///
-/// Texture seams store a position once for each of its UVs: equal coordinates are one vertex.
-fn weld(mesh: &TriMesh) -> (Vec<[u32; 3]>, usize) {
-    let mut index: HashMap<[u64; 3], u32> = HashMap::with_capacity(mesh.vertices.len());
-    let welded: Vec<u32> = mesh
-        .vertices
-        .iter()
-        .map(|v| {
-            let next = index.len() as u32;
-            // Adding zero makes -0 and +0 one position.
-            *index.entry([v.x, v.y, v.z].map(|x| (x + 0.0).to_bits())).or_insert(next)
-        })
-        .collect();
-    (mesh.faces.iter().map(|f| f.map(|v| welded[v as usize])).collect(), index.len())
-}
-
-/// Whether two corners of a face coincide: such a face has no surface and bounds nothing.
-fn collapsed(c: &[u32; 3]) -> bool {
-    c[0] == c[1] || c[1] == c[2] || c[2] == c[0]
-}
-
 /// For each half-edge `3 f + i` its opposite one (`None` on collapsed faces); `None` altogether if an
 /// edge is open, shared by more than two faces, or run through twice in one direction.
 fn partners(corners: &[[u32; 3]]) -> Option<Vec<Option<usize>>> {
-    let mut half_edges: HashMap<(u32, u32), usize> = HashMap::with_capacity(3 * corners.len());
-    for (f, c) in corners.iter().enumerate().filter(|(_, c)| !collapsed(c)) {
-        for i in 0..3 {
-            if half_edges.insert((c[i], c[(i + 1) % 3]), 3 * f + i).is_some() {
-                return None;
-            }
-        }
-    }
+    let edges = edges(corners);
     let mut partners = vec![None; 3 * corners.len()];
-    for (f, c) in corners.iter().enumerate().filter(|(_, c)| !collapsed(c)) {
-        for i in 0..3 {
-            partners[3 * f + i] = Some(*half_edges.get(&(c[(i + 1) % 3], c[i]))?);
+    for edge in edges.iter() {
+        if !edge.is_manifold() {
+            return None;
         }
+        let [a, b] = [0, 1].map(|i| 3 * edge.uses[i].face as usize + edge.uses[i].corner as usize);
+        (partners[a], partners[b]) = (Some(b), Some(a));
     }
-    (!half_edges.is_empty()).then_some(partners)
+    (!edges.is_empty()).then_some(partners)
 }
 
 /// Whether the faces around every vertex form one fan: a vertex where two bodies touch has two.
 fn fans_are_single(corners: &[[u32; 3]], partners: &[Option<usize>], vertex_count: usize) -> bool {
     let mut degree = vec![0usize; vertex_count];
     let mut start = vec![None; vertex_count];
-    for (f, c) in corners.iter().enumerate().filter(|(_, c)| !collapsed(c)) {
+    for (f, c) in corners.iter().enumerate().filter(|(_, c)| !is_collapsed(c)) {
         for i in 0..3 {
             degree[c[i] as usize] += 1;
             start[c[i] as usize] = Some(3 * f + i);

@@ -147,6 +147,7 @@ impl Triangle {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::SplitMix64;
 
     /// Smallest distance over a fine lattice of barycentric coordinates: an upper bound.
     fn lattice(t: &Triangle, p: &Vector3<f64>, n: usize) -> f64 {
@@ -162,11 +163,8 @@ mod tests {
 
     #[test]
     fn every_region_agrees_with_a_dense_lattice() {
-        let mut seed = 1u64;
-        let mut next = || {
-            seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (seed >> 11) as f64 / (1u64 << 53) as f64 - 0.5
-        };
+        let mut random = SplitMix64::new(1);
+        let mut next = || random.unit() - 0.5;
         let mut seen = [false; 7];
         for case in 0..200 {
             let mut point = || Point3::new(next(), next(), next());

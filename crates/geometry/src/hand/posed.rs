@@ -1,24 +1,18 @@
 //! The hand's parts in the base frame, for tests of contact.
 
-use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point3, Vector3};
 
-use super::JOINT_COUNT;
-use super::allegro::{Joint, Part, joint, link};
-use crate::TriMesh;
+use super::allegro::{Part, link, link_name};
+use super::{JOINT_COUNT, JOINT_NAMES, allegro_xela_urdf};
 use crate::shapes::{capsule, cuboid};
+use crate::{Robot, TriMesh};
 
 /// `t_base_link` of links 0–15.
 pub(super) fn link_poses(q: &[f64; JOINT_COUNT]) -> Vec<Isometry3<f64>> {
-    let mut poses: Vec<Isometry3<f64>> = Vec::new();
-    for (i, angle) in q.iter().enumerate() {
-        let Joint { parent, xyz, rpy: [roll, pitch, yaw], axis, .. } = joint(i);
-        let turn =
-            UnitQuaternion::from_axis_angle(&Unit::new_normalize(Vector3::from(axis)), *angle);
-        let rotation = UnitQuaternion::from_euler_angles(roll, pitch, yaw) * turn;
-        let t_parent_link = Isometry3::from_parts(Translation3::from(Vector3::from(xyz)), rotation);
-        poses.push(parent.map_or(t_parent_link, |p| poses[p] * t_parent_link));
-    }
-    poses
+    let robot = Robot::from_urdf_str(&allegro_xela_urdf(), None).unwrap();
+    let state = JOINT_NAMES.map(str::to_owned).into_iter().zip(*q).collect();
+    let poses = robot.forward_kinematics(&robot.joint_vector(&state).unwrap());
+    (0..JOINT_COUNT).map(|i| poses[robot.link_index(&link_name(Some(i))).unwrap()]).collect()
 }
 
 /// Parts of a link with their pose in the base frame.
@@ -72,11 +66,11 @@ pub(super) fn surface(part: &Part) -> TriMesh {
     let (mesh, center) = match *part {
         Part::Box { size, center } => (cuboid(size.into()), center.into()),
         Part::Capsule { low, high, radius } => (
-            capsule(radius, 0.5 * (high[2] - low[2]), 24),
+            capsule(radius, 0.5 * (high[2] - low[2]), 24, 12),
             0.5 * (Vector3::from(low) + Vector3::from(high)),
         ),
     };
-    mesh.transformed(&Isometry3::from_parts(Translation3::from(center), UnitQuaternion::identity()))
+    mesh.transformed(&Isometry3::from(center))
 }
 
 #[test]

@@ -18,6 +18,7 @@ use std::path::{Component, Path, PathBuf};
 
 use crate::TriMesh;
 pub use error::MeshError;
+pub use whole::write_whole;
 
 impl TriMesh {
     /// Reads a mesh by the extension of `path`: `.ply`, `.obj`, `.stl`, `.gltf` or `.glb`, in the file's unit.

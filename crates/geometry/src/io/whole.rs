@@ -5,6 +5,15 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
+/// Writes `content` to a new file beside `path` and gives it that name, replacing what was there: no reader ever sees
+/// half a file.
+///
+/// # Errors
+/// What the system said; a file that was there before is then unchanged, and no other is left.
+pub fn write_whole(path: &Path, content: &[u8]) -> io::Result<()> {
+    WholeFile::write(path, content)?.commit()
+}
+
 /// Content written under a temporary name in the target's folder; dropped without [`WholeFile::commit`],
 /// it vanishes.
 pub(super) struct WholeFile {
@@ -55,9 +64,14 @@ mod tests {
         let target = folder.path().join("a.bin");
         drop(WholeFile::write(&target, b"x").unwrap());
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
-        WholeFile::write(&target, b"y").unwrap().commit().unwrap();
-        assert_eq!(std::fs::read(&target).unwrap(), b"y");
-        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
-        assert!(WholeFile::write(&folder.path().join("no/a.bin"), b"y").is_err());
+        write_whole(&target, b"a much longer first version").unwrap();
+        write_whole(&target, b"second").unwrap();
+        assert_eq!(std::fs::read(&target).unwrap(), b"second");
+        assert!(write_whole(&folder.path().join("no/a.bin"), b"y").is_err());
+        // A folder in the way stops the rename.
+        let taken = folder.path().join("taken");
+        std::fs::create_dir(&taken).unwrap();
+        assert!(write_whole(&taken, b"y").is_err());
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2);
     }
 }

@@ -1,12 +1,19 @@
 //! Collision tags of a URDF link as triangle meshes in the link frame.
+//!
+//! Boxes are exact. Round shapes have [`COLUMNS`] columns about the z axis and half as many rows from pole to pole,
+//! their vertices on the true surface: facets lie up to `radius * (1 - cos(π / 48))` = 0.21 % of the radius inside it
+//! (34 µm at 15.7 mm), on a sphere up to twice as much.
 
 use std::path::{Component, Path, PathBuf};
 
 use nalgebra::{Point3, Vector3};
 use urdf_rs::Geometry;
 
-use super::{RobotError, primitive, urdf};
-use crate::TriMesh;
+use super::{RobotError, urdf};
+use crate::{TriMesh, shapes};
+
+/// Columns of facets around a cylinder, a capsule or a sphere.
+const COLUMNS: usize = 48;
 
 /// One mesh a collision tag of `link`, in the link frame \[m\].
 pub(super) fn parts(
@@ -38,19 +45,19 @@ fn geometry(
     match geometry {
         Geometry::Box { size } => {
             positive("box size", &size.0)?;
-            Ok(primitive::cuboid(&Vector3::from(size.0)))
+            Ok(shapes::cuboid(Vector3::from(size.0)).welded())
         }
         Geometry::Cylinder { radius, length } => {
             positive("cylinder size", &[*radius, *length])?;
-            Ok(primitive::cylinder(*radius, *length))
+            Ok(shapes::cylinder(*radius, *length, COLUMNS).welded())
         }
         Geometry::Capsule { radius, length } => {
             positive("capsule size", &[*radius, *length])?;
-            Ok(primitive::capsule(*radius, *length))
+            Ok(shapes::capsule(*radius, 0.5 * length, COLUMNS, COLUMNS / 4).welded())
         }
         Geometry::Sphere { radius } => {
             positive("sphere radius", &[*radius])?;
-            Ok(primitive::sphere(*radius))
+            Ok(shapes::sphere(*radius, COLUMNS).welded())
         }
         Geometry::Mesh { filename, scale } => {
             let error = |reason: String| RobotError::Mesh {
@@ -59,7 +66,8 @@ fn geometry(
                 reason,
             };
             let path = resolve(filename, asset_dir).map_err(error)?;
-            let mut mesh = load_collision_mesh(&path).map_err(error)?;
+            let loaded = TriMesh::load(&path).map_err(|e| error(e.to_string()))?;
+            let mut mesh = TriMesh::new(loaded.vertices, loaded.faces);
             let scale = scale.map_or([1.0; 3], |s| s.0);
             if !scale.iter().all(|s| s.is_finite() && *s != 0.0) {
                 return Err(error("scale must be finite and not zero".into()));
@@ -109,48 +117,14 @@ fn resolve(file: &str, asset_dir: Option<&Path>) -> Result<PathBuf, String> {
     Ok(path)
 }
 
-/// Loads the geometry of a mesh file, in the units of the file.
-fn load_collision_mesh(path: &Path) -> Result<TriMesh, String> {
-    let extension =
-        path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
-    match extension.as_str() {
-        "stl" => {
-            let file = std::fs::File::open(path).map_err(|e| e.to_string())?;
-            let stl =
-                stl_io::read_stl(&mut std::io::BufReader::new(file)).map_err(|e| e.to_string())?;
-            let vertices = stl
-                .vertices
-                .iter()
-                .map(|v| Point3::new(f64::from(v[0]), f64::from(v[1]), f64::from(v[2])))
-                .collect();
-            Ok(TriMesh::new(
-                vertices,
-                stl.faces.iter().map(|f| f.vertices.map(|v| v as u32)).collect(),
-            ))
-        }
-        "obj" => {
-            let options = tobj::LoadOptions { triangulate: true, ..Default::default() };
-            let (models, _) = tobj::load_obj(path, &options).map_err(|e| e.to_string())?;
-            let mut mesh = TriMesh::default();
-            for model in &models {
-                let positions = &model.mesh.positions;
-                let vertices = positions
-                    .chunks_exact(3)
-                    .map(|v| Point3::new(f64::from(v[0]), f64::from(v[1]), f64::from(v[2])))
-                    .collect();
-                let faces =
-                    model.mesh.indices.chunks_exact(3).map(|f| [f[0], f[1], f[2]]).collect();
-                mesh.append(&TriMesh::new(vertices, faces));
-            }
-            Ok(mesh)
-        }
-        _ => Err(format!("unknown mesh format '.{extension}'")),
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::PI;
+
     use super::super::Robot;
+    use crate::ClosestPoints;
+    use crate::closest::SignMethod;
+    use crate::mass::signed_volume;
 
     fn link(geometry: &str) -> String {
         format!(
@@ -180,15 +154,7 @@ mod tests {
             let part = &robot.links()[0].parts[0];
             assert_eq!((part.faces.len(), part.bounds().unwrap().0.y), (4, -2.0));
             // Reflected, but still facing outwards.
-            let six_volumes: f64 = part
-                .faces
-                .iter()
-                .map(|f| {
-                    let [a, b, c] = f.map(|v| part.vertices[v as usize].coords);
-                    a.dot(&b.cross(&c))
-                })
-                .sum();
-            assert!((six_volumes - 2.0).abs() < 1e-12);
+            assert!((signed_volume(part) - 1.0 / 3.0).abs() < 1e-12);
         }
         for file in ["../b.obj", "meshes/../../b.obj", "package://x/../../b.obj", "/etc/passwd"] {
             assert!(read(file).unwrap_err().contains("leaves the folder"), "{file}");
@@ -210,13 +176,24 @@ mod tests {
     }
 
     #[test]
-    fn primitives_need_positive_sizes() {
-        for (geometry, faces) in
-            [("<box size=\"1 2 3\"/>", 12), ("<cylinder radius=\"1\" length=\"2\"/>", 192)]
-        {
+    fn every_primitive_is_closed_and_faces_outwards() {
+        for (geometry, faces, exact, tolerance) in [
+            ("<box size=\"1 2 3\"/>", 12, 6.0, 1e-15),
+            ("<cylinder radius=\"1\" length=\"2\"/>", 192, 2.0 * PI, 0.003),
+            ("<sphere radius=\"1\"/>", 2208, 4.0 / 3.0 * PI, 0.008),
+            ("<capsule radius=\"1\" length=\"2\"/>", 2304, (2.0 + 4.0 / 3.0) * PI, 0.008),
+        ] {
             let robot = Robot::from_urdf_str(&link(geometry), None).unwrap();
-            assert_eq!(robot.links()[0].parts[0].faces.len(), faces);
+            let part = &robot.links()[0].parts[0];
+            assert_eq!(part.faces.len(), faces, "{geometry}");
+            assert_eq!(ClosestPoints::new(part).unwrap().sign_method(), SignMethod::PseudoNormal);
+            let volume = signed_volume(part);
+            assert!((volume / exact - 1.0).abs() < tolerance, "{geometry}: {volume}");
         }
+    }
+
+    #[test]
+    fn primitives_need_positive_sizes() {
         for geometry in
             ["<box size=\"1 0 3\"/>", "<sphere radius=\"-1\"/>", "<sphere radius=\"NaN\"/>"]
         {

@@ -87,6 +87,7 @@ fn constant<S: Scalar>(t: &Isometry3<f64>) -> Isometry3<S> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use prehend_autodiff::{Fwd, Var, gradient};
 
     /// A finger: yaw, pitch, a slide, and a last phalanx that bends with the second joint.
     const FINGER: &str = r#"<robot name="finger">
@@ -150,6 +151,37 @@ mod tests {
                     (plus.rotation * minus.rotation.inverse()).scaled_axis() / (2.0 * step);
                 assert!((jacobian.fixed_view::<3, 1>(0, i) - linear).norm() < 1e-9);
                 assert!((jacobian.fixed_view::<3, 1>(3, i) - angular).norm() < 1e-9);
+            }
+        }
+    }
+
+    #[test]
+    fn forward_and_reverse_mode_give_the_geometric_jacobian() {
+        let robot = finger();
+        let tip = robot.link_index("tip").unwrap();
+        let point = Point3::new(0.003, -0.002, 0.012);
+        for q in [[0.0, 0.0, 0.0], [0.3, -0.8, 0.004], [-2.0, 3.0, 0.01]] {
+            let jacobian = robot.jacobian(&q, tip, &point);
+            let seeded: [Fwd<3>; 3] = std::array::from_fn(|i| Fwd::variable(q[i], i));
+            let pose = robot.forward_kinematics(&seeded)[tip];
+            let moved = pose * point.map(Fwd::<3>::constant);
+            let rotation = pose.rotation.to_rotation_matrix().into_inner();
+            for i in 0..3 {
+                let linear = moved.coords.map(|x| x.derivative[i]);
+                assert!((jacobian.fixed_view::<3, 1>(0, i) - linear).norm() < 1e-12);
+                // The rate of a rotation is the cross product with the angular velocity, after the rotation.
+                let rate =
+                    rotation.map(|x| x.derivative[i]) * rotation.map(|x| x.value).transpose();
+                let angular = jacobian.fixed_view::<3, 1>(3, i).into_owned();
+                assert!((angular.cross_matrix() - rate).norm() < 1e-12);
+            }
+            // The vector that reverse mode multiplies the Jacobian with picks one row after the other.
+            for row in 0..3 {
+                let moved = |q: &[Var]| robot.forward_kinematics(q)[tip] * point.map(Var::constant);
+                let (_, gradient) = gradient(|q| moved(q)[row], &q);
+                for (i, reverse) in gradient.iter().enumerate() {
+                    assert!((jacobian[(row, i)] - reverse).abs() < 1e-12);
+                }
             }
         }
     }

@@ -4,7 +4,6 @@ mod collision;
 mod error;
 mod kinematics;
 mod posed;
-mod primitive;
 mod shape;
 mod tree;
 mod urdf;
@@ -15,7 +14,6 @@ use nalgebra::{Isometry3, Unit, Vector3};
 
 pub use error::RobotError;
 pub use posed::PosedRobot;
-pub use primitive::{cuboid, cylinder, sphere};
 pub use shape::{LinkShape, RobotShape};
 
 use crate::TriMesh;

@@ -168,7 +168,8 @@ fn equal_arcs(rows: &[Section], parts: usize) -> Vec<[f64; 2]> {
         .map(|k| match k {
             0 => at(0),
             k if k == parts => at(fine),
-            k => at(lengths.partition_point(|l| *l < k as f64 * step)),
+            // Rounding may leave a length just short of its goal, where the next would be a whole step too far.
+            k => at(lengths.partition_point(|l| *l < (k as f64 - 1e-9) * step)),
         })
         .collect()
 }

@@ -24,15 +24,16 @@ pub fn cylinder(radius: f64, height: f64, segments: usize) -> TriMesh {
 }
 
 /// The points within `radius` \[m\] of the segment from −`half_length` to `half_length` \[m\] on the z axis,
-/// in `segments` columns and `segments`/4 rows a hemisphere.
-pub fn capsule(radius: f64, half_length: f64, segments: usize) -> TriMesh {
-    let steps = segments.div_ceil(4).max(1);
+/// in `segments` columns, one of them at +x, and `rows` rows a hemisphere (at least one) of equal latitude; its
+/// vertices lie on the true surface.
+pub fn capsule(radius: f64, half_length: f64, segments: usize, rows: usize) -> TriMesh {
+    let rows = rows.max(1);
     let arc = |i: usize, centre: f64, sign: f64| {
-        let (s, c) = (FRAC_PI_2 * i as f64 / steps as f64).sin_cos();
-        [radius * if i == steps { 0.0 } else { c }, centre + sign * radius * s]
+        let (s, c) = (FRAC_PI_2 * i as f64 / rows as f64).sin_cos();
+        [radius * if i == rows { 0.0 } else { c }, centre + sign * radius * s]
     };
-    let bottom = (0..=steps).rev().map(|i| arc(i, -half_length, -1.0));
-    let top = (0..=steps).map(|i| arc(i, half_length, 1.0));
+    let bottom = (0..=rows).rev().map(|i| arc(i, -half_length, -1.0));
+    let top = (0..=rows).map(|i| arc(i, half_length, 1.0));
     revolve(&bottom.chain(top).collect::<Vec<_>>(), segments)
 }
 
@@ -71,7 +72,7 @@ mod tests {
         let (r, h) = (0.03, 0.05);
         converges(4.0 / 3.0 * PI * r * r * r, |n| sphere(r, n));
         converges(PI * r * r * h, |n| cylinder(r, h, n));
-        converges(PI * r * r * (h + 4.0 / 3.0 * r), |n| capsule(r, 0.5 * h, n));
+        converges(PI * r * r * (h + 4.0 / 3.0 * r), |n| capsule(r, 0.5 * h, n, n / 4));
         converges(PI * r * r * h / 3.0, |n| revolve(&[[r, 0.0], [0.0, h]], n));
         converges(4.0 / 3.0 * PI * r * h * 0.1, |n| superellipsoid([r, h, 0.1], [1.0, 1.0], n));
     }
@@ -91,10 +92,23 @@ mod tests {
         for p in &sphere(0.03, 24).vertices {
             assert!((p.coords.norm() - 0.03).abs() < 1e-15);
         }
-        for p in &capsule(0.01, 0.02, 24).vertices {
+        for p in &capsule(0.01, 0.02, 24, 12).vertices {
             let axis = nalgebra::Vector3::new(0.0, 0.0, p.z.clamp(-0.02, 0.02));
             let distance = (p.coords - axis).norm();
             assert!((distance - 0.01).abs() < 1e-15);
+        }
+    }
+
+    #[test]
+    fn columns_and_rows_divide_a_capsule_equally() {
+        let mesh = capsule(0.01, 0.02, 24, 12).welded();
+        // Two poles, and 12 rings of 24 at each end of the cylinder.
+        assert_eq!(mesh.vertices.len(), 2 + 2 * 12 * 24);
+        for p in &mesh.vertices {
+            let latitude = ((p.z.abs() - 0.02) / 0.01).asin() / (FRAC_PI_2 / 12.0);
+            assert!((latitude - latitude.round()).abs() < 1e-6, "{p}");
+            let column = p.y.atan2(p.x) / (PI / 12.0);
+            assert!((column - column.round()).abs() < 1e-9 || p.x.hypot(p.y) == 0.0, "{p}");
         }
     }
 }

@@ -4,8 +4,9 @@ use super::*;
 use crate::image::Mask;
 use crate::raster::depth_map;
 use crate::scene::{SceneObject, render_scene};
-use crate::shapes_for_tests::{cuboid, lump, painted, sphere, torus};
+use crate::shapes_for_tests::{lump, painted, torus};
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
+use prehend_geometry::shapes::{cuboid, sphere};
 use prehend_geometry::{Texture, TriMesh};
 use std::sync::Arc;
 
@@ -52,7 +53,7 @@ fn unit(axis: usize, step: f64) -> [f64; 6] {
 
 /// A box with a smooth texture, projected obliquely so that it runs on across the edges.
 fn textured_box() -> TriMesh {
-    let mut mesh = cuboid(Vector3::new(0.03, 0.04, 0.05));
+    let mut mesh = cuboid(Vector3::new(0.06, 0.08, 0.1));
     let uv = |p: &Point3<f64>| {
         [0.5 + 4.0 * (p.x + 0.6 * p.z), 0.5 + 4.0 * (p.y - 0.5 * p.z + 0.2 * p.x)]
     };
@@ -275,7 +276,7 @@ fn gradients_match_differences_of_the_value() {
     let scenes = [
         ("textured box", textured_box(), Light::ambient(0.9)),
         ("painted lump", painted(lump(0.045, 90), 0.05), lamp()),
-        ("painted sphere", painted(sphere(0.045, 90), 0.04), lamp()),
+        ("painted sphere", painted(sphere(0.045, 240), 0.04), lamp()),
     ];
     let options = [
         ContourOptions::default(),
@@ -346,7 +347,7 @@ fn a_known_occluder_silences_what_it_hides() {
     let model = RenderModel::new(&painted(lump(0.045, 90), 0.05)).unwrap();
     let mut noise = Noise(21);
     let truth = pose(&mut noise);
-    let bar = RenderModel::new(&cuboid(Vector3::new(0.012, 0.1, 0.01))).unwrap();
+    let bar = RenderModel::new(&cuboid(Vector3::new(0.024, 0.2, 0.02))).unwrap();
     let hand = depth_map(&camera(), &[(&bar, Isometry3::translation(0.005, 0.0, 0.3))]);
     let target = target_of(&model, &truth, &lamp(), Some(hand), 0.5);
     let renderer = ContourRenderer::new(full_options());
@@ -469,7 +470,7 @@ fn gradients_match_differences_of_supersampled_pictures() {
     let scenes = [
         (textured_box(), Light::ambient(0.9)),
         (painted(lump(0.045, 120), 0.05), lamp()),
-        (painted(sphere(0.045, 120), 0.04), lamp()),
+        (painted(sphere(0.045, 240), 0.04), lamp()),
     ];
     for (i, (mesh, light)) in scenes.into_iter().enumerate() {
         let model = RenderModel::new(&mesh).unwrap();

@@ -5,6 +5,7 @@ mod topology;
 
 use nalgebra::{Matrix3, Point3, Vector3};
 use prehend_geometry::TriMesh;
+use prehend_geometry::topology::is_collapsed;
 
 pub(crate) use mipmap::Mipmap;
 pub(crate) use topology::{Edge, NONE};
@@ -108,18 +109,18 @@ impl RenderModel {
         let (low, high) = mesh.bounds().ok_or(empty)?;
         let center = nalgebra::center(&low, &high);
         let extent = (high - low).norm();
-        let (positions, map) = topology::weld(&mesh.vertices, (1e-6 * extent).max(1e-300));
+        let weld = mesh.weld_within(1e-6 * extent);
+        let welded = weld.faces(mesh);
+        let positions = weld.positions;
         let kept: Vec<usize> = (0..mesh.faces.len())
             .filter(|&f| {
-                let [a, b, c] = mesh.faces[f].map(|v| map[v as usize]);
-                a != b && b != c && c != a && mesh.area_vector(f).norm() > 1e-14 * extent * extent
+                !is_collapsed(&welded[f]) && mesh.area_vector(f).norm() > 1e-14 * extent * extent
             })
             .collect();
         if kept.is_empty() {
             return Err(empty);
         }
-        let faces: Vec<[u32; 3]> =
-            kept.iter().map(|&f| mesh.faces[f].map(|v| map[v as usize])).collect();
+        let faces: Vec<[u32; 3]> = kept.iter().map(|&f| welded[f]).collect();
         let face_normals: Vec<Vector3<f64>> =
             kept.iter().map(|&f| mesh.area_vector(f).normalize()).collect();
         let normals = topology::corner_normals(&positions, &faces, &face_normals, CREASE);

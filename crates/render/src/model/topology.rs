@@ -1,8 +1,7 @@
-//! Welding, edge adjacency and crease-aware normals.
-
-use std::collections::HashMap;
+//! Edges with a direction, and crease-aware normals.
 
 use nalgebra::{Point3, Vector3};
+use prehend_geometry::topology;
 
 /// Marks an absent neighbour in [`Edge`].
 pub(crate) const NONE: u32 = u32::MAX;
@@ -22,63 +21,25 @@ pub(crate) struct Edge {
     pub(crate) other_corner: u8,
 }
 
-/// Gives vertices at the same position (within `tolerance`) the same index; returns the representative
-/// positions and each vertex's index among them.
-pub(crate) fn weld(vertices: &[Point3<f64>], tolerance: f64) -> (Vec<Point3<f64>>, Vec<u32>) {
-    let cell = |v: f64| (v / tolerance).round() as i64;
-    let mut positions = Vec::new();
-    let mut index_of = HashMap::new();
-    let map = vertices.iter().map(|p| {
-        *index_of.entry([cell(p.x), cell(p.y), cell(p.z)]).or_insert_with(|| {
-            positions.push(*p);
-            positions.len() as u32 - 1
-        })
-    });
-    let map = map.collect();
-    (positions, map)
-}
-
 /// Pairs up the half-edges of `faces`. A half-edge without an opposite is a boundary; where more than two
 /// faces meet, they are paired in order of appearance.
 pub(crate) fn edges(faces: &[[u32; 3]]) -> Vec<Edge> {
-    let mut half: Vec<(u32, u32, bool, u32, u8)> = Vec::with_capacity(faces.len() * 3);
-    for (f, face) in faces.iter().enumerate() {
-        for k in 0..3u8 {
-            let (a, b) = (face[k as usize], face[(k as usize + 1) % 3]);
-            half.push((a.min(b), a.max(b), a > b, f as u32, k));
-        }
-    }
-    half.sort_unstable();
-    let mut out = Vec::with_capacity(half.len() / 2);
-    for group in half.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
-        let split = group.partition_point(|h| !h.2);
-        let (ahead, back) = group.split_at(split);
+    let mut out = Vec::with_capacity(faces.len() * 3 / 2);
+    for topology::Edge { vertices: [low, high], uses } in topology::edges(faces) {
+        let (back, ahead) = uses.split_at(uses.partition_point(|u| !u.forward));
         for i in 0..ahead.len().max(back.len()) {
-            let edge = match (ahead.get(i), back.get(i)) {
-                (Some(h), Some(o)) => Edge {
-                    vertices: [h.0, h.1],
-                    face: h.3,
-                    corner: h.4,
-                    other: o.3,
-                    other_corner: o.4,
-                },
-                (Some(h), None) => Edge {
-                    vertices: [h.0, h.1],
-                    face: h.3,
-                    corner: h.4,
-                    other: NONE,
-                    other_corner: 0,
-                },
-                (None, Some(h)) => Edge {
-                    vertices: [h.1, h.0],
-                    face: h.3,
-                    corner: h.4,
-                    other: NONE,
-                    other_corner: 0,
-                },
+            let (vertices, own, opposite) = match (ahead.get(i), back.get(i)) {
+                (Some(own), opposite) => ([low, high], own, opposite),
+                (None, Some(own)) => ([high, low], own, None),
                 (None, None) => continue,
             };
-            out.push(edge);
+            out.push(Edge {
+                vertices,
+                face: own.face,
+                corner: own.corner,
+                other: opposite.map_or(NONE, |o| o.face),
+                other_corner: opposite.map_or(0, |o| o.corner),
+            });
         }
     }
     out
@@ -117,9 +78,10 @@ pub(crate) fn corner_normals(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use prehend_geometry::TriMesh;
 
     /// Two triangles over a common edge, folded by `angle` about the x axis, the edge stored twice.
-    fn fold(angle: f64) -> (Vec<Point3<f64>>, Vec<[u32; 3]>) {
+    fn fold(angle: f64) -> TriMesh {
         let vertices = vec![
             Point3::new(0.0, 0.0, 0.0),
             Point3::new(1.0, 0.0, 0.0),
@@ -128,15 +90,12 @@ mod tests {
             Point3::new(1.0, 0.0, 0.0),
             Point3::new(0.5, -angle.cos(), -angle.sin()),
         ];
-        (vertices, vec![[0, 1, 2], [4, 3, 5]])
+        TriMesh::new(vertices, vec![[0, 1, 2], [4, 3, 5]]).welded()
     }
 
     #[test]
     fn seams_weld_and_pair_up() {
-        let (vertices, faces) = fold(0.3);
-        let (positions, map) = weld(&vertices, 1e-9);
-        assert_eq!(positions.len(), 4);
-        let faces: Vec<[u32; 3]> = faces.iter().map(|f| f.map(|v| map[v as usize])).collect();
+        let faces = fold(0.3).faces;
         let edges = edges(&faces);
         assert_eq!(edges.len(), 5);
         let inner: Vec<&Edge> = edges.iter().filter(|e| e.other != NONE).collect();
@@ -154,17 +113,9 @@ mod tests {
     #[test]
     fn normals_smooth_below_the_crease_angle_only() {
         for (angle, smooth) in [(0.3f64, true), (1.2, false)] {
-            let (vertices, faces) = fold(angle);
-            let (positions, map) = weld(&vertices, 1e-9);
-            let faces: Vec<[u32; 3]> = faces.iter().map(|f| f.map(|v| map[v as usize])).collect();
-            let normals: Vec<_> = faces
-                .iter()
-                .map(|f| {
-                    let p = f.map(|v| positions[v as usize]);
-                    (p[1] - p[0]).cross(&(p[2] - p[0])).normalize()
-                })
-                .collect();
-            let corners = corner_normals(&positions, &faces, &normals, 0.65);
+            let mesh = fold(angle);
+            let normals = [0, 1].map(|f| mesh.area_vector(f).normalize());
+            let corners = corner_normals(&mesh.vertices, &mesh.faces, &normals, 0.65);
             let tilt = corners[0][0].angle(&normals[0]);
             assert!((tilt - if smooth { angle / 2.0 } else { 0.0 }).abs() < 1e-9);
         }

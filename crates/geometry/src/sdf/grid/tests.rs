@@ -1,22 +1,11 @@
 use super::*;
+use crate::ClosestPoints;
 use crate::sdf::SdfError;
-use crate::{ClosestPoints, TriMesh};
+use crate::shapes::cuboid;
 
 fn sphere(radius: f64, spacing: f64, margin: f64) -> SdfGrid {
     let corner = Point3::new(radius, radius, radius);
     SdfGrid::from_fn((-corner, corner), spacing, margin, |p, _| p.coords.norm() - radius).unwrap()
-}
-
-fn cube(half: f64) -> TriMesh {
-    let vertices = (0..8)
-        .map(|i| {
-            let sign = |bit: usize| if i >> bit & 1 == 1 { half } else { -half };
-            Point3::new(sign(0), sign(1), sign(2))
-        })
-        .collect();
-    let quads =
-        [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
-    TriMesh::new(vertices, quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect())
 }
 
 #[test]
@@ -42,7 +31,7 @@ fn a_sphere_is_reproduced_with_both_derivatives() {
 
 #[test]
 fn a_box_is_exact_away_from_its_edges() {
-    let mesh = ClosestPoints::new(&cube(0.02)).unwrap();
+    let mesh = ClosestPoints::new(&cuboid(Vector3::repeat(0.04))).unwrap();
     let grid = SdfGrid::build(&mesh, 0.001, 0.01).unwrap();
     for (x, expected) in [(0.0256, 0.0056), (0.0203, 0.0003), (0.0191, -0.0009)] {
         let s = grid.sample(&Point3::new(x, 0.0031, -0.0042), 0.01).unwrap();
@@ -83,7 +72,7 @@ fn check_derivatives(grid: &SdfGrid, p: &Point3<f64>, on_face: bool) {
 
 #[test]
 fn derivatives_match_differences_inside_cells_and_across_their_faces() {
-    let mesh = ClosestPoints::new(&cube(0.5)).unwrap();
+    let mesh = ClosestPoints::new(&cuboid(Vector3::repeat(1.0))).unwrap();
     let grid = SdfGrid::build(&mesh, 0.1, 0.3).unwrap();
     let (origin, end) = grid.extent();
     for i in 0..100 {
@@ -117,7 +106,7 @@ fn the_reach_decides_what_is_answered() {
 
 #[test]
 fn senseless_grids_are_refused() {
-    let mesh = ClosestPoints::new(&cube(1.0)).unwrap();
+    let mesh = ClosestPoints::new(&cuboid(Vector3::repeat(2.0))).unwrap();
     assert!(matches!(
         SdfGrid::build(&mesh, 0.0, 0.1),
         Err(SdfError::Length { name: "spacing", .. })

@@ -64,12 +64,15 @@ fn check(
     Ok((outline_picture(&observation, &object, robot.as_deref(), t_cam_model), warnings))
 }
 
+/// What a frame brings, and what it lacks.
+type Sensed = (Observation, Option<Arc<Robot>>, Vec<String>);
+
 /// The frame with all that it brings; a warning where it has no hand or no touch, as plain BOP datasets.
 fn sensed(
     assets: &mut Assets<'_>,
     frame: &Frame<'_>,
     instance: usize,
-) -> Result<(Observation, Option<Arc<Robot>>, Vec<String>), AssetError> {
+) -> Result<Sensed, AssetError> {
     use TermKind::{Depth, Physics, Rendering};
     let all = assets.observation(frame, instance, &TermKind::ALL);
     let Some(absent) = absent_extension(&all) else {
