@@ -2,6 +2,8 @@
 
 use std::sync::LazyLock;
 
+use nalgebra::Vector6;
+use prehend::autodiff::lie::perturb_about;
 use prehend::refine::metrics::{oe_deg, pe_cm};
 use prehend::refine::synth::{Scene, default_scene};
 use prehend::refine::{Config, RefineError, RefinedPose, TermKind, refine};
@@ -22,13 +24,19 @@ fn all_terms_together_find_the_pose() {
 
 #[test]
 fn every_term_lowers_its_own_value() {
+    // Some millimetres and degrees off: far inside the hand, contact alone knows no way out.
+    let delta = Vector6::new(3e-3, -2e-3, 4e-3, 0.04, -0.03, 0.05);
+    let start = perturb_about(&SCENE.truth, &(SCENE.truth * SCENE.object.centre).coords, &delta);
     for kind in TermKind::ALL {
         let mut config = Config { terms: vec![kind], checkpoint: false, ..Config::default() };
         config.heuristic.iterations = 40;
-        let trace = run(&config).unwrap().trace;
+        let robot = Some(&SCENE.robot);
+        let refined = refine(&SCENE.observation, &SCENE.object, robot, &start, &config);
+        let trace = refined.unwrap().trace;
         let value = |i: usize| trace.iterations[i].values[0];
         let last = trace.iterations.len() - 1;
-        assert!(value(last) < 0.99 * value(0), "{kind}: {} to {}", value(0), value(last));
+        println!("{kind}: {} to {}", value(0), value(last));
+        assert!(value(last) < 0.9 * value(0), "{kind}: {} to {}", value(0), value(last));
     }
 }
 

@@ -20,7 +20,7 @@ pub struct DepthSettings {
     /// Distance at which a point counts as an outlier \[m\].
     pub outlier: f64,
     /// How many independent measurements the points of one frame amount to: neighbouring depth errors
-    /// are correlated, so 2000 points are not 2000 witnesses.
+    /// are correlated, so 2000 points are not 2000 witnesses. The two directions have half of them each.
     pub effective_points: f64,
 }
 
@@ -65,8 +65,9 @@ impl DepthTerm {
         Ok(Self { object, camera: observation.camera, points, tree, hand, settings })
     }
 
-    /// Sums `f` over both directions: the mean loss of each, in nats.
-    fn sum<A: Send>(&self, state: &State, f: impl Fn(Pair) -> A + Sync) -> (Vec<A>, Vec<A>) {
+    /// `f` of every match: of each depth point with the mesh, and of each visible surface sample with the
+    /// depth points.
+    fn matches<A: Send>(&self, state: &State, f: impl Fn(Pair) -> A + Sync) -> (Vec<A>, Vec<A>) {
         let t_object_cam = state.t_cam_object.inverse();
         let to_mesh = self
             .points
@@ -96,9 +97,20 @@ impl DepthTerm {
         (to_mesh, to_cloud)
     }
 
-    /// Nats per square metre of the mean squared distance of one direction.
-    fn scale(&self) -> f64 {
-        0.5 * self.settings.effective_points / self.settings.sigma.powi(2)
+    /// Nats of one match of a direction: both directions share the effective points between them.
+    fn share<A>(&self, side: &[A]) -> f64 {
+        let settings = &self.settings;
+        0.5 * settings.effective_points / settings.sigma.powi(2) / side.len().max(1) as f64
+    }
+
+    /// Nats of a pose that shows the camera none of the object, whose mean distance would be nothing's: as
+    /// if all of it were as far from the depth points as the object is large.
+    fn unseen<A>(&self, to_cloud: &[A]) -> f64 {
+        if !to_cloud.is_empty() {
+            return 0.0;
+        }
+        let cauchy = Cauchy { scale: self.settings.outlier };
+        self.share(to_cloud) * cauchy.loss((2.0 * self.object.radius).powi(2))
     }
 
     /// Whether the camera sees a surface point of the object, as far as facing and the hand decide.
@@ -135,25 +147,26 @@ impl Term for DepthTerm {
     fn value(&self, state: &State) -> f64 {
         let cauchy = Cauchy { scale: self.settings.outlier };
         let losses =
-            self.sum(state, |pair| cauchy.loss((pair.cloud - pair.surface).norm_squared()));
-        let mean = |side: &[f64]| side.iter().sum::<f64>() / side.len().max(1) as f64;
-        self.scale() * (mean(&losses.0) + mean(&losses.1))
+            self.matches(state, |pair| cauchy.loss((pair.cloud - pair.surface).norm_squared()));
+        self.share(&losses.0) * losses.0.iter().sum::<f64>()
+            + self.share(&losses.1) * losses.1.iter().sum::<f64>()
+            + self.unseen(&losses.1)
     }
 
     fn linearise(&self, state: &State, normal: &mut Normal) -> f64 {
         let cauchy = Cauchy { scale: self.settings.outlier };
         let centre = state.centre();
-        let (to_mesh, to_cloud) = self.sum(state, |pair| {
+        let (to_mesh, to_cloud) = self.matches(state, |pair| {
             let residual = pair.cloud - pair.surface;
             let r2 = residual.norm_squared();
             let arm = pair.surface.coords - centre;
             (cauchy.loss(r2), cauchy.weight(r2), residual, arm)
         });
-        let mut value = 0.0;
+        let mut value = self.unseen(&to_cloud);
         let mut gradient = Vector6::zeros();
         let mut hessian = Matrix6::zeros();
         for side in [to_mesh, to_cloud] {
-            let scale = self.scale() / side.len().max(1) as f64;
+            let scale = self.share(&side);
             for (loss, weight, residual, arm) in side {
                 value += scale * loss;
                 // The matched surface point slides along the surface as the object moves, so only
@@ -174,7 +187,7 @@ impl Term for DepthTerm {
     }
 }
 
-/// Up to `limit` masked depth pixels as camera-frame points \[m\], on a regular grid of the image.
+/// Some `limit` masked depth pixels as camera-frame points \[m\], on a regular grid of the image.
 fn back_project(observation: &Observation, limit: usize) -> Vec<Point3<f64>> {
     let depth = &observation.depth;
     let at = |x: usize, y: usize| {
@@ -215,6 +228,16 @@ mod tests {
         let term = DepthTerm::new(&scene.observation, object, hand, settings).unwrap();
         let truth = State { t_cam_object: scene.truth, ..state.clone() };
         assert!(term.value(&truth) < 0.3 * term.value(&state));
+    }
+
+    #[test]
+    fn leaving_the_view_never_pays() {
+        let (scene, state, hand) = fixture(0);
+        let object = Arc::clone(&scene.object);
+        let settings = DepthSettings::default();
+        let term = DepthTerm::new(&scene.observation, object, hand, settings).unwrap();
+        let aside = |x: f64| term.value(&state.moved(Block::ObjectPose, &(Vector6::x() * x)));
+        assert!(aside(1.0) > aside(0.2) && aside(0.2) > aside(0.05));
     }
 
     #[test]

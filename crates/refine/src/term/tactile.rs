@@ -99,7 +99,7 @@ impl TactileTerm {
         let touched = self.touches.iter().filter(|t| t.touched).count().max(1) as f64;
         let share = (self.settings.effective_taxels / touched).min(1.0);
         let touch_weight = share / self.settings.sigma.powi(2);
-        let quiet_weight = share / self.settings.quiet_sigma.powi(2);
+        let quiet_weight = self.settings.quiet_sigma.powi(-2);
         let reach = self.object.radius;
         self.touches.iter().filter_map(move |touch| {
             let point = state.t_cam_hand * touch.position;
