@@ -14,7 +14,10 @@ use prehend::refine::synth::default_scene;
 use prehend::refine::{Config, HandReading, refine};
 
 fn main() -> anyhow::Result<()> {
-    let seed = std::env::args().nth(1).map_or(Ok(1), |text| text.parse()).context("SEED")?;
+    let seed = std::env::args()
+        .nth(1)
+        .map_or(Ok(1), |text| text.parse())
+        .context("SEED must be a number")?;
     println!("Making a frame: a mustard bottle in an Allegro hand, seen by a noisy RGB-D camera.");
     let scene = default_scene(seed)?;
 

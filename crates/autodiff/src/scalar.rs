@@ -7,6 +7,8 @@ use nalgebra::RealField;
 /// Code written over `S: Scalar` runs unchanged with `f32`, `f64`, forward-mode [`Fwd`](crate::Fwd)
 /// and reverse-mode [`Var`](crate::Var), inside every nalgebra type.
 ///
+/// Plain numbers enter through `S::constant`: write `x * S::constant(2.0)`, not `2.0 * x`.
+///
 /// Branches: compare values (`<`, `>` and `==` look at nothing else) and choose with nalgebra's
 /// `if_true.select(condition, if_false)`. Unlike multiplying by 0 or 1, the branch not taken then
 /// contributes no derivative, so an infinite or NaN slope there cannot leak in as `0 · ∞`.

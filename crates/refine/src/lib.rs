@@ -2,6 +2,20 @@
 //!
 //! [`refine`] takes an [`Observation`], an [`Object`], a [`Robot`] and an initial pose, and returns a
 //! [`RefinedPose`]. The evidence comes from [`Term`]s over a common [`State`]; [`strategy`] walks downhill.
+//!
+//! ```
+//! use prehend_refine::synth::default_scene;
+//! use prehend_refine::{Config, refine};
+//!
+//! let scene = default_scene(1)?;
+//! let mut config = Config::default();
+//! config.heuristic.iterations = 20;
+//! let robot = Some(&scene.robot);
+//! let refined = refine(&scene.observation, &scene.object, robot, &scene.initial, &config)?;
+//! println!("{}", refined.t_cam_object);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
 //! [`bop`] reads and writes datasets, [`Scorer`] and [`metrics`] measure poses, [`report`] draws them.
 
 mod assets;

@@ -40,7 +40,7 @@ fn draw(trace: &Trace, svg: &mut String) -> Result<(), Box<dyn std::error::Error
         .configure_mesh()
         .light_line_style(WHITE)
         .x_label_formatter(&|x| format!("{x:.0}"))
-        .y_label_formatter(&|y| format!("{y}"))
+        .y_label_formatter(&|y| two_digits(*y))
         .x_desc("iteration")
         .y_desc("loss / initial loss")
         .draw()?;
@@ -65,4 +65,34 @@ fn draw(trace: &Trace, svg: &mut String) -> Result<(), Box<dyn std::error::Error
         .draw()?;
     root.present()?;
     Ok(())
+}
+
+/// A number with two significant digits: on a logarithmic axis 0.6 may come as 0.6000000000000001.
+fn two_digits(value: f64) -> String {
+    let places = (1.0 - value.abs().log10().floor()).clamp(0.0, 12.0) as usize;
+    let text = format!("{value:.places$}");
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::trace::Iteration;
+
+    #[test]
+    fn labels_are_short() {
+        let labels = [0.6000000000000001, 0.01, 1.0, 10.0, 0.00025].map(two_digits);
+        assert_eq!(labels, ["0.6", "0.01", "1", "10", "0.00025"]);
+    }
+
+    #[test]
+    fn curves_are_drawn_and_named() {
+        let mut trace = Trace::new(["depth", "tactile"].into_iter());
+        for index in 0..5 {
+            let values = vec![1.0 / (1.0 + index as f64), 0.0];
+            trace.iterations.push(Iteration { index, values, weights: vec![1.0, 0.0], step: 1e-3 });
+        }
+        let svg = loss_curves(&trace);
+        assert!(svg.contains("<svg") && svg.contains("depth") && svg.contains("tactile"));
+    }
 }

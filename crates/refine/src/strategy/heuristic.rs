@@ -1,4 +1,4 @@
-//! The paper's heuristic: a candidate step along every gradient, weighed by what each one achieves.
+//! The paper's heuristic: a candidate step along every gradient, weighted by what each one achieves.
 
 use nalgebra::{Matrix6, Vector6};
 
