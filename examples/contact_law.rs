@@ -18,7 +18,7 @@ struct Quadratic {
 impl ContactLaw for Quadratic {
     fn law<S: Scalar>(&self, _: &[S], contact: &Contact<S>) -> Response<S> {
         let normal = S::constant(self.stiffness * contact.area) * contact.gap * contact.gap;
-        let tangential = regularised_coulomb(normal, S::constant(0.5), &contact.slip, 1e-3);
+        let tangential = regularised_coulomb(S::constant(0.5), normal, &contact.slip, 1e-3);
         Response { normal, tangential }
     }
 

@@ -33,6 +33,14 @@ impl<const N: usize> Fwd<N> {
     }
 }
 
+/// `slope * derivative`, but 0 where the operand does not move: 0 · ∞ must not make a NaN of a direction
+/// that has nothing to do with the operation. Both sides are computed, so it is a select, not a branch.
+#[inline]
+fn through(slope: f64, derivative: f64) -> f64 {
+    let product = slope * derivative;
+    if derivative == 0.0 { 0.0 } else { product }
+}
+
 impl<const N: usize> Chain for Fwd<N> {
     #[inline]
     fn lift(value: f64) -> Self {
@@ -51,13 +59,14 @@ impl<const N: usize> Chain for Fwd<N> {
 
     #[inline]
     fn unary(self, value: f64, slope: f64) -> Self {
-        Self { value, derivative: self.derivative.map(|d| slope * d) }
+        Self { value, derivative: self.derivative.map(|d| through(slope, d)) }
     }
 
     #[inline]
     fn binary(self, other: Self, value: f64, [da, db]: [f64; 2]) -> Self {
-        let derivative =
-            std::array::from_fn(|i| da * self.derivative[i] + db * other.derivative[i]);
+        let derivative = std::array::from_fn(|i| {
+            through(da, self.derivative[i]) + through(db, other.derivative[i])
+        });
         Self { value, derivative }
     }
 }
@@ -120,6 +129,27 @@ mod tests {
         assert_eq!((x + zero.sqrt()).derivative, [1.0]);
         assert_eq!((x * Fwd::lift(-1.0).powf(Fwd::lift(2.0))).derivative, [1.0]);
         assert_eq!(Vector3::new(zero, zero, zero).norm().derivative, [0.0]);
+    }
+
+    #[test]
+    fn infinite_slopes_stay_in_their_direction() {
+        let [x, y] = Fwd::<2>::variables([0.0, 2.0]);
+        assert_eq!(x.sqrt().derivative, [f64::INFINITY, 0.0]);
+        assert_eq!((y * x.sqrt()).derivative, [f64::INFINITY, 0.0]);
+        let [zero, one] = [0.0, 1.0].map(Fwd::<2>::lift);
+        assert_eq!((zero.atan2(zero) + y).derivative, [0.0, 1.0]);
+        assert_eq!((one / (one / zero) + y).derivative, [0.0, 1.0]);
+        assert_eq!((zero.recip().recip() + y).derivative, [0.0, 1.0]);
+    }
+
+    #[test]
+    fn angles_of_tiny_and_huge_vectors_have_derivatives() {
+        for scale in [1e-200, 1.0, 1e200] {
+            let [y, x] = Fwd::<2>::variables([3.0 * scale, 4.0 * scale]);
+            let [by_y, by_x] = y.atan2(x).derivative;
+            assert!((by_y * scale - 4.0 / 25.0).abs() < 1e-15, "{by_y}");
+            assert!((by_x * scale + 3.0 / 25.0).abs() < 1e-15, "{by_x}");
+        }
     }
 
     #[test]

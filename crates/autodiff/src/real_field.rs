@@ -414,8 +414,9 @@ macro_rules! impl_real_field {
             #[inline]
             fn atan2(self, other: Self) -> Self {
                 let (y, x) = (self.primal(), other.primal());
-                let scale = 1.0 / (x * x + y * y);
-                self.binary(other, y.atan2(x), [x * scale, -y * scale])
+                // Not by x² + y², which leaves the range of f64 for tiny and huge arguments.
+                let r = x.hypot(y);
+                self.binary(other, y.atan2(x), [x / r / r, -y / r / r])
             }
             #[inline]
             fn min_value() -> Option<Self> {

@@ -46,6 +46,17 @@ pub(crate) fn with_tape<R>(f: impl FnOnce(&mut Tape) -> R) -> R {
     TAPE.with(|tape| f(&mut tape.borrow_mut()))
 }
 
+/// A count of nodes or arguments in the 32 bits that the tape stores, which keep a number small.
+#[inline]
+fn narrow(count: usize) -> u32 {
+    assert!(
+        count <= u32::MAX as usize,
+        "the tape is full: a thread's open recordings may hold 2^32 nodes and as many operands; \
+         record less at a time, or bring derivatives by `block` or `custom`"
+    );
+    count as u32
+}
+
 impl Tape {
     fn current(&self) -> u32 {
         self.open.last().map_or(0, |start| start.recording)
@@ -67,9 +78,14 @@ impl Tape {
         value: f64,
         operands: impl IntoIterator<Item = (Var, f64)>,
     ) -> Var {
+        let (start, current) = (self.arguments.len(), self.current());
         for (var, slope) in operands {
             if var.recording != 0 {
-                self.check(var);
+                if var.recording != current {
+                    // Arguments left behind would pass to the next node, should the panic be caught.
+                    self.arguments.truncate(start);
+                    self.check(var);
+                }
                 self.arguments.push((var.node, slope * var.coefficient));
             }
         }
@@ -77,8 +93,8 @@ impl Tape {
     }
 
     fn push_node(&mut self, value: f64) -> Var {
-        let node = self.ends.len() as u32;
-        self.ends.push(self.arguments.len() as u32);
+        let node = narrow(self.ends.len());
+        self.ends.push(narrow(self.arguments.len()));
         Var { value, coefficient: 1.0, node, recording: self.current() }
     }
 
@@ -98,11 +114,15 @@ impl Tape {
                 (var.node, var.coefficient)
             })
             .collect();
-        let first_output = self.ends.len() as u32;
+        // Nothing can flow back, and the sweep finds an operation by its first output.
+        if outputs.is_empty() {
+            return Vec::new();
+        }
+        let first_output = narrow(self.ends.len());
         let vars = outputs.iter().map(|&value| self.push_node(value)).collect();
         self.customs.push(CustomNode {
             first_output,
-            outputs: outputs.len() as u32,
+            outputs: narrow(outputs.len()),
             inputs,
             operation,
         });
@@ -251,11 +271,16 @@ pub struct Adjoints {
 }
 
 impl Adjoints {
-    /// Derivative of the seeded output with respect to `input`; 0 for a constant.
+    /// Derivative of the seeded output with respect to `input`: a variable, or a result that was recorded
+    /// as a node because it joins two active numbers; 0 for a constant.
+    ///
+    /// A fused result (see [`Var`]) has no adjoint of its own. Where it moves one to one with its operand's
+    /// node (`x + 3`), that node's adjoint is returned, which also counts the other uses of the operand;
+    /// any other fused result is refused.
     ///
     /// # Panics
-    /// If `input` belongs to another recording, or is the result of a fused operation rather than a
-    /// variable or a recorded node (its own adjoint is not stored).
+    /// If `input` belongs to another recording, or is a fused result whose derivative with respect to its
+    /// node is not exactly 1 (such as `x * 3`).
     pub fn wrt(&self, input: Var) -> f64 {
         if input.recording == 0 {
             return 0.0;
@@ -345,6 +370,33 @@ mod tests {
         let recording = Recording::start();
         let fresh = recording.variable(1.0);
         let _ = stale * fresh;
+    }
+
+    #[test]
+    fn a_refused_operation_leaves_nothing_on_the_tape() {
+        let stale = Recording::start().variable(1.0);
+        let recording = Recording::start();
+        let [x, y] = recording.variables([2.0, 3.0]);
+        let refused = std::panic::catch_unwind(|| crate::block(&[x, stale], &[1.0], &[7.0; 2]));
+        assert!(refused.is_err());
+        assert_eq!(recording.gradient(x * y).wrt(x), 3.0);
+    }
+
+    #[test]
+    fn only_unit_fused_results_have_an_adjoint() {
+        let recording = Recording::start();
+        let x = recording.variable(2.0);
+        let (shifted, stretched) = (x + Var::from(3.0), x * Var::from(3.0));
+        let adjoints = recording.gradient(shifted * stretched);
+        assert_eq!(adjoints.wrt(shifted), adjoints.wrt(x));
+        assert!(std::panic::catch_unwind(|| adjoints.wrt(stretched)).is_err());
+    }
+
+    #[test]
+    #[should_panic(expected = "the tape is full")]
+    fn too_many_nodes_are_refused() {
+        assert_eq!(narrow(u32::MAX as usize), u32::MAX);
+        narrow(u32::MAX as usize + 1);
     }
 
     #[test]

@@ -80,4 +80,13 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn an_operation_without_outputs_does_not_hide_earlier_ones() {
+        let recording = Recording::start();
+        let x = recording.variable(0.4);
+        let y = custom(&[x], &[1.2], Dot(vec![3.0]))[0];
+        assert!(custom(&[x, y], &[], Dot(vec![])).is_empty());
+        assert_eq!(recording.gradient(y).wrt(x), 3.0);
+    }
 }

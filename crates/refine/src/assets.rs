@@ -102,6 +102,12 @@ impl<'a> Assets<'a> {
         }
         let touch = terms.contains(&TermKind::Tactile);
         let tactile = touch.then(|| frame.tactile()).transpose()?;
+        if let Some(Tactile { body: named, .. }) = &tactile
+            && *named != body.name
+        {
+            let problem = format!("names {named:?}, but the hand is {:?}", body.name);
+            return Err(frame.tactile_fault("body", problem).into());
+        }
         let robot = self.robot(&body.urdf, tactile.as_ref().map(|t| t.taxels.as_path()))?;
         if let Some(Tactile { taxels, force, .. }) = &tactile
             && force.len() != robot.taxels.len()

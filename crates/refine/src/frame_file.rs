@@ -176,6 +176,14 @@ pub fn load(file: &Path, seed: u64) -> Result<FrameInput, FrameFileError> {
     let mask = Mask::load(&folder.join(&layout.mask)).map_err(image)?;
     let camera = Camera::from_k(layout.k, color.width(), color.height())
         .map_err(|e| field("K", e.to_string()))?;
+    let sizes = [("depth", depth.width(), depth.height()), ("mask", mask.width(), mask.height())];
+    for (name, width, height) in sizes {
+        if (width, height) != (color.width(), color.height()) {
+            let (w, h) = (color.width(), color.height());
+            let reason = format!("the image is {width}x{height} pixels, rgb is {w}x{h}");
+            return Err(field(name, reason));
+        }
+    }
     let mesh = TriMesh::load(&folder.join(&layout.mesh)).map_err(|e| asset(e.into()))?;
     let mesh = mesh.scaled(layout.mesh_unit.metres());
     let name = folder.join(&layout.mesh).display().to_string();

@@ -47,6 +47,12 @@ pub fn inspect_pose(
         warnings.push(format!("the object is behind the camera (z = {:.3} m)", centre.z));
         return warnings;
     }
+    if let (Some(robot), Some(hand)) = (robot, &observation.hand)
+        && let Err(error) = robot.check_joints(&hand.joints)
+    {
+        warnings.push(error.to_string());
+        return warnings;
+    }
     let rendered = depth_map(&observation.camera, &[(&object.model, *t_cam_object)]);
     let hand = hand_depth(observation, robot);
     let mut ratios = Vec::new();

@@ -54,7 +54,7 @@ impl Object {
     /// the surface is sampled.
     ///
     /// # Errors
-    /// If the mesh has no area, or is open where a mass has to be assumed. With `inertial`, an open mesh
+    /// If a face names a vertex that is not there, the mesh has no area, or is open where a mass has to be assumed. With `inertial`, an open mesh
     /// serves: inside is then where its winding number is above one half.
     pub fn new(
         name: &str,
@@ -71,7 +71,7 @@ impl Object {
     /// Prepares `mesh` (metres) of uniform density and mass `mass` \[kg\], or of an assumed density.
     ///
     /// # Errors
-    /// If the mesh is open or has no area, or the mass is not positive.
+    /// If a face names a vertex that is not there, the mesh is open or has no area, or the mass is not positive.
     pub fn with_mass(
         name: &str,
         mesh: TriMesh,
@@ -96,6 +96,14 @@ impl Object {
         ) -> Result<(Inertial, bool), MassError>,
     ) -> Result<Self, RefineError> {
         let fail = |reason: String| RefineError::Object { object: name.to_owned(), reason };
+        let count = mesh.vertices.len();
+        let outside = |f: &[u32; 3]| f.iter().any(|&v| v as usize >= count);
+        if let Some(face) = mesh.faces.iter().position(outside) {
+            let [a, b, c] = mesh.faces[face];
+            return Err(fail(format!(
+                "face {face} joins vertices {a}, {b} and {c}, but the mesh has {count}"
+            )));
+        }
         let (solid, report) = mesh.cleaned();
         let (low, high) = solid.bounds().ok_or_else(|| fail("the mesh has no faces".into()))?;
         let uniform = || mass_properties(&solid, DEFAULT_DENSITY);
@@ -131,5 +139,18 @@ impl Object {
 impl From<MassProperties> for Inertial {
     fn from(m: MassProperties) -> Self {
         Self { mass: m.mass, center_of_mass: m.center_of_mass, inertia: m.inertia }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_face_beyond_the_vertices_is_an_error() {
+        let corners = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]].map(Point3::from);
+        let mesh = TriMesh::new(corners.to_vec(), vec![[0, 1, 2], [0, 1, 3]]);
+        let error = Object::new("sheet", mesh, None, 0).map(|_| ()).unwrap_err().to_string();
+        assert!(error.contains("object sheet: face 1 joins vertices 0, 1 and 3"), "{error}");
     }
 }

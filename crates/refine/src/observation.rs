@@ -31,6 +31,25 @@ pub struct Observation {
     pub hand: Option<HandReading>,
 }
 
+impl Observation {
+    /// Refuses images that have not the camera's size: the first of colour, depth and mask, and what is wrong.
+    pub(crate) fn check_sizes(&self) -> Result<(), (&'static str, String)> {
+        let expected = (self.camera.width, self.camera.height);
+        let sizes = [
+            ("colour image", self.color.width(), self.color.height()),
+            ("depth image", self.depth.width(), self.depth.height()),
+            ("mask", self.mask.width(), self.mask.height()),
+        ];
+        for (image, width, height) in sizes {
+            if (width, height) != expected {
+                let (w, h) = expected;
+                return Err((image, format!("{width}x{height} pixels, the camera has {w}x{h}")));
+            }
+        }
+        Ok(())
+    }
+}
+
 /// Magnitudes of gravity on solid ground, from small moons up, with room to spare \[m/s²\].
 const PLAUSIBLE_GRAVITY: std::ops::Range<f64> = 1e-2..1e3;
 

@@ -106,6 +106,9 @@ pub fn standard_terms(
     initial: &State,
     config: &Config,
 ) -> Result<Vec<Box<dyn Term>>, RefineError> {
+    if let (Some(robot), Some(hand)) = (robot, &observation.hand) {
+        robot.check_joints(&hand.joints)?;
+    }
     let hand = Arc::new(hand_depth(observation, robot));
     let term = |kind: &TermKind| -> Result<Box<dyn Term>, RefineError> {
         let missing = || RefineError::Missing { what: "hand", term: kind.name() };
@@ -133,7 +136,7 @@ pub fn standard_terms(
     config.terms.iter().map(term).collect()
 }
 
-/// Depth image of the hand alone \[m\], 0 where it is not.
+/// Depth image of the hand alone \[m\], 0 where it is not. The hand's joints must have been checked.
 pub(crate) fn hand_depth(observation: &Observation, robot: Option<&Robot>) -> DepthImage {
     let camera = &observation.camera;
     match (robot, &observation.hand) {

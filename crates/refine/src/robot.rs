@@ -33,24 +33,43 @@ impl Robot {
         let links = tree.links().iter().enumerate();
         let bodies = links
             .flat_map(|(index, link)| link.parts.iter().map(move |part| (index, part)))
-            .filter_map(|(index, part)| Some((index, RenderModel::new(part).ok()?)))
-            .collect();
+            .map(|(index, part)| {
+                let fault = |e: prehend_render::ModelError| RobotError::Shape {
+                    link: tree.links()[index].name.clone(),
+                    reason: e.to_string(),
+                };
+                Ok((index, RenderModel::new(part).map_err(fault)?))
+            })
+            .collect::<Result<_, RobotError>>()?;
         Ok(Self { tree, shape, taxels, bodies })
     }
 
     /// The hand with its base at `t_cam_hand` and its joints at `joints` \[rad\].
     ///
     /// # Errors
-    /// If a pose is not finite.
+    /// If there is not one joint position a joint, or a pose is not finite.
     pub fn posed(
         &self,
         t_cam_hand: &Isometry3<f64>,
         joints: &[f64],
     ) -> Result<PosedRobot, RobotError> {
+        self.check_joints(joints)?;
         PosedRobot::new(Arc::clone(&self.shape), self.link_poses(t_cam_hand, joints))
     }
 
+    /// Whether `joints` has one position for each of [`joint_names`](KinematicTree::joint_names).
+    ///
+    /// # Errors
+    /// [`RobotError::JointCount`].
+    pub fn check_joints(&self, joints: &[f64]) -> Result<(), RobotError> {
+        let (given, expected) = (joints.len(), self.tree.joint_names().len());
+        if given == expected { Ok(()) } else { Err(RobotError::JointCount { given, expected }) }
+    }
+
     /// What there is to draw of the hand, with link → camera poses.
+    ///
+    /// # Panics
+    /// If there is not one joint position a joint: see [`check_joints`](Self::check_joints).
     pub fn render_bodies(
         &self,
         t_cam_hand: &Isometry3<f64>,
@@ -62,5 +81,51 @@ impl Robot {
 
     fn link_poses(&self, t_cam_hand: &Isometry3<f64>, joints: &[f64]) -> Vec<Isometry3<f64>> {
         self.tree.forward_kinematics(joints).iter().map(|t| t_cam_hand * t).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::synth::default_scene;
+    use crate::{Config, RefineError, TermKind, inspect_pose, refine};
+
+    #[test]
+    fn a_wrong_number_of_joints_is_an_error_for_every_term() {
+        let scene = default_scene(1).unwrap();
+        let mut observation = scene.observation.clone();
+        observation.hand.as_mut().unwrap().joints.pop();
+        for kind in [TermKind::Rendering, TermKind::Depth, TermKind::Physics, TermKind::Tactile] {
+            let config = Config { terms: vec![kind], ..Config::default() };
+            let robot = Some(&scene.robot);
+            let error = refine(&observation, &scene.object, robot, &scene.initial, &config);
+            let error = error.unwrap_err();
+            assert!(
+                matches!(
+                    error,
+                    RefineError::Robot(RobotError::JointCount { given: 15, expected: 16 })
+                ),
+                "{error}"
+            );
+        }
+        let posed = scene.robot.posed(&Isometry3::identity(), &[0.0; 17]);
+        assert!(matches!(posed, Err(RobotError::JointCount { given: 17, expected: 16 })));
+        let warnings =
+            inspect_pose(&observation, &scene.object, Some(&scene.robot), &scene.initial);
+        assert!(warnings.iter().any(|w| w.contains("15 joint positions")), "{warnings:?}");
+    }
+
+    #[test]
+    fn a_part_that_cannot_be_drawn_is_an_error() {
+        // A flat triangle without any area, as a mesh file may hold.
+        let dir = tempfile::tempdir().unwrap();
+        std::fs::write(dir.path().join("flat.obj"), "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n")
+            .unwrap();
+        let urdf = r#"<robot name="r"><link name="palm"><collision><geometry>
+            <mesh filename="flat.obj"/></geometry></collision></link></robot>"#;
+        let refused = KinematicTree::from_urdf_str(urdf, Some(dir.path()))
+            .and_then(|tree| Robot::new(tree, Vec::new()).map(|_| ()));
+        println!("{refused:?}");
+        assert!(refused.unwrap_err().to_string().contains("link 'palm'"));
     }
 }

@@ -44,7 +44,8 @@ impl State {
     /// The state that a refinement of `initial` (object → camera \[m\]) begins with.
     ///
     /// # Errors
-    /// If the pose is not finite or behind the camera, or the object's mask is empty.
+    /// If the pose is not finite or behind the camera, an image has not the camera's size, or the object's
+    /// mask is empty.
     pub fn new(
         observation: &Observation,
         object: &Object,
@@ -54,6 +55,9 @@ impl State {
         if !rotation.chain(initial.translation.vector.iter()).all(|v| v.is_finite()) {
             return Err(RefineError::NotFinite);
         }
+        observation.check_sizes().map_err(|(image, problem)| {
+            RefineError::Images(format!("the {image} has {problem}"))
+        })?;
         if observation.mask.count() == 0 {
             return Err(RefineError::EmptyMask);
         }
@@ -90,5 +94,29 @@ impl State {
         // Thousands of small steps must not let the quaternion drift off the unit sphere.
         pose.rotation.renormalize();
         state
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use prehend_render::{DepthImage, Mask, RgbImage};
+
+    use super::*;
+    use crate::synth::default_scene;
+
+    #[test]
+    fn images_of_another_size_are_named() {
+        let scene = default_scene(1).unwrap();
+        let refused = |change: &dyn Fn(&mut Observation)| {
+            let mut observation = scene.observation.clone();
+            change(&mut observation);
+            State::new(&observation, &scene.object, &scene.initial).unwrap_err().to_string()
+        };
+        let colour = refused(&|o| o.color = RgbImage::filled(640, 479, [0.0; 3]));
+        assert!(colour.contains("the colour image has 640x479 pixels, the camera has 640x480"));
+        let depth = refused(&|o| o.depth = DepthImage::filled(320, 480, 1.0));
+        assert!(depth.contains("the depth image has 320x480 pixels"), "{depth}");
+        let mask = refused(&|o| o.mask = Mask::filled(1, 1, true));
+        assert!(mask.contains("the mask has 1x1 pixels"), "{mask}");
     }
 }

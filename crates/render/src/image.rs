@@ -225,14 +225,15 @@ impl DepthImage {
 }
 
 impl Mask {
-    /// Reads an 8-bit mask: a pixel is set where its grey value is above 127.
+    /// Reads a mask: a pixel is set where its grey value is not zero, as BOP has it.
     ///
     /// # Errors
     /// When the file cannot be read or decoded.
     pub fn load(path: &Path) -> Result<Self, ImageError> {
-        let image = decode(path)?.into_luma8();
+        // 16 bits, or the smallest values of a 16-bit file would round to zero.
+        let image = decode(path)?.into_luma16();
         let (width, height) = (image.width() as usize, image.height() as usize);
-        Self::new(width, height, image.pixels().map(|p| p.0[0] > 127).collect())
+        Self::new(width, height, image.pixels().map(|p| p.0[0] > 0).collect())
     }
 
     /// Writes an 8-bit grey file, 255 where set. The file appears whole or not at all.
@@ -306,6 +307,17 @@ mod tests {
         assert_eq!(Mask::load(&dir.path().join("m.png")).unwrap(), mask);
         // Only the finished files are left.
         assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 3);
+    }
+
+    #[test]
+    fn any_value_but_zero_sets_a_mask_pixel() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("m.png");
+        image::GrayImage::from_raw(4, 1, vec![0, 1, 127, 255]).unwrap().save(&path).unwrap();
+        assert_eq!(Mask::load(&path).unwrap().pixels(), [false, true, true, true]);
+        let deep = image::ImageBuffer::<image::Luma<u16>, _>::from_raw(2, 1, vec![0u16, 1]);
+        deep.unwrap().save(&path).unwrap();
+        assert_eq!(Mask::load(&path).unwrap().pixels(), [false, true]);
     }
 
     #[test]

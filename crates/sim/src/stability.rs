@@ -193,7 +193,7 @@ impl<L: LocalLaw> StabilityLoss<L> {
         State { linear, angular, ..State::at_rest(&self.body, pose) }
     }
 
-    /// Sums `term` over the measured states with their weights.
+    /// The states that count, in the order of time, each with its weight: the last one, or the mean of all.
     fn measured<'s, T>(&self, states: &'s [T]) -> impl Iterator<Item = (&'s T, f64)> {
         let count = match self.weights.averaging {
             Averaging::Final => 1,

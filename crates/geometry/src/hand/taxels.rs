@@ -101,7 +101,7 @@ fn curved_tip() -> Vec<(Point3<f64>, Vector3<f64>)> {
         &[33.8, 29.7, 23.3, 17.0, 10.3, 3.8],
     ];
     let column = |k: usize, sign: f64| {
-        let (s, c) = [90.0_f64, 50.0, 20.0][k].to_radians().sin_cos();
+        let (s, c) = [90.0_f64, 50.0, 25.0][k].to_radians().sin_cos();
         side[k].iter().map(move |y| {
             let beyond = (y * 1e-3 - LENGTH).max(0.0);
             let normal = {

@@ -109,13 +109,21 @@ pub enum RobotError {
         /// Why not.
         reason: String,
     },
-    /// A distance field of a link cannot be built.
+    /// The collision bodies of a link cannot be used.
     #[error("link '{link}': {reason}")]
     Shape {
         /// The link.
         link: String,
         /// Why not.
         reason: String,
+    },
+    /// A joint vector that does not fit the robot.
+    #[error("{given} joint positions were given for a robot of {expected}")]
+    JointCount {
+        /// Positions given.
+        given: usize,
+        /// Entries of the robot's joint vector.
+        expected: usize,
     },
     /// A pose list that does not fit the robot.
     #[error("{given} link poses were given for a robot of {expected} links")]

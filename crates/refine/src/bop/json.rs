@@ -29,7 +29,7 @@ impl JsonFile {
         let bytes = fs::read(path).map_err(|e| DatasetError::reading(path, &e))?;
         let parsed = serde_json::from_slice(&bytes).or_else(|error| {
             // Report the strict parser's complaint unless non-finite numbers were all that stopped it.
-            serde_json::from_slice(&null_for_non_finite(&bytes)).map_err(|_| error)
+            serde_json::from_slice(&false_for_non_finite(&bytes)).map_err(|_| error)
         });
         match parsed {
             Ok(Value::Object(root)) => Ok(Self { path: path.to_path_buf(), root }),
@@ -61,8 +61,9 @@ impl JsonFile {
     }
 }
 
-/// Replaces `NaN`, `Infinity` and `-Infinity` outside strings by `null`, which no number field accepts.
-fn null_for_non_finite(bytes: &[u8]) -> Vec<u8> {
+/// Replaces `NaN`, `Infinity` and `-Infinity` outside strings by `false`, which no field accepts: unlike `null`,
+/// it does not count as absent.
+fn false_for_non_finite(bytes: &[u8]) -> Vec<u8> {
     let mut out = Vec::with_capacity(bytes.len());
     let (mut i, mut in_string) = (0, false);
     while let Some(&byte) = bytes.get(i) {
@@ -75,7 +76,7 @@ fn null_for_non_finite(bytes: &[u8]) -> Vec<u8> {
                 i += 2;
             }
             (false, _, Some(word)) => {
-                out.extend(b"null");
+                out.extend(b"false");
                 i += word.len();
             }
             _ => {
@@ -307,6 +308,15 @@ mod tests {
             "a NaN \" in a string"
         );
         assert_eq!(f.entry(1).unwrap().get("t").unwrap().numbers(), Ok([1.0, 2.0, 3.0]));
+    }
+
+    #[test]
+    fn nan_in_an_optional_field_is_not_absence() {
+        let f = file(r#"{"0": {"scale": NaN, "none": null}}"#).unwrap();
+        let entry = f.entry(0).unwrap();
+        assert!(entry.find("none").unwrap().is_none());
+        let error = entry.find("scale").unwrap().unwrap().positive().unwrap_err();
+        assert!(error.to_string().contains("0.scale: is not a finite number"), "{error}");
     }
 
     #[test]

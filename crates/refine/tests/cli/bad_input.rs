@@ -341,6 +341,13 @@ fn entries_of_an_image() {
                 ],
             },
             Fault {
+                name: "forces of another body",
+                make: |p| entry(p, "scene_tactile.json", |e| e["body"] = json!("left_hand")),
+                expected: &[
+                    "scene_tactile.json: 0.body: names \"left_hand\", but the hand is \"hand\"",
+                ],
+            },
+            Fault {
                 name: "a force of two numbers",
                 make: |p| entry(p, "scene_tactile.json", |e| e["force"][5] = json!([0, 1])),
                 expected: &["scene_tactile.json: 0.force[5]: expected 3 numbers, found 2"],
@@ -633,6 +640,7 @@ fn frame_files_name_file_and_field() {
             }),
         )
     };
+    Mask::filled(3, 2, true).save(&place.path("ds/small.png")).unwrap();
     for (text, expected) in [
         ("{".to_owned(), "error: ds/f.json: EOF"),
         (with("depth_unit", json!(1)), "error: ds/f.json: unknown field `depth_unit`"),
@@ -642,6 +650,10 @@ fn frame_files_name_file_and_field() {
         (with("K", json!([0, 0, 0, 0, 0, 0, 0, 0, 1])), "error: ds/f.json: K: "),
         (with("rgb", json!("none.png")), "error: ds/f.json: ds/none.png: "),
         (with("mask", json!("init.csv")), "error: ds/f.json: ds/init.csv: "),
+        (
+            with("mask", json!("small.png")),
+            "error: ds/f.json: mask: the image is 3x2 pixels, rgb is 640x480",
+        ),
         (with("mesh", json!("none.ply")), "error: ds/f.json: ds/none.ply: "),
         (
             with("mass_kg", json!(-1)),

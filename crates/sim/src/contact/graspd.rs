@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 use prehend_autodiff::Scalar;
 
 use super::law::{Contact, ContactLaw, Response};
+use super::penalty::LawError;
 
 /// The penalty law of Grasp'D (D. Turpin et al., ECCV 2022), a spring per sample:
 /// with c = min(φ − ρ, 0), f_n = −k_n c and f_t = −(u/|u|)·min(k_f |u| |c|, μ k_n |c|).
@@ -16,6 +17,21 @@ pub struct GraspD {
     pub params: [f64; 3],
     /// Distance ρ at which contact begins \[m\].
     pub offset: f64,
+}
+
+impl GraspD {
+    /// `stiffness` \[N/m\] > 0, friction `gain` \[N s/m²\] ≥ 0, `friction` coefficient ≥ 0, and the distance
+    /// `offset` \[m\] at which contact begins.
+    ///
+    /// # Errors
+    /// Names the parameter that is out of its range.
+    pub fn new(stiffness: f64, gain: f64, friction: f64, offset: f64) -> Result<Self, LawError> {
+        LawError::check_positive("stiffness", stiffness)?;
+        LawError::check_not_negative("gain", gain)?;
+        LawError::check_not_negative("friction", friction)?;
+        LawError::check_finite("offset", offset)?;
+        Ok(Self { params: [stiffness, gain, friction], offset })
+    }
 }
 
 impl Default for GraspD {

@@ -17,6 +17,22 @@ pub struct LawError {
     pub value: f64,
 }
 
+impl LawError {
+    pub(super) fn check_positive(name: &'static str, value: f64) -> Result<(), Self> {
+        let ok = value.is_finite() && value > 0.0;
+        if ok { Ok(()) } else { Err(Self { name, range: "positive", value }) }
+    }
+
+    pub(super) fn check_not_negative(name: &'static str, value: f64) -> Result<(), Self> {
+        let ok = value.is_finite() && value >= 0.0;
+        if ok { Ok(()) } else { Err(Self { name, range: "zero or positive", value }) }
+    }
+
+    pub(super) fn check_finite(name: &'static str, value: f64) -> Result<(), Self> {
+        if value.is_finite() { Ok(()) } else { Err(Self { name, range: "finite", value }) }
+    }
+}
+
 /// Spring and damper per area, clamped so that contact never pulls:
 /// f_n = A·max(0, −K g − D ġ), with friction coefficient μ.
 ///
@@ -43,15 +59,10 @@ impl Penalty {
         friction: f64,
         slip_scale: f64,
     ) -> Result<Self, LawError> {
-        let check = |name, value: f64, positive: bool| {
-            let ok = value.is_finite() && if positive { value > 0.0 } else { value >= 0.0 };
-            let range = if positive { "positive" } else { "zero or positive" };
-            if ok { Ok(()) } else { Err(LawError { name, range, value }) }
-        };
-        check("stiffness", stiffness, true)?;
-        check("damping", damping, false)?;
-        check("friction", friction, false)?;
-        check("slip_scale", slip_scale, true)?;
+        LawError::check_positive("stiffness", stiffness)?;
+        LawError::check_not_negative("damping", damping)?;
+        LawError::check_not_negative("friction", friction)?;
+        LawError::check_positive("slip_scale", slip_scale)?;
         Ok(Isotropic(KelvinVoigt { params: [stiffness, damping, friction], slip_scale }))
     }
 }

@@ -36,7 +36,7 @@ impl Default for LawRegistry {
         registry.register("graspd", |v| {
             let (stiffness, gain) = (parameter(v, 0, "stiffness")?, parameter(v, 1, "gain")?);
             let (friction, offset) = (parameter(v, 2, "friction")?, parameter(v, 3, "offset")?);
-            Ok(Box::new(GraspD { params: [stiffness, gain, friction], offset }))
+            Ok(Box::new(GraspD::new(stiffness, gain, friction, offset)?))
         });
         registry
     }
@@ -86,5 +86,30 @@ mod tests {
         assert!(registry.create("glue", &[]).is_none());
         let error = registry.create("penalty", &[1.0]).unwrap().err().unwrap();
         assert_eq!(error.name, "damping");
+    }
+
+    #[test]
+    fn built_in_laws_refuse_parameters_out_of_range() {
+        let registry = LawRegistry::default();
+        let good = [1e5, 1e3, 0.5, 1e-3];
+        for (law, names) in [
+            ("graspd", ["stiffness", "gain", "friction", "offset"]),
+            ("penalty", ["stiffness", "damping", "friction", "slip_scale"]),
+        ] {
+            assert!(registry.create(law, &good).unwrap().is_ok());
+            for (k, name) in names.into_iter().enumerate() {
+                for bad in [f64::NAN, f64::INFINITY, -1.0] {
+                    let mut params = good;
+                    params[k] = bad;
+                    let refused = registry.create(law, &params).unwrap().map(|_| ());
+                    // An offset may be negative: contact then begins inside.
+                    let allowed = name == "offset" && bad == -1.0;
+                    assert_eq!(
+                        refused.map_err(|e| e.name),
+                        if allowed { Ok(()) } else { Err(name) }
+                    );
+                }
+            }
+        }
     }
 }

@@ -19,7 +19,10 @@ pub fn damping_per_area(mass: f64, stiffness: f64, contact_area: f64, ratio: f64
 }
 
 /// Coefficient of restitution of a clamped Kelvin–Voigt contact without gravity,
-/// e = exp(−2ζ/√(1−ζ²)·acos ζ), for a damping ratio ζ in 0..1; exp(−2) from 1 on.
+/// e = exp(−2ζ/√(1−ζ²)·acos ζ), for a damping ratio ζ in 0..1.
+///
+/// From ζ = 1 on it returns the formula's limit there, exp(−2) ≈ 0.135. An overdamped contact bounces still less
+/// (e = exp(−2ζ/√(ζ²−1)·acosh ζ), the formula's continuation); a larger ζ is rarely wanted and not modelled here.
 pub fn restitution(ratio: f64) -> f64 {
     let sine2 = 1.0 - ratio * ratio;
     if sine2 < 1e-12 { (-2f64).exp() } else { (-2.0 * ratio / sine2.sqrt() * ratio.acos()).exp() }
