@@ -99,7 +99,7 @@ impl<'a> Scorer<'a> {
     }
 
     fn prepare_hand(&mut self, scene: u32, image: u32) -> Result<(), AssetError> {
-        if !self.hand.as_ref().is_some_and(|(of, _)| *of == (scene, image)) {
+        if self.hand.as_ref().is_none_or(|(of, _)| *of != (scene, image)) {
             self.hand = Some(((scene, image), self.true_hand(scene, image)?));
         }
         Ok(())
