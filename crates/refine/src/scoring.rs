@@ -202,8 +202,7 @@ mod tests {
         for row in &rows {
             let alone = Scorer::new(&dataset).score(row).unwrap();
             assert_eq!(json(&scorer.score(row).unwrap()), json(&alone));
-        }
-        for (_, hand) in scorer.hand.iter() {
+            let (_, hand) = scorer.hand.as_ref().unwrap();
             assert_eq!(hand.as_ref().unwrap().truths.len(), 1);
         }
 
