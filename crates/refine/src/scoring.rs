@@ -99,7 +99,7 @@ impl<'a> Scorer<'a> {
     }
 
     fn prepare_hand(&mut self, scene: u32, image: u32) -> Result<(), AssetError> {
-        if !self.hand.as_ref().is_some_and(|(of, _)| *of == (scene, image)) {
+        if self.hand.as_ref().is_none_or(|(of, _)| *of != (scene, image)) {
             self.hand = Some(((scene, image), self.true_hand(scene, image)?));
         }
         Ok(())
@@ -202,8 +202,7 @@ mod tests {
         for row in &rows {
             let alone = Scorer::new(&dataset).score(row).unwrap();
             assert_eq!(json(&scorer.score(row).unwrap()), json(&alone));
-        }
-        for (_, hand) in scorer.hand.iter() {
+            let (_, hand) = scorer.hand.as_ref().unwrap();
             assert_eq!(hand.as_ref().unwrap().truths.len(), 1);
         }
 
