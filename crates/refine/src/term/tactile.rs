@@ -73,6 +73,7 @@ impl TactileTerm {
                 taxels: robot.taxels.len(),
             });
         }
+        robot.check_joints(&hand.joints)?;
         let links = robot.tree.forward_kinematics(&hand.joints);
         let touches = robot
             .taxels
