@@ -14,7 +14,7 @@ pub struct HeuristicSettings {
     pub first_step: f64,
     /// The search ends when candidate steps are shorter than this \[m\].
     pub last_step: f64,
-    /// Always run all the iterations, even after nothing improves.
+    /// Always run all the iterations, however small the steps become.
     pub exhaustive: bool,
 }
 

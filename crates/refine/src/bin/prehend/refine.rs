@@ -63,10 +63,10 @@ pub(crate) struct Method {
         help_heading = "Method"
     )]
     strategy: String,
-    /// Iterations at most; the search ends earlier when nothing improves
+    /// Iterations at most; the search ends earlier when the steps become negligible
     #[arg(long, value_name = "N", default_value_t = 400, help_heading = "Method")]
     iterations: usize,
-    /// Run all the iterations even after nothing improves
+    /// Run all the iterations, however small the steps become
     #[arg(long, help_heading = "Method")]
     exhaustive: bool,
     /// Evidence to use, a list of physics, rendering, depth and tactile such as "rendering,depth"
