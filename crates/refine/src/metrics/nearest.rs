@@ -1,84 +1,27 @@
 //! Exact nearest neighbours among a fixed set of points.
 
+use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use nalgebra::Point3;
 
-/// A k-d tree over points: median splits along the widest axis, small leaves.
-#[derive(Clone, Debug)]
+/// A k-d tree over points that knows what to answer without any.
+#[derive(Debug)]
 pub struct NearestPoint {
-    points: Vec<Point3<f64>>,
-    nodes: Vec<Node>,
+    tree: Option<ImmutableKdTree<f64, 3>>,
 }
-
-#[derive(Clone, Copy, Debug)]
-enum Node {
-    Leaf {
-        start: usize,
-        end: usize,
-    },
-    /// The left child follows its parent directly.
-    Split {
-        axis: usize,
-        at: f64,
-        right: usize,
-    },
-}
-
-const LEAF_SIZE: usize = 16;
 
 impl NearestPoint {
     /// Builds the tree; coordinates must be finite.
     pub fn new(points: &[Point3<f64>]) -> Self {
-        let mut tree = Self { points: points.to_vec(), nodes: Vec::new() };
-        if !points.is_empty() {
-            tree.build(0, points.len());
-        }
-        tree
-    }
-
-    fn build(&mut self, start: usize, end: usize) {
-        let part = &mut self.points[start..end];
-        let (lo, hi) = part.iter().fold((part[0], part[0]), |(lo, hi), p| (lo.inf(p), hi.sup(p)));
-        if part.len() <= LEAF_SIZE || lo == hi {
-            self.nodes.push(Node::Leaf { start, end });
-            return;
-        }
-        let axis = (hi - lo).imax();
-        let middle = part.len() / 2;
-        part.select_nth_unstable_by(middle, |a, b| a[axis].total_cmp(&b[axis]));
-        let at = part[middle][axis];
-        let node = self.nodes.len();
-        self.nodes.push(Node::Split { axis, at, right: 0 });
-        self.build(start, start + middle);
-        let right = self.nodes.len();
-        self.nodes[node] = Node::Split { axis, at, right };
-        self.build(start + middle, end);
+        let coordinates: Vec<[f64; 3]> = points.iter().map(|p| p.coords.into()).collect();
+        Self { tree: ImmutableKdTree::new_from_slice(&coordinates).ok().filter(|t| t.size() > 0) }
     }
 
     /// The distance from `query` to the nearest point; infinite when there are no points.
     pub fn distance(&self, query: &Point3<f64>) -> f64 {
-        let mut best = f64::INFINITY;
-        if !self.nodes.is_empty() {
-            self.search(0, query, &mut best);
-        }
-        best.sqrt()
-    }
-
-    fn search(&self, node: usize, query: &Point3<f64>, best: &mut f64) {
-        match self.nodes[node] {
-            Node::Leaf { start, end } => {
-                for p in &self.points[start..end] {
-                    *best = best.min((p - query).norm_squared());
-                }
-            }
-            Node::Split { axis, at, right } => {
-                let offset = query[axis] - at;
-                let (near, far) = if offset < 0.0 { (node + 1, right) } else { (right, node + 1) };
-                self.search(near, query, best);
-                if offset * offset < *best {
-                    self.search(far, query, best);
-                }
-            }
-        }
+        self.tree.as_ref().map_or(f64::INFINITY, |tree| {
+            let query = query.coords.into();
+            tree.query(&query).nearest_one::<SquaredEuclidean<f64>>().execute().distance.sqrt()
+        })
     }
 }
 

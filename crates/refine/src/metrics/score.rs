@@ -86,7 +86,7 @@ impl PoseScore {
 }
 
 /// What scoring needs to know of an object, prepared once for many poses.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct ScoredModel {
     points: Vec<Point3<f64>>,
     nearest: NearestPoint,
