@@ -19,18 +19,22 @@
 //! [`custom`] and [`block`] record operations that bring their own derivative, [`lie`] holds rotations
 //! and rigid motions, [`check`] the finite differences that every derivative here is held against.
 
+mod arena;
 mod chain;
 pub mod check;
 mod fwd;
 pub mod lie;
 mod real_field;
+mod recording;
 mod scalar;
+mod sweep;
 mod tape;
 mod var;
 mod vjp;
 
 pub use fwd::Fwd;
+pub use recording::{Adjoints, Recording, gradient, gradient_into, jacobian};
 pub use scalar::Scalar;
-pub use tape::{Adjoints, Recording, gradient};
+pub use tape::TapeStatistics;
 pub use var::Var;
 pub use vjp::{CustomVjp, block, custom};

@@ -2,7 +2,7 @@
 
 use crate::chain::Chain;
 use crate::real_field::impl_real_field;
-use crate::tape::with_tape;
+use crate::tape::{push, refuse_foreign};
 
 /// A number on the thread's tape.
 ///
@@ -30,6 +30,29 @@ impl Var {
     pub fn value(self) -> f64 {
         self.value
     }
+
+    /// The result of an operation on two numbers with the same node.
+    #[inline]
+    fn fuse(self, other: Self, value: f64, [da, db]: [f64; 2]) -> Self {
+        if self.recording != other.recording {
+            refuse_foreign();
+        }
+        let coefficient = da * self.coefficient + db * other.coefficient;
+        Self { value, coefficient, ..self }
+    }
+
+    /// The node whose adjoint is this number's derivative; none for a constant.
+    ///
+    /// # Panics
+    /// If the number belongs to another recording or is not the node itself.
+    pub(crate) fn own_node(self, recording: u32) -> Option<u32> {
+        if self.recording == 0 {
+            return None;
+        }
+        assert!(self.recording == recording, "the number belongs to another recording");
+        assert!(self.coefficient == 1.0, "only variables have an adjoint, not fused operations");
+        Some(self.node)
+    }
 }
 
 impl Chain for Var {
@@ -50,9 +73,7 @@ impl Chain for Var {
 
     #[inline]
     fn unary(self, value: f64, slope: f64) -> Self {
-        if self.is_constant() {
-            return Self::lift(value);
-        }
+        // A constant stays one: its coefficient is never looked at.
         Self { value, coefficient: self.coefficient * slope, ..self }
     }
 
@@ -62,11 +83,10 @@ impl Chain for Var {
             (_, true) => self.unary(value, da),
             (true, false) => other.unary(value, db),
             (false, false) => {
-                if self.node == other.node && self.recording == other.recording {
-                    let coefficient = da * self.coefficient + db * other.coefficient;
-                    return Self { value, coefficient, ..self };
+                if self.node == other.node {
+                    return self.fuse(other, value, [da, db]);
                 }
-                with_tape(|tape| tape.push(value, [(self, da), (other, db)]))
+                push(value, [self, other], [da, db])
             }
         }
     }

@@ -11,7 +11,8 @@ use crate::tape::with_tape;
 pub trait CustomVjp: 'static {
     /// Adds to `input_adjoints` (zero at the call) the product of `output_adjoints` and the Jacobian (outputs × inputs).
     ///
-    /// Runs inside the sweep, so it must not itself record on the tape; forward mode is free to use.
+    /// Runs in the midst of the sweep. It may open a [`Recording`](crate::Recording) of its own, but may not use
+    /// numbers of others; it is called once for each seed that the sweep carries.
     fn vjp(&self, output_adjoints: &[f64], input_adjoints: &mut [f64]);
 }
 
@@ -20,7 +21,12 @@ pub trait CustomVjp: 'static {
 /// # Panics
 /// If an input belongs to another recording (see [`Var`]).
 pub fn custom(inputs: &[Var], outputs: &[f64], operation: impl CustomVjp) -> Vec<Var> {
-    with_tape(|tape| tape.push_custom(inputs, outputs, Box::new(operation)))
+    // Nothing can flow back.
+    if outputs.is_empty() {
+        return Vec::new();
+    }
+    let group = with_tape(|tape| tape.push_custom(inputs, outputs.len(), Box::new(operation)));
+    outputs.iter().enumerate().map(|(i, &value)| group.var(i, value)).collect()
 }
 
 /// Records an operation whose dense Jacobian (row-major, outputs × inputs) is already known.
@@ -32,16 +38,9 @@ pub fn custom(inputs: &[Var], outputs: &[f64], operation: impl CustomVjp) -> Vec
 /// recording.
 pub fn block(inputs: &[Var], outputs: &[f64], jacobian: &[f64]) -> Vec<Var> {
     assert_eq!(jacobian.len(), outputs.len() * inputs.len(), "size of the block's Jacobian");
-    with_tape(|tape| {
-        let rows = jacobian.chunks_exact(inputs.len().max(1));
-        outputs
-            .iter()
-            .zip(rows.map(Some).chain(std::iter::repeat(None)))
-            .map(|(&value, row)| {
-                tape.push(value, inputs.iter().copied().zip(row.unwrap_or(&[]).iter().copied()))
-            })
-            .collect()
-    })
+    let rows = jacobian.chunks_exact(inputs.len().max(1));
+    let group = with_tape(|tape| tape.push_block(inputs, outputs.len(), rows));
+    outputs.iter().enumerate().map(|(i, &value)| group.var(i, value)).collect()
 }
 
 #[cfg(test)]

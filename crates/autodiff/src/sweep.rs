@@ -1,0 +1,157 @@
+//! The way back over the tape: adjoints of every node, for several seeds at once.
+
+use crate::arena::Mark;
+use crate::tape::{Entry, Group, Start, Tape, with_tape};
+
+/// Adjoints of one node, one a seed.
+type Lanes<const K: usize> = [f64; K];
+
+/// A sweep under way. It stops at each custom operation, so that the operation may use the tape.
+struct Sweep<'a, const K: usize> {
+    adjoints: &'a mut [Lanes<K>],
+    start: Start,
+    /// Nodes that are still to be visited, counted from the start of the recording.
+    node: usize,
+    entry: Mark,
+    slope: Mark,
+    parent: Mark,
+    operation: usize,
+}
+
+/// Adds to the adjoints of everything that the seeded nodes of `recording` depend on.
+///
+/// `adjoints` holds the seeds, one element a node of the recording.
+pub(crate) fn sweep<const K: usize>(recording: u32, adjoints: &mut [Lanes<K>]) {
+    let mut sweep = with_tape(|tape| Sweep {
+        node: adjoints.len(),
+        adjoints,
+        start: tape.start(recording),
+        entry: tape.entries.mark(),
+        slope: tape.slopes.mark(),
+        parent: tape.parents.mark(),
+        operation: tape.operations.len(),
+    });
+    let (mut outputs, mut inputs) = (Vec::new(), Vec::new());
+    while let Some(group) = with_tape(|tape| sweep.run(tape)) {
+        sweep.operation -= 1;
+        let operation = sweep.operation;
+        let Some(custom) = with_tape(|tape| tape.operations[operation].take()) else { continue };
+        let (parents, coefficients) = with_tape(|tape| {
+            let parents = tape.parents.take_back(&mut sweep.parent, group.inputs).to_vec();
+            let coefficients = tape.slopes.take_back(&mut sweep.slope, group.inputs).to_vec();
+            (parents, coefficients)
+        });
+        let range = sweep.node - group.outputs..sweep.node;
+        for lane in 0..K {
+            outputs.clear();
+            outputs.extend(sweep.adjoints[range.clone()].iter().map(|adjoint| adjoint[lane]));
+            if outputs.iter().all(|adjoint| *adjoint == 0.0) {
+                continue;
+            }
+            inputs.clear();
+            inputs.resize(group.inputs, 0.0);
+            custom.vjp(&outputs, &mut inputs);
+            for ((parent, coefficient), adjoint) in parents.iter().zip(&coefficients).zip(&inputs) {
+                if *coefficient != 0.0 {
+                    sweep.adjoints[(parent - sweep.start.node) as usize][lane] +=
+                        coefficient * adjoint;
+                }
+            }
+        }
+        with_tape(|tape| tape.operations[operation] = Some(custom));
+        sweep.node -= group.outputs;
+    }
+}
+
+impl<const K: usize> Sweep<'_, K> {
+    /// Goes back to the next custom operation, if there is one, and returns it.
+    fn run(&mut self, tape: &Tape) -> Option<Group> {
+        while self.entry != self.start.entry {
+            let (chunk, below) = tape.entries.top_chunk(self.start.entry, self.entry);
+            let mut rest = chunk;
+            while let Some(index) = self.scalar_entries(rest) {
+                let group = rest[index].as_group()?;
+                rest = &rest[..index];
+                if group.custom {
+                    self.entry = below.above(index);
+                    return Some(group);
+                }
+                self.dense(tape, &group);
+            }
+            self.entry = below;
+        }
+        None
+    }
+
+    /// Goes back over nodes of two parents until there is a group, whose index is returned.
+    #[inline]
+    fn scalar_entries(&mut self, entries: &[Entry]) -> Option<usize> {
+        let base = self.start.node;
+        let adjoints = &mut *self.adjoints;
+        let mut node = self.node;
+        // What flows to the node before is kept in a register: most nodes continue the one before, and
+        // writing it to memory to read it back at once would be the slowest part of the sweep.
+        let mut carry = [0.0; K];
+        let mut end = None;
+        for (index, entry) in entries.iter().enumerate().rev() {
+            if entry.is_group() {
+                end = Some(index);
+                break;
+            }
+            node -= 1;
+            let adjoint = add(adjoints[node], carry);
+            adjoints[node] = adjoint;
+            carry = [0.0; K];
+            if adjoint == [0.0; K] {
+                continue;
+            }
+            for side in 0..2 {
+                let parent = (entry.parents[side] - base) as usize;
+                let flow = through(entry.slopes[side], adjoint);
+                if parent + 1 == node {
+                    carry = flow;
+                } else {
+                    adjoints[parent] = add(adjoints[parent], flow);
+                }
+            }
+        }
+        if node > 0 {
+            adjoints[node - 1] = add(adjoints[node - 1], carry);
+        }
+        self.node = node;
+        end
+    }
+
+    /// Goes back over a group with a dense Jacobian.
+    fn dense(&mut self, tape: &Tape, group: &Group) {
+        let base = self.start.node;
+        let parents = tape.parents.take_back(&mut self.parent, group.inputs);
+        let slopes = tape.slopes.take_back(&mut self.slope, group.inputs * group.outputs);
+        let first = self.node - group.outputs;
+        self.node = first;
+        if group.inputs == 0 {
+            return;
+        }
+        let (before, outputs) = self.adjoints.split_at_mut(first);
+        for (adjoint, row) in outputs.iter().zip(slopes.chunks_exact(group.inputs)) {
+            if *adjoint == [0.0; K] {
+                continue;
+            }
+            for (parent, slope) in parents.iter().zip(row) {
+                let parent = &mut before[(parent - base) as usize];
+                *parent = add(*parent, through(*slope, *adjoint));
+            }
+        }
+    }
+}
+
+#[inline]
+fn add<const K: usize>(a: Lanes<K>, b: Lanes<K>) -> Lanes<K> {
+    std::array::from_fn(|lane| a[lane] + b[lane])
+}
+
+/// `slope * adjoint`, but 0 where nothing flows: 0 · ∞ must not make a NaN of a branch that was not used.
+#[inline]
+fn through<const K: usize>(slope: f64, adjoint: Lanes<K>) -> Lanes<K> {
+    adjoint.map(|a| if K > 1 && a == 0.0 { 0.0 } else { slope * a })
+}
