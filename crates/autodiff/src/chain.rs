@@ -1,18 +1,29 @@
 //! The two ways a derivative passes through an operation; everything else is arithmetic on values.
 
+use crate::Scalar;
+
 /// A scalar that records how its value depends on its operands.
 ///
 /// Implementing these five functions is all that a differentiation mode needs: `real_field.rs` derives
 /// the whole of `RealField` from them.
 pub(crate) trait Chain: Copy {
+    /// What values and slopes are made of: `f64`, or another scalar for derivatives of derivatives.
+    type Inner: Scalar;
+
+    /// A plain number as a value or slope.
+    #[inline]
+    fn inner(value: f64) -> Self::Inner {
+        Self::Inner::constant(value)
+    }
+
     /// A constant.
-    fn lift(value: f64) -> Self;
-    /// The plain value.
-    fn primal(self) -> f64;
+    fn lift(value: Self::Inner) -> Self;
+    /// The value without this scalar's own derivatives.
+    fn primal(self) -> Self::Inner;
     /// Whether no derivative passes through this number.
     fn is_constant(self) -> bool;
     /// The result `value` of an operation on `self` whose derivative is `slope`.
-    fn unary(self, value: f64, slope: f64) -> Self;
+    fn unary(self, value: Self::Inner, slope: Self::Inner) -> Self;
     /// The result `value` of an operation on `self` and `other` with partial derivatives `slopes`.
-    fn binary(self, other: Self, value: f64, slopes: [f64; 2]) -> Self;
+    fn binary(self, other: Self, value: Self::Inner, slopes: [Self::Inner; 2]) -> Self;
 }

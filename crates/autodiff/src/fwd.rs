@@ -1,77 +1,109 @@
 //! Forward mode: a value with its derivatives along `N` directions.
 
+use crate::Scalar;
 use crate::chain::Chain;
 use crate::real_field::impl_real_field;
 
 /// A number and its partial derivatives with respect to `N` inputs, carried forward.
 ///
-/// The mode of choice for up to about 16 inputs: no tape, no allocation, usable in any thread.
+/// The mode of choice for up to about 16 inputs: no tape, no allocation, usable in any thread. Over another
+/// scalar `T` it carries derivatives of derivatives: `Fwd<N, Fwd<N>>` has second derivatives, and
+/// `Fwd<1, Var>` those of a directional derivative (see [`hessian_vector`](crate::hessian_vector)).
 #[derive(Clone, Copy, Debug)]
-pub struct Fwd<const N: usize> {
+pub struct Fwd<const N: usize, T = f64> {
     /// The value.
-    pub value: f64,
+    pub value: T,
     /// Derivative with respect to each input.
-    pub derivative: [f64; N],
+    pub derivative: [T; N],
 }
 
-impl<const N: usize> Fwd<N> {
+impl<const N: usize, T: Scalar> Fwd<N, T> {
     /// Input number `index`: derivative 1 along its own direction, 0 along the others.
     ///
     /// # Panics
     /// If `index >= N`.
     #[inline]
-    pub fn variable(value: f64, index: usize) -> Self {
-        let mut derivative = [0.0; N];
-        derivative[index] = 1.0;
+    pub fn variable(value: T, index: usize) -> Self {
+        let mut derivative = [T::zero(); N];
+        derivative[index] = T::one();
         Self { value, derivative }
     }
 
     /// All `N` inputs at once.
     #[inline]
-    pub fn variables(values: [f64; N]) -> [Self; N] {
+    pub fn variables(values: [T; N]) -> [Self; N] {
         std::array::from_fn(|i| Self::variable(values[i], i))
     }
 }
 
 /// `slope * derivative`, but 0 where the operand does not move: 0 · ∞ must not make a NaN of a direction
-/// that has nothing to do with the operation. Both sides are computed, so it is a select, not a branch.
+/// that has nothing to do with the operation.
 #[inline]
-fn through(slope: f64, derivative: f64) -> f64 {
-    let product = slope * derivative;
-    if derivative == 0.0 { 0.0 } else { product }
+fn through<T: Scalar>(slope: T, derivative: T) -> T {
+    if derivative.is_constant_zero() { T::zero() } else { slope * derivative }
 }
 
-impl<const N: usize> Chain for Fwd<N> {
+/// Whether [`through`] is no more than a product: plain numbers with finite slopes. Looking once at the slopes
+/// costs half as much as looking at every derivative.
+#[inline]
+fn is_tame<T: Scalar>(slopes: &[T]) -> bool {
+    size_of::<T>() <= size_of::<f64>() && slopes.iter().all(|slope| slope.value().is_finite())
+}
+
+impl<const N: usize, T: Scalar> Chain for Fwd<N, T> {
+    type Inner = T;
+
     #[inline]
-    fn lift(value: f64) -> Self {
-        Self { value, derivative: [0.0; N] }
+    fn lift(value: T) -> Self {
+        Self { value, derivative: [T::zero(); N] }
     }
 
     #[inline]
-    fn primal(self) -> f64 {
+    fn primal(self) -> T {
         self.value
     }
 
     #[inline]
     fn is_constant(self) -> bool {
-        self.derivative.iter().all(|d| *d == 0.0)
+        self.derivative.iter().all(|d| d.is_constant_zero())
     }
 
     #[inline]
-    fn unary(self, value: f64, slope: f64) -> Self {
-        Self { value, derivative: self.derivative.map(|d| through(slope, d)) }
+    fn unary(self, value: T, slope: T) -> Self {
+        let derivative = if is_tame(&[slope]) {
+            self.derivative.map(|d| slope * d)
+        } else {
+            wild_unary(self.derivative, slope)
+        };
+        Self { value, derivative }
     }
 
     #[inline]
-    fn binary(self, other: Self, value: f64, [da, db]: [f64; 2]) -> Self {
-        let derivative = std::array::from_fn(|i| {
-            through(da, self.derivative[i]) + through(db, other.derivative[i])
-        });
+    fn binary(self, other: Self, value: T, [da, db]: [T; 2]) -> Self {
+        let derivative = if is_tame(&[da, db]) {
+            std::array::from_fn(|i| da * self.derivative[i] + db * other.derivative[i])
+        } else {
+            wild_binary(self.derivative, other.derivative, da, db)
+        };
         Self { value, derivative }
     }
 }
 
-impl_real_field!([const N: usize] Fwd<N>);
+// Arrays by value: a reference would keep them out of registers in the common case too.
+
+#[cold]
+#[inline(never)]
+fn wild_unary<const N: usize, T: Scalar>(a: [T; N], slope: T) -> [T; N] {
+    a.map(|d| through(slope, d))
+}
+
+#[cold]
+#[inline(never)]
+fn wild_binary<const N: usize, T: Scalar>(a: [T; N], b: [T; N], da: T, db: T) -> [T; N] {
+    std::array::from_fn(|i| through(da, a[i]) + through(db, b[i]))
+}
+
+impl_real_field!([const N: usize, T: Scalar] Fwd<N, T>);
 
 #[cfg(test)]
 mod tests {

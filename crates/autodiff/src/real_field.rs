@@ -6,18 +6,41 @@
 /// Implements nalgebra's scalar traits for a type that implements [`Chain`](crate::chain::Chain).
 macro_rules! impl_real_field {
     ([$($generics:tt)*] $t:ty) => {
+        impl<$($generics)*> std::ops::Add<f64> for $t {
+            type Output = Self;
+            #[inline]
+            fn add(self, o: f64) -> Self {
+                self.unary(self.primal() + Self::inner(o), Self::inner(1.0))
+            }
+        }
+        impl<$($generics)*> std::ops::Sub<f64> for $t {
+            type Output = Self;
+            #[inline]
+            fn sub(self, o: f64) -> Self {
+                self.unary(self.primal() - Self::inner(o), Self::inner(1.0))
+            }
+        }
+        impl<$($generics)*> std::ops::Mul<f64> for $t {
+            type Output = Self;
+            #[inline]
+            fn mul(self, o: f64) -> Self {
+                { let c = Self::inner(o); self.unary(self.primal() * c, c) }
+            }
+        }
         impl<$($generics)*> std::ops::Add for $t {
             type Output = Self;
             #[inline]
             fn add(self, o: Self) -> Self {
-                self.binary(o, self.primal() + o.primal(), [1.0, 1.0])
+                let one = Self::inner(1.0);
+                self.binary(o, self.primal() + o.primal(), [one, one])
             }
         }
         impl<$($generics)*> std::ops::Sub for $t {
             type Output = Self;
             #[inline]
             fn sub(self, o: Self) -> Self {
-                self.binary(o, self.primal() - o.primal(), [1.0, -1.0])
+                let one = Self::inner(1.0);
+                self.binary(o, self.primal() - o.primal(), [one, -one])
             }
         }
         impl<$($generics)*> std::ops::Mul for $t {
@@ -32,7 +55,7 @@ macro_rules! impl_real_field {
             type Output = Self;
             #[inline]
             fn div(self, o: Self) -> Self {
-                let inverse = 1.0 / o.primal();
+                let inverse = o.primal().recip();
                 let value = self.primal() / o.primal();
                 self.binary(o, value, [inverse, -value * inverse])
             }
@@ -42,14 +65,14 @@ macro_rules! impl_real_field {
             #[inline]
             fn rem(self, o: Self) -> Self {
                 let (a, b) = (self.primal(), o.primal());
-                self.binary(o, a % b, [1.0, -(a / b).trunc()])
+                self.binary(o, a % b, [Self::inner(1.0), -(a / b).trunc()])
             }
         }
         impl<$($generics)*> std::ops::Neg for $t {
             type Output = Self;
             #[inline]
             fn neg(self) -> Self {
-                self.unary(-self.primal(), -1.0)
+                self.unary(-self.primal(), Self::inner(-1.0))
             }
         }
         impl_real_field!(@assign [$($generics)*] $t,
@@ -59,109 +82,109 @@ macro_rules! impl_real_field {
         impl<$($generics)*> PartialEq for $t {
             #[inline]
             fn eq(&self, o: &Self) -> bool {
-                self.primal() == o.primal()
+                self.value() == o.value()
             }
         }
         impl<$($generics)*> PartialOrd for $t {
             #[inline]
             fn partial_cmp(&self, o: &Self) -> Option<std::cmp::Ordering> {
-                self.primal().partial_cmp(&o.primal())
+                self.value().partial_cmp(&o.value())
             }
         }
         impl<$($generics)*> Default for $t {
             #[inline]
             fn default() -> Self {
-                Self::lift(0.0)
+                Self::constant(0.0)
             }
         }
         impl<$($generics)*> From<f64> for $t {
             #[inline]
             fn from(value: f64) -> Self {
-                Self::lift(value)
+                Self::constant(value)
             }
         }
         impl<$($generics)*> std::fmt::Display for $t {
             fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-                std::fmt::Display::fmt(&self.primal(), f)
+                std::fmt::Display::fmt(&self.value(), f)
             }
         }
 
         impl<$($generics)*> num_traits::Zero for $t {
             #[inline]
             fn zero() -> Self {
-                Self::lift(0.0)
+                Self::constant(0.0)
             }
             #[inline]
             fn is_zero(&self) -> bool {
-                self.primal() == 0.0
+                self.value() == 0.0
             }
         }
         impl<$($generics)*> num_traits::One for $t {
             #[inline]
             fn one() -> Self {
-                Self::lift(1.0)
+                Self::constant(1.0)
             }
         }
         impl<$($generics)*> num_traits::Num for $t {
             type FromStrRadixErr = <f64 as num_traits::Num>::FromStrRadixErr;
             fn from_str_radix(text: &str, radix: u32) -> Result<Self, Self::FromStrRadixErr> {
-                <f64 as num_traits::Num>::from_str_radix(text, radix).map(Self::lift)
+                <f64 as num_traits::Num>::from_str_radix(text, radix).map(Self::constant)
             }
         }
         impl<$($generics)*> num_traits::FromPrimitive for $t {
             #[inline]
             fn from_i64(n: i64) -> Option<Self> {
-                Some(Self::lift(n as f64))
+                Some(Self::constant(n as f64))
             }
             #[inline]
             fn from_u64(n: u64) -> Option<Self> {
-                Some(Self::lift(n as f64))
+                Some(Self::constant(n as f64))
             }
             #[inline]
             fn from_f64(n: f64) -> Option<Self> {
-                Some(Self::lift(n))
+                Some(Self::constant(n))
             }
         }
         impl<$($generics)*> num_traits::Signed for $t {
             #[inline]
             fn abs(&self) -> Self {
                 let v = self.primal();
-                let slope = if v == 0.0 { 0.0 } else { v.signum() };
-                self.unary(v.abs(), slope)
+                let slope = if v.value() == 0.0 { 0.0 } else { v.value().signum() };
+                self.unary(num_traits::Signed::abs(&v), Self::inner(slope))
             }
             #[inline]
             fn abs_sub(&self, o: &Self) -> Self {
-                if self <= o { Self::lift(0.0) } else { *self - *o }
+                if self <= o { Self::constant(0.0) } else { *self - *o }
             }
             #[inline]
             fn signum(&self) -> Self {
-                Self::lift(num_traits::Signed::signum(&self.primal()))
+                Self::constant(num_traits::Signed::signum(&self.value()))
             }
             #[inline]
             fn is_positive(&self) -> bool {
-                num_traits::Signed::is_positive(&self.primal())
+                num_traits::Signed::is_positive(&self.value())
             }
             #[inline]
             fn is_negative(&self) -> bool {
-                num_traits::Signed::is_negative(&self.primal())
+                num_traits::Signed::is_negative(&self.value())
             }
         }
 
         impl<$($generics)*> approx::AbsDiffEq for $t {
             type Epsilon = Self;
             fn default_epsilon() -> Self {
-                Self::lift(f64::EPSILON)
+                Self::constant(f64::EPSILON)
             }
             fn abs_diff_eq(&self, o: &Self, epsilon: Self) -> bool {
-                self.primal().abs_diff_eq(&o.primal(), epsilon.primal())
+                self.value().abs_diff_eq(&o.value(), epsilon.value())
             }
         }
         impl<$($generics)*> approx::RelativeEq for $t {
             fn default_max_relative() -> Self {
-                Self::lift(f64::default_max_relative())
+                Self::constant(f64::default_max_relative())
             }
             fn relative_eq(&self, o: &Self, epsilon: Self, max_relative: Self) -> bool {
-                self.primal().relative_eq(&o.primal(), epsilon.primal(), max_relative.primal())
+                self.value().relative_eq(&o.value(), epsilon.value(), max_relative.value())
             }
         }
         impl<$($generics)*> approx::UlpsEq for $t {
@@ -169,7 +192,7 @@ macro_rules! impl_real_field {
                 f64::default_max_ulps()
             }
             fn ulps_eq(&self, o: &Self, epsilon: Self, max_ulps: u32) -> bool {
-                self.primal().ulps_eq(&o.primal(), epsilon.primal(), max_ulps)
+                self.value().ulps_eq(&o.value(), epsilon.value(), max_ulps)
             }
         }
 
@@ -236,7 +259,7 @@ macro_rules! impl_real_field {
             }
             #[inline]
             fn imaginary(self) -> Self {
-                Self::lift(0.0)
+                Self::constant(0.0)
             }
             #[inline]
             fn modulus(self) -> Self {
@@ -248,7 +271,7 @@ macro_rules! impl_real_field {
             }
             #[inline]
             fn argument(self) -> Self {
-                Self::lift(if self.primal() >= 0.0 { 0.0 } else { std::f64::consts::PI })
+                Self::constant(if self.value() >= 0.0 { 0.0 } else { std::f64::consts::PI })
             }
             #[inline]
             fn norm1(self) -> Self {
@@ -264,8 +287,8 @@ macro_rules! impl_real_field {
             }
             #[inline]
             fn to_exp(self) -> (Self, Self) {
-                let one = Self::lift(1.0);
-                if self.primal() >= 0.0 { (self, one) } else { (-self, -one) }
+                let one = Self::constant(1.0);
+                if self.value() >= 0.0 { (self, one) } else { (-self, -one) }
             }
             #[inline]
             fn signum(self) -> Self {
@@ -274,7 +297,7 @@ macro_rules! impl_real_field {
             impl_real_field!(@flat floor ceil round trunc);
             #[inline]
             fn fract(self) -> Self {
-                self.unary(self.primal().fract(), 1.0)
+                self.unary(self.primal().fract(), Self::inner(1.0))
             }
             #[inline]
             fn mul_add(self, a: Self, b: Self) -> Self {
@@ -288,12 +311,14 @@ macro_rules! impl_real_field {
             fn hypot(self, other: Self) -> Self {
                 let (a, b) = (self.primal(), other.primal());
                 let value = a.hypot(b);
-                let inverse = if value == 0.0 { 0.0 } else { 1.0 / value };
-                self.binary(other, value, [a * inverse, b * inverse])
+                if value.value() == 0.0 {
+                    return self.binary(other, value, [Self::inner(0.0); 2]);
+                }
+                self.binary(other, value, [a / value, b / value])
             }
             #[inline]
             fn recip(self) -> Self {
-                let value = 1.0 / self.primal();
+                let value = self.primal().recip();
                 self.unary(value, -value * value)
             }
             #[inline]
@@ -318,25 +343,25 @@ macro_rules! impl_real_field {
                 (self.sinh(), self.cosh())
             }
             impl_real_field!(@smooth
-                tan |_x, y| 1.0 + y * y;
-                asin |x, _y| 1.0 / (1.0 - x * x).sqrt();
-                acos |x, _y| -1.0 / (1.0 - x * x).sqrt();
-                atan |x, _y| 1.0 / (1.0 + x * x);
-                sinh |x, _y| x.cosh();
-                cosh |x, _y| x.sinh();
-                tanh |_x, y| 1.0 - y * y;
-                asinh |x, _y| 1.0 / (x * x + 1.0).sqrt();
-                acosh |x, _y| 1.0 / (x * x - 1.0).sqrt();
-                atanh |x, _y| 1.0 / (1.0 - x * x);
-                log2 |x, _y| std::f64::consts::LOG2_E / x;
-                log10 |x, _y| std::f64::consts::LOG10_E / x;
-                ln |x, _y| 1.0 / x;
-                ln_1p |x, _y| 1.0 / (1.0 + x);
-                sqrt |_x, y| 0.5 / y;
-                cbrt |_x, y| 1.0 / (3.0 * y * y);
-                exp |_x, y| y;
-                exp2 |_x, y| y * std::f64::consts::LN_2;
-                exp_m1 |_x, y| y + 1.0
+                tan |c, _x, y| c(1.0) + y * y;
+                asin |c, x, _y| ((c(1.0) - x) * (c(1.0) + x)).sqrt().recip();
+                acos |c, x, _y| -((c(1.0) - x) * (c(1.0) + x)).sqrt().recip();
+                atan |c, x, _y| (c(1.0) + x * x).recip();
+                sinh |_c, x, _y| x.cosh();
+                cosh |_c, x, _y| x.sinh();
+                tanh |_c, x, _y| (x.cosh() * x.cosh()).recip();
+                asinh |c, x, _y| x.hypot(c(1.0)).recip();
+                acosh |c, x, _y| ((x - c(1.0)).sqrt() * (x + c(1.0)).sqrt()).recip();
+                atanh |c, x, _y| ((c(1.0) - x) * (c(1.0) + x)).recip();
+                log2 |c, x, _y| c(std::f64::consts::LOG2_E) / x;
+                log10 |c, x, _y| c(std::f64::consts::LOG10_E) / x;
+                ln |_c, x, _y| x.recip();
+                ln_1p |c, x, _y| (c(1.0) + x).recip();
+                sqrt |c, _x, y| c(0.5) / y;
+                cbrt |c, _x, y| (c(3.0) * y * y).recip();
+                exp |_c, _x, y| y;
+                exp2 |c, _x, y| y * c(std::f64::consts::LN_2);
+                exp_m1 |c, _x, y| y + c(1.0)
             );
             #[inline]
             fn log(self, base: Self) -> Self {
@@ -345,10 +370,10 @@ macro_rules! impl_real_field {
             #[inline]
             fn powi(self, n: i32) -> Self {
                 if n == 0 {
-                    return Self::lift(1.0);
+                    return Self::constant(1.0);
                 }
                 let x = self.primal();
-                self.unary(x.powi(n), f64::from(n) * x.powi(n - 1))
+                self.unary(x.powi(n), Self::inner(f64::from(n)) * x.powi(n - 1))
             }
             #[inline]
             fn powf(self, n: Self) -> Self {
@@ -356,10 +381,16 @@ macro_rules! impl_real_field {
                 let value = x.powf(e);
                 // Partials of inactive operands may be NaN (a logarithm of a negative base), so they
                 // are not computed rather than multiplied by zero.
-                let by_base =
-                    if self.is_constant() || e == 0.0 { 0.0 } else { e * x.powf(e - 1.0) };
-                let by_exponent =
-                    if n.is_constant() || value == 0.0 { 0.0 } else { value * x.ln() };
+                let by_base = if self.is_constant() || e.value() == 0.0 {
+                    Self::inner(0.0)
+                } else {
+                    e * x.powf(e - Self::inner(1.0))
+                };
+                let by_exponent = if n.is_constant() || value.value() == 0.0 {
+                    Self::inner(0.0)
+                } else {
+                    value * x.ln()
+                };
                 self.binary(n, value, [by_base, by_exponent])
             }
             #[inline]
@@ -368,26 +399,26 @@ macro_rules! impl_real_field {
             }
             #[inline]
             fn is_finite(&self) -> bool {
-                self.primal().is_finite()
+                self.value().is_finite()
             }
             #[inline]
             fn try_sqrt(self) -> Option<Self> {
-                (self.primal() >= 0.0).then(|| self.sqrt())
+                (self.value() >= 0.0).then(|| self.sqrt())
             }
         }
 
         impl<$($generics)*> simba::scalar::RealField for $t {
             #[inline]
             fn is_sign_positive(&self) -> bool {
-                self.primal().is_sign_positive()
+                self.value().is_sign_positive()
             }
             #[inline]
             fn is_sign_negative(&self) -> bool {
-                self.primal().is_sign_negative()
+                self.value().is_sign_negative()
             }
             #[inline]
             fn copysign(self, sign: Self) -> Self {
-                if self.primal().is_sign_negative() == sign.primal().is_sign_negative() {
+                if self.value().is_sign_negative() == sign.value().is_sign_negative() {
                     self
                 } else {
                     -self
@@ -395,11 +426,11 @@ macro_rules! impl_real_field {
             }
             #[inline]
             fn max(self, other: Self) -> Self {
-                if other.primal() > self.primal() || self.primal().is_nan() { other } else { self }
+                if other.value() > self.value() || self.value().is_nan() { other } else { self }
             }
             #[inline]
             fn min(self, other: Self) -> Self {
-                if other.primal() < self.primal() || self.primal().is_nan() { other } else { self }
+                if other.value() < self.value() || self.value().is_nan() { other } else { self }
             }
             #[inline]
             fn clamp(self, min: Self, max: Self) -> Self {
@@ -420,11 +451,11 @@ macro_rules! impl_real_field {
             }
             #[inline]
             fn min_value() -> Option<Self> {
-                Some(Self::lift(f64::MIN))
+                Some(Self::constant(f64::MIN))
             }
             #[inline]
             fn max_value() -> Option<Self> {
-                Some(Self::lift(f64::MAX))
+                Some(Self::constant(f64::MAX))
             }
             impl_real_field!(@constants
                 pi PI, two_pi TAU, frac_pi_2 FRAC_PI_2, frac_pi_3 FRAC_PI_3, frac_pi_4 FRAC_PI_4,
@@ -436,11 +467,24 @@ macro_rules! impl_real_field {
         impl<$($generics)*> crate::Scalar for $t {
             #[inline]
             fn constant(value: f64) -> Self {
-                Self::lift(value)
+                Self::lift(Self::inner(value))
             }
             #[inline]
             fn value(self) -> f64 {
-                self.primal()
+                self.primal().value()
+            }
+            #[inline]
+            fn times(self, factor: f64) -> Self {
+                let factor = Self::inner(factor);
+                self.unary(self.primal() * factor, factor)
+            }
+            #[inline]
+            fn plus(self, term: f64) -> Self {
+                self.unary(self.primal() + Self::inner(term), Self::inner(1.0))
+            }
+            #[inline]
+            fn is_constant_zero(self) -> bool {
+                self.is_constant() && self.primal().is_constant_zero()
             }
         }
     };
@@ -463,11 +507,11 @@ macro_rules! impl_real_field {
         impl<$($generics)*> simba::scalar::SubsetOf<$t> for $plain {
             #[inline]
             fn to_superset(&self) -> $t {
-                <$t>::lift(f64::from(*self))
+                <$t>::constant(f64::from(*self))
             }
             #[inline]
             fn from_superset_unchecked(element: &$t) -> $plain {
-                element.primal() as $plain
+                element.value() as $plain
             }
             #[inline]
             fn is_in_subset(_: &$t) -> bool {
@@ -478,22 +522,22 @@ macro_rules! impl_real_field {
     (@flat $($name:ident)*) => {
         $(#[inline]
         fn $name(self) -> Self {
-            Self::lift(self.primal().$name())
+            Self::constant(self.value().$name())
         })*
     };
-    (@smooth $($name:ident |$x:ident, $y:ident| $slope:expr);*) => {
+    (@smooth $($name:ident |$c:ident, $x:ident, $y:ident| $slope:expr);*) => {
         $(#[inline]
         fn $name(self) -> Self {
+            let $c = Self::inner;
             let $x = self.primal();
             let $y = $x.$name();
-            // A constant stays one: an infinite slope must not meet a zero derivative.
-            if self.is_constant() { Self::lift($y) } else { self.unary($y, $slope) }
+            self.unary($y, $slope)
         })*
     };
     (@constants $($name:ident $value:ident),*) => {
         $(#[inline]
         fn $name() -> Self {
-            Self::lift(std::f64::consts::$value)
+            Self::constant(std::f64::consts::$value)
         })*
     };
 }

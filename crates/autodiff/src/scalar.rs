@@ -7,7 +7,7 @@ use nalgebra::RealField;
 /// Code written over `S: Scalar` runs unchanged with `f32`, `f64`, forward-mode [`Fwd`](crate::Fwd)
 /// and reverse-mode [`Var`](crate::Var), inside every nalgebra type.
 ///
-/// Plain numbers enter through `S::constant`: write `x * S::constant(2.0)`, not `2.0 * x`.
+/// Plain numbers enter through `S::constant`: write `x * S::constant(2.0)` or `x.times(2.0)`, not `2.0 * x`.
 ///
 /// Branches: compare values (`<`, `>` and `==` look at nothing else) and choose with nalgebra's
 /// `if_true.select(condition, if_false)`. Unlike multiplying by 0 or 1, the branch not taken then
@@ -18,6 +18,21 @@ pub trait Scalar: RealField + Copy + Default {
 
     /// The plain value, without its derivatives.
     fn value(self) -> f64;
+
+    /// `self * factor`: what multiplying by a constant gives, faster in forward mode.
+    #[inline]
+    fn times(self, factor: f64) -> Self {
+        self * Self::constant(factor)
+    }
+
+    /// `self + term`: what adding a constant gives, faster in forward mode.
+    #[inline]
+    fn plus(self, term: f64) -> Self {
+        self + Self::constant(term)
+    }
+
+    /// Whether this is the constant 0, which moves in no direction.
+    fn is_constant_zero(self) -> bool;
 }
 
 macro_rules! plain_scalar {
@@ -32,6 +47,11 @@ macro_rules! plain_scalar {
             #[allow(clippy::unnecessary_cast)]
             fn value(self) -> f64 {
                 self as f64
+            }
+
+            #[inline]
+            fn is_constant_zero(self) -> bool {
+                self == 0.0
             }
         }
     };

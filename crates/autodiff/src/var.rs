@@ -1,5 +1,6 @@
 //! Reverse mode: a number that remembers where on the tape it came from.
 
+use crate::Scalar;
 use crate::chain::Chain;
 use crate::real_field::impl_real_field;
 use crate::tape::{push, refuse_foreign};
@@ -56,6 +57,8 @@ impl Var {
 }
 
 impl Chain for Var {
+    type Inner = f64;
+
     #[inline]
     fn lift(value: f64) -> Self {
         Self { value, coefficient: 0.0, node: 0, recording: 0 }
