@@ -29,14 +29,6 @@ impl<T> Arena<T> {
         Self { full: Vec::new(), current: Vec::new(), spare: Vec::new() }
     }
 
-    #[inline(always)]
-    pub(crate) fn push(&mut self, item: T) {
-        if self.current.len() == self.current.capacity() {
-            self.next_chunk(1);
-        }
-        self.current.push(item);
-    }
-
     /// A new chunk for at least `len` items.
     #[cold]
     fn next_chunk(&mut self, len: usize) {
@@ -119,11 +111,11 @@ mod tests {
     #[test]
     fn chunks_come_back_in_order_and_are_reused() {
         let mut arena = Arena::new();
-        arena.push(0);
+        arena.room(1).push(0);
         let bottom = arena.mark();
         for round in 0..2 {
             for i in 0..3 * CHUNK {
-                arena.push(i);
+                arena.room(1).push(i);
             }
             arena.room(CHUNK + 1).extend(std::iter::repeat_n(7, CHUNK + 1));
             assert_eq!(arena.len_above(bottom), 4 * CHUNK + 1);

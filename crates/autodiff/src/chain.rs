@@ -1,6 +1,7 @@
 //! The two ways a derivative passes through an operation; everything else is arithmetic on values.
 
-use crate::Scalar;
+use crate::scalar::add_up;
+use crate::{LocalFunction, Scalar};
 
 /// A scalar that records how its value depends on its operands.
 ///
@@ -26,4 +27,28 @@ pub(crate) trait Chain: Copy {
     fn unary(self, value: Self::Inner, slope: Self::Inner) -> Self;
     /// The result `value` of an operation on `self` and `other` with partial derivatives `slopes`.
     fn binary(self, other: Self, value: Self::Inner, slopes: [Self::Inner; 2]) -> Self;
+
+    /// `function` of `x`, as one operation where that pays.
+    #[inline]
+    fn local<const N: usize, const M: usize>(
+        function: &impl LocalFunction<N, M>,
+        x: [Self; N],
+    ) -> [Self; M]
+    where
+        Self: Scalar,
+    {
+        function.evaluate(x)
+    }
+
+    /// The sum of local terms of `x`.
+    #[inline]
+    fn sum_local<const K: usize, F: LocalFunction<K, 1>>(
+        x: &[Self],
+        terms: impl IntoIterator<Item = (F, [usize; K])>,
+    ) -> Self
+    where
+        Self: Scalar,
+    {
+        add_up(x, terms)
+    }
 }

@@ -24,8 +24,10 @@ mod chain;
 pub mod check;
 mod fwd;
 pub mod lie;
+mod local;
 mod real_field;
 mod recording;
+pub mod rigid;
 mod scalar;
 mod sweep;
 mod tape;
@@ -33,6 +35,7 @@ mod var;
 mod vjp;
 
 pub use fwd::Fwd;
+pub use local::{LocalFunction, preaccumulate};
 pub use recording::{Adjoints, Recording, gradient, gradient_into, jacobian};
 pub use scalar::Scalar;
 pub use tape::TapeStatistics;

@@ -483,6 +483,20 @@ macro_rules! impl_real_field {
                 self.unary(self.primal() + Self::inner(term), Self::inner(1.0))
             }
             #[inline]
+            fn local<const IN: usize, const OUT: usize>(
+                function: &impl crate::LocalFunction<IN, OUT>,
+                x: [Self; IN],
+            ) -> [Self; OUT] {
+                <Self as Chain>::local(function, x)
+            }
+            #[inline]
+            fn sum_local<const K: usize, F: crate::LocalFunction<K, 1>>(
+                x: &[Self],
+                terms: impl IntoIterator<Item = (F, [usize; K])>,
+            ) -> Self {
+                <Self as Chain>::sum_local(x, terms)
+            }
+            #[inline]
             fn is_constant_zero(self) -> bool {
                 self.is_constant() && self.primal().is_constant_zero()
             }

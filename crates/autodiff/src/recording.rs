@@ -7,7 +7,7 @@ use nalgebra::DMatrix;
 
 use crate::Var;
 use crate::sweep::sweep;
-use crate::tape::{TapeStatistics, with_tape};
+use crate::tape::{Outputs, TapeStatistics, push_variables, with_tape};
 
 /// Tags of recordings, unique over all threads (until 2³² recordings have been made); 0 means constant.
 static NEXT_RECORDING: AtomicU32 = AtomicU32::new(1);
@@ -72,11 +72,9 @@ impl Recording {
         values.iter().enumerate().map(|(i, &value)| group.var(i, value)).collect()
     }
 
-    fn variable_group(&self, count: usize) -> crate::tape::Outputs {
-        with_tape(|tape| {
-            tape.start(self.recording);
-            tape.push_variables(count)
-        })
+    fn variable_group(&self, count: usize) -> Outputs {
+        with_tape(|tape| tape.start(self.recording));
+        push_variables(count)
     }
 
     /// Derivatives of `output` with respect to everything recorded so far.

@@ -2,6 +2,8 @@
 
 use nalgebra::RealField;
 
+use crate::LocalFunction;
+
 /// A real number that may carry derivatives.
 ///
 /// Code written over `S: Scalar` runs unchanged with `f32`, `f64`, forward-mode [`Fwd`](crate::Fwd)
@@ -31,8 +33,43 @@ pub trait Scalar: RealField + Copy + Default {
         self + Self::constant(term)
     }
 
+    /// `function` of `x`: plain generic code for most scalars; for [`Var`](crate::Var) one block node with
+    /// the function's own Jacobian, which is smaller and faster than recording each operation inside.
+    #[inline]
+    fn local<const N: usize, const M: usize>(
+        function: &impl LocalFunction<N, M>,
+        x: [Self; N],
+    ) -> [Self; M] {
+        function.evaluate(x)
+    }
+
+    /// The sum of many terms, each a function of `K` of the numbers `x`; every term comes with the places of
+    /// its numbers in `x`.
+    ///
+    /// For [`Var`](crate::Var) the whole sum is one node, whose gradient is added up outside the tape.
+    ///
+    /// # Panics
+    /// If a place is not in `x`.
+    #[inline]
+    fn sum_local<const K: usize, F: LocalFunction<K, 1>>(
+        x: &[Self],
+        terms: impl IntoIterator<Item = (F, [usize; K])>,
+    ) -> Self {
+        add_up(x, terms)
+    }
+
     /// Whether this is the constant 0, which moves in no direction.
     fn is_constant_zero(self) -> bool;
+}
+
+/// [`Scalar::sum_local`] as plain generic code.
+#[inline]
+pub(crate) fn add_up<S: Scalar, const K: usize, F: LocalFunction<K, 1>>(
+    x: &[S],
+    terms: impl IntoIterator<Item = (F, [usize; K])>,
+) -> S {
+    let values = terms.into_iter().map(|(term, places)| term.evaluate(places.map(|p| x[p])));
+    values.fold(S::zero(), |sum, [value]| sum + value)
 }
 
 macro_rules! plain_scalar {

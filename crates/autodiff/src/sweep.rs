@@ -6,6 +6,9 @@ use crate::tape::{Entry, Group, Start, Tape, with_tape};
 /// Adjoints of one node, one a seed.
 type Lanes<const K: usize> = [f64; K];
 
+/// Inputs of a dense block that the sweep takes at a time.
+const COLUMNS: usize = 8;
+
 /// A sweep under way. It stops at each custom operation, so that the operation may use the tape.
 struct Sweep<'a, const K: usize> {
     adjoints: &'a mut [Lanes<K>],
@@ -133,15 +136,32 @@ impl<const K: usize> Sweep<'_, K> {
             return;
         }
         let (before, outputs) = self.adjoints.split_at_mut(first);
-        for (adjoint, row) in outputs.iter().zip(slopes.chunks_exact(group.inputs)) {
-            if *adjoint == [0.0; K] {
-                continue;
+        let active = || outputs.iter().zip(slopes.chunks_exact(group.inputs));
+        let active = || active().filter(|(adjoint, _)| **adjoint != [0.0; K]);
+        // Several inputs at a time, summed over the outputs in registers.
+        for (chunk, parents) in parents.chunks(COLUMNS).enumerate() {
+            let start = chunk * COLUMNS;
+            let mut flows = [[0.0; K]; COLUMNS];
+            for (adjoint, row) in active() {
+                let row = &row[start..start + parents.len()];
+                // The same loop twice: with a length known beforehand it needs no loop at all.
+                match <&[f64; COLUMNS]>::try_from(row) {
+                    Ok(row) => add_row(&mut flows, row, *adjoint),
+                    Err(_) => add_row(&mut flows, row, *adjoint),
+                }
             }
-            for (parent, slope) in parents.iter().zip(row) {
+            for (parent, flow) in parents.iter().zip(flows) {
                 let parent = &mut before[(parent - base) as usize];
-                *parent = add(*parent, through(*slope, *adjoint));
+                *parent = add(*parent, flow);
             }
         }
+    }
+}
+
+#[inline(always)]
+fn add_row<const K: usize>(flows: &mut [Lanes<K>], row: &[f64], adjoint: Lanes<K>) {
+    for (flow, slope) in flows.iter_mut().zip(row) {
+        *flow = add(*flow, through(*slope, adjoint));
     }
 }
 

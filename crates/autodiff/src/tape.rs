@@ -91,7 +91,7 @@ const WAITING: usize = 512;
 struct End {
     /// Tag of the innermost recording; 0 when none is open.
     recording: Cell<u32>,
-    /// Nodes of all open recordings that do not wait here.
+    /// Nodes of all open recordings, but one less for each entry that waits here.
     nodes: Cell<u32>,
     len: Cell<u32>,
     waiting: [Cell<Entry>; WAITING],
@@ -131,18 +131,78 @@ pub(crate) fn push(value: f64, [a, b]: [Var; 2], slopes: [f64; 2]) -> Var {
         if (a.recording ^ recording) | (b.recording ^ recording) != 0 {
             refuse_foreign();
         }
-        let entry = Entry {
+        let node = end.push(Entry {
             slopes: [slopes[0] * a.coefficient, slopes[1] * b.coefficient],
             parents: [a.node, b.node],
-        };
-        let mut len = end.len.get();
-        if len as usize >= WAITING {
-            make_room();
-            len = 0;
+        });
+        Var { value, coefficient: 1.0, node, recording }
+    })
+}
+
+/// Records a group without inputs: independent variables.
+pub(crate) fn push_variables(count: usize) -> Outputs {
+    END.with(|end| end.push_group(&Group { outputs: count, inputs: 0, custom: false }))
+}
+
+/// Records a group of nodes with a dense Jacobian (row-major, outputs × inputs).
+#[inline(always)]
+pub(crate) fn push_block(inputs: &[Var], outputs: usize, jacobian: &[f64]) -> Outputs {
+    END.with(|end| {
+        let recording = end.recording.get();
+        if recording == 0 || inputs.iter().any(|var| var.recording != recording) {
+            return push_sparse_block(inputs, outputs, jacobian);
         }
-        end.waiting[len as usize].set(entry);
-        end.len.set(len + 1);
-        Var { value, coefficient: 1.0, node: end.nodes.get() + len, recording }
+        let group = end.push_group(&Group { outputs, inputs: inputs.len(), custom: false });
+        TAPE.with(|tape| {
+            let tape = &mut *tape.borrow_mut();
+            let parents = tape.parents.room(inputs.len());
+            parents.extend(inputs.iter().map(|var| var.node));
+            let slopes = tape.slopes.room(jacobian.len());
+            // Most inputs are variables or nodes.
+            if inputs.iter().all(|var| var.coefficient == 1.0) {
+                slopes.extend_from_slice(jacobian);
+                return;
+            }
+            for row in jacobian.chunks_exact(inputs.len()) {
+                slopes.extend(row.iter().zip(inputs).map(|(slope, var)| slope * var.coefficient));
+            }
+        });
+        group
+    })
+}
+
+/// [`push_block`] where some inputs are constants (or of another recording).
+#[cold]
+fn push_sparse_block(inputs: &[Var], outputs: usize, jacobian: &[f64]) -> Outputs {
+    let active: Vec<Var> = inputs.iter().copied().filter(|var| var.recording != 0).collect();
+    if active.is_empty() {
+        return Outputs { first: 0, recording: 0 };
+    }
+    END.with(|end| end.check(&active));
+    let rows = jacobian.chunks_exact(inputs.len());
+    let slopes = rows.flat_map(|row| row.iter().zip(inputs)).filter(|(_, var)| var.recording != 0);
+    let slopes: Vec<f64> = slopes.map(|(slope, _)| *slope).collect();
+    push_block(&active, outputs, &slopes)
+}
+
+/// Records a group of nodes that `operation` differentiates.
+pub(crate) fn push_custom(
+    inputs: &[Var],
+    outputs: usize,
+    operation: Box<dyn CustomVjp>,
+) -> Outputs {
+    END.with(|end| {
+        end.check(inputs);
+        let group = end.push_group(&Group { outputs, inputs: inputs.len(), custom: true });
+        TAPE.with(|tape| {
+            let tape = &mut *tape.borrow_mut();
+            tape.parents.room(inputs.len()).extend(inputs.iter().map(|var| var.node));
+            // A constant's coefficient may be anything; 0 tells the sweep to leave it out.
+            let coefficient = |var: &Var| if var.recording == 0 { 0.0 } else { var.coefficient };
+            tape.slopes.room(inputs.len()).extend(inputs.iter().map(coefficient));
+            tape.operations.push(Some(operation));
+        });
+        group
     })
 }
 
@@ -153,12 +213,44 @@ fn make_room() {
 }
 
 impl End {
+    /// Adds an entry of one node, whose number is returned.
+    #[inline(always)]
+    fn push(&self, entry: Entry) -> u32 {
+        let mut len = self.len.get();
+        if len as usize >= WAITING {
+            make_room();
+            len = 0;
+        }
+        self.waiting[len as usize].set(entry);
+        self.len.set(len + 1);
+        self.nodes.get().wrapping_add(len)
+    }
+
+    #[inline]
+    fn push_group(&self, group: &Group) -> Outputs {
+        let next = u64::from(self.nodes.get().wrapping_add(self.len.get())) + group.outputs as u64;
+        if next > u64::from(GROUP - WAITING as u32) {
+            refuse_more();
+        }
+        let first = self.push(Entry::group(group));
+        // The entry itself counts as one node.
+        self.nodes.set(self.nodes.get().wrapping_add(group.outputs as u32).wrapping_sub(1));
+        Outputs { first, recording: self.recording.get() }
+    }
+
+    fn check(&self, inputs: &[Var]) {
+        let recording = self.recording.get();
+        if inputs.iter().any(|var| var.recording != 0 && var.recording != recording) {
+            refuse_foreign();
+        }
+    }
+
     /// Moves the waiting entries to the tape.
     fn flush(&self, tape: &mut Tape) {
         let len = self.len.replace(0);
         let waiting = &self.waiting[..len as usize];
         tape.entries.room(waiting.len()).extend(waiting.iter().map(Cell::get));
-        tape.nodes = self.nodes.get() + len;
+        tape.nodes = self.nodes.get().wrapping_add(len);
         // The next entries to wait must not be refused, and the last number marks groups.
         if tape.nodes > GROUP - WAITING as u32 {
             refuse_more();
@@ -281,80 +373,11 @@ impl Tape {
         }
     }
 
-    #[inline(always)]
+    #[inline]
     pub(crate) fn check(&self, var: Var) {
         if var.recording != self.recording {
             refuse_foreign();
         }
-    }
-
-    #[inline(always)]
-    fn take_nodes(&mut self, count: usize) -> u32 {
-        let first = self.nodes;
-        // The last number marks groups.
-        match u32::try_from(count).ok().and_then(|count| first.checked_add(count)) {
-            Some(next) if next < GROUP => self.nodes = next,
-            _ => refuse_more(),
-        }
-        first
-    }
-
-    /// Records a group without inputs: independent variables.
-    pub(crate) fn push_variables(&mut self, count: usize) -> Outputs {
-        self.push_group(Group { outputs: count, inputs: 0, custom: false })
-    }
-
-    /// Records a group of nodes with a dense Jacobian, given by its rows of one slope an input.
-    #[inline]
-    pub(crate) fn push_block<'a>(
-        &mut self,
-        inputs: &[Var],
-        outputs: usize,
-        rows: impl Iterator<Item = &'a [f64]>,
-    ) -> Outputs {
-        let active = inputs.iter().filter(|var| var.recording != 0);
-        active.clone().for_each(|var| self.check(*var));
-        let count = active.clone().count();
-        if count == 0 {
-            return Outputs { first: 0, recording: 0 };
-        }
-        let group = self.push_group(Group { outputs, inputs: count, custom: false });
-        self.parents.room(count).extend(active.map(|var| var.node));
-        let slopes = self.slopes.room(count * outputs);
-        // Most inputs are variables or nodes: then the rows are copied as they are.
-        if count == inputs.len() && inputs.iter().all(|var| var.coefficient == 1.0) {
-            rows.for_each(|row| slopes.extend_from_slice(row));
-        } else {
-            for row in rows {
-                let pairs = row.iter().zip(inputs).filter(|(_, var)| var.recording != 0);
-                slopes.extend(pairs.map(|(slope, var)| slope * var.coefficient));
-            }
-        }
-        group
-    }
-
-    /// Records a group of nodes that `operation` differentiates.
-    pub(crate) fn push_custom(
-        &mut self,
-        inputs: &[Var],
-        outputs: usize,
-        operation: Box<dyn CustomVjp>,
-    ) -> Outputs {
-        let active = |var: &&Var| var.recording != 0;
-        inputs.iter().filter(active).for_each(|var| self.check(*var));
-        let group = self.push_group(Group { outputs, inputs: inputs.len(), custom: true });
-        self.parents.room(inputs.len()).extend(inputs.iter().map(|var| var.node));
-        // A constant's coefficient may be anything; 0 tells the sweep to leave it out.
-        let coefficient = |var: &Var| if var.recording == 0 { 0.0 } else { var.coefficient };
-        self.slopes.room(inputs.len()).extend(inputs.iter().map(coefficient));
-        self.operations.push(Some(operation));
-        group
-    }
-
-    fn push_group(&mut self, group: Group) -> Outputs {
-        let first = self.take_nodes(group.outputs);
-        self.entries.push(Entry::group(&group));
-        Outputs { first, recording: self.recording }
     }
 }
 

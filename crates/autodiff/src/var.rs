@@ -1,9 +1,10 @@
 //! Reverse mode: a number that remembers where on the tape it came from.
 
-use crate::Scalar;
 use crate::chain::Chain;
+use crate::local::sum_local;
 use crate::real_field::impl_real_field;
-use crate::tape::{push, refuse_foreign};
+use crate::tape::{push, push_block, refuse_foreign};
+use crate::{LocalFunction, Scalar};
 
 /// A number on the thread's tape.
 ///
@@ -92,6 +93,24 @@ impl Chain for Var {
                 push(value, [self, other], [da, db])
             }
         }
+    }
+
+    #[inline]
+    fn local<const N: usize, const M: usize>(
+        function: &impl LocalFunction<N, M>,
+        x: [Self; N],
+    ) -> [Self; M] {
+        let (values, jacobian) = function.linearise(x.map(Self::value));
+        let group = push_block(&x, M, jacobian.as_flattened());
+        std::array::from_fn(|i| group.var(i, values[i]))
+    }
+
+    #[inline]
+    fn sum_local<const K: usize, F: LocalFunction<K, 1>>(
+        x: &[Self],
+        terms: impl IntoIterator<Item = (F, [usize; K])>,
+    ) -> Self {
+        sum_local(x, terms)
     }
 }
 

@@ -1,7 +1,7 @@
 //! Operations that bring their own derivative.
 
 use crate::Var;
-use crate::tape::with_tape;
+use crate::tape::{push_block, push_custom};
 
 /// The reverse derivative of an operation with many inputs and outputs: a rendered image, a point set,
 /// a linear solve.
@@ -25,7 +25,7 @@ pub fn custom(inputs: &[Var], outputs: &[f64], operation: impl CustomVjp) -> Vec
     if outputs.is_empty() {
         return Vec::new();
     }
-    let group = with_tape(|tape| tape.push_custom(inputs, outputs.len(), Box::new(operation)));
+    let group = push_custom(inputs, outputs.len(), Box::new(operation));
     outputs.iter().enumerate().map(|(i, &value)| group.var(i, value)).collect()
 }
 
@@ -38,8 +38,7 @@ pub fn custom(inputs: &[Var], outputs: &[f64], operation: impl CustomVjp) -> Vec
 /// recording.
 pub fn block(inputs: &[Var], outputs: &[f64], jacobian: &[f64]) -> Vec<Var> {
     assert_eq!(jacobian.len(), outputs.len() * inputs.len(), "size of the block's Jacobian");
-    let rows = jacobian.chunks_exact(inputs.len().max(1));
-    let group = with_tape(|tape| tape.push_block(inputs, outputs.len(), rows));
+    let group = push_block(inputs, outputs.len(), jacobian);
     outputs.iter().enumerate().map(|(i, &value)| group.var(i, value)).collect()
 }
 

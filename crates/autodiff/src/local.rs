@@ -1,0 +1,169 @@
+//! Functions of few numbers, differentiated as a whole.
+
+use crate::tape::{push_block, with_tape};
+use crate::{Fwd, Scalar, Var};
+
+/// A function of `N` numbers with `M` results: a rotation, a contact wrench, a term of a sum.
+///
+/// [`Scalar::local`] applies it. For reverse mode it then costs one block node with a dense `M`×`N`
+/// Jacobian, which [`linearise`](Self::linearise) finds by forward mode unless it is overridden with
+/// something faster:
+///
+/// ```
+/// use prehend_autodiff::{LocalFunction, Scalar, gradient};
+///
+/// /// Force of a spring that hardens as it is stretched.
+/// struct Spring {
+///     stiffness: f64,
+/// }
+///
+/// impl LocalFunction<1, 1> for Spring {
+///     fn evaluate<S: Scalar>(&self, [x]: [S; 1]) -> [S; 1] {
+///         [(x + x.powi(3)).times(-self.stiffness)]
+///     }
+///
+///     fn linearise(&self, [x]: [f64; 1]) -> ([f64; 1], [[f64; 1]; 1]) {
+///         (self.evaluate([x]), [[-self.stiffness * (1.0 + 3.0 * x * x)]])
+///     }
+/// }
+///
+/// let spring = Spring { stiffness: 2.0 };
+/// let (force, slope) = gradient(|x| Scalar::local(&spring, [x[0]])[0], &[2.0]);
+/// assert_eq!((force, slope[0]), (-20.0, -26.0));
+/// ```
+pub trait LocalFunction<const N: usize, const M: usize> {
+    /// The results.
+    fn evaluate<S: Scalar>(&self, x: [S; N]) -> [S; M];
+
+    /// The results and their Jacobian, one row a result.
+    #[inline]
+    fn linearise(&self, x: [f64; N]) -> ([f64; M], [[f64; N]; M]) {
+        let results = self.evaluate(Fwd::<N>::variables(x));
+        (results.map(|y| y.value), results.map(|y| y.derivative))
+    }
+}
+
+impl<const N: usize, const M: usize, F: LocalFunction<N, M>> LocalFunction<N, M> for &F {
+    #[inline]
+    fn evaluate<S: Scalar>(&self, x: [S; N]) -> [S; M] {
+        (**self).evaluate(x)
+    }
+
+    #[inline]
+    fn linearise(&self, x: [f64; N]) -> ([f64; M], [[f64; N]; M]) {
+        (**self).linearise(x)
+    }
+}
+
+/// Records a closure as one block node, differentiated by forward mode (preaccumulation).
+///
+/// For a closure that is called in one place; what is called in many deserves a [`LocalFunction`].
+///
+/// ```
+/// use prehend_autodiff::{gradient, preaccumulate};
+/// let (_, g) = gradient(|x| preaccumulate([x[0], x[1]], |[a, b]| [a * b * b])[0], &[3.0, 4.0]);
+/// assert_eq!(g, [16.0, 24.0]);
+/// ```
+#[inline]
+pub fn preaccumulate<const N: usize, const M: usize>(
+    x: [Var; N],
+    f: impl FnOnce([Fwd<N>; N]) -> [Fwd<N>; M],
+) -> [Var; M] {
+    let results = f(Fwd::variables(x.map(Var::value)));
+    let jacobian = results.each_ref().map(|y| y.derivative);
+    let group = push_block(&x, M, jacobian.as_flattened());
+    std::array::from_fn(|i| group.var(i, results[i].value))
+}
+
+/// The sum of many terms, whose gradient is summed up outside the tape.
+#[inline]
+pub(crate) fn sum_local<const K: usize, F: LocalFunction<K, 1>>(
+    x: &[Var],
+    terms: impl IntoIterator<Item = (F, [usize; K])>,
+) -> Var {
+    let mut sum = 0.0;
+    let mut gradient = with_tape(|tape| tape.zeros(x.len()));
+    for (term, places) in terms {
+        let ([value], [slopes]) = term.linearise(places.map(|place| x[place].value));
+        sum += value;
+        for (place, slope) in places.into_iter().zip(slopes) {
+            gradient[place] += slope;
+        }
+    }
+    let node = push_block(x, 1, &gradient).var(0, sum);
+    with_tape(|tape| tape.keep(gradient));
+    node
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Recording, gradient};
+
+    struct Pair;
+
+    impl LocalFunction<2, 2> for Pair {
+        fn evaluate<S: Scalar>(&self, [a, b]: [S; 2]) -> [S; 2] {
+            [a.sin() * b, a / b]
+        }
+    }
+
+    struct Difference(f64);
+
+    impl LocalFunction<2, 1> for Difference {
+        fn evaluate<S: Scalar>(&self, [a, b]: [S; 2]) -> [S; 1] {
+            [(a - b).powi(2).times(self.0)]
+        }
+    }
+
+    fn through_pair<S: Scalar>(x: &[S], local: bool) -> S {
+        // A fused input, one that is used twice, and a constant.
+        let inputs = [[x[0].times(3.0), x[1]], [x[0] * x[1], x[0]], [x[1], S::constant(2.0)]];
+        let apply = |x| if local { S::local(&Pair, x) } else { Pair.evaluate(x) };
+        inputs.map(apply).into_iter().flatten().fold(S::zero(), |sum, y| sum + y * y)
+    }
+
+    #[test]
+    fn a_block_has_the_derivative_of_its_code() {
+        let x = [0.7, -1.3];
+        let (value, plain) = gradient(|x| through_pair(x, false), &x);
+        let (by_block, block) = gradient(|x| through_pair(x, true), &x);
+        assert_eq!(value, by_block);
+        plain.iter().zip(&block).for_each(|(a, b)| assert!((a - b).abs() < 1e-14, "{a} {b}"));
+        assert_eq!(through_pair(&x, true), value);
+        let forward = through_pair(&Fwd::<2>::variables(x), true);
+        assert!((forward.derivative[1] - plain[1]).abs() < 1e-14);
+    }
+
+    #[test]
+    fn constants_alone_record_nothing() {
+        let recording = Recording::start();
+        let [x] = recording.variables([1.0]);
+        let before = recording.statistics();
+        let [y, _] = Var::local(&Pair, [2.0, 3.0].map(Var::from));
+        assert_eq!(recording.statistics(), before);
+        assert_eq!((recording.gradient(y).wrt(x), recording.gradient(y).wrt(y)), (0.0, 0.0));
+    }
+
+    #[test]
+    fn a_sum_of_terms_is_one_node() {
+        let x: Vec<f64> = (0..20).map(|i| f64::from(i * i % 7)).collect();
+        let terms = || (0..19).map(|i| (Difference(f64::from(i as u32)), [i, (i * 5 + 1) % 20]));
+        let (plain_value, plain) = gradient(|x| crate::scalar::add_up(x, terms()), &x);
+        let (value, summed) = gradient(|x| Var::sum_local(x, terms()), &x);
+        assert_eq!((plain_value, &plain), (value, &summed));
+        assert_eq!(f64::sum_local(&x, terms()), value);
+        let recording = Recording::start();
+        let inputs = recording.variables_of(&x);
+        let _ = Var::sum_local(&inputs, terms());
+        assert_eq!(recording.statistics().nodes, x.len() + 1);
+    }
+
+    #[test]
+    #[should_panic(expected = "another recording")]
+    fn a_block_refuses_foreign_numbers() {
+        let stale = Recording::start().variable(1.0);
+        let recording = Recording::start();
+        let _ = Var::local(&Pair, [recording.variable(1.0), stale]);
+    }
+}
