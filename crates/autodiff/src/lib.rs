@@ -17,12 +17,14 @@
 //! ```
 //!
 //! [`custom`] and [`block`] record operations that bring their own derivative, [`lie`] holds rotations
-//! and rigid motions, [`check`] the finite differences that every derivative here is held against.
+//! and rigid motions, [`optimise`] a few small optimisers, [`check`] the finite differences that every
+//! derivative here is held against.
 
 mod chain;
 pub mod check;
 mod fwd;
 pub mod lie;
+pub mod optimise;
 mod real_field;
 mod scalar;
 mod tape;
