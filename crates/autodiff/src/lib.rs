@@ -17,7 +17,8 @@
 //! ```
 //!
 //! [`custom`] and [`block`] record operations that bring their own derivative, [`lie`] holds rotations
-//! and rigid motions, [`check`] the finite differences that every derivative here is held against.
+//! and rigid motions, [`optimise`] a few small optimisers, [`check`] the finite differences that every
+//! derivative here is held against.
 
 mod arena;
 mod chain;
@@ -25,6 +26,7 @@ pub mod check;
 mod fwd;
 pub mod lie;
 mod local;
+pub mod optimise;
 mod real_field;
 mod recording;
 pub mod rigid;

@@ -1,0 +1,227 @@
+//! The loop that all methods share: try a step, judge it, tell the method, look whether to stop.
+
+use std::ops::ControlFlow;
+
+use super::{Criteria, Iteration, OptimiseError, Outcome, Stop};
+
+/// Least ratio of actual to predicted decrease at which a step is taken (Armijo's condition).
+const SUFFICIENT_GAIN: f64 = 1e-4;
+
+/// What an objective says of one point.
+pub(super) trait Evaluation {
+    fn value(&self) -> f64;
+    fn gradient(&self) -> &[f64];
+
+    fn is_finite(&self) -> bool {
+        self.value().is_finite() && self.gradient().iter().all(|g| g.is_finite())
+    }
+
+    fn check_shape(&self, expected: usize) -> Result<(), OptimiseError> {
+        let found = self.gradient().len();
+        if found == expected {
+            Ok(())
+        } else {
+            Err(OptimiseError::GradientLength { expected, found })
+        }
+    }
+}
+
+impl Evaluation for (f64, Vec<f64>) {
+    fn value(&self) -> f64 {
+        self.0
+    }
+
+    fn gradient(&self) -> &[f64] {
+        &self.1
+    }
+}
+
+/// A step to try.
+pub(super) struct Trial {
+    pub(super) step: Vec<f64>,
+    /// The decrease of the value that the method expects and wants to be judged by; without one the
+    /// step is taken wherever the objective is finite.
+    pub(super) predicted: Option<f64>,
+}
+
+/// How to choose steps.
+pub(super) trait Method {
+    type Evaluation: Evaluation;
+
+    /// The next step to try; `None` if there is none.
+    fn propose(&mut self, here: &Self::Evaluation) -> Option<Trial>;
+
+    /// The step was taken, with this ratio of actual to predicted decrease (1 without a prediction).
+    fn taken(&mut self, gain: f64);
+
+    /// The step was not taken: the next one must be shorter.
+    fn refused(&mut self);
+}
+
+/// Runs `method` from `start` until one of the criteria is met.
+pub(super) fn iterate<M: Method>(
+    mut method: M,
+    criteria: &Criteria,
+    start: &[f64],
+    mut objective: impl FnMut(&[f64]) -> M::Evaluation,
+    mut observe: impl FnMut(&Iteration) -> ControlFlow<()>,
+) -> Result<Outcome, OptimiseError> {
+    criteria.check()?;
+    if start.is_empty() {
+        return Err(OptimiseError::NoParameters);
+    }
+    if let Some(index) = start.iter().position(|x| !x.is_finite()) {
+        return Err(OptimiseError::StartNotFinite { index });
+    }
+    let mut evaluate = |x: &[f64]| {
+        let evaluation = objective(x);
+        evaluation.check_shape(start.len()).map(|()| evaluation)
+    };
+
+    let mut x = start.to_vec();
+    let mut here = evaluate(&x)?;
+    if !here.is_finite() {
+        return Err(OptimiseError::ObjectiveNotFinite);
+    }
+    let mut best =
+        Outcome { parameters: x.clone(), value: here.value(), iterations: 0, stop: Stop::Gradient };
+    // Reported only if the gradient has not vanished as well, which says more.
+    let mut settled = None;
+    best.stop = loop {
+        let gradient = largest(here.gradient());
+        if gradient <= criteria.gradient {
+            break Stop::Gradient;
+        }
+        if let Some(stop) = settled {
+            break stop;
+        }
+        if best.iterations == criteria.iterations {
+            break Stop::Iterations;
+        }
+        let Some(Trial { step, predicted }) = method.propose(&here) else {
+            break Stop::Step;
+        };
+        best.iterations += 1;
+        let moved: Vec<f64> = x.iter().zip(&step).map(|(x, h)| x + h).collect();
+        let there = evaluate(&moved)?;
+
+        let length = norm(&step);
+        let change = here.value() - there.value();
+        let small = criteria.decrease * here.value().abs();
+        if length < criteria.step * (norm(&x) + criteria.step) {
+            settled = Some(Stop::Step);
+        } else if change.abs() < small && predicted.is_none_or(|p| p < small) {
+            settled = Some(Stop::Decrease);
+        }
+
+        let gain = predicted.map_or(1.0, |p| change / p);
+        let taken = there.is_finite() && gain >= SUFFICIENT_GAIN;
+        if taken {
+            method.taken(gain);
+            x = moved;
+            here = there;
+            if here.value() < best.value {
+                best.parameters.copy_from_slice(&x);
+                best.value = here.value();
+            }
+        } else {
+            method.refused();
+        }
+        let iteration = Iteration {
+            number: best.iterations,
+            parameters: &x,
+            value: here.value(),
+            gradient: largest(here.gradient()),
+            step: length,
+            taken,
+        };
+        if observe(&iteration).is_break() {
+            break Stop::Observer;
+        }
+    };
+    Ok(best)
+}
+
+/// The observer of those who want none.
+pub(super) fn unobserved(_: &Iteration) -> ControlFlow<()> {
+    ControlFlow::Continue(())
+}
+
+fn largest(v: &[f64]) -> f64 {
+    v.iter().fold(0.0, |m: f64, x| m.max(x.abs()))
+}
+
+fn norm(v: &[f64]) -> f64 {
+    v.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::GradientDescent;
+    use super::*;
+
+    fn bowl(x: &[f64]) -> (f64, Vec<f64>) {
+        (x.iter().map(|x| x * x).sum(), x.iter().map(|x| 2.0 * x).collect())
+    }
+
+    #[test]
+    fn bad_input_is_refused() {
+        let refused = |start: &[f64], f: fn(&[f64]) -> (f64, Vec<f64>)| {
+            GradientDescent::default().minimise(start, f).unwrap_err()
+        };
+        assert_eq!(refused(&[], bowl), OptimiseError::NoParameters);
+        assert_eq!(refused(&[0.0, f64::NAN], bowl), OptimiseError::StartNotFinite { index: 1 });
+        for f in [|_: &[f64]| (f64::NAN, vec![1.0]), |_: &[f64]| (1.0, vec![f64::INFINITY])] {
+            assert_eq!(refused(&[1.0], f), OptimiseError::ObjectiveNotFinite);
+        }
+        let expected = OptimiseError::GradientLength { expected: 2, found: 1 };
+        assert_eq!(refused(&[1.0, 1.0], |x| (x[0], vec![1.0])), expected);
+        // Also later on the way.
+        let expected = OptimiseError::GradientLength { expected: 1, found: 0 };
+        let shrinking = |x: &[f64]| if x[0] == 1.0 { bowl(x) } else { (0.0, vec![]) };
+        assert_eq!(refused(&[1.0], shrinking), expected);
+    }
+
+    #[test]
+    fn tolerances_must_not_be_negative() {
+        for bad in [-1.0, f64::NAN] {
+            let criteria = Criteria { step: bad, ..Criteria::default() };
+            let refused = GradientDescent { criteria, ..Default::default() }.minimise(&[1.0], bowl);
+            assert!(matches!(refused, Err(OptimiseError::Setting { name: "step", .. })));
+        }
+    }
+
+    #[test]
+    fn each_criterion_stops_for_its_own_reason() {
+        let never = Criteria { iterations: 1000, gradient: 0.0, step: 0.0, decrease: 0.0 };
+        let stop = |criteria| {
+            let method = GradientDescent { rate: 0.01, criteria };
+            // An offset, so that the relative decrease becomes small before the steps do.
+            method.minimise(&[3.0, 4.0], |x| (bowl(x).0 + 1.0, bowl(x).1)).unwrap()
+        };
+        assert_eq!(stop(Criteria { gradient: 1e-3, ..never }).stop, Stop::Gradient);
+        assert_eq!(stop(Criteria { step: 1e-3, ..never }).stop, Stop::Step);
+        assert_eq!(stop(Criteria { decrease: 1e-3, ..never }).stop, Stop::Decrease);
+        let ended = stop(Criteria { iterations: 3, ..never });
+        assert_eq!((ended.stop, ended.iterations), (Stop::Iterations, 3));
+        let at_once = GradientDescent::default().minimise(&[0.0], bowl).unwrap();
+        assert_eq!((at_once.stop, at_once.iterations), (Stop::Gradient, 0));
+    }
+
+    #[test]
+    fn an_observer_ends_it_early() {
+        let mut seen = Vec::new();
+        let found = GradientDescent::default()
+            .minimise_observed(&[3.0, 4.0], bowl, |iteration| {
+                seen.push(iteration.number);
+                if iteration.number == 2 {
+                    ControlFlow::Break(())
+                } else {
+                    ControlFlow::Continue(())
+                }
+            })
+            .unwrap();
+        assert_eq!((found.stop, found.iterations, seen), (Stop::Observer, 2, vec![1, 2]));
+        assert_eq!(bowl(&found.parameters).0, found.value);
+    }
+}

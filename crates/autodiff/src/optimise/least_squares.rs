@@ -1,0 +1,395 @@
+//! Levenberg–Marquardt, and Gauss–Newton as its undamped case.
+
+use std::ops::ControlFlow;
+
+use nalgebra::{Cholesky, DMatrix, DVector};
+
+use super::error::check_setting;
+use super::iterate::{Method, Trial, iterate, unobserved};
+use super::{Criteria, Iteration, NormalEquations, OptimiseError, Outcome};
+
+/// Less damping is dropped, so that the last steps are Gauss and Newton's own; where those cannot be
+/// computed, this much is enough.
+const LEAST_DAMPING: f64 = 1e-8;
+
+/// Solves (JᵀJ + λD) h = −Jᵀr for the step h, with a damping λ that follows the steps' success.
+///
+/// D holds the largest diagonal of JᵀJ so far, which makes the path independent of the parameters'
+/// units (J. J. Moré, "The Levenberg–Marquardt algorithm: implementation and theory", 1978). λ follows
+/// the ratio of actual to predicted decrease by the rule of H. B. Nielsen, "Damping parameter in
+/// Marquardt's method", IMM-REP-1999-05. The value only ever falls. A rank-deficient problem is solved
+/// in what it determines; what it does not stays about where it was.
+///
+/// ```
+/// use prehend_autodiff::optimise::{LevenbergMarquardt, NormalEquations};
+/// use prehend_autodiff::Scalar;
+///
+/// // Amount and rate of a decay, from what was left at three times.
+/// fn decay<S: Scalar>(x: &[S]) -> Vec<S> {
+///     [(1.0, 8.0), (3.0, 2.0), (5.0, 0.5)]
+///         .map(|(time, left)| x[0] * (-x[1] * S::constant(time)).exp2() - S::constant(left))
+///         .to_vec()
+/// }
+///
+/// let fit = LevenbergMarquardt::default()
+///     .minimise(&[1.0, 0.0], |x| NormalEquations::forward::<2>(decay, x))?;
+/// assert!((fit.parameters[0] - 16.0).abs() < 1e-9 && (fit.parameters[1] - 1.0).abs() < 1e-9);
+/// # Ok::<(), prehend_autodiff::optimise::OptimiseError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LevenbergMarquardt {
+    /// First damping, relative to the diagonal of JᵀJ; 1e-3 by default.
+    pub damping: f64,
+    /// When to stop.
+    pub criteria: Criteria,
+}
+
+impl Default for LevenbergMarquardt {
+    fn default() -> Self {
+        Self { damping: 1e-3, criteria: Criteria::default() }
+    }
+}
+
+impl LevenbergMarquardt {
+    /// Gauss–Newton: no damping until a step fails, because JᵀJ is singular or the value would rise.
+    pub fn gauss_newton() -> Self {
+        Self { damping: 0.0, ..Self::default() }
+    }
+
+    /// Minimises ½‖r‖² from `start`, given its normal equations at any point.
+    ///
+    /// # Errors
+    /// If a setting is out of range, `start` is empty or not finite, the normal equations are not finite
+    /// there, or have the wrong shape anywhere.
+    pub fn minimise(
+        &self,
+        start: &[f64],
+        objective: impl FnMut(&[f64]) -> NormalEquations,
+    ) -> Result<Outcome, OptimiseError> {
+        self.minimise_observed(start, objective, unobserved)
+    }
+
+    /// As [`minimise`](Self::minimise), with an observer that sees every iteration and may end it all.
+    ///
+    /// # Errors
+    /// As for [`minimise`](Self::minimise).
+    pub fn minimise_observed(
+        &self,
+        start: &[f64],
+        objective: impl FnMut(&[f64]) -> NormalEquations,
+        observe: impl FnMut(&Iteration) -> ControlFlow<()>,
+    ) -> Result<Outcome, OptimiseError> {
+        let inside = self.damping >= 0.0 && self.damping.is_finite();
+        check_setting("damping", self.damping, "finite and at least 0", inside)?;
+        let scale = DVector::zeros(start.len());
+        let damped = Damped { damping: self.damping, growth: 2.0, scale };
+        iterate(damped, &self.criteria, start, objective, observe)
+    }
+}
+
+struct Damped {
+    /// λ.
+    damping: f64,
+    /// By how much λ grows at the next failure: faster with each in a row.
+    growth: f64,
+    /// The diagonal of D.
+    scale: DVector<f64>,
+}
+
+impl Method for Damped {
+    type Evaluation = NormalEquations;
+
+    fn propose(&mut self, here: &NormalEquations) -> Option<Trial> {
+        self.scale.zip_apply(&here.matrix.diagonal(), |scale, entry| *scale = scale.max(entry));
+        // A parameter without any effect yet has no scale of its own, and no gradient to move it.
+        let scale = self.scale.map(|entry| if entry > 0.0 { entry } else { 1.0 });
+        loop {
+            let damping = &scale * self.damping;
+            let mut matrix = here.matrix.clone();
+            for i in 0..matrix.nrows() {
+                matrix[(i, i)] += damping[i];
+            }
+            if let Some(step) = solve(matrix, &here.gradient) {
+                let predicted = 0.5 * step.dot(&(damping.component_mul(&step) + &here.gradient));
+                let step = (-step).as_slice().to_vec();
+                return Some(Trial { step, predicted: Some(predicted) });
+            }
+            if !self.damping.is_finite() {
+                return None;
+            }
+            self.refused();
+        }
+    }
+
+    fn taken(&mut self, gain: f64) {
+        self.damping *= (1.0 - (2.0 * gain - 1.0).powi(3)).max(1.0 / 3.0);
+        if self.damping < LEAST_DAMPING {
+            self.damping = 0.0;
+        }
+        self.growth = 2.0;
+    }
+
+    fn refused(&mut self) {
+        self.damping = (self.damping * self.growth).max(LEAST_DAMPING);
+        self.growth *= 2.0;
+    }
+}
+
+/// The solution of `matrix` · x = `right`, unless the matrix is singular to rounding.
+fn solve(matrix: DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
+    let diagonal = matrix.diagonal();
+    let rounding = diagonal.len() as f64 * f64::EPSILON;
+    let factor = Cholesky::new(matrix)?;
+    // Relative to its own diagonal, so that the parameters' units do not matter.
+    let regular = diagonal
+        .iter()
+        .zip(factor.l_dirty().diagonal().iter())
+        .all(|(whole, pivot)| pivot * pivot > rounding * whole);
+    regular.then(|| factor.solve(right)).filter(|step| step.iter().all(|x| x.is_finite()))
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+
+    use super::super::test_problems::{meyer, powell, rosenbrock};
+    use super::super::{Criteria, Stop};
+    use super::*;
+    use crate::lie::{so3_exp, so3_log};
+    use crate::{Fwd, Scalar};
+
+    fn both() -> [LevenbergMarquardt; 2] {
+        [LevenbergMarquardt::default(), LevenbergMarquardt::gauss_newton()]
+    }
+
+    #[test]
+    fn rosenbrock_is_solved_to_rounding() {
+        for method in both() {
+            let found = method
+                .minimise(&[-1.2, 1.0], |x| NormalEquations::forward::<2>(rosenbrock, x))
+                .unwrap();
+            assert_eq!(found.stop, Stop::Gradient);
+            assert!(found.iterations < 40, "{found:?}");
+            assert!(found.parameters.iter().all(|x| (x - 1.0).abs() < 1e-9), "{found:?}");
+        }
+    }
+
+    #[test]
+    fn powell_singular_is_reached_though_its_jacobian_loses_rank_there() {
+        for method in both() {
+            let found = method
+                .minimise(&[3.0, -1.0, 0.0, 1.0], |x| NormalEquations::forward::<3>(powell, x))
+                .unwrap();
+            assert_eq!(found.stop, Stop::Gradient);
+            assert!(found.iterations < 40, "{found:?}");
+            assert!(found.parameters.iter().all(|x| x.abs() < 1e-3), "{found:?}");
+        }
+    }
+
+    #[test]
+    fn a_badly_scaled_fit_with_residuals_left_reaches_the_published_value() {
+        for method in both() {
+            let found = method
+                .minimise(&[0.02, 4000.0, 250.0], |x| NormalEquations::forward::<3>(meyer, x))
+                .unwrap();
+            assert!((2.0 * found.value - 87.9458).abs() < 1e-4, "{found:?}");
+            assert_ne!(found.stop, Stop::Iterations);
+        }
+    }
+
+    #[test]
+    fn units_of_the_parameters_do_not_change_the_path() {
+        let path = |unit: f64| {
+            let scaled = |x: &[Fwd<2>]| rosenbrock(&[x[0], x[1] * Fwd::constant(unit)]);
+            let mut values = Vec::new();
+            LevenbergMarquardt::default()
+                .minimise_observed(
+                    &[-1.2, 1.0 / unit],
+                    |x| NormalEquations::forward(scaled, x),
+                    |iteration| {
+                        values.push(iteration.value);
+                        ControlFlow::Continue(())
+                    },
+                )
+                .unwrap();
+            values
+        };
+        // A power of two, so that rounding is the same as well.
+        let (metres, other) = (path(1.0), path(1.0 / 1024.0));
+        assert!(metres.len() > 10);
+        assert_eq!(metres[..10], other[..10]);
+    }
+
+    const POINTS: [[f64; 3]; 4] =
+        [[0.3, -0.2, 0.9], [1.0, 0.1, -0.4], [-0.5, 0.8, 0.2], [0.1, 0.9, 0.7]];
+
+    fn rotation(x: &[f64]) -> UnitQuaternion<f64> {
+        so3_exp(&Vector3::from_column_slice(x))
+    }
+
+    /// The rotation that turns `POINTS` onto `seen`.
+    fn fit_rotation(method: LevenbergMarquardt, seen: &[Vector3<f64>]) -> UnitQuaternion<f64> {
+        let residuals = |x: &[Fwd<3>]| {
+            let turn = so3_exp(&Vector3::from_column_slice(x));
+            POINTS
+                .iter()
+                .zip(seen)
+                .flat_map(|(&point, seen)| {
+                    let miss =
+                        turn * Vector3::from(point).map(Fwd::constant) - seen.map(Fwd::constant);
+                    [miss.x, miss.y, miss.z]
+                })
+                .collect()
+        };
+        let found = method.minimise(&[0.0; 3], |x| NormalEquations::forward(residuals, x)).unwrap();
+        assert_ne!(found.stop, Stop::Iterations);
+        rotation(&found.parameters)
+    }
+
+    #[test]
+    fn a_rotation_is_found_from_points_seen_turned() {
+        for omega in [[0.0, 0.0, 0.0], [0.4, -0.9, 0.2], [-1.5, 2.0, 1.2]] {
+            let truth = rotation(&omega);
+            let seen = POINTS.map(|p| truth * Vector3::from(p));
+            for method in both() {
+                let error = so3_log(&(truth.inverse() * fit_rotation(method, &seen))).norm();
+                assert!(error < 1e-10, "{omega:?}: {error:e}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_rotation_fitted_to_noisy_points_is_that_of_kabsch() {
+        let truth = rotation(&[0.4, -0.9, 0.2]);
+        let mut noise = [0.07, -0.07, 0.03, -0.05].iter();
+        let seen = POINTS.map(|p| {
+            truth * Vector3::from(p) + Vector3::new(1.0, -1.0, 0.5) * *noise.next().unwrap()
+        });
+        let correlation: Matrix3<f64> =
+            POINTS.iter().zip(&seen).map(|(&p, seen)| seen * Vector3::from(p).transpose()).sum();
+        let svd = correlation.svd(true, true);
+        let best = svd.u.unwrap() * svd.v_t.unwrap();
+        assert!(best.determinant() > 0.0);
+        for method in both() {
+            let fitted = fit_rotation(method, &seen).to_rotation_matrix();
+            let difference = (fitted.matrix() - best).norm();
+            assert!(difference < 1e-8, "{difference:e}");
+        }
+    }
+
+    #[test]
+    fn what_the_residuals_do_not_determine_stays() {
+        // Only the sum of the first two counts, and the third not at all.
+        fn residuals<S: Scalar>(x: &[S]) -> Vec<S> {
+            let sum = x[0] + x[1];
+            vec![sum - S::constant(4.0), (sum - S::constant(4.0)) * S::constant(3.0)]
+        }
+        for method in both() {
+            let found = method
+                .minimise(&[1.0, 2.0, 7.0], |x| NormalEquations::forward::<3>(residuals, x))
+                .unwrap();
+            assert_eq!(found.stop, Stop::Gradient);
+            for (x, expected) in found.parameters.iter().zip([1.5, 2.5, 7.0]) {
+                assert!((x - expected).abs() < 1e-6, "{found:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn pivots_of_mere_rounding_make_no_huge_steps() {
+        // One weighted sum seen twice: JᵀJ has rank 1, but the factorisation may not notice.
+        for case in 1..200 {
+            let weights = [1.0, 2.0, 3.0].map(|i| 2.0 + (f64::from(case) * i).sin());
+            let residuals = |x: &[Fwd<3>]| {
+                let sum =
+                    (0..3).fold(Fwd::constant(-4.0), |s, i| s + x[i] * Fwd::constant(weights[i]));
+                vec![sum, sum * Fwd::constant(0.3)]
+            };
+            let found = LevenbergMarquardt::gauss_newton()
+                .minimise(&[0.0; 3], |x| NormalEquations::forward(residuals, x))
+                .unwrap();
+            // Each parameter takes its third of the sum.
+            for (x, weight) in found.parameters.iter().zip(weights) {
+                assert!((x * weight - 4.0 / 3.0).abs() < 1e-5, "{weights:?}: {found:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_value_never_rises_and_refused_steps_change_nothing() {
+        for method in both() {
+            let (mut last, mut refused) = ((f64::INFINITY, vec![-1.2, 1.0]), 0);
+            method
+                .minimise_observed(
+                    &[-1.2, 1.0],
+                    |x| NormalEquations::forward::<2>(rosenbrock, x),
+                    |iteration| {
+                        if iteration.taken {
+                            assert!(iteration.value < last.0);
+                        } else {
+                            refused += 1;
+                            assert_eq!(iteration.parameters, last.1);
+                        }
+                        last = (iteration.value, iteration.parameters.to_vec());
+                        ControlFlow::Continue(())
+                    },
+                )
+                .unwrap();
+            assert!(refused > 0, "no step was refused, so nothing was tested");
+        }
+    }
+
+    #[test]
+    fn steps_to_where_residuals_are_not_finite_are_shortened() {
+        // √x has no value left of zero, which is where the first step of Gauss–Newton from 9 leads.
+        fn residuals<S: Scalar>(x: &[S]) -> Vec<S> {
+            vec![x[0].sqrt() - S::constant(0.1)]
+        }
+        for method in both() {
+            let mut bad = 0;
+            let found = method
+                .minimise(&[9.0], |x| {
+                    bad += usize::from(x[0] < 0.0);
+                    NormalEquations::forward::<1>(residuals, x)
+                })
+                .unwrap();
+            assert!(bad > 0, "every step was finite, so nothing was tested");
+            assert!((found.parameters[0] - 0.01).abs() < 1e-9, "{found:?}");
+            assert!(found.iterations < 20, "{found:?}");
+        }
+    }
+
+    #[test]
+    fn a_minimum_that_leaves_residuals_settles() {
+        let criteria = Criteria { gradient: 0.0, ..Criteria::default() };
+        for method in both() {
+            let method = LevenbergMarquardt { criteria, ..method };
+            let line = |x: &[Fwd<1>]| {
+                [1.0, 2.0, 6.0].map(|y| (x[0] - Fwd::constant(y)) * Fwd::constant(0.1)).to_vec()
+            };
+            let found = method.minimise(&[100.0], |x| NormalEquations::forward(line, x)).unwrap();
+            assert!((found.parameters[0] - 3.0).abs() < 1e-6, "{found:?}");
+            assert!(found.iterations < 20 && found.stop != Stop::Iterations, "{found:?}");
+        }
+    }
+
+    #[test]
+    fn bad_damping_and_matrices_are_refused() {
+        let method = LevenbergMarquardt { damping: -1.0, ..Default::default() };
+        let refused = method.minimise(&[1.0], |x| NormalEquations::forward::<2>(rosenbrock, x));
+        assert!(matches!(refused, Err(OptimiseError::Setting { name: "damping", .. })));
+        let with_matrix = |matrix: DMatrix<f64>| {
+            LevenbergMarquardt::default().minimise(&[1.0], |_| NormalEquations {
+                value: 1.0,
+                gradient: DVector::repeat(1, 1.0),
+                matrix: matrix.clone(),
+            })
+        };
+        assert_eq!(
+            with_matrix(DMatrix::identity(2, 2)),
+            Err(OptimiseError::MatrixShape { expected: 1, rows: 2, columns: 2 })
+        );
+        let infinite = DMatrix::repeat(1, 1, f64::INFINITY);
+        assert_eq!(with_matrix(infinite), Err(OptimiseError::ObjectiveNotFinite));
+    }
+}

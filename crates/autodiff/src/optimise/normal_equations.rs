@@ -1,0 +1,142 @@
+//! Gauss and Newton's quadratic model of a sum of squares.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::OptimiseError;
+use super::iterate::Evaluation;
+use crate::{Fwd, Scalar};
+
+/// The value ½‖r‖² of a least-squares problem at a point, with its derivatives as far as the Jacobian J
+/// of the residuals r gives them.
+///
+/// The fields may also be summed up piece by piece, from blocks of residuals or from sensors, without
+/// ever holding J. Forming JᵀJ squares the condition of J: of directions that move the residuals 10⁸
+/// times less than others (after each parameter is scaled to its own effect) nothing can be learnt.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NormalEquations {
+    /// ½‖r‖².
+    pub value: f64,
+    /// Jᵀr, shape \[parameters\].
+    pub gradient: DVector<f64>,
+    /// JᵀJ, shape \[parameters, parameters\]; of this symmetric matrix the lower triangle is read.
+    pub matrix: DMatrix<f64>,
+}
+
+impl NormalEquations {
+    /// From residuals and their Jacobian, shape \[residuals, parameters\].
+    ///
+    /// # Panics
+    /// If `jacobian` does not have as many rows as there are residuals.
+    pub fn from_jacobian(residuals: &[f64], jacobian: &DMatrix<f64>) -> Self {
+        assert_eq!(jacobian.nrows(), residuals.len(), "rows of the Jacobian");
+        let residuals = DVector::from_column_slice(residuals);
+        Self {
+            value: 0.5 * residuals.norm_squared(),
+            gradient: jacobian.tr_mul(&residuals),
+            matrix: jacobian.tr_mul(jacobian),
+        }
+    }
+
+    /// From the residuals alone, differentiated in forward mode along `N` parameters at a time:
+    /// `residuals` runs once for every `N` parameters, rounded up.
+    ///
+    /// # Panics
+    /// If `residuals` does not return the same number of residuals each time.
+    pub fn forward<const N: usize>(
+        mut residuals: impl FnMut(&[Fwd<N>]) -> Vec<Fwd<N>>,
+        x: &[f64],
+    ) -> Self {
+        const { assert!(N > 0, "at least one direction at a time") };
+        let constants: Vec<Fwd<N>> = x.iter().map(|&value| Fwd::constant(value)).collect();
+        let mut values = Vec::new();
+        let mut columns = Vec::new();
+        for first in (0..x.len()).step_by(N) {
+            let mut inputs = constants.clone();
+            let lanes = N.min(x.len() - first);
+            for lane in 0..lanes {
+                inputs[first + lane] = Fwd::variable(x[first + lane], lane);
+            }
+            let outputs = residuals(&inputs);
+            assert!(first == 0 || outputs.len() == values.len(), "number of residuals changed");
+            values = outputs.iter().map(|r| r.value).collect();
+            columns.extend(
+                (0..lanes).flat_map(|lane| outputs.iter().map(move |r| r.derivative[lane])),
+            );
+        }
+        Self::from_jacobian(&values, &DMatrix::from_vec(values.len(), x.len(), columns))
+    }
+}
+
+impl Evaluation for NormalEquations {
+    fn value(&self) -> f64 {
+        self.value
+    }
+
+    fn gradient(&self) -> &[f64] {
+        self.gradient.as_slice()
+    }
+
+    fn is_finite(&self) -> bool {
+        let matrix = self.matrix.as_slice();
+        self.value.is_finite() && self.gradient.iter().chain(matrix).all(|entry| entry.is_finite())
+    }
+
+    fn check_shape(&self, expected: usize) -> Result<(), OptimiseError> {
+        let found = self.gradient.len();
+        if found != expected {
+            return Err(OptimiseError::GradientLength { expected, found });
+        }
+        let (rows, columns) = self.matrix.shape();
+        if (rows, columns) != (expected, expected) {
+            return Err(OptimiseError::MatrixShape { expected, rows, columns });
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::test_problems::{half_square, powell};
+    use super::*;
+    use crate::check::{finite_difference_gradient, finite_difference_jacobian};
+
+    #[test]
+    fn every_number_of_lanes_agrees_with_differences() {
+        let x = [3.0, -1.0, 0.5, 1.0];
+        let rows = finite_difference_jacobian(powell, &x, 1e-3);
+        let jacobian = DMatrix::from_fn(4, 4, |r, c| rows[r][c]);
+        let gradient = finite_difference_gradient(|x| half_square(powell(x)), &x, 1e-3);
+        for equations in [
+            NormalEquations::forward::<1>(powell, &x),
+            NormalEquations::forward::<3>(powell, &x),
+            NormalEquations::forward::<4>(powell, &x),
+            NormalEquations::forward::<9>(powell, &x),
+            NormalEquations::from_jacobian(&powell(&x), &jacobian),
+        ] {
+            assert!((equations.value - half_square(powell(&x))).abs() < 1e-12 * equations.value);
+            let scale = equations.matrix.amax();
+            assert!((equations.matrix - jacobian.tr_mul(&jacobian)).amax() < 1e-8 * scale);
+            for (g, d) in equations.gradient.iter().zip(&gradient) {
+                assert!((g - d).abs() < 1e-8 * equations.gradient.amax(), "{g} {d}");
+            }
+        }
+    }
+
+    #[test]
+    fn no_residuals_are_a_minimum_everywhere() {
+        let equations = NormalEquations::forward::<2>(|_| Vec::new(), &[1.0, 2.0, 3.0]);
+        assert_eq!(equations.value, 0.0);
+        assert_eq!(equations.matrix, DMatrix::zeros(3, 3));
+    }
+
+    #[test]
+    #[should_panic(expected = "number of residuals changed")]
+    fn residuals_that_come_and_go_are_a_mistake() {
+        let mut count = 0;
+        let residuals = |x: &[Fwd<1>]| {
+            count += 1;
+            vec![x[0]; count]
+        };
+        NormalEquations::forward(residuals, &[1.0, 2.0]);
+    }
+}

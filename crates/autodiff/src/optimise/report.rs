@@ -1,0 +1,48 @@
+//! What an optimisation says of itself, on the way and at the end.
+
+/// Why an optimisation ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stop {
+    /// The gradient vanished to within [`Criteria::gradient`](super::Criteria::gradient).
+    Gradient,
+    /// The trial step was shorter than [`Criteria::step`](super::Criteria::step) asks, or there was none.
+    ///
+    /// Either the parameters have converged, or no step downhill was found however short.
+    Step,
+    /// The value settled to within [`Criteria::decrease`](super::Criteria::decrease).
+    Decrease,
+    /// [`Criteria::iterations`](super::Criteria::iterations) were used up.
+    Iterations,
+    /// The observer asked for it.
+    Observer,
+}
+
+/// One iteration, as the observer sees it.
+#[derive(Clone, Copy, Debug)]
+pub struct Iteration<'a> {
+    /// Counts from 1.
+    pub number: usize,
+    /// The parameters after the iteration.
+    pub parameters: &'a [f64],
+    /// The objective there.
+    pub value: f64,
+    /// Largest absolute entry of the gradient there.
+    pub gradient: f64,
+    /// Euclidean length of the trial step.
+    pub step: f64,
+    /// Whether the trial step was taken; otherwise parameters, value and gradient are as before.
+    pub taken: bool,
+}
+
+/// How an optimisation ended.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outcome {
+    /// The parameters of the lowest value seen.
+    pub parameters: Vec<f64>,
+    /// The objective there.
+    pub value: f64,
+    /// Trial steps made.
+    pub iterations: usize,
+    /// Why there were no more.
+    pub stop: Stop,
+}
