@@ -21,6 +21,7 @@
 
 mod chain;
 pub mod check;
+pub mod checkpoint;
 mod fwd;
 pub mod lie;
 mod real_field;

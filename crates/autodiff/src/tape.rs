@@ -233,11 +233,15 @@ impl Recording {
     /// # Panics
     /// If an output belongs to another recording.
     pub fn vjp(&self, outputs: &[(Var, f64)]) -> Adjoints {
-        with_tape(|tape| Adjoints {
+        // Away from the thread while it is swept, so that operations may make recordings of their own.
+        let tape = TAPE.take();
+        let adjoints = Adjoints {
             recording: self.recording,
             base: tape.open.last().map_or(0, |s| s.node),
             adjoints: tape.sweep(outputs),
-        })
+        };
+        TAPE.replace(tape);
+        adjoints
     }
 
     /// Nodes recorded so far.
