@@ -26,6 +26,7 @@ mod fwd;
 pub mod lie;
 mod real_field;
 mod scalar;
+pub mod sparse;
 mod tape;
 mod var;
 mod vjp;
