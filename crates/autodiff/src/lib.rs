@@ -23,6 +23,7 @@
 mod arena;
 mod chain;
 pub mod check;
+pub mod checkpoint;
 mod fwd;
 pub mod lie;
 mod local;
@@ -31,6 +32,7 @@ mod real_field;
 mod recording;
 pub mod rigid;
 mod scalar;
+pub mod sparse;
 mod sweep;
 mod tape;
 mod var;
