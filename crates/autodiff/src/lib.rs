@@ -18,18 +18,24 @@
 //!
 //! [`custom`] and [`block`] record operations that bring their own derivative, [`lie`] holds rotations
 //! and rigid motions, [`check`] the finite differences that every derivative here is held against.
+//! [`solve`] and [`implicit`] differentiate linear solves and the solutions of equations without
+//! differentiating the solver: see [a differentiable solve](implicit#a-differentiable-solve).
 
 mod chain;
 pub mod check;
 mod fwd;
+pub mod implicit;
 pub mod lie;
+mod operand;
 mod real_field;
 mod scalar;
+pub mod solve;
 mod tape;
 mod var;
 mod vjp;
 
 pub use fwd::Fwd;
+pub use operand::{CustomJvp, Operand};
 pub use scalar::Scalar;
 pub use tape::{Adjoints, Recording, gradient};
 pub use var::Var;

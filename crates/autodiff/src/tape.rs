@@ -233,11 +233,12 @@ impl Recording {
     /// # Panics
     /// If an output belongs to another recording.
     pub fn vjp(&self, outputs: &[(Var, f64)]) -> Adjoints {
-        with_tape(|tape| Adjoints {
+        let set_aside = SetAside::new();
+        Adjoints {
             recording: self.recording,
-            base: tape.open.last().map_or(0, |s| s.node),
-            adjoints: tape.sweep(outputs),
-        })
+            base: set_aside.0.open.last().map_or(0, |s| s.node),
+            adjoints: set_aside.0.sweep(outputs),
+        }
     }
 
     /// Nodes recorded so far.
@@ -248,6 +249,21 @@ impl Recording {
     /// Whether nothing was recorded yet.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
+    }
+}
+
+/// The thread's tape during a sweep, so that a custom operation can record on another in the meantime.
+struct SetAside(Tape);
+
+impl SetAside {
+    fn new() -> Self {
+        Self(with_tape(std::mem::take))
+    }
+}
+
+impl Drop for SetAside {
+    fn drop(&mut self) {
+        with_tape(|tape| std::mem::swap(tape, &mut self.0));
     }
 }
 

@@ -11,7 +11,7 @@ use crate::tape::with_tape;
 pub trait CustomVjp: 'static {
     /// Adds to `input_adjoints` (zero at the call) the product of `output_adjoints` and the Jacobian (outputs × inputs).
     ///
-    /// Runs inside the sweep, so it must not itself record on the tape; forward mode is free to use.
+    /// May open a [`Recording`](crate::Recording) of its own.
     fn vjp(&self, output_adjoints: &[f64], input_adjoints: &mut [f64]);
 }
 
