@@ -19,19 +19,25 @@
 //! [`custom`] and [`block`] record operations that bring their own derivative, [`lie`] holds rotations
 //! and rigid motions, [`optimise`] a few small optimisers, [`check`] the finite differences that every
 //! derivative here is held against.
+//! and rigid motions, [`check`] the finite differences that every derivative here is held against.
+//! [`solve`] and [`implicit`] differentiate linear solves and the solutions of equations without
+//! differentiating the solver: see [a differentiable solve](implicit#a-differentiable-solve).
 
 mod arena;
 mod chain;
 pub mod check;
 pub mod checkpoint;
 mod fwd;
+pub mod implicit;
 pub mod lie;
 mod local;
+mod operand;
 pub mod optimise;
 mod real_field;
 mod recording;
 pub mod rigid;
 mod scalar;
+pub mod solve;
 pub mod sparse;
 mod sweep;
 mod tape;
@@ -40,6 +46,7 @@ mod vjp;
 
 pub use fwd::Fwd;
 pub use local::{LocalFunction, preaccumulate};
+pub use operand::{CustomJvp, Operand};
 pub use recording::{Adjoints, Recording, gradient, gradient_into, jacobian};
 pub use scalar::Scalar;
 pub use tape::TapeStatistics;

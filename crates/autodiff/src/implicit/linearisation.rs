@@ -1,0 +1,83 @@
+//! The equation to first order in its unknowns.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::{ImplicitError, Residual};
+use crate::solve::{Factored, lu};
+use crate::{Fwd, Scalar};
+
+/// Columns of the Jacobian computed at a time.
+const CHUNK: usize = 8;
+
+/// Error of an unknown, relative to it and absolute, below which it counts as solved.
+const RELATIVE: f64 = 1e-6;
+const ABSOLUTE: f64 = 1e-9;
+
+/// The factorised Jacobian by the unknowns, and the Newton step −J⁻¹ F.
+pub(super) struct Linearisation {
+    pub(super) jacobian: Factored<f64>,
+    pub(super) step: DVector<f64>,
+}
+
+impl Linearisation {
+    pub(super) fn new(
+        equation: &impl Residual,
+        x: &[f64],
+        p: &[f64],
+    ) -> Result<Self, ImplicitError> {
+        let jacobian = lu(&jacobian(equation, x, p)?)?;
+        let step = newton_step(equation, &jacobian, x, p)?;
+        Ok(Self { jacobian, step })
+    }
+
+    /// The unknown whose step is largest, in multiples of what is tolerated; none without unknowns.
+    pub(super) fn worst(&self, x: &[f64]) -> Option<(usize, f64)> {
+        let excess = |(step, x): (&f64, &f64)| step.abs() / (RELATIVE * x.abs() + ABSOLUTE);
+        self.step.iter().zip(x).map(excess).enumerate().max_by(|a, b| a.1.total_cmp(&b.1))
+    }
+}
+
+/// −J⁻¹ F(x, p).
+pub(super) fn newton_step(
+    equation: &impl Residual,
+    jacobian: &Factored<f64>,
+    x: &[f64],
+    p: &[f64],
+) -> Result<DVector<f64>, ImplicitError> {
+    let residual = DVector::from_vec(equation.residual(x, p));
+    check_length(x, residual.len())?;
+    Ok(-jacobian.solve(&residual)?)
+}
+
+/// ∂F/∂x by forward mode.
+fn jacobian(equation: &impl Residual, x: &[f64], p: &[f64]) -> Result<DMatrix<f64>, ImplicitError> {
+    let p: Vec<Fwd<CHUNK>> = p.iter().map(|&p| Fwd::constant(p)).collect();
+    let mut at: Vec<Fwd<CHUNK>> = x.iter().map(|&x| Fwd::constant(x)).collect();
+    let mut jacobian = DMatrix::zeros(x.len(), x.len());
+    // At least once, so that the number of equations is checked when there are no unknowns.
+    for first in (0..x.len().max(1)).step_by(CHUNK) {
+        let chunk = first..(first + CHUNK).min(x.len());
+        for column in chunk.clone() {
+            at[column] = Fwd::variable(x[column], column - first);
+        }
+        let residual = equation.residual(&at, &p);
+        check_length(x, residual.len())?;
+        for (row, residual) in residual.iter().enumerate() {
+            for column in chunk.clone() {
+                jacobian[(row, column)] = residual.derivative[column - first];
+            }
+        }
+        for column in chunk {
+            at[column] = Fwd::constant(x[column]);
+        }
+    }
+    Ok(jacobian)
+}
+
+fn check_length(x: &[f64], found: usize) -> Result<(), ImplicitError> {
+    if found == x.len() {
+        Ok(())
+    } else {
+        Err(ImplicitError::Equations { unknowns: x.len(), found })
+    }
+}

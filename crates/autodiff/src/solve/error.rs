@@ -1,0 +1,53 @@
+//! What can be wrong with a linear system.
+
+/// A linear system that cannot be solved.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SolveError {
+    /// The matrix has more rows than columns, or fewer.
+    #[error("a matrix of {rows} rows and {columns} columns is not square")]
+    NotSquare {
+        /// Rows of the matrix.
+        rows: usize,
+        /// Columns of the matrix.
+        columns: usize,
+    },
+    /// The number of values does not fit the matrix: rows of a right-hand side, or entries of a pattern.
+    #[error("{expected} {what} are needed, {found} were given")]
+    Length {
+        /// What was counted.
+        what: &'static str,
+        /// How many the matrix needs.
+        expected: usize,
+        /// How many there were.
+        found: usize,
+    },
+    /// An entry of a sparse pattern lies outside the matrix.
+    #[error("entry ({row}, {column}) lies outside a matrix of size {size}")]
+    OutOfBounds {
+        /// Row of the entry.
+        row: usize,
+        /// Column of the entry.
+        column: usize,
+        /// Rows, and columns, of the matrix.
+        size: usize,
+    },
+    /// The matrix, a right-hand side or the solution holds an infinity or NaN.
+    #[error("the {0} is not finite")]
+    NotFinite(&'static str),
+    /// The matrix is singular, or too close to it for its solution to mean anything.
+    #[error("the matrix is singular to working precision (condition number about {condition:.1e})")]
+    Singular {
+        /// The estimate of [`Factored::condition`](super::Factored::condition); infinite when a pivot is zero.
+        condition: f64,
+    },
+    /// A Cholesky factorisation met a pivot that is not positive.
+    #[error("the matrix is not positive definite (step {step} of its Cholesky factorisation)")]
+    NotPositiveDefinite {
+        /// The step of the elimination, in the order that it chose.
+        step: usize,
+    },
+    /// The factorisation needs more memory than there is, or more entries than can be counted.
+    #[error("the matrix is too large to factorise")]
+    TooLarge,
+}
