@@ -25,6 +25,7 @@ mod fwd;
 pub mod lie;
 mod real_field;
 mod scalar;
+mod stumpff;
 mod tape;
 mod var;
 mod vjp;
