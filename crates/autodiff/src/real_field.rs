@@ -319,15 +319,15 @@ macro_rules! impl_real_field {
             }
             impl_real_field!(@smooth
                 tan |_x, y| 1.0 + y * y;
-                asin |x, _y| 1.0 / (1.0 - x * x).sqrt();
-                acos |x, _y| -1.0 / (1.0 - x * x).sqrt();
+                asin |x, _y| 1.0 / ((1.0 - x) * (1.0 + x)).sqrt();
+                acos |x, _y| -1.0 / ((1.0 - x) * (1.0 + x)).sqrt();
                 atan |x, _y| 1.0 / (1.0 + x * x);
                 sinh |x, _y| x.cosh();
                 cosh |x, _y| x.sinh();
                 tanh |_x, y| 1.0 - y * y;
                 asinh |x, _y| 1.0 / (x * x + 1.0).sqrt();
                 acosh |x, _y| 1.0 / (x * x - 1.0).sqrt();
-                atanh |x, _y| 1.0 / (1.0 - x * x);
+                atanh |x, _y| 1.0 / ((1.0 - x) * (1.0 + x));
                 log2 |x, _y| std::f64::consts::LOG2_E / x;
                 log10 |x, _y| std::f64::consts::LOG10_E / x;
                 ln |x, _y| 1.0 / x;
