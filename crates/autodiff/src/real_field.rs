@@ -325,8 +325,8 @@ macro_rules! impl_real_field {
                 sinh |x, _y| x.cosh();
                 cosh |x, _y| x.sinh();
                 tanh |_x, y| 1.0 - y * y;
-                asinh |x, _y| 1.0 / (x * x + 1.0).sqrt();
-                acosh |x, _y| 1.0 / (x * x - 1.0).sqrt();
+                asinh |x, _y| 1.0 / x.hypot(1.0);
+                acosh |x, _y| 1.0 / ((x - 1.0).sqrt() * (x + 1.0).sqrt());
                 atanh |x, _y| 1.0 / ((1.0 - x) * (1.0 + x));
                 log2 |x, _y| std::f64::consts::LOG2_E / x;
                 log10 |x, _y| std::f64::consts::LOG10_E / x;
