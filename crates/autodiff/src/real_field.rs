@@ -324,7 +324,7 @@ macro_rules! impl_real_field {
                 atan |x, _y| 1.0 / (1.0 + x * x);
                 sinh |x, _y| x.cosh();
                 cosh |x, _y| x.sinh();
-                tanh |_x, y| 1.0 - y * y;
+                tanh |x, _y| { let cosh = x.cosh(); 1.0 / (cosh * cosh) };
                 asinh |x, _y| 1.0 / x.hypot(1.0);
                 acosh |x, _y| 1.0 / ((x - 1.0).sqrt() * (x + 1.0).sqrt());
                 atanh |x, _y| 1.0 / ((1.0 - x) * (1.0 + x));
