@@ -336,7 +336,7 @@ macro_rules! impl_real_field {
                 cbrt |_x, y| 1.0 / (3.0 * y * y);
                 exp |_x, y| y;
                 exp2 |_x, y| y * std::f64::consts::LN_2;
-                exp_m1 |_x, y| y + 1.0
+                exp_m1 |x, _y| x.exp()
             );
             #[inline]
             fn log(self, base: Self) -> Self {
