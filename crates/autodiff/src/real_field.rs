@@ -288,8 +288,8 @@ macro_rules! impl_real_field {
             fn hypot(self, other: Self) -> Self {
                 let (a, b) = (self.primal(), other.primal());
                 let value = a.hypot(b);
-                let inverse = if value == 0.0 { 0.0 } else { 1.0 / value };
-                self.binary(other, value, [a * inverse, b * inverse])
+                let slopes = if value == 0.0 { [0.0; 2] } else { [a / value, b / value] };
+                self.binary(other, value, slopes)
             }
             #[inline]
             fn recip(self) -> Self {
