@@ -42,7 +42,9 @@ macro_rules! impl_real_field {
             #[inline]
             fn rem(self, o: Self) -> Self {
                 let (a, b) = (self.primal(), o.primal());
-                self.binary(o, a % b, [1.0, -(a / b).trunc()])
+                // Not the truncated a / b, which rounds up to the next integer just below it.
+                let value = a % b;
+                self.binary(o, value, [1.0, -((a - value) / b).round()])
             }
         }
         impl<$($generics)*> std::ops::Neg for $t {
