@@ -280,7 +280,9 @@ macro_rules! impl_real_field {
             }
             #[inline]
             fn mul_add(self, a: Self, b: Self) -> Self {
-                self * a + b
+                // Rounded once, as the plain number's is: code for error terms lives off the difference.
+                let value = self.primal().mul_add(a.primal(), b.primal());
+                (self * a).binary(b, value, [1.0, 1.0])
             }
             #[inline]
             fn abs(self) -> Self {
