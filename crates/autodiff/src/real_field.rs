@@ -352,7 +352,8 @@ macro_rules! impl_real_field {
                     return Self::lift(1.0);
                 }
                 let x = self.primal();
-                self.unary(x.powi(n), f64::from(n) * x.powi(n - 1))
+                let below = n.checked_sub(1).map_or_else(|| x.powi(n) / x, |m| x.powi(m));
+                self.unary(x.powi(n), f64::from(n) * below)
             }
             #[inline]
             fn powf(self, n: Self) -> Self {
