@@ -1,6 +1,6 @@
 //! `RealField` and its supertraits for every differentiable scalar, derived from [`Chain`].
 //!
-//! Conventions at points without a derivative: `abs` has slope 0 at 0, `min`/`max` follow the first
+//! Conventions at points without a derivative: `abs` and `copysign` have slope 0 at 0, `min`/`max` follow the first
 //! operand on a tie, rounding has slope 0. Comparisons look at values alone.
 
 /// Implements nalgebra's scalar traits for a type that implements [`Chain`](crate::chain::Chain).
@@ -392,11 +392,8 @@ macro_rules! impl_real_field {
             }
             #[inline]
             fn copysign(self, sign: Self) -> Self {
-                if self.primal().is_sign_negative() == sign.primal().is_sign_negative() {
-                    self
-                } else {
-                    -self
-                }
+                let magnitude = num_traits::Signed::abs(&self);
+                if sign.primal().is_sign_negative() { -magnitude } else { magnitude }
             }
             #[inline]
             fn max(self, other: Self) -> Self {
