@@ -317,6 +317,25 @@ macro_rules! impl_real_field {
             fn cos(self) -> Self {
                 self.sin_cos().1
             }
+            // Not the quotients near zero, whose slopes are differences of two reciprocals there.
+            #[inline]
+            fn sinc(self) -> Self {
+                let square = self * self;
+                if square.primal() < crate::stumpff::SERIES_BELOW {
+                    crate::stumpff::series::<Self, 0>(square)[1]
+                } else {
+                    self.sin() / self
+                }
+            }
+            #[inline]
+            fn sinhc(self) -> Self {
+                let square = self * self;
+                if square.primal() < crate::stumpff::SERIES_BELOW {
+                    crate::stumpff::series::<Self, 0>(-square)[1]
+                } else {
+                    self.sinh() / self
+                }
+            }
             #[inline]
             fn sinh_cosh(self) -> (Self, Self) {
                 (self.sinh(), self.cosh())
