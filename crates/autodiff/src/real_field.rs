@@ -355,7 +355,7 @@ macro_rules! impl_real_field {
                 log10 |x, _y| std::f64::consts::LOG10_E / x;
                 ln |x, _y| 1.0 / x;
                 ln_1p |x, _y| 1.0 / (1.0 + x);
-                sqrt |_x, y| 0.5 / y;
+                sqrt |_x, y| 0.5 / y.abs();
                 cbrt |_x, y| 1.0 / (3.0 * y * y);
                 exp |_x, y| y;
                 exp2 |_x, y| y * std::f64::consts::LN_2;
