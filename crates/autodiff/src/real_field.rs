@@ -267,7 +267,8 @@ macro_rules! impl_real_field {
             #[inline]
             fn to_exp(self) -> (Self, Self) {
                 let one = Self::lift(1.0);
-                if self.primal() >= 0.0 { (self, one) } else { (-self, -one) }
+                let modulus = num_traits::Signed::abs(&self);
+                (modulus, if self.primal() >= 0.0 { one } else { -one })
             }
             #[inline]
             fn signum(self) -> Self {
