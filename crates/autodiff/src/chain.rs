@@ -16,3 +16,11 @@ pub(crate) trait Chain: Copy {
     /// The result `value` of an operation on `self` and `other` with partial derivatives `slopes`.
     fn binary(self, other: Self, value: f64, slopes: [f64; 2]) -> Self;
 }
+
+/// `slope * derivative`, but 0 where the operand does not move: 0 · ∞ must not make a NaN of a direction
+/// that has nothing to do with the operation. Both sides are computed, so it is a select, not a branch.
+#[inline]
+pub(crate) fn through(slope: f64, derivative: f64) -> f64 {
+    let product = slope * derivative;
+    if derivative == 0.0 { 0.0 } else { product }
+}

@@ -1,6 +1,6 @@
 //! Forward mode: a value with its derivatives along `N` directions.
 
-use crate::chain::Chain;
+use crate::chain::{Chain, through};
 use crate::real_field::impl_real_field;
 
 /// A number and its partial derivatives with respect to `N` inputs, carried forward.
@@ -31,14 +31,6 @@ impl<const N: usize> Fwd<N> {
     pub fn variables(values: [f64; N]) -> [Self; N] {
         std::array::from_fn(|i| Self::variable(values[i], i))
     }
-}
-
-/// `slope * derivative`, but 0 where the operand does not move: 0 · ∞ must not make a NaN of a direction
-/// that has nothing to do with the operation. Both sides are computed, so it is a select, not a branch.
-#[inline]
-fn through(slope: f64, derivative: f64) -> f64 {
-    let product = slope * derivative;
-    if derivative == 0.0 { 0.0 } else { product }
 }
 
 impl<const N: usize> Chain for Fwd<N> {

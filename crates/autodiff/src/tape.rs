@@ -4,6 +4,7 @@ use std::cell::RefCell;
 use std::marker::PhantomData;
 use std::sync::atomic::{AtomicU32, Ordering};
 
+use crate::chain::through;
 use crate::{CustomVjp, Var};
 
 /// An operation with its own reverse derivative, whose outputs are consecutive nodes.
@@ -86,7 +87,12 @@ impl Tape {
                     self.arguments.truncate(start);
                     self.check(var);
                 }
-                self.arguments.push((var.node, slope * var.coefficient));
+                let coefficient = through(slope, var.coefficient);
+                // An operand that does not move the result must not meet an infinite adjoint: it is
+                // left out, as forward mode leaves it out.
+                if coefficient != 0.0 {
+                    self.arguments.push((var.node, coefficient));
+                }
             }
         }
         self.push_node(value)

@@ -1,6 +1,6 @@
 //! Reverse mode: a number that remembers where on the tape it came from.
 
-use crate::chain::Chain;
+use crate::chain::{Chain, through};
 use crate::real_field::impl_real_field;
 use crate::tape::with_tape;
 
@@ -53,7 +53,7 @@ impl Chain for Var {
         if self.is_constant() {
             return Self::lift(value);
         }
-        Self { value, coefficient: self.coefficient * slope, ..self }
+        Self { value, coefficient: through(slope, self.coefficient), ..self }
     }
 
     #[inline]
@@ -63,7 +63,8 @@ impl Chain for Var {
             (true, false) => other.unary(value, db),
             (false, false) => {
                 if self.node == other.node && self.recording == other.recording {
-                    let coefficient = da * self.coefficient + db * other.coefficient;
+                    let coefficient =
+                        through(da, self.coefficient) + through(db, other.coefficient);
                     return Self { value, coefficient, ..self };
                 }
                 with_tape(|tape| tape.push(value, [(self, da), (other, db)]))

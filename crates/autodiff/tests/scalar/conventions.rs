@@ -2,7 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_2, LN_2, PI};
 
-use nalgebra::ComplexField;
+use nalgebra::{ComplexField, Vector3};
 use prehend_autodiff::{Fwd, Recording, Scalar, Var};
 
 use crate::table::cases;
@@ -167,4 +167,17 @@ fn multiplying_and_adding_rounds_once() {
     let recording = Recording::start();
     let z = recording.variable(x).mul_add(recording.variable(y), Var::from(-1.0));
     assert_eq!(z.value(), exact);
+}
+
+#[test]
+fn what_does_not_move_stops_an_infinite_slope() {
+    for slopes in both_modes!(|x, y| (x * x + y * y).sqrt() + x, [0.0, 0.0]) {
+        assert_eq!(slopes, [1.0, 0.0]);
+    }
+    for slopes in both_modes!(|x, y| (x * S::zero()).sqrt() + y, [2.0, 1.0]) {
+        assert_eq!(slopes, [0.0, 1.0]);
+    }
+    for slopes in both_modes!(|x, y| Vector3::new(x, y, x * y).norm() + y, [0.0, 0.0]) {
+        assert_eq!(slopes, [0.0, 1.0]);
+    }
 }
