@@ -1,7 +1,9 @@
 //! `RealField` and its supertraits for every differentiable scalar, derived from [`Chain`].
 //!
-//! Conventions at points without a derivative: `abs` and `copysign` have slope 0 at 0, `min`/`max` follow the first
-//! operand on a tie, rounding has slope 0. Comparisons look at values alone.
+//! Conventions at points without a derivative: `abs` and `copysign` have slope 0 at 0, and `hypot` at
+//! (0, 0), where `atan2` has none (NaN); `min`/`max` follow the first operand on a tie; rounding has slope
+//! 0, and `%` the slopes of the piece that its value lies on. At the edge of its domain a function has the
+//! slope from inside, which may be infinite. Comparisons look at values alone.
 
 /// Implements nalgebra's scalar traits for a type that implements [`Chain`](crate::chain::Chain).
 macro_rules! impl_real_field {
