@@ -52,3 +52,10 @@ pub(crate) trait Chain: Copy {
         add_up(x, terms)
     }
 }
+
+/// `slope * derivative`, but 0 where the operand does not move: 0 · ∞ must not make a NaN of a direction
+/// that has nothing to do with the operation.
+#[inline]
+pub(crate) fn through<T: Scalar>(slope: T, derivative: T) -> T {
+    if derivative.is_constant_zero() { T::zero() } else { slope * derivative }
+}

@@ -1,7 +1,7 @@
 //! Forward mode: a value with its derivatives along `N` directions.
 
 use crate::Scalar;
-use crate::chain::Chain;
+use crate::chain::{Chain, through};
 use crate::real_field::impl_real_field;
 
 /// A number and its partial derivatives with respect to `N` inputs, carried forward.
@@ -34,13 +34,6 @@ impl<const N: usize, T: Scalar> Fwd<N, T> {
     pub fn variables(values: [T; N]) -> [Self; N] {
         std::array::from_fn(|i| Self::variable(values[i], i))
     }
-}
-
-/// `slope * derivative`, but 0 where the operand does not move: 0 · ∞ must not make a NaN of a direction
-/// that has nothing to do with the operation.
-#[inline]
-fn through<T: Scalar>(slope: T, derivative: T) -> T {
-    if derivative.is_constant_zero() { T::zero() } else { slope * derivative }
 }
 
 /// Whether [`through`] is no more than a product: plain numbers with finite slopes. Looking once at the slopes

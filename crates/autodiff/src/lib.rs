@@ -19,7 +19,6 @@
 //! [`custom`] and [`block`] record operations that bring their own derivative, [`lie`] holds rotations
 //! and rigid motions, [`optimise`] a few small optimisers, [`check`] the finite differences that every
 //! derivative here is held against.
-//! and rigid motions, [`check`] the finite differences that every derivative here is held against.
 //! [`solve`] and [`implicit`] differentiate linear solves and the solutions of equations without
 //! differentiating the solver: see [a differentiable solve](implicit#a-differentiable-solve).
 
@@ -39,6 +38,7 @@ pub mod rigid;
 mod scalar;
 pub mod solve;
 pub mod sparse;
+mod stumpff;
 mod sweep;
 mod tape;
 mod var;

@@ -1,32 +1,13 @@
 //! `RealField` and its supertraits for every differentiable scalar, derived from [`Chain`].
 //!
-//! Conventions at points without a derivative: `abs` has slope 0 at 0, `min`/`max` follow the first
-//! operand on a tie, rounding has slope 0. Comparisons look at values alone.
+//! Conventions at points without a derivative: `abs` and `copysign` have slope 0 at 0, and `hypot` at
+//! (0, 0), where `atan2` has none (NaN); `min`/`max` follow the first operand on a tie; rounding has slope
+//! 0, and `%` the slopes of the piece that its value lies on. At the edge of its domain a function has the
+//! slope from inside, which may be infinite. Comparisons look at values alone.
 
 /// Implements nalgebra's scalar traits for a type that implements [`Chain`](crate::chain::Chain).
 macro_rules! impl_real_field {
     ([$($generics:tt)*] $t:ty) => {
-        impl<$($generics)*> std::ops::Add<f64> for $t {
-            type Output = Self;
-            #[inline]
-            fn add(self, o: f64) -> Self {
-                self.unary(self.primal() + Self::inner(o), Self::inner(1.0))
-            }
-        }
-        impl<$($generics)*> std::ops::Sub<f64> for $t {
-            type Output = Self;
-            #[inline]
-            fn sub(self, o: f64) -> Self {
-                self.unary(self.primal() - Self::inner(o), Self::inner(1.0))
-            }
-        }
-        impl<$($generics)*> std::ops::Mul<f64> for $t {
-            type Output = Self;
-            #[inline]
-            fn mul(self, o: f64) -> Self {
-                { let c = Self::inner(o); self.unary(self.primal() * c, c) }
-            }
-        }
         impl<$($generics)*> std::ops::Add for $t {
             type Output = Self;
             #[inline]
@@ -65,7 +46,9 @@ macro_rules! impl_real_field {
             #[inline]
             fn rem(self, o: Self) -> Self {
                 let (a, b) = (self.primal(), o.primal());
-                self.binary(o, a % b, [Self::inner(1.0), -(a / b).trunc()])
+                // Not the truncated a / b, which rounds up to the next integer just below it.
+                let value = a % b;
+                self.binary(o, value, [Self::inner(1.0), -((a - value) / b).round()])
             }
         }
         impl<$($generics)*> std::ops::Neg for $t {
@@ -288,7 +271,8 @@ macro_rules! impl_real_field {
             #[inline]
             fn to_exp(self) -> (Self, Self) {
                 let one = Self::constant(1.0);
-                if self.value() >= 0.0 { (self, one) } else { (-self, -one) }
+let modulus = num_traits::Signed::abs(&self);
+                (modulus, if self.value() >= 0.0 { one } else { -one })
             }
             #[inline]
             fn signum(self) -> Self {
@@ -301,7 +285,9 @@ macro_rules! impl_real_field {
             }
             #[inline]
             fn mul_add(self, a: Self, b: Self) -> Self {
-                self * a + b
+                // Rounded once, as the plain number's is: code for error terms lives off the difference.
+                let value = self.primal().mul_add(a.primal(), b.primal());
+                (self * a).binary(b, value, [Self::inner(1.0); 2])
             }
             #[inline]
             fn abs(self) -> Self {
@@ -338,6 +324,25 @@ macro_rules! impl_real_field {
             fn cos(self) -> Self {
                 self.sin_cos().1
             }
+            // Not the quotients near zero, whose slopes are differences of two reciprocals there.
+            #[inline]
+            fn sinc(self) -> Self {
+                let square = self * self;
+                if square.value() < crate::stumpff::SERIES_BELOW {
+                    crate::stumpff::series::<Self, 0>(square)[1]
+                } else {
+                    self.sin() / self
+                }
+            }
+            #[inline]
+            fn sinhc(self) -> Self {
+                let square = self * self;
+                if square.value() < crate::stumpff::SERIES_BELOW {
+                    crate::stumpff::series::<Self, 0>(-square)[1]
+                } else {
+                    self.sinh() / self
+                }
+            }
             #[inline]
             fn sinh_cosh(self) -> (Self, Self) {
                 (self.sinh(), self.cosh())
@@ -357,11 +362,11 @@ macro_rules! impl_real_field {
                 log10 |c, x, _y| c(std::f64::consts::LOG10_E) / x;
                 ln |_c, x, _y| x.recip();
                 ln_1p |c, x, _y| (c(1.0) + x).recip();
-                sqrt |c, _x, y| c(0.5) / y;
+                sqrt |c, _x, y| c(0.5) / num_traits::Signed::abs(&y);
                 cbrt |c, _x, y| (c(3.0) * y * y).recip();
                 exp |_c, _x, y| y;
                 exp2 |c, _x, y| y * c(std::f64::consts::LN_2);
-                exp_m1 |c, _x, y| y + c(1.0)
+                exp_m1 |_c, x, _y| x.exp()
             );
             #[inline]
             fn log(self, base: Self) -> Self {
@@ -373,7 +378,8 @@ macro_rules! impl_real_field {
                     return Self::constant(1.0);
                 }
                 let x = self.primal();
-                self.unary(x.powi(n), Self::inner(f64::from(n)) * x.powi(n - 1))
+                let below = n.checked_sub(1).map_or_else(|| x.powi(n) / x, |m| x.powi(m));
+                self.unary(x.powi(n), Self::inner(f64::from(n)) * below)
             }
             #[inline]
             fn powf(self, n: Self) -> Self {
@@ -418,11 +424,8 @@ macro_rules! impl_real_field {
             }
             #[inline]
             fn copysign(self, sign: Self) -> Self {
-                if self.value().is_sign_negative() == sign.value().is_sign_negative() {
-                    self
-                } else {
-                    -self
-                }
+                let magnitude = num_traits::Signed::abs(&self);
+                if sign.value().is_sign_negative() { -magnitude } else { magnitude }
             }
             #[inline]
             fn max(self, other: Self) -> Self {

@@ -108,9 +108,11 @@ impl<const K: usize> Sweep<'_, K> {
             if adjoint == [0.0; K] {
                 continue;
             }
+            let plain = K == 1 && adjoint[0].is_finite();
             for side in 0..2 {
                 let parent = (entry.parents[side] - base) as usize;
-                let flow = through(entry.slopes[side], adjoint);
+                let slope = entry.slopes[side];
+                let flow = if plain { adjoint.map(|a| slope * a) } else { through(slope, adjoint) };
                 if parent + 1 == node {
                     carry = flow;
                 } else {
@@ -170,8 +172,9 @@ fn add<const K: usize>(a: Lanes<K>, b: Lanes<K>) -> Lanes<K> {
     std::array::from_fn(|lane| a[lane] + b[lane])
 }
 
-/// `slope * adjoint`, but 0 where nothing flows: 0 · ∞ must not make a NaN of a branch that was not used.
+/// `slope * adjoint`, but 0 where nothing flows: 0 · ∞ must not make a NaN of a branch that was not used or of
+/// an operand that does not move the result.
 #[inline]
 fn through<const K: usize>(slope: f64, adjoint: Lanes<K>) -> Lanes<K> {
-    adjoint.map(|a| if K > 1 && a == 0.0 { 0.0 } else { slope * a })
+    adjoint.map(|a| if a == 0.0 || slope == 0.0 { 0.0 } else { slope * a })
 }

@@ -7,6 +7,7 @@
 use std::cell::{Cell, RefCell};
 
 use crate::arena::{Arena, Mark};
+use crate::chain::through;
 use crate::{CustomVjp, Var};
 
 /// What the sweep reads: 24 bytes for a node of two parents.
@@ -131,10 +132,11 @@ pub(crate) fn push(value: f64, [a, b]: [Var; 2], slopes: [f64; 2]) -> Var {
         if (a.recording ^ recording) | (b.recording ^ recording) != 0 {
             refuse_foreign();
         }
-        let node = end.push(Entry {
-            slopes: [slopes[0] * a.coefficient, slopes[1] * b.coefficient],
-            parents: [a.node, b.node],
-        });
+        let mut flows = [slopes[0] * a.coefficient, slopes[1] * b.coefficient];
+        if flows[0].is_nan() || flows[1].is_nan() {
+            flows = [through(slopes[0], a.coefficient), through(slopes[1], b.coefficient)];
+        }
+        let node = end.push(Entry { slopes: flows, parents: [a.node, b.node] });
         Var { value, coefficient: 1.0, node, recording }
     })
 }
@@ -164,7 +166,9 @@ pub(crate) fn push_block(inputs: &[Var], outputs: usize, jacobian: &[f64]) -> Ou
                 return;
             }
             for row in jacobian.chunks_exact(inputs.len()) {
-                slopes.extend(row.iter().zip(inputs).map(|(slope, var)| slope * var.coefficient));
+                slopes.extend(
+                    row.iter().zip(inputs).map(|(&slope, var)| through(slope, var.coefficient)),
+                );
             }
         });
         group
