@@ -16,6 +16,8 @@ mod num_dual;
 mod older;
 #[path = "../../../crates/autodiff/benches/workloads/ours.rs"]
 mod ours;
+#[path = "../../../crates/autodiff/benches/workloads/rigid_blocks.rs"]
+mod rigid_blocks;
 #[path = "../../../crates/autodiff/benches/workloads/table.rs"]
 mod table;
 #[path = "../../../crates/autodiff/benches/workloads/mod.rs"]

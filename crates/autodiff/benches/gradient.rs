@@ -8,6 +8,8 @@ extern crate nalgebra;
 
 #[path = "workloads/ours.rs"]
 mod ours;
+#[path = "workloads/rigid_blocks.rs"]
+mod rigid_blocks;
 #[path = "workloads/table.rs"]
 mod table;
 mod workloads;

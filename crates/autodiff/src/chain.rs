@@ -28,6 +28,12 @@ pub(crate) trait Chain: Copy {
     /// The result `value` of an operation on `self` and `other` with partial derivatives `slopes`.
     fn binary(self, other: Self, value: Self::Inner, slopes: [Self::Inner; 2]) -> Self;
 
+    /// [`binary`](Self::binary) for slopes that are infinite only where an operand is.
+    #[inline]
+    fn product(self, other: Self, value: Self::Inner, slopes: [Self::Inner; 2]) -> Self {
+        self.binary(other, value, slopes)
+    }
+
     /// `function` of `x`, as one operation where that pays.
     #[inline]
     fn local<const N: usize, const M: usize>(

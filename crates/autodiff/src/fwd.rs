@@ -36,11 +36,17 @@ impl<const N: usize, T: Scalar> Fwd<N, T> {
     }
 }
 
+/// Whether `T` is a plain number, without derivatives of its own.
+#[inline]
+const fn is_plain<T>() -> bool {
+    size_of::<T>() <= size_of::<f64>()
+}
+
 /// Whether [`through`] is no more than a product: plain numbers with finite slopes. Looking once at the slopes
 /// costs half as much as looking at every derivative.
 #[inline]
 fn is_tame<T: Scalar>(slopes: &[T]) -> bool {
-    size_of::<T>() <= size_of::<f64>() && slopes.iter().all(|slope| slope.value().is_finite())
+    is_plain::<T>() && slopes.iter().all(|slope| slope.value().is_finite())
 }
 
 impl<const N: usize, T: Scalar> Chain for Fwd<N, T> {
@@ -78,6 +84,16 @@ impl<const N: usize, T: Scalar> Chain for Fwd<N, T> {
         } else {
             wild_binary(self.derivative, other.derivative, da, db)
         };
+        Self { value, derivative }
+    }
+
+    #[inline]
+    fn product(self, other: Self, value: T, [da, db]: [T; 2]) -> Self {
+        if !is_plain::<T>() {
+            return self.binary(other, value, [da, db]);
+        }
+        let derivative =
+            std::array::from_fn(|i| da * self.derivative[i] + db * other.derivative[i]);
         Self { value, derivative }
     }
 }

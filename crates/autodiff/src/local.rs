@@ -82,7 +82,8 @@ pub(crate) fn sum_local<const K: usize, F: LocalFunction<K, 1>>(
     terms: impl IntoIterator<Item = (F, [usize; K])>,
 ) -> Var {
     let mut sum = 0.0;
-    let mut gradient = with_tape(|tape| tape.zeros(x.len()));
+    let mut gradient = with_tape(|tape| tape.scratch(x.len()));
+    gradient.fill(0.0);
     for (term, places) in terms {
         let ([value], [slopes]) = term.linearise(places.map(|place| x[place].value));
         sum += value;

@@ -11,6 +11,7 @@ macro_rules! impl_real_field {
         impl<$($generics)*> std::ops::Add for $t {
             type Output = Self;
             #[inline]
+            #[track_caller]
             fn add(self, o: Self) -> Self {
                 let one = Self::inner(1.0);
                 self.binary(o, self.primal() + o.primal(), [one, one])
@@ -19,6 +20,7 @@ macro_rules! impl_real_field {
         impl<$($generics)*> std::ops::Sub for $t {
             type Output = Self;
             #[inline]
+            #[track_caller]
             fn sub(self, o: Self) -> Self {
                 let one = Self::inner(1.0);
                 self.binary(o, self.primal() - o.primal(), [one, -one])
@@ -27,14 +29,16 @@ macro_rules! impl_real_field {
         impl<$($generics)*> std::ops::Mul for $t {
             type Output = Self;
             #[inline]
+            #[track_caller]
             fn mul(self, o: Self) -> Self {
                 let (a, b) = (self.primal(), o.primal());
-                self.binary(o, a * b, [b, a])
+                self.product(o, a * b, [b, a])
             }
         }
         impl<$($generics)*> std::ops::Div for $t {
             type Output = Self;
             #[inline]
+            #[track_caller]
             fn div(self, o: Self) -> Self {
                 let inverse = o.primal().recip();
                 let value = self.primal() / o.primal();
@@ -44,6 +48,7 @@ macro_rules! impl_real_field {
         impl<$($generics)*> std::ops::Rem for $t {
             type Output = Self;
             #[inline]
+            #[track_caller]
             fn rem(self, o: Self) -> Self {
                 let (a, b) = (self.primal(), o.primal());
                 // Not the truncated a / b, which rounds up to the next integer just below it.
@@ -54,6 +59,7 @@ macro_rules! impl_real_field {
         impl<$($generics)*> std::ops::Neg for $t {
             type Output = Self;
             #[inline]
+            #[track_caller]
             fn neg(self) -> Self {
                 self.unary(-self.primal(), Self::inner(-1.0))
             }
@@ -130,12 +136,14 @@ macro_rules! impl_real_field {
         }
         impl<$($generics)*> num_traits::Signed for $t {
             #[inline]
+            #[track_caller]
             fn abs(&self) -> Self {
                 let v = self.primal();
                 let slope = if v.value() == 0.0 { 0.0 } else { v.value().signum() };
                 self.unary(num_traits::Signed::abs(&v), Self::inner(slope))
             }
             #[inline]
+            #[track_caller]
             fn abs_sub(&self, o: &Self) -> Self {
                 if self <= o { Self::constant(0.0) } else { *self - *o }
             }
@@ -189,21 +197,25 @@ macro_rules! impl_real_field {
                 value
             }
             #[inline]
+            #[track_caller]
             fn extract(&self, _: usize) -> Self {
                 *self
             }
             // The trait declares these two `unsafe fn`; the bodies contain no unsafe operation.
             #[allow(unsafe_code)]
             #[inline]
+            #[track_caller]
             unsafe fn extract_unchecked(&self, _: usize) -> Self {
                 *self
             }
             #[inline]
+            #[track_caller]
             fn replace(&mut self, _: usize, value: Self) {
                 *self = value;
             }
             #[allow(unsafe_code)]
             #[inline]
+            #[track_caller]
             unsafe fn replace_unchecked(&mut self, _: usize, value: Self) {
                 *self = value;
             }
@@ -215,6 +227,7 @@ macro_rules! impl_real_field {
 
         impl<$($generics)*> simba::scalar::SubsetOf<$t> for $t {
             #[inline]
+            #[track_caller]
             fn to_superset(&self) -> Self {
                 *self
             }
@@ -245,10 +258,12 @@ macro_rules! impl_real_field {
                 Self::constant(0.0)
             }
             #[inline]
+            #[track_caller]
             fn modulus(self) -> Self {
                 num_traits::Signed::abs(&self)
             }
             #[inline]
+            #[track_caller]
             fn modulus_squared(self) -> Self {
                 self * self
             }
@@ -257,18 +272,22 @@ macro_rules! impl_real_field {
                 Self::constant(if self.value() >= 0.0 { 0.0 } else { std::f64::consts::PI })
             }
             #[inline]
+            #[track_caller]
             fn norm1(self) -> Self {
                 num_traits::Signed::abs(&self)
             }
             #[inline]
+            #[track_caller]
             fn scale(self, factor: Self) -> Self {
                 self * factor
             }
             #[inline]
+            #[track_caller]
             fn unscale(self, factor: Self) -> Self {
                 self / factor
             }
             #[inline]
+            #[track_caller]
             fn to_exp(self) -> (Self, Self) {
                 let one = Self::constant(1.0);
 let modulus = num_traits::Signed::abs(&self);
@@ -280,20 +299,24 @@ let modulus = num_traits::Signed::abs(&self);
             }
             impl_real_field!(@flat floor ceil round trunc);
             #[inline]
+            #[track_caller]
             fn fract(self) -> Self {
                 self.unary(self.primal().fract(), Self::inner(1.0))
             }
             #[inline]
+            #[track_caller]
             fn mul_add(self, a: Self, b: Self) -> Self {
                 // Rounded once, as the plain number's is: code for error terms lives off the difference.
                 let value = self.primal().mul_add(a.primal(), b.primal());
                 (self * a).binary(b, value, [Self::inner(1.0); 2])
             }
             #[inline]
+            #[track_caller]
             fn abs(self) -> Self {
                 num_traits::Signed::abs(&self)
             }
             #[inline]
+            #[track_caller]
             fn hypot(self, other: Self) -> Self {
                 let (a, b) = (self.primal(), other.primal());
                 let value = a.hypot(b);
@@ -303,6 +326,7 @@ let modulus = num_traits::Signed::abs(&self);
                 self.binary(other, value, [a / value, b / value])
             }
             #[inline]
+            #[track_caller]
             fn recip(self) -> Self {
                 let value = self.primal().recip();
                 self.unary(value, -value * value)
@@ -312,20 +336,24 @@ let modulus = num_traits::Signed::abs(&self);
                 self
             }
             #[inline]
+            #[track_caller]
             fn sin_cos(self) -> (Self, Self) {
                 let (s, c) = self.primal().sin_cos();
                 (self.unary(s, c), self.unary(c, -s))
             }
             #[inline]
+            #[track_caller]
             fn sin(self) -> Self {
                 self.sin_cos().0
             }
             #[inline]
+            #[track_caller]
             fn cos(self) -> Self {
                 self.sin_cos().1
             }
             // Not the quotients near zero, whose slopes are differences of two reciprocals there.
             #[inline]
+            #[track_caller]
             fn sinc(self) -> Self {
                 let square = self * self;
                 if square.value() < crate::stumpff::SERIES_BELOW {
@@ -335,6 +363,7 @@ let modulus = num_traits::Signed::abs(&self);
                 }
             }
             #[inline]
+            #[track_caller]
             fn sinhc(self) -> Self {
                 let square = self * self;
                 if square.value() < crate::stumpff::SERIES_BELOW {
@@ -344,6 +373,7 @@ let modulus = num_traits::Signed::abs(&self);
                 }
             }
             #[inline]
+            #[track_caller]
             fn sinh_cosh(self) -> (Self, Self) {
                 (self.sinh(), self.cosh())
             }
@@ -369,10 +399,12 @@ let modulus = num_traits::Signed::abs(&self);
                 exp_m1 |_c, x, _y| x.exp()
             );
             #[inline]
+            #[track_caller]
             fn log(self, base: Self) -> Self {
                 self.ln() / base.ln()
             }
             #[inline]
+            #[track_caller]
             fn powi(self, n: i32) -> Self {
                 if n == 0 {
                     return Self::constant(1.0);
@@ -382,6 +414,7 @@ let modulus = num_traits::Signed::abs(&self);
                 self.unary(x.powi(n), Self::inner(f64::from(n)) * below)
             }
             #[inline]
+            #[track_caller]
             fn powf(self, n: Self) -> Self {
                 let (x, e) = (self.primal(), n.primal());
                 let value = x.powf(e);
@@ -400,6 +433,7 @@ let modulus = num_traits::Signed::abs(&self);
                 self.binary(n, value, [by_base, by_exponent])
             }
             #[inline]
+            #[track_caller]
             fn powc(self, n: Self) -> Self {
                 self.powf(n)
             }
@@ -408,6 +442,7 @@ let modulus = num_traits::Signed::abs(&self);
                 self.value().is_finite()
             }
             #[inline]
+            #[track_caller]
             fn try_sqrt(self) -> Option<Self> {
                 (self.value() >= 0.0).then(|| self.sqrt())
             }
@@ -423,6 +458,7 @@ let modulus = num_traits::Signed::abs(&self);
                 self.value().is_sign_negative()
             }
             #[inline]
+            #[track_caller]
             fn copysign(self, sign: Self) -> Self {
                 let magnitude = num_traits::Signed::abs(&self);
                 if sign.value().is_sign_negative() { -magnitude } else { magnitude }
@@ -446,6 +482,7 @@ let modulus = num_traits::Signed::abs(&self);
                 }
             }
             #[inline]
+            #[track_caller]
             fn atan2(self, other: Self) -> Self {
                 let (y, x) = (self.primal(), other.primal());
                 // Not by x² + y², which leaves the range of f64 for tiny and huge arguments.
@@ -477,11 +514,13 @@ let modulus = num_traits::Signed::abs(&self);
                 self.primal().value()
             }
             #[inline]
+            #[track_caller]
             fn times(self, factor: f64) -> Self {
                 let factor = Self::inner(factor);
                 self.unary(self.primal() * factor, factor)
             }
             #[inline]
+            #[track_caller]
             fn plus(self, term: f64) -> Self {
                 self.unary(self.primal() + Self::inner(term), Self::inner(1.0))
             }
@@ -515,6 +554,7 @@ let modulus = num_traits::Signed::abs(&self);
     (@assign_one [[$($generics:tt)*] $t:ty] [$trait:ident $method:ident $op:tt]) => {
         impl<$($generics)*> std::ops::$trait for $t {
             #[inline]
+            #[track_caller]
             fn $method(&mut self, o: Self) {
                 *self = *self $op o;
             }
@@ -523,6 +563,7 @@ let modulus = num_traits::Signed::abs(&self);
     (@subset [$($generics:tt)*] $t:ty, $plain:ty) => {
         impl<$($generics)*> simba::scalar::SubsetOf<$t> for $plain {
             #[inline]
+            #[track_caller]
             fn to_superset(&self) -> $t {
                 <$t>::constant(f64::from(*self))
             }
@@ -544,6 +585,7 @@ let modulus = num_traits::Signed::abs(&self);
     };
     (@smooth $($name:ident |$c:ident, $x:ident, $y:ident| $slope:expr);*) => {
         $(#[inline]
+        #[track_caller]
         fn $name(self) -> Self {
             let $c = Self::inner;
             let $x = self.primal();

@@ -92,15 +92,18 @@ impl Recording {
     pub fn vjp(&self, outputs: &[(Var, f64)]) -> Adjoints {
         let (base, mut adjoints) = with_tape(|tape| {
             let start = tape.start(self.recording);
+            outputs
+                .iter()
+                .filter(|(var, _)| var.recording != 0)
+                .for_each(|(var, _)| tape.check(*var));
             let nodes = tape.nodes_since(start);
-            let mut adjoints = tape.zeros(nodes);
-            for &(var, seed) in outputs.iter().filter(|(var, _)| var.recording != 0) {
-                tape.check(var);
-                adjoints[(var.node - start.node) as usize] += seed * var.coefficient;
-            }
-            (start.node, adjoints)
+            (start.node, tape.scratch(nodes))
         });
-        sweep::<1>(self.recording, adjoints.as_chunks_mut().0);
+        sweep::<1>(self.recording, adjoints.as_chunks_mut().0, |adjoints| {
+            for &(var, seed) in outputs.iter().filter(|(var, _)| var.recording != 0) {
+                adjoints[(var.node - base) as usize][0] += seed * var.coefficient;
+            }
+        });
         Adjoints { recording: self.recording, base, adjoints }
     }
 
@@ -115,15 +118,15 @@ impl Recording {
             let start = tape.start(self.recording);
             outputs.iter().filter(|var| var.recording != 0).for_each(|var| tape.check(*var));
             let nodes = tape.nodes_since(start);
-            (start, tape.zeros(nodes * LANES))
+            (start, tape.scratch(nodes * LANES))
         });
         let lanes = adjoints.as_chunks_mut::<LANES>().0;
         for (block, rows) in outputs.chunks(LANES).enumerate() {
-            lanes.fill([0.0; LANES]);
-            for (lane, var) in rows.iter().enumerate().filter(|(_, var)| var.recording != 0) {
-                lanes[(var.node - start.node) as usize][lane] = var.coefficient;
-            }
-            sweep(self.recording, lanes);
+            sweep(self.recording, lanes, |lanes| {
+                for (lane, var) in rows.iter().enumerate().filter(|(_, var)| var.recording != 0) {
+                    lanes[(var.node - start.node) as usize][lane] = var.coefficient;
+                }
+            });
             for (column, input) in inputs.iter().enumerate() {
                 let Some(node) = input.own_node(self.recording) else { continue };
                 for lane in 0..rows.len() {

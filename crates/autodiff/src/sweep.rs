@@ -10,8 +10,10 @@ type Lanes<const K: usize> = [f64; K];
 const COLUMNS: usize = 8;
 
 /// A sweep under way. It stops at each custom operation, so that the operation may use the tape.
-struct Sweep<'a, const K: usize> {
+struct Sweep<'a, const K: usize, const CAREFUL: bool> {
     adjoints: &'a mut [Lanes<K>],
+    /// Whether a variable's adjoint is NaN.
+    poisoned: bool,
     start: Start,
     /// Nodes that are still to be visited, counted from the start of the recording.
     node: usize,
@@ -21,13 +23,32 @@ struct Sweep<'a, const K: usize> {
     operation: usize,
 }
 
-/// Adds to the adjoints of everything that the seeded nodes of `recording` depend on.
+/// Finds the adjoints of everything that the nodes of `recording` that `seed` sets depend on.
 ///
-/// `adjoints` holds the seeds, one element a node of the recording.
-pub(crate) fn sweep<const K: usize>(recording: u32, adjoints: &mut [Lanes<K>]) {
-    let mut sweep = with_tape(|tape| Sweep {
+/// `adjoints` holds one element a node of the recording.
+pub(crate) fn sweep<const K: usize>(
+    recording: u32,
+    adjoints: &mut [Lanes<K>],
+    seed: impl Fn(&mut [Lanes<K>]),
+) {
+    adjoints.fill([0.0; K]);
+    seed(adjoints);
+    if run::<K, false>(recording, adjoints) {
+        return;
+    }
+    // A NaN came out. Where it is 0 · ∞ of an operand that does not move the result, there is a better
+    // answer, but looking at every slope for it would slow down all other sweeps by half.
+    adjoints.fill([0.0; K]);
+    seed(adjoints);
+    run::<K, true>(recording, adjoints);
+}
+
+/// Sweeps once, and says whether no variable's adjoint is NaN.
+fn run<const K: usize, const CAREFUL: bool>(recording: u32, adjoints: &mut [Lanes<K>]) -> bool {
+    let mut sweep = with_tape(|tape| Sweep::<K, CAREFUL> {
         node: adjoints.len(),
         adjoints,
+        poisoned: false,
         start: tape.start(recording),
         entry: tape.entries.mark(),
         slope: tape.slopes.mark(),
@@ -64,9 +85,10 @@ pub(crate) fn sweep<const K: usize>(recording: u32, adjoints: &mut [Lanes<K>]) {
         with_tape(|tape| tape.operations[operation] = Some(custom));
         sweep.node -= group.outputs;
     }
+    !sweep.poisoned
 }
 
-impl<const K: usize> Sweep<'_, K> {
+impl<const K: usize, const CAREFUL: bool> Sweep<'_, K, CAREFUL> {
     /// Goes back to the next custom operation, if there is one, and returns it.
     fn run(&mut self, tape: &Tape) -> Option<Group> {
         while self.entry != self.start.entry {
@@ -108,11 +130,9 @@ impl<const K: usize> Sweep<'_, K> {
             if adjoint == [0.0; K] {
                 continue;
             }
-            let plain = K == 1 && adjoint[0].is_finite();
             for side in 0..2 {
                 let parent = (entry.parents[side] - base) as usize;
-                let slope = entry.slopes[side];
-                let flow = if plain { adjoint.map(|a| slope * a) } else { through(slope, adjoint) };
+                let flow = through::<K, CAREFUL>(entry.slopes[side], adjoint);
                 if parent + 1 == node {
                     carry = flow;
                 } else {
@@ -135,6 +155,8 @@ impl<const K: usize> Sweep<'_, K> {
         let first = self.node - group.outputs;
         self.node = first;
         if group.inputs == 0 {
+            let variables = &self.adjoints[first..first + group.outputs];
+            self.poisoned |= variables.as_flattened().iter().any(|adjoint| adjoint.is_nan());
             return;
         }
         let (before, outputs) = self.adjoints.split_at_mut(first);
@@ -148,8 +170,8 @@ impl<const K: usize> Sweep<'_, K> {
                 let row = &row[start..start + parents.len()];
                 // The same loop twice: with a length known beforehand it needs no loop at all.
                 match <&[f64; COLUMNS]>::try_from(row) {
-                    Ok(row) => add_row(&mut flows, row, *adjoint),
-                    Err(_) => add_row(&mut flows, row, *adjoint),
+                    Ok(row) => add_row::<K, CAREFUL>(&mut flows, row, *adjoint),
+                    Err(_) => add_row::<K, CAREFUL>(&mut flows, row, *adjoint),
                 }
             }
             for (parent, flow) in parents.iter().zip(flows) {
@@ -161,9 +183,13 @@ impl<const K: usize> Sweep<'_, K> {
 }
 
 #[inline(always)]
-fn add_row<const K: usize>(flows: &mut [Lanes<K>], row: &[f64], adjoint: Lanes<K>) {
+fn add_row<const K: usize, const CAREFUL: bool>(
+    flows: &mut [Lanes<K>],
+    row: &[f64],
+    adjoint: Lanes<K>,
+) {
     for (flow, slope) in flows.iter_mut().zip(row) {
-        *flow = add(*flow, through(*slope, adjoint));
+        *flow = add(*flow, through::<K, CAREFUL>(*slope, adjoint));
     }
 }
 
@@ -172,9 +198,12 @@ fn add<const K: usize>(a: Lanes<K>, b: Lanes<K>) -> Lanes<K> {
     std::array::from_fn(|lane| a[lane] + b[lane])
 }
 
-/// `slope * adjoint`, but 0 where nothing flows: 0 · ∞ must not make a NaN of a branch that was not used or of
-/// an operand that does not move the result.
+/// `slope * adjoint`, but 0 where nothing flows: 0 · ∞ must not make a NaN of a branch that was not used or,
+/// looking carefully, of an operand that does not move the result.
 #[inline]
-fn through<const K: usize>(slope: f64, adjoint: Lanes<K>) -> Lanes<K> {
-    adjoint.map(|a| if a == 0.0 || slope == 0.0 { 0.0 } else { slope * a })
+fn through<const K: usize, const CAREFUL: bool>(slope: f64, adjoint: Lanes<K>) -> Lanes<K> {
+    adjoint.map(|a| {
+        let still = (CAREFUL && slope == 0.0) || (CAREFUL && a == 0.0);
+        if still { 0.0 } else { slope * a }
+    })
 }

@@ -60,6 +60,7 @@ pub(crate) struct Start {
     recording: u32,
     closed: bool,
     pub(crate) node: u32,
+    groups: u32,
     pub(crate) entry: Mark,
     pub(crate) slope: Mark,
     pub(crate) parent: Mark,
@@ -72,6 +73,8 @@ pub(crate) struct Tape {
     recording: u32,
     /// Nodes of all open recordings.
     nodes: u32,
+    /// Groups among their entries.
+    groups: u32,
     open: Vec<Start>,
     pub(crate) entries: Arena<Entry>,
     /// Dense Jacobians (row-major, outputs × inputs), or one coefficient an input of a custom operation.
@@ -94,6 +97,7 @@ struct End {
     recording: Cell<u32>,
     /// Nodes of all open recordings, but one less for each entry that waits here.
     nodes: Cell<u32>,
+    groups: Cell<u32>,
     len: Cell<u32>,
     waiting: [Cell<Entry>; WAITING],
 }
@@ -103,6 +107,7 @@ thread_local! {
         End {
             recording: Cell::new(0),
             nodes: Cell::new(0),
+            groups: Cell::new(0),
             len: Cell::new(0),
             waiting: [const { Cell::new(Entry { slopes: [0.0; 2], parents: [0; 2] }) }; WAITING],
         }
@@ -118,6 +123,7 @@ pub(crate) fn with_tape<R>(f: impl FnOnce(&mut Tape) -> R) -> R {
             end.flush(&mut tape);
             let result = f(&mut tape);
             end.nodes.set(tape.nodes);
+            end.groups.set(tape.groups);
             end.recording.set(tape.recording);
             result
         })
@@ -237,6 +243,7 @@ impl End {
             refuse_more();
         }
         let first = self.push(Entry::group(group));
+        self.groups.set(self.groups.get() + 1);
         // The entry itself counts as one node.
         self.nodes.set(self.nodes.get().wrapping_add(group.outputs as u32).wrapping_sub(1));
         Outputs { first, recording: self.recording.get() }
@@ -255,6 +262,7 @@ impl End {
         let waiting = &self.waiting[..len as usize];
         tape.entries.room(waiting.len()).extend(waiting.iter().map(Cell::get));
         tape.nodes = self.nodes.get().wrapping_add(len);
+        tape.groups = self.groups.get();
         // The next entries to wait must not be refused, and the last number marks groups.
         if tape.nodes > GROUP - WAITING as u32 {
             refuse_more();
@@ -294,6 +302,7 @@ impl Tape {
         Self {
             recording: 0,
             nodes: 0,
+            groups: 0,
             open: Vec::new(),
             entries: Arena::new(),
             slopes: Arena::new(),
@@ -310,6 +319,7 @@ impl Tape {
             recording,
             closed: false,
             node: self.nodes,
+            groups: self.groups,
             entry: self.entries.mark(),
             slope: self.slopes.mark(),
             parent: self.parents.mark(),
@@ -324,6 +334,7 @@ impl Tape {
         }
         while let Some(start) = self.open.pop_if(|start| start.closed) {
             self.nodes = start.node;
+            self.groups = start.groups;
             self.entries.truncate(start.entry);
             self.slopes.truncate(start.slope);
             self.parents.truncate(start.parent);
@@ -343,15 +354,14 @@ impl Tape {
         (self.nodes - start.node) as usize
     }
 
-    /// Numbers to work with, of memory that was used before: `len` zeros.
-    pub(crate) fn zeros(&mut self, len: usize) -> Vec<f64> {
+    /// `len` numbers to work with, of memory that was used before: their values are arbitrary.
+    pub(crate) fn scratch(&mut self, len: usize) -> Vec<f64> {
         let mut numbers = self.spare.pop().unwrap_or_default();
-        numbers.clear();
         numbers.resize(len, 0.0);
         numbers
     }
 
-    /// Takes memory back for [`Self::zeros`].
+    /// Takes memory back for [`Self::scratch`].
     pub(crate) fn keep(&mut self, numbers: Vec<f64>) {
         self.spare.push(numbers);
     }
@@ -361,16 +371,9 @@ impl Tape {
         let entries = self.entries.len_above(start.entry);
         let (slopes, parents) =
             (self.slopes.len_above(start.slope), self.parents.len_above(start.parent));
-        let mut blocks = 0;
-        let mut top = self.entries.mark();
-        while top != start.entry {
-            let (slice, below) = self.entries.top_chunk(start.entry, top);
-            blocks += slice.iter().filter(|entry| entry.as_group().is_some()).count();
-            top = below;
-        }
         TapeStatistics {
             nodes: self.nodes_since(start),
-            blocks,
+            blocks: (self.groups - start.groups) as usize,
             bytes: entries * size_of::<Entry>()
                 + slopes * size_of::<f64>()
                 + parents * size_of::<u32>(),

@@ -1,7 +1,8 @@
 //! What this crate brings to the comparison: one line for each workload and mode.
 
-use prehend_autodiff::{Fwd, Recording, Var};
+use prehend_autodiff::{Fwd, LocalFunction, Recording, Scalar, Var};
 
+use super::rigid_blocks;
 use super::table::{Comparison, print};
 use super::workloads::rigid_body::{self, Scene, miss, wrench};
 use super::workloads::{point_mass, rosenbrock};
@@ -35,7 +36,13 @@ impl<'a> Comparisons<'a> {
     pub(crate) fn new(scenes: &'a Scenes) -> Self {
         let mut a = Comparison::new("a Rosenbrock", rosenbrock::inputs(), rosenbrock::sum);
         a.add("by hand", rosenbrock::adjoint);
-        a.add("ours, reverse", reverse(rosenbrock::sum));
+        a.add_taped("ours, reverse", reverse(rosenbrock::sum));
+        a.add_taped(
+            "ours, summed terms",
+            reverse(|x: &[Var; rosenbrock::INPUTS]| {
+                Var::sum_local(x, (1..x.len()).map(|i| (RosenbrockTerm, [i - 1, i])))
+            }),
+        );
         a.add_absent("ours, forward", TOO_MANY);
 
         let mut b = Comparison::new("b point mass", point_mass::INPUTS, point_mass::miss);
@@ -45,14 +52,15 @@ impl<'a> Comparisons<'a> {
             (value, size_of_val(states.as_slice()))
         });
         b.add("ours, forward", forward(point_mass::miss));
-        b.add("ours, reverse", reverse(point_mass::miss));
+        b.add_taped("ours, reverse", reverse(point_mass::miss));
 
         let bodies = [("c8 box", &scenes.corners), ("d ellipsoid", &scenes.cloud)];
         let [c, d] = bodies.map(|(workload, scene)| {
             let start = rigid_body::INPUTS;
             let mut body = Comparison::new(workload, start, |x| miss(x, scene, wrench));
             body.add("ours, forward", forward(|x| miss(x, scene, wrench)));
-            body.add("ours, reverse", reverse(|x| miss(x, scene, wrench)));
+            body.add_taped("ours, reverse", reverse(|x| miss(x, scene, wrench)));
+            body.add_taped("ours, blocks", reverse(|x| rigid_blocks::miss(x, scene)));
             body
         });
         Self { rosenbrock: a, point_mass: b, corners: c, cloud: d }
@@ -80,16 +88,27 @@ fn forward<const N: usize>(
     }
 }
 
-/// A recording of every operation, and a sweep back over it.
+/// A recording and a sweep back over it.
 fn reverse<const N: usize>(
     f: impl Fn(&[Var; N]) -> Var,
-) -> impl FnMut(&[f64; N], &mut [f64; N]) -> f64 {
+) -> impl FnMut(&[f64; N], &mut [f64; N]) -> (f64, usize) {
     move |x, gradient| {
         let recording = Recording::start();
         let inputs = recording.variables(*x);
         let output = f(&inputs);
         let adjoints = recording.gradient(output);
         *gradient = inputs.map(|input| adjoints.wrt(input));
-        output.value()
+        (output.value(), recording.statistics().bytes)
+    }
+}
+
+/// What two neighbours in the Rosenbrock chain add.
+struct RosenbrockTerm;
+
+impl LocalFunction<2, 1> for RosenbrockTerm {
+    #[inline]
+    fn evaluate<S: Scalar>(&self, [a, b]: [S; 2]) -> [S; 1] {
+        let (bend, offset) = (b - a * a, S::one() - a);
+        [(bend * bend).times(100.0) + offset * offset]
     }
 }

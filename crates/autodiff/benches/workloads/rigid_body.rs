@@ -11,18 +11,18 @@ pub(crate) const INPUTS: [f64; 12] =
     [0.1, -0.2, 0.15, 0.0, 0.0, 0.12, 0.5, 0.1, -0.5, 1.0, -2.0, 0.5];
 
 /// \[s\]
-const STEP: f64 = 1e-3;
+pub(crate) const STEP: f64 = 1e-3;
 /// \[m/s²\]
-const GRAVITY: f64 = 9.81;
+pub(crate) const GRAVITY: f64 = 9.81;
 /// Moments of inertia about the body's axes \[kg·m²\].
-const INERTIA: [f64; 3] = [0.0034, 0.0078, 0.009];
+pub(crate) const INERTIA: [f64; 3] = [0.0034, 0.0078, 0.009];
 /// \[s/m\]
 const DAMPING: f64 = 0.5;
 const FRICTION: f64 = 0.4;
 /// Square of the sliding speed below which friction fades out \[m²/s²\].
 const CREEP: f64 = 1e-4;
 /// Where the body should end, upright \[m\].
-const TARGET: [f64; 3] = [0.1, 0.0, 0.05];
+pub(crate) const TARGET: [f64; 3] = [0.1, 0.0, 0.05];
 /// Half the body's extent along its axes \[m\].
 const HALF_EXTENTS: [f64; 3] = [0.1, 0.06, 0.04];
 
@@ -146,10 +146,15 @@ pub(crate) fn contact<T: RealField + Copy>(
     if z >= T::zero() {
         return None;
     }
-    let v = state.velocity + state.angular_velocity.cross(&arm);
+    let force = push(z, state.velocity + state.angular_velocity.cross(&arm), stiffness);
+    Some(Wrench { force, torque: arm.cross(&force) })
+}
+
+/// The floor's force on a point at height `z` < 0 that moves with velocity `v`.
+#[inline]
+pub(crate) fn push<T: RealField + Copy>(z: T, v: Vector3<T>, stiffness: f64) -> Vector3<T> {
     let normal = -z * constant(stiffness) * (T::one() - v.z * constant(DAMPING));
     let slip = (v.x * v.x + v.y * v.y + constant(CREEP)).sqrt();
     let drag = -(normal * constant(FRICTION)) / slip;
-    let force = Vector3::new(drag * v.x, drag * v.y, normal);
-    Some(Wrench { force, torque: arm.cross(&force) })
+    Vector3::new(drag * v.x, drag * v.y, normal)
 }
