@@ -1,7 +1,8 @@
-//! Forward- and reverse-mode automatic differentiation over nalgebra's `RealField`.
+//! Automatic differentiation of ordinary nalgebra code, for simulation.
 //!
-//! Write a function once over [`Scalar`] and run it with `f64`, forward-mode [`Fwd`] (few inputs) or
-//! reverse-mode [`Var`] (many inputs), inside every nalgebra type:
+//! # A first gradient
+//! Write a function once over [`Scalar`]; run it with `f64`, with forward mode [`Fwd`] for few inputs or
+//! with reverse mode [`Var`] for many, inside every nalgebra type:
 //!
 //! ```
 //! use prehend_autodiff::{Fwd, Scalar, gradient};
@@ -16,11 +17,54 @@
 //! assert_eq!((value, reverse), (forward.value, forward.derivative.to_vec()));
 //! ```
 //!
-//! [`custom`] and [`block`] record operations that bring their own derivative, [`lie`] holds rotations
-//! and rigid motions, [`optimise`] a few small optimisers, [`check`] the finite differences that every
-//! derivative here is held against.
-//! [`solve`] and [`implicit`] differentiate linear solves and the solutions of equations without
-//! differentiating the solver: see [a differentiable solve](implicit#a-differentiable-solve).
+//! Forward mode needs no memory and wins up to some 16 inputs on plain code. Reverse mode costs a few
+//! evaluations whatever the number of inputs; what makes it fast is to record little: see blocks below.
+//!
+//! | wanted | use |
+//! |---|---|
+//! | gradient | [`gradient`], [`gradient_into`] (allocates nothing), [`Recording`] for control |
+//! | Jacobian | [`jacobian`], [`forward_jacobian`], [`sparse`] by colouring |
+//! | Hessian, Hessian–vector product | [`hessian`], [`hessian_vector`], or `Fwd<N, Fwd<N>>` |
+//! | gradient through thousands of steps | [`checkpoint`] |
+//! | derivative of a linear solve, of a root | [`solve`], [`implicit`] |
+//! | an operation with its own derivative | [`LocalFunction`], [`block`], [`custom`], [`preaccumulate`] |
+//! | rotations and rigid motions | [`lie`], [`rigid`] |
+//! | local Jacobians on all cores, the same bits for any number of them | [`parallel`] |
+//! | where a NaN comes from | [`diagnose`] |
+//! | something to minimise with | [`optimise`] |
+//! | an independent derivative to test against | [`check`] |
+//!
+//! # A derivative of your own
+//! A [`LocalFunction`] of few numbers is generic code that may bring its Jacobian. Reverse mode records it as one
+//! block, without what is inside. Here a contact force and its slope, with the slope left to forward mode:
+//!
+//! ```
+//! use prehend_autodiff::{LocalFunction, Scalar, gradient};
+//!
+//! struct Contact { stiffness: f64 }
+//!
+//! impl LocalFunction<2, 1> for Contact {
+//!     fn evaluate<S: Scalar>(&self, [depth, speed]: [S; 2]) -> [S; 1] {
+//!         let force = depth * depth.sqrt() * (S::one() - speed.times(0.5));
+//!         [force.times(self.stiffness).select(depth.value() > 0.0, S::zero())]
+//!     }
+//! }
+//!
+//! let contact = Contact { stiffness: 1e4 };
+//! let (force, by) = gradient(|x| Scalar::local(&contact, [x[0], x[1]])[0], &[0.01, -1.0]);
+//! assert!((by[0] - 1.5 * force / 0.01).abs() < 1e-9 * by[0]);
+//! ```
+//!
+//! Images, point sets and solvers are operations of many numbers: implement [`CustomVjp`] and record with
+//! [`custom`].
+//!
+//! # Further
+//! [A checkpointed rollout](checkpoint), [a differentiable solve](implicit#a-differentiable-solve), and the
+//! example `argmin_lbfgs`, which aims a throw with the optimisers here and with those of `argmin`.
+//!
+//! A [`Var`] belongs to its [`Recording`] and thread: using it elsewhere is a panic that says so, never a wrong
+//! number. At singular points the derivative is documented (in [`Scalar`] and at each function), and a
+//! branch that is not taken contributes nothing, not even a NaN.
 
 mod arena;
 mod chain;
@@ -30,6 +74,7 @@ pub mod diagnose;
 mod fwd;
 mod hessian;
 pub mod implicit;
+mod jacobian;
 pub mod lie;
 mod local;
 mod operand;
@@ -49,9 +94,10 @@ mod vjp;
 
 pub use fwd::Fwd;
 pub use hessian::{Second, hessian, hessian_vector};
+pub use jacobian::{forward_jacobian, jacobian};
 pub use local::{LocalFunction, preaccumulate};
 pub use operand::{CustomJvp, Operand};
-pub use recording::{Adjoints, Recording, gradient, gradient_into, jacobian};
+pub use recording::{Adjoints, Recording, gradient, gradient_into};
 pub use scalar::Scalar;
 pub use tape::TapeStatistics;
 pub use var::Var;

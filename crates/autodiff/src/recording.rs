@@ -207,15 +207,6 @@ pub fn gradient_into(f: impl FnOnce(&[Var]) -> Var, x: &[f64], gradient: &mut [f
     output.value
 }
 
-/// Values of `f` at `x` and their Jacobian (outputs × inputs) by reverse mode.
-pub fn jacobian(f: impl FnOnce(&[Var]) -> Vec<Var>, x: &[f64]) -> (Vec<f64>, DMatrix<f64>) {
-    let recording = Recording::start();
-    let inputs = recording.variables_of(x);
-    let outputs = f(&inputs);
-    let values = outputs.iter().map(|output| output.value).collect();
-    (values, recording.jacobian(&outputs, &inputs))
-}
-
 #[cfg(test)]
 mod tests {
     use nalgebra::{ComplexField, Isometry3, Matrix3, SimdValue, Translation3, Vector3};

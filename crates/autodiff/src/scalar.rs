@@ -14,6 +14,10 @@ use crate::LocalFunction;
 /// Branches: compare values (`<`, `>` and `==` look at nothing else) and choose with nalgebra's
 /// `if_true.select(condition, if_false)`. Unlike multiplying by 0 or 1, the branch not taken then
 /// contributes no derivative, so an infinite or NaN slope there cannot leak in as `0 · ∞`.
+///
+/// At points without a derivative `abs` and `copysign` have slope 0, as has `hypot` at (0, 0); `min` and `max`
+/// follow the first operand on a tie; rounding has slope 0. At the edge of its domain a function has the slope
+/// from inside, which may be infinite.
 pub trait Scalar: RealField + Copy + Default {
     /// A constant: carries no derivative.
     fn constant(value: f64) -> Self;

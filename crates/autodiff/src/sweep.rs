@@ -203,7 +203,7 @@ fn add<const K: usize>(a: Lanes<K>, b: Lanes<K>) -> Lanes<K> {
 #[inline]
 fn through<const K: usize, const CAREFUL: bool>(slope: f64, adjoint: Lanes<K>) -> Lanes<K> {
     adjoint.map(|a| {
-        let still = (CAREFUL && slope == 0.0) || (CAREFUL && a == 0.0);
+        let still = CAREFUL && (slope == 0.0 || a == 0.0);
         if still { 0.0 } else { slope * a }
     })
 }

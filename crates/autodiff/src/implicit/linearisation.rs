@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::{ImplicitError, Residual};
 use crate::solve::{Factored, lu};
-use crate::{Fwd, Scalar};
+use crate::{Fwd, Scalar, forward_jacobian};
 
 /// Columns of the Jacobian computed at a time.
 const CHUNK: usize = 8;
@@ -52,25 +52,8 @@ pub(super) fn newton_step(
 /// ∂F/∂x by forward mode.
 fn jacobian(equation: &impl Residual, x: &[f64], p: &[f64]) -> Result<DMatrix<f64>, ImplicitError> {
     let p: Vec<Fwd<CHUNK>> = p.iter().map(|&p| Fwd::constant(p)).collect();
-    let mut at: Vec<Fwd<CHUNK>> = x.iter().map(|&x| Fwd::constant(x)).collect();
-    let mut jacobian = DMatrix::zeros(x.len(), x.len());
-    // At least once, so that the number of equations is checked when there are no unknowns.
-    for first in (0..x.len().max(1)).step_by(CHUNK) {
-        let chunk = first..(first + CHUNK).min(x.len());
-        for column in chunk.clone() {
-            at[column] = Fwd::variable(x[column], column - first);
-        }
-        let residual = equation.residual(&at, &p);
-        check_length(x, residual.len())?;
-        for (row, residual) in residual.iter().enumerate() {
-            for column in chunk.clone() {
-                jacobian[(row, column)] = residual.derivative[column - first];
-            }
-        }
-        for column in chunk {
-            at[column] = Fwd::constant(x[column]);
-        }
-    }
+    let (residual, jacobian) = forward_jacobian(|x| equation.residual(x, &p), x);
+    check_length(x, residual.len())?;
     Ok(jacobian)
 }
 
