@@ -59,9 +59,9 @@ pub(crate) trait Chain: Copy {
     }
 }
 
-/// `slope * derivative`, but 0 where the operand does not move: 0 · ∞ must not make a NaN of a direction
-/// that has nothing to do with the operation.
+/// `slope * derivative`, but 0 if either is: 0 · ∞ must not make a NaN of a direction that has nothing to do
+/// with the operation, nor of a branch that was not taken.
 #[inline]
-pub(crate) fn through<T: Scalar>(slope: T, derivative: T) -> T {
-    if derivative.is_constant_zero() { T::zero() } else { slope * derivative }
+pub(crate) fn through(slope: f64, derivative: f64) -> f64 {
+    if slope == 0.0 || derivative == 0.0 { 0.0 } else { slope * derivative }
 }

@@ -41,8 +41,12 @@ pub struct GradientError {
     pub cosine: f64,
 }
 
-/// Compares `gradient` with `reference` (both of the same length).
+/// Compares `gradient` with `reference`.
+///
+/// # Panics
+/// If they differ in length.
 pub fn compare_gradients(gradient: &[f64], reference: &[f64]) -> GradientError {
+    assert_eq!(gradient.len(), reference.len(), "lengths of the gradients");
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
     let scale = reference.iter().fold(0.0_f64, |m, v| m.max(v.abs())).max(f64::MIN_POSITIVE);
     let worst = gradient.iter().zip(reference).fold(0.0, |m: f64, (a, b)| {

@@ -104,10 +104,8 @@ impl<M: Step> CustomVjp for Rollout<M> {
                 self.step.advance(index, state, &self.parameters);
             });
             let recording = Recording::start();
-            let variables = |values: &[f64]| -> Vec<Var> {
-                values.iter().map(|&value| recording.variable(value)).collect()
-            };
-            let (before, parameters) = (variables(&state), variables(&self.parameters));
+            let before = recording.variables_of(&state);
+            let parameters = recording.variables_of(&self.parameters);
             let mut after = before.clone();
             self.step.advance(index, &mut after, &parameters);
             // The order of one long tape: what later steps gave the parameters comes first, then the

@@ -65,7 +65,9 @@ thread_local! {
 /// result becomes NaN or infinite on its way back to the inputs.
 ///
 /// `f` is run once, and again if there is something to tell, to find out who called the operations. It must
-/// do the same both times.
+/// do the same both times. Operations with their own derivative ([`custom`](crate::custom), linear solves,
+/// checkpointed loops) take other numbers and cannot be looked into; local functions are followed through their
+/// generic code.
 ///
 /// ```
 /// use prehend_autodiff::{Scalar, diagnose::diagnose};
@@ -138,13 +140,16 @@ fn culprits(operations: &[Operation], output: Traced, inputs: usize) -> Vec<usiz
         let mut sources_finite = true;
         let mut flows_finite = true;
         for (node, slope) in operation.operands {
-            let Some(source) = node.checked_sub(1) else { continue };
+            // A number of another diagnosis is of no use here.
+            let Some(source) = node.checked_sub(1).filter(|source| *source < place) else {
+                continue;
+            };
             sources_finite &= operations[source].value.is_finite();
             // What does not reach the output does no harm.
             if adjoint != 0.0 {
-                let flow = adjoint * slope;
-                flows_finite &= flow.is_finite();
-                adjoints[source] += flow;
+                let was_finite = adjoints[source].is_finite();
+                adjoints[source] += adjoint * slope;
+                flows_finite &= !was_finite || adjoints[source].is_finite();
             }
         }
         let value_lost = !operation.value.is_finite() && sources_finite;
@@ -221,6 +226,12 @@ mod tests {
         let found = diagnose(|x| (x[0] * Traced::from(1e200)) * Traced::from(1e200), &[1e-300]);
         assert_eq!(found.len(), 1, "{found:?}");
         assert_eq!(found[0].operands[0].1, 1e200);
+    }
+
+    #[test]
+    fn a_sum_that_overflows_on_the_way_back_is_found() {
+        let found = diagnose(|x| x[0].times(1e308) + x[0].times(1e308), &[0.0]);
+        assert_eq!(found.len(), 1, "{found:?}");
     }
 
     #[test]

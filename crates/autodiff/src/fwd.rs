@@ -1,7 +1,7 @@
 //! Forward mode: a value with its derivatives along `N` directions.
 
 use crate::Scalar;
-use crate::chain::{Chain, through};
+use crate::chain::Chain;
 use crate::real_field::impl_real_field;
 
 /// A number and its partial derivatives with respect to `N` inputs, carried forward.
@@ -36,17 +36,18 @@ impl<const N: usize, T: Scalar> Fwd<N, T> {
     }
 }
 
-/// Whether `T` is a plain number, without derivatives of its own.
+/// `slope * derivative`, but 0 where the operand does not move: 0 · ∞ must not make a NaN of a direction
+/// that has nothing to do with the operation.
 #[inline]
-const fn is_plain<T>() -> bool {
-    size_of::<T>() <= size_of::<f64>()
+fn along<T: Scalar>(slope: T, derivative: T) -> T {
+    if derivative.is_constant_zero() { T::zero() } else { slope * derivative }
 }
 
-/// Whether [`through`] is no more than a product: plain numbers with finite slopes. Looking once at the slopes
+/// Whether [`along`] is no more than a product: plain numbers with finite slopes. Looking once at the slopes
 /// costs half as much as looking at every derivative.
 #[inline]
 fn is_tame<T: Scalar>(slopes: &[T]) -> bool {
-    is_plain::<T>() && slopes.iter().all(|slope| slope.value().is_finite())
+    T::IS_PLAIN && slopes.iter().all(|slope| slope.value().is_finite())
 }
 
 impl<const N: usize, T: Scalar> Chain for Fwd<N, T> {
@@ -89,7 +90,7 @@ impl<const N: usize, T: Scalar> Chain for Fwd<N, T> {
 
     #[inline]
     fn product(self, other: Self, value: T, [da, db]: [T; 2]) -> Self {
-        if !is_plain::<T>() {
+        if !T::IS_PLAIN {
             return self.binary(other, value, [da, db]);
         }
         let derivative =
@@ -103,13 +104,13 @@ impl<const N: usize, T: Scalar> Chain for Fwd<N, T> {
 #[cold]
 #[inline(never)]
 fn wild_unary<const N: usize, T: Scalar>(a: [T; N], slope: T) -> [T; N] {
-    a.map(|d| through(slope, d))
+    a.map(|d| along(slope, d))
 }
 
 #[cold]
 #[inline(never)]
 fn wild_binary<const N: usize, T: Scalar>(a: [T; N], b: [T; N], da: T, db: T) -> [T; N] {
-    std::array::from_fn(|i| through(da, a[i]) + through(db, b[i]))
+    std::array::from_fn(|i| along(da, a[i]) + along(db, b[i]))
 }
 
 impl_real_field!([const N: usize, T: Scalar] Fwd<N, T>);

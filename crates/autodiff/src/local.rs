@@ -75,17 +75,28 @@ pub fn preaccumulate<const N: usize, const M: usize>(
     std::array::from_fn(|i| group.var(i, results[i].value))
 }
 
-/// The sum of many terms, whose gradient is summed up outside the tape.
+/// [`Scalar::sum_local`] for [`Var`].
 #[inline]
 pub(crate) fn sum_local<const K: usize, F: LocalFunction<K, 1>>(
     x: &[Var],
     terms: impl IntoIterator<Item = (F, [usize; K])>,
 ) -> Var {
+    let linearise = |(term, places): (F, [usize; K])| {
+        (places, term.linearise(places.map(|place| x[place].value)))
+    };
+    record_sum(x, terms.into_iter().map(linearise))
+}
+
+/// Records the sum of terms of `x`, given their places, values and slopes, as one node.
+#[inline]
+pub(crate) fn record_sum<const K: usize>(
+    x: &[Var],
+    terms: impl Iterator<Item = ([usize; K], ([f64; 1], [[f64; K]; 1]))>,
+) -> Var {
     let mut sum = 0.0;
     let mut gradient = with_tape(|tape| tape.scratch(x.len()));
     gradient.fill(0.0);
-    for (term, places) in terms {
-        let ([value], [slopes]) = term.linearise(places.map(|place| x[place].value));
+    for (places, ([value], [slopes])) in terms {
         sum += value;
         for (place, slope) in places.into_iter().zip(slopes) {
             gradient[place] += slope;

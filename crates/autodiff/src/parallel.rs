@@ -6,7 +6,8 @@
 
 use rayon::prelude::*;
 
-use crate::tape::{push_block, with_tape};
+use crate::local::record_sum;
+use crate::tape::push_block;
 use crate::{LocalFunction, Var};
 
 /// `function` of each of `inputs`, one block each, evaluated by the threads of rayon's current pool.
@@ -37,16 +38,7 @@ pub fn sum_local<const K: usize, F: LocalFunction<K, 1> + Sync>(
 ) -> Var {
     let linear = terms.par_iter().map(|(term, places)| term.linearise(places.map(|p| x[p].value)));
     let linear: Vec<_> = linear.collect();
-    let mut sum = 0.0;
-    let mut gradient = with_tape(|tape| tape.scratch(x.len()));
-    gradient.fill(0.0);
-    for ((_, places), ([value], [slopes])) in terms.iter().zip(linear) {
-        sum += value;
-        places.iter().zip(slopes).for_each(|(&place, slope)| gradient[place] += slope);
-    }
-    let node = push_block(x, 1, &gradient).var(0, sum);
-    with_tape(|tape| tape.keep(gradient));
-    node
+    record_sum(x, terms.iter().map(|(_, places)| *places).zip(linear))
 }
 
 #[cfg(test)]

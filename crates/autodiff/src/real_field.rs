@@ -420,12 +420,13 @@ let modulus = num_traits::Signed::abs(&self);
                 let value = x.powf(e);
                 // Partials of inactive operands may be NaN (a logarithm of a negative base), so they
                 // are not computed rather than multiplied by zero.
-                let by_base = if self.is_constant() || e.value() == 0.0 {
+                let at_zero = x.value() == 0.0;
+                let by_base = if self.is_constant() || (at_zero && e.value() == 0.0) {
                     Self::inner(0.0)
                 } else {
                     e * x.powf(e - Self::inner(1.0))
                 };
-                let by_exponent = if n.is_constant() || value.value() == 0.0 {
+                let by_exponent = if n.is_constant() || (at_zero && value.value() == 0.0) {
                     Self::inner(0.0)
                 } else {
                     value * x.ln()

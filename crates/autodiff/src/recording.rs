@@ -6,8 +6,9 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use nalgebra::DMatrix;
 
 use crate::Var;
+use crate::chain::through;
 use crate::sweep::sweep;
-use crate::tape::{Outputs, TapeStatistics, push_variables, with_tape};
+use crate::tape::{Outputs, Tape, TapeStatistics, push_variables, with_tape, with_tape_if_alive};
 
 /// Tags of recordings, unique over all threads (until 2³² recordings have been made); 0 means constant.
 static NEXT_RECORDING: AtomicU32 = AtomicU32::new(1);
@@ -101,7 +102,7 @@ impl Recording {
         });
         sweep::<1>(self.recording, adjoints.as_chunks_mut().0, |adjoints| {
             for &(var, seed) in outputs.iter().filter(|(var, _)| var.recording != 0) {
-                adjoints[(var.node - base) as usize][0] += seed * var.coefficient;
+                adjoints[(var.node - base) as usize][0] += through(var.coefficient, seed);
             }
         });
         Adjoints { recording: self.recording, base, adjoints }
@@ -113,7 +114,17 @@ impl Recording {
     /// If an output or input belongs to another recording, an input is a fused result (see
     /// [`Adjoints::wrt`]), or a nested recording is open.
     pub fn jacobian(&self, outputs: &[Var], inputs: &[Var]) -> DMatrix<f64> {
-        let mut jacobian = DMatrix::zeros(outputs.len(), inputs.len());
+        self.vjps(outputs, &DMatrix::identity(outputs.len(), outputs.len()), inputs)
+    }
+
+    /// The products of several rows of `weights`, one weight for each of `outputs`, with the Jacobian of
+    /// `outputs` with respect to `inputs`: shape \[rows, inputs\], several rows in one sweep.
+    ///
+    /// # Panics
+    /// If `weights` does not have a column for each output, and as [`jacobian`](Self::jacobian).
+    pub fn vjps(&self, outputs: &[Var], weights: &DMatrix<f64>, inputs: &[Var]) -> DMatrix<f64> {
+        assert_eq!(weights.ncols(), outputs.len(), "a weight for each output");
+        let mut products = DMatrix::zeros(weights.nrows(), inputs.len());
         let (start, mut adjoints) = with_tape(|tape| {
             let start = tape.start(self.recording);
             outputs.iter().filter(|var| var.recording != 0).for_each(|var| tape.check(*var));
@@ -121,22 +132,25 @@ impl Recording {
             (start, tape.scratch(nodes * LANES))
         });
         let lanes = adjoints.as_chunks_mut::<LANES>().0;
-        for (block, rows) in outputs.chunks(LANES).enumerate() {
+        for first in (0..weights.nrows()).step_by(LANES) {
+            let rows = LANES.min(weights.nrows() - first);
             sweep(self.recording, lanes, |lanes| {
-                for (lane, var) in rows.iter().enumerate().filter(|(_, var)| var.recording != 0) {
-                    lanes[(var.node - start.node) as usize][lane] = var.coefficient;
+                for (column, var) in outputs.iter().enumerate().filter(|(_, v)| v.recording != 0) {
+                    let adjoint = &mut lanes[(var.node - start.node) as usize];
+                    for lane in 0..rows {
+                        adjoint[lane] += through(var.coefficient, weights[(first + lane, column)]);
+                    }
                 }
             });
             for (column, input) in inputs.iter().enumerate() {
                 let Some(node) = input.own_node(self.recording) else { continue };
-                for lane in 0..rows.len() {
-                    jacobian[(block * LANES + lane, column)] =
-                        lanes[(node - start.node) as usize][lane];
+                for lane in 0..rows {
+                    products[(first + lane, column)] = lanes[(node - start.node) as usize][lane];
                 }
             }
         }
         with_tape(|tape| tape.keep(adjoints));
-        jacobian
+        products
     }
 
     /// How much was recorded so far.
@@ -150,7 +164,8 @@ impl Recording {
 
 impl Drop for Recording {
     fn drop(&mut self) {
-        with_tape(|tape| tape.close(self.recording));
+        // The operations are dropped here, when the tape is free again.
+        let _operations = with_tape_if_alive(|tape| tape.close(self.recording));
     }
 }
 
@@ -182,7 +197,7 @@ impl Adjoints {
 
 impl Drop for Adjoints {
     fn drop(&mut self) {
-        with_tape(|tape| tape.keep(std::mem::take(&mut self.adjoints)));
+        with_tape_if_alive(|tape| tape.keep(std::mem::take(&mut self.adjoints)));
     }
 }
 
@@ -199,8 +214,11 @@ pub fn gradient(f: impl FnOnce(&[Var]) -> Var, x: &[f64]) -> (f64, Vec<f64>) {
 pub fn gradient_into(f: impl FnOnce(&[Var]) -> Var, x: &[f64], gradient: &mut [f64]) -> f64 {
     assert_eq!(x.len(), gradient.len(), "length of the gradient");
     let recording = Recording::start();
-    let inputs = recording.variables_of(x);
+    let mut inputs = with_tape(Tape::scratch_variables);
+    let group = recording.variable_group(x.len());
+    inputs.extend(x.iter().enumerate().map(|(i, &value)| group.var(i, value)));
     let output = f(&inputs);
+    with_tape(|tape| tape.keep_variables(inputs));
     let adjoints = recording.gradient(output);
     // The variables are the recording's first nodes.
     gradient.copy_from_slice(&adjoints.adjoints[..x.len()]);

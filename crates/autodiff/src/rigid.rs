@@ -8,6 +8,7 @@
 use nalgebra::{Matrix3, Matrix3x4, Quaternion, UnitQuaternion, Vector3};
 
 use crate::lie::{cross_matrix, so3_exp};
+use crate::stumpff::stumpff;
 use crate::{LocalFunction, Scalar};
 
 /// `rotation * vector`.
@@ -17,7 +18,7 @@ pub fn rotate<S: Scalar>(rotation: &UnitQuaternion<S>, vector: &Vector3<S>) -> V
     Vector3::from(S::local(&Rotate, [i, j, k, w, vector.x, vector.y, vector.z]))
 }
 
-/// `a.cross(b)`.
+/// `a.cross(b)`: a torque of arm and force, a velocity of spin and arm.
 #[inline]
 pub fn cross<S: Scalar>(a: &Vector3<S>, b: &Vector3<S>) -> Vector3<S> {
     Vector3::from(S::local(&Cross, [a.x, a.y, a.z, b.x, b.y, b.z]))
@@ -40,6 +41,9 @@ pub fn turn<S: Scalar>(
 ///
 /// `rotation` maps the body's principal axes into the frame of `velocity` \[rad/s\], `torque` \[N·m\] and the
 /// result; `inertia` are the principal moments \[kg·m²\].
+///
+/// In reverse mode the derivative is that along turns of the body: what would change the length of the
+/// quaternion has none.
 #[inline]
 pub fn angular_acceleration<S: Scalar>(
     rotation: &UnitQuaternion<S>,
@@ -65,7 +69,7 @@ impl LocalFunction<7, 3> for Rotate {
         (quaternion([i, j, k, w]) * Vector3::new(x, y, z)).into()
     }
 
-    // v + w t + u × t with t = 2 u × v, as nalgebra evaluates it.
+    // Of v + w t + u × t with t = 2 u × v, which is what nalgebra evaluates.
     #[inline]
     fn linearise(&self, [i, j, k, w, x, y, z]: [f64; 7]) -> ([f64; 3], [[f64; 7]; 3]) {
         let (u, v) = (Vector3::new(i, j, k), Vector3::new(x, y, z));
@@ -76,7 +80,7 @@ impl LocalFunction<7, 3> for Rotate {
             [by_t * by_u * -2.0 - cross_matrix(&t), by_t * by_v * 2.0 + Matrix3::identity()];
         let row =
             |r| [du[(r, 0)], du[(r, 1)], du[(r, 2)], t[r], dv[(r, 0)], dv[(r, 1)], dv[(r, 2)]];
-        ((v + t * w + u.cross(&t)).into(), std::array::from_fn(row))
+        (self.evaluate([i, j, k, w, x, y, z]), std::array::from_fn(row))
     }
 }
 
@@ -114,16 +118,10 @@ impl LocalFunction<7, 4> for Turn {
         let step = so3_exp(&omega);
         let (a, u) = (step.w, step.imag());
         let v = Vector3::new(i, j, k);
-        let squared = omega.norm_squared();
-        let (s, ds) = if squared < 1e-2 {
-            let s = [0.5, -1.0 / 48.0, 1.0 / 3840.0, -1.0 / 645120.0, 1.0 / 185794560.0];
-            let ds = [-1.0 / 24.0, 1.0 / 960.0, -1.0 / 107520.0, 1.0 / 23224320.0];
-            let sum = |c: &[f64]| c.iter().rev().fold(0.0, |sum, c| sum * squared + c);
-            (sum(&s), sum(&ds))
-        } else {
-            let s = u.norm() / squared.sqrt();
-            (s, (0.5 * a - s) / squared)
-        };
+        // s = sin(θ/2)/θ = c₁(θ²/4)/2, and s'/θ = c₁'(θ²/4)/4.
+        let quarter = omega.norm_squared() * 0.25;
+        let ([_, c1], [c2, c3]) = (stumpff::<f64, 0>(quarter), stumpff::<f64, 2>(quarter));
+        let (s, ds) = (0.5 * c1, 0.125 * (c3 - c2));
         let mut jacobian = [[0.0; 7]; 4];
         let by_v = cross_matrix(&u);
         for r in 0..3 {
@@ -143,8 +141,7 @@ impl LocalFunction<7, 4> for Turn {
             (0..3).for_each(|r| jacobian[r][4 + c] = column[r]);
             jacobian[3][4 + c] = da * w - du.dot(&v);
         }
-        let vector = v * a + u * w + u.cross(&v);
-        ([vector.x, vector.y, vector.z, a * w - u.dot(&v)], jacobian)
+        (self.evaluate([i, j, k, w, x, y, z]), jacobian)
     }
 }
 
@@ -193,7 +190,7 @@ impl LocalFunction<10, 3> for Euler {
                 _ => by_torque[(r, c - 7)],
             })
         };
-        (acceleration.into(), std::array::from_fn(row))
+        (self.evaluate(x), std::array::from_fn(row))
     }
 }
 
@@ -221,12 +218,23 @@ mod tests {
         let (values, jacobian) = function.linearise(x);
         let forward = function.evaluate(Fwd::<N>::variables(x));
         for (row, (value, forward)) in values.iter().zip(forward).enumerate() {
-            assert!((value - forward.value).abs() < 1e-14 * (1.0 + value.abs()), "{x:?}");
+            assert_eq!(*value, forward.value, "{x:?}");
             for (a, b) in jacobian[row].iter().zip(forward.derivative) {
                 assert!((a - b).abs() < 1e-12 * (1.0 + b.abs()), "row {row} at {x:?}: {a} {b}");
             }
         }
     }
+
+    /// Up to a step of four turns, on both sides of every switch.
+    const VELOCITIES: [[f64; 3]; 7] = [
+        [0.0; 3],
+        [1e-9, 0.0, -1e-9],
+        [0.09, 0.03, 0.0],
+        [4.0, -2.0, 9.0],
+        [12.8, 0.6, -0.4],
+        [-20.0, 3.0, 17.0],
+        [0.0, 50.0, 0.0],
+    ];
 
     fn unit<const N: usize>(mut x: [f64; N]) -> [f64; N] {
         let norm = x[..4].iter().map(|c| c * c).sum::<f64>().sqrt();
@@ -240,7 +248,7 @@ mod tests {
             let [i, j, k, w] = q;
             // Rotate's derivative holds for quaternions of any length; the others' for unit ones.
             check(&Rotate, [i, j, k, w, 0.4, -1.2, 2.0]);
-            for velocity in [[0.0; 3], [1e-9, 0.0, -1e-9], [0.09, 0.03, 0.0], [4.0, -2.0, 9.0]] {
+            for velocity in VELOCITIES {
                 let [x, y, z] = velocity;
                 check(&Turn { duration: 0.5 }, unit([i, j, k, w, x, y, z]));
                 check(&Cross, [x, y, z, 0.3, w, -1.0]);

@@ -19,6 +19,9 @@ use crate::LocalFunction;
 /// follow the first operand on a tie; rounding has slope 0. At the edge of its domain a function has the slope
 /// from inside, which may be infinite.
 pub trait Scalar: RealField + Copy + Default {
+    /// Whether this is a plain number, which never carries derivatives.
+    const IS_PLAIN: bool = false;
+
     /// A constant: carries no derivative.
     fn constant(value: f64) -> Self;
 
@@ -79,6 +82,8 @@ pub(crate) fn add_up<S: Scalar, const K: usize, F: LocalFunction<K, 1>>(
 macro_rules! plain_scalar {
     ($t:ty) => {
         impl Scalar for $t {
+            const IS_PLAIN: bool = true;
+
             #[inline]
             fn constant(value: f64) -> Self {
                 value as $t

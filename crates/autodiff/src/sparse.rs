@@ -197,7 +197,7 @@ impl Reverse {
     ) -> Result<(Vec<f64>, Vec<f64>), SparseError> {
         check_inputs(&self.pattern, x)?;
         let recording = Recording::start();
-        let inputs: Vec<Var> = x.iter().map(|&value| recording.variable(value)).collect();
+        let inputs = recording.variables_of(x);
         let outputs = f(&inputs);
         check_outputs(&self.pattern, outputs.len())?;
         let mut entries = vec![0.0; self.pattern.column_indices().len()];

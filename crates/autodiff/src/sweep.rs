@@ -1,6 +1,9 @@
 //! The way back over the tape: adjoints of every node, for several seeds at once.
 
+use std::rc::Rc;
+
 use crate::arena::Mark;
+use crate::chain::through;
 use crate::tape::{Entry, Group, Start, Tape, with_tape};
 
 /// Adjoints of one node, one a seed.
@@ -58,12 +61,10 @@ fn run<const K: usize, const CAREFUL: bool>(recording: u32, adjoints: &mut [Lane
     let (mut outputs, mut inputs) = (Vec::new(), Vec::new());
     while let Some(group) = with_tape(|tape| sweep.run(tape)) {
         sweep.operation -= 1;
-        let operation = sweep.operation;
-        let Some(custom) = with_tape(|tape| tape.operations[operation].take()) else { continue };
-        let (parents, coefficients) = with_tape(|tape| {
+        let (custom, parents, coefficients) = with_tape(|tape| {
             let parents = tape.parents.take_back(&mut sweep.parent, group.inputs).to_vec();
             let coefficients = tape.slopes.take_back(&mut sweep.slope, group.inputs).to_vec();
-            (parents, coefficients)
+            (Rc::clone(&tape.operations[sweep.operation]), parents, coefficients)
         });
         let range = sweep.node - group.outputs..sweep.node;
         for lane in 0..K {
@@ -72,17 +73,21 @@ fn run<const K: usize, const CAREFUL: bool>(recording: u32, adjoints: &mut [Lane
             if outputs.iter().all(|adjoint| *adjoint == 0.0) {
                 continue;
             }
+            // The operation might turn it into something that looks right.
+            if !CAREFUL && outputs.iter().any(|adjoint| adjoint.is_nan()) {
+                return false;
+            }
             inputs.clear();
             inputs.resize(group.inputs, 0.0);
             custom.vjp(&outputs, &mut inputs);
-            for ((parent, coefficient), adjoint) in parents.iter().zip(&coefficients).zip(&inputs) {
-                if *coefficient != 0.0 {
+            for ((parent, &coefficient), &adjoint) in parents.iter().zip(&coefficients).zip(&inputs)
+            {
+                if coefficient != 0.0 {
                     sweep.adjoints[(parent - sweep.start.node) as usize][lane] +=
-                        coefficient * adjoint;
+                        through(coefficient, adjoint);
                 }
             }
         }
-        with_tape(|tape| tape.operations[operation] = Some(custom));
         sweep.node -= group.outputs;
     }
     !sweep.poisoned
@@ -132,7 +137,7 @@ impl<const K: usize, const CAREFUL: bool> Sweep<'_, K, CAREFUL> {
             }
             for side in 0..2 {
                 let parent = (entry.parents[side] - base) as usize;
-                let flow = through::<K, CAREFUL>(entry.slopes[side], adjoint);
+                let flow = carry_over::<K, CAREFUL>(entry.slopes[side], adjoint);
                 if parent + 1 == node {
                     carry = flow;
                 } else {
@@ -189,7 +194,7 @@ fn add_row<const K: usize, const CAREFUL: bool>(
     adjoint: Lanes<K>,
 ) {
     for (flow, slope) in flows.iter_mut().zip(row) {
-        *flow = add(*flow, through::<K, CAREFUL>(*slope, adjoint));
+        *flow = add(*flow, carry_over::<K, CAREFUL>(*slope, adjoint));
     }
 }
 
@@ -198,12 +203,8 @@ fn add<const K: usize>(a: Lanes<K>, b: Lanes<K>) -> Lanes<K> {
     std::array::from_fn(|lane| a[lane] + b[lane])
 }
 
-/// `slope * adjoint`, but 0 where nothing flows: 0 · ∞ must not make a NaN of a branch that was not used or,
-/// looking carefully, of an operand that does not move the result.
+/// What flows back through `slope`: just the product, or looking carefully.
 #[inline]
-fn through<const K: usize, const CAREFUL: bool>(slope: f64, adjoint: Lanes<K>) -> Lanes<K> {
-    adjoint.map(|a| {
-        let still = CAREFUL && (slope == 0.0 || a == 0.0);
-        if still { 0.0 } else { slope * a }
-    })
+fn carry_over<const K: usize, const CAREFUL: bool>(slope: f64, adjoint: Lanes<K>) -> Lanes<K> {
+    adjoint.map(|a| if CAREFUL { through(slope, a) } else { slope * a })
 }

@@ -5,6 +5,7 @@
 //! entry for all its nodes, its parents and slopes lying in arenas of their own.
 
 use std::cell::{Cell, RefCell};
+use std::rc::Rc;
 
 use crate::arena::{Arena, Mark};
 use crate::chain::through;
@@ -81,11 +82,15 @@ pub(crate) struct Tape {
     pub(crate) slopes: Arena<f64>,
     /// Parent nodes of groups.
     pub(crate) parents: Arena<u32>,
-    /// Empty while the sweep runs that operation.
-    pub(crate) operations: Vec<Option<Box<dyn CustomVjp>>>,
+    /// Shared with the sweep while it runs one of them.
+    pub(crate) operations: Vec<Rc<dyn CustomVjp>>,
     /// Numbers that were worked with and will be again: adjoints.
     spare: Vec<Vec<f64>>,
+    spare_variables: Vec<Vec<Var>>,
 }
+
+/// Pieces of spare memory that are kept: as many as recordings are commonly nested.
+const KEPT: usize = 8;
 
 /// Entries that wait at the tape's end, in fixed memory of the thread.
 const WAITING: usize = 512;
@@ -117,16 +122,23 @@ thread_local! {
 
 /// The thread's tape, complete.
 pub(crate) fn with_tape<R>(f: impl FnOnce(&mut Tape) -> R) -> R {
-    TAPE.with(|tape| {
-        let mut tape = tape.borrow_mut();
-        END.with(|end| {
-            end.flush(&mut tape);
-            let result = f(&mut tape);
-            end.nodes.set(tape.nodes);
-            end.groups.set(tape.groups);
-            end.recording.set(tape.recording);
-            result
-        })
+    TAPE.with(|tape| complete(tape, f))
+}
+
+/// [`with_tape`] for destructors, which may run when the thread's tape is gone.
+pub(crate) fn with_tape_if_alive<R>(f: impl FnOnce(&mut Tape) -> R) -> Option<R> {
+    TAPE.try_with(|tape| complete(tape, f)).ok()
+}
+
+fn complete<R>(tape: &RefCell<Tape>, f: impl FnOnce(&mut Tape) -> R) -> R {
+    let mut tape = tape.borrow_mut();
+    END.with(|end| {
+        end.flush(&mut tape);
+        let result = f(&mut tape);
+        end.nodes.set(tape.nodes);
+        end.groups.set(tape.groups);
+        end.recording.set(tape.recording);
+        result
     })
 }
 
@@ -157,7 +169,8 @@ pub(crate) fn push_variables(count: usize) -> Outputs {
 pub(crate) fn push_block(inputs: &[Var], outputs: usize, jacobian: &[f64]) -> Outputs {
     END.with(|end| {
         let recording = end.recording.get();
-        if recording == 0 || inputs.iter().any(|var| var.recording != recording) {
+        let foreign = |var: &Var| var.recording != recording;
+        if recording == 0 || inputs.is_empty() || inputs.iter().any(foreign) {
             return push_sparse_block(inputs, outputs, jacobian);
         }
         let group = end.push_group(&Group { outputs, inputs: inputs.len(), custom: false });
@@ -196,13 +209,12 @@ fn push_sparse_block(inputs: &[Var], outputs: usize, jacobian: &[f64]) -> Output
 }
 
 /// Records a group of nodes that `operation` differentiates.
-pub(crate) fn push_custom(
-    inputs: &[Var],
-    outputs: usize,
-    operation: Box<dyn CustomVjp>,
-) -> Outputs {
+pub(crate) fn push_custom(inputs: &[Var], outputs: usize, operation: Rc<dyn CustomVjp>) -> Outputs {
     END.with(|end| {
         end.check(inputs);
+        if inputs.iter().all(|var| var.recording == 0) {
+            return Outputs { first: 0, recording: 0 };
+        }
         let group = end.push_group(&Group { outputs, inputs: inputs.len(), custom: true });
         TAPE.with(|tape| {
             let tape = &mut *tape.borrow_mut();
@@ -210,7 +222,7 @@ pub(crate) fn push_custom(
             // A constant's coefficient may be anything; 0 tells the sweep to leave it out.
             let coefficient = |var: &Var| if var.recording == 0 { 0.0 } else { var.coefficient };
             tape.slopes.room(inputs.len()).extend(inputs.iter().map(coefficient));
-            tape.operations.push(Some(operation));
+            tape.operations.push(operation);
         });
         group
     })
@@ -219,6 +231,12 @@ pub(crate) fn push_custom(
 #[cold]
 #[inline(never)]
 fn make_room() {
+    END.with(|end| {
+        // As many again must not be refused while they wait, and the last number marks groups.
+        if end.nodes.get().wrapping_add(end.len.get()) > GROUP - 2 * WAITING as u32 {
+            refuse_more();
+        }
+    });
     with_tape(|_| ());
 }
 
@@ -239,7 +257,7 @@ impl End {
     #[inline]
     fn push_group(&self, group: &Group) -> Outputs {
         let next = u64::from(self.nodes.get().wrapping_add(self.len.get())) + group.outputs as u64;
-        if next > u64::from(GROUP - WAITING as u32) {
+        if next > u64::from(GROUP - 2 * WAITING as u32) {
             refuse_more();
         }
         let first = self.push(Entry::group(group));
@@ -263,10 +281,8 @@ impl End {
         tape.entries.room(waiting.len()).extend(waiting.iter().map(Cell::get));
         tape.nodes = self.nodes.get().wrapping_add(len);
         tape.groups = self.groups.get();
-        // The next entries to wait must not be refused, and the last number marks groups.
-        if tape.nodes > GROUP - WAITING as u32 {
-            refuse_more();
-        }
+        // What follows may panic, and the next number must be right all the same.
+        self.nodes.set(tape.nodes);
     }
 }
 
@@ -309,6 +325,7 @@ impl Tape {
             parents: Arena::new(),
             operations: Vec::new(),
             spare: Vec::new(),
+            spare_variables: Vec::new(),
         }
     }
 
@@ -328,7 +345,12 @@ impl Tape {
     }
 
     /// Closes a recording; its nodes go when those inside it are closed too.
-    pub(crate) fn close(&mut self, recording: u32) {
+    ///
+    /// Returns the operations that it owned: dropping them may run the user's code, which must find the tape
+    /// free.
+    #[must_use]
+    pub(crate) fn close(&mut self, recording: u32) -> Vec<Rc<dyn CustomVjp>> {
+        let mut operations = Vec::new();
         if let Some(start) = self.open.iter_mut().rev().find(|s| s.recording == recording) {
             start.closed = true;
         }
@@ -338,9 +360,10 @@ impl Tape {
             self.entries.truncate(start.entry);
             self.slopes.truncate(start.slope);
             self.parents.truncate(start.parent);
-            self.operations.truncate(start.operation);
+            operations = self.operations.split_off(start.operation);
         }
         self.recording = self.open.last().map_or(0, |start| start.recording);
+        operations
     }
 
     /// The start of the innermost recording, which must be `recording`.
@@ -354,6 +377,19 @@ impl Tape {
         (self.nodes - start.node) as usize
     }
 
+    /// An empty list for variables, of memory that was used before.
+    pub(crate) fn scratch_variables(&mut self) -> Vec<Var> {
+        self.spare_variables.pop().unwrap_or_default()
+    }
+
+    /// Takes memory back for [`Self::scratch_variables`].
+    pub(crate) fn keep_variables(&mut self, mut variables: Vec<Var>) {
+        variables.clear();
+        if self.spare_variables.len() < KEPT {
+            self.spare_variables.push(variables);
+        }
+    }
+
     /// `len` numbers to work with, of memory that was used before: their values are arbitrary.
     pub(crate) fn scratch(&mut self, len: usize) -> Vec<f64> {
         let mut numbers = self.spare.pop().unwrap_or_default();
@@ -363,7 +399,9 @@ impl Tape {
 
     /// Takes memory back for [`Self::scratch`].
     pub(crate) fn keep(&mut self, numbers: Vec<f64>) {
-        self.spare.push(numbers);
+        if self.spare.len() < KEPT {
+            self.spare.push(numbers);
+        }
     }
 
     pub(crate) fn statistics(&self, recording: u32) -> TapeStatistics {

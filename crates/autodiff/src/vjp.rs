@@ -1,5 +1,7 @@
 //! Operations that bring their own derivative.
 
+use std::rc::Rc;
+
 use crate::Var;
 use crate::tape::{push_block, push_custom};
 
@@ -12,7 +14,8 @@ pub trait CustomVjp: 'static {
     /// Adds to `input_adjoints` (zero at the call) the product of `output_adjoints` and the Jacobian (outputs × inputs).
     ///
     /// Runs in the midst of the sweep. It may open a [`Recording`](crate::Recording) of its own, but may not use
-    /// numbers of others; it is called once for each seed that the sweep carries.
+    /// numbers of others; it is called at least once for each seed that
+    /// the sweep carries, and may then see adjoints that are NaN.
     fn vjp(&self, output_adjoints: &[f64], input_adjoints: &mut [f64]);
 }
 
@@ -25,7 +28,7 @@ pub fn custom(inputs: &[Var], outputs: &[f64], operation: impl CustomVjp) -> Vec
     if outputs.is_empty() {
         return Vec::new();
     }
-    let group = push_custom(inputs, outputs.len(), Box::new(operation));
+    let group = push_custom(inputs, outputs.len(), Rc::new(operation));
     outputs.iter().enumerate().map(|(i, &value)| group.var(i, value)).collect()
 }
 

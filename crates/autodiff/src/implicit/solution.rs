@@ -102,7 +102,7 @@ impl<R: Residual + 'static> CustomVjp for Implicit<R> {
         let mut lambda = DMatrix::from_column_slice(self.x.len(), 1, output_adjoints);
         self.jacobian.solve_transpose_in_place(&mut lambda);
         let recording = Recording::start();
-        let p: Vec<Var> = self.p.iter().map(|&p| recording.variable(p)).collect();
+        let p = recording.variables_of(&self.p);
         let residual = self.equation.residual(&self.unknowns(), &p);
         let seeds: Vec<(Var, f64)> = residual
             .into_iter()
