@@ -142,7 +142,7 @@ fn glb_with_its_image_inside() {
 fn robot_descriptions() {
     let folder = tempfile::tempdir().unwrap();
     tetrahedron().save_ply(&folder.path().join("m.ply")).unwrap();
-    let text = r#"<?xml version="1.0"?><!-- a --><robot name="r"><link name="a"><inertial><mass value="1"/></inertial>
+    let text = r#"<?xml version="1.0"?><!-- a --><robot name="r"><link name="a">
         <collision><origin xyz="1 0 0" rpy="0 1 0"/><geometry><box size="1 2 3"/></geometry></collision>
         <collision><geometry><mesh filename="package://r/m.ply" scale="1 2 1"/></geometry></collision></link>
         <link name="b"><collision><geometry><cylinder radius="1" length="2"/></geometry></collision></link>

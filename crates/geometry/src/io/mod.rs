@@ -10,6 +10,7 @@ pub(crate) mod folder;
 mod gltf;
 mod images;
 pub mod limits;
+mod mtl;
 mod obj;
 mod parts;
 mod ply;

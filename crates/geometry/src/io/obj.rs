@@ -9,7 +9,7 @@ use tobj::{LoadError, LoadOptions, Material, Mesh};
 
 use super::images::Images;
 use super::parts::{Part, join};
-use super::{MeshError, texture};
+use super::{MeshError, mtl, texture};
 use crate::TriMesh;
 
 const OPTIONS: LoadOptions =
@@ -20,15 +20,10 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshError> {
     let library = RefCell::new((String::new(), String::new()));
     let (models, materials) = tobj::load_obj_buf(&mut Cursor::new(bytes), &OPTIONS, |name| {
         let name = name.display().to_string();
-        let content = texture::beside(path, &name);
-        let read = match &content {
-            Ok(content) => tobj::load_mtl_buf(&mut Cursor::new(content)),
-            Err(_) => Err(LoadError::OpenFileFailed),
-        };
-        if let Err(e) = &read {
-            *library.borrow_mut() = (name, content.err().unwrap_or_else(|| e.to_string()));
-        }
-        read
+        texture::beside(path, &name).and_then(|content| mtl::parse(&content)).map_err(|reason| {
+            *library.borrow_mut() = (name, reason);
+            LoadError::MaterialParseError
+        })
     })
     .map_err(|e| MeshError::malformed(path, line_at_fault(bytes), e))?;
     let textured = models.iter().any(|m| !m.mesh.texcoords.is_empty());

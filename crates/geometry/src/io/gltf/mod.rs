@@ -32,6 +32,15 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshError> {
             feature: format!("extension {required}"),
         });
     }
+    // The crate unwraps what the standard requires of an image.
+    let whole = |i: &::gltf::json::Image| match i.buffer_view {
+        Some(_) => i.mime_type.is_some(),
+        None => i.uri.is_some(),
+    };
+    if let Some(i) = gltf.document.as_json().images.iter().position(|image| !whole(image)) {
+        let reason = "neither a URI nor a buffer view with a mimeType";
+        return Err(MeshError::malformed(path, format!("image {i}"), reason));
+    }
     let blob = gltf.blob.take();
     let mut content = Vec::new();
     let mut size = 0_usize;
@@ -410,6 +419,7 @@ mod tests {
             r#""byteOffset": 4000, "byteLength": 12"#,
             "accessor 1: outside",
         );
+        broken(r#", "mimeType": "image/png""#, "", "image 0: neither");
         // A few bytes that claim ever more buffers, or a stride that lets elements overlap without end.
         broken(r#""byteLength": 36}"#, r#""byteLength": 36, "byteStride": 0}"#, "document");
         let mut far = bin.clone();
