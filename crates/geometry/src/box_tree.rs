@@ -33,7 +33,8 @@ impl BoxTree {
         let mut tree = Self { tree: Bvh2::default(), centre, size };
         if !boxes.is_empty() {
             let boxes: Vec<Aabb> = boxes.iter().map(|b| tree.rounded(b)).collect();
-            let params = BvhBuildParams::medium_build();
+            let mut params = BvhBuildParams::medium_build();
+            params.max_prims_per_leaf = 2;
             tree.tree = build_bvh2(&boxes, params, &mut Duration::default());
         }
         tree

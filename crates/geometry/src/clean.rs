@@ -4,7 +4,7 @@ use std::collections::HashSet;
 
 use nalgebra::Point3;
 
-use crate::orient::{compacted, nested_shells, orient, wedge};
+use crate::orient::{compacted, orient, wedge};
 use crate::topology::{components, edges, is_collapsed, non_manifold_vertices};
 use crate::{MeshReport, TriMesh};
 
@@ -66,7 +66,6 @@ impl TriMesh {
         report.non_manifold_vertices = non_manifold_vertices(&faces, &edges).len();
         report.watertight =
             !faces.is_empty() && report.open_edges == 0 && report.non_manifold_edges == 0;
-        report.nested_shells = nested_shells(&weld.positions, &faces);
         let clean = compacted(&TriMesh::new(weld.positions, faces));
         report.flat_faces = (0..clean.faces.len()).filter(|f| is_flat(&clean, *f)).count();
         report.crossing_faces = clean.crossing_faces().len();

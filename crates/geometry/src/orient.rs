@@ -18,7 +18,7 @@ pub(crate) fn wedge(positions: &[Point3<f64>], face: &[u32; 3], origin: &Point3<
     a.dot(&b.cross(&c))
 }
 
-/// Makes neighbours agree and shells face outward.
+/// Makes neighbours agree and shells face outward, and counts the nested ones.
 ///
 /// A closed shell within no other that encloses a negative volume is turned over, together with all shells
 /// within it: those keep facing the way they do relative to it, since a shell that faces inward inside another is a
@@ -26,33 +26,27 @@ pub(crate) fn wedge(positions: &[Point3<f64>], face: &[u32; 3], origin: &Point3<
 /// leaves enough of a surface to tell.
 pub(crate) fn orient(positions: &[Point3<f64>], faces: &mut [[u32; 3]], report: &mut MeshReport) {
     align_neighbours(faces, report);
-    let shells = Shells::new(positions, faces);
-    let turn: Vec<bool> = if shells.list.iter().all(|s| s.facing >= 0.0) {
-        vec![false; shells.list.len()]
-    } else {
-        let around = shells.around(positions, faces);
-        (0..shells.list.len())
-            .map(|s| shells.list[shells.outermost(s, &around)].facing < 0.0)
-            .collect()
-    };
+    let mut shells = Shells::new(positions, faces);
+    let around = shells.around(positions, faces);
+    let turn: Vec<bool> = (0..shells.list.len())
+        .map(|s| shells.list[shells.outermost(s, &around)].facing < 0.0)
+        .collect();
     report.inverted_shells = turn.iter().filter(|t| **t).count();
     for (face, &shell) in faces.iter_mut().zip(&shells.of) {
         if turn[shell as usize] {
             face.swap(1, 2);
         }
     }
-}
-
-/// The closed shells within others so that the winding number leaves 0 and 1, once all are oriented.
-pub(crate) fn nested_shells(positions: &[Point3<f64>], faces: &[[u32; 3]]) -> usize {
-    let shells = Shells::new(positions, faces);
-    let around = shells.around(positions, faces);
+    for (shell, _) in shells.list.iter_mut().zip(&turn).filter(|(_, t)| **t) {
+        shell.facing = -shell.facing;
+    }
+    // Sound shells part what is enclosed once from what is not enclosed.
     let sound = |s: &usize| {
         let outside: f64 = around[*s].iter().map(|&o| shells.list[o].facing).sum();
         let inside = outside + shells.list[*s].facing;
         outside.min(inside) >= 0.0 && outside.max(inside) <= 1.0
     };
-    (0..shells.list.len()).filter(|s| !sound(s)).count()
+    report.nested_shells = (0..shells.list.len()).filter(|s| !sound(s)).count();
 }
 
 /// Turns faces so that neighbours agree, following the majority of each component.

@@ -37,6 +37,9 @@ impl TriMesh {
             let triangle = self.triangle(f);
             let mut found = false;
             tree.meeting(&boxes[f], |g| {
+                if !meet(&boxes[f], &boxes[g]) {
+                    return true;
+                }
                 let shared = self.faces[g].iter().filter(|v| corners.contains(v)).count();
                 // Beyond a common edge two triangles meet in one plane only.
                 found = shared < 2 && cross(&triangle, &self.triangle(g));
@@ -48,8 +51,16 @@ impl TriMesh {
     }
 }
 
+fn meet(a: &Bounds, b: &Bounds) -> bool {
+    (0..3).all(|k| a.0[k] <= b.1[k] && b.0[k] <= a.1[k])
+}
+
 /// On which side of the plane through `t` the point `p` lies: exact in sign, zero on it.
 fn side(t: &Triangle, p: &Point3<f64>) -> f64 {
+    // The corner of a neighbour, which the predicate would take its longest way to find out.
+    if t.contains(p) {
+        return 0.0;
+    }
     let [a, b, c, d] = [t[0], t[1], t[2], *p].map(|q| Coord3D { x: q.x, y: q.y, z: q.z });
     orient3d(a, b, c, d)
 }
