@@ -1,43 +1,19 @@
 //! Repairing what scans and exporters leave behind.
 
-use nalgebra::{Point3, Vector3};
+use std::collections::HashSet;
 
-use crate::TriMesh;
-use crate::topology::{Edge, EdgeUse, components, edges, is_collapsed};
+use nalgebra::Point3;
+
+use crate::orient::{compacted, orient, wedge};
+use crate::topology::{components, edges, is_collapsed, non_manifold_vertices};
+use crate::{MeshReport, TriMesh};
 
 /// Components with fewer faces than this fraction of the largest are stray if open or hollow.
 const STRAY_FRACTION: f64 = 0.01;
 /// A closed component that small \[of the largest volume\] encloses nothing.
 const HOLLOW_FRACTION: f64 = 1e-6;
-
-/// What [`TriMesh::cleaned`] changed, and the topology of its result.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct MeshReport {
-    /// Vertices joined with another at the same position.
-    pub welded_vertices: usize,
-    /// Faces removed because two of their corners fall together.
-    pub degenerate_faces: usize,
-    /// Faces removed because an earlier one has the same corners.
-    pub duplicate_faces: usize,
-    /// Faces removed because they stand off an edge that other faces already share, ending in the open.
-    pub fin_faces: usize,
-    /// Components removed as stray.
-    pub stray_components: usize,
-    /// Faces of those.
-    pub stray_faces: usize,
-    /// Faces turned over to agree with their neighbours.
-    pub flipped_faces: usize,
-    /// The mesh as a whole faced inward and was turned over.
-    pub inverted: bool,
-    /// Edge-connected components of the result.
-    pub components: usize,
-    /// Edges of the result with a single face.
-    pub open_edges: usize,
-    /// Edges of the result with more than two faces, or two of contrary orientation.
-    pub non_manifold_edges: usize,
-    /// Every edge of the result has exactly two faces, of one orientation.
-    pub watertight: bool,
-}
+/// A face is flat if its height is below this fraction of its longest side.
+const FLAT: f64 = 1e-12;
 
 impl TriMesh {
     /// The welded mesh (see [`TriMesh::welded`]) without degenerate, duplicate, fin and stray faces, consistently
@@ -45,7 +21,21 @@ impl TriMesh {
     ///
     /// A component is stray if it has less than 1 % of the faces of the largest and is open or encloses no volume:
     /// scans carry a few such faces. Faces of no area whose corners differ are kept, since their neighbours need
-    /// them. Holes are not filled: the report says whether the result is watertight.
+    /// them. A closed shell that faces inward within no other is turned over with all it contains; a cavity stays a
+    /// cavity. Holes are not filled and overlaps not resolved: the report says whether the result is watertight, and
+    /// whether it [overlaps itself](MeshReport::overlaps_itself).
+    ///
+    /// ```
+    /// # use prehend_geometry::shapes;
+    /// let mut mesh = shapes::cuboid([0.1, 0.2, 0.3].into());
+    /// mesh.faces.pop();
+    /// let (_, report) = mesh.cleaned();
+    /// assert!(!report.watertight && report.open_edges == 3);
+    /// println!("{report}");
+    /// ```
+    ///
+    /// # Panics
+    /// If a face refers to a vertex that the mesh has not.
     pub fn cleaned(&self) -> (TriMesh, MeshReport) {
         let weld = self.weld();
         let mut report = MeshReport {
@@ -57,7 +47,7 @@ impl TriMesh {
         faces.retain(|f| !is_collapsed(f));
         report.degenerate_faces = given - faces.len();
         let distinct = faces.len();
-        let mut seen = std::collections::HashSet::with_capacity(distinct);
+        let mut seen = HashSet::with_capacity(distinct);
         faces.retain(|f| {
             let mut key = *f;
             key.sort_unstable();
@@ -73,16 +63,21 @@ impl TriMesh {
         report.open_edges = edges.iter().filter(|e| e.uses.len() == 1).count();
         report.non_manifold_edges =
             edges.iter().filter(|e| e.uses.len() > 1 && !e.is_manifold()).count();
+        report.non_manifold_vertices = non_manifold_vertices(&faces, &edges).len();
         report.watertight =
             !faces.is_empty() && report.open_edges == 0 && report.non_manifold_edges == 0;
-        (compacted(&weld.positions, &faces), report)
+        let clean = compacted(&TriMesh::new(weld.positions, faces));
+        report.flat_faces = (0..clean.faces.len()).filter(|f| is_flat(&clean, *f)).count();
+        report.crossing_faces = clean.crossing_faces().len();
+        (clean, report)
     }
 }
 
-/// Six times the signed volume that each face spans with `origin`.
-fn wedge(positions: &[Point3<f64>], face: &[u32; 3], origin: &Point3<f64>) -> f64 {
-    let [a, b, c] = face.map(|v| positions[v as usize] - origin);
-    a.dot(&b.cross(&c))
+fn is_flat(mesh: &TriMesh, face: usize) -> bool {
+    let [a, b, c] = mesh.triangle(face);
+    let longest = (b - a).norm_squared().max((c - a).norm_squared()).max((c - b).norm_squared());
+    // Written so that what overflows is not called flat.
+    mesh.area_vector(face).norm() <= FLAT * longest
 }
 
 /// A fin has an open edge and one that more than two faces share; removing it may leave another behind it.
@@ -141,79 +136,10 @@ fn drop_stray(positions: &[Point3<f64>], faces: &mut Vec<[u32; 3]>, report: &mut
     report.stray_faces = before - faces.len();
 }
 
-/// Makes neighbours agree, following the majority of each component, and the whole face outward.
-fn orient(positions: &[Point3<f64>], faces: &mut [[u32; 3]], report: &mut MeshReport) {
-    let all = edges(faces);
-    let pairs: Vec<&Edge> = all.iter().filter(|e| e.uses.len() == 2).collect();
-    let mut turn = vec![false; faces.len()];
-    if pairs.iter().any(|e| !e.is_manifold()) {
-        let mut neighbours: Vec<Vec<(u32, bool)>> = vec![Vec::new(); faces.len()];
-        for edge in &pairs {
-            let [EdgeUse { face: f, forward, .. }, other] = [edge.uses[0], edge.uses[1]];
-            neighbours[f as usize].push((other.face, forward == other.forward));
-            neighbours[other.face as usize].push((f, forward == other.forward));
-        }
-        let mut reached = vec![false; faces.len()];
-        for start in 0..faces.len() {
-            if std::mem::replace(&mut reached[start], true) {
-                continue;
-            }
-            let mut component = vec![start];
-            let mut next = 0;
-            while next < component.len() {
-                let f = component[next];
-                next += 1;
-                for &(g, contrary) in &neighbours[f] {
-                    let g = g as usize;
-                    if !std::mem::replace(&mut reached[g], true) {
-                        turn[g] = turn[f] ^ contrary;
-                        component.push(g);
-                    }
-                }
-            }
-            if 2 * component.iter().filter(|f| turn[**f]).count() > component.len() {
-                component.iter().for_each(|f| turn[*f] = !turn[*f]);
-            }
-        }
-    }
-    for (face, _) in faces.iter_mut().zip(&turn).filter(|(_, t)| **t) {
-        face.swap(1, 2);
-        report.flipped_faces += 1;
-    }
-    // An open surface has no inside; one with a small hole still has, so the sign decides there too.
-    let n = positions.len().max(1) as f64;
-    let centre = Point3::from(positions.iter().fold(Vector3::zeros(), |s, p| s + p.coords) / n);
-    let wedges: Vec<f64> = faces.iter().map(|f| wedge(positions, f, &centre)).collect();
-    let (signed, unsigned) = wedges.iter().fold((0.0, 0.0), |(s, u), w| (s + w, u + w.abs()));
-    // A flat sheet gives a sum of rounding errors, whose sign means nothing.
-    if signed < -1e-9 * unsigned {
-        faces.iter_mut().for_each(|f| f.swap(1, 2));
-        report.inverted = true;
-    }
-}
-
-/// The mesh without vertices that no face uses.
-fn compacted(positions: &[Point3<f64>], faces: &[[u32; 3]]) -> TriMesh {
-    let mut new = vec![u32::MAX; positions.len()];
-    let mut kept = Vec::new();
-    let faces = faces.iter().map(|f| {
-        f.map(|v| {
-            let slot = &mut new[v as usize];
-            if *slot == u32::MAX {
-                *slot = kept.len() as u32;
-                kept.push(positions[v as usize]);
-            }
-            *slot
-        })
-    });
-    let faces = faces.collect();
-    TriMesh::new(kept, faces)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::topology;
+    use crate::topology::{self, Edge};
     use crate::volume::tests::{cuboid, icosphere};
 
     #[test]
@@ -252,7 +178,7 @@ mod tests {
             stray_components: 1,
             stray_faces: 1,
             flipped_faces: n.div_ceil(9),
-            inverted: true,
+            inverted_shells: 1,
             components: 1,
             watertight: true,
             ..Default::default()
@@ -274,7 +200,7 @@ mod tests {
         let mut open = two.clone();
         open.faces.remove(0);
         let (_, report) = open.cleaned();
-        assert_eq!((report.open_edges, report.watertight, report.inverted), (3, false, false));
+        assert_eq!((report.open_edges, report.watertight, report.inverted_shells), (3, false, 0));
         let mut fin = two.clone();
         fin.vertices.push(Point3::new(3.0, 3.0, 3.0));
         let tip = fin.vertices.len() as u32 - 1;

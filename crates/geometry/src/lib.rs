@@ -1,5 +1,6 @@
 //! Meshes, closest points, signed distance grids, kinematics and exact volumes.
 
+mod box_tree;
 mod clean;
 pub mod closest;
 mod field;
@@ -9,7 +10,10 @@ pub mod mass;
 mod mesh;
 mod normals;
 pub mod objects;
+mod orient;
+mod overlap;
 mod random;
+mod report;
 pub mod robot;
 pub mod sample;
 pub mod sdf;
@@ -18,13 +22,13 @@ pub mod topology;
 pub mod volume;
 mod weld;
 
-pub use clean::MeshReport;
 pub use closest::ClosestPoints;
 pub use field::{DistanceField, FieldSample};
-pub use io::{MeshError, write_whole};
+pub use io::{MeshError, limits, write_whole};
 pub use mass::{MassError, MassProperties};
 pub use mesh::{Texture, TriMesh};
 pub use random::SplitMix64;
+pub use report::MeshReport;
 pub use robot::{PosedRobot, Robot, RobotShape};
 pub use sample::SurfaceSample;
 pub use sdf::SdfGrid;

@@ -51,27 +51,40 @@ pub fn edges(faces: &[[u32; 3]]) -> Vec<Edge> {
         .collect()
 }
 
+/// Things that are joined one pair at a time (Tarjan 1975).
+struct Groups(Vec<u32>);
+
+impl Groups {
+    fn new(things: usize) -> Self {
+        Self((0..things as u32).collect())
+    }
+
+    /// The smallest of the things joined with `thing`.
+    fn root(&mut self, mut thing: u32) -> u32 {
+        while self.0[thing as usize] != thing {
+            self.0[thing as usize] = self.0[self.0[thing as usize] as usize];
+            thing = self.0[thing as usize];
+        }
+        thing
+    }
+
+    fn join(&mut self, a: u32, b: u32) {
+        let (a, b) = (self.root(a), self.root(b));
+        self.0[a.max(b) as usize] = a.min(b);
+    }
+}
+
 /// For each face, the number of its edge-connected component, counted in the order of first faces; and how many.
 pub(crate) fn components(edges: &[Edge], faces: usize) -> (Vec<u32>, usize) {
-    let mut parent: Vec<u32> = (0..faces as u32).collect();
-    fn root(parent: &mut [u32], mut f: u32) -> u32 {
-        while parent[f as usize] != f {
-            parent[f as usize] = parent[parent[f as usize] as usize];
-            f = parent[f as usize];
-        }
-        f
-    }
+    let mut groups = Groups::new(faces);
     for edge in edges {
-        for pair in edge.uses.windows(2) {
-            let (a, b) = (root(&mut parent, pair[0].face), root(&mut parent, pair[1].face));
-            parent[a.max(b) as usize] = a.min(b);
-        }
+        edge.uses.windows(2).for_each(|pair| groups.join(pair[0].face, pair[1].face));
     }
     let mut number = vec![u32::MAX; faces];
     let mut count = 0;
     let of = (0..faces as u32)
         .map(|f| {
-            let r = root(&mut parent, f) as usize;
+            let r = groups.root(f) as usize;
             if number[r] == u32::MAX {
                 number[r] = count;
                 count += 1;
@@ -80,6 +93,36 @@ pub(crate) fn components(edges: &[Edge], faces: usize) -> (Vec<u32>, usize) {
         })
         .collect();
     (of, count as usize)
+}
+
+/// Vertices in which surfaces touch without sharing an edge there: the faces around such a vertex form several fans.
+///
+/// `edges` are those of `faces` ([`edges`]). In ascending order.
+pub fn non_manifold_vertices(faces: &[[u32; 3]], edges: &[Edge]) -> Vec<u32> {
+    // Corners of faces, joined where an edge from their vertex has both faces.
+    let mut corners = Groups::new(3 * faces.len());
+    for edge in edges {
+        let at = |u: &EdgeUse, end: usize| {
+            let from_start = u.forward == (end == 0);
+            let corner = if from_start { u.corner } else { (u.corner + 1) % 3 };
+            3 * u.face + u32::from(corner)
+        };
+        for pair in edge.uses.windows(2) {
+            (0..2).for_each(|end| corners.join(at(&pair[0], end), at(&pair[1], end)));
+        }
+    }
+    let mut fans: Vec<u32> = faces
+        .iter()
+        .enumerate()
+        .filter(|(_, face)| !is_collapsed(face))
+        .flat_map(|(f, face)| [0, 1, 2].map(|k| (3 * f as u32 + k, face[k as usize])))
+        .filter_map(|(corner, vertex)| (corners.root(corner) == corner).then_some(vertex))
+        .collect();
+    fans.sort_unstable();
+    let mut touching: Vec<u32> =
+        fans.windows(2).filter(|pair| pair[0] == pair[1]).map(|pair| pair[0]).collect();
+    touching.dedup();
+    touching
 }
 
 #[cfg(test)]
@@ -100,5 +143,15 @@ mod tests {
         assert!(super::edges(&[[0, 1, 1]]).is_empty());
         // The same edge in the same direction is a contradiction of orientations.
         assert!(super::edges(&[[0, 1, 2], [1, 2, 3]]).iter().all(|e| !e.is_manifold()));
+    }
+
+    #[test]
+    fn cones_that_share_their_tip_touch_in_it() {
+        // Two fans of two faces each around vertex 0.
+        let faces = [[0, 1, 2], [0, 2, 3], [0, 4, 5], [0, 5, 6], [7, 7, 0]];
+        assert_eq!(non_manifold_vertices(&faces, &edges(&faces)), [0]);
+        // A closed fan, whatever way its faces are turned.
+        let faces = [[0, 1, 2], [0, 3, 2], [3, 0, 1]];
+        assert!(non_manifold_vertices(&faces, &edges(&faces)).is_empty());
     }
 }

@@ -19,7 +19,25 @@ pub struct Weld {
 }
 
 impl Weld {
+    /// Joins equal positions only.
+    fn exact(vertices: &[Point3<f64>]) -> Self {
+        let mut known = HashMap::with_capacity(vertices.len());
+        let mut weld = Self { positions: Vec::new(), index: Vec::with_capacity(vertices.len()) };
+        for v in vertices {
+            // Adding zero makes one of the two zeros.
+            let bits = v.coords.map(|c| (c + 0.0).to_bits());
+            weld.index.push(*known.entry(bits).or_insert_with(|| {
+                weld.positions.push(*v);
+                weld.positions.len() as u32 - 1
+            }));
+        }
+        weld
+    }
+
     fn new(vertices: &[Point3<f64>], tolerance: f64) -> Self {
+        if tolerance <= 0.0 {
+            return Self::exact(vertices);
+        }
         let everywhere = Point3::from([f64::INFINITY; 3]);
         let (low, high) =
             vertices.iter().fold((everywhere, -everywhere), |(l, h), v| (l.inf(v), h.sup(v)));
@@ -131,6 +149,8 @@ mod tests {
             assert_eq!(weld.index, [0, 1, 2, 1, 2, 3]);
             assert_eq!(weld.faces(&mesh), [[0, 1, 2], [1, 1, 2], [1, 3, 2]]);
         }
+        let zeros = TriMesh::new(vec![p(0., 0., 0.), p(-0., 0., 0.)], vec![]);
+        assert_eq!(zeros.weld_within(0.0).index, [0, 0]);
         assert_eq!(mesh.welded().vertices, mesh.weld().positions);
         assert!(TriMesh::default().welded().vertices.is_empty());
     }

@@ -36,7 +36,11 @@ fn textured_models_load_and_become_watertight() {
             }
             let (clean, report) = mesh.cleaned();
             println!("{}: {report:?}", path.display());
-            assert!(report.watertight && !report.inverted, "{}: {report:?}", path.display());
+            assert!(
+                report.watertight && report.inverted_shells == 0,
+                "{}: {report:?}",
+                path.display()
+            );
             // Two copies of a solid share all of it; this also says that the booleans accept the mesh.
             let own = prehend_geometry::mass::mass_properties(&clean, 1.0).unwrap().volume;
             let shared = volume::intersection_volume(std::slice::from_ref(&clean), &clean).unwrap();
@@ -46,11 +50,10 @@ fn textured_models_load_and_become_watertight() {
     }
 }
 
-#[test]
-#[ignore = "reads PREHEND_DATA"]
-fn hand_meshes_load() {
-    let mut count = 0;
-    let mut folders = vec![data("hands/allegro_right_mesh/meshes"), data("mujoco/hand/meshes")];
+/// Every mesh file in `folder` and below it, in order of name.
+fn meshes(folder: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    let mut folders = vec![folder.to_owned()];
     while let Some(folder) = folders.pop() {
         for entry in std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()) {
             let extension =
@@ -58,14 +61,42 @@ fn hand_meshes_load() {
             if entry.is_dir() {
                 folders.push(entry);
             } else if ["obj", "stl", "ply", "glb"].contains(&extension.as_str()) {
-                let (_, report) = TriMesh::load(&entry).unwrap().cleaned();
-                println!("{}: {report:?}", entry.display());
-                assert!(report.watertight, "{}: {report:?}", entry.display());
-                count += 1;
+                found.push(entry);
             }
         }
     }
-    assert!(count > 10);
+    found.sort();
+    found
+}
+
+/// The objects, the scans and the hands: what is wrong with each, printed as a table.
+#[test]
+#[ignore = "reads PREHEND_DATA"]
+fn every_mesh_loads_and_is_repaired_and_reported() {
+    let root = data("");
+    for (folder, expected) in [
+        ("objects", 38),
+        ("mujoco/models", 9),
+        ("hands/allegro_right_mesh", 12),
+        ("mujoco/hand", 4),
+    ] {
+        let found = meshes(&data(folder));
+        assert_eq!(found.len(), expected, "{folder}");
+        for path in found {
+            let mesh = TriMesh::load(&path).unwrap();
+            let (clean, report) = mesh.cleaned();
+            let name = path.strip_prefix(&root).unwrap_or(&path).display();
+            println!("{name}: {} faces; {report}", mesh.faces.len());
+            assert!(report.watertight, "{name}: {report:?}");
+            let mass = prehend_geometry::mass::mass_properties(&clean, 1.0);
+            assert!(mass.unwrap().volume > 0.0, "{name}");
+            // Repairing what is repaired changes nothing.
+            let (again, second) = clean.cleaned();
+            assert_eq!(again.faces, clean.faces, "{name}");
+            let repairs = second.welded_vertices + second.flipped_faces + second.inverted_shells;
+            assert_eq!(repairs + second.fin_faces + second.stray_faces, 0, "{name}: {second:?}");
+        }
+    }
 }
 
 /// How well the texture, read at the vertices in sight, explains the image: the correlation of brightness (far from 1:

@@ -1,9 +1,10 @@
 //! Whatever a file holds, reading it ends in a mesh or an error.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use nalgebra::{Point3, Vector3};
-use prehend_geometry::{SplitMix64, TriMesh};
+use prehend_geometry::{Robot, SplitMix64, Texture, TriMesh};
 
 fn tetrahedron() -> TriMesh {
     let p = Point3::new;
@@ -15,22 +16,24 @@ fn tetrahedron() -> TriMesh {
     mesh
 }
 
-/// Reads `original` with bytes replaced, removed and repeated at places chosen by a fixed sequence.
-fn mutate(original: &[u8], name: &str) -> (usize, usize) {
-    let path = Path::new(name);
-    assert!(TriMesh::from_bytes(original, path).is_ok(), "{name}");
+/// Hands `original` to `read` with bytes replaced, removed and repeated at places chosen by a fixed sequence.
+fn mutations(original: &[u8], count: usize, mut read: impl FnMut(Vec<u8>)) {
     let mut random = SplitMix64::new(1);
     let mut next = |below: usize| (random.unit() * below as f64) as usize;
-    let (mut read, mut refused) = (0, 0);
-    for _ in 0..3000 {
+    for _ in 0..count {
         let mut bytes = original.to_vec();
         for _ in 0..=next(3) {
             let at = next(bytes.len());
-            match next(5) {
+            match next(6) {
                 0 => bytes[at] = next(256) as u8,
                 1 => bytes[at] = b"0129-. \n/ex#"[next(12)],
                 2 => drop(bytes.drain(at..(at + next(20)).min(bytes.len()))),
                 3 => bytes.truncate(at.max(1)),
+                // The largest number that fits, where there is one.
+                4 => {
+                    let end = (at + 4).min(bytes.len());
+                    bytes[at..end].fill(255);
+                }
                 _ => {
                     let piece = bytes[at..(at + next(40)).min(bytes.len())].to_vec();
                     bytes.splice(at..at, piece);
@@ -40,28 +43,40 @@ fn mutate(original: &[u8], name: &str) -> (usize, usize) {
                 bytes.push(0);
             }
         }
-        match TriMesh::from_bytes(&bytes, path) {
-            Ok(mesh) => {
-                assert!(mesh.faces.iter().flatten().all(|&v| (v as usize) < mesh.vertices.len()));
-                assert!(mesh.uvs.as_ref().is_none_or(|u| u.len() == mesh.vertices.len()));
-                assert!(mesh.normals.as_ref().is_none_or(|n| n.len() == mesh.vertices.len()));
-                assert!(mesh.colors.as_ref().is_none_or(|c| c.len() == mesh.vertices.len()));
-                // What was read is fit for the next steps, too.
-                let (clean, _) = mesh.cleaned();
-                prehend_geometry::mass::mass_properties(&clean, 1.0).ok();
-                read += 1;
-            }
-            Err(error) => {
-                assert!(error.to_string().starts_with(name), "{error}");
-                refused += 1;
-            }
+        read(bytes);
+    }
+}
+
+/// Whether `bytes` are a mesh; panics where it is one that contradicts itself.
+fn reads(bytes: &[u8], path: &Path) -> bool {
+    match TriMesh::from_bytes(bytes, path) {
+        Ok(mesh) => {
+            assert!(mesh.faces.iter().flatten().all(|&v| (v as usize) < mesh.vertices.len()));
+            assert!(mesh.uvs.as_ref().is_none_or(|u| u.len() == mesh.vertices.len()));
+            assert!(mesh.normals.as_ref().is_none_or(|n| n.len() == mesh.vertices.len()));
+            assert!(mesh.colors.as_ref().is_none_or(|c| c.len() == mesh.vertices.len()));
+            // What was read is fit for the next steps, too.
+            let (clean, report) = mesh.cleaned();
+            assert!(report.crossing_faces <= clean.faces.len(), "{report}");
+            prehend_geometry::mass::mass_properties(&clean, 1.0).ok();
+            true
+        }
+        Err(error) => {
+            assert!(error.to_string().starts_with(&path.display().to_string()), "{error}");
+            false
         }
     }
+}
+
+fn mutate(original: &[u8], path: &Path) -> (usize, usize) {
+    assert!(TriMesh::from_bytes(original, path).is_ok(), "{}", path.display());
+    let (mut read, mut refused) = (0, 0);
+    mutations(original, 3000, |bytes| if reads(&bytes, path) { read += 1 } else { refused += 1 });
     (read, refused)
 }
 
 fn check(original: &[u8], name: &str) {
-    let (read, refused) = mutate(original, name);
+    let (read, refused) = mutate(original, Path::new(name));
     // Both ends were met, or the mutations say nothing.
     assert!(read > 50 && refused > 50, "{name}: {read} read, {refused} refused");
 }
@@ -84,6 +99,71 @@ fn obj() {
     let path = folder.path().join("m.obj");
     tetrahedron().save_obj(&path).unwrap();
     check(&std::fs::read(&path).unwrap(), "m.obj");
+}
+
+fn painted() -> TriMesh {
+    let texture = Texture { width: 3, height: 2, pixels: vec![[9, 90, 200]; 6] };
+    TriMesh { texture: Some(Arc::new(texture)), ..tetrahedron() }
+}
+
+#[test]
+fn materials_and_images_beside_an_obj() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("m.obj");
+    painted().save_obj(&path).unwrap();
+    let mesh = std::fs::read(&path).unwrap();
+    for companion in ["m.mtl", "m.png"] {
+        let file = folder.path().join(companion);
+        let original = std::fs::read(&file).unwrap();
+        let mut read = 0;
+        mutations(&original, 500, |bytes| {
+            std::fs::write(&file, bytes).unwrap();
+            read += usize::from(reads(&mesh, &path));
+        });
+        assert!(read < 500, "no mutation of {companion} was noticed");
+        std::fs::write(&file, original).unwrap();
+        assert!(reads(&mesh, &path));
+    }
+}
+
+#[test]
+fn glb_with_its_image_inside() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("m.glb");
+    painted().save_glb(&path).unwrap();
+    let original = std::fs::read(&path).unwrap();
+    let (read, refused) = mutate(&original, &path);
+    assert!(read + refused == 3000 && refused > 50, "{read} {refused}");
+    // Every way to end too early.
+    assert!((0..original.len()).all(|n| !reads(&original[..n], &path)));
+}
+
+#[test]
+fn robot_descriptions() {
+    let folder = tempfile::tempdir().unwrap();
+    tetrahedron().save_ply(&folder.path().join("m.ply")).unwrap();
+    let text = r#"<?xml version="1.0"?><!-- a --><robot name="r"><link name="a">
+        <collision><origin xyz="1 0 0" rpy="0 1 0"/><geometry><box size="1 2 3"/></geometry></collision>
+        <collision><geometry><mesh filename="package://r/m.ply" scale="1 2 1"/></geometry></collision></link>
+        <link name="b"><collision><geometry><cylinder radius="1" length="2"/></geometry></collision></link>
+        <link name="c"><collision><geometry><sphere radius="1"/></geometry></collision></link>
+        <joint name="p" type="revolute"><parent link="a"/><child link="b"/><origin xyz="0 0 1"/><axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+        <joint name="q" type="prismatic"><parent link="b"/><child link="c"/><axis xyz="0 1 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/><mimic joint="p" multiplier="0.5" offset="0.1"/></joint></robot>"#;
+    let read = |text: &str| Robot::from_urdf_str(text, Some(folder.path()));
+    assert_eq!(read(text).unwrap().joint_limits(), [(-1.0, 1.0)]);
+    let (mut accepted, mut refused) = (0, 0);
+    mutations(text.as_bytes(), 2000, |bytes| match read(&String::from_utf8_lossy(&bytes)) {
+        Ok(robot) => {
+            let joints = robot.clamp_joints(&vec![0.3; robot.joint_names().len()]).unwrap();
+            assert_eq!(robot.forward_kinematics(&joints).len(), robot.links().len());
+            accepted += 1;
+        }
+        Err(error) => {
+            assert!(!error.to_string().is_empty());
+            refused += 1;
+        }
+    });
+    assert!(accepted > 50 && refused > 50, "{accepted} {refused}");
 }
 
 #[test]
@@ -125,7 +205,7 @@ fn glb() {
         bytes.extend(kind);
         bytes.extend(chunk);
     }
-    mutate(&bytes, "m.glb");
+    mutate(&bytes, Path::new("m.glb"));
     check(&json_with_data_uri(&json, &bin), "m.gltf");
 }
 

@@ -37,6 +37,18 @@ pub enum MeshError {
         /// What is wrong with it.
         reason: String,
     },
+    /// The file asks for more than [`limits`](crate::limits) allow.
+    #[error("{path}: {element}: {count}, more than the limit of {limit}")]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// What there is too much of, such as `file, bytes` or `vertices`.
+        element: String,
+        /// How much.
+        count: u64,
+        /// How much is read at most.
+        limit: u64,
+    },
     /// The file uses a part of its format that is not read here.
     #[error("{path}: {feature} not supported")]
     Unsupported {
@@ -74,6 +86,20 @@ impl MeshError {
         reason: impl ToString,
     ) -> Self {
         Self::Malformed { path: path.into(), element: element.into(), reason: reason.to_string() }
+    }
+
+    /// [`MeshError::TooLarge`] where `count` is more than `limit`.
+    pub(super) fn within(
+        path: &Path,
+        element: &str,
+        count: usize,
+        limit: usize,
+    ) -> Result<(), Self> {
+        if count <= limit {
+            return Ok(());
+        }
+        let (count, limit) = (count as u64, limit as u64);
+        Err(Self::TooLarge { path: path.into(), element: element.into(), count, limit })
     }
 
     pub(super) fn texture(path: &Path, texture: impl Into<String>, reason: impl ToString) -> Self {

@@ -1,11 +1,16 @@
-//! Mesh files: PLY, OBJ + MTL, STL, glTF in; PLY and OBJ out.
+//! Mesh files: PLY, OBJ + MTL, STL, glTF in; PLY, OBJ + MTL and GLB out.
 //!
-//! Lengths stay in the unit of the file: scale the result where a file is not in metres
+//! Companion files (materials, textures, buffers) are read from the folder of the mesh only, see [`folder::inside`];
+//! [`limits`] bound what a file may ask for. Lengths stay in the unit of the file: scale the result where a file is not in metres
 //! (`mesh.scaled(1e-3)` for BOP models in millimetres).
 
 mod base64;
 mod error;
+pub(crate) mod folder;
 mod gltf;
+mod images;
+pub mod limits;
+mod mtl;
 mod obj;
 mod parts;
 mod ply;
@@ -14,7 +19,7 @@ mod stl;
 mod texture;
 mod whole;
 
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
 
 use crate::TriMesh;
 pub use error::MeshError;
@@ -29,7 +34,8 @@ impl TriMesh {
     ///
     /// # Errors
     /// Every error names the file, and the element or field at fault: unreadable or truncated files,
-    /// counts or indices that do not fit, non-finite numbers, missing textures, meshes without triangles.
+    /// counts or indices that do not fit, non-finite numbers, missing textures, meshes without triangles, and whatever
+    /// is larger than [`limits`](crate::limits) allow.
     pub fn load(path: &Path) -> Result<TriMesh, MeshError> {
         let bytes = read(path)?;
         TriMesh::from_bytes(&bytes, path)
@@ -41,9 +47,8 @@ impl TriMesh {
     /// # Errors
     /// As [`TriMesh::load`].
     pub fn from_bytes(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshError> {
-        let extension =
-            path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
-        let mesh = match extension.as_str() {
+        MeshError::within(path, "file, bytes", bytes.len(), limits::MAX_FILE_BYTES)?;
+        let mesh = match extension(path).as_str() {
             "ply" => ply::parse(bytes, path)?,
             "obj" => obj::parse(bytes, path)?,
             "stl" => stl::parse(bytes, path)?,
@@ -54,8 +59,14 @@ impl TriMesh {
     }
 }
 
+/// The extension of `path` in lower case, empty without one.
+fn extension(path: &Path) -> String {
+    path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase()
+}
+
 fn read(path: &Path) -> Result<Vec<u8>, MeshError> {
-    std::fs::read(path).map_err(|source| MeshError::Read { path: path.into(), source })
+    folder::read_limited(path, limits::MAX_FILE_BYTES)
+        .map_err(|source| MeshError::Read { path: path.into(), source })
 }
 
 /// Rejects what no later stage can use and normalises stored normals.
@@ -64,6 +75,8 @@ fn checked(mut mesh: TriMesh, path: &Path) -> Result<TriMesh, MeshError> {
     if vertices == 0 || faces == 0 {
         return Err(MeshError::Empty { path: path.into(), vertices, faces });
     }
+    MeshError::within(path, "vertices", vertices, limits::MAX_ELEMENTS)?;
+    MeshError::within(path, "faces", faces, limits::MAX_ELEMENTS)?;
     if let Some(face) = mesh.faces.iter().position(|f| f.iter().any(|&v| v as usize >= vertices)) {
         let reason =
             format!("vertex index out of range: {:?} of {vertices} vertices", mesh.faces[face]);
@@ -105,14 +118,7 @@ fn checked(mut mesh: TriMesh, path: &Path) -> Result<TriMesh, MeshError> {
 
 /// The companion file `name` of the mesh at `path`, refused where it would lie outside the mesh's folder.
 fn companion(path: &Path, name: &str) -> Result<PathBuf, &'static str> {
-    // Files written on Windows separate folders by backslashes.
-    let relative = PathBuf::from(name.trim().replace('\\', "/"));
-    let inside =
-        relative.components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
-    if !inside || relative.as_os_str().is_empty() {
-        return Err("must be a relative path inside the folder of the mesh");
-    }
-    Ok(path.parent().unwrap_or(Path::new("")).join(relative))
+    folder::inside(path.parent().unwrap_or(Path::new("")), name)
 }
 
 #[cfg(test)]
@@ -138,15 +144,6 @@ mod tests {
         assert!(
             matches!(&error, MeshError::Read { .. }) && error.to_string().contains("no/such.ply")
         );
-    }
-
-    #[test]
-    fn companions_stay_inside_the_folder() {
-        let mesh = Path::new("models/a.ply");
-        assert_eq!(companion(mesh, "./tex\\a.png").unwrap(), Path::new("models/tex/a.png"));
-        for name in ["../a.png", "/etc/passwd", "x/../../a.png", ""] {
-            assert!(companion(mesh, name).is_err(), "{name}");
-        }
     }
 
     #[test]

@@ -1,53 +1,48 @@
 //! Wavefront OBJ with MTL materials, through `tobj` (coordinates in single precision).
 
-use std::collections::BTreeMap;
+use std::cell::RefCell;
 use std::io::Cursor;
 use std::path::Path;
-use std::sync::Arc;
 
 use nalgebra::{Point3, Vector3};
 use tobj::{LoadError, LoadOptions, Material, Mesh};
 
+use super::images::Images;
 use super::parts::{Part, join};
-use super::{MeshError, companion, texture};
-use crate::{Texture, TriMesh};
+use super::{MeshError, mtl, texture};
+use crate::TriMesh;
+
+const OPTIONS: LoadOptions =
+    LoadOptions { single_index: true, triangulate: true, ignore_points: true, ignore_lines: true };
 
 pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshError> {
-    let options = LoadOptions {
-        single_index: true,
-        triangulate: true,
-        ignore_points: true,
-        ignore_lines: true,
-    };
-    let material_file = std::cell::RefCell::new(String::new());
-    let (models, materials) = tobj::load_obj_buf(&mut Cursor::new(bytes), &options, |name| {
-        *material_file.borrow_mut() = name.display().to_string();
-        let file =
-            companion(path, &name.to_string_lossy()).map_err(|_| LoadError::OpenFileFailed)?;
-        let content = std::fs::read(file).map_err(|_| LoadError::OpenFileFailed)?;
-        tobj::load_mtl_buf(&mut Cursor::new(content))
+    // The name of the material library, and why it could not be read.
+    let library = RefCell::new((String::new(), String::new()));
+    let (models, materials) = tobj::load_obj_buf(&mut Cursor::new(bytes), &OPTIONS, |name| {
+        let name = name.display().to_string();
+        texture::beside(path, &name).and_then(|content| mtl::parse(&content)).map_err(|reason| {
+            *library.borrow_mut() = (name, reason);
+            LoadError::MaterialParseError
+        })
     })
-    .map_err(|e| MeshError::malformed(path, "content", e))?;
+    .map_err(|e| MeshError::malformed(path, line_at_fault(bytes), e))?;
     let textured = models.iter().any(|m| !m.mesh.texcoords.is_empty());
     let materials = match materials {
         Ok(materials) => materials,
         // Collision meshes often name materials that were never shipped; without UVs nothing is lost.
         Err(_) if !textured => Vec::new(),
-        Err(e) => {
-            return Err(MeshError::malformed(
-                path,
-                format!("mtllib {}", material_file.borrow()),
-                e,
-            ));
+        Err(_) => {
+            let (name, reason) = library.into_inner();
+            return Err(MeshError::malformed(path, format!("mtllib {name}"), reason));
         }
     };
-    let mut images = BTreeMap::new();
+    let mut images = Images::new(path);
     let mut parts = Vec::new();
     for model in &models {
         let material = model.mesh.material_id.and_then(|id| materials.get(id));
         let image = match material.and_then(image_name) {
             Some(name) if !model.mesh.texcoords.is_empty() => {
-                Some(load_image(path, name, &mut images)?)
+                Some(images.get(name, || texture::beside(path, name))?)
             }
             _ => None,
         };
@@ -59,23 +54,28 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshError> {
     join(parts, path)
 }
 
+/// The line, from 1, without which the lines before it can be read: `tobj` does not say where it stopped. Where faces
+/// precede their vertices, it may be such a face's.
+fn line_at_fault(bytes: &[u8]) -> String {
+    let ends: Vec<usize> = (0..bytes.len()).filter(|&i| bytes[i] == b'\n').map(|i| i + 1).collect();
+    let reads = |lines: usize| {
+        let end = if lines > ends.len() { bytes.len() } else { ends[lines - 1] };
+        let text = &mut Cursor::new(&bytes[..end]);
+        tobj::load_obj_buf(text, &OPTIONS, |_| Err(LoadError::GenericFailure)).is_ok()
+    };
+    // The first `good` lines can be read, the first `bad` cannot.
+    let (mut good, mut bad) = (0, ends.len() + 1);
+    while bad - good > 1 {
+        let middle = good + (bad - good) / 2;
+        if reads(middle) { good = middle } else { bad = middle }
+    }
+    format!("line {bad}")
+}
+
 /// The file of `map_Kd`, which may follow options such as `-s 1 1 1`.
 fn image_name(material: &Material) -> Option<&str> {
     let name = material.diffuse_texture.as_deref()?.trim();
     if name.starts_with('-') { name.split_whitespace().last() } else { Some(name) }
-}
-
-fn load_image(
-    path: &Path,
-    name: &str,
-    images: &mut BTreeMap<String, Arc<Texture>>,
-) -> Result<Arc<Texture>, MeshError> {
-    if let Some(image) = images.get(name) {
-        return Ok(image.clone());
-    }
-    let image = Arc::new(texture::load_companion(path, name)?);
-    images.insert(name.into(), image.clone());
-    Ok(image)
 }
 
 fn geometry(mesh: &Mesh) -> TriMesh {
@@ -119,7 +119,10 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("m.obj");
         let error = load(CUBE_CORNER, &path).unwrap_err().to_string();
-        assert!(error.contains("mtllib m.mtl"), "{error}");
+        assert!(error.contains("mtllib m.mtl: ") && error.contains("No such file"), "{error}");
+        let escaping = CUBE_CORNER.replace("m.mtl", "../m.mtl");
+        let error = load(&escaping, &path).unwrap_err().to_string();
+        assert!(error.contains("leaves the folder"), "{error}");
         std::fs::write(
             folder.path().join("m.mtl"),
             "newmtl painted\nKd 1 1 1\nmap_Kd -s 1 1 1 t.png\n",
@@ -166,7 +169,9 @@ mod tests {
             "v 0 0\n",
             "f a b c\n",
         ] {
-            assert!(load(&format!("{triangle}{bad}"), path).is_err(), "{bad}");
+            let text = format!("# a comment\n{triangle}{bad}vn 0 0 1\nf 1 2 3\n");
+            let error = load(&text, path).unwrap_err().to_string();
+            assert!(error.starts_with("m.obj: line 5: "), "{bad}{error}");
         }
         assert!(matches!(load("", path), Err(MeshError::Empty { .. })));
         assert!(matches!(load(triangle, path), Err(MeshError::Empty { .. })));

@@ -4,6 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::MeshError;
+use super::limits::MAX_PIXELS;
 use crate::{Texture, TriMesh};
 
 /// Geometry under one material.
@@ -68,6 +69,13 @@ fn into_atlas(mut parts: Vec<Part>, path: &Path) -> Result<Vec<Part>, MeshError>
     }
     let width = tiles.iter().map(|t| t.width + 2).max().unwrap_or(0);
     let height: usize = tiles.iter().map(|t| t.height + 2).sum();
+    // A wide tile beside a tall one spans far more than both.
+    MeshError::within(
+        path,
+        "joined texture, pixels",
+        width.saturating_mul(height),
+        2 * MAX_PIXELS,
+    )?;
     let mut pixels = Vec::with_capacity(width * height);
     let mut top = Vec::new();
     for tile in &tiles {
@@ -142,6 +150,10 @@ mod tests {
         let repeated =
             vec![part(Some([[0.0, 2.0]; 3]), Some(&a), [1.0; 3]), part(None, None, [1.0; 3])];
         assert!(matches!(join(repeated, path), Err(MeshError::Unsupported { .. })));
+        let (wide, tall) = (image(20_000, 1, 0), image(1, 20_000, 0));
+        let cross =
+            vec![part(Some(uvs), Some(&wide), [1.0; 3]), part(Some(uvs), Some(&tall), [1.0; 3])];
+        assert!(matches!(join(cross, path), Err(MeshError::TooLarge { .. })));
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! STL, ASCII and binary, through `stl_io`, which welds identical corners.
+//! STL, ASCII and binary, through `stl_io`; identical corners become one vertex.
 
 use std::borrow::Cow;
 use std::io::Cursor;
@@ -7,14 +7,25 @@ use std::path::Path;
 use nalgebra::Point3;
 
 use super::MeshError;
+use super::limits::MAX_ELEMENTS;
 use crate::TriMesh;
 
 pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshError> {
-    let stl = stl_io::read_stl(&mut Cursor::new(as_its_kind(bytes)))
-        .map_err(|e| MeshError::malformed(path, "facets", e))?;
-    let vertices = stl.vertices.iter().map(|v| Point3::from(v.0.map(f64::from))).collect();
-    let faces = stl.faces.iter().map(|f| f.vertices.map(|v| v as u32)).collect();
-    Ok(TriMesh::new(vertices, faces))
+    let mut content = Cursor::new(as_its_kind(bytes));
+    let facets = stl_io::create_stl_reader(&mut content)
+        .map_err(|e| MeshError::malformed(path, "header", e))?;
+    let mut vertices = Vec::new();
+    for (k, facet) in facets.enumerate() {
+        let facet = facet.map_err(|e| MeshError::malformed(path, format!("facet {k}"), e))?;
+        MeshError::within(path, "facets", k + 1, MAX_ELEMENTS)?;
+        vertices.extend(facet.vertices.map(|v| Point3::from(v.0.map(f64::from))));
+    }
+    let faces = (0..vertices.len() as u32 / 3).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
+    let separate = TriMesh::new(vertices, faces);
+    // The format knows no shared corners: equal ones are one.
+    let weld = separate.weld_within(0.0);
+    let faces = weld.faces(&separate);
+    Ok(TriMesh::new(weld.positions, faces))
 }
 
 /// Many programs begin binary headers with `solid`, the mark of ASCII files; the length tells them apart.
@@ -77,7 +88,7 @@ mod tests {
             load(&bytes[..bytes.len() - 10])
                 .unwrap_err()
                 .to_string()
-                .starts_with("m.stl: facets: ")
+                .starts_with("m.stl: facet 1: ")
         );
         assert!(load(&[]).is_err());
         let mut hostile = bytes.clone();

@@ -5,6 +5,8 @@ use std::path::Path;
 
 use image::{ImageFormat, ImageReader, RgbImage};
 
+use super::folder::read_limited;
+use super::limits::{MAX_FILE_BYTES, MAX_PIXELS};
 use super::{MeshError, companion};
 use crate::Texture;
 
@@ -12,11 +14,12 @@ impl Texture {
     /// Reads a PNG or JPEG image; grey images become RGB, alpha is dropped.
     ///
     /// # Errors
-    /// [`MeshError::Texture`] where the file is missing or not an image.
+    /// [`MeshError::Texture`] where the file is missing, not an image, or larger than [`limits`](crate::limits) allow.
     pub fn load(path: &Path) -> Result<Texture, MeshError> {
         let name = path.display().to_string();
-        let bytes = std::fs::read(path).map_err(|e| MeshError::texture(path, &name, e))?;
-        decode(&bytes, path, &name)
+        let bytes =
+            read_limited(path, MAX_FILE_BYTES).map_err(|e| MeshError::texture(path, &name, e))?;
+        decode(&bytes, path, &name, MAX_PIXELS)
     }
 
     /// The image as PNG.
@@ -33,19 +36,30 @@ impl Texture {
     }
 }
 
-/// Reads the image `name` from the folder of the mesh at `path`.
-pub(super) fn load_companion(path: &Path, name: &str) -> Result<Texture, MeshError> {
-    let file = companion(path, name).map_err(|e| MeshError::texture(path, name, e))?;
-    let bytes = std::fs::read(file).map_err(|e| MeshError::texture(path, name, e))?;
-    decode(&bytes, path, name)
+/// The content of the file `name` in the folder of the mesh at `path`.
+pub(super) fn beside(path: &Path, name: &str) -> Result<Vec<u8>, String> {
+    let file = companion(path, name)?;
+    read_limited(&file, MAX_FILE_BYTES).map_err(|e| e.to_string())
 }
 
-/// Decodes an image embedded in, or named by, the mesh at `path`.
-pub(super) fn decode(bytes: &[u8], path: &Path, name: &str) -> Result<Texture, MeshError> {
-    // The reader's default limits keep a hostile image from allocating more than 512 MiB.
-    let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
-    let image = reader.map_err(|e| MeshError::texture(path, name, e))?.decode();
-    let rgb = image.map_err(|e| MeshError::texture(path, name, e))?.into_rgb8();
+/// Decodes an image of at most `limit` pixels that is embedded in, or named by, the mesh at `path`.
+pub(super) fn decode(
+    bytes: &[u8],
+    path: &Path,
+    name: &str,
+    limit: usize,
+) -> Result<Texture, MeshError> {
+    let fault = |e: String| MeshError::texture(path, name, e);
+    let reader = || {
+        ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| fault(e.to_string()))
+    };
+    // The size stands in the header: a few bytes may claim, and compress, any number of pixels.
+    let (width, height) = reader()?.into_dimensions().map_err(|e| fault(e.to_string()))?;
+    let pixels = u64::from(width) * u64::from(height);
+    if pixels > limit as u64 {
+        return Err(fault(format!("{pixels} pixels, more than the limit of {limit} that is left")));
+    }
+    let rgb = reader()?.decode().map_err(|e| fault(e.to_string()))?.into_rgb8();
     let (width, height) = (rgb.width() as usize, rgb.height() as usize);
     Ok(Texture { width, height, pixels: rgb.pixels().map(|p| p.0).collect() })
 }
@@ -59,11 +73,13 @@ mod tests {
         let texture =
             Texture { width: 3, height: 2, pixels: (0..6).map(|k| [k, 2 * k, 255 - k]).collect() };
         let png = texture.encode_png().unwrap();
-        assert_eq!(decode(&png, Path::new("m.ply"), "t.png").unwrap(), texture);
+        assert_eq!(decode(&png, Path::new("m.ply"), "t.png", 6).unwrap(), texture);
         let error =
-            decode(&png[..png.len() / 2], Path::new("m.ply"), "t.png").unwrap_err().to_string();
+            decode(&png[..png.len() / 2], Path::new("m.ply"), "t.png", 6).unwrap_err().to_string();
         assert!(error.starts_with("m.ply: texture t.png: "), "{error}");
-        assert!(decode(b"not an image", Path::new("m.ply"), "t.png").is_err());
+        assert!(decode(b"not an image", Path::new("m.ply"), "t.png", 6).is_err());
+        let error = decode(&png, Path::new("m.ply"), "t.png", 5).unwrap_err().to_string();
+        assert!(error.contains("6 pixels, more than the limit"), "{error}");
         assert!(Texture { width: 3, height: 3, ..texture }.encode_png().is_err());
         assert!(matches!(Texture::load(Path::new("none.png")), Err(MeshError::Texture { .. })));
     }

@@ -93,6 +93,44 @@ pub enum RobotError {
         /// What it must be.
         requirement: &'static str,
     },
+    /// No position of a joint is within all its limits and those of the joints that mimic it.
+    #[error(
+        "joint '{joint}': no position is within the limits {lower} to {upper}, imposed by {by}"
+    )]
+    Limits {
+        /// The joint.
+        joint: String,
+        /// The largest of the lower limits \[rad or m\].
+        lower: f64,
+        /// The smallest of the upper limits \[rad or m\].
+        upper: f64,
+        /// The joints whose limits these are.
+        by: String,
+    },
+    /// A joint position outside the limits of the joint, or of one that mimics it.
+    #[error("joint '{joint}' at {position} is outside {lower} to {upper}, imposed by {by}")]
+    OutsideLimits {
+        /// The joint.
+        joint: String,
+        /// Its position \[rad or m\].
+        position: f64,
+        /// Smallest position \[rad or m\].
+        lower: f64,
+        /// Largest position \[rad or m\].
+        upper: f64,
+        /// The joints whose limits these are.
+        by: String,
+    },
+    /// A description too large or nested too deeply.
+    #[error("the description is too large: {count} {what}, at most {limit} are read")]
+    TooLarge {
+        /// Bytes, or levels of tags.
+        what: &'static str,
+        /// How many.
+        count: usize,
+        /// How many are read.
+        limit: usize,
+    },
     /// A joint has no value in a joint state.
     #[error("joint '{joint}' is missing from the joint state")]
     MissingJoint {

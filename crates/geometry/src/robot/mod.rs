@@ -1,8 +1,11 @@
 //! Robots: kinematic trees with collision shapes, read from URDF.
 
+mod articulated;
+mod closest;
 mod collision;
 mod error;
 mod kinematics;
+mod limits;
 mod posed;
 mod shape;
 mod tree;
@@ -12,6 +15,8 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Isometry3, Unit, Vector3};
 
+pub use articulated::{ArticulatedRobot, RobotSample};
+pub use closest::RobotClosest;
 pub use error::RobotError;
 pub use posed::PosedRobot;
 pub use shape::{LinkShape, RobotShape};
@@ -86,6 +91,8 @@ pub struct Robot {
     root: usize,
     /// Names of the entries of the joint vector.
     variables: Vec<String>,
+    /// Limits of those entries.
+    ranges: Vec<limits::Range>,
 }
 
 impl Robot {

@@ -1,12 +1,15 @@
 //! From URDF text to a [`Robot`].
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::io;
 use std::path::Path;
 
 use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
 use urdf_rs::JointType;
 
-use super::{Drive, Joint, Link, Motion, Robot, RobotError, collision, tree};
+use super::{Drive, Joint, Link, Motion, Robot, RobotError, collision, limits, tree};
+use crate::io::folder::read_limited;
+use crate::limits::{MAX_URDF_BYTES, MAX_URDF_DEPTH};
 
 impl Robot {
     /// Reads a URDF file; mesh files are looked for in its folder.
@@ -15,8 +18,10 @@ impl Robot {
     /// [`RobotError`], naming this file.
     pub fn from_urdf_file(path: impl AsRef<Path>) -> Result<Self, RobotError> {
         let path = path.as_ref();
-        let text = std::fs::read_to_string(path)
-            .map_err(|source| RobotError::Read { path: path.into(), source })?;
+        let read_error = |source| RobotError::Read { path: path.into(), source };
+        let bytes = read_limited(path, MAX_URDF_BYTES).map_err(read_error)?;
+        let text = String::from_utf8(bytes)
+            .map_err(|e| read_error(io::Error::new(io::ErrorKind::InvalidData, e)))?;
         let folder = match path.parent() {
             Some(p) if !p.as_os_str().is_empty() => p,
             _ => Path::new("."),
@@ -28,11 +33,13 @@ impl Robot {
     /// Reads URDF text. Relative and `package://` mesh files are looked for in `asset_dir` and never
     /// outside of it; visual shapes are not read.
     ///
-    /// Mimicking joints follow the joint they name; `continuous` joints are revolute ones without limits.
+    /// Mimicking joints follow the joint they name; `continuous` joints are revolute ones without limits, and so are
+    /// those whose `limit` tag, against the format, is missing.
     ///
     /// # Errors
     /// [`RobotError`], naming the link, joint or mesh file.
     pub fn from_urdf_str(xml: &str, asset_dir: Option<&Path>) -> Result<Self, RobotError> {
+        check_size(xml)?;
         let urdf = urdf_rs::read_from_string(xml)
             .map_err(|error| RobotError::Urdf { message: error.to_string() })?;
         if urdf.links.is_empty() {
@@ -78,14 +85,18 @@ impl Robot {
                 };
                 let limits = match j.joint_type {
                     JointType::Revolute | JointType::Prismatic => {
-                        if j.limit.lower.is_nan() || j.limit.upper.is_nan() {
+                        let l = &j.limit;
+                        if l.lower.is_nan() || l.upper.is_nan() {
                             return Err(RobotError::Number {
                                 owner: owner(),
                                 field: "limit",
                                 requirement: "must be a number",
                             });
                         }
-                        Some((j.limit.lower, j.limit.upper))
+                        // Against the format, some descriptions lack the tag: no limit is meant, not a joint that
+                        // cannot move.
+                        let absent = [l.lower, l.upper, l.effort, l.velocity] == [0.0; 4];
+                        (!absent).then_some((l.lower, l.upper))
                     }
                     _ => None,
                 };
@@ -102,8 +113,50 @@ impl Robot {
             })
             .collect::<Result<Vec<_>, RobotError>>()?;
         let (order, root) = tree::order(&links, &joints)?;
-        Ok(Self { name: urdf.name, links, joints, order, root, variables })
+        let ranges = limits::ranges(&joints, &variables)?;
+        Ok(Self { name: urdf.name, links, joints, order, root, variables, ranges })
     }
+}
+
+/// Refuses text that the XML reader would take too long for, or descend into until the stack ends.
+fn check_size(xml: &str) -> Result<(), RobotError> {
+    let too_large = |what, count, limit| Err(RobotError::TooLarge { what, count, limit });
+    if xml.len() > MAX_URDF_BYTES {
+        return too_large("bytes", xml.len(), MAX_URDF_BYTES);
+    }
+    let mut depth = 0_usize;
+    let mut rest = xml;
+    while let Some(start) = rest.find('<') {
+        rest = &rest[start..];
+        let (end, change) = match rest {
+            _ if rest.starts_with("<!--") => (rest.find("-->"), 0),
+            _ if rest.starts_with("<![CDATA[") => (rest.find("]]>"), 0),
+            _ => (tag_end(rest), if rest.starts_with("</") { -1 } else { 1 }),
+        };
+        // What never ends is for the parser to complain about.
+        let Some(end) = end else { break };
+        let is_whole =
+            rest.starts_with("<!") || rest.starts_with("<?") || rest[..end].ends_with('/');
+        depth = depth.saturating_add_signed(if is_whole { 0 } else { change });
+        if depth > MAX_URDF_DEPTH {
+            return too_large("levels of tags", depth, MAX_URDF_DEPTH);
+        }
+        rest = &rest[end..];
+    }
+    Ok(())
+}
+
+/// Where the first tag of `text` ends: a `>` within quotes is part of a value.
+fn tag_end(text: &str) -> Option<usize> {
+    let mut quote = None;
+    text.bytes().position(|byte| {
+        match quote {
+            Some(open) if byte == open => quote = None,
+            None if byte == b'"' || byte == b'\'' => quote = Some(byte),
+            _ => {}
+        }
+        quote.is_none() && byte == b'>'
+    })
 }
 
 fn unique<'a>(
@@ -263,6 +316,20 @@ mod tests {
         assert!(matches!(Robot::from_urdf_str("<robot", None), Err(RobotError::Urdf { .. })));
         assert!(matches!(Robot::from_urdf_str("", None), Err(RobotError::Urdf { .. })));
         assert!(matches!(Robot::from_urdf_file("/nowhere/x.urdf"), Err(RobotError::Read { .. })));
+    }
+
+    #[test]
+    fn text_that_nests_without_end_is_refused() {
+        for tag in ["<link name=\"l\">", "<x>", "<!-- > --><gazebo>"] {
+            let xml = format!("<robot name=\"r\">{}", tag.repeat(200_000));
+            let error = Robot::from_urdf_str(&xml, None).unwrap_err();
+            assert!(matches!(error, RobotError::TooLarge { limit: MAX_URDF_DEPTH, .. }), "{error}");
+        }
+        // Many tags side by side are no nest, nor are comments and values that look like tags.
+        let link = |k: i32| format!("<!-- <a> --><link name=\"l{k}\"></link><x y='<>'/>");
+        let links: String = (0..300).map(link).collect();
+        let error = Robot::from_urdf_str(&format!("<robot name=\"r\">{links}</robot>"), None);
+        assert!(matches!(error, Err(RobotError::Roots { .. })));
     }
 
     #[test]

@@ -4,7 +4,7 @@
 
 mod accessor;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -13,8 +13,10 @@ use ::gltf::{Gltf, Node, Primitive, Semantic, buffer, image};
 use nalgebra::{Matrix4, Point3, Vector3};
 
 use self::accessor::Buffers;
+use super::images::Images;
+use super::limits::{MAX_ELEMENTS, MAX_FILE_BYTES};
 use super::parts::{Part, join};
-use super::{MeshError, base64, companion, texture};
+use super::{MeshError, base64, texture};
 use crate::{Texture, TriMesh};
 
 pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshError> {
@@ -30,13 +32,28 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshError> {
             feature: format!("extension {required}"),
         });
     }
+    // The crate unwraps what the standard requires of an image.
+    let whole = |i: &::gltf::json::Image| match i.buffer_view {
+        Some(_) => i.mime_type.is_some(),
+        None => i.uri.is_some(),
+    };
+    if let Some(i) = gltf.document.as_json().images.iter().position(|image| !whole(image)) {
+        let reason = "neither a URI nor a buffer view with a mimeType";
+        return Err(MeshError::malformed(path, format!("image {i}"), reason));
+    }
     let blob = gltf.blob.take();
-    let content =
-        gltf.buffers().map(|b| load_buffer(&b, blob.as_deref(), path)).collect::<Result<_, _>>()?;
+    let mut content = Vec::new();
+    let mut size = 0_usize;
+    for buffer in gltf.buffers() {
+        content.push(load_buffer(&buffer, blob.as_deref(), path)?);
+        // Any number of buffers may name one large file.
+        size = size.saturating_add(content[content.len() - 1].len());
+        MeshError::within(path, "buffers, bytes", size, MAX_FILE_BYTES)?;
+    }
     let mut reader = Reader {
         path,
         buffers: Buffers { path, content },
-        images: BTreeMap::new(),
+        images: Images::new(path),
         parts: Vec::new(),
         size: 0,
         visited: BTreeSet::new(),
@@ -79,8 +96,7 @@ fn fetch(uri: &str, path: &Path) -> Result<Vec<u8>, String> {
         let (_, text) = data.split_once(";base64,").ok_or("a data URI that is not base64")?;
         return base64::decode(text).ok_or_else(|| "broken base64".into());
     }
-    let file = companion(path, &percent_decoded(uri))?;
-    std::fs::read(file).map_err(|e| e.to_string())
+    texture::beside(path, &percent_decoded(uri))
 }
 
 fn percent_decoded(uri: &str) -> String {
@@ -124,13 +140,10 @@ fn load_buffer(
     Ok(bytes)
 }
 
-/// Triangles and vertices that a file may ask for.
-const MOST: usize = 50_000_000;
-
 struct Reader<'a> {
     path: &'a Path,
     buffers: Buffers<'a>,
-    images: BTreeMap<usize, Arc<Texture>>,
+    images: Images<'a>,
     parts: Vec<Part>,
     size: usize,
     visited: BTreeSet<usize>,
@@ -218,26 +231,20 @@ impl Reader<'_> {
         let pbr = primitive.material().pbr_metallic_roughness();
         let [r, g, b, _] = pbr.base_color_factor();
         let mut part = Part { mesh, texture: None, color: [r, g, b] };
-        if let Some(info) = pbr.base_color_texture() {
-            let image = info.texture().source();
-            part.texture = Some(self.image(&image)?);
-            if let Some(accessor) = primitive.get(&Semantic::TexCoords(info.tex_coord())) {
-                // glTF measures v from the top of the image.
-                let uvs = self
-                    .buffers
-                    .floats::<2>(&accessor)?
-                    .iter()
-                    .map(|[u, v]| [*u, 1.0 - v])
-                    .collect();
-                part.mesh.uvs = self.one_each(uvs, n, "TEXCOORD")?;
-            }
+        let info = pbr.base_color_texture();
+        if let Some(info) = &info {
+            part.texture = Some(self.image(&info.texture().source())?);
+        }
+        let uv_set = info.map_or(0, |info| info.tex_coord());
+        if let Some(accessor) = primitive.get(&Semantic::TexCoords(uv_set)) {
+            // glTF measures v from the top of the image.
+            let uvs = self.buffers.floats::<2>(&accessor)?;
+            let uvs = uvs.iter().map(|[u, v]| [*u, 1.0 - v]).collect();
+            part.mesh.uvs = self.one_each(uvs, n, "TEXCOORD")?;
         }
         // Nodes and primitives may share data, so that a small file can ask for any number of triangles.
         self.size += part.mesh.faces.len() + n;
-        if self.size > MOST {
-            let feature = format!("more than {MOST} triangles and vertices");
-            return Err(MeshError::Unsupported { path: self.path.into(), feature });
-        }
+        MeshError::within(self.path, "faces and vertices", self.size, MAX_ELEMENTS)?;
         self.parts.push(part);
         Ok(())
     }
@@ -260,28 +267,15 @@ impl Reader<'_> {
     }
 
     fn image(&mut self, image: &image::Image) -> Result<Arc<Texture>, MeshError> {
-        if let Some(known) = self.images.get(&image.index()) {
-            return Ok(known.clone());
-        }
-        let texture = match image.source() {
+        match image.source() {
             image::Source::View { view, .. } => {
-                let name = format!("image {}", image.index());
-                let bytes = self
-                    .buffers
-                    .view(&view)
-                    .ok_or_else(|| MeshError::texture(self.path, &name, "outside its buffer"))?;
-                texture::decode(bytes, self.path, &name)?
+                let bytes = || self.buffers.view(&view).map(<[u8]>::to_vec);
+                self.images.get(&format!("image {}", image.index()), || {
+                    bytes().ok_or_else(|| "outside its buffer".into())
+                })
             }
-            image::Source::Uri { uri, .. } => {
-                let name: String = uri.chars().take(64).collect();
-                let bytes =
-                    fetch(uri, self.path).map_err(|e| MeshError::texture(self.path, &name, e))?;
-                texture::decode(&bytes, self.path, &name)?
-            }
-        };
-        let texture = Arc::new(texture);
-        self.images.insert(image.index(), texture.clone());
-        Ok(texture)
+            image::Source::Uri { uri, .. } => self.images.get(uri, || fetch(uri, self.path)),
+        }
     }
 }
 
@@ -425,6 +419,9 @@ mod tests {
             r#""byteOffset": 4000, "byteLength": 12"#,
             "accessor 1: outside",
         );
+        broken(r#", "mimeType": "image/png""#, "", "image 0: neither");
+        // A few bytes that claim ever more buffers, or a stride that lets elements overlap without end.
+        broken(r#""byteLength": 36}"#, r#""byteLength": 36, "byteStride": 0}"#, "document");
         let mut far = bin.clone();
         far[48] = 9;
         let error = TriMesh::from_bytes(&glb(&json, &far), path).unwrap_err().to_string();

@@ -5,6 +5,7 @@ use std::str::SplitAsciiWhitespace;
 
 use super::header::{Element, Encoding, Header, Number, Property};
 use crate::io::MeshError;
+use crate::io::limits::MAX_ELEMENTS;
 
 /// What is left of the values.
 pub(super) struct Body<'a> {
@@ -89,6 +90,9 @@ impl<'a> Body<'a> {
             };
             if n.is_nan() || n < 0.0 || n.fract() != 0.0 {
                 return Err("a list length that is no count");
+            }
+            if n > MAX_ELEMENTS as f64 {
+                return Err("a list of more items than any mesh may have");
             }
             // A hostile length costs nothing: reading stops where the file does.
             for _ in 0..n as usize {

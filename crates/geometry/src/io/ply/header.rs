@@ -3,6 +3,10 @@
 use std::path::Path;
 
 use crate::io::MeshError;
+use crate::io::limits::MAX_PLY_HEADER;
+
+/// Most kinds of elements, real files have four at most.
+const MAX_KINDS: usize = 256;
 
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) enum Number {
@@ -108,6 +112,9 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Header, MeshError> {
             return Err(bad("no end_header: truncated, or not a PLY file".into()));
         };
         at += end + 1;
+        if at > MAX_PLY_HEADER {
+            return Err(bad(format!("longer than {MAX_PLY_HEADER} bytes")));
+        }
         let line = String::from_utf8_lossy(&rest[..end]);
         let line = line.trim();
         let words: Vec<&str> = line.split_whitespace().collect();
@@ -138,6 +145,9 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Header, MeshError> {
                 }
             }
             ["element", name, count] => {
+                if elements.len() == MAX_KINDS {
+                    return Err(bad(format!("more than {MAX_KINDS} kinds of elements")));
+                }
                 let count =
                     count.parse().map_err(|_| bad(format!("element {name}: count `{count}`")))?;
                 if elements.iter().any(|e| e.name == *name) {

@@ -9,12 +9,13 @@ mod header;
 
 use std::collections::HashMap;
 use std::path::Path;
-use std::sync::Arc;
 
 use nalgebra::{Point3, Vector3};
 
 use self::body::Body;
 use self::header::Element;
+use super::images::Images;
+use super::limits::MAX_ELEMENTS;
 use super::{MeshError, texture};
 use crate::TriMesh;
 
@@ -53,6 +54,10 @@ pub(in crate::io) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshErr
     let mut body = Body::new(bytes, &header, path);
     let mut mesh = TriMesh::default();
     let mut corner_uvs = None;
+    // Checked before any is read: what a header claims must not cost more than the file is worth.
+    for element in header.elements.iter().filter(|e| !e.properties.is_empty()) {
+        MeshError::within(path, &format!("element {}", element.name), element.count, MAX_ELEMENTS)?;
+    }
     for element in &header.elements {
         match element.name.as_str() {
             "vertex" => read_vertices(&mut body, element, &mut mesh)?,
@@ -64,7 +69,7 @@ pub(in crate::io) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshErr
         mesh = split_seams(mesh, &corners);
     }
     if let (Some(name), true) = (&header.texture, mesh.uvs.is_some()) {
-        mesh.texture = Some(Arc::new(texture::load_companion(path, name)?));
+        mesh.texture = Some(Images::new(path).get(name, || texture::beside(path, name))?);
     }
     Ok(mesh)
 }
@@ -254,13 +259,19 @@ mod tests {
             for bytes in [binary(false), ascii().into_bytes()] {
                 let end = bytes.windows(10).position(|w| w == b"end_header").unwrap();
                 let text = String::from_utf8_lossy(&bytes[..end]).replace(from, to).into_bytes();
-                assert!(load(&[&text, &bytes[end..]].concat()).is_err());
+                let error = load(&[&text, &bytes[end..]].concat()).unwrap_err();
+                assert!(matches!(error, MeshError::TooLarge { .. }), "{error}");
             }
         }
         let list = "ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty float x\nproperty float y\n\
             property float z\nelement face 1\nproperty list uint float vertex_indices\nend_header\n";
         let bytes = [list.as_bytes(), &[0; 12], &u32::MAX.to_le_bytes()].concat();
+        assert!(load(&bytes).unwrap_err().to_string().starts_with("m.ply: face 0: a list of"));
+        let bytes = [list.as_bytes(), &[0; 12], &1_000_000_u32.to_le_bytes()].concat();
         assert!(load(&bytes).unwrap_err().to_string().starts_with("m.ply: face 0: the file ends"));
+        let endless = "comment nothing\n".repeat(100_000);
+        let error = load(format!("ply\n{endless}").as_bytes()).unwrap_err().to_string();
+        assert!(error.contains("header: longer than"), "{error}");
         let empty = "ply\nformat ascii 1.0\nelement nothing 18446744073709551615\nend_header\n";
         assert!(matches!(load(empty.as_bytes()), Err(MeshError::Empty { .. })));
     }

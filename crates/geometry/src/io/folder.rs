@@ -1,0 +1,103 @@
+//! Files named by other files: read from the folder of the file that names them, and from nowhere else.
+
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::{Component, Path, PathBuf};
+
+/// What an error says about a name that leads elsewhere.
+pub(crate) const OUTSIDE: &str = "the path leaves the folder of the file that names it";
+
+/// The file `name` in `folder` or below it, whether or not it exists.
+///
+/// Refused are absolute names, names with `..`, and symbolic links on the way that lead outside of the folder (those
+/// that stay within are followed). The folder itself may be reached through links.
+pub(crate) fn inside(folder: &Path, name: &str) -> Result<PathBuf, &'static str> {
+    // Files written on Windows separate folders by backslashes.
+    let relative = PathBuf::from(name.trim().replace('\\', "/"));
+    let descends =
+        relative.components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
+    if !descends || relative.as_os_str().is_empty() {
+        return Err(OUTSIDE);
+    }
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    let path = folder.join(relative);
+    // What does not exist has no real path, and no content that could be given away.
+    match (path.canonicalize(), folder.canonicalize()) {
+        (Ok(file), Ok(root)) if !file.starts_with(&root) => Err(OUTSIDE),
+        _ => Ok(path),
+    }
+}
+
+/// The content of a plain file of at most `limit` bytes: neither a pipe, which may never end, nor a device.
+///
+/// # Errors
+/// What the system said; [`io::ErrorKind::FileTooLarge`] beyond the limit.
+pub(crate) fn read_limited(path: &Path, limit: usize) -> io::Result<Vec<u8>> {
+    let too_large = |size: u64| {
+        let message = format!("{size} bytes, more than the limit of {limit}");
+        io::Error::new(io::ErrorKind::FileTooLarge, message)
+    };
+    // Asked before opening, since opening a pipe waits for its other end.
+    let size = std::fs::metadata(path)?;
+    if !size.is_file() {
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, "not a plain file"));
+    }
+    if size.len() > limit as u64 {
+        return Err(too_large(size.len()));
+    }
+    let mut content = Vec::new();
+    // The file may grow in the meantime.
+    File::open(path)?.take(limit as u64 + 1).read_to_end(&mut content)?;
+    if content.len() > limit {
+        return Err(too_large(content.len() as u64));
+    }
+    Ok(content)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_stay_inside_the_folder() {
+        let folder = Path::new("models");
+        assert_eq!(inside(folder, "./tex\\a.png").unwrap(), Path::new("models/tex/a.png"));
+        for name in ["../a.png", "/etc/passwd", "x/../../a.png", "", "..\\a.png"] {
+            assert_eq!(inside(folder, name), Err(OUTSIDE), "{name}");
+        }
+        assert_eq!(inside(Path::new(""), "a.png").unwrap(), Path::new("./a.png"));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_may_not_lead_out() {
+        use std::os::unix::fs::symlink;
+        let root = tempfile::tempdir().unwrap();
+        let folder = root.path().join("asset");
+        std::fs::create_dir_all(folder.join("sub")).unwrap();
+        std::fs::write(root.path().join("secret"), "x").unwrap();
+        std::fs::write(folder.join("own"), "y").unwrap();
+        symlink(root.path().join("secret"), folder.join("out")).unwrap();
+        symlink(root.path(), folder.join("up")).unwrap();
+        symlink(folder.join("own"), folder.join("sub/again")).unwrap();
+        for name in ["out", "up/secret"] {
+            assert_eq!(inside(&folder, name), Err(OUTSIDE), "{name}");
+        }
+        assert!(inside(&folder, "sub/again").is_ok());
+        // A folder that is itself reached through a link is one like any other.
+        symlink(&folder, root.path().join("link")).unwrap();
+        assert!(inside(&root.path().join("link"), "own").is_ok());
+    }
+
+    #[test]
+    fn only_plain_files_of_limited_size_are_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("f");
+        std::fs::write(&path, b"12345").unwrap();
+        assert_eq!(read_limited(&path, 5).unwrap(), b"12345");
+        assert_eq!(read_limited(&path, 4).unwrap_err().kind(), io::ErrorKind::FileTooLarge);
+        assert!(read_limited(folder.path(), 100).is_err());
+        #[cfg(unix)]
+        assert!(read_limited(Path::new("/dev/zero"), 100).is_err());
+    }
+}

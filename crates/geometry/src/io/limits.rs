@@ -1,0 +1,23 @@
+//! How much a mesh file may ask for.
+//!
+//! A file beyond a limit is refused with [`MeshError::TooLarge`](crate::MeshError::TooLarge). Whatever a header claims, memory
+//! is taken for what has been read, so that a small file costs little: counts are checked first, and nothing is
+//! reserved on their word.
+
+/// Largest file, and largest sum of the buffers that a glTF file draws in \[bytes\].
+pub const MAX_FILE_BYTES: usize = 1 << 30;
+
+/// Most vertices of a mesh, and most triangles.
+pub const MAX_ELEMENTS: usize = 50_000_000;
+
+/// Most pixels of an image, and of all images of a mesh together: 192 MiB as 8-bit RGB.
+pub const MAX_PIXELS: usize = 1 << 26;
+
+/// Longest PLY header \[bytes\].
+pub const MAX_PLY_HEADER: usize = 1 << 20;
+
+/// Largest robot description \[bytes\].
+pub const MAX_URDF_BYTES: usize = 1 << 26;
+
+/// Deepest nesting of tags in a robot description, whose readers descend by recursion.
+pub const MAX_URDF_DEPTH: usize = 64;

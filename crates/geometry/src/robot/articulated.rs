@@ -1,0 +1,338 @@
+//! Distances to a robot with their derivatives by its joints and the pose of its base.
+
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector, Isometry3, Point3, Vector3, Vector6};
+
+use super::{Drive, Motion, PosedRobot, Robot, RobotError, RobotShape};
+use crate::{DistanceField, FieldSample};
+
+/// A robot posed by its base and its joints: a [`PosedRobot`] that knows how each link moves.
+///
+/// ```
+/// # use std::sync::Arc;
+/// # use nalgebra::{Isometry3, Point3};
+/// # use prehend_geometry::robot::{ArticulatedRobot, Robot, RobotShape};
+/// let robot = Robot::from_urdf_str(r#"<robot name="lever"><link name="base"/>
+///     <link name="arm"><collision><geometry><box size="0.2 0.02 0.02"/></geometry></collision></link>
+///     <joint name="q" type="continuous"><parent link="base"/><child link="arm"/><axis xyz="0 0 1"/></joint>
+///     </robot>"#, None)?;
+/// let shape = Arc::new(RobotShape::new(&robot, 0.002, 0.02)?);
+/// let posed = ArticulatedRobot::new(&robot, shape, &Isometry3::identity(), &[0.0])?;
+/// let sample = posed.sample_motion(&Point3::new(0.05, 0.02, 0.0), 0.02).ok_or("out of reach")?;
+/// // The arm, 5 cm from its joint, comes nearer by 5 cm a radian.
+/// assert!((sample.field.distance - 0.01).abs() < 1e-4 && (sample.joints[0] + 0.05).abs() < 1e-3);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct ArticulatedRobot {
+    posed: PosedRobot,
+    centre: Point3<f64>,
+    /// Joints that move, in the world.
+    screws: Vec<Screw>,
+    /// For each link the screws that move it, from the base to the link.
+    paths: Vec<Vec<usize>>,
+    variables: usize,
+}
+
+/// The motion of a joint by an entry of the joint vector: multiplier included, in the world frame.
+#[derive(Clone, Copy, Debug)]
+struct Screw {
+    variable: usize,
+    /// Rate of rotation \[1\].
+    angular: Vector3<f64>,
+    /// Velocity of the point of the body at the world's origin \[m/rad or 1\].
+    linear: Vector3<f64>,
+}
+
+/// A signed distance to a robot and its gradient by all that can move.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RobotSample {
+    /// The nearest link.
+    pub link: usize,
+    /// The signed distance and its derivatives by the query point, in the world frame.
+    pub field: FieldSample,
+    /// Gradient by a left twist of the base (translation \[1\], then rotation \[m\]) about the base's own origin, as
+    /// [`prehend_autodiff::lie::perturb_about`] has it.
+    pub base: Vector6<f64>,
+    /// Gradient by the joint vector \[m/rad or 1\]; zero for joints that do not move the link.
+    pub joints: DVector<f64>,
+}
+
+/// How the query point moves in the frame of the undisturbed link, by one of the things that can change.
+struct Direction {
+    /// Its row in the Hessian.
+    row: usize,
+    /// First derivative of the point.
+    first: Vector3<f64>,
+    /// Rate at which it turns what moved before it.
+    turn: Vector3<f64>,
+}
+
+impl ArticulatedRobot {
+    /// Poses `robot` with its base at `t_world_base` and its joints at `joints` \[rad or m\], limits not enforced
+    /// ([`Robot::check_joints`] tells).
+    ///
+    /// # Errors
+    /// [`RobotError::JointCount`] or [`RobotError::Number`] for the joints, [`RobotError::PoseCount`] where `shape` is
+    /// that of another robot, [`RobotError::Number`] for a base that is not finite.
+    pub fn new(
+        robot: &Robot,
+        shape: Arc<RobotShape>,
+        t_world_base: &Isometry3<f64>,
+        joints: &[f64],
+    ) -> Result<Self, RobotError> {
+        robot.check_finite(joints)?;
+        let poses: Vec<Isometry3<f64>> =
+            robot.forward_kinematics(joints).iter().map(|t| t_world_base * t).collect();
+        let mut screws = Vec::new();
+        let mut paths: Vec<Vec<usize>> = vec![Vec::new(); poses.len()];
+        for &j in &robot.order {
+            let joint = &robot.joints[j];
+            paths[joint.child] = paths[joint.parent].clone();
+            let Drive::Variable { index, multiplier, .. } = joint.drive else { continue };
+            let t_world_joint = poses[joint.parent] * joint.t_parent_joint;
+            let axis = t_world_joint.rotation * joint.axis.into_inner() * multiplier;
+            let (angular, linear) = match joint.motion {
+                Motion::Fixed => continue,
+                Motion::Revolute => (axis, t_world_joint.translation.vector.cross(&axis)),
+                Motion::Prismatic => (Vector3::zeros(), axis),
+            };
+            paths[joint.child].push(screws.len());
+            screws.push(Screw { variable: index, angular, linear });
+        }
+        let posed = PosedRobot::new(shape, poses)?;
+        let centre = Point3::from(t_world_base.translation.vector);
+        Ok(Self { posed, centre, screws, paths, variables: joints.len() })
+    }
+
+    /// The robot in its pose, for everything but derivatives.
+    pub fn posed(&self) -> &PosedRobot {
+        &self.posed
+    }
+
+    /// As [`PosedRobot::sample_link`], with the gradient by the pose of the base and by the joints; `None` beyond
+    /// `reach` \[m\].
+    ///
+    /// A link that moves by v at the point changes the distance by −∇φ·v. Exact for the links' grids; where
+    /// two links are equally near the gradient is that of one of them.
+    pub fn sample_motion(&self, point: &Point3<f64>, reach: f64) -> Option<RobotSample> {
+        let (link, field) = self.posed.sample_link(point, reach)?;
+        let g = field.gradient;
+        let torque = -(point - self.centre).cross(&g);
+        let base = Vector6::new(-g.x, -g.y, -g.z, torque.x, torque.y, torque.z);
+        let mut joints = DVector::zeros(self.variables);
+        for &s in &self.paths[link] {
+            let screw = &self.screws[s];
+            let velocity = screw.linear + screw.angular.cross(&point.coords);
+            joints[screw.variable] -= g.dot(&velocity);
+        }
+        Some(RobotSample { link, field, base, joints })
+    }
+
+    /// Second derivatives of the distance of `sample`, taken at `point`: rows and columns are the point (3), the left
+    /// twist of the base about its origin (6) and the joint vector, in the units of the gradients over theirs.
+    ///
+    /// The twist enters by the exponential map; its Hessian is taken at zero. From the product of exponentials (Brockett
+    /// 1984): the point in the frame of the undisturbed link is `exp(−Sₖ qₖ) … exp(−S₁ q₁) exp(−δ) p`.
+    pub fn hessian(&self, point: &Point3<f64>, sample: &RobotSample) -> DMatrix<f64> {
+        let p = &point.coords;
+        // From what acts first on the point to what acts last.
+        let mut directions = Vec::new();
+        for i in 0..3 {
+            let first = Vector3::ith(i, 1.0);
+            directions.push(Direction { row: i, first, turn: Vector3::zeros() });
+        }
+        for i in 0..3 {
+            let first = -Vector3::ith(i, 1.0);
+            directions.push(Direction { row: 3 + i, first, turn: Vector3::zeros() });
+        }
+        for i in 0..3 {
+            let axis = Vector3::ith(i, 1.0);
+            let first = -axis.cross(&(point - self.centre));
+            directions.push(Direction { row: 6 + i, first, turn: -axis });
+        }
+        for &s in &self.paths[sample.link] {
+            let screw = &self.screws[s];
+            let first = -(screw.linear + screw.angular.cross(p));
+            directions.push(Direction { row: 9 + screw.variable, first, turn: -screw.angular });
+        }
+        let (g, h) = (sample.field.gradient, sample.field.hessian);
+        let mut hessian = DMatrix::zeros(9 + self.variables, 9 + self.variables);
+        for (i, a) in directions.iter().enumerate() {
+            for (j, b) in directions.iter().enumerate() {
+                let (inner, outer) = if i <= j { (a, b) } else { (b, a) };
+                let mut second = outer.turn.cross(&inner.first);
+                if (3..9).contains(&a.row) && (3..9).contains(&b.row) {
+                    // One exponential of both: the mean of the two orders.
+                    second = 0.5 * (second + inner.turn.cross(&outer.first));
+                }
+                hessian[(a.row, b.row)] += a.first.dot(&(h * b.first)) + g.dot(&second);
+            }
+        }
+        hessian
+    }
+}
+
+impl DistanceField for ArticulatedRobot {
+    fn sample(&self, point: &Point3<f64>, reach: f64) -> Option<FieldSample> {
+        self.posed.sample(point, reach)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use prehend_autodiff::lie::perturb_about;
+
+    use super::*;
+    use crate::SplitMix64;
+
+    /// A tilted base, a swing, a slide, and a finger that bends twice as one joint says.
+    const ARM: &str = r#"<robot name="arm"><link name="base"/>
+        <link name="palm"><collision><geometry><box size="0.05 0.07 0.06"/></geometry></collision></link>
+        <link name="slide"><collision><origin xyz="0 0 0.03"/><geometry><box size="0.02 0.03 0.06"/></geometry></collision></link>
+        <link name="tip"><collision><origin xyz="0 0 0.03"/><geometry><cylinder radius="0.012" length="0.06"/></geometry></collision></link>
+        <joint name="mount" type="fixed"><parent link="base"/><child link="palm"/><origin xyz="0.01 0 0.02" rpy="0.3 -0.2 0.5"/></joint>
+        <joint name="swing" type="continuous"><parent link="palm"/><child link="root"/><origin xyz="0 0 0.04" rpy="0.1 0 0"/><axis xyz="0 1 0.3"/></joint>
+        <link name="root"/>
+        <joint name="push" type="prismatic"><parent link="root"/><child link="slide"/><axis xyz="0.1 0 1"/><limit lower="0" upper="0.1" effort="1" velocity="1"/></joint>
+        <joint name="bend" type="revolute"><parent link="slide"/><child link="tip"/><origin xyz="0 0 0.07"/><axis xyz="1 0 0"/>
+          <mimic joint="swing" multiplier="0.6" offset="0.2"/><limit lower="-9" upper="9" effort="1" velocity="1"/></joint>
+        </robot>"#;
+
+    struct Setting {
+        robot: Robot,
+        shape: Arc<RobotShape>,
+        base: Isometry3<f64>,
+        joints: [f64; 2],
+    }
+
+    impl Setting {
+        fn new(joints: [f64; 2]) -> Self {
+            let robot = Robot::from_urdf_str(ARM, None).unwrap();
+            let shape = Arc::new(RobotShape::new(&robot, 0.004, 0.02).unwrap());
+            let base = Isometry3::new(Vector3::new(0.3, -0.2, 0.5), Vector3::new(0.4, 1.0, -0.7));
+            Self { robot, shape, base, joints }
+        }
+
+        /// The robot moved by a twist of its base and by changes of its joints: entries 3 and up of `x`.
+        fn at(&self, x: &[f64; 11]) -> ArticulatedRobot {
+            let twist = Vector6::from_column_slice(&x[3..9]);
+            let base = perturb_about(&self.base, &self.base.translation.vector, &twist);
+            let joints = [self.joints[0] + x[9], self.joints[1] + x[10]];
+            ArticulatedRobot::new(&self.robot, self.shape.clone(), &base, &joints).unwrap()
+        }
+
+        /// Points around every link.
+        fn points(&self) -> Vec<Point3<f64>> {
+            let mut random = SplitMix64::new(3);
+            let posed = self.at(&[0.0; 11]);
+            let links = posed.posed().t_world_links().to_vec();
+            (0..240)
+                .map(|i| {
+                    let mut unit = || random.unit() - 0.5;
+                    links[i % links.len()] * Point3::new(0.09 * unit(), 0.1 * unit(), 0.14 * unit())
+                })
+                .collect()
+        }
+    }
+
+    /// Second derivatives [1/m] of the spline are continuous but not smooth: where a difference spans a cell face its error
+    /// is the step times a jump of the third derivative, up to a few times spacing⁻².
+    fn mostly_zero(mut errors: Vec<f64>) {
+        errors.sort_by(f64::total_cmp);
+        let (most, worst) = (errors[errors.len() * 9 / 10], errors[errors.len() - 1]);
+        assert!(most < 1e-3 && worst < 0.5, "{most} {worst}");
+    }
+
+    #[test]
+    fn gradient_and_hessian_match_differences_in_all_that_moves() {
+        for joints in [[0.0, 0.0], [0.5, 0.02], [-1.1, 0.05]] {
+            let setting = Setting::new(joints);
+            let robot = setting.at(&[0.0; 11]);
+            let (mut checked, mut of_link, mut errors) = (0, [0; 5], Vec::new());
+            for point in setting.points() {
+                let Some(sample) = robot.sample_motion(&point, 0.02) else { continue };
+                let hessian = robot.hessian(&point, &sample);
+                let gradient = |s: &RobotSample| {
+                    let mut all = s.field.gradient.as_slice().to_vec();
+                    all.extend(s.base.iter().chain(s.joints.iter()));
+                    DVector::from_vec(all)
+                };
+                let exact = gradient(&sample);
+                for i in 0..11 {
+                    let step = 1e-6;
+                    let moved = |sign: f64| {
+                        let mut x = [0.0; 11];
+                        x[i] = sign * step;
+                        let p = point + Vector3::new(x[0], x[1], x[2]);
+                        let s = setting.at(&x).sample_motion(&p, 0.021);
+                        s.filter(|s| s.link == sample.link)
+                    };
+                    // Next to a crease between links there is no derivative.
+                    let (Some(plus), Some(minus)) = (moved(1.0), moved(-1.0)) else { continue };
+                    let slope = (plus.field.distance - minus.field.distance) / (2.0 * step);
+                    assert!((slope - exact[i]).abs() < 1e-7, "{i}: {slope} {}", exact[i]);
+                    if !(3..9).contains(&i) {
+                        // Twists compose: only about zero is their Hessian that of the gradient above.
+                        let bend = (gradient(&plus) - gradient(&minus)) / (2.0 * step);
+                        errors.extend(
+                            (0..11)
+                                .filter(|k| !(3..9).contains(k))
+                                .map(|k| (bend[k] - hessian[(k, i)]).abs()),
+                        );
+                    }
+                    checked += 1;
+                }
+                of_link[sample.link] += 1;
+                assert!((&hessian - hessian.transpose()).amax() < 1e-9 * hessian.amax());
+            }
+            assert!(
+                checked > 1000 && of_link[1].min(of_link[2]).min(of_link[3]) > 5,
+                "{of_link:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn second_derivatives_match_differences_of_the_distance() {
+        let setting = Setting::new([0.5, 0.02]);
+        let robot = setting.at(&[0.0; 11]);
+        let mut errors = Vec::new();
+        for point in setting.points().into_iter().take(80) {
+            let Some(sample) = robot.sample_motion(&point, 0.015) else { continue };
+            let hessian = robot.hessian(&point, &sample);
+            let step = 4e-6;
+            let value = |moves: [(usize, f64); 2]| {
+                let mut x = [0.0; 11];
+                moves.iter().for_each(|(i, d)| x[*i] += d * step);
+                let p = point + Vector3::new(x[0], x[1], x[2]);
+                let s = setting.at(&x).sample_motion(&p, 0.02)?;
+                (s.link == sample.link).then_some(s.field.distance)
+            };
+            for i in 0..11 {
+                for j in 0..=i {
+                    let corners = [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)];
+                    let values = corners.map(|(a, b)| value([(i, a), (j, b)]));
+                    let [Some(pp), Some(pm), Some(mp), Some(mm)] = values else { continue };
+                    let second = (pp - pm - mp + mm) / (4.0 * step * step);
+                    errors.push((second - hessian[(i, j)]).abs());
+                }
+            }
+        }
+        assert!(errors.len() > 500, "{}", errors.len());
+        mostly_zero(errors);
+    }
+
+    #[test]
+    fn bad_states_are_errors() {
+        let s = Setting::new([0.0; 2]);
+        let new = |base: &Isometry3<f64>, joints: &[f64]| {
+            ArticulatedRobot::new(&s.robot, s.shape.clone(), base, joints).map(|_| ())
+        };
+        assert!(matches!(new(&s.base, &[0.0]), Err(RobotError::JointCount { .. })));
+        assert!(matches!(new(&s.base, &[0.0, f64::NAN]), Err(RobotError::Number { .. })));
+        let far = Isometry3::translation(f64::INFINITY, 0.0, 0.0);
+        assert!(matches!(new(&far, &[0.0; 2]), Err(RobotError::Number { .. })));
+    }
+}
