@@ -1,7 +1,7 @@
 //! Times the gradients of four functions in every mode of this crate, beside plain numbers and derivatives
 //! by hand: `cargo bench -p prehend-autodiff`.
 //!
-//! `benches/peers` at the root of the repository prints the same table with other crates in it.
+//! `benches/peers/autodiff` at the root of the repository prints the same table with other crates in it.
 
 // The workloads take nalgebra from their parent.
 extern crate nalgebra;

@@ -3,5 +3,5 @@
 use ::ad_trait::nalgebra;
 
 #[allow(dead_code)] // The derivatives by hand are timed only once.
-#[path = "../../../crates/autodiff/benches/workloads/mod.rs"]
+#[path = "../../../../crates/autodiff/benches/workloads/mod.rs"]
 pub(crate) mod workloads;

@@ -1,5 +1,5 @@
 //! Times the gradients of four functions with this repository's autodiff and with other crates, in one run:
-//! `cargo run --release --manifest-path benches/peers/Cargo.toml`.
+//! `cargo run --release --manifest-path benches/peers/Cargo.toml --bin autodiff`.
 //!
 //! The functions are those of `crates/autodiff/benches/workloads`, the same text for everybody. Each crate
 //! is used as its documentation recommends for a gradient, in its own file here.
@@ -14,13 +14,13 @@ mod ad_trait;
 mod echidna;
 mod num_dual;
 mod older;
-#[path = "../../../crates/autodiff/benches/workloads/ours.rs"]
+#[path = "../../../../crates/autodiff/benches/workloads/ours.rs"]
 mod ours;
-#[path = "../../../crates/autodiff/benches/workloads/rigid_blocks.rs"]
+#[path = "../../../../crates/autodiff/benches/workloads/rigid_blocks.rs"]
 mod rigid_blocks;
-#[path = "../../../crates/autodiff/benches/workloads/table.rs"]
+#[path = "../../../../crates/autodiff/benches/workloads/table.rs"]
 mod table;
-#[path = "../../../crates/autodiff/benches/workloads/mod.rs"]
+#[path = "../../../../crates/autodiff/benches/workloads/mod.rs"]
 mod workloads;
 
 fn main() {
