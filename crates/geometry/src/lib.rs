@@ -2,8 +2,10 @@
 
 mod clean;
 pub mod closest;
+pub mod cloud;
 mod field;
 pub mod hand;
+pub mod icp;
 mod io;
 pub mod mass;
 mod mesh;
@@ -11,22 +13,27 @@ mod normals;
 pub mod objects;
 mod random;
 pub mod robot;
+mod robust;
 pub mod sample;
 pub mod sdf;
 pub mod shapes;
+pub mod surface_distance;
 pub mod topology;
 pub mod volume;
 mod weld;
 
 pub use clean::MeshReport;
 pub use closest::ClosestPoints;
+pub use cloud::{KdTree, PointCloud};
 pub use field::{DistanceField, FieldSample};
 pub use io::{MeshError, write_whole};
 pub use mass::{MassError, MassProperties};
 pub use mesh::{Texture, TriMesh};
 pub use random::SplitMix64;
 pub use robot::{PosedRobot, Robot, RobotShape};
+pub use robust::Kernel;
 pub use sample::SurfaceSample;
 pub use sdf::SdfGrid;
+pub use surface_distance::SurfaceDistance;
 pub use volume::{UnionBody, VolumeError};
 pub use weld::Weld;
