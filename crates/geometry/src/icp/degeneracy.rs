@@ -8,8 +8,8 @@ use super::NormalEquations;
 ///
 /// Rotations count by the arc at `length` from the centre, and the matrix is divided by the sum of weights. So an
 /// eigenvalue is a number, about the mean squared change of the residuals \[m²\] for each squared metre of motion:
-/// at most 3, about ⅓ for a translation of a round object by point-to-plane, zero for a motion along which the
-/// surface slides on itself. (Gelfand et al., "Geometrically stable sampling for the ICP algorithm", 2003.)
+/// at most about two, ⅓ for a translation of a ball by point-to-plane, zero for a motion along which the surface
+/// slides on itself. (Gelfand et al., "Geometrically stable sampling for the ICP algorithm", 2003.)
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Degeneracy {
     /// The centre that twists turn about \[m\], in the target's frame.

@@ -223,8 +223,7 @@ fn check(settings: &IcpSettings, pose: &Isometry3<f64>) -> Result<(), IcpError> 
         ("rotation_tolerance", settings.rotation_tolerance),
         ("least_eigenvalue", settings.least_eigenvalue),
     ];
-    // Written so that NaN fails too.
-    if let Some(&(name, value)) = numbers.iter().find(|(_, v)| !(*v >= 0.0)) {
+    if let Some(&(name, value)) = numbers.iter().find(|(_, v)| v.is_nan() || *v < 0.0) {
         return Err(IcpError::Setting { name, value });
     }
     if !settings.kernel.is_valid() {

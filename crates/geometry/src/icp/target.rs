@@ -14,7 +14,27 @@ pub struct Match {
     pub normal: Vector3<f64>,
 }
 
-/// A shape to align to.
+/// A shape to align to: [`CloudTarget`], [`MeshTarget`], or any other that knows its closest point.
+///
+/// ```
+/// use nalgebra::{Point3, Vector3};
+/// use prehend_geometry::icp::{Match, Target};
+///
+/// /// The ball of this radius \[m\] about the origin.
+/// struct Ball(f64);
+///
+/// impl Target for Ball {
+///     type Memory = ();
+///     fn closest(&self, query: &Point3<f64>, max_distance: f64, _: &mut ()) -> Option<Match> {
+///         let normal = query.coords.try_normalize(0.0)?;
+///         let near = (query.coords.norm() - self.0).abs() <= max_distance;
+///         near.then(|| Match { point: (normal * self.0).into(), normal })
+///     }
+///     fn has_normals(&self) -> bool {
+///         true
+///     }
+/// }
+/// ```
 pub trait Target: Sync {
     /// What is worth remembering of a query when the next is for the same point, a little farther.
     type Memory: Default + Send;

@@ -41,6 +41,8 @@ pub struct SurfaceDistance {
     vertices: Vec<Point3<f64>>,
     faces: Vec<[u32; 3]>,
     cloud: KdTree,
+    /// The points of the cloud one near the other, so that a match is a good guess for the next.
+    order: Vec<usize>,
     kernel: Kernel,
 }
 
@@ -70,11 +72,13 @@ impl SurfaceDistance {
         if cloud.is_empty() {
             return Err(SurfaceDistanceError::NoPoints);
         }
+        let cloud = KdTree::new(cloud)?;
         Ok(Self {
             surface: ClosestPoints::new(mesh)?,
             vertices: mesh.vertices.clone(),
             faces: mesh.faces.clone(),
-            cloud: KdTree::new(cloud)?,
+            order: cloud.order().collect(),
+            cloud,
             kernel: Kernel::Squared,
         })
     }
@@ -147,12 +151,12 @@ impl SurfaceDistance {
             |n: usize| (0..n).into_par_iter().step_by(CHUNK).map(move |i| i..n.min(i + CHUNK));
         let of_points = pieces(points.len()).map(|piece| {
             let (mut sum, mut last) = (A::default(), 0);
-            for point in &points[piece] {
-                let local = t_mesh_cloud * point;
+            for &i in &self.order[piece] {
+                let local = t_mesh_cloud * points[i];
                 let found = self.surface.closest_from(&local, f64::INFINITY, last);
                 let pair = found.map_or(Pair::NOWHERE, |closest| {
                     last = closest.face;
-                    Pair::new(self.corners(t_cloud_mesh, closest.face), &closest, *point)
+                    Pair::new(self.corners(t_cloud_mesh, closest.face), &closest, points[i])
                 });
                 add(&mut sum, &pair, 1.0 / points.len() as f64);
             }

@@ -15,8 +15,8 @@ fn vectors(n: usize, seed: u64) -> Vec<Vector3<f64>> {
 
 /// A few faces, open or closed.
 fn mesh(seed: u64) -> TriMesh {
-    if seed % 2 == 0 {
-        return superellipsoid([0.5, 0.7, 0.9], [0.8, 1.3], 6);
+    if seed.is_multiple_of(2) {
+        return superellipsoid([0.5, 0.7, 0.9], [0.8, 1.3], 6).welded();
     }
     let vertices = vectors(9, seed).into_iter().map(Point3::from).collect();
     TriMesh::new(vertices, vec![[0, 1, 2], [2, 1, 3], [4, 5, 6], [6, 7, 8]])
@@ -28,9 +28,21 @@ fn pose(seed: u64) -> Isometry3<f64> {
 }
 
 impl SurfaceDistance {
-    /// What is matched with what: differences over a change of it are differences over a kink.
-    fn matching(&self, t: &Isometry3<f64>) -> Vec<(u32, Feature, Point3<f64>)> {
-        let add = |all: &mut Vec<_>, p: &Pair, _: f64| all.push((p.face, p.feature, p.point));
+    /// What is matched with what: differences over a change of it are differences over a kink. Faces that share
+    /// the nearest corner or edge are as good as each other, so it counts by its vertices.
+    fn matching(&self, t: &Isometry3<f64>) -> Vec<(Vec<u32>, Point3<f64>, bool)> {
+        let add = |all: &mut Vec<_>, p: &Pair, _: f64| {
+            let corner = |i: u8| self.faces[p.face as usize][usize::from(i % 3)];
+            let mut vertices = match p.feature {
+                Feature::Vertex(i) => vec![corner(i)],
+                Feature::Edge(i) => vec![corner(i), corner(i + 1)],
+                Feature::Face => self.faces[p.face as usize].to_vec(),
+            };
+            vertices.sort_unstable();
+            // Huber's loss bends at its scale.
+            let beyond = self.kernel.scale().is_some_and(|s| p.offset().norm() > s);
+            all.push((vertices, p.point, beyond));
+        };
         self.sums(t, add).into_iter().flatten().collect()
     }
 }
@@ -66,14 +78,14 @@ proptest! {
                 (twist.transpose() * there).iter().copied().collect::<Vec<_>>()
             };
             let rows = finite_difference_jacobian(second, &[0.0; 6], step);
-            for i in 0..6 {
-                for j in 0..6 {
-                    let (h, r) = (at.hessian[(i, j)], rows[i][j]);
+            for (i, row) in rows.iter().enumerate() {
+                for (j, r) in row.iter().enumerate() {
+                    let h = at.hessian[(i, j)];
                     prop_assert!((h - r).abs() < 1e-6, "{:?} {} {}: {} {}", kernel, i, j, h, r);
                 }
             }
             let least = at.gauss_newton.symmetric_eigenvalues().min();
-            prop_assert!(least > -1e-9 && at.gauss_newton == at.gauss_newton.transpose() || least > -1e-9);
+            prop_assert!(least > -1e-9, "{}", least);
         }
     }
 

@@ -37,8 +37,8 @@ pub(super) fn build(points: &[Point3<f64>]) -> (Vec<Node>, Vec<Leaf>) {
         let mut leaf = Leaf { coordinates: [[f64::INFINITY; LEAF]; 3], indices: [u32::MAX; LEAF] };
         for (lane, &i) in part.iter().enumerate() {
             leaf.indices[lane] = i;
-            for axis in 0..3 {
-                leaf.coordinates[axis][lane] = points[i as usize][axis];
+            for (axis, lanes) in leaf.coordinates.iter_mut().enumerate() {
+                lanes[lane] = points[i as usize][axis];
             }
         }
         leaves.push(leaf);

@@ -1,6 +1,5 @@
 //! Branch and bound over the tree, and what may be collected on the way.
 
-use super::build::LEAF;
 use super::probe::Probe;
 use super::{KdTree, Neighbour};
 
@@ -30,9 +29,9 @@ impl KdTree {
             let Some(node) = self.nodes.get(at as usize) else {
                 let leaf = &self.leaves[at as usize - self.nodes.len()];
                 let distances = probe.distances_squared(leaf, collect.limit());
-                for lane in 0..LEAF {
-                    if distances[lane] <= collect.limit() {
-                        collect.offer(distances[lane], leaf.indices[lane]);
+                for (&d2, &index) in distances.iter().zip(&leaf.indices) {
+                    if d2 <= collect.limit() {
+                        collect.offer(d2, index);
                     }
                 }
                 bound = prune_bound(collect.limit());
