@@ -2,7 +2,7 @@
 
 mod bvh;
 mod topology;
-mod triangle;
+pub(crate) mod triangle;
 mod winding;
 
 use nalgebra::{Point3, Vector3};

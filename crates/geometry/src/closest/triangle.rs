@@ -6,38 +6,38 @@ use super::Feature;
 
 /// A triangle prepared for repeated closest-point queries.
 #[derive(Clone, Debug)]
-pub(super) struct Triangle {
+pub(crate) struct Triangle {
     /// First corner \[m\].
-    pub(super) a: Vector3<f64>,
+    pub(crate) a: Vector3<f64>,
     /// Second minus first corner \[m\].
-    pub(super) ab: Vector3<f64>,
+    pub(crate) ab: Vector3<f64>,
     /// Third minus first corner \[m\].
-    pub(super) ac: Vector3<f64>,
+    pub(crate) ac: Vector3<f64>,
     /// Unit normal, or zero where the triangle has no area.
-    pub(super) normal: Vector3<f64>,
+    pub(crate) normal: Vector3<f64>,
     /// Index in the mesh.
-    pub(super) face: u32,
+    pub(crate) face: u32,
     /// So thin that the region test would cancel: the edges are measured one by one instead.
     sliver: bool,
 }
 
 /// Where on a triangle the closest point lies.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Foot {
+pub(crate) struct Foot {
     /// Squared distance \[m²\].
-    pub(super) distance_squared: f64,
+    pub(crate) distance_squared: f64,
     /// Weights of the second and third corner.
-    pub(super) v: f64,
-    pub(super) w: f64,
+    pub(crate) v: f64,
+    pub(crate) w: f64,
     /// The part of the triangle the point lies on.
-    pub(super) feature: Feature,
+    pub(crate) feature: Feature,
 }
 
 /// Ratio of height to longest edge below which a triangle counts as a sliver.
 const SLIVER: f64 = 1e-5;
 
 impl Triangle {
-    pub(super) fn new([a, b, c]: [Point3<f64>; 3], face: u32) -> Self {
+    pub(crate) fn new([a, b, c]: [Point3<f64>; 3], face: u32) -> Self {
         let (ab, ac) = (b - a, c - a);
         let area = ab.cross(&ac);
         let longest = ab.norm_squared().max(ac.norm_squared()).max((ac - ab).norm_squared());
@@ -48,7 +48,7 @@ impl Triangle {
 
     /// Squared distance from `p` to the plane of the triangle \[m²\]: a cheap lower bound (zero without a normal).
     #[inline]
-    pub(super) fn plane_distance_squared(&self, p: &Vector3<f64>) -> f64 {
+    pub(crate) fn plane_distance_squared(&self, p: &Vector3<f64>) -> f64 {
         let d = (p - self.a).dot(&self.normal);
         d * d
     }
@@ -62,7 +62,7 @@ impl Triangle {
     /// The closest point, by the Voronoi region of the triangle that `p` projects into
     /// (Ericson, Real-Time Collision Detection, 2005, section 5.1.5).
     #[inline]
-    pub(super) fn closest(&self, p: &Vector3<f64>) -> Foot {
+    pub(crate) fn closest(&self, p: &Vector3<f64>) -> Foot {
         let ap = p - self.a;
         if self.sliver {
             return self.closest_of_edges(&ap);

@@ -6,14 +6,20 @@ use crate::TriMesh;
 use crate::mass::signed_volume;
 use crate::topology::{Edge, edges, is_collapsed};
 
-/// Signed volume \[m³\] of a mesh that must be, after welding, one closed body of genus 0 facing outward.
+/// Signed volume \[m³\] of a mesh that must be, after welding, one closed body without holes facing outward.
 pub(crate) fn closed_volume(mesh: &TriMesh) -> f64 {
+    closed_volume_of_genus(mesh, 0)
+}
+
+/// The same of a body with `genus` holes through it.
+pub(crate) fn closed_volume_of_genus(mesh: &TriMesh, genus: usize) -> f64 {
     let faces = mesh.weld_within(0.0).faces(mesh);
     assert!(!faces.iter().any(is_collapsed), "degenerate face");
     let edges = edges(&faces);
     assert!(edges.iter().all(Edge::is_manifold), "an edge is not shared by two faces");
     let used: BTreeSet<_> = faces.iter().flatten().collect();
-    assert_eq!(used.len() + faces.len(), edges.len() + 2, "Euler characteristic");
+    let euler = used.len() + faces.len() + 2 * genus;
+    assert_eq!(euler, edges.len() + 2, "Euler characteristic");
     if let Some(uvs) = &mesh.uvs {
         assert_eq!(uvs.len(), mesh.vertices.len());
         assert!(uvs.iter().flatten().all(|c| (0.0..=1.0).contains(c)));

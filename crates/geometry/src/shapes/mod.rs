@@ -3,9 +3,13 @@
 mod boxes;
 #[cfg(test)]
 pub(crate) mod closed;
+mod extrude;
 mod loft;
+mod ring;
 mod round;
 
 pub use boxes::{BoxFace, Panel, RoundedBox, cuboid, rounded_box};
+pub use extrude::{OutlineError, extrude};
 pub use loft::{Section, loft, meridian_lengths, smoothed, subdivided};
-pub use round::{capsule, cylinder, revolve, sphere, superellipsoid};
+pub use ring::{revolve_ring, torus};
+pub use round::{capsule, cone, cylinder, revolve, sphere, superellipsoid};

@@ -23,6 +23,12 @@ pub fn cylinder(radius: f64, height: f64, segments: usize) -> TriMesh {
     revolve(&[[radius, -0.5 * height], [radius, 0.5 * height]], segments)
 }
 
+/// A cone about z cut off flat, of radius `radii`\[0\] \[m\] at −`height`/2 and `radii`\[1\] at `height`/2 \[m\], in
+/// `segments` columns; a radius of zero is an apex.
+pub fn cone(radii: [f64; 2], height: f64, segments: usize) -> TriMesh {
+    revolve(&[[radii[0], -0.5 * height], [radii[1], 0.5 * height]], segments)
+}
+
 /// The points within `radius` \[m\] of the segment from −`half_length` to `half_length` \[m\] on the z axis,
 /// in `segments` columns, one of them at +x, and `rows` rows a hemisphere (at least one) of equal latitude; its
 /// vertices lie on the true surface.
@@ -74,6 +80,9 @@ mod tests {
         converges(PI * r * r * h, |n| cylinder(r, h, n));
         converges(PI * r * r * (h + 4.0 / 3.0 * r), |n| capsule(r, 0.5 * h, n, n / 4));
         converges(PI * r * r * h / 3.0, |n| revolve(&[[r, 0.0], [0.0, h]], n));
+        converges(PI * r * r * h / 3.0, |n| cone([0.0, r], h, n));
+        let frustum = PI * h / 3.0 * (r * r + r * 0.01 + 1e-4);
+        converges(frustum, |n| cone([r, 0.01], h, n));
         converges(4.0 / 3.0 * PI * r * h * 0.1, |n| superellipsoid([r, h, 0.1], [1.0, 1.0], n));
     }
 

@@ -1,0 +1,212 @@
+//! Branch and bound over the tree, and what may be collected on the way.
+
+use super::probe::Probe;
+use super::{KdTree, Neighbour};
+
+/// Deepest tree: 4¹⁶ leaves of eight exceed the number of points there may be. Each level leaves three siblings.
+const STACK: usize = 3 * 16 + 4;
+
+/// Keeps the points that are wanted of those that are offered.
+pub(super) trait Collect {
+    /// Squared distance beyond which nothing is wanted any more \[m²\].
+    fn limit(&self) -> f64;
+    /// Considers the point `index` at squared distance `d2` \[m²\].
+    fn offer(&mut self, d2: f64, index: u32);
+}
+
+impl KdTree {
+    #[inline]
+    pub(super) fn search<C: Collect>(&self, probe: &impl Probe, mut collect: C) -> C {
+        let mut bound = prune_bound(collect.limit());
+        let mut stack = [(0_u32, 0.0_f32); STACK];
+        let mut len = 1;
+        while len > 0 {
+            len -= 1;
+            let (at, distance) = stack[len];
+            if distance > bound {
+                continue;
+            }
+            let Some(node) = self.nodes.get(at as usize) else {
+                let leaf = &self.leaves[at as usize - self.nodes.len()];
+                let distances = probe.distances_squared(leaf, collect.limit());
+                for (&d2, &index) in distances.iter().zip(&leaf.indices) {
+                    if d2 <= collect.limit() {
+                        collect.offer(d2, index);
+                    }
+                }
+                bound = prune_bound(collect.limit());
+                continue;
+            };
+            let distances = probe.interval().distances_squared(node);
+            let first = len;
+            for (lane, &d) in distances.iter().enumerate() {
+                // The box of a leaf without points is infinitely far.
+                if d <= bound && d < f32::INFINITY {
+                    // Farthest first: the nearest ends on top of the stack.
+                    let mut place = len;
+                    while place > first && stack[place - 1].1 < d {
+                        stack[place] = stack[place - 1];
+                        place -= 1;
+                    }
+                    stack[place] = (4 * at + 1 + lane as u32, d);
+                    len += 1;
+                }
+            }
+        }
+        collect
+    }
+}
+
+/// A single-precision squared bound that no box holding something within `squared` exceeds: the five roundings
+/// of a squared box distance lose at most a relative 4e-7.
+#[inline]
+fn prune_bound(squared: f64) -> f32 {
+    (squared * (1.0 + 1e-6)) as f32 + f32::MIN_POSITIVE
+}
+
+/// The square of a limit \[m\], or `None` of one that is no distance.
+fn squared(limit: f64) -> Option<f64> {
+    (limit >= 0.0).then_some(limit * limit)
+}
+
+/// The nearest point.
+pub(super) struct Nearest {
+    d2: f64,
+    index: u32,
+}
+
+impl Nearest {
+    #[inline]
+    pub(super) fn within(max_distance: f64) -> Option<Self> {
+        Some(Self { d2: squared(max_distance)?, index: u32::MAX })
+    }
+
+    #[inline]
+    pub(super) fn found(self) -> Option<Neighbour> {
+        (self.index != u32::MAX)
+            .then_some(Neighbour { index: self.index as usize, distance_squared: self.d2 })
+    }
+}
+
+impl Collect for Nearest {
+    #[inline]
+    fn limit(&self) -> f64 {
+        self.d2
+    }
+
+    #[inline]
+    fn offer(&mut self, d2: f64, index: u32) {
+        if d2 < self.d2 || (d2 == self.d2 && index < self.index) {
+            *self = Self { d2, index };
+        }
+    }
+}
+
+/// The nearest point, and how far all others are.
+pub(super) struct Alone {
+    nearest: Nearest,
+    /// Squared distance that none of the others is nearer than \[m²\].
+    others: f64,
+}
+
+impl Alone {
+    #[inline]
+    pub(super) fn within(max_distance: f64) -> Option<Self> {
+        let nearest = Nearest::within(max_distance)?;
+        Some(Self { others: nearest.d2, nearest })
+    }
+
+    /// The nearest point, and the squared distance of the next or of the limit \[m²\].
+    #[inline]
+    pub(super) fn found(self) -> Option<(Neighbour, f64)> {
+        Some((self.nearest.found()?, self.others))
+    }
+}
+
+impl Collect for Alone {
+    #[inline]
+    fn limit(&self) -> f64 {
+        self.others
+    }
+
+    #[inline]
+    fn offer(&mut self, d2: f64, index: u32) {
+        let Nearest { d2: least, index: found } = self.nearest;
+        if index == found {
+            // A hint comes by twice.
+            return;
+        }
+        self.nearest.offer(d2, index);
+        if found == u32::MAX {
+            return;
+        }
+        self.others = self.others.min(if self.nearest.index == index { least } else { d2 });
+    }
+}
+
+/// The k nearest points, in order.
+pub(super) struct Best {
+    k: usize,
+    found: Vec<(f64, u32)>,
+}
+
+impl Best {
+    /// At least one.
+    pub(super) fn new(k: usize) -> Self {
+        Self { k, found: Vec::with_capacity(k) }
+    }
+
+    pub(super) fn found(self) -> Vec<Neighbour> {
+        neighbours(self.found)
+    }
+}
+
+impl Collect for Best {
+    fn limit(&self) -> f64 {
+        if self.found.len() < self.k { f64::MAX } else { self.found[self.k - 1].0 }
+    }
+
+    fn offer(&mut self, d2: f64, index: u32) {
+        let mut at = self.found.len();
+        while at > 0 && (d2, index) < self.found[at - 1] {
+            at -= 1;
+        }
+        if at < self.k {
+            self.found.truncate(self.k - 1);
+            self.found.insert(at, (d2, index));
+        }
+    }
+}
+
+/// All points within a distance.
+pub(super) struct Every {
+    limit: f64,
+    found: Vec<(f64, u32)>,
+}
+
+impl Every {
+    pub(super) fn within(radius: f64) -> Option<Self> {
+        Some(Self { limit: squared(radius)?.min(f64::MAX), found: Vec::new() })
+    }
+
+    pub(super) fn found(mut self) -> Vec<Neighbour> {
+        self.found.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        neighbours(self.found)
+    }
+}
+
+impl Collect for Every {
+    fn limit(&self) -> f64 {
+        self.limit
+    }
+
+    fn offer(&mut self, d2: f64, index: u32) {
+        self.found.push((d2, index));
+    }
+}
+
+fn neighbours(found: Vec<(f64, u32)>) -> Vec<Neighbour> {
+    let neighbour =
+        |(distance_squared, index)| Neighbour { index: index as usize, distance_squared };
+    found.into_iter().map(neighbour).collect()
+}
