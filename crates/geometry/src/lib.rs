@@ -28,5 +28,5 @@ pub use random::SplitMix64;
 pub use robot::{PosedRobot, Robot, RobotShape};
 pub use sample::SurfaceSample;
 pub use sdf::SdfGrid;
-pub use volume::{UnionBody, VolumeError};
+pub use volume::{Overlap, UnionBody, VolumeError};
 pub use weld::Weld;
