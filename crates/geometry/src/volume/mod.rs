@@ -28,6 +28,8 @@ mod overlap;
 mod polygon;
 mod predicates;
 #[cfg(test)]
+mod reference;
+#[cfg(test)]
 pub(crate) mod tests;
 
 use nalgebra::{Isometry3, Point3};

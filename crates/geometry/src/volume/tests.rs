@@ -218,3 +218,91 @@ fn unusable_meshes_are_named() {
     assert!(matches!(intersection_volume(&[wild], &good), Err(VolumeError::Invalid { .. })));
     assert!(intersection_volume(&[TriMesh::default()], &good).is_err());
 }
+
+#[test]
+fn degenerate_boxes_share_what_they_should() {
+    let at = |c: [f64; 3]| Isometry3::from(Vector3::from(c));
+    let quarter = UnitQuaternion::from_euler_angles(0.0, 0.0, std::f64::consts::FRAC_PI_4);
+    let corner_down =
+        UnitQuaternion::rotation_between(&Vector3::repeat(1.0), &-Vector3::z()).unwrap_or_default();
+    let unit = || cuboid([1.0; 3], [0.0; 3]);
+    let turned = |turn: UnitQuaternion<f64>, c: [f64; 3]| {
+        unit().transformed(&(at(c) * Isometry3::from_parts(Translation3::identity(), turn)))
+    };
+    let (root2, root3) = (2f64.sqrt(), 3f64.sqrt());
+    let cases = [
+        (unit(), 1.0),
+        (cuboid([1.0; 3], [0.5, 0.5, 0.0]), 0.25),
+        (cuboid([0.5; 3], [0.25, 0.25, 0.25]), 0.125),
+        (cuboid([0.5; 3], [0.0; 3]), 0.125),
+        (cuboid([2.0, 1.0, 0.25], [0.0; 3]), 0.25),
+        // An edge along a face, along an edge, and across an edge.
+        (turned(quarter, [0.5 + 0.5 * root2, 0.0, 0.0]), 0.0),
+        (turned(quarter, [0.5, 0.5 + 0.5 * root2, 0.0]), 0.0),
+        (turned(quarter, [0.5, 0.0, 0.0]), 0.5 - (0.5 * root2 - 0.5).powi(2)),
+        // A corner on a face, and one at its corner.
+        (turned(corner_down, [0.0, 0.0, 0.5 + 0.5 * root3]), 0.0),
+        (turned(corner_down, [0.5, 0.5, 0.5 + 0.5 * root3]), 0.0),
+        // A corner 0.1 below the face: three right angles make 0.1³ √3/2.
+        (turned(corner_down, [0.0, 0.0, 0.4 + 0.5 * root3]), 0.5 * root3 * 1e-3),
+    ];
+    let frame = Isometry3::new(Vector3::new(0.3, -2.0, 1.0), Vector3::new(0.4, 1.0, -0.2));
+    for (i, (b, expected)) in cases.iter().enumerate() {
+        for t in [Isometry3::identity(), at([0.25, 8.0, -2.0]), frame] {
+            let (a, b) = (unit().transformed(&t), b.transformed(&t));
+            for (a, b) in [(&a, &b), (&b, &a)] {
+                let volume = intersection_volume(from_ref(a), b).unwrap();
+                assert!((volume - expected).abs() < 4e-15, "case {i}: {volume} {expected}");
+            }
+        }
+        let [a, b] = [&unit(), b].map(|m| m.clone().scaled(1e-4));
+        let volume = intersection_volume(from_ref(&a), &b).unwrap();
+        assert!((volume * 1e12 - expected).abs() < 1e-14, "case {i}: {volume:e}");
+    }
+}
+
+#[test]
+fn a_body_shares_all_of_itself_and_nothing_with_its_neighbour() {
+    let ball = icosphere(0.05, 4);
+    let own = signed_volume(&ball);
+    assert!((intersection_volume(from_ref(&ball), &ball).unwrap() / own - 1.0).abs() < 1e-13);
+    // Twice the same part is that part.
+    let twice = UnionBody::new(&[ball.clone(), ball.clone()]).unwrap();
+    assert!((twice.volume() / own - 1.0).abs() < 1e-13);
+    assert!((twice.intersection_volume(&ball).unwrap() / own - 1.0).abs() < 1e-13);
+}
+
+#[test]
+fn a_cavity_belongs_to_the_shell_around_it() {
+    let hollow = |size: f64| {
+        let mut mesh = cuboid([1.0; 3], [0.0; 3]);
+        let mut inner = cuboid([size; 3], [0.0; 3]);
+        inner.faces.iter_mut().for_each(|f| f.swap(0, 1));
+        mesh.append(&inner);
+        mesh
+    };
+    check(&[hollow(0.5)], &cuboid([0.5; 3], [0.0; 3]), 0.0);
+    check(&[hollow(0.5)], &cuboid([0.8; 3], [0.0; 3]), 0.512 - 0.125);
+    check(&[hollow(0.5)], &hollow(0.8), 1.0 - 0.512);
+    // Another part fills half of it.
+    check(&[hollow(0.5), cuboid([0.5; 3], [0.25, 0.0, 0.0])], &cuboid([0.5; 3], [0.0; 3]), 0.0625);
+}
+
+#[test]
+fn moving_a_box_changes_the_volume_by_the_side_inside() {
+    let (a, b) = (cuboid([1.0; 3], [0.0; 3]), cuboid([0.5; 3], [0.0; 3]));
+    let [a, b] = [a, b].map(|m| UnionBody::new(&[m]).unwrap());
+    let pose = Isometry3::translation(0.5, 0.2, 0.1);
+    let found = a.overlap(&b, &pose, &Point3::new(0.5, 0.2, 0.1)).unwrap();
+    // The lower half of the small box is inside.
+    let expected = [-0.25, 0.0, 0.0, 0.0, 0.0, 0.0];
+    assert!((found.volume - 0.0625).abs() < 1e-15);
+    assert!((found.gradient - nalgebra::Vector6::from(expected)).norm() < 1e-15, "{found:?}");
+    // About another centre, a turn also moves it.
+    let found = a.overlap(&b, &pose, &Point3::new(0.5, 0.0, 0.1)).unwrap();
+    assert!((found.gradient[5] - 0.2 * 0.25).abs() < 1e-15);
+    let nowhere = Isometry3::translation(f64::NAN, 0.0, 0.0);
+    assert!(matches!(a.overlap(&b, &nowhere, &Point3::origin()), Err(VolumeError::Invalid { .. })));
+    let far = Isometry3::translation(5.0, 0.0, 0.0);
+    assert_eq!(a.overlap(&b, &far, &Point3::origin()), Ok(Overlap::default()));
+}
