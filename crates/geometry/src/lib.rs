@@ -2,6 +2,7 @@
 
 mod clean;
 pub mod closest;
+mod contact_area;
 mod field;
 pub mod hand;
 mod io;
@@ -20,6 +21,7 @@ mod weld;
 
 pub use clean::MeshReport;
 pub use closest::ClosestPoints;
+pub use contact_area::contact_area;
 pub use field::{DistanceField, FieldSample};
 pub use io::{MeshError, write_whole};
 pub use mass::{MassError, MassProperties};
