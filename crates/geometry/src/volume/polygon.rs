@@ -191,3 +191,94 @@ fn clip(mut ring: Vec<Corner>, triangles: &mut Vec<[u32; 3]>) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::SplitMix64;
+
+    /// Fills rings of points in a plane seen from `normal` and checks area, direction and boundary.
+    fn check(rings: &[Vec<Point2<f64>>], expected: f64) {
+        let points: Vec<Point3<f64>> =
+            rings.iter().flatten().map(|p| Point3::new(p.x, p.y, 0.3 * p.x - 0.1 * p.y)).collect();
+        let (mut edges, mut first) = (Vec::new(), 0);
+        for ring in rings {
+            let n = ring.len() as u32;
+            edges.extend((0..n).map(|k| [first + k, first + (k + 1) % n]));
+            first += n;
+        }
+        // The same from the other side: every edge and the normal turned round.
+        for turned in [false, true] {
+            let mut normal = Vector3::new(-0.3, 0.1, 1.0);
+            if turned {
+                normal = -normal;
+                edges.iter_mut().for_each(|e| e.swap(0, 1));
+            }
+            let triangles = fill(&edges, |id| points[id as usize], &normal);
+            let mut area = 0.0;
+            let mut left = Vec::new();
+            for t in &triangles {
+                let [a, b, c] = t.map(|v| points[v as usize]);
+                let own = (b - a).cross(&(c - a)).z * if turned { -0.5 } else { 0.5 };
+                assert!(own > -1e-15, "{t:?}");
+                area += own;
+                left.extend([[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]]);
+            }
+            assert!((area - expected).abs() < 1e-12, "{area} {expected}");
+            for edge in &edges {
+                let at = left.iter().position(|e| e == edge).unwrap();
+                left.swap_remove(at);
+            }
+            while let Some([a, b]) = left.pop() {
+                let at = left.iter().position(|e| *e == [b, a]).unwrap();
+                left.swap_remove(at);
+            }
+        }
+    }
+
+    fn rectangle(low: [f64; 2], high: [f64; 2]) -> Vec<Point2<f64>> {
+        [[low[0], low[1]], [high[0], low[1]], high, [low[0], high[1]]].map(Point2::from).to_vec()
+    }
+
+    fn reversed(mut ring: Vec<Point2<f64>>) -> Vec<Point2<f64>> {
+        ring.reverse();
+        ring
+    }
+
+    #[test]
+    fn pieces_with_holes_and_islands_in_them() {
+        let square = rectangle([0.0, 0.0], [4.0, 4.0]);
+        let hole = |x: f64, y: f64| reversed(rectangle([x, y], [x + 1.0, y + 1.0]));
+        check(std::slice::from_ref(&square), 16.0);
+        check(&[square.clone(), hole(0.5, 0.5), hole(2.0, 2.5), hole(2.5, 0.25)], 13.0);
+        let island = rectangle([0.75, 0.75], [1.25, 1.25]);
+        check(&[island, hole(0.5, 0.5), square, rectangle([5.0, 0.0], [6.0, 1.0])], 16.25);
+    }
+
+    #[test]
+    fn stars_with_points_on_their_sides() {
+        let mut random = SplitMix64::new(1);
+        for n in 5..60_u32 {
+            let corner = |k: u32, r: f64| {
+                let a = std::f64::consts::TAU * f64::from(k) / f64::from(n);
+                Point2::new(r * a.cos(), r * a.sin())
+            };
+            let outer: Vec<_> = (0..n).map(|k| corner(k, 1.0 + random.unit())).collect();
+            let inner: Vec<_> =
+                (0..n).rev().map(|k| corner(k, 0.2 + 0.2 * random.unit())).collect();
+            // Middles of sides make straight corners.
+            let outer: Vec<_> = (0..outer.len())
+                .flat_map(|k| {
+                    let next = outer[(k + 1) % outer.len()];
+                    [outer[k], nalgebra::center(&outer[k], &next)]
+                })
+                .collect();
+            let area = |ring: &[Point2<f64>]| {
+                let next = ring.iter().cycle().skip(1);
+                0.5 * ring.iter().zip(next).map(|(p, q)| p.coords.perp(&q.coords)).sum::<f64>()
+            };
+            let expected = area(&outer) + area(&inner);
+            check(&[outer, inner], expected);
+        }
+    }
+}

@@ -15,8 +15,8 @@ use super::expansion::{Expansion, difference};
 pub(super) type Arrow<'a> = [&'a Point3<f64>; 2];
 
 /// Above this part of its terms' magnitudes, a triple product of rounded differences has the right sign; the bound is
-/// 7.8e-16 (Shewchuk 1997, `o3derrboundA`).
-const FILTER: f64 = 1e-15;
+/// 7.8e-16 (Shewchuk 1997, `o3derrboundA`); ten times that also keeps the value right to a tenth.
+const FILTER: f64 = 1e-14;
 
 /// A product (u × v)·w and its sign after the infinitesimal motion, 0 only where that leaves it zero.
 #[derive(Clone, Copy, Debug)]
@@ -153,4 +153,75 @@ fn exact_triple(u: Arrow<'_>, v: Arrow<'_>, w: Arrow<'_>) -> f64 {
     let two: Expansion<128> = term(0).plus(&term(1));
     let all: Expansion<192> = two.plus(&term(2));
     all.value()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::SplitMix64;
+
+    /// The same in integers, of which the coordinates are multiples.
+    fn integer_triple(u: Arrow<'_>, v: Arrow<'_>, w: Arrow<'_>) -> i128 {
+        let d = |a: Arrow<'_>| [0, 1, 2].map(|k| a[1][k] as i128 - a[0][k] as i128);
+        let (u, v, w) = (d(u), d(v), d(w));
+        (0..3)
+            .map(|k| {
+                let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+                (u[i] * v[j] - u[j] * v[i]) * w[k]
+            })
+            .sum()
+    }
+
+    #[test]
+    fn signs_are_those_of_integers_where_rounding_decides() {
+        let mut random = SplitMix64::new(2);
+        let mut decided = [0; 3];
+        for _ in 0..3000 {
+            let mut integer = |bits: i32| ((random.unit() - 0.5) * 2f64.powi(bits)).round();
+            // Points of a plane through the first, nudged by nothing or one unit.
+            let mut vector = |bits: i32| Vector3::from_fn(|_, _| integer(bits));
+            let (a, u, v) = (Point3::from(vector(30)), vector(20), vector(20));
+            let at = |i: f64, j: f64| a + u * i + v * j;
+            let weights = vector(8);
+            let mut p = [at(0.0, 0.0), at(1.0, 0.0), at(weights.z, 1.0), at(weights.x, weights.y)];
+            p[3] += vector(1);
+            let exact = integer_triple([&p[0], &p[1]], [&p[0], &p[2]], [&p[0], &p[3]]);
+            let side = Plane::new([&p[0], &p[1], &p[2]], true).side(&p[3]);
+            let error = (side.value - exact as f64).abs();
+            assert!(error <= 0.3 * (exact as f64).abs(), "{} {exact}", side.value);
+            if exact != 0 {
+                assert_eq!(i128::from(side.sign), exact.signum());
+            }
+            decided[(exact.signum() + 1) as usize] += 1;
+            // Four points on an edge pair: the same determinant.
+            let exact = integer_triple([&p[0], &p[1]], [&p[2], &p[3]], [&p[0], &p[2]]);
+            let turn = edges_turn([&p[0], &p[1]], [&p[2], &p[3]]);
+            assert!(exact == 0 || i128::from(turn) == exact.signum());
+        }
+        assert!(decided.iter().all(|n| *n > 100), "{decided:?}");
+    }
+
+    #[test]
+    fn ties_are_broken_by_one_motion() {
+        // In units so fine that the motion (ε, ε², ε³) can be carried out: bodies in a corner of the grid.
+        let motion = Vector3::new(2f64.powi(-12), 2f64.powi(-24), 2f64.powi(-36));
+        let mut random = SplitMix64::new(3);
+        for _ in 0..5000 {
+            let mut point = || Point3::from(Vector3::from_fn(|_, _| (3.0 * random.unit()).floor()));
+            let p: [Point3<f64>; 4] = std::array::from_fn(|_| point());
+            let [a, b, c, d] = &p;
+            let moved = d + motion;
+            let side = |of_a, q: &Point3<f64>| Plane::new([a, b, c], of_a).side(q).sign;
+            assert_eq!(side(true, d), side(true, &moved));
+            assert_eq!(side(false, d), side(false, &(d - motion)));
+            let (from, to) = (c + motion, d + motion);
+            assert_eq!(edges_turn([a, b], [c, d]), edges_turn([a, b], [&from, &to]));
+            // Turned round, an edge is passed on the other side.
+            assert_eq!(edges_turn([a, b], [c, d]), -edges_turn([b, a], [c, d]));
+            assert_eq!(edges_turn([a, b], [c, d]), -edges_turn([a, b], [d, c]));
+            let plane = |of_a| Plane::new([a, b, c], of_a);
+            assert_eq!(plane(true).along_x(d), plane(true).along_x(&moved));
+            assert_eq!(plane(false).along_x(d), plane(false).along_x(&(d - motion)));
+        }
+    }
 }

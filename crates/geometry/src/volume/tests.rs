@@ -306,3 +306,28 @@ fn moving_a_box_changes_the_volume_by_the_side_inside() {
     let far = Isometry3::translation(5.0, 0.0, 0.0);
     assert_eq!(a.overlap(&b, &far, &Point3::origin()), Ok(Overlap::default()));
 }
+
+#[test]
+fn the_surface_of_a_union_is_what_lies_outside_once() {
+    // A bar through a cube leaves a hole in two of its sides.
+    let parts = [cuboid([1.0; 3], [0.0; 3]), cuboid([0.4, 0.3, 2.0], [0.1, 0.05, 0.0])];
+    let mesh = UnionBody::new(&parts).unwrap().mesh();
+    assert!((mesh.area() - (6.0 + 1.4)).abs() < 1e-12, "{}", mesh.area());
+    assert_eq!(crate::mass::closedness(&mesh), 0);
+    // Two balls: each face of the union lies on one and outside the other.
+    let (r, d) = (0.05, 0.06);
+    let t = Isometry3::new(Vector3::new(d, 0.0, 0.0), Vector3::new(0.1, 0.2, 0.3));
+    let balls = [icosphere(r, 4), icosphere(r, 4).transformed(&t)];
+    let mesh = UnionBody::new(&balls).unwrap().mesh();
+    assert_eq!(crate::mass::closedness(&mesh), 0);
+    let zones = 2.0 * std::f64::consts::TAU * r * (r + 0.5 * d);
+    assert!((mesh.area() / zones - 1.0).abs() < 5e-3, "{} {zones}", mesh.area());
+    for f in 0..mesh.faces.len() {
+        let [a, b, c] = mesh.triangle(f).map(|p| p.coords);
+        let center = (a + b + c) / 3.0;
+        let from = [center, center - t.translation.vector];
+        let outward = if from[0].norm() > from[1].norm() { from[1] } else { from[0] };
+        let normal = mesh.area_vector(f);
+        assert!(from.iter().all(|x| x.norm() > 0.99 * r) && normal.dot(&outward) >= -1e-18);
+    }
+}
