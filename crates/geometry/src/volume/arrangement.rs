@@ -113,8 +113,8 @@ fn meet(
     let mut ends = [None; 2];
     for own in 0..2 {
         let (sides, faces) = if own == 0 { (&sides_a, [i, j]) } else { (&sides_b, [j, i]) };
-        for k in 0..3 {
-            let [s, e] = SIDES[k].map(|c| sides[c]);
+        for (k, ends_of_side) in SIDES.into_iter().enumerate() {
+            let [s, e] = ends_of_side.map(|c| sides[c]);
             let at = |l: usize| if own == 0 { turn(k, l) } else { turn(l, k) };
             if s.sign * e.sign != -1 || at(0) != at(1) || at(1) != at(2) {
                 continue;

@@ -195,7 +195,7 @@ fn random_convex_bodies_agree_with_another_library() {
             mesh.transformed(&random_pose(&mut random, 0.03))
         };
         let (a, b) = (body(1), body(3));
-        let volume = intersection_volume(&[a.clone()], &b).unwrap();
+        let volume = intersection_volume(std::slice::from_ref(&a), &b).unwrap();
         match oracle(&a, &b) {
             Some(expected) => assert!((volume - expected).abs() < 1e-15 * expected.max(1.0)),
             None => assert_eq!(volume, 0.0),
