@@ -6,9 +6,9 @@ use std::path::Path;
 use std::time::Instant;
 
 use anyhow::{Context, ensure};
-use nalgebra::{Isometry3, Point3};
+use nalgebra::Isometry3;
 use prehend::geometry::{ClosestPoints, UnionBody};
-use prehend::refine::metrics::{CONTACT_DISTANCE, ContactModel, Table, oe_deg, pe_cm};
+use prehend::refine::metrics::{ContactModel, Table, oe_deg, pe_cm};
 use prehend::refine::report::before_and_after;
 use prehend::refine::synth::default_scene;
 use prehend::refine::{Config, HandReading, refine};
@@ -35,13 +35,10 @@ fn main() -> anyhow::Result<()> {
     let header = ["", "PE cm", "OE °", "CA cm²", "IV cm³"].map(str::to_owned).to_vec();
     let mut table = Table::new(header);
     let mut row = |name: &str, pose: &Isometry3<f64>| -> anyhow::Result<()> {
-        let distance = |p: &Point3<f64>| {
-            surface.closest(p, CONTACT_DISTANCE).map_or(f64::INFINITY, |c| c.distance)
-        };
         let figures = [
             pe_cm(pose, &scene.truth),
             oe_deg(pose, &scene.truth),
-            contact.contact_area_cm2(pose, &distance),
+            contact.contact_area_cm2(pose, &surface),
             contact.intersection_volume_cm3(pose, &body)?,
         ];
         let figures = figures.iter().map(|f| format!("{f:.2}"));

@@ -54,12 +54,17 @@ pub enum MassError {
 /// # Errors
 /// [`MassError`] where the mesh is open, encloses no volume or faces inward, or the density is not positive.
 pub fn mass_properties(mesh: &TriMesh, density: f64) -> Result<MassProperties, MassError> {
-    if !(density > 0.0 && density.is_finite()) {
-        return Err(MassError::BadScale { what: "density", value: density });
-    }
     let open = closedness(mesh);
     if open > 0 {
         return Err(MassError::NotClosed { edges: open });
+    }
+    mass_of_closed(mesh, density)
+}
+
+/// As [`mass_properties`], for a mesh that is known to close.
+pub(crate) fn mass_of_closed(mesh: &TriMesh, density: f64) -> Result<MassProperties, MassError> {
+    if !(density > 0.0 && density.is_finite()) {
+        return Err(MassError::BadScale { what: "density", value: density });
     }
     let (volume, first, second, origin) = moments(mesh);
     let extent = mesh.bounds().map_or(0.0, |(low, high)| (high - low).norm());

@@ -3,13 +3,13 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-use nalgebra::{Isometry3, Point3};
+use nalgebra::Isometry3;
 use prehend_geometry::robot::Robot as KinematicTree;
 use prehend_geometry::{ClosestPoints, TriMesh, UnionBody};
 
 use crate::assets::{AssetError, load_mesh};
 use crate::bop::{Dataset, DatasetError, GroundTruth, ResultRow};
-use crate::metrics::{CONTACT_DISTANCE, ContactModel, ScoredModel, ScoredRow};
+use crate::metrics::{ContactModel, ScoredModel, ScoredRow};
 
 /// An evaluation model, prepared once.
 struct Model {
@@ -142,11 +142,8 @@ impl TrueHand {
         model: &ContactModel,
         t_cam_model: &Isometry3<f64>,
     ) -> Result<Contact, AssetError> {
-        let distance = |p: &Point3<f64>| {
-            self.surface.closest(p, CONTACT_DISTANCE).map_or(f64::INFINITY, |c| c.distance)
-        };
         Ok(Contact {
-            area_cm2: model.contact_area_cm2(t_cam_model, &distance),
+            area_cm2: model.contact_area_cm2(t_cam_model, &self.surface),
             volume_cm3: model.intersection_volume_cm3(t_cam_model, &self.body)?,
         })
     }

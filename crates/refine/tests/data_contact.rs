@@ -6,11 +6,11 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 use prehend_geometry::shapes::{capsule, cuboid};
 use prehend_geometry::{ClosestPoints, Robot, TriMesh, UnionBody};
 use prehend_refine::bop::{Dataset, GroundTruth, read_results};
-use prehend_refine::metrics::{CONTACT_DISTANCE, CONTACT_SAMPLES, ContactModel};
+use prehend_refine::metrics::{CONTACT_SAMPLES, ContactModel};
 use serde_json::Value;
 
 fn data(name: &str) -> PathBuf {
@@ -83,9 +83,6 @@ fn golden_contact_of_the_inhand_frames() {
         let model = ContactModel::new(&mesh);
         let body = UnionBody::new(&hand_parts(&robot, &hand, frame)).unwrap();
         let surface = ClosestPoints::new(&body.mesh()).unwrap();
-        let distance = |p: &Point3<f64>| {
-            surface.closest(p, CONTACT_DISTANCE).map_or(f64::INFINITY, |c| c.distance)
-        };
         for (set, rows) in sets.iter().zip(&results) {
             let row = rows.iter().find(|r| r.im_id == im_id);
             let pose = row
@@ -99,8 +96,7 @@ fn golden_contact_of_the_inhand_frames() {
             worst = worst.max((iv - expected).abs());
 
             // Both numbers are estimates from as many samples: their difference in standard errors.
-            let (ca, expected) =
-                (model.contact_area_cm2(&pose, &distance), golden("CA_cm2_eps5mm"));
+            let (ca, expected) = (model.contact_area_cm2(&pose, &surface), golden("CA_cm2_eps5mm"));
             let area = 1e4 * mesh.area();
             let fraction = expected / area;
             let sigma = area * (2.0 * fraction * (1.0 - fraction) / CONTACT_SAMPLES as f64).sqrt();

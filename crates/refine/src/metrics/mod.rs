@@ -15,7 +15,7 @@ mod symmetry;
 mod table;
 
 pub use add::{add, adi};
-pub use contact::{CONTACT_DISTANCE, CONTACT_SAMPLES, ContactModel, contact_area_cm2};
+pub use contact::{CONTACT_DISTANCE, CONTACT_SAMPLES, ContactModel};
 pub use nearest::NearestPoint;
 pub use pose_error::{oe_deg, oe_symmetric_deg, pe_cm};
 pub use score::{COLUMNS, PoseScore, ScoredModel};
