@@ -1,12 +1,17 @@
 //! Closest points of a mesh and signed distance to it.
 
+mod batch;
 mod bvh;
+mod derivative;
+mod pack;
+mod search;
 mod topology;
 mod triangle;
 mod winding;
 
 use nalgebra::{Point3, Vector3};
-use rayon::prelude::*;
+
+pub use self::derivative::ClosestDerivative;
 
 use self::bvh::{Bvh, MAX_FACES};
 use self::topology::PseudoNormals;
@@ -72,6 +77,22 @@ pub struct Closest {
     pub feature: Feature,
 }
 
+impl Closest {
+    /// The squared distance \[m²\].
+    pub fn distance_squared(&self) -> f64 {
+        self.distance * self.distance
+    }
+
+    /// The answer for a point that is nowhere.
+    const NONE: Self = Self {
+        point: Point3::new(f64::NAN, f64::NAN, f64::NAN),
+        distance: f64::NAN,
+        face: 0,
+        barycentric: [f64::NAN; 3],
+        feature: Feature::Face,
+    };
+}
+
 /// How inside is told from outside.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SignMethod {
@@ -83,12 +104,14 @@ pub enum SignMethod {
 
 /// Closest points of, and signed distances to, one triangle mesh.
 ///
-/// A four-wide tree over single-precision boxes that bound from outside, with exact double-precision
-/// triangle distances at the leaves: the answer is the true closest point up to `f64` rounding.
+/// An eight-wide tree of oriented boxes over packs of eight triangles, searched in single precision up to the last
+/// word, which double precision has: the answer is the true closest point up to `f64` rounding. Among points at
+/// exactly equal distance that on the face of lowest number is answered, so that an answer depends neither on hints
+/// nor on what else is asked.
 ///
 /// The distance is differentiable wherever the closest point is unique and the point is off the
 /// surface: its gradient by the query point `p` is the unit vector `(p - closest.point) / distance`, and
-/// that of the signed distance is the same vector times the sign.
+/// that of the signed distance is the same vector times the sign. [`ClosestPoints::derivative`] has the rest.
 #[derive(Clone, Debug)]
 pub struct ClosestPoints {
     bvh: Bvh,
@@ -169,8 +192,7 @@ impl ClosestPoints {
     }
 
     /// As [`Self::closest`], trying `face` first: the answer for a nearby point, or for this point a
-    /// moment ago, spares most of the search. The distance does not depend on the hint; among points
-    /// at exactly equal distance the hinted face wins.
+    /// moment ago, spares most of the search. The answer does not depend on the hint; a face that does not exist is none.
     #[inline]
     pub fn closest_from(
         &self,
@@ -181,23 +203,9 @@ impl ClosestPoints {
         self.search(point, max_distance, Some(face))
     }
 
-    /// Closest points of many points, in their order, in parallel.
-    pub fn closest_many(&self, points: &[Point3<f64>], max_distance: f64) -> Vec<Option<Closest>> {
-        points.par_iter().with_min_len(256).map(|p| self.closest(p, max_distance)).collect()
-    }
-
     /// Signed distance \[m\], negative inside, and the closest point; NaN for a point that is not finite.
     pub fn signed_distance(&self, point: &Point3<f64>) -> (f64, Closest) {
-        self.signed_distance_within(point, f64::INFINITY).unwrap_or((
-            f64::NAN,
-            Closest {
-                point: Point3::new(f64::NAN, f64::NAN, f64::NAN),
-                distance: f64::NAN,
-                face: 0,
-                barycentric: [f64::NAN; 3],
-                feature: Feature::Face,
-            },
-        ))
+        self.signed(point, self.closest(point, f64::INFINITY))
     }
 
     /// As [`Self::signed_distance`], or `None` where the surface is farther than `max_distance` \[m\],
@@ -208,13 +216,16 @@ impl ClosestPoints {
         max_distance: f64,
     ) -> Option<(f64, Closest)> {
         let closest = self.closest(point, max_distance)?;
-        let inside = closest.distance > 0.0 && self.is_inside(point, &closest);
-        Some((if inside { -closest.distance } else { closest.distance }, closest))
+        Some(self.signed(point, Some(closest)))
     }
 
-    /// Signed distances of many points, in their order, in parallel.
-    pub fn signed_distance_many(&self, points: &[Point3<f64>]) -> Vec<(f64, Closest)> {
-        points.par_iter().with_min_len(256).map(|p| self.signed_distance(p)).collect()
+    /// Adds the sign to the answer for `point`; no answer, for a point that is not finite, becomes NaN.
+    fn signed(&self, point: &Point3<f64>, closest: Option<Closest>) -> (f64, Closest) {
+        let Some(closest) = closest else {
+            return (f64::NAN, Closest::NONE);
+        };
+        let inside = closest.distance > 0.0 && self.is_inside(point, &closest);
+        (if inside { -closest.distance } else { closest.distance }, closest)
     }
 
     #[inline]

@@ -46,13 +46,6 @@ impl Triangle {
         Self { a: a.coords, ab, ac, normal, face, sliver: norm <= SLIVER * longest }
     }
 
-    /// Squared distance from `p` to the plane of the triangle \[m²\]: a cheap lower bound (zero without a normal).
-    #[inline]
-    pub(super) fn plane_distance_squared(&self, p: &Vector3<f64>) -> f64 {
-        let d = (p - self.a).dot(&self.normal);
-        d * d
-    }
-
     #[inline]
     fn foot(&self, ap: &Vector3<f64>, v: f64, w: f64, feature: Feature) -> Foot {
         let d = ap - self.ab * v - self.ac * w;
