@@ -7,7 +7,7 @@ use prehend_geometry::sample::surface_samples;
 use prehend_geometry::{SplitMix64, TriMesh};
 
 /// An ellipsoid of 5 × 5 × 7 cm half axes with smooth bumps: 16 128 faces, closed, in metres.
-pub fn body() -> TriMesh {
+pub(crate) fn body() -> TriMesh {
     let (around, along) = (128, 64);
     let phase = [0.5118216247, 0.9504636963, 0.1441596113, 0.9486494471].map(|x| x * TAU);
     let mut vertices = Vec::new();
@@ -40,7 +40,7 @@ pub fn body() -> TriMesh {
 
 /// Where query points lie.
 #[derive(Clone, Copy, Debug)]
-pub enum Queries {
+pub(crate) enum Queries {
     /// On the surface.
     Surface,
     /// Off it along the normal, with a standard deviation of 5 mm.
@@ -50,10 +50,10 @@ pub enum Queries {
 }
 
 /// All of them.
-pub const ALL: [Queries; 3] = [Queries::Surface, Queries::Near, Queries::Box];
+pub(crate) const ALL: [Queries; 3] = [Queries::Surface, Queries::Near, Queries::Box];
 
 /// `n` points in no order.
-pub fn queries(mesh: &TriMesh, kind: Queries, n: usize) -> Vec<Point3<f64>> {
+pub(crate) fn queries(mesh: &TriMesh, kind: Queries, n: usize) -> Vec<Point3<f64>> {
     let mut random = SplitMix64::new(7);
     if let Queries::Box = kind {
         let (lo, hi) = mesh.bounds().expect("the body has vertices");

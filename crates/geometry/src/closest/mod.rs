@@ -122,7 +122,8 @@ pub struct ClosestPoints {
 #[derive(Clone, Debug)]
 enum Sign {
     /// With the factor that makes the enclosed side negative: -1 on a mesh turned inside out.
-    PseudoNormal(PseudoNormals, f64),
+    /// The winding number has the say where the surface folds back, and scans cross themselves.
+    PseudoNormal(PseudoNormals, f64, Winding),
     Winding(Winding),
 }
 
@@ -139,7 +140,7 @@ impl ClosestPoints {
     pub fn new(mesh: &TriMesh) -> Result<Self, ClosestError> {
         let bvh = build(mesh)?;
         let sign = match PseudoNormals::new(mesh) {
-            Some(normals) => Sign::PseudoNormal(normals, orientation(mesh)),
+            Some(normals) => Sign::PseudoNormal(normals, orientation(mesh), Winding::new(&bvh)),
             None => Sign::Winding(Winding::new(&bvh)),
         };
         Ok(Self::from_parts(bvh, sign))
@@ -219,8 +220,19 @@ impl ClosestPoints {
         Some(self.signed(point, Some(closest)))
     }
 
+    /// As [`Self::signed_distance`] from a hint, with the face of the answer only.
+    #[inline]
+    pub(crate) fn signed_distance_hinted(
+        &self,
+        point: &Point3<f64>,
+        hint: Option<u32>,
+    ) -> (f64, u32) {
+        let (signed, closest) = self.signed(point, self.search(point, f64::INFINITY, hint));
+        (signed, closest.face)
+    }
+
     /// Adds the sign to the answer for `point`; no answer, for a point that is not finite, becomes NaN.
-    fn signed(&self, point: &Point3<f64>, closest: Option<Closest>) -> (f64, Closest) {
+    pub(crate) fn signed(&self, point: &Point3<f64>, closest: Option<Closest>) -> (f64, Closest) {
         let Some(closest) = closest else {
             return (f64::NAN, Closest::NONE);
         };
@@ -229,7 +241,12 @@ impl ClosestPoints {
     }
 
     #[inline]
-    fn search(&self, point: &Point3<f64>, max_distance: f64, hint: Option<u32>) -> Option<Closest> {
+    pub(crate) fn search(
+        &self,
+        point: &Point3<f64>,
+        max_distance: f64,
+        hint: Option<u32>,
+    ) -> Option<Closest> {
         if !(max_distance >= 0.0 && point.iter().all(|x| x.is_finite())) {
             return None;
         }
@@ -249,7 +266,10 @@ impl ClosestPoints {
     fn is_inside(&self, point: &Point3<f64>, closest: &Closest) -> bool {
         match &self.sign {
             Sign::Winding(winding) => winding.at(&self.bvh, &point.coords).abs() > 0.5,
-            Sign::PseudoNormal(normals, orientation) => {
+            Sign::PseudoNormal(normals, orientation, winding) => {
+                if normals.is_folded(closest.face as usize) {
+                    return winding.at(&self.bvh, &point.coords).abs() > 0.5;
+                }
                 let offset = point - closest.point;
                 let face = closest.face as usize;
                 let normal = match closest.feature {
