@@ -66,7 +66,7 @@ fn objects_have_the_right_sign_everywhere() {
     folders.sort();
     for folder in folders.iter().filter(|f| f.is_dir()) {
         let mesh = TriMesh::load(&folder.join("5000.ply")).unwrap();
-        check(&folder.display().to_string(), &mesh, 50_000, 500);
+        check(&folder.display().to_string(), &mesh, 50_000, 100);
         count += 1;
     }
     assert_eq!(count, 19);
@@ -82,6 +82,6 @@ fn scans_have_the_right_sign_everywhere() {
     assert_eq!(scans.len(), 9);
     for path in scans {
         let mesh = TriMesh::load(&path).unwrap().scaled(1e-3);
-        check(&path.display().to_string(), &mesh.cleaned().0, 50_000, 500);
+        check(&path.display().to_string(), &mesh.cleaned().0, 50_000, 100);
     }
 }

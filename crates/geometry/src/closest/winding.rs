@@ -36,7 +36,7 @@ impl Winding {
         let mut sums = vec![(0.0, Vector3::zeros(), Vector3::zeros()); bvh.nodes.len()];
         for n in (0..bvh.nodes.len()).rev() {
             let node = &bvh.nodes[n];
-            for lane in 0..node.used {
+            for (lane, dipole) in dipoles[n].iter_mut().enumerate().take(node.used) {
                 let (area, weighted, area_vector) = match child(node.child[lane]) {
                     Child::Node(index) => sums[index],
                     Child::Pack(pack) => bvh.triangles_of(pack).iter().fold(
@@ -56,7 +56,7 @@ impl Winding {
                 let middle = middle + bvh.center;
                 let center = if area > 0.0 { weighted / area } else { middle };
                 let radius = (center - middle).norm() + reach;
-                dipoles[n][lane] = Dipole { center, area_vector, radius };
+                *dipole = Dipole { center, area_vector, radius };
             }
         }
         Self { dipoles }

@@ -110,7 +110,7 @@ impl SdfGrid {
             return Err(("bounds", "not finite or of a negative size".into()));
         }
         let band = number(&mut left, "band")?;
-        if !(band >= spacing) {
+        if band.is_nan() || band < spacing {
             return Err(("band", format!("{band} m is narrower than the spacing")));
         }
         let offset = number(&mut left, "offset")?;
