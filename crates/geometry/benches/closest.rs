@@ -2,10 +2,11 @@
 
 mod body;
 
-use body::{ALL, Queries, body, queries};
+use body::body;
 use divan::Bencher;
 use nalgebra::Point3;
-use prehend_geometry::ClosestPoints;
+use prehend_geometry::sample::surface_samples;
+use prehend_geometry::{ClosestPoints, SplitMix64, TriMesh};
 
 const N: usize = 100_000;
 
@@ -15,6 +16,41 @@ fn main() {
         .build_global()
         .expect("nothing has used the pool yet");
     divan::main();
+}
+
+/// Where query points lie.
+#[derive(Clone, Copy, Debug)]
+enum Queries {
+    /// On the surface.
+    Surface,
+    /// Off it along the normal, with a standard deviation of 5 mm.
+    Near,
+    /// Anywhere in one and a half times the box around it.
+    Box,
+}
+
+/// All of them.
+const ALL: [Queries; 3] = [Queries::Surface, Queries::Near, Queries::Box];
+
+/// `n` points in no order.
+fn queries(mesh: &TriMesh, kind: Queries, n: usize) -> Vec<Point3<f64>> {
+    let mut random = SplitMix64::new(7);
+    if let Queries::Box = kind {
+        let (lo, hi) = mesh.bounds().expect("the body has vertices");
+        let (center, half) = (nalgebra::center(&lo, &hi), (hi - lo) * 0.75);
+        return (0..n).map(|_| center + half.map(|h| h * (2.0 * random.unit() - 1.0))).collect();
+    }
+    let mut points: Vec<Point3<f64>> = surface_samples(mesh, n, 11)
+        .iter()
+        .map(|s| match kind {
+            Queries::Near => s.point + s.normal * (0.005 * random.normal()),
+            _ => s.point,
+        })
+        .collect();
+    for i in (1..n).rev() {
+        points.swap(i, (random.unit() * (i + 1) as f64) as usize);
+    }
+    points
 }
 
 fn scene(kind: Queries) -> (ClosestPoints, Vec<Point3<f64>>) {

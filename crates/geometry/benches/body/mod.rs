@@ -1,10 +1,9 @@
-//! The body that closest points and distance grids are timed on, and points around it.
+//! The body that closest points and distance grids are timed on.
 
 use std::f64::consts::{PI, TAU};
 
 use nalgebra::{Point3, Vector3};
-use prehend_geometry::sample::surface_samples;
-use prehend_geometry::{SplitMix64, TriMesh};
+use prehend_geometry::TriMesh;
 
 /// An ellipsoid of 5 × 5 × 7 cm half axes with smooth bumps: 16 128 faces, closed, in metres.
 pub(crate) fn body() -> TriMesh {
@@ -36,39 +35,4 @@ pub(crate) fn body() -> TriMesh {
         }
     }
     TriMesh::new(vertices, faces)
-}
-
-/// Where query points lie.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum Queries {
-    /// On the surface.
-    Surface,
-    /// Off it along the normal, with a standard deviation of 5 mm.
-    Near,
-    /// Anywhere in one and a half times the box around it.
-    Box,
-}
-
-/// All of them.
-pub(crate) const ALL: [Queries; 3] = [Queries::Surface, Queries::Near, Queries::Box];
-
-/// `n` points in no order.
-pub(crate) fn queries(mesh: &TriMesh, kind: Queries, n: usize) -> Vec<Point3<f64>> {
-    let mut random = SplitMix64::new(7);
-    if let Queries::Box = kind {
-        let (lo, hi) = mesh.bounds().expect("the body has vertices");
-        let (center, half) = (nalgebra::center(&lo, &hi), (hi - lo) * 0.75);
-        return (0..n).map(|_| center + half.map(|h| h * (2.0 * random.unit() - 1.0))).collect();
-    }
-    let mut points: Vec<Point3<f64>> = surface_samples(mesh, n, 11)
-        .iter()
-        .map(|s| match kind {
-            Queries::Near => s.point + s.normal * (0.005 * random.normal()),
-            _ => s.point,
-        })
-        .collect();
-    for i in (1..n).rev() {
-        points.swap(i, (random.unit() * (i + 1) as f64) as usize);
-    }
-    points
 }
