@@ -1,12 +1,17 @@
 //! Closest points of a mesh and signed distance to it.
 
+mod batch;
 mod bvh;
+mod derivative;
+mod pack;
+mod search;
 mod topology;
 pub(crate) mod triangle;
 mod winding;
 
 use nalgebra::{Point3, Vector3};
-use rayon::prelude::*;
+
+pub use self::derivative::ClosestDerivative;
 
 use self::bvh::{Bvh, MAX_FACES};
 use self::topology::PseudoNormals;
@@ -72,6 +77,22 @@ pub struct Closest {
     pub feature: Feature,
 }
 
+impl Closest {
+    /// The squared distance \[m²\].
+    pub fn distance_squared(&self) -> f64 {
+        self.distance * self.distance
+    }
+
+    /// The answer for a point that is nowhere.
+    const NONE: Self = Self {
+        point: Point3::new(f64::NAN, f64::NAN, f64::NAN),
+        distance: f64::NAN,
+        face: 0,
+        barycentric: [f64::NAN; 3],
+        feature: Feature::Face,
+    };
+}
+
 /// How inside is told from outside.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SignMethod {
@@ -83,12 +104,14 @@ pub enum SignMethod {
 
 /// Closest points of, and signed distances to, one triangle mesh.
 ///
-/// A four-wide tree over single-precision boxes that bound from outside, with exact double-precision
-/// triangle distances at the leaves: the answer is the true closest point up to `f64` rounding.
+/// An eight-wide tree of oriented boxes over packs of eight triangles, searched in single precision up to the last
+/// word, which double precision has: the answer is the true closest point up to `f64` rounding. Among points at
+/// exactly equal distance that on the face of lowest number is answered, so that an answer depends neither on hints
+/// nor on what else is asked.
 ///
 /// The distance is differentiable wherever the closest point is unique and the point is off the
 /// surface: its gradient by the query point `p` is the unit vector `(p - closest.point) / distance`, and
-/// that of the signed distance is the same vector times the sign.
+/// that of the signed distance is the same vector times the sign. [`ClosestPoints::derivative`] has the rest.
 #[derive(Clone, Debug)]
 pub struct ClosestPoints {
     bvh: Bvh,
@@ -99,7 +122,8 @@ pub struct ClosestPoints {
 #[derive(Clone, Debug)]
 enum Sign {
     /// With the factor that makes the enclosed side negative: -1 on a mesh turned inside out.
-    PseudoNormal(PseudoNormals, f64),
+    /// The winding number has the say where the surface folds back, and scans cross themselves.
+    PseudoNormal(PseudoNormals, f64, Winding),
     Winding(Winding),
 }
 
@@ -116,7 +140,7 @@ impl ClosestPoints {
     pub fn new(mesh: &TriMesh) -> Result<Self, ClosestError> {
         let bvh = build(mesh)?;
         let sign = match PseudoNormals::new(mesh) {
-            Some(normals) => Sign::PseudoNormal(normals, orientation(mesh)),
+            Some(normals) => Sign::PseudoNormal(normals, orientation(mesh), Winding::new(&bvh)),
             None => Sign::Winding(Winding::new(&bvh)),
         };
         Ok(Self::from_parts(bvh, sign))
@@ -169,8 +193,7 @@ impl ClosestPoints {
     }
 
     /// As [`Self::closest`], trying `face` first: the answer for a nearby point, or for this point a
-    /// moment ago, spares most of the search. The distance does not depend on the hint; among points
-    /// at exactly equal distance the hinted face wins.
+    /// moment ago, spares most of the search. The answer does not depend on the hint; a face that does not exist is none.
     #[inline]
     pub fn closest_from(
         &self,
@@ -181,23 +204,9 @@ impl ClosestPoints {
         self.search(point, max_distance, Some(face))
     }
 
-    /// Closest points of many points, in their order, in parallel.
-    pub fn closest_many(&self, points: &[Point3<f64>], max_distance: f64) -> Vec<Option<Closest>> {
-        points.par_iter().with_min_len(256).map(|p| self.closest(p, max_distance)).collect()
-    }
-
     /// Signed distance \[m\], negative inside, and the closest point; NaN for a point that is not finite.
     pub fn signed_distance(&self, point: &Point3<f64>) -> (f64, Closest) {
-        self.signed_distance_within(point, f64::INFINITY).unwrap_or((
-            f64::NAN,
-            Closest {
-                point: Point3::new(f64::NAN, f64::NAN, f64::NAN),
-                distance: f64::NAN,
-                face: 0,
-                barycentric: [f64::NAN; 3],
-                feature: Feature::Face,
-            },
-        ))
+        self.signed(point, self.closest(point, f64::INFINITY))
     }
 
     /// As [`Self::signed_distance`], or `None` where the surface is farther than `max_distance` \[m\],
@@ -208,17 +217,36 @@ impl ClosestPoints {
         max_distance: f64,
     ) -> Option<(f64, Closest)> {
         let closest = self.closest(point, max_distance)?;
-        let inside = closest.distance > 0.0 && self.is_inside(point, &closest);
-        Some((if inside { -closest.distance } else { closest.distance }, closest))
+        Some(self.signed(point, Some(closest)))
     }
 
-    /// Signed distances of many points, in their order, in parallel.
-    pub fn signed_distance_many(&self, points: &[Point3<f64>]) -> Vec<(f64, Closest)> {
-        points.par_iter().with_min_len(256).map(|p| self.signed_distance(p)).collect()
+    /// As [`Self::signed_distance`] from a hint, with the face of the answer only.
+    #[inline]
+    pub(crate) fn signed_distance_hinted(
+        &self,
+        point: &Point3<f64>,
+        hint: Option<u32>,
+    ) -> (f64, u32) {
+        let (signed, closest) = self.signed(point, self.search(point, f64::INFINITY, hint));
+        (signed, closest.face)
+    }
+
+    /// Adds the sign to the answer for `point`; no answer, for a point that is not finite, becomes NaN.
+    pub(crate) fn signed(&self, point: &Point3<f64>, closest: Option<Closest>) -> (f64, Closest) {
+        let Some(closest) = closest else {
+            return (f64::NAN, Closest::NONE);
+        };
+        let inside = closest.distance > 0.0 && self.is_inside(point, &closest);
+        (if inside { -closest.distance } else { closest.distance }, closest)
     }
 
     #[inline]
-    fn search(&self, point: &Point3<f64>, max_distance: f64, hint: Option<u32>) -> Option<Closest> {
+    pub(crate) fn search(
+        &self,
+        point: &Point3<f64>,
+        max_distance: f64,
+        hint: Option<u32>,
+    ) -> Option<Closest> {
         if !(max_distance >= 0.0 && point.iter().all(|x| x.is_finite())) {
             return None;
         }
@@ -238,7 +266,10 @@ impl ClosestPoints {
     fn is_inside(&self, point: &Point3<f64>, closest: &Closest) -> bool {
         match &self.sign {
             Sign::Winding(winding) => winding.at(&self.bvh, &point.coords).abs() > 0.5,
-            Sign::PseudoNormal(normals, orientation) => {
+            Sign::PseudoNormal(normals, orientation, winding) => {
+                if normals.is_folded(closest.face as usize) {
+                    return winding.at(&self.bvh, &point.coords).abs() > 0.5;
+                }
                 let offset = point - closest.point;
                 let face = closest.face as usize;
                 let normal = match closest.feature {

@@ -5,6 +5,9 @@ use nalgebra::Vector3;
 use crate::TriMesh;
 use crate::topology::{edges, is_collapsed};
 
+/// Cosine between the normals of two faces below which they are back to back: 150 degrees.
+const FOLD: f64 = -0.866;
+
 /// Angle-weighted pseudo-normals of a mesh welded by position.
 ///
 /// Baerentzen and Aanaes, Signed distance computation using the angle weighted pseudonormal, 2005: on a
@@ -15,6 +18,8 @@ pub(super) struct PseudoNormals {
     corners: Vec<[u32; 3]>,
     /// Pseudo-normals of the welded vertices.
     vertices: Vec<Vector3<f64>>,
+    /// Welded vertices around which the surface all but folds back on itself, where it may cross itself too.
+    folded: Vec<bool>,
     /// Pseudo-normals of the edges from corner i to corner i + 1 of each face.
     edges: Vec<[Vector3<f64>; 3]>,
 }
@@ -46,12 +51,32 @@ impl PseudoNormals {
                 vertices[corner[i] as usize] += unit[f] * angle;
             }
         }
+        let mut folded = vec![false; vertex_count];
+        for (f, corner) in corners.iter().enumerate() {
+            for i in 0..3 {
+                // Faces on an edge that fold back spoil all around, as does a face turned from its corner.
+                let across = partners[3 * f + i].map_or(1.0, |g| unit[f].dot(&unit[g / 3]));
+                if across < FOLD {
+                    let opposite = partners[3 * f + i].map_or(f, |g| g / 3);
+                    for v in corner.iter().chain(&corners[opposite]) {
+                        folded[*v as usize] = true;
+                    }
+                }
+                let v = corner[i] as usize;
+                folded[v] |= unit[f].dot(&vertices[v]) < 0.0;
+            }
+        }
         let edges = (0..corners.len())
             .map(|f| {
                 [0, 1, 2].map(|i| partners[3 * f + i].map_or(unit[f], |g| unit[f] + unit[g / 3]))
             })
             .collect();
-        Some(Self { corners, vertices, edges })
+        Some(Self { corners, vertices, folded, edges })
+    }
+
+    /// Whether the surface may fold back on itself at a corner of `face`.
+    pub(super) fn is_folded(&self, face: usize) -> bool {
+        self.corners[face].iter().any(|&v| self.folded[v as usize])
     }
 
     /// Pseudo-normal of corner `i` of `face`.

@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use nalgebra::Vector3;
 
 use super::bvh::{Bvh, Child, child};
+use super::pack::LANES;
 use super::triangle::Triangle;
 
 /// A group of triangles seen from afar: its area vector at its centre of area.
@@ -22,7 +23,7 @@ struct Dipole {
 /// the first-order term only, which an accuracy parameter of 4 radii keeps well within what the threshold at one half needs.
 #[derive(Clone, Debug)]
 pub(super) struct Winding {
-    dipoles: Vec<[Dipole; 4]>,
+    dipoles: Vec<[Dipole; LANES]>,
 }
 
 const FAR: f64 = 4.0;
@@ -30,15 +31,15 @@ const FAR: f64 = 4.0;
 impl Winding {
     pub(super) fn new(bvh: &Bvh) -> Self {
         let none = Dipole { center: Vector3::zeros(), area_vector: Vector3::zeros(), radius: 0.0 };
-        let mut dipoles = vec![[none; 4]; bvh.nodes.len()];
+        let mut dipoles = vec![[none; LANES]; bvh.nodes.len()];
         // (area, area-weighted centre, area vector) of each node; children come after their parents.
         let mut sums = vec![(0.0, Vector3::zeros(), Vector3::zeros()); bvh.nodes.len()];
         for n in (0..bvh.nodes.len()).rev() {
             let node = &bvh.nodes[n];
-            for lane in (0..4).filter(|&lane| node.used(lane)) {
+            for (lane, dipole) in dipoles[n].iter_mut().enumerate().take(node.used) {
                 let (area, weighted, area_vector) = match child(node.child[lane]) {
                     Child::Node(index) => sums[index],
-                    Child::Leaf(range) => bvh.triangles[range].iter().fold(
+                    Child::Pack(pack) => bvh.triangles_of(pack).iter().fold(
                         (0.0, Vector3::zeros(), Vector3::zeros()),
                         |(area, weighted, sum), t| {
                             let vector = t.ab.cross(&t.ac) * 0.5;
@@ -51,10 +52,11 @@ impl Winding {
                 sums[n].0 += area;
                 sums[n].1 += weighted;
                 sums[n].2 += area_vector;
-                let (lo, hi) = node.bounds(lane);
-                let center = if area > 0.0 { weighted / area } else { (lo + hi) * 0.5 };
-                let radius = (center - lo).sup(&(hi - center)).norm();
-                dipoles[n][lane] = Dipole { center, area_vector, radius };
+                let (middle, reach) = node.ball(lane);
+                let middle = middle + bvh.center;
+                let center = if area > 0.0 { weighted / area } else { middle };
+                let radius = (center - middle).norm() + reach;
+                *dipole = Dipole { center, area_vector, radius };
             }
         }
         Self { dipoles }
@@ -66,7 +68,7 @@ impl Winding {
         let mut open = vec![0usize];
         while let Some(n) = open.pop() {
             let node = &bvh.nodes[n];
-            for lane in (0..4).filter(|&lane| node.used(lane)) {
+            for lane in 0..node.used {
                 let dipole = &self.dipoles[n][lane];
                 let r = dipole.center - p;
                 let distance = r.norm();
@@ -76,9 +78,12 @@ impl Winding {
                 }
                 match child(node.child[lane]) {
                     Child::Node(index) => open.push(index),
-                    Child::Leaf(range) => {
-                        solid_angle +=
-                            bvh.triangles[range].iter().map(|t| solid_angle_of(t, p)).sum::<f64>();
+                    Child::Pack(pack) => {
+                        solid_angle += bvh
+                            .triangles_of(pack)
+                            .iter()
+                            .map(|t| solid_angle_of(t, p))
+                            .sum::<f64>();
                     }
                 }
             }

@@ -1,55 +1,75 @@
 //! Sampling a signed distance onto a grid.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Point3;
 use rayon::prelude::*;
 
-use super::SdfGrid;
+use super::{Lattice, SdfError, SdfGrid};
 use crate::ClosestPoints;
+use crate::closest::SignMethod;
 
-/// Largest number of samples a grid may have: half a gigabyte.
-pub const MAX_SAMPLES: usize = 64 << 20;
-
-/// Why a grid cannot be built.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum SdfError {
-    /// A length is not usable.
-    #[error("{name} of the distance grid is {value} m, but must be finite and {requirement}")]
-    Length {
-        /// "spacing" or "margin".
-        name: &'static str,
-        /// What was given \[m\].
-        value: f64,
-        /// What it must be.
-        requirement: &'static str,
-    },
-    /// The box around the shape is not finite or turned around.
-    #[error("the box around the shape is not finite or has a negative size")]
-    Bounds,
-    /// The grid would not fit.
-    #[error(
-        "the distance grid would have {samples} samples, more than {limit}: use a larger spacing"
-    )]
-    TooLarge {
-        /// Samples it would have.
-        samples: f64,
-        /// The limit.
-        limit: usize,
-    },
-}
+/// Samples along the side of the blocks that a narrow band is looked for in.
+const BLOCK: usize = 4;
 
 impl SdfGrid {
     /// Samples the signed distance to a mesh every `spacing` \[m\], up to at least `margin` \[m\] around
-    /// the mesh. Each sample is exact; rows are sampled in parallel.
+    /// the mesh. Each sample is exact.
     ///
     /// # Errors
     /// [`SdfError`] for lengths that make no sense or too many samples.
     pub fn build(mesh: &ClosestPoints, spacing: f64, margin: f64) -> Result<Self, SdfError> {
-        Self::from_fn(mesh.bounds(), spacing, margin, |point, bound| {
-            match mesh.signed_distance_within(point, bound) {
-                Some((distance, _)) => distance,
-                None => mesh.signed_distance(point).0,
-            }
-        })
+        Ok(Self::build_on(mesh, Lattice::around(mesh.bounds(), spacing, margin)?))
+    }
+
+    /// As [`Self::build`], with the samples of a given lattice.
+    pub fn build_on(mesh: &ClosestPoints, lattice: Lattice) -> Self {
+        let [_, ny, nz] = lattice.dims();
+        let mut values = vec![0.0; lattice.dims().iter().product()];
+        values.par_chunks_mut(ny * nz).enumerate().for_each(|(i, slab)| {
+            sample_slab(mesh, &lattice, i, slab);
+        });
+        Self::from_samples(lattice, &values, mesh.bounds(), f64::INFINITY)
+    }
+
+    /// As [`Self::build_band_on`], with samples up to at least `margin` \[m\] around the mesh.
+    ///
+    /// # Errors
+    /// [`SdfError`] for lengths that make no sense or too many samples.
+    pub fn build_band(
+        mesh: &ClosestPoints,
+        spacing: f64,
+        margin: f64,
+        band: f64,
+    ) -> Result<Self, SdfError> {
+        Self::build_band_on(mesh, Lattice::around(mesh.bounds(), spacing, margin)?, band)
+    }
+
+    /// Samples the signed distance to a mesh where it is at most `band` \[m\] in absolute value, at a fraction of the
+    /// time; samples farther away are set to plus or minus `band`, by the right sign.
+    ///
+    /// The spline runs through every sample, but feels the cut in its derivatives: within two spacings of the band's edge
+    /// they are off. Ask for a band two spacings wider than distances will be asked for.
+    ///
+    /// # Errors
+    /// [`SdfError::Length`] for a band narrower than the spacing.
+    pub fn build_band_on(
+        mesh: &ClosestPoints,
+        lattice: Lattice,
+        band: f64,
+    ) -> Result<Self, SdfError> {
+        if !(band >= lattice.spacing() && band.is_finite()) {
+            return Err(SdfError::Length {
+                name: "band",
+                value: band,
+                requirement: "finite and at least the spacing",
+            });
+        }
+        let [nx, ny, nz] = lattice.dims();
+        let mut values = vec![f64::NAN; nx * ny * nz];
+        values.par_chunks_mut(BLOCK * ny * nz).enumerate().for_each(|(slabs, values)| {
+            sample_band(mesh, &lattice, band, slabs * BLOCK, values);
+        });
+        fill_outside(mesh, &lattice, band, &mut values);
+        Ok(Self::from_samples(lattice, &values, mesh.bounds(), band))
     }
 
     /// Samples any signed distance of a shape within `bounds` \[m\].
@@ -65,44 +85,125 @@ impl SdfGrid {
         margin: f64,
         distance: impl Fn(&Point3<f64>, f64) -> f64 + Sync,
     ) -> Result<Self, SdfError> {
-        if !(spacing.is_finite() && spacing > 0.0) {
-            return Err(SdfError::Length {
-                name: "spacing",
-                value: spacing,
-                requirement: "positive",
-            });
-        }
-        if !(margin.is_finite() && margin >= 0.0) {
-            return Err(SdfError::Length {
-                name: "margin",
-                value: margin,
-                requirement: "not negative",
-            });
-        }
-        let size = bounds.1 - bounds.0;
-        if !size.iter().all(|s| s.is_finite() && *s >= 0.0) {
-            return Err(SdfError::Bounds);
-        }
-        let counts = size.map(|s| ((s + 2.0 * margin) / spacing).ceil().max(1.0) + 1.0);
-        let samples = counts.product();
-        if samples > MAX_SAMPLES as f64 {
-            return Err(SdfError::TooLarge { samples, limit: MAX_SAMPLES });
-        }
-        let dims = [counts.x as usize, counts.y as usize, counts.z as usize];
-        // Centred, so that a symmetric shape has symmetric samples.
-        let center = nalgebra::center(&bounds.0, &bounds.1);
-        let origin = center - (counts - Vector3::repeat(1.0)) * (0.5 * spacing);
-        let mut values = vec![0.0; dims[0] * dims[1] * dims[2]];
-        values.par_chunks_mut(dims[2]).enumerate().for_each(|(row, line)| {
-            let (i, j) = (row / dims[1], row % dims[1]);
+        let lattice = Lattice::around(bounds, spacing, margin)?;
+        let [_, ny, nz] = lattice.dims();
+        let mut values = vec![0.0; lattice.dims().iter().product()];
+        values.par_chunks_mut(nz).enumerate().for_each(|(row, line)| {
             let mut bound = f64::INFINITY;
             for (k, value) in line.iter_mut().enumerate() {
-                let offset = Vector3::new(i as f64, j as f64, k as f64) * spacing;
-                *value = distance(&(origin + offset), bound);
+                *value = distance(&lattice.position([row / ny, row % ny, k]), bound);
                 // A distance changes by at most the length of the step; the rest is rounding.
                 bound = (value.abs() + spacing) * (1.0 + 1e-9);
             }
         });
-        Ok(Self::from_samples(origin, spacing, dims, &values, bounds))
+        Ok(Self::from_samples(lattice, &values, bounds, f64::INFINITY))
     }
+}
+
+/// Samples `i` along x; each search starts from the answer of a neighbour.
+fn sample_slab(mesh: &ClosestPoints, lattice: &Lattice, i: usize, slab: &mut [f64]) {
+    let nz = lattice.dims()[2];
+    let mut row_hint = None;
+    for (j, line) in slab.chunks_mut(nz).enumerate() {
+        let mut hint = row_hint;
+        for (k, value) in line.iter_mut().enumerate() {
+            let (signed, face) = mesh.signed_distance_hinted(&lattice.position([i, j, k]), hint);
+            *value = signed;
+            hint = Some(face);
+            if k == 0 {
+                row_hint = hint;
+            }
+        }
+    }
+}
+
+/// Samples within the band, the first along x being number `first`; the rest is left alone.
+///
+/// One query at the middle of a block of samples says whether the block reaches into the band, which samples
+/// certainly do not, and where to begin.
+fn sample_band(
+    mesh: &ClosestPoints,
+    lattice: &Lattice,
+    band: f64,
+    first: usize,
+    values: &mut [f64],
+) {
+    let [_, ny, nz] = lattice.dims();
+    let layers = values.len() / (ny * nz);
+    let radius = 0.5 * (BLOCK - 1) as f64 * lattice.spacing() * 3.0_f64.sqrt();
+    let mut block_hint = None;
+    for j0 in (0..ny).step_by(BLOCK) {
+        for k0 in (0..nz).step_by(BLOCK) {
+            let near = lattice.position([first, j0, k0]);
+            let last = [layers - 1, (ny - j0).min(BLOCK) - 1, (nz - k0).min(BLOCK) - 1];
+            let middle = nalgebra::center(
+                &near,
+                &lattice.position([first + last[0], j0 + last[1], k0 + last[2]]),
+            );
+            let Some(block) = mesh.search(&middle, (band + radius) * (1.0 + 1e-9), block_hint)
+            else {
+                continue;
+            };
+            block_hint = Some(block.face);
+            let certain = (block.distance - band * (1.0 + 1e-9)).max(0.0);
+            let certain_squared = certain * certain;
+            let mut hint = block_hint;
+            for i in 0..=last[0] {
+                for j in j0..=j0 + last[1] {
+                    for k in k0..=k0 + last[2] {
+                        let p = lattice.position([first + i, j, k]);
+                        if (p - middle).norm_squared() < certain_squared {
+                            continue;
+                        }
+                        if let Some(closest) = mesh.search(&p, band, hint) {
+                            hint = Some(closest.face);
+                            values[(i * ny + j) * nz + k] = mesh.signed(&p, Some(closest)).0;
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Gives the samples outside of the band its width and their sign.
+///
+/// Such a sample is farther from the surface than its neighbours from it, so that on a closed surface no crossing
+/// lies between: the sign is theirs. Where the surface may be open it is asked for.
+fn fill_outside(mesh: &ClosestPoints, lattice: &Lattice, band: f64, values: &mut [f64]) {
+    let [nx, ny, nz] = lattice.dims();
+    let ask = |index: [usize; 3]| {
+        let signed = mesh.signed_distance(&lattice.position(index)).0;
+        band.copysign(signed)
+    };
+    if mesh.sign_method() == SignMethod::WindingNumber {
+        values.par_chunks_mut(nz).enumerate().for_each(|(row, line)| {
+            for (k, value) in line.iter_mut().enumerate().filter(|(_, v)| v.is_nan()) {
+                *value = ask([row / ny, row % ny, k]);
+            }
+        });
+        return;
+    }
+    for i in 0..nx {
+        let corner = i * ny * nz;
+        if values[corner].is_nan() {
+            values[corner] =
+                if i == 0 { ask([0; 3]) } else { band.copysign(values[corner - ny * nz]) };
+        }
+    }
+    values.par_chunks_mut(ny * nz).for_each(|slab| {
+        for j in 0..ny {
+            if slab[j * nz].is_nan() {
+                slab[j * nz] = band.copysign(slab[(j - 1) * nz]);
+            }
+            let line = &mut slab[j * nz..(j + 1) * nz];
+            let mut previous = line[0];
+            for value in line {
+                if value.is_nan() {
+                    *value = band.copysign(previous);
+                }
+                previous = *value;
+            }
+        }
+    });
 }

@@ -3,6 +3,7 @@
 use nalgebra::{Matrix3, Point3, Vector3};
 
 use super::spline::{Basis, prefilter};
+use super::{Lattice, SdfError};
 use crate::{DistanceField, FieldSample};
 
 /// A signed distance on a uniform grid, interpolated by a tricubic B-spline (twice continuously
@@ -17,36 +18,69 @@ use crate::{DistanceField, FieldSample};
 /// still twice continuously differentiable, right to first order at the border, and rough far from it.
 #[derive(Clone, Debug)]
 pub struct SdfGrid {
-    /// Position of the first sample \[m\].
-    origin: Point3<f64>,
-    /// Distance between samples \[m\].
-    spacing: f64,
-    dims: [usize; 3],
-    coefficients: Vec<f64>,
+    pub(super) lattice: Lattice,
+    pub(super) coefficients: Vec<f64>,
     /// Box around the shape itself \[m\].
-    bounds: (Point3<f64>, Point3<f64>),
+    pub(super) bounds: (Point3<f64>, Point3<f64>),
+    /// Samples are cut off at this distance \[m\]; infinite for none.
+    pub(super) band: f64,
+    /// What has been taken off the distance since \[m\].
+    pub(super) offset: f64,
 }
 
 impl SdfGrid {
-    /// `samples` holds `dims` values, the last index fastest; each dimension is at least 2.
+    /// `samples` holds a value for each sample of the lattice, the last index fastest.
     pub(super) fn from_samples(
-        origin: Point3<f64>,
-        spacing: f64,
-        dims: [usize; 3],
+        lattice: Lattice,
         samples: &[f64],
         bounds: (Point3<f64>, Point3<f64>),
+        band: f64,
     ) -> Self {
-        Self { origin, spacing, dims, coefficients: prefilter(samples, dims), bounds }
+        let coefficients = prefilter(samples, lattice.dims());
+        Self { lattice, coefficients, bounds, band, offset: 0.0 }
+    }
+
+    /// Where the samples lie.
+    pub fn lattice(&self) -> &Lattice {
+        &self.lattice
     }
 
     /// Distance between samples \[m\].
     pub fn spacing(&self) -> f64 {
-        self.spacing
+        self.lattice.spacing()
     }
 
     /// Number of samples along each axis.
     pub fn dims(&self) -> [usize; 3] {
-        self.dims
+        self.lattice.dims()
+    }
+
+    /// Smallest and largest value that samples were not cut off at \[m\]: infinite for a grid that is exact throughout.
+    pub fn band(&self) -> (f64, f64) {
+        (-self.band - self.offset, self.band - self.offset)
+    }
+
+    /// The shape grown by `offset` \[m\] all around (or shrunk by a negative one): the distance less the offset, with
+    /// the same derivatives up to rounding.
+    ///
+    /// Outside this is the true distance to the grown shape. Inside, and for a shape shrunk across its medial axis, it is
+    /// a lower bound of the depth, as any offset of a distance is. The grid does not grow: its margin shrinks by the offset.
+    ///
+    /// # Errors
+    /// [`SdfError::Length`] for an offset that is not finite.
+    pub fn dilated(mut self, offset: f64) -> Result<Self, SdfError> {
+        if !offset.is_finite() {
+            return Err(SdfError::Length { name: "offset", value: offset, requirement: "finite" });
+        }
+        // The weights of a point's coefficients sum to one.
+        self.coefficients.iter_mut().for_each(|c| *c -= offset);
+        self.offset += offset;
+        let (lo, hi) = self.bounds;
+        let half = (hi - lo) * 0.5;
+        // A shrunk shape may vanish; its box becomes a point.
+        let grow = half.map(|h| offset.max(-h));
+        self.bounds = (lo - grow, hi + grow);
+        Ok(self)
     }
 
     /// Smallest and largest corner of the box around the shape, without the margin \[m\].
@@ -56,8 +90,7 @@ impl SdfGrid {
 
     /// Smallest and largest corner of the grid \[m\].
     pub fn extent(&self) -> (Point3<f64>, Point3<f64>) {
-        let size = Vector3::from_fn(|i, _| (self.dims[i] - 1) as f64 * self.spacing);
-        (self.origin, self.origin + size)
+        (self.lattice.position([0; 3]), self.lattice.position(self.dims().map(|n| n - 1)))
     }
 
     /// Distance from `point` to the box around the shape: never above the distance outside \[m\].
@@ -70,10 +103,11 @@ impl SdfGrid {
     /// Value, gradient and Hessian of the spline at `point`, wherever it is.
     #[inline]
     pub fn evaluate(&self, point: &Point3<f64>) -> FieldSample {
-        let inverse = 1.0 / self.spacing;
-        let x = (point - self.origin) * inverse;
-        let [bx, by, bz] = [0, 1, 2].map(|i| Basis::at(x[i], self.dims[i]));
-        let (sy, sz) = (self.dims[1] + 2, self.dims[2] + 2);
+        let inverse = 1.0 / self.lattice.spacing();
+        let dims = self.lattice.dims();
+        let x = (point - self.lattice.origin()) * inverse;
+        let [bx, by, bz] = [0, 1, 2].map(|i| Basis::at(x[i], dims[i]));
+        let (sy, sz) = (dims[1] + 2, dims[2] + 2);
         // Sums over x, then y, each for four consecutive z: value, x and xx; then with y derivatives.
         let mut planes = [[0.0; 4]; 6];
         for j in 0..4 {

@@ -1,8 +1,13 @@
 //! Signed distance grids with two continuous derivatives.
 
 mod build;
+mod error_bound;
+mod file;
 mod grid;
+mod lattice;
 mod spline;
 
-pub use build::{MAX_SAMPLES, SdfError};
+pub use error_bound::SdfErrorBound;
+pub use file::SdfFileError;
 pub use grid::SdfGrid;
+pub use lattice::{Lattice, MAX_SAMPLES, SdfError};

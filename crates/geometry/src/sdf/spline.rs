@@ -4,6 +4,8 @@
 //! derivative zero), which makes the coefficient there the sample itself and lets the spline be
 //! continued by straight lines without losing a derivative.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 /// Basis values and derivatives of the four coefficients around a point, with respect to the grid
@@ -58,34 +60,78 @@ pub(super) fn prefilter(samples: &[f64], dims: [usize; 3]) -> Vec<f64> {
         for j in 0..ny {
             let line = &mut out[(j + 1) * sz..(j + 2) * sz];
             line[1..=nz].copy_from_slice(&samples[(i * ny + j) * nz..(i * ny + j + 1) * nz]);
-            solve(line, nz, 1);
         }
-        solve(out, ny, sz);
+        solve_lines(&mut out[sz..(ny + 1) * sz], sz);
+        solve(out, ny, sz, 0..sz);
     });
-    solve(&mut c, nx, slab);
+    // Column by column, so that a column stays in cache between its two sweeps.
+    for j in 0..sy {
+        solve(&mut c, nx, slab, j * sz..(j + 1) * sz);
+    }
     c
 }
 
-/// Turns `n` samples, each a row of `width` numbers with a spare row before and after, into coefficients.
+/// As [`solve`] for every line of `length` numbers, a spare one at both of its ends.
 ///
-/// Thomas elimination of `c[i-1] + 4 c[i] + c[i+1] = 6 f[i]` with `c = f` at both ends.
-fn solve(rows: &mut [f64], n: usize, width: usize) {
+/// Each line is a chain of dependent operations; eight at a time keep the processor busy.
+fn solve_lines(lines: &mut [f64], length: usize) {
+    let n = length - 2;
+    let factor = factors(n);
+    for group in lines.chunks_mut(8 * length) {
+        let mut lines: [&mut [f64]; 8] = [(); 8].map(|()| &mut [][..]);
+        let mut count = 0;
+        for (line, part) in lines.iter_mut().zip(group.chunks_mut(length)) {
+            *line = part;
+            count += 1;
+        }
+        let lines = &mut lines[..count];
+        for i in 1..n - 1 {
+            for c in lines.iter_mut() {
+                c[i + 1] = (6.0 * c[i + 1] - c[i]) * factor[i];
+            }
+        }
+        for i in (1..n - 1).rev() {
+            for c in lines.iter_mut() {
+                c[i + 1] -= factor[i] * c[i + 2];
+            }
+        }
+        for c in lines.iter_mut() {
+            c[0] = 2.0 * c[1] - c[2];
+            c[n + 1] = 2.0 * c[n] - c[n - 1];
+        }
+    }
+}
+
+/// Inverse pivots of the elimination.
+fn factors(n: usize) -> Vec<f64> {
     let mut factor = vec![0.0; n];
     for i in 1..n - 1 {
         factor[i] = 1.0 / (4.0 - factor[i - 1]);
+    }
+    factor
+}
+
+/// Turns `n` samples, each a row of `width` numbers with a spare row before and after, into coefficients, in the
+/// given columns.
+///
+/// Thomas elimination of `c[i-1] + 4 c[i] + c[i+1] = 6 f[i]` with `c = f` at both ends.
+fn solve(rows: &mut [f64], n: usize, width: usize, columns: Range<usize>) {
+    let factor = factors(n);
+    for i in 1..n - 1 {
         let (before, from) = rows.split_at_mut((i + 1) * width);
         let previous = &before[i * width..];
-        for (c, &p) in from[..width].iter_mut().zip(previous) {
+        for (c, &p) in from[columns.clone()].iter_mut().zip(&previous[columns.clone()]) {
             *c = (6.0 * *c - p) * factor[i];
         }
     }
     for i in (1..n - 1).rev() {
         let (before, after) = rows.split_at_mut((i + 2) * width);
-        for (c, &next) in before[(i + 1) * width..].iter_mut().zip(&after[..width]) {
+        let own = &mut before[(i + 1) * width..];
+        for (c, &next) in own[columns.clone()].iter_mut().zip(&after[columns.clone()]) {
             *c -= factor[i] * next;
         }
     }
-    for k in 0..width {
+    for k in columns {
         rows[k] = 2.0 * rows[width + k] - rows[2 * width + k];
         rows[(n + 1) * width + k] = 2.0 * rows[n * width + k] - rows[(n - 1) * width + k];
     }

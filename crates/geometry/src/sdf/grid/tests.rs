@@ -104,6 +104,90 @@ fn the_reach_decides_what_is_answered() {
     assert!(at(0.06, 0.1).is_some_and(|s| (s.distance - 0.03).abs() < 1e-6));
 }
 
+/// A ball with a hole where faces are missing, unless `closed`.
+fn ball(closed: bool) -> ClosestPoints {
+    let mut mesh = crate::volume::tests::icosphere(0.03, 3);
+    if !closed {
+        mesh.faces.truncate(mesh.faces.len() - 20);
+    }
+    ClosestPoints::new(&mesh).unwrap()
+}
+
+#[test]
+fn a_band_has_the_exact_samples_and_the_right_sign_elsewhere() {
+    for closed in [true, false] {
+        let mesh = ball(closed);
+        let (spacing, band) = (0.003, 0.007);
+        let grid = SdfGrid::build_band(&mesh, spacing, 0.011, band).unwrap();
+        let full = SdfGrid::build(&mesh, spacing, 0.011).unwrap();
+        assert_eq!((grid.band(), full.band().1), ((-band, band), f64::INFINITY));
+        let [nx, ny, nz] = grid.dims();
+        let mut cut = 0;
+        for n in 0..nx * ny * nz {
+            let p = grid.lattice().position([n / (ny * nz), n / nz % ny, n % nz]);
+            let exact = mesh.signed_distance(&p).0;
+            assert!((full.evaluate(&p).distance - exact).abs() < 1e-15);
+            let expected = exact.clamp(-band, band);
+            assert!((grid.evaluate(&p).distance - expected).abs() < 1e-15, "{p} {expected}");
+            cut += usize::from(exact.abs() > band);
+        }
+        assert!(cut > 1000);
+    }
+}
+
+#[test]
+fn grids_are_the_same_for_any_number_of_threads() {
+    let mesh = ball(true);
+    let build = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let band = SdfGrid::build_band(&mesh, 0.002, 0.01, 0.006).unwrap();
+            [SdfGrid::build(&mesh, 0.002, 0.01).unwrap(), band].map(|g| g.coefficients)
+        })
+    };
+    assert_eq!(build(1), build(3));
+}
+
+#[test]
+fn derivatives_match_differences_at_random_points_of_a_band() {
+    let grid = SdfGrid::build_band(&ball(true), 0.01, 0.03, 0.025).unwrap();
+    let mut random = crate::SplitMix64::new(37);
+    for _ in 0..300 {
+        // A difference must not leave the cell.
+        let index = grid.dims().map(|n| (random.unit() * (n - 1) as f64).floor());
+        let within = [(); 3].map(|()| 0.1 + 0.8 * random.unit());
+        let offset = (Vector3::from(index) + Vector3::from(within)) * grid.spacing();
+        let p = grid.extent().0 + offset;
+        let (s, step) = (grid.evaluate(&p), 1e-6);
+        for i in 0..3 {
+            let e = Vector3::ith(i, step);
+            let (plus, minus) = (grid.evaluate(&(p + e)), grid.evaluate(&(p - e)));
+            let slope = (plus.distance - minus.distance) / (2.0 * step);
+            assert!((slope - s.gradient[i]).abs() < 1e-6);
+            let bend = (plus.gradient - minus.gradient) / (2.0 * step);
+            assert!((bend - s.hessian.column(i)).norm() < 1e-6 * (1.0 + s.hessian.norm()));
+        }
+    }
+}
+
+#[test]
+fn dilation_moves_the_surface_and_nothing_else() {
+    let grid = sphere(0.03, 0.002, 0.012);
+    let grown = grid.clone().dilated(0.004).unwrap();
+    let p = Point3::new(0.02, 0.021, 0.019);
+    let (before, after) = (grid.evaluate(&p), grown.evaluate(&p));
+    assert!((after.distance - before.distance + 0.004).abs() < 1e-15);
+    assert!((after.gradient - before.gradient).norm() < 1e-12);
+    assert!((after.hessian - before.hessian).norm() < 1e-9);
+    assert!((grown.bounds().1 - Point3::new(0.034, 0.034, 0.034)).norm() < 1e-15);
+    assert!(grown.sample(&Point3::new(0.036, 0.0, 0.0), 0.0021).is_some());
+    // Shrunk to nothing there is no inside, and the box is a point.
+    let gone = grid.clone().dilated(-0.05).unwrap();
+    assert!(gone.evaluate(&Point3::origin()).distance > 0.01);
+    assert_eq!(gone.bounds().0, gone.bounds().1);
+    assert!(matches!(grid.dilated(f64::NAN), Err(SdfError::Length { name: "offset", .. })));
+}
+
 #[test]
 fn senseless_grids_are_refused() {
     let mesh = ClosestPoints::new(&cuboid(Vector3::repeat(2.0))).unwrap();
@@ -121,5 +205,13 @@ fn senseless_grids_are_refused() {
     ));
     assert!(matches!(SdfGrid::build(&mesh, 1e-4, 0.1), Err(SdfError::TooLarge { .. })));
     let wrong = (Point3::origin(), Point3::new(-1.0, 0.0, 0.0));
+    assert!(matches!(
+        SdfGrid::build_band(&mesh, 0.1, 0.1, 0.05),
+        Err(SdfError::Length { name: "band", .. })
+    ));
+    let lattice = |x, dims| Lattice::new(Point3::new(x, 0.0, 0.0), 0.1, dims).unwrap_err();
+    assert_eq!(lattice(f64::NAN, [2; 3]), SdfError::Origin);
+    assert_eq!(lattice(0.0, [2, 1, 2]), SdfError::Dims { axis: 1, count: 1 });
+    assert!(matches!(lattice(0.0, [1 << 20; 3]), SdfError::TooLarge { .. }));
     assert_eq!(SdfGrid::from_fn(wrong, 0.1, 0.1, |_, _| 0.0).unwrap_err(), SdfError::Bounds);
 }

@@ -1,0 +1,225 @@
+//! Distance grids in files.
+//!
+//! Little-endian: `PREHSDF` and a zero byte; version (u32); samples along each axis (3 × u32); first sample \[m\] (3 ×
+//! f64); spacing \[m\] (f64); smallest and largest corner of the shape's box \[m\] (6 × f64); band and offset \[m\] (2 × f64,
+//! the band infinite for none); spline coefficients (f64, two more than samples along each axis, the last axis
+//! fastest); and the FNV-1a hash of all that by 64-bit words after the first 8 bytes (u64).
+
+use std::path::{Path, PathBuf};
+
+use nalgebra::Point3;
+
+use super::{Lattice, SdfGrid};
+use crate::write_whole;
+
+const MAGIC: &[u8; 8] = b"PREHSDF\0";
+const VERSION: u32 = 1;
+
+/// Why a distance grid could not be read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum SdfFileError {
+    /// The file could not be read.
+    #[error("{path}: cannot be read: {source}")]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The file could not be written; what was there before is unchanged.
+    #[error("{path}: cannot be written: {source}")]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The file is not a distance grid, or is damaged.
+    #[error("{path}: {field}: {reason}")]
+    Malformed {
+        /// The file.
+        path: PathBuf,
+        /// The field of the format, such as "version" or "coefficients".
+        field: &'static str,
+        /// What is wrong with it.
+        reason: String,
+    },
+}
+
+impl SdfGrid {
+    /// Writes the grid to a file, whole or not at all.
+    ///
+    /// # Errors
+    /// [`SdfFileError::Write`].
+    pub fn save(&self, path: &Path) -> Result<(), SdfFileError> {
+        write_whole(path, &self.to_bytes())
+            .map_err(|source| SdfFileError::Write { path: path.into(), source })
+    }
+
+    /// Reads a grid that [`Self::save`] wrote: the same to the last bit.
+    ///
+    /// # Errors
+    /// [`SdfFileError`], naming the file and the field that is wrong with it.
+    pub fn load(path: &Path) -> Result<Self, SdfFileError> {
+        let bytes = std::fs::read(path)
+            .map_err(|source| SdfFileError::Read { path: path.into(), source })?;
+        Self::from_bytes(&bytes).map_err(|(field, reason)| SdfFileError::Malformed {
+            path: path.into(),
+            field,
+            reason,
+        })
+    }
+
+    fn to_bytes(&self) -> Vec<u8> {
+        let mut bytes = Vec::with_capacity(128 + 8 * self.coefficients.len());
+        bytes.extend(MAGIC);
+        bytes.extend(VERSION.to_le_bytes());
+        // At most MAX_SAMPLES, so that they fit.
+        self.dims().iter().for_each(|&n| bytes.extend((n as u32).to_le_bytes()));
+        let origin = self.lattice.origin();
+        let header = [self.spacing()];
+        let bounds = self.bounds.0.iter().chain(self.bounds.1.iter());
+        let numbers = origin.iter().chain(&header).chain(bounds).chain([&self.band, &self.offset]);
+        numbers.chain(&self.coefficients).for_each(|x| bytes.extend(x.to_le_bytes()));
+        bytes.extend(hash(&bytes[MAGIC.len()..]).to_le_bytes());
+        bytes
+    }
+
+    fn from_bytes(bytes: &[u8]) -> Result<Self, (&'static str, String)> {
+        let mut left = bytes;
+        if take(&mut left, "magic")? != *MAGIC {
+            return Err(("magic", "not a distance grid".into()));
+        }
+        let version = u32::from_le_bytes(take(&mut left, "version")?);
+        if version != VERSION {
+            return Err(("version", format!("{version} is not {VERSION}, the one that is read")));
+        }
+        let mut dims = [0; 3];
+        for n in &mut dims {
+            *n = u32::from_le_bytes(take(&mut left, "dims")?) as usize;
+        }
+        let origin = [(); 3].map(|()| number(&mut left, "origin"));
+        let [x, y, z] = origin;
+        let origin = Point3::new(x?, y?, z?);
+        let spacing = number(&mut left, "spacing")?;
+        let lattice =
+            Lattice::new(origin, spacing, dims).map_err(|e| ("lattice", e.to_string()))?;
+        let [a, b, c, d, e, f] = [(); 6].map(|()| number(&mut left, "bounds"));
+        let bounds = (Point3::new(a?, b?, c?), Point3::new(d?, e?, f?));
+        if !(0..3).all(|i| bounds.0[i] <= bounds.1[i] && (bounds.1[i] - bounds.0[i]).is_finite()) {
+            return Err(("bounds", "not finite or of a negative size".into()));
+        }
+        let band = number(&mut left, "band")?;
+        if band.is_nan() || band < spacing {
+            return Err(("band", format!("{band} m is narrower than the spacing")));
+        }
+        let offset = number(&mut left, "offset")?;
+        if !offset.is_finite() {
+            return Err(("offset", format!("{offset} m is not finite")));
+        }
+        // The lattice keeps this from overflowing.
+        let count: usize = dims.iter().map(|n| n + 2).product();
+        if left.len() != 8 * count + 8 {
+            let reason = format!("{} bytes are left for {count} of them and a hash", left.len());
+            return Err(("coefficients", reason));
+        }
+        let (body, end) = left.split_at(8 * count);
+        if hash(&bytes[MAGIC.len()..bytes.len() - 8]).to_le_bytes() != *end {
+            return Err(("hash", "the content is damaged".into()));
+        }
+        let mut body = body;
+        let mut coefficients = Vec::with_capacity(count);
+        for _ in 0..count {
+            coefficients.push(number(&mut body, "coefficients")?);
+        }
+        if !coefficients.iter().all(|c| c.is_finite()) {
+            return Err(("coefficients", "not all are finite".into()));
+        }
+        Ok(Self { lattice, coefficients, bounds, band, offset })
+    }
+}
+
+/// The next `N` bytes.
+fn take<const N: usize>(
+    left: &mut &[u8],
+    field: &'static str,
+) -> Result<[u8; N], (&'static str, String)> {
+    let (first, rest) =
+        left.split_first_chunk().ok_or_else(|| (field, "the file ends here".to_string()))?;
+    *left = rest;
+    Ok(*first)
+}
+
+fn number(left: &mut &[u8], field: &'static str) -> Result<f64, (&'static str, String)> {
+    take(left, field).map(f64::from_le_bytes)
+}
+
+/// Fowler, Noll and Vo's hash 1a, by words of eight bytes instead of one.
+fn hash(bytes: &[u8]) -> u64 {
+    bytes.chunks(8).fold(0xcbf2_9ce4_8422_2325, |hash, chunk| {
+        let mut word = [0; 8];
+        word[..chunk.len()].copy_from_slice(chunk);
+        (hash ^ u64::from_le_bytes(word)).wrapping_mul(0x0000_0100_0000_01b3)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::ClosestPoints;
+    use crate::shapes::cuboid;
+
+    fn grid() -> SdfGrid {
+        let mesh = ClosestPoints::new(&cuboid(Vector3::new(0.4, 0.5, 0.6))).unwrap();
+        SdfGrid::build_band(&mesh, 0.1, 0.2, 0.15).unwrap().dilated(0.01).unwrap()
+    }
+
+    #[test]
+    fn comes_back_to_the_last_bit() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.sdf");
+        let grid = grid();
+        grid.save(&path).unwrap();
+        let again = SdfGrid::load(&path).unwrap();
+        assert_eq!(again.to_bytes(), grid.to_bytes());
+        let p = Point3::new(0.21, 0.03, 0.14);
+        assert_eq!(again.evaluate(&p), grid.evaluate(&p));
+        assert_eq!((again.band(), again.bounds()), (grid.band(), grid.bounds()));
+        assert!(matches!(SdfGrid::load(folder.path()), Err(SdfFileError::Read { .. })));
+        let nowhere = folder.path().join("no/a.sdf");
+        assert!(matches!(grid.save(&nowhere), Err(SdfFileError::Write { .. })));
+    }
+
+    #[test]
+    fn damage_is_named() {
+        let whole = grid().to_bytes();
+        let field = |bytes: &[u8]| SdfGrid::from_bytes(bytes).unwrap_err().0;
+        let changed = |at: usize, with: &[u8]| {
+            let mut bytes = whole.clone();
+            bytes[at..at + with.len()].copy_from_slice(with);
+            field(&bytes)
+        };
+        assert_eq!(changed(0, b"x"), "magic");
+        assert_eq!(changed(8, &[2]), "version");
+        assert_eq!(changed(12, &[0]), "lattice");
+        assert_eq!(changed(12, &[255; 12]), "lattice");
+        assert_eq!(changed(16, &[99]), "coefficients");
+        assert_eq!(changed(24, &f64::NAN.to_le_bytes()), "lattice");
+        assert_eq!(changed(48, &(-1.0_f64).to_le_bytes()), "lattice");
+        assert_eq!(changed(56, &9.0_f64.to_le_bytes()), "bounds");
+        assert_eq!(changed(104, &f64::NAN.to_le_bytes()), "band");
+        assert_eq!(changed(112, &f64::INFINITY.to_le_bytes()), "offset");
+        assert_eq!(changed(200, &[1, 2, 3]), "hash");
+        // No length is taken on trust, nor does any panic.
+        for n in 0..whole.len().min(400) {
+            field(&whole[..n]);
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.sdf");
+        std::fs::write(&path, &whole[..60]).unwrap();
+        let message = SdfGrid::load(&path).unwrap_err().to_string();
+        assert!(message.ends_with("a.sdf: bounds: the file ends here"), "{message}");
+    }
+}
