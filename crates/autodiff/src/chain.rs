@@ -29,7 +29,7 @@ pub(crate) trait Chain: Copy {
     fn binary(self, other: Self, value: Self::Inner, slopes: [Self::Inner; 2]) -> Self;
 
     /// [`binary`](Self::binary) for slopes that are infinite only where an operand is.
-    #[inline]
+    #[inline(always)]
     fn product(self, other: Self, value: Self::Inner, slopes: [Self::Inner; 2]) -> Self {
         self.binary(other, value, slopes)
     }
@@ -61,7 +61,9 @@ pub(crate) trait Chain: Copy {
 
 /// `slope * derivative`, but 0 if either is: 0 · ∞ must not make a NaN of a direction that has nothing to do
 /// with the operation, nor of a branch that was not taken.
-#[inline]
+// Never inlined: where it is needed is rare, and operators must stay small enough to be inlined themselves.
+#[cold]
+#[inline(never)]
 pub(crate) fn through(slope: f64, derivative: f64) -> f64 {
     if slope == 0.0 || derivative == 0.0 { 0.0 } else { slope * derivative }
 }

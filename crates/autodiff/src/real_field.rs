@@ -10,7 +10,7 @@ macro_rules! impl_real_field {
     ([$($generics:tt)*] $t:ty) => {
         impl<$($generics)*> std::ops::Add for $t {
             type Output = Self;
-            #[inline]
+            #[inline(always)]
             #[track_caller]
             fn add(self, o: Self) -> Self {
                 let one = Self::inner(1.0);
@@ -19,7 +19,7 @@ macro_rules! impl_real_field {
         }
         impl<$($generics)*> std::ops::Sub for $t {
             type Output = Self;
-            #[inline]
+            #[inline(always)]
             #[track_caller]
             fn sub(self, o: Self) -> Self {
                 let one = Self::inner(1.0);
@@ -28,7 +28,7 @@ macro_rules! impl_real_field {
         }
         impl<$($generics)*> std::ops::Mul for $t {
             type Output = Self;
-            #[inline]
+            #[inline(always)]
             #[track_caller]
             fn mul(self, o: Self) -> Self {
                 let (a, b) = (self.primal(), o.primal());
@@ -37,7 +37,7 @@ macro_rules! impl_real_field {
         }
         impl<$($generics)*> std::ops::Div for $t {
             type Output = Self;
-            #[inline]
+            #[inline(always)]
             #[track_caller]
             fn div(self, o: Self) -> Self {
                 let inverse = o.primal().recip();

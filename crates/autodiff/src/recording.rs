@@ -73,6 +73,21 @@ impl Recording {
         values.iter().enumerate().map(|(i, &value)| group.var(i, value)).collect()
     }
 
+    /// Variables in memory that was used before; [`Self::finish`] takes it back.
+    fn reused_variables(&self, values: &[f64]) -> Vec<Var> {
+        let mut variables = with_tape(Tape::scratch_variables);
+        let group = self.variable_group(values.len());
+        variables.extend(values.iter().enumerate().map(|(i, &value)| group.var(i, value)));
+        variables
+    }
+
+    /// Writes the gradient by `variables`, which are the recording's first nodes.
+    fn finish(&self, variables: Vec<Var>, output: Var, gradient: &mut [f64]) {
+        with_tape(|tape| tape.keep_variables(variables));
+        let adjoints = self.gradient(output);
+        gradient.copy_from_slice(&adjoints.adjoints[..gradient.len()]);
+    }
+
     fn variable_group(&self, count: usize) -> Outputs {
         with_tape(|tape| tape.start(self.recording));
         push_variables(count)
@@ -214,14 +229,9 @@ pub fn gradient(f: impl FnOnce(&[Var]) -> Var, x: &[f64]) -> (f64, Vec<f64>) {
 pub fn gradient_into(f: impl FnOnce(&[Var]) -> Var, x: &[f64], gradient: &mut [f64]) -> f64 {
     assert_eq!(x.len(), gradient.len(), "length of the gradient");
     let recording = Recording::start();
-    let mut inputs = with_tape(Tape::scratch_variables);
-    let group = recording.variable_group(x.len());
-    inputs.extend(x.iter().enumerate().map(|(i, &value)| group.var(i, value)));
+    let inputs = recording.reused_variables(x);
     let output = f(&inputs);
-    with_tape(|tape| tape.keep_variables(inputs));
-    let adjoints = recording.gradient(output);
-    // The variables are the recording's first nodes.
-    gradient.copy_from_slice(&adjoints.adjoints[..x.len()]);
+    recording.finish(inputs, output, gradient);
     output.value
 }
 

@@ -145,18 +145,20 @@ fn complete<R>(tape: &RefCell<Tape>, f: impl FnOnce(&mut Tape) -> R) -> R {
 /// Records the join of two active numbers with partial derivatives `slopes`.
 #[inline(always)]
 pub(crate) fn push(value: f64, [a, b]: [Var; 2], slopes: [f64; 2]) -> Var {
-    END.with(|end| {
+    let mut flows = [slopes[0] * a.coefficient, slopes[1] * b.coefficient];
+    if flows[0].is_nan() || flows[1].is_nan() {
+        flows = [through(slopes[0], a.coefficient), through(slopes[1], b.coefficient)];
+    }
+    let entry = Entry { slopes: flows, parents: [a.node, b.node] };
+    // As little as possible in here: what `with` is given must stay small enough to be inlined.
+    let (node, recording) = END.with(|end| {
         let recording = end.recording.get();
         if (a.recording ^ recording) | (b.recording ^ recording) != 0 {
             refuse_foreign();
         }
-        let mut flows = [slopes[0] * a.coefficient, slopes[1] * b.coefficient];
-        if flows[0].is_nan() || flows[1].is_nan() {
-            flows = [through(slopes[0], a.coefficient), through(slopes[1], b.coefficient)];
-        }
-        let node = end.push(Entry { slopes: flows, parents: [a.node, b.node] });
-        Var { value, coefficient: 1.0, node, recording }
-    })
+        (end.push(entry), recording)
+    });
+    Var { value, coefficient: 1.0, node, recording }
 }
 
 /// Records a group without inputs: independent variables.

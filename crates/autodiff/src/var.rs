@@ -34,12 +34,15 @@ impl Var {
     }
 
     /// The result of an operation on two numbers with the same node.
-    #[inline]
+    #[inline(always)]
     fn fuse(self, other: Self, value: f64, [da, db]: [f64; 2]) -> Self {
         if self.recording != other.recording {
             refuse_foreign();
         }
-        let coefficient = through(da, self.coefficient) + through(db, other.coefficient);
+        let mut coefficient = da * self.coefficient + db * other.coefficient;
+        if coefficient.is_nan() {
+            coefficient = through(da, self.coefficient) + through(db, other.coefficient);
+        }
         Self { value, coefficient, ..self }
     }
 
@@ -75,10 +78,10 @@ impl Chain for Var {
         self.recording == 0
     }
 
-    #[inline]
+    #[inline(always)]
     fn unary(self, value: f64, slope: f64) -> Self {
         // A constant stays one: its coefficient is never looked at.
-        // `through`, told apart by the slope because that is often known when compiling.
+        // Told apart by the slope because that is often known when compiling.
         let coefficient = if slope.is_finite() {
             slope * self.coefficient
         } else {
@@ -87,7 +90,7 @@ impl Chain for Var {
         Self { value, coefficient, ..self }
     }
 
-    #[inline]
+    #[inline(always)]
     fn binary(self, other: Self, value: f64, [da, db]: [f64; 2]) -> Self {
         match (self.is_constant(), other.is_constant()) {
             (_, true) => self.unary(value, da),

@@ -1,6 +1,6 @@
 //! What this crate brings to the comparison: one line for each workload and mode.
 
-use prehend_autodiff::{Fwd, LocalFunction, Recording, Scalar, Var};
+use prehend_autodiff::{Fwd, LocalFunction, Recording, Scalar, Var, gradient_into};
 
 use super::rigid_blocks;
 use super::table::{Comparison, print};
@@ -92,13 +92,16 @@ fn forward<const N: usize>(
 fn reverse<const N: usize>(
     f: impl Fn(&[Var; N]) -> Var,
 ) -> impl FnMut(&[f64; N], &mut [f64; N]) -> (f64, usize) {
+    let mut bytes = None;
     move |x, gradient| {
-        let recording = Recording::start();
-        let inputs = recording.variables(*x);
-        let output = f(&inputs);
-        let adjoints = recording.gradient(output);
-        *gradient = inputs.map(|input| adjoints.wrt(input));
-        (output.value(), recording.statistics().bytes)
+        // The size of the tape is asked for once, not every time.
+        let bytes = *bytes.get_or_insert_with(|| {
+            let recording = Recording::start();
+            f(&recording.variables(*x));
+            recording.statistics().bytes
+        });
+        let on_slice = |inputs: &[Var]| f(inputs.try_into().expect("one variable an input"));
+        (gradient_into(on_slice, x, gradient), bytes)
     }
 }
 
