@@ -1,7 +1,8 @@
 //! Two clouds of 100 000 points: preparing one, nearest points in it, and aligning the other with it.
 
 use nalgebra::{Isometry3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
-use prehend_geometry::{SplitMix64, TriMesh};
+use prehend_geometry::icp::{CloudTarget, IcpSettings, align};
+use prehend_geometry::{KdTree, PointCloud, SplitMix64, TriMesh};
 
 use super::points::{Sample, on_surface};
 use super::table::Comparison;
@@ -11,7 +12,6 @@ const COUNT: usize = 100_000;
 const NOISE: f64 = 0.0005;
 
 /// Points of the body, and others that a pose maps onto it.
-#[allow(dead_code)] // Until ours is in the comparison, the peers alone use some of it.
 pub(crate) struct Registration {
     pub(crate) target: Vec<Point3<f64>>,
     /// Unit normals of the target.
@@ -21,7 +21,6 @@ pub(crate) struct Registration {
     t_target_source: Isometry3<f64>,
 }
 
-#[allow(dead_code)] // As above.
 impl Registration {
     /// Pairs farther apart do not count \[m\].
     pub(crate) const REACH: f64 = 0.02;
@@ -46,6 +45,13 @@ impl Registration {
         Self { target, normals, source, t_target_source: pose }
     }
 
+    /// The target, ready to be searched and aligned with.
+    pub(crate) fn prepared(&self) -> (KdTree, CloudTarget) {
+        let cloud = PointCloud { points: self.target.clone(), normals: Some(self.normals.clone()) };
+        let tree = KdTree::new(&self.target).expect("finite points");
+        (tree, CloudTarget::new(&cloud).expect("a normal for each point"))
+    }
+
     /// Where a pose brings the corners of a box about the body.
     pub(crate) fn corners(&self, pose: &Isometry3<f64>) -> Vec<f64> {
         let corner = |i: usize| [4, 2, 1].map(|bit| if i & bit == 0 { -0.06 } else { 0.06 });
@@ -55,8 +61,11 @@ impl Registration {
 
 /// Preparing the target; the answers are a few distances that the result must be able to give.
 pub(crate) fn build(clouds: &Registration) -> Comparison<'_> {
-    // Ours goes here, first, as in `closest::build`.
-    Comparison::new("prepare 100k points", "m", 1e-9, nearest_by_force(clouds, few(clouds)))
+    let truth = nearest_by_force(clouds, few(clouds));
+    let mut job = Comparison::new("prepare 100k points", "m", 1e-9, truth);
+    let distances = |tree: KdTree| distances(&tree, few(clouds));
+    job.add("ours", || KdTree::new(&clouds.target).expect("finite points"), distances);
+    job
 }
 
 /// The points that a freshly prepared cloud is asked about.
@@ -65,17 +74,38 @@ pub(crate) fn few(clouds: &Registration) -> &[Point3<f64>] {
 }
 
 /// The nearest point of the target for every point of the source, where it is.
-pub(crate) fn nearest(clouds: &Registration) -> Comparison<'_> {
+pub(crate) fn nearest<'a>(clouds: &'a Registration, tree: &'a KdTree) -> Comparison<'a> {
     let truth = nearest_by_force(clouds, &clouds.source);
-    // Ours goes here, first.
-    Comparison::new("nearest of 100k points, 100k", "m", 1e-9, truth)
+    let mut job = Comparison::new("nearest of 100k points, 100k", "m", 1e-9, truth);
+    job.add("ours", || distances(tree, &clouds.source), |found| found);
+    job
+}
+
+fn distances(tree: &KdTree, points: &[Point3<f64>]) -> Vec<f64> {
+    let distance =
+        |p| tree.nearest(p, f64::INFINITY).map_or(f64::NAN, |found| found.distance_squared.sqrt());
+    points.iter().map(distance).collect()
 }
 
 /// Point-to-plane ICP of twenty steps, the target prepared before; the answer is where it brings a box.
-pub(crate) fn registration(clouds: &Registration) -> Comparison<'_> {
+pub(crate) fn registration<'a>(
+    clouds: &'a Registration,
+    target: &'a CloudTarget,
+) -> Comparison<'a> {
     let truth = clouds.corners(&clouds.t_target_source).into_iter().enumerate().collect();
-    // Ours goes here, first: `job.add("ours", || ..., |pose| clouds.corners(&pose))`.
-    Comparison::new("ICP, 100k points, 20 steps", "m", 5e-5, truth)
+    let mut job = Comparison::new("ICP, 100k points, 20 steps", "m", 5e-5, truth);
+    // Tolerances of zero: all the steps are taken.
+    let settings = IcpSettings {
+        max_distance: Registration::REACH,
+        max_iterations: Registration::STEPS,
+        translation_tolerance: 0.0,
+        rotation_tolerance: 0.0,
+        ..IcpSettings::default()
+    };
+    let start = Isometry3::identity();
+    let ours = move || align(&clouds.source, target, &start, &settings).expect("close clouds");
+    job.add("ours", ours, |found| clouds.corners(&found.t_target_source));
+    job
 }
 
 /// True distances of some of `points` from the target \[m\].

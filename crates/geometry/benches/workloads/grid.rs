@@ -14,7 +14,6 @@ const BAND: f64 = 4.0;
 pub(crate) struct Lattice {
     pub(crate) points: Vec<Point3<f64>>,
     low: Point3<f64>,
-    high: Point3<f64>,
     spacing: f64,
 }
 
@@ -23,11 +22,11 @@ impl Lattice {
         let (low, high) = body.bounds().expect("a body with vertices");
         let middle = nalgebra::center(&low, &high);
         let half = Vector3::repeat((high - low).max() / 2.0 * 1.25);
-        let (low, high) = (middle - half, middle + half);
+        let low = middle - half;
         let spacing = 2.0 * half.x / (COUNT - 1) as f64;
         let place = |i: usize| [i / (COUNT * COUNT), i / COUNT % COUNT, i % COUNT];
         let point = |i| low + Vector3::from(place(i).map(|k| k as f64 * spacing));
-        Self { points: (0..COUNT.pow(3)).map(point).collect(), low, high, spacing }
+        Self { points: (0..COUNT.pow(3)).map(point).collect(), low, spacing }
     }
 
     /// The distance up to which the band is asked for \[m\].
@@ -35,11 +34,10 @@ impl Lattice {
         BAND * self.spacing
     }
 
-    /// A grid of this crate at exactly these points.
-    fn grid(&self, distance: impl Fn(&Point3<f64>, f64) -> f64 + Sync) -> SdfGrid {
-        // A spacing a little larger keeps rounding from adding another layer of points.
-        let spacing = self.spacing * (1.0 + 1e-12);
-        SdfGrid::from_fn((self.low, self.high), spacing, 0.0, distance).expect("a sound grid")
+    /// The same points as this crate describes them.
+    fn ours(&self) -> prehend_geometry::sdf::Lattice {
+        let lattice = prehend_geometry::sdf::Lattice::new(self.low, self.spacing, [COUNT; 3]);
+        lattice.expect("a sound lattice")
     }
 
     fn values(&self, grid: &SdfGrid) -> Vec<f64> {
@@ -56,12 +54,7 @@ pub(crate) fn whole<'a>(
 ) -> Comparison<'a> {
     let truth = oracle::truth(&lattice.points, 2000, |p| oracle::signed_distance(body, p));
     let mut job = Comparison::new("SDF 128³", "m", 1e-7, truth);
-    let ours = || {
-        lattice.grid(|p, bound| match tree.signed_distance_within(p, bound) {
-            Some((distance, _)) => distance,
-            None => tree.signed_distance(p).0,
-        })
-    };
+    let ours = || SdfGrid::build_on(tree, lattice.ours());
     job.add("ours", ours, |grid| lattice.values(&grid));
     job
 }
@@ -79,10 +72,8 @@ pub(crate) fn band<'a>(
     };
     let truth = oracle::truth(&lattice.points, 2000, near);
     let mut job = Comparison::new("SDF 128³, band of 4", "m", 1e-7, truth);
-    let ours = move || {
-        let near = |p| tree.signed_distance_within(p, reach).map_or(reach, |(d, _)| d);
-        lattice.points.iter().map(near).collect::<Vec<f64>>()
-    };
-    job.add("ours", ours, |distances| distances);
+    let ours = move || SdfGrid::build_band_on(tree, lattice.ours(), reach).expect("a band");
+    let within = move |distance: f64| if distance.abs() < reach { distance } else { reach };
+    job.add("ours", ours, move |grid| lattice.values(&grid).into_iter().map(within).collect());
     job
 }

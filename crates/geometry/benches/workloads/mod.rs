@@ -15,7 +15,8 @@ pub(crate) mod sign;
 pub(crate) mod table;
 
 use nalgebra::Point3;
-use prehend_geometry::{ClosestPoints, TriMesh};
+use prehend_geometry::icp::CloudTarget;
+use prehend_geometry::{ClosestPoints, KdTree, TriMesh};
 
 use self::cloud::Registration;
 use self::grid::Lattice;
@@ -44,6 +45,8 @@ pub(crate) struct Scenes {
     pub(crate) posed: Vec<TriMesh>,
     pub(crate) cubes: Vec<overlap::Cubes>,
     pub(crate) registration: Registration,
+    pub(crate) neighbours: KdTree,
+    pub(crate) target: CloudTarget,
 }
 
 impl Scenes {
@@ -52,6 +55,8 @@ impl Scenes {
     pub(crate) fn new() -> Self {
         let body = bodies::body();
         let links = bodies::hand();
+        let registration = Registration::new(&body);
+        let (neighbours, target) = registration.prepared();
         let mut hand = TriMesh::default();
         links.iter().for_each(|link| hand.append(link));
         Self {
@@ -63,7 +68,9 @@ impl Scenes {
             pair: bodies::pair(),
             posed: overlap::poses().iter().map(|pose| body.transformed(pose)).collect(),
             cubes: overlap::cubes(),
-            registration: Registration::new(&body),
+            registration,
+            neighbours,
+            target,
             body,
             links,
             hand,
@@ -106,8 +113,8 @@ impl<'a> Comparisons<'a> {
             poses: overlap::in_poses(links, &scenes.posed),
             cubes: overlap::of_cubes(&scenes.cubes),
             cloud: cloud::build(&scenes.registration),
-            nearest: cloud::nearest(&scenes.registration),
-            registration: cloud::registration(&scenes.registration),
+            nearest: cloud::nearest(&scenes.registration, &scenes.neighbours),
+            registration: cloud::registration(&scenes.registration, &scenes.target),
         }
     }
 
