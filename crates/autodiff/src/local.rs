@@ -96,11 +96,21 @@ pub(crate) fn record_sum<const K: usize>(
     let mut sum = 0.0;
     let mut gradient = with_tape(|tape| tape.scratch(x.len()));
     gradient.fill(0.0);
+    // Neighbouring terms often share a number. What was touched last is held in a register, because reading
+    // back what was just written would be the slowest part.
+    let mut held = (0, 0.0);
     for (places, ([value], [slopes])) in terms {
         sum += value;
         for (place, slope) in places.into_iter().zip(slopes) {
-            gradient[place] += slope;
+            if place != held.0 {
+                gradient[held.0] = held.1;
+                held = (place, gradient[place]);
+            }
+            held.1 += slope;
         }
+    }
+    if let Some(last) = gradient.get_mut(held.0) {
+        *last = held.1;
     }
     let node = push_block(x, 1, &gradient).var(0, sum);
     with_tape(|tape| tape.keep(gradient));

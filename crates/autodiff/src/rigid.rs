@@ -69,7 +69,7 @@ impl LocalFunction<7, 3> for Rotate {
         (quaternion([i, j, k, w]) * Vector3::new(x, y, z)).into()
     }
 
-    // Of v + w t + u × t with t = 2 u × v, which is what nalgebra evaluates.
+    // Of w t + u × t + v with t = 2 u × v, which is what nalgebra evaluates.
     #[inline]
     fn linearise(&self, [i, j, k, w, x, y, z]: [f64; 7]) -> ([f64; 3], [[f64; 7]; 3]) {
         let (u, v) = (Vector3::new(i, j, k), Vector3::new(x, y, z));
@@ -80,7 +80,7 @@ impl LocalFunction<7, 3> for Rotate {
             [by_t * by_u * -2.0 - cross_matrix(&t), by_t * by_v * 2.0 + Matrix3::identity()];
         let row =
             |r| [du[(r, 0)], du[(r, 1)], du[(r, 2)], t[r], dv[(r, 0)], dv[(r, 1)], dv[(r, 2)]];
-        (self.evaluate([i, j, k, w, x, y, z]), std::array::from_fn(row))
+        ((t * w + u.cross(&t) + v).into(), std::array::from_fn(row))
     }
 }
 
@@ -141,7 +141,7 @@ impl LocalFunction<7, 4> for Turn {
             (0..3).for_each(|r| jacobian[r][4 + c] = column[r]);
             jacobian[3][4 + c] = da * w - du.dot(&v);
         }
-        (self.evaluate([i, j, k, w, x, y, z]), jacobian)
+        ((step.into_inner() * Quaternion::new(w, i, j, k)).coords.into(), jacobian)
     }
 }
 
@@ -165,13 +165,15 @@ impl LocalFunction<10, 3> for Euler {
     #[inline]
     fn linearise(&self, x: [f64; 10]) -> ([f64; 3], [[f64; 10]; 3]) {
         let q = quaternion([x[0], x[1], x[2], x[3]]);
+        let (velocity, torque) = (Vector3::new(x[4], x[5], x[6]), Vector3::new(x[7], x[8], x[9]));
+        // The value as `evaluate` computes it, to the last bit.
+        let inverse = q.inverse();
+        let body_velocity = inverse * velocity;
+        let momentum = body_velocity.component_mul(&self.inertia);
+        let net = inverse * torque - body_velocity.cross(&momentum);
+        let acceleration = q * net.zip_map(&self.inertia, |n, j| n * j.recip());
         let rotation = q.to_rotation_matrix().into_inner();
         let to_body = rotation.transpose();
-        let (velocity, torque) = (Vector3::new(x[4], x[5], x[6]), Vector3::new(x[7], x[8], x[9]));
-        let body_velocity = to_body * velocity;
-        let momentum = body_velocity.component_mul(&self.inertia);
-        let net = to_body * torque - body_velocity.cross(&momentum);
-        let acceleration = rotation * net.component_div(&self.inertia);
         let scaled = Matrix3::from_fn(|r, c| rotation[(r, c)] / self.inertia[c]);
         let gyroscopic = {
             let by_momentum = cross_matrix(&body_velocity);
@@ -190,7 +192,7 @@ impl LocalFunction<10, 3> for Euler {
                 _ => by_torque[(r, c - 7)],
             })
         };
-        (self.evaluate(x), std::array::from_fn(row))
+        (acceleration.into(), std::array::from_fn(row))
     }
 }
 
