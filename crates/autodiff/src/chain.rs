@@ -67,3 +67,11 @@ pub(crate) trait Chain: Copy {
 pub(crate) fn through(slope: f64, derivative: f64) -> f64 {
     if slope == 0.0 || derivative == 0.0 { 0.0 } else { slope * derivative }
 }
+
+/// [`through`] where the operators of reverse mode are: 0 only for a number that does not move. A select and
+/// not a branch with a call, which was measured to slow recording by a third.
+#[inline(always)]
+pub(crate) fn unless_still(slope: f64, coefficient: f64) -> f64 {
+    let product = slope * coefficient;
+    if coefficient == 0.0 { 0.0 } else { product }
+}

@@ -8,7 +8,7 @@ use std::cell::{Cell, RefCell};
 use std::rc::Rc;
 
 use crate::arena::{Arena, Mark};
-use crate::chain::through;
+use crate::chain::{through, unless_still};
 use crate::{CustomVjp, Var};
 
 /// What the sweep reads: 24 bytes for a node of two parents.
@@ -145,10 +145,7 @@ fn complete<R>(tape: &RefCell<Tape>, f: impl FnOnce(&mut Tape) -> R) -> R {
 /// Records the join of two active numbers with partial derivatives `slopes`.
 #[inline(always)]
 pub(crate) fn push(value: f64, [a, b]: [Var; 2], slopes: [f64; 2]) -> Var {
-    let mut flows = [slopes[0] * a.coefficient, slopes[1] * b.coefficient];
-    if flows[0].is_nan() || flows[1].is_nan() {
-        flows = [through(slopes[0], a.coefficient), through(slopes[1], b.coefficient)];
-    }
+    let flows = [unless_still(slopes[0], a.coefficient), unless_still(slopes[1], b.coefficient)];
     let entry = Entry { slopes: flows, parents: [a.node, b.node] };
     // As little as possible in here: what `with` is given must stay small enough to be inlined.
     let (node, recording) = END.with(|end| {

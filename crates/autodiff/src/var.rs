@@ -1,6 +1,6 @@
 //! Reverse mode: a number that remembers where on the tape it came from.
 
-use crate::chain::{Chain, through};
+use crate::chain::{Chain, unless_still};
 use crate::local::sum_local;
 use crate::real_field::impl_real_field;
 use crate::tape::{push, push_block, refuse_foreign};
@@ -39,10 +39,7 @@ impl Var {
         if self.recording != other.recording {
             refuse_foreign();
         }
-        let mut coefficient = da * self.coefficient + db * other.coefficient;
-        if coefficient.is_nan() {
-            coefficient = through(da, self.coefficient) + through(db, other.coefficient);
-        }
+        let coefficient = unless_still(da, self.coefficient) + unless_still(db, other.coefficient);
         Self { value, coefficient, ..self }
     }
 
@@ -81,12 +78,7 @@ impl Chain for Var {
     #[inline(always)]
     fn unary(self, value: f64, slope: f64) -> Self {
         // A constant stays one: its coefficient is never looked at.
-        // Told apart by the slope because that is often known when compiling.
-        let coefficient = if slope.is_finite() {
-            slope * self.coefficient
-        } else {
-            through(slope, self.coefficient)
-        };
+        let coefficient = unless_still(slope, self.coefficient);
         Self { value, coefficient, ..self }
     }
 
