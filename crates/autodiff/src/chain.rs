@@ -61,9 +61,7 @@ pub(crate) trait Chain: Copy {
 
 /// `slope * derivative`, but 0 if either is: 0 · ∞ must not make a NaN of a direction that has nothing to do
 /// with the operation, nor of a branch that was not taken.
-// Never inlined: where it is needed is rare, and operators must stay small enough to be inlined themselves.
-#[cold]
-#[inline(never)]
+#[inline]
 pub(crate) fn through(slope: f64, derivative: f64) -> f64 {
     if slope == 0.0 || derivative == 0.0 { 0.0 } else { slope * derivative }
 }

@@ -196,9 +196,10 @@ impl LocalFunction<10, 3> for Euler {
     }
 }
 
-/// The turn θ that a change of a unit quaternion's coordinates (i, j, k, w) means: θ = 2 vec(dq q̄).
+/// The small turn θ \[rad\] that a change of a unit quaternion's coordinates (i, j, k, w) means,
+/// θ = 2 vec(dq q̄), as a matrix: for Jacobians that are easier to write by a turn of the body.
 #[inline]
-fn turn_of_coordinates(rotation: &UnitQuaternion<f64>) -> Matrix3x4<f64> {
+pub fn turn_of_coordinates(rotation: &UnitQuaternion<f64>) -> Matrix3x4<f64> {
     let (w, v) = (rotation.w, rotation.imag());
     let by_vector = (Matrix3::from_diagonal_element(w) + cross_matrix(&v)) * 2.0;
     let mut turn = Matrix3x4::zeros();

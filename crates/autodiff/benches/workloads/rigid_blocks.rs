@@ -1,7 +1,7 @@
 //! The rigid body of `rigid_body.rs` in block nodes: one for the sum of all contacts, and the steps of
 //! `prehend_autodiff::rigid`.
 
-use nalgebra::{Isometry3, Matrix3, Matrix3x4, Quaternion, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use prehend_autodiff::lie::{cross_matrix, so3_exp};
 use prehend_autodiff::{Fwd, LocalFunction, Scalar, rigid};
 
@@ -85,7 +85,7 @@ impl LocalFunction<11, 6> for Contacts<'_> {
             }
             by[1][2] += cross_matrix(&f) * cross;
         }
-        let turn = turn_of_coordinates(&pose.rotation);
+        let turn = rigid::turn_of_coordinates(&pose.rotation);
         let jacobian = std::array::from_fn(|row| {
             let (part, row) = (row / 3, row % 3);
             let [velocity, spin, by_turn] = &by[part];
@@ -110,14 +110,4 @@ fn state<S: Scalar>(x: [S; 11]) -> State<S> {
         velocity: Vector3::new(vx, vy, vz),
         angular_velocity: Vector3::new(wx, wy, wz),
     }
-}
-
-/// The turn that a change of the coordinates (i, j, k, w) means: θ = 2 vec(dq q̄).
-fn turn_of_coordinates(rotation: &UnitQuaternion<f64>) -> Matrix3x4<f64> {
-    let (w, v) = (rotation.w, rotation.imag());
-    let mut turn = Matrix3x4::zeros();
-    let by_vector = (Matrix3::from_diagonal_element(w) + cross_matrix(&v)) * 2.0;
-    turn.fixed_columns_mut::<3>(0).copy_from(&by_vector);
-    turn.set_column(3, &(v * -2.0));
-    turn
 }
