@@ -45,7 +45,7 @@ fn along<T: Scalar>(slope: T, derivative: T) -> T {
 
 /// Whether [`along`] is no more than a product: plain numbers with finite slopes. Looking once at the slopes
 /// costs half as much as looking at every derivative.
-#[inline]
+#[inline(always)]
 fn is_tame<T: Scalar>(slopes: &[T]) -> bool {
     T::IS_PLAIN && slopes.iter().all(|slope| slope.value().is_finite())
 }
@@ -53,48 +53,47 @@ fn is_tame<T: Scalar>(slopes: &[T]) -> bool {
 impl<const N: usize, T: Scalar> Chain for Fwd<N, T> {
     type Inner = T;
 
-    #[inline]
+    #[inline(always)]
     fn lift(value: T) -> Self {
         Self { value, derivative: [T::zero(); N] }
     }
 
-    #[inline]
+    #[inline(always)]
     fn primal(self) -> T {
         self.value
     }
 
-    #[inline]
+    #[inline(always)]
     fn is_constant(self) -> bool {
         self.derivative.iter().all(|d| d.is_constant_zero())
     }
 
-    #[inline]
+    #[inline(always)]
     fn unary(self, value: T, slope: T) -> Self {
         let derivative = if is_tame(&[slope]) {
-            self.derivative.map(|d| slope * d)
+            slope.scale_lanes(self.derivative)
         } else {
             wild_unary(self.derivative, slope)
         };
         Self { value, derivative }
     }
 
-    #[inline]
+    #[inline(always)]
     fn binary(self, other: Self, value: T, [da, db]: [T; 2]) -> Self {
         let derivative = if is_tame(&[da, db]) {
-            std::array::from_fn(|i| da * self.derivative[i] + db * other.derivative[i])
+            T::combine_lanes([da, db], self.derivative, other.derivative)
         } else {
             wild_binary(self.derivative, other.derivative, da, db)
         };
         Self { value, derivative }
     }
 
-    #[inline]
+    #[inline(always)]
     fn product(self, other: Self, value: T, [da, db]: [T; 2]) -> Self {
         if !T::IS_PLAIN {
             return self.binary(other, value, [da, db]);
         }
-        let derivative =
-            std::array::from_fn(|i| da * self.derivative[i] + db * other.derivative[i]);
+        let derivative = T::combine_lanes([da, db], self.derivative, other.derivative);
         Self { value, derivative }
     }
 }

@@ -75,6 +75,7 @@ mod fwd;
 mod hessian;
 pub mod implicit;
 mod jacobian;
+mod lanes;
 pub mod lie;
 mod local;
 mod operand;

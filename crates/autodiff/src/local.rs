@@ -182,6 +182,33 @@ mod tests {
     }
 
     #[test]
+    fn long_blocks_find_their_parents_wherever_they_are() {
+        fn sum<S: Scalar>(x: &[S], order: fn(&mut [S])) -> S {
+            let mut x: Vec<S> = x.to_vec();
+            order(&mut x);
+            let terms = (0..299).map(|i| (Difference(1.0 + i as f64), [i, (i * 7 + 1) % 300]));
+            S::sum_local(&x, terms)
+        }
+        let x: Vec<f64> = (0..300).map(|i| (i * i % 11) as f64).collect();
+        // Neighbours on the tape; the other way round; a fused result, a constant and a repetition among them.
+        let orders: [(fn(&mut [Var]), fn(&mut [f64])); 3] =
+            [(|_| (), |_| ()), (<[Var]>::reverse, <[f64]>::reverse), (mix::<Var>, mix::<f64>)];
+        fn mix<S: Scalar>(x: &mut [S]) {
+            (x[10], x[70], x[200]) = (x[10].times(2.0), S::constant(0.5), x[201]);
+        }
+        for (order, plain_order) in orders {
+            let (value, gradient) = gradient(|x| sum(x, order), &x);
+            assert_eq!(value, sum(&x, plain_order));
+            let differences =
+                crate::check::finite_difference_gradient(|x| sum(x, plain_order), &x, 1e-3);
+            // Central differences of a quadratic function are exact but for rounding.
+            for (exact, difference) in gradient.iter().zip(&differences) {
+                assert!((exact - difference).abs() < 1e-5 * (1.0 + exact.abs()));
+            }
+        }
+    }
+
+    #[test]
     #[should_panic(expected = "another recording")]
     fn a_block_refuses_foreign_numbers() {
         let stale = Recording::start().variable(1.0);

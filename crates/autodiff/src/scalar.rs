@@ -2,7 +2,7 @@
 
 use nalgebra::RealField;
 
-use crate::LocalFunction;
+use crate::{LocalFunction, lanes};
 
 /// A real number that may carry derivatives.
 ///
@@ -67,6 +67,20 @@ pub trait Scalar: RealField + Copy + Default {
 
     /// Whether this is the constant 0, which moves in no direction.
     fn is_constant_zero(self) -> bool;
+
+    /// `self` times each of `derivative`.
+    #[doc(hidden)]
+    #[inline(always)]
+    fn scale_lanes<const N: usize>(self, derivative: [Self; N]) -> [Self; N] {
+        derivative.map(|d| self * d)
+    }
+
+    /// The sum of `slopes[0]` times `a` and `slopes[1]` times `b`, place by place.
+    #[doc(hidden)]
+    #[inline(always)]
+    fn combine_lanes<const N: usize>(slopes: [Self; 2], a: [Self; N], b: [Self; N]) -> [Self; N] {
+        std::array::from_fn(|i| slopes[0] * a[i] + slopes[1] * b[i])
+    }
 }
 
 /// [`Scalar::sum_local`] as plain generic code.
@@ -80,7 +94,7 @@ pub(crate) fn add_up<S: Scalar, const K: usize, F: LocalFunction<K, 1>>(
 }
 
 macro_rules! plain_scalar {
-    ($t:ty) => {
+    ($t:ty { $($own:tt)* }) => {
         impl Scalar for $t {
             const IS_PLAIN: bool = true;
 
@@ -99,9 +113,21 @@ macro_rules! plain_scalar {
             fn is_constant_zero(self) -> bool {
                 self == 0.0
             }
+
+            $($own)*
         }
     };
 }
 
-plain_scalar!(f32);
-plain_scalar!(f64);
+plain_scalar!(f32 {});
+plain_scalar!(f64 {
+    #[inline(always)]
+    fn scale_lanes<const N: usize>(self, derivative: [Self; N]) -> [Self; N] {
+        lanes::scaled(self, derivative)
+    }
+
+    #[inline(always)]
+    fn combine_lanes<const N: usize>(slopes: [Self; 2], a: [Self; N], b: [Self; N]) -> [Self; N] {
+        lanes::combined(slopes, a, b)
+    }
+});

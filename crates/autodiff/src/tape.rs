@@ -21,21 +21,35 @@ pub(crate) struct Entry {
 /// In place of the first parent: this entry stands for a group.
 const GROUP: u32 = u32::MAX;
 
-/// In place of a group's slopes: it brings its own derivative.
-const CUSTOM: f64 = 1.0;
-
 /// Several nodes that share their parents.
 pub(crate) struct Group {
     pub(crate) outputs: usize,
     pub(crate) inputs: usize,
-    /// An operation with its own derivative; otherwise the slopes are a dense Jacobian.
-    pub(crate) custom: bool,
+    pub(crate) kind: Kind,
 }
+
+/// How a group's adjoints flow to its parents.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Kind {
+    /// Through a dense Jacobian.
+    Dense,
+    /// Through a dense Jacobian, to parents that follow each other: only the first is kept.
+    Run,
+    /// By an operation with its own derivative.
+    Custom,
+}
+
+impl Kind {
+    const ALL: [Self; 3] = [Self::Dense, Self::Run, Self::Custom];
+}
+
+/// Inputs from which on a block looks whether they follow each other: for fewer, looking costs more.
+const LONG: usize = 64;
 
 impl Entry {
     fn group(group: &Group) -> Self {
         Self {
-            slopes: [group.inputs as f64, if group.custom { CUSTOM } else { 0.0 }],
+            slopes: [group.inputs as f64, f64::from(group.kind as u8)],
             parents: [GROUP, group.outputs as u32],
         }
     }
@@ -50,7 +64,7 @@ impl Entry {
         self.is_group().then(|| Group {
             outputs: self.parents[1] as usize,
             inputs: self.slopes[0] as usize,
-            custom: self.slopes[1] == CUSTOM,
+            kind: Kind::ALL[self.slopes[1] as usize],
         })
     }
 }
@@ -160,7 +174,7 @@ pub(crate) fn push(value: f64, [a, b]: [Var; 2], slopes: [f64; 2]) -> Var {
 
 /// Records a group without inputs: independent variables.
 pub(crate) fn push_variables(count: usize) -> Outputs {
-    END.with(|end| end.push_group(&Group { outputs: count, inputs: 0, custom: false }))
+    END.with(|end| end.push_group(&Group { outputs: count, inputs: 0, kind: Kind::Dense }))
 }
 
 /// Records a group of nodes with a dense Jacobian (row-major, outputs × inputs).
@@ -168,11 +182,24 @@ pub(crate) fn push_variables(count: usize) -> Outputs {
 pub(crate) fn push_block(inputs: &[Var], outputs: usize, jacobian: &[f64]) -> Outputs {
     END.with(|end| {
         let recording = end.recording.get();
-        let foreign = |var: &Var| var.recording != recording;
-        if recording == 0 || inputs.is_empty() || inputs.iter().any(foreign) {
+        if recording == 0 || inputs.is_empty() {
             return push_sparse_block(inputs, outputs, jacobian);
         }
-        let group = end.push_group(&Group { outputs, inputs: inputs.len(), custom: false });
+        if inputs.len() >= LONG && is_run(inputs, recording) {
+            let kind = Kind::Run;
+            let group = end.push_group(&Group { outputs, inputs: inputs.len(), kind });
+            TAPE.with(|tape| {
+                let tape = &mut *tape.borrow_mut();
+                tape.parents.room(1).push(inputs[0].node);
+                tape.slopes.room(jacobian.len()).extend_from_slice(jacobian);
+            });
+            return group;
+        }
+        if inputs.iter().any(|var| var.recording != recording) {
+            return push_sparse_block(inputs, outputs, jacobian);
+        }
+        let kind = Kind::Dense;
+        let group = end.push_group(&Group { outputs, inputs: inputs.len(), kind });
         TAPE.with(|tape| {
             let tape = &mut *tape.borrow_mut();
             let parents = tape.parents.room(inputs.len());
@@ -191,6 +218,17 @@ pub(crate) fn push_block(inputs: &[Var], outputs: usize, jacobian: &[f64]) -> Ou
         });
         group
     })
+}
+
+/// Whether `inputs` are nodes of `recording` that follow each other.
+fn is_run(inputs: &[Var], recording: u32) -> bool {
+    let follows = |(var, node): (&Var, u32)| {
+        var.node == node && var.recording == recording && var.coefficient == 1.0
+    };
+    // Without an early end inside, a chunk is compared without branches.
+    let mut chunks = inputs.chunks(LONG).zip((inputs[0].node..).step_by(LONG));
+    chunks
+        .all(|(chunk, first)| chunk.iter().zip(first..).fold(true, |all, pair| all & follows(pair)))
 }
 
 /// [`push_block`] where some inputs are constants (or of another recording).
@@ -214,7 +252,7 @@ pub(crate) fn push_custom(inputs: &[Var], outputs: usize, operation: Rc<dyn Cust
         if inputs.iter().all(|var| var.recording == 0) {
             return Outputs { first: 0, recording: 0 };
         }
-        let group = end.push_group(&Group { outputs, inputs: inputs.len(), custom: true });
+        let group = end.push_group(&Group { outputs, inputs: inputs.len(), kind: Kind::Custom });
         TAPE.with(|tape| {
             let tape = &mut *tape.borrow_mut();
             tape.parents.room(inputs.len()).extend(inputs.iter().map(|var| var.node));
