@@ -47,7 +47,7 @@ fn along<T: Scalar>(slope: T, derivative: T) -> T {
 /// costs half as much as looking at every derivative.
 #[inline(always)]
 fn is_tame<T: Scalar>(slopes: &[T]) -> bool {
-    T::IS_PLAIN && slopes.iter().all(|slope| slope.value().is_finite())
+    T::ORDER == 0 && slopes.iter().all(|slope| slope.value().is_finite())
 }
 
 impl<const N: usize, T: Scalar> Chain for Fwd<N, T> {
@@ -90,7 +90,7 @@ impl<const N: usize, T: Scalar> Chain for Fwd<N, T> {
 
     #[inline(always)]
     fn product(self, other: Self, value: T, [da, db]: [T; 2]) -> Self {
-        if !T::IS_PLAIN {
+        if T::ORDER > 0 {
             return self.binary(other, value, [da, db]);
         }
         let derivative = T::combine_lanes([da, db], self.derivative, other.derivative);

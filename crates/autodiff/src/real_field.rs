@@ -506,6 +506,8 @@ let modulus = num_traits::Signed::abs(&self);
         }
 
         impl<$($generics)*> crate::Scalar for $t {
+            const ORDER: usize = 1 + <Self as crate::chain::Chain>::Inner::ORDER;
+
             #[inline]
             fn constant(value: f64) -> Self {
                 Self::lift(Self::inner(value))

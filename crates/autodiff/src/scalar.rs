@@ -19,8 +19,11 @@ use crate::{LocalFunction, lanes};
 /// follow the first operand on a tie; rounding has slope 0. At the edge of its domain a function has the slope
 /// from inside, which may be infinite.
 pub trait Scalar: RealField + Copy + Default {
-    /// Whether this is a plain number, which never carries derivatives.
-    const IS_PLAIN: bool = false;
+    /// Of which order the derivatives are that it carries: 0 for plain numbers, 2 for forward mode over another mode.
+    ///
+    /// An operation that brings its own first derivatives cannot serve numbers of a higher order, and should refuse
+    /// them when it is compiled: `const { assert!(S::ORDER <= 1) }`.
+    const ORDER: usize;
 
     /// A constant: carries no derivative.
     fn constant(value: f64) -> Self;
@@ -96,7 +99,7 @@ pub(crate) fn add_up<S: Scalar, const K: usize, F: LocalFunction<K, 1>>(
 macro_rules! plain_scalar {
     ($t:ty { $($own:tt)* }) => {
         impl Scalar for $t {
-            const IS_PLAIN: bool = true;
+            const ORDER: usize = 0;
 
             #[inline]
             fn constant(value: f64) -> Self {

@@ -1,7 +1,10 @@
-//! A rigid body and the surface samples through which it touches its surroundings.
+//! A rigid body: mass, inertia, centre of mass.
 
-use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion};
+use prehend_autodiff::Scalar;
 use thiserror::Error;
+
+use crate::state::State;
 
 /// Why a body cannot be simulated.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
@@ -23,48 +26,59 @@ pub enum BodyError {
         /// Number of areas.
         areas: usize,
     },
+    /// There are no surface points, so nothing would ever touch.
+    #[error("no surface points")]
+    NoSamples,
+    /// A surface point is not finite, or stands for no area.
+    #[error("surface point {index} must be finite and of positive area")]
+    Sample {
+        /// Its place.
+        index: usize,
+    },
 }
 
 /// Mass, inertia and centre of mass of a rigid body.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RigidBody {
-    mass: f64,
-    inertia: Matrix3<f64>,
-    inverse_inertia: Matrix3<f64>,
+pub struct RigidBody<S: Scalar = f64> {
+    mass: S,
+    inertia: Matrix3<S>,
+    inverse_inertia: Matrix3<S>,
     com: Point3<f64>,
 }
 
-impl RigidBody {
+impl<S: Scalar> RigidBody<S> {
     /// A body of `mass` \[kg\], `inertia` about its centre of mass along the model's axes \[kg m²\] and
     /// centre of mass `com` in its model frame \[m\].
     ///
     /// # Errors
     /// Unless the mass is positive, the inertia symmetric positive definite and everything finite.
-    pub fn new(mass: f64, inertia: Matrix3<f64>, com: Point3<f64>) -> Result<Self, BodyError> {
-        if !(mass > 0.0 && mass.is_finite()) {
-            return Err(BodyError::Mass(mass));
+    pub fn new(mass: S, inertia: Matrix3<S>, com: Point3<f64>) -> Result<Self, BodyError> {
+        let value = mass.value();
+        if !(value > 0.0 && value.is_finite()) {
+            return Err(BodyError::Mass(value));
         }
         if !com.iter().all(|c| c.is_finite()) {
             return Err(BodyError::CenterOfMass);
         }
-        let asymmetry = (inertia - inertia.transpose()).norm();
-        if !inertia.iter().all(|x| x.is_finite()) || asymmetry > 1e-6 * inertia.norm() {
+        let values = inertia.map(S::value);
+        let asymmetry = (values - values.transpose()).norm();
+        if !values.iter().all(|x| x.is_finite()) || asymmetry > 1e-6 * values.norm() {
             return Err(BodyError::Inertia);
         }
-        let inertia = (inertia + inertia.transpose()) * 0.5;
+        let inertia = (inertia + inertia.transpose()) * S::constant(0.5);
         let inverse_inertia = inertia.cholesky().ok_or(BodyError::Inertia)?.inverse();
         Ok(Self { mass, inertia, inverse_inertia, com })
     }
 
     /// Mass \[kg\].
     #[inline]
-    pub fn mass(&self) -> f64 {
+    pub fn mass(&self) -> S {
         self.mass
     }
 
     /// Inertia about the centre of mass, along the model's axes \[kg m²\].
     #[inline]
-    pub fn inertia(&self) -> &Matrix3<f64> {
+    pub fn inertia(&self) -> &Matrix3<S> {
         &self.inertia
     }
 
@@ -76,58 +90,53 @@ impl RigidBody {
 
     /// Inertia about the centre of mass, along the world's axes \[kg m²\].
     #[inline]
-    pub fn world_inertia(&self, rotation: &UnitQuaternion<f64>) -> Matrix3<f64> {
+    pub fn world_inertia(&self, rotation: &UnitQuaternion<S>) -> Matrix3<S> {
         let r = rotation.to_rotation_matrix();
         r.matrix() * self.inertia * r.matrix().transpose()
     }
 
     /// Inverse of [`Self::world_inertia`].
     #[inline]
-    pub fn inverse_world_inertia(&self, rotation: &UnitQuaternion<f64>) -> Matrix3<f64> {
+    pub fn inverse_world_inertia(&self, rotation: &UnitQuaternion<S>) -> Matrix3<S> {
         let r = rotation.to_rotation_matrix();
         r.matrix() * self.inverse_inertia * r.matrix().transpose()
     }
 
     /// `t_world_com` of a body whose model frame is at `t_world_model`.
     #[inline]
-    pub fn com_pose(&self, t_world_model: &Isometry3<f64>) -> Isometry3<f64> {
-        t_world_model * Translation3::from(self.com.coords)
+    pub fn com_pose(&self, t_world_model: &Isometry3<S>) -> Isometry3<S> {
+        t_world_model * Translation3::from(self.com.coords.map(S::constant))
     }
 
     /// `t_world_model` of a body whose centre-of-mass frame is at `t_world_com`.
     #[inline]
-    pub fn model_pose(&self, t_world_com: &Isometry3<f64>) -> Isometry3<f64> {
-        t_world_com * Translation3::from(-self.com.coords)
+    pub fn model_pose(&self, t_world_com: &Isometry3<S>) -> Isometry3<S> {
+        t_world_com * Translation3::from(self.com.coords.map(|x| S::constant(-x)))
     }
 
-    /// Surface samples from `points` in the model frame \[m\] and the `areas` they stand for \[m²\].
-    ///
-    /// # Errors
-    /// Where the two differ in number.
-    pub fn surface_points(
-        &self,
-        points: &[Point3<f64>],
-        areas: &[f64],
-    ) -> Result<Vec<SurfacePoint>, BodyError> {
-        if points.len() != areas.len() {
-            return Err(BodyError::Samples { points: points.len(), areas: areas.len() });
-        }
-        let samples = points.iter().zip(areas);
-        Ok(samples.map(|(p, &area)| SurfacePoint { position: p - self.com, area }).collect())
+    /// The body at rest with its model frame at `t_world_model`.
+    pub fn at_rest(&self, t_world_model: &Isometry3<S>) -> State<S> {
+        State::at_rest(self.com_pose(t_world_model))
     }
 }
 
-/// A sample of a body's surface.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SurfacePoint {
-    /// Position relative to the centre of mass, along the model's axes \[m\].
-    pub position: Vector3<f64>,
-    /// Area the sample stands for \[m²\].
-    pub area: f64,
+impl RigidBody {
+    /// The same body in constants of another scalar.
+    pub fn lift<S: Scalar>(&self) -> RigidBody<S> {
+        RigidBody {
+            mass: S::constant(self.mass),
+            inertia: self.inertia.map(S::constant),
+            inverse_inertia: self.inverse_inertia.map(S::constant),
+            com: self.com,
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Vector3;
+    use prehend_autodiff::Fwd;
+
     use super::*;
 
     #[test]
@@ -139,9 +148,6 @@ mod tests {
         assert_eq!(RigidBody::new(1.0, i * f64::NAN, o), Err(BodyError::Inertia));
         let nowhere = Point3::new(f64::NAN, 0.0, 0.0);
         assert_eq!(RigidBody::new(1.0, i, nowhere), Err(BodyError::CenterOfMass));
-        let body = RigidBody::new(1.0, i, o).unwrap();
-        let error = body.surface_points(&[o], &[]);
-        assert_eq!(error, Err(BodyError::Samples { points: 1, areas: 0 }));
     }
 
     #[test]
@@ -152,5 +158,18 @@ mod tests {
         let at_com = body.com_pose(&pose);
         assert!((at_com.translation.vector - (pose * com).coords).norm() < 1e-15);
         assert!((body.model_pose(&at_com).to_homogeneous() - pose.to_homogeneous()).norm() < 1e-15);
+    }
+
+    #[test]
+    fn inertia_carries_its_derivative_into_its_inverse() {
+        let [a, b] = Fwd::<2>::variables([2.0, 0.3]);
+        let mut inertia = Matrix3::<Fwd<2>>::identity();
+        (inertia[(0, 0)], inertia[(0, 1)], inertia[(1, 0)]) = (a, b, b);
+        let body = RigidBody::new(Fwd::constant(1.0), inertia, Point3::origin()).unwrap();
+        // (2·1 − b²)⁻¹ at the corner: ∂/∂a of the inverse's first entry is −(that entry)².
+        let inverse = body.inverse_world_inertia(&UnitQuaternion::identity());
+        let first = inverse[(0, 0)];
+        assert!((first.value - 1.0 / (2.0 - 0.09)).abs() < 1e-14);
+        assert!((first.derivative[0] + first.value * first.value).abs() < 1e-14);
     }
 }

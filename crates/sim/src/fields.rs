@@ -24,6 +24,7 @@ impl DistanceField for HalfSpace {
 }
 
 /// Everything outside of a sphere.
+#[derive(Clone)]
 pub(crate) struct SphereCavity {
     pub(crate) center: Point3<f64>,
     pub(crate) radius: f64,
@@ -40,5 +41,23 @@ impl DistanceField for SphereCavity {
         let n = offset / length;
         let hessian = -(Matrix3::identity() - n * n.transpose()) / length;
         Some(FieldSample { distance, gradient: -n, hessian })
+    }
+}
+
+/// What a field leaves free.
+pub(crate) struct Complement<F>(F);
+
+impl SphereCavity {
+    /// The sphere itself.
+    pub(crate) fn inside_out(self) -> Complement<Self> {
+        Complement(self)
+    }
+}
+
+impl<F: DistanceField> DistanceField for Complement<F> {
+    fn sample(&self, point: &Point3<f64>, reach: f64) -> Option<FieldSample> {
+        let FieldSample { distance, gradient, hessian } = self.0.sample(point, f64::INFINITY)?;
+        let sample = FieldSample { distance: -distance, gradient: -gradient, hessian: -hessian };
+        (sample.distance <= reach).then_some(sample)
     }
 }

@@ -13,21 +13,32 @@ mod body;
 #[cfg(test)]
 mod canonical;
 pub mod contact;
+mod error;
 #[cfg(test)]
 mod fields;
 mod integrator;
 mod rollout;
+#[cfg(test)]
+mod scenes;
 mod stability;
 mod state;
+mod surface;
+mod time_step;
+mod world;
 
-pub use body::{BodyError, RigidBody, SurfacePoint};
+pub use body::{BodyError, RigidBody};
 pub use contact::friction::regularised_coulomb;
 pub use contact::graspd::GraspD;
 pub use contact::law::{Contact, ContactLaw, Isotropic, IsotropicLaw, LocalLaw, Response};
 pub use contact::onset::{LeakSteps, Onset, OnsetSample};
 pub use contact::penalty::{KelvinVoigt, LawError, Penalty};
 pub use contact::registry::LawRegistry;
-pub use integrator::{Matrix12, Vector12, step, step_transition};
-pub use rollout::{Matrix12x6, Simulation};
-pub use stability::{Averaging, Perturbation, StabilityLoss, StabilityWeights};
+pub use contact::wrench::{Patch, WrenchJacobian};
+pub use error::SimulationError;
+pub use integrator::{Integrator, SemiImplicitEuler};
+pub use rollout::Horizon;
+pub use stability::{Averaging, Perturbation, StabilityJacobian, StabilityLoss, StabilityWeights};
 pub use state::State;
+pub use surface::{Surface, SurfacePoint};
+pub use time_step::StepError;
+pub use world::{Body, ContactPair, Course, Motion, Step, World};

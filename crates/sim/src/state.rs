@@ -1,32 +1,211 @@
-//! Pose and velocity of a rigid body.
+//! Pose and velocity of a body.
 
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::{
+    Isometry3, Quaternion, SMatrix, Translation3, Unit, UnitQuaternion, Vector3, Vector6,
+};
+use prehend_autodiff::lie::perturb_about;
+use prehend_autodiff::{Fwd, Scalar};
 
-use crate::body::RigidBody;
-
-/// Where a body is and how it moves.
+/// Where a body is and how it moves; plain numbers, or numbers that carry derivatives.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct State {
+pub struct State<S: Scalar = f64> {
     /// `t_world_com`: origin at the centre of mass \[m\], axes of the model.
-    pub pose: Isometry3<f64>,
+    pub pose: Isometry3<S>,
     /// Velocity of the centre of mass, world frame \[m/s\].
-    pub linear: Vector3<f64>,
+    pub linear: Vector3<S>,
     /// Angular velocity, world frame \[rad/s\].
-    pub angular: Vector3<f64>,
+    pub angular: Vector3<S>,
 }
 
-impl State {
-    /// `body` at rest with its model frame at `t_world_model`.
-    pub fn at_rest(body: &RigidBody, t_world_model: &Isometry3<f64>) -> Self {
-        let pose = body.com_pose(t_world_model);
+impl<S: Scalar> State<S> {
+    /// At rest at `pose` (`t_world_com`).
+    pub fn at_rest(pose: Isometry3<S>) -> Self {
         Self { pose, linear: Vector3::zeros(), angular: Vector3::zeros() }
+    }
+
+    /// The same numbers without derivatives.
+    #[inline]
+    pub fn value(&self) -> State {
+        let rotation =
+            Unit::new_unchecked(Quaternion::from(self.pose.rotation.coords.map(S::value)));
+        let translation = Translation3::from(self.pose.translation.vector.map(S::value));
+        State {
+            pose: Isometry3::from_parts(translation, rotation),
+            linear: self.linear.map(S::value),
+            angular: self.angular.map(S::value),
+        }
     }
 
     /// Whether every coordinate is a finite number.
     pub fn is_finite(&self) -> bool {
-        let pose = &self.pose;
-        let parts = [pose.translation.vector, self.linear, self.angular];
-        parts.iter().flat_map(|v| v.iter()).all(|x| x.is_finite())
-            && pose.rotation.coords.iter().all(|x| x.is_finite())
+        let parts = [&self.pose.translation.vector, &self.linear, &self.angular];
+        parts.iter().flat_map(|v| v.iter()).all(|x| x.value().is_finite())
+            && self.pose.rotation.coords.iter().all(|x| x.value().is_finite())
+    }
+
+    /// What an observer in `frame` sees, who moves and turns with it: `self` along the axes of `frame`.
+    #[inline]
+    pub fn seen_from(&self, frame: &Self) -> Self {
+        let to_frame = frame.pose.rotation.inverse();
+        let offset = self.pose.translation.vector - frame.pose.translation.vector;
+        let linear = self.linear - frame.linear - frame.angular.cross(&offset);
+        Self {
+            pose: Isometry3::from_parts(
+                Translation3::from(to_frame * offset),
+                to_frame * self.pose.rotation,
+            ),
+            linear: to_frame * linear,
+            angular: to_frame * (self.angular - frame.angular),
+        }
+    }
+
+    /// The state of a frame fixed to the body at `offset` from its centre of mass, in the model's axes \[m\].
+    #[inline]
+    pub fn shifted(&self, offset: &Vector3<f64>) -> Self {
+        let arm = self.pose.rotation * offset.map(S::constant);
+        let mut shifted = *self;
+        shifted.pose.translation.vector += arm;
+        shifted.linear += self.angular.cross(&arm);
+        shifted
+    }
+
+    /// Numbers that are zero and carry this state's derivatives, as a tangent vector: pose twist about the
+    /// centre of mass (translation \[m\], rotation \[rad\]), then linear \[m/s\] and angular \[rad/s\]
+    /// velocity, world frame. First derivatives only.
+    #[inline]
+    pub fn tangent(&self) -> [S; 12] {
+        let value = self.value();
+        let [x, y, z] = less(&self.pose.translation.vector, &value.pose.translation.vector).into();
+        let inverse = value.pose.rotation.inverse().into_inner().coords.map(S::constant);
+        // q q̄₀ = 1 + θ/2 for a small turn θ.
+        let turn = self.pose.rotation.into_inner() * Quaternion::from(inverse);
+        let [rx, ry, rz] = turn.imag().map(|x| x.times(2.0) - S::constant(2.0 * x.value())).into();
+        let [vx, vy, vz] = less(&self.linear, &value.linear).into();
+        let [wx, wy, wz] = less(&self.angular, &value.angular).into();
+        [x, y, z, rx, ry, rz, vx, vy, vz, wx, wy, wz]
+    }
+}
+
+/// `a` less its own value.
+#[inline]
+fn less<S: Scalar>(a: &Vector3<S>, value: &Vector3<f64>) -> Vector3<S> {
+    a.zip_map(value, |a, v| a.plus(-v))
+}
+
+impl State {
+    /// The state `tangent` away, in the order of [`State::tangent`].
+    pub fn moved<S: Scalar>(&self, tangent: &[S; 12]) -> State<S> {
+        let [x, y, z, rx, ry, rz, vx, vy, vz, wx, wy, wz] = *tangent;
+        let State { pose, linear, angular } = self.lift::<S>();
+        let centre = pose.translation.vector;
+        State {
+            pose: perturb_about(&pose, &centre, &Vector6::new(x, y, z, rx, ry, rz)),
+            linear: linear + Vector3::new(vx, vy, vz),
+            angular: angular + Vector3::new(wx, wy, wz),
+        }
+    }
+
+    /// Constants of another scalar.
+    pub fn lift<S: Scalar>(&self) -> State<S> {
+        let rotation: UnitQuaternion<S> =
+            Unit::new_unchecked(Quaternion::from(self.pose.rotation.coords.map(S::constant)));
+        let translation = Translation3::from(self.pose.translation.vector.map(S::constant));
+        State {
+            pose: Isometry3::from_parts(translation, rotation),
+            linear: self.linear.map(S::constant),
+            angular: self.angular.map(S::constant),
+        }
+    }
+
+    /// This state with the six directions of its pose as variables: a twist about the centre of mass.
+    pub fn pose_variables(&self) -> State<Fwd<6>> {
+        let mut tangent = [Fwd::constant(0.0); 12];
+        tangent[..6].copy_from_slice(&Fwd::<6>::variables([0.0; 6]));
+        self.moved(&tangent)
+    }
+
+    /// This state with all its twelve directions as variables.
+    pub fn variables(&self) -> State<Fwd<12>> {
+        self.moved(&Fwd::variables([0.0; 12]))
+    }
+}
+
+impl<const M: usize> State<Fwd<M>> {
+    /// Derivatives of the state, as tangent vectors, by the `M` inputs.
+    pub fn sensitivity(&self) -> SMatrix<f64, 12, M> {
+        let tangent = self.tangent();
+        SMatrix::from_fn(|row, column| tangent[row].derivative[column])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use prehend_autodiff::check::finite_difference_jacobian;
+
+    use super::*;
+
+    fn state(k: f64) -> State {
+        State {
+            pose: Isometry3::new(Vector3::new(0.1, k, -0.3), Vector3::new(1.4, -0.3 * k, 0.2)),
+            linear: Vector3::new(k, 2.0, -0.5),
+            angular: Vector3::new(3.0, -k, 1.0),
+        }
+    }
+
+    #[test]
+    fn tangents_of_variables_are_the_directions_themselves() {
+        let variables = state(0.7).variables();
+        assert!((variables.sensitivity() - SMatrix::<f64, 12, 12>::identity()).norm() < 1e-14);
+        assert!(variables.tangent().iter().all(|x| x.value == 0.0));
+        assert_eq!(variables.value(), state(0.7).moved(&[0.0; 12]));
+    }
+
+    #[test]
+    fn the_view_from_a_moving_frame_is_the_derivative_of_the_relative_pose() {
+        let (body, frame) = (state(0.7), state(-0.4));
+        let seen = body.seen_from(&frame);
+        // Both move on for a moment: where the body's points go in the frame is what the view says.
+        let point = Vector3::new(0.2, -0.1, 0.3);
+        let position = |time: f64| {
+            let at = |s: &State| {
+                let step = [s.linear * time, s.angular * time];
+                let [t, r] = step;
+                s.moved(&[t.x, t.y, t.z, r.x, r.y, r.z, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]).pose
+            };
+            (at(&frame).inverse() * at(&body) * nalgebra::Point3::from(point)).coords
+        };
+        let velocity = (position(1e-6) - position(-1e-6)) / 2e-6;
+        let expected = seen.linear + seen.angular.cross(&(seen.pose.rotation * point));
+        assert!((velocity - expected).norm() < 1e-8, "{velocity} {expected}");
+        assert!(
+            ((frame.pose.inverse() * body.pose).to_homogeneous() - seen.pose.to_homogeneous())
+                .norm()
+                < 1e-14
+        );
+    }
+
+    #[test]
+    fn derivatives_of_the_view_match_differences() {
+        let (body, frame) = (state(0.7), state(-0.4));
+        let seen = body.variables().seen_from(&frame.lift()).sensitivity();
+        let value = body.seen_from(&frame);
+        let differences = finite_difference_jacobian(
+            |x| {
+                let moved =
+                    body.moved(&std::array::from_fn::<f64, 12, _>(|i| x[i])).seen_from(&frame);
+                let turn = prehend_autodiff::lie::so3_log(
+                    &(moved.pose.rotation * value.pose.rotation.inverse()),
+                );
+                let parts = [moved.pose.translation.vector, turn, moved.linear, moved.angular];
+                parts.iter().flat_map(|v| v.iter().copied()).collect()
+            },
+            &[0.0; 12],
+            1e-6,
+        );
+        for (row, difference) in differences.iter().enumerate() {
+            for (column, d) in difference.iter().enumerate() {
+                assert!((seen[(row, column)] - d).abs() < 1e-8, "{row} {column}");
+            }
+        }
     }
 }

@@ -1,10 +1,12 @@
 //! Physics: an object held in a hand stays where it is. Measured by simulating.
 
+use std::sync::Arc;
+
 use nalgebra::{Isometry3, Matrix6, Point3, Vector3, Vector6};
-use prehend_geometry::PosedRobot;
-use prehend_sim::contact::stiffness::{StepError, damping_per_area, stiffness_per_area};
+use prehend_sim::contact::stiffness::{damping_per_area, stiffness_per_area};
 use prehend_sim::{
-    LeakSteps, Onset, Penalty, Perturbation, RigidBody, StabilityLoss, StabilityWeights,
+    Body, Horizon, LeakSteps, Onset, Penalty, Perturbation, RigidBody, StabilityJacobian,
+    StabilityLoss, StabilityWeights, StepError, Surface, World,
 };
 
 use super::Term;
@@ -55,6 +57,9 @@ impl Default for PhysicsSettings {
     }
 }
 
+/// Stability loss of a rollout that blew up.
+const BLOWN_UP: f64 = f64::MAX;
+
 /// The paper's L_phys = L_DP + λ‖Δt‖².
 ///
 /// L_DP is how fast and how far the object has moved after a short rollout under gravity and penalty
@@ -62,8 +67,7 @@ impl Default for PhysicsSettings {
 /// a logarithm: one centimetre of penetration throws the object out at hundreds of g, and must count as
 /// wrong, not as a thousand times more wrong than everything the camera says.
 pub struct PhysicsTerm {
-    stability: StabilityLoss<Penalty>,
-    hand: PosedRobot,
+    stability: StabilityLoss,
     initial_centre: Vector3<f64>,
     settings: PhysicsSettings,
 }
@@ -88,8 +92,7 @@ impl PhysicsTerm {
         let body = RigidBody::new(inertial.mass, inertial.inertia, inertial.center_of_mass)
             .map_err(|e| fail(e.to_string()))?;
         let positions: Vec<Point3<f64>> = object.samples.iter().map(|s| s.point).collect();
-        let areas = vec![object.area / positions.len().max(1) as f64; positions.len()];
-        let points = body.surface_points(&positions, &areas).map_err(|e| fail(e.to_string()))?;
+        let surface = Surface::uniform(&positions, object.area).map_err(|e| fail(e.to_string()))?;
         let g = gravity.norm();
         let area = settings.contact_area;
         let stiffness = stiffness_per_area(inertial.mass, g, settings.penetration, area);
@@ -97,32 +100,33 @@ impl PhysicsTerm {
         let law = Penalty::new(stiffness, damping, settings.friction, settings.slip_scale)
             .map_err(|e| fail(e.to_string()))?;
         let (alpha, band) = settings.leak;
+        let onset = Onset::Leaky { alpha, band, steps: LeakSteps::All };
+        let mut world = World::new(gravity);
+        let field = Arc::new(robot.posed(&hand.t_cam_hand, &hand.joints)?);
+        // Its field is in the camera's frame already.
+        let hand = world.add(Body::held("hand").with_field(field));
+        let held = world.add(Body::free(&object.name, body).with_surface(surface));
+        world.touch(held, hand, Arc::new(law), onset).map_err(|e| fail(e.to_string()))?;
+        let steps = settings.steps.0;
         let stability = StabilityLoss {
-            body,
-            points,
-            gravity,
-            law,
-            onset: Onset::Leaky { alpha, band, steps: LeakSteps::All },
-            dt: settings.time / settings.steps.0 as f64,
-            steps: settings.steps.0,
+            world,
+            states: vec![prehend_sim::State::at_rest(Isometry3::identity()); 2],
+            object: held,
+            horizon: Horizon { dt: settings.time / steps as f64, steps },
             perturbations: Perturbation::rest_and_diagonal(settings.perturbation),
             weights: StabilityWeights::relative_to_fall(g, settings.time, object.radius),
         };
-        let hand = robot.posed(&hand.t_cam_hand, &hand.joints)?;
-        Ok(Self { stability, hand, initial_centre: initial.centre(), settings })
+        Ok(Self { stability, initial_centre: initial.centre(), settings })
     }
 
     /// The rollouts with steps short enough for the contacts at `pose`.
     ///
     /// Penetration of some millimetres makes contact and friction so stiff that steps which suit a held
     /// object would be unstable, and their derivatives meaningless.
-    fn stable(&self, pose: &Isometry3<f64>) -> StabilityLoss<Penalty> {
+    fn stable(&self, pose: &Isometry3<f64>) -> StabilityLoss {
         let mut stability = self.stability.clone();
-        if let Err(StepError { limit, .. }) = stability.check(pose, &self.hand) {
-            let (least, most) = self.settings.steps;
-            let steps = (self.settings.time / limit).ceil().clamp(least as f64, most as f64);
-            stability.steps = steps as usize;
-            stability.dt = self.settings.time / steps;
+        if let Err(StepError { limit, .. }) = stability.check(pose) {
+            stability.horizon = stability.horizon.refined(limit, self.settings.steps.1);
         }
         stability
     }
@@ -132,9 +136,8 @@ impl PhysicsTerm {
         (state.centre() - self.initial_centre, precision)
     }
 
-    /// Nats of a stability loss; where the rollout blew up, those of a very large one.
+    /// Nats of a stability loss.
     fn nats(&self, loss: f64) -> f64 {
-        let loss = if loss.is_finite() { loss } else { f64::MAX };
         self.settings.weight * loss.ln_1p()
     }
 }
@@ -151,21 +154,23 @@ impl Term for PhysicsTerm {
     fn value(&self, state: &State) -> f64 {
         let pose = &state.t_cam_object;
         let (moved, precision) = self.displacement(state);
-        let loss = self.stable(pose).value(pose, &self.hand);
+        let loss = self.stable(pose).value(pose).unwrap_or(BLOWN_UP);
         self.nats(loss) + 0.5 * precision * moved.norm_squared()
     }
 
     fn linearise(&self, state: &State, normal: &mut Normal) -> f64 {
         let pose = &state.t_cam_object;
         let centre = Point3::from(state.centre());
-        let (loss, gradient, jtj) = self.stable(pose).linearise(pose, &self.hand, &centre);
         let (moved, precision) = self.displacement(state);
+        // A rollout that blew up has no derivative.
+        let StabilityJacobian { value: loss, gradient, normal: jtj } =
+            self.stable(pose).linearise(pose, &centre).unwrap_or(StabilityJacobian {
+                value: BLOWN_UP,
+                gradient: Vector6::zeros(),
+                normal: Matrix6::zeros(),
+            });
         let slope = self.settings.weight / (1.0 + loss);
-        let usable = slope.is_finite() && gradient.iter().chain(jtj.iter()).all(|v| v.is_finite());
-        let (mut gradient, mut hessian) = match usable {
-            true => (gradient * slope, jtj * (2.0 * slope)),
-            false => (Vector6::zeros(), Matrix6::zeros()),
-        };
+        let (mut gradient, mut hessian) = (gradient * slope, jtj * (2.0 * slope));
         for k in 0..3 {
             gradient[k] += precision * moved[k];
             hessian[(k, k)] += precision;

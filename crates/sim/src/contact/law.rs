@@ -1,7 +1,9 @@
 //! What a contact-model author writes, and the object-safe form that the simulator calls.
 
-use nalgebra::Vector3;
+use nalgebra::{Vector3, Vector6};
 use prehend_autodiff::{Fwd, Scalar};
+
+use super::wrench::{self, Patch, WrenchJacobian};
 
 use super::friction::{regularised_coulomb, regularised_speed};
 
@@ -130,11 +132,10 @@ impl<L: IsotropicLaw> ContactLaw for Isotropic<L> {
 mod sealed {
     pub trait Sealed {}
     impl<L: super::ContactLaw> Sealed for L {}
-    impl Sealed for Box<dyn super::LocalLaw> {}
 }
 
-/// The object-safe twin of [`ContactLaw`], implemented for every law: its value, and its derivatives
-/// along six local directions by forward mode.
+/// The object-safe twin of [`ContactLaw`], implemented for every law: forces at a contact and over all contacts of a
+/// surface, and their derivatives by forward mode. Loops over contacts are inside, where the law is known.
 pub trait LocalLaw: Send + Sync + sealed::Sealed {
     /// See [`ContactLaw::params`].
     fn parameters(&self) -> &[f64];
@@ -148,6 +149,12 @@ pub trait LocalLaw: Send + Sync + sealed::Sealed {
     /// Force at one contact with its derivatives along the directions that `contact` and `p` carry.
     fn response_with_derivative(&self, p: &[Fwd<6>], contact: &Contact<Fwd<6>>)
     -> Response<Fwd<6>>;
+
+    /// Force \[N\], then torque about the centre of mass \[N m\], of all contacts of `patch`, in the field's frame.
+    fn wrench(&self, p: &[f64], patch: &Patch<'_>) -> Vector6<f64>;
+
+    /// [`LocalLaw::wrench`] with its derivatives by the state, and by the parameters if `by_params`.
+    fn wrench_jacobian(&self, p: &[f64], patch: &Patch<'_>, by_params: bool) -> WrenchJacobian;
 }
 
 impl<L: ContactLaw> LocalLaw for L {
@@ -174,27 +181,13 @@ impl<L: ContactLaw> LocalLaw for L {
     ) -> Response<Fwd<6>> {
         self.law(p, contact)
     }
-}
 
-impl LocalLaw for Box<dyn LocalLaw> {
-    fn parameters(&self) -> &[f64] {
-        (**self).parameters()
+    fn wrench(&self, p: &[f64], patch: &Patch<'_>) -> Vector6<f64> {
+        wrench::wrench(self, p, patch)
     }
 
-    fn cutoff(&self) -> f64 {
-        (**self).cutoff()
-    }
-
-    fn response(&self, p: &[f64], contact: &Contact<f64>) -> Response<f64> {
-        (**self).response(p, contact)
-    }
-
-    fn response_with_derivative(
-        &self,
-        p: &[Fwd<6>],
-        contact: &Contact<Fwd<6>>,
-    ) -> Response<Fwd<6>> {
-        (**self).response_with_derivative(p, contact)
+    fn wrench_jacobian(&self, p: &[f64], patch: &Patch<'_>, by_params: bool) -> WrenchJacobian {
+        wrench::wrench_jacobian(self, p, patch, by_params)
     }
 }
 

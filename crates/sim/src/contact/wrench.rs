@@ -1,33 +1,61 @@
 //! The total contact wrench on a body and its derivative, gathered point by point.
 
-use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Vector3, Vector6};
+use nalgebra::{Matrix3, Point3, Vector3, Vector6};
 use prehend_autodiff::lie::cross_matrix;
-use prehend_autodiff::{Fwd, Scalar};
+use prehend_autodiff::{Fwd, LocalFunction, Scalar};
 use prehend_geometry::{DistanceField, FieldSample};
 
-use super::law::{Contact, LocalLaw};
+use super::law::{Contact, ContactLaw};
 use super::onset::{Onset, OnsetSample};
-use crate::body::SurfacePoint;
 use crate::state::State;
+use crate::surface::Surface;
 
 /// Below this length a distance gradient has no direction, and the point no contact.
 const MIN_GRADIENT: f64 = 1e-9;
 
-/// A wrench about the centre of mass, world frame, with its 6×12 derivative in two blocks.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// How much a distance field may rise over a length: interpolated ones are a little steeper than one in places.
+const STEEPEST: f64 = 1.25;
+
+/// A body's surface beside a distance field, at one moment; everything in the field's frame.
+#[derive(Clone, Copy)]
+pub struct Patch<'a> {
+    /// The samples that may touch.
+    pub surface: &'a Surface,
+    /// Centre of mass of the body that carries them, in its model frame \[m\].
+    pub com: Point3<f64>,
+    /// The body's state, as the field sees it.
+    pub state: State,
+    /// Whose surface is at distance zero.
+    pub field: &'a dyn DistanceField,
+    /// How contact begins.
+    pub onset: Onset,
+}
+
+/// A wrench about the centre of mass with its derivatives.
+#[derive(Clone, Debug, PartialEq)]
 pub struct WrenchJacobian {
     /// Force \[N\], then torque about the centre of mass \[N m\].
     pub wrench: Vector6<f64>,
-    /// Derivative by the pose: left twist (translation, rotation) about the centre of mass.
-    pub pose: Matrix6<f64>,
-    /// Derivative by the velocity (linear, angular), world frame.
-    pub velocity: Matrix6<f64>,
+    /// One row for each component of the wrench: derivatives along the directions of [`State::tangent`].
+    pub by_state: [[f64; 12]; 6],
+    /// Derivative of the wrench by each parameter of the law; empty if not asked for.
+    pub by_params: Vec<Vector6<f64>>,
 }
 
-impl WrenchJacobian {
-    /// No contact.
-    pub fn zero() -> Self {
-        Self { wrench: Vector6::zeros(), pose: Matrix6::zeros(), velocity: Matrix6::zeros() }
+/// The wrench as a function of the state's tangent, to first order about where it was found.
+impl LocalFunction<12, 6> for WrenchJacobian {
+    #[inline]
+    fn evaluate<S: Scalar>(&self, tangent: [S; 12]) -> [S; 6] {
+        std::array::from_fn(|row| {
+            let sum = S::constant(self.wrench[row]);
+            let terms = tangent.iter().zip(&self.by_state[row]);
+            terms.fold(sum, |sum, (direction, slope)| sum + direction.times(*slope))
+        })
+    }
+
+    #[inline]
+    fn linearise(&self, _: [f64; 12]) -> ([f64; 6], [[f64; 12]; 6]) {
+        (self.wrench.into(), self.by_state)
     }
 }
 
@@ -35,86 +63,129 @@ impl WrenchJacobian {
 struct Touch {
     arm: Vector3<f64>,
     velocity: Vector3<f64>,
-    field: FieldSample,
     onset: OnsetSample,
     normal: Vector3<f64>,
     length: f64,
     area: f64,
+    hessian: Matrix3<f64>,
 }
 
-/// The points of `points` in contact at `state`, in order.
-fn touches<'a>(
-    points: impl Iterator<Item = &'a SurfacePoint> + 'a,
-    state: &State,
-    field: &'a dyn DistanceField,
-    onset: Onset,
-    cutoff: f64,
-) -> impl Iterator<Item = Touch> + 'a {
-    let state = *state;
-    let rotation = state.pose.rotation.to_rotation_matrix();
-    let reach = cutoff + onset.band();
-    points.filter_map(move |point| {
-        let arm = rotation * point.position;
-        let field = field.sample(&Point3::from(state.pose.translation.vector + arm), reach)?;
-        let onset = onset.at(field.distance - cutoff)?;
-        let length = field.gradient.norm();
-        if length.is_nan() || length < MIN_GRADIENT {
-            return None;
+impl Patch<'_> {
+    /// Calls `visit` with every point in contact, in order. Points beyond `cutoff` and the onset's band exert no
+    /// force, so leaving out blocks of them changes nothing.
+    #[inline(always)]
+    fn for_each_touch(&self, cutoff: f64, mut visit: impl FnMut(&Touch)) {
+        let State { pose, linear, angular } = &self.state;
+        let (translation, rotation) = (pose.translation.vector, pose.rotation.to_rotation_matrix());
+        let reach = cutoff + self.onset.band();
+        for (block, points) in self.surface.blocks() {
+            let centre = Point3::from(translation + rotation * (block.centre - self.com));
+            if self.field.sample(&centre, reach + STEEPEST * block.radius).is_none() {
+                continue;
+            }
+            for point in points {
+                let arm = rotation * (point.position - self.com);
+                let Some(sample) = self.field.sample(&Point3::from(translation + arm), reach)
+                else {
+                    continue;
+                };
+                let FieldSample { distance, gradient, hessian } = sample;
+                let Some(onset) = self.onset.at(distance - cutoff) else { continue };
+                let length = gradient.norm();
+                if length.is_nan() || length < MIN_GRADIENT {
+                    continue;
+                }
+                let (normal, area) = (gradient / length, point.area);
+                let velocity = linear + angular.cross(&arm);
+                visit(&Touch { arm, velocity, onset, normal, length, area, hessian });
+            }
         }
-        let normal = field.gradient / length;
-        let velocity = state.linear + state.angular.cross(&arm);
-        Some(Touch { arm, velocity, field, onset, normal, length, area: point.area })
-    })
+    }
 }
 
-/// Contact wrench (force \[N\], torque about the centre of mass \[N m\]; world frame) on a body whose
-/// surface `points` touch `field`.
-pub fn contact_wrench<'a, L: LocalLaw + ?Sized>(
-    law: &L,
-    onset: Onset,
-    points: impl Iterator<Item = &'a SurfacePoint> + 'a,
-    state: &State,
-    field: &'a dyn DistanceField,
-) -> Vector6<f64> {
-    let (params, cutoff) = (law.parameters(), law.cutoff());
+impl Touch {
+    /// What the law sees.
+    #[inline(always)]
+    fn contact(&self, cutoff: f64) -> Contact<f64> {
+        let speed = self.velocity.dot(&self.normal);
+        Contact {
+            gap: cutoff + self.onset.gap,
+            normal_speed: self.onset.activation * speed,
+            slip: self.velocity - self.normal * speed,
+            normal: self.normal,
+            area: self.area,
+        }
+    }
+
+    /// What the law sees, with derivatives by the point's position (0..3) and velocity (3..6).
+    #[inline(always)]
+    fn lifted(&self, cutoff: f64) -> Contact<Fwd<6>> {
+        let gradient = self.normal * self.length;
+        let along_gradient = |value: f64, slope: f64| {
+            let g = gradient * slope;
+            Fwd { value, derivative: [g.x, g.y, g.z, 0.0, 0.0, 0.0] }
+        };
+        let normal = self.lifted_normal();
+        let u: Vector3<Fwd<6>> = Vector3::from_fn(|i, _| Fwd::variable(self.velocity[i], 3 + i));
+        let speed = u.x * normal.x + u.y * normal.y + u.z * normal.z;
+        let activation = along_gradient(self.onset.activation, self.onset.activation_slope);
+        Contact {
+            gap: along_gradient(cutoff + self.onset.gap, self.onset.slope),
+            normal_speed: activation * speed,
+            slip: Vector3::from_fn(|i, _| u[i] - normal[i] * speed),
+            normal,
+            area: self.area,
+        }
+    }
+
+    /// The unit normal with its derivative by position: (I − nnᵀ)·∇²φ/|∇φ|.
+    #[inline(always)]
+    fn lifted_normal(&self) -> Vector3<Fwd<6>> {
+        let n = &self.normal;
+        let hessian_n = self.hessian.tr_mul(n);
+        Vector3::from_fn(|i, _| {
+            let mut derivative = [0.0; 6];
+            for j in 0..3 {
+                derivative[j] = (self.hessian[(i, j)] - n[i] * hessian_n[j]) / self.length;
+            }
+            Fwd { value: n[i], derivative }
+        })
+    }
+}
+
+/// The sum of all contacts of `patch`.
+pub(crate) fn wrench<L: ContactLaw>(law: &L, p: &[f64], patch: &Patch<'_>) -> Vector6<f64> {
+    let cutoff = law.reach();
     let (mut force, mut torque) = (Vector3::zeros(), Vector3::zeros());
-    for touch in touches(points, state, field, onset, cutoff) {
-        let speed = touch.velocity.dot(&touch.normal);
-        let response = law.response(
-            params,
-            &Contact {
-                gap: cutoff + touch.onset.gap,
-                normal_speed: touch.onset.activation * speed,
-                slip: touch.velocity - touch.normal * speed,
-                normal: touch.normal,
-                area: touch.area,
-            },
-        );
+    patch.for_each_touch(cutoff, |touch| {
+        let response = law.law(p, &touch.contact(cutoff));
         let f = touch.normal * response.normal + response.tangential;
         force += f;
         torque += touch.arm.cross(&f);
-    }
+    });
     stack(&force, &torque)
 }
 
-/// [`contact_wrench`] with its derivative by pose and velocity.
+/// [`wrench`] with its derivative.
 ///
 /// Each point differentiates its force by its own position and velocity in forward mode (the normal
 /// turns with the position: hence the field's Hessian); the rest is the rigid body's kinematics.
-pub fn contact_wrench_jacobian<'a, L: LocalLaw + ?Sized>(
+pub(crate) fn wrench_jacobian<L: ContactLaw>(
     law: &L,
-    onset: Onset,
-    points: impl Iterator<Item = &'a SurfacePoint> + 'a,
-    state: &State,
-    field: &'a dyn DistanceField,
+    p: &[f64],
+    patch: &Patch<'_>,
+    by_params: bool,
 ) -> WrenchJacobian {
-    let cutoff = law.cutoff();
-    let params: Vec<Fwd<6>> = law.parameters().iter().map(|&p| Fwd::constant(p)).collect();
-    let spin = cross_matrix(&state.angular);
-    let mut total = WrenchJacobian::zero();
-    for touch in touches(points, state, field, onset, cutoff) {
-        let contact = lift(&touch, cutoff);
-        let response = law.response_with_derivative(&params, &contact);
+    let cutoff = law.reach();
+    let params: Vec<Fwd<6>> = p.iter().map(|&p| Fwd::constant(p)).collect();
+    let spin = cross_matrix(&patch.state.angular);
+    let mut wrench = Vector6::zeros();
+    // Force and torque by position, turn, velocity and spin of the body.
+    let mut by = [[Matrix3::<f64>::zeros(); 4]; 2];
+    let mut param_slopes = vec![Vector6::zeros(); if by_params { p.len() } else { 0 }];
+    patch.for_each_touch(cutoff, |touch| {
+        let contact = touch.lifted(cutoff);
+        let response = law.law(&params, &contact);
         let force: Vector3<Fwd<6>> =
             Vector3::from_fn(|i, _| contact.normal[i] * response.normal + response.tangential[i]);
         let f = force.map(|x| x.value);
@@ -124,54 +195,53 @@ pub fn contact_wrench_jacobian<'a, L: LocalLaw + ?Sized>(
         // Point position: δt + δθ×r; point velocity: δv + δω×r + ω×(δθ×r), for the arm r.
         let arm = cross_matrix(&touch.arm);
         let by_turn = -(by_position + by_velocity * spin) * arm;
-        let by_spin = -by_velocity * arm;
-        // Torque r×f: the arm turns with the body, δ(r×f) = (δθ×r)×f + r×δf.
-        let arm_turn = cross_matrix(&f) * arm;
-
-        total.wrench += stack(&f, &touch.arm.cross(&f));
-        add_block(&mut total.pose, 0, 0, &by_position);
-        add_block(&mut total.pose, 0, 3, &by_turn);
-        add_block(&mut total.pose, 3, 0, &(arm * by_position));
-        add_block(&mut total.pose, 3, 3, &(arm * by_turn + arm_turn));
-        add_block(&mut total.velocity, 0, 0, &by_velocity);
-        add_block(&mut total.velocity, 0, 3, &by_spin);
-        add_block(&mut total.velocity, 3, 0, &(arm * by_velocity));
-        add_block(&mut total.velocity, 3, 3, &(arm * by_spin));
-    }
-    total
-}
-
-/// The unit normal with its derivative by position: (I − nnᵀ)·∇²φ/|∇φ|.
-#[inline]
-fn lifted_normal(touch: &Touch) -> Vector3<Fwd<6>> {
-    let n = &touch.normal;
-    let hessian_n = touch.field.hessian.tr_mul(n);
-    Vector3::from_fn(|i, _| {
-        let mut derivative = [0.0; 6];
-        for j in 0..3 {
-            derivative[j] = (touch.field.hessian[(i, j)] - n[i] * hessian_n[j]) / touch.length;
+        let slopes = [by_position, by_turn, by_velocity, -by_velocity * arm];
+        for (column, slope) in slopes.iter().enumerate() {
+            by[0][column] += slope;
+            by[1][column] += arm * slope;
         }
-        Fwd { value: n[i], derivative }
-    })
+        // Torque r×f: the arm turns with the body, δ(r×f) = (δθ×r)×f + r×δf.
+        by[1][1] += cross_matrix(&f) * arm;
+        wrench += stack(&f, &touch.arm.cross(&f));
+        add_param_slopes(law, p, touch, cutoff, &mut param_slopes);
+    });
+    let by_state = std::array::from_fn(|row| {
+        std::array::from_fn(|column| by[row / 3][column / 3][(row % 3, column % 3)])
+    });
+    WrenchJacobian { wrench, by_state, by_params: param_slopes }
 }
 
-/// The contact with its derivatives by the point's position (0..3) and velocity (3..6).
-#[inline]
-fn lift(touch: &Touch, cutoff: f64) -> Contact<Fwd<6>> {
-    let along_gradient = |value: f64, slope: f64| {
-        let g = touch.field.gradient * slope;
-        Fwd { value, derivative: [g.x, g.y, g.z, 0.0, 0.0, 0.0] }
-    };
-    let normal = lifted_normal(touch);
-    let u: Vector3<Fwd<6>> = Vector3::from_fn(|i, _| Fwd::variable(touch.velocity[i], 3 + i));
-    let speed = u.x * normal.x + u.y * normal.y + u.z * normal.z;
-    let activation = along_gradient(touch.onset.activation, touch.onset.activation_slope);
-    Contact {
-        gap: along_gradient(cutoff + touch.onset.gap, touch.onset.slope),
-        normal_speed: activation * speed,
-        slip: Vector3::from_fn(|i, _| u[i] - normal[i] * speed),
-        normal,
-        area: touch.area,
+/// Adds the derivatives of one contact's wrench by the parameters, six at a time.
+#[inline(always)]
+fn add_param_slopes<L: ContactLaw>(
+    law: &L,
+    p: &[f64],
+    touch: &Touch,
+    cutoff: f64,
+    slopes: &mut [Vector6<f64>],
+) {
+    for (chunk, slopes) in slopes.chunks_mut(6).enumerate() {
+        let seeded = |(i, &p): (usize, &f64)| match i.checked_sub(6 * chunk) {
+            Some(lane) if lane < 6 => Fwd::variable(p, lane),
+            _ => Fwd::constant(p),
+        };
+        let params: Vec<Fwd<6>> = p.iter().enumerate().map(seeded).collect();
+        let Contact { gap, normal_speed, slip, normal, area } = touch.contact(cutoff);
+        let response = law.law(
+            &params,
+            &Contact {
+                gap: Fwd::constant(gap),
+                normal_speed: Fwd::constant(normal_speed),
+                slip: slip.map(Fwd::constant),
+                normal: normal.map(Fwd::constant),
+                area,
+            },
+        );
+        for (lane, slope) in slopes.iter_mut().enumerate() {
+            let f = touch.normal * response.normal.derivative[lane]
+                + response.tangential.map(|x| x.derivative[lane]);
+            *slope += stack(&f, &touch.arm.cross(&f));
+        }
     }
 }
 
@@ -180,83 +250,58 @@ fn stack(a: &Vector3<f64>, b: &Vector3<f64>) -> Vector6<f64> {
     Vector6::new(a.x, a.y, a.z, b.x, b.y, b.z)
 }
 
-#[inline]
-fn add_block(m: &mut Matrix6<f64>, row: usize, column: usize, block: &Matrix3<f64>) {
-    let mut view = m.fixed_view_mut::<3, 3>(row, column);
-    view += block;
-}
-
-/// The points whose distance from the field is at most `distance` \[m\] for a body at `t_world_com`.
-pub(crate) fn within_reach(
-    points: &[SurfacePoint],
-    t_world_com: &Isometry3<f64>,
-    field: &dyn DistanceField,
-    distance: f64,
-) -> Vec<SurfacePoint> {
-    let rotation = t_world_com.rotation.to_rotation_matrix();
-    let place = |p: &SurfacePoint| t_world_com.translation.vector + rotation * p.position;
-    let near = |p: &&SurfacePoint| field.sample(&Point3::from(place(p)), distance).is_some();
-    points.iter().filter(near).copied().collect()
-}
-
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
+    use nalgebra::{Isometry3, Point3, Vector3, Vector6};
+    use prehend_autodiff::Fwd;
     use prehend_autodiff::check::{compare_gradients, finite_difference_jacobian};
-    use prehend_autodiff::lie::perturb_about;
+    use prehend_geometry::{DistanceField, FieldSample};
 
-    use super::*;
-    use crate::fields::{HalfSpace, SphereCavity};
-    use crate::{LeakSteps, Penalty};
+    use crate::scenes::{bowl, egg_on, floor};
+    use crate::{LeakSteps, LocalLaw, Onset, Patch, Penalty, State, Surface, WrenchJacobian};
 
-    fn points() -> Vec<SurfacePoint> {
-        let corner = |i: u32| {
-            let sign = |bit: u32| if i & bit == 0 { -1.0 } else { 1.0 };
-            Vector3::new(0.02 * sign(1), 0.03 * sign(2), 0.01 * sign(4) - 2e-3)
-        };
-        (0..8).map(|i| SurfacePoint { position: corner(i), area: 1e-4 }).collect()
+    /// A single sample, with the state of the egg but at `height` above the floor.
+    fn sample_at<R>(
+        height: f64,
+        field: &dyn DistanceField,
+        onset: Onset,
+        f: impl Fn(&Patch<'_>) -> R,
+    ) -> R {
+        let surface = Surface::new(&[Point3::origin()], &[1e-4]).unwrap();
+        let (_, states) = egg_on(floor(), onset);
+        let state = State { pose: Isometry3::translation(0.0, 0.0, height), ..states[1] };
+        f(&Patch { surface: &surface, com: Point3::origin(), state, field, onset })
     }
 
-    fn state() -> State {
-        let pose = Isometry3::new(Vector3::new(0.01, 0.0, 0.0105), Vector3::new(0.05, -0.03, 0.8));
-        State { pose, linear: Vector3::new(0.1, 0.2, -0.05), angular: Vector3::new(1.0, 2.0, -1.5) }
+    fn is_finite(jacobian: &WrenchJacobian) -> bool {
+        jacobian.wrench.iter().chain(jacobian.by_state.as_flattened()).all(|x| x.is_finite())
     }
 
     #[test]
-    fn jacobian_matches_differences() {
-        let law = Penalty::new(2e7, 1e4, 0.5, 1e-2).unwrap();
-        let (points, state) = (points(), state());
-        let com = state.pose.translation.vector;
-        let bowl = SphereCavity { center: Point3::new(0.0, 0.0, 0.05), radius: 0.05 };
-        let fields: [&dyn DistanceField; 2] = [&HalfSpace::floor(), &bowl];
-        for field in fields {
+    fn derivatives_match_differences() {
+        for field in [floor(), bowl()] {
             for onset in [Onset::Hard, Onset::Softplus { width: 5e-4 }] {
-                let exact = contact_wrench_jacobian(&law, onset, points.iter(), &state, field);
-                let value = contact_wrench(&law, onset, points.iter(), &state, field);
-                assert!((value - exact.wrench).norm() <= 1e-12 * value.norm() && value.z > 0.0);
+                let (world, mut states) = egg_on(Arc::clone(&field), onset);
+                states[1].pose.translation.z -= 1e-3;
+                let wrench = |state: State| world.wrenches(&[states[0], state], 0)[1];
+                let mut lifted: Vec<State<Fwd<12>>> = states.iter().map(State::lift).collect();
+                lifted[1] = states[1].variables();
+                let exact = world.lift().wrenches(&lifted, 0)[1];
+                let value = wrench(states[1]);
+                assert!((value - exact.map(|w| w.value)).norm() <= 1e-12 * value.norm());
+                assert!(value.z > 0.0);
                 let differences = finite_difference_jacobian(
                     |x| {
-                        let pose =
-                            perturb_about(&state.pose, &com, &Vector6::from_column_slice(&x[..6]));
-                        let linear = state.linear + Vector3::new(x[6], x[7], x[8]);
-                        let angular = state.angular + Vector3::new(x[9], x[10], x[11]);
-                        let moved = State { pose, linear, angular };
-                        contact_wrench(&law, onset, points.iter(), &moved, field)
-                            .iter()
-                            .copied()
-                            .collect()
+                        let moved = states[1].moved(&std::array::from_fn::<f64, 12, _>(|i| x[i]));
+                        wrench(moved).iter().copied().collect()
                     },
                     &[0.0; 12],
-                    1e-6,
+                    1e-7,
                 );
                 for (row, reference) in differences.iter().enumerate() {
-                    let exact: Vec<f64> = exact
-                        .pose
-                        .row(row)
-                        .iter()
-                        .chain(exact.velocity.row(row).iter())
-                        .copied()
-                        .collect();
-                    let error = compare_gradients(&exact, reference);
+                    let error = compare_gradients(&exact[row].derivative, reference);
                     assert!(error.relative < 1e-6, "{onset:?} row {row}: {error:?}");
                 }
             }
@@ -266,17 +311,22 @@ mod tests {
     #[test]
     fn a_leak_adds_stiffness_and_no_force() {
         let law = Penalty::new(2e7, 1e4, 0.5, 1e-2).unwrap();
-        let point = [SurfacePoint { position: Vector3::zeros(), area: 1e-4 }];
-        let pose = Isometry3::translation(0.0, 0.0, 1e-3);
-        let state = State { pose, ..state() };
-        let leaky = Onset::Leaky { alpha: 0.1, band: 2e-3, steps: LeakSteps::All };
-        let floor = HalfSpace::floor();
-        let total = contact_wrench_jacobian(&law, leaky, point.iter(), &state, &floor);
-        assert_eq!(total.wrench, Vector6::zeros());
-        assert!((total.pose[(2, 2)] + 0.1 * 2e7 * 1e-4).abs() < 1e-9);
-        assert_eq!(total.velocity, Matrix6::zeros());
-        let hard = contact_wrench_jacobian(&law, Onset::Hard, point.iter(), &state, &floor);
-        assert_eq!(hard, WrenchJacobian::zero());
+        let jacobian = |onset| {
+            sample_at(1e-3, floor().as_ref(), onset, |patch| {
+                law.wrench_jacobian(law.parameters(), patch, true)
+            })
+        };
+        let leaky = jacobian(Onset::Leaky { alpha: 0.1, band: 2e-3, steps: LeakSteps::All });
+        assert_eq!(leaky.wrench, Vector6::zeros());
+        assert!((leaky.by_state[2][2] + 0.1 * 2e7 * 1e-4).abs() < 1e-9);
+        assert!(leaky.by_state.iter().all(|row| row[6..].iter().all(|slope| *slope == 0.0)));
+        let hard = jacobian(Onset::Hard);
+        let zero = WrenchJacobian {
+            wrench: Vector6::zeros(),
+            by_state: [[0.0; 12]; 6],
+            by_params: vec![Vector6::zeros(); 3],
+        };
+        assert_eq!(hard, zero);
     }
 
     #[test]
@@ -284,23 +334,21 @@ mod tests {
         struct Flat;
         impl DistanceField for Flat {
             fn sample(&self, _: &Point3<f64>, _: f64) -> Option<FieldSample> {
-                let (gradient, hessian) = (Vector3::zeros(), Matrix3::zeros());
+                let (gradient, hessian) = (Vector3::zeros(), nalgebra::Matrix3::zeros());
                 Some(FieldSample { distance: -1e-3, gradient, hessian })
             }
         }
         let law = Penalty::new(2e7, 1e4, 0.5, 1e-2).unwrap();
-        let point = [SurfacePoint { position: Vector3::zeros(), area: 1e-4 }];
-        let (linear, angular) = (Vector3::zeros(), Vector3::zeros());
-        let state = State { pose: Isometry3::identity(), linear, angular };
         let leaky = Onset::Leaky { alpha: 0.1, band: 2e-3, steps: LeakSteps::All };
         for onset in [Onset::Hard, Onset::Softplus { width: 1e-4 }, leaky] {
-            // ∇φ = 0, then φ = 0 and no slip.
-            let flat = contact_wrench_jacobian(&law, onset, point.iter(), &state, &Flat);
-            assert_eq!(flat, WrenchJacobian::zero());
-            let floor = HalfSpace::floor();
-            let rest = contact_wrench_jacobian(&law, onset, point.iter(), &state, &floor);
-            let entries = rest.wrench.iter().chain(rest.pose.iter()).chain(rest.velocity.iter());
-            assert!(entries.clone().all(|x| x.is_finite()));
+            let jacobian = |patch: &Patch<'_>| law.wrench_jacobian(law.parameters(), patch, true);
+            // ∇φ = 0 gives no contact; φ = 0 without slip, finite ones.
+            assert_eq!(sample_at(0.0, &Flat, onset, jacobian).wrench, Vector6::zeros());
+            let rest = |patch: &Patch<'_>| {
+                let state = State::at_rest(Isometry3::identity());
+                jacobian(&Patch { state, ..*patch })
+            };
+            assert!(is_finite(&sample_at(0.0, floor().as_ref(), onset, rest)));
         }
     }
 }

@@ -1,0 +1,77 @@
+//! Why a simulation cannot be set up or cannot go on.
+
+use thiserror::Error;
+
+/// Why a simulation cannot be set up or cannot go on.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum SimulationError {
+    /// There is no body of that number.
+    #[error("there is no body {body}: the world has {bodies}")]
+    NoBody {
+        /// The number.
+        body: usize,
+        /// How many there are.
+        bodies: usize,
+    },
+    /// A body that should touch others has no samples.
+    #[error("body '{body}' has no surface samples to touch others with")]
+    NoSamples {
+        /// Its name.
+        body: String,
+    },
+    /// A body that should be touched has no distance field.
+    #[error("body '{body}' has no distance field to be touched")]
+    NoField {
+        /// Its name.
+        body: String,
+    },
+    /// A body cannot touch itself.
+    #[error("body '{body}' cannot touch itself")]
+    Itself {
+        /// Its name.
+        body: String,
+    },
+    /// A body that forces should move is held or driven.
+    #[error("body '{body}' is not free to move")]
+    NotFree {
+        /// Its name.
+        body: String,
+    },
+    /// States and bodies differ in number.
+    #[error("{states} states for {bodies} bodies")]
+    States {
+        /// How many states.
+        states: usize,
+        /// How many bodies.
+        bodies: usize,
+    },
+    /// The time step is not a positive number.
+    #[error("the time step must be positive and finite, is {0} s")]
+    TimeStep(f64),
+    /// A body's state is not finite: given so, or blown up.
+    #[error(
+        "the state of body '{body}' is not finite after step {step}, at {time} s: bad input, or a time step too long for the contacts"
+    )]
+    NotFinite {
+        /// Its name.
+        body: String,
+        /// Steps that had been taken.
+        step: usize,
+        /// Time \[s\].
+        time: f64,
+    },
+    /// An implicit step found no solution.
+    #[error(
+        "the equations of step {step}, at {time} s, were not solved: residual {residual:.3e} after {iterations} iterations"
+    )]
+    Unsolved {
+        /// Number of the step.
+        step: usize,
+        /// Time \[s\].
+        time: f64,
+        /// Norm of what remained, as a velocity \[m/s, rad/s\].
+        residual: f64,
+        /// Newton iterations.
+        iterations: usize,
+    },
+}

@@ -1,0 +1,147 @@
+//! Samples of a body's surface, in blocks that are left out together where nothing is near.
+
+use nalgebra::Point3;
+
+use crate::body::BodyError;
+
+/// A sample of a body's surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfacePoint {
+    /// Position in the model frame \[m\].
+    pub position: Point3<f64>,
+    /// Area the sample stands for \[m²\].
+    pub area: f64,
+}
+
+/// Samples of a surface, sorted into blocks of neighbours.
+///
+/// Blocks out of reach of a contact cost one query of the distance field. The order of samples is part of the
+/// result's rounding, so it depends on nothing but the samples themselves.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Surface {
+    points: Vec<SurfacePoint>,
+    blocks: Vec<Block>,
+    area: f64,
+}
+
+/// Neighbouring samples and the ball they lie in.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Block {
+    start: usize,
+    end: usize,
+    /// Model frame \[m\].
+    pub(crate) centre: Point3<f64>,
+    /// \[m\]
+    pub(crate) radius: f64,
+}
+
+/// Samples of a block at most: few enough to be left out often, many enough that asking is cheap.
+const BLOCK: usize = 16;
+
+impl Surface {
+    /// Samples at `points` in the model frame \[m\] that stand for `areas` \[m²\].
+    ///
+    /// # Errors
+    /// Where the two differ in number, there are none, or one is not finite or of no area.
+    pub fn new(points: &[Point3<f64>], areas: &[f64]) -> Result<Self, BodyError> {
+        if points.len() != areas.len() {
+            return Err(BodyError::Samples { points: points.len(), areas: areas.len() });
+        }
+        if points.is_empty() {
+            return Err(BodyError::NoSamples);
+        }
+        let fine = |(p, a): (&Point3<f64>, &f64)| {
+            p.iter().all(|x| x.is_finite()) && a.is_finite() && *a > 0.0
+        };
+        if let Some(index) = points.iter().zip(areas).position(|sample| !fine(sample)) {
+            return Err(BodyError::Sample { index });
+        }
+        let samples = points.iter().zip(areas);
+        let mut points: Vec<SurfacePoint> =
+            samples.map(|(&position, &area)| SurfacePoint { position, area }).collect();
+        let mut blocks = Vec::new();
+        sort_into_blocks(&mut points, 0, &mut blocks);
+        Ok(Self { blocks, area: areas.iter().sum(), points })
+    }
+
+    /// `points` that share `area` \[m²\] equally, such as uniform samples of a surface.
+    ///
+    /// # Errors
+    /// See [`Surface::new`].
+    pub fn uniform(points: &[Point3<f64>], area: f64) -> Result<Self, BodyError> {
+        Self::new(points, &vec![area / points.len().max(1) as f64; points.len()])
+    }
+
+    /// The samples, block after block.
+    pub fn points(&self) -> &[SurfacePoint] {
+        &self.points
+    }
+
+    /// Area of all samples \[m²\].
+    pub fn area(&self) -> f64 {
+        self.area
+    }
+
+    /// The blocks with their samples.
+    #[inline]
+    pub(crate) fn blocks(&self) -> impl Iterator<Item = (&Block, &[SurfacePoint])> {
+        self.blocks.iter().map(|block| (block, &self.points[block.start..block.end]))
+    }
+}
+
+/// Sorts by halves along the longest side of their box until a block is small enough.
+fn sort_into_blocks(points: &mut [SurfacePoint], start: usize, blocks: &mut Vec<Block>) {
+    let first = points[0].position;
+    let (lo, hi) = points
+        .iter()
+        .fold((first, first), |(lo, hi), p| (lo.inf(&p.position), hi.sup(&p.position)));
+    if points.len() > BLOCK {
+        let axis = (hi - lo).imax();
+        let half = points.len() / 2;
+        points.select_nth_unstable_by(half, |a, b| a.position[axis].total_cmp(&b.position[axis]));
+        let (left, right) = points.split_at_mut(half);
+        sort_into_blocks(left, start, blocks);
+        sort_into_blocks(right, start + half, blocks);
+        return;
+    }
+    let centre = nalgebra::center(&lo, &hi);
+    let radius = points.iter().map(|p| (p.position - centre).norm()).fold(0.0, f64::max);
+    blocks.push(Block { start, end: start + points.len(), centre, radius });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blocks_hold_every_sample_once_and_in_their_ball() {
+        let points: Vec<Point3<f64>> = (0..533)
+            .map(|i| {
+                let t = f64::from(i);
+                Point3::new((1.3 * t).sin(), (0.7 * t).cos(), (0.1 * t).sin())
+            })
+            .collect();
+        let surface = Surface::uniform(&points, 2.0).unwrap();
+        let mut seen = 0;
+        for (block, samples) in surface.blocks() {
+            assert!(!samples.is_empty() && samples.len() <= BLOCK);
+            let inside = |p: &SurfacePoint| (p.position - block.centre).norm() <= block.radius;
+            assert!(samples.iter().all(inside) && block.radius < 0.8);
+            seen += samples.len();
+        }
+        assert_eq!(seen, 533);
+        for p in &points {
+            assert_eq!(surface.points().iter().filter(|s| s.position == *p).count(), 1);
+        }
+        assert!((surface.area() - 2.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn bad_samples_are_refused() {
+        let o = Point3::origin();
+        assert_eq!(Surface::new(&[o], &[]), Err(BodyError::Samples { points: 1, areas: 0 }));
+        assert_eq!(Surface::new(&[], &[]), Err(BodyError::NoSamples));
+        assert_eq!(Surface::new(&[o, o], &[1.0, 0.0]), Err(BodyError::Sample { index: 1 }));
+        assert_eq!(Surface::new(&[o * f64::NAN], &[1.0]), Err(BodyError::Sample { index: 0 }));
+    }
+}

@@ -1,0 +1,472 @@
+//! Bodies, what acts on them and what touches what.
+
+use std::fmt;
+use std::sync::Arc;
+
+use nalgebra::{Point3, Vector3, Vector6};
+use prehend_autodiff::Scalar;
+use prehend_geometry::DistanceField;
+
+use crate::body::RigidBody;
+use crate::contact::law::LocalLaw;
+use crate::contact::onset::Onset;
+use crate::contact::wrench::Patch;
+use crate::error::SimulationError;
+use crate::state::State;
+use crate::surface::Surface;
+
+/// What a body is and how it touches others.
+#[derive(Clone)]
+pub struct Body<S: Scalar = f64> {
+    /// Name, for messages.
+    pub name: String,
+    /// What moves it.
+    pub motion: Motion<S>,
+    /// Samples of its surface, in its model frame: with them it touches the fields of others.
+    pub surface: Option<Arc<Surface>>,
+    /// Signed distance to it, in its model frame: what the samples of others touch.
+    pub field: Option<Arc<dyn DistanceField>>,
+    /// External wrench: force \[N\] and torque about the centre of mass \[N m\], world frame.
+    pub load: Vector6<S>,
+}
+
+/// What moves a body.
+#[derive(Clone)]
+pub enum Motion<S: Scalar = f64> {
+    /// Forces.
+    Free(RigidBody<S>),
+    /// Nothing: it keeps its state, whose velocity (a conveyor's, say) is felt by what touches it.
+    Held,
+    /// A given course, whatever the forces: a link of a robot whose joints are driven.
+    Driven(Arc<dyn Course>),
+}
+
+/// A course in time: state of the model frame, in the world.
+pub trait Course: Send + Sync {
+    /// The state at `time` \[s\].
+    fn state(&self, time: f64) -> State;
+}
+
+impl<F: Fn(f64) -> State + Send + Sync> Course for F {
+    fn state(&self, time: f64) -> State {
+        self(time)
+    }
+}
+
+impl<S: Scalar> Body<S> {
+    fn new(name: &str, motion: Motion<S>) -> Self {
+        let load = Vector6::zeros();
+        Self { name: name.to_owned(), motion, surface: None, field: None, load }
+    }
+
+    /// A body that forces move.
+    pub fn free(name: &str, body: RigidBody<S>) -> Self {
+        Self::new(name, Motion::Free(body))
+    }
+
+    /// A body that stays as it is. Its centre of mass is the origin of its model frame.
+    pub fn held(name: &str) -> Self {
+        Self::new(name, Motion::Held)
+    }
+
+    /// A body on a given course. Its centre of mass is the origin of its model frame.
+    pub fn driven(name: &str, course: impl Course + 'static) -> Self {
+        Self::new(name, Motion::Driven(Arc::new(course)))
+    }
+
+    /// The same body with samples of its surface.
+    #[must_use]
+    pub fn with_surface(mut self, surface: impl Into<Arc<Surface>>) -> Self {
+        self.surface = Some(surface.into());
+        self
+    }
+
+    /// The same body with a distance field, in its model frame.
+    #[must_use]
+    pub fn with_field(mut self, field: Arc<dyn DistanceField>) -> Self {
+        self.field = Some(field);
+        self
+    }
+
+    /// Its mass properties, if forces move it.
+    #[inline]
+    pub fn rigid(&self) -> Option<&RigidBody<S>> {
+        match &self.motion {
+            Motion::Free(body) => Some(body),
+            Motion::Held | Motion::Driven(_) => None,
+        }
+    }
+
+    /// Centre of mass in the model frame \[m\].
+    #[inline]
+    pub fn com(&self) -> Point3<f64> {
+        self.rigid().map_or_else(Point3::origin, |body| *body.com())
+    }
+}
+
+/// Samples of one body that touch the field of another.
+#[derive(Clone)]
+pub struct ContactPair<S: Scalar = f64> {
+    /// The body with the samples.
+    pub samples: usize,
+    /// The body with the field.
+    pub field: usize,
+    /// Force of a contact.
+    pub law: Arc<dyn LocalLaw>,
+    /// Parameters of the law, in its order.
+    pub params: Vec<S>,
+    /// How contact begins.
+    pub onset: Onset,
+    /// Factor on the forces: a half where both bodies have samples and fields, so that together they count once.
+    pub share: f64,
+}
+
+/// Moment of a simulation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Step {
+    /// Number of the step, from 0.
+    pub index: usize,
+    /// Time step \[s\].
+    pub dt: f64,
+}
+
+impl Step {
+    /// Time at its start \[s\].
+    pub fn time(&self) -> f64 {
+        self.index as f64 * self.dt
+    }
+}
+
+/// Bodies, their contacts, and gravity: plain data, over plain numbers or numbers that carry derivatives.
+///
+/// To differentiate by a mass, a friction coefficient or gravity, [`lift`](World::lift) the world to the scalar and put
+/// the variable in its place. States come in the order of the bodies.
+#[derive(Clone)]
+pub struct World<S: Scalar = f64> {
+    /// The bodies.
+    pub bodies: Vec<Body<S>>,
+    /// What touches what.
+    pub contacts: Vec<ContactPair<S>>,
+    /// Gravity, world frame \[m/s²\].
+    pub gravity: Vector3<S>,
+}
+
+impl World {
+    /// A world without bodies under `gravity` \[m/s²\].
+    pub fn new(gravity: Vector3<f64>) -> Self {
+        Self { bodies: Vec::new(), contacts: Vec::new(), gravity }
+    }
+
+    /// Adds a body and returns its number.
+    pub fn add(&mut self, body: Body) -> usize {
+        self.bodies.push(body);
+        self.bodies.len() - 1
+    }
+
+    /// Lets the samples of body `samples` touch the field of body `field`.
+    ///
+    /// # Errors
+    /// If there is no such body, it has no samples or no field, or the two are the same.
+    pub fn touch(
+        &mut self,
+        samples: usize,
+        field: usize,
+        law: Arc<dyn LocalLaw>,
+        onset: Onset,
+    ) -> Result<(), SimulationError> {
+        self.check_pair(samples, field)?;
+        let params = law.parameters().to_vec();
+        self.contacts.push(ContactPair { samples, field, law, params, onset, share: 1.0 });
+        Ok(())
+    }
+
+    /// Lets two bodies touch both ways, samples on field, each with half of the force.
+    ///
+    /// # Errors
+    /// See [`World::touch`].
+    pub fn touch_both_ways(
+        &mut self,
+        a: usize,
+        b: usize,
+        law: &Arc<dyn LocalLaw>,
+        onset: Onset,
+    ) -> Result<(), SimulationError> {
+        self.check_pair(a, b)?;
+        self.check_pair(b, a)?;
+        for (samples, field) in [(a, b), (b, a)] {
+            let (law, params) = (Arc::clone(law), law.parameters().to_vec());
+            self.contacts.push(ContactPair { samples, field, law, params, onset, share: 0.5 });
+        }
+        Ok(())
+    }
+
+    fn check_pair(&self, samples: usize, field: usize) -> Result<(), SimulationError> {
+        for body in [samples, field] {
+            if body >= self.bodies.len() {
+                return Err(SimulationError::NoBody { body, bodies: self.bodies.len() });
+            }
+        }
+        let name = |body: usize| self.bodies[body].name.clone();
+        if samples == field {
+            return Err(SimulationError::Itself { body: name(samples) });
+        }
+        if self.bodies[samples].surface.is_none() {
+            return Err(SimulationError::NoSamples { body: name(samples) });
+        }
+        if self.bodies[field].field.is_none() {
+            return Err(SimulationError::NoField { body: name(field) });
+        }
+        Ok(())
+    }
+
+    /// The same world in constants of another scalar.
+    pub fn lift<S: Scalar>(&self) -> World<S> {
+        let body = |body: &Body| Body {
+            name: body.name.clone(),
+            motion: match &body.motion {
+                Motion::Free(rigid) => Motion::Free(rigid.lift()),
+                Motion::Held => Motion::Held,
+                Motion::Driven(course) => Motion::Driven(Arc::clone(course)),
+            },
+            surface: body.surface.clone(),
+            field: body.field.clone(),
+            load: body.load.map(S::constant),
+        };
+        let pair = |pair: &ContactPair| ContactPair {
+            samples: pair.samples,
+            field: pair.field,
+            law: Arc::clone(&pair.law),
+            params: pair.params.iter().map(|&p| S::constant(p)).collect(),
+            onset: pair.onset,
+            share: pair.share,
+        };
+        World {
+            bodies: self.bodies.iter().map(body).collect(),
+            contacts: self.contacts.iter().map(pair).collect(),
+            gravity: self.gravity.map(S::constant),
+        }
+    }
+}
+
+impl<S: Scalar> World<S> {
+    /// External and contact wrenches on every body at `states` (force \[N\], torque about the centre of mass \[N m\],
+    /// world frame), without gravity. `step` matters to onsets that leak in the first step only.
+    ///
+    /// Derivatives through contacts are first derivatives.
+    pub fn wrenches(&self, states: &[State<S>], step: usize) -> Vec<Vector6<S>> {
+        const { assert!(S::ORDER <= 1, "contacts have first derivatives only: no nested scalars") };
+        let mut wrenches: Vec<Vector6<S>> = self.bodies.iter().map(|body| body.load).collect();
+        for pair in &self.contacts {
+            let [on_samples, on_field] = self.contact_wrenches(pair, states, step);
+            wrenches[pair.samples] += on_samples;
+            wrenches[pair.field] += on_field;
+        }
+        wrenches
+    }
+
+    /// Wrenches of `pair` on the body with the samples and on that with the field, each about its own centre of mass.
+    pub fn contact_wrenches(
+        &self,
+        pair: &ContactPair<S>,
+        states: &[State<S>],
+        step: usize,
+    ) -> [Vector6<S>; 2] {
+        let (body, other) = (&self.bodies[pair.samples], &self.bodies[pair.field]);
+        let (Some(surface), Some(field)) = (&body.surface, &other.field) else {
+            return [Vector6::zeros(); 2];
+        };
+        let (state, base) = (&states[pair.samples], &states[pair.field]);
+        let frame = base.shifted(&-other.com().coords);
+        let seen = state.seen_from(&frame);
+        let patch = Patch {
+            surface,
+            com: body.com(),
+            state: seen.value(),
+            field: field.as_ref(),
+            onset: pair.onset.at_step(step),
+        };
+        let [fx, fy, fz, tx, ty, tz] = local_wrench(pair, &seen, &patch);
+        let rotation = frame.pose.rotation;
+        let force = rotation * Vector3::new(fx, fy, fz).map(|x| x.times(pair.share));
+        let torque = rotation * Vector3::new(tx, ty, tz).map(|x| x.times(pair.share));
+        let offset = state.pose.translation.vector - base.pose.translation.vector;
+        [stack(&force, &torque), stack(&-force, &-(torque + offset.cross(&force)))]
+    }
+
+    /// Moves the bodies that forces do not move to where they are at `time` \[s\].
+    pub fn drive(&self, states: &mut [State<S>], time: f64) {
+        for (body, state) in self.bodies.iter().zip(states) {
+            if let Motion::Driven(course) = &body.motion {
+                *state = course.state(time).lift();
+            }
+        }
+    }
+}
+
+/// The wrench of `patch`, which is `pair` at the value of `seen`, with the derivatives that `seen` and the parameters
+/// carry.
+fn local_wrench<S: Scalar>(pair: &ContactPair<S>, seen: &State<S>, patch: &Patch<'_>) -> [S; 6] {
+    let values: Vec<f64> = pair.params.iter().map(|p| p.value()).collect();
+    if S::ORDER == 0 {
+        return pair.law.wrench(&values, patch).map(S::constant).into();
+    }
+    // Zeros that carry the parameters' derivatives.
+    let moved: Vec<S> = pair.params.iter().map(|p| p.plus(-p.value())).collect();
+    let by_params = moved.iter().any(|p| !p.is_constant_zero());
+    let jacobian = pair.law.wrench_jacobian(&values, patch, by_params);
+    let mut wrench = S::local(&jacobian, seen.tangent());
+    for (by_param, moved) in jacobian.by_params.iter().zip(moved) {
+        for (component, slope) in wrench.iter_mut().zip(by_param.iter()) {
+            *component += moved.times(*slope);
+        }
+    }
+    wrench
+}
+
+#[inline]
+fn stack<S: Scalar>(a: &Vector3<S>, b: &Vector3<S>) -> Vector6<S> {
+    Vector6::new(a.x, a.y, a.z, b.x, b.y, b.z)
+}
+
+impl<S: Scalar> fmt::Debug for World<S> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let names: Vec<&str> = self.bodies.iter().map(|body| body.name.as_str()).collect();
+        let pairs = self.contacts.iter().map(|pair| (names[pair.samples], names[pair.field]));
+        f.debug_struct("World")
+            .field("bodies", &names)
+            .field("contacts", &pairs.collect::<Vec<_>>())
+            .field("gravity", &self.gravity)
+            .finish_non_exhaustive()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Isometry3, Matrix3};
+    use prehend_autodiff::Fwd;
+    use prehend_autodiff::check::{compare_gradients, finite_difference_jacobian};
+
+    use super::*;
+    use crate::fields::SphereCavity;
+    use crate::scenes::{egg_on, ellipsoid, floor};
+    use crate::{Penalty, RigidBody};
+
+    /// A pebble in a cup, both free, turned and moving; they touch both ways.
+    fn pebble_in_cup() -> (World, Vec<State>) {
+        let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
+        let inertia = Matrix3::from_diagonal(&Vector3::new(6e-5, 9e-5, 5e-5));
+        let rigid = |com| RigidBody::new(0.2, inertia, com).unwrap();
+        let cavity = Arc::new(SphereCavity { center: Point3::new(0.0, 0.0, 0.05), radius: 0.05 });
+        let ball = Arc::new(SphereCavity { center: Point3::origin(), radius: 0.02 }.inside_out());
+        let pebble_points: Vec<Point3<f64>> = ellipsoid(90, [0.02; 3]);
+        let cup_points: Vec<Point3<f64>> = ellipsoid(90, [0.05; 3])
+            .iter()
+            .map(|p| p + Vector3::new(0.0, 0.0, 0.05))
+            .filter(|p| p.z < 0.02)
+            .collect();
+        let surface = |points: &[Point3<f64>]| Surface::uniform(points, 5e-3).unwrap();
+        let cup = Body::free("cup", rigid(Point3::new(0.01, 0.0, -0.02)))
+            .with_field(cavity)
+            .with_surface(surface(&cup_points));
+        let pebble = Body::free("pebble", rigid(Point3::new(1e-3, -2e-3, 3e-3)))
+            .with_field(ball)
+            .with_surface(surface(&pebble_points));
+        let (cup, pebble) = (world.add(cup), world.add(pebble));
+        let law: Arc<dyn LocalLaw> = Arc::new(Penalty::new(5e6, 2e4, 0.6, 2e-2).unwrap());
+        world.touch_both_ways(pebble, cup, &law, Onset::Softplus { width: 3e-4 }).unwrap();
+        let cup_pose = Isometry3::new(Vector3::new(0.3, 0.2, 0.1), Vector3::new(0.4, -0.7, 1.0));
+        let pebble_pose = cup_pose
+            * Isometry3::new(Vector3::new(2e-3, 1e-3, 0.0192), Vector3::new(0.5, 0.1, -0.2));
+        let state = |body: usize, pose: &Isometry3<f64>, sign: f64| {
+            let mut state = world.bodies[body].rigid().unwrap().at_rest(pose);
+            state.linear = Vector3::new(0.05, -0.1, 0.02) * sign;
+            state.angular = Vector3::new(1.0, 2.0, -1.5) * sign;
+            state
+        };
+        let states = vec![state(cup, &cup_pose, -1.0), state(pebble, &pebble_pose, 1.0)];
+        (world, states)
+    }
+
+    #[test]
+    fn both_bodies_feel_derivatives_of_both() {
+        let (world, states) = pebble_in_cup();
+        for moving in 0..2 {
+            let mut lifted: Vec<State<Fwd<12>>> = states.iter().map(State::lift).collect();
+            lifted[moving] = states[moving].variables();
+            let exact = world.lift().wrenches(&lifted, 0);
+            let differences = finite_difference_jacobian(
+                |x| {
+                    let mut states = states.clone();
+                    let tangent = std::array::from_fn::<f64, 12, _>(|i| x[i]);
+                    states[moving] = states[moving].moved(&tangent);
+                    world.wrenches(&states, 0).iter().flat_map(|w| w.iter().copied()).collect()
+                },
+                &[0.0; 12],
+                1e-7,
+            );
+            for (row, reference) in differences.iter().enumerate() {
+                let error = compare_gradients(&exact[row / 6][row % 6].derivative, reference);
+                assert!(error.relative < 1e-6, "body {moving} row {row}: {error:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn action_is_reaction() {
+        let (world, states) = pebble_in_cup();
+        let wrenches = world.wrenches(&states, 0);
+        let about_origin = |body: usize| {
+            let (force, torque) =
+                (wrenches[body].fixed_rows::<3>(0), wrenches[body].fixed_rows::<3>(3));
+            let arm = states[body].pose.translation.vector;
+            (force.into_owned(), torque + arm.cross(&force))
+        };
+        let (force, torque) = about_origin(0);
+        let (other_force, other_torque) = about_origin(1);
+        assert!(force.norm() > 0.1);
+        assert!((force + other_force).norm() < 1e-12 * force.norm());
+        assert!((torque + other_torque).norm() < 1e-12 * torque.norm());
+    }
+
+    #[test]
+    fn every_parameter_has_its_derivative() {
+        let (world, states) = egg_on(floor(), Onset::Hard);
+        let mut states = states;
+        states[1].pose.translation.z -= 1e-3;
+        let wrench = |p: &[f64]| {
+            let mut world = world.clone();
+            world.contacts[0].params = p[..3].to_vec();
+            world.bodies[1].load = Vector6::repeat(p[3]);
+            world.wrenches(&states, 0)[1].iter().copied().collect::<Vec<f64>>()
+        };
+        let at = [5e6, 2e4, 0.6, 0.3];
+        let mut lifted = world.lift::<Fwd<4>>();
+        let variables = Fwd::variables(at);
+        lifted.contacts[0].params = variables[..3].to_vec();
+        lifted.bodies[1].load = Vector6::repeat(variables[3]);
+        let constants: Vec<State<Fwd<4>>> = states.iter().map(State::lift).collect();
+        let exact = lifted.wrenches(&constants, 0)[1];
+        // Scaled, so that one step suits all.
+        let differences = finite_difference_jacobian(
+            |x| wrench(&std::array::from_fn::<f64, 4, _>(|i| at[i] * (1.0 + x[i]))),
+            &[0.0; 4],
+            1e-6,
+        );
+        for (row, reference) in differences.iter().enumerate() {
+            for (i, difference) in reference.iter().enumerate() {
+                let slope = exact[row].derivative[i] * at[i];
+                assert!((slope - difference).abs() < 1e-6 * (1.0 + difference.abs()), "{row} {i}");
+            }
+        }
+    }
+
+    #[test]
+    fn impossible_contacts_are_refused() {
+        let (mut world, _) = egg_on(floor(), Onset::Hard);
+        let law: Arc<dyn LocalLaw> = Arc::new(Penalty::new(1.0, 0.0, 0.0, 1.0).unwrap());
+        let mut touch = |a, b| world.touch(a, b, Arc::clone(&law), Onset::Hard).unwrap_err();
+        assert_eq!(touch(1, 2), SimulationError::NoBody { body: 2, bodies: 2 });
+        assert_eq!(touch(1, 1), SimulationError::Itself { body: "egg".to_owned() });
+        assert_eq!(touch(0, 1), SimulationError::NoSamples { body: "ground".to_owned() });
+    }
+}
