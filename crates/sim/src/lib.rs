@@ -17,6 +17,7 @@ mod error;
 #[cfg(test)]
 mod fields;
 mod integrator;
+mod near;
 mod rollout;
 #[cfg(test)]
 mod scenes;

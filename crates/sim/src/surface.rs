@@ -31,7 +31,7 @@ pub(crate) struct Block {
     end: usize,
     /// Model frame \[m\].
     pub(crate) centre: Point3<f64>,
-    /// \[m\]
+    /// Infinite where nothing is known but that asking does not pay \[m\].
     pub(crate) radius: f64,
 }
 
@@ -80,6 +80,25 @@ impl Surface {
     /// Area of all samples \[m²\].
     pub fn area(&self) -> f64 {
         self.area
+    }
+
+    /// No sample is farther from `point` than this \[m\].
+    pub(crate) fn radius_about(&self, point: &Point3<f64>) -> f64 {
+        self.blocks.iter().map(|b| (b.centre - point).norm() + b.radius).fold(0.0, f64::max)
+    }
+
+    /// The samples that `keep` wants, as one block that is never left out. What is not kept stays part of the area.
+    pub(crate) fn only(
+        &self,
+        keep: impl Fn(&SurfacePoint) -> bool,
+        block: impl Fn(&Block) -> bool,
+    ) -> Self {
+        let blocks = self.blocks().filter(|(b, _)| block(b));
+        let points: Vec<SurfacePoint> =
+            blocks.flat_map(|(_, points)| points.iter().filter(|p| keep(p)).copied()).collect();
+        let all =
+            Block { start: 0, end: points.len(), centre: Point3::origin(), radius: f64::INFINITY };
+        Self { blocks: vec![all], points, area: self.area }
     }
 
     /// The blocks with their samples.

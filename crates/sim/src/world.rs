@@ -109,6 +109,8 @@ impl<S: Scalar> Body<S> {
 pub struct ContactPair<S: Scalar = f64> {
     /// The body with the samples.
     pub samples: usize,
+    /// Those samples.
+    pub surface: Arc<Surface>,
     /// The body with the field.
     pub field: usize,
     /// Force of a contact.
@@ -174,9 +176,8 @@ impl World {
         law: Arc<dyn LocalLaw>,
         onset: Onset,
     ) -> Result<(), SimulationError> {
-        self.check_pair(samples, field)?;
-        let params = law.parameters().to_vec();
-        self.contacts.push(ContactPair { samples, field, law, params, onset, share: 1.0 });
+        let pair = self.pair(samples, field, law, onset)?;
+        self.contacts.push(pair);
         Ok(())
     }
 
@@ -191,16 +192,19 @@ impl World {
         law: &Arc<dyn LocalLaw>,
         onset: Onset,
     ) -> Result<(), SimulationError> {
-        self.check_pair(a, b)?;
-        self.check_pair(b, a)?;
-        for (samples, field) in [(a, b), (b, a)] {
-            let (law, params) = (Arc::clone(law), law.parameters().to_vec());
-            self.contacts.push(ContactPair { samples, field, law, params, onset, share: 0.5 });
-        }
+        let there = self.pair(a, b, Arc::clone(law), onset)?;
+        let back = self.pair(b, a, Arc::clone(law), onset)?;
+        self.contacts.extend([there, back].map(|pair| ContactPair { share: 0.5, ..pair }));
         Ok(())
     }
 
-    fn check_pair(&self, samples: usize, field: usize) -> Result<(), SimulationError> {
+    fn pair(
+        &self,
+        samples: usize,
+        field: usize,
+        law: Arc<dyn LocalLaw>,
+        onset: Onset,
+    ) -> Result<ContactPair, SimulationError> {
         for body in [samples, field] {
             if body >= self.bodies.len() {
                 return Err(SimulationError::NoBody { body, bodies: self.bodies.len() });
@@ -210,13 +214,13 @@ impl World {
         if samples == field {
             return Err(SimulationError::Itself { body: name(samples) });
         }
-        if self.bodies[samples].surface.is_none() {
-            return Err(SimulationError::NoSamples { body: name(samples) });
-        }
         if self.bodies[field].field.is_none() {
             return Err(SimulationError::NoField { body: name(field) });
         }
-        Ok(())
+        let surface = self.bodies[samples].surface.as_ref();
+        let surface = surface.ok_or_else(|| SimulationError::NoSamples { body: name(samples) })?;
+        let (surface, params) = (Arc::clone(surface), law.parameters().to_vec());
+        Ok(ContactPair { samples, surface, field, law, params, onset, share: 1.0 })
     }
 
     /// The same world in constants of another scalar.
@@ -234,6 +238,7 @@ impl World {
         };
         let pair = |pair: &ContactPair| ContactPair {
             samples: pair.samples,
+            surface: Arc::clone(&pair.surface),
             field: pair.field,
             law: Arc::clone(&pair.law),
             params: pair.params.iter().map(|&p| S::constant(p)).collect(),
@@ -271,26 +276,28 @@ impl<S: Scalar> World<S> {
         states: &[State<S>],
         step: usize,
     ) -> [Vector6<S>; 2] {
-        let (body, other) = (&self.bodies[pair.samples], &self.bodies[pair.field]);
-        let (Some(surface), Some(field)) = (&body.surface, &other.field) else {
-            return [Vector6::zeros(); 2];
-        };
-        let (state, base) = (&states[pair.samples], &states[pair.field]);
-        let frame = base.shifted(&-other.com().coords);
-        let seen = state.seen_from(&frame);
+        let Some(field) = &self.bodies[pair.field].field else { return [Vector6::zeros(); 2] };
+        let seen = self.seen(pair, states);
         let patch = Patch {
-            surface,
-            com: body.com(),
+            surface: &pair.surface,
+            com: self.bodies[pair.samples].com(),
             state: seen.value(),
             field: field.as_ref(),
             onset: pair.onset.at_step(step),
         };
         let [fx, fy, fz, tx, ty, tz] = local_wrench(pair, &seen, &patch);
-        let rotation = frame.pose.rotation;
+        let (state, base) = (&states[pair.samples], &states[pair.field]);
+        let rotation = base.pose.rotation;
         let force = rotation * Vector3::new(fx, fy, fz).map(|x| x.times(pair.share));
         let torque = rotation * Vector3::new(tx, ty, tz).map(|x| x.times(pair.share));
         let offset = state.pose.translation.vector - base.pose.translation.vector;
         [stack(&force, &torque), stack(&-force, &-(torque + offset.cross(&force)))]
+    }
+
+    /// The body with the samples as the field sees it, in the model frame of the body with the field.
+    pub(crate) fn seen(&self, pair: &ContactPair<S>, states: &[State<S>]) -> State<S> {
+        let frame = states[pair.field].shifted(&-self.bodies[pair.field].com().coords);
+        states[pair.samples].seen_from(&frame)
     }
 
     /// Moves the bodies that forces do not move to where they are at `time` \[s\].

@@ -8,7 +8,7 @@ use prehend_geometry::{DistanceField, FieldSample};
 use super::law::{Contact, ContactLaw};
 use super::onset::{Onset, OnsetSample};
 use crate::state::State;
-use crate::surface::Surface;
+use crate::surface::{Block, Surface, SurfacePoint};
 
 /// Below this length a distance gradient has no direction, and the point no contact.
 const MIN_GRADIENT: f64 = 1e-9;
@@ -71,6 +71,27 @@ struct Touch {
 }
 
 impl Patch<'_> {
+    /// Whether a point of `block` may be nearer to the field than `reach`.
+    #[inline]
+    fn may_touch(&self, block: &Block, reach: f64) -> bool {
+        let within = reach + STEEPEST * block.radius;
+        block.radius.is_infinite() || self.distance_within(&block.centre, within)
+    }
+
+    #[inline]
+    fn distance_within(&self, point: &Point3<f64>, within: f64) -> bool {
+        let State { pose, .. } = &self.state;
+        let place = pose.translation.vector + pose.rotation * (point - self.com);
+        self.field.sample(&Point3::from(place), within).is_some()
+    }
+
+    /// The samples that may touch, for a law that reaches to `cutoff`, before one of them has moved by `margin` \[m\].
+    pub(crate) fn near(&self, cutoff: f64, margin: f64) -> Surface {
+        let reach = cutoff + self.onset.band() + STEEPEST * margin;
+        let near = |point: &SurfacePoint| self.distance_within(&point.position, reach);
+        self.surface.only(near, |block| self.may_touch(block, reach))
+    }
+
     /// Calls `visit` with every point in contact, in order. Points beyond `cutoff` and the onset's band exert no
     /// force, so leaving out blocks of them changes nothing.
     #[inline(always)]
@@ -79,8 +100,7 @@ impl Patch<'_> {
         let (translation, rotation) = (pose.translation.vector, pose.rotation.to_rotation_matrix());
         let reach = cutoff + self.onset.band();
         for (block, points) in self.surface.blocks() {
-            let centre = Point3::from(translation + rotation * (block.centre - self.com));
-            if self.field.sample(&centre, reach + STEEPEST * block.radius).is_none() {
+            if !self.may_touch(block, reach) {
                 continue;
             }
             for point in points {

@@ -1,0 +1,80 @@
+//! The law and the step that all simulators compared have in common.
+
+use nalgebra::{Quaternion, Unit, UnitQuaternion, Vector3, Vector6};
+use prehend_autodiff::Scalar;
+use prehend_sim::{
+    Contact, ContactLaw, Integrator, Response, RigidBody, SimulationError, State, Step, World,
+    regularised_coulomb,
+};
+
+/// Stiffness \[N/m\], damping on approach \[N s/m\] and friction coefficient of a sample.
+pub(super) struct SmoothedPenalty([f64; 3]);
+
+impl SmoothedPenalty {
+    /// The law of one of `count` samples.
+    pub(super) fn shared_by(count: usize) -> Self {
+        let share = 10.0 / count as f64;
+        Self([2e3 * share, 4.0 * share, 0.5])
+    }
+}
+
+impl ContactLaw for SmoothedPenalty {
+    #[inline]
+    fn params(&self) -> &[f64] {
+        &self.0
+    }
+
+    #[inline]
+    fn law<S: Scalar>(&self, p: &[S], contact: &Contact<S>) -> Response<S> {
+        let speed = contact.normal_speed;
+        let approach = speed.select(speed.value() < 0.0, S::zero());
+        let normal = -(p[0] * contact.gap + p[1] * approach);
+        Response { normal, tangential: regularised_coulomb(p[2], normal, &contact.slip, 1e-2) }
+    }
+
+    fn reach(&self) -> f64 {
+        0.0
+    }
+}
+
+/// Semi-implicit Euler: Euler's equations in the body's frame, the quaternion advanced by its rate and normalised.
+pub(crate) struct FirstOrder;
+
+impl Integrator for FirstOrder {
+    fn step<S: Scalar>(
+        &self,
+        world: &World<S>,
+        states: &[State<S>],
+        step: Step,
+    ) -> Result<Vec<State<S>>, SimulationError> {
+        let wrenches = world.wrenches(states, step.index);
+        let bodies = world.bodies.iter().zip(states).zip(&wrenches);
+        let next = bodies.map(|((body, state), wrench)| match body.rigid() {
+            Some(rigid) => advance(rigid, &world.gravity, state, wrench, step.dt),
+            None => *state,
+        });
+        Ok(next.collect())
+    }
+}
+
+fn advance<S: Scalar>(
+    body: &RigidBody<S>,
+    gravity: &Vector3<S>,
+    state: &State<S>,
+    wrench: &Vector6<S>,
+    dt: f64,
+) -> State<S> {
+    let (force, torque) = (wrench.fixed_rows::<3>(0), wrench.fixed_rows::<3>(3).into_owned());
+    let mut next = *state;
+    next.linear += (force / body.mass() + gravity).map(|a| a.times(dt));
+    next.pose.translation.vector += next.linear.map(|v| v.times(dt));
+    let q: UnitQuaternion<S> = state.pose.rotation;
+    let spin = q.inverse_transform_vector(&state.angular);
+    let inertia = body.inertia().diagonal();
+    let torque = q.inverse_transform_vector(&torque) - spin.cross(&inertia.component_mul(&spin));
+    next.angular = q * (spin + torque.component_div(&inertia).map(|a| a.times(dt)));
+    let rate = Quaternion::from_imag(next.angular) * q.into_inner();
+    let turned = q.into_inner().coords + rate.coords.map(|r| r.times(0.5 * dt));
+    next.pose.rotation = Unit::new_normalize(Quaternion::from(turned));
+    next
+}

@@ -1,0 +1,88 @@
+//! An ellipsoid that settles between a palm and five fingers: the scene that simulators are compared on.
+//!
+//! Everybody integrates the same equations on the same numbers: a grid of the hand's signed distance interpolated
+//! linearly, samples of equal weight, a penalty with damping on approach, regularised Coulomb friction, and
+//! semi-implicit Euler with the rotation advanced to first order.
+
+mod equations;
+mod grid;
+
+use std::sync::Arc;
+
+use nalgebra::{
+    Isometry3, Matrix3, Point3, Quaternion, Translation3, Unit, UnitQuaternion, Vector3,
+};
+use prehend_autodiff::Scalar;
+use prehend_geometry::DistanceField;
+use prehend_sim::{Body, Horizon, LocalLaw, Onset, RigidBody, State, Surface, World};
+
+pub(crate) use equations::FirstOrder;
+use equations::SmoothedPenalty;
+use grid::LinearGrid;
+
+/// \[kg\]
+const MASS: f64 = 0.2;
+/// \[s\]
+const STEP: f64 = 1e-3;
+/// Half axes along the model's axes \[m\].
+const AXES: [f64; 3] = [0.03, 0.055, 0.03];
+/// Where the ellipsoid should end \[m\].
+const TARGET: Vector3<f64> = Vector3::new(0.0, 0.0, 0.035);
+
+/// The hand and its field, made once.
+pub(crate) struct Grasp {
+    field: Arc<dyn DistanceField>,
+}
+
+impl Grasp {
+    pub(crate) fn new() -> Self {
+        Self { field: Arc::new(LinearGrid::of_hand()) }
+    }
+
+    /// Hand (body 0) and ellipsoid (body 1) with `count` samples.
+    pub(crate) fn world(&self, count: usize, onset: Onset) -> anyhow::Result<World> {
+        let squares = AXES.map(|a| a * a);
+        let moments = [squares[1] + squares[2], squares[0] + squares[2], squares[0] + squares[1]];
+        let inertia = Matrix3::from_diagonal(&(Vector3::from(moments) * (MASS / 5.0)));
+        let rigid = RigidBody::new(MASS, inertia, Point3::origin())?;
+        // Weights are in the law: a sample stands for itself.
+        let surface = Surface::new(&spiral(count), &vec![1.0; count])?;
+        let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
+        let hand = world.add(Body::held("hand").with_field(Arc::clone(&self.field)));
+        let object = world.add(Body::free("ellipsoid", rigid).with_surface(surface));
+        let law: Arc<dyn LocalLaw> = Arc::new(SmoothedPenalty::shared_by(count));
+        world.touch(object, hand, law, onset)?;
+        Ok(world)
+    }
+}
+
+/// Where hand and ellipsoid begin.
+pub(crate) fn start() -> [State; 2] {
+    let rotation: UnitQuaternion<f64> = Unit::new_normalize(Quaternion::new(1.0, 0.05, 0.02, 0.03));
+    let pose = Isometry3::from_parts(Translation3::new(0.002, -0.001, 0.0295), rotation);
+    let (linear, angular) = (Vector3::new(0.02, 0.01, -0.05), Vector3::new(0.3, 0.1, 0.2));
+    [State::at_rest(Isometry3::identity()), State { pose, linear, angular }]
+}
+
+pub(crate) fn horizon(steps: usize) -> Horizon {
+    Horizon { dt: STEP, steps }
+}
+
+/// How far from the target, and how fast, the ellipsoid ends.
+pub(crate) fn loss<S: Scalar>(state: &State<S>) -> S {
+    let off = state.pose.translation.vector - TARGET.map(S::constant);
+    off.norm_squared().times(100.0) + state.linear.norm_squared() + state.angular.norm_squared()
+}
+
+/// `count` samples of the ellipsoid on a golden-angle spiral about the model's y axis, in single precision \[m\].
+fn spiral(count: usize) -> Vec<Point3<f64>> {
+    let golden = std::f64::consts::PI * (1.0 + 5f64.sqrt());
+    let point = |i: usize| {
+        let i = i as f64 + 0.5;
+        let polar = (1.0 - 2.0 * i / count as f64).acos();
+        let (sin, cos) = (golden * i).sin_cos();
+        let unit = [cos * polar.sin(), polar.cos(), sin * polar.sin()];
+        Point3::from(std::array::from_fn(|k| f64::from((unit[k] * AXES[k]) as f32)))
+    };
+    (0..count).map(point).collect()
+}
