@@ -8,12 +8,9 @@ mod grasp;
 use std::hint::black_box;
 use std::time::Instant;
 
-use grasp::{FirstOrder, Grasp, horizon, loss, start};
+use grasp::{Derivatives, FirstOrder, Grasp, horizon, loss, start};
 use prehend_autodiff::{Fwd, Scalar, gradient};
 use prehend_sim::{LeakSteps, Onset, State, World};
-
-/// Loss and its gradient by the initial translation \[1/m\] and turn \[1/rad\] of the ellipsoid.
-type Derivatives = (f64, [f64; 6]);
 
 fn main() -> anyhow::Result<()> {
     let grasp = Grasp::new();
@@ -25,6 +22,8 @@ fn main() -> anyhow::Result<()> {
         let leaky = grasp.world(count, leak)?;
         for steps in [20, 100] {
             let expected = forward_mode(&hard, steps)?;
+            let reference = grasp::reference(count, steps);
+            anyhow::ensure!(close(&expected, &reference, 1e-6), "{expected:?} {reference:?}");
             let adjoint = adjoint(&hard, steps)?;
             anyhow::ensure!(close(&expected, &adjoint, 1e-9), "{expected:?} {adjoint:?}");
             anyhow::ensure!((expected.0 - value(&hard, steps)?).abs() < 1e-12 * expected.0);

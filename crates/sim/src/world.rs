@@ -214,11 +214,11 @@ impl World {
         if samples == field {
             return Err(SimulationError::Itself { body: name(samples) });
         }
+        let surface = self.bodies[samples].surface.as_ref();
+        let surface = surface.ok_or_else(|| SimulationError::NoSamples { body: name(samples) })?;
         if self.bodies[field].field.is_none() {
             return Err(SimulationError::NoField { body: name(field) });
         }
-        let surface = self.bodies[samples].surface.as_ref();
-        let surface = surface.ok_or_else(|| SimulationError::NoSamples { body: name(samples) })?;
         let (surface, params) = (Arc::clone(surface), law.parameters().to_vec());
         Ok(ContactPair { samples, surface, field, law, params, onset, share: 1.0 })
     }

@@ -74,6 +74,85 @@ pub(crate) fn loss<S: Scalar>(state: &State<S>) -> S {
     off.norm_squared().times(100.0) + state.linear.norm_squared() + state.angular.norm_squared()
 }
 
+/// Loss and its gradient by the initial translation \[1/m\] and turn \[1/rad\] of the ellipsoid.
+pub(crate) type Derivatives = (f64, [f64; 6]);
+
+/// What JAX 0.10 in double precision finds for `count` samples and `steps` steps.
+///
+/// # Panics
+/// For numbers that it was not asked about.
+pub(crate) fn reference(count: usize, steps: usize) -> Derivatives {
+    match (count, steps) {
+        (500, 20) => (
+            2.132029677529,
+            [
+                3706.38400343,
+                313.598563806,
+                315.919235896,
+                1.08760160514,
+                -7.20911545027,
+                22.1275272467,
+            ],
+        ),
+        (500, 100) => (
+            3.295388729648,
+            [
+                254.079212985,
+                -46.1562327139,
+                1059.82356232,
+                51.0455899799,
+                1.1561906309,
+                1.51494083103,
+            ],
+        ),
+        (2000, 20) => (
+            2.098457492053,
+            [
+                3468.63582617,
+                51.6147234541,
+                252.160446425,
+                2.15700587171,
+                -1.25728902171,
+                10.7881121345,
+            ],
+        ),
+        (2000, 100) => (
+            3.300597788226,
+            [
+                101.868444889,
+                -88.9716929472,
+                1038.91735375,
+                51.2171007102,
+                2.93291824654,
+                0.670679683138,
+            ],
+        ),
+        (8000, 20) => (
+            2.121946853812,
+            [
+                3472.13846292,
+                124.677512767,
+                249.389890432,
+                2.28207321772,
+                -1.92495078279,
+                11.6727018101,
+            ],
+        ),
+        (8000, 100) => (
+            3.304870898419,
+            [
+                124.682232576,
+                -81.5459847082,
+                1042.32763912,
+                51.1809439348,
+                2.26463915572,
+                0.622776744776,
+            ],
+        ),
+        _ => panic!("no reference for {count} samples and {steps} steps"),
+    }
+}
+
 /// `count` samples of the ellipsoid on a golden-angle spiral about the model's y axis, in single precision \[m\].
 fn spiral(count: usize) -> Vec<Point3<f64>> {
     let golden = std::f64::consts::PI * (1.0 + 5f64.sqrt());
