@@ -9,7 +9,7 @@ use crate::state::State;
 use crate::world::World;
 
 /// How far samples may move relative to a field before those near it are looked for anew \[m\].
-const MARGIN: f64 = 2e-3;
+const MARGIN: f64 = 1e-3;
 
 /// A world that only knows the samples near to a field: the others exert no force as long as [`Near::holds`], so
 /// results are the same to the last bit.

@@ -198,7 +198,7 @@ pub(crate) fn wrench_jacobian<L: ContactLaw>(
 ) -> WrenchJacobian {
     let cutoff = law.reach();
     let params: Vec<Fwd<6>> = p.iter().map(|&p| Fwd::constant(p)).collect();
-    let spin = cross_matrix(&patch.state.angular);
+    let spin = patch.state.angular;
     let mut wrench = Vector6::zeros();
     // Force and torque by position, turn, velocity and spin of the body.
     let mut by = [[Matrix3::<f64>::zeros(); 4]; 2];
@@ -213,15 +213,15 @@ pub(crate) fn wrench_jacobian<L: ContactLaw>(
         let by_velocity = Matrix3::from_fn(|i, j| force[i].derivative[3 + j]);
 
         // Point position: δt + δθ×r; point velocity: δv + δω×r + ω×(δθ×r), for the arm r.
-        let arm = cross_matrix(&touch.arm);
-        let by_turn = -(by_position + by_velocity * spin) * arm;
-        let slopes = [by_position, by_turn, by_velocity, -by_velocity * arm];
+        let arm = &touch.arm;
+        let by_turn = times_cross(&-(by_position + times_cross(&by_velocity, &spin)), arm);
+        let slopes = [by_position, by_turn, by_velocity, times_cross(&-by_velocity, arm)];
         for (column, slope) in slopes.iter().enumerate() {
             by[0][column] += slope;
-            by[1][column] += arm * slope;
+            by[1][column] += cross_times(arm, slope);
         }
         // Torque r×f: the arm turns with the body, δ(r×f) = (δθ×r)×f + r×δf.
-        by[1][1] += cross_matrix(&f) * arm;
+        by[1][1] += cross_times(&f, &cross_matrix(arm));
         wrench += stack(&f, &touch.arm.cross(&f));
         add_param_slopes(law, p, touch, cutoff, &mut param_slopes);
     });
@@ -263,6 +263,18 @@ fn add_param_slopes<L: ContactLaw>(
             *slope += stack(&f, &touch.arm.cross(&f));
         }
     }
+}
+
+/// \[a\]× `m`, column by column.
+#[inline(always)]
+fn cross_times(a: &Vector3<f64>, m: &Matrix3<f64>) -> Matrix3<f64> {
+    Matrix3::from_columns(&[a.cross(&m.column(0)), a.cross(&m.column(1)), a.cross(&m.column(2))])
+}
+
+/// `m` \[a\]×, row by row.
+#[inline(always)]
+fn times_cross(m: &Matrix3<f64>, a: &Vector3<f64>) -> Matrix3<f64> {
+    -cross_times(a, &m.transpose()).transpose()
 }
 
 #[inline]
