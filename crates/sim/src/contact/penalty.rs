@@ -1,42 +1,18 @@
 //! The linear Kelvin–Voigt penalty law, per area, with Coulomb friction.
 
 use prehend_autodiff::Scalar;
-use thiserror::Error;
 
+use super::error::LawError;
 use super::law::{Contact, Isotropic, IsotropicLaw};
-
-/// A contact-law parameter out of its range.
-#[derive(Clone, Copy, Debug, Error, PartialEq)]
-#[error("{name} must be {range}, is {value}")]
-pub struct LawError {
-    /// Name of the parameter.
-    pub name: &'static str,
-    /// What it must be.
-    pub range: &'static str,
-    /// What it is.
-    pub value: f64,
-}
-
-impl LawError {
-    pub(super) fn check_positive(name: &'static str, value: f64) -> Result<(), Self> {
-        let ok = value.is_finite() && value > 0.0;
-        if ok { Ok(()) } else { Err(Self { name, range: "positive", value }) }
-    }
-
-    pub(super) fn check_not_negative(name: &'static str, value: f64) -> Result<(), Self> {
-        let ok = value.is_finite() && value >= 0.0;
-        if ok { Ok(()) } else { Err(Self { name, range: "zero or positive", value }) }
-    }
-
-    pub(super) fn check_finite(name: &'static str, value: f64) -> Result<(), Self> {
-        if value.is_finite() { Ok(()) } else { Err(Self { name, range: "finite", value }) }
-    }
-}
+use super::resting::RestingContact;
+use super::restitution::damping_ratio;
 
 /// Spring and damper per area, clamped so that contact never pulls:
-/// f_n = A·max(0, −K g − D ġ), with friction coefficient μ.
+/// f_n = A·max(0, −K g − D ġ) for g ≤ 0, with friction coefficient μ.
 ///
-/// Per area, so that forces do not depend on how many samples a surface carries.
+/// Per area, so that forces do not depend on how many samples a surface carries. Contact ends while the body is
+/// still inside, which is where the clamped formula of [`restitution`](super::restitution::restitution) comes
+/// from; [`ApproachDamped`](super::approach::ApproachDamped) bounces more for the same damping.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KelvinVoigt {
     /// Stiffness K \[N/m³\], damping D \[N s/m³\], friction coefficient μ.
@@ -65,6 +41,22 @@ impl Penalty {
         LawError::check_positive("slip_scale", slip_scale)?;
         Ok(Isotropic(KelvinVoigt { params: [stiffness, damping, friction], slip_scale }))
     }
+
+    /// The law on which `resting` rests, and which bounces with coefficient `restitution` (above 0, at most 1).
+    ///
+    /// # Errors
+    /// Names the parameter that is out of its range.
+    pub fn from_resting(
+        resting: &RestingContact,
+        restitution: f64,
+        friction: f64,
+        slip_scale: f64,
+    ) -> Result<Self, LawError> {
+        resting.check()?;
+        LawError::check_restitution(restitution)?;
+        let damping = resting.damping(damping_ratio(restitution));
+        Self::new(resting.stiffness(1.0), damping, friction, slip_scale)
+    }
 }
 
 impl IsotropicLaw for KelvinVoigt {
@@ -78,7 +70,8 @@ impl IsotropicLaw for KelvinVoigt {
         let &[stiffness, damping, ..] = p else { return S::zero() };
         let pressure = -(stiffness * contact.gap + damping * contact.normal_speed);
         // Zero counts as active: a leaky onset differentiates a contact of exactly zero force.
-        if pressure.value() >= 0.0 { pressure * S::constant(contact.area) } else { S::zero() }
+        let active = pressure.value() >= 0.0 && contact.gap.value() <= 0.0;
+        if active { pressure * S::constant(contact.area) } else { S::zero() }
     }
 
     #[inline]
@@ -98,6 +91,12 @@ mod tests {
 
     use super::*;
     use crate::ContactLaw;
+    use crate::contact::law_checks::{Claims, check_law};
+
+    #[test]
+    fn keeps_what_laws_promise() {
+        check_law(&Penalty::new(3e7, 2e5, 0.7, 1e-2).unwrap(), &Claims::new(0.7));
+    }
 
     #[test]
     fn bad_parameters_are_named() {
