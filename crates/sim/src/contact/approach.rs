@@ -4,20 +4,17 @@ use prehend_autodiff::Scalar;
 
 use super::error::LawError;
 use super::law::{Contact, Isotropic, IsotropicLaw};
+use super::penalty::{KelvinVoigt, Penalty};
 use super::resting::RestingContact;
 use super::restitution::approach_damping_ratio;
 
 /// Spring, and a damper that resists approach only: f_n = A·(−K g + D·max(0, −ġ)) for g ≤ 0, as in NVIDIA
 /// Warp's simulator, with friction coefficient μ.
 ///
-/// Contact lasts until the gap closes, without clamping: a body leaves as fast as the spring throws it. It bounces
-/// with [`approach_restitution`](super::restitution::approach_restitution).
+/// Contact lasts until the gap closes, without clamping: a body leaves as fast as the spring throws it. It
+/// bounces with [`approach_restitution`](super::restitution::approach_restitution).
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ApproachDamped {
-    /// Stiffness K \[N/m³\], damping D \[N s/m³\], friction coefficient μ.
-    params: [f64; 3],
-    slip_scale: f64,
-}
+pub struct ApproachDamped(KelvinVoigt);
 
 /// [`ApproachDamped`] as a contact law.
 pub type ApproachPenalty = Isotropic<ApproachDamped>;
@@ -34,11 +31,8 @@ impl ApproachPenalty {
         friction: f64,
         slip_scale: f64,
     ) -> Result<Self, LawError> {
-        LawError::check_positive("stiffness", stiffness)?;
-        LawError::check_not_negative("damping", damping)?;
-        LawError::check_not_negative("friction", friction)?;
-        LawError::check_positive("slip_scale", slip_scale)?;
-        Ok(Isotropic(ApproachDamped { params: [stiffness, damping, friction], slip_scale }))
+        let Isotropic(law) = Penalty::new(stiffness, damping, friction, slip_scale)?;
+        Ok(Isotropic(ApproachDamped(law)))
     }
 
     /// The law on which `resting` rests, and which bounces with coefficient `restitution` (above 0, at most 1).
@@ -61,7 +55,7 @@ impl ApproachPenalty {
 impl IsotropicLaw for ApproachDamped {
     #[inline]
     fn params(&self) -> &[f64] {
-        &self.params
+        self.0.params()
     }
 
     #[inline]
@@ -77,13 +71,13 @@ impl IsotropicLaw for ApproachDamped {
     }
 
     #[inline]
-    fn friction_coefficient<S: Scalar>(&self, p: &[S], _slip_speed: S) -> S {
-        p.get(2).copied().unwrap_or_else(S::zero)
+    fn friction_coefficient<S: Scalar>(&self, p: &[S], slip_speed: S) -> S {
+        self.0.friction_coefficient(p, slip_speed)
     }
 
     #[inline]
     fn slip_scale(&self) -> f64 {
-        self.slip_scale
+        self.0.slip_scale()
     }
 }
 
@@ -103,7 +97,8 @@ mod tests {
     fn bounces_with_its_restitution() {
         let resting =
             RestingContact { mass: 0.3, gravity: 9.81, penetration: 5e-4, contact_area: 4e-4 };
-        for e in [0.9, 0.6715, 0.2] {
+        // The last two are overdamped.
+        for e in [0.9, 0.6715, 0.3, 0.1] {
             let law = ApproachPenalty::from_resting(&resting, e, 0.0, 1e-3).unwrap();
             assert!((bounce(&law, &resting, 0.5) - e).abs() < 2e-4);
         }

@@ -10,12 +10,13 @@ use super::law::{Contact, ContactLaw, Isotropic, IsotropicLaw, Response};
 /// `law` with the friction of a grained surface: its own coefficient μ along the unit direction a of the
 /// grain, fixed in the world, and r·μ across it.
 ///
-/// f_t = −f_n·P M u/√(|u|² + v_s²) with the friction tensor M = μ·(a aᵀ + r (I − a aᵀ)) and P the projection across
-/// the normal: linear anisotropic friction (A. Zmitrowicz, "A theoretical model of anisotropic dry friction", Wear
-/// 73, 1981), regularised as in [`regularised_coulomb`](super::friction::regularised_coulomb). M is positive, so
-/// every slip is braked. On a surface that holds a, the force stays inside the elliptic cone
-/// (f_a/μ)² + (f_b/rμ)² ≤ f_n² and reaches it in fast slip. On a tilted one the tensor turns smoothly into the coefficient r·μ
-/// of every direction, where a is the normal. Where the coefficient depends on speed, both directions do.
+/// f_t = −f_n·P M u/√(|u|² + v_s²) with the friction tensor M = μ·(a aᵀ + r (I − a aᵀ)) and P the projection
+/// across the normal: linear anisotropic friction (A. Zmitrowicz, "A theoretical model of anisotropic dry
+/// friction", Wear 73, 1981), regularised as in
+/// [`regularised_coulomb`](super::friction::regularised_coulomb). M is positive, so every slip is braked. On
+/// a surface that holds a, the force stays inside the elliptic cone (f_a/μ)² + (f_b/rμ)² ≤ f_n² and reaches
+/// it in fast slip. On a tilted one the tensor turns smoothly into the coefficient r·μ of every direction,
+/// where a is the normal. Where the coefficient depends on speed, both directions do.
 ///
 /// ```
 /// use nalgebra::Vector3;

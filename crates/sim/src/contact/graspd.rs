@@ -10,8 +10,9 @@ use super::law::{Contact, ContactLaw, Response};
 /// with c = min(φ − ρ, 0), f_n = −k_n c and f_t = −(u/|u|)·min(k_f |u| |c|, μ k_n |c|).
 ///
 /// Sample areas are ignored, so forces grow with the number of samples. Its leaky gradient is
-/// [`Onset::grasp_d`](super::onset::Onset::grasp_d). There, at c = 0, both sides of the minimum are zero: the derivative used is that of a
-/// contact that just begins, k_f|u| or μ k_n, whichever is less; the authors' code always takes μ k_n.
+/// [`Onset::grasp_d`](super::onset::Onset::grasp_d). There, at c = 0, both sides of the minimum are zero: the
+/// derivative used is that of a contact that just begins, k_f|u| or μ k_n, whichever is less; the authors'
+/// code always takes μ k_n.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GraspD {
     /// Normal stiffness k_n \[N/m\], friction gain k_f \[N s/m²\], friction coefficient μ.

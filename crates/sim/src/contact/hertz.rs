@@ -8,9 +8,9 @@ use super::resting::RestingContact;
 
 /// An elastic contact that stiffens with depth d = −g: f_n = A·K·d^{3/2}, with friction coefficient μ.
 ///
-/// The exponent is that of two touching spheres (H. Hertz, 1882; K. L. Johnson, Contact Mechanics, §4.2), whose
-/// whole contact has F = 4/3 E* √R d^{3/2}: one sample with A·K = 4/3 E* √R reproduces it. Spread over the samples of
-/// a finely sampled surface it is an elastic foundation of the same exponent.
+/// The exponent is that of two touching spheres (H. Hertz, 1882; K. L. Johnson, Contact Mechanics, §4.2),
+/// whose whole contact has F = 4/3 E* √R d^{3/2}: one sample with A·K = 4/3 E* √R reproduces it. Spread over
+/// the samples of a finely sampled surface it is an elastic foundation of the same exponent.
 ///
 /// Force and stiffness are both zero at d = 0 and continuous there, so a contact begins without a kink, and a
 /// leaky onset has nothing to leak. It does not dissipate: [`HuntCrossley`](super::hunt_crossley::HuntCrossley)

@@ -8,13 +8,13 @@ use super::resting::RestingContact;
 use super::restitution::hunt_crossley_damping;
 
 /// A power-law spring whose damping grows with the load: f_n = A·K·dⁿ·max(0, 1 + c ḋ) for depth d = −g, with
-/// friction coefficient μ (K. H. Hunt and F. R. E. Crossley, "Coefficient of restitution interpreted as damping in
-/// vibroimpact", J. Applied Mechanics 42, 1975).
+/// friction coefficient μ (K. H. Hunt and F. R. E. Crossley, "Coefficient of restitution interpreted as
+/// damping in vibroimpact", J. Applied Mechanics 42, 1975).
 ///
-/// Unlike with a linear damper the force starts from zero at any speed, so contact begins without a jump;
-/// for n > 1 it begins without a kink too, and a leaky onset has nothing to leak. It bounces with
-/// [`hunt_crossley_restitution`](super::restitution::hunt_crossley_restitution), whatever K and n. A free rebound
-/// never reaches the clamp; bodies that are pulled apart do.
+/// Unlike with a linear damper the force starts from zero at any speed, so contact begins without a jump; for
+/// n > 1 it begins without a kink too, and a leaky onset has nothing to leak. It bounces with
+/// [`hunt_crossley_restitution`](super::restitution::hunt_crossley_restitution), whatever K and n. A free
+/// rebound never reaches the clamp; bodies that are pulled apart do.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HuntCrossley {
     /// Stiffness K \[N/m^{2+n}\], damping c \[s/m\], exponent n, friction coefficient μ.
@@ -46,15 +46,16 @@ impl HuntCrossleyPenalty {
         Ok(Isotropic(HuntCrossley { params: [stiffness, damping, exponent, friction], slip_scale }))
     }
 
-    /// The law on which `resting` rests, and which bounces with coefficient `restitution` (above 0, at most 1) when
-    /// hit at `impact_speed` \[m/s\] > 0. Slower impacts bounce more.
+    /// The law on which `resting` rests, and which bounces with coefficient `restitution` (above 0, at most
+    /// 1) when hit at `impact_speed` \[m/s\] > 0. Slower impacts bounce more.
     ///
     /// # Errors
     /// Names the parameter that is out of its range.
     pub fn from_resting(
         resting: &RestingContact,
         exponent: f64,
-        [restitution, impact_speed]: [f64; 2],
+        restitution: f64,
+        impact_speed: f64,
         friction: f64,
         slip_scale: f64,
     ) -> Result<Self, LawError> {
@@ -122,8 +123,7 @@ mod tests {
         let resting =
             RestingContact { mass: 0.3, gravity: 9.81, penetration: 5e-4, contact_area: 4e-4 };
         for (exponent, e) in [(1.0, 0.8), (1.5, 0.5), (2.5, 0.2)] {
-            let target = [e, 0.5];
-            let law = HuntCrossleyPenalty::from_resting(&resting, exponent, target, 0.5, 1e-3);
+            let law = HuntCrossleyPenalty::from_resting(&resting, exponent, e, 0.5, 0.5, 1e-3);
             let law = law.unwrap();
             assert!((load(&law, 4e-4, 5e-4) - 0.3 * 9.81).abs() < 1e-12);
             let measured = bounce(&law, &resting, 0.5);

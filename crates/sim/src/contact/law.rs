@@ -8,7 +8,8 @@ use super::friction::{regularised_coulomb, regularised_speed};
 /// One contact point, as a law sees it.
 #[derive(Clone, Copy, Debug)]
 pub struct Contact<S: Scalar> {
-    /// Effective gap after the [`Onset`](super::onset::Onset) \[m\], at most the law's reach; negative is penetration.
+    /// Effective gap after the [`Onset`](super::onset::Onset) \[m\], at most the law's reach; negative is
+    /// penetration.
     pub gap: S,
     /// Rate of the effective gap \[m/s\], negative while approaching. The onset scales it too, so that
     /// damping fades in with contact and is zero without.
@@ -84,9 +85,9 @@ pub trait ContactLaw: Send + Sync {
 
 /// An isotropic law: friction opposes slip, with a coefficient that may depend on its speed.
 ///
-/// [`Isotropic`] makes a [`ContactLaw`] of it, with friction regularised and never outside the cone; it also gives
-/// any of them stick–slip ([`Isotropic::with_stribeck`]) or anisotropic friction ([`Isotropic::with_grain`]). A law whose pressure is that of
-/// an exponential spring:
+/// [`Isotropic`] makes a [`ContactLaw`] of it, with friction regularised and never outside the cone; it also
+/// gives any of them stick–slip ([`Isotropic::with_stribeck`]) or anisotropic friction
+/// ([`Isotropic::with_grain`]). A law whose pressure is that of an exponential spring:
 ///
 /// ```
 /// use prehend_autodiff::Scalar;

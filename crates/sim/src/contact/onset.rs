@@ -23,8 +23,8 @@ pub enum Onset {
         /// Steps of a rollout on which contacts leak.
         steps: LeakSteps,
     },
-    /// [`Onset::Leaky`] in reverse mode only where it pulls a contact in: an inactive contact passes on the part of
-    /// a gradient whose descent would close its gap, and nothing that would open it further
+    /// [`Onset::Leaky`] in reverse mode only where it pulls a contact in: an inactive contact passes on the
+    /// part of a gradient whose descent would close its gap, and nothing that would open it further
     /// ([`OnsetSample::pull_back`]). Forward mode knows no loss, so there it is [`Onset::Leaky`].
     AsymmetricLeaky {
         /// Derivative where inactive, usually 0.1.
@@ -74,24 +74,28 @@ impl OnsetSample {
 const SOFTPLUS_CUTOFF: f64 = 30.0;
 
 impl Onset {
-    /// The leaky gradient of Grasp'D, called symmetric: α = 0.1 on every step at any distance, whatever the gradient's sign.
+    /// The leaky gradient of Grasp'D, the symmetric form: α = 0.1 on every step, at any distance and for
+    /// gradients of either sign.
     ///
-    /// In D. Turpin et al., "Grasp'D", ECCV 2022, the gradient of c = min(φ − ρ, 0) is α instead of 0 where inactive; the
-    /// authors' code (`leaky_min` of its dFlex) multiplies the adjoint by 0.1, with either sign.
+    /// In D. Turpin et al., "Grasp'D", ECCV 2022, the gradient of c = min(φ − ρ, 0) is α instead of 0 where
+    /// inactive. The authors' code (`leaky_min` in its dFlex) multiplies the adjoint by 0.1, and gives this form
+    /// no name.
     pub fn grasp_d() -> Self {
         Self::Leaky { alpha: 0.1, band: f64::INFINITY, steps: LeakSteps::All }
     }
 
-    /// The leaky gradient of Fast-Grasp'D, called asymmetric: as [`Onset::grasp_d`], but only what closes a gap leaks.
+    /// The leaky gradient of Fast-Grasp'D, the asymmetric form: as [`Onset::grasp_d`], but only what closes a
+    /// gap leaks.
     ///
-    /// D. Turpin et al., "Fast-Grasp'D", ICRA 2023. The word and the rule are those of the authors' code: its `leaky_max` of
-    /// the depth passes 0.1 times an adjoint below zero, and none above. Its depth is minus the gap here.
+    /// D. Turpin et al., "Fast-Grasp'D", ICRA 2023. The rule and its name are those of the code that the authors
+    /// published later: its `leaky_max` of the depth passes 0.1 times an adjoint below zero, and none above.
+    /// That depth is minus the gap here.
     pub fn fast_grasp_d() -> Self {
         Self::AsymmetricLeaky { alpha: 0.1, band: f64::INFINITY, steps: LeakSteps::All }
     }
 
-    /// Checks the parameters: a softplus needs a finite `width` > 0, a leak `alpha` in 0..=1 and a `band` > 0, which
-    /// may be infinite.
+    /// Checks the parameters: a softplus needs a positive and finite `width`, a leak an `alpha` in 0..=1 and a
+    /// positive `band`, which may be infinite.
     ///
     /// # Errors
     /// Names the parameter that is out of its range.

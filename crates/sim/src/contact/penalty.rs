@@ -70,8 +70,10 @@ impl IsotropicLaw for KelvinVoigt {
         let &[stiffness, damping, ..] = p else { return S::zero() };
         let pressure = -(stiffness * contact.gap + damping * contact.normal_speed);
         // Zero counts as active: a leaky onset differentiates a contact of exactly zero force.
-        let active = pressure.value() >= 0.0 && contact.gap.value() <= 0.0;
-        if active { pressure * S::constant(contact.area) } else { S::zero() }
+        if pressure.value() < 0.0 || contact.gap.value() > 0.0 {
+            return S::zero();
+        }
+        pressure * S::constant(contact.area)
     }
 
     #[inline]
@@ -91,11 +93,24 @@ mod tests {
 
     use super::*;
     use crate::ContactLaw;
-    use crate::contact::law_checks::{Claims, check_law};
+    use crate::contact::law_checks::{Claims, bounce, check_law};
 
     #[test]
     fn keeps_what_laws_promise() {
         check_law(&Penalty::new(3e7, 2e5, 0.7, 1e-2).unwrap(), &Claims::new(0.7));
+    }
+
+    #[test]
+    fn bounces_with_its_restitution() {
+        let resting =
+            RestingContact { mass: 0.3, gravity: 9.81, penetration: 5e-4, contact_area: 4e-4 };
+        // The last two are overdamped.
+        for e in [0.9, 0.451, 0.1, 0.03] {
+            let law = Penalty::from_resting(&resting, e, 0.0, 1e-3).unwrap();
+            assert!((bounce(&law, &resting, 0.5) - e).abs() < 2e-4);
+        }
+        let error = Penalty::from_resting(&resting, 1.1, 0.0, 1e-3).unwrap_err();
+        assert_eq!(error.name, "restitution");
     }
 
     #[test]

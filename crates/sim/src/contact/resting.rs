@@ -64,7 +64,7 @@ mod tests {
         let penalty = Penalty::from_resting(&RESTING, 0.3, 0.5, 1e-3).unwrap();
         let approach = ApproachPenalty::from_resting(&RESTING, 0.3, 0.5, 1e-3).unwrap();
         let hertz = HertzPenalty::from_resting(&RESTING, 0.5, 1e-3).unwrap();
-        let hunt = HuntCrossleyPenalty::from_resting(&RESTING, 2.0, [0.5, 1.0], 0.5, 1e-3).unwrap();
+        let hunt = HuntCrossleyPenalty::from_resting(&RESTING, 2.0, 0.5, 1.0, 0.5, 1e-3).unwrap();
         for samples in [1u32, 4, 8, 2000] {
             let count = f64::from(samples);
             let area = RESTING.contact_area / count;

@@ -1,11 +1,13 @@
 //! How bodies bounce off a damped contact: coefficients of restitution and their inverses.
 //!
-//! All are of a single body that hits a contact without gravity. Where the damping is linear they depend on the damping
-//! ratio ζ = c/(2√(k m)) alone, with c and k the whole contact's: ζ = D/(2√(K m/A)) for K and D per area.
+//! All are of a single body that hits a contact without gravity. Where the damping is linear they depend on
+//! the damping ratio ζ = c/(2√(k m)) alone, with c and k the whole contact's: ζ = D/(2√(K m/A)) for K and D
+//! per area.
 
-/// Coefficient of restitution of the clamped Kelvin–Voigt contact ([`KelvinVoigt`](super::penalty::KelvinVoigt)):
-/// e = exp(−2ζ/√(1−ζ²)·acos ζ) for a damping ratio ζ ≥ 0, continued by exp(−2ζ/√(ζ²−1)·acosh ζ) beyond critical damping
-/// (exp(−2) ≈ 0.135 at ζ = 1, about 1/(4ζ²) far beyond).
+/// Coefficient of restitution of the clamped Kelvin–Voigt contact
+/// ([`KelvinVoigt`](super::penalty::KelvinVoigt)): e = exp(−2ζ/√(1−ζ²)·acos ζ) for a damping ratio ζ ≥ 0,
+/// continued by exp(−2ζ/√(ζ²−1)·acosh ζ) beyond critical damping (exp(−2) ≈ 0.135 at ζ = 1, about 1/(4ζ²) far
+/// beyond).
 pub fn restitution(ratio: f64) -> f64 {
     (-2.0 * logarithmic_loss(ratio)).exp()
 }
@@ -28,11 +30,12 @@ pub fn approach_damping_ratio(restitution_coefficient: f64) -> f64 {
     ratio_of_loss(-restitution_coefficient.ln())
 }
 
-/// Coefficient of restitution of the law of Hunt and Crossley with `damping` c \[s/m\] ≥ 0 hit at `speed` \[m/s\] ≥ 0:
-/// the e in 0..=1 with (1 + e)·x = ln((1 + x)/(1 − e x)), x = c·v.
+/// Coefficient of restitution of the law of Hunt and Crossley with `damping` c \[s/m\] ≥ 0 hit at `speed`
+/// \[m/s\] ≥ 0: the e in 0..=1 with (1 + e)·x = ln((1 + x)/(1 − e x)), x = c·v.
 ///
-/// That is exact, for every exponent and stiffness and any set of samples that share a depth: from m ḋ dḋ = −K dⁿ(1 + c ḋ) dd the
-/// integral of v/(1 + c v) over the impact vanishes. For slow impacts e ≈ 1 − 2x/3 (Hunt and Crossley, 1975).
+/// That is exact, for every exponent and stiffness and any set of samples that share a depth: from m ḋ dḋ =
+/// −K dⁿ(1 + c ḋ) dd the integral of v/(1 + c v) over the impact vanishes. For slow impacts e ≈ 1 − 2x/3
+/// (Hunt and Crossley, 1975).
 pub fn hunt_crossley_restitution(damping: f64, speed: f64) -> f64 {
     let x = damping * speed;
     if x <= 0.0 {

@@ -27,8 +27,8 @@ pub struct Stribeck<L> {
 }
 
 impl<L: IsotropicLaw> Isotropic<L> {
-    /// This law with stick–slip friction: its own coefficient at rest, `kinetic_friction` in fast slip (at least 0, at
-    /// most the law's own), `stribeck_speed` \[m/s\] > 0 between. See [`Stribeck`].
+    /// This law with stick–slip friction: its own coefficient at rest, `kinetic_friction` in fast slip (at
+    /// least 0, at most the law's own), `stribeck_speed` \[m/s\] > 0 between. See [`Stribeck`].
     ///
     /// # Errors
     /// Names the parameter that is out of its range.
@@ -94,8 +94,7 @@ mod tests {
         let claims = Claims::new(0.6);
         let kinked = Claims { smooth_at_rest: false, ..claims };
         let scale = 1e-2;
-        let stick_slip = (0.35, 0.05);
-        let (k, u) = stick_slip;
+        let (k, u) = (0.35, 0.05);
         check_law(
             &Penalty::new(3e7, 2e5, 0.6, scale).unwrap().with_stribeck(k, u).unwrap(),
             &claims,
