@@ -66,10 +66,11 @@ impl<L: IsotropicLaw> ContactLaw for Grained<L> {
         let normal = self.law.normal_force(inner, contact);
         let speed = regularised_speed(&contact.slip, self.law.slip_scale());
         let scale = -(self.law.friction_coefficient(inner, speed) * normal) / speed;
-        let (a, n, u) = (self.direction.map(S::constant), &contact.normal, &contact.slip);
-        let along = (S::one() - across) * a.dot(u);
-        let pull = Vector3::from_fn(|i, _| across * u[i] + along * a[i]);
-        let lift = n.dot(&pull);
+        let (a, n, u) = (&self.direction, &contact.normal, &contact.slip);
+        let slip_along = u.x.times(a.x) + u.y.times(a.y) + u.z.times(a.z);
+        let along = (S::one() - across) * slip_along;
+        let pull = Vector3::from_fn(|i, _| across * u[i] + along.times(a[i]));
+        let lift = n.x * pull.x + n.y * pull.y + n.z * pull.z;
         let tangential = Vector3::from_fn(|i, _| scale * (pull[i] - lift * n[i]));
         Response { normal, tangential }
     }
