@@ -1,7 +1,9 @@
 //! Functions of few numbers, differentiated as a whole.
 
+use std::rc::Rc;
+
 use crate::tape::{push_block, with_tape};
-use crate::{Fwd, Scalar, Var};
+use crate::{CustomVjp, Fwd, Scalar, Var};
 
 /// A function of `N` numbers with `M` results: a rotation, a contact wrench, a term of a sum.
 ///
@@ -41,6 +43,13 @@ pub trait LocalFunction<const N: usize, const M: usize> {
         let results = self.evaluate(Fwd::<N>::variables(x));
         (results.map(|y| y.value), results.map(|y| y.derivative))
     }
+
+    /// A rule for reverse mode that takes the place of the Jacobian, for derivatives that are not linear in the
+    /// adjoint: a gradient that is clipped, or let through in one direction only.
+    #[inline]
+    fn reverse_rule(&self) -> Option<Rc<dyn CustomVjp>> {
+        None
+    }
 }
 
 impl<const N: usize, const M: usize, F: LocalFunction<N, M>> LocalFunction<N, M> for &F {
@@ -52,6 +61,11 @@ impl<const N: usize, const M: usize, F: LocalFunction<N, M>> LocalFunction<N, M>
     #[inline]
     fn linearise(&self, x: [f64; N]) -> ([f64; M], [[f64; N]; M]) {
         (**self).linearise(x)
+    }
+
+    #[inline]
+    fn reverse_rule(&self) -> Option<Rc<dyn CustomVjp>> {
+        (**self).reverse_rule()
     }
 }
 
@@ -155,6 +169,30 @@ mod tests {
         assert_eq!(through_pair(&x, true), value);
         let forward = through_pair(&Fwd::<2>::variables(x), true);
         assert!((forward.derivative[1] - plain[1]).abs() < 1e-14);
+    }
+
+    #[test]
+    fn a_rule_takes_the_place_of_the_jacobian() {
+        /// Twice the input; only gradients above zero pass.
+        struct OneWay;
+        impl LocalFunction<1, 1> for OneWay {
+            fn evaluate<S: Scalar>(&self, [x]: [S; 1]) -> [S; 1] {
+                [x.times(2.0)]
+            }
+            fn reverse_rule(&self) -> Option<Rc<dyn CustomVjp>> {
+                Some(Rc::new(OneWay))
+            }
+        }
+        impl CustomVjp for OneWay {
+            fn vjp(&self, output_adjoints: &[f64], input_adjoints: &mut [f64]) {
+                input_adjoints[0] += 2.0 * output_adjoints[0].max(0.0);
+            }
+        }
+        let slope = |sign: f64| {
+            gradient(|x| Var::local(&OneWay, [x[0] * x[1]])[0].times(sign), &[3.0, 5.0]).1
+        };
+        assert_eq!((slope(1.0), slope(-1.0)), (vec![10.0, 6.0], vec![0.0, 0.0]));
+        assert_eq!(<Fwd<1>>::local(&OneWay, [Fwd::variable(3.0, 0)])[0].derivative, [2.0]);
     }
 
     #[test]

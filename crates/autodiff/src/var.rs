@@ -3,7 +3,7 @@
 use crate::chain::{Chain, unless_still};
 use crate::local::sum_local;
 use crate::real_field::impl_real_field;
-use crate::tape::{push, push_block, refuse_foreign};
+use crate::tape::{push, push_block, push_custom, refuse_foreign};
 use crate::{LocalFunction, Scalar};
 
 /// A number on the thread's tape.
@@ -102,7 +102,10 @@ impl Chain for Var {
         x: [Self; N],
     ) -> [Self; M] {
         let (values, jacobian) = function.linearise(x.map(Self::value));
-        let group = push_block(&x, M, jacobian.as_flattened());
+        let group = match function.reverse_rule() {
+            None => push_block(&x, M, jacobian.as_flattened()),
+            Some(rule) => push_custom(&x, M, rule),
+        };
         std::array::from_fn(|i| group.var(i, values[i]))
     }
 

@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 
-use crate::contact::stiffness::{damping_per_area, restitution, stiffness_per_area};
+use crate::contact::restitution::restitution;
+use crate::contact::stiffness::{damping_per_area, stiffness_per_area};
 use crate::scenes::floor;
 use crate::{Body, Horizon, Onset, Penalty, RigidBody, SemiImplicitEuler, State, Surface, World};
 

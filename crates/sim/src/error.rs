@@ -2,6 +2,8 @@
 
 use thiserror::Error;
 
+use crate::contact::LawError;
+
 /// Why a simulation cannot be set up or cannot go on.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum SimulationError {
@@ -31,6 +33,9 @@ pub enum SimulationError {
         /// Its name.
         body: String,
     },
+    /// A parameter of a contact is out of its range.
+    #[error(transparent)]
+    Parameter(#[from] LawError),
     /// A body that forces should move is held or driven.
     #[error("body '{body}' is not free to move")]
     NotFree {

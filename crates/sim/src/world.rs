@@ -168,7 +168,8 @@ impl World {
     /// Lets the samples of body `samples` touch the field of body `field`.
     ///
     /// # Errors
-    /// If there is no such body, it has no samples or no field, or the two are the same.
+    /// If there is no such body, it has no samples or no field, the two are the same, or the onset's parameters are
+    /// out of their range.
     pub fn touch(
         &mut self,
         samples: usize,
@@ -219,6 +220,7 @@ impl World {
         if self.bodies[field].field.is_none() {
             return Err(SimulationError::NoField { body: name(field) });
         }
+        onset.check()?;
         let (surface, params) = (Arc::clone(surface), law.parameters().to_vec());
         Ok(ContactPair { samples, surface, field, law, params, onset, share: 1.0 })
     }

@@ -3,14 +3,16 @@
 use nalgebra::Vector3;
 use prehend_autodiff::Scalar;
 
+use super::error::LawError;
 use super::law::{Contact, ContactLaw, Response};
-use super::penalty::LawError;
 
 /// The penalty law of Grasp'D (D. Turpin et al., ECCV 2022), a spring per sample:
 /// with c = min(φ − ρ, 0), f_n = −k_n c and f_t = −(u/|u|)·min(k_f |u| |c|, μ k_n |c|).
 ///
 /// Sample areas are ignored, so forces grow with the number of samples. Its leaky gradient is
-/// [`Onset::Leaky`](super::onset::Onset) with α = 0.1 and no band.
+/// [`Onset::grasp_d`](super::onset::Onset::grasp_d). There, at c = 0, both sides of the minimum are zero: the
+/// derivative used is that of a contact that just begins, k_f|u| or μ k_n, whichever is less; the authors'
+/// code always takes μ k_n.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GraspD {
     /// Normal stiffness k_n \[N/m\], friction gain k_f \[N s/m²\], friction coefficient μ.
@@ -50,9 +52,13 @@ impl ContactLaw for GraspD {
     #[inline]
     fn law<S: Scalar>(&self, p: &[S], contact: &Contact<S>) -> Response<S> {
         let &[stiffness, gain, friction] = p else {
-            return Response { normal: S::zero(), tangential: Vector3::zeros() };
+            return Response::zero();
         };
         let depth = S::constant(self.offset) - contact.gap;
+        // Zero counts as active: a leaky onset differentiates a contact of exactly zero force.
+        if depth.value() < 0.0 {
+            return Response::zero();
+        }
         let [x, y, z] = [contact.slip.x, contact.slip.y, contact.slip.z];
         let speed2 = x * x + y * y + z * z;
         let (k, f) = (gain.value(), friction.value() * stiffness.value());
@@ -75,6 +81,14 @@ impl ContactLaw for GraspD {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::contact::law_checks::{Claims, check_law};
+
+    #[test]
+    fn keeps_what_laws_promise() {
+        check_law(&GraspD::default(), &Claims::new(0.5));
+        check_law(&GraspD::new(2e4, 1e5, 0.8, 2e-3).unwrap(), &Claims::new(0.8));
+        check_law(&GraspD::new(2e4, 1e5, 0.8, -2e-3).unwrap(), &Claims::new(0.8));
+    }
 
     #[test]
     fn forces_are_the_published_formula() {

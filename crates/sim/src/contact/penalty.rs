@@ -1,42 +1,18 @@
 //! The linear Kelvin–Voigt penalty law, per area, with Coulomb friction.
 
 use prehend_autodiff::Scalar;
-use thiserror::Error;
 
+use super::error::LawError;
 use super::law::{Contact, Isotropic, IsotropicLaw};
-
-/// A contact-law parameter out of its range.
-#[derive(Clone, Copy, Debug, Error, PartialEq)]
-#[error("{name} must be {range}, is {value}")]
-pub struct LawError {
-    /// Name of the parameter.
-    pub name: &'static str,
-    /// What it must be.
-    pub range: &'static str,
-    /// What it is.
-    pub value: f64,
-}
-
-impl LawError {
-    pub(super) fn check_positive(name: &'static str, value: f64) -> Result<(), Self> {
-        let ok = value.is_finite() && value > 0.0;
-        if ok { Ok(()) } else { Err(Self { name, range: "positive", value }) }
-    }
-
-    pub(super) fn check_not_negative(name: &'static str, value: f64) -> Result<(), Self> {
-        let ok = value.is_finite() && value >= 0.0;
-        if ok { Ok(()) } else { Err(Self { name, range: "zero or positive", value }) }
-    }
-
-    pub(super) fn check_finite(name: &'static str, value: f64) -> Result<(), Self> {
-        if value.is_finite() { Ok(()) } else { Err(Self { name, range: "finite", value }) }
-    }
-}
+use super::resting::RestingContact;
+use super::restitution::damping_ratio;
 
 /// Spring and damper per area, clamped so that contact never pulls:
-/// f_n = A·max(0, −K g − D ġ), with friction coefficient μ.
+/// f_n = A·max(0, −K g − D ġ) for g ≤ 0, with friction coefficient μ.
 ///
-/// Per area, so that forces do not depend on how many samples a surface carries.
+/// Per area, so that forces do not depend on how many samples a surface carries. Contact ends while the body is
+/// still inside, which is where the clamped formula of [`restitution`](super::restitution::restitution) comes
+/// from; [`ApproachDamped`](super::approach::ApproachDamped) bounces more for the same damping.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KelvinVoigt {
     /// Stiffness K \[N/m³\], damping D \[N s/m³\], friction coefficient μ.
@@ -65,6 +41,22 @@ impl Penalty {
         LawError::check_positive("slip_scale", slip_scale)?;
         Ok(Isotropic(KelvinVoigt { params: [stiffness, damping, friction], slip_scale }))
     }
+
+    /// The law on which `resting` rests, and which bounces with coefficient `restitution` (above 0, at most 1).
+    ///
+    /// # Errors
+    /// Names the parameter that is out of its range.
+    pub fn from_resting(
+        resting: &RestingContact,
+        restitution: f64,
+        friction: f64,
+        slip_scale: f64,
+    ) -> Result<Self, LawError> {
+        resting.check()?;
+        LawError::check_restitution(restitution)?;
+        let damping = resting.damping(damping_ratio(restitution));
+        Self::new(resting.stiffness(1.0), damping, friction, slip_scale)
+    }
 }
 
 impl IsotropicLaw for KelvinVoigt {
@@ -78,7 +70,10 @@ impl IsotropicLaw for KelvinVoigt {
         let &[stiffness, damping, ..] = p else { return S::zero() };
         let pressure = -(stiffness * contact.gap + damping * contact.normal_speed);
         // Zero counts as active: a leaky onset differentiates a contact of exactly zero force.
-        if pressure.value() >= 0.0 { pressure * S::constant(contact.area) } else { S::zero() }
+        if pressure.value() < 0.0 || contact.gap.value() > 0.0 {
+            return S::zero();
+        }
+        pressure * S::constant(contact.area)
     }
 
     #[inline]
@@ -98,6 +93,25 @@ mod tests {
 
     use super::*;
     use crate::ContactLaw;
+    use crate::contact::law_checks::{Claims, bounce, check_law};
+
+    #[test]
+    fn keeps_what_laws_promise() {
+        check_law(&Penalty::new(3e7, 2e5, 0.7, 1e-2).unwrap(), &Claims::new(0.7));
+    }
+
+    #[test]
+    fn bounces_with_its_restitution() {
+        let resting =
+            RestingContact { mass: 0.3, gravity: 9.81, penetration: 5e-4, contact_area: 4e-4 };
+        // The last two are overdamped.
+        for e in [0.9, 0.451, 0.1, 0.03] {
+            let law = Penalty::from_resting(&resting, e, 0.0, 1e-3).unwrap();
+            assert!((bounce(&law, &resting, 0.5) - e).abs() < 2e-4);
+        }
+        let error = Penalty::from_resting(&resting, 1.1, 0.0, 1e-3).unwrap_err();
+        assert_eq!(error.name, "restitution");
+    }
 
     #[test]
     fn bad_parameters_are_named() {

@@ -2,55 +2,90 @@
 
 use std::collections::BTreeMap;
 
-use super::graspd::GraspD;
+use super::built_in;
+use super::error::LawError;
 use super::law::LocalLaw;
-use super::penalty::{LawError, Penalty};
 
 /// Makes a law from its parameters, in the order of its `params`, then whatever else it takes.
 pub type LawConstructor = fn(&[f64]) -> Result<Box<dyn LocalLaw>, LawError>;
 
-/// Contact laws by name, in alphabetical order.
-#[derive(Clone, Debug)]
-pub struct LawRegistry {
-    laws: BTreeMap<String, LawConstructor>,
+/// One of the numbers that a law is made from.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub struct LawParameter {
+    /// Its name, as errors call it.
+    pub name: &'static str,
+    /// Its unit; empty for plain numbers.
+    pub unit: &'static str,
+    /// What it is, in a few words.
+    pub meaning: &'static str,
 }
 
-/// Parameter number `index`, or an error that names it.
-fn parameter(values: &[f64], index: usize, name: &'static str) -> Result<f64, LawError> {
-    values.get(index).copied().ok_or(LawError { name, range: "given", value: f64::NAN })
+/// A law as the registry knows it.
+#[derive(Clone, Copy, Debug)]
+pub struct LawEntry {
+    /// What the law is, in a line.
+    pub summary: &'static str,
+    /// What its constructor takes, in order. The law's own parameters, which may carry derivatives, come first.
+    pub parameters: &'static [LawParameter],
+    /// Makes the law.
+    pub constructor: LawConstructor,
+}
+
+/// Contact laws by name, in alphabetical order.
+///
+/// ```
+/// use prehend_sim::LawRegistry;
+///
+/// let registry = LawRegistry::default();
+/// for (name, law) in registry.entries() {
+///     println!("{name}: {}", law.summary);
+///     for p in law.parameters {
+///         println!("  {} [{}] {}", p.name, p.unit, p.meaning);
+///     }
+/// }
+/// assert_eq!(registry.entry("hertz").map(|law| law.parameters[0].unit), Some("N/m^3.5"));
+/// ```
+#[derive(Clone, Debug)]
+pub struct LawRegistry {
+    laws: BTreeMap<String, LawEntry>,
 }
 
 impl Default for LawRegistry {
-    /// `penalty` (stiffness, damping, friction, slip scale) and `graspd` (stiffness, gain, friction, offset).
+    /// The laws of this crate: `graspd`, `hertz`, `hunt_crossley`, `hunt_crossley_stribeck`, `penalty`,
+    /// `penalty_approach`, `penalty_grain` and `penalty_stribeck`.
     fn default() -> Self {
         let mut registry = Self { laws: BTreeMap::new() };
-        registry.register("penalty", |v| {
-            let law = Penalty::new(
-                parameter(v, 0, "stiffness")?,
-                parameter(v, 1, "damping")?,
-                parameter(v, 2, "friction")?,
-                parameter(v, 3, "slip_scale")?,
-            )?;
-            Ok(Box::new(law))
-        });
-        registry.register("graspd", |v| {
-            let (stiffness, gain) = (parameter(v, 0, "stiffness")?, parameter(v, 1, "gain")?);
-            let (friction, offset) = (parameter(v, 2, "friction")?, parameter(v, 3, "offset")?);
-            Ok(Box::new(GraspD::new(stiffness, gain, friction, offset)?))
-        });
+        for (name, entry) in built_in::LAWS {
+            registry.register_entry(name, entry);
+        }
         registry
     }
 }
 
 impl LawRegistry {
-    /// Adds a law, or replaces the one of that name.
+    /// Adds a law without saying what it takes, or replaces the one of that name.
     pub fn register(&mut self, name: &str, constructor: LawConstructor) {
-        self.laws.insert(name.to_owned(), constructor);
+        self.register_entry(name, LawEntry { summary: "", parameters: &[], constructor });
+    }
+
+    /// Adds a law with its description, or replaces the one of that name.
+    pub fn register_entry(&mut self, name: &str, entry: LawEntry) {
+        self.laws.insert(name.to_owned(), entry);
     }
 
     /// The names known.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.laws.keys().map(String::as_str)
+    }
+
+    /// All laws with their names.
+    pub fn entries(&self) -> impl Iterator<Item = (&str, &LawEntry)> {
+        self.laws.iter().map(|(name, entry)| (name.as_str(), entry))
+    }
+
+    /// What is known of the law called `name`.
+    pub fn entry(&self, name: &str) -> Option<&LawEntry> {
+        self.laws.get(name)
     }
 
     /// The law called `name` with the given parameters, or `None` where there is none of that name.
@@ -59,7 +94,7 @@ impl LawRegistry {
         name: &str,
         params: &[f64],
     ) -> Option<Result<Box<dyn LocalLaw>, LawError>> {
-        self.laws.get(name).map(|constructor| constructor(params))
+        self.laws.get(name).map(|entry| (entry.constructor)(params))
     }
 }
 
@@ -68,12 +103,11 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::*;
-    use crate::{Contact, ContactLaw};
+    use crate::{Contact, ContactLaw, Penalty};
 
     #[test]
     fn a_registered_law_answers_like_the_law_itself() {
         let registry = LawRegistry::default();
-        assert_eq!(registry.names().collect::<Vec<_>>(), ["graspd", "penalty"]);
         let params = [1e6, 1e3, 0.5, 1e-2];
         let boxed = registry.create("penalty", &params).unwrap().unwrap();
         let law = Penalty::new(1e6, 1e3, 0.5, 1e-2).unwrap();
@@ -89,27 +123,16 @@ mod tests {
     }
 
     #[test]
-    fn built_in_laws_refuse_parameters_out_of_range() {
-        let registry = LawRegistry::default();
-        let good = [1e5, 1e3, 0.5, 1e-3];
-        for (law, names) in [
-            ("graspd", ["stiffness", "gain", "friction", "offset"]),
-            ("penalty", ["stiffness", "damping", "friction", "slip_scale"]),
-        ] {
-            assert!(registry.create(law, &good).unwrap().is_ok());
-            for (k, name) in names.into_iter().enumerate() {
-                for bad in [f64::NAN, f64::INFINITY, -1.0] {
-                    let mut params = good;
-                    params[k] = bad;
-                    let refused = registry.create(law, &params).unwrap().map(|_| ());
-                    // An offset may be negative: contact then begins inside.
-                    let allowed = name == "offset" && bad == -1.0;
-                    assert_eq!(
-                        refused.map_err(|e| e.name),
-                        if allowed { Ok(()) } else { Err(name) }
-                    );
-                }
-            }
-        }
+    fn a_law_of_ones_own_can_be_added_and_described() {
+        let mut registry = LawRegistry::default();
+        registry.register("mine", |v| {
+            let &[k] = v else {
+                return Err(LawError { name: "k", range: "given", value: f64::NAN });
+            };
+            Ok(Box::new(Penalty::new(k, 0.0, 0.0, 1.0)?))
+        });
+        assert!(registry.names().any(|name| name == "mine"));
+        assert_eq!(registry.entry("mine").unwrap().parameters, []);
+        assert!(registry.create("mine", &[1e6]).unwrap().is_ok());
     }
 }

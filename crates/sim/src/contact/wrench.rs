@@ -1,8 +1,10 @@
 //! The total contact wrench on a body and its derivative, gathered point by point.
 
+use std::rc::Rc;
+
 use nalgebra::{Matrix3, Point3, Vector3, Vector6};
 use prehend_autodiff::lie::cross_matrix;
-use prehend_autodiff::{Fwd, LocalFunction, Scalar};
+use prehend_autodiff::{CustomVjp, Fwd, LocalFunction, Scalar};
 use prehend_geometry::{DistanceField, FieldSample};
 
 use super::law::{Contact, ContactLaw};
@@ -40,6 +42,18 @@ pub struct WrenchJacobian {
     pub by_state: [[f64; 12]; 6],
     /// Derivative of the wrench by each parameter of the law; empty if not asked for.
     pub by_params: Vec<Vector6<f64>>,
+    /// Contacts whose part in `by_state` reverse mode passes on in one direction only.
+    pub(crate) one_sided: Vec<OneSided>,
+}
+
+/// A contact not yet made under [`Onset::AsymmetricLeaky`].
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct OneSided {
+    onset: OnsetSample,
+    /// Derivative of the wrench by the effective gap.
+    wrench: Vector6<f64>,
+    /// Derivative of the gap by the body's twist.
+    gap: Vector6<f64>,
 }
 
 /// The wrench as a function of the state's tangent, to first order about where it was found.
@@ -56,6 +70,33 @@ impl LocalFunction<12, 6> for WrenchJacobian {
     #[inline]
     fn linearise(&self, _: [f64; 12]) -> ([f64; 6], [[f64; 12]; 6]) {
         (self.wrench.into(), self.by_state)
+    }
+
+    fn reverse_rule(&self) -> Option<Rc<dyn CustomVjp>> {
+        let (by_state, one_sided) = (self.by_state, self.one_sided.clone());
+        (!one_sided.is_empty())
+            .then(|| -> Rc<dyn CustomVjp> { Rc::new(Rule { by_state, one_sided }) })
+    }
+}
+
+/// Reverse mode with contacts that leak in one direction only.
+struct Rule {
+    by_state: [[f64; 12]; 6],
+    one_sided: Vec<OneSided>,
+}
+
+impl CustomVjp for Rule {
+    fn vjp(&self, output_adjoints: &[f64], input_adjoints: &mut [f64]) {
+        for (adjoint, row) in output_adjoints.iter().zip(&self.by_state) {
+            input_adjoints.iter_mut().zip(row).for_each(|(sum, slope)| *sum += adjoint * slope);
+        }
+        let adjoint = Vector6::from_column_slice(output_adjoints);
+        for OneSided { onset, wrench, gap } in &self.one_sided {
+            let by_gap = adjoint.dot(wrench);
+            // What the Jacobian has let through already is taken back.
+            let change = onset.pull_back(by_gap, 0.0) - onset.slope * by_gap;
+            input_adjoints.iter_mut().zip(gap).for_each(|(sum, slope)| *sum += change * slope);
+        }
     }
 }
 
@@ -158,6 +199,18 @@ impl Touch {
         }
     }
 
+    /// This contact, whose force depends on its position as said, as one that leaks to one side.
+    fn one_sided(&self, by_position: &Matrix3<f64>) -> OneSided {
+        let gradient = self.normal * self.length;
+        // Without contact the gap alone matters: the derivative by position is that by the gap times ∇φ.
+        let force = by_position * self.normal / (self.length * self.onset.slope);
+        OneSided {
+            onset: self.onset,
+            wrench: stack(&force, &self.arm.cross(&force)),
+            gap: stack(&gradient, &self.arm.cross(&gradient)),
+        }
+    }
+
     /// The unit normal with its derivative by position: (I − nnᵀ)·∇²φ/|∇φ|.
     #[inline(always)]
     fn lifted_normal(&self) -> Vector3<Fwd<6>> {
@@ -202,6 +255,7 @@ pub(crate) fn wrench_jacobian<L: ContactLaw>(
     let mut wrench = Vector6::zeros();
     // Force and torque by position, turn, velocity and spin of the body.
     let mut by = [[Matrix3::<f64>::zeros(); 4]; 2];
+    let mut one_sided = Vec::new();
     let mut param_slopes = vec![Vector6::zeros(); if by_params { p.len() } else { 0 }];
     patch.for_each_touch(cutoff, |touch| {
         let contact = touch.lifted(cutoff);
@@ -223,12 +277,15 @@ pub(crate) fn wrench_jacobian<L: ContactLaw>(
         // Torque r×f: the arm turns with the body, δ(r×f) = (δθ×r)×f + r×δf.
         by[1][1] += cross_times(&f, &cross_matrix(arm));
         wrench += stack(&f, &touch.arm.cross(&f));
+        if touch.onset.closes_only {
+            one_sided.push(touch.one_sided(&by_position));
+        }
         add_param_slopes(law, p, touch, cutoff, &mut param_slopes);
     });
     let by_state = std::array::from_fn(|row| {
         std::array::from_fn(|column| by[row / 3][column / 3][(row % 3, column % 3)])
     });
-    WrenchJacobian { wrench, by_state, by_params: param_slopes }
+    WrenchJacobian { wrench, by_state, by_params: param_slopes, one_sided }
 }
 
 /// Adds the derivatives of one contact's wrench by the parameters, six at a time.
@@ -287,8 +344,8 @@ mod tests {
     use std::sync::Arc;
 
     use nalgebra::{Isometry3, Point3, Vector3, Vector6};
-    use prehend_autodiff::Fwd;
     use prehend_autodiff::check::{compare_gradients, finite_difference_jacobian};
+    use prehend_autodiff::{Fwd, Scalar, Var};
     use prehend_geometry::{DistanceField, FieldSample};
 
     use crate::scenes::{bowl, egg_on, floor};
@@ -357,8 +414,33 @@ mod tests {
             wrench: Vector6::zeros(),
             by_state: [[0.0; 12]; 6],
             by_params: vec![Vector6::zeros(); 3],
+            one_sided: Vec::new(),
         };
         assert_eq!(hard, zero);
+    }
+
+    #[test]
+    fn an_asymmetric_leak_passes_on_only_what_closes_the_gap() {
+        let gradient = |onset, sign: f64| {
+            let (world, mut states) = egg_on(floor(), onset);
+            states[1].pose.translation.z += 2e-3;
+            let height = |x: &[Var]| {
+                let mut tangent = [Var::constant(0.0); 12];
+                tangent[..6].copy_from_slice(x);
+                let states = [states[0].lift(), states[1].moved(&tangent)];
+                world.lift().wrenches(&states, 0)[1].z.times(sign)
+            };
+            prehend_autodiff::gradient(height, &[0.0; 6]).1
+        };
+        let (alpha, band, steps) = (0.1, 1e-2, LeakSteps::All);
+        let symmetric = |sign| gradient(Onset::Leaky { alpha, band, steps }, sign);
+        let asymmetric = |sign| gradient(Onset::AsymmetricLeaky { alpha, band, steps }, sign);
+        // The lift falls with the height. To have less of it, the gap would have to open.
+        assert!(symmetric(1.0)[2] < -1.0);
+        assert!(asymmetric(1.0).iter().all(|slope| slope.abs() < 1e-12));
+        for (a, b) in asymmetric(-1.0).iter().zip(symmetric(-1.0)) {
+            assert!((a - b).abs() < 1e-9 * b.abs().max(1.0), "{a} {b}");
+        }
     }
 
     #[test]
