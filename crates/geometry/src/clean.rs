@@ -6,6 +6,7 @@ use nalgebra::Point3;
 
 use crate::orient::{compacted, orient, wedge};
 use crate::topology::{components, edges, is_collapsed, non_manifold_vertices};
+use crate::weld::is_finite;
 use crate::{MeshReport, TriMesh};
 
 /// Components with fewer faces than this fraction of the largest are stray if open or hollow.
@@ -17,7 +18,7 @@ const FLAT: f64 = 1e-12;
 
 impl TriMesh {
     /// The welded mesh (see [`TriMesh::welded`]) without degenerate, duplicate, fin and stray faces, consistently
-    /// oriented and facing outward; attributes are dropped.
+    /// oriented and facing outward; attributes are dropped. A face with a corner that is not finite is degenerate.
     ///
     /// A component is stray if it has less than 1 % of the faces of the largest and is open or encloses no volume:
     /// scans carry a few such faces. Faces of no area whose corners differ are kept, since their neighbours need
@@ -44,7 +45,9 @@ impl TriMesh {
         };
         let mut faces = weld.faces(self);
         let given = faces.len();
-        faces.retain(|f| !is_collapsed(f));
+        faces.retain(|f| {
+            !is_collapsed(f) && f.iter().all(|v| is_finite(&weld.positions[*v as usize]))
+        });
         report.degenerate_faces = given - faces.len();
         let distinct = faces.len();
         let mut seen = HashSet::with_capacity(distinct);
@@ -187,6 +190,19 @@ mod tests {
         assert_eq!((clean.faces.len(), clean.vertices.len()), (n, sphere.vertices.len()));
         assert!((0..n).all(|f| clean.area_vector(f).dot(&clean.triangle(f)[0].coords) > 0.0));
         assert!(topology::edges(&clean.faces).iter().all(Edge::is_manifold));
+    }
+
+    #[test]
+    fn what_is_not_finite_takes_nothing_else_along() {
+        for bad in [f64::NAN, f64::INFINITY] {
+            let mut mesh = icosphere(1.0, 2);
+            let at = mesh.vertices.len() as u32;
+            mesh.vertices.extend([Point3::new(bad, 0.0, 0.0), Point3::new(0.0, bad, 1.0)]);
+            mesh.faces.extend([[0, 1, at], [at + 1, at, 2]]);
+            let (clean, report) = mesh.cleaned();
+            assert_eq!((report.degenerate_faces, report.welded_vertices), (2, 0));
+            assert!(report.watertight && clean.faces.len() == mesh.faces.len() - 2);
+        }
     }
 
     #[test]

@@ -64,9 +64,14 @@ impl TriMesh {
         mesh
     }
 
-    /// Multiplies every coordinate by `factor` (0.001 brings millimetres to metres).
+    /// Multiplies every coordinate by `factor` (0.001 brings millimetres to metres). A negative factor reflects the
+    /// body; its faces and normals still look outward.
     pub fn scaled(mut self, factor: f64) -> Self {
         self.vertices.iter_mut().for_each(|v| v.coords *= factor);
+        if factor < 0.0 {
+            self.faces.iter_mut().for_each(|f| f.swap(1, 2));
+            self.normals.iter_mut().flatten().for_each(|n| *n = -*n);
+        }
         self
     }
 
@@ -108,4 +113,21 @@ pub struct Texture {
     pub height: usize,
     /// sRGB-encoded pixels, `width * height` of them, row-major from the top-left.
     pub pixels: Vec<[u8; 3]>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mass::signed_volume;
+    use crate::shapes::cuboid;
+
+    #[test]
+    fn a_reflected_body_still_looks_outward() {
+        let mut mesh = cuboid(Vector3::new(1.0, 2.0, 3.0));
+        mesh.normals = Some(mesh.vertex_normals());
+        let scaled = mesh.scaled(-2.0);
+        assert!((signed_volume(&scaled) - 48.0).abs() < 1e-12);
+        let normals = scaled.normals.as_ref().unwrap();
+        assert!(scaled.vertex_normals().iter().zip(normals).all(|(a, b)| (a - b).norm() < 1e-12));
+    }
 }

@@ -117,8 +117,7 @@ impl Shells {
         }
         let n = positions.len().max(1) as f64;
         let centre = positions.iter().fold(Vector3::zeros(), |s, p| s + p.coords / n).into();
-        let everywhere = Point3::from([f64::INFINITY; 3]);
-        let mut bounds = vec![(everywhere, -everywhere); count];
+        let mut bounds = vec![Bounds::EMPTY; count];
         let mut first = vec![None; count];
         // Volumes about a corner of the shell, those of open shells together and about the centre of all.
         let (mut signed, mut unsigned) = (vec![0.0; count], vec![0.0; count]);
@@ -133,9 +132,8 @@ impl Shells {
                 open_signed += central;
                 open_unsigned += central.abs();
             }
-            for p in face.map(|v| positions[v as usize]) {
-                bounds[s] = (bounds[s].0.inf(&p), bounds[s].1.sup(&p));
-            }
+            let own = Bounds::of(face.iter().map(|v| &positions[*v as usize]));
+            bounds[s] = bounds[s].joined(&own);
         }
         let facing = |signed: f64, unsigned: f64| {
             if signed.abs() > MEANINGFUL * unsigned { signed.signum() } else { 0.0 }
@@ -168,14 +166,16 @@ impl Shells {
         }
         let mut within: Vec<Vec<usize>> = vec![Vec::new(); n];
         for inner in (0..n).filter(|s| self.list[*s].closed) {
-            tree.meeting(&boxes[inner], |outer| {
-                let (i, o) = (&boxes[inner], &boxes[outer]);
-                let fits = o.0 <= i.0 && i.1 <= o.1 && o != i;
-                if outer != inner && self.list[outer].closed && fits {
-                    within[outer].push(inner);
-                }
-                true
-            });
+            let i = &boxes[inner];
+            tree.each(
+                |o| o.holds(i),
+                |outer| {
+                    if outer != inner && self.list[outer].closed && boxes[outer] != *i {
+                        within[outer].push(inner);
+                    }
+                    true
+                },
+            );
         }
         for (outer, candidates) in within.iter().enumerate().filter(|(_, c)| !c.is_empty()) {
             let shell = TriMesh::new(positions.to_vec(), members[outer].clone());

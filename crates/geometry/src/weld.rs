@@ -5,9 +5,18 @@ use std::collections::HashMap;
 use nalgebra::{Point3, Vector3};
 
 use crate::TriMesh;
+use crate::box_tree::Bounds;
 
 /// Positions closer than this fraction of the bounding box's diagonal count as one.
 const RELATIVE_TOLERANCE: f64 = 1e-9;
+
+pub(crate) fn is_finite(v: &Point3<f64>) -> bool {
+    v.iter().all(|c| c.is_finite())
+}
+
+fn finite_bounds(vertices: &[Point3<f64>]) -> Bounds {
+    Bounds::of(vertices.iter().filter(|v| is_finite(v)))
+}
 
 /// The distinct positions of a mesh, in the order of their first appearance.
 #[derive(Clone, Debug)]
@@ -38,9 +47,7 @@ impl Weld {
         if tolerance <= 0.0 {
             return Self::exact(vertices);
         }
-        let everywhere = Point3::from([f64::INFINITY; 3]);
-        let (low, high) =
-            vertices.iter().fold((everywhere, -everywhere), |(l, h), v| (l.inf(v), h.sup(v)));
+        let Bounds { low, high } = finite_bounds(vertices);
         // Cells much larger than the tolerance, so that most vertices look into one cell only; and not so small
         // that their numbers overflow.
         let cell = (8.0 * tolerance).max(1e-7 * (high - low).norm()).max(f64::MIN_POSITIVE);
@@ -48,6 +55,12 @@ impl Weld {
         let mut cells: HashMap<Vector3<i64>, Vec<u32>> = HashMap::new();
         let mut weld = Self { positions: Vec::new(), index: Vec::with_capacity(vertices.len()) };
         for v in vertices {
+            if !is_finite(v) {
+                // Near to nothing.
+                weld.index.push(weld.positions.len() as u32);
+                weld.positions.push(*v);
+                continue;
+            }
             let offset = v - low;
             let reach = Vector3::repeat(tolerance);
             let (from, to) = (cell_of(offset - reach), cell_of(offset + reach));
@@ -86,9 +99,10 @@ impl Weld {
 
 impl TriMesh {
     /// Which vertices share a position, to 1e-9 of the bounding box's diagonal: what topological questions need
-    /// where texture seams store vertices several times.
+    /// where texture seams store vertices several times. Vertices that are not finite join no others.
     pub fn weld(&self) -> Weld {
-        let diagonal = self.bounds().map_or(0.0, |(low, high)| (high - low).norm());
+        let Bounds { low, high } = finite_bounds(&self.vertices);
+        let diagonal = if low.x <= high.x { (high - low).norm() } else { 0.0 };
         self.weld_within(RELATIVE_TOLERANCE * diagonal)
     }
 

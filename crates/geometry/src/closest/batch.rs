@@ -11,9 +11,8 @@ const CHUNK: usize = 1024;
 impl ClosestPoints {
     /// Closest points of many points, in their order, in parallel: the very answers of [`Self::closest`].
     pub fn closest_many(&self, points: &[Point3<f64>], max_distance: f64) -> Vec<Option<Closest>> {
-        self.in_order(points, |i, hint| match hint {
-            Some(face) => self.closest_from(&points[i], max_distance, face),
-            None => self.closest(&points[i], max_distance),
+        in_order(&along_a_curve(points, &self.bounds), |i, last| {
+            self.search(&points[i], max_distance, last)
         })
     }
 
@@ -25,17 +24,11 @@ impl ClosestPoints {
         max_distance: f64,
         hints: &[u32],
     ) -> Vec<Option<Closest>> {
-        let mut found = vec![None; points.len()];
-        found.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, found)| {
-            for (k, found) in found.iter_mut().enumerate() {
-                let i = chunk * CHUNK + k;
-                *found = match hints.get(i) {
-                    Some(&face) => self.closest_from(&points[i], max_distance, face),
-                    None => self.closest(&points[i], max_distance),
-                };
-            }
-        });
-        found
+        let hint = |i: usize| hints.get(i).copied();
+        // Those from one pack of triangles follow each other, so that they find it in the cache.
+        let pack = |i| hint(i).and_then(|face| self.bvh.pack.get(face as usize)).copied();
+        let packs: Vec<u32> = (0..points.len()).map(|i| pack(i).unwrap_or_default()).collect();
+        in_order(&sorted(&packs), |i, _| self.search(&points[i], max_distance, hint(i)))
     }
 
     /// Signed distances of many points, in their order, in parallel: the very answers of
@@ -44,55 +37,68 @@ impl ClosestPoints {
         let found = self.closest_many(points, f64::INFINITY);
         points.par_iter().zip(found).with_min_len(CHUNK).map(|(p, c)| self.signed(p, c)).collect()
     }
+}
 
-    /// Answers point `i` by `query(i, face of an answer nearby)`, along a curve through space.
-    fn in_order(
-        &self,
-        points: &[Point3<f64>],
-        query: impl Fn(usize, Option<u32>) -> Option<Closest> + Sync,
-    ) -> Vec<Option<Closest>> {
-        let order = morton_order(points, &self.bounds);
-        let chunks: Vec<Vec<Option<Closest>>> = order
-            .par_chunks(CHUNK)
-            .map(|indices| {
-                let mut hint = None;
-                indices
-                    .iter()
-                    .map(|&i| {
-                        let found = query(i as usize, hint);
-                        hint = found.map(|c| c.face).or(hint);
-                        found
-                    })
-                    .collect()
-            })
-            .collect();
-        let mut answers = vec![None; points.len()];
-        for (&i, found) in order.iter().zip(chunks.into_iter().flatten()) {
-            answers[i as usize] = found;
-        }
-        answers
+/// Answers every point i of `order` by `query(i, face of the answer before)`, in parallel.
+fn in_order(
+    order: &[u32],
+    query: impl Fn(usize, Option<u32>) -> Option<Closest> + Sync,
+) -> Vec<Option<Closest>> {
+    let of_chunk = |indices: &[u32]| -> Vec<Option<Closest>> {
+        let mut last = None;
+        let mut answer = |&i: &u32| {
+            let found = query(i as usize, last);
+            last = found.map(|c| c.face).or(last);
+            found
+        };
+        indices.iter().map(&mut answer).collect()
+    };
+    let chunks: Vec<_> = order.par_chunks(CHUNK).map(of_chunk).collect();
+    let mut answers = vec![None; order.len()];
+    for (&i, found) in order.iter().zip(chunks.into_iter().flatten()) {
+        answers[i as usize] = found;
     }
+    answers
 }
 
 /// Indices of the points along a Z-order curve (Morton 1966) through twice the box `bounds`, those outside of it at
 /// its border.
-fn morton_order(points: &[Point3<f64>], bounds: &(Point3<f64>, Point3<f64>)) -> Vec<u32> {
+fn along_a_curve(points: &[Point3<f64>], bounds: &(Point3<f64>, Point3<f64>)) -> Vec<u32> {
     let cells = f64::from(1 << 10);
     let low = bounds.0 - (bounds.1 - bounds.0) * 0.5;
     let scale = (bounds.1 - bounds.0).map(|s| if s > 0.0 { 0.5 * cells / s } else { 0.0 });
-    let mut keys: Vec<u64> = points
-        .iter()
-        .enumerate()
-        .map(|(i, p)| {
-            // A cast saturates, and takes NaN for zero.
-            let cell = |axis: usize| {
-                spread((((p[axis] - low[axis]) * scale[axis]) as u32).min(cells as u32 - 1))
-            };
-            u64::from(cell(0) << 2 | cell(1) << 1 | cell(2)) << 32 | i as u64
-        })
-        .collect();
-    keys.sort_unstable();
-    keys.into_iter().map(|key| key as u32).collect()
+    let key = |p: &Point3<f64>| {
+        // A cast saturates, and takes NaN for zero.
+        let cell = |axis: usize| {
+            spread((((p[axis] - low[axis]) * scale[axis]) as u32).min(cells as u32 - 1))
+        };
+        cell(0) << 2 | cell(1) << 1 | cell(2)
+    };
+    sorted(&points.iter().map(key).collect::<Vec<_>>())
+}
+
+/// The indices of `keys` in ascending order of those, equal ones in their own: counted by eleven bits at a time, the
+/// lowest first.
+fn sorted(keys: &[u32]) -> Vec<u32> {
+    const BITS: u32 = 11;
+    let top = keys.iter().fold(0, |top, key| top | key);
+    let mut order: Vec<u32> = (0..keys.len() as u32).collect();
+    let mut next = vec![0; keys.len()];
+    let mut shift = 0;
+    while shift < u32::BITS && top >> shift != 0 {
+        let digit = |i: u32| (keys[i as usize] >> shift) as usize & ((1 << BITS) - 1);
+        let mut place = [0_u32; (1 << BITS) + 1];
+        order.iter().for_each(|&i| place[digit(i) + 1] += 1);
+        (0..1 << BITS).for_each(|d| place[d + 1] += place[d]);
+        for &i in &order {
+            let place = &mut place[digit(i)];
+            next[*place as usize] = i;
+            *place += 1;
+        }
+        std::mem::swap(&mut order, &mut next);
+        shift += BITS;
+    }
+    order
 }
 
 /// Moves bit k of ten to bit 3 k.
@@ -115,12 +121,25 @@ mod tests {
         let mut points: Vec<Point3<f64>> =
             (0..500).map(|_| Point3::from([(); 3].map(|()| random.unit() - 0.5))).collect();
         points.extend([Point3::new(f64::NAN, 1e300, -1e300), Point3::new(f64::INFINITY, 0.0, 0.0)]);
-        let order = morton_order(&points, &bounds);
-        let mut sorted = order.clone();
-        sorted.sort_unstable();
-        assert!(sorted.iter().copied().eq(0..502));
+        let order = along_a_curve(&points, &bounds);
+        let mut all = order.clone();
+        all.sort_unstable();
+        assert!(all.iter().copied().eq(0..502));
         let octant = |i: &u32| points[*i as usize].map(|x| x >= 0.0);
         let changes = order.windows(2).filter(|w| octant(&w[0]) != octant(&w[1])).count();
         assert!(changes <= 9, "{changes}");
+    }
+
+    #[test]
+    fn sorting_by_counting_is_sorting() {
+        let mut random = crate::SplitMix64::new(4);
+        for bits in [0, 3, 11, 12, 30, 32] {
+            let keys: Vec<u32> =
+                (0..3000).map(|_| (random.unit() * 2_f64.powi(bits)) as u32).collect();
+            let mut expected: Vec<u32> = (0..3000).collect();
+            expected.sort_by_key(|&i| keys[i as usize]);
+            assert_eq!(sorted(&keys), expected);
+        }
+        assert!(sorted(&[]).is_empty());
     }
 }

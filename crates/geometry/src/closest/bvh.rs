@@ -196,8 +196,6 @@ pub(super) struct Bvh {
     pub(super) center: Vector3<f64>,
     /// Largest coordinate from there \[m\].
     pub(super) reach: f64,
-    /// Most references that a traversal leaves behind.
-    pub(super) stack: usize,
 }
 
 impl Bvh {
@@ -241,30 +239,18 @@ impl Bvh {
             .collect();
         let pack = vec![0; slot.len()];
         let reach = (hi.coords - center).amax();
-        let mut tree = Self {
-            nodes: Vec::new(),
-            packs: Vec::new(),
-            triangles,
-            slot,
-            pack,
-            center,
-            reach,
-            stack: 0,
-        };
-        let depth = tree.widen(&binary, &ranges, &corners);
-        // Each level leaves at most seven siblings behind.
-        tree.stack = (LANES - 1) * depth + LANES;
+        let (nodes, packs) = (Vec::new(), Vec::new());
+        let mut tree = Self { nodes, packs, triangles, slot, pack, center, reach };
+        tree.widen(&binary, &ranges, &corners);
         tree
     }
 
-    /// Regroups the binary tree into nodes and packs of eight; returns the depth.
-    fn widen(&mut self, binary: &Bvh2, ranges: &Ranges, corners: &[[Vector3<f64>; 3]]) -> usize {
-        let mut depth = 0;
-        let mut open = vec![(0usize, 0usize, 1usize)];
+    /// Regroups the binary tree into nodes and packs of eight.
+    fn widen(&mut self, binary: &Bvh2, ranges: &Ranges, corners: &[[Vector3<f64>; 3]]) {
+        let mut open = vec![(0usize, 0usize)];
         let empty = Node::new(&[], [0; LANES]);
         self.nodes.push(empty.clone());
-        while let Some((wide, root, level)) = open.pop() {
-            depth = depth.max(level);
+        while let Some((wide, root)) = open.pop() {
             let mut members = vec![root];
             // Open the largest box that is not yet a pack until the node is full.
             while members.len() < LANES {
@@ -295,13 +281,12 @@ impl Bvh {
                 } else {
                     let index = self.nodes.len();
                     self.nodes.push(empty.clone());
-                    open.push((index, m, level + 1));
+                    open.push((index, m));
                     index as u32
                 };
             }
             self.nodes[wide] = Node::new(&boxes, children);
         }
-        depth
     }
 
     /// The triangles of a pack.

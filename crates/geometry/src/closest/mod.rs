@@ -186,7 +186,7 @@ impl ClosestPoints {
     }
 
     /// The point of the mesh closest to `point`, or `None` beyond `max_distance` \[m\] (which may be
-    /// infinite) or for a point that is not finite.
+    /// infinite) or for a point that is not finite or so far (1e150 m) that its squared distance may not be.
     #[inline]
     pub fn closest(&self, point: &Point3<f64>, max_distance: f64) -> Option<Closest> {
         self.search(point, max_distance, None)
@@ -204,7 +204,7 @@ impl ClosestPoints {
         self.search(point, max_distance, Some(face))
     }
 
-    /// Signed distance \[m\], negative inside, and the closest point; NaN for a point that is not finite.
+    /// Signed distance \[m\], negative inside, and the closest point; NaN where [`Self::closest`] has no answer.
     pub fn signed_distance(&self, point: &Point3<f64>) -> (f64, Closest) {
         self.signed(point, self.closest(point, f64::INFINITY))
     }

@@ -54,9 +54,9 @@ impl Pack {
         self.first as usize..self.first as usize + self.used.count_ones() as usize
     }
 
-    /// Squared distances \[m²\] and a bit for each of those that are at most `limit`.
+    /// Squared distances \[m²\], those of unused lanes of no meaning.
     #[inline]
-    pub(super) fn within(&self, p: &Point8, limit: f32) -> ([f32; LANES], u32) {
+    pub(super) fn distances_squared(&self, p: &Point8) -> f32x8 {
         let d = [p[0] - self.a[0], p[1] - self.a[1], p[2] - self.a[2]];
         let x = dot3(&d, &self.axes[0]);
         let y = dot3(&d, &self.axes[1]);
@@ -69,9 +69,13 @@ impl Pack {
         let (start, inside_start) = side(x, y, &self.up[1], self.length[1]);
         let inside = y.simd_gt(zero) & inside_end.simd_gt(zero) & inside_start.simd_lt(zero);
         let border = base.fast_min(end).fast_min(start);
-        let squared = z * z + inside.select(zero, border);
-        let near = squared.simd_le(f32x8::splat(limit)).to_bitmask();
-        (squared.to_array(), near & self.used)
+        z * z + inside.select(zero, border)
+    }
+
+    /// A bit for each of the triangles that `squared` places within `limit` \[m²\].
+    #[inline]
+    pub(super) fn within(&self, squared: f32x8, limit: f32) -> u32 {
+        squared.simd_le(f32x8::splat(limit)).to_bitmask() & self.used
     }
 }
 
@@ -147,15 +151,16 @@ mod tests {
             let pack = Pack::new(&[corners, [c, a, b]], 5);
             let p = vector(3.0);
             let lanes = [p.x, p.y, p.z].map(|x| f32x8::splat(x as f32));
-            let (squared, near) = pack.within(&lanes, f32::MAX);
-            assert_eq!(near, 3);
+            let all = pack.distances_squared(&lanes);
+            let squared = all.to_array();
+            assert_eq!(pack.within(all, f32::MAX), 3);
             let exact = |corners: [Vector3<f64>; 3]| {
                 Triangle::new(corners.map(Into::into), 0).closest(&p).distance_squared.sqrt()
             };
             // A tenth of what the search allows for.
             assert!((f64::from(squared[0]).sqrt() - exact(corners)).abs() < 5e-7, "case {case}");
             assert!((f64::from(squared[1]).sqrt() - exact([c, a, b])).abs() < 5e-7, "case {case}");
-            assert_eq!(pack.within(&lanes, 0.0).1 & !3, 0);
+            assert_eq!(pack.within(all, 0.0) & !3, 0);
         }
     }
 }

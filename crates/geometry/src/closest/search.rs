@@ -12,8 +12,6 @@ use super::bvh::{Bvh, Child, child};
 use super::pack::Point8;
 use super::triangle::Foot;
 
-/// Stack that lives in cache; deeper trees fall back to the heap.
-const SHORT_STACK: usize = 64;
 /// Triangles kept for the last word.
 const KEPT: usize = 16;
 /// Farther away \[m\] squares leave single precision.
@@ -56,14 +54,20 @@ impl Bvh {
             None => search.plunge(),
         };
         search.visit_pack(skip);
-        if self.stack <= SHORT_STACK {
-            search.descend(skip, &mut [(0, 0.0); SHORT_STACK]);
-        } else {
-            search.descend(skip, &mut vec![(0, 0.0); self.stack]);
-        }
+        search.visit_node(0, skip);
         search.settle();
         search.last.found
     }
+}
+
+/// The numbers of the bits that are set, ascending.
+#[inline(always)]
+fn lanes(mut bits: u32) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let lane = (bits != 0).then_some(bits.trailing_zeros() as usize);
+        bits &= bits.wrapping_sub(1);
+        lane
+    })
 }
 
 struct Search<'a> {
@@ -103,40 +107,26 @@ impl Search<'_> {
         }
     }
 
-    #[inline]
-    fn descend(&mut self, skip: usize, stack: &mut [(u32, f32)]) {
-        let mut len = 1;
-        stack[0] = (0, 0.0);
-        while len > 0 {
-            len -= 1;
-            let (reference, distance) = stack[len];
-            if distance > self.limit {
-                continue;
+    /// Visits what may hold the nearest below a node, nearest boxes first, but not the pack `skip`.
+    fn visit_node(&mut self, index: usize, skip: usize) {
+        let tree = self.tree;
+        let node = &tree.nodes[index];
+        let (distances, mut near) = node.within(&self.point, self.limit);
+        while near != 0 {
+            let mut nearest = near.trailing_zeros() as usize;
+            for lane in lanes(near & (near - 1)) {
+                if distances[lane] < distances[nearest] {
+                    nearest = lane;
+                }
             }
-            match child(reference) {
-                Child::Pack(pack) => {
-                    if pack != skip {
-                        self.visit_pack(pack);
-                    }
-                }
-                Child::Node(index) => {
-                    let node = &self.tree.nodes[index];
-                    let (distances, mut near) = node.within(&self.point, self.limit);
-                    let first = len;
-                    while near != 0 {
-                        let lane = near.trailing_zeros() as usize;
-                        near &= near - 1;
-                        let d = distances[lane];
-                        // Farthest first: the nearest ends on top of the stack.
-                        let mut at = len;
-                        while at > first && stack[at - 1].1 < d {
-                            stack[at] = stack[at - 1];
-                            at -= 1;
-                        }
-                        stack[at] = (node.child[lane], d);
-                        len += 1;
-                    }
-                }
+            if distances[nearest] > self.limit {
+                return;
+            }
+            near &= !(1 << nearest);
+            match child(node.child[nearest]) {
+                Child::Pack(pack) if pack == skip => {}
+                Child::Pack(pack) => self.visit_pack(pack),
+                Child::Node(index) => self.visit_node(index, skip),
             }
         }
     }
@@ -144,26 +134,25 @@ impl Search<'_> {
     #[inline]
     fn visit_pack(&mut self, index: usize) {
         let pack = &self.tree.packs[index];
-        let (distances, mut near) = pack.within(&self.point, self.limit);
+        let squared = pack.distances_squared(&self.point);
+        let mut near = pack.within(squared, self.limit);
         if near == 0 {
             return;
         }
-        let before = self.nearest;
-        while near != 0 {
-            let lane = near.trailing_zeros();
-            near &= near - 1;
-            let d = distances[lane as usize];
+        // The limit first: it leaves few to be kept.
+        let distances = squared.to_array();
+        let least = lanes(near).fold(f32::INFINITY, |least, lane| least.min(distances[lane]));
+        if least < self.nearest {
+            self.nearest = least;
+            self.limit = self.limit.min(self.square_with_slack(least.sqrt()));
+            near = pack.within(squared, self.limit);
+        }
+        for lane in lanes(near) {
             if self.count == KEPT {
                 self.make_room();
             }
-            self.kept[self.count] = (d, pack.first + lane);
+            self.kept[self.count] = (distances[lane], pack.first + lane as u32);
             self.count += 1;
-            if d < self.nearest {
-                self.nearest = d;
-            }
-        }
-        if self.nearest < before {
-            self.limit = self.limit.min(self.square_with_slack(self.nearest.sqrt()));
         }
     }
 

@@ -40,7 +40,7 @@ pub trait Target: Sync {
     type Memory: Default + Send;
 
     /// The point closest to `query` within `max_distance` \[m\]. `memory`, of the last query for the same source point,
-    /// may only change how fast the answer is found.
+    /// may only change how fast the answer is found. A match that is not finite makes the alignment so.
     fn closest(
         &self,
         query: &Point3<f64>,

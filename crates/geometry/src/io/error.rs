@@ -1,8 +1,8 @@
-//! What can be wrong with a mesh file.
+//! What can be wrong with the file of a mesh or of a distance grid.
 
 use std::path::{Path, PathBuf};
 
-/// Why a mesh could not be read or written; every variant names the file.
+/// Why a mesh or a distance grid could not be read or written; every variant names the file.
 #[derive(Debug, thiserror::Error)]
 pub enum MeshError {
     /// The file could not be opened or read.
@@ -80,7 +80,7 @@ pub enum MeshError {
 }
 
 impl MeshError {
-    pub(super) fn malformed(
+    pub(crate) fn malformed(
         path: &Path,
         element: impl Into<String>,
         reason: impl ToString,

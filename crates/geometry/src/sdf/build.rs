@@ -117,6 +117,10 @@ fn sample_slab(mesh: &ClosestPoints, lattice: &Lattice, i: usize, slab: &mut [f6
     }
 }
 
+/// How much wider than asked for the band is searched, so that rounding decides nothing: a sample that is not found is then
+/// farther away than its neighbours from it, and on their side of the surface.
+const ROUNDING: f64 = 1.0 + 1e-9;
+
 /// Samples within the band, the first along x being number `first`; the rest is left alone.
 ///
 /// One query at the middle of a block of samples says whether the block reaches into the band, which samples
@@ -135,29 +139,35 @@ fn sample_band(
     for j0 in (0..ny).step_by(BLOCK) {
         for k0 in (0..nz).step_by(BLOCK) {
             let near = lattice.position([first, j0, k0]);
-            let last = [layers - 1, (ny - j0).min(BLOCK) - 1, (nz - k0).min(BLOCK) - 1];
+            let size = [layers - 1, (ny - j0).min(BLOCK) - 1, (nz - k0).min(BLOCK) - 1];
             let middle = nalgebra::center(
                 &near,
-                &lattice.position([first + last[0], j0 + last[1], k0 + last[2]]),
+                &lattice.position([first + size[0], j0 + size[1], k0 + size[2]]),
             );
-            let Some(block) = mesh.search(&middle, (band + radius) * (1.0 + 1e-9), block_hint)
-            else {
+            let Some(block) = mesh.search(&middle, (band + radius) * ROUNDING, block_hint) else {
                 continue;
             };
             block_hint = Some(block.face);
-            let certain = (block.distance - band * (1.0 + 1e-9)).max(0.0);
+            let certain = (block.distance - band * ROUNDING).max(0.0);
             let certain_squared = certain * certain;
-            let mut hint = block_hint;
-            for i in 0..=last[0] {
-                for j in j0..=j0 + last[1] {
-                    for k in k0..=k0 + last[2] {
+            let mut last_sample = (middle, block);
+            for i in 0..=size[0] {
+                for j in 0..=size[1] {
+                    // To and fro, so that each sample is next to the one before.
+                    let j = j0 + if i % 2 == 0 { j } else { size[1] - j };
+                    for k in 0..=size[2] {
+                        let k = k0 + if (i + j) % 2 == 0 { k } else { size[2] - k };
                         let p = lattice.position([first + i, j, k]);
                         if (p - middle).norm_squared() < certain_squared {
                             continue;
                         }
-                        if let Some(closest) = mesh.search(&p, band, hint) {
-                            hint = Some(closest.face);
-                            values[(i * ny + j) * nz + k] = mesh.signed(&p, Some(closest)).0;
+                        // A distance changes by no more than its point moves.
+                        let (from, last) = &last_sample;
+                        let most = band.min(last.distance + (p - from).norm()) * ROUNDING;
+                        if let Some(closest) = mesh.search(&p, most, Some(last.face)) {
+                            last_sample = (p, closest);
+                            let signed = mesh.signed(&p, Some(closest)).0;
+                            values[(i * ny + j) * nz + k] = signed.clamp(-band, band);
                         }
                     }
                 }

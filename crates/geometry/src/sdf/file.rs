@@ -5,69 +5,39 @@
 //! the band infinite for none); spline coefficients (f64, two more than samples along each axis, the last axis
 //! fastest); and the FNV-1a hash of all that by 64-bit words after the first 8 bytes (u64).
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use nalgebra::Point3;
 
-use super::{Lattice, SdfGrid};
-use crate::write_whole;
+use super::{Lattice, MAX_SAMPLES, SdfGrid};
+use crate::io::folder::read_limited;
+use crate::{MeshError, write_whole};
 
 const MAGIC: &[u8; 8] = b"PREHSDF\0";
 const VERSION: u32 = 1;
 
-/// Why a distance grid could not be read or written.
-#[derive(Debug, thiserror::Error)]
-pub enum SdfFileError {
-    /// The file could not be read.
-    #[error("{path}: cannot be read: {source}")]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
-    },
-    /// The file could not be written; what was there before is unchanged.
-    #[error("{path}: cannot be written: {source}")]
-    Write {
-        /// The file.
-        path: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
-    },
-    /// The file is not a distance grid, or is damaged.
-    #[error("{path}: {field}: {reason}")]
-    Malformed {
-        /// The file.
-        path: PathBuf,
-        /// The field of the format, such as "version" or "coefficients".
-        field: &'static str,
-        /// What is wrong with it.
-        reason: String,
-    },
-}
+/// No grid takes more: a spare coefficient on both sides of each axis at most doubles it.
+const MAX_BYTES: usize = 128 + 8 * (8 * MAX_SAMPLES);
 
 impl SdfGrid {
     /// Writes the grid to a file, whole or not at all.
     ///
     /// # Errors
-    /// [`SdfFileError::Write`].
-    pub fn save(&self, path: &Path) -> Result<(), SdfFileError> {
+    /// [`MeshError::Write`].
+    pub fn save(&self, path: &Path) -> Result<(), MeshError> {
         write_whole(path, &self.to_bytes())
-            .map_err(|source| SdfFileError::Write { path: path.into(), source })
+            .map_err(|source| MeshError::Write { path: path.into(), source })
     }
 
     /// Reads a grid that [`Self::save`] wrote: the same to the last bit.
     ///
     /// # Errors
-    /// [`SdfFileError`], naming the file and the field that is wrong with it.
-    pub fn load(path: &Path) -> Result<Self, SdfFileError> {
-        let bytes = std::fs::read(path)
-            .map_err(|source| SdfFileError::Read { path: path.into(), source })?;
-        Self::from_bytes(&bytes).map_err(|(field, reason)| SdfFileError::Malformed {
-            path: path.into(),
-            field,
-            reason,
-        })
+    /// [`MeshError::Read`], or [`MeshError::Malformed`] with the field that is wrong.
+    pub fn load(path: &Path) -> Result<Self, MeshError> {
+        let bytes = read_limited(path, MAX_BYTES)
+            .map_err(|source| MeshError::Read { path: path.into(), source })?;
+        Self::from_bytes(&bytes)
+            .map_err(|(field, reason)| MeshError::malformed(path, field, reason))
     }
 
     fn to_bytes(&self) -> Vec<u8> {
@@ -187,9 +157,12 @@ mod tests {
         let p = Point3::new(0.21, 0.03, 0.14);
         assert_eq!(again.evaluate(&p), grid.evaluate(&p));
         assert_eq!((again.band(), again.bounds()), (grid.band(), grid.bounds()));
-        assert!(matches!(SdfGrid::load(folder.path()), Err(SdfFileError::Read { .. })));
+        assert!(matches!(SdfGrid::load(folder.path()), Err(MeshError::Read { .. })));
+        // A pipe or a device may never end.
+        #[cfg(unix)]
+        assert!(matches!(SdfGrid::load(Path::new("/dev/zero")), Err(MeshError::Read { .. })));
         let nowhere = folder.path().join("no/a.sdf");
-        assert!(matches!(grid.save(&nowhere), Err(SdfFileError::Write { .. })));
+        assert!(matches!(grid.save(&nowhere), Err(MeshError::Write { .. })));
     }
 
     #[test]

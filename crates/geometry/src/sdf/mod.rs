@@ -8,6 +8,5 @@ mod lattice;
 mod spline;
 
 pub use error_bound::SdfErrorBound;
-pub use file::SdfFileError;
 pub use grid::SdfGrid;
 pub use lattice::{Lattice, MAX_SAMPLES, SdfError};

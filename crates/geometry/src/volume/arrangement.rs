@@ -5,7 +5,7 @@ use std::cell::Cell;
 use nalgebra::Point3;
 
 use super::chain::{Chain, SIDES};
-use super::predicates::{Plane, Side, edges_turn};
+use crate::predicates::{Plane, Side, edges_turn};
 
 /// Where an edge of one surface pierces a face of the other.
 #[derive(Clone, Copy, Debug)]
@@ -55,7 +55,7 @@ pub(super) struct Arrangement {
 }
 
 impl Arrangement {
-    /// Crosses `a` with `b`, which is moved infinitesimally where they only touch (see `predicates`).
+    /// Crosses `a` with `b`, which is moved infinitesimally where they only touch (see `crate::predicates`).
     pub(super) fn new(a: &Chain, b: &Chain) -> Self {
         let mut crossings = [Vec::new(), Vec::new()];
         let mut segments = Vec::new();

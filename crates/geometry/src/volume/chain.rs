@@ -2,8 +2,8 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
-use super::boxes::Tree;
-use super::predicates::Plane;
+use crate::box_tree::{Bounds, BoxTree};
+use crate::predicates::Plane;
 
 /// Closed surfaces, taken as a chain: what counts is how often they wind about a point.
 ///
@@ -12,7 +12,7 @@ use super::predicates::Plane;
 pub(super) struct Chain {
     pub(super) positions: Vec<Point3<f64>>,
     pub(super) faces: Vec<[u32; 3]>,
-    pub(super) tree: Tree,
+    pub(super) tree: BoxTree,
     /// A vertex of every connected piece.
     roots: Vec<u32>,
     /// The sides of faces that lead from the roots to all other vertices, every vertex after the one it is reached from.
@@ -33,7 +33,8 @@ pub(super) const SIDES: [[usize; 2]; 3] = [[0, 1], [1, 2], [2, 0]];
 impl Chain {
     /// Faces whose corners differ, between positions that are all finite; at least one face.
     pub(super) fn new(positions: Vec<Point3<f64>>, faces: Vec<[u32; 3]>) -> Self {
-        let tree = Tree::new(&positions, &faces);
+        let boxes: Vec<Bounds> = faces.iter().map(|f| bounds(&positions, f)).collect();
+        let tree = BoxTree::new(&boxes);
         let (roots, steps) = spanning_forest(positions.len(), &faces);
         Self { positions, faces, tree, roots, steps }
     }
@@ -50,7 +51,7 @@ impl Chain {
     pub(super) fn moved(&self, motion: &Isometry3<f64>) -> Self {
         let mut chain = self.clone();
         chain.positions.iter_mut().for_each(|p| *p = motion * *p);
-        chain.tree.refit(&chain.positions, &chain.faces);
+        chain.tree.refit(|face| bounds(&chain.positions, &chain.faces[face]));
         chain
     }
 
@@ -59,7 +60,10 @@ impl Chain {
         let mut winding = 0;
         self.tree.each(
             |bounds| bounds.is_ahead_of(point),
-            |face| winding += Plane::new(self.triangle(face), is_a).along_x(point),
+            |face| {
+                winding += Plane::new(self.triangle(face), is_a).along_x(point);
+                true
+            },
         );
         winding
     }
@@ -78,6 +82,10 @@ impl Chain {
         }
         windings
     }
+}
+
+fn bounds(positions: &[Point3<f64>], face: &[u32; 3]) -> Bounds {
+    Bounds::of(face.iter().map(|v| &positions[*v as usize]))
 }
 
 /// Volume under the faces \[m³\], of every part as often as they wind about it.

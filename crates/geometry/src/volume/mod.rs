@@ -1,7 +1,7 @@
 //! Exact volume of the intersection of solids, and its derivative by their poses.
 //!
 //! No mesh of the intersection is made. Where edges of one surface pierce faces of the other is decided exactly
-//! (`predicates`); from these points, the volume follows by the divergence theorem (`overlap`). The same points cut
+//! (`crate::predicates`); from these points, the volume follows by the divergence theorem (`overlap`). The same points cut
 //! surfaces for the union of parts that overlap (`join`). Degenerate positions, such as shared faces and
 //! coinciding bodies, are decided as if one body had been moved by less than any number, so that no case is special, nothing
 //! fails on a closed surface, and the volume is right to rounding.
@@ -20,13 +20,10 @@
 //! ```
 
 mod arrangement;
-mod boxes;
 mod chain;
-mod expansion;
 mod join;
 mod overlap;
 mod polygon;
-mod predicates;
 #[cfg(test)]
 mod reference;
 #[cfg(test)]

@@ -68,7 +68,7 @@ impl KdTree {
     }
 
     /// The point nearest to `query` within `max_distance` \[m\], which may be infinite; `None` too for a query
-    /// that is not finite.
+    /// that is not finite or farther than 1e18 m, whose square leaves single precision.
     #[inline]
     pub fn nearest(&self, query: &Point3<f64>, max_distance: f64) -> Option<Neighbour> {
         let probe = PointProbe::new(query)?;

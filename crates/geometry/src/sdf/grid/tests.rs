@@ -114,6 +114,21 @@ fn ball(closed: bool) -> ClosestPoints {
 }
 
 #[test]
+fn samples_at_the_very_edge_of_the_band_have_the_right_sign() {
+    // Samples on the faces of the cube, whose neighbours inside are a band away but for rounding.
+    for (size, spacing) in [(0.4, 0.1), (0.6, 0.1), (0.3, 0.05), (3.3, 0.3)] {
+        let mesh = ClosestPoints::new(&cuboid(Vector3::repeat(size))).unwrap();
+        let grid = SdfGrid::build_band(&mesh, spacing, 2.0 * spacing, spacing).unwrap();
+        let [nx, ny, nz] = grid.dims();
+        for n in 0..nx * ny * nz {
+            let p = grid.lattice().position([n / (ny * nz), n / nz % ny, n % nz]);
+            let expected = mesh.signed_distance(&p).0.clamp(-spacing, spacing);
+            assert!((grid.evaluate(&p).distance - expected).abs() < 1e-12, "{p}");
+        }
+    }
+}
+
+#[test]
 fn a_band_has_the_exact_samples_and_the_right_sign_elsewhere() {
     for closed in [true, false] {
         let mesh = ball(closed);

@@ -2,10 +2,10 @@
 
 use nalgebra::Point3;
 use rayon::prelude::*;
-use robust::{Coord3D, orient3d};
 
 use crate::TriMesh;
 use crate::box_tree::{Bounds, BoxTree};
+use crate::predicates::Plane;
 use crate::topology::is_collapsed;
 
 type Triangle = [Point3<f64>; 3];
@@ -21,12 +21,8 @@ impl TriMesh {
     /// # Panics
     /// If a face refers to a vertex that the mesh has not.
     pub fn crossing_faces(&self) -> Vec<u32> {
-        let boxes: Vec<Bounds> = (0..self.faces.len())
-            .map(|f| {
-                let [a, b, c] = self.triangle(f);
-                (a.inf(&b).inf(&c), a.sup(&b).sup(&c))
-            })
-            .collect();
+        let boxes: Vec<Bounds> =
+            (0..self.faces.len()).map(|f| Bounds::of(&self.triangle(f))).collect();
         let tree = BoxTree::new(&boxes);
         let crosses = |f: &u32| {
             let f = *f as usize;
@@ -36,33 +32,26 @@ impl TriMesh {
             }
             let triangle = self.triangle(f);
             let mut found = false;
-            tree.meeting(&boxes[f], |g| {
-                if !meet(&boxes[f], &boxes[g]) {
-                    return true;
-                }
+            let crosses = |g: usize| {
                 let shared = self.faces[g].iter().filter(|v| corners.contains(v)).count();
                 // Beyond a common edge two triangles meet in one plane only.
                 found = shared < 2 && cross(&triangle, &self.triangle(g));
                 !found
-            });
+            };
+            tree.each(|b| b.meets(&boxes[f]), crosses);
             found
         };
         (0..self.faces.len() as u32).into_par_iter().with_min_len(256).filter(crosses).collect()
     }
 }
 
-fn meet(a: &Bounds, b: &Bounds) -> bool {
-    (0..3).all(|k| a.0[k] <= b.1[k] && b.0[k] <= a.1[k])
-}
-
 /// On which side of the plane through `t` the point `p` lies: exact in sign, zero on it.
 fn side(t: &Triangle, p: &Point3<f64>) -> f64 {
-    // The corner of a neighbour, which the predicate would take its longest way to find out.
+    // The corner of a neighbour, which the predicate would take longer to find out.
     if t.contains(p) {
         return 0.0;
     }
-    let [a, b, c, d] = [t[0], t[1], t[2], *p].map(|q| Coord3D { x: q.x, y: q.y, z: q.z });
-    orient3d(a, b, c, d)
+    Plane::new(t.each_ref(), true).side(p).value
 }
 
 fn on_both_sides(sides: &[f64]) -> bool {

@@ -9,7 +9,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::expansion::{Expansion, difference};
+use crate::expansion::{Expansion, difference};
 
 /// The difference of the second point and the first.
 pub(super) type Arrow<'a> = [&'a Point3<f64>; 2];
