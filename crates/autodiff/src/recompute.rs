@@ -129,7 +129,7 @@ mod tests {
         let before = recording.statistics();
         let constants = [2.0, 3.0, 1.0].map(Var::from);
         assert_eq!(Var::recompute(Root, &constants).unwrap()[1].value(), 3.0);
-        assert_eq!(Var::recompute(Root, &[x - y, y, y]).unwrap_err(), "negative");
+        assert_eq!(Var::recompute(Root, &[x.plus(-1.0), y, y]).unwrap_err(), "negative");
         assert_eq!(recording.statistics(), before);
         // The root's slope at 0 is infinite.
         let results = Var::recompute(Root, &[x, y, y]).unwrap();

@@ -15,10 +15,10 @@ use crate::world::{Body, ContactPair, Motion, Step, World};
 
 /// An integrator each of whose steps [`Var`] records as one node.
 ///
-/// The node keeps the numbers that the step began with, and the sweep records the step again: some hundred bytes a
-/// step and free body instead of the tens of kilobytes of its operations. States, masses, loads, gravity and
-/// parameters of laws may come from anywhere on the tape, and may be others at each step; what is made of the states
-/// is up to the caller. Numbers without derivatives are simulated by `integrator` as it is.
+/// The node keeps the numbers that the step began with, and the sweep records the step again: some 540 bytes for a free
+/// body on a held one, 1240 if every number of their world varies, where plain recording takes 14 kB. States, masses,
+/// loads, gravity and parameters of laws may come from anywhere on the tape and may be others at each step. Numbers
+/// without derivatives are simulated by `integrator` as it is.
 ///
 /// ```
 /// # use std::sync::Arc;

@@ -130,7 +130,7 @@
 //! let mut lifted = world.lift::<Var>();
 //! let mut states = vec![State::at_rest(Isometry3::translation(1.0, 0.0, 0.0)).lift()];
 //! let mut loss = Var::from(0.0);
-//! for index in 0..100 {
+//! for index in 0..30 {
 //!     lifted.bodies[ball].load.x = -gain * states[ball].pose.translation.x;
 //!     states = lifted.step(&integrator, &states, Step { index, dt: 1e-2 })?;
 //!     loss += states[ball].pose.translation.vector.norm_squared();
