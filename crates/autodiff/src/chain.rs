@@ -1,7 +1,7 @@
 //! The two ways a derivative passes through an operation; everything else is arithmetic on values.
 
 use crate::scalar::add_up;
-use crate::{LocalFunction, Scalar};
+use crate::{LocalFunction, Recompute, Scalar};
 
 /// A scalar that records how its value depends on its operands.
 ///
@@ -56,6 +56,15 @@ pub(crate) trait Chain: Copy {
         Self: Scalar,
     {
         add_up(x, terms)
+    }
+
+    /// `function` of `x`, computed again in a sweep where there is one.
+    #[inline]
+    fn recompute<F: Recompute>(function: F, x: &[Self]) -> Result<Vec<Self>, F::Error>
+    where
+        Self: Scalar,
+    {
+        function.evaluate(x)
     }
 }
 

@@ -25,7 +25,7 @@
 //! | gradient | [`gradient`], [`gradient_into`] (allocates nothing), [`Recording`] for control |
 //! | Jacobian | [`jacobian`], [`forward_jacobian`], [`sparse`] by colouring |
 //! | Hessian, Hessian–vector product | [`hessian`], [`hessian_vector`], or `Fwd<N, Fwd<N>>` |
-//! | gradient through thousands of steps | [`checkpoint`] |
+//! | gradient through thousands of steps | [`checkpoint`], [`Scalar::recompute`] for one node a step |
 //! | derivative of a linear solve, of a root | [`solve`], [`implicit`] |
 //! | an operation with its own derivative | [`LocalFunction`], [`block`], [`custom`], [`preaccumulate`] |
 //! | rotations and rigid motions | [`lie`], [`rigid`] |
@@ -82,6 +82,7 @@ mod operand;
 pub mod optimise;
 pub mod parallel;
 mod real_field;
+mod recompute;
 mod recording;
 pub mod rigid;
 mod scalar;
@@ -98,6 +99,7 @@ pub use hessian::{Second, hessian, hessian_vector};
 pub use jacobian::{forward_jacobian, jacobian};
 pub use local::{LocalFunction, preaccumulate};
 pub use operand::{CustomJvp, Operand};
+pub use recompute::Recompute;
 pub use recording::{Adjoints, Recording, gradient, gradient_into};
 pub use scalar::Scalar;
 pub use tape::TapeStatistics;

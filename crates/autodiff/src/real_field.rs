@@ -542,6 +542,13 @@ let modulus = num_traits::Signed::abs(&self);
                 <Self as Chain>::sum_local(x, terms)
             }
             #[inline]
+            fn recompute<F: crate::Recompute>(
+                function: F,
+                x: &[Self],
+            ) -> Result<Vec<Self>, F::Error> {
+                <Self as Chain>::recompute(function, x)
+            }
+            #[inline]
             fn is_constant_zero(self) -> bool {
                 self.is_constant() && self.primal().is_constant_zero()
             }

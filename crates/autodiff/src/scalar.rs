@@ -2,7 +2,7 @@
 
 use nalgebra::RealField;
 
-use crate::{LocalFunction, lanes};
+use crate::{LocalFunction, Recompute, lanes};
 
 /// A real number that may carry derivatives.
 ///
@@ -66,6 +66,16 @@ pub trait Scalar: RealField + Copy + Default {
         terms: impl IntoIterator<Item = (F, [usize; K])>,
     ) -> Self {
         add_up(x, terms)
+    }
+
+    /// `function` of `x`: plain generic code for most scalars; for [`Var`](crate::Var) one node that keeps only `x`,
+    /// whose inside the sweep computes again.
+    ///
+    /// # Errors
+    /// If the function has no results.
+    #[inline]
+    fn recompute<F: Recompute>(function: F, x: &[Self]) -> Result<Vec<Self>, F::Error> {
+        function.evaluate(x)
     }
 
     /// Whether this is the constant 0, which moves in no direction.

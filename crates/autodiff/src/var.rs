@@ -3,8 +3,9 @@
 use crate::chain::{Chain, unless_still};
 use crate::local::sum_local;
 use crate::real_field::impl_real_field;
+use crate::recompute::recompute;
 use crate::tape::{push, push_block, push_custom, refuse_foreign};
-use crate::{LocalFunction, Scalar};
+use crate::{LocalFunction, Recompute, Scalar};
 
 /// A number on the thread's tape.
 ///
@@ -115,6 +116,11 @@ impl Chain for Var {
         terms: impl IntoIterator<Item = (F, [usize; K])>,
     ) -> Self {
         sum_local(x, terms)
+    }
+
+    #[inline]
+    fn recompute<F: Recompute>(function: F, x: &[Self]) -> Result<Vec<Self>, F::Error> {
+        recompute(function, x)
     }
 }
 

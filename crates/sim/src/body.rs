@@ -114,6 +114,16 @@ impl<S: Scalar> RigidBody<S> {
         t_world_com * Translation3::from(self.com.coords.map(|x| S::constant(-x)))
     }
 
+    /// The same body, each number through `f`.
+    pub(crate) fn map<T: Scalar>(&self, f: impl Fn(S) -> T) -> RigidBody<T> {
+        RigidBody {
+            mass: f(self.mass),
+            inertia: self.inertia.map(&f),
+            inverse_inertia: self.inverse_inertia.map(&f),
+            com: self.com,
+        }
+    }
+
     /// The body at rest with its model frame at `t_world_model`.
     pub fn at_rest(&self, t_world_model: &Isometry3<S>) -> State<S> {
         State::at_rest(self.com_pose(t_world_model))
@@ -123,12 +133,7 @@ impl<S: Scalar> RigidBody<S> {
 impl RigidBody {
     /// The same body in constants of another scalar.
     pub fn lift<S: Scalar>(&self) -> RigidBody<S> {
-        RigidBody {
-            mass: S::constant(self.mass),
-            inertia: self.inertia.map(S::constant),
-            inverse_inertia: self.inverse_inertia.map(S::constant),
-            com: self.com,
-        }
+        self.map(S::constant)
     }
 }
 

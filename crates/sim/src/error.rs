@@ -2,6 +2,7 @@
 
 use thiserror::Error;
 
+use crate::body::BodyError;
 use crate::contact::LawError;
 
 /// Why a simulation cannot be set up or cannot go on.
@@ -50,6 +51,25 @@ pub enum SimulationError {
         /// How many bodies.
         bodies: usize,
     },
+    /// Numbers of a world that are too few or too many.
+    #[error("{given} numbers for a world of {expected}")]
+    Numbers {
+        /// How many were given.
+        given: usize,
+        /// How many it has.
+        expected: usize,
+    },
+    /// A body has an impossible mass or inertia.
+    #[error("body '{body}': {error}")]
+    Body {
+        /// Its name.
+        body: String,
+        /// What is wrong.
+        error: BodyError,
+    },
+    /// A world that differs in more than numbers from the one its integrator was made for.
+    #[error("the integrator was made for a world of other bodies or contacts")]
+    AnotherWorld,
     /// The time step is not a positive number.
     #[error("the time step must be positive and finite, is {0} s")]
     TimeStep(f64),

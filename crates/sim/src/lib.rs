@@ -3,12 +3,15 @@
 //! A rigid [`RigidBody`] carries surface samples ([`SurfacePoint`]) that touch a
 //! [`DistanceField`](prehend_geometry::DistanceField). A [`ContactLaw`], written once over a generic scalar, turns gap and slip into
 //! force; an [`Onset`] says how contact begins. Forces and their derivatives are gathered into one
-//! wrench a step ([`contact::wrench`]), so that a [`Simulation`] carries exact derivatives with respect
-//! to its initial pose. [`StabilityLoss`] measures by such rollouts how far an object is from resting.
+//! wrench a step ([`contact::wrench`]), so that a rollout of a [`World`] carries exact derivatives by its initial states
+//! and by every number of the world. [`StabilityLoss`] measures by such rollouts how far an object is from resting.
+//!
+//! The [`guide`] goes from a world in ten lines to gradients of long rollouts.
 //!
 //! World-frame conventions: a pose perturbation is the left twist (translation, rotation) about the
 //! centre of mass, velocities are those of the centre of mass, in the world frame.
 
+mod adjoint;
 mod body;
 #[cfg(test)]
 mod canonical;
@@ -16,8 +19,12 @@ pub mod contact;
 mod error;
 #[cfg(test)]
 mod fields;
+#[cfg(test)]
+mod gradients;
+pub mod guide;
 mod integrator;
 mod near;
+mod numbers;
 mod rollout;
 #[cfg(test)]
 mod scenes;
@@ -27,6 +34,7 @@ mod surface;
 mod time_step;
 mod world;
 
+pub use adjoint::Compact;
 pub use body::{BodyError, RigidBody};
 pub use contact::LawError;
 pub use contact::approach::{ApproachDamped, ApproachPenalty};

@@ -83,7 +83,7 @@ impl<S: Scalar> World<S> {
     }
 
     /// Whether a rollout may begin.
-    fn check(&self, states: &[State<S>], dt: f64) -> Result<(), SimulationError> {
+    pub(crate) fn check(&self, states: &[State<S>], dt: f64) -> Result<(), SimulationError> {
         if !(dt > 0.0 && dt.is_finite()) {
             return Err(SimulationError::TimeStep(dt));
         }

@@ -227,35 +227,40 @@ impl World {
 
     /// The same world in constants of another scalar.
     pub fn lift<S: Scalar>(&self) -> World<S> {
-        let body = |body: &Body| Body {
+        self.map(S::constant)
+    }
+}
+
+impl<S: Scalar> World<S> {
+    /// The same world, each number through `f`.
+    pub(crate) fn map<T: Scalar>(&self, f: impl Fn(S) -> T) -> World<T> {
+        let body = |body: &Body<S>| Body {
             name: body.name.clone(),
             motion: match &body.motion {
-                Motion::Free(rigid) => Motion::Free(rigid.lift()),
+                Motion::Free(rigid) => Motion::Free(rigid.map(&f)),
                 Motion::Held => Motion::Held,
                 Motion::Driven(course) => Motion::Driven(Arc::clone(course)),
             },
             surface: body.surface.clone(),
             field: body.field.clone(),
-            load: body.load.map(S::constant),
+            load: body.load.map(&f),
         };
-        let pair = |pair: &ContactPair| ContactPair {
+        let pair = |pair: &ContactPair<S>| ContactPair {
             samples: pair.samples,
             surface: Arc::clone(&pair.surface),
             field: pair.field,
             law: Arc::clone(&pair.law),
-            params: pair.params.iter().map(|&p| S::constant(p)).collect(),
+            params: pair.params.iter().map(|&p| f(p)).collect(),
             onset: pair.onset,
             share: pair.share,
         };
         World {
             bodies: self.bodies.iter().map(body).collect(),
             contacts: self.contacts.iter().map(pair).collect(),
-            gravity: self.gravity.map(S::constant),
+            gravity: self.gravity.map(&f),
         }
     }
-}
 
-impl<S: Scalar> World<S> {
     /// External and contact wrenches on every body at `states` (force \[N\], torque about the centre of mass \[N m\],
     /// world frame), without gravity. `step` matters to onsets that leak in the first step only.
     ///

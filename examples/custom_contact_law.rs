@@ -1,0 +1,108 @@
+//! Adds a contact law, drops a ball through it, and differentiates where the ball is then by the height of the drop and
+//! by the law's own stiffness: in forward mode, in reverse mode, and by differences.
+
+use std::sync::Arc;
+
+use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
+use prehend::autodiff::{Fwd, Recording, Scalar};
+use prehend::geometry::sample::surface_samples;
+use prehend::geometry::{DistanceField, FieldSample, shapes};
+use prehend::sim::{
+    Body, Compact, Contact, ContactLaw, Horizon, Integrator, Onset, Response, RigidBody,
+    SemiImplicitEuler, SimulationError, State, Surface, World, regularised_coulomb,
+};
+
+/// Force grows with the square of the penetration. Stiffness per area \[N/m⁴\] and friction coefficient.
+struct Quadratic([f64; 2]);
+
+impl ContactLaw for Quadratic {
+    fn params(&self) -> &[f64] {
+        &self.0
+    }
+    fn law<S: Scalar>(&self, p: &[S], contact: &Contact<S>) -> Response<S> {
+        let normal = (p[0] * contact.gap * contact.gap).times(contact.area);
+        let tangential = regularised_coulomb(p[1], normal, &contact.slip, 1e-3);
+        Response { normal, tangential }
+    }
+    fn reach(&self) -> f64 {
+        0.0
+    }
+}
+
+/// The half-space z < 0.
+struct Floor;
+
+impl DistanceField for Floor {
+    fn sample(&self, point: &Point3<f64>, reach: f64) -> Option<FieldSample> {
+        let sample =
+            FieldSample { distance: point.z, gradient: Vector3::z(), hessian: Matrix3::zeros() };
+        (point.z <= reach).then_some(sample)
+    }
+}
+
+/// Down, and up again.
+const DROP: Horizon = Horizon { dt: 1e-4, steps: 1000 };
+const RADIUS: f64 = 0.05;
+
+/// A ball on the floor, and the states of both.
+fn ball_on_floor(law: Quadratic) -> anyhow::Result<(World, [State; 2])> {
+    let (ball, mass) = (shapes::sphere(RADIUS, 64), 0.2);
+    let points: Vec<Point3<f64>> =
+        surface_samples(&ball, 2000, 0).iter().map(|s| s.point).collect();
+    let inertia = Matrix3::identity() * (0.4 * mass * RADIUS * RADIUS);
+    let rigid = RigidBody::new(mass, inertia, Point3::origin())?;
+    let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
+    let floor = world.add(Body::held("floor").with_field(Arc::new(Floor)));
+    let surface = Surface::uniform(&points, ball.area())?;
+    let ball = world.add(Body::free("ball", rigid).with_surface(surface));
+    // A smooth onset, or the moment of impact jumps from one time step to the next.
+    world.touch(ball, floor, Arc::new(law), Onset::Softplus { width: 5e-5 })?;
+    let resting = rigid.at_rest(&Isometry3::translation(0.0, 0.0, RADIUS));
+    Ok((world, [State::at_rest(Isometry3::identity()), resting]))
+}
+
+/// Height \[m\] of the ball at the end, dropped from `drop` \[m\] with the law's `stiffness`.
+fn height<S: Scalar>(
+    world: &World,
+    states: &[State; 2],
+    integrator: &impl Integrator,
+    [drop, stiffness]: [S; 2],
+) -> Result<S, SimulationError> {
+    let mut world = world.lift();
+    world.contacts[0].params[0] = stiffness;
+    let mut states = states.each_ref().map(|state| state.lift());
+    states[1].pose.translation.z += drop;
+    let end = world.simulate(integrator, &states, DROP, |_, _| ())?;
+    Ok(end[1].pose.translation.z)
+}
+
+fn main() -> anyhow::Result<()> {
+    let (world, states) = ball_on_floor(Quadratic([1e10, 0.5]))?;
+    let at = [0.01, 1e10];
+
+    let euler = SemiImplicitEuler;
+    let forward = height(&world, &states, &euler, Fwd::<2>::variables(at))?;
+    println!("dropped from 10 mm, after 0.1 s the ball is at {:.4} m", forward.value);
+
+    // Reverse mode: one node a step.
+    let compact = Compact::new(euler, &world)?;
+    let recording = Recording::start();
+    let inputs = recording.variables(at);
+    let adjoints = recording.gradient(height(&world, &states, &compact, inputs)?);
+    let reverse = inputs.map(|x| adjoints.wrt(x));
+
+    for (i, name) in ["drop", "stiffness"].into_iter().enumerate() {
+        let off = |share: f64| {
+            let mut x = at;
+            x[i] *= 1.0 + share;
+            height(&world, &states, &euler, x)
+        };
+        let difference = (off(1e-6)? - off(-1e-6)?) / (2e-6 * at[i]);
+        let (forward, reverse) = (forward.derivative[i], reverse[i]);
+        println!("d(height)/d({name})");
+        println!("  forward {forward:.6e}, reverse {reverse:.6e}, differences {difference:.6e}");
+        anyhow::ensure!((forward - difference).abs() < 1e-4 * difference.abs());
+        anyhow::ensure!((forward - reverse).abs() < 1e-9 * forward.abs());
+    }
+    Ok(())
+}
