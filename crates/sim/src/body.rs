@@ -114,6 +114,16 @@ impl<S: Scalar> RigidBody<S> {
         t_world_com * Translation3::from(self.com.coords.map(|x| S::constant(-x)))
     }
 
+    /// The same body in other numbers.
+    pub(crate) fn converted<T: Scalar>(&self, number: fn(S) -> T) -> RigidBody<T> {
+        RigidBody {
+            mass: number(self.mass),
+            inertia: self.inertia.map(number),
+            inverse_inertia: self.inverse_inertia.map(number),
+            com: self.com,
+        }
+    }
+
     /// The body at rest with its model frame at `t_world_model`.
     pub fn at_rest(&self, t_world_model: &Isometry3<S>) -> State<S> {
         State::at_rest(self.com_pose(t_world_model))
@@ -123,12 +133,7 @@ impl<S: Scalar> RigidBody<S> {
 impl RigidBody {
     /// The same body in constants of another scalar.
     pub fn lift<S: Scalar>(&self) -> RigidBody<S> {
-        RigidBody {
-            mass: S::constant(self.mass),
-            inertia: self.inertia.map(S::constant),
-            inverse_inertia: self.inverse_inertia.map(S::constant),
-            com: self.com,
-        }
+        self.converted(S::constant)
     }
 }
 

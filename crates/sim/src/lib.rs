@@ -13,10 +13,12 @@ mod body;
 #[cfg(test)]
 mod canonical;
 pub mod contact;
+mod equilibrium;
 mod error;
 #[cfg(test)]
 mod fields;
 mod integrator;
+mod robot;
 mod rollout;
 #[cfg(test)]
 mod scenes;
@@ -34,8 +36,12 @@ pub use contact::onset::{LeakSteps, Onset, OnsetSample};
 pub use contact::penalty::{KelvinVoigt, LawError, Penalty};
 pub use contact::registry::LawRegistry;
 pub use contact::wrench::{Patch, WrenchJacobian};
+pub use equilibrium::{Balance, Equilibrium, Support, friction_factor};
 pub use error::SimulationError;
-pub use integrator::{Integrator, SemiImplicitEuler};
+pub use integrator::{
+    BackwardEuler, Integrator, RungeKutta4, SemiImplicitEuler, SubStepped, VelocityVerlet,
+};
+pub use robot::JointState;
 pub use rollout::Horizon;
 pub use stability::{Averaging, Perturbation, StabilityJacobian, StabilityLoss, StabilityWeights};
 pub use state::State;

@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, Matrix3, Matrix6};
 use prehend_autodiff::Fwd;
 use thiserror::Error;
 
+use crate::integrator::Integrator;
 use crate::rollout::Horizon;
 use crate::state::State;
 use crate::world::World;
@@ -38,6 +39,20 @@ impl World {
         let fastest = self.contact_frequency(states);
         let ok = dt > 0.0 && dt * fastest <= 1.0;
         if ok { Ok(()) } else { Err(StepError { dt, limit: fastest.recip() }) }
+    }
+
+    /// Checks that `integrator` is stable with steps of `dt` \[s\] for the contacts at `states`.
+    ///
+    /// # Errors
+    /// With the longest step that passes.
+    pub fn check_stability(
+        &self,
+        integrator: &impl Integrator,
+        states: &[State],
+        dt: f64,
+    ) -> Result<(), StepError> {
+        let limit = integrator.stability_limit() / self.contact_frequency(states);
+        if dt > 0.0 && dt <= limit { Ok(()) } else { Err(StepError { dt, limit }) }
     }
 
     /// The largest of the contacts' natural frequency ω_max and damping rate \[1/s\] at `states`: of M⁻¹K and M⁻¹D, with

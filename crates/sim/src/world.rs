@@ -135,6 +135,18 @@ impl Step {
     pub fn time(&self) -> f64 {
         self.index as f64 * self.dt
     }
+
+    /// The step that follows.
+    #[must_use]
+    pub fn after(self) -> Self {
+        Self { index: self.index + 1, ..self }
+    }
+
+    /// The step divided into `parts` equal ones.
+    pub fn parts(self, parts: usize) -> impl Iterator<Item = Self> {
+        let (first, dt) = (self.index * parts, self.dt / parts as f64);
+        (first..first + parts).map(move |index| Self { index, dt })
+    }
 }
 
 /// Bodies, their contacts, and gravity: plain data, over plain numbers or numbers that carry derivatives.
@@ -221,34 +233,50 @@ impl World {
 
     /// The same world in constants of another scalar.
     pub fn lift<S: Scalar>(&self) -> World<S> {
-        let body = |body: &Body| Body {
+        self.converted(S::constant)
+    }
+}
+
+impl<S: Scalar> World<S> {
+    /// The same world in other numbers.
+    fn converted<T: Scalar>(&self, number: fn(S) -> T) -> World<T> {
+        let body = |body: &Body<S>| Body {
             name: body.name.clone(),
             motion: match &body.motion {
-                Motion::Free(rigid) => Motion::Free(rigid.lift()),
+                Motion::Free(rigid) => Motion::Free(rigid.converted(number)),
                 Motion::Held => Motion::Held,
                 Motion::Driven(course) => Motion::Driven(Arc::clone(course)),
             },
             surface: body.surface.clone(),
             field: body.field.clone(),
-            load: body.load.map(S::constant),
+            load: body.load.map(number),
         };
-        let pair = |pair: &ContactPair| ContactPair {
+        let pair = |pair: &ContactPair<S>| ContactPair {
             samples: pair.samples,
             field: pair.field,
             law: Arc::clone(&pair.law),
-            params: pair.params.iter().map(|&p| S::constant(p)).collect(),
+            params: pair.params.iter().map(|&p| number(p)).collect(),
             onset: pair.onset,
             share: pair.share,
         };
         World {
             bodies: self.bodies.iter().map(body).collect(),
             contacts: self.contacts.iter().map(pair).collect(),
-            gravity: self.gravity.map(S::constant),
+            gravity: self.gravity.map(number),
         }
     }
-}
 
-impl<S: Scalar> World<S> {
+    /// The same world as values alone: without derivatives, and without onsets that leak, which are for derivatives.
+    pub(crate) fn plain(&self) -> World {
+        let mut plain = self.converted(S::value);
+        for pair in &mut plain.contacts {
+            if let Onset::Leaky { .. } = pair.onset {
+                pair.onset = Onset::Hard;
+            }
+        }
+        plain
+    }
+
     /// External and contact wrenches on every body at `states` (force \[N\], torque about the centre of mass \[N m\],
     /// world frame), without gravity. `step` matters to onsets that leak in the first step only.
     ///
