@@ -154,9 +154,10 @@ mod tests {
             let [a, b] = [&before[link].pose, &after[link].pose];
             let linear = (b.translation.vector - a.translation.vector) / 2e-5;
             let angular = so3_log(&(b.rotation * a.rotation.inverse())) / 2e-5;
-            assert!((linear - now[link].linear).norm() < 1e-8 && linear.norm() > 0.01);
+            assert!((linear - now[link].linear).norm() < 1e-8);
             assert!((angular - now[link].angular).norm() < 1e-8 && angular.norm() > 0.1);
         }
+        assert!(now[1].linear.norm() > 0.01);
     }
 
     #[test]
@@ -182,7 +183,7 @@ mod tests {
         let run =
             world.rollout(&SemiImplicitEuler, &states, Horizon { dt: 1e-4, steps: 1000 }).unwrap();
         let end = run.last().unwrap();
-        assert_eq!(run[20][ball].linear, Vector3::zeros());
+        assert!(run[20][ball].linear.norm() < 1e-5);
         assert!((end[tip].linear - axis * speed).norm() < 1e-12);
         let pushed = end[ball].linear.dot(&axis);
         assert!(pushed > 0.95 * speed && pushed < 2.0 * speed, "{pushed}");

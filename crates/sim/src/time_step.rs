@@ -62,7 +62,7 @@ impl World {
             (0..self.bodies.len()).filter(|&i| self.bodies[i].rigid().is_some()).collect();
         let size = 6 * free.len();
         let (mut stiffness, mut damping) = (DMatrix::zeros(size, size), DMatrix::zeros(size, size));
-        let lifted = self.lift::<Fwd<12>>();
+        let lifted = self.plain().lift::<Fwd<12>>();
         let constants: Vec<State<Fwd<12>>> = states.iter().map(State::lift).collect();
         let roots: Vec<Matrix6<f64>> =
             free.iter().map(|&body| self.inverse_mass_root(body, &states[body])).collect();

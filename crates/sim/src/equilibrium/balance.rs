@@ -67,6 +67,22 @@ impl Balance {
 
 /// The least factor on all friction coefficients of `supports` with which forces balance `load` about `centre`: below
 /// one there is a reserve, above one friction is too little. Infinite if friction does not help.
+///
+/// Two fingers hold a wedge that tapers upwards by 0.3 rad: friction has to be the tangent of that.
+///
+/// ```
+/// use nalgebra::{Point3, Unit, Vector3, Vector6};
+/// use prehend_sim::{Support, friction_factor};
+///
+/// let finger = |side: f64| Support {
+///     position: Point3::new(-0.03 * side, 0.0, 0.0),
+///     normal: Unit::new_normalize(Vector3::new(side * 0.3_f64.cos(), 0.0, -0.3_f64.sin())),
+///     friction: 0.5,
+/// };
+/// let weight = Vector6::new(0.0, 0.0, -2.0, 0.0, 0.0, 0.0);
+/// let factor = friction_factor(&[finger(1.0), finger(-1.0)], &Point3::origin(), &weight);
+/// assert!((factor * 0.5 - 0.3_f64.tan()).abs() < 1e-4);
+/// ```
 pub fn friction_factor(supports: &[Support], centre: &Point3<f64>, load: &Vector6<f64>) -> f64 {
     let balanced = |factor: f64| {
         let scaled = |s: &Support| Support { friction: factor * s.friction, ..*s };

@@ -380,10 +380,10 @@ mod tests {
 
     #[test]
     fn leaks_matter_to_derivatives_only() {
-        let leaky = Onset::Leaky { alpha: 0.1, band: 5e-3, steps: LeakSteps::All };
+        let leaky = Onset::Leaky { alpha: 0.1, band: 1e-2, steps: LeakSteps::All };
         let ends = [Onset::Hard, leaky].map(|onset| {
             let (world, mut states) = egg_on(bowl(), onset);
-            states[1].pose.translation.z += 2e-3;
+            states[1].pose.translation.z += 5e-3;
             let lifted = [states[0].lift(), states[1].variables()];
             let step = Step { index: 0, dt: 1e-3 };
             BackwardEuler.step(&world.lift(), &lifted, step).unwrap()[1]

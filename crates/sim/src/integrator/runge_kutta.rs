@@ -63,18 +63,17 @@ fn rates<S: Scalar>(
     index: usize,
 ) -> Vec<Change<S>> {
     let wrenches = world.wrenches(states, index);
-    let bodies = world.bodies.iter().zip(states).zip(change.iter().zip(&wrenches));
-    let rate = |((body, state), (change, wrench)): ((_, &State<S>), (&Change<S>, _))| {
-        let (body, wrench): (&crate::Body<S>, &nalgebra::Vector6<S>) = (body, wrench);
-        let Some(rigid) = body.rigid() else { return [Vector3::zeros(); 4] };
-        let (force, torque) = (wrench.fixed_rows::<3>(0), wrench.fixed_rows::<3>(3).into_owned());
-        let (turn, angular) = (&change[2], &state.angular);
-        let once = turn.cross(angular);
+    let rate = |body: usize| {
+        let Some(rigid) = world.bodies[body].rigid() else { return [Vector3::zeros(); 4] };
+        let (state, turn, wrench) = (&states[body], &change[body][2], &wrenches[body]);
+        let (force, torque) = (wrench.fixed_rows::<3>(0), wrench.fixed_rows::<3>(3));
+        let once = turn.cross(&state.angular);
+        let twice = turn.cross(&once);
         let turning =
-            angular - once * S::constant(0.5) + turn.cross(&once) * S::constant(1.0 / 12.0);
-        [state.linear, world.gravity + force / rigid.mass(), turning, torque]
+            state.angular - once.map(|x| x.times(0.5)) + twice.map(|x| x.times(1.0 / 12.0));
+        [state.linear, world.gravity + force / rigid.mass(), turning, torque.into_owned()]
     };
-    bodies.map(rate).collect()
+    (0..states.len()).map(rate).collect()
 }
 
 /// `states` after `change`.

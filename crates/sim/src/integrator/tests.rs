@@ -134,7 +134,6 @@ fn orders_are_as_documented() {
         let spinning = orders(&world, &states, integrator, 0.02, 1.0);
         let (world, states) = table(2e4);
         let touching = orders(&world, &states, integrator, 1e-3, 0.1);
-        println!("order {order}: {spinning:.3?} {touching:.3?}");
         for measured in spinning.iter().chain(&touching) {
             assert!((measured - order).abs() < 0.15, "{order}: {spinning:?} {touching:?}");
         }
@@ -176,20 +175,21 @@ fn energy_behaves() {
                 largest = f64::max(largest, f64::abs(last));
             })
             .unwrap();
-        println!("energy: largest error {largest:.2e}, last {last:.2e}");
         (largest, last)
     }
-    assert!(drift(&SemiImplicitEuler).0 < 0.3);
-    assert!(drift(&VelocityVerlet).0 < 0.02);
-    assert!(drift(&RungeKutta4).0 < 1e-3);
+    assert!(drift(&SemiImplicitEuler).0 < 0.1);
+    assert!(drift(&VelocityVerlet).0 < 2e-3);
+    assert!(drift(&RungeKutta4).0 < 1e-5);
     assert!(drift(&BackwardEuler).1 < -0.5);
 }
 
 #[test]
 fn derivatives_match_differences() {
     fn check(integrator: &impl Integrator) {
-        let (world, mut states) = egg_on(bowl(), Onset::Softplus { width: 3e-4 });
+        let (mut world, mut states) = egg_on(bowl(), Onset::Softplus { width: 3e-4 });
         states[1].pose.translation.z -= 5e-4;
+        // So little damping that contacts, which never pull, are not cut off: that would be a kink.
+        world.contacts[0].params[1] = 2e3;
         for steps in [1, 30] {
             let horizon = Horizon { dt: 1e-3, steps };
             let mut lifted: Vec<State<Fwd<12>>> = states.iter().map(State::lift).collect();
