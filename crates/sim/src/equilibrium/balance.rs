@@ -55,7 +55,7 @@ impl Balance {
         };
         let residual = supports.iter().zip(&forces).fold(*load, sum);
         let size = problem.load.norm();
-        let relative = if size > 0.0 { problem.scaled(&residual).norm() / size } else { 0.0 };
+        let relative = if size == 0.0 { 0.0 } else { problem.scaled(&residual).norm() / size };
         Self { forces, residual, relative }
     }
 
@@ -186,6 +186,11 @@ impl<'a> Problem<'a> {
     /// The best lengths, none negative: rays that would be are left out. False if they cannot be told apart.
     fn fit(&self, rays: &mut Vec<Ray>) -> bool {
         loop {
+            // More rays than a wrench has components cannot be told apart.
+            if rays.len() > 6 {
+                rays.pop();
+                return false;
+            }
             let matrix = DMatrix::from_fn(6, rays.len(), |i, j| rays[j].wrench[i]);
             let target = DVector::from_iterator(6, self.load.iter().map(|x| -x));
             let qr = matrix.qr();
@@ -292,6 +297,8 @@ mod tests {
         let alone = Balance::find(&[], &Point3::origin(), &weight);
         assert_eq!((alone.residual, alone.relative, alone.is_balanced()), (weight, 1.0, false));
         assert_eq!(friction_factor(&[], &Point3::origin(), &weight), f64::INFINITY);
+        let lost = Balance::find(&wedge(0.3, 0.1), &Point3::origin(), &(weight * f64::NAN));
+        assert!(!lost.is_balanced());
         let still = Balance::find(&wedge(0.3, 0.1), &Point3::origin(), &Vector6::zeros());
         assert!(still.is_balanced() && still.forces == [Vector3::zeros(); 2]);
     }

@@ -216,6 +216,53 @@ fn derivatives_match_differences() {
     for_every_integrator!(check);
 }
 
+/// The egg of a world with its parameters, in multiples of their values: stiffness, damping and friction of the contact,
+/// mass, inertia, gravity, and a load.
+fn with_parameters<S: Scalar>(world: &World, factors: &[S]) -> World<S> {
+    let mut changed = world.lift::<S>();
+    for (param, factor) in changed.contacts[0].params.iter_mut().zip(factors) {
+        *param *= *factor;
+    }
+    let rigid = world.bodies[1].rigid().unwrap();
+    let inertia = rigid.inertia().map(|x| factors[4].times(x));
+    let rigid = RigidBody::new(factors[3].times(rigid.mass()), inertia, *rigid.com()).unwrap();
+    changed.bodies[1].motion = crate::Motion::Free(rigid);
+    changed.gravity *= factors[5];
+    changed.bodies[1].load =
+        Vector6::new(0.3, 0.1, 0.0, 0.0, 1e-3, 1e-3).map(|x| factors[6].times(x));
+    changed
+}
+
+#[test]
+fn derivatives_by_parameters_match_differences() {
+    fn check(integrator: &impl Integrator) {
+        let (mut world, mut states) = egg_on(bowl(), Onset::Softplus { width: 3e-4 });
+        states[1].pose.translation.z -= 5e-4;
+        world.contacts[0].params[1] = 2e3;
+        let horizon = Horizon { dt: 1e-3, steps: 10 };
+        let lifted: Vec<State<Fwd<7>>> = states.iter().map(State::lift).collect();
+        let changed = with_parameters(&world, &Fwd::<7>::variables([1.0; 7]));
+        let end = changed.simulate(integrator, &lifted, horizon, |_, _| ()).unwrap()[1];
+        let exact = end.sensitivity();
+        let differences = finite_difference_jacobian(
+            |x| {
+                let changed = with_parameters(&world, x);
+                let run = changed.simulate(integrator, &states, horizon, |_, _| ()).unwrap();
+                coordinates(&run[1], &end.value())
+            },
+            &[1.0; 7],
+            1e-5,
+        );
+        for (row, reference) in differences.iter().enumerate() {
+            let exact: Vec<f64> = exact.row(row).iter().copied().collect();
+            let error = compare_gradients(&exact, reference);
+            assert!(error.relative < 1e-6, "row {row}: {error:?}");
+            assert!(row < 6 || exact.iter().all(|slope| *slope != 0.0));
+        }
+    }
+    for_every_integrator!(check);
+}
+
 #[test]
 fn adjoints_agree_with_forward_mode() {
     fn weighted<S: Scalar>(states: &[State<S>]) -> S {
