@@ -80,23 +80,30 @@ impl Equations<'_> {
         for iteration in 1..=MOST_ITERATIONS {
             let (residual, jacobian) = self.linearise(&x);
             let tolerance = LAST.0 + LAST.1 * x.amax();
-            let Some(change) = jacobian.lu().solve(&-&residual) else {
+            let factors = jacobian.lu();
+            let Some(change) = factors.solve(&-&residual) else {
                 return Err(self.unsolved(&x, iteration));
             };
-            if change.iter().all(|c| c.abs() <= tolerance) {
+            if change.amax() <= tolerance {
                 return Ok(x + change);
             }
             let size = self.norm(&residual);
-            let falls = |fraction: &f64| {
-                let next = self.norm(&self.residual(&(&x + &change * *fraction)));
-                next <= (1.0 - 1e-4 * fraction) * size
+            let shortened = |fraction: f64| {
+                let next = self.residual(&(&x + &change * fraction));
+                (self.norm(&next) <= (1.0 - 1e-4 * fraction) * size).then_some((fraction, next))
             };
             let mut fractions = std::iter::successors(Some(1.0), |fraction| Some(0.5 * fraction))
                 .take_while(|fraction| *fraction >= SHORTEST);
-            let Some(fraction) = fractions.find(falls) else {
+            let Some((fraction, next)) = fractions.find_map(shortened) else {
                 return Err(self.unsolved(&x, iteration));
             };
             x += change * fraction;
+            // The old Jacobian is near enough to tell, and to take, a step shorter still.
+            if let Some(last) = factors.solve(&-next)
+                && last.amax() <= 1e-2 * tolerance
+            {
+                return Ok(x + last);
+            }
         }
         Err(self.unsolved(&x, MOST_ITERATIONS))
     }
