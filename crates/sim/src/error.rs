@@ -99,4 +99,28 @@ pub enum SimulationError {
         /// Newton iterations.
         iterations: usize,
     },
+    /// Contacts are too stiff or damped for the parts into which a step may be divided.
+    #[error(
+        "the contacts of step {step}, at {time} s, need {needed} parts of it, and {most} are allowed"
+    )]
+    SubSteps {
+        /// Number of the step.
+        step: usize,
+        /// Time \[s\].
+        time: f64,
+        /// Parts that would be needed.
+        needed: f64,
+        /// Parts that are allowed.
+        most: usize,
+    },
+    /// A robot, its shape and the course of its joints do not belong together.
+    #[error("{found} {what} for a robot that has {expected}")]
+    Robot {
+        /// What was counted.
+        what: &'static str,
+        /// How many there were.
+        found: usize,
+        /// How many the robot has.
+        expected: usize,
+    },
 }

@@ -1,10 +1,20 @@
 //! How states advance in time.
 
+mod backward_euler;
+mod runge_kutta;
 mod semi_implicit;
+mod sub_stepped;
+#[cfg(test)]
+mod tests;
+mod velocity_verlet;
 
 use prehend_autodiff::Scalar;
 
+pub use backward_euler::BackwardEuler;
+pub use runge_kutta::RungeKutta4;
 pub use semi_implicit::SemiImplicitEuler;
+pub use sub_stepped::SubStepped;
+pub use velocity_verlet::VelocityVerlet;
 
 use crate::error::SimulationError;
 use crate::state::State;
@@ -47,4 +57,12 @@ pub trait Integrator: Sync {
         states: &[State<S>],
         step: Step,
     ) -> Result<Vec<State<S>>, SimulationError>;
+
+    /// The largest dt·max(ω, damping rate) for which linear contacts are stable, where ω and the damping rate are as in
+    /// [`World::contact_frequency`]; infinite for a scheme that is stable always.
+    ///
+    /// The default suits every explicit scheme of use.
+    fn stability_limit(&self) -> f64 {
+        1.0
+    }
 }

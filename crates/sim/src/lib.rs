@@ -16,6 +16,7 @@ mod body;
 #[cfg(test)]
 mod canonical;
 pub mod contact;
+mod equilibrium;
 mod error;
 #[cfg(test)]
 mod fields;
@@ -25,6 +26,7 @@ pub mod guide;
 mod integrator;
 mod near;
 mod numbers;
+mod robot;
 mod rollout;
 #[cfg(test)]
 mod scenes;
@@ -50,8 +52,12 @@ pub use contact::registry::{LawEntry, LawParameter, LawRegistry};
 pub use contact::resting::RestingContact;
 pub use contact::stribeck::Stribeck;
 pub use contact::wrench::{Patch, WrenchJacobian};
+pub use equilibrium::{Balance, Equilibrium, Support, friction_factor};
 pub use error::SimulationError;
-pub use integrator::{Integrator, SemiImplicitEuler};
+pub use integrator::{
+    BackwardEuler, Integrator, RungeKutta4, SemiImplicitEuler, SubStepped, VelocityVerlet,
+};
+pub use robot::JointState;
 pub use rollout::Horizon;
 pub use stability::{Averaging, Perturbation, StabilityJacobian, StabilityLoss, StabilityWeights};
 pub use state::State;

@@ -76,7 +76,7 @@ impl<S: Scalar> World<S> {
         step: Step,
     ) -> Result<Vec<State<S>>, SimulationError> {
         let mut next = integrator.step(self, states, step)?;
-        let after = Step { index: step.index + 1, ..step };
+        let after = step.after();
         self.drive(&mut next, after.time());
         self.check_finite(&next, after)?;
         Ok(next)

@@ -3,7 +3,7 @@
 use nalgebra::{
     Isometry3, Quaternion, SMatrix, Translation3, Unit, UnitQuaternion, Vector3, Vector6,
 };
-use prehend_autodiff::lie::perturb_about;
+use prehend_autodiff::lie::{perturb_about, so3_exp};
 use prehend_autodiff::{Fwd, Scalar};
 
 /// Where a body is and how it moves; plain numbers, or numbers that carry derivatives.
@@ -41,6 +41,16 @@ impl<S: Scalar> State<S> {
         let parts = [&self.pose.translation.vector, &self.linear, &self.angular];
         parts.iter().flat_map(|v| v.iter()).all(|x| x.value().is_finite())
             && self.pose.rotation.coords.iter().all(|x| x.value().is_finite())
+    }
+
+    /// The state after moving on with its velocities for `time` \[s\].
+    #[inline]
+    pub(crate) fn drifted(&self, time: f64) -> Self {
+        let mut drifted = *self;
+        drifted.pose.translation.vector += self.linear.map(|v| v.times(time));
+        drifted.pose.rotation = so3_exp(&self.angular.map(|w| w.times(time))) * self.pose.rotation;
+        drifted.pose.rotation.renormalize_fast();
+        drifted
     }
 
     /// What an observer in `frame` sees, who moves and turns with it: `self` along the axes of `frame`.

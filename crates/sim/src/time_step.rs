@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, Matrix3, Matrix6};
 use prehend_autodiff::Fwd;
 use thiserror::Error;
 
+use crate::integrator::Integrator;
 use crate::rollout::Horizon;
 use crate::state::State;
 use crate::world::World;
@@ -40,6 +41,20 @@ impl World {
         if ok { Ok(()) } else { Err(StepError { dt, limit: fastest.recip() }) }
     }
 
+    /// Checks that `integrator` is stable with steps of `dt` \[s\] for the contacts at `states`.
+    ///
+    /// # Errors
+    /// With the longest step that passes.
+    pub fn check_stability(
+        &self,
+        integrator: &impl Integrator,
+        states: &[State],
+        dt: f64,
+    ) -> Result<(), StepError> {
+        let limit = integrator.stability_limit() / self.contact_frequency(states);
+        if dt > 0.0 && dt <= limit { Ok(()) } else { Err(StepError { dt, limit }) }
+    }
+
     /// The largest of the contacts' natural frequency ω_max and damping rate \[1/s\] at `states`: of M⁻¹K and M⁻¹D, with
     /// the symmetric parts of the contacts' stiffness K and damping D.
     pub fn contact_frequency(&self, states: &[State]) -> f64 {
@@ -47,7 +62,7 @@ impl World {
             (0..self.bodies.len()).filter(|&i| self.bodies[i].rigid().is_some()).collect();
         let size = 6 * free.len();
         let (mut stiffness, mut damping) = (DMatrix::zeros(size, size), DMatrix::zeros(size, size));
-        let lifted = self.lift::<Fwd<12>>();
+        let lifted = self.plain().lift::<Fwd<12>>();
         let constants: Vec<State<Fwd<12>>> = states.iter().map(State::lift).collect();
         let roots: Vec<Matrix6<f64>> =
             free.iter().map(|&body| self.inverse_mass_root(body, &states[body])).collect();

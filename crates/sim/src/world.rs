@@ -137,6 +137,18 @@ impl Step {
     pub fn time(&self) -> f64 {
         self.index as f64 * self.dt
     }
+
+    /// The step that follows.
+    #[must_use]
+    pub fn after(self) -> Self {
+        Self { index: self.index + 1, ..self }
+    }
+
+    /// The step divided into `parts` equal ones.
+    pub fn parts(self, parts: usize) -> impl Iterator<Item = Self> {
+        let (first, dt) = (self.index * parts, self.dt / parts as f64);
+        (first..first + parts).map(move |index| Self { index, dt })
+    }
 }
 
 /// Bodies, their contacts, and gravity: plain data, over plain numbers or numbers that carry derivatives.
@@ -259,6 +271,17 @@ impl<S: Scalar> World<S> {
             contacts: self.contacts.iter().map(pair).collect(),
             gravity: self.gravity.map(&f),
         }
+    }
+
+    /// The same world as values alone: without derivatives, and without onsets that leak, which are for derivatives.
+    pub(crate) fn plain(&self) -> World {
+        let mut plain = self.map(S::value);
+        for pair in &mut plain.contacts {
+            if let Onset::Leaky { .. } | Onset::AsymmetricLeaky { .. } = pair.onset {
+                pair.onset = Onset::Hard;
+            }
+        }
+        plain
     }
 
     /// External and contact wrenches on every body at `states` (force \[N\], torque about the centre of mass \[N m\],

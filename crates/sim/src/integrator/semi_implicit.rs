@@ -33,6 +33,11 @@ impl Integrator for SemiImplicitEuler {
         });
         Ok(next.collect())
     }
+
+    /// Stable for (dt ω)² + 2 dt c < 4 at damping rate c: at 2 without damping, at √5 − 1 with the worst.
+    fn stability_limit(&self) -> f64 {
+        1.236
+    }
 }
 
 #[inline]

@@ -1,0 +1,206 @@
+//! Quasi-static analysis: could a body rest where it is?
+
+mod balance;
+
+use nalgebra::{Point3, Unit, Vector3, Vector6};
+
+pub use balance::{Balance, Support, friction_factor};
+
+use crate::error::SimulationError;
+use crate::state::State;
+use crate::world::{ContactPair, World};
+
+/// Whether a body could rest where it is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Equilibrium {
+    /// What acts on it in the simulation, by its contact laws, loads and gravity: force \[N\], torque about the centre
+    /// of mass \[N m\], world frame. Zero at rest.
+    pub net: Vector6<f64>,
+    /// Its points of contact.
+    pub supports: Vec<Support>,
+    /// Forces at these points that balance loads and gravity, whatever the contact laws say.
+    pub balance: Balance,
+    /// The least factor on the friction coefficient with which they do; see [`friction_factor`].
+    pub friction_factor: f64,
+}
+
+impl Equilibrium {
+    /// Whether forces within the friction cones balance loads and gravity.
+    pub fn is_possible(&self) -> bool {
+        self.balance.is_balanced()
+    }
+}
+
+impl World {
+    /// Whether forces at the contacts of `body`, within friction cones of coefficient `friction`, could hold it at
+    /// `states` under loads and gravity. Samples no farther than `reach` \[m\] are in contact.
+    ///
+    /// Velocities matter to [`Equilibrium::net`] only.
+    ///
+    /// # Errors
+    /// If there is no such body, it is not free, or there is not one state for each body.
+    pub fn equilibrium(
+        &self,
+        body: usize,
+        states: &[State],
+        friction: f64,
+        reach: f64,
+    ) -> Result<Equilibrium, SimulationError> {
+        let bodies = self.bodies.len();
+        if states.len() != bodies {
+            return Err(SimulationError::States { states: states.len(), bodies });
+        }
+        let found = self.bodies.get(body).ok_or(SimulationError::NoBody { body, bodies })?;
+        let Some(rigid) = found.rigid() else {
+            return Err(SimulationError::NotFree { body: found.name.clone() });
+        };
+        let weight = self.gravity * rigid.mass();
+        let weight = Vector6::new(weight.x, weight.y, weight.z, 0.0, 0.0, 0.0);
+        let load = found.load + weight;
+        let supports = self.supports(body, states, friction, reach);
+        let centre = Point3::from(states[body].pose.translation.vector);
+        Ok(Equilibrium {
+            net: self.wrenches(states, 0)[body] + weight,
+            balance: Balance::find(&supports, &centre, &load),
+            friction_factor: friction_factor(&supports, &centre, &load),
+            supports,
+        })
+    }
+
+    /// Where samples of `body` touch others, and theirs touch it.
+    fn supports(&self, body: usize, states: &[State], friction: f64, reach: f64) -> Vec<Support> {
+        let mut supports = Vec::new();
+        for pair in &self.contacts {
+            let sign = match body {
+                _ if pair.samples == body => 1.0,
+                _ if pair.field == body => -1.0,
+                _ => continue,
+            };
+            for (position, outward) in self.touching(pair, states, reach) {
+                if let Some(normal) = Unit::try_new(outward * sign, 0.0) {
+                    supports.push(Support { position, normal, friction });
+                }
+            }
+        }
+        supports
+    }
+
+    /// Samples of `pair` within `reach` and the gradient of the field there, in the world.
+    fn touching(
+        &self,
+        pair: &ContactPair,
+        states: &[State],
+        reach: f64,
+    ) -> Vec<(Point3<f64>, Vector3<f64>)> {
+        let (body, other) = (&self.bodies[pair.samples], &self.bodies[pair.field]);
+        let (Some(surface), Some(field)) = (&body.surface, &other.field) else {
+            return Vec::new();
+        };
+        let (t_world_com, t_world_field) = (states[pair.samples].pose, states[pair.field].pose);
+        let place = |position: &Point3<f64>| t_world_com * (position - body.com().coords);
+        let touch = |position: Point3<f64>| {
+            let local = t_world_field.inverse_transform_point(&position) + other.com().coords;
+            let sample = field.sample(&local, reach)?;
+            Some((position, t_world_field.rotation * sample.gradient))
+        };
+        surface.points().iter().filter_map(|point| touch(place(&point.position))).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use nalgebra::{Isometry3, Matrix3};
+
+    use super::*;
+    use crate::fields::HalfSpace;
+    use crate::{Body, Onset, Penalty, RigidBody, Surface};
+
+    /// A box of 0.5 kg, 6 cm wide and 4 cm high, on an incline; the centre of mass is in its middle.
+    fn incline(angle: f64) -> (World, Vec<State>) {
+        let corners: Vec<Point3<f64>> = (0..8)
+            .map(|i| {
+                let sign = |bit: usize| if i & bit == 0 { -1.0 } else { 1.0 };
+                Point3::new(0.03 * sign(1), 0.03 * sign(2), 0.02 * sign(4))
+            })
+            .collect();
+        let rigid = RigidBody::new(0.5, Matrix3::identity() * 1e-4, Point3::origin()).unwrap();
+        let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
+        let slope = Arc::new(HalfSpace { normal: Vector3::z() });
+        let slope = world.add(Body::held("slope").with_field(slope));
+        let surface = Surface::uniform(&corners, 1e-2).unwrap();
+        let block = world.add(Body::free("block", rigid).with_surface(surface));
+        let law = Arc::new(Penalty::new(1e6, 1e3, 0.5, 1e-3).unwrap());
+        world.touch(block, slope, law, Onset::Hard).unwrap();
+        let tilt = Isometry3::rotation(Vector3::new(0.0, angle, 0.0));
+        let states = [Isometry3::identity(), Isometry3::translation(0.0, 0.0, 0.02)]
+            .map(|pose| State::at_rest(tilt * pose));
+        (world, states.to_vec())
+    }
+
+    #[test]
+    fn a_block_holds_below_the_friction_angle() {
+        let friction = 0.5_f64;
+        for fraction in [0.0, 0.5, 0.99, 1.01, 1.5] {
+            let slope = fraction * friction;
+            let (world, states) = incline(slope.atan());
+            let found = world.equilibrium(1, &states, friction, 1e-9).unwrap();
+            assert_eq!(found.supports.len(), 4);
+            assert_eq!(found.is_possible(), fraction < 1.0, "{fraction}: {:?}", found.balance);
+            assert!((found.friction_factor - fraction).abs() < 1e-4, "{}", found.friction_factor);
+            if fraction < 1.0 {
+                let sum: Vector3<f64> = found.balance.forces.iter().sum();
+                assert!((sum + world.gravity * 0.5).norm() < 1e-5);
+            } else {
+                // What slides is left: m g (sin θ − μ cos θ), but that the balance trades against the pressure.
+                let slides = 9.81 * 0.5 * (slope - friction) * slope.atan().cos();
+                let left = found.balance.residual.fixed_rows::<3>(0).norm();
+                assert!((left - slides * friction.atan().cos()).abs() < 1e-6, "{left} {slides}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_steep_block_tips_whatever_the_friction() {
+        // Wider by half than high: it tips at tan θ = 3/2.
+        let factor = |slope: f64| {
+            let (world, states) = incline(slope.atan());
+            world.equilibrium(1, &states, 1.0, 1e-9).unwrap().friction_factor
+        };
+        assert!((factor(1.45) - 1.45).abs() < 1e-3);
+        assert_eq!(factor(1.55), f64::INFINITY);
+    }
+
+    #[test]
+    fn a_body_in_free_space_has_nothing_but_its_weight() {
+        let (world, mut states) = incline(0.1);
+        states[1].pose.translation.z += 1.0;
+        let found = world.equilibrium(1, &states, 0.5, 1e-3).unwrap();
+        let weight = Vector6::new(0.0, 0.0, -9.81 * 0.5, 0.0, 0.0, 0.0);
+        assert_eq!((found.net, found.balance.residual), (weight, weight));
+        assert!(found.supports.is_empty() && !found.is_possible());
+        assert_eq!(found.friction_factor, f64::INFINITY);
+    }
+
+    #[test]
+    fn the_supporting_body_feels_the_same_points_from_the_other_side() {
+        let (mut world, states) = incline(0.2);
+        let rigid = *world.bodies[1].rigid().unwrap();
+        world.bodies[0].motion = crate::Motion::Free(rigid);
+        let [below, above] = [0, 1].map(|b| world.equilibrium(b, &states, 0.5, 1e-9).unwrap());
+        for (a, b) in below.supports.iter().zip(&above.supports) {
+            assert!((a.position - b.position).norm() < 1e-15 && a.normal == -b.normal);
+        }
+        assert!(!below.is_possible() && above.is_possible());
+    }
+
+    #[test]
+    fn impossible_questions_are_refused() {
+        let (world, states) = incline(0.1);
+        let ask = |body, states: &[State]| world.equilibrium(body, states, 0.5, 1e-3).unwrap_err();
+        assert_eq!(ask(2, &states), SimulationError::NoBody { body: 2, bodies: 2 });
+        assert_eq!(ask(0, &states), SimulationError::NotFree { body: "slope".to_owned() });
+        assert_eq!(ask(1, &states[..1]), SimulationError::States { states: 1, bodies: 2 });
+    }
+}

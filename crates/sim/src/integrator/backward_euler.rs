@@ -1,0 +1,224 @@
+//! Backward Euler: forces at the end of the step.
+
+mod equations;
+
+use equations::{Equations, arrived, excess};
+use nalgebra::{DMatrix, DVector, Matrix6};
+use prehend_autodiff::{LocalFunction, Scalar};
+
+use super::Integrator;
+use crate::error::SimulationError;
+use crate::state::State;
+use crate::world::{Step, World};
+
+/// Backward Euler, first order, stable for every step: what is faster than the step is damped away.
+///
+/// v' = v + dt (g + f'/m), L' = L + dt τ', with the forces at the end of the step, x' = x + dt v',
+/// R' = exp(dt ω') R, L' = I(R')ω'. Newton's method finds the velocities of all free bodies together, with the exact
+/// Jacobian of the contacts and steps that are shortened until the residual, in the norm of kinetic energy, falls. The
+/// derivative of a step is that of the solution, by the implicit function theorem (D. Baraff, A. Witkin, "Large steps in
+/// cloth simulation", 1998; E. Hairer, G. Wanner, "Solving ordinary differential equations II", IV.8).
+///
+/// # Errors
+/// A force that jumps, as a damped contact does under a hard onset, may leave the equations of an impact without a
+/// solution: [`SimulationError::Unsolved`]. [`SubStepped`](super::SubStepped) then tries shorter steps; a softplus
+/// onset has no jumps.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct BackwardEuler;
+
+impl Integrator for BackwardEuler {
+    fn step<S: Scalar>(
+        &self,
+        world: &World<S>,
+        states: &[State<S>],
+        step: Step,
+    ) -> Result<Vec<State<S>>, SimulationError> {
+        let free: Vec<usize> =
+            (0..world.bodies.len()).filter(|&i| world.bodies[i].rigid().is_some()).collect();
+        if free.is_empty() {
+            return Ok(states.to_vec());
+        }
+        let values: Vec<State> = states.iter().map(State::value).collect();
+        let plain = world.plain();
+        let lifted = plain.lift();
+        let mut at_end = values.clone();
+        plain.drive(&mut at_end, step.after().time());
+        let mut equations =
+            Equations { world: &plain, lifted: &lifted, states: &values, at_end, free, step };
+        let solution = equations.solve()?;
+        if S::ORDER == 0 {
+            return Ok(carried(world, states, &equations, &solution, &DMatrix::zeros(0, 0)));
+        }
+        // Onsets that leak do so in derivatives only.
+        let mut leaky = lifted.clone();
+        for (leaky, pair) in leaky.contacts.iter_mut().zip(&world.contacts) {
+            leaky.onset = pair.onset;
+        }
+        equations.lifted = &leaky;
+        let inverse = equations.linearise(&solution).1.try_inverse();
+        let inverse = inverse.ok_or_else(|| equations.unsolved(&solution, 0))?;
+        Ok(carried(world, states, &equations, &solution, &inverse))
+    }
+
+    fn stability_limit(&self) -> f64 {
+        f64::INFINITY
+    }
+}
+
+/// The states at the end, with the derivatives of the solution: x − J⁻¹F(x), where F carries those by all else.
+fn carried<S: Scalar>(
+    world: &World<S>,
+    states: &[State<S>],
+    equations: &Equations<'_>,
+    solution: &DVector<f64>,
+    inverse: &DMatrix<f64>,
+) -> Vec<State<S>> {
+    let (free, dt) = (&equations.free, equations.step.dt);
+    let mut next = states.to_vec();
+    world.drive(&mut next, equations.step.after().time());
+    let velocity =
+        |slot: usize| -> [S; 6] { std::array::from_fn(|i| S::constant(solution[6 * slot + i])) };
+    for (slot, &body) in free.iter().enumerate() {
+        next[body] = arrived(&states[body], &velocity(slot), dt);
+    }
+    if S::ORDER == 0 {
+        return next;
+    }
+    let wrenches = world.wrenches(&next, equations.step.index);
+    let excess: Vec<[S; 6]> = (free.iter().enumerate())
+        .filter_map(|(slot, &body)| {
+            let rigid = world.bodies[body].rigid()?;
+            Some(excess(rigid, world, &states[body], &velocity(slot), &wrenches[body], dt))
+        })
+        .collect();
+    for (row, &body) in free.iter().enumerate() {
+        let mut velocity = velocity(row);
+        for (column, excess) in excess.iter().enumerate() {
+            let block = inverse.fixed_view::<6, 6>(6 * row, 6 * column).into_owned();
+            // Bodies that nothing connects.
+            if block == Matrix6::zeros() {
+                continue;
+            }
+            for (velocity, change) in velocity.iter_mut().zip(S::local(&Product(block), *excess)) {
+                *velocity -= change;
+            }
+        }
+        next[body] = arrived(&states[body], &velocity, dt);
+    }
+    next
+}
+
+/// The product with a matrix.
+struct Product(Matrix6<f64>);
+
+impl LocalFunction<6, 6> for Product {
+    fn evaluate<S: Scalar>(&self, x: [S; 6]) -> [S; 6] {
+        std::array::from_fn(|row| {
+            let terms = self.0.row(row).into_owned();
+            terms.iter().zip(x).fold(S::zero(), |sum, (a, x)| sum + x.times(*a))
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+    use prehend_autodiff::Fwd;
+    use prehend_autodiff::check::{compare_gradients, finite_difference_jacobian};
+
+    use super::*;
+    use crate::body::RigidBody;
+    use crate::scenes::{bowl, egg_on};
+    use crate::{Horizon, LeakSteps, Motion, Onset};
+
+    /// The egg in a bowl that flies freely.
+    fn egg_in_free_bowl(onset: Onset) -> (World, Vec<State>) {
+        let (mut world, mut states) = egg_on(bowl(), onset);
+        let mut rigid = *world.bodies[1].rigid().unwrap();
+        rigid = RigidBody::new(0.5, rigid.inertia() * 3.0, *rigid.com()).unwrap();
+        world.bodies[0].motion = Motion::Free(rigid);
+        states[0] = rigid.at_rest(&nalgebra::Isometry3::identity());
+        states[0].angular = Vector3::new(-0.5, 0.3, 0.2);
+        states[1].pose.translation.z -= 5e-4;
+        (world, states)
+    }
+
+    #[test]
+    fn free_bodies_are_solved_and_differentiated_together() {
+        let (world, states) = egg_in_free_bowl(Onset::Softplus { width: 3e-4 });
+        let horizon = Horizon { dt: 2e-3, steps: 3 };
+        for moving in 0..2 {
+            let mut lifted: Vec<State<Fwd<12>>> = states.iter().map(State::lift).collect();
+            lifted[moving] = states[moving].variables();
+            let run = world.lift().simulate(&BackwardEuler, &lifted, horizon, |_, _| ()).unwrap();
+            let differences = finite_difference_jacobian(
+                |x| {
+                    let mut moved = states.clone();
+                    let tangent = std::array::from_fn::<f64, 12, _>(|i| x[i]);
+                    moved[moving] = states[moving].moved(&tangent);
+                    let run = world.simulate(&BackwardEuler, &moved, horizon, |_, _| ()).unwrap();
+                    let velocities = run.iter().flat_map(|s| [s.linear, s.angular]);
+                    velocities.flat_map(|v| [v.x, v.y, v.z]).collect()
+                },
+                &[0.0; 12],
+                1e-6,
+            );
+            let exact = run.iter().flat_map(|s| [s.linear, s.angular]);
+            for (exact, reference) in exact.flat_map(|v| [v.x, v.y, v.z]).zip(&differences) {
+                let error = compare_gradients(&exact.derivative, reference);
+                assert!(error.relative < 1e-6, "body {moving}: {error:?}");
+            }
+        }
+        let plain = world.simulate(&BackwardEuler, &states, horizon, |_, _| ()).unwrap();
+        let momentum = |states: &[State]| states[0].linear * 0.5 + states[1].linear * 0.2;
+        let gained = world.gravity * (0.7 * 6e-3);
+        assert!((momentum(&plain) - momentum(&states) - gained).norm() < 1e-14);
+    }
+
+    #[test]
+    fn steps_far_beyond_the_stability_limit_come_to_rest() {
+        let (mut world, states) = egg_on(bowl(), Onset::Softplus { width: 3e-4 });
+        world.contacts[0].params[0] *= 1e3;
+        let mut hit = states.clone();
+        hit[1].pose.translation.z -= 1e-3;
+        assert!(0.01 * world.contact_frequency(&hit) > 50.0);
+        let horizon = Horizon { dt: 0.01, steps: 300 };
+        let end = world.simulate(&BackwardEuler, &states, horizon, |_, _| ()).unwrap()[1];
+        assert!(end.linear.norm() < 1e-3 && end.angular.norm() < 0.1, "{end:?}");
+    }
+
+    #[test]
+    fn leaks_matter_to_derivatives_only() {
+        let leaky = Onset::Leaky { alpha: 0.1, band: 1e-2, steps: LeakSteps::All };
+        let ends = [Onset::Hard, leaky].map(|onset| {
+            let (world, mut states) = egg_on(bowl(), onset);
+            states[1].pose.translation.z += 5e-3;
+            let lifted = [states[0].lift(), states[1].variables()];
+            let step = Step { index: 0, dt: 1e-3 };
+            BackwardEuler.step(&world.lift(), &lifted, step).unwrap()[1]
+        });
+        assert_eq!(ends[0].value(), ends[1].value());
+        let slope = |end: &State<Fwd<12>>| end.linear.z.derivative[2];
+        assert_eq!(slope(&ends[0]), 0.0);
+        assert!(slope(&ends[1]) < -1e-2, "{}", slope(&ends[1]));
+    }
+
+    #[test]
+    fn a_jump_without_a_solution_is_an_error() {
+        let (world, states, step) = crate::integrator::tests::jump();
+        let error = BackwardEuler.step(&world, &states, step).unwrap_err();
+        let SimulationError::Unsolved { step: 3, time, residual, iterations } = error else {
+            panic!("{error}");
+        };
+        assert!((time - 0.03).abs() < 1e-15 && residual > 1e-3 && iterations > 0);
+        assert!(error.to_string().contains("step 3"));
+    }
+
+    #[test]
+    fn nothing_free_is_nothing_to_solve() {
+        let (mut world, states) = egg_on(bowl(), Onset::Hard);
+        world.bodies[1].motion = Motion::Held;
+        let step = Step { index: 0, dt: 1e-3 };
+        assert_eq!(BackwardEuler.step(&world, &states, step).unwrap(), states);
+    }
+}

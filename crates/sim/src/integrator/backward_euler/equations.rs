@@ -1,0 +1,219 @@
+//! The equations of an implicit step, and Newton's method for them.
+
+use nalgebra::{DMatrix, DVector, Matrix6, Vector3, Vector6};
+use prehend_autodiff::lie::so3_exp;
+use prehend_autodiff::{Fwd, Scalar};
+
+use crate::body::RigidBody;
+use crate::error::SimulationError;
+use crate::state::State;
+use crate::world::{Step, World};
+
+const MOST_ITERATIONS: usize = 60;
+
+/// Shortest fraction of a Newton step.
+const SHORTEST: f64 = 1e-6;
+
+/// A Newton step so short, absolute \[m/s, rad/s\] and relative, is the last: convergence is quadratic, so that what is
+/// left after it is rounding.
+const LAST: (f64, f64) = (1e-10, 1e-9);
+
+/// `state` after moving with `velocity` (linear, angular) for `dt`.
+pub(super) fn arrived<S: Scalar>(state: &State<S>, velocity: &[S; 6], dt: f64) -> State<S> {
+    let [x, y, z, rx, ry, rz] = *velocity;
+    let moving = State { linear: [x, y, z].into(), angular: [rx, ry, rz].into(), ..*state };
+    moving.drifted(dt)
+}
+
+/// `velocity` at the end of the step less what momentum and `wrench` there make it.
+pub(super) fn excess<S: Scalar>(
+    body: &RigidBody<S>,
+    world: &World<S>,
+    state: &State<S>,
+    velocity: &[S; 6],
+    wrench: &Vector6<S>,
+    dt: f64,
+) -> [S; 6] {
+    let [vx, vy, vz, wx, wy, wz] = *velocity;
+    let (force, torque) = (wrench.fixed_rows::<3>(0), wrench.fixed_rows::<3>(3));
+    let step = S::constant(dt);
+    let linear = state.linear + (world.gravity + force / body.mass()) * step;
+    let rotation = &state.pose.rotation;
+    let momentum = body.world_inertia(rotation) * state.angular + torque * step;
+    let turned = so3_exp(&Vector3::new(wx, wy, wz).map(|w| w.times(dt))) * rotation;
+    let angular = body.inverse_world_inertia(&turned) * momentum;
+    let expected = [linear.x, linear.y, linear.z, angular.x, angular.y, angular.z];
+    let velocity = [vx, vy, vz, wx, wy, wz];
+    std::array::from_fn(|i| velocity[i] - expected[i])
+}
+
+/// The equations of a step, for the velocities of the free bodies, one after the other.
+pub(super) struct Equations<'a> {
+    pub(super) world: &'a World,
+    pub(super) lifted: &'a World<Fwd<12>>,
+    pub(super) states: &'a [State],
+    /// The states at the end, right for the bodies that are not free.
+    pub(super) at_end: Vec<State>,
+    pub(super) free: Vec<usize>,
+    pub(super) step: Step,
+}
+
+impl Equations<'_> {
+    /// Newton's method: first from the velocities at the start, then from those of a flight without contacts, in
+    /// which what will touch touches already.
+    pub(super) fn solve(&self) -> Result<DVector<f64>, SimulationError> {
+        let start = |flight: f64| {
+            let velocity = |&body: &usize| {
+                let State { linear, angular, .. } = self.states[body];
+                let linear = linear + self.world.gravity * flight;
+                [linear.x, linear.y, linear.z, angular.x, angular.y, angular.z]
+            };
+            DVector::from_vec(self.free.iter().flat_map(velocity).collect())
+        };
+        match self.newton(start(0.0)) {
+            Err(SimulationError::Unsolved { .. }) => self.newton(start(self.step.dt)),
+            solved => solved,
+        }
+    }
+
+    fn newton(&self, mut x: DVector<f64>) -> Result<DVector<f64>, SimulationError> {
+        for iteration in 1..=MOST_ITERATIONS {
+            let (residual, jacobian) = self.linearise(&x);
+            let tolerance = LAST.0 + LAST.1 * x.amax();
+            let factors = jacobian.lu();
+            let Some(change) = factors.solve(&-&residual) else {
+                return Err(self.unsolved(&x, iteration));
+            };
+            if change.amax() <= tolerance {
+                return Ok(x + change);
+            }
+            let size = self.norm(&residual);
+            let shortened = |fraction: f64| {
+                let next = self.residual(&(&x + &change * fraction));
+                (self.norm(&next) <= (1.0 - 1e-4 * fraction) * size).then_some((fraction, next))
+            };
+            let mut fractions = std::iter::successors(Some(1.0), |fraction| Some(0.5 * fraction))
+                .take_while(|fraction| *fraction >= SHORTEST);
+            let Some((fraction, next)) = fractions.find_map(shortened) else {
+                return Err(self.unsolved(&x, iteration));
+            };
+            x += change * fraction;
+            // The old Jacobian is near enough to tell, and to take, a step shorter still.
+            if let Some(last) = factors.solve(&-next)
+                && last.amax() <= 1e-2 * tolerance
+            {
+                return Ok(x + last);
+            }
+        }
+        Err(self.unsolved(&x, MOST_ITERATIONS))
+    }
+
+    fn residual(&self, x: &DVector<f64>) -> DVector<f64> {
+        let wrenches = self.world.wrenches(&self.ends(x), self.step.index);
+        self.excesses(x, &wrenches)
+    }
+
+    fn excesses(&self, x: &DVector<f64>, wrenches: &[Vector6<f64>]) -> DVector<f64> {
+        let mut excesses = DVector::zeros(x.len());
+        for (slot, &body) in self.free.iter().enumerate() {
+            let Some(rigid) = self.world.bodies[body].rigid() else { continue };
+            let (state, velocity) = (&self.states[body], velocity_at(x, slot));
+            let excess = excess(rigid, self.world, state, &velocity, &wrenches[body], self.step.dt);
+            excesses.fixed_rows_mut::<6>(6 * slot).copy_from_slice(&excess);
+        }
+        excesses
+    }
+
+    fn ends(&self, x: &DVector<f64>) -> Vec<State> {
+        let mut ends = self.at_end.clone();
+        for (slot, &body) in self.free.iter().enumerate() {
+            ends[body] = arrived(&self.states[body], &velocity_at(x, slot), self.step.dt);
+        }
+        ends
+    }
+
+    /// The residual and its Jacobian.
+    pub(super) fn linearise(&self, x: &DVector<f64>) -> (DVector<f64>, DMatrix<f64>) {
+        let dt = self.step.dt;
+        let ends = self.ends(x);
+        let mut slots = vec![None; ends.len()];
+        self.free.iter().enumerate().for_each(|(slot, &body)| slots[body] = Some(slot));
+        let mut wrenches: Vec<Vector6<f64>> =
+            self.world.bodies.iter().map(|body| body.load).collect();
+        let mut by_velocity = DMatrix::zeros(x.len(), x.len());
+        let mut states: Vec<State<Fwd<12>>> = ends.iter().map(State::lift).collect();
+        for pair in &self.lifted.contacts {
+            // The velocities of the one body in lanes 0..6, of the other in lanes 6..12.
+            let bodies = [pair.samples, pair.field];
+            for (body, lane) in bodies.into_iter().zip([0, 6]) {
+                if let Some(slot) = slots[body] {
+                    let at = velocity_at(x, slot);
+                    let velocity = std::array::from_fn(|i| Fwd::variable(at[i], lane + i));
+                    states[body] = arrived(&self.states[body].lift(), &velocity, dt);
+                }
+            }
+            let pair_wrenches = self.lifted.contact_wrenches(pair, &states, self.step.index);
+            for (on, wrench) in bodies.into_iter().zip(pair_wrenches) {
+                wrenches[on] += wrench.map(|w| w.value);
+                let Some(row) = slots[on] else { continue };
+                for (body, lane) in bodies.into_iter().zip([0, 6]) {
+                    let Some(column) = slots[body] else { continue };
+                    for (i, component) in wrench.iter().enumerate() {
+                        for j in 0..6 {
+                            by_velocity[(6 * row + i, 6 * column + j)] +=
+                                component.derivative[lane + j];
+                        }
+                    }
+                }
+            }
+            bodies.into_iter().for_each(|body| states[body] = ends[body].lift());
+        }
+        (self.excesses(x, &wrenches), self.jacobian(x, &wrenches, &by_velocity))
+    }
+
+    /// Derivative of the excesses, with that of the wrenches.
+    fn jacobian(
+        &self,
+        x: &DVector<f64>,
+        wrenches: &[Vector6<f64>],
+        wrenches_by_velocity: &DMatrix<f64>,
+    ) -> DMatrix<f64> {
+        let mut jacobian = DMatrix::zeros(x.len(), x.len());
+        for (slot, &body) in self.free.iter().enumerate() {
+            let Some(rigid) = self.lifted.bodies[body].rigid() else { continue };
+            // The body's own velocity in lanes 0..6, the wrench on it in lanes 6..12.
+            let at = velocity_at(x, slot);
+            let velocity = std::array::from_fn(|i| Fwd::variable(at[i], i));
+            let wrench = Vector6::from_fn(|i, _| Fwd::variable(wrenches[body][i], 6 + i));
+            let state = self.states[body].lift();
+            let excess = excess(rigid, self.lifted, &state, &velocity, &wrench, self.step.dt);
+            let by = |lane: usize| Matrix6::from_fn(|i, j| excess[i].derivative[lane + j]);
+            let mut rows = jacobian.fixed_rows_mut::<6>(6 * slot);
+            rows.copy_from(&(by(6) * wrenches_by_velocity.fixed_rows::<6>(6 * slot)));
+            let mut own = rows.fixed_columns_mut::<6>(6 * slot);
+            own += by(0);
+        }
+        jacobian
+    }
+
+    /// The velocity of equal kinetic energy of 1 kg \[m/s\].
+    fn norm(&self, velocities: &DVector<f64>) -> f64 {
+        let energy = |(slot, &body): (usize, &usize)| {
+            let rigid = self.world.bodies[body].rigid()?;
+            let at = Vector6::from(velocity_at(velocities, slot));
+            let (linear, angular) = (at.fixed_rows::<3>(0), at.fixed_rows::<3>(3));
+            let inertia = rigid.world_inertia(&self.states[body].pose.rotation);
+            Some(rigid.mass() * linear.norm_squared() + angular.dot(&(inertia * angular)))
+        };
+        self.free.iter().enumerate().filter_map(energy).sum::<f64>().sqrt()
+    }
+
+    pub(super) fn unsolved(&self, x: &DVector<f64>, iterations: usize) -> SimulationError {
+        let (step, time) = (self.step.index, self.step.time());
+        SimulationError::Unsolved { step, time, residual: self.residual(x).norm(), iterations }
+    }
+}
+
+fn velocity_at(x: &DVector<f64>, slot: usize) -> [f64; 6] {
+    std::array::from_fn(|i| x[6 * slot + i])
+}

@@ -1,0 +1,157 @@
+//! Steps that are divided where contacts are too stiff for them.
+
+use prehend_autodiff::Scalar;
+
+use super::Integrator;
+use crate::error::SimulationError;
+use crate::state::State;
+use crate::world::{Step, World};
+
+/// Another integrator, each step of which is divided as far as stiffness and damping of the contacts demand.
+///
+/// The fastest of the contacts (see [`World::contact_frequency`]) is looked for at the start of the step and where
+/// the bodies would drift in it, so that impacts are foreseen. Steps are then as short as
+/// [`Integrator::stability_limit`] allows, with a margin of a fifth. A step whose equations an implicit integrator
+/// does not solve is divided into twice as many.
+///
+/// Which division is chosen depends on values only: derivatives are exact for the steps that are taken, and ignore that
+/// other steps might be. Onsets that leak in the first step of a rollout leak in the first part of it.
+///
+/// ```
+/// use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
+/// use prehend_sim::{Body, Horizon, RigidBody, SemiImplicitEuler, SubStepped, World};
+///
+/// let stone = RigidBody::new(1.0, Matrix3::identity(), Point3::origin())?;
+/// let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
+/// world.add(Body::free("stone", stone));
+/// let start = [stone.at_rest(&Isometry3::identity())];
+/// let integrator = SubStepped { integrator: SemiImplicitEuler, most: 32 };
+/// let run = world.rollout(&integrator, &start, Horizon { dt: 1e-2, steps: 100 })?;
+/// assert!((run[100][0].linear.z + 9.81).abs() < 1e-12);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SubStepped<I> {
+    /// What takes the steps.
+    pub integrator: I,
+    /// Parts of a step at most.
+    pub most: usize,
+}
+
+/// Fraction of the stability limit that is used.
+const MARGIN: f64 = 0.8;
+
+impl<I: Integrator> SubStepped<I> {
+    fn divided<S: Scalar>(
+        &self,
+        world: &World<S>,
+        states: &[State<S>],
+        step: Step,
+        parts: usize,
+    ) -> Result<Vec<State<S>>, SimulationError> {
+        let mut states = states.to_vec();
+        for part in step.parts(parts) {
+            states = self.integrator.step(world, &states, part)?;
+            world.drive(&mut states, part.after().time());
+        }
+        Ok(states)
+    }
+
+    /// How many parts the contacts demand.
+    fn demanded<S: Scalar>(&self, world: &World<S>, states: &[State<S>], dt: f64) -> f64 {
+        let limit = self.integrator.stability_limit();
+        if limit.is_infinite() {
+            return 1.0;
+        }
+        let plain = world.plain();
+        let now: Vec<State> = states.iter().map(State::value).collect();
+        let then: Vec<State> = now.iter().map(|state| state.drifted(dt)).collect();
+        let fastest = plain.contact_frequency(&now).max(plain.contact_frequency(&then));
+        (dt * fastest / (MARGIN * limit)).ceil().max(1.0)
+    }
+}
+
+impl<I: Integrator> Integrator for SubStepped<I> {
+    fn step<S: Scalar>(
+        &self,
+        world: &World<S>,
+        states: &[State<S>],
+        step: Step,
+    ) -> Result<Vec<State<S>>, SimulationError> {
+        let needed = self.demanded(world, states, step.dt);
+        let most = self.most.max(1);
+        if needed.is_nan() || needed > most as f64 {
+            let (step, time) = (step.index, step.time());
+            return Err(SimulationError::SubSteps { step, time, needed, most });
+        }
+        let mut parts = needed as usize;
+        loop {
+            match self.divided(world, states, step, parts) {
+                Err(SimulationError::Unsolved { .. }) if 2 * parts <= most => parts *= 2,
+                // Parts have numbers of their own.
+                Err(SimulationError::Unsolved { time, residual, iterations, .. }) => {
+                    let step = step.index;
+                    return Err(SimulationError::Unsolved { step, time, residual, iterations });
+                }
+                done => return done,
+            }
+        }
+    }
+
+    fn stability_limit(&self) -> f64 {
+        MARGIN * self.integrator.stability_limit() * self.most.max(1) as f64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scenes::{egg_on, floor};
+    use crate::{BackwardEuler, Horizon, Onset, RungeKutta4, SemiImplicitEuler};
+
+    #[test]
+    fn impacts_are_foreseen_and_flights_are_not_divided() {
+        let (world, mut states) = egg_on(floor(), Onset::Hard);
+        states[1].pose.translation.z += 1e-3;
+        states[1].linear.z = -0.5;
+        let step = Step { index: 2, dt: 1e-2 };
+        let parts = |states: &[State]| {
+            let euler = SubStepped { integrator: SemiImplicitEuler, most: 1000 };
+            euler.demanded(&world, states, step.dt)
+        };
+        let impact = parts(&states);
+        assert!(impact > 2.0 && world.contact_frequency(&states) == 0.0, "{impact}");
+        let divided = SubStepped { integrator: SemiImplicitEuler, most: impact as usize };
+        let done = divided.step(&world, &states, step).unwrap();
+        let fine = Horizon { dt: step.dt / impact, steps: impact as usize };
+        let expected = world.simulate(&SemiImplicitEuler, &states, fine, |_, _| ()).unwrap();
+        assert_eq!(done, expected);
+        let too_few = SubStepped { most: impact as usize - 1, ..divided };
+        assert_eq!(
+            too_few.step(&world, &states, step).unwrap_err(),
+            SimulationError::SubSteps {
+                step: 2,
+                time: 0.02,
+                needed: impact,
+                most: impact as usize - 1
+            }
+        );
+        let wider = SubStepped { integrator: RungeKutta4, most: 1000 };
+        assert!(wider.demanded(&world, &states, step.dt) < impact);
+        states[1].pose.translation.z += 0.1;
+        assert_eq!(parts(&states), 1.0);
+    }
+
+    #[test]
+    fn what_an_implicit_step_does_not_solve_shorter_ones_do() {
+        let (world, states, step) = crate::integrator::tests::jump();
+        let divided = SubStepped { integrator: BackwardEuler, most: 64 };
+        let end = divided.step(&world, &states, step).unwrap()[1];
+        assert!(end.linear.z < 0.0 && end.linear.z > states[1].linear.z + 0.1);
+        let once = SubStepped { integrator: BackwardEuler, most: 1 };
+        assert!(matches!(
+            once.step(&world, &states, step),
+            Err(SimulationError::Unsolved { step: 3, .. })
+        ));
+    }
+}
