@@ -10,8 +10,6 @@
 //! centre of mass, velocities are those of the centre of mass, in the world frame.
 
 mod body;
-#[cfg(test)]
-mod canonical;
 pub mod contact;
 mod error;
 #[cfg(test)]
@@ -20,6 +18,7 @@ mod integrator;
 mod rollout;
 #[cfg(test)]
 mod scenes;
+mod smoothing;
 mod stability;
 mod state;
 mod surface;
@@ -37,6 +36,7 @@ pub use contact::wrench::{Patch, WrenchJacobian};
 pub use error::SimulationError;
 pub use integrator::{Integrator, SemiImplicitEuler};
 pub use rollout::Horizon;
+pub use smoothing::{SmoothedGradient, Smoothing, SmoothingError};
 pub use stability::{Averaging, Perturbation, StabilityJacobian, StabilityLoss, StabilityWeights};
 pub use state::State;
 pub use surface::{Surface, SurfacePoint};

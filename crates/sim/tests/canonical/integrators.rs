@@ -1,0 +1,89 @@
+//! The integrators under test and what theory says of them.
+
+use prehend_autodiff::Fwd;
+use prehend_sim::{Horizon, Integrator, SemiImplicitEuler, SimulationError, State, Step, World};
+
+/// An integrator.
+pub(crate) struct Scheme {
+    pub(crate) name: &'static str,
+    pub(crate) method: &'static dyn Method,
+    /// Undamped contact is stable for dt·ω below this, or for any step.
+    pub(crate) stable_below: Option<f64>,
+    /// a in the height after n steps of free fall, −g dt² n(n + a)/2.
+    pub(crate) fall_lead: f64,
+    /// Whether angular momentum is kept to rounding.
+    pub(crate) keeps_angular_momentum: bool,
+}
+
+/// Every integrator.
+pub(crate) const SCHEMES: &[Scheme] = &[Scheme {
+    name: "semi-implicit Euler",
+    method: &SemiImplicitEuler,
+    stable_below: Some(2.0),
+    fall_lead: 1.0,
+    keeps_angular_momentum: true,
+}];
+
+/// The number of inputs that forward mode differentiates by.
+pub(crate) const INPUTS: usize = 4;
+
+/// [`Integrator`] over the scalars of this suite, as an object.
+pub(crate) trait Method: Sync {
+    fn simulate(
+        &self,
+        world: &World,
+        start: &[State],
+        horizon: Horizon,
+        visit: &mut dyn FnMut(&[State]),
+    ) -> Result<Vec<State>, SimulationError>;
+
+    fn differentiate(
+        &self,
+        world: &World,
+        start: &[State<Fwd<INPUTS>>],
+        horizon: Horizon,
+    ) -> Result<Vec<State<Fwd<INPUTS>>>, SimulationError>;
+}
+
+impl<I: Integrator> Method for I {
+    fn simulate(
+        &self,
+        world: &World,
+        start: &[State],
+        horizon: Horizon,
+        visit: &mut dyn FnMut(&[State]),
+    ) -> Result<Vec<State>, SimulationError> {
+        world.simulate(self, start, horizon, |_: Step, states| visit(states))
+    }
+
+    fn differentiate(
+        &self,
+        world: &World,
+        start: &[State<Fwd<INPUTS>>],
+        horizon: Horizon,
+    ) -> Result<Vec<State<Fwd<INPUTS>>>, SimulationError> {
+        world.lift().simulate(self, start, horizon, |_, _| ())
+    }
+}
+
+impl Scheme {
+    /// The states after `horizon`.
+    pub(crate) fn end(&self, world: &World, start: &[State], horizon: Horizon) -> Vec<State> {
+        self.method.simulate(world, start, horizon, &mut |_| ()).unwrap()
+    }
+
+    /// The states of body `body` at 0, dt, ….
+    pub(crate) fn course(
+        &self,
+        world: &World,
+        start: &[State],
+        horizon: Horizon,
+        body: usize,
+    ) -> Vec<State> {
+        let mut course = vec![start[body]];
+        self.method
+            .simulate(world, start, horizon, &mut |states| course.push(states[body]))
+            .unwrap();
+        course
+    }
+}
