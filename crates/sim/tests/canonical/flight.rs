@@ -78,7 +78,7 @@ pub(crate) fn flip(scheme: &Scheme) -> Vec<Row> {
     let modulus2 =
         (i2 - i1) * (energy2 * i3 - momentum2) / ((i3 - i2) * (momentum2 - energy2 * i1));
     let expected = 2.0 * complete_elliptic(modulus2) / rate;
-    let horizon = Horizon { dt: 1e-5, steps: 120_000 };
+    let horizon = Horizon { dt: 1e-5, steps: 140_000 };
     let course = scheme.course(&world, &[start], horizon, 0);
     let middle = |s: &State| s.pose.rotation.inverse_transform_vector(&s.angular).y;
     // Moments at which the spin about the middle axis passes zero.
