@@ -33,9 +33,19 @@ fn rounded(offset: Vector3<f64>, radius: f64, free: &Matrix3<f64>) -> FieldSampl
     FieldSample { distance: length - radius, gradient, hessian }
 }
 
-fn palm(point: &Point3<f64>) -> FieldSample {
+/// From the palm's middle to `point`, and how far beyond each of its sides that is.
+fn from_palm(point: &Point3<f64>) -> [Vector3<f64>; 2] {
     let from = point - Point3::new(0.0, 0.0, -0.01);
-    let beyond = from.abs() - Vector3::new(0.05, 0.05, 0.01);
+    [from, from.abs() - Vector3::new(0.05, 0.05, 0.01)]
+}
+
+fn palm_distance(point: &Point3<f64>) -> f64 {
+    let [_, beyond] = from_palm(point);
+    beyond.map(|b| b.max(0.0)).norm() + beyond.max().min(0.0)
+}
+
+fn palm(point: &Point3<f64>) -> FieldSample {
+    let [from, beyond] = from_palm(point);
     if beyond.max() <= 0.0 {
         let axis = beyond.imax();
         let mut gradient = Vector3::zeros();
@@ -47,25 +57,32 @@ fn palm(point: &Point3<f64>) -> FieldSample {
     rounded(offset, 0.0, &free)
 }
 
-fn finger(point: &Point3<f64>, a: &Point3<f64>, b: &Point3<f64>, radius: f64) -> FieldSample {
+/// Where between its ends a finger is nearest to `point`, as a fraction beyond 0..=1 past them, and the offset from
+/// there.
+fn from_finger(point: &Point3<f64>, a: &Point3<f64>, b: &Point3<f64>) -> (f64, Vector3<f64>) {
     let (along, from) = (b - a, point - a);
     let t = from.dot(&along) / along.norm_squared();
-    let axis = along.normalize();
-    let inside = (0.0..=1.0).contains(&t);
-    let free =
-        Matrix3::identity() - if inside { axis * axis.transpose() } else { Matrix3::zeros() };
-    rounded(from - along * t.clamp(0.0, 1.0), radius, &free)
+    (t, from - along * t.clamp(0.0, 1.0))
+}
+
+fn finger(point: &Point3<f64>, (a, b, radius): &(Point3<f64>, Point3<f64>, f64)) -> FieldSample {
+    let (t, offset) = from_finger(point, a, b);
+    let axis = (b - a).normalize();
+    let held = if (0.0..=1.0).contains(&t) { axis * axis.transpose() } else { Matrix3::zeros() };
+    rounded(offset, *radius, &(Matrix3::identity() - held))
 }
 
 impl DistanceField for Hand {
     fn sample(&self, point: &Point3<f64>, reach: f64) -> Option<FieldSample> {
-        let nearest =
-            fingers()
-                .map(|(a, b, radius)| finger(point, &a, &b, radius))
-                .fold(palm(point), |nearest, sample| {
-                    if sample.distance < nearest.distance { sample } else { nearest }
-                });
-        (nearest.distance <= reach).then_some(nearest)
+        let mut nearest = (palm_distance(point), None);
+        for shape in fingers() {
+            let distance = from_finger(point, &shape.0, &shape.1).1.norm() - shape.2;
+            if distance < nearest.0 {
+                nearest = (distance, Some(shape));
+            }
+        }
+        let sample = || nearest.1.map_or_else(|| palm(point), |shape| finger(point, &shape));
+        (nearest.0 <= reach).then(sample)
     }
 }
 

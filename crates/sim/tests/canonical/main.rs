@@ -3,6 +3,8 @@
 //! `cargo test -p prehend-sim --release --test canonical -- --nocapture` prints the table. An integrator is added by
 //! one entry in [`integrators::SCHEMES`], a law by one in [`laws::LAWS`], a problem by one in [`PROBLEMS`].
 
+#![allow(clippy::unwrap_used)] // a test may panic; helpers outside test functions count as code to the lint
+
 mod balls;
 mod flight;
 mod friction;
