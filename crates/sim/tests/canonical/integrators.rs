@@ -11,6 +11,8 @@ pub(crate) struct Scheme {
     pub(crate) stable_below: Option<f64>,
     /// a in the height after n steps of free fall, −g dt² n(n + a)/2.
     pub(crate) fall_lead: f64,
+    /// Whether an elastic bounce that takes twenty steps keeps its energy.
+    pub(crate) keeps_energy: bool,
     /// Whether angular momentum is kept to rounding.
     pub(crate) keeps_angular_momentum: bool,
 }
@@ -21,6 +23,7 @@ pub(crate) const SCHEMES: &[Scheme] = &[Scheme {
     method: &SemiImplicitEuler,
     stable_below: Some(2.0),
     fall_lead: 1.0,
+    keeps_energy: true,
     keeps_angular_momentum: true,
 }];
 
