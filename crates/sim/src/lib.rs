@@ -3,7 +3,7 @@
 //! A rigid [`RigidBody`] carries surface samples ([`SurfacePoint`]) that touch a
 //! [`DistanceField`](prehend_geometry::DistanceField). A [`ContactLaw`], written once over a generic scalar, turns gap and slip into
 //! force; an [`Onset`] says how contact begins. Forces and their derivatives are gathered into one
-//! wrench a step ([`contact::wrench`]), so that a [`Simulation`] carries exact derivatives with respect
+//! wrench a step ([`contact::wrench`]), so that a [`World`]'s rollout carries exact derivatives with respect
 //! to its initial pose. [`StabilityLoss`] measures by such rollouts how far an object is from resting.
 //!
 //! World-frame conventions: a pose perturbation is the left twist (translation, rotation) about the

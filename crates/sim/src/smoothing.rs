@@ -162,7 +162,8 @@ impl<const N: usize> Smoothing<N> {
 mod tests {
     use std::convert::Infallible;
 
-    use nalgebra::{Matrix6, Vector1, Vector6};
+    use nalgebra::{Matrix6, Point3, Vector1, Vector3, Vector6};
+    use prehend_autodiff::lie::{se3_exp, se3_left_jacobian};
 
     use super::*;
 
@@ -213,6 +214,31 @@ mod tests {
                 assert!(wrong <= 4.0 * estimate.value_variance.sqrt(), "{x}: {estimate:?}");
             }
         }
+    }
+
+    #[test]
+    fn both_orders_agree_on_a_function_of_a_pose() {
+        // Squared distance of a moved point from another, and its gradient by a further left twist.
+        let (point, target) = (Point3::new(0.1, 0.4, -0.3), Vector3::new(1.0, 0.2, 0.3));
+        let by_twist = |x: &Vector6<f64>| {
+            let moved = se3_exp(x) * point;
+            let off = moved.coords - target;
+            let (by_shift, by_turn) = (off * 2.0, moved.coords.cross(&off) * 2.0);
+            let mut slope = Vector6::zeros();
+            slope.fixed_rows_mut::<3>(0).copy_from(&by_shift);
+            slope.fixed_rows_mut::<3>(3).copy_from(&by_turn);
+            Ok::<_, Infallible>((off.norm_squared(), se3_left_jacobian(x).tr_mul(&slope)))
+        };
+        let smoothing = Smoothing::new(Vector6::repeat(0.3), 20_000, 2).unwrap();
+        let x = Vector6::new(0.1, -0.2, 0.3, 0.5, -0.4, 0.6);
+        let first = smoothing.first_order(&x, by_twist).unwrap();
+        let zeroth = smoothing.zeroth_order(&x, |x| by_twist(x).map(|(v, _)| v)).unwrap();
+        for i in 0..6 {
+            let chance = (first.variance[i] + zeroth.variance[i]).sqrt();
+            assert!((first.gradient[i] - zeroth.gradient[i]).abs() < 4.0 * chance);
+            assert!(chance < 0.05, "{chance}");
+        }
+        assert!((first.value - zeroth.value).abs() < 1e-12);
     }
 
     #[test]
