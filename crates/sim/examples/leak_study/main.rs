@@ -114,7 +114,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     onsets().iter().for_each(|(name, _)| print!(" {name:>18}"));
     println!("\n{:>36} {}", "", "   cosine (× |exact|)".repeat(onsets().len()));
     for steps in [1, 5, 20, 50, 100] {
-        let Study { smoothed, first_order, onsets } = study(1000, steps, 512)?;
+        let Study { smoothed, first_order, onsets } = study(2000, steps, 512)?;
         let (length, chance) = (smoothed.gradient.norm(), smoothed.variance.sum().sqrt());
         print!("{steps:>4} {length:>12.3} ± {chance:<7.3} {first_order:>8.3}");
         onsets.iter().for_each(|(_, cosine, length)| print!(" {cosine:>8.3} {length:>9.2}"));
