@@ -16,7 +16,6 @@ pub mod penalty;
 pub mod registry;
 pub mod resting;
 pub mod restitution;
-pub mod stiffness;
 pub mod stribeck;
 pub mod wrench;
 

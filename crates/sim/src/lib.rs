@@ -13,8 +13,6 @@
 
 mod adjoint;
 mod body;
-#[cfg(test)]
-mod canonical;
 pub mod contact;
 mod equilibrium;
 mod error;
@@ -30,6 +28,7 @@ mod robot;
 mod rollout;
 #[cfg(test)]
 mod scenes;
+mod smoothing;
 mod stability;
 mod state;
 mod surface;
@@ -59,6 +58,7 @@ pub use integrator::{
 };
 pub use robot::JointState;
 pub use rollout::Horizon;
+pub use smoothing::{SmoothedGradient, Smoothing, SmoothingError};
 pub use stability::{Averaging, Perturbation, StabilityJacobian, StabilityLoss, StabilityWeights};
 pub use state::State;
 pub use surface::{Surface, SurfacePoint};

@@ -3,10 +3,9 @@
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix6, Point3, Vector3, Vector6};
-use prehend_sim::contact::stiffness::{damping_per_area, stiffness_per_area};
 use prehend_sim::{
-    Body, Horizon, LeakSteps, Onset, Penalty, Perturbation, RigidBody, StabilityJacobian,
-    StabilityLoss, StabilityWeights, StepError, Surface, World,
+    Body, Horizon, LeakSteps, Onset, Penalty, Perturbation, RestingContact, RigidBody,
+    StabilityJacobian, StabilityLoss, StabilityWeights, StepError, Surface, World,
 };
 
 use super::Term;
@@ -94,9 +93,14 @@ impl PhysicsTerm {
         let positions: Vec<Point3<f64>> = object.samples.iter().map(|s| s.point).collect();
         let surface = Surface::uniform(&positions, object.area).map_err(|e| fail(e.to_string()))?;
         let g = gravity.norm();
-        let area = settings.contact_area;
-        let stiffness = stiffness_per_area(inertial.mass, g, settings.penetration, area);
-        let damping = damping_per_area(inertial.mass, stiffness, area, settings.damping_ratio);
+        let resting = RestingContact {
+            mass: inertial.mass,
+            gravity: g,
+            penetration: settings.penetration,
+            contact_area: settings.contact_area,
+        };
+        let (stiffness, damping) =
+            (resting.stiffness(1.0), resting.damping(settings.damping_ratio));
         let law = Penalty::new(stiffness, damping, settings.friction, settings.slip_scale)
             .map_err(|e| fail(e.to_string()))?;
         let (alpha, band) = settings.leak;

@@ -1,7 +1,6 @@
 //! What one knows of a contact: the body that rests on it.
 
 use super::error::LawError;
-use super::stiffness::{damping_per_area, stiffness_per_area};
 
 /// A body at rest on a contact, from which laws get their stiffness and damping per area.
 ///
@@ -40,13 +39,12 @@ impl RestingContact {
 
     /// Stiffness per area K = m g/(A δⁿ) \[N/m^{2+n}\] of a law whose pressure is K dⁿ.
     pub fn stiffness(&self, exponent: f64) -> f64 {
-        let compression = self.penetration.powf(exponent);
-        stiffness_per_area(self.mass, self.gravity, compression, self.contact_area)
+        self.mass * self.gravity / (self.penetration.powf(exponent) * self.contact_area)
     }
 
-    /// Damping per area \[N s/m³\] of a linear law for a damping ratio.
+    /// Damping per area D = 2ζ√(K m/A) \[N s/m³\] of a linear law for the damping ratio ζ.
     pub fn damping(&self, ratio: f64) -> f64 {
-        damping_per_area(self.mass, self.stiffness(1.0), self.contact_area, ratio)
+        2.0 * ratio * (self.stiffness(1.0) * self.mass / self.contact_area).sqrt()
     }
 }
 
