@@ -24,7 +24,7 @@ impl<S: Scalar> Near<S> {
         let mut near = world.clone();
         let mut made_at = Vec::new();
         for pair in &mut near.contacts {
-            let (state, com) = (world.seen(pair, states).value(), world.bodies[pair.samples].com());
+            let (state, com) = (world.seen_value(pair, states), world.bodies[pair.samples].com());
             made_at.push((state, pair.surface.radius_about(&com)));
             if let Some(field) = &world.bodies[pair.field].field {
                 let (surface, onset) = (&*pair.surface, pair.onset);
@@ -38,7 +38,7 @@ impl<S: Scalar> Near<S> {
     /// Whether no sample that was left out can touch during the next `dt` \[s\].
     pub(crate) fn holds(&self, states: &[State<S>], dt: f64) -> bool {
         self.world.contacts.iter().zip(&self.made_at).all(|(pair, (made_at, radius))| {
-            let now = self.world.seen(pair, states).value();
+            let now = self.world.seen_value(pair, states);
             let shift = now.pose.translation.vector - made_at.pose.translation.vector;
             let turn = now.pose.rotation.angle_to(&made_at.pose.rotation);
             let ahead = now.linear.norm() + now.angular.norm() * radius;

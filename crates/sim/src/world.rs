@@ -325,9 +325,16 @@ impl<S: Scalar> World<S> {
     }
 
     /// The body with the samples as the field sees it, in the model frame of the body with the field.
-    pub(crate) fn seen(&self, pair: &ContactPair<S>, states: &[State<S>]) -> State<S> {
-        let frame = states[pair.field].shifted(&-self.bodies[pair.field].com().coords);
-        states[pair.samples].seen_from(&frame)
+    fn seen(&self, pair: &ContactPair<S>, states: &[State<S>]) -> State<S> {
+        let com = self.bodies[pair.field].com();
+        states[pair.samples].seen_from(&states[pair.field].shifted(&-com.coords))
+    }
+
+    /// [`World::seen`] without derivatives: nothing is recorded.
+    pub(crate) fn seen_value(&self, pair: &ContactPair<S>, states: &[State<S>]) -> State {
+        let com = self.bodies[pair.field].com();
+        let frame = states[pair.field].value().shifted(&-com.coords);
+        states[pair.samples].value().seen_from(&frame)
     }
 
     /// Moves the bodies that forces do not move to where they are at `time` \[s\].
