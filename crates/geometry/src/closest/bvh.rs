@@ -172,6 +172,17 @@ fn principal_axes(triangles: &[[Vector3<f64>; 3]]) -> Matrix3<f64> {
     Matrix3::identity()
 }
 
+/// Up to a hundredth along each axis, by the number of a face.
+///
+/// The builder merges nearest neighbours; among equal boxes (a strip of equal triangles, faces on top of each other) it
+/// takes quadratic time and may build a chain. What it gets has no equals. Only the tree's shape depends on it: the
+/// boxes that queries look at are made from the triangles.
+fn jitter(face: usize) -> Vector3<f64> {
+    let hash = (face as u32).wrapping_mul(0x9E37_79B9);
+    let part = |bits: u32| f64::from(bits >> 8) / f64::from(1 << 24) * 0.01;
+    Vector3::new(part(hash), part(hash.rotate_left(11)), part(hash.rotate_left(22)))
+}
+
 fn below(x: f64) -> f32 {
     let y = x as f32;
     if f64::from(y) > x { y.next_down() } else { y }
@@ -212,10 +223,14 @@ impl Bvh {
             })
             .collect();
         let center = nalgebra::center(&lo, &hi).coords;
+        let reach = (hi.coords - center).amax();
         let boxes: Vec<Aabb> = boxes
             .iter()
-            .map(|(lo, hi)| {
+            .enumerate()
+            .map(|(face, (lo, hi))| {
                 let (lo, hi) = (lo.coords - center, hi.coords - center);
+                let size = (hi - lo).amax().max(1e-6 * reach);
+                let hi = hi + jitter(face) * size;
                 Aabb::new(
                     [below(lo.x), below(lo.y), below(lo.z)].into(),
                     [above(hi.x), above(hi.y), above(hi.z)].into(),
@@ -238,7 +253,6 @@ impl Bvh {
             .map(|&f| mesh.triangle(f as usize).map(|v| v.coords - center))
             .collect();
         let pack = vec![0; slot.len()];
-        let reach = (hi.coords - center).amax();
         let (nodes, packs) = (Vec::new(), Vec::new());
         let mut tree = Self { nodes, packs, triangles, slot, pack, center, reach };
         tree.widen(&binary, &ranges, &corners);

@@ -315,3 +315,23 @@ fn many_equal_triangles_make_no_trouble() {
     let found = tree.closest(&Point3::new(2.0, 0.0, 0.0), f64::INFINITY).unwrap();
     assert_eq!((found.distance, found.point), (1.0, Point3::new(1.0, 0.0, 0.0)));
 }
+
+#[test]
+fn equal_faces_make_neither_a_slow_nor_a_deep_tree() {
+    // Without care both take minutes, and a query's recursion overflows this thread's stack.
+    let triangle = |x: f64| [[x, 0.0, 0.0], [x + 1.0, 0.0, 0.0], [x, 1.0, 0.0]].map(Point3::from);
+    let mesh = move |x: fn(u32) -> f64| {
+        let vertices = (0..50_000).flat_map(|i| triangle(x(i))).collect();
+        TriMesh::new(vertices, (0..50_000).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect())
+    };
+    let check = move || {
+        let stacked = ClosestPoints::new(&mesh(|_| 0.0)).unwrap();
+        let strip = ClosestPoints::new(&mesh(f64::from)).unwrap();
+        let point = Point3::new(0.25, 0.25, 2.0);
+        for tree in [&stacked, &strip] {
+            let closest = tree.closest(&point, 10.0).unwrap();
+            assert_eq!((closest.face, closest.distance), (0, 2.0));
+        }
+    };
+    std::thread::Builder::new().stack_size(256 << 10).spawn(check).unwrap().join().unwrap();
+}
