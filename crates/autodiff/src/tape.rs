@@ -232,17 +232,26 @@ fn is_run(inputs: &[Var], recording: u32) -> bool {
 }
 
 /// [`push_block`] where some inputs are constants (or of another recording).
-#[cold]
 fn push_sparse_block(inputs: &[Var], outputs: usize, jacobian: &[f64]) -> Outputs {
-    let active: Vec<Var> = inputs.iter().copied().filter(|var| var.recording != 0).collect();
-    if active.is_empty() {
-        return Outputs { first: 0, recording: 0 };
-    }
-    END.with(|end| end.check(&active));
-    let rows = jacobian.chunks_exact(inputs.len());
-    let slopes = rows.flat_map(|row| row.iter().zip(inputs)).filter(|(_, var)| var.recording != 0);
-    let slopes: Vec<f64> = slopes.map(|(slope, _)| *slope).collect();
-    push_block(&active, outputs, &slopes)
+    END.with(|end| {
+        end.check(inputs);
+        let active = |var: &&Var| var.recording != 0;
+        let count = inputs.iter().filter(active).count();
+        if count == 0 {
+            return Outputs { first: 0, recording: 0 };
+        }
+        let group = end.push_group(&Group { outputs, inputs: count, kind: Kind::Dense });
+        TAPE.with(|tape| {
+            let tape = &mut *tape.borrow_mut();
+            tape.parents.room(count).extend(inputs.iter().filter(active).map(|var| var.node));
+            let slopes = tape.slopes.room(count * outputs);
+            for row in jacobian.chunks_exact(inputs.len()) {
+                let pairs = row.iter().zip(inputs).filter(|(_, var)| active(&var));
+                slopes.extend(pairs.map(|(&slope, var)| through(slope, var.coefficient)));
+            }
+        });
+        group
+    })
 }
 
 /// Records a group of nodes that `operation` differentiates.

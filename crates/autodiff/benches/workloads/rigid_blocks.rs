@@ -21,7 +21,12 @@ pub(crate) fn miss<S: Scalar>(inputs: &[S; 12], scene: &Scene) -> S {
         let [i, j, k, w] = rotation.coords.into();
         let [v, s] = [velocity, spin].map(<[S; 3]>::from);
         let contacts = [i, j, k, w, position.z, v[0], v[1], v[2], s[0], s[1], s[2]];
-        let [fx, fy, fz, tx, ty, tz] = S::local(&Contacts { scene }, contacts);
+        // In flight there is nothing to record.
+        let [fx, fy, fz, tx, ty, tz] = if touches(&contacts, scene) {
+            S::local(&Contacts { scene }, contacts)
+        } else {
+            [S::zero(); 6]
+        };
         velocity += Vector3::new(fx, fy, fz.plus(-GRAVITY)).map(|force| force.times(STEP));
         let torque = Vector3::new(tx, ty, tz);
         let acceleration = rigid::angular_acceleration(&rotation, &spin, &torque, &inertia);
@@ -32,6 +37,12 @@ pub(crate) fn miss<S: Scalar>(inputs: &[S; 12], scene: &Scene) -> S {
     let offset = position - Vector3::from(TARGET.map(S::constant));
     let tilt = S::one() - rigid::rotate(&rotation, &Vector3::z()).z;
     offset.dot(&offset) + tilt * tilt
+}
+
+/// Whether any point is below the floor.
+fn touches<S: Scalar>(contacts: &[S; 11], scene: &Scene) -> bool {
+    let State { pose, .. } = state(contacts.map(S::value));
+    scene.points.iter().any(|point| (pose * point).z < 0.0)
 }
 
 /// Force and torque of all contacts, of the rotation's coordinates (i, j, k, w), the height and both
