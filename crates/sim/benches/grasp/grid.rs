@@ -45,14 +45,14 @@ fn hand(p: &Point3<f64>) -> f64 {
 impl DistanceField for LinearGrid {
     #[inline]
     fn sample(&self, point: &Point3<f64>, reach: f64) -> Option<FieldSample> {
-        let x = point.coords.map(|x| ((x - EXTENT[0]) * self.inverse_spacing).clamp(0.0, 126.999));
-        let cell = x.map(|x| x as usize);
-        let [u, v, w] = [0, 1, 2].map(|k| x[k] - cell[k] as f64);
-        let start = (cell.x * SIZE + cell.y) * SIZE + cell.z;
-        let pair = |offset: usize| {
-            let pair = &self.values[start + offset..start + offset + 2];
-            [f64::from(pair[0]), f64::from(pair[1])]
-        };
+        let x =
+            point.coords.map(|x| ((x - EXTENT[0]) * self.inverse_spacing).max(0.0).min(126.999));
+        let cell = x.map(|x| x as i32);
+        let [u, v, w] = [0, 1, 2].map(|k| x[k] - f64::from(cell[k]));
+        let [i, j, k] = cell.map(|c| c as usize).into();
+        let start = (i * SIZE + j) * SIZE + k;
+        let corners = &self.values[start..start + SIZE * SIZE + SIZE + 2];
+        let pair = |offset: usize| [corners[offset], corners[offset + 1]].map(f64::from);
         let [a, b] = [pair(0), pair(SIZE)];
         let [c, d] = [pair(SIZE * SIZE), pair(SIZE * SIZE + SIZE)];
         // Along z, then y, then x; the differences of each are the slopes.
