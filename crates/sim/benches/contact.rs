@@ -14,6 +14,8 @@ use prehend_sim::{LeakSteps, Onset, State, World};
 
 fn main() -> anyhow::Result<()> {
     let grasp = Grasp::new();
+    let graspd = forward_mode(&grasp.world(2000, Onset::grasp_d())?, 20)?;
+    anyhow::ensure!(close(&graspd, &grasp::LEAKY_REFERENCE, 1e-6), "{graspd:?}");
     println!("| samples | steps | run | ms | M contact-points·steps/s | × forward |");
     println!("|--:|--:|---|--:|--:|--:|");
     let leak = Onset::Leaky { alpha: 0.1, band: 2e-3, steps: LeakSteps::All };

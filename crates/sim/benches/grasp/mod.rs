@@ -77,6 +77,19 @@ pub(crate) fn loss<S: Scalar>(state: &State<S>) -> S {
 /// Loss and its gradient by the initial translation \[1/m\] and turn \[1/rad\] of the ellipsoid.
 pub(crate) type Derivatives = (f64, [f64; 6]);
 
+/// What JAX finds for 2000 samples and 20 steps with Grasp'D's leak of a tenth at any distance.
+pub(crate) const LEAKY_REFERENCE: Derivatives = (
+    2.0984574920526,
+    [
+        5924.0832307006,
+        -204.63812234556,
+        528.74477528365,
+        32.112273186398,
+        71.917648678977,
+        49.351515840698,
+    ],
+);
+
 /// What JAX 0.10 in double precision finds for `count` samples and `steps` steps.
 ///
 /// # Panics
