@@ -229,7 +229,8 @@ mod tests {
         }
         let x: Vec<f64> = (0..300).map(|i| (i * i % 11) as f64).collect();
         // Neighbours on the tape; the other way round; a fused result, a constant and a repetition among them.
-        let orders: [(fn(&mut [Var]), fn(&mut [f64])); 3] =
+        type Order<S> = fn(&mut [S]);
+        let orders: [(Order<Var>, Order<f64>); 3] =
             [(|_| (), |_| ()), (<[Var]>::reverse, <[f64]>::reverse), (mix::<Var>, mix::<f64>)];
         fn mix<S: Scalar>(x: &mut [S]) {
             (x[10], x[70], x[200]) = (x[10].times(2.0), S::constant(0.5), x[201]);

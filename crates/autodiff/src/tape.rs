@@ -246,7 +246,7 @@ fn push_sparse_block(inputs: &[Var], outputs: usize, jacobian: &[f64]) -> Output
             tape.parents.room(count).extend(inputs.iter().filter(active).map(|var| var.node));
             let slopes = tape.slopes.room(count * outputs);
             for row in jacobian.chunks_exact(inputs.len()) {
-                let pairs = row.iter().zip(inputs).filter(|(_, var)| active(&var));
+                let pairs = row.iter().zip(inputs).filter(|(_, var)| active(var));
                 slopes.extend(pairs.map(|(&slope, var)| through(slope, var.coefficient)));
             }
         });

@@ -19,4 +19,10 @@ pub trait DistanceField: Send + Sync {
     ///
     /// Culling happens here, before any arithmetic that carries derivatives.
     fn sample(&self, point: &Point3<f64>, reach: f64) -> Option<FieldSample>;
+
+    /// How much the field rises over a length at most: 1 for a distance, a little more where it is interpolated. A field that
+    /// is no distance (a height above terrain) must say so, or what is near to it is overlooked.
+    fn steepest(&self) -> f64 {
+        1.25
+    }
 }

@@ -215,7 +215,7 @@ impl World<Var> {
         let Changes { places, numbers } = scene.changes(self);
         let failure = Rc::new(RefCell::new(None));
         let step = Steps { scene, places, dt, failure: Rc::clone(&failure) };
-        let initial: Vec<Var> = numbers_of(initial).collect();
+        let initial: Vec<Var> = numbers_of(&self.started(initial)).collect();
         let end = checkpoint::rollout(step, steps, snapshots, &initial, &numbers);
         match failure.take() {
             Some(error) => Err(error),

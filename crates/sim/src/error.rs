@@ -43,6 +43,9 @@ pub enum SimulationError {
         /// Its name.
         body: String,
     },
+    /// A stability loss without a start to measure from.
+    #[error("no perturbation to measure stability with: rest is one")]
+    NoPerturbations,
     /// States and bodies differ in number.
     #[error("{states} states for {bodies} bodies")]
     States {

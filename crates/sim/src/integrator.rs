@@ -61,8 +61,13 @@ pub trait Integrator: Sync {
     /// The largest dt·max(ω, damping rate) for which linear contacts are stable, where ω and the damping rate are as in
     /// [`World::contact_frequency`]; infinite for a scheme that is stable always.
     ///
-    /// The default suits every explicit scheme of use.
+    /// The default suits semi-implicit and higher-order explicit schemes (explicit Euler has no such limit: it is unstable).
     fn stability_limit(&self) -> f64 {
         1.0
+    }
+
+    /// Whether a step looks at forces at its start alone. Then samples that are out of reach there may be left out.
+    fn needs_forces_at_start_only(&self) -> bool {
+        false
     }
 }

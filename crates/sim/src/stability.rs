@@ -193,7 +193,15 @@ impl StabilityLoss {
         pose: &Isometry3<f64>,
         perturbation: &Perturbation,
     ) -> Result<State, SimulationError> {
-        let body = &self.world.bodies[self.object];
+        if self.perturbations.is_empty() {
+            return Err(SimulationError::NoPerturbations);
+        }
+        let (body, bodies) = (self.object, self.world.bodies.len());
+        let body = self.world.bodies.get(body).ok_or(SimulationError::NoBody { body, bodies })?;
+        let states = self.states.len();
+        if states != bodies {
+            return Err(SimulationError::States { states, bodies });
+        }
         let rigid =
             body.rigid().ok_or_else(|| SimulationError::NotFree { body: body.name.clone() })?;
         let Perturbation { linear, angular } = *perturbation;

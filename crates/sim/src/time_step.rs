@@ -24,8 +24,11 @@ impl Horizon {
     #[must_use]
     pub fn refined(self, limit: f64, most: usize) -> Self {
         let time = self.dt * self.steps as f64;
-        let steps = (time / limit).ceil().clamp(self.steps as f64, most.max(self.steps) as f64);
-        Self { dt: time / steps, steps: steps as usize }
+        let most = most.max(self.steps) as f64;
+        // Without a limit that is a number the most is the safest.
+        let wanted = if limit > 0.0 { (time / limit).ceil() } else { most };
+        let steps = wanted.clamp(self.steps as f64, most);
+        if steps < 1.0 { self } else { Self { dt: time / steps, steps: steps as usize } }
     }
 }
 
@@ -56,7 +59,10 @@ impl World {
     }
 
     /// The largest of the contacts' natural frequency ω_max and damping rate \[1/s\] at `states`: of M⁻¹K and M⁻¹D, with
-    /// the symmetric parts of the contacts' stiffness K and damping D.
+    /// the symmetric parts of the contacts' stiffness K and damping D; NaN for states that are.
+    ///
+    /// # Panics
+    /// If there are fewer states than bodies.
     pub fn contact_frequency(&self, states: &[State]) -> f64 {
         let free: Vec<usize> =
             (0..self.bodies.len()).filter(|&i| self.bodies[i].rigid().is_some()).collect();
@@ -80,10 +86,17 @@ impl World {
             }
         }
         let largest = |m: DMatrix<f64>| {
+            if m.iter().any(|x| x.is_nan()) {
+                return f64::NAN;
+            }
             let symmetric = (&m + m.transpose()) * 0.5;
             symmetric.symmetric_eigenvalues().iter().fold(0.0, |a: f64, b| a.max(*b))
         };
-        if size == 0 { 0.0 } else { largest(stiffness).sqrt().max(largest(damping)) }
+        if size == 0 {
+            return 0.0;
+        }
+        let (stiffness, damping) = (largest(stiffness).sqrt(), largest(damping));
+        if stiffness.is_nan() { stiffness } else { damping.max(stiffness) }
     }
 
     /// The root of the inverse mass matrix of a free body.

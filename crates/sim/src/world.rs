@@ -8,6 +8,7 @@ use prehend_autodiff::Scalar;
 use prehend_geometry::DistanceField;
 
 use crate::body::RigidBody;
+use crate::contact::LawError;
 use crate::contact::law::LocalLaw;
 use crate::contact::onset::Onset;
 use crate::contact::wrench::Patch;
@@ -109,8 +110,6 @@ impl<S: Scalar> Body<S> {
 pub struct ContactPair<S: Scalar = f64> {
     /// The body with the samples.
     pub samples: usize,
-    /// Those samples.
-    pub surface: Arc<Surface>,
     /// The body with the field.
     pub field: usize,
     /// Force of a contact.
@@ -121,6 +120,23 @@ pub struct ContactPair<S: Scalar = f64> {
     pub onset: Onset,
     /// Factor on the forces: a half where both bodies have samples and fields, so that together they count once.
     pub share: f64,
+    /// Those of the samples that are near enough to touch for now; all if nothing is known.
+    pub(crate) near: Option<Arc<Surface>>,
+}
+
+impl<S: Scalar> ContactPair<S> {
+    /// Whether the law takes these parameters.
+    pub(crate) fn check(&self) -> Result<(), LawError> {
+        let values: Vec<f64> = self.params.iter().map(|p| p.value()).collect();
+        if values.len() != self.law.parameters().len() {
+            let (name, range) = ("number of parameters", "the law's");
+            return Err(LawError { name, range, value: values.len() as f64 });
+        }
+        if let Some(&value) = values.iter().find(|value| !value.is_finite()) {
+            return Err(LawError { name: "parameter of a contact", range: "finite", value });
+        }
+        self.law.check_parameters(&values)
+    }
 }
 
 /// Moment of a simulation.
@@ -227,14 +243,15 @@ impl World {
         if samples == field {
             return Err(SimulationError::Itself { body: name(samples) });
         }
-        let surface = self.bodies[samples].surface.as_ref();
-        let surface = surface.ok_or_else(|| SimulationError::NoSamples { body: name(samples) })?;
+        if self.bodies[samples].surface.is_none() {
+            return Err(SimulationError::NoSamples { body: name(samples) });
+        }
         if self.bodies[field].field.is_none() {
             return Err(SimulationError::NoField { body: name(field) });
         }
         onset.check()?;
-        let (surface, params) = (Arc::clone(surface), law.parameters().to_vec());
-        Ok(ContactPair { samples, surface, field, law, params, onset, share: 1.0 })
+        let params = law.parameters().to_vec();
+        Ok(ContactPair { samples, field, law, params, onset, share: 1.0, near: None })
     }
 
     /// The same world in constants of another scalar.
@@ -259,12 +276,12 @@ impl<S: Scalar> World<S> {
         };
         let pair = |pair: &ContactPair<S>| ContactPair {
             samples: pair.samples,
-            surface: Arc::clone(&pair.surface),
             field: pair.field,
             law: Arc::clone(&pair.law),
             params: pair.params.iter().map(|&p| f(p)).collect(),
             onset: pair.onset,
             share: pair.share,
+            near: pair.near.clone(),
         };
         World {
             bodies: self.bodies.iter().map(body).collect(),
@@ -288,8 +305,10 @@ impl<S: Scalar> World<S> {
     /// world frame), without gravity. `step` matters to onsets that leak in the first step only.
     ///
     /// Derivatives through contacts are first derivatives.
+    ///
+    /// # Panics
+    /// If there are fewer states than bodies.
     pub fn wrenches(&self, states: &[State<S>], step: usize) -> Vec<Vector6<S>> {
-        const { assert!(S::ORDER <= 1, "contacts have first derivatives only: no nested scalars") };
         let mut wrenches: Vec<Vector6<S>> = self.bodies.iter().map(|body| body.load).collect();
         for pair in &self.contacts {
             let [on_samples, on_field] = self.contact_wrenches(pair, states, step);
@@ -306,10 +325,13 @@ impl<S: Scalar> World<S> {
         states: &[State<S>],
         step: usize,
     ) -> [Vector6<S>; 2] {
-        let Some(field) = &self.bodies[pair.field].field else { return [Vector6::zeros(); 2] };
+        let surface = pair.near.as_ref().or(self.bodies[pair.samples].surface.as_ref());
+        let (Some(surface), Some(field)) = (surface, &self.bodies[pair.field].field) else {
+            return [Vector6::zeros(); 2];
+        };
         let seen = self.seen(pair, states);
         let patch = Patch {
-            surface: &pair.surface,
+            surface,
             com: self.bodies[pair.samples].com(),
             state: seen.value(),
             field: field.as_ref(),
@@ -350,6 +372,7 @@ impl<S: Scalar> World<S> {
 /// The wrench of `patch`, which is `pair` at the value of `seen`, with the derivatives that `seen` and the parameters
 /// carry.
 fn local_wrench<S: Scalar>(pair: &ContactPair<S>, seen: &State<S>, patch: &Patch<'_>) -> [S; 6] {
+    const { assert!(S::ORDER <= 1, "contacts have first derivatives only: no nested scalars") };
     let values: Vec<f64> = pair.params.iter().map(|p| p.value()).collect();
     if S::ORDER == 0 {
         return pair.law.wrench(&values, patch).map(S::constant).into();

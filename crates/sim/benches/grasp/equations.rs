@@ -41,6 +41,10 @@ impl ContactLaw for SmoothedPenalty {
 pub(crate) struct FirstOrder;
 
 impl Integrator for FirstOrder {
+    fn needs_forces_at_start_only(&self) -> bool {
+        true
+    }
+
     fn step<S: Scalar>(
         &self,
         world: &World<S>,

@@ -79,6 +79,10 @@ impl IsotropicLaw for ApproachDamped {
     fn slip_scale(&self) -> f64 {
         self.0.slip_scale()
     }
+
+    fn check(&self, p: &[f64]) -> Result<(), LawError> {
+        self.0.check(p)
+    }
 }
 
 #[cfg(test)]

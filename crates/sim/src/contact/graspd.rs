@@ -76,6 +76,10 @@ impl ContactLaw for GraspD {
     fn reach(&self) -> f64 {
         self.offset
     }
+
+    fn check(&self, p: &[f64]) -> Result<(), LawError> {
+        Self::new(p[0], p[1], p[2], self.offset).map(|_| ())
+    }
 }
 
 #[cfg(test)]

@@ -78,6 +78,10 @@ impl IsotropicLaw for Hertz {
     fn slip_scale(&self) -> f64 {
         self.slip_scale
     }
+
+    fn check(&self, p: &[f64]) -> Result<(), LawError> {
+        HertzPenalty::new(p[0], p[1], self.slip_scale).map(|_| ())
+    }
 }
 
 #[cfg(test)]

@@ -93,6 +93,10 @@ impl IsotropicLaw for HuntCrossley {
     fn slip_scale(&self) -> f64 {
         self.slip_scale
     }
+
+    fn check(&self, p: &[f64]) -> Result<(), LawError> {
+        HuntCrossleyPenalty::new(p[0], p[1], p[2], p[3], self.slip_scale).map(|_| ())
+    }
 }
 
 #[cfg(test)]

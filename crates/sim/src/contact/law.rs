@@ -3,9 +3,9 @@
 use nalgebra::{Vector3, Vector6};
 use prehend_autodiff::{Fwd, Scalar};
 
-use super::wrench::{self, Patch, WrenchJacobian};
-
+use super::error::LawError;
 use super::friction::{regularised_coulomb, regularised_speed};
+use super::wrench::{self, Patch, WrenchJacobian};
 
 /// One contact point, as a law sees it.
 #[derive(Clone, Copy, Debug)]
@@ -83,6 +83,14 @@ pub trait ContactLaw: Send + Sync {
 
     /// Beyond this gap both value and derivative are zero \[m\].
     fn reach(&self) -> f64;
+
+    /// Whether `p`, as many as [`params`](Self::params) and finite, are in their ranges.
+    ///
+    /// # Errors
+    /// Names the parameter that is not.
+    fn check(&self, _p: &[f64]) -> Result<(), LawError> {
+        Ok(())
+    }
 }
 
 /// An isotropic law: friction opposes slip, with a coefficient that may depend on its speed.
@@ -131,6 +139,14 @@ pub trait IsotropicLaw: Send + Sync {
     fn reach(&self) -> f64 {
         0.0
     }
+
+    /// See [`ContactLaw::check`].
+    ///
+    /// # Errors
+    /// Names the parameter that is out of its range.
+    fn check(&self, _p: &[f64]) -> Result<(), LawError> {
+        Ok(())
+    }
 }
 
 /// Adapter from an [`IsotropicLaw`] to a [`ContactLaw`].
@@ -160,6 +176,10 @@ impl<L: IsotropicLaw> ContactLaw for Isotropic<L> {
     fn reach(&self) -> f64 {
         self.0.reach()
     }
+
+    fn check(&self, p: &[f64]) -> Result<(), LawError> {
+        self.0.check(p)
+    }
 }
 
 mod sealed {
@@ -175,6 +195,12 @@ pub trait LocalLaw: Send + Sync + sealed::Sealed {
 
     /// See [`ContactLaw::reach`] \[m\].
     fn cutoff(&self) -> f64;
+
+    /// See [`ContactLaw::check`].
+    ///
+    /// # Errors
+    /// Names the parameter that is out of its range.
+    fn check_parameters(&self, p: &[f64]) -> Result<(), LawError>;
 
     /// Force at one contact, with parameters `p`.
     fn response(&self, p: &[f64], contact: &Contact<f64>) -> Response<f64>;
@@ -199,6 +225,10 @@ impl<L: ContactLaw> LocalLaw for L {
     #[inline]
     fn cutoff(&self) -> f64 {
         self.reach()
+    }
+
+    fn check_parameters(&self, p: &[f64]) -> Result<(), LawError> {
+        self.check(p)
     }
 
     #[inline]

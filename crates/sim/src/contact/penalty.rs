@@ -85,6 +85,10 @@ impl IsotropicLaw for KelvinVoigt {
     fn slip_scale(&self) -> f64 {
         self.slip_scale
     }
+
+    fn check(&self, p: &[f64]) -> Result<(), LawError> {
+        Penalty::new(p[0], p[1], p[2], self.slip_scale).map(|_| ())
+    }
 }
 
 #[cfg(test)]

@@ -79,6 +79,10 @@ impl<L: IsotropicLaw> IsotropicLaw for Stribeck<L> {
     fn reach(&self) -> f64 {
         self.law.reach()
     }
+
+    fn check(&self, p: &[f64]) -> Result<(), LawError> {
+        self.law.check(&p[..self.law.params().len()])
+    }
 }
 
 #[cfg(test)]

@@ -15,9 +15,6 @@ use crate::surface::{Block, Surface, SurfacePoint};
 /// Below this length a distance gradient has no direction, and the point no contact.
 const MIN_GRADIENT: f64 = 1e-9;
 
-/// How much a distance field may rise over a length: interpolated ones are a little steeper than one in places.
-const STEEPEST: f64 = 1.25;
-
 /// A body's surface beside a distance field, at one moment; everything in the field's frame.
 #[derive(Clone, Copy)]
 pub struct Patch<'a> {
@@ -115,7 +112,7 @@ impl Patch<'_> {
     /// Whether a point of `block` may be nearer to the field than `reach`.
     #[inline]
     fn may_touch(&self, block: &Block, reach: f64) -> bool {
-        let within = reach + STEEPEST * block.radius;
+        let within = reach + self.field.steepest() * block.radius;
         block.radius.is_infinite() || self.distance_within(&block.centre, within)
     }
 
@@ -128,15 +125,15 @@ impl Patch<'_> {
 
     /// The samples that may touch, for a law that reaches to `cutoff`, before one of them has moved by `margin` \[m\].
     pub(crate) fn near(&self, cutoff: f64, margin: f64) -> Surface {
-        let reach = cutoff + self.onset.band() + STEEPEST * margin;
+        let reach = cutoff + self.onset.band() + self.field.steepest() * margin;
         let near = |point: &SurfacePoint| self.distance_within(&point.position, reach);
         self.surface.only(near, |block| self.may_touch(block, reach))
     }
 
     /// Calls `visit` with every point in contact, in order. Points beyond `cutoff` and the onset's band exert no
-    /// force, so leaving out blocks of them changes nothing.
+    /// force, so leaving out blocks of them changes nothing. Says whether every distance was a number.
     #[inline(always)]
-    fn for_each_touch(&self, cutoff: f64, mut visit: impl FnMut(&Touch)) {
+    fn for_each_touch(&self, cutoff: f64, mut visit: impl FnMut(&Touch)) -> bool {
         let State { pose, linear, angular } = &self.state;
         let (translation, rotation) = (pose.translation.vector, pose.rotation.to_rotation_matrix());
         let reach = cutoff + self.onset.band();
@@ -151,6 +148,9 @@ impl Patch<'_> {
                     continue;
                 };
                 let FieldSample { distance, gradient, hessian } = sample;
+                if distance.is_nan() {
+                    return false;
+                }
                 let Some(onset) = self.onset.at(distance - cutoff) else { continue };
                 let length = gradient.norm();
                 if length.is_nan() || length < MIN_GRADIENT {
@@ -161,6 +161,7 @@ impl Patch<'_> {
                 visit(&Touch { arm, velocity, onset, normal, length, area, hessian });
             }
         }
+        true
     }
 }
 
@@ -230,13 +231,14 @@ impl Touch {
 pub(crate) fn wrench<L: ContactLaw>(law: &L, p: &[f64], patch: &Patch<'_>) -> Vector6<f64> {
     let cutoff = law.reach();
     let (mut force, mut torque) = (Vector3::zeros(), Vector3::zeros());
-    patch.for_each_touch(cutoff, |touch| {
+    let sound = patch.for_each_touch(cutoff, |touch| {
         let response = law.law(p, &touch.contact(cutoff));
         let f = touch.normal * response.normal + response.tangential;
         force += f;
         torque += touch.arm.cross(&f);
     });
-    stack(&force, &torque)
+    // A field that fails must not look like free space.
+    if sound { stack(&force, &torque) } else { Vector6::repeat(f64::NAN) }
 }
 
 /// [`wrench`] with its derivative.
@@ -257,7 +259,7 @@ pub(crate) fn wrench_jacobian<L: ContactLaw>(
     let mut by = [[Matrix3::<f64>::zeros(); 4]; 2];
     let mut one_sided = Vec::new();
     let mut param_slopes = vec![Vector6::zeros(); if by_params { p.len() } else { 0 }];
-    patch.for_each_touch(cutoff, |touch| {
+    let sound = patch.for_each_touch(cutoff, |touch| {
         let contact = touch.lifted(cutoff);
         let response = law.law(&params, &contact);
         let force: Vector3<Fwd<6>> =
@@ -277,11 +279,14 @@ pub(crate) fn wrench_jacobian<L: ContactLaw>(
         // Torque r×f: the arm turns with the body, δ(r×f) = (δθ×r)×f + r×δf.
         by[1][1] += cross_times(&f, &cross_matrix(arm));
         wrench += stack(&f, &touch.arm.cross(&f));
-        if touch.onset.closes_only {
+        if touch.onset.closes_only && touch.onset.slope > 0.0 {
             one_sided.push(touch.one_sided(&by_position));
         }
         add_param_slopes(law, p, touch, cutoff, &mut param_slopes);
     });
+    if !sound {
+        wrench = Vector6::repeat(f64::NAN);
+    }
     let by_state = std::array::from_fn(|row| {
         std::array::from_fn(|column| by[row / 3][column / 3][(row % 3, column % 3)])
     });
@@ -438,9 +443,57 @@ mod tests {
         // The lift falls with the height. To have less of it, the gap would have to open.
         assert!(symmetric(1.0)[2] < -1.0);
         assert!(asymmetric(1.0).iter().all(|slope| slope.abs() < 1e-12));
+        let closed = |sign| gradient(Onset::AsymmetricLeaky { alpha: 0.0, band, steps }, sign);
+        assert_eq!(closed(-1.0), [0.0; 6]);
         for (a, b) in asymmetric(-1.0).iter().zip(symmetric(-1.0)) {
             assert!((a - b).abs() < 1e-9 * b.abs().max(1.0), "{a} {b}");
         }
+    }
+
+    #[test]
+    fn a_field_that_fails_does_not_look_like_free_space() {
+        struct Broken;
+        impl DistanceField for Broken {
+            fn sample(&self, _: &Point3<f64>, _: f64) -> Option<FieldSample> {
+                let (gradient, hessian) = (Vector3::z(), nalgebra::Matrix3::zeros());
+                Some(FieldSample { distance: f64::NAN, gradient, hessian })
+            }
+        }
+        let law = Penalty::new(2e7, 1e4, 0.5, 1e-2).unwrap();
+        sample_at(0.0, &Broken, Onset::Hard, |patch| {
+            assert!(law.wrench(law.parameters(), patch).iter().all(|w| w.is_nan()));
+            let jacobian = law.wrench_jacobian(law.parameters(), patch, false);
+            assert!(jacobian.wrench.iter().all(|w| w.is_nan()));
+        });
+    }
+
+    #[test]
+    fn a_height_above_terrain_may_be_steep_if_it_says_so() {
+        /// z − 2x, which rises by √5.
+        struct Slope;
+        impl DistanceField for Slope {
+            fn sample(&self, p: &Point3<f64>, reach: f64) -> Option<FieldSample> {
+                let (distance, gradient) = (p.z - 2.0 * p.x, Vector3::new(-2.0, 0.0, 1.0));
+                let hessian = nalgebra::Matrix3::zeros();
+                (distance <= reach).then_some(FieldSample { distance, gradient, hessian })
+            }
+            fn steepest(&self) -> f64 {
+                2.3
+            }
+        }
+        let law = Penalty::new(2e7, 1e4, 0.5, 1e-2).unwrap();
+        let row: Vec<Point3<f64>> =
+            (0..16).map(|i| Point3::new(0.02 * f64::from(i), 0.0, 0.55)).collect();
+        let whole = Surface::uniform(&row, 16e-4).unwrap();
+        let state = State::at_rest(Isometry3::identity());
+        let (com, onset) = (Point3::origin(), Onset::Hard);
+        let wrench = |surface: &Surface| {
+            let patch = Patch { surface, com, state, field: &Slope, onset };
+            law.wrench(law.parameters(), &patch)
+        };
+        let singly = row.iter().map(|p| wrench(&Surface::new(&[*p], &[1e-4]).unwrap()));
+        let singly = singly.fold(Vector6::zeros(), |sum: Vector6<f64>, w| sum + w);
+        assert!(singly.norm() > 1.0 && (wrench(&whole) - singly).norm() < 1e-9 * singly.norm());
     }
 
     #[test]

@@ -35,6 +35,10 @@ impl Integrator for SemiImplicitEuler {
     }
 
     /// Stable for (dt ω)² + 2 dt c < 4 at damping rate c: at 2 without damping, at √5 − 1 with the worst.
+    fn needs_forces_at_start_only(&self) -> bool {
+        true
+    }
+
     fn stability_limit(&self) -> f64 {
         1.236
     }

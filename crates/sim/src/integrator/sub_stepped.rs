@@ -5,7 +5,7 @@ use prehend_autodiff::Scalar;
 use super::Integrator;
 use crate::error::SimulationError;
 use crate::state::State;
-use crate::world::{Step, World};
+use crate::world::{Body, Step, World};
 
 /// Another integrator, each step of which is divided as far as stiffness and damping of the contacts demand.
 ///
@@ -65,7 +65,15 @@ impl<I: Integrator> SubStepped<I> {
         }
         let plain = world.plain();
         let now: Vec<State> = states.iter().map(State::value).collect();
-        let then: Vec<State> = now.iter().map(|state| state.drifted(dt)).collect();
+        let drift = |(body, state): (&Body, &State)| {
+            let mut falling = *state;
+            if let Some(rigid) = body.rigid() {
+                let load = body.load.fixed_rows::<3>(0) / rigid.mass();
+                falling.linear += (plain.gravity + load) * dt;
+            }
+            falling.drifted(dt)
+        };
+        let then: Vec<State> = plain.bodies.iter().zip(&now).map(drift).collect();
         let fastest = plain.contact_frequency(&now).max(plain.contact_frequency(&then));
         (dt * fastest / (MARGIN * limit)).ceil().max(1.0)
     }
