@@ -8,11 +8,12 @@ use crate::contact::wrench::Patch;
 use crate::state::State;
 use crate::world::{ContactPair, World};
 
-/// How far samples may move relative to a field before those near it are looked for anew \[m\].
-const MARGIN: f64 = 1e-3;
+/// How far samples may move relative to a field before those near it are looked for anew \[m\]: the least and the most
+/// that pays.
+const MARGIN: [f64; 2] = [1e-3, 4e-3];
 
-/// Steps for which the search for near samples should serve, or it does not pay.
-const WORTH: f64 = 4.0;
+/// Steps for which a search for near samples should serve.
+const STEPS: f64 = 2.0;
 
 /// A world that only knows the samples near to a field. The others exert no force, so results are the same to the last bit.
 pub(crate) struct Near<S: Scalar> {
@@ -21,6 +22,8 @@ pub(crate) struct Near<S: Scalar> {
     radii: Vec<f64>,
     /// For each contact, the body with the samples as the field saw it when near ones were looked for.
     made_at: Vec<State>,
+    /// How far samples may move until the next search \[m\].
+    margin: f64,
 }
 
 impl<S: Scalar> Near<S> {
@@ -30,7 +33,7 @@ impl<S: Scalar> Near<S> {
             body.surface.as_ref().map_or(0.0, |surface| surface.radius_about(&body.com()))
         };
         let radii = full.contacts.iter().map(radius).collect();
-        Self { world: None, radii, made_at: Vec::new() }
+        Self { world: None, radii, made_at: Vec::new(), margin: 0.0 }
     }
 
     /// A world whose forces at `states` are those of `full`, for a step of `dt` \[s\].
@@ -50,8 +53,10 @@ impl<S: Scalar> Near<S> {
                 moved = moved.max(shift.norm() + turn * radius);
             }
         }
-        if self.world.is_none() || moved.is_nan() || moved > MARGIN {
-            if WORTH * ahead * dt > MARGIN {
+        if self.world.is_none() || moved.is_nan() || moved > self.margin {
+            self.margin = MARGIN[0].max(STEPS * ahead * dt);
+            if self.margin > MARGIN[1] {
+                self.world = None;
                 return full;
             }
             self.look(full, states);
@@ -69,7 +74,7 @@ impl<S: Scalar> Near<S> {
             if let (Some(surface), Some(field)) = (&body.surface, &other.field) {
                 let (com, onset) = (body.com(), pair.onset);
                 let patch = Patch { surface, com, state, field: field.as_ref(), onset };
-                pair.near = Some(Arc::new(patch.near(pair.law.cutoff(), MARGIN)));
+                pair.near = Some(Arc::new(patch.near(pair.law.cutoff(), self.margin)));
             }
         }
         self.world = Some(near);
