@@ -91,7 +91,8 @@ pub struct StabilityLoss {
 /// A [`StabilityLoss`] with its derivatives by a left twist (translation \[m\], rotation \[rad\]) of the object's pose.
 ///
 /// With the residuals r and their Jacobian J the loss is |r|² and the gradient 2Jᵀr, so the Gauss–Newton step solves
-/// JᵀJ δ = −gradient/2. Under a leaky onset these are the leaky derivatives.
+/// JᵀJ δ = −gradient/2. Under a leaky onset these are the leaky derivatives, in forward mode: an asymmetric leak counts as
+/// symmetric.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StabilityJacobian {
     /// The loss.

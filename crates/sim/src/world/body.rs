@@ -1,0 +1,100 @@
+//! A body of a world: what moves it and how it touches others.
+
+use std::sync::Arc;
+
+use nalgebra::{Point3, Vector6};
+use prehend_autodiff::Scalar;
+use prehend_geometry::DistanceField;
+
+use crate::body::RigidBody;
+use crate::state::State;
+use crate::surface::Surface;
+
+/// What a body is and how it touches others.
+#[derive(Clone)]
+pub struct Body<S: Scalar = f64> {
+    /// Name, for messages.
+    pub name: String,
+    /// What moves it.
+    pub motion: Motion<S>,
+    /// Samples of its surface, in its model frame: with them it touches the fields of others.
+    pub surface: Option<Arc<Surface>>,
+    /// Signed distance to it, in its model frame: what the samples of others touch.
+    pub field: Option<Arc<dyn DistanceField>>,
+    /// External wrench: force \[N\] and torque about the centre of mass \[N m\], world frame.
+    pub load: Vector6<S>,
+}
+
+/// What moves a body.
+#[derive(Clone)]
+pub enum Motion<S: Scalar = f64> {
+    /// Forces.
+    Free(RigidBody<S>),
+    /// Nothing: it keeps its state, whose velocity (a conveyor's, say) is felt by what touches it.
+    Held,
+    /// A given course, whatever the forces: a link of a robot whose joints are driven.
+    Driven(Arc<dyn Course>),
+}
+
+/// A course in time: state of the model frame, in the world.
+pub trait Course: Send + Sync {
+    /// The state at `time` \[s\].
+    fn state(&self, time: f64) -> State;
+}
+
+impl<F: Fn(f64) -> State + Send + Sync> Course for F {
+    fn state(&self, time: f64) -> State {
+        self(time)
+    }
+}
+
+impl<S: Scalar> Body<S> {
+    fn new(name: &str, motion: Motion<S>) -> Self {
+        let load = Vector6::zeros();
+        Self { name: name.to_owned(), motion, surface: None, field: None, load }
+    }
+
+    /// A body that forces move.
+    pub fn free(name: &str, body: RigidBody<S>) -> Self {
+        Self::new(name, Motion::Free(body))
+    }
+
+    /// A body that stays as it is. Its centre of mass is the origin of its model frame.
+    pub fn held(name: &str) -> Self {
+        Self::new(name, Motion::Held)
+    }
+
+    /// A body on a given course. Its centre of mass is the origin of its model frame.
+    pub fn driven(name: &str, course: impl Course + 'static) -> Self {
+        Self::new(name, Motion::Driven(Arc::new(course)))
+    }
+
+    /// The same body with samples of its surface.
+    #[must_use]
+    pub fn with_surface(mut self, surface: impl Into<Arc<Surface>>) -> Self {
+        self.surface = Some(surface.into());
+        self
+    }
+
+    /// The same body with a distance field, in its model frame.
+    #[must_use]
+    pub fn with_field(mut self, field: Arc<dyn DistanceField>) -> Self {
+        self.field = Some(field);
+        self
+    }
+
+    /// Its mass properties, if forces move it.
+    #[inline]
+    pub fn rigid(&self) -> Option<&RigidBody<S>> {
+        match &self.motion {
+            Motion::Free(body) => Some(body),
+            Motion::Held | Motion::Driven(_) => None,
+        }
+    }
+
+    /// Centre of mass in the model frame \[m\].
+    #[inline]
+    pub fn com(&self) -> Point3<f64> {
+        self.rigid().map_or_else(Point3::origin, |body| *body.com())
+    }
+}
