@@ -133,7 +133,9 @@
 //! # let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin())?;
 //! # let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
 //! # let floor = world.add(Body::held("floor").with_field(Arc::new(Floor)));
-//! # let surface = Surface::uniform(&[(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)].map(|(x, y)| Point3::new(0.03 * x, 0.03 * y, -0.02)), 4e-4)?;
+//! # let feet = [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)];
+//! # let feet = feet.map(|(x, y)| Point3::new(0.03 * x, 0.03 * y, -0.02));
+//! # let surface = Surface::uniform(&feet, 4e-4)?;
 //! # let stool = world.add(Body::free("stool", rigid).with_surface(surface));
 //! # let law = Arc::new(Penalty::new(1e7, 1e5, 0.5, 1e-2)?);
 //! # world.touch(stool, floor, law, Onset::Softplus { width: 5e-5 })?;
@@ -169,7 +171,9 @@
 //! # let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin())?;
 //! # let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
 //! # let floor = world.add(Body::held("floor").with_field(Arc::new(Floor)));
-//! # let surface = Surface::uniform(&[(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)].map(|(x, y)| Point3::new(0.03 * x, 0.03 * y, -0.02)), 4e-4)?;
+//! # let feet = [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)];
+//! # let feet = feet.map(|(x, y)| Point3::new(0.03 * x, 0.03 * y, -0.02));
+//! # let surface = Surface::uniform(&feet, 4e-4)?;
 //! # let stool = world.add(Body::free("stool", rigid).with_surface(surface));
 //! # let law = Arc::new(Penalty::new(1e7, 1e5, 0.5, 1e-2)?);
 //! # world.touch(stool, floor, law, Onset::Hard)?;
