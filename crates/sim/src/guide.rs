@@ -24,7 +24,8 @@
 //! }
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin())?;
+//! let com = Point3::new(0.0, 0.0, -5e-3);
+//! let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, com)?;
 //! let feet = [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)];
 //! let feet = feet.map(|(x, y)| Point3::new(0.03 * x, 0.03 * y, -0.02));
 //!
@@ -35,25 +36,213 @@
 //! let law = Arc::new(Penalty::new(1e7, 1e5, 0.5, 1e-2)?);
 //! world.touch(stool, floor, law, Onset::Softplus { width: 5e-5 })?;
 //!
-//! let mut start = vec![State::at_rest(Isometry3::identity()); 2];
-//! start[stool].pose.translation.z = 0.02;
+//! let t_world_stool = Isometry3::translation(0.0, 0.0, 0.02);
+//! let mut start = [State::at_rest(Isometry3::identity()), rigid.at_rest(&t_world_stool)];
 //! start[stool].linear.x = 0.3;
 //! world.check_time_step(&start, 1e-3)?;
 //! let horizon = Horizon { dt: 1e-3, steps: 200 };
 //! let end = world.simulate(&SemiImplicitEuler, &start, horizon, |_, _| ())?;
 //! // It slid to a halt: v²/2μg.
-//! let slid = end[stool].pose.translation.x;
+//! let slid = rigid.model_pose(&end[stool].pose).translation.x;
 //! assert!((slid - 0.3 * 0.3 / (2.0 * 0.5 * 9.81)).abs() < 2e-3, "{slid}");
 //! # Ok(())
 //! # }
 //! ```
 //!
-//! [`Body::driven`] puts a body on a course of its own, such as a robot's link; [`World::touch_both_ways`] is for two
-//! bodies that both have samples and fields.
+//! The pose in a state is that of the centre of mass: [`RigidBody::at_rest`] makes a state from the pose of the model, and
+//! [`RigidBody::model_pose`] goes back, which is what a renderer needs. For held and driven bodies the two are the same.
+//!
+//! [`World::check_time_step`] sees only contacts already made, none of an impact to come. Where there are such, use
+//! [`SubStepped`](crate::SubStepped).
+//!
+//! # Bodies on a course
+//! [`Body::driven`] puts a body on a course in time, such as a robot's link. [`World::simulate`] moves it by itself, to
+//! time 0 before the first step too: what you give as its state does not matter.
+//!
+//! ```
+//! # use nalgebra::{Isometry3, Vector3};
+//! # use prehend_sim::*;
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # let mut world = World::new(Vector3::zeros());
+//! let table = world.add(Body::driven("table", |time: f64| {
+//!     let mut state = State::at_rest(Isometry3::translation(0.1 * time, 0.0, 0.0));
+//!     state.linear.x = 0.1; // What touches it feels this velocity.
+//!     state
+//! }));
+//! let start = [State::at_rest(Isometry3::identity())];
+//! let horizon = Horizon { dt: 1e-3, steps: 500 };
+//! let end = world.simulate(&SemiImplicitEuler, &start, horizon, |_, _| ())?;
+//! assert!((end[table].pose.translation.x - 0.05).abs() < 1e-12);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # Contact both ways
+//! Two bodies that both have samples and fields touch both ways, each with half of the force: corners of either are
+//! felt. Each direction's law sees the axes of its own field's body.
+//!
+//! ```
+//! # use std::sync::Arc;
+//! # use nalgebra::{Isometry3, Matrix3, Point3, Vector1, Vector3};
+//! # use prehend_autodiff::{Fwd, Scalar};
+//! # use prehend_geometry::{DistanceField, FieldSample};
+//! # use prehend_sim::*;
+//! # struct Floor;
+//! # impl DistanceField for Floor {
+//! #     fn sample(&self, point: &Point3<f64>, reach: f64) -> Option<FieldSample> {
+//! #         let (distance, gradient, hessian) = (point.z, Vector3::z(), Matrix3::zeros());
+//! #         (distance <= reach).then_some(FieldSample { distance, gradient, hessian })
+//! #     }
+//! # }
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin())?;
+//! # let surface = Arc::new(Surface::uniform(&[Point3::origin()], 1e-4)?);
+//! # let mut world = World::new(Vector3::zeros());
+//! // Half-spaces, for brevity, the upper one upside down.
+//! let body = |name| Body::free(name, rigid).with_surface(surface.clone()).with_field(Arc::new(Floor));
+//! let (lower, upper) = (world.add(body("lower")), world.add(body("upper")));
+//! let law: Arc<dyn LocalLaw> = Arc::new(Penalty::new(1e7, 1e5, 0.5, 1e-2)?);
+//! world.touch_both_ways(lower, upper, &law, Onset::Hard)?;
+//! let turned = Isometry3::new(Vector3::new(0.0, 0.0, -1e-3), Vector3::x() * std::f64::consts::PI);
+//! let states = [Isometry3::identity(), turned].map(|pose| rigid.at_rest(&pose));
+//! // 1e7 N/m³ · 1 mm · 1 cm², half of it each way.
+//! assert!((world.wrenches(&states, 0)[upper].z - 1.0).abs() < 1e-9);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # Stiff contacts
+//! [`BackwardEuler`](crate::BackwardEuler) is stable for every step and damps what is faster than it;
+//! [`SubStepped`](crate::SubStepped) divides the steps of any integrator where contacts, impacts to come among them,
+//! demand it. Both have derivatives.
+//!
+//! ```
+//! # use std::sync::Arc;
+//! # use nalgebra::{Isometry3, Matrix3, Point3, Vector1, Vector3};
+//! # use prehend_autodiff::{Fwd, Scalar};
+//! # use prehend_geometry::{DistanceField, FieldSample};
+//! # use prehend_sim::*;
+//! # struct Floor;
+//! # impl DistanceField for Floor {
+//! #     fn sample(&self, point: &Point3<f64>, reach: f64) -> Option<FieldSample> {
+//! #         let (distance, gradient, hessian) = (point.z, Vector3::z(), Matrix3::zeros());
+//! #         (distance <= reach).then_some(FieldSample { distance, gradient, hessian })
+//! #     }
+//! # }
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin())?;
+//! # let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
+//! # let floor = world.add(Body::held("floor").with_field(Arc::new(Floor)));
+//! # let feet = [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)];
+//! # let feet = feet.map(|(x, y)| Point3::new(0.03 * x, 0.03 * y, -0.02));
+//! # let surface = Surface::uniform(&feet, 4e-4)?;
+//! # let stool = world.add(Body::free("stool", rigid).with_surface(surface));
+//! # let law = Arc::new(Penalty::new(1e7, 1e5, 0.5, 1e-2)?);
+//! # world.touch(stool, floor, law, Onset::Softplus { width: 5e-5 })?;
+//! # let above = rigid.at_rest(&Isometry3::translation(0.0, 0.0, 0.021));
+//! # let start = [State::at_rest(Isometry3::identity()), above];
+//! let horizon = Horizon { dt: 1e-2, steps: 50 };
+//! let divided = SubStepped { integrator: SemiImplicitEuler, most: 256 };
+//! let a = world.simulate(&BackwardEuler, &start, horizon, |_, _| ())?;
+//! let b = world.simulate(&divided, &start, horizon, |_, _| ())?;
+//! assert!((a[stool].pose.translation.z - b[stool].pose.translation.z).abs() < 1e-4);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # Could it rest?
+//! [`World::equilibrium`] asks whether forces within friction cones could hold a body where it is, whatever the laws
+//! say, and how much friction that takes.
+//!
+//! ```
+//! # use std::sync::Arc;
+//! # use nalgebra::{Isometry3, Matrix3, Point3, Vector1, Vector3};
+//! # use prehend_autodiff::{Fwd, Scalar};
+//! # use prehend_geometry::{DistanceField, FieldSample};
+//! # use prehend_sim::*;
+//! # struct Floor;
+//! # impl DistanceField for Floor {
+//! #     fn sample(&self, point: &Point3<f64>, reach: f64) -> Option<FieldSample> {
+//! #         let (distance, gradient, hessian) = (point.z, Vector3::z(), Matrix3::zeros());
+//! #         (distance <= reach).then_some(FieldSample { distance, gradient, hessian })
+//! #     }
+//! # }
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin())?;
+//! # let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
+//! # let floor = world.add(Body::held("floor").with_field(Arc::new(Floor)));
+//! # let feet = [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)];
+//! # let feet = feet.map(|(x, y)| Point3::new(0.03 * x, 0.03 * y, -0.02));
+//! # let surface = Surface::uniform(&feet, 4e-4)?;
+//! # let stool = world.add(Body::free("stool", rigid).with_surface(surface));
+//! # let law = Arc::new(Penalty::new(1e7, 1e5, 0.5, 1e-2)?);
+//! # world.touch(stool, floor, law, Onset::Hard)?;
+//! # let stands = rigid.at_rest(&Isometry3::translation(0.0, 0.0, 0.02));
+//! # let states = [State::at_rest(Isometry3::identity()), stands];
+//! // Friction coefficient 0.5; samples within 0.1 mm are in contact.
+//! assert!(world.equilibrium(stool, &states, 0.5, 1e-4)?.is_possible());
+//! world.bodies[stool].load.x = 2.0; // More than μ m g.
+//! assert!(!world.equilibrium(stool, &states, 0.5, 1e-4)?.is_possible());
+//! # Ok(())
+//! # }
+//! ```
 //!
 //! # A law of your own
-//! One function over the scalar, from gap and velocity to force ([`ContactLaw`](crate::ContactLaw)). What it calls its
-//! parameters can carry derivatives. The example `custom_contact_law` does this and what follows.
+//! One function over the scalar, from gap and velocity to force ([`ContactLaw`](crate::ContactLaw)), along the axes of
+//! the body with the field. What it calls its parameters can carry derivatives:
+//!
+//! ```
+//! # use std::sync::Arc;
+//! # use nalgebra::{Isometry3, Matrix3, Point3, Vector1, Vector3};
+//! # use prehend_autodiff::{Fwd, Scalar};
+//! # use prehend_geometry::{DistanceField, FieldSample};
+//! # use prehend_sim::*;
+//! # struct Floor;
+//! # impl DistanceField for Floor {
+//! #     fn sample(&self, point: &Point3<f64>, reach: f64) -> Option<FieldSample> {
+//! #         let (distance, gradient, hessian) = (point.z, Vector3::z(), Matrix3::zeros());
+//! #         (distance <= reach).then_some(FieldSample { distance, gradient, hessian })
+//! #     }
+//! # }
+//! /// Pressure by the square of the depth, and a film whose drag grows with slip.
+//! struct Wet([f64; 2]);
+//!
+//! impl ContactLaw for Wet {
+//!     fn params(&self) -> &[f64] {
+//!         &self.0
+//!     }
+//!     fn law<S: Scalar>(&self, p: &[S], contact: &Contact<S>) -> Response<S> {
+//!         let normal = (p[0] * contact.gap * contact.gap).times(contact.area);
+//!         Response { normal, tangential: contact.slip * -(p[1] * normal) }
+//!     }
+//!     fn reach(&self) -> f64 {
+//!         0.0
+//!     }
+//! }
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin())?;
+//! # let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
+//! # let floor = world.add(Body::held("floor").with_field(Arc::new(Floor)));
+//! # let surface = Surface::uniform(&[Point3::origin()], 1e-4)?;
+//! # let puck = world.add(Body::free("puck", rigid).with_surface(surface));
+//! # let below = rigid.at_rest(&Isometry3::translation(0.0, 0.0, -1e-3));
+//! # let mut start = vec![State::at_rest(Isometry3::identity()), below];
+//! # start[puck].linear.x = 0.3;
+//! # let horizon = Horizon { dt: 1e-3, steps: 200 };
+//!
+//! world.touch(puck, floor, Arc::new(Wet([1.962e10, 0.5])), Onset::Hard)?;
+//! let mut lifted = world.lift::<Fwd<1>>();
+//! lifted.contacts[0].params[1].derivative = [1.0];
+//! let start: Vec<_> = start.iter().map(State::lift).collect();
+//! let end = lifted.simulate(&SemiImplicitEuler, &start, horizon, |_, _| ())?;
+//! // v = v₀ exp(−c g t), by c:
+//! let speed = end[puck].linear.x;
+//! assert!((speed.derivative[0] / (-9.81 * 0.2 * speed.value) - 1.0).abs() < 1e-2);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! The example `custom_contact_law` does this at length, and what follows.
 //!
 //! # Gradients, forward
 //! Write what you want to know once over the scalar: [`World::lift`] makes constants of a world, and any of its numbers may then
@@ -71,7 +260,7 @@
 //! # let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin())?;
 //! # let ball = world.add(Body::free("ball", rigid));
 //! # world.bodies[ball].load.z = 1.0;
-//! # let start = [State::at_rest(Isometry3::identity())];
+//! # let start = [rigid.at_rest(&Isometry3::identity())];
 //! # let horizon = Horizon { dt: 1e-3, steps: 100 };
 //! // Height after a while, by the speed at the start and the mass.
 //! fn height<S: Scalar>(
@@ -128,7 +317,7 @@
 //! let recording = Recording::start();
 //! let gain = recording.variable(2.0);
 //! let mut lifted = world.lift::<Var>();
-//! let mut states = vec![State::at_rest(Isometry3::translation(1.0, 0.0, 0.0)).lift()];
+//! let mut states = vec![rigid.at_rest(&Isometry3::translation(1.0, 0.0, 0.0)).lift()];
 //! let mut loss = Var::from(0.0);
 //! for index in 0..30 {
 //!     lifted.bodies[ball].load.x = -gain * states[ball].pose.translation.x;
@@ -137,6 +326,75 @@
 //! }
 //! // A stiffer spring brings it back sooner.
 //! assert!(recording.gradient(loss).wrt(gain) < 0.0);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # Contacts not yet made
+//! A leaky onset has the forces of a hard one, but gradients feel samples that do not touch yet:
+//!
+//! ```
+//! # use std::sync::Arc;
+//! # use nalgebra::{Isometry3, Matrix3, Point3, Vector1, Vector3};
+//! # use prehend_autodiff::{Fwd, Scalar};
+//! # use prehend_geometry::{DistanceField, FieldSample};
+//! # use prehend_sim::*;
+//! # struct Floor;
+//! # impl DistanceField for Floor {
+//! #     fn sample(&self, point: &Point3<f64>, reach: f64) -> Option<FieldSample> {
+//! #         let (distance, gradient, hessian) = (point.z, Vector3::z(), Matrix3::zeros());
+//! #         (distance <= reach).then_some(FieldSample { distance, gradient, hessian })
+//! #     }
+//! # }
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin())?;
+//! # let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
+//! # let floor = world.add(Body::held("floor").with_field(Arc::new(Floor)));
+//! # let surface = Surface::uniform(&[Point3::origin()], 4e-4)?;
+//! # let stool = world.add(Body::free("stool", rigid).with_surface(surface));
+//! # let law = Arc::new(Penalty::new(1e7, 1e5, 0.5, 1e-2)?);
+//! # world.touch(stool, floor, law, Onset::Leaky { alpha: 0.1, band: 5e-3, steps: LeakSteps::All })?;
+//! # let above = rigid.at_rest(&Isometry3::translation(0.0, 0.0, 1e-3));
+//! # let states = [State::at_rest(Isometry3::identity()), above];
+//! let mut lifted: Vec<State<Fwd<1>>> = states.iter().map(State::lift).collect();
+//! lifted[stool].pose.translation.z.derivative = [1.0];
+//! let force = world.lift().wrenches(&lifted, 0)[stool].z;
+//! assert!(force.value == 0.0 && force.derivative[0] < 0.0);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! [`Smoothing`](crate::Smoothing) averages over perturbations instead, and gives a gradient that is true of the average:
+//!
+//! ```
+//! # use std::sync::Arc;
+//! # use nalgebra::{Isometry3, Matrix3, Point3, Vector1, Vector3};
+//! # use prehend_autodiff::{Fwd, Scalar};
+//! # use prehend_geometry::{DistanceField, FieldSample};
+//! # use prehend_sim::*;
+//! # struct Floor;
+//! # impl DistanceField for Floor {
+//! #     fn sample(&self, point: &Point3<f64>, reach: f64) -> Option<FieldSample> {
+//! #         let (distance, gradient, hessian) = (point.z, Vector3::z(), Matrix3::zeros());
+//! #         (distance <= reach).then_some(FieldSample { distance, gradient, hessian })
+//! #     }
+//! # }
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin())?;
+//! # let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
+//! # let floor = world.add(Body::held("floor").with_field(Arc::new(Floor)));
+//! # let surface = Surface::uniform(&[Point3::origin()], 4e-4)?;
+//! # let stool = world.add(Body::free("stool", rigid).with_surface(surface));
+//! # let law = Arc::new(Penalty::new(1e7, 1e5, 0.5, 1e-2)?);
+//! # world.touch(stool, floor, law, Onset::Hard)?;
+//! let smoothing = Smoothing::new(Vector1::new(1e-3), 200, 7)?;
+//! let force = |height: &Vector1<f64>| {
+//!     let body = rigid.at_rest(&Isometry3::translation(0.0, 0.0, height.x));
+//!     let states = [State::at_rest(Isometry3::identity()), body];
+//!     Ok::<_, SimulationError>(world.wrenches(&states, 0)[stool].z)
+//! };
+//! let estimate = smoothing.zeroth_order(&Vector1::new(1e-3), force)?;
+//! assert!(estimate.value > 0.0 && estimate.gradient.x < 0.0);
 //! # Ok(())
 //! # }
 //! ```

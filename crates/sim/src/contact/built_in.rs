@@ -46,7 +46,11 @@ const PENALTY_GRAIN: [LawParameter; 8] = [
     parameter("friction", "", "friction coefficient along the grain"),
     parameter("across_ratio", "", "friction across the grain over that along it"),
     SLIP_SCALE,
-    parameter("direction_x", "", "direction of the grain in the world, any length"),
+    parameter(
+        "direction_x",
+        "",
+        "direction of the grain in the frame of the body with the field, any length",
+    ),
     parameter("direction_y", "", "its y"),
     parameter("direction_z", "", "its z"),
 ];

@@ -8,7 +8,12 @@ use super::friction::regularised_speed;
 use super::law::{Contact, ContactLaw, Isotropic, IsotropicLaw, Response};
 
 /// `law` with the friction of a grained surface: its own coefficient μ along the unit direction a of the
-/// grain, fixed in the world, and r·μ across it.
+/// grain and r·μ across it. The grain is fixed to the surface it lies on: a is along the axes of the body with
+/// the field and turns with that body.
+///
+/// Between bodies that touch both ways
+/// ([`World::touch_both_ways`](crate::World::touch_both_ways)), a is along the axes of each direction's own
+/// field: a body on each side of the contact carries the grain.
 ///
 /// f_t = −f_n·P M u/√(|u|² + v_s²) with the friction tensor M = μ·(a aᵀ + r (I − a aᵀ)) and P the projection
 /// across the normal: linear anisotropic friction (A. Zmitrowicz, "A theoretical model of anisotropic dry
@@ -36,8 +41,8 @@ pub struct Grained<L> {
 }
 
 impl<L: IsotropicLaw> Isotropic<L> {
-    /// This law with its own friction coefficient along `direction` (world frame, of any length but zero) and
-    /// `across_ratio` ≥ 0 times as much across. See [`Grained`].
+    /// This law with its own friction coefficient along `direction` (along the axes of the body
+    /// with the field, of any length but zero) and `across_ratio` ≥ 0 times as much across. See [`Grained`].
     ///
     /// # Errors
     /// Names the parameter that is out of its range.
@@ -83,9 +88,14 @@ impl<L: IsotropicLaw> ContactLaw for Grained<L> {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
+    use nalgebra::{Isometry3, Matrix3, Point3};
+
     use super::*;
     use crate::contact::law_checks::{Claims, check_law};
-    use crate::{HuntCrossleyPenalty, Penalty};
+    use crate::scenes::floor;
+    use crate::{Body, HuntCrossleyPenalty, Onset, Penalty, RigidBody, State, Surface, World};
 
     fn contact(slip: Vector3<f64>, normal: Vector3<f64>) -> Contact<f64> {
         Contact { gap: -1e-3, normal_speed: 0.0, slip, normal, area: 1e-4 }
@@ -134,6 +144,30 @@ mod tests {
         let upright = isotropic.with_grain(Vector3::z(), 3.0).unwrap();
         let force = upright.law(upright.params(), &contact(slip, Vector3::z())).tangential;
         assert!((force - 3.0 * expected).norm() < 1e-15);
+    }
+
+    #[test]
+    fn grain_turns_with_the_body_it_lies_on() {
+        let law = Penalty::new(1e7, 0.0, 0.2, 1e-3).unwrap().with_grain(Vector3::x(), 3.0).unwrap();
+        let mut world = World::new(Vector3::zeros());
+        let ground = world.add(Body::held("ground").with_field(floor()));
+        let rigid = RigidBody::new(0.2, Matrix3::identity(), Point3::origin()).unwrap();
+        let surface = Surface::uniform(&[Point3::origin()], 1e-4).unwrap();
+        let runner = world.add(Body::free("runner", rigid).with_surface(surface));
+        world.touch(runner, ground, Arc::new(law), Onset::Hard).unwrap();
+        let friction = |degrees: f64, slip: Vector3<f64>| {
+            let turn = Isometry3::rotation(Vector3::z() * degrees.to_radians());
+            let mut sliding = rigid.at_rest(&Isometry3::translation(0.0, 0.0, -1e-3));
+            sliding.linear = slip;
+            let wrench = world.wrenches(&[State::at_rest(turn), sliding], 0)[runner];
+            assert!(wrench.z > 0.5);
+            wrench.fixed_rows::<3>(0) / wrench.z - Vector3::z()
+        };
+        let (x, y) = (Vector3::x(), Vector3::y());
+        for (degrees, along, across) in [(0.0, x, y), (90.0, y, x)] {
+            assert!((friction(degrees, along * 5.0) + along * 0.2).norm() < 1e-6);
+            assert!((friction(degrees, across * 5.0) + across * 0.6).norm() < 1e-6);
+        }
     }
 
     #[test]

@@ -7,7 +7,9 @@ use super::error::LawError;
 use super::friction::{regularised_coulomb, regularised_speed};
 use super::wrench::{self, Patch, WrenchJacobian};
 
-/// One contact point, as a law sees it.
+/// One contact point, as a law sees it: vectors are along the axes of the body with the field (its model frame), which
+/// for a held body at the identity are those of the world. Where two bodies touch both ways, each direction has the axes
+/// of its own field's body.
 #[derive(Clone, Copy, Debug)]
 pub struct Contact<S: Scalar> {
     /// Effective gap after the [`Onset`](super::onset::Onset) \[m\], at most the law's reach; negative is
@@ -16,20 +18,21 @@ pub struct Contact<S: Scalar> {
     /// Rate of the effective gap \[m/s\], negative while approaching. The onset scales it too, so that
     /// damping fades in with contact and is zero without.
     pub normal_speed: S,
-    /// Velocity of the body's point across the normal, world frame \[m/s\].
+    /// Velocity of the sample's point across the normal, relative to the body with the field and along its axes
+    /// \[m/s\].
     pub slip: Vector3<S>,
-    /// Unit normal, out of the surroundings towards the body, world frame.
+    /// Unit normal, out of the body with the field towards that with the sample, along the axes of the former.
     pub normal: Vector3<S>,
     /// Surface area the point stands for \[m²\].
     pub area: f64,
 }
 
-/// Force on the body at one contact point.
+/// Force on the body with the sample at one contact point.
 #[derive(Clone, Copy, Debug)]
 pub struct Response<S: Scalar> {
     /// Force along the normal \[N\], positive pushes the body out.
     pub normal: S,
-    /// Force across the normal, world frame \[N\].
+    /// Force across the normal, along the axes of the body with the field \[N\].
     pub tangential: Vector3<S>,
 }
 
