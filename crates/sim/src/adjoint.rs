@@ -242,7 +242,7 @@ impl<I: Integrator + 'static> Steps<I> {
     ) -> Result<Vec<State<S>>, SimulationError> {
         let world = self.scene.world(&self.places, parameters)?;
         let states: Vec<State<S>> = states_of(numbers).collect();
-        world.step(&self.scene.integrator, &states, Step { index, dt: self.dt })
+        world.advance(&self.scene.integrator, &states, Step { index, dt: self.dt })
     }
 }
 

@@ -1,6 +1,6 @@
 //! A rigid body: mass, inertia, centre of mass.
 
-use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion};
+use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3, Vector6};
 use prehend_autodiff::Scalar;
 use thiserror::Error;
 
@@ -102,6 +102,21 @@ impl<S: Scalar> RigidBody<S> {
         r.matrix() * self.inverse_inertia * r.matrix().transpose()
     }
 
+    /// Velocity of the centre of mass \[m/s\] and angular momentum \[kg m²/s\] of the body at `state` after `wrench` (about the
+    /// centre of mass) and `gravity` \[m/s²\] have acted on it for `dt` \[s\], world frame.
+    #[inline]
+    pub(crate) fn kicked(
+        &self,
+        state: &State<S>,
+        wrench: &Vector6<S>,
+        gravity: &Vector3<S>,
+        dt: S,
+    ) -> (Vector3<S>, Vector3<S>) {
+        let (force, torque) = (wrench.fixed_rows::<3>(0), wrench.fixed_rows::<3>(3));
+        let linear = state.linear + (gravity + force / self.mass) * dt;
+        (linear, self.world_inertia(&state.pose.rotation) * state.angular + torque * dt)
+    }
+
     /// `t_world_com` of a body whose model frame is at `t_world_model`.
     #[inline]
     pub fn com_pose(&self, t_world_model: &Isometry3<S>) -> Isometry3<S> {
@@ -139,7 +154,6 @@ impl RigidBody {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::Vector3;
     use prehend_autodiff::Fwd;
 
     use super::*;

@@ -77,7 +77,7 @@ impl<S: Scalar> World<S> {
     }
 
     /// [`World::step`] of what has been checked.
-    fn advance(
+    pub(crate) fn advance(
         &self,
         integrator: &impl Integrator,
         states: &[State<S>],

@@ -13,7 +13,7 @@ pub use body::{Body, Course, Motion};
 use crate::contact::LawError;
 use crate::contact::law::LocalLaw;
 use crate::contact::onset::Onset;
-use crate::contact::wrench::Patch;
+use crate::contact::wrench::{Patch, stack};
 use crate::error::SimulationError;
 use crate::state::State;
 use crate::surface::Surface;
@@ -301,11 +301,6 @@ fn local_wrench<S: Scalar>(pair: &ContactPair<S>, seen: &State<S>, patch: &Patch
         }
     }
     wrench
-}
-
-#[inline]
-fn stack<S: Scalar>(a: &Vector3<S>, b: &Vector3<S>) -> Vector6<S> {
-    Vector6::new(a.x, a.y, a.z, b.x, b.y, b.z)
 }
 
 impl<S: Scalar> fmt::Debug for World<S> {

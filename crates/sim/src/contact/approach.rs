@@ -45,10 +45,8 @@ impl ApproachPenalty {
         friction: f64,
         slip_scale: f64,
     ) -> Result<Self, LawError> {
-        resting.check()?;
-        LawError::check_restitution(restitution)?;
-        let damping = resting.damping(approach_damping_ratio(restitution));
-        Self::new(resting.stiffness(1.0), damping, friction, slip_scale)
+        let [stiffness, damping] = resting.bouncing(restitution, approach_damping_ratio)?;
+        Self::new(stiffness, damping, friction, slip_scale)
     }
 }
 

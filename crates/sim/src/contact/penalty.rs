@@ -52,10 +52,8 @@ impl Penalty {
         friction: f64,
         slip_scale: f64,
     ) -> Result<Self, LawError> {
-        resting.check()?;
-        LawError::check_restitution(restitution)?;
-        let damping = resting.damping(damping_ratio(restitution));
-        Self::new(resting.stiffness(1.0), damping, friction, slip_scale)
+        let [stiffness, damping] = resting.bouncing(restitution, damping_ratio)?;
+        Self::new(stiffness, damping, friction, slip_scale)
     }
 }
 

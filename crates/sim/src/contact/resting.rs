@@ -42,6 +42,18 @@ impl RestingContact {
         self.mass * self.gravity / (self.penetration.powf(exponent) * self.contact_area)
     }
 
+    /// Stiffness and damping per area of a linear law that bounces with coefficient `restitution`, as which damping ratio
+    /// `ratio` says.
+    pub(super) fn bouncing(
+        &self,
+        restitution: f64,
+        ratio: fn(f64) -> f64,
+    ) -> Result<[f64; 2], LawError> {
+        self.check()?;
+        LawError::check_restitution(restitution)?;
+        Ok([self.stiffness(1.0), self.damping(ratio(restitution))])
+    }
+
     /// Damping per area D = 2ζ√(K m/A) \[N s/m³\] of a linear law for the damping ratio ζ.
     pub fn damping(&self, ratio: f64) -> f64 {
         2.0 * ratio * (self.stiffness(1.0) * self.mass / self.contact_area).sqrt()

@@ -52,12 +52,11 @@ fn advance<S: Scalar>(
     wrench: &Vector6<S>,
     dt: S,
 ) -> State<S> {
-    let (force, torque) = (wrench.fixed_rows::<3>(0), wrench.fixed_rows::<3>(3));
     let mut next = *state;
-    next.linear += (world.gravity + force / body.mass()) * dt;
+    let (linear, momentum) = body.kicked(state, wrench, &world.gravity, dt);
+    next.linear = linear;
     next.pose.translation.vector += next.linear * dt;
     let rotation = &state.pose.rotation;
-    let momentum = body.world_inertia(rotation) * state.angular + torque * dt;
     let mid_velocity = body.inverse_world_inertia(rotation) * momentum;
     next.pose.rotation = so3_exp(&(mid_velocity * dt)) * rotation;
     next.pose.rotation.renormalize_fast();

@@ -95,11 +95,6 @@ fn kicked<S: Scalar>(
     wrench: &Vector6<S>,
     dt: S,
 ) -> State<S> {
-    let (force, torque) = (wrench.fixed_rows::<3>(0), wrench.fixed_rows::<3>(3));
-    let momentum = body.world_inertia(&state.pose.rotation) * state.angular + torque * dt;
-    State {
-        pose,
-        linear: state.linear + (world.gravity + force / body.mass()) * dt,
-        angular: body.inverse_world_inertia(&pose.rotation) * momentum,
-    }
+    let (linear, momentum) = body.kicked(state, wrench, &world.gravity, dt);
+    State { pose, linear, angular: body.inverse_world_inertia(&pose.rotation) * momentum }
 }

@@ -35,12 +35,8 @@ pub(super) fn excess<S: Scalar>(
     dt: f64,
 ) -> [S; 6] {
     let [vx, vy, vz, wx, wy, wz] = *velocity;
-    let (force, torque) = (wrench.fixed_rows::<3>(0), wrench.fixed_rows::<3>(3));
-    let step = S::constant(dt);
-    let linear = state.linear + (world.gravity + force / body.mass()) * step;
-    let rotation = &state.pose.rotation;
-    let momentum = body.world_inertia(rotation) * state.angular + torque * step;
-    let turned = so3_exp(&Vector3::new(wx, wy, wz).map(|w| w.times(dt))) * rotation;
+    let (linear, momentum) = body.kicked(state, wrench, &world.gravity, S::constant(dt));
+    let turned = so3_exp(&Vector3::new(wx, wy, wz).map(|w| w.times(dt))) * state.pose.rotation;
     let angular = body.inverse_world_inertia(&turned) * momentum;
     let expected = [linear.x, linear.y, linear.z, angular.x, angular.y, angular.z];
     let velocity = [vx, vy, vz, wx, wy, wz];
