@@ -12,6 +12,7 @@ pub mod law;
 #[cfg(test)]
 pub(crate) mod law_checks;
 pub mod onset;
+pub mod patch;
 pub mod penalty;
 pub mod registry;
 pub mod resting;

@@ -46,11 +46,12 @@ pub use contact::hertz::{Hertz, HertzPenalty};
 pub use contact::hunt_crossley::{HuntCrossley, HuntCrossleyPenalty};
 pub use contact::law::{Contact, ContactLaw, Isotropic, IsotropicLaw, LocalLaw, Response};
 pub use contact::onset::{LeakSteps, Onset, OnsetSample};
+pub use contact::patch::Patch;
 pub use contact::penalty::{KelvinVoigt, Penalty};
 pub use contact::registry::{LawEntry, LawParameter, LawRegistry};
 pub use contact::resting::RestingContact;
 pub use contact::stribeck::Stribeck;
-pub use contact::wrench::{Patch, WrenchJacobian};
+pub use contact::wrench::WrenchJacobian;
 pub use equilibrium::{Balance, Equilibrium, Support, friction_factor};
 pub use error::SimulationError;
 pub use integrator::{

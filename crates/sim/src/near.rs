@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use prehend_autodiff::Scalar;
 
-use crate::contact::wrench::Patch;
+use crate::contact::patch::Patch;
 use crate::state::State;
 use crate::world::{ContactPair, World};
 

@@ -5,7 +5,8 @@ use prehend_autodiff::{Fwd, Scalar};
 
 use super::error::LawError;
 use super::friction::{regularised_coulomb, regularised_speed};
-use super::wrench::{self, Patch, WrenchJacobian};
+use super::patch::Patch;
+use super::wrench::{self, WrenchJacobian};
 
 /// One contact point, as a law sees it: vectors are along the axes of the body with the field (its model frame), which
 /// for a held body at the identity are those of the world. Where two bodies touch both ways, each direction has the axes

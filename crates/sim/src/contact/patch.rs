@@ -1,0 +1,146 @@
+//! A surface beside a distance field: which of its points touch, and what a contact law sees of them.
+
+use nalgebra::{Matrix3, Point3, Vector3};
+use prehend_autodiff::Fwd;
+use prehend_geometry::{DistanceField, FieldSample};
+
+use super::law::Contact;
+use super::onset::{Onset, OnsetSample};
+use crate::state::State;
+use crate::surface::{Block, Surface, SurfacePoint};
+
+/// Below this length a distance gradient has no direction, and the point no contact.
+const MIN_GRADIENT: f64 = 1e-9;
+
+/// A body's surface beside a distance field, at one moment; everything in the field's frame.
+#[derive(Clone, Copy)]
+pub struct Patch<'a> {
+    /// The samples that may touch.
+    pub surface: &'a Surface,
+    /// Centre of mass of the body that carries them, in its model frame \[m\].
+    pub com: Point3<f64>,
+    /// The body's state, as the field sees it.
+    pub state: State,
+    /// Whose surface is at distance zero.
+    pub field: &'a dyn DistanceField,
+    /// How contact begins.
+    pub onset: Onset,
+}
+
+/// A point in contact: what both the value and its derivative start from.
+pub(super) struct Touch {
+    pub(super) arm: Vector3<f64>,
+    pub(super) velocity: Vector3<f64>,
+    pub(super) onset: OnsetSample,
+    pub(super) normal: Vector3<f64>,
+    pub(super) length: f64,
+    pub(super) area: f64,
+    pub(super) hessian: Matrix3<f64>,
+}
+
+impl Patch<'_> {
+    /// Whether a point of `block` may be nearer to the field than `reach`.
+    #[inline]
+    fn may_touch(&self, block: &Block, reach: f64) -> bool {
+        let within = reach + self.field.steepest() * block.radius;
+        block.radius.is_infinite() || self.distance_within(&block.centre, within)
+    }
+
+    #[inline]
+    fn distance_within(&self, point: &Point3<f64>, within: f64) -> bool {
+        let State { pose, .. } = &self.state;
+        let place = pose.translation.vector + pose.rotation * (point - self.com);
+        self.field.sample(&Point3::from(place), within).is_some()
+    }
+
+    /// The samples that may touch, for a law that reaches to `cutoff`, before one of them has moved by `margin` \[m\].
+    pub(crate) fn near(&self, cutoff: f64, margin: f64) -> Surface {
+        let reach = cutoff + self.onset.band() + self.field.steepest() * margin;
+        let near = |point: &SurfacePoint| self.distance_within(&point.position, reach);
+        self.surface.only(near, |block| self.may_touch(block, reach))
+    }
+
+    /// Calls `visit` with every point in contact, in order. Points beyond `cutoff` and the onset's band exert no
+    /// force, so leaving out blocks of them changes nothing. Says whether every distance was a number.
+    #[inline(always)]
+    pub(super) fn for_each_touch(&self, cutoff: f64, mut visit: impl FnMut(&Touch)) -> bool {
+        let State { pose, linear, angular } = &self.state;
+        let (translation, rotation) = (pose.translation.vector, pose.rotation.to_rotation_matrix());
+        let reach = cutoff + self.onset.band();
+        for (block, points) in self.surface.blocks() {
+            if !self.may_touch(block, reach) {
+                continue;
+            }
+            for point in points {
+                let arm = rotation * (point.position - self.com);
+                let Some(sample) = self.field.sample(&Point3::from(translation + arm), reach)
+                else {
+                    continue;
+                };
+                let FieldSample { distance, gradient, hessian } = sample;
+                if distance.is_nan() {
+                    return false;
+                }
+                let Some(onset) = self.onset.at(distance - cutoff) else { continue };
+                let length = gradient.norm();
+                if length.is_nan() || length < MIN_GRADIENT {
+                    continue;
+                }
+                let (normal, area) = (gradient / length, point.area);
+                let velocity = linear + angular.cross(&arm);
+                visit(&Touch { arm, velocity, onset, normal, length, area, hessian });
+            }
+        }
+        true
+    }
+}
+
+impl Touch {
+    /// What the law sees.
+    #[inline(always)]
+    pub(super) fn contact(&self, cutoff: f64) -> Contact<f64> {
+        let speed = self.velocity.dot(&self.normal);
+        Contact {
+            gap: cutoff + self.onset.gap,
+            normal_speed: self.onset.activation * speed,
+            slip: self.velocity - self.normal * speed,
+            normal: self.normal,
+            area: self.area,
+        }
+    }
+
+    /// What the law sees, with derivatives by the point's position (0..3) and velocity (3..6).
+    #[inline(always)]
+    pub(super) fn lifted(&self, cutoff: f64) -> Contact<Fwd<6>> {
+        let gradient = self.normal * self.length;
+        let along_gradient = |value: f64, slope: f64| {
+            let g = gradient * slope;
+            Fwd { value, derivative: [g.x, g.y, g.z, 0.0, 0.0, 0.0] }
+        };
+        let normal = self.lifted_normal();
+        let u: Vector3<Fwd<6>> = Vector3::from_fn(|i, _| Fwd::variable(self.velocity[i], 3 + i));
+        let speed = u.x * normal.x + u.y * normal.y + u.z * normal.z;
+        let activation = along_gradient(self.onset.activation, self.onset.activation_slope);
+        Contact {
+            gap: along_gradient(cutoff + self.onset.gap, self.onset.slope),
+            normal_speed: activation * speed,
+            slip: Vector3::from_fn(|i, _| u[i] - normal[i] * speed),
+            normal,
+            area: self.area,
+        }
+    }
+
+    /// The unit normal with its derivative by position: (I − nnᵀ)·∇²φ/|∇φ|.
+    #[inline(always)]
+    fn lifted_normal(&self) -> Vector3<Fwd<6>> {
+        let n = &self.normal;
+        let hessian_n = self.hessian.tr_mul(n);
+        Vector3::from_fn(|i, _| {
+            let mut derivative = [0.0; 6];
+            for j in 0..3 {
+                derivative[j] = (self.hessian[(i, j)] - n[i] * hessian_n[j]) / self.length;
+            }
+            Fwd { value: n[i], derivative }
+        })
+    }
+}
