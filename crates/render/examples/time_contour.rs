@@ -7,8 +7,7 @@ use std::time::Instant;
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use prehend_geometry::TriMesh;
 use prehend_render::{
-    Camera, ContourOptions, ContourRenderer, DepthOptions, Light, Mask, RenderModel, Target,
-    depth_map,
+    Camera, DepthOptions, Light, LossOptions, Mask, Mode, PoseLoss, RenderModel, Target, depth_map,
 };
 
 fn body(rings: usize) -> TriMesh {
@@ -57,28 +56,28 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         Isometry3::from_parts(Translation3::new(x, 0.0, 0.45), turn)
     };
     let (truth, pose) = (at(0.0, 0.2), at(0.003, 0.25));
-    let picture = ContourRenderer::default().render(&model, &truth, &camera, &light);
+    let picture = PoseLoss::default().render(&model, &truth, &camera, &light);
     let mask = picture.coverage.iter().map(|a| *a >= 0.5).collect();
     let mask = Mask::new(camera.width, camera.height, mask)?;
     let hand = depth_map(&camera, &[(&model, Isometry3::translation(0.04, 0.05, 0.4))]);
     let plain = Target::new(camera, &picture.color, &mask)?;
     let full = plain.clone().with_depth(&picture.depth)?.with_occluder(hand)?;
-    let all = ContourOptions {
+    let all = LossOptions {
         mask_weight: 0.5,
         depth: Some(DepthOptions { weight: 1.0, scale: 0.02, truncation: 0.03 }),
-        ..ContourOptions::default()
+        ..LossOptions::default()
     };
     println!("{} faces, mask of {} px", model.face_count(), plain.area());
     for (name, options, target) in
-        [("colour", ContourOptions::default(), &plain), ("colour, mask, depth, hand", all, &full)]
+        [("colour", LossOptions::default(), &plain), ("colour, mask, depth, hand", all, &full)]
     {
-        let renderer = ContourRenderer::new(options);
+        let loss = PoseLoss::new(Mode::default(), options);
         let value = milliseconds(|| {
-            std::hint::black_box(renderer.evaluate(&model, &pose, &light, target));
+            std::hint::black_box(loss.evaluate(&model, &pose, &light, target));
         });
         let center = pose * model.center();
         let linearised = milliseconds(|| {
-            std::hint::black_box(renderer.linearise(&model, &pose, &center, &light, target));
+            std::hint::black_box(loss.linearise(&model, &pose, &center, &light, target));
         });
         println!("{name}: evaluate {value:.3} ms, linearise {linearised:.3} ms");
     }

@@ -6,7 +6,8 @@ use crate::camera::Camera;
 use crate::contour::{Band, outline};
 use crate::image::RgbImage;
 use crate::model::{NONE, RenderModel};
-use crate::posed::{Posed, Region};
+use crate::posed::Posed;
+use crate::projected::Region;
 
 /// Draws the outline of `model` at pose `t_cam_model` over `image` as a line of `width` pixels.
 ///
@@ -23,11 +24,11 @@ pub fn draw_outline(
     // The line's edge fades over one pixel.
     let reach = (0.5 * width as f32 + 0.5).clamp(0.5, 64.0);
     let posed = Posed::new(model, camera, t_cam_model, reach);
-    let region = posed.region;
+    let region = posed.projected.region;
     if region == Region::EMPTY {
         return;
     }
-    let pieces = outline(&posed, &region, reach).outline;
+    let pieces = outline(&posed.projected, &region, reach).outline;
     let band = Band::new(pieces.iter(), &region, reach);
     let columns = image.width();
     let rows = image.height();

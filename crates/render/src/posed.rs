@@ -4,42 +4,10 @@ use nalgebra::{Isometry3, Matrix3, Vector3};
 
 use crate::camera::Camera;
 use crate::model::RenderModel;
+use crate::projected::Projected;
 
 /// Geometry nearer to the camera plane than this is not drawn \[m\].
 const NEAR: f32 = 1e-3;
-
-/// A rectangle of pixels; the upper ends are exclusive.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Region {
-    pub(crate) x0: usize,
-    pub(crate) y0: usize,
-    pub(crate) x1: usize,
-    pub(crate) y1: usize,
-}
-
-impl Region {
-    pub(crate) const EMPTY: Self = Self { x0: 0, y0: 0, x1: 0, y1: 0 };
-
-    pub(crate) fn width(&self) -> usize {
-        self.x1 - self.x0
-    }
-
-    /// The smallest rectangle around both.
-    pub(crate) fn union(&self, other: &Self) -> Self {
-        if *self == Self::EMPTY {
-            return *other;
-        }
-        if *other == Self::EMPTY {
-            return *self;
-        }
-        Self {
-            x0: self.x0.min(other.x0),
-            y0: self.y0.min(other.y0),
-            x1: self.x1.max(other.x1),
-            y1: self.y1.max(other.y1),
-        }
-    }
-}
 
 /// A model transformed into the camera frame and projected, in f32.
 pub(crate) struct Posed<'a> {
@@ -53,15 +21,10 @@ pub(crate) struct Posed<'a> {
     pub(crate) center: Vector3<f32>,
     /// Welded vertices in the camera frame \[m\].
     pub(crate) position: Vec<Vector3<f32>>,
-    /// Column, row \[px\] and 1/Z \[1/m\] of each vertex; 1/Z is 0 where it is not in front of the camera.
-    pub(crate) screen: Vec<[f32; 3]>,
-    /// Per face: 1 seen from outside, -1 seen from inside, 0 not drawn.
-    pub(crate) facing: Vec<i8>,
+    pub(crate) projected: Projected<'a>,
     /// Pyramid level of the texture, and its derivative by the centre's Z \[1/m\].
     pub(crate) level: f32,
     pub(crate) level_dz: f32,
-    /// Pixels that the model may cover.
-    pub(crate) region: Region,
 }
 
 impl<'a> Posed<'a> {
@@ -87,22 +50,10 @@ impl<'a> Posed<'a> {
             [focal[0] * p.x * w + principal[0], focal[1] * p.y * w + principal[1], w]
         };
         let screen: Vec<[f32; 3]> = position.iter().map(project).collect();
-        let facing = model.faces.iter().map(|f| facing(&screen, f, model.closed)).collect();
         let (level, level_dz) = level(model, camera, center.z);
-        let region = region(&screen, camera, margin);
-        Self {
-            model,
-            focal,
-            principal,
-            rotation,
-            center,
-            position,
-            screen,
-            facing,
-            level,
-            level_dz,
-            region,
-        }
+        let (faces, edges) = (&model.faces, &model.edges);
+        let projected = Projected::new(faces, edges, |_| model.closed, screen, camera, margin);
+        Self { model, focal, principal, rotation, center, position, projected, level, level_dz }
     }
 
     /// The viewing ray X/Z through an image position \[px\].
@@ -113,31 +64,6 @@ impl<'a> Posed<'a> {
             (v - self.principal[1]) / self.focal[1],
             1.0,
         )
-    }
-
-    /// Screen positions of a face's corners.
-    #[inline]
-    pub(crate) fn corners(&self, face: usize) -> [[f32; 3]; 3] {
-        self.model.faces[face].map(|v| self.screen[v as usize])
-    }
-}
-
-/// Twice the signed area of a screen triangle \[px²\]; negative where its outside is seen.
-#[inline]
-pub(crate) fn signed_area([a, b, c]: &[[f32; 3]; 3]) -> f32 {
-    (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-}
-
-fn facing(screen: &[[f32; 3]], face: &[u32; 3], closed: bool) -> i8 {
-    let corners = face.map(|v| screen[v as usize]);
-    if corners.iter().any(|c| c[2] == 0.0) {
-        return 0;
-    }
-    let area = signed_area(&corners);
-    match () {
-        () if area < 0.0 => 1,
-        () if area > 0.0 && !closed => -1,
-        () => 0,
     }
 }
 
@@ -152,24 +78,4 @@ fn level(model: &RenderModel, camera: &Camera, z: f32) -> (f32, f32) {
     } else {
         (if level > 0.0 { map.last_level() } else { 0.0 }, 0.0)
     }
-}
-
-fn region(screen: &[[f32; 3]], camera: &Camera, margin: f32) -> Region {
-    let (mut low, mut high) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
-    for p in screen.iter().filter(|p| p[2] > 0.0) {
-        for i in 0..2 {
-            low[i] = low[i].min(p[i]);
-            high[i] = high[i].max(p[i]);
-        }
-    }
-    // Float-to-integer casts saturate, so far-off projections clip to the image.
-    let start = |v: f32| (v - margin).ceil().max(0.0) as usize;
-    let end = |v: f32, size: usize| ((v + margin).floor() + 1.0).clamp(0.0, size as f32) as usize;
-    let region = Region {
-        x0: start(low[0]),
-        y0: start(low[1]),
-        x1: end(high[0], camera.width),
-        y1: end(high[1], camera.height),
-    };
-    if region.x0 < region.x1 && region.y0 < region.y1 { region } else { Region::EMPTY }
 }

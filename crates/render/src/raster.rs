@@ -6,7 +6,8 @@ use rayon::prelude::*;
 use crate::camera::Camera;
 use crate::image::DepthImage;
 use crate::model::RenderModel;
-use crate::posed::{Posed, Region, signed_area};
+use crate::posed::Posed;
+use crate::projected::{Projected, Region, signed_area};
 
 /// Rows of the image that one task renders; results do not depend on it.
 pub(crate) const BAND: usize = 16;
@@ -45,8 +46,8 @@ impl Visible {
 
     /// Draws one face where it is nearer than what is there; of equals the first stays.
     #[inline]
-    pub(crate) fn draw(&mut self, posed: &Posed, face: u32) {
-        let corners = posed.corners(face as usize);
+    pub(crate) fn draw(&mut self, projected: &Projected, face: u32) {
+        let corners = projected.corners(face as usize);
         let region = &self.region;
         let low = |i: usize| corners[0][i].min(corners[1][i]).min(corners[2][i]);
         let high = |i: usize| corners[0][i].max(corners[1][i]).max(corners[2][i]);
@@ -62,7 +63,7 @@ impl Visible {
         let area = signed_area(&corners);
         let sign = if area < 0.0 { -1.0 } else { 1.0 };
         let scale = 1.0 / area.abs();
-        let ids = posed.model.faces[face as usize];
+        let ids = projected.faces[face as usize];
         let edges = [(1, 2), (2, 0), (0, 1)].map(|(i, j)| {
             // Both faces of an edge evaluate the same expression, so that none of its pixels is lost.
             let (a, b, s) = if ids[i] < ids[j] { (i, j, sign) } else { (j, i, -sign) };
@@ -90,15 +91,15 @@ impl Visible {
     }
 }
 
-/// The faces of a posed model that touch each block of [`BAND`] rows of `region`, in ascending order.
-pub(crate) fn bin(posed: &Posed, region: &Region) -> Vec<Vec<u32>> {
+/// The faces that touch each block of [`BAND`] rows of `region`, in ascending order.
+pub(crate) fn bin(projected: &Projected, region: &Region) -> Vec<Vec<u32>> {
     let mut bins = vec![Vec::new(); (region.y1 - region.y0).div_ceil(BAND)];
     if bins.is_empty() {
         return bins;
     }
     let (first, last) = (region.y0 as f32, region.y1 as f32 - 1.0);
-    for (f, _) in posed.facing.iter().enumerate().filter(|(_, facing)| **facing != 0) {
-        let [a, b, c] = posed.corners(f);
+    for (f, _) in projected.facing.iter().enumerate().filter(|(_, facing)| **facing != 0) {
+        let [a, b, c] = projected.corners(f);
         let low = a[1].min(b[1]).min(c[1]).max(first);
         let high = a[1].max(b[1]).max(c[1]).min(last);
         if low > high {
@@ -121,14 +122,14 @@ pub(crate) fn band(region: &Region, index: usize) -> Region {
     Region { y0, y1: (y0 + BAND).min(region.y1), ..*region }
 }
 
-/// Visible faces of one posed model over `region`, band by band, in parallel.
-pub(crate) fn rasterise(posed: &Posed, region: &Region) -> Vec<Visible> {
-    bin(posed, region)
+/// Visible faces over `region`, band by band, in parallel.
+pub(crate) fn rasterise(projected: &Projected, region: &Region) -> Vec<Visible> {
+    bin(projected, region)
         .par_iter()
         .enumerate()
         .map(|(index, faces)| {
             let mut visible = Visible::new(band(region, index));
-            faces.iter().for_each(|&f| visible.draw(posed, f));
+            faces.iter().for_each(|&f| visible.draw(projected, f));
             visible
         })
         .collect()
@@ -143,7 +144,7 @@ pub fn depth_map(camera: &Camera, bodies: &[(&RenderModel, Isometry3<f64>)]) -> 
     let mut inverse = vec![0.0f32; camera.width * camera.height];
     for (model, pose) in bodies {
         let posed = Posed::new(model, camera, pose, 0.0);
-        for part in rasterise(&posed, &posed.region) {
+        for part in rasterise(&posed.projected, &posed.projected.region) {
             let width = part.region.width();
             for (row, values) in part.inverse_z.chunks(width.max(1)).enumerate() {
                 let start = (part.region.y0 + row) * camera.width + part.region.x0;

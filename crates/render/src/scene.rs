@@ -52,8 +52,8 @@ pub fn render_scene(
         let posed = Posed::new(body.model, &fine, &body.t_cam_model, 0.0);
         let lighting = Lighting::new(light, &posed.rotation);
         let twist_center = Vector3::zeros();
-        let scene = Scene { posed: &posed, lighting: &lighting, half_width: 1.0, twist_center };
-        for part in rasterise(&posed, &posed.region) {
+        let scene = Scene { posed, lighting, half_width: 1.0, twist_center };
+        for part in rasterise(&scene.posed.projected, &scene.posed.projected.region) {
             for (i, &face) in part.face.iter().enumerate() {
                 let (x, y) = part.position(i);
                 let at = y * width + x;

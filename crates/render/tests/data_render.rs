@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use prehend_geometry::TriMesh;
 use prehend_render::{
-    Camera, ContourOptions, ContourRenderer, DepthImage, DepthOptions, Light, Mask, RenderModel,
-    RgbImage, Target, draw_outline,
+    Camera, DepthImage, DepthOptions, Light, LossOptions, Mask, Mode, PoseLoss, RenderModel,
+    RgbImage, Target, draw_outline, light_samples,
 };
 use serde_json::Value;
 
@@ -83,7 +83,7 @@ fn silhouettes_of_scans_match_an_independent_renderer() {
     for object in OBJECTS {
         for image in 0..4 {
             let view = view(object, image);
-            let picture = ContourRenderer::default().render(
+            let picture = PoseLoss::default().render(
                 &view.model,
                 &view.truth,
                 &view.camera,
@@ -121,23 +121,23 @@ fn silhouettes_of_scans_match_an_independent_renderer() {
 fn textures_of_scans_are_the_right_way_up() {
     for object in OBJECTS {
         let view = view(object, 0);
-        let renderer = ContourRenderer::default();
+        let pose_loss = PoseLoss::default();
         let target = view.target();
-        let samples = renderer.light_samples(&view.model, &view.truth, &target);
+        let samples = light_samples(&view.model, &view.truth, &target, 1.0);
         let light = Light::fit(&samples, 1e-3).unwrap();
-        let loss = renderer.evaluate(&view.model, &view.truth, &light, &target);
+        let loss = pose_loss.evaluate(&view.model, &view.truth, &light, &target);
         // The error with a colour that is right only on average.
         let plain = view.model.clone().with_uniform_color([0.5; 3]);
-        let samples = renderer.light_samples(&plain, &view.truth, &target);
+        let samples = light_samples(&plain, &view.truth, &target, 1.0);
         let plain_light = Light::fit(&samples, 1e-3).unwrap();
-        let blank = renderer.evaluate(&plain, &view.truth, &plain_light, &target);
+        let blank = pose_loss.evaluate(&plain, &view.truth, &plain_light, &target);
         println!(
             "{object}: {:.5} textured, {:.5} plain; {:?}",
             loss.color, blank.color, loss.counts
         );
         if let Some(folder) = std::env::var_os("PREHEND_PICTURES") {
             let folder = PathBuf::from(folder);
-            let picture = renderer.render(&view.model, &view.truth, &view.camera, &light);
+            let picture = pose_loss.render(&view.model, &view.truth, &view.camera, &light);
             picture.color.save(&folder.join(format!("{object}_rendered.png"))).unwrap();
             let mut image = view.color.clone();
             draw_outline(&mut image, &view.camera, &view.model, &view.truth, [0.0, 1.0, 0.0], 1.0);
@@ -152,10 +152,13 @@ fn textures_of_scans_are_the_right_way_up() {
 fn colour_mask_and_depth_lead_back_to_the_true_pose() {
     let view = view("000006", 0);
     let target = view.target();
-    let renderer = ContourRenderer::new(ContourOptions {
-        depth: Some(DepthOptions { weight: 1.0, scale: 0.02, truncation: 0.02 }),
-        ..ContourOptions::default()
-    });
+    let pose_loss = PoseLoss::new(
+        Mode::default(),
+        LossOptions {
+            depth: Some(DepthOptions { weight: 1.0, scale: 0.02, truncation: 0.02 }),
+            ..LossOptions::default()
+        },
+    );
     let offset =
         Isometry3::new(Vector3::new(0.003, -0.002, 0.002), Vector3::new(0.06, 0.04, -0.05));
     let mut guess = Isometry3::from_parts(
@@ -163,10 +166,10 @@ fn colour_mask_and_depth_lead_back_to_the_true_pose() {
         offset.rotation * view.truth.rotation,
     );
     for _ in 0..30 {
-        let samples = renderer.light_samples(&view.model, &guess, &target);
+        let samples = light_samples(&view.model, &guess, &target, 1.0);
         let light = Light::fit(&samples, 1e-3).unwrap();
         let center = guess * view.model.center();
-        let at = renderer.linearise(&view.model, &guess, &center, &light, &target);
+        let at = pose_loss.linearise(&view.model, &guess, &center, &light, &target);
         let mut matrix = at.jtj * 2.0;
         (0..6).for_each(|i| matrix[(i, i)] *= 1.01);
         let step = -matrix.cholesky().unwrap().solve(&at.gradient);

@@ -3,7 +3,9 @@
 use std::sync::Arc;
 
 use nalgebra::Point3;
-use prehend_render::{ContourOptions, ContourRenderer, DepthImage, Light, Robust, Target};
+use prehend_render::{
+    ContourOptions, DepthImage, Light, LossOptions, Mode, PoseLoss, Robust, Target, light_samples,
+};
 
 use super::Term;
 use crate::{Block, Normal, Object, Observation, RefineError, State};
@@ -51,7 +53,7 @@ impl Default for RenderingSettings {
 pub struct RenderingTerm {
     object: Arc<Object>,
     target: Target,
-    renderer: ContourRenderer,
+    loss: PoseLoss,
     /// Nats per unit of the renderer's loss.
     scale: f64,
     light_ridge: f64,
@@ -74,18 +76,17 @@ impl RenderingTerm {
             .and_then(|t| t.downsampled(settings.downsample))
             .map_err(images)?;
         let sigma = settings.sigma * brightness(observation);
-        let options = ContourOptions {
-            half_width: HALF_WIDTH,
+        let options = LossOptions {
             mask_weight: (sigma / settings.mask_sigma).powi(2),
             // Or a pose could lower its loss by hiding behind the hand.
             hidden_is_missed: true,
             robust: Robust::Cauchy(settings.outlier * sigma),
-            ..ContourOptions::default()
+            ..LossOptions::default()
         };
         Ok(Self {
             object,
             target,
-            renderer: ContourRenderer::new(options),
+            loss: PoseLoss::new(Mode::Contour(ContourOptions { half_width: HALF_WIDTH }), options),
             scale: 0.5 * settings.effective_pixels / (sigma * sigma),
             light_ridge: settings.light_ridge,
         })
@@ -113,7 +114,7 @@ impl Term for RenderingTerm {
 
     fn value(&self, state: &State) -> f64 {
         let model = &self.object.model;
-        let loss = self.renderer.evaluate(model, &state.t_cam_object, &state.light, &self.target);
+        let loss = self.loss.evaluate(model, &state.t_cam_object, &state.light, &self.target);
         self.scale * loss.total
     }
 
@@ -121,14 +122,14 @@ impl Term for RenderingTerm {
         let centre = Point3::from(state.centre());
         let model = &self.object.model;
         let pose = &state.t_cam_object;
-        let at = self.renderer.linearise(model, pose, &centre, &state.light, &self.target);
+        let at = self.loss.linearise(model, pose, &centre, &state.light, &self.target);
         normal.add(self.blocks(), &(at.gradient * self.scale), &(at.jtj * (2.0 * self.scale)));
         self.scale * at.loss.total
     }
 
     fn refresh(&self, state: &mut State) {
-        let samples =
-            self.renderer.light_samples(&self.object.model, &state.t_cam_object, &self.target);
+        let (model, pose) = (&self.object.model, &state.t_cam_object);
+        let samples = light_samples(model, pose, &self.target, HALF_WIDTH);
         // With too little in view the light stays what it was.
         if let Ok(light) = Light::fit(&samples, self.light_ridge) {
             state.light = light;

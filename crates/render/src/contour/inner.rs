@@ -1,12 +1,13 @@
 //! Inner contours: where the object hides farther parts of itself.
 
 use super::outline::Piece;
-use super::pixel::{Pixel, Scene, falling_step, scaled_sum};
-use crate::posed::Posed;
+use super::pixel::{Scene, falling_step, scaled_sum};
+use crate::pose_loss::Pixel;
+use crate::projected::Projected;
 use crate::raster::{MISS, Visible};
 
 /// Depth steps below this share of the model's radius are folds of the surface, not contours.
-const LEAST_STEP: f32 = 0.02;
+pub(crate) const LEAST_STEP: f32 = 0.02;
 
 /// A piece of a visible inner contour.
 #[derive(Clone, Copy, Debug)]
@@ -19,9 +20,13 @@ pub(crate) struct Inner {
 }
 
 /// Picks the visible inner contours among silhouette pieces that are not part of the outline: the surface seen one
-/// pixel outside is farther than the edge, and one pixel inside it is not.
-pub(crate) fn inner_contours(posed: &Posed, visible: &[Visible], pieces: Vec<Piece>) -> Vec<Inner> {
-    let least = LEAST_STEP * posed.model.radius() as f32;
+/// pixel outside is farther than the edge by more than `least` \[m\], and one pixel inside it is not.
+pub(crate) fn inner_contours(
+    projected: &Projected,
+    visible: &[Visible],
+    pieces: Vec<Piece>,
+    least: f32,
+) -> Vec<Inner> {
     let seen = |x: f32, y: f32| {
         let (x, y) = (x.round(), y.round());
         if x < 0.0 || y < 0.0 {
@@ -37,8 +42,8 @@ pub(crate) fn inner_contours(posed: &Posed, visible: &[Visible], pieces: Vec<Pie
     };
     let select = |piece: Piece| {
         let t = 0.5 * (piece.range[0] + piece.range[1]);
-        let face = posed.model.faces[piece.face as usize];
-        let [wa, wb] = piece.corners.map(|c| posed.screen[face[c as usize] as usize][2]);
+        let face = projected.faces[piece.face as usize];
+        let [wa, wb] = piece.corners.map(|c| projected.screen[face[c as usize] as usize][2]);
         let z = 1.0 / (wa + t * (wb - wa));
         let beside = |distance: f32| {
             let at =

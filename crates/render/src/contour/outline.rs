@@ -1,7 +1,7 @@
 //! The outline of a posed mesh: silhouette edges that separate it from the background.
 
 use crate::model::NONE;
-use crate::posed::{Posed, Region};
+use crate::projected::{Projected, Region};
 
 /// Longest piece of an edge that is judged as a whole \[px\].
 const PIECE: f32 = 4.0;
@@ -69,16 +69,16 @@ pub(crate) struct Silhouette {
 /// An edge is a silhouette where exactly one of its faces is drawn, or one is seen from outside and the
 /// other from inside. The oriented silhouette is the boundary of the drawn faces, so its winding number about an image
 /// point is the number of layers there; a piece is part of the outline if there are none just outside it.
-pub(crate) fn outline(posed: &Posed, region: &Region, margin: f32) -> Silhouette {
+pub(crate) fn outline(projected: &Projected, region: &Region, margin: f32) -> Silhouette {
     let mut segments = Vec::new();
     let mut candidates = Vec::new();
-    for edge in &posed.model.edges {
-        let own = posed.facing[edge.face as usize];
-        let other = if edge.other == NONE { 0 } else { posed.facing[edge.other as usize] };
+    for edge in projected.edges {
+        let own = projected.facing[edge.face as usize];
+        let other = if edge.other == NONE { 0 } else { projected.facing[edge.other as usize] };
         if own == other {
             continue;
         }
-        let screen = edge.vertices.map(|v| posed.screen[v as usize]);
+        let screen = edge.vertices.map(|v| projected.screen[v as usize]);
         // A drawn face has all its corners in front of the camera.
         let (a, b) = ([screen[0][0], screen[0][1]], [screen[1][0], screen[1][1]]);
         let layers = f32::from(other) - f32::from(own);
@@ -87,7 +87,7 @@ pub(crate) fn outline(posed: &Posed, region: &Region, margin: f32) -> Silhouette
         let (face, corner) =
             if use_own { (edge.face, edge.corner) } else { (edge.other, edge.other_corner) };
         let (a, b) = if use_own { (a, b) } else { (b, a) };
-        let sign = f32::from(posed.facing[face as usize]);
+        let sign = f32::from(projected.facing[face as usize]);
         let corners = [corner, (corner + 1) % 3];
         let d = [b[0] - a[0], b[1] - a[1]];
         let length = d[0].hypot(d[1]);

@@ -4,32 +4,14 @@ use nalgebra::Vector3;
 
 use super::inner::Inner;
 use super::outline::{Foot, Piece};
-use super::sums::Row;
 use super::surface::{Lighting, Shaded, shade};
+use crate::pose_loss::{Pixel, Row};
 use crate::posed::Posed;
-
-/// What a pixel shows of the object: colour and coverage after blending with the black background, the
-/// depth of the surface there, and their derivatives by the twist.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Pixel {
-    /// α C.
-    pub(crate) color: [f32; 3],
-    /// α: one inside, one half on the outline, zero outside.
-    pub(crate) coverage: f32,
-    /// Z of the surface, or outside of the nearest outline point \[m\].
-    pub(crate) z: f32,
-    /// Weight of the depth here: one inside, falling to zero at the outline, where depth says little.
-    pub(crate) depth_weight: f32,
-    pub(crate) color_rows: [Row; 3],
-    pub(crate) coverage_row: Row,
-    pub(crate) z_row: Row,
-    pub(crate) depth_weight_row: Row,
-}
 
 /// A posed, lit model, and the point about which twists turn (camera frame).
 pub(crate) struct Scene<'a> {
-    pub(crate) posed: &'a Posed<'a>,
-    pub(crate) lighting: &'a Lighting,
+    pub(crate) posed: Posed<'a>,
+    pub(crate) lighting: Lighting,
     pub(crate) half_width: f32,
     pub(crate) twist_center: Vector3<f32>,
 }
@@ -96,7 +78,7 @@ impl Scene<'_> {
     ) -> Pixel {
         let face = face as usize;
         let b = self.barycentric(face, x, y);
-        let shaded = shade::<DERIVATIVES>(self.posed, self.lighting, face, b);
+        let shaded = shade::<DERIVATIVES>(&self.posed, &self.lighting, face, b);
         let z = 1.0 / inverse_z;
         let mut pixel =
             Pixel { color: shaded.color, coverage: 1.0, z, depth_weight: 1.0, ..Pixel::default() };
@@ -110,7 +92,7 @@ impl Scene<'_> {
     #[inline]
     pub(crate) fn at_foot<const DERIVATIVES: bool>(&self, piece: &Piece, foot: &Foot) -> Pixel {
         let (b, point, ends) = self.on_edge(piece, foot.t);
-        let shaded = shade::<DERIVATIVES>(self.posed, self.lighting, piece.face as usize, b);
+        let shaded = shade::<DERIVATIVES>(&self.posed, &self.lighting, piece.face as usize, b);
         let mut pixel = Pixel {
             color: shaded.color,
             coverage: 1.0,
@@ -128,13 +110,13 @@ impl Scene<'_> {
     /// Colour of a face at pixel (x, y), unblended.
     pub(crate) fn color(&self, face: u32, x: f32, y: f32) -> [f32; 3] {
         let b = self.barycentric(face as usize, x, y);
-        shade::<false>(self.posed, self.lighting, face as usize, b).color
+        shade::<false>(&self.posed, &self.lighting, face as usize, b).color
     }
 
     /// Perspective-correct barycentric coordinates of pixel (x, y) on a face.
     #[inline]
     pub(crate) fn barycentric(&self, face: usize, x: f32, y: f32) -> [f32; 3] {
-        let [a, b, c] = self.posed.corners(face);
+        let [a, b, c] = self.posed.projected.corners(face);
         let cross = |p: [f32; 3], q: [f32; 3]| (p[0] - x) * (q[1] - y) - (p[1] - y) * (q[0] - x);
         let weights = [cross(b, c) * a[2], cross(c, a) * b[2], cross(a, b) * c[2]];
         let sum = weights[0] + weights[1] + weights[2];
@@ -252,7 +234,10 @@ impl Scene<'_> {
         let face = self.posed.model.faces[piece.face as usize];
         let ids = piece.corners.map(|c| face[c as usize] as usize);
         let ends = ids.map(|v| self.posed.position[v]);
-        let (wa, wb) = ((1.0 - t) * self.posed.screen[ids[0]][2], t * self.posed.screen[ids[1]][2]);
+        let (wa, wb) = (
+            (1.0 - t) * self.posed.projected.screen[ids[0]][2],
+            t * self.posed.projected.screen[ids[1]][2],
+        );
         let share = wb / (wa + wb);
         let mut b = [0.0; 3];
         b[piece.corners[0] as usize] = 1.0 - share;

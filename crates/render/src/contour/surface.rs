@@ -74,7 +74,7 @@ pub(crate) fn normal(posed: &Posed, face: usize, b: [f32; 3]) -> (Vector3<f32>, 
     let n = &posed.model.normals[face];
     let sum = n[0] * b[0] + n[1] * b[1] + n[2] * b[2];
     let length = sum.norm().max(1e-6);
-    let side = if posed.facing[face] < 0 { -1.0 } else { 1.0 };
+    let side = if posed.projected.facing[face] < 0 { -1.0 } else { 1.0 };
     (sum * (side / length), length, side)
 }
 

@@ -1,7 +1,10 @@
 //! Rows and whole gradients against finite differences.
 
 use super::*;
+use crate::contour::Band;
 use crate::image::Mask;
+use crate::light_samples;
+use crate::mode::ContourOptions;
 use crate::raster::depth_map;
 use crate::scene::{SceneObject, render_scene};
 use crate::shapes_for_tests::{lump, painted, torus};
@@ -9,8 +12,6 @@ use nalgebra::{Translation3, UnitQuaternion, Vector3};
 use prehend_geometry::shapes::{cuboid, sphere};
 use prehend_geometry::{Texture, TriMesh};
 use std::sync::Arc;
-
-use super::sums::Row;
 
 fn camera() -> Camera {
     Camera { fx: 300.0, fy: 310.0, cx: 79.0, cy: 60.5, width: 160, height: 120 }
@@ -85,27 +86,25 @@ struct Sample {
 }
 
 fn pixels<const D: bool>(
-    renderer: &ContourRenderer,
     model: &RenderModel,
     pose: &Isometry3<f64>,
     center: &Point3<f64>,
     light: &Light,
 ) -> Vec<Option<Sample>> {
     let camera = camera();
-    let frame = renderer.frame(model, pose, &camera, light, Region::EMPTY);
-    let scene = renderer.scene(&frame, center);
+    let options = ContourOptions::default();
+    let view = ContourView::new(&options, model, pose, center, &camera, light, &Region::EMPTY);
     let mut out = vec![None; camera.width * camera.height];
-    for index in 0..frame.visible.len() {
-        renderer.visit::<D>(&frame, &scene, index, |x, y, seen| {
+    for (index, visible) in view.visible.iter().enumerate() {
+        view.visit::<D>(index, |x, y, seen| {
             out[y * camera.width + x] =
                 seen.map(|s| Sample { hit: s.hit, face: 0, pixel: s.pixel });
         });
-        let visible = &frame.visible[index];
-        let band = Band::new(frame.pieces.iter(), &visible.region, scene.half_width);
+        let band = Band::new(view.pieces.iter(), &visible.region, view.scene.half_width);
         for (i, &face) in visible.face.iter().enumerate() {
             let (x, y) = visible.position(i);
             if let Some(sample) = &mut out[y * camera.width + x] {
-                let edge = frame.pieces.get(band.piece[i] as usize);
+                let edge = view.pieces.get(band.piece[i] as usize);
                 sample.face = if sample.hit { face } else { edge.unwrap().face };
             }
         }
@@ -121,17 +120,16 @@ fn compare_rows(
     seed: u64,
     pick: impl Fn(&Sample) -> Option<Vec<(f32, Row)>>,
 ) -> (f64, f64, usize) {
-    let renderer = ContourRenderer::default();
     let pose = pose(&mut Noise(seed));
     let center = pose * model.center() + Vector3::new(0.01, -0.02, 0.015);
-    let analytic = pixels::<true>(&renderer, model, &pose, &center, light);
+    let analytic = pixels::<true>(model, &pose, &center, light);
     let (mut ab, mut aa, mut bb, mut error, mut count) = (0.0, 0.0, 0.0, 0.0, 0);
     for axis in 0..6 {
         // About a fiftieth of a pixel either way.
         let step = if axis < 3 { 3e-5 } else { 6e-4 };
         let moved = [1.0, -1.0].map(|sign| {
             let pose = twisted(&pose, &center, &unit(axis, sign * step));
-            pixels::<false>(&renderer, model, &pose, &center, light)
+            pixels::<false>(model, &pose, &center, light)
         });
         // Rotations move points by about 4 cm a radian.
         let weight = if axis < 3 { 1.0 } else { 25.0 };
@@ -221,7 +219,7 @@ fn target_of(
     least_coverage: f32,
 ) -> Target {
     let camera = camera();
-    let image = ContourRenderer::default().render(model, pose, &camera, light);
+    let image = PoseLoss::default().render(model, pose, &camera, light);
     let free = |at: usize| {
         let hand = occluder.as_ref().map_or(0.0, |o| o.pixels()[at]);
         hand == 0.0 || image.depth.pixels()[at] < hand
@@ -241,20 +239,20 @@ fn target_of(
 /// Cosine and relative error of the gradient against central differences of the value, with rotations scaled to
 /// lengths at 4 cm.
 fn compare_gradient(
-    renderer: &ContourRenderer,
+    loss: &PoseLoss,
     model: &RenderModel,
     pose: &Isometry3<f64>,
     light: &Light,
     target: &Target,
 ) -> (f64, f64) {
     let center = pose * model.center();
-    let at = renderer.linearise(model, pose, &center, light, target);
+    let at = loss.linearise(model, pose, &center, light, target);
     let scale = Vector6::new(1.0, 1.0, 1.0, 25.0, 25.0, 25.0);
     let difference = Vector6::from_fn(|axis, _| {
         let step = if axis < 3 { 4e-5 } else { 1e-3 };
         let value = |s: f64| {
             let pose = twisted(pose, &center, &unit(axis, s * step));
-            renderer.evaluate(model, &pose, light, target).total
+            loss.evaluate(model, &pose, light, target).total
         };
         (value(1.0) - value(-1.0)) / (2.0 * step)
     });
@@ -262,11 +260,15 @@ fn compare_gradient(
     (a.dot(&b) / (a.norm() * b.norm()), (a - b).norm() / b.norm())
 }
 
-fn full_options() -> ContourOptions {
-    ContourOptions {
+fn contour(half_width: f64) -> Mode {
+    Mode::Contour(ContourOptions { half_width })
+}
+
+fn full_options() -> LossOptions {
+    LossOptions {
         mask_weight: 0.5,
         depth: Some(DepthOptions { weight: 1.0, scale: 0.02, truncation: 0.03 }),
-        ..ContourOptions::default()
+        ..LossOptions::default()
     }
 }
 
@@ -279,21 +281,21 @@ fn gradients_match_differences_of_the_value() {
         ("painted sphere", painted(sphere(0.045, 240), 0.04), lamp()),
     ];
     let options = [
-        ContourOptions::default(),
-        full_options(),
-        ContourOptions { robust: Robust::Cauchy(0.1), half_width: 1.5, ..full_options() },
-        ContourOptions { robust: Robust::Huber(0.05), ..ContourOptions::default() },
+        (1.0, LossOptions::default()),
+        (1.0, full_options()),
+        (1.5, LossOptions { robust: Robust::Cauchy(0.1), ..full_options() }),
+        (1.0, LossOptions { robust: Robust::Huber(0.05), ..LossOptions::default() }),
     ];
     for (name, mesh, light) in scenes {
         let model = RenderModel::new(&mesh).unwrap();
-        for (seed, options) in options.iter().enumerate() {
+        for (seed, (half_width, options)) in options.into_iter().enumerate() {
             let mut noise = Noise(40 + seed as u64);
             let truth = pose(&mut noise);
             let target = target_of(&model, &truth, &light, None, 0.5);
             let twist = [0, 1, 2, 3, 4, 5].map(|i| noise.next() * if i < 3 { 0.004 } else { 0.08 });
             let guess = twisted(&truth, &(truth * model.center()), &twist);
-            let renderer = ContourRenderer::new(*options);
-            let (cosine, error) = compare_gradient(&renderer, &model, &guess, &light, &target);
+            let loss = PoseLoss::new(contour(half_width), options);
+            let (cosine, error) = compare_gradient(&loss, &model, &guess, &light, &target);
             assert!(cosine > 0.999 && error < 0.02, "{name} {seed}: {cosine} {error}");
         }
     }
@@ -304,15 +306,15 @@ fn evaluate_is_the_value_of_linearise_and_zero_at_the_truth() {
     let model = RenderModel::new(&painted(lump(0.045, 60), 0.05)).unwrap();
     let truth = pose(&mut Noise(5));
     let target = target_of(&model, &truth, &lamp(), None, 0.5);
-    let renderer = ContourRenderer::new(full_options());
+    let loss = PoseLoss::new(Mode::default(), full_options());
     let guess =
         twisted(&truth, &(truth * model.center()), &[0.002, -0.003, 0.004, 0.02, 0.05, -0.04]);
-    let value = renderer.evaluate(&model, &guess, &lamp(), &target);
-    let linearised = renderer.linearise(&model, &guess, &Point3::origin(), &lamp(), &target);
+    let value = loss.evaluate(&model, &guess, &lamp(), &target);
+    let linearised = loss.linearise(&model, &guess, &Point3::origin(), &lamp(), &target);
     assert_eq!(value, linearised.loss);
     assert!((value.total - value.color - value.mask - value.depth).abs() < 1e-15);
     assert!(value.color > 1e-4 && value.mask > 1e-4 && value.depth > 1e-4);
-    let at_truth = ContourRenderer::default().evaluate(&model, &truth, &lamp(), &target);
+    let at_truth = PoseLoss::default().evaluate(&model, &truth, &lamp(), &target);
     // Only the faint outer half of the band differs from the hard mask.
     assert!(at_truth.total < 0.1 * value.color, "{at_truth:?} {value:?}");
 }
@@ -328,10 +330,10 @@ fn gauss_newton_steps_find_the_pose() {
         let center = truth * model.center();
         let twist = [0, 1, 2, 3, 4, 5].map(|i| noise.next() * if i < 3 { 0.002 } else { 0.05 });
         let mut guess = twisted(&truth, &center, &twist);
-        let renderer = ContourRenderer::default();
+        let loss = PoseLoss::default();
         for _ in 0..12 {
             let c = guess * model.center();
-            let at = renderer.linearise(&model, &guess, &c, &lamp(), &target);
+            let at = loss.linearise(&model, &guess, &c, &lamp(), &target);
             let damped = at.jtj * 2.0 + Matrix6::from_diagonal(&at.jtj.diagonal()) * 1e-3;
             let step = -(damped.cholesky().unwrap().solve(&at.gradient));
             guess = twisted(&guess, &c, &step.into());
@@ -350,25 +352,25 @@ fn a_known_occluder_silences_what_it_hides() {
     let bar = RenderModel::new(&cuboid(Vector3::new(0.024, 0.2, 0.02))).unwrap();
     let hand = depth_map(&camera(), &[(&bar, Isometry3::translation(0.005, 0.0, 0.3))]);
     let target = target_of(&model, &truth, &lamp(), Some(hand), 0.5);
-    let renderer = ContourRenderer::new(full_options());
+    let loss = PoseLoss::new(Mode::default(), full_options());
     let guess =
         twisted(&truth, &(truth * model.center()), &[0.003, 0.001, -0.003, 0.05, -0.04, 0.05]);
-    let (cosine, error) = compare_gradient(&renderer, &model, &guess, &lamp(), &target);
+    let (cosine, error) = compare_gradient(&loss, &model, &guess, &lamp(), &target);
     assert!(cosine > 0.999 && error < 0.03, "{cosine} {error}");
-    let value = renderer.evaluate(&model, &guess, &lamp(), &target);
+    let value = loss.evaluate(&model, &guess, &lamp(), &target);
     assert!(value.counts.hidden > 500, "{value:?}");
     // At the truth the hidden part costs nothing, while without the occluder it is all residual.
-    let at_truth = renderer.evaluate(&model, &truth, &lamp(), &target).total;
+    let at_truth = loss.evaluate(&model, &truth, &lamp(), &target).total;
     let blind = Target { occluder: None, ..target.clone() };
-    assert!(renderer.evaluate(&model, &truth, &lamp(), &blind).total > 20.0 * at_truth);
+    assert!(loss.evaluate(&model, &truth, &lamp(), &blind).total > 20.0 * at_truth);
     // Hidden altogether: neither covered pixels nor derivatives.
     let wall = target.with_occluder(DepthImage::filled(160, 120, 0.2)).unwrap();
-    let nothing = renderer.linearise(&model, &guess, &Point3::origin(), &lamp(), &wall);
+    let nothing = loss.linearise(&model, &guess, &Point3::origin(), &lamp(), &wall);
     assert_eq!(nothing.gradient, Vector6::zeros());
     assert_eq!(nothing.loss.counts.covered, 0);
     // Hidden pixels of the mask cost nothing, or as much as if the object were not there at all.
     let counting =
-        ContourRenderer::new(ContourOptions { hidden_is_missed: true, ..full_options() });
+        PoseLoss::new(Mode::default(), LossOptions { hidden_is_missed: true, ..full_options() });
     let away = Isometry3::translation(9.0, 0.0, 0.4);
     let missed = counting.evaluate(&model, &away, &lamp(), &wall).total;
     let hidden = counting.linearise(&model, &guess, &Point3::origin(), &lamp(), &wall);
@@ -387,10 +389,10 @@ fn an_object_partly_outside_the_image_has_the_right_gradient() {
         let mut truth = pose(&mut noise);
         truth.translation.vector += shift;
         let target = target_of(&model, &truth, &lamp(), None, 0.5);
-        let renderer = ContourRenderer::new(full_options());
+        let loss = PoseLoss::new(Mode::default(), full_options());
         let guess =
             twisted(&truth, &(truth * model.center()), &[0.002, 0.001, -0.003, 0.05, -0.04, 0.05]);
-        let (cosine, error) = compare_gradient(&renderer, &model, &guess, &lamp(), &target);
+        let (cosine, error) = compare_gradient(&loss, &model, &guess, &lamp(), &target);
         assert!(cosine > 0.998 && error < 0.05, "{shift}: {cosine} {error}");
     }
 }
@@ -400,13 +402,13 @@ fn what_cannot_be_seen_misses_the_whole_mask() {
     let model = RenderModel::new(&painted(lump(0.045, 30), 0.05)).unwrap();
     let truth = pose(&mut Noise(3));
     let target = target_of(&model, &truth, &lamp(), None, 0.5);
-    let renderer = ContourRenderer::new(full_options());
+    let loss = PoseLoss::new(Mode::default(), full_options());
     let area = target.area() as usize;
     let mut poses =
         vec![Isometry3::translation(0.0, 0.0, -0.4), Isometry3::translation(9.0, 0.0, 0.4)];
     poses.extend([f64::NAN, f64::INFINITY].map(|v| Isometry3::translation(v, 0.0, v)));
     for pose in poses {
-        let at = renderer.linearise(&model, &pose, &Point3::origin(), &lamp(), &target);
+        let at = loss.linearise(&model, &pose, &Point3::origin(), &lamp(), &target);
         assert_eq!((at.loss.counts.missed, at.loss.counts.covered), (area, 0));
         assert_eq!((at.gradient, at.jtj), (Vector6::zeros(), Matrix6::zeros()));
         assert!((at.loss.mask - 0.5 / 3.0).abs() < 1e-9 && at.loss.color > 0.05);
@@ -414,7 +416,7 @@ fn what_cannot_be_seen_misses_the_whole_mask() {
     // The camera inside the object, and in its surface: whatever is seen, everything stays finite.
     for z in [0.0, 0.03, 0.046, 0.06] {
         let pose = Isometry3::translation(0.0, 0.0, z);
-        let at = renderer.linearise(&model, &pose, &Point3::origin(), &lamp(), &target);
+        let at = loss.linearise(&model, &pose, &Point3::origin(), &lamp(), &target);
         assert!(at.loss.total.is_finite() && at.gradient.iter().all(|v| v.is_finite()));
         assert!(at.jtj.iter().all(|v| v.is_finite()));
     }
@@ -425,11 +427,11 @@ fn results_do_not_depend_on_the_number_of_threads() {
     let model = RenderModel::new(&painted(torus(0.04, 0.015, 60), 0.05)).unwrap();
     let truth = pose(&mut Noise(8));
     let target = target_of(&model, &truth, &lamp(), None, 0.5);
-    let renderer = ContourRenderer::new(full_options());
+    let loss = PoseLoss::new(Mode::default(), full_options());
     let guess = twisted(&truth, &Point3::origin(), &[0.002, 0.001, -0.003, 0.01, -0.01, 0.01]);
     let run = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| renderer.linearise(&model, &guess, &Point3::origin(), &lamp(), &target))
+        pool.install(|| loss.linearise(&model, &guess, &Point3::origin(), &lamp(), &target))
     };
     assert_eq!(run(1), run(4));
 }
@@ -440,7 +442,7 @@ fn light_is_recovered_from_its_samples() {
     let truth = pose(&mut Noise(9));
     let light = lamp();
     let target = target_of(&model, &truth, &light, None, 0.5);
-    let samples = ContourRenderer::default().light_samples(&model, &truth, &target);
+    let samples = light_samples(&model, &truth, &target, 1.0);
     assert!(samples.len() > 2000);
     let fitted = Light::fit(&samples, 0.0).unwrap();
     for k in 0..3 {
@@ -497,11 +499,8 @@ fn gradients_match_differences_of_supersampled_pictures() {
             let b = difference.component_mul(&scale);
             // A step of half-width 0.645 blurs as much as a pixel's box; one pixel is the default.
             for (half_width, limit) in [(0.645, 0.03), (1.0, 0.035)] {
-                let renderer = ContourRenderer::new(ContourOptions {
-                    half_width,
-                    ..ContourOptions::default()
-                });
-                let at = renderer.linearise(&model, &guess, &center, &light, &target);
+                let loss = PoseLoss::new(contour(half_width), LossOptions::default());
+                let at = loss.linearise(&model, &guess, &center, &light, &target);
                 let a = at.gradient.component_mul(&scale);
                 let cosine = a.dot(&b) / (a.norm() * b.norm());
                 let error = (a - b).norm() / b.norm();
@@ -518,14 +517,14 @@ fn gradients_match_differences_of_supersampled_pictures() {
 fn contours_inside_the_object_have_derivatives() {
     // Seen from the side, a torus hides a part of itself; in half of these poses the step is visible.
     let model = RenderModel::new(&painted(torus(0.04, 0.015, 90), 0.05)).unwrap();
-    let renderer = ContourRenderer::default();
+    let loss = PoseLoss::default();
     for seed in 140..152 {
         let mut noise = Noise(seed);
         let truth = pose(&mut noise);
         let target = target_of(&model, &truth, &lamp(), None, 0.5);
         let twist = [0, 1, 2, 3, 4, 5].map(|i| noise.next() * if i < 3 { 0.004 } else { 0.08 });
         let guess = twisted(&truth, &(truth * model.center()), &twist);
-        let (cosine, error) = compare_gradient(&renderer, &model, &guess, &lamp(), &target);
+        let (cosine, error) = compare_gradient(&loss, &model, &guess, &lamp(), &target);
         assert!(cosine > 0.999 && error < 0.1, "{seed}: {cosine} {error}");
     }
 }

@@ -1,14 +1,12 @@
-//! What the contour loss consists of.
+//! What the loss of a pose consists of.
 
-/// Settings of [`super::ContourRenderer`].
+/// What a [`PoseLoss`](super::PoseLoss) consists of, whatever the mode.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ContourOptions {
-    /// Half-width of the contour band \[px\]: over this distance on both sides of the outline the object fades
-    /// into the background. 0.645 (the square root of 5/12) blurs as much as a pixel that averages over its square; one adds
-    /// a camera's own blur; more widens the basin of attraction.
-    pub half_width: f64,
+pub struct LossOptions {
+    /// Weight of the squared colour difference a channel. Zero leaves it out.
+    pub color_weight: f64,
     /// Weight of the squared difference between the object's coverage (0..=1) and the mask, relative to one
-    /// colour channel. Zero leaves it out.
+    /// colour channel of weight one. Zero leaves it out.
     pub mask_weight: f64,
     /// Comparison of depth, if the target has any.
     pub depth: Option<DepthOptions>,
@@ -20,11 +18,11 @@ pub struct ContourOptions {
     pub hidden_is_missed: bool,
 }
 
-impl Default for ContourOptions {
-    /// The mean squared error of the colour alone, with a band of one pixel.
+impl Default for LossOptions {
+    /// The mean squared error of the colour alone.
     fn default() -> Self {
         Self {
-            half_width: 1.0,
+            color_weight: 1.0,
             mask_weight: 0.0,
             depth: None,
             robust: Robust::None,

@@ -2,7 +2,7 @@
 
 use crate::camera::Camera;
 use crate::image::{DepthImage, Mask, RgbImage};
-use crate::posed::Region;
+use crate::projected::Region;
 
 /// A segmented image: colour where the object is, black elsewhere, with optional depth and the depth of
 /// known bodies that may hide the object.

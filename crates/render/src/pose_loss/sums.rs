@@ -2,8 +2,7 @@
 
 use nalgebra::{Matrix6, Vector6};
 
-/// A derivative by the twist (translation, rotation).
-pub(crate) type Row = [f32; 6];
+use super::pixel::Row;
 
 /// Numbers of pixels by what became of them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

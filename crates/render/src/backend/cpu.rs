@@ -1,0 +1,41 @@
+//! The processor at hand.
+
+use rayon::prelude::*;
+
+use super::{Backend, BackendError, Hypothesis, PoseProblem, Session};
+use crate::pose_loss::{Linearised, Loss, PoseImage};
+
+/// All cores of this processor. Never fails.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Cpu;
+
+impl Backend for Cpu {
+    fn name(&self) -> &str {
+        "CPU"
+    }
+
+    fn prepare(&self, problem: &PoseProblem) -> Result<Box<dyn Session>, BackendError> {
+        Ok(Box::new(problem.clone()))
+    }
+}
+
+impl Session for PoseProblem {
+    fn evaluate(&mut self, hypotheses: &[Hypothesis]) -> Result<Vec<Loss>, BackendError> {
+        let one = |h: &Hypothesis| {
+            self.loss.evaluate(&self.model, &h.t_cam_object, &h.light, &self.target)
+        };
+        Ok(hypotheses.par_iter().map(one).collect())
+    }
+
+    fn linearise(&mut self, hypotheses: &[Hypothesis]) -> Result<Vec<Linearised>, BackendError> {
+        let one = |h: &Hypothesis| {
+            let center = h.t_cam_object * self.model.center();
+            self.loss.linearise(&self.model, &h.t_cam_object, &center, &h.light, &self.target)
+        };
+        Ok(hypotheses.par_iter().map(one).collect())
+    }
+
+    fn render(&mut self, h: &Hypothesis) -> Result<PoseImage, BackendError> {
+        Ok(self.loss.render(&self.model, &h.t_cam_object, &self.target.camera, &h.light))
+    }
+}

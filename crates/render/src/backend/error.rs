@@ -1,0 +1,29 @@
+//! What can go wrong on a device.
+
+/// Why a device did not answer.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum BackendError {
+    /// There is no device of the kind asked for.
+    #[error("no graphics device: {0}")]
+    NoDevice(String),
+    /// The device was lost or its driver failed.
+    #[error("{device}: {reason}")]
+    Device {
+        /// The device's name.
+        device: String,
+        /// What the driver said.
+        reason: String,
+    },
+    /// The problem does not fit the device.
+    #[error("{device}: {what} needs {needed} bytes, at most {limit} are allowed")]
+    TooLarge {
+        /// The device's name.
+        device: String,
+        /// What is too large.
+        what: &'static str,
+        /// Bytes needed.
+        needed: u64,
+        /// Bytes the device allows.
+        limit: u64,
+    },
+}

@@ -1,0 +1,46 @@
+//! What the estimation of light needs from a posed model and an image.
+
+use nalgebra::{Isometry3, Point3};
+
+use super::{Band, ContourView, surface};
+use crate::light::{Light, LightSample};
+use crate::mode::ContourOptions;
+use crate::model::{NONE, RenderModel};
+use crate::pose_loss::Target;
+use crate::projected::Region;
+use crate::raster::MISS;
+
+/// What [`Light::fit`] needs: unlit colour, normal and observed colour where the object is seen inside the
+/// mask and more than `margin` pixels away from its outline.
+pub fn light_samples(
+    model: &RenderModel,
+    t_cam_object: &Isometry3<f64>,
+    target: &Target,
+    margin: f64,
+) -> Vec<LightSample> {
+    let options = ContourOptions { half_width: margin };
+    let (center, light, also) = (Point3::origin(), Light::ambient(1.0), Region::EMPTY);
+    let camera = &target.camera;
+    let view = ContourView::new(&options, model, t_cam_object, &center, camera, &light, &also);
+    let scene = &view.scene;
+    let mut samples = Vec::new();
+    for visible in &view.visible {
+        let band = Band::new(view.pieces.iter(), &visible.region, scene.half_width);
+        for (i, &face) in visible.face.iter().enumerate() {
+            if face == MISS || band.piece[i] != NONE {
+                continue;
+            }
+            let (x, y) = visible.position(i);
+            let at = y * camera.width + x;
+            if target.coverage[at] < 1.0 || target.hides(at, 1.0 / visible.inverse_z[i]) {
+                continue;
+            }
+            let face = face as usize;
+            let b = scene.barycentric(face, x as f32, y as f32);
+            let (albedo, _, _) = surface::albedo(&scene.posed, face, b);
+            let normal = scene.posed.rotation * surface::normal(&scene.posed, face, b).0;
+            samples.push(LightSample { albedo, normal, observed: target.color[at] });
+        }
+    }
+    samples
+}

@@ -1,0 +1,177 @@
+//! The loss of a pose: a posed object compared with a segmented image, with exact derivatives by the pose.
+
+mod options;
+mod pixel;
+mod residuals;
+mod sums;
+mod target;
+#[cfg(test)]
+mod tests;
+
+use nalgebra::{Isometry3, Matrix6, Point3, Vector6};
+
+pub use options::{DepthOptions, LossOptions, Robust};
+pub(crate) use pixel::{Pixel, Row, Seen, View};
+pub use sums::Counts;
+use sums::Sums;
+pub use target::{Target, TargetError};
+
+use crate::camera::Camera;
+use crate::contour::ContourView;
+use crate::image::{DepthImage, RgbImage};
+use crate::light::Light;
+use crate::mode::Mode;
+use crate::model::RenderModel;
+use crate::projected::Region;
+use crate::softras::SoftRasView;
+
+/// Renders a posed object and compares it with a segmented image.
+///
+/// Stateless but for its settings; share it freely between threads. Results do not depend on the number of
+/// threads. A pose that is not finite, or puts the object behind the camera or outside the image, renders nothing:
+/// the loss is then that of the whole mask missed, with zero gradient.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PoseLoss {
+    /// How visibility is softened.
+    pub mode: Mode,
+    /// What is compared.
+    pub options: LossOptions,
+}
+
+/// The loss of a pose: weighted squared residuals over three times the area of the target's mask \[px\], so that
+/// without further channels it is the mean squared error over the mask's pixels and colour channels.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Loss {
+    /// Sum of the three below.
+    pub total: f64,
+    /// Share of the colour.
+    pub color: f64,
+    /// Share of the mask.
+    pub mask: f64,
+    /// Share of the depth.
+    pub depth: f64,
+    /// Numbers of pixels.
+    pub counts: Counts,
+}
+
+/// A loss with its derivatives by a left twist of the pose, (translation \[m\], rotation \[rad\]), about a given centre.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Linearised {
+    /// The loss.
+    pub loss: Loss,
+    /// Its gradient, 2 Jᵀr / N.
+    pub gradient: Vector6<f64>,
+    /// JᵀJ / N: the Gauss–Newton approximation of half the loss's Hessian, so that the step is −(2 `jtj`)⁻¹ `gradient`.
+    pub jtj: Matrix6<f64>,
+}
+
+/// A picture of the object alone, as the mode sees it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PoseImage {
+    /// Colour blended with the black background.
+    pub color: RgbImage,
+    /// Coverage α in 0..=1, row-major.
+    pub coverage: Vec<f32>,
+    /// Z of the surface at pixel centres \[m\], 0 where there is none.
+    pub depth: DepthImage,
+}
+
+impl PoseLoss {
+    /// A loss of the given settings.
+    pub fn new(mode: Mode, options: LossOptions) -> Self {
+        Self { mode, options }
+    }
+
+    /// The loss of `model` at pose `t_cam_object` under `light`.
+    pub fn evaluate(
+        &self,
+        model: &RenderModel,
+        t_cam_object: &Isometry3<f64>,
+        light: &Light,
+        target: &Target,
+    ) -> Loss {
+        let sums = self.sum::<false>(model, t_cam_object, &Point3::origin(), light, target);
+        self.loss(&sums, target)
+    }
+
+    /// The loss, its gradient and the Gauss–Newton matrix by the twist about `center` (camera frame \[m\]).
+    pub fn linearise(
+        &self,
+        model: &RenderModel,
+        t_cam_object: &Isometry3<f64>,
+        center: &Point3<f64>,
+        light: &Light,
+        target: &Target,
+    ) -> Linearised {
+        let sums = self.sum::<true>(model, t_cam_object, center, light, target);
+        let (right, jtj) = sums.equations(target.normalisation);
+        Linearised { loss: self.loss(&sums, target), gradient: right * 2.0, jtj }
+    }
+
+    /// The picture whose difference from the target is the loss's residual (without occluder).
+    pub fn render(
+        &self,
+        model: &RenderModel,
+        t_cam_object: &Isometry3<f64>,
+        camera: &Camera,
+        light: &Light,
+    ) -> PoseImage {
+        let (center, also) = (Point3::origin(), Region::EMPTY);
+        match &self.mode {
+            Mode::Contour(options) => picture(
+                &ContourView::new(options, model, t_cam_object, &center, camera, light, &also),
+                camera,
+            ),
+            Mode::SoftRas(options) => picture(
+                &SoftRasView::new(options, model, t_cam_object, &center, camera, light, &also),
+                camera,
+            ),
+        }
+    }
+
+    fn loss(&self, sums: &Sums, target: &Target) -> Loss {
+        let n = target.normalisation;
+        let (color, mask, depth) = (sums.color * n, sums.mask * n, sums.depth * n);
+        Loss { total: color + mask + depth, color, mask, depth, counts: sums.counts }
+    }
+
+    fn sum<const DERIVATIVES: bool>(
+        &self,
+        model: &RenderModel,
+        pose: &Isometry3<f64>,
+        center: &Point3<f64>,
+        light: &Light,
+        target: &Target,
+    ) -> Sums {
+        let (camera, also) = (&target.camera, &target.bounds);
+        match &self.mode {
+            Mode::Contour(options) => {
+                let view = ContourView::new(options, model, pose, center, camera, light, also);
+                residuals::sum::<DERIVATIVES>(&view, &self.options, target)
+            }
+            Mode::SoftRas(options) => {
+                let view = SoftRasView::new(options, model, pose, center, camera, light, also);
+                residuals::sum::<DERIVATIVES>(&view, &self.options, target)
+            }
+        }
+    }
+}
+
+fn picture(view: &impl View, camera: &Camera) -> PoseImage {
+    let mut image = PoseImage {
+        color: RgbImage::filled(camera.width, camera.height, [0.0; 3]),
+        coverage: vec![0.0; camera.width * camera.height],
+        depth: DepthImage::filled(camera.width, camera.height, 0.0),
+    };
+    for block in 0..view.blocks() {
+        view.visit::<false>(block, |x, y, seen| {
+            let at = y * camera.width + x;
+            if let Some(Seen { pixel, hit, .. }) = seen {
+                image.color.pixels_mut()[at] = pixel.color;
+                image.coverage[at] = pixel.coverage;
+                image.depth.pixels_mut()[at] = if hit { pixel.z } else { 0.0 };
+            }
+        });
+    }
+    image
+}

@@ -1,0 +1,48 @@
+//! What a pixel shows of the posed object, in either mode.
+
+/// A derivative by the twist (translation, rotation).
+pub(crate) type Row = [f32; 6];
+
+/// What a pixel shows of the object: colour and coverage after blending with the black background, the
+/// depth of the surface there, and their derivatives by the twist.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Pixel {
+    /// α C.
+    pub(crate) color: [f32; 3],
+    /// α: one inside, one half on the outline, zero outside.
+    pub(crate) coverage: f32,
+    /// Z of the surface, or outside of the nearest outline point \[m\].
+    pub(crate) z: f32,
+    /// Weight of the depth here: one inside, falling to zero at the outline, where depth says little.
+    pub(crate) depth_weight: f32,
+    pub(crate) color_rows: [Row; 3],
+    pub(crate) coverage_row: Row,
+    pub(crate) z_row: Row,
+    pub(crate) depth_weight_row: Row,
+}
+
+/// A pixel with what kind of pixel it is.
+pub(crate) struct Seen {
+    pub(crate) pixel: Pixel,
+    /// A face covers the pixel's centre.
+    pub(crate) hit: bool,
+    /// The centre lies within the contour band.
+    pub(crate) near_outline: bool,
+}
+
+/// A posed, lit model as a mode shows it.
+pub(crate) trait View: Sync {
+    /// The number of blocks of rows, each a task of its own.
+    fn blocks(&self) -> usize;
+
+    /// One past the last column visited.
+    fn right(&self) -> usize;
+
+    /// Calls `each` for every pixel of one block, row by row, with its column and row and what is seen of the object
+    /// there, if anything.
+    fn visit<const DERIVATIVES: bool>(
+        &self,
+        block: usize,
+        each: impl FnMut(usize, usize, Option<Seen>),
+    );
+}

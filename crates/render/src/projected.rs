@@ -1,0 +1,111 @@
+//! Projected triangles: all that visibility needs to know.
+
+use crate::camera::Camera;
+use crate::model::Edge;
+
+/// A rectangle of pixels; the upper ends are exclusive.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Region {
+    pub(crate) x0: usize,
+    pub(crate) y0: usize,
+    pub(crate) x1: usize,
+    pub(crate) y1: usize,
+}
+
+impl Region {
+    pub(crate) const EMPTY: Self = Self { x0: 0, y0: 0, x1: 0, y1: 0 };
+
+    pub(crate) fn width(&self) -> usize {
+        self.x1 - self.x0
+    }
+
+    /// The smallest rectangle around both.
+    pub(crate) fn union(&self, other: &Self) -> Self {
+        if *self == Self::EMPTY {
+            return *other;
+        }
+        if *other == Self::EMPTY {
+            return *self;
+        }
+        Self {
+            x0: self.x0.min(other.x0),
+            y0: self.y0.min(other.y0),
+            x1: self.x1.max(other.x1),
+            y1: self.y1.max(other.y1),
+        }
+    }
+}
+
+/// The faces and edges of one or several surfaces, projected into the image.
+pub(crate) struct Projected<'a> {
+    pub(crate) faces: &'a [[u32; 3]],
+    pub(crate) edges: &'a [Edge],
+    /// Column, row \[px\] and 1/Z \[1/m\] of each vertex; 1/Z is 0 where it is not in front of the camera.
+    pub(crate) screen: Vec<[f32; 3]>,
+    /// Per face: 1 seen from outside, -1 seen from inside, 0 not drawn.
+    pub(crate) facing: Vec<i8>,
+    /// Pixels that may be covered.
+    pub(crate) region: Region,
+}
+
+impl<'a> Projected<'a> {
+    /// `closed` says of a face whether it is drawn from outside only; `margin` pixels are added around the covered
+    /// region.
+    pub(crate) fn new(
+        faces: &'a [[u32; 3]],
+        edges: &'a [Edge],
+        closed: impl Fn(usize) -> bool,
+        screen: Vec<[f32; 3]>,
+        camera: &Camera,
+        margin: f32,
+    ) -> Self {
+        let facing = faces.iter().enumerate().map(|(i, f)| facing(&screen, f, closed(i))).collect();
+        let region = region(&screen, camera, margin);
+        Self { faces, edges, screen, facing, region }
+    }
+
+    /// Screen positions of a face's corners.
+    #[inline]
+    pub(crate) fn corners(&self, face: usize) -> [[f32; 3]; 3] {
+        self.faces[face].map(|v| self.screen[v as usize])
+    }
+}
+
+/// Twice the signed area of a screen triangle \[px²\]; negative where its outside is seen.
+#[inline]
+pub(crate) fn signed_area([a, b, c]: &[[f32; 3]; 3]) -> f32 {
+    (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+}
+
+fn facing(screen: &[[f32; 3]], face: &[u32; 3], closed: bool) -> i8 {
+    let corners = face.map(|v| screen[v as usize]);
+    if corners.iter().any(|c| c[2] == 0.0) {
+        return 0;
+    }
+    let area = signed_area(&corners);
+    match () {
+        () if area < 0.0 => 1,
+        () if area > 0.0 && !closed => -1,
+        () => 0,
+    }
+}
+
+fn region(screen: &[[f32; 3]], camera: &Camera, margin: f32) -> Region {
+    let (mut low, mut high) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
+    for p in screen.iter().filter(|p| p[2] > 0.0) {
+        for i in 0..2 {
+            low[i] = low[i].min(p[i]);
+            high[i] = high[i].max(p[i]);
+        }
+    }
+    // Float-to-integer casts saturate, so far-off projections clip to the image.
+    let start = |v: f32| (v - margin).ceil().max(0.0) as usize;
+    let end = |v: f32, size: usize| ((v + margin).floor() + 1.0).clamp(0.0, size as f32) as usize;
+    let region = Region {
+        x0: start(low[0]),
+        y0: start(low[1]),
+        x1: end(high[0], camera.width),
+        y1: end(high[1], camera.height),
+    };
+    if region.x0 < region.x1 && region.y0 < region.y1 { region } else { Region::EMPTY }
+}
