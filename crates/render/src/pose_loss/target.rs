@@ -28,7 +28,7 @@ pub enum TargetError {
     /// An image does not have the camera's size.
     #[error("{image} is {width} x {height}, the camera {camera_width} x {camera_height}")]
     Size {
-        /// `"image"`, `"mask"`, `"depth"` or `"occluder"`.
+        /// `"image"`, `"mask"`, `"matte"`, `"depth"` or `"occluder"`.
         image: &'static str,
         /// Columns.
         width: usize,
@@ -55,6 +55,28 @@ impl Target {
         let coverage = mask.pixels().iter().map(|&m| if m { 1.0 } else { 0.0 }).collect();
         let segmented = image.pixels().iter().zip(mask.pixels());
         let color = segmented.map(|(c, &m)| if m { *c } else { [0.0; 3] }).collect();
+        Self::assemble(camera, color, coverage)
+    }
+
+    /// From a picture of the object over black and how much of each pixel the object covers (0..=1, row-major; a matte),
+    /// which unlike a binary mask places the outline within the pixel.
+    ///
+    /// # Errors
+    /// When a size differs from the camera's or nothing is covered.
+    pub fn from_matte(
+        camera: Camera,
+        image: &RgbImage,
+        coverage: Vec<f32>,
+    ) -> Result<Self, TargetError> {
+        check(&camera, "image", image.width(), image.height())?;
+        if coverage.len() != camera.width * camera.height {
+            check(&camera, "matte", coverage.len() / camera.height.max(1), camera.height)?;
+        }
+        // A NaN is not above zero and so becomes zero.
+        let coverage: Vec<f32> =
+            coverage.into_iter().map(|a| if a > 0.0 { a.min(1.0) } else { 0.0 }).collect();
+        let covered = image.pixels().iter().zip(&coverage);
+        let color = covered.map(|(c, a)| if *a > 0.0 { *c } else { [0.0; 3] }).collect();
         Self::assemble(camera, color, coverage)
     }
 
