@@ -1,0 +1,98 @@
+//! Times the loss of a pose, alone and with gradient and Gauss–Newton matrix, in both modes:
+//! `cargo bench -p prehend-render`.
+//!
+//! The bottle of 5k and 16k faces covers some 12 000 pixels of 256 x 256 and of 640 x 480. `RAYON_NUM_THREADS=1` times one
+//! thread.
+
+#[path = "../examples/bottle/mod.rs"]
+mod bottle;
+
+use std::hint::black_box;
+use std::sync::Arc;
+use std::time::Instant;
+
+use bottle::{SIZES, bottle, camera, guess, truth};
+use nalgebra::Isometry3;
+use prehend_geometry::shapes::capsule;
+use prehend_render::{
+    Backend, Cpu, DepthOptions, Hypothesis, Light, LossOptions, Mode, PoseLoss, PoseProblem,
+    RenderModel, SceneObject, SoftRasOptions, Target, depth_map, render_scene,
+};
+
+fn main() -> anyhow::Result<()> {
+    let full = LossOptions {
+        mask_weight: 0.5,
+        depth: Some(DepthOptions { weight: 1.0, scale: 0.02, truncation: 0.03 }),
+        ..LossOptions::default()
+    };
+    let runs = [
+        ("contour", PoseLoss::default()),
+        ("contour; mask, depth, hand too", PoseLoss::new(Mode::default(), full)),
+        (
+            "SoftRas",
+            PoseLoss::new(Mode::SoftRas(SoftRasOptions::default()), LossOptions::default()),
+        ),
+    ];
+    let backends: Vec<Box<dyn Backend>> = vec![Box::new(Cpu)];
+    println!("| device | loss | image | faces | pixels | value, ms | with derivatives, ms |");
+    println!("|---|---|---|--:|--:|--:|--:|");
+    for backend in &backends {
+        for cropped in [true, false] {
+            for (_, sides, rings) in SIZES {
+                let model = Arc::new(RenderModel::new(&bottle(sides, rings))?);
+                let (plain, full) = targets(&model, cropped)?;
+                for (name, loss) in runs {
+                    let target = if loss.options.depth.is_some() { &full } else { &plain };
+                    let (model, target) = (Arc::clone(&model), Arc::clone(target));
+                    let problem = PoseProblem { model, target, loss };
+                    let mut session = backend.prepare(&problem)?;
+                    let light = Light::headlight(0.5, 0.4);
+                    let start = [Hypothesis { t_cam_object: guess(), light }];
+                    let value = median(|| Ok(session.evaluate(&start)?[0].total))?;
+                    let all = median(|| Ok(session.linearise(&start)?[0].gradient[0]))?;
+                    println!(
+                        "| {} | {name} | {} x {} | {} | {:.0} | {value:.3} | {all:.3} |",
+                        backend.name(),
+                        problem.target.camera().width,
+                        problem.target.camera().height,
+                        problem.model.face_count(),
+                        problem.target.area()
+                    );
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The bottle at its true pose, alone, and with depth and partly behind a finger.
+fn targets(model: &RenderModel, cropped: bool) -> anyhow::Result<(Arc<Target>, Arc<Target>)> {
+    let camera = camera(cropped);
+    let light = Light::headlight(0.5, 0.4);
+    let draw = |model: &RenderModel, light: &Light| {
+        let object = SceneObject { model, t_cam_model: truth() };
+        render_scene(&camera, &[object], light, [0.0; 3], 5)
+    };
+    let picture = draw(model, &light);
+    let white = model.clone().with_uniform_color([1.0; 3]);
+    let matte = draw(&white, &Light::ambient(1.0)).color;
+    let coverage = matte.pixels().iter().map(|c| c[0]).collect();
+    let finger = RenderModel::new(&capsule(0.01, 0.06, 24, 8))?;
+    let hand = depth_map(&camera, &[(&finger, Isometry3::translation(0.03, 0.0, 0.5))]);
+    let plain = Target::from_matte(camera, &picture.color, coverage)?;
+    let full = plain.clone().with_depth(&picture.depth)?.with_occluder(hand)?;
+    Ok((Arc::new(plain), Arc::new(full)))
+}
+
+/// Milliseconds, after a warm-up.
+fn median(mut run: impl FnMut() -> anyhow::Result<f64>) -> anyhow::Result<f64> {
+    let (mut times, begin) = (Vec::new(), Instant::now());
+    black_box(run()?);
+    while times.len() < 11 || (times.len() < 501 && begin.elapsed().as_secs_f64() < 2.0) {
+        let start = Instant::now();
+        black_box(run()?);
+        times.push(start.elapsed().as_secs_f64() * 1e3);
+    }
+    times.sort_by(f64::total_cmp);
+    Ok(times[times.len() / 2])
+}
