@@ -5,7 +5,7 @@ use nalgebra::{Matrix4, Vector3, Vector4};
 /// First-order lighting, fixed in the camera frame.
 ///
 /// A surface with unit normal `n` (camera frame) and albedo `a` shows colour
-/// `a_c * max(0, ambient_c + directional_c · n)` in channel c: the first two bands of a spherical-harmonic
+/// `a_c * max(0, ambient_c + directional_c · n) + offset_c` in channel c: the first two bands of a spherical-harmonic
 /// irradiance map (Ramamoorthi and Hanrahan, "An efficient representation for irradiance environment maps",
 /// 2001), which also absorbs exposure and white balance.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -14,6 +14,8 @@ pub struct Light {
     pub ambient: [f64; 3],
     /// Direction and strength of the light, per channel, pointing towards the light (camera frame).
     pub directional: [Vector3<f64>; 3],
+    /// Added to the object's colour whatever its albedo, per channel: haze, or the camera's black level.
+    pub offset: [f64; 3],
 }
 
 /// One observation for [`Light::fit`]: a visible surface point.
@@ -49,12 +51,12 @@ pub enum LightError {
 impl Light {
     /// The same light from everywhere: colours are shown as stored times `strength`.
     pub fn ambient(strength: f64) -> Self {
-        Self { ambient: [strength; 3], directional: [Vector3::zeros(); 3] }
+        Self { ambient: [strength; 3], directional: [Vector3::zeros(); 3], offset: [0.0; 3] }
     }
 
     /// A light at the camera of strength `head` on surfaces that face it, over an ambient term.
     pub fn headlight(ambient: f64, head: f64) -> Self {
-        Self { ambient: [ambient; 3], directional: [Vector3::new(0.0, 0.0, -head); 3] }
+        Self { directional: [Vector3::new(0.0, 0.0, -head); 3], ..Self::ambient(ambient) }
     }
 
     /// Irradiance factor of channel `channel` (0..3) on a surface with unit normal `normal` (camera frame).

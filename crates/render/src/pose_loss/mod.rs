@@ -1,5 +1,6 @@
 //! The loss of a pose: a posed object compared with a segmented image, with exact derivatives by the pose.
 
+mod lane;
 mod options;
 mod pixel;
 mod residuals;
@@ -11,9 +12,11 @@ mod tests;
 use nalgebra::{Isometry3, Matrix6, Point3, Vector6};
 
 pub use options::{DepthOptions, LossOptions, Robust};
+pub(crate) use lane::{LANES, Lane, Patch, get, put};
 pub(crate) use pixel::{Pixel, Row, Seen, View};
+pub(crate) use residuals::Residuals;
 pub use sums::Counts;
-use sums::Sums;
+pub(crate) use sums::{LaneSums, Sums};
 pub use target::{Target, TargetError};
 
 use crate::camera::Camera;
@@ -144,14 +147,15 @@ impl PoseLoss {
         target: &Target,
     ) -> Sums {
         let (camera, also) = (&target.camera, &target.bounds);
+        let residuals = Residuals { options: &self.options, target };
         match &self.mode {
             Mode::Contour(options) => {
                 let view = ContourView::new(options, model, pose, center, camera, light, also);
-                residuals::sum::<DERIVATIVES>(&view, &self.options, target)
+                residuals.sum::<DERIVATIVES>(&view)
             }
             Mode::SoftRas(options) => {
                 let view = SoftRasView::new(options, model, pose, center, camera, light, also);
-                residuals::sum::<DERIVATIVES>(&view, &self.options, target)
+                residuals.sum::<DERIVATIVES>(&view)
             }
         }
     }
