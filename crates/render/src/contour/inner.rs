@@ -1,8 +1,8 @@
 //! Inner contours: where the object hides farther parts of itself.
 
 use super::outline::Piece;
-use super::pixel::{Scene, falling_step, scaled_sum};
-use crate::pose_loss::Pixel;
+use super::pixel::{Scene, falling_step};
+use crate::pose_loss::{Pixel, scaled_sum};
 use crate::projected::Projected;
 use crate::raster::{MISS, Visible};
 
@@ -79,7 +79,7 @@ impl Scene<'_> {
             (own, self.interior::<DERIVATIVES>(u, v, face, inverse_z))
         };
         let distance = foot.distance_squared.sqrt();
-        let (alpha, slope) = falling_step(side * distance, self.half_width);
+        let (alpha, slope) = self.coverage(&inner.piece, &foot, side);
         // Depth counts for nothing at the step itself.
         let (weight, weight_slope) =
             falling_step(self.half_width - 2.0 * distance, self.half_width);

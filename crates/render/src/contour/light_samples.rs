@@ -3,7 +3,6 @@
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::interior::barycentric;
-use super::vec3::vec3;
 use super::{Band, ContourView, surface};
 use crate::light::{Light, LightSample};
 use crate::mode::ContourOptions;
@@ -41,10 +40,7 @@ pub fn light_samples(
             let face = face as usize;
             let b = barycentric(projected.corners(face), x as f32, y as f32);
             let albedo = surface::albedo(&scene.posed, face, b).color;
-            let corners = scene.posed.model.normals[face].each_ref().map(vec3);
-            let side = if projected.facing[face] < 0 { -1.0 } else { 1.0 };
-            let (normal, _) = surface::normal(&corners, side, b);
-            let normal = scene.posed.rotation * Vector3::from(normal);
+            let normal = Vector3::from(scene.normal(face, x as f32, y as f32));
             samples.push(LightSample { albedo, normal, observed: target.color[at] });
         }
     }

@@ -28,6 +28,7 @@ use lanes::Waiting;
 use inner::{Inner, LEAST_STEP, inner_contours};
 pub use light_samples::light_samples;
 pub(crate) use outline::{Band, Piece, Silhouette, outline};
+use pixel::REACH;
 pub(crate) use pixel::Scene;
 pub(crate) use surface::Lighting;
 
@@ -54,14 +55,14 @@ impl<'a> ContourView<'a> {
     ) -> Self {
         // A band of zero width would divide by zero.
         let half_width = (options.half_width as f32).clamp(0.05, 64.0);
-        let posed = Posed::new(model, camera, pose, half_width);
+        let posed = Posed::new(model, camera, pose, half_width * REACH);
         let lighting = Lighting::new(light, &posed.rotation);
         let projected = &posed.projected;
         let region = projected.region.union(also);
         let visible = raster::rasterise(projected, &region);
         let silhouette = match projected.region == Region::EMPTY {
             true => Silhouette::default(),
-            false => outline(projected, &region, half_width),
+            false => outline(projected, &region, half_width * REACH),
         };
         let least = LEAST_STEP * model.radius() as f32;
         let inner = inner_contours(projected, &visible, silhouette.covered, least);
@@ -95,7 +96,7 @@ impl ContourView<'_> {
     #[inline]
     fn walk(&self, block: usize, mut each: impl FnMut(usize, usize, Found)) {
         let visible = &self.visible[block];
-        let width = self.scene.half_width;
+        let width = self.scene.half_width * REACH;
         let band = Band::new(self.pieces.iter(), &visible.region, width);
         let inner_pieces = self.inner.iter().map(|inner| &inner.piece);
         let inner_band = (!self.inner.is_empty())
@@ -153,6 +154,14 @@ impl View for ContourView<'_> {
         mut each: impl FnMut(usize, usize, Option<Seen>),
     ) {
         self.walk(block, |x, y, found| each(x, y, self.seen::<DERIVATIVES>(x, y, found)));
+    }
+
+    fn faces(&self, block: usize, mut each: impl FnMut(usize, usize, u32, [f32; 3])) {
+        let visible = &self.visible[block];
+        for (i, &face) in visible.face.iter().enumerate().filter(|(_, face)| **face != MISS) {
+            let (x, y) = visible.position(i);
+            each(x, y, face, self.scene.normal(face as usize, x as f32, y as f32));
+        }
     }
 
     /// Pixels inside faces are treated many at a time.

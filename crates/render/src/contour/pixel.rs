@@ -5,9 +5,9 @@ use nalgebra::Vector3;
 use super::inner::Inner;
 use super::interior::{Motion, add_level, barycentric, row};
 use super::outline::{Foot, Piece};
-use super::surface::{Lighting, Shaded, shade};
+use super::surface::{self, Lighting, Shaded, shade};
 use super::vec3::{Vec3, vec3};
-use crate::pose_loss::{Pixel, Row};
+use crate::pose_loss::{Pixel, Row, scaled_sum};
 use crate::posed::Posed;
 
 /// A posed, lit model, and the point about which twists turn (camera frame).
@@ -25,13 +25,38 @@ pub(crate) fn falling_step(s: f32, w: f32) -> (f32, f32) {
     (x * x * (3.0 - 2.0 * x), -3.0 * x * (1.0 - x) / w)
 }
 
-/// `p a + q b`.
-#[inline]
-pub(crate) fn scaled_sum(p: f32, a: &Row, q: f32, b: &Row) -> Row {
-    std::array::from_fn(|i| p * a[i] + q * b[i])
+/// The share of a pixel on the inner side of a straight edge at signed distance `s` (positive: the centre is outside) with
+/// unit normal `normal`, and its derivative by `s`; for a pixel `scale` times as large as it is.
+///
+/// A square pixel seen along the edge is a trapezium: two boxes as wide as the normal's components, folded.
+#[inline(always)]
+pub(crate) fn coverage(s: f32, normal: [f32; 2], scale: f32) -> (f32, f32) {
+    let (x, y) = (normal[0].abs(), normal[1].abs());
+    let (wide, narrow) = if x > y { (x, y) } else { (y, x) };
+    let narrow = narrow.max(1e-4);
+    let (flat, end) = (0.5 * (wide - narrow), 0.5 * (wide + narrow));
+    let u = s.abs() / scale;
+    let (half, density) = if u <= flat {
+        (u / wide, 1.0 / wide)
+    } else {
+        let left = (end - u).max(0.0);
+        (0.5 - left * left / (2.0 * wide * narrow), left / (wide * narrow))
+    };
+    (if s > 0.0 { 0.5 - half } else { 0.5 + half }, -density / scale)
 }
 
+/// How far beyond an edge a pixel reaches at most, relative to the half-width of the smooth step of the same variance.
+pub(crate) const REACH: f32 = 0.707_107 / 0.645_497;
+
 impl Scene<'_> {
+    /// [`coverage`] at the foot of a contour; `half_width` sets the scale.
+    #[inline]
+    pub(crate) fn coverage(&self, piece: &Piece, foot: &Foot, side: f32) -> (f32, f32) {
+        let distance = foot.distance_squared.sqrt();
+        let normal = direction(piece, foot, side);
+        coverage(side * distance, normal, self.half_width / 0.645_497)
+    }
+
     /// A pixel that `face` covers; `edge` is the outline piece and `inner` the inner contour within the band, if
     /// any.
     #[inline]
@@ -120,6 +145,16 @@ impl Scene<'_> {
         shade::<false>(&self.posed, &self.lighting, face as usize, b).color
     }
 
+    /// Unit normal of a face at pixel (x, y), camera frame.
+    pub(crate) fn normal(&self, face: usize, x: f32, y: f32) -> Vec3 {
+        let projected = &self.posed.projected;
+        let b = barycentric(projected.corners(face), x, y);
+        let corners = self.posed.model.normals[face].each_ref().map(vec3);
+        let side = if projected.facing[face] < 0 { -1.0 } else { 1.0 };
+        let (normal, _) = surface::normal(&corners, side, b);
+        vec3(&(self.posed.rotation * Vector3::from(normal)))
+    }
+
     /// Rows of the colour of an outline point, whose material point slides along the edge by `slide`.
     #[inline]
     fn foot_rows(&self, piece: &Piece, shaded: &Shaded, slide: &Row, pixel: &mut Pixel) {
@@ -153,7 +188,7 @@ impl Scene<'_> {
         let distance = foot.distance_squared.sqrt();
         let s = side * distance;
         let w = self.half_width;
-        let (alpha, slope) = falling_step(s, w);
+        let (alpha, slope) = self.coverage(piece, foot, side);
         // The same step, compressed to the inner half of the band.
         let (outer, outer_slope) = falling_step(2.0 * s + w, w);
         let color = pixel.color;
@@ -176,9 +211,7 @@ impl Scene<'_> {
     /// Row of the signed distance to a contour at its foot (`side` is −1 inside, 1 outside).
     #[inline]
     pub(crate) fn distance_row(&self, piece: &Piece, foot: &Foot, side: f32) -> Row {
-        let distance = foot.distance_squared.sqrt();
-        let outward =
-            if distance > 1e-3 { foot.offset.map(|o| o * side / distance) } else { piece.outward };
+        let outward = direction(piece, foot, side);
         let (_, point, _) = self.on_edge(piece, foot.t);
         // The foot moves by J v along the outward normal, and the signed distance shrinks by as much.
         self.image_motion(outward, &point).map(|v| -v)
@@ -247,6 +280,13 @@ impl Scene<'_> {
     }
 }
 
+/// Unit normal in the image of a contour at a foot, away from the object.
+#[inline]
+fn direction(piece: &Piece, foot: &Foot, side: f32) -> [f32; 2] {
+    let distance = foot.distance_squared.sqrt();
+    if distance > 1e-3 { foot.offset.map(|o| o * side / distance) } else { piece.outward }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -261,6 +301,32 @@ mod tests {
             let d = 1e-2;
             let difference = (falling_step(s + d, w).0 - falling_step(s - d, w).0) / (2.0 * d);
             assert!((difference - falling_step(s, w).1).abs() < 1e-3);
+        }
+    }
+
+    #[test]
+    fn coverage_is_the_area_of_the_pixel_inside() {
+        let samples = 400;
+        for angle in [0.0f32, 0.3, 0.785, 1.2, 2.5, 4.0] {
+            let normal = [angle.cos(), angle.sin()];
+            for s in [-0.8f32, -0.55, -0.3, 0.0, 0.2, 0.45, 0.6] {
+                for scale in [1.0f32, 1.5] {
+                    let mut inside = 0;
+                    for i in 0..samples {
+                        for j in 0..samples {
+                            let at = |k: i32| scale * ((k as f32 + 0.5) / samples as f32 - 0.5);
+                            let beyond = s + normal[0] * at(i) + normal[1] * at(j);
+                            inside += i32::from(beyond < 0.0);
+                        }
+                    }
+                    let expected = inside as f32 / (samples * samples) as f32;
+                    let (value, slope) = coverage(s, normal, scale);
+                    assert!((value - expected).abs() < 4e-3, "{angle} {s}: {value} {expected}");
+                    let at = |d: f32| coverage(s + d, normal, scale).0;
+                    let difference = (at(1e-3) - at(-1e-3)) / 2e-3;
+                    assert!((difference - slope).abs() < 2e-2, "{angle} {s}: {slope} {difference}");
+                }
+            }
         }
     }
 }

@@ -18,6 +18,10 @@ pub struct LossOptions {
     /// gives it no residual; `true` counts it as missed, like a pixel that the object does not cover, so that hiding
     /// behind the body does not lower the loss. Neither has a derivative.
     pub hidden_is_missed: bool,
+    /// Minimises the loss of each pose over a gain and an offset of the object's colours in each channel, for images whose
+    /// exposure, white balance or black level is not known. Costs about another evaluation; with a robust kernel, one for
+    /// each round of reweighting.
+    pub affine: bool,
 }
 
 impl Default for LossOptions {
@@ -29,6 +33,7 @@ impl Default for LossOptions {
             depth: None,
             robust: Robust::None,
             hidden_is_missed: false,
+            affine: false,
         }
     }
 }
@@ -75,6 +80,11 @@ impl Robust {
                 (k2 * ln_1p(x), 1.0 / (1.0 + x))
             }
         }
+    }
+
+    /// Whether the cost is the plain square.
+    pub(crate) fn is_square(self) -> bool {
+        self == Self::None
     }
 
     /// The same for residuals side by side.

@@ -6,6 +6,12 @@ use super::sums::Sums;
 /// A derivative by the twist (translation, rotation).
 pub(crate) type Row = [f32; 6];
 
+/// `p a + q b`.
+#[inline(always)]
+pub(crate) fn scaled_sum(p: f32, a: &Row, q: f32, b: &Row) -> Row {
+    std::array::from_fn(|i| p * a[i] + q * b[i])
+}
+
 /// What a pixel shows of the object: colour and coverage after blending with the black background, the
 /// depth of the surface there, and their derivatives by the twist.
 #[derive(Clone, Copy, Debug, Default)]
@@ -48,6 +54,10 @@ pub(crate) trait View: Sync {
         block: usize,
         each: impl FnMut(usize, usize, Option<Seen>),
     );
+
+    /// Calls `each` for every pixel of one block whose centre shows a face, with its column and row, the face (of the
+    /// model's faces drawn) and the unit normal there (camera frame).
+    fn faces(&self, block: usize, each: impl FnMut(usize, usize, u32, [f32; 3]));
 
     /// Adds the residuals of one block. A view that has a quicker way than pixel by pixel writes its own.
     fn sum<const DERIVATIVES: bool>(&self, block: usize, residuals: &Residuals, sums: &mut Sums) {

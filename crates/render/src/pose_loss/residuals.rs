@@ -1,7 +1,9 @@
 //! Residuals of pixels against the target, and their sums.
 
+use nalgebra::Matrix6;
 use rayon::prelude::*;
 
+use super::affine::{Affine, Corrected};
 use super::lane::{LANES, Patch};
 use super::options::LossOptions;
 use super::pixel::{Seen, View};
@@ -16,8 +18,17 @@ pub(crate) struct Residuals<'a> {
 }
 
 impl Residuals<'_> {
+    /// Sums the residuals over all pixels of a view, under the best correction if the options ask for one.
+    pub(crate) fn total<const DERIVATIVES: bool>(&self, view: &impl View) -> Corrected {
+        if self.options.affine {
+            return self.corrected::<DERIVATIVES>(view);
+        }
+        let (affine, reduction) = (Affine::default(), Matrix6::zeros());
+        Corrected { sums: self.sum::<DERIVATIVES>(view), affine, reduction }
+    }
+
     /// Sums the residuals over all pixels of a view, block by block in parallel, added up in a fixed order.
-    pub(crate) fn sum<const DERIVATIVES: bool>(&self, view: &impl View) -> Sums {
+    fn sum<const DERIVATIVES: bool>(&self, view: &impl View) -> Sums {
         let blocks: Vec<Sums> = (0..view.blocks())
             .into_par_iter()
             .map(|block| {

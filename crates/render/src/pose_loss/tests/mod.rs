@@ -1,4 +1,7 @@
-//! Rows and whole gradients against finite differences.
+//! The loss and its derivatives, and what several of these tests need.
+
+mod affine;
+mod truth;
 
 use super::*;
 use crate::contour::Band;
