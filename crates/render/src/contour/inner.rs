@@ -79,7 +79,7 @@ impl Scene<'_> {
             (own, self.interior::<DERIVATIVES>(u, v, face, inverse_z))
         };
         let distance = foot.distance_squared.sqrt();
-        let (alpha, slope) = self.coverage(&inner.piece, &foot, side);
+        let (alpha, slope) = falling_step(side * distance, self.half_width);
         // Depth counts for nothing at the step itself.
         let (weight, weight_slope) =
             falling_step(self.half_width - 2.0 * distance, self.half_width);

@@ -24,11 +24,10 @@ use crate::pose_loss::{LaneSums, Residuals, Seen, Sums, View};
 use crate::posed::Posed;
 use crate::projected::Region;
 use crate::raster::{self, MISS, Visible};
-use lanes::Waiting;
 use inner::{Inner, LEAST_STEP, inner_contours};
+use lanes::Waiting;
 pub use light_samples::light_samples;
 pub(crate) use outline::{Band, Piece, Silhouette, outline};
-use pixel::REACH;
 pub(crate) use pixel::Scene;
 pub(crate) use surface::Lighting;
 
@@ -55,14 +54,14 @@ impl<'a> ContourView<'a> {
     ) -> Self {
         // A band of zero width would divide by zero.
         let half_width = (options.half_width as f32).clamp(0.05, 64.0);
-        let posed = Posed::new(model, camera, pose, half_width * REACH);
+        let posed = Posed::new(model, camera, pose, half_width);
         let lighting = Lighting::new(light, &posed.rotation);
         let projected = &posed.projected;
         let region = projected.region.union(also);
         let visible = raster::rasterise(projected, &region);
         let silhouette = match projected.region == Region::EMPTY {
             true => Silhouette::default(),
-            false => outline(projected, &region, half_width * REACH),
+            false => outline(projected, &region, half_width),
         };
         let least = LEAST_STEP * model.radius() as f32;
         let inner = inner_contours(projected, &visible, silhouette.covered, least);
@@ -96,11 +95,11 @@ impl ContourView<'_> {
     #[inline]
     fn walk(&self, block: usize, mut each: impl FnMut(usize, usize, Found)) {
         let visible = &self.visible[block];
-        let width = self.scene.half_width * REACH;
+        let width = self.scene.half_width;
         let band = Band::new(self.pieces.iter(), &visible.region, width);
         let inner_pieces = self.inner.iter().map(|inner| &inner.piece);
-        let inner_band = (!self.inner.is_empty())
-            .then(|| Band::new(inner_pieces, &visible.region, width));
+        let inner_band =
+            (!self.inner.is_empty()).then(|| Band::new(inner_pieces, &visible.region, width));
         let mut i = 0;
         for y in visible.region.y0..visible.region.y1 {
             for x in visible.region.x0..visible.region.x1 {

@@ -25,38 +25,7 @@ pub(crate) fn falling_step(s: f32, w: f32) -> (f32, f32) {
     (x * x * (3.0 - 2.0 * x), -3.0 * x * (1.0 - x) / w)
 }
 
-/// The share of a pixel on the inner side of a straight edge at signed distance `s` (positive: the centre is outside) with
-/// unit normal `normal`, and its derivative by `s`; for a pixel `scale` times as large as it is.
-///
-/// A square pixel seen along the edge is a trapezium: two boxes as wide as the normal's components, folded.
-#[inline(always)]
-pub(crate) fn coverage(s: f32, normal: [f32; 2], scale: f32) -> (f32, f32) {
-    let (x, y) = (normal[0].abs(), normal[1].abs());
-    let (wide, narrow) = if x > y { (x, y) } else { (y, x) };
-    let narrow = narrow.max(1e-4);
-    let (flat, end) = (0.5 * (wide - narrow), 0.5 * (wide + narrow));
-    let u = s.abs() / scale;
-    let (half, density) = if u <= flat {
-        (u / wide, 1.0 / wide)
-    } else {
-        let left = (end - u).max(0.0);
-        (0.5 - left * left / (2.0 * wide * narrow), left / (wide * narrow))
-    };
-    (if s > 0.0 { 0.5 - half } else { 0.5 + half }, -density / scale)
-}
-
-/// How far beyond an edge a pixel reaches at most, relative to the half-width of the smooth step of the same variance.
-pub(crate) const REACH: f32 = 0.707_107 / 0.645_497;
-
 impl Scene<'_> {
-    /// [`coverage`] at the foot of a contour; `half_width` sets the scale.
-    #[inline]
-    pub(crate) fn coverage(&self, piece: &Piece, foot: &Foot, side: f32) -> (f32, f32) {
-        let distance = foot.distance_squared.sqrt();
-        let normal = direction(piece, foot, side);
-        coverage(side * distance, normal, self.half_width / 0.645_497)
-    }
-
     /// A pixel that `face` covers; `edge` is the outline piece and `inner` the inner contour within the band, if
     /// any.
     #[inline]
@@ -161,7 +130,8 @@ impl Scene<'_> {
         let arm = self.level_arm();
         for k in 0..3 {
             // Moving along the edge by dt changes the coordinates of its two corners by -dt and +dt.
-            let at = |corner: u8| if corner == 0 { 0.0 } else { shaded.along[corner as usize - 1][k] };
+            let at =
+                |corner: u8| if corner == 0 { 0.0 } else { shaded.along[corner as usize - 1][k] };
             let along = at(piece.corners[1]) - at(piece.corners[0]);
             let out = &mut pixel.color_rows[k];
             *out = slide.map(|v| along * v);
@@ -188,7 +158,7 @@ impl Scene<'_> {
         let distance = foot.distance_squared.sqrt();
         let s = side * distance;
         let w = self.half_width;
-        let (alpha, slope) = self.coverage(piece, foot, side);
+        let (alpha, slope) = falling_step(s, w);
         // The same step, compressed to the inner half of the band.
         let (outer, outer_slope) = falling_step(2.0 * s + w, w);
         let color = pixel.color;
@@ -211,7 +181,9 @@ impl Scene<'_> {
     /// Row of the signed distance to a contour at its foot (`side` is −1 inside, 1 outside).
     #[inline]
     pub(crate) fn distance_row(&self, piece: &Piece, foot: &Foot, side: f32) -> Row {
-        let outward = direction(piece, foot, side);
+        let distance = foot.distance_squared.sqrt();
+        let outward =
+            if distance > 1e-3 { foot.offset.map(|o| o * side / distance) } else { piece.outward };
         let (_, point, _) = self.on_edge(piece, foot.t);
         // The foot moves by J v along the outward normal, and the signed distance shrinks by as much.
         self.image_motion(outward, &point).map(|v| -v)
@@ -280,13 +252,6 @@ impl Scene<'_> {
     }
 }
 
-/// Unit normal in the image of a contour at a foot, away from the object.
-#[inline]
-fn direction(piece: &Piece, foot: &Foot, side: f32) -> [f32; 2] {
-    let distance = foot.distance_squared.sqrt();
-    if distance > 1e-3 { foot.offset.map(|o| o * side / distance) } else { piece.outward }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -301,32 +266,6 @@ mod tests {
             let d = 1e-2;
             let difference = (falling_step(s + d, w).0 - falling_step(s - d, w).0) / (2.0 * d);
             assert!((difference - falling_step(s, w).1).abs() < 1e-3);
-        }
-    }
-
-    #[test]
-    fn coverage_is_the_area_of_the_pixel_inside() {
-        let samples = 400;
-        for angle in [0.0f32, 0.3, 0.785, 1.2, 2.5, 4.0] {
-            let normal = [angle.cos(), angle.sin()];
-            for s in [-0.8f32, -0.55, -0.3, 0.0, 0.2, 0.45, 0.6] {
-                for scale in [1.0f32, 1.5] {
-                    let mut inside = 0;
-                    for i in 0..samples {
-                        for j in 0..samples {
-                            let at = |k: i32| scale * ((k as f32 + 0.5) / samples as f32 - 0.5);
-                            let beyond = s + normal[0] * at(i) + normal[1] * at(j);
-                            inside += i32::from(beyond < 0.0);
-                        }
-                    }
-                    let expected = inside as f32 / (samples * samples) as f32;
-                    let (value, slope) = coverage(s, normal, scale);
-                    assert!((value - expected).abs() < 4e-3, "{angle} {s}: {value} {expected}");
-                    let at = |d: f32| coverage(s + d, normal, scale).0;
-                    let difference = (at(1e-3) - at(-1e-3)) / 2e-3;
-                    assert!((difference - slope).abs() < 2e-2, "{angle} {s}: {slope} {difference}");
-                }
-            }
         }
     }
 }

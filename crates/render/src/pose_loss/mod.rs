@@ -14,8 +14,8 @@ use nalgebra::{Isometry3, Matrix6, Point3, Vector6};
 
 pub use affine::Affine;
 use affine::Corrected;
-pub use options::{DepthOptions, LossOptions, Robust};
 pub(crate) use lane::{LANES, Lane, Patch, get, put};
+pub use options::{DepthOptions, LossOptions, Robust};
 pub(crate) use pixel::{Pixel, Row, Seen, View, scaled_sum};
 pub(crate) use residuals::Residuals;
 pub use sums::Counts;

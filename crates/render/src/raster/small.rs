@@ -110,11 +110,8 @@ impl SideBySide {
                     let e1 = (cx * ay - cy * ax) * scale;
                     let e2 = (ax * by - ay * bx) * scale;
                     let inverse_z = e0 * a[2] + e1 * b[2] + e2 * c[2];
-                    let covered = (e0 >= 0.0)
-                        & (e1 >= 0.0)
-                        & (e2 >= 0.0)
-                        & (px <= right)
-                        & (py <= bottom);
+                    let covered =
+                        (e0 >= 0.0) & (e1 >= 0.0) & (e2 >= 0.0) & (px <= right) & (py <= bottom);
                     self.inverse_z[i * ACROSS + j][l] = inverse_z;
                     all |= u32::from(covered) << (i * ACROSS + j);
                 }

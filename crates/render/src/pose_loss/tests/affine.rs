@@ -16,7 +16,8 @@ fn problem(seed: u64) -> (RenderModel, Isometry3<f64>, Target) {
 
 #[test]
 fn gradients_are_those_of_the_minimum() {
-    for (seed, robust) in [Robust::None, Robust::None, Robust::Cauchy(0.1)].into_iter().enumerate() {
+    for (seed, robust) in [Robust::None, Robust::None, Robust::Cauchy(0.1)].into_iter().enumerate()
+    {
         let (model, guess, target) = problem(60 + seed as u64);
         let options = LossOptions { affine: true, robust, ..full_options() };
         let loss = PoseLoss::new(Mode::default(), options);

@@ -1,15 +1,16 @@
 //! The loss and its derivatives, and what several of these tests need.
 
 mod affine;
+mod gradient;
+mod occluder;
+mod picture;
+mod rows;
 mod truth;
 
 use super::*;
-use crate::contour::Band;
 use crate::image::Mask;
 use crate::light_samples;
 use crate::mode::ContourOptions;
-use crate::raster::depth_map;
-use crate::scene::{SceneObject, render_scene};
 use crate::shapes_for_tests::{lump, painted, torus};
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 use prehend_geometry::shapes::{cuboid, sphere};
@@ -79,141 +80,6 @@ fn lamp() -> Light {
     light
 }
 
-/// A pixel that shows the object.
-#[derive(Clone)]
-struct Sample {
-    hit: bool,
-    /// The face whose colour it shows.
-    face: u32,
-    pixel: Pixel,
-}
-
-fn pixels<const D: bool>(
-    model: &RenderModel,
-    pose: &Isometry3<f64>,
-    center: &Point3<f64>,
-    light: &Light,
-) -> Vec<Option<Sample>> {
-    let camera = camera();
-    let options = ContourOptions::default();
-    let view = ContourView::new(&options, model, pose, center, &camera, light, &Region::EMPTY);
-    let mut out = vec![None; camera.width * camera.height];
-    for (index, visible) in view.visible.iter().enumerate() {
-        view.visit::<D>(index, |x, y, seen| {
-            out[y * camera.width + x] =
-                seen.map(|s| Sample { hit: s.hit, face: 0, pixel: s.pixel });
-        });
-        let band = Band::new(view.pieces.iter(), &visible.region, view.scene.half_width);
-        for (i, &face) in visible.face.iter().enumerate() {
-            let (x, y) = visible.position(i);
-            if let Some(sample) = &mut out[y * camera.width + x] {
-                let edge = view.pieces.get(band.piece[i] as usize);
-                sample.face = if sample.hit { face } else { edge.unwrap().face };
-            }
-        }
-    }
-    out
-}
-
-/// Compares rows with central differences over all pixels that `pick` takes from both renderings and the
-/// derivatives, unless the face seen changes between (kinks are the business of the tests of whole gradients); returns the cosine and the relative error of the whole Jacobian, and the number of entries.
-fn compare_rows(
-    model: &RenderModel,
-    light: &Light,
-    seed: u64,
-    pick: impl Fn(&Sample) -> Option<Vec<(f32, Row)>>,
-) -> (f64, f64, usize) {
-    let pose = pose(&mut Noise(seed));
-    let center = pose * model.center() + Vector3::new(0.01, -0.02, 0.015);
-    let analytic = pixels::<true>(model, &pose, &center, light);
-    let (mut ab, mut aa, mut bb, mut error, mut count) = (0.0, 0.0, 0.0, 0.0, 0);
-    for axis in 0..6 {
-        // About a fiftieth of a pixel either way.
-        let step = if axis < 3 { 3e-5 } else { 6e-4 };
-        let moved = [1.0, -1.0].map(|sign| {
-            let pose = twisted(&pose, &center, &unit(axis, sign * step));
-            pixels::<false>(model, &pose, &center, light)
-        });
-        // Rotations move points by about 4 cm a radian.
-        let weight = if axis < 3 { 1.0 } else { 25.0 };
-        for (i, pixel) in analytic.iter().enumerate() {
-            let (Some(pixel), Some(high), Some(low)) = (pixel, &moved[0][i], &moved[1][i]) else {
-                continue;
-            };
-            if high.face != pixel.face || low.face != pixel.face {
-                continue;
-            }
-            let (Some(values), Some(high), Some(low)) = (pick(pixel), pick(high), pick(low)) else {
-                continue;
-            };
-            for ((value, high), low) in values.iter().zip(&high).zip(&low) {
-                let difference = weight * (high.0 - low.0) as f64 / (2.0 * step);
-                let derivative = weight * value.1[axis] as f64;
-                ab += difference * derivative;
-                aa += derivative * derivative;
-                bb += difference * difference;
-                error += (difference - derivative).powi(2);
-                count += 1;
-            }
-        }
-    }
-    (ab / (aa * bb).sqrt(), (error / bb).sqrt(), count)
-}
-
-fn interior_colors(p: &Sample) -> Option<Vec<(f32, Row)>> {
-    (p.hit && p.pixel.depth_weight == 1.0)
-        .then(|| (0..3).map(|k| (p.pixel.color[k], p.pixel.color_rows[k])).collect())
-}
-
-#[test]
-fn interior_rows_of_a_texture_match_differences() {
-    let model = RenderModel::new(&textured_box()).unwrap();
-    for seed in 1..5 {
-        let (cosine, error, count) =
-            compare_rows(&model, &Light::ambient(0.9), seed, interior_colors);
-        assert!(cosine > 0.9995 && error < 0.03 && count > 10_000, "{cosine} {error} {count}");
-    }
-}
-
-#[test]
-fn interior_rows_of_shading_match_differences() {
-    let model = RenderModel::new(&lump(0.045, 120)).unwrap().with_uniform_color([0.8, 0.6, 0.7]);
-    for seed in 1..5 {
-        let (cosine, error, count) = compare_rows(&model, &lamp(), seed, interior_colors);
-        assert!(cosine > 0.999 && error < 0.05 && count > 10_000, "{cosine} {error} {count}");
-    }
-}
-
-#[test]
-fn depth_rows_match_differences() {
-    for (name, mesh) in [("box", textured_box()), ("lump", lump(0.045, 120))] {
-        let model = RenderModel::new(&mesh).unwrap();
-        let (cosine, error, count) = compare_rows(&model, &lamp(), 3, |p| {
-            (p.hit && p.pixel.depth_weight == 1.0).then(|| vec![(p.pixel.z, p.pixel.z_row)])
-        });
-        assert!(cosine > 0.999 && error < 0.05 && count > 3000, "{name} {cosine} {error} {count}");
-    }
-}
-
-#[test]
-fn contour_rows_match_differences() {
-    let meshes =
-        [textured_box(), painted(lump(0.045, 120), 0.05), painted(torus(0.04, 0.015, 60), 0.05)];
-    for (i, mesh) in meshes.into_iter().enumerate() {
-        let model = RenderModel::new(&mesh).unwrap();
-        let coverage = |p: &Sample| {
-            (p.pixel.coverage < 1.0).then(|| vec![(p.pixel.coverage, p.pixel.coverage_row)])
-        };
-        let (cosine, error, count) = compare_rows(&model, &lamp(), 4, coverage);
-        assert!(cosine > 0.999 && error < 0.05 && count > 1000, "{i} {cosine} {error} {count}");
-        let outside = |p: &Sample| {
-            (!p.hit).then(|| (0..3).map(|k| (p.pixel.color[k], p.pixel.color_rows[k])).collect())
-        };
-        let (cosine, error, count) = compare_rows(&model, &lamp(), 4, outside);
-        assert!(cosine > 0.999 && error < 0.05 && count > 1000, "{i} {cosine} {error} {count}");
-    }
-}
-
 fn target_of(
     model: &RenderModel,
     pose: &Isometry3<f64>,
@@ -276,35 +142,6 @@ fn full_options() -> LossOptions {
 }
 
 #[test]
-fn gradients_match_differences_of_the_value() {
-    // Shading jumps at the edges of the box, and jumps inside the object have no derivative.
-    let scenes = [
-        ("textured box", textured_box(), Light::ambient(0.9)),
-        ("painted lump", painted(lump(0.045, 90), 0.05), lamp()),
-        ("painted sphere", painted(sphere(0.045, 240), 0.04), lamp()),
-    ];
-    let options = [
-        (1.0, LossOptions::default()),
-        (1.0, full_options()),
-        (1.5, LossOptions { robust: Robust::Cauchy(0.1), ..full_options() }),
-        (1.0, LossOptions { robust: Robust::Huber(0.05), ..LossOptions::default() }),
-    ];
-    for (name, mesh, light) in scenes {
-        let model = RenderModel::new(&mesh).unwrap();
-        for (seed, (half_width, options)) in options.into_iter().enumerate() {
-            let mut noise = Noise(40 + seed as u64);
-            let truth = pose(&mut noise);
-            let target = target_of(&model, &truth, &light, None, 0.5);
-            let twist = [0, 1, 2, 3, 4, 5].map(|i| noise.next() * if i < 3 { 0.004 } else { 0.08 });
-            let guess = twisted(&truth, &(truth * model.center()), &twist);
-            let loss = PoseLoss::new(contour(half_width), options);
-            let (cosine, error) = compare_gradient(&loss, &model, &guess, &light, &target);
-            assert!(cosine > 0.999 && error < 0.02, "{name} {seed}: {cosine} {error}");
-        }
-    }
-}
-
-#[test]
 fn evaluate_is_the_value_of_linearise_and_zero_at_the_truth() {
     let model = RenderModel::new(&painted(lump(0.045, 60), 0.05)).unwrap();
     let truth = pose(&mut Noise(5));
@@ -344,59 +181,6 @@ fn gauss_newton_steps_find_the_pose() {
         let shift = (guess * model.center() - center).norm();
         let turn = guess.rotation.angle_to(&truth.rotation);
         assert!(shift < 1e-6 && turn < 1e-5, "{seed}: {shift} {turn}");
-    }
-}
-
-#[test]
-fn a_known_occluder_silences_what_it_hides() {
-    let model = RenderModel::new(&painted(lump(0.045, 90), 0.05)).unwrap();
-    let mut noise = Noise(21);
-    let truth = pose(&mut noise);
-    let bar = RenderModel::new(&cuboid(Vector3::new(0.024, 0.2, 0.02))).unwrap();
-    let hand = depth_map(&camera(), &[(&bar, Isometry3::translation(0.005, 0.0, 0.3))]);
-    let target = target_of(&model, &truth, &lamp(), Some(hand), 0.5);
-    let loss = PoseLoss::new(Mode::default(), full_options());
-    let guess =
-        twisted(&truth, &(truth * model.center()), &[0.003, 0.001, -0.003, 0.05, -0.04, 0.05]);
-    let (cosine, error) = compare_gradient(&loss, &model, &guess, &lamp(), &target);
-    assert!(cosine > 0.999 && error < 0.03, "{cosine} {error}");
-    let value = loss.evaluate(&model, &guess, &lamp(), &target);
-    assert!(value.counts.hidden > 500, "{value:?}");
-    // At the truth the hidden part costs nothing, while without the occluder it is all residual.
-    let at_truth = loss.evaluate(&model, &truth, &lamp(), &target).total;
-    let blind = Target { occluder: None, ..target.clone() };
-    assert!(loss.evaluate(&model, &truth, &lamp(), &blind).total > 20.0 * at_truth);
-    // Hidden altogether: neither covered pixels nor derivatives.
-    let wall = target.with_occluder(DepthImage::filled(160, 120, 0.2)).unwrap();
-    let nothing = loss.linearise(&model, &guess, &Point3::origin(), &lamp(), &wall);
-    assert_eq!(nothing.gradient, Vector6::zeros());
-    assert_eq!(nothing.loss.counts.covered, 0);
-    // Hidden pixels of the mask cost nothing, or as much as if the object were not there at all.
-    let counting =
-        PoseLoss::new(Mode::default(), LossOptions { hidden_is_missed: true, ..full_options() });
-    let away = Isometry3::translation(9.0, 0.0, 0.4);
-    let missed = counting.evaluate(&model, &away, &lamp(), &wall).total;
-    let hidden = counting.linearise(&model, &guess, &Point3::origin(), &lamp(), &wall);
-    assert!((hidden.loss.total - missed).abs() < 1e-9 && missed > 0.1);
-    assert!(nothing.loss.total < 0.2 * missed, "{nothing:?}");
-    assert_eq!(hidden.gradient, Vector6::zeros());
-}
-
-#[test]
-fn an_object_partly_outside_the_image_has_the_right_gradient() {
-    let model = RenderModel::new(&painted(lump(0.045, 90), 0.05)).unwrap();
-    let mut noise = Noise(31);
-    for shift in
-        [Vector3::new(0.11, 0.0, 0.0), Vector3::new(-0.1, -0.08, 0.0), Vector3::new(0.0, 0.0, -0.3)]
-    {
-        let mut truth = pose(&mut noise);
-        truth.translation.vector += shift;
-        let target = target_of(&model, &truth, &lamp(), None, 0.5);
-        let loss = PoseLoss::new(Mode::default(), full_options());
-        let guess =
-            twisted(&truth, &(truth * model.center()), &[0.002, 0.001, -0.003, 0.05, -0.04, 0.05]);
-        let (cosine, error) = compare_gradient(&loss, &model, &guess, &lamp(), &target);
-        assert!(cosine > 0.998 && error < 0.05, "{shift}: {cosine} {error}");
     }
 }
 
@@ -451,83 +235,5 @@ fn light_is_recovered_from_its_samples() {
     for k in 0..3 {
         assert!((fitted.ambient[k] - light.ambient[k]).abs() < 1e-3, "{fitted:?}");
         assert!((fitted.directional[k] - light.directional[k]).norm() < 1e-3, "{fitted:?}");
-    }
-}
-
-/// The mean squared error of a picture with 9 x 9 hard samples a pixel.
-fn supersampled_error(
-    model: &RenderModel,
-    pose: &Isometry3<f64>,
-    light: &Light,
-    target: &Target,
-) -> f64 {
-    let object = SceneObject { model, t_cam_model: *pose };
-    let picture = render_scene(target.camera(), &[object], light, [0.0; 3], 9);
-    let mut sum = 0.0;
-    for (ours, theirs) in picture.color.pixels().iter().zip(&target.color) {
-        (0..3).for_each(|k| sum += f64::from(ours[k] - theirs[k]).powi(2));
-    }
-    sum * target.normalisation
-}
-
-#[test]
-fn gradients_match_differences_of_supersampled_pictures() {
-    let scenes = [
-        (textured_box(), Light::ambient(0.9)),
-        (painted(lump(0.045, 120), 0.05), lamp()),
-        (painted(sphere(0.045, 240), 0.04), lamp()),
-    ];
-    for (i, (mesh, light)) in scenes.into_iter().enumerate() {
-        let model = RenderModel::new(&mesh).unwrap();
-        for seed in 0..2 {
-            let mut noise = Noise(70 + seed);
-            let truth = pose(&mut noise);
-            let center = truth * model.center();
-            let object = SceneObject { model: &model, t_cam_model: truth };
-            let picture = render_scene(&camera(), &[object], &light, [0.0; 3], 9);
-            let mask = picture.color.pixels().iter().map(|c| *c != [0.0; 3]).collect();
-            let mask = Mask::new(160, 120, mask).unwrap();
-            let target = Target::new(camera(), &picture.color, &mask).unwrap();
-            let twist = [0, 1, 2, 3, 4, 5].map(|i| noise.next() * if i < 3 { 0.004 } else { 0.08 });
-            let guess = twisted(&truth, &center, &twist);
-            let difference = Vector6::from_fn(|axis, _| {
-                let step = if axis < 3 { 2e-4 } else { 5e-3 };
-                let value = |s: f64| {
-                    let pose = twisted(&guess, &center, &unit(axis, s * step));
-                    supersampled_error(&model, &pose, &light, &target)
-                };
-                (value(1.0) - value(-1.0)) / (2.0 * step)
-            });
-            let scale = Vector6::new(1.0, 1.0, 1.0, 25.0, 25.0, 25.0);
-            let b = difference.component_mul(&scale);
-            // A step of half-width 0.645 blurs as much as a pixel's box; one pixel is the default.
-            for (half_width, limit) in [(0.645, 0.03), (1.0, 0.035)] {
-                let loss = PoseLoss::new(contour(half_width), LossOptions::default());
-                let at = loss.linearise(&model, &guess, &center, &light, &target);
-                let a = at.gradient.component_mul(&scale);
-                let cosine = a.dot(&b) / (a.norm() * b.norm());
-                let error = (a - b).norm() / b.norm();
-                assert!(
-                    cosine > 0.999 && error < limit,
-                    "{i} {seed} {half_width}: {cosine} {error}"
-                );
-            }
-        }
-    }
-}
-
-#[test]
-fn contours_inside_the_object_have_derivatives() {
-    // Seen from the side, a torus hides a part of itself; in half of these poses the step is visible.
-    let model = RenderModel::new(&painted(torus(0.04, 0.015, 90), 0.05)).unwrap();
-    let loss = PoseLoss::default();
-    for seed in 140..152 {
-        let mut noise = Noise(seed);
-        let truth = pose(&mut noise);
-        let target = target_of(&model, &truth, &lamp(), None, 0.5);
-        let twist = [0, 1, 2, 3, 4, 5].map(|i| noise.next() * if i < 3 { 0.004 } else { 0.08 });
-        let guess = twisted(&truth, &(truth * model.center()), &twist);
-        let (cosine, error) = compare_gradient(&loss, &model, &guess, &lamp(), &target);
-        assert!(cosine > 0.999 && error < 0.1, "{seed}: {cosine} {error}");
     }
 }
