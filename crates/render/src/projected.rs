@@ -65,29 +65,25 @@ impl<'a> Projected<'a> {
     }
 
     /// Screen positions of a face's corners.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn corners(&self, face: usize) -> [[f32; 3]; 3] {
-        self.faces[face].map(|v| self.screen[v as usize])
+        let [a, b, c] = self.faces[face];
+        [self.screen[a as usize], self.screen[b as usize], self.screen[c as usize]]
     }
 }
 
 /// Twice the signed area of a screen triangle \[px²\]; negative where its outside is seen.
-#[inline]
+#[inline(always)]
 pub(crate) fn signed_area([a, b, c]: &[[f32; 3]; 3]) -> f32 {
     (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 }
 
 fn facing(screen: &[[f32; 3]], face: &[u32; 3], closed: bool) -> i8 {
-    let corners = face.map(|v| screen[v as usize]);
-    if corners.iter().any(|c| c[2] == 0.0) {
-        return 0;
-    }
+    let corners @ [a, b, c] = face.map(|v| screen[v as usize]);
+    let drawn = (a[2] != 0.0) & (b[2] != 0.0) & (c[2] != 0.0);
     let area = signed_area(&corners);
-    match () {
-        () if area < 0.0 => 1,
-        () if area > 0.0 && !closed => -1,
-        () => 0,
-    }
+    let sign = i8::from(area < 0.0) - i8::from((area > 0.0) & !closed);
+    if drawn { sign } else { 0 }
 }
 
 fn region(screen: &[[f32; 3]], camera: &Camera, margin: f32) -> Region {

@@ -30,7 +30,11 @@ pub(super) fn photograph(
     }
     let toward = Vector3::new(-0.4, -0.7, -0.6).normalize();
     let warm = [0.62, 0.58, 0.52];
-    let light = Light { ambient: [0.42, 0.43, 0.46], directional: warm.map(|s| toward * s) };
+    let light = Light {
+        ambient: [0.42, 0.43, 0.46],
+        directional: warm.map(|s| toward * s),
+        offset: [0.0; 3],
+    };
     let mut image = render_scene(camera, &bodies, &light, [0.12, 0.13, 0.15], 3);
     for value in image.color.pixels_mut().iter_mut().flatten() {
         *value = (*value + (COLOR_NOISE * noise.normal()) as f32).clamp(0.0, 1.0);

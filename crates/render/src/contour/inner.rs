@@ -1,8 +1,8 @@
 //! Inner contours: where the object hides farther parts of itself.
 
 use super::outline::Piece;
-use super::pixel::{Scene, falling_step, scaled_sum};
-use crate::pose_loss::Pixel;
+use super::pixel::{Scene, falling_step};
+use crate::pose_loss::{Pixel, scaled_sum};
 use crate::projected::Projected;
 use crate::raster::{MISS, Visible};
 

@@ -1,7 +1,8 @@
 //! What the estimation of light needs from a posed model and an image.
 
-use nalgebra::{Isometry3, Point3};
+use nalgebra::{Isometry3, Point3, Vector3};
 
+use super::interior::barycentric;
 use super::{Band, ContourView, surface};
 use crate::light::{Light, LightSample};
 use crate::mode::ContourOptions;
@@ -23,6 +24,7 @@ pub fn light_samples(
     let camera = &target.camera;
     let view = ContourView::new(&options, model, t_cam_object, &center, camera, &light, &also);
     let scene = &view.scene;
+    let projected = &scene.posed.projected;
     let mut samples = Vec::new();
     for visible in &view.visible {
         let band = Band::new(view.pieces.iter(), &visible.region, scene.half_width);
@@ -36,9 +38,9 @@ pub fn light_samples(
                 continue;
             }
             let face = face as usize;
-            let b = scene.barycentric(face, x as f32, y as f32);
-            let (albedo, _, _) = surface::albedo(&scene.posed, face, b);
-            let normal = scene.posed.rotation * surface::normal(&scene.posed, face, b).0;
+            let b = barycentric(projected.corners(face), x as f32, y as f32);
+            let albedo = surface::albedo(&scene.posed, face, b).color;
+            let normal = Vector3::from(scene.normal(face, x as f32, y as f32));
             samples.push(LightSample { albedo, normal, observed: target.color[at] });
         }
     }

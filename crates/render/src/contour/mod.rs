@@ -6,10 +6,13 @@
 //! (α C_near + (1−α) C_far). Jumps of colour at creases and texture seams are part of the value, but not of the derivative.
 
 mod inner;
+mod interior;
+mod lanes;
 mod light_samples;
 mod outline;
 mod pixel;
 mod surface;
+mod vec3;
 
 use nalgebra::{Isometry3, Point3};
 
@@ -17,11 +20,12 @@ use crate::camera::Camera;
 use crate::light::Light;
 use crate::mode::ContourOptions;
 use crate::model::RenderModel;
-use crate::pose_loss::{Seen, View};
+use crate::pose_loss::{LaneSums, Residuals, Seen, Sums, View};
 use crate::posed::Posed;
 use crate::projected::Region;
 use crate::raster::{self, MISS, Visible};
 use inner::{Inner, LEAST_STEP, inner_contours};
+use lanes::Waiting;
 pub use light_samples::light_samples;
 pub(crate) use outline::{Band, Piece, Silhouette, outline};
 pub(crate) use pixel::Scene;
@@ -67,6 +71,73 @@ impl<'a> ContourView<'a> {
     }
 }
 
+/// What is at a pixel.
+#[derive(Clone, Copy)]
+enum Found<'a> {
+    Nothing,
+    /// The object is not here, but its outline is near.
+    Outside(&'a Piece),
+    /// A face, far from contours.
+    Face(Hit),
+    /// A face near contours.
+    Border(Hit, Option<&'a Piece>, Option<&'a Inner>),
+}
+
+/// A visible face.
+#[derive(Clone, Copy)]
+struct Hit {
+    face: u32,
+    inverse_z: f32,
+}
+
+impl ContourView<'_> {
+    /// Calls `each` for every pixel of a block with its column and row.
+    #[inline]
+    fn walk(&self, block: usize, mut each: impl FnMut(usize, usize, Found)) {
+        let visible = &self.visible[block];
+        let width = self.scene.half_width;
+        let band = Band::new(self.pieces.iter(), &visible.region, width);
+        let inner_pieces = self.inner.iter().map(|inner| &inner.piece);
+        let inner_band =
+            (!self.inner.is_empty()).then(|| Band::new(inner_pieces, &visible.region, width));
+        let mut i = 0;
+        for y in visible.region.y0..visible.region.y1 {
+            for x in visible.region.x0..visible.region.x1 {
+                let edge = self.pieces.get(band.piece[i] as usize);
+                let inner = inner_band.as_ref().and_then(|b| self.inner.get(b.piece[i] as usize));
+                let hit = Hit { face: visible.face[i], inverse_z: visible.inverse_z[i] };
+                let found = match (hit.face, edge, inner) {
+                    (MISS, None, _) => Found::Nothing,
+                    (MISS, Some(piece), _) => Found::Outside(piece),
+                    (_, None, None) => Found::Face(hit),
+                    _ => Found::Border(hit, edge, inner),
+                };
+                each(x, y, found);
+                i += 1;
+            }
+        }
+    }
+
+    /// The pixel (x, y).
+    #[inline]
+    fn seen<const DERIVATIVES: bool>(&self, x: usize, y: usize, found: Found) -> Option<Seen> {
+        let scene = &self.scene;
+        let (u, v) = (x as f32, y as f32);
+        let (pixel, hit, near_outline) = match found {
+            Found::Nothing => return None,
+            Found::Outside(piece) => (scene.outside::<DERIVATIVES>(u, v, piece), false, true),
+            Found::Face(Hit { face, inverse_z }) => {
+                (scene.interior::<DERIVATIVES>(u, v, face, inverse_z), true, false)
+            }
+            Found::Border(Hit { face, inverse_z }, edge, inner) => {
+                let pixel = scene.inside::<DERIVATIVES>(u, v, face, inverse_z, edge, inner);
+                (pixel, true, edge.is_some())
+            }
+        };
+        Some(Seen { pixel, hit, near_outline })
+    }
+}
+
 impl View for ContourView<'_> {
     fn blocks(&self) -> usize {
         self.visible.len()
@@ -81,28 +152,43 @@ impl View for ContourView<'_> {
         block: usize,
         mut each: impl FnMut(usize, usize, Option<Seen>),
     ) {
-        let scene = &self.scene;
+        self.walk(block, |x, y, found| each(x, y, self.seen::<DERIVATIVES>(x, y, found)));
+    }
+
+    fn faces(&self, block: usize, mut each: impl FnMut(usize, usize, u32, [f32; 3])) {
         let visible = &self.visible[block];
-        let band = Band::new(self.pieces.iter(), &visible.region, scene.half_width);
-        let inner_pieces = self.inner.iter().map(|inner| &inner.piece);
-        let inner_band = (!self.inner.is_empty())
-            .then(|| Band::new(inner_pieces, &visible.region, scene.half_width));
-        for (i, &face) in visible.face.iter().enumerate() {
+        for (i, &face) in visible.face.iter().enumerate().filter(|(_, face)| **face != MISS) {
             let (x, y) = visible.position(i);
-            let inner = inner_band.as_ref().and_then(|b| self.inner.get(b.piece[i] as usize));
-            let edge = self.pieces.get(band.piece[i] as usize);
-            let (u, v) = (x as f32, y as f32);
-            let seen = if face != MISS {
-                let pixel =
-                    scene.inside::<DERIVATIVES>(u, v, face, visible.inverse_z[i], edge, inner);
-                Some(Seen { pixel, hit: true, near_outline: edge.is_some() })
-            } else {
-                edge.map(|piece| {
-                    let pixel = scene.outside::<DERIVATIVES>(u, v, piece);
-                    Seen { pixel, hit: false, near_outline: true }
-                })
-            };
-            each(x, y, seen);
+            each(x, y, face, self.scene.normal(face as usize, x as f32, y as f32));
         }
+    }
+
+    /// Pixels inside faces are treated many at a time.
+    fn sum<const DERIVATIVES: bool>(&self, block: usize, residuals: &Residuals, sums: &mut Sums) {
+        let width = residuals.target.camera.width;
+        let mut waiting = Waiting::new();
+        let mut lanes = LaneSums::new();
+        self.walk(block, |x, y, found| {
+            let at = y * width + x;
+            if DERIVATIVES && x == self.region.x0 {
+                sums.end_row();
+            }
+            let Found::Face(Hit { face, inverse_z }) = found else {
+                residuals.add::<DERIVATIVES>(sums, at, self.seen::<DERIVATIVES>(x, y, found));
+                return;
+            };
+            let z = 1.0 / inverse_z;
+            if residuals.hidden(sums, at, z) {
+                return;
+            }
+            sums.counts.covered += 1;
+            sums.counts.depth += usize::from(residuals.has_depth(at));
+            if waiting.push((x as f32, y as f32), at, face, z) {
+                waiting.flush::<DERIVATIVES>(&self.scene, residuals, &mut lanes);
+            }
+        });
+        waiting.flush::<DERIVATIVES>(&self.scene, residuals, &mut lanes);
+        sums.end_row();
+        sums.absorb(&lanes);
     }
 }

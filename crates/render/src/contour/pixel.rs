@@ -3,9 +3,11 @@
 use nalgebra::Vector3;
 
 use super::inner::Inner;
+use super::interior::{Motion, add_level, barycentric, row};
 use super::outline::{Foot, Piece};
-use super::surface::{Lighting, Shaded, shade};
-use crate::pose_loss::{Pixel, Row};
+use super::surface::{self, Lighting, Shaded, shade};
+use super::vec3::{Vec3, vec3};
+use crate::pose_loss::{Pixel, Row, scaled_sum};
 use crate::posed::Posed;
 
 /// A posed, lit model, and the point about which twists turn (camera frame).
@@ -21,17 +23,6 @@ pub(crate) struct Scene<'a> {
 pub(crate) fn falling_step(s: f32, w: f32) -> (f32, f32) {
     let x = ((w - s) / (2.0 * w)).clamp(0.0, 1.0);
     (x * x * (3.0 - 2.0 * x), -3.0 * x * (1.0 - x) / w)
-}
-
-#[inline]
-fn row(linear: Vector3<f32>, angular: Vector3<f32>) -> Row {
-    [linear.x, linear.y, linear.z, angular.x, angular.y, angular.z]
-}
-
-/// `p a + q b`.
-#[inline]
-pub(crate) fn scaled_sum(p: f32, a: &Row, q: f32, b: &Row) -> Row {
-    std::array::from_fn(|i| p * a[i] + q * b[i])
 }
 
 impl Scene<'_> {
@@ -77,13 +68,23 @@ impl Scene<'_> {
         inverse_z: f32,
     ) -> Pixel {
         let face = face as usize;
-        let b = self.barycentric(face, x, y);
+        let b = barycentric(self.posed.projected.corners(face), x, y);
         let shaded = shade::<DERIVATIVES>(&self.posed, &self.lighting, face, b);
         let z = 1.0 / inverse_z;
         let mut pixel =
             Pixel { color: shaded.color, coverage: 1.0, z, depth_weight: 1.0, ..Pixel::default() };
         if DERIVATIVES {
-            self.interior_rows(face, self.posed.ray(x, y) * z, &shaded, &mut pixel);
+            let corners =
+                self.posed.model.faces[face].map(|v| vec3(&self.posed.position[v as usize]));
+            let ray = self.posed.ray(x, y);
+            let motion = Motion::new(&corners, b, ray, z, vec3(&self.twist_center));
+            let arm = self.level_arm();
+            for k in 0..3 {
+                pixel.color_rows[k] = motion.color_row(&shaded, k);
+                let level = shaded.level[k] * self.posed.level_dz;
+                add_level(&mut pixel.color_rows[k], level, arm);
+            }
+            pixel.z_row = motion.z_row;
         }
         pixel
     }
@@ -109,80 +110,40 @@ impl Scene<'_> {
 
     /// Colour of a face at pixel (x, y), unblended.
     pub(crate) fn color(&self, face: u32, x: f32, y: f32) -> [f32; 3] {
-        let b = self.barycentric(face as usize, x, y);
+        let b = barycentric(self.posed.projected.corners(face as usize), x, y);
         shade::<false>(&self.posed, &self.lighting, face as usize, b).color
     }
 
-    /// Perspective-correct barycentric coordinates of pixel (x, y) on a face.
-    #[inline]
-    pub(crate) fn barycentric(&self, face: usize, x: f32, y: f32) -> [f32; 3] {
-        let [a, b, c] = self.posed.projected.corners(face);
-        let cross = |p: [f32; 3], q: [f32; 3]| (p[0] - x) * (q[1] - y) - (p[1] - y) * (q[0] - x);
-        let weights = [cross(b, c) * a[2], cross(c, a) * b[2], cross(a, b) * c[2]];
-        let sum = weights[0] + weights[1] + weights[2];
-        if sum == 0.0 {
-            return [1.0, 0.0, 0.0];
-        }
-        weights.map(|w| w / sum)
-    }
-
-    /// Rows of colour and depth at surface point `point` (camera frame), seen through a fixed pixel.
-    ///
-    /// A twist with velocity v(X) = t + ω × (X − c) moves the surface; the pixel then sees another material point.
-    /// With the colour gradient g along the surface and normal n this changes the colour by −h·v,
-    /// h = g − n (g·X)/(n·X), and the depth by n·v/(n·d), d = X/Z.
-    #[inline]
-    fn interior_rows(&self, face: usize, point: Vector3<f32>, shaded: &Shaded, pixel: &mut Pixel) {
-        let [p0, p1, p2] = self.posed.model.faces[face].map(|v| self.posed.position[v as usize]);
-        let (e1, e2) = (p1 - p0, p2 - p0);
-        let n = e1.cross(&e2);
-        let inverse = 1.0 / n.norm_squared();
-        // Of the corner, where rounding disturbs the plane's offset least.
-        let facing = n.dot(&p0);
-        let arm = point - self.twist_center;
-        let moving = [e2.cross(&n), n.cross(&e1)].map(|gradient| {
-            let g = gradient * inverse;
-            let h = g - n * (g.dot(&point) / facing);
-            row(-h, -arm.cross(&h))
-        });
-        self.color_rows(shaded, &moving, pixel);
-        let n = n * (point.z / facing);
-        pixel.z_row = row(n, arm.cross(&n));
+    /// Unit normal of a face at pixel (x, y), camera frame.
+    pub(crate) fn normal(&self, face: usize, x: f32, y: f32) -> Vec3 {
+        let projected = &self.posed.projected;
+        let b = barycentric(projected.corners(face), x, y);
+        let corners = self.posed.model.normals[face].each_ref().map(vec3);
+        let side = if projected.facing[face] < 0 { -1.0 } else { 1.0 };
+        let (normal, _) = surface::normal(&corners, side, b);
+        vec3(&(self.posed.rotation * Vector3::from(normal)))
     }
 
     /// Rows of the colour of an outline point, whose material point slides along the edge by `slide`.
     #[inline]
     fn foot_rows(&self, piece: &Piece, shaded: &Shaded, slide: &Row, pixel: &mut Pixel) {
-        // Moving along the edge by dt changes the coordinates of its two corners by -dt and +dt.
-        let moving = [1, 2].map(|corner| {
-            let sign = match () {
-                () if piece.corners[0] == corner => -1.0,
-                () if piece.corners[1] == corner => 1.0,
-                () => 0.0,
-            };
-            slide.map(|v| sign * v)
-        });
-        self.color_rows(shaded, &moving, pixel);
+        let arm = self.level_arm();
+        for k in 0..3 {
+            // Moving along the edge by dt changes the coordinates of its two corners by -dt and +dt.
+            let at =
+                |corner: u8| if corner == 0 { 0.0 } else { shaded.along[corner as usize - 1][k] };
+            let along = at(piece.corners[1]) - at(piece.corners[0]);
+            let out = &mut pixel.color_rows[k];
+            *out = slide.map(|v| along * v);
+            (0..3).for_each(|i| out[i + 3] += shaded.turning[k][i]);
+            add_level(out, shaded.level[k] * self.posed.level_dz, arm);
+        }
     }
 
-    /// Colour rows from those of the barycentric coordinates of corners 1 and 2.
-    #[inline]
-    fn color_rows(&self, shaded: &Shaded, moving: &[Row; 2], pixel: &mut Pixel) {
-        let center = self.posed.center - self.twist_center;
-        for k in 0..3 {
-            let [first, second] = [shaded.along[0][k], shaded.along[1][k]];
-            let turning = shaded.turning[k];
-            let out = &mut pixel.color_rows[k];
-            for i in 0..6 {
-                out[i] = first * moving[0][i] + second * moving[1][i];
-            }
-            (0..3).for_each(|i| out[i + 3] += turning[i]);
-            // The texture's level follows the depth of the model's centre: (0, 0, 1) and center × (0, 0, 1).
-            let level = shaded.level[k] * self.posed.level_dz;
-            out[2] += level;
-            out[3] += level * center.y;
-            out[4] -= level * center.x;
-        }
+    /// The model's centre from where twists turn.
+    #[inline(always)]
+    pub(crate) fn level_arm(&self) -> Vec3 {
+        vec3(&(self.posed.center - self.twist_center))
     }
 
     /// Fades the pixel by its signed distance to the outline (`side` is −1 inside, 1 outside).
@@ -249,7 +210,7 @@ impl Scene<'_> {
     #[inline]
     fn image_motion(&self, direction: [f32; 2], point: &Vector3<f32>) -> Row {
         let a = self.image_gradient(direction, point);
-        row(a, (point - self.twist_center).cross(&a))
+        row(vec3(&a), vec3(&(point - self.twist_center).cross(&a)))
     }
 
     /// Gradient by the point of its image position along `direction`.

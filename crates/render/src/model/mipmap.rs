@@ -8,8 +8,9 @@ pub(crate) struct Mipmap {
     levels: Vec<Level>,
 }
 
+/// One level of the pyramid.
 #[derive(Clone, Debug)]
-struct Level {
+pub(crate) struct Level {
     width: usize,
     height: usize,
     texels: Vec<[f32; 3]>,
@@ -57,22 +58,76 @@ impl Mipmap {
     /// fractions blend).
     #[inline]
     pub(crate) fn sample(&self, u: f32, v: f32, level: f32) -> Texel {
-        let level = level.clamp(0.0, self.last_level());
-        let fine = level as usize;
-        let blend = level - fine as f32;
+        let (fine, blend) = self.split(level);
         let a = self.levels[fine].sample(u, v);
         if blend == 0.0 {
             return a;
         }
-        let b = self.levels[fine + 1].sample(u, v);
-        let mix = |x: [f32; 3], y: [f32; 3]| [0, 1, 2].map(|c| x[c] + blend * (y[c] - x[c]));
-        Texel {
-            color: mix(a.color, b.color),
-            du: mix(a.du, b.du),
-            dv: mix(a.dv, b.dv),
-            dlevel: [0, 1, 2].map(|c| b.color[c] - a.color[c]),
+        a.blended(&self.levels[fine + 1].sample(u, v), blend)
+    }
+
+    /// The whole part of a pyramid level within the pyramid, and the weight of the next coarser one.
+    #[inline]
+    pub(crate) fn split(&self, level: f32) -> (usize, f32) {
+        let level = level.clamp(0.0, self.last_level());
+        let fine = level as usize;
+        (fine, level - fine as f32)
+    }
+
+    /// Level `index` alone.
+    #[inline]
+    pub(crate) fn level(&self, index: usize) -> &Level {
+        &self.levels[index]
+    }
+}
+
+impl Texel {
+    /// Between this level and the next coarser one.
+    #[inline(always)]
+    pub(crate) fn blended(&self, coarse: &Self, blend: f32) -> Self {
+        let mix = |x: [f32; 3], y: [f32; 3]| {
+            [
+                x[0] + blend * (y[0] - x[0]),
+                x[1] + blend * (y[1] - x[1]),
+                x[2] + blend * (y[2] - x[2]),
+            ]
+        };
+        let (near, far) = (self.color, coarse.color);
+        Self {
+            color: mix(near, far),
+            du: mix(self.du, coarse.du),
+            dv: mix(self.dv, coarse.dv),
+            dlevel: [far[0] - near[0], far[1] - near[1], far[2] - near[2]],
         }
     }
+
+    /// Between four texels of a level: upper left, upper right, lower left, lower right.
+    #[inline(always)]
+    pub(crate) fn bilinear(texels: &[[f32; 3]; 4], cell: &Cell, size: [f32; 2]) -> Self {
+        let [a, b, c, d] = texels;
+        let (x, y) = (cell.x, cell.y);
+        let mut out = Self::default();
+        for k in 0..3 {
+            let (top, bottom) = (b[k] - a[k], d[k] - c[k]);
+            let (left, right) = (c[k] - a[k], d[k] - b[k]);
+            out.color[k] = a[k] + x * top + y * (left + x * (bottom - top));
+            out.du[k] = (top + y * (bottom - top)) * size[0];
+            // Rows run down while v runs up.
+            out.dv[k] = -(left + x * (right - left)) * size[1];
+        }
+        out
+    }
+}
+
+/// Where a point lies between texel centres.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Cell {
+    /// Share of the way from the left to the right texels, and from the upper to the lower.
+    pub(crate) x: f32,
+    pub(crate) y: f32,
+    /// Column of the right texels and row of the lower ones, before clamping to the texture.
+    pub(crate) right: i32,
+    pub(crate) lower: i32,
 }
 
 impl Level {
@@ -101,33 +156,52 @@ impl Level {
     /// Bilinear colour, and derivatives by (u, v) with no entry for the level.
     #[inline]
     fn sample(&self, u: f32, v: f32) -> Texel {
+        let cell = self.cell(u, v);
+        Texel::bilinear(&self.around(cell.right, cell.lower), &cell, self.size())
+    }
+
+    /// Columns and rows.
+    #[inline(always)]
+    pub(crate) fn size(&self) -> [f32; 2] {
+        [self.width as f32, self.height as f32]
+    }
+
+    /// The cell of texture coordinates (`u`, `v`).
+    #[inline(always)]
+    pub(crate) fn cell(&self, u: f32, v: f32) -> Cell {
         // Coordinates within 0..=1 stay (an edge at exactly 1 must not wrap to 0); others repeat.
-        let wrap = |t: f32| if (0.0..=1.0).contains(&t) { t } else { t - t.floor() };
-        let (x, x0, x1) = cell(wrap(u), self.width);
-        let (y, y0, y1) = cell(1.0 - wrap(v), self.height);
-        let texel = |x: usize, y: usize| self.texels[y * self.width + x];
-        let (a, b, c, d) = (texel(x0, y0), texel(x1, y0), texel(x0, y1), texel(x1, y1));
-        let mut out = Texel::default();
-        for k in 0..3 {
-            let (top, bottom) = (b[k] - a[k], d[k] - c[k]);
-            let (left, right) = (c[k] - a[k], d[k] - b[k]);
-            out.color[k] = a[k] + x * top + y * (left + x * (bottom - top));
-            out.du[k] = (top + y * (bottom - top)) * self.width as f32;
-            // Rows run down while v runs up.
-            out.dv[k] = -(left + x * (right - left)) * self.height as f32;
-        }
-        out
+        let wrap = |t: f32| {
+            let beyond = t < 0.0 || t > 1.0;
+            t - if beyond { floor(t) } else { 0.0 }
+        };
+        let place = |t: f32, size: f32| {
+            let position = t * size - 0.5;
+            // Truncation rounds down once nothing is negative.
+            let above = (position + 1.0) as i32;
+            (position - (above as f32 - 1.0), above)
+        };
+        let [width, height] = self.size();
+        let (x, right) = place(wrap(u), width);
+        let (y, lower) = place(1.0 - wrap(v), height);
+        Cell { x, y, right, lower }
+    }
+
+    /// The four texels of a cell: upper left, upper right, lower left, lower right.
+    #[inline]
+    pub(crate) fn around(&self, right: i32, lower: i32) -> [[f32; 3]; 4] {
+        let (right, lower) = (right.max(0) as usize, lower.max(0) as usize);
+        let (x0, x1) = (right.saturating_sub(1).min(self.width - 1), right.min(self.width - 1));
+        let (y0, y1) = (lower.saturating_sub(1).min(self.height - 1), lower.min(self.height - 1));
+        let (upper, lower) = (y0 * self.width, y1 * self.width);
+        [upper + x0, upper + x1, lower + x0, lower + x1].map(|i| self.texels[i])
     }
 }
 
-/// Offset within the cell, and the cell's two texel indices, clamped at the borders.
-#[inline]
-fn cell(t: f32, size: usize) -> (f32, usize, usize) {
-    let position = t * size as f32 - 0.5;
-    // Truncation rounds down once nothing is negative (`f32::floor` is a function call on baseline x86-64).
-    let above = (position + 1.0).max(0.0) as usize;
-    let offset = position - (above as f32 - 1.0);
-    (offset, above.saturating_sub(1).min(size - 1), above.min(size - 1))
+/// The largest whole number not above `t` (`f32::floor` is a function call on baseline x86-64).
+#[inline(always)]
+fn floor(t: f32) -> f32 {
+    let whole = t as i32 as f32;
+    whole - if whole > t { 1.0 } else { 0.0 }
 }
 
 #[cfg(test)]

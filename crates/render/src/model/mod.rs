@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Point3, Vector3};
 use prehend_geometry::TriMesh;
 use prehend_geometry::topology::is_collapsed;
 
-pub(crate) use mipmap::Mipmap;
+pub(crate) use mipmap::{Cell, Mipmap, Texel};
 pub(crate) use topology::{Edge, NONE};
 
 /// Faces that meet at less than this angle share a smooth normal \[rad\] (37.5 degrees).

@@ -1,5 +1,7 @@
 //! The loss of a pose: a posed object compared with a segmented image, with exact derivatives by the pose.
 
+mod affine;
+mod lane;
 mod options;
 mod pixel;
 mod residuals;
@@ -10,10 +12,14 @@ mod tests;
 
 use nalgebra::{Isometry3, Matrix6, Point3, Vector6};
 
+pub use affine::Affine;
+use affine::Corrected;
+pub(crate) use lane::{LANES, Lane, Patch, get, put};
 pub use options::{DepthOptions, LossOptions, Robust};
-pub(crate) use pixel::{Pixel, Row, Seen, View};
+pub(crate) use pixel::{Pixel, Row, Seen, View, scaled_sum};
+pub(crate) use residuals::Residuals;
 pub use sums::Counts;
-use sums::Sums;
+pub(crate) use sums::{LaneSums, Sums};
 pub use target::{Target, TargetError};
 
 use crate::camera::Camera;
@@ -63,6 +69,9 @@ pub struct Linearised {
     pub gradient: Vector6<f64>,
     /// JᵀJ / N: the Gauss–Newton approximation of half the loss's Hessian, so that the step is −(2 `jtj`)⁻¹ `gradient`.
     pub jtj: Matrix6<f64>,
+    /// The correction of the colours at which the loss is least, with [`LossOptions::affine`];
+    /// [`Light::corrected`] makes a light of it.
+    pub affine: Option<Affine>,
 }
 
 /// A picture of the object alone, as the mode sees it.
@@ -74,6 +83,11 @@ pub struct PoseImage {
     pub coverage: Vec<f32>,
     /// Z of the surface at pixel centres \[m\], 0 where there is none.
     pub depth: DepthImage,
+    /// Unit normal at pixel centres as shading sees it, towards the camera (camera frame), row-major; zero where there is
+    /// no surface.
+    pub normal: Vec<[f32; 3]>,
+    /// The face at pixel centres, counting those that the model draws, row-major.
+    pub face: Vec<Option<u32>>,
 }
 
 impl PoseLoss {
@@ -90,8 +104,8 @@ impl PoseLoss {
         light: &Light,
         target: &Target,
     ) -> Loss {
-        let sums = self.sum::<false>(model, t_cam_object, &Point3::origin(), light, target);
-        self.loss(&sums, target)
+        let all = self.sum::<false>(model, t_cam_object, &Point3::origin(), light, target);
+        self.loss(&all.sums, target)
     }
 
     /// The loss, its gradient and the Gauss–Newton matrix by the twist about `center` (camera frame \[m\]).
@@ -103,9 +117,14 @@ impl PoseLoss {
         light: &Light,
         target: &Target,
     ) -> Linearised {
-        let sums = self.sum::<true>(model, t_cam_object, center, light, target);
-        let (right, jtj) = sums.equations(target.normalisation);
-        Linearised { loss: self.loss(&sums, target), gradient: right * 2.0, jtj }
+        let all = self.sum::<true>(model, t_cam_object, center, light, target);
+        let (right, jtj) = all.sums.equations(target.normalisation);
+        Linearised {
+            loss: self.loss(&all.sums, target),
+            gradient: right * 2.0,
+            jtj: jtj - all.reduction * target.normalisation,
+            affine: self.options.affine.then_some(all.affine),
+        }
     }
 
     /// The picture whose difference from the target is the loss's residual (without occluder).
@@ -142,16 +161,17 @@ impl PoseLoss {
         center: &Point3<f64>,
         light: &Light,
         target: &Target,
-    ) -> Sums {
+    ) -> Corrected {
         let (camera, also) = (&target.camera, &target.bounds);
+        let residuals = Residuals { options: &self.options, target };
         match &self.mode {
             Mode::Contour(options) => {
                 let view = ContourView::new(options, model, pose, center, camera, light, also);
-                residuals::sum::<DERIVATIVES>(&view, &self.options, target)
+                residuals.total::<DERIVATIVES>(&view)
             }
             Mode::SoftRas(options) => {
                 let view = SoftRasView::new(options, model, pose, center, camera, light, also);
-                residuals::sum::<DERIVATIVES>(&view, &self.options, target)
+                residuals.total::<DERIVATIVES>(&view)
             }
         }
     }
@@ -162,6 +182,8 @@ fn picture(view: &impl View, camera: &Camera) -> PoseImage {
         color: RgbImage::filled(camera.width, camera.height, [0.0; 3]),
         coverage: vec![0.0; camera.width * camera.height],
         depth: DepthImage::filled(camera.width, camera.height, 0.0),
+        normal: vec![[0.0; 3]; camera.width * camera.height],
+        face: vec![None; camera.width * camera.height],
     };
     for block in 0..view.blocks() {
         view.visit::<false>(block, |x, y, seen| {
@@ -171,6 +193,11 @@ fn picture(view: &impl View, camera: &Camera) -> PoseImage {
                 image.coverage[at] = pixel.coverage;
                 image.depth.pixels_mut()[at] = if hit { pixel.z } else { 0.0 };
             }
+        });
+        view.faces(block, |x, y, face, normal| {
+            let at = y * camera.width + x;
+            image.normal[at] = normal;
+            image.face[at] = Some(face);
         });
     }
     image

@@ -1,7 +1,16 @@
 //! What a pixel shows of the posed object, in either mode.
 
+use super::residuals::Residuals;
+use super::sums::Sums;
+
 /// A derivative by the twist (translation, rotation).
 pub(crate) type Row = [f32; 6];
+
+/// `p a + q b`.
+#[inline(always)]
+pub(crate) fn scaled_sum(p: f32, a: &Row, q: f32, b: &Row) -> Row {
+    std::array::from_fn(|i| p * a[i] + q * b[i])
+}
 
 /// What a pixel shows of the object: colour and coverage after blending with the black background, the
 /// depth of the surface there, and their derivatives by the twist.
@@ -45,4 +54,20 @@ pub(crate) trait View: Sync {
         block: usize,
         each: impl FnMut(usize, usize, Option<Seen>),
     );
+
+    /// Calls `each` for every pixel of one block whose centre shows a face, with its column and row, the face (of the
+    /// model's faces drawn) and the unit normal there (camera frame).
+    fn faces(&self, block: usize, each: impl FnMut(usize, usize, u32, [f32; 3]));
+
+    /// Adds the residuals of one block. A view that has a quicker way than pixel by pixel writes its own.
+    fn sum<const DERIVATIVES: bool>(&self, block: usize, residuals: &Residuals, sums: &mut Sums) {
+        let last = self.right().wrapping_sub(1);
+        let width = residuals.target.camera.width;
+        self.visit::<DERIVATIVES>(block, |x, y, seen| {
+            residuals.add::<DERIVATIVES>(sums, y * width + x, seen);
+            if DERIVATIVES && x == last {
+                sums.end_row();
+            }
+        });
+    }
 }

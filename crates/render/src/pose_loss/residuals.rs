@@ -1,91 +1,110 @@
-//! Residuals of one pixel against the target, and their sums.
+//! Residuals of pixels against the target, and their sums.
 
-use super::options::LossOptions;
-use super::pixel::{Seen, View};
-use super::sums::Sums;
-use super::target::Target;
+use nalgebra::Matrix6;
 use rayon::prelude::*;
 
-/// Sums the residuals over all pixels of a view, block by block in parallel, added up in a fixed order.
-pub(crate) fn sum<const DERIVATIVES: bool>(
-    view: &impl View,
-    options: &LossOptions,
-    target: &Target,
-) -> Sums {
-    let last = view.right().wrapping_sub(1);
-    let blocks: Vec<Sums> = (0..view.blocks())
-        .into_par_iter()
-        .map(|block| {
-            let mut sums = Sums::new();
-            view.visit::<DERIVATIVES>(block, |x, y, seen| {
-                let at = y * target.camera.width + x;
-                options.add::<DERIVATIVES>(&mut sums, target, at, seen);
-                if DERIVATIVES && x == last {
-                    sums.end_row();
-                }
-            });
-            sums
-        })
-        .collect();
-    let mut total = Sums::new();
-    blocks.iter().for_each(|block| total.merge(block));
-    total
+use super::affine::{Affine, Corrected};
+use super::lane::{LANES, Patch};
+use super::options::LossOptions;
+use super::pixel::{Seen, View};
+use super::sums::{LaneSums, Sums};
+use super::target::Target;
+
+/// What a view is compared with, and how.
+#[derive(Clone, Copy)]
+pub(crate) struct Residuals<'a> {
+    pub(crate) options: &'a LossOptions,
+    pub(crate) target: &'a Target,
 }
 
-impl LossOptions {
-    /// Adds the cost of a pixel of the mask that shows nothing of the object.
-    fn miss(&self, sums: &mut Sums, observed: [f32; 3], coverage: f32) {
-        let weight = self.color_weight;
-        observed.iter().for_each(|c| sums.color += weight * self.robust.cost(*c).0 as f64);
-        sums.mask += self.mask_weight * (coverage * coverage) as f64;
+impl Residuals<'_> {
+    /// Sums the residuals over all pixels of a view, under the best correction if the options ask for one.
+    pub(crate) fn total<const DERIVATIVES: bool>(&self, view: &impl View) -> Corrected {
+        if self.options.affine {
+            return self.corrected::<DERIVATIVES>(view);
+        }
+        let (affine, reduction) = (Affine::default(), Matrix6::zeros());
+        Corrected { sums: self.sum::<DERIVATIVES>(view), affine, reduction }
     }
 
-    /// Adds the residuals of one pixel.
+    /// Sums the residuals over all pixels of a view, block by block in parallel, added up in a fixed order.
+    fn sum<const DERIVATIVES: bool>(&self, view: &impl View) -> Sums {
+        let blocks: Vec<Sums> = (0..view.blocks())
+            .into_par_iter()
+            .map(|block| {
+                let mut sums = Sums::new();
+                view.sum::<DERIVATIVES>(block, self, &mut sums);
+                sums
+            })
+            .collect();
+        let mut total = Sums::new();
+        blocks.iter().for_each(|block| total.merge(block));
+        total
+    }
+
+    /// Adds the cost of a pixel of the mask that shows nothing of the object.
+    fn miss(&self, sums: &mut Sums, at: usize) {
+        let coverage = self.target.coverage[at];
+        for c in self.target.color[at] {
+            sums.color += self.options.color_weight * self.options.robust.cost(c).0 as f64;
+        }
+        sums.mask += self.options.mask_weight * (coverage * coverage) as f64;
+    }
+
+    /// Whether a known body lies in front of depth `z` \[m\] at pixel `at`; if so, it is counted.
     #[inline]
-    fn add<const DERIVATIVES: bool>(
+    pub(crate) fn hidden(&self, sums: &mut Sums, at: usize, z: f32) -> bool {
+        if !self.target.hides(at, z) {
+            return false;
+        }
+        sums.counts.hidden += 1;
+        if self.options.hidden_is_missed && self.target.coverage[at] > 0.0 {
+            self.miss(sums, at);
+        }
+        true
+    }
+
+    /// Adds the residuals of pixel `at`.
+    #[inline]
+    pub(crate) fn add<const DERIVATIVES: bool>(
         &self,
         sums: &mut Sums,
-        target: &Target,
         at: usize,
         seen: Option<Seen>,
     ) {
-        let (observed, coverage) = (target.color[at], target.coverage[at]);
-        let (color_weight, mask_weight) = (self.color_weight as f32, self.mask_weight as f32);
         let Some(Seen { pixel, hit, near_outline }) = seen else {
-            if coverage > 0.0 {
-                self.miss(sums, observed, coverage);
+            if self.target.coverage[at] > 0.0 {
+                self.miss(sums, at);
                 sums.counts.missed += 1;
             }
             return;
         };
-        if target.hides(at, pixel.z) {
-            sums.counts.hidden += 1;
-            if self.hidden_is_missed && coverage > 0.0 {
-                self.miss(sums, observed, coverage);
-            }
+        if self.hidden(sums, at, pixel.z) {
             return;
         }
+        let options = self.options;
+        let (color_weight, mask_weight) = (options.color_weight as f32, options.mask_weight as f32);
         sums.counts.covered += usize::from(hit);
         sums.counts.contour += usize::from(near_outline);
         if color_weight > 0.0 {
-            for ((color, observed), row) in pixel.color.iter().zip(observed).zip(&pixel.color_rows)
-            {
-                let r = color - observed;
-                let (cost, weight) = self.robust.cost(r);
+            let observed = self.target.color[at];
+            for k in 0..3 {
+                let r = pixel.color[k] - observed[k];
+                let (cost, weight) = options.robust.cost(r);
                 sums.color += (color_weight * cost) as f64;
                 if DERIVATIVES {
-                    sums.add(row, r, color_weight * weight);
+                    sums.add(&pixel.color_rows[k], r, color_weight * weight);
                 }
             }
         }
         if mask_weight > 0.0 {
-            let r = pixel.coverage - coverage;
+            let r = pixel.coverage - self.target.coverage[at];
             sums.mask += (mask_weight * r * r) as f64;
             if DERIVATIVES && pixel.coverage < 1.0 {
                 sums.add(&pixel.coverage_row, r, mask_weight);
             }
         }
-        let (Some(options), Some(depth)) = (self.depth, &target.depth) else { return };
+        let (Some(options), Some(depth)) = (options.depth, &self.target.depth) else { return };
         let measured = depth.pixels()[at];
         if hit && measured > 0.0 {
             let scale = (1.0 / options.scale) as f32;
@@ -104,6 +123,77 @@ impl LossOptions {
                 sums.add(&row, r, weight);
             }
         }
+    }
+
+    /// Adds the residuals of pixels side by side, none of which is hidden.
+    #[inline(always)]
+    pub(crate) fn add_patch<const DERIVATIVES: bool>(&self, sums: &mut LaneSums, patch: &Patch) {
+        let options = self.options;
+        let mut used = [0.0f32; LANES];
+        used[..patch.count].fill(1.0);
+        if options.color_weight > 0.0 {
+            let color_weight = options.color_weight as f32;
+            let (mut residuals, mut weights) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3]);
+            for l in 0..patch.count {
+                let observed = self.target.color[patch.at[l]];
+                (0..3).for_each(|k| residuals[k][l] = observed[k]);
+            }
+            for k in 0..3 {
+                for l in 0..LANES {
+                    residuals[k][l] = patch.color[k][l] - residuals[k][l];
+                }
+                let mut costs = [0.0; LANES];
+                options.robust.costs(&residuals[k], &mut costs, &mut weights[k]);
+                for l in 0..LANES {
+                    let weight = color_weight * used[l];
+                    sums.color[l] += (weight * costs[l]) as f64;
+                    weights[k][l] *= weight;
+                }
+            }
+            if DERIVATIVES {
+                sums.add(&patch.color_rows, &residuals, &weights);
+            }
+        }
+        if options.mask_weight > 0.0 {
+            let mask_weight = options.mask_weight as f32;
+            for l in 0..patch.count {
+                let r = 1.0 - self.target.coverage[patch.at[l]];
+                sums.mask[l] += (mask_weight * r * r) as f64;
+            }
+        }
+        if let (Some(options), Some(depth)) = (options.depth, &self.target.depth) {
+            let mut measured = [0.0; LANES];
+            for l in 0..patch.count {
+                measured[l] = depth.pixels()[patch.at[l]];
+            }
+            let scale = (1.0 / options.scale) as f32;
+            let limit = options.truncation as f32;
+            let (mut residuals, mut weights) = ([0.0; LANES], [0.0; LANES]);
+            let mut rows = [[0.0; LANES]; 6];
+            for l in 0..LANES {
+                let difference = patch.z[l] - measured[l];
+                let bounded = difference.max(-limit).min(limit);
+                let r = bounded * scale;
+                let weight = if measured[l] > 0.0 { options.weight as f32 } else { 0.0 };
+                sums.depth[l] += (weight * r * r) as f64;
+                let along = if bounded == difference { scale } else { 0.0 };
+                for i in 0..6 {
+                    rows[i][l] = patch.z_row[i][l] * along;
+                }
+                residuals[l] = r;
+                weights[l] = weight;
+            }
+            if DERIVATIVES {
+                sums.add(&[rows], &[residuals], &[weights]);
+            }
+        }
+    }
+
+    /// Whether there is a depth to compare with.
+    #[inline]
+    pub(crate) fn has_depth(&self, at: usize) -> bool {
+        let depth = self.options.depth.and(self.target.depth.as_ref());
+        depth.is_some_and(|d| d.pixels()[at] > 0.0)
     }
 }
 

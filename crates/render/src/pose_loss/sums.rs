@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix6, Vector6};
 
+use super::lane::{LANES, Lane};
 use super::pixel::Row;
 
 /// Numbers of pixels by what became of them.
@@ -19,6 +20,9 @@ pub struct Counts {
     pub depth: usize,
 }
 
+/// Σ w r J and the upper triangle of Σ w JᵀJ, row by row.
+const ENTRIES: usize = 27;
+
 /// Sums over some pixels; added up in a fixed order.
 #[derive(Clone, Debug)]
 pub(crate) struct Sums {
@@ -26,10 +30,58 @@ pub(crate) struct Sums {
     pub(crate) mask: f64,
     pub(crate) depth: f64,
     pub(crate) counts: Counts,
-    /// Σ w r J and the upper triangle of Σ w JᵀJ, row by row.
-    equations: [f64; 27],
+    equations: [f64; ENTRIES],
     /// The part of the image row at hand, still in f32.
-    row: [f32; 27],
+    row: [f32; ENTRIES],
+}
+
+/// The same sums of pixels side by side, over one block of rows.
+pub(crate) struct LaneSums {
+    pub(crate) color: [f64; LANES],
+    pub(crate) mask: [f64; LANES],
+    pub(crate) depth: [f64; LANES],
+    equations: [Lane; ENTRIES],
+}
+
+impl LaneSums {
+    pub(crate) fn new() -> Self {
+        Self {
+            color: [0.0; LANES],
+            mask: [0.0; LANES],
+            depth: [0.0; LANES],
+            equations: [[0.0; LANES]; ENTRIES],
+        }
+    }
+
+    /// Adds in each lane `N` residuals with derivatives `rows` and weights `weights`.
+    #[inline(always)]
+    pub(crate) fn add<const N: usize>(
+        &mut self,
+        rows: &[[Lane; 6]; N],
+        residuals: &[Lane; N],
+        weights: &[Lane; N],
+    ) {
+        for l in 0..LANES {
+            let mut at = 6;
+            for i in 0..6 {
+                let mut scaled = [0.0; N];
+                let mut sum = 0.0;
+                for k in 0..N {
+                    scaled[k] = weights[k][l] * rows[k][i][l];
+                    sum += scaled[k] * residuals[k][l];
+                }
+                self.equations[i][l] += sum;
+                for j in i..6 {
+                    let mut sum = 0.0;
+                    for k in 0..N {
+                        sum += scaled[k] * rows[k][j][l];
+                    }
+                    self.equations[at][l] += sum;
+                    at += 1;
+                }
+            }
+        }
+    }
 }
 
 impl Sums {
@@ -39,8 +91,8 @@ impl Sums {
             mask: 0.0,
             depth: 0.0,
             counts: Counts::default(),
-            equations: [0.0; 27],
-            row: [0.0; 27],
+            equations: [0.0; ENTRIES],
+            row: [0.0; ENTRIES],
         }
     }
 
@@ -63,6 +115,16 @@ impl Sums {
         for (sum, part) in self.equations.iter_mut().zip(&mut self.row) {
             *sum += *part as f64;
             *part = 0.0;
+        }
+    }
+
+    /// Adds what lies side by side, lane after lane.
+    pub(crate) fn absorb(&mut self, lanes: &LaneSums) {
+        self.color += lanes.color.iter().sum::<f64>();
+        self.mask += lanes.mask.iter().sum::<f64>();
+        self.depth += lanes.depth.iter().sum::<f64>();
+        for (sum, lane) in self.equations.iter_mut().zip(&lanes.equations) {
+            *sum += lane.iter().map(|v| *v as f64).sum::<f64>();
         }
     }
 
@@ -117,5 +179,28 @@ mod tests {
                 assert!((matrix[(i, j)] - expected as f64).abs() < 1e-12);
             }
         }
+    }
+
+    #[test]
+    fn lanes_add_up_to_the_same() {
+        let row = |l: usize, k: usize| -> Row {
+            std::array::from_fn(|i| ((l * 7 + k * 3 + i * 5) % 11) as f32 - 4.0)
+        };
+        let (mut sums, mut side_by_side) = (Sums::new(), Sums::new());
+        let mut lanes = LaneSums::new();
+        let mut rows = [[[0.0; LANES]; 6]; 2];
+        let (mut residuals, mut weights) = ([[0.0; LANES]; 2], [[0.0; LANES]; 2]);
+        for l in 0..LANES {
+            for k in 0..2 {
+                (0..6).for_each(|i| rows[k][i][l] = row(l, k)[i]);
+                residuals[k][l] = l as f32 - 9.0;
+                weights[k][l] = 1.0 + k as f32;
+                sums.add(&row(l, k), residuals[k][l], weights[k][l]);
+            }
+        }
+        sums.end_row();
+        lanes.add(&rows, &residuals, &weights);
+        side_by_side.absorb(&lanes);
+        assert_eq!(sums.equations(1.0), side_by_side.equations(1.0));
     }
 }

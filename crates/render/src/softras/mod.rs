@@ -50,4 +50,6 @@ impl View for SoftRasView<'_> {
     ) {
         let _ = &self.posed;
     }
+
+    fn faces(&self, _block: usize, _each: impl FnMut(usize, usize, u32, [f32; 3])) {}
 }

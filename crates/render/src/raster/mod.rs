@@ -1,5 +1,7 @@
 //! The hard z-buffer.
 
+mod small;
+
 use nalgebra::Isometry3;
 use rayon::prelude::*;
 
@@ -16,10 +18,28 @@ pub(crate) const BAND: usize = 16;
 pub(crate) const MISS: u32 = u32::MAX;
 
 /// The smallest whole number not below `v` ≥ 0 (`f32::ceil` is a function call on baseline x86-64).
-#[inline]
-fn ceil(v: f32) -> usize {
-    let whole = v as usize;
-    whole + usize::from((whole as f32) < v)
+#[inline(always)]
+fn ceil(v: f32) -> i32 {
+    let whole = v as i32;
+    whole + i32::from((whole as f32) < v)
+}
+
+/// The smaller and the larger of three numbers (`f32::min` would look for a NaN).
+#[inline(always)]
+fn span(a: f32, b: f32, c: f32) -> [f32; 2] {
+    let (low, high) = if a < b { (a, b) } else { (b, a) };
+    [if c < low { c } else { low }, if c > high { c } else { high }]
+}
+
+/// The pixel centres from `low` to `high` among those from `first` to `last`, if any.
+#[inline(always)]
+fn centres([low, high]: [f32; 2], first: usize, last: usize) -> Option<(usize, usize)> {
+    let (first, last) = (first as f32, last as f32 - 1.0);
+    let low = if low > first { low } else { first };
+    let high = if high < last { high } else { last };
+    let (start, end) = (ceil(low), high as i32);
+    // Most faces of a fine mesh lie between pixel centres. (One branch, not two.)
+    ((low <= high) & (start <= end)).then_some((start as usize, end as usize))
 }
 
 /// Visible faces of a block of rows.
@@ -45,42 +65,32 @@ impl Visible {
     }
 
     /// Draws one face where it is nearer than what is there; of equals the first stays.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn draw(&mut self, projected: &Projected, face: u32) {
-        let corners = projected.corners(face as usize);
-        let region = &self.region;
-        let low = |i: usize| corners[0][i].min(corners[1][i]).min(corners[2][i]);
-        let high = |i: usize| corners[0][i].max(corners[1][i]).max(corners[2][i]);
-        let (left, top) = (low(0).max(region.x0 as f32), low(1).max(region.y0 as f32));
-        let right = high(0).min(region.x1 as f32 - 1.0);
-        let bottom = high(1).min(region.y1 as f32 - 1.0);
-        let (x0, y0) = (ceil(left), ceil(top));
-        // Most faces of a fine mesh lie between pixel centres.
-        if left > right || top > bottom || x0 as f32 > right || y0 as f32 > bottom {
-            return;
-        }
-        let (x1, y1) = (right as usize, bottom as usize);
-        let area = signed_area(&corners);
-        let sign = if area < 0.0 { -1.0 } else { 1.0 };
-        let scale = 1.0 / area.abs();
-        let ids = projected.faces[face as usize];
-        let edges = [(1, 2), (2, 0), (0, 1)].map(|(i, j)| {
-            // Both faces of an edge evaluate the same expression, so that none of its pixels is lost.
-            let (a, b, s) = if ids[i] < ids[j] { (i, j, sign) } else { (j, i, -sign) };
-            let (a, b) = (corners[a], corners[b]);
-            [a[0], a[1], s * (b[0] - a[0]), s * (b[1] - a[1])]
-        });
+        let [a, b, c] = projected.corners(face as usize);
+        let region = self.region;
+        let Some((y0, y1)) = centres(span(a[1], b[1], c[1]), region.y0, region.y1) else { return };
+        let Some((x0, x1)) = centres(span(a[0], b[0], c[0]), region.x0, region.x1) else { return };
+        let area = signed_area(&[a, b, c]);
+        let scale = 1.0 / area;
+        let width = region.width();
         for y in y0..=y1 {
             let py = y as f32;
-            let row = (y - region.y0) * region.width();
+            let (ay, by, cy) = (a[1] - py, b[1] - py, c[1] - py);
+            let row = (y - region.y0) * width;
             for x in x0..=x1 {
                 let px = x as f32;
-                let e = edges.map(|[ax, ay, dx, dy]| dx * (py - ay) - dy * (px - ax));
-                if e[0] < 0.0 || e[1] < 0.0 || e[2] < 0.0 {
+                let (ax, bx, cx) = (a[0] - px, b[0] - px, c[0] - px);
+                // The other face of an edge has exactly the opposite number, so that none of its pixels is lost.
+                let e = [
+                    (bx * cy - by * cx) * scale,
+                    (cx * ay - cy * ax) * scale,
+                    (ax * by - ay * bx) * scale,
+                ];
+                if (e[0] < 0.0) | (e[1] < 0.0) | (e[2] < 0.0) {
                     continue;
                 }
-                let inverse_z =
-                    (e[0] * corners[0][2] + e[1] * corners[1][2] + e[2] * corners[2][2]) * scale;
+                let inverse_z = e[0] * a[2] + e[1] * b[2] + e[2] * c[2];
                 let at = row + x - region.x0;
                 if inverse_z > self.inverse_z[at] {
                     self.inverse_z[at] = inverse_z;
@@ -93,22 +103,15 @@ impl Visible {
 
 /// The faces that touch each block of [`BAND`] rows of `region`, in ascending order.
 pub(crate) fn bin(projected: &Projected, region: &Region) -> Vec<Vec<u32>> {
-    let mut bins = vec![Vec::new(); (region.y1 - region.y0).div_ceil(BAND)];
-    if bins.is_empty() {
-        return bins;
-    }
-    let (first, last) = (region.y0 as f32, region.y1 as f32 - 1.0);
+    let count = (region.y1 - region.y0).div_ceil(BAND);
+    // Each face is drawn in one block or two; a closed body shows half of its faces.
+    let expected = if count == 0 { 0 } else { projected.faces.len() / count };
+    let mut bins: Vec<Vec<u32>> = (0..count).map(|_| Vec::with_capacity(expected)).collect();
     for (f, _) in projected.facing.iter().enumerate().filter(|(_, facing)| **facing != 0) {
         let [a, b, c] = projected.corners(f);
-        let low = a[1].min(b[1]).min(c[1]).max(first);
-        let high = a[1].max(b[1]).max(c[1]).min(last);
-        if low > high {
+        let Some((top, bottom)) = centres(span(a[1], b[1], c[1]), region.y0, region.y1) else {
             continue;
-        }
-        let (top, bottom) = (ceil(low), high as usize);
-        if top > bottom {
-            continue;
-        }
+        };
         for bin in &mut bins[(top - region.y0) / BAND..=(bottom - region.y0) / BAND] {
             bin.push(f as u32);
         }
@@ -129,7 +132,7 @@ pub(crate) fn rasterise(projected: &Projected, region: &Region) -> Vec<Visible> 
         .enumerate()
         .map(|(index, faces)| {
             let mut visible = Visible::new(band(region, index));
-            faces.iter().for_each(|&f| visible.draw(projected, f));
+            visible.draw_all(projected, faces);
             visible
         })
         .collect()

@@ -1,0 +1,78 @@
+//! A pixel inside a face: where it lies on the surface, and how that changes with the pose.
+
+use super::surface::Shaded;
+use super::vec3::{Vec3, cross, dot, mix, scale, sub};
+use crate::pose_loss::Row;
+
+/// Surfaces are taken to be inclined to the viewing ray by at least this sine: of what is seen at a grazing angle, a
+/// pixel's centre says little, and its derivatives would grow without bound.
+const GRAZING: f32 = 1e-3;
+
+#[inline(always)]
+pub(crate) fn row(linear: Vec3, angular: Vec3) -> Row {
+    [linear[0], linear[1], linear[2], angular[0], angular[1], angular[2]]
+}
+
+/// Perspective-correct barycentric coordinates of pixel (x, y) on a face with these corners (column, row, 1/Z).
+#[inline(always)]
+pub(crate) fn barycentric([a, b, c]: [[f32; 3]; 3], x: f32, y: f32) -> [f32; 3] {
+    let (ax, ay, bx, by, cx, cy) = (a[0] - x, a[1] - y, b[0] - x, b[1] - y, c[0] - x, c[1] - y);
+    let weights =
+        [(bx * cy - by * cx) * a[2], (cx * ay - cy * ax) * b[2], (ax * by - ay * bx) * c[2]];
+    let sum = weights[0] + weights[1] + weights[2];
+    let scale = if sum == 0.0 { 0.0 } else { 1.0 / sum };
+    let (second, third) = (weights[1] * scale, weights[2] * scale);
+    [1.0 - second - third, second, third]
+}
+
+/// How what a fixed pixel shows of a face changes with the pose.
+pub(crate) struct Motion {
+    /// Gradients of the barycentric coordinates of corners 1 and 2 by the surface's own motion, reversed.
+    gradients: [Vec3; 2],
+    arm: Vec3,
+    /// Derivative of the depth.
+    pub(crate) z_row: Row,
+}
+
+impl Motion {
+    /// At barycentric coordinates `b` and depth `z` on the viewing ray `ray` (X/Z) of a face with corners `p` (camera frame
+    /// \[m\]).
+    ///
+    /// A twist with velocity v(X) = t + ω × (X − c) moves the surface; the pixel then sees another material point. The
+    /// coordinate of corner 1 of the point on ray X is f(X) = c₁·X / n·X with c₁ = e₂ × p₀ and n = e₁ × e₂ (of corner
+    /// 2 likewise with c₂ = p₀ × e₁), so it changes by −h·v, h = (c₁ − f n) / n·X, and the depth by n·v / n·ray.
+    #[inline(always)]
+    pub(crate) fn new(p: &[Vec3; 3], b: [f32; 3], ray: Vec3, z: f32, twist_center: Vec3) -> Self {
+        let point = scale(ray, z);
+        let (e1, e2) = (sub(p[1], p[0]), sub(p[2], p[0]));
+        let n = cross(e1, e2);
+        // Of the corner, where rounding disturbs the plane's offset least.
+        let facing = dot(n, p[0]);
+        let least = GRAZING * (dot(n, n) * dot(p[0], p[0])).sqrt().max(1e-30);
+        let facing = if facing < 0.0 { facing.min(-least) } else { facing.max(least) };
+        let inverse = 1.0 / facing;
+        let first = mix(inverse, cross(e2, p[0]), -b[1] * inverse, n);
+        let second = mix(inverse, cross(p[0], e1), -b[2] * inverse, n);
+        let arm = sub(point, twist_center);
+        let along = scale(n, z * inverse);
+        Self { gradients: [first, second], arm, z_row: row(along, cross(arm, along)) }
+    }
+
+    /// Derivative of colour channel `k`.
+    #[inline(always)]
+    pub(crate) fn color_row(&self, shaded: &Shaded, k: usize) -> Row {
+        let [first, second] = self.gradients;
+        let h = mix(shaded.along[0][k], first, shaded.along[1][k], second);
+        let turn = cross(self.arm, h);
+        row(scale(h, -1.0), sub(shaded.turning[k], turn))
+    }
+}
+
+/// Adds to a colour's row that the texture's level follows the depth of the model's centre: `level` times (0, 0, 1) and
+/// arm × (0, 0, 1), with the centre's position `arm` from where twists turn.
+#[inline(always)]
+pub(crate) fn add_level(row: &mut Row, level: f32, arm: Vec3) {
+    row[2] += level;
+    row[3] += level * arm[1];
+    row[4] -= level * arm[0];
+}
