@@ -44,23 +44,25 @@ impl Candidates {
         self.inside = [u64::MAX; RUN];
     }
 
-    /// Adds `face` with index `index` to the pixels from (column, row) on where it counts.
+    /// Adds `face` with index `index` to the `lanes` pixels from `pixel` (column, row) on, where it counts.
     #[inline(always)]
     pub(crate) fn add(
         &mut self,
         face: &Face,
         index: u32,
-        column: f32,
-        row: f32,
+        pixel: [f32; 2],
+        lanes: usize,
         settings: &Settings,
     ) {
+        let [column, row] = pixel;
         let (mut z, mut state) = ([0.0f32; RUN], [0u32; RUN]);
-        for lane in 0..RUN {
-            let fragment = Fragment::new(face, column + lane as f32, row, settings);
-            z[lane] = fragment.z;
-            state[lane] = fragment.kept as u32 + ((fragment.kept & fragment.inside) as u32) * 2;
+        // A number of turns that the compiler does not know: it makes vectors of such a loop, and would unroll another.
+        for (lane, (z, state)) in z[..lanes].iter_mut().zip(&mut state[..lanes]).enumerate() {
+            let fragment = Fragment::new(face, column + lane as i32 as f32, row, settings);
+            *z = fragment.z;
+            *state = fragment.kept as u32 + ((fragment.kept & fragment.inside) as u32) * 2;
         }
-        for lane in 0..RUN {
+        for lane in 0..lanes {
             if state[lane] == 0 {
                 continue;
             }
@@ -89,7 +91,11 @@ impl Candidates {
     }
 
     /// The faces that count at a pixel, the nearest first.
-    pub(crate) fn nearest(&mut self, lane: usize, most: usize) -> impl ExactSizeIterator<Item = u32> {
+    pub(crate) fn nearest(
+        &mut self,
+        lane: usize,
+        most: usize,
+    ) -> impl ExactSizeIterator<Item = u32> {
         self.keep(lane, most);
         let keys = &self.keys[lane][..self.count[lane]];
         keys.iter().map(|key| *key as u32)

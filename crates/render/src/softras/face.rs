@@ -3,7 +3,7 @@
 use super::settings::Settings;
 
 /// Corners of the edges that a distance is taken to; of equally near ones the first counts.
-pub(crate) const EDGES: [[usize; 2]; 3] = [[0, 1], [0, 2], [1, 2]];
+const EDGES: [[usize; 2]; 3] = [[0, 1], [0, 2], [1, 2]];
 
 /// A face in the image. Positions are relative to a pixel near it, so that f32 holds them well.
 #[derive(Clone, Copy, Debug)]
@@ -12,7 +12,7 @@ pub(crate) struct Face {
     pub(crate) base: [f32; 2],
     /// Corners \[px\].
     pub(crate) corner: [[f32; 2]; 3],
-    /// The edges of [`EDGES`] \[px\].
+    /// The edges from corner 0 to 1, 0 to 2 and 1 to 2 \[px\].
     pub(crate) edge: [[f32; 2]; 3],
     /// One over their squared lengths \[1/px²\], 0 for the very short.
     pub(crate) inverse_length: [f32; 3],
@@ -51,7 +51,8 @@ impl Face {
             base: base.map(|v| v as f32),
             corner: corners.map(|c| [0, 1].map(|k| (c[k] - base[k]) as f32)),
             edge: edge.map(|e| e.map(|v| v as f32)),
-            inverse_length: [0, 1, 2].map(|i| if is_short[i] { 0.0 } else { 1.0 / length[i] as f32 }),
+            inverse_length: [0, 1, 2]
+                .map(|i| if is_short[i] { 0.0 } else { 1.0 / length[i] as f32 }),
             short: is_short.map(|s| if s { 1.0 } else { 0.0 }),
             share: share.map(|s| (sign * s) as f32),
             z: corners.map(|c| c[2] as f32),

@@ -12,7 +12,8 @@
 //! - Faces with a corner at or behind the camera's plane (Z ≤ 1 mm) are left out whole, not clipped.
 //! - Areas are not raised by 1e-8 before dividing by them. This shows only without perspective correction and without
 //!   clipping, where coordinates then sum up to one exactly.
-//! - Both sides of a face are lit as seen, by a normal towards the camera.
+//! - The faces of an open mesh are lit by a normal towards the camera, as in the other mode. Those of a closed one keep
+//!   their outward normals, seen from inside too.
 //! - The depth that is compared and shown is that of the nearest face that contains the pixel's centre, because the
 //!   nearest of the spread faces is biased towards the camera on slanted surfaces. Where no face contains the centre it is
 //!   that of the nearest kept face, and has no weight in a loss.
@@ -60,6 +61,8 @@ pub(crate) struct SoftRasView<'a> {
     region: Region,
     /// The faces that may count in each band of rows, in ascending order.
     bands: Vec<Vec<u32>>,
+    /// The vector instructions at hand. No sum is fused, so that results do not depend on them.
+    arch: pulp::Arch,
 }
 
 impl<'a> SoftRasView<'a> {
@@ -89,7 +92,8 @@ impl<'a> SoftRasView<'a> {
                 };
                 // Seen from outside, the area is negative.
                 let outside = face.share[0] < 0.0;
-                posed.projected.facing[id] = if outside { 1 } else { -1 };
+                // A closed surface is lit by its outward normals on both sides: a face that turns over must not jump.
+                posed.projected.facing[id] = if outside || model.closed { 1 } else { -1 };
                 if outside || !settings.cull {
                     faces.push(face);
                     ids.push(id as u32);
@@ -100,7 +104,7 @@ impl<'a> SoftRasView<'a> {
         let rows = faces.iter().map(|_| OnceLock::new()).collect();
         let twist_center = center.coords.cast();
         let scene = Scene { posed, lighting, settings, faces, ids, rows, twist_center };
-        Self { scene, region, bands }
+        Self { scene, region, bands, arch: pulp::Arch::new() }
     }
 }
 
@@ -200,27 +204,51 @@ impl View for SoftRasView<'_> {
     fn visit<const DERIVATIVES: bool>(
         &self,
         block: usize,
-        mut each: impl FnMut(usize, usize, Option<Seen>),
+        each: impl FnMut(usize, usize, Option<Seen>),
     ) {
-        let (scene, region) = (&self.scene, &self.region);
-        let y = region.y0 + block;
-        let runs = Runs::new(scene, &self.bands[block / BAND], region, y as f32);
+        self.arch.dispatch(Visit::<DERIVATIVES, _> { view: self, block, each });
+    }
+}
+
+/// The work on one row of pixels, compiled for each set of vector instructions.
+struct Visit<'a, const DERIVATIVES: bool, F> {
+    view: &'a SoftRasView<'a>,
+    block: usize,
+    each: F,
+}
+
+impl<const DERIVATIVES: bool, F> pulp::WithSimd for Visit<'_, DERIVATIVES, F>
+where
+    F: FnMut(usize, usize, Option<Seen>),
+{
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(mut self, _: S) {
+        let (scene, region) = (&self.view.scene, &self.view.region);
+        let y = region.y0 + self.block;
+        let runs = Runs::new(scene, &self.view.bands[self.block / BAND], region, y as f32);
         let (mut candidates, mut scratch) = (Candidates::new(), Scratch::new());
         for run in 0..region.width().div_ceil(RUN) {
             let x0 = region.x0 + run * RUN;
+            let lanes = RUN.min(region.x1 - x0);
             candidates.clear();
             for &index in runs.of(run) {
                 let face = &scene.faces[index as usize];
-                candidates.add(face, index, x0 as f32, y as f32, &scene.settings);
+                candidates.add(face, index, [x0 as f32, y as f32], lanes, &scene.settings);
             }
-            for x in x0..(x0 + RUN).min(region.x1) {
-                let lane = x - x0;
+            for lane in 0..lanes {
+                let x = x0 + lane;
                 let inside = candidates.inside(lane);
                 let nearest = candidates.nearest(lane, scene.settings.faces);
                 let (u, v) = (x as f32, y as f32);
-                let seen = (nearest.len() > 0)
-                    .then(|| scene.pixel::<DERIVATIVES>(&mut scratch, u, v, nearest, inside));
-                each(x, y, seen);
+                // Not a closure, which would be compiled for the plain instructions.
+                let seen = if nearest.len() > 0 {
+                    Some(scene.pixel::<DERIVATIVES>(&mut scratch, u, v, nearest, inside))
+                } else {
+                    None
+                };
+                (self.each)(x, y, seen);
             }
         }
     }

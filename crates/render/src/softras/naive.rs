@@ -32,8 +32,8 @@ pub(super) fn naive_fragment(
     if area.abs() <= 1e-8 || z.iter().any(|z| *z <= 1e-3) {
         return None;
     }
-    let flat = [(b - p).perp(&(c - p)), (c - p).perp(&(a - p)), (a - p).perp(&(b - p))]
-        .map(|e| e / area);
+    let flat =
+        [(b - p).perp(&(c - p)), (c - p).perp(&(a - p)), (a - p).perp(&(b - p))].map(|e| e / area);
     let inside = flat.iter().all(|b| *b > 0.0);
     let mut coordinates = flat;
     if options.perspective_correct {
@@ -66,6 +66,7 @@ pub(super) fn naive_fragment(
 pub(super) struct NaivePixel {
     pub(super) color: [f64; 3],
     pub(super) alpha: f64,
+    /// Twice the index of each face, one more if it is seen from outside.
     pub(super) faces: Vec<usize>,
     /// Depth of the nearest face around the pixel's centre.
     pub(super) depth: Option<f64>,
@@ -96,11 +97,10 @@ pub(super) fn naive_picture(
         .collect();
     let faces: Vec<[[f64; 3]; 3]> =
         model.faces.iter().map(|f| f.map(|v| vertices[v as usize])).collect();
-    let outside = |[a, b, c]: &[[f64; 3]; 3]| {
-        (b[0] - a[0]) * (c[1] - a[1]) < (b[1] - a[1]) * (c[0] - a[0])
-    };
+    let outside =
+        |[a, b, c]: &[[f64; 3]; 3]| (b[0] - a[0]) * (c[1] - a[1]) < (b[1] - a[1]) * (c[0] - a[0]);
     for (facing, face) in posed.projected.facing.iter_mut().zip(&faces) {
-        *facing = if outside(face) { 1 } else { -1 };
+        *facing = if outside(face) || model.closed { 1 } else { -1 };
     }
     let pixel = |x: usize, y: usize| {
         let p = [x as f64 * scale, y as f64 * scale];
@@ -128,8 +128,12 @@ pub(super) fn naive_picture(
             sum += weight;
             clear *= 1.0 - p;
         }
-        let faces = all.iter().map(|f| f.face).collect();
+        let sided = |f: &NaiveFragment| 2 * f.face + usize::from(outside(&faces[f.face]));
+        let faces = all.iter().map(sided).collect();
         NaivePixel { color: color.map(|c| c / sum), alpha: 1.0 - clear, faces, depth }
     };
-    (0..camera.height).flat_map(|y| (0..camera.width).map(move |x| (x, y))).map(|(x, y)| pixel(x, y)).collect()
+    (0..camera.height)
+        .flat_map(|y| (0..camera.width).map(move |x| (x, y)))
+        .map(|(x, y)| pixel(x, y))
+        .collect()
 }

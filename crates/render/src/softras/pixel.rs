@@ -51,8 +51,9 @@ impl Scratch {
     }
 }
 
-fn narrow(row: &WideRow) -> Row {
-    [0, 1, 2, 3, 4, 5].map(|i| row[i])
+#[inline(always)]
+fn narrow([a, b, c, d, e, f, _, _]: &WideRow) -> Row {
+    [*a, *b, *c, *d, *e, *f]
 }
 
 impl Scene<'_> {
@@ -168,11 +169,8 @@ impl Scene<'_> {
             // The nearest depth is what the weights are relative to; the background's weight is not if it is at its bound.
             let nearest = drift && fragment.z == blend.nearest;
             drift &= !nearest;
-            let relative = if nearest {
-                settings.depth_rate * blend.background * inverse_sum
-            } else {
-                0.0
-            };
+            let relative =
+                if nearest { settings.depth_rate * blend.background * inverse_sum } else { 0.0 };
             let geometry = &self.faces[face as usize];
             let (x, y) = (column - geometry.base[0], row - geometry.base[1]);
             let weight_rows = rows.weights(x, y);
