@@ -70,6 +70,8 @@ pub(super) struct NaivePixel {
     pub(super) faces: Vec<usize>,
     /// Depth of the nearest face around the pixel's centre.
     pub(super) depth: Option<f64>,
+    /// That face.
+    pub(super) inside: Option<usize>,
 }
 
 /// The picture, row by row.
@@ -112,7 +114,8 @@ pub(super) fn naive_picture(
         });
         let mut all: Vec<NaiveFragment> = all.collect();
         all.sort_by(|a, b| (a.z, a.face).partial_cmp(&(b.z, b.face)).unwrap());
-        let depth = all.iter().find(|f| f.distance < 0.0).map(|f| f.z);
+        let surface = all.iter().find(|f| f.distance < 0.0);
+        let (depth, inside) = (surface.map(|f| f.z), surface.map(|f| f.face));
         all.truncate(options.faces_per_pixel);
         let range = options.z_far - options.z_near;
         let inverse = |f: &NaiveFragment| (options.z_far - f.z) / range;
@@ -130,7 +133,7 @@ pub(super) fn naive_picture(
         }
         let sided = |f: &NaiveFragment| 2 * f.face + usize::from(outside(&faces[f.face]));
         let faces = all.iter().map(sided).collect();
-        NaivePixel { color: color.map(|c| c / sum), alpha: 1.0 - clear, faces, depth }
+        NaivePixel { color: color.map(|c| c / sum), alpha: 1.0 - clear, faces, depth, inside }
     };
     (0..camera.height)
         .flat_map(|y| (0..camera.width).map(move |x| (x, y)))
