@@ -75,9 +75,9 @@ impl FaceRows {
     /// Adds the row of Σ f_i u_i x + f_i v_i y for a foot with coordinates f and a direction (x, y).
     #[inline(always)]
     pub(crate) fn add_image(&self, sum: &mut WideRow, direction: [f32; 2], foot: [f32; 3]) {
-        for i in 0..3 {
-            add_scaled(sum, direction[0] * foot[i], &self.image[i][0]);
-            add_scaled(sum, direction[1] * foot[i], &self.image[i][1]);
+        for (share, [column, row]) in foot.iter().zip(&self.image) {
+            add_scaled(sum, direction[0] * share, column);
+            add_scaled(sum, direction[1] * share, row);
         }
     }
 
