@@ -245,9 +245,12 @@ fn rows_are_derivatives_of_the_naive_pixels() {
     assert!(wrong.is_empty(), "{wrong:?}");
 }
 
+/// Depth \[m\], corners and colour.
+type Flat = (f64, [[f64; 2]; 3], [f32; 3]);
+
 /// Triangles in the plane Z = `depth`, corners in normalised device coordinates about the centre of a 64² image.
 fn flat_picture(
-    triangles: &[(f64, [[f64; 2]; 3], [f32; 3])],
+    triangles: &[Flat],
     options: &SoftRasOptions,
 ) -> impl Fn(usize, usize) -> Option<Pixel> + use<> {
     let camera = Camera { fx: 32.0, fy: 32.0, cx: 32.0, cy: 32.0, width: 64, height: 64 };
