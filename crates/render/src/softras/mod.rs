@@ -1,54 +1,256 @@
-//! The SoftRas mode.
+//! The SoftRas mode: every face spreads beyond its border, and the nearest of them are blended by depth (Liu et al.,
+//! "Soft Rasterizer: A Differentiable Renderer for Image-based 3D Reasoning", 2019), with the semantics of PyTorch3D
+//! (Ravi et al., "Accelerating 3D Deep Learning with PyTorch3D", 2020): its mesh rasterizer and its softmax blend of colours.
+//!
+//! For each pixel and face, d is the squared distance from the pixel's centre to the face's borders, negative inside; the
+//! face is kept if it contains the centre or d is below the blur radius. Of the kept, the K nearest by the depth
+//! z = Σ b_i Z_i count, where the barycentric coordinates b are perspective-correct and clipped if the options say so. With
+//! p = sigmoid(−d/σ) and ζ = (z_far − z)/(z_far − z_near), the pixel shows Σ w C / (Σ w + δ), w = p exp((ζ − ζ_max)/γ),
+//! over a black background of weight δ = max(exp((ε − ζ_max)/γ), ε), ε = 1e-10, and its coverage is 1 − Π (1 − p).
+//!
+//! Where it differs from PyTorch3D:
+//! - Faces with a corner at or behind the camera's plane (Z ≤ 1 mm) are left out whole, not clipped.
+//! - Areas are not raised by 1e-8 before dividing by them. This shows only without perspective correction and without
+//!   clipping, where coordinates then sum up to one exactly.
+//! - The faces of an open mesh are lit by a normal towards the camera, as in the other mode. Those of a closed one keep
+//!   their outward normals, seen from inside too.
+//! - The depth that is compared and shown is that of the nearest face that contains the pixel's centre, because the
+//!   nearest of the spread faces is biased towards the camera on slanted surfaces. Where no face contains the centre it is
+//!   that of the nearest kept face, and has no weight in a loss.
+//!
+//! Lengths in the image are pixels inside; the options are in normalised device coordinates, in which the shorter
+//! side of the image is 2 long.
+
+mod adjoint;
+mod blend;
+mod candidates;
+mod exponential;
+mod face;
+mod fragment;
+#[cfg(test)]
+mod naive;
+mod pixel;
+mod rows;
+mod settings;
+#[cfg(test)]
+mod tests;
+
+use std::sync::OnceLock;
 
 use nalgebra::{Isometry3, Point3};
 
 use crate::camera::Camera;
+use crate::contour::Lighting;
 use crate::light::Light;
 use crate::mode::SoftRasOptions;
 use crate::model::RenderModel;
 use crate::pose_loss::{Seen, View};
 use crate::posed::Posed;
 use crate::projected::Region;
+use candidates::{Candidates, RUN};
+use face::Face;
+use pixel::{Scene, Scratch};
+use settings::Settings;
+
+/// Rows whose faces are listed together.
+const BAND: usize = 8;
 
 /// A posed model whose faces spread beyond their borders.
 pub(crate) struct SoftRasView<'a> {
-    posed: Posed<'a>,
+    scene: Scene<'a>,
     region: Region,
+    /// The faces that may count in each band of rows, in ascending order.
+    bands: Vec<Vec<u32>>,
+    /// The vector instructions at hand. No sum is fused, so that results do not depend on them.
+    arch: pulp::Arch,
 }
 
 impl<'a> SoftRasView<'a> {
     /// Twists turn about `center` (camera frame \[m\]). Besides the pixels that the model may cover, those of `also` are
     /// visited.
     pub(crate) fn new(
-        _options: &SoftRasOptions,
+        options: &SoftRasOptions,
         model: &'a RenderModel,
         pose: &Isometry3<f64>,
-        _center: &Point3<f64>,
+        center: &Point3<f64>,
         camera: &Camera,
-        _light: &Light,
+        light: &Light,
         also: &Region,
     ) -> Self {
-        let posed = Posed::new(model, camera, pose, 0.0);
+        let settings = Settings::new(options, camera);
+        let mut posed = Posed::new(model, camera, pose, settings.reach);
         let region = posed.projected.region.union(also);
-        Self { posed, region }
+        let lighting = Lighting::new(light, &posed.rotation);
+        let (mut faces, mut ids) = (Vec::new(), Vec::new());
+        if posed.projected.region != Region::EMPTY {
+            let screen = project(&posed, camera, pose);
+            for (id, corners) in model.faces.iter().enumerate() {
+                let corners = corners.map(|v| screen[v as usize]);
+                let in_front = corners.iter().all(|c| c[2] > 0.0);
+                let Some(face) = in_front.then(|| Face::new(corners, &settings)).flatten() else {
+                    continue;
+                };
+                // Seen from outside, the area is negative.
+                let outside = face.share[0] < 0.0;
+                // A closed surface is lit by its outward normals on both sides: a face that turns over must not jump.
+                posed.projected.facing[id] = if outside || model.closed { 1 } else { -1 };
+                if outside || !settings.cull {
+                    faces.push(face);
+                    ids.push(id as u32);
+                }
+            }
+        }
+        let bands = bands(&faces, &region);
+        let rows = faces.iter().map(|_| OnceLock::new()).collect();
+        let twist_center = center.coords.cast();
+        let scene = Scene { posed, lighting, settings, faces, ids, rows, twist_center };
+        Self { scene, region, bands, arch: pulp::Arch::new() }
+    }
+}
+
+/// Column, row \[px\] and Z \[m\] of the vertices; Z is 0 where it is not in front of the camera. In f64, because
+/// barycentric coordinates of narrow faces magnify what rounding does to positions.
+fn project(posed: &Posed, camera: &Camera, pose: &Isometry3<f64>) -> Vec<[f64; 3]> {
+    let rotation = pose.rotation.to_rotation_matrix();
+    let center = pose * posed.model.center();
+    let vertices = posed.model.positions.iter().zip(&posed.projected.screen);
+    vertices
+        .map(|(p, screen)| {
+            if screen[2] == 0.0 {
+                return [0.0; 3];
+            }
+            let p = center + rotation * p.cast::<f64>();
+            [camera.fx * p.x / p.z + camera.cx, camera.fy * p.y / p.z + camera.cy, p.z]
+        })
+        .collect()
+}
+
+/// The faces that may count in each [`BAND`] rows of `region`, in ascending order.
+fn bands(faces: &[Face], region: &Region) -> Vec<Vec<u32>> {
+    let mut bands = vec![Vec::new(); (region.y1 - region.y0).div_ceil(BAND)];
+    let last = bands.len().wrapping_sub(1);
+    for (i, face) in faces.iter().enumerate() {
+        let [left, right, top, bottom] = face.bounds;
+        let outside = right < region.x0 as f32
+            || left >= region.x1 as f32
+            || bottom < region.y0 as f32
+            || top >= region.y1 as f32;
+        if outside || bands.is_empty() {
+            continue;
+        }
+        // Casts to integers saturate.
+        let first = (top as usize).saturating_sub(region.y0) / BAND;
+        let end = (bottom as usize).saturating_sub(region.y0) / BAND;
+        bands[first..=end.min(last)].iter_mut().for_each(|band| band.push(i as u32));
+    }
+    bands
+}
+
+/// The faces that may count in each run of pixels of one row, in ascending order.
+struct Runs {
+    faces: Vec<u32>,
+    /// Where the faces of each run start, and the end.
+    start: Vec<usize>,
+}
+
+impl Runs {
+    fn new(scene: &Scene, band: &[u32], region: &Region, row: f32) -> Self {
+        let count = region.width().div_ceil(RUN);
+        let touched = |face: &Face| {
+            let [left, right, top, bottom] = face.bounds;
+            if row < top || row > bottom || right < region.x0 as f32 || left >= region.x1 as f32 {
+                return 0..0;
+            }
+            let first = (left as usize).saturating_sub(region.x0) / RUN;
+            let end = (right as usize).saturating_sub(region.x0) / RUN + 1;
+            first..end.min(count)
+        };
+        let mut start = vec![0; count + 1];
+        for &index in band {
+            touched(&scene.faces[index as usize]).for_each(|run| start[run] += 1);
+        }
+        let mut sum = 0;
+        for value in &mut start {
+            sum += *value;
+            *value = sum;
+        }
+        let mut faces = vec![0; sum];
+        // Backwards, so that each run's faces end up in ascending order and `start` at its start.
+        for &index in band.iter().rev() {
+            for run in touched(&scene.faces[index as usize]) {
+                start[run] -= 1;
+                faces[start[run]] = index;
+            }
+        }
+        Self { faces, start }
+    }
+
+    fn of(&self, run: usize) -> &[u32] {
+        &self.faces[self.start[run]..self.start[run + 1]]
     }
 }
 
 impl View for SoftRasView<'_> {
+    /// One for each row of pixels.
     fn blocks(&self) -> usize {
-        0
+        self.region.y1 - self.region.y0
     }
 
     fn right(&self) -> usize {
         self.region.x1
     }
 
+    #[inline]
     fn visit<const DERIVATIVES: bool>(
         &self,
-        _block: usize,
-        _each: impl FnMut(usize, usize, Option<Seen>),
+        block: usize,
+        each: impl FnMut(usize, usize, Option<Seen>),
     ) {
-        let _ = &self.posed;
+        self.arch.dispatch(Visit::<DERIVATIVES, _> { view: self, block, each });
+    }
+}
+
+/// The work on one row of pixels, compiled for each set of vector instructions.
+struct Visit<'a, const DERIVATIVES: bool, F> {
+    view: &'a SoftRasView<'a>,
+    block: usize,
+    each: F,
+}
+
+impl<const DERIVATIVES: bool, F> pulp::WithSimd for Visit<'_, DERIVATIVES, F>
+where
+    F: FnMut(usize, usize, Option<Seen>),
+{
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(mut self, _: S) {
+        let (scene, region) = (&self.view.scene, &self.view.region);
+        let y = region.y0 + self.block;
+        let runs = Runs::new(scene, &self.view.bands[self.block / BAND], region, y as f32);
+        let (mut candidates, mut scratch) = (Candidates::new(), Scratch::new());
+        for run in 0..region.width().div_ceil(RUN) {
+            let x0 = region.x0 + run * RUN;
+            let lanes = RUN.min(region.x1 - x0);
+            candidates.clear();
+            for &index in runs.of(run) {
+                let face = &scene.faces[index as usize];
+                candidates.add(face, index, [x0 as f32, y as f32], lanes, &scene.settings);
+            }
+            for lane in 0..lanes {
+                let x = x0 + lane;
+                let inside = candidates.inside(lane);
+                let nearest = candidates.nearest(lane, scene.settings.faces);
+                let (u, v) = (x as f32, y as f32);
+                // Not a closure, which would be compiled for the plain instructions.
+                let seen = if nearest.len() > 0 {
+                    Some(scene.pixel::<DERIVATIVES>(&mut scratch, u, v, nearest, inside))
+                } else {
+                    None
+                };
+                (self.each)(x, y, seen);
+            }
+        }
     }
 
     fn faces(&self, _block: usize, _each: impl FnMut(usize, usize, u32, [f32; 3])) {}
