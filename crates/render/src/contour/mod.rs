@@ -29,7 +29,7 @@ use lanes::Waiting;
 pub use light_samples::light_samples;
 pub(crate) use outline::{Band, Piece, Silhouette, outline};
 pub(crate) use pixel::Scene;
-pub(crate) use surface::{Lighting, Shaded, shade};
+pub(crate) use surface::{Lighting, Shaded, posed_normal, shade};
 
 /// A posed model with its contours.
 pub(crate) struct ContourView<'a> {

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::inner::Inner;
 use super::interior::{Motion, add_level, barycentric, row};
 use super::outline::{Foot, Piece};
-use super::surface::{self, Lighting, Shaded, shade};
+use super::surface::{Lighting, Shaded, posed_normal, shade};
 use super::vec3::{Vec3, vec3};
 use crate::pose_loss::{Pixel, Row, scaled_sum};
 use crate::posed::Posed;
@@ -118,10 +118,7 @@ impl Scene<'_> {
     pub(crate) fn normal(&self, face: usize, x: f32, y: f32) -> Vec3 {
         let projected = &self.posed.projected;
         let b = barycentric(projected.corners(face), x, y);
-        let corners = self.posed.model.normals[face].each_ref().map(vec3);
-        let side = if projected.facing[face] < 0 { -1.0 } else { 1.0 };
-        let (normal, _) = surface::normal(&corners, side, b);
-        vec3(&(self.posed.rotation * Vector3::from(normal)))
+        posed_normal(&self.posed, face, b)
     }
 
     /// Rows of the colour of an outline point, whose material point slides along the edge by `slide`.

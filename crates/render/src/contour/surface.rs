@@ -1,6 +1,6 @@
 //! Colour of a surface point and its derivatives along the surface and with the normal.
 
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 
 use super::vec3::{Vec3, add, cross, dot, mix, scale, sub, times, vec3};
 use crate::light::Light;
@@ -101,6 +101,13 @@ pub(crate) fn normal(corners: &[Vec3; 3], side: f32, b: [f32; 3]) -> (Vec3, f32)
     let sum = add(mix(b[0], corners[0], b[1], corners[1]), scale(corners[2], b[2]));
     let length = dot(sum, sum).sqrt().max(1e-6);
     (scale(sum, side / length), length)
+}
+
+/// Unit normal (camera frame) at barycentric coordinates `b` of a face, on the side seen.
+pub(crate) fn posed_normal(posed: &Posed, face: usize, b: [f32; 3]) -> Vec3 {
+    let corners = posed.model.normals[face].each_ref().map(vec3);
+    let side = if posed.projected.facing[face] < 0 { -1.0 } else { 1.0 };
+    vec3(&(posed.rotation * Vector3::from(normal(&corners, side, b).0)))
 }
 
 /// Lit colour at barycentric coordinates `b` of a face with normals `corners` at its corners.

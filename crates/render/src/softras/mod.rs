@@ -35,6 +35,7 @@ mod settings;
 #[cfg(test)]
 mod tests;
 
+use std::ops::Range;
 use std::sync::OnceLock;
 
 use nalgebra::{Isometry3, Point3};
@@ -185,8 +186,37 @@ impl Runs {
         Self { faces, start }
     }
 
-    fn of(&self, run: usize) -> &[u32] {
-        &self.faces[self.start[run]..self.start[run + 1]]
+    fn count(&self) -> usize {
+        self.start.len() - 1
+    }
+
+    /// Finds out which faces count at the pixels of a run, whose columns it returns.
+    #[inline(always)]
+    fn collect(
+        &self,
+        candidates: &mut Candidates,
+        scene: &Scene,
+        run: usize,
+        region: &Region,
+        row: f32,
+    ) -> Range<usize> {
+        let x0 = region.x0 + run * RUN;
+        let lanes = RUN.min(region.x1 - x0);
+        candidates.clear();
+        for &index in &self.faces[self.start[run]..self.start[run + 1]] {
+            let face = &scene.faces[index as usize];
+            candidates.add(face, index, [x0 as f32, row], lanes, &scene.settings);
+        }
+        x0..x0 + lanes
+    }
+}
+
+impl SoftRasView<'_> {
+    /// The row of a block, and its faces.
+    #[inline(always)]
+    fn runs(&self, block: usize) -> (usize, Runs) {
+        let y = self.region.y0 + block;
+        (y, Runs::new(&self.scene, &self.bands[block / BAND], &self.region, y as f32))
     }
 }
 
@@ -208,6 +238,20 @@ impl View for SoftRasView<'_> {
     ) {
         self.arch.dispatch(Visit::<DERIVATIVES, _> { view: self, block, each });
     }
+
+    fn faces(&self, block: usize, mut each: impl FnMut(usize, usize, u32, [f32; 3])) {
+        let (y, runs) = self.runs(block);
+        let mut candidates = Candidates::new();
+        for run in 0..runs.count() {
+            let columns = runs.collect(&mut candidates, &self.scene, run, &self.region, y as f32);
+            for (lane, x) in columns.enumerate() {
+                if let Some(face) = candidates.inside(lane) {
+                    let (face, normal) = self.scene.normal(face, x as f32, y as f32);
+                    each(x, y, face, normal);
+                }
+            }
+        }
+    }
 }
 
 /// The work on one row of pixels, compiled for each set of vector instructions.
@@ -226,19 +270,11 @@ where
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(mut self, _: S) {
         let (scene, region) = (&self.view.scene, &self.view.region);
-        let y = region.y0 + self.block;
-        let runs = Runs::new(scene, &self.view.bands[self.block / BAND], region, y as f32);
+        let (y, runs) = self.view.runs(self.block);
         let (mut candidates, mut scratch) = (Candidates::new(), Scratch::new());
-        for run in 0..region.width().div_ceil(RUN) {
-            let x0 = region.x0 + run * RUN;
-            let lanes = RUN.min(region.x1 - x0);
-            candidates.clear();
-            for &index in runs.of(run) {
-                let face = &scene.faces[index as usize];
-                candidates.add(face, index, [x0 as f32, y as f32], lanes, &scene.settings);
-            }
-            for lane in 0..lanes {
-                let x = x0 + lane;
+        for run in 0..runs.count() {
+            let columns = runs.collect(&mut candidates, scene, run, region, y as f32);
+            for (lane, x) in columns.enumerate() {
                 let inside = candidates.inside(lane);
                 let nearest = candidates.nearest(lane, scene.settings.faces);
                 let (u, v) = (x as f32, y as f32);
@@ -252,6 +288,4 @@ where
             }
         }
     }
-
-    fn faces(&self, _block: usize, _each: impl FnMut(usize, usize, u32, [f32; 3])) {}
 }

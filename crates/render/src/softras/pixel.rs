@@ -9,7 +9,7 @@ use super::face::Face;
 use super::fragment::Fragment;
 use super::rows::{FaceRows, WideRow, add_scaled};
 use super::settings::Settings;
-use crate::contour::{Lighting, Shaded, shade};
+use crate::contour::{Lighting, Shaded, posed_normal, shade};
 use crate::mode::SoftRasOptions;
 use crate::pose_loss::{Pixel, Row, Seen};
 use crate::posed::Posed;
@@ -97,6 +97,13 @@ impl Scene<'_> {
         Seen { pixel, hit: inside.is_some(), near_outline: inside.is_none() }
     }
 
+    /// The unit normal (camera frame) of a face at a pixel inside it, and the model's index of the face.
+    pub(crate) fn normal(&self, face: u32, column: f32, row: f32) -> (u32, [f32; 3]) {
+        let b = Fragment::new(&self.faces[face as usize], column, row, &self.settings).b;
+        let id = self.ids[face as usize];
+        (id, posed_normal(&self.posed, id as usize, b))
+    }
+
     /// The depth of the surface at a pixel inside a face.
     #[inline(always)]
     fn depth<const DERIVATIVES: bool>(&self, face: u32, column: f32, row: f32, pixel: &mut Pixel) {
@@ -146,7 +153,7 @@ impl Scene<'_> {
         let inverse_sum = 1.0 / blend.sum;
         let mut color_rows = [[0.0; 8]; 3];
         let mut coverage_row = [0.0; 8];
-        let (mut turning, mut level) = ([Vector3::zeros(); 3], [0.0; 3]);
+        let (mut turning, mut level) = ([[0.0; 3]; 3], [0.0; 3]);
         let mut drift = blend.drifting;
         for i in 0..count {
             let (part, fragment) = (&scratch.parts[i], &scratch.fragments[i]);
@@ -194,7 +201,7 @@ impl Scene<'_> {
                         + z * depth_row[n]
                         + distance * distance_row[n];
                 }
-                turning[k] += shaded.turning[k] * share;
+                (0..3).for_each(|n| turning[k][n] += shaded.turning[k][n] * share);
                 level[k] += shaded.level[k] * share;
             }
         }
