@@ -19,7 +19,9 @@ mod pose_loss;
 mod posed;
 mod projected;
 mod raster;
+mod renderer;
 pub mod scene;
+pub mod shading;
 #[cfg(test)]
 mod shapes_for_tests;
 mod softras;
@@ -37,4 +39,9 @@ pub use pose_loss::{
     TargetError,
 };
 pub use raster::depth_map;
+pub use renderer::{
+    BufferAdjoints, Buffers, FaceId, ObjectGradient, PosedModel, Renderer, Rendering, Scene,
+    SceneGradient,
+};
 pub use scene::{SceneImage, SceneObject, render_scene};
+pub use shading::{Lamp, Lighting, Material, Shader, SurfacePoint};

@@ -50,7 +50,8 @@ impl<'a> Posed<'a> {
             [focal[0] * p.x * w + principal[0], focal[1] * p.y * w + principal[1], w]
         };
         let screen: Vec<[f32; 3]> = position.iter().map(project).collect();
-        let (level, level_dz) = level(model, camera, center.z);
+        let (level, level_dz) = level(model, camera, center.z as f64);
+        let (level, level_dz) = (level as f32, level_dz as f32);
         let (faces, edges) = (&model.faces, &model.edges);
         let projected = Projected::new(faces, edges, |_| model.closed, screen, camera, margin);
         Self { model, focal, principal, rotation, center, position, projected, level, level_dz }
@@ -67,15 +68,16 @@ impl<'a> Posed<'a> {
     }
 }
 
-/// One level for the whole object, from its distance: smooth in the pose, so that the loss is too.
-fn level(model: &RenderModel, camera: &Camera, z: f32) -> (f32, f32) {
+/// Pyramid level of the texture and its derivative by the centre's depth `z`. One level for the whole object, from its
+/// distance: smooth in the pose, so that the loss is too.
+pub(crate) fn level(model: &RenderModel, camera: &Camera, z: f64) -> (f64, f64) {
     let crate::model::Albedo::Texture(map, _) = &model.albedo else { return (0.0, 0.0) };
-    let texels_a_pixel = model.texel_density * z as f64 / (0.5 * (camera.fx + camera.fy));
-    let level = texels_a_pixel.log2() as f32;
+    let level = (model.texel_density * z / (0.5 * (camera.fx + camera.fy))).log2();
+    let last = map.last_level() as f64;
     // Also false for the NaN of an object behind the camera.
-    if level > 0.0 && level < map.last_level() {
-        (level, 1.0 / (z * std::f32::consts::LN_2))
+    if level > 0.0 && level < last {
+        (level, 1.0 / (z * std::f64::consts::LN_2))
     } else {
-        (if level > 0.0 { map.last_level() } else { 0.0 }, 0.0)
+        (if level > 0.0 { last } else { 0.0 }, 0.0)
     }
 }

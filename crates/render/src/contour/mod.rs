@@ -21,7 +21,7 @@ use crate::pose_loss::{Seen, View};
 use crate::posed::Posed;
 use crate::projected::Region;
 use crate::raster::{self, MISS, Visible};
-use inner::{Inner, LEAST_STEP, inner_contours};
+pub(crate) use inner::{Inner, LEAST_STEP, inner_contours};
 pub use light_samples::light_samples;
 pub(crate) use outline::{Band, Piece, Silhouette, outline};
 pub(crate) use pixel::Scene;
