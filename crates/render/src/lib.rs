@@ -10,6 +10,7 @@
 pub mod backend;
 pub mod camera;
 mod contour;
+pub mod distortion;
 pub mod image;
 pub mod light;
 mod mode;
@@ -29,6 +30,7 @@ mod softras;
 pub use backend::{Backend, BackendError, Cpu, Hypothesis, PoseProblem, Session};
 pub use camera::{Camera, CameraError};
 pub use contour::light_samples;
+pub use distortion::{Distortion, DistortionError, Undistortion};
 pub use image::{DepthImage, ImageError, Mask, RgbImage};
 pub use light::{Light, LightError, LightSample};
 pub use mode::{ContourOptions, Mode, SoftRasOptions};
@@ -40,8 +42,8 @@ pub use pose_loss::{
 };
 pub use raster::depth_map;
 pub use renderer::{
-    BufferAdjoints, Buffers, FaceId, ObjectGradient, PosedModel, Renderer, Rendering, Scene,
-    SceneGradient,
+    BufferAdjoints, BufferVars, Buffers, FaceId, ObjectGradient, PosedModel, RecordError, Renderer,
+    Rendering, Scene, SceneGradient, SceneVars,
 };
 pub use scene::{SceneImage, SceneObject, render_scene};
 pub use shading::{Lamp, Lighting, Material, Shader, SurfacePoint};

@@ -9,6 +9,7 @@ mod buffers;
 mod frame;
 mod geometry;
 mod gradient;
+mod node;
 mod pixel;
 mod scene;
 mod sums;
@@ -20,6 +21,7 @@ use rayon::prelude::*;
 
 pub use buffers::{BufferAdjoints, Buffers, FaceId};
 pub use gradient::{ObjectGradient, SceneGradient};
+pub use node::{BufferVars, RecordError, SceneVars};
 pub use scene::{PosedModel, Scene};
 
 use crate::contour::{Band, Inner, LEAST_STEP, Piece, inner_contours, outline};
