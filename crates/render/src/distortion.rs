@@ -88,9 +88,7 @@ impl Distortion {
         let r2 = x * x + y * y;
         let [k1, k2, k3, k4, k5, k6] = self.radial;
         let [p1, p2] = self.tangential;
-        let cubic = |a: f64, b: f64, c: f64| {
-            ((r2.times(c).plus(b) * r2).plus(a) * r2).plus(1.0)
-        };
+        let cubic = |a: f64, b: f64, c: f64| ((r2.times(c).plus(b) * r2).plus(a) * r2).plus(1.0);
         let scale = cubic(k1, k2, k3) / cubic(k4, k5, k6);
         let xy = (x * y).times(2.0);
         Vector2::new(
@@ -111,9 +109,8 @@ impl Distortion {
                 return (slope.determinant() > 0.0).then_some(ideal);
             }
             let step = slope.try_inverse()? * residual;
-            let improves = |t: f64| {
-                (self.distort(ideal - step * t) - seen).norm() < residual.norm()
-            };
+            let improves =
+                |t: f64| (self.distort(ideal - step * t) - seen).norm() < residual.norm();
             // Halved until it helps: far out a whole step may jump over the fold.
             let Some(length) = (0..30).map(|i| 0.5f64.powi(i)).find(|t| improves(*t)) else {
                 let good = residual.norm() <= 1e-10 * (1.0 + seen.norm());
@@ -250,8 +247,7 @@ mod tests {
     #[test]
     fn hand_values_hold() {
         // r² = 0.25; c = 1 + 0.4·0.25 + 0.2·0.0625 − 0.1·0.015625 over 1 + 0.1·0.25.
-        let lens =
-            Distortion::from_opencv(&[0.4, 0.2, 0.01, 0.02, -0.1, 0.1, 0.0, 0.0]).unwrap();
+        let lens = Distortion::from_opencv(&[0.4, 0.2, 0.01, 0.02, -0.1, 0.1, 0.0, 0.0]).unwrap();
         let c = (1.0 + 0.1 + 0.0125 - 0.0015625) / 1.025;
         let seen = lens.distort(Vector2::new(0.3, 0.4));
         let x = 0.3 * c + 2.0 * 0.01 * 0.12 + 0.02 * (0.25 + 0.18);

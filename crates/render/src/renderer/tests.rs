@@ -63,17 +63,24 @@ fn scene() -> Scene {
     scene
 }
 
-/// What was decided about each pixel: while this stays the same, the pixel is a smooth function.
+/// What was decided about each pixel: while this stays the same, the pixel is a smooth function. None where the nearest
+/// point of a contour is the end of a piece within an edge, which is where the visibility of the contour changes.
 fn decisions<Sh: Shader>(rendering: &Rendering<Sh>) -> Vec<Option<[u32; 8]>> {
     let mut out = vec![None; rendering.buffers.alpha.len()];
     for block in &rendering.blocks {
         for i in 0..block.visible.face.len() {
             let decision = rendering.decision(block, i);
-            let edge = |piece: Option<&Piece>| {
-                piece.map_or([MISS; 2], |p| [p.face, u32::from(p.corners[0])])
+            let ends_here = |piece: &Piece| {
+                let t = piece.foot(decision.x as f32, decision.y as f32).t;
+                let [low, high] = piece.range;
+                (low > 0.0 && t <= low) || (high < 1.0 && t >= high)
             };
-            let [a, b] = edge(decision.edge);
-            let [c, d] = edge(decision.inner.map(|inner| &inner.piece));
+            let pieces = [decision.edge, decision.inner.map(|inner| &inner.piece)];
+            if pieces.into_iter().flatten().any(ends_here) {
+                continue;
+            }
+            let [[a, b], [c, d]] =
+                pieces.map(|p| p.map_or([MISS; 2], |p| [p.face, u32::from(p.corners[0])]));
             let (u, v, face, _) = decision.inner.map_or((0.0, 0.0, MISS, 0.0), |i| i.behind);
             let own = decision.face.map_or(MISS, |face| face as u32);
             out[decision.y * rendering.buffers.width + decision.x] =
@@ -122,8 +129,8 @@ fn check<Sh: Shader>(
     let (mut left_out, mut drawn) = (0, 0);
     for at in 0..pixels {
         drawn += usize::from(middle.buffers.alpha[at] > 0.0);
-        if seen[0][at] != seen[1][at] || seen[1][at] != seen[2][at] {
-            left_out += 1;
+        if seen[0][at] != seen[1][at] || seen[1][at] != seen[2][at] || seen[1][at].is_none() {
+            left_out += usize::from(middle.buffers.alpha[at] > 0.0);
             by.color[at] = [0.0; 3];
             (by.alpha[at], by.depth[at], by.normal[at]) = (0.0, 0.0, Vector3::zeros());
         }
@@ -133,6 +140,9 @@ fn check<Sh: Shader>(
     assert!(drawn > 800 && left_out * 20 < drawn, "{left_out} of {drawn} pixels left out");
     let exact = along(&middle.vjp(&by));
     let error = (exact - difference).abs() / difference.abs();
+    println!(
+        "exact {exact}, difference {difference}: error {error}; {left_out} of {drawn} left out"
+    );
     assert!(error < 1e-3, "exact {exact}, difference {difference}: error {error}");
 }
 
@@ -160,15 +170,19 @@ fn one_object_looks_as_the_loss_of_its_pose_sees_it() {
             let picture = PoseLoss::default().render(&model, &pose, &camera(), &light);
             let scene = Scene::new(camera()).with(model.clone(), pose);
             let ours = Renderer::new(light).render(&scene).buffers;
+            let mut sum = 0.0;
             for at in 0..ours.alpha.len() {
                 assert!((ours.alpha[at] - f64::from(picture.coverage[at])).abs() < 1e-5);
                 assert!((ours.depth[at] - f64::from(picture.depth.pixels()[at])).abs() < 1e-5);
                 for k in 0..3 {
                     let theirs = f64::from(picture.color.pixels()[at][k]);
                     let ours = ours.color[at][k];
-                    assert!((ours - theirs).abs() < 1e-5, "pixel {at}: {ours} {theirs}");
+                    // Single precision errs most on grazing faces.
+                    assert!((ours - theirs).abs() < 5e-5, "pixel {at}: {ours} {theirs}");
+                    sum += (ours - theirs).abs();
                 }
             }
+            assert!(sum / (3.0 * ours.alpha.len() as f64) < 1e-6, "{sum}");
         }
     }
 }
@@ -208,7 +222,7 @@ fn poses_and_extrinsics_match_differences() {
 fn the_camera_matches_differences() {
     for i in 0..4 {
         check_edit(
-            1e-3,
+            1e-4,
             |scene, _, amount| {
                 let camera = &mut scene.camera;
                 *[&mut camera.fx, &mut camera.fy, &mut camera.cx, &mut camera.cy][i] += amount;
@@ -262,7 +276,7 @@ fn vertices_match_differences() {
             let mut random = SplitMix64::new(11);
             let mut positions = model.positions();
             for value in positions.iter_mut().flat_map(|p| p.coords.iter_mut()) {
-                *value += sign * 2e-5 * (random.unit() - 0.4);
+                *value += sign * 5e-6 * (random.unit() - 0.4);
             }
             RenderModel::clone(&model).with_positions(&positions).unwrap()
         };

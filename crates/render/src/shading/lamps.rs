@@ -45,8 +45,9 @@ pub enum Material {
 ///
 /// With albedo a, unit normal n, unit direction to the eye v, and for lamp l the unit direction to it s and the strength
 /// e (divided by the squared distance in metres where it falls off), the colour of each channel is
-/// `a ambient + Σ_l e (a max(0, n·s) + specular max(0, n·h)^shininess)`, h = (s + v)/|s + v|; the highlight only where
-/// n·s > 0. There are no shadows.
+/// `a ambient + Σ_l e max(0, n·s) (a + specular max(0, n·h)^shininess)`, h = (s + v)/|s + v|. The highlight is part of the
+/// reflectance (T. Akenine-Möller and others, "Real-Time Rendering", 3rd edition, 2008, section 7.5.2), so that it fades
+/// where the light grazes instead of ending there. There are no shadows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lighting {
     /// Light from everywhere, per channel.
@@ -146,7 +147,7 @@ impl Shader for Lighting {
             };
             for k in 0..3 {
                 let strength = fall_off.map_or(p[3 + k], |f| p[3 + k] * f);
-                color[k] += strength * (point.albedo[k] * facing + shine);
+                color[k] += strength * facing * (point.albedo[k] + shine);
             }
         }
         color
