@@ -70,9 +70,8 @@ fn an_image_loss_flows_back_through_a_rollout() {
     let renderer = Renderer::new(Light::headlight(0.5, 0.5));
     let scene_at = |pose: Isometry3<f64>| Scene::new(camera).with(model.clone(), pose);
     let still = end(&world, &[0.0; 12]);
-    let target = renderer.render(&scene_at(
-        t_cam_world * Translation3::new(0.004, 0.003, -0.002) * still,
-    ));
+    let target =
+        renderer.render(&scene_at(t_cam_world * Translation3::new(0.004, 0.003, -0.002) * still));
     let target = &target.buffers;
     let plain = |x: &[f64]| -> f64 {
         let image = renderer.render(&scene_at(t_cam_world * end(&world, x))).buffers;

@@ -1,8 +1,10 @@
 //! Rendering with exact derivatives by the object's pose, and plain pictures.
 //!
 //! [`PoseLoss`] compares a posed [`RenderModel`] with a segmented image and returns the loss, its
-//! gradient and the Gauss–Newton matrix by the six degrees of freedom of the pose, in either [`Mode`]. [`render_scene`] makes
-//! pictures, [`depth_map`] the z-buffer of what hides the object.
+//! gradient and the Gauss–Newton matrix by the six degrees of freedom of the pose, in either [`Mode`]. [`Renderer`] renders
+//! whole scenes under any [`Shader`] and carries the derivatives of any loss back to poses, vertices, colours, textures,
+//! camera and light, on the tape too. [`render_scene`] makes antialiased pictures, [`depth_map`] the z-buffer of what hides
+//! the object, and [`Undistortion`] pinhole images of those through a lens.
 //!
 //! Cameras follow OpenCV (x right, y down, z forward; pixel centres at integers); lengths are in metres; colours
 //! are in 0..=1 as stored in files.
