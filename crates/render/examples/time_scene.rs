@@ -33,7 +33,9 @@ fn time(name: &str, scene: &Scene, shader: impl Shader + Clone) {
     let vjp = milliseconds(|| rendering.vjp(&adjoints));
     let gradient = rendering.vjp(&adjoints);
     let vertices = milliseconds(|| gradient.objects[0].positions());
-    println!("{name}: {drawn} px, render {forward:.2} ms, vjp {vjp:.2} ms, vertices {vertices:.2} ms");
+    println!(
+        "{name}: {drawn} px, render {forward:.2} ms, vjp {vjp:.2} ms, vertices {vertices:.2} ms"
+    );
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

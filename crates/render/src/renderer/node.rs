@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
 use prehend_autodiff::rigid::turn_of_coordinates;
-use prehend_autodiff::{CustomVjp, Scalar, Var, custom};
+use prehend_autodiff::{CustomVjp, Var, custom};
 
 use super::{BufferAdjoints, Renderer, Rendering, Scene, SceneGradient};
 use crate::model::{ModelError, RenderModel};
@@ -228,8 +228,8 @@ impl<Sh: Shader + Clone + 'static> Renderer<Sh> {
 #[cfg(test)]
 mod tests {
     use nalgebra::Vector6;
-    use prehend_autodiff::Recording;
     use prehend_autodiff::lie::perturb_about;
+    use prehend_autodiff::{Recording, Scalar};
     use prehend_geometry::shapes::cuboid;
 
     use super::*;
