@@ -101,8 +101,8 @@ impl<Sh: Shader> Lit<'_, Sh> {
             Albedo::Corners(colors) => {
                 let face = sums.face(sample.face);
                 for (k, color) in colors[own].iter().enumerate() {
-                    for c in 0..3 {
-                        by_b[k] += f64::from(color[c]) * by.albedo[c];
+                    for (c, value) in color.iter().enumerate() {
+                        by_b[k] += f64::from(*value) * by.albedo[c];
                         face.albedo[k][c] += sample.b[k] * by.albedo[c];
                     }
                 }

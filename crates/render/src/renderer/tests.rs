@@ -136,9 +136,10 @@ fn check<Sh: Shader>(
     let seen = [ends[0], middle, ends[1]].map(decisions);
     let mut difference = 0.0;
     let (mut left_out, mut drawn) = (0, 0);
-    for at in 0..pixels {
+    let [before, now, after] = seen;
+    for (at, now) in now.iter().enumerate() {
         drawn += usize::from(middle.buffers.alpha[at] > 0.0);
-        if seen[0][at] != seen[1][at] || seen[1][at] != seen[2][at] || seen[1][at].is_none() {
+        if before[at] != *now || *now != after[at] || now.is_none() {
             left_out += usize::from(middle.buffers.alpha[at] > 0.0);
             by.color[at] = [0.0; 3];
             (by.alpha[at], by.depth[at], by.normal[at]) = (0.0, 0.0, Vector3::zeros());

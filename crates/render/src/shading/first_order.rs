@@ -49,8 +49,8 @@ mod tests {
         for normal in [Vector3::new(0.6, 0.0, -0.8), Vector3::new(0.0, 1.0, 0.0), Vector3::z()] {
             let point = SurfacePoint { position: Vector3::z(), normal, albedo: [0.5, 0.6, 0.7] };
             let color = light.shade(&parameters, &point);
-            for k in 0..3 {
-                assert!((color[k] - point.albedo[k] * light.factor(k, &normal)).abs() < 1e-15);
+            for (k, value) in color.iter().enumerate() {
+                assert!((value - point.albedo[k] * light.factor(k, &normal)).abs() < 1e-15);
             }
         }
         assert_eq!(Light::from_parameters(&parameters.try_into().unwrap()), light);
