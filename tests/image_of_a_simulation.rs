@@ -21,7 +21,7 @@ impl DistanceField for Floor {
     }
 }
 
-const HORIZON: Horizon = Horizon { dt: 5e-4, steps: 200 };
+const HORIZON: Horizon = Horizon { dt: 1e-4, steps: 1000 };
 
 /// A block, painted in smooth colours.
 fn block() -> TriMesh {
@@ -37,15 +37,14 @@ fn world(mesh: &TriMesh) -> World {
     let floor = world.add(Body::held("floor").with_field(Arc::new(Floor)));
     let surface = Surface::uniform(&mesh.vertices, mesh.area()).unwrap();
     let block = world.add(Body::free("block", rigid).with_surface(surface));
-    let law = Penalty::new(1e7, 1e4, 0.4, 1e-2).unwrap();
-    world.touch(block, floor, Arc::new(law), Onset::Softplus { width: 1e-4 }).unwrap();
+    let law = Penalty::new(2e6, 1e3, 0.4, 5e-2).unwrap();
+    world.touch(block, floor, Arc::new(law), Onset::Softplus { width: 5e-4 }).unwrap();
     world
 }
 
 /// Poses of the block at the end, in the world, for a throw of the given tangent.
 fn end<S: Scalar>(world: &World, tangent: &[S]) -> Isometry3<S> {
-    let start = State::at_rest(Isometry3::translation(0.0, 0.0, 0.08));
-    let mut start = start;
+    let mut start = State::at_rest(Isometry3::translation(0.0, 0.0, 0.08));
     start.linear = Vector3::new(0.3, 0.0, -0.4);
     start.angular = Vector3::new(1.0, 3.0, -2.0);
     let held = State::at_rest(Isometry3::identity()).lift();
@@ -86,15 +85,17 @@ fn an_image_loss_flows_back_through_a_rollout() {
             let image = renderer.record(&scene_at(Isometry3::identity()), &vars).unwrap();
             let color = image.color.as_flattened().iter().zip(target.color.as_flattened());
             let alpha = image.alpha.iter().zip(&target.alpha);
-            color.chain(alpha).fold(Var::default(), |sum, (a, b)| sum + a.plus(-b).powi(2))
+            color.chain(alpha).fold(Var::default(), |sum, (a, b)| {
+                let residual = a.plus(-b);
+                sum + residual * residual
+            })
         },
         &[0.0; 12],
     );
     assert!((value - plain(&[0.0; 12])).abs() < 1e-9 * value && value > 1.0, "{value}");
-    // Wide steps average over changes of visibility, which are left out of the derivative.
-    let differences = finite_difference_gradient(plain, &[0.0; 12], 2e-4);
+    let differences = finite_difference_gradient(plain, &[0.0; 12], 1e-5);
     let norm = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
     let error: Vec<f64> = by.iter().zip(&differences).map(|(a, b)| a - b).collect();
-    println!("{by:?}\n{differences:?}");
-    assert!(norm(&error) < 2e-2 * norm(&differences), "{by:?} {differences:?}");
+    // The differences also see changes of visibility, which are left out of the derivative.
+    assert!(norm(&error) < 1e-2 * norm(&differences), "{by:?} {differences:?}");
 }
