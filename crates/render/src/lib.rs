@@ -1,8 +1,10 @@
 //! Rendering with exact derivatives by the object's pose, and plain pictures.
 //!
 //! [`PoseLoss`] compares a posed [`RenderModel`] with a segmented image and returns the loss, its
-//! gradient and the Gauss–Newton matrix by the six degrees of freedom of the pose, in either [`Mode`]. [`render_scene`] makes
-//! pictures, [`depth_map`] the z-buffer of what hides the object.
+//! gradient and the Gauss–Newton matrix by the six degrees of freedom of the pose, in either [`Mode`]. [`Renderer`] renders
+//! whole scenes under any [`Shader`] and carries the derivatives of any loss back to poses, vertices, colours, textures,
+//! camera and light, on the tape too. [`render_scene`] makes antialiased pictures, [`depth_map`] the z-buffer of what hides
+//! the object, and [`Undistortion`] pinhole images of those through a lens.
 //!
 //! Cameras follow OpenCV (x right, y down, z forward; pixel centres at integers); lengths are in metres; colours
 //! are in 0..=1 as stored in files.
@@ -10,6 +12,7 @@
 pub mod backend;
 pub mod camera;
 mod contour;
+pub mod distortion;
 pub mod image;
 pub mod light;
 mod mode;
@@ -19,7 +22,9 @@ mod pose_loss;
 mod posed;
 mod projected;
 mod raster;
+mod renderer;
 pub mod scene;
+pub mod shading;
 #[cfg(test)]
 mod shapes_for_tests;
 mod softras;
@@ -27,6 +32,7 @@ mod softras;
 pub use backend::{Backend, BackendError, Cpu, Hypothesis, PoseProblem, Session};
 pub use camera::{Camera, CameraError};
 pub use contour::light_samples;
+pub use distortion::{Distortion, DistortionError, Undistortion};
 pub use image::{DepthImage, ImageError, Mask, RgbImage};
 pub use light::{Light, LightError, LightSample};
 pub use mode::{ContourOptions, Mode, SoftRasOptions};
@@ -37,4 +43,9 @@ pub use pose_loss::{
     Target, TargetError,
 };
 pub use raster::depth_map;
+pub use renderer::{
+    BufferAdjoints, BufferVars, Buffers, FaceId, ObjectGradient, PosedModel, RecordError, Renderer,
+    Rendering, Scene, SceneGradient, SceneVars,
+};
 pub use scene::{SceneImage, SceneObject, render_scene};
+pub use shading::{Lamp, Lighting, Material, Shader, SurfacePoint};

@@ -43,7 +43,8 @@ impl<'a> Posed<'a> {
             model.positions.iter().map(|p| rotation * p + center).collect();
         let screen: Vec<[f32; 3]> =
             position.iter().map(|p| project(focal, principal, [p.x, p.y, p.z])).collect();
-        let (level, level_dz) = level(model, camera, center.z);
+        let (level, level_dz) = level(model, camera, center.z as f64);
+        let (level, level_dz) = (level as f32, level_dz as f32);
         let (faces, edges) = (&model.faces, &model.edges);
         let projected = Projected::new(faces, edges, |_| model.closed, screen, camera, margin);
         Self { model, focal, principal, rotation, center, position, projected, level, level_dz }
@@ -77,15 +78,17 @@ fn project(focal: [f32; 2], principal: [f32; 2], p: [f32; 3]) -> [f32; 3] {
 /// the pixel by 1/12 of its own size squared.
 const SHARPER: f64 = -0.792_481_250_360_578;
 
-/// One level for the whole object, from its distance: smooth in the pose, so that the loss is too.
-fn level(model: &RenderModel, camera: &Camera, z: f32) -> (f32, f32) {
+/// Pyramid level of the texture and its derivative by the centre's depth `z`. One level for the whole object, from its
+/// distance: smooth in the pose, so that the loss is too.
+pub(crate) fn level(model: &RenderModel, camera: &Camera, z: f64) -> (f64, f64) {
     let crate::model::Albedo::Texture(map, _) = &model.albedo else { return (0.0, 0.0) };
-    let texels_a_pixel = model.texel_density * z as f64 / (0.5 * (camera.fx + camera.fy));
-    let level = (texels_a_pixel.log2() + SHARPER) as f32;
+    let texels_a_pixel = model.texel_density * z / (0.5 * (camera.fx + camera.fy));
+    let level = texels_a_pixel.log2() + SHARPER;
+    let last = map.last_level() as f64;
     // Also false for the NaN of an object behind the camera.
-    if level > 0.0 && level < map.last_level() {
-        (level, 1.0 / (z * std::f32::consts::LN_2))
+    if level > 0.0 && level < last {
+        (level, 1.0 / (z * std::f64::consts::LN_2))
     } else {
-        (if level > 0.0 { map.last_level() } else { 0.0 }, 0.0)
+        (if level > 0.0 { last } else { 0.0 }, 0.0)
     }
 }

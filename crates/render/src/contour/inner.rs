@@ -14,9 +14,9 @@ pub(crate) const LEAST_STEP: f32 = 0.02;
 pub(crate) struct Inner {
     pub(crate) piece: Piece,
     /// The pixel next to it on the far side, the face seen there and its 1/Z \[1/m\].
-    behind: (f32, f32, u32, f32),
+    pub(crate) behind: (f32, f32, u32, f32),
     /// Half-way between the near and the far surface \[m\].
-    split: f32,
+    pub(crate) split: f32,
 }
 
 /// Picks the visible inner contours among silhouette pieces that are not part of the outline: the surface seen one

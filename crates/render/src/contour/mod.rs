@@ -24,7 +24,7 @@ use crate::pose_loss::{LaneSums, Residuals, Seen, Sums, View};
 use crate::posed::Posed;
 use crate::projected::Region;
 use crate::raster::{self, MISS, Visible};
-use inner::{Inner, LEAST_STEP, inner_contours};
+pub(crate) use inner::{Inner, LEAST_STEP, inner_contours};
 use lanes::Waiting;
 pub use light_samples::light_samples;
 pub(crate) use outline::{Band, Piece, Silhouette, outline};

@@ -5,15 +5,15 @@ use prehend_geometry::Texture;
 /// A texture with its pyramid of halved copies.
 #[derive(Clone, Debug)]
 pub(crate) struct Mipmap {
-    levels: Vec<Level>,
+    pub(super) levels: Vec<Level>,
 }
 
 /// One level of the pyramid.
 #[derive(Clone, Debug)]
 pub(crate) struct Level {
-    width: usize,
-    height: usize,
-    texels: Vec<[f32; 3]>,
+    pub(super) width: usize,
+    pub(super) height: usize,
+    pub(super) texels: Vec<[f32; 3]>,
 }
 
 /// A filtered colour and its derivatives, per channel.
@@ -37,11 +37,16 @@ impl Mipmap {
             return None;
         }
         let texels = texture.pixels.iter().map(|p| p.map(|v| v as f32 / 255.0)).collect();
+        Some(Self::of_texels(width, height, texels))
+    }
+
+    /// The pyramid over a finest level.
+    pub(super) fn of_texels(width: usize, height: usize, texels: Vec<[f32; 3]>) -> Self {
         let mut levels = vec![Level { width, height, texels }];
         while let Some(next) = levels.last().and_then(Level::halved) {
             levels.push(next);
         }
-        Some(Self { levels })
+        Self { levels }
     }
 
     /// Columns and rows of the finest level.
@@ -140,17 +145,22 @@ impl Level {
         for y in 0..height {
             for x in 0..width {
                 let mut sum = [0.0f32; 3];
-                for (dx, dy) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
-                    // Odd sizes repeat their last row and column.
-                    let (sx, sy) =
-                        ((2 * x + dx).min(self.width - 1), (2 * y + dy).min(self.height - 1));
-                    let texel = self.texels[sy * self.width + sx];
-                    (0..3).for_each(|c| sum[c] += 0.25 * texel[c]);
+                for index in self.below(x, y) {
+                    (0..3).for_each(|c| sum[c] += 0.25 * self.texels[index][c]);
                 }
                 texels.push(sum);
             }
         }
         Some(Self { width, height, texels })
+    }
+
+    /// The four texels whose mean is texel (x, y) of the next level.
+    pub(super) fn below(&self, x: usize, y: usize) -> [usize; 4] {
+        [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(dx, dy)| {
+            // Odd sizes repeat their last row and column.
+            let (sx, sy) = ((2 * x + dx).min(self.width - 1), (2 * y + dy).min(self.height - 1));
+            sy * self.width + sx
+        })
     }
 
     /// Bilinear colour, and derivatives by (u, v) with no entry for the level.

@@ -1,6 +1,9 @@
 //! A triangle mesh prepared for rendering.
 
+mod edit;
 mod mipmap;
+mod normal_adjoint;
+mod texels;
 mod topology;
 
 use nalgebra::{Matrix3, Point3, Vector3};
@@ -49,6 +52,16 @@ pub enum ModelError {
         found: usize,
         /// Vertices of the mesh.
         vertices: usize,
+    },
+    /// Numbers that should take the place of the model's own are not as many.
+    #[error("{found} {what} given, the model has {expected}")]
+    Count {
+        /// `"positions"`, `"colours"` or `"texels"`.
+        what: &'static str,
+        /// Numbers given.
+        found: usize,
+        /// Numbers of the model.
+        expected: usize,
     },
     /// The texture has no pixels or not as many as its size says.
     #[error("texture of {width} x {height} has {found} pixels")]
@@ -138,13 +151,6 @@ impl RenderModel {
             center,
             radius,
         })
-    }
-
-    /// The same shape in one colour (0..=1).
-    pub fn with_uniform_color(mut self, color: [f32; 3]) -> Self {
-        self.albedo = Albedo::Uniform(color);
-        self.texel_density = 0.0;
-        self
     }
 
     /// Centre of the bounding box, mesh frame \[m\].

@@ -45,14 +45,8 @@ pub(crate) fn edges(faces: &[[u32; 3]]) -> Vec<Edge> {
     out
 }
 
-/// A unit normal for each corner of each face: the mean of the normals of the faces around the vertex that
-/// lie within `crease` \[rad\] of the face's own, weighted by their angles at the vertex.
-pub(crate) fn corner_normals(
-    positions: &[Point3<f64>],
-    faces: &[[u32; 3]],
-    face_normals: &[Vector3<f64>],
-    crease: f64,
-) -> Vec<[Vector3<f64>; 3]> {
+/// The faces around each vertex, with their angles there.
+pub(super) fn around(positions: &[Point3<f64>], faces: &[[u32; 3]]) -> Vec<Vec<(u32, f64)>> {
     let mut around: Vec<Vec<(u32, f64)>> = vec![Vec::new(); positions.len()];
     for (f, face) in faces.iter().enumerate() {
         let p = face.map(|v| positions[v as usize]);
@@ -61,6 +55,18 @@ pub(crate) fn corner_normals(
             around[face[k] as usize].push((f as u32, angle));
         }
     }
+    around
+}
+
+/// A unit normal for each corner of each face: the mean of the normals of the faces around the vertex that
+/// lie within `crease` \[rad\] of the face's own, weighted by their angles at the vertex.
+pub(crate) fn corner_normals(
+    positions: &[Point3<f64>],
+    faces: &[[u32; 3]],
+    face_normals: &[Vector3<f64>],
+    crease: f64,
+) -> Vec<[Vector3<f64>; 3]> {
+    let around = around(positions, faces);
     let limit = crease.cos();
     let corner = |own: &Vector3<f64>, vertex: u32| {
         let mut sum = Vector3::zeros();

@@ -1,0 +1,117 @@
+//! What comes out of a rendering, and the adjoints that go back in.
+
+use nalgebra::Vector3;
+
+use crate::camera::Camera;
+use crate::image::{DepthImage, ImageError, RgbImage};
+
+/// A face of a scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FaceId {
+    /// Place of the object in the scene.
+    pub object: u32,
+    /// Face of its model.
+    pub face: u32,
+}
+
+/// Images of a scene, row-major from the top-left, one entry a pixel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Buffers {
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// Colour over the background.
+    pub color: Vec<[f64; 3]>,
+    /// Coverage, 0..=1.
+    pub alpha: Vec<f64>,
+    /// Z of the surface at the pixel's centre \[m\], 0 where there is none.
+    pub depth: Vec<f64>,
+    /// Its unit normal on the side that is seen, camera frame; zero where there is none.
+    pub normal: Vec<Vector3<f64>>,
+    /// The face at the pixel's centre.
+    pub face: Vec<Option<FaceId>>,
+}
+
+impl Buffers {
+    pub(super) fn new(camera: &Camera, background: [f64; 3]) -> Self {
+        let (width, height) = (camera.width, camera.height);
+        let count = width * height;
+        Self {
+            width,
+            height,
+            color: vec![background; count],
+            alpha: vec![0.0; count],
+            depth: vec![0.0; count],
+            normal: vec![Vector3::zeros(); count],
+            face: vec![None; count],
+        }
+    }
+
+    /// The colours as an image.
+    ///
+    /// # Errors
+    /// When the lists were changed to another length.
+    pub fn to_rgb(&self) -> Result<RgbImage, ImageError> {
+        let pixels = self.color.iter().map(|c| c.map(|v| v as f32)).collect();
+        RgbImage::new(self.width, self.height, pixels)
+    }
+
+    /// The depth as an image.
+    ///
+    /// # Errors
+    /// When the list was changed to another length.
+    pub fn to_depth(&self) -> Result<DepthImage, ImageError> {
+        DepthImage::new(self.width, self.height, self.depth.iter().map(|z| *z as f32).collect())
+    }
+}
+
+/// Derivatives of a loss by the images of [`Buffers`], one entry a pixel; an empty list stands for zeros.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct BufferAdjoints {
+    /// By the colour.
+    pub color: Vec<[f64; 3]>,
+    /// By the coverage.
+    pub alpha: Vec<f64>,
+    /// By the depth, which counts only where there is a surface \[1/m\].
+    pub depth: Vec<f64>,
+    /// By the normal.
+    pub normal: Vec<Vector3<f64>>,
+}
+
+/// The adjoints of one pixel.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PixelAdjoint {
+    pub(super) color: [f64; 3],
+    pub(super) alpha: f64,
+    pub(super) depth: f64,
+    pub(super) normal: Vector3<f64>,
+}
+
+impl BufferAdjoints {
+    pub(super) fn fits(&self, pixels: usize) -> bool {
+        let lengths = [self.color.len(), self.alpha.len(), self.depth.len(), self.normal.len()];
+        lengths.iter().all(|&n| n == 0 || n == pixels)
+    }
+
+    #[inline]
+    pub(super) fn pixel(&self, at: usize) -> PixelAdjoint {
+        let scalar = |list: &[f64]| list.get(at).copied().unwrap_or(0.0);
+        PixelAdjoint {
+            color: self.color.get(at).copied().unwrap_or([0.0; 3]),
+            alpha: scalar(&self.alpha),
+            depth: scalar(&self.depth),
+            normal: self.normal.get(at).copied().unwrap_or(Vector3::zeros()),
+        }
+    }
+}
+
+impl PixelAdjoint {
+    #[inline]
+    pub(super) fn is_zero(&self) -> bool {
+        self.color == [0.0; 3]
+            && self.alpha == 0.0
+            && self.depth == 0.0
+            && self.normal == Vector3::zeros()
+    }
+}

@@ -1,0 +1,61 @@
+//! First-order light as a shader.
+
+use nalgebra::Vector3;
+use prehend_autodiff::Scalar;
+
+use super::{Shader, SurfacePoint};
+use crate::light::Light;
+
+impl Shader for Light {
+    /// For each channel the ambient factor, the directional vector and the offset.
+    fn parameters(&self) -> Vec<f64> {
+        let channel = |k: usize| {
+            let d = self.directional[k];
+            [self.ambient[k], d.x, d.y, d.z, self.offset[k]]
+        };
+        [0, 1, 2].map(channel).concat()
+    }
+
+    #[inline]
+    fn shade<S: Scalar>(&self, parameters: &[S], point: &SurfacePoint<S>) -> [S; 3] {
+        [0, 1, 2].map(|k| {
+            let p = &parameters[5 * k..5 * k + 5];
+            let factor = p[0] + Vector3::new(p[1], p[2], p[3]).dot(&point.normal);
+            (point.albedo[k] * factor).select(factor.value() > 0.0, S::zero()) + p[4]
+        })
+    }
+}
+
+impl Light {
+    /// The light with the given [`Shader::parameters`].
+    pub fn from_parameters(parameters: &[f64; 15]) -> Self {
+        let p = parameters;
+        Self {
+            ambient: [p[0], p[5], p[10]],
+            directional: [0, 5, 10].map(|i| Vector3::new(p[i + 1], p[i + 2], p[i + 3])),
+            offset: [p[4], p[9], p[14]],
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_shader_is_the_lights_own_factor() {
+        let mut light = Light::headlight(0.3, 0.6);
+        light.directional[1] = Vector3::new(0.2, -0.5, 0.1);
+        light.offset = [0.0, 0.1, -0.02];
+        let parameters = light.parameters();
+        for normal in [Vector3::new(0.6, 0.0, -0.8), Vector3::new(0.0, 1.0, 0.0), Vector3::z()] {
+            let point = SurfacePoint { position: Vector3::z(), normal, albedo: [0.5, 0.6, 0.7] };
+            let color = light.shade(&parameters, &point);
+            for (k, value) in color.iter().enumerate() {
+                let expected = point.albedo[k] * light.factor(k, &normal) + light.offset[k];
+                assert!((value - expected).abs() < 1e-15);
+            }
+        }
+        assert_eq!(Light::from_parameters(&parameters.try_into().unwrap()), light);
+    }
+}

@@ -1,0 +1,101 @@
+//! A loss of the picture of a thrown and bouncing body, differentiated by how it was thrown.
+
+use std::sync::Arc;
+
+use nalgebra::{Isometry3, Matrix3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
+use prehend::autodiff::check::finite_difference_gradient;
+use prehend::autodiff::{Scalar, Var, gradient};
+use prehend::geometry::{DistanceField, FieldSample, TriMesh, shapes};
+use prehend::render::{Camera, Light, RenderModel, Renderer, Scene, SceneVars};
+use prehend::sim::{
+    Body, Horizon, Onset, Penalty, RigidBody, SemiImplicitEuler, State, Surface, World,
+};
+
+/// The half-space z < 0.
+struct Floor;
+
+impl DistanceField for Floor {
+    fn sample(&self, point: &Point3<f64>, reach: f64) -> Option<FieldSample> {
+        let (gradient, hessian) = (Vector3::z(), Matrix3::zeros());
+        (point.z <= reach).then_some(FieldSample { distance: point.z, gradient, hessian })
+    }
+}
+
+const HORIZON: Horizon = Horizon { dt: 1e-4, steps: 1000 };
+
+/// A block, painted in smooth colours.
+fn block() -> TriMesh {
+    let mut mesh = shapes::superellipsoid([0.04, 0.03, 0.05], [0.8, 0.8], 32);
+    let color = |p: &Point3<f64>| [p.x, p.y, p.z].map(|v| (0.5 + 0.4 * (50.0 * v).sin()) as f32);
+    mesh.colors = Some(mesh.vertices.iter().map(color).collect());
+    mesh
+}
+
+fn world(mesh: &TriMesh) -> World {
+    let rigid = RigidBody::new(0.2, Matrix3::identity() * 2e-4, Point3::origin()).unwrap();
+    let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
+    let floor = world.add(Body::held("floor").with_field(Arc::new(Floor)));
+    let surface = Surface::uniform(&mesh.vertices, mesh.area()).unwrap();
+    let block = world.add(Body::free("block", rigid).with_surface(surface));
+    let law = Penalty::new(2e6, 1e3, 0.4, 5e-2).unwrap();
+    world.touch(block, floor, Arc::new(law), Onset::Softplus { width: 5e-4 }).unwrap();
+    world
+}
+
+/// Poses of the block at the end, in the world, for a throw of the given tangent.
+fn end<S: Scalar>(world: &World, tangent: &[S]) -> Isometry3<S> {
+    let mut start = State::at_rest(Isometry3::translation(0.0, 0.0, 0.08));
+    start.linear = Vector3::new(0.3, 0.0, -0.4);
+    start.angular = Vector3::new(1.0, 3.0, -2.0);
+    let held = State::at_rest(Isometry3::identity()).lift();
+    let thrown = start.moved(&std::array::from_fn(|i| tangent[i]));
+    let states = world.lift().simulate(&SemiImplicitEuler, &[held, thrown], HORIZON, |_, _| ());
+    states.unwrap()[1].pose
+}
+
+fn lifted<S: Scalar>(pose: &Isometry3<f64>) -> Isometry3<S> {
+    let rotation = Unit::new_unchecked(pose.rotation.quaternion().coords.map(S::constant).into());
+    Isometry3::from_parts(Translation3::from(pose.translation.vector.map(S::constant)), rotation)
+}
+
+#[test]
+fn an_image_loss_flows_back_through_a_rollout() {
+    let mesh = block();
+    let (world, model) = (world(&mesh), Arc::new(RenderModel::new(&mesh).unwrap()));
+    let camera = Camera { fx: 110.0, fy: 110.0, cx: 31.3, cy: 23.6, width: 64, height: 48 };
+    // Looks along the world's y axis, with z up.
+    let turn = UnitQuaternion::from_scaled_axis(Vector3::x() * std::f64::consts::FRAC_PI_2);
+    let t_cam_world = Isometry3::from_parts(Translation3::new(-0.02, 0.04, 0.3), turn);
+    let renderer = Renderer::new(Light::headlight(0.5, 0.5));
+    let scene_at = |pose: Isometry3<f64>| Scene::new(camera).with(model.clone(), pose);
+    let still = end(&world, &[0.0; 12]);
+    let target =
+        renderer.render(&scene_at(t_cam_world * Translation3::new(0.004, 0.003, -0.002) * still));
+    let target = &target.buffers;
+    let plain = |x: &[f64]| -> f64 {
+        let image = renderer.render(&scene_at(t_cam_world * end(&world, x))).buffers;
+        let color = image.color.as_flattened().iter().zip(target.color.as_flattened());
+        let alpha = image.alpha.iter().zip(&target.alpha);
+        color.chain(alpha).map(|(a, b)| (a - b).powi(2)).sum()
+    };
+    let (value, by) = gradient(
+        |x| {
+            let pose = lifted::<Var>(&t_cam_world) * end(&world, x);
+            let vars = SceneVars { poses: vec![(0, pose)], ..SceneVars::default() };
+            let image = renderer.record(&scene_at(Isometry3::identity()), &vars).unwrap();
+            let color = image.color.as_flattened().iter().zip(target.color.as_flattened());
+            let alpha = image.alpha.iter().zip(&target.alpha);
+            color.chain(alpha).fold(Var::default(), |sum, (a, b)| {
+                let residual = a.plus(-b);
+                sum + residual * residual
+            })
+        },
+        &[0.0; 12],
+    );
+    assert!((value - plain(&[0.0; 12])).abs() < 1e-9 * value && value > 1.0, "{value}");
+    let differences = finite_difference_gradient(plain, &[0.0; 12], 1e-5);
+    let norm = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let error: Vec<f64> = by.iter().zip(&differences).map(|(a, b)| a - b).collect();
+    // The differences also see changes of visibility, which are left out of the derivative.
+    assert!(norm(&error) < 1e-2 * norm(&differences), "{by:?} {differences:?}");
+}
