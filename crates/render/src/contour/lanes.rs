@@ -1,5 +1,7 @@
 //! Many pixels inside faces at once, side by side: the formulas of one pixel in loops over lanes.
 
+#![allow(clippy::needless_range_loop)] // loops over lanes index several arrays alike
+
 use pulp::{Arch, NullaryFnOnce};
 
 use super::interior::{Motion, add_level, barycentric};

@@ -1,5 +1,7 @@
 //! Colour of a surface point and its derivatives along the surface and with the normal.
 
+#![allow(clippy::needless_range_loop)] // loops over lanes index several arrays alike
+
 use nalgebra::{Matrix3, Vector3};
 
 use super::vec3::{Vec3, add, cross, dot, mix, scale, sub, times, vec3};

@@ -181,7 +181,7 @@ impl Level {
     pub(crate) fn cell(&self, u: f32, v: f32) -> Cell {
         // Coordinates within 0..=1 stay (an edge at exactly 1 must not wrap to 0); others repeat.
         let wrap = |t: f32| {
-            let beyond = t < 0.0 || t > 1.0;
+            let beyond = !(0.0..=1.0).contains(&t);
             t - if beyond { floor(t) } else { 0.0 }
         };
         let place = |t: f32, size: f32| {

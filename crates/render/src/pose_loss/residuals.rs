@@ -1,5 +1,7 @@
 //! Residuals of pixels against the target, and their sums.
 
+#![allow(clippy::needless_range_loop)] // loops over lanes index several arrays alike
+
 use nalgebra::Matrix6;
 use rayon::prelude::*;
 

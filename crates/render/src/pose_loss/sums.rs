@@ -1,5 +1,7 @@
 //! Sums of squared residuals and their normal equations.
 
+#![allow(clippy::needless_range_loop)] // loops over lanes index several arrays alike
+
 use nalgebra::{Matrix6, Vector6};
 
 use super::lane::{LANES, Lane};

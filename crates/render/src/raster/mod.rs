@@ -105,7 +105,7 @@ impl Visible {
 pub(crate) fn bin(projected: &Projected, region: &Region) -> Vec<Vec<u32>> {
     let count = (region.y1 - region.y0).div_ceil(BAND);
     // Each face is drawn in one block or two; a closed body shows half of its faces.
-    let expected = if count == 0 { 0 } else { projected.faces.len() / count };
+    let expected = projected.faces.len().checked_div(count).unwrap_or(0);
     let mut bins: Vec<Vec<u32>> = (0..count).map(|_| Vec::with_capacity(expected)).collect();
     for (f, _) in projected.facing.iter().enumerate().filter(|(_, facing)| **facing != 0) {
         let [a, b, c] = projected.corners(f);
