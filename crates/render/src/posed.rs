@@ -67,8 +67,9 @@ impl<'a> Posed<'a> {
     }
 }
 
-/// One level for the whole object, from its distance: smooth in the pose, so that the loss is too.
-fn level(model: &RenderModel, camera: &Camera, z: f32) -> (f32, f32) {
+/// One level for the whole object, from the distance `z` of its centre: smooth in the pose, so that the loss is too. With
+/// its derivative by `z`.
+pub(crate) fn level(model: &RenderModel, camera: &Camera, z: f32) -> (f32, f32) {
     let crate::model::Albedo::Texture(map, _) = &model.albedo else { return (0.0, 0.0) };
     let texels_a_pixel = model.texel_density * z as f64 / (0.5 * (camera.fx + camera.fy));
     let level = texels_a_pixel.log2() as f32;
