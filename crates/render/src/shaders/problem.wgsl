@@ -82,7 +82,7 @@ struct Hypothesis {
 struct Corner {
     normal: vec3<f32>,
     // Colour, or texture coordinates.
-    attribute: vec3<f32>,
+    paint: vec3<f32>,
 }
 
 struct Edge {

@@ -38,9 +38,9 @@ fn albedo(h: u32, face: u32, b: vec3<f32>) -> Shaded {
         out.color = params.albedo;
         return out;
     }
-    let c0 = corners[3u * face].attribute;
-    let c1 = corners[3u * face + 1u].attribute;
-    let c2 = corners[3u * face + 2u].attribute;
+    let c0 = corners[3u * face].paint;
+    let c1 = corners[3u * face + 1u].paint;
+    let c2 = corners[3u * face + 2u].paint;
     let mixed = b.x * c0 + b.y * c1 + b.z * c2;
     if params.albedo_kind == ALBEDO_CORNERS {
         out.color = mixed;

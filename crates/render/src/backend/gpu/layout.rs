@@ -99,7 +99,7 @@ pub(super) struct Hypothesis {
 pub(super) struct Corner {
     pub(super) normal: [f32; 3],
     pub(super) pad: u32,
-    pub(super) attribute: [f32; 3],
+    pub(super) paint: [f32; 3],
     pub(super) pad_2: u32,
 }
 

@@ -82,7 +82,7 @@ mod tests {
                 Hypothesis, rotation, center, alive, camera_light, object_light, ambient,
                 flat_light, offset, level, level_dz
             )),
-            ("Corner", fields!(Corner, normal, attribute)),
+            ("Corner", fields!(Corner, normal, paint)),
             ("Edge", fields!(Edge, vertices, face, other, corner, other_corner)),
             ("TargetPixel", fields!(TargetPixel, color, coverage, depth, occluder)),
         ];

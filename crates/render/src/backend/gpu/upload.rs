@@ -24,7 +24,7 @@ pub(super) fn faces(model: &RenderModel) -> Vec<[u32; 4]> {
 
 /// Normal and colour or texture coordinates of each corner, three a face.
 pub(super) fn corners(model: &RenderModel) -> Vec<Corner> {
-    let attribute = |face: usize, k: usize| match &model.albedo {
+    let paint = |face: usize, k: usize| match &model.albedo {
         Albedo::Uniform(_) => [0.0; 3],
         Albedo::Corners(colors) => colors[face][k],
         Albedo::Texture(_, uvs) => [uvs[face][k][0], uvs[face][k][1], 0.0],
@@ -32,7 +32,7 @@ pub(super) fn corners(model: &RenderModel) -> Vec<Corner> {
     let corner = |face: usize, k: usize| Corner {
         normal: model.normals[face][k].into(),
         pad: 0,
-        attribute: attribute(face, k),
+        paint: paint(face, k),
         pad_2: 0,
     };
     (0..model.faces.len()).flat_map(|f| (0..3).map(move |k| corner(f, k))).collect()
