@@ -1,6 +1,6 @@
 // Sorts the faces of each hypothesis into tiles: count, scan, scatter. The order within a tile is left open.
 
-// First and last tile of the pixel centres in the box around a face.
+// First and last tile of the pixel centres in the box around a face and its reach.
 struct TileSpan {
     first: vec2<u32>,
     last: vec2<u32>,
@@ -10,12 +10,14 @@ struct TileSpan {
 fn tile_span(h: u32, face: u32) -> TileSpan {
     let c = face_screen(h, face);
     var span = TileSpan(vec2<u32>(0u), vec2<u32>(0u), false);
-    if facing_of(c) == 0 {
+    let soft = (params.soft_flags & SOFT_MODE) != 0u;
+    if (soft && !is_soft_face(c)) || (!soft && facing_of(c) == 0) {
         return span;
     }
     let region = region_of(h);
-    let low = min(min(c[0].xy, c[1].xy), c[2].xy);
-    let high = max(max(c[0].xy, c[1].xy), c[2].xy);
+    let base = hypotheses[h].image_center.xy;
+    let low = min(min(c[0].xy, c[1].xy), c[2].xy) + base - params.reach;
+    let high = max(max(c[0].xy, c[1].xy), c[2].xy) + base + params.reach;
     let first = max(ceil(low), vec2<f32>(region.xy));
     let last = min(floor(high), vec2<f32>(region.zw) - 1.0);
     // Most faces of a fine mesh lie between pixel centres.

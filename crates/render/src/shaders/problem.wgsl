@@ -13,6 +13,12 @@ const ROBUST_NONE: u32 = 0u;
 const ROBUST_HUBER: u32 = 1u;
 const ROBUST_CAUCHY: u32 = 2u;
 
+// Flags of the SoftRas mode.
+const SOFT_MODE: u32 = 1u;
+const SOFT_PERSPECTIVE: u32 = 2u;
+const SOFT_CLIP: u32 = 4u;
+const SOFT_CULL: u32 = 8u;
+
 struct Params {
     // Columns and rows of the image, and of the grid of tiles.
     size: vec2<u32>,
@@ -47,13 +53,15 @@ struct Params {
     robust_kind: u32,
     robust_scale: f32,
     hidden_is_missed: u32,
-    // SoftRas: see `softras.wgsl`.
-    blur_radius: f32,
-    sigma: f32,
-    gamma: f32,
-    z_near: f32,
-    z_far: f32,
-    ndc_scale: f32,
+    // SoftRas, in pixels: how far beyond its border a face may be kept [px], and its square [px²]; 1/σ [1/px²]; how fast the
+    // logarithm of a weight falls with depth [1/m], and the depth of the background [m]; the least double area of a face and
+    // squared length of an edge [px²].
+    reach: f32,
+    blur: f32,
+    sharpness: f32,
+    depth_rate: f32,
+    farthest: f32,
+    least_area: f32,
     faces_per_pixel: u32,
     soft_flags: u32,
     // Of each level of the texture: first texel, columns, rows.
@@ -77,6 +85,9 @@ struct Hypothesis {
     // Pyramid level of the texture, and its derivative by the centre's Z.
     level: f32,
     level_dz: f32,
+    // The projected centre: its pixel, which screen positions are relative to, and the rest [px]. Zero in the contour mode,
+    // where screen positions are those of the image.
+    image_center: vec4<f32>,
 }
 
 struct Corner {

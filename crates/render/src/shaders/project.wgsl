@@ -32,10 +32,20 @@ fn project(
         let p = camera_position(h, vertex);
         if hypotheses[h].alive != 0u && p.z > NEAR {
             let w = 1.0 / p.z;
-            out = vec4<f32>(params.focal * p.xy * w + params.principal, w, p.z);
+            let center = hypotheses[h].center;
+            if (params.soft_flags & SOFT_MODE) != 0u && center.z > NEAR {
+                // Barycentric coordinates of narrow faces magnify rounding, so these are relative to the centre.
+                let ratio = center.xy / center.z;
+                let arm = hypotheses[h].rotation * positions[vertex].xyz;
+                let shift = params.focal * (arm.xy - ratio * arm.z) * w;
+                out = vec4<f32>(shift + hypotheses[h].image_center.zw, w, p.z);
+            } else {
+                out = vec4<f32>(params.focal * p.xy * w + params.principal, w, p.z);
+            }
+            let place = out.xy + hypotheses[h].image_center.xy;
             let size = vec2<f32>(params.size);
-            let start = vec2<u32>(clamp(ceil(out.xy - params.margin), vec2<f32>(0.0), size));
-            let end = vec2<u32>(clamp(floor(out.xy + params.margin) + 1.0, vec2<f32>(0.0), size));
+            let start = vec2<u32>(clamp(ceil(place - params.margin), vec2<f32>(0.0), size));
+            let end = vec2<u32>(clamp(floor(place + params.margin) + 1.0, vec2<f32>(0.0), size));
             atomicMax(&box_left, FAR_COLUMN - start.x);
             atomicMax(&box_top, FAR_COLUMN - start.y);
             atomicMax(&box_right, end.x);

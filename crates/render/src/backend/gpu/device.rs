@@ -29,11 +29,15 @@ pub(super) const CONTOUR_VALUE: Pass = pass("contour_residuals");
 pub(super) const CONTOUR_DERIVATIVES: Pass =
     Pass { entry: "contour_residuals", derivatives: true };
 pub(super) const CONTOUR_PICTURE: Pass = pass("contour_picture");
+pub(super) const SOFTRAS_VALUE: Pass = pass("softras_residuals");
+pub(super) const SOFTRAS_DERIVATIVES: Pass =
+    Pass { entry: "softras_residuals", derivatives: true };
+pub(super) const SOFTRAS_PICTURE: Pass = pass("softras_picture");
 pub(super) const TOTAL: Pass = pass("total");
 pub(super) const NEEDS: Pass = pass("needs");
 
 /// All of them.
-pub(super) const PASSES: [Pass; 12] = [
+pub(super) const PASSES: [Pass; 15] = [
     PROJECT,
     COUNT_FACES,
     SCAN_BINS,
@@ -44,6 +48,9 @@ pub(super) const PASSES: [Pass; 12] = [
     CONTOUR_VALUE,
     CONTOUR_DERIVATIVES,
     CONTOUR_PICTURE,
+    SOFTRAS_VALUE,
+    SOFTRAS_DERIVATIVES,
+    SOFTRAS_PICTURE,
     TOTAL,
     NEEDS,
 ];

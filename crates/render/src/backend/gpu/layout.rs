@@ -17,6 +17,12 @@ pub(super) const ROBUST_NONE: u32 = 0;
 pub(super) const ROBUST_HUBER: u32 = 1;
 pub(super) const ROBUST_CAUCHY: u32 = 2;
 
+/// Flags of the SoftRas mode.
+pub(super) const SOFT_MODE: u32 = 1;
+pub(super) const SOFT_PERSPECTIVE: u32 = 2;
+pub(super) const SOFT_CLIP: u32 = 4;
+pub(super) const SOFT_CULL: u32 = 8;
+
 /// Pixels along a tile's side.
 pub(super) const TILE: usize = 8;
 
@@ -66,12 +72,12 @@ pub(super) struct Params {
     pub(super) robust_kind: u32,
     pub(super) robust_scale: f32,
     pub(super) hidden_is_missed: u32,
-    pub(super) blur_radius: f32,
-    pub(super) sigma: f32,
-    pub(super) gamma: f32,
-    pub(super) z_near: f32,
-    pub(super) z_far: f32,
-    pub(super) ndc_scale: f32,
+    pub(super) reach: f32,
+    pub(super) blur: f32,
+    pub(super) sharpness: f32,
+    pub(super) depth_rate: f32,
+    pub(super) farthest: f32,
+    pub(super) least_area: f32,
     pub(super) faces_per_pixel: u32,
     pub(super) soft_flags: u32,
     pub(super) level: [[u32; 4]; LEVELS],
@@ -92,6 +98,7 @@ pub(super) struct Hypothesis {
     pub(super) level: f32,
     pub(super) level_dz: f32,
     pub(super) pad: [u32; 3],
+    pub(super) image_center: [f32; 4],
 }
 
 #[repr(C)]

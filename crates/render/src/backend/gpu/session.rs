@@ -7,16 +7,18 @@ use wgpu::util::DeviceExt;
 
 use super::device::{
     CONTOUR_DERIVATIVES, CONTOUR_PICTURE, CONTOUR_VALUE, COUNT_FACES, Device, FIND_PIECES,
-    FIND_SEGMENTS, NEEDS, PROJECT, Pass, RASTER, SCAN_BINS, SCATTER_FACES, TOTAL,
+    FIND_SEGMENTS, NEEDS, PROJECT, Pass, RASTER, SCAN_BINS, SCATTER_FACES, SOFTRAS_DERIVATIVES,
+    SOFTRAS_PICTURE, SOFTRAS_VALUE, TOTAL,
 };
 use super::layout::{
     PICTURE_COLUMNS, Params, SUM_COLOR, SUM_COLUMNS, SUM_CONTOUR, SUM_COVERED, SUM_DEPTH,
     SUM_GRADIENT, SUM_HIDDEN, SUM_JTJ, SUM_MASK, SUM_MISSED, SUM_WITH_DEPTH, Usage,
 };
 use super::upload;
-use super::work::{self, Capacity, Work};
+use super::work::{self, BUDGET, Capacity, Work};
 use crate::backend::{BackendError, Hypothesis, PoseProblem, Session};
 use crate::image::{DepthImage, RgbImage};
+use crate::mode::Mode;
 use crate::pose_loss::{Counts, Linearised, Loss, PoseImage};
 
 /// What a call wants to know.
@@ -35,7 +37,9 @@ pub(super) struct GpuSession {
     settings: wgpu::Buffer,
     /// Positions, faces, corners, edges, texels and target.
     model: Vec<wgpu::Buffer>,
-    capacity: Capacity,
+    pub(super) capacity: Capacity,
+    /// Memory for the work buffers [bytes].
+    pub(super) budget: u64,
     work: Option<Work>,
 }
 
@@ -45,7 +49,8 @@ impl GpuSession {
         let params = upload::params(problem)
             .ok_or_else(|| device.failed("the texture has too many levels"))?;
         let capacity = Capacity::guess(&params);
-        work::batch(&device, &params, &capacity, 1)?;
+        // Fails early where not even one hypothesis fits.
+        work::batch(&device, &params, &capacity, BUDGET, 1)?;
         check_dispatch(&device, &params)?;
         let (positions, faces) = (upload::positions(model), upload::faces(model));
         let (corners, edges) = (upload::corners(model), upload::edges(model));
@@ -80,7 +85,7 @@ impl GpuSession {
             (settings, contents.map(|c| upload(c, storage)).into())
         })?;
         let problem = problem.clone();
-        Ok(Self { device, problem, params, settings, model, capacity, work: None })
+        Ok(Self { device, problem, params, settings, model, capacity, budget: BUDGET, work: None })
     }
 
     /// The sums of each hypothesis.
@@ -101,7 +106,7 @@ impl GpuSession {
 
     /// Makes sure that there are buffers, and says for how many of `wanted` hypotheses.
     fn prepare(&mut self, wanted: usize) -> Result<usize, BackendError> {
-        let count = work::batch(&self.device, &self.params, &self.capacity, wanted)?;
+        let count = work::batch(&self.device, &self.params, &self.capacity, self.budget, wanted)?;
         let fits = |w: &Work| w.hypotheses >= count && w.capacity == self.capacity;
         if !self.work.as_ref().is_some_and(fits) {
             // The old buffers go first: the new ones may need their memory.
@@ -174,14 +179,20 @@ impl GpuSession {
             run(COUNT_FACES, p.faces.div_ceil(64), 1);
             run(SCAN_BINS, 1, 1);
             run(SCATTER_FACES, p.faces.div_ceil(64), 1);
-            run(RASTER, across, down);
-            run(FIND_SEGMENTS, p.edges.div_ceil(64), 1);
-            run(FIND_PIECES, p.segment_capacity.div_ceil(64), 1);
-            match wanted {
-                Wanted::Value => run(CONTOUR_VALUE, across, down),
-                Wanted::Derivatives => run(CONTOUR_DERIVATIVES, across, down),
-                Wanted::Picture => run(CONTOUR_PICTURE, across, down),
+            let pixels = match (&self.problem.loss.mode, wanted) {
+                (Mode::Contour(_), Wanted::Value) => CONTOUR_VALUE,
+                (Mode::Contour(_), Wanted::Derivatives) => CONTOUR_DERIVATIVES,
+                (Mode::Contour(_), Wanted::Picture) => CONTOUR_PICTURE,
+                (Mode::SoftRas(_), Wanted::Value) => SOFTRAS_VALUE,
+                (Mode::SoftRas(_), Wanted::Derivatives) => SOFTRAS_DERIVATIVES,
+                (Mode::SoftRas(_), Wanted::Picture) => SOFTRAS_PICTURE,
+            };
+            if let Mode::Contour(_) = self.problem.loss.mode {
+                run(RASTER, across, down);
+                run(FIND_SEGMENTS, p.edges.div_ceil(64), 1);
+                run(FIND_PIECES, p.segment_capacity.div_ceil(64), 1);
             }
+            run(pixels, across, down);
             match wanted {
                 Wanted::Picture => run(NEEDS, 1, 1),
                 _ => run(TOTAL, 1, 1),

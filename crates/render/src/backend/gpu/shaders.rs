@@ -1,6 +1,6 @@
 //! The compute shaders: one module, put together from files by concept.
 
-const FILES: [&str; 16] = [
+const FILES: [&str; 18] = [
     include_str!("../../shaders/problem.wgsl"),
     include_str!("../../shaders/work.wgsl"),
     include_str!("../../shaders/project.wgsl"),
@@ -17,6 +17,8 @@ const FILES: [&str; 16] = [
     include_str!("../../shaders/residuals.wgsl"),
     include_str!("../../shaders/total.wgsl"),
     include_str!("../../shaders/picture.wgsl"),
+    include_str!("../../shaders/fragment.wgsl"),
+    include_str!("../../shaders/softras.wgsl"),
 ];
 
 /// The whole module.
@@ -75,12 +77,12 @@ mod tests {
                 entry_capacity, segment_capacity, piece_capacity, closed, albedo_kind, levels,
                 margin, half_width, albedo, least_step, color_weight, mask_weight, depth_weight,
                 depth_scale, depth_truncation, robust_kind, robust_scale, hidden_is_missed,
-                blur_radius, sigma, gamma, z_near, z_far, ndc_scale, faces_per_pixel, soft_flags,
+                reach, blur, sharpness, depth_rate, farthest, least_area, faces_per_pixel, soft_flags,
                 level
             )),
             ("Hypothesis", fields!(
                 Hypothesis, rotation, center, alive, camera_light, object_light, ambient,
-                flat_light, offset, level, level_dz
+                flat_light, offset, level, level_dz, image_center
             )),
             ("Corner", fields!(Corner, normal, paint)),
             ("Edge", fields!(Edge, vertices, face, other, corner, other_corner)),
@@ -145,6 +147,11 @@ mod tests {
             ("ROBUST_NONE", ROBUST_NONE as usize),
             ("ROBUST_HUBER", ROBUST_HUBER as usize),
             ("ROBUST_CAUCHY", ROBUST_CAUCHY as usize),
+            ("SOFT_MODE", SOFT_MODE as usize),
+            ("SOFT_PERSPECTIVE", SOFT_PERSPECTIVE as usize),
+            ("SOFT_CLIP", SOFT_CLIP as usize),
+            ("SOFT_CULL", SOFT_CULL as usize),
+            ("MOST_FACES", crate::mode::SoftRasOptions::MOST_FACES),
             ("SUM_COLOR", SUM_COLOR),
             ("SUM_MASK", SUM_MASK),
             ("SUM_DEPTH", SUM_DEPTH),

@@ -7,6 +7,8 @@ use nalgebra::{Isometry3, Vector3, Vector6};
 use prehend_geometry::TriMesh;
 use prehend_geometry::shapes::cuboid;
 
+use super::session::GpuSession;
+use super::work::Capacity;
 use super::*;
 use crate::backend::Hypothesis;
 use crate::image::DepthImage;
@@ -246,4 +248,32 @@ fn results_repeat_to_the_bit_whatever_the_batch() {
         std::array::from_fn(|i| w[i].max(e[i]))
     });
     println!("70 hypotheses: loss, gradient, JtJ {worst:?}");
+}
+
+#[test]
+fn buffers_that_are_too_small_grow_and_large_batches_are_split() {
+    let Some(gpu) = gpu("buffers_that_are_too_small_grow_and_large_batches_are_split") else {
+        return;
+    };
+    let mesh = painted(torus(0.04, 0.015, 30), 0.05);
+    let Case { problem, hypotheses, .. } =
+        case("torus", &mesh, lamp(), contour(1.0), full_options(), Vector3::zeros(), 9);
+    let expected = gpu.prepare(&problem).unwrap().linearise(&hypotheses).unwrap();
+    let mut session = GpuSession::new(gpu.device.clone(), &problem).unwrap();
+    session.capacity = Capacity { entries: 1, segments: 1, pieces: 1 };
+    let grown = session.linearise(&hypotheses).unwrap();
+    assert_eq!(grown, expected);
+    assert!(session.capacity.segments > 50 && session.capacity.pieces > 50);
+    // Enough for two hypotheses at a time.
+    session.budget = 3_000_000;
+    assert_eq!(session.linearise(&hypotheses).unwrap(), expected);
+    session.capacity = Capacity { entries: 1, segments: 1, pieces: 1 };
+    let picture = session.render(&hypotheses[0]).unwrap();
+    assert_eq!(picture, gpu.prepare(&problem).unwrap().render(&hypotheses[0]).unwrap());
+    // Not enough for one.
+    session.budget = 1000;
+    assert!(matches!(session.evaluate(&hypotheses), Err(BackendError::TooLarge { .. })));
+    // A picture's needs do not depend on the sums' being there first.
+    session.budget = 1 << 30;
+    assert_eq!(session.linearise(&hypotheses).unwrap(), expected);
 }

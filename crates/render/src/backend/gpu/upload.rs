@@ -2,11 +2,13 @@
 
 use super::layout::{
     ALBEDO_CORNERS, ALBEDO_TEXTURE, ALBEDO_UNIFORM, Corner, Edge, Hypothesis, LEVELS, Params,
-    ROBUST_CAUCHY, ROBUST_HUBER, ROBUST_NONE, TILE, TargetPixel,
+    ROBUST_CAUCHY, ROBUST_HUBER, ROBUST_NONE, SOFT_CLIP, SOFT_CULL, SOFT_MODE,
+    SOFT_PERSPECTIVE, TILE, TargetPixel,
 };
 use crate::backend::{self, PoseProblem};
+use crate::camera::Camera;
 use crate::contour::LEAST_STEP;
-use crate::mode::Mode;
+use crate::mode::{Mode, SoftRasOptions};
 use crate::model::{Albedo, RenderModel};
 use crate::pose_loss::{LossOptions, Robust, Target};
 use crate::posed;
@@ -88,7 +90,7 @@ pub(super) fn params(problem: &PoseProblem) -> Option<Params> {
     params.closed = model.closed.into();
     params.least_step = LEAST_STEP * model.radius() as f32;
     set_albedo(&mut params, model)?;
-    set_mode(&mut params, &loss.mode);
+    set_mode(&mut params, &loss.mode, camera);
     set_loss(&mut params, &loss.options, target.depth.is_some());
     Some(params)
 }
@@ -120,15 +122,41 @@ fn set_albedo(params: &mut Params, model: &RenderModel) -> Option<()> {
     Some(())
 }
 
-fn set_mode(params: &mut Params, mode: &Mode) {
+fn set_mode(params: &mut Params, mode: &Mode, camera: &Camera) {
     match mode {
         Mode::Contour(options) => {
             // As on the CPU: a band of zero width would divide by zero.
             params.half_width = (options.half_width as f32).clamp(0.05, 64.0);
             params.margin = params.half_width;
         }
-        Mode::SoftRas(_) => {}
+        Mode::SoftRas(options) => set_softras(params, options, camera),
     }
+}
+
+/// PyTorch3D's bound for areas and squared lengths (NDC²), and the inverse depth of the background.
+const SMALL: f64 = 1e-8;
+const BACKGROUND: f64 = 1e-10;
+
+fn set_softras(params: &mut Params, options: &SoftRasOptions, camera: &Camera) {
+    // Pixels per unit of normalised device coordinates.
+    let scale = 0.5 * camera.width.min(camera.height) as f64;
+    let area = scale * scale;
+    let range = options.z_far - options.z_near;
+    let range = if range.abs() > 1e-9 { range } else { 1e-9 };
+    params.blur = (options.blur_radius.max(0.0) * area) as f32;
+    params.reach = params.blur.sqrt();
+    params.margin = params.reach;
+    params.sharpness = (1.0 / (options.sigma.max(1e-12) * area)) as f32;
+    params.depth_rate = (1.0 / (options.gamma.max(1e-12) * range)) as f32;
+    params.farthest = (options.z_far - BACKGROUND * range) as f32;
+    params.least_area = (SMALL * area) as f32;
+    params.faces_per_pixel =
+        options.faces_per_pixel.clamp(1, SoftRasOptions::MOST_FACES) as u32;
+    let flag = |set: bool, flag: u32| if set { flag } else { 0 };
+    params.soft_flags = SOFT_MODE
+        | flag(options.perspective_correct, SOFT_PERSPECTIVE)
+        | flag(options.clip_barycentric, SOFT_CLIP)
+        | flag(options.cull_backfaces, SOFT_CULL);
 }
 
 fn set_loss(params: &mut Params, options: &LossOptions, has_depth: bool) {
@@ -172,5 +200,12 @@ pub(super) fn hypothesis(problem: &PoseProblem, h: &backend::Hypothesis) -> Hypo
     out.ambient = h.light.ambient.map(|a| a as f32);
     out.flat_light = light.iter().all(|d| *d == nalgebra::Vector3::zeros()).into();
     (out.level, out.level_dz) = (level, level_dz);
+    if let (Mode::SoftRas(_), true) = (&problem.loss.mode, center.z > posed::NEAR) {
+        let camera = &problem.target.camera;
+        let p = h.t_cam_object * model.center();
+        let at = [camera.fx * p.x / p.z + camera.cx, camera.fy * p.y / p.z + camera.cy];
+        let [x, y] = at.map(f64::round);
+        out.image_center = [x, y, at[0] - x, at[1] - y].map(|v| v as f32);
+    }
     out
 }

@@ -8,7 +8,7 @@ use super::layout::{
 use crate::backend::BackendError;
 
 /// Memory that a session's work buffers may take together \[bytes\]. More hypotheses are worked off in turns.
-const BUDGET: u64 = 768 << 20;
+pub(super) const BUDGET: u64 = 768 << 20;
 
 /// What one hypothesis needs, in numbers of entries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,7 +31,7 @@ impl Capacity {
         Self { entries: 256 + faces / 2 + 4 * tiles, segments, pieces }
     }
 
-    /// Whether `usage` of `count` hypotheses sharing a pool of `pool` entries stayed within bounds.
+    /// Whether `usage` of hypotheses that share a pool of `pool` entries stayed within bounds.
     pub(super) fn holds(&self, usage: &Usage, pool: usize) -> bool {
         usage.entries as usize <= pool
             && usage.segments as usize <= self.segments
@@ -85,7 +85,7 @@ const NAMES: [&str; 9] = [
     "results",
 ];
 
-/// How many of `wanted` hypotheses can be worked off at once.
+/// How many of `wanted` hypotheses can be worked off at once within `budget` \[bytes\].
 ///
 /// # Errors
 /// When not even one can.
@@ -93,6 +93,7 @@ pub(super) fn batch(
     device: &Device,
     params: &Params,
     capacity: &Capacity,
+    budget: u64,
     wanted: usize,
 ) -> Result<usize, BackendError> {
     let limits = &device.limits;
@@ -108,12 +109,12 @@ pub(super) fn batch(
         return Err(too_large(NAMES[i], one[i], most));
     }
     let all: u64 = one.iter().sum();
-    if all > BUDGET {
-        return Err(too_large("one hypothesis", all, BUDGET));
+    if all > budget {
+        return Err(too_large("one hypothesis", all, budget));
     }
     let by_buffer = one.iter().map(|size| most / size).min().unwrap_or(1);
     let by_dispatch = u64::from(limits.max_compute_workgroups_per_dimension);
-    let count = by_buffer.min(BUDGET / all).min(by_dispatch) as usize;
+    let count = by_buffer.min(budget / all).min(by_dispatch) as usize;
     // Turns of equal size.
     Ok(wanted.div_ceil(wanted.div_ceil(count.max(1))))
 }
