@@ -13,7 +13,7 @@ use super::*;
 use crate::backend::Hypothesis;
 use crate::image::DepthImage;
 use crate::light::Light;
-use crate::mode::{ContourOptions, Mode};
+use crate::mode::{ContourOptions, Mode, SoftRasOptions};
 use crate::model::RenderModel;
 use crate::pose_loss::tests::{
     Noise, camera, full_options, lamp, pose, target_of, textured_box, twisted,
@@ -135,11 +135,51 @@ fn errors(cpu: &Linearised, gpu: &Linearised) -> [f64; 3] {
     ]
 }
 
+fn softras(change: impl Fn(&mut SoftRasOptions)) -> Mode {
+    let mut options = SoftRasOptions::default();
+    change(&mut options);
+    Mode::SoftRas(options)
+}
+
+fn softras_cases() -> Vec<Case> {
+    let none = Vector3::zeros();
+    let (plain, full) = (LossOptions::default(), full_options());
+    let lump = painted(lump(0.045, 24), 0.05);
+    let torus = painted(torus(0.04, 0.015, 20), 0.05);
+    let usual = softras(|_| ());
+    let few = softras(|o| o.faces_per_pixel = 3);
+    let wide = softras(|o| (o.sigma, o.blur_radius, o.gamma) = (1e-3, 5e-3, 1e-3));
+    let flat = softras(|o| o.perspective_correct = false);
+    let culled = softras(|o| o.cull_backfaces = true);
+    let robust = LossOptions { robust: Robust::Cauchy(0.1), ..full };
+    vec![
+        case("soft lump", &lump, lamp(), usual, full, none, 3),
+        case("soft textured box", &textured_box(), Light::ambient(0.9), usual, plain, none, 3),
+        case("soft open box", &without_two_faces(), lamp(), usual, full, none, 3),
+        case("soft torus, three faces", &torus, lamp(), few, full, none, 2),
+        case("soft torus, wide", &torus, lamp(), wide, robust, none, 2),
+        case("soft box, no perspective", &textured_box(), lamp(), flat, full, none, 2),
+        with_occluder(case("soft lump, culled", &lump, lamp(), culled, full, none, 2)),
+        case("soft corner", &torus, lamp(), usual, full, Vector3::new(-0.1, -0.08, 0.0), 2),
+    ]
+}
+
 #[test]
-fn images_losses_and_derivatives_agree_with_the_processor() {
-    let Some(gpu) = gpu("images_losses_and_derivatives_agree_with_the_processor") else { return };
+fn the_contour_mode_agrees_with_the_processor() {
+    agree("the_contour_mode_agrees_with_the_processor", cases());
+}
+
+#[test]
+#[ignore = "waits for the SoftRas mode on the processor"]
+fn the_softras_mode_agrees_with_the_processor() {
+    agree("the_softras_mode_agrees_with_the_processor", softras_cases());
+}
+
+/// Pictures, losses and derivatives of all cases.
+fn agree(test: &str, cases: Vec<Case>) {
+    let Some(gpu) = gpu(test) else { return };
     let (mut pixels, mut ties) = (0, 0);
-    for Case { name, mut problem, hypotheses } in cases() {
+    for Case { name, mut problem, hypotheses } in cases {
         let mut session = gpu.prepare(&problem).unwrap();
         // Pixels at which rounding decides what is seen are set aside by hiding them from both.
         let mut tied = problem.target.occluder.clone();
