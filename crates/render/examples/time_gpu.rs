@@ -55,8 +55,10 @@ mod timing {
     fn hypotheses(count: usize, light: Light) -> Vec<Hypothesis> {
         let at = |i: usize, k: f64| (i as f64 * k).sin();
         let pose = |i: usize| {
-            let turn = Vector3::new(0.4 + 0.2 * at(i, 1.3), 0.2 + 0.2 * at(i, 2.1), 0.2 * at(i, 0.7));
-            let shift = Vector3::new(0.006 * at(i, 3.7), 0.006 * at(i, 5.3), 0.45 + 0.01 * at(i, 1.9));
+            let turn =
+                Vector3::new(0.4 + 0.2 * at(i, 1.3), 0.2 + 0.2 * at(i, 2.1), 0.2 * at(i, 0.7));
+            let shift =
+                Vector3::new(0.006 * at(i, 3.7), 0.006 * at(i, 5.3), 0.45 + 0.01 * at(i, 1.9));
             Isometry3::from_parts(Translation3::from(shift), UnitQuaternion::from_scaled_axis(turn))
         };
         (0..count).map(|i| Hypothesis { t_cam_object: pose(i), light }).collect()

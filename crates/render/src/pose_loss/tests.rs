@@ -39,7 +39,11 @@ pub(crate) fn pose(noise: &mut Noise) -> Isometry3<f64> {
 }
 
 /// The pose after a small twist about `center`.
-pub(crate) fn twisted(pose: &Isometry3<f64>, center: &Point3<f64>, twist: &[f64; 6]) -> Isometry3<f64> {
+pub(crate) fn twisted(
+    pose: &Isometry3<f64>,
+    center: &Point3<f64>,
+    twist: &[f64; 6],
+) -> Isometry3<f64> {
     let turn = UnitQuaternion::from_scaled_axis(Vector3::new(twist[3], twist[4], twist[5]));
     let shift = Vector3::new(twist[0], twist[1], twist[2]);
     let center = Translation3::from(center.coords);

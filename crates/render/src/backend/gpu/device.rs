@@ -26,12 +26,10 @@ pub(super) const RASTER: Pass = pass("raster");
 pub(super) const FIND_SEGMENTS: Pass = pass("find_segments");
 pub(super) const FIND_PIECES: Pass = pass("find_pieces");
 pub(super) const CONTOUR_VALUE: Pass = pass("contour_residuals");
-pub(super) const CONTOUR_DERIVATIVES: Pass =
-    Pass { entry: "contour_residuals", derivatives: true };
+pub(super) const CONTOUR_DERIVATIVES: Pass = Pass { entry: "contour_residuals", derivatives: true };
 pub(super) const CONTOUR_PICTURE: Pass = pass("contour_picture");
 pub(super) const SOFTRAS_VALUE: Pass = pass("softras_residuals");
-pub(super) const SOFTRAS_DERIVATIVES: Pass =
-    Pass { entry: "softras_residuals", derivatives: true };
+pub(super) const SOFTRAS_DERIVATIVES: Pass = Pass { entry: "softras_residuals", derivatives: true };
 pub(super) const SOFTRAS_PICTURE: Pass = pass("softras_picture");
 pub(super) const TOTAL: Pass = pass("total");
 pub(super) const NEEDS: Pass = pass("needs");
@@ -80,7 +78,9 @@ impl Device {
         let limits = adapter.limits();
         let buffers = READ_WRITE.end - READ_ONLY.start;
         if limits.max_storage_buffers_per_shader_stage < buffers {
-            return Err(BackendError::NoDevice(format!("{name} binds fewer than {buffers} buffers")));
+            return Err(BackendError::NoDevice(format!(
+                "{name} binds fewer than {buffers} buffers"
+            )));
         }
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("prehend"),
@@ -100,8 +100,7 @@ impl Device {
         });
         // Errors outside of a scope, such as those of another thread's dropped buffers, must not abort the program.
         device.on_uncaptured_error(Arc::new(|error| log::warn!("graphics device: {error}")));
-        let (layout, pipelines) =
-            watched(&device, || compile(&device)).map_err(failed)?;
+        let (layout, pipelines) = watched(&device, || compile(&device)).map_err(failed)?;
         Ok(Self { name, device, queue, limits, layout, pipelines, lost })
     }
 
@@ -125,8 +124,11 @@ impl Device {
 }
 
 fn watched<T>(device: &wgpu::Device, work: impl FnOnce() -> T) -> Result<T, String> {
-    let filters =
-        [wgpu::ErrorFilter::Internal, wgpu::ErrorFilter::OutOfMemory, wgpu::ErrorFilter::Validation];
+    let filters = [
+        wgpu::ErrorFilter::Internal,
+        wgpu::ErrorFilter::OutOfMemory,
+        wgpu::ErrorFilter::Validation,
+    ];
     let mut scopes: Vec<_> = filters.into_iter().map(|f| device.push_error_scope(f)).collect();
     let value = work();
     let mut reason = None;

@@ -63,7 +63,8 @@ impl GpuSession {
             bytemuck::cast_slice(&texels),
             bytemuck::cast_slice(&target),
         ];
-        let limit = device.limits.max_storage_buffer_binding_size.min(device.limits.max_buffer_size);
+        let limit =
+            device.limits.max_storage_buffer_binding_size.min(device.limits.max_buffer_size);
         if let Some(large) = contents.iter().find(|c| c.len() as u64 > limit) {
             return Err(BackendError::TooLarge {
                 device: device.name.clone(),
@@ -138,7 +139,9 @@ impl GpuSession {
             _ => upload::bounds(&self.problem.target.bounds),
         };
         let values = match wanted {
-            Wanted::Picture => (self.params.size[0] * self.params.size[1]) as usize * PICTURE_COLUMNS,
+            Wanted::Picture => {
+                (self.params.size[0] * self.params.size[1]) as usize * PICTURE_COLUMNS
+            }
             _ => hypotheses.len() * SUM_COLUMNS,
         };
         let size = (size_of::<Usage>() + values * size_of::<f32>()) as u64;
@@ -204,8 +207,7 @@ impl GpuSession {
 
     fn loss(&self, sums: &[f32]) -> Loss {
         let n = self.problem.target.normalisation;
-        let [color, mask, depth] =
-            [SUM_COLOR, SUM_MASK, SUM_DEPTH].map(|i| n * f64::from(sums[i]));
+        let [color, mask, depth] = [SUM_COLOR, SUM_MASK, SUM_DEPTH].map(|i| n * f64::from(sums[i]));
         let count = |i: usize| sums[i] as usize;
         let counts = Counts {
             covered: count(SUM_COVERED),

@@ -257,10 +257,8 @@ fn what_cannot_be_seen_misses_the_whole_mask() {
         }
     }
     // The camera inside the object, and in its surface: whatever is seen, everything stays finite.
-    let inside = [0.0, 0.03, 0.046, 0.06].map(|z| Hypothesis {
-        t_cam_object: Isometry3::translation(0.0, 0.0, z),
-        light: lamp(),
-    });
+    let inside = [0.0, 0.03, 0.046, 0.06]
+        .map(|z| Hypothesis { t_cam_object: Isometry3::translation(0.0, 0.0, z), light: lamp() });
     for at in session.linearise(&inside).unwrap() {
         assert!(at.loss.total.is_finite() && at.gradient.iter().all(|v| v.is_finite()));
         assert!(at.jtj.iter().all(|v| v.is_finite()));
@@ -283,10 +281,11 @@ fn results_repeat_to_the_bit_whatever_the_batch() {
     }
     assert_eq!(session.linearise(&hypotheses[3..50]).unwrap(), all[3..50]);
     let mut cpu = problem.clone();
-    let worst = cpu.linearise(&hypotheses).unwrap().iter().zip(&all).fold([0.0f64; 3], |w, (c, g)| {
-        let e = errors(c, g);
-        std::array::from_fn(|i| w[i].max(e[i]))
-    });
+    let worst =
+        cpu.linearise(&hypotheses).unwrap().iter().zip(&all).fold([0.0f64; 3], |w, (c, g)| {
+            let e = errors(c, g);
+            std::array::from_fn(|i| w[i].max(e[i]))
+        });
     println!("70 hypotheses: loss, gradient, JtJ {worst:?}");
 }
 

@@ -2,8 +2,8 @@
 
 use super::layout::{
     ALBEDO_CORNERS, ALBEDO_TEXTURE, ALBEDO_UNIFORM, Corner, Edge, Hypothesis, LEVELS, Params,
-    ROBUST_CAUCHY, ROBUST_HUBER, ROBUST_NONE, SOFT_CLIP, SOFT_CULL, SOFT_MODE,
-    SOFT_PERSPECTIVE, TILE, TargetPixel,
+    ROBUST_CAUCHY, ROBUST_HUBER, ROBUST_NONE, SOFT_CLIP, SOFT_CULL, SOFT_MODE, SOFT_PERSPECTIVE,
+    TILE, TargetPixel,
 };
 use crate::backend::{self, PoseProblem};
 use crate::camera::Camera;
@@ -150,8 +150,7 @@ fn set_softras(params: &mut Params, options: &SoftRasOptions, camera: &Camera) {
     params.depth_rate = (1.0 / (options.gamma.max(1e-12) * range)) as f32;
     params.farthest = (options.z_far - BACKGROUND * range) as f32;
     params.least_area = (SMALL * area) as f32;
-    params.faces_per_pixel =
-        options.faces_per_pixel.clamp(1, SoftRasOptions::MOST_FACES) as u32;
+    params.faces_per_pixel = options.faces_per_pixel.clamp(1, SoftRasOptions::MOST_FACES) as u32;
     let flag = |set: bool, flag: u32| if set { flag } else { 0 };
     params.soft_flags = SOFT_MODE
         | flag(options.perspective_correct, SOFT_PERSPECTIVE)
