@@ -30,6 +30,7 @@ fn interior(h: u32, p: vec2<f32>, face: u32, inverse_z: f32) -> Pixel {
     var pixel: Pixel;
     pixel.some = true;
     pixel.hit = true;
+    pixel.face = face;
     pixel.color = shaded.color;
     pixel.coverage = 1.0;
     pixel.z = z;

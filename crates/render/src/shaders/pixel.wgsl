@@ -5,6 +5,8 @@ struct Pixel {
     some: bool,
     hit: bool,
     near_outline: bool,
+    // The face at the centre, if one covers it.
+    face: u32,
     // Colour and coverage after blending with the black background.
     color: vec3<f32>,
     coverage: f32,

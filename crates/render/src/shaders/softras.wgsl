@@ -133,6 +133,7 @@ fn softras_pixel(h: u32, p: vec2<f32>, nearest: ptr<function, Nearest>) -> Pixel
         let f = soft_face(h, (*nearest).inside);
         let fragment = fragment_of(f, p);
         pixel.hit = true;
+        pixel.face = f.face;
         pixel.near_outline = false;
         pixel.z = fragment.z;
         pixel.depth_weight = 1.0;
@@ -207,5 +208,5 @@ fn softras_picture(
     @builtin(local_invocation_index) lane: u32,
     @builtin(global_invocation_id) id: vec3<u32>,
 ) {
-    store_picture(seen_in_softras_mode(group.z, lane, group.xy, id.xy), id.xy);
+    store_picture(group.z, seen_in_softras_mode(group.z, lane, group.xy, id.xy), id.xy);
 }

@@ -56,6 +56,15 @@ fn albedo(h: u32, face: u32, b: vec3<f32>) -> Shaded {
     return out;
 }
 
+// Smooth unit normal on the side seen, mesh frame, and in w the sign of that side over the length before normalising.
+fn normal_at(face: u32, b: vec3<f32>, seen_inside: bool) -> vec4<f32> {
+    let sum = corners[3u * face].normal * b.x
+        + corners[3u * face + 1u].normal * b.y
+        + corners[3u * face + 2u].normal * b.z;
+    let factor = select(1.0, -1.0, seen_inside) / max(sqrt(dot(sum, sum)), 1e-6);
+    return vec4<f32>(sum * factor, factor);
+}
+
 // Lit colour at barycentric coordinates b of a face; `seen_inside` says which side is seen.
 fn shade(h: u32, face: u32, b: vec3<f32>, seen_inside: bool) -> Shaded {
     var out = albedo(h, face, b);
@@ -67,13 +76,8 @@ fn shade(h: u32, face: u32, b: vec3<f32>, seen_inside: bool) -> Shaded {
         out.level *= factor;
         return out;
     }
-    let n0 = corners[3u * face].normal;
-    let n1 = corners[3u * face + 1u].normal;
-    let n2 = corners[3u * face + 2u].normal;
-    let sum = n0 * b.x + n1 * b.y + n2 * b.z;
-    let length = max(sqrt(dot(sum, sum)), 1e-6);
-    let side = select(1.0, -1.0, seen_inside);
-    let n = sum * (side / length);
+    let smooth_normal = normal_at(face, b, seen_inside);
+    let n = smooth_normal.xyz;
     var light = hypotheses[h].object_light;
     let along_normal = n * light;
     let factor = max(hypotheses[h].ambient + along_normal, vec3<f32>(0.0));
@@ -81,15 +85,15 @@ fn shade(h: u32, face: u32, b: vec3<f32>, seen_inside: bool) -> Shaded {
     out.color = unlit * factor;
     if DERIVATIVES {
         let in_camera = hypotheses[h].rotation * n;
-        let d1 = n1 - n0;
-        let d2 = n2 - n0;
+        let d1 = corners[3u * face + 1u].normal - corners[3u * face].normal;
+        let d2 = corners[3u * face + 2u].normal - corners[3u * face].normal;
         out.along_1 *= factor;
         out.along_2 *= factor;
         out.level *= factor;
         for (var k = 0u; k < 3u; k++) {
             if factor[k] > 0.0 {
                 // The normal turns by the part of the corners' difference across it.
-                let across = (light[k] - n * along_normal[k]) * (side / length);
+                let across = (light[k] - n * along_normal[k]) * smooth_normal.w;
                 out.along_1[k] += unlit[k] * dot(across, d1);
                 out.along_2[k] += unlit[k] * dot(across, d2);
                 out.turning[k] = cross(in_camera, hypotheses[h].camera_light[k]) * unlit[k];

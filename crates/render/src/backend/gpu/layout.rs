@@ -39,8 +39,8 @@ pub(super) const SUM_MISSED: usize = 33;
 pub(super) const SUM_WITH_DEPTH: usize = 34;
 pub(super) const SUM_COLUMNS: usize = 35;
 
-/// Colour, coverage and depth of a pixel of a picture.
-pub(super) const PICTURE_COLUMNS: usize = 5;
+/// Colour, coverage, depth, normal and face plus one of a pixel of a picture.
+pub(super) const PICTURE_COLUMNS: usize = 9;
 
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
