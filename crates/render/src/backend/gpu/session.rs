@@ -3,7 +3,6 @@
 use std::sync::{Arc, mpsc};
 
 use nalgebra::{Matrix6, Vector6};
-use wgpu::util::DeviceExt;
 
 use super::device::{
     CONTOUR_DERIVATIVES, CONTOUR_PICTURE, CONTOUR_VALUE, COUNT_FACES, Device, FIND_PIECES,
@@ -73,16 +72,21 @@ impl GpuSession {
                 limit,
             });
         }
+        // Not `create_buffer_init`, which panics when memory is short or the device lost.
         let upload = |contents: &[u8], usage: wgpu::BufferUsages| {
-            // A binding must not be empty.
-            let contents = if contents.is_empty() { &[0; 16] } else { contents };
-            let descriptor = wgpu::util::BufferInitDescriptor { label: None, contents, usage };
-            device.device.create_buffer_init(&descriptor)
+            let buffer = device.device.create_buffer(&wgpu::BufferDescriptor {
+                label: None,
+                // A binding must not be empty.
+                size: contents.len().max(16) as u64,
+                usage: usage | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            });
+            device.queue.write_buffer(&buffer, 0, contents);
+            buffer
         };
         let (settings, model) = device.watched(|| {
             let storage = wgpu::BufferUsages::STORAGE;
-            let uniform = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
-            let settings = upload(bytemuck::bytes_of(&params), uniform);
+            let settings = upload(bytemuck::bytes_of(&params), wgpu::BufferUsages::UNIFORM);
             (settings, contents.map(|c| upload(c, storage)).into())
         })?;
         let problem = problem.clone();
@@ -122,6 +126,19 @@ impl GpuSession {
 
     /// One round trip. `None` when a buffer was too small: they are larger the next time.
     fn attempt(
+        &mut self,
+        hypotheses: &[Hypothesis],
+        wanted: Wanted,
+    ) -> Result<Option<Vec<f32>>, BackendError> {
+        let answer = self.round_trip(hypotheses, wanted);
+        if answer.is_err() {
+            // Whatever state they are in now.
+            self.work = None;
+        }
+        answer
+    }
+
+    fn round_trip(
         &mut self,
         hypotheses: &[Hypothesis],
         wanted: Wanted,

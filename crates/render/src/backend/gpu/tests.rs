@@ -10,7 +10,7 @@ use prehend_geometry::shapes::cuboid;
 use super::session::GpuSession;
 use super::work::Capacity;
 use super::*;
-use crate::backend::Hypothesis;
+use crate::backend::{Hypothesis, WithFallback};
 use crate::image::DepthImage;
 use crate::light::Light;
 use crate::mode::{ContourOptions, Mode, SoftRasOptions};
@@ -315,4 +315,25 @@ fn buffers_that_are_too_small_grow_and_large_batches_are_split() {
     // A picture's needs do not depend on the sums' being there first.
     session.budget = 1 << 30;
     assert_eq!(session.linearise(&hypotheses).unwrap(), expected);
+}
+
+#[test]
+fn a_lost_device_is_an_error_and_the_processor_takes_over() {
+    if gpu("a_lost_device_is_an_error_and_the_processor_takes_over").is_none() {
+        return;
+    }
+    // Of its own: the others share theirs.
+    let gpu = Gpu::with_software().unwrap();
+    let Case { mut problem, hypotheses, .. } = cases().remove(0);
+    let mut bare = gpu.prepare(&problem).unwrap();
+    let mut safe = WithFallback(gpu.clone()).prepare(&problem).unwrap();
+    let (expected, ours) = (problem.linearise(&hypotheses).unwrap(), safe.linearise(&hypotheses));
+    assert!(ours.unwrap().iter().zip(&expected).all(|(g, c)| errors(c, g)[1] < 1e-4));
+    bare.linearise(&hypotheses).unwrap();
+    gpu.device.device.destroy();
+    let lost = bare.linearise(&hypotheses);
+    assert!(matches!(lost, Err(BackendError::Device { .. })), "{lost:?}");
+    assert_eq!(safe.linearise(&hypotheses).unwrap(), expected);
+    assert_eq!(safe.render(&hypotheses[0]).unwrap(), problem.render(&hypotheses[0]).unwrap());
+    assert!(matches!(gpu.prepare(&problem), Err(BackendError::Device { .. })));
 }
