@@ -64,7 +64,8 @@ fn soft_face(h: u32, face: u32) -> SoftFace {
     }
     out.least_sum = LEAST_SHARE_SUM * share.x * share.y * share.z * abs(area);
     out.share = select(share, -share, area < 0.0);
-    out.seen_inside = select(0u, 1u, area > 0.0);
+    // A closed surface is lit by its outward normals on both sides: a face that turns over must not jump.
+    out.seen_inside = select(0u, 1u, area > 0.0 && params.closed == 0u);
     return out;
 }
 

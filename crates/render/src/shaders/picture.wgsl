@@ -11,7 +11,7 @@ fn store_picture(h: u32, pixel: Pixel, at: vec2<u32>) {
     if pixel.hit {
         let c = face_screen(h, pixel.face);
         let b = barycentric(c, vec2<f32>(at) - hypotheses[h].image_center.xy);
-        let seen_inside = signed_area(c) > 0.0;
+        let seen_inside = signed_area(c) > 0.0 && params.closed == 0u;
         normal = hypotheses[h].rotation * normal_at(pixel.face, b, seen_inside).xyz;
     }
     let first = PICTURE_COLUMNS * (at.y * params.size.x + at.x);

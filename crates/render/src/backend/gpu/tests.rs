@@ -144,6 +144,8 @@ fn softras(change: impl Fn(&mut SoftRasOptions)) -> Mode {
 fn softras_cases() -> Vec<Case> {
     let none = Vector3::zeros();
     let (plain, full) = (LossOptions::default(), full_options());
+    // More faces near a pixel than are kept.
+    let dense = painted(lump(0.045, 90), 0.05);
     let lump = painted(lump(0.045, 24), 0.05);
     let torus = painted(torus(0.04, 0.015, 20), 0.05);
     let usual = softras(|_| ());
@@ -154,6 +156,7 @@ fn softras_cases() -> Vec<Case> {
     let robust = LossOptions { robust: Robust::Cauchy(0.1), ..full };
     vec![
         case("soft lump", &lump, lamp(), usual, full, none, 3),
+        case("soft dense lump", &dense, lamp(), usual, full, none, 2),
         case("soft textured box", &textured_box(), Light::ambient(0.9), usual, plain, none, 3),
         case("soft open box", &without_two_faces(), lamp(), usual, full, none, 3),
         case("soft torus, three faces", &torus, lamp(), few, full, none, 2),
