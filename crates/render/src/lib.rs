@@ -29,6 +29,8 @@ pub mod shading;
 mod shapes_for_tests;
 mod softras;
 
+#[cfg(feature = "gpu")]
+pub use backend::Gpu;
 pub use backend::{Backend, BackendError, Cpu, Hypothesis, PoseProblem, Session};
 pub use camera::{Camera, CameraError};
 pub use contour::light_samples;

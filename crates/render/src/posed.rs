@@ -7,7 +7,7 @@ use crate::model::RenderModel;
 use crate::projected::Projected;
 
 /// Geometry nearer to the camera plane than this is not drawn \[m\].
-const NEAR: f32 = 1e-3;
+pub(crate) const NEAR: f32 = 1e-3;
 
 /// A model transformed into the camera frame and projected, in f32.
 pub(crate) struct Posed<'a> {

@@ -26,4 +26,12 @@ pub enum BackendError {
         /// Bytes the device allows.
         limit: u64,
     },
+    /// The device's passes do not know an option.
+    #[error("{device} does not support {what}")]
+    Unsupported {
+        /// The device's name.
+        device: String,
+        /// The option.
+        what: &'static str,
+    },
 }

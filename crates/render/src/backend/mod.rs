@@ -1,14 +1,20 @@
 //! Where poses are compared with an image: this processor, or a graphics device.
 
+mod auto;
 mod cpu;
 mod error;
+#[cfg(feature = "gpu")]
+mod gpu;
 
 use std::sync::Arc;
 
 use nalgebra::Isometry3;
 
+pub use auto::{WithFallback, auto};
 pub use cpu::Cpu;
 pub use error::BackendError;
+#[cfg(feature = "gpu")]
+pub use gpu::Gpu;
 
 use crate::light::Light;
 use crate::model::RenderModel;

@@ -59,6 +59,12 @@ impl Mipmap {
         (self.levels.len() - 1) as f32
     }
 
+    /// Columns, rows and row-major texels of each level, from the finest on.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn levels(&self) -> impl ExactSizeIterator<Item = (usize, usize, &[[f32; 3]])> {
+        self.levels.iter().map(|l| (l.width, l.height, l.texels.as_slice()))
+    }
+
     /// Colour at texture coordinates (`u`, `v`) (v up, repeating) on pyramid level `level` (0 the finest,
     /// fractions blend).
     #[inline]

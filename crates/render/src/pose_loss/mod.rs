@@ -8,7 +8,7 @@ mod residuals;
 mod sums;
 mod target;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 
 use nalgebra::{Isometry3, Matrix6, Point3, Vector6};
 

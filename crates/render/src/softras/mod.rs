@@ -51,7 +51,7 @@ use crate::projected::Region;
 use candidates::{Candidates, RUN};
 use face::Face;
 use pixel::{Scene, Scratch};
-use settings::Settings;
+pub(crate) use settings::Settings;
 
 /// Rows whose faces are listed together.
 const BAND: usize = 8;

@@ -17,15 +17,15 @@ use prehend_geometry::shapes::{cuboid, sphere};
 use prehend_geometry::{Texture, TriMesh};
 use std::sync::Arc;
 
-fn camera() -> Camera {
+pub(crate) fn camera() -> Camera {
     Camera { fx: 300.0, fy: 310.0, cx: 79.0, cy: 60.5, width: 160, height: 120 }
 }
 
 /// A deterministic sequence in -1..=1.
-struct Noise(u64);
+pub(crate) struct Noise(pub(crate) u64);
 
 impl Noise {
-    fn next(&mut self) -> f64 {
+    pub(crate) fn next(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         (self.0 >> 11) as f64 / (1u64 << 52) as f64 - 1.0
     }
@@ -35,7 +35,7 @@ impl Noise {
     }
 }
 
-fn pose(noise: &mut Noise) -> Isometry3<f64> {
+pub(crate) fn pose(noise: &mut Noise) -> Isometry3<f64> {
     Isometry3::from_parts(
         Translation3::from(Vector3::new(0.0, 0.0, 0.45) + noise.vector(0.01)),
         UnitQuaternion::from_scaled_axis(noise.vector(2.0)),
@@ -43,7 +43,11 @@ fn pose(noise: &mut Noise) -> Isometry3<f64> {
 }
 
 /// The pose after a small twist about `center`.
-fn twisted(pose: &Isometry3<f64>, center: &Point3<f64>, twist: &[f64; 6]) -> Isometry3<f64> {
+pub(crate) fn twisted(
+    pose: &Isometry3<f64>,
+    center: &Point3<f64>,
+    twist: &[f64; 6],
+) -> Isometry3<f64> {
     let turn = UnitQuaternion::from_scaled_axis(Vector3::new(twist[3], twist[4], twist[5]));
     let shift = Vector3::new(twist[0], twist[1], twist[2]);
     let center = Translation3::from(center.coords);
@@ -57,7 +61,7 @@ fn unit(axis: usize, step: f64) -> [f64; 6] {
 }
 
 /// A box with a smooth texture, projected obliquely so that it runs on across the edges.
-fn textured_box() -> TriMesh {
+pub(crate) fn textured_box() -> TriMesh {
     let mut mesh = cuboid(Vector3::new(0.06, 0.08, 0.1));
     let uv = |p: &Point3<f64>| {
         [0.5 + 4.0 * (p.x + 0.6 * p.z), 0.5 + 4.0 * (p.y - 0.5 * p.z + 0.2 * p.x)]
@@ -73,14 +77,14 @@ fn textured_box() -> TriMesh {
     mesh
 }
 
-fn lamp() -> Light {
+pub(crate) fn lamp() -> Light {
     let mut light = Light::headlight(0.4, 0.5);
     light.directional[0] += Vector3::new(0.2, -0.1, 0.0);
     light.directional[2] += Vector3::new(-0.1, -0.3, 0.1);
     light
 }
 
-fn target_of(
+pub(crate) fn target_of(
     model: &RenderModel,
     pose: &Isometry3<f64>,
     light: &Light,
@@ -133,7 +137,7 @@ fn contour(half_width: f64) -> Mode {
     Mode::Contour(ContourOptions { half_width })
 }
 
-fn full_options() -> LossOptions {
+pub(crate) fn full_options() -> LossOptions {
     LossOptions {
         mask_weight: 0.5,
         depth: Some(DepthOptions { weight: 1.0, scale: 0.02, truncation: 0.03 }),

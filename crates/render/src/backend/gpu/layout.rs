@@ -1,0 +1,150 @@
+//! The structs shared with the shaders, field by field as in `shaders/problem.wgsl` and `shaders/work.wgsl`.
+//!
+//! Vectors of three take sixteen bytes there unless a scalar follows.
+
+use bytemuck::{Pod, Zeroable};
+
+/// Most levels of a texture's pyramid: enough for 8 million texels a side.
+pub(super) const LEVELS: usize = 24;
+
+/// How the unlit colours are stored.
+pub(super) const ALBEDO_UNIFORM: u32 = 0;
+pub(super) const ALBEDO_CORNERS: u32 = 1;
+pub(super) const ALBEDO_TEXTURE: u32 = 2;
+
+/// Robust costs.
+pub(super) const ROBUST_NONE: u32 = 0;
+pub(super) const ROBUST_HUBER: u32 = 1;
+pub(super) const ROBUST_CAUCHY: u32 = 2;
+
+/// Flags of the SoftRas mode.
+pub(super) const SOFT_MODE: u32 = 1;
+pub(super) const SOFT_PERSPECTIVE: u32 = 2;
+pub(super) const SOFT_CLIP: u32 = 4;
+pub(super) const SOFT_CULL: u32 = 8;
+
+/// Pixels along a tile's side.
+pub(super) const TILE: usize = 8;
+
+/// Columns of the sums of a hypothesis.
+pub(super) const SUM_COLOR: usize = 0;
+pub(super) const SUM_MASK: usize = 1;
+pub(super) const SUM_DEPTH: usize = 2;
+pub(super) const SUM_GRADIENT: usize = 3;
+pub(super) const SUM_JTJ: usize = 9;
+pub(super) const SUM_COVERED: usize = 30;
+pub(super) const SUM_CONTOUR: usize = 31;
+pub(super) const SUM_HIDDEN: usize = 32;
+pub(super) const SUM_MISSED: usize = 33;
+pub(super) const SUM_WITH_DEPTH: usize = 34;
+pub(super) const SUM_COLUMNS: usize = 35;
+
+/// Colour, coverage, depth, normal and face plus one of a pixel of a picture.
+pub(super) const PICTURE_COLUMNS: usize = 9;
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+pub(super) struct Params {
+    pub(super) size: [u32; 2],
+    pub(super) tiles: [u32; 2],
+    pub(super) focal: [f32; 2],
+    pub(super) principal: [f32; 2],
+    pub(super) bounds: [u32; 4],
+    pub(super) vertices: u32,
+    pub(super) faces: u32,
+    pub(super) edges: u32,
+    pub(super) hypotheses: u32,
+    pub(super) entry_capacity: u32,
+    pub(super) segment_capacity: u32,
+    pub(super) piece_capacity: u32,
+    pub(super) closed: u32,
+    pub(super) albedo_kind: u32,
+    pub(super) levels: u32,
+    pub(super) margin: f32,
+    pub(super) half_width: f32,
+    pub(super) albedo: [f32; 3],
+    pub(super) least_step: f32,
+    pub(super) color_weight: f32,
+    pub(super) mask_weight: f32,
+    pub(super) depth_weight: f32,
+    pub(super) depth_scale: f32,
+    pub(super) depth_truncation: f32,
+    pub(super) robust_kind: u32,
+    pub(super) robust_scale: f32,
+    pub(super) hidden_is_missed: u32,
+    pub(super) reach: f32,
+    pub(super) blur: f32,
+    pub(super) sharpness: f32,
+    pub(super) depth_rate: f32,
+    pub(super) farthest: f32,
+    pub(super) least_area: f32,
+    pub(super) faces_per_pixel: u32,
+    pub(super) soft_flags: u32,
+    pub(super) level: [[u32; 4]; LEVELS],
+}
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+pub(super) struct Hypothesis {
+    /// Columns, the fourth entries unused; likewise below.
+    pub(super) rotation: [[f32; 4]; 3],
+    pub(super) center: [f32; 3],
+    pub(super) alive: u32,
+    pub(super) camera_light: [[f32; 4]; 3],
+    pub(super) object_light: [[f32; 4]; 3],
+    pub(super) ambient: [f32; 3],
+    pub(super) flat_light: u32,
+    pub(super) offset: [f32; 3],
+    pub(super) level: f32,
+    pub(super) level_dz: f32,
+    pub(super) pad: [u32; 3],
+    pub(super) image_center: [f32; 4],
+}
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+pub(super) struct Corner {
+    pub(super) normal: [f32; 3],
+    pub(super) pad: u32,
+    pub(super) paint: [f32; 3],
+    pub(super) pad_2: u32,
+}
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+pub(super) struct Edge {
+    pub(super) vertices: [u32; 2],
+    pub(super) face: u32,
+    pub(super) other: u32,
+    pub(super) corner: u32,
+    pub(super) other_corner: u32,
+}
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+pub(super) struct TargetPixel {
+    pub(super) color: [f32; 3],
+    pub(super) coverage: f32,
+    pub(super) depth: f32,
+    pub(super) occluder: f32,
+    pub(super) pad: [u32; 2],
+}
+
+/// The front of what is read back; floats follow.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub(super) struct Usage {
+    pub(super) entries: u32,
+    pub(super) segments: u32,
+    pub(super) pieces: u32,
+    pub(super) unused: u32,
+}
+
+/// Sizes of what only the shaders read and write \[bytes\].
+pub(super) const SCREEN: usize = 16;
+pub(super) const TALLY: usize = 28;
+pub(super) const BIN: usize = 12;
+pub(super) const ENTRY: usize = 4;
+pub(super) const VISIBLE: usize = 8;
+pub(super) const SEGMENT: usize = 32;
+pub(super) const PIECE: usize = 64;

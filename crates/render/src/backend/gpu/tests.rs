@@ -1,0 +1,349 @@
+//! The processor and the graphics device agree. Without a Vulkan device these tests are skipped, or fail if the
+//! environment variable `PREHEND_REQUIRE_GPU` is `1`.
+
+use std::sync::{Arc, OnceLock};
+
+use nalgebra::{Isometry3, Vector3, Vector6};
+use prehend_geometry::TriMesh;
+use prehend_geometry::shapes::cuboid;
+
+use super::session::GpuSession;
+use super::work::Capacity;
+use super::*;
+use crate::backend::{Hypothesis, WithFallback};
+use crate::image::DepthImage;
+use crate::light::Light;
+use crate::mode::{ContourOptions, Mode, SoftRasOptions};
+use crate::model::RenderModel;
+use crate::pose_loss::tests::{
+    Noise, camera, full_options, lamp, pose, target_of, textured_box, twisted,
+};
+use crate::pose_loss::{Linearised, LossOptions, PoseLoss, Robust};
+use crate::raster::depth_map;
+use crate::shapes_for_tests::{lump, painted, torus};
+
+/// The device, or `None` to skip the test called `test`.
+fn gpu(test: &str) -> Option<Gpu> {
+    static GPU: OnceLock<Result<Gpu, BackendError>> = OnceLock::new();
+    match GPU.get_or_init(Gpu::with_software) {
+        Ok(gpu) => Some(gpu.clone()),
+        Err(error) => {
+            assert!(matches!(error, BackendError::NoDevice(_)), "{test}: {error}");
+            let required = std::env::var("PREHEND_REQUIRE_GPU").is_ok_and(|v| v == "1");
+            assert!(!required, "{test}: {error}");
+            println!("{test} skipped: {error}");
+            None
+        }
+    }
+}
+
+fn without_two_faces() -> TriMesh {
+    let mut mesh = cuboid(Vector3::new(0.06, 0.08, 0.1));
+    let nearest = |f: &[u32; 3]| f.iter().all(|v| mesh.vertices[*v as usize].z < 0.0);
+    mesh.faces = mesh.faces.iter().copied().filter(|f| !nearest(f)).collect();
+    mesh
+}
+
+/// A problem with poses to try.
+struct Case {
+    name: &'static str,
+    problem: PoseProblem,
+    hypotheses: Vec<Hypothesis>,
+}
+
+fn case(
+    name: &'static str,
+    mesh: &TriMesh,
+    light: Light,
+    mode: Mode,
+    options: LossOptions,
+    shift: Vector3<f64>,
+    count: usize,
+) -> Case {
+    let model = RenderModel::new(mesh).unwrap();
+    let mut noise = Noise(700);
+    let mut truth = pose(&mut noise);
+    truth.translation.vector += shift;
+    let target = target_of(&model, &truth, &light, None, 0.5);
+    let center = truth * model.center();
+    let hypotheses = (0..count).map(|_| {
+        let twist = [0, 1, 2, 3, 4, 5].map(|i| noise.next() * if i < 3 { 0.006 } else { 0.15 });
+        Hypothesis { t_cam_object: twisted(&truth, &center, &twist), light }
+    });
+    let hypotheses = hypotheses.collect();
+    let loss = PoseLoss::new(mode, options);
+    let problem = PoseProblem { model: Arc::new(model), target: Arc::new(target), loss };
+    Case { name, problem, hypotheses }
+}
+
+fn with_occluder(mut case: Case) -> Case {
+    let bar = RenderModel::new(&cuboid(Vector3::new(0.024, 0.2, 0.02))).unwrap();
+    let hand = depth_map(&camera(), &[(&bar, Isometry3::translation(0.005, 0.0, 0.3))]);
+    let target = (*case.problem.target).clone().with_occluder(hand).unwrap();
+    case.problem.target = Arc::new(target);
+    case
+}
+
+fn contour(half_width: f64) -> Mode {
+    Mode::Contour(ContourOptions { half_width })
+}
+
+fn cases() -> Vec<Case> {
+    let none = Vector3::zeros();
+    let (plain, full) = (LossOptions::default(), full_options());
+    let lump = painted(lump(0.045, 60), 0.05);
+    let torus = painted(torus(0.04, 0.015, 60), 0.05);
+    let robust = |robust: Robust| LossOptions { robust, ..full };
+    let hidden = LossOptions { hidden_is_missed: true, ..robust(Robust::Huber(0.05)) };
+    let one = contour(1.0);
+    vec![
+        case("painted lump", &lump, lamp(), one, plain, none, 4),
+        case("textured box", &textured_box(), Light::ambient(0.9), one, plain, none, 4),
+        case("lit textured box", &textured_box(), lamp(), contour(0.645), full, none, 4),
+        case("torus", &torus, lamp(), one, full, none, 6),
+        case("torus, wide band", &torus, lamp(), contour(4.0), full, none, 4),
+        case("open box", &without_two_faces(), lamp(), one, full, none, 4),
+        case("Cauchy", &lump, lamp(), contour(1.5), robust(Robust::Cauchy(0.1)), none, 2),
+        with_occluder(case("occluder", &lump, lamp(), one, robust(Robust::Huber(0.05)), none, 4)),
+        with_occluder(case("hidden is missed", &lump, lamp(), one, hidden, none, 2)),
+        case("right border", &lump, lamp(), one, full, Vector3::new(0.11, 0.0, 0.0), 3),
+        case("corner", &torus, lamp(), one, full, Vector3::new(-0.1, -0.08, 0.0), 3),
+        case("near", &lump, lamp(), one, full, Vector3::new(0.0, 0.0, -0.3), 3),
+        case("near box", &textured_box(), lamp(), one, full, Vector3::new(0.0, 0.0, -0.35), 3),
+    ]
+}
+
+/// Norm of the difference over the norm of the first.
+fn error(a: impl Iterator<Item = f64>, b: impl Iterator<Item = f64>) -> f64 {
+    let (mut difference, mut size) = (0.0, 0.0);
+    for (a, b) in a.zip(b) {
+        difference += (a - b) * (a - b);
+        size += a * a;
+    }
+    if difference == 0.0 { 0.0 } else { (difference / size).sqrt() }
+}
+
+/// Relative errors of the loss, the gradient and JᵀJ, with rotations scaled to lengths at 4 cm.
+fn errors(cpu: &Linearised, gpu: &Linearised) -> [f64; 3] {
+    let s = Vector6::new(1.0, 1.0, 1.0, 25.0, 25.0, 25.0);
+    let gradient = |l: &Linearised| l.gradient.component_mul(&s);
+    let jtj = |l: &Linearised| l.jtj.component_mul(&(s * s.transpose()));
+    [
+        error([cpu.loss.total].into_iter(), [gpu.loss.total].into_iter()),
+        error(gradient(cpu).iter().copied(), gradient(gpu).iter().copied()),
+        error(jtj(cpu).iter().copied(), jtj(gpu).iter().copied()),
+    ]
+}
+
+fn softras(change: impl Fn(&mut SoftRasOptions)) -> Mode {
+    let mut options = SoftRasOptions::default();
+    change(&mut options);
+    Mode::SoftRas(options)
+}
+
+fn softras_cases() -> Vec<Case> {
+    let none = Vector3::zeros();
+    let (plain, full) = (LossOptions::default(), full_options());
+    // More faces near a pixel than are kept.
+    let dense = painted(lump(0.045, 90), 0.05);
+    let lump = painted(lump(0.045, 24), 0.05);
+    let torus = painted(torus(0.04, 0.015, 20), 0.05);
+    let usual = softras(|_| ());
+    let few = softras(|o| o.faces_per_pixel = 3);
+    let wide = softras(|o| (o.sigma, o.blur_radius, o.gamma) = (1e-3, 5e-3, 1e-3));
+    let flat = softras(|o| o.perspective_correct = false);
+    let culled = softras(|o| o.cull_backfaces = true);
+    let robust = LossOptions { robust: Robust::Cauchy(0.1), ..full };
+    vec![
+        case("soft lump", &lump, lamp(), usual, full, none, 3),
+        case("soft dense lump", &dense, lamp(), usual, full, none, 2),
+        case("soft textured box", &textured_box(), Light::ambient(0.9), usual, plain, none, 3),
+        case("soft open box", &without_two_faces(), lamp(), usual, full, none, 3),
+        case("soft torus, three faces", &torus, lamp(), few, full, none, 2),
+        case("soft torus, wide", &torus, lamp(), wide, robust, none, 2),
+        case("soft box, no perspective", &textured_box(), lamp(), flat, full, none, 2),
+        with_occluder(case("soft lump, culled", &lump, lamp(), culled, full, none, 2)),
+        case("soft corner", &torus, lamp(), usual, full, Vector3::new(-0.1, -0.08, 0.0), 2),
+    ]
+}
+
+#[test]
+fn the_contour_mode_agrees_with_the_processor() {
+    agree("the_contour_mode_agrees_with_the_processor", cases());
+}
+
+#[test]
+fn the_softras_mode_agrees_with_the_processor() {
+    agree("the_softras_mode_agrees_with_the_processor", softras_cases());
+}
+
+/// Pictures, losses and derivatives of all cases.
+fn agree(test: &str, cases: Vec<Case>) {
+    let Some(gpu) = gpu(test) else { return };
+    let (mut pixels, mut ties) = (0, 0);
+    for Case { name, mut problem, hypotheses } in cases {
+        let mut session = gpu.prepare(&problem).unwrap();
+        // Pixels at which rounding decides what is seen are set aside by hiding them from both.
+        let mut tied = problem.target.occluder.clone();
+        let mut worst_image = 0.0f64;
+        for h in &hypotheses {
+            let (cpu, gpu) = (problem.render(h).unwrap(), session.render(h).unwrap());
+            let mut kept = (Vec::new(), Vec::new());
+            for at in 0..cpu.coverage.len() {
+                let values = [&cpu, &gpu].map(|image| {
+                    let [r, g, b] = image.color.pixels()[at];
+                    [r, g, b, image.coverage[at], image.depth.pixels()[at]].map(f64::from)
+                });
+                let differ = (0..5).any(|k| (values[0][k] - values[1][k]).abs() > 2e-3);
+                pixels += 1;
+                if differ {
+                    ties += 1;
+                    let (width, height) = (cpu.color.width(), cpu.color.height());
+                    tied.get_or_insert_with(|| DepthImage::filled(width, height, 0.0))
+                        .pixels_mut()[at] = 1e-6;
+                } else {
+                    kept.0.extend(values[0]);
+                    kept.1.extend(values[1]);
+                }
+            }
+            for at in 0..cpu.face.len() {
+                if cpu.face[at] != gpu.face[at] {
+                    ties += 1;
+                    continue;
+                }
+                let difference = (0..3).map(|k| (cpu.normal[at][k] - gpu.normal[at][k]).abs());
+                assert!(difference.fold(0.0, f32::max) < 1e-4, "{name}: normal");
+            }
+            worst_image = worst_image.max(error(kept.0.into_iter(), kept.1.into_iter()));
+        }
+        if let Some(tied) = tied {
+            let target = (*problem.target).clone().with_occluder(tied).unwrap();
+            problem.target = Arc::new(target);
+        }
+        let mut session = gpu.prepare(&problem).unwrap();
+        let cpu = problem.linearise(&hypotheses).unwrap();
+        let gpu = session.linearise(&hypotheses).unwrap();
+        let mut worst = [0.0f64; 3];
+        for (c, g) in cpu.iter().zip(&gpu) {
+            let errors = errors(c, g);
+            (0..3).for_each(|i| worst[i] = worst[i].max(errors[i]));
+            assert_eq!(c.loss.counts, g.loss.counts, "{name}");
+        }
+        println!("{name}: image {worst_image:.1e}, loss, gradient, JtJ {worst:?}");
+        assert!(worst_image < 1e-4 && worst.iter().all(|e| *e < 1e-4), "{name}");
+        // Without derivatives the losses are the same.
+        let values = session.evaluate(&hypotheses).unwrap();
+        for (value, linearised) in values.iter().zip(&gpu) {
+            let difference = (value.total - linearised.loss.total).abs();
+            assert!(difference <= 1e-6 * value.total, "{name}");
+        }
+    }
+    println!("{ties} of {pixels} pixels set aside");
+    assert!(ties as f64 <= 1e-4 * pixels as f64, "{ties} of {pixels}");
+}
+
+#[test]
+fn what_cannot_be_seen_misses_the_whole_mask() {
+    let Some(gpu) = gpu("what_cannot_be_seen_misses_the_whole_mask") else { return };
+    let Case { mut problem, hypotheses, .. } = cases().remove(0);
+    let poses = [
+        Isometry3::translation(0.0, 0.0, -0.4),
+        Isometry3::translation(9.0, 0.0, 0.4),
+        Isometry3::translation(f64::NAN, 0.0, 0.4),
+        Isometry3::translation(0.0, f64::INFINITY, 0.4),
+        Isometry3::translation(0.0, 0.0, 1e30),
+    ];
+    // A good pose among the bad ones keeps its result.
+    let mut all: Vec<Hypothesis> =
+        poses.iter().map(|p| Hypothesis { t_cam_object: *p, light: lamp() }).collect();
+    all.insert(2, hypotheses[0]);
+    let mut session = gpu.prepare(&problem).unwrap();
+    let (cpu, gpu) = (problem.linearise(&all).unwrap(), session.linearise(&all).unwrap());
+    for (i, (c, g)) in cpu.iter().zip(&gpu).enumerate() {
+        assert_eq!(c.loss.counts, g.loss.counts, "{i}");
+        assert!(errors(c, g).iter().all(|e| *e < 1e-4), "{i}: {c:?} {g:?}");
+        if i != 2 {
+            assert_eq!((g.gradient.norm(), g.jtj.norm()), (0.0, 0.0));
+        }
+    }
+    // The camera inside the object, and in its surface: whatever is seen, everything stays finite.
+    let inside = [0.0, 0.03, 0.046, 0.06]
+        .map(|z| Hypothesis { t_cam_object: Isometry3::translation(0.0, 0.0, z), light: lamp() });
+    for at in session.linearise(&inside).unwrap() {
+        assert!(at.loss.total.is_finite() && at.gradient.iter().all(|v| v.is_finite()));
+        assert!(at.jtj.iter().all(|v| v.is_finite()));
+    }
+    assert_eq!(session.linearise(&[]).unwrap(), []);
+}
+
+#[test]
+fn results_repeat_to_the_bit_whatever_the_batch() {
+    let Some(gpu) = gpu("results_repeat_to_the_bit_whatever_the_batch") else { return };
+    let full = full_options();
+    let mesh = painted(torus(0.04, 0.015, 40), 0.05);
+    let Case { problem, hypotheses, .. } =
+        case("torus", &mesh, lamp(), contour(1.0), full, Vector3::zeros(), 70);
+    let mut session = gpu.prepare(&problem).unwrap();
+    let all = session.linearise(&hypotheses).unwrap();
+    assert_eq!(session.linearise(&hypotheses).unwrap(), all);
+    for (i, h) in hypotheses.iter().enumerate().step_by(23) {
+        assert_eq!(session.linearise(std::slice::from_ref(h)).unwrap()[0], all[i], "{i}");
+    }
+    assert_eq!(session.linearise(&hypotheses[3..50]).unwrap(), all[3..50]);
+    let mut cpu = problem.clone();
+    let worst =
+        cpu.linearise(&hypotheses).unwrap().iter().zip(&all).fold([0.0f64; 3], |w, (c, g)| {
+            let e = errors(c, g);
+            std::array::from_fn(|i| w[i].max(e[i]))
+        });
+    println!("70 hypotheses: loss, gradient, JtJ {worst:?}");
+}
+
+#[test]
+fn buffers_that_are_too_small_grow_and_large_batches_are_split() {
+    let Some(gpu) = gpu("buffers_that_are_too_small_grow_and_large_batches_are_split") else {
+        return;
+    };
+    let mesh = painted(torus(0.04, 0.015, 30), 0.05);
+    let Case { problem, hypotheses, .. } =
+        case("torus", &mesh, lamp(), contour(1.0), full_options(), Vector3::zeros(), 9);
+    let expected = gpu.prepare(&problem).unwrap().linearise(&hypotheses).unwrap();
+    let mut session = GpuSession::new(gpu.device.clone(), &problem).unwrap();
+    session.capacity = Capacity { entries: 1, segments: 1, pieces: 1 };
+    let grown = session.linearise(&hypotheses).unwrap();
+    assert_eq!(grown, expected);
+    assert!(session.capacity.segments > 50 && session.capacity.pieces > 50);
+    // Enough for two hypotheses at a time.
+    session.budget = 3_000_000;
+    assert_eq!(session.linearise(&hypotheses).unwrap(), expected);
+    session.capacity = Capacity { entries: 1, segments: 1, pieces: 1 };
+    let picture = session.render(&hypotheses[0]).unwrap();
+    assert_eq!(picture, gpu.prepare(&problem).unwrap().render(&hypotheses[0]).unwrap());
+    // Not enough for one.
+    session.budget = 1000;
+    assert!(matches!(session.evaluate(&hypotheses), Err(BackendError::TooLarge { .. })));
+    // A picture's needs do not depend on the sums' being there first.
+    session.budget = 1 << 30;
+    assert_eq!(session.linearise(&hypotheses).unwrap(), expected);
+}
+
+#[test]
+fn a_lost_device_is_an_error_and_the_processor_takes_over() {
+    if gpu("a_lost_device_is_an_error_and_the_processor_takes_over").is_none() {
+        return;
+    }
+    // Of its own: the others share theirs.
+    let gpu = Gpu::with_software().unwrap();
+    let Case { mut problem, hypotheses, .. } = cases().remove(0);
+    let mut bare = gpu.prepare(&problem).unwrap();
+    let mut safe = WithFallback(gpu.clone()).prepare(&problem).unwrap();
+    let (expected, ours) = (problem.linearise(&hypotheses).unwrap(), safe.linearise(&hypotheses));
+    assert!(ours.unwrap().iter().zip(&expected).all(|(g, c)| errors(c, g)[1] < 1e-4));
+    bare.linearise(&hypotheses).unwrap();
+    gpu.device.device.destroy();
+    let lost = bare.linearise(&hypotheses);
+    assert!(matches!(lost, Err(BackendError::Device { .. })), "{lost:?}");
+    assert_eq!(safe.linearise(&hypotheses).unwrap(), expected);
+    assert_eq!(safe.render(&hypotheses[0]).unwrap(), problem.render(&hypotheses[0]).unwrap());
+    assert!(matches!(gpu.prepare(&problem), Err(BackendError::Device { .. })));
+}

@@ -1,0 +1,205 @@
+//! Models, targets, settings and hypotheses in the form that the shaders read.
+
+use super::layout::{
+    ALBEDO_CORNERS, ALBEDO_TEXTURE, ALBEDO_UNIFORM, Corner, Edge, Hypothesis, LEVELS, Params,
+    ROBUST_CAUCHY, ROBUST_HUBER, ROBUST_NONE, SOFT_CLIP, SOFT_CULL, SOFT_MODE, SOFT_PERSPECTIVE,
+    TILE, TargetPixel,
+};
+use crate::backend::{self, PoseProblem};
+use crate::camera::Camera;
+use crate::contour::LEAST_STEP;
+use crate::mode::{Mode, SoftRasOptions};
+use crate::model::{Albedo, RenderModel};
+use crate::pose_loss::{LossOptions, Robust, Target};
+use crate::posed;
+use crate::projected::Region;
+use crate::softras::Settings;
+
+/// Positions, mesh frame [m].
+pub(super) fn positions(model: &RenderModel) -> Vec<[f32; 4]> {
+    model.positions.iter().map(|p| [p.x, p.y, p.z, 0.0]).collect()
+}
+
+/// Vertices of each face.
+pub(super) fn faces(model: &RenderModel) -> Vec<[u32; 4]> {
+    model.faces.iter().map(|&[a, b, c]| [a, b, c, 0]).collect()
+}
+
+/// Normal and colour or texture coordinates of each corner, three a face.
+pub(super) fn corners(model: &RenderModel) -> Vec<Corner> {
+    let paint = |face: usize, k: usize| match &model.albedo {
+        Albedo::Uniform(_) => [0.0; 3],
+        Albedo::Corners(colors) => colors[face][k],
+        Albedo::Texture(_, uvs) => [uvs[face][k][0], uvs[face][k][1], 0.0],
+    };
+    let corner = |face: usize, k: usize| Corner {
+        normal: model.normals[face][k].into(),
+        pad: 0,
+        paint: paint(face, k),
+        pad_2: 0,
+    };
+    (0..model.faces.len()).flat_map(|f| (0..3).map(move |k| corner(f, k))).collect()
+}
+
+/// Edges with their faces.
+pub(super) fn edges(model: &RenderModel) -> Vec<Edge> {
+    let edge = |e: &crate::model::Edge| Edge {
+        vertices: e.vertices,
+        face: e.face,
+        other: e.other,
+        corner: e.corner.into(),
+        other_corner: e.other_corner.into(),
+    };
+    model.edges.iter().map(edge).collect()
+}
+
+/// Texels of all levels of the pyramid, with 21 bits a channel: twice as compact as floats, and as exact as matters.
+pub(super) fn texels(model: &RenderModel) -> Vec<[u32; 2]> {
+    let Albedo::Texture(map, _) = &model.albedo else { return Vec::new() };
+    let pack = |texel: &[f32; 3]| {
+        let [r, g, b] = texel.map(|v| (f64::from(v.clamp(0.0, 1.0)) * 2_097_151.0).round() as u32);
+        [r | (g << 21), (g >> 11) | (b << 10)]
+    };
+    map.levels().flat_map(|(_, _, texels)| texels.iter().map(pack)).collect()
+}
+
+/// The target, pixel by pixel.
+pub(super) fn target(target: &Target) -> Vec<TargetPixel> {
+    let pixel = |(at, (&color, &coverage)): (usize, (&[f32; 3], &f32))| TargetPixel {
+        color,
+        coverage,
+        depth: target.depth.as_ref().map_or(0.0, |d| d.pixels()[at]),
+        occluder: target.occluder.as_ref().map_or(0.0, |o| o.pixels()[at]),
+        pad: [0; 2],
+    };
+    target.color.iter().zip(&target.coverage).enumerate().map(pixel).collect()
+}
+
+/// The settings, without what a call decides. `None` if the texture has too many levels.
+pub(super) fn params(problem: &PoseProblem) -> Option<Params> {
+    let PoseProblem { model, target, loss } = problem;
+    let camera = &target.camera;
+    let mut params: Params = bytemuck::Zeroable::zeroed();
+    params.size = [camera.width, camera.height].map(|v| v as u32);
+    params.tiles = [camera.width, camera.height].map(|v| v.div_ceil(TILE) as u32);
+    params.focal = [camera.fx, camera.fy].map(|v| v as f32);
+    params.principal = [camera.cx, camera.cy].map(|v| v as f32);
+    params.bounds = bounds(&target.bounds);
+    params.vertices = model.positions.len() as u32;
+    params.faces = model.faces.len() as u32;
+    params.edges = model.edges.len() as u32;
+    params.closed = model.closed.into();
+    params.least_step = LEAST_STEP * model.radius() as f32;
+    set_albedo(&mut params, model)?;
+    set_mode(&mut params, &loss.mode, camera);
+    set_loss(&mut params, &loss.options, target.depth.is_some());
+    Some(params)
+}
+
+pub(super) fn bounds(region: &Region) -> [u32; 4] {
+    [region.x0, region.y0, region.x1, region.y1].map(|v| v as u32)
+}
+
+fn set_albedo(params: &mut Params, model: &RenderModel) -> Option<()> {
+    match &model.albedo {
+        Albedo::Uniform(color) => {
+            params.albedo_kind = ALBEDO_UNIFORM;
+            params.albedo = *color;
+        }
+        Albedo::Corners(_) => params.albedo_kind = ALBEDO_CORNERS,
+        Albedo::Texture(map, _) => {
+            params.albedo_kind = ALBEDO_TEXTURE;
+            params.levels = map.levels().len() as u32;
+            if map.levels().len() > LEVELS {
+                return None;
+            }
+            let mut first = 0;
+            for (entry, (width, height, texels)) in params.level.iter_mut().zip(map.levels()) {
+                *entry = [first as u32, width as u32, height as u32, 0];
+                first += texels.len();
+            }
+        }
+    }
+    Some(())
+}
+
+fn set_mode(params: &mut Params, mode: &Mode, camera: &Camera) {
+    match mode {
+        Mode::Contour(options) => {
+            // As on the CPU: a band of zero width would divide by zero.
+            params.half_width = (options.half_width as f32).clamp(0.05, 64.0);
+            params.margin = params.half_width;
+        }
+        Mode::SoftRas(options) => set_softras(params, options, camera),
+    }
+}
+
+fn set_softras(params: &mut Params, options: &SoftRasOptions, camera: &Camera) {
+    let settings = Settings::new(options, camera);
+    params.blur = settings.blur;
+    params.reach = settings.reach;
+    params.margin = settings.reach;
+    params.sharpness = settings.sharpness;
+    params.depth_rate = settings.depth_rate;
+    params.farthest = settings.farthest;
+    params.least_area = settings.least_area as f32;
+    params.faces_per_pixel = settings.faces as u32;
+    let flag = |set: bool, flag: u32| if set { flag } else { 0 };
+    params.soft_flags = SOFT_MODE
+        | flag(settings.perspective, SOFT_PERSPECTIVE)
+        | flag(options.clip_barycentric, SOFT_CLIP)
+        | flag(settings.cull, SOFT_CULL);
+}
+
+fn set_loss(params: &mut Params, options: &LossOptions, has_depth: bool) {
+    params.color_weight = options.color_weight as f32;
+    params.mask_weight = options.mask_weight as f32;
+    if let Some(depth) = options.depth.filter(|_| has_depth) {
+        params.depth_weight = depth.weight as f32;
+        params.depth_scale = (1.0 / depth.scale) as f32;
+        // Shaders may assume that nothing is infinite.
+        params.depth_truncation = depth.truncation.min(1e30) as f32;
+    }
+    let (kind, scale) = match options.robust {
+        Robust::None => (ROBUST_NONE, 1.0),
+        Robust::Huber(k) => (ROBUST_HUBER, k),
+        Robust::Cauchy(k) => (ROBUST_CAUCHY, k),
+    };
+    params.robust_kind = kind;
+    params.robust_scale = scale as f32;
+    params.hidden_is_missed = options.hidden_is_missed.into();
+}
+
+/// A hypothesis; one that is not finite is marked so that nothing of it is computed with.
+pub(super) fn hypothesis(problem: &PoseProblem, h: &backend::Hypothesis) -> Hypothesis {
+    let model = &problem.model;
+    let rotation = h.t_cam_object.rotation.to_rotation_matrix().matrix().cast::<f32>();
+    let center = (h.t_cam_object * model.center()).coords.cast::<f32>();
+    // Beyond this, squares overflow.
+    let alive = rotation.iter().chain(center.iter()).all(|v| v.abs() < 1e18);
+    let mut out: Hypothesis = bytemuck::Zeroable::zeroed();
+    if !alive {
+        return out;
+    }
+    let (level, level_dz) = posed::level(model, &problem.target.camera, center.z as f64);
+    let (level, level_dz) = (level as f32, level_dz as f32);
+    let column = |v: nalgebra::Vector3<f32>| [v.x, v.y, v.z, 0.0];
+    let light = h.light.directional.map(|d| d.cast::<f32>());
+    out.rotation = [0, 1, 2].map(|k| column(rotation.column(k).into_owned()));
+    out.center = center.into();
+    out.alive = 1;
+    out.camera_light = light.map(column);
+    out.object_light = light.map(|d| column(rotation.tr_mul(&d)));
+    out.ambient = h.light.ambient.map(|a| a as f32);
+    out.offset = h.light.offset.map(|a| a as f32);
+    out.flat_light = light.iter().all(|d| *d == nalgebra::Vector3::zeros()).into();
+    (out.level, out.level_dz) = (level, level_dz);
+    if let (Mode::SoftRas(_), true) = (&problem.loss.mode, center.z > posed::NEAR) {
+        let camera = &problem.target.camera;
+        let p = h.t_cam_object * model.center();
+        let at = [camera.fx * p.x / p.z + camera.cx, camera.fy * p.y / p.z + camera.cy];
+        let [x, y] = at.map(f64::round);
+        out.image_center = [x, y, at[0] - x, at[1] - y].map(|v| v as f32);
+    }
+    out
+}

@@ -1,0 +1,170 @@
+// Residuals of the pixels of a tile against the target, and their sums. See `pose_loss/residuals.rs`.
+
+// Columns of the sums: losses of colour, mask and depth, the gradient, the upper triangle of JᵀJ row by row, and numbers of
+// pixels covered, near the outline, hidden, missed, and with depth.
+const SUM_COLOR: u32 = 0u;
+const SUM_MASK: u32 = 1u;
+const SUM_DEPTH: u32 = 2u;
+const SUM_GRADIENT: u32 = 3u;
+const SUM_JTJ: u32 = 9u;
+const SUM_COVERED: u32 = 30u;
+const SUM_CONTOUR: u32 = 31u;
+const SUM_HIDDEN: u32 = 32u;
+const SUM_MISSED: u32 = 33u;
+const SUM_WITH_DEPTH: u32 = 34u;
+const SUM_COLUMNS: u32 = 35u;
+
+// One row a thread, so that columns add up in a fixed order; an odd length keeps the banks of memory apart.
+var<workgroup> tile_sums: array<f32, 2240>;
+
+// ln(1 + x) for x ≥ 0.
+fn log_1p(x: f32) -> f32 {
+    if x < 0.01 {
+        return x * (1.0 - x * (0.5 - x * (1.0 / 3.0 - 0.25 * x)));
+    }
+    return log(1.0 + x);
+}
+
+// The cost of residual r, and the weight w with derivative 2 w r.
+fn robust_cost(r: f32) -> vec2<f32> {
+    let k = params.robust_scale;
+    if params.robust_kind == ROBUST_NONE || (params.robust_kind == ROBUST_HUBER && abs(r) <= k) {
+        return vec2<f32>(r * r, 1.0);
+    }
+    if params.robust_kind == ROBUST_HUBER {
+        return vec2<f32>(2.0 * k * abs(r) - k * k, k / abs(r));
+    }
+    let x = r * r / (k * k);
+    return vec2<f32>(k * k * log_1p(x), 1.0 / (1.0 + x));
+}
+
+struct Equations {
+    gradient: array<f32, 6>,
+    jtj: array<f32, 21>,
+}
+
+fn add_residual(sums: ptr<function, Equations>, row: Row, r: f32, weight: f32) {
+    var v = array<f32, 6>(
+        row.linear.x, row.linear.y, row.linear.z, row.angular.x, row.angular.y, row.angular.z,
+    );
+    var at = 0u;
+    for (var i = 0u; i < 6u; i++) {
+        let scaled_entry = weight * v[i];
+        (*sums).gradient[i] += scaled_entry * r;
+        for (var j = i; j < 6u; j++) {
+            (*sums).jtj[at] += scaled_entry * v[j];
+            at += 1u;
+        }
+    }
+}
+
+// The cost of a pixel of the mask that shows nothing of the object: colour, mask.
+fn missed_cost(goal_pixel: TargetPixel) -> vec2<f32> {
+    var color = 0.0;
+    for (var k = 0u; k < 3u; k++) {
+        color += robust_cost(goal_pixel.color[k]).x;
+    }
+    let coverage = goal_pixel.coverage;
+    return vec2<f32>(params.color_weight * color, params.mask_weight * coverage * coverage);
+}
+
+// Writes the sums of one pixel to this thread's row.
+fn store_pixel_sums(lane: u32, pixel: Pixel, goal_pixel: TargetPixel) {
+    let row = lane * SUM_COLUMNS;
+    for (var i = 0u; i < SUM_COLUMNS; i++) {
+        tile_sums[row + i] = 0.0;
+    }
+    if !pixel.some {
+        if goal_pixel.coverage > 0.0 {
+            let cost = missed_cost(goal_pixel);
+            tile_sums[row + SUM_COLOR] = cost.x;
+            tile_sums[row + SUM_MASK] = cost.y;
+            tile_sums[row + SUM_MISSED] = 1.0;
+        }
+        return;
+    }
+    if goal_pixel.occluder > 0.0 && goal_pixel.occluder < pixel.z {
+        tile_sums[row + SUM_HIDDEN] = 1.0;
+        if params.hidden_is_missed != 0u && goal_pixel.coverage > 0.0 {
+            let cost = missed_cost(goal_pixel);
+            tile_sums[row + SUM_COLOR] = cost.x;
+            tile_sums[row + SUM_MASK] = cost.y;
+        }
+        return;
+    }
+    tile_sums[row + SUM_COVERED] = select(0.0, 1.0, pixel.hit);
+    tile_sums[row + SUM_CONTOUR] = select(0.0, 1.0, pixel.near_outline);
+    var equations: Equations;
+    if params.color_weight > 0.0 {
+        var cost_sum = 0.0;
+        for (var k = 0u; k < 3u; k++) {
+            let r = pixel.color[k] - goal_pixel.color[k];
+            let cost = robust_cost(r);
+            cost_sum += params.color_weight * cost.x;
+            if DERIVATIVES {
+                add_residual(&equations, pixel.color_rows[k], r, params.color_weight * cost.y);
+            }
+        }
+        tile_sums[row + SUM_COLOR] = cost_sum;
+    }
+    if params.mask_weight > 0.0 {
+        let r = pixel.coverage - goal_pixel.coverage;
+        tile_sums[row + SUM_MASK] = params.mask_weight * r * r;
+        if DERIVATIVES && pixel.coverage < 1.0 {
+            add_residual(&equations, pixel.coverage_row, r, params.mask_weight);
+        }
+    }
+    if params.depth_weight > 0.0 && pixel.hit && goal_pixel.depth > 0.0 {
+        let scale = params.depth_scale;
+        let difference = pixel.z - goal_pixel.depth;
+        let bounded = clamp(difference, -params.depth_truncation, params.depth_truncation);
+        let r = pixel.depth_weight * bounded * scale;
+        tile_sums[row + SUM_DEPTH] = params.depth_weight * r * r;
+        tile_sums[row + SUM_WITH_DEPTH] = 1.0;
+        if DERIVATIVES {
+            let along = select(0.0, pixel.depth_weight * scale, bounded == difference);
+            let depth_row =
+                scaled_sum(along, pixel.z_row, bounded * scale, pixel.depth_weight_row);
+            add_residual(&equations, depth_row, r, params.depth_weight);
+        }
+    }
+    if DERIVATIVES {
+        for (var i = 0u; i < 6u; i++) {
+            tile_sums[row + SUM_GRADIENT + i] = equations.gradient[i];
+        }
+        for (var i = 0u; i < 21u; i++) {
+            tile_sums[row + SUM_JTJ + i] = equations.jtj[i];
+        }
+    }
+}
+
+// Adds up the rows of a tile's threads; to be called by a whole workgroup.
+fn store_tile_sums(h: u32, lane: u32, tile: vec2<u32>) {
+    workgroupBarrier();
+    if lane < SUM_COLUMNS && touches_tile(region_of(h), tile) {
+        var sum = 0.0;
+        for (var i = 0u; i < TILE_PIXELS; i++) {
+            sum += tile_sums[i * SUM_COLUMNS + lane];
+        }
+        partials[tile_index(h, tile) * SUM_COLUMNS + lane] = sum;
+    }
+}
+
+fn goal_at(pixel: vec2<u32>) -> TargetPixel {
+    var out: TargetPixel;
+    if all(pixel < params.size) {
+        out = goal[pixel.y * params.size.x + pixel.x];
+    }
+    return out;
+}
+
+@compute @workgroup_size(8, 8)
+fn contour_residuals(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32,
+    @builtin(global_invocation_id) id: vec3<u32>,
+) {
+    let pixel = seen_in_contour_mode(group.z, lane, group.xy, id.xy);
+    store_pixel_sums(lane, pixel, goal_at(id.xy));
+    store_tile_sums(group.z, lane, group.xy);
+}

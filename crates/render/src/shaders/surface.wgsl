@@ -1,0 +1,105 @@
+// Colour of a surface point and its derivatives along the surface and with the normal.
+
+// Whether derivatives are wanted; without them the compiler drops their computation.
+override DERIVATIVES: bool = true;
+
+struct Shaded {
+    color: vec3<f32>,
+    // Derivatives by the barycentric coordinates of corners 1 and 2 (corner 0 taking up the rest).
+    along_1: vec3<f32>,
+    along_2: vec3<f32>,
+    // Derivative of each channel by a rotation of the surface under the fixed light, camera frame.
+    turning: mat3x3<f32>,
+    // Derivative by the pyramid level of the texture.
+    level: vec3<f32>,
+}
+
+// Perspective-correct barycentric coordinates of image point p on a face.
+fn barycentric(c: mat3x3<f32>, p: vec2<f32>) -> vec3<f32> {
+    let a = c[0].xy - p;
+    let b = c[1].xy - p;
+    let d = c[2].xy - p;
+    let weights = vec3<f32>(
+        (b.x * d.y - b.y * d.x) * c[0].z,
+        (d.x * a.y - d.y * a.x) * c[1].z,
+        (a.x * b.y - a.y * b.x) * c[2].z,
+    );
+    let sum = weights.x + weights.y + weights.z;
+    if sum == 0.0 {
+        return vec3<f32>(1.0, 0.0, 0.0);
+    }
+    return weights / sum;
+}
+
+// Unlit colour and its derivatives by the barycentric coordinates and the level, in the fields of `Shaded`.
+fn albedo(h: u32, face: u32, b: vec3<f32>) -> Shaded {
+    var out: Shaded;
+    if params.albedo_kind == ALBEDO_UNIFORM {
+        out.color = params.albedo;
+        return out;
+    }
+    let c0 = corners[3u * face].paint;
+    let c1 = corners[3u * face + 1u].paint;
+    let c2 = corners[3u * face + 2u].paint;
+    let mixed = b.x * c0 + b.y * c1 + b.z * c2;
+    if params.albedo_kind == ALBEDO_CORNERS {
+        out.color = mixed;
+        out.along_1 = c1 - c0;
+        out.along_2 = c2 - c0;
+        return out;
+    }
+    let texel = sample_texture(mixed.xy, hypotheses[h].level);
+    out.color = texel.color;
+    out.along_1 = texel.du * (c1.x - c0.x) + texel.dv * (c1.y - c0.y);
+    out.along_2 = texel.du * (c2.x - c0.x) + texel.dv * (c2.y - c0.y);
+    out.level = texel.dlevel;
+    return out;
+}
+
+// Smooth unit normal on the side seen, mesh frame, and in w the sign of that side over the length before normalising.
+fn normal_at(face: u32, b: vec3<f32>, seen_inside: bool) -> vec4<f32> {
+    let sum = corners[3u * face].normal * b.x
+        + corners[3u * face + 1u].normal * b.y
+        + corners[3u * face + 2u].normal * b.z;
+    let factor = select(1.0, -1.0, seen_inside) / max(sqrt(dot(sum, sum)), 1e-6);
+    return vec4<f32>(sum * factor, factor);
+}
+
+// Lit colour at barycentric coordinates b of a face; `seen_inside` says which side is seen.
+fn shade(h: u32, face: u32, b: vec3<f32>, seen_inside: bool) -> Shaded {
+    var out = albedo(h, face, b);
+    if hypotheses[h].flat_light != 0u {
+        let factor = max(hypotheses[h].ambient, vec3<f32>(0.0));
+        out.color = out.color * factor + hypotheses[h].offset;
+        out.along_1 *= factor;
+        out.along_2 *= factor;
+        out.level *= factor;
+        return out;
+    }
+    let smooth_normal = normal_at(face, b, seen_inside);
+    let n = smooth_normal.xyz;
+    var light = hypotheses[h].object_light;
+    let along_normal = n * light;
+    let factor = max(hypotheses[h].ambient + along_normal, vec3<f32>(0.0));
+    let unlit = out.color;
+    out.color = unlit * factor;
+    if DERIVATIVES {
+        let in_camera = hypotheses[h].rotation * n;
+        let d1 = corners[3u * face + 1u].normal - corners[3u * face].normal;
+        let d2 = corners[3u * face + 2u].normal - corners[3u * face].normal;
+        out.along_1 *= factor;
+        out.along_2 *= factor;
+        out.level *= factor;
+        for (var k = 0u; k < 3u; k++) {
+            if factor[k] > 0.0 {
+                // The normal turns by the part of the corners' difference across it.
+                let across = (light[k] - n * along_normal[k]) * smooth_normal.w;
+                out.along_1[k] += unlit[k] * dot(across, d1);
+                out.along_2[k] += unlit[k] * dot(across, d2);
+                out.turning[k] = cross(in_camera, hypotheses[h].camera_light[k]) * unlit[k];
+            }
+        }
+    }
+    out.color += hypotheses[h].offset;
+    return out;
+}

@@ -1,0 +1,57 @@
+// Adds up the tiles of each hypothesis in a fixed order, and notes what the work buffers would have needed.
+
+// Threads of a column share the tiles.
+const TOTAL_GROUPS: u32 = 7u;
+
+var<workgroup> group_sums: array<f32, 245>;
+
+@compute @workgroup_size(256)
+fn total(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    let h = group.z;
+    let column = lane % SUM_COLUMNS;
+    let share = lane / SUM_COLUMNS;
+    if share < TOTAL_GROUPS {
+        let region = region_of(h);
+        let low = region.xy / TILE;
+        let high = (region.zw + TILE - 1u) / TILE;
+        let columns = high.x - low.x;
+        let count = columns * (high.y - low.y);
+        var sum = 0.0;
+        // What rounding lost so far (Kahan summation).
+        var lost = 0.0;
+        for (var i = share; i < count; i += TOTAL_GROUPS) {
+            let tile = low + vec2<u32>(i % columns, i / columns);
+            let value = partials[tile_index(h, tile) * SUM_COLUMNS + column] - lost;
+            let next = sum + value;
+            lost = (next - sum) - value;
+            sum = next;
+        }
+        group_sums[lane] = sum;
+    }
+    workgroupBarrier();
+    if lane < SUM_COLUMNS {
+        var sum = 0.0;
+        for (var i = 0u; i < TOTAL_GROUPS; i++) {
+            sum += group_sums[i * SUM_COLUMNS + lane];
+        }
+        results.values[h * SUM_COLUMNS + lane] = sum;
+    }
+    if lane == 0u {
+        note_needs(h);
+    }
+}
+
+fn note_needs(h: u32) {
+    atomicMax(&results.segments, atomicLoad(&tallies[h].segments));
+    let outline = atomicLoad(&tallies[h].outline);
+    atomicMax(&results.pieces, outline + atomicLoad(&tallies[h].inner));
+}
+
+// For pictures, which are not added up.
+@compute @workgroup_size(1)
+fn needs(@builtin(workgroup_id) group: vec3<u32>) {
+    note_needs(group.z);
+}
