@@ -107,11 +107,18 @@ impl Device {
     /// Runs `work` and turns whatever the device complains about meanwhile into an error.
     pub(super) fn watched<T>(&self, work: impl FnOnce() -> T) -> Result<T, BackendError> {
         let result = watched(&self.device, work);
-        let lost = self.lost.lock().ok().and_then(|lost| lost.clone());
-        match (result, lost) {
+        match (result, self.lost_because()) {
             (_, Some(reason)) | (Err(reason), None) => Err(self.failed(reason)),
             (Ok(value), None) => Ok(value),
         }
+    }
+
+    pub(super) fn is_lost(&self) -> bool {
+        self.lost_because().is_some()
+    }
+
+    fn lost_because(&self) -> Option<String> {
+        self.lost.lock().ok().and_then(|lost| lost.clone())
     }
 
     pub(super) fn failed(&self, reason: impl Into<String>) -> BackendError {

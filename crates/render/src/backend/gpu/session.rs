@@ -1,6 +1,8 @@
 //! A problem on a graphics device.
 
-use std::sync::{Arc, mpsc};
+use std::sync::Arc;
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::time::{Duration, Instant};
 
 use nalgebra::{Matrix6, Vector6};
 
@@ -19,6 +21,9 @@ use crate::backend::{BackendError, Hypothesis, PoseProblem, Session};
 use crate::image::{DepthImage, RgbImage};
 use crate::mode::Mode;
 use crate::pose_loss::{Counts, Linearised, Loss, PoseImage};
+
+/// How long a call back may take once the device is done.
+const PATIENCE: Duration = Duration::from_secs(1);
 
 /// What a call wants to know.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -171,7 +176,7 @@ impl GpuSession {
             queue.write_buffer(&self.settings, 0, bytemuck::bytes_of(&self.params));
             queue.write_buffer(&work.poses, 0, bytemuck::cast_slice(&poses));
             queue.submit([self.encode(work, wanted, size)]);
-            receive(&self.device.device, &work.readback, size)
+            receive(&self.device, &work.readback, size)
         })?;
         let bytes = received.map_err(|reason| self.device.failed(reason))?;
         let (usage, values) = bytes.split_at(size_of::<Usage>());
@@ -318,16 +323,26 @@ fn check_dispatch(device: &Device, params: &Params) -> Result<(), BackendError> 
 }
 
 /// Waits for a buffer's bytes.
-fn receive(device: &wgpu::Device, buffer: &wgpu::Buffer, size: u64) -> Result<Vec<u8>, String> {
-    let (sender, receiver) = mpsc::channel();
+fn receive(device: &Device, buffer: &wgpu::Buffer, size: u64) -> Result<Vec<u8>, String> {
+    let (sender, receiver) = channel();
     buffer.map_async(wgpu::MapMode::Read, ..size, move |result| {
         // Nobody listens any more if the device failed meanwhile.
         let _ = sender.send(result);
     });
-    device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| e.to_string())?;
-    // Not `recv`: a lost device may never call back.
-    let mapped = receiver.try_recv().map_err(|_| "no answer".to_string())?;
-    mapped.map_err(|e| e.to_string())?;
+    let begin = Instant::now();
+    loop {
+        device.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| e.to_string())?;
+        // The call may still be on its way in another thread, which polled for a session of its own.
+        match receiver.recv_timeout(PATIENCE / 100) {
+            Ok(mapped) => break mapped.map_err(|e| e.to_string())?,
+            Err(RecvTimeoutError::Disconnected) => return Err("no answer".into()),
+            // A lost device may never call back.
+            Err(RecvTimeoutError::Timeout) if device.is_lost() || begin.elapsed() > PATIENCE => {
+                return Err("no answer".into());
+            }
+            Err(RecvTimeoutError::Timeout) => (),
+        }
+    }
     let bytes = buffer.get_mapped_range(..size).map_err(|e| e.to_string())?.to_vec();
     buffer.unmap();
     Ok(bytes)
