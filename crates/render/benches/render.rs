@@ -2,7 +2,8 @@
 //! `cargo bench -p prehend-render`.
 //!
 //! The bottle of 5k and 16k faces covers some 12 000 pixels of 256 x 256 and of 640 x 480. `RAYON_NUM_THREADS=1` times one
-//! thread.
+//! thread. A graphics device is timed too, if there is one; software devices such as Mesa's lavapipe only with
+//! `PREHEND_SOFTWARE_GPU=1`.
 
 #[path = "../examples/bottle/mod.rs"]
 mod bottle;
@@ -16,7 +17,7 @@ use nalgebra::Isometry3;
 use prehend_geometry::shapes::capsule;
 use prehend_render::{
     Backend, Cpu, DepthOptions, Hypothesis, Light, LossOptions, Mode, PoseLoss, PoseProblem,
-    RenderModel, SceneObject, SoftRasOptions, Target, depth_map, render_scene,
+    RenderModel, SceneObject, SoftRasOptions, Target, backend, depth_map, render_scene,
 };
 
 fn main() -> anyhow::Result<()> {
@@ -33,7 +34,8 @@ fn main() -> anyhow::Result<()> {
             PoseLoss::new(Mode::SoftRas(SoftRasOptions::default()), LossOptions::default()),
         ),
     ];
-    let backends: Vec<Box<dyn Backend>> = vec![Box::new(Cpu)];
+    let mut backends: Vec<Box<dyn Backend>> = vec![Box::new(Cpu)];
+    backends.extend(Some(backend::auto()).filter(|b| b.name() != Cpu.name()));
     println!("| device | loss | image | faces | pixels | value, ms | with derivatives, ms |");
     println!("|---|---|---|--:|--:|--:|--:|");
     for backend in &backends {
