@@ -106,7 +106,7 @@ impl Distortion {
             let residual = value - seen;
             // Also false for a NaN.
             if residual.norm() <= 1e-14 * (1.0 + seen.norm()) {
-                return (slope.determinant() > 0.0).then_some(ideal);
+                return self.shows(ideal, &slope).then_some(ideal);
             }
             let step = slope.try_inverse()? * residual;
             let improves =
@@ -114,11 +114,32 @@ impl Distortion {
             // Halved until it helps: far out a whole step may jump over the fold.
             let Some(length) = (0..30).map(|i| 0.5f64.powi(i)).find(|t| improves(*t)) else {
                 let good = residual.norm() <= 1e-10 * (1.0 + seen.norm());
-                return (good && slope.determinant() > 0.0).then_some(ideal);
+                return (good && self.shows(ideal, &slope)).then_some(ideal);
             };
             ideal -= step * length;
         }
         None
+    }
+
+    /// Whether an ideal position, at which the derivative is `slope`, lies before the model's fold: beyond it the same content
+    /// would show again, mirrored.
+    fn shows(&self, ideal: Vector2<f64>, slope: &Matrix2<f64>) -> bool {
+        const SAMPLES: usize = 32;
+        let r2 = ideal.norm_squared();
+        // The derivative here is not enough: it changes its sign again where the factor does, and at a second fold.
+        let rises = |i: usize| self.radius_rises(r2 * (i as f64 / SAMPLES as f64).powi(2));
+        slope.determinant() > 0.0 && (1..=SAMPLES).all(rises)
+    }
+
+    /// Whether the seen radius grows with the ideal one where that squared is `s`.
+    fn radius_rises(&self, s: f64) -> bool {
+        let [k1, k2, k3, k4, k5, k6] = self.radial;
+        let cubic = |a: f64, b: f64, c: f64| 1.0 + s * (a + s * (b + s * c));
+        let slope = |a: f64, b: f64, c: f64| a + s * (2.0 * b + s * 3.0 * c);
+        let (top, bottom) = (cubic(k1, k2, k3), cubic(k4, k5, k6));
+        let turn = slope(k1, k2, k3) * bottom - top * slope(k4, k5, k6);
+        // d(r t/b)/dr = (t b + 2 r² (t' b − t b')) / b², with t and b as functions of r².
+        bottom > 0.0 && top * bottom + 2.0 * s * turn > 0.0
     }
 
     fn linearise(&self, ideal: Vector2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
@@ -144,8 +165,7 @@ impl Undistortion {
         let place = |at: usize| {
             let (u, v) = ((at % target.width) as f64, (at / target.width) as f64);
             let (seen, slope) = distortion.linearise(target.ray(u, v).xy());
-            // Beyond the fold of the model the same content would show again, mirrored.
-            match slope.determinant() > 0.0 {
+            match distortion.shows(target.ray(u, v).xy(), &slope) {
                 true => [source.fx * seen.x + source.cx, source.fy * seen.y + source.cy]
                     .map(|p| p as f32),
                 false => [f32::NAN; 2],
@@ -281,6 +301,8 @@ mod tests {
         let camera = Camera { fx: 10.0, fy: 10.0, cx: 19.5, cy: 0.0, width: 40, height: 1 };
         let made = Undistortion::new(camera, &lens, camera);
         let picture = made.rgb(&RgbImage::filled(40, 1, [1.0; 3])).unwrap();
+        // Beyond x = 1.58 the factor is negative, and the derivative positive again.
+        assert_eq!([0, 3, 36, 39].map(|x| picture.get(x, 0)), [Some([0.0; 3]); 4]);
         // The fold is at x = 0.913.
         assert_eq!((picture.get(28, 0), picture.get(29, 0)), (Some([1.0; 3]), Some([0.0; 3])));
     }

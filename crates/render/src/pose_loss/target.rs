@@ -28,7 +28,7 @@ pub enum TargetError {
     /// An image does not have the camera's size.
     #[error("{image} is {width} x {height}, the camera {camera_width} x {camera_height}")]
     Size {
-        /// `"image"`, `"mask"`, `"matte"`, `"depth"` or `"occluder"`.
+        /// `"image"`, `"mask"`, `"depth"` or `"occluder"`.
         image: &'static str,
         /// Columns.
         width: usize,
@@ -38,6 +38,22 @@ pub enum TargetError {
         camera_width: usize,
         /// Rows of the camera.
         camera_height: usize,
+    },
+    /// The matte does not have a number a pixel.
+    #[error("matte has {found} numbers for {expected} pixels")]
+    Matte {
+        /// Numbers given.
+        found: usize,
+        /// Pixels of the camera.
+        expected: usize,
+    },
+    /// A colour under the mask is infinite or not a number.
+    #[error("pixel ({x}, {y}) has a colour that is not finite")]
+    NotFinite {
+        /// Column.
+        x: usize,
+        /// Row.
+        y: usize,
     },
     /// The mask is empty: there is nothing to compare with.
     #[error("mask has no pixel set")]
@@ -70,7 +86,8 @@ impl Target {
     ) -> Result<Self, TargetError> {
         check(&camera, "image", image.width(), image.height())?;
         if coverage.len() != camera.width * camera.height {
-            check(&camera, "matte", coverage.len() / camera.height.max(1), camera.height)?;
+            let (found, expected) = (coverage.len(), camera.width * camera.height);
+            return Err(TargetError::Matte { found, expected });
         }
         // A NaN is not above zero and so becomes zero.
         let coverage: Vec<f32> =
@@ -109,21 +126,20 @@ impl Target {
     }
 
     /// The target with one pixel for every block of `factor` by `factor`: means of colour and coverage, medians
-    /// of depth.
+    /// of depth. `factor` is at least one and at most the shorter side.
     ///
     /// # Errors
     /// When nothing of the mask is left.
     pub fn downsampled(&self, factor: usize) -> Result<Self, TargetError> {
-        let factor = factor.max(1);
+        let factor = factor.clamp(1, self.camera.width.min(self.camera.height).max(1));
         let camera = self.camera.scaled(1.0 / factor as f64);
-        let (mut color, mut coverage) = (Vec::new(), Vec::new());
         let share = 1.0 / (factor * factor) as f32;
+        let (mut color, mut coverage) = (Vec::new(), Vec::new());
         for y in 0..camera.height {
             for x in 0..camera.width {
                 let (mut c, mut a) = ([0.0f32; 3], 0.0);
-                // A block is incomplete only if the whole image is smaller than one.
-                for sy in (y * factor..(y + 1) * factor).filter(|v| *v < self.camera.height) {
-                    for sx in (x * factor..(x + 1) * factor).filter(|v| *v < self.camera.width) {
+                for sy in y * factor..(y + 1) * factor {
+                    for sx in x * factor..(x + 1) * factor {
                         let at = sy * self.camera.width + sx;
                         (0..3).for_each(|k| c[k] += share * self.color[at][k]);
                         a += share * self.coverage[at];
@@ -158,6 +174,9 @@ impl Target {
         color: Vec<[f32; 3]>,
         coverage: Vec<f32>,
     ) -> Result<Self, TargetError> {
+        if let Some(at) = color.iter().position(|c| c.iter().any(|v| !v.is_finite())) {
+            return Err(TargetError::NotFinite { x: at % camera.width, y: at / camera.width });
+        }
         let mut bounds = Region { x0: usize::MAX, y0: usize::MAX, x1: 0, y1: 0 };
         let mut area = 0.0f64;
         for (at, &a) in coverage.iter().enumerate().filter(|(_, a)| **a > 0.0) {
@@ -212,6 +231,13 @@ mod tests {
         let target = Target::new(CAMERA, &image, &mask).unwrap();
         assert!(target.clone().with_depth(&DepthImage::filled(4, 3, 1.0)).is_err());
         assert!(target.with_occluder(DepthImage::filled(3, 2, 1.0)).is_err());
+        // One number too many would be a row of its own.
+        let matte = Target::from_matte(CAMERA, &image, vec![1.0; 9]).unwrap_err();
+        assert_eq!(matte, TargetError::Matte { found: 9, expected: 8 });
+        let mut image = image;
+        image.pixels_mut()[6] = [0.5, f32::NAN, 0.5];
+        let bad = Target::new(CAMERA, &image, &mask).unwrap_err();
+        assert_eq!(bad, TargetError::NotFinite { x: 2, y: 1 });
     }
 
     #[test]
@@ -226,6 +252,8 @@ mod tests {
         assert_eq!(half.coverage, [0.25, 0.0]);
         assert_eq!(half.color[0], [0.125, 0.0625, 0.25]);
         assert!((half.area() - 0.25).abs() < 1e-12);
+        // A larger factor than the image has pixels is that number.
+        assert_eq!(target.downsampled(100).unwrap().coverage, half.coverage);
         // A lone depth among four pixels is no evidence for the block.
         assert_eq!(half.depth.unwrap().pixels(), [0.0, 0.0]);
     }

@@ -25,7 +25,8 @@ fn falling_step(s: f32, w: f32) -> vec2<f32> {
 // The unblended pixel p of a face.
 fn interior(h: u32, p: vec2<f32>, face: u32, inverse_z: f32) -> Pixel {
     let c = face_screen(h, face);
-    let shaded = shade(h, face, barycentric(c, p), facing_of(c) < 0);
+    let b = barycentric(c, p);
+    let shaded = shade(h, face, b, facing_of(c) < 0);
     let z = 1.0 / inverse_z;
     var pixel: Pixel;
     pixel.some = true;
@@ -36,28 +37,38 @@ fn interior(h: u32, p: vec2<f32>, face: u32, inverse_z: f32) -> Pixel {
     pixel.z = z;
     pixel.depth_weight = 1.0;
     if DERIVATIVES {
-        interior_rows(h, face, ray(p) * z, shaded, &pixel);
+        interior_rows(h, face, b, ray(p) * z, shaded, &pixel);
     }
     return pixel;
 }
 
-// Rows of colour and depth at a surface point seen through a fixed pixel: with the colour gradient g along the surface and
-// normal n the colour changes by -(g - n (g·X)/(n·X))·v, and the depth by n·v/(n·d).
-fn interior_rows(h: u32, face: u32, point: vec3<f32>, shaded: Shaded, pixel: ptr<function, Pixel>) {
+// Surfaces are taken to be inclined to the viewing ray by at least this sine.
+const GRAZING: f32 = 1e-3;
+
+// Rows of colour and depth at a surface point seen through a fixed pixel: the barycentric coordinate of corner i of the point
+// on ray X is c_i·X / n·X with c_1 = e2 x p0 and c_2 = p0 x e1, so it changes by -(c_i - b_i n)/(n·X)·v, and the depth by
+// n·v/(n·d).
+fn interior_rows(
+    h: u32,
+    face: u32,
+    b: vec3<f32>,
+    point: vec3<f32>,
+    shaded: Shaded,
+    pixel: ptr<function, Pixel>,
+) {
     let ids = faces[face];
     let p0 = camera_position(h, ids.x);
     let e1 = camera_position(h, ids.y) - p0;
     let e2 = camera_position(h, ids.z) - p0;
     let n = cross(e1, e2);
-    let inverse = 1.0 / dot(n, n);
     // Of the corner, where rounding disturbs the plane's offset least.
-    let facing = dot(n, p0);
-    let g1 = cross(e2, n) * inverse;
-    let g2 = cross(n, e1) * inverse;
-    let h1 = g1 - n * (dot(g1, point) / facing);
-    let h2 = g2 - n * (dot(g2, point) / facing);
+    let offset = dot(n, p0);
+    let least = GRAZING * max(length(n) * length(p0), 1e-30);
+    let inverse = 1.0 / select(max(offset, least), min(offset, -least), offset < 0.0);
+    let h1 = (cross(e2, p0) - b.y * n) * inverse;
+    let h2 = (cross(p0, e1) - b.z * n) * inverse;
     color_rows(h, shaded, motion_along(h, -h1, point), motion_along(h, -h2, point), pixel);
-    (*pixel).z_row = motion_along(h, n * (point.z / facing), point);
+    (*pixel).z_row = motion_along(h, n * (point.z * inverse), point);
 }
 
 // A point on an edge at screen share t.

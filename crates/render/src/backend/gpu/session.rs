@@ -49,11 +49,17 @@ pub(super) struct GpuSession {
 
 impl GpuSession {
     pub(super) fn new(device: Arc<Device>, problem: &PoseProblem) -> Result<Self, BackendError> {
-        if problem.loss.options.affine {
-            let device = device.name.clone();
-            return Err(BackendError::Unsupported { device, what: "an affine correction" });
-        }
         let model = &problem.model;
+        let unsupported = |what| {
+            let device = device.name.clone();
+            BackendError::Unsupported { device, what }
+        };
+        if problem.loss.options.affine {
+            return Err(unsupported("an affine correction"));
+        }
+        if !upload::texels_fit(model) {
+            return Err(unsupported("texels outside 0..=1"));
+        }
         let params = upload::params(problem)
             .ok_or_else(|| device.failed("the texture has too many levels"))?;
         let capacity = Capacity::guess(&params);
@@ -329,18 +335,20 @@ fn receive(device: &Device, buffer: &wgpu::Buffer, size: u64) -> Result<Vec<u8>,
         // Nobody listens any more if the device failed meanwhile.
         let _ = sender.send(result);
     });
-    let begin = Instant::now();
+    let poll =
+        || device.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| e.to_string());
+    poll()?;
+    let done = Instant::now();
     loop {
-        device.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| e.to_string())?;
         // The call may still be on its way in another thread, which polled for a session of its own.
         match receiver.recv_timeout(PATIENCE / 100) {
             Ok(mapped) => break mapped.map_err(|e| e.to_string())?,
             Err(RecvTimeoutError::Disconnected) => return Err("no answer".into()),
             // A lost device may never call back.
-            Err(RecvTimeoutError::Timeout) if device.is_lost() || begin.elapsed() > PATIENCE => {
+            Err(RecvTimeoutError::Timeout) if device.is_lost() || done.elapsed() > PATIENCE => {
                 return Err("no answer".into());
             }
-            Err(RecvTimeoutError::Timeout) => (),
+            Err(RecvTimeoutError::Timeout) => drop(poll()?),
         }
     }
     let bytes = buffer.get_mapped_range(..size).map_err(|e| e.to_string())?.to_vec();

@@ -3,7 +3,7 @@
 
 use std::sync::{Arc, OnceLock};
 
-use nalgebra::{Isometry3, Vector3, Vector6};
+use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3, Vector6};
 use prehend_geometry::TriMesh;
 use prehend_geometry::shapes::cuboid;
 
@@ -111,6 +111,34 @@ fn cases() -> Vec<Case> {
         case("near", &lump, lamp(), one, full, Vector3::new(0.0, 0.0, -0.3), 3),
         case("near box", &textured_box(), lamp(), one, full, Vector3::new(0.0, 0.0, -0.35), 3),
     ]
+}
+
+/// A plane seen at a sine of inclination from well above to well below what derivatives are clamped at.
+#[test]
+fn grazing_surfaces_agree_with_the_processor() {
+    let Some(gpu) = gpu("grazing_surfaces_agree_with_the_processor") else { return };
+    let corners = [[-0.05, -0.05], [0.05, -0.05], [0.05, 0.05], [-0.05, 0.05]];
+    let vertices = corners.map(|[x, y]| Point3::new(x, y, 0.0)).to_vec();
+    let mesh = painted(TriMesh::new(vertices, vec![[0, 1, 2], [0, 2, 3]]), 0.05);
+    let model = Arc::new(RenderModel::new(&mesh).unwrap());
+    let light = Light::ambient(0.9);
+    let face_on = Isometry3::translation(0.0, 0.0, 0.4);
+    let target = Arc::new(target_of(&model, &face_on, &light, None, 0.5));
+    let mut problem = PoseProblem { model, target, loss: PoseLoss::default() };
+    let mut session = gpu.prepare(&problem).unwrap();
+    for sine in [2e-3f64, 8e-4, 2e-4] {
+        // The ray through a row of pixels runs along the plane.
+        let ray = camera().ray(79.0, 61.0);
+        let along = UnitQuaternion::rotation_between(&Vector3::z(), &ray).unwrap();
+        let turn = along * UnitQuaternion::from_scaled_axis(Vector3::x() * sine.acos());
+        let t_cam_object = Isometry3::from_parts((ray * 0.4).into(), turn);
+        let h = [Hypothesis { t_cam_object, light }];
+        let (c, g) = (problem.linearise(&h).unwrap()[0], session.linearise(&h).unwrap()[0]);
+        assert!(c.loss.counts.covered > 0, "{sine}");
+        assert_eq!(c.loss.counts, g.loss.counts);
+        println!("sine {sine}: loss, gradient, JtJ {:?}", errors(&c, &g));
+        assert!(errors(&c, &g).iter().all(|e| *e < 1e-4), "{sine}: {:?}", errors(&c, &g));
+    }
 }
 
 /// Norm of the difference over the norm of the first.

@@ -53,11 +53,18 @@ pub(super) fn edges(model: &RenderModel) -> Vec<Edge> {
     model.edges.iter().map(edge).collect()
 }
 
+/// Whether all texels can be packed.
+pub(super) fn texels_fit(model: &RenderModel) -> bool {
+    let Albedo::Texture(map, _) = &model.albedo else { return true };
+    let mut all = map.levels().flat_map(|(_, _, texels)| texels.iter().flatten());
+    all.all(|v| (0.0..=1.0).contains(v))
+}
+
 /// Texels of all levels of the pyramid, with 21 bits a channel: twice as compact as floats, and as exact as matters.
 pub(super) fn texels(model: &RenderModel) -> Vec<[u32; 2]> {
     let Albedo::Texture(map, _) = &model.albedo else { return Vec::new() };
     let pack = |texel: &[f32; 3]| {
-        let [r, g, b] = texel.map(|v| (f64::from(v.clamp(0.0, 1.0)) * 2_097_151.0).round() as u32);
+        let [r, g, b] = texel.map(|v| (f64::from(v) * 2_097_151.0).round() as u32);
         [r | (g << 21), (g >> 11) | (b << 10)]
     };
     map.levels().flat_map(|(_, _, texels)| texels.iter().map(pack)).collect()
