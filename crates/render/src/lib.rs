@@ -41,8 +41,8 @@ pub use mode::{ContourOptions, Mode, SoftRasOptions};
 pub use model::{ModelError, RenderModel};
 pub use overlay::draw_outline;
 pub use pose_loss::{
-    Affine, Counts, DepthOptions, Linearised, Loss, LossOptions, PoseImage, PoseLoss, Robust,
-    Target, TargetError,
+    Affine, Counts, DepthOptions, Linearised, Loss, LossOptions, OptionError, PoseImage, PoseLoss,
+    Robust, Target, TargetError,
 };
 pub use raster::depth_map;
 pub use renderer::{

@@ -12,6 +12,8 @@ pub struct WithFallback<B>(pub B);
 
 /// The graphics device of this machine with the processor to fall back on, or the processor where there is none.
 ///
+/// Opening a device and compiling its shaders takes some tenths of a second: call this once.
+///
 /// Software adapters do not count, since the processor by itself is faster, unless the environment variable
 /// `PREHEND_SOFTWARE_GPU` is `1`.
 pub fn auto() -> Box<dyn Backend> {
@@ -34,6 +36,7 @@ impl<B: Backend> Backend for WithFallback<B> {
     }
 
     fn prepare(&self, problem: &PoseProblem) -> Result<Box<dyn Session>, BackendError> {
+        problem.loss.check()?;
         let device = self.0.prepare(problem).map_err(warn).ok();
         Ok(Box::new(FallbackSession { device, processor: problem.clone() }))
     }
@@ -68,6 +71,10 @@ fn warn(error: BackendError) {
 }
 
 impl Session for FallbackSession {
+    fn name(&self) -> &str {
+        self.device.as_ref().map_or(self.processor.name(), |device| device.name())
+    }
+
     fn evaluate(&mut self, hypotheses: &[Hypothesis]) -> Result<Vec<Loss>, BackendError> {
         self.run(|session| session.evaluate(hypotheses))
     }
@@ -102,6 +109,10 @@ mod tests {
     }
 
     impl Session for Fragile {
+        fn name(&self) -> &str {
+            "fragile"
+        }
+
         fn evaluate(&mut self, _: &[Hypothesis]) -> Result<Vec<Loss>, BackendError> {
             panic!("asked after its failure")
         }
@@ -141,8 +152,10 @@ mod tests {
         let mut session = WithFallback(FragileBackend(true)).prepare(&problem).unwrap();
         // The device's own answer, then the processor's.
         assert_eq!(session.linearise(&hypotheses).unwrap(), []);
+        assert_eq!(session.name(), "fragile");
         assert_eq!(session.linearise(&hypotheses).unwrap(), expected);
         assert_eq!(session.linearise(&hypotheses).unwrap(), expected);
+        assert_eq!(session.name(), "CPU");
         assert_eq!(session.evaluate(&hypotheses).unwrap()[0], expected[0].loss);
         assert!(session.render(&hypotheses[0]).is_ok());
         let mut session = WithFallback(FragileBackend(false)).prepare(&problem).unwrap();

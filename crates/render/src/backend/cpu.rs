@@ -15,11 +15,16 @@ impl Backend for Cpu {
     }
 
     fn prepare(&self, problem: &PoseProblem) -> Result<Box<dyn Session>, BackendError> {
+        problem.loss.check()?;
         Ok(Box::new(problem.clone()))
     }
 }
 
 impl Session for PoseProblem {
+    fn name(&self) -> &str {
+        Cpu.name()
+    }
+
     fn evaluate(&mut self, hypotheses: &[Hypothesis]) -> Result<Vec<Loss>, BackendError> {
         let one = |h: &Hypothesis| {
             self.loss.evaluate(&self.model, &h.t_cam_object, &h.light, &self.target)

@@ -1,11 +1,16 @@
 //! What can go wrong on a device.
 
+use crate::pose_loss::OptionError;
+
 /// Why a device did not answer.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum BackendError {
     /// There is no device of the kind asked for.
     #[error("no graphics device: {0}")]
     NoDevice(String),
+    /// A setting of the loss is out of its range.
+    #[error(transparent)]
+    Option(#[from] OptionError),
     /// The device was lost or its driver failed.
     #[error("{device}: {reason}")]
     Device {

@@ -41,6 +41,33 @@ pub struct Hypothesis {
 }
 
 /// A device that compares many poses with an image at once.
+///
+/// ```
+/// use std::sync::Arc;
+///
+/// use nalgebra::{Isometry3, Vector3};
+/// use prehend_geometry::shapes::cuboid;
+/// use prehend_render::{
+///     Camera, Hypothesis, Light, Mask, PoseLoss, PoseProblem, RenderModel, RgbImage, Target, backend,
+/// };
+///
+/// let camera = Camera { fx: 60.0, fy: 60.0, cx: 31.5, cy: 23.5, width: 64, height: 48 };
+/// let (image, mask) = (RgbImage::filled(64, 48, [0.5; 3]), Mask::filled(64, 48, true));
+/// let problem = PoseProblem {
+///     model: Arc::new(RenderModel::new(&cuboid(Vector3::repeat(0.1)))?),
+///     target: Arc::new(Target::new(camera, &image, &mask)?),
+///     loss: PoseLoss::default(),
+/// };
+/// let mut session = backend::auto().prepare(&problem)?;
+/// let hypotheses: Vec<Hypothesis> = (0..100)
+///     .map(|i| Hypothesis {
+///         t_cam_object: Isometry3::translation(0.0, 0.0, 0.3 + 0.01 * i as f64),
+///         light: Light::headlight(0.5, 0.5),
+///     })
+///     .collect();
+/// assert_eq!(session.linearise(&hypotheses)?.len(), 100);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub trait Backend: Send + Sync {
     /// What computes, for people to read.
     fn name(&self) -> &str;
@@ -48,13 +75,16 @@ pub trait Backend: Send + Sync {
     /// Uploads a problem. What the session allocates serves all its calls.
     ///
     /// # Errors
-    /// When the problem does not fit the device.
+    /// When a setting of the loss is out of its range, or the problem does not fit the device.
     fn prepare(&self, problem: &PoseProblem) -> Result<Box<dyn Session>, BackendError>;
 }
 
 /// A problem on its device. Results come in the order of the hypotheses, and a hypothesis has the same result whatever
 /// the others are.
 pub trait Session: Send {
+    /// What computes at present, for people to read.
+    fn name(&self) -> &str;
+
     /// The loss of each hypothesis.
     ///
     /// # Errors

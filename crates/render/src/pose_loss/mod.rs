@@ -1,6 +1,7 @@
 //! The loss of a pose: a posed object compared with a segmented image, with exact derivatives by the pose.
 
 mod affine;
+mod check;
 mod lane;
 mod options;
 mod pixel;
@@ -14,6 +15,7 @@ use nalgebra::{Isometry3, Matrix6, Point3, Vector6};
 
 pub use affine::Affine;
 use affine::Corrected;
+pub use check::OptionError;
 pub(crate) use lane::{LANES, Lane, Patch, get, put};
 pub use options::{DepthOptions, LossOptions, Robust};
 pub(crate) use pixel::{Pixel, Row, Seen, View, scaled_sum};
@@ -33,7 +35,28 @@ use crate::softras::SoftRasView;
 
 /// Renders a posed object and compares it with a segmented image.
 ///
-/// Stateless but for its settings; share it freely between threads. Results do not depend on the number of
+/// ```
+/// use nalgebra::{Isometry3, Vector3};
+/// use prehend_geometry::shapes::cuboid;
+/// use prehend_render::{Camera, Light, Mask, PoseLoss, RenderModel, Target};
+///
+/// let camera = Camera { fx: 60.0, fy: 60.0, cx: 31.5, cy: 23.5, width: 64, height: 48 };
+/// let model = RenderModel::new(&cuboid(Vector3::repeat(0.1)))?;
+/// let light = Light::headlight(0.5, 0.5);
+/// let loss = PoseLoss::default();
+/// // A picture of the box, as a camera would give it, and the mask of a segmentation.
+/// let seen = loss.render(&model, &Isometry3::translation(0.0, 0.0, 0.4), &camera, &light);
+/// let mask = Mask::new(64, 48, seen.coverage.iter().map(|a| *a > 0.5).collect())?;
+/// let target = Target::new(camera, &seen.color, &mask)?;
+/// // The box is believed 5 mm too far to the right: the loss falls to the left.
+/// let pose = Isometry3::translation(0.005, 0.0, 0.4);
+/// let at = loss.linearise(&model, &pose, &(pose * model.center()), &light, &target);
+/// assert!(at.loss.total > 0.0 && at.gradient[0] > 0.0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// Stateless but for its settings, which [`PoseLoss::check`] checks; share it freely between threads. Faces with a corner
+/// behind the camera, or within a millimetre of its plane, are not drawn. Results do not depend on the number of
 /// threads. A pose that is not finite, or puts the object behind the camera or outside the image, renders nothing:
 /// the loss is then that of the whole mask missed, with zero gradient.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

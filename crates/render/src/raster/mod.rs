@@ -142,7 +142,8 @@ pub(crate) fn rasterise(projected: &Projected, region: &Region) -> Vec<Visible> 
 /// there is none.
 ///
 /// Each body is given with `t_cam_body`. Bodies behind the camera, or with a pose that is not finite, are not
-/// drawn. Meant for what is known and does not move during a refinement, such as the hand.
+/// drawn, nor are faces with a corner within a millimetre of its plane or behind it: cut large tables and walls into small faces.
+/// Meant for what is known and does not move during a refinement, such as the hand.
 pub fn depth_map(camera: &Camera, bodies: &[(&RenderModel, Isometry3<f64>)]) -> DepthImage {
     let mut inverse = vec![0.0f32; camera.width * camera.height];
     for (model, pose) in bodies {

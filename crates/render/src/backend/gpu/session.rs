@@ -49,6 +49,7 @@ pub(super) struct GpuSession {
 
 impl GpuSession {
     pub(super) fn new(device: Arc<Device>, problem: &PoseProblem) -> Result<Self, BackendError> {
+        problem.loss.check()?;
         let model = &problem.model;
         let unsupported = |what| {
             let device = device.name.clone();
@@ -268,6 +269,10 @@ impl GpuSession {
 }
 
 impl Session for GpuSession {
+    fn name(&self) -> &str {
+        &self.device.name
+    }
+
     fn evaluate(&mut self, hypotheses: &[Hypothesis]) -> Result<Vec<Loss>, BackendError> {
         let sums = self.sums(hypotheses, Wanted::Value)?;
         Ok(sums.chunks_exact(SUM_COLUMNS).map(|s| self.loss(s)).collect())

@@ -1,0 +1,132 @@
+//! Which settings of a loss make sense.
+
+use super::PoseLoss;
+use super::options::{LossOptions, Robust};
+use crate::mode::{Mode, SoftRasOptions};
+
+/// A setting out of its range.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error("{name} is {value}, expected {expected}")]
+pub struct OptionError {
+    /// The setting, such as `"depth.scale"`.
+    pub name: &'static str,
+    /// Its value.
+    pub value: f64,
+    /// What it should be.
+    pub expected: &'static str,
+}
+
+fn check(
+    name: &'static str,
+    value: f64,
+    expected: &'static str,
+    holds: bool,
+) -> Result<(), OptionError> {
+    if holds { Ok(()) } else { Err(OptionError { name, value, expected }) }
+}
+
+fn positive(name: &'static str, value: f64) -> Result<(), OptionError> {
+    // Smaller ones vanish when squared in single precision.
+    check(name, value, "a finite number of at least 1e-15", value >= 1e-15 && value.is_finite())
+}
+
+fn weight(name: &'static str, value: f64) -> Result<(), OptionError> {
+    check(name, value, "a finite number of at least 0", value >= 0.0 && value.is_finite())
+}
+
+impl PoseLoss {
+    /// Whether all settings are in their ranges. With others a loss says nothing, although it is computed.
+    ///
+    /// # Errors
+    /// Names the first setting that is not.
+    pub fn check(&self) -> Result<(), OptionError> {
+        match &self.mode {
+            Mode::Contour(options) => {
+                let w = options.half_width;
+                check("half_width", w, "0.05 to 64 px", (0.05..=64.0).contains(&w))?;
+            }
+            Mode::SoftRas(options) => options.check()?,
+        }
+        self.options.check()
+    }
+}
+
+impl SoftRasOptions {
+    fn check(&self) -> Result<(), OptionError> {
+        weight("blur_radius", self.blur_radius)?;
+        positive("sigma", self.sigma)?;
+        positive("gamma", self.gamma)?;
+        let faces = self.faces_per_pixel;
+        let few = (1..=Self::MOST_FACES).contains(&faces);
+        check("faces_per_pixel", faces as f64, "1 to 64", few)?;
+        let (near, far) = (self.z_near, self.z_far);
+        check("z_far", far, "a finite number above z_near", far > near && far.is_finite())
+    }
+}
+
+impl LossOptions {
+    fn check(&self) -> Result<(), OptionError> {
+        weight("color_weight", self.color_weight)?;
+        weight("mask_weight", self.mask_weight)?;
+        if let Some(depth) = self.depth {
+            weight("depth.weight", depth.weight)?;
+            positive("depth.scale", depth.scale)?;
+            let limit = depth.truncation;
+            check("depth.truncation", limit, "above 0, or infinite", limit > 0.0)?;
+        }
+        match self.robust {
+            Robust::None => Ok(()),
+            Robust::Huber(k) | Robust::Cauchy(k) => positive("robust", k),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mode::ContourOptions;
+    use crate::pose_loss::DepthOptions;
+
+    #[test]
+    fn settings_out_of_range_are_named() {
+        let soft = Mode::SoftRas(SoftRasOptions::default());
+        let plain = LossOptions::default();
+        assert_eq!(PoseLoss::default().check(), Ok(()));
+        assert_eq!(PoseLoss::new(soft, plain).check(), Ok(()));
+        let named = |mode: Mode, options: LossOptions| {
+            PoseLoss::new(mode, options).check().unwrap_err().name
+        };
+        for half_width in [f64::NAN, 0.0, -3.0, 1000.0] {
+            let mode = Mode::Contour(ContourOptions { half_width });
+            assert_eq!(named(mode, plain), "half_width");
+        }
+        for k in [0.0, -1.0, f64::NAN, 1e-25] {
+            assert_eq!(named(soft, LossOptions { robust: Robust::Huber(k), ..plain }), "robust");
+            assert_eq!(named(soft, LossOptions { robust: Robust::Cauchy(k), ..plain }), "robust");
+        }
+        let depth = DepthOptions { weight: 1.0, scale: 0.02, truncation: f64::INFINITY };
+        let with = |depth: DepthOptions| LossOptions { depth: Some(depth), ..plain };
+        assert_eq!(PoseLoss::new(soft, with(depth)).check(), Ok(()));
+        assert_eq!(named(soft, with(DepthOptions { weight: -1.0, ..depth })), "depth.weight");
+        assert_eq!(named(soft, with(DepthOptions { scale: 0.0, ..depth })), "depth.scale");
+        assert_eq!(
+            named(soft, with(DepthOptions { truncation: -0.1, ..depth })),
+            "depth.truncation"
+        );
+        let nan = LossOptions { color_weight: f64::NAN, ..plain };
+        assert_eq!(named(soft, nan), "color_weight");
+        let of = |change: fn(&mut SoftRasOptions)| {
+            let mut options = SoftRasOptions::default();
+            change(&mut options);
+            named(Mode::SoftRas(options), plain)
+        };
+        assert_eq!(of(|o| o.faces_per_pixel = 100), "faces_per_pixel");
+        assert_eq!(of(|o| o.z_near = 200.0), "z_far");
+        assert_eq!((of(|o| o.sigma = 0.0), of(|o| o.gamma = -1.0)), ("sigma", "gamma"));
+        let error = PoseLoss::new(soft, nan).check().unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "color_weight is NaN, expected a finite number of at least 0"
+        );
+    }
+}
