@@ -1,6 +1,5 @@
 //! The hard z-buffer.
 
-mod face;
 mod small;
 
 use nalgebra::Isometry3;
@@ -10,7 +9,7 @@ use crate::camera::Camera;
 use crate::image::DepthImage;
 use crate::model::RenderModel;
 use crate::posed::Posed;
-use crate::projected::{Projected, Region};
+use crate::projected::{Projected, Region, signed_area};
 
 /// Rows of the image that one task renders; results do not depend on it.
 pub(crate) const BAND: usize = 16;
@@ -63,6 +62,42 @@ impl Visible {
     pub(crate) fn position(&self, i: usize) -> (usize, usize) {
         let width = self.region.width();
         (self.region.x0 + i % width, self.region.y0 + i / width)
+    }
+
+    /// Draws one face where it is nearer than what is there; of equals the first stays.
+    #[inline(always)]
+    pub(crate) fn draw(&mut self, projected: &Projected, face: u32) {
+        let [a, b, c] = projected.corners(face as usize);
+        let region = self.region;
+        let Some((y0, y1)) = centres(span(a[1], b[1], c[1]), region.y0, region.y1) else { return };
+        let Some((x0, x1)) = centres(span(a[0], b[0], c[0]), region.x0, region.x1) else { return };
+        let area = signed_area(&[a, b, c]);
+        let scale = 1.0 / area;
+        let width = region.width();
+        for y in y0..=y1 {
+            let py = y as f32;
+            let (ay, by, cy) = (a[1] - py, b[1] - py, c[1] - py);
+            let row = (y - region.y0) * width;
+            for x in x0..=x1 {
+                let px = x as f32;
+                let (ax, bx, cx) = (a[0] - px, b[0] - px, c[0] - px);
+                // The other face of an edge has exactly the opposite number, so that none of its pixels is lost.
+                let e = [
+                    (bx * cy - by * cx) * scale,
+                    (cx * ay - cy * ax) * scale,
+                    (ax * by - ay * bx) * scale,
+                ];
+                if (e[0] < 0.0) | (e[1] < 0.0) | (e[2] < 0.0) {
+                    continue;
+                }
+                let inverse_z = e[0] * a[2] + e[1] * b[2] + e[2] * c[2];
+                let at = row + x - region.x0;
+                if inverse_z > self.inverse_z[at] {
+                    self.inverse_z[at] = inverse_z;
+                    self.face[at] = face;
+                }
+            }
+        }
     }
 }
 
