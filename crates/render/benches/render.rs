@@ -1,9 +1,10 @@
 //! Times the loss of a pose, alone and with gradient and Gauss–Newton matrix, in both modes:
 //! `cargo bench -p prehend-render`.
 //!
-//! The bottle of 5k and 16k faces covers some 12 000 pixels of 256 x 256 and of 640 x 480. `RAYON_NUM_THREADS=1` times one
-//! thread. A graphics device is timed too, if there is one; software devices such as Mesa's lavapipe only with
-//! `PREHEND_SOFTWARE_GPU=1`.
+//! The bottle of 5k and 16k faces covers some 12 000 pixels of 256 x 256 and of 640 x 480. A word times only the losses
+//! whose name starts with it, and one thread is asked for by
+//! `RAYON_NUM_THREADS=1 cargo bench -p prehend-render --bench render -- contour`. A graphics device is timed too, if there is
+//! one; software devices such as Mesa's lavapipe only with `PREHEND_SOFTWARE_GPU=1`.
 
 #[path = "../examples/bottle/mod.rs"]
 mod bottle;
@@ -34,6 +35,7 @@ fn main() -> anyhow::Result<()> {
             PoseLoss::new(Mode::SoftRas(SoftRasOptions::default()), LossOptions::default()),
         ),
     ];
+    let wanted = std::env::args().skip(1).find(|word| !word.starts_with('-')).unwrap_or_default();
     let mut backends: Vec<Box<dyn Backend>> = vec![Box::new(Cpu)];
     backends.extend(Some(backend::auto()).filter(|b| b.name() != Cpu.name()));
     println!("| device | loss | image | faces | pixels | value, ms | with derivatives, ms |");
@@ -43,10 +45,10 @@ fn main() -> anyhow::Result<()> {
             for (_, sides, rings) in SIZES {
                 let model = Arc::new(RenderModel::new(&bottle(sides, rings))?);
                 let (plain, full) = targets(&model, cropped)?;
-                for (name, loss) in runs {
+                for (name, loss) in runs.iter().filter(|(name, _)| name.starts_with(&wanted)) {
                     let target = if loss.options.depth.is_some() { &full } else { &plain };
                     let (model, target) = (Arc::clone(&model), Arc::clone(target));
-                    let problem = PoseProblem { model, target, loss };
+                    let problem = PoseProblem { model, target, loss: *loss };
                     let mut session = backend.prepare(&problem)?;
                     let light = Light::headlight(0.5, 0.4);
                     let start = [Hypothesis { t_cam_object: guess(), light }];

@@ -1,10 +1,11 @@
 //! A model transformed into the camera and projected.
 
 use nalgebra::{Isometry3, Matrix3, Vector3};
+use rayon::prelude::*;
 
 use crate::camera::Camera;
 use crate::model::RenderModel;
-use crate::projected::Projected;
+use crate::projected::{Projected, TASK};
 
 /// Geometry nearer to the camera plane than this is not drawn \[m\].
 pub(crate) const NEAR: f32 = 1e-3;
@@ -39,10 +40,13 @@ impl<'a> Posed<'a> {
         let center: Vector3<f32> = (t_cam_object * model.center()).coords.cast();
         let focal = [camera.fx as f32, camera.fy as f32];
         let principal = [camera.cx as f32, camera.cy as f32];
-        let position: Vec<Vector3<f32>> =
-            model.positions.iter().map(|p| rotation * p + center).collect();
-        let screen: Vec<[f32; 3]> =
-            position.iter().map(|p| project(focal, principal, [p.x, p.y, p.z])).collect();
+        let (mut position, mut screen) = (Vec::new(), Vec::new());
+        let place = |p: &Vector3<f32>| {
+            let p = rotation * p + center;
+            (p, project(focal, principal, [p.x, p.y, p.z]))
+        };
+        let each = model.positions.par_iter().with_min_len(TASK).map(place);
+        each.unzip_into_vecs(&mut position, &mut screen);
         let (level, level_dz) = level(model, camera, center.z as f64);
         let (level, level_dz) = (level as f32, level_dz as f32);
         let (faces, edges) = (&model.faces, &model.edges);

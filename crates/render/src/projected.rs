@@ -1,7 +1,12 @@
 //! Projected triangles: all that visibility needs to know.
 
+use rayon::prelude::*;
+
 use crate::camera::Camera;
 use crate::model::Edge;
+
+/// Vertices or faces that are worth a task of their own.
+pub(crate) const TASK: usize = 1024;
 
 /// A rectangle of pixels; the upper ends are exclusive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,13 +59,16 @@ impl<'a> Projected<'a> {
     pub(crate) fn new(
         faces: &'a [[u32; 3]],
         edges: &'a [Edge],
-        closed: impl Fn(usize) -> bool,
+        closed: impl Fn(usize) -> bool + Sync,
         screen: Vec<[f32; 3]>,
         camera: &Camera,
         margin: f32,
     ) -> Self {
-        let facing = faces.iter().enumerate().map(|(i, f)| facing(&screen, f, closed(i))).collect();
-        let region = region(&screen, camera, margin);
+        let each = faces.par_iter().with_min_len(TASK).enumerate();
+        let (facing, region) = rayon::join(
+            || each.map(|(i, f)| facing(&screen, f, closed(i))).collect(),
+            || region(&screen, camera, margin),
+        );
         Self { faces, edges, screen, facing, region }
     }
 

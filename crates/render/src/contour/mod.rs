@@ -58,11 +58,13 @@ impl<'a> ContourView<'a> {
         let lighting = Lighting::new(light, &posed.rotation);
         let projected = &posed.projected;
         let region = projected.region.union(also);
-        let visible = raster::rasterise(projected, &region);
-        let silhouette = match projected.region == Region::EMPTY {
-            true => Silhouette::default(),
-            false => outline(projected, &region, half_width),
-        };
+        let (visible, silhouette) = rayon::join(
+            || raster::rasterise(projected, &region),
+            || match projected.region == Region::EMPTY {
+                true => Silhouette::default(),
+                false => outline(projected, &region, half_width),
+            },
+        );
         let least = LEAST_STEP * model.radius() as f32;
         let inner = inner_contours(projected, &visible, silhouette.covered, least);
         let twist_center = center.coords.cast();

@@ -187,7 +187,8 @@ impl PoseLoss {
     ) -> Corrected {
         let (camera, also) = (&target.camera, &target.bounds);
         let residuals = Residuals { options: &self.options, target };
-        match &self.mode {
+        // One of rayon's threads takes all of it, or each of its parallel loops would hand over and wait.
+        rayon::scope(|_| match &self.mode {
             Mode::Contour(options) => {
                 let view = ContourView::new(options, model, pose, center, camera, light, also);
                 residuals.total::<DERIVATIVES>(&view)
@@ -196,7 +197,7 @@ impl PoseLoss {
                 let view = SoftRasView::new(options, model, pose, center, camera, light, also);
                 residuals.total::<DERIVATIVES>(&view)
             }
-        }
+        })
     }
 }
 
