@@ -118,4 +118,56 @@ impl Fragment {
         }
         out
     }
+
+    /// Which sides of the kinks the fragment is on: its smooth function is another for each.
+    #[cfg(test)]
+    pub(super) fn branches(&self) -> u32 {
+        let bits = [
+            self.weight.map(|w| w > 0.0),
+            self.foot.map(|f| f > 0.0),
+            [self.sum_is_free, self.distance < 0.0, false],
+        ];
+        bits.as_flattened().iter().fold(0, |all, bit| 2 * all + u32::from(*bit))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use prehend_autodiff::check::finite_difference_gradient;
+
+    use super::*;
+    use crate::camera::Camera;
+    use crate::mode::SoftRasOptions;
+
+    /// Inside, beside an edge, beside a corner, beyond the line of an edge; with each pair of options.
+    #[test]
+    fn derivatives_match_differences_of_the_values() {
+        let camera = Camera { fx: 1.0, fy: 1.0, cx: 0.0, cy: 0.0, width: 64, height: 64 };
+        let corners = [3.0, 4.0, 0.5, 9.0, 5.5, 0.6, 5.0, 11.0, 0.45];
+        let triangle = |x: &[f64]| [0, 3, 6].map(|i| [x[i], x[i + 1], x[i + 2]]);
+        for (perspective_correct, clip_barycentric) in
+            [(false, false), (false, true), (true, false), (true, true)]
+        {
+            let options = SoftRasOptions {
+                perspective_correct,
+                clip_barycentric,
+                ..SoftRasOptions::default()
+            };
+            let settings = Settings::new(&options, &camera);
+            for pixel in [[6.0, 7.0], [5.0, 4.1], [7.0, 3.0], [1.0, 2.0], [9.0, 9.0]] {
+                let value = |x: &[f64]| {
+                    let f = Fragment::new(&triangle(x), pixel, &settings);
+                    0.3 * f.b[0] - 0.8 * f.b[1] + 0.2 * f.b[2] + 2.0 * f.z + 0.1 * f.distance
+                };
+                for x in [corners, [0, 1, 2, 6, 7, 8, 3, 4, 5].map(|i| corners[i])] {
+                    let fragment = Fragment::new(&triangle(&x), pixel, &settings);
+                    let exact = fragment.pull_back([0.3, -0.8, 0.2], 2.0, 0.1);
+                    let differences = finite_difference_gradient(value, &x, 1e-6);
+                    for (a, b) in exact.as_flattened().iter().zip(&differences) {
+                        assert!((a - b).abs() < 1e-6, "{pixel:?} {exact:?} {differences:?}");
+                    }
+                }
+            }
+        }
+    }
 }

@@ -89,7 +89,8 @@ impl SoftFaces {
         (faces, (inside != NONE).then_some(inside))
     }
 
-    fn fragment(&self, frame: &Frame, face: usize, at: [f64; 2]) -> Fragment {
+    #[inline]
+    pub(super) fn fragment(&self, frame: &Frame, face: usize, at: [f64; 2]) -> Fragment {
         let corners = frame.faces[face].map(|v| self.screen[v as usize]);
         Fragment::new(&corners, at, &self.settings)
     }

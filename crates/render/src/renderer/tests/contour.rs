@@ -39,7 +39,7 @@ pub(super) fn decision(frame: &Frame, contours: &Contours, place: Place) -> Opti
 fn where_objects_touch_they_blend() {
     let (small, large) = (cuboid(Vector3::repeat(0.06)), cuboid(Vector3::new(0.3, 0.04, 0.3)));
     let model = |mesh: &TriMesh| Arc::new(RenderModel::new(mesh).unwrap());
-    let turn = UnitQuaternion::from_scaled_axis(Vector3::new(-0.5, 0.0, 0.0))
+    let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.5, 0.0, 0.0))
         * UnitQuaternion::from_scaled_axis(Vector3::y() * 0.6);
     let table = Isometry3::from_parts(Translation3::new(0.0, 0.03, 0.4), turn);
     // y is down: the small box stands on the large one.
@@ -63,7 +63,8 @@ fn where_objects_touch_they_blend() {
     // Two edges of the small box's lower face are seen.
     let camera = camera();
     let corner = |x: f64, z: f64| camera.project(&(table * Point3::new(x, -0.02, z))).unwrap();
-    let corners = [(-0.03, -0.03), (0.03, -0.03), (0.03, 0.03), (-0.03, 0.03)].map(|(x, z)| corner(x, z));
+    let corners =
+        [(-0.03, -0.03), (0.03, -0.03), (0.03, 0.03), (-0.03, 0.03)].map(|(x, z)| corner(x, z));
     let mut edges = [0, 1, 2, 3].map(|i| (i, (corners[(i + 1) % 4] - corners[i]).norm()));
     let low = |i: usize| corners[i].y + corners[(i + 1) % 4].y;
     edges.sort_by(|a, b| low(b.0).total_cmp(&low(a.0)));

@@ -87,7 +87,7 @@ fn decisions<Sh: Shader>(rendering: &Rendering<Sh>) -> Vec<Option<Vec<u32>>> {
         Visible::SoftRas(faces) => {
             for (block, region) in faces.regions().iter().enumerate() {
                 for place in places(block, region) {
-                    out[place.y * width + place.x] = Some(softras::decision(faces, place));
+                    out[place.y * width + place.x] = Some(softras::decision(frame, faces, place));
                 }
             }
         }
@@ -353,7 +353,8 @@ fn singular_points_have_finite_derivatives() {
         let expected = if matches!(mode, Mode::Contour(_)) { 0.5 } else { 0.75 };
         assert!((on_outline - expected).abs() < 1e-4, "{on_outline}");
         // Grazing faces, and places before or behind everything.
-        for pose in [at(0.0, 0.0, 0.08), at(0.0, 0.0, -1.0), Isometry3::translation(f64::NAN, 0.0, 1.0)]
+        for pose in
+            [at(0.0, 0.0, 0.08), at(0.0, 0.0, -1.0), Isometry3::translation(f64::NAN, 0.0, 1.0)]
         {
             finite(&model, pose);
         }

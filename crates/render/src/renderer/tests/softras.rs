@@ -3,11 +3,18 @@
 use super::super::softras::SoftFaces;
 use super::*;
 
-/// Which faces count at a pixel, which is the nearest, and which is at the centre.
-pub(super) fn decision(faces: &SoftFaces, place: Place) -> Vec<u32> {
+/// Which faces count at a pixel, each with the branches that lead to its distance and coordinates, which is the nearest, and
+/// which is at the centre.
+pub(super) fn decision(frame: &Frame, faces: &SoftFaces, place: Place) -> Vec<u32> {
     let (all, inside) = faces.decision(place.block, place.i);
-    let mut out = all.to_vec();
-    out.sort_unstable();
+    let at = [place.x as f64, place.y as f64];
+    let mut pairs: Vec<(u32, u32)> = all
+        .iter()
+        .map(|&face| (face, faces.fragment(frame, face as usize, at).branches()))
+        .collect();
+    pairs.sort_unstable();
+    let mut out: Vec<u32> =
+        pairs.into_iter().flat_map(|(face, branches)| [face, branches]).collect();
     out.extend(all.first());
     out.extend(inside);
     out
@@ -39,7 +46,7 @@ fn the_background_has_the_weight_delta() {
 /// A face hidden behind as many as count still gives depth and face of its pixel: here all of them only spread to it.
 #[test]
 fn faces_behind_those_that_count_give_the_depth() {
-    let options = SoftRasOptions { faces_per_pixel: 1, blur_radius: 0.02, ..Default::default() };
+    let options = SoftRasOptions { sigma: 5e-3, blur_radius: 0.02, ..SoftRasOptions::default() };
     for (faces_per_pixel, seed) in [(1, 0.0), (2, 0.01)] {
         let options = SoftRasOptions { faces_per_pixel, ..options };
         let renderer = Renderer::new(lighting()).with_mode(Mode::SoftRas(options));
@@ -53,8 +60,9 @@ fn faces_behind_those_that_count_give_the_depth() {
         };
         let (middle, ends) = (render(0.0), [&render(-1e-6), &render(1e-6)]);
         let Visible::SoftRas(faces) = &middle.visible else { panic!("the other mode") };
-        let hidden = faces.regions().iter().enumerate().flat_map(|(b, region)| places(b, region));
-        let hidden = hidden.filter(|place| {
+        let regions = faces.regions();
+        let all = regions.iter().enumerate().flat_map(|(block, region)| places(block, region));
+        let hidden = all.filter(|place| {
             let (all, inside) = faces.decision(place.block, place.i);
             inside.is_some_and(|face| !all.contains(&face))
         });
