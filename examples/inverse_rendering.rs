@@ -1,7 +1,8 @@
 //! Recovers the texture of a vase and the lamp that lights it from six pictures, with Adam on the renderer's derivatives.
 //!
-//! `cargo run --release --example inverse_rendering [folder]` writes one view before, after and as photographed to the
-//! folder (`target/inverse_rendering` unless given).
+//! `cargo run --release --example inverse_rendering [folder]` writes one view before, after and as photographed, side by side
+//! and at four times the resolution of the photographs, to `before_after_target.png` in the folder (`target/inverse_rendering`
+//! unless given). `docs/images/inverse_rendering.png` is that picture.
 
 use std::f64::consts::TAU;
 use std::path::PathBuf;
@@ -159,11 +160,15 @@ fn main() -> anyhow::Result<()> {
     let found = &outcome.parameters;
     say("after ", found);
 
-    let picture = |x: &[f64]| -> anyhow::Result<RgbImage> {
-        let model = Arc::new(model_of(x)?);
-        Ok(Renderer::new(light_of(x)).render(&view(&model, 1)).buffers.to_rgb()?)
+    let enlarged = |renderer: &Renderer<Lighting>, model: &Arc<RenderModel>| {
+        let mut scene = view(model, 1);
+        scene.camera = scene.camera.scaled(4.0);
+        renderer.render(&scene).buffers.to_rgb()
     };
-    let target = photographer.render(&view(&painted, 1)).buffers.to_rgb()?;
+    let picture = |x: &[f64]| -> anyhow::Result<RgbImage> {
+        Ok(enlarged(&Renderer::new(light_of(x)), &Arc::new(model_of(x)?))?)
+    };
+    let target = enlarged(&photographer, &painted)?;
     let pictures = strip(&[picture(&start)?, picture(found)?, target])?;
     std::fs::create_dir_all(&folder).with_context(|| folder.clone())?;
     let path = PathBuf::from(folder).join("before_after_target.png");

@@ -93,9 +93,9 @@ fn an_image_loss_flows_back_through_a_rollout() {
         &[0.0; 12],
     );
     assert!((value - plain(&[0.0; 12])).abs() < 1e-9 * value && value > 1.0, "{value}");
-    let differences = finite_difference_gradient(plain, &[0.0; 12], 1e-5);
+    let differences = finite_difference_gradient(plain, &[0.0; 12], 1e-6);
     let norm = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
     let error: Vec<f64> = by.iter().zip(&differences).map(|(a, b)| a - b).collect();
-    // The differences also see changes of visibility, which are left out of the derivative.
-    assert!(norm(&error) < 1e-2 * norm(&differences), "{by:?} {differences:?}");
+    // The differences also see changes of visibility, which are left out of the derivative; over such a step they are rare.
+    assert!(norm(&error) < 1e-4 * norm(&differences), "{by:?} {differences:?}");
 }

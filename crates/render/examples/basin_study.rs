@@ -63,7 +63,7 @@ fn main() -> anyhow::Result<()> {
 fn start(seed: u64, angle: f64, shift: f64) -> Isometry3<f64> {
     let (turn, shift) = (direction(2 * seed + 1) * angle, direction(2 * seed) * shift);
     let twist = Vector6::new(shift.x, shift.y, shift.z, turn.x, turn.y, turn.z);
-    perturb_about(&truth(), &truth().translation.vector.into(), &twist)
+    perturb_about(&truth(), &truth().translation.vector, &twist)
 }
 
 /// What the camera sees of the bottle alone, averaged over 9 by 9 samples a pixel.

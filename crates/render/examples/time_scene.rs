@@ -1,18 +1,20 @@
-//! Times the renderer of scenes on a painted 16k-face body that covers about 12k pixels of a 640 x 480 image.
+//! Times the renderer of scenes in both modes, on the 16k-face bottle that covers about 12k pixels of a 640 x 480 image.
 //!
 //! `cargo run --release -p prehend-render --example time_scene`
+
+mod bottle;
 
 use std::sync::Arc;
 use std::time::Instant;
 
-use nalgebra::{Isometry3, Point3, Vector3};
-use prehend_geometry::shapes;
+use nalgebra::Vector3;
 use prehend_render::{
-    BufferAdjoints, Camera, Lamp, Light, Lighting, Material, RenderModel, Renderer, Scene, Shader,
+    BufferAdjoints, Lamp, Light, Lighting, Material, Mode, RenderModel, Renderer, Scene, Shader,
+    SoftRasOptions,
 };
 
 fn milliseconds<T>(mut work: impl FnMut() -> T) -> f64 {
-    let mut times: Vec<f64> = (0..21)
+    let mut times: Vec<f64> = (0..11)
         .map(|_| {
             let start = Instant::now();
             std::hint::black_box(work());
@@ -20,11 +22,10 @@ fn milliseconds<T>(mut work: impl FnMut() -> T) -> f64 {
         })
         .collect();
     times.sort_by(f64::total_cmp);
-    times[10]
+    times[5]
 }
 
-fn time(name: &str, scene: &Scene, shader: impl Shader + Clone) {
-    let renderer = Renderer::new(shader);
+fn time(name: &str, scene: &Scene, renderer: &Renderer<impl Shader + Clone>) {
     let rendering = renderer.render(scene);
     let drawn = rendering.buffers.alpha.iter().filter(|a| **a > 0.0).count();
     let color = rendering.buffers.color.iter().map(|c| c.map(|v| v - 0.5)).collect();
@@ -39,17 +40,21 @@ fn time(name: &str, scene: &Scene, shader: impl Shader + Clone) {
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let mut mesh = shapes::superellipsoid([0.05, 0.04, 0.06], [0.8, 0.8], 128);
-    let color = |p: &Point3<f64>| [p.x, p.y, p.z].map(|v| (0.5 + 0.4 * (90.0 * v).sin()) as f32);
-    mesh.colors = Some(mesh.vertices.iter().map(color).collect());
-    let camera = Camera { fx: 580.0, fy: 580.0, cx: 319.5, cy: 239.5, width: 640, height: 480 };
-    let model = Arc::new(RenderModel::new(&mesh)?);
+    let (_, sides, rings) = bottle::SIZES[1];
+    let model = Arc::new(RenderModel::new(&bottle::bottle(sides, rings))?);
     println!("{} faces", model.face_count());
-    let scene = Scene::new(camera).with(model, Isometry3::translation(0.0, 0.0, 0.45));
-    time("first-order light", &scene, Light::headlight(0.4, 0.5));
+    let scene = Scene::new(bottle::camera(false)).with(model, bottle::truth());
     let towards = Vector3::new(-0.3, -0.8, -1.0);
     let lamp = Lamp::Directional { towards, strength: [0.5; 3] };
     let material = Material::BlinnPhong { specular: 0.3, shininess: 20.0 };
-    time("lamp, Blinn-Phong", &scene, Lighting { ambient: [0.3; 3], lamps: vec![lamp], material });
+    let lamps = Lighting { ambient: [0.3; 3], lamps: vec![lamp], material };
+    for (name, mode) in
+        [("contour", Mode::default()), ("SoftRas", Mode::SoftRas(SoftRasOptions::default()))]
+    {
+        let first_order = Renderer::new(Light::headlight(0.4, 0.5)).with_mode(mode);
+        time(&format!("{name}, first-order light"), &scene, &first_order);
+        let phong = Renderer::new(lamps.clone()).with_mode(mode);
+        time(&format!("{name}, lamp with Blinn-Phong"), &scene, &phong);
+    }
     Ok(())
 }

@@ -21,11 +21,14 @@ pub(crate) struct Inner {
 
 /// Picks the visible inner contours among silhouette pieces that are not part of the outline: the surface seen one
 /// pixel outside is farther than the edge by more than `least` \[m\], and one pixel inside it is not.
+///
+/// `least` is given the faces at the edge and outside. It is None for those of different objects, whose border is a
+/// contour whatever the step (they may touch there), if it is the edge's own object that is seen inside.
 pub(crate) fn inner_contours(
     projected: &Projected,
     visible: &[Visible],
     pieces: Vec<Piece>,
-    least: f32,
+    least: impl Fn(u32, u32) -> Option<f32>,
 ) -> Vec<Inner> {
     let seen = |x: f32, y: f32| {
         let (x, y) = (x.round(), y.round());
@@ -53,7 +56,11 @@ pub(crate) fn inner_contours(
         let (behind, front) = (beside(1.0)?, beside(-1.0)?);
         let step = 1.0 / behind.3 - z;
         let split = z + 0.5 * step;
-        (step > least && 1.0 / front.3 < split).then_some(Inner { piece, behind, split })
+        let shown = match least(piece.face, behind.2) {
+            Some(least) => step > least && 1.0 / front.3 < split,
+            None => least(piece.face, front.2).is_some(),
+        };
+        shown.then_some(Inner { piece, behind, split })
     };
     pieces.into_iter().filter_map(select).collect()
 }

@@ -28,7 +28,7 @@ pub(crate) use inner::{Inner, LEAST_STEP, inner_contours};
 use lanes::Waiting;
 pub use light_samples::light_samples;
 pub(crate) use outline::{Band, Piece, Silhouette, outline};
-pub(crate) use pixel::Scene;
+pub(crate) use pixel::{Scene, falling_step};
 pub(crate) use surface::{Lighting, Shaded, posed_normal, shade};
 
 /// A posed model with its contours.
@@ -66,7 +66,7 @@ impl<'a> ContourView<'a> {
             },
         );
         let least = LEAST_STEP * model.radius() as f32;
-        let inner = inner_contours(projected, &visible, silhouette.covered, least);
+        let inner = inner_contours(projected, &visible, silhouette.covered, |_, _| Some(least));
         let twist_center = center.coords.cast();
         let scene = Scene { posed, lighting, half_width, twist_center };
         Self { scene, region, pieces: silhouette.outline, inner, visible }

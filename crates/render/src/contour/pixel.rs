@@ -1,6 +1,6 @@
 //! The blended value of one pixel and its derivatives by the pose.
 
-use nalgebra::Vector3;
+use nalgebra::{RealField, Vector3, convert};
 
 use super::inner::Inner;
 use super::interior::{Motion, add_level, barycentric, row};
@@ -20,9 +20,10 @@ pub(crate) struct Scene<'a> {
 
 /// The smooth step from 1 at −w to 0 at +w, and its derivative.
 #[inline]
-pub(crate) fn falling_step(s: f32, w: f32) -> (f32, f32) {
-    let x = ((w - s) / (2.0 * w)).clamp(0.0, 1.0);
-    (x * x * (3.0 - 2.0 * x), -3.0 * x * (1.0 - x) / w)
+pub(crate) fn falling_step<T: RealField + Copy>(s: T, w: T) -> (T, T) {
+    let (one, two, three): (T, T, T) = (T::one(), convert(2.0), convert(3.0));
+    let x = ((w - s) / (two * w)).clamp(T::zero(), one);
+    (x * x * (three - two * x), -three * x * (one - x) / w)
 }
 
 impl Scene<'_> {

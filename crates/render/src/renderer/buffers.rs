@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 
+use super::pixel::Pixel;
 use crate::camera::Camera;
 use crate::image::{DepthImage, ImageError, RgbImage};
 
@@ -25,11 +26,11 @@ pub struct Buffers {
     pub color: Vec<[f64; 3]>,
     /// Coverage, 0..=1.
     pub alpha: Vec<f64>,
-    /// Z of the surface at the pixel's centre \[m\], 0 where there is none.
+    /// Z of the nearest face that contains the pixel's centre \[m\], 0 where there is none.
     pub depth: Vec<f64>,
     /// Its unit normal on the side that is seen, camera frame; zero where there is none.
     pub normal: Vec<Vector3<f64>>,
-    /// The face at the pixel's centre.
+    /// The nearest face that contains the pixel's centre.
     pub face: Vec<Option<FaceId>>,
 }
 
@@ -46,6 +47,14 @@ impl Buffers {
             normal: vec![Vector3::zeros(); count],
             face: vec![None; count],
         }
+    }
+
+    pub(super) fn set(&mut self, at: usize, pixel: &Pixel, id: impl Fn(usize) -> FaceId) {
+        self.color[at] = pixel.color;
+        self.alpha[at] = pixel.alpha;
+        self.depth[at] = pixel.depth;
+        self.normal[at] = pixel.normal;
+        self.face[at] = pixel.face.map(id);
     }
 
     /// The colours as an image.

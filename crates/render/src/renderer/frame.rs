@@ -33,15 +33,16 @@ pub(super) struct Frame {
     pub(super) position: Vec<Vector3<f64>>,
     /// Faces of all bodies, as indices into `position`.
     pub(super) faces: Vec<[u32; 3]>,
-    /// Per face: 1 seen from outside, -1 seen from inside, 0 not drawn.
+    /// Per face: -1 if it is lit as seen from inside; else 1 seen from outside, 0 not drawn.
     pub(super) facing: Vec<i8>,
 }
 
 /// The same scene projected in f32, for the discrete part: what is visible.
 pub(super) struct Flat {
     edges: Vec<Edge>,
-    screen: Vec<[f32; 3]>,
-    region: Region,
+    /// Column, row \[px\] and 1/Z \[1/m\]; 1/Z is 0 where it is not in front of the camera.
+    pub(super) screen: Vec<[f32; 3]>,
+    pub(super) region: Region,
 }
 
 impl Frame {

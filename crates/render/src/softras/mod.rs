@@ -48,10 +48,11 @@ use crate::model::RenderModel;
 use crate::pose_loss::{Seen, View};
 use crate::posed::Posed;
 use crate::projected::Region;
-use candidates::{Candidates, RUN};
-use face::Face;
+pub(crate) use candidates::{Candidates, RUN};
+pub(crate) use face::Face;
+pub(crate) use pixel::LEAST_SHARE;
 use pixel::{Scene, Scratch};
-pub(crate) use settings::Settings;
+pub(crate) use settings::{BACKGROUND, Settings};
 
 /// Rows whose faces are listed together.
 const BAND: usize = 8;

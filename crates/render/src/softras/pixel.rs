@@ -15,7 +15,7 @@ use crate::pose_loss::{Pixel, Row, Seen};
 use crate::posed::Posed;
 
 /// What has a smaller share of the pixel is left out: 64 such fragments are less than 1e-6 of its colour.
-const LEAST_SHARE: f32 = 1e-8;
+pub(crate) const LEAST_SHARE: f32 = 1e-8;
 
 const MOST: usize = SoftRasOptions::MOST_FACES;
 

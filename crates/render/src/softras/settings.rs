@@ -7,7 +7,7 @@ use crate::mode::SoftRasOptions;
 const SMALL: f64 = 1e-8;
 
 /// Inverse depth and weight of the background.
-const BACKGROUND: f64 = 1e-10;
+pub(crate) const BACKGROUND: f64 = 1e-10;
 
 /// [`SoftRasOptions`] with lengths in pixels instead of normalised device coordinates (NDC).
 #[derive(Clone, Copy, Debug)]

@@ -1,4 +1,4 @@
-//! The renderer against the loss of a pose and against finite differences of its own images.
+//! Derivatives against finite differences of the mode's own images.
 
 use std::sync::Arc;
 
@@ -10,10 +10,19 @@ use prehend_geometry::{SplitMix64, Texture, TriMesh};
 use super::*;
 use crate::camera::Camera;
 use crate::light::Light;
+use crate::mode::{ContourOptions, SoftRasOptions};
 use crate::model::RenderModel;
-use crate::pose_loss::PoseLoss;
 use crate::shading::{Lamp, Lighting, Material};
 use crate::shapes_for_tests::{lump, painted, torus};
+
+mod contour;
+mod equality;
+mod softras;
+
+/// Both, with their default options.
+fn modes() -> [Mode; 2] {
+    [Mode::Contour(ContourOptions::default()), Mode::SoftRas(SoftRasOptions::default())]
+}
 
 fn camera() -> Camera {
     Camera { fx: 150.0, fy: 160.0, cx: 47.3, cy: 35.6, width: 96, height: 72 }
@@ -63,37 +72,24 @@ fn scene() -> Scene {
     scene
 }
 
-/// What was decided about each pixel: while this stays the same, the pixel is a smooth function. None where the nearest
-/// point of a contour is the end of a piece within an edge, which is where the visibility of the contour changes, and on
-/// faces seen within 3 degrees of their plane, where colours are so steep that differences are no measure.
-fn decisions<Sh: Shader>(rendering: &Rendering<Sh>) -> Vec<Option<[u32; 8]>> {
+/// What was decided about each pixel: while this stays the same, the pixel is a smooth function. None where that is not so.
+fn decisions<Sh: Shader>(rendering: &Rendering<Sh>) -> Vec<Option<Vec<u32>>> {
     let mut out = vec![None; rendering.buffers.alpha.len()];
-    for block in &rendering.blocks {
-        for i in 0..block.visible.face.len() {
-            let decision = rendering.decision(block, i);
-            let ends_here = |piece: &Piece| {
-                let t = piece.foot(decision.x as f32, decision.y as f32).t;
-                let [low, high] = piece.range;
-                (low > 0.0 && t <= low) || (high < 1.0 && t >= high)
-            };
-            let pieces = [decision.edge, decision.inner.map(|inner| &inner.piece)];
-            let grazes = |face: usize| {
-                let [a, b, c] = rendering.frame.corners(face);
-                let ray = rendering.frame.camera.ray(decision.x as f64, decision.y as f64);
-                ray.normalize().dot(&(b - a).cross(&(c - a)).normalize()).abs() < 0.05
-            };
-            let (u, v, face, _) = decision.inner.map_or((0.0, 0.0, MISS, 0.0), |i| i.behind);
-            let behind = (face != MISS).then_some(face as usize);
-            if pieces.into_iter().flatten().any(ends_here)
-                || decision.face.into_iter().chain(behind).any(grazes)
-            {
-                continue;
+    let (frame, width) = (&rendering.frame, rendering.buffers.width);
+    match &rendering.visible {
+        Visible::Contour(contours) => {
+            for (block, region) in contours.regions().iter().enumerate() {
+                for place in places(block, region) {
+                    out[place.y * width + place.x] = contour::decision(frame, contours, place);
+                }
             }
-            let [[a, b], [c, d]] =
-                pieces.map(|p| p.map_or([MISS; 2], |p| [p.face, u32::from(p.corners[0])]));
-            let own = decision.face.map_or(MISS, |face| face as u32);
-            out[decision.y * rendering.buffers.width + decision.x] =
-                Some([own, a, b, c, d, u as u32, v as u32, face]);
+        }
+        Visible::SoftRas(faces) => {
+            for (block, region) in faces.regions().iter().enumerate() {
+                for place in places(block, region) {
+                    out[place.y * width + place.x] = Some(softras::decision(frame, faces, place));
+                }
+            }
         }
     }
     out
@@ -163,37 +159,13 @@ fn check_edit(
     edit: impl Fn(&mut Scene, &mut Renderer<Lighting>, f64),
     along: impl Fn(&SceneGradient) -> f64,
 ) {
-    let render = |amount: f64| {
-        let (mut scene, mut renderer) = (scene(), Renderer::new(lighting()));
-        edit(&mut scene, &mut renderer, amount);
-        renderer.render(&scene)
-    };
-    check(&render(0.0), [&render(-step), &render(step)], 2.0 * step, along);
-}
-
-#[test]
-fn one_object_looks_as_the_loss_of_its_pose_sees_it() {
-    let light = Light::headlight(0.4, 0.6);
-    for mesh in [painted(torus(0.05, 0.018, 16), 0.08), painted(lump(0.05, 20), 0.06)] {
-        let model = Arc::new(RenderModel::new(&mesh).unwrap());
-        for pose in [at(0.0, 0.0, 0.4), at(0.12, -0.02, 0.35)] {
-            let picture = PoseLoss::default().render(&model, &pose, &camera(), &light);
-            let scene = Scene::new(camera()).with(model.clone(), pose);
-            let ours = Renderer::new(light).render(&scene).buffers;
-            let mut sum = 0.0;
-            for at in 0..ours.alpha.len() {
-                assert!((ours.alpha[at] - f64::from(picture.coverage[at])).abs() < 1e-5);
-                assert!((ours.depth[at] - f64::from(picture.depth.pixels()[at])).abs() < 1e-5);
-                for k in 0..3 {
-                    let theirs = f64::from(picture.color.pixels()[at][k]);
-                    let ours = ours.color[at][k];
-                    // Single precision errs most on grazing faces.
-                    assert!((ours - theirs).abs() < 5e-5, "pixel {at}: {ours} {theirs}");
-                    sum += (ours - theirs).abs();
-                }
-            }
-            assert!(sum / (3.0 * ours.alpha.len() as f64) < 1e-6, "{sum}");
-        }
+    for mode in modes() {
+        let render = |amount: f64| {
+            let (mut scene, mut renderer) = (scene(), Renderer::new(lighting()).with_mode(mode));
+            edit(&mut scene, &mut renderer, amount);
+            renderer.render(&scene)
+        };
+        check(&render(0.0), [&render(-step), &render(step)], 2.0 * step, &along);
     }
 }
 
@@ -268,14 +240,16 @@ fn check_versions(
     versions: [RenderModel; 2],
     along: impl Fn(&ObjectGradient) -> f64,
 ) {
-    let renderer = Renderer::new(lighting());
-    let middle = renderer.render(&scene());
-    let ends = versions.map(|model| {
-        let mut scene = scene();
-        scene.objects[object].model = Arc::new(model);
-        renderer.render(&scene)
-    });
-    check(&middle, [&ends[0], &ends[1]], 1.0, |gradient| along(&gradient.objects[object]));
+    for mode in modes() {
+        let renderer = Renderer::new(lighting()).with_mode(mode);
+        let middle = renderer.render(&scene());
+        let ends = versions.clone().map(|model| {
+            let mut scene = scene();
+            scene.objects[object].model = Arc::new(model);
+            renderer.render(&scene)
+        });
+        check(&middle, [&ends[0], &ends[1]], 1.0, |gradient| along(&gradient.objects[object]));
+    }
 }
 
 #[test]
@@ -341,26 +315,28 @@ fn the_inside_of_an_open_mesh_matches_differences() {
     let direction = Vector6::new(0.01, -0.02, 0.03, 0.3, -0.2, 0.1);
     let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.3, -0.2, 0.1));
     let pose = Isometry3::from_parts(Translation3::new(0.0, 0.0, 0.4), turn);
-    let renderer = Renderer::new(lighting());
-    let render = |amount: f64| {
-        let center = (pose * model.center()).coords;
-        let pose = perturb_about(&pose, &center, &(direction * amount));
-        renderer.render(&Scene::new(camera()).with(model.clone(), pose))
-    };
-    let middle = render(0.0);
-    assert!(middle.frame.facing.contains(&-1));
-    check(&middle, [&render(-1e-5), &render(1e-5)], 2e-5, |g| g.objects[0].twist.dot(&direction));
+    for mode in modes() {
+        let renderer = Renderer::new(lighting()).with_mode(mode);
+        let render = |amount: f64| {
+            let center = (pose * model.center()).coords;
+            let pose = perturb_about(&pose, &center, &(direction * amount));
+            renderer.render(&Scene::new(camera()).with(model.clone(), pose))
+        };
+        let (middle, ends) = (render(0.0), [&render(-1e-5), &render(1e-5)]);
+        assert!(middle.frame.facing.contains(&-1));
+        check(&middle, ends, 2e-5, |g| g.objects[0].twist.dot(&direction));
+    }
 }
 
 #[test]
 fn singular_points_have_finite_derivatives() {
     // The box's outline runs through pixel centres, exactly: 31.5 ± 10 columns and 23.5 ± 10 rows.
     let camera = Camera { fx: 100.0, fy: 100.0, cx: 31.0, cy: 23.0, width: 64, height: 48 };
-    let mut model = RenderModel::new(&cuboid(Vector3::repeat(0.125))).unwrap();
+    let model = RenderModel::new(&cuboid(Vector3::repeat(0.125))).unwrap();
     let pose = Isometry3::translation(0.0, 0.0, 0.6875);
-    let finite = |model: &RenderModel, pose: Isometry3<f64>| {
+    let finite_in = |mode: Mode, model: &RenderModel, pose: Isometry3<f64>| {
         let scene = Scene::new(camera).with(Arc::new(model.clone()), pose);
-        let rendering = Renderer::new(lighting()).render(&scene);
+        let rendering = Renderer::new(lighting()).with_mode(mode).render(&scene);
         let gradient = rendering.vjp(&adjoints(64 * 48));
         let object = &gradient.objects[0];
         assert!(rendering.buffers.color.iter().flatten().all(|c| c.is_finite()));
@@ -369,26 +345,33 @@ fn singular_points_have_finite_derivatives() {
         assert!(gradient.shader.iter().chain(&gradient.intrinsics).all(|g| g.is_finite()));
         (rendering, gradient)
     };
-    let (rendering, _) = finite(&model, pose);
-    let on_outline = rendering.buffers.alpha[23 * 64 + 21];
-    assert!((on_outline - 0.5).abs() < 1e-4, "{on_outline}");
-    // Grazing faces, and places before or behind everything.
-    for pose in [at(0.0, 0.0, 0.08), at(0.0, 0.0, -1.0), Isometry3::translation(f64::NAN, 0.0, 1.0)]
-    {
+    for mode in modes() {
+        let finite = |model: &RenderModel, pose: Isometry3<f64>| finite_in(mode, model, pose);
+        let (rendering, _) = finite(&model, pose);
+        let on_outline = rendering.buffers.alpha[23 * 64 + 21];
+        // Two faces that meet there, each half present, cover three quarters.
+        let expected = if matches!(mode, Mode::Contour(_)) { 0.5 } else { 0.75 };
+        assert!((on_outline - expected).abs() < 1e-4, "{on_outline}");
+        // Grazing faces, and places before or behind everything.
+        for pose in
+            [at(0.0, 0.0, 0.08), at(0.0, 0.0, -1.0), Isometry3::translation(f64::NAN, 0.0, 1.0)]
+        {
+            finite(&model, pose);
+        }
+        let (_, gradient) = finite(&model, at(0.0, 0.0, -1.0));
+        assert_eq!(gradient.objects[0].twist, Vector6::zeros());
+        let mut model = model.clone();
+        model.normals.fill([Vector3::zeros(); 3]);
         finite(&model, pose);
     }
-    let (_, gradient) = finite(&model, at(0.0, 0.0, -1.0));
-    assert_eq!(gradient.objects[0].twist, Vector6::zeros());
-    model.normals.fill([Vector3::zeros(); 3]);
-    finite(&model, pose);
 }
 
 #[test]
 fn bits_do_not_depend_on_threads() {
-    let bits = |threads: usize| {
+    let bits = |mode: Mode, threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
-            let rendering = Renderer::new(lighting()).render(&scene());
+            let rendering = Renderer::new(lighting()).with_mode(mode).render(&scene());
             let gradient = rendering.vjp(&adjoints(96 * 72));
             (
                 rendering.buffers,
@@ -398,6 +381,8 @@ fn bits_do_not_depend_on_threads() {
             )
         })
     };
-    let one = bits(1);
-    assert!(one == bits(2) && one == bits(3));
+    for mode in modes() {
+        let one = bits(mode, 1);
+        assert!(one == bits(mode, 2) && one == bits(mode, 3));
+    }
 }
