@@ -94,7 +94,6 @@ impl Light {
     pub fn corrected(&self, affine: &Affine) -> Self {
         let mut light = *self;
         for k in 0..3 {
-            // The factor is clipped at zero, so that a negative gain would not be one of light.
             let gain = affine.gain[k];
             light.ambient[k] *= gain;
             light.directional[k] *= gain;

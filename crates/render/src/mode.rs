@@ -25,6 +25,17 @@ pub struct ContourOptions {
     pub half_width: f64,
 }
 
+impl ContourOptions {
+    /// The band at which pixels with `samples` samples, across and down, blur as much as these options ask for: the step
+    /// spreads by a variance of w²/5, the samples by (s² − 1)/12s² of a pixel. It is no narrower than what a sample needs.
+    pub(crate) fn finer(&self, samples: usize) -> Self {
+        let s2 = (samples * samples) as f64;
+        let least = 5.0 / 12.0;
+        let left = s2 * self.half_width * self.half_width - least * (s2 - 1.0);
+        if samples == 1 { *self } else { Self { half_width: left.max(least).sqrt() } }
+    }
+}
+
 impl Default for ContourOptions {
     /// A band of one pixel.
     fn default() -> Self {

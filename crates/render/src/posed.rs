@@ -77,17 +77,12 @@ fn project(focal: [f32; 2], principal: [f32; 2], p: [f32; 3]) -> [f32; 3] {
     [focal[0] * p[0] * w + principal[0], focal[1] * p[1] * w + principal[1], w]
 }
 
-/// The level at which interpolated texels blur as much as a pixel that averages over its square, relative to the one whose
-/// texels are as large as the pixel, log₂ √⅓: averages over texels, interpolated, spread by a variance of (1/12 + 1/6) texels²,
-/// the pixel by 1/12 of its own size squared.
-const SHARPER: f64 = -0.792_481_250_360_578;
-
 /// Pyramid level of the texture and its derivative by the centre's depth `z`. One level for the whole object, from its
 /// distance: smooth in the pose, so that the loss is too.
 pub(crate) fn level(model: &RenderModel, camera: &Camera, z: f64) -> (f64, f64) {
     let crate::model::Albedo::Texture(map, _) = &model.albedo else { return (0.0, 0.0) };
     let texels_a_pixel = model.texel_density * z / (0.5 * (camera.fx + camera.fy));
-    let level = texels_a_pixel.log2() + SHARPER;
+    let level = texels_a_pixel.log2();
     let last = map.last_level() as f64;
     // Also false for the NaN of an object behind the camera.
     if level > 0.0 && level < last {

@@ -24,6 +24,12 @@ impl Region {
         self.x1 - self.x0
     }
 
+    /// The same rectangle in an image of `factor` times the resolution.
+    pub(crate) fn scaled(&self, factor: usize) -> Self {
+        let Self { x0, y0, x1, y1 } = *self;
+        Self { x0: x0 * factor, y0: y0 * factor, x1: x1 * factor, y1: y1 * factor }
+    }
+
     /// The smallest rectangle around both.
     pub(crate) fn union(&self, other: &Self) -> Self {
         if *self == Self::EMPTY {

@@ -14,7 +14,7 @@ use super::sums::Sums;
 /// A correction of the rendered object's colours: `gain * colour + offset` in each channel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Affine {
-    /// Factor of each channel.
+    /// Factor of each channel, at least 0: no light turns bright into dark.
     pub gain: [f64; 3],
     /// Added to each channel.
     pub offset: [f64; 3],
@@ -89,9 +89,18 @@ impl Residuals<'_> {
         let mut sums = Sums::new();
         blocks.iter().for_each(|(part, _)| sums.merge(part));
         let mut reduction = Matrix6::zeros();
-        for channel in merged(blocks.into_iter().map(|(_, channels)| channels).collect()) {
-            if let Some(inverse) = pulled(&channel.square).try_inverse() {
-                reduction += channel.cross * inverse * channel.cross.transpose();
+        let channels = merged(blocks.into_iter().map(|(_, channels)| channels).collect());
+        for (channel, gain) in channels.iter().zip(affine.gain) {
+            let mut square = pulled(&channel.square);
+            let mut cross = channel.cross;
+            if gain == 0.0 {
+                // At its bound, and so no longer free.
+                square[(0, 1)] = 0.0;
+                square[(1, 0)] = 0.0;
+                cross.column_mut(0).fill(0.0);
+            }
+            if let Some(inverse) = square.try_inverse() {
+                reduction += cross * inverse * cross.transpose();
             }
         }
         Corrected { sums, affine, reduction }
@@ -151,9 +160,12 @@ impl Residuals<'_> {
                 let square = pulled(&channel.square);
                 let pull = square - channel.square;
                 let right = channel.right + pull * Vector2::new(1.0, 0.0);
-                let Some(best) = square.try_inverse().map(|inverse| inverse * right) else {
+                let Some(mut best) = square.try_inverse().map(|inverse| inverse * right) else {
                     continue;
                 };
+                if best[0] < 0.0 {
+                    best = Vector2::new(0.0, right[1] / square[(1, 1)]);
+                }
                 if best.iter().all(|v| v.is_finite()) {
                     let new = (best[0], best[1]);
                     change = change.max((new.0 - affine.gain[k]).abs());

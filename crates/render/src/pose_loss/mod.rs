@@ -1,6 +1,7 @@
 //! The loss of a pose: a posed object compared with a segmented image, with exact derivatives by the pose.
 
 mod affine;
+mod averaged;
 mod check;
 mod lane;
 mod options;
@@ -15,6 +16,7 @@ use nalgebra::{Isometry3, Matrix6, Point3, Vector6};
 
 pub use affine::Affine;
 use affine::Corrected;
+use averaged::Averaged;
 pub use check::OptionError;
 pub(crate) use lane::{LANES, Lane, Patch, get, put};
 pub use options::{DepthOptions, LossOptions, Robust};
@@ -32,6 +34,9 @@ use crate::mode::Mode;
 use crate::model::RenderModel;
 use crate::projected::Region;
 use crate::softras::SoftRasView;
+
+/// The largest [`PoseLoss::samples`].
+const MOST_SAMPLES: usize = 16;
 
 /// Renders a posed object and compares it with a segmented image.
 ///
@@ -59,12 +64,22 @@ use crate::softras::SoftRasView;
 /// behind the camera, or within a millimetre of its plane, are not drawn. Results do not depend on the number of
 /// threads. A pose that is not finite, or puts the object behind the camera or outside the image, renders nothing:
 /// the loss is then that of the whole mask missed, with zero gradient.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoseLoss {
     /// How visibility is softened.
     pub mode: Mode,
     /// What is compared.
     pub options: LossOptions,
+    /// The object is drawn with so many samples a pixel, across and down (1..=16). One takes the colour at the pixel's
+    /// centre, and its derivative, for that of the whole pixel; with more the loss is nearer to that of a camera, whose pixels
+    /// average over creases and fine texture, and takes longer accordingly.
+    pub samples: usize,
+}
+
+impl Default for PoseLoss {
+    fn default() -> Self {
+        Self::new(Mode::default(), LossOptions::default())
+    }
 }
 
 /// The loss of a pose: weighted squared residuals over three times the area of the target's mask \[px\], so that
@@ -116,7 +131,12 @@ pub struct PoseImage {
 impl PoseLoss {
     /// A loss of the given settings.
     pub fn new(mode: Mode, options: LossOptions) -> Self {
-        Self { mode, options }
+        Self { mode, options, samples: 1 }
+    }
+
+    /// The same with `samples` by `samples` samples a pixel.
+    pub fn with_samples(self, samples: usize) -> Self {
+        Self { samples, ..self }
     }
 
     /// The loss of `model` at pose `t_cam_object` under `light`.
@@ -158,16 +178,45 @@ impl PoseLoss {
         camera: &Camera,
         light: &Light,
     ) -> PoseImage {
+        struct Picture<'a>(&'a Camera);
+
+        impl Task for Picture<'_> {
+            type Output = PoseImage;
+
+            fn run(self, view: &impl View) -> PoseImage {
+                picture(view, self.0)
+            }
+        }
+
         let (center, also) = (Point3::origin(), Region::EMPTY);
+        self.view(model, t_cam_object, &center, camera, light, &also, Picture(camera))
+    }
+
+    /// Runs a task on the view that the mode and the samples ask for.
+    #[allow(clippy::too_many_arguments)] // a view's own, and the task
+    fn view<T: Task>(
+        &self,
+        model: &RenderModel,
+        pose: &Isometry3<f64>,
+        center: &Point3<f64>,
+        camera: &Camera,
+        light: &Light,
+        also: &Region,
+        task: T,
+    ) -> T::Output {
+        let samples = self.samples.clamp(1, MOST_SAMPLES);
+        let fine = camera.scaled(samples as f64);
+        let also = also.scaled(samples);
         match &self.mode {
-            Mode::Contour(options) => picture(
-                &ContourView::new(options, model, t_cam_object, &center, camera, light, &also),
-                camera,
-            ),
-            Mode::SoftRas(options) => picture(
-                &SoftRasView::new(options, model, t_cam_object, &center, camera, light, &also),
-                camera,
-            ),
+            Mode::Contour(options) => {
+                let options = options.finer(samples);
+                let view = ContourView::new(&options, model, pose, center, &fine, light, &also);
+                if samples == 1 { task.run(&view) } else { task.run(&Averaged::new(view, samples)) }
+            }
+            Mode::SoftRas(options) => {
+                let view = SoftRasView::new(options, model, pose, center, &fine, light, &also);
+                if samples == 1 { task.run(&view) } else { task.run(&Averaged::new(view, samples)) }
+            }
         }
     }
 
@@ -185,20 +234,28 @@ impl PoseLoss {
         light: &Light,
         target: &Target,
     ) -> Corrected {
+        struct Total<'a, const DERIVATIVES: bool>(Residuals<'a>);
+
+        impl<const DERIVATIVES: bool> Task for Total<'_, DERIVATIVES> {
+            type Output = Corrected;
+
+            fn run(self, view: &impl View) -> Corrected {
+                self.0.total::<DERIVATIVES>(view)
+            }
+        }
+
         let (camera, also) = (&target.camera, &target.bounds);
-        let residuals = Residuals { options: &self.options, target };
+        let task = Total::<DERIVATIVES>(Residuals { options: &self.options, target });
         // One of rayon's threads takes all of it, or each of its parallel loops would hand over and wait.
-        rayon::scope(|_| match &self.mode {
-            Mode::Contour(options) => {
-                let view = ContourView::new(options, model, pose, center, camera, light, also);
-                residuals.total::<DERIVATIVES>(&view)
-            }
-            Mode::SoftRas(options) => {
-                let view = SoftRasView::new(options, model, pose, center, camera, light, also);
-                residuals.total::<DERIVATIVES>(&view)
-            }
-        })
+        rayon::scope(|_| self.view(model, pose, center, camera, light, also, task))
     }
+}
+
+/// Something to do with a view of whatever kind.
+trait Task {
+    type Output;
+
+    fn run(self, view: &impl View) -> Self::Output;
 }
 
 fn picture(view: &impl View, camera: &Camera) -> PoseImage {

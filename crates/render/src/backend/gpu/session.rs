@@ -55,6 +55,9 @@ impl GpuSession {
             let device = device.name.clone();
             BackendError::Unsupported { device, what }
         };
+        if problem.loss.samples > 1 {
+            return Err(unsupported("more than one sample a pixel"));
+        }
         if problem.loss.options.affine {
             return Err(unsupported("an affine correction"));
         }

@@ -57,6 +57,28 @@ fn the_correction_is_the_best_and_makes_a_light() {
     assert!(at.jtj.symmetric_eigenvalues().min() > 0.0);
 }
 
+/// The negative of a picture is no picture of the object in another light.
+#[test]
+fn bright_does_not_become_dark() {
+    let (model, guess, target) = problem(65);
+    let mut negative = target.clone();
+    for (color, coverage) in negative.color.iter_mut().zip(&target.coverage) {
+        *color = color.map(|c| if *coverage > 0.0 { 1.0 - c } else { 0.0 });
+    }
+    let free = PoseLoss::new(Mode::default(), LossOptions { affine: true, ..full_options() });
+    let fixed = PoseLoss::new(Mode::default(), full_options());
+    let center = guess * model.center();
+    let at = free.linearise(&model, &guess, &center, &lamp(), &negative);
+    let affine = at.affine.unwrap();
+    assert_eq!(affine.gain, [0.0; 3]);
+    let light = lamp().corrected(&affine);
+    let corrected = fixed.linearise(&model, &guess, &center, &light, &negative);
+    assert!((corrected.loss.total - at.loss.total).abs() < 1e-6 * at.loss.total);
+    assert!(at.jtj.symmetric_eigenvalues().min() > -1e-9 * at.jtj.norm());
+    let (cosine, error) = compare_gradient(&free, &model, &guess, &lamp(), &negative);
+    assert!(cosine > 0.999 && error < 0.04, "{cosine} {error}");
+}
+
 #[test]
 fn with_nothing_to_correct_nothing_is() {
     let (model, _, target) = problem(64);
