@@ -2,12 +2,13 @@
 
 use rayon::prelude::*;
 
-use super::pixel::{Pixel, Row, Seen, View};
+use super::pixel::{Pixel, Row, Seen, View, scaled_sum};
 
 /// A view whose pixels are the means of `samples` by `samples` pixels of a finer one.
 ///
 /// A camera's pixel averages over its area, and so do the colours, the coverage and the rows of these: creases, fine
-/// texture and folds count for as much of a pixel as they fill. Depth is the mean over the part that shows a face.
+/// texture and folds count for as much of a pixel as they fill. Depth is the mean over the part that shows a face, by the weight
+/// that it has there, so that it does not jump as an outline passes over the samples.
 pub(crate) struct Averaged<V> {
     fine: V,
     samples: usize,
@@ -18,9 +19,11 @@ pub(crate) struct Averaged<V> {
 struct Accumulated {
     /// Colours, coverage and weight of depth, with their rows.
     sum: Pixel,
-    /// Depth and its row where a face is hit, and elsewhere.
-    hit: [f32; 7],
-    beside: f32,
+    /// Depth times its weight, with its row, where a face is hit.
+    weighted: f32,
+    weighted_row: Row,
+    /// Depth of all that is seen.
+    depth: f32,
     hits: usize,
     seen: usize,
     near_outline: bool,
@@ -36,12 +39,11 @@ impl Accumulated {
         self.near_outline |= near_outline;
         (0..3).for_each(|k| self.sum.color[k] += pixel.color[k]);
         self.sum.coverage += pixel.coverage;
+        self.depth += pixel.z;
         if *hit {
             self.hits += 1;
             self.sum.depth_weight += pixel.depth_weight;
-            self.hit[6] += pixel.z;
-        } else {
-            self.beside += pixel.z;
+            self.weighted += pixel.depth_weight * pixel.z;
         }
         if !DERIVATIVES {
             return;
@@ -51,7 +53,9 @@ impl Accumulated {
         }
         add(&mut self.sum.coverage_row, &pixel.coverage_row);
         if *hit {
-            self.hit.iter_mut().zip(&pixel.z_row).for_each(|(a, b)| *a += b);
+            let row =
+                scaled_sum(pixel.depth_weight, &pixel.z_row, pixel.z, &pixel.depth_weight_row);
+            add(&mut self.weighted_row, &row);
             add(&mut self.sum.depth_weight_row, &pixel.depth_weight_row);
         }
     }
@@ -65,8 +69,9 @@ impl Accumulated {
         self.sum.depth_weight += other.sum.depth_weight;
         add(&mut self.sum.coverage_row, &other.sum.coverage_row);
         add(&mut self.sum.depth_weight_row, &other.sum.depth_weight_row);
-        self.hit.iter_mut().zip(&other.hit).for_each(|(a, b)| *a += b);
-        self.beside += other.beside;
+        self.weighted += other.weighted;
+        add(&mut self.weighted_row, &other.weighted_row);
+        self.depth += other.depth;
         self.hits += other.hits;
         self.seen += other.seen;
         self.near_outline |= other.near_outline;
@@ -79,19 +84,27 @@ impl Accumulated {
         }
         let share = 1.0 / count as f32;
         let scaled = |row: &Row| row.map(|v| v * share);
-        let by_hit = 1.0 / self.hits.max(1) as f32;
-        let beside = self.beside / (self.seen - self.hits).max(1) as f32;
+        // Without weight the depth only tells what hides the pixel.
+        let weight = self.sum.depth_weight;
+        let by_weight = if weight > 0.0 { 1.0 / weight } else { 0.0 };
+        let plain = self.depth / self.seen as f32;
+        let z = if weight > 0.0 { self.weighted * by_weight } else { plain };
         let pixel = Pixel {
             color: self.sum.color.map(|v| v * share),
             coverage: self.sum.coverage * share,
-            z: if self.hits > 0 { self.hit[6] * by_hit } else { beside },
+            z,
             depth_weight: self.sum.depth_weight * share,
             color_rows: self.sum.color_rows.each_ref().map(scaled),
             coverage_row: scaled(&self.sum.coverage_row),
-            z_row: std::array::from_fn(|i| self.hit[i] * by_hit),
+            z_row: scaled_sum(
+                by_weight,
+                &self.weighted_row,
+                -z * by_weight,
+                &self.sum.depth_weight_row,
+            ),
             depth_weight_row: scaled(&self.sum.depth_weight_row),
         };
-        Some(Seen { pixel, hit: 2 * self.hits >= count, near_outline: self.near_outline })
+        Some(Seen { pixel, hit: self.hits > 0, near_outline: self.near_outline })
     }
 }
 

@@ -356,7 +356,9 @@ fn receive(device: &Device, buffer: &wgpu::Buffer, size: u64) -> Result<Vec<u8>,
             Err(RecvTimeoutError::Timeout) if device.is_lost() || done.elapsed() > PATIENCE => {
                 return Err("no answer".into());
             }
-            Err(RecvTimeoutError::Timeout) => drop(poll()?),
+            Err(RecvTimeoutError::Timeout) => {
+                poll()?;
+            }
         }
     }
     let bytes = buffer.get_mapped_range(..size).map_err(|e| e.to_string())?.to_vec();

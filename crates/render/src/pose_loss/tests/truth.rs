@@ -163,8 +163,8 @@ fn gradients_of_outlines_are_true() {
     assert!(fine.0 > 0.999 && fine.1 < 0.02, "{fine:?}");
 }
 
-/// At the rims of cans and the edges of cartons the light jumps from one face to the next, which has no derivative but where
-/// samples within the pixel see it.
+/// At the rims of cans and the edges of cartons the light jumps from one face to the next, which has no derivative here;
+/// samples within the pixel only make the rest more exact.
 #[test]
 fn gradients_of_shading_are_true_with_samples_in_the_pixel() {
     let fine = worst("shading, fine", 4, lamp(), plain);
