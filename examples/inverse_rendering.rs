@@ -54,7 +54,7 @@ fn painting() -> Vec<[f32; 3]> {
     let texel = |at: usize| {
         let (x, y) = ((at % SIZE) as f32, (at / SIZE) as f32);
         let dot = ((x % 12.0 - 6.0).powi(2) + (y % 12.0 - 6.0).powi(2)) < 12.0;
-        let stripe = (at % SIZE / 6 + at / SIZE / 8) % 2 == 0;
+        let stripe = (at % SIZE / 6 + at / SIZE / 8).is_multiple_of(2);
         match (dot, stripe) {
             (true, _) => [0.85, 0.25, 0.2],
             (_, true) => [0.2, 0.35, 0.6 + 0.3 * y / SIZE as f32],
@@ -74,8 +74,9 @@ fn lighting(towards: Vector3<f64>, strength: [f64; 3]) -> Lighting {
 fn view(model: &Arc<RenderModel>, index: usize) -> Scene {
     let camera = Camera { fx: 150.0, fy: 150.0, cx: 35.5, cy: 47.5, width: 72, height: 96 };
     let turn = UnitQuaternion::from_scaled_axis(Vector3::y() * (TAU * index as f64 / VIEWS as f64));
-    let tilt =
-        UnitQuaternion::from_scaled_axis(Vector3::x() * if index % 2 == 0 { 0.2 } else { -0.25 });
+    let tilt = UnitQuaternion::from_scaled_axis(
+        Vector3::x() * if index.is_multiple_of(2) { 0.2 } else { -0.25 },
+    );
     let pose = Isometry3::from_parts(Translation3::new(0.0, 0.0, 0.3), tilt * turn);
     Scene::new(camera).with(model.clone(), pose)
 }
