@@ -1,7 +1,8 @@
 //! Rendering with exact derivatives by the object's pose, and plain pictures.
 //!
 //! [`PoseLoss`] compares a posed [`RenderModel`] with a segmented image and returns the loss, its
-//! gradient and the Gauss–Newton matrix by the six degrees of freedom of the pose, in either [`Mode`]. [`Renderer`] renders
+//! gradient and the Gauss–Newton matrix by the six degrees of freedom of the pose, in either [`Mode`]; a [`Backend`] does so for
+//! thousands of poses at once, on this processor or a graphics device ([`backend::auto`]). [`Renderer`] renders
 //! whole scenes under any [`Shader`] and carries the derivatives of any loss back to poses, vertices, colours, textures,
 //! camera and light, on the tape too. [`render_scene`] makes antialiased pictures, [`depth_map`] the z-buffer of what hides
 //! the object, and [`Undistortion`] pinhole images of those through a lens.
