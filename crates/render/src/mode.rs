@@ -1,5 +1,7 @@
 //! The two ways to make an image differentiable.
 
+use std::ops::RangeInclusive;
+
 /// How visibility is softened.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Mode {
@@ -26,6 +28,15 @@ pub struct ContourOptions {
 }
 
 impl ContourOptions {
+    /// Half-widths of the band that are drawn as they are \[px\].
+    pub(crate) const HALF_WIDTHS: RangeInclusive<f64> = 0.05..=64.0;
+
+    /// The half-width that is drawn \[px\]: a band of zero width would divide by zero.
+    pub(crate) fn drawn_half_width(&self) -> f32 {
+        let (least, most) = (*Self::HALF_WIDTHS.start() as f32, *Self::HALF_WIDTHS.end() as f32);
+        (self.half_width as f32).clamp(least, most)
+    }
+
     /// The band at which pixels with `samples` samples, across and down, blur as much as these options ask for: the step
     /// spreads by a variance of w²/5, the samples by (s² − 1)/12s² of a pixel. It is no narrower than what a sample needs.
     pub(crate) fn finer(&self, samples: usize) -> Self {

@@ -1,9 +1,11 @@
 //! Watertight shapes for this crate's tests, beside those of `prehend_geometry::shapes`.
 
 use std::f64::consts::{PI, TAU};
+use std::sync::Arc;
 
 use nalgebra::{Point3, Vector3};
-use prehend_geometry::TriMesh;
+use prehend_geometry::shapes::cuboid;
+use prehend_geometry::{Texture, TriMesh};
 
 /// A torus around z \[m\].
 pub(crate) fn torus(major: f64, minor: f64, rings: usize) -> TriMesh {
@@ -36,6 +38,23 @@ pub(crate) fn painted(mut mesh: TriMesh, period: f64) -> TriMesh {
         .map(|v| v as f32)
     };
     mesh.colors = Some(mesh.vertices.iter().map(color).collect());
+    mesh
+}
+
+/// A box with a smooth texture of `size` texels that varies over about `period` of them, projected obliquely so that it
+/// runs on across the edges \[m\].
+pub(crate) fn textured_box([width, height]: [usize; 2], period: [f64; 2]) -> TriMesh {
+    let mut mesh = cuboid(Vector3::new(0.06, 0.08, 0.1));
+    let uv = |p: &Point3<f64>| {
+        [0.5 + 4.0 * (p.x + 0.6 * p.z), 0.5 + 4.0 * (p.y - 0.5 * p.z + 0.2 * p.x)]
+    };
+    mesh.uvs = Some(mesh.vertices.iter().map(|p| uv(p).map(|v| v as f32)).collect());
+    let pixels = (0..width * height).map(|i| {
+        let (x, y) = ((i % width) as f64 / period[0], (i / width) as f64 / period[1]);
+        [x.sin() + 0.3 * y.cos(), (0.7 * x + y).cos(), (0.4 * x - y).sin()]
+            .map(|v| (140.0 + 80.0 * v) as u8)
+    });
+    mesh.texture = Some(Arc::new(Texture { width, height, pixels: pixels.collect() }));
     mesh
 }
 

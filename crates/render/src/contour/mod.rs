@@ -52,8 +52,7 @@ impl<'a> ContourView<'a> {
         light: &Light,
         also: &Region,
     ) -> Self {
-        // A band of zero width would divide by zero.
-        let half_width = (options.half_width as f32).clamp(0.05, 64.0);
+        let half_width = options.drawn_half_width();
         let posed = Posed::new(model, camera, pose, half_width);
         let lighting = Lighting::new(light, &posed.rotation);
         let projected = &posed.projected;

@@ -53,6 +53,9 @@ struct Channel {
 
 type Channels = [Channel; 3];
 
+/// Colour and coverage of a pixel before the correction.
+type Raw = ([f32; 3], f32);
+
 fn merged(all: Vec<Channels>) -> Channels {
     let mut total = Channels::default();
     for part in all {
@@ -133,26 +136,40 @@ impl Residuals<'_> {
         (sums, channels)
     }
 
+    /// Index, colour and coverage of the pixels that show the object, block by block.
+    fn drawn(&self, view: &impl View) -> Vec<Vec<(usize, Raw)>> {
+        let width = self.target.camera.width;
+        let blocks = (0..view.blocks()).into_par_iter().map(|block| {
+            let mut pixels = Vec::new();
+            view.visit::<false>(block, |x, y, seen| {
+                let at = y * width + x;
+                if let Some(Seen { pixel, .. }) = seen
+                    && !self.target.hides(at, pixel.z)
+                {
+                    pixels.push((at, (pixel.color, pixel.coverage)));
+                }
+            });
+            pixels
+        });
+        blocks.collect()
+    }
+
     /// The best correction: least squares in closed form, reweighted for a robust kernel.
     fn fit(&self, view: &impl View) -> Affine {
         let mut affine = Affine::default();
         if self.options.color_weight <= 0.0 {
             return affine;
         }
-        let width = self.target.camera.width;
+        let drawn = self.drawn(view);
         for _ in 0..ROUNDS {
-            let blocks = (0..view.blocks()).into_par_iter().map(|block| {
+            let blocks = drawn.par_iter().map(|pixels| {
                 let mut channels = Channels::default();
-                view.visit::<false>(block, |x, y, seen| {
-                    let at = y * width + x;
-                    if let Some(Seen { mut pixel, .. }) = seen
-                        && !self.target.hides(at, pixel.z)
-                    {
-                        let raw = (pixel.color, pixel.coverage);
-                        affine.apply::<false>(&mut pixel);
-                        self.add_channels::<false>(&mut channels, at, raw, &pixel);
-                    }
-                });
+                for (at, raw) in pixels {
+                    let (color, coverage) = *raw;
+                    let mut pixel = Pixel { color, coverage, ..Pixel::default() };
+                    affine.apply::<false>(&mut pixel);
+                    self.add_channels::<false>(&mut channels, *at, *raw, &pixel);
+                }
                 channels
             });
             let mut change = 0.0f64;
@@ -180,12 +197,12 @@ impl Residuals<'_> {
         affine
     }
 
-    /// Adds a pixel with colour and coverage `raw` before, and `pixel` after the correction.
+    /// Adds a pixel that is `raw` before, and `pixel` after the correction.
     fn add_channels<const DERIVATIVES: bool>(
         &self,
         channels: &mut Channels,
         at: usize,
-        raw: ([f32; 3], f32),
+        raw: Raw,
         pixel: &Pixel,
     ) {
         let observed = self.target.color[at];

@@ -2,7 +2,7 @@
 
 use super::options::{LossOptions, Robust};
 use super::{MOST_SAMPLES, PoseLoss};
-use crate::mode::{Mode, SoftRasOptions};
+use crate::mode::{ContourOptions, Mode, SoftRasOptions};
 
 /// A setting out of its range.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -45,7 +45,7 @@ impl PoseLoss {
         match &self.mode {
             Mode::Contour(options) => {
                 let w = options.half_width;
-                check("half_width", w, "0.05 to 64 px", (0.05..=64.0).contains(&w))?;
+                check("half_width", w, "0.05 to 64 px", ContourOptions::HALF_WIDTHS.contains(&w))?;
             }
             Mode::SoftRas(options) => options.check()?,
         }
@@ -86,7 +86,6 @@ impl LossOptions {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mode::ContourOptions;
     use crate::pose_loss::DepthOptions;
 
     #[test]

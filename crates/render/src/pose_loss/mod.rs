@@ -23,6 +23,8 @@ pub use options::{DepthOptions, LossOptions, Robust};
 pub(crate) use pixel::{Pixel, Row, Seen, View, scaled_sum};
 pub(crate) use residuals::Residuals;
 pub use sums::Counts;
+#[cfg(feature = "gpu")]
+pub(crate) use sums::unpacked;
 pub(crate) use sums::{LaneSums, Sums};
 pub use target::{Target, TargetError};
 
@@ -98,6 +100,14 @@ pub struct Loss {
     pub counts: Counts,
 }
 
+impl Loss {
+    /// From the sums of colour, mask and depth over all pixels of the target.
+    pub(crate) fn new([color, mask, depth]: [f64; 3], counts: Counts, target: &Target) -> Self {
+        let [color, mask, depth] = [color, mask, depth].map(|sum| sum * target.normalisation);
+        Self { total: color + mask + depth, color, mask, depth, counts }
+    }
+}
+
 /// A loss with its derivatives by a left twist of the pose, (translation \[m\], rotation \[rad\]), about a given centre.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Linearised {
@@ -148,7 +158,7 @@ impl PoseLoss {
         target: &Target,
     ) -> Loss {
         let all = self.sum::<false>(model, t_cam_object, &Point3::origin(), light, target);
-        self.loss(&all.sums, target)
+        all.sums.loss(target)
     }
 
     /// The loss, its gradient and the Gauss–Newton matrix by the twist about `center` (camera frame \[m\]).
@@ -163,7 +173,7 @@ impl PoseLoss {
         let all = self.sum::<true>(model, t_cam_object, center, light, target);
         let (right, jtj) = all.sums.equations(target.normalisation);
         Linearised {
-            loss: self.loss(&all.sums, target),
+            loss: all.sums.loss(target),
             gradient: right * 2.0,
             jtj: jtj - all.reduction * target.normalisation,
             affine: self.options.affine.then_some(all.affine),
@@ -218,12 +228,6 @@ impl PoseLoss {
                 if samples == 1 { task.run(&view) } else { task.run(&Averaged::new(view, samples)) }
             }
         }
-    }
-
-    fn loss(&self, sums: &Sums, target: &Target) -> Loss {
-        let n = target.normalisation;
-        let (color, mask, depth) = (sums.color * n, sums.mask * n, sums.depth * n);
-        Loss { total: color + mask + depth, color, mask, depth, counts: sums.counts }
     }
 
     fn sum<const DERIVATIVES: bool>(

@@ -4,8 +4,10 @@
 
 use nalgebra::{Matrix6, Vector6};
 
+use super::Loss;
 use super::lane::{LANES, Lane};
 use super::pixel::Row;
+use super::target::Target;
 
 /// Numbers of pixels by what became of them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -23,7 +25,7 @@ pub struct Counts {
 }
 
 /// Σ w r J and the upper triangle of Σ w JᵀJ, row by row.
-const ENTRIES: usize = 27;
+pub(crate) const ENTRIES: usize = 27;
 
 /// Sums over some pixels; added up in a fixed order.
 #[derive(Clone, Debug)]
@@ -143,20 +145,29 @@ impl Sums {
         self.equations.iter_mut().zip(&other.equations).for_each(|(a, b)| *a += b);
     }
 
+    pub(crate) fn loss(&self, target: &Target) -> Loss {
+        Loss::new([self.color, self.mask, self.depth], self.counts, target)
+    }
+
     /// Σ w r J and Σ w JᵀJ, each times `factor`.
     pub(crate) fn equations(&self, factor: f64) -> (Vector6<f64>, Matrix6<f64>) {
-        let right = Vector6::from_fn(|i, _| factor * self.equations[i]);
-        let mut matrix = Matrix6::zeros();
-        let mut at = 6;
-        for i in 0..6 {
-            for j in i..6 {
-                matrix[(i, j)] = factor * self.equations[at];
-                matrix[(j, i)] = matrix[(i, j)];
-                at += 1;
-            }
-        }
-        (right, matrix)
+        unpacked(&self.equations, factor)
     }
+}
+
+/// Σ w r J and Σ w JᵀJ, each times `factor`, from their entries.
+pub(crate) fn unpacked(entries: &[f64; ENTRIES], factor: f64) -> (Vector6<f64>, Matrix6<f64>) {
+    let right = Vector6::from_fn(|i, _| factor * entries[i]);
+    let mut matrix = Matrix6::zeros();
+    let mut at = 6;
+    for i in 0..6 {
+        for j in i..6 {
+            matrix[(i, j)] = factor * entries[at];
+            matrix[(j, i)] = matrix[(i, j)];
+            at += 1;
+        }
+    }
+    (right, matrix)
 }
 
 #[cfg(test)]

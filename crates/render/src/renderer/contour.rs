@@ -10,7 +10,6 @@ use super::geometry::{Foot, Hit, hit, hit_adjoint};
 use super::sums::Sums;
 use super::visibility::{Blend, BlendAdjoint, Part, PartAdjoint, Visibility};
 use crate::contour::{Band, Inner, LEAST_STEP, Piece, falling_step, inner_contours, outline};
-use crate::mode::ContourOptions;
 use crate::projected::Region;
 use crate::raster::{MISS, Visible, rasterise};
 
@@ -91,11 +90,6 @@ impl Trace {
 }
 
 impl Contours {
-    /// The softness of contours in use \[px\]: as for the loss of a pose, a band of zero width would divide by zero.
-    pub(super) fn half_width(options: &ContourOptions) -> f32 {
-        (options.half_width as f32).clamp(0.05, 64.0)
-    }
-
     pub(super) fn new(frame: &Frame, mut flat: Flat, half_width: f32) -> Self {
         let projected = frame.projected(&mut flat);
         let region = projected.region;

@@ -112,7 +112,7 @@ impl<Sh: Shader + Clone> Renderer<Sh> {
         assert_eq!(self.parameters.len(), expected, "parameters of the shader");
         let (frame, visible) = match &self.mode {
             Mode::Contour(options) => {
-                let half_width = Contours::half_width(options);
+                let half_width = options.drawn_half_width();
                 let (frame, flat) = Frame::new(scene, half_width);
                 let contours = Contours::new(&frame, flat, half_width);
                 (frame, Visible::Contour(contours))

@@ -1,5 +1,6 @@
 //! The SoftRas mode: the faces of all objects as one set, blended by depth ([`crate::softras`] has the equations).
 
+use nalgebra::Point3;
 use rayon::prelude::*;
 
 use super::fragment::Fragment;
@@ -8,7 +9,7 @@ use super::sums::Sums;
 use super::visibility::{Blend, BlendAdjoint, Part, PartAdjoint, Visibility};
 use crate::model::NONE;
 use crate::projected::Region;
-use crate::softras::{BACKGROUND, Candidates, Face, LEAST_SHARE, RUN, Settings};
+use crate::softras::{BACKGROUND, Candidates, Drawn, Face, LEAST_SHARE, RUN, Settings, project};
 
 /// The faces that count at each pixel.
 pub(super) struct SoftFaces {
@@ -53,30 +54,13 @@ pub(super) struct Trace {
 impl SoftFaces {
     /// Decides which faces count, and on which side each is lit.
     pub(super) fn new(frame: &mut Frame, flat: &Flat, settings: Settings) -> Self {
-        let camera = frame.camera;
-        let place = frame.position.iter().zip(&flat.screen).map(|(p, flat)| {
-            if flat[2] == 0.0 {
-                return [0.0; 3];
-            }
-            [camera.fx * p.x / p.z + camera.cx, camera.fy * p.y / p.z + camera.cy, p.z]
-        });
-        let screen: Vec<[f64; 3]> = place.collect();
-        let (mut faces, mut ids) = (Vec::new(), Vec::new());
-        for id in 0..frame.faces.len() {
-            let corners = frame.faces[id].map(|v| screen[v as usize]);
-            let in_front = corners.iter().all(|c| c[2] > 0.0);
-            let Some(face) = in_front.then(|| Face::new(corners, &settings)).flatten() else {
-                continue;
-            };
-            // Seen from outside, the area is negative.
-            let outside = face.share[0] < 0.0;
-            let closed = frame.bodies[frame.body_of(id)].model.closed;
-            frame.facing[id] = if outside || closed { 1 } else { -1 };
-            if outside || !settings.cull {
-                faces.push(face);
-                ids.push(id as u32);
-            }
-        }
+        let vertices = frame.position.iter().map(|p| Point3::from(*p));
+        let screen = project(&frame.camera, vertices, &flat.screen);
+        let mut facing = std::mem::take(&mut frame.facing);
+        let closed = |face: usize| frame.bodies[frame.body_of(face)].model.closed;
+        let Drawn { faces, ids } =
+            Drawn::new(&frame.faces, &screen, closed, &mut facing, &settings);
+        frame.facing = facing;
         let blocks = blocks(&faces, &ids, &flat.region, &settings);
         Self { settings, screen, blocks }
     }

@@ -1,12 +1,12 @@
 //! Derivatives of a fragment by the corners of its face.
 
+#[cfg(test)]
 use super::face::Face;
 use super::fragment::Fragment;
 
 /// Derivatives of something by what a fragment holds.
+#[cfg(test)]
 #[derive(Clone, Copy, Debug, Default)]
-// The pose has rows prepared for each face; this is for derivatives by all vertices.
-#[cfg_attr(not(test), allow(dead_code))]
 pub(crate) struct FragmentAdjoint {
     /// By the barycentric coordinates.
     pub(crate) b: [f32; 3],
@@ -41,9 +41,10 @@ impl Fragment {
     /// From derivatives by the fragment of `face` at pixel (column, row) to those by the columns, rows \[1/px\] and depths
     /// \[1/m\] of the face's corners.
     ///
+    /// Of the same pieces as the rows of a pose, so that tests can try those at corners anywhere.
+    ///
     /// At kinks (a coordinate clamped just so, two edges equally near) it is the derivative of one side.
-    #[cfg_attr(not(test), allow(dead_code))]
-    #[inline]
+    #[cfg(test)]
     pub(crate) fn pull_back(
         &self,
         face: &Face,

@@ -24,6 +24,7 @@
 mod adjoint;
 mod blend;
 mod candidates;
+mod drawn;
 mod exponential;
 mod face;
 mod fragment;
@@ -49,6 +50,7 @@ use crate::pose_loss::{Seen, View};
 use crate::posed::Posed;
 use crate::projected::Region;
 pub(crate) use candidates::{Candidates, RUN};
+pub(crate) use drawn::{Drawn, project};
 pub(crate) use face::Face;
 pub(crate) use pixel::LEAST_SHARE;
 use pixel::{Scene, Scratch};
@@ -83,48 +85,21 @@ impl<'a> SoftRasView<'a> {
         let mut posed = Posed::new(model, camera, pose, settings.reach);
         let region = posed.projected.region.union(also);
         let lighting = Lighting::new(light, &posed.rotation);
-        let (mut faces, mut ids) = (Vec::new(), Vec::new());
+        let mut drawn = Drawn { faces: Vec::new(), ids: Vec::new() };
         if posed.projected.region != Region::EMPTY {
-            let screen = project(&posed, camera, pose);
-            for (id, corners) in model.faces.iter().enumerate() {
-                let corners = corners.map(|v| screen[v as usize]);
-                let in_front = corners.iter().all(|c| c[2] > 0.0);
-                let Some(face) = in_front.then(|| Face::new(corners, &settings)).flatten() else {
-                    continue;
-                };
-                // Seen from outside, the area is negative.
-                let outside = face.share[0] < 0.0;
-                // A closed surface is lit by its outward normals on both sides: a face that turns over must not jump.
-                posed.projected.facing[id] = if outside || model.closed { 1 } else { -1 };
-                if outside || !settings.cull {
-                    faces.push(face);
-                    ids.push(id as u32);
-                }
-            }
+            let (rotation, center) = (pose.rotation.to_rotation_matrix(), pose * model.center());
+            let vertices = model.positions.iter().map(|p| center + rotation * p.cast::<f64>());
+            let screen = project(camera, vertices, &posed.projected.screen);
+            let facing = &mut posed.projected.facing;
+            drawn = Drawn::new(&model.faces, &screen, |_| model.closed, facing, &settings);
         }
+        let Drawn { faces, ids } = drawn;
         let bands = bands(&faces, &region);
         let rows = faces.iter().map(|_| OnceLock::new()).collect();
         let twist_center = center.coords.cast();
         let scene = Scene { posed, lighting, settings, faces, ids, rows, twist_center };
         Self { scene, region, bands, arch: pulp::Arch::new() }
     }
-}
-
-/// Column, row \[px\] and Z \[m\] of the vertices; Z is 0 where it is not in front of the camera. In f64, because
-/// barycentric coordinates of narrow faces magnify what rounding does to positions.
-fn project(posed: &Posed, camera: &Camera, pose: &Isometry3<f64>) -> Vec<[f64; 3]> {
-    let rotation = pose.rotation.to_rotation_matrix();
-    let center = pose * posed.model.center();
-    let vertices = posed.model.positions.iter().zip(&posed.projected.screen);
-    vertices
-        .map(|(p, screen)| {
-            if screen[2] == 0.0 {
-                return [0.0; 3];
-            }
-            let p = center + rotation * p.cast::<f64>();
-            [camera.fx * p.x / p.z + camera.cx, camera.fy * p.y / p.z + camera.cy, p.z]
-        })
-        .collect()
 }
 
 /// The faces that may count in each [`BAND`] rows of `region`, in ascending order.

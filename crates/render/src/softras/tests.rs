@@ -3,12 +3,11 @@
 use super::naive::{NaivePixel, naive_picture};
 use super::*;
 use crate::pose_loss::Pixel;
-use crate::shapes_for_tests::{lump, painted, torus};
+use crate::pose_loss::tests::lamp;
+use crate::shapes_for_tests::{self, lump, painted, torus};
 use crate::{LossOptions, Mask, Mode, PoseLoss, Target};
 use nalgebra::{Translation3, UnitQuaternion, Vector3, Vector6};
-use prehend_geometry::shapes::cuboid;
-use prehend_geometry::{Texture, TriMesh};
-use std::sync::Arc;
+use prehend_geometry::TriMesh;
 
 fn camera() -> Camera {
     Camera { fx: 90.0, fy: 94.0, cx: 31.0, cy: 24.5, width: 64, height: 52 }
@@ -21,27 +20,8 @@ fn pose() -> Isometry3<f64> {
     )
 }
 
-fn lamp() -> Light {
-    let mut light = Light::headlight(0.4, 0.5);
-    light.directional[0] += Vector3::new(0.2, -0.1, 0.0);
-    light.directional[2] += Vector3::new(-0.1, -0.3, 0.1);
-    light
-}
-
 fn textured_box() -> TriMesh {
-    let mut mesh = cuboid(Vector3::new(0.06, 0.08, 0.1));
-    let uv = |p: &Point3<f64>| {
-        [0.5 + 4.0 * (p.x + 0.6 * p.z), 0.5 + 4.0 * (p.y - 0.5 * p.z + 0.2 * p.x)]
-    };
-    mesh.uvs = Some(mesh.vertices.iter().map(|p| uv(p).map(|v| v as f32)).collect());
-    let (width, height) = (96, 64);
-    let pixels = (0..width * height).map(|i| {
-        let (x, y) = ((i % width) as f64 / 9.0, (i / width) as f64 / 7.0);
-        [x.sin() + 0.3 * y.cos(), (0.7 * x + y).cos(), (0.4 * x - y).sin()]
-            .map(|v| (140.0 + 80.0 * v) as u8)
-    });
-    mesh.texture = Some(Arc::new(Texture { width, height, pixels: pixels.collect() }));
-    mesh
+    shapes_for_tests::textured_box([96, 64], [9.0, 7.0])
 }
 
 /// A lump with every third face taken away.

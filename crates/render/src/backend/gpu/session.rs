@@ -4,8 +4,6 @@ use std::sync::Arc;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
-use nalgebra::{Matrix6, Vector6};
-
 use super::device::{
     CONTOUR_DERIVATIVES, CONTOUR_PICTURE, CONTOUR_VALUE, COUNT_FACES, Device, FIND_PIECES,
     FIND_SEGMENTS, NEEDS, PROJECT, Pass, RASTER, SCAN_BINS, SCATTER_FACES, SOFTRAS_DERIVATIVES,
@@ -20,7 +18,7 @@ use super::work::{self, BUDGET, Capacity, Work};
 use crate::backend::{BackendError, Hypothesis, PoseProblem, Session};
 use crate::image::{DepthImage, RgbImage};
 use crate::mode::Mode;
-use crate::pose_loss::{Counts, Linearised, Loss, PoseImage};
+use crate::pose_loss::{Counts, Linearised, Loss, PoseImage, unpacked};
 
 /// How long a call back may take once the device is done.
 const PATIENCE: Duration = Duration::from_secs(1);
@@ -242,8 +240,6 @@ impl GpuSession {
     }
 
     fn loss(&self, sums: &[f32]) -> Loss {
-        let n = self.problem.target.normalisation;
-        let [color, mask, depth] = [SUM_COLOR, SUM_MASK, SUM_DEPTH].map(|i| n * f64::from(sums[i]));
         let count = |i: usize| sums[i] as usize;
         let counts = Counts {
             covered: count(SUM_COVERED),
@@ -252,21 +248,16 @@ impl GpuSession {
             missed: count(SUM_MISSED),
             depth: count(SUM_WITH_DEPTH),
         };
-        Loss { total: color + mask + depth, color, mask, depth, counts }
+        let shares = [SUM_COLOR, SUM_MASK, SUM_DEPTH].map(|i| f64::from(sums[i]));
+        Loss::new(shares, counts, &self.problem.target)
     }
 
     fn linearised(&self, sums: &[f32]) -> Linearised {
-        let n = self.problem.target.normalisation;
-        let gradient = Vector6::from_fn(|i, _| 2.0 * n * f64::from(sums[SUM_GRADIENT + i]));
-        let mut jtj = Matrix6::zeros();
-        let mut at = SUM_JTJ;
-        for i in 0..6 {
-            for j in i..6 {
-                jtj[(i, j)] = n * f64::from(sums[at]);
-                jtj[(j, i)] = jtj[(i, j)];
-                at += 1;
-            }
-        }
+        // In the order of the processor's own sums.
+        const { assert!(SUM_JTJ == SUM_GRADIENT + 6) };
+        let entries = std::array::from_fn(|i| f64::from(sums[SUM_GRADIENT + i]));
+        let (right, jtj) = unpacked(&entries, self.problem.target.normalisation);
+        let gradient = right * 2.0;
         Linearised { loss: self.loss(sums), gradient, jtj, affine: None }
     }
 }

@@ -133,8 +133,7 @@ fn set_albedo(params: &mut Params, model: &RenderModel) -> Option<()> {
 fn set_mode(params: &mut Params, mode: &Mode, camera: &Camera) {
     match mode {
         Mode::Contour(options) => {
-            // As on the CPU: a band of zero width would divide by zero.
-            params.half_width = (options.half_width as f32).clamp(0.05, 64.0);
+            params.half_width = options.drawn_half_width();
             params.margin = params.half_width;
         }
         Mode::SoftRas(options) => set_softras(params, options, camera),

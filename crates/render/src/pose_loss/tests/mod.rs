@@ -11,11 +11,10 @@ use super::*;
 use crate::image::Mask;
 use crate::light_samples;
 use crate::mode::ContourOptions;
-use crate::shapes_for_tests::{lump, painted, torus};
+use crate::shapes_for_tests::{self, lump, painted, torus};
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
+use prehend_geometry::TriMesh;
 use prehend_geometry::shapes::{cuboid, sphere};
-use prehend_geometry::{Texture, TriMesh};
-use std::sync::Arc;
 
 pub(crate) fn camera() -> Camera {
     Camera { fx: 300.0, fy: 310.0, cx: 79.0, cy: 60.5, width: 160, height: 120 }
@@ -62,19 +61,7 @@ fn unit(axis: usize, step: f64) -> [f64; 6] {
 
 /// A box with a smooth texture, projected obliquely so that it runs on across the edges.
 pub(crate) fn textured_box() -> TriMesh {
-    let mut mesh = cuboid(Vector3::new(0.06, 0.08, 0.1));
-    let uv = |p: &Point3<f64>| {
-        [0.5 + 4.0 * (p.x + 0.6 * p.z), 0.5 + 4.0 * (p.y - 0.5 * p.z + 0.2 * p.x)]
-    };
-    mesh.uvs = Some(mesh.vertices.iter().map(|p| uv(p).map(|v| v as f32)).collect());
-    let (width, height) = (384, 256);
-    let pixels = (0..width * height).map(|i| {
-        let (x, y) = ((i % width) as f64 / 17.0, (i / width) as f64 / 13.0);
-        [x.sin() + 0.3 * y.cos(), (0.7 * x + y).cos(), (0.4 * x - y).sin()]
-            .map(|v| (140.0 + 80.0 * v) as u8)
-    });
-    mesh.texture = Some(Arc::new(Texture { width, height, pixels: pixels.collect() }));
-    mesh
+    shapes_for_tests::textured_box([384, 256], [17.0, 13.0])
 }
 
 pub(crate) fn lamp() -> Light {
