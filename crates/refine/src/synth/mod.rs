@@ -2,8 +2,10 @@
 
 mod annotation;
 mod dataset;
+mod moment;
 mod scene;
 mod sensing;
 
 pub use dataset::write_dataset;
+pub use moment::Moment;
 pub use scene::{Scene, default_scene};

@@ -1,0 +1,89 @@
+//! Named ways to refine a pose: what `--method` picks and what studies compare.
+
+use crate::{Config, TermKind};
+
+/// A way to refine a pose, with all of its settings.
+#[derive(Clone, Copy, Debug)]
+pub struct Method {
+    /// Short name, as options and tables have it.
+    pub name: &'static str,
+    /// What it is, in one line.
+    pub summary: &'static str,
+    config: fn() -> Config,
+}
+
+impl Method {
+    /// All methods, in the order of the paper's tables.
+    pub fn all() -> &'static [Self] {
+        &METHODS
+    }
+
+    /// The method called `name`.
+    pub fn named(name: &str) -> Option<&'static Self> {
+        METHODS.iter().find(|m| m.name == name)
+    }
+
+    /// Its settings.
+    pub fn config(&self) -> Config {
+        (self.config)()
+    }
+}
+
+/// One gradient alone.
+macro_rules! alone {
+    ($name:literal, $term:expr, $checkpoint:literal) => {
+        Method {
+            name: $name,
+            summary: if $checkpoint {
+                "this gradient alone, checkpointing"
+            } else {
+                "this gradient alone, the last pose"
+            },
+            config: || Config { terms: vec![$term], checkpoint: $checkpoint, ..Config::default() },
+        }
+    };
+}
+
+static METHODS: [Method; 11] = [
+    Method {
+        name: "combined",
+        summary: "all four gradients, checkpointing",
+        config: Config::default,
+    },
+    Method {
+        name: "combined-last",
+        summary: "all four gradients, the last pose",
+        config: || Config { checkpoint: false, ..Config::default() },
+    },
+    Method {
+        name: "combined-free",
+        summary: "all four gradients, no regularisation, the last pose",
+        config: || {
+            let mut config = Config { checkpoint: false, ..Config::default() };
+            config.physics.displacement_sigma = f64::INFINITY;
+            config
+        },
+    },
+    alone!("depth", TermKind::Depth, false),
+    alone!("depth-best", TermKind::Depth, true),
+    alone!("tactile", TermKind::Tactile, false),
+    alone!("tactile-best", TermKind::Tactile, true),
+    alone!("rendering", TermKind::Rendering, false),
+    alone!("rendering-best", TermKind::Rendering, true),
+    alone!("physics", TermKind::Physics, false),
+    alone!("physics-best", TermKind::Physics, true),
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_unique_and_found() {
+        for method in Method::all() {
+            assert_eq!(Method::all().iter().filter(|m| m.name == method.name).count(), 1);
+            assert_eq!(Method::named(method.name).map(|m| m.summary), Some(method.summary));
+        }
+        assert!(Method::named("guess").is_none());
+    }
+}
