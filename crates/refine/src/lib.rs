@@ -36,6 +36,7 @@ mod robust;
 mod scoring;
 mod state;
 pub mod strategy;
+pub mod symmetry;
 pub mod synth;
 pub mod term;
 pub mod trace;

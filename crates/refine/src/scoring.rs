@@ -6,15 +6,19 @@ use std::path::{Path, PathBuf};
 use nalgebra::Isometry3;
 use prehend_geometry::robot::Robot as KinematicTree;
 use prehend_geometry::{ClosestPoints, TriMesh, UnionBody};
+use prehend_render::{DepthImage, RenderModel, depth_map};
 
+use crate::RefineError;
 use crate::assets::{AssetError, load_mesh};
 use crate::bop::{Dataset, DatasetError, GroundTruth, ResultRow};
-use crate::metrics::{ContactModel, ScoredModel, ScoredRow};
+use crate::metrics::{ContactModel, ScoredModel, ScoredRow, diameter, vsd};
 
 /// An evaluation model, prepared once.
 struct Model {
     scored: ScoredModel,
     contact: ContactModel,
+    drawn: RenderModel,
+    diameter: f64,
 }
 
 /// The hand where it truly is in one image, as one body: its parts overlap each other.
@@ -40,6 +44,8 @@ pub struct Scorer<'a> {
     models: HashMap<u32, Model>,
     /// Scene, image and hand of the row scored last: rows come image by image, and hands are large.
     hand: Option<((u32, u32), Option<TrueHand>)>,
+    /// The same with the image's depth.
+    depth: Option<((u32, u32), Option<DepthImage>)>,
 }
 
 impl<'a> Scorer<'a> {
@@ -51,6 +57,7 @@ impl<'a> Scorer<'a> {
             trees: HashMap::new(),
             models: HashMap::new(),
             hand: None,
+            depth: None,
         }
     }
 
@@ -64,8 +71,16 @@ impl<'a> Scorer<'a> {
         let camera = self.dataset.frame(scene, image)?.intrinsics;
         self.prepare_model(row.obj_id)?;
         self.prepare_hand(scene, image)?;
+        self.prepare_depth(scene, image)?;
         let model = &self.models[&row.obj_id];
         let mut score = model.scored.score(&row.t_cam_model, &truth, &camera);
+        if let Some((_, Some(sensed))) = &self.depth {
+            let camera = camera.camera(sensed.width(), sensed.height());
+            let draw = |pose: &Isometry3<f64>| depth_map(&camera, &[(&model.drawn, *pose)]);
+            let errors =
+                vsd(&camera, sensed, &draw(&row.t_cam_model), &draw(&truth), model.diameter);
+            score = score.with_visible_surface(&errors, model.diameter, camera.width);
+        }
         if let Some((_, Some(hand))) = &mut self.hand {
             let estimate = hand.contact(&model.contact, &row.t_cam_model)?;
             let truth = hand.true_contact(row.obj_id, &model.contact, &truth)?;
@@ -84,17 +99,32 @@ impl<'a> Scorer<'a> {
             return Ok(());
         }
         let mesh = load_mesh(self.truth.models(), id)?;
-        let symmetries = match self.truth.models().info(id) {
-            Ok(info) => info.symmetries,
+        let (symmetries, diameter) = match self.truth.models().info(id) {
+            Ok(info) => (info.symmetries, info.diameter),
             Err(DatasetError::Missing { .. } | DatasetError::UnknownObject { .. }) => {
-                Default::default()
+                (Default::default(), diameter(&mesh.vertices))
             }
             // Without its symmetries, a symmetric object would be scored wrongly.
             Err(broken) => return Err(broken.into()),
         };
         let contact = ContactModel::new(&mesh);
+        let drawn = RenderModel::new(&mesh)
+            .map_err(|e| RefineError::Object { object: format!("{id}"), reason: e.to_string() })?;
         let scored = ScoredModel::new(mesh.vertices, symmetries);
-        self.models.insert(id, Model { scored, contact });
+        self.models.insert(id, Model { scored, contact, drawn, diameter });
+        Ok(())
+    }
+
+    /// A dataset without depth, or an image of which nothing was measured, has no visible surface discrepancy.
+    fn prepare_depth(&mut self, scene: u32, image: u32) -> Result<(), AssetError> {
+        if self.depth.as_ref().is_none_or(|(of, _)| *of != (scene, image)) {
+            let depth = match self.dataset.frame(scene, image)?.depth() {
+                Ok(depth) => Some(depth),
+                Err(DatasetError::Missing { .. } | DatasetError::NoDepth { .. }) => None,
+                Err(broken) => return Err(broken.into()),
+            };
+            self.depth = Some(((scene, image), depth));
+        }
         Ok(())
     }
 

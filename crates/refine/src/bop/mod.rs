@@ -12,6 +12,7 @@ mod error;
 mod frame;
 mod ground_truth;
 mod json;
+mod model_list;
 mod models;
 mod pose;
 mod results;
@@ -23,6 +24,7 @@ pub use error::DatasetError;
 pub use frame::Frame;
 pub use ground_truth::{GroundTruth, TrueObject};
 pub use json::{Entry, JsonFile};
+pub use model_list::{extent_to_bop, write_symmetries};
 pub use models::{ModelInfo, Models};
 pub use pose::{
     PoseFault, ROTATION_TOLERANCE, pose_from_bop, rotation_from_row_major, rotation_to_row_major,

@@ -4,10 +4,13 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Isometry3, Matrix3, Point3, Unit, Vector3};
+use serde_json::{Map, Value, json};
 
 use super::error::DatasetError;
 use super::json::{Entry, LazyJson};
-use super::pose::{rotation_from_row_major, translation_from_mm};
+use super::pose::{
+    rotation_from_row_major, rotation_to_row_major, translation_from_mm, translation_to_mm,
+};
 use crate::metrics::{ContinuousSymmetry, Symmetries};
 
 /// A folder with `obj_000001.ply`, … (millimetres) and `models_info.json`.
@@ -78,6 +81,31 @@ impl Models {
             other => other,
         })?;
         ModelInfo::parse(&entry)
+    }
+}
+
+impl Symmetries {
+    /// As `models_info.json` has them: `symmetries_discrete` and `symmetries_continuous`, in millimetres; what there is
+    /// none of is left out.
+    pub fn to_bop(&self) -> Map<String, Value> {
+        let motion = |m: &Isometry3<f64>| {
+            let [r, t] = [
+                rotation_to_row_major(&m.rotation).to_vec(),
+                translation_to_mm(&m.translation).to_vec(),
+            ];
+            let rows = r.chunks(3).zip(&t).flat_map(|(row, t)| [row[0], row[1], row[2], *t]);
+            rows.chain([0.0, 0.0, 0.0, 1.0]).collect::<Vec<f64>>()
+        };
+        let axis = |c: &ContinuousSymmetry| json!({ "axis": c.axis.as_slice(), "offset": (c.point.coords * 1e3).as_slice() });
+        let mut fields = Map::new();
+        if !self.discrete.is_empty() {
+            fields.insert("symmetries_discrete".into(), self.discrete.iter().map(motion).collect());
+        }
+        if !self.continuous.is_empty() {
+            let axes: Vec<Value> = self.continuous.iter().map(axis).collect();
+            fields.insert("symmetries_continuous".into(), axes.into());
+        }
+        fields
     }
 }
 
@@ -177,6 +205,25 @@ mod tests {
         assert_eq!((plain.mass, plain.center_of_mass, plain.inertia), (None, None, None));
         assert_eq!(plain.symmetries, Symmetries::default());
         assert_eq!(models.object_ids().unwrap(), [12]);
+    }
+
+    #[test]
+    fn symmetries_read_back_as_written() {
+        let turn = Isometry3::new(Vector3::new(0.001, -0.02, 0.3), Vector3::new(0.2, 0.1, -3.0));
+        let axis = ContinuousSymmetry {
+            axis: Unit::new_normalize(Vector3::new(0.1, 0.2, 0.9)),
+            point: Point3::new(0.01, -0.02, 0.003),
+        };
+        let written = Symmetries { discrete: vec![turn], continuous: vec![axis] };
+        let mut info = written.to_bop();
+        info.insert("diameter".into(), 1.0.into());
+        let (_dir, models) = models(&json!({ "1": info }).to_string());
+        let read = models.info(1).unwrap().symmetries;
+        let error = read.discrete[0].to_homogeneous() - turn.to_homogeneous();
+        assert!(error.amax() < 1e-14, "{error}");
+        assert!((read.continuous[0].axis.dot(&written.continuous[0].axis) - 1.0).abs() < 1e-15);
+        assert!((read.continuous[0].point - written.continuous[0].point).norm() < 1e-15);
+        assert!(Symmetries::default().to_bop().is_empty());
     }
 
     #[test]

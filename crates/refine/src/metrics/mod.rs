@@ -6,20 +6,26 @@
 
 mod add;
 mod contact;
+mod diameter;
 mod nearest;
 mod pose_error;
+mod recall;
 mod score;
 mod summary;
 mod surface_distance;
 mod symmetry;
 mod table;
+mod vsd;
 
 pub use add::{add, adi};
 pub use contact::{CONTACT_DISTANCE, CONTACT_SAMPLES, ContactModel};
+pub use diameter::diameter;
 pub use nearest::NearestPoint;
 pub use pose_error::{oe_deg, oe_symmetric_deg, pe_cm};
+pub use recall::Recall;
 pub use score::{COLUMNS, PoseScore, ScoredModel};
 pub use summary::{Average, ScoredRow, Statistic, Statistics, Summary, summarize};
 pub use surface_distance::{mspd, mssd};
 pub use symmetry::{CONTINUOUS_STEPS, ContinuousSymmetry, Symmetries};
 pub use table::Table;
+pub use vsd::{VISIBILITY_TOLERANCE, VSD_TOLERANCES, vsd};

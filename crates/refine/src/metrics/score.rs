@@ -6,12 +6,14 @@ use serde::Serialize;
 use super::add::{add, adi};
 use super::nearest::NearestPoint;
 use super::pose_error::{oe_deg, oe_symmetric_deg, pe_cm};
+use super::recall::Recall;
 use super::surface_distance::{mspd, mssd};
 use super::symmetry::Symmetries;
+use super::vsd::VSD_TOLERANCES;
 use crate::bop::Intrinsics;
 
 /// Headings of the columns of [`PoseScore::values`], with units.
-pub const COLUMNS: [&str; 11] = [
+pub const COLUMNS: [&str; 13] = [
     "PE cm",
     "OE °",
     "OEsym °",
@@ -23,6 +25,8 @@ pub const COLUMNS: [&str; 11] = [
     "IV cm³",
     "|ΔCA| cm²",
     "|ΔIV| cm³",
+    "VSD",
+    "AR",
 ];
 
 /// The metrics of one pose; what was not computed is `None`.
@@ -50,6 +54,10 @@ pub struct PoseScore {
     pub delta_ca_cm2: Option<f64>,
     /// Deviation of the intersection volume from that of the true pose \[cm³\].
     pub delta_iv_cm3: Option<f64>,
+    /// Visible surface discrepancy, the mean over BOP's ten tolerances (0..=1).
+    pub vsd: Option<f64>,
+    /// Recalls of BOP's three metrics over their thresholds (0..=1).
+    pub recall: Option<Recall>,
 }
 
 impl PoseScore {
@@ -67,6 +75,8 @@ impl PoseScore {
             self.iv_cm3,
             self.delta_ca_cm2,
             self.delta_iv_cm3,
+            self.vsd,
+            self.recall.map(|r| r.average()),
         ]
     }
 
@@ -81,6 +91,22 @@ impl PoseScore {
         (self.ca_cm2, self.iv_cm3) = (Some(ca_cm2), Some(iv_cm3));
         self.delta_ca_cm2 = Some((ca_cm2 - true_ca_cm2).abs());
         self.delta_iv_cm3 = Some((iv_cm3 - true_iv_cm3).abs());
+        self
+    }
+
+    /// Adds the visible surface discrepancy, `vsd` for each of BOP's tolerances, and with it the recalls; `diameter` is the
+    /// object's \[m\], `width` the image's \[px\].
+    pub fn with_visible_surface(
+        mut self,
+        vsd: &[f64; VSD_TOLERANCES.len()],
+        diameter: f64,
+        width: usize,
+    ) -> Self {
+        self.vsd = Some(vsd.iter().sum::<f64>() / vsd.len() as f64);
+        self.recall = self
+            .mssd_mm
+            .zip(self.mspd_px)
+            .map(|(mssd, mspd)| Recall::new(vsd, 1e-3 * mssd, diameter, mspd, width));
         self
     }
 }
@@ -139,7 +165,10 @@ mod tests {
         let truth = Isometry3::translation(0.0, 0.0, 0.5);
         let estimate = Isometry3::new(Vector3::new(0.0, 0.01, 0.5), Vector3::y() * 0.0);
         let score = model.score(&estimate, &truth, &camera).with_contact(3.0, 2.0, 4.5, 0.5);
-        let expected = [1.0, 0.0, 0.0, 10.0, 10.0, 10.0, 10.0, 3.0, 2.0, 1.5, 1.5];
+        let score = score.with_visible_surface(&[0.24; 10], 0.1, 640);
+        // Of ten thresholds each, VSD is under six, MSSD (a tenth of the diameter) under eight, MSPD under eight.
+        let recall = (0.6 + 0.8 + 0.8) / 3.0;
+        let expected = [1.0, 0.0, 0.0, 10.0, 10.0, 10.0, 10.0, 3.0, 2.0, 1.5, 1.5, 0.24, recall];
         for ((value, expected), name) in score.values().into_iter().zip(expected).zip(COLUMNS) {
             assert!((value.unwrap() - expected).abs() < 1e-9, "{name}: {value:?}");
         }

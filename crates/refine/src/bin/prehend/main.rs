@@ -8,6 +8,7 @@ mod outcome;
 mod output;
 mod progress;
 mod refine;
+mod symmetry;
 
 use std::process::ExitCode;
 
@@ -50,6 +51,10 @@ enum Command {
     Eval(eval::Arguments),
     /// Draw poses over their images, and warn about units and frames, before refining anything
     Check(check::Arguments),
+    /// Find the symmetries of models, and write them into models_info.json
+    ///
+    /// Scores that are free of symmetries (MSSD, MSPD, the symmetric OE) take them from there.
+    Symmetry(symmetry::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -65,6 +70,7 @@ fn main() -> ExitCode {
         Command::Refine(arguments) => refine::run(&arguments),
         Command::Eval(arguments) => eval::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
+        Command::Symmetry(arguments) => symmetry::run(&arguments),
     };
     match outcome {
         Ok(outcome) => outcome.exit_code(),

@@ -1,0 +1,88 @@
+//! `prehend symmetry`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use prehend_refine::bop::{Models, write_symmetries};
+use prehend_refine::load_mesh;
+use prehend_refine::metrics::Symmetries;
+use prehend_refine::symmetry::{SymmetrySettings, find_symmetries};
+
+use crate::outcome::Outcome;
+use crate::output::say;
+use crate::progress;
+
+#[derive(Args)]
+pub(crate) struct Arguments {
+    /// Folder of obj_000001.ply, … in millimetres, such as a dataset's models/
+    #[arg(long, value_name = "DIR", help_heading = "Input")]
+    models: PathBuf,
+    /// Only this object; may be repeated
+    #[arg(long, value_name = "ID", help_heading = "Input")]
+    object: Vec<u32>,
+    /// How far the surface may be off, as a fraction of the diameter
+    #[arg(long, value_name = "FRACTION", default_value_t = SymmetrySettings::default().tolerance, help_heading = "Method")]
+    tolerance: f64,
+    /// Compare colours too: how much they may differ, root mean square, of 0 to 1 (0.05 is good) [default: shape alone]
+    #[arg(long, value_name = "DIFFERENCE", help_heading = "Method")]
+    color: Option<f64>,
+    /// Write them into models_info.json, in place of those that were there
+    #[arg(long, help_heading = "Output")]
+    write: bool,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
+    let models = Models::new(arguments.models.clone());
+    let settings = SymmetrySettings {
+        tolerance: arguments.tolerance,
+        color_tolerance: arguments.color,
+        ..SymmetrySettings::default()
+    };
+    let ids = match arguments.object.as_slice() {
+        [] => models.object_ids()?,
+        ids => ids.to_vec(),
+    };
+    let (mut done, mut failures) = (0, Vec::new());
+    let bar = progress::bar(ids.len() as u64, "searching");
+    for id in ids {
+        match search(&models, id, &settings, arguments.write) {
+            Ok(symmetries) => {
+                bar.suspend(|| say(format!("object {id}: {}", describe(&symmetries))))?;
+                done += 1;
+            }
+            Err(error) => failures.push(format!("object {id}: {error}")),
+        }
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    Ok(Outcome { done, failures })
+}
+
+fn search(
+    models: &Models,
+    id: u32,
+    settings: &SymmetrySettings,
+    write: bool,
+) -> anyhow::Result<Symmetries> {
+    let mesh = load_mesh(models, id)?;
+    let symmetries = find_symmetries(&mesh, settings)?;
+    if write {
+        write_symmetries(models, id, &mesh.vertices, &symmetries)?;
+    }
+    Ok(symmetries)
+}
+
+/// Rotations by axis and angle, axes of revolution; what a person compares with the object in hand.
+fn describe(symmetries: &Symmetries) -> String {
+    let vector = |v: &[f64]| format!("({:.3}, {:.3}, {:.3})", v[0], v[1], v[2]);
+    let continuous = symmetries
+        .continuous
+        .iter()
+        .map(|c| format!("any turn about {}", vector(c.axis.as_slice())));
+    let discrete = symmetries.discrete.iter().filter_map(|m| {
+        let (axis, angle) = m.rotation.axis_angle()?;
+        Some(format!("{:.1}° about {}", angle.to_degrees(), vector(axis.as_slice())))
+    });
+    let all: Vec<String> = continuous.chain(discrete).collect();
+    if all.is_empty() { "none".to_owned() } else { all.join("; ") }
+}

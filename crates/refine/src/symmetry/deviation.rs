@@ -1,0 +1,144 @@
+//! How far a rotation is from being a symmetry.
+
+use nalgebra::{Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
+use prehend_geometry::closest::{ClosestError, ClosestPoints};
+use prehend_geometry::sample::surface_samples;
+use prehend_geometry::{SurfaceSample, TriMesh};
+
+use super::SymmetrySettings;
+use super::paint::Paint;
+
+/// A surface, prepared for comparing it with itself.
+pub(super) struct Shape {
+    surface: ClosestPoints,
+    /// Points of the surface relative to its centroid, each with its unit normal.
+    samples: Vec<(Vector3<f64>, Vector3<f64>)>,
+    centre: Point3<f64>,
+    /// Second moments of the surface about its centroid, per area \[m²\].
+    moments: Matrix3<f64>,
+    /// How far a point may lie off \[m\], and how many may lie farther.
+    tolerance: f64,
+    exempt: usize,
+    paint: Option<Paint>,
+}
+
+impl Shape {
+    pub(super) fn new(mesh: &TriMesh, settings: &SymmetrySettings) -> Result<Self, ClosestError> {
+        let surface = ClosestPoints::new(mesh)?;
+        let samples = surface_samples(mesh, settings.samples.max(1), 0);
+        let (centre, moments) = moments(mesh);
+        let place = |s: &SurfaceSample| (s.point - centre, s.normal);
+        // Twice the largest distance from the centroid is the diameter of what is symmetric at all.
+        let radius = mesh.vertices.iter().map(|v| (v - centre).norm()).fold(0.0, f64::max);
+        let tolerance = settings.tolerance * 2.0 * radius;
+        let paint = settings.color_tolerance.and_then(|most| Paint::new(mesh, tolerance, most));
+        let exempt = (settings.exempt * samples.len() as f64) as usize;
+        let samples = samples.iter().map(place).collect();
+        Ok(Self { surface, samples, centre, moments, tolerance, exempt, paint })
+    }
+
+    /// The centroid of the surface, which every symmetry leaves where it is \[m\].
+    pub(super) fn centre(&self) -> Point3<f64> {
+        self.centre
+    }
+
+    /// Directions of the principal axes of the surface's second moments.
+    pub(super) fn principal_axes(&self) -> Matrix3<f64> {
+        self.moments.symmetric_eigen().eigenvectors
+    }
+
+    /// Whether `turn` is a symmetry.
+    pub(super) fn is_symmetric(&self, turn: &UnitQuaternion<f64>) -> bool {
+        self.fits(turn, 1.0)
+    }
+
+    /// Whether the surface is off by no more than `slack` tolerances.
+    pub(super) fn fits(&self, turn: &UnitQuaternion<f64>, slack: f64) -> bool {
+        let reach = slack * self.tolerance;
+        let matrix = turn.to_rotation_matrix();
+        let far = |(x, _): &&(Vector3<f64>, Vector3<f64>)| {
+            self.surface.closest(&(self.centre + matrix * x), reach).is_none()
+        };
+        self.samples.iter().filter(far).nth(self.exempt).is_none()
+            && self.paint.as_ref().is_none_or(|paint| paint.fits(&self.centre, &matrix))
+    }
+
+    /// The rotation nearest to `turn` at which every `stride`-th sample lies on the surface best, in the least-squares
+    /// sense of point to plane; and their root-mean-square distance there \[m\].
+    pub(super) fn drawn(
+        &self,
+        mut turn: UnitQuaternion<f64>,
+        stride: usize,
+        iterations: usize,
+    ) -> (UnitQuaternion<f64>, f64) {
+        let mut rms = f64::INFINITY;
+        for _ in 0..iterations {
+            let matrix = turn.to_rotation_matrix();
+            let (hessian, gradient, sum, count) = self.normal_equations(&matrix, stride);
+            rms = (sum / f64::from(count.max(1))).sqrt();
+            // Directions that the shape leaves free (the spin of a cylinder) must stay where they are.
+            let damping = Matrix3::identity() * (1e-3 * hessian.trace() + f64::MIN_POSITIVE);
+            let Some(factor) = (hessian + damping).cholesky() else { break };
+            let step = -factor.solve(&gradient);
+            let length = step.norm();
+            turn = UnitQuaternion::from_scaled_axis(step * (0.3 / length).min(1.0)) * turn;
+            if length < 1e-4 {
+                break;
+            }
+        }
+        (turn, rms)
+    }
+
+    /// Point to plane: JᵀJ and Jᵀr by a rotation on the left, Σr² and the number of samples.
+    fn normal_equations(
+        &self,
+        turn: &Rotation3<f64>,
+        stride: usize,
+    ) -> (Matrix3<f64>, Vector3<f64>, f64, u32) {
+        let (mut hessian, mut gradient) = (Matrix3::zeros(), Vector3::zeros());
+        let (mut sum, mut count) = (0.0, 0);
+        for (x, normal) in self.samples.iter().step_by(stride) {
+            let (arm, normal) = (turn * x, turn * normal);
+            let Some(closest) = self.surface.closest(&(self.centre + arm), f64::INFINITY) else {
+                continue;
+            };
+            let residual = (self.centre + arm - closest.point).dot(&normal);
+            let row = arm.cross(&normal);
+            hessian += row * row.transpose();
+            gradient += row * residual;
+            sum += closest.distance_squared();
+            count += 1;
+        }
+        (hessian, gradient, sum, count)
+    }
+
+    /// How far `turn` moves the second moments, relative to themselves.
+    pub(super) fn moments_moved(&self, turn: &UnitQuaternion<f64>) -> f64 {
+        let turn = turn.to_rotation_matrix();
+        let moved = turn.matrix() * self.moments * turn.matrix().transpose();
+        (moved - self.moments).norm() / self.moments.norm().max(f64::MIN_POSITIVE)
+    }
+
+    /// How far a sample may lie off \[m\].
+    pub(super) fn tolerance(&self) -> f64 {
+        self.tolerance
+    }
+}
+
+/// Centroid \[m\] and second moments about it, per area \[m²\], of a surface.
+fn moments(mesh: &TriMesh) -> (Point3<f64>, Matrix3<f64>) {
+    let (mut area, mut first, mut second) = (0.0, Vector3::zeros(), Matrix3::zeros());
+    for face in 0..mesh.faces.len() {
+        let weight = 0.5 * mesh.area_vector(face).norm();
+        let corners = mesh.triangle(face).map(|c| c.coords);
+        let sum: Vector3<f64> = corners.iter().sum();
+        area += weight;
+        first += sum * (weight / 3.0);
+        // ∫ x xᵀ over a triangle: area / 12 (Σ c cᵀ + (Σ c)(Σ c)ᵀ).
+        let squares: Matrix3<f64> = corners.iter().map(|c| c * c.transpose()).sum();
+        second += (squares + sum * sum.transpose()) * (weight / 12.0);
+    }
+    let area = f64::max(area, f64::MIN_POSITIVE);
+    let centre = first / area;
+    (centre.into(), second / area - centre * centre.transpose())
+}
