@@ -20,6 +20,12 @@ pub trait DistanceField: Send + Sync {
     /// Culling happens here, before any arithmetic that carries derivatives.
     fn sample(&self, point: &Point3<f64>, reach: f64) -> Option<FieldSample>;
 
+    /// The distance alone, the same number as [`Self::sample`]'s, for whoever needs no derivative; fields that can be quicker
+    /// about it are.
+    fn distance(&self, point: &Point3<f64>, reach: f64) -> Option<f64> {
+        self.sample(point, reach).map(|s| s.distance)
+    }
+
     /// How much the field rises over a length at most: 1 for a distance, a little more where it is interpolated. A field that
     /// is no distance (a height above terrain) must say so, or what is near to it is overlooked.
     fn steepest(&self) -> f64 {

@@ -151,8 +151,9 @@ fn fit_channel(
         let residuals: Vec<f64> =
             samples.iter().map(|s| s.observed[channel] as f64 - row(s).dot(&solution)).collect();
         let mut magnitudes: Vec<f64> = residuals.iter().map(|r| r.abs()).collect();
-        magnitudes.sort_by(f64::total_cmp);
-        let scale = (2.4 * magnitudes[magnitudes.len() / 2]).max(1e-4);
+        let middle = magnitudes.len() / 2;
+        let (_, median, _) = magnitudes.select_nth_unstable_by(middle, f64::total_cmp);
+        let scale = (2.4 * *median).max(1e-4);
         weights
             .iter_mut()
             .zip(&residuals)

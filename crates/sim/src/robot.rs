@@ -59,6 +59,10 @@ impl DistanceField for LinkField {
     fn sample(&self, point: &Point3<f64>, reach: f64) -> Option<FieldSample> {
         self.0.grid()?.sample(point, reach)
     }
+
+    fn distance(&self, point: &Point3<f64>, reach: f64) -> Option<f64> {
+        self.0.grid()?.distance(point, reach)
+    }
 }
 
 impl World {

@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Point3};
 
 use super::shape::box_distance;
 use super::{RobotError, RobotShape};
-use crate::{DistanceField, FieldSample, TriMesh};
+use crate::{DistanceField, FieldSample, SdfGrid, TriMesh};
 
 /// A [`RobotShape`] with a pose for every link.
 ///
@@ -107,7 +107,23 @@ impl PosedRobot {
     /// The nearest link and the signed distance to it by its grid, with derivatives in the world frame;
     /// `None` beyond `reach` \[m\].
     pub fn sample_link(&self, point: &Point3<f64>, reach: f64) -> Option<(usize, FieldSample)> {
-        let mut best: Option<(&Solid, FieldSample)> = None;
+        let (solid, s) = self.nearest(point, reach, SdfGrid::sample, |s| s.distance)?;
+        let rotation = self.t_world_links[solid.link].rotation.to_rotation_matrix();
+        let hessian = rotation.matrix() * s.hessian * rotation.matrix().transpose();
+        let gradient = rotation * s.gradient;
+        Some((solid.link, FieldSample { distance: s.distance, gradient, hessian }))
+    }
+
+    /// The nearest link and what `query` says of its grid at the point, in the link's frame; `None` beyond `reach` \[m\].
+    #[inline]
+    fn nearest<T>(
+        &self,
+        point: &Point3<f64>,
+        reach: f64,
+        query: impl Fn(&SdfGrid, &Point3<f64>, f64) -> Option<T>,
+        distance: impl Fn(&T) -> f64,
+    ) -> Option<(&Solid, T)> {
+        let mut best = None;
         let mut limit = reach;
         for solid in &self.solid {
             // A deep point may be deeper still in a link whose box it is in, so zero always counts.
@@ -121,21 +137,14 @@ impl PosedRobot {
                 continue;
             }
             let grid = self.shape.links()[solid.link].grid();
-            if let Some(sample) = grid.and_then(|g| g.sample(&local, near))
-                && sample.distance <= limit
+            if let Some(found) = grid.and_then(|g| query(g, &local, near))
+                && distance(&found) <= limit
             {
-                limit = sample.distance;
-                best = Some((solid, sample));
+                limit = distance(&found);
+                best = Some((solid, found));
             }
         }
-        best.map(|(solid, s)| {
-            let rotation = self.t_world_links[solid.link].rotation.to_rotation_matrix();
-            let hessian = rotation.matrix() * s.hessian * rotation.matrix().transpose();
-            (
-                solid.link,
-                FieldSample { distance: s.distance, gradient: rotation * s.gradient, hessian },
-            )
-        })
+        best
     }
 
     /// Exact signed distance to the bodies \[m\] (no grid), or `None` farther outside than `max_distance`.
@@ -195,6 +204,10 @@ impl DistanceField for PosedRobot {
     fn sample(&self, point: &Point3<f64>, reach: f64) -> Option<FieldSample> {
         self.sample_link(point, reach).map(|(_, sample)| sample)
     }
+
+    fn distance(&self, point: &Point3<f64>, reach: f64) -> Option<f64> {
+        self.nearest(point, reach, SdfGrid::distance, |d| *d).map(|(_, distance)| distance)
+    }
 }
 
 #[cfg(test)]
@@ -243,6 +256,7 @@ mod tests {
         for p in points(&robot) {
             let exact = robot.signed_distance(&p, 0.01);
             let grid = robot.sample(&p, 0.01);
+            assert_eq!(robot.distance(&p, 0.01), grid.map(|g| g.distance));
             match (exact, grid) {
                 (Some(e), Some(g)) => {
                     // Kinks are rounded within the spacing, never more.

@@ -145,6 +145,32 @@ impl SdfGrid {
     }
 }
 
+impl SdfGrid {
+    /// The value of the spline at `point`: that of [`Self::evaluate`] to the last bit.
+    #[inline]
+    pub fn value(&self, point: &Point3<f64>) -> f64 {
+        let dims = self.lattice.dims();
+        let x = (point - self.lattice.origin()) * (1.0 / self.lattice.spacing());
+        let [bx, by, bz] = [0, 1, 2].map(|i| Basis::at(x[i], dims[i]));
+        let (sy, sz) = (dims[1] + 2, dims[2] + 2);
+        let mut plane = [0.0; 4];
+        for j in 0..4 {
+            let mut line = [0.0; 4];
+            for i in 0..4 {
+                let start = ((bx.first + i) * sy + by.first + j) * sz + bz.first;
+                let c = &self.coefficients[start..start + 4];
+                for k in 0..4 {
+                    line[k] += bx.weights[0][i] * c[k];
+                }
+            }
+            for k in 0..4 {
+                plane[k] += by.weights[0][j] * line[k];
+            }
+        }
+        (0..4).map(|k| plane[k] * bz.weights[0][k]).sum()
+    }
+}
+
 impl DistanceField for SdfGrid {
     #[inline]
     fn sample(&self, point: &Point3<f64>, reach: f64) -> Option<FieldSample> {
@@ -152,6 +178,15 @@ impl DistanceField for SdfGrid {
         if self.lower_bound(point) <= reach {
             let sample = self.evaluate(point);
             return (sample.distance <= reach).then_some(sample);
+        }
+        None
+    }
+
+    #[inline]
+    fn distance(&self, point: &Point3<f64>, reach: f64) -> Option<f64> {
+        if self.lower_bound(point) <= reach {
+            let distance = self.value(point);
+            return (distance <= reach).then_some(distance);
         }
         None
     }

@@ -1,27 +1,24 @@
 //! Exact nearest neighbours among a fixed set of points.
 
-use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use nalgebra::Point3;
+use prehend_geometry::KdTree;
 
 /// A k-d tree over points that knows what to answer without any.
 #[derive(Debug)]
 pub struct NearestPoint {
-    tree: Option<ImmutableKdTree<f64, 3>>,
+    tree: Option<KdTree>,
 }
 
 impl NearestPoint {
     /// Builds the tree; coordinates must be finite.
     pub fn new(points: &[Point3<f64>]) -> Self {
-        let coordinates: Vec<[f64; 3]> = points.iter().map(|p| p.coords.into()).collect();
-        Self { tree: ImmutableKdTree::new_from_slice(&coordinates).ok().filter(|t| t.size() > 0) }
+        Self { tree: KdTree::new(points).ok() }
     }
 
     /// The distance from `query` to the nearest point; infinite when there are no points.
     pub fn distance(&self, query: &Point3<f64>) -> f64 {
-        self.tree.as_ref().map_or(f64::INFINITY, |tree| {
-            let query = query.coords.into();
-            tree.query(&query).nearest_one::<SquaredEuclidean<f64>>().execute().distance.sqrt()
-        })
+        let nearest = self.tree.as_ref().and_then(|tree| tree.nearest(query, f64::INFINITY));
+        nearest.map_or(f64::INFINITY, |n| n.distance_squared.sqrt())
     }
 }
 

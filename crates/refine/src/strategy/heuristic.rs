@@ -1,6 +1,7 @@
 //! The paper's heuristic: a candidate step along every gradient, weighted by what each one achieves.
 
 use nalgebra::{Matrix6, Vector6};
+use rayon::prelude::*;
 
 use crate::trace::{Iteration, Trace};
 use crate::{Block, Normal, State, Term};
@@ -59,8 +60,10 @@ impl Heuristic {
         let mut least = f64::INFINITY;
         for index in 0..=settings.iterations {
             terms.iter().for_each(|t| t.refresh(&mut state));
-            let candidates: Vec<Candidate> =
-                terms.iter().map(|t| Candidate::of(t.as_ref(), &state, radius, length)).collect();
+            let candidates: Vec<Candidate> = terms
+                .par_iter()
+                .map(|t| Candidate::of(t.as_ref(), &state, radius, length))
+                .collect();
             let total: f64 = candidates.iter().map(|c| c.value).sum();
             let gain: f64 = candidates.iter().map(Candidate::gain).sum();
             let weights = candidates.iter().map(|c| if gain > 0.0 { c.gain() / gain } else { 0.0 });

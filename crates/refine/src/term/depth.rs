@@ -1,9 +1,10 @@
 //! Mesh-to-depth: the two-way distance between the object's surface and the depth points on it.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
 
-use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use nalgebra::{Matrix6, Point3, Vector3, Vector6};
+use prehend_geometry::KdTree;
 use prehend_render::{Camera, DepthImage};
 use rayon::prelude::*;
 
@@ -38,8 +39,10 @@ impl Default for DepthSettings {
 pub struct DepthTerm {
     object: Arc<Object>,
     camera: Camera,
-    points: Vec<Point3<f64>>,
-    tree: ImmutableKdTree<f64, 3>,
+    tree: KdTree,
+    /// What was nearest last, for each depth point a face and for each surface sample a depth point: where a search begins
+    /// changes how long it takes, not what it finds.
+    nearest: [Vec<AtomicU32>; 2],
     /// Depth of the hand, where it may hide the object.
     hand: Arc<DepthImage>,
     settings: DepthSettings,
@@ -57,12 +60,10 @@ impl DepthTerm {
         settings: DepthSettings,
     ) -> Result<Self, RefineError> {
         let points = back_project(observation, settings.points);
-        let coordinates: Vec<[f64; 3]> = points.iter().map(|p| p.coords.into()).collect();
-        let tree = ImmutableKdTree::new_from_slice(&coordinates)
-            .ok()
-            .filter(|_| !points.is_empty())
-            .ok_or(RefineError::NoDepth)?;
-        Ok(Self { object, camera: observation.camera, points, tree, hand, settings })
+        let tree = KdTree::new(&points).map_err(|_| RefineError::NoDepth)?;
+        let nearest = [points.len(), object.samples.len()]
+            .map(|n| (0..n).map(|_| AtomicU32::new(u32::MAX)).collect());
+        Ok(Self { object, camera: observation.camera, tree, nearest, hand, settings })
     }
 
     /// `f` of every match: of each depth point with the mesh, and of each visible surface sample with the
@@ -70,10 +71,14 @@ impl DepthTerm {
     fn matches<A: Send>(&self, state: &State, f: impl Fn(Pair) -> A + Sync) -> (Vec<A>, Vec<A>) {
         let t_object_cam = state.t_cam_object.inverse();
         let to_mesh = self
-            .points
+            .tree
+            .points()
             .par_iter()
-            .filter_map(|p| {
-                let closest = self.object.surface.closest(&(t_object_cam * p), f64::INFINITY)?;
+            .zip(&self.nearest[0])
+            .filter_map(|(p, nearest)| {
+                let (query, face) = (t_object_cam * p, nearest.load(Ordering::Relaxed));
+                let closest = self.object.surface.closest_from(&query, f64::INFINITY, face)?;
+                nearest.store(closest.face, Ordering::Relaxed);
                 let surface = state.t_cam_object * closest.point;
                 Some(f(Pair { surface, cloud: *p }))
             })
@@ -82,16 +87,17 @@ impl DepthTerm {
             .object
             .samples
             .par_iter()
-            .filter_map(|sample| {
+            .zip(&self.nearest[1])
+            .filter_map(|(sample, nearest)| {
                 let surface = state.t_cam_object * sample.point;
                 let normal = state.t_cam_object * sample.normal;
                 if !self.sees(&surface, &normal) {
                     return None;
                 }
-                let query = surface.coords.into();
-                let nearest = self.tree.query(&query).nearest_one::<SquaredEuclidean<f64>>();
-                let cloud = self.points[nearest.execute().item as usize];
-                Some(f(Pair { surface, cloud }))
+                let point = nearest.load(Ordering::Relaxed) as usize;
+                let found = self.tree.nearest_from(&surface, f64::INFINITY, point)?.index;
+                nearest.store(found as u32, Ordering::Relaxed);
+                Some(f(Pair { surface, cloud: self.tree.points()[found] }))
             })
             .collect();
         (to_mesh, to_cloud)

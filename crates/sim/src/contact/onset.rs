@@ -120,6 +120,12 @@ impl Onset {
         }
     }
 
+    /// Whether there are contacts with a derivative that exert no force.
+    #[inline]
+    pub(crate) fn leaks(&self) -> bool {
+        matches!(self, Self::Leaky { .. } | Self::AsymmetricLeaky { .. })
+    }
+
     /// The onset to use at step number `index` of a rollout.
     #[inline]
     pub fn at_step(&self, index: usize) -> Self {

@@ -50,7 +50,7 @@ impl Patch<'_> {
     fn distance_within(&self, point: &Point3<f64>, within: f64) -> bool {
         let State { pose, .. } = &self.state;
         let place = pose.translation.vector + pose.rotation * (point - self.com);
-        self.field.sample(&Point3::from(place), within).is_some()
+        self.field.distance(&Point3::from(place), within).is_some()
     }
 
     /// The samples that may touch, for a law that reaches to `cutoff`, before one of them has moved by `margin` \[m\].
@@ -60,23 +60,32 @@ impl Patch<'_> {
         self.surface.only(near, |block| self.may_touch(block, reach))
     }
 
-    /// Calls `visit` with every point in contact, in order. Points beyond `cutoff` and the onset's band exert no
-    /// force, so leaving out blocks of them changes nothing. Says whether every distance was a number.
+    /// Calls `visit` with every point in contact, in order; with `pressing_only` without those that exert no force and only
+    /// leak. Points beyond `cutoff` and the onset's band exert no force, so leaving out blocks of them changes nothing.
+    /// Says whether every distance was a number.
     #[inline(always)]
-    pub(super) fn for_each_touch(&self, cutoff: f64, mut visit: impl FnMut(&Touch)) -> bool {
+    pub(super) fn for_each_touch(
+        &self,
+        cutoff: f64,
+        pressing_only: bool,
+        mut visit: impl FnMut(&Touch),
+    ) -> bool {
         let State { pose, linear, angular } = &self.state;
         let (translation, rotation) = (pose.translation.vector, pose.rotation.to_rotation_matrix());
         let reach = cutoff + self.onset.band();
+        let skips = pressing_only && self.onset.leaks();
         for (block, points) in self.surface.blocks() {
             if !self.may_touch(block, reach) {
                 continue;
             }
             for point in points {
                 let arm = rotation * (point.position - self.com);
-                let Some(sample) = self.field.sample(&Point3::from(translation + arm), reach)
-                else {
+                let place = Point3::from(translation + arm);
+                // The distance alone is cheap. What is no number is found below.
+                if skips && self.field.distance(&place, reach).is_none_or(|d| d >= cutoff) {
                     continue;
-                };
+                }
+                let Some(sample) = self.field.sample(&place, reach) else { continue };
                 let FieldSample { distance, gradient, hessian } = sample;
                 if distance.is_nan() {
                     return false;

@@ -96,7 +96,7 @@ impl CustomVjp for Rule {
 pub(crate) fn wrench<L: ContactLaw>(law: &L, p: &[f64], patch: &Patch<'_>) -> Vector6<f64> {
     let cutoff = law.reach();
     let (mut force, mut torque) = (Vector3::zeros(), Vector3::zeros());
-    let sound = patch.for_each_touch(cutoff, |touch| {
+    let sound = patch.for_each_touch(cutoff, true, |touch| {
         let response = law.law(p, &touch.contact(cutoff));
         let f = touch.normal * response.normal + response.tangential;
         force += f;
@@ -124,7 +124,7 @@ pub(crate) fn wrench_jacobian<L: ContactLaw>(
     let mut by = [[Matrix3::<f64>::zeros(); 4]; 2];
     let mut one_sided = Vec::new();
     let mut param_slopes = vec![Vector6::zeros(); if by_params { p.len() } else { 0 }];
-    let sound = patch.for_each_touch(cutoff, |touch| {
+    let sound = patch.for_each_touch(cutoff, false, |touch| {
         let contact = touch.lifted(cutoff);
         let response = law.law(&params, &contact);
         let force: Vector3<Fwd<6>> =

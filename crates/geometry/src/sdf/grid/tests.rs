@@ -40,6 +40,12 @@ fn a_box_is_exact_away_from_its_edges() {
         assert!(s.hessian.norm() < 1e-3);
     }
     assert!(grid.evaluate(&Point3::origin()).distance < -0.018);
+    for i in 0..500 {
+        let at = |k: usize| ((i * k) % 97) as f64 / 97.0 * 0.07 - 0.035;
+        let p = Point3::new(at(7), at(13), at(29));
+        let alone = grid.distance(&p, 0.005);
+        assert_eq!(alone, grid.sample(&p, 0.005).map(|s| s.distance));
+    }
     // Every sample is the exact distance, near the edges too.
     let (origin, _) = grid.extent();
     for i in 0..300 {
