@@ -23,20 +23,23 @@
 
 mod adjoint;
 mod blend;
-mod candidates;
 mod drawn;
 mod exponential;
 mod face;
 mod fragment;
 #[cfg(test)]
+mod jumps;
+mod lit;
+mod motion;
+#[cfg(test)]
 mod naive;
+mod number;
 mod pixel;
-mod rows;
+mod run;
 mod settings;
 #[cfg(test)]
 mod tests;
 
-use std::ops::Range;
 use std::sync::OnceLock;
 
 use nalgebra::{Isometry3, Point3};
@@ -49,11 +52,12 @@ use crate::model::RenderModel;
 use crate::pose_loss::{Seen, View};
 use crate::posed::Posed;
 use crate::projected::Region;
-pub(crate) use candidates::{Candidates, RUN};
 pub(crate) use drawn::{Drawn, project};
 pub(crate) use face::Face;
+pub(crate) use number::Wide;
 pub(crate) use pixel::LEAST_SHARE;
-use pixel::{Scene, Scratch};
+use pixel::Scene;
+pub(crate) use run::{RUN, Run};
 pub(crate) use settings::{BACKGROUND, Settings};
 
 /// Rows whose faces are listed together.
@@ -85,19 +89,20 @@ impl<'a> SoftRasView<'a> {
         let mut posed = Posed::new(model, camera, pose, settings.reach);
         let region = posed.projected.region.union(also);
         let lighting = Lighting::new(light, &posed.rotation);
-        let mut drawn = Drawn { faces: Vec::new(), ids: Vec::new() };
+        let (mut drawn, mut screen) = (Drawn { faces: Vec::new(), ids: Vec::new() }, Vec::new());
         if posed.projected.region != Region::EMPTY {
             let (rotation, center) = (pose.rotation.to_rotation_matrix(), pose * model.center());
             let vertices = model.positions.iter().map(|p| center + rotation * p.cast::<f64>());
-            let screen = project(camera, vertices, &posed.projected.screen);
+            screen = project(camera, vertices, &posed.projected.screen);
             let facing = &mut posed.projected.facing;
             drawn = Drawn::new(&model.faces, &screen, |_| model.closed, facing, &settings);
         }
         let Drawn { faces, ids } = drawn;
         let bands = bands(&faces, &region);
-        let rows = faces.iter().map(|_| OnceLock::new()).collect();
-        let twist_center = center.coords.cast();
-        let scene = Scene { posed, lighting, settings, faces, ids, rows, twist_center };
+        let motions = faces.iter().map(|_| OnceLock::new()).collect();
+        let (camera, twist_center) = (*camera, *center);
+        let scene =
+            Scene { posed, lighting, settings, camera, screen, faces, ids, motions, twist_center };
         Self { scene, region, bands, arch: pulp::Arch::new() }
     }
 }
@@ -166,24 +171,9 @@ impl Runs {
         self.start.len() - 1
     }
 
-    /// Finds out which faces count at the pixels of a run, whose columns it returns.
-    #[inline(always)]
-    fn collect(
-        &self,
-        candidates: &mut Candidates,
-        scene: &Scene,
-        run: usize,
-        region: &Region,
-        row: f32,
-    ) -> Range<usize> {
-        let x0 = region.x0 + run * RUN;
-        let lanes = RUN.min(region.x1 - x0);
-        candidates.clear();
-        for &index in &self.faces[self.start[run]..self.start[run + 1]] {
-            let face = &scene.faces[index as usize];
-            candidates.add(face, index, [x0 as f32, row], lanes, &scene.settings);
-        }
-        x0..x0 + lanes
+    /// The faces of a run, and the first of its columns.
+    fn of(&self, run: usize, region: &Region) -> (&[u32], usize) {
+        (&self.faces[self.start[run]..self.start[run + 1]], region.x0 + run * RUN)
     }
 }
 
@@ -217,12 +207,15 @@ impl View for SoftRasView<'_> {
 
     fn faces(&self, block: usize, mut each: impl FnMut(usize, usize, u32, [f32; 3])) {
         let (y, runs) = self.runs(block);
-        let mut candidates = Candidates::new();
-        for run in 0..runs.count() {
-            let columns = runs.collect(&mut candidates, &self.scene, run, &self.region, y as f32);
-            for (lane, x) in columns.enumerate() {
-                if let Some(face) = candidates.inside(lane) {
-                    let (face, normal) = self.scene.normal(face, x as f32, y as f32);
+        let mut run = Run::new(0.0f32);
+        for i in 0..runs.count() {
+            let (faces, first) = runs.of(i, &self.region);
+            for x in first..(first + RUN).min(self.region.x1) {
+                let indices = faces.iter().copied();
+                let pixel = [x, y];
+                run.collect(&self.scene.faces, indices, pixel, &self.scene.settings);
+                if let Some((face, b)) = run.inside(0) {
+                    let (face, normal) = self.scene.normal(face, b);
                     each(x, y, face, normal);
                 }
             }
@@ -244,23 +237,23 @@ where
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: pulp::Simd>(mut self, _: S) {
+    fn with_simd<S: pulp::Simd>(mut self, simd: S) {
         let (scene, region) = (&self.view.scene, &self.view.region);
         let (y, runs) = self.view.runs(self.block);
-        let (mut candidates, mut scratch) = (Candidates::new(), Scratch::new());
-        for run in 0..runs.count() {
-            let columns = runs.collect(&mut candidates, scene, run, region, y as f32);
-            for (lane, x) in columns.enumerate() {
-                let inside = candidates.inside(lane);
-                let nearest = candidates.nearest(lane, scene.settings.faces);
-                let (u, v) = (x as f32, y as f32);
-                // Not a closure, which would be compiled for the plain instructions.
-                let seen = if nearest.len() > 0 {
-                    Some(scene.pixel::<DERIVATIVES>(&mut scratch, u, v, nearest, inside))
-                } else {
-                    None
-                };
-                (self.each)(x, y, seen);
+        let zero = Wide::zero(simd);
+        let (mut run, mut parts) = (Run::new(zero), Vec::new());
+        for i in 0..runs.count() {
+            let (faces, first) = runs.of(i, region);
+            let end = (first + RUN).min(region.x1);
+            for x0 in (first..end).step_by(S::F32_LANES) {
+                let indices = faces.iter().copied();
+                run.collect(&scene.faces, indices, [x0, y], &scene.settings);
+                let (column, row) = run::places(zero, x0, y);
+                let pixels = scene.pixels::<DERIVATIVES, _>(&run, &mut parts, column, row);
+                for (lane, x) in (x0..end.min(x0 + S::F32_LANES)).enumerate() {
+                    let seen = run.shows(lane).then(|| pixels.seen::<DERIVATIVES>(lane));
+                    (self.each)(x, y, seen);
+                }
             }
         }
     }
