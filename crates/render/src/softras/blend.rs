@@ -32,18 +32,13 @@ pub(crate) struct Blend<T> {
 }
 
 impl<T: Number> Blend<T> {
-    /// Weighs `candidates`, writing each one's part to `parts`.
+    /// Weighs `candidates`, writing each one's part.
     #[inline(always)]
-    pub(crate) fn new(
-        candidates: &[Candidate<T>],
-        parts: &mut Vec<Part<T>>,
-        settings: &Settings,
-        zero: T,
-    ) -> Self {
+    pub(crate) fn new(candidates: &mut [Candidate<T>], settings: &Settings, zero: T) -> Self {
         let is = |value: f32| zero.like(value);
         let one = is(1.0);
         let mut nearest = is(f32::INFINITY);
-        for candidate in candidates {
+        for candidate in candidates.iter() {
             let z = candidate.fragment.z;
             let nearer = zero.below(candidate.counts) & z.below(nearest);
             nearest = T::pick(nearer, z, nearest);
@@ -53,7 +48,6 @@ impl<T: Number> Blend<T> {
         let reference = T::pick(in_range, nearest, farthest);
         let (background, bounded) = settings.background(reference);
         let (mut sum, mut clear) = (background, one);
-        parts.clear();
         for candidate in candidates {
             let counts = zero.below(candidate.counts);
             // exp is bounded, so that a p of one and a p of zero both stay finite.
@@ -67,7 +61,7 @@ impl<T: Number> Blend<T> {
             };
             sum = sum + part.weight;
             clear = clear * part.absence;
-            parts.push(part);
+            candidate.part = part;
         }
         let drifting = T::pick(bounded & in_range, one, zero);
         Self { nearest, drifting, background, inverse_sum: one / sum, clear }

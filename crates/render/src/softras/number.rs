@@ -220,3 +220,44 @@ impl<S: Simd> Number for Wide<S> {
         Self { simd, value: simd.transmute_f32s_u32s(bits) }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::exponential::exp;
+    use super::*;
+
+    /// Something of every operation.
+    fn sample<T: Number>(x: T) -> T {
+        let (zero, one) = (x.like(0.0), x.like(1.0));
+        let positive = zero.below(x) & x.at_least(zero);
+        let root = T::pick(positive, x, -x).sqrt();
+        let bounded = T::pick(positive | one.below(root), root, one - x);
+        exp(bounded / x.like(3.0)) * x + one
+    }
+
+    struct Sides;
+
+    impl pulp::WithSimd for Sides {
+        type Output = ();
+
+        #[inline(always)]
+        fn with_simd<S: Simd>(self, simd: S) {
+            let values: Vec<f32> = (0..200).map(|i| (i as f32 - 100.5) * 0.37).collect();
+            for part in values.chunks(S::F32_LANES) {
+                let x = Wide::zero(simd).loaded(part);
+                let y = sample(x);
+                for (lane, value) in part.iter().enumerate() {
+                    assert_eq!(y.lanes()[lane].to_bits(), sample(*value).to_bits());
+                }
+                let most = part.iter().copied().fold(f32::MIN, f32::max);
+                assert!(x.any(x.at_least(x.like(most))));
+                assert!(!x.any(x.like(most.max(0.0)).below(x)));
+            }
+        }
+    }
+
+    #[test]
+    fn numbers_side_by_side_have_the_bits_of_single_ones() {
+        pulp::Arch::new().dispatch(Sides);
+    }
+}

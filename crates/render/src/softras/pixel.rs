@@ -6,12 +6,12 @@ use std::sync::OnceLock;
 
 use nalgebra::{Point3, Vector3};
 
-use super::blend::{Blend, Part};
+use super::blend::Blend;
 use super::face::Face;
 use super::lit::Lit;
 use super::motion::{FaceMotion, Ray, RowSum, TwistRow, cross};
 use super::number::Number;
-use super::run::Run;
+use super::run::{Run, places};
 use super::settings::Settings;
 use crate::camera::Camera;
 use crate::contour::{Lighting, posed_normal};
@@ -81,23 +81,23 @@ impl<T: Number> Pixels<T> {
 }
 
 impl Scene<'_> {
-    /// The pixels of `run`, from (`column`, `row`) on.
+    /// The pixels of `run`, from (column, row) on. Leaves each fragment's share of the colour in the weight of its part.
     #[inline(always)]
     pub(crate) fn pixels<const DERIVATIVES: bool, T: Number>(
         &self,
-        run: &Run<T>,
-        parts: &mut Vec<Part<T>>,
-        column: T,
-        row: T,
+        run: &mut Run<T>,
+        column: usize,
+        row: usize,
     ) -> Pixels<T> {
-        let is = |value: f32| column.like(value);
-        let (zero, one) = (is(0.0), is(1.0));
-        let blend = Blend::new(&run.candidates, parts, &self.settings, zero);
+        let zero = run.zero();
+        let is = |value: f32| zero.like(value);
+        let one = is(1.0);
+        let blend = Blend::new(&mut run.candidates, &self.settings, zero);
         let mut color = [zero; 3];
-        for (candidate, part) in run.candidates.iter().zip(parts.iter_mut()) {
-            let share = part.weight * blend.inverse_sum;
+        for candidate in &mut run.candidates {
+            let share = candidate.part.weight * blend.inverse_sum;
             let share = T::pick(is(LEAST_SHARE).below(share), share, zero);
-            part.weight = share;
+            candidate.part.weight = share;
             if !zero.any(zero.below(share)) {
                 continue;
             }
@@ -118,7 +118,8 @@ impl Scene<'_> {
             z_row: [zero; 6],
         };
         if DERIVATIVES {
-            self.rows(run, parts, &blend, column, row, &mut pixels);
+            let (column, row) = places(zero, column, row);
+            self.rows(run, &blend, column, row, &mut pixels);
         }
         pixels
     }
@@ -139,7 +140,7 @@ impl Scene<'_> {
         })
     }
 
-    /// Rows of colour, coverage and depth, from each fragment's share of the colour (in the weight of `parts`).
+    /// Rows of colour, coverage and depth, from each fragment's share of the colour (in the weight of its part).
     ///
     /// With the shares ω = w/D, dC = Σ ω (dC_k + (C_k − C) d ln w_k), d ln w = −(1 − p)/σ dd − dz/(γ (z_far − z_near)),
     /// and dα = −(1 − α) Σ p/σ dd.
@@ -147,7 +148,6 @@ impl Scene<'_> {
     fn rows<T: Number>(
         &self,
         run: &Run<T>,
-        parts: &[Part<T>],
         blend: &Blend<T>,
         column: T,
         row: T,
@@ -174,7 +174,8 @@ impl Scene<'_> {
         // The nearest depth is what the weights are relative to; the background's weight is not if it is at its bound.
         let mut relative =
             blend.drifting * is(settings.depth_rate) * blend.background * blend.inverse_sum;
-        for (place, (candidate, part)) in run.candidates.iter().zip(parts).enumerate() {
+        for (place, candidate) in run.candidates.iter().enumerate() {
+            let part = &candidate.part;
             let (face, fragment) = (&self.faces[candidate.face as usize], &candidate.fragment);
             let motion = self.motion(candidate.face);
             let mean_z = fragment.z * fragment.sum_active;

@@ -1,5 +1,6 @@
 //! The faces that count at the pixels of a short run of them, side by side.
 
+use super::blend::Part;
 use super::face::Face;
 use super::fragment::Fragment;
 use super::number::Number;
@@ -12,10 +13,12 @@ pub(crate) const RUN: usize = 8;
 #[derive(Clone, Copy)]
 pub(crate) struct Candidate<T> {
     pub(crate) face: u32,
-    /// Of zeros where the face does not count.
+    /// Of plain numbers that come to nothing where the face does not count.
     pub(crate) fragment: Fragment<T>,
     /// 1 where the face counts, else 0.
     pub(crate) counts: T,
+    /// What [`Blend`](super::blend::Blend) finds.
+    pub(crate) part: Part<T>,
 }
 
 /// The faces that count at the pixels of a run, in the order in which they were given: the nearest by depth, of equals
@@ -64,14 +67,15 @@ impl<T: Number> Run<T> {
             // What is anything but a number must not reach sums, not even times zero.
             fragment.z = T::pick(extent.kept, fragment.z, zero);
             fragment.distance = T::pick(extent.kept, fragment.distance, zero);
-            fragment.inverse_sum = T::pick(extent.kept, fragment.inverse_sum, zero);
+            fragment.inverse_sum = T::pick(extent.kept, fragment.inverse_sum, one);
             let [a, b, c] = fragment.b;
             fragment.b = [
                 T::pick(extent.kept, a, zero),
                 T::pick(extent.kept, b, zero),
                 T::pick(extent.kept, c, zero),
             ];
-            self.candidates.push(Candidate { face: index, fragment, counts });
+            let part = Part { presence: zero, absence: one, weight: zero };
+            self.candidates.push(Candidate { face: index, fragment, counts, part });
         }
         for lane in 0..T::LANES {
             if self.count.lanes()[lane] > settings.faces as f32 {
@@ -95,6 +99,12 @@ impl<T: Number> Run<T> {
             self.candidates[*key as u32 as usize].counts.lanes_mut()[lane] = 0.0;
         }
         self.count.lanes_mut()[lane] = most as f32;
+    }
+
+    /// Zeros, as many as there are pixels.
+    #[inline(always)]
+    pub(crate) fn zero(&self) -> T {
+        self.count.like(0.0)
     }
 
     /// Whether any face counts at a pixel.
