@@ -29,7 +29,7 @@ use lanes::Waiting;
 pub use light_samples::light_samples;
 pub(crate) use outline::{Band, Piece, Silhouette, outline};
 pub(crate) use pixel::{Scene, falling_step};
-pub(crate) use surface::{Lighting, Shaded, posed_normal, shade};
+pub(crate) use surface::{Lighting, Unlit, albedo, posed_normal};
 
 /// A posed model with its contours.
 pub(crate) struct ContourView<'a> {

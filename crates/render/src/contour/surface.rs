@@ -11,12 +11,12 @@ use crate::posed::Posed;
 
 /// Lighting in f32, in the mesh frame as well.
 pub(crate) struct Lighting {
-    ambient: [f32; 3],
-    offset: [f32; 3],
-    camera: [Vec3; 3],
-    object: [Vec3; 3],
+    pub(crate) ambient: [f32; 3],
+    pub(crate) offset: [f32; 3],
+    pub(crate) camera: [Vec3; 3],
+    pub(crate) object: [Vec3; 3],
     /// Rows of the rotation from the mesh into the camera frame.
-    rotation: [Vec3; 3],
+    pub(crate) rotation: [Vec3; 3],
 }
 
 impl Lighting {

@@ -9,7 +9,7 @@ use super::sums::Sums;
 use super::visibility::{Blend, BlendAdjoint, Part, PartAdjoint, Visibility};
 use crate::model::NONE;
 use crate::projected::Region;
-use crate::softras::{BACKGROUND, Candidates, Drawn, Face, LEAST_SHARE, RUN, Settings, project};
+use crate::softras::{BACKGROUND, Drawn, Face, LEAST_SHARE, RUN, Run, Settings, Wide, project};
 
 /// The faces that count at each pixel.
 pub(super) struct SoftFaces {
@@ -24,7 +24,6 @@ pub(super) struct Block {
     pub(super) region: Region,
     /// Where the faces of each pixel start in `faces`, and the end.
     start: Vec<u32>,
-    /// The nearest first.
     faces: Vec<u32>,
     /// The nearest that contains the pixel's centre, or [`NONE`].
     inside: Vec<u32>,
@@ -65,7 +64,7 @@ impl SoftFaces {
         Self { settings, screen, blocks }
     }
 
-    /// The faces of a pixel, the nearest first, and the one at its centre.
+    /// The faces of a pixel, and the one at its centre.
     pub(super) fn decision(&self, block: usize, i: usize) -> (&[u32], Option<u32>) {
         let block = &self.blocks[block];
         let faces = &block.faces[block.start[i] as usize..block.start[i + 1] as usize];
@@ -124,29 +123,26 @@ impl pulp::WithSimd for Collect<'_> {
     type Output = Block;
 
     #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) -> Block {
+    fn with_simd<S: pulp::Simd>(self, simd: S) -> Block {
         let Self { faces, ids, settings, tiles, mut block } = self;
         let region = block.region;
-        let mut candidates = Candidates::new();
+        let mut run = Run::new(Wide::zero(simd));
         for y in region.y0..region.y1 {
-            let row = y as f32;
+            let near = |index: &&u32| {
+                let [.., top, bottom] = faces[**index as usize].bounds;
+                (top..=bottom).contains(&(y as f32))
+            };
             for (tile, indices) in tiles.iter().enumerate() {
-                let x0 = region.x0 + tile * RUN;
-                let lanes = RUN.min(region.x1 - x0);
-                candidates.clear();
-                for &index in indices {
-                    let face = &faces[index as usize];
-                    let [.., top, bottom] = face.bounds;
-                    if (top..=bottom).contains(&row) {
-                        candidates.add(face, index, [x0 as f32, row], lanes, settings);
+                let first = region.x0 + tile * RUN;
+                let end = (first + RUN).min(region.x1);
+                for x0 in (first..end).step_by(S::F32_LANES) {
+                    run.collect(faces, indices.iter().filter(near).copied(), [x0, y], settings);
+                    for lane in 0..S::F32_LANES.min(end - x0) {
+                        let inside = run.inside(lane);
+                        block.inside.push(inside.map_or(NONE, |(index, _)| ids[index as usize]));
+                        block.faces.extend(run.faces(lane).map(|index| ids[index as usize]));
+                        block.start.push(block.faces.len() as u32);
                     }
-                }
-                for lane in 0..lanes {
-                    let inside = candidates.inside(lane);
-                    block.inside.push(inside.map_or(NONE, |index| ids[index as usize]));
-                    let nearest = candidates.nearest(lane, settings.faces);
-                    block.faces.extend(nearest.map(|index| ids[index as usize]));
-                    block.start.push(block.faces.len() as u32);
                 }
             }
         }

@@ -3,6 +3,7 @@
 #[cfg(test)]
 use super::face::Face;
 use super::fragment::Fragment;
+use super::number::Number;
 
 /// Derivatives of something by what a fragment holds.
 #[cfg(test)]
@@ -16,11 +17,11 @@ pub(crate) struct FragmentAdjoint {
     pub(crate) distance: f32,
 }
 
-impl Fragment {
+impl<T: Number> Fragment<T> {
     /// From the derivatives by the barycentric coordinates, depth included (`along[i]` is b̄_i + z̄ Z_i), to those by the
     /// unclamped weights W_i.
     #[inline(always)]
-    pub(crate) fn weight_adjoint(&self, along: [f32; 3]) -> [f32; 3] {
+    pub(crate) fn weight_adjoint(&self, along: [T; 3]) -> [T; 3] {
         let mean = self.b[0] * along[0] + self.b[1] * along[1] + self.b[2] * along[2];
         let mean = mean * self.sum_active;
         let factor = self.inverse_sum;
@@ -33,18 +34,19 @@ impl Fragment {
 
     /// 2 (foot − p), signed as the distance is: the distance's derivative by a shift of the foot \[px\].
     #[inline(always)]
-    pub(crate) fn distance_gradient(&self) -> [f32; 2] {
-        let factor = if self.inside { -2.0 } else { 2.0 };
+    pub(crate) fn distance_gradient(&self) -> [T; 2] {
+        let two = self.z.like(2.0);
+        let factor = T::pick(self.distance.below(self.z.like(0.0)), -two, two);
         [factor * self.to_foot[0], factor * self.to_foot[1]]
     }
+}
 
+#[cfg(test)]
+impl Fragment<f32> {
     /// From derivatives by the fragment of `face` at pixel (column, row) to those by the columns, rows \[1/px\] and depths
     /// \[1/m\] of the face's corners.
     ///
-    /// Of the same pieces as the rows of a pose, so that tests can try those at corners anywhere.
-    ///
     /// At kinks (a coordinate clamped just so, two edges equally near) it is the derivative of one side.
-    #[cfg(test)]
     pub(crate) fn pull_back(
         &self,
         face: &Face,
@@ -109,9 +111,9 @@ mod tests {
         // The prepared face is rounded to f32, so the other starts there too.
         let corners = corners.map(|c| c.map(|v| v as f32 as f64));
         let face = Face::new(corners, &settings).unwrap();
-        let fragment = Fragment::new(&face, 0.0, 0.0, &settings);
+        let (fragment, extent) = Fragment::new(&face, 0.0, 0.0, &settings);
         let naive = naive_fragment(corners, [0.0; 2], options);
-        assert_eq!(fragment.kept, naive.is_some());
+        assert_eq!(extent.kept, naive.is_some());
         let Some(naive) = naive else { return };
         // Near the horizon, which has a test of its own.
         if naive.b.iter().any(|b| b.abs() > 10.0) {
@@ -205,7 +207,7 @@ mod tests {
         let options = flags(true, true);
         let settings = Settings::new(&options, &CAMERA);
         let face = Face::new(short, &settings).unwrap();
-        let fragment = Fragment::new(&face, 0.0, 0.0, &settings);
+        let (fragment, _) = Fragment::new(&face, 0.0, 0.0, &settings);
         let naive = naive_fragment(short, [0.0; 2], &options).unwrap();
         assert!((fragment.distance as f64 - naive.distance).abs() < 1e-7);
         check(short, &options, 1e-2);
@@ -220,7 +222,7 @@ mod tests {
             let corners = steep.map(|c| [c[0] + x, c[1], c[2]]);
             let settings = Settings::new(&wide, &CAMERA);
             let face = Face::new(corners, &settings).unwrap();
-            let fragment = Fragment::new(&face, 0.0, 0.0, &settings);
+            let (fragment, _) = Fragment::new(&face, 0.0, 0.0, &settings);
             let naive = naive_fragment(corners, [0.0; 2], &wide).unwrap();
             assert!((fragment.z as f64 / naive.z - 1.0).abs() < 1e-3, "{fragment:?} {naive:?}");
             let adjoint = FragmentAdjoint { b: [1.0; 3], z: 1.0, distance: 1.0 };

@@ -1,55 +1,69 @@
 //! How the fragments of a pixel are blended.
 
 use super::exponential::exp;
-use super::fragment::Fragment;
+use super::number::Number;
+use super::run::Candidate;
 use super::settings::Settings;
 
 /// A fragment's part in its pixel.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Part {
+#[derive(Clone, Copy)]
+pub(crate) struct Part<T> {
     /// p = sigmoid(−d/σ).
-    pub(crate) presence: f32,
+    pub(crate) presence: T,
     /// 1 − p, without cancellation.
-    pub(crate) absence: f32,
+    pub(crate) absence: T,
     /// w = p exp((ζ − ζ_max)/γ).
-    pub(crate) weight: f32,
+    pub(crate) weight: T,
 }
 
 /// The sums of a pixel's blend.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Blend {
+#[derive(Clone, Copy)]
+pub(crate) struct Blend<T> {
     /// Depth of the nearest fragment \[m\].
-    pub(crate) nearest: f32,
-    /// Its depth moves the depth that weights are relative to, but not the background's weight.
-    pub(crate) drifting: bool,
+    pub(crate) nearest: T,
+    /// 1 where that depth moves the depth that weights are relative to, but not the background's weight; else 0.
+    pub(crate) drifting: T,
     /// δ, the background's weight.
-    pub(crate) background: f32,
-    /// Σ w + δ.
-    pub(crate) sum: f32,
+    pub(crate) background: T,
+    /// One over Σ w + δ.
+    pub(crate) inverse_sum: T,
     /// 1 − α = Π (1 − p).
-    pub(crate) clear: f32,
+    pub(crate) clear: T,
 }
 
-impl Blend {
-    /// Weighs `fragments`, writing each one's part to `parts`.
+impl<T: Number> Blend<T> {
+    /// Weighs `candidates`, writing each one's part.
     #[inline(always)]
-    pub(crate) fn new(fragments: &[Fragment], parts: &mut [Part], settings: &Settings) -> Self {
-        let nearest = fragments.iter().fold(f32::INFINITY, |z, f| if f.z < z { f.z } else { z });
-        let reference = nearest.min(settings.farthest);
+    pub(crate) fn new(candidates: &mut [Candidate<T>], settings: &Settings, zero: T) -> Self {
+        let is = |value: f32| zero.like(value);
+        let one = is(1.0);
+        let mut nearest = is(f32::INFINITY);
+        for candidate in candidates.iter() {
+            let z = candidate.fragment.z;
+            let nearer = zero.below(candidate.counts) & z.below(nearest);
+            nearest = T::pick(nearer, z, nearest);
+        }
+        let (farthest, rate) = (is(settings.farthest), is(settings.depth_rate));
+        let in_range = nearest.below(farthest);
+        let reference = T::pick(in_range, nearest, farthest);
         let (background, bounded) = settings.background(reference);
-        for (part, fragment) in parts.iter_mut().zip(fragments) {
+        let (mut sum, mut clear) = (background, one);
+        for candidate in candidates {
+            let counts = zero.below(candidate.counts);
             // exp is bounded, so that a p of one and a p of zero both stay finite.
-            let e = exp(fragment.distance * settings.sharpness);
-            let presence = 1.0 / (1.0 + e);
-            let depth = exp((reference - fragment.z) * settings.depth_rate);
-            *part = Part { presence, absence: e * presence, weight: presence * depth };
+            let e = exp(candidate.fragment.distance * is(settings.sharpness));
+            let presence = one / (one + e);
+            let depth = exp((reference - candidate.fragment.z) * rate);
+            let part = Part {
+                presence: T::pick(counts, presence, zero),
+                absence: T::pick(counts, e * presence, one),
+                weight: T::pick(counts, presence * depth, zero),
+            };
+            sum = sum + part.weight;
+            clear = clear * part.absence;
+            candidate.part = part;
         }
-        let (mut sum, mut clear) = (background, 1.0);
-        for part in &parts[..fragments.len()] {
-            sum += part.weight;
-            clear *= part.absence;
-        }
-        let drifting = bounded && nearest < settings.farthest;
-        Self { nearest, drifting, background, sum, clear }
+        let drifting = T::pick(bounded & in_range, one, zero);
+        Self { nearest, drifting, background, inverse_sum: one / sum, clear }
     }
 }

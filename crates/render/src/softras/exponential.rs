@@ -1,25 +1,29 @@
-//! An exponential function that compilers turn into vector instructions.
+//! The exponential function of one number or of several.
+
+use super::number::{Number, ROUND};
 
 /// e^x to 2e-7 of its value for |x| ≤ 87; beyond, that of the bound.
 ///
 /// x = n ln 2 + r with |r| ≤ ln 2 / 2, a Taylor polynomial for e^r, and 2^n by its bits.
 #[inline(always)]
-pub(crate) fn exp(x: f32) -> f32 {
-    // Added and taken away again, rounds to a whole number.
-    const ROUND: f32 = 12_582_912.0;
+pub(crate) fn exp<T: Number>(x: T) -> T {
     // ln 2 in two parts, the first short enough for n times it to be exact.
     const LN2_HIGH: f32 = 0.693_359_4;
     const LN2_LOW: f32 = -2.121_944_4e-4;
-    let x = if x > -87.0 { x } else { -87.0 };
-    let x = if x < 87.0 { x } else { 87.0 };
-    let shifted = x * std::f32::consts::LOG2_E + ROUND;
-    let n = shifted - ROUND;
-    let r = (x - n * LN2_HIGH) - n * LN2_LOW;
-    let tail = 1.0 / 6.0 + r * (1.0 / 24.0 + r * (1.0 / 120.0 + r * (1.0 / 720.0 + r / 5040.0)));
-    let mantissa = 1.0 + r + r * r * (0.5 + r * tail);
-    // The low bits of the shifted number are n.
-    let bits = shifted.to_bits().wrapping_sub(ROUND.to_bits()).wrapping_add(127) << 23;
-    mantissa * f32::from_bits(bits)
+    const TAYLOR: [f32; 5] = [1.0 / 720.0, 1.0 / 120.0, 1.0 / 24.0, 1.0 / 6.0, 0.5];
+    // Selected so that what is not a number counts as the lower bound.
+    let (low, high) = (x.like(-87.0), x.like(87.0));
+    let x = T::pick(low.below(x), x, low);
+    let x = T::pick(x.below(high), x, high);
+    let shifted = x * x.like(std::f32::consts::LOG2_E) + x.like(ROUND);
+    let n = shifted - x.like(ROUND);
+    let r = (x - n * x.like(LN2_HIGH)) - n * x.like(LN2_LOW);
+    let mut tail = x.like(1.0 / 5040.0);
+    for coefficient in TAYLOR {
+        tail = x.like(coefficient) + r * tail;
+    }
+    let mantissa = x.like(1.0) + r + r * r * tail;
+    mantissa * T::power_of_two(shifted)
 }
 
 #[cfg(test)]

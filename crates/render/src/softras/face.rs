@@ -21,6 +21,8 @@ pub(crate) struct Face {
     /// What a corner's edge function is multiplied with for its weight: 1/Z with the perspective correction, 1
     /// without; with the sign of the face's area, so that weights are positive inside.
     pub(crate) share: [f32; 3],
+    /// One over the Z of the corners \[1/m\].
+    pub(crate) inverse_z: [f32; 3],
     /// Z of the corners \[m\].
     pub(crate) z: [f32; 3],
     /// The weights' sum is taken to be at least this.
@@ -55,6 +57,7 @@ impl Face {
                 .map(|i| if is_short[i] { 0.0 } else { 1.0 / length[i] as f32 }),
             short: is_short.map(|s| if s { 1.0 } else { 0.0 }),
             share: share.map(|s| (sign * s) as f32),
+            inverse_z: corners.map(|c| (1.0 / c[2]) as f32),
             z: corners.map(|c| c[2] as f32),
             least_sum: least_sum as f32,
             bounds: [low(0), high(0), low(1), high(1)].map(|v| v as f32),

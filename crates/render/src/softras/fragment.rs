@@ -1,6 +1,7 @@
 //! What a face looks like from a pixel.
 
 use super::face::Face;
+use super::number::Number;
 use super::settings::Settings;
 
 /// A face as seen from a pixel centre p.
@@ -8,60 +9,58 @@ use super::settings::Settings;
 /// With the corners v_i relative to p, the edge functions are E_0 = v_1 × v_2, E_1 = v_2 × v_0 and E_2 = v_0 × v_1
 /// (positive inside), the weights W_i = s_i E_i with s_i = 1/Z_i if the perspective is corrected and s_i = 1 if not,
 /// clamped to zero from below if coordinates are clipped, and b_i = W_i / Σ W_j.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Fragment {
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Fragment<T> {
     /// Barycentric coordinates of the surface point.
-    pub(crate) b: [f32; 3],
+    pub(crate) b: [T; 3],
     /// Σ b_i Z_i \[m\].
-    pub(crate) z: f32,
+    pub(crate) z: T,
     /// Squared distance to the nearest of the three edges \[px²\], negative inside.
-    pub(crate) distance: f32,
+    pub(crate) distance: T,
     /// Barycentric coordinates, in the image, of the nearest point on the edges.
-    pub(crate) foot: [f32; 3],
+    pub(crate) foot: [T; 3],
     /// From the pixel centre to that point \[px\].
-    pub(crate) to_foot: [f32; 2],
+    pub(crate) to_foot: [T; 2],
     /// One over the sum of the weights.
-    pub(crate) inverse_sum: f32,
+    pub(crate) inverse_sum: T,
     /// 1 where the weight depends on the corners, 0 where it is clamped.
-    pub(crate) active: [f32; 3],
+    pub(crate) active: [T; 3],
     /// 1 where the sum of the weights does, 0 where it is at its lower bound.
-    pub(crate) sum_active: f32,
-    /// The pixel centre lies inside the face.
-    pub(crate) inside: bool,
-    /// The face counts at this pixel.
-    pub(crate) kept: bool,
+    pub(crate) sum_active: T,
+}
+
+/// Of each lane, whether the face counts there, and whether the pixel's centre lies inside it.
+#[derive(Clone, Copy)]
+pub(crate) struct Extent<M> {
+    pub(crate) kept: M,
+    pub(crate) inside: M,
 }
 
 #[inline(always)]
-fn pick(condition: bool, yes: f32, no: f32) -> f32 {
-    if condition { yes } else { no }
-}
-
-#[inline(always)]
-fn cross(a: [f32; 2], b: [f32; 2]) -> f32 {
+fn cross<T: Number>(a: [T; 2], b: [T; 2]) -> T {
     a[0] * b[1] - a[1] * b[0]
 }
 
 /// The point of an edge that is nearest to a pixel.
 #[derive(Clone, Copy)]
-struct Foot {
+struct Foot<T> {
     /// Share of the edge.
-    share: f32,
+    share: T,
     /// From the pixel \[px\].
-    offset: [f32; 2],
-    squared: f32,
+    offset: [T; 2],
+    squared: T,
 }
 
-impl Foot {
+impl<T: Number> Foot<T> {
     #[inline(always)]
-    fn or(self, other_instead: bool, other: Self) -> Self {
+    fn or(self, other_instead: T::Mask, other: Self) -> Self {
         Self {
-            share: pick(other_instead, other.share, self.share),
+            share: T::pick(other_instead, other.share, self.share),
             offset: [
-                pick(other_instead, other.offset[0], self.offset[0]),
-                pick(other_instead, other.offset[1], self.offset[1]),
+                T::pick(other_instead, other.offset[0], self.offset[0]),
+                T::pick(other_instead, other.offset[1], self.offset[1]),
             ],
-            squared: pick(other_instead, other.squared, self.squared),
+            squared: T::pick(other_instead, other.squared, self.squared),
         }
     }
 }
@@ -69,66 +68,87 @@ impl Foot {
 impl Face {
     /// On edge `edge`, whose first end lies at `start` from the pixel.
     #[inline(always)]
-    fn foot(&self, edge: usize, start: [f32; 2]) -> Foot {
-        let d = self.edge[edge];
-        let t = self.short[edge] - (start[0] * d[0] + start[1] * d[1]) * self.inverse_length[edge];
-        let t = pick(t > 0.0, t, 0.0);
-        let share = pick(t < 1.0, t, 1.0);
-        let offset = [start[0] + share * d[0], start[1] + share * d[1]];
+    fn foot<T: Number>(&self, edge: usize, start: [T; 2]) -> Foot<T> {
+        let is = |value: f32| start[0].like(value);
+        let [x, y] = self.edge[edge];
+        let (x, y) = (is(x), is(y));
+        let t =
+            is(self.short[edge]) - (start[0] * x + start[1] * y) * is(self.inverse_length[edge]);
+        let t = T::pick(is(0.0).below(t), t, is(0.0));
+        let share = T::pick(t.below(is(1.0)), t, is(1.0));
+        let offset = [start[0] + share * x, start[1] + share * y];
         Foot { share, offset, squared: offset[0] * offset[0] + offset[1] * offset[1] }
     }
 }
 
-impl Fragment {
-    /// The fragment of `face` at pixel (column, row). Written without branches, so that a loop over pixels or faces becomes
-    /// vector instructions.
+impl<T: Number> Fragment<T> {
+    /// The fragments of `face` at pixels (column, row). Without branches and calls of closures from elsewhere, so that all
+    /// of it is compiled for the vector instructions at hand.
     #[inline(always)]
-    pub(crate) fn new(face: &Face, column: f32, row: f32, settings: &Settings) -> Self {
-        // Exact: both are whole numbers. Arrays are written out: `map` is a call that keeps loops from becoming vectors.
-        let (x, y) = (column - face.base[0], row - face.base[1]);
-        let [c0, c1, c2] = &face.corner;
-        let (v0, v1, v2) = ([c0[0] - x, c0[1] - y], [c1[0] - x, c1[1] - y], [c2[0] - x, c2[1] - y]);
-        let raw0 = face.share[0] * cross(v1, v2);
-        let raw1 = face.share[1] * cross(v2, v0);
-        let raw2 = face.share[2] * cross(v0, v1);
-        let inside = (raw0 > 0.0) & (raw1 > 0.0) & (raw2 > 0.0);
-        let least = settings.least_weight;
-        let w0 = pick(raw0 >= least, raw0, least);
-        let w1 = pick(raw1 >= least, raw1, least);
-        let w2 = pick(raw2 >= least, raw2, least);
-        let sum = w0 + w1 + w2;
-        let sum_active = pick(sum > face.least_sum, 1.0, 0.0);
-        let sum = pick(sum > face.least_sum, sum, face.least_sum);
+    pub(crate) fn new(
+        face: &Face,
+        column: T,
+        row: T,
+        settings: &Settings,
+    ) -> (Self, Extent<T::Mask>) {
+        let is = |value: f32| column.like(value);
+        let (zero, one) = (is(0.0), is(1.0));
+        // Exact: both are whole numbers.
+        let (x, y) = (column - is(face.base[0]), row - is(face.base[1]));
+        let [c0, c1, c2] = face.corner;
+        let v0 = [is(c0[0]) - x, is(c0[1]) - y];
+        let v1 = [is(c1[0]) - x, is(c1[1]) - y];
+        let v2 = [is(c2[0]) - x, is(c2[1]) - y];
+        let raw0 = is(face.share[0]) * cross(v1, v2);
+        let raw1 = is(face.share[1]) * cross(v2, v0);
+        let raw2 = is(face.share[2]) * cross(v0, v1);
+        let inside = zero.below(raw0) & zero.below(raw1) & zero.below(raw2);
+        let least = is(settings.least_weight);
+        let free = [raw0.at_least(least), raw1.at_least(least), raw2.at_least(least)];
+        let w0 = T::pick(free[0], raw0, least);
+        let w1 = T::pick(free[1], raw1, least);
+        let w2 = T::pick(free[2], raw2, least);
+        let (sum, least_sum) = (w0 + w1 + w2, is(face.least_sum));
+        let sum_is_free = least_sum.below(sum);
+        let sum = T::pick(sum_is_free, sum, least_sum);
         // Divisions, so that a point clamped to a corner has its coordinates and depth exactly: ties between the faces
         // around a corner stay ties.
         let b = [w0 / sum, w1 / sum, w2 / sum];
-        let z = b[0] * face.z[0] + b[1] * face.z[1] + b[2] * face.z[2];
+        let z = b[0] * is(face.z[0]) + b[1] * is(face.z[1]) + b[2] * is(face.z[2]);
 
         let [first, second, third] = [face.foot(0, v0), face.foot(1, v0), face.foot(2, v1)];
-        let (t, u) = (first.share, 1.0 - first.share);
-        let (mut foot, mut near) = ([u, t, 0.0], first);
-        let (t, u, nearer) = (second.share, 1.0 - second.share, second.squared < near.squared);
-        foot = [pick(nearer, u, foot[0]), pick(nearer, 0.0, foot[1]), pick(nearer, t, foot[2])];
+        let (t, u) = (first.share, one - first.share);
+        let (mut foot, mut near) = ([u, t, zero], first);
+        let (t, u, nearer) = (second.share, one - second.share, second.squared.below(near.squared));
+        foot = [
+            T::pick(nearer, u, foot[0]),
+            T::pick(nearer, zero, foot[1]),
+            T::pick(nearer, t, foot[2]),
+        ];
         near = near.or(nearer, second);
-        let (t, u, nearer) = (third.share, 1.0 - third.share, third.squared < near.squared);
-        foot = [pick(nearer, 0.0, foot[0]), pick(nearer, u, foot[1]), pick(nearer, t, foot[2])];
+        let (t, u, nearer) = (third.share, one - third.share, third.squared.below(near.squared));
+        foot = [
+            T::pick(nearer, zero, foot[0]),
+            T::pick(nearer, u, foot[1]),
+            T::pick(nearer, t, foot[2]),
+        ];
         near = near.or(nearer, third);
         let squared = near.squared;
-        Self {
+        let fragment = Self {
             b,
             z,
-            distance: pick(inside, -squared, squared),
+            distance: T::pick(inside, -squared, squared),
             foot,
             to_foot: near.offset,
-            inverse_sum: 1.0 / sum,
+            inverse_sum: one / sum,
             active: [
-                pick(raw0 >= least, 1.0, 0.0),
-                pick(raw1 >= least, 1.0, 0.0),
-                pick(raw2 >= least, 1.0, 0.0),
+                T::pick(free[0], one, zero),
+                T::pick(free[1], one, zero),
+                T::pick(free[2], one, zero),
             ],
-            sum_active,
-            inside,
-            kept: (inside | (squared < settings.blur)) & (z >= 0.0),
-        }
+            sum_active: T::pick(sum_is_free, one, zero),
+        };
+        let kept = (inside | squared.below(is(settings.blur))) & z.at_least(zero);
+        (fragment, Extent { kept, inside })
     }
 }

@@ -1,13 +1,14 @@
 //! The equations of the mode once more, for tests: in f64 and normalised device coordinates, every face at every pixel.
 
-use nalgebra::{Isometry3, Vector2};
+use nalgebra::{Isometry3, Vector2, Vector3};
 
 use crate::camera::Camera;
-use crate::contour::{Lighting, shade};
+use crate::contour::albedo;
 use crate::light::Light;
 use crate::mode::SoftRasOptions;
-use crate::model::RenderModel;
+use crate::model::{Albedo, RenderModel};
 use crate::posed::Posed;
+use crate::shading::{Shader, SurfacePoint};
 
 /// What a face looks like from a point of the image.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -61,6 +62,38 @@ pub(super) fn naive_fragment(
     kept.then_some(NaiveFragment { face: 0, b: coordinates, z: depth, distance })
 }
 
+/// The unlit colour at barycentric coordinates of a face. (Of a texture in f32.)
+fn naive_albedo(posed: &Posed, face: usize, b: [f64; 3]) -> [f64; 3] {
+    match &posed.model.albedo {
+        Albedo::Corners(corners) => {
+            [0, 1, 2].map(|k| (0..3).map(|i| b[i] * f64::from(corners[face][i][k])).sum())
+        }
+        _ => albedo(posed, face, b.map(|b| b as f32)).color.map(f64::from),
+    }
+}
+
+/// The signed area of each face (NDC²), negative if it is seen from outside: where one goes through zero the picture jumps.
+pub(super) fn naive_areas(model: &RenderModel, pose: &Isometry3<f64>, camera: &Camera) -> Vec<f64> {
+    let area =
+        |[a, b, c]: [[f64; 3]; 3]| (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+    naive_faces(model, pose, camera).into_iter().map(area).collect()
+}
+
+/// The corners of all faces: x and y in normalised device coordinates, and Z.
+fn naive_faces(model: &RenderModel, pose: &Isometry3<f64>, camera: &Camera) -> Vec<[[f64; 3]; 3]> {
+    let scale = 2.0 / camera.width.min(camera.height) as f64;
+    let place = |p: &Vector3<f32>| {
+        let p = pose.rotation * p.cast::<f64>() + (pose * model.center()).coords;
+        [
+            (camera.fx * p.x / p.z + camera.cx) * scale,
+            (camera.fy * p.y / p.z + camera.cy) * scale,
+            p.z,
+        ]
+    };
+    let vertices: Vec<[f64; 3]> = model.positions.iter().map(place).collect();
+    model.faces.iter().map(|f| f.map(|v| vertices[v as usize])).collect()
+}
+
 /// A pixel.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct NaivePixel {
@@ -84,26 +117,23 @@ pub(super) fn naive_picture(
 ) -> Vec<NaivePixel> {
     let scale = 2.0 / camera.width.min(camera.height) as f64;
     let mut posed = Posed::new(model, camera, pose, 0.0);
-    let lighting = Lighting::new(light, &posed.rotation);
-    let vertices: Vec<[f64; 3]> = model
-        .positions
-        .iter()
-        .map(|p| {
-            let p = pose.rotation * p.cast::<f64>() + (pose * model.center()).coords;
-            [
-                (camera.fx * p.x / p.z + camera.cx) * scale,
-                (camera.fy * p.y / p.z + camera.cy) * scale,
-                p.z,
-            ]
-        })
-        .collect();
-    let faces: Vec<[[f64; 3]; 3]> =
-        model.faces.iter().map(|f| f.map(|v| vertices[v as usize])).collect();
+    let faces = naive_faces(model, pose, camera);
     let outside =
         |[a, b, c]: &[[f64; 3]; 3]| (b[0] - a[0]) * (c[1] - a[1]) < (b[1] - a[1]) * (c[0] - a[0]);
     for (facing, face) in posed.projected.facing.iter_mut().zip(&faces) {
         *facing = if outside(face) || model.closed { 1 } else { -1 };
     }
+    let parameters = light.parameters();
+    let shaded = |fragment: &NaiveFragment| {
+        let NaiveFragment { face, b, .. } = *fragment;
+        let corners = model.normals[face].map(|n| n.cast::<f64>());
+        let normal = corners[0] * b[0] + corners[1] * b[1] + corners[2] * b[2];
+        let side = f64::from(posed.projected.facing[face]);
+        let normal = pose.rotation * normal.normalize() * side;
+        let albedo = naive_albedo(&posed, face, b);
+        // This light does not ask where.
+        light.shade(&parameters, &SurfacePoint { position: Vector3::zeros(), normal, albedo })
+    };
     let pixel = |x: usize, y: usize| {
         let p = [x as f64 * scale, y as f64 * scale];
         let all = faces.iter().enumerate().filter_map(|(face, corners)| {
@@ -125,9 +155,8 @@ pub(super) fn naive_picture(
         for fragment in &all {
             let p = 1.0 / (1.0 + (fragment.distance / options.sigma).exp());
             let weight = p * ((inverse(fragment) - highest) / options.gamma).exp();
-            let b = fragment.b.map(|b| b as f32);
-            let surface = shade::<false>(&posed, &lighting, fragment.face, b).color;
-            (0..3).for_each(|k| color[k] += weight * surface[k] as f64);
+            let surface = shaded(fragment);
+            (0..3).for_each(|k| color[k] += weight * surface[k]);
             sum += weight;
             clear *= 1.0 - p;
         }

@@ -1,221 +1,260 @@
-//! What a pixel shows, and its derivatives by the pose.
+//! What pixels show, and its derivatives by the pose.
+
+#![allow(clippy::needless_range_loop)] // closures from elsewhere would be compiled for the plain instructions
 
 use std::sync::OnceLock;
 
-use nalgebra::Vector3;
+use nalgebra::{Point3, Vector3};
 
-use super::blend::{Blend, Part};
+use super::blend::Blend;
 use super::face::Face;
-use super::fragment::Fragment;
-use super::rows::{FaceRows, WideRow, add_scaled};
+use super::lit::Lit;
+use super::motion::{FaceMotion, Ray, RowSum, TwistRow, cross};
+use super::number::Number;
+use super::run::{Run, places};
 use super::settings::Settings;
-use crate::contour::{Lighting, Shaded, posed_normal, shade};
-use crate::mode::SoftRasOptions;
-use crate::pose_loss::{Pixel, Row, Seen};
+use crate::camera::Camera;
+use crate::contour::{Lighting, posed_normal};
+use crate::pose_loss::{Pixel, Seen};
 use crate::posed::Posed;
 
 /// What has a smaller share of the pixel is left out: 64 such fragments are less than 1e-6 of its colour.
 pub(crate) const LEAST_SHARE: f32 = 1e-8;
-
-const MOST: usize = SoftRasOptions::MOST_FACES;
 
 /// A posed, lit model with the faces that are drawn, and the point about which twists turn (camera frame).
 pub(crate) struct Scene<'a> {
     pub(crate) posed: Posed<'a>,
     pub(crate) lighting: Lighting,
     pub(crate) settings: Settings,
+    pub(crate) camera: Camera,
+    /// Column, row \[px\] and Z \[m\] of the vertices.
+    pub(crate) screen: Vec<[f64; 3]>,
     pub(crate) faces: Vec<Face>,
     /// The model's index of each of them.
     pub(crate) ids: Vec<u32>,
-    /// The derivatives of those that are seen.
-    pub(crate) rows: Vec<OnceLock<FaceRows>>,
-    pub(crate) twist_center: Vector3<f32>,
+    /// How those that are seen move.
+    pub(crate) motions: Vec<OnceLock<FaceMotion>>,
+    pub(crate) twist_center: Point3<f64>,
 }
 
-/// The fragments of the pixel at hand. Reused, because clearing it takes as long as filling it.
-pub(crate) struct Scratch {
-    faces: [u32; MOST],
-    fragments: [Fragment; MOST],
-    parts: [Part; MOST],
-    shaded: [Shaded; MOST],
-}
-
-impl Scratch {
-    pub(crate) fn new() -> Self {
-        Self {
-            faces: [0; MOST],
-            fragments: [Fragment::default(); MOST],
-            parts: [Part::default(); MOST],
-            shaded: [Shaded::default(); MOST],
-        }
-    }
+/// The pixels of a run, side by side.
+pub(crate) struct Pixels<T> {
+    color: [T; 3],
+    coverage: T,
+    z: T,
+    /// 1 where a face contains the pixel's centre, else 0.
+    hit: T,
+    color_rows: [TwistRow<T>; 3],
+    coverage_row: TwistRow<T>,
+    z_row: TwistRow<T>,
 }
 
 #[inline(always)]
-fn narrow([a, b, c, d, e, f, _, _]: &WideRow) -> Row {
-    [*a, *b, *c, *d, *e, *f]
+fn lane<const N: usize, T: Number>(values: &[T; N], lane: usize) -> [f32; N] {
+    let mut out = [0.0; N];
+    for i in 0..N {
+        out[i] = values[i].lanes()[lane];
+    }
+    out
+}
+
+impl<T: Number> Pixels<T> {
+    #[inline(always)]
+    pub(crate) fn seen<const DERIVATIVES: bool>(&self, at: usize) -> Seen {
+        let hit = self.hit.lanes()[at] > 0.0;
+        let mut pixel = Pixel {
+            color: lane(&self.color, at),
+            coverage: self.coverage.lanes()[at],
+            z: self.z.lanes()[at],
+            depth_weight: if hit { 1.0 } else { 0.0 },
+            ..Pixel::default()
+        };
+        if DERIVATIVES {
+            for k in 0..3 {
+                pixel.color_rows[k] = lane(&self.color_rows[k], at);
+            }
+            pixel.coverage_row = lane(&self.coverage_row, at);
+            pixel.z_row = lane(&self.z_row, at);
+        }
+        Seen { pixel, hit, near_outline: !hit }
+    }
 }
 
 impl Scene<'_> {
-    /// Pixel (column, row) that shows `faces`, not none of them; `inside` is the nearest that contains its centre.
+    /// The pixels of `run`, from (column, row) on. Leaves each fragment's share of the colour in the weight of its part.
     #[inline(always)]
-    pub(crate) fn pixel<const DERIVATIVES: bool>(
+    pub(crate) fn pixels<const DERIVATIVES: bool, T: Number>(
         &self,
-        scratch: &mut Scratch,
-        column: f32,
-        row: f32,
-        faces: impl Iterator<Item = u32>,
-        inside: Option<u32>,
-    ) -> Seen {
-        let settings = &self.settings;
-        let mut count = 0;
-        for face in faces.take(MOST) {
-            scratch.faces[count] = face;
-            scratch.fragments[count] =
-                Fragment::new(&self.faces[face as usize], column, row, settings);
-            count += 1;
-        }
-        let blend = Blend::new(&scratch.fragments[..count], &mut scratch.parts, settings);
-        let inverse_sum = 1.0 / blend.sum;
-        let mut pixel = Pixel { coverage: 1.0 - blend.clear, z: blend.nearest, ..Pixel::default() };
-        for i in 0..count {
-            let share = scratch.parts[i].weight * inverse_sum;
-            if share > LEAST_SHARE {
-                let b = scratch.fragments[i].b;
-                let id = self.ids[scratch.faces[i] as usize] as usize;
-                let shaded = shade::<DERIVATIVES>(&self.posed, &self.lighting, id, b);
-                (0..3).for_each(|k| pixel.color[k] += share * shaded.color[k]);
-                scratch.shaded[i] = shaded;
+        run: &mut Run<T>,
+        column: usize,
+        row: usize,
+    ) -> Pixels<T> {
+        let zero = run.zero();
+        let is = |value: f32| zero.like(value);
+        let one = is(1.0);
+        let blend = Blend::new(&mut run.candidates, &self.settings, zero);
+        let mut color = [zero; 3];
+        for candidate in &mut run.candidates {
+            let share = candidate.part.weight * blend.inverse_sum;
+            let share = T::pick(is(LEAST_SHARE).below(share), share, zero);
+            candidate.part.weight = share;
+            if !zero.any(zero.below(share)) {
+                continue;
+            }
+            let id = self.ids[candidate.face as usize] as usize;
+            let lit = Lit::new(&self.posed, &self.lighting, id, candidate.fragment.b);
+            for k in 0..3 {
+                color[k] = color[k] + share * lit.color[k];
             }
         }
+        let hit = run.inside_z.below(is(f32::INFINITY));
+        let mut pixels = Pixels {
+            color,
+            coverage: one - blend.clear,
+            z: T::pick(hit, run.inside_z, blend.nearest),
+            hit: T::pick(hit, one, zero),
+            color_rows: [[zero; 6]; 3],
+            coverage_row: [zero; 6],
+            z_row: [zero; 6],
+        };
         if DERIVATIVES {
-            self.rows::<DERIVATIVES>(scratch, count, &blend, column, row, &mut pixel);
+            let (column, row) = places(zero, column, row);
+            self.rows(run, &blend, column, row, &mut pixels);
         }
-        if let Some(face) = inside {
-            self.depth::<DERIVATIVES>(face, column, row, &mut pixel);
-        }
-        Seen { pixel, hit: inside.is_some(), near_outline: inside.is_none() }
+        pixels
     }
 
-    /// The unit normal (camera frame) of a face at a pixel inside it, and the model's index of the face.
-    pub(crate) fn normal(&self, face: u32, column: f32, row: f32) -> (u32, [f32; 3]) {
-        let b = Fragment::new(&self.faces[face as usize], column, row, &self.settings).b;
+    /// The unit normal (camera frame) of a face at barycentric coordinates, and the model's index of the face.
+    pub(crate) fn normal(&self, face: u32, b: [f32; 3]) -> (u32, [f32; 3]) {
         let id = self.ids[face as usize];
         (id, posed_normal(&self.posed, id as usize, b))
     }
 
-    /// The depth of the surface at a pixel inside a face.
     #[inline(always)]
-    fn depth<const DERIVATIVES: bool>(&self, face: u32, column: f32, row: f32, pixel: &mut Pixel) {
-        let geometry = &self.faces[face as usize];
-        let fragment = Fragment::new(geometry, column, row, &self.settings);
-        pixel.z = fragment.z;
-        pixel.depth_weight = 1.0;
-        if DERIVATIVES {
-            let rows = self.face_rows(face);
-            let mut out = rows.depth(fragment.b);
-            let (x, y) = (column - geometry.base[0], row - geometry.base[1]);
-            let level = fragment.z * fragment.sum_active;
-            let weight = fragment.weight_adjoint(geometry.z.map(|z| z - level));
-            for (weight, row) in weight.iter().zip(&rows.weights(x, y)) {
-                add_scaled(&mut out, *weight, row);
-            }
-            pixel.z_row = narrow(&out);
-        }
-    }
-
-    #[inline(always)]
-    fn face_rows(&self, face: u32) -> &FaceRows {
-        self.rows[face as usize].get_or_init(|| {
-            let points = self.posed.model.faces[self.ids[face as usize] as usize]
-                .map(|v| self.posed.position[v as usize]);
-            let geometry = &self.faces[face as usize];
-            let (focal, center) = (self.posed.focal, &self.twist_center);
-            FaceRows::new(geometry, points, focal, center, self.settings.perspective)
+    fn motion(&self, face: u32) -> &FaceMotion {
+        self.motions[face as usize].get_or_init(|| {
+            let corners = self.posed.model.faces[self.ids[face as usize] as usize]
+                .map(|v| self.screen[v as usize]);
+            let center = &self.twist_center.coords;
+            FaceMotion::new(&self.faces[face as usize], corners, &self.camera, center)
         })
     }
 
-    /// Rows of colour and coverage.
+    /// Rows of colour, coverage and depth, from each fragment's share of the colour (in the weight of its part).
     ///
     /// With the shares ω = w/D, dC = Σ ω (dC_k + (C_k − C) d ln w_k), d ln w = −(1 − p)/σ dd − dz/(γ (z_far − z_near)),
     /// and dα = −(1 − α) Σ p/σ dd.
     #[inline(always)]
-    fn rows<const DERIVATIVES: bool>(
+    fn rows<T: Number>(
         &self,
-        scratch: &Scratch,
-        count: usize,
-        blend: &Blend,
-        column: f32,
-        row: f32,
-        pixel: &mut Pixel,
+        run: &Run<T>,
+        blend: &Blend<T>,
+        column: T,
+        row: T,
+        pixels: &mut Pixels<T>,
     ) {
+        let is = |value: f32| column.like(value);
+        let (zero, one) = (is(0.0), is(1.0));
         let settings = &self.settings;
-        let inverse_sum = 1.0 / blend.sum;
-        let mut color_rows = [[0.0; 8]; 3];
-        let mut coverage_row = [0.0; 8];
-        let (mut turning, mut level) = ([[0.0; 3]; 3], [0.0; 3]);
-        let mut drift = blend.drifting;
-        for i in 0..count {
-            let (part, fragment) = (&scratch.parts[i], &scratch.fragments[i]);
-            let share = part.weight * inverse_sum;
-            let cover = blend.clear * part.presence;
-            if share <= LEAST_SHARE && cover <= LEAST_SHARE {
-                continue;
-            }
-            let face = scratch.faces[i];
-            let rows = self.face_rows(face);
-            let mut distance_row = [0.0; 8];
-            rows.add_image(&mut distance_row, fragment.distance_gradient(), fragment.foot);
-            add_scaled(&mut coverage_row, -cover * settings.sharpness, &distance_row);
-            if share <= LEAST_SHARE {
-                continue;
-            }
-            let shaded = &scratch.shaded[i];
-            let by_distance = -part.absence * settings.sharpness * share;
-            let by_depth = -settings.depth_rate * share;
-            // The nearest depth is what the weights are relative to; the background's weight is not if it is at its bound.
-            let nearest = drift && fragment.z == blend.nearest;
-            drift &= !nearest;
-            let relative =
-                if nearest { settings.depth_rate * blend.background * inverse_sum } else { 0.0 };
-            let geometry = &self.faces[face as usize];
-            let (x, y) = (column - geometry.base[0], row - geometry.base[1]);
-            let weight_rows = rows.weights(x, y);
-            let depth_row = rows.depth(fragment.b);
+        let (focal, principal) = (self.posed.focal, self.posed.principal);
+        let focal = [is(focal[0]), is(focal[1])];
+        let center: Vector3<f32> = self.twist_center.coords.cast();
+        let ray = Ray {
+            direction: [
+                (column - is(principal[0])) / focal[0],
+                (row - is(principal[1])) / focal[1],
+                one,
+            ],
+            center: [is(center.x), is(center.y), is(center.z)],
+            focal,
+        };
+        let mut color_sums = [RowSum::new(zero); 3];
+        let (mut coverage_sum, mut z_sum) = (RowSum::new(zero), RowSum::new(zero));
+        let (mut turning, mut level) = ([[zero; 3]; 3], [zero; 3]);
+        // The nearest depth is what the weights are relative to; the background's weight is not if it is at its bound.
+        let mut relative =
+            blend.drifting * is(settings.depth_rate) * blend.background * blend.inverse_sum;
+        for (place, candidate) in run.candidates.iter().enumerate() {
+            let part = &candidate.part;
+            let (face, fragment) = (&self.faces[candidate.face as usize], &candidate.fragment);
+            let motion = self.motion(candidate.face);
             let mean_z = fragment.z * fragment.sum_active;
+            // Where the sum is free, a depth that is the same everywhere moves with no coordinate; taking it off saves
+            // digits.
+            let depths = [is(face.z[0]) - mean_z, is(face.z[1]) - mean_z, is(face.z[2]) - mean_z];
+            let at_center = run.inside.at_least(is(place as f32))
+                & is(place as f32).at_least(run.inside)
+                & run.inside_z.below(is(f32::INFINITY));
+            if zero.any(at_center) {
+                let by_z = T::pick(at_center, one, zero);
+                let along = [by_z * depths[0], by_z * depths[1], by_z * depths[2]];
+                let by_weight = fragment.weight_adjoint(along);
+                z_sum.add_surface(motion, face, fragment, settings.perspective, by_z, by_weight);
+            }
+            let share = part.weight;
+            let cover = blend.clear * part.presence;
+            let (shown, covers) =
+                (zero.any(zero.below(share)), zero.any(is(LEAST_SHARE).below(cover)));
+            if !shown && !covers {
+                continue;
+            }
+            let distance_row = ray.distance_row(face, fragment);
+            if covers {
+                coverage_sum.add_distance(cover * is(-settings.sharpness), &distance_row);
+            }
+            if !shown {
+                continue;
+            }
+            let id = self.ids[candidate.face as usize] as usize;
+            let lit = Lit::new(&self.posed, &self.lighting, id, fragment.b);
+            let by_distance = part.absence * share * is(-settings.sharpness);
+            let by_depth = share * is(-settings.depth_rate);
+            let nearest = zero.below(candidate.counts) & blend.nearest.at_least(fragment.z);
+            let drift = T::pick(nearest, relative, zero);
+            relative = T::pick(nearest, zero, relative);
             for k in 0..3 {
-                let contrast = shaded.color[k] - pixel.color[k];
-                let z = by_depth * contrast + relative * pixel.color[k];
+                let contrast = lit.color[k] - pixels.color[k];
+                let by_z = by_depth * contrast + drift * pixels.color[k];
                 let along = [
-                    z * (geometry.z[0] - mean_z),
-                    z * (geometry.z[1] - mean_z) + share * shaded.along[0][k],
-                    z * (geometry.z[2] - mean_z) + share * shaded.along[1][k],
+                    by_z * depths[0],
+                    by_z * depths[1] + share * lit.along[0][k],
+                    by_z * depths[2] + share * lit.along[1][k],
                 ];
-                let weight = fragment.weight_adjoint(along);
-                let distance = by_distance * contrast;
-                let sum = &mut color_rows[k];
-                for n in 0..8 {
-                    sum[n] += weight[0] * weight_rows[0][n]
-                        + weight[1] * weight_rows[1][n]
-                        + weight[2] * weight_rows[2][n]
-                        + z * depth_row[n]
-                        + distance * distance_row[n];
+                let by_weight = fragment.weight_adjoint(along);
+                let sum = &mut color_sums[k];
+                sum.add_distance(by_distance * contrast, &distance_row);
+                sum.add_surface(motion, face, fragment, settings.perspective, by_z, by_weight);
+                let turn = share * lit.turning[k];
+                for n in 0..3 {
+                    turning[k][n] = turning[k][n] + turn * lit.normal[n];
                 }
-                (0..3).for_each(|n| turning[k][n] += shaded.turning[k][n] * share);
-                level[k] += shaded.level[k] * share;
+                level[k] = level[k] + share * lit.level[k];
             }
         }
-        let center = self.posed.center - self.twist_center;
+        pixels.coverage_row = coverage_sum.row(&ray);
+        pixels.z_row = z_sum.row(&ray);
+        let arm = self.posed.center - center;
         for k in 0..3 {
-            let out = &mut pixel.color_rows[k];
-            *out = narrow(&color_rows[k]);
-            (0..3).for_each(|n| out[n + 3] += turning[k][n]);
+            // A turn of the normals under the light, n × light.
+            let normals = turning[k];
+            let mut in_camera = [zero; 3];
+            for n in 0..3 {
+                let axis = self.lighting.rotation[n];
+                in_camera[n] =
+                    normals[0] * is(axis[0]) + normals[1] * is(axis[1]) + normals[2] * is(axis[2]);
+            }
+            let light = self.lighting.camera[k];
+            let turn = cross(in_camera, [is(light[0]), is(light[1]), is(light[2])]);
+            let mut out = color_sums[k].row(&ray);
+            for n in 0..3 {
+                out[n + 3] = out[n + 3] + turn[n];
+            }
             // The texture's level follows the depth of the model's centre: (0, 0, 1) and center × (0, 0, 1).
-            let level = level[k] * self.posed.level_dz;
-            out[2] += level;
-            out[3] += level * center.y;
-            out[4] -= level * center.x;
+            let level = level[k] * is(self.posed.level_dz);
+            out[2] = out[2] + level;
+            out[3] = out[3] + level * is(arm.y);
+            out[4] = out[4] - level * is(arm.x);
+            pixels.color_rows[k] = out;
         }
-        pixel.coverage_row = narrow(&coverage_row);
     }
 }

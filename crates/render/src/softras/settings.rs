@@ -1,5 +1,7 @@
 //! The options of the mode, in pixels.
 
+use super::exponential::exp;
+use super::number::Number;
 use crate::camera::Camera;
 use crate::mode::SoftRasOptions;
 
@@ -62,9 +64,10 @@ impl Settings {
 
     /// Weight of the background beside a nearest surface at depth `z`, and whether it is at its lower bound.
     #[inline(always)]
-    pub(crate) fn background(&self, z: f32) -> (f32, bool) {
-        let weight = super::exponential::exp((z - self.farthest) * self.depth_rate);
-        let least = BACKGROUND as f32;
-        if weight > least { (weight, false) } else { (least, true) }
+    pub(crate) fn background<T: Number>(&self, z: T) -> (T, T::Mask) {
+        let weight = exp((z - z.like(self.farthest)) * z.like(self.depth_rate));
+        let least = z.like(BACKGROUND as f32);
+        let bounded = least.at_least(weight);
+        (T::pick(bounded, least, weight), bounded)
     }
 }

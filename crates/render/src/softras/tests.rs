@@ -167,7 +167,7 @@ fn rows_are_derivatives_of_the_naive_pixels() {
     for case in cases() {
         let center = case.pose * case.model.center() + Vector3::new(0.01, -0.02, 0.005);
         let ours = pixels::<true>(&case, &center);
-        // Colours are f32, so the step is not too small.
+        // Textures are f32, so the step is not too small.
         let step = 4e-6;
         let moved = |axis: usize, s: f64| {
             let twist = Vector6::from_fn(|i, _| if i == axis { s } else { 0.0 });
