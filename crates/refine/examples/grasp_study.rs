@@ -1,11 +1,12 @@
-//! Grasps every built-in object with the built-in hand, prints what came of it, and draws some grasps.
+//! Grasps every built-in object with the built-in hand, prints what came of it, and draws some grasps. Times are the
+//! processor's.
 //!
 //! `cargo run --release -p prehend-refine --example grasp_study [TRIES [FOLDER]]`
 
 use std::path::PathBuf;
-use std::time::Instant;
 
 use anyhow::Context;
+use cpu_time::ProcessTime;
 use nalgebra::{Isometry3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use prehend_geometry::hand::{allegro_xela_urdf, taxels};
 use prehend_geometry::objects::YcbObject;
@@ -32,7 +33,7 @@ fn main() -> anyhow::Result<()> {
         }
         let object = Object::with_mass(ycb.name(), ycb.mesh(), Some(ycb.mass()), 0)?;
         let grasper = Grasper::new(&robot, &object, &GraspSettings::default())?;
-        let start = Instant::now();
+        let start = ProcessTime::now();
         let mut grasps = Vec::new();
         let mut faults: Vec<String> = Vec::new();
         for seed in 0..tries {
@@ -42,7 +43,7 @@ fn main() -> anyhow::Result<()> {
             }
         }
         let seconds = start.elapsed().as_secs_f64() / grasps.len().max(1) as f64;
-        let start = Instant::now();
+        let start = ProcessTime::now();
         let mut frames = 0;
         for (seed, grasp) in grasps.iter().take(3) {
             match grasper.trajectory(grasp, *seed, FRAMES) {

@@ -22,6 +22,11 @@ pub(super) struct Drive<'a> {
     dt: f64,
 }
 
+/// The least lever that counts \[m\].
+const MIN_LEVER: f64 = 5e-3;
+/// Contacts that push with a smaller part of the grip say nothing of where it will act.
+const FELT: f64 = 0.05;
+
 /// How a hand is driven for the moment.
 #[derive(Clone, Debug)]
 pub(super) struct Effort {
@@ -62,26 +67,34 @@ impl<'a> Drive<'a> {
 
     /// By how much the joints move in the next step.
     ///
-    /// A joint advances at its speed where nothing resists, and stops where the torque of the contacts on all that it
-    /// moves reaches its limit; beyond `yield_ratio` times that it gives way; between the two it keeps still, as a geared
-    /// motor does. The step is implicit in the stiffness of the contacts: (D + dt K) q̇ = τ_limit − τ, D = τ_limit/speed.
+    /// A joint advances at its speed where nothing resists, and stops where the contacts on all that it moves push against
+    /// it with the grip; beyond `yield_ratio` times that it gives way; between the two it keeps still, as a geared motor
+    /// does. The step is implicit in the stiffness of the contacts: (D + dt K) q̇ = τ_limit − τ, D = τ_limit/speed, where
+    /// τ_limit is the torque that the same contacts would exert if they pushed with the grip.
     pub(super) fn change(&self, simulation: &Simulation<'_>, effort: &Effort) -> Vec<f64> {
         let count = self.speed.len();
         let screws = Skeleton::screws(&self.robot.tree, simulation.poses());
+        // Torques against closing, and the forces that make them.
         let mut resisting = vec![0.0; count];
+        let mut pressing = vec![0.0; count];
         let mut stiffness = DMatrix::<f64>::zeros(count, count);
         for touch in simulation.touches() {
             let mut along = DVector::<f64>::zeros(count);
             for screw in self.skeleton.path(touch.link).iter().filter_map(|&j| screws[j]) {
                 let velocity = screw.velocity(&touch.point);
                 // The force on the link is opposite to that on the object.
-                resisting[screw.variable] +=
-                    velocity.dot(&touch.force) * self.speed[screw.variable].signum();
+                let torque = velocity.dot(&touch.force) * self.speed[screw.variable].signum();
+                resisting[screw.variable] += torque;
+                pressing[screw.variable] += torque / velocity.norm().max(MIN_LEVER);
                 along[screw.variable] += velocity.dot(&touch.normal);
             }
             stiffness.ger(touch.stiffness, &along, &along, 1.0);
         }
-        let limit = |v: usize| effort.grip * self.lever[v];
+        let limit = |v: usize| {
+            let lever = resisting[v] / pressing[v];
+            let known = pressing[v] > FELT * effort.grip && lever > MIN_LEVER;
+            effort.grip * if known { lever } else { self.lever[v] }
+        };
         let error = |v: usize| {
             let (limit, resisting) = (limit(v), resisting[v]);
             if resisting < limit {
@@ -169,5 +182,5 @@ fn lever(
         }
     }
     // A joint whose links lie on its axis still has some size.
-    if count == 0 { 1.0 } else { (sum / f64::from(count)).max(5e-3) }
+    if count == 0 { 1.0 } else { (sum / f64::from(count)).max(MIN_LEVER) }
 }

@@ -57,6 +57,9 @@ pub enum GraspError {
 /// Why one attempt at a grasp, or one trajectory, came to nothing. Another seed may do better.
 #[derive(Debug, Error)]
 pub enum GraspFault {
+    /// The open hand lets the object nowhere near its palm.
+    #[error("the fingers keep the object from the palm")]
+    NoRoom,
     /// Too few links touch the object.
     #[error("{links} links touch the object")]
     NoContact {

@@ -66,9 +66,13 @@ pub struct Grasper<'a> {
 /// Links that push with less than this do not count as touching \[N\].
 const TOUCHING: f64 = 0.05;
 /// Hand and object are at rest below this part of the joints' speeds, and below these speeds of the object \[m/s, rad/s\].
-const STILL: (f64, f64, f64) = (0.01, 2e-3, 0.05);
+const STILL: (f64, f64, f64) = (0.03, 2e-3, 0.05);
+/// When time is up the object may be so many times faster.
+const CREEPING: f64 = 5.0;
 /// For so long \[s\].
 const STILL_TIME: f64 = 0.1;
+/// By how much friction is softened where a step cannot be solved otherwise.
+const SOFTER: f64 = 20.0;
 /// Samples of an object's surface, at least and at most.
 const SAMPLES: (f64, f64) = (2e3, 4e4);
 
@@ -99,12 +103,13 @@ impl<'a> Grasper<'a> {
         let area = object.area / samples.len().max(1) as f64;
         let samples = samples.iter().map(|s| SurfacePoint { position: s.point, area }).collect();
         // Backward Euler damps what is faster than its step: contacts need no damping of their own.
-        let law = Penalty::new(settings.stiffness, 0.0, settings.friction, settings.slip_speed)?;
+        let law = |slip_speed| Penalty::new(settings.stiffness, 0.0, settings.friction, slip_speed);
+        let (law, soft_law) = (law(settings.slip_speed)?, law(SOFTER * settings.slip_speed)?);
         let (time_step, damping_time) = (settings.time_step, settings.damping_time);
         Ok(Self {
             drive: Drive::new(robot, &preshape, settings),
             skin: Skin::new(robot, settings.taxel_reach)?,
-            setup: Setup { robot, body, samples, law, time_step, damping_time },
+            setup: Setup { robot, body, samples, law, soft_law, time_step, damping_time },
             placement: Placement::new(object),
             contact: ContactModel::new(&object.mesh),
             settings: settings.clone(),
@@ -118,12 +123,13 @@ impl<'a> Grasper<'a> {
     /// Why it is none.
     pub fn grasp(&self, seed: u64) -> Result<Grasp, GraspFault> {
         let mut random = SplitMix64::new(seed);
-        let (joints, t_hand_object) = self.placement.draw(
+        let placed = self.placement.draw(
             self.setup.robot,
             &self.preshape,
             &self.settings,
             &mut random,
         )?;
+        let (joints, t_hand_object) = placed.ok_or(GraspFault::NoRoom)?;
         let weight = self.setup.body.mass() * self.settings.gravity;
         let pace = self.preshape.speed.iter();
         let pace =
@@ -134,6 +140,7 @@ impl<'a> Grasper<'a> {
         self.close(&mut simulation, &effort)?;
         self.check_links(&simulation)?;
         let (drift, turn) = self.hold(&mut simulation, &effort, &mut random)?;
+        self.check_rest(&simulation, 1.0)?;
         let links = self.check_links(&simulation)?;
         let (joints, t_hand_object) = (simulation.joints().to_vec(), simulation.t_hand_object());
         let (contact_area, intersection_volume) = self.measure(&joints, &t_hand_object)?;
@@ -164,7 +171,8 @@ impl<'a> Grasper<'a> {
         Err(GraspFault::Exhausted { tries, last: Box::new(last) })
     }
 
-    /// Closes the hand around the floating object.
+    /// Closes the hand around the floating object, until all is at rest or nearly so when time is up: some fingers go on
+    /// creeping, and whether the object is held will be seen.
     fn close(&self, simulation: &mut Simulation<'_>, effort: &Effort) -> Result<(), GraspFault> {
         let steps = |time: f64| (time / self.settings.time_step).ceil() as usize;
         let mut still = 0;
@@ -178,7 +186,14 @@ impl<'a> Grasper<'a> {
                 return Ok(());
             }
         }
-        Err(GraspFault::Restless)
+        self.check_rest(simulation, CREEPING)
+    }
+
+    /// Whether the object moves no faster than this many times what counts as still.
+    fn check_rest(&self, simulation: &Simulation<'_>, times: f64) -> Result<(), GraspFault> {
+        let (speed, spin) = simulation.speed();
+        let rests = speed < times * STILL.1 && spin < times * STILL.2;
+        if rests { Ok(()) } else { Err(GraspFault::Restless) }
     }
 
     /// Lets gravity pull in several directions; how far the object moves and turns at most.

@@ -13,6 +13,10 @@ const PROBES: usize = 600;
 const FAR: f64 = 0.6;
 /// Steps of the approach at most.
 const MOST_ADVANCES: usize = 200;
+/// Placements that are tried.
+const DRAWS: usize = 20;
+/// An object farther from the middle of the palm, beyond its clearance, has been kept off by the fingers \[m\].
+const NEAR_PALM: f64 = 0.03;
 
 /// An object as it is placed.
 pub(super) struct Placement {
@@ -44,10 +48,29 @@ impl Placement {
         }
     }
 
-    /// Joints of the open hand and `t_hand_object` before the palm.
+    /// Joints of the open hand and `t_hand_object` before the palm; nothing if the fingers are in the way time and again.
     ///
     /// The longest axis of aligned placements lies along that about which fingers wrap, their faces towards the palm.
     pub(super) fn draw(
+        &self,
+        robot: &Robot,
+        preshape: &Preshape,
+        settings: &GraspSettings,
+        random: &mut SplitMix64,
+    ) -> Result<Option<(Vec<f64>, Isometry3<f64>)>, RobotError> {
+        let palm = Point3::from(preshape.t_hand_palm.translation.vector);
+        for _ in 0..DRAWS {
+            let (joints, t_hand_object) = self.draw_one(robot, preshape, settings, random)?;
+            let gap = |p: &Point3<f64>| (t_hand_object * p - palm).norm();
+            let gap = self.probes.iter().map(gap).fold(f64::INFINITY, f64::min);
+            if gap < settings.clearance + NEAR_PALM {
+                return Ok(Some((joints, t_hand_object)));
+            }
+        }
+        Ok(None)
+    }
+
+    fn draw_one(
         &self,
         robot: &Robot,
         preshape: &Preshape,

@@ -17,7 +17,7 @@ pub struct GraspSettings {
     pub sample_spacing: f64,
     /// Time step of the simulation \[s\].
     pub time_step: f64,
-    /// Force at which a finger stops \[N\], at the mean lever of what each joint moves.
+    /// Force against it at which a joint stops \[N\], that on all it moves taken together.
     pub grip: f64,
     /// What is added to `grip` for each newton of the object's weight.
     pub grip_per_weight: f64,
@@ -27,7 +27,7 @@ pub struct GraspSettings {
     pub speed_spread: f64,
     /// While the hand closes the object floats, and loses its speed within this time \[s\].
     pub damping_time: f64,
-    /// All must be at rest within this time after the hand begins to close \[s\].
+    /// All must be nearly at rest within this time after the hand begins to close \[s\].
     pub closing_time: f64,
     /// The part of placements that follow the object's principal axes; the rest are turned at random.
     pub aligned: f64,
@@ -74,10 +74,10 @@ impl Default for GraspSettings {
             time_step: 5e-3,
             grip: 2.0,
             grip_per_weight: 0.6,
-            yield_ratio: 3.0,
+            yield_ratio: 6.0,
             speed_spread: 0.3,
             damping_time: 0.05,
-            closing_time: 4.0,
+            closing_time: 3.0,
             aligned: 0.8,
             tilt: 0.15,
             offset: 0.012,

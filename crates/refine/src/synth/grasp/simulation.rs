@@ -7,8 +7,8 @@ use prehend_autodiff::lie::so3_log;
 use prehend_geometry::robot::LinkShape;
 use prehend_geometry::{DistanceField, FieldSample};
 use prehend_sim::{
-    BackwardEuler, Body, Contact, ContactLaw, Integrator, Onset, Penalty, RigidBody,
-    SimulationError, State, Step, SubStepped, Surface, SurfacePoint, World,
+    BackwardEuler, Body, Contact, ContactLaw, Integrator, LocalLaw, Onset, Penalty, RigidBody,
+    SemiImplicitEuler, SimulationError, State, Step, SubStepped, Surface, SurfacePoint, World,
 };
 
 use crate::Robot;
@@ -18,6 +18,10 @@ const NEAR: f64 = 10e-3;
 /// By how much something may move until they are looked for anew \[m\]: interpolated distances rise a little faster than
 /// points move.
 const MOVED: f64 = 7e-3;
+/// Parts into which a step is divided at most.
+const PARTS: usize = 8;
+/// The same where steps are explicit.
+const EXPLICIT_PARTS: usize = 1 << 12;
 
 /// What stays the same for all simulations of an object in a hand.
 pub(super) struct Setup<'a> {
@@ -25,6 +29,8 @@ pub(super) struct Setup<'a> {
     pub(super) body: RigidBody,
     pub(super) samples: Vec<SurfacePoint>,
     pub(super) law: Penalty,
+    /// The same with softer friction, for steps that cannot be solved otherwise.
+    pub(super) soft_law: Penalty,
     pub(super) time_step: f64,
     /// Time in which a floating object loses its speed \[s\].
     pub(super) damping_time: f64,
@@ -169,12 +175,37 @@ impl<'a> Simulation<'a> {
         }
         self.world.bodies[self.object].load = load;
         self.look_around()?;
-        let step = Step { index: self.steps, dt };
-        // Impacts may leave the equations of a long step without a solution.
-        let integrator = SubStepped { integrator: BackwardEuler, most: 64 };
-        self.states = integrator.step(&self.world, &self.states, step)?;
+        self.states = self.stepped()?;
         self.steps += 1;
         Ok(())
+    }
+
+    /// The states one time step later: by the implicit equations as they are, or else with softer friction, or else by
+    /// explicit steps as short as those need. Newton's method may fail where many samples make or lose contact at once.
+    fn stepped(&mut self) -> Result<Vec<State>, SimulationError> {
+        let step = || Step { index: self.steps, dt: self.setup.time_step };
+        let implicit = SubStepped { integrator: BackwardEuler, most: PARTS };
+        let explicit = SubStepped { integrator: SemiImplicitEuler, most: EXPLICIT_PARTS };
+        let unsolved = |error: &SimulationError| matches!(error, SimulationError::Unsolved { .. });
+        match implicit.step(&self.world, &self.states, step()) {
+            Err(error) if unsolved(&error) => {}
+            done => return done,
+        }
+        let step = [step(), step()];
+        self.rub(self.setup.soft_law);
+        let [second, third] = step;
+        let solved = match implicit.step(&self.world, &self.states, second) {
+            Err(error) if unsolved(&error) => explicit.step(&self.world, &self.states, third),
+            done => done,
+        };
+        self.rub(self.setup.law);
+        solved
+    }
+
+    /// Lets all contacts follow `law`.
+    fn rub(&mut self, law: Penalty) {
+        let law: Arc<dyn LocalLaw> = Arc::new(law);
+        self.world.contacts.iter_mut().for_each(|pair| pair.law = Arc::clone(&law));
     }
 
     /// Keeps the samples that may touch before the next look.
