@@ -27,7 +27,7 @@ pub use settings::GraspSettings;
 use crate::metrics::ContactModel;
 use crate::{Object, Robot};
 use drive::{Drive, Effort};
-use placement::Placement;
+use placement::{Placed, Placement};
 use simulation::{Medium, Setup, Simulation};
 use skin::Skin;
 
@@ -95,8 +95,8 @@ impl<'a> Grasper<'a> {
         preshape.check(robot.tree.joint_names().len())?;
         let inertial = &object.inertial;
         let body = RigidBody::new(inertial.mass, inertial.inertia, inertial.center_of_mass);
-        let body = body
-            .map_err(|reason| GraspError::Object { object: object.name.clone(), reason })?;
+        let body =
+            body.map_err(|reason| GraspError::Object { object: object.name.clone(), reason })?;
         let count = (object.area / settings.sample_spacing.powi(2)).clamp(SAMPLES.0, SAMPLES.1);
         let solid = object.mesh.cleaned().0;
         let samples = surface_samples(&solid, count as usize, 0);
@@ -123,13 +123,9 @@ impl<'a> Grasper<'a> {
     /// Why it is none.
     pub fn grasp(&self, seed: u64) -> Result<Grasp, GraspFault> {
         let mut random = SplitMix64::new(seed);
-        let placed = self.placement.draw(
-            self.setup.robot,
-            &self.preshape,
-            &self.settings,
-            &mut random,
-        )?;
-        let (joints, t_hand_object) = placed.ok_or(GraspFault::NoRoom)?;
+        let placed =
+            self.placement.draw(self.setup.robot, &self.preshape, &self.settings, &mut random)?;
+        let Placed { joints, t_hand_object } = placed.ok_or(GraspFault::NoRoom)?;
         let weight = self.setup.body.mass() * self.settings.gravity;
         let pace = self.preshape.speed.iter();
         let pace =
@@ -180,7 +176,8 @@ impl<'a> Grasper<'a> {
             let change = self.drive.change(simulation, effort);
             simulation.advance(&change, Medium::Viscous)?;
             let (speed, spin) = simulation.speed();
-            let rests = self.drive.is_at_rest(&change, STILL.0) && speed < STILL.1 && spin < STILL.2;
+            let rests =
+                self.drive.is_at_rest(&change, STILL.0) && speed < STILL.1 && spin < STILL.2;
             still = if rests { still + 1 } else { 0 };
             if still >= steps(STILL_TIME) {
                 return Ok(());
@@ -220,13 +217,10 @@ impl<'a> Grasper<'a> {
     }
 
     /// How far the object has moved between two poses, unless it has slipped.
-    fn moved(
-        &self,
-        from: &Isometry3<f64>,
-        to: &Isometry3<f64>,
-    ) -> Result<(f64, f64), GraspFault> {
+    fn moved(&self, from: &Isometry3<f64>, to: &Isometry3<f64>) -> Result<(f64, f64), GraspFault> {
         let centre: Point3<f64> = *self.setup.body.com();
-        let (distance, angle) = ((to * centre - from * centre).norm(), from.rotation.angle_to(&to.rotation));
+        let (distance, angle) =
+            ((to * centre - from * centre).norm(), from.rotation.angle_to(&to.rotation));
         let stays = distance <= self.settings.slip_distance && angle <= self.settings.slip_angle;
         if stays { Ok((distance, angle)) } else { Err(GraspFault::Slipped { distance, angle }) }
     }

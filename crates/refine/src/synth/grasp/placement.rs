@@ -27,6 +27,12 @@ pub(super) struct Placement {
     half_length: f64,
 }
 
+/// An open hand and an object before its palm.
+pub(super) struct Placed {
+    pub(super) joints: Vec<f64>,
+    pub(super) t_hand_object: Isometry3<f64>,
+}
+
 impl Placement {
     pub(super) fn new(object: &Object) -> Self {
         let every = object.samples.len().div_ceil(PROBES).max(1);
@@ -48,7 +54,7 @@ impl Placement {
         }
     }
 
-    /// Joints of the open hand and `t_hand_object` before the palm; nothing if the fingers are in the way time and again.
+    /// A random placement; nothing if the fingers are in the way time and again.
     ///
     /// The longest axis of aligned placements lies along that about which fingers wrap, their faces towards the palm.
     pub(super) fn draw(
@@ -57,14 +63,14 @@ impl Placement {
         preshape: &Preshape,
         settings: &GraspSettings,
         random: &mut SplitMix64,
-    ) -> Result<Option<(Vec<f64>, Isometry3<f64>)>, RobotError> {
+    ) -> Result<Option<Placed>, RobotError> {
         let palm = Point3::from(preshape.t_hand_palm.translation.vector);
         for _ in 0..DRAWS {
-            let (joints, t_hand_object) = self.draw_one(robot, preshape, settings, random)?;
-            let gap = |p: &Point3<f64>| (t_hand_object * p - palm).norm();
+            let placed = self.draw_one(robot, preshape, settings, random)?;
+            let gap = |p: &Point3<f64>| (placed.t_hand_object * p - palm).norm();
             let gap = self.probes.iter().map(gap).fold(f64::INFINITY, f64::min);
             if gap < settings.clearance + NEAR_PALM {
-                return Ok(Some((joints, t_hand_object)));
+                return Ok(Some(placed));
             }
         }
         Ok(None)
@@ -76,7 +82,7 @@ impl Placement {
         preshape: &Preshape,
         settings: &GraspSettings,
         random: &mut SplitMix64,
-    ) -> Result<(Vec<f64>, Isometry3<f64>), RobotError> {
+    ) -> Result<Placed, RobotError> {
         let both_ways = |random: &mut SplitMix64| 2.0 * random.unit() - 1.0;
         let open = preshape.open.iter().zip(&preshape.spread);
         let open: Vec<f64> = open.map(|(q, s)| q + s * both_ways(random)).collect();
@@ -105,8 +111,7 @@ impl Placement {
             let middle = long * slide + across;
             let middle = Vector3::new(middle.x, middle.y, height);
             let shift = middle - t_palm_object * self.centre.coords;
-            preshape.t_hand_palm
-                * Isometry3::from_parts(Translation3::from(shift), t_palm_object)
+            preshape.t_hand_palm * Isometry3::from_parts(Translation3::from(shift), t_palm_object)
         };
         let hand = robot.posed(&Isometry3::identity(), &joints)?;
         let mut height = FAR;
@@ -118,7 +123,7 @@ impl Placement {
             }
             height -= room;
         }
-        Ok((joints, at(height)))
+        Ok(Placed { joints, t_hand_object: at(height) })
     }
 
     fn distance(&self, hand: &PosedRobot, t_hand_object: &Isometry3<f64>) -> f64 {

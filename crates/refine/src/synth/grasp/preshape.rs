@@ -116,9 +116,8 @@ impl Preshape {
             return Err(GraspError::NoFingers);
         }
         let closes = |v: usize| nearer[v].abs() > CLOSES * best;
-        let turns = |v: usize| {
-            screws.iter().flatten().any(|s| s.variable == v && s.angular.norm() > 0.0)
-        };
+        let turns =
+            |v: usize| screws.iter().flatten().any(|s| s.variable == v && s.angular.norm() > 0.0);
         let count = limits.len();
         let open = |v: usize| match (closes(v), nearer[v] > 0.0) {
             (false, _) => middle[v],

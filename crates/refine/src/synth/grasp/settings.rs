@@ -138,7 +138,7 @@ impl GraspSettings {
                 return refuse(name, value, "at least 0");
             }
         }
-        if !(self.yield_ratio >= 1.0) {
+        if self.yield_ratio.is_nan() || self.yield_ratio < 1.0 {
             return refuse("yield_ratio", self.yield_ratio, "at least 1");
         }
         if self.speed_spread >= 1.0 {

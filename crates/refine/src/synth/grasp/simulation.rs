@@ -106,7 +106,9 @@ impl<'a> Simulation<'a> {
             let Some(grid) = shape.grid() else { continue };
             let (low, high) = grid.bounds();
             let corner = |i: usize| {
-                Point3::from(Vector3::from_fn(|k, _| if i >> k & 1 == 0 { low[k] } else { high[k] }))
+                Point3::from(Vector3::from_fn(
+                    |k, _| if i >> k & 1 == 0 { low[k] } else { high[k] },
+                ))
             };
             let field = Arc::new(LinkField(Arc::clone(shape)));
             world.add(Body::held(&robot.tree.links()[link].name).with_field(field));
@@ -117,8 +119,7 @@ impl<'a> Simulation<'a> {
         let object = world.add(Body::free("object", setup.body));
         states.push(setup.body.at_rest(t_hand_object));
         let joints = joints.to_vec();
-        let mut new =
-            Self { setup, world, states, object, links, joints, poses, steps: 0 };
+        let mut new = Self { setup, world, states, object, links, joints, poses, steps: 0 };
         new.look_around()?;
         for body in 0..object {
             new.world.touch(object, body, Arc::new(setup.law), Onset::Hard)?;
@@ -146,7 +147,11 @@ impl<'a> Simulation<'a> {
     }
 
     /// One time step, during which the joints move by `change`.
-    pub(super) fn advance(&mut self, change: &[f64], medium: Medium) -> Result<(), SimulationError> {
+    pub(super) fn advance(
+        &mut self,
+        change: &[f64],
+        medium: Medium,
+    ) -> Result<(), SimulationError> {
         let dt = self.setup.time_step;
         self.joints.iter_mut().zip(change).for_each(|(q, d)| *q += d);
         let poses = self.setup.robot.tree.forward_kinematics(&self.joints);
