@@ -2,10 +2,12 @@
 
 mod annotation;
 mod dataset;
+mod grasp;
 mod moment;
 mod scene;
 mod sensing;
 
 pub use dataset::write_dataset;
+pub use grasp::{Grasp, GraspError, GraspFault, GraspSettings, Grasper, Preshape};
 pub use moment::Moment;
 pub use scene::{Scene, default_scene};

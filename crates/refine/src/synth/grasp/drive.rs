@@ -1,0 +1,186 @@
+//! Fingers that close until they are resisted.
+
+use nalgebra::{DMatrix, DVector, Isometry3, Point3, Vector3};
+
+use super::clash::Clash;
+use super::simulation::Simulation;
+use super::skeleton::{Screw, Skeleton};
+use super::{GraspSettings, Preshape};
+use crate::Robot;
+
+/// Which joints close, how fast, and where they stop.
+pub(super) struct Drive<'a> {
+    robot: &'a Robot,
+    skeleton: Skeleton,
+    clash: Clash,
+    limits: Vec<(f64, f64)>,
+    /// Of each joint \[rad/s or m/s\], signed.
+    speed: Vec<f64>,
+    /// Mean lever of the links that a joint moves \[m\]; 1 for those that slide.
+    lever: Vec<f64>,
+    yield_ratio: f64,
+    dt: f64,
+}
+
+/// The least lever that counts \[m\].
+const MIN_LEVER: f64 = 5e-3;
+/// Contacts that push with a smaller part of the grip say nothing of where it will act.
+const FELT: f64 = 0.05;
+
+/// How a hand is driven for the moment.
+#[derive(Clone, Debug)]
+pub(super) struct Effort {
+    /// Factors on the speeds.
+    pub(super) pace: Vec<f64>,
+    /// Force at which fingers stop, at the mean lever \[N\].
+    pub(super) grip: f64,
+}
+
+impl<'a> Drive<'a> {
+    pub(super) fn new(robot: &'a Robot, preshape: &Preshape, settings: &GraspSettings) -> Self {
+        let tree = &robot.tree;
+        let skeleton = Skeleton::new(tree);
+        let middle = |i: usize| {
+            // Where the hand is half closed.
+            let (lower, upper) = tree.joint_limits()[i];
+            let end = if preshape.speed[i] > 0.0 { upper } else { lower };
+            let moves = preshape.speed[i] != 0.0 && end.is_finite();
+            if moves { 0.5 * (preshape.open[i] + end) } else { preshape.open[i] }
+        };
+        let joints: Vec<f64> = (0..preshape.open.len()).map(middle).collect();
+        let poses = tree.forward_kinematics(&joints);
+        let screws = Skeleton::screws(tree, &poses);
+        let lever = (0..joints.len()).map(|v| lever(robot, &skeleton, &screws, &poses, v));
+        let lever = lever.collect();
+        let clash = Clash::new(robot, &skeleton, &tree.forward_kinematics(&preshape.open));
+        Self {
+            robot,
+            clash,
+            limits: tree.joint_limits(),
+            speed: preshape.speed.clone(),
+            lever,
+            skeleton,
+            yield_ratio: settings.yield_ratio,
+            dt: settings.time_step,
+        }
+    }
+
+    /// By how much the joints move in the next step.
+    ///
+    /// A joint advances at its speed where nothing resists, and stops where the contacts on all that it moves push against
+    /// it with the grip; beyond `yield_ratio` times that it gives way; between the two it keeps still, as a geared motor
+    /// does. The step is implicit in the stiffness of the contacts: (D + dt K) q̇ = τ_limit − τ, D = τ_limit/speed, where
+    /// τ_limit is the torque that the same contacts would exert if they pushed with the grip.
+    pub(super) fn change(&self, simulation: &Simulation<'_>, effort: &Effort) -> Vec<f64> {
+        let count = self.speed.len();
+        let screws = Skeleton::screws(&self.robot.tree, simulation.poses());
+        // Torques against closing, and the forces that make them.
+        let mut resisting = vec![0.0; count];
+        let mut pressing = vec![0.0; count];
+        let mut stiffness = DMatrix::<f64>::zeros(count, count);
+        for touch in simulation.touches() {
+            let mut along = DVector::<f64>::zeros(count);
+            for screw in self.skeleton.path(touch.link).iter().filter_map(|&j| screws[j]) {
+                let velocity = screw.velocity(&touch.point);
+                // The force on the link is opposite to that on the object.
+                let torque = velocity.dot(&touch.force) * self.speed[screw.variable].signum();
+                resisting[screw.variable] += torque;
+                pressing[screw.variable] += torque / velocity.norm().max(MIN_LEVER);
+                along[screw.variable] += velocity.dot(&touch.normal);
+            }
+            stiffness.ger(touch.stiffness, &along, &along, 1.0);
+        }
+        let limit = |v: usize| {
+            let lever = resisting[v] / pressing[v];
+            let known = pressing[v] > FELT * effort.grip && lever > MIN_LEVER;
+            effort.grip * if known { lever } else { self.lever[v] }
+        };
+        let error = |v: usize| {
+            let (limit, resisting) = (limit(v), resisting[v]);
+            if resisting < limit {
+                limit - resisting
+            } else {
+                (self.yield_ratio * limit - resisting).min(0.0)
+            }
+        };
+        let active: Vec<usize> = (0..count)
+            .filter(|&v| self.speed[v] != 0.0 && error(v) != 0.0)
+            .filter(|&v| self.has_room(v, simulation.joints()[v], error(v)))
+            .collect();
+        let fastest = |v: usize| self.speed[v].abs() * effort.pace[v];
+        let matrix = DMatrix::from_fn(active.len(), active.len(), |i, j| {
+            let (a, b) = (active[i], active[j]);
+            let own = if i == j { limit(a) / fastest(a) } else { 0.0 };
+            let sign = self.speed[a].signum() * self.speed[b].signum();
+            own + self.dt * sign * stiffness[(a, b)]
+        });
+        let errors = DVector::from_fn(active.len(), |i, _| error(active[i]));
+        let mut change = vec![0.0; count];
+        if let Some(factors) = matrix.cholesky() {
+            let rates = factors.solve(&errors);
+            for (&v, rate) in active.iter().zip(rates.iter()) {
+                // Joints coupled by a contact may not push each other back.
+                let (low, high) = if error(v) > 0.0 { (0.0, 1.0) } else { (-1.0, 0.0) };
+                let rate = rate.clamp(low * fastest(v), high * fastest(v));
+                let (from, (lower, upper)) = (simulation.joints()[v], self.limits[v]);
+                let to = from + rate * self.speed[v].signum() * self.dt;
+                change[v] = to.max(lower).min(upper) - from;
+            }
+        }
+        self.avoid_clashes(simulation, &mut change);
+        change
+    }
+
+    /// Whether a joint can go where it is pushed.
+    fn has_room(&self, v: usize, position: f64, error: f64) -> bool {
+        let (lower, upper) = self.limits[v];
+        if self.speed[v] * error > 0.0 { position < upper } else { position > lower }
+    }
+
+    /// Stops joints that would drive links into each other.
+    fn avoid_clashes(&self, simulation: &Simulation<'_>, change: &mut [f64]) {
+        if change.iter().all(|c| *c == 0.0) {
+            return;
+        }
+        let joints: Vec<f64> =
+            simulation.joints().iter().zip(change.iter()).map(|(q, d)| q + d).collect();
+        let poses = self.robot.tree.forward_kinematics(&joints);
+        for variable in self.clash.stopped(&poses) {
+            // Opening is always allowed.
+            if change[variable] * self.speed[variable] > 0.0 {
+                change[variable] = 0.0;
+            }
+        }
+    }
+
+    /// Whether no joint moves faster than this part of its speed.
+    pub(super) fn is_at_rest(&self, change: &[f64], part: f64) -> bool {
+        change.iter().zip(&self.speed).all(|(c, s)| c.abs() <= part * s.abs() * self.dt)
+    }
+}
+
+fn lever(
+    robot: &Robot,
+    skeleton: &Skeleton,
+    screws: &[Option<Screw>],
+    poses: &[Isometry3<f64>],
+    variable: usize,
+) -> f64 {
+    let (mut sum, mut count) = (0.0, 0);
+    for (link, shape) in robot.shape.links().iter().enumerate() {
+        let Some(grid) = shape.grid() else { continue };
+        let (low, high) = grid.bounds();
+        let centre: Point3<f64> = poses[link] * nalgebra::center(&low, &high);
+        let own = skeleton.path(link).iter().filter_map(|&j| screws[j]);
+        let velocity: Option<Vector3<f64>> = own
+            .filter(|s| s.variable == variable)
+            .map(|s| s.velocity(&centre))
+            .reduce(|a, b| a + b);
+        if let Some(velocity) = velocity {
+            sum += velocity.norm();
+            count += 1;
+        }
+    }
+    // A joint whose links lie on its axis still has some size.
+    if count == 0 { 1.0 } else { (sum / f64::from(count)).max(MIN_LEVER) }
+}

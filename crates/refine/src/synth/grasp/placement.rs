@@ -1,0 +1,139 @@
+//! Where the object is when the hand begins to close.
+
+use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use prehend_geometry::SplitMix64;
+use prehend_geometry::robot::{PosedRobot, RobotError};
+
+use super::{GraspSettings, Preshape};
+use crate::{Object, Robot};
+
+/// Points of the object that must stay clear of the hand.
+const PROBES: usize = 600;
+/// From where the object approaches the palm \[m\].
+const FAR: f64 = 0.6;
+/// Steps of the approach at most.
+const MOST_ADVANCES: usize = 200;
+/// Placements that are tried.
+const DRAWS: usize = 20;
+/// An object farther from the middle of the palm, beyond its clearance, has been kept off by the fingers \[m\].
+const NEAR_PALM: f64 = 0.03;
+
+/// An object as it is placed.
+pub(super) struct Placement {
+    probes: Vec<Point3<f64>>,
+    centre: Point3<f64>,
+    /// Axes from the longest to the shortest, in the object's frame.
+    axes: UnitQuaternion<f64>,
+    half_length: f64,
+}
+
+/// An open hand and an object before its palm.
+pub(super) struct Placed {
+    pub(super) joints: Vec<f64>,
+    pub(super) t_hand_object: Isometry3<f64>,
+}
+
+impl Placement {
+    pub(super) fn new(object: &Object) -> Self {
+        let every = object.samples.len().div_ceil(PROBES).max(1);
+        let probes: Vec<Point3<f64>> =
+            object.samples.iter().step_by(every).map(|s| s.point).collect();
+        // A long body turns most easily about its long axis.
+        let eigen = object.inertial.inertia.symmetric_eigen();
+        let mut order = [0, 1, 2];
+        order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
+        let column = |k: usize| eigen.eigenvectors.column(order[k]).into_owned();
+        let (long, middle) = (column(0), column(1));
+        let turn = Matrix3::from_columns(&[long, middle, long.cross(&middle)]);
+        let along = |p: &Point3<f64>| (p - object.centre).dot(&long).abs();
+        Self {
+            half_length: probes.iter().map(along).fold(0.0, f64::max),
+            centre: object.centre,
+            axes: UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turn)),
+            probes,
+        }
+    }
+
+    /// A random placement; nothing if the fingers are in the way time and again.
+    ///
+    /// The longest axis of aligned placements lies along that about which fingers wrap, their faces towards the palm.
+    pub(super) fn draw(
+        &self,
+        robot: &Robot,
+        preshape: &Preshape,
+        settings: &GraspSettings,
+        random: &mut SplitMix64,
+    ) -> Result<Option<Placed>, RobotError> {
+        let palm = Point3::from(preshape.t_hand_palm.translation.vector);
+        for _ in 0..DRAWS {
+            let placed = self.draw_one(robot, preshape, settings, random)?;
+            let gap = |p: &Point3<f64>| (placed.t_hand_object * p - palm).norm();
+            let gap = self.probes.iter().map(gap).fold(f64::INFINITY, f64::min);
+            if gap < settings.clearance + NEAR_PALM {
+                return Ok(Some(placed));
+            }
+        }
+        Ok(None)
+    }
+
+    fn draw_one(
+        &self,
+        robot: &Robot,
+        preshape: &Preshape,
+        settings: &GraspSettings,
+        random: &mut SplitMix64,
+    ) -> Result<Placed, RobotError> {
+        let both_ways = |random: &mut SplitMix64| 2.0 * random.unit() - 1.0;
+        let open = preshape.open.iter().zip(&preshape.spread);
+        let open: Vec<f64> = open.map(|(q, s)| q + s * both_ways(random)).collect();
+        let joints = robot.tree.clamp_joints(&open)?;
+        let aligned = random.unit() < settings.aligned;
+        let t_palm_axes = if aligned {
+            let quarter = std::f64::consts::FRAC_PI_2;
+            let roll = quarter * (4.0 * random.unit()).floor();
+            let flip = if random.unit() < 0.5 { -1.0 } else { 1.0 };
+            let long = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), flip * quarter);
+            let tilt = Vector3::from_fn(|_, _| settings.tilt * random.normal());
+            UnitQuaternion::from_scaled_axis(tilt)
+                * UnitQuaternion::from_axis_angle(&Vector3::y_axis(), roll)
+                * long
+        } else {
+            let four = nalgebra::Vector4::from_fn(|_, _| random.normal());
+            UnitQuaternion::from_quaternion(nalgebra::Quaternion::from(four))
+        };
+        let t_palm_object = t_palm_axes * self.axes.inverse();
+        // Where along a long object it is held.
+        let slide = 0.6 * both_ways(random) * (self.half_length - 0.04).max(0.0);
+        let long = t_palm_axes * Vector3::x();
+        let across = Vector3::new(random.normal(), random.normal(), 0.0) * settings.offset;
+        let clearance = settings.clearance * random.unit().powi(2) + 1e-3;
+        let at = |height: f64| {
+            let middle = long * slide + across;
+            let middle = Vector3::new(middle.x, middle.y, height);
+            let shift = middle - t_palm_object * self.centre.coords;
+            preshape.t_hand_palm * Isometry3::from_parts(Translation3::from(shift), t_palm_object)
+        };
+        let hand = robot.posed(&Isometry3::identity(), &joints)?;
+        let mut height = FAR;
+        // No point comes nearer by more than the object moves.
+        for _ in 0..MOST_ADVANCES {
+            let room = self.distance(&hand, &at(height)) - clearance;
+            if room < 2e-4 || height < -FAR {
+                break;
+            }
+            height -= room;
+        }
+        Ok(Placed { joints, t_hand_object: at(height) })
+    }
+
+    fn distance(&self, hand: &PosedRobot, t_hand_object: &Isometry3<f64>) -> f64 {
+        let mut nearest = f64::INFINITY;
+        for probe in &self.probes {
+            let limit = if nearest.is_finite() { nearest } else { 2.0 * FAR };
+            if let Some(closest) = hand.closest(&(t_hand_object * probe), limit) {
+                nearest = nearest.min(closest.closest.distance);
+            }
+        }
+        nearest
+    }
+}

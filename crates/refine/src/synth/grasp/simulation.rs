@@ -1,0 +1,289 @@
+//! The object as a free body among the links of a hand that moves as it is told.
+
+use std::sync::Arc;
+
+use nalgebra::{Isometry3, Point3, Vector3, Vector6};
+use prehend_autodiff::lie::so3_log;
+use prehend_geometry::robot::LinkShape;
+use prehend_geometry::{DistanceField, FieldSample};
+use prehend_sim::{
+    BackwardEuler, Body, Contact, ContactLaw, Integrator, LocalLaw, Onset, Penalty, RigidBody,
+    SemiImplicitEuler, SimulationError, State, Step, SubStepped, Surface, SurfacePoint, World,
+};
+
+use crate::Robot;
+
+/// Samples farther from the hand than this are left out until something has moved \[m\]. Links' grids reach farther.
+const NEAR: f64 = 10e-3;
+/// By how much something may move until they are looked for anew \[m\]: interpolated distances rise a little faster than
+/// points move.
+const MOVED: f64 = 7e-3;
+/// Parts into which a step is divided at most.
+const PARTS: usize = 8;
+/// The same where steps are explicit.
+const EXPLICIT_PARTS: usize = 1 << 12;
+
+/// What stays the same for all simulations of an object in a hand.
+pub(super) struct Setup<'a> {
+    pub(super) robot: &'a Robot,
+    pub(super) body: RigidBody,
+    pub(super) samples: Vec<SurfacePoint>,
+    pub(super) law: Penalty,
+    /// The same with softer friction, for steps that cannot be solved otherwise.
+    pub(super) soft_law: Penalty,
+    pub(super) time_step: f64,
+    /// Time in which a floating object loses its speed \[s\].
+    pub(super) damping_time: f64,
+}
+
+/// A sample of the object's surface in contact with a link.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Touch {
+    pub(super) link: usize,
+    /// Hand frame \[m\].
+    pub(super) point: Point3<f64>,
+    /// Out of the link, hand frame.
+    pub(super) normal: Vector3<f64>,
+    /// Force on the object, hand frame \[N\].
+    pub(super) force: Vector3<f64>,
+    /// Stiffness along the normal \[N/m\].
+    pub(super) stiffness: f64,
+}
+
+/// What holds the object while the simulation advances.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Medium {
+    /// It floats and loses its speed.
+    Viscous,
+    /// Gravity, hand frame \[m/s²\].
+    Gravity(Vector3<f64>),
+}
+
+/// One hand and one object, at one moment.
+pub(super) struct Simulation<'a> {
+    setup: &'a Setup<'a>,
+    world: World,
+    /// Of the bodies of the world.
+    states: Vec<State>,
+    object: usize,
+    /// Links with a shape, in the order of their bodies.
+    links: Vec<Solid>,
+    joints: Vec<f64>,
+    poses: Vec<Isometry3<f64>>,
+    steps: usize,
+}
+
+struct Solid {
+    link: usize,
+    shape: Arc<LinkShape>,
+    /// Corners of the box around the link, link frame.
+    corners: [Point3<f64>; 8],
+    /// `t_object_link` when the samples near it were looked for.
+    looked_at: Option<Isometry3<f64>>,
+}
+
+/// Distance to a link, in its frame.
+struct LinkField(Arc<LinkShape>);
+
+impl DistanceField for LinkField {
+    fn sample(&self, point: &Point3<f64>, reach: f64) -> Option<FieldSample> {
+        self.0.grid()?.sample(point, reach)
+    }
+}
+
+impl<'a> Simulation<'a> {
+    /// Hand and object at rest.
+    pub(super) fn new(
+        setup: &'a Setup<'a>,
+        joints: &[f64],
+        t_hand_object: &Isometry3<f64>,
+    ) -> Result<Self, SimulationError> {
+        let robot = setup.robot;
+        let poses = robot.tree.forward_kinematics(joints);
+        let mut world = World::new(Vector3::zeros());
+        let (mut links, mut states) = (Vec::new(), Vec::new());
+        for (link, shape) in robot.shape.links().iter().enumerate() {
+            let Some(grid) = shape.grid() else { continue };
+            let (low, high) = grid.bounds();
+            let corner = |i: usize| {
+                Point3::from(Vector3::from_fn(
+                    |k, _| if i >> k & 1 == 0 { low[k] } else { high[k] },
+                ))
+            };
+            let field = Arc::new(LinkField(Arc::clone(shape)));
+            world.add(Body::held(&robot.tree.links()[link].name).with_field(field));
+            states.push(State::at_rest(poses[link]));
+            let (shape, corners) = (Arc::clone(shape), std::array::from_fn(corner));
+            links.push(Solid { link, shape, corners, looked_at: None });
+        }
+        let object = world.add(Body::free("object", setup.body));
+        states.push(setup.body.at_rest(t_hand_object));
+        let joints = joints.to_vec();
+        let mut new = Self { setup, world, states, object, links, joints, poses, steps: 0 };
+        new.look_around()?;
+        for body in 0..object {
+            new.world.touch(object, body, Arc::new(setup.law), Onset::Hard)?;
+        }
+        Ok(new)
+    }
+
+    pub(super) fn joints(&self) -> &[f64] {
+        &self.joints
+    }
+
+    /// Pose of every link, hand frame.
+    pub(super) fn poses(&self) -> &[Isometry3<f64>] {
+        &self.poses
+    }
+
+    pub(super) fn t_hand_object(&self) -> Isometry3<f64> {
+        self.setup.body.model_pose(&self.states[self.object].pose)
+    }
+
+    /// Speed of the object's centre of mass \[m/s\] and its angular speed \[rad/s\].
+    pub(super) fn speed(&self) -> (f64, f64) {
+        let State { linear, angular, .. } = &self.states[self.object];
+        (linear.norm(), angular.norm())
+    }
+
+    /// One time step, during which the joints move by `change`.
+    pub(super) fn advance(
+        &mut self,
+        change: &[f64],
+        medium: Medium,
+    ) -> Result<(), SimulationError> {
+        let dt = self.setup.time_step;
+        self.joints.iter_mut().zip(change).for_each(|(q, d)| *q += d);
+        let poses = self.setup.robot.tree.forward_kinematics(&self.joints);
+        for (body, solid) in self.links.iter().enumerate() {
+            let (from, to) = (&self.poses[solid.link], &poses[solid.link]);
+            let turn = so3_log(&(to.rotation * from.rotation.inverse()));
+            self.states[body] = State {
+                pose: *to,
+                linear: (to.translation.vector - from.translation.vector) / dt,
+                angular: turn / dt,
+            };
+        }
+        self.poses = poses;
+        let state = self.states[self.object];
+        let mut load = Vector6::zeros();
+        self.world.gravity = Vector3::zeros();
+        match medium {
+            Medium::Gravity(gravity) => self.world.gravity = gravity,
+            Medium::Viscous => {
+                let rate = 1.0 / (self.setup.damping_time + dt);
+                let inertia = self.setup.body.world_inertia(&state.pose.rotation);
+                load.fixed_rows_mut::<3>(0)
+                    .copy_from(&(state.linear * (-rate * self.setup.body.mass())));
+                load.fixed_rows_mut::<3>(3).copy_from(&(inertia * state.angular * -rate));
+            }
+        }
+        self.world.bodies[self.object].load = load;
+        self.look_around()?;
+        self.states = self.stepped()?;
+        self.steps += 1;
+        Ok(())
+    }
+
+    /// The states one time step later: by the implicit equations as they are, or else with softer friction, or else by
+    /// explicit steps as short as those need. Newton's method may fail where many samples make or lose contact at once.
+    fn stepped(&mut self) -> Result<Vec<State>, SimulationError> {
+        let step = || Step { index: self.steps, dt: self.setup.time_step };
+        let implicit = SubStepped { integrator: BackwardEuler, most: PARTS };
+        let explicit = SubStepped { integrator: SemiImplicitEuler, most: EXPLICIT_PARTS };
+        let unsolved = |error: &SimulationError| matches!(error, SimulationError::Unsolved { .. });
+        match implicit.step(&self.world, &self.states, step()) {
+            Err(error) if unsolved(&error) => {}
+            done => return done,
+        }
+        let step = [step(), step()];
+        self.rub(self.setup.soft_law);
+        let [second, third] = step;
+        let solved = match implicit.step(&self.world, &self.states, second) {
+            Err(error) if unsolved(&error) => explicit.step(&self.world, &self.states, third),
+            done => done,
+        };
+        self.rub(self.setup.law);
+        solved
+    }
+
+    /// Lets all contacts follow `law`.
+    fn rub(&mut self, law: Penalty) {
+        let law: Arc<dyn LocalLaw> = Arc::new(law);
+        self.world.contacts.iter_mut().for_each(|pair| pair.law = Arc::clone(&law));
+    }
+
+    /// Keeps the samples that may touch before the next look.
+    fn look_around(&mut self) -> Result<(), SimulationError> {
+        let t_object_hand = self.t_hand_object().inverse();
+        let moved = |solid: &Solid| {
+            let now = t_object_hand * self.poses[solid.link];
+            solid.looked_at.is_none_or(|then| {
+                // Displacements are affine in the point: none within the box exceeds those of its corners.
+                solid.corners.iter().any(|c| (now * c - then * c).norm_squared() > MOVED * MOVED)
+            })
+        };
+        if !self.links.iter().any(moved) {
+            return Ok(());
+        }
+        for solid in &mut self.links {
+            solid.looked_at = Some(t_object_hand * self.poses[solid.link]);
+        }
+        let near = |sample: &&SurfacePoint| {
+            self.links.iter().any(|solid| {
+                let local = solid.looked_at.map(|t| t.inverse_transform_point(&sample.position));
+                let grid = solid.shape.grid();
+                let found = local.zip(grid).and_then(|(local, grid)| grid.sample(&local, NEAR));
+                found.is_some()
+            })
+        };
+        let mut kept: Vec<SurfacePoint> = self.setup.samples.iter().filter(near).copied().collect();
+        // A surface must not be empty.
+        if kept.is_empty() {
+            kept.extend(self.setup.samples.first());
+        }
+        let (points, areas): (Vec<_>, Vec<_>) = kept.iter().map(|s| (s.position, s.area)).unzip();
+        let surface = Surface::new(&points, &areas)
+            .map_err(|error| SimulationError::Body { body: "object".to_owned(), error })?;
+        self.world.bodies[self.object].surface = Some(Arc::new(surface));
+        Ok(())
+    }
+
+    /// All contacts, as the simulator has them.
+    pub(super) fn touches(&self) -> Vec<Touch> {
+        let state = &self.states[self.object];
+        let t_hand_object = self.t_hand_object();
+        let mut touches = Vec::new();
+        let Some(surface) = &self.world.bodies[self.object].surface else { return touches };
+        let law = &self.setup.law;
+        let stiffness = law.params()[0];
+        for sample in surface.points() {
+            let point = t_hand_object * sample.position;
+            let arm = point.coords - state.pose.translation.vector;
+            let velocity = state.linear + state.angular.cross(&arm);
+            for (body, solid) in self.links.iter().enumerate() {
+                let link = &self.states[body];
+                let local = link.pose.inverse_transform_point(&point);
+                let found = solid.shape.grid().and_then(|grid| grid.sample(&local, 0.0));
+                let Some(FieldSample { distance, gradient, .. }) = found else { continue };
+                let Some(normal) = gradient.try_normalize(1e-9) else { continue };
+                let normal = link.pose.rotation * normal;
+                let lever = point.coords - link.pose.translation.vector;
+                let relative = velocity - link.linear - link.angular.cross(&lever);
+                let normal_speed = relative.dot(&normal);
+                let slip = relative - normal * normal_speed;
+                let contact =
+                    Contact { gap: distance, normal_speed, slip, normal, area: sample.area };
+                let response = law.law(law.params(), &contact);
+                touches.push(Touch {
+                    link: solid.link,
+                    point,
+                    normal,
+                    force: normal * response.normal + response.tangential,
+                    stiffness: stiffness * sample.area,
+                });
+            }
+        }
+        touches
+    }
+}

@@ -1,0 +1,98 @@
+//! What taxels feel of the contacts.
+
+use nalgebra::{Isometry3, Point3, Vector3};
+
+use super::GraspError;
+use super::simulation::Touch;
+use crate::Robot;
+
+/// The taxels of a hand by link.
+pub(super) struct Skin {
+    by_link: Vec<Vec<Spot>>,
+    count: usize,
+    reach: f64,
+}
+
+struct Spot {
+    taxel: usize,
+    /// Link frame.
+    position: Point3<f64>,
+    normal: Vector3<f64>,
+}
+
+impl Skin {
+    pub(super) fn new(robot: &Robot, reach: f64) -> Result<Self, GraspError> {
+        let mut by_link: Vec<Vec<Spot>> = Vec::new();
+        by_link.resize_with(robot.tree.links().len(), Vec::new);
+        for (taxel, t) in robot.taxels.iter().enumerate() {
+            let link = robot.tree.link_index(&t.link);
+            let link = link.ok_or_else(|| GraspError::TaxelLink { link: t.link.clone() })?;
+            by_link[link].push(Spot { taxel, position: t.position, normal: t.normal });
+        }
+        Ok(Self { by_link, count: robot.taxels.len(), reach })
+    }
+
+    /// Force of the object on each taxel, in the frame of its link \[N\].
+    ///
+    /// Each contact spreads over the taxels of its link within reach r, by weights (1 − (d/r)²)²·(n·n_t)⁺ that sum to one;
+    /// d is the distance, n the normal of the contact and n_t that of the taxel. Where there is none it is not felt.
+    pub(super) fn forces(&self, touches: &[Touch], poses: &[Isometry3<f64>]) -> Vec<Vector3<f64>> {
+        let mut forces = vec![Vector3::zeros(); self.count];
+        let mut weights: Vec<(usize, f64)> = Vec::new();
+        for touch in touches {
+            let pose = &poses[touch.link];
+            let point = pose.inverse_transform_point(&touch.point);
+            let normal = pose.rotation.inverse() * touch.normal;
+            weights.clear();
+            for spot in &self.by_link[touch.link] {
+                let nearness =
+                    1.0 - (spot.position - point).norm_squared() / (self.reach * self.reach);
+                let facing = spot.normal.dot(&normal);
+                if nearness > 0.0 && facing > 0.0 {
+                    weights.push((spot.taxel, nearness * nearness * facing));
+                }
+            }
+            let sum: f64 = weights.iter().map(|(_, w)| w).sum();
+            let force = pose.rotation.inverse() * -touch.force;
+            for (taxel, weight) in &weights {
+                forces[*taxel] += force * (weight / sum);
+            }
+        }
+        forces
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use prehend_geometry::hand::{allegro_xela_urdf, taxels};
+    use prehend_geometry::robot::Robot as Tree;
+
+    use super::*;
+
+    #[test]
+    fn contacts_on_pads_are_felt_whole_and_others_not_at_all() {
+        let tree = Tree::from_urdf_str(&allegro_xela_urdf(), None).unwrap();
+        let robot = Robot::new(tree, taxels()).unwrap();
+        let skin = Skin::new(&robot, 8e-3).unwrap();
+        let poses = robot.tree.forward_kinematics(&[0.3; 16]);
+        let link = robot.tree.link_index("link_2.0").unwrap();
+        let t = &poses[link];
+        let taxel = robot.taxels.iter().find(|t| t.link == "link_2.0").unwrap();
+        let touch = |offset: f64, normal: Vector3<f64>| Touch {
+            link,
+            point: t * (taxel.position + taxel.normal * offset),
+            normal: t.rotation * normal,
+            force: t.rotation * Vector3::new(1.0, 0.2, -0.3),
+            stiffness: 1.0,
+        };
+        let felt = skin.forces(&[touch(1e-3, taxel.normal)], &poses);
+        let sum: Vector3<f64> = felt.iter().sum();
+        assert!((sum - Vector3::new(-1.0, -0.2, 0.3)).norm() < 1e-12);
+        assert!(felt.iter().filter(|f| f.norm() > 0.0).count() > 3);
+        let largest = (0..368).max_by(|&a, &b| felt[a].norm().total_cmp(&felt[b].norm()));
+        assert_eq!(largest, Some(taxel.index));
+        for unfelt in [touch(9e-3, taxel.normal), touch(0.0, -taxel.normal)] {
+            assert!(skin.forces(&[unfelt], &poses).iter().all(|f| *f == Vector3::zeros()));
+        }
+    }
+}
