@@ -102,8 +102,8 @@ fn check_draws_every_pose_and_warns() {
     });
     place.replace(
         "ds/test/000001/scene_camera.json",
-        "\"depth_scale\": 0.1",
-        "\"depth_scale\": 100",
+        "\"depth_scale\":0.1",
+        "\"depth_scale\":100",
     );
     let said = place.prehend("check --dataset ds --poses ds/init.csv --report look");
     assert_eq!(said.code, 0, "{}", said.err);
