@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -80,7 +79,9 @@ where
     settle(dir, hand, subjects, settings)?;
     hand.write(dir)?;
     write_both_models(dir, subjects, settings)?;
-    ["", "hand", "models", "models_eval"].map(|f| sweep(&dir.join(f))).into_iter().collect::<Result<(), _>>()?;
+    for folder in ["", "hand", "models", "models_eval"] {
+        sweep(&dir.join(folder))?;
+    }
     let mut made = Made::default();
     for subject in subjects {
         let scene = Scene { dir: scene_dir(dir, subject), hand, subject, settings };
@@ -141,23 +142,22 @@ fn write_both_models(
 }
 
 /// A scene in the making.
-struct Scene<'a> {
+struct Scene<'a, 's> {
     dir: PathBuf,
     hand: &'a HandFiles,
-    subject: &'a Subject,
+    subject: &'s Subject,
     settings: &'a SynthSettings,
 }
 
-impl<'a> Scene<'a> {
+impl<'s> Scene<'_, 's> {
     /// Makes what is missing; returns the grasps that could not be made.
-    fn complete<'s, G>(
+    fn complete<G>(
         &self,
         prepare: &impl Fn(&'s Subject) -> Result<G, String>,
         progress: &(dyn Fn(u64) + Sync),
     ) -> Result<Vec<GraspFailure>, SynthError>
     where
         G: Fn(u64) -> Result<Vec<Moment>, String> + Sync,
-        'a: 's,
     {
         remove(&self.dir.join(SPENT_JOURNAL))?;
         let journal = self.dir.join(JOURNAL);
@@ -175,9 +175,9 @@ impl<'a> Scene<'a> {
         progress(all - missing.values().map(|ids| ids.len() as u64).sum::<u64>());
         let mut failures = Vec::new();
         if !missing.is_empty() {
-            let subject: &'s Subject = self.subject;
-            let source = prepare(subject)
-                .map_err(|reason| SynthError::Object { obj_id: subject.obj_id, reason })?;
+            let obj_id = self.subject.obj_id;
+            let source =
+                prepare(self.subject).map_err(|reason| SynthError::Object { obj_id, reason })?;
             let attempts: Vec<Result<Option<GraspFailure>, SynthError>> = missing
                 .into_par_iter()
                 .map(|(grasp, images)| self.grasp(&source, grasp, images, progress))
@@ -319,7 +319,7 @@ fn initial_poses(
     purpose: Use,
     level: InitialNoise,
 ) -> Result<Vec<ResultRow>, SynthError> {
-    let dataset = Arc::new(Dataset::open_split(dir, "test")?);
+    let dataset = Dataset::open_split(dir, "test")?;
     let truth = GroundTruth::new(&dataset);
     let mut order: Vec<&Subject> = subjects.iter().collect();
     order.sort_by_key(|s| s.obj_id);

@@ -8,6 +8,7 @@ mod outcome;
 mod output;
 mod progress;
 mod refine;
+mod synth;
 
 use std::process::ExitCode;
 
@@ -50,6 +51,11 @@ enum Command {
     Eval(eval::Arguments),
     /// Draw poses over their images, and warn about units and frames, before refining anything
     Check(check::Arguments),
+    /// Make a dataset of objects in a hand: images, touch and truth
+    ///
+    /// Interrupted at any moment and run again with the same options, it goes on with what is missing; the files are
+    /// the same in the end.
+    Synth(Box<synth::Arguments>),
 }
 
 fn main() -> ExitCode {
@@ -65,6 +71,7 @@ fn main() -> ExitCode {
         Command::Refine(arguments) => refine::run(&arguments),
         Command::Eval(arguments) => eval::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
+        Command::Synth(arguments) => synth::run(&arguments),
     };
     match outcome {
         Ok(outcome) => outcome.exit_code(),

@@ -59,9 +59,9 @@ impl LightSettings {
     fn lamp(&self, index: u32, up: &Vector3<f64>, noise: &mut SplitMix64) -> Lamp {
         let spread = Vector3::from_fn(|_, _| noise.normal());
         // Mostly from above and from the camera's side, so that what is seen is lit.
-        let towards = (spread.normalize() + 0.7 * up - 0.7 * Vector3::z()).normalize().cast();
+        let towards = spread.normalize() + up * 0.7 - Vector3::z() * 0.7;
         let strength = if index == 0 { 1.0 } else { 0.2 + 0.4 * noise.unit() };
-        Lamp { towards, strength: self.tinted(strength, noise) }
+        Lamp { towards: towards.normalize().cast(), strength: self.tinted(strength, noise) }
     }
 
     fn tinted(&self, strength: f64, noise: &mut SplitMix64) -> [f32; 3] {

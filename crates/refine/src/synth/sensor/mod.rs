@@ -20,7 +20,7 @@ pub use deformation::ModelSettings;
 pub use depth::DepthSettings;
 pub use light::LightSettings;
 pub use mask::MaskSettings;
-pub(super) use rig::{Rig, Shot};
+pub(super) use rig::Rig;
 pub use settings::{SensorSettings, SettingError};
 pub use touch::TouchSettings;
 pub use viewpoint::ViewpointSettings;
