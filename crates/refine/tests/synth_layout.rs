@@ -22,7 +22,14 @@ fn subject() -> Subject {
 }
 
 fn settings(sensor: SensorSettings) -> SynthSettings {
-    SynthSettings { frames: 3, frames_per_grasp: 2, width: 320, height: 240, sensor, ..Default::default() }
+    SynthSettings {
+        frames: 3,
+        frames_per_grasp: 2,
+        width: 320,
+        height: 240,
+        sensor,
+        ..Default::default()
+    }
 }
 
 fn make(
@@ -105,7 +112,10 @@ fn inspect(root: &Path, rgb: &str, exact: bool) {
     let size = models["5"]["size_z"].as_f64().unwrap();
     // The bottle is 192 mm high.
     assert!((185.0..200.0).contains(&size), "{size}");
-    assert!(root.join("models/obj_000005.ply").is_file() && root.join("models/obj_000005.png").is_file());
+    assert!(
+        root.join("models/obj_000005.ply").is_file()
+            && root.join("models/obj_000005.png").is_file()
+    );
     let table = fs::read_to_string(root.join("hand/taxels.csv")).unwrap();
     let taxels = table.lines().count() - 1;
     for im_id in 0..3 {
@@ -125,7 +135,8 @@ fn inspect(root: &Path, rgb: &str, exact: bool) {
 
         let color = image::open(image("rgb", rgb)).unwrap();
         assert_eq!(color.dimensions(), (320, 240));
-        let (whole, told) = (mask(image("mask", "_000000.png")), mask(image("mask_visib", "_000000.png")));
+        let (whole, told) =
+            (mask(image("mask", "_000000.png")), mask(image("mask_visib", "_000000.png")));
         let depth = match image::open(image("depth", ".png")).unwrap() {
             image::DynamicImage::ImageLuma16(image) => image,
             other => panic!("{:?}", other.color()),
@@ -223,9 +234,7 @@ fn interrupted_datasets_end_as_others_do() {
     // Breaks off after the first frame, as a process that is killed would.
     let interrupted = std::panic::catch_unwind(|| {
         let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-        one.install(|| {
-            make(broken.path(), &settings, &|done| assert_eq!(done, 0, "interrupted"))
-        })
+        one.install(|| make(broken.path(), &settings, &|done| assert_eq!(done, 0, "interrupted")))
     });
     assert!(interrupted.is_err());
     let before = tree(broken.path());

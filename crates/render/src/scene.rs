@@ -44,9 +44,14 @@ pub fn render_scene(
     background: [f32; 3],
     samples: usize,
 ) -> SceneImage {
-    compose(camera, objects, light, samples, |_, _| background, |_, scene, face, x, y| {
-        scene.color(face, x, y)
-    })
+    compose(
+        camera,
+        objects,
+        light,
+        samples,
+        |_, _| background,
+        |_, scene, face, x, y| scene.color(face, x, y),
+    )
 }
 
 /// Like [`render_scene`], with a colour of one's own for every visible point and every pixel behind.

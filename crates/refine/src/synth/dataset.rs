@@ -83,11 +83,11 @@ fn silhouette(scene: &Scene) -> Mask {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::fs;
     use crate::bop::{Dataset, GroundTruth, read_results};
     use crate::synth::default_scene;
     use crate::{Assets, TermKind};
     use nalgebra::Isometry3;
+    use std::fs;
 
     fn near(a: &Isometry3<f64>, b: &Isometry3<f64>) -> bool {
         (a.translation.vector - b.translation.vector).norm() < 1e-12

@@ -65,10 +65,7 @@ impl Recorded<'_> {
         let told = self.told;
         let mut entries = vec![
             ("scene_gt.json", annotation::truth(self.obj_id, self.truth)),
-            (
-                "scene_gt_info.json",
-                annotation::visibility(self.visible, self.whole, &told.depth),
-            ),
+            ("scene_gt_info.json", annotation::visibility(self.visible, self.whole, &told.depth)),
             ("scene_camera.json", annotation::camera(&told.camera, self.world)),
         ];
         let gravity = told.gravity.unwrap_or_default();

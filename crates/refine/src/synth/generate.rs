@@ -305,8 +305,9 @@ impl<'s> Scene<'_, 's> {
         match fs::read(&file) {
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(Vec::new()),
             Err(e) => Err(DatasetError::reading(&file, &e).into()),
-            Ok(bytes) => Ok(serde_json::from_slice(&bytes)
-                .map_err(|e| DatasetError::malformed(&file, e))?),
+            Ok(bytes) => {
+                Ok(serde_json::from_slice(&bytes).map_err(|e| DatasetError::malformed(&file, e))?)
+            }
         }
     }
 }

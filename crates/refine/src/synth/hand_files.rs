@@ -142,7 +142,8 @@ mod tests {
         let file = dir.path().join("some.urdf");
         fs::write(&file, urdf).unwrap();
         let table = dir.path().join("t.csv");
-        fs::write(&table, "idx,patch,link,x_m,y_m,z_m,nx,ny,nz\n0,a,palm,0,0,0.015,0,0,1\n").unwrap();
+        fs::write(&table, "idx,patch,link,x_m,y_m,z_m,nx,ny,nz\n0,a,palm,0,0,0.015,0,0,1\n")
+            .unwrap();
         let hand = HandFiles::load(&file, Some(&table)).unwrap();
         let out = dir.path().join("out");
         hand.write(&out).unwrap();

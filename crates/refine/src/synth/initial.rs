@@ -43,7 +43,9 @@ mod tests {
         let truth = Isometry3::translation(0.1, -0.1, 0.5);
         let centre = Point3::new(0.1, -0.1, 0.5);
         let mut noise = SplitMix64::new(1);
-        for (level, cm, degrees) in [(InitialNoise::LOW, 0.65, 6.98), (InitialNoise::HIGH, 2.21, 15.25)] {
+        for (level, cm, degrees) in
+            [(InitialNoise::LOW, 0.65, 6.98), (InitialNoise::HIGH, 2.21, 15.25)]
+        {
             let (mut moved, mut turned) = (0.0, 0.0);
             for _ in 0..4000 {
                 let pose = level.perturb(&truth, &centre, &mut noise);

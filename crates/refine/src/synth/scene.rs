@@ -50,12 +50,8 @@ pub fn default_scene(seed: u64) -> Result<Scene, AssetError> {
     let robot = Robot::new(tree, taxels())?;
 
     let camera = Camera { fx: 580.0, fy: 580.0, cx: 319.5, cy: 239.5, width: 640, height: 480 };
-    let t_cam_hand = look_at(
-        &Point3::new(0.42, 0.12, 0.24),
-        &Point3::new(0.04, 0.02, 0.03),
-        &Vector3::z(),
-        0.0,
-    );
+    let t_cam_hand =
+        look_at(&Point3::new(0.42, 0.12, 0.24), &Point3::new(0.04, 0.02, 0.03), &Vector3::z(), 0.0);
     let truth = t_cam_hand * grasp.t_base_object;
     let mut noise = SplitMix64::new(seed);
     let (color, depth, mask) =

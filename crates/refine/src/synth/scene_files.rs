@@ -72,8 +72,10 @@ mod tests {
     fn files_are_json_with_a_line_an_image() {
         let dir = tempfile::tempdir().unwrap();
         let mut files = SceneFiles::default();
-        let entries =
-            vec![("scene_gt.json", "[{\"a\":1}]".to_owned()), ("scene_camera.json", "{}".to_owned())];
+        let entries = vec![
+            ("scene_gt.json", "[{\"a\":1}]".to_owned()),
+            ("scene_camera.json", "{}".to_owned()),
+        ];
         assert_eq!(from_text(&to_text(&entries)), Some(entries.clone()));
         assert_eq!(from_text("other.json\t{}"), None);
         files.add(9, &entries);

@@ -26,7 +26,12 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = "Objects and hand")]
     objects: Option<Vec<String>>,
     /// Instead of built-in objects, a closed mesh (PLY, OBJ, STL, glTF); may be repeated, numbered from 1
-    #[arg(long, value_name = "FILE", conflicts_with = "objects", help_heading = "Objects and hand")]
+    #[arg(
+        long,
+        value_name = "FILE",
+        conflicts_with = "objects",
+        help_heading = "Objects and hand"
+    )]
     mesh: Vec<PathBuf>,
     /// Unit of the meshes
     #[arg(long, value_name = "UNIT", default_value = "m", help_heading = "Objects and hand")]
@@ -162,8 +167,7 @@ fn subjects(arguments: &Arguments) -> anyhow::Result<Vec<Subject>> {
     chosen
         .into_iter()
         .map(|object| {
-            let prepared =
-                Object::with_mass(object.name(), object.mesh(), Some(object.mass()), 0)?;
+            let prepared = Object::with_mass(object.name(), object.mesh(), Some(object.mass()), 0)?;
             Ok(Subject { obj_id: object.bop_id(), object: prepared })
         })
         .collect()
@@ -183,8 +187,8 @@ fn own(obj_id: u32, file: &Path, unit: Unit, mass: Option<f64>) -> anyhow::Resul
         Unit::Mm => mesh.scaled(1e-3),
     };
     let name = file.file_stem().unwrap_or_default().to_string_lossy();
-    let object = Object::with_mass(&name, mesh, mass, 0)
-        .with_context(|| file.display().to_string())?;
+    let object =
+        Object::with_mass(&name, mesh, mass, 0).with_context(|| file.display().to_string())?;
     let size = 2.0 * object.radius;
     if !(5e-3..1.0).contains(&size) {
         bail!("{}: is {size:.3e} m across: see --mesh-unit", file.display());

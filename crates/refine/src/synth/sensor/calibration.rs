@@ -100,8 +100,7 @@ mod tests {
     #[test]
     fn errors_are_as_large_as_asked_for() {
         let (settings, mut noise) = (CalibrationSettings::realistic(), SplitMix64::new(13));
-        let camera =
-            Camera { fx: 580.0, fy: 580.0, cx: 319.5, cy: 239.5, width: 640, height: 480 };
+        let camera = Camera { fx: 580.0, fy: 580.0, cx: 319.5, cy: 239.5, width: 640, height: 480 };
         let place = Isometry3::translation(0.1, 0.2, 0.5);
         let count = 400.0;
         let mut squares = [0.0; 6];

@@ -48,9 +48,8 @@ impl ColourSettings {
     /// The picture that the camera takes.
     pub(super) fn expose(&self, truth: &RgbImage, noise: &mut SplitMix64) -> RgbImage {
         let exposure = (self.exposure * noise.normal()).exp2();
-        let gain = [0; 3].map(|_| {
-            (exposure * (1.0 + self.white_balance * noise.normal()).max(0.1)) as f32
-        });
+        let gain = [0; 3]
+            .map(|_| (exposure * (1.0 + self.white_balance * noise.normal()).max(0.1)) as f32);
         let mut picture = blurred(truth, self.blur * (0.4 + 0.6 * noise.unit()));
         let (dark, shot) = ((self.noise * self.noise) as f32, self.shot_noise as f32);
         let noisy = dark > 0.0 || shot > 0.0;
@@ -87,8 +86,7 @@ fn blurred(image: &RgbImage, sigma: f64) -> RgbImage {
     let mut down = RgbImage::filled(width, height, [0.0; 3]);
     for (y, target) in down.pixels_mut().chunks_mut(width.max(1)).enumerate() {
         for (x, value) in target.iter_mut().enumerate() {
-            *value =
-                mean(&weights, |d, far| across.pixels()[shift(y, d, far, height) * width + x]);
+            *value = mean(&weights, |d, far| across.pixels()[shift(y, d, far, height) * width + x]);
         }
     }
     down

@@ -322,7 +322,8 @@ mod tests {
         let holes = measured(&DepthSettings { hole_share: 0.05, ..without() });
         let share = holes.pixels().iter().filter(|z| **z == 0.0).count() as f64 / 76800.0;
         assert!((0.025..0.1).contains(&share), "{share}");
-        let settings = DepthSettings { baseline: 0.05, disparity_step: 0.5, ..DepthSettings::clean() };
+        let settings =
+            DepthSettings { baseline: 0.05, disparity_step: 0.5, ..DepthSettings::clean() };
         let seen = measured(&settings);
         let disparity = 0.906 * 320.0 * 0.05;
         for z in seen.pixels().iter().filter(|z| **z > 0.0) {

@@ -110,10 +110,8 @@ impl<'a> Rig<'a> {
         let (width, height) = (self.camera.width, self.camera.height);
         let lights = self.settings.light.draw(bodies, &-gravity, noise);
         let (wall, behind) = self.settings.background.draw(&self.camera, noise);
-        let drawn: Vec<_> = bodies
-            .iter()
-            .map(|(model, pose)| SceneObject { model, t_cam_model: *pose })
-            .collect();
+        let drawn: Vec<_> =
+            bodies.iter().map(|(model, pose)| SceneObject { model, t_cam_model: *pose }).collect();
         let shade = |body: usize, point: &SurfacePoint<f32>| {
             let albedo = if body == 0 { point.albedo } else { self.paint.of(body) };
             lights.shade(point, albedo)
@@ -166,9 +164,7 @@ impl Paint {
 
 /// Whether each of the robot's joints is prismatic.
 fn slides(robot: &Robot) -> Vec<bool> {
-    let moved_by = |variable: usize| {
-        move |drive: &Drive| matches!(drive, Drive::Variable { index, .. } if *index == variable)
-    };
+    let moved_by = |variable: usize| move |drive: &Drive| matches!(drive, Drive::Variable { index, .. } if *index == variable);
     let prismatic = |variable: usize| {
         let mut joints = robot.tree.joints().iter();
         joints.any(|j| j.motion == Motion::Prismatic && moved_by(variable)(&j.drive))

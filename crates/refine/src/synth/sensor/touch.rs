@@ -89,7 +89,9 @@ impl TouchSettings {
             if felt.norm() < self.threshold {
                 return Vector3::zeros();
             }
-            let step = |v: f64| if self.quantum > 0.0 { (v / self.quantum).round() * self.quantum } else { v };
+            let step = |v: f64| {
+                if self.quantum > 0.0 { (v / self.quantum).round() * self.quantum } else { v }
+            };
             // Adding zero makes the negative zero a positive one.
             felt.map(|v| step(v).clamp(-self.limit, self.limit) / UNITS_PER_NEWTON + 0.0)
         };
