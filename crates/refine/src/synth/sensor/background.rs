@@ -26,7 +26,7 @@ impl BackgroundSettings {
     }
 
     pub(super) fn realistic() -> Self {
-        Self { distance: 1.4, slope: 0.3, things: 14, pattern: 0.06 }
+        Self { distance: 1.4, slope: 0.3, things: 14, pattern: 0.04 }
     }
 
     /// Colour and depth of a random room without the hand.
@@ -71,7 +71,7 @@ impl BackgroundSettings {
 /// A dull colour.
 fn muted(noise: &mut SplitMix64) -> [f32; 3] {
     let grey = 0.1 + 0.6 * noise.unit();
-    [0; 3].map(|_| (grey + 0.1 * noise.normal()).clamp(0.02, 0.95) as f32)
+    [0; 3].map(|_| (grey + 0.05 * noise.normal()).clamp(0.02, 0.95) as f32)
 }
 
 /// A rounded box that stands somewhere.
@@ -92,7 +92,7 @@ impl Thing {
         let half = [0; 2].map(|_| (width * (0.03 + 0.12 * noise.unit())) as f32);
         let angle = (std::f64::consts::PI * noise.unit()) as f32;
         let power = if noise.unit() < 0.3 { 2 } else { 8 };
-        let color = muted(noise).map(|c| (c + 0.15 * noise.normal() as f32).clamp(0.0, 1.0));
+        let color = muted(noise).map(|c| (c + 0.07 * noise.normal() as f32).clamp(0.0, 1.0));
         Self { centre, half, turn: [angle.cos(), angle.sin()], power, color, depth }
     }
 

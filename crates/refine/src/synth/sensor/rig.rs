@@ -150,7 +150,7 @@ struct Paint {
 impl Paint {
     /// Black anodised metal, grey plastic and black rubber, each a little different every time.
     fn random(noise: &mut SplitMix64) -> Self {
-        let tones = [[0.16, 0.17, 0.19], [0.34, 0.35, 0.36], [0.10, 0.10, 0.11]].map(|tone| {
+        let tones = [[0.21, 0.22, 0.24], [0.42, 0.43, 0.44], [0.14, 0.14, 0.15]].map(|tone| {
             let lighter = 0.8 + 0.5 * noise.unit() as f32;
             tone.map(|v: f32| v * lighter)
         });
