@@ -3,7 +3,7 @@
 use std::num::{NonZeroU32, NonZeroUsize};
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, bail};
+use anyhow::{Context, anyhow, bail};
 use clap::{Args, ValueEnum};
 use prehend_geometry::TriMesh;
 use prehend_geometry::objects::YcbObject;
@@ -142,7 +142,7 @@ fn sensors(given: &[String]) -> anyhow::Result<SensorSettings> {
         }
     }
     for (key, value) in given.iter().filter_map(|word| word.split_once('=')) {
-        settings.set(key.trim(), value.trim()).with_context(|| format!("--sensor {key}"))?;
+        settings.set(key.trim(), value.trim())?;
     }
     Ok(settings)
 }
@@ -188,7 +188,7 @@ fn own(obj_id: u32, file: &Path, unit: Unit, mass: Option<f64>) -> anyhow::Resul
     };
     let name = file.file_stem().unwrap_or_default().to_string_lossy();
     let object =
-        Object::with_mass(&name, mesh, mass, 0).with_context(|| file.display().to_string())?;
+        Object::with_mass(&name, mesh, mass, 0).map_err(|e| anyhow!("{}: {e}", file.display()))?;
     let size = 2.0 * object.radius;
     if !(5e-3..1.0).contains(&size) {
         bail!("{}: is {size:.3e} m across: see --mesh-unit", file.display());

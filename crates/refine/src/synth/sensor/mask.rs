@@ -45,12 +45,13 @@ impl MaskSettings {
         let outside = distance_to(visible, true, reach);
         let inside = distance_to(visible, false, reach);
         for (i, set) in mask.pixels_mut().iter_mut().enumerate() {
-            let signed = outside[i] - inside[i];
+            // The outline runs half a pixel from the centres beside it.
+            let signed = if *set { 0.5 - inside[i] } else { outside[i] - 0.5 };
             let mut border = self.wobble as f32 * wobble[i];
             if hand.pixels()[i] && leaks[i] > limit {
                 border += self.leak as f32 * ((leaks[i] - limit) / 0.5).min(1.0);
             }
-            *set = signed < border + 0.5;
+            *set = signed < border;
         }
         mask
     }
