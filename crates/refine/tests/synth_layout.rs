@@ -1,5 +1,7 @@
 //! Datasets of `synth` as an independent reader sees them: raw JSON and images, without this crate's reader.
 
+#![allow(clippy::unwrap_used)] // A test that panics has failed, in its helpers too.
+
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
