@@ -158,10 +158,29 @@ impl RgbImage {
     /// # Errors
     /// When the format is unknown or the file cannot be written.
     pub fn save(&self, path: &Path) -> Result<(), ImageError> {
-        let byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0).round() as u8;
-        let bytes = self.pixels.iter().flat_map(|p| p.map(byte)).collect();
-        let image = image::RgbImage::from_raw(self.width as u32, self.height as u32, bytes);
+        let image =
+            image::RgbImage::from_raw(self.width as u32, self.height as u32, self.to_bytes());
         encode(path, image.map(DynamicImage::ImageRgb8))
+    }
+
+    /// Writes 8 bits a channel as JPEG of quality `quality` (1..=100, clamped); values are clamped to 0..=1. The file
+    /// appears whole or not at all.
+    ///
+    /// # Errors
+    /// When the file cannot be written.
+    pub fn save_jpeg(&self, path: &Path, quality: u8) -> Result<(), ImageError> {
+        let (width, height) = (self.width as u32, self.height as u32);
+        let mut bytes = Vec::new();
+        image::codecs::jpeg::JpegEncoder::new_with_quality(&mut bytes, quality.clamp(1, 100))
+            .encode(&self.to_bytes(), width, height, image::ExtendedColorType::Rgb8)
+            .map_err(|source| ImageError::Codec { path: path.into(), source })?;
+        write_whole(path, &bytes).map_err(|source| ImageError::Io { path: path.into(), source })
+    }
+
+    /// Three bytes a pixel.
+    fn to_bytes(&self) -> Vec<u8> {
+        let byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0).round() as u8;
+        self.pixels.iter().flat_map(|p| p.map(byte)).collect()
     }
 
     /// The mean of every block of `factor` by `factor` pixels.

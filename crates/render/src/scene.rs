@@ -1,6 +1,7 @@
 //! Antialiased pictures of several lit bodies.
 
 use nalgebra::{Isometry3, Vector3};
+use rayon::prelude::*;
 
 use crate::camera::Camera;
 use crate::contour::{Lighting, Scene};
@@ -8,7 +9,9 @@ use crate::image::{DepthImage, RgbImage};
 use crate::light::Light;
 use crate::model::RenderModel;
 use crate::posed::Posed;
+use crate::projected::Region;
 use crate::raster::{MISS, rasterise};
+use crate::shading::SurfacePoint;
 
 /// A body of a picture.
 #[derive(Clone, Copy, Debug)]
@@ -41,43 +44,165 @@ pub fn render_scene(
     background: [f32; 3],
     samples: usize,
 ) -> SceneImage {
-    let samples = samples.max(1) | 1;
-    let fine = camera.scaled(samples as f64);
-    let (width, height) = (camera.width * samples, camera.height * samples);
-    let mut color = RgbImage::filled(width, height, background);
-    let mut inverse = vec![0.0f32; width * height];
-    let mut object = vec![None; width * height];
-    for (index, body) in objects.iter().enumerate() {
-        // Mip levels follow the picture's own pixels: finer ones would only be averaged again.
-        let posed = Posed::new(body.model, &fine, &body.t_cam_model, 0.0);
-        let lighting = Lighting::new(light, &posed.rotation);
-        let twist_center = Vector3::zeros();
-        let scene = Scene { posed, lighting, half_width: 1.0, twist_center };
+    compose(
+        camera,
+        objects,
+        light,
+        samples,
+        |_, _| background,
+        |_, scene, face, x, y| scene.color(face, x, y),
+    )
+}
+
+/// Like [`render_scene`], with a colour of one's own for every visible point and every pixel behind.
+///
+/// `shade` gets the index of the body and the point with its unlit colour; `background` the column and row of a pixel.
+///
+/// ```
+/// use nalgebra::{Isometry3, Vector3};
+/// use prehend_render::{Camera, RenderModel, SceneObject, render_shaded};
+///
+/// let cube = prehend_geometry::shapes::cuboid(Vector3::repeat(0.1));
+/// let model = RenderModel::new(&cube)?;
+/// let camera = Camera { fx: 60.0, fy: 60.0, cx: 15.5, cy: 15.5, width: 32, height: 32 };
+/// let body = SceneObject { model: &model, t_cam_model: Isometry3::translation(0.0, 0.0, 0.5) };
+/// // Normals as colours, over a picture that darkens downwards.
+/// let picture = render_shaded(
+///     &camera,
+///     &[body],
+///     3,
+///     |_, point| [0, 1, 2].map(|k| 0.5 - 0.5 * point.normal[k]),
+///     |_, y| [1.0 - y as f32 / 31.0; 3],
+/// );
+/// assert!((picture.color.get(15, 15).unwrap()[2] - 1.0).abs() < 1e-6);
+/// assert_eq!(picture.color.get(0, 31), Some([0.0; 3]));
+/// # Ok::<(), prehend_render::ModelError>(())
+/// ```
+pub fn render_shaded(
+    camera: &Camera,
+    objects: &[SceneObject],
+    samples: usize,
+    shade: impl Fn(usize, &SurfacePoint<f32>) -> [f32; 3] + Sync,
+    background: impl Fn(usize, usize) -> [f32; 3] + Sync,
+) -> SceneImage {
+    let dark = Light::ambient(0.0);
+    compose(camera, objects, &dark, samples, background, |body, scene, face, x, y| {
+        shade(body, &scene.point(face, x, y))
+    })
+}
+
+/// Nearest face of each sample.
+struct Nearest {
+    /// The samples looked at: whole pixels.
+    region: Region,
+    inverse_z: Vec<f32>,
+    body: Vec<u32>,
+    face: Vec<u32>,
+}
+
+impl Nearest {
+    fn new(scenes: &[Scene], samples: usize) -> Self {
+        let all = scenes.iter().map(|s| s.posed.projected.region);
+        let Region { x0, y0, x1, y1 } = all.fold(Region::EMPTY, |a, b| a.union(&b));
+        let pixels = Region {
+            x0: x0 / samples,
+            y0: y0 / samples,
+            x1: x1.div_ceil(samples),
+            y1: y1.div_ceil(samples),
+        };
+        let region = pixels.scaled(samples);
+        let count = region.width() * (region.y1 - region.y0);
+        let (body, face) = (vec![0; count], vec![MISS; count]);
+        let mut nearest = Self { region, inverse_z: vec![0.0; count], body, face };
+        for (index, scene) in scenes.iter().enumerate() {
+            nearest.draw(index as u32, scene);
+        }
+        nearest
+    }
+
+    fn draw(&mut self, index: u32, scene: &Scene) {
+        let width = self.region.width();
         for part in rasterise(&scene.posed.projected, &scene.posed.projected.region) {
-            for (i, &face) in part.face.iter().enumerate() {
+            for (i, &face) in part.face.iter().enumerate().filter(|(_, face)| **face != MISS) {
                 let (x, y) = part.position(i);
-                let at = y * width + x;
-                if face == MISS || part.inverse_z[i] <= inverse[at] {
-                    continue;
+                let at = (y - self.region.y0) * width + x - self.region.x0;
+                if part.inverse_z[i] > self.inverse_z[at] {
+                    self.inverse_z[at] = part.inverse_z[i];
+                    self.body[at] = index;
+                    self.face[at] = face;
                 }
-                inverse[at] = part.inverse_z[i];
-                object[at] = Some(index as u32);
-                color.pixels_mut()[at] = scene.color(face, x as f32, y as f32);
             }
         }
     }
-    let middle = samples / 2;
-    let center = |at: usize| {
-        let (x, y) = (at % camera.width, at / camera.width);
-        (y * samples + middle) * width + x * samples + middle
+}
+
+fn in_view<'a>(body: &SceneObject<'a>, fine: &Camera, light: &Light) -> Scene<'a> {
+    // Mip levels follow the picture's own pixels: finer ones would only be averaged again.
+    let posed = Posed::new(body.model, fine, &body.t_cam_model, 0.0);
+    let lighting = Lighting::new(light, &posed.rotation);
+    Scene { posed, lighting, half_width: 1.0, twist_center: Vector3::zeros() }
+}
+
+fn compose(
+    camera: &Camera,
+    objects: &[SceneObject],
+    light: &Light,
+    samples: usize,
+    background: impl Fn(usize, usize) -> [f32; 3] + Sync,
+    color: impl Fn(usize, &Scene, u32, f32, f32) -> [f32; 3] + Sync,
+) -> SceneImage {
+    let samples = samples.max(1) | 1;
+    let fine = camera.scaled(samples as f64);
+    let scenes: Vec<Scene> = objects.iter().map(|body| in_view(body, &fine, light)).collect();
+    let nearest = Nearest::new(&scenes, samples);
+    let Region { x0, y0, x1, y1 } = nearest.region;
+    let (inside_x, inside_y) = (x0 / samples..x1 / samples, y0 / samples..y1 / samples);
+    let pixel = |x: usize, y: usize| {
+        let behind = background(x, y);
+        if !(inside_x.contains(&x) && inside_y.contains(&y)) {
+            return (behind, 0.0, None);
+        }
+        let at = |sx: usize, sy: usize| {
+            (y * samples + sy - y0) * nearest.region.width() + x * samples + sx - x0
+        };
+        let mut sum = [0.0f32; 3];
+        for sy in 0..samples {
+            for sx in 0..samples {
+                let i = at(sx, sy);
+                let (u, v) = ((x * samples + sx) as f32, (y * samples + sy) as f32);
+                let seen = match nearest.face[i] {
+                    MISS => behind,
+                    face => {
+                        let body = nearest.body[i] as usize;
+                        color(body, &scenes[body], face, u, v)
+                    }
+                };
+                (0..3).for_each(|c| sum[c] += seen[c]);
+            }
+        }
+        let middle = at(samples / 2, samples / 2);
+        let hit = nearest.face[middle] != MISS;
+        let z = if hit { 1.0 / nearest.inverse_z[middle] } else { 0.0 };
+        let mean = sum.map(|s| s / (samples * samples) as f32);
+        (mean, z, hit.then(|| nearest.body[middle]))
     };
-    let mut depth = DepthImage::filled(camera.width, camera.height, 0.0);
-    for (at, z) in depth.pixels_mut().iter_mut().enumerate() {
-        let w = inverse[center(at)];
-        *z = if w > 0.0 { 1.0 / w } else { 0.0 };
+    let (width, height) = (camera.width, camera.height);
+    let pixels: Vec<_> = (0..width * height)
+        .into_par_iter()
+        .with_min_len(width.max(1))
+        .map(|i| pixel(i % width, i / width))
+        .collect();
+    let mut image = SceneImage {
+        color: RgbImage::filled(width, height, [0.0; 3]),
+        depth: DepthImage::filled(width, height, 0.0),
+        object: Vec::with_capacity(width * height),
+    };
+    let targets = image.color.pixels_mut().iter_mut().zip(image.depth.pixels_mut());
+    for ((color, z), (seen, depth, body)) in targets.zip(pixels) {
+        (*color, *z) = (seen, depth);
+        image.object.push(body);
     }
-    let object = (0..camera.width * camera.height).map(|at| object[center(at)]).collect();
-    SceneImage { color: color.downsampled(samples), depth, object }
+    image
 }
 
 #[cfg(test)]

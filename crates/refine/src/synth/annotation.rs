@@ -1,41 +1,39 @@
-//! What the JSON files of a dataset say of made-up scenes. Lengths in millimetres, as BOP has them.
+//! What the JSON files of a dataset say. Lengths in millimetres, as BOP has them.
 
-use nalgebra::{Isometry3, Point3};
-use prehend_render::Mask;
+use nalgebra::{Isometry3, Point3, Vector3};
+use prehend_geometry::TriMesh;
+use prehend_render::{Camera, DepthImage, Mask};
 use serde_json::{Map, Value, json};
 
-use super::Scene;
+use crate::Inertial;
 use crate::bop::{UNITS_PER_NEWTON, rotation_to_row_major, translation_to_mm};
-use crate::{HandReading, Object};
 
 /// Millimetres of one unit of the depth images.
 pub(super) const DEPTH_SCALE: f64 = 0.1;
 /// Forces are clipped at this many units, as sensors do.
 const FORCE_LIMIT: f64 = 10_000.0;
 
-/// Entry of `scene_camera.json`; the world is the hand's base where there is a hand.
-pub(super) fn camera(scene: &Scene) -> Value {
-    let k = scene.observation.camera.k();
+/// Entry of `scene_camera.json`, with the pose world → camera where there is a world.
+pub(super) fn camera(camera: &Camera, world: Option<&Isometry3<f64>>) -> Value {
     let mut entry = Map::from_iter([
-        ("cam_K".to_owned(), json!(k)),
+        ("cam_K".to_owned(), json!(camera.k())),
         ("depth_scale".to_owned(), json!(DEPTH_SCALE)),
     ]);
-    if let Some(hand) = &scene.observation.hand {
-        entry.extend(pose("w2c", &hand.t_cam_hand));
+    if let Some(t_cam_world) = world {
+        entry.extend(pose("w2c", t_cam_world));
     }
     Value::Object(entry)
 }
 
 /// Entry of `scene_gt.json`.
-pub(super) fn truth(scene: &Scene) -> Value {
-    let mut object = pose("m2c", &scene.truth);
-    object.insert("obj_id".into(), json!(scene.obj_id));
+pub(super) fn truth(obj_id: u32, t_cam_object: &Isometry3<f64>) -> Value {
+    let mut object = pose("m2c", t_cam_object);
+    object.insert("obj_id".into(), json!(obj_id));
     json!([object])
 }
 
-/// Entry of `scene_gt_info.json`; `whole` is the silhouette that nothing hides.
-pub(super) fn visibility(scene: &Scene, whole: &Mask) -> Value {
-    let (visible, depth) = (&scene.observation.mask, &scene.observation.depth);
+/// Entry of `scene_gt_info.json`; `whole` is the silhouette that nothing hides, `depth` what was measured.
+pub(super) fn visibility(visible: &Mask, whole: &Mask, depth: &DepthImage) -> Value {
     let measured = whole.pixels().iter().zip(depth.pixels()).filter(|(m, z)| **m && **z > 0.0);
     json!([{
         "bbox_obj": bounding_box(whole),
@@ -47,34 +45,43 @@ pub(super) fn visibility(scene: &Scene, whole: &Mask) -> Value {
     }])
 }
 
-/// Entry of `scene_bodies.json`.
-pub(super) fn bodies(scene: &Scene, hand: &HandReading, urdf: &str) -> Value {
-    let names = scene.robot.tree.joint_names().iter().cloned();
-    let joints: Map<String, Value> = names.zip(hand.joints.iter().map(|&q| json!(q))).collect();
-    let mut body = pose("b2c", &hand.t_cam_hand);
+/// Entry of `scene_bodies.json` and `scene_bodies_gt.json`.
+pub(super) fn bodies(
+    gravity: &Vector3<f64>,
+    t_cam_hand: &Isometry3<f64>,
+    names: &[String],
+    joints: &[f64],
+    urdf: &str,
+) -> Value {
+    let joints: Map<String, Value> =
+        names.iter().cloned().zip(joints.iter().map(|&q| json!(q))).collect();
+    let mut body = pose("b2c", t_cam_hand);
     body.insert("name".into(), json!("hand"));
     body.insert("urdf".into(), json!(urdf));
     body.insert("joints".into(), Value::Object(joints));
-    let gravity = scene.observation.gravity.unwrap_or_default();
     json!({ "gravity": gravity.as_slice(), "bodies": [body] })
 }
 
 /// Entry of `scene_tactile.json`.
-pub(super) fn touch(hand: &HandReading, taxels: &str) -> Value {
-    let units = |f: f64| (f * UNITS_PER_NEWTON).clamp(-FORCE_LIMIT, FORCE_LIMIT);
-    let force: Vec<[f64; 3]> = hand.forces.iter().map(|f| [f.x, f.y, f.z].map(units)).collect();
+pub(super) fn touch(forces: &[Vector3<f64>], taxels: &str) -> Value {
+    // Whole units are written without a fraction.
+    let units = |f: f64| {
+        let units = (f * UNITS_PER_NEWTON).clamp(-FORCE_LIMIT, FORCE_LIMIT);
+        let whole = units.round();
+        if (units - whole).abs() < 1e-9 { json!(whole as i64) } else { json!(units) }
+    };
+    let force: Vec<[Value; 3]> = forces.iter().map(|f| [f.x, f.y, f.z].map(units)).collect();
     json!({ "body": "hand", "taxels": taxels, "force": force })
 }
 
-/// Entry of `models_info.json`.
-pub(super) fn model(object: &Object) -> Value {
+/// Entry of `models_info.json`; `mesh` in metres.
+pub(super) fn model(mesh: &TriMesh, inertial: &Inertial) -> Value {
     let mm = |p: Point3<f64>| [p.x, p.y, p.z].map(|v| v * 1e3);
-    let (low, high) = object.mesh.bounds().unwrap_or_default();
+    let (low, high) = mesh.bounds().unwrap_or_default();
     let ([x, y, z], size) = (mm(low), mm(Point3::from(high - low)));
-    let inertial = &object.inertial;
     let rows = inertial.inertia.row_iter().map(|r| r.iter().copied().collect());
     json!({
-        "diameter": diameter(&object.mesh.vertices) * 1e3,
+        "diameter": diameter(&mesh.vertices) * 1e3,
         "min_x": x, "min_y": y, "min_z": z,
         "size_x": size[0], "size_y": size[1], "size_z": size[2],
         "mass_kg": inertial.mass,

@@ -1,13 +1,38 @@
-//! Made-up frames whose truth is known: to try things on, and to test with.
+//! Made-up frames whose truth is known: to try things on, to test with, and to measure methods by.
+//!
+//! [`default_scene`] is one ready-made frame; [`generate`] makes whole datasets of [`Moment`]s as sensors would see them
+//! ([`SensorSettings`]).
 
 mod annotation;
 mod dataset;
 mod grasp;
+mod error;
+mod folder;
+mod frame;
+mod generate;
+mod hand_files;
+mod initial;
+mod models;
 mod moment;
+mod plan;
+mod ready_made;
 mod scene;
+mod scene_files;
+mod seeds;
 mod sensing;
+mod sensor;
 
 pub use dataset::write_dataset;
 pub use grasp::{Grasp, GraspError, GraspFault, GraspSettings, Grasper, Preshape};
+pub use error::SynthError;
+pub use generate::{GraspFailure, Made, generate};
+pub use hand_files::HandFiles;
+pub use initial::InitialNoise;
 pub use moment::Moment;
+pub use plan::{Subject, SynthSettings};
+pub use ready_made::ready_made_moments;
 pub use scene::{Scene, default_scene};
+pub use sensor::{
+    BackgroundSettings, CalibrationSettings, ColourSettings, DepthSettings, LightSettings,
+    MaskSettings, ModelSettings, SensorSettings, SettingError, TouchSettings, ViewpointSettings,
+};

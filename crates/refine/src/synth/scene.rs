@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Isometry3, Point3, Vector3, Vector6};
 use prehend_autodiff::lie::perturb_about;
 use prehend_geometry::SplitMix64;
 use prehend_geometry::hand::{JOINT_NAMES, allegro_xela_urdf, default_grasp, taxels};
@@ -10,6 +10,7 @@ use prehend_geometry::robot::Robot as KinematicTree;
 use prehend_render::Camera;
 
 use super::sensing::{feel, photograph};
+use super::sensor::look_at;
 use crate::{AssetError, HandReading, Object, Observation, Robot};
 
 /// A frame whose truth is known.
@@ -49,7 +50,8 @@ pub fn default_scene(seed: u64) -> Result<Scene, AssetError> {
     let robot = Robot::new(tree, taxels())?;
 
     let camera = Camera { fx: 580.0, fy: 580.0, cx: 319.5, cy: 239.5, width: 640, height: 480 };
-    let t_cam_hand = look_at(&Point3::new(0.42, 0.12, 0.24), &Point3::new(0.04, 0.02, 0.03));
+    let t_cam_hand =
+        look_at(&Point3::new(0.42, 0.12, 0.24), &Point3::new(0.04, 0.02, 0.03), &Vector3::z(), 0.0);
     let truth = t_cam_hand * grasp.t_base_object;
     let mut noise = SplitMix64::new(seed);
     let (color, depth, mask) =
@@ -69,15 +71,4 @@ pub fn default_scene(seed: u64) -> Result<Scene, AssetError> {
     let initial = perturb_about(&truth, &(truth * object.centre).coords, &error);
     let (object, obj_id) = (Arc::new(object), grasp.object.bop_id());
     Ok(Scene { observation, object, obj_id, robot, urdf, truth, initial })
-}
-
-/// Pose base → camera of a camera at `eye` that looks at `target` with the hand's +z up in the image.
-fn look_at(eye: &Point3<f64>, target: &Point3<f64>) -> Isometry3<f64> {
-    let forward = (target - eye).normalize();
-    let right = forward.cross(&Vector3::z()).normalize();
-    let down = forward.cross(&right);
-    let rows =
-        nalgebra::Matrix3::from_rows(&[right.transpose(), down.transpose(), forward.transpose()]);
-    let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rows));
-    Isometry3::from_parts(Translation3::from(-(rotation * eye.coords)), rotation)
 }

@@ -100,11 +100,7 @@ fn check_draws_every_pose_and_warns() {
     place.edit_json("ds/models/models_info.json", |info| {
         info["5"].as_object_mut().unwrap().remove("mass_kg");
     });
-    place.replace(
-        "ds/test/000001/scene_camera.json",
-        "\"depth_scale\": 0.1",
-        "\"depth_scale\": 100",
-    );
+    place.replace("ds/test/000001/scene_camera.json", "\"depth_scale\":0.1", "\"depth_scale\":100");
     let said = place.prehend("check --dataset ds --poses ds/init.csv --report look");
     assert_eq!(said.code, 0, "{}", said.err);
     for warning in [

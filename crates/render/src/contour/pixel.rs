@@ -5,10 +5,11 @@ use nalgebra::{RealField, Vector3, convert};
 use super::inner::Inner;
 use super::interior::{Motion, add_level, barycentric, row};
 use super::outline::{Foot, Piece};
-use super::surface::{Lighting, Shaded, posed_normal, shade};
+use super::surface::{Lighting, Shaded, albedo, posed_normal, shade};
 use super::vec3::{Vec3, vec3};
 use crate::pose_loss::{Pixel, Row, scaled_sum};
 use crate::posed::Posed;
+use crate::shading::SurfacePoint;
 
 /// A posed, lit model, and the point about which twists turn (camera frame).
 pub(crate) struct Scene<'a> {
@@ -113,6 +114,19 @@ impl Scene<'_> {
     pub(crate) fn color(&self, face: u32, x: f32, y: f32) -> [f32; 3] {
         let b = barycentric(self.posed.projected.corners(face as usize), x, y);
         shade::<false>(&self.posed, &self.lighting, face as usize, b).color
+    }
+
+    /// The visible point of a face at pixel (x, y), with its unlit colour.
+    pub(crate) fn point(&self, face: u32, x: f32, y: f32) -> SurfacePoint<f32> {
+        let corners = self.posed.projected.corners(face as usize);
+        let b = barycentric(corners, x, y);
+        let [p, q, r] =
+            self.posed.model.faces[face as usize].map(|v| self.posed.position[v as usize]);
+        SurfacePoint {
+            position: p * b[0] + q * b[1] + r * b[2],
+            normal: posed_normal(&self.posed, face as usize, b).into(),
+            albedo: albedo(&self.posed, face as usize, b).color,
+        }
     }
 
     /// Unit normal of a face at pixel (x, y), camera frame.

@@ -9,6 +9,7 @@ mod output;
 mod progress;
 mod refine;
 mod symmetry;
+mod synth;
 
 use std::process::ExitCode;
 
@@ -55,6 +56,11 @@ enum Command {
     ///
     /// Scores that are free of symmetries (MSSD, MSPD, the symmetric OE) take them from there.
     Symmetry(symmetry::Arguments),
+    /// Make a dataset of objects in a hand: images, touch and truth
+    ///
+    /// Interrupted at any moment and run again with the same options, it goes on with what is missing; the files are
+    /// the same in the end.
+    Synth(Box<synth::Arguments>),
 }
 
 fn main() -> ExitCode {
@@ -71,6 +77,7 @@ fn main() -> ExitCode {
         Command::Eval(arguments) => eval::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
         Command::Symmetry(arguments) => symmetry::run(&arguments),
+        Command::Synth(arguments) => synth::run(&arguments),
     };
     match outcome {
         Ok(outcome) => outcome.exit_code(),

@@ -1,0 +1,197 @@
+//! `prehend synth`.
+
+use std::num::{NonZeroU32, NonZeroUsize};
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, anyhow, bail};
+use clap::{Args, ValueEnum};
+use prehend_geometry::TriMesh;
+use prehend_geometry::objects::YcbObject;
+use prehend_refine::Object;
+use prehend_refine::synth::{
+    HandFiles, Moment, SensorSettings, Subject, SynthSettings, generate, ready_made_moments,
+};
+use serde_json::json;
+
+use crate::outcome::Outcome;
+use crate::output::say;
+use crate::progress;
+
+#[derive(Args)]
+pub(crate) struct Arguments {
+    /// Folder of the dataset: absent, empty, or one that was begun with the same settings and will be gone on with
+    #[arg(long, value_name = "DIR", help_heading = "Output")]
+    out: PathBuf,
+    /// Built-in objects, a list such as "006_mustard_bottle,061_foam_brick" [default: all nine]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = "Objects and hand")]
+    objects: Option<Vec<String>>,
+    /// Instead of built-in objects, a closed mesh (PLY, OBJ, STL, glTF); may be repeated, numbered from 1
+    #[arg(
+        long,
+        value_name = "FILE",
+        conflicts_with = "objects",
+        help_heading = "Objects and hand"
+    )]
+    mesh: Vec<PathBuf>,
+    /// Unit of the meshes
+    #[arg(long, value_name = "UNIT", default_value = "m", help_heading = "Objects and hand")]
+    mesh_unit: Unit,
+    /// Mass of each mesh in the same order, in kilograms [default: 500 kg/m³]
+    #[arg(long, value_name = "KG", requires = "mesh", help_heading = "Objects and hand")]
+    mass: Vec<f64>,
+    /// Hand as URDF [default: built-in Allegro hand with XELA pads]
+    #[arg(long, value_name = "URDF", help_heading = "Objects and hand")]
+    hand: Option<PathBuf>,
+    /// Taxels of that hand (see docs/DATASET.md)
+    #[arg(long, value_name = "CSV", requires = "hand", help_heading = "Objects and hand")]
+    taxels: Option<PathBuf>,
+    /// Frames of each object
+    #[arg(long, value_name = "N", default_value = "40", help_heading = "Frames")]
+    frames: NonZeroU32,
+    /// Frames of each grasp, spread over its trajectory
+    #[arg(long, value_name = "N", default_value = "4", help_heading = "Frames")]
+    frames_per_grasp: NonZeroU32,
+    /// Steps of each trajectory
+    #[arg(long, value_name = "N", default_value = "100", help_heading = "Frames")]
+    steps: NonZeroUsize,
+    /// Columns of the images
+    #[arg(long, value_name = "PX", default_value = "640", help_heading = "Frames")]
+    width: NonZeroUsize,
+    /// Rows of the images
+    #[arg(long, value_name = "PX", default_value = "480", help_heading = "Frames")]
+    height: NonZeroUsize,
+    /// `clean`, `realistic`, or one setting such as depth.noise=0.001; may be repeated, settings override
+    ///
+    /// `--sensor list` prints all settings and their values.
+    #[arg(long, value_name = "PRESET|KEY=VALUE", help_heading = "Frames")]
+    sensor: Vec<String>,
+    /// Decides everything that is random
+    #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Frames")]
+    seed: u64,
+    /// Worker threads; the dataset is the same for any number [default: all cores]
+    #[arg(long, value_name = "N", help_heading = "Frames")]
+    threads: Option<NonZeroUsize>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Unit {
+    M,
+    Mm,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
+    let sensor = sensors(&arguments.sensor)?;
+    if arguments.sensor.iter().any(|s| s == "list") {
+        for (name, value) in sensor.names() {
+            say(format!("{name}={value}"))?;
+        }
+        return Ok(Outcome { done: 1, failures: Vec::new() });
+    }
+    if let Some(threads) = arguments.threads {
+        rayon::ThreadPoolBuilder::new().num_threads(threads.get()).build_global()?;
+    }
+    let subjects = subjects(arguments)?;
+    let hand = match &arguments.hand {
+        Some(urdf) => HandFiles::load(urdf, arguments.taxels.as_deref())?,
+        None => HandFiles::built_in()?,
+    };
+    let steps = arguments.steps.get();
+    let settings = SynthSettings {
+        frames: arguments.frames.get(),
+        frames_per_grasp: arguments.frames_per_grasp.get(),
+        width: arguments.width.get(),
+        height: arguments.height.get(),
+        sensor,
+        seed: arguments.seed,
+        grasp: json!({ "steps": steps }),
+    };
+    let total = u64::from(settings.frames) * subjects.len() as u64;
+    let bar = progress::bar(total, "frames");
+    let prepare = |subject| grasps(&hand, subject, steps);
+    let made =
+        generate(&arguments.out, &hand, &subjects, &settings, prepare, &|done| bar.inc(done))?;
+    bar.finish_and_clear();
+    say(format!("{} frames of {total} in {}", made.frames, arguments.out.display()))?;
+    let failures = made.failures.iter().map(|f| {
+        let images: Vec<String> = f.images.iter().map(u32::to_string).collect();
+        format!("scene {} images {}: {}", f.obj_id, images.join(" "), f.reason)
+    });
+    Ok(Outcome { done: made.frames as usize, failures: failures.collect() })
+}
+
+/// What makes the grasps of one object: moments of the grasp that a seed stands for.
+fn grasps<'a>(
+    hand: &'a HandFiles,
+    subject: &'a Subject,
+    steps: usize,
+) -> Result<impl Fn(u64) -> Result<Vec<Moment>, String> + Sync + use<'a>, String> {
+    Ok(move |seed| {
+        ready_made_moments(&subject.object, &hand.robot, seed, steps).map_err(|e| e.to_string())
+    })
+}
+
+/// The last preset named, with all single settings over it.
+fn sensors(given: &[String]) -> anyhow::Result<SensorSettings> {
+    let mut settings = SensorSettings::clean();
+    for word in given.iter().filter(|word| !word.contains('=')) {
+        match word.as_str() {
+            "clean" => settings = SensorSettings::clean(),
+            "realistic" => settings = SensorSettings::realistic(),
+            "list" => {}
+            _ => bail!("--sensor {word}: neither clean, realistic, list nor KEY=VALUE"),
+        }
+    }
+    for (key, value) in given.iter().filter_map(|word| word.split_once('=')) {
+        settings.set(key.trim(), value.trim())?;
+    }
+    Ok(settings)
+}
+
+fn subjects(arguments: &Arguments) -> anyhow::Result<Vec<Subject>> {
+    if !arguments.mesh.is_empty() {
+        let (meshes, masses) = (arguments.mesh.len(), arguments.mass.len());
+        if masses != 0 && masses != meshes {
+            bail!("--mass is given {masses} times for {meshes} meshes: give one for each, or none");
+        }
+        let mass = |i: usize| arguments.mass.get(i).copied();
+        let files = (1..).zip(&arguments.mesh);
+        return files
+            .enumerate()
+            .map(|(i, (id, file))| own(id, file, arguments.mesh_unit, mass(i)))
+            .collect();
+    }
+    let chosen = match &arguments.objects {
+        None => YcbObject::ALL.to_vec(),
+        Some(names) => names.iter().map(|name| built_in(name)).collect::<Result<_, _>>()?,
+    };
+    chosen
+        .into_iter()
+        .map(|object| {
+            let prepared = Object::with_mass(object.name(), object.mesh(), Some(object.mass()), 0)?;
+            Ok(Subject { obj_id: object.bop_id(), object: prepared })
+        })
+        .collect()
+}
+
+fn built_in(name: &str) -> anyhow::Result<YcbObject> {
+    YcbObject::from_name(name).with_context(|| {
+        let known: Vec<&str> = YcbObject::ALL.into_iter().map(YcbObject::name).collect();
+        format!("there is no built-in object {name:?}; there are {}", known.join(", "))
+    })
+}
+
+fn own(obj_id: u32, file: &Path, unit: Unit, mass: Option<f64>) -> anyhow::Result<Subject> {
+    let mesh = TriMesh::load(file)?;
+    let mesh = match unit {
+        Unit::M => mesh,
+        Unit::Mm => mesh.scaled(1e-3),
+    };
+    let name = file.file_stem().unwrap_or_default().to_string_lossy();
+    let object =
+        Object::with_mass(&name, mesh, mass, 0).map_err(|e| anyhow!("{}: {e}", file.display()))?;
+    let size = 2.0 * object.radius;
+    if !(5e-3..1.0).contains(&size) {
+        bail!("{}: is {size:.3e} m across: see --mesh-unit", file.display());
+    }
+    Ok(Subject { obj_id, object })
+}

@@ -1,0 +1,128 @@
+//! What is wrong about what is known of the camera and the hand.
+
+use nalgebra::{Isometry3, Vector6};
+use prehend_autodiff::lie::se3_exp;
+use prehend_geometry::SplitMix64;
+use prehend_render::Camera;
+use serde::{Deserialize, Serialize};
+
+/// Standard deviations of the calibration's errors, which stay the same through a grasp.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CalibrationSettings {
+    /// Focal lengths, relative.
+    pub focal: f64,
+    /// Principal point, each coordinate \[px\] of an image 640 px wide.
+    pub principal_px: f64,
+    /// Place of the hand in the camera frame, each axis \[m\].
+    pub hand_translation: f64,
+    /// Turn of the hand in the camera frame, each axis \[deg\].
+    pub hand_rotation_deg: f64,
+    /// Joint positions \[deg\], of prismatic joints in thousandths of `joint_deg` metres.
+    pub joint_deg: f64,
+}
+
+impl CalibrationSettings {
+    pub(super) fn clean() -> Self {
+        Self {
+            focal: 0.0,
+            principal_px: 0.0,
+            hand_translation: 0.0,
+            hand_rotation_deg: 0.0,
+            joint_deg: 0.0,
+        }
+    }
+
+    pub(super) fn realistic() -> Self {
+        Self {
+            focal: 3e-3,
+            principal_px: 2.0,
+            hand_translation: 2e-3,
+            hand_rotation_deg: 0.4,
+            joint_deg: 0.8,
+        }
+    }
+
+    /// The errors of one grasp; `prismatic` says of each joint whether it slides.
+    pub(super) fn draw(&self, prismatic: &[bool], noise: &mut SplitMix64) -> Miscalibration {
+        let mut normal = |scale: f64| scale * noise.normal();
+        let focal = [0; 2].map(|_| 1.0 + normal(self.focal));
+        let principal = [0; 2].map(|_| normal(self.principal_px) / 640.0);
+        let scale = [self.hand_translation, self.hand_rotation_deg.to_radians()];
+        let hand = se3_exp(&Vector6::from_fn(|i, _| normal(scale[i / 3])));
+        let joint = |slides: &bool| match slides {
+            true => normal(1e-3 * self.joint_deg),
+            false => normal(self.joint_deg.to_radians()),
+        };
+        let joints = prismatic.iter().map(joint).collect();
+        Miscalibration { focal, principal, hand, joints }
+    }
+}
+
+/// The errors of one grasp.
+pub(super) struct Miscalibration {
+    focal: [f64; 2],
+    /// In widths of the image.
+    principal: [f64; 2],
+    /// In the hand's base frame.
+    hand: Isometry3<f64>,
+    joints: Vec<f64>,
+}
+
+impl Miscalibration {
+    /// The camera that the estimator is told.
+    pub(super) fn camera(&self, truth: &Camera) -> Camera {
+        let width = truth.width as f64;
+        Camera {
+            fx: truth.fx * self.focal[0],
+            fy: truth.fy * self.focal[1],
+            cx: truth.cx + self.principal[0] * width,
+            cy: truth.cy + self.principal[1] * width,
+            ..*truth
+        }
+    }
+
+    /// The hand's pose that the estimator is told.
+    pub(super) fn hand(&self, truth: &Isometry3<f64>) -> Isometry3<f64> {
+        truth * self.hand
+    }
+
+    /// The joint positions that the estimator is told.
+    pub(super) fn joints(&self, truth: &[f64]) -> Vec<f64> {
+        truth.iter().zip(&self.joints).map(|(q, error)| q + error).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_are_as_large_as_asked_for() {
+        let (settings, mut noise) = (CalibrationSettings::realistic(), SplitMix64::new(13));
+        let camera = Camera { fx: 580.0, fy: 580.0, cx: 319.5, cy: 239.5, width: 640, height: 480 };
+        let place = Isometry3::translation(0.1, 0.2, 0.5);
+        let count = 400.0;
+        let mut squares = [0.0; 6];
+        for _ in 0..count as usize {
+            let errors = settings.draw(&[false, true], &mut noise);
+            let told = errors.camera(&camera);
+            let moved = place.inverse() * errors.hand(&place);
+            let joints = errors.joints(&[0.3, 0.1]);
+            let all = [
+                (told.fx / 580.0 - 1.0) / settings.focal,
+                (told.cy - 239.5) / settings.principal_px,
+                moved.translation.vector.norm() / 3f64.sqrt() / settings.hand_translation,
+                moved.rotation.angle().to_degrees() / 3f64.sqrt() / settings.hand_rotation_deg,
+                (joints[0] - 0.3).to_degrees() / settings.joint_deg,
+                (joints[1] - 0.1) * 1e3 / settings.joint_deg,
+            ];
+            all.iter().zip(&mut squares).for_each(|(e, sum)| *sum += e * e / count);
+        }
+        assert!(squares.iter().all(|s| (s.sqrt() - 1.0).abs() < 0.1), "{squares:?}");
+        let exact = CalibrationSettings::clean().draw(&[false], &mut noise);
+        assert_eq!(exact.camera(&camera), camera);
+        assert_eq!(exact.joints(&[0.7]), [0.7]);
+        assert!((exact.hand(&place).translation.vector - place.translation.vector).norm() < 1e-15);
+    }
+}

@@ -1,0 +1,150 @@
+//! What a colour camera makes of the light that reaches it.
+
+use prehend_geometry::SplitMix64;
+use prehend_render::RgbImage;
+use serde::{Deserialize, Serialize};
+
+/// Faults of the colour images. Zero takes any of them away.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ColourSettings {
+    /// Standard deviation of the exposure \[stops\].
+    pub exposure: f64,
+    /// Standard deviation of the gain of each channel.
+    pub white_balance: f64,
+    /// Standard deviation of the blur \[px\], at most.
+    pub blur: f64,
+    /// Standard deviation of the noise of each channel in the dark.
+    pub noise: f64,
+    /// Variance that noise gains with brightness, up to white.
+    pub shot_noise: f64,
+    /// Quality of the JPEG files, 1 to 100; 0 for PNG, which loses nothing.
+    pub jpeg_quality: u8,
+}
+
+impl ColourSettings {
+    pub(super) fn clean() -> Self {
+        Self {
+            exposure: 0.0,
+            white_balance: 0.0,
+            blur: 0.0,
+            noise: 0.01,
+            shot_noise: 0.0,
+            jpeg_quality: 0,
+        }
+    }
+
+    pub(super) fn realistic() -> Self {
+        Self {
+            exposure: 0.35,
+            white_balance: 0.06,
+            blur: 1.0,
+            noise: 0.01,
+            shot_noise: 2e-4,
+            jpeg_quality: 88,
+        }
+    }
+
+    /// The picture that the camera takes.
+    pub(super) fn expose(&self, truth: &RgbImage, noise: &mut SplitMix64) -> RgbImage {
+        let exposure = (self.exposure * noise.normal()).exp2();
+        let gain = [0; 3]
+            .map(|_| (exposure * (1.0 + self.white_balance * noise.normal()).max(0.1)) as f32);
+        let mut picture = blurred(truth, self.blur * (0.4 + 0.6 * noise.unit()));
+        let (dark, shot) = ((self.noise * self.noise) as f32, self.shot_noise as f32);
+        let noisy = dark > 0.0 || shot > 0.0;
+        for pixel in picture.pixels_mut() {
+            for c in 0..3 {
+                let level = (gain[c] * pixel[c]).min(1.0);
+                let spread = (dark + shot * level).sqrt();
+                let error = if noisy { spread * noise.normal() as f32 } else { 0.0 };
+                pixel[c] = (level + error).clamp(0.0, 1.0);
+            }
+        }
+        picture
+    }
+}
+
+/// Blurred by a normal distribution of that standard deviation \[px\]; borders repeat.
+fn blurred(image: &RgbImage, sigma: f64) -> RgbImage {
+    if sigma < 0.05 {
+        return image.clone();
+    }
+    let reach = (3.0 * sigma).ceil() as usize;
+    let bell = |d: usize| (-0.5 * (d as f64 / sigma).powi(2)).exp();
+    let total = bell(0) + 2.0 * (1..=reach).map(bell).sum::<f64>();
+    let weights: Vec<f32> = (0..=reach).map(|d| (bell(d) / total) as f32).collect();
+    let (width, height) = (image.width(), image.height());
+    let mut across = RgbImage::filled(width, height, [0.0; 3]);
+    for (target, row) in
+        across.pixels_mut().chunks_mut(width.max(1)).zip(image.pixels().chunks(width.max(1)))
+    {
+        for (x, value) in target.iter_mut().enumerate() {
+            *value = mean(&weights, |d, far| row[shift(x, d, far, width)]);
+        }
+    }
+    let mut down = RgbImage::filled(width, height, [0.0; 3]);
+    for (y, target) in down.pixels_mut().chunks_mut(width.max(1)).enumerate() {
+        for (x, value) in target.iter_mut().enumerate() {
+            *value = mean(&weights, |d, far| across.pixels()[shift(y, d, far, height) * width + x]);
+        }
+    }
+    down
+}
+
+/// `at` moved by `d` forwards (`far`) or backwards, within 0..size.
+fn shift(at: usize, d: usize, far: bool, size: usize) -> usize {
+    if far { (at + d).min(size - 1) } else { at.saturating_sub(d) }
+}
+
+fn mean(weights: &[f32], pixel: impl Fn(usize, bool) -> [f32; 3]) -> [f32; 3] {
+    let mut sum = pixel(0, true).map(|v| v * weights[0]);
+    for (d, weight) in weights.iter().enumerate().skip(1) {
+        let (ahead, back) = (pixel(d, true), pixel(d, false));
+        (0..3).for_each(|c| sum[c] += weight * (ahead[c] + back[c]));
+    }
+    sum
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blur_keeps_the_mean_and_spreads_a_point() {
+        let mut image = RgbImage::filled(31, 21, [0.0; 3]);
+        image.pixels_mut()[10 * 31 + 15] = [1.0, 0.5, 0.0];
+        let soft = blurred(&image, 1.2);
+        let sum: f32 = soft.pixels().iter().map(|p| p[0]).sum();
+        assert!((sum - 1.0).abs() < 1e-5);
+        let moment: f32 = soft
+            .pixels()
+            .iter()
+            .enumerate()
+            .map(|(i, p)| p[0] * ((i % 31) as f32 - 15.0).powi(2))
+            .sum();
+        assert!((moment - 1.44).abs() < 0.1, "{moment}");
+        let flat = RgbImage::filled(9, 9, [0.3, 0.6, 0.9]);
+        let still = blurred(&flat, 2.0);
+        assert!(still.pixels().iter().all(|p| (p[1] - 0.6).abs() < 1e-6));
+    }
+
+    #[test]
+    fn noise_and_gains_are_as_strong_as_asked_for() {
+        let flat = RgbImage::filled(100, 100, [0.4; 3]);
+        let mut noise = SplitMix64::new(6);
+        let clean = ColourSettings::clean().expose(&flat, &mut noise);
+        let spread = |image: &RgbImage| {
+            let mean = image.pixels().iter().map(|p| p[0]).sum::<f32>() / 1e4;
+            let square = image.pixels().iter().map(|p| (p[0] - mean).powi(2)).sum::<f32>() / 1e4;
+            (mean, square.sqrt())
+        };
+        let (mean, sigma) = spread(&clean);
+        assert!((mean - 0.4).abs() < 1e-3 && (sigma - 0.01).abs() < 5e-4, "{mean} {sigma}");
+        let settings = ColourSettings::realistic();
+        let means: Vec<f32> =
+            (0..40).map(|_| spread(&settings.expose(&flat, &mut noise)).0).collect();
+        let stops: f32 = means.iter().map(|m| (m / 0.4).log2().powi(2)).sum::<f32>() / 40.0;
+        assert!((0.2..0.5).contains(&stops.sqrt()), "{}", stops.sqrt());
+    }
+}

@@ -1,0 +1,147 @@
+//! A tactile skin and its faults.
+
+use nalgebra::Vector3;
+use prehend_geometry::SplitMix64;
+use serde::{Deserialize, Serialize};
+
+use crate::bop::UNITS_PER_NEWTON;
+
+/// Faults of the taxels. Forces are in sensor units, 1000 a newton.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TouchSettings {
+    /// Share of the taxels that say nothing, the same ones through a grasp.
+    pub dead_share: f64,
+    /// Share of the taxels that feel what is not there, the same ones through a grasp.
+    pub false_share: f64,
+    /// Mean size of what those feel \[units\].
+    pub false_force: f64,
+    /// Largest error of a taxel's gain, uniform, the same through a grasp.
+    pub gain: f64,
+    /// Standard deviation of the noise of each axis \[units\].
+    pub noise: f64,
+    /// Forces smaller than this read as none \[units\].
+    pub threshold: f64,
+    /// Step of the readings \[units\].
+    pub quantum: f64,
+    /// Largest reading of an axis \[units\].
+    pub limit: f64,
+}
+
+impl TouchSettings {
+    pub(super) fn clean() -> Self {
+        Self {
+            dead_share: 0.0,
+            false_share: 0.0,
+            false_force: 0.0,
+            gain: 0.0,
+            noise: 0.0,
+            threshold: 0.0,
+            quantum: 1.0,
+            limit: 10_000.0,
+        }
+    }
+
+    pub(super) fn realistic() -> Self {
+        Self {
+            dead_share: 0.1,
+            false_share: 0.03,
+            false_force: 250.0,
+            gain: 0.25,
+            noise: 8.0,
+            threshold: 30.0,
+            quantum: 10.0,
+            limit: 10_000.0,
+        }
+    }
+
+    /// How each of `count` taxels is disposed through a grasp.
+    pub(super) fn condition(&self, count: usize, noise: &mut SplitMix64) -> Vec<TaxelCondition> {
+        let one = |_| {
+            let (fate, gain) = (noise.unit(), 1.0 + self.gain * (2.0 * noise.unit() - 1.0));
+            let direction = Vector3::new(noise.normal(), noise.normal(), noise.normal());
+            let size = -self.false_force * (1.0 - noise.unit()).ln();
+            let wrong = fate >= self.dead_share && fate < self.dead_share + self.false_share;
+            TaxelCondition {
+                gain: if fate < self.dead_share { 0.0 } else { gain },
+                phantom: match direction.try_normalize(1e-12) {
+                    Some(direction) if wrong => direction * size,
+                    _ => Vector3::zeros(),
+                },
+            }
+        };
+        (0..count).map(one).collect()
+    }
+
+    /// Readings \[N\] of taxels that bear `forces` \[N\].
+    pub(super) fn feel(
+        &self,
+        forces: &[Vector3<f64>],
+        condition: &[TaxelCondition],
+        noise: &mut SplitMix64,
+    ) -> Vec<Vector3<f64>> {
+        let read = |(force, taxel): (&Vector3<f64>, &TaxelCondition)| {
+            let jitter = Vector3::from_fn(|_, _| self.noise * noise.normal());
+            if taxel.gain == 0.0 {
+                return Vector3::zeros();
+            }
+            let felt = force * (taxel.gain * UNITS_PER_NEWTON) + taxel.phantom + jitter;
+            if felt.norm() < self.threshold {
+                return Vector3::zeros();
+            }
+            let step = |v: f64| {
+                if self.quantum > 0.0 { (v / self.quantum).round() * self.quantum } else { v }
+            };
+            // Adding zero makes the negative zero a positive one.
+            felt.map(|v| step(v).clamp(-self.limit, self.limit) / UNITS_PER_NEWTON + 0.0)
+        };
+        forces.iter().zip(condition).map(read).collect()
+    }
+}
+
+/// What stays the same about one taxel through a grasp.
+#[derive(Clone, Debug)]
+pub(super) struct TaxelCondition {
+    /// Zero for a dead one.
+    gain: f64,
+    /// Felt without cause \[units\].
+    phantom: Vector3<f64>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn readings(settings: &TouchSettings, force: f64) -> Vec<Vector3<f64>> {
+        let mut noise = SplitMix64::new(12);
+        let forces = vec![Vector3::z() * force; 5000];
+        let condition = settings.condition(forces.len(), &mut noise);
+        settings.feel(&forces, &condition, &mut noise)
+    }
+
+    #[test]
+    fn clean_skin_reads_the_force_to_a_unit_and_clips_it() {
+        let all = readings(&TouchSettings::clean(), -0.3504);
+        assert!(all.iter().all(|f| (f - Vector3::new(0.0, 0.0, -0.35)).norm() < 1e-12));
+        let strong = readings(&TouchSettings::clean(), 12.0);
+        assert!(strong.iter().all(|f| f.z == 10.0));
+    }
+
+    #[test]
+    fn shares_of_dead_and_false_taxels_are_as_asked_for() {
+        let settings = TouchSettings::realistic();
+        let touched = readings(&settings, 1.0);
+        let dead = touched.iter().filter(|f| f.norm() == 0.0).count() as f64 / 5000.0;
+        assert!((dead - 0.1).abs() < 0.015, "{dead}");
+        let quiet = readings(&settings, 0.0);
+        let wrong = quiet.iter().filter(|f| f.norm() > 0.0).count() as f64 / 5000.0;
+        assert!((0.02..0.04).contains(&wrong), "{wrong}");
+        let gains: Vec<f64> = touched.iter().map(|f| f.z).filter(|z| *z > 0.0).collect();
+        let inside = gains.iter().filter(|g| (0.72..1.28).contains(*g)).count();
+        assert!(inside as f64 > 0.95 * gains.len() as f64);
+        assert!(gains.iter().any(|g| *g < 0.8) && gains.iter().any(|g| *g > 1.2));
+        for f in touched.iter().chain(&quiet) {
+            assert!(f.iter().all(|v| (v * 100.0 - (v * 100.0).round()).abs() < 1e-9));
+        }
+    }
+}

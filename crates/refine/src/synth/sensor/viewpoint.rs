@@ -1,0 +1,181 @@
+//! Where the camera stands.
+
+use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use prehend_geometry::SplitMix64;
+use prehend_render::{Camera, RenderModel, depth_map};
+use serde::{Deserialize, Serialize};
+
+/// Where cameras stand about the hand.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ViewpointSettings {
+    /// Nearest distance from the object's centre \[m\].
+    pub nearest: f64,
+    /// Farthest distance \[m\].
+    pub farthest: f64,
+    /// Focal length, as a share of the image's width.
+    pub focal_width_ratio: f64,
+    /// Standard deviation of where the camera aims, per axis \[m\].
+    pub aim: f64,
+    /// Standard deviation of the angle between the image's vertical and the world's \[deg\].
+    pub roll_deg: f64,
+    /// Largest share of the object that the hand may hide, where a view with less can be found.
+    pub hidden_share: f64,
+}
+
+impl ViewpointSettings {
+    pub(super) fn preset() -> Self {
+        Self {
+            nearest: 0.4,
+            farthest: 0.6,
+            focal_width_ratio: 0.906,
+            aim: 0.015,
+            roll_deg: 8.0,
+            hidden_share: 0.55,
+        }
+    }
+
+    /// The true camera of an image of that size.
+    pub(super) fn camera(&self, width: usize, height: usize) -> Camera {
+        let focal = self.focal_width_ratio * width as f64;
+        let (cx, cy) = (0.5 * (width as f64 - 1.0), 0.5 * (height as f64 - 1.0));
+        Camera { fx: focal, fy: focal, cx, cy, width, height }
+    }
+
+    /// A pose hand base → camera from which the first of `bodies` (in hand base coordinates) is well seen, among the
+    /// first tries; else the one from which most of it is seen.
+    pub(super) fn choose(
+        &self,
+        camera: &Camera,
+        bodies: &[(&RenderModel, Isometry3<f64>)],
+        gravity: &Vector3<f64>,
+        noise: &mut SplitMix64,
+    ) -> Isometry3<f64> {
+        let Some((object, t_hand_object)) = bodies.first() else { return Isometry3::identity() };
+        let centre = t_hand_object * object.center();
+        let coarse = camera.scaled(COARSE_WIDTH / camera.width as f64);
+        let mut best: Option<(f64, Isometry3<f64>)> = None;
+        for _ in 0..TRIES {
+            let candidate = self.candidate(&centre, gravity, noise);
+            let seen = visible_share(&coarse, bodies, &candidate);
+            if seen >= 1.0 - self.hidden_share {
+                return candidate;
+            }
+            if best.is_none_or(|(most, _)| seen > most) {
+                best = Some((seen, candidate));
+            }
+        }
+        best.map_or_else(Isometry3::identity, |(_, pose)| pose)
+    }
+
+    fn candidate(
+        &self,
+        centre: &Point3<f64>,
+        gravity: &Vector3<f64>,
+        noise: &mut SplitMix64,
+    ) -> Isometry3<f64> {
+        let mut spread = |scale: f64| Vector3::from_fn(|_, _| scale * noise.normal());
+        let (towards, aim) = (spread(1.0), centre + spread(self.aim));
+        let distance = self.nearest + (self.farthest - self.nearest) * noise.unit();
+        let away = towards.try_normalize(1e-9).unwrap_or_else(Vector3::x);
+        let roll = (self.roll_deg * noise.normal()).to_radians();
+        look_at(&(aim + away * distance), &aim, &-gravity, roll)
+    }
+}
+
+/// Views tried, and the columns of their pictures.
+const TRIES: usize = 24;
+const COARSE_WIDTH: f64 = 120.0;
+
+/// How much of the first body's silhouette is seen past the others, as a share of what an unbounded image would show if
+/// nothing hid it (to the border's coarseness).
+fn visible_share(
+    coarse: &Camera,
+    bodies: &[(&RenderModel, Isometry3<f64>)],
+    t_cam_hand: &Isometry3<f64>,
+) -> f64 {
+    let border = coarse.width / 2;
+    let wide = Camera {
+        cx: coarse.cx + border as f64,
+        cy: coarse.cy + border as f64,
+        width: coarse.width + 2 * border,
+        height: coarse.height + 2 * border,
+        ..*coarse
+    };
+    let posed: Vec<_> = bodies.iter().map(|(model, pose)| (*model, t_cam_hand * pose)).collect();
+    let (alone, others) = (depth_map(&wide, &posed[..1]), depth_map(&wide, &posed[1..]));
+    let (mut all, mut seen) = (0usize, 0usize);
+    for (i, (z, front)) in alone.pixels().iter().zip(others.pixels()).enumerate() {
+        let (x, y) = (i % wide.width, i / wide.width);
+        let inside = (border..border + coarse.width).contains(&x)
+            && (border..border + coarse.height).contains(&y);
+        all += usize::from(*z > 0.0);
+        seen += usize::from(*z > 0.0 && inside && !(*front > 0.0 && front < z));
+    }
+    seen as f64 / all.max(1) as f64
+}
+
+/// Pose base → camera of a camera at `eye` that looks at `target`, with the direction `up` (any length) up in the image
+/// but for a turn by `roll` \[rad\] about the optical axis.
+pub(in crate::synth) fn look_at(
+    eye: &Point3<f64>,
+    target: &Point3<f64>,
+    up: &Vector3<f64>,
+    roll: f64,
+) -> Isometry3<f64> {
+    let forward = (target - eye).try_normalize(1e-12).unwrap_or_else(Vector3::z);
+    // Straight up or down, any direction serves as right.
+    let right = forward
+        .cross(up)
+        .try_normalize(1e-9)
+        .or_else(|| forward.cross(&Vector3::x()).try_normalize(1e-6))
+        .unwrap_or_else(|| forward.cross(&Vector3::y()).normalize());
+    let down = forward.cross(&right);
+    let rows = Matrix3::from_rows(&[right.transpose(), down.transpose(), forward.transpose()]);
+    let upright = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rows));
+    let rotation = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), roll) * upright;
+    Isometry3::from_parts(Translation3::from(-(rotation * eye.coords)), rotation)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use prehend_geometry::shapes::cuboid;
+
+    #[test]
+    fn the_camera_looks_at_its_target_with_the_world_upright() {
+        let (eye, target) = (Point3::new(0.3, -0.2, 0.4), Point3::new(0.05, 0.01, 0.02));
+        let up = Vector3::new(0.2, 0.1, 1.0);
+        let pose = look_at(&eye, &target, &up, 0.0);
+        let seen = pose * target;
+        assert!(seen.x.abs() < 1e-12 && seen.y.abs() < 1e-12);
+        assert!((seen.z - (target - eye).norm()).abs() < 1e-12);
+        let up_seen = pose.rotation * up;
+        assert!(up_seen.x.abs() < 1e-12 && up_seen.y < 0.0);
+        let turned = look_at(&eye, &target, &up, 0.3).rotation * up;
+        assert!((turned.x / -turned.y - 0.3f64.tan()).abs() < 1e-9);
+        for straight in [Vector3::x(), Vector3::z(), -Vector3::y()] {
+            let pose = look_at(&Point3::from(straight), &Point3::origin(), &straight, 0.0);
+            assert!((pose * Point3::origin() - Point3::new(0.0, 0.0, 1.0)).norm() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn views_past_the_hand_are_preferred() {
+        let model = RenderModel::new(&cuboid(Vector3::repeat(0.05))).unwrap();
+        let wall = RenderModel::new(&cuboid(Vector3::new(0.01, 0.3, 0.3))).unwrap();
+        let bodies =
+            [(&model, Isometry3::identity()), (&wall, Isometry3::translation(0.06, 0.0, 0.0))];
+        let settings = ViewpointSettings::preset();
+        let camera = settings.camera(640, 480);
+        let mut noise = SplitMix64::new(1);
+        for _ in 0..10 {
+            let pose = settings.choose(&camera, &bodies, &(-9.81 * Vector3::z()), &mut noise);
+            let eye = pose.inverse() * Point3::origin();
+            assert!(eye.x < 0.1, "{eye}");
+            let distance = eye.coords.norm();
+            assert!((0.3..0.7).contains(&distance), "{distance}");
+            assert!(visible_share(&camera.scaled(0.2), &bodies, &pose) > 0.44);
+        }
+    }
+}
