@@ -41,7 +41,7 @@ pub mod term;
 pub mod trace;
 
 pub use assets::{AssetError, Assets, load_mesh, load_object};
-pub use config::{Config, TermKind};
+pub use config::{Config, StrategyKind, TermKind};
 pub use error::RefineError;
 pub use inspect::{inspect_object, inspect_pose};
 pub use method::Method;
