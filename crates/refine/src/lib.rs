@@ -23,6 +23,7 @@ pub mod bop;
 mod config;
 mod error;
 pub mod frame_file;
+pub mod initial;
 mod inspect;
 mod method;
 pub mod metrics;

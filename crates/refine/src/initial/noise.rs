@@ -6,6 +6,8 @@ use std::str::FromStr;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use prehend_geometry::SplitMix64;
 
+use super::Target;
+
 /// How wrong initial poses are. All errors are of the pose's own translation and rotation, those that PE and OE
 /// measure, so that the stated means are met for any choice of the model's origin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -51,6 +53,24 @@ impl NoiseLevel {
             Translation3::from(truth.translation.vector + offset),
             UnitQuaternion::from_scaled_axis(turn) * truth.rotation,
         )
+    }
+}
+
+impl NoiseLevel {
+    /// As [`perturb`](Self::perturb) with random numbers that depend on `seed` and the target alone, so that the poses
+    /// of a part of a dataset are those of the whole.
+    pub fn perturb_target(
+        self,
+        truth: &Isometry3<f64>,
+        seed: u64,
+        target: &Target,
+    ) -> Isometry3<f64> {
+        let Target { scene_id, im_id, obj_id, instance } = *target;
+        let ids = [scene_id.into(), im_id.into(), obj_id.into(), instance as u64];
+        let mix = |state: u64, id: u64| {
+            (state ^ id).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29)
+        };
+        self.perturb(truth, &mut SplitMix64::new(ids.into_iter().fold(seed, mix)))
     }
 }
 
@@ -137,6 +157,18 @@ mod tests {
             towards += usize::from(along < 0.0);
         }
         assert!((900..1100).contains(&towards), "{towards}");
+    }
+
+    #[test]
+    fn targets_have_errors_of_their_own() {
+        let of = |seed, im_id| {
+            let target = Target { scene_id: 1, im_id, obj_id: 5, instance: 0 };
+            NoiseLevel::High.perturb_target(&truth(), seed, &target)
+        };
+        assert_eq!(of(1, 0), of(1, 0));
+        assert!(pe_cm(&of(1, 0), &of(1, 1)) > 1e-3 && pe_cm(&of(1, 0), &of(2, 0)) > 1e-3);
+        let mean: f64 = (0..2000).map(|im| pe_cm(&of(0, im), &truth()) / 2000.0).sum();
+        assert!((mean / 2.21 - 1.0).abs() < 0.04, "{mean}");
     }
 
     #[test]

@@ -549,6 +549,18 @@ fn hopeless_runs() {
             "refine --dataset ds --poses init.csv --terms smell --out refined.csv",
             "unknown term",
         ),
+        (
+            "unknown method",
+            |_| (),
+            "refine --dataset ds --poses init.csv --method magic --out refined.csv",
+            "unknown method: one of combined, ",
+        ),
+        (
+            "terms of a method without",
+            |_| (),
+            "refine --dataset ds --poses init.csv --method icp --terms depth --out refined.csv",
+            "error: --terms: the method icp uses depth alone",
+        ),
     ];
     for (name, make, arguments, expected) in cases {
         let place = workplace();
