@@ -67,9 +67,8 @@ impl NoiseLevel {
     ) -> Isometry3<f64> {
         let Target { scene_id, im_id, obj_id, instance } = *target;
         let ids = [scene_id.into(), im_id.into(), obj_id.into(), instance as u64];
-        let mix = |state: u64, id: u64| {
-            (state ^ id).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29)
-        };
+        let mix =
+            |state: u64, id: u64| (state ^ id).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29);
         self.perturb(truth, &mut SplitMix64::new(ids.into_iter().fold(seed, mix)))
     }
 }
@@ -103,7 +102,8 @@ fn along_ray(place: &Vector3<f64>, random: &mut SplitMix64) -> (Vector3<f64>, Ve
     let side = if between(0.0, 1.0) < 0.5 { -1.0 } else { 1.0 };
     let angle = between(2.5, 6.6).to_radians();
     let across = direction(random);
-    let across = (across - ray * ray.dot(&across)).try_normalize(1e-9).unwrap_or_else(Vector3::zeros);
+    let across =
+        (across - ray * ray.dot(&across)).try_normalize(1e-9).unwrap_or_else(Vector3::zeros);
     let offset = ray * (side * share) + across * (1.0 - share * share).sqrt();
     (offset * length, direction(random) * angle)
 }
@@ -137,7 +137,10 @@ mod tests {
                 mean += (pose.translation.vector - truth().translation.vector) / f64::from(n);
             }
             // The standard deviation of a length is 0.42 of its mean: 0.3 % of the mean of 20 000.
-            assert!((sums[0] / pe - 1.0).abs() < 0.01 && (sums[1] / oe - 1.0).abs() < 0.01, "{sums:?}");
+            assert!(
+                (sums[0] / pe - 1.0).abs() < 0.01 && (sums[1] / oe - 1.0).abs() < 0.01,
+                "{sums:?}"
+            );
             assert!(mean.norm() < 0.02 * pe * 1e-2, "{mean}");
         }
     }

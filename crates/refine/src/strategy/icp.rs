@@ -113,7 +113,8 @@ mod tests {
     fn it_descends_and_its_own_optimum_is_not_the_truth() {
         let scene = default_scene(1).unwrap();
         let start = State::new(&scene.observation, &scene.object, &scene.truth).unwrap();
-        let start = start.moved(Block::ObjectPose, &Vector6::new(4e-3, -3e-3, 5e-3, 0.05, 0.0, 0.04));
+        let start =
+            start.moved(Block::ObjectPose, &Vector6::new(4e-3, -3e-3, 5e-3, 0.05, 0.0, 0.04));
         let mut last = start.clone();
         let icp = Icp { settings: IcpSettings::default() };
         let trace = icp
@@ -126,7 +127,8 @@ mod tests {
         // Closest points are matched anew at each step, so the value hardly ever rises.
         assert!(values.windows(2).all(|v| v[1] <= v[0] * (1.0 + 1e-3)), "{values:?}");
         assert!(values[values.len() - 1] < 0.9 * values[0]);
-        let (pe, oe) = (pe_cm(&last.t_cam_object, &scene.truth), oe_deg(&last.t_cam_object, &scene.truth));
+        let (pe, oe) =
+            (pe_cm(&last.t_cam_object, &scene.truth), oe_deg(&last.t_cam_object, &scene.truth));
         // Matched with what cannot be seen, it leaves even a good pose.
         assert!(pe > 0.5 && pe < 10.0, "{pe} cm, {oe}°");
     }

@@ -85,7 +85,12 @@ struct Point {
 }
 
 /// The sum of robust losses of the points' distances to the planes of the faces nearest to them.
-fn match_all(cloud: &mut [Point], object: &Object, state: &State, kernel: Kernel) -> NormalEquations {
+fn match_all(
+    cloud: &mut [Point],
+    object: &Object,
+    state: &State,
+    kernel: Kernel,
+) -> NormalEquations {
     let t_object_cam = state.t_cam_object.inverse();
     let centre = state.centre().into();
     let of_point = |point: &mut Point| -> Option<(Point3<f64>, Match)> {

@@ -63,7 +63,10 @@ fn methods_are_picked_by_name_and_changed_by_options() {
     let two = trace("--method depth --terms depth,tactile --iterations 1");
     assert_eq!(two["trace"]["terms"], json!(["depth", "tactile"]));
     let robust = trace("--method robust-icp");
-    assert_eq!((&robust["iteration"], &robust["trace"]["terms"]), (&json!(60), &json!(["robust-icp"])));
+    assert_eq!(
+        (&robust["iteration"], &robust["trace"]["terms"]),
+        (&json!(60), &json!(["robust-icp"]))
+    );
     let weak = trace("--method icp --iterations 5");
     assert_eq!(weak["iteration"], json!(5));
     // The checkpoint is seldom the last pose of a method that drags the object away.
@@ -254,7 +257,9 @@ fn help_names_what_is_needed() {
     let place = Workplace::new();
     let help = place.succeed("--help");
     assert!(
-        ["refine", "initial", "eval", "check", "millimetres", "Exit codes"].iter().all(|w| help.contains(w))
+        ["refine", "initial", "eval", "check", "millimetres", "Exit codes"]
+            .iter()
+            .all(|w| help.contains(w))
     );
     let help = place.succeed("refine --help");
     assert!(help.contains("prehend refine --dataset <DIR> --poses <FILE> --out <FILE> [OPTIONS]"));

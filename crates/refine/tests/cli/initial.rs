@@ -11,9 +11,8 @@ fn noise_is_of_the_level_and_the_same_for_a_seed() {
     let truth = default_scene(1).unwrap().truth;
     let errors = |level: &str, seed: u32| {
         let out = format!("{level}-{seed}.csv");
-        let told = place.succeed(&format!(
-            "initial --dataset ds --noise {level} --seed {seed} --out {out}"
-        ));
+        let told = place
+            .succeed(&format!("initial --dataset ds --noise {level} --seed {seed} --out {out}"));
         assert_eq!(told, format!("2 poses written to {out}\n"));
         let rows = place.poses(&out);
         let ids: Vec<_> = rows.iter().map(|r| (r.scene_id, r.im_id, r.obj_id, r.time)).collect();
@@ -71,7 +70,8 @@ fn a_list_of_targets_says_what_to_search_for() {
     place.remove("ds/test_targets_bop19.json");
     place.copy("ds/models/obj_000005.ply", "ds/models/obj_000006.ply");
     let said = search(&place);
-    let expected = "ds/test_targets_bop19.json: no list of targets, and there is not just one object";
+    let expected =
+        "ds/test_targets_bop19.json: no list of targets, and there is not just one object";
     assert!(said.code == 1 && said.err.contains(expected), "{}", said.err);
     let said = place.prehend("initial --dataset ds --search --targets none.json --out f.csv");
     assert!(said.err.contains("none.json: no such file"), "{}", said.err);
@@ -85,7 +85,10 @@ fn faults_are_named_and_nothing_is_written() {
         ("--noise loud --out f.csv", "unknown noise level"),
         ("--out f.csv", "--noise <LEVEL>"),
         ("--noise low --search --out f.csv", "cannot be used with"),
-        ("--noise low --scene 7 --out f.csv", "nothing is of the scenes, images and objects asked for"),
+        (
+            "--noise low --scene 7 --out f.csv",
+            "nothing is of the scenes, images and objects asked for",
+        ),
         ("--noise low --out no/f.csv", "no/f.csv: cannot be written"),
     ] {
         let said = place.prehend(&format!("initial --dataset ds {arguments}"));

@@ -56,13 +56,19 @@ impl Evidence {
             for (taxel, force) in robot.taxels.iter().zip(&reading.forces) {
                 let link = robot.tree.link_index(&taxel.link);
                 let link = link.and_then(|i| posed.t_world_links().get(i));
-                let link = link.ok_or_else(|| RefineError::TaxelLink { link: taxel.link.clone() })?;
+                let link =
+                    link.ok_or_else(|| RefineError::TaxelLink { link: taxel.link.clone() })?;
                 let list = if force.norm() > touch_force { &mut touched } else { &mut outside };
                 list.push(link * taxel.position);
             }
         }
         let map = SightMap::new(observation, hand);
-        Ok(Self { points: shuffled(places.into_iter().zip(normals).collect()), touched, outside, map })
+        Ok(Self {
+            points: shuffled(places.into_iter().zip(normals).collect()),
+            touched,
+            outside,
+            map,
+        })
     }
 }
 

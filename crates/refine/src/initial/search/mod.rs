@@ -94,9 +94,8 @@ impl PoseSearch {
         let rough = Rough { object: &self.object, lattice: &self.lattice, evidence: &evidence };
         let placed = self.place(&rough);
         let turned = self.turn(&rough, &placed);
-        let judge = |resolution| {
-            Fine::new(observation, &self.object, robot, &hand, resolution, settings)
-        };
+        let judge =
+            |resolution| Fine::new(observation, &self.object, robot, &hand, resolution, settings);
         let coarse = judge(settings.coarse_resolution)?;
         let seen = evaluate(&turned, |pose| (*pose, coarse.value(pose)));
         let seen = distinct(seen, settings.seen, 6e-3, 6.0);

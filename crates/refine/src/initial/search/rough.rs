@@ -144,7 +144,8 @@ impl Rough<'_> {
         evidence.points[..used].iter().for_each(|(p, _)| add(p, share(1.0, used), false));
         let touched = share(TOUCH_WEIGHT, evidence.touched.len());
         evidence.touched.iter().for_each(|p| add(p, touched, false));
-        let outside = evidence.outside.iter().step_by(evidence.outside.len().div_ceil(points).max(1));
+        let outside =
+            evidence.outside.iter().step_by(evidence.outside.len().div_ceil(points).max(1));
         let weight = share(OUTSIDE_WEIGHT, points.min(evidence.outside.len()));
         outside.for_each(|p| add(p, weight, true));
         (gradient, matrix)

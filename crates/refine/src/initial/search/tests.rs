@@ -31,7 +31,8 @@ fn vision_alone_finds_it_too() {
 
 #[test]
 fn any_number_of_threads_finds_the_same() {
-    let few = SearchSettings { rotations: 200, placed: 40, turned: 16, ..SearchSettings::default() };
+    let few =
+        SearchSettings { rotations: 200, placed: 40, turned: 16, ..SearchSettings::default() };
     let found = [1, 2, 3].map(|threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| search(few.clone())).unwrap()
