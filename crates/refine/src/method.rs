@@ -45,8 +45,7 @@ macro_rules! alone {
 }
 
 /// Without the pull to the initial pose.
-fn free(config: Config) -> Config {
-    let mut config = config;
+fn free(mut config: Config) -> Config {
     config.physics.displacement_sigma = f64::INFINITY;
     config
 }

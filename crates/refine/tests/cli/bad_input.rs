@@ -513,7 +513,7 @@ fn files_of_a_scene() {
 #[test]
 fn hopeless_runs() {
     type Case = (&'static str, fn(&Workplace), &'static str, &'static str);
-    let cases: [Case; 10] = [
+    let cases: [Case; 12] = [
         ("no poses", |p| p.remove("init.csv"), REFINE, "error: init.csv: no such file"),
         ("empty poses", |p| p.write("init.csv", ""), REFINE, "error: init.csv: the file is empty"),
         (
