@@ -1,6 +1,6 @@
 //! Options that several commands share.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use clap::Args;
@@ -60,6 +60,25 @@ impl Selection {
     pub(crate) fn admits_image(&self, scene_id: u32, im_id: u32) -> bool {
         admits(&self.scene, scene_id) && admits(&self.image, im_id)
     }
+
+    /// The rows of the results file `poses` that are meant, and what is wrong with the others.
+    pub(crate) fn jobs(&self, poses: &Path) -> anyhow::Result<(Vec<Job>, Vec<String>)> {
+        let ReadResults { rows, instances, errors } = read_results(poses)?;
+        let file = poses.display();
+        if rows.is_empty() && errors.is_empty() {
+            bail!("{file}: no poses: there is nothing but a header");
+        }
+        let jobs: Vec<Job> = rows
+            .into_iter()
+            .zip(instances)
+            .filter(|(r, _)| self.admits(r.scene_id, r.im_id, r.obj_id))
+            .map(|(row, instance)| Job { row, instance })
+            .collect();
+        if jobs.is_empty() && errors.is_empty() {
+            bail!("{file}: no pose is of the scenes, images and objects asked for");
+        }
+        Ok((jobs, errors.iter().map(ToString::to_string).collect()))
+    }
 }
 
 /// An empty list admits everything.
@@ -73,23 +92,9 @@ impl Input {
         self.selection.open()
     }
 
-    /// The rows that pass the filter, and what is wrong with the others.
+    /// See [`Selection::jobs`].
     pub(crate) fn jobs(&self) -> anyhow::Result<(Vec<Job>, Vec<String>)> {
-        let ReadResults { rows, instances, errors } = read_results(&self.poses)?;
-        let file = self.poses.display();
-        if rows.is_empty() && errors.is_empty() {
-            bail!("{file}: no poses: there is nothing but a header");
-        }
-        let jobs: Vec<Job> = rows
-            .into_iter()
-            .zip(instances)
-            .filter(|(r, _)| self.selection.admits(r.scene_id, r.im_id, r.obj_id))
-            .map(|(row, instance)| Job { row, instance })
-            .collect();
-        if jobs.is_empty() && errors.is_empty() {
-            bail!("{file}: no pose is of the scenes, images and objects asked for");
-        }
-        Ok((jobs, errors.iter().map(ToString::to_string).collect()))
+        self.selection.jobs(&self.poses)
     }
 }
 

@@ -15,7 +15,7 @@ use prehend_refine::{
 };
 use serde_json::json;
 
-use crate::options::{Input, Job, label};
+use crate::options::{Job, Selection, label};
 use crate::outcome::Outcome;
 use crate::output::say;
 use crate::{frame, progress};
@@ -26,12 +26,14 @@ use crate::{frame, progress};
                             prehend refine --frame <FILE> [OPTIONS]"
 )]
 #[command(mut_arg("dataset", |a| a.required(false).required_unless_present("frame")))]
-#[command(mut_arg("poses", |a| a.required(false).required_unless_present("frame")))]
 pub(crate) struct Arguments {
     #[command(flatten)]
-    input: Option<Input>,
+    selection: Option<Selection>,
+    /// Poses on the dataset's images, as a BOP results file
+    #[arg(long, value_name = "FILE", required_unless_present = "frame", help_heading = "Input")]
+    poses: Option<PathBuf>,
     /// Instead of a dataset, one frame described by a JSON file (see docs/FRAME.md)
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["Input", "Selection", "report"], help_heading = "Input")]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["Selection", "poses", "report"], help_heading = "Input")]
     frame: Option<PathBuf>,
     /// Write the refined poses here: a BOP results file, or JSON with --frame (then optional)
     ///
@@ -139,18 +141,24 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     if let Some(threads) = arguments.threads {
         rayon::ThreadPoolBuilder::new().num_threads(threads.get()).build_global()?;
     }
-    match (&arguments.frame, &arguments.input, &arguments.out) {
-        (Some(file), ..) => {
-            frame::run(file, &arguments.method, arguments.out.as_deref(), arguments.json)
+    let Arguments { frame, selection, poses, out, .. } = arguments;
+    match (frame, selection, poses, out) {
+        (Some(file), ..) => frame::run(file, &arguments.method, out.as_deref(), arguments.json),
+        (None, Some(selection), Some(poses), Some(out)) => {
+            dataset_run(arguments, selection, poses, out)
         }
-        (None, Some(input), Some(out)) => dataset_run(arguments, input, out),
         _ => bail!("give --dataset, --poses and --out, or --frame"),
     }
 }
 
-fn dataset_run(arguments: &Arguments, input: &Input, out: &Path) -> anyhow::Result<Outcome> {
-    let dataset = input.open()?;
-    let (jobs, mut failures) = input.jobs()?;
+fn dataset_run(
+    arguments: &Arguments,
+    selection: &Selection,
+    poses: &Path,
+    out: &Path,
+) -> anyhow::Result<Outcome> {
+    let dataset = selection.open()?;
+    let (jobs, mut failures) = selection.jobs(poses)?;
     let method = &arguments.method;
     let config = method.config()?;
     let mut assets = Assets::new(&dataset, method.seed());
