@@ -16,7 +16,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! [`bop`] reads and writes datasets, [`Scorer`] and [`metrics`] measure poses, [`report`] draws them.
+//! [`initial`] makes poses to start from, [`Method`] names ways to refine them, [`bop`] reads and writes datasets, [`Scorer`] and [`metrics`] measure poses, [`report`] draws them.
 
 mod assets;
 pub mod bop;
