@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use crate::strategy::HeuristicSettings;
+use crate::strategy::{HeuristicSettings, IcpSettings, RobustIcpSettings};
 use crate::term::{DepthSettings, PhysicsSettings, RenderingSettings, TactileSettings};
 
 /// One of the four kinds of evidence.
@@ -50,15 +50,49 @@ impl FromStr for TermKind {
     }
 }
 
+/// One of the ways from an initial pose to a refined one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum StrategyKind {
+    /// The paper's heuristic over the [`terms`](Config::terms).
+    Heuristic,
+    /// The paper's ICP, point to point; it uses depth alone.
+    Icp,
+    /// Robust point-to-plane ICP; it uses depth alone.
+    RobustIcp,
+}
+
+impl StrategyKind {
+    /// The name used in reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Heuristic => "heuristic",
+            Self::Icp => "icp",
+            Self::RobustIcp => "robust-icp",
+        }
+    }
+}
+
+impl fmt::Display for StrategyKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
 /// Settings of a refinement. The default is the paper's method with all four terms.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Config {
-    /// Terms to use.
+    /// How evidence moves the pose.
+    pub strategy: StrategyKind,
+    /// Terms to use; only the heuristic has any.
     pub terms: Vec<TermKind>,
     /// Return the pose of lowest rendering value seen, instead of the last one.
     pub checkpoint: bool,
     /// Settings of the heuristic.
     pub heuristic: HeuristicSettings,
+    /// Settings of the paper's ICP.
+    pub icp: IcpSettings,
+    /// Settings of the robust ICP.
+    pub robust_icp: RobustIcpSettings,
     /// Settings of the physics term.
     pub physics: PhysicsSettings,
     /// Settings of the rendering term.
@@ -72,13 +106,42 @@ pub struct Config {
 impl Default for Config {
     fn default() -> Self {
         Self {
+            strategy: StrategyKind::Heuristic,
             terms: TermKind::ALL.to_vec(),
             checkpoint: true,
             heuristic: HeuristicSettings::default(),
+            icp: IcpSettings::default(),
+            robust_icp: RobustIcpSettings::default(),
             physics: PhysicsSettings::default(),
             rendering: RenderingSettings::default(),
             depth: DepthSettings::default(),
             tactile: TactileSettings::default(),
         }
+    }
+}
+
+impl Config {
+    /// Iterations at most of the strategy.
+    pub fn iterations(&self) -> usize {
+        match self.strategy {
+            StrategyKind::Heuristic => self.heuristic.iterations,
+            StrategyKind::Icp => self.icp.iterations,
+            StrategyKind::RobustIcp => self.robust_icp.iterations,
+        }
+    }
+
+    /// Sets [`iterations`](Self::iterations).
+    pub fn set_iterations(&mut self, iterations: usize) {
+        match self.strategy {
+            StrategyKind::Heuristic => self.heuristic.iterations = iterations,
+            StrategyKind::Icp => self.icp.iterations = iterations,
+            StrategyKind::RobustIcp => self.robust_icp.iterations = iterations,
+        }
+    }
+
+    /// Runs all the iterations however small the steps become; the robust ICP always does.
+    pub fn set_exhaustive(&mut self) {
+        self.heuristic.exhaustive = true;
+        self.icp.last_step = f64::NEG_INFINITY;
     }
 }

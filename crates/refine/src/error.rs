@@ -54,6 +54,17 @@ pub enum RefineError {
     /// No term was asked for.
     #[error("no term to refine by")]
     NoTerms,
+    /// A search has come to nothing.
+    #[error("no pose of the object fits what is seen")]
+    NothingFits,
+    /// A setting is out of range.
+    #[error("{name} {problem}")]
+    Setting {
+        /// The field of the settings.
+        name: &'static str,
+        /// What is wrong with it.
+        problem: String,
+    },
     /// Kinematics failed.
     #[error(transparent)]
     Robot(#[from] RobotError),

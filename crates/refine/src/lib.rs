@@ -16,13 +16,14 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! [`bop`] reads and writes datasets, [`Scorer`] and [`metrics`] measure poses, [`report`] draws them.
+//! [`initial`] makes poses to start from, [`Method`] names ways to refine them, [`bop`] reads and writes datasets, [`Scorer`] and [`metrics`] measure poses, [`report`] draws them.
 
 mod assets;
 pub mod bop;
 mod config;
 mod error;
 pub mod frame_file;
+pub mod initial;
 mod inspect;
 mod method;
 pub mod metrics;
@@ -42,7 +43,7 @@ pub mod term;
 pub mod trace;
 
 pub use assets::{AssetError, Assets, load_mesh, load_object};
-pub use config::{Config, TermKind};
+pub use config::{Config, StrategyKind, TermKind};
 pub use error::RefineError;
 pub use inspect::{inspect_object, inspect_pose};
 pub use method::Method;

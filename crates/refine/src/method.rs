@@ -1,6 +1,6 @@
 //! Named ways to refine a pose: what `--method` picks and what studies compare.
 
-use crate::{Config, TermKind};
+use crate::{Config, StrategyKind, TermKind};
 
 /// A way to refine a pose, with all of its settings.
 #[derive(Clone, Copy, Debug)]
@@ -44,7 +44,18 @@ macro_rules! alone {
     };
 }
 
-static METHODS: [Method; 11] = [
+/// Without the pull to the initial pose.
+fn free(mut config: Config) -> Config {
+    config.physics.displacement_sigma = f64::INFINITY;
+    config
+}
+
+/// A baseline that uses depth alone.
+fn baseline(strategy: StrategyKind, checkpoint: bool) -> Config {
+    Config { strategy, terms: Vec::new(), checkpoint, ..Config::default() }
+}
+
+static METHODS: [Method; 16] = [
     Method {
         name: "combined",
         summary: "all four gradients, checkpointing",
@@ -58,11 +69,12 @@ static METHODS: [Method; 11] = [
     Method {
         name: "combined-free",
         summary: "all four gradients, no regularisation, the last pose",
-        config: || {
-            let mut config = Config { checkpoint: false, ..Config::default() };
-            config.physics.displacement_sigma = f64::INFINITY;
-            config
-        },
+        config: || free(Config { checkpoint: false, ..Config::default() }),
+    },
+    Method {
+        name: "combined-free-best",
+        summary: "all four gradients, no regularisation, checkpointing",
+        config: || free(Config::default()),
     },
     alone!("depth", TermKind::Depth, false),
     alone!("depth-best", TermKind::Depth, true),
@@ -72,6 +84,28 @@ static METHODS: [Method; 11] = [
     alone!("rendering-best", TermKind::Rendering, true),
     alone!("physics", TermKind::Physics, false),
     alone!("physics-best", TermKind::Physics, true),
+    Method {
+        name: "physics-free",
+        summary: "this gradient alone, no regularisation, the last pose",
+        config: || {
+            free(Config { terms: vec![TermKind::Physics], checkpoint: false, ..Config::default() })
+        },
+    },
+    Method {
+        name: "icp",
+        summary: "the paper's ICP, point to point, the last pose",
+        config: || baseline(StrategyKind::Icp, false),
+    },
+    Method {
+        name: "icp-best",
+        summary: "the paper's ICP, point to point, checkpointing",
+        config: || baseline(StrategyKind::Icp, true),
+    },
+    Method {
+        name: "robust-icp",
+        summary: "robust point-to-plane ICP, a strong baseline, the last pose",
+        config: || baseline(StrategyKind::RobustIcp, false),
+    },
 ];
 
 #[cfg(test)]

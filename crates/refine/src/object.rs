@@ -1,6 +1,6 @@
 //! The object whose pose is sought, prepared for every term.
 
-use nalgebra::{Matrix3, Point3};
+use nalgebra::{Matrix3, Point3, Vector3};
 use prehend_geometry::closest::ClosestPoints;
 use prehend_geometry::mass::{MassError, MassProperties, mass_properties};
 use prehend_geometry::sample::{SurfaceSample, surface_samples};
@@ -45,6 +45,8 @@ pub struct Object {
     /// Surface area \[m²\].
     pub area: f64,
     pub(crate) surface: ClosestPoints,
+    /// Outward unit normal of each face that `surface` may answer; zero for a face without area.
+    pub(crate) normals: Vec<Vector3<f64>>,
     pub(crate) samples: Vec<SurfaceSample>,
     pub(crate) model: RenderModel,
 }
@@ -120,8 +122,10 @@ impl Object {
         if !(inertial.mass.is_finite() && inertial.mass > 0.0) {
             return Err(fail(format!("the mass {} kg is not positive", inertial.mass)));
         }
+        let unit = |f| solid.area_vector(f).try_normalize(0.0).unwrap_or_else(Vector3::zeros);
         Ok(Self {
             name: name.to_owned(),
+            normals: (0..solid.faces.len()).map(unit).collect(),
             surface: ClosestPoints::new(&solid).map_err(|e| fail(e.to_string()))?,
             samples: surface_samples(&solid, SURFACE_SAMPLES, seed),
             model: RenderModel::new(&mesh).map_err(|e| fail(e.to_string()))?,

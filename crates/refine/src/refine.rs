@@ -5,10 +5,10 @@ use std::sync::Arc;
 use nalgebra::Isometry3;
 use prehend_render::{DepthImage, depth_map};
 
-use crate::strategy::Heuristic;
+use crate::strategy::{Heuristic, Icp, RobustIcp};
 use crate::term::{DepthTerm, PhysicsTerm, RenderingTerm, TactileTerm, Term};
-use crate::trace::Trace;
-use crate::{Config, Object, Observation, RefineError, Robot, State, TermKind};
+use crate::trace::{Iteration, Trace};
+use crate::{Config, Object, Observation, RefineError, Robot, State, StrategyKind, TermKind};
 
 /// The outcome of a refinement.
 #[derive(Clone, Debug)]
@@ -30,13 +30,13 @@ pub struct Progress {
     pub iterations: usize,
 }
 
-/// Refines `initial` (object → camera \[m\]) by the terms of `config`.
+/// Refines `initial` (object → camera \[m\]) by the strategy of `config`.
 ///
 /// `robot` may be absent if the terms do not need it; without it, or without its state in the
 /// observation, nothing is known to hide the object.
 ///
 /// # Errors
-/// If the observation lacks what a term needs, or the initial pose cannot be seen.
+/// If the observation lacks what the strategy or a term needs, or the initial pose cannot be seen.
 pub fn refine(
     observation: &Observation,
     object: &Arc<Object>,
@@ -60,13 +60,17 @@ pub fn refine_with(
     mut observe: impl FnMut(Progress) -> bool,
 ) -> Result<RefinedPose, RefineError> {
     let state = State::new(observation, object, initial)?;
-    let terms = standard_terms(observation, object, robot, &state, config)?;
-    if terms.is_empty() {
-        return Err(RefineError::NoTerms);
+    let kinds = match config.strategy {
+        StrategyKind::Heuristic if config.terms.is_empty() => return Err(RefineError::NoTerms),
+        StrategyKind::Heuristic => config.terms.as_slice(),
+        StrategyKind::Icp | StrategyKind::RobustIcp => &[],
+    };
+    if let (Some(robot), Some(hand)) = (robot, &observation.hand) {
+        robot.check_joints(&hand.joints)?;
     }
 
     // The judge of checkpoints: the rendering term among the terms, or one of its own.
-    let judge_index = config.terms.iter().position(|&k| k == TermKind::Rendering);
+    let judge_index = kinds.iter().position(|&k| k == TermKind::Rendering);
     let own_judge = config.checkpoint && judge_index.is_none();
     let judge = own_judge
         .then(|| {
@@ -75,8 +79,7 @@ pub fn refine_with(
         })
         .transpose()?;
     let mut best = (f64::INFINITY, 0, state.t_cam_object);
-    let heuristic = Heuristic { settings: config.heuristic.clone() };
-    let trace = heuristic.run(&terms, state, object.radius, |state, iteration| {
+    let visit = |state: &State, iteration: &Iteration| {
         let score = match (&judge, judge_index) {
             (Some(judge), _) => {
                 let mut lit = state.clone();
@@ -89,8 +92,22 @@ pub fn refine_with(
         if !config.checkpoint || score < best.0 {
             best = (score, iteration.index, state.t_cam_object);
         }
-        observe(Progress { iteration: iteration.index, iterations: config.heuristic.iterations })
-    });
+        observe(Progress { iteration: iteration.index, iterations: config.iterations() })
+    };
+    let trace = match config.strategy {
+        StrategyKind::Heuristic => {
+            let terms = standard_terms(observation, object, robot, &state, config)?;
+            let heuristic = Heuristic { settings: config.heuristic.clone() };
+            heuristic.run(&terms, state, object.radius, visit)
+        }
+        StrategyKind::Icp => {
+            Icp { settings: config.icp.clone() }.run(observation, object, state, visit)?
+        }
+        StrategyKind::RobustIcp => {
+            let robust = RobustIcp { settings: config.robust_icp.clone() };
+            robust.run(observation, object, state, visit)?
+        }
+    };
     Ok(RefinedPose { t_cam_object: best.2, iteration: best.1, trace })
 }
 

@@ -7,11 +7,11 @@ use serde::Serialize;
 pub struct Iteration {
     /// Number of the iteration; 0 is the initial pose.
     pub index: usize,
-    /// Value of each term \[nats\].
+    /// Value of each term \[nats\]; a strategy without terms says what its one value is.
     pub values: Vec<f64>,
     /// Weight αᵢ of each term's step.
     pub weights: Vec<f64>,
-    /// Length limit of the steps \[m\].
+    /// Length limit of the steps \[m\]; for a strategy without terms, the length of the step taken next.
     pub step: f64,
 }
 

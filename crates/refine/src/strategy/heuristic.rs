@@ -1,8 +1,9 @@
 //! The paper's heuristic: a candidate step along every gradient, weighted by what each one achieves.
 
-use nalgebra::{Matrix6, Vector6};
+use nalgebra::Vector6;
 use rayon::prelude::*;
 
+use super::step::preconditioned_step;
 use crate::trace::{Iteration, Trace};
 use crate::{Block, Normal, State, Term};
 
@@ -120,29 +121,9 @@ impl Candidate {
     }
 }
 
-/// −(H + μ)⁻¹ g in units where a radian counts `radius` metres, no longer than `limit`; and its length
-/// in these units \[m\].
-fn preconditioned_step(normal: &Normal, radius: f64, limit: f64) -> (Vector6<f64>, f64) {
-    let unit = Vector6::new(1.0, 1.0, 1.0, 1.0 / radius, 1.0 / radius, 1.0 / radius);
-    let gradient = Vector6::from_column_slice(normal.gradient().as_slice()).component_mul(&unit);
-    let hessian = Matrix6::from_column_slice(normal.hessian().as_slice());
-    let hessian = Matrix6::from_fn(|r, c| unit[r] * hessian[(r, c)] * unit[c]);
-    // Directions that the term says nothing about (a cylinder's spin) must not become long steps.
-    let damping = 1e-3 * hessian.trace() / 6.0 + f64::MIN_POSITIVE;
-    let step = (hessian + Matrix6::identity() * damping)
-        .cholesky()
-        .map_or_else(Vector6::zeros, |factor| -factor.solve(&gradient));
-    let norm = step.norm();
-    if !(norm.is_finite() && norm > 0.0) {
-        return (Vector6::zeros(), 0.0);
-    }
-    let length = norm.min(limit);
-    (step.component_mul(&unit) * (length / norm), length)
-}
-
 #[cfg(test)]
 mod tests {
-    use nalgebra::{Isometry3, Point3, Vector3};
+    use nalgebra::{Isometry3, Matrix6, Point3, Vector3};
     use prehend_render::Light;
 
     use super::*;

@@ -194,7 +194,7 @@ impl Term for DepthTerm {
 }
 
 /// Some `limit` masked depth pixels as camera-frame points \[m\], on a regular grid of the image.
-fn back_project(observation: &Observation, limit: usize) -> Vec<Point3<f64>> {
+pub(crate) fn back_project(observation: &Observation, limit: usize) -> Vec<Point3<f64>> {
     let depth = &observation.depth;
     let at = |x: usize, y: usize| {
         let z = f64::from(depth.get(x, y)?);

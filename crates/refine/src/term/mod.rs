@@ -5,6 +5,7 @@ mod physics;
 mod rendering;
 mod tactile;
 
+pub(crate) use depth::back_project;
 pub use depth::{DepthSettings, DepthTerm};
 pub use physics::{PhysicsSettings, PhysicsTerm};
 pub use rendering::{RenderingSettings, RenderingTerm};

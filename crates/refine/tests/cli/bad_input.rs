@@ -513,7 +513,7 @@ fn files_of_a_scene() {
 #[test]
 fn hopeless_runs() {
     type Case = (&'static str, fn(&Workplace), &'static str, &'static str);
-    let cases: [Case; 10] = [
+    let cases: [Case; 12] = [
         ("no poses", |p| p.remove("init.csv"), REFINE, "error: init.csv: no such file"),
         ("empty poses", |p| p.write("init.csv", ""), REFINE, "error: init.csv: the file is empty"),
         (
@@ -548,6 +548,18 @@ fn hopeless_runs() {
             |_| (),
             "refine --dataset ds --poses init.csv --terms smell --out refined.csv",
             "unknown term",
+        ),
+        (
+            "unknown method",
+            |_| (),
+            "refine --dataset ds --poses init.csv --method magic --out refined.csv",
+            "unknown method: one of combined, ",
+        ),
+        (
+            "terms of a method without",
+            |_| (),
+            "refine --dataset ds --poses init.csv --method icp --terms depth --out refined.csv",
+            "error: --terms: the method icp uses depth alone",
         ),
     ];
     for (name, make, arguments, expected) in cases {

@@ -49,6 +49,38 @@ fn any_number_of_threads_gives_the_same_bytes() {
 }
 
 #[test]
+fn methods_are_picked_by_name_and_changed_by_options() {
+    let place = Workplace::new();
+    let trace = |arguments: &str| -> Value {
+        let command = "refine --dataset ds --poses ds/init.csv --image 0 --json --out r.csv";
+        let told = place.succeed(&format!("{command} {arguments}"));
+        serde_json::from_str::<Value>(&told).unwrap()["frames"][0].clone()
+    };
+    let depth = trace("--method depth --iterations 3");
+    assert_eq!(depth["trace"]["terms"], json!(["depth"]));
+    assert_eq!(depth["trace"]["iterations"].as_array().unwrap().len(), 4);
+    assert_eq!(depth["iteration"], json!(3));
+    let two = trace("--method depth --terms depth,tactile --iterations 1");
+    assert_eq!(two["trace"]["terms"], json!(["depth", "tactile"]));
+    let robust = trace("--method robust-icp");
+    assert_eq!(
+        (&robust["iteration"], &robust["trace"]["terms"]),
+        (&json!(60), &json!(["robust-icp"]))
+    );
+    let weak = trace("--method icp --iterations 5");
+    assert_eq!(weak["iteration"], json!(5));
+    // The checkpoint is seldom the last pose of a method that drags the object away.
+    let best = trace("--method icp-best --iterations 40");
+    assert!(best["iteration"].as_u64() < Some(40));
+    let last = trace("--method icp-best --no-checkpoint --iterations 5");
+    assert_eq!(last["t_cam_model_mm"], weak["t_cam_model_mm"]);
+    let help = place.succeed("refine --help");
+    for method in prehend_refine::Method::all() {
+        assert!(help.contains(&format!("  {} ", method.name)), "{}", method.name);
+    }
+}
+
+#[test]
 fn filters_choose_rows() {
     let place = Workplace::new();
     place.succeed(&format!("{REFINE} --image 1 --out one.csv"));
@@ -221,7 +253,9 @@ fn help_names_what_is_needed() {
     let place = Workplace::new();
     let help = place.succeed("--help");
     assert!(
-        ["refine", "eval", "check", "millimetres", "Exit codes"].iter().all(|w| help.contains(w))
+        ["refine", "initial", "eval", "check", "millimetres", "Exit codes"]
+            .iter()
+            .all(|w| help.contains(w))
     );
     let help = place.succeed("refine --help");
     assert!(help.contains("prehend refine --dataset <DIR> --poses <FILE> --out <FILE> [OPTIONS]"));

@@ -20,7 +20,7 @@ pub(crate) fn run(
     print: bool,
 ) -> anyhow::Result<Outcome> {
     let input = frame_file::load(file, method.seed())?;
-    let mut config = method.config();
+    let mut config = method.config()?;
     // A frame brings what it has: terms whose evidence is absent drop out unless they were asked for.
     if !method.terms_given() {
         config.terms.retain(|&t| input.offers(t));
@@ -30,7 +30,7 @@ pub(crate) fn run(
     let mut warnings = inspect_object(&object);
     warnings.extend(inspect_pose(&input.observation, &object, robot, &input.t_cam_object));
     warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
-    let bar = progress::bar(config.heuristic.iterations as u64, "refining");
+    let bar = progress::bar(config.iterations() as u64, "refining");
     let refined =
         refine_with(&input.observation, &object, robot, &input.t_cam_object, &config, |p| {
             bar.set_position(p.iteration as u64);

@@ -3,6 +3,7 @@
 mod check;
 mod eval;
 mod frame;
+mod initial;
 mod options;
 mod outcome;
 mod output;
@@ -28,9 +29,10 @@ use clap::{Parser, Subcommand};
 ///
 /// A first session:
 ///
-///   prehend check  --dataset DIR --poses init.csv
-///   prehend refine --dataset DIR --poses init.csv --out refined.csv --report out
-///   prehend eval   --dataset DIR --poses refined.csv
+///   prehend initial --dataset DIR --search --out init.csv
+///   prehend check   --dataset DIR --poses init.csv
+///   prehend refine  --dataset DIR --poses init.csv --out refined.csv --report out
+///   prehend eval    --dataset DIR --poses refined.csv
 ///
 /// Exit codes: 0 all done; 1 nothing could be done; 2 some frames failed and the output has the others.
 #[derive(Parser)]
@@ -44,6 +46,8 @@ struct Arguments {
 enum Command {
     /// Refine initial poses: all those of a dataset, or one described by a JSON file
     Refine(Box<refine::Arguments>),
+    /// Make initial poses: the true ones with errors, or found by a search from sensors alone
+    Initial(initial::Arguments),
     /// Score poses against a dataset's ground truth
     ///
     /// Prints means and medians, overall and by object, of PE and OE (position and rotation error), of
@@ -74,6 +78,7 @@ fn main() -> ExitCode {
     };
     let outcome = match arguments.command {
         Command::Refine(arguments) => refine::run(&arguments),
+        Command::Initial(arguments) => initial::run(&arguments),
         Command::Eval(arguments) => eval::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
         Command::Symmetry(arguments) => symmetry::run(&arguments),

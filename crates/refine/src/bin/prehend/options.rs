@@ -1,20 +1,17 @@
 //! Options that several commands share.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use clap::Args;
 use prehend_refine::bop::{Dataset, DatasetError, ReadResults, ResultRow, read_results};
 
-/// A dataset and poses on it.
+/// A dataset, and which of its images and objects are meant.
 #[derive(Args)]
-pub(crate) struct Input {
+pub(crate) struct Selection {
     /// BOP dataset: the folder that holds models/ and the split (such as test/)
     #[arg(long, value_name = "DIR", help_heading = "Input")]
     pub(crate) dataset: PathBuf,
-    /// Poses on the dataset's images, as a BOP results file
-    #[arg(long, value_name = "FILE", help_heading = "Input")]
-    pub(crate) poses: PathBuf,
     /// Split of the dataset [default: test, or the only one]
     #[arg(long, value_name = "NAME", requires = "dataset", help_heading = "Input")]
     pub(crate) split: Option<String>,
@@ -29,13 +26,23 @@ pub(crate) struct Input {
     pub(crate) object: Vec<u32>,
 }
 
+/// A dataset and poses on it.
+#[derive(Args)]
+pub(crate) struct Input {
+    #[command(flatten)]
+    pub(crate) selection: Selection,
+    /// Poses on the dataset's images, as a BOP results file
+    #[arg(long, value_name = "FILE", help_heading = "Input")]
+    pub(crate) poses: PathBuf,
+}
+
 /// A row of the results file and which of the image's rows it is.
 pub(crate) struct Job {
     pub(crate) row: ResultRow,
     pub(crate) instance: usize,
 }
 
-impl Input {
+impl Selection {
     /// The dataset.
     pub(crate) fn open(&self) -> Result<Dataset, DatasetError> {
         match &self.split {
@@ -44,17 +51,27 @@ impl Input {
         }
     }
 
-    /// The rows that pass the filter, and what is wrong with the others.
-    pub(crate) fn jobs(&self) -> anyhow::Result<(Vec<Job>, Vec<String>)> {
-        let ReadResults { rows, instances, errors } = read_results(&self.poses)?;
-        let file = self.poses.display();
+    /// Whether an object of an image is meant.
+    pub(crate) fn admits(&self, scene_id: u32, im_id: u32, obj_id: u32) -> bool {
+        self.admits_image(scene_id, im_id) && admits(&self.object, obj_id)
+    }
+
+    /// Whether anything in an image is meant.
+    pub(crate) fn admits_image(&self, scene_id: u32, im_id: u32) -> bool {
+        admits(&self.scene, scene_id) && admits(&self.image, im_id)
+    }
+
+    /// The rows of the results file `poses` that are meant, and what is wrong with the others.
+    pub(crate) fn jobs(&self, poses: &Path) -> anyhow::Result<(Vec<Job>, Vec<String>)> {
+        let ReadResults { rows, instances, errors } = read_results(poses)?;
+        let file = poses.display();
         if rows.is_empty() && errors.is_empty() {
             bail!("{file}: no poses: there is nothing but a header");
         }
         let jobs: Vec<Job> = rows
             .into_iter()
             .zip(instances)
-            .filter(|(row, _)| self.admits(row))
+            .filter(|(r, _)| self.admits(r.scene_id, r.im_id, r.obj_id))
             .map(|(row, instance)| Job { row, instance })
             .collect();
         if jobs.is_empty() && errors.is_empty() {
@@ -62,12 +79,22 @@ impl Input {
         }
         Ok((jobs, errors.iter().map(ToString::to_string).collect()))
     }
+}
 
-    fn admits(&self, row: &ResultRow) -> bool {
-        let admits = |list: &[u32], id: u32| list.is_empty() || list.contains(&id);
-        admits(&self.scene, row.scene_id)
-            && admits(&self.image, row.im_id)
-            && admits(&self.object, row.obj_id)
+/// An empty list admits everything.
+fn admits(list: &[u32], id: u32) -> bool {
+    list.is_empty() || list.contains(&id)
+}
+
+impl Input {
+    /// The dataset.
+    pub(crate) fn open(&self) -> Result<Dataset, DatasetError> {
+        self.selection.open()
+    }
+
+    /// See [`Selection::jobs`].
+    pub(crate) fn jobs(&self) -> anyhow::Result<(Vec<Job>, Vec<String>)> {
+        self.selection.jobs(&self.poses)
     }
 }
 

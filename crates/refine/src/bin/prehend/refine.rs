@@ -10,11 +10,12 @@ use clap::Args;
 use prehend_refine::bop::{ResultRow, check_writable, share_image_times, write_results};
 use prehend_refine::report::{FrameReport, Report};
 use prehend_refine::{
-    AssetError, Assets, Config, RefinedPose, TermKind, inspect_object, inspect_pose, refine_with,
+    self as refine, AssetError, Assets, Config, RefinedPose, StrategyKind, TermKind,
+    inspect_object, inspect_pose, refine_with,
 };
 use serde_json::json;
 
-use crate::options::{Input, Job, label};
+use crate::options::{Job, Selection, label};
 use crate::outcome::Outcome;
 use crate::output::say;
 use crate::{frame, progress};
@@ -25,12 +26,14 @@ use crate::{frame, progress};
                             prehend refine --frame <FILE> [OPTIONS]"
 )]
 #[command(mut_arg("dataset", |a| a.required(false).required_unless_present("frame")))]
-#[command(mut_arg("poses", |a| a.required(false).required_unless_present("frame")))]
 pub(crate) struct Arguments {
     #[command(flatten)]
-    input: Option<Input>,
+    selection: Option<Selection>,
+    /// Poses on the dataset's images, as a BOP results file
+    #[arg(long, value_name = "FILE", required_unless_present = "frame", help_heading = "Input")]
+    poses: Option<PathBuf>,
     /// Instead of a dataset, one frame described by a JSON file (see docs/FRAME.md)
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["Input", "report"], help_heading = "Input")]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["Selection", "poses", "report"], help_heading = "Input")]
     frame: Option<PathBuf>,
     /// Write the refined poses here: a BOP results file, or JSON with --frame (then optional)
     ///
@@ -53,24 +56,25 @@ pub(crate) struct Arguments {
 /// How to refine.
 #[derive(Args)]
 pub(crate) struct Method {
-    /// How evidence moves the pose: `heuristic` weighs one step along each term's gradient by its success
+    /// How to refine, with settings that the options below change
     #[arg(
         long,
         value_name = "NAME",
-        default_value = "heuristic",
-        value_parser = ["heuristic"],
-        hide_possible_values = true,
+        default_value = "combined",
+        value_parser = named,
+        long_help = method_help(),
         help_heading = "Method"
     )]
-    strategy: String,
+    method: &'static refine::Method,
     /// Iterations at most; the search ends earlier when the steps become negligible
-    #[arg(long, value_name = "N", default_value_t = 400, help_heading = "Method")]
-    iterations: usize,
+    /// [default: 400; robust-icp: 60]
+    #[arg(long, value_name = "N", help_heading = "Method")]
+    iterations: Option<usize>,
     /// Run all the iterations, however small the steps become
     #[arg(long, help_heading = "Method")]
     exhaustive: bool,
     /// Evidence to use, a list of physics, rendering, depth and tactile such as "rendering,depth"
-    /// [default: all; with --frame, what the frame brings]
+    /// [default: the method's; with --frame, of those what the frame brings]
     #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = "Method")]
     terms: Option<Vec<TermKind>>,
     /// Return the last pose instead of the one whose rendering fits best
@@ -81,16 +85,43 @@ pub(crate) struct Method {
     seed: u64,
 }
 
+/// The method called `name`.
+fn named(name: &str) -> Result<&'static refine::Method, String> {
+    refine::Method::named(name).ok_or_else(|| {
+        let names: Vec<_> = refine::Method::all().iter().map(|m| m.name).collect();
+        format!("unknown method: one of {}", names.join(", "))
+    })
+}
+
+/// What `--help` says of the methods.
+fn method_help() -> String {
+    let mut text = "How to refine, with settings that the options below change:\n".to_owned();
+    for method in refine::Method::all() {
+        text += &format!("\n  {:<19} {}", method.name, method.summary);
+    }
+    text
+}
+
 impl Method {
-    pub(crate) fn config(&self) -> Config {
-        let mut config = Config::default();
+    /// The settings of the method, changed by the other options.
+    pub(crate) fn config(&self) -> anyhow::Result<Config> {
+        let mut config = self.method.config();
         if let Some(terms) = &self.terms {
+            if config.strategy != StrategyKind::Heuristic {
+                bail!("--terms: the method {} uses depth alone", self.method.name);
+            }
             config.terms.clone_from(terms);
         }
-        config.checkpoint = !self.no_checkpoint;
-        config.heuristic.iterations = self.iterations;
-        config.heuristic.exhaustive = self.exhaustive;
-        config
+        if self.no_checkpoint {
+            config.checkpoint = false;
+        }
+        if let Some(iterations) = self.iterations {
+            config.set_iterations(iterations);
+        }
+        if self.exhaustive {
+            config.set_exhaustive();
+        }
+        Ok(config)
     }
 
     pub(crate) fn seed(&self) -> u64 {
@@ -110,20 +141,26 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     if let Some(threads) = arguments.threads {
         rayon::ThreadPoolBuilder::new().num_threads(threads.get()).build_global()?;
     }
-    match (&arguments.frame, &arguments.input, &arguments.out) {
-        (Some(file), ..) => {
-            frame::run(file, &arguments.method, arguments.out.as_deref(), arguments.json)
+    let Arguments { frame, selection, poses, out, .. } = arguments;
+    match (frame, selection, poses, out) {
+        (Some(file), ..) => frame::run(file, &arguments.method, out.as_deref(), arguments.json),
+        (None, Some(selection), Some(poses), Some(out)) => {
+            dataset_run(arguments, selection, poses, out)
         }
-        (None, Some(input), Some(out)) => dataset_run(arguments, input, out),
         _ => bail!("give --dataset, --poses and --out, or --frame"),
     }
 }
 
-fn dataset_run(arguments: &Arguments, input: &Input, out: &Path) -> anyhow::Result<Outcome> {
-    let dataset = input.open()?;
-    let (jobs, mut failures) = input.jobs()?;
+fn dataset_run(
+    arguments: &Arguments,
+    selection: &Selection,
+    poses: &Path,
+    out: &Path,
+) -> anyhow::Result<Outcome> {
+    let dataset = selection.open()?;
+    let (jobs, mut failures) = selection.jobs(poses)?;
     let method = &arguments.method;
-    let config = method.config();
+    let config = method.config()?;
     let mut assets = Assets::new(&dataset, method.seed());
     let mut report = arguments.report.as_deref().map(Report::create).transpose()?;
     let mut rows = Vec::new();
