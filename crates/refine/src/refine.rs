@@ -28,6 +28,8 @@ pub struct Progress {
     pub iteration: usize,
     /// Iterations at most.
     pub iterations: usize,
+    /// The pose that would be returned if the refinement ended here (object → camera \[m\]).
+    pub t_cam_object: Isometry3<f64>,
 }
 
 /// Refines `initial` (object → camera \[m\]) by the terms of `config`.
@@ -89,7 +91,11 @@ pub fn refine_with(
         if !config.checkpoint || score < best.0 {
             best = (score, iteration.index, state.t_cam_object);
         }
-        observe(Progress { iteration: iteration.index, iterations: config.heuristic.iterations })
+        observe(Progress {
+            iteration: iteration.index,
+            iterations: config.heuristic.iterations,
+            t_cam_object: best.2,
+        })
     });
     Ok(RefinedPose { t_cam_object: best.2, iteration: best.1, trace })
 }

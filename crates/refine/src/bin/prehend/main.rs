@@ -1,6 +1,7 @@
 //! The `prehend` command.
 
 mod check;
+mod dataset;
 mod eval;
 mod frame;
 mod options;
@@ -8,6 +9,7 @@ mod outcome;
 mod output;
 mod progress;
 mod refine;
+mod study;
 
 use std::process::ExitCode;
 
@@ -48,6 +50,8 @@ enum Command {
     /// ADD, ADI, MSSD and MSPD, and of CA and IV (contact area and intersection volume with the hand).
     /// Where the dataset has models_eval/ or scene_bodies_gt.json, those count as the truth.
     Eval(eval::Arguments),
+    /// Regenerate the paper's tables on a dataset, ours beside the published rows
+    Study(Box<study::Arguments>),
     /// Draw poses over their images, and warn about units and frames, before refining anything
     Check(check::Arguments),
 }
@@ -64,6 +68,7 @@ fn main() -> ExitCode {
     let outcome = match arguments.command {
         Command::Refine(arguments) => refine::run(&arguments),
         Command::Eval(arguments) => eval::run(&arguments),
+        Command::Study(arguments) => study::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
     };
     match outcome {
