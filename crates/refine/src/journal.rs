@@ -111,7 +111,7 @@ impl Journal {
         if !restart {
             file.read_to_end(&mut bytes).map_err(fault)?;
         }
-        let (header, entries, length) = parse(path, &bytes)?;
+        let Parsed { header, entries, length } = parse(path, &bytes)?;
         if let Some(header) = &header {
             let differences = header.differences(identity, &[]);
             if !differences.is_empty() {
@@ -136,7 +136,7 @@ impl Journal {
     ) -> Result<(Identity, BTreeMap<usize, E>), JournalError> {
         let bytes =
             std::fs::read(path).map_err(|source| JournalError::Io { file: path.into(), source })?;
-        let (header, entries, _) = parse(path, &bytes)?;
+        let Parsed { header, entries, .. } = parse(path, &bytes)?;
         Ok((header.ok_or_else(|| JournalError::Foreign { file: path.into() })?, entries))
     }
 
@@ -199,32 +199,32 @@ impl Journal {
     }
 }
 
-/// Header, entries, and how many bytes are whole lines; no header if not even that is whole.
-#[allow(clippy::type_complexity)] // the three belong together only here
-fn parse<E: DeserializeOwned>(
-    path: &Path,
-    bytes: &[u8],
-) -> Result<(Option<Identity>, BTreeMap<usize, E>, usize), JournalError> {
+/// What is whole in a journal.
+struct Parsed<E> {
+    /// `None` if not even the first line is whole.
+    header: Option<Identity>,
+    entries: BTreeMap<usize, E>,
+    /// How many bytes are whole lines.
+    length: usize,
+}
+
+fn parse<E: DeserializeOwned>(path: &Path, bytes: &[u8]) -> Result<Parsed<E>, JournalError> {
+    let foreign = || JournalError::Foreign { file: path.into() };
     let mut entries = BTreeMap::new();
     let mut lines = bytes.split_inclusive(|&b| b == b'\n').filter(|l| l.ends_with(b"\n"));
     let Some(first) = lines.next() else {
         // A header cut short begins as all do; anything else is not ours to overwrite.
         let ours = bytes.is_empty() || bytes.starts_with(b"{");
-        return if ours {
-            Ok((None, entries, 0))
-        } else {
-            Err(JournalError::Foreign { file: path.into() })
-        };
+        return if ours { Ok(Parsed { header: None, entries, length: 0 }) } else { Err(foreign()) };
     };
-    let header =
-        serde_json::from_slice(first).map_err(|_| JournalError::Foreign { file: path.into() })?;
+    let header = serde_json::from_slice(first).map_err(|_| foreign())?;
     let mut length = first.len();
     for line in lines {
         let Ok(Line { index, entry }) = serde_json::from_slice(line) else { break };
         entries.insert(index, entry);
         length += line.len();
     }
-    Ok((Some(header), entries, length))
+    Ok(Parsed { header: Some(header), entries, length })
 }
 
 #[cfg(test)]

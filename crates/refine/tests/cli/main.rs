@@ -5,4 +5,6 @@
 mod bad_input;
 mod command;
 mod fixture;
+mod resume;
+mod study;
 mod truth;

@@ -8,6 +8,8 @@ use crate::metrics::COLUMNS;
 
 /// A point of a curve: steps, mean, and the ends of its interval.
 type Point = (f64, f64, [f64; 2]);
+/// Our curve, and the published one.
+type Curves = (Vec<Point>, Vec<(f64, f64)>);
 
 pub(super) fn draw(tables: &Tables) -> Result<String, String> {
     let failures: String = tables.overall().map(|b| failed(tables, &b.level)).collect();
@@ -38,8 +40,7 @@ fn theirs(block: &Block, metric: usize) -> Vec<(f64, f64)> {
 }
 
 fn panel(area: &Area<'_>, metric: usize, blocks: &[&Block], named: bool) -> Drawn {
-    let curves: Vec<(Vec<Point>, Vec<(f64, f64)>)> =
-        blocks.iter().map(|b| (ours(b, metric), theirs(b, metric))).collect();
+    let curves: Vec<Curves> = blocks.iter().map(|b| (ours(b, metric), theirs(b, metric))).collect();
     let values = curves
         .iter()
         .flat_map(|(ours, theirs)| ours.iter().map(|p| p.2[1]).chain(theirs.iter().map(|p| p.1)));
