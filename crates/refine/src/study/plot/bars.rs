@@ -33,12 +33,13 @@ fn panel(area: &Area<'_>, metric: usize, lines: &[&Line], labels: &[String]) -> 
     });
     let top = ends.flatten().fold(0.0, f64::max);
     let top = if top > 0.0 { 1.05 * top } else { 1.0 };
+    // Ranges of integers include their end here.
     let mut chart = ChartBuilder::on(area)
         .margin(8)
         .margin_right(24)
         .x_label_area_size(44)
         .y_label_area_size(140)
-        .build_cartesian_2d(0.0..top, (0..lines.len()).into_segmented())?;
+        .build_cartesian_2d(0.0..top, (0..lines.len().saturating_sub(1).max(1)).into_segmented())?;
     let label = |at: &SegmentValue<usize>| match at {
         SegmentValue::CenterOf(i) => labels.get(*i).cloned().unwrap_or_default(),
         _ => String::new(),
