@@ -10,8 +10,8 @@ const STACK_BYTES: usize = 8 << 20;
 
 /// Threads that each do whole frames.
 ///
-/// A frame alone on a thread needs no waiting for others, so that many frames are done soonest one a thread; only
-/// where there are fewer frames than threads do several threads share a frame. Results do not depend on it.
+/// A frame alone on a thread waits for no other thread; only where there are fewer frames than threads do several threads
+/// share a frame. Results do not depend on it.
 #[derive(Debug)]
 pub struct Workers {
     pools: Vec<ThreadPool>,

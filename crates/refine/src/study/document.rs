@@ -180,9 +180,9 @@ fn with_interval(value: String, interval: Option<[String; 2]>) -> String {
     }
 }
 
-/// Two decimals, and a third for what is small.
+/// Two decimals, and a third for what is small but not as good as nothing.
 fn number(value: f64) -> String {
-    if value != 0.0 && value.abs() < 0.1 { format!("{value:.3}") } else { format!("{value:.2}") }
+    if (5e-4..0.1).contains(&value.abs()) { format!("{value:.3}") } else { format!("{value:.2}") }
 }
 
 #[cfg(test)]

@@ -147,7 +147,7 @@ fn a_killed_study_resumes() {
             "{name}"
         );
     }
-    assert_eq!(place.read("part/times.csv").lines().count(), 7);
+    assert!(place.read("part/times.csv").lines().count() >= 7);
     let said = place.prehend(&study("part").replace("--iterations 2", "--iterations 3"));
     assert!(said.code == 1 && said.err.contains("another run"), "{}", said.err);
 }

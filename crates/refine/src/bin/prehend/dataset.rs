@@ -87,8 +87,9 @@ impl Run<'_> {
                         for warning in &done.refined.warnings {
                             bar.suspend(|| eprintln!("warning: {}: {warning}", label(&job.row)));
                         }
-                        refined.insert(index, journal.append(index, &done.refined)?);
+                        // First the time: of a frame whose record is lost, a second line is no harm.
                         times.add(index, &label(&job.row), self.method, done.seconds)?;
+                        refined.insert(index, journal.append(index, &done.refined)?);
                     }
                     // Not recorded: a resumed run tries again.
                     Err(error) => drop(failed.insert(index, error)),

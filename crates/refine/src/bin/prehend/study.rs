@@ -135,11 +135,11 @@ impl Run {
                 move |frame: &&Frame| examiner.examine(frame)
             },
             |frame, Examined { record, seconds }| -> anyhow::Result<()> {
-                let record = journal.append(frame.index, &record)?;
+                // First the times: of a frame whose record is lost, a second line is no harm.
                 for (method, seconds) in seconds {
                     times.add(frame.index, &record.label(), &method, seconds)?;
                 }
-                records.insert(frame.index, record);
+                records.insert(frame.index, journal.append(frame.index, &record)?);
                 bar.inc(1);
                 Ok(())
             },

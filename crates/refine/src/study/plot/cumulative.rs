@@ -49,7 +49,7 @@ fn panel(area: &Area<'_>, metric: usize, curves: &[Curve], frames: usize, named:
     let right = if largest > 0.0 { 1.1 * largest } else { 1.0 };
     let smallest =
         curves.iter().flat_map(|c| &c.1).copied().filter(|&v| v > 0.0).fold(right, f64::min);
-    let left = smallest.clamp(1e-3 * right, 0.1 * right);
+    let left = smallest.clamp(1e-4 * right, 0.1 * right);
     let mut chart = ChartBuilder::on(area)
         .margin(8)
         .margin_right(24)
