@@ -28,6 +28,8 @@ pub struct Progress {
     pub iteration: usize,
     /// Iterations at most.
     pub iterations: usize,
+    /// The pose that would be returned if the refinement ended here (object → camera \[m\]).
+    pub t_cam_object: Isometry3<f64>,
 }
 
 /// Refines `initial` (object → camera \[m\]) by the strategy of `config`.
@@ -92,7 +94,11 @@ pub fn refine_with(
         if !config.checkpoint || score < best.0 {
             best = (score, iteration.index, state.t_cam_object);
         }
-        observe(Progress { iteration: iteration.index, iterations: config.iterations() })
+        observe(Progress {
+            iteration: iteration.index,
+            iterations: config.iterations(),
+            t_cam_object: best.2,
+        })
     };
     let trace = match config.strategy {
         StrategyKind::Heuristic => {

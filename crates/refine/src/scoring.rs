@@ -61,13 +61,21 @@ impl<'a> Scorer<'a> {
         }
     }
 
+    /// Where the object of `row` truly is; among several such objects, the one nearest to the pose of `row`.
+    ///
+    /// # Errors
+    /// If a file that scoring needs is missing or broken, or the image shows no such object.
+    pub fn true_pose(&self, row: &ResultRow) -> Result<Isometry3<f64>, AssetError> {
+        Ok(self.truth.pose(row.scene_id, row.im_id, row.obj_id, &row.t_cam_model)?)
+    }
+
     /// The score of `row`; contact metrics only where the scene says where the hand is.
     ///
     /// # Errors
     /// If a file that scoring needs is missing or broken.
     pub fn score(&mut self, row: &ResultRow) -> Result<ScoredRow, AssetError> {
         let (scene, image) = (row.scene_id, row.im_id);
-        let truth = self.truth.pose(scene, image, row.obj_id, &row.t_cam_model)?;
+        let truth = self.true_pose(row)?;
         let camera = self.dataset.frame(scene, image)?.intrinsics;
         self.prepare_model(row.obj_id)?;
         self.prepare_hand(scene, image)?;

@@ -1,22 +1,25 @@
 //! What happened during a refinement, iteration by iteration.
 
-use serde::Serialize;
+use serde::{Deserialize, Deserializer, Serialize};
 
 /// One iteration of a strategy.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Iteration {
     /// Number of the iteration; 0 is the initial pose.
     pub index: usize,
-    /// Value of each term \[nats\]; a strategy without terms says what its one value is.
+    /// Value of each term \[nats\], NaN where it is not finite and was read from a file; a strategy without terms says
+    /// what its one value is.
+    #[serde(deserialize_with = "null_as_nan")]
     pub values: Vec<f64>,
     /// Weight αᵢ of each term's step.
+    #[serde(deserialize_with = "null_as_nan")]
     pub weights: Vec<f64>,
     /// Length limit of the steps \[m\]; for a strategy without terms, the length of the step taken next.
     pub step: f64,
 }
 
 /// The history of a refinement.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Trace {
     /// Names of the terms, in the order of `values` and `weights`.
     pub terms: Vec<String>,
@@ -28,4 +31,10 @@ impl Trace {
     pub(crate) fn new<'a>(terms: impl Iterator<Item = &'a str>) -> Self {
         Self { terms: terms.map(str::to_owned).collect(), iterations: Vec::new() }
     }
+}
+
+/// JSON has no numbers that are not finite: they are written as null.
+fn null_as_nan<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<f64>, D::Error> {
+    let values: Vec<Option<f64>> = Deserialize::deserialize(deserializer)?;
+    Ok(values.into_iter().map(|v| v.unwrap_or(f64::NAN)).collect())
 }

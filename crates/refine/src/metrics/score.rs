@@ -1,7 +1,7 @@
 //! All metrics of one pose together.
 
 use nalgebra::{Isometry3, Point3};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::add::{add, adi};
 use super::nearest::NearestPoint;
@@ -30,7 +30,7 @@ pub const COLUMNS: [&str; 13] = [
 ];
 
 /// The metrics of one pose; what was not computed is `None`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PoseScore {
     /// Position error \[cm\].
     pub pe_cm: Option<f64>,

@@ -21,6 +21,23 @@ impl Table {
     pub fn push(&mut self, row: Vec<String>) {
         self.rows.push(row);
     }
+
+    /// The table in Markdown.
+    pub fn markdown(&self) -> String {
+        let line = |row: &[String]| {
+            let cells = (0..self.header.len()).map(|i| row.get(i).map_or("", String::as_str));
+            format!(
+                "| {} |\n",
+                cells.map(|c| c.replace('|', "\\|")).collect::<Vec<_>>().join(" | ")
+            )
+        };
+        let mut out = line(&self.header);
+        out.push_str("|---|");
+        out.push_str(&"--:|".repeat(self.header.len().saturating_sub(1)));
+        out.push('\n');
+        self.rows.iter().for_each(|row| out.push_str(&line(row)));
+        out
+    }
 }
 
 impl fmt::Display for Table {
@@ -57,5 +74,8 @@ mod tests {
         table.push(vec!["short".into()]);
         let expected = "object         IV cm³\n-------------  ------\nmug               0.5\na longer name   12.25\nshort\n";
         assert_eq!(table.to_string(), expected);
+        let mut table = Table::new(vec!["object".into(), "|ΔIV|".into()]);
+        table.push(vec!["mug".into()]);
+        assert_eq!(table.markdown(), "| object | \\|ΔIV\\| |\n|---|--:|\n| mug |  |\n");
     }
 }

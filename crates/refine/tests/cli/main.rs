@@ -6,4 +6,6 @@ mod bad_input;
 mod command;
 mod fixture;
 mod initial;
+mod resume;
+mod study;
 mod truth;

@@ -1,6 +1,7 @@
 //! The `prehend` command.
 
 mod check;
+mod dataset;
 mod eval;
 mod frame;
 mod initial;
@@ -11,6 +12,7 @@ mod progress;
 mod refine;
 mod symmetry;
 mod synth;
+mod study;
 
 use std::process::ExitCode;
 
@@ -54,6 +56,8 @@ enum Command {
     /// ADD, ADI, MSSD and MSPD, and of CA and IV (contact area and intersection volume with the hand).
     /// Where the dataset has models_eval/ or scene_bodies_gt.json, those count as the truth.
     Eval(eval::Arguments),
+    /// Regenerate the paper's tables on a dataset, ours beside the published rows
+    Study(Box<study::Arguments>),
     /// Draw poses over their images, and warn about units and frames, before refining anything
     Check(check::Arguments),
     /// Find the symmetries of models, and write them into models_info.json
@@ -80,6 +84,7 @@ fn main() -> ExitCode {
         Command::Refine(arguments) => refine::run(&arguments),
         Command::Initial(arguments) => initial::run(&arguments),
         Command::Eval(arguments) => eval::run(&arguments),
+        Command::Study(arguments) => study::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
         Command::Symmetry(arguments) => symmetry::run(&arguments),
         Command::Synth(arguments) => synth::run(&arguments),

@@ -102,3 +102,11 @@ impl Input {
 pub(crate) fn label(row: &ResultRow) -> String {
     format!("scene {} image {} object {}", row.scene_id, row.im_id, row.obj_id)
 }
+
+/// The file `extension` that accompanies the output `out`: out.csv.journal beside out.csv.
+pub(crate) fn beside(out: &Path, extension: &str) -> PathBuf {
+    let mut name = out.as_os_str().to_owned();
+    name.push(".");
+    name.push(extension);
+    name.into()
+}

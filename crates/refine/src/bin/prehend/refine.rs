@@ -1,24 +1,16 @@
 //! `prehend refine`.
 
-use std::collections::BTreeSet;
 use std::num::NonZeroUsize;
-use std::path::{Path, PathBuf};
-use std::time::Instant;
+use std::path::PathBuf;
 
 use anyhow::bail;
 use clap::Args;
-use prehend_refine::bop::{ResultRow, check_writable, share_image_times, write_results};
-use prehend_refine::report::{FrameReport, Report};
-use prehend_refine::{
-    self as refine, AssetError, Assets, Config, RefinedPose, StrategyKind, TermKind,
-    inspect_object, inspect_pose, refine_with,
-};
-use serde_json::json;
+use prehend_refine::bop::check_writable;
+use prehend_refine::{self as refine, Config, StrategyKind, TermKind};
 
-use crate::options::{Job, Selection, label};
+use crate::options::Selection;
 use crate::outcome::Outcome;
-use crate::output::say;
-use crate::{frame, progress};
+use crate::{dataset, frame};
 
 #[derive(Args)]
 #[command(
@@ -37,7 +29,9 @@ pub(crate) struct Arguments {
     frame: Option<PathBuf>,
     /// Write the refined poses here: a BOP results file, or JSON with --frame (then optional)
     ///
-    /// The file appears whole or not at all, once all frames are done; an existing one is replaced.
+    /// The file appears whole or not at all, once all frames are done; an existing one is replaced. Until then
+    /// FILE.journal records the finished frames: after an interruption the same command resumes, and ends with
+    /// the same file. What frames took is in FILE.times.csv.
     #[arg(long, value_name = "FILE", required_unless_present = "frame", help_heading = "Output")]
     out: Option<PathBuf>,
     /// Write a web page here, with pictures of the poses before and after and loss curves
@@ -46,6 +40,13 @@ pub(crate) struct Arguments {
     /// Print JSON on standard output: poses, times, loss curves and failures
     #[arg(long, help_heading = "Output")]
     json: bool,
+    /// Put times into the results' last column, which is -1 otherwise; frames are then refined one after another, each
+    /// with all threads
+    #[arg(long, conflicts_with = "frame", help_heading = "Output")]
+    time: bool,
+    /// Discard what an interrupted run with other settings left, instead of refusing
+    #[arg(long, conflicts_with = "frame", help_heading = "Output")]
+    restart: bool,
     #[command(flatten)]
     method: Method,
     /// Worker threads; the poses are the same for any number [default: all cores]
@@ -144,128 +145,20 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let Arguments { frame, selection, poses, out, .. } = arguments;
     match (frame, selection, poses, out) {
         (Some(file), ..) => frame::run(file, &arguments.method, out.as_deref(), arguments.json),
-        (None, Some(selection), Some(poses), Some(out)) => {
-            dataset_run(arguments, selection, poses, out)
+        (None, Some(selection), Some(poses), Some(out)) => dataset::Run {
+            selection,
+            poses,
+            method: arguments.method.method.name,
+            config: &arguments.method.config()?,
+            seed: arguments.method.seed,
+            threads: arguments.threads,
+            out,
+            report: arguments.report.as_deref(),
+            json: arguments.json,
+            time: arguments.time,
+            restart: arguments.restart,
         }
+        .run(),
         _ => bail!("give --dataset, --poses and --out, or --frame"),
     }
-}
-
-fn dataset_run(
-    arguments: &Arguments,
-    selection: &Selection,
-    poses: &Path,
-    out: &Path,
-) -> anyhow::Result<Outcome> {
-    let dataset = selection.open()?;
-    let (jobs, mut failures) = selection.jobs(poses)?;
-    let method = &arguments.method;
-    let config = method.config()?;
-    let mut assets = Assets::new(&dataset, method.seed());
-    let mut report = arguments.report.as_deref().map(Report::create).transpose()?;
-    let mut rows = Vec::new();
-    let mut outcomes = Vec::new();
-    let mut introduced = BTreeSet::new();
-    let bar = progress::bar(jobs.len() as u64, "refining");
-    for job in &jobs {
-        match refine_job(&mut assets, job, &config, report.is_some()) {
-            Ok(done) => {
-                let id = job.row.obj_id;
-                if introduced.insert(id) {
-                    let warnings = done.object_warnings.iter();
-                    warnings.for_each(|w| bar.suspend(|| eprintln!("warning: object {id}: {w}")));
-                }
-                for warning in &done.warnings {
-                    bar.suspend(|| eprintln!("warning: {}: {warning}", label(&job.row)));
-                }
-                outcomes.push(summary(job, &done));
-                if let (Some(report), Some(frame)) = (&mut report, &done.report) {
-                    // A full disk must not cost the poses.
-                    if let Err(error) = report.add(&label(&job.row), frame) {
-                        failures.push(format!("{}: report: {error}", label(&job.row)));
-                    }
-                }
-                rows.push(ResultRow {
-                    t_cam_model: done.pose.t_cam_object,
-                    time: done.seconds,
-                    ..job.row.clone()
-                });
-            }
-            Err(error) => failures.push(format!("{}: {error}", label(&job.row))),
-        }
-        bar.inc(1);
-    }
-    bar.finish_and_clear();
-    let done = rows.len();
-    if done > 0 {
-        let seconds: f64 = rows.iter().map(|r| r.time).sum();
-        share_image_times(&mut rows);
-        write_results(out, &rows)?;
-        if !arguments.json {
-            let mean = seconds / done as f64;
-            let file = out.display();
-            say(format!("{done} poses refined in {mean:.2} s each, written to {file}"))?;
-        }
-        if let Some(report) = report {
-            match report.finish() {
-                Ok(index) if !arguments.json => say(format!("report: open {}", index.display()))?,
-                Ok(_) => {}
-                Err(error) => failures.push(format!("report: {error}")),
-            }
-        }
-    } else {
-        failures.push(format!("no pose could be refined, {} was not written", out.display()));
-    }
-    if arguments.json {
-        let document = json!({ "frames": outcomes, "failures": failures });
-        say(format!("{document:#}"))?;
-    }
-    Ok(Outcome { done, failures })
-}
-
-struct Done {
-    pose: RefinedPose,
-    seconds: f64,
-    report: Option<FrameReport>,
-    object_warnings: Vec<String>,
-    warnings: Vec<String>,
-}
-
-fn refine_job(
-    assets: &mut Assets<'_>,
-    job: &Job,
-    config: &Config,
-    with_report: bool,
-) -> Result<Done, AssetError> {
-    let row = &job.row;
-    let object = assets.object(row.obj_id)?;
-    let frame = assets.dataset().frame(row.scene_id, row.im_id)?;
-    let (observation, robot) = assets.observation(&frame, job.instance, &config.terms)?;
-    let start = Instant::now();
-    let pose =
-        refine_with(&observation, &object, robot.as_deref(), &row.t_cam_model, config, |_| true)?;
-    let seconds = start.elapsed().as_secs_f64();
-    let report =
-        with_report.then(|| FrameReport::draw(&observation, &object, &row.t_cam_model, &pose));
-    let object_warnings = inspect_object(&object);
-    let warnings = inspect_pose(&observation, &object, robot.as_deref(), &row.t_cam_model);
-    Ok(Done { pose, seconds, report, object_warnings, warnings })
-}
-
-fn summary(job: &Job, done: &Done) -> serde_json::Value {
-    let pose = &done.pose.t_cam_object;
-    let q = pose.rotation.quaternion();
-    let warnings: Vec<&String> = done.object_warnings.iter().chain(&done.warnings).collect();
-    json!({
-        "scene_id": job.row.scene_id,
-        "im_id": job.row.im_id,
-        "obj_id": job.row.obj_id,
-        "seconds": done.seconds,
-        "iteration": done.pose.iteration,
-        "iterations": done.pose.trace.iterations.len().saturating_sub(1),
-        "t_cam_model_mm": (pose.translation.vector * 1e3).as_slice(),
-        "quaternion_wxyz": [q.w, q.i, q.j, q.k],
-        "warnings": warnings,
-        "trace": done.pose.trace,
-    })
 }

@@ -1,0 +1,262 @@
+//! `prehend study`.
+
+use std::collections::BTreeMap;
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+
+use anyhow::{anyhow, bail};
+use clap::{Args, Subcommand};
+use prehend_refine::bop::{Dataset, DatasetError};
+use prehend_refine::identity::{SENSED, TRUTH, canonical, dataset_fingerprint};
+use prehend_refine::study::{
+    Design, Examined, Examiner, Failure, Frame, FrameRecord, Kind, Level, MethodSettings, RECORDS,
+    Shard, TIMES, Tables, merge, write_outputs,
+};
+use prehend_refine::{Assets, Config, Identity, Journal, Method, Times, Workers, join_times};
+
+use crate::options::Selection;
+use crate::outcome::Outcome;
+use crate::output::say;
+use crate::progress;
+
+#[derive(Args)]
+pub(crate) struct Arguments {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Subcommand)]
+enum What {
+    /// Baselines and the combined method, at both levels of noise
+    Main(Run),
+    /// Each gradient alone, physics with and without checkpoint, and all together
+    Gradients(Run),
+    /// The combined method at all levels of noise
+    Noise(Run),
+    /// The combined method after more and more steps: no regularisation, no checkpoint, all iterations
+    Steps(Run),
+    /// Put the shards of a study together
+    Merge(Merge),
+}
+
+/// The folder gets tables.txt, .md, .csv and .json, plots (*.svg), the poses and scores of every frame
+/// (records.jsonl) and what each took (times.csv). After an interruption the same command resumes.
+#[derive(Args)]
+struct Run {
+    #[command(flatten)]
+    selection: Selection,
+    /// Initial poses at a level of noise; may be repeated. The paper's levels are called low and high
+    /// [default: init_low.csv and init_high.csv of the dataset]
+    #[arg(long, value_name = "[LEVEL=]FILE", help_heading = "Input")]
+    poses: Vec<String>,
+    /// Write everything here
+    #[arg(long, value_name = "DIR", help_heading = "Output")]
+    out: PathBuf,
+    /// Discard what an interrupted run with other settings left, instead of refusing
+    #[arg(long, help_heading = "Output")]
+    restart: bool,
+    /// Methods to compare, such as "depth,combined" [default: those of the paper's table]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = "Method")]
+    methods: Option<Vec<String>>,
+    /// Iterations at most [default: the method's own; 1000 for steps]
+    #[arg(long, value_name = "N", help_heading = "Method")]
+    iterations: Option<usize>,
+    /// Seed of the points sampled on objects' surfaces
+    #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Method")]
+    seed: u64,
+    /// Do part i (from 0) of n only: frames i, i+n, …; `prehend study merge` puts parts together
+    #[arg(long, value_name = "I/N", default_value_t = Shard::WHOLE, help_heading = "Running")]
+    shard: Shard,
+    /// Worker threads; the results are the same for any number [default: all cores]
+    #[arg(long, value_name = "N", help_heading = "Running")]
+    threads: Option<NonZeroUsize>,
+}
+
+#[derive(Args)]
+struct Merge {
+    /// The folders of all shards
+    #[arg(value_name = "DIR", required = true)]
+    shards: Vec<PathBuf>,
+    /// Write the whole study here
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
+    match &arguments.what {
+        What::Main(run) => run.study(Kind::Main),
+        What::Gradients(run) => run.study(Kind::Gradients),
+        What::Noise(run) => run.study(Kind::Noise),
+        What::Steps(run) => run.study(Kind::Steps),
+        What::Merge(merge) => merge.run(),
+    }
+}
+
+impl Run {
+    fn study(&self, kind: Kind) -> anyhow::Result<Outcome> {
+        let dataset = self.selection.open()?;
+        let methods = self.methods(kind)?;
+        let (design, frames) = self.design(kind, &dataset, &methods)?;
+        make(&self.out)?;
+        let (mut journal, mut records): (_, BTreeMap<usize, FrameRecord>) =
+            Journal::open(&self.out.join(RECORDS), &Identity::of(&design), self.restart)?;
+        let mut times = Times::open(&self.out.join(TIMES), !records.is_empty())?;
+        // What failed is tried again.
+        records.retain(|_, record| !record.failed());
+        let own: Vec<&Frame> = frames.iter().filter(|f| design.shard.holds(f.index)).collect();
+        let open: Vec<&Frame> =
+            own.iter().copied().filter(|f| !records.contains_key(&f.index)).collect();
+
+        let assets = Mutex::new(Assets::new(&dataset, self.seed));
+        let threads = self.threads.map_or_else(rayon::current_num_threads, NonZeroUsize::get);
+        let bar = progress::bar(own.len() as u64, kind.name());
+        bar.set_position(records.len() as u64);
+        bar.reset_eta();
+        Workers::new(open.len(), threads)?.run(
+            &open,
+            || {
+                let mut examiner = Examiner::new(&design, &methods, &assets);
+                move |frame: &&Frame| examiner.examine(frame)
+            },
+            |frame, Examined { record, seconds }| -> anyhow::Result<()> {
+                // First the times: of a frame whose record is lost, a second line is no harm.
+                for (method, seconds) in seconds {
+                    times.add(frame.index, &record.label(), &method, seconds)?;
+                }
+                records.insert(frame.index, journal.append(frame.index, &record)?);
+                bar.inc(1);
+                Ok(())
+            },
+        )?;
+        bar.finish_and_clear();
+        journal.settle(&records)?;
+        finish(&self.out, &design, &records, &times)
+    }
+
+    fn methods(&self, kind: Kind) -> anyhow::Result<Vec<(String, Config)>> {
+        let names: Vec<&str> = match &self.methods {
+            Some(names) => names.iter().map(String::as_str).collect(),
+            None => kind.methods().to_vec(),
+        };
+        if kind == Kind::Steps && names.len() != 1 {
+            bail!("the steps study is of one method");
+        }
+        let known = || Method::all().iter().map(|m| m.name).collect::<Vec<_>>().join(", ");
+        let mut methods: Vec<(String, Config)> = Vec::new();
+        for name in names {
+            let method = Method::named(name)
+                .ok_or_else(|| anyhow!("unknown method {name:?}: one of {}", known()))?;
+            if methods.iter().any(|(other, _)| other == name) {
+                bail!("method {name} is named twice");
+            }
+            methods.push((name.to_owned(), Design::config(kind, method, self.iterations)));
+        }
+        Ok(methods)
+    }
+
+    fn design(
+        &self,
+        kind: Kind,
+        dataset: &Dataset,
+        methods: &[(String, Config)],
+    ) -> anyhow::Result<(Design, Vec<Frame>)> {
+        let files: Vec<(String, PathBuf)> = if self.poses.is_empty() {
+            kind.levels_of(&self.selection.dataset)
+        } else {
+            self.poses.iter().map(|text| level_and_file(text)).collect()
+        };
+        let (mut levels, mut frames): (Vec<Level>, Vec<Frame>) = Default::default();
+        for (name, file) in &files {
+            if levels.iter().any(|l| l.name == *name) {
+                bail!("two files of initial poses are of level {name}: give LEVEL=FILE");
+            }
+            let (level, found) =
+                Level::read(name, file, levels.len(), frames.len(), |r| {
+                    self.selection.admits(r.scene_id, r.im_id, r.obj_id)
+                })?;
+            levels.push(level);
+            frames.extend(found);
+        }
+        if frames.is_empty() && levels.iter().all(|l| l.unreadable.is_empty()) {
+            bail!("there are no initial poses to start from: give --poses");
+        }
+        let Selection { scene, image, object, .. } = &self.selection;
+        let settings = |(name, config): &(String, Config)| MethodSettings {
+            name: name.clone(),
+            settings: format!("{config:?}"),
+        };
+        let design = Design {
+            study: kind,
+            dataset: canonical(dataset.split_dir()),
+            annotations: [&SENSED[..], &TRUTH]
+                .map(|names| dataset_fingerprint(dataset, names))
+                .into_iter()
+                .collect::<Result<Vec<_>, _>>()?
+                .join(" "),
+            levels,
+            filters: format!("scenes {scene:?} images {image:?} objects {object:?}"),
+            methods: methods.iter().map(settings).collect(),
+            steps: methods.first().map_or_else(Vec::new, |(_, c)| Design::steps(kind, c)),
+            seed: self.seed,
+            backend: "cpu".into(),
+            shard: self.shard,
+        };
+        Ok((design, frames))
+    }
+}
+
+impl Merge {
+    fn run(&self) -> anyhow::Result<Outcome> {
+        let (design, records) = merge(&self.shards)?;
+        make(&self.out)?;
+        let (journal, _) =
+            Journal::open::<FrameRecord>(&self.out.join(RECORDS), &Identity::of(&design), true)?;
+        journal.settle(&records)?;
+        let parts: Vec<PathBuf> = self.shards.iter().map(|s| s.join(TIMES)).collect();
+        let file = self.out.join(TIMES);
+        join_times(&parts, &file)?;
+        finish(&self.out, &design, &records, &Times::open(&file, true)?)
+    }
+}
+
+/// Writes the tables and says what was found.
+fn finish(
+    out: &Path,
+    design: &Design,
+    records: &BTreeMap<usize, FrameRecord>,
+    times: &Times,
+) -> anyhow::Result<Outcome> {
+    let (tables, files) = write_outputs(out, design, records)?;
+    say(std::fs::read_to_string(out.join("tables.txt"))?.trim_end())?;
+    let means = times.means();
+    if !means.is_empty() {
+        let each = means.iter().map(|(method, (mean, n))| format!("{method} {mean:.2} ({n})"));
+        say(format!("\nSeconds a frame (frames): {}", each.collect::<Vec<_>>().join(", ")))?;
+    }
+    let names = files.iter().filter_map(|f| f.file_name()).map(|n| n.to_string_lossy());
+    say(format!("{}: {}", out.display(), names.collect::<Vec<_>>().join(" ")))?;
+    Ok(outcome(&tables, records))
+}
+
+fn outcome(tables: &Tables, records: &BTreeMap<usize, FrameRecord>) -> Outcome {
+    Outcome {
+        done: records.values().filter(|r| !r.failed()).count(),
+        failures: tables.failures.iter().map(Failure::sentence).collect(),
+    }
+}
+
+/// `LEVEL=FILE`, or a file whose name says the level: init_low.csv.
+fn level_and_file(text: &str) -> (String, PathBuf) {
+    if let Some((level, file)) = text.split_once('=') {
+        return (level.into(), file.into());
+    }
+    let file = PathBuf::from(text);
+    let stem = file.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
+    (stem.strip_prefix("init_").map_or(stem.clone(), str::to_owned), file)
+}
+
+fn make(folder: &Path) -> Result<(), DatasetError> {
+    std::fs::create_dir_all(folder)
+        .map_err(|e| DatasetError::Write { file: folder.to_path_buf(), problem: e.to_string() })
+}

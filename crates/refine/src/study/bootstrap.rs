@@ -1,0 +1,116 @@
+//! Confidence intervals by resampling (Efron, 1979).
+
+use prehend_geometry::SplitMix64;
+use rayon::prelude::*;
+
+/// Resamples an interval is made of.
+pub const REPLICATES: usize = 2000;
+
+/// The mean of every column over each of [`REPLICATES`] resamples of the rows, drawn with replacement: the same rows for all
+/// columns, so that differences and ratios of columns are paired. Rows where a column has nothing do not count for it; a
+/// resample without any is NaN.
+///
+/// Equal columns and seeds give equal results, whatever the number of threads.
+pub fn resampled_means(columns: &[Vec<Option<f64>>], seed: u64) -> Vec<Vec<f64>> {
+    let rows = columns.first().map_or(0, Vec::len);
+    let replicate = |r: usize| -> Vec<f64> {
+        let mut random = SplitMix64::new(seed ^ (r as u64).wrapping_mul(0xd134_2543_de82_ef95));
+        let mut counts = vec![0_u32; rows];
+        for _ in 0..rows {
+            counts[((random.unit() * rows as f64) as usize).min(rows - 1)] += 1;
+        }
+        columns.iter().map(|column| weighted_mean(column, &counts)).collect()
+    };
+    let replicates: Vec<Vec<f64>> = (0..REPLICATES).into_par_iter().map(replicate).collect();
+    (0..columns.len()).map(|c| replicates.iter().map(|r| r[c]).collect()).collect()
+}
+
+fn weighted_mean(column: &[Option<f64>], counts: &[u32]) -> f64 {
+    let (mut sum, mut weight) = (0.0, 0.0);
+    for (value, &count) in column.iter().zip(counts) {
+        if let Some(value) = value {
+            sum += f64::from(count) * value;
+            weight += f64::from(count);
+        }
+    }
+    sum / weight
+}
+
+/// The middle 95 % of resampled statistics (the percentile interval); `None` if none is finite.
+pub fn interval(replicates: &[f64]) -> Option<[f64; 2]> {
+    let mut sorted: Vec<f64> = replicates.iter().copied().filter(|v| v.is_finite()).collect();
+    sorted.sort_by(f64::total_cmp);
+    let quantile = |p: f64| {
+        let place = p * sorted.len().checked_sub(1)? as f64;
+        let (low, high) = (sorted[place.floor() as usize], sorted[place.ceil() as usize]);
+        Some(low + (high - low) * place.fract())
+    };
+    Some([quantile(0.025)?, quantile(0.975)?])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn column(n: usize, f: impl Fn(usize) -> f64) -> Vec<Option<f64>> {
+        (0..n).map(|i| Some(f(i))).collect()
+    }
+
+    #[test]
+    fn quantiles_interpolate() {
+        let values: Vec<f64> = (0..=1000).rev().map(f64::from).collect();
+        assert_eq!(interval(&values), Some([25.0, 975.0]));
+        assert_eq!(interval(&[3.0, f64::NAN]), Some([3.0, 3.0]));
+        assert_eq!(interval(&[]), None);
+    }
+
+    #[test]
+    fn the_mean_of_coins_is_binomial() {
+        // 40 of 100: the mean of a resample is Binomial(100, 0.4)/100, whose 2.5 % and 97.5 % quantiles are 0.31 and 0.50.
+        let means = resampled_means(&[column(100, |i| f64::from(u8::from(i < 40)))], 1);
+        let [low, high] = interval(&means[0]).unwrap();
+        assert!((low - 0.31).abs() < 0.011 && (high - 0.50).abs() < 0.011, "{low} {high}");
+        let mean = means[0].iter().sum::<f64>() / REPLICATES as f64;
+        // Its standard error is √(0.24/100/2000) = 0.0011.
+        assert!((mean - 0.4).abs() < 0.004, "{mean}");
+    }
+
+    #[test]
+    fn the_interval_of_a_normal_sample_is_that_of_the_textbook() {
+        let mut random = SplitMix64::new(5);
+        let sample: Vec<f64> = (0..400).map(|_| 3.0 + 2.0 * random.normal()).collect();
+        let mean = sample.iter().sum::<f64>() / 400.0;
+        let variance = sample.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / 399.0;
+        let half = 1.96 * (variance / 400.0).sqrt();
+        let means = resampled_means(&[sample.into_iter().map(Some).collect()], 2);
+        let [low, high] = interval(&means[0]).unwrap();
+        assert!((low - (mean - half)).abs() < 0.1 * half, "{low} {}", mean - half);
+        assert!((high - (mean + half)).abs() < 0.1 * half, "{high} {}", mean + half);
+    }
+
+    #[test]
+    fn columns_are_paired_and_gaps_left_out() {
+        let one = column(30, |i| 1.0 + i as f64);
+        let half = column(30, |i| 0.5 * (1.0 + i as f64));
+        let mut gaps = column(30, |_| 7.0);
+        gaps[3..].fill(None);
+        let means = resampled_means(&[one, half, gaps], 3);
+        assert!(means[0].iter().zip(&means[1]).all(|(a, b)| (b / a - 0.5).abs() < 1e-15));
+        assert_eq!(interval(&means[2]), Some([7.0, 7.0]));
+        // All three rows are missed by (27/30)³⁰ = 4 % of the resamples.
+        let missed = means[2].iter().filter(|m| m.is_nan()).count();
+        assert!((60..110).contains(&missed), "{missed}");
+        assert!(resampled_means(&[], 0).is_empty());
+    }
+
+    #[test]
+    fn threads_do_not_matter_and_seeds_do() {
+        let columns = [column(20, |i| i as f64)];
+        let with = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| resampled_means(&columns, 9))
+        };
+        assert_eq!(with(1), with(3));
+        assert_ne!(with(1), resampled_means(&columns, 10));
+    }
+}

@@ -1,0 +1,103 @@
+//! All numbers of a study's tables, one a line.
+
+use std::fmt::Display;
+
+use super::tables::Tables;
+
+const HEADER: [&str; 16] = [
+    "study",
+    "level",
+    "object",
+    "row",
+    "metric",
+    "frames",
+    "n",
+    "mean",
+    "mean_low",
+    "mean_high",
+    "median",
+    "change_percent",
+    "change_low",
+    "change_high",
+    "published_mean",
+    "note",
+];
+
+/// The tables as CSV. `object` is empty over all objects; failures come last, with their reason as the note.
+pub(super) fn csv(tables: &Tables) -> Result<Vec<u8>, ::csv::Error> {
+    let mut out = ::csv::Writer::from_writer(Vec::new());
+    out.write_record(HEADER)?;
+    let study = tables.study.name();
+    for block in &tables.blocks {
+        for line in &block.lines {
+            for (m, metric) in tables.metrics.iter().enumerate() {
+                let published = line.published.and_then(|p| p[m]);
+                let Some(estimate) = &line.metrics[m] else { continue };
+                let [low, high] = ends(estimate.interval);
+                let change = estimate.change;
+                let [change_low, change_high] = ends(change.and_then(|c| c.interval));
+                out.write_record([
+                    study.to_owned(),
+                    block.level.clone(),
+                    text(block.object),
+                    line.row.clone(),
+                    (*metric).to_owned(),
+                    block.frames.to_string(),
+                    estimate.n.to_string(),
+                    estimate.mean.to_string(),
+                    low,
+                    high,
+                    estimate.median.to_string(),
+                    text(change.map(|c| c.percent)),
+                    change_low,
+                    change_high,
+                    text(published),
+                    String::new(),
+                ])?;
+            }
+        }
+    }
+    for failure in &tables.failures {
+        let mut record = vec![String::new(); HEADER.len()];
+        record[0] = study.into();
+        record[1].clone_from(&failure.level);
+        record[2] = text(failure.object);
+        record[3] = failure.rows.join(" ");
+        record[4] = "failed".into();
+        record[15] = format!("{}: {}", failure.frame, failure.reason);
+        out.write_record(record)?;
+    }
+    out.into_inner().map_err(|e| e.into_error().into())
+}
+
+fn text<T: Display>(value: Option<T>) -> String {
+    value.map_or_else(String::new, |v| v.to_string())
+}
+
+fn ends(interval: Option<[f64; 2]>) -> [String; 2] {
+    [text(interval.map(|i| i[0])), text(interval.map(|i| i[1]))]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tables::tests::example;
+    use super::*;
+
+    #[test]
+    fn every_estimate_and_every_failure_has_a_line() {
+        let (design, records) = example();
+        let tables = Tables::new(&design, &records);
+        let text = String::from_utf8(csv(&tables).unwrap()).unwrap();
+        let estimates =
+            tables.blocks.iter().flat_map(|b| &b.lines).flat_map(|l| l.metrics).flatten();
+        assert_eq!(text.lines().count(), 1 + estimates.count() + tables.failures.len());
+        assert!(
+            text.contains("\nmain,low,,combined,PE cm,4,3,0.5,0.25,0.75,0.5,-75,-75,-75,0.62,\n"),
+            "{text}"
+        );
+        assert!(
+            text.contains(",6,icp,failed,,,,,,,,,,,low: scene 1 image 2 object 6: no pixel\n"),
+            "{text}"
+        );
+    }
+}

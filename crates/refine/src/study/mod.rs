@@ -1,0 +1,28 @@
+//! Studies: the paper's tables, regenerated on a dataset.
+//!
+//! A [`Design`] says what is compared on which initial poses; an [`Examiner`] takes one frame after another and makes a
+//! [`FrameRecord`] of each; [`Tables`] summarise the records beside the [`published()`] figures, and [`write_outputs`] writes
+//! them down. Everything follows from design and records: they may come from one process or from many.
+
+mod bootstrap;
+mod csv;
+mod design;
+mod document;
+mod examiner;
+mod kind;
+mod merge;
+mod output;
+mod plot;
+mod published;
+mod record;
+mod tables;
+
+pub use bootstrap::{REPLICATES, interval, resampled_means};
+pub use design::{Design, Frame, Level, MethodSettings, Shard, ShardFault};
+pub use examiner::{Examined, Examiner};
+pub use kind::Kind;
+pub use merge::{MergeError, merge};
+pub use output::{RECORDS, TIMES, write_outputs};
+pub use published::{Published, published};
+pub use record::{FrameRecord, RowOutcome};
+pub use tables::{Block, Change, Estimate, Failure, Line, Tables};

@@ -1,0 +1,129 @@
+//! Frames side by side.
+
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::mpsc;
+
+use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
+
+/// Main threads have as much; Rayon's own default is a quarter of it.
+const STACK_BYTES: usize = 8 << 20;
+
+/// Threads that each do whole frames.
+///
+/// A frame alone on a thread waits for no other thread; only where there are fewer frames than threads do several threads
+/// share a frame. Results do not depend on it.
+#[derive(Debug)]
+pub struct Workers {
+    pools: Vec<ThreadPool>,
+}
+
+impl Workers {
+    /// Workers for so many frames; `threads` in all.
+    ///
+    /// # Errors
+    /// If the system gives no threads.
+    pub fn new(frames: usize, threads: usize) -> Result<Self, ThreadPoolBuildError> {
+        let threads = threads.max(1);
+        let workers = threads.min(frames).max(1);
+        let pool = |worker: usize| {
+            let own = threads / workers + usize::from(worker < threads % workers);
+            ThreadPoolBuilder::new().num_threads(own).stack_size(STACK_BYTES).build()
+        };
+        Ok(Self { pools: (0..workers).map(pool).collect::<Result<_, _>>()? })
+    }
+
+    /// One worker that has all threads: the frames come one after another.
+    ///
+    /// # Errors
+    /// If the system gives no threads.
+    pub fn together(threads: usize) -> Result<Self, ThreadPoolBuildError> {
+        Self::new(1, threads)
+    }
+
+    /// Does all `jobs`, each by one of the workers that `worker` makes, and hands results to `done` on this thread as they
+    /// come, in no particular order. Once `done` fails, no further job is begun.
+    ///
+    /// # Errors
+    /// What `done` returns.
+    pub fn run<J, T, E, W>(
+        &self,
+        jobs: &[J],
+        worker: impl Fn() -> W + Sync,
+        mut done: impl FnMut(&J, T) -> Result<(), E>,
+    ) -> Result<(), E>
+    where
+        J: Sync,
+        T: Send,
+        W: FnMut(&J) -> T,
+    {
+        let next = AtomicUsize::new(0);
+        let stop = AtomicBool::new(false);
+        std::thread::scope(|scope| {
+            let (sender, results) = mpsc::channel();
+            for pool in &self.pools {
+                let (sender, next, stop, worker) = (sender.clone(), &next, &stop, &worker);
+                scope.spawn(move || {
+                    pool.install(move || {
+                        let mut work = worker();
+                        while !stop.load(Ordering::Relaxed) {
+                            let index = next.fetch_add(1, Ordering::Relaxed);
+                            let Some(job) = jobs.get(index) else { break };
+                            if sender.send((index, work(job))).is_err() {
+                                break;
+                            }
+                        }
+                    });
+                });
+            }
+            drop(sender);
+            let mut outcome = Ok(());
+            for (index, result) in results {
+                if outcome.is_ok() {
+                    outcome = done(&jobs[index], result);
+                    stop.store(outcome.is_err(), Ordering::Relaxed);
+                }
+            }
+            outcome
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_job_is_done_once_and_threads_are_shared_out() {
+        for (frames, threads, expected) in [(5, 2, vec![1, 1]), (2, 5, vec![3, 2]), (0, 1, vec![1])]
+        {
+            let workers = Workers::new(frames, threads).unwrap();
+            let own: Vec<usize> =
+                workers.pools.iter().map(ThreadPool::current_num_threads).collect();
+            assert_eq!(own, expected);
+            let jobs: Vec<usize> = (0..frames).collect();
+            let mut sum = vec![0; frames];
+            let done = |&job: &usize, result: usize| {
+                assert_eq!(result, job * job);
+                sum[job] += 1;
+                Ok::<(), ()>(())
+            };
+            workers.run(&jobs, || |&job: &usize| job * job, done).unwrap();
+            assert_eq!(sum, vec![1; frames]);
+        }
+    }
+
+    #[test]
+    fn a_failure_ends_the_run() {
+        let jobs: Vec<usize> = (0..1000).collect();
+        let mut count = 0;
+        let ended = Workers::together(1).unwrap().run(
+            &jobs,
+            || |&job: &usize| job,
+            |_, job| {
+                count += 1;
+                if job == 3 { Err("full") } else { Ok(()) }
+            },
+        );
+        assert_eq!((ended, count), (Err("full"), 4));
+    }
+}
