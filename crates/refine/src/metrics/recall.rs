@@ -1,12 +1,12 @@
 //! Average recall of the BOP challenges (Hodaň et al., "BOP Challenge 2020", ECCVW 2020).
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::vsd::VSD_TOLERANCES;
 
 /// The fraction of its thresholds that one pose stays under, by metric; their means over all targets are BOP's
 /// average recalls.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Recall {
     /// Of VSD: below 0.05, 0.1 … 0.5, for each of its ten tolerances.
     pub vsd: f64,

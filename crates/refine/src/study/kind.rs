@@ -48,9 +48,15 @@ impl Kind {
     pub fn methods(self) -> &'static [&'static str] {
         match self {
             Self::Main => &["icp", "icp-best", "robust-icp", "combined"],
-            Self::Gradients => {
-                &["depth", "tactile", "rendering", "physics", "physics-best", "robust-icp", "combined"]
-            }
+            Self::Gradients => &[
+                "depth",
+                "tactile",
+                "rendering",
+                "physics",
+                "physics-best",
+                "robust-icp",
+                "combined",
+            ],
             Self::Noise => &["robust-icp", "combined"],
             Self::Steps => &["combined-free"],
         }

@@ -59,7 +59,7 @@ const ROWS: [Row; 35] = [
 pub fn published(study: Kind, level: &str, row: &str) -> Option<Published> {
     let (.., values) = ROWS.iter().find(|r| (r.0, r.1, r.2) == (study, level, row))?;
     let [pe, oe, ca, iv, delta_ca, delta_iv] = values.map(|v| (!v.is_nan()).then_some(v));
-    Some([pe, oe, None, None, None, None, None, ca, iv, delta_ca, delta_iv])
+    Some([pe, oe, None, None, None, None, None, ca, iv, delta_ca, delta_iv, None, None])
 }
 
 #[cfg(test)]
@@ -85,7 +85,7 @@ mod tests {
                 );
             }
         }
-        assert_eq!(COLUMNS[7..], ["CA cm²", "IV cm³", "|ΔCA| cm²", "|ΔIV| cm³"]);
+        assert_eq!(COLUMNS[7..11], ["CA cm²", "IV cm³", "|ΔCA| cm²", "|ΔIV| cm³"]);
         assert!(published(Main, "low", "guess").is_none());
     }
 }

@@ -1,12 +1,12 @@
 //! What the JSON files of a dataset say. Lengths in millimetres, as BOP has them.
 
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Isometry3, Vector3};
 use prehend_geometry::TriMesh;
 use prehend_render::{Camera, DepthImage, Mask};
 use serde_json::{Map, Value, json};
 
 use crate::Inertial;
-use crate::bop::{UNITS_PER_NEWTON, rotation_to_row_major, translation_to_mm};
+use crate::bop::{UNITS_PER_NEWTON, extent_to_bop, rotation_to_row_major, translation_to_mm};
 
 /// Millimetres of one unit of the depth images.
 pub(super) const DEPTH_SCALE: f64 = 0.1;
@@ -76,18 +76,12 @@ pub(super) fn touch(forces: &[Vector3<f64>], taxels: &str) -> Value {
 
 /// Entry of `models_info.json`; `mesh` in metres.
 pub(super) fn model(mesh: &TriMesh, inertial: &Inertial) -> Value {
-    let mm = |p: Point3<f64>| [p.x, p.y, p.z].map(|v| v * 1e3);
-    let (low, high) = mesh.bounds().unwrap_or_default();
-    let ([x, y, z], size) = (mm(low), mm(Point3::from(high - low)));
+    let mut fields = extent_to_bop(&mesh.vertices);
     let rows = inertial.inertia.row_iter().map(|r| r.iter().copied().collect());
-    json!({
-        "diameter": diameter(&mesh.vertices) * 1e3,
-        "min_x": x, "min_y": y, "min_z": z,
-        "size_x": size[0], "size_y": size[1], "size_z": size[2],
-        "mass_kg": inertial.mass,
-        "com_mm": mm(inertial.center_of_mass),
-        "inertia_kg_m2": rows.collect::<Vec<Vec<f64>>>(),
-    })
+    fields.insert("mass_kg".into(), json!(inertial.mass));
+    fields.insert("com_mm".into(), json!((inertial.center_of_mass.coords * 1e3).as_slice()));
+    fields.insert("inertia_kg_m2".into(), json!(rows.collect::<Vec<Vec<f64>>>()));
+    Value::Object(fields)
 }
 
 /// `cam_R_…` and `cam_t_…` of a pose into the camera frame.
@@ -112,14 +106,6 @@ fn bounding_box(mask: &Mask) -> [i64; 4] {
     bounds.map_or([-1; 4], |[l, t, r, b]| [l, t, r - l + 1, b - t + 1])
 }
 
-/// Largest distance between two of `points`.
-fn diameter(points: &[Point3<f64>]) -> f64 {
-    let from = |(i, p): (usize, &Point3<f64>)| {
-        points[i + 1..].iter().map(|q| (q - p).norm_squared()).fold(0.0, f64::max)
-    };
-    points.iter().enumerate().map(from).fold(0.0, f64::max).sqrt()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -132,12 +118,5 @@ mod tests {
             mask.pixels_mut()[y * 5 + x] = true;
         }
         assert_eq!(bounding_box(&mask), [1, 2, 3, 2]);
-    }
-
-    #[test]
-    fn the_diameter_is_the_longest_distance() {
-        let points = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [-2.0, 4.0, 0.0], [0.0, 0.0, 3.0]];
-        assert_eq!(diameter(&points.map(Point3::from)), 29f64.sqrt());
-        assert_eq!(diameter(&[]), 0.0);
     }
 }

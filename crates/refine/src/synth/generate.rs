@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use serde_json::json;
 
 use super::folder::{fault, make, remove, sweep};
 use super::frame::{FRAME_FOLDERS, Recorded};
@@ -15,9 +16,10 @@ use super::plan::{Subject, SynthSettings, settle};
 use super::scene_files::{NAMES, SceneFiles, from_text, to_text};
 use super::seeds::{Use, seed, sequence};
 use super::sensor::Rig;
-use super::{InitialNoise, Moment, SynthError};
+use super::{Moment, SynthError};
 use crate::AssetError;
 use crate::bop::{Dataset, DatasetError, GroundTruth, ResultRow, write_atomically, write_results};
+use crate::initial::NoiseLevel;
 
 /// What became of a dataset.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -58,7 +60,7 @@ const FAILURES: &str = "synth_failures.json";
 ///
 /// `models/` and `scene_bodies.json` hold what the estimator is told, `models_eval/`, `mask/`, `scene_gt.json`,
 /// `scene_gt_info.json` and `scene_bodies_gt.json` the truth; `init_low.csv` and `init_high.csv` are initial poses
-/// ([`InitialNoise`]); `synth.json` keeps the settings.
+/// ([`NoiseLevel`]); `synth.json` keeps the settings.
 ///
 /// # Errors
 /// If the folder holds something else or a dataset of other settings, a file cannot be written, or an object cannot be
@@ -92,11 +94,12 @@ where
     }
     if made.frames > 0 {
         for (name, purpose, noise) in [
-            ("init_low.csv", Use::InitialLow, InitialNoise::LOW),
-            ("init_high.csv", Use::InitialHigh, InitialNoise::HIGH),
+            ("init_low.csv", Use::InitialLow, NoiseLevel::Low),
+            ("init_high.csv", Use::InitialHigh, NoiseLevel::High),
         ] {
             let rows = initial_poses(dir, subjects, settings, purpose, noise)?;
             write_results(&dir.join(name), &rows)?;
+            write_targets(&dir.join("test_targets_bop19.json"), &rows)?;
         }
     }
     Ok(made)
@@ -312,20 +315,27 @@ impl<'s> Scene<'_, 's> {
     }
 }
 
+/// BOP's list of what an estimator is to find: the object of every row.
+fn write_targets(file: &Path, rows: &[ResultRow]) -> Result<(), DatasetError> {
+    let target = |r: &ResultRow| json!({ "scene_id": r.scene_id, "im_id": r.im_id, "obj_id": r.obj_id, "inst_count": 1 });
+    let lines: Vec<String> = rows.iter().map(|r| target(r).to_string()).collect();
+    write_atomically(file, format!("[\n{}\n]\n", lines.join(",\n")).as_bytes())
+}
+
 /// Wrong poses of every frame that is there.
 fn initial_poses(
     dir: &Path,
     subjects: &[Subject],
     settings: &SynthSettings,
     purpose: Use,
-    level: InitialNoise,
+    level: NoiseLevel,
 ) -> Result<Vec<ResultRow>, SynthError> {
     let dataset = Dataset::open_split(dir, "test")?;
     let truth = GroundTruth::new(&dataset);
     let mut order: Vec<&Subject> = subjects.iter().collect();
     order.sort_by_key(|s| s.obj_id);
     let mut rows = Vec::new();
-    for Subject { obj_id, object } in order {
+    for Subject { obj_id, .. } in order {
         let scene = dataset.scene(*obj_id)?;
         if !scene.dir().join("scene_camera.json").exists() {
             continue;
@@ -333,13 +343,12 @@ fn initial_poses(
         for im_id in scene.images()? {
             for seen in truth.objects(*obj_id, im_id)? {
                 let mut noise = sequence(settings.seed, purpose, *obj_id, im_id);
-                let centre = seen.t_cam_model * object.centre;
                 rows.push(ResultRow {
                     scene_id: *obj_id,
                     im_id,
                     obj_id: *obj_id,
                     score: 1.0,
-                    t_cam_model: level.perturb(&seen.t_cam_model, &centre, &mut noise),
+                    t_cam_model: level.perturb(&seen.t_cam_model, &mut noise),
                     time: -1.0,
                 });
             }

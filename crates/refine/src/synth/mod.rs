@@ -5,13 +5,12 @@
 
 mod annotation;
 mod dataset;
-mod grasp;
 mod error;
 mod folder;
 mod frame;
 mod generate;
+mod grasp;
 mod hand_files;
-mod initial;
 mod models;
 mod moment;
 mod plan;
@@ -23,11 +22,10 @@ mod sensing;
 mod sensor;
 
 pub use dataset::write_dataset;
-pub use grasp::{Grasp, GraspError, GraspFault, GraspSettings, Grasper, Preshape};
 pub use error::SynthError;
 pub use generate::{GraspFailure, Made, generate};
+pub use grasp::{Grasp, GraspError, GraspFault, GraspSettings, Grasper, Preshape};
 pub use hand_files::HandFiles;
-pub use initial::InitialNoise;
 pub use moment::Moment;
 pub use plan::{Subject, SynthSettings};
 pub use ready_made::ready_made_moments;

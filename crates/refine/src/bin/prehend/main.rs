@@ -10,9 +10,9 @@ mod outcome;
 mod output;
 mod progress;
 mod refine;
+mod study;
 mod symmetry;
 mod synth;
-mod study;
 
 use std::process::ExitCode;
 

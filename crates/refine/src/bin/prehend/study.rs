@@ -171,10 +171,9 @@ impl Run {
             if levels.iter().any(|l| l.name == *name) {
                 bail!("two files of initial poses are of level {name}: give LEVEL=FILE");
             }
-            let (level, found) =
-                Level::read(name, file, levels.len(), frames.len(), |r| {
-                    self.selection.admits(r.scene_id, r.im_id, r.obj_id)
-                })?;
+            let (level, found) = Level::read(name, file, levels.len(), frames.len(), |r| {
+                self.selection.admits(r.scene_id, r.im_id, r.obj_id)
+            })?;
             levels.push(level);
             frames.extend(found);
         }

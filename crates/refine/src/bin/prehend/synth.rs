@@ -9,7 +9,7 @@ use prehend_geometry::TriMesh;
 use prehend_geometry::objects::YcbObject;
 use prehend_refine::Object;
 use prehend_refine::synth::{
-    HandFiles, Moment, SensorSettings, Subject, SynthSettings, generate, ready_made_moments,
+    GraspSettings, Grasper, HandFiles, SensorSettings, Subject, SynthSettings, generate,
 };
 use serde_json::json;
 
@@ -54,6 +54,9 @@ pub(crate) struct Arguments {
     /// Steps of each trajectory
     #[arg(long, value_name = "N", default_value = "100", help_heading = "Frames")]
     steps: NonZeroUsize,
+    /// Grasps tried until one holds through its trajectory
+    #[arg(long, value_name = "N", default_value = "60", help_heading = "Frames")]
+    tries: NonZeroU32,
     /// Columns of the images
     #[arg(long, value_name = "PX", default_value = "640", help_heading = "Frames")]
     width: NonZeroUsize,
@@ -95,7 +98,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         Some(urdf) => HandFiles::load(urdf, arguments.taxels.as_deref())?,
         None => HandFiles::built_in()?,
     };
-    let steps = arguments.steps.get();
+    let (steps, tries) = (arguments.steps.get(), u64::from(arguments.tries.get()));
+    let grasping = GraspSettings::default();
     let settings = SynthSettings {
         frames: arguments.frames.get(),
         frames_per_grasp: arguments.frames_per_grasp.get(),
@@ -103,11 +107,18 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         height: arguments.height.get(),
         sensor,
         seed: arguments.seed,
-        grasp: json!({ "steps": steps }),
+        grasp: json!({ "steps": steps, "tries": tries, "settings": format!("{grasping:?}") }),
     };
     let total = u64::from(settings.frames) * subjects.len() as u64;
     let bar = progress::bar(total, "frames");
-    let prepare = |subject| grasps(&hand, subject, steps);
+    let prepare = |subject: &'_ Subject| -> Result<_, String> {
+        let grasper = Grasper::new(&hand.robot, &subject.object, &grasping);
+        let grasper = grasper.map_err(|e| e.to_string())?;
+        Ok(move |seed| {
+            let sequence = grasper.sequence(seed, tries, steps);
+            sequence.map(|(_, moments)| moments).map_err(|e| e.to_string())
+        })
+    };
     let made =
         generate(&arguments.out, &hand, &subjects, &settings, prepare, &|done| bar.inc(done))?;
     bar.finish_and_clear();
@@ -117,17 +128,6 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         format!("scene {} images {}: {}", f.obj_id, images.join(" "), f.reason)
     });
     Ok(Outcome { done: made.frames as usize, failures: failures.collect() })
-}
-
-/// What makes the grasps of one object: moments of the grasp that a seed stands for.
-fn grasps<'a>(
-    hand: &'a HandFiles,
-    subject: &'a Subject,
-    steps: usize,
-) -> Result<impl Fn(u64) -> Result<Vec<Moment>, String> + Sync + use<'a>, String> {
-    Ok(move |seed| {
-        ready_made_moments(&subject.object, &hand.robot, seed, steps).map_err(|e| e.to_string())
-    })
 }
 
 /// The last preset named, with all single settings over it.

@@ -24,6 +24,7 @@ pub use fault::{GraspError, GraspFault};
 pub use preshape::Preshape;
 pub use settings::GraspSettings;
 
+use super::Moment;
 use crate::metrics::ContactModel;
 use crate::{Object, Robot};
 use drive::{Drive, Effort};
@@ -157,14 +158,41 @@ impl<'a> Grasper<'a> {
     /// # Errors
     /// [`GraspFault::Exhausted`] if none of `tries` seeds leads to one.
     pub fn search(&self, first_seed: u64, tries: u64) -> Result<(u64, Grasp), GraspFault> {
+        self.first(first_seed, tries, |seed| Ok((seed, self.grasp(seed)?)))
+    }
+
+    /// What `attempt` makes of the first seed from which it makes something.
+    fn first<T>(
+        &self,
+        first_seed: u64,
+        tries: u64,
+        attempt: impl Fn(u64) -> Result<T, GraspFault>,
+    ) -> Result<T, GraspFault> {
         let mut last = GraspFault::NoContact { links: 0 };
-        for seed in (first_seed..).take(tries as usize) {
-            match self.grasp(seed) {
-                Ok(grasp) => return Ok((seed, grasp)),
+        for k in 0..tries {
+            match attempt(first_seed.wrapping_add(k)) {
+                Ok(found) => return Ok(found),
                 Err(fault) => last = fault,
             }
         }
         Err(GraspFault::Exhausted { tries, last: Box::new(last) })
+    }
+
+    /// The first grasp of the seeds from `first_seed` on that holds through a motion of `steps` moments, and that motion.
+    ///
+    /// # Errors
+    /// [`GraspFault::Exhausted`] if none of `tries` seeds leads to one.
+    pub fn sequence(
+        &self,
+        first_seed: u64,
+        tries: u64,
+        steps: usize,
+    ) -> Result<(Grasp, Vec<Moment>), GraspFault> {
+        self.first(first_seed, tries, |seed| {
+            let grasp = self.grasp(seed)?;
+            let moments = self.trajectory(&grasp, seed, steps)?;
+            Ok((grasp, moments))
+        })
     }
 
     /// Closes the hand around the floating object, until all is at rest or nearly so when time is up: some fingers go on
