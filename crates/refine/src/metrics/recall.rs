@@ -49,10 +49,10 @@ mod tests {
 
     #[test]
     fn thresholds_are_strict_and_scale_with_object_and_image() {
-        let mut errors = [0.3; 10];
+        let mut errors = [0.31; 10];
         errors[9] = 0.0;
         let recall = Recall::new(&errors, 0.021, 0.2, 12.0, 1280);
-        // 0.3 is below 0.35 … 0.5; 2.1 cm is below 3 cm … 10 cm; 12 px are below 20 … 100.
+        // 0.31 is below 0.35 … 0.5; 2.1 cm is below 3 cm … 10 cm; 12 px are below 20 … 100.
         assert!((recall.vsd - (9.0 * 0.4 + 1.0) / 10.0).abs() < 1e-12, "{recall:?}");
         assert_eq!((recall.mssd, recall.mspd), (0.8, 0.9));
         assert!((recall.average() - (0.46 + 0.8 + 0.9) / 3.0).abs() < 1e-12);

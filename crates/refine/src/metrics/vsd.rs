@@ -86,7 +86,7 @@ mod tests {
     fn unmeasured_pixels_count_as_visible_and_the_estimate_shows_where_the_truth_does() {
         let truth = row([1.0, 1.0, 0.0, 0.0]);
         // The second lies 5 cm behind the sensed surface, which shows the truth.
-        let estimate = row([1.0, 1.05, 0.0, 0.0]);
+        let estimate = row([1.0, 1.052, 0.0, 0.0]);
         let sensed = row([0.0, 1.0, 0.0, 0.0]);
         let errors = vsd(&CAMERA, &sensed, &estimate, &truth, 0.2);
         assert_eq!(errors[..5], [0.5; 5]);

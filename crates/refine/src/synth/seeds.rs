@@ -22,7 +22,8 @@ pub(super) enum Use {
 /// A seed for one `purpose`, one object and one number.
 pub(super) fn seed(seed: u64, purpose: Use, obj_id: u32, number: u32) -> u64 {
     // The finaliser of SplitMix64 after each word, so that near words give unrelated seeds.
-    [purpose as u64, u64::from(obj_id), u64::from(number)].into_iter().fold(seed, |state, word| {
+    let words = [seed, purpose as u64, u64::from(obj_id), u64::from(number)];
+    words.into_iter().fold(0_u64, |state, word| {
         let mut z = (state ^ word).wrapping_add(0x9e37_79b9_7f4a_7c15);
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);

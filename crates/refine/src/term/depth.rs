@@ -60,7 +60,8 @@ impl DepthTerm {
         settings: DepthSettings,
     ) -> Result<Self, RefineError> {
         let points = back_project(observation, settings.points);
-        let tree = KdTree::new(&points).map_err(|_| RefineError::NoDepth)?;
+        let tree = KdTree::new(&points).ok().filter(|_| !points.is_empty());
+        let tree = tree.ok_or(RefineError::NoDepth)?;
         let nearest = [points.len(), object.samples.len()]
             .map(|n| (0..n).map(|_| AtomicU32::new(u32::MAX)).collect());
         Ok(Self { object, camera: observation.camera, tree, nearest, hand, settings })
