@@ -6,6 +6,7 @@ mod occluder;
 mod picture;
 mod rows;
 mod truth;
+mod whence;
 
 use super::*;
 use crate::image::Mask;
@@ -121,7 +122,7 @@ fn compare_gradient(
 }
 
 fn contour(half_width: f64) -> Mode {
-    Mode::Contour(ContourOptions { half_width })
+    Mode::Contour(ContourOptions { half_width, ..ContourOptions::default() })
 }
 
 pub(crate) fn full_options() -> LossOptions {
