@@ -84,8 +84,7 @@ impl Crease {
         inverse_z: f32,
     ) -> Option<f32> {
         let across: f32 = (0..2).map(|k| foot.offset[k] * self.piece.outward[k]).sum();
-        let (side, face) =
-            if across > 0.0 { (1.0, self.other) } else { (-1.0, self.piece.face) };
+        let (side, face) = if across > 0.0 { (1.0, self.other) } else { (-1.0, self.piece.face) };
         // 1/Z is linear in the image: that of the face's plane, continued to the pixel.
         let [a, b, c] = projected.corners(face as usize);
         let (ax, ay, bx, by, cx, cy) = (a[0] - x, a[1] - y, b[0] - x, b[1] - y, c[0] - x, c[1] - y);

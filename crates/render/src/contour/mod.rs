@@ -39,7 +39,7 @@ pub(crate) struct ContourView<'a> {
     pub(crate) scene: Scene<'a>,
     region: Region,
     pub(crate) pieces: Vec<Piece>,
-    pub(crate) inner: Vec<Inner>,
+    inner: Vec<Inner>,
     creases: Vec<Crease>,
     pub(crate) visible: Vec<Visible>,
 }

@@ -151,7 +151,8 @@ impl Contours {
             let pieces = folds.iter().map(|fold: &Crease| &fold.piece);
             let crease = Band::new(pieces, &visible.region, half_width).piece;
             let side = |(i, index): (usize, &u32)| {
-                let (Some(fold), true) = (folds.get(*index as usize), visible.face[i] != MISS) else {
+                let (Some(fold), true) = (folds.get(*index as usize), visible.face[i] != MISS)
+                else {
                     return 0.0;
                 };
                 let (x, y) = visible.position(i);
@@ -357,7 +358,8 @@ impl Visibility for Contours {
         sums: &mut Sums,
     ) {
         let Some(own) = &trace.own else { return };
-        let by_surface: f64 = trace.shares().zip(by_parts).map(|(share, by)| share * by.weight).sum();
+        let by_surface: f64 =
+            trace.shares().zip(by_parts).map(|(share, by)| share * by.weight).sum();
         let by_edge = trace.edge.map_or(0.0, |e| e.slope * (by_surface - by.background + by.alpha));
         let mut by_own = by_parts[0].weight;
         if let (Some(fold), [.., by_here, by_beyond]) = (&trace.fold, by_parts) {

@@ -58,7 +58,12 @@ impl Frame {
             faces: Vec::new(),
             facing: Vec::new(),
         };
-        let mut flat = Flat { edges: Vec::new(), creases: Vec::new(), screen: Vec::new(), region: Region::EMPTY };
+        let mut flat = Flat {
+            edges: Vec::new(),
+            creases: Vec::new(),
+            screen: Vec::new(),
+            region: Region::EMPTY,
+        };
         for object in &scene.objects {
             let model = &object.model;
             let (first_face, first_vertex) = (frame.faces.len(), frame.position.len());

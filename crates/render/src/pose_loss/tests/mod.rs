@@ -6,7 +6,6 @@ mod occluder;
 mod picture;
 mod rows;
 mod truth;
-mod whence;
 
 use super::*;
 use crate::image::Mask;
@@ -119,6 +118,10 @@ fn compare_gradient(
     });
     let (a, b) = (at.gradient.component_mul(&scale), difference.component_mul(&scale));
     (a.dot(&b) / (a.norm() * b.norm()), (a - b).norm() / b.norm())
+}
+
+fn creased() -> Mode {
+    Mode::Contour(ContourOptions { half_width: 0.645, creases: true })
 }
 
 fn contour(half_width: f64) -> Mode {

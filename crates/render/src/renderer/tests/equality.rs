@@ -36,7 +36,8 @@ fn one_object_looks_as_the_loss_of_its_pose_sees_it() {
     let mut open = painted(lump(0.05, 20), 0.06);
     open.faces.retain(|f| f.iter().any(|v| *v % 3 == 0));
     let ring = painted(torus(0.05, 0.018, 16), 0.08);
-    for mesh in [ring, painted(lump(0.05, 20), 0.06), open, textured(lump(0.05, 20))] {
+    let creased = painted(cuboid(Vector3::new(0.06, 0.08, 0.1)), 0.06);
+    for mesh in [ring, painted(lump(0.05, 20), 0.06), open, textured(lump(0.05, 20)), creased] {
         let model = Arc::new(RenderModel::new(&mesh).unwrap());
         for (pose, mode) in [at(0.0, 0.0, 0.4), at(0.12, -0.02, 0.35)]
             .into_iter()
