@@ -26,8 +26,8 @@ pub struct ContourOptions {
     /// one adds a camera's own blur; more widens the basin of attraction. From 0.05 to 64; others count as the nearest.
     pub half_width: f64,
     /// Where the colour of the surface jumps — at edges with separate normals, and at seams of its texture or its vertex
-    /// colours — a pixel within the band shows some of both sides, so that the jump has a derivative. Costs about a tenth of the
-    /// time on objects with few such edges. Not on graphics devices.
+    /// colours — a pixel within the band shows some of both sides, so that the jump has a derivative. Together with
+    /// samples within pixels this makes gradients true where light falls on cans and cartons. Graphics devices do not support it.
     pub creases: bool,
 }
 
