@@ -110,7 +110,7 @@ fn find(
     let (mut pose, mut iterations) = (start, 0);
     for (factor, half_width) in LEVELS {
         let level = target.downsampled(factor)?;
-        let mode = Mode::Contour(ContourOptions { half_width });
+        let mode = Mode::Contour(ContourOptions { half_width, ..ContourOptions::default() });
         let loss = PoseLoss::new(mode, LossOptions { mask_weight: 1.0, ..LossOptions::default() });
         let (base, center) = (pose, pose * model.center());
         let moved =

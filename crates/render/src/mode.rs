@@ -25,6 +25,10 @@ pub struct ContourOptions {
     /// into what lies behind. 0.645 (the square root of 5/12) blurs as much as a pixel that averages over its square;
     /// one adds a camera's own blur; more widens the basin of attraction. From 0.05 to 64; others count as the nearest.
     pub half_width: f64,
+    /// Where the colour of the surface jumps — at edges with separate normals, and at seams of its texture or its vertex
+    /// colours — a pixel within the band shows some of both sides, so that the jump has a derivative. Together with
+    /// samples within pixels this makes gradients true where light falls on cans and cartons. Graphics devices do not support it.
+    pub creases: bool,
 }
 
 impl ContourOptions {
@@ -43,14 +47,14 @@ impl ContourOptions {
         let s2 = (samples * samples) as f64;
         let least = 5.0 / 12.0;
         let left = s2 * self.half_width * self.half_width - least * (s2 - 1.0);
-        if samples == 1 { *self } else { Self { half_width: left.max(least).sqrt() } }
+        if samples == 1 { *self } else { Self { half_width: left.max(least).sqrt(), ..*self } }
     }
 }
 
 impl Default for ContourOptions {
-    /// A band of one pixel.
+    /// A band of one pixel, across contours only.
     fn default() -> Self {
-        Self { half_width: 1.0 }
+        Self { half_width: 1.0, creases: false }
     }
 }
 

@@ -89,7 +89,13 @@ impl RenderingTerm {
         Ok(Self {
             object,
             target,
-            loss: PoseLoss::new(Mode::Contour(ContourOptions { half_width: HALF_WIDTH }), options),
+            loss: PoseLoss::new(
+                Mode::Contour(ContourOptions {
+                    half_width: HALF_WIDTH,
+                    ..ContourOptions::default()
+                }),
+                options,
+            ),
             scale: 0.5 * settings.effective_pixels / (sigma * sigma),
             light_ridge: settings.light_ridge,
         })

@@ -4,7 +4,7 @@ use super::outline::Piece;
 use super::pixel::{Scene, falling_step};
 use crate::pose_loss::{Pixel, scaled_sum};
 use crate::projected::Projected;
-use crate::raster::{MISS, Visible};
+use crate::raster::Visible;
 
 /// Depth steps below this share of the model's radius are folds of the surface, not contours.
 pub(crate) const LEAST_STEP: f32 = 0.02;
@@ -30,19 +30,6 @@ pub(crate) fn inner_contours(
     pieces: Vec<Piece>,
     least: impl Fn(u32, u32) -> Option<f32>,
 ) -> Vec<Inner> {
-    let seen = |x: f32, y: f32| {
-        let (x, y) = (x.round(), y.round());
-        if x < 0.0 || y < 0.0 {
-            return None;
-        }
-        let (column, row) = (x as usize, y as usize);
-        let part = visible.iter().find(|v| (v.region.y0..v.region.y1).contains(&row))?;
-        if !(part.region.x0..part.region.x1).contains(&column) {
-            return None;
-        }
-        let at = (row - part.region.y0) * part.region.width() + column - part.region.x0;
-        (part.face[at] != MISS).then(|| (x, y, part.face[at], part.inverse_z[at]))
-    };
     let select = |piece: Piece| {
         let t = 0.5 * (piece.range[0] + piece.range[1]);
         let face = projected.faces[piece.face as usize];
@@ -51,15 +38,16 @@ pub(crate) fn inner_contours(
         let beside = |distance: f32| {
             let at =
                 |k: usize| piece.a[k] + t * (piece.b[k] - piece.a[k]) + distance * piece.outward[k];
-            seen(at(0), at(1))
+            Visible::seen(visible, at(0), at(1))
         };
         let (behind, front) = (beside(1.0)?, beside(-1.0)?);
-        let step = 1.0 / behind.3 - z;
+        let step = 1.0 / behind.inverse_z - z;
         let split = z + 0.5 * step;
-        let shown = match least(piece.face, behind.2) {
-            Some(least) => step > least && 1.0 / front.3 < split,
-            None => least(piece.face, front.2).is_some(),
+        let shown = match least(piece.face, behind.face) {
+            Some(least) => step > least && 1.0 / front.inverse_z < split,
+            None => least(piece.face, front.face).is_some(),
         };
+        let behind = (behind.x, behind.y, behind.face, behind.inverse_z);
         shown.then_some(Inner { piece, behind, split })
     };
     pieces.into_iter().filter_map(select).collect()

@@ -19,7 +19,7 @@ pub fn light_samples(
     target: &Target,
     margin: f64,
 ) -> Vec<LightSample> {
-    let options = ContourOptions { half_width: margin };
+    let options = ContourOptions { half_width: margin, ..ContourOptions::default() };
     let (center, light, also) = (Point3::origin(), Light::ambient(1.0), Region::EMPTY);
     let camera = &target.camera;
     let view = ContourView::new(&options, model, t_cam_object, &center, camera, &light, &also);

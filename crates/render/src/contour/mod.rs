@@ -3,8 +3,10 @@
 //! A pixel shows α C with the colour C of the surface and a coverage α that falls smoothly from one to zero over a narrow
 //! band around the object's outline (the background of a segmented image is black). All derivatives by the pose are in
 //! closed form. Where the object hides farther parts of itself, the two surfaces are blended likewise
-//! (α C_near + (1−α) C_far). Jumps of colour at creases and texture seams are part of the value, but not of the derivative.
+//! (α C_near + (1−α) C_far). Jumps of colour at creases and texture seams are
+//! softened likewise if the options ask for it; else they are part of the value, but not of the derivative.
 
+mod crease;
 mod inner;
 mod interior;
 mod lanes;
@@ -24,6 +26,7 @@ use crate::pose_loss::{LaneSums, Residuals, Seen, Sums, View};
 use crate::posed::Posed;
 use crate::projected::Region;
 use crate::raster::{self, MISS, Visible};
+pub(crate) use crease::{Crease, creases};
 pub(crate) use inner::{Inner, LEAST_STEP, inner_contours};
 use lanes::Waiting;
 pub use light_samples::light_samples;
@@ -37,6 +40,7 @@ pub(crate) struct ContourView<'a> {
     region: Region,
     pub(crate) pieces: Vec<Piece>,
     inner: Vec<Inner>,
+    creases: Vec<Crease>,
     pub(crate) visible: Vec<Visible>,
 }
 
@@ -66,9 +70,16 @@ impl<'a> ContourView<'a> {
         );
         let least = LEAST_STEP * model.radius() as f32;
         let inner = inner_contours(projected, &visible, silhouette.covered, |_, _| Some(least));
+        let creases = match options.creases && projected.region != Region::EMPTY {
+            false => Vec::new(),
+            true => {
+                let edges = model.creases.iter().map(|i| &model.edges[*i as usize]);
+                creases(projected, &visible, edges, &region, half_width, |_| least)
+            }
+        };
         let twist_center = center.coords.cast();
         let scene = Scene { posed, lighting, half_width, twist_center };
-        Self { scene, region, pieces: silhouette.outline, inner, visible }
+        Self { scene, region, pieces: silhouette.outline, inner, creases, visible }
     }
 }
 
@@ -80,8 +91,16 @@ enum Found<'a> {
     Outside(&'a Piece),
     /// A face, far from contours.
     Face(Hit),
-    /// A face near contours.
-    Border(Hit, Option<&'a Piece>, Option<&'a Inner>),
+    /// A face near contours or a crease.
+    Border(Hit, Near<'a>),
+}
+
+/// The contours and the crease within whose bands a pixel lies.
+#[derive(Clone, Copy)]
+pub(crate) struct Near<'a> {
+    pub(crate) edge: Option<&'a Piece>,
+    pub(crate) inner: Option<&'a Inner>,
+    pub(crate) crease: Option<&'a Crease>,
 }
 
 /// A visible face.
@@ -101,17 +120,22 @@ impl ContourView<'_> {
         let inner_pieces = self.inner.iter().map(|inner| &inner.piece);
         let inner_band =
             (!self.inner.is_empty()).then(|| Band::new(inner_pieces, &visible.region, width));
+        let crease_pieces = self.creases.iter().map(|crease| &crease.piece);
+        let crease_band =
+            (!self.creases.is_empty()).then(|| Band::new(crease_pieces, &visible.region, width));
         let mut i = 0;
         for y in visible.region.y0..visible.region.y1 {
             for x in visible.region.x0..visible.region.x1 {
                 let edge = self.pieces.get(band.piece[i] as usize);
                 let inner = inner_band.as_ref().and_then(|b| self.inner.get(b.piece[i] as usize));
+                let crease =
+                    crease_band.as_ref().and_then(|b| self.creases.get(b.piece[i] as usize));
                 let hit = Hit { face: visible.face[i], inverse_z: visible.inverse_z[i] };
-                let found = match (hit.face, edge, inner) {
-                    (MISS, None, _) => Found::Nothing,
-                    (MISS, Some(piece), _) => Found::Outside(piece),
-                    (_, None, None) => Found::Face(hit),
-                    _ => Found::Border(hit, edge, inner),
+                let found = match (hit.face, edge, inner, crease) {
+                    (MISS, None, ..) => Found::Nothing,
+                    (MISS, Some(piece), ..) => Found::Outside(piece),
+                    (_, None, None, None) => Found::Face(hit),
+                    _ => Found::Border(hit, Near { edge, inner, crease }),
                 };
                 each(x, y, found);
                 i += 1;
@@ -130,9 +154,9 @@ impl ContourView<'_> {
             Found::Face(Hit { face, inverse_z }) => {
                 (scene.interior::<DERIVATIVES>(u, v, face, inverse_z), true, false)
             }
-            Found::Border(Hit { face, inverse_z }, edge, inner) => {
-                let pixel = scene.inside::<DERIVATIVES>(u, v, face, inverse_z, edge, inner);
-                (pixel, true, edge.is_some())
+            Found::Border(Hit { face, inverse_z }, near) => {
+                let pixel = scene.inside::<DERIVATIVES>(u, v, face, inverse_z, near);
+                (pixel, true, near.edge.is_some())
             }
         };
         Some(Seen { pixel, hit, near_outline })

@@ -4,7 +4,7 @@ use crate::model::NONE;
 use crate::projected::{Projected, Region};
 
 /// Longest piece of an edge that is judged as a whole \[px\].
-const PIECE: f32 = 4.0;
+pub(super) const PIECE: f32 = 4.0;
 /// How far outside an edge it is probed for other parts of the object \[px\]: small against a pixel, large against
 /// the rounding of coordinates.
 const PROBE: f32 = 0.02;
@@ -117,7 +117,7 @@ pub(crate) fn outline(projected: &Projected, region: &Region, margin: f32) -> Si
 }
 
 /// The share of an edge within `margin` of `region`.
-fn clip(edge: &Piece, region: &Region, margin: f32) -> Option<[f32; 2]> {
+pub(super) fn clip(edge: &Piece, region: &Region, margin: f32) -> Option<[f32; 2]> {
     let (mut start, mut end) = (0.0f32, 1.0f32);
     let bounds = [(region.x0, region.x1), (region.y0, region.y1)];
     for (k, (low, high)) in bounds.into_iter().enumerate() {

@@ -2,7 +2,7 @@
 
 use nalgebra::{RealField, Vector3, convert};
 
-use super::inner::Inner;
+use super::Near;
 use super::interior::{Motion, add_level, barycentric, row};
 use super::outline::{Foot, Piece};
 use super::surface::{Lighting, Shaded, albedo, posed_normal, shade};
@@ -28,8 +28,7 @@ pub(crate) fn falling_step<T: RealField + Copy>(s: T, w: T) -> (T, T) {
 }
 
 impl Scene<'_> {
-    /// A pixel that `face` covers; `edge` is the outline piece and `inner` the inner contour within the band, if
-    /// any.
+    /// A pixel that `face` covers, with what is near.
     #[inline]
     pub(crate) fn inside<const DERIVATIVES: bool>(
         &self,
@@ -37,10 +36,12 @@ impl Scene<'_> {
         y: f32,
         face: u32,
         inverse_z: f32,
-        edge: Option<&Piece>,
-        inner: Option<&Inner>,
+        Near { edge, inner, crease }: Near,
     ) -> Pixel {
         let mut pixel = self.interior::<DERIVATIVES>(x, y, face, inverse_z);
+        if let Some(crease) = crease {
+            self.soften::<DERIVATIVES>(x, y, inverse_z, &mut pixel, crease);
+        }
         if let Some(inner) = inner {
             pixel = self.cross::<DERIVATIVES>(x, y, pixel, inner);
         }

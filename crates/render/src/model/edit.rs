@@ -61,6 +61,7 @@ impl RenderModel {
         let face_normals: Vec<Vector3<f64>> = self.faces.iter().map(face_normal).collect();
         let normals = topology::corner_normals(positions, &self.faces, &face_normals, CREASE);
         self.normals = normals.iter().map(|n| n.map(|v| v.cast())).collect();
+        self.find_creases();
         Ok(self)
     }
 
@@ -73,6 +74,7 @@ impl RenderModel {
         let corners = self.faces.iter().map(|f| f.map(|v| colors[v as usize])).collect();
         self.albedo = Albedo::Corners(corners);
         self.texel_density = 0.0;
+        self.find_creases();
         Ok(self)
     }
 
@@ -93,6 +95,7 @@ impl RenderModel {
     pub fn with_uniform_color(mut self, color: [f32; 3]) -> Self {
         self.albedo = Albedo::Uniform(color);
         self.texel_density = 0.0;
+        self.find_creases();
         self
     }
 }

@@ -1,5 +1,6 @@
 //! A triangle mesh prepared for rendering.
 
+mod crease;
 mod edit;
 mod mipmap;
 mod normal_adjoint;
@@ -99,6 +100,8 @@ pub struct RenderModel {
     /// Unit normals of each face's corners, mesh frame.
     pub(crate) normals: Vec<[Vector3<f32>; 3]>,
     pub(crate) edges: Vec<Edge>,
+    /// Edges at which normals, texture coordinates or colours jump.
+    pub(crate) creases: Vec<u32>,
     pub(crate) albedo: Albedo,
     /// Every edge has two faces: what faces away from the camera cannot be seen.
     pub(crate) closed: bool,
@@ -140,17 +143,20 @@ impl RenderModel {
         let edges = topology::edges(&faces);
         let (albedo, texel_density) = albedo(mesh, &kept)?;
         let radius = mesh.vertices.iter().map(|v| (v - center).norm()).fold(0.0, f64::max);
-        Ok(Self {
+        let mut model = Self {
             positions: positions.iter().map(|p| (p - center).cast()).collect(),
             faces,
             normals: normals.iter().map(|n| n.map(|v| v.cast())).collect(),
             closed: edges.iter().all(|e| e.other != NONE),
             edges,
+            creases: Vec::new(),
             albedo,
             texel_density,
             center,
             radius,
-        })
+        };
+        model.find_creases();
+        Ok(model)
     }
 
     /// Centre of the bounding box, mesh frame \[m\].

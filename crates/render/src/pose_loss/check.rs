@@ -98,7 +98,7 @@ mod tests {
             PoseLoss::new(mode, options).check().unwrap_err().name
         };
         for half_width in [f64::NAN, 0.0, -3.0, 1000.0] {
-            let mode = Mode::Contour(ContourOptions { half_width });
+            let mode = Mode::Contour(ContourOptions { half_width, ..ContourOptions::default() });
             assert_eq!(named(mode, plain), "half_width");
         }
         for k in [0.0, -1.0, f64::NAN, 1e-25] {

@@ -51,10 +51,37 @@ pub(crate) struct Visible {
     pub(crate) inverse_z: Vec<f32>,
 }
 
+/// What is seen at the pixel nearest to an image point.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Seen {
+    /// The pixel.
+    pub(crate) x: f32,
+    pub(crate) y: f32,
+    /// The face, and its 1/Z \[1/m\].
+    pub(crate) face: u32,
+    pub(crate) inverse_z: f32,
+}
+
 impl Visible {
     pub(crate) fn new(region: Region) -> Self {
         let count = region.width() * (region.y1 - region.y0);
         Self { region, face: vec![MISS; count], inverse_z: vec![0.0; count] }
+    }
+
+    /// What the blocks show at the pixel nearest to (x, y), if anything.
+    pub(crate) fn seen(blocks: &[Self], x: f32, y: f32) -> Option<Seen> {
+        let (x, y) = (x.round(), y.round());
+        if x < 0.0 || y < 0.0 {
+            return None;
+        }
+        let (column, row) = (x as usize, y as usize);
+        let part = blocks.iter().find(|v| (v.region.y0..v.region.y1).contains(&row))?;
+        if !(part.region.x0..part.region.x1).contains(&column) {
+            return None;
+        }
+        let at = (row - part.region.y0) * part.region.width() + column - part.region.x0;
+        let (face, inverse_z) = (part.face[at], part.inverse_z[at]);
+        (face != MISS).then_some(Seen { x, y, face, inverse_z })
     }
 
     /// Column and row of the pixel with index `i`.

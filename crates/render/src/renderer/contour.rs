@@ -9,7 +9,10 @@ use super::frame::{Flat, Frame};
 use super::geometry::{Foot, Hit, hit, hit_adjoint};
 use super::sums::Sums;
 use super::visibility::{Blend, BlendAdjoint, Part, PartAdjoint, Visibility};
-use crate::contour::{Band, Inner, LEAST_STEP, Piece, falling_step, inner_contours, outline};
+use crate::contour::{
+    Band, Crease, Inner, LEAST_STEP, Piece, creases, falling_step, inner_contours, outline,
+};
+use crate::mode::ContourOptions;
 use crate::projected::Region;
 use crate::raster::{MISS, Visible, rasterise};
 
@@ -18,15 +21,19 @@ pub(super) struct Contours {
     half_width: f64,
     pub(super) outline: Vec<Piece>,
     pub(super) inner: Vec<Inner>,
+    creases: Vec<Crease>,
     pub(super) blocks: Vec<Block>,
 }
 
 /// What is visible in a block of rows.
 pub(super) struct Block {
     pub(super) visible: Visible,
-    /// Outline piece and inner contour in whose band each pixel is.
+    /// Outline piece, inner contour and crease in whose band each pixel is.
     edge: Vec<u32>,
     inner: Vec<u32>,
+    crease: Vec<u32>,
+    /// The side of the crease: −1, 1, or 0 where the pixel shows another surface.
+    side: Vec<f32>,
 }
 
 /// What was decided about a pixel: which face is at its centre, and which contours are near.
@@ -35,6 +42,8 @@ pub(super) struct Decision<'a> {
     pub(super) face: Option<usize>,
     pub(super) edge: Option<&'a Piece>,
     pub(super) inner: Option<&'a Inner>,
+    /// With the side that the pixel is on.
+    pub(super) crease: Option<(&'a Crease, f32)>,
 }
 
 /// Where a part of a pixel lies on its face.
@@ -66,11 +75,21 @@ struct Crossing {
     own_is_near: bool,
 }
 
-/// All that makes a pixel: its own part, that across an inner contour, and the outline.
+/// A crease next to a pixel.
+#[derive(Clone, Copy)]
+struct Fold {
+    /// Its weight is the share of the jump that the pixel gains. On the side of the pixel.
+    step: Step,
+    /// The edge as the face beyond has it.
+    beyond: Piece,
+}
+
+/// All that makes a pixel: its own part, that across an inner contour, what lies beyond a crease, and the outline.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Trace {
     own: Option<Site>,
     crossing: Option<Crossing>,
+    fold: Option<Fold>,
     edge: Option<Step>,
 }
 
@@ -79,22 +98,33 @@ impl Trace {
         self.edge.map_or(1.0, |edge| edge.alpha)
     }
 
-    /// Shares of the own part and the other in the surface.
-    fn shares(&self) -> [f64; 2] {
+    /// Shares of the own part and the one across an inner contour in the surface.
+    fn sides(&self) -> [f64; 2] {
         match &self.crossing {
             None => [1.0, 0.0],
             Some(Crossing { step, own_is_near: true, .. }) => [step.alpha, 1.0 - step.alpha],
             Some(Crossing { step, .. }) => [1.0 - step.alpha, step.alpha],
         }
     }
+
+    /// Shares of all parts in the surface: of the sides, and of the two faces at a crease.
+    fn shares(&self) -> impl Iterator<Item = f64> {
+        let [own, other] = self.sides();
+        let jump = self.fold.map_or(0.0, |fold| own * fold.step.alpha);
+        let sides = [Some(own), self.crossing.map(|_| other)];
+        let fold = self.fold.map(|_| [-jump, jump]);
+        sides.into_iter().flatten().chain(fold.into_iter().flatten())
+    }
 }
 
 impl Contours {
-    pub(super) fn new(frame: &Frame, mut flat: Flat, half_width: f32) -> Self {
+    pub(super) fn new(frame: &Frame, mut flat: Flat, options: &ContourOptions) -> Self {
+        let half_width = options.drawn_half_width();
+        let edges = std::mem::take(&mut flat.creases);
         let projected = frame.projected(&mut flat);
         let region = projected.region;
         let visible = rasterise(&projected, &region);
-        let (mut pieces, mut inner) = (Vec::new(), Vec::new());
+        let (mut pieces, mut inner, mut folds) = (Vec::new(), Vec::new(), Vec::new());
         if region != Region::EMPTY {
             let silhouette = outline(&projected, &region, half_width);
             pieces = silhouette.outline;
@@ -105,15 +135,36 @@ impl Contours {
                 (near == far).then_some(LEAST_STEP * radius as f32)
             };
             inner = inner_contours(&projected, &visible, silhouette.covered, least);
+            if options.creases {
+                let least = |face: u32| {
+                    let body = &frame.bodies[frame.body_of(face as usize)];
+                    LEAST_STEP * body.model.radius() as f32
+                };
+                let edges = edges.iter();
+                folds = creases(&projected, &visible, edges, &region, half_width, least);
+            }
         }
         let blocks = visible.into_par_iter().map(|visible| {
             let edge = Band::new(pieces.iter(), &visible.region, half_width).piece;
             let inner_pieces = inner.iter().map(|inner: &Inner| &inner.piece);
             let inner = Band::new(inner_pieces, &visible.region, half_width).piece;
-            Block { visible, edge, inner }
+            let pieces = folds.iter().map(|fold: &Crease| &fold.piece);
+            let crease = Band::new(pieces, &visible.region, half_width).piece;
+            let side = |(i, index): (usize, &u32)| {
+                let (Some(fold), true) = (folds.get(*index as usize), visible.face[i] != MISS)
+                else {
+                    return 0.0;
+                };
+                let (x, y) = visible.position(i);
+                let (x, y) = (x as f32, y as f32);
+                let foot = fold.piece.foot(x, y);
+                fold.side(&projected, [x, y], &foot, visible.inverse_z[i]).unwrap_or(0.0)
+            };
+            let side = crease.iter().enumerate().map(side).collect();
+            Block { visible, edge, inner, crease, side }
         });
         let blocks = blocks.collect();
-        Self { half_width: f64::from(half_width), outline: pieces, inner, blocks }
+        Self { half_width: f64::from(half_width), outline: pieces, inner, creases: folds, blocks }
     }
 
     pub(super) fn decision(&self, block: usize, i: usize) -> Decision<'_> {
@@ -123,6 +174,11 @@ impl Contours {
             face: (face != MISS).then_some(face as usize),
             edge: self.outline.get(block.edge[i] as usize),
             inner: self.inner.get(block.inner[i] as usize),
+            crease: self
+                .creases
+                .get(block.crease[i] as usize)
+                .filter(|_| block.side[i] != 0.0)
+                .map(|crease| (crease, block.side[i])),
         }
     }
 
@@ -134,6 +190,22 @@ impl Contours {
         let [share, distance] = foot.evaluate(foot_inputs(frame, piece));
         let (alpha, slope) = falling_step(distance, self.half_width);
         Step { piece: *piece, foot, share, alpha, slope }
+    }
+
+    /// The jump at a crease next to a pixel on the given side.
+    #[inline]
+    fn fold(&self, frame: &Frame, crease: &Crease, pixel: [f64; 2], side: f32) -> Fold {
+        let side = f64::from(side);
+        let mut step = self.step(frame, &crease.piece, pixel, side);
+        let mut beyond = crease.reversed();
+        // The share falls on both sides alike, by the distance without its sign.
+        if side > 0.0 {
+            std::mem::swap(&mut step.piece, &mut beyond);
+        } else {
+            step.alpha = 1.0 - step.alpha;
+            step.slope = -step.slope;
+        }
+        Fold { step, beyond }
     }
 }
 
@@ -169,18 +241,23 @@ fn at_pixel(frame: &Frame, face: usize, at: [f64; 2], weight: f64) -> (Part, Hit
 
 /// That at the foot on a contour.
 #[inline]
-fn at_foot(step: &Step, weight: f64) -> Part {
+fn at_foot(piece: &Piece, share: f64, weight: f64) -> Part {
     let mut b = [0.0; 3];
-    b[step.piece.corners[0] as usize] = 1.0 - step.share;
-    b[step.piece.corners[1] as usize] = step.share;
-    Part { face: step.piece.face as usize, b, weight }
+    b[piece.corners[0] as usize] = 1.0 - share;
+    b[piece.corners[1] as usize] = share;
+    Part { face: piece.face as usize, b, weight }
 }
 
-/// Carries the adjoint of a signed distance back, and those of barycentric coordinates of its foot.
+/// The adjoint of the foot's share of its edge, from those of its barycentric coordinates.
 #[inline]
-fn step_back(frame: &Frame, step: &Step, by_b: [f64; 3], by_distance: f64, sums: &mut Sums) {
+fn by_share(piece: &Piece, by_b: [f64; 3]) -> f64 {
+    by_b[piece.corners[1] as usize] - by_b[piece.corners[0] as usize]
+}
+
+/// Carries the adjoints of a signed distance and of the foot's share of its edge back.
+#[inline]
+fn step_back(frame: &Frame, step: &Step, by_share: f64, by_distance: f64, sums: &mut Sums) {
     let corners = step.piece.corners.map(|c| c as usize);
-    let by_share = by_b[corners[1]] - by_b[corners[0]];
     if by_share == 0.0 && by_distance == 0.0 {
         return;
     }
@@ -234,8 +311,8 @@ impl Visibility for Contours {
         let decision = self.decision(block, i);
         let Some(face) = decision.face else {
             let edge = self.step(frame, decision.edge?, at, 1.0);
-            *trace = Trace { own: Some(Site::Foot), crossing: None, edge: Some(edge) };
-            parts.push(at_foot(&edge, edge.alpha));
+            *trace = Trace { own: Some(Site::Foot), edge: Some(edge), ..Trace::default() };
+            parts.push(at_foot(&edge.piece, edge.share, edge.alpha));
             return Some(Blend { background: 1.0 - edge.alpha, alpha: edge.alpha, center: None });
         };
         let (own, hit) = at_pixel(frame, face, at, 1.0);
@@ -254,10 +331,15 @@ impl Visibility for Contours {
                 let (part, hit) = at_pixel(frame, face as usize, behind, 0.0);
                 (part, Site::Ray(behind, hit))
             } else {
-                (at_foot(&step, 0.0), Site::Foot)
+                (at_foot(&step.piece, step.share, 0.0), Site::Foot)
             };
             trace.crossing = Some(Crossing { step, other, own_is_near });
             parts.push(part);
+        }
+        if let Some((crease, side)) = decision.crease {
+            let fold = self.fold(frame, crease, at, side);
+            parts.extend([fold.step.piece, fold.beyond].map(|p| at_foot(&p, fold.step.share, 0.0)));
+            trace.fold = Some(fold);
         }
         for (part, share) in parts.iter_mut().zip(trace.shares()) {
             part.weight = alpha * share;
@@ -276,28 +358,37 @@ impl Visibility for Contours {
         sums: &mut Sums,
     ) {
         let Some(own) = &trace.own else { return };
-        let shares = trace.shares().into_iter();
-        let by_surface: f64 = shares.zip(by_parts).map(|(share, by)| share * by.weight).sum();
+        let by_surface: f64 =
+            trace.shares().zip(by_parts).map(|(share, by)| share * by.weight).sum();
         let by_edge = trace.edge.map_or(0.0, |e| e.slope * (by_surface - by.background + by.alpha));
-        if let (Some(crossing), [by_own, by_other]) = (&trace.crossing, by_parts) {
+        let mut by_own = by_parts[0].weight;
+        if let (Some(fold), [.., by_here, by_beyond]) = (&trace.fold, by_parts) {
+            let step = &fold.step;
+            let by_jump = by_beyond.weight - by_here.weight;
+            by_own += step.alpha * by_jump;
+            let by_foot = by_share(&step.piece, by_here.b) + by_share(&fold.beyond, by_beyond.b);
+            let by_distance = step.slope * trace.sides()[0] * trace.alpha() * by_jump;
+            step_back(frame, step, by_foot, by_distance, sums);
+        }
+        if let (Some(crossing), Some(by_other)) = (&trace.crossing, by_parts.get(1)) {
             let step = &crossing.step;
             let sign = if crossing.own_is_near { 1.0 } else { -1.0 };
-            let by_step = step.slope * sign * trace.alpha() * (by_own.weight - by_other.weight);
+            let by_step = step.slope * sign * trace.alpha() * (by_own - by_other.weight);
             let by_foot = match &crossing.other {
                 Site::Ray(at, hit) => {
                     hit_back(frame, parts[1].face, *at, hit, by_other.b, 0.0, sums);
-                    [0.0; 3]
+                    0.0
                 }
-                Site::Foot => by_other.b,
+                Site::Foot => by_share(&step.piece, by_other.b),
             };
             step_back(frame, step, by_foot, by_step, sums);
         }
         let by_foot = match own {
             Site::Ray(at, hit) => {
                 hit_back(frame, parts[0].face, *at, hit, by_parts[0].b, by.depth, sums);
-                [0.0; 3]
+                0.0
             }
-            Site::Foot => by_parts[0].b,
+            Site::Foot => trace.edge.map_or(0.0, |e| by_share(&e.piece, by_parts[0].b)),
         };
         if let Some(edge) = &trace.edge {
             step_back(frame, edge, by_foot, by_edge, sums);

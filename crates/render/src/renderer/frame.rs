@@ -40,6 +40,8 @@ pub(super) struct Frame {
 /// The same scene projected in f32, for the discrete part: what is visible.
 pub(super) struct Flat {
     edges: Vec<Edge>,
+    /// Those at which normals or colours of an object jump.
+    pub(super) creases: Vec<Edge>,
     /// Column, row \[px\] and 1/Z \[1/m\]; 1/Z is 0 where it is not in front of the camera.
     pub(super) screen: Vec<[f32; 3]>,
     pub(super) region: Region,
@@ -56,7 +58,12 @@ impl Frame {
             faces: Vec::new(),
             facing: Vec::new(),
         };
-        let mut flat = Flat { edges: Vec::new(), screen: Vec::new(), region: Region::EMPTY };
+        let mut flat = Flat {
+            edges: Vec::new(),
+            creases: Vec::new(),
+            screen: Vec::new(),
+            region: Region::EMPTY,
+        };
         for object in &scene.objects {
             let model = &object.model;
             let (first_face, first_vertex) = (frame.faces.len(), frame.position.len());
@@ -71,12 +78,15 @@ impl Frame {
             frame.facing.extend(&projected.facing);
             flat.screen.extend(&projected.screen);
             flat.region = flat.region.union(&projected.region);
+            let first_edge = flat.edges.len();
             flat.edges.extend(model.edges.iter().map(|e| Edge {
                 vertices: e.vertices.map(|v| v + first_vertex as u32),
                 face: e.face + first_face as u32,
                 other: if e.other == NONE { NONE } else { e.other + first_face as u32 },
                 ..*e
             }));
+            let creases = model.creases.iter().map(|i| flat.edges[first_edge + *i as usize]);
+            flat.creases.extend(creases);
             let model = model.clone();
             let body = Body { model, rotation, center, first_face, first_vertex, level, level_dz };
             frame.bodies.push(body);

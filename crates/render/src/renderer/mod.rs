@@ -114,7 +114,7 @@ impl<Sh: Shader + Clone> Renderer<Sh> {
             Mode::Contour(options) => {
                 let half_width = options.drawn_half_width();
                 let (frame, flat) = Frame::new(scene, half_width);
-                let contours = Contours::new(&frame, flat, half_width);
+                let contours = Contours::new(&frame, flat, options);
                 (frame, Visible::Contour(contours))
             }
             Mode::SoftRas(options) => {

@@ -56,6 +56,9 @@ impl GpuSession {
         if problem.loss.samples > 1 {
             return Err(unsupported("more than one sample a pixel"));
         }
+        if matches!(problem.loss.mode, Mode::Contour(options) if options.creases) {
+            return Err(unsupported("creases that blend"));
+        }
         if problem.loss.options.affine {
             return Err(unsupported("an affine correction"));
         }

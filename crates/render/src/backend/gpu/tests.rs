@@ -85,7 +85,7 @@ fn with_occluder(mut case: Case) -> Case {
 }
 
 fn contour(half_width: f64) -> Mode {
-    Mode::Contour(ContourOptions { half_width })
+    Mode::Contour(ContourOptions { half_width, ..ContourOptions::default() })
 }
 
 fn cases() -> Vec<Case> {

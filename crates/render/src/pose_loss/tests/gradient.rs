@@ -32,6 +32,33 @@ fn gradients_match_differences_of_the_value() {
 }
 
 #[test]
+fn creases_that_blend_have_derivatives() {
+    // The light jumps at every edge of the boxes, and so do the colours of one.
+    let mut colored = cuboid(Vector3::new(0.06, 0.08, 0.1));
+    let color = |i: usize| [0.3 + 0.1 * (i % 5) as f32, 0.9 - 0.2 * (i % 4) as f32, 0.5];
+    colored.colors = Some((0..colored.vertices.len()).map(color).collect());
+    for mesh in [colored, cuboid(Vector3::new(0.06, 0.08, 0.1))] {
+        let model = RenderModel::new(&mesh).unwrap();
+        let mut errors = [0.0f64; 2];
+        for seed in 60..66 {
+            let mut noise = Noise(seed);
+            let truth = pose(&mut noise);
+            let target = target_of(&model, &truth, &lamp(), None, 0.5);
+            let twist = [0, 1, 2, 3, 4, 5].map(|i| noise.next() * if i < 3 { 0.004 } else { 0.08 });
+            let guess = twisted(&truth, &(truth * model.center()), &twist);
+            for (mode, worst) in [contour(0.645), creased()].into_iter().zip(&mut errors) {
+                let loss = PoseLoss::new(mode, full_options());
+                *worst = worst.max(compare_gradient(&loss, &model, &guess, &lamp(), &target).1);
+            }
+        }
+        // Where three edges meet the nearest one counts, which is not smooth.
+        let [hard, soft] = errors;
+        println!("hard {hard:.4}, soft {soft:.4}");
+        assert!(soft < 0.03 && soft < 0.5 * hard, "{errors:?}");
+    }
+}
+
+#[test]
 fn an_object_partly_outside_the_image_has_the_right_gradient() {
     let model = RenderModel::new(&painted(lump(0.045, 90), 0.05)).unwrap();
     let mut noise = Noise(31);

@@ -120,8 +120,12 @@ fn compare_gradient(
     (a.dot(&b) / (a.norm() * b.norm()), (a - b).norm() / b.norm())
 }
 
+fn creased() -> Mode {
+    Mode::Contour(ContourOptions { half_width: 0.645, creases: true })
+}
+
 fn contour(half_width: f64) -> Mode {
-    Mode::Contour(ContourOptions { half_width })
+    Mode::Contour(ContourOptions { half_width, ..ContourOptions::default() })
 }
 
 pub(crate) fn full_options() -> LossOptions {

@@ -8,7 +8,7 @@ use crate::contour::{Inner, Piece};
 /// where the visibility of the contour changes, and on faces seen within 3 degrees of their plane, where colours are so steep
 /// that differences are no measure.
 pub(super) fn decision(frame: &Frame, contours: &Contours, place: Place) -> Option<Vec<u32>> {
-    let Decision { face, edge, inner } = contours.decision(place.block, place.i);
+    let Decision { face, edge, inner, crease } = contours.decision(place.block, place.i);
     let (x, y) = (place.x as f32, place.y as f32);
     let ends_here = |piece: &Piece| {
         let t = piece.foot(x, y).t;
@@ -20,7 +20,8 @@ pub(super) fn decision(frame: &Frame, contours: &Contours, place: Place) -> Opti
         let ray = frame.camera.ray(f64::from(x), f64::from(y));
         ray.normalize().dot(&(b - a).cross(&(c - a)).normalize()).abs() < 0.05
     };
-    let pieces = [edge, inner.map(|inner| &inner.piece)].into_iter().flatten();
+    let fold = crease.map(|(crease, _)| &crease.piece);
+    let pieces = [edge, inner.map(|inner| &inner.piece), fold].into_iter().flatten();
     let own = face.map(|face| face as u32);
     let behind = inner.map(|inner| inner.behind);
     if pieces.clone().any(ends_here) || own.into_iter().chain(behind.map(|b| b.2)).any(grazes) {
@@ -28,6 +29,7 @@ pub(super) fn decision(frame: &Frame, contours: &Contours, place: Place) -> Opti
     }
     let ids = |piece: &Piece| [piece.face, u32::from(piece.corners[0])];
     let mut out = vec![u32::from(edge.is_some()), u32::from(inner.is_some())];
+    out.extend(crease.map(|(_, side)| u32::from(side > 0.0)));
     out.extend(own);
     out.extend(pieces.flat_map(ids));
     out.extend(behind.map(|(u, v, face, _)| [u as u32, v as u32, face]).into_iter().flatten());

@@ -7,13 +7,14 @@ use crate::pose_loss::{PoseImage, PoseLoss};
 /// difference of colours, relative to the norm of the picture.
 ///
 /// The loss of a pose rounds projected vertices to f32, which shifts faces by up to a unit in the last place of 96 px, 8e-6 px:
-/// colours that are steep in the image, on faces seen at a grazing angle, change with it. All else agrees to 2e-6.
-fn compare(ours: &Buffers, theirs: &PoseImage, slope: impl Fn(usize) -> f64) -> f64 {
+/// colours that are steep in the image, on faces seen at a grazing angle, change with it. All else agrees to
+/// `rounding`.
+fn compare(ours: &Buffers, theirs: &PoseImage, rounding: f64, slope: impl Fn(usize) -> f64) -> f64 {
     let (mut off, mut all) = (0.0, 0.0);
     for at in 0..ours.alpha.len() {
         assert_eq!(ours.face[at].map(|id| id.face), theirs.face[at]);
         let close = |a: f64, b: f32| {
-            let (b, bound) = (f64::from(b), 2e-6 + 8e-6 * slope(at));
+            let (b, bound) = (f64::from(b), rounding + 8e-6 * slope(at));
             assert!((a - b).abs() < bound, "pixel {at}: {a} {b}, bound {bound}");
         };
         close(ours.alpha[at], theirs.coverage[at]);
@@ -36,7 +37,8 @@ fn one_object_looks_as_the_loss_of_its_pose_sees_it() {
     let mut open = painted(lump(0.05, 20), 0.06);
     open.faces.retain(|f| f.iter().any(|v| *v % 3 == 0));
     let ring = painted(torus(0.05, 0.018, 16), 0.08);
-    for mesh in [ring, painted(lump(0.05, 20), 0.06), open, textured(lump(0.05, 20))] {
+    let creased = painted(cuboid(Vector3::new(0.06, 0.08, 0.1)), 0.06);
+    for mesh in [ring, painted(lump(0.05, 20), 0.06), open, textured(lump(0.05, 20)), creased] {
         let model = Arc::new(RenderModel::new(&mesh).unwrap());
         for (pose, mode) in [at(0.0, 0.0, 0.4), at(0.12, -0.02, 0.35)]
             .into_iter()
@@ -63,8 +65,10 @@ fn one_object_looks_as_the_loss_of_its_pose_sees_it() {
                 };
                 (change(&right) + change(&down)) / step
             };
-            let off = compare(&ours, &picture, slope);
-            assert!(off < 1e-6, "{mode:?}: {off}");
+            // Places on faces of many pixels are rounded more.
+            let rounding = if model.face_count() == 12 { 1e-5 } else { 2e-6 };
+            let off = compare(&ours, &picture, rounding, slope);
+            assert!(off < 0.5 * rounding, "{mode:?}: {off}");
         }
     }
 }

@@ -19,9 +19,12 @@ mod contour;
 mod equality;
 mod softras;
 
-/// Both, with their default options.
-fn modes() -> [Mode; 2] {
-    [Mode::Contour(ContourOptions::default()), Mode::SoftRas(SoftRasOptions::default())]
+/// Both, with their default options, and the contour mode with creases.
+fn modes() -> [Mode; 3] {
+    let contour = ContourOptions::default();
+    let creases = ContourOptions { creases: true, ..contour };
+    let soft = SoftRasOptions::default();
+    [Mode::Contour(contour), Mode::Contour(creases), Mode::SoftRas(soft)]
 }
 
 fn camera() -> Camera {

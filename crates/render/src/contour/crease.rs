@@ -1,0 +1,137 @@
+//! Creases: edges in view at which the colour of the surface jumps, because normals, texture coordinates or colours do.
+
+use super::outline::{Foot, PIECE, Piece, clip};
+use super::pixel::{Scene, falling_step};
+use crate::model::{Edge, NONE};
+use crate::pose_loss::Pixel;
+use crate::projected::{Projected, Region};
+use crate::raster::{Seen, Visible};
+
+/// A piece of a visible crease, directed as the one of its two faces runs through it that `outward` points away from.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Crease {
+    pub(crate) piece: Piece,
+    /// The face beyond, and its corners at the start and the end of the edge.
+    pub(crate) other: u32,
+    pub(crate) other_corners: [u8; 2],
+}
+
+/// The visible pieces of `edges` that come within `margin` pixels of `region`.
+///
+/// A piece shows unless another surface is more than `least` \[m\] nearer at its middle, for the given face.
+pub(crate) fn creases<'a>(
+    projected: &Projected,
+    visible: &[Visible],
+    edges: impl Iterator<Item = &'a Edge>,
+    region: &Region,
+    margin: f32,
+    least: impl Fn(u32) -> f32,
+) -> Vec<Crease> {
+    let mut out = Vec::new();
+    for edge in edges {
+        let facing = projected.facing[edge.face as usize];
+        if edge.other == NONE || facing == 0 || facing != projected.facing[edge.other as usize] {
+            continue;
+        }
+        let [a, b] = edge.vertices.map(|v| projected.screen[v as usize]);
+        let d = [b[0] - a[0], b[1] - a[1]];
+        let length = d[0].hypot(d[1]);
+        if !(length > 1e-4 && length.is_finite()) {
+            continue;
+        }
+        let sign = f32::from(facing);
+        let whole = Piece {
+            face: edge.face,
+            corners: [edge.corner, (edge.corner + 1) % 3],
+            a: [a[0], a[1]],
+            b: [b[0], b[1]],
+            range: [0.0, 1.0],
+            outward: [-sign * d[1] / length, sign * d[0] / length],
+        };
+        let Some([start, end]) = clip(&whole, region, margin) else { continue };
+        let count = ((end - start) * length / PIECE).ceil().max(1.0);
+        for i in 0..count as usize {
+            let at = |j: f32| start + (end - start) * j / count;
+            let range = [at(i as f32), at(i as f32 + 1.0)];
+            let t = 0.5 * (range[0] + range[1]);
+            let z = 1.0 / (a[2] + t * (b[2] - a[2]));
+            let nearest = Visible::seen(visible, a[0] + t * d[0], a[1] + t * d[1]);
+            if nearest.is_none_or(|Seen { inverse_z, .. }| 1.0 / inverse_z > z - least(edge.face)) {
+                // The other face runs through the edge the other way.
+                let other_corners = [(edge.other_corner + 1) % 3, edge.other_corner];
+                let piece = Piece { range, ..whole };
+                out.push(Crease { piece, other: edge.other, other_corners });
+            }
+        }
+    }
+    out
+}
+
+impl Crease {
+    /// The same edge as the face beyond it has it.
+    pub(crate) fn reversed(&self) -> Piece {
+        Piece { face: self.other, corners: self.other_corners, ..self.piece }
+    }
+
+    /// On which side of the crease a pixel is (−1 that of the piece's own face, 1 the other), given its foot on the
+    /// crease; and whether the surface that it shows, of inverse depth `inverse_z`, is the one with the crease.
+    #[inline]
+    pub(crate) fn side(
+        &self,
+        projected: &Projected,
+        [x, y]: [f32; 2],
+        foot: &Foot,
+        inverse_z: f32,
+    ) -> Option<f32> {
+        let across: f32 = (0..2).map(|k| foot.offset[k] * self.piece.outward[k]).sum();
+        let (side, face) = if across > 0.0 { (1.0, self.other) } else { (-1.0, self.piece.face) };
+        // 1/Z is linear in the image: that of the face's plane, continued to the pixel.
+        let [a, b, c] = projected.corners(face as usize);
+        let (ax, ay, bx, by, cx, cy) = (a[0] - x, a[1] - y, b[0] - x, b[1] - y, c[0] - x, c[1] - y);
+        let e = [bx * cy - by * cx, cx * ay - cy * ax, ax * by - ay * bx];
+        let plane = (e[0] * a[2] + e[1] * b[2] + e[2] * c[2]) / (e[0] + e[1] + e[2]);
+        ((plane - inverse_z).abs() < SAME * inverse_z).then_some(side)
+    }
+}
+
+/// Depths that differ by less than this share may lie on one surface.
+const SAME: f32 = 0.01;
+
+impl Scene<'_> {
+    /// Blends in what lies beyond a crease, at pixel (x, y) that shows `own` of this
+    /// inverse depth.
+    ///
+    /// The colour of the surface jumps at the crease by that of the foot, so the pixel gains as much of the jump as its
+    /// distance says.
+    pub(crate) fn soften<const DERIVATIVES: bool>(
+        &self,
+        x: f32,
+        y: f32,
+        inverse_z: f32,
+        own: &mut Pixel,
+        crease: &Crease,
+    ) {
+        let foot = crease.piece.foot(x, y);
+        let projected = &self.posed.projected;
+        let Some(side) = crease.side(projected, [x, y], &foot, inverse_z) else { return };
+        let (here, beyond) = (crease.piece, crease.reversed());
+        let (here, beyond) = if side < 0.0 { (here, beyond) } else { (beyond, here) };
+        let here = self.at_foot::<DERIVATIVES>(&here, &foot);
+        let beyond = self.at_foot::<DERIVATIVES>(&beyond, &foot);
+        let (share, slope) = falling_step(foot.distance_squared.sqrt(), self.half_width);
+        let jump = [0, 1, 2].map(|k| beyond.color[k] - here.color[k]);
+        for k in 0..3 {
+            own.color[k] += share * jump[k];
+        }
+        if DERIVATIVES {
+            let ds = self.distance_row(&crease.piece, &foot, side);
+            for k in 0..3 {
+                let step = side * slope * jump[k];
+                for i in 0..6 {
+                    let change = beyond.color_rows[k][i] - here.color_rows[k][i];
+                    own.color_rows[k][i] += share * change + step * ds[i];
+                }
+            }
+        }
+    }
+}
