@@ -120,16 +120,14 @@ impl Scene<'_> {
         let beyond = self.at_foot::<DERIVATIVES>(&beyond, &foot);
         let (share, slope) = falling_step(foot.distance_squared.sqrt(), self.half_width);
         let jump = [0, 1, 2].map(|k| beyond.color[k] - here.color[k]);
-        for k in 0..3 {
-            own.color[k] += share * jump[k];
-        }
+        own.color.iter_mut().zip(jump).for_each(|(color, jump)| *color += share * jump);
         if DERIVATIVES {
             let ds = self.distance_row(&crease.piece, &foot, side);
-            for k in 0..3 {
-                let step = side * slope * jump[k];
-                for i in 0..6 {
-                    let change = beyond.color_rows[k][i] - here.color_rows[k][i];
-                    own.color_rows[k][i] += share * change + step * ds[i];
+            for (k, jump) in jump.into_iter().enumerate() {
+                let step = side * slope * jump;
+                let rows = beyond.color_rows[k].iter().zip(&here.color_rows[k]).zip(&ds);
+                for (own, ((beyond, here), ds)) in own.color_rows[k].iter_mut().zip(rows) {
+                    *own += share * (beyond - here) + step * ds;
                 }
             }
         }
