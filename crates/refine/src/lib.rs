@@ -37,6 +37,7 @@ mod refine;
 pub mod report;
 mod robot;
 mod robust;
+mod rotations;
 mod scoring;
 mod state;
 pub mod strategy;

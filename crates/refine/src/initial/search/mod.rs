@@ -3,7 +3,6 @@
 mod evidence;
 mod fine;
 mod lattice;
-mod rotations;
 mod rough;
 mod settings;
 
@@ -17,9 +16,9 @@ pub use self::settings::SearchSettings;
 use self::evidence::Evidence;
 use self::fine::Fine;
 use self::lattice::DistanceLattice;
-use self::rotations::spread_rotations;
 use self::rough::Rough;
 use crate::refine::hand_depth;
+use crate::rotations::spread_rotations;
 use crate::{Object, Observation, RefineError, Robot, State};
 
 /// A pose that a search ends with.

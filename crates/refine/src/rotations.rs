@@ -6,7 +6,7 @@ use nalgebra::{Quaternion, UnitQuaternion};
 
 /// `count` rotations along a super-Fibonacci spiral: M. Alexa, "Super-Fibonacci spirals: fast, low-discrepancy sampling
 /// of SO(3)", 2022, algorithm 1.
-pub(super) fn spread_rotations(count: usize) -> Vec<UnitQuaternion<f64>> {
+pub(crate) fn spread_rotations(count: usize) -> Vec<UnitQuaternion<f64>> {
     let (phi, psi) = (2.0_f64.sqrt(), 1.533_751_168_755_204_3);
     let one = |i: usize| {
         let s = i as f64 + 0.5;
