@@ -5,7 +5,7 @@ use prehend_geometry::Kernel;
 use prehend_geometry::icp::{Match, Metric, NormalEquations};
 use rayon::prelude::*;
 
-use super::step::preconditioned_step;
+use super::step::damped_step;
 use super::walk::{Advance, walk};
 use crate::term::back_project;
 use crate::trace::{Iteration, Trace};
@@ -22,11 +22,14 @@ pub struct RobustIcpSettings {
     pub first_scale: f64,
     /// The same at the end \[m\].
     pub last_scale: f64,
+    /// How strongly a step is held back, as a part of the mean curvature of the loss: what the points leave open must not
+    /// drift with their noise.
+    pub damping: f64,
 }
 
 impl Default for RobustIcpSettings {
     fn default() -> Self {
-        Self { iterations: 60, points: 3000, first_scale: 20e-3, last_scale: 2e-3 }
+        Self { iterations: 60, points: 3000, first_scale: 10e-3, last_scale: 2e-3, damping: 0.05 }
     }
 }
 
@@ -55,7 +58,8 @@ impl RobustIcp {
         state: State,
         visit: impl FnMut(&State, &Iteration) -> bool,
     ) -> Result<Trace, RefineError> {
-        let RobustIcpSettings { iterations, points, first_scale, last_scale } = self.settings;
+        let RobustIcpSettings { iterations, points, first_scale, last_scale, damping } =
+            self.settings;
         let mut cloud: Vec<Point> = back_project(observation, points)
             .into_iter()
             .map(|place| Point { place, face: None })
@@ -70,7 +74,7 @@ impl RobustIcp {
             let sums = match_all(&mut cloud, object, state, Kernel::Cauchy { scale });
             let mut normal = Normal::new(&[Block::ObjectPose]);
             normal.add(&[Block::ObjectPose], &sums.gradient, &sums.matrix);
-            let step = preconditioned_step(&normal, object.radius, f64::INFINITY);
+            let step = damped_step(&normal, object.radius, damping, f64::INFINITY);
             Advance { value: sums.rms(), step }
         };
         // A step of no length at all says only that no point counts any more.
