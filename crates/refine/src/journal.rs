@@ -35,6 +35,14 @@ pub enum JournalError {
         /// The file.
         file: PathBuf,
     },
+    /// A whole line is no entry: something else wrote into the file.
+    #[error("{}: line {line} is damaged (--restart discards the whole journal)", file.display())]
+    Damaged {
+        /// The journal.
+        file: PathBuf,
+        /// Number of the line, from 1.
+        line: usize,
+    },
     /// Another process is writing it.
     #[error("{}: another process is at work on it", file.display())]
     Busy {
@@ -84,7 +92,7 @@ impl Journal {
     ///
     /// # Errors
     /// [`JournalError::OtherRun`] unless it is of a run with the same facts, [`JournalError::Foreign`],
-    /// [`JournalError::Busy`] and [`JournalError::Io`].
+    /// [`JournalError::Damaged`], [`JournalError::Busy`] and [`JournalError::Io`].
     pub fn open<E: DeserializeOwned>(
         path: &Path,
         identity: &Identity,
@@ -111,7 +119,8 @@ impl Journal {
         if !restart {
             file.read_to_end(&mut bytes).map_err(fault)?;
         }
-        let Parsed { header, entries, length } = parse(path, &bytes)?;
+        let own = header(path, identity)?;
+        let Parsed { header, entries, length } = parse(path, &bytes, &own)?;
         if let Some(header) = &header {
             let differences = header.differences(identity, &[]);
             if !differences.is_empty() {
@@ -122,7 +131,7 @@ impl Journal {
         file.seek(SeekFrom::End(0)).map_err(fault)?;
         let mut journal = Self { path: path.into(), file, identity: identity.clone() };
         if header.is_none() {
-            journal.write_line(&journal.header()?)?;
+            journal.write_line(&own)?;
         }
         Ok((journal, entries))
     }
@@ -130,13 +139,13 @@ impl Journal {
     /// What a journal says of its run, and its entries; for reading alone.
     ///
     /// # Errors
-    /// [`JournalError::Io`] and [`JournalError::Foreign`].
+    /// [`JournalError::Io`], [`JournalError::Foreign`] and [`JournalError::Damaged`].
     pub fn read<E: DeserializeOwned>(
         path: &Path,
     ) -> Result<(Identity, BTreeMap<usize, E>), JournalError> {
         let bytes =
             std::fs::read(path).map_err(|source| JournalError::Io { file: path.into(), source })?;
-        let Parsed { header, entries, .. } = parse(path, &bytes)?;
+        let Parsed { header, entries, .. } = parse(path, &bytes, "")?;
         Ok((header.ok_or_else(|| JournalError::Foreign { file: path.into() })?, entries))
     }
 
@@ -162,14 +171,26 @@ impl Journal {
     /// # Errors
     /// If it cannot be written; the journal is then as it was.
     pub fn settle<E: Serialize>(self, entries: &BTreeMap<usize, E>) -> Result<(), JournalError> {
-        let mut text = self.header()? + "\n";
+        Self::write(&self.path, &self.identity, entries)
+    }
+
+    /// Writes a whole journal to `path`, in place of what was there.
+    ///
+    /// # Errors
+    /// If it cannot be written; what was there is then as it was.
+    pub fn write<E: Serialize>(
+        path: &Path,
+        identity: &Identity,
+        entries: &BTreeMap<usize, E>,
+    ) -> Result<(), JournalError> {
+        let mut text = header(path, identity)? + "\n";
         for (&index, entry) in entries {
             let line = serde_json::to_string(&Line { index, entry })
-                .map_err(|source| JournalError::Entry { file: self.path.clone(), index, source })?;
+                .map_err(|source| JournalError::Entry { file: path.into(), index, source })?;
             text.push_str(&line);
             text.push('\n');
         }
-        Ok(write_atomically(&self.path, text.as_bytes())?)
+        Ok(write_atomically(path, text.as_bytes())?)
     }
 
     /// Removes the journal of a run whose output is complete.
@@ -179,14 +200,6 @@ impl Journal {
     pub fn discard(self) -> Result<(), JournalError> {
         std::fs::remove_file(&self.path)
             .map_err(|source| JournalError::Io { file: self.path, source })
-    }
-
-    fn header(&self) -> Result<String, JournalError> {
-        serde_json::to_string(&self.identity).map_err(|source| JournalError::Entry {
-            file: self.path.clone(),
-            index: 0,
-            source,
-        })
     }
 
     /// One call of the system a line, so that a kill leaves at most one broken line; and then to disk.
@@ -199,6 +212,12 @@ impl Journal {
     }
 }
 
+/// The first line of a run's journal.
+fn header(path: &Path, identity: &Identity) -> Result<String, JournalError> {
+    let fault = |source| JournalError::Entry { file: path.into(), index: 0, source };
+    serde_json::to_string(identity).map_err(fault)
+}
+
 /// What is whole in a journal.
 struct Parsed<E> {
     /// `None` if not even the first line is whole.
@@ -208,19 +227,27 @@ struct Parsed<E> {
     length: usize,
 }
 
-fn parse<E: DeserializeOwned>(path: &Path, bytes: &[u8]) -> Result<Parsed<E>, JournalError> {
+/// `own` is the first line that this run would write: of a file without a whole line, what may be overwritten is a part of it.
+fn parse<E: DeserializeOwned>(
+    path: &Path,
+    bytes: &[u8],
+    own: &str,
+) -> Result<Parsed<E>, JournalError> {
     let foreign = || JournalError::Foreign { file: path.into() };
     let mut entries = BTreeMap::new();
     let mut lines = bytes.split_inclusive(|&b| b == b'\n').filter(|l| l.ends_with(b"\n"));
     let Some(first) = lines.next() else {
-        // A header cut short begins as all do; anything else is not ours to overwrite.
-        let ours = bytes.is_empty() || bytes.starts_with(b"{");
-        return if ours { Ok(Parsed { header: None, entries, length: 0 }) } else { Err(foreign()) };
+        return if own.as_bytes().starts_with(bytes) {
+            Ok(Parsed { header: None, entries, length: 0 })
+        } else {
+            Err(foreign())
+        };
     };
     let header = serde_json::from_slice(first).map_err(|_| foreign())?;
     let mut length = first.len();
-    for line in lines {
-        let Ok(Line { index, entry }) = serde_json::from_slice(line) else { break };
+    for (number, line) in (2..).zip(lines) {
+        let Line { index, entry } = serde_json::from_slice(line)
+            .map_err(|_| JournalError::Damaged { file: path.into(), line: number })?;
         entries.insert(index, entry);
         length += line.len();
     }
@@ -296,12 +323,25 @@ mod tests {
         assert!(found.is_empty());
         journal.discard().unwrap();
         assert!(!path.exists());
-        for text in ["precious", "precious\n"] {
+        for text in ["precious", "precious\n", "{\"precious\": 1}"] {
             fs::write(&path, text).unwrap();
             let error = Journal::open::<Vec<f64>>(&path, &identity(1), false).unwrap_err();
             assert!(matches!(error, JournalError::Foreign { .. }));
             assert_eq!(fs::read_to_string(&path).unwrap(), text);
         }
+    }
+
+    #[test]
+    fn a_damaged_line_is_named_and_nothing_is_lost() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("x.journal");
+        let entries: Entries = (0..3).map(|i| (i, entry(i))).collect();
+        Journal::write(&path, &identity(1), &entries).unwrap();
+        let text = fs::read_to_string(&path).unwrap().replace("\"index\":1", "\"index\":x");
+        fs::write(&path, &text).unwrap();
+        let error = Journal::open::<Vec<f64>>(&path, &identity(1), false).unwrap_err();
+        assert!(matches!(error, JournalError::Damaged { line: 3, .. }), "{error}");
+        assert_eq!(fs::read_to_string(&path).unwrap(), text);
     }
 
     #[test]

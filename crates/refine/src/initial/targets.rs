@@ -46,7 +46,7 @@ pub fn find_targets(dataset: &Dataset, file: Option<&Path>) -> Result<Vec<Target
         return read(file);
     }
     let [obj_id] = dataset.models().object_ids()?[..] else {
-        let problem = "no list of targets, and there is not just one object";
+        let problem = "no list of targets (--targets names one), and there is not just one object";
         return Err(DatasetError::malformed(&own, problem));
     };
     let mut targets = Vec::new();

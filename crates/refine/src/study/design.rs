@@ -118,11 +118,11 @@ impl Design {
     pub fn config(study: Kind, method: &Method, iterations: Option<usize>) -> Config {
         let mut config = method.config();
         if study == Kind::Steps {
-            config.heuristic.exhaustive = true;
-            config.heuristic.iterations = 1000;
+            config.set_exhaustive();
+            config.set_iterations(1000);
         }
         if let Some(iterations) = iterations {
-            config.heuristic.iterations = iterations;
+            config.set_iterations(iterations);
         }
         config
     }
@@ -130,7 +130,7 @@ impl Design {
     /// The iterations at which a study compares poses.
     pub fn steps(study: Kind, config: &Config) -> Vec<usize> {
         match study {
-            Kind::Steps => Kind::steps(config.heuristic.iterations),
+            Kind::Steps => Kind::steps(config.iterations()),
             _ => Vec::new(),
         }
     }

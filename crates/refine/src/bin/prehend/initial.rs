@@ -5,7 +5,6 @@ use std::collections::btree_map::Entry;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Instant;
 
 use anyhow::bail;
 use clap::Args;
@@ -138,11 +137,10 @@ fn found(dataset: &Dataset, selection: &Selection, list: Option<&Path>) -> anyho
     let (mut rows, mut failures) = (Vec::new(), Vec::new());
     let bar = progress::bar(targets.len() as u64, "searching");
     for target in targets {
-        let start = Instant::now();
         match search_one(&mut assets, &mut searches, target) {
             Ok((pose, value)) => {
                 // Of a results file's scores the higher is the better.
-                rows.push(row(&target, pose, -value, start.elapsed().as_secs_f64()));
+                rows.push(row(&target, pose, -value, -1.0));
             }
             Err(error) => {
                 let row = row(&target, Isometry3::identity(), 0.0, -1.0);

@@ -53,7 +53,8 @@ enum Command {
     /// Score poses against a dataset's ground truth
     ///
     /// Prints means and medians, overall and by object, of PE and OE (position and rotation error), of
-    /// ADD, ADI, MSSD and MSPD, and of CA and IV (contact area and intersection volume with the hand).
+    /// ADD, ADI, MSSD, MSPD and VSD, of AR (BOP's average recall, over the poses given), and of CA and IV
+    /// (contact area and intersection volume with the hand).
     /// Where the dataset has models_eval/ or scene_bodies_gt.json, those count as the truth.
     Eval(eval::Arguments),
     /// Regenerate the paper's tables on a dataset, ours beside the published rows

@@ -81,6 +81,9 @@ struct Merge {
     /// Write the whole study here
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    /// Replace the study that is there, instead of refusing
+    #[arg(long)]
+    restart: bool,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
@@ -168,6 +171,10 @@ impl Run {
         };
         let (mut levels, mut frames): (Vec<Level>, Vec<Frame>) = Default::default();
         for (name, file) in &files {
+            // It becomes part of files' names.
+            if name.is_empty() || !name.chars().all(|c| c.is_alphanumeric() || "._-".contains(c)) {
+                bail!("{name:?} is no name of a level: give letters, digits, '.', '_' and '-'");
+            }
             if levels.iter().any(|l| l.name == *name) {
                 bail!("two files of initial poses are of level {name}: give LEVEL=FILE");
             }
@@ -178,7 +185,10 @@ impl Run {
             frames.extend(found);
         }
         if frames.is_empty() && levels.iter().all(|l| l.unreadable.is_empty()) {
-            bail!("there are no initial poses to start from: give --poses");
+            bail!(match files.is_empty() {
+                true => "there are no initial poses to start from: give --poses",
+                false => "no initial pose is of the scenes, images and objects asked for",
+            });
         }
         let Selection { scene, image, object, .. } = &self.selection;
         let settings = |(name, config): &(String, Config)| MethodSettings {
@@ -209,9 +219,11 @@ impl Merge {
     fn run(&self) -> anyhow::Result<Outcome> {
         let (design, records) = merge(&self.shards)?;
         make(&self.out)?;
-        let (journal, _) =
-            Journal::open::<FrameRecord>(&self.out.join(RECORDS), &Identity::of(&design), true)?;
-        journal.settle(&records)?;
+        let own = self.out.join(RECORDS);
+        if own.exists() && !self.restart {
+            bail!("{}: there is a study already (--restart replaces it)", own.display());
+        }
+        Journal::write(&own, &Identity::of(&design), &records)?;
         let parts: Vec<PathBuf> = self.shards.iter().map(|s| s.join(TIMES)).collect();
         let file = self.out.join(TIMES);
         join_times(&parts, &file)?;
@@ -247,10 +259,10 @@ fn outcome(tables: &Tables, records: &BTreeMap<usize, FrameRecord>) -> Outcome {
 
 /// `LEVEL=FILE`, or a file whose name says the level: init_low.csv.
 fn level_and_file(text: &str) -> (String, PathBuf) {
-    if let Some((level, file)) = text.split_once('=') {
+    let file = PathBuf::from(text);
+    if let Some((level, file)) = text.split_once('=').filter(|_| !file.is_file()) {
         return (level.into(), file.into());
     }
-    let file = PathBuf::from(text);
     let stem = file.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
     (stem.strip_prefix("init_").map_or(stem.clone(), str::to_owned), file)
 }

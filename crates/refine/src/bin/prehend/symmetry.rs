@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use anyhow::bail;
 use clap::Args;
 use prehend_refine::bop::{Models, write_symmetries};
 use prehend_refine::load_mesh;
@@ -32,6 +33,13 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
+    let Arguments { tolerance, color, .. } = arguments;
+    if !(*tolerance > 0.0 && *tolerance < 0.5) {
+        bail!("--tolerance {tolerance}: must be above 0 and below 0.5");
+    }
+    if color.is_some_and(|c| !(0.0..=1.0).contains(&c)) {
+        bail!("--color: must be from 0 to 1");
+    }
     let models = Models::new(arguments.models.clone());
     let settings = SymmetrySettings {
         tolerance: arguments.tolerance,

@@ -145,7 +145,7 @@ impl Rough<'_> {
         let touched = share(TOUCH_WEIGHT, evidence.touched.len());
         evidence.touched.iter().for_each(|p| add(p, touched, false));
         let outside =
-            evidence.outside.iter().step_by(evidence.outside.len().div_ceil(points).max(1));
+            evidence.outside.iter().step_by(evidence.outside.len().div_ceil(points.max(1)).max(1));
         let weight = share(OUTSIDE_WEIGHT, points.min(evidence.outside.len()));
         outside.for_each(|p| add(p, weight, true));
         (gradient, matrix)

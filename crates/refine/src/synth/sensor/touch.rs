@@ -89,11 +89,12 @@ impl TouchSettings {
             if felt.norm() < self.threshold {
                 return Vector3::zeros();
             }
+            let limit = if self.limit > 0.0 { self.limit } else { f64::INFINITY };
             let step = |v: f64| {
                 if self.quantum > 0.0 { (v / self.quantum).round() * self.quantum } else { v }
             };
             // Adding zero makes the negative zero a positive one.
-            felt.map(|v| step(v).clamp(-self.limit, self.limit) / UNITS_PER_NEWTON + 0.0)
+            felt.map(|v| step(v).clamp(-limit, limit) / UNITS_PER_NEWTON + 0.0)
         };
         forces.iter().zip(condition).map(read).collect()
     }
