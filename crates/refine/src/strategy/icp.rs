@@ -55,10 +55,8 @@ impl Icp {
         visit: impl FnMut(&State, &Iteration) -> bool,
     ) -> Result<Trace, RefineError> {
         let IcpSettings { iterations, points, last_step } = self.settings;
-        let cloud = KdTree::new(&back_project(observation, points))
-            .ok()
-            .filter(|tree| !tree.points().is_empty())
-            .ok_or(RefineError::NoDepth)?;
+        let cloud = KdTree::new(&back_project(observation, points)?);
+        let cloud = cloud.map_err(|_| RefineError::NoDepth)?;
         let advance = |state: &State, _| {
             let t_object_cam = state.t_cam_object.inverse();
             let to_mesh = pairs(cloud.points(), |p| {

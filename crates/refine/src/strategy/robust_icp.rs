@@ -60,13 +60,10 @@ impl RobustIcp {
     ) -> Result<Trace, RefineError> {
         let RobustIcpSettings { iterations, points, first_scale, last_scale, damping } =
             self.settings;
-        let mut cloud: Vec<Point> = back_project(observation, points)
+        let mut cloud: Vec<Point> = back_project(observation, points)?
             .into_iter()
             .map(|place| Point { place, face: None })
             .collect();
-        if cloud.is_empty() {
-            return Err(RefineError::NoDepth);
-        }
         let shrinking = 0.75 * iterations as f64;
         let advance = |state: &State, index: usize| {
             let done = (index as f64 / shrinking.max(1.0)).min(1.0);

@@ -59,9 +59,8 @@ impl DepthTerm {
         hand: Arc<DepthImage>,
         settings: DepthSettings,
     ) -> Result<Self, RefineError> {
-        let points = back_project(observation, settings.points);
-        let tree = KdTree::new(&points).ok().filter(|_| !points.is_empty());
-        let tree = tree.ok_or(RefineError::NoDepth)?;
+        let points = back_project(observation, settings.points)?;
+        let tree = KdTree::new(&points).map_err(|_| RefineError::NoDepth)?;
         let nearest = [points.len(), object.samples.len()]
             .map(|n| (0..n).map(|_| AtomicU32::new(u32::MAX)).collect());
         Ok(Self { object, camera: observation.camera, tree, nearest, hand, settings })
@@ -194,8 +193,14 @@ impl Term for DepthTerm {
     }
 }
 
-/// Some `limit` masked depth pixels as camera-frame points \[m\], on a regular grid of the image.
-pub(crate) fn back_project(observation: &Observation, limit: usize) -> Vec<Point3<f64>> {
+/// Some `limit` masked depth pixels as camera-frame points \[m\], on a regular grid of the image; at least one.
+///
+/// # Errors
+/// [`RefineError::NoDepth`] if no pixel of the grid has a depth.
+pub(crate) fn back_project(
+    observation: &Observation,
+    limit: usize,
+) -> Result<Vec<Point3<f64>>, RefineError> {
     let depth = &observation.depth;
     let at = |x: usize, y: usize| {
         let z = f64::from(depth.get(x, y)?);
@@ -204,10 +209,11 @@ pub(crate) fn back_project(observation: &Observation, limit: usize) -> Vec<Point
     };
     let masked = observation.mask.count();
     let step = ((masked as f64 / limit.max(1) as f64).sqrt().ceil() as usize).max(1);
-    (0..depth.height())
+    let points: Vec<Point3<f64>> = (0..depth.height())
         .step_by(step)
         .flat_map(|y| (0..depth.width()).step_by(step).filter_map(move |x| at(x, y)))
-        .collect()
+        .collect();
+    if points.is_empty() { Err(RefineError::NoDepth) } else { Ok(points) }
 }
 
 #[cfg(test)]

@@ -42,11 +42,8 @@ impl Evidence {
         hand: &DepthImage,
         touch_force: f64,
     ) -> Result<Self, RefineError> {
-        let places = back_project(observation, POINTS);
+        let places = back_project(observation, POINTS)?;
         let tree = KdTree::new(&places).map_err(|_| RefineError::NoDepth)?;
-        if places.is_empty() {
-            return Err(RefineError::NoDepth);
-        }
         let normals = estimate_normals(&tree, NEIGHBOURS, &Point3::origin());
         let (mut touched, mut outside) = (Vec::new(), Vec::new());
         if let (Some(robot), Some(reading)) = (robot, &observation.hand) {
