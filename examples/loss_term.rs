@@ -17,10 +17,6 @@ impl Term for Landmark {
         "landmark"
     }
 
-    fn blocks(&self) -> &'static [Block] {
-        &[Block::ObjectPose]
-    }
-
     fn value(&self, state: &State) -> f64 {
         let offset = state.t_cam_object * self.on_object - self.in_camera;
         0.5 * offset.norm_squared() / self.sigma.powi(2)
@@ -35,7 +31,7 @@ impl Term for Landmark {
         let precision = self.sigma.powi(-2);
         let gradient: Vector6<f64> = rows.tr_mul(&(point - self.in_camera)) * precision;
         let hessian: Matrix6<f64> = rows.tr_mul(&rows) * precision;
-        normal.add(self.blocks(), &gradient, &hessian);
+        normal.add(&[Block::ObjectPose], &gradient, &hessian);
         self.value(state)
     }
 }

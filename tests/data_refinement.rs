@@ -19,7 +19,7 @@ fn before_and_after(dataset: &Path, poses: &str) -> (usize, [f64; 3], [f64; 3]) 
         let frame = data.frame(row.scene_id, row.im_id).expect("the frame is listed");
         let (observation, robot) =
             assets.observation(&frame, 0, &config.terms).expect("the frame loads");
-        let refined = refine(&observation, &object, robot.as_deref(), &row.t_cam_model, &config)
+        let refined = refine(&observation, &object, robot.as_ref(), &row.t_cam_model, &config)
             .expect("the frame refines");
         let refined = ResultRow { t_cam_model: refined.t_cam_object, ..row.clone() };
         for (sum, row) in [(&mut before, row), (&mut after, &refined)] {

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use crate::strategy::{HeuristicSettings, IcpSettings, RobustIcpSettings};
+use crate::strategy::{FusedSettings, HeuristicSettings, IcpSettings, RobustIcpSettings};
 use crate::term::{DepthSettings, PhysicsSettings, RenderingSettings, TactileSettings};
 
 /// One of the four kinds of evidence.
@@ -59,6 +59,8 @@ pub enum StrategyKind {
     Icp,
     /// Robust point-to-plane ICP; it uses depth alone.
     RobustIcp,
+    /// All evidence in one least-squares problem.
+    Fused,
 }
 
 impl StrategyKind {
@@ -68,6 +70,7 @@ impl StrategyKind {
             Self::Heuristic => "heuristic",
             Self::Icp => "icp",
             Self::RobustIcp => "robust-icp",
+            Self::Fused => "fused",
         }
     }
 }
@@ -93,6 +96,8 @@ pub struct Config {
     pub icp: IcpSettings,
     /// Settings of the robust ICP.
     pub robust_icp: RobustIcpSettings,
+    /// Settings of the fused estimator.
+    pub fused: FusedSettings,
     /// Settings of the physics term.
     pub physics: PhysicsSettings,
     /// Settings of the rendering term.
@@ -112,6 +117,7 @@ impl Default for Config {
             heuristic: HeuristicSettings::default(),
             icp: IcpSettings::default(),
             robust_icp: RobustIcpSettings::default(),
+            fused: FusedSettings::default(),
             physics: PhysicsSettings::default(),
             rendering: RenderingSettings::default(),
             depth: DepthSettings::default(),
@@ -127,6 +133,7 @@ impl Config {
             StrategyKind::Heuristic => self.heuristic.iterations,
             StrategyKind::Icp => self.icp.iterations,
             StrategyKind::RobustIcp => self.robust_icp.iterations,
+            StrategyKind::Fused => self.fused.stages.iter().map(|s| s.iterations).sum(),
         }
     }
 
@@ -136,6 +143,9 @@ impl Config {
             StrategyKind::Heuristic => self.heuristic.iterations = iterations,
             StrategyKind::Icp => self.icp.iterations = iterations,
             StrategyKind::RobustIcp => self.robust_icp.iterations = iterations,
+            StrategyKind::Fused => {
+                self.fused.stages.iter_mut().for_each(|s| s.iterations = iterations)
+            }
         }
     }
 

@@ -5,6 +5,7 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use prehend_geometry::TriMesh;
@@ -71,7 +72,7 @@ pub struct FrameInput {
     /// The object.
     pub object: Object,
     /// The hand, if the file describes one.
-    pub robot: Option<Robot>,
+    pub robot: Option<Arc<Robot>>,
     /// The initial pose, object → camera \[m\].
     pub t_cam_object: Isometry3<f64>,
 }
@@ -214,7 +215,8 @@ pub fn load(file: &Path, seed: u64) -> Result<FrameInput, FrameFileError> {
                 joints,
                 forces: forces.iter().map(|&f| Vector3::from(f)).collect(),
             };
-            (Some(Robot::new(tree, skin).map_err(|e| asset(e.into()))?), Some(hand))
+            let robot = Robot::new(tree, skin).map_err(|e| asset(e.into()))?;
+            (Some(Arc::new(robot)), Some(hand))
         }
     };
     let gravity = layout.gravity.map(Vector3::from);

@@ -20,6 +20,7 @@
 
 mod assets;
 pub mod bop;
+mod camera_correction;
 mod config;
 mod error;
 pub mod frame_file;
@@ -50,6 +51,7 @@ pub mod trace;
 mod workers;
 
 pub use assets::{AssetError, Assets, load_mesh, load_object};
+pub use camera_correction::CameraCorrection;
 pub use config::{Config, StrategyKind, TermKind};
 pub use error::RefineError;
 pub use identity::Identity;

@@ -55,7 +55,12 @@ fn baseline(strategy: StrategyKind, checkpoint: bool) -> Config {
     Config { strategy, terms: Vec::new(), checkpoint, ..Config::default() }
 }
 
-static METHODS: [Method; 16] = [
+static METHODS: [Method; 17] = [
+    Method {
+        name: "fused",
+        summary: "all evidence in one least-squares problem, with calibrations estimated",
+        config: || Config { strategy: StrategyKind::Fused, checkpoint: false, ..Config::default() },
+    },
     Method {
         name: "combined",
         summary: "all four gradients, checkpointing",

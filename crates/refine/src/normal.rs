@@ -10,13 +10,20 @@ pub struct Normal {
     blocks: Vec<Block>,
     gradient: DVector<f64>,
     hessian: DMatrix<f64>,
+    /// Scratch of [`add_row`](Self::add_row): place and derivative of each parameter of a row.
+    entries: Vec<(usize, f64)>,
 }
 
 impl Normal {
     /// Empty equations over `blocks`, in that order.
     pub fn new(blocks: &[Block]) -> Self {
         let n = blocks.iter().map(|b| b.dimension()).sum();
-        Self { blocks: blocks.to_vec(), gradient: DVector::zeros(n), hessian: DMatrix::zeros(n, n) }
+        Self {
+            blocks: blocks.to_vec(),
+            gradient: DVector::zeros(n),
+            hessian: DMatrix::zeros(n, n),
+            entries: Vec::new(),
+        }
     }
 
     /// Where the parameters of `block` begin, or `None` if it was not requested.
@@ -33,6 +40,39 @@ impl Normal {
     /// Gauss–Newton approximation of the second derivative: symmetric, positive semi-definite.
     pub fn hessian(&self) -> &DMatrix<f64> {
         &self.hessian
+    }
+
+    /// The requested blocks, in order.
+    pub fn blocks(&self) -> &[Block] {
+        &self.blocks
+    }
+
+    /// Adds what half the square of `residual`, times `weight`, brings; `row` has its derivatives by some blocks.
+    ///
+    /// Parts that belong to blocks nobody requested are dropped.
+    pub fn add_row(&mut self, row: &[(Block, &[f64])], residual: f64, weight: f64) {
+        self.entries.clear();
+        for &(block, derivatives) in row {
+            if let Some(offset) = self.offset(block) {
+                self.entries.extend(derivatives.iter().enumerate().map(|(i, &d)| (offset + i, d)));
+            }
+        }
+        for &(i, d) in &self.entries {
+            self.gradient[i] += weight * residual * d;
+            let column = &mut self.hessian.column_mut(i);
+            for &(j, e) in &self.entries {
+                column[j] += weight * d * e;
+            }
+        }
+    }
+
+    /// Adds half the squares of a block's parameters from a place, given each one's (difference, weight).
+    pub fn add_diagonal(&mut self, block: Block, parameters: &[(f64, f64)]) {
+        let Some(offset) = self.offset(block) else { return };
+        for (i, (difference, weight)) in parameters.iter().enumerate() {
+            self.gradient[offset + i] += weight * difference;
+            self.hessian[(offset + i, offset + i)] += weight;
+        }
     }
 
     /// Adds the gradient and Hessian of a term whose parameters are those of `blocks`, concatenated.
@@ -66,6 +106,14 @@ impl Normal {
                 }
             }
         }
+    }
+}
+
+impl std::ops::AddAssign<&Self> for Normal {
+    /// Adds equations over the same blocks.
+    fn add_assign(&mut self, other: &Self) {
+        self.gradient += &other.gradient;
+        self.hessian += &other.hessian;
     }
 }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::Isometry3;
 use prehend_render::{DepthImage, depth_map};
 
-use crate::strategy::{Heuristic, Icp, RobustIcp};
+use crate::strategy::{Confidence, Fused, Heuristic, Icp, RobustIcp};
 use crate::term::{DepthTerm, PhysicsTerm, RenderingTerm, TactileTerm, Term};
 use crate::trace::{Iteration, Trace};
 use crate::{Config, Object, Observation, RefineError, Robot, State, StrategyKind, TermKind};
@@ -19,6 +19,8 @@ pub struct RefinedPose {
     pub iteration: usize,
     /// What happened on the way.
     pub trace: Trace,
+    /// How sure the pose is; only the fused estimator knows.
+    pub confidence: Option<Confidence>,
 }
 
 /// Progress of a refinement under way.
@@ -42,7 +44,7 @@ pub struct Progress {
 pub fn refine(
     observation: &Observation,
     object: &Arc<Object>,
-    robot: Option<&Robot>,
+    robot: Option<&Arc<Robot>>,
     initial: &Isometry3<f64>,
     config: &Config,
 ) -> Result<RefinedPose, RefineError> {
@@ -56,7 +58,7 @@ pub fn refine(
 pub fn refine_with(
     observation: &Observation,
     object: &Arc<Object>,
-    robot: Option<&Robot>,
+    robot: Option<&Arc<Robot>>,
     initial: &Isometry3<f64>,
     config: &Config,
     mut observe: impl FnMut(Progress) -> bool,
@@ -65,7 +67,7 @@ pub fn refine_with(
     let kinds = match config.strategy {
         StrategyKind::Heuristic if config.terms.is_empty() => return Err(RefineError::NoTerms),
         StrategyKind::Heuristic => config.terms.as_slice(),
-        StrategyKind::Icp | StrategyKind::RobustIcp => &[],
+        StrategyKind::Icp | StrategyKind::RobustIcp | StrategyKind::Fused => &[],
     };
     if let (Some(robot), Some(hand)) = (robot, &observation.hand) {
         robot.check_joints(&hand.joints)?;
@@ -76,7 +78,7 @@ pub fn refine_with(
     let own_judge = config.checkpoint && judge_index.is_none();
     let judge = own_judge
         .then(|| {
-            let hand = hand_depth(observation, robot);
+            let hand = hand_depth(observation, robot.map(Arc::as_ref));
             RenderingTerm::new(observation, Arc::clone(object), &hand, config.rendering.clone())
         })
         .transpose()?;
@@ -100,6 +102,7 @@ pub fn refine_with(
             t_cam_object: best.2,
         })
     };
+    let mut confidence = None;
     let trace = match config.strategy {
         StrategyKind::Heuristic => {
             let terms = standard_terms(observation, object, robot, &state, config)?;
@@ -113,8 +116,14 @@ pub fn refine_with(
             let robust = RobustIcp { settings: config.robust_icp.clone() };
             robust.run(observation, object, state, visit)?
         }
+        StrategyKind::Fused => {
+            let fused = Fused { settings: config.fused.clone() };
+            let (trace, of_pose) = fused.run(observation, object, robot, state, visit)?;
+            confidence = Some(of_pose);
+            trace
+        }
     };
-    Ok(RefinedPose { t_cam_object: best.2, iteration: best.1, trace })
+    Ok(RefinedPose { t_cam_object: best.2, iteration: best.1, trace, confidence })
 }
 
 /// The terms that `config` asks for, in its order; add your own to them and hand all to a
@@ -125,14 +134,14 @@ pub fn refine_with(
 pub fn standard_terms(
     observation: &Observation,
     object: &Arc<Object>,
-    robot: Option<&Robot>,
+    robot: Option<&Arc<Robot>>,
     initial: &State,
     config: &Config,
 ) -> Result<Vec<Box<dyn Term>>, RefineError> {
     if let (Some(robot), Some(hand)) = (robot, &observation.hand) {
         robot.check_joints(&hand.joints)?;
     }
-    let hand = Arc::new(hand_depth(observation, robot));
+    let hand = Arc::new(hand_depth(observation, robot.map(Arc::as_ref)));
     let term = |kind: &TermKind| -> Result<Box<dyn Term>, RefineError> {
         let missing = || RefineError::Missing { what: "hand", term: kind.name() };
         let robot = || robot.ok_or_else(missing);
@@ -152,7 +161,7 @@ pub fn standard_terms(
             }
             TermKind::Tactile => {
                 let settings = config.tactile.clone();
-                Box::new(TactileTerm::new(observation, object, robot()?, settings)?)
+                Box::new(TactileTerm::new(observation, object, Arc::clone(robot()?), settings)?)
             }
         })
     };

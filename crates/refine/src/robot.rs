@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use nalgebra::Isometry3;
 use prehend_geometry::hand::Taxel;
-use prehend_geometry::robot::{PosedRobot, Robot as KinematicTree, RobotError, RobotShape};
+use prehend_geometry::robot::{
+    ArticulatedRobot, PosedRobot, Robot as KinematicTree, RobotError, RobotShape,
+};
 use prehend_render::RenderModel;
 
 /// A robot hand: kinematics, shape and skin.
@@ -55,6 +57,18 @@ impl Robot {
     ) -> Result<PosedRobot, RobotError> {
         self.check_joints(joints)?;
         PosedRobot::new(Arc::clone(&self.shape), self.link_poses(t_cam_hand, joints))
+    }
+
+    /// The hand with its base at `t_cam_hand` and its joints at `joints` \[rad\], knowing how each link moves.
+    ///
+    /// # Errors
+    /// If there is not one joint position a joint, or a number is not finite.
+    pub fn articulated(
+        &self,
+        t_cam_hand: &Isometry3<f64>,
+        joints: &[f64],
+    ) -> Result<ArticulatedRobot, RobotError> {
+        ArticulatedRobot::new(&self.tree, Arc::clone(&self.shape), t_cam_hand, joints)
     }
 
     /// Whether `joints` has one position for each of [`joint_names`](KinematicTree::joint_names).

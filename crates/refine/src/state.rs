@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3, Vector6};
 use prehend_autodiff::lie::perturb_about;
 use prehend_render::Light;
 
-use crate::{Object, Observation, RefineError};
+use crate::{CameraCorrection, Object, Observation, RefineError};
 
 /// A named block of a [`State`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -15,6 +15,10 @@ pub enum Block {
     ///
     /// About the object's centre because that is where an error of the camera–hand calibration acts.
     HandPose,
+    /// So many joint positions of the hand \[rad or m\].
+    Joints(usize),
+    /// How the camera differs from what is said of it: see [`CameraCorrection`].
+    Camera,
 }
 
 impl Block {
@@ -22,6 +26,8 @@ impl Block {
     pub fn dimension(self) -> usize {
         match self {
             Self::ObjectPose | Self::HandPose => 6,
+            Self::Joints(count) => count,
+            Self::Camera => CameraCorrection::DIMENSION,
         }
     }
 }
@@ -35,6 +41,10 @@ pub struct State {
     pub object_centre: Point3<f64>,
     /// Hand base coordinates → camera coordinates \[m\].
     pub t_cam_hand: Isometry3<f64>,
+    /// Joint positions of the hand \[rad or m\]; none without a hand.
+    pub joints: Vec<f64>,
+    /// How the camera differs from what is said of it.
+    pub camera: CameraCorrection,
     /// Light on the object, in the camera frame. Not a block: [`Term::refresh`](crate::Term::refresh)
     /// solves for it in closed form.
     pub light: Light,
@@ -69,6 +79,8 @@ impl State {
             ),
             object_centre: object.centre,
             t_cam_hand: hand.map_or_else(Isometry3::identity, |h| h.t_cam_hand),
+            joints: hand.map_or_else(Vec::new, |h| h.joints.clone()),
+            camera: CameraCorrection::default(),
             light: Light::ambient(1.0),
         };
         let depth = state.centre().z;
@@ -83,16 +95,36 @@ impl State {
         (self.t_cam_object * self.object_centre).coords
     }
 
-    /// The state with `block` moved by the left twist `delta` about [`centre`](Self::centre).
-    pub fn moved(&self, block: Block, delta: &Vector6<f64>) -> Self {
+    /// The state with `block` moved by `delta`, which has the block's dimension; twists are about
+    /// [`centre`](Self::centre).
+    pub fn moved(&self, block: Block, delta: &[f64]) -> Self {
+        self.moved_all(&[block], delta)
+    }
+
+    /// The state with all of `blocks` moved at once, by their parts of `delta` one after the other.
+    pub fn moved_all(&self, blocks: &[Block], delta: &[f64]) -> Self {
         let mut state = self.clone();
-        let pose = match block {
-            Block::ObjectPose => &mut state.t_cam_object,
-            Block::HandPose => &mut state.t_cam_hand,
-        };
-        *pose = perturb_about(pose, &self.centre(), delta);
-        // Thousands of small steps must not let the quaternion drift off the unit sphere.
-        pose.rotation.renormalize();
+        let centre = self.centre();
+        let mut rest = delta;
+        for &block in blocks {
+            let (part, others) = rest.split_at(block.dimension());
+            rest = others;
+            let pose = match block {
+                Block::ObjectPose => &mut state.t_cam_object,
+                Block::HandPose => &mut state.t_cam_hand,
+                Block::Joints(_) => {
+                    state.joints.iter_mut().zip(part).for_each(|(joint, change)| *joint += change);
+                    continue;
+                }
+                Block::Camera => {
+                    state.camera = state.camera.changed(part);
+                    continue;
+                }
+            };
+            *pose = perturb_about(pose, &centre, &Vector6::from_column_slice(part));
+            // Thousands of small steps must not let the quaternion drift off the unit sphere.
+            pose.rotation.renormalize();
+        }
         state
     }
 }

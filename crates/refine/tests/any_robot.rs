@@ -31,7 +31,7 @@ const CAMERA: Camera =
 /// What is held or carried by what, and where.
 struct Setting {
     object: Arc<Object>,
-    robot: Robot,
+    robot: Arc<Robot>,
     joints: Vec<f64>,
     t_robot_object: Isometry3<f64>,
     t_cam_robot: Isometry3<f64>,
@@ -46,7 +46,7 @@ impl Setting {
         let t_robot_object = place * Translation3::from(-object.centre.coords);
         Self {
             object: Arc::new(object),
-            robot: Robot::new(tree, Vec::new()).unwrap(),
+            robot: Arc::new(Robot::new(tree, Vec::new()).unwrap()),
             joints,
             t_robot_object,
             t_cam_robot: look_at(&Point3::new(0.35, 0.15, 0.25), &place.translation.vector.into()),

@@ -32,7 +32,7 @@ fn half_of_the_inhand_objects_are_found_without_a_hand() {
         let (observation, robot) = assets.observation(&frame, target.instance, &[]).unwrap();
         let start = Instant::now();
         let search = PoseSearch::new(object, SearchSettings::default()).unwrap();
-        let pose = search.run(&observation, robot.as_deref()).unwrap()[0].t_cam_object;
+        let pose = search.run(&observation, robot.as_ref()).unwrap()[0].t_cam_object;
         let seconds = start.elapsed().as_secs_f64();
         let symmetries = truth.models().info(target.obj_id).unwrap().symmetries;
         let true_pose = truth.pose(target.scene_id, target.im_id, target.obj_id, &pose).unwrap();

@@ -122,12 +122,25 @@ impl ArticulatedRobot {
         let torque = -(point - self.centre).cross(&g);
         let base = Vector6::new(-g.x, -g.y, -g.z, torque.x, torque.y, torque.z);
         let mut joints = DVector::zeros(self.variables);
-        for &s in &self.paths[link] {
-            let screw = &self.screws[s];
-            let velocity = screw.linear + screw.angular.cross(&point.coords);
-            joints[screw.variable] -= g.dot(&velocity);
+        for (variable, velocity) in self.velocities(link, point) {
+            joints[variable] -= g.dot(&velocity);
         }
         Some(RobotSample { link, field, base, joints })
+    }
+
+    /// Velocity of a point fixed to link `link` \[m/rad or 1\] by each joint that moves it, as (entry of the joint vector,
+    /// velocity); `point` and the velocities are in the world frame.
+    ///
+    /// # Panics
+    /// If there is no such link.
+    pub fn velocities(
+        &self,
+        link: usize,
+        point: &Point3<f64>,
+    ) -> impl Iterator<Item = (usize, Vector3<f64>)> {
+        let screws = self.paths[link].iter().map(|&s| &self.screws[s]);
+        let point = point.coords;
+        screws.map(move |s| (s.variable, s.linear + s.angular.cross(&point)))
     }
 
     /// Second derivatives of the distance of `sample`, taken at `point`: rows and columns are the point (3), the left

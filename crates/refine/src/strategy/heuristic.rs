@@ -90,7 +90,7 @@ impl Heuristic {
             };
             length = length.clamp(0.5 * settings.last_step, settings.first_step);
             least = least.min(total);
-            state = state.moved(Block::ObjectPose, &step);
+            state = state.moved(Block::ObjectPose, step.as_slice());
         }
         trace
     }
@@ -110,7 +110,7 @@ impl Candidate {
         let mut normal = Normal::new(&[Block::ObjectPose]);
         let value = term.linearise(state, &mut normal);
         let (step, length) = preconditioned_step(&normal, radius, length);
-        let value_after = term.value(&state.moved(Block::ObjectPose, &step));
+        let value_after = term.value(&state.moved(Block::ObjectPose, step.as_slice()));
         Self { value, value_after, step, length }
     }
 
@@ -127,6 +127,7 @@ mod tests {
     use prehend_render::Light;
 
     use super::*;
+    use crate::CameraCorrection;
 
     /// Half the squared distance of the object from a place, over a variance.
     struct Spring {
@@ -139,10 +140,6 @@ mod tests {
             "spring"
         }
 
-        fn blocks(&self) -> &'static [Block] {
-            &[Block::ObjectPose]
-        }
-
         fn value(&self, state: &State) -> f64 {
             0.5 * self.precision * (state.centre() - self.place).norm_squared()
         }
@@ -153,7 +150,7 @@ mod tests {
             gradient.fixed_rows_mut::<3>(0).copy_from(&offset);
             let mut hessian = Matrix6::zeros();
             (0..3).for_each(|k| hessian[(k, k)] = self.precision);
-            normal.add(self.blocks(), &gradient, &hessian);
+            normal.add(&[Block::ObjectPose], &gradient, &hessian);
             self.value(state)
         }
     }
@@ -167,6 +164,8 @@ mod tests {
             t_cam_object: Isometry3::translation(0.03, 0.01, 0.5),
             object_centre: Point3::origin(),
             t_cam_hand: Isometry3::identity(),
+            joints: Vec::new(),
+            camera: CameraCorrection::default(),
             light: Light::ambient(1.0),
         };
         let mut last = start.clone();

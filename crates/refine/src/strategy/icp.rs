@@ -111,8 +111,8 @@ mod tests {
     fn it_descends_and_its_own_optimum_is_not_the_truth() {
         let scene = default_scene(1).unwrap();
         let start = State::new(&scene.observation, &scene.object, &scene.truth).unwrap();
-        let start =
-            start.moved(Block::ObjectPose, &Vector6::new(4e-3, -3e-3, 5e-3, 0.05, 0.0, 0.04));
+        let start = start
+            .moved(Block::ObjectPose, Vector6::new(4e-3, -3e-3, 5e-3, 0.05, 0.0, 0.04).as_slice());
         let mut last = start.clone();
         let icp = Icp { settings: IcpSettings::default() };
         let trace = icp

@@ -1,11 +1,16 @@
 //! Ways from an initial pose to a refined one.
 
+mod fused;
 mod heuristic;
 mod icp;
 mod robust_icp;
 mod step;
 mod walk;
 
+pub use fused::{
+    Confidence, Disagreement, Ending, Evidence, Fused, FusedSettings, Hypothesis, Nuisance, Stage,
+    Unobserved,
+};
 pub use heuristic::{Heuristic, HeuristicSettings};
 pub use icp::{Icp, IcpSettings};
 pub use robust_icp::{RobustIcp, RobustIcpSettings};

@@ -123,7 +123,7 @@ mod tests {
 
     fn start(scene: &Scene, offset: &Vector6<f64>) -> State {
         let truth = State::new(&scene.observation, &scene.object, &scene.truth).unwrap();
-        truth.moved(Block::ObjectPose, offset)
+        truth.moved(Block::ObjectPose, offset.as_slice())
     }
 
     fn robust(scene: &Scene, start: State) -> Isometry3<f64> {

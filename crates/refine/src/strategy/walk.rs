@@ -33,7 +33,7 @@ pub(super) fn walk(
         if !go_on || length <= last_step {
             break;
         }
-        state = state.moved(Block::ObjectPose, &step);
+        state = state.moved(Block::ObjectPose, step.as_slice());
     }
     trace
 }

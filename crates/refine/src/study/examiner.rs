@@ -91,7 +91,7 @@ impl<'a> Examiner<'a> {
         let mut poses: Vec<Pose> = Vec::new();
         let start = Instant::now();
         let refined =
-            refine_with(&observation, &object, robot.as_deref(), &row.t_cam_model, config, |p| {
+            refine_with(&observation, &object, robot.as_ref(), &row.t_cam_model, config, |p| {
                 // A run of fewer iterations would have come just as far: nothing in it looks ahead.
                 if steps.contains(&p.iteration) {
                     poses.push((p.t_cam_object, p.iteration));

@@ -22,7 +22,7 @@ pub struct Scene {
     /// Its number among the models of a dataset.
     pub obj_id: u32,
     /// The hand.
-    pub robot: Robot,
+    pub robot: Arc<Robot>,
     /// The hand as URDF text.
     pub urdf: String,
     /// The true pose, object → camera \[m\].
@@ -47,7 +47,7 @@ pub fn default_scene(seed: u64) -> Result<Scene, AssetError> {
     let tree = KinematicTree::from_urdf_str(&urdf, None)?;
     let joints = JOINT_NAMES.iter().map(|n| (*n).to_owned()).zip(grasp.joints).collect();
     let joints = tree.joint_vector(&joints)?;
-    let robot = Robot::new(tree, taxels())?;
+    let robot = Arc::new(Robot::new(tree, taxels())?);
 
     let camera = Camera { fx: 580.0, fy: 580.0, cx: 319.5, cy: 239.5, width: 640, height: 480 };
     let t_cam_hand =

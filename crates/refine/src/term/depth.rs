@@ -146,10 +146,6 @@ impl Term for DepthTerm {
         "depth"
     }
 
-    fn blocks(&self) -> &'static [Block] {
-        &[Block::ObjectPose]
-    }
-
     fn value(&self, state: &State) -> f64 {
         let cauchy = Cauchy { scale: self.settings.outlier };
         let losses =
@@ -188,7 +184,7 @@ impl Term for DepthTerm {
                 hessian += row * row.transpose() * (scale * weight);
             }
         }
-        normal.add(self.blocks(), &gradient, &hessian);
+        normal.add(&[Block::ObjectPose], &gradient, &hessian);
         value
     }
 }
@@ -201,19 +197,31 @@ pub(crate) fn back_project(
     observation: &Observation,
     limit: usize,
 ) -> Result<Vec<Point3<f64>>, RefineError> {
+    let camera = &observation.camera;
+    let depths = masked_depths(observation, limit)?;
+    Ok(depths.into_iter().map(|(x, y, z)| camera.unproject(x as f64, y as f64, z)).collect())
+}
+
+/// Column, row and depth \[m\] of some `limit` masked pixels with depth, on a regular grid of the image; at least one.
+///
+/// # Errors
+/// [`RefineError::NoDepth`] if no pixel of the grid has a depth.
+pub(super) fn masked_depths(
+    observation: &Observation,
+    limit: usize,
+) -> Result<Vec<(usize, usize, f64)>, RefineError> {
     let depth = &observation.depth;
     let at = |x: usize, y: usize| {
         let z = f64::from(depth.get(x, y)?);
-        (observation.mask.get(x, y)? && z > 0.0)
-            .then(|| observation.camera.unproject(x as f64, y as f64, z))
+        (observation.mask.get(x, y)? && z > 0.0).then_some((x, y, z))
     };
     let masked = observation.mask.count();
     let step = ((masked as f64 / limit.max(1) as f64).sqrt().ceil() as usize).max(1);
-    let points: Vec<Point3<f64>> = (0..depth.height())
+    let depths: Vec<_> = (0..depth.height())
         .step_by(step)
         .flat_map(|y| (0..depth.width()).step_by(step).filter_map(move |x| at(x, y)))
         .collect();
-    if points.is_empty() { Err(RefineError::NoDepth) } else { Ok(points) }
+    if depths.is_empty() { Err(RefineError::NoDepth) } else { Ok(depths) }
 }
 
 #[cfg(test)]
@@ -249,7 +257,8 @@ mod tests {
         let object = Arc::clone(&scene.object);
         let settings = DepthSettings::default();
         let term = DepthTerm::new(&scene.observation, object, hand, settings).unwrap();
-        let aside = |x: f64| term.value(&state.moved(Block::ObjectPose, &(Vector6::x() * x)));
+        let aside =
+            |x: f64| term.value(&state.moved(Block::ObjectPose, (Vector6::x() * x).as_slice()));
         assert!(aside(1.0) > aside(0.2) && aside(0.2) > aside(0.05));
     }
 

@@ -1,17 +1,27 @@
 //! The evidence: each term is a negative log-likelihood of the state, up to a constant.
 
 mod depth;
+mod free_space;
+mod hand_depth;
+mod penetration;
 mod physics;
+mod point_to_plane;
+mod prior;
 mod rendering;
 mod tactile;
 
 pub(crate) use depth::back_project;
 pub use depth::{DepthSettings, DepthTerm};
+pub use free_space::{FreeSpaceSettings, FreeSpaceTerm};
+pub use hand_depth::{HandDepthSettings, HandDepthTerm};
+pub use penetration::{PenetrationSettings, PenetrationTerm};
 pub use physics::{PhysicsSettings, PhysicsTerm};
+pub use point_to_plane::{PointToPlaneSettings, PointToPlaneTerm};
+pub use prior::{Prior, PriorSettings};
 pub use rendering::{RenderingSettings, RenderingTerm};
 pub use tactile::{TactileSettings, TactileTerm};
 
-use crate::{Block, Normal, State};
+use crate::{Normal, State};
 
 /// One kind of evidence about a [`State`].
 ///
@@ -21,13 +31,12 @@ pub trait Term: Send + Sync {
     /// A short name for reports.
     fn name(&self) -> &'static str;
 
-    /// The blocks that the term has derivatives for; it is constant in, or not differentiable by, others.
-    fn blocks(&self) -> &'static [Block];
-
     /// The term at `state`. Cheap: candidate steps are judged by it.
     fn value(&self, state: &State) -> f64;
 
-    /// The term at `state`; adds its gradient and Gauss–Newton Hessian to `normal`.
+    /// The term at `state`; adds its gradient and Gauss–Newton Hessian by the requested blocks to `normal`.
+    ///
+    /// Blocks that it is constant in, or not differentiable by, are left as they are.
     fn linearise(&self, state: &State, normal: &mut Normal) -> f64;
 
     /// Solves in closed form for nuisance parameters of `state` that only this term sees.
@@ -42,6 +51,7 @@ mod gradient_check {
     use prehend_autodiff::check::{compare_gradients, finite_difference_gradient};
 
     use super::*;
+    use crate::Block;
     use crate::refine::hand_depth;
     use crate::synth::{Scene, default_scene};
 
@@ -57,8 +67,18 @@ mod gradient_check {
             let scale = if k < 3 { 0.05 } else { 1.0 };
             turn[(k + seed) % 6] * scale
         });
-        state = state.moved(Block::ObjectPose, &delta);
+        state = state.moved(Block::ObjectPose, delta.as_slice());
         (scene, state, hand)
+    }
+
+    /// Steps of a block's parameters that move the surface about as far as a metre would.
+    fn scales(block: Block) -> Vec<f64> {
+        match block {
+            // Radians move the surface by a tenth of what metres do.
+            Block::ObjectPose | Block::HandPose => vec![1.0, 1.0, 1.0, 10.0, 10.0, 10.0],
+            Block::Joints(count) => vec![10.0; count],
+            Block::Camera => vec![2.0, 1.0, 2.0, 2.0, 10.0],
+        }
     }
 
     /// Compares the term's gradient by `block` with differences of its value over `step`.
@@ -72,20 +92,18 @@ mod gradient_check {
         let mut normal = Normal::new(&[block]);
         let value = term.linearise(state, &mut normal);
         assert!((value - term.value(state)).abs() <= 1e-9 * value.abs(), "the two values differ");
-        let along = |x: &[f64]| term.value(&state.moved(block, &Vector6::from_column_slice(x)));
-        // Radians move the surface by a tenth of what metres do.
-        let scale = Vector6::new(1.0, 1.0, 1.0, 10.0, 10.0, 10.0);
+        let scales = scales(block);
         let scaled = |x: &[f64]| {
-            let x: Vec<f64> = x.iter().zip(scale.iter()).map(|(x, s)| x * s).collect();
-            along(&x)
+            let x: Vec<f64> = x.iter().zip(&scales).map(|(x, s)| x * s).collect();
+            term.value(&state.moved(block, &x))
         };
-        let reference = finite_difference_gradient(scaled, &[0.0; 6], step);
+        let reference = finite_difference_gradient(scaled, &vec![0.0; scales.len()], step);
         let gradient: Vec<f64> =
-            normal.gradient().iter().zip(scale.iter()).map(|(g, s)| g * s).collect();
+            normal.gradient().iter().zip(&scales).map(|(g, s)| g * s).collect();
         let error = compare_gradients(&gradient, &reference);
         assert!(
             error.relative < tolerance && error.cosine > 1.0 - tolerance,
-            "{}: {error:?}\n{gradient:?}\n{reference:?}",
+            "{} by {block:?}: {error:?}\n{gradient:?}\n{reference:?}",
             term.name()
         );
         let eigenvalues = normal.hessian().clone().symmetric_eigenvalues();
@@ -95,7 +113,7 @@ mod gradient_check {
     #[test]
     fn a_pose_is_not_changed_by_a_zero_twist() {
         let (_, state, _) = fixture(0);
-        let moved = state.moved(Block::ObjectPose, &Vector6::zeros());
+        let moved = state.moved(Block::ObjectPose, &[0.0; 6]);
         let difference: Isometry3<f64> = moved.t_cam_object.inv_mul(&state.t_cam_object);
         assert!(
             difference.translation.vector.norm() < 1e-15 && difference.rotation.angle() < 1e-15

@@ -151,10 +151,6 @@ impl Term for PhysicsTerm {
         "physics"
     }
 
-    fn blocks(&self) -> &'static [Block] {
-        &[Block::ObjectPose]
-    }
-
     fn value(&self, state: &State) -> f64 {
         let pose = &state.t_cam_object;
         let (moved, precision) = self.displacement(state);
@@ -179,7 +175,7 @@ impl Term for PhysicsTerm {
             gradient[k] += precision * moved[k];
             hessian[(k, k)] += precision;
         }
-        normal.add(self.blocks(), &gradient, &hessian);
+        normal.add(&[Block::ObjectPose], &gradient, &hessian);
         self.nats(loss) + 0.5 * precision * moved.norm_squared()
     }
 }
@@ -211,7 +207,7 @@ mod tests {
         let held = State { t_cam_object: scene.truth, ..state };
         for depth in [0.0, 2e-3, 5e-3] {
             let twist = Vector6::new(toward_palm.x, toward_palm.y, toward_palm.z, 0.0, 0.0, 0.0);
-            let pose = held.moved(Block::ObjectPose, &(twist * depth));
+            let pose = held.moved(Block::ObjectPose, (twist * depth).as_slice());
             let linearised = |steps| {
                 let settings = PhysicsSettings { steps, ..PhysicsSettings::default() };
                 let term =
@@ -239,7 +235,7 @@ mod tests {
         let moved = |by: f64| {
             let twist =
                 Vector6::new(toward_palm.x, toward_palm.y, toward_palm.z, 0.0, 0.0, 0.0) * by;
-            term.value(&held.moved(Block::ObjectPose, &twist))
+            term.value(&held.moved(Block::ObjectPose, twist.as_slice()))
         };
         assert!(term.value(&held) < moved(5e-3), "penetrating");
         assert!(term.value(&held) < moved(-0.1), "falling");

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::Point3;
+use nalgebra::{Isometry3, SMatrix};
 use prehend_render::{
     ContourOptions, DepthImage, Light, LossOptions, Mode, PoseLoss, Robust, Target, light_samples,
 };
@@ -15,6 +15,8 @@ use crate::{Block, Normal, Object, Observation, RefineError, State};
 pub struct RenderingSettings {
     /// The image is made smaller by this factor.
     pub downsample: usize,
+    /// Whether colours are compared.
+    pub colour: bool,
     /// Standard deviation of a colour, relative to the object's brightness in the image: exposure is
     /// unknown, and a dark image is no better evidence than a bright one.
     pub sigma: f64,
@@ -39,6 +41,7 @@ impl Default for RenderingSettings {
     fn default() -> Self {
         Self {
             downsample: 2,
+            colour: true,
             sigma: 0.15,
             mask_sigma: 0.3,
             outlier: 2.0,
@@ -80,6 +83,7 @@ impl RenderingTerm {
             .map_err(images)?;
         let sigma = settings.sigma * brightness(observation);
         let options = LossOptions {
+            color_weight: if settings.colour { 1.0 } else { 0.0 },
             mask_weight: (sigma / settings.mask_sigma).powi(2),
             // Or a pose could lower its loss by hiding behind the hand.
             hidden_is_missed: true,
@@ -117,28 +121,31 @@ impl Term for RenderingTerm {
         "rendering"
     }
 
-    fn blocks(&self) -> &'static [Block] {
-        &[Block::ObjectPose]
-    }
-
     fn value(&self, state: &State) -> f64 {
-        let model = &self.object.model;
-        let loss = self.loss.evaluate(model, &state.t_cam_object, &state.light, &self.target);
-        self.scale * loss.total
+        let (model, seen) = (&self.object.model, apparent(state));
+        self.scale * self.loss.evaluate(model, &seen, &state.light, &self.target).total
     }
 
     fn linearise(&self, state: &State, normal: &mut Normal) -> f64 {
-        let centre = Point3::from(state.centre());
-        let model = &self.object.model;
-        let pose = &state.t_cam_object;
-        let at = self.loss.linearise(model, pose, &centre, &state.light, &self.target);
-        normal.add(self.blocks(), &(at.gradient * self.scale), &(at.jtj * (2.0 * self.scale)));
+        let centre = state.centre();
+        let (model, seen) = (&self.object.model, apparent(state));
+        let turning = seen * self.object.centre;
+        let at = self.loss.linearise(model, &seen, &turning, &state.light, &self.target);
+        // The object appears shifted, and turned as it is.
+        let mut seen_by_state = SMatrix::<f64, 6, 11>::zeros();
+        let place = state.camera.apparent_jacobian(&centre);
+        seen_by_state.fixed_view_mut::<3, 3>(0, 0).copy_from(&place.fixed_columns::<3>(0));
+        seen_by_state.fixed_view_mut::<3, 5>(0, 6).copy_from(&place.fixed_columns::<5>(3));
+        seen_by_state.fixed_view_mut::<3, 3>(3, 3).fill_with_identity();
+        let gradient = seen_by_state.tr_mul(&at.gradient) * self.scale;
+        let hessian = seen_by_state.tr_mul(&at.jtj) * seen_by_state * (2.0 * self.scale);
+        normal.add(&[Block::ObjectPose, Block::Camera], &gradient, &hessian);
         self.scale * at.loss.total
     }
 
     fn refresh(&self, state: &mut State) {
-        let (model, pose) = (&self.object.model, &state.t_cam_object);
-        let mut samples = light_samples(model, pose, &self.target, HALF_WIDTH);
+        let (model, pose) = (&self.object.model, apparent(state));
+        let mut samples = light_samples(model, &pose, &self.target, HALF_WIDTH);
         // Four unknowns a channel do not need every pixel.
         let step = samples.len().div_ceil(LIGHT_SAMPLES).max(1);
         let mut index = 0;
@@ -151,6 +158,11 @@ impl Term for RenderingTerm {
             state.light = light;
         }
     }
+}
+
+/// Where the object appears to be to the camera as it is said to be.
+fn apparent(state: &State) -> Isometry3<f64> {
+    state.camera.apparent(&state.t_cam_object, &state.centre())
 }
 
 #[cfg(test)]
@@ -168,6 +180,8 @@ mod tests {
             term.refresh(&mut state);
             // Pixels are in single precision and texture has kinks: a step of some hundredths of a pixel.
             assert_gradient(&term, &state, Block::ObjectPose, 5e-5, 0.03);
+            state.camera = state.camera.changed(&[0.0, 0.0, 1e-3, -1e-3, 3e-3]);
+            assert_gradient(&term, &state, Block::Camera, 5e-5, 0.05);
         }
     }
 

@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Matrix6, Point3, SMatrix, SVector, Vector3, Vector6};
+use nalgebra::{Point3, Vector3, Vector6};
+use prehend_geometry::robot::ArticulatedRobot;
 
 use super::Term;
 use crate::{Block, Cauchy, Normal, Object, Observation, RefineError, Robot, State};
@@ -15,6 +16,9 @@ pub struct TactileSettings {
     /// Standard deviation of a touched taxel from the object's surface \[m\]: a contact spreads over
     /// the taxels around it, so a touched taxel may itself be a few millimetres away.
     pub sigma: f64,
+    /// How far outside the surface a touched taxel is on average \[m\]: it lies under a skin, and feels what its neighbours
+    /// touch.
+    pub standoff: f64,
     /// Standard deviation of how deep a quiet taxel may lie inside the object \[m\].
     pub quiet_sigma: f64,
     /// Distance at which a taxel counts as an outlier (dead, false) \[m\].
@@ -29,6 +33,7 @@ impl Default for TactileSettings {
         Self {
             touch_force: 0.1,
             sigma: 3e-3,
+            standoff: 0.0,
             quiet_sigma: 1e-3,
             outlier: 10e-3,
             effective_taxels: 8.0,
@@ -36,8 +41,10 @@ impl Default for TactileSettings {
     }
 }
 
-/// A taxel in hand base coordinates.
+/// A taxel.
 struct Touch {
+    link: usize,
+    /// In link coordinates \[m\].
     position: Point3<f64>,
     touched: bool,
 }
@@ -48,6 +55,7 @@ struct Touch {
 /// paper leaves unused. Both go through Cauchy's loss, because some taxels are dead and some ring false.
 pub struct TactileTerm {
     object: Arc<Object>,
+    robot: Arc<Robot>,
     touches: Vec<Touch>,
     settings: TactileSettings,
 }
@@ -60,7 +68,7 @@ impl TactileTerm {
     pub fn new(
         observation: &Observation,
         object: Arc<Object>,
-        robot: &Robot,
+        robot: Arc<Robot>,
         settings: TactileSettings,
     ) -> Result<Self, RefineError> {
         let hand = observation
@@ -74,58 +82,65 @@ impl TactileTerm {
             });
         }
         robot.check_joints(&hand.joints)?;
-        let links = robot.tree.forward_kinematics(&hand.joints);
         let touches = robot
             .taxels
             .iter()
             .zip(&hand.forces)
             .map(|(taxel, force)| {
-                let link = robot.tree.link_index(&taxel.link).and_then(|i| links.get(i));
-                let link =
-                    link.ok_or_else(|| RefineError::TaxelLink { link: taxel.link.clone() })?;
+                let link = robot.tree.link_index(&taxel.link);
                 Ok(Touch {
-                    position: link * taxel.position,
+                    link: link
+                        .ok_or_else(|| RefineError::TaxelLink { link: taxel.link.clone() })?,
+                    position: taxel.position,
                     touched: force.norm() > settings.touch_force,
                 })
             })
             .collect::<Result<_, RefineError>>()?;
-        Ok(Self { object, touches, settings })
+        Ok(Self { object, robot, touches, settings })
     }
 
-    /// Signed distance \[m\] of each taxel that matters to the surface, its outward gradient and its
-    /// lever arm about the object's centre (camera frame), with the nats per square metre it weighs.
-    fn residuals<'a>(&'a self, state: &'a State) -> impl Iterator<Item = Residual> + 'a {
+    /// Calls `f` with each taxel that matters. A hand that cannot be posed says nothing.
+    fn residuals(&self, state: &State, mut f: impl FnMut(&ArticulatedRobot, Residual)) {
+        let Ok(hand) = self.robot.articulated(&state.t_cam_hand, &state.joints) else { return };
         let t_object_cam = state.t_cam_object.inverse();
-        let centre = state.centre();
         let touched = self.touches.iter().filter(|t| t.touched).count().max(1) as f64;
         let share = (self.settings.effective_taxels / touched).min(1.0);
         let touch_weight = share / self.settings.sigma.powi(2);
         let quiet_weight = self.settings.quiet_sigma.powi(-2);
         let reach = self.object.radius;
-        self.touches.iter().filter_map(move |touch| {
-            let point = state.t_cam_hand * touch.position;
+        for touch in &self.touches {
+            let point = hand.posed().t_world_links()[touch.link] * touch.position;
             let local = t_object_cam * point;
             // Far outside everything a quiet taxel says nothing, and no exact distance is needed.
             if !touch.touched && (local - self.object.centre).norm() > reach {
-                return None;
+                continue;
             }
             let (distance, closest) = self.object.surface.signed_distance(&local);
             if !touch.touched && distance >= 0.0 {
-                return None;
+                continue;
             }
             let along = (local - closest.point) * distance.signum();
             let gradient =
                 along.try_normalize(1e-12).map_or_else(Vector3::zeros, |n| state.t_cam_object * n);
-            let weight = if touch.touched { touch_weight } else { quiet_weight };
-            Some(Residual { distance, gradient, arm: point.coords - centre, weight })
-        })
+            let (value, weight) = match touch.touched {
+                true => (distance - self.settings.standoff, touch_weight),
+                false => (distance, quiet_weight),
+            };
+            f(&hand, Residual { value, gradient, link: touch.link, point, weight });
+        }
     }
 }
 
+/// What a taxel's distance from the surface is too much.
 struct Residual {
-    distance: f64,
+    /// Signed, positive outside \[m\].
+    value: f64,
+    /// Its derivative by the taxel's place: the outward direction (camera frame).
     gradient: Vector3<f64>,
-    arm: Vector3<f64>,
+    link: usize,
+    /// The taxel (camera frame).
+    point: Point3<f64>,
+    /// Nats per square metre.
     weight: f64,
 }
 
@@ -134,41 +149,38 @@ impl Term for TactileTerm {
         "tactile"
     }
 
-    fn blocks(&self) -> &'static [Block] {
-        &[Block::ObjectPose, Block::HandPose]
-    }
-
     fn value(&self, state: &State) -> f64 {
         let cauchy = Cauchy { scale: self.settings.outlier };
-        self.residuals(state).map(|r| r.weight * cauchy.loss(r.distance.powi(2))).sum()
+        let mut value = 0.0;
+        self.residuals(state, |_, r| value += r.weight * cauchy.loss(r.value * r.value));
+        value
     }
 
     fn linearise(&self, state: &State, normal: &mut Normal) -> f64 {
         let cauchy = Cauchy { scale: self.settings.outlier };
+        let centre = state.centre();
         let mut value = 0.0;
-        let mut gradient = Vector6::zeros();
-        let mut hessian = Matrix6::zeros();
-        for r in self.residuals(state) {
-            let r2 = r.distance * r.distance;
-            let weight = r.weight * cauchy.weight(r2);
-            let turn = r.arm.cross(&r.gradient);
+        let mut joints = vec![0.0; state.joints.len()];
+        self.residuals(state, |hand, r| {
+            let squared = r.value * r.value;
+            value += r.weight * cauchy.loss(squared);
             let n = r.gradient;
-            let row = Vector6::new(n.x, n.y, n.z, turn.x, turn.y, turn.z);
-            value += r.weight * cauchy.loss(r2);
-            gradient += row * (weight * r.distance);
-            hessian += row * row.transpose() * weight;
-        }
-        // Only where the taxels are relative to the object matters: moving the object by a twist is
-        // moving the hand by its opposite.
-        let mut both_gradient = SVector::<f64, 12>::zeros();
-        let mut both_hessian = SMatrix::<f64, 12, 12>::zeros();
-        for (i, sign_i) in [(0, -1.0), (6, 1.0)] {
-            both_gradient.fixed_rows_mut::<6>(i).copy_from(&(gradient * sign_i));
-            for (j, sign_j) in [(0, -1.0), (6, 1.0)] {
-                both_hessian.fixed_view_mut::<6, 6>(i, j).copy_from(&(hessian * (sign_i * sign_j)));
+            let turn = (r.point.coords - centre).cross(&n);
+            // Only where the taxels are relative to the object matters: moving the object by a twist is
+            // moving the hand by its opposite.
+            let of_hand = Vector6::new(n.x, n.y, n.z, turn.x, turn.y, turn.z);
+            let of_object = -of_hand;
+            joints.fill(0.0);
+            for (joint, velocity) in hand.velocities(r.link, &r.point) {
+                joints[joint] += n.dot(&velocity);
             }
-        }
-        normal.add(self.blocks(), &both_gradient, &both_hessian);
+            let row = [
+                (Block::ObjectPose, of_object.as_slice()),
+                (Block::HandPose, of_hand.as_slice()),
+                (Block::Joints(joints.len()), joints.as_slice()),
+            ];
+            normal.add_row(&row, r.value, r.weight * cauchy.weight(squared));
+        });
         value
     }
 }
@@ -181,15 +193,16 @@ mod tests {
     fn term(observation: &Observation) -> Result<TactileTerm, RefineError> {
         let (scene, _, _) = fixture(0);
         let object = Arc::clone(&scene.object);
-        TactileTerm::new(observation, object, &scene.robot, TactileSettings::default())
+        let robot = Arc::clone(&scene.robot);
+        TactileTerm::new(observation, object, robot, TactileSettings::default())
     }
 
     #[test]
-    fn gradients_by_object_and_hand_match_differences() {
+    fn gradients_match_differences() {
         for seed in 0..3 {
             let (scene, state, _) = fixture(seed);
             let term = term(&scene.observation).unwrap();
-            for block in [Block::ObjectPose, Block::HandPose] {
+            for block in [Block::ObjectPose, Block::HandPose, Block::Joints(16)] {
                 assert_gradient(&term, &state, block, 1e-7, 1e-4);
             }
         }

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::num::NonZeroUsize;
 use std::path::Path;
+use std::sync::Arc;
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
@@ -179,7 +180,7 @@ impl Run<'_> {
                 assets.observation(&frame, job.instance, &self.config.terms)?;
             (object, observation, robot)
         };
-        let robot = robot.as_deref();
+        let robot = robot.as_ref();
         let start = Instant::now();
         let pose =
             refine_with(&observation, &object, robot, &row.t_cam_model, self.config, |_| true)?;
@@ -188,7 +189,7 @@ impl Run<'_> {
             pose: PlainPose::from(&pose.t_cam_object),
             iteration: pose.iteration,
             iterations: pose.trace.iterations.len().saturating_sub(1),
-            warnings: inspect_pose(&observation, &object, robot, &row.t_cam_model),
+            warnings: inspect_pose(&observation, &object, robot.map(Arc::as_ref), &row.t_cam_model),
             object_warnings: inspect_object(&object),
             trace: self.keeps_trace().then_some(pose.trace),
         };
@@ -237,6 +238,7 @@ fn draw(
                 t_cam_object: (&refined.pose).into(),
                 iteration: refined.iteration,
                 trace: refined.trace.clone().unwrap_or_default(),
+                confidence: None,
             };
             let frame = FrameReport::draw(&observation, &object, &row.t_cam_model, &pose);
             Ok(report.add(&label(row), &frame)?)

@@ -28,7 +28,12 @@ pub(crate) fn run(
     let object = Arc::new(input.object);
     let robot = input.robot.as_ref();
     let mut warnings = inspect_object(&object);
-    warnings.extend(inspect_pose(&input.observation, &object, robot, &input.t_cam_object));
+    warnings.extend(inspect_pose(
+        &input.observation,
+        &object,
+        robot.map(Arc::as_ref),
+        &input.t_cam_object,
+    ));
     warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
     let bar = progress::bar(config.iterations() as u64, "refining");
     let refined =

@@ -170,7 +170,7 @@ fn search_one(
             unknown.insert(PoseSearch::new(Arc::clone(&object), SearchSettings::default())?)
         }
     };
-    let found = search.run(&observation, robot.as_deref())?;
+    let found = search.run(&observation, robot.as_ref())?;
     let best = found.first().ok_or(RefineError::NothingFits)?;
     Ok((best.t_cam_object, best.value))
 }

@@ -34,7 +34,7 @@ impl<'a> Fine<'a> {
     pub(super) fn new(
         observation: &'a Observation,
         object: &'a Arc<Object>,
-        robot: Option<&Robot>,
+        robot: Option<&Arc<Robot>>,
         hand: &Arc<DepthImage>,
         resolution: usize,
         settings: &SearchSettings,
@@ -50,7 +50,12 @@ impl<'a> Fine<'a> {
         if let (Some(robot), true) = (robot, feels) {
             let touch_force = settings.touch_force;
             let touch = TactileSettings { touch_force, ..TactileSettings::default() };
-            terms.push(Box::new(TactileTerm::new(observation, Arc::clone(object), robot, touch)?));
+            terms.push(Box::new(TactileTerm::new(
+                observation,
+                Arc::clone(object),
+                Arc::clone(robot),
+                touch,
+            )?));
         }
         Ok(Self { observation, object, terms })
     }
@@ -80,7 +85,7 @@ impl<'a> Fine<'a> {
             if length < SHORTEST {
                 break;
             }
-            let mut next = state.moved(Block::ObjectPose, &step);
+            let mut next = state.moved(Block::ObjectPose, step.as_slice());
             self.terms.iter().for_each(|t| t.refresh(&mut next));
             let reached = self.sum(&next);
             if reached < value {

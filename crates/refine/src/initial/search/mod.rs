@@ -77,7 +77,7 @@ impl PoseSearch {
     pub fn run(
         &self,
         observation: &Observation,
-        robot: Option<&Robot>,
+        robot: Option<&Arc<Robot>>,
     ) -> Result<Vec<Found>, RefineError> {
         let settings = &self.settings;
         // The checks that every refinement makes.
@@ -89,8 +89,9 @@ impl PoseSearch {
                 return Err(RefineError::TaxelCount { forces, taxels });
             }
         }
-        let hand = Arc::new(hand_depth(observation, robot));
-        let evidence = Evidence::new(observation, robot, &hand, settings.touch_force)?;
+        let hand = Arc::new(hand_depth(observation, robot.map(Arc::as_ref)));
+        let evidence =
+            Evidence::new(observation, robot.map(Arc::as_ref), &hand, settings.touch_force)?;
         let rough = Rough { object: &self.object, lattice: &self.lattice, evidence: &evidence };
         let placed = self.place(&rough);
         let turned = self.turn(&rough, &placed);

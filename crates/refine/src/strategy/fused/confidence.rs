@@ -1,0 +1,200 @@
+//! How sure a pose is: the posterior around it, and what speaks against it.
+
+use nalgebra::{DMatrix, Isometry3, Matrix6, Vector3, Vector6};
+use prehend_autodiff::lie::{perturb_about, so3_log};
+use prehend_geometry::SplitMix64;
+
+use super::Ending;
+use super::solve::{Point, balanced};
+use crate::Block;
+
+/// A pose that the search came upon.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Hypothesis {
+    /// Object coordinates → camera coordinates \[m\].
+    pub t_cam_object: Isometry3<f64>,
+    /// Its share of the posterior among the hypotheses found.
+    pub weight: f64,
+    /// Negative logarithm of the posterior, up to a constant \[nat\].
+    pub value: f64,
+    /// Covariance of a left twist about the object's centre, in the camera frame \[m², m rad, rad²\].
+    pub covariance: Matrix6<f64>,
+}
+
+/// A direction that the evidence says little of: only the prior holds the pose there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Unobserved {
+    /// Twist about the object's centre, in the camera frame, of unit length where a rotation counts by how far it moves
+    /// the surface.
+    pub twist: Vector6<f64>,
+    /// Standard deviation along it \[m of surface motion\].
+    pub deviation: f64,
+}
+
+/// A sense that would rather have the pose elsewhere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Disagreement {
+    /// The evidence's name.
+    pub evidence: &'static str,
+    /// How far from its own optimum the pose is, in its own standard deviations.
+    pub distance: f64,
+}
+
+/// What is known of how good a pose is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Confidence {
+    /// The poses found, the best first.
+    pub hypotheses: Vec<Hypothesis>,
+    /// Directions that are hardly observed.
+    pub unobserved: Vec<Unobserved>,
+    /// Senses that disagree with the pose.
+    pub disagreements: Vec<Disagreement>,
+    /// Why the search ended.
+    pub ending: Ending,
+    /// Centre of the object, about which twists turn (camera frame) \[m\].
+    centre: Vector3<f64>,
+}
+
+/// Random poses that stand for the posterior.
+const SAMPLES: usize = 512;
+
+/// Standard deviation of surface motion from which a direction counts as unobserved \[m\].
+const UNOBSERVED: f64 = 8e-3;
+
+/// Distance from its optimum at which a sense counts as disagreeing, in its standard deviations.
+const DISAGREES: f64 = 5.0;
+
+impl Confidence {
+    /// Of the solutions `found`, the best first; `inflation` multiplies covariances, `radius` turns radians into metres.
+    pub(super) fn new(found: &[(Point, Ending)], inflation: f64, radius: f64) -> Self {
+        let (best, ending) = &found[0];
+        let covariances: Vec<(Matrix6<f64>, f64)> =
+            found.iter().map(|(point, _)| laplace(point, inflation)).collect();
+        // Laplace: the mass of a mode is its height times its volume.
+        let logarithm = |k: usize| 0.5 * covariances[k].1 - found[k].0.value;
+        let first = (0..found.len()).map(logarithm).fold(f64::NEG_INFINITY, f64::max);
+        let masses: Vec<f64> = (0..found.len()).map(|k| (logarithm(k) - first).exp()).collect();
+        let total: f64 = masses.iter().sum();
+        let hypotheses: Vec<Hypothesis> = found
+            .iter()
+            .zip(&covariances)
+            .zip(&masses)
+            .map(|(((point, _), (covariance, _)), mass)| Hypothesis {
+                t_cam_object: point.state.t_cam_object,
+                weight: mass / total,
+                value: point.value,
+                covariance: *covariance,
+            })
+            .collect();
+        Self {
+            unobserved: unobserved(&hypotheses[0].covariance, radius),
+            disagreements: disagreements(best),
+            hypotheses,
+            ending: *ending,
+            centre: best.state.centre(),
+        }
+    }
+
+    /// Covariance of the pose's error: a left twist about the object's centre in the camera frame \[m², m rad, rad²\].
+    pub fn covariance(&self) -> Matrix6<f64> {
+        self.hypotheses[0].covariance
+    }
+
+    /// Probability that the true pose is within `distance` \[m\] and `angle` \[rad\] of the best one, all hypotheses
+    /// considered. By sampling; always the same for the same posterior.
+    pub fn probability_within(&self, distance: f64, angle: f64) -> f64 {
+        let best = &self.hypotheses[0].t_cam_object;
+        let place = best.inverse() * nalgebra::Point3::from(self.centre);
+        let mut random = SplitMix64::new(0);
+        let of = |hypothesis: &Hypothesis, random: &mut SplitMix64| {
+            let Some(root) = root(&hypothesis.covariance) else { return 0.0 };
+            let inside = (0..SAMPLES).filter(|_| {
+                let twist = root * Vector6::from_fn(|_, _| random.normal());
+                let centre = (hypothesis.t_cam_object * place).coords;
+                let pose = perturb_about(&hypothesis.t_cam_object, &centre, &twist);
+                let off = (pose * place).coords - self.centre;
+                let turn = so3_log(&(pose.rotation * best.rotation.inverse()));
+                off.norm() <= distance && turn.norm() <= angle
+            });
+            inside.count() as f64 / SAMPLES as f64
+        };
+        self.hypotheses.iter().map(|h| h.weight * of(h, &mut random)).sum()
+    }
+
+    /// How far `pose` is from the best one, in standard deviations: the square is χ² of six degrees of freedom if the
+    /// posterior is right.
+    pub fn mahalanobis(&self, pose: &Isometry3<f64>) -> f64 {
+        let best = &self.hypotheses[0].t_cam_object;
+        let place = best.inverse() * nalgebra::Point3::from(self.centre);
+        let off = (pose * place).coords - self.centre;
+        let turn = so3_log(&(pose.rotation * best.rotation.inverse()));
+        let twist = Vector6::new(off.x, off.y, off.z, turn.x, turn.y, turn.z);
+        let inverse = self.covariance().try_inverse().unwrap_or_else(Matrix6::zeros);
+        twist.dot(&(inverse * twist)).max(0.0).sqrt()
+    }
+}
+
+/// Covariance of the object's pose with all else integrated out, and the logarithm of the determinant of that of everything.
+fn laplace(point: &Point, inflation: f64) -> (Matrix6<f64>, f64) {
+    let (scaled, scale) = balanced(point.normal.hessian());
+    // As in a solve: what nothing is known of, not even beforehand, must not be infinite.
+    let n = scale.len();
+    let Some(factor) = (scaled + DMatrix::identity(n, n) * 1e-9).cholesky() else {
+        return (Matrix6::identity(), 0.0);
+    };
+    let all = factor.inverse();
+    let at = point.normal.offset(Block::ObjectPose).unwrap_or(0);
+    let covariance =
+        Matrix6::from_fn(|r, c| all[(at + r, at + c)] * scale[at + r] * scale[at + c] * inflation);
+    let determinant = factor.l_dirty().diagonal().iter().map(|d| -2.0 * d.ln()).sum::<f64>()
+        + scale.iter().map(|s| 2.0 * s.ln()).sum::<f64>();
+    (covariance, determinant)
+}
+
+fn root(covariance: &Matrix6<f64>) -> Option<Matrix6<f64>> {
+    Some(covariance.cholesky()?.l())
+}
+
+/// Directions in which the pose of `point` is uncertain, the most uncertain first: twists about the object's centre that move
+/// its surface by a metre, with the standard deviation of that motion \[m\].
+pub(super) fn principal_directions(point: &Point, radius: f64) -> Vec<(Vector6<f64>, f64)> {
+    directions(&laplace(point, 1.0).0, radius)
+}
+
+fn directions(covariance: &Matrix6<f64>, radius: f64) -> Vec<(Vector6<f64>, f64)> {
+    let scale = Vector6::new(1.0, 1.0, 1.0, radius, radius, radius);
+    let metres = Matrix6::from_fn(|r, c| covariance[(r, c)] * scale[r] * scale[c]);
+    let eigen = metres.symmetric_eigen();
+    let mut found: Vec<_> = (0..6)
+        .map(|k| {
+            let twist: Vector6<f64> = eigen.eigenvectors.column(k).component_div(&scale);
+            (twist, eigen.eigenvalues[k].max(0.0).sqrt())
+        })
+        .collect();
+    found.sort_by(|a, b| b.1.total_cmp(&a.1));
+    found
+}
+
+fn unobserved(covariance: &Matrix6<f64>, radius: f64) -> Vec<Unobserved> {
+    directions(covariance, radius)
+        .into_iter()
+        .filter(|(_, deviation)| *deviation > UNOBSERVED)
+        .map(|(twist, deviation)| Unobserved { twist, deviation })
+        .collect()
+}
+
+/// Which evidence, the prior included, has its own optimum far away.
+fn disagreements(point: &Point) -> Vec<Disagreement> {
+    let distance = |part: &crate::Normal| {
+        let (scaled, scale) = balanced(part.hessian());
+        let gradient = part.gradient().component_mul(&scale);
+        let n = scale.len();
+        let step = (scaled + DMatrix::identity(n, n) * 1e-3).cholesky()?.solve(&gradient);
+        Some(gradient.dot(&step).max(0.0).sqrt())
+    };
+    let of = |part: &super::solve::Part| {
+        let distance = distance(&part.normal)?;
+        (distance > DISAGREES).then_some(Disagreement { evidence: part.name, distance })
+    };
+    point.parts.iter().filter_map(of).collect()
+}

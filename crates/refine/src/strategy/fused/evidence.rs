@@ -1,0 +1,112 @@
+//! The terms of a stage, for the evidence that an observation brings.
+
+use std::sync::Arc;
+
+use prehend_render::DepthImage;
+
+use super::settings::{Evidence, FusedSettings, Stage};
+use crate::refine::hand_depth;
+use crate::term::{
+    FreeSpaceTerm, HandDepthTerm, PenetrationTerm, PointToPlaneTerm, Prior, RenderingTerm,
+    TactileTerm, Term,
+};
+use crate::{Object, Observation, RefineError, Robot, State};
+
+/// What is known of one frame.
+pub(super) struct Known<'a> {
+    pub(super) observation: &'a Observation,
+    pub(super) object: &'a Arc<Object>,
+    /// The robot, if its state is known too.
+    pub(super) robot: Option<&'a Arc<Robot>>,
+    /// Depth image of the hand alone.
+    pub(super) hand: DepthImage,
+}
+
+impl<'a> Known<'a> {
+    pub(super) fn new(
+        observation: &'a Observation,
+        object: &'a Arc<Object>,
+        robot: Option<&'a Arc<Robot>>,
+    ) -> Self {
+        let robot = robot.filter(|_| observation.hand.is_some());
+        let hand = hand_depth(observation, robot.map(Arc::as_ref));
+        Self { observation, object, robot, hand }
+    }
+
+    /// The terms of `stage`, a prior about `initial` among them.
+    pub(super) fn terms(
+        &self,
+        initial: &State,
+        stage: &Stage,
+        settings: &FusedSettings,
+    ) -> Result<Vec<Box<dyn Term>>, RefineError> {
+        let wanted = |kind| settings.evidence.contains(&kind);
+        let object = || Arc::clone(self.object);
+        let mut terms: Vec<Box<dyn Term>> =
+            vec![Box::new(Prior::new(initial, &settings.accuracy)?)];
+        let colour = stage.colour && wanted(Evidence::Colour);
+        let silhouette = wanted(Evidence::Silhouette);
+        if colour || silhouette {
+            let mut rendering = settings.rendering.clone();
+            rendering.downsample *= stage.downsample;
+            rendering.outlier *= stage.tolerance;
+            rendering.colour = colour;
+            if !silhouette {
+                rendering.mask_sigma = f64::INFINITY;
+            }
+            terms.push(Box::new(RenderingTerm::new(
+                self.observation,
+                object(),
+                &self.hand,
+                rendering,
+            )?));
+        }
+        if wanted(Evidence::Depth) {
+            let mut depth = settings.depth.clone();
+            depth.points = stage.points;
+            depth.outlier *= stage.tolerance;
+            match PointToPlaneTerm::new(self.observation, object(), depth) {
+                Ok(term) => terms.push(Box::new(term)),
+                // Each sense may be absent.
+                Err(RefineError::NoDepth) => {}
+                Err(other) => return Err(other),
+            }
+        }
+        if wanted(Evidence::FreeSpace) {
+            let free = settings.free_space.clone();
+            terms.push(Box::new(FreeSpaceTerm::new(self.observation, object(), free)));
+        }
+        let (Some(robot), Some(hand)) = (self.robot, &self.observation.hand) else {
+            return Ok(terms);
+        };
+        if wanted(Evidence::HandDepth) {
+            let mut depth = settings.hand_depth.clone();
+            depth.points = stage.points / 2;
+            terms.push(Box::new(HandDepthTerm::new(
+                self.observation,
+                Arc::clone(robot),
+                &self.hand,
+                depth,
+            )));
+        }
+        let touch = wanted(Evidence::Touch);
+        let quiet = stage.contact && wanted(Evidence::Quiet);
+        if (touch || quiet) && !hand.forces.is_empty() {
+            let mut tactile = settings.tactile.clone();
+            tactile.outlier *= stage.tolerance;
+            if !touch {
+                tactile.effective_taxels = 0.0;
+            }
+            if !quiet {
+                tactile.quiet_sigma = f64::INFINITY;
+            }
+            let robot = Arc::clone(robot);
+            terms.push(Box::new(TactileTerm::new(self.observation, object(), robot, tactile)?));
+        }
+        if stage.contact && wanted(Evidence::Penetration) {
+            let penetration = settings.penetration.clone();
+            terms.push(Box::new(PenetrationTerm::new(object(), Arc::clone(robot), penetration)));
+        }
+        Ok(terms)
+    }
+}

@@ -1,0 +1,145 @@
+//! The fused estimator: all evidence in one robust nonlinear least-squares problem.
+
+mod confidence;
+mod evidence;
+mod settings;
+mod solve;
+
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+pub use self::confidence::{Confidence, Disagreement, Hypothesis, Unobserved};
+use self::evidence::Known;
+pub use self::settings::{Evidence, FusedSettings, Nuisance, Stage};
+pub use self::solve::Ending;
+use self::solve::{Point, solve};
+use crate::trace::{Iteration, Trace};
+use crate::{Block, Object, Observation, RefineError, Robot, State};
+
+/// Gauss–Newton on all evidence at once, with the quantities that are not known exactly estimated beside the pose.
+///
+/// Terms are negative log-likelihoods, so their sum is that of the posterior, up to a constant. From coarse to fine: small
+/// images and tolerant losses first.
+pub struct Fused {
+    /// Settings.
+    pub settings: FusedSettings,
+}
+
+impl Fused {
+    /// Walks from `initial`, calling `visit` at every pose of the winning hypothesis; ends when that returns false.
+    ///
+    /// # Errors
+    /// If the observation or the settings are at fault.
+    pub fn run(
+        &self,
+        observation: &Observation,
+        object: &Arc<Object>,
+        robot: Option<&Arc<Robot>>,
+        initial: State,
+        mut visit: impl FnMut(&State, &Iteration) -> bool,
+    ) -> Result<(Trace, Confidence), RefineError> {
+        let settings = &self.settings;
+        if settings.stages.is_empty() {
+            return Err(RefineError::Setting { name: "stages", problem: "are missing".into() });
+        }
+        let known = Known::new(observation, object, robot);
+        let blocks = self.blocks(&known, &initial);
+        let mut states = self.starts(&initial);
+        let mut trace = Trace::new(["posterior"].into_iter());
+        let mut found = Vec::new();
+        for (index, stage) in settings.stages.iter().enumerate() {
+            let terms = known.terms(&initial, stage, settings)?;
+            let solve_from = |state: &State| {
+                let start = Point::new(&terms, state.clone(), &blocks);
+                solve(&terms, start, stage.iterations, settings.last_gain, |_| true)
+            };
+            states.truncate(stage.hypotheses.max(1));
+            found = states.par_iter().map(solve_from).collect::<Vec<(Point, Ending)>>();
+            found.sort_by(|a, b| a.0.value.total_cmp(&b.0.value));
+            states = distinct(&found, object.radius);
+            if index == 0
+                && let Some(next) = settings.stages.get(1)
+            {
+                // What geometry alone makes of it may be worse than what it was given.
+                states.truncate(next.hypotheses.saturating_sub(1));
+                states.push(initial.clone());
+                let more = next.hypotheses.saturating_sub(states.len());
+                states.extend(spread(&found[0].0, settings.spread, object.radius, more));
+            }
+            let index = trace.iterations.len();
+            let iteration =
+                Iteration { index, values: vec![found[0].0.value], weights: vec![1.0], step: 0.0 };
+            let go_on = visit(&states[0], &iteration);
+            trace.iterations.push(iteration);
+            if !go_on {
+                break;
+            }
+        }
+        Ok((trace, Confidence::new(&found, settings.covariance_scale, object.radius)))
+    }
+
+    /// What is solved for.
+    fn blocks(&self, known: &Known<'_>, state: &State) -> Vec<Block> {
+        let joints = state.joints.len();
+        let mut blocks = vec![Block::ObjectPose];
+        for nuisance in &self.settings.nuisances {
+            if known.robot.is_some() || *nuisance == Nuisance::Camera {
+                blocks.push(nuisance.block(joints));
+            }
+        }
+        blocks
+    }
+
+    /// The initial state and those it is turned to.
+    fn starts(&self, initial: &State) -> Vec<State> {
+        let mut starts = vec![initial.clone()];
+        let angle = self.settings.turns;
+        if angle > 0.0 {
+            for axis in 0..3 {
+                for turn in [angle, -angle] {
+                    let mut twist = [0.0; 6];
+                    twist[3 + axis] = turn;
+                    starts.push(initial.moved(Block::ObjectPose, &twist));
+                }
+            }
+        }
+        starts
+    }
+}
+
+/// Surface motion between poses that are the same solution \[m\].
+const SAME: f64 = 2e-3;
+
+/// The states of `found`, the best first, without those that came to the same pose.
+fn distinct(found: &[(Point, Ending)], radius: f64) -> Vec<State> {
+    let mut kept: Vec<State> = Vec::new();
+    for (point, _) in found {
+        let centre = point.state.centre();
+        let same = |other: &State| {
+            let turn = point.state.t_cam_object.rotation.angle_to(&other.t_cam_object.rotation);
+            (centre - other.centre()).norm() + radius * turn < SAME
+        };
+        if !kept.iter().any(same) {
+            kept.push(point.state.clone());
+        }
+    }
+    kept
+}
+
+/// At most `count` states away from `point` by multiples of `distance` of surface motion, along the directions in which the
+/// posterior is wider than that, the widest first.
+fn spread(point: &Point, distance: f64, radius: f64, count: usize) -> Vec<State> {
+    let mut states = Vec::new();
+    for (twist, deviation) in confidence::principal_directions(point, radius) {
+        let reach = (1.5 * deviation / distance) as usize;
+        for step in 1..=reach.min(4) {
+            for sign in [1.0, -1.0] {
+                let twist = twist * (sign * distance * step as f64);
+                states.push(point.state.moved(Block::ObjectPose, twist.as_slice()));
+            }
+        }
+    }
+    states.truncate(count);
+    states
+}

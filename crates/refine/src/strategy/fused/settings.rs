@@ -1,0 +1,212 @@
+//! Settings of the fused estimator.
+
+use crate::Block;
+use crate::term::{
+    FreeSpaceSettings, HandDepthSettings, PenetrationSettings, PointToPlaneSettings, PriorSettings,
+    RenderingSettings, TactileSettings,
+};
+
+/// A kind of evidence that the fused estimator weighs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Evidence {
+    /// Colours on the object.
+    Colour,
+    /// The outline of the object's mask.
+    Silhouette,
+    /// Depth on the object.
+    Depth,
+    /// Depth on the hand.
+    HandDepth,
+    /// Depth behind where the object is not.
+    FreeSpace,
+    /// Taxels that feel a force.
+    Touch,
+    /// Taxels that feel none.
+    Quiet,
+    /// Hand and object are not in the same place.
+    Penetration,
+}
+
+impl Evidence {
+    /// All kinds.
+    pub const ALL: [Self; 8] = [
+        Self::Colour,
+        Self::Silhouette,
+        Self::Depth,
+        Self::HandDepth,
+        Self::FreeSpace,
+        Self::Touch,
+        Self::Quiet,
+        Self::Penetration,
+    ];
+
+    /// The name used in reports and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Colour => "colour",
+            Self::Silhouette => "silhouette",
+            Self::Depth => "depth",
+            Self::HandDepth => "hand-depth",
+            Self::FreeSpace => "free-space",
+            Self::Touch => "touch",
+            Self::Quiet => "quiet",
+            Self::Penetration => "penetration",
+        }
+    }
+}
+
+/// A group of quantities that are estimated beside the pose because they are not known exactly.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Nuisance {
+    /// The hand's pose in the camera frame.
+    HandPose,
+    /// The hand's joint positions.
+    Joints,
+    /// Depth scale and bias, centre of projection and size of images.
+    Camera,
+}
+
+impl Nuisance {
+    /// All groups.
+    pub const ALL: [Self; 3] = [Self::HandPose, Self::Joints, Self::Camera];
+
+    /// The name used in reports and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::HandPose => "hand-pose",
+            Self::Joints => "joints",
+            Self::Camera => "camera",
+        }
+    }
+
+    /// Its block for a hand of `joints` joints.
+    pub(super) fn block(self, joints: usize) -> Block {
+        match self {
+            Self::HandPose => Block::HandPose,
+            Self::Joints => Block::Joints(joints),
+            Self::Camera => Block::Camera,
+        }
+    }
+}
+
+/// One level of the way from coarse to fine.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stage {
+    /// Images are made smaller by this factor.
+    pub downsample: usize,
+    /// Depth points used at most.
+    pub points: usize,
+    /// Distances and colour differences count as outliers only from so many times their final limits on.
+    pub tolerance: f64,
+    /// Iterations at most.
+    pub iterations: usize,
+    /// How many of the best hypotheses the stage takes up.
+    pub hypotheses: usize,
+    /// Whether colours are compared, which have many minima.
+    pub colour: bool,
+    /// Whether hand and object may not be in the same place, which bars ways that lead through the hand.
+    pub contact: bool,
+}
+
+/// Settings of [`Fused`](super::Fused).
+#[derive(Clone, Debug, PartialEq)]
+pub struct FusedSettings {
+    /// Evidence to use, where the observation brings it.
+    pub evidence: Vec<Evidence>,
+    /// What is estimated beside the pose; the rest is believed as it is said to be.
+    pub nuisances: Vec<Nuisance>,
+    /// Stated accuracies.
+    pub accuracy: PriorSettings,
+    /// From coarse to fine.
+    pub stages: Vec<Stage>,
+    /// Angle of the turns about three axes, both ways, that hypotheses start with beside the initial pose \[rad\]; zero for
+    /// none.
+    pub turns: f64,
+    /// Where the first stage leaves the pose open, further hypotheses are tried at this distance \[m of surface motion\].
+    pub spread: f64,
+    /// A stage ends when its next step promises less than so many nats.
+    pub last_gain: f64,
+    /// What the covariance of the posterior is multiplied by, to be as large as errors are.
+    pub covariance_scale: f64,
+    /// Colour and silhouette.
+    pub rendering: RenderingSettings,
+    /// Depth on the object.
+    pub depth: PointToPlaneSettings,
+    /// Depth on the hand.
+    pub hand_depth: HandDepthSettings,
+    /// Free space.
+    pub free_space: FreeSpaceSettings,
+    /// Taxels.
+    pub tactile: TactileSettings,
+    /// Non-penetration.
+    pub penetration: PenetrationSettings,
+}
+
+impl Default for FusedSettings {
+    fn default() -> Self {
+        Self {
+            evidence: Evidence::ALL.to_vec(),
+            nuisances: Nuisance::ALL.to_vec(),
+            accuracy: PriorSettings::default(),
+            stages: vec![
+                Stage {
+                    downsample: 4,
+                    points: 200,
+                    tolerance: 8.0,
+                    iterations: 10,
+                    hypotheses: 7,
+                    colour: false,
+                    contact: false,
+                },
+                Stage {
+                    downsample: 4,
+                    points: 250,
+                    tolerance: 4.0,
+                    iterations: 8,
+                    hypotheses: 8,
+                    colour: true,
+                    contact: true,
+                },
+                Stage {
+                    downsample: 4,
+                    points: 600,
+                    tolerance: 2.0,
+                    iterations: 8,
+                    hypotheses: 3,
+                    colour: true,
+                    contact: true,
+                },
+                Stage {
+                    downsample: 2,
+                    points: 1200,
+                    tolerance: 1.0,
+                    iterations: 10,
+                    hypotheses: 1,
+                    colour: true,
+                    contact: true,
+                },
+            ],
+            turns: 20f64.to_radians(),
+            spread: 10e-3,
+            last_gain: 0.02,
+            covariance_scale: 1.0,
+            rendering: RenderingSettings {
+                downsample: 1,
+                effective_pixels: 50.0,
+                mask_sigma: 0.6,
+                ..RenderingSettings::default()
+            },
+            depth: PointToPlaneSettings {
+                effective_points: 20.0,
+                ..PointToPlaneSettings::default()
+            },
+            hand_depth: HandDepthSettings {
+                effective_points: 200.0,
+                ..HandDepthSettings::default()
+            },
+            free_space: FreeSpaceSettings::default(),
+            tactile: TactileSettings { standoff: 1.5e-3, ..TactileSettings::default() },
+            penetration: PenetrationSettings::default(),
+        }
+    }
+}

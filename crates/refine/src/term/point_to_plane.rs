@@ -1,0 +1,215 @@
+//! Depth points on the planes of the surface nearest to them.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use nalgebra::{SMatrix, SVector, Vector2, Vector3};
+use rayon::prelude::*;
+
+use super::Term;
+use super::depth::masked_depths;
+use crate::{Block, Cauchy, Normal, Object, Observation, RefineError, State};
+
+/// Settings of [`PointToPlaneTerm`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct PointToPlaneSettings {
+    /// Depth points used at most, spread evenly over the mask.
+    pub points: usize,
+    /// Standard deviation of a depth point from the surface \[m\].
+    pub sigma: f64,
+    /// Distance at which a point counts as an outlier \[m\].
+    pub outlier: f64,
+    /// How many independent measurements the points amount to at most: errors of neighbours are alike.
+    pub effective_points: f64,
+}
+
+impl Default for PointToPlaneSettings {
+    fn default() -> Self {
+        Self { points: 1000, sigma: 1e-3, outlier: 4e-3, effective_points: 60.0 }
+    }
+}
+
+/// Distances from the masked depth points to the planes that touch the surface where it is nearest to them (Chen and
+/// Medioni, 1992), where the points are as the state corrects the camera ([`CameraCorrection`](crate::CameraCorrection)).
+///
+/// A depth point is not of a face that looks away from the camera: such a match counts as it is far, and pulls nothing.
+pub struct PointToPlaneTerm {
+    object: Arc<Object>,
+    points: Vec<Point>,
+    settings: PointToPlaneSettings,
+}
+
+/// A depth point.
+struct Point {
+    /// Its direction, (x/z, y/z).
+    ray: Vector2<f64>,
+    /// Its depth as measured \[m\].
+    depth: f64,
+    /// The face that was nearest last: where a search begins changes how long it takes, not what it finds.
+    face: AtomicU32,
+}
+
+/// Parameters of the object's pose and the camera together.
+const N: usize = 11;
+
+/// Points that one task takes.
+const CHUNK: usize = 64;
+
+impl PointToPlaneTerm {
+    /// Takes the masked depth of `observation`.
+    ///
+    /// # Errors
+    /// If no pixel of the mask has a depth.
+    pub fn new(
+        observation: &Observation,
+        object: Arc<Object>,
+        settings: PointToPlaneSettings,
+    ) -> Result<Self, RefineError> {
+        let camera = &observation.camera;
+        let point = |(x, y, depth): (usize, usize, f64)| Point {
+            ray: camera.unproject(x as f64, y as f64, 1.0).coords.xy(),
+            depth,
+            face: AtomicU32::new(u32::MAX),
+        };
+        let points = masked_depths(observation, settings.points)?.into_iter().map(point).collect();
+        Ok(Self { object, points, settings })
+    }
+
+    /// Sum over the points of `f` of each one's signed distance \[m\], whether it can be of the face, the nearest place of
+    /// the surface and the outward direction from there to the point (camera frame).
+    fn sum<A: Sums>(
+        &self,
+        state: &State,
+        f: impl Fn(&mut A, &Point, f64, bool, Vector3<f64>, Vector3<f64>) + Sync,
+    ) -> A {
+        let t_object_cam = state.t_cam_object.inverse();
+        let sums: Vec<A> = self
+            .points
+            .par_chunks(CHUNK)
+            .map(|chunk| {
+                let mut sums = A::default();
+                for point in chunk {
+                    let place = state.camera.point(&point.ray, point.depth);
+                    let (query, face) = (t_object_cam * place, point.face.load(Ordering::Relaxed));
+                    let closest = self.object.surface.closest_from(&query, f64::INFINITY, face);
+                    let Some(closest) = closest else { continue };
+                    point.face.store(closest.face, Ordering::Relaxed);
+                    let normal = state.t_cam_object * self.object.normals[closest.face as usize];
+                    let surface = (state.t_cam_object * closest.point).coords;
+                    let offset = place.coords - surface;
+                    let distance = offset.norm().copysign(normal.dot(&offset));
+                    let faces_camera = normal.dot(&surface) < 0.0;
+                    let away = if distance.abs() > 1e-9 { offset / distance } else { normal };
+                    f(&mut sums, point, distance, faces_camera, surface, away);
+                }
+                sums
+            })
+            .collect();
+        // In order, so that the sum does not depend on the threads.
+        sums.into_iter().fold(A::default(), A::joined)
+    }
+
+    /// Nats of one square metre.
+    fn share(&self) -> f64 {
+        let count = self.points.len() as f64;
+        (self.settings.effective_points / count).min(1.0) / self.settings.sigma.powi(2)
+    }
+}
+
+/// What is summed up.
+trait Sums: Default + Send {
+    fn joined(self, other: Self) -> Self;
+}
+
+impl Sums for f64 {
+    fn joined(self, other: Self) -> Self {
+        self + other
+    }
+}
+
+#[derive(Default)]
+struct Equations {
+    value: f64,
+    gradient: SVector<f64, N>,
+    hessian: SMatrix<f64, N, N>,
+}
+
+impl Sums for Equations {
+    fn joined(self, other: Self) -> Self {
+        Self {
+            value: self.value + other.value,
+            gradient: self.gradient + other.gradient,
+            hessian: self.hessian + other.hessian,
+        }
+    }
+}
+
+impl Term for PointToPlaneTerm {
+    fn name(&self) -> &'static str {
+        "depth"
+    }
+
+    fn value(&self, state: &State) -> f64 {
+        let cauchy = Cauchy { scale: self.settings.outlier };
+        self.share()
+            * self.sum(state, |sum: &mut f64, _, distance, _, _, _| {
+                *sum += cauchy.loss(distance * distance);
+            })
+    }
+
+    fn linearise(&self, state: &State, normal: &mut Normal) -> f64 {
+        let cauchy = Cauchy { scale: self.settings.outlier };
+        let centre = state.centre();
+        let all = self.sum(state, |sum: &mut Equations, point, distance, faces, surface, n| {
+            sum.value += cauchy.loss(distance * distance);
+            if !faces {
+                return;
+            }
+            let turn = (surface - centre).cross(&n);
+            let camera = state.camera.point_jacobian(&point.ray, point.depth).tr_mul(&n);
+            let mut row = SVector::<f64, N>::zeros();
+            row.fixed_rows_mut::<3>(0).copy_from(&-n);
+            row.fixed_rows_mut::<3>(3).copy_from(&-turn);
+            row.fixed_rows_mut::<5>(6).copy_from(&camera);
+            let weight = cauchy.weight(distance * distance);
+            sum.gradient.axpy(weight * distance, &row, 1.0);
+            sum.hessian.ger(weight, &row, &row, 1.0);
+        });
+        let share = self.share();
+        let blocks = [Block::ObjectPose, Block::Camera];
+        normal.add(&blocks, &(all.gradient * share), &(all.hessian * share));
+        all.value * share
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::gradient_check::{assert_gradient, fixture};
+    use super::*;
+
+    #[test]
+    fn gradients_match_differences() {
+        for seed in 0..3 {
+            let (scene, mut state, _) = fixture(seed);
+            state.camera = state.camera.changed(&[2e-3, 1e-3, 1e-3, -1e-3, 2e-3]);
+            let object = Arc::clone(&scene.object);
+            let term =
+                PointToPlaneTerm::new(&scene.observation, object, PointToPlaneSettings::default());
+            for block in [Block::ObjectPose, Block::Camera] {
+                // So short a step that hardly any point changes its face.
+                assert_gradient(term.as_ref().unwrap(), &state, block, 1e-8, 5e-3);
+            }
+        }
+    }
+
+    #[test]
+    fn the_truth_is_near_the_minimum() {
+        let (scene, state, _) = fixture(0);
+        let object = Arc::clone(&scene.object);
+        let term =
+            PointToPlaneTerm::new(&scene.observation, object, PointToPlaneSettings::default())
+                .unwrap();
+        let truth = State { t_cam_object: scene.truth, ..state.clone() };
+        assert!(term.value(&truth) < 0.3 * term.value(&state));
+    }
+}
