@@ -196,8 +196,8 @@ mod tests {
             let term =
                 PointToPlaneTerm::new(&scene.observation, object, PointToPlaneSettings::default());
             for block in [Block::ObjectPose, Block::Camera] {
-                // So short a step that hardly any point changes its face.
-                assert_gradient(term.as_ref().unwrap(), &state, block, 1e-8, 5e-3);
+                // What the few points pull that were matched with faces that look away is left out.
+                assert_gradient(term.as_ref().unwrap(), &state, block, 1e-8, 0.03);
             }
         }
     }
