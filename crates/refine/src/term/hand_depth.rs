@@ -50,26 +50,33 @@ impl HandDepthTerm {
         hand: &DepthImage,
         settings: HandDepthSettings,
     ) -> Self {
-        let (depth, mask, camera) = (&observation.depth, &observation.mask, &observation.camera);
-        let masked = |x: usize, y: usize| mask.get(x, y).unwrap_or(false);
-        let at = |x: usize, y: usize| {
-            let (measured, known) = (f64::from(depth.get(x, y)?), f64::from(hand.get(x, y)?));
-            // Around the mask's outline the object may be what is seen.
-            let near =
-                [(0, 0), (MARGIN, 0), (0, MARGIN), (2 * MARGIN, MARGIN), (MARGIN, 2 * MARGIN)];
-            let of_object = near.iter().any(|(dx, dy)| {
-                masked((x + dx).saturating_sub(MARGIN), (y + dy).saturating_sub(MARGIN))
-            });
-            let of_hand =
-                measured > 0.0 && known > 0.0 && (measured - known).abs() < settings.reach;
-            (of_hand && !of_object && !masked(x, y))
-                .then(|| (camera.unproject(x as f64, y as f64, 1.0).coords.xy(), measured))
+        let (depth, camera) = (&observation.depth, &observation.camera);
+        let mask = observation.mask.pixels();
+        let width = depth.width();
+        let on_hand: Vec<usize> = (depth.pixels().iter().zip(hand.pixels()).enumerate())
+            .filter(|(_, (measured, known))| {
+                **measured > 0.0
+                    && **known > 0.0
+                    && f64::from(**measured - **known).abs() < settings.reach
+            })
+            .map(|(pixel, _)| pixel)
+            .collect();
+        // Around the mask's outline the object may be what is seen.
+        let of_object = |pixel: usize| {
+            let near = [0, MARGIN, MARGIN * width];
+            near.iter().any(|step| {
+                let (before, after) = (pixel.checked_sub(*step), mask.get(pixel + step));
+                before.is_some_and(|p| mask[p]) || after.is_some_and(|m| *m)
+            })
         };
-        let (width, height) = (depth.width(), depth.height());
-        let all: Vec<_> =
-            (0..height).flat_map(|y| (0..width).filter_map(move |x| at(x, y))).collect();
-        let step = all.len().div_ceil(settings.points.max(1)).max(1);
-        Self { robot, points: all.into_iter().step_by(step).collect(), settings }
+        let of_hand: Vec<usize> = on_hand.into_iter().filter(|p| !of_object(*p)).collect();
+        let step = of_hand.len().div_ceil(settings.points.max(1)).max(1);
+        let point = |&pixel: &usize| {
+            let (x, y) = ((pixel % width) as f64, (pixel / width) as f64);
+            (camera.unproject(x, y, 1.0).coords.xy(), f64::from(depth.pixels()[pixel]))
+        };
+        let points = of_hand.iter().step_by(step).map(point).collect();
+        Self { robot, points, settings }
     }
 
     /// Each point that is near the hand with what is known of its distance.

@@ -16,7 +16,7 @@ pub use free_space::{FreeSpaceSettings, FreeSpaceTerm};
 pub use hand_depth::{HandDepthSettings, HandDepthTerm};
 pub use penetration::{PenetrationSettings, PenetrationTerm};
 pub use physics::{PhysicsSettings, PhysicsTerm};
-pub use point_to_plane::{PointToPlaneSettings, PointToPlaneTerm};
+pub use point_to_plane::{PointToPlaneSettings, PointToPlaneTerm, Scatter};
 pub use prior::{Prior, PriorSettings};
 pub use rendering::{RenderingSettings, RenderingTerm};
 pub use tactile::{TactileSettings, TactileTerm};

@@ -39,8 +39,19 @@ pub struct PointToPlaneTerm {
     settings: PointToPlaneSettings,
 }
 
+/// How depth points scatter about a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scatter {
+    /// Standard deviation of a point \[m\].
+    pub sigma: f64,
+    /// How many independent measurements the points amount to.
+    pub effective_points: f64,
+}
+
 /// A depth point.
 struct Point {
+    /// Its column and row.
+    pixel: (usize, usize),
     /// Its direction, (x/z, y/z).
     ray: Vector2<f64>,
     /// Its depth as measured \[m\].
@@ -51,6 +62,23 @@ struct Point {
 
 /// Parameters of the object's pose and the camera together.
 const N: usize = 11;
+
+/// Patches that the mask's bounding box is cut into, about, to judge how alike the errors of neighbours are.
+const PATCHES: f64 = 36.0;
+
+/// Number, sum and sum of squares of the residuals in each patch.
+#[derive(Default)]
+struct Patches(Vec<(f64, f64, f64)>);
+
+impl Sums for Patches {
+    fn joined(mut self, other: Self) -> Self {
+        self.0.resize(self.0.len().max(other.0.len()), (0.0, 0.0, 0.0));
+        for (mine, theirs) in self.0.iter_mut().zip(other.0) {
+            *mine = (mine.0 + theirs.0, mine.1 + theirs.1, mine.2 + theirs.2);
+        }
+        self
+    }
+}
 
 /// Points that one task takes.
 const CHUNK: usize = 64;
@@ -67,6 +95,7 @@ impl PointToPlaneTerm {
     ) -> Result<Self, RefineError> {
         let camera = &observation.camera;
         let point = |(x, y, depth): (usize, usize, f64)| Point {
+            pixel: (x, y),
             ray: camera.unproject(x as f64, y as f64, 1.0).coords.xy(),
             depth,
             face: AtomicU32::new(u32::MAX),
@@ -107,6 +136,51 @@ impl PointToPlaneTerm {
             .collect();
         // In order, so that the sum does not depend on the threads.
         sums.into_iter().fold(A::default(), A::joined)
+    }
+
+    /// How the points scatter about the surface at `state`, which should be the best there is.
+    ///
+    /// Where errors are alike within patches, their means scatter more than means of independent errors would: so many patches as
+    /// there are, and as many measurements a patch as the variance of the means is smaller than that of the points.
+    pub fn scatter(&self, state: &State) -> Scatter {
+        let count = self.points.len() as f64;
+        let (columns, rows) = self.points.iter().fold(
+            ((usize::MAX, 0), (usize::MAX, 0)),
+            |((left, right), (top, bottom)), p| {
+                let (x, y) = p.pixel;
+                ((left.min(x), right.max(x)), (top.min(y), bottom.max(y)))
+            },
+        );
+        let area = ((columns.1 - columns.0 + 1) * (rows.1 - rows.0 + 1)) as f64;
+        let side = (area / PATCHES).sqrt().max(1.0);
+        let across = ((columns.1 - columns.0) as f64 / side) as usize + 1;
+        let down = ((rows.1 - rows.0) as f64 / side) as usize + 1;
+        let limit = self.settings.outlier;
+        let sums = self.sum(state, |sums: &mut Patches, point, distance, faces, _, _| {
+            if faces {
+                let column = ((point.pixel.0 - columns.0) as f64 / side) as usize;
+                let row = ((point.pixel.1 - rows.0) as f64 / side) as usize;
+                sums.0.resize(across * down, (0.0, 0.0, 0.0));
+                let patch = &mut sums.0[row * across + column];
+                let residual = distance.clamp(-limit, limit);
+                patch.0 += 1.0;
+                patch.1 += residual;
+                patch.2 += residual * residual;
+            }
+        });
+        let patches: Vec<_> = sums.0.into_iter().filter(|(n, _, _)| *n >= 3.0).collect();
+        let total: f64 = patches.iter().map(|(n, _, _)| n).sum();
+        let of_means: f64 = patches.iter().map(|(n, sum, _)| sum * sum / n).sum::<f64>() / total;
+        let of_points: f64 = patches.iter().map(|(_, _, squares)| squares).sum::<f64>() / total;
+        if !(of_means > 0.0 && patches.len() >= 6) {
+            let PointToPlaneSettings { sigma, effective_points, .. } = self.settings;
+            return Scatter { sigma, effective_points };
+        }
+        let number = patches.len() as f64;
+        Scatter {
+            sigma: of_points.sqrt(),
+            effective_points: (number * of_points / of_means).clamp(number.min(count), count),
+        }
     }
 
     /// Nats of one square metre.

@@ -40,9 +40,9 @@ impl Default for PriorSettings {
             hand_translation: 2.5e-3,
             hand_rotation: 8e-3,
             joints: 0.014,
-            depth_scale: 5e-3,
+            depth_scale: 4e-3,
             depth_bias: 1e-3,
-            shift: 3.4e-3,
+            shift: 1.7e-3,
             magnification: 4e-3,
         }
     }

@@ -63,6 +63,8 @@ pub struct RenderingTerm {
     /// Nats per unit of the renderer's loss.
     scale: f64,
     light_ridge: f64,
+    /// Whether colours are compared.
+    colour: bool,
 }
 
 impl RenderingTerm {
@@ -102,6 +104,7 @@ impl RenderingTerm {
             ),
             scale: 0.5 * settings.effective_pixels / (sigma * sigma),
             light_ridge: settings.light_ridge,
+            colour: settings.colour,
         })
     }
 }
@@ -144,6 +147,9 @@ impl Term for RenderingTerm {
     }
 
     fn refresh(&self, state: &mut State) {
+        if !self.colour {
+            return;
+        }
         let (model, pose) = (&self.object.model, apparent(state));
         let mut samples = light_samples(model, &pose, &self.target, HALF_WIDTH);
         // Four unknowns a channel do not need every pixel.

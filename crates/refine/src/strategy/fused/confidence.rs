@@ -55,6 +55,15 @@ pub struct Confidence {
     centre: Vector3<f64>,
 }
 
+/// What makes posteriors as wide as errors are.
+#[derive(Clone, Copy)]
+pub(super) struct Width {
+    /// What covariances are multiplied by.
+    pub(super) scale: f64,
+    /// How far the object's surface may be from the model's \[m\].
+    pub(super) model_tolerance: f64,
+}
+
 /// Random poses that stand for the posterior.
 const SAMPLES: usize = 512;
 
@@ -65,11 +74,18 @@ const UNOBSERVED: f64 = 8e-3;
 const DISAGREES: f64 = 5.0;
 
 impl Confidence {
-    /// Of the solutions `found`, the best first; `inflation` multiplies covariances, `radius` turns radians into metres.
-    pub(super) fn new(found: &[(Point, Ending)], inflation: f64, radius: f64) -> Self {
+    /// Of the solutions `found`, the best first; `radius` turns radians into metres of surface motion.
+    pub(super) fn new(found: &[(Point, Ending)], width: Width, radius: f64) -> Self {
         let (best, ending) = &found[0];
+        // Half the radius is about where the surface is, on average.
+        let turn = (2.0 * width.model_tolerance / radius).powi(2);
+        let more = Matrix6::from_diagonal(&Vector6::new(0.0, 0.0, 0.0, turn, turn, turn));
+        let covariance = |point: &Point| {
+            let (covariance, determinant) = laplace(point, width.scale);
+            (covariance + more, determinant)
+        };
         let covariances: Vec<(Matrix6<f64>, f64)> =
-            found.iter().map(|(point, _)| laplace(point, inflation)).collect();
+            found.iter().map(|(point, _)| covariance(point)).collect();
         // Laplace: the mass of a mode is its height times its volume.
         let logarithm = |k: usize| 0.5 * covariances[k].1 - found[k].0.value;
         let first = (0..found.len()).map(logarithm).fold(f64::NEG_INFINITY, f64::max);

@@ -7,10 +7,13 @@ use prehend_render::DepthImage;
 use super::settings::{Evidence, FusedSettings, Stage};
 use crate::refine::hand_depth;
 use crate::term::{
-    FreeSpaceTerm, HandDepthTerm, PenetrationTerm, PointToPlaneTerm, Prior, RenderingTerm,
-    TactileTerm, Term,
+    FreeSpaceTerm, HandDepthTerm, PenetrationTerm, PointToPlaneSettings, PointToPlaneTerm, Prior,
+    RenderingTerm, Scatter, TactileTerm, Term,
 };
 use crate::{Object, Observation, RefineError, Robot, State};
+
+/// Depth points that their scatter is judged by.
+const SCATTERED: usize = 1200;
 
 /// What is known of one frame.
 pub(super) struct Known<'a> {
@@ -31,6 +34,13 @@ impl<'a> Known<'a> {
         let robot = robot.filter(|_| observation.hand.is_some());
         let hand = hand_depth(observation, robot.map(Arc::as_ref));
         Self { observation, object, robot, hand }
+    }
+
+    /// How depth points scatter about the object at `state`; `None` without depth.
+    pub(super) fn scatter(&self, state: &State, settings: &FusedSettings) -> Option<Scatter> {
+        let depth = PointToPlaneSettings { points: SCATTERED, ..settings.depth.clone() };
+        let term = PointToPlaneTerm::new(self.observation, Arc::clone(self.object), depth).ok()?;
+        Some(term.scatter(state))
     }
 
     /// The terms of `stage`, a prior about `initial` among them.
@@ -81,7 +91,7 @@ impl<'a> Known<'a> {
         };
         if wanted(Evidence::HandDepth) {
             let mut depth = settings.hand_depth.clone();
-            depth.points = stage.points / 2;
+            depth.points = stage.points / 3;
             terms.push(Box::new(HandDepthTerm::new(
                 self.observation,
                 Arc::clone(robot),

@@ -2,13 +2,16 @@
 
 mod confidence;
 mod evidence;
+mod exactness;
 mod settings;
 mod solve;
 
 use std::sync::Arc;
 
+use nalgebra::Translation3;
 use rayon::prelude::*;
 
+use self::confidence::Width;
 pub use self::confidence::{Confidence, Disagreement, Hypothesis, Unobserved};
 use self::evidence::Known;
 pub use self::settings::{Evidence, FusedSettings, Nuisance, Stage};
@@ -39,7 +42,7 @@ impl Fused {
         initial: State,
         mut visit: impl FnMut(&State, &Iteration) -> bool,
     ) -> Result<(Trace, Confidence), RefineError> {
-        let settings = &self.settings;
+        let mut settings = self.settings.clone();
         if settings.stages.is_empty() {
             return Err(RefineError::Setting { name: "stages", problem: "are missing".into() });
         }
@@ -48,11 +51,26 @@ impl Fused {
         let mut states = self.starts(&initial);
         let mut trace = Trace::new(["posterior"].into_iter());
         let mut found = Vec::new();
-        for (index, stage) in settings.stages.iter().enumerate() {
-            let terms = known.terms(&initial, stage, settings)?;
+        let mut step = |point: &Point, trace: &mut Trace| {
+            let index = trace.iterations.len();
+            let values = vec![point.value];
+            let iteration = Iteration { index, values, weights: vec![1.0], step: 0.0 };
+            let go_on = visit(&point.state, &iteration);
+            trace.iterations.push(iteration);
+            go_on
+        };
+        for (index, stage) in self.settings.stages.iter().enumerate() {
+            if stage.measured_scatter
+                && let Some(scatter) = known.scatter(&states[0], &self.settings)
+            {
+                settings.depth.sigma = scatter.sigma.clamp(FINEST, COARSEST);
+                settings.depth.effective_points =
+                    scatter.effective_points.min(settings.most_points);
+            }
+            let terms = known.terms(&initial, stage, &settings)?;
             let solve_from = |state: &State| {
                 let start = Point::new(&terms, state.clone(), &blocks);
-                solve(&terms, start, stage.iterations, settings.last_gain, |_| true)
+                solve(&terms, start, stage.iterations, stage.last_gain, |_| true)
             };
             states.truncate(stage.hypotheses.max(1));
             found = states.par_iter().map(solve_from).collect::<Vec<(Point, Ending)>>();
@@ -61,22 +79,46 @@ impl Fused {
             if index == 0
                 && let Some(next) = settings.stages.get(1)
             {
-                // What geometry alone makes of it may be worse than what it was given.
-                states.truncate(next.hypotheses.saturating_sub(1));
-                states.push(initial.clone());
+                // Where it is, geometry finds well; how it is turned, colours may say better from where they were told. And
+                // what little is seen of the object may have led astray.
+                states.truncate(next.hypotheses.saturating_sub(2));
+                let mut turned_back = states[0].clone();
+                let moved = states[0].centre() - initial.centre();
+                turned_back.t_cam_object = Translation3::from(moved) * initial.t_cam_object;
+                states.extend([turned_back, initial.clone()]);
                 let more = next.hypotheses.saturating_sub(states.len());
                 states.extend(spread(&found[0].0, settings.spread, object.radius, more));
             }
-            let index = trace.iterations.len();
-            let iteration =
-                Iteration { index, values: vec![found[0].0.value], weights: vec![1.0], step: 0.0 };
-            let go_on = visit(&states[0], &iteration);
-            trace.iterations.push(iteration);
-            if !go_on {
+            if !step(&found[0].0, &mut trace) {
                 break;
             }
         }
-        Ok((trace, Confidence::new(&found, settings.covariance_scale, object.radius)))
+        let mut exact = false;
+        if settings.exactness && blocks.len() > 1 {
+            let last = &self.settings.stages[self.settings.stages.len() - 1];
+            let terms = known.terms(&initial, last, &settings)?;
+            let point = Point::new(&terms, found[0].0.state.clone(), &blocks);
+            let (iterations, last_gain) = (last.iterations, last.last_gain);
+            let odds = exactness::exact(&terms, &point, &initial, iterations, last_gain);
+            if let Some((odds, (point, _))) = odds
+                && odds > 0.0
+            {
+                // Then depth's errors are not alike over whole patches either.
+                if let Some(scatter) = known.scatter(&point.state, &self.settings) {
+                    settings.depth.effective_points = scatter.effective_points;
+                }
+                let terms = known.terms(&initial, last, &settings)?;
+                let start = Point::new(&terms, point.state, &[Block::ObjectPose]);
+                found = vec![solve(&terms, start, iterations, last_gain, |_| true)];
+                step(&found[0].0, &mut trace);
+                exact = true;
+            }
+        }
+        let width = Width {
+            scale: settings.covariance_scale,
+            model_tolerance: if exact { 0.0 } else { settings.model_tolerance },
+        };
+        Ok((trace, Confidence::new(&found, width, object.radius)))
     }
 
     /// What is solved for.
@@ -107,6 +149,10 @@ impl Fused {
         starts
     }
 }
+
+/// Standard deviations of depth points that are believed when measured \[m\].
+const FINEST: f64 = 2e-4;
+const COARSEST: f64 = 3e-3;
 
 /// Surface motion between poses that are the same solution \[m\].
 const SAME: f64 = 2e-3;

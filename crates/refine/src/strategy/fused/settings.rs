@@ -100,10 +100,14 @@ pub struct Stage {
     pub tolerance: f64,
     /// Iterations at most.
     pub iterations: usize,
+    /// The stage ends when the next step promises less than so many nats.
+    pub last_gain: f64,
     /// How many of the best hypotheses the stage takes up.
     pub hypotheses: usize,
     /// Whether colours are compared, which have many minima.
     pub colour: bool,
+    /// Whether the scatter of depth points about the best solution so far says how much depth is to be trusted.
+    pub measured_scatter: bool,
     /// Whether hand and object may not be in the same place, which bars ways that lead through the hand.
     pub contact: bool,
 }
@@ -124,10 +128,14 @@ pub struct FusedSettings {
     pub turns: f64,
     /// Where the first stage leaves the pose open, further hypotheses are tried at this distance \[m of surface motion\].
     pub spread: f64,
-    /// A stage ends when its next step promises less than so many nats.
-    pub last_gain: f64,
+    /// Whether to ask the evidence if calibrations are exact.
+    pub exactness: bool,
+    /// Independent measurements that depth points amount to at most, if calibrations are not exact.
+    pub most_points: f64,
     /// What the covariance of the posterior is multiplied by, to be as large as errors are.
     pub covariance_scale: f64,
+    /// How far the object's surface may be from the model's \[m\]: a model that is off so much is as good as turned.
+    pub model_tolerance: f64,
     /// Colour and silhouette.
     pub rendering: RenderingSettings,
     /// Depth on the object.
@@ -154,8 +162,10 @@ impl Default for FusedSettings {
                     points: 200,
                     tolerance: 8.0,
                     iterations: 10,
+                    last_gain: 1.0,
                     hypotheses: 7,
                     colour: false,
+                    measured_scatter: false,
                     contact: false,
                 },
                 Stage {
@@ -163,8 +173,10 @@ impl Default for FusedSettings {
                     points: 250,
                     tolerance: 4.0,
                     iterations: 8,
+                    last_gain: 0.3,
                     hypotheses: 8,
                     colour: true,
+                    measured_scatter: false,
                     contact: true,
                 },
                 Stage {
@@ -172,8 +184,10 @@ impl Default for FusedSettings {
                     points: 600,
                     tolerance: 2.0,
                     iterations: 8,
+                    last_gain: 0.1,
                     hypotheses: 3,
                     colour: true,
+                    measured_scatter: true,
                     contact: true,
                 },
                 Stage {
@@ -181,15 +195,19 @@ impl Default for FusedSettings {
                     points: 1200,
                     tolerance: 1.0,
                     iterations: 10,
+                    last_gain: 0.02,
                     hypotheses: 1,
                     colour: true,
+                    measured_scatter: true,
                     contact: true,
                 },
             ],
             turns: 20f64.to_radians(),
             spread: 10e-3,
-            last_gain: 0.02,
+            exactness: true,
+            most_points: 20.0,
             covariance_scale: 1.0,
+            model_tolerance: 7e-4,
             rendering: RenderingSettings {
                 downsample: 1,
                 effective_pixels: 50.0,

@@ -36,7 +36,7 @@ impl CalibrationSettings {
     pub(super) fn realistic() -> Self {
         Self {
             focal: 3e-3,
-            principal_px: 2.0,
+            principal_px: 1.0,
             hand_translation: 2e-3,
             hand_rotation_deg: 0.4,
             joint_deg: 0.8,
