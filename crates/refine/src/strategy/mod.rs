@@ -8,8 +8,8 @@ mod step;
 mod walk;
 
 pub use fused::{
-    Confidence, Disagreement, Ending, Evidence, Fused, FusedSettings, Hypothesis, Nuisance, Stage,
-    Unobserved,
+    Confidence, ConfidenceSummary, Disagreement, Ending, Evidence, Fused, FusedSettings,
+    Hypothesis, Nuisance, Stage, Unobserved,
 };
 pub use heuristic::{Heuristic, HeuristicSettings};
 pub use icp::{Icp, IcpSettings};

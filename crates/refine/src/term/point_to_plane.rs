@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use nalgebra::{SMatrix, SVector, Vector2, Vector3};
+use prehend_render::DepthImage;
 use rayon::prelude::*;
 
 use super::Term;
@@ -80,17 +81,22 @@ impl Sums for Patches {
     }
 }
 
+/// How far in front of the hand a point must be to be of something else \[m\].
+const IN_FRONT: f64 = 6e-3;
+
 /// Points that one task takes.
 const CHUNK: usize = 64;
 
 impl PointToPlaneTerm {
-    /// Takes the masked depth of `observation`.
+    /// Takes the masked depth of `observation`; `hand` is the depth image of the hand alone, where masks may have leaked
+    /// onto it.
     ///
     /// # Errors
-    /// If no pixel of the mask has a depth.
+    /// If no pixel of the mask, beside the hand, has a depth.
     pub fn new(
         observation: &Observation,
         object: Arc<Object>,
+        hand: &DepthImage,
         settings: PointToPlaneSettings,
     ) -> Result<Self, RefineError> {
         let camera = &observation.camera;
@@ -100,7 +106,15 @@ impl PointToPlaneTerm {
             depth,
             face: AtomicU32::new(u32::MAX),
         };
-        let points = masked_depths(observation, settings.points)?.into_iter().map(point).collect();
+        let of_object = |&(x, y, depth): &(usize, usize, f64)| {
+            let hand = hand.get(x, y).map_or(0.0, f64::from);
+            hand == 0.0 || depth < hand - IN_FRONT
+        };
+        let depths = masked_depths(observation, settings.points)?;
+        let points: Vec<Point> = depths.into_iter().filter(of_object).map(point).collect();
+        if points.is_empty() {
+            return Err(RefineError::NoDepth);
+        }
         Ok(Self { object, points, settings })
     }
 
@@ -264,11 +278,11 @@ mod tests {
     #[test]
     fn gradients_match_differences() {
         for seed in 0..3 {
-            let (scene, mut state, _) = fixture(seed);
+            let (scene, mut state, hand) = fixture(seed);
             state.camera = state.camera.changed(&[2e-3, 1e-3, 1e-3, -1e-3, 2e-3]);
             let object = Arc::clone(&scene.object);
-            let term =
-                PointToPlaneTerm::new(&scene.observation, object, PointToPlaneSettings::default());
+            let settings = PointToPlaneSettings::default();
+            let term = PointToPlaneTerm::new(&scene.observation, object, &hand, settings);
             for block in [Block::ObjectPose, Block::Camera] {
                 // What the few points pull that were matched with faces that look away is left out.
                 assert_gradient(term.as_ref().unwrap(), &state, block, 1e-8, 0.03);
@@ -278,11 +292,10 @@ mod tests {
 
     #[test]
     fn the_truth_is_near_the_minimum() {
-        let (scene, state, _) = fixture(0);
+        let (scene, state, hand) = fixture(0);
         let object = Arc::clone(&scene.object);
-        let term =
-            PointToPlaneTerm::new(&scene.observation, object, PointToPlaneSettings::default())
-                .unwrap();
+        let settings = PointToPlaneSettings::default();
+        let term = PointToPlaneTerm::new(&scene.observation, object, &hand, settings).unwrap();
         let truth = State { t_cam_object: scene.truth, ..state.clone() };
         assert!(term.value(&truth) < 0.3 * term.value(&state));
     }

@@ -3,13 +3,13 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::num::NonZeroUsize;
 use std::path::Path;
-use std::sync::Arc;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
 use prehend_refine::bop::{Dataset, ResultRow, share_image_times, write_results};
 use prehend_refine::identity::{SENSED, canonical, dataset_fingerprint, file_fingerprint};
 use prehend_refine::report::{FrameReport, Report};
+use prehend_refine::strategy::ConfidenceSummary;
 use prehend_refine::trace::Trace;
 use prehend_refine::{
     AssetError, Assets, Config, Identity, Journal, PlainPose, RefinedPose, Times, Workers,
@@ -48,6 +48,8 @@ struct Refined {
     iterations: usize,
     warnings: Vec<String>,
     object_warnings: Vec<String>,
+    /// How sure the pose is, where the method knows.
+    confidence: Option<ConfidenceSummary>,
     /// Kept only if something will be made of it: it is long.
     trace: Option<Trace>,
 }
@@ -191,6 +193,7 @@ impl Run<'_> {
             iterations: pose.trace.iterations.len().saturating_sub(1),
             warnings: inspect_pose(&observation, &object, robot.map(Arc::as_ref), &row.t_cam_model),
             object_warnings: inspect_object(&object),
+            confidence: pose.confidence.as_ref().map(ConfidenceSummary::from),
             trace: self.keeps_trace().then_some(pose.trace),
         };
         Ok(Done { refined, seconds })
@@ -204,6 +207,8 @@ impl Run<'_> {
     ) -> Vec<ResultRow> {
         let row = |(&index, refined): (&usize, &Refined)| ResultRow {
             t_cam_model: (&refined.pose).into(),
+            // BOP leaves open what a score is; here it is the probability of being right.
+            score: refined.confidence.as_ref().map_or(jobs[index].row.score, |c| c.probability),
             time: times.of(index, self.method).filter(|_| self.time).unwrap_or(-1.0),
             ..jobs[index].row.clone()
         };
@@ -263,6 +268,7 @@ fn summary(job: &Job, refined: &Refined, seconds: Option<f64>) -> serde_json::Va
         "t_cam_model_mm": t_mm,
         "quaternion_wxyz": refined.pose.quaternion_wxyz,
         "warnings": warnings,
+        "confidence": refined.confidence,
         "trace": refined.trace,
     })
 }

@@ -39,7 +39,9 @@ impl<'a> Known<'a> {
     /// How depth points scatter about the object at `state`; `None` without depth.
     pub(super) fn scatter(&self, state: &State, settings: &FusedSettings) -> Option<Scatter> {
         let depth = PointToPlaneSettings { points: SCATTERED, ..settings.depth.clone() };
-        let term = PointToPlaneTerm::new(self.observation, Arc::clone(self.object), depth).ok()?;
+        let term =
+            PointToPlaneTerm::new(self.observation, Arc::clone(self.object), &self.hand, depth)
+                .ok()?;
         Some(term.scatter(state))
     }
 
@@ -75,7 +77,7 @@ impl<'a> Known<'a> {
             let mut depth = settings.depth.clone();
             depth.points = stage.points;
             depth.outlier *= stage.tolerance;
-            match PointToPlaneTerm::new(self.observation, object(), depth) {
+            match PointToPlaneTerm::new(self.observation, object(), &self.hand, depth) {
                 Ok(term) => terms.push(Box::new(term)),
                 // Each sense may be absent.
                 Err(RefineError::NoDepth) => {}

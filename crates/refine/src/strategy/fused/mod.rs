@@ -5,6 +5,9 @@ mod evidence;
 mod exactness;
 mod settings;
 mod solve;
+mod summary;
+#[cfg(test)]
+mod tests;
 
 use std::sync::Arc;
 
@@ -17,6 +20,7 @@ use self::evidence::Known;
 pub use self::settings::{Evidence, FusedSettings, Nuisance, Stage};
 pub use self::solve::Ending;
 use self::solve::{Point, solve};
+pub use self::summary::ConfidenceSummary;
 use crate::trace::{Iteration, Trace};
 use crate::{Block, Object, Observation, RefineError, Robot, State};
 
@@ -51,6 +55,7 @@ impl Fused {
         let mut states = self.starts(&initial);
         let mut trace = Trace::new(["posterior"].into_iter());
         let mut found = Vec::new();
+        let mut go_on = true;
         let mut step = |point: &Point, trace: &mut Trace| {
             let index = trace.iterations.len();
             let values = vec![point.value];
@@ -89,12 +94,13 @@ impl Fused {
                 let more = next.hypotheses.saturating_sub(states.len());
                 states.extend(spread(&found[0].0, settings.spread, object.radius, more));
             }
-            if !step(&found[0].0, &mut trace) {
+            go_on = step(&found[0].0, &mut trace);
+            if !go_on {
                 break;
             }
         }
         let mut exact = false;
-        if settings.exactness && blocks.len() > 1 {
+        if go_on && settings.exactness && blocks.len() > 1 {
             let last = &self.settings.stages[self.settings.stages.len() - 1];
             let terms = known.terms(&initial, last, &settings)?;
             let point = Point::new(&terms, found[0].0.state.clone(), &blocks);

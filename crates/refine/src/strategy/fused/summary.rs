@@ -1,0 +1,51 @@
+//! A confidence in numbers that fit a line.
+
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+use super::Confidence;
+
+/// What reports and files say of a [`Confidence`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ConfidenceSummary {
+    /// Probability that the pose is within 5 mm and 5° of the true one.
+    pub probability: f64,
+    /// Standard deviations of the place of the object's centre in the camera frame \[mm\].
+    pub deviation_mm: [f64; 3],
+    /// Standard deviations of the rotation about the axes of the camera frame \[°\].
+    pub deviation_deg: [f64; 3],
+    /// Standard deviations of surface motion along directions that the evidence says hardly anything of \[mm\].
+    pub unobserved_mm: Vec<f64>,
+    /// Evidence that would rather have the pose elsewhere, and by how many of its standard deviations.
+    pub disagreements: Vec<(String, f64)>,
+    /// Shares of the posterior that the poses found have, the best first.
+    pub weights: Vec<f64>,
+    /// Why the search ended.
+    pub ending: String,
+}
+
+impl ConfidenceSummary {
+    /// Distance that a pose may be off to count as right \[m\].
+    pub const DISTANCE: f64 = 5e-3;
+    /// Angle that a pose may be off to count as right \[°\].
+    pub const ANGLE_DEG: f64 = 5.0;
+}
+
+impl From<&Confidence> for ConfidenceSummary {
+    fn from(confidence: &Confidence) -> Self {
+        let covariance = confidence.covariance();
+        let deviation =
+            |first: usize| Vector3::from_fn(|k, _| covariance[(first + k, first + k)].sqrt());
+        let angle = Self::ANGLE_DEG.to_radians();
+        let disagreements = confidence.disagreements.iter();
+        Self {
+            probability: confidence.probability_within(Self::DISTANCE, angle),
+            deviation_mm: (deviation(0) * 1e3).into(),
+            deviation_deg: deviation(3).map(f64::to_degrees).into(),
+            unobserved_mm: confidence.unobserved.iter().map(|u| u.deviation * 1e3).collect(),
+            disagreements: disagreements.map(|d| (d.evidence.to_owned(), d.distance)).collect(),
+            weights: confidence.hypotheses.iter().map(|h| h.weight).collect(),
+            ending: confidence.ending.name().to_owned(),
+        }
+    }
+}
