@@ -196,7 +196,7 @@ impl Default for FusedSettings {
                     tolerance: 1.0,
                     iterations: 10,
                     last_gain: 0.02,
-                    hypotheses: 1,
+                    hypotheses: 2,
                     colour: true,
                     measured_scatter: true,
                     contact: true,
