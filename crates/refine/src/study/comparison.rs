@@ -37,14 +37,14 @@ pub struct Contrast {
 
 /// Compares `pairs` of rows over some records.
 pub(super) fn comparisons(pairs: &[(String, String)], records: &[&FrameRecord]) -> Vec<Comparison> {
-    let column = |row: &str, metric: usize| {
-        records.iter().map(move |r| r.outcome(row)?.score?.values()[metric])
+    let column = |row: &str, metric: usize| -> Vec<Option<f64>> {
+        records.iter().map(|r| r.outcome(row)?.score?.values()[metric]).collect()
     };
     let mut columns: Vec<Vec<Option<f64>>> = Vec::new();
     for (row, reference) in pairs {
         for metric in 0..COLUMNS.len() {
-            let both = column(row, metric).zip(column(reference, metric)).map(|(a, b)| a.zip(b));
-            let both: Vec<Option<(f64, f64)>> = both.collect();
+            let both = column(row, metric).into_iter().zip(column(reference, metric));
+            let both: Vec<Option<(f64, f64)>> = both.map(|(a, b)| a.zip(b)).collect();
             columns.push(both.iter().map(|both| both.map(|b| b.0)).collect());
             columns.push(both.iter().map(|both| both.map(|b| b.1)).collect());
         }

@@ -72,13 +72,10 @@ impl<'a> Examiner<'a> {
                 outcomes.extend(renamed.map(|(same, row)| RowOutcome { row, ..same.clone() }));
                 continue;
             }
-            let (found, time) = self.run(frame, &trial);
-            let name = match self.design.study {
-                Kind::Steps => &trial.method,
-                _ => &trial.rows[0],
-            };
-            seconds.extend(time.map(|time| (name.clone(), time)));
+            let (mut found, time) = self.run(frame, &trial);
+            found.iter_mut().for_each(|outcome| outcome.disturbed = trial.fault.is_some());
             if trial.fault.is_none() {
+                seconds.extend(time.map(|time| (trial.method.clone(), time)));
                 undisturbed.insert(trial.method, found.clone());
             }
             outcomes.extend(found);
@@ -200,6 +197,7 @@ impl<'a> Examiner<'a> {
             Ok(_) => (None, Some("scoring: a metric is not finite".into())),
             Err(error) => (None, Some(format!("scoring: {error}"))),
         };
-        RowOutcome { row: name.into(), pose: Some(plain), iteration, score, belief: None, failed }
+        let row = name.into();
+        RowOutcome { row, pose: Some(plain), iteration, score, failed, ..RowOutcome::default() }
     }
 }

@@ -38,6 +38,9 @@ pub struct RowOutcome {
     /// What was believed of the pose; in the confidence study.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub belief: Option<Belief>,
+    /// Whether something was made wrong with the observation: a failure is a finding then.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub disturbed: bool,
     /// Why there is no pose or no score.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub failed: Option<String>,
@@ -50,9 +53,9 @@ impl FrameRecord {
         format!("{level}: scene {scene_id} image {im_id} object {obj_id}")
     }
 
-    /// Whether any row failed.
+    /// Whether any row failed with whose observation nothing was made wrong.
     pub fn failed(&self) -> bool {
-        self.outcomes.iter().any(|o| o.failed.is_some())
+        self.outcomes.iter().any(|o| o.failed.is_some() && !o.disturbed)
     }
 
     /// The outcome of a row.

@@ -104,6 +104,9 @@ pub struct Failure {
     pub rows: Vec<String>,
     /// Why.
     pub reason: String,
+    /// Whether something was made wrong with the observations: that a method cannot do without is a finding then.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub disturbed: bool,
 }
 
 impl Tables {
@@ -139,6 +142,7 @@ impl Tables {
                 frame: "a row of the initial poses".into(),
                 rows: rows.clone(),
                 reason: reason.clone(),
+                disturbed: false,
             }));
             failures.extend(of_level.iter().flat_map(|record| failures_of(record)));
         }
@@ -165,7 +169,8 @@ fn failures_of(record: &FrameRecord) -> Vec<Failure> {
     let mut found: Vec<Failure> = Vec::new();
     for outcome in &record.outcomes {
         let Some(reason) = &outcome.failed else { continue };
-        match found.iter_mut().find(|f| f.reason == *reason) {
+        let same = |f: &&mut Failure| f.reason == *reason && f.disturbed == outcome.disturbed;
+        match found.iter_mut().find(same) {
             Some(same) => same.rows.push(outcome.row.clone()),
             None => found.push(Failure {
                 level: record.level.clone(),
@@ -173,6 +178,7 @@ fn failures_of(record: &FrameRecord) -> Vec<Failure> {
                 frame: record.label(),
                 rows: vec![outcome.row.clone()],
                 reason: reason.clone(),
+                disturbed: outcome.disturbed,
             }),
         }
     }

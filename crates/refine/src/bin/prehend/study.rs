@@ -278,7 +278,13 @@ fn finish(
 fn outcome(tables: &Tables, records: &BTreeMap<usize, FrameRecord>) -> Outcome {
     Outcome {
         done: records.values().filter(|r| !r.failed()).count(),
-        failures: tables.failures.iter().map(Failure::sentence).collect(),
+        // What comes of a fault that the study itself makes is in its tables.
+        failures: tables
+            .failures
+            .iter()
+            .filter(|failure| !failure.disturbed)
+            .map(Failure::sentence)
+            .collect(),
     }
 }
 

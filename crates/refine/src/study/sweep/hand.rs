@@ -8,7 +8,7 @@ use crate::Observation;
 /// Shifts the hand by `distance` \[m\].
 pub(super) fn shift(observation: &mut Observation, distance: f64, random: &mut SplitMix64) {
     let shift = Translation3::from(distance * direction(random));
-    for hand in &mut observation.hand {
+    if let Some(hand) = &mut observation.hand {
         hand.t_cam_hand = shift * hand.t_cam_hand;
     }
 }
@@ -16,7 +16,7 @@ pub(super) fn shift(observation: &mut Observation, distance: f64, random: &mut S
 /// Turns the hand by `angle` \[rad\] about its base.
 pub(super) fn turn(observation: &mut Observation, angle: f64, random: &mut SplitMix64) {
     let turn = UnitQuaternion::new(angle * direction(random));
-    for hand in &mut observation.hand {
+    if let Some(hand) = &mut observation.hand {
         let Isometry3 { rotation, translation } = hand.t_cam_hand;
         hand.t_cam_hand = Isometry3::from_parts(translation, turn * rotation);
     }
