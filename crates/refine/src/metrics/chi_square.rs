@@ -4,6 +4,9 @@
 /// function by its series (Abramowitz and Stegun, 6.5.29). NaN for a value that is not a number.
 pub fn chi_square_cdf(value: f64, degrees: u32) -> f64 {
     let (a, x) = (0.5 * f64::from(degrees), 0.5 * value);
+    if x.is_nan() {
+        return x;
+    }
     if x <= 0.0 {
         return 0.0;
     }
