@@ -94,7 +94,7 @@ fn panel(area: &Area<'_>, curves: &[Curve], x: &str, y: &str, marked: bool) -> D
     }
     chart
         .configure_series_labels()
-        .position(SeriesLabelPosition::LowerRight)
+        .position(SeriesLabelPosition::UpperLeft)
         .background_style(WHITE.mix(0.85))
         .border_style(BLACK.mix(0.3))
         .label_font(("sans-serif", 13))
