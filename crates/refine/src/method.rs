@@ -1,5 +1,6 @@
 //! Named ways to refine a pose: what `--method` picks and what studies compare.
 
+use crate::strategy::{Evidence, FusedSettings, Nuisance};
 use crate::{Config, StrategyKind, TermKind};
 
 /// A way to refine a pose, with all of its settings.
@@ -18,9 +19,15 @@ impl Method {
         &METHODS
     }
 
-    /// The method called `name`.
+    /// The fused estimator with less than all evidence, or with quantities believed that it would estimate: what each of them
+    /// is worth.
+    pub fn ablations() -> &'static [Self] {
+        &ABLATIONS
+    }
+
+    /// The method called `name`, ablations included.
     pub fn named(name: &str) -> Option<&'static Self> {
-        METHODS.iter().find(|m| m.name == name)
+        METHODS.iter().chain(&ABLATIONS).find(|m| m.name == name)
     }
 
     /// Its settings.
@@ -55,11 +62,79 @@ fn baseline(strategy: StrategyKind, checkpoint: bool) -> Config {
     Config { strategy, terms: Vec::new(), checkpoint, ..Config::default() }
 }
 
+/// The fused estimator with other settings.
+fn fused(change: impl FnOnce(&mut FusedSettings)) -> Config {
+    let mut config =
+        Config { strategy: StrategyKind::Fused, checkpoint: false, ..Config::default() };
+    change(&mut config.fused);
+    config
+}
+
+/// All evidence but one kind.
+macro_rules! without {
+    ($name:literal, $kind:expr) => {
+        Method {
+            name: concat!("fused-without-", $name),
+            summary: concat!("fused, all evidence but ", $name),
+            config: || fused(|settings| settings.evidence.retain(|kind| *kind != $kind)),
+        }
+    };
+}
+
+/// One kind of evidence, and the prior.
+macro_rules! only {
+    ($name:literal, $kind:expr) => {
+        Method {
+            name: concat!("fused-only-", $name),
+            summary: concat!("fused, no evidence but ", $name, " and the prior"),
+            config: || fused(|settings| settings.evidence = vec![$kind]),
+        }
+    };
+}
+
+/// One group of quantities believed as they are said to be.
+macro_rules! fixed {
+    ($name:literal, $group:expr) => {
+        Method {
+            name: concat!("fused-fixed-", $name),
+            summary: concat!("fused, ", $name, " not estimated"),
+            config: || fused(|settings| settings.nuisances.retain(|group| *group != $group)),
+        }
+    };
+}
+
+static ABLATIONS: [Method; 20] = [
+    without!("colour", Evidence::Colour),
+    without!("silhouette", Evidence::Silhouette),
+    without!("depth", Evidence::Depth),
+    without!("hand-depth", Evidence::HandDepth),
+    without!("free-space", Evidence::FreeSpace),
+    without!("touch", Evidence::Touch),
+    without!("quiet", Evidence::Quiet),
+    without!("penetration", Evidence::Penetration),
+    only!("colour", Evidence::Colour),
+    only!("silhouette", Evidence::Silhouette),
+    only!("depth", Evidence::Depth),
+    only!("hand-depth", Evidence::HandDepth),
+    only!("free-space", Evidence::FreeSpace),
+    only!("touch", Evidence::Touch),
+    only!("quiet", Evidence::Quiet),
+    only!("penetration", Evidence::Penetration),
+    fixed!("hand-pose", Nuisance::HandPose),
+    fixed!("joints", Nuisance::Joints),
+    fixed!("camera", Nuisance::Camera),
+    Method {
+        name: "fused-fixed-all",
+        summary: "fused, nothing estimated but the pose",
+        config: || fused(|settings| settings.nuisances.clear()),
+    },
+];
+
 static METHODS: [Method; 17] = [
     Method {
         name: "fused",
         summary: "all evidence in one least-squares problem, with calibrations estimated",
-        config: || Config { strategy: StrategyKind::Fused, checkpoint: false, ..Config::default() },
+        config: || fused(|_| ()),
     },
     Method {
         name: "combined",
@@ -119,10 +194,29 @@ mod tests {
 
     #[test]
     fn names_are_unique_and_found() {
-        for method in Method::all() {
-            assert_eq!(Method::all().iter().filter(|m| m.name == method.name).count(), 1);
+        let all = || Method::all().iter().chain(Method::ablations());
+        for method in all() {
+            assert_eq!(all().filter(|m| m.name == method.name).count(), 1);
             assert_eq!(Method::named(method.name).map(|m| m.summary), Some(method.summary));
         }
         assert!(Method::named("guess").is_none());
+    }
+
+    #[test]
+    fn every_kind_of_evidence_and_every_nuisance_has_its_ablations() {
+        let settings = |name: &str| Method::named(name).unwrap().config().fused;
+        let all = settings("fused");
+        for kind in Evidence::ALL {
+            let without = settings(&format!("fused-without-{}", kind.name()));
+            assert_eq!(without.evidence.len(), all.evidence.len() - 1);
+            assert!(!without.evidence.contains(&kind));
+            assert_eq!(settings(&format!("fused-only-{}", kind.name())).evidence, [kind]);
+        }
+        for group in Nuisance::ALL {
+            let fixed = settings(&format!("fused-fixed-{}", group.name()));
+            assert_eq!(fixed.nuisances.len(), all.nuisances.len() - 1);
+            assert!(!fixed.nuisances.contains(&group) && fixed.evidence == all.evidence);
+        }
+        assert!(settings("fused-fixed-all").nuisances.is_empty());
     }
 }

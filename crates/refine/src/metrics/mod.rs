@@ -5,6 +5,8 @@
 //! challenge (Hodaň et al., ECCVW 2020).
 
 mod add;
+mod calibration;
+mod chi_square;
 mod contact;
 mod diameter;
 mod nearest;
@@ -18,6 +20,11 @@ mod table;
 mod vsd;
 
 pub use add::{add, adi};
+pub use calibration::{
+    Bin, Prediction, area_under_roc, area_under_roc_error, brier_score, calibration_error,
+    calibration_error_by_chance, equal_count_bins,
+};
+pub use chi_square::chi_square_cdf;
 pub use contact::{CONTACT_DISTANCE, CONTACT_SAMPLES, ContactModel};
 pub use diameter::diameter;
 pub use nearest::NearestPoint;

@@ -4,7 +4,7 @@ use std::fmt::Display;
 
 use super::tables::Tables;
 
-const HEADER: [&str; 16] = [
+const HEADER: [&str; 23] = [
     "study",
     "level",
     "object",
@@ -20,22 +20,36 @@ const HEADER: [&str; 16] = [
     "change_low",
     "change_high",
     "published_mean",
+    "reference",
+    "difference",
+    "difference_low",
+    "difference_high",
+    "ratio",
+    "ratio_low",
+    "ratio_high",
     "note",
 ];
 
-/// The tables as CSV. `object` is empty over all objects; failures come last, with their reason as the note.
+/// The tables as CSV. A row that is compared with another one has that one's name, the difference of their means over the
+/// frames that have both, and their ratio. `object` is empty over all objects; failures come last, with their reason as the note.
 pub(super) fn csv(tables: &Tables) -> Result<Vec<u8>, ::csv::Error> {
     let mut out = ::csv::Writer::from_writer(Vec::new());
     out.write_record(HEADER)?;
     let study = tables.study.name();
     for block in &tables.blocks {
         for line in &block.lines {
+            let compared = block.comparisons.iter().find(|c| c.row == line.row);
             for (m, metric) in tables.metrics.iter().enumerate() {
                 let published = line.published.and_then(|p| p[m]);
                 let Some(estimate) = &line.metrics[m] else { continue };
                 let [low, high] = ends(estimate.interval);
                 let change = estimate.change;
                 let [change_low, change_high] = ends(change.and_then(|c| c.interval));
+                let contrast = compared.and_then(|c| c.metrics[m]);
+                let reference = compared.filter(|_| contrast.is_some());
+                let [difference_low, difference_high] =
+                    ends(contrast.and_then(|c| c.difference_interval));
+                let [ratio_low, ratio_high] = ends(contrast.and_then(|c| c.ratio_interval));
                 out.write_record([
                     study.to_owned(),
                     block.level.clone(),
@@ -52,6 +66,13 @@ pub(super) fn csv(tables: &Tables) -> Result<Vec<u8>, ::csv::Error> {
                     change_low,
                     change_high,
                     text(published),
+                    text(reference.map(|c| &c.reference)),
+                    text(contrast.map(|c| c.difference)),
+                    difference_low,
+                    difference_high,
+                    text(contrast.and_then(|c| c.ratio)),
+                    ratio_low,
+                    ratio_high,
                     String::new(),
                 ])?;
             }
@@ -64,7 +85,7 @@ pub(super) fn csv(tables: &Tables) -> Result<Vec<u8>, ::csv::Error> {
         record[2] = text(failure.object);
         record[3] = failure.rows.join(" ");
         record[4] = "failed".into();
-        record[15] = format!("{}: {}", failure.frame, failure.reason);
+        record[HEADER.len() - 1] = format!("{}: {}", failure.frame, failure.reason);
         out.write_record(record)?;
     }
     out.into_inner().map_err(|e| e.into_error().into())
@@ -92,12 +113,29 @@ mod tests {
             tables.blocks.iter().flat_map(|b| &b.lines).flat_map(|l| l.metrics).flatten();
         assert_eq!(text.lines().count(), 1 + estimates.count() + tables.failures.len());
         assert!(
-            text.contains("\nmain,low,,combined,PE cm,4,3,0.5,0.25,0.75,0.5,-75,-75,-75,0.62,\n"),
+            text.contains(
+                "\nmain,low,,combined,PE cm,4,3,0.5,0.25,0.75,0.5,-75,-75,-75,0.62,,,,,,,,\n"
+            ),
             "{text}"
         );
         assert!(
-            text.contains(",6,icp,failed,,,,,,,,,,,low: scene 1 image 2 object 6: no pixel\n"),
+            text.contains(
+                ",6,icp,failed,,,,,,,,,,,,,,,,,,low: scene 1 image 2 object 6: no pixel\n"
+            ),
             "{text}"
         );
+    }
+
+    #[test]
+    fn compared_rows_have_their_reference() {
+        let (mut design, mut records) = example();
+        design.methods[1].name = "robust-icp".into();
+        for record in records.values_mut() {
+            record.outcomes[3].row = "robust-icp".into();
+        }
+        let text = String::from_utf8(csv(&Tables::new(&design, &records)).unwrap()).unwrap();
+        let line = "\nmain,high,,combined,PE cm,3,3,1,0.5,1.5,1,-75,-75,-75,1.45,robust-icp,-7,";
+        assert!(text.contains(line), "{text}");
+        assert!(text.contains(",0.125,0.125,0.125,\n"), "{text}");
     }
 }

@@ -7,6 +7,7 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 
 use super::kind::{INITIAL, Kind, TRUTH};
+use super::sweep::Sweep;
 use crate::bop::{DatasetError, ResultRow, read_results};
 use crate::identity::file_fingerprint;
 use crate::{Config, Method};
@@ -28,6 +29,9 @@ pub struct Design {
     pub methods: Vec<MethodSettings>,
     /// The iterations at which poses are compared; empty except in the steps study.
     pub steps: Vec<usize>,
+    /// Faults of the observation; empty except in the robustness study.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sweeps: Vec<Sweep>,
     /// Seed of the points on objects' surfaces.
     pub seed: u64,
     /// What renders.
@@ -56,6 +60,17 @@ pub struct MethodSettings {
     pub name: String,
     /// Its settings, as text.
     pub settings: String,
+}
+
+/// One run of a method on a frame.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Trial {
+    /// Name of the method.
+    pub(super) method: String,
+    /// What is wrong with the observation, and how much of it; nothing to begin a sweep with.
+    pub(super) fault: Option<(Sweep, f64)>,
+    /// The rows of the table that its poses make.
+    pub(super) rows: Vec<String>,
 }
 
 /// One initial pose of a study.
@@ -101,11 +116,47 @@ impl Level {
 impl Design {
     /// The rows of the study's tables.
     pub fn rows(&self) -> Vec<String> {
-        let compared: Vec<String> = match self.study {
-            Kind::Steps => self.steps.iter().map(usize::to_string).collect(),
-            _ => self.methods.iter().map(|m| m.name.clone()).collect(),
-        };
+        let compared = self.trials().into_iter().flat_map(|trial| trial.rows);
         [TRUTH, INITIAL].into_iter().map(str::to_owned).chain(compared).collect()
+    }
+
+    /// What is done with a frame, in the order of the tables' rows.
+    pub(super) fn trials(&self) -> Vec<Trial> {
+        let names = self.methods.iter().map(|m| m.name.clone());
+        match self.study {
+            Kind::Steps => {
+                let rows: Vec<String> = self.steps.iter().map(usize::to_string).collect();
+                names.map(|method| Trial { method, fault: None, rows: rows.clone() }).collect()
+            }
+            Kind::Robustness => self
+                .sweeps
+                .iter()
+                .flat_map(|sweep| sweep.amounts().iter().map(|&amount| (*sweep, amount)))
+                .flat_map(|(sweep, amount)| {
+                    names.clone().map(move |method| Trial {
+                        rows: vec![disturbed(&method, sweep, amount)],
+                        fault: (amount != sweep.amounts()[0]).then_some((sweep, amount)),
+                        method,
+                    })
+                })
+                .collect(),
+            _ => names
+                .map(|method| Trial { rows: vec![method.clone()], method, fault: None })
+                .collect(),
+        }
+    }
+
+    /// Rows of the tables that are compared frame by frame, each with the row that it is compared with.
+    pub(super) fn pairs(&self) -> Vec<(String, String)> {
+        let Some(reference) = self.study.reference() else { return Vec::new() };
+        let trials = self.trials();
+        let rows: Vec<&String> = trials.iter().flat_map(|t| &t.rows).collect();
+        let pair = |trial: &Trial| {
+            let other = trial.rows[0].replacen(&trial.method, reference, 1);
+            (trial.method != reference && rows.contains(&&other))
+                .then(|| (trial.rows[0].clone(), other))
+        };
+        trials.iter().filter_map(pair).collect()
     }
 
     /// The number of frames, all shards together.
@@ -134,6 +185,11 @@ impl Design {
             _ => Vec::new(),
         }
     }
+}
+
+/// The row of a method when so much of something is wrong with the observation.
+pub(super) fn disturbed(method: &str, sweep: Sweep, amount: f64) -> String {
+    format!("{method} {sweep} {amount}")
 }
 
 /// One of several parts of a study: frame k belongs to part k mod `count`.
@@ -202,5 +258,25 @@ mod tests {
         for text in ["3/3", "1", "a/2", "-1/2", "0/0"] {
             assert!(text.parse::<Shard>().is_err(), "{text}");
         }
+    }
+
+    #[test]
+    fn trials_and_pairs_follow_from_the_methods() {
+        let (mut design, _) = super::super::tables::tests::example();
+        assert_eq!(design.rows(), ["truth", "initial", "combined", "icp"]);
+        // Neither method is the one to compare with.
+        assert_eq!(design.pairs(), []);
+        let method = |name: &str| MethodSettings { name: name.into(), settings: String::new() };
+        design.methods = vec![method("robust-icp"), method("fused")];
+        let pair = |a: &str, b: &str| (a.to_owned(), b.to_owned());
+        assert_eq!(design.pairs(), [pair("fused", "robust-icp")]);
+        design.study = Kind::Robustness;
+        design.sweeps = vec![Sweep::MissingTouch, Sweep::Joints];
+        let trials = design.trials();
+        assert_eq!(trials.len(), 2 * (2 + 4));
+        assert_eq!((trials[1].fault, trials[1].rows[0].as_str()), (None, "fused missing-touch 0"));
+        assert_eq!(trials[11].fault, Some((Sweep::Joints, 5.0)));
+        assert_eq!(design.pairs().len(), 6);
+        assert_eq!(design.pairs()[5], pair("fused joints 5", "robust-icp joints 5"));
     }
 }

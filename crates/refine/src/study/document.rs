@@ -1,5 +1,7 @@
 //! Tables for people, as text and as Markdown.
 
+use super::calibration::Calibration;
+use super::comparison::Contrast;
 use super::kind::{INITIAL, Kind, TRUTH};
 use super::published::Published;
 use super::tables::{Block, ERRORS, Line, Tables};
@@ -61,12 +63,26 @@ fn sections(tables: &Tables) -> Vec<Section> {
             ),
             Body::Table(changes(tables.study, block)),
         );
+        for (heading, table) in comparisons(tables.study, block) {
+            add(format!("Noise {level}: {heading}"), Body::Table(table));
+        }
         let objects: Vec<&Block> =
             tables.blocks.iter().filter(|b| b.level == *level && b.object.is_some()).collect();
-        if objects.len() > 1 {
+        // Of many faults times many objects nobody reads a table.
+        if objects.len() > 1 && tables.study != Kind::Robustness {
             let table = by_object(tables.study, block, &objects);
             add(format!("Noise {level}: means by object"), Body::Table(table));
         }
+    }
+    for calibration in &tables.calibrations {
+        let label = calibration.label();
+        let title = format!(
+            "{label}: % of {} true poses within ellipsoids of the posterior [95 % confidence]",
+            calibration.n
+        );
+        add(title, Body::Table(coverage(calibration)));
+        add(format!("{label}: predicted probabilities"), Body::Table(events(calibration)));
+        add(format!("{label}: failures"), Body::List(vec![failures(calibration)]));
     }
     let failed: Vec<String> = tables.failures.iter().map(|f| f.sentence()).collect();
     if failed.is_empty() {
@@ -159,6 +175,82 @@ fn changes(study: Kind, block: &Block) -> Table {
     out
 }
 
+/// Differences and ratios of the means of rows that are compared frame by frame.
+fn comparisons(study: Kind, block: &Block) -> Vec<(String, Table)> {
+    let Some(first) = block.comparisons.first() else { return Vec::new() };
+    let errors: Vec<usize> = SHOWN.into_iter().filter(|m| ERRORS.contains(m)).collect();
+    let metrics = present(block, &errors);
+    let against = match study {
+        Kind::Robustness => study.reference().unwrap_or_default(),
+        _ => first.reference.as_str(),
+    };
+    let make = |name: &str, cell: &dyn Fn(&Contrast) -> Option<String>| {
+        let mut out = table(name, &metrics);
+        for comparison in &block.comparisons {
+            let n = comparison.metrics.iter().flatten().map(|c| c.n).max().unwrap_or(0);
+            let cells = metrics.iter().map(|&m| {
+                comparison.metrics[m].as_ref().and_then(cell).unwrap_or_else(|| "-".into())
+            });
+            let label = row_label(study, &comparison.row);
+            let head = [label, format!("{n}/{}", block.frames)];
+            out.push(head.into_iter().chain(cells).collect());
+        }
+        out
+    };
+    let difference = make("difference", &|c| {
+        let show = |v: f64| if v < 0.0 { number(v) } else { format!("+{}", number(v)) };
+        Some(with_interval(show(c.difference), c.difference_interval.map(|i| i.map(show))))
+    });
+    let ratio = make("ratio", &|c| {
+        let show = |v: f64| format!("{v:.2}");
+        Some(with_interval(show(c.ratio?), c.ratio_interval.map(|i| i.map(show))))
+    });
+    vec![
+        (format!("mean less that of {against}, same frames [95 % confidence]"), difference),
+        (format!("mean over that of {against}, same frames [95 % confidence]"), ratio),
+    ]
+}
+
+fn coverage(calibration: &Calibration) -> Table {
+    let mut out =
+        Table::new(["ellipsoid of", "should hold %", "holds %"].map(str::to_owned).into());
+    for part in &calibration.coverage {
+        let show = |v: f64| format!("{:.1}", 100.0 * v);
+        let share = with_interval(show(part.share), part.interval.map(|i| i.map(show)));
+        out.push(vec![part.of.into(), format!("{:.0}", 100.0 * part.nominal), share]);
+    }
+    out
+}
+
+fn events(calibration: &Calibration) -> Table {
+    let header = ["within", "predicted %", "true %", "calibration error", "by chance", "Brier"];
+    let mut out = Table::new(header.map(str::to_owned).into());
+    for event in &calibration.events {
+        out.push(vec![
+            event.event.into(),
+            format!("{:.1}", 100.0 * event.predicted),
+            format!("{:.1}", 100.0 * event.share),
+            format!("{:.3}", event.calibration_error),
+            format!("{:.3}", event.by_chance),
+            format!("{:.3}", event.brier),
+        ]);
+    }
+    out
+}
+
+fn failures(calibration: &Calibration) -> String {
+    let Calibration { n, failures, auroc, auroc_interval, .. } = calibration;
+    let area = auroc.map_or_else(
+        || "no area under a curve".to_owned(),
+        |area| {
+            let show = |v: f64| format!("{v:.3}");
+            let area = with_interval(show(area), auroc_interval.map(|i| i.map(show)));
+            format!("area under the curve of the predicted probability {area}")
+        },
+    );
+    format!("{failures} of {n} poses are not within 5 mm and 5°; {area}")
+}
+
 fn by_object(study: Kind, overall: &Block, objects: &[&Block]) -> Table {
     let metrics = present(overall, &SHOWN);
     let mut out = table("mean", &metrics);
@@ -215,5 +307,25 @@ mod tests {
             assert!(whole.contains("- low: scene 1 image 2 object 6: icp: no pixel"), "{whole}");
             assert!(whole.contains("object 6: combined"));
         }
+    }
+
+    #[test]
+    fn comparisons_and_calibrations_are_told() {
+        let (mut design, mut records) = example();
+        design.methods[1].name = "robust-icp".into();
+        for record in records.values_mut() {
+            record.outcomes[3].row = "robust-icp".into();
+        }
+        let said = text(&Tables::new(&design, &records));
+        assert!(said.contains("Noise low: mean less that of robust-icp, same frames"), "{said}");
+        let ratios = said.split("mean over that of robust-icp").nth(1).unwrap();
+        assert!(ratios.contains("combined  2/4  0.12 [0.12, 0.12]"), "{said}");
+
+        let (design, records) = super::super::calibration::tests::calibrated(20);
+        let said = text(&Tables::new(&design, &records));
+        for words in ["all noise, combined: % of 40 true poses", "5 mm and 5°", "orientation"] {
+            assert!(said.contains(words), "{words}: {said}");
+        }
+        assert!(said.contains(" of 40 poses are not within 5 mm and 5°; area under"), "{said}");
     }
 }

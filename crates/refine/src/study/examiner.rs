@@ -1,15 +1,19 @@
 //! What the methods make of a frame.
 
-use std::sync::{Mutex, PoisonError};
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
 use nalgebra::Isometry3;
 
-use super::design::{Design, Frame};
+use super::belief::Belief;
+use super::design::{Design, Frame, Trial};
 use super::kind::{INITIAL, Kind, TRUTH};
 use super::record::{FrameRecord, RowOutcome};
+use super::sweep::Sweep;
 use crate::bop::ResultRow;
-use crate::{AssetError, Assets, Config, PlainPose, Scorer, refine_with};
+use crate::strategy::Confidence;
+use crate::{AssetError, Assets, Config, Object, PlainPose, Scorer, refine_with};
 
 /// Takes frames one by one; several may share the assets.
 pub struct Examiner<'a> {
@@ -30,6 +34,15 @@ pub struct Examined {
 /// A pose and the iteration it comes from.
 type Pose = (Isometry3<f64>, usize);
 
+/// What a method made of a frame.
+struct Refined {
+    /// The poses that the study compares, one in all or one a number of steps.
+    poses: Vec<Pose>,
+    seconds: f64,
+    object: Arc<Object>,
+    confidence: Option<Confidence>,
+}
+
 impl<'a> Examiner<'a> {
     /// One that runs `methods`, those of the design, with their settings.
     pub fn new(
@@ -49,23 +62,23 @@ impl<'a> Examiner<'a> {
         let truth = self.scorer.true_pose(row).map(|pose| (pose, None));
         outcomes.push(self.outcome(TRUTH, row, truth.map_err(|e| e.to_string())));
         outcomes.push(self.outcome(INITIAL, row, Ok((row.t_cam_model, None))));
-        for (name, config) in self.methods {
-            let rows = match self.design.study {
-                Kind::Steps => self.design.steps.iter().map(usize::to_string).collect(),
-                _ => vec![name.clone()],
-            };
-            match self.refine(frame, config) {
-                Ok((poses, time)) => {
-                    seconds.push((name.clone(), time));
-                    for (row_name, (pose, iteration)) in rows.iter().zip(poses) {
-                        outcomes.push(self.outcome(row_name, row, Ok((pose, Some(iteration)))));
-                    }
-                }
-                Err(error) => {
-                    let reason = error.to_string();
-                    outcomes.extend(rows.iter().map(|r| self.outcome(r, row, Err(reason.clone()))));
-                }
+        // Sweeps begin where nothing is wrong: that is done once for all of them.
+        let mut undisturbed: BTreeMap<String, Vec<RowOutcome>> = BTreeMap::new();
+        for trial in self.design.trials() {
+            if trial.fault.is_none()
+                && let Some(known) = undisturbed.get(&trial.method)
+            {
+                let renamed = known.iter().zip(trial.rows);
+                outcomes.extend(renamed.map(|(same, row)| RowOutcome { row, ..same.clone() }));
+                continue;
             }
+            let (mut found, time) = self.run(frame, &trial);
+            found.iter_mut().for_each(|outcome| outcome.disturbed = trial.fault.is_some());
+            if trial.fault.is_none() {
+                seconds.extend(time.map(|time| (trial.method.clone(), time)));
+                undisturbed.insert(trial.method, found.clone());
+            }
+            outcomes.extend(found);
         }
         let record = FrameRecord {
             level: self.design.levels[frame.level].name.clone(),
@@ -77,16 +90,69 @@ impl<'a> Examiner<'a> {
         Examined { record, seconds }
     }
 
-    /// The poses that the study compares, one in all or one a number of steps, and the seconds it took.
-    fn refine(&self, frame: &Frame, config: &Config) -> Result<(Vec<Pose>, f64), AssetError> {
+    /// The outcomes of the rows of a trial, and the seconds that it took.
+    fn run(&mut self, frame: &Frame, trial: &Trial) -> (Vec<RowOutcome>, Option<f64>) {
+        let refined = self
+            .methods
+            .iter()
+            .find(|(name, _)| *name == trial.method)
+            .ok_or_else(|| format!("there is no method {}", trial.method))
+            .and_then(|(_, config)| {
+                self.refine(frame, config, trial.fault).map_err(|e| e.to_string())
+            });
         let row = &frame.row;
-        let (object, observation, robot) = {
+        let refined = match refined {
+            Ok(refined) => refined,
+            Err(reason) => {
+                let failed = |r: &String| self.outcome(r, row, Err(reason.clone()));
+                return (trial.rows.iter().map(failed).collect(), None);
+            }
+        };
+        let poses = trial.rows.iter().zip(&refined.poses);
+        let mut outcomes: Vec<RowOutcome> = poses
+            .map(|(name, (pose, at))| self.outcome(name, row, Ok((*pose, Some(*at)))))
+            .collect();
+        if let Some(confidence) = refined.confidence.filter(|_| self.believes()) {
+            for (outcome, (pose, _)) in outcomes.iter_mut().zip(&refined.poses) {
+                let Ok(truth) =
+                    self.scorer.true_pose(&ResultRow { t_cam_model: *pose, ..row.clone() })
+                else {
+                    continue;
+                };
+                let belief = Belief::new(&confidence, &refined.object, &truth);
+                if belief.is_finite() {
+                    outcome.belief = Some(belief);
+                } else if outcome.failed.is_none() {
+                    outcome.failed = Some("the posterior is not finite".into());
+                }
+            }
+        }
+        (outcomes, Some(refined.seconds))
+    }
+
+    /// Whether the study is of what methods believe.
+    fn believes(&self) -> bool {
+        self.design.study == Kind::Confidence
+    }
+
+    /// What a method makes of a frame with which something may be wrong.
+    fn refine(
+        &self,
+        frame: &Frame,
+        config: &Config,
+        fault: Option<(Sweep, f64)>,
+    ) -> Result<Refined, AssetError> {
+        let row = &frame.row;
+        let (object, mut observation, robot) = {
             let mut assets = self.assets.lock().unwrap_or_else(PoisonError::into_inner);
             let object = assets.object(row.obj_id)?;
             let image = assets.dataset().frame(row.scene_id, row.im_id)?;
             let (observation, robot) = assets.observation(&image, frame.instance, &config.terms)?;
             (object, observation, robot)
         };
+        if let Some((sweep, amount)) = fault {
+            sweep.disturb(&mut observation, amount, sweep.seed(row));
+        }
         let steps = &self.design.steps;
         let mut poses: Vec<Pose> = Vec::new();
         let start = Instant::now();
@@ -101,7 +167,7 @@ impl<'a> Examiner<'a> {
         let seconds = start.elapsed().as_secs_f64();
         // One pose without steps; with them, a run that ended early stays where it is.
         poses.resize(steps.len().max(1), (refined.t_cam_object, refined.iteration));
-        Ok((poses, seconds))
+        Ok(Refined { poses, seconds, object, confidence: refined.confidence })
     }
 
     fn outcome(
@@ -131,6 +197,7 @@ impl<'a> Examiner<'a> {
             Ok(_) => (None, Some("scoring: a metric is not finite".into())),
             Err(error) => (None, Some(format!("scoring: {error}"))),
         };
-        RowOutcome { row: name.into(), pose: Some(plain), iteration, score, failed }
+        let row = name.into();
+        RowOutcome { row, pose: Some(plain), iteration, score, failed, ..RowOutcome::default() }
     }
 }

@@ -1,10 +1,12 @@
-//! The four studies of the paper.
+//! The studies: the paper's four, and those that measure the fused estimator.
 
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-/// Which of the paper's tables.
+use crate::Method;
+
+/// Which study.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
@@ -16,6 +18,12 @@ pub enum Kind {
     Noise,
     /// The combined method, free to move, after more and more steps.
     Steps,
+    /// The fused estimator with less evidence, and with less estimated.
+    Evidence,
+    /// Whether the fused estimator's posterior is right.
+    Confidence,
+    /// What faults of the observation do.
+    Robustness,
 }
 
 /// The true pose, as a row of a table.
@@ -24,6 +32,17 @@ pub(super) const TRUTH: &str = "truth";
 pub(super) const INITIAL: &str = "initial";
 
 impl Kind {
+    /// All studies.
+    pub const ALL: [Self; 7] = [
+        Self::Main,
+        Self::Gradients,
+        Self::Noise,
+        Self::Steps,
+        Self::Evidence,
+        Self::Confidence,
+        Self::Robustness,
+    ];
+
     /// Its name in commands and files.
     pub fn name(self) -> &'static str {
         match self {
@@ -31,24 +50,32 @@ impl Kind {
             Self::Gradients => "gradients",
             Self::Noise => "noise",
             Self::Steps => "steps",
+            Self::Evidence => "evidence",
+            Self::Confidence => "confidence",
+            Self::Robustness => "robustness",
         }
     }
 
     /// What it shows, as a heading.
     pub fn title(self) -> &'static str {
         match self {
-            Self::Main => "Main study: baselines and the combined method",
+            Self::Main => "Main study: baselines, the combined method and the fused estimator",
             Self::Gradients => "Gradients study: each kind of evidence alone, and all together",
-            Self::Noise => "Noise study: the combined method at several levels of noise",
+            Self::Noise => "Noise study: the same at several levels of noise",
             Self::Steps => "Steps study: no regularisation, no checkpoint, all iterations",
+            Self::Evidence => "Evidence study: fused with less evidence, and with less estimated",
+            Self::Confidence => {
+                "Confidence study: the fused estimator's posterior beside the truth"
+            }
+            Self::Robustness => "Robustness study: what faults of the observation do",
         }
     }
 
     /// The methods compared unless others are asked for, by name and in the order of the paper's table.
-    pub fn methods(self) -> &'static [&'static str] {
+    pub fn methods(self) -> Vec<&'static str> {
         match self {
-            Self::Main => &["icp", "icp-best", "robust-icp", "combined"],
-            Self::Gradients => &[
+            Self::Main => vec!["icp", "icp-best", "robust-icp", "combined", "fused"],
+            Self::Gradients => vec![
                 "depth",
                 "tactile",
                 "rendering",
@@ -57,16 +84,30 @@ impl Kind {
                 "robust-icp",
                 "combined",
             ],
-            Self::Noise => &["robust-icp", "combined"],
-            Self::Steps => &["combined-free"],
+            Self::Noise => vec!["robust-icp", "combined", "fused"],
+            Self::Steps => vec!["combined-free"],
+            Self::Evidence => {
+                ["fused"].into_iter().chain(Method::ablations().iter().map(|m| m.name)).collect()
+            }
+            Self::Confidence => vec!["fused"],
+            Self::Robustness => vec!["robust-icp", "fused"],
         }
     }
 
-    /// The levels of noise that the paper has in this table.
+    /// The method that the others are compared with, frame by frame.
+    pub fn reference(self) -> Option<&'static str> {
+        match self {
+            Self::Steps => None,
+            Self::Evidence => Some("fused"),
+            _ => Some("robust-icp"),
+        }
+    }
+
+    /// The levels of noise that the paper has in this table, or that the study takes if it is not the paper's.
     pub fn levels(self) -> &'static [&'static str] {
         match self {
-            Self::Gradients => &["low"],
-            Self::Main | Self::Noise | Self::Steps => &["low", "high"],
+            Self::Gradients | Self::Evidence | Self::Robustness => &["low"],
+            Self::Main | Self::Noise | Self::Steps | Self::Confidence => &["low", "high"],
         }
     }
 
@@ -90,12 +131,11 @@ impl fmt::Display for Kind {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Method;
 
     #[test]
     fn all_methods_exist() {
-        for kind in [Kind::Main, Kind::Gradients, Kind::Noise, Kind::Steps] {
-            for name in kind.methods() {
+        for kind in Kind::ALL {
+            for name in kind.methods().into_iter().chain(kind.reference()) {
                 assert!(Method::named(name).is_some(), "{name}");
             }
         }

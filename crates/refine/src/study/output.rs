@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use super::calibration;
 use super::csv::csv;
 use super::design::Design;
 use super::document::{markdown, text};
@@ -16,7 +17,7 @@ pub const RECORDS: &str = "records.jsonl";
 /// Seconds by frame and method.
 pub const TIMES: &str = "times.csv";
 
-/// Writes the tables (`tables.txt`, `.md`, `.csv`, `.json`) and the plots (`*.svg`) of a study to a folder and returns the
+/// Writes the tables (`tables.txt`, `.md`, `.csv`, `.json`, and `calibration.csv` where something was believed) and the plots (`*.svg`) of a study to a folder and returns the
 /// tables, and the files.
 ///
 /// # Errors
@@ -38,7 +39,13 @@ pub fn write_outputs(
     let file = folder.join("tables.json");
     let json = serde_json::to_string_pretty(&tables).map_err(|e| fault(&file, e.to_string()))?;
     files.push((file, (json + "\n").into_bytes()));
-    for (name, plot) in plots(&tables, records) {
+    if !tables.calibrations.is_empty() {
+        let file = folder.join("calibration.csv");
+        let bytes =
+            calibration::csv(&tables.calibrations).map_err(|e| fault(&file, e.to_string()))?;
+        files.push((file, bytes));
+    }
+    for (name, plot) in plots(design, &tables, records) {
         let file = folder.join(name);
         let svg = plot.map_err(|e| fault(&file, e))?;
         files.push((file, svg.into_bytes()));

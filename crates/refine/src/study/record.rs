@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::belief::Belief;
 use crate::PlainPose;
 use crate::metrics::PoseScore;
 
@@ -23,7 +24,7 @@ pub struct FrameRecord {
 /// One row of a table, for one frame.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RowOutcome {
-    /// Name of the row: `truth`, `initial`, a method, or a number of steps.
+    /// Name of the row: `truth`, `initial`, a method, a number of steps, or a method with a fault.
     pub row: String,
     /// The pose, object → camera.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -34,6 +35,12 @@ pub struct RowOutcome {
     /// Its metrics.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub score: Option<PoseScore>,
+    /// What was believed of the pose; in the confidence study.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub belief: Option<Belief>,
+    /// Whether something was made wrong with the observation: a failure is a finding then.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub disturbed: bool,
     /// Why there is no pose or no score.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub failed: Option<String>,
@@ -46,9 +53,9 @@ impl FrameRecord {
         format!("{level}: scene {scene_id} image {im_id} object {obj_id}")
     }
 
-    /// Whether any row failed.
+    /// Whether any row failed with whose observation nothing was made wrong.
     pub fn failed(&self) -> bool {
-        self.outcomes.iter().any(|o| o.failed.is_some())
+        self.outcomes.iter().any(|o| o.failed.is_some() && !o.disturbed)
     }
 
     /// The outcome of a row.

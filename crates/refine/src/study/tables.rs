@@ -5,6 +5,8 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::bootstrap::{interval, resampled_means};
+use super::calibration::{Calibration, calibrations};
+use super::comparison::{Comparison, comparisons};
 use super::design::Design;
 use super::kind::{INITIAL, Kind, TRUTH};
 use super::published::{Published, published};
@@ -27,6 +29,9 @@ pub struct Tables {
     pub metrics: [&'static str; COLUMNS.len()],
     /// By level, first over all objects and then by object.
     pub blocks: Vec<Block>,
+    /// Whether what was believed is right; in the confidence study.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub calibrations: Vec<Calibration>,
     /// What failed.
     pub failures: Vec<Failure>,
 }
@@ -42,12 +47,15 @@ pub struct Block {
     pub frames: usize,
     /// One a row of the table.
     pub lines: Vec<Line>,
+    /// Rows compared frame by frame.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub comparisons: Vec<Comparison>,
 }
 
 /// A row of a table.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Line {
-    /// `truth`, `initial`, a method, or a number of steps.
+    /// `truth`, `initial`, a method, a number of steps, or a method with a fault.
     pub row: String,
     /// Frames that have a score.
     pub n: usize,
@@ -96,12 +104,15 @@ pub struct Failure {
     pub rows: Vec<String>,
     /// Why.
     pub reason: String,
+    /// Whether something was made wrong with the observations: that a method cannot do without is a finding then.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub disturbed: bool,
 }
 
 impl Tables {
     /// Summarises the records of a study, by frame.
     pub fn new(design: &Design, records: &BTreeMap<usize, FrameRecord>) -> Self {
-        let rows = design.rows();
+        let (rows, pairs) = (design.rows(), design.pairs());
         let mut blocks = Vec::new();
         let mut failures = Vec::new();
         for level in &design.levels {
@@ -122,6 +133,7 @@ impl Tables {
                     object,
                     frames: chosen.len() + unreadable,
                     lines: lines(design.study, &level.name, object, &rows, &chosen),
+                    comparisons: comparisons(&pairs, &chosen),
                 });
             }
             failures.extend(level.unreadable.iter().map(|reason| Failure {
@@ -130,10 +142,12 @@ impl Tables {
                 frame: "a row of the initial poses".into(),
                 rows: rows.clone(),
                 reason: reason.clone(),
+                disturbed: false,
             }));
             failures.extend(of_level.iter().flat_map(|record| failures_of(record)));
         }
-        Self { study: design.study, metrics: COLUMNS, blocks, failures }
+        let calibrations = calibrations(design, records);
+        Self { study: design.study, metrics: COLUMNS, blocks, calibrations, failures }
     }
 
     /// The blocks over all objects.
@@ -155,7 +169,8 @@ fn failures_of(record: &FrameRecord) -> Vec<Failure> {
     let mut found: Vec<Failure> = Vec::new();
     for outcome in &record.outcomes {
         let Some(reason) = &outcome.failed else { continue };
-        match found.iter_mut().find(|f| f.reason == *reason) {
+        let same = |f: &&mut Failure| f.reason == *reason && f.disturbed == outcome.disturbed;
+        match found.iter_mut().find(same) {
             Some(same) => same.rows.push(outcome.row.clone()),
             None => found.push(Failure {
                 level: record.level.clone(),
@@ -163,6 +178,7 @@ fn failures_of(record: &FrameRecord) -> Vec<Failure> {
                 frame: record.label(),
                 rows: vec![outcome.row.clone()],
                 reason: reason.clone(),
+                disturbed: outcome.disturbed,
             }),
         }
     }
@@ -274,6 +290,7 @@ pub(super) mod tests {
             filters: String::new(),
             methods: vec![method("combined"), method("icp")],
             steps: Vec::new(),
+            sweeps: Vec::new(),
             seed: 0,
             backend: "cpu".into(),
             shard: Shard::WHOLE,

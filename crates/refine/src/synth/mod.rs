@@ -30,6 +30,7 @@ pub use moment::Moment;
 pub use plan::{Subject, SynthSettings};
 pub use ready_made::ready_made_moments;
 pub use scene::{Scene, default_scene};
+pub(crate) use sensor::smooth_field;
 pub use sensor::{
     BackgroundSettings, CalibrationSettings, ColourSettings, DepthSettings, LightSettings,
     MaskSettings, ModelSettings, SensorSettings, SettingError, TouchSettings, ViewpointSettings,

@@ -553,7 +553,7 @@ fn hopeless_runs() {
             "unknown method",
             |_| (),
             "refine --dataset ds --poses init.csv --method magic --out refined.csv",
-            "unknown method: one of combined, ",
+            "unknown method: one of fused, ",
         ),
         (
             "terms of a method without",

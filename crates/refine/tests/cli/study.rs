@@ -181,5 +181,92 @@ fn all_steps_are_of_one_run() {
     assert!(place.path("s10/steps.svg").is_file() && place.path("s10/means-init.svg").is_file());
     let said =
         place.prehend("study steps --dataset ds --poses ds/init.csv --methods nothing --out x");
-    assert!(said.code == 1 && said.err.contains("unknown method \"nothing\": one of combined"));
+    assert!(said.code == 1 && said.err.contains("unknown method \"nothing\": one of fused"));
+}
+
+/// Every line of the records but the first, the design.
+fn outcomes(place: &Workplace, folder: &str) -> Vec<BTreeMap<String, Value>> {
+    let text = place.read(&format!("{folder}/records.jsonl"));
+    let record = |line: &str| -> BTreeMap<String, Value> {
+        let record: Value = serde_json::from_str(line).unwrap();
+        let outcomes = record["entry"]["outcomes"].as_array().unwrap().iter();
+        outcomes.map(|o| (o["row"].as_str().unwrap().to_owned(), o.clone())).collect()
+    };
+    text.lines().skip(1).map(record).collect()
+}
+
+#[test]
+fn evidence_is_compared_with_all_of_it() {
+    let place = Workplace::new();
+    let said = place.succeed(
+        "study evidence --dataset ds --poses low=ds/init.csv --image 0 --out ev \
+         --methods fused,fused-without-depth,fused-only-touch,fused-fixed-joints",
+    );
+    assert!(said.contains("mean less that of fused, same frames") && said.contains("Failed\n"));
+    let [record] = outcomes(&place, "ev").try_into().unwrap();
+    let pose = |row: &str| &record[row]["pose"];
+    for other in ["fused-without-depth", "fused-only-touch", "fused-fixed-joints"] {
+        assert_ne!(pose("fused"), pose(other), "{other}");
+    }
+    let tables: Value = serde_json::from_str(&place.read("ev/tables.json")).unwrap();
+    let comparisons = &tables["blocks"][0]["comparisons"];
+    assert_eq!(comparisons.as_array().unwrap().len(), 3);
+    let pe = |row: &str| record[row]["score"]["pe_cm"].as_f64().unwrap();
+    let difference = comparisons[0]["metrics"][0]["difference"].as_f64().unwrap();
+    assert!((difference - (pe("fused-without-depth") - pe("fused"))).abs() < 1e-12);
+}
+
+#[test]
+fn confidence_is_compared_with_the_truth() {
+    let place = Workplace::new();
+    let study = "study confidence --dataset ds --poses low=ds/init.csv --poses other=ds/init.csv";
+    let said = place.succeed(&format!("{study} --out whole"));
+    assert!(said.contains("all noise, fused: predicted probabilities"), "{said}");
+    for record in outcomes(&place, "whole") {
+        let belief = &record["fused"]["belief"];
+        let squared = |k: usize| belief["squared"][k].as_f64().unwrap();
+        // Of correlated errors the whole is at least each of its parts.
+        assert!(squared(0) >= squared(1).max(squared(2)) - 1e-9, "{belief}");
+        assert!(belief["within"].as_array().unwrap().len() == 7 && belief["weight"].is_number());
+        assert!(record["initial"]["belief"].is_null());
+    }
+    for shard in 0..2 {
+        place.succeed(&format!("{study} --shard {shard}/2 --out part{shard}"));
+    }
+    place.succeed("study merge part0 part1 --out merged");
+    let more = ["calibration.csv", "reliability-low-fused.svg", "reliability-all-fused.svg"];
+    for name in OUTPUTS.iter().chain(&more) {
+        let [merged, whole] = ["merged", "whole"].map(|f| place.read(&format!("{f}/{name}")));
+        assert_eq!(merged, whole, "{name}");
+    }
+    assert!(place.read("whole/calibration.csv").contains("\nlow,fused,2,coverage of 95 %,pose,"));
+}
+
+#[test]
+fn faults_are_swept_and_what_they_make_impossible_is_a_finding() {
+    let place = Workplace::new();
+    let study = "study robustness --dataset ds --poses low=ds/init.csv --image 0 \
+                 --sweeps missing-touch,missing-depth,hand-position --out rob";
+    // No failure, though the ICP fails where all depth is missing.
+    let said = place.succeed(study);
+    let failed = "object 5: robust-icp missing-depth 100: no pixel of the object's mask";
+    assert!(said.contains(failed) && said.contains("mean over that of robust-icp"), "{said}");
+    let [record] = outcomes(&place, "rob").try_into().unwrap();
+    assert_eq!(record.len(), 2 + 2 * (5 + 4 + 2));
+    let pose = |row: &str| &record[row]["pose"];
+    assert_eq!(pose("fused missing-depth 0"), pose("fused hand-position 0"));
+    for other in ["missing-touch 100", "missing-depth 75", "missing-depth 100", "hand-position 5"] {
+        assert!(record[&format!("fused {other}")]["failed"].is_null(), "{other}");
+        assert_ne!(pose("fused missing-touch 0"), pose(&format!("fused {other}")), "{other}");
+    }
+    assert_eq!(pose("robust-icp hand-position 10"), pose("robust-icp hand-position 0"));
+    assert_ne!(pose("robust-icp missing-depth 75"), pose("robust-icp hand-position 0"));
+    assert!(place.read("rob/missing-depth-low.svg").contains("robust-icp failed: 1 at 100"));
+    assert!(place.path("rob/hand-position-low.svg").is_file());
+    // Nothing is left to be done.
+    let times = place.read("rob/times.csv");
+    place.succeed(study);
+    assert_eq!(place.read("rob/times.csv"), times);
+    let said = place.prehend("study robustness --dataset ds --sweeps smell --out x");
+    assert!(said.code == 1 && said.err.contains("unknown sweep \"smell\": one of depth-noise"));
 }

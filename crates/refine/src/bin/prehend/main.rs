@@ -57,7 +57,7 @@ enum Command {
     /// (contact area and intersection volume with the hand).
     /// Where the dataset has models_eval/ or scene_bodies_gt.json, those count as the truth.
     Eval(eval::Arguments),
-    /// Regenerate the paper's tables on a dataset, ours beside the published rows
+    /// Regenerate the paper's tables on a dataset, ours beside the published rows, or measure the fused estimator
     Study(Box<study::Arguments>),
     /// Draw poses over their images, and warn about units and frames, before refining anything
     Check(check::Arguments),

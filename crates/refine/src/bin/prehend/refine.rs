@@ -100,7 +100,7 @@ fn method_help() -> String {
     for method in refine::Method::all() {
         text += &format!("\n  {:<19} {}", method.name, method.summary);
     }
-    text
+    text + "\n  and fused-without-E, fused-only-E and fused-fixed-N, which `prehend study evidence` compares"
 }
 
 impl Method {

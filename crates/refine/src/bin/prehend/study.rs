@@ -11,7 +11,7 @@ use prehend_refine::bop::{Dataset, DatasetError};
 use prehend_refine::identity::{SENSED, TRUTH, canonical, dataset_fingerprint};
 use prehend_refine::study::{
     Design, Examined, Examiner, Failure, Frame, FrameRecord, Kind, Level, MethodSettings, RECORDS,
-    Shard, TIMES, Tables, merge, write_outputs,
+    Shard, Sweep, TIMES, Tables, merge, write_outputs,
 };
 use prehend_refine::{Assets, Config, Identity, Journal, Method, Times, Workers, join_times};
 
@@ -28,14 +28,20 @@ pub(crate) struct Arguments {
 
 #[derive(Subcommand)]
 enum What {
-    /// Baselines and the combined method, at both levels of noise
+    /// Baselines, the combined method and the fused estimator, at both levels of noise
     Main(Run),
     /// Each gradient alone, physics with and without checkpoint, and all together
     Gradients(Run),
-    /// The combined method at all levels of noise
+    /// The robust ICP, the combined method and the fused estimator at all levels of noise
     Noise(Run),
     /// The combined method after more and more steps: no regularisation, no checkpoint, all iterations
     Steps(Run),
+    /// The fused estimator without each kind of evidence, with one kind alone, and with calibrations believed
+    Evidence(Run),
+    /// Whether the fused estimator's covariances and probabilities are right
+    Confidence(Run),
+    /// The robust ICP and the fused estimator when more and more is wrong with the sensors
+    Robustness(Robustness),
     /// Put the shards of a study together
     Merge(Merge),
 }
@@ -56,7 +62,7 @@ struct Run {
     /// Discard what an interrupted run with other settings left, instead of refusing
     #[arg(long, help_heading = "Output")]
     restart: bool,
-    /// Methods to compare, such as "depth,combined" [default: those of the paper's table]
+    /// Methods to compare, such as "depth,combined" [default: those of the study]
     #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = "Method")]
     methods: Option<Vec<String>>,
     /// Iterations at most [default: the method's own; 1000 for steps]
@@ -74,6 +80,15 @@ struct Run {
 }
 
 #[derive(Args)]
+struct Robustness {
+    #[command(flatten)]
+    run: Run,
+    /// Faults to sweep, such as "depth-noise,visibility" [default: all of docs/STUDY.md]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = "Method")]
+    sweeps: Option<Vec<Sweep>>,
+}
+
+#[derive(Args)]
 struct Merge {
     /// The folders of all shards
     #[arg(value_name = "DIR", required = true)]
@@ -88,19 +103,27 @@ struct Merge {
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     match &arguments.what {
-        What::Main(run) => run.study(Kind::Main),
-        What::Gradients(run) => run.study(Kind::Gradients),
-        What::Noise(run) => run.study(Kind::Noise),
-        What::Steps(run) => run.study(Kind::Steps),
+        What::Main(run) => run.study(Kind::Main, &[]),
+        What::Gradients(run) => run.study(Kind::Gradients, &[]),
+        What::Noise(run) => run.study(Kind::Noise, &[]),
+        What::Steps(run) => run.study(Kind::Steps, &[]),
+        What::Evidence(run) => run.study(Kind::Evidence, &[]),
+        What::Confidence(run) => run.study(Kind::Confidence, &[]),
+        What::Robustness(Robustness { run, sweeps }) => {
+            let mut sweeps = sweeps.clone().unwrap_or_else(|| Sweep::ALL.to_vec());
+            sweeps.sort_unstable();
+            sweeps.dedup();
+            run.study(Kind::Robustness, &sweeps)
+        }
         What::Merge(merge) => merge.run(),
     }
 }
 
 impl Run {
-    fn study(&self, kind: Kind) -> anyhow::Result<Outcome> {
+    fn study(&self, kind: Kind, sweeps: &[Sweep]) -> anyhow::Result<Outcome> {
         let dataset = self.selection.open()?;
         let methods = self.methods(kind)?;
-        let (design, frames) = self.design(kind, &dataset, &methods)?;
+        let (design, frames) = self.design(kind, &dataset, &methods, sweeps)?;
         make(&self.out)?;
         let (mut journal, mut records): (_, BTreeMap<usize, FrameRecord>) =
             Journal::open(&self.out.join(RECORDS), &Identity::of(&design), self.restart)?;
@@ -140,7 +163,7 @@ impl Run {
     fn methods(&self, kind: Kind) -> anyhow::Result<Vec<(String, Config)>> {
         let names: Vec<&str> = match &self.methods {
             Some(names) => names.iter().map(String::as_str).collect(),
-            None => kind.methods().to_vec(),
+            None => kind.methods(),
         };
         if kind == Kind::Steps && names.len() != 1 {
             bail!("the steps study is of one method");
@@ -163,6 +186,7 @@ impl Run {
         kind: Kind,
         dataset: &Dataset,
         methods: &[(String, Config)],
+        sweeps: &[Sweep],
     ) -> anyhow::Result<(Design, Vec<Frame>)> {
         let files: Vec<(String, PathBuf)> = if self.poses.is_empty() {
             kind.levels_of(&self.selection.dataset)
@@ -207,6 +231,7 @@ impl Run {
             filters: format!("scenes {scene:?} images {image:?} objects {object:?}"),
             methods: methods.iter().map(settings).collect(),
             steps: methods.first().map_or_else(Vec::new, |(_, c)| Design::steps(kind, c)),
+            sweeps: sweeps.to_vec(),
             seed: self.seed,
             backend: "cpu".into(),
             shard: self.shard,
@@ -253,7 +278,13 @@ fn finish(
 fn outcome(tables: &Tables, records: &BTreeMap<usize, FrameRecord>) -> Outcome {
     Outcome {
         done: records.values().filter(|r| !r.failed()).count(),
-        failures: tables.failures.iter().map(Failure::sentence).collect(),
+        // What comes of a fault that the study itself makes is in its tables.
+        failures: tables
+            .failures
+            .iter()
+            .filter(|failure| !failure.disturbed)
+            .map(Failure::sentence)
+            .collect(),
     }
 }
 

@@ -2,6 +2,8 @@
 
 mod bars;
 mod cumulative;
+mod faults;
+mod reliability;
 mod steps;
 
 use std::collections::BTreeMap;
@@ -9,6 +11,7 @@ use std::collections::BTreeMap;
 use plotters::coord::Shift;
 use plotters::prelude::*;
 
+use super::design::Design;
 use super::kind::Kind;
 use super::record::FrameRecord;
 use super::tables::Tables;
@@ -28,14 +31,28 @@ const STEPS: [usize; 4] = [0, 1, 7, 8];
 
 /// File names and documents.
 pub(super) fn plots(
+    design: &Design,
     tables: &Tables,
     records: &BTreeMap<usize, FrameRecord>,
 ) -> Vec<(String, Result<String, String>)> {
     let mut out = Vec::new();
     for block in tables.overall() {
         let level = &block.level;
+        if tables.study == Kind::Robustness {
+            // The rows are too many for one plot; there is one a sweep instead.
+            for &sweep in &design.sweeps {
+                let name = format!("{sweep}-{level}.svg");
+                out.push((name, faults::draw(design, tables, block, sweep)));
+            }
+            continue;
+        }
         out.push((format!("means-{level}.svg"), bars::draw(tables, block)));
         out.push((format!("cumulative-{level}.svg"), cumulative::draw(tables, block, records)));
+    }
+    for calibration in &tables.calibrations {
+        let level = calibration.level.as_deref().unwrap_or("all");
+        let name = format!("reliability-{level}-{}.svg", calibration.method);
+        out.push((name, reliability::draw(tables, calibration, records)));
     }
     if tables.study == Kind::Steps {
         out.push(("steps.svg".into(), steps::draw(tables)));
@@ -111,7 +128,7 @@ mod tests {
     fn every_plot_is_a_document_with_its_rows_and_failures() {
         let (design, records) = example();
         let tables = Tables::new(&design, &records);
-        let drawn = plots(&tables, &records);
+        let drawn = plots(&design, &tables, &records);
         let names: Vec<&str> = drawn.iter().map(|(name, _)| name.as_str()).collect();
         assert_eq!(
             names,

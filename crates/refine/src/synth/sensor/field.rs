@@ -6,7 +6,7 @@ use prehend_geometry::SplitMix64;
 /// uncorrelated over more than four times `cell` pixels.
 ///
 /// White noise on a lattice of spacing `cell` \[px\], interpolated by cubic B-splines. A cell below one pixel counts as one.
-pub(super) fn smooth_field(
+pub(crate) fn smooth_field(
     width: usize,
     height: usize,
     cell: f64,

@@ -18,6 +18,7 @@ pub use calibration::CalibrationSettings;
 pub use colour::ColourSettings;
 pub use deformation::ModelSettings;
 pub use depth::DepthSettings;
+pub(crate) use field::smooth_field;
 pub use light::LightSettings;
 pub use mask::MaskSettings;
 pub(super) use rig::Rig;

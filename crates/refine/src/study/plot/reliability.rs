@@ -1,0 +1,129 @@
+//! What was predicted beside what was so.
+
+use std::collections::BTreeMap;
+
+use plotters::prelude::*;
+
+use super::super::belief::EVENTS;
+use super::super::calibration::{Calibration, ELLIPSOIDS, beliefs, holding};
+use super::super::record::FrameRecord;
+use super::super::tables::Tables;
+use super::{Area, Drawn, color, page};
+
+/// A name and points, in per cent.
+type Curve = (String, Vec<(f64, f64)>);
+
+/// Events of the panels: distances, angles, and both at once.
+const PANELS: [std::ops::Range<usize>; 3] = [0..3, 3..6, 6..EVENTS.len()];
+
+pub(super) fn draw(
+    tables: &Tables,
+    calibration: &Calibration,
+    records: &BTreeMap<usize, FrameRecord>,
+) -> Result<String, String> {
+    let title = format!("{}: {}", tables.study.title(), calibration.label());
+    let legend = format!(
+        "share of {} poses over predicted probability, in bins of equal counts (ECE: calibration error); \
+         last: share within ellipsoids of the posterior",
+        calibration.n
+    );
+    let believed = beliefs(records, calibration.level.as_deref(), &calibration.method);
+    page(&title, &legend, 420, |k, area| match PANELS.get(k) {
+        Some(range) => {
+            let events = &calibration.events[range.clone()];
+            let curves: Vec<Curve> = events
+                .iter()
+                .map(|event| {
+                    let points = event.bins.iter().map(|b| (100.0 * b.predicted, 100.0 * b.share));
+                    let name = format!("{} (ECE {:.3})", event.event, event.calibration_error);
+                    (name, points.collect())
+                })
+                .collect();
+            panel(area, &curves, "predicted probability, %", "came about, %", true)
+        }
+        None => {
+            let curve = |of: usize| -> Curve {
+                let holding = holding(&believed, of);
+                let total = holding.len().max(1) as f64;
+                let points = holding.iter().enumerate().filter(|(_, p)| p.is_finite());
+                let points =
+                    points.map(|(count, p)| (100.0 * p, 100.0 * (count + 1) as f64 / total));
+                let (name, degrees) = ELLIPSOIDS[of];
+                let name = format!("{name} (χ² of {degrees})");
+                (name, [(0.0, 0.0)].into_iter().chain(points).collect())
+            };
+            let curves: Vec<Curve> = (0..ELLIPSOIDS.len()).map(curve).collect();
+            panel(
+                area,
+                &curves,
+                "nominal probability of the ellipsoid, %",
+                "holds the truth, %",
+                false,
+            )
+        }
+    })
+}
+
+fn panel(area: &Area<'_>, curves: &[Curve], x: &str, y: &str, marked: bool) -> Drawn {
+    let mut chart = ChartBuilder::on(area)
+        .margin(8)
+        .margin_right(24)
+        .x_label_area_size(44)
+        .y_label_area_size(58)
+        .build_cartesian_2d(0.0..100.0, 0.0..100.0)?;
+    chart
+        .configure_mesh()
+        .light_line_style(WHITE)
+        .x_labels(6)
+        .y_labels(6)
+        .x_label_formatter(&|x| format!("{x:.0}"))
+        .y_label_formatter(&|y| format!("{y:.0}"))
+        .label_style(("sans-serif", 14))
+        .x_desc(x)
+        .y_desc(y)
+        .draw()?;
+    let right = [(0.0, 0.0), (100.0, 100.0)];
+    chart.draw_series(DashedLineSeries::new(right, 6, 5, BLACK.mix(0.5).stroke_width(1)))?;
+    for (k, (name, points)) in curves.iter().enumerate() {
+        let style = color(k + 1).stroke_width(2);
+        let line = LineSeries::new(points.iter().copied(), style);
+        chart
+            .draw_series(if marked { line.point_size(3) } else { line })?
+            .label(name)
+            .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], style));
+    }
+    chart
+        .configure_series_labels()
+        .position(SeriesLabelPosition::UpperLeft)
+        .background_style(WHITE.mix(0.85))
+        .border_style(BLACK.mix(0.3))
+        .label_font(("sans-serif", 13))
+        .draw()?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::calibration::tests::calibrated;
+    use super::super::plots;
+    use super::*;
+
+    #[test]
+    fn every_level_has_a_diagram_with_all_events_and_ellipsoids() {
+        let (design, records) = calibrated(30);
+        let tables = Tables::new(&design, &records);
+        let drawn = plots(&design, &tables, &records);
+        for level in ["low", "high", "all"] {
+            let name = format!("reliability-{level}-combined.svg");
+            let svg = &drawn.iter().find(|(n, _)| *n == name).unwrap().1;
+            let svg = svg.as_ref().unwrap();
+            for event in &EVENTS {
+                assert!(svg.contains(&format!("{} (ECE", event.name)), "{}", event.name);
+            }
+            for (name, _) in ELLIPSOIDS {
+                assert!(svg.contains(&format!("{name} (χ²")), "{name}");
+            }
+            assert!(!svg.contains("NaN"));
+        }
+    }
+}
