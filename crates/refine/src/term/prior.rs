@@ -71,7 +71,7 @@ impl Prior {
         let hand = both([s.hand_translation; 3], [s.hand_rotation; 3]);
         let camera = [s.depth_scale, s.depth_bias, s.shift, s.shift, s.magnification];
         let all = object.iter().chain(&hand).chain(&camera).chain(std::iter::once(&s.joints));
-        if let Some(wrong) = all.into_iter().find(|v| !(**v > 0.0)) {
+        if let Some(wrong) = all.into_iter().find(|v| v.is_nan() || **v <= 0.0) {
             let problem = format!("a standard deviation of {wrong} is not positive");
             return Err(RefineError::Setting { name: "prior", problem });
         }
@@ -107,24 +107,36 @@ impl Prior {
         (deviation, jacobian)
     }
 
-    /// Deviation, its derivatives and precisions of the object and the hand.
-    fn poses(&self, state: &State) -> [(Block, Vector6<f64>, Matrix6<f64>, Vector6<f64>); 2] {
+    /// How the object and the hand deviate.
+    fn poses(&self, state: &State) -> [PoseDeviation; 2] {
         let (centre, from) = &self.object;
         let now = state.centre();
-        let object = Self::deviation(&state.t_cam_object, from, centre, &now);
-        let hand = Self::deviation(&state.t_cam_hand, &self.hand, centre, &now);
+        let of = |block, pose, from, precision| {
+            let (deviation, jacobian) = Self::deviation(pose, from, centre, &now);
+            PoseDeviation { block, deviation, jacobian, precision }
+        };
         [
-            (Block::ObjectPose, object.0, object.1, self.precision_object),
-            (Block::HandPose, hand.0, hand.1, self.precision_hand),
+            of(Block::ObjectPose, &state.t_cam_object, from, self.precision_object),
+            of(Block::HandPose, &state.t_cam_hand, &self.hand, self.precision_hand),
         ]
     }
 
     /// Deviation and precision of every joint and every parameter of the camera.
-    fn numbers(&self, state: &State) -> (Vec<(f64, f64)>, Vec<(f64, f64)>) {
+    fn numbers(&self, state: &State) -> [(Block, Vec<(f64, f64)>); 2] {
         let joints = state.joints.iter().zip(&self.joints);
+        let joints: Vec<_> = joints.map(|(q, from)| (q - from, self.precision_joints)).collect();
         let camera = state.camera.parameters().into_iter().zip(self.precision_camera);
-        (joints.map(|(q, from)| (q - from, self.precision_joints)).collect(), camera.collect())
+        [(Block::Joints(joints.len()), joints), (Block::Camera, camera.collect())]
     }
+}
+
+/// How far a pose is from where it is believed to be.
+struct PoseDeviation {
+    block: Block,
+    deviation: Vector6<f64>,
+    /// Derivatives of the deviation by the block.
+    jacobian: Matrix6<f64>,
+    precision: Vector6<f64>,
 }
 
 impl Term for Prior {
@@ -134,19 +146,19 @@ impl Term for Prior {
 
     fn value(&self, state: &State) -> f64 {
         let poses = self.poses(state);
-        let poses = poses.iter().map(|(_, e, _, p)| e.component_mul(e).dot(p));
-        let (joints, camera) = self.numbers(state);
-        let numbers = joints.iter().chain(&camera).map(|(e, p)| e * e * p);
-        0.5 * (poses.sum::<f64>() + numbers.sum::<f64>())
+        let of_poses =
+            poses.iter().map(|p| p.deviation.component_mul(&p.deviation).dot(&p.precision));
+        let numbers = self.numbers(state);
+        let of_numbers = numbers.iter().flat_map(|(_, all)| all).map(|(e, p)| e * e * p);
+        0.5 * (of_poses.sum::<f64>() + of_numbers.sum::<f64>())
     }
 
     fn linearise(&self, state: &State, normal: &mut Normal) -> f64 {
-        for (block, deviation, jacobian, precision) in self.poses(state) {
-            let weighted = nalgebra::Matrix6::from_diagonal(&precision) * jacobian;
+        for PoseDeviation { block, deviation, jacobian, precision } in self.poses(state) {
+            let weighted = Matrix6::from_diagonal(&precision) * jacobian;
             normal.add(&[block], &weighted.tr_mul(&deviation), &jacobian.tr_mul(&weighted));
         }
-        let (joints, camera) = self.numbers(state);
-        for (block, numbers) in [(Block::Joints(joints.len()), joints), (Block::Camera, camera)] {
+        for (block, numbers) in self.numbers(state) {
             normal.add_diagonal(block, &numbers);
         }
         self.value(state)

@@ -23,7 +23,13 @@ pub(super) struct Known<'a> {
     pub(super) robot: Option<&'a Arc<Robot>>,
     /// Depth image of the hand alone.
     pub(super) hand: DepthImage,
+    /// Depth image of all that may hide the object: the hand, and what was seen beside the mask.
+    occluder: DepthImage,
 }
+
+/// How far in front of the object something beside the mask must be to hide it \[m\]: what is seen there may be the
+/// object itself, where the mask falls short.
+const IN_FRONT: f32 = 10e-3;
 
 impl<'a> Known<'a> {
     pub(super) fn new(
@@ -33,7 +39,15 @@ impl<'a> Known<'a> {
     ) -> Self {
         let robot = robot.filter(|_| observation.hand.is_some());
         let hand = hand_depth(observation, robot.map(Arc::as_ref));
-        Self { observation, object, robot, hand }
+        let mut occluder = hand.clone();
+        let seen = observation.depth.pixels().iter().zip(observation.mask.pixels());
+        for (nearest, (depth, masked)) in occluder.pixels_mut().iter_mut().zip(seen) {
+            let known = *nearest > 0.0;
+            if *depth > 0.0 && !masked && (!known || depth + IN_FRONT < *nearest) {
+                *nearest = depth + IN_FRONT;
+            }
+        }
+        Self { observation, object, robot, hand, occluder }
     }
 
     /// How depth points scatter about the object at `state`; `None` without depth.
@@ -69,7 +83,7 @@ impl<'a> Known<'a> {
             terms.push(Box::new(RenderingTerm::new(
                 self.observation,
                 object(),
-                &self.hand,
+                &self.occluder,
                 rendering,
             )?));
         }

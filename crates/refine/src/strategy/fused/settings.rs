@@ -206,8 +206,8 @@ impl Default for FusedSettings {
             spread: 10e-3,
             exactness: true,
             most_points: 20.0,
-            covariance_scale: 1.0,
-            model_tolerance: 7e-4,
+            covariance_scale: 1.1,
+            model_tolerance: 6e-4,
             rendering: RenderingSettings {
                 downsample: 1,
                 effective_pixels: 50.0,
