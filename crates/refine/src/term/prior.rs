@@ -37,8 +37,8 @@ impl Default for PriorSettings {
         Self {
             object_translation: [0.03; 3],
             object_rotation: [0.4; 3],
-            hand_translation: 2.5e-3,
-            hand_rotation: 8e-3,
+            hand_translation: 2.1e-3,
+            hand_rotation: 7e-3,
             joints: 0.014,
             depth_scale: 4e-3,
             depth_bias: 1e-3,
