@@ -66,7 +66,7 @@ const DISAGREES: f64 = 5.0;
 
 impl Confidence {
     /// Of the solutions `found`, the best first; `inflation` multiplies covariances, `radius` turns radians into metres.
-    pub(super) fn new(found: &[(Point, Ending)], inflation: f64, radius: f64) -> Self {
+    pub(crate) fn new(found: &[(Point, Ending)], inflation: f64, radius: f64) -> Self {
         let (best, ending) = &found[0];
         let covariances: Vec<(Matrix6<f64>, f64)> =
             found.iter().map(|(point, _)| laplace(point, inflation)).collect();

@@ -13,17 +13,17 @@ use crate::term::{
 use crate::{Object, Observation, RefineError, Robot, State};
 
 /// What is known of one frame.
-pub(super) struct Known<'a> {
+pub(crate) struct Known<'a> {
     pub(super) observation: &'a Observation,
     pub(super) object: &'a Arc<Object>,
     /// The robot, if its state is known too.
-    pub(super) robot: Option<&'a Arc<Robot>>,
+    pub(crate) robot: Option<&'a Arc<Robot>>,
     /// Depth image of the hand alone.
     pub(super) hand: DepthImage,
 }
 
 impl<'a> Known<'a> {
-    pub(super) fn new(
+    pub(crate) fn new(
         observation: &'a Observation,
         object: &'a Arc<Object>,
         robot: Option<&'a Arc<Robot>>,
@@ -34,7 +34,7 @@ impl<'a> Known<'a> {
     }
 
     /// The terms of `stage`, a prior about `initial` among them.
-    pub(super) fn terms(
+    pub(crate) fn terms(
         &self,
         initial: &State,
         stage: &Stage,
