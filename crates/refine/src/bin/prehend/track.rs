@@ -239,9 +239,14 @@ fn probability(tracked: &Tracked) -> f64 {
 
 /// What became of `frames`, which are not empty.
 fn told(frames: &[Done]) -> String {
-    let mut seconds: Vec<f64> =
-        frames.iter().map(|f| f.tracked.spent.total().as_secs_f64()).collect();
-    let rate = frames.len() as f64 / seconds.iter().sum::<f64>();
+    // To find an object takes far longer than to follow it, and is rare.
+    let rare = |f: &&Done| matches!(f.tracked.following, Following::Found | Following::Lost);
+    let of = |f: &Done| f.tracked.spent.total().as_secs_f64();
+    let mut seconds: Vec<f64> = frames.iter().filter(|f| !rare(f)).map(of).collect();
+    if seconds.is_empty() {
+        seconds = frames.iter().map(of).collect();
+    }
+    let rate = seconds.len() as f64 / seconds.iter().sum::<f64>();
     seconds.sort_by(f64::total_cmp);
     let median = 1e3 * seconds[seconds.len() / 2];
     let mut text =
