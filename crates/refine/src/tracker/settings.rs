@@ -100,9 +100,9 @@ impl Default for TrackerSettings {
                 colour: true,
                 contact: true,
             },
-            held: MotionSettings { translation: 0.05, rotation: 0.5, gain: 0.1 },
+            held: MotionSettings { translation: 0.02, rotation: 0.2, gain: 0.1 },
             free: MotionSettings { translation: 0.3, rotation: 2.0, gain: 0.5 },
-            memory: 1.0,
+            memory: 3.0,
             budget: None,
             loss: LossSettings {
                 misfit_ratio: 2.5,
