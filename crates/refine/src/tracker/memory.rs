@@ -119,7 +119,7 @@ impl Memory {
         let coasting = COASTING * (1.0 - (-seconds / COASTING).exp());
         let mut state = told.clone();
         state.t_cam_object = perturb_about(&rest, &centre, &(velocity * coasting));
-        state.light = self.state.light.clone();
+        state.light = self.state.light;
         if in_hand {
             state.t_cam_hand = told.t_cam_hand * part(&self.hand_error, kept);
             let errors = self.joint_errors.iter();

@@ -145,6 +145,8 @@ impl Solved {
     }
 }
 
+type Terms = Vec<Box<dyn Term>>;
+
 /// Part of the way that the level of misfits goes to the next one.
 const LEVEL_GAIN: f64 = 0.1;
 /// By how much of itself the level grows while an object is lost: circumstances may have changed for good.
@@ -265,7 +267,7 @@ impl Tracker {
         &self,
         known: &Known<'_>,
         prediction: &Prediction,
-    ) -> Result<(Vec<Box<dyn Term>>, Arc<Carried>), RefineError> {
+    ) -> Result<(Terms, Arc<Carried>), RefineError> {
         let Prediction { state, covariance, layout, .. } = prediction;
         let carried = Carried::new(state.clone(), *layout, covariance).ok_or_else(|| {
             let problem = "does not allow for a prediction".to_owned();
@@ -379,8 +381,7 @@ impl Tracker {
         level: f64,
     ) -> Option<Doubt> {
         let (loss, misfit) = (&self.settings.loss, solved.misfit());
-        // Written so that a misfit that is no number is one too many.
-        if !(misfit <= loss.misfit_ratio * level + loss.misfit_margin) {
+        if misfit.is_nan() || misfit > loss.misfit_ratio * level + loss.misfit_margin {
             return Some(Doubt::Misfit(misfit, level));
         }
         let surprise = carried.map_or(0.0, |c| c.surprise(&solved.point.state));

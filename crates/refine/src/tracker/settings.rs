@@ -130,7 +130,7 @@ impl TrackerSettings {
             ("loss.deviation", self.loss.deviation),
         ];
         for (name, value) in positive {
-            if !(value > 0.0) {
+            if value.is_nan() || value <= 0.0 {
                 return Err(RefineError::Setting { name, problem: format!("is {value}") });
             }
         }
