@@ -16,7 +16,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! [`initial`] makes poses to start from, [`Method`] names ways to refine them, [`bop`] reads and writes datasets, [`Scorer`] and [`metrics`] measure poses, [`report`] draws them.
+//! [`initial`] makes poses to start from, [`Method`] names ways to refine them, [`tracker`] follows an object through frames, [`bop`] reads and writes datasets, [`Scorer`] and [`metrics`] measure poses, [`report`] draws them.
 
 mod assets;
 pub mod bop;
@@ -48,6 +48,7 @@ pub mod synth;
 pub mod term;
 mod times;
 pub mod trace;
+pub mod tracker;
 mod workers;
 
 pub use assets::{AssetError, Assets, load_mesh, load_object};

@@ -1,6 +1,6 @@
 //! Made-up frames whose truth is known: to try things on, to test with, and to measure methods by.
 //!
-//! [`default_scene`] is one ready-made frame; [`generate`] makes whole datasets of [`Moment`]s as sensors would see them
+//! [`default_scene`] is one ready-made frame, [`default_sequence`] many of them; [`generate`] makes whole datasets of [`Moment`]s as sensors would see them
 //! ([`SensorSettings`]).
 
 mod annotation;
@@ -20,6 +20,7 @@ mod scene_files;
 mod seeds;
 mod sensing;
 mod sensor;
+mod sequence;
 
 pub use dataset::write_dataset;
 pub use error::SynthError;
@@ -35,3 +36,4 @@ pub use sensor::{
     BackgroundSettings, CalibrationSettings, ColourSettings, DepthSettings, LightSettings,
     MaskSettings, ModelSettings, SensorSettings, SettingError, TouchSettings, ViewpointSettings,
 };
+pub use sequence::{Sequence, SequenceFrame, default_sequence};

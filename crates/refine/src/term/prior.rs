@@ -89,7 +89,7 @@ impl Prior {
 
     /// How far `pose` has been moved from `from`, as (displacement of the point that was at `point`, rotation vector),
     /// and the derivatives by a left twist of `pose` about `centre`.
-    fn deviation(
+    pub(crate) fn deviation(
         pose: &Isometry3<f64>,
         from: &Isometry3<f64>,
         point: &Vector3<f64>,

@@ -8,4 +8,5 @@ mod fixture;
 mod initial;
 mod resume;
 mod study;
+mod track;
 mod truth;

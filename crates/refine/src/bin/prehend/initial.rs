@@ -13,7 +13,7 @@ use prehend_refine::bop::{
     Dataset, DatasetError, GroundTruth, ResultRow, check_writable, share_image_times, write_results,
 };
 use prehend_refine::initial::{NoiseLevel, PoseSearch, SearchSettings, Target, find_targets};
-use prehend_refine::{AssetError, Assets, RefineError, TermKind};
+use prehend_refine::{AssetError, Assets, Observation, RefineError, Robot, TermKind};
 
 use crate::options::{Selection, label};
 use crate::outcome::Outcome;
@@ -158,11 +158,7 @@ fn search_one(
     searches: &mut BTreeMap<u32, PoseSearch>,
     target: Target,
 ) -> Result<(Isometry3<f64>, f64), AssetError> {
-    let frame = assets.dataset().frame(target.scene_id, target.im_id)?;
-    // Touch where there is some.
-    let feels = !matches!(frame.tactile(), Err(DatasetError::Missing { .. }));
-    let terms: &[TermKind] = if feels { &[TermKind::Tactile] } else { &[] };
-    let (observation, robot) = assets.observation(&frame, target.instance, terms)?;
+    let (observation, robot) = observed(assets, target.scene_id, target.im_id, target.instance)?;
     let search = match searches.entry(target.obj_id) {
         Entry::Occupied(known) => known.into_mut(),
         Entry::Vacant(unknown) => {
@@ -173,4 +169,17 @@ fn search_one(
     let found = search.run(&observation, robot.as_ref())?;
     let best = found.first().ok_or(RefineError::NothingFits)?;
     Ok((best.t_cam_object, best.value))
+}
+
+/// An image with touch where there is some, and the robot if the image says where it is.
+pub(crate) fn observed(
+    assets: &mut Assets<'_>,
+    scene_id: u32,
+    im_id: u32,
+    instance: usize,
+) -> Result<(Observation, Option<Arc<Robot>>), AssetError> {
+    let frame = assets.dataset().frame(scene_id, im_id)?;
+    let feels = !matches!(frame.tactile(), Err(DatasetError::Missing { .. }));
+    let terms: &[TermKind] = if feels { &[TermKind::Tactile] } else { &[] };
+    assets.observation(&frame, instance, terms)
 }

@@ -13,6 +13,7 @@ mod refine;
 mod study;
 mod symmetry;
 mod synth;
+mod track;
 
 use std::process::ExitCode;
 
@@ -50,6 +51,10 @@ enum Command {
     Refine(Box<refine::Arguments>),
     /// Make initial poses: the true ones with errors, or found by a search from sensors alone
     Initial(initial::Arguments),
+    /// Follow objects through the images of scenes, taken for the frames of a camera
+    ///
+    /// An image's pose comes from the one before it; an object that is lost is looked for.
+    Track(Box<track::Arguments>),
     /// Score poses against a dataset's ground truth
     ///
     /// Prints means and medians, overall and by object, of PE and OE (position and rotation error), of
@@ -84,6 +89,7 @@ fn main() -> ExitCode {
     let outcome = match arguments.command {
         Command::Refine(arguments) => refine::run(&arguments),
         Command::Initial(arguments) => initial::run(&arguments),
+        Command::Track(arguments) => track::run(&arguments),
         Command::Eval(arguments) => eval::run(&arguments),
         Command::Study(arguments) => study::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),

@@ -57,11 +57,11 @@ pub struct Confidence {
 
 /// What makes posteriors as wide as errors are.
 #[derive(Clone, Copy)]
-pub(super) struct Width {
+pub(crate) struct Width {
     /// What covariances are multiplied by.
-    pub(super) scale: f64,
+    pub(crate) scale: f64,
     /// How far the object's surface may be from the model's \[m\].
-    pub(super) model_tolerance: f64,
+    pub(crate) model_tolerance: f64,
 }
 
 /// Random poses that stand for the posterior.
@@ -75,7 +75,7 @@ const DISAGREES: f64 = 5.0;
 
 impl Confidence {
     /// Of the solutions `found`, the best first; `radius` turns radians into metres of surface motion.
-    pub(super) fn new(found: &[(Point, Ending)], width: Width, radius: f64) -> Self {
+    pub(crate) fn new(found: &[(Point, Ending)], width: Width, radius: f64) -> Self {
         let (best, ending) = &found[0];
         // Half the radius is about where the surface is, on average.
         let turn = (2.0 * width.model_tolerance / radius).powi(2);

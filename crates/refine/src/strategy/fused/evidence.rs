@@ -16,11 +16,11 @@ use crate::{Object, Observation, RefineError, Robot, State};
 const SCATTERED: usize = 1200;
 
 /// What is known of one frame.
-pub(super) struct Known<'a> {
+pub(crate) struct Known<'a> {
     pub(super) observation: &'a Observation,
     pub(super) object: &'a Arc<Object>,
     /// The robot, if its state is known too.
-    pub(super) robot: Option<&'a Arc<Robot>>,
+    pub(crate) robot: Option<&'a Arc<Robot>>,
     /// Depth image of the hand alone.
     pub(super) hand: DepthImage,
     /// Depth image of all that may hide the object: the hand, and what was seen beside the mask.
@@ -32,7 +32,7 @@ pub(super) struct Known<'a> {
 const IN_FRONT: f32 = 10e-3;
 
 impl<'a> Known<'a> {
-    pub(super) fn new(
+    pub(crate) fn new(
         observation: &'a Observation,
         object: &'a Arc<Object>,
         robot: Option<&'a Arc<Robot>>,
@@ -60,7 +60,7 @@ impl<'a> Known<'a> {
     }
 
     /// The terms of `stage`, a prior about `initial` among them.
-    pub(super) fn terms(
+    pub(crate) fn terms(
         &self,
         initial: &State,
         stage: &Stage,

@@ -14,12 +14,12 @@ use std::sync::Arc;
 use nalgebra::Translation3;
 use rayon::prelude::*;
 
-use self::confidence::Width;
+pub(crate) use self::confidence::Width;
 pub use self::confidence::{Confidence, Disagreement, Hypothesis, Unobserved};
-use self::evidence::Known;
+pub(crate) use self::evidence::Known;
 pub use self::settings::{Evidence, FusedSettings, Nuisance, Stage};
 pub use self::solve::Ending;
-use self::solve::{Point, solve};
+pub(crate) use self::solve::{Point, balanced, solve};
 pub use self::summary::ConfidenceSummary;
 use crate::trace::{Iteration, Trace};
 use crate::{Block, Object, Observation, RefineError, Robot, State};
@@ -128,7 +128,7 @@ impl Fused {
     }
 
     /// What is solved for.
-    fn blocks(&self, known: &Known<'_>, state: &State) -> Vec<Block> {
+    pub(crate) fn blocks(&self, known: &Known<'_>, state: &State) -> Vec<Block> {
         let joints = state.joints.len();
         let mut blocks = vec![Block::ObjectPose];
         for nuisance in &self.settings.nuisances {

@@ -7,27 +7,27 @@ use crate::{Block, Normal, State, Term};
 
 /// A state, the value of the terms there, and their derivatives.
 #[derive(Clone)]
-pub(super) struct Point {
-    pub(super) state: State,
+pub(crate) struct Point {
+    pub(crate) state: State,
     /// Nats.
-    pub(super) value: f64,
-    pub(super) normal: Normal,
+    pub(crate) value: f64,
+    pub(crate) normal: Normal,
     /// The same of each term.
-    pub(super) parts: Vec<Part>,
+    pub(crate) parts: Vec<Part>,
 }
 
 /// What one term brings.
 #[derive(Clone)]
-pub(super) struct Part {
-    pub(super) name: &'static str,
+pub(crate) struct Part {
+    pub(crate) name: &'static str,
     /// Nats.
-    pub(super) value: f64,
-    pub(super) normal: Normal,
+    pub(crate) value: f64,
+    pub(crate) normal: Normal,
 }
 
 impl Point {
     /// The terms at `state`, whose light is solved for.
-    pub(super) fn new(terms: &[Box<dyn Term>], mut state: State, blocks: &[Block]) -> Self {
+    pub(crate) fn new(terms: &[Box<dyn Term>], mut state: State, blocks: &[Block]) -> Self {
         terms.iter().for_each(|t| t.refresh(&mut state));
         let parts: Vec<Part> = terms
             .par_iter()
@@ -74,7 +74,7 @@ const LAST_DAMPING: f64 = 1e6;
 
 /// Lowers the sum of `terms` from `point` in at most `iterations` steps, calling `visit` at every point that is lower than the
 /// one before; ends when that returns false (Marquardt, 1963).
-pub(super) fn solve(
+pub(crate) fn solve(
     terms: &[Box<dyn Term>],
     mut point: Point,
     iterations: usize,
@@ -118,7 +118,7 @@ fn step(normal: &Normal, damping: f64) -> Option<(DVector<f64>, f64)> {
 }
 
 /// `matrix` with its diagonal scaled to one, and what its rows and columns were multiplied by.
-pub(super) fn balanced(matrix: &DMatrix<f64>) -> (DMatrix<f64>, DVector<f64>) {
+pub(crate) fn balanced(matrix: &DMatrix<f64>) -> (DMatrix<f64>, DVector<f64>) {
     let scale = matrix.diagonal().map(|d| if d > 0.0 { d.sqrt().recip() } else { 1.0 });
     let n = scale.len();
     (DMatrix::from_fn(n, n, |r, c| matrix[(r, c)] * scale[r] * scale[c]), scale)

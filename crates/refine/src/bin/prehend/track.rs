@@ -1,0 +1,288 @@
+//! `prehend track`.
+
+use std::collections::BTreeMap;
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Duration;
+
+use anyhow::bail;
+use clap::Args;
+use nalgebra::Isometry3;
+use prehend_refine::bop::{Dataset, ResultRow, check_writable, share_image_times, write_results};
+use prehend_refine::initial::find_targets;
+use prehend_refine::tracker::{Following, Recovery, Tracked, Tracker, TrackerSettings};
+use prehend_refine::{AssetError, Assets, PlainPose};
+use serde_json::json;
+
+use crate::initial::observed;
+use crate::options::{Selection, label};
+use crate::outcome::Outcome;
+use crate::output::say;
+use crate::progress;
+
+#[derive(Args)]
+#[command(
+    override_usage = "prehend track --dataset <DIR> --poses <FILE> --out <FILE> [OPTIONS]\n       \
+                            prehend track --dataset <DIR> --search --out <FILE> [OPTIONS]"
+)]
+pub(crate) struct Arguments {
+    #[command(flatten)]
+    selection: Selection,
+    /// Begin at the first pose of every object of a scene in this BOP results file
+    #[arg(
+        long,
+        value_name = "FILE",
+        required_unless_present = "search",
+        conflicts_with = "search",
+        help_heading = "Input"
+    )]
+    poses: Option<PathBuf>,
+    /// Begin by searching for the objects in the first image
+    #[arg(long, help_heading = "Input")]
+    search: bool,
+    /// What to search for, as BOP's test_targets_bop19.json has it
+    /// [default: that file of the dataset, or the only object in every image]
+    #[arg(long, value_name = "FILE", requires = "search", help_heading = "Input")]
+    targets: Option<PathBuf>,
+    /// Images a second: those of a scene, in order of their ids, are the frames; ids that are missing count
+    #[arg(long, value_name = "HZ", default_value_t = 30.0, help_heading = "Input")]
+    rate: f64,
+    /// Write the poses here, as a BOP results file with a row an image; an existing one is replaced
+    ///
+    /// The score is the probability that a pose is within 5 mm and 5°, and 0 where the object is lost: there the pose is
+    /// where it should be.
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    out: PathBuf,
+    /// Print JSON on standard output: poses, states, times and failures
+    #[arg(long, help_heading = "Output")]
+    json: bool,
+    /// Put times into the results' last column, which is -1 otherwise
+    #[arg(long, help_heading = "Output")]
+    time: bool,
+    /// Time that following may take in a frame: the pose is then the best until there, and no longer the same every time
+    /// [default: none]
+    #[arg(long, value_name = "MS", help_heading = "Method")]
+    budget: Option<f64>,
+    /// What to do when an object is lost, whatever time it takes: off, near (look about where it should be), or anywhere
+    #[arg(long, value_name = "HOW", default_value = "anywhere", help_heading = "Method")]
+    recovery: Recovery,
+    /// Worker threads; the poses are the same for any number [default: all cores]
+    #[arg(long, value_name = "N", help_heading = "Method")]
+    threads: Option<NonZeroUsize>,
+}
+
+/// An object of a scene, to be followed from an image on.
+struct Sequence {
+    scene_id: u32,
+    obj_id: u32,
+    instance: usize,
+    first: u32,
+    /// The search says where if it is not known.
+    initial: Option<Isometry3<f64>>,
+}
+
+/// A frame that is done.
+struct Done {
+    row: ResultRow,
+    tracked: Tracked,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
+    check_writable(&arguments.out)?;
+    if !(arguments.rate.is_finite() && arguments.rate > 0.0) {
+        bail!("--rate: {} is no number of images a second", arguments.rate);
+    }
+    let settings = arguments.settings()?;
+    if let Some(threads) = arguments.threads {
+        rayon::ThreadPoolBuilder::new().num_threads(threads.get()).build_global()?;
+    }
+    let dataset = arguments.selection.open()?;
+    let (sequences, mut failures) = arguments.sequences(&dataset)?;
+    let mut assets = Assets::new(&dataset, 0);
+    let mut frames = Vec::new();
+    for sequence in &sequences {
+        let followed =
+            arguments.follow(&mut assets, sequence, &settings, &mut frames, &mut failures);
+        if let Err(error) = followed {
+            let Sequence { scene_id, obj_id, .. } = sequence;
+            failures.push(format!("scene {scene_id} object {obj_id}: {error}"));
+        }
+    }
+    let out = arguments.out.display();
+    if frames.is_empty() {
+        failures.push(format!("there is no pose, {out} was not written"));
+    } else {
+        let mut rows: Vec<ResultRow> = frames.iter().map(|f| f.row.clone()).collect();
+        share_image_times(&mut rows);
+        write_results(&arguments.out, &rows)?;
+    }
+    if arguments.json {
+        let frames: Vec<_> = frames.iter().map(summary).collect();
+        let document = json!({ "frames": frames, "failures": failures });
+        say(format!("{document:#}"))?;
+    } else if !frames.is_empty() {
+        say(format!("{}, written to {out}", told(&frames)))?;
+    }
+    Ok(Outcome { done: frames.len(), failures })
+}
+
+impl Arguments {
+    fn settings(&self) -> anyhow::Result<TrackerSettings> {
+        let budget = self.budget.map(|ms| Duration::try_from_secs_f64(ms * 1e-3));
+        Ok(TrackerSettings {
+            budget: budget.transpose().map_err(|e| anyhow::anyhow!("--budget: {e}"))?,
+            recovery: self.recovery,
+            ..TrackerSettings::default()
+        })
+    }
+
+    /// What to follow, in order, and what is wrong with rows of the poses.
+    fn sequences(&self, dataset: &Dataset) -> anyhow::Result<(Vec<Sequence>, Vec<String>)> {
+        let (mut starts, mut faults) = (Vec::new(), Vec::new());
+        if let Some(poses) = &self.poses {
+            let (jobs, errors) = self.selection.jobs(poses)?;
+            faults = errors;
+            for job in jobs {
+                let ResultRow { scene_id, im_id, obj_id, t_cam_model, .. } = job.row;
+                let instance = job.instance;
+                let (first, initial) = (im_id, Some(t_cam_model));
+                starts.push(Sequence { scene_id, obj_id, instance, first, initial });
+            }
+        } else {
+            for target in find_targets(dataset, self.targets.as_deref())? {
+                let (scene_id, obj_id, first) = (target.scene_id, target.obj_id, target.im_id);
+                if self.selection.admits(scene_id, first, obj_id) {
+                    let instance = target.instance;
+                    starts.push(Sequence { scene_id, obj_id, instance, first, initial: None });
+                }
+            }
+            if starts.is_empty() {
+                bail!("nothing is of the scenes, images and objects asked for");
+            }
+        }
+        let mut sequences = BTreeMap::new();
+        for start in starts {
+            let key = (start.scene_id, start.obj_id, start.instance);
+            let earliest = sequences.entry(key).or_insert_with(|| Sequence { ..start });
+            if start.first < earliest.first {
+                *earliest = start;
+            }
+        }
+        Ok((sequences.into_values().collect(), faults))
+    }
+
+    /// Follows one object; the frames that are done join `frames`, those at fault `failures`.
+    fn follow(
+        &self,
+        assets: &mut Assets<'_>,
+        sequence: &Sequence,
+        settings: &TrackerSettings,
+        frames: &mut Vec<Done>,
+        failures: &mut Vec<String>,
+    ) -> Result<(), AssetError> {
+        let Sequence { scene_id, obj_id, instance, first, initial } = *sequence;
+        let object = assets.object(obj_id)?;
+        let mut images = assets.dataset().scene(scene_id)?.images()?;
+        images.retain(|id| *id >= first && self.selection.admits_image(scene_id, *id));
+        let mut tracker: Option<Tracker> = None;
+        let bar = progress::bar(images.len() as u64, "tracking");
+        for im_id in images {
+            let mut row = ResultRow {
+                scene_id,
+                im_id,
+                obj_id,
+                score: 0.0,
+                t_cam_model: Isometry3::identity(),
+                time: -1.0,
+            };
+            let mut frame = || -> Result<Tracked, AssetError> {
+                let (observation, robot) = observed(assets, scene_id, im_id, instance)?;
+                let time = Duration::from_secs_f64(f64::from(im_id - first) / self.rate);
+                let tracker = match &mut tracker {
+                    Some(tracker) => tracker,
+                    none => {
+                        let mut new = Tracker::new(Arc::clone(&object), robot, settings.clone())?;
+                        initial.iter().for_each(|pose| new.start_from(pose));
+                        none.insert(new)
+                    }
+                };
+                Ok(tracker.track(&observation, time)?)
+            };
+            match frame() {
+                Ok(tracked) => {
+                    bar.set_message(tracked.following.name());
+                    if let (Following::Lost, Some(doubt)) = (tracked.following, tracked.doubt) {
+                        bar.suspend(|| eprintln!("warning: {}: lost: {doubt}", label(&row)));
+                    }
+                    row.t_cam_model = tracked.t_cam_object;
+                    row.score = probability(&tracked);
+                    if self.time {
+                        row.time = tracked.spent.total().as_secs_f64();
+                    }
+                    frames.push(Done { row, tracked });
+                }
+                Err(error) => failures.push(format!("{}: {error}", label(&row))),
+            }
+            bar.inc(1);
+        }
+        bar.finish_and_clear();
+        Ok(())
+    }
+}
+
+/// Of the pose being within 5 mm and 5°.
+fn probability(tracked: &Tracked) -> f64 {
+    let confidence = tracked.confidence.as_ref();
+    confidence.map_or(0.0, |c| c.probability_within(5e-3, 5f64.to_radians()))
+}
+
+/// What became of `frames`, which are not empty.
+fn told(frames: &[Done]) -> String {
+    // To find an object takes far longer than to follow it, and is rare.
+    let rare = |f: &&Done| matches!(f.tracked.following, Following::Found | Following::Lost);
+    let of = |f: &Done| f.tracked.spent.total().as_secs_f64();
+    let mut seconds: Vec<f64> = frames.iter().filter(|f| !rare(f)).map(of).collect();
+    if seconds.is_empty() {
+        seconds = frames.iter().map(of).collect();
+    }
+    let rate = seconds.len() as f64 / seconds.iter().sum::<f64>();
+    seconds.sort_by(f64::total_cmp);
+    let median = 1e3 * seconds[seconds.len() / 2];
+    let mut text =
+        format!("{} frames tracked at {rate:.1} a second, median {median:.1} ms: ", frames.len());
+    let all = [Following::Followed, Following::Predicted, Following::Found, Following::Lost];
+    let counts: Vec<String> = all
+        .into_iter()
+        .map(|f| (f, frames.iter().filter(|d| d.tracked.following == f).count()))
+        .filter(|(_, count)| *count > 0)
+        .map(|(following, count)| format!("{count} {}", following.name()))
+        .collect();
+    text += &counts.join(", ");
+    text
+}
+
+fn summary(frame: &Done) -> serde_json::Value {
+    let Done { row, tracked } = frame;
+    let pose = PlainPose::from(&tracked.t_cam_object);
+    let milliseconds = |d: Duration| 1e3 * d.as_secs_f64();
+    let spent = &tracked.spent;
+    json!({
+        "scene_id": row.scene_id,
+        "im_id": row.im_id,
+        "obj_id": row.obj_id,
+        "following": tracked.following.name(),
+        "doubt": tracked.doubt.map(|d| d.to_string()),
+        "iterations": tracked.iterations,
+        "misfit": tracked.misfit.is_finite().then_some(tracked.misfit),
+        "probability_within_5mm_5deg": row.score,
+        "milliseconds": {
+            "preparation": milliseconds(spent.preparation),
+            "steps": milliseconds(spent.steps),
+            "judgement": milliseconds(spent.judgement),
+            "recovery": milliseconds(spent.recovery),
+        },
+        "t_cam_model_mm": pose.translation_m.map(|v| v * 1e3),
+        "quaternion_wxyz": pose.quaternion_wxyz,
+    })
+}

@@ -1,0 +1,215 @@
+//! What a tracker keeps from one frame to the next.
+
+use std::time::Duration;
+
+use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, UnitQuaternion, Vector3, Vector6};
+use prehend_autodiff::lie::{perturb_about, so3_log};
+
+use super::carried::Layout;
+use super::settings::{MotionSettings, TrackerSettings};
+use crate::strategy::{Point, balanced};
+use crate::term::PriorSettings;
+use crate::{Block, CameraCorrection, State};
+
+/// Time within which an object that is not seen comes to rest, all but 1/e of its velocity \[s\].
+const COASTING: f64 = 0.25;
+
+/// The last pose that was believed, and what was learnt with it.
+#[derive(Clone, Debug)]
+pub(super) struct Memory {
+    /// When that was.
+    pub(super) time: Duration,
+    /// The solution of that frame.
+    pub(super) state: State,
+    /// Whether the hand was known.
+    in_hand: bool,
+    /// The hand as it is, in the frame of the hand as it was said to be.
+    hand_error: Isometry3<f64>,
+    /// Joint positions as they are, less those that were said.
+    joint_errors: Vec<f64>,
+    /// Twist about the object's centre, in the camera frame of then, relative to the hand where that was known
+    /// \[m/s; rad/s\].
+    velocity: Vector6<f64>,
+    /// Of the solution: see [`Layout`].
+    covariance: DMatrix<f64>,
+    layout: Layout,
+    /// Running level of the misfit \[nat\].
+    pub(super) level: f64,
+}
+
+/// What is expected of a frame before it is looked at.
+pub(super) struct Prediction {
+    pub(super) state: State,
+    pub(super) covariance: DMatrix<f64>,
+    pub(super) layout: Layout,
+    /// Where the object would be without its velocity.
+    rest: Isometry3<f64>,
+    velocity: Vector6<f64>,
+    seconds: f64,
+}
+
+impl Memory {
+    /// Of `point`, the solution of a frame in which the hand was said to be as in `told`, and known if `in_hand`.
+    pub(super) fn new(
+        time: Duration,
+        point: &Point,
+        told: &State,
+        in_hand: bool,
+        accuracy: &PriorSettings,
+        level: f64,
+    ) -> Self {
+        let layout = Layout::new(if in_hand { told.joints.len() } else { 0 });
+        let joints = point.state.joints.iter().zip(&told.joints);
+        Self {
+            time,
+            state: point.state.clone(),
+            in_hand,
+            hand_error: told.t_cam_hand.inverse() * point.state.t_cam_hand,
+            joint_errors: joints.map(|(is, said)| is - said).collect(),
+            velocity: Vector6::zeros(),
+            covariance: posterior(point, layout, accuracy),
+            layout,
+            level,
+        }
+    }
+
+    /// The next of this memory: as [`new`](Self::new), and with the velocity between `prediction` and there.
+    pub(super) fn followed(
+        mut next: Self,
+        prediction: &Prediction,
+        motion: &MotionSettings,
+    ) -> Self {
+        next.velocity = prediction.velocity;
+        if prediction.seconds > 0.0 {
+            let moved = next.state.t_cam_object * prediction.rest.inverse();
+            let rest = prediction.rest * next.state.object_centre;
+            let off = next.state.centre() - rest.coords;
+            let turn = so3_log(&moved.rotation);
+            let measured =
+                Vector6::new(off.x, off.y, off.z, turn.x, turn.y, turn.z) / prediction.seconds;
+            next.velocity += motion.gain * (measured - next.velocity);
+        }
+        next
+    }
+
+    /// What is expected at `time` where the hand is said to be as in `told`, and known if `in_hand`.
+    pub(super) fn predict(
+        &self,
+        time: Duration,
+        told: &State,
+        in_hand: bool,
+        settings: &TrackerSettings,
+    ) -> Prediction {
+        let seconds = time.saturating_sub(self.time).as_secs_f64();
+        let motion = if in_hand { &settings.held } else { &settings.free };
+        let layout = Layout::new(if in_hand { told.joints.len() } else { 0 });
+        let kept = (-seconds / settings.memory).exp();
+        let (with_hand, velocity) = if in_hand == self.in_hand {
+            let moved = match in_hand {
+                true => told.t_cam_hand * self.hand_error * self.state.t_cam_hand.inverse(),
+                false => Isometry3::identity(),
+            };
+            (moved, both(&moved.rotation, &self.velocity))
+        } else {
+            // Velocities are of something else now.
+            (Isometry3::identity(), Vector6::zeros())
+        };
+        let rest = with_hand * self.state.t_cam_object;
+        let centre = (rest * self.state.object_centre).coords;
+        let coasting = COASTING * (1.0 - (-seconds / COASTING).exp());
+        let mut state = told.clone();
+        state.t_cam_object = perturb_about(&rest, &centre, &(velocity * coasting));
+        state.light = self.state.light;
+        if in_hand {
+            state.t_cam_hand = told.t_cam_hand * part(&self.hand_error, kept);
+            let errors = self.joint_errors.iter();
+            state.joints.iter_mut().zip(errors).for_each(|(q, error)| *q += kept * error);
+        }
+        let camera = self.state.camera.parameters().map(|p| kept * p);
+        state.camera = CameraCorrection::default().changed(&camera);
+        let stated = variances(&settings.fused.accuracy, layout);
+        let covariance = if layout == self.layout {
+            let carry = carrier(&with_hand.rotation, kept, layout);
+            &carry * &self.covariance * carry.transpose()
+        } else {
+            let mut fresh = DMatrix::from_diagonal(&stated);
+            fresh.view_mut((0, 0), (6, 6)).copy_from(&self.covariance.view((0, 0), (6, 6)));
+            fresh
+        };
+        // What is forgotten of calibrations returns to what was said of them (Ornstein and Uhlenbeck); what the object
+        // does is not bounded.
+        let mut growth = stated * (1.0 - kept * kept);
+        for k in 0..3 {
+            growth[k] = (motion.translation * seconds).powi(2);
+            growth[3 + k] = (motion.rotation * seconds).powi(2);
+        }
+        let covariance = covariance + DMatrix::from_diagonal(&growth);
+        Prediction { state, covariance, layout, rest, velocity, seconds }
+    }
+}
+
+/// `pose` by a part of its way from the identity.
+fn part(pose: &Isometry3<f64>, part: f64) -> Isometry3<f64> {
+    let turn = UnitQuaternion::from_scaled_axis(so3_log(&pose.rotation) * part);
+    Isometry3::from_parts((pose.translation.vector * part).into(), turn)
+}
+
+/// A twist with both its parts turned.
+fn both(turn: &UnitQuaternion<f64>, twist: &Vector6<f64>) -> Vector6<f64> {
+    let halves: [Vector3<f64>; 2] = [0, 3].map(|k| turn * twist.fixed_rows::<3>(k));
+    Vector6::from_iterator(halves.iter().flatten().copied())
+}
+
+/// What takes deviations of one frame to those of the next: twists turn with the hand, calibrations fade.
+fn carrier(turn: &UnitQuaternion<f64>, kept: f64, layout: Layout) -> DMatrix<f64> {
+    let n = layout.len();
+    let mut carrier = DMatrix::identity(n, n) * kept;
+    let turn: Matrix3<f64> = turn.to_rotation_matrix().into_inner();
+    for k in 0..4 {
+        let factor = if k < 2 { 1.0 } else { kept };
+        carrier.fixed_view_mut::<3, 3>(3 * k, 3 * k).copy_from(&(turn * factor));
+    }
+    carrier
+}
+
+/// Stated variances.
+fn variances(accuracy: &PriorSettings, layout: Layout) -> DVector<f64> {
+    let mut all = DVector::from_element(layout.len(), accuracy.joints.powi(2));
+    for k in 0..3 {
+        all[k] = accuracy.object_translation[k].powi(2);
+        all[3 + k] = accuracy.object_rotation[k].powi(2);
+        all[6 + k] = accuracy.hand_translation.powi(2);
+        all[9 + k] = accuracy.hand_rotation.powi(2);
+    }
+    let camera = [
+        accuracy.depth_scale,
+        accuracy.depth_bias,
+        accuracy.shift,
+        accuracy.shift,
+        accuracy.magnification,
+    ];
+    let offset = layout.offset(Block::Camera);
+    camera.iter().enumerate().for_each(|(k, sigma)| all[offset + k] = sigma.powi(2));
+    all
+}
+
+/// Covariance of what was solved for, and the stated one of the rest.
+fn posterior(point: &Point, layout: Layout, accuracy: &PriorSettings) -> DMatrix<f64> {
+    let mut covariance = DMatrix::from_diagonal(&variances(accuracy, layout));
+    let (scaled, scale) = balanced(point.normal.hessian());
+    let n = scale.len();
+    let Some(factor) = (scaled + DMatrix::identity(n, n) * 1e-9).cholesky() else {
+        return covariance;
+    };
+    let all = factor.inverse();
+    let mut places = Vec::with_capacity(n);
+    for block in point.normal.blocks() {
+        places.extend((0..block.dimension()).map(|k| layout.offset(*block) + k));
+    }
+    for r in 0..n {
+        for c in 0..n {
+            covariance[(places[r], places[c])] = all[(r, c)] * scale[r] * scale[c];
+        }
+    }
+    covariance
+}

@@ -1,0 +1,447 @@
+//! An object followed from frame to frame.
+
+mod carried;
+mod clock;
+mod memory;
+mod settings;
+#[cfg(test)]
+mod tests;
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use nalgebra::Isometry3;
+
+use self::carried::Carried;
+use self::clock::Clock;
+pub use self::clock::Spent;
+use self::memory::{Memory, Prediction};
+pub use self::settings::{LossSettings, MotionSettings, Recovery, TrackerSettings};
+use crate::initial::PoseSearch;
+use crate::strategy::{Confidence, Ending, Fused, FusedSettings, Known, Point, Width, solve};
+use crate::term::Term;
+use crate::{Object, Observation, RefineError, Robot, State};
+
+/// Follows one object through the frames of a camera.
+///
+/// A frame is one least-squares problem, that of [`Fused`] at one resolution and from one start: where the object would be
+/// if it went on as it did, relative to the hand where that is known, because the hand moves the object. What was learnt
+/// before comes in as a Gaussian about that prediction, with all its correlations: poses, calibration of the hand, errors of
+/// the joints' positions and corrections of the camera. It is a Kalman filter whose update is iterated, with calibrations
+/// that return to what is said of them within [`memory`](TrackerSettings::memory).
+///
+/// A pose that does not fit is not believed ([`LossSettings`]); the object is then looked for ([`Recovery`]). A frame
+/// allocates: its terms, the hand's depth image and the renderer's buffers are made anew.
+///
+/// ```
+/// use std::sync::Arc;
+/// use prehend_refine::synth::default_sequence;
+/// use prehend_refine::tracker::{Following, Tracker, TrackerSettings};
+///
+/// let sequence = default_sequence(1, 2)?;
+/// let robot = Some(Arc::clone(&sequence.robot));
+/// let mut tracker = Tracker::new(Arc::clone(&sequence.object), robot, TrackerSettings::default())?;
+/// tracker.start_from(&sequence.initial);
+/// for frame in &sequence.frames {
+///     let tracked = tracker.track(&frame.observation, frame.time)?;
+///     assert_ne!(tracked.following, Following::Lost);
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct Tracker {
+    object: Arc<Object>,
+    robot: Option<Arc<Robot>>,
+    settings: TrackerSettings,
+    /// Where to begin; the search says where if it is not known.
+    initial: Option<Isometry3<f64>>,
+    memory: Option<Memory>,
+    /// Made when it is first needed.
+    search: Option<PoseSearch>,
+}
+
+/// How a frame's pose came about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Following {
+    /// From the frame before.
+    Followed,
+    /// It is where the object should be: there was no time to look at the frame.
+    Predicted,
+    /// It was found anew: the first of all, or after a loss.
+    Found,
+    /// It is where the object should be, and it does not seem to be there.
+    Lost,
+}
+
+impl Following {
+    /// The name used in reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Followed => "followed",
+            Self::Predicted => "predicted",
+            Self::Found => "found",
+            Self::Lost => "lost",
+        }
+    }
+}
+
+/// Why a pose was not believed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Doubt {
+    /// The mask is empty, or the object would be behind the camera.
+    Unseen,
+    /// The evidence fits so badly \[nat\], its level being the other number.
+    Misfit(f64, f64),
+    /// The object would have moved so many standard deviations of the prediction.
+    Surprise(f64),
+    /// The pose is so uncertain \[m of surface motion\].
+    Uncertain(f64),
+}
+
+impl std::fmt::Display for Doubt {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Unseen => write!(f, "nothing of the object is seen"),
+            Self::Misfit(value, level) => {
+                write!(f, "a misfit of {value:.0} nats where {level:.0} are usual")
+            }
+            Self::Surprise(sigmas) => write!(f, "{sigmas:.0} deviations from where it should be"),
+            Self::Uncertain(metres) => write!(f, "uncertain by {:.0} mm", metres * 1e3),
+        }
+    }
+}
+
+/// A frame's outcome.
+#[derive(Clone, Debug)]
+pub struct Tracked {
+    /// Object coordinates → camera coordinates \[m\].
+    pub t_cam_object: Isometry3<f64>,
+    /// The same with the hand, its joints and the camera as they are estimated to be.
+    pub state: State,
+    /// How the pose came about.
+    pub following: Following,
+    /// How sure it is, unless it was only predicted.
+    pub confidence: Option<Confidence>,
+    /// Why the object was not followed, if it was tried.
+    pub doubt: Option<Doubt>,
+    /// Steps down that were made, all stages together.
+    pub iterations: usize,
+    /// What the evidence is from fitting perfectly \[nat\].
+    pub misfit: f64,
+    /// What the time was spent on.
+    pub spent: Spent,
+}
+
+/// A pose that was solved for.
+struct Solved {
+    point: Point,
+    ending: Ending,
+    iterations: usize,
+}
+
+impl Solved {
+    /// Negative log-likelihood without what was known before \[nat\].
+    fn misfit(&self) -> f64 {
+        self.point.parts.iter().filter(|p| p.name != "prior").map(|p| p.value).sum()
+    }
+}
+
+type Terms = Vec<Box<dyn Term>>;
+
+/// Part of the way that the level of misfits goes to the next one.
+const LEVEL_GAIN: f64 = 0.1;
+/// By how much of itself the level grows while an object is lost: circumstances may have changed for good.
+const LEVEL_GROWTH: f64 = 0.1;
+
+impl Tracker {
+    /// A tracker that begins by searching, unless [`start_from`](Self::start_from) says where.
+    ///
+    /// # Errors
+    /// [`RefineError::Setting`] for a setting out of range.
+    pub fn new(
+        object: Arc<Object>,
+        robot: Option<Arc<Robot>>,
+        settings: TrackerSettings,
+    ) -> Result<Self, RefineError> {
+        settings.check()?;
+        Ok(Self { object, robot, settings, initial: None, memory: None, search: None })
+    }
+
+    /// Forgets all, and begins anew at `t_cam_object` \[m\] in the next frame.
+    pub fn start_from(&mut self, t_cam_object: &Isometry3<f64>) {
+        self.initial = Some(*t_cam_object);
+        self.memory = None;
+    }
+
+    /// The pose in the next frame, which was taken at `time`, counted from any moment; a time before the last frame's
+    /// counts as that.
+    ///
+    /// # Errors
+    /// If the images do not fit each other, the hand's joints or forces do not fit the robot, or nothing is found to begin with.
+    /// The tracker is then as it was before.
+    pub fn track(
+        &mut self,
+        observation: &Observation,
+        time: Duration,
+    ) -> Result<Tracked, RefineError> {
+        let mut clock = Clock::start(self.settings.budget);
+        if let (Some(robot), Some(hand)) = (&self.robot, &observation.hand) {
+            robot.check_joints(&hand.joints)?;
+        }
+        let Some(memory) = self.memory.clone() else {
+            return self.begin(observation, time, &mut clock);
+        };
+        let in_hand = self.robot.is_some() && observation.hand.is_some();
+        let told = match State::new(observation, &self.object, &memory.state.t_cam_object) {
+            Ok(told) => told,
+            Err(RefineError::EmptyMask) => {
+                return Ok(lost(memory.state, Doubt::Unseen, Spent::default()));
+            }
+            Err(error) => return Err(error),
+        };
+        let prediction = memory.predict(time, &told, in_hand, &self.settings);
+        if !clock.has(Duration::ZERO) {
+            return Ok(outcome(prediction.state, Following::Predicted, Spent::default()));
+        }
+        let (object, robot) = (Arc::clone(&self.object), self.robot.clone());
+        let known = Known::new(observation, &object, robot.as_ref());
+        let mut spent = Spent::default();
+        let doubt = if prediction.state.centre().z > 0.0 {
+            let (terms, carried) = self.prepare(&known, &prediction)?;
+            spent.preparation = clock.lap();
+            if !clock.has(Duration::ZERO) {
+                return Ok(outcome(prediction.state, Following::Predicted, spent));
+            }
+            let solved = self.solve(&known, &terms, prediction.state.clone(), &clock);
+            spent.steps = clock.lap();
+            let confidence = self.confidence(&solved);
+            let doubt = self.doubt(&solved, &confidence, Some(&carried), memory.level);
+            spent.judgement = clock.lap();
+            if doubt.is_none() {
+                let motion = if in_hand { &self.settings.held } else { &self.settings.free };
+                let level = memory.level + LEVEL_GAIN * (solved.misfit() - memory.level);
+                let next = self.remember(time, &solved, &told, in_hand, level);
+                self.memory = Some(Memory::followed(next, &prediction, motion));
+                return Ok(found(solved, confidence, Following::Followed, None, spent));
+            }
+            doubt
+        } else {
+            Some(Doubt::Unseen)
+        };
+        let again = self.recover(observation, &known, &prediction.state, memory.level)?;
+        spent.recovery = clock.lap();
+        let doubt = doubt.unwrap_or(Doubt::Unseen);
+        if let Some((solved, confidence)) = again {
+            let level = memory.level.max(solved.misfit());
+            self.memory = Some(self.remember(time, &solved, &told, in_hand, level));
+            return Ok(found(solved, confidence, Following::Found, Some(doubt), spent));
+        }
+        if let Some(memory) = &mut self.memory {
+            memory.level *= 1.0 + LEVEL_GROWTH;
+        }
+        Ok(lost(prediction.state, doubt, spent))
+    }
+
+    /// The first frame.
+    fn begin(
+        &mut self,
+        observation: &Observation,
+        time: Duration,
+        clock: &mut Clock,
+    ) -> Result<Tracked, RefineError> {
+        let initial = match self.initial {
+            Some(pose) => pose,
+            None => self.search(observation)?,
+        };
+        let told = State::new(observation, &self.object, &initial)?;
+        let known = Known::new(observation, &self.object, self.robot.as_ref());
+        let solved = self.estimate(observation, &known, &told)?;
+        let confidence = self.confidence(&solved);
+        let in_hand = known.robot.is_some();
+        self.memory = Some(self.remember(time, &solved, &told, in_hand, solved.misfit()));
+        let spent = Spent { recovery: clock.lap(), ..Spent::default() };
+        Ok(found(solved, confidence, Following::Found, None, spent))
+    }
+
+    /// The terms of a frame, and the one among them that carries what was known before.
+    fn prepare(
+        &self,
+        known: &Known<'_>,
+        prediction: &Prediction,
+    ) -> Result<(Terms, Arc<Carried>), RefineError> {
+        let Prediction { state, covariance, layout, .. } = prediction;
+        let carried = Carried::new(state.clone(), *layout, covariance).ok_or_else(|| {
+            let problem = "does not allow for a prediction".to_owned();
+            RefineError::Setting { name: "accuracy", problem }
+        })?;
+        let carried = Arc::new(carried);
+        let mut terms = known.terms(state, &self.settings.stage, &self.settings.fused)?;
+        terms.retain(|t| t.name() != carried.name());
+        terms.insert(0, Box::new(Arc::clone(&carried)));
+        Ok((terms, carried))
+    }
+
+    /// Steps down from `start` until the clock says otherwise.
+    fn solve(
+        &self,
+        known: &Known<'_>,
+        terms: &[Box<dyn Term>],
+        start: State,
+        clock: &Clock,
+    ) -> Solved {
+        let (stage, settings) = (&self.settings.stage, &self.settings.fused);
+        let blocks = Fused { settings: settings.clone() }.blocks(known, &start);
+        let mut before = Instant::now();
+        let mut iterations = 0;
+        let start = Point::new(terms, start, &blocks);
+        let mut go_on = || {
+            let step = before.elapsed();
+            before += step;
+            clock.has(step)
+        };
+        if !go_on() {
+            return Solved { point: start, ending: Ending::Stopped, iterations };
+        }
+        let (point, ending) = solve(terms, start, stage.iterations, stage.last_gain, |_| {
+            iterations += 1;
+            go_on()
+        });
+        Solved { point, ending, iterations }
+    }
+
+    /// The whole fused estimator from `initial`, and the stage of tracking from there, with nothing carried over but
+    /// what `initial` has.
+    fn estimate(
+        &self,
+        observation: &Observation,
+        known: &Known<'_>,
+        initial: &State,
+    ) -> Result<Solved, RefineError> {
+        let fused = Fused { settings: self.settings.fused.clone() };
+        let mut best = initial.clone();
+        let robot = self.robot.as_ref();
+        fused.run(observation, &self.object, robot, initial.clone(), |state, _| {
+            best = state.clone();
+            true
+        })?;
+        let terms = known.terms(initial, &self.settings.stage, &self.settings.fused)?;
+        Ok(self.solve(known, &terms, best, &Clock::start(None)))
+    }
+
+    fn search(&mut self, observation: &Observation) -> Result<Isometry3<f64>, RefineError> {
+        let search = match &mut self.search {
+            Some(search) => search,
+            none => {
+                let (object, settings) = (Arc::clone(&self.object), self.settings.search.clone());
+                none.insert(PoseSearch::new(object, settings)?)
+            }
+        };
+        let found = search.run(observation, self.robot.as_ref())?;
+        found.first().map(|f| f.t_cam_object).ok_or(RefineError::NothingFits)
+    }
+
+    /// A pose that is believed, looked for from near to far.
+    fn recover(
+        &mut self,
+        observation: &Observation,
+        known: &Known<'_>,
+        predicted: &State,
+        level: f64,
+    ) -> Result<Option<(Solved, Confidence)>, RefineError> {
+        let recovery = self.settings.recovery;
+        for reach in [Recovery::Near, Recovery::Anywhere] {
+            if reach > recovery {
+                break;
+            }
+            let mut start = predicted.clone();
+            if reach == Recovery::Anywhere {
+                match self.search(observation) {
+                    Ok(pose) => start.t_cam_object = pose,
+                    Err(RefineError::NothingFits | RefineError::NoDepth) => break,
+                    Err(error) => return Err(error),
+                }
+            }
+            if start.centre().z <= 0.0 {
+                continue;
+            }
+            let solved = self.estimate(observation, known, &start)?;
+            let confidence = self.confidence(&solved);
+            if self.doubt(&solved, &confidence, None, level).is_none() {
+                return Ok(Some((solved, confidence)));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Why `solved` should not be believed, if so.
+    fn doubt(
+        &self,
+        solved: &Solved,
+        confidence: &Confidence,
+        carried: Option<&Carried>,
+        level: f64,
+    ) -> Option<Doubt> {
+        let (loss, misfit) = (&self.settings.loss, solved.misfit());
+        if misfit.is_nan() || misfit > loss.misfit_ratio * level + loss.misfit_margin {
+            return Some(Doubt::Misfit(misfit, level));
+        }
+        let surprise = carried.map_or(0.0, |c| c.surprise(&solved.point.state));
+        if surprise > loss.surprise {
+            return Some(Doubt::Surprise(surprise));
+        }
+        let widest = confidence.unobserved.iter().map(|u| u.deviation).fold(0.0, f64::max);
+        (widest > loss.deviation).then_some(Doubt::Uncertain(widest))
+    }
+
+    fn confidence(&self, solved: &Solved) -> Confidence {
+        let FusedSettings { covariance_scale: scale, model_tolerance, .. } = self.settings.fused;
+        let width = Width { scale, model_tolerance };
+        Confidence::new(&[(solved.point.clone(), solved.ending)], width, self.object.radius)
+    }
+
+    fn remember(
+        &self,
+        time: Duration,
+        solved: &Solved,
+        told: &State,
+        in_hand: bool,
+        level: f64,
+    ) -> Memory {
+        Memory::new(time, &solved.point, told, in_hand, &self.settings.fused.accuracy, level)
+    }
+}
+
+/// A pose that nothing was made of but a prediction.
+fn outcome(state: State, following: Following, spent: Spent) -> Tracked {
+    Tracked {
+        t_cam_object: state.t_cam_object,
+        state,
+        following,
+        confidence: None,
+        doubt: None,
+        iterations: 0,
+        misfit: f64::NAN,
+        spent,
+    }
+}
+
+fn lost(state: State, doubt: Doubt, spent: Spent) -> Tracked {
+    Tracked { doubt: Some(doubt), ..outcome(state, Following::Lost, spent) }
+}
+
+fn found(
+    solved: Solved,
+    confidence: Confidence,
+    following: Following,
+    doubt: Option<Doubt>,
+    spent: Spent,
+) -> Tracked {
+    let (misfit, iterations) = (solved.misfit(), solved.iterations);
+    let state = solved.point.state;
+    Tracked {
+        iterations,
+        misfit,
+        doubt,
+        confidence: Some(confidence),
+        ..outcome(state, following, spent)
+    }
+}

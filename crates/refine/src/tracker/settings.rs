@@ -1,0 +1,165 @@
+//! Settings of a tracker.
+
+use std::time::Duration;
+
+use crate::RefineError;
+use crate::initial::SearchSettings;
+use crate::strategy::{FusedSettings, Stage};
+
+/// What is known of how an object moves from frame to frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MotionSettings {
+    /// Standard deviation of a velocity that was not foreseen, in each direction \[m/s\].
+    pub translation: f64,
+    /// Of a rate of rotation that was not foreseen, about each axis \[rad/s\].
+    pub rotation: f64,
+    /// How much of the difference between measured and believed velocity is believed, between 0 and 1.
+    pub gain: f64,
+}
+
+/// When a pose is not believed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LossSettings {
+    /// The misfit may be so many times its running level,
+    pub misfit_ratio: f64,
+    /// and so much more \[nat\].
+    pub misfit_margin: f64,
+    /// Standard deviations of the prediction that the object may be away from it.
+    pub surprise: f64,
+    /// Standard deviation of the pose in the direction in which it is largest \[m of surface motion\].
+    pub deviation: f64,
+}
+
+/// How far a tracker goes to find an object that it has lost. Finding takes far longer than following, and the budget does
+/// not hold for it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Recovery {
+    /// The frame is lost; the next is tried from the prediction.
+    Off,
+    /// The whole fused estimator from where the object should be.
+    Near,
+    /// If that fails, a search among all poses.
+    Anywhere,
+}
+
+impl Recovery {
+    /// The name used on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Off => "off",
+            Self::Near => "near",
+            Self::Anywhere => "anywhere",
+        }
+    }
+}
+
+impl std::str::FromStr for Recovery {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let all = [Self::Off, Self::Near, Self::Anywhere];
+        let found = all.into_iter().find(|r| r.name() == text);
+        found.ok_or_else(|| format!("unknown recovery {text:?}: one of off, near, anywhere"))
+    }
+}
+
+/// Settings of [`Tracker`](super::Tracker).
+#[derive(Clone, Debug, PartialEq)]
+pub struct TrackerSettings {
+    /// Evidence, nuisances and stated accuracies; its stages serve where a pose has to be found.
+    pub fused: FusedSettings,
+    /// The one stage that follows the object.
+    pub stage: Stage,
+    /// Motion relative to a hand that is known.
+    pub held: MotionSettings,
+    /// Motion in the camera frame, where no hand is known.
+    pub free: MotionSettings,
+    /// Time within which what was learnt of calibrations is forgotten, all but 1/e \[s\].
+    pub memory: f64,
+    /// Time that following may take in a frame; without one it takes what it needs. A step that would not end in time is
+    /// not begun, as far as the one before it tells.
+    pub budget: Option<Duration>,
+    /// When a pose is not believed.
+    pub loss: LossSettings,
+    /// What is done then.
+    pub recovery: Recovery,
+    /// How poses are searched for.
+    pub search: SearchSettings,
+}
+
+impl Default for TrackerSettings {
+    fn default() -> Self {
+        Self {
+            fused: FusedSettings::default(),
+            stage: Stage {
+                downsample: 4,
+                points: 400,
+                tolerance: 1.0,
+                iterations: 4,
+                last_gain: 0.02,
+                hypotheses: 1,
+                colour: true,
+                measured_scatter: false,
+                contact: true,
+            },
+            held: MotionSettings { translation: 0.02, rotation: 0.2, gain: 0.1 },
+            free: MotionSettings { translation: 0.3, rotation: 2.0, gain: 0.5 },
+            memory: 3.0,
+            budget: None,
+            loss: LossSettings {
+                misfit_ratio: 2.5,
+                misfit_margin: 40.0,
+                surprise: 8.0,
+                deviation: 12e-3,
+            },
+            recovery: Recovery::Anywhere,
+            search: SearchSettings::default(),
+        }
+    }
+}
+
+impl TrackerSettings {
+    pub(super) fn check(&self) -> Result<(), RefineError> {
+        let positive = [
+            ("held.translation", self.held.translation),
+            ("held.rotation", self.held.rotation),
+            ("free.translation", self.free.translation),
+            ("free.rotation", self.free.rotation),
+            ("memory", self.memory),
+            ("loss.misfit_ratio", self.loss.misfit_ratio),
+            ("loss.misfit_margin", self.loss.misfit_margin),
+            ("loss.surprise", self.loss.surprise),
+            ("loss.deviation", self.loss.deviation),
+        ];
+        for (name, value) in positive {
+            if value.is_nan() || value <= 0.0 {
+                return Err(RefineError::Setting { name, problem: format!("is {value}") });
+            }
+        }
+        for (name, gain) in [("held.gain", self.held.gain), ("free.gain", self.free.gain)] {
+            if !(0.0..=1.0).contains(&gain) {
+                let problem = format!("is {gain}, not between 0 and 1");
+                return Err(RefineError::Setting { name, problem });
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settings_out_of_range_are_named() {
+        let mut settings = TrackerSettings::default();
+        assert!(settings.check().is_ok());
+        settings.memory = 0.0;
+        assert_eq!(settings.check().unwrap_err().to_string(), "memory is 0");
+        settings = TrackerSettings::default();
+        settings.free.gain = f64::NAN;
+        assert!(settings.check().unwrap_err().to_string().contains("free.gain is NaN"));
+        assert_eq!("near".parse(), Ok(Recovery::Near));
+        assert!("far".parse::<Recovery>().is_err());
+    }
+}

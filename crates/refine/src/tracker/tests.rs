@@ -1,0 +1,158 @@
+use std::sync::LazyLock;
+
+use super::*;
+use crate::metrics::{oe_deg, pe_cm};
+use crate::synth::{Sequence, default_sequence};
+
+static SEQUENCE: LazyLock<Sequence> = LazyLock::new(|| default_sequence(1, 24).unwrap());
+
+fn tracker(settings: TrackerSettings) -> Tracker {
+    let robot = Some(Arc::clone(&SEQUENCE.robot));
+    let mut tracker = Tracker::new(Arc::clone(&SEQUENCE.object), robot, settings).unwrap();
+    tracker.start_from(&SEQUENCE.initial);
+    tracker
+}
+
+fn track(tracker: &mut Tracker, index: usize) -> Tracked {
+    let frame = &SEQUENCE.frames[index];
+    tracker.track(&frame.observation, frame.time).unwrap()
+}
+
+/// Errors \[cm; deg\].
+fn errors(tracked: &Tracked, index: usize) -> (f64, f64) {
+    let truth = &SEQUENCE.frames[index].truth;
+    (pe_cm(&tracked.t_cam_object, truth), oe_deg(&tracked.t_cam_object, truth))
+}
+
+#[test]
+fn a_moving_hand_is_followed() {
+    let mut tracker = tracker(TrackerSettings { recovery: Recovery::Off, ..Default::default() });
+    for index in 0..SEQUENCE.frames.len() {
+        let tracked = track(&mut tracker, index);
+        let expected = if index == 0 { Following::Found } else { Following::Followed };
+        assert_eq!(tracked.following, expected, "frame {index}: {:?}", tracked.doubt);
+        let (pe, oe) = errors(&tracked, index);
+        println!("{index}: {pe:.3} cm {oe:.2}° {:.0} nats {}", tracked.misfit, tracked.iterations);
+        assert!(pe < 0.2 && oe < 2.0, "frame {index}: {pe} cm, {oe}°");
+        let confidence = tracked.confidence.unwrap();
+        assert!(confidence.covariance().cholesky().is_some());
+    }
+}
+
+#[test]
+fn without_a_hand_the_camera_is_enough() {
+    let mut tracker = tracker(TrackerSettings { recovery: Recovery::Off, ..Default::default() });
+    tracker.robot = None;
+    for index in 0..12 {
+        let frame = &SEQUENCE.frames[index];
+        let mut observation = frame.observation.clone();
+        observation.hand = None;
+        let tracked = tracker.track(&observation, frame.time).unwrap();
+        let (pe, oe) = errors(&tracked, index);
+        println!("{index}: {pe:.3} cm {oe:.2}° {:?} {}", tracked.following, tracked.misfit);
+        assert!(pe < 0.6 && oe < 6.0 && tracked.following != Following::Lost, "frame {index}");
+    }
+}
+
+#[test]
+fn a_jump_is_noticed_and_recovered_from() {
+    let jump = |tracker: &mut Tracker| {
+        (0..3).for_each(|index| drop(track(tracker, index)));
+        // The hand's reading stays behind: to the tracker, the object has left it.
+        let frame = &SEQUENCE.frames[23];
+        let mut observation = frame.observation.clone();
+        observation.hand = SEQUENCE.frames[3].observation.hand.clone();
+        tracker.robot = None;
+        let time = SEQUENCE.frames[3].time;
+        tracker.track(&observation, time).unwrap()
+    };
+    let careful = MotionSettings { translation: 0.05, rotation: 0.5, gain: 0.5 };
+    let settings = TrackerSettings { free: careful, ..Default::default() };
+    let mut hopeless = tracker(TrackerSettings { recovery: Recovery::Off, ..settings.clone() });
+    let lost = jump(&mut hopeless);
+    assert!(lost.following == Following::Lost && lost.doubt.is_some(), "{:?}", lost.following);
+    let mut tracker = tracker(settings);
+    let found = jump(&mut tracker);
+    let (pe, oe) = errors(&found, 23);
+    assert_eq!(found.following, Following::Found, "{:?}", found.doubt);
+    assert!(pe < 0.6 && oe < 6.0, "{pe} cm, {oe}°");
+    assert!(found.doubt.is_some() && found.spent.recovery > Duration::ZERO);
+}
+
+#[test]
+fn without_time_the_prediction_is_returned() {
+    let mut tracker = tracker(TrackerSettings::default());
+    let first = track(&mut tracker, 0);
+    tracker.settings.budget = Some(Duration::ZERO);
+    let hand = |k: usize| SEQUENCE.frames[k].observation.hand.as_ref().unwrap().t_cam_hand;
+    for index in 1..4 {
+        let predicted = track(&mut tracker, index);
+        assert_eq!(predicted.following, Following::Predicted);
+        assert!(predicted.confidence.is_none() && predicted.iterations == 0);
+        // The hand carries the object along.
+        let expected = hand(index) * hand(0).inverse() * first.t_cam_object;
+        let (pe, oe) =
+            (pe_cm(&predicted.t_cam_object, &expected), oe_deg(&predicted.t_cam_object, &expected));
+        assert!(pe < 0.05 && oe < 0.1, "{pe} cm, {oe}°");
+    }
+    tracker.settings.budget = None;
+    assert_eq!(track(&mut tracker, 4).following, Following::Followed);
+}
+
+#[test]
+fn an_empty_mask_is_lost_and_a_full_one_found_again() {
+    let mut tracker = tracker(TrackerSettings::default());
+    track(&mut tracker, 0);
+    let mut observation = SEQUENCE.frames[1].observation.clone();
+    observation.mask.pixels_mut().fill(false);
+    let lost = tracker.track(&observation, SEQUENCE.frames[1].time).unwrap();
+    assert_eq!((lost.following, lost.doubt), (Following::Lost, Some(Doubt::Unseen)));
+    assert_eq!(track(&mut tracker, 2).following, Following::Followed);
+    // Neither colour nor depth under the mask.
+    let mut observation = SEQUENCE.frames[3].observation.clone();
+    observation.depth.pixels_mut().fill(0.0);
+    let blind = tracker.track(&observation, SEQUENCE.frames[3].time).unwrap();
+    assert!(blind.t_cam_object.translation.vector.iter().all(|v| v.is_finite()));
+}
+
+#[test]
+fn calibrations_carry_over() {
+    let mut tracker = tracker(TrackerSettings::default());
+    let wrong = 0.03;
+    let observation = |index: usize| {
+        let mut observation = SEQUENCE.frames[index].observation.clone();
+        observation.hand.as_mut().unwrap().joints.iter_mut().for_each(|q| *q += wrong);
+        observation
+    };
+    let error = |tracked: &Tracked, index: usize| -> f64 {
+        let truth = &SEQUENCE.frames[index].observation.hand.as_ref().unwrap().joints;
+        let joints = tracked.state.joints.iter().zip(truth);
+        joints.map(|(q, truth)| (q - truth).abs()).sum::<f64>() / truth.len() as f64
+    };
+    let mut errors = Vec::new();
+    for index in 0..8 {
+        let tracked = tracker.track(&observation(index), SEQUENCE.frames[index].time).unwrap();
+        errors.push(error(&tracked, index));
+    }
+    println!("{errors:?}");
+    assert!(errors[7] < 0.8 * wrong && errors[7] < errors[0], "{errors:?}");
+    // What is predicted without looking has it too, but for what is forgotten.
+    tracker.settings.budget = Some(Duration::ZERO);
+    let blind = tracker.track(&observation(8), SEQUENCE.frames[8].time).unwrap();
+    let moved = error(&blind, 8);
+    assert!(moved > errors[7] && moved < errors[7] + 0.05 * wrong, "{moved} {errors:?}");
+}
+
+#[test]
+fn faults_of_a_frame_are_errors_and_change_nothing() {
+    let mut tracker = tracker(TrackerSettings::default());
+    track(&mut tracker, 0);
+    let mut observation = SEQUENCE.frames[1].observation.clone();
+    observation.hand.as_mut().unwrap().joints.pop();
+    assert!(tracker.track(&observation, SEQUENCE.frames[1].time).is_err());
+    let mut observation = SEQUENCE.frames[1].observation.clone();
+    observation.hand.as_mut().unwrap().forces.pop();
+    let error = tracker.track(&observation, SEQUENCE.frames[1].time).unwrap_err();
+    assert!(matches!(error, RefineError::TaxelCount { .. }));
+    assert_eq!(track(&mut tracker, 1).following, Following::Followed);
+}
