@@ -10,7 +10,9 @@ use prehend_geometry::robot::Robot as KinematicTree;
 
 use crate::bop::{Dataset, DatasetError, Frame, Models, Tactile};
 use crate::observation::check_gravity;
-use crate::{HandReading, Inertial, Object, Observation, RefineError, Robot, TermKind};
+use crate::{
+    Config, HandReading, Inertial, Object, Observation, RefineError, Robot, StrategyKind, TermKind,
+};
 
 /// BOP models are in millimetres \[m\].
 const MILLIMETRE: f64 = 1e-3;
@@ -127,6 +129,38 @@ impl<'a> Assets<'a> {
             forces: tactile.map_or_else(Vec::new, |t| t.force),
         });
         Ok((observation, Some(robot)))
+    }
+
+    /// The frame as [`observation`](Self::observation) has it, with every sense that it brings and none that it must.
+    ///
+    /// # Errors
+    /// If a file that is there is broken.
+    pub fn whole_observation(
+        &mut self,
+        frame: &Frame<'_>,
+        instance: usize,
+    ) -> Result<(Observation, Option<Arc<Robot>>), AssetError> {
+        let feels = !matches!(frame.tactile(), Err(DatasetError::Missing { .. }));
+        let terms: &[TermKind] = if feels { &[TermKind::Tactile] } else { &[] };
+        self.observation(frame, instance, terms)
+    }
+
+    /// The frame with what a refinement by `config` uses.
+    ///
+    /// # Errors
+    /// If a file that it needs is missing, or one that is there is broken.
+    pub fn observation_for(
+        &mut self,
+        frame: &Frame<'_>,
+        instance: usize,
+        config: &Config,
+    ) -> Result<(Observation, Option<Arc<Robot>>), AssetError> {
+        match config.strategy {
+            StrategyKind::Fused => self.whole_observation(frame, instance),
+            StrategyKind::Heuristic | StrategyKind::Icp | StrategyKind::RobustIcp => {
+                self.observation(frame, instance, &config.terms)
+            }
+        }
     }
 
     /// The robot of `urdf` with the skin of `taxels`.

@@ -147,7 +147,7 @@ impl<'a> Examiner<'a> {
             let mut assets = self.assets.lock().unwrap_or_else(PoisonError::into_inner);
             let object = assets.object(row.obj_id)?;
             let image = assets.dataset().frame(row.scene_id, row.im_id)?;
-            let (observation, robot) = assets.observation(&image, frame.instance, &config.terms)?;
+            let (observation, robot) = assets.observation_for(&image, frame.instance, config)?;
             (object, observation, robot)
         };
         if let Some((sweep, amount)) = fault {

@@ -559,7 +559,7 @@ fn hopeless_runs() {
             "terms of a method without",
             |_| (),
             "refine --dataset ds --poses init.csv --method icp --terms depth --out refined.csv",
-            "error: --terms: the method icp uses depth alone",
+            "error: --terms: the method icp does not combine gradients",
         ),
     ];
     for (name, make, arguments, expected) in cases {

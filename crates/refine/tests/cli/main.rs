@@ -5,6 +5,7 @@
 mod bad_input;
 mod command;
 mod fixture;
+mod fused;
 mod initial;
 mod resume;
 mod study;

@@ -178,8 +178,7 @@ impl Run<'_> {
             let mut assets = assets.lock().unwrap_or_else(PoisonError::into_inner);
             let object = assets.object(row.obj_id)?;
             let frame = assets.dataset().frame(row.scene_id, row.im_id)?;
-            let (observation, robot) =
-                assets.observation(&frame, job.instance, &self.config.terms)?;
+            let (observation, robot) = assets.observation_for(&frame, job.instance, self.config)?;
             (object, observation, robot)
         };
         let robot = robot.as_ref();
@@ -238,7 +237,7 @@ fn draw(
         let mut drawn = || -> anyhow::Result<()> {
             let object = assets.object(row.obj_id)?;
             let frame = assets.dataset().frame(row.scene_id, row.im_id)?;
-            let (observation, _) = assets.observation(&frame, *instance, &config.terms)?;
+            let (observation, _) = assets.observation_for(&frame, *instance, config)?;
             let pose = RefinedPose {
                 t_cam_object: (&refined.pose).into(),
                 iteration: refined.iteration,

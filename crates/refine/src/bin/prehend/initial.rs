@@ -13,7 +13,7 @@ use prehend_refine::bop::{
     Dataset, DatasetError, GroundTruth, ResultRow, check_writable, share_image_times, write_results,
 };
 use prehend_refine::initial::{NoiseLevel, PoseSearch, SearchSettings, Target, find_targets};
-use prehend_refine::{AssetError, Assets, Observation, RefineError, Robot, TermKind};
+use prehend_refine::{AssetError, Assets, Observation, RefineError, Robot};
 
 use crate::options::{Selection, label};
 use crate::outcome::Outcome;
@@ -179,7 +179,5 @@ pub(crate) fn observed(
     instance: usize,
 ) -> Result<(Observation, Option<Arc<Robot>>), AssetError> {
     let frame = assets.dataset().frame(scene_id, im_id)?;
-    let feels = !matches!(frame.tactile(), Err(DatasetError::Missing { .. }));
-    let terms: &[TermKind] = if feels { &[TermKind::Tactile] } else { &[] };
-    assets.observation(&frame, instance, terms)
+    assets.whole_observation(&frame, instance)
 }

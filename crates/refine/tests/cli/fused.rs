@@ -1,0 +1,44 @@
+//! `prehend refine --method fused`.
+
+use prehend_refine::metrics::{oe_deg, pe_cm};
+use prehend_refine::synth::default_scene;
+use serde_json::Value;
+
+use crate::fixture::Workplace;
+
+const REFINE: &str = "refine --dataset ds --poses ds/init.csv --method fused --out f.csv";
+
+fn assert_right(place: &Workplace, most_cm: f64, most_deg: f64) {
+    let truth = default_scene(1).unwrap().truth;
+    for row in place.poses("f.csv") {
+        let (pe, oe) = (pe_cm(&row.t_cam_model, &truth), oe_deg(&row.t_cam_model, &truth));
+        assert!(pe < most_cm && oe < most_deg, "{pe} cm, {oe}°");
+        // The score is a probability, and such poses are not doubted.
+        assert!(row.score > 0.5 && row.score <= 1.0, "{}", row.score);
+    }
+}
+
+#[test]
+fn poses_come_with_how_sure_they_are() {
+    let place = Workplace::new();
+    let told: Value = serde_json::from_str(&place.succeed(&format!("{REFINE} --json"))).unwrap();
+    assert_right(&place, 0.1, 1.0);
+    let confidence = &told["frames"][0]["confidence"];
+    let score = place.poses("f.csv")[0].score;
+    assert_eq!(confidence["probability"].as_f64().unwrap(), score);
+    assert!(
+        confidence["deviation_mm"].as_array().unwrap().iter().all(|d| d.as_f64().unwrap() > 0.0)
+    );
+    assert!(confidence["ending"].is_string() && confidence["weights"].is_array());
+}
+
+#[test]
+fn files_of_absent_senses_may_be_absent() {
+    let place = Workplace::new();
+    place.remove("ds/test/000001/scene_tactile.json");
+    place.succeed(REFINE);
+    assert_right(&place, 0.3, 2.0);
+    place.remove("ds/test/000001/scene_bodies.json");
+    place.succeed(&format!("{REFINE} --restart"));
+    assert_right(&place, 0.5, 4.0);
+}
