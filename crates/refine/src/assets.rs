@@ -140,7 +140,13 @@ impl<'a> Assets<'a> {
         frame: &Frame<'_>,
         instance: usize,
     ) -> Result<(Observation, Option<Arc<Robot>>), AssetError> {
-        let feels = !matches!(frame.tactile(), Err(DatasetError::Missing { .. }));
+        let absent = |error: &DatasetError| {
+            matches!(error, DatasetError::Missing { .. } | DatasetError::NoEntry { .. })
+        };
+        if frame.bodies().is_err_and(|e| absent(&e)) {
+            return Ok((frame.observation(instance)?, None));
+        }
+        let feels = !frame.tactile().is_err_and(|e| absent(&e));
         let terms: &[TermKind] = if feels { &[TermKind::Tactile] } else { &[] };
         self.observation(frame, instance, terms)
     }

@@ -133,7 +133,7 @@ impl Config {
             StrategyKind::Heuristic => self.heuristic.iterations,
             StrategyKind::Icp => self.icp.iterations,
             StrategyKind::RobustIcp => self.robust_icp.iterations,
-            StrategyKind::Fused => self.fused.stages.iter().map(|s| s.iterations).sum(),
+            StrategyKind::Fused => self.fused.stages.len() + usize::from(self.fused.exactness),
         }
     }
 

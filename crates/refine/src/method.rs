@@ -57,15 +57,14 @@ fn free(mut config: Config) -> Config {
     config
 }
 
-/// A baseline that uses depth alone.
+/// A strategy that does not combine gradients.
 fn baseline(strategy: StrategyKind, checkpoint: bool) -> Config {
     Config { strategy, terms: Vec::new(), checkpoint, ..Config::default() }
 }
 
 /// The fused estimator with other settings.
 fn fused(change: impl FnOnce(&mut FusedSettings)) -> Config {
-    let mut config =
-        Config { strategy: StrategyKind::Fused, checkpoint: false, ..Config::default() };
+    let mut config = baseline(StrategyKind::Fused, false);
     change(&mut config.fused);
     config
 }

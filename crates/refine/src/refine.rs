@@ -75,7 +75,9 @@ pub fn refine_with(
 
     // The judge of checkpoints: the rendering term among the terms, or one of its own.
     let judge_index = kinds.iter().position(|&k| k == TermKind::Rendering);
-    let own_judge = config.checkpoint && judge_index.is_none();
+    // The fused estimator's last pose is its best, and the one that its confidence is of.
+    let checkpoint = config.checkpoint && config.strategy != StrategyKind::Fused;
+    let own_judge = checkpoint && judge_index.is_none();
     let judge = own_judge
         .then(|| {
             let hand = hand_depth(observation, robot.map(Arc::as_ref));
@@ -93,7 +95,7 @@ pub fn refine_with(
             (None, Some(index)) => iteration.values[index],
             (None, None) => f64::INFINITY,
         };
-        if !config.checkpoint || score < best.0 {
+        if !checkpoint || score < best.0 {
             best = (score, iteration.index, state.t_cam_object);
         }
         observe(Progress {

@@ -97,11 +97,17 @@ impl State {
 
     /// The state with `block` moved by `delta`, which has the block's dimension; twists are about
     /// [`centre`](Self::centre).
+    ///
+    /// # Panics
+    /// If `delta` is shorter than the block.
     pub fn moved(&self, block: Block, delta: &[f64]) -> Self {
         self.moved_all(&[block], delta)
     }
 
     /// The state with all of `blocks` moved at once, by their parts of `delta` one after the other.
+    ///
+    /// # Panics
+    /// If `delta` is shorter than the blocks together.
     pub fn moved_all(&self, blocks: &[Block], delta: &[f64]) -> Self {
         let mut state = self.clone();
         let centre = self.centre();

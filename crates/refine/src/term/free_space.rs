@@ -67,7 +67,7 @@ impl FreeSpaceTerm {
                 continue;
             }
             let Some(measured) = self.depth.get(u as usize, v as usize) else { continue };
-            if measured <= 0.0 {
+            if !measured.is_finite() || measured <= 0.0 {
                 continue;
             }
             let measured = f64::from(measured);
@@ -82,7 +82,9 @@ impl FreeSpaceTerm {
     /// Nats of one square metre.
     fn share(&self) -> f64 {
         let settings = &self.settings;
-        let count = self.object.samples.len().min(settings.samples).max(1) as f64;
+        let samples = self.object.samples.len();
+        let step = samples.div_ceil(settings.samples.max(1)).max(1);
+        let count = samples.div_ceil(step).max(1) as f64;
         (settings.effective_samples / count).min(1.0) / settings.sigma.powi(2)
     }
 }

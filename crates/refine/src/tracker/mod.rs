@@ -20,7 +20,7 @@ pub use self::settings::{LossSettings, MotionSettings, Recovery, TrackerSettings
 use crate::initial::PoseSearch;
 use crate::strategy::{Confidence, Ending, Fused, FusedSettings, Known, Point, Width, solve};
 use crate::term::Term;
-use crate::{Object, Observation, RefineError, Robot, State};
+use crate::{CameraCorrection, Object, Observation, RefineError, Robot, State};
 
 /// Follows one object through the frames of a camera.
 ///
@@ -194,7 +194,16 @@ impl Tracker {
         let told = match State::new(observation, &self.object, &memory.state.t_cam_object) {
             Ok(told) => told,
             Err(RefineError::EmptyMask) => {
-                return Ok(lost(memory.state, Doubt::Unseen, Spent::default()));
+                // Where the hand is said to be needs no mask.
+                let hand = observation.hand.as_ref();
+                let told = State {
+                    t_cam_hand: hand.map_or(memory.state.t_cam_hand, |h| h.t_cam_hand),
+                    joints: hand.map_or_else(Vec::new, |h| h.joints.clone()),
+                    camera: CameraCorrection::default(),
+                    ..memory.state.clone()
+                };
+                let state = memory.predict(time, &told, in_hand, &self.settings).state;
+                return Ok(lost(state, Doubt::Unseen, Spent::default()));
             }
             Err(error) => return Err(error),
         };
@@ -213,6 +222,9 @@ impl Tracker {
             }
             let solved = self.solve(&known, &terms, prediction.state.clone(), &clock);
             spent.steps = clock.lap();
+            if solved.ending == Ending::Stopped && solved.iterations == 0 {
+                return Ok(outcome(prediction.state, Following::Predicted, spent));
+            }
             let confidence = self.confidence(&solved);
             let doubt = self.doubt(&solved, &confidence, Some(&carried), memory.level);
             spent.judgement = clock.lap();
@@ -231,7 +243,7 @@ impl Tracker {
         spent.recovery = clock.lap();
         let doubt = doubt.unwrap_or(Doubt::Unseen);
         if let Some((solved, confidence)) = again {
-            let level = memory.level.max(solved.misfit());
+            let level = solved.misfit();
             self.memory = Some(self.remember(time, &solved, &told, in_hand, level));
             return Ok(found(solved, confidence, Following::Found, Some(doubt), spent));
         }

@@ -198,7 +198,8 @@ impl Arguments {
             };
             let mut frame = || -> Result<Tracked, AssetError> {
                 let (observation, robot) = observed(assets, scene_id, im_id, instance)?;
-                let time = Duration::from_secs_f64(f64::from(im_id - first) / self.rate);
+                let seconds = f64::from(im_id - first) / self.rate;
+                let time = Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX);
                 let tracker = match &mut tracker {
                     Some(tracker) => tracker,
                     none => {

@@ -43,7 +43,7 @@ pub struct Disagreement {
 /// What is known of how good a pose is.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Confidence {
-    /// The poses found, the best first.
+    /// The poses found, that of the lowest value first.
     pub hypotheses: Vec<Hypothesis>,
     /// Directions that are hardly observed.
     pub unobserved: Vec<Unobserved>,
@@ -89,7 +89,9 @@ impl Confidence {
         // Laplace: the mass of a mode is its height times its volume.
         let logarithm = |k: usize| 0.5 * covariances[k].1 - found[k].0.value;
         let first = (0..found.len()).map(logarithm).fold(f64::NEG_INFINITY, f64::max);
-        let masses: Vec<f64> = (0..found.len()).map(|k| (logarithm(k) - first).exp()).collect();
+        // A mode whose width is not known counts only where none is.
+        let mass = |k: usize| if first.is_finite() { (logarithm(k) - first).exp() } else { 1.0 };
+        let masses: Vec<f64> = (0..found.len()).map(mass).collect();
         let total: f64 = masses.iter().sum();
         let hypotheses: Vec<Hypothesis> = found
             .iter()
@@ -145,8 +147,8 @@ impl Confidence {
         let off = (pose * place).coords - self.centre;
         let turn = so3_log(&(pose.rotation * best.rotation.inverse()));
         let twist = Vector6::new(off.x, off.y, off.z, turn.x, turn.y, turn.z);
-        let inverse = self.covariance().try_inverse().unwrap_or_else(Matrix6::zeros);
-        twist.dot(&(inverse * twist)).max(0.0).sqrt()
+        let factor = self.covariance().cholesky();
+        factor.map_or(f64::INFINITY, |factor| twist.dot(&factor.solve(&twist)).max(0.0).sqrt())
     }
 }
 
@@ -156,7 +158,7 @@ fn laplace(point: &Point, inflation: f64) -> (Matrix6<f64>, f64) {
     // As in a solve: what nothing is known of, not even beforehand, must not be infinite.
     let n = scale.len();
     let Some(factor) = (scaled + DMatrix::identity(n, n) * 1e-9).cholesky() else {
-        return (Matrix6::identity(), 0.0);
+        return (Matrix6::identity(), f64::NEG_INFINITY);
     };
     let all = factor.inverse();
     let at = point.normal.offset(Block::ObjectPose).unwrap_or(0);

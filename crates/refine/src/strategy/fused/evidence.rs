@@ -43,7 +43,11 @@ impl<'a> Known<'a> {
         let seen = observation.depth.pixels().iter().zip(observation.mask.pixels());
         for (nearest, (depth, masked)) in occluder.pixels_mut().iter_mut().zip(seen) {
             let known = *nearest > 0.0;
-            if *depth > 0.0 && !masked && (!known || depth + IN_FRONT < *nearest) {
+            if depth.is_finite()
+                && *depth > 0.0
+                && !masked
+                && (!known || depth + IN_FRONT < *nearest)
+            {
                 *nearest = depth + IN_FRONT;
             }
         }

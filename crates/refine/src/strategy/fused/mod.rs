@@ -34,7 +34,7 @@ pub struct Fused {
 }
 
 impl Fused {
-    /// Walks from `initial`, calling `visit` at every pose of the winning hypothesis; ends when that returns false.
+    /// Walks from `initial`, calling `visit` with the best pose after every stage; ends when that returns false.
     ///
     /// # Errors
     /// If the observation or the settings are at fault.
@@ -79,16 +79,16 @@ impl Fused {
             };
             states.truncate(stage.hypotheses.max(1));
             found = states.par_iter().map(solve_from).collect::<Vec<(Point, Ending)>>();
-            found.sort_by(|a, b| a.0.value.total_cmp(&b.0.value));
-            states = distinct(&found, object.radius);
+            found = distinct(found, object.radius);
+            states = found.iter().map(|(point, _)| point.state.clone()).collect();
             if index == 0
                 && let Some(next) = settings.stages.get(1)
             {
                 // Where it is, geometry finds well; how it is turned, colours may say better from where they were told. And
                 // what little is seen of the object may have led astray.
-                states.truncate(next.hypotheses.saturating_sub(2));
                 let mut turned_back = states[0].clone();
                 let moved = states[0].centre() - initial.centre();
+                states.truncate(next.hypotheses.saturating_sub(2).max(1));
                 turned_back.t_cam_object = Translation3::from(moved) * initial.t_cam_object;
                 states.extend([turned_back, initial.clone()]);
                 let more = next.hypotheses.saturating_sub(states.len());
@@ -114,14 +114,25 @@ impl Fused {
                     settings.depth.effective_points = scatter.effective_points;
                 }
                 let terms = known.terms(&initial, last, &settings)?;
-                let start = Point::new(&terms, point.state, &[Block::ObjectPose]);
-                found = vec![solve(&terms, start, iterations, last_gain, |_| true)];
+                let solve_from = |state: State| {
+                    let start = Point::new(&terms, state, &[Block::ObjectPose]);
+                    solve(&terms, start, iterations, last_gain, |_| true)
+                };
+                let rivals = found.iter().skip(1).map(|(rival, _)| State {
+                    t_cam_hand: initial.t_cam_hand,
+                    joints: initial.joints.clone(),
+                    camera: initial.camera,
+                    ..rival.state.clone()
+                });
+                let states: Vec<State> = std::iter::once(point.state).chain(rivals).collect();
+                found = distinct(states.into_par_iter().map(solve_from).collect(), object.radius);
                 step(&found[0].0, &mut trace);
                 exact = true;
             }
         }
         let width = Width {
             scale: settings.covariance_scale,
+            // Where calibrations are exact, as in simulation, so are models.
             model_tolerance: if exact { 0.0 } else { settings.model_tolerance },
         };
         Ok((trace, Confidence::new(&found, width, object.radius)))
@@ -163,17 +174,18 @@ const COARSEST: f64 = 3e-3;
 /// Surface motion between poses that are the same solution \[m\].
 const SAME: f64 = 2e-3;
 
-/// The states of `found`, the best first, without those that came to the same pose.
-fn distinct(found: &[(Point, Ending)], radius: f64) -> Vec<State> {
-    let mut kept: Vec<State> = Vec::new();
-    for (point, _) in found {
-        let centre = point.state.centre();
-        let same = |other: &State| {
-            let turn = point.state.t_cam_object.rotation.angle_to(&other.t_cam_object.rotation);
-            (centre - other.centre()).norm() + radius * turn < SAME
+/// Solutions of which no two are the same pose, the one of the lowest value first.
+fn distinct(mut found: Vec<(Point, Ending)>, radius: f64) -> Vec<(Point, Ending)> {
+    found.sort_by(|a, b| a.0.value.total_cmp(&b.0.value));
+    let mut kept: Vec<(Point, Ending)> = Vec::new();
+    for solution in found {
+        let state = &solution.0.state;
+        let same = |(other, _): &(Point, Ending)| {
+            let turn = state.t_cam_object.rotation.angle_to(&other.state.t_cam_object.rotation);
+            (state.centre() - other.state.centre()).norm() + radius * turn < SAME
         };
         if !kept.iter().any(same) {
-            kept.push(point.state.clone());
+            kept.push(solution);
         }
     }
     kept

@@ -83,21 +83,25 @@ pub(crate) fn solve(
 ) -> (Point, Ending) {
     let blocks = point.normal.blocks().to_vec();
     let mut damping = FIRST_DAMPING;
+    let mut rejected = false;
     for _ in 0..iterations {
         let Some((step, gain)) = step(&point.normal, damping) else {
             return (point, Ending::Stuck);
         };
         if gain < last_gain {
-            return (point, Ending::Converged);
+            // Small because it is held back, not because there is nothing to gain?
+            return (point, if rejected { Ending::Stuck } else { Ending::Converged });
         }
         let next = Point::new(terms, point.state.moved_all(&blocks, step.as_slice()), &blocks);
         if next.value < point.value {
             point = next;
+            rejected = false;
             damping = (damping / 10.0).max(1e-6);
             if !visit(&point) {
                 return (point, Ending::Stopped);
             }
         } else {
+            rejected = true;
             damping *= 8.0;
             if damping > LAST_DAMPING {
                 return (point, Ending::Stuck);
