@@ -11,7 +11,7 @@ pub use fused::{
     Confidence, ConfidenceSummary, Disagreement, Ending, Evidence, Fused, FusedSettings,
     Hypothesis, Nuisance, Stage, Unobserved,
 };
-pub(crate) use fused::{Known, Point, Width, balanced, solve};
+pub(crate) use fused::{Factor, Known, Point, RIDGE, Width, solve};
 pub use heuristic::{Heuristic, HeuristicSettings};
 pub use icp::{Icp, IcpSettings};
 pub use robust_icp::{RobustIcp, RobustIcpSettings};

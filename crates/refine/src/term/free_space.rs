@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::{SVector, Vector3};
 use prehend_render::{Camera, DepthImage};
 
-use super::Term;
+use super::{Term, share};
 use crate::{Block, Cauchy, Normal, Object, Observation, State};
 
 /// Settings of [`FreeSpaceTerm`].
@@ -52,10 +52,8 @@ impl FreeSpaceTerm {
 
     /// Calls `f` with the place of each sample (camera frame) and how far it is in front of measured depth \[m\].
     fn in_front(&self, state: &State, mut f: impl FnMut(&Vector3<f64>, &Vector3<f64>, f64)) {
-        let samples = &self.object.samples;
-        let step = samples.len().div_ceil(self.settings.samples.max(1)).max(1);
         let apparent = state.camera.apparent(&state.t_cam_object, &state.centre());
-        for sample in samples.iter().step_by(step) {
+        for sample in self.object.samples.iter().step_by(self.stride()) {
             let normal = state.t_cam_object * sample.normal;
             let point = (state.t_cam_object * sample.point).coords;
             if normal.dot(&point) >= 0.0 {
@@ -79,13 +77,15 @@ impl FreeSpaceTerm {
         }
     }
 
+    /// One of so many samples is taken.
+    fn stride(&self) -> usize {
+        self.object.samples.len().div_ceil(self.settings.samples.max(1)).max(1)
+    }
+
     /// Nats of one square metre.
     fn share(&self) -> f64 {
-        let settings = &self.settings;
-        let samples = self.object.samples.len();
-        let step = samples.div_ceil(settings.samples.max(1)).max(1);
-        let count = samples.div_ceil(step).max(1) as f64;
-        (settings.effective_samples / count).min(1.0) / settings.sigma.powi(2)
+        let count = self.object.samples.len().div_ceil(self.stride()).max(1) as f64;
+        share(self.settings.effective_samples, count, self.settings.sigma)
     }
 }
 

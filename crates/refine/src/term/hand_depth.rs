@@ -7,7 +7,7 @@ use prehend_geometry::robot::RobotSample;
 use prehend_render::DepthImage;
 use rayon::prelude::*;
 
-use super::Term;
+use super::{Term, share};
 use crate::{Block, Cauchy, Normal, Observation, Robot, State};
 
 /// Settings of [`HandDepthTerm`].
@@ -95,7 +95,7 @@ impl HandDepthTerm {
     /// Nats of one square metre.
     fn share(&self) -> f64 {
         let count = self.points.len().max(1) as f64;
-        (self.settings.effective_points / count).min(1.0) / self.settings.sigma.powi(2)
+        share(self.settings.effective_points, count, self.settings.sigma)
     }
 
     /// Loss of a sample; points out of reach are as bad as those at its end.

@@ -43,6 +43,12 @@ pub trait Term: Send + Sync {
     fn refresh(&self, _state: &mut State) {}
 }
 
+/// Nats of half a squared residual of one of `count` measurements of deviation `sigma` that amount to at most `effective`
+/// independent ones.
+fn share(effective: f64, count: f64, sigma: f64) -> f64 {
+    (effective / count).min(1.0) / sigma.powi(2)
+}
+
 #[cfg(test)]
 mod gradient_check {
     use std::sync::{Arc, LazyLock};

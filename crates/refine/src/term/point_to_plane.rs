@@ -7,8 +7,8 @@ use nalgebra::{SMatrix, SVector, Vector2, Vector3};
 use prehend_render::DepthImage;
 use rayon::prelude::*;
 
-use super::Term;
 use super::depth::masked_depths;
+use super::{Term, share};
 use crate::{Block, Cauchy, Normal, Object, Observation, RefineError, State};
 
 /// Settings of [`PointToPlaneTerm`].
@@ -199,8 +199,7 @@ impl PointToPlaneTerm {
 
     /// Nats of one square metre.
     fn share(&self) -> f64 {
-        let count = self.points.len() as f64;
-        (self.settings.effective_points / count).min(1.0) / self.settings.sigma.powi(2)
+        share(self.settings.effective_points, self.points.len() as f64, self.settings.sigma)
     }
 }
 

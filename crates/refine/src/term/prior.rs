@@ -31,6 +31,20 @@ pub struct PriorSettings {
     pub magnification: f64,
 }
 
+impl PriorSettings {
+    /// Standard deviations of the parameters of `block`, in their order.
+    pub(crate) fn deviations(&self, block: Block) -> Vec<f64> {
+        match block {
+            Block::ObjectPose => [self.object_translation, self.object_rotation].concat(),
+            Block::HandPose => [[self.hand_translation; 3], [self.hand_rotation; 3]].concat(),
+            Block::Joints(count) => vec![self.joints; count],
+            Block::Camera => {
+                vec![self.depth_scale, self.depth_bias, self.shift, self.shift, self.magnification]
+            }
+        }
+    }
+}
+
 impl Default for PriorSettings {
     /// An initial pose that is good to some centimetres and some tens of degrees, and a robot of common accuracy.
     fn default() -> Self {
@@ -65,12 +79,11 @@ impl Prior {
     /// # Errors
     /// If a deviation is not a positive number.
     pub fn new(state: &State, settings: &PriorSettings) -> Result<Self, RefineError> {
-        let s = settings;
-        let both = |t: [f64; 3], r: [f64; 3]| [t[0], t[1], t[2], r[0], r[1], r[2]];
-        let object = both(s.object_translation, s.object_rotation);
-        let hand = both([s.hand_translation; 3], [s.hand_rotation; 3]);
-        let camera = [s.depth_scale, s.depth_bias, s.shift, s.shift, s.magnification];
-        let all = object.iter().chain(&hand).chain(&camera).chain(std::iter::once(&s.joints));
+        let of = |block| settings.deviations(block);
+        let (object, hand) = (of(Block::ObjectPose), of(Block::HandPose));
+        let camera = of(Block::Camera);
+        let all =
+            object.iter().chain(&hand).chain(&camera).chain(std::iter::once(&settings.joints));
         if let Some(wrong) = all.into_iter().find(|v| v.is_nan() || **v <= 0.0) {
             let problem = format!("a standard deviation of {wrong} is not positive");
             return Err(RefineError::Setting { name: "prior", problem });
@@ -80,10 +93,10 @@ impl Prior {
             object: (state.centre(), state.t_cam_object),
             hand: state.t_cam_hand,
             joints: state.joints.clone(),
-            precision_object: Vector6::from(object).map(precision),
-            precision_hand: Vector6::from(hand).map(precision),
-            precision_joints: precision(s.joints),
-            precision_camera: camera.map(precision),
+            precision_object: Vector6::from_vec(object).map(precision),
+            precision_hand: Vector6::from_vec(hand).map(precision),
+            precision_joints: precision(settings.joints),
+            precision_camera: std::array::from_fn(|k| precision(camera[k])),
         })
     }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::{Point3, Vector3, Vector6};
 use prehend_geometry::robot::ArticulatedRobot;
 
-use super::Term;
+use super::{Term, share};
 use crate::{Block, Cauchy, Normal, Object, Observation, RefineError, Robot, State};
 
 /// Settings of the mesh-to-tactile term.
@@ -104,8 +104,7 @@ impl TactileTerm {
         let Ok(hand) = self.robot.articulated(&state.t_cam_hand, &state.joints) else { return };
         let t_object_cam = state.t_cam_object.inverse();
         let touched = self.touches.iter().filter(|t| t.touched).count().max(1) as f64;
-        let share = (self.settings.effective_taxels / touched).min(1.0);
-        let touch_weight = share / self.settings.sigma.powi(2);
+        let touch_weight = share(self.settings.effective_taxels, touched, self.settings.sigma);
         let quiet_weight = self.settings.quiet_sigma.powi(-2);
         let reach = self.object.radius;
         for touch in &self.touches {

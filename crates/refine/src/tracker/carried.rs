@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, Vector3, Vector6};
 
-use crate::strategy::balanced;
+use crate::strategy::{Factor, RIDGE};
 use crate::term::{Prior, Term};
 use crate::{Block, CameraCorrection, Normal, State};
 
@@ -22,6 +22,11 @@ impl Layout {
 
     pub(super) fn len(self) -> usize {
         POSES + self.joints + CameraCorrection::DIMENSION
+    }
+
+    /// Its blocks, in order.
+    pub(super) fn blocks(self) -> [Block; 4] {
+        [Block::ObjectPose, Block::HandPose, Block::Joints(self.joints), Block::Camera]
     }
 
     /// Where `block` begins.
@@ -49,12 +54,7 @@ pub(super) struct Carried {
 impl Carried {
     /// About `mean`, whose deviations have that covariance \[m, rad\]; `None` if it is not positive definite.
     pub(super) fn new(mean: State, layout: Layout, covariance: &DMatrix<f64>) -> Option<Self> {
-        let (scaled, scale) = balanced(covariance);
-        let n = layout.len();
-        let lower = (scaled + DMatrix::identity(n, n) * 1e-9).cholesky()?.l();
-        let mut whitener = lower.solve_lower_triangular(&DMatrix::from_diagonal(&scale))?;
-        // The solve may leave rounding above the diagonal.
-        whitener.fill_upper_triangle(0.0, 1);
+        let whitener = Factor::new(covariance, RIDGE)?.whitener()?;
         let object = covariance.fixed_view::<6, 6>(0, 0).into_owned().try_inverse()?;
         Some(Self { centre: mean.centre(), mean, layout, whitener, object })
     }

@@ -7,9 +7,9 @@ use prehend_autodiff::lie::{perturb_about, so3_log};
 
 use super::carried::Layout;
 use super::settings::{MotionSettings, TrackerSettings};
-use crate::strategy::{Point, balanced};
+use crate::strategy::{Factor, Point, RIDGE};
 use crate::term::PriorSettings;
-use crate::{Block, CameraCorrection, State};
+use crate::{CameraCorrection, State};
 
 /// Time within which an object that is not seen comes to rest, all but 1/e of its velocity \[s\].
 const COASTING: f64 = 0.25;
@@ -174,41 +174,23 @@ fn carrier(turn: &UnitQuaternion<f64>, kept: f64, layout: Layout) -> DMatrix<f64
 
 /// Stated variances.
 fn variances(accuracy: &PriorSettings, layout: Layout) -> DVector<f64> {
-    let mut all = DVector::from_element(layout.len(), accuracy.joints.powi(2));
-    for k in 0..3 {
-        all[k] = accuracy.object_translation[k].powi(2);
-        all[3 + k] = accuracy.object_rotation[k].powi(2);
-        all[6 + k] = accuracy.hand_translation.powi(2);
-        all[9 + k] = accuracy.hand_rotation.powi(2);
-    }
-    let camera = [
-        accuracy.depth_scale,
-        accuracy.depth_bias,
-        accuracy.shift,
-        accuracy.shift,
-        accuracy.magnification,
-    ];
-    let offset = layout.offset(Block::Camera);
-    camera.iter().enumerate().for_each(|(k, sigma)| all[offset + k] = sigma.powi(2));
-    all
+    let all = layout.blocks().into_iter().flat_map(|block| accuracy.deviations(block));
+    DVector::from_iterator(layout.len(), all.map(|sigma| sigma.powi(2)))
 }
 
 /// Covariance of what was solved for, and the stated one of the rest.
 fn posterior(point: &Point, layout: Layout, accuracy: &PriorSettings) -> DMatrix<f64> {
     let mut covariance = DMatrix::from_diagonal(&variances(accuracy, layout));
-    let (scaled, scale) = balanced(point.normal.hessian());
-    let n = scale.len();
-    let Some(factor) = (scaled + DMatrix::identity(n, n) * 1e-9).cholesky() else {
-        return covariance;
-    };
+    let Some(factor) = Factor::new(point.normal.hessian(), RIDGE) else { return covariance };
     let all = factor.inverse();
+    let n = all.nrows();
     let mut places = Vec::with_capacity(n);
     for block in point.normal.blocks() {
         places.extend((0..block.dimension()).map(|k| layout.offset(*block) + k));
     }
     for r in 0..n {
         for c in 0..n {
-            covariance[(places[r], places[c])] = all[(r, c)] * scale[r] * scale[c];
+            covariance[(places[r], places[c])] = all[(r, c)];
         }
     }
     covariance

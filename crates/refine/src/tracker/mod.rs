@@ -301,7 +301,7 @@ impl Tracker {
         clock: &Clock,
     ) -> Solved {
         let (stage, settings) = (&self.settings.stage, &self.settings.fused);
-        let blocks = Fused { settings: settings.clone() }.blocks(known, &start);
+        let blocks = settings.blocks(known.robot.is_some(), &start);
         let mut before = Instant::now();
         let mut iterations = 0;
         let start = Point::new(terms, start, &blocks);

@@ -11,6 +11,7 @@ use clap::Args;
 use nalgebra::Isometry3;
 use prehend_refine::bop::{Dataset, ResultRow, check_writable, share_image_times, write_results};
 use prehend_refine::initial::find_targets;
+use prehend_refine::strategy::Confidence;
 use prehend_refine::tracker::{Following, Recovery, Tracked, Tracker, TrackerSettings};
 use prehend_refine::{AssetError, Assets, PlainPose};
 use serde_json::json;
@@ -73,6 +74,7 @@ pub(crate) struct Arguments {
 }
 
 /// An object of a scene, to be followed from an image on.
+#[derive(Clone, Copy)]
 struct Sequence {
     scene_id: u32,
     obj_id: u32,
@@ -164,7 +166,7 @@ impl Arguments {
         let mut sequences = BTreeMap::new();
         for start in starts {
             let key = (start.scene_id, start.obj_id, start.instance);
-            let earliest = sequences.entry(key).or_insert_with(|| Sequence { ..start });
+            let earliest = sequences.entry(key).or_insert_with(|| start);
             if start.first < earliest.first {
                 *earliest = start;
             }
@@ -217,7 +219,7 @@ impl Arguments {
                         bar.suspend(|| eprintln!("warning: {}: lost: {doubt}", label(&row)));
                     }
                     row.t_cam_model = tracked.t_cam_object;
-                    row.score = probability(&tracked);
+                    row.score = tracked.confidence.as_ref().map_or(0.0, Confidence::probability);
                     if self.time {
                         row.time = tracked.spent.total().as_secs_f64();
                     }
@@ -230,12 +232,6 @@ impl Arguments {
         bar.finish_and_clear();
         Ok(())
     }
-}
-
-/// Of the pose being within 5 mm and 5°.
-fn probability(tracked: &Tracked) -> f64 {
-    let confidence = tracked.confidence.as_ref();
-    confidence.map_or(0.0, |c| c.probability_within(5e-3, 5f64.to_radians()))
 }
 
 /// What became of `frames`, which are not empty.

@@ -1,11 +1,12 @@
 //! How sure a pose is: the posterior around it, and what speaks against it.
 
-use nalgebra::{DMatrix, Isometry3, Matrix6, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix6, Point3, Vector3, Vector6};
 use prehend_autodiff::lie::{perturb_about, so3_log};
 use prehend_geometry::SplitMix64;
 
 use super::Ending;
-use super::solve::{Point, balanced};
+use super::factor::Factor;
+use super::solve::Point;
 use crate::Block;
 
 /// A pose that the search came upon.
@@ -67,6 +68,9 @@ pub(crate) struct Width {
 /// Random poses that stand for the posterior.
 const SAMPLES: usize = 512;
 
+/// Part of the diagonal that is added before a posterior is inverted.
+pub(crate) const RIDGE: f64 = 1e-9;
+
 /// Standard deviation of surface motion from which a direction counts as unobserved \[m\].
 const UNOBSERVED: f64 = 8e-3;
 
@@ -118,20 +122,24 @@ impl Confidence {
         self.hypotheses[0].covariance
     }
 
+    /// Probability that the pose is right: within 5 mm and 5° of the true one.
+    pub fn probability(&self) -> f64 {
+        self.probability_within(5e-3, 5f64.to_radians())
+    }
+
     /// Probability that the true pose is within `distance` \[m\] and `angle` \[rad\] of the best one, all hypotheses
     /// considered. By sampling; always the same for the same posterior.
     pub fn probability_within(&self, distance: f64, angle: f64) -> f64 {
-        let best = &self.hypotheses[0].t_cam_object;
-        let place = best.inverse() * nalgebra::Point3::from(self.centre);
+        let place = self.hypotheses[0].t_cam_object.inverse() * Point3::from(self.centre);
         let mut random = SplitMix64::new(0);
         let of = |hypothesis: &Hypothesis, random: &mut SplitMix64| {
-            let Some(root) = root(&hypothesis.covariance) else { return 0.0 };
+            let Some(factor) = hypothesis.covariance.cholesky() else { return 0.0 };
+            let root = factor.l();
             let inside = (0..SAMPLES).filter(|_| {
                 let twist = root * Vector6::from_fn(|_, _| random.normal());
                 let centre = (hypothesis.t_cam_object * place).coords;
                 let pose = perturb_about(&hypothesis.t_cam_object, &centre, &twist);
-                let off = (pose * place).coords - self.centre;
-                let turn = so3_log(&(pose.rotation * best.rotation.inverse()));
+                let (off, turn) = self.deviation(&pose);
                 off.norm() <= distance && turn.norm() <= angle
             });
             inside.count() as f64 / SAMPLES as f64
@@ -139,13 +147,18 @@ impl Confidence {
         self.hypotheses.iter().map(|h| h.weight * of(h, &mut random)).sum()
     }
 
+    /// How far `pose` is from the best one: displacement of the object's centre \[m\] and rotation vector \[rad\].
+    fn deviation(&self, pose: &Isometry3<f64>) -> (Vector3<f64>, Vector3<f64>) {
+        let best = &self.hypotheses[0].t_cam_object;
+        let place = best.inverse() * Point3::from(self.centre);
+        let turn = so3_log(&(pose.rotation * best.rotation.inverse()));
+        ((pose * place).coords - self.centre, turn)
+    }
+
     /// How far `pose` is from the best one, in standard deviations: the square is χ² of six degrees of freedom if the
     /// posterior is right.
     pub fn mahalanobis(&self, pose: &Isometry3<f64>) -> f64 {
-        let best = &self.hypotheses[0].t_cam_object;
-        let place = best.inverse() * nalgebra::Point3::from(self.centre);
-        let off = (pose * place).coords - self.centre;
-        let turn = so3_log(&(pose.rotation * best.rotation.inverse()));
+        let (off, turn) = self.deviation(pose);
         let twist = Vector6::new(off.x, off.y, off.z, turn.x, turn.y, turn.z);
         let factor = self.covariance().cholesky();
         factor.map_or(f64::INFINITY, |factor| twist.dot(&factor.solve(&twist)).max(0.0).sqrt())
@@ -154,23 +167,14 @@ impl Confidence {
 
 /// Covariance of the object's pose with all else integrated out, and the logarithm of the determinant of that of everything.
 fn laplace(point: &Point, inflation: f64) -> (Matrix6<f64>, f64) {
-    let (scaled, scale) = balanced(point.normal.hessian());
-    // As in a solve: what nothing is known of, not even beforehand, must not be infinite.
-    let n = scale.len();
-    let Some(factor) = (scaled + DMatrix::identity(n, n) * 1e-9).cholesky() else {
+    // What nothing is known of, not even beforehand, must not be infinite.
+    let Some(factor) = Factor::new(point.normal.hessian(), RIDGE) else {
         return (Matrix6::identity(), f64::NEG_INFINITY);
     };
     let all = factor.inverse();
     let at = point.normal.offset(Block::ObjectPose).unwrap_or(0);
-    let covariance =
-        Matrix6::from_fn(|r, c| all[(at + r, at + c)] * scale[at + r] * scale[at + c] * inflation);
-    let determinant = factor.l_dirty().diagonal().iter().map(|d| -2.0 * d.ln()).sum::<f64>()
-        + scale.iter().map(|s| 2.0 * s.ln()).sum::<f64>();
-    (covariance, determinant)
-}
-
-fn root(covariance: &Matrix6<f64>) -> Option<Matrix6<f64>> {
-    Some(covariance.cholesky()?.l())
+    let covariance = Matrix6::from_fn(|r, c| all[(at + r, at + c)] * inflation);
+    (covariance, -factor.log_determinant())
 }
 
 /// Directions in which the pose of `point` is uncertain, the most uncertain first: twists about the object's centre that move
@@ -204,11 +208,8 @@ fn unobserved(covariance: &Matrix6<f64>, radius: f64) -> Vec<Unobserved> {
 /// Which evidence, the prior included, has its own optimum far away.
 fn disagreements(point: &Point) -> Vec<Disagreement> {
     let distance = |part: &crate::Normal| {
-        let (scaled, scale) = balanced(part.hessian());
-        let gradient = part.gradient().component_mul(&scale);
-        let n = scale.len();
-        let step = (scaled + DMatrix::identity(n, n) * 1e-3).cholesky()?.solve(&gradient);
-        Some(gradient.dot(&step).max(0.0).sqrt())
+        let factor = Factor::new(part.hessian(), 1e-3)?;
+        Some(factor.squared_norm(part.gradient()).max(0.0).sqrt())
     };
     let of = |part: &super::solve::Part| {
         let distance = distance(&part.normal)?;

@@ -54,8 +54,11 @@ impl<'a> Known<'a> {
         Self { observation, object, robot, hand, occluder }
     }
 
-    /// How depth points scatter about the object at `state`; `None` without depth.
+    /// How depth points scatter about the object at `state`; `None` without depth, or if it is not used.
     pub(super) fn scatter(&self, state: &State, settings: &FusedSettings) -> Option<Scatter> {
+        if !settings.evidence.contains(&Evidence::Depth) {
+            return None;
+        }
         let depth = PointToPlaneSettings { points: SCATTERED, ..settings.depth.clone() };
         let term =
             PointToPlaneTerm::new(self.observation, Arc::clone(self.object), &self.hand, depth)

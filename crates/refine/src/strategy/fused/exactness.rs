@@ -2,6 +2,7 @@
 
 use nalgebra::DMatrix;
 
+use super::factor::Factor;
 use super::solve::{Ending, Point, solve};
 use crate::{Block, State, Term};
 
@@ -32,15 +33,9 @@ pub(super) fn exact(
     let of_prior = DMatrix::from_fn(others.len(), others.len(), |r, c| {
         prior.hessian()[(others[r], others[c])]
     });
+    let log_determinant = |matrix: &DMatrix<f64>| Some(Factor::new(matrix, 0.0)?.log_determinant());
     let free = -point.value - 0.5 * log_determinant(point.normal.hessian())?
         + 0.5 * log_determinant(&of_prior)?;
     let exact = -solution.0.value - 0.5 * log_determinant(solution.0.normal.hessian())?;
     Some((exact - free, solution))
-}
-
-fn log_determinant(matrix: &DMatrix<f64>) -> Option<f64> {
-    let (scaled, scale) = super::solve::balanced(matrix);
-    let factor = scaled.cholesky()?;
-    let root: f64 = factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum();
-    Some(2.0 * root - 2.0 * scale.iter().map(|s| s.ln()).sum::<f64>())
 }

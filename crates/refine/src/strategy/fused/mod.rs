@@ -3,6 +3,7 @@
 mod confidence;
 mod evidence;
 mod exactness;
+mod factor;
 mod settings;
 mod solve;
 mod summary;
@@ -14,12 +15,13 @@ use std::sync::Arc;
 use nalgebra::Translation3;
 use rayon::prelude::*;
 
-pub(crate) use self::confidence::Width;
 pub use self::confidence::{Confidence, Disagreement, Hypothesis, Unobserved};
+pub(crate) use self::confidence::{RIDGE, Width};
 pub(crate) use self::evidence::Known;
+pub(crate) use self::factor::Factor;
 pub use self::settings::{Evidence, FusedSettings, Nuisance, Stage};
 pub use self::solve::Ending;
-pub(crate) use self::solve::{Point, balanced, solve};
+pub(crate) use self::solve::{Point, solve};
 pub use self::summary::ConfidenceSummary;
 use crate::trace::{Iteration, Trace};
 use crate::{Block, Object, Observation, RefineError, Robot, State};
@@ -51,10 +53,11 @@ impl Fused {
             return Err(RefineError::Setting { name: "stages", problem: "are missing".into() });
         }
         let known = Known::new(observation, object, robot);
-        let blocks = self.blocks(&known, &initial);
+        let blocks = settings.blocks(known.robot.is_some(), &initial);
         let mut states = self.starts(&initial);
         let mut trace = Trace::new(["posterior"].into_iter());
         let mut found = Vec::new();
+        let mut terms = Vec::new();
         let mut go_on = true;
         let mut step = |point: &Point, trace: &mut Trace| {
             let index = trace.iterations.len();
@@ -72,7 +75,7 @@ impl Fused {
                 settings.depth.effective_points =
                     scatter.effective_points.min(settings.most_points);
             }
-            let terms = known.terms(&initial, stage, &settings)?;
+            terms = known.terms(&initial, stage, &settings)?;
             let solve_from = |state: &State| {
                 let start = Point::new(&terms, state.clone(), &blocks);
                 solve(&terms, start, stage.iterations, stage.last_gain, |_| true)
@@ -102,10 +105,8 @@ impl Fused {
         let mut exact = false;
         if go_on && settings.exactness && blocks.len() > 1 {
             let last = &self.settings.stages[self.settings.stages.len() - 1];
-            let terms = known.terms(&initial, last, &settings)?;
-            let point = Point::new(&terms, found[0].0.state.clone(), &blocks);
             let (iterations, last_gain) = (last.iterations, last.last_gain);
-            let odds = exactness::exact(&terms, &point, &initial, iterations, last_gain);
+            let odds = exactness::exact(&terms, &found[0].0, &initial, iterations, last_gain);
             if let Some((odds, (point, _))) = odds
                 && odds > 0.0
             {
@@ -136,18 +137,6 @@ impl Fused {
             model_tolerance: if exact { 0.0 } else { settings.model_tolerance },
         };
         Ok((trace, Confidence::new(&found, width, object.radius)))
-    }
-
-    /// What is solved for.
-    pub(crate) fn blocks(&self, known: &Known<'_>, state: &State) -> Vec<Block> {
-        let joints = state.joints.len();
-        let mut blocks = vec![Block::ObjectPose];
-        for nuisance in &self.settings.nuisances {
-            if known.robot.is_some() || *nuisance == Nuisance::Camera {
-                blocks.push(nuisance.block(joints));
-            }
-        }
-        blocks
     }
 
     /// The initial state and those it is turned to.

@@ -1,10 +1,10 @@
 //! Settings of the fused estimator.
 
-use crate::Block;
 use crate::term::{
     FreeSpaceSettings, HandDepthSettings, PenetrationSettings, PointToPlaneSettings, PriorSettings,
     RenderingSettings, TactileSettings,
 };
+use crate::{Block, State};
 
 /// A kind of evidence that the fused estimator weighs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -148,6 +148,15 @@ pub struct FusedSettings {
     pub tactile: TactileSettings,
     /// Non-penetration.
     pub penetration: PenetrationSettings,
+}
+
+impl FusedSettings {
+    /// What is solved for from `state`; of a hand that is not `known`, nothing.
+    pub(crate) fn blocks(&self, known: bool, state: &State) -> Vec<Block> {
+        let nuisances = self.nuisances.iter().filter(|n| known || **n == Nuisance::Camera);
+        let blocks = nuisances.map(|nuisance| nuisance.block(state.joints.len()));
+        std::iter::once(Block::ObjectPose).chain(blocks).collect()
+    }
 }
 
 impl Default for FusedSettings {

@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use super::factor::balanced;
 use crate::{Block, Normal, State, Term};
 
 /// A state, the value of the terms there, and their derivatives.
@@ -119,11 +120,4 @@ fn step(normal: &Normal, damping: f64) -> Option<(DVector<f64>, f64)> {
     let step = -damped.cholesky()?.solve(&gradient);
     let gain = -gradient.dot(&step) - 0.5 * step.dot(&(&scaled * &step));
     Some((step.component_mul(&scale), gain))
-}
-
-/// `matrix` with its diagonal scaled to one, and what its rows and columns were multiplied by.
-pub(crate) fn balanced(matrix: &DMatrix<f64>) -> (DMatrix<f64>, DVector<f64>) {
-    let scale = matrix.diagonal().map(|d| if d > 0.0 { d.sqrt().recip() } else { 1.0 });
-    let n = scale.len();
-    (DMatrix::from_fn(n, n, |r, c| matrix[(r, c)] * scale[r] * scale[c]), scale)
 }

@@ -24,22 +24,14 @@ pub struct ConfidenceSummary {
     pub ending: String,
 }
 
-impl ConfidenceSummary {
-    /// Distance that a pose may be off to count as right \[m\].
-    pub const DISTANCE: f64 = 5e-3;
-    /// Angle that a pose may be off to count as right \[°\].
-    pub const ANGLE_DEG: f64 = 5.0;
-}
-
 impl From<&Confidence> for ConfidenceSummary {
     fn from(confidence: &Confidence) -> Self {
         let covariance = confidence.covariance();
         let deviation =
             |first: usize| Vector3::from_fn(|k, _| covariance[(first + k, first + k)].sqrt());
-        let angle = Self::ANGLE_DEG.to_radians();
         let disagreements = confidence.disagreements.iter();
         Self {
-            probability: confidence.probability_within(Self::DISTANCE, angle),
+            probability: confidence.probability(),
             deviation_mm: (deviation(0) * 1e3).into(),
             deviation_deg: deviation(3).map(f64::to_degrees).into(),
             unobserved_mm: confidence.unobserved.iter().map(|u| u.deviation * 1e3).collect(),

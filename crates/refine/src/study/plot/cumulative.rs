@@ -8,7 +8,7 @@ use super::super::document::row_label;
 use super::super::kind::TRUTH;
 use super::super::record::FrameRecord;
 use super::super::tables::{Block, Tables};
-use super::{Area, DEVIATIONS, Drawn, color, failed, page, tick};
+use super::{Area, DEVIATIONS, Drawn, color, failed, legend, page, swatch, tick};
 use crate::metrics::COLUMNS;
 
 /// A row's label and its sorted errors.
@@ -81,17 +81,11 @@ fn panel(area: &Area<'_>, metric: usize, curves: &[Curve], frames: usize, named:
         let style = color(k).stroke_width(2);
         let series = chart.draw_series(LineSeries::new(points, style))?;
         if named {
-            series.label(name).legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], style));
+            series.label(name).legend(move |at| swatch(at, style));
         }
     }
     if named {
-        chart
-            .configure_series_labels()
-            .position(SeriesLabelPosition::UpperLeft)
-            .background_style(WHITE.mix(0.85))
-            .border_style(BLACK.mix(0.3))
-            .label_font(("sans-serif", 13))
-            .draw()?;
+        legend(&mut chart, SeriesLabelPosition::UpperLeft)?;
     }
     Ok(())
 }

@@ -5,7 +5,7 @@ use plotters::prelude::*;
 use super::super::design::{Design, disturbed};
 use super::super::sweep::Sweep;
 use super::super::tables::{Block, Estimate, Tables};
-use super::{Area, Drawn, color, page, tick};
+use super::{Area, Drawn, color, legend, page, swatch, tick};
 use crate::metrics::COLUMNS;
 
 /// Panels: a metric, and whether its median is drawn instead of its mean.
@@ -104,9 +104,7 @@ fn panel(
         let line = points.iter().map(|&(x, y, _)| (x, y));
         let series = chart.draw_series(LineSeries::new(line, style).point_size(3))?;
         if named {
-            series
-                .label(*name)
-                .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], style));
+            series.label(*name).legend(move |at| swatch(at, style));
         }
         chart.draw_series(
             points
@@ -115,13 +113,7 @@ fn panel(
         )?;
     }
     if named {
-        chart
-            .configure_series_labels()
-            .position(SeriesLabelPosition::UpperMiddle)
-            .background_style(WHITE.mix(0.85))
-            .border_style(BLACK.mix(0.3))
-            .label_font(("sans-serif", 13))
-            .draw()?;
+        legend(&mut chart, SeriesLabelPosition::UpperMiddle)?;
     }
     Ok(())
 }

@@ -8,7 +8,7 @@ mod steps;
 
 use std::collections::BTreeMap;
 
-use plotters::coord::Shift;
+use plotters::coord::{CoordTranslate, Shift};
 use plotters::prelude::*;
 
 use super::design::Design;
@@ -28,6 +28,26 @@ const HEAD: u32 = 64;
 const DEVIATIONS: [usize; 4] = [0, 1, 9, 10];
 /// Those of the paper's steps study: PE, OE, CA and IV.
 const STEPS: [usize; 4] = [0, 1, 7, 8];
+
+/// A line in a legend.
+fn swatch((x, y): (i32, i32), style: ShapeStyle) -> PathElement<(i32, i32)> {
+    PathElement::new([(x, y), (x + 18, y)], style)
+}
+
+/// Draws the legend of the series that have labels.
+fn legend<'a, C: CoordTranslate>(
+    chart: &mut ChartContext<'a, SVGBackend<'a>, C>,
+    position: SeriesLabelPosition,
+) -> Drawn {
+    chart
+        .configure_series_labels()
+        .position(position)
+        .background_style(WHITE.mix(0.85))
+        .border_style(BLACK.mix(0.3))
+        .label_font(("sans-serif", 13))
+        .draw()?;
+    Ok(())
+}
 
 /// File names and documents.
 pub(super) fn plots(

@@ -8,7 +8,7 @@ use super::super::belief::EVENTS;
 use super::super::calibration::{Calibration, ELLIPSOIDS, beliefs, holding};
 use super::super::record::FrameRecord;
 use super::super::tables::Tables;
-use super::{Area, Drawn, color, page};
+use super::{Area, Drawn, color, legend, page, swatch};
 
 /// A name and points, in per cent.
 type Curve = (String, Vec<(f64, f64)>);
@@ -90,15 +90,9 @@ fn panel(area: &Area<'_>, curves: &[Curve], x: &str, y: &str, marked: bool) -> D
         chart
             .draw_series(if marked { line.point_size(3) } else { line })?
             .label(name)
-            .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], style));
+            .legend(move |at| swatch(at, style));
     }
-    chart
-        .configure_series_labels()
-        .position(SeriesLabelPosition::UpperLeft)
-        .background_style(WHITE.mix(0.85))
-        .border_style(BLACK.mix(0.3))
-        .label_font(("sans-serif", 13))
-        .draw()?;
+    legend(&mut chart, SeriesLabelPosition::UpperLeft)?;
     Ok(())
 }
 

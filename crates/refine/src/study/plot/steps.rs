@@ -3,7 +3,7 @@
 use plotters::prelude::*;
 
 use super::super::tables::{Block, Tables};
-use super::{Area, Drawn, STEPS, color, failed, page, tick};
+use super::{Area, Drawn, STEPS, color, failed, legend, page, swatch, tick};
 use crate::metrics::COLUMNS;
 
 /// A point of a curve: steps, mean, and the ends of its interval.
@@ -70,9 +70,7 @@ fn panel(area: &Area<'_>, metric: usize, blocks: &[&Block], named: bool) -> Draw
         let line = ours.iter().map(|&(x, y, _)| (x, y));
         let series = chart.draw_series(LineSeries::new(line, style).point_size(3))?;
         if named {
-            series
-                .label(format!("noise {}", block.level))
-                .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], style));
+            series.label(format!("noise {}", block.level)).legend(move |at| swatch(at, style));
         }
         chart.draw_series(
             ours.iter().map(|&(x, _, [low, high])| PathElement::new([(x, low), (x, high)], style)),
@@ -82,13 +80,7 @@ fn panel(area: &Area<'_>, metric: usize, blocks: &[&Block], named: bool) -> Draw
         chart.draw_series(theirs.iter().map(|&at| Circle::new(at, 4, color.stroke_width(1))))?;
     }
     if named {
-        chart
-            .configure_series_labels()
-            .position(SeriesLabelPosition::UpperRight)
-            .background_style(WHITE.mix(0.85))
-            .border_style(BLACK.mix(0.3))
-            .label_font(("sans-serif", 13))
-            .draw()?;
+        legend(&mut chart, SeriesLabelPosition::UpperRight)?;
     }
     Ok(())
 }
