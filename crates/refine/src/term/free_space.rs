@@ -6,7 +6,7 @@ use nalgebra::{SVector, Vector3};
 use prehend_render::{Camera, DepthImage};
 
 use super::{Term, share};
-use crate::{Block, Cauchy, Normal, Object, Observation, State};
+use crate::{Block, Cauchy, Normal, Object, State};
 
 /// Settings of [`FreeSpaceTerm`].
 #[derive(Clone, Debug, PartialEq)]
@@ -36,18 +36,19 @@ impl Default for FreeSpaceSettings {
 pub struct FreeSpaceTerm {
     object: Arc<Object>,
     camera: Camera,
-    depth: DepthImage,
+    depth: Arc<DepthImage>,
     settings: FreeSpaceSettings,
 }
 
 impl FreeSpaceTerm {
-    /// A term for the depth of `observation`, which may be missing everywhere: the term is then zero.
+    /// A term for a `depth` image of `camera`, which may be missing everywhere: the term is then zero.
     pub fn new(
-        observation: &Observation,
+        camera: Camera,
+        depth: Arc<DepthImage>,
         object: Arc<Object>,
         settings: FreeSpaceSettings,
     ) -> Self {
-        Self { object, camera: observation.camera, depth: observation.depth.clone(), settings }
+        Self { object, camera, depth, settings }
     }
 
     /// Calls `f` with the place of each sample (camera frame) and how far it is in front of measured depth \[m\].
@@ -126,6 +127,12 @@ mod tests {
     use super::super::gradient_check::{assert_gradient, fixture};
     use super::*;
 
+    fn term(depth: DepthImage) -> FreeSpaceTerm {
+        let (scene, _, _) = fixture(0);
+        let (camera, object) = (scene.observation.camera, Arc::clone(&scene.object));
+        FreeSpaceTerm::new(camera, Arc::new(depth), object, FreeSpaceSettings::default())
+    }
+
     #[test]
     fn gradients_match_differences() {
         for seed in 0..3 {
@@ -133,10 +140,9 @@ mod tests {
             // Towards the camera, where there is something to say; the truth's own depth varies from pixel to pixel.
             let towards = Vector6::new(0.0, 0.0, -6e-3, 0.0, 0.0, 0.0);
             let state = state.moved(Block::ObjectPose, towards.as_slice());
-            let mut observation = scene.observation.clone();
-            observation.depth.pixels_mut().fill(state.centre().z as f32 - 0.02);
-            let object = Arc::clone(&scene.object);
-            let term = FreeSpaceTerm::new(&observation, object, FreeSpaceSettings::default());
+            let mut depth = scene.observation.depth.clone();
+            depth.pixels_mut().fill(state.centre().z as f32 - 0.02);
+            let term = term(depth);
             assert!(term.value(&state) > 0.0);
             for block in [Block::ObjectPose, Block::Camera] {
                 assert_gradient(&term, &state, block, 1e-8, 1e-3);
@@ -147,8 +153,7 @@ mod tests {
     #[test]
     fn in_front_is_worse_than_in_place() {
         let (scene, state, _) = fixture(0);
-        let object = Arc::clone(&scene.object);
-        let term = FreeSpaceTerm::new(&scene.observation, object, FreeSpaceSettings::default());
+        let term = term(scene.observation.depth.clone());
         let truth = State { t_cam_object: scene.truth, ..state };
         let front = truth.moved(Block::ObjectPose, &[0.0, 0.0, -0.02, 0.0, 0.0, 0.0]);
         assert!(term.value(&front) > 3.0 * term.value(&truth));

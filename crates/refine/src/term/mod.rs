@@ -18,6 +18,7 @@ pub use penetration::{PenetrationSettings, PenetrationTerm};
 pub use physics::{PhysicsSettings, PhysicsTerm};
 pub use point_to_plane::{PointToPlaneSettings, PointToPlaneTerm, Scatter};
 pub use prior::{Prior, PriorSettings};
+pub(crate) use rendering::Segmented;
 pub use rendering::{RenderingSettings, RenderingTerm};
 pub use tactile::{TactileSettings, TactileTerm};
 

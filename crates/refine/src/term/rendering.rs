@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, SMatrix};
 use prehend_render::{
-    ContourOptions, DepthImage, Light, LossOptions, Mode, PoseLoss, Robust, Target, light_samples,
+    ContourOptions, DepthImage, Light, LossOptions, Mode, PoseLoss, Robust, Target, TargetError,
+    light_samples,
 };
 
 use super::Term;
@@ -51,6 +52,43 @@ impl Default for RenderingSettings {
     }
 }
 
+/// The segmented image that a [`RenderingTerm`] compares with, made once for all terms of one size of image.
+#[derive(Clone)]
+pub(crate) struct Segmented {
+    target: Arc<Target>,
+    /// Root mean square of the colours under the mask.
+    brightness: f64,
+}
+
+impl Segmented {
+    /// The object in `observation`; `hand` is the depth image of what may hide it.
+    ///
+    /// # Errors
+    /// If the images do not fit the camera or the mask is empty.
+    pub(crate) fn new(observation: &Observation, hand: &DepthImage) -> Result<Self, RefineError> {
+        let target = Target::new(observation.camera, &observation.color, &observation.mask)
+            .and_then(|t| t.with_occluder(hand.clone()))
+            .map_err(images)?;
+        Ok(Self { target: Arc::new(target), brightness: brightness(observation) })
+    }
+
+    /// The same made smaller by `factor`.
+    ///
+    /// # Errors
+    /// If nothing of the mask is left.
+    pub(crate) fn downsampled(&self, factor: usize) -> Result<Self, RefineError> {
+        let target = match factor {
+            1 => Arc::clone(&self.target),
+            _ => Arc::new(self.target.downsampled(factor).map_err(images)?),
+        };
+        Ok(Self { target, ..*self })
+    }
+}
+
+fn images(error: TargetError) -> RefineError {
+    RefineError::Images(error.to_string())
+}
+
 /// The paper's L_DR with what it leaves open filled in.
 ///
 /// Light: solved for in closed form at every pose ([`Term::refresh`]), because it is unknown. Hand: where
@@ -58,7 +96,7 @@ impl Default for RenderingSettings {
 /// object as dark as the black outside the mask still has an outline.
 pub struct RenderingTerm {
     object: Arc<Object>,
-    target: Target,
+    target: Arc<Target>,
     loss: PoseLoss,
     /// Nats per unit of the renderer's loss.
     scale: f64,
@@ -78,12 +116,14 @@ impl RenderingTerm {
         hand: &DepthImage,
         settings: RenderingSettings,
     ) -> Result<Self, RefineError> {
-        let images = |e: prehend_render::TargetError| RefineError::Images(e.to_string());
-        let target = Target::new(observation.camera, &observation.color, &observation.mask)
-            .and_then(|t| t.with_occluder(hand.clone()))
-            .and_then(|t| t.downsampled(settings.downsample))
-            .map_err(images)?;
-        let sigma = settings.sigma * brightness(observation);
+        let image = Segmented::new(observation, hand)?.downsampled(settings.downsample)?;
+        Ok(Self::of(image, object, settings))
+    }
+
+    /// A term for `image`, which has the size that it should have.
+    pub(crate) fn of(image: Segmented, object: Arc<Object>, settings: RenderingSettings) -> Self {
+        let Segmented { target, brightness } = image;
+        let sigma = settings.sigma * brightness;
         let options = LossOptions {
             color_weight: if settings.colour { 1.0 } else { 0.0 },
             mask_weight: (sigma / settings.mask_sigma).powi(2),
@@ -92,7 +132,7 @@ impl RenderingTerm {
             robust: Robust::Cauchy(settings.outlier * sigma),
             ..LossOptions::default()
         };
-        Ok(Self {
+        Self {
             object,
             target,
             loss: PoseLoss::new(
@@ -105,7 +145,7 @@ impl RenderingTerm {
             scale: 0.5 * settings.effective_pixels / (sigma * sigma),
             light_ridge: settings.light_ridge,
             colour: settings.colour,
-        })
+        }
     }
 }
 

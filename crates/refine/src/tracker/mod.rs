@@ -212,7 +212,7 @@ impl Tracker {
             return Ok(outcome(prediction.state, Following::Predicted, Spent::default()));
         }
         let (object, robot) = (Arc::clone(&self.object), self.robot.clone());
-        let known = Known::new(observation, &object, robot.as_ref());
+        let known = Known::new(observation, &object, robot.as_ref())?;
         let mut spent = Spent::default();
         let doubt = if prediction.state.centre().z > 0.0 {
             let (terms, carried) = self.prepare(&known, &prediction)?;
@@ -265,7 +265,7 @@ impl Tracker {
             None => self.search(observation)?,
         };
         let told = State::new(observation, &self.object, &initial)?;
-        let known = Known::new(observation, &self.object, self.robot.as_ref());
+        let known = Known::new(observation, &self.object, self.robot.as_ref())?;
         let solved = self.estimate(observation, &known, &told)?;
         let confidence = self.confidence(&solved);
         let in_hand = known.robot.is_some();

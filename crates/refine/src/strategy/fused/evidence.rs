@@ -1,6 +1,7 @@
 //! The terms of a stage, for the evidence that an observation brings.
 
-use std::sync::Arc;
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use prehend_render::DepthImage;
 
@@ -8,7 +9,7 @@ use super::settings::{Evidence, FusedSettings, Stage};
 use crate::refine::hand_depth;
 use crate::term::{
     FreeSpaceTerm, HandDepthTerm, PenetrationTerm, PointToPlaneSettings, PointToPlaneTerm, Prior,
-    RenderingTerm, Scatter, TactileTerm, Term,
+    RenderingTerm, Scatter, Segmented, TactileTerm, Term,
 };
 use crate::{Object, Observation, RefineError, Robot, State};
 
@@ -23,8 +24,11 @@ pub(crate) struct Known<'a> {
     pub(crate) robot: Option<&'a Arc<Robot>>,
     /// Depth image of the hand alone.
     pub(super) hand: DepthImage,
-    /// Depth image of all that may hide the object: the hand, and what was seen beside the mask.
-    occluder: DepthImage,
+    /// Depth as measured.
+    depth: Arc<DepthImage>,
+    /// The segmented image, and smaller ones, by how many times smaller they are: stages share them. What may hide the
+    /// object in them is the hand, and what was seen beside the mask.
+    images: Mutex<BTreeMap<usize, Segmented>>,
 }
 
 /// How far in front of the object something beside the mask must be to hide it \[m\]: what is seen there may be the
@@ -36,7 +40,7 @@ impl<'a> Known<'a> {
         observation: &'a Observation,
         object: &'a Arc<Object>,
         robot: Option<&'a Arc<Robot>>,
-    ) -> Self {
+    ) -> Result<Self, RefineError> {
         let robot = robot.filter(|_| observation.hand.is_some());
         let hand = hand_depth(observation, robot.map(Arc::as_ref));
         let mut occluder = hand.clone();
@@ -51,7 +55,21 @@ impl<'a> Known<'a> {
                 *nearest = depth + IN_FRONT;
             }
         }
-        Self { observation, object, robot, hand, occluder }
+        let image = Segmented::new(observation, &occluder)?;
+        let images = Mutex::new(BTreeMap::from([(1, image)]));
+        let depth = Arc::new(observation.depth.clone());
+        Ok(Self { observation, object, robot, hand, depth, images })
+    }
+
+    /// The segmented image, `factor` times smaller.
+    fn image(&self, factor: usize) -> Result<Segmented, RefineError> {
+        let mut images = self.images.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(image) = images.get(&factor) {
+            return Ok(image.clone());
+        }
+        let image = images[&1].downsampled(factor)?;
+        images.insert(factor, image.clone());
+        Ok(image)
     }
 
     /// How depth points scatter about the object at `state`; `None` without depth, or if it is not used.
@@ -75,6 +93,7 @@ impl<'a> Known<'a> {
     ) -> Result<Vec<Box<dyn Term>>, RefineError> {
         let wanted = |kind| settings.evidence.contains(&kind);
         let object = || Arc::clone(self.object);
+        let camera = self.observation.camera;
         let mut terms: Vec<Box<dyn Term>> =
             vec![Box::new(Prior::new(initial, &settings.accuracy)?)];
         let colour = stage.colour && wanted(Evidence::Colour);
@@ -87,12 +106,8 @@ impl<'a> Known<'a> {
             if !silhouette {
                 rendering.mask_sigma = f64::INFINITY;
             }
-            terms.push(Box::new(RenderingTerm::new(
-                self.observation,
-                object(),
-                &self.occluder,
-                rendering,
-            )?));
+            let image = self.image(rendering.downsample)?;
+            terms.push(Box::new(RenderingTerm::of(image, object(), rendering)));
         }
         if wanted(Evidence::Depth) {
             let mut depth = settings.depth.clone();
@@ -107,7 +122,8 @@ impl<'a> Known<'a> {
         }
         if wanted(Evidence::FreeSpace) {
             let free = settings.free_space.clone();
-            terms.push(Box::new(FreeSpaceTerm::new(self.observation, object(), free)));
+            let depth = Arc::clone(&self.depth);
+            terms.push(Box::new(FreeSpaceTerm::new(camera, depth, object(), free)));
         }
         let (Some(robot), Some(hand)) = (self.robot, &self.observation.hand) else {
             return Ok(terms);

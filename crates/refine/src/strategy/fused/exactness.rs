@@ -1,41 +1,39 @@
 //! Whether calibrations are better than they are said to be.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 use super::factor::Factor;
-use super::solve::{Ending, Point, solve};
-use crate::{Block, State, Term};
+use super::solve::Point;
+use crate::Block;
 
-/// Logarithm of the odds, by Laplace's approximation of both evidences (MacKay, 1992), that all calibrations are exact rather
-/// than off by their stated deviations; and the solution if they are.
+/// Logarithm of the odds that everything but the object's pose is exactly as it is said to be, rather than off by its stated
+/// deviations.
 ///
-/// `point` is the solution with everything estimated, `said` the state with everything as it is said to be, and `terms` are
-/// those that were solved, among them the one called "prior".
-pub(super) fn exact(
-    terms: &[Box<dyn Term>],
-    point: &Point,
-    said: &State,
-    iterations: usize,
-    last_gain: f64,
-) -> Option<(f64, (Point, Ending))> {
-    let state = State {
-        t_cam_hand: said.t_cam_hand,
-        joints: said.joints.clone(),
-        camera: said.camera,
-        ..point.state.clone()
-    };
-    let start = Point::new(terms, state, &[Block::ObjectPose]);
-    let solution = solve(terms, start, iterations, last_gain, |_| true);
+/// For a hypothesis nested in another the odds are the posterior's density there over the prior's (Dickey, 1971), both of
+/// what is estimated beside the pose, and both normal about `point`, the solution with everything estimated. Robust losses
+/// make far places less unlikely than that, but not so that the sign would change: exact calibrations lie within the
+/// posterior, wrong ones far outside of it.
+pub(super) fn log_odds_of_exact(point: &Point) -> Option<f64> {
     let prior = &point.parts.iter().find(|part| part.name == "prior")?.normal;
     let at = point.normal.offset(Block::ObjectPose)?;
-    let others: Vec<usize> =
-        (0..prior.gradient().len()).filter(|k| !(at..at + 6).contains(k)).collect();
-    let of_prior = DMatrix::from_fn(others.len(), others.len(), |r, c| {
-        prior.hessian()[(others[r], others[c])]
-    });
-    let log_determinant = |matrix: &DMatrix<f64>| Some(Factor::new(matrix, 0.0)?.log_determinant());
-    let free = -point.value - 0.5 * log_determinant(point.normal.hessian())?
-        + 0.5 * log_determinant(&of_prior)?;
-    let exact = -solution.0.value - 0.5 * log_determinant(solution.0.normal.hessian())?;
-    Some((exact - free, solution))
+    let pose: Vec<usize> = (at..at + 6).collect();
+    let rest: Vec<usize> = (0..prior.gradient().len()).filter(|k| !pose.contains(k)).collect();
+    if rest.is_empty() {
+        return None;
+    }
+    let of = |matrix: &DMatrix<f64>, rows: &[usize], columns: &[usize]| {
+        DMatrix::from_fn(rows.len(), columns.len(), |r, c| matrix[(rows[r], columns[c])])
+    };
+    let said = of(prior.hessian(), &rest, &rest);
+    let offset = DVector::from_fn(rest.len(), |r, _| prior.gradient()[rest[r]]);
+    let said = Factor::new(&said, 0.0)?;
+    let offset = said.inverse() * offset;
+    // With the pose integrated out, which is Schur's complement.
+    let all = point.normal.hessian();
+    let coupling = of(all, &rest, &pose);
+    let through_pose = Factor::new(&of(all, &pose, &pose), 0.0)?.inverse();
+    let found = of(all, &rest, &rest) - &coupling * through_pose * coupling.transpose();
+    let misfit = 0.5 * offset.dot(&(&found * &offset));
+    let determinants = Factor::new(&found, 0.0)?.log_determinant() - said.log_determinant();
+    Some(0.5 * determinants - misfit)
 }

@@ -52,12 +52,11 @@ impl Fused {
         if settings.stages.is_empty() {
             return Err(RefineError::Setting { name: "stages", problem: "are missing".into() });
         }
-        let known = Known::new(observation, object, robot);
+        let known = Known::new(observation, object, robot)?;
         let blocks = settings.blocks(known.robot.is_some(), &initial);
         let mut states = self.starts(&initial);
         let mut trace = Trace::new(["posterior"].into_iter());
         let mut found = Vec::new();
-        let mut terms = Vec::new();
         let mut go_on = true;
         let mut step = |point: &Point, trace: &mut Trace| {
             let index = trace.iterations.len();
@@ -75,7 +74,7 @@ impl Fused {
                 settings.depth.effective_points =
                     scatter.effective_points.min(settings.most_points);
             }
-            terms = known.terms(&initial, stage, &settings)?;
+            let terms = known.terms(&initial, stage, &settings)?;
             let solve_from = |state: &State| {
                 let start = Point::new(&terms, state.clone(), &blocks);
                 solve(&terms, start, stage.iterations, stage.last_gain, |_| true)
@@ -102,34 +101,28 @@ impl Fused {
                 break;
             }
         }
-        let mut exact = false;
-        if go_on && settings.exactness && blocks.len() > 1 {
+        let odds = || exactness::log_odds_of_exact(&found[0].0);
+        let exact = go_on && settings.exactness && odds().is_some_and(|odds| odds > 0.0);
+        if exact {
             let last = &self.settings.stages[self.settings.stages.len() - 1];
-            let (iterations, last_gain) = (last.iterations, last.last_gain);
-            let odds = exactness::exact(&terms, &found[0].0, &initial, iterations, last_gain);
-            if let Some((odds, (point, _))) = odds
-                && odds > 0.0
-            {
-                // Then depth's errors are not alike over whole patches either.
-                if let Some(scatter) = known.scatter(&point.state, &self.settings) {
-                    settings.depth.effective_points = scatter.effective_points;
-                }
-                let terms = known.terms(&initial, last, &settings)?;
-                let solve_from = |state: State| {
-                    let start = Point::new(&terms, state, &[Block::ObjectPose]);
-                    solve(&terms, start, iterations, last_gain, |_| true)
-                };
-                let rivals = found.iter().skip(1).map(|(rival, _)| State {
-                    t_cam_hand: initial.t_cam_hand,
-                    joints: initial.joints.clone(),
-                    camera: initial.camera,
-                    ..rival.state.clone()
-                });
-                let states: Vec<State> = std::iter::once(point.state).chain(rivals).collect();
-                found = distinct(states.into_par_iter().map(solve_from).collect(), object.radius);
-                step(&found[0].0, &mut trace);
-                exact = true;
+            let as_said = |(point, _): &(Point, Ending)| State {
+                t_cam_hand: initial.t_cam_hand,
+                joints: initial.joints.clone(),
+                camera: initial.camera,
+                ..point.state.clone()
+            };
+            states = found.iter().map(as_said).collect();
+            // Then depth's errors are not alike over whole patches either.
+            if let Some(scatter) = known.scatter(&states[0], &self.settings) {
+                settings.depth.effective_points = scatter.effective_points;
             }
+            let terms = known.terms(&initial, last, &settings)?;
+            let solve_from = |state: &State| {
+                let start = Point::new(&terms, state.clone(), &[Block::ObjectPose]);
+                solve(&terms, start, last.iterations, last.last_gain, |_| true)
+            };
+            found = distinct(states.par_iter().map(solve_from).collect(), object.radius);
+            step(&found[0].0, &mut trace);
         }
         let width = Width {
             scale: settings.covariance_scale,
