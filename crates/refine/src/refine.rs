@@ -89,7 +89,7 @@ pub fn refine_with(
         let score = match (&judge, judge_index) {
             (Some(judge), _) => {
                 let mut lit = state.clone();
-                judge.refresh(&mut lit);
+                lit.relight(judge);
                 judge.value(&lit)
             }
             (None, Some(index)) => iteration.values[index],

@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3, Vector6};
 use prehend_autodiff::lie::perturb_about;
 use prehend_render::Light;
 
-use crate::{CameraCorrection, Object, Observation, RefineError};
+use crate::{CameraCorrection, Object, Observation, RefineError, Term};
 
 /// A named block of a [`State`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -45,7 +45,7 @@ pub struct State {
     pub joints: Vec<f64>,
     /// How the camera differs from what is said of it.
     pub camera: CameraCorrection,
-    /// Light on the object, in the camera frame. Not a block: [`Term::refresh`](crate::Term::refresh)
+    /// Light on the object, in the camera frame. Not a block: [`Term::light`](crate::Term::light)
     /// solves for it in closed form.
     pub light: Light,
 }
@@ -93,6 +93,13 @@ impl State {
     /// The object's centre in the camera frame \[m\]: the point that twists turn about.
     pub fn centre(&self) -> Vector3<f64> {
         (self.t_cam_object * self.object_centre).coords
+    }
+
+    /// Lights the object as `term` sees it, if it sees any light.
+    pub(crate) fn relight(&mut self, term: &dyn Term) {
+        if let Some(light) = term.light(self) {
+            self.light = light;
+        }
     }
 
     /// The state with `block` moved by `delta`, which has the block's dimension; twists are about

@@ -1,6 +1,7 @@
 //! The paper's heuristic: a candidate step along every gradient, weighted by what each one achieves.
 
 use nalgebra::Vector6;
+use prehend_render::Light;
 use rayon::prelude::*;
 
 use super::step::preconditioned_step;
@@ -60,11 +61,13 @@ impl Heuristic {
         let mut length = settings.first_step;
         let mut least = f64::INFINITY;
         for index in 0..=settings.iterations {
-            terms.iter().for_each(|t| t.refresh(&mut state));
             let candidates: Vec<Candidate> = terms
                 .par_iter()
                 .map(|t| Candidate::of(t.as_ref(), &state, radius, length))
                 .collect();
+            if let Some(light) = candidates.iter().find_map(|c| c.light) {
+                state.light = light;
+            }
             let total: f64 = candidates.iter().map(|c| c.value).sum();
             let gain: f64 = candidates.iter().map(Candidate::gain).sum();
             let weights = candidates.iter().map(|c| if gain > 0.0 { c.gain() / gain } else { 0.0 });
@@ -98,6 +101,8 @@ impl Heuristic {
 
 /// A step along one term's gradient and what it does to that term.
 struct Candidate {
+    /// Light under which the term is judged, if it sees any.
+    light: Option<Light>,
     value: f64,
     value_after: f64,
     step: Vector6<f64>,
@@ -107,11 +112,13 @@ struct Candidate {
 
 impl Candidate {
     fn of(term: &dyn Term, state: &State, radius: f64, length: f64) -> Self {
+        let light = term.light(state);
+        let state = &State { light: light.unwrap_or(state.light), ..state.clone() };
         let mut normal = Normal::new(&[Block::ObjectPose]);
         let value = term.linearise(state, &mut normal);
         let (step, length) = preconditioned_step(&normal, radius, length);
         let value_after = term.value(&state.moved(Block::ObjectPose, step.as_slice()));
-        Self { value, value_after, step, length }
+        Self { light, value, value_after, step, length }
     }
 
     /// How much the step improves the term's own value; 0 if it does not.
@@ -124,7 +131,6 @@ impl Candidate {
 #[cfg(test)]
 mod tests {
     use nalgebra::{Isometry3, Matrix6, Point3, Vector3};
-    use prehend_render::Light;
 
     use super::*;
     use crate::CameraCorrection;

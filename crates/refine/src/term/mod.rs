@@ -22,6 +22,8 @@ pub(crate) use rendering::Segmented;
 pub use rendering::{RenderingSettings, RenderingTerm};
 pub use tactile::{TactileSettings, TactileTerm};
 
+use prehend_render::Light;
+
 use crate::{Normal, State};
 
 /// One kind of evidence about a [`State`].
@@ -40,8 +42,11 @@ pub trait Term: Send + Sync {
     /// Blocks that it is constant in, or not differentiable by, are left as they are.
     fn linearise(&self, state: &State, normal: &mut Normal) -> f64;
 
-    /// Solves in closed form for nuisance parameters of `state` that only this term sees.
-    fn refresh(&self, _state: &mut State) {}
+    /// The light that suits the term best at `state`, solved for in closed form, if it sees any. No other term does, so it is
+    /// part of what the term costs.
+    fn light(&self, _state: &State) -> Option<Light> {
+        None
+    }
 }
 
 /// Nats of half a squared residual of one of `count` measurements of deviation `sigma` that amount to at most `effective`

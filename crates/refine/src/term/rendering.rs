@@ -91,7 +91,7 @@ fn images(error: TargetError) -> RefineError {
 
 /// The paper's L_DR with what it leaves open filled in.
 ///
-/// Light: solved for in closed form at every pose ([`Term::refresh`]), because it is unknown. Hand: where
+/// Light: solved for in closed form at every pose ([`Term::light`]), because it is unknown. Hand: where
 /// it hides the object there is no residual. Silhouette: coverage is compared with the mask, so that an
 /// object as dark as the black outside the mask still has an outline.
 pub struct RenderingTerm {
@@ -186,9 +186,9 @@ impl Term for RenderingTerm {
         self.scale * at.loss.total
     }
 
-    fn refresh(&self, state: &mut State) {
+    fn light(&self, state: &State) -> Option<Light> {
         if !self.colour {
-            return;
+            return None;
         }
         let (model, pose) = (&self.object.model, apparent(state));
         let mut samples = light_samples(model, &pose, &self.target, HALF_WIDTH);
@@ -200,9 +200,7 @@ impl Term for RenderingTerm {
             index % step == 0
         });
         // With too little in view the light stays what it was.
-        if let Ok(light) = Light::fit(&samples, self.light_ridge) {
-            state.light = light;
-        }
+        Light::fit(&samples, self.light_ridge).ok()
     }
 }
 
@@ -223,11 +221,11 @@ mod tests {
             let object = Arc::clone(&scene.object);
             let settings = RenderingSettings::default();
             let term = RenderingTerm::new(&scene.observation, object, &hand, settings).unwrap();
-            term.refresh(&mut state);
+            state.relight(&term);
             // Pixels are in single precision and texture has kinks: a step of some hundredths of a pixel.
             assert_gradient(&term, &state, Block::ObjectPose, 5e-5, 0.03);
             state.camera = state.camera.changed(&[0.0, 0.0, 1e-3, -1e-3, 3e-3]);
-            term.refresh(&mut state);
+            state.relight(&term);
             // The camera moves the object as its own pose does, with that gradient's error at this state.
             assert_gradient(&term, &state, Block::Camera, 5e-5, 0.1);
         }
@@ -240,7 +238,7 @@ mod tests {
         let settings = RenderingSettings::default();
         let term = RenderingTerm::new(&scene.observation, object, &hand, settings).unwrap();
         let lit = |mut state: State| {
-            term.refresh(&mut state);
+            state.relight(&term);
             state
         };
         let truth = State { t_cam_object: scene.truth, ..state.clone() };

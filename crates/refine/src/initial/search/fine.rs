@@ -86,7 +86,7 @@ impl<'a> Fine<'a> {
                 break;
             }
             let mut next = state.moved(Block::ObjectPose, step.as_slice());
-            self.terms.iter().for_each(|t| t.refresh(&mut next));
+            self.terms.iter().for_each(|t| next.relight(t.as_ref()));
             let reached = self.sum(&next);
             if reached < value {
                 (state, value) = (next, reached);
@@ -101,7 +101,7 @@ impl<'a> Fine<'a> {
 
     fn state(&self, pose: &Isometry3<f64>) -> Option<State> {
         let mut state = State::new(self.observation, self.object, pose).ok()?;
-        self.terms.iter().for_each(|t| t.refresh(&mut state));
+        self.terms.iter().for_each(|t| state.relight(t.as_ref()));
         Some(state)
     }
 

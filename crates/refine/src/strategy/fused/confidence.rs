@@ -81,9 +81,11 @@ impl Confidence {
     /// Of the solutions `found`, the best first; `radius` turns radians into metres of surface motion.
     pub(crate) fn new(found: &[(Point, Ending)], width: Width, radius: f64) -> Self {
         let (best, ending) = &found[0];
-        // Half the radius is about where the surface is, on average.
-        let turn = (2.0 * width.model_tolerance / radius).powi(2);
-        let more = Matrix6::from_diagonal(&Vector6::new(0.0, 0.0, 0.0, turn, turn, turn));
+        // A surface that is off by so much everywhere is as good as shifted by it, and, as it lies some seven tenths of the
+        // radius from the axes, turned by that over its distance.
+        let place = width.model_tolerance.powi(2);
+        let turn = 2.0 * place / radius.powi(2);
+        let more = Matrix6::from_diagonal(&Vector6::new(place, place, place, turn, turn, turn));
         let covariance = |point: &Point| {
             let (covariance, determinant) = laplace(point, width.scale);
             (covariance + more, determinant)

@@ -216,7 +216,7 @@ impl Default for FusedSettings {
             exactness: true,
             most_points: 20.0,
             covariance_scale: 1.1,
-            model_tolerance: 6e-4,
+            model_tolerance: 6.5e-4,
             rendering: RenderingSettings {
                 downsample: 1,
                 effective_pixels: 50.0,

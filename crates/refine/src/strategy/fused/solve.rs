@@ -1,6 +1,7 @@
 //! Levenberg–Marquardt over all that is not known.
 
 use nalgebra::{DMatrix, DVector};
+use prehend_render::Light;
 use rayon::prelude::*;
 
 use super::factor::balanced;
@@ -29,15 +30,18 @@ pub(crate) struct Part {
 impl Point {
     /// The terms at `state`, whose light is solved for.
     pub(crate) fn new(terms: &[Box<dyn Term>], mut state: State, blocks: &[Block]) -> Self {
-        terms.iter().for_each(|t| t.refresh(&mut state));
-        let parts: Vec<Part> = terms
-            .par_iter()
-            .map(|term| {
-                let mut normal = Normal::new(blocks);
-                let value = term.linearise(&state, &mut normal);
-                Part { name: term.name(), value, normal }
-            })
-            .collect();
+        let linearise = |term: &Box<dyn Term>| {
+            let light = term.light(&state);
+            let state = State { light: light.unwrap_or(state.light), ..state.clone() };
+            let mut normal = Normal::new(blocks);
+            let value = term.linearise(&state, &mut normal);
+            (Part { name: term.name(), value, normal }, light)
+        };
+        let (parts, lights): (Vec<Part>, Vec<Option<Light>>) =
+            terms.par_iter().map(linearise).unzip();
+        if let Some(light) = lights.into_iter().flatten().next() {
+            state.light = light;
+        }
         let mut normal = Normal::new(blocks);
         parts.iter().for_each(|part| normal += &part.normal);
         Self { state, value: parts.iter().map(|p| p.value).sum(), normal, parts }
