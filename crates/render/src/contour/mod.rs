@@ -32,7 +32,7 @@ pub(crate) use crease::{Crease, creases};
 pub(crate) use drawing::{Drawing, Step};
 use footprint::Place;
 pub(crate) use inner::{Inner, LEAST_STEP, inner_contours};
-use lanes::Waiting;
+use lanes::{Blended, Waiting};
 pub use light_samples::light_samples;
 pub(crate) use outline::{Band, Piece, Silhouette, outline};
 pub(crate) use pixel::{Scene, falling_step};
@@ -217,10 +217,10 @@ impl View for ContourView<'_> {
         }
     }
 
-    /// Pixels inside faces are treated many at a time.
+    /// Pixels inside faces are treated many at a time, and the colours of the others added up likewise.
     fn sum<const DERIVATIVES: bool>(&self, block: usize, residuals: &Residuals, sums: &mut Sums) {
         let width = residuals.target.camera.width;
-        let mut waiting = Waiting::new();
+        let (mut waiting, mut blended) = (Waiting::new(), Blended::new());
         let mut lanes = LaneSums::new();
         self.walk(block, |place, found| {
             let Place { x, y, .. } = place;
@@ -228,9 +228,20 @@ impl View for ContourView<'_> {
             if DERIVATIVES && x == self.region.x0 {
                 sums.end_row();
             }
-            let Found::Face(Hit { face, inverse_z }) = found else {
-                residuals.add::<DERIVATIVES>(sums, at, self.seen::<DERIVATIVES>(place, found));
-                return;
+            let (face, inverse_z) = match found {
+                Found::Nothing => return residuals.add_nothing(sums, at),
+                Found::Face(Hit { face, inverse_z }) => (face, inverse_z),
+                _ => {
+                    let Some(seen) = self.seen::<DERIVATIVES>(place, found) else { return };
+                    if residuals.hidden(sums, at, seen.pixel.z) {
+                        return;
+                    }
+                    residuals.add_but_color::<DERIVATIVES>(sums, at, &seen);
+                    if blended.push::<DERIVATIVES>(at, &seen.pixel) {
+                        blended.flush::<DERIVATIVES>(residuals, &mut lanes);
+                    }
+                    return;
+                }
             };
             let z = 1.0 / inverse_z;
             if residuals.hidden(sums, at, z) {
@@ -243,6 +254,7 @@ impl View for ContourView<'_> {
             }
         });
         waiting.flush::<DERIVATIVES>(&self.scene, residuals, &mut lanes);
+        blended.flush::<DERIVATIVES>(residuals, &mut lanes);
         sums.end_row();
         sums.absorb(&lanes);
     }
