@@ -73,6 +73,13 @@ impl ContourView<'_> {
     }
 }
 
+/// What a pixel that a face covers has around it.
+pub(crate) struct Beside {
+    pub(super) around: Around,
+    /// The two surfaces, if an inner contour is near and cuts pixels.
+    pub(super) layers: Option<[Layer; 2]>,
+}
+
 /// One of the two surfaces that an inner contour divides.
 pub(crate) struct Layer {
     pub(super) face: u32,
@@ -110,7 +117,6 @@ impl Scene<'_> {
     /// pixels each have half a say in the colour there, so a jump of colour counts, too.
     ///
     /// Of a pixel through which a contour runs only the part inside counts; that the contour moves is left to the caller.
-    #[allow(clippy::too_many_arguments)] // a place on the surface
     pub(super) fn rows_over_footprint(
         &self,
         [x, y]: [f32; 2],

@@ -30,7 +30,7 @@ use crate::projected::Region;
 use crate::raster::{self, MISS, Visible};
 pub(crate) use crease::{Crease, creases};
 pub(crate) use drawing::{Drawing, Step};
-use footprint::Place;
+use footprint::{Beside, Place};
 pub(crate) use inner::{Inner, LEAST_STEP, inner_contours};
 use lanes::{Blended, Waiting};
 pub use light_samples::light_samples;
@@ -176,13 +176,15 @@ impl ContourView<'_> {
             }
             Found::Border(hit, near) => {
                 let Hit { face, inverse_z } = hit;
-                let around = around(face, 1.0 / inverse_z, near.inner);
-                let cut = footprint && scene.drawing.step == Step::Square;
-                let layers = near.inner.filter(|_| cut);
-                let layers = layers.map(|inner| self.layers(&place, face, 1.0 / inverse_z, inner));
-                let (around, layers) = (around.as_ref(), layers.as_ref());
-                let pixel =
-                    scene.inside::<DERIVATIVES>(u, v, face, inverse_z, near, around, layers);
+                let z = 1.0 / inverse_z;
+                let cut = scene.drawing.step == Step::Square;
+                let beside = around(face, z, near.inner).map(|around| {
+                    let inner = near.inner.filter(|_| cut);
+                    let layers = inner.map(|inner| self.layers(&place, face, z, inner));
+                    Beside { around, layers }
+                });
+                let beside = beside.as_ref();
+                let pixel = scene.inside::<DERIVATIVES>(u, v, face, inverse_z, near, beside);
                 (pixel, true, near.edge.is_some())
             }
         };

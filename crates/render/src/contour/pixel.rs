@@ -4,7 +4,7 @@ use nalgebra::{RealField, Vector3, convert};
 
 use super::Near;
 use super::drawing::{Drawing, Step};
-use super::footprint::{Around, Cut, Layer};
+use super::footprint::{Around, Beside, Cut};
 use super::interior::{Motion, add_level, barycentric, row};
 use super::outline::{Foot, Piece};
 use super::surface::{Lighting, Shaded, albedo, posed_normal, shade};
@@ -39,9 +39,10 @@ impl Scene<'_> {
         face: u32,
         inverse_z: f32,
         Near { edge, inner, crease }: Near,
-        around: Option<&Around>,
-        layers: Option<&[Layer; 2]>,
+        beside: Option<&Beside>,
     ) -> Pixel {
+        let around = beside.map(|beside| &beside.around);
+        let layers = beside.and_then(|beside| beside.layers.as_ref());
         // Of a pixel through which a contour runs only a part counts, whose rows come below.
         let cut = around.filter(|_| inner.is_none() && edge.is_some());
         let cut = cut.filter(|_| self.drawing.step == Step::Square);
