@@ -26,8 +26,8 @@ pub struct ContourOptions {
     /// one adds a camera's own blur; more widens the basin of attraction. From 0.05 to 64; others count as the nearest.
     pub half_width: f64,
     /// Where the colour of the surface jumps — at edges with separate normals, and at seams of its texture or its vertex
-    /// colours — a pixel within the band shows some of both sides, so that the jump has a derivative. Together with
-    /// samples within pixels this makes gradients true where light falls on cans and cartons. Graphics devices do not support it.
+    /// colours — a pixel within the band shows some of both sides, so that the jump has a derivative.
+    /// For one sample a pixel only: with more, jumps count in any case. Graphics devices do not support it.
     pub creases: bool,
 }
 
@@ -39,15 +39,6 @@ impl ContourOptions {
     pub(crate) fn drawn_half_width(&self) -> f32 {
         let (least, most) = (*Self::HALF_WIDTHS.start() as f32, *Self::HALF_WIDTHS.end() as f32);
         (self.half_width as f32).clamp(least, most)
-    }
-
-    /// The band at which pixels with `samples` samples, across and down, blur as much as these options ask for: the step
-    /// spreads by a variance of w²/5, the samples by (s² − 1)/12s² of a pixel. It is no narrower than what a sample needs.
-    pub(crate) fn finer(&self, samples: usize) -> Self {
-        let s2 = (samples * samples) as f64;
-        let least = 5.0 / 12.0;
-        let left = s2 * self.half_width * self.half_width - least * (s2 - 1.0);
-        if samples == 1 { *self } else { Self { half_width: left.max(least).sqrt(), ..*self } }
     }
 }
 

@@ -7,6 +7,7 @@ use crate::camera::Camera;
 use crate::contour::{Lighting, Scene};
 use crate::image::{DepthImage, RgbImage};
 use crate::light::Light;
+use crate::mode::ContourOptions;
 use crate::model::RenderModel;
 use crate::posed::Posed;
 use crate::projected::Region;
@@ -140,7 +141,8 @@ fn in_view<'a>(body: &SceneObject<'a>, fine: &Camera, light: &Light) -> Scene<'a
     // Mip levels follow the picture's own pixels: finer ones would only be averaged again.
     let posed = Posed::new(body.model, fine, &body.t_cam_model, 0.0);
     let lighting = Lighting::new(light, &posed.rotation);
-    Scene { posed, lighting, half_width: 1.0, twist_center: Vector3::zeros() }
+    let drawing = ContourOptions::default().drawing(1);
+    Scene { posed, lighting, drawing, twist_center: Vector3::zeros() }
 }
 
 fn compose(

@@ -1,7 +1,7 @@
 //! Creases: edges in view at which the colour of the surface jumps, because normals, texture coordinates or colours do.
 
 use super::outline::{Foot, PIECE, Piece, clip};
-use super::pixel::{Scene, falling_step};
+use super::pixel::Scene;
 use crate::model::{Edge, NONE};
 use crate::pose_loss::Pixel;
 use crate::projected::{Projected, Region};
@@ -118,7 +118,8 @@ impl Scene<'_> {
         let (here, beyond) = if side < 0.0 { (here, beyond) } else { (beyond, here) };
         let here = self.at_foot::<DERIVATIVES>(&here, &foot);
         let beyond = self.at_foot::<DERIVATIVES>(&beyond, &foot);
-        let (share, slope) = falling_step(foot.distance_squared.sqrt(), self.half_width);
+        let step = self.drawing.step;
+        let (share, slope) = step.at(foot.distance_squared.sqrt(), crease.piece.outward);
         let jump = [0, 1, 2].map(|k| beyond.color[k] - here.color[k]);
         own.color.iter_mut().zip(jump).for_each(|(color, jump)| *color += share * jump);
         if DERIVATIVES {

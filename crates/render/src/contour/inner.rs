@@ -1,5 +1,6 @@
 //! Inner contours: where the object hides farther parts of itself.
 
+use super::footprint::Layer;
 use super::outline::Piece;
 use super::pixel::{Scene, falling_step};
 use crate::pose_loss::{Pixel, scaled_sum};
@@ -64,6 +65,7 @@ impl Scene<'_> {
         y: f32,
         own: Pixel,
         inner: &Inner,
+        layers: Option<&[Layer; 2]>,
     ) -> Pixel {
         let foot = inner.piece.foot(x, y);
         let side = if own.z > inner.split { 1.0 } else { -1.0 };
@@ -71,13 +73,13 @@ impl Scene<'_> {
             (self.at_foot::<DERIVATIVES>(&inner.piece, &foot), own)
         } else {
             let (u, v, face, inverse_z) = inner.behind;
-            (own, self.interior::<DERIVATIVES>(u, v, face, inverse_z))
+            (own, self.interior::<DERIVATIVES>(u, v, face, inverse_z, None))
         };
         let distance = foot.distance_squared.sqrt();
-        let (alpha, slope) = falling_step(side * distance, self.half_width);
+        let step = self.drawing.step;
+        let (alpha, slope) = step.at(side * distance, inner.piece.outward);
         // Depth counts for nothing at the step itself.
-        let (weight, weight_slope) =
-            falling_step(self.half_width - 2.0 * distance, self.half_width);
+        let (weight, weight_slope) = falling_step(step.reach() - 2.0 * distance, step.reach());
         let mut out = own;
         for k in 0..3 {
             out.color[k] = alpha * near.color[k] + (1.0 - alpha) * far.color[k];
@@ -89,6 +91,9 @@ impl Scene<'_> {
                 let mixed = scaled_sum(alpha, &near.color_rows[k], 1.0 - alpha, &far.color_rows[k]);
                 let step = slope * (near.color[k] - far.color[k]);
                 out.color_rows[k] = scaled_sum(1.0, &mixed, step, &ds);
+            }
+            if let Some(layers) = layers {
+                out.color_rows = self.rows_across([x, y], inner, &foot, side, layers, &ds);
             }
             out.depth_weight_row = ds.map(|v| -2.0 * side * weight_slope * v);
         }

@@ -9,7 +9,7 @@ use super::pixel::Scene;
 use super::surface::{Unlit, coordinates, lit};
 use super::vec3::{Vec3, vec3};
 use crate::model::{Albedo, Cell, Mipmap, Texel};
-use crate::pose_loss::{LANES, Lane, LaneSums, Patch, Residuals, get, put};
+use crate::pose_loss::{LANES, Lane, LaneSums, Patch, Pixel, Residuals, get, put};
 
 /// Three vectors, or colours, of each pixel.
 type Nine = [Lane; 9];
@@ -85,6 +85,63 @@ impl Waiting {
         }
         self.arch.dispatch(Flush::<DERIVATIVES> { waiting: self, scene, residuals, sums });
         self.patch.count = 0;
+    }
+}
+
+/// Blended pixels whose colours wait until there are enough of them.
+pub(crate) struct Blended {
+    arch: Arch,
+    patch: Patch,
+}
+
+impl Blended {
+    pub(crate) fn new() -> Self {
+        Self { arch: Arch::new(), patch: Patch::new() }
+    }
+
+    /// Adds the colour of the pixel with index `at`; true if there is room for no other.
+    #[inline]
+    pub(crate) fn push<const DERIVATIVES: bool>(&mut self, at: usize, pixel: &Pixel) -> bool {
+        let l = self.patch.count;
+        self.patch.at[l] = at;
+        put(&mut self.patch.color, l, pixel.color);
+        if DERIVATIVES {
+            for k in 0..3 {
+                put(&mut self.patch.color_rows[k], l, pixel.color_rows[k]);
+            }
+        }
+        self.patch.count += 1;
+        self.patch.count == LANES
+    }
+
+    /// Adds the residuals of all that wait; none does afterwards.
+    pub(crate) fn flush<const DERIVATIVES: bool>(
+        &mut self,
+        residuals: &Residuals,
+        sums: &mut LaneSums,
+    ) {
+        if self.patch.count == 0 {
+            return;
+        }
+        // Lanes without a pixel have no weight.
+        let patch = &self.patch;
+        self.arch.dispatch(FlushBlended::<DERIVATIVES> { patch, residuals, sums });
+        self.patch.count = 0;
+    }
+}
+
+struct FlushBlended<'a, const DERIVATIVES: bool> {
+    patch: &'a Patch,
+    residuals: &'a Residuals<'a>,
+    sums: &'a mut LaneSums,
+}
+
+impl<const DERIVATIVES: bool> NullaryFnOnce for FlushBlended<'_, DERIVATIVES> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        self.residuals.add_colors::<DERIVATIVES>(self.sums, self.patch);
     }
 }
 

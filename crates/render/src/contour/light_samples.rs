@@ -22,12 +22,13 @@ pub fn light_samples(
     let options = ContourOptions { half_width: margin, ..ContourOptions::default() };
     let (center, light, also) = (Point3::origin(), Light::ambient(1.0), Region::EMPTY);
     let camera = &target.camera;
-    let view = ContourView::new(&options, model, t_cam_object, &center, camera, &light, &also);
+    let view =
+        ContourView::new(options.drawing(1), model, t_cam_object, &center, camera, &light, &also);
     let scene = &view.scene;
     let projected = &scene.posed.projected;
     let mut samples = Vec::new();
     for visible in &view.visible {
-        let band = Band::new(view.pieces.iter(), &visible.region, scene.half_width);
+        let band = Band::new(view.pieces.iter(), &visible.region, scene.drawing.step.reach());
         for (i, &face) in visible.face.iter().enumerate() {
             if face == MISS || band.piece[i] != NONE {
                 continue;

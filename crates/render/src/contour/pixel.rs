@@ -3,6 +3,8 @@
 use nalgebra::{RealField, Vector3, convert};
 
 use super::Near;
+use super::drawing::{Drawing, Step};
+use super::footprint::{Around, Beside, Cut};
 use super::interior::{Motion, add_level, barycentric, row};
 use super::outline::{Foot, Piece};
 use super::surface::{Lighting, Shaded, albedo, posed_normal, shade};
@@ -15,7 +17,7 @@ use crate::shading::SurfacePoint;
 pub(crate) struct Scene<'a> {
     pub(crate) posed: Posed<'a>,
     pub(crate) lighting: Lighting,
-    pub(crate) half_width: f32,
+    pub(crate) drawing: Drawing,
     pub(crate) twist_center: Vector3<f32>,
 }
 
@@ -37,31 +39,47 @@ impl Scene<'_> {
         face: u32,
         inverse_z: f32,
         Near { edge, inner, crease }: Near,
+        beside: Option<&Beside>,
     ) -> Pixel {
-        let mut pixel = self.interior::<DERIVATIVES>(x, y, face, inverse_z);
+        let around = beside.map(|beside| &beside.around);
+        let layers = beside.and_then(|beside| beside.layers.as_ref());
+        // Of a pixel through which a contour runs only a part counts, whose rows come below.
+        let cut = around.filter(|_| inner.is_none() && edge.is_some());
+        let cut = cut.filter(|_| self.drawing.step == Step::Square);
+        let whole = around.filter(|_| cut.is_none() && layers.is_none());
+        let mut pixel = self.interior::<DERIVATIVES>(x, y, face, inverse_z, whole);
         if let Some(crease) = crease {
             self.soften::<DERIVATIVES>(x, y, inverse_z, &mut pixel, crease);
         }
         if let Some(inner) = inner {
-            pixel = self.cross::<DERIVATIVES>(x, y, pixel, inner);
+            pixel = self.cross::<DERIVATIVES>(x, y, pixel, inner, layers);
         }
         if let Some(piece) = edge {
             let foot = piece.foot(x, y);
-            self.blend::<DERIVATIVES>(piece, &foot, -1.0, &mut pixel);
+            let cut = cut.map(|around| (face, around));
+            self.blend::<DERIVATIVES>([x, y], piece, &foot, -1.0, cut, &mut pixel);
         }
         pixel
     }
 
     /// A pixel that no face covers, next to the outline: it shows the colour of the nearest outline point.
     #[inline]
-    pub(crate) fn outside<const DERIVATIVES: bool>(&self, x: f32, y: f32, piece: &Piece) -> Pixel {
+    pub(crate) fn outside<const DERIVATIVES: bool>(
+        &self,
+        x: f32,
+        y: f32,
+        piece: &Piece,
+        around: Option<&Around>,
+    ) -> Pixel {
         let foot = piece.foot(x, y);
         let mut pixel = self.at_foot::<DERIVATIVES>(piece, &foot);
-        self.blend::<DERIVATIVES>(piece, &foot, 1.0, &mut pixel);
+        let cut = around.filter(|_| self.drawing.step == Step::Square);
+        let cut = cut.map(|around| (piece.face, around));
+        self.blend::<DERIVATIVES>([x, y], piece, &foot, 1.0, cut, &mut pixel);
         pixel
     }
 
-    /// The unblended pixel (x, y) of a face.
+    /// The unblended pixel (x, y) of a face. Its rows are those at its centre, or over its area if what is `around` is given.
     #[inline]
     pub(crate) fn interior<const DERIVATIVES: bool>(
         &self,
@@ -69,8 +87,9 @@ impl Scene<'_> {
         y: f32,
         face: u32,
         inverse_z: f32,
+        around: Option<&Around>,
     ) -> Pixel {
-        let face = face as usize;
+        let (index, face) = (face, face as usize);
         let b = barycentric(self.posed.projected.corners(face), x, y);
         let shaded = shade::<DERIVATIVES>(&self.posed, &self.lighting, face, b);
         let z = 1.0 / inverse_z;
@@ -88,6 +107,10 @@ impl Scene<'_> {
                 add_level(&mut pixel.color_rows[k], level, arm);
             }
             pixel.z_row = motion.z_row;
+            if let Some(around) = around {
+                pixel.color_rows =
+                    self.rows_over_footprint([x, y], z, index, around, &shaded, None);
+            }
         }
         pixel
     }
@@ -163,15 +186,18 @@ impl Scene<'_> {
     #[inline]
     fn blend<const DERIVATIVES: bool>(
         &self,
+        at: [f32; 2],
         piece: &Piece,
         foot: &Foot,
         side: f32,
+        cut: Option<(u32, &Around)>,
         pixel: &mut Pixel,
     ) {
         let distance = foot.distance_squared.sqrt();
         let s = side * distance;
-        let w = self.half_width;
-        let (alpha, slope) = falling_step(s, w);
+        let step = self.drawing.step;
+        let (alpha, slope) = step.at(s, piece.outward);
+        let w = step.reach();
         // The same step, compressed to the inner half of the band.
         let (outer, outer_slope) = falling_step(2.0 * s + w, w);
         let color = pixel.color;
@@ -183,8 +209,20 @@ impl Scene<'_> {
             return;
         }
         let ds = self.distance_row(piece, foot, side);
-        for (rows, c) in pixel.color_rows.iter_mut().zip(color) {
-            *rows = scaled_sum(alpha, rows, slope * c, &ds);
+        let mut edge = color;
+        match cut {
+            Some((face, around)) => {
+                let (b, point, _) = self.on_edge(piece, foot.t);
+                let shaded = shade::<true>(&self.posed, &self.lighting, piece.face as usize, b);
+                edge = shaded.color;
+                let cut = Cut { distance: s, outward: piece.outward, color: edge };
+                pixel.color_rows =
+                    self.rows_over_footprint(at, point.z, face, around, &shaded, Some(&cut));
+            }
+            _ => pixel.color_rows.iter_mut().for_each(|rows| *rows = rows.map(|v| alpha * v)),
+        }
+        for (rows, c) in pixel.color_rows.iter_mut().zip(edge) {
+            *rows = scaled_sum(1.0, rows, slope * c, &ds);
         }
         pixel.coverage_row = ds.map(|v| slope * v);
         pixel.depth_weight_row =
@@ -204,7 +242,11 @@ impl Scene<'_> {
 
     /// Barycentric coordinates and camera-frame position at screen share `t` of an edge, and its ends.
     #[inline]
-    fn on_edge(&self, piece: &Piece, t: f32) -> ([f32; 3], Vector3<f32>, [Vector3<f32>; 2]) {
+    pub(super) fn on_edge(
+        &self,
+        piece: &Piece,
+        t: f32,
+    ) -> ([f32; 3], Vector3<f32>, [Vector3<f32>; 2]) {
         let face = self.posed.model.faces[piece.face as usize];
         let ids = piece.corners.map(|c| face[c as usize] as usize);
         let ends = ids.map(|v| self.posed.position[v]);
@@ -221,7 +263,7 @@ impl Scene<'_> {
 
     /// Motion of the image of `point` along the image direction `direction` \[px\] by the twist.
     #[inline]
-    fn image_motion(&self, direction: [f32; 2], point: &Vector3<f32>) -> Row {
+    pub(super) fn image_motion(&self, direction: [f32; 2], point: &Vector3<f32>) -> Row {
         let a = self.image_gradient(direction, point);
         row(vec3(&a), vec3(&(point - self.twist_center).cross(&a)))
     }

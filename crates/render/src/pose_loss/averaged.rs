@@ -203,7 +203,7 @@ impl<V: View> View for Averaged<V> {
 #[cfg(test)]
 mod tests {
     use super::super::tests::{Noise, camera, full_options, lamp, pose, target_of, textured_box};
-    use crate::contour::ContourView;
+    use crate::contour::{ContourView, Step};
     use crate::mode::{ContourOptions, Mode, SoftRasOptions};
     use crate::model::RenderModel;
     use crate::pose_loss::PoseLoss;
@@ -219,7 +219,8 @@ mod tests {
         let loss = PoseLoss::default();
         for samples in [2, 3] {
             let coarse = loss.with_samples(samples).render(&model, &pose, &camera(), &lamp());
-            let fine = ContourOptions::default().finer(samples);
+            let Step::Smooth(w) = ContourOptions::default().drawing(samples).step else { panic!() };
+            let fine = ContourOptions { half_width: w.into(), ..ContourOptions::default() };
             let fine = PoseLoss::new(Mode::Contour(fine), full_options());
             let fine = fine.render(&model, &pose, &camera().scaled(samples as f64), &lamp());
             let mean = fine.color.downsampled(samples);
@@ -264,7 +265,8 @@ mod tests {
         let (options, light) = (ContourOptions::default(), lamp());
         let also = Region { x0: 1, y0: 2, x1: 100, y1: 110 };
         let center = Point3::origin();
-        let view = ContourView::new(&options, &model, &pose, &center, &camera, &light, &also);
+        let view =
+            ContourView::new(options.drawing(3), &model, &pose, &center, &camera, &light, &also);
         let mut seen = std::collections::HashSet::new();
         let averaged = Averaged::new(view, 3);
         averaged.visit::<false>(0, |x, y, _| assert!(seen.insert((x, y)), "{x} {y}"));

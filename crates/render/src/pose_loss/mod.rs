@@ -74,7 +74,8 @@ pub struct PoseLoss {
     pub options: LossOptions,
     /// The object is drawn with so many samples a pixel, across and down (1..=16). One takes the colour at the pixel's
     /// centre, and its derivative, for that of the whole pixel; with more the loss is nearer to that of a camera, whose pixels
-    /// average over creases and fine texture, and takes longer accordingly.
+    /// average over creases and fine texture, and takes longer accordingly. In the contour mode the derivatives are then those of
+    /// such averages, from differences between the sides of samples: true to some per cent of a camera's with four.
     pub samples: usize,
 }
 
@@ -219,8 +220,8 @@ impl PoseLoss {
         let also = also.scaled(samples);
         match &self.mode {
             Mode::Contour(options) => {
-                let options = options.finer(samples);
-                let view = ContourView::new(&options, model, pose, center, &fine, light, &also);
+                let drawing = options.drawing(samples);
+                let view = ContourView::new(drawing, model, pose, center, &fine, light, &also);
                 if samples == 1 { task.run(&view) } else { task.run(&Averaged::new(view, samples)) }
             }
             Mode::SoftRas(options) => {

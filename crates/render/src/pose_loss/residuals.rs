@@ -74,20 +74,13 @@ impl Residuals<'_> {
         at: usize,
         seen: Option<Seen>,
     ) {
-        let Some(Seen { pixel, hit, near_outline }) = seen else {
-            if self.target.coverage[at] > 0.0 {
-                self.miss(sums, at);
-                sums.counts.missed += 1;
-            }
-            return;
-        };
-        if self.hidden(sums, at, pixel.z) {
+        let Some(seen) = seen else { return self.add_nothing(sums, at) };
+        if self.hidden(sums, at, seen.pixel.z) {
             return;
         }
         let options = self.options;
-        let (color_weight, mask_weight) = (options.color_weight as f32, options.mask_weight as f32);
-        sums.counts.covered += usize::from(hit);
-        sums.counts.contour += usize::from(near_outline);
+        let color_weight = options.color_weight as f32;
+        let pixel = &seen.pixel;
         if color_weight > 0.0 {
             let observed = self.target.color[at];
             for k in 0..3 {
@@ -99,6 +92,30 @@ impl Residuals<'_> {
                 }
             }
         }
+        self.add_but_color::<DERIVATIVES>(sums, at, &seen);
+    }
+
+    /// Adds the residuals of pixel `at`, where nothing of the object is seen.
+    #[inline]
+    pub(crate) fn add_nothing(&self, sums: &mut Sums, at: usize) {
+        if self.target.coverage[at] > 0.0 {
+            self.miss(sums, at);
+            sums.counts.missed += 1;
+        }
+    }
+
+    /// Counts pixel `at`, which nothing hides, and adds all of its residuals but those of the colour.
+    #[inline]
+    pub(crate) fn add_but_color<const DERIVATIVES: bool>(
+        &self,
+        sums: &mut Sums,
+        at: usize,
+        Seen { pixel, hit, near_outline }: &Seen,
+    ) {
+        let options = self.options;
+        let mask_weight = options.mask_weight as f32;
+        sums.counts.covered += usize::from(*hit);
+        sums.counts.contour += usize::from(*near_outline);
         if mask_weight > 0.0 {
             let r = pixel.coverage - self.target.coverage[at];
             sums.mask += (mask_weight * r * r) as f64;
@@ -108,7 +125,7 @@ impl Residuals<'_> {
         }
         let (Some(options), Some(depth)) = (options.depth, &self.target.depth) else { return };
         let measured = depth.pixels()[at];
-        if hit && measured > 0.0 {
+        if *hit && measured > 0.0 {
             let scale = (1.0 / options.scale) as f32;
             let difference = pixel.z - measured;
             let limit = options.truncation as f32;
@@ -127,9 +144,9 @@ impl Residuals<'_> {
         }
     }
 
-    /// Adds the residuals of pixels side by side, none of which is hidden.
+    /// Adds the residuals of the colours of pixels side by side.
     #[inline(always)]
-    pub(crate) fn add_patch<const DERIVATIVES: bool>(&self, sums: &mut LaneSums, patch: &Patch) {
+    pub(crate) fn add_colors<const DERIVATIVES: bool>(&self, sums: &mut LaneSums, patch: &Patch) {
         let options = self.options;
         let mut used = [0.0f32; LANES];
         used[..patch.count].fill(1.0);
@@ -156,6 +173,13 @@ impl Residuals<'_> {
                 sums.add(&patch.color_rows, &residuals, &weights);
             }
         }
+    }
+
+    /// Adds the residuals of pixels side by side, none of which is hidden.
+    #[inline(always)]
+    pub(crate) fn add_patch<const DERIVATIVES: bool>(&self, sums: &mut LaneSums, patch: &Patch) {
+        let options = self.options;
+        self.add_colors::<DERIVATIVES>(sums, patch);
         if options.mask_weight > 0.0 {
             let mask_weight = options.mask_weight as f32;
             for l in 0..patch.count {

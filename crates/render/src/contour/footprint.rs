@@ -1,0 +1,203 @@
+//! Slopes of the image over a whole pixel.
+
+use super::drawing::Step;
+use super::interior::{add_level, barycentric};
+use super::outline::Foot;
+use super::pixel::Scene;
+use super::surface::{Shaded, shade};
+use super::{Band, ContourView, Hit, Inner};
+use crate::pose_loss::{Row, scaled_sum};
+use crate::raster::{BAND, MISS};
+
+/// The faces seen at the pixels to the left, to the right, above and below of the same surface; the face at hand where there
+/// is none.
+pub(crate) type Around = [u32; 4];
+
+/// Where these pixels are.
+const STEPS: [[f32; 2]; 4] = [[-1.0, 0.0], [1.0, 0.0], [0.0, -1.0], [0.0, 1.0]];
+
+/// A pixel, and the outline near it and its neighbours.
+#[derive(Clone, Copy)]
+pub(super) struct Place<'a> {
+    pub(super) x: usize,
+    pub(super) y: usize,
+    pub(super) band: &'a Band,
+    /// The pixel's index in the band.
+    pub(super) at: usize,
+}
+
+impl ContourView<'_> {
+    /// What is seen around a pixel that shows `face`, of depth `z` and near this inner contour, if any.
+    pub(super) fn around(&self, place: &Place, face: u32, z: f32, inner: Option<&Inner>) -> Around {
+        STEPS.map(|step| {
+            let (dx, dy) = (step[0] as i64, step[1] as i64);
+            let (x, y) = (place.x as i64 + dx, place.y as i64 + dy);
+            let Some(hit) = self.seen_at(x, y) else {
+                // Outside the object the nearest piece of the outline is seen.
+                let at = place.at as i64 + dy * self.region.width() as i64 + dx;
+                let inside = (self.region.x0 as i64..self.region.x1 as i64).contains(&x);
+                let piece = usize::try_from(at).ok().and_then(|at| place.band.piece.get(at));
+                let piece = piece.filter(|_| inside).and_then(|i| self.pieces.get(*i as usize));
+                return piece.map_or(face, |piece| piece.face);
+            };
+            // On the other side of an inner contour there is another surface.
+            let same = inner.is_none_or(|i| (1.0 / hit.inverse_z > i.split) == (z > i.split));
+            if same { hit.face } else { face }
+        })
+    }
+
+    /// The near and the far surface at an inner contour, where `face` is seen at this depth.
+    pub(super) fn layers(&self, place: &Place, face: u32, z: f32, inner: &Inner) -> [Layer; 2] {
+        let (_, _, behind, inverse_z) = inner.behind;
+        let beyond = z > inner.split;
+        let [near, far] = if beyond { [inner.piece.face, face] } else { [face, behind] };
+        let far_z = if beyond { z } else { 1.0 / inverse_z };
+        // Depths before and behind all contours tell the sides apart.
+        let layer = |face: u32, z: f32, side: f32| {
+            let around = self.around(place, face, side, Some(inner));
+            Layer { face, z, around }
+        };
+        [layer(near, z.min(inner.split), 0.0), layer(far, far_z, f32::INFINITY)]
+    }
+
+    fn seen_at(&self, x: i64, y: i64) -> Option<Hit> {
+        let (x, y) = (usize::try_from(x).ok()?, usize::try_from(y).ok()?);
+        let block = self.visible.get(y.checked_sub(self.region.y0)? / BAND)?;
+        let (column, row) = (x.checked_sub(block.region.x0)?, y.checked_sub(block.region.y0)?);
+        if column >= block.region.width() {
+            return None;
+        }
+        let at = row * block.region.width() + column;
+        let face = *block.face.get(at)?;
+        (face != MISS).then_some(Hit { face, inverse_z: block.inverse_z[at] })
+    }
+}
+
+/// What a pixel that a face covers has around it.
+pub(crate) struct Beside {
+    pub(super) around: Around,
+    /// The two surfaces, if an inner contour is near and cuts pixels.
+    pub(super) layers: Option<[Layer; 2]>,
+}
+
+/// One of the two surfaces that an inner contour divides.
+pub(crate) struct Layer {
+    pub(super) face: u32,
+    /// Depth at the pixel \[m\].
+    pub(super) z: f32,
+    pub(super) around: Around,
+}
+
+/// A straight contour through a pixel, which hides what is beyond.
+pub(super) struct Cut {
+    /// Signed distance of the pixel from it \[px\], positive outside, and its unit normal.
+    pub(super) distance: f32,
+    pub(super) outward: [f32; 2],
+    /// The surface's colour at it.
+    pub(super) color: [f32; 3],
+}
+
+impl Cut {
+    /// The share of a side of the pixel that is on this side of the contour.
+    fn left_of(&self, step: [f32; 2]) -> f32 {
+        let across = self.outward[0] * step[0] + self.outward[1] * step[1];
+        let along = (self.outward[0] * step[1]).abs() + (self.outward[1] * step[0]).abs();
+        let distance = self.distance + 0.5 * across;
+        (0.5 - distance / along.max(1e-6)).clamp(0.0, 1.0)
+    }
+}
+
+impl Scene<'_> {
+    /// Rows of the colour of pixel (x, y) of depth `z` that shows `face` as `shaded`, from the differences of the colours seen
+    /// at its opposite sides.
+    ///
+    /// At its centre the slope of a print, or of the light on a narrow bevel, says little about a pixel as large as its details,
+    /// and jumps from pixel to pixel. The differences of pixels side by side add up to that between the sides of all of
+    /// them, and that is what the mean over an area changes by when what it shows moves. Two faces that meet between two
+    /// pixels each have half a say in the colour there, so a jump of colour counts, too.
+    ///
+    /// Of a pixel through which a contour runs only the part inside counts; that the contour moves is left to the caller.
+    pub(super) fn rows_over_footprint(
+        &self,
+        [x, y]: [f32; 2],
+        z: f32,
+        face: u32,
+        around: &Around,
+        shaded: &Shaded,
+        cut: Option<&Cut>,
+    ) -> [Row; 3] {
+        let mut sides = [[0.0f32; 3]; 4];
+        for (side, (step, &beside)) in sides.iter_mut().zip(STEPS.iter().zip(around)) {
+            let at = [x + 0.5 * step[0], y + 0.5 * step[1]];
+            *side = self.within(face, at);
+            if beside != face {
+                let other = self.within(beside, at);
+                (0..3).for_each(|k| side[k] = 0.5 * (side[k] + other[k]));
+            }
+            if let Some(cut) = cut {
+                // The sides that are left and the contour itself close a polygon, so that a uniform colour has no slope.
+                let share = cut.left_of(*step);
+                (0..3).for_each(|k| side[k] = share * (side[k] - cut.color[k]));
+            }
+        }
+        let [left, right, top, bottom] = sides;
+        let point = self.posed.ray(x, y).map(|r| r * z).into();
+        let arm = self.level_arm();
+        let area = cut.map_or(1.0, |cut| Step::Square.at(cut.distance, cut.outward).0);
+        std::array::from_fn(|k| {
+            let slope = [right[k] - left[k], bottom[k] - top[k]];
+            let mut row = self.image_motion(slope, &point).map(|v| -v);
+            (0..3).for_each(|i| row[i + 3] += area * shaded.turning[k][i]);
+            add_level(&mut row, area * shaded.level[k] * self.posed.level_dz, arm);
+            row
+        })
+    }
+
+    /// Rows of the colour of a pixel through which an inner contour runs: those of the part of it that shows the near surface,
+    /// and of the part that shows the far one. The border of both moves with the contour, whose signed distance has row `ds`.
+    pub(super) fn rows_across(
+        &self,
+        at: [f32; 2],
+        inner: &Inner,
+        foot: &Foot,
+        side: f32,
+        [near, far]: &[Layer; 2],
+        ds: &Row,
+    ) -> [Row; 3] {
+        let (distance, outward) = (side * foot.distance_squared.sqrt(), inner.piece.outward);
+        let (b, point, _) = self.on_edge(&inner.piece, foot.t);
+        let edge = inner.piece.face as usize;
+        let shaded = shade::<true>(&self.posed, &self.lighting, edge, b);
+        let here = shaded.color;
+        let cut = Cut { distance, outward, color: here };
+        let mut rows =
+            self.rows_over_footprint(at, point.z, near.face, &near.around, &shaded, Some(&cut));
+        let beyond = self.within(far.face, [at[0] - foot.offset[0], at[1] - foot.offset[1]]);
+        let b = self.clamped(far.face, at);
+        let shaded = shade::<true>(&self.posed, &self.lighting, far.face as usize, b);
+        let complement = Cut { distance: -distance, outward: outward.map(|v| -v), color: beyond };
+        let cut = Some(&complement);
+        let behind = self.rows_over_footprint(at, far.z, far.face, &far.around, &shaded, cut);
+        let (_, slope) = Step::Square.at(distance, outward);
+        for k in 0..3 {
+            let jump = slope * (here[k] - beyond[k]);
+            let moved = scaled_sum(1.0, &behind[k], jump, ds);
+            rows[k] = scaled_sum(1.0, &rows[k], 1.0, &moved);
+        }
+        rows
+    }
+
+    /// Barycentric coordinates of the point of a face that is seen at (x, y), or next to it on its border.
+    fn clamped(&self, face: u32, [x, y]: [f32; 2]) -> [f32; 3] {
+        let b = barycentric(self.posed.projected.corners(face as usize), x, y);
+        let b = b.map(|v| v.max(0.0));
+        let sum = b[0] + b[1] + b[2];
+        b.map(|v| v / sum)
+    }
+
+    /// The colour there.
+    fn within(&self, face: u32, at: [f32; 2]) -> [f32; 3] {
+        let b = self.clamped(face, at);
+        shade::<false>(&self.posed, &self.lighting, face as usize, b).color
+    }
+}
