@@ -66,7 +66,7 @@ fn excerpts(a: &str, b: &str) -> (String, String) {
 }
 
 /// The version of this program, and a fingerprint of the very build.
-fn program() -> String {
+pub(crate) fn program() -> String {
     let build = std::env::current_exe().and_then(fs::read).map(|bytes| fingerprint(&bytes));
     let build = build.unwrap_or_else(|_| "unknown".into());
     format!("{} {build}", env!("CARGO_PKG_VERSION"))

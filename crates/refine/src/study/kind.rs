@@ -10,11 +10,11 @@ use crate::Method;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
-    /// Baselines and the combined method.
+    /// Baselines, the combined method and the fused estimator.
     Main,
     /// Each gradient alone and all together.
     Gradients,
-    /// The combined method at several levels of noise.
+    /// Robust ICP, the combined method and the fused estimator at several levels of noise.
     Noise,
     /// The combined method, free to move, after more and more steps.
     Steps,

@@ -139,7 +139,7 @@ impl Tables {
             failures.extend(level.unreadable.iter().map(|reason| Failure {
                 level: level.name.clone(),
                 object: None,
-                frame: "a row of the initial poses".into(),
+                frame: format!("a row of the initial poses of level {}", level.name),
                 rows: rows.clone(),
                 reason: reason.clone(),
                 disturbed: false,

@@ -99,7 +99,9 @@ where
         ] {
             let rows = initial_poses(dir, subjects, settings, purpose, noise)?;
             write_results(&dir.join(name), &rows)?;
-            write_targets(&dir.join("test_targets_bop19.json"), &rows)?;
+            if noise == NoiseLevel::Low {
+                write_targets(&dir.join("test_targets_bop19.json"), &rows)?;
+            }
         }
     }
     Ok(made)

@@ -11,7 +11,7 @@ use super::hand_files::HandFiles;
 use super::{SensorSettings, SynthError};
 use crate::Object;
 use crate::bop::{DatasetError, write_atomically};
-use crate::identity::fingerprint;
+use crate::identity::{fingerprint, program};
 
 /// An object of a dataset in the making.
 pub struct Subject {
@@ -55,8 +55,6 @@ impl Default for SynthSettings {
     }
 }
 
-/// Changes whenever the same settings make other datasets.
-const FORMAT: u32 = 1;
 const FILE: &str = "synth.json";
 
 /// Writes the plan to `dir`, or makes sure that it is the one which is there.
@@ -102,7 +100,7 @@ fn describe(hand: &HandFiles, subjects: &[Subject], settings: &SynthSettings) ->
     };
     let SynthSettings { frames, frames_per_grasp, width, height, sensor, seed, grasp } = settings;
     json!({
-        "format": FORMAT,
+        "program": program(),
         "frames": frames,
         "frames_per_grasp": frames_per_grasp,
         "width": width,

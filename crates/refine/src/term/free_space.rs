@@ -25,7 +25,7 @@ pub struct FreeSpaceSettings {
 
 impl Default for FreeSpaceSettings {
     fn default() -> Self {
-        Self { samples: 400, margin: 3e-3, sigma: 2e-3, outlier: 5e-3, effective_samples: 40.0 }
+        Self { samples: 400, margin: 3e-3, sigma: 2e-3, outlier: 5e-3, effective_samples: 10.0 }
     }
 }
 

@@ -12,7 +12,7 @@ use prehend_refine::{
 
 use crate::options::{Input, Job, label};
 use crate::outcome::Outcome;
-use crate::output::say;
+use crate::output::{complain, say};
 use crate::progress;
 
 #[derive(Args)]
@@ -35,7 +35,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         match check(&mut assets, job) {
             Ok((picture, warnings)) => {
                 for warning in &warnings {
-                    bar.suspend(|| eprintln!("warning: {}: {warning}", label(&job.row)));
+                    bar.suspend(|| complain(format!("warning: {}: {warning}", label(&job.row))));
                 }
                 report.add_picture(&label(&job.row), &picture, &warnings)?;
                 done += 1;

@@ -20,7 +20,7 @@ use serde_json::json;
 
 use crate::options::{Job, Selection, beside, label};
 use crate::outcome::Outcome;
-use crate::output::say;
+use crate::output::{complain, say};
 use crate::progress;
 
 /// What to do with a dataset's frames.
@@ -85,11 +85,15 @@ impl Run<'_> {
                         let id = job.row.obj_id;
                         if introduced.insert(id) {
                             for warning in &done.refined.object_warnings {
-                                bar.suspend(|| eprintln!("warning: object {id}: {warning}"));
+                                bar.suspend(|| {
+                                    complain(format!("warning: object {id}: {warning}"))
+                                });
                             }
                         }
                         for warning in &done.refined.warnings {
-                            bar.suspend(|| eprintln!("warning: {}: {warning}", label(&job.row)));
+                            bar.suspend(|| {
+                                complain(format!("warning: {}: {warning}", label(&job.row)))
+                            });
                         }
                         // First the time: of a frame whose record is lost, a second line is no harm.
                         times.add(index, &label(&job.row), self.method, done.seconds)?;

@@ -9,7 +9,7 @@ use prehend_refine::{frame_file, inspect_object, inspect_pose, refine_with};
 use serde_json::json;
 
 use crate::outcome::Outcome;
-use crate::output::say;
+use crate::output::{complain, say};
 use crate::progress;
 use crate::refine::Method;
 
@@ -35,7 +35,7 @@ pub(crate) fn run(
         robot.map(Arc::as_ref),
         &input.t_cam_object,
     ));
-    warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
+    warnings.iter().for_each(|warning| complain(format!("warning: {warning}")));
     let bar = progress::bar(config.iterations() as u64, "refining");
     let refined =
         refine_with(&input.observation, &object, robot, &input.t_cam_object, &config, |p| {

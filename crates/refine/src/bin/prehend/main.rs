@@ -100,7 +100,7 @@ fn main() -> ExitCode {
         Ok(outcome) => outcome.exit_code(),
         Err(error) => {
             // The messages of our errors contain those of their causes.
-            eprintln!("error: {error}");
+            output::complain(format!("error: {error}"));
             ExitCode::from(1)
         }
     }

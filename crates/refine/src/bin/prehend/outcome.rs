@@ -2,6 +2,8 @@
 
 use std::process::ExitCode;
 
+use crate::output::complain;
+
 /// How a run over many frames ended.
 pub(crate) struct Outcome {
     /// Frames that succeeded.
@@ -17,10 +19,8 @@ impl Outcome {
         if self.failures.is_empty() {
             return ExitCode::SUCCESS;
         }
-        eprintln!("\n{} done, {} failed:", self.done, self.failures.len());
-        for failure in &self.failures {
-            eprintln!("  {failure}");
-        }
+        complain(format!("\n{} done, {} failed:", self.done, self.failures.len()));
+        self.failures.iter().for_each(|failure| complain(format!("  {failure}")));
         ExitCode::from(if self.done > 0 { 2 } else { 1 })
     }
 }

@@ -1,4 +1,4 @@
-//! Standard output.
+//! Standard output and standard error.
 
 use std::io::{ErrorKind, Write};
 
@@ -9,4 +9,9 @@ pub(crate) fn say(text: impl std::fmt::Display) -> anyhow::Result<()> {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(error.into()),
         _ => Ok(()),
     }
+}
+
+/// Prints `text` and a line break on standard error. What cannot be told there cannot be told, and is no reason to end a run.
+pub(crate) fn complain(text: impl std::fmt::Display) {
+    let _ = writeln!(std::io::stderr().lock(), "{text}");
 }

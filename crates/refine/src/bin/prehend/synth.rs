@@ -45,6 +45,19 @@ pub(crate) struct Arguments {
     /// Taxels of that hand (see docs/DATASET.md)
     #[arg(long, value_name = "CSV", requires = "hand", help_heading = "Objects and hand")]
     taxels: Option<PathBuf>,
+    /// Links of the hand that must touch the object at least
+    #[arg(long, value_name = "N", default_value = "3", help_heading = "Objects and hand")]
+    links: NonZeroUsize,
+    /// How much of the object must be within 5 mm of the hand, at least and at most \[cm²\]
+    #[arg(
+        long,
+        value_name = "MIN,MAX",
+        value_delimiter = ',',
+        num_args = 2,
+        default_values_t = [20.0, 60.0],
+        help_heading = "Objects and hand"
+    )]
+    contact_area: Vec<f64>,
     /// Frames of each object
     #[arg(long, value_name = "N", default_value = "40", help_heading = "Frames")]
     frames: NonZeroU32,
@@ -99,7 +112,14 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         None => HandFiles::built_in()?,
     };
     let (steps, tries) = (arguments.steps.get(), u64::from(arguments.tries.get()));
-    let grasping = GraspSettings::default();
+    let &[least, most] = arguments.contact_area.as_slice() else {
+        bail!("--contact-area: expected two numbers, such as 20,60");
+    };
+    let grasping = GraspSettings {
+        links: arguments.links.get(),
+        contact_area: (least, most),
+        ..GraspSettings::default()
+    };
     let settings = SynthSettings {
         frames: arguments.frames.get(),
         frames_per_grasp: arguments.frames_per_grasp.get(),

@@ -19,7 +19,7 @@ use serde_json::json;
 use crate::initial::observed;
 use crate::options::{Selection, label};
 use crate::outcome::Outcome;
-use crate::output::say;
+use crate::output::{complain, say};
 use crate::progress;
 
 #[derive(Args)]
@@ -216,7 +216,9 @@ impl Arguments {
                 Ok(tracked) => {
                     bar.set_message(tracked.following.name());
                     if let (Following::Lost, Some(doubt)) = (tracked.following, tracked.doubt) {
-                        bar.suspend(|| eprintln!("warning: {}: lost: {doubt}", label(&row)));
+                        bar.suspend(|| {
+                            complain(format!("warning: {}: lost: {doubt}", label(&row)))
+                        });
                     }
                     row.t_cam_model = tracked.t_cam_object;
                     row.score = tracked.confidence.as_ref().map_or(0.0, Confidence::probability);

@@ -200,7 +200,7 @@ impl Default for FusedSettings {
                     contact: true,
                 },
                 Stage {
-                    downsample: 2,
+                    downsample: 1,
                     points: 1200,
                     tolerance: 1.0,
                     iterations: 10,

@@ -128,6 +128,10 @@ impl GraspSettings {
             ("squeeze", self.squeeze),
         ];
         let refuse = |name, value, range| Err(GraspError::Setting { name, value, range });
+        let (least, most) = self.contact_area;
+        if !(least >= 0.0 && most > least) {
+            return refuse("contact_area", most, "more than the least area, which is at least 0");
+        }
         for (name, value) in positive {
             if !(value.is_finite() && value > 0.0) {
                 return refuse(name, value, "positive");
