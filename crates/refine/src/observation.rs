@@ -48,6 +48,14 @@ impl Observation {
         }
         Ok(())
     }
+
+    /// Whether the picture shows anything under the mask: one colour everywhere is what a camera gives that failed.
+    pub(crate) fn has_colours(&self) -> bool {
+        let masked = self.color.pixels().iter().zip(self.mask.pixels()).filter(|(_, m)| **m);
+        let mut colours = masked.map(|(colour, _)| colour);
+        let first = colours.next();
+        colours.any(|colour| Some(colour) != first)
+    }
 }
 
 /// Magnitudes of gravity on solid ground, from small moons up, with room to spare \[m/s²\].

@@ -41,6 +41,8 @@ pub struct Belief {
     pub distance_mm: f64,
     /// Angle between the pose and the true one \[°\].
     pub angle_deg: f64,
+    /// Cramér and Rao's bounds on the root mean square of these two, from the information in the frame \[mm\], \[°\].
+    pub bounds: [f64; 2],
     /// Squared Mahalanobis distances of the truth: of pose, place and orientation; nothing where the covariance is singular.
     pub squared: [Option<f64>; 3],
     /// Predicted probabilities of [`EVENTS`].
@@ -64,9 +66,11 @@ impl Belief {
         let pose = &best.t_cam_object;
         let off = truth * object.centre - pose * object.centre;
         let turn = so3_log(&(truth.rotation * pose.rotation.inverse()));
+        let bound = |first: usize| confidence.bound.fixed_view::<3, 3>(first, first).trace().sqrt();
         Self {
             distance_mm: 1e3 * off.norm(),
             angle_deg: turn.norm().to_degrees(),
+            bounds: [1e3 * bound(0), bound(3).to_degrees()],
             squared: squared_distances(&confidence.covariance(), &off, &turn),
             within: EVENTS.map(|event| {
                 confidence.probability_within(event.distance, event.angle_deg.to_radians())
@@ -86,7 +90,8 @@ impl Belief {
 
     /// Whether all its numbers are finite, so that they can be kept.
     pub fn is_finite(&self) -> bool {
-        let numbers = [self.distance_mm, self.angle_deg, self.weight];
+        let numbers =
+            [self.distance_mm, self.angle_deg, self.weight, self.bounds[0], self.bounds[1]];
         let squared = self.squared.iter().flatten();
         numbers.iter().chain(&self.within).chain(squared).all(|v| v.is_finite())
     }
@@ -151,6 +156,11 @@ mod tests {
         let confidence = refined.confidence.unwrap();
         let belief = Belief::new(&confidence, &scene.object, &scene.truth);
         assert!(belief.is_finite(), "{belief:?}");
+        // Nothing is as sure as the bound.
+        let covariance = confidence.covariance();
+        let deviation = |first: usize| covariance.fixed_view::<3, 3>(first, first).trace().sqrt();
+        assert!(belief.bounds[0] > 0.0 && belief.bounds[0] < 1e3 * deviation(0));
+        assert!(belief.bounds[1] > 0.0 && belief.bounds[1] < deviation(3).to_degrees());
         let expected = confidence.mahalanobis(&scene.truth).powi(2);
         assert!((belief.squared[0].unwrap() / expected - 1.0).abs() < 1e-6);
         // Nearer is less likely, and what is certain at the pose itself came about there.

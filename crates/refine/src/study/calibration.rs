@@ -35,6 +35,8 @@ pub struct Calibration {
     pub method: String,
     /// Poses of which something was believed.
     pub n: usize,
+    /// Root mean squares of what the centre is off \[mm\] and of the angle \[°\], and Cramér and Rao's bounds on them.
+    pub errors: [RootMeanSquare; 2],
     /// How often the truth is within the posterior's ellipsoids.
     pub coverage: Vec<Coverage>,
     /// Predicted probabilities, by event.
@@ -46,6 +48,28 @@ pub struct Calibration {
     pub auroc: Option<f64>,
     /// Its confidence interval, 95 %.
     pub auroc_interval: Option<[f64; 2]>,
+}
+
+/// A root mean square over poses, beside what information allows.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct RootMeanSquare {
+    /// Of what, with its unit.
+    pub of: &'static str,
+    /// As found.
+    pub found: f64,
+    /// The median of what was squared.
+    pub median: f64,
+    /// Cramér and Rao's bound, averaged in the same way.
+    pub bound: f64,
+}
+
+impl RootMeanSquare {
+    fn new(of: &'static str, found: Vec<f64>, bounds: &[f64]) -> Self {
+        let root = |of: &[f64]| (of.iter().map(|v| v * v).sum::<f64>() / of.len() as f64).sqrt();
+        let (bound, mut sorted) = (root(bounds), found);
+        sorted.sort_by(f64::total_cmp);
+        Self { of, found: root(&sorted), median: sorted[sorted.len() / 2], bound }
+    }
 }
 
 /// How often the truth is within ellipsoids that should hold it with some probability.
@@ -151,6 +175,18 @@ impl Calibration {
             level: level.map(str::to_owned),
             method: method.into(),
             n,
+            errors: [
+                RootMeanSquare::new(
+                    "place mm",
+                    beliefs.iter().map(|b| b.distance_mm).collect(),
+                    &beliefs.iter().map(|b| b.bounds[0]).collect::<Vec<_>>(),
+                ),
+                RootMeanSquare::new(
+                    "orientation °",
+                    beliefs.iter().map(|b| b.angle_deg).collect(),
+                    &beliefs.iter().map(|b| b.bounds[1]).collect::<Vec<_>>(),
+                ),
+            ],
             coverage: coverage(&beliefs),
             events,
             failures,
@@ -209,6 +245,11 @@ pub(super) fn csv(calibrations: &[Calibration]) -> Result<Vec<u8>, ::csv::Error>
                 &end(1),
             ])
         };
+        for error in &c.errors {
+            line("root mean square", error.of, error.found, None)?;
+            line("median", error.of, error.median, None)?;
+            line("bound", error.of, error.bound, None)?;
+        }
         for part in &c.coverage {
             let what = format!("coverage of {} %", 100.0 * part.nominal);
             line(&what, part.of, part.share, part.interval)?;
@@ -252,6 +293,7 @@ pub(super) mod tests {
             record.outcomes[2].belief = Some(Belief {
                 distance_mm: off,
                 angle_deg: off,
+                bounds: [1.0, 2.0],
                 squared: [Some(place + turn), Some(place), Some(turn)],
                 within: [probability; EVENTS.len()],
                 hypotheses: 1,
@@ -274,6 +316,10 @@ pub(super) mod tests {
         let all = &found[2];
         assert_eq!(all.n, 2000);
         assert_eq!(all.coverage.len(), 9);
+        assert_eq!(all.errors.map(|e| e.bound), [1.0, 2.0]);
+        let of_failures = all.failures as f64 / 2000.0;
+        let expected = (400.0 * of_failures + 0.25 * (1.0 - of_failures)).sqrt();
+        assert!((all.errors[0].found - expected).abs() < 1e-9);
         for part in &all.coverage {
             // Three standard errors of a share of 2000.
             let error = 3.0 * (part.nominal * (1.0 - part.nominal) / 2000.0).sqrt();
@@ -308,7 +354,7 @@ pub(super) mod tests {
         assert!(event.calibration_error > 0.4 && event.by_chance == 0.0);
         assert_eq!(found[2].auroc, Some(0.5));
         let text = String::from_utf8(csv(&found).unwrap()).unwrap();
-        assert_eq!(text.lines().count(), 1 + 3 * (9 + 7 * 5 + 2));
+        assert_eq!(text.lines().count(), 1 + 3 * (6 + 9 + 7 * 5 + 2));
         assert!(text.contains("\n,combined,400,auroc,failures,0.5,"), "{text}");
         assert!(text.contains("\nlow,combined,200,coverage of 95 %,place,0,0,0\n"), "{text}");
     }

@@ -81,6 +81,10 @@ fn sections(tables: &Tables) -> Vec<Section> {
             calibration.n
         );
         add(title, Body::Table(coverage(calibration)));
+        add(
+            format!("{label}: errors and what the information in the frames allows"),
+            Body::Table(errors(calibration)),
+        );
         add(format!("{label}: predicted probabilities"), Body::Table(events(calibration)));
         add(format!("{label}: failures"), Body::List(vec![failures(calibration)]));
     }
@@ -218,6 +222,16 @@ fn coverage(calibration: &Calibration) -> Table {
         let show = |v: f64| format!("{:.1}", 100.0 * v);
         let share = with_interval(show(part.share), part.interval.map(|i| i.map(show)));
         out.push(vec![part.of.into(), format!("{:.0}", 100.0 * part.nominal), share]);
+    }
+    out
+}
+
+fn errors(calibration: &Calibration) -> Table {
+    let header = ["error of", "root mean square", "Cramér–Rao bound", "median"];
+    let mut out = Table::new(header.map(str::to_owned).into());
+    for error in &calibration.errors {
+        let numbers = [error.found, error.bound, error.median].map(|v| format!("{v:.2}"));
+        out.push([[error.of.to_owned()].as_slice(), &numbers].concat());
     }
     out
 }

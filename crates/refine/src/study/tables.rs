@@ -368,7 +368,7 @@ pub(super) mod tests {
         let said: Vec<String> = tables.failures.iter().map(Failure::sentence).collect();
         assert_eq!(
             said[0],
-            "a row of the initial poses: truth, initial, combined, icp: line 9: R: 3 numbers"
+            "a row of the initial poses of level low: truth, initial, combined, icp: line 9: R: 3 numbers"
         );
         assert_eq!(said[1..], ["low: scene 1 image 2 object 6: icp: no pixel"]);
     }

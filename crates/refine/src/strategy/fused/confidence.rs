@@ -52,6 +52,9 @@ pub struct Confidence {
     pub disagreements: Vec<Disagreement>,
     /// Why the search ended.
     pub ending: Ending,
+    /// Cramér and Rao's bound on the covariance, prior included (van Trees, 1968): the inverse of all information, with nothing
+    /// added for what the models of sensors and object leave out. Units are those of [`covariance`](Self::covariance).
+    pub bound: Matrix6<f64>,
     /// Centre of the object, about which twists turn (camera frame) \[m\].
     centre: Vector3<f64>,
 }
@@ -86,14 +89,11 @@ impl Confidence {
         let place = width.model_tolerance.powi(2);
         let turn = 2.0 * place / radius.powi(2);
         let more = Matrix6::from_diagonal(&Vector6::new(place, place, place, turn, turn, turn));
-        let covariance = |point: &Point| {
-            let (covariance, determinant) = laplace(point, width.scale);
-            (covariance + more, determinant)
-        };
-        let covariances: Vec<(Matrix6<f64>, f64)> =
-            found.iter().map(|(point, _)| covariance(point)).collect();
+        let bounds: Vec<(Matrix6<f64>, f64)> =
+            found.iter().map(|(point, _)| laplace(point)).collect();
+        let covariance = |bound: &Matrix6<f64>| bound * width.scale + more;
         // Laplace: the mass of a mode is its height times its volume.
-        let logarithm = |k: usize| 0.5 * covariances[k].1 - found[k].0.value;
+        let logarithm = |k: usize| 0.5 * bounds[k].1 - found[k].0.value;
         let first = (0..found.len()).map(logarithm).fold(f64::NEG_INFINITY, f64::max);
         // A mode whose width is not known counts only where none is.
         let mass = |k: usize| if first.is_finite() { (logarithm(k) - first).exp() } else { 1.0 };
@@ -101,13 +101,13 @@ impl Confidence {
         let total: f64 = masses.iter().sum();
         let hypotheses: Vec<Hypothesis> = found
             .iter()
-            .zip(&covariances)
+            .zip(&bounds)
             .zip(&masses)
-            .map(|(((point, _), (covariance, _)), mass)| Hypothesis {
+            .map(|(((point, _), (bound, _)), mass)| Hypothesis {
                 t_cam_object: point.state.t_cam_object,
                 weight: mass / total,
                 value: point.value,
-                covariance: *covariance,
+                covariance: covariance(bound),
             })
             .collect();
         Self {
@@ -115,6 +115,7 @@ impl Confidence {
             disagreements: disagreements(best),
             hypotheses,
             ending: *ending,
+            bound: bounds[0].0,
             centre: best.state.centre(),
         }
     }
@@ -168,21 +169,21 @@ impl Confidence {
 }
 
 /// Covariance of the object's pose with all else integrated out, and the logarithm of the determinant of that of everything.
-fn laplace(point: &Point, inflation: f64) -> (Matrix6<f64>, f64) {
+fn laplace(point: &Point) -> (Matrix6<f64>, f64) {
     // What nothing is known of, not even beforehand, must not be infinite.
     let Some(factor) = Factor::new(point.normal.hessian(), RIDGE) else {
         return (Matrix6::identity(), f64::NEG_INFINITY);
     };
     let all = factor.inverse();
     let at = point.normal.offset(Block::ObjectPose).unwrap_or(0);
-    let covariance = Matrix6::from_fn(|r, c| all[(at + r, at + c)] * inflation);
+    let covariance = Matrix6::from_fn(|r, c| all[(at + r, at + c)]);
     (covariance, -factor.log_determinant())
 }
 
 /// Directions in which the pose of `point` is uncertain, the most uncertain first: twists about the object's centre that move
 /// its surface by a metre, with the standard deviation of that motion \[m\].
 pub(super) fn principal_directions(point: &Point, radius: f64) -> Vec<(Vector6<f64>, f64)> {
-    directions(&laplace(point, 1.0).0, radius)
+    directions(&laplace(point).0, radius)
 }
 
 fn directions(covariance: &Matrix6<f64>, radius: f64) -> Vec<(Vector6<f64>, f64)> {

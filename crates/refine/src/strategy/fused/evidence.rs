@@ -24,6 +24,8 @@ pub(crate) struct Known<'a> {
     pub(crate) robot: Option<&'a Arc<Robot>>,
     /// Depth image of the hand alone.
     pub(super) hand: DepthImage,
+    /// Whether there are colours to compare.
+    coloured: bool,
     /// Depth as measured.
     depth: Arc<DepthImage>,
     /// The segmented image, and smaller ones, by how many times smaller they are: stages share them. What may hide the
@@ -58,7 +60,8 @@ impl<'a> Known<'a> {
         let image = Segmented::new(observation, &occluder)?;
         let images = Mutex::new(BTreeMap::from([(1, image)]));
         let depth = Arc::new(observation.depth.clone());
-        Ok(Self { observation, object, robot, hand, depth, images })
+        let coloured = observation.has_colours();
+        Ok(Self { observation, object, robot, hand, coloured, depth, images })
     }
 
     /// The segmented image, `factor` times smaller.
@@ -96,7 +99,7 @@ impl<'a> Known<'a> {
         let camera = self.observation.camera;
         let mut terms: Vec<Box<dyn Term>> =
             vec![Box::new(Prior::new(initial, &settings.accuracy)?)];
-        let colour = stage.colour && wanted(Evidence::Colour);
+        let colour = stage.colour && wanted(Evidence::Colour) && self.coloured;
         let silhouette = wanted(Evidence::Silhouette);
         if colour || silhouette {
             let mut rendering = settings.rendering.clone();

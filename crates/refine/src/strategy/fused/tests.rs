@@ -87,6 +87,7 @@ fn every_sense_may_be_absent() {
         ("hand", without(&|o| o.hand = None)),
         ("gravity", without(&|o| o.gravity = None)),
         ("depth", without(&|o| o.depth.pixels_mut().fill(0.0))),
+        ("colour", without(&|o| o.color.pixels_mut().fill([0.5; 3]))),
     ];
     for (sense, pose) in poses {
         let (pe, oe) = errors(&pose);
