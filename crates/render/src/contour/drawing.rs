@@ -68,7 +68,8 @@ impl ContourOptions {
     pub(crate) fn drawing(&self, samples: usize) -> Drawing {
         let s2 = (samples * samples) as f64;
         let least = 5.0 / 12.0;
-        let left = s2 * self.half_width * self.half_width - least * (s2 - 1.0);
+        let half_width = f64::from(self.drawn_half_width());
+        let left = s2 * half_width * half_width - least * (s2 - 1.0);
         let step = match samples {
             1 => Step::Smooth(self.drawn_half_width()),
             _ if left > 1.01 * least => Step::Smooth(left.sqrt() as f32),
@@ -109,7 +110,10 @@ mod tests {
         let Step::Smooth(w) = options.drawing(4).step else { panic!() };
         let variance = f64::from(w * w) / 5.0 / 16.0 + 15.0 / (12.0 * 16.0);
         assert!((variance - 1.44 / 5.0).abs() < 1e-6);
-        let sharp = ContourOptions { half_width: 0.645, ..options };
-        assert_eq!(sharp.drawing(4).step, Step::Square);
+        for half_width in [0.645, 0.0, -3.0] {
+            assert_eq!(ContourOptions { half_width, ..options }.drawing(4).step, Step::Square);
+        }
+        let wide = |half_width| ContourOptions { half_width, ..options }.drawing(2).step;
+        assert_eq!(wide(f64::INFINITY), wide(64.0));
     }
 }

@@ -10,8 +10,8 @@ use crate::pose_loss::{Row, scaled_sum};
 use crate::raster::{BAND, MISS};
 
 /// The faces seen at the pixels to the left, to the right, above and below of the same surface; the face at hand where there
-/// is none.
-pub(crate) type Around = [u32; 4];
+/// is none of it, and nothing beyond the border of the image.
+pub(crate) type Around = [Option<u32>; 4];
 
 /// Where these pixels are.
 const STEPS: [[f32; 2]; 4] = [[-1.0, 0.0], [1.0, 0.0], [0.0, -1.0], [0.0, 1.0]];
@@ -32,17 +32,21 @@ impl ContourView<'_> {
         STEPS.map(|step| {
             let (dx, dy) = (step[0] as i64, step[1] as i64);
             let (x, y) = (place.x as i64 + dx, place.y as i64 + dy);
+            let [width, height] = self.size;
+            if !(0..width as i64).contains(&x) || !(0..height as i64).contains(&y) {
+                return None;
+            }
             let Some(hit) = self.seen_at(x, y) else {
                 // Outside the object the nearest piece of the outline is seen.
                 let at = place.at as i64 + dy * self.region.width() as i64 + dx;
                 let inside = (self.region.x0 as i64..self.region.x1 as i64).contains(&x);
                 let piece = usize::try_from(at).ok().and_then(|at| place.band.piece.get(at));
                 let piece = piece.filter(|_| inside).and_then(|i| self.pieces.get(*i as usize));
-                return piece.map_or(face, |piece| piece.face);
+                return Some(piece.map_or(face, |piece| piece.face));
             };
             // On the other side of an inner contour there is another surface.
             let same = inner.is_none_or(|i| (1.0 / hit.inverse_z > i.split) == (z > i.split));
-            if same { hit.face } else { face }
+            Some(if same { hit.face } else { face })
         })
     }
 
@@ -130,13 +134,18 @@ impl Scene<'_> {
         for (side, (step, &beside)) in sides.iter_mut().zip(STEPS.iter().zip(around)) {
             let at = [x + 0.5 * step[0], y + 0.5 * step[1]];
             *side = self.within(face, at);
-            if beside != face {
+            if let Some(beside) = beside.filter(|beside| *beside != face) {
                 let other = self.within(beside, at);
                 (0..3).for_each(|k| side[k] = 0.5 * (side[k] + other[k]));
             }
-            if let Some(cut) = cut {
-                // The sides that are left and the contour itself close a polygon, so that a uniform colour has no slope.
-                let share = cut.left_of(*step);
+        }
+        if around.contains(&None) {
+            self.continue_over_border(face, [x, y], around, &mut sides);
+        }
+        if let Some(cut) = cut {
+            // The sides that are left and the contour itself close a polygon, so that a uniform colour has no slope.
+            for (side, step) in sides.iter_mut().zip(STEPS) {
+                let share = cut.left_of(step);
                 (0..3).for_each(|k| side[k] = share * (side[k] - cut.color[k]));
             }
         }
@@ -151,6 +160,22 @@ impl Scene<'_> {
             add_level(&mut row, area * shaded.level[k] * self.posed.level_dz, arm);
             row
         })
+    }
+
+    /// Nothing is known of what is beyond the border of the image: there the slope goes on as it comes from the other side.
+    fn continue_over_border(
+        &self,
+        face: u32,
+        at: [f32; 2],
+        around: &Around,
+        sides: &mut [[f32; 3]; 4],
+    ) {
+        let center = self.within(face, at);
+        for (side, opposite) in [(0, 1), (1, 0), (2, 3), (3, 2)] {
+            if around[side].is_none() && around[opposite].is_some() {
+                sides[side] = [0, 1, 2].map(|k| 2.0 * center[k] - sides[opposite][k]);
+            }
+        }
     }
 
     /// Rows of the colour of a pixel through which an inner contour runs: those of the part of it that shows the near surface,

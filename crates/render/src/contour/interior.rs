@@ -6,7 +6,7 @@ use crate::pose_loss::Row;
 
 /// Surfaces are taken to be inclined to the viewing ray by at least this sine: of what is seen at a grazing angle, a
 /// pixel's centre says little, and its derivatives would grow without bound.
-const GRAZING: f32 = 1e-3;
+pub(crate) const GRAZING: f32 = 1e-3;
 
 #[inline(always)]
 pub(crate) fn row(linear: Vec3, angular: Vec3) -> Row {

@@ -32,6 +32,7 @@ pub(crate) use crease::{Crease, creases};
 pub(crate) use drawing::{Drawing, Step};
 use footprint::{Beside, Place};
 pub(crate) use inner::{Inner, LEAST_STEP, inner_contours};
+pub(crate) use interior::GRAZING;
 use lanes::{Blended, Waiting};
 pub use light_samples::light_samples;
 pub(crate) use outline::{Band, Piece, Silhouette, outline};
@@ -41,6 +42,8 @@ pub(crate) use surface::{Lighting, Unlit, albedo, posed_normal};
 /// A posed model with its contours.
 pub(crate) struct ContourView<'a> {
     pub(crate) scene: Scene<'a>,
+    /// Columns and rows of the image.
+    size: [usize; 2],
     region: Region,
     pub(crate) pieces: Vec<Piece>,
     inner: Vec<Inner>,
@@ -83,7 +86,8 @@ impl<'a> ContourView<'a> {
         };
         let twist_center = center.coords.cast();
         let scene = Scene { posed, lighting, drawing, twist_center };
-        Self { scene, region, pieces: silhouette.outline, inner, creases, visible }
+        let size = [camera.width, camera.height];
+        Self { scene, size, region, pieces: silhouette.outline, inner, creases, visible }
     }
 }
 

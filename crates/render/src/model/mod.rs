@@ -38,8 +38,8 @@ pub enum ModelError {
         /// Vertices of the mesh.
         vertices: usize,
     },
-    /// A vertex position is infinite or not a number.
-    #[error("vertex {vertex} has a position that is not finite")]
+    /// A vertex's position, texture coordinates or colour are infinite or not numbers.
+    #[error("vertex {vertex} has a position, texture coordinate or colour that is not finite")]
     NotFinite {
         /// The vertex.
         vertex: usize,
@@ -188,7 +188,9 @@ fn check(mesh: &TriMesh) -> Result<(), ModelError> {
         }
     }
     let finite = |p: &Point3<f64>| p.iter().all(|v| v.is_finite());
-    if let Some(vertex) = mesh.vertices.iter().position(|p| !finite(p)) {
+    let uvs = mesh.uvs.iter().flatten().position(|uv| uv.iter().any(|v| !v.is_finite()));
+    let colors = mesh.colors.iter().flatten().position(|c| c.iter().any(|v| !v.is_finite()));
+    if let Some(vertex) = mesh.vertices.iter().position(|p| !finite(p)).or(uvs).or(colors) {
         return Err(ModelError::NotFinite { vertex });
     }
     for (attribute, found) in
@@ -269,6 +271,9 @@ mod tests {
         let mut mesh = triangle();
         mesh.vertices[2].y = f64::NAN;
         assert_eq!(RenderModel::new(&mesh).unwrap_err(), ModelError::NotFinite { vertex: 2 });
+        let mut mesh = triangle();
+        mesh.uvs = Some(vec![[0.0; 2], [0.0, f32::NAN], [0.0; 2]]);
+        assert_eq!(RenderModel::new(&mesh).unwrap_err(), ModelError::NotFinite { vertex: 1 });
         let mut mesh = triangle();
         mesh.vertices[2] = Point3::new(2.0, 0.0, 0.0);
         assert!(matches!(RenderModel::new(&mesh), Err(ModelError::Empty { faces: 1, .. })));

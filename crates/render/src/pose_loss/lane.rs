@@ -27,7 +27,7 @@ pub(crate) fn put<const N: usize>(lanes: &mut [Lane; N], l: usize, values: [f32;
     }
 }
 
-/// Pixels inside the object, where nothing is blended and coverage is one.
+/// Pixels side by side. Depths are of those inside the object alone, where nothing is blended and coverage is one.
 pub(crate) struct Patch {
     /// How many of the lanes are in use. The others hold finite numbers.
     pub(crate) count: usize,

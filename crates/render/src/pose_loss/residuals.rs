@@ -7,10 +7,11 @@ use rayon::prelude::*;
 
 use super::affine::{Affine, Corrected};
 use super::lane::{LANES, Patch};
-use super::options::LossOptions;
+use super::options::{DepthOptions, LossOptions};
 use super::pixel::{Seen, View};
 use super::sums::{LaneSums, Sums};
 use super::target::Target;
+use crate::image::DepthImage;
 
 /// What a view is compared with, and how.
 #[derive(Clone, Copy)]
@@ -123,7 +124,7 @@ impl Residuals<'_> {
                 sums.add(&pixel.coverage_row, r, mask_weight);
             }
         }
-        let (Some(options), Some(depth)) = (options.depth, &self.target.depth) else { return };
+        let Some((options, depth)) = self.depth() else { return };
         let measured = depth.pixels()[at];
         if *hit && measured > 0.0 {
             let scale = (1.0 / options.scale) as f32;
@@ -187,7 +188,7 @@ impl Residuals<'_> {
                 sums.mask[l] += (mask_weight * r * r) as f64;
             }
         }
-        if let (Some(options), Some(depth)) = (options.depth, &self.target.depth) {
+        if let Some((options, depth)) = self.depth() {
             let mut measured = [0.0; LANES];
             for l in 0..patch.count {
                 measured[l] = depth.pixels()[patch.at[l]];
@@ -218,8 +219,14 @@ impl Residuals<'_> {
     /// Whether there is a depth to compare with.
     #[inline]
     pub(crate) fn has_depth(&self, at: usize) -> bool {
-        let depth = self.options.depth.and(self.target.depth.as_ref());
-        depth.is_some_and(|d| d.pixels()[at] > 0.0)
+        self.depth().is_some_and(|(_, depth)| depth.pixels()[at] > 0.0)
+    }
+
+    /// How depth is compared, and with what; a weight of zero leaves it out.
+    #[inline]
+    fn depth(&self) -> Option<(DepthOptions, &DepthImage)> {
+        let options = self.options.depth.filter(|depth| depth.weight > 0.0)?;
+        Some((options, self.target.depth.as_ref()?))
     }
 }
 

@@ -3,6 +3,8 @@
 use nalgebra::Vector3;
 use prehend_autodiff::{LocalFunction, Scalar};
 
+use crate::contour::GRAZING;
+
 /// Where a ray meets the plane of a face.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Hit {
@@ -34,7 +36,8 @@ pub(super) fn hit([p0, p1, p2]: &[Vector3<f64>; 3], ray: &Vector3<f64>) -> Hit {
 
 /// The reverse derivative of [`hit`], given adjoints of its results. Σ b_i p_i = Z d implies
 /// Σ p_i δb_i − d δZ = Z δd − Σ b_i δp_i, so one solution λ of the transposed 3×3 system gives all adjoints:
-/// Z λ that of the ray, −b_i λ those of the corners. None where the ray lies within the plane.
+/// Z λ that of the ray, −b_i λ those of the corners. Planes count as inclined to the ray by at least the sine [`GRAZING`], as in
+/// `PoseLoss`. None where the ray lies within the plane.
 #[inline]
 pub(super) fn hit_adjoint(
     [p0, p1, p2]: &[Vector3<f64>; 3],
@@ -45,10 +48,12 @@ pub(super) fn hit_adjoint(
 ) -> Option<HitAdjoint> {
     let (e1, e2) = (p1 - p0, p2 - p0);
     let n = e1.cross(&e2);
+    let least = f64::from(GRAZING) * n.norm() * ray.norm();
     let determinant = -ray.dot(&n);
-    if determinant.abs() <= 1e-9 * n.norm() {
+    if determinant == 0.0 || least == 0.0 {
         return None;
     }
+    let determinant = determinant.abs().max(least).copysign(determinant);
     let (a1, a2) = (by_b[1] - by_b[0], by_b[2] - by_b[0]);
     let sum = ray.cross(&e2) * a1 + e1.cross(ray) * a2 + n * by_z;
     // Rows of the system: e1·λ = a1, e2·λ = a2, −d·λ = by_z.
@@ -132,6 +137,24 @@ mod tests {
         for (a, b) in exact.iter().zip(&differences) {
             assert!((a - b).abs() < 1e-6 * (1.0 + b.abs()), "{exact:?} {differences:?}");
         }
+    }
+
+    #[test]
+    fn a_grazing_ray_has_a_bounded_derivative() {
+        let largest = |sine: f64| {
+            let corners = [
+                Vector3::new(-0.1, 0.5 * sine, 0.5),
+                Vector3::new(0.1, 0.5 * sine, 0.5),
+                Vector3::new(0.0, 0.5 * sine, 0.9),
+            ];
+            let ray = Vector3::new(0.0, 0.7 * sine, 1.0);
+            let at = hit(&corners, &ray);
+            let adjoint = hit_adjoint(&corners, &ray, &at, [0.0; 3], 1.0).unwrap();
+            adjoint.corners.iter().map(Vector3::amax).fold(0.0, f64::max)
+        };
+        // As steep as it is down to the bound, and no steeper beyond.
+        assert!((largest(1e-2) / largest(1e-1) - 10.0).abs() < 1.0);
+        assert!(largest(1e-6) <= 1.0 / f64::from(GRAZING), "{}", largest(1e-6));
     }
 
     #[test]

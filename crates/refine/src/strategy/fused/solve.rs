@@ -30,7 +30,7 @@ pub(crate) struct Part {
 impl Point {
     /// The terms at `state`, whose light is solved for.
     pub(crate) fn new(terms: &[Box<dyn Term>], mut state: State, blocks: &[Block]) -> Self {
-        let linearise = |term: &Box<dyn Term>| {
+        let linearise = |term: &dyn Term| {
             let light = term.light(&state);
             let state = State { light: light.unwrap_or(state.light), ..state.clone() };
             let mut normal = Normal::new(blocks);
@@ -38,7 +38,7 @@ impl Point {
             (Part { name: term.name(), value, normal }, light)
         };
         let (parts, lights): (Vec<Part>, Vec<Option<Light>>) =
-            terms.par_iter().map(linearise).unzip();
+            terms.par_iter().map(|term| linearise(term.as_ref())).unzip();
         if let Some(light) = lights.into_iter().flatten().next() {
             state.light = light;
         }

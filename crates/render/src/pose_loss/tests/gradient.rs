@@ -91,3 +91,35 @@ fn contours_inside_the_object_have_derivatives() {
         assert!(cosine > 0.999 && error < 0.1, "{seed}: {cosine} {error}");
     }
 }
+
+/// A sheet that reaches beyond the image on all sides, with a colour that changes evenly across it.
+#[test]
+fn slopes_go_on_over_the_border_of_the_image() {
+    let corner = |x: f64, y: f64| Point3::new(x, y, 0.0);
+    let mut sheet = TriMesh::new(
+        vec![corner(-0.2, -0.2), corner(0.2, -0.2), corner(0.2, 0.2), corner(-0.2, 0.2)],
+        vec![[0, 2, 1], [0, 3, 2]],
+    );
+    sheet.colors = Some([0.1, 0.9, 0.9, 0.1].map(|v| [v; 3]).into());
+    let model = RenderModel::new(&sheet).unwrap();
+    for (width, height) in [(6, 5), (1, 5)] {
+        let (cx, cy) = (0.5 * (width as f64 - 1.0), 0.5 * (height as f64 - 1.0));
+        let camera = Camera { fx: 40.0, fy: 40.0, cx, cy, width, height };
+        let picture = RgbImage::filled(width, height, [0.7; 3]);
+        let target = Target::new(camera, &picture, &Mask::filled(width, height, true)).unwrap();
+        let pose = Isometry3::translation(0.0, 0.0, 0.4);
+        let center = pose * Point3::origin();
+        for samples in [1, 2, 4] {
+            let loss = PoseLoss::new(contour(0.645), LossOptions::default()).with_samples(samples);
+            let light = Light::ambient(1.0);
+            let at = loss.linearise(&model, &pose, &center, &light, &target);
+            let value = |s: f64| {
+                let pose = twisted(&pose, &center, &unit(0, s));
+                loss.evaluate(&model, &pose, &light, &target).total
+            };
+            let difference = (value(1e-4) - value(-1e-4)) / 2e-4;
+            let error = (at.gradient[0] / difference - 1.0).abs();
+            assert!(error < 5e-3, "{width}, {samples}: {} {difference}", at.gradient[0]);
+        }
+    }
+}
