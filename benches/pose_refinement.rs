@@ -131,7 +131,9 @@ fn prepared(kind: TermKind) -> (Box<dyn prehend::refine::Term>, State) {
         let robot = Some(&SCENE.robot);
         let mut terms = standard_terms(&SCENE.observation, &SCENE.object, robot, &state, &config)?;
         let term = terms.remove(0);
-        term.refresh(&mut state);
+        if let Some(light) = term.light(&state) {
+            state.light = light;
+        }
         Ok::<_, prehend::refine::RefineError>((term, state))
     };
     prepare().expect("a term of the built-in scene")

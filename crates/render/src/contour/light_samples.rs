@@ -12,7 +12,7 @@ use crate::projected::Region;
 use crate::raster::MISS;
 
 /// What [`Light::fit`] needs: unlit colour, normal and observed colour where the object is seen inside the
-/// mask and more than `margin` pixels away from its outline.
+/// mask and more than `margin` pixels (0.05 to 64; others count as the nearest) away from its outline.
 pub fn light_samples(
     model: &RenderModel,
     t_cam_object: &Isometry3<f64>,

@@ -1,4 +1,4 @@
-//! The loss of a pose: a posed object compared with a segmented image, with exact derivatives by the pose.
+//! The loss of a pose: a posed object compared with a segmented image, with derivatives by the pose in closed form.
 
 mod affine;
 mod averaged;
@@ -130,12 +130,12 @@ pub struct PoseImage {
     pub color: RgbImage,
     /// Coverage α in 0..=1, row-major.
     pub coverage: Vec<f32>,
-    /// Z of the surface at pixel centres \[m\], 0 where there is none.
+    /// Z of the surface at pixel centres \[m\], 0 where there is none; with several samples a pixel, their mean.
     pub depth: DepthImage,
-    /// Unit normal at pixel centres as shading sees it, towards the camera (camera frame), row-major; zero where there is
+    /// Unit normal at pixel centres, or the sample next to them, as shading sees it, towards the camera (camera frame), row-major; zero where there is
     /// no surface.
     pub normal: Vec<[f32; 3]>,
-    /// The face at pixel centres, counting those that the model draws, row-major.
+    /// The face there, counting those that the model draws, row-major.
     pub face: Vec<Option<u32>>,
 }
 

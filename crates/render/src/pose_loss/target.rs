@@ -64,7 +64,7 @@ impl Target {
     /// The object's colours: `image` where `mask` is set, black elsewhere.
     ///
     /// # Errors
-    /// When a size differs from the camera's or no pixel of the mask is set.
+    /// When a size differs from the camera's, no pixel of the mask is set, or a colour under it is not finite.
     pub fn new(camera: Camera, image: &RgbImage, mask: &Mask) -> Result<Self, TargetError> {
         check(&camera, "image", image.width(), image.height())?;
         check(&camera, "mask", mask.width(), mask.height())?;
@@ -78,7 +78,7 @@ impl Target {
     /// which unlike a binary mask places the outline within the pixel.
     ///
     /// # Errors
-    /// When a size differs from the camera's or nothing is covered.
+    /// When a size differs from the camera's, nothing is covered, or a colour where something is is not finite.
     pub fn from_matte(
         camera: Camera,
         image: &RgbImage,
