@@ -51,17 +51,17 @@ impl ContourView<'_> {
     }
 
     /// The near and the far surface at an inner contour, where `face` is seen at this depth.
-    pub(super) fn layers(&self, place: &Place, face: u32, z: f32, inner: &Inner) -> [Layer; 2] {
+    pub(super) fn layers(&self, place: &Place, face: u32, z: f32, inner: &Inner) -> Layers {
         let (_, _, behind, inverse_z) = inner.behind;
         let beyond = z > inner.split;
         let [near, far] = if beyond { [inner.piece.face, face] } else { [face, behind] };
         let far_z = if beyond { z } else { 1.0 / inverse_z };
         // Depths before and behind all contours tell the sides apart.
-        let layer = |face: u32, z: f32, side: f32| {
-            let around = self.around(place, face, side, Some(inner));
-            Layer { face, z, around }
+        let layer = |face: u32, side: f32| Layer {
+            face,
+            around: self.around(place, face, side, Some(inner)),
         };
-        [layer(near, z.min(inner.split), 0.0), layer(far, far_z, f32::INFINITY)]
+        Layers { near: layer(near, 0.0), far: layer(far, f32::INFINITY), far_z }
     }
 
     fn seen_at(&self, x: i64, y: i64) -> Option<Hit> {
@@ -78,17 +78,24 @@ impl ContourView<'_> {
 }
 
 /// What a pixel that a face covers has around it.
-pub(crate) struct Beside {
-    pub(super) around: Around,
-    /// The two surfaces, if an inner contour is near and cuts pixels.
-    pub(super) layers: Option<[Layer; 2]>,
+pub(crate) enum Beside {
+    /// Of its own surface.
+    Surface(Around),
+    /// Of both, where an inner contour is near and cuts pixels.
+    Layers(Layers),
 }
 
-/// One of the two surfaces that an inner contour divides.
+/// The two surfaces that an inner contour divides.
+pub(crate) struct Layers {
+    pub(super) near: Layer,
+    pub(super) far: Layer,
+    /// Depth of the far one at the pixel \[m\].
+    pub(super) far_z: f32,
+}
+
+/// One of them.
 pub(crate) struct Layer {
     pub(super) face: u32,
-    /// Depth at the pixel \[m\].
-    pub(super) z: f32,
     pub(super) around: Around,
 }
 
@@ -186,7 +193,7 @@ impl Scene<'_> {
         inner: &Inner,
         foot: &Foot,
         side: f32,
-        [near, far]: &[Layer; 2],
+        Layers { near, far, far_z }: &Layers,
         ds: &Row,
     ) -> [Row; 3] {
         let (distance, outward) = (side * foot.distance_squared.sqrt(), inner.piece.outward);
@@ -202,7 +209,7 @@ impl Scene<'_> {
         let shaded = shade::<true>(&self.posed, &self.lighting, far.face as usize, b);
         let complement = Cut { distance: -distance, outward: outward.map(|v| -v), color: beyond };
         let cut = Some(&complement);
-        let behind = self.rows_over_footprint(at, far.z, far.face, &far.around, &shaded, cut);
+        let behind = self.rows_over_footprint(at, *far_z, far.face, &far.around, &shaded, cut);
         let (_, slope) = Step::Square.at(distance, outward);
         for k in 0..3 {
             let jump = slope * (here[k] - beyond[k]);

@@ -1,6 +1,6 @@
 //! Inner contours: where the object hides farther parts of itself.
 
-use super::footprint::Layer;
+use super::footprint::Layers;
 use super::outline::Piece;
 use super::pixel::{Scene, falling_step};
 use crate::pose_loss::{Pixel, scaled_sum};
@@ -65,7 +65,7 @@ impl Scene<'_> {
         y: f32,
         own: Pixel,
         inner: &Inner,
-        layers: Option<&[Layer; 2]>,
+        layers: Option<&Layers>,
     ) -> Pixel {
         let foot = inner.piece.foot(x, y);
         let side = if own.z > inner.split { 1.0 } else { -1.0 };

@@ -182,11 +182,10 @@ impl ContourView<'_> {
                 let Hit { face, inverse_z } = hit;
                 let z = 1.0 / inverse_z;
                 let cut = scene.drawing.step == Step::Square;
-                let beside = around(face, z, near.inner).map(|around| {
-                    let inner = near.inner.filter(|_| cut);
-                    let layers = inner.map(|inner| self.layers(&place, face, z, inner));
-                    Beside { around, layers }
-                });
+                let beside = match near.inner.filter(|_| footprint && cut) {
+                    Some(inner) => Some(Beside::Layers(self.layers(&place, face, z, inner))),
+                    None => around(face, z, near.inner).map(Beside::Surface),
+                };
                 let beside = beside.as_ref();
                 let pixel = scene.inside::<DERIVATIVES>(u, v, face, inverse_z, near, beside);
                 (pixel, true, near.edge.is_some())

@@ -41,12 +41,15 @@ impl Scene<'_> {
         Near { edge, inner, crease }: Near,
         beside: Option<&Beside>,
     ) -> Pixel {
-        let around = beside.map(|beside| &beside.around);
-        let layers = beside.and_then(|beside| beside.layers.as_ref());
+        let (around, layers) = match beside {
+            Some(Beside::Surface(around)) => (Some(around), None),
+            Some(Beside::Layers(layers)) => (None, Some(layers)),
+            None => (None, None),
+        };
         // Of a pixel through which a contour runs only a part counts, whose rows come below.
         let cut = around.filter(|_| inner.is_none() && edge.is_some());
         let cut = cut.filter(|_| self.drawing.step == Step::Square);
-        let whole = around.filter(|_| cut.is_none() && layers.is_none());
+        let whole = around.filter(|_| cut.is_none());
         let mut pixel = self.interior::<DERIVATIVES>(x, y, face, inverse_z, whole);
         if let Some(crease) = crease {
             self.soften::<DERIVATIVES>(x, y, inverse_z, &mut pixel, crease);
