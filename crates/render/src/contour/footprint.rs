@@ -2,10 +2,11 @@
 
 use super::drawing::Step;
 use super::interior::{add_level, barycentric};
+use super::near::Hit;
 use super::outline::Foot;
 use super::pixel::Scene;
 use super::surface::{Shaded, shade};
-use super::{Band, ContourView, Hit, Inner};
+use super::{Band, ContourView, Inner};
 use crate::pose_loss::{Row, scaled_sum};
 use crate::raster::{BAND, MISS};
 

@@ -14,6 +14,7 @@ mod inner;
 mod interior;
 mod lanes;
 mod light_samples;
+mod near;
 mod outline;
 mod pixel;
 mod surface;
@@ -35,6 +36,8 @@ pub(crate) use inner::{Inner, LEAST_STEP, inner_contours};
 pub(crate) use interior::GRAZING;
 use lanes::{Blended, Waiting};
 pub use light_samples::light_samples;
+pub(crate) use near::Near;
+use near::{Bands, Found, Hit};
 pub(crate) use outline::{Band, Piece, Silhouette, outline};
 pub(crate) use pixel::{Scene, falling_step};
 pub(crate) use surface::{Lighting, Unlit, albedo, posed_normal};
@@ -91,74 +94,7 @@ impl<'a> ContourView<'a> {
     }
 }
 
-/// What is at a pixel.
-#[derive(Clone, Copy)]
-enum Found<'a> {
-    Nothing,
-    /// The object is not here, but its outline is near.
-    Outside(&'a Piece),
-    /// A face, far from contours.
-    Face(Hit),
-    /// A face near contours or a crease.
-    Border(Hit, Near<'a>),
-}
-
-/// The contours and the crease within whose bands a pixel lies.
-#[derive(Clone, Copy)]
-pub(crate) struct Near<'a> {
-    pub(crate) edge: Option<&'a Piece>,
-    pub(crate) inner: Option<&'a Inner>,
-    pub(crate) crease: Option<&'a Crease>,
-}
-
-/// A visible face.
-#[derive(Clone, Copy)]
-struct Hit {
-    face: u32,
-    inverse_z: f32,
-}
-
 impl ContourView<'_> {
-    /// Calls `each` for every pixel of a block with its column and row.
-    #[inline]
-    fn walk(&self, block: usize, mut each: impl FnMut(Place, Found)) {
-        let visible = &self.visible[block];
-        let width = self.scene.drawing.step.reach();
-        let rows = visible.region;
-        // Pixels over whose area slopes are taken look at their neighbours.
-        let beyond = usize::from(self.scene.drawing.footprint);
-        let around = Region { y0: rows.y0.saturating_sub(beyond), y1: rows.y1 + beyond, ..rows };
-        let band = Band::new(self.pieces.iter(), &around, width);
-        let mut at = (rows.y0 - around.y0) * rows.width();
-        // A contour between a pixel and the next is less than a pixel away.
-        let inner_width = if self.scene.drawing.footprint { width.max(1.0) } else { width };
-        let inner_pieces = self.inner.iter().map(|inner| &inner.piece);
-        let inner_band =
-            (!self.inner.is_empty()).then(|| Band::new(inner_pieces, &visible.region, inner_width));
-        let crease_pieces = self.creases.iter().map(|crease| &crease.piece);
-        let crease_band =
-            (!self.creases.is_empty()).then(|| Band::new(crease_pieces, &visible.region, width));
-        let mut i = 0;
-        for y in visible.region.y0..visible.region.y1 {
-            for x in visible.region.x0..visible.region.x1 {
-                let edge = self.pieces.get(band.piece[at] as usize);
-                let inner = inner_band.as_ref().and_then(|b| self.inner.get(b.piece[i] as usize));
-                let crease =
-                    crease_band.as_ref().and_then(|b| self.creases.get(b.piece[i] as usize));
-                let hit = Hit { face: visible.face[i], inverse_z: visible.inverse_z[i] };
-                let found = match (hit.face, edge, inner, crease) {
-                    (MISS, None, ..) => Found::Nothing,
-                    (MISS, Some(piece), ..) => Found::Outside(piece),
-                    (_, None, None, None) => Found::Face(hit),
-                    _ => Found::Border(hit, Near { edge, inner, crease }),
-                };
-                each(Place { x, y, band: &band, at }, found);
-                i += 1;
-                at += 1;
-            }
-        }
-    }
-
     /// The pixel (x, y).
     #[inline]
     fn seen<const DERIVATIVES: bool>(&self, place: Place, found: Found) -> Option<Seen> {
@@ -209,9 +145,13 @@ impl View for ContourView<'_> {
         block: usize,
         mut each: impl FnMut(usize, usize, Option<Seen>),
     ) {
-        self.walk(block, |place, found| {
-            each(place.x, place.y, self.seen::<DERIVATIVES>(place, found));
-        });
+        let bands = Bands::new(self, block);
+        let Region { x0, y0, x1, y1 } = bands.visible.region;
+        let pixels = (y0..y1).flat_map(|y| (x0..x1).map(move |x| (x, y)));
+        for (i, (x, y)) in pixels.enumerate() {
+            let (place, found) = bands.found(i, x, y);
+            each(x, y, self.seen::<DERIVATIVES>(place, found));
+        }
     }
 
     fn faces(&self, block: usize, mut each: impl FnMut(usize, usize, u32, [f32; 3])) {
@@ -224,43 +164,62 @@ impl View for ContourView<'_> {
 
     /// Pixels inside faces are treated many at a time, and the colours of the others added up likewise.
     fn sum<const DERIVATIVES: bool>(&self, block: usize, residuals: &Residuals, sums: &mut Sums) {
-        let width = residuals.target.camera.width;
         let (mut waiting, mut blended) = (Waiting::new(), Blended::new());
         let mut lanes = LaneSums::new();
-        self.walk(block, |place, found| {
-            let Place { x, y, .. } = place;
-            let at = y * width + x;
-            if DERIVATIVES && x == self.region.x0 {
+        let bands = Bands::new(self, block);
+        let visible = bands.visible;
+        let Region { x0, y0, y1, .. } = visible.region;
+        let width = visible.region.width();
+        // Columns of a row's pixels inside faces, and of the others in whose residuals something of the pose may be.
+        let (mut inside, mut others) = (vec![0u32; width], vec![0u32; width]);
+        for y in y0..y1 {
+            let (first, start) = ((y - y0) * width, y * residuals.target.camera.width + x0);
+            let faces = &visible.face[first..first + width];
+            let wanted = residuals.wanted(start..start + width);
+            let clear = &bands.clear[first..first + width];
+            let (mut n_inside, mut n_others) = (0, 0);
+            // Without branches: what is where changes too often to be foreseen.
+            for (x, ((face, &clear), wanted)) in faces.iter().zip(clear).zip(wanted).enumerate() {
+                let hit = *face != MISS;
+                inside[n_inside] = x as u32;
+                n_inside += usize::from(hit & clear);
+                others[n_others] = x as u32;
+                n_others += usize::from(!clear | (!hit & wanted));
+            }
+            for &x in &inside[..n_inside] {
+                let x = x as usize;
+                let z = 1.0 / visible.inverse_z[first + x];
+                let at = start + x;
+                if residuals.hidden(sums, at, z) {
+                    continue;
+                }
+                sums.counts.covered += 1;
+                sums.counts.depth += usize::from(residuals.has_depth(at));
+                if waiting.push(((x0 + x) as f32, y as f32), at, faces[x], z) {
+                    waiting.flush::<DERIVATIVES>(&self.scene, residuals, &mut lanes);
+                }
+            }
+            for &x in &others[..n_others] {
+                let (i, at) = (first + x as usize, start + x as usize);
+                let (place, found) = bands.found(i, x0 + x as usize, y);
+                let Some(seen) = self.seen::<DERIVATIVES>(place, found) else {
+                    residuals.add_nothing(sums, at);
+                    continue;
+                };
+                if residuals.hidden(sums, at, seen.pixel.z) {
+                    continue;
+                }
+                residuals.add_but_color::<DERIVATIVES>(sums, at, &seen);
+                if blended.push::<DERIVATIVES>(at, &seen.pixel) {
+                    blended.flush::<DERIVATIVES>(residuals, &mut lanes);
+                }
+            }
+            if DERIVATIVES {
                 sums.end_row();
             }
-            let (face, inverse_z) = match found {
-                Found::Nothing => return residuals.add_nothing(sums, at),
-                Found::Face(Hit { face, inverse_z }) => (face, inverse_z),
-                _ => {
-                    let Some(seen) = self.seen::<DERIVATIVES>(place, found) else { return };
-                    if residuals.hidden(sums, at, seen.pixel.z) {
-                        return;
-                    }
-                    residuals.add_but_color::<DERIVATIVES>(sums, at, &seen);
-                    if blended.push::<DERIVATIVES>(at, &seen.pixel) {
-                        blended.flush::<DERIVATIVES>(residuals, &mut lanes);
-                    }
-                    return;
-                }
-            };
-            let z = 1.0 / inverse_z;
-            if residuals.hidden(sums, at, z) {
-                return;
-            }
-            sums.counts.covered += 1;
-            sums.counts.depth += usize::from(residuals.has_depth(at));
-            if waiting.push((x as f32, y as f32), at, face, z) {
-                waiting.flush::<DERIVATIVES>(&self.scene, residuals, &mut lanes);
-            }
-        });
+        }
         waiting.flush::<DERIVATIVES>(&self.scene, residuals, &mut lanes);
         blended.flush::<DERIVATIVES>(residuals, &mut lanes);
-        sums.end_row();
         sums.absorb(&lanes);
     }
 }

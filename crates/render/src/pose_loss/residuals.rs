@@ -2,6 +2,8 @@
 
 #![allow(clippy::needless_range_loop)] // loops over lanes index several arrays alike
 
+use std::ops::Range;
+
 use nalgebra::Matrix6;
 use rayon::prelude::*;
 
@@ -94,6 +96,12 @@ impl Residuals<'_> {
             }
         }
         self.add_but_color::<DERIVATIVES>(sums, at, &seen);
+    }
+
+    /// Whether the mask has these pixels at least in part.
+    #[inline]
+    pub(crate) fn wanted(&self, at: Range<usize>) -> impl Iterator<Item = bool> {
+        self.target.coverage[at].iter().map(|coverage| *coverage > 0.0)
     }
 
     /// Adds the residuals of pixel `at`, where nothing of the object is seen.

@@ -1,6 +1,6 @@
 //! What the rendered object is compared with.
 
-use crate::camera::Camera;
+use crate::camera::{Camera, CameraError};
 use crate::image::{DepthImage, Mask, RgbImage};
 use crate::projected::Region;
 
@@ -58,13 +58,16 @@ pub enum TargetError {
     /// The mask is empty: there is nothing to compare with.
     #[error("mask has no pixel set")]
     EmptyMask,
+    /// The camera has a focal length that is not positive, a number that is not finite, or no pixels.
+    #[error(transparent)]
+    Camera(#[from] CameraError),
 }
 
 impl Target {
     /// The object's colours: `image` where `mask` is set, black elsewhere.
     ///
     /// # Errors
-    /// When a size differs from the camera's, no pixel of the mask is set, or a colour under it is not finite.
+    /// When the camera is none, a size differs from its, no pixel of the mask is set, or a colour under it is not finite.
     pub fn new(camera: Camera, image: &RgbImage, mask: &Mask) -> Result<Self, TargetError> {
         check(&camera, "image", image.width(), image.height())?;
         check(&camera, "mask", mask.width(), mask.height())?;
@@ -78,7 +81,7 @@ impl Target {
     /// which unlike a binary mask places the outline within the pixel.
     ///
     /// # Errors
-    /// When a size differs from the camera's, nothing is covered, or a colour where something is is not finite.
+    /// When the camera is none, a size differs from its, nothing is covered, or a colour where something is is not finite.
     pub fn from_matte(
         camera: Camera,
         image: &RgbImage,
@@ -174,6 +177,7 @@ impl Target {
         color: Vec<[f32; 3]>,
         coverage: Vec<f32>,
     ) -> Result<Self, TargetError> {
+        Camera::from_k(camera.k(), camera.width, camera.height)?;
         if let Some(at) = color.iter().position(|c| c.iter().any(|v| !v.is_finite())) {
             return Err(TargetError::NotFinite { x: at % camera.width, y: at / camera.width });
         }
@@ -238,6 +242,9 @@ mod tests {
         image.pixels_mut()[6] = [0.5, f32::NAN, 0.5];
         let bad = Target::new(CAMERA, &image, &mask).unwrap_err();
         assert_eq!(bad, TargetError::NotFinite { x: 2, y: 1 });
+        let flat = Camera { fy: 0.0, ..CAMERA };
+        let bad = Target::new(flat, &RgbImage::filled(4, 2, [0.5; 3]), &mask).unwrap_err();
+        assert_eq!(bad.to_string(), "focal length fy is 0 px, expected more than zero");
     }
 
     #[test]

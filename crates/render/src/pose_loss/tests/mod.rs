@@ -209,13 +209,17 @@ fn results_do_not_depend_on_the_number_of_threads() {
     let model = RenderModel::new(&painted(torus(0.04, 0.015, 60), 0.05)).unwrap();
     let truth = pose(&mut Noise(8));
     let target = target_of(&model, &truth, &lamp(), None, 0.5);
-    let loss = PoseLoss::new(Mode::default(), full_options());
     let guess = twisted(&truth, &Point3::origin(), &[0.002, 0.001, -0.003, 0.01, -0.01, 0.01]);
-    let run = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| loss.linearise(&model, &guess, &Point3::origin(), &lamp(), &target))
-    };
-    assert_eq!(run(1), run(4));
+    let plain = PoseLoss::new(Mode::default(), full_options());
+    let affine = LossOptions { affine: true, ..full_options() };
+    let losses = [plain, plain.with_samples(2), PoseLoss::new(Mode::default(), affine)];
+    for loss in losses {
+        let run = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| loss.linearise(&model, &guess, &Point3::origin(), &lamp(), &target))
+        };
+        assert_eq!(run(1), run(4));
+    }
 }
 
 #[test]

@@ -1,0 +1,91 @@
+//! What is near each pixel of a block of rows: a face, and the contours and creases within whose bands the pixel lies.
+
+use super::footprint::Place;
+use super::{Band, ContourView, Crease, Inner, Piece};
+use crate::model::NONE;
+use crate::projected::Region;
+use crate::raster::{MISS, Visible};
+
+/// What is at a pixel.
+#[derive(Clone, Copy)]
+pub(super) enum Found<'a> {
+    Nothing,
+    /// The object is not here, but its outline is near.
+    Outside(&'a Piece),
+    /// A face, far from contours.
+    Face(Hit),
+    /// A face near contours or a crease.
+    Border(Hit, Near<'a>),
+}
+
+/// The contours and the crease within whose bands a pixel lies.
+#[derive(Clone, Copy)]
+pub(crate) struct Near<'a> {
+    pub(crate) edge: Option<&'a Piece>,
+    pub(crate) inner: Option<&'a Inner>,
+    pub(crate) crease: Option<&'a Crease>,
+}
+
+/// A visible face.
+#[derive(Clone, Copy)]
+pub(super) struct Hit {
+    pub(super) face: u32,
+    pub(super) inverse_z: f32,
+}
+
+/// The bands of one block of rows. Its pixels are counted row by row.
+pub(super) struct Bands<'a> {
+    view: &'a ContourView<'a>,
+    pub(super) visible: &'a Visible,
+    outline: Band,
+    /// The first pixel's index in the outline's band, which may have a row more above.
+    start: usize,
+    /// Of inner contours and creases, if there are any.
+    inner: Option<Band>,
+    crease: Option<Band>,
+    /// Whether a pixel is in no band.
+    pub(super) clear: Vec<bool>,
+}
+
+impl<'a> Bands<'a> {
+    pub(super) fn new(view: &'a ContourView, block: usize) -> Self {
+        let visible = &view.visible[block];
+        let width = view.scene.drawing.step.reach();
+        let rows = visible.region;
+        // Pixels over whose area slopes are taken look at their neighbours.
+        let beyond = usize::from(view.scene.drawing.footprint);
+        let around = Region { y0: rows.y0.saturating_sub(beyond), y1: rows.y1 + beyond, ..rows };
+        // A contour between a pixel and the next is less than a pixel away.
+        let inner_width = if view.scene.drawing.footprint { width.max(1.0) } else { width };
+        let inner = view.inner.iter().map(|inner| &inner.piece);
+        let crease = view.creases.iter().map(|crease| &crease.piece);
+        let outline = Band::new(view.pieces.iter(), &around, width);
+        let inner = (!view.inner.is_empty()).then(|| Band::new(inner, &rows, inner_width));
+        let crease = (!view.creases.is_empty()).then(|| Band::new(crease, &rows, width));
+        let start = (rows.y0 - around.y0) * rows.width();
+        let own = &outline.piece[start..start + visible.face.len()];
+        let mut clear: Vec<bool> = own.iter().map(|piece| *piece == NONE).collect();
+        for band in [&inner, &crease].into_iter().flatten() {
+            clear.iter_mut().zip(&band.piece).for_each(|(clear, piece)| *clear &= *piece == NONE);
+        }
+        Self { view, visible, outline, start, inner, crease, clear }
+    }
+
+    /// Pixel `i`, which is (x, y).
+    #[inline]
+    pub(super) fn found(&self, i: usize, x: usize, y: usize) -> (Place<'_>, Found<'a>) {
+        let place = Place { x, y, band: &self.outline, at: self.start + i };
+        let near = |band: &Option<Band>| band.as_ref().map_or(NONE, |band| band.piece[i]) as usize;
+        let edge = self.view.pieces.get(self.outline.piece[place.at] as usize);
+        let inner = self.view.inner.get(near(&self.inner));
+        let crease = self.view.creases.get(near(&self.crease));
+        let hit = Hit { face: self.visible.face[i], inverse_z: self.visible.inverse_z[i] };
+        let found = match (hit.face, edge, inner, crease) {
+            (MISS, None, ..) => Found::Nothing,
+            (MISS, Some(piece), ..) => Found::Outside(piece),
+            (_, None, None, None) => Found::Face(hit),
+            _ => Found::Border(hit, Near { edge, inner, crease }),
+        };
+        (place, found)
+    }
+}
