@@ -75,7 +75,7 @@ impl<'a> Known<'a> {
         Ok(image)
     }
 
-    /// How depth points scatter about the object at `state`; `None` without depth, or if it is not used.
+    /// How depth points scatter about the object at `state`; `None` without enough depth, or if it is not used.
     pub(super) fn scatter(&self, state: &State, settings: &FusedSettings) -> Option<Scatter> {
         if !settings.evidence.contains(&Evidence::Depth) {
             return None;
@@ -84,7 +84,7 @@ impl<'a> Known<'a> {
         let term =
             PointToPlaneTerm::new(self.observation, Arc::clone(self.object), &self.hand, depth)
                 .ok()?;
-        Some(term.scatter(state))
+        term.scatter(state)
     }
 
     /// The terms of `stage`, a prior about `initial` among them.

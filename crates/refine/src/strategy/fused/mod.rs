@@ -70,9 +70,10 @@ impl Fused {
             if stage.measured_scatter
                 && let Some(scatter) = known.scatter(&states[0], &self.settings)
             {
-                settings.depth.sigma = scatter.sigma.clamp(FINEST, COARSEST);
-                settings.depth.effective_points =
-                    scatter.effective_points.min(settings.most_points);
+                let alone = (scatter.sigma.powi(2) - scatter.shared.powi(2)).max(0.0).sqrt();
+                settings.depth.sigma = alone.clamp(FINEST, COARSEST);
+                settings.depth.deviation = scatter.shared.min(COARSEST);
+                settings.depth.effective_points = settings.most_points;
             }
             let terms = known.terms(&initial, stage, &settings)?;
             let solve_from = |state: &State| {
@@ -114,6 +115,8 @@ impl Fused {
             states = found.iter().map(as_said).collect();
             // Then depth's errors are not alike over whole patches either.
             if let Some(scatter) = known.scatter(&states[0], &self.settings) {
+                settings.depth.sigma = scatter.sigma.clamp(FINEST, COARSEST);
+                settings.depth.deviation = 0.0;
                 settings.depth.effective_points = scatter.effective_points;
             }
             let terms = known.terms(&initial, last, &settings)?;

@@ -130,7 +130,7 @@ pub struct FusedSettings {
     pub spread: f64,
     /// Whether to ask the evidence if calibrations are exact.
     pub exactness: bool,
-    /// Independent measurements that depth points amount to at most, if calibrations are not exact.
+    /// Independent measurements that depth points amount to beside the errors that neighbours share, where both were measured.
     pub most_points: f64,
     /// What the covariance of the posterior is multiplied by, to be as large as errors are.
     pub covariance_scale: f64,
@@ -214,7 +214,7 @@ impl Default for FusedSettings {
             turns: 20f64.to_radians(),
             spread: 10e-3,
             exactness: true,
-            most_points: 20.0,
+            most_points: 50.0,
             covariance_scale: 1.1,
             model_tolerance: 6.5e-4,
             rendering: RenderingSettings {

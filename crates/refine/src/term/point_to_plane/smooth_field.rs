@@ -1,0 +1,157 @@
+//! A smooth field by which measurements at places are off.
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, SMatrix, Vector3};
+
+/// Numbers that the field is described by, at most.
+const MOST_NUMBERS: usize = 24;
+
+/// Distance between the places that describe the field, as a share of its smoothness.
+const SPACING: f64 = 0.5;
+
+/// Times that weights are found anew: they depend on what the field leaves.
+const ROUNDS: usize = 3;
+
+/// A Gaussian process over space, with covariance τ² exp(−d²/2ℓ²) at distance d, through a few places that describe all others
+/// (Quiñonero-Candela and Rasmussen, 2005).
+///
+/// It is what the errors of a depth camera and of an object's model have in common: neighbours are off alike.
+pub(super) struct SmoothField {
+    /// A column for each place: the field there is its product with independent standard normal numbers.
+    features: DMatrix<f64>,
+}
+
+/// The field that fits residuals best.
+pub(super) struct Fit {
+    /// Residuals without it.
+    pub(super) left: Vec<f64>,
+    /// What it costs \[nat\].
+    pub(super) cost: f64,
+    /// Of the information on its numbers.
+    information: Cholesky<f64, Dyn>,
+}
+
+impl SmoothField {
+    /// At `places` \[m\], with standard deviation `deviation` \[m\] and length `smoothness` \[m\]; `None` if there is none.
+    pub(super) fn new(places: &[Vector3<f64>], deviation: f64, smoothness: f64) -> Option<Self> {
+        if !(deviation > 0.0 && smoothness > 0.0) {
+            return None;
+        }
+        let kernel = |a: &Vector3<f64>, b: &Vector3<f64>| {
+            (-0.5 * (a - b).norm_squared() / smoothness.powi(2)).exp()
+        };
+        let chosen = far_apart(places, SPACING * smoothness);
+        let among = DMatrix::from_fn(chosen.len(), chosen.len(), |i, j| {
+            // What makes it certainly positive definite.
+            kernel(&chosen[i], &chosen[j]) + if i == j { 1e-6 } else { 0.0 }
+        });
+        let to = DMatrix::from_fn(chosen.len(), places.len(), |i, j| {
+            deviation * kernel(&chosen[i], &places[j])
+        });
+        let features = Cholesky::new(among)?.l().solve_lower_triangular(&to)?;
+        Some(Self { features })
+    }
+
+    /// The field that is most likely where `residuals` are seen, of which `weight` says from index and residual how much
+    /// information is in one \[1/m²\].
+    ///
+    /// With it at its best, derivatives by anything else are those at a fixed field (Golub and Pereyra, 1973).
+    pub(super) fn fit(&self, residuals: &[f64], weight: impl Fn(usize, f64) -> f64) -> Option<Fit> {
+        let count = self.features.nrows();
+        let mut left = residuals.to_vec();
+        let mut round = || {
+            let mut information = DMatrix::identity(count, count);
+            let mut right = DVector::zeros(count);
+            for (i, feature) in self.features.column_iter().enumerate() {
+                let weight = weight(i, left[i]);
+                right.axpy(weight * residuals[i], &feature, 1.0);
+                information.syger(weight, &feature, &feature, 1.0);
+            }
+            let information = Cholesky::new(information)?;
+            let numbers = information.solve(&right);
+            for (i, feature) in self.features.column_iter().enumerate() {
+                left[i] = residuals[i] - feature.dot(&numbers);
+            }
+            Some((information, 0.5 * numbers.norm_squared()))
+        };
+        let mut last = round()?;
+        for _ in 1..ROUNDS {
+            last = round()?;
+        }
+        let (information, cost) = last;
+        Some(Fit { left, cost, information })
+    }
+
+    /// The information that residuals with derivatives `rows` and weights, one of each a place, lose because they are also what the
+    /// field may be.
+    pub(super) fn lost<'a, const N: usize>(
+        &self,
+        fit: &Fit,
+        rows: impl Iterator<Item = (f64, &'a [f64; N])>,
+    ) -> SMatrix<f64, N, N> {
+        let mut shared = DMatrix::zeros(self.features.nrows(), N);
+        for (feature, (weight, row)) in self.features.column_iter().zip(rows) {
+            for (mut column, value) in shared.column_iter_mut().zip(row) {
+                column.axpy(weight * value, &feature, 1.0);
+            }
+        }
+        let lost = shared.tr_mul(&fit.information.solve(&shared));
+        SMatrix::from_fn(|r, c| lost[(r, c)])
+    }
+}
+
+/// Some of `places`, each farther than `distance` from all before it, the farthest first.
+fn far_apart(places: &[Vector3<f64>], distance: f64) -> Vec<Vector3<f64>> {
+    let mut chosen: Vec<Vector3<f64>> = places.first().copied().into_iter().collect();
+    let mut nearest = vec![f64::INFINITY; places.len()];
+    while let Some(last) = chosen.last().filter(|_| chosen.len() < MOST_NUMBERS) {
+        for (nearest, place) in nearest.iter_mut().zip(places) {
+            *nearest = nearest.min((place - last).norm());
+        }
+        let farthest = nearest.iter().zip(places).max_by(|a, b| a.0.total_cmp(b.0));
+        match farthest.filter(|(nearest, _)| **nearest > distance) {
+            Some((_, place)) => chosen.push(*place),
+            None => break,
+        }
+    }
+    chosen
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use prehend_geometry::SplitMix64;
+
+    #[test]
+    fn fitting_is_integrating_out() {
+        let mut random = SplitMix64::new(3);
+        let place = |i: usize| Vector3::new(0.003 * i as f64, 0.01 * (i as f64).sin(), 0.5);
+        let places: Vec<_> = (0..40).map(place).collect();
+        let field = SmoothField::new(&places, 1e-3, 20e-3).unwrap();
+        let residuals: Vec<f64> = (0..40).map(|_| 1e-3 * random.normal()).collect();
+        let rows: Vec<[f64; 2]> = (0..40).map(|_| [random.normal(), random.normal()]).collect();
+        let weight = 1.0 / 0.5e-3f64.powi(2);
+        let fit = field.fit(&residuals, |_, _| weight).unwrap();
+        let lost = field.lost(&fit, rows.iter().map(|row| (weight, row)));
+        // The same with the covariance of all residuals.
+        let covariance =
+            field.features.tr_mul(&field.features) + DMatrix::identity(40, 40) / weight;
+        let inverse = covariance.clone().cholesky().unwrap().inverse();
+        let r = DVector::from_vec(residuals);
+        let value = 0.5 * weight * fit.left.iter().map(|r| r * r).sum::<f64>() + fit.cost;
+        let expected = 0.5 * r.dot(&(&inverse * &r));
+        assert!((value / expected - 1.0).abs() < 1e-9, "{value} {expected}");
+        let j = DMatrix::from_fn(40, 2, |r, c| rows[r][c]);
+        let kept = j.tr_mul(&j) * weight - lost;
+        let expected = j.tr_mul(&(inverse * &j));
+        assert!((kept - &expected).amax() < 1e-9 * expected.amax());
+        // Neighbours are off nearly alike, those far apart are not.
+        let alike = |i: usize, j: usize| covariance[(i, j)] / 1e-6;
+        assert!(
+            (alike(10, 11) - (-0.5f64 * (places[10] - places[11]).norm_squared() / 4e-4).exp())
+                .abs()
+                < 0.02
+        );
+        assert!(alike(0, 39) < 1e-3);
+        assert!(SmoothField::new(&places, 0.0, 20e-3).is_none());
+    }
+}
