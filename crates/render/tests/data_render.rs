@@ -123,12 +123,12 @@ fn textures_of_scans_are_the_right_way_up() {
         let view = view(object, 0);
         let pose_loss = PoseLoss::default();
         let target = view.target();
-        let samples = light_samples(&view.model, &view.truth, &target, 1.0);
+        let samples = light_samples(&view.model, &view.truth, &target, 1, usize::MAX);
         let light = Light::fit(&samples, 1e-3).unwrap();
         let loss = pose_loss.evaluate(&view.model, &view.truth, &light, &target);
         // The error with a colour that is right only on average.
         let plain = view.model.clone().with_uniform_color([0.5; 3]);
-        let samples = light_samples(&plain, &view.truth, &target, 1.0);
+        let samples = light_samples(&plain, &view.truth, &target, 1, usize::MAX);
         let plain_light = Light::fit(&samples, 1e-3).unwrap();
         let blank = pose_loss.evaluate(&plain, &view.truth, &plain_light, &target);
         println!(
@@ -166,7 +166,7 @@ fn colour_mask_and_depth_lead_back_to_the_true_pose() {
         offset.rotation * view.truth.rotation,
     );
     for _ in 0..30 {
-        let samples = light_samples(&view.model, &guess, &target, 1.0);
+        let samples = light_samples(&view.model, &guess, &target, 1, usize::MAX);
         let light = Light::fit(&samples, 1e-3).unwrap();
         let center = guess * view.model.center();
         let at = pose_loss.linearise(&view.model, &guess, &center, &light, &target);

@@ -35,7 +35,8 @@ pub struct RenderingSettings {
 /// Half-width of the contour band \[px\] that is nearest to how a box-filtered edge fades.
 const HALF_WIDTH: f64 = 0.645;
 
-/// Pixels at most that the light is solved from.
+/// Distance from where the object is not seen of the pixels that the light is solved from \[px\], and their number at most.
+const LIGHT_MARGIN: usize = 1;
 const LIGHT_SAMPLES: usize = 1000;
 
 impl Default for RenderingSettings {
@@ -191,14 +192,8 @@ impl Term for RenderingTerm {
             return None;
         }
         let (model, pose) = (&self.object.model, apparent(state));
-        let mut samples = light_samples(model, &pose, &self.target, HALF_WIDTH);
         // Four unknowns a channel do not need every pixel.
-        let step = samples.len().div_ceil(LIGHT_SAMPLES).max(1);
-        let mut index = 0;
-        samples.retain(|_| {
-            index += 1;
-            index % step == 0
-        });
+        let samples = light_samples(model, &pose, &self.target, LIGHT_MARGIN, LIGHT_SAMPLES);
         // With too little in view the light stays what it was.
         Light::fit(&samples, self.light_ridge).ok()
     }

@@ -1,49 +1,70 @@
 //! What the estimation of light needs from a posed model and an image.
 
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Isometry3, Vector3};
 
 use super::interior::barycentric;
-use super::{Band, ContourView, surface};
-use crate::light::{Light, LightSample};
-use crate::mode::ContourOptions;
-use crate::model::{NONE, RenderModel};
+use super::surface::{albedo, posed_normal};
+use crate::light::LightSample;
+use crate::model::RenderModel;
 use crate::pose_loss::Target;
-use crate::projected::Region;
-use crate::raster::MISS;
+use crate::posed::Posed;
+use crate::raster::{BAND, MISS, Visible, rasterise};
 
-/// What [`Light::fit`] needs: unlit colour, normal and observed colour where the object is seen inside the
-/// mask and more than `margin` pixels (0.05 to 64; others count as the nearest) away from its outline.
+/// What [`Light::fit`](crate::Light::fit) needs: unlit colour, normal and observed colour where the object is seen inside the
+/// mask, and `margin` pixels to the left, to the right, above and below too; of `most` of these pixels, spread evenly over them.
 pub fn light_samples(
     model: &RenderModel,
     t_cam_object: &Isometry3<f64>,
     target: &Target,
-    margin: f64,
+    margin: usize,
+    most: usize,
 ) -> Vec<LightSample> {
-    let options = ContourOptions { half_width: margin, ..ContourOptions::default() };
-    let (center, light, also) = (Point3::origin(), Light::ambient(1.0), Region::EMPTY);
-    let camera = &target.camera;
-    let view =
-        ContourView::new(options.drawing(1), model, t_cam_object, &center, camera, &light, &also);
-    let scene = &view.scene;
-    let projected = &scene.posed.projected;
-    let mut samples = Vec::new();
-    for visible in &view.visible {
-        let band = Band::new(view.pieces.iter(), &visible.region, scene.drawing.step.reach());
-        for (i, &face) in visible.face.iter().enumerate() {
-            if face == MISS || band.piece[i] != NONE {
-                continue;
+    let posed = Posed::new(model, &target.camera, t_cam_object, 0.0);
+    let visible = rasterise(&posed.projected, &posed.projected.region);
+    let pixels = inner_pixels(&visible, target, margin);
+    let step = pixels.len().div_ceil(most.max(1)).max(1);
+    let sample = |&(face, x, y): &(usize, usize, usize)| {
+        let b = barycentric(posed.projected.corners(face), x as f32, y as f32);
+        LightSample {
+            albedo: albedo(&posed, face, b).color,
+            normal: Vector3::from(posed_normal(&posed, face, b)),
+            observed: target.color[y * target.camera.width + x],
+        }
+    };
+    pixels.iter().skip(step - 1).step_by(step).map(sample).collect()
+}
+
+/// Faces, columns and rows of the pixels that show the object alone.
+fn inner_pixels(visible: &[Visible], target: &Target, margin: usize) -> Vec<(usize, usize, usize)> {
+    let Some(region) = visible.first().map(|block| block.region) else { return Vec::new() };
+    let seen = |x: usize, y: usize| {
+        let block = visible.get(y.checked_sub(region.y0)? / BAND)?;
+        let column = x.checked_sub(region.x0).filter(|column| *column < region.width())?;
+        let at = (y - block.region.y0) * region.width() + column;
+        Some((*block.face.get(at)?, block.inverse_z[at])).filter(|(face, _)| *face != MISS)
+    };
+    let inside = |x: usize, y: usize| {
+        let shift = |centre: usize, by: usize| (centre + by).checked_sub(margin);
+        let steps = [[0, 1], [2, 1], [1, 0], [1, 2]].map(|step| step.map(|by| by * margin));
+        steps.iter().all(|[dx, dy]| match (shift(x, *dx), shift(y, *dy)) {
+            (Some(x), Some(y)) => seen(x, y).is_some(),
+            _ => false,
+        })
+    };
+    let mut pixels = Vec::new();
+    for block in visible {
+        for y in block.region.y0..block.region.y1 {
+            for x in region.x0..region.x1 {
+                let at = y * target.camera.width + x;
+                let Some((face, inverse_z)) = seen(x, y).filter(|_| target.coverage[at] >= 1.0)
+                else {
+                    continue;
+                };
+                if !target.hides(at, 1.0 / inverse_z) && inside(x, y) {
+                    pixels.push((face as usize, x, y));
+                }
             }
-            let (x, y) = visible.position(i);
-            let at = y * camera.width + x;
-            if target.coverage[at] < 1.0 || target.hides(at, 1.0 / visible.inverse_z[i]) {
-                continue;
-            }
-            let face = face as usize;
-            let b = barycentric(projected.corners(face), x as f32, y as f32);
-            let albedo = surface::albedo(&scene.posed, face, b).color;
-            let normal = Vector3::from(scene.normal(face, x as f32, y as f32));
-            samples.push(LightSample { albedo, normal, observed: target.color[at] });
         }
     }
-    samples
+    pixels
 }

@@ -48,6 +48,7 @@ impl Piece {
 }
 
 /// A silhouette edge: where the number of surface layers changes.
+#[derive(Clone, Copy, Default)]
 struct Segment {
     a: [f32; 2],
     b: [f32; 2],
@@ -97,7 +98,7 @@ pub(crate) fn outline(projected: &Projected, region: &Region, margin: f32) -> Si
             candidates.push((Piece { face, corners, a, b, range: [0.0, 1.0], outward }, length));
         }
     }
-    let layers = Layers::new(segments, region, margin + 1.0);
+    let layers = Layers::new(&segments, region, margin + 1.0);
     let mut silhouette = Silhouette::default();
     for (edge, length) in candidates {
         let Some([start, end]) = clip(&edge, region, margin) else { continue };
@@ -136,38 +137,56 @@ pub(super) fn clip(edge: &Piece, region: &Region, margin: f32) -> Option<[f32; 2
     (start < end).then_some([start, end])
 }
 
-/// Counts surface layers at image points, from the silhouette sorted into rows.
+/// Counts surface layers at image points, from the silhouette sorted into strips of rows.
 struct Layers {
-    segments: Vec<Segment>,
     first_row: f32,
-    rows: Vec<Vec<u32>>,
+    /// Where each strip's segments begin, and where the last one's end.
+    starts: Vec<u32>,
+    segments: Vec<Segment>,
 }
 
+/// Strips a row: fine meshes have edges much shorter than a pixel.
+const STRIPS: f32 = 4.0;
+
 impl Layers {
-    fn new(segments: Vec<Segment>, region: &Region, margin: f32) -> Self {
+    fn new(segments: &[Segment], region: &Region, margin: f32) -> Self {
         let first_row = (region.y0 as f32 - margin).floor();
-        let count = ((region.y1 as f32 + margin).ceil() - first_row) as usize + 1;
-        let mut rows = vec![Vec::new(); count];
-        for (index, s) in segments.iter().enumerate() {
-            let low = s.a[1].min(s.b[1]).floor() - first_row;
-            let high = s.a[1].max(s.b[1]).floor() - first_row;
-            if high < 0.0 || low >= count as f32 {
-                continue;
+        let rows = (region.y1 as f32 + margin).ceil() - first_row;
+        let count = (rows * STRIPS) as usize + 1;
+        let strips = |s: &Segment| {
+            let strip = |y: f32| ((y - first_row) * STRIPS).floor();
+            let (low, high) = (strip(s.a[1].min(s.b[1])), strip(s.a[1].max(s.b[1])));
+            match high < 0.0 || low >= count as f32 {
+                true => 0..0,
+                false => low.max(0.0) as usize..(high as usize).min(count - 1) + 1,
             }
-            let last = (high as usize).min(count - 1);
-            rows[low.max(0.0) as usize..=last].iter_mut().for_each(|r| r.push(index as u32));
+        };
+        let mut starts = vec![0u32; count + 1];
+        for strip in segments.iter().flat_map(strips) {
+            starts[strip + 1] += 1;
         }
-        Self { segments, first_row, rows }
+        for strip in 0..count {
+            starts[strip + 1] += starts[strip];
+        }
+        let mut next = starts.clone();
+        let mut sorted = vec![Segment::default(); starts[count] as usize];
+        for segment in segments {
+            for strip in strips(segment) {
+                sorted[next[strip] as usize] = *segment;
+                next[strip] += 1;
+            }
+        }
+        Self { first_row, starts, segments: sorted }
     }
 
     fn at(&self, x: f32, y: f32) -> f32 {
-        let row = y.floor() - self.first_row;
-        if row < 0.0 || row >= self.rows.len() as f32 {
+        let strip = ((y - self.first_row) * STRIPS).floor();
+        if strip < 0.0 || strip >= (self.starts.len() - 1) as f32 {
             return 0.0;
         }
+        let strip = strip as usize;
         let mut layers = 0.0;
-        for &index in &self.rows[row as usize] {
-            let s = &self.segments[index as usize];
+        for s in &self.segments[self.starts[strip] as usize..self.starts[strip + 1] as usize] {
             // Half-open in y, so that a shared vertex counts once.
             let up = s.a[1] <= y;
             if up == (s.b[1] <= y) {

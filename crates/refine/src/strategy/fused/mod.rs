@@ -23,6 +23,7 @@ pub use self::settings::{Evidence, FusedSettings, Nuisance, Stage};
 pub use self::solve::Ending;
 pub(crate) use self::solve::{Point, solve};
 pub use self::summary::ConfidenceSummary;
+use crate::term::Scatter;
 use crate::trace::{Iteration, Trace};
 use crate::{Block, Object, Observation, RefineError, Robot, State};
 
@@ -81,8 +82,24 @@ impl Fused {
                 solve(&terms, start, stage.iterations, stage.last_gain, |_| true)
             };
             states.truncate(stage.hypotheses.max(1));
-            found = states.par_iter().map(solve_from).collect::<Vec<(Point, Ending)>>();
+            let solve_all =
+                |states: &[State]| states.par_iter().map(solve_from).collect::<Vec<_>>();
+            found = if index == 0 {
+                let first = solve_from(&states[0]);
+                let scatter = known.scatter(&first.0.state, &self.settings);
+                let others =
+                    if settled(&first.0, scatter, object.radius) { 1 } else { states.len() };
+                let mut all = solve_all(&states[1..others]);
+                all.insert(0, first);
+                all
+            } else {
+                solve_all(&states)
+            };
             found = distinct(found, object.radius);
+            if index > 0 {
+                let hopeless = found[0].0.value + settings.hopeless;
+                found.retain(|(point, _)| point.value <= hopeless);
+            }
             states = found.iter().map(|(point, _)| point.state.clone()).collect();
             if index == 0
                 && let Some(next) = settings.stages.get(1)
@@ -156,8 +173,19 @@ impl Fused {
 const FINEST: f64 = 2e-4;
 const COARSEST: f64 = 3e-3;
 
+/// How wide the posterior may be in any direction \[m of surface motion\], and how far depth points may be from the surface \[m\],
+/// for a first solution that needs no others beside it.
+const SETTLED_WIDTH: f64 = 6e-3;
+const SETTLED_SCATTER: f64 = 1.5e-3;
+
 /// Surface motion between poses that are the same solution \[m\].
 const SAME: f64 = 2e-3;
+
+/// Whether `point` leaves no direction open and the surface lies where depth was measured.
+fn settled(point: &Point, scatter: Option<Scatter>, radius: f64) -> bool {
+    let widest = confidence::principal_directions(point, radius)[0].1;
+    widest < SETTLED_WIDTH && scatter.is_some_and(|scatter| scatter.sigma < SETTLED_SCATTER)
+}
 
 /// Solutions of which no two are the same pose, the one of the lowest value first.
 fn distinct(mut found: Vec<(Point, Ending)>, radius: f64) -> Vec<(Point, Ending)> {

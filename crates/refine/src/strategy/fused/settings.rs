@@ -132,6 +132,8 @@ pub struct FusedSettings {
     pub exactness: bool,
     /// Independent measurements that depth points amount to beside the errors that neighbours share, where both were measured.
     pub most_points: f64,
+    /// Hypotheses that are so much behind the best one after a stage, colours considered, are given up \[nat\].
+    pub hopeless: f64,
     /// What the covariance of the posterior is multiplied by, to be as large as errors are.
     pub covariance_scale: f64,
     /// How far the object's surface may be from the model's \[m\]: a model that is off so much is as good as turned.
@@ -215,6 +217,7 @@ impl Default for FusedSettings {
             spread: 10e-3,
             exactness: true,
             most_points: 50.0,
+            hopeless: 15.0,
             covariance_scale: 1.1,
             model_tolerance: 6.5e-4,
             rendering: RenderingSettings {

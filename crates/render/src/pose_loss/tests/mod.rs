@@ -228,7 +228,7 @@ fn light_is_recovered_from_its_samples() {
     let truth = pose(&mut Noise(9));
     let light = lamp();
     let target = target_of(&model, &truth, &light, None, 0.5);
-    let samples = light_samples(&model, &truth, &target, 1.0);
+    let samples = light_samples(&model, &truth, &target, 1, usize::MAX);
     assert!(samples.len() > 2000);
     let fitted = Light::fit(&samples, 0.0).unwrap();
     for k in 0..3 {
