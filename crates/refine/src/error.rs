@@ -68,7 +68,7 @@ pub enum RefineError {
     /// Kinematics failed.
     #[error(transparent)]
     Robot(#[from] RobotError),
-    /// The images of the observation do not fit each other.
-    #[error("the images of the observation do not fit: {0}")]
+    /// The images of the observation do not fit each other, or their camera is impossible.
+    #[error("the images of the observation cannot be used: {0}")]
     Images(String),
 }

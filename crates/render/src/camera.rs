@@ -68,23 +68,36 @@ impl Camera {
     /// When an entry is not finite, a focal length is not positive, the matrix has skew or the image is
     /// empty.
     pub fn from_k(k: [f64; 9], width: usize, height: usize) -> Result<Self, CameraError> {
+        for (index, expected) in [(1, 0.0), (3, 0.0), (6, 0.0), (7, 0.0), (8, 1.0)] {
+            let value = k[index];
+            if value.is_nan() || (value - expected).abs() > 1e-9 {
+                return Err(CameraError::Layout { index, value, expected });
+            }
+        }
+        let camera = Self { fx: k[0], fy: k[4], cx: k[2], cy: k[5], width, height };
+        camera.check()?;
+        Ok(camera)
+    }
+
+    /// Whether a camera can be like this, whoever made it.
+    ///
+    /// # Errors
+    /// When a number is not finite, a focal length is not positive or the image is empty.
+    pub fn check(&self) -> Result<(), CameraError> {
+        let Self { width, height, .. } = *self;
+        let k = self.k();
         if let Some((index, &value)) = k.iter().enumerate().find(|(_, v)| !v.is_finite()) {
             return Err(CameraError::NotFinite { index, value });
         }
-        for (name, value) in [("fx", k[0]), ("fy", k[4])] {
+        for (name, value) in [("fx", self.fx), ("fy", self.fy)] {
             if value <= 0.0 {
                 return Err(CameraError::FocalLength { name, value });
-            }
-        }
-        for (index, expected) in [(1, 0.0), (3, 0.0), (6, 0.0), (7, 0.0), (8, 1.0)] {
-            if (k[index] - expected).abs() > 1e-9 {
-                return Err(CameraError::Layout { index, value: k[index], expected });
             }
         }
         if width == 0 || height == 0 {
             return Err(CameraError::Empty { width, height });
         }
-        Ok(Self { fx: k[0], fy: k[4], cx: k[2], cy: k[5], width, height })
+        Ok(())
     }
 
     /// The row-major camera matrix \[px\].

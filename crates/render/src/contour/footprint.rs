@@ -2,11 +2,11 @@
 
 use super::drawing::Step;
 use super::interior::{add_level, barycentric};
-use super::near::Hit;
+use super::near::{Hit, Place};
 use super::outline::Foot;
 use super::pixel::Scene;
 use super::surface::{Shaded, shade};
-use super::{Band, ContourView, Inner};
+use super::{ContourView, Inner};
 use crate::pose_loss::{Row, scaled_sum};
 use crate::raster::{BAND, MISS};
 
@@ -16,16 +16,6 @@ pub(crate) type Around = [Option<u32>; 4];
 
 /// Where these pixels are.
 const STEPS: [[f32; 2]; 4] = [[-1.0, 0.0], [1.0, 0.0], [0.0, -1.0], [0.0, 1.0]];
-
-/// A pixel, and the outline near it and its neighbours.
-#[derive(Clone, Copy)]
-pub(super) struct Place<'a> {
-    pub(super) x: usize,
-    pub(super) y: usize,
-    pub(super) band: &'a Band,
-    /// The pixel's index in the band.
-    pub(super) at: usize,
-}
 
 impl ContourView<'_> {
     /// What is seen around a pixel that shows `face`, of depth `z` and near this inner contour, if any.

@@ -17,6 +17,7 @@ mod light_samples;
 mod near;
 mod outline;
 mod pixel;
+mod sum;
 mod surface;
 mod vec3;
 
@@ -25,21 +26,21 @@ use nalgebra::{Isometry3, Point3};
 use crate::camera::Camera;
 use crate::light::Light;
 use crate::model::RenderModel;
-use crate::pose_loss::{LaneSums, Residuals, Seen, Sums, View};
+use crate::pose_loss::{Residuals, Seen, Sums, View};
 use crate::posed::Posed;
 use crate::projected::Region;
 use crate::raster::{self, MISS, Visible};
 pub(crate) use crease::{Crease, creases};
 pub(crate) use drawing::{Drawing, Step};
-use footprint::{Beside, Place};
+use footprint::Beside;
 pub(crate) use inner::{Inner, LEAST_STEP, inner_contours};
 pub(crate) use interior::GRAZING;
-use lanes::{Blended, Waiting};
 pub use light_samples::light_samples;
 pub(crate) use near::Near;
-use near::{Bands, Found, Hit};
+use near::{Bands, Found, Hit, Place};
 pub(crate) use outline::{Band, Piece, Silhouette, outline};
 pub(crate) use pixel::{Scene, falling_step};
+use sum::BlockSum;
 pub(crate) use surface::{Lighting, Unlit, albedo, posed_normal};
 
 /// A posed model with its contours.
@@ -95,7 +96,7 @@ impl<'a> ContourView<'a> {
 }
 
 impl ContourView<'_> {
-    /// The pixel (x, y).
+    /// What the pixel at `place` shows, given what was found there.
     #[inline]
     fn seen<const DERIVATIVES: bool>(&self, place: Place, found: Found) -> Option<Seen> {
         let scene = &self.scene;
@@ -147,9 +148,8 @@ impl View for ContourView<'_> {
     ) {
         let bands = Bands::new(self, block);
         let Region { x0, y0, x1, y1 } = bands.visible.region;
-        let pixels = (y0..y1).flat_map(|y| (x0..x1).map(move |x| (x, y)));
-        for (i, (x, y)) in pixels.enumerate() {
-            let (place, found) = bands.found(i, x, y);
+        for (x, y) in (y0..y1).flat_map(|y| (x0..x1).map(move |x| (x, y))) {
+            let (place, found) = bands.found(x, y);
             each(x, y, self.seen::<DERIVATIVES>(place, found));
         }
     }
@@ -162,64 +162,7 @@ impl View for ContourView<'_> {
         }
     }
 
-    /// Pixels inside faces are treated many at a time, and the colours of the others added up likewise.
     fn sum<const DERIVATIVES: bool>(&self, block: usize, residuals: &Residuals, sums: &mut Sums) {
-        let (mut waiting, mut blended) = (Waiting::new(), Blended::new());
-        let mut lanes = LaneSums::new();
-        let bands = Bands::new(self, block);
-        let visible = bands.visible;
-        let Region { x0, y0, y1, .. } = visible.region;
-        let width = visible.region.width();
-        // Columns of a row's pixels inside faces, and of the others in whose residuals something of the pose may be.
-        let (mut inside, mut others) = (vec![0u32; width], vec![0u32; width]);
-        for y in y0..y1 {
-            let (first, start) = ((y - y0) * width, y * residuals.target.camera.width + x0);
-            let faces = &visible.face[first..first + width];
-            let wanted = residuals.wanted(start..start + width);
-            let clear = &bands.clear[first..first + width];
-            let (mut n_inside, mut n_others) = (0, 0);
-            // Without branches: what is where changes too often to be foreseen.
-            for (x, ((face, &clear), wanted)) in faces.iter().zip(clear).zip(wanted).enumerate() {
-                let hit = *face != MISS;
-                inside[n_inside] = x as u32;
-                n_inside += usize::from(hit & clear);
-                others[n_others] = x as u32;
-                n_others += usize::from(!clear | (!hit & wanted));
-            }
-            for &x in &inside[..n_inside] {
-                let x = x as usize;
-                let z = 1.0 / visible.inverse_z[first + x];
-                let at = start + x;
-                if residuals.hidden(sums, at, z) {
-                    continue;
-                }
-                sums.counts.covered += 1;
-                sums.counts.depth += usize::from(residuals.has_depth(at));
-                if waiting.push(((x0 + x) as f32, y as f32), at, faces[x], z) {
-                    waiting.flush::<DERIVATIVES>(&self.scene, residuals, &mut lanes);
-                }
-            }
-            for &x in &others[..n_others] {
-                let (i, at) = (first + x as usize, start + x as usize);
-                let (place, found) = bands.found(i, x0 + x as usize, y);
-                let Some(seen) = self.seen::<DERIVATIVES>(place, found) else {
-                    residuals.add_nothing(sums, at);
-                    continue;
-                };
-                if residuals.hidden(sums, at, seen.pixel.z) {
-                    continue;
-                }
-                residuals.add_but_color::<DERIVATIVES>(sums, at, &seen);
-                if blended.push::<DERIVATIVES>(at, &seen.pixel) {
-                    blended.flush::<DERIVATIVES>(residuals, &mut lanes);
-                }
-            }
-            if DERIVATIVES {
-                sums.end_row();
-            }
-        }
-        waiting.flush::<DERIVATIVES>(&self.scene, residuals, &mut lanes);
-        blended.flush::<DERIVATIVES>(residuals, &mut lanes);
-        sums.absorb(&lanes);
+        BlockSum::<DERIVATIVES>::new(self, block, residuals, sums).run();
     }
 }

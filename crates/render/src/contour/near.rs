@@ -1,10 +1,19 @@
 //! What is near each pixel of a block of rows: a face, and the contours and creases within whose bands the pixel lies.
 
-use super::footprint::Place;
 use super::{Band, ContourView, Crease, Inner, Piece};
 use crate::model::NONE;
 use crate::projected::Region;
 use crate::raster::{MISS, Visible};
+
+/// A pixel, and the outline near it and its neighbours.
+#[derive(Clone, Copy)]
+pub(super) struct Place<'a> {
+    pub(super) x: usize,
+    pub(super) y: usize,
+    pub(super) band: &'a Band,
+    /// The pixel's index in the band.
+    pub(super) at: usize,
+}
 
 /// What is at a pixel.
 #[derive(Clone, Copy)]
@@ -38,13 +47,11 @@ pub(super) struct Bands<'a> {
     view: &'a ContourView<'a>,
     pub(super) visible: &'a Visible,
     outline: Band,
-    /// The first pixel's index in the outline's band, which may have a row more above.
+    /// The first pixel's index in the outline's band, which has a row more above and below where slopes look at neighbours.
     start: usize,
     /// Of inner contours and creases, if there are any.
     inner: Option<Band>,
     crease: Option<Band>,
-    /// Whether a pixel is in no band.
-    pub(super) clear: Vec<bool>,
 }
 
 impl<'a> Bands<'a> {
@@ -57,28 +64,40 @@ impl<'a> Bands<'a> {
         let around = Region { y0: rows.y0.saturating_sub(beyond), y1: rows.y1 + beyond, ..rows };
         // A contour between a pixel and the next is less than a pixel away.
         let inner_width = if view.scene.drawing.footprint { width.max(1.0) } else { width };
-        let inner = view.inner.iter().map(|inner| &inner.piece);
-        let crease = view.creases.iter().map(|crease| &crease.piece);
-        let outline = Band::new(view.pieces.iter(), &around, width);
-        let inner = (!view.inner.is_empty()).then(|| Band::new(inner, &rows, inner_width));
-        let crease = (!view.creases.is_empty()).then(|| Band::new(crease, &rows, width));
-        let start = (rows.y0 - around.y0) * rows.width();
-        let own = &outline.piece[start..start + visible.face.len()];
-        let mut clear: Vec<bool> = own.iter().map(|piece| *piece == NONE).collect();
-        for band in [&inner, &crease].into_iter().flatten() {
-            clear.iter_mut().zip(&band.piece).for_each(|(clear, piece)| *clear &= *piece == NONE);
+        let inner_pieces = view.inner.iter().map(|inner| &inner.piece);
+        let crease_pieces = view.creases.iter().map(|crease| &crease.piece);
+        Self {
+            view,
+            visible,
+            outline: Band::new(view.pieces.iter(), &around, width),
+            start: (rows.y0 - around.y0) * rows.width(),
+            inner: (!view.inner.is_empty()).then(|| Band::new(inner_pieces, &rows, inner_width)),
+            crease: (!view.creases.is_empty()).then(|| Band::new(crease_pieces, &rows, width)),
         }
-        Self { view, visible, outline, start, inner, crease, clear }
     }
 
-    /// Pixel `i`, which is (x, y).
+    /// Of each pixel, whether it is in no band.
+    pub(super) fn clear(&self) -> Vec<bool> {
+        let count = self.visible.face.len();
+        let outline = &self.outline.piece[self.start..self.start + count];
+        let mut clear: Vec<bool> = outline.iter().map(|piece| *piece == NONE).collect();
+        for band in [&self.inner, &self.crease].into_iter().flatten() {
+            clear.iter_mut().zip(&band.piece).for_each(|(clear, piece)| *clear &= *piece == NONE);
+        }
+        clear
+    }
+
+    /// What is at pixel (x, y) of the block.
     #[inline]
-    pub(super) fn found(&self, i: usize, x: usize, y: usize) -> (Place<'_>, Found<'a>) {
+    pub(super) fn found(&self, x: usize, y: usize) -> (Place<'_>, Found<'a>) {
+        let Region { x0, y0, .. } = self.visible.region;
+        let i = (y - y0) * self.visible.region.width() + x - x0;
         let place = Place { x, y, band: &self.outline, at: self.start + i };
-        let near = |band: &Option<Band>| band.as_ref().map_or(NONE, |band| band.piece[i]) as usize;
+        let index_in =
+            |band: &Option<Band>| band.as_ref().map_or(NONE, |band| band.piece[i]) as usize;
         let edge = self.view.pieces.get(self.outline.piece[place.at] as usize);
-        let inner = self.view.inner.get(near(&self.inner));
-        let crease = self.view.creases.get(near(&self.crease));
+        let inner = self.view.inner.get(index_in(&self.inner));
+        let crease = self.view.creases.get(index_in(&self.crease));
         let hit = Hit { face: self.visible.face[i], inverse_z: self.visible.inverse_z[i] };
         let found = match (hit.face, edge, inner, crease) {
             (MISS, None, ..) => Found::Nothing,

@@ -98,16 +98,16 @@ impl Residuals<'_> {
         self.add_but_color::<DERIVATIVES>(sums, at, &seen);
     }
 
-    /// Whether the mask has these pixels at least in part.
+    /// Of each of these pixels, whether it costs something if nothing of the object is seen there.
     #[inline]
-    pub(crate) fn wanted(&self, at: Range<usize>) -> impl Iterator<Item = bool> {
+    pub(crate) fn missed_if_empty(&self, at: Range<usize>) -> impl Iterator<Item = bool> {
         self.target.coverage[at].iter().map(|coverage| *coverage > 0.0)
     }
 
     /// Adds the residuals of pixel `at`, where nothing of the object is seen.
     #[inline]
     pub(crate) fn add_nothing(&self, sums: &mut Sums, at: usize) {
-        if self.target.coverage[at] > 0.0 {
+        if self.missed_if_empty(at..at + 1).any(|missed| missed) {
             self.miss(sums, at);
             sums.counts.missed += 1;
         }

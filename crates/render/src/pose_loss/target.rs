@@ -67,7 +67,7 @@ impl Target {
     /// The object's colours: `image` where `mask` is set, black elsewhere.
     ///
     /// # Errors
-    /// When the camera is none, a size differs from its, no pixel of the mask is set, or a colour under it is not finite.
+    /// When the camera is impossible, a size differs from the camera's, no pixel of the mask is set, or a colour under it is not finite.
     pub fn new(camera: Camera, image: &RgbImage, mask: &Mask) -> Result<Self, TargetError> {
         check(&camera, "image", image.width(), image.height())?;
         check(&camera, "mask", mask.width(), mask.height())?;
@@ -81,7 +81,7 @@ impl Target {
     /// which unlike a binary mask places the outline within the pixel.
     ///
     /// # Errors
-    /// When the camera is none, a size differs from its, nothing is covered, or a colour where something is is not finite.
+    /// When the camera is impossible, a size differs from the camera's, nothing is covered, or a colour where something is is not finite.
     pub fn from_matte(
         camera: Camera,
         image: &RgbImage,
@@ -134,7 +134,7 @@ impl Target {
     /// # Errors
     /// When nothing of the mask is left.
     pub fn downsampled(&self, factor: usize) -> Result<Self, TargetError> {
-        let factor = factor.clamp(1, self.camera.width.min(self.camera.height).max(1));
+        let factor = factor.clamp(1, self.camera.width.min(self.camera.height));
         let camera = self.camera.scaled(1.0 / factor as f64);
         let share = 1.0 / (factor * factor) as f32;
         let (mut color, mut coverage) = (Vec::new(), Vec::new());
@@ -177,7 +177,7 @@ impl Target {
         color: Vec<[f32; 3]>,
         coverage: Vec<f32>,
     ) -> Result<Self, TargetError> {
-        Camera::from_k(camera.k(), camera.width, camera.height)?;
+        camera.check()?;
         if let Some(at) = color.iter().position(|c| c.iter().any(|v| !v.is_finite())) {
             return Err(TargetError::NotFinite { x: at % camera.width, y: at / camera.width });
         }

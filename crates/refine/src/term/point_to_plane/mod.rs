@@ -252,7 +252,6 @@ mod tests {
         for seed in 0..3 {
             let (scene, mut state, hand) = fixture(seed);
             state.camera = state.camera.changed(&[2e-3, 1e-3, 1e-3, -1e-3, 2e-3]);
-            let object = Arc::clone(&scene.object);
             let check = |state: &State, deviation: f64| {
                 let settings = PointToPlaneSettings { deviation, ..Default::default() };
                 let (observation, object) = (&scene.observation, Arc::clone(&scene.object));

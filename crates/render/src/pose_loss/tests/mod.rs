@@ -4,6 +4,7 @@ mod affine;
 mod gradient;
 mod occluder;
 mod picture;
+mod quick;
 mod rows;
 mod truth;
 

@@ -1,0 +1,116 @@
+//! Residuals of a block of rows, the quick way: pixels inside faces many at a time, and the colours of the others likewise.
+
+use super::ContourView;
+use super::lanes::{Blended, Waiting};
+use super::near::Bands;
+use crate::pose_loss::{LaneSums, Residuals, Sums};
+use crate::raster::MISS;
+
+/// Adds up the residuals of one block.
+pub(super) struct BlockSum<'a, const DERIVATIVES: bool> {
+    view: &'a ContourView<'a>,
+    bands: Bands<'a>,
+    residuals: &'a Residuals<'a>,
+    sums: &'a mut Sums,
+    lanes: LaneSums,
+    waiting: Waiting,
+    blended: Blended,
+}
+
+impl<'a, const DERIVATIVES: bool> BlockSum<'a, DERIVATIVES> {
+    pub(super) fn new(
+        view: &'a ContourView,
+        block: usize,
+        residuals: &'a Residuals,
+        sums: &'a mut Sums,
+    ) -> Self {
+        Self {
+            view,
+            bands: Bands::new(view, block),
+            residuals,
+            sums,
+            lanes: LaneSums::new(),
+            waiting: Waiting::new(),
+            blended: Blended::new(),
+        }
+    }
+
+    pub(super) fn run(mut self) {
+        let visible = self.bands.visible;
+        let (width, first_row) = (visible.region.width(), visible.region.y0);
+        let clear = self.bands.clear();
+        // Columns of a row's pixels inside faces, and of the others that may cost something.
+        let (mut inside, mut others) = (vec![0; width], vec![0; width]);
+        for y in first_row..visible.region.y1 {
+            let row = (y - first_row) * width..(y - first_row + 1) * width;
+            let start = self.in_image(visible.region.x0, y);
+            let costly = self.residuals.missed_if_empty(start..start + width);
+            let faces = visible.face[row.clone()].iter();
+            let (mut inside_count, mut other_count) = (0, 0);
+            // Without branches, which would be mispredicted: kinds alternate along a row.
+            for (column, ((face, clear), costly)) in
+                faces.zip(&clear[row.clone()]).zip(costly).enumerate()
+            {
+                let hit = *face != MISS;
+                inside[inside_count] = column;
+                inside_count += usize::from(hit & clear);
+                others[other_count] = column;
+                other_count += usize::from(!clear | (!hit & costly));
+            }
+            self.add_inside(y, row.start, &inside[..inside_count]);
+            self.add_others(y, &others[..other_count]);
+            if DERIVATIVES {
+                self.sums.end_row();
+            }
+        }
+        self.waiting.flush::<DERIVATIVES>(&self.view.scene, self.residuals, &mut self.lanes);
+        self.blended.flush::<DERIVATIVES>(self.residuals, &mut self.lanes);
+        self.sums.absorb(&self.lanes);
+    }
+
+    /// Index of pixel (x, y) in the image.
+    #[inline]
+    fn in_image(&self, x: usize, y: usize) -> usize {
+        y * self.residuals.target.camera.width + x
+    }
+
+    /// Pixels inside faces, in `columns` of row `y`, which begins at index `row` of the block.
+    #[inline]
+    fn add_inside(&mut self, y: usize, row: usize, columns: &[usize]) {
+        let visible = self.bands.visible;
+        for column in columns {
+            let (i, x) = (row + column, visible.region.x0 + column);
+            let (z, at) = (1.0 / visible.inverse_z[i], self.in_image(x, y));
+            if self.residuals.hidden(self.sums, at, z) {
+                continue;
+            }
+            self.sums.counts.covered += 1;
+            self.sums.counts.depth += usize::from(self.residuals.has_depth(at));
+            if self.waiting.push((x as f32, y as f32), at, visible.face[i], z) {
+                let scene = &self.view.scene;
+                self.waiting.flush::<DERIVATIVES>(scene, self.residuals, &mut self.lanes);
+            }
+        }
+    }
+
+    /// Pixels at contours or that show nothing, in `columns` of row `y`.
+    #[inline]
+    fn add_others(&mut self, y: usize, columns: &[usize]) {
+        for column in columns {
+            let x = self.bands.visible.region.x0 + column;
+            let at = self.in_image(x, y);
+            let (place, found) = self.bands.found(x, y);
+            let Some(seen) = self.view.seen::<DERIVATIVES>(place, found) else {
+                self.residuals.add_nothing(self.sums, at);
+                continue;
+            };
+            if self.residuals.hidden(self.sums, at, seen.pixel.z) {
+                continue;
+            }
+            self.residuals.add_but_color::<DERIVATIVES>(self.sums, at, &seen);
+            if self.blended.push::<DERIVATIVES>(at, &seen.pixel) {
+                self.blended.flush::<DERIVATIVES>(self.residuals, &mut self.lanes);
+            }
+        }
+    }
+}
