@@ -9,7 +9,7 @@ use divan::counter::ItemsCount;
 use prehend::refine::synth::{Scene, Sequence, default_scene, default_sequence};
 use prehend::refine::tracker::{Following, Spent, Tracked, Tracker, TrackerSettings};
 use prehend::refine::{
-    Block, Config, Normal, RefineError, State, StrategyKind, TermKind, refine, standard_terms,
+    Block, Config, Normal, RefineError, State, TermKind, refine, standard_terms,
 };
 
 static SCENE: LazyLock<Scene> = LazyLock::new(|| default_scene(1).expect("the built-in scene"));
@@ -79,7 +79,7 @@ fn tell_shares() {
 /// The fused estimator with all its hypotheses.
 #[divan::bench(sample_count = 10)]
 fn fused(bencher: Bencher) {
-    let config = Config { strategy: StrategyKind::Fused, checkpoint: false, ..Config::default() };
+    let config = Config::default();
     let robot = Some(&SCENE.robot);
     bencher.bench(|| {
         refine(&SCENE.observation, &SCENE.object, robot, &SCENE.initial, &config).is_ok()
@@ -89,7 +89,7 @@ fn fused(bencher: Bencher) {
 /// A whole refinement, ending when nothing improves.
 #[divan::bench(sample_count = 5)]
 fn refinement(bencher: Bencher) {
-    let config = Config::default();
+    let config = Config::combined();
     let robot = Some(&SCENE.robot);
     bencher.bench(|| {
         refine(&SCENE.observation, &SCENE.object, robot, &SCENE.initial, &config).is_ok()
@@ -99,7 +99,7 @@ fn refinement(bencher: Bencher) {
 /// Iterations that the paper's standard setting runs.
 #[divan::bench(sample_count = 3)]
 fn four_hundred_iterations(bencher: Bencher) {
-    let mut config = Config::default();
+    let mut config = Config::combined();
     config.heuristic.exhaustive = true;
     let robot = Some(&SCENE.robot);
     bencher.bench(|| {
@@ -126,7 +126,7 @@ fn linearise(bencher: Bencher, kind: TermKind) {
 
 fn prepared(kind: TermKind) -> (Box<dyn prehend::refine::Term>, State) {
     let prepare = || {
-        let config = Config { terms: vec![kind], ..Config::default() };
+        let config = Config::of(&[kind]);
         let mut state = State::new(&SCENE.observation, &SCENE.object, &SCENE.initial)?;
         let robot = Some(&SCENE.robot);
         let mut terms = standard_terms(&SCENE.observation, &SCENE.object, robot, &state, &config)?;

@@ -41,7 +41,7 @@ fn main() -> anyhow::Result<()> {
     let start = State::new(&scene.observation, &scene.object, &scene.initial)?;
     let robot = Some(&scene.robot);
     let mut terms =
-        standard_terms(&scene.observation, &scene.object, robot, &start, &Config::default())?;
+        standard_terms(&scene.observation, &scene.object, robot, &start, &Config::combined())?;
     let cap = Point3::new(0.0, 0.0, 0.09);
     terms.push(Box::new(Landmark { on_object: cap, in_camera: scene.truth * cap, sigma: 3e-3 }));
 

@@ -49,8 +49,8 @@ fn main() -> anyhow::Result<()> {
     row("refined pose", &refined.t_cam_object)?;
     row("true pose", &scene.truth)?;
     println!("\n{table}");
-    let iterations = refined.trace.iterations.len() - 1;
-    println!("{iterations} iterations in {seconds:.2} s.");
+    let probability = refined.confidence.map_or(f64::NAN, |confidence| confidence.probability());
+    println!("{seconds:.2} s. Within 5 mm and 5° with a probability of {probability:.3}.");
 
     let picture = Path::new("out/pose_refinement.png");
     std::fs::create_dir_all("out")?;

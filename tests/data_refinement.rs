@@ -12,7 +12,7 @@ fn before_and_after(dataset: &Path, poses: &str) -> (usize, [f64; 3], [f64; 3]) 
     let rows = read_results(&dataset.join(poses)).expect("the poses read").rows;
     let mut assets = Assets::new(&data, 0);
     let mut scorer = Scorer::new(&data);
-    let config = Config::default();
+    let config = Config::combined();
     let (mut before, mut after) = ([0.0; 3], [0.0; 3]);
     for row in &rows {
         let object = assets.object(row.obj_id).expect("the model loads");

@@ -81,7 +81,7 @@ impl fmt::Display for StrategyKind {
     }
 }
 
-/// Settings of a refinement. The default is the paper's method with all four terms.
+/// Settings of a refinement. The default is the fused estimator; [`Config::combined`] is the paper's method.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Config {
     /// How evidence moves the pose.
@@ -111,9 +111,9 @@ pub struct Config {
 impl Default for Config {
     fn default() -> Self {
         Self {
-            strategy: StrategyKind::Heuristic,
-            terms: TermKind::ALL.to_vec(),
-            checkpoint: true,
+            strategy: StrategyKind::Fused,
+            terms: Vec::new(),
+            checkpoint: false,
             heuristic: HeuristicSettings::default(),
             icp: IcpSettings::default(),
             robust_icp: RobustIcpSettings::default(),
@@ -127,6 +127,16 @@ impl Default for Config {
 }
 
 impl Config {
+    /// The paper's method with all four terms, which returns the pose whose rendering fits best.
+    pub fn combined() -> Self {
+        Self { checkpoint: true, ..Self::of(&TermKind::ALL) }
+    }
+
+    /// The paper's heuristic over some terms, which returns the last pose.
+    pub fn of(terms: &[TermKind]) -> Self {
+        Self { strategy: StrategyKind::Heuristic, terms: terms.to_vec(), ..Self::default() }
+    }
+
     /// Iterations at most of the strategy.
     pub fn iterations(&self) -> usize {
         match self.strategy {

@@ -8,8 +8,7 @@
 //! use prehend_refine::{Config, refine};
 //!
 //! let scene = default_scene(1)?;
-//! let mut config = Config::default();
-//! config.heuristic.iterations = 20;
+//! let config = Config::default();
 //! let robot = Some(&scene.robot);
 //! let refined = refine(&scene.observation, &scene.object, robot, &scene.initial, &config)?;
 //! println!("{}", refined.t_cam_object);

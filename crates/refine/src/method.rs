@@ -14,6 +14,20 @@ pub struct Method {
 }
 
 impl Method {
+    /// The fused estimator, the default.
+    pub const FUSED: Self = Self {
+        name: "fused",
+        summary: "all evidence in one least-squares problem, with calibrations estimated",
+        config: Config::default,
+    };
+
+    /// The paper's method.
+    pub const COMBINED: Self = Self {
+        name: "combined",
+        summary: "all four gradients, checkpointing",
+        config: Config::combined,
+    };
+
     /// All methods, in the order of the paper's tables.
     pub fn all() -> &'static [Self] {
         &METHODS
@@ -46,7 +60,7 @@ macro_rules! alone {
             } else {
                 "this gradient alone, the last pose"
             },
-            config: || Config { terms: vec![$term], checkpoint: $checkpoint, ..Config::default() },
+            config: || Config { checkpoint: $checkpoint, ..Config::of(&[$term]) },
         }
     };
 }
@@ -59,7 +73,7 @@ fn free(mut config: Config) -> Config {
 
 /// A strategy that does not combine gradients.
 fn baseline(strategy: StrategyKind, checkpoint: bool) -> Config {
-    Config { strategy, terms: Vec::new(), checkpoint, ..Config::default() }
+    Config { strategy, checkpoint, ..Config::default() }
 }
 
 /// The fused estimator with other settings.
@@ -130,30 +144,22 @@ static ABLATIONS: [Method; 20] = [
 ];
 
 static METHODS: [Method; 17] = [
-    Method {
-        name: "fused",
-        summary: "all evidence in one least-squares problem, with calibrations estimated",
-        config: || fused(|_| ()),
-    },
-    Method {
-        name: "combined",
-        summary: "all four gradients, checkpointing",
-        config: Config::default,
-    },
+    Method::FUSED,
+    Method::COMBINED,
     Method {
         name: "combined-last",
         summary: "all four gradients, the last pose",
-        config: || Config { checkpoint: false, ..Config::default() },
+        config: || Config::of(&TermKind::ALL),
     },
     Method {
         name: "combined-free",
         summary: "all four gradients, no regularisation, the last pose",
-        config: || free(Config { checkpoint: false, ..Config::default() }),
+        config: || free(Config::of(&TermKind::ALL)),
     },
     Method {
         name: "combined-free-best",
         summary: "all four gradients, no regularisation, checkpointing",
-        config: || free(Config::default()),
+        config: || free(Config::combined()),
     },
     alone!("depth", TermKind::Depth, false),
     alone!("depth-best", TermKind::Depth, true),
@@ -166,9 +172,7 @@ static METHODS: [Method; 17] = [
     Method {
         name: "physics-free",
         summary: "this gradient alone, no regularisation, the last pose",
-        config: || {
-            free(Config { terms: vec![TermKind::Physics], checkpoint: false, ..Config::default() })
-        },
+        config: || free(Config::of(&[TermKind::Physics])),
     },
     Method {
         name: "icp",

@@ -110,7 +110,7 @@ mod tests {
         let mut observation = scene.observation.clone();
         observation.hand.as_mut().unwrap().joints.pop();
         for kind in [TermKind::Rendering, TermKind::Depth, TermKind::Physics, TermKind::Tactile] {
-            let config = Config { terms: vec![kind], ..Config::default() };
+            let config = Config::of(&[kind]);
             let robot = Some(&scene.robot);
             let error = refine(&observation, &scene.object, robot, &scene.initial, &config);
             let error = error.unwrap_err();

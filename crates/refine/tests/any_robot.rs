@@ -97,7 +97,7 @@ impl Setting {
         let truth = self.truth();
         let initial = perturb_about(&truth, &(truth * self.object.centre).coords, error);
         let terms = vec![TermKind::Physics, TermKind::Rendering, TermKind::Depth];
-        let config = Config { terms, ..Config::default() };
+        let config = Config { checkpoint: true, ..Config::of(&terms) };
         let found = refine(&self.observation(), &self.object, Some(&self.robot), &initial, &config)
             .unwrap();
         let pose = found.t_cam_object;

@@ -7,7 +7,8 @@ use serde_json::{Value, json};
 
 use crate::fixture::Workplace;
 
-const REFINE: &str = "refine --dataset ds --poses init.csv --iterations 2 --out refined.csv";
+const REFINE: &str =
+    "refine --dataset ds --poses init.csv --method combined --iterations 2 --out refined.csv";
 const SCENE: &str = "ds/test/000001";
 const RGB: &str = "ds/test/000001/rgb/000000.png";
 const DEPTH: &str = "ds/test/000001/depth/000000.png";

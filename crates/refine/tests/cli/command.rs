@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use crate::fixture::Workplace;
 
-const REFINE: &str = "refine --dataset ds --poses ds/init.csv --iterations 10";
+const REFINE: &str = "refine --dataset ds --poses ds/init.csv --method combined --iterations 10";
 
 #[test]
 fn refined_poses_are_nearer_the_truth() {
@@ -148,15 +148,15 @@ fn a_plain_bop_dataset_can_be_checked_and_refined() {
     place.remove("ds/test/000001/scene_tactile.json");
     let check = || place.prehend("check --dataset ds --poses ds/init.csv --image 0 --report look");
     let said = check();
-    let expected =
-        "no ds/test/000001/scene_tactile.json: refine with --terms physics,rendering,depth";
+    let expected = "no ds/test/000001/scene_tactile.json: --method combined needs --terms physics,rendering,depth";
     assert!(said.code == 0 && said.err.contains(expected), "{}", said.err);
     place.succeed(&format!("{REFINE} --terms physics,rendering,depth --out r.csv"));
     place.remove("ds/test/000001/scene_bodies.json");
     place.remove("ds/hand");
     place.remove("ds/models/models_info.json");
     let said = check();
-    let expected = "no ds/test/000001/scene_bodies.json: refine with --terms rendering,depth";
+    let expected =
+        "no ds/test/000001/scene_bodies.json: --method combined needs --terms rendering,depth";
     assert!(said.code == 0 && said.err.contains(expected), "{}", said.err);
     let said = place.prehend(&format!("{REFINE} --terms rendering,depth --out r.csv"));
     assert_eq!((said.code, place.poses("r.csv").len()), (0, 2), "{}", said.err);
@@ -224,7 +224,7 @@ fn a_frame_file_is_as_good_as_a_dataset() {
         },
     });
     place.write("ds/frame.json", &frame.to_string());
-    let printed = place.succeed("refine --frame ds/frame.json --iterations 10");
+    let printed = place.succeed("refine --frame ds/frame.json --method combined --iterations 10");
     let told: Value = serde_json::from_str(&printed).unwrap();
     assert_eq!(told["terms"], json!(["physics", "rendering", "depth", "tactile"]));
     place.succeed(&format!("{REFINE} --image 0 --out r.csv"));
@@ -234,15 +234,22 @@ fn a_frame_file_is_as_good_as_a_dataset() {
         assert!((found - expected.translation.vector[k]).abs() < 1e-6);
         assert_eq!(told["t_cam_object"][k][3].as_f64(), Some(found));
     }
-    assert_eq!(place.succeed("refine --frame ds/frame.json --iterations 10 --out pose.json"), "");
+    assert_eq!(
+        place.succeed(
+            "refine --frame ds/frame.json --method combined --iterations 10 --out pose.json"
+        ),
+        ""
+    );
     assert_eq!(place.json("pose.json"), told);
 
     // Without the hand there is no physics and no touch.
     let mut bare = frame;
     bare.as_object_mut().unwrap().remove("robot");
     place.write("ds/bare.json", &bare.to_string());
-    let told: Value =
-        serde_json::from_str(&place.succeed("refine --frame ds/bare.json --iterations 2")).unwrap();
+    let told: Value = serde_json::from_str(
+        &place.succeed("refine --frame ds/bare.json --method combined --iterations 2"),
+    )
+    .unwrap();
     assert_eq!(told["terms"], json!(["rendering", "depth"]));
 }
 

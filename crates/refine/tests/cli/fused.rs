@@ -1,4 +1,4 @@
-//! `prehend refine --method fused`.
+//! `prehend refine` with its default method, the fused estimator.
 
 use prehend_refine::metrics::{oe_deg, pe_cm};
 use prehend_refine::synth::default_scene;
@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use crate::fixture::Workplace;
 
-const REFINE: &str = "refine --dataset ds --poses ds/init.csv --method fused --out f.csv";
+const REFINE: &str = "refine --dataset ds --poses ds/init.csv --out f.csv";
 
 fn assert_right(place: &Workplace, most_cm: f64, most_deg: f64) {
     let truth = default_scene(1).unwrap().truth;

@@ -5,7 +5,8 @@ use std::time::{Duration, Instant};
 
 use crate::fixture::Workplace;
 
-const REFINE: &str = "refine --dataset ds --poses init.csv --iterations 3 --out r.csv";
+const REFINE: &str =
+    "refine --dataset ds --poses init.csv --method combined --iterations 3 --out r.csv";
 const JOURNAL: &str = "r.csv.journal";
 
 /// Six initial poses of two images.

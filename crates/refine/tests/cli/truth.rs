@@ -38,19 +38,21 @@ fn strip(place: &Workplace, dataset: &str) -> BTreeSet<String> {
 fn compare(place: &Workplace, frames: usize) -> BTreeSet<String> {
     place.copy("ds", "bare");
     let removed = strip(place, "bare");
-    let poses = |dataset: &str| {
+    let poses = |dataset: &str, method: &str| {
         let out = format!("{dataset}.csv");
         place.succeed(&format!(
-            "refine --dataset {dataset} --poses {dataset}/init.csv --iterations 10 --out {out}"
+            "refine --dataset {dataset} --poses {dataset}/init.csv --method {method} --out {out}"
         ));
         let rows = place.poses(&out);
         rows.iter().map(|r| (r.scene_id, r.im_id, r.t_cam_model)).collect::<Vec<_>>()
     };
-    let full = poses("ds");
-    assert_eq!(full.len(), frames);
     let initial = place.poses("ds/init.csv");
-    assert!(full.iter().zip(&initial).all(|(pose, row)| pose.2 != row.t_cam_model));
-    assert_eq!(full, poses("bare"));
+    for method in ["fused", "combined --iterations 10"] {
+        let full = poses("ds", method);
+        assert_eq!(full.len(), frames);
+        assert!(full.iter().zip(&initial).all(|(pose, row)| pose.2 != row.t_cam_model));
+        assert_eq!(full, poses("bare", method));
+    }
     removed
 }
 

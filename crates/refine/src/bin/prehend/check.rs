@@ -84,7 +84,7 @@ fn sensed(
         Some(_) => (assets.observation(frame, instance, &[Rendering, Depth]), "rendering,depth"),
     };
     let (observation, robot) = rest?;
-    let warning = format!("there is no {absent}: refine with --terms {terms}");
+    let warning = format!("there is no {absent}: --method combined needs --terms {terms}");
     Ok((observation, robot, vec![warning]))
 }
 

@@ -57,18 +57,17 @@ pub(crate) struct Arguments {
 /// How to refine.
 #[derive(Args)]
 pub(crate) struct Method {
-    /// How to refine, with settings that the options below change
+    /// How to refine, with settings that the options below change [default: fused; with --terms, combined]
     #[arg(
         long,
         value_name = "NAME",
-        default_value = "combined",
         value_parser = named,
         long_help = method_help(),
         help_heading = "Method"
     )]
-    method: &'static refine::Method,
+    method: Option<&'static refine::Method>,
     /// Iterations at most; the search ends earlier when the steps become negligible
-    /// [default: 400; robust-icp: 60; fused: up to 10 a stage]
+    /// [default: up to 10 a stage; robust-icp: 60; others: 400]
     #[arg(long, value_name = "N", help_heading = "Method")]
     iterations: Option<usize>,
     /// Run all the iterations, however small the steps become
@@ -100,16 +99,18 @@ fn method_help() -> String {
     for method in refine::Method::all() {
         text += &format!("\n  {:<19} {}", method.name, method.summary);
     }
-    text + "\n  and fused-without-E, fused-only-E and fused-fixed-N, which `prehend study evidence` compares"
+    text + "\n\n[default: fused; with --terms, combined]"
+        + "\n\nAlso fused-without-E, fused-only-E and fused-fixed-N, which `prehend study evidence` compares"
 }
 
 impl Method {
     /// The settings of the method, changed by the other options.
     pub(crate) fn config(&self) -> anyhow::Result<Config> {
-        let mut config = self.method.config();
+        let method = self.chosen();
+        let mut config = method.config();
         if let Some(terms) = &self.terms {
             if config.strategy != StrategyKind::Heuristic {
-                bail!("--terms: the method {} does not combine gradients", self.method.name);
+                bail!("--terms: the method {} does not combine gradients", method.name);
             }
             config.terms.clone_from(terms);
         }
@@ -123,6 +124,14 @@ impl Method {
             config.set_exhaustive();
         }
         Ok(config)
+    }
+
+    /// The method asked for, or the best.
+    fn chosen(&self) -> &'static refine::Method {
+        // Only the heuristic takes its evidence apart by terms.
+        let default =
+            if self.terms.is_some() { &refine::Method::COMBINED } else { &refine::Method::FUSED };
+        self.method.unwrap_or(default)
     }
 
     pub(crate) fn seed(&self) -> u64 {
@@ -148,7 +157,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         (None, Some(selection), Some(poses), Some(out)) => dataset::Run {
             selection,
             poses,
-            method: arguments.method.method.name,
+            method: arguments.method.chosen().name,
             config: &arguments.method.config()?,
             seed: arguments.method.seed,
             threads: arguments.threads,
