@@ -76,7 +76,7 @@ fn tell_shares() {
     }
 }
 
-/// The fused estimator with all its hypotheses.
+/// The fused estimator.
 #[divan::bench(sample_count = 10)]
 fn fused(bencher: Bencher) {
     let config = Config::default();

@@ -67,6 +67,10 @@ pub fn refine_with(
     let kinds = match config.strategy {
         StrategyKind::Heuristic if config.terms.is_empty() => return Err(RefineError::NoTerms),
         StrategyKind::Heuristic => config.terms.as_slice(),
+        _ if !config.terms.is_empty() => {
+            let problem = format!("are given, which {} does not take", config.strategy);
+            return Err(RefineError::Setting { name: "terms", problem });
+        }
         StrategyKind::Icp | StrategyKind::RobustIcp | StrategyKind::Fused => &[],
     };
     if let (Some(robot), Some(hand)) = (robot, &observation.hand) {

@@ -11,7 +11,7 @@ use crate::posed::Posed;
 use crate::raster::{BAND, MISS, Visible, rasterise};
 
 /// What [`Light::fit`](crate::Light::fit) needs: unlit colour, normal and observed colour where the object is seen inside the
-/// mask, and `margin` pixels to the left, to the right, above and below too; of `most` of these pixels, spread evenly over them.
+/// mask, and `margin` pixels to the left, to the right, above and below too; of `most` of these pixels at most, spread evenly over them.
 pub fn light_samples(
     model: &RenderModel,
     t_cam_object: &Isometry3<f64>,

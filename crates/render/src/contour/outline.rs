@@ -156,10 +156,10 @@ impl Layers {
         let strips = |s: &Segment| {
             let strip = |y: f32| ((y - first_row) * STRIPS).floor();
             let (low, high) = (strip(s.a[1].min(s.b[1])), strip(s.a[1].max(s.b[1])));
-            match high < 0.0 || low >= count as f32 {
-                true => 0..0,
-                false => low.max(0.0) as usize..(high as usize).min(count - 1) + 1,
+            if high < 0.0 || low >= count as f32 {
+                return 0..0;
             }
+            low.max(0.0) as usize..(high as usize).min(count - 1) + 1
         };
         let mut starts = vec![0u32; count + 1];
         for strip in segments.iter().flat_map(strips) {

@@ -66,7 +66,7 @@ pub(crate) struct Method {
         help_heading = "Method"
     )]
     method: Option<&'static refine::Method>,
-    /// Iterations at most; the search ends earlier when the steps become negligible
+    /// Iterations at most, fused: in each of its stages; the search ends earlier when the steps become negligible
     /// [default: up to 10 a stage; robust-icp: 60; others: 400]
     #[arg(long, value_name = "N", help_heading = "Method")]
     iterations: Option<usize>,
@@ -115,6 +115,9 @@ impl Method {
             config.terms.clone_from(terms);
         }
         if self.no_checkpoint {
+            if config.strategy == StrategyKind::Fused {
+                bail!("--no-checkpoint: the method {} returns its last pose anyway", method.name);
+            }
             config.checkpoint = false;
         }
         if let Some(iterations) = self.iterations {

@@ -71,8 +71,7 @@ impl Fused {
             if stage.measured_scatter
                 && let Some(scatter) = known.scatter(&states[0], &self.settings)
             {
-                let alone = (scatter.sigma.powi(2) - scatter.shared.powi(2)).max(0.0).sqrt();
-                settings.depth.sigma = alone.clamp(FINEST, COARSEST);
+                settings.depth.sigma = scatter.own.clamp(FINEST, COARSEST);
                 settings.depth.deviation = scatter.shared.min(COARSEST);
                 settings.depth.effective_points = settings.most_points;
             }
@@ -96,9 +95,16 @@ impl Fused {
                 solve_all(&states)
             };
             found = distinct(found, object.radius);
+            // Not by the first stage, which sees no colours.
             if index > 0 {
-                let hopeless = found[0].0.value + settings.hopeless;
-                found.retain(|(point, _)| point.value <= hopeless);
+                let limit = found[0].0.value + settings.hopeless;
+                // One that is still on its way down is not judged yet, and the best stays whatever its value.
+                let mut best = true;
+                found.retain(|(point, ending)| {
+                    let kept = best || *ending == Ending::Iterations || point.value <= limit;
+                    best = false;
+                    kept
+                });
             }
             states = found.iter().map(|(point, _)| point.state.clone()).collect();
             if index == 0

@@ -123,8 +123,8 @@ pub struct FusedSettings {
     pub accuracy: PriorSettings,
     /// From coarse to fine.
     pub stages: Vec<Stage>,
-    /// Angle of the turns about three axes, both ways, that hypotheses start with beside the initial pose \[rad\]; zero for
-    /// none.
+    /// Angle of the turns about three axes, both ways, that hypotheses start with beside the initial pose where that alone leaves
+    /// something open \[rad\]; zero for none.
     pub turns: f64,
     /// Where the first stage leaves the pose open, further hypotheses are tried at this distance \[m of surface motion\].
     pub spread: f64,
@@ -140,7 +140,8 @@ pub struct FusedSettings {
     pub model_tolerance: f64,
     /// Colour and silhouette.
     pub rendering: RenderingSettings,
-    /// Depth on the object.
+    /// Depth on the object. Its deviations and number of effective points are overwritten by what is measured, in stages with
+    /// [`Stage::measured_scatter`] and where calibrations are exact.
     pub depth: PointToPlaneSettings,
     /// Depth on the hand.
     pub hand_depth: HandDepthSettings,

@@ -32,7 +32,8 @@ pub struct PointToPlaneSettings {
     pub deviation: f64,
     /// Distance over which that field changes \[m\].
     pub smoothness: f64,
-    /// Points so near to the mask's border are left out \[px\]: there depth is of what is in front or behind, or of both.
+    /// Points so near to the mask's border are left out \[px\], if at least a quarter of all is left then: there depth is of what
+    /// is in front or behind, or of both.
     pub margin: usize,
 }
 
@@ -54,7 +55,7 @@ impl Default for PointToPlaneSettings {
 /// Medioni, 1992), where the points are as the state corrects the camera ([`CameraCorrection`](crate::CameraCorrection)).
 ///
 /// A depth point is not of a face that looks away from the camera: such a match counts as it is far, and pulls nothing. What
-/// the points' errors have in common, a smooth field, is integrated out.
+/// the points' errors have in common, a smooth field, is eliminated.
 pub struct PointToPlaneTerm {
     object: Arc<Object>,
     points: Vec<Point>,
@@ -156,19 +157,21 @@ impl PointToPlaneTerm {
         self.points.par_iter().with_min_len(TASK).map(residual).collect()
     }
 
-    /// What is left of the distances, which is squared, and what the field that takes away the rest costs \[nat\].
-    fn fit(&self, residuals: &[Option<Residual>]) -> (Vec<f64>, Option<Fit>) {
+    /// The field that the distances are best seen with, and what it leaves of them.
+    fn fit(&self, residuals: &[Option<Residual>]) -> Fit {
         let distance = |r: &Option<Residual>| r.as_ref().map_or(0.0, |r| r.distance);
         let distances: Vec<f64> = residuals.iter().map(distance).collect();
         let (cauchy, share) = (self.cauchy(), self.share());
-        let fit = self.field.as_ref().and_then(|field| {
-            field.fit(&distances, |i, left| match residuals[i] {
-                Some(_) => share * cauchy.weight(left * left),
-                None => 0.0,
-            })
-        });
-        let left = fit.as_ref().map_or(distances, |fit| fit.left.clone());
-        (left, fit)
+        let usable = |i: usize| residuals[i].as_ref().is_some_and(|r| r.faces_camera);
+        let weight =
+            |i: usize, left: f64| if usable(i) { share * cauchy.weight(left * left) } else { 0.0 };
+        let fitted = self.field.as_ref().and_then(|field| field.fit(&distances, weight));
+        let mut fit = fitted.unwrap_or_else(|| Fit::without_field(&distances, weight));
+        // What is not of the surface says nothing of the field either.
+        for i in (0..distances.len()).filter(|i| !usable(*i)) {
+            fit.left[i] = distances[i];
+        }
+        fit
     }
 
     fn cauchy(&self) -> Cauchy {
@@ -176,10 +179,9 @@ impl PointToPlaneTerm {
     }
 
     /// Nats at the fitted field.
-    fn cost(&self, left: &[f64], fit: Option<&Fit>) -> f64 {
+    fn cost(&self, fit: &Fit) -> f64 {
         let cauchy = self.cauchy();
-        let squares: f64 = left.iter().map(|left| cauchy.loss(left * left)).sum();
-        self.share() * squares + fit.map_or(0.0, |fit| fit.cost)
+        self.share() * fit.left.iter().map(|left| cauchy.loss(left * left)).sum::<f64>() + fit.cost
     }
 
     /// Nats of one square metre.
@@ -204,41 +206,37 @@ impl Term for PointToPlaneTerm {
     }
 
     fn value(&self, state: &State) -> f64 {
-        let (left, fit) = self.fit(&self.residuals(state));
-        self.cost(&left, fit.as_ref())
+        self.cost(&self.fit(&self.residuals(state)))
     }
 
     fn linearise(&self, state: &State, normal: &mut Normal) -> f64 {
         let residuals = self.residuals(state);
-        let (left, fit) = self.fit(&residuals);
-        let (centre, cauchy, share) = (state.centre(), self.cauchy(), self.share());
-        let row = |(point, (residual, left)): (&Point, (&Option<Residual>, &f64))| {
-            let Some(Residual { faces_camera: true, surface, away, .. }) = residual else {
-                return (0.0, [0.0; N]);
-            };
+        let fit = self.fit(&residuals);
+        let centre = state.centre();
+        let row = |(point, residual): (&Point, &Option<Residual>)| {
+            let mut row = [0.0; N];
+            let Some(Residual { surface, away, .. }) = residual else { return row };
             let turn = (surface - centre).cross(away);
             let camera = state.camera.point_jacobian(&point.ray, point.depth).tr_mul(away);
-            let mut row = [0.0; N];
             for k in 0..3 {
                 (row[k], row[3 + k]) = (-away[k], -turn[k]);
             }
             row[6..].copy_from_slice(camera.as_slice());
-            (share * cauchy.weight(left * left), row)
+            row
         };
-        let rows: Vec<(f64, [f64; N])> =
-            self.points.iter().zip(residuals.iter().zip(&left)).map(row).collect();
+        let rows: Vec<[f64; N]> = self.points.iter().zip(&residuals).map(row).collect();
         let mut gradient = SVector::<f64, N>::zeros();
         let mut hessian = SMatrix::<f64, N, N>::zeros();
-        for ((weight, row), left) in rows.iter().zip(&left) {
+        for ((row, weight), left) in rows.iter().zip(&fit.weights).zip(&fit.left) {
             let row = SVector::from(*row);
             gradient.axpy(weight * left, &row, 1.0);
             hessian.ger(*weight, &row, &row, 1.0);
         }
-        if let (Some(field), Some(fit)) = (&self.field, &fit) {
-            hessian -= field.lost(fit, rows.iter().map(|(weight, row)| (*weight, row)));
+        if let Some(field) = &self.field {
+            hessian -= field.lost(&fit, &rows);
         }
         normal.add(&[Block::ObjectPose, Block::Camera], &gradient, &hessian);
-        self.cost(&left, fit.as_ref())
+        self.cost(&fit)
     }
 }
 

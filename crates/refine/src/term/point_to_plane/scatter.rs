@@ -9,8 +9,10 @@ use super::{PointToPlaneTerm, Residual};
 pub struct Scatter {
     /// Standard deviation of a point \[m\].
     pub sigma: f64,
-    /// Standard deviation of what the points of a patch have in common \[m\], part of the former.
+    /// The part of it that the points of a patch have in common \[m\].
     pub shared: f64,
+    /// The part that is each point's own \[m\].
+    pub own: f64,
     /// How many independent measurements the points amount to.
     pub effective_points: f64,
 }
@@ -62,10 +64,13 @@ impl PointToPlaneTerm {
             return None;
         }
         let (number, count) = (patches.len() as f64, self.points.len() as f64);
+        let own = ((of_points - of_means) * total / (total - number)).max(0.0);
         Some(Scatter {
             sigma: of_points.sqrt(),
-            shared: of_means.sqrt(),
-            effective_points: (number * of_points / of_means).clamp(number.min(count), count),
+            // Means of a few points scatter even if these have nothing in common.
+            shared: (of_means - own * number / total).max(0.0).sqrt(),
+            own: own.sqrt(),
+            effective_points: (number * of_points / of_means).min(count),
         })
     }
 }

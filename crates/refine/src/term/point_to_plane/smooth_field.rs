@@ -2,7 +2,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, SMatrix, Vector3};
 
-/// Numbers that the field is described by, at most.
+/// Coefficients that the field is described by, at most.
 const MOST_NUMBERS: usize = 24;
 
 /// Distance between the places that describe the field, as a share of its smoothness.
@@ -16,18 +16,28 @@ const ROUNDS: usize = 3;
 ///
 /// It is what the errors of a depth camera and of an object's model have in common: neighbours are off alike.
 pub(super) struct SmoothField {
-    /// A column for each place: the field there is its product with independent standard normal numbers.
+    /// A column for each place \[m\]: the field there is its product with coefficients, which are independent and of unit variance.
     features: DMatrix<f64>,
 }
 
-/// The field that fits residuals best.
+/// The field that fits residuals best, or none.
 pub(super) struct Fit {
-    /// Residuals without it.
+    /// Residuals without it \[m\].
     pub(super) left: Vec<f64>,
-    /// What it costs \[nat\].
+    /// Their weights, with which it was found \[1/m²\].
+    pub(super) weights: Vec<f64>,
+    /// What it costs: half the squares of its coefficients \[nat\].
     pub(super) cost: f64,
-    /// Of the information on its numbers.
-    information: Cholesky<f64, Dyn>,
+    /// Factor of the coefficients' information matrix.
+    information: Option<Cholesky<f64, Dyn>>,
+}
+
+impl Fit {
+    /// Without a field; `weight` is that of [`SmoothField::fit`].
+    pub(super) fn without_field(residuals: &[f64], weight: impl Fn(usize, f64) -> f64) -> Self {
+        let weights = residuals.iter().enumerate().map(|(i, r)| weight(i, *r)).collect();
+        Self { left: residuals.to_vec(), weights, cost: 0.0, information: None }
+    }
 }
 
 impl SmoothField {
@@ -57,49 +67,46 @@ impl SmoothField {
     /// With it at its best, derivatives by anything else are those at a fixed field (Golub and Pereyra, 1973).
     pub(super) fn fit(&self, residuals: &[f64], weight: impl Fn(usize, f64) -> f64) -> Option<Fit> {
         let count = self.features.nrows();
-        let mut left = residuals.to_vec();
-        let mut round = || {
+        let round = |left: &[f64]| {
+            let weights: Vec<f64> = left.iter().enumerate().map(|(i, r)| weight(i, *r)).collect();
             let mut information = DMatrix::identity(count, count);
             let mut right = DVector::zeros(count);
             for (i, feature) in self.features.column_iter().enumerate() {
-                let weight = weight(i, left[i]);
-                right.axpy(weight * residuals[i], &feature, 1.0);
-                information.syger(weight, &feature, &feature, 1.0);
+                right.axpy(weights[i] * residuals[i], &feature, 1.0);
+                information.syger(weights[i], &feature, &feature, 1.0);
             }
             let information = Cholesky::new(information)?;
-            let numbers = information.solve(&right);
-            for (i, feature) in self.features.column_iter().enumerate() {
-                left[i] = residuals[i] - feature.dot(&numbers);
-            }
-            Some((information, 0.5 * numbers.norm_squared()))
+            let coefficients = information.solve(&right);
+            let field = self.features.tr_mul(&coefficients);
+            let left = residuals.iter().zip(field.iter()).map(|(r, field)| r - field).collect();
+            let (cost, information) = (0.5 * coefficients.norm_squared(), Some(information));
+            Some(Fit { left, weights, cost, information })
         };
-        let mut last = round()?;
+        let mut fit = round(residuals)?;
         for _ in 1..ROUNDS {
-            last = round()?;
+            fit = round(&fit.left)?;
         }
-        let (information, cost) = last;
-        Some(Fit { left, cost, information })
+        Some(fit)
     }
 
-    /// The information that residuals with derivatives `rows` and weights, one of each a place, lose because they are also what the
-    /// field may be.
-    pub(super) fn lost<'a, const N: usize>(
-        &self,
-        fit: &Fit,
-        rows: impl Iterator<Item = (f64, &'a [f64; N])>,
-    ) -> SMatrix<f64, N, N> {
+    /// The information that residuals with derivatives `rows`, one a place, lose because they may also be the field. With the
+    /// weights of the fit it is never more than there is.
+    pub(super) fn lost<const N: usize>(&self, fit: &Fit, rows: &[[f64; N]]) -> SMatrix<f64, N, N> {
+        let Some(information) = &fit.information else { return SMatrix::zeros() };
         let mut shared = DMatrix::zeros(self.features.nrows(), N);
-        for (feature, (weight, row)) in self.features.column_iter().zip(rows) {
+        for (feature, (weight, row)) in
+            self.features.column_iter().zip(fit.weights.iter().zip(rows))
+        {
             for (mut column, value) in shared.column_iter_mut().zip(row) {
                 column.axpy(weight * value, &feature, 1.0);
             }
         }
-        let lost = shared.tr_mul(&fit.information.solve(&shared));
+        let lost = shared.tr_mul(&information.solve(&shared));
         SMatrix::from_fn(|r, c| lost[(r, c)])
     }
 }
 
-/// Some of `places`, each farther than `distance` from all before it, the farthest first.
+/// The first of `places`, and others, each farther than `distance` from all before it and the farthest of those left.
 fn far_apart(places: &[Vector3<f64>], distance: f64) -> Vec<Vector3<f64>> {
     let mut chosen: Vec<Vector3<f64>> = places.first().copied().into_iter().collect();
     let mut nearest = vec![f64::INFINITY; places.len()];
@@ -122,7 +129,7 @@ mod tests {
     use prehend_geometry::SplitMix64;
 
     #[test]
-    fn fitting_is_integrating_out() {
+    fn eliminating_is_integrating_out_if_weights_are_fixed() {
         let mut random = SplitMix64::new(3);
         let place = |i: usize| Vector3::new(0.003 * i as f64, 0.01 * (i as f64).sin(), 0.5);
         let places: Vec<_> = (0..40).map(place).collect();
@@ -131,7 +138,7 @@ mod tests {
         let rows: Vec<[f64; 2]> = (0..40).map(|_| [random.normal(), random.normal()]).collect();
         let weight = 1.0 / 0.5e-3f64.powi(2);
         let fit = field.fit(&residuals, |_, _| weight).unwrap();
-        let lost = field.lost(&fit, rows.iter().map(|row| (weight, row)));
+        let lost = field.lost(&fit, &rows);
         // The same with the covariance of all residuals.
         let covariance =
             field.features.tr_mul(&field.features) + DMatrix::identity(40, 40) / weight;
