@@ -1,7 +1,7 @@
 //! Times the loss of a pose, alone and with gradient and Gauss–Newton matrix, in both modes:
 //! `cargo bench -p prehend-render`.
 //!
-//! The bottle of 5k and 16k faces covers some 12 000 pixels of 256 x 256 and of 640 x 480. A word times only the losses
+//! The bottle of 5k and 16k faces covers some 11 000 pixels of 256 x 256 and of 640 x 480. A word times only the losses
 //! whose name starts with it, and one thread is asked for by
 //! `RAYON_NUM_THREADS=1 cargo bench -p prehend-render --bench render -- contour`. A graphics device is timed too, if there is
 //! one; software devices such as Mesa's lavapipe only with `PREHEND_SOFTWARE_GPU=1`.
