@@ -8,7 +8,7 @@ use super::pixel::Scene;
 use super::surface::{Shaded, shade};
 use super::{ContourView, Inner};
 use crate::pose_loss::{Row, scaled_sum};
-use crate::raster::{BAND, MISS};
+use crate::raster::Visible;
 
 /// The faces seen at the pixels to the left, to the right, above and below of the same surface; the face at hand where there
 /// is none of it, and nothing beyond the border of the image.
@@ -57,14 +57,7 @@ impl ContourView<'_> {
 
     fn seen_at(&self, x: i64, y: i64) -> Option<Hit> {
         let (x, y) = (usize::try_from(x).ok()?, usize::try_from(y).ok()?);
-        let block = self.visible.get(y.checked_sub(self.region.y0)? / BAND)?;
-        let (column, row) = (x.checked_sub(block.region.x0)?, y.checked_sub(block.region.y0)?);
-        if column >= block.region.width() {
-            return None;
-        }
-        let at = row * block.region.width() + column;
-        let face = *block.face.get(at)?;
-        (face != MISS).then_some(Hit { face, inverse_z: block.inverse_z[at] })
+        Visible::at(&self.visible, x, y).map(|(face, inverse_z)| Hit { face, inverse_z })
     }
 }
 

@@ -8,7 +8,7 @@ use crate::light::LightSample;
 use crate::model::RenderModel;
 use crate::pose_loss::Target;
 use crate::posed::Posed;
-use crate::raster::{BAND, MISS, Visible, rasterise};
+use crate::raster::{Visible, rasterise};
 
 /// What [`Light::fit`](crate::Light::fit) needs: unlit colour, normal and observed colour where the object is seen inside the
 /// mask, and `margin` pixels to the left, to the right, above and below too; of `most` of these pixels at most, spread evenly over them.
@@ -36,13 +36,7 @@ pub fn light_samples(
 
 /// Faces, columns and rows of the pixels that show the object alone.
 fn inner_pixels(visible: &[Visible], target: &Target, margin: usize) -> Vec<(usize, usize, usize)> {
-    let Some(region) = visible.first().map(|block| block.region) else { return Vec::new() };
-    let seen = |x: usize, y: usize| {
-        let block = visible.get(y.checked_sub(region.y0)? / BAND)?;
-        let column = x.checked_sub(region.x0).filter(|column| *column < region.width())?;
-        let at = (y - block.region.y0) * region.width() + column;
-        Some((*block.face.get(at)?, block.inverse_z[at])).filter(|(face, _)| *face != MISS)
-    };
+    let seen = |x: usize, y: usize| Visible::at(visible, x, y);
     let inside = |x: usize, y: usize| {
         let shift = |centre: usize, by: usize| (centre + by).checked_sub(margin);
         let steps = [[0, 1], [2, 1], [1, 0], [1, 2]].map(|step| step.map(|by| by * margin));
@@ -54,7 +48,7 @@ fn inner_pixels(visible: &[Visible], target: &Target, margin: usize) -> Vec<(usi
     let mut pixels = Vec::new();
     for block in visible {
         for y in block.region.y0..block.region.y1 {
-            for x in region.x0..region.x1 {
+            for x in block.region.x0..block.region.x1 {
                 let at = y * target.camera.width + x;
                 let Some((face, inverse_z)) = seen(x, y).filter(|_| target.coverage[at] >= 1.0)
                 else {

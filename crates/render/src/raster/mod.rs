@@ -74,14 +74,20 @@ impl Visible {
         if x < 0.0 || y < 0.0 {
             return None;
         }
-        let (column, row) = (x as usize, y as usize);
-        let part = blocks.iter().find(|v| (v.region.y0..v.region.y1).contains(&row))?;
-        if !(part.region.x0..part.region.x1).contains(&column) {
-            return None;
-        }
-        let at = (row - part.region.y0) * part.region.width() + column - part.region.x0;
-        let (face, inverse_z) = (part.face[at], part.inverse_z[at]);
-        (face != MISS).then_some(Seen { x, y, face, inverse_z })
+        let (face, inverse_z) = Self::at(blocks, x as usize, y as usize)?;
+        Some(Seen { x, y, face, inverse_z })
+    }
+
+    /// The face that the blocks, [`BAND`] rows each, show at pixel (x, y), and its 1/Z \[1/m\]; `None` where there is none.
+    #[inline]
+    pub(crate) fn at(blocks: &[Self], x: usize, y: usize) -> Option<(u32, f32)> {
+        let first_row = blocks.first()?.region.y0;
+        let block = blocks.get(y.checked_sub(first_row)? / BAND)?;
+        let width = block.region.width();
+        let column = x.checked_sub(block.region.x0).filter(|column| *column < width)?;
+        let at = (y - block.region.y0) * width + column;
+        let face = *block.face.get(at)?;
+        (face != MISS).then(|| (face, block.inverse_z[at]))
     }
 
     /// Column and row of the pixel with index `i`.

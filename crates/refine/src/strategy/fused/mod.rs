@@ -85,7 +85,7 @@ impl Fused {
                 |states: &[State]| states.par_iter().map(solve_from).collect::<Vec<_>>();
             found = if index == 0 {
                 let first = solve_from(&states[0]);
-                let scatter = known.scatter(&first.0.state, &self.settings);
+                let scatter = || known.scatter(&first.0.state, &self.settings);
                 let others =
                     if settled(&first.0, scatter, object.radius) { 1 } else { states.len() };
                 let mut all = solve_all(&states[1..others]);
@@ -188,9 +188,9 @@ const SETTLED_SCATTER: f64 = 1.5e-3;
 const SAME: f64 = 2e-3;
 
 /// Whether `point` leaves no direction open and the surface lies where depth was measured.
-fn settled(point: &Point, scatter: Option<Scatter>, radius: f64) -> bool {
+fn settled(point: &Point, scatter: impl FnOnce() -> Option<Scatter>, radius: f64) -> bool {
     let widest = confidence::principal_directions(point, radius)[0].1;
-    widest < SETTLED_WIDTH && scatter.is_some_and(|scatter| scatter.sigma < SETTLED_SCATTER)
+    widest < SETTLED_WIDTH && scatter().is_some_and(|scatter| scatter.sigma < SETTLED_SCATTER)
 }
 
 /// Solutions of which no two are the same pose, the one of the lowest value first.

@@ -3,7 +3,7 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, SMatrix, Vector3};
 
 /// Coefficients that the field is described by, at most.
-const MOST_NUMBERS: usize = 24;
+const MOST_COEFFICIENTS: usize = 24;
 
 /// Distance between the places that describe the field, as a share of its smoothness.
 const SPACING: f64 = 0.5;
@@ -110,7 +110,7 @@ impl SmoothField {
 fn far_apart(places: &[Vector3<f64>], distance: f64) -> Vec<Vector3<f64>> {
     let mut chosen: Vec<Vector3<f64>> = places.first().copied().into_iter().collect();
     let mut nearest = vec![f64::INFINITY; places.len()];
-    while let Some(last) = chosen.last().filter(|_| chosen.len() < MOST_NUMBERS) {
+    while let Some(last) = chosen.last().filter(|_| chosen.len() < MOST_COEFFICIENTS) {
         for (nearest, place) in nearest.iter_mut().zip(places) {
             *nearest = nearest.min((place - last).norm());
         }
