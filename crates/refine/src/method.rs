@@ -116,7 +116,7 @@ macro_rules! fixed {
     };
 }
 
-static ABLATIONS: [Method; 20] = [
+static ABLATIONS: [Method; 21] = [
     without!("colour", Evidence::Colour),
     without!("silhouette", Evidence::Silhouette),
     without!("depth", Evidence::Depth),
@@ -136,6 +136,7 @@ static ABLATIONS: [Method; 20] = [
     fixed!("hand-pose", Nuisance::HandPose),
     fixed!("joints", Nuisance::Joints),
     fixed!("camera", Nuisance::Camera),
+    fixed!("model", Nuisance::Model),
     Method {
         name: "fused-fixed-all",
         summary: "fused, nothing estimated but the pose",

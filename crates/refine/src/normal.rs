@@ -1,6 +1,6 @@
 //! The normal equations that terms add to.
 
-use nalgebra::{DMatrix, DVector, SMatrix, SVector};
+use nalgebra::{DMatrix, DMatrixView, DVector, DVectorView, SMatrix, SVector};
 
 use crate::Block;
 
@@ -30,6 +30,39 @@ impl Normal {
     pub fn offset(&self, block: Block) -> Option<usize> {
         let position = self.blocks.iter().position(|&b| b == block)?;
         Some(self.blocks[..position].iter().map(|b| b.dimension()).sum())
+    }
+
+    /// What is left if the last block takes the value at which the quadratic model of the sum is least: the equations of the
+    /// other blocks, and how much lower that value is. `None` if the last block is not determined.
+    pub(crate) fn without_last(&self) -> Option<(Self, f64)> {
+        let (last, blocks) = self.blocks.split_last()?;
+        let (n, m) = (self.gradient.len() - last.dimension(), last.dimension());
+        let factor = self.hessian.view((n, n), (m, m)).clone_owned().cholesky()?;
+        let solved = |right: DMatrix<f64>| factor.l_dirty().solve_lower_triangular(&right);
+        let coupling = solved(self.hessian.view((n, 0), (m, n)).clone_owned())?;
+        let pull = solved(
+            self.gradient
+                .rows(n, m)
+                .clone_owned()
+                .reshape_generic(nalgebra::Dyn(m), nalgebra::Dyn(1)),
+        )?;
+        let left = Self {
+            blocks: blocks.to_vec(),
+            gradient: self.gradient.rows(0, n) - coupling.tr_mul(&pull).column(0),
+            hessian: self.hessian.view((0, 0), (n, n)) - coupling.tr_mul(&coupling),
+            entries: Vec::new(),
+        };
+        Some((left, 0.5 * pull.norm_squared()))
+    }
+
+    /// Leaves the first `blocks` only, as if the others were fixed.
+    pub(crate) fn truncate(&mut self, blocks: &[Block]) {
+        let n = blocks.iter().map(|b| b.dimension()).sum();
+        if n < self.gradient.len() {
+            self.blocks.truncate(blocks.len());
+            self.gradient = self.gradient.rows(0, n).clone_owned();
+            self.hessian = self.hessian.view((0, 0), (n, n)).clone_owned();
+        }
     }
 
     /// Derivative of the sum with respect to the requested parameters.
@@ -75,6 +108,19 @@ impl Normal {
         }
     }
 
+    /// Adds the information that displacements in `block` have before anything is seen: zero is likeliest, directions are independent, and
+    /// the covariance of any one has the inverse `precision`.
+    pub(crate) fn add_precision(&mut self, block: Block, precision: &DMatrix<f64>) {
+        let Some(offset) = self.offset(block) else { return };
+        for c in 0..precision.ncols() {
+            for r in 0..precision.nrows() {
+                for k in 0..3 {
+                    self.hessian[(offset + 3 * r + k, offset + 3 * c + k)] += precision[(r, c)];
+                }
+            }
+        }
+    }
+
     /// Adds the gradient and Hessian of a term whose parameters are those of `blocks`, concatenated.
     ///
     /// Parts that belong to blocks nobody requested are dropped.
@@ -83,6 +129,25 @@ impl Normal {
         blocks: &[Block],
         gradient: &SVector<f64, N>,
         hessian: &SMatrix<f64, N, N>,
+    ) {
+        self.add_views(blocks, &gradient.as_view(), &hessian.as_view());
+    }
+
+    /// The same of blocks whose size is not known beforehand.
+    pub fn add_dynamic(
+        &mut self,
+        blocks: &[Block],
+        gradient: &DVector<f64>,
+        hessian: &DMatrix<f64>,
+    ) {
+        self.add_views(blocks, &gradient.as_view(), &hessian.as_view());
+    }
+
+    fn add_views(
+        &mut self,
+        blocks: &[Block],
+        gradient: &DVectorView<f64>,
+        hessian: &DMatrixView<f64>,
     ) {
         let mut local = 0;
         let places: Vec<(usize, usize, usize)> = blocks
@@ -110,10 +175,13 @@ impl Normal {
 }
 
 impl std::ops::AddAssign<&Self> for Normal {
-    /// Adds equations over the same blocks.
+    /// Adds equations over the same blocks, or the first of them.
     fn add_assign(&mut self, other: &Self) {
-        self.gradient += &other.gradient;
-        self.hessian += &other.hessian;
+        let n = other.gradient.len();
+        let mut gradient = self.gradient.rows_mut(0, n);
+        gradient += &other.gradient;
+        let mut hessian = self.hessian.view_mut((0, 0), (n, n));
+        hessian += &other.hessian;
     }
 }
 

@@ -19,6 +19,9 @@ pub enum Block {
     Joints(usize),
     /// How the camera differs from what is said of it: see [`CameraCorrection`].
     Camera,
+    /// Displacements of so many patches of the object's surface from where the model has them, in the camera frame \[m\]. No state
+    /// holds them: they are eliminated.
+    Patches(usize),
 }
 
 impl Block {
@@ -28,6 +31,7 @@ impl Block {
             Self::ObjectPose | Self::HandPose => 6,
             Self::Joints(count) => count,
             Self::Camera => CameraCorrection::DIMENSION,
+            Self::Patches(count) => 3 * count,
         }
     }
 }
@@ -133,6 +137,7 @@ impl State {
                     state.camera = state.camera.changed(part);
                     continue;
                 }
+                Block::Patches(_) => continue,
             };
             *pose = perturb_about(pose, &centre, &Vector6::from_column_slice(part));
             // Thousands of small steps must not let the quaternion drift off the unit sphere.

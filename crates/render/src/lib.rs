@@ -43,7 +43,7 @@ pub use model::{ModelError, RenderModel};
 pub use overlay::draw_outline;
 pub use pose_loss::{
     Affine, Counts, DepthOptions, Linearised, Loss, LossOptions, OptionError, PoseImage, PoseLoss,
-    Robust, Target, TargetError,
+    Robust, Target, TargetError, Tile,
 };
 pub use raster::depth_map;
 pub use renderer::{

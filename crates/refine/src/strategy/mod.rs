@@ -9,9 +9,9 @@ mod walk;
 
 pub use fused::{
     Confidence, ConfidenceSummary, Disagreement, Ending, Evidence, Fused, FusedSettings,
-    Hypothesis, Nuisance, Stage, Unobserved,
+    Hypothesis, Nuisance, Stage, Unobserved, Width,
 };
-pub(crate) use fused::{Factor, Known, Point, RIDGE, Width, solve};
+pub(crate) use fused::{Factor, Known, Point, Problem, RIDGE};
 pub use heuristic::{Heuristic, HeuristicSettings};
 pub use icp::{Icp, IcpSettings};
 pub use robust_icp::{RobustIcp, RobustIcpSettings};

@@ -3,6 +3,8 @@
 mod depth;
 mod free_space;
 mod hand_depth;
+mod patch_sums;
+mod patches;
 mod penetration;
 mod physics;
 mod point_to_plane;
@@ -14,6 +16,8 @@ pub(crate) use depth::back_project;
 pub use depth::{DepthSettings, DepthTerm};
 pub use free_space::{FreeSpaceSettings, FreeSpaceTerm};
 pub use hand_depth::{HandDepthSettings, HandDepthTerm};
+pub use patches::ModelSettings;
+pub(crate) use patches::Patches;
 pub use penetration::{PenetrationSettings, PenetrationTerm};
 pub use physics::{PhysicsSettings, PhysicsTerm};
 pub use point_to_plane::{PointToPlaneSettings, PointToPlaneTerm, Scatter};
@@ -24,7 +28,7 @@ pub use tactile::{TactileSettings, TactileTerm};
 
 use prehend_render::Light;
 
-use crate::{Normal, State};
+use crate::{Block, Normal, State};
 
 /// One kind of evidence about a [`State`].
 ///
@@ -41,6 +45,11 @@ pub trait Term: Send + Sync {
     ///
     /// Blocks that it is constant in, or not differentiable by, are left as they are.
     fn linearise(&self, state: &State, normal: &mut Normal) -> f64;
+
+    /// Whether the term may change with `block`, so that room is needed for derivatives by it.
+    fn depends_on(&self, block: Block) -> bool {
+        !matches!(block, Block::Patches(_))
+    }
 
     /// The light that suits the term best at `state`, solved for in closed form, if it sees any. No other term does, so it is
     /// part of what the term costs.
@@ -63,7 +72,6 @@ mod gradient_check {
     use prehend_autodiff::check::{compare_gradients, finite_difference_gradient};
 
     use super::*;
-    use crate::Block;
     use crate::refine::hand_depth;
     use crate::synth::{Scene, default_scene};
 
@@ -90,6 +98,7 @@ mod gradient_check {
             Block::ObjectPose | Block::HandPose => vec![1.0, 1.0, 1.0, 10.0, 10.0, 10.0],
             Block::Joints(count) => vec![10.0; count],
             Block::Camera => vec![2.0, 1.0, 2.0, 2.0, 10.0],
+            Block::Patches(count) => vec![1.0; 3 * count],
         }
     }
 

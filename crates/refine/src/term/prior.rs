@@ -41,6 +41,7 @@ impl PriorSettings {
             Block::Camera => {
                 vec![self.depth_scale, self.depth_bias, self.shift, self.shift, self.magnification]
             }
+            Block::Patches(_) => Vec::new(),
         }
     }
 }

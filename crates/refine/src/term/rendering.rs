@@ -5,10 +5,11 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, SMatrix};
 use prehend_render::{
     ContourOptions, DepthImage, Light, LossOptions, Mode, PoseLoss, Robust, Target, TargetError,
-    light_samples,
+    Tile, light_samples,
 };
 
-use super::Term;
+use super::patch_sums::PatchSums;
+use super::{Patches, Term};
 use crate::{Block, Normal, Object, Observation, RefineError, State};
 
 /// Settings of the rendering term.
@@ -104,6 +105,8 @@ pub struct RenderingTerm {
     light_ridge: f64,
     /// Whether colours are compared.
     colour: bool,
+    /// Where the object may be off from its model, and the width of the patches' tiles in the image at hand \[px\].
+    patches: Option<(Arc<Patches>, usize)>,
 }
 
 impl RenderingTerm {
@@ -146,7 +149,14 @@ impl RenderingTerm {
             scale: 0.5 * settings.effective_pixels / (sigma * sigma),
             light_ridge: settings.light_ridge,
             colour: settings.colour,
+            patches: None,
         }
+    }
+
+    /// The same where the object may be off from its model in `patches`; the image is `downsample` times smaller than theirs.
+    pub(crate) fn with_patches(self, patches: Arc<Patches>, downsample: usize) -> Self {
+        let side = patches.side() / downsample;
+        Self { patches: Some((patches, side)), ..self }
     }
 }
 
@@ -170,21 +180,42 @@ impl Term for RenderingTerm {
         self.scale * self.loss.evaluate(model, &seen, &state.light, &self.target).total
     }
 
+    fn depends_on(&self, _block: Block) -> bool {
+        true
+    }
+
     fn linearise(&self, state: &State, normal: &mut Normal) -> f64 {
         let centre = state.centre();
         let (model, seen) = (&self.object.model, apparent(state));
         let turning = seen * self.object.centre;
-        let at = self.loss.linearise(model, &seen, &turning, &state.light, &self.target);
         // The object appears shifted, and turned as it is.
         let mut seen_by_state = SMatrix::<f64, 6, 11>::zeros();
         let place = state.camera.apparent_jacobian(&centre);
         seen_by_state.fixed_view_mut::<3, 3>(0, 0).copy_from(&place.fixed_columns::<3>(0));
         seen_by_state.fixed_view_mut::<3, 5>(0, 6).copy_from(&place.fixed_columns::<5>(3));
         seen_by_state.fixed_view_mut::<3, 3>(3, 3).fill_with_identity();
-        let gradient = seen_by_state.tr_mul(&at.gradient) * self.scale;
-        let hessian = seen_by_state.tr_mul(&at.jtj) * seen_by_state * (2.0 * self.scale);
-        normal.add(&[Block::ObjectPose, Block::Camera], &gradient, &hessian);
-        self.scale * at.loss.total
+        let requested = |(patches, _): &&(Arc<Patches>, usize)| {
+            normal.offset(Block::Patches(patches.count())).is_some()
+        };
+        let patches = self.patches.as_ref().filter(requested);
+        let count = patches.map_or(0, |(patches, _)| patches.count());
+        // One tile for all if nobody asks for more.
+        let side = patches.map_or(usize::MAX, |(_, side)| *side);
+        let tiles =
+            self.loss.linearise_tiles(model, &seen, &turning, &state.light, &self.target, side);
+        let mut sums = PatchSums::<11>::new(count);
+        let mut value = 0.0;
+        for Tile { column, row, at } in tiles {
+            let patch = patches.and_then(|(patches, _)| patches.in_tile(column, row));
+            let (gradient, hessian) = sums.of(patch);
+            *gradient += seen_by_state.tr_mul(&at.gradient) * self.scale;
+            *hessian += seen_by_state.tr_mul(&at.jtj) * seen_by_state * (2.0 * self.scale);
+            value += self.scale * at.loss.total;
+        }
+        let (gradient, hessian) = sums.equations();
+        let blocks = [Block::ObjectPose, Block::Camera, Block::Patches(count)];
+        normal.add_dynamic(&blocks, &gradient, &hessian);
+        value
     }
 
     fn light(&self, state: &State) -> Option<Light> {

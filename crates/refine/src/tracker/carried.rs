@@ -36,6 +36,8 @@ impl Layout {
             Block::HandPose => 6,
             Block::Joints(_) => POSES,
             Block::Camera => POSES + self.joints,
+            // None of these is carried.
+            Block::Patches(_) => self.len(),
         }
     }
 }

@@ -18,7 +18,7 @@ pub use self::clock::Spent;
 use self::memory::{Memory, Prediction};
 pub use self::settings::{LossSettings, MotionSettings, Recovery, TrackerSettings};
 use crate::initial::PoseSearch;
-use crate::strategy::{Confidence, Ending, Fused, FusedSettings, Known, Point, Width, solve};
+use crate::strategy::{Confidence, Ending, Fused, Known, Point, Problem};
 use crate::term::Term;
 use crate::{CameraCorrection, Object, Observation, RefineError, Robot, State};
 
@@ -145,8 +145,6 @@ impl Solved {
     }
 }
 
-type Terms = Vec<Box<dyn Term>>;
-
 /// Part of the way that the level of misfits goes to the next one.
 const LEVEL_GAIN: f64 = 0.1;
 /// By how much of itself the level grows while an object is lost: circumstances may have changed for good.
@@ -215,12 +213,12 @@ impl Tracker {
         let known = Known::new(observation, &object, robot.as_ref())?;
         let mut spent = Spent::default();
         let doubt = if prediction.state.centre().z > 0.0 {
-            let (terms, carried) = self.prepare(&known, &prediction)?;
+            let (problem, carried) = self.prepare(&known, &prediction)?;
             spent.preparation = clock.lap();
             if !clock.has(Duration::ZERO) {
                 return Ok(outcome(prediction.state, Following::Predicted, spent));
             }
-            let solved = self.solve(&known, &terms, prediction.state.clone(), &clock);
+            let solved = self.solve(&problem, prediction.state.clone(), &clock);
             spent.steps = clock.lap();
             if solved.ending == Ending::Stopped && solved.iterations == 0 {
                 return Ok(outcome(prediction.state, Following::Predicted, spent));
@@ -279,32 +277,25 @@ impl Tracker {
         &self,
         known: &Known<'_>,
         prediction: &Prediction,
-    ) -> Result<(Terms, Arc<Carried>), RefineError> {
+    ) -> Result<(Problem, Arc<Carried>), RefineError> {
         let Prediction { state, covariance, layout, .. } = prediction;
         let carried = Carried::new(state.clone(), *layout, covariance).ok_or_else(|| {
             let problem = "does not allow for a prediction".to_owned();
             RefineError::Setting { name: "accuracy", problem }
         })?;
         let carried = Arc::new(carried);
-        let mut terms = known.terms(state, &self.settings.stage, &self.settings.fused)?;
-        terms.retain(|t| t.name() != carried.name());
-        terms.insert(0, Box::new(Arc::clone(&carried)));
-        Ok((terms, carried))
+        let mut problem = known.problem(state, &self.settings.stage, &self.settings.fused)?;
+        problem.terms.retain(|t| t.name() != carried.name());
+        problem.terms.insert(0, Box::new(Arc::clone(&carried)));
+        Ok((problem, carried))
     }
 
     /// Steps down from `start` until the clock says otherwise.
-    fn solve(
-        &self,
-        known: &Known<'_>,
-        terms: &[Box<dyn Term>],
-        start: State,
-        clock: &Clock,
-    ) -> Solved {
-        let (stage, settings) = (&self.settings.stage, &self.settings.fused);
-        let blocks = settings.blocks(known.robot.is_some(), &start);
+    fn solve(&self, problem: &Problem, start: State, clock: &Clock) -> Solved {
+        let stage = &self.settings.stage;
         let mut before = Instant::now();
         let mut iterations = 0;
-        let start = Point::new(terms, start, &blocks);
+        let start = problem.at(start);
         let mut go_on = || {
             let step = before.elapsed();
             before += step;
@@ -313,7 +304,7 @@ impl Tracker {
         if !go_on() {
             return Solved { point: start, ending: Ending::Stopped, iterations };
         }
-        let (point, ending) = solve(terms, start, stage.iterations, stage.last_gain, |_| {
+        let (point, ending) = problem.solve(start, stage.iterations, stage.last_gain, |_| {
             iterations += 1;
             go_on()
         });
@@ -335,8 +326,8 @@ impl Tracker {
             best = state.clone();
             true
         })?;
-        let terms = known.terms(initial, &self.settings.stage, &self.settings.fused)?;
-        Ok(self.solve(known, &terms, best, &Clock::start(None)))
+        let problem = known.problem(initial, &self.settings.stage, &self.settings.fused)?;
+        Ok(self.solve(&problem, best, &Clock::start(None)))
     }
 
     fn search(&mut self, observation: &Observation) -> Result<Isometry3<f64>, RefineError> {
@@ -405,8 +396,7 @@ impl Tracker {
     }
 
     fn confidence(&self, solved: &Solved) -> Confidence {
-        let FusedSettings { covariance_scale: scale, model_tolerance, .. } = self.settings.fused;
-        let width = Width { scale, model_tolerance };
+        let width = self.settings.fused.width;
         Confidence::new(&[(solved.point.clone(), solved.ending)], width, self.object.radius)
     }
 

@@ -100,6 +100,7 @@ impl Default for TrackerSettings {
                 hypotheses: 1,
                 colour: true,
                 measured_scatter: false,
+                model_deviates: true,
                 contact: true,
             },
             held: MotionSettings { translation: 0.02, rotation: 0.2, gain: 0.1 },

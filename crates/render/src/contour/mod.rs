@@ -26,7 +26,7 @@ use nalgebra::{Isometry3, Point3};
 use crate::camera::Camera;
 use crate::light::Light;
 use crate::model::RenderModel;
-use crate::pose_loss::{Residuals, Seen, Sums, View};
+use crate::pose_loss::{Residuals, Seen, TileSums, View};
 use crate::posed::Posed;
 use crate::projected::Region;
 use crate::raster::{self, MISS, Visible};
@@ -162,7 +162,23 @@ impl View for ContourView<'_> {
         }
     }
 
-    fn sum<const DERIVATIVES: bool>(&self, block: usize, residuals: &Residuals, sums: &mut Sums) {
-        BlockSum::<DERIVATIVES>::new(self, block, residuals, sums).run();
+    fn sum<const DERIVATIVES: bool>(
+        &self,
+        block: usize,
+        residuals: &Residuals,
+        sums: &mut TileSums,
+    ) {
+        let bands = Bands::new(self, block);
+        let clear = bands.clear();
+        let Region { x0, y0, x1, y1 } = bands.visible.region;
+        let tiling = sums.tiling;
+        for rows in tiling.cut(y0..y1) {
+            for columns in tiling.cut(x0..x1) {
+                let window =
+                    Region { x0: columns.start, x1: columns.end, y0: rows.start, y1: rows.end };
+                let sums = sums.at(window.x0, window.y0);
+                BlockSum::<DERIVATIVES>::new(self, &bands, residuals, sums).run(&window, &clear);
+            }
+        }
     }
 }

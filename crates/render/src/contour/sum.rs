@@ -1,15 +1,16 @@
-//! Residuals of a block of rows, the quick way: pixels inside faces many at a time, and the colours of the others likewise.
+//! Residuals of a window of a block of rows, the quick way: pixels inside faces many at a time, and the colours of the others likewise.
 
 use super::ContourView;
 use super::lanes::{Blended, Waiting};
 use super::near::Bands;
 use crate::pose_loss::{LaneSums, Residuals, Sums};
+use crate::projected::Region;
 use crate::raster::MISS;
 
-/// Adds up the residuals of one block.
+/// Adds up the residuals of a window of one block.
 pub(super) struct BlockSum<'a, const DERIVATIVES: bool> {
     view: &'a ContourView<'a>,
-    bands: Bands<'a>,
+    bands: &'a Bands<'a>,
     residuals: &'a Residuals<'a>,
     sums: &'a mut Sums,
     lanes: LaneSums,
@@ -20,13 +21,13 @@ pub(super) struct BlockSum<'a, const DERIVATIVES: bool> {
 impl<'a, const DERIVATIVES: bool> BlockSum<'a, DERIVATIVES> {
     pub(super) fn new(
         view: &'a ContourView,
-        block: usize,
+        bands: &'a Bands<'a>,
         residuals: &'a Residuals,
         sums: &'a mut Sums,
     ) -> Self {
         Self {
             view,
-            bands: Bands::new(view, block),
+            bands,
             residuals,
             sums,
             lanes: LaneSums::new(),
@@ -35,15 +36,16 @@ impl<'a, const DERIVATIVES: bool> BlockSum<'a, DERIVATIVES> {
         }
     }
 
-    pub(super) fn run(mut self) {
+    /// The pixels of `window`; `clear` are all of the block that are in no band.
+    pub(super) fn run(mut self, window: &Region, clear: &[bool]) {
         let visible = self.bands.visible;
-        let (width, first_row) = (visible.region.width(), visible.region.y0);
-        let clear = self.bands.clear();
+        let (width, whole) = (window.width(), &visible.region);
         // Columns of a row's pixels inside faces, and of the others that may cost something.
         let (mut inside, mut others) = (vec![0; width], vec![0; width]);
-        for y in first_row..visible.region.y1 {
-            let row = (y - first_row) * width..(y - first_row + 1) * width;
-            let start = self.in_image(visible.region.x0, y);
+        for y in window.y0..window.y1 {
+            let first = (y - whole.y0) * whole.width() + window.x0 - whole.x0;
+            let row = first..first + width;
+            let start = self.in_image(window.x0, y);
             let costly = self.residuals.missed_if_empty(start..start + width);
             let faces = visible.face[row.clone()].iter();
             let (mut inside_count, mut other_count) = (0, 0);
@@ -57,8 +59,8 @@ impl<'a, const DERIVATIVES: bool> BlockSum<'a, DERIVATIVES> {
                 others[other_count] = column;
                 other_count += usize::from(!clear | (!hit & costly));
             }
-            self.add_inside(y, row.start, &inside[..inside_count]);
-            self.add_others(y, &others[..other_count]);
+            self.add_inside([window.x0, y], row.start, &inside[..inside_count]);
+            self.add_others([window.x0, y], &others[..other_count]);
             if DERIVATIVES {
                 self.sums.end_row();
             }
@@ -74,12 +76,12 @@ impl<'a, const DERIVATIVES: bool> BlockSum<'a, DERIVATIVES> {
         y * self.residuals.target.camera.width + x
     }
 
-    /// Pixels inside faces, in `columns` of row `y`, which begins at index `row` of the block.
+    /// Pixels inside faces, in `columns` from pixel (`left`, `y`) on, which has index `first` in the block.
     #[inline]
-    fn add_inside(&mut self, y: usize, row: usize, columns: &[usize]) {
+    fn add_inside(&mut self, [left, y]: [usize; 2], first: usize, columns: &[usize]) {
         let visible = self.bands.visible;
         for column in columns {
-            let (i, x) = (row + column, visible.region.x0 + column);
+            let (i, x) = (first + column, left + column);
             let (z, at) = (1.0 / visible.inverse_z[i], self.in_image(x, y));
             if self.residuals.hidden(self.sums, at, z) {
                 continue;
@@ -93,11 +95,11 @@ impl<'a, const DERIVATIVES: bool> BlockSum<'a, DERIVATIVES> {
         }
     }
 
-    /// Pixels at contours or that show nothing, in `columns` of row `y`.
+    /// Pixels at contours or that show nothing, in `columns` from pixel (`left`, `y`) on.
     #[inline]
-    fn add_others(&mut self, y: usize, columns: &[usize]) {
+    fn add_others(&mut self, [left, y]: [usize; 2], columns: &[usize]) {
         for column in columns {
-            let x = self.bands.visible.region.x0 + column;
+            let x = left + column;
             let at = self.in_image(x, y);
             let (place, found) = self.bands.found(x, y);
             let Some(seen) = self.view.seen::<DERIVATIVES>(place, found) else {

@@ -11,6 +11,7 @@ mod sums;
 mod target;
 #[cfg(test)]
 pub(crate) mod tests;
+mod tiles;
 
 use nalgebra::{Isometry3, Matrix6, Point3, Vector6};
 
@@ -27,6 +28,8 @@ pub use sums::Counts;
 pub(crate) use sums::unpacked;
 pub(crate) use sums::{LaneSums, Sums};
 pub use target::{Target, TargetError};
+pub use tiles::Tile;
+pub(crate) use tiles::{TileSums, Tiling};
 
 use crate::camera::Camera;
 use crate::contour::ContourView;
@@ -179,6 +182,42 @@ impl PoseLoss {
             jtj: jtj - all.reduction * target.normalisation,
             affine: self.options.affine.then_some(all.affine),
         }
+    }
+
+    /// The loss by square tiles of the image, `side` pixels wide and high from its upper left corner on, each with the derivatives by a twist of
+    /// what is seen in it alone: for bodies that are not quite rigid, or models that are not quite the body. Together the
+    /// tiles are what [`linearise`](Self::linearise) gives; tiles to which no pixel is drawn or missed may be left out. Colours are not
+    /// corrected as [`LossOptions::affine`] would have it, since that is not of one tile.
+    pub fn linearise_tiles(
+        &self,
+        model: &RenderModel,
+        t_cam_object: &Isometry3<f64>,
+        center: &Point3<f64>,
+        light: &Light,
+        target: &Target,
+        side: usize,
+    ) -> Vec<Tile> {
+        struct ByTiles<'a>(Residuals<'a>, Tiling);
+
+        impl Task for ByTiles<'_> {
+            type Output = Vec<Tile>;
+
+            fn run(self, view: &impl View) -> Vec<Tile> {
+                let Self(residuals, tiling) = self;
+                let target = residuals.target;
+                let tile = |([column, row], sums): ([usize; 2], Sums)| {
+                    let (right, jtj) = sums.equations(target.normalisation);
+                    let loss = sums.loss(target);
+                    let at = Linearised { loss, gradient: right * 2.0, jtj, affine: None };
+                    Tile { column, row, at }
+                };
+                residuals.by_tiles::<true>(view, tiling).into_iter().map(tile).collect()
+            }
+        }
+
+        let (camera, also) = (&target.camera, &target.bounds);
+        let task = ByTiles(Residuals { options: &self.options, target }, Tiling::new(side));
+        rayon::scope(|_| self.view(model, t_cam_object, center, camera, light, also, task))
     }
 
     /// The picture whose difference from the target is the loss's residual (without occluder).

@@ -1,7 +1,7 @@
 //! What a pixel shows of the posed object, in either mode.
 
 use super::residuals::Residuals;
-use super::sums::Sums;
+use super::tiles::TileSums;
 
 /// A derivative by the twist (translation, rotation).
 pub(crate) type Row = [f32; 6];
@@ -60,11 +60,16 @@ pub(crate) trait View: Sync {
     fn faces(&self, block: usize, each: impl FnMut(usize, usize, u32, [f32; 3]));
 
     /// Adds the residuals of one block. A view that has a quicker way than pixel by pixel writes its own.
-    fn sum<const DERIVATIVES: bool>(&self, block: usize, residuals: &Residuals, sums: &mut Sums) {
+    fn sum<const DERIVATIVES: bool>(
+        &self,
+        block: usize,
+        residuals: &Residuals,
+        sums: &mut TileSums,
+    ) {
         let last = self.right().wrapping_sub(1);
         let width = residuals.target.camera.width;
         self.visit::<DERIVATIVES>(block, |x, y, seen| {
-            residuals.add::<DERIVATIVES>(sums, y * width + x, seen);
+            residuals.add::<DERIVATIVES>(sums.at(x, y), y * width + x, seen);
             if DERIVATIVES && x == last {
                 sums.end_row();
             }

@@ -2,6 +2,7 @@
 
 #![allow(clippy::needless_range_loop)] // loops over lanes index several arrays alike
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 use nalgebra::Matrix6;
@@ -13,6 +14,7 @@ use super::options::{DepthOptions, LossOptions};
 use super::pixel::{Seen, View};
 use super::sums::{LaneSums, Sums};
 use super::target::Target;
+use super::tiles::{TileSums, Tiling};
 use crate::image::DepthImage;
 
 /// What a view is compared with, and how.
@@ -32,18 +34,32 @@ impl Residuals<'_> {
         Corrected { sums: self.sum::<DERIVATIVES>(view), affine, reduction }
     }
 
-    /// Sums the residuals over all pixels of a view, block by block in parallel, added up in a fixed order.
+    /// Sums the residuals over all pixels of a view.
     fn sum<const DERIVATIVES: bool>(&self, view: &impl View) -> Sums {
-        let blocks: Vec<Sums> = (0..view.blocks())
+        let tiles = self.by_tiles::<DERIVATIVES>(view, Tiling::WHOLE);
+        let mut total = Sums::new();
+        tiles.into_iter().for_each(|(_, sums)| total.merge(&sums));
+        total
+    }
+
+    /// Sums the residuals over the pixels of a view by tiles, block by block in parallel, added up in a fixed order.
+    pub(crate) fn by_tiles<const DERIVATIVES: bool>(
+        &self,
+        view: &impl View,
+        tiling: Tiling,
+    ) -> BTreeMap<[usize; 2], Sums> {
+        let blocks: Vec<TileSums> = (0..view.blocks())
             .into_par_iter()
             .map(|block| {
-                let mut sums = Sums::new();
+                let mut sums = TileSums::new(tiling);
                 view.sum::<DERIVATIVES>(block, self, &mut sums);
                 sums
             })
             .collect();
-        let mut total = Sums::new();
-        blocks.iter().for_each(|block| total.merge(block));
+        let mut total = BTreeMap::new();
+        for (tile, sums) in blocks.into_iter().flatten() {
+            total.entry(tile).or_insert_with(Sums::new).merge(&sums);
+        }
         total
     }
 

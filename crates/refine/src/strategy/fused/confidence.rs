@@ -59,13 +59,21 @@ pub struct Confidence {
     centre: Vector3<f64>,
 }
 
-/// What makes posteriors as wide as errors are.
-#[derive(Clone, Copy)]
-pub(crate) struct Width {
+/// What makes posteriors as wide as errors are, besides the information that there is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Width {
     /// What covariances are multiplied by.
-    pub(crate) scale: f64,
-    /// How far the object's surface may be from the model's \[m\].
-    pub(crate) model_tolerance: f64,
+    pub scale: f64,
+    /// Standard deviation that is added to the place, in each direction, for what no term models \[m\].
+    pub place: f64,
+    /// The same of the rotation, about each axis \[rad\].
+    pub turn: f64,
+}
+
+impl Default for Width {
+    fn default() -> Self {
+        Self { scale: 1.2, place: 3.5e-4, turn: 0.45f64.to_radians() }
+    }
 }
 
 /// Random poses that stand for the posterior.
@@ -84,10 +92,7 @@ impl Confidence {
     /// Of the solutions `found`, the best first; `radius` turns radians into metres of surface motion.
     pub(crate) fn new(found: &[(Point, Ending)], width: Width, radius: f64) -> Self {
         let (best, ending) = &found[0];
-        // A surface that is off by so much everywhere is as good as shifted by it, and, as it lies some seven tenths of the
-        // radius from the axes, turned by that over its distance.
-        let place = width.model_tolerance.powi(2);
-        let turn = 2.0 * place / radius.powi(2);
+        let (place, turn) = (width.place.powi(2), width.turn.powi(2));
         let more = Matrix6::from_diagonal(&Vector6::new(place, place, place, turn, turn, turn));
         let bounds: Vec<(Matrix6<f64>, f64)> =
             found.iter().map(|(point, _)| laplace(point)).collect();

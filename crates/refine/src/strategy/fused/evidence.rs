@@ -1,15 +1,16 @@
 //! The terms of a stage, for the evidence that an observation brings.
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use prehend_render::DepthImage;
 
-use super::settings::{Evidence, FusedSettings, Stage};
+use super::settings::{Evidence, FusedSettings, Nuisance, Stage};
+use super::solve::Problem;
 use crate::refine::hand_depth;
 use crate::term::{
-    FreeSpaceTerm, HandDepthTerm, PenetrationTerm, PointToPlaneSettings, PointToPlaneTerm, Prior,
-    RenderingTerm, Scatter, Segmented, TactileTerm, Term,
+    FreeSpaceTerm, HandDepthTerm, Patches, PenetrationTerm, PointToPlaneSettings, PointToPlaneTerm,
+    Prior, RenderingTerm, Scatter, Segmented, TactileTerm, Term,
 };
 use crate::{Object, Observation, RefineError, Robot, State};
 
@@ -31,6 +32,8 @@ pub(crate) struct Known<'a> {
     /// The segmented image, and smaller ones, by how many times smaller they are: stages share them. What may hide the
     /// object in them is the hand, and what was seen beside the mask.
     images: Mutex<BTreeMap<usize, Segmented>>,
+    /// Where the object may be off from its model, if it may; the first stage that asks for it finds it.
+    patches: OnceLock<Option<Arc<Patches>>>,
 }
 
 /// How far in front of the object something beside the mask must be to hide it \[m\]: what is seen there may be the
@@ -61,7 +64,16 @@ impl<'a> Known<'a> {
         let images = Mutex::new(BTreeMap::from([(1, image)]));
         let depth = Arc::new(observation.depth.clone());
         let coloured = observation.has_colours();
-        Ok(Self { observation, object, robot, hand, coloured, depth, images })
+        Ok(Self {
+            observation,
+            object,
+            robot,
+            hand,
+            coloured,
+            depth,
+            images,
+            patches: OnceLock::new(),
+        })
     }
 
     /// The segmented image, `factor` times smaller.
@@ -87,12 +99,28 @@ impl<'a> Known<'a> {
         term.scatter(state)
     }
 
-    /// The terms of `stage`, a prior about `initial` among them.
-    pub(crate) fn terms(
+    /// What `stage` solves: all terms, a prior about `initial` among them, by the pose and all nuisances.
+    pub(crate) fn problem(
         &self,
         initial: &State,
         stage: &Stage,
         settings: &FusedSettings,
+    ) -> Result<Problem, RefineError> {
+        let blocks = settings.blocks(self.robot.is_some(), initial);
+        let deviates = stage.model_deviates && settings.nuisances.contains(&Nuisance::Model);
+        let distance = initial.centre().z;
+        let patches = || Patches::new(self.observation, distance, &settings.model).map(Arc::new);
+        let patches = self.patches.get_or_init(patches).as_ref().filter(|_| deviates);
+        let terms = self.terms(initial, stage, settings, patches)?;
+        Ok(Problem { terms, blocks, patches: patches.cloned() })
+    }
+
+    fn terms(
+        &self,
+        initial: &State,
+        stage: &Stage,
+        settings: &FusedSettings,
+        patches: Option<&Arc<Patches>>,
     ) -> Result<Vec<Box<dyn Term>>, RefineError> {
         let wanted = |kind| settings.evidence.contains(&kind);
         let object = || Arc::clone(self.object);
@@ -110,14 +138,24 @@ impl<'a> Known<'a> {
                 rendering.mask_sigma = f64::INFINITY;
             }
             let image = self.image(rendering.downsample)?;
-            terms.push(Box::new(RenderingTerm::of(image, object(), rendering)));
+            let downsample = rendering.downsample;
+            let mut term = RenderingTerm::of(image, object(), rendering);
+            if let Some(patches) = patches {
+                term = term.with_patches(Arc::clone(patches), downsample);
+            }
+            terms.push(Box::new(term));
         }
         if wanted(Evidence::Depth) {
             let mut depth = settings.depth.clone();
             depth.points = stage.points;
             depth.outlier *= stage.tolerance;
             match PointToPlaneTerm::new(self.observation, object(), &self.hand, depth) {
-                Ok(term) => terms.push(Box::new(term)),
+                Ok(mut term) => {
+                    if let Some(patches) = patches {
+                        term = term.with_patches(Arc::clone(patches));
+                    }
+                    terms.push(Box::new(term));
+                }
                 // Each sense may be absent.
                 Err(RefineError::NoDepth) => {}
                 Err(other) => return Err(other),

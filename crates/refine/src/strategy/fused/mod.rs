@@ -15,13 +15,13 @@ use std::sync::Arc;
 use nalgebra::Translation3;
 use rayon::prelude::*;
 
-pub use self::confidence::{Confidence, Disagreement, Hypothesis, Unobserved};
-pub(crate) use self::confidence::{RIDGE, Width};
+pub(crate) use self::confidence::RIDGE;
+pub use self::confidence::{Confidence, Disagreement, Hypothesis, Unobserved, Width};
 pub(crate) use self::evidence::Known;
 pub(crate) use self::factor::Factor;
 pub use self::settings::{Evidence, FusedSettings, Nuisance, Stage};
 pub use self::solve::Ending;
-pub(crate) use self::solve::{Point, solve};
+pub(crate) use self::solve::{Point, Problem};
 pub use self::summary::ConfidenceSummary;
 use crate::term::Scatter;
 use crate::trace::{Iteration, Trace};
@@ -54,7 +54,6 @@ impl Fused {
             return Err(RefineError::Setting { name: "stages", problem: "are missing".into() });
         }
         let known = Known::new(observation, object, robot)?;
-        let blocks = settings.blocks(known.robot.is_some(), &initial);
         let mut states = self.starts(&initial);
         let mut trace = Trace::new(["posterior"].into_iter());
         let mut found = Vec::new();
@@ -72,13 +71,18 @@ impl Fused {
                 && let Some(scatter) = known.scatter(&states[0], &self.settings)
             {
                 settings.depth.sigma = scatter.own.clamp(FINEST, COARSEST);
-                settings.depth.deviation = scatter.shared.min(COARSEST);
+                // The model's part of it is what patches are off by.
+                let deviates =
+                    stage.model_deviates && settings.nuisances.contains(&Nuisance::Model);
+                let model = if deviates { settings.model.deviation } else { 0.0 };
+                let shared = (scatter.shared.powi(2) - model.powi(2)).max(0.0).sqrt();
+                settings.depth.deviation = shared.min(COARSEST);
                 settings.depth.effective_points = settings.most_points;
             }
-            let terms = known.terms(&initial, stage, &settings)?;
+            let problem = known.problem(&initial, stage, &settings)?;
             let solve_from = |state: &State| {
-                let start = Point::new(&terms, state.clone(), &blocks);
-                solve(&terms, start, stage.iterations, stage.last_gain, |_| true)
+                let start = problem.at(state.clone());
+                problem.solve(start, stage.iterations, stage.last_gain, |_| true)
             };
             states.truncate(stage.hypotheses.max(1));
             let solve_all =
@@ -142,18 +146,22 @@ impl Fused {
                 settings.depth.deviation = 0.0;
                 settings.depth.effective_points = scatter.effective_points;
             }
-            let terms = known.terms(&initial, last, &settings)?;
+            let problem = Problem {
+                blocks: vec![Block::ObjectPose],
+                patches: None,
+                ..known.problem(&initial, last, &settings)?
+            };
             let solve_from = |state: &State| {
-                let start = Point::new(&terms, state.clone(), &[Block::ObjectPose]);
-                solve(&terms, start, last.iterations, last.last_gain, |_| true)
+                let start = problem.at(state.clone());
+                problem.solve(start, last.iterations, last.last_gain, |_| true)
             };
             found = distinct(states.par_iter().map(solve_from).collect(), object.radius);
             step(&found[0].0, &mut trace);
         }
-        let width = Width {
-            scale: settings.covariance_scale,
-            // Where calibrations are exact, as in simulation, so are models.
-            model_tolerance: if exact { 0.0 } else { settings.model_tolerance },
+        // Where calibrations are exact, as in simulation, so are models.
+        let width = match exact {
+            true => Width { place: 0.0, turn: 0.0, ..settings.width },
+            false => settings.width,
         };
         Ok((trace, Confidence::new(&found, width, object.radius)))
     }

@@ -1,8 +1,9 @@
 //! Settings of the fused estimator.
 
+use super::confidence::Width;
 use crate::term::{
-    FreeSpaceSettings, HandDepthSettings, PenetrationSettings, PointToPlaneSettings, PriorSettings,
-    RenderingSettings, TactileSettings,
+    FreeSpaceSettings, HandDepthSettings, ModelSettings, PenetrationSettings, PointToPlaneSettings,
+    PriorSettings, RenderingSettings, TactileSettings,
 };
 use crate::{Block, State};
 
@@ -64,11 +65,13 @@ pub enum Nuisance {
     Joints,
     /// Depth scale and bias, centre of projection and size of images.
     Camera,
+    /// How the object differs from its model.
+    Model,
 }
 
 impl Nuisance {
     /// All groups.
-    pub const ALL: [Self; 3] = [Self::HandPose, Self::Joints, Self::Camera];
+    pub const ALL: [Self; 4] = [Self::HandPose, Self::Joints, Self::Camera, Self::Model];
 
     /// The name used in reports and on the command line.
     pub fn name(self) -> &'static str {
@@ -76,15 +79,17 @@ impl Nuisance {
             Self::HandPose => "hand-pose",
             Self::Joints => "joints",
             Self::Camera => "camera",
+            Self::Model => "model",
         }
     }
 
-    /// Its block for a hand of `joints` joints.
-    pub(super) fn block(self, joints: usize) -> Block {
+    /// Its block for a hand of `joints` joints; none of the model's, whose size depends on what is seen of the object.
+    fn block(self, joints: usize) -> Option<Block> {
         match self {
-            Self::HandPose => Block::HandPose,
-            Self::Joints => Block::Joints(joints),
-            Self::Camera => Block::Camera,
+            Self::HandPose => Some(Block::HandPose),
+            Self::Joints => Some(Block::Joints(joints)),
+            Self::Camera => Some(Block::Camera),
+            Self::Model => None,
         }
     }
 }
@@ -108,6 +113,8 @@ pub struct Stage {
     pub colour: bool,
     /// Whether the scatter of depth points about the best solution so far says how much depth is to be trusted.
     pub measured_scatter: bool,
+    /// Whether the object may differ from its model, where it is asked: [`Nuisance::Model`].
+    pub model_deviates: bool,
     /// Whether hand and object may not be in the same place, which bars ways that lead through the hand.
     pub contact: bool,
 }
@@ -134,10 +141,10 @@ pub struct FusedSettings {
     pub most_points: f64,
     /// Hypotheses that are so much behind the best one after a stage, colours considered, are given up \[nat\].
     pub hopeless: f64,
-    /// What the covariance of the posterior is multiplied by, to be as large as errors are.
-    pub covariance_scale: f64,
-    /// How far the object's surface may be from the model's \[m\]: a model that is off so much is as good as turned.
-    pub model_tolerance: f64,
+    /// What makes the posterior as wide as errors are.
+    pub width: Width,
+    /// How far the object's surface may be from the model's, patch by patch, with [`Nuisance::Model`].
+    pub model: ModelSettings,
     /// Colour and silhouette.
     pub rendering: RenderingSettings,
     /// Depth on the object. Its deviations and number of effective points are overwritten by what is measured, in stages with
@@ -154,10 +161,10 @@ pub struct FusedSettings {
 }
 
 impl FusedSettings {
-    /// What is solved for from `state`; of a hand that is not `known`, nothing.
-    pub(crate) fn blocks(&self, known: bool, state: &State) -> Vec<Block> {
+    /// What is solved for from `state` that it holds; of a hand that is not `known`, nothing.
+    pub(super) fn blocks(&self, known: bool, state: &State) -> Vec<Block> {
         let nuisances = self.nuisances.iter().filter(|n| known || **n == Nuisance::Camera);
-        let blocks = nuisances.map(|nuisance| nuisance.block(state.joints.len()));
+        let blocks = nuisances.filter_map(|nuisance| nuisance.block(state.joints.len()));
         std::iter::once(Block::ObjectPose).chain(blocks).collect()
     }
 }
@@ -178,6 +185,7 @@ impl Default for FusedSettings {
                     hypotheses: 7,
                     colour: false,
                     measured_scatter: false,
+                    model_deviates: false,
                     contact: false,
                 },
                 Stage {
@@ -189,6 +197,7 @@ impl Default for FusedSettings {
                     hypotheses: 14,
                     colour: true,
                     measured_scatter: false,
+                    model_deviates: false,
                     contact: true,
                 },
                 Stage {
@@ -200,10 +209,11 @@ impl Default for FusedSettings {
                     hypotheses: 6,
                     colour: true,
                     measured_scatter: true,
+                    model_deviates: false,
                     contact: true,
                 },
                 Stage {
-                    downsample: 1,
+                    downsample: 2,
                     points: 1200,
                     tolerance: 1.0,
                     iterations: 10,
@@ -211,6 +221,7 @@ impl Default for FusedSettings {
                     hypotheses: 4,
                     colour: true,
                     measured_scatter: true,
+                    model_deviates: true,
                     contact: true,
                 },
             ],
@@ -219,11 +230,11 @@ impl Default for FusedSettings {
             exactness: true,
             most_points: 50.0,
             hopeless: 15.0,
-            covariance_scale: 1.1,
-            model_tolerance: 6.5e-4,
+            width: Width::default(),
+            model: ModelSettings::default(),
             rendering: RenderingSettings {
                 downsample: 1,
-                effective_pixels: 50.0,
+                effective_pixels: 80.0,
                 mask_sigma: 0.6,
                 ..RenderingSettings::default()
             },

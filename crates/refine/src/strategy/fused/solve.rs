@@ -1,10 +1,13 @@
 //! Levenberg–Marquardt over all that is not known.
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, DVector};
 use prehend_render::Light;
 use rayon::prelude::*;
 
 use super::factor::balanced;
+use crate::term::Patches;
 use crate::{Block, Normal, State, Term};
 
 /// A state, the value of the terms there, and their derivatives.
@@ -25,27 +28,6 @@ pub(crate) struct Part {
     /// Nats.
     pub(crate) value: f64,
     pub(crate) normal: Normal,
-}
-
-impl Point {
-    /// The terms at `state`, whose light is solved for.
-    pub(crate) fn new(terms: &[Box<dyn Term>], mut state: State, blocks: &[Block]) -> Self {
-        let linearise = |term: &dyn Term| {
-            let light = term.light(&state);
-            let state = State { light: light.unwrap_or(state.light), ..state.clone() };
-            let mut normal = Normal::new(blocks);
-            let value = term.linearise(&state, &mut normal);
-            (Part { name: term.name(), value, normal }, light)
-        };
-        let (parts, lights): (Vec<Part>, Vec<Option<Light>>) =
-            terms.par_iter().map(|term| linearise(term.as_ref())).unzip();
-        if let Some(light) = lights.into_iter().flatten().next() {
-            state.light = light;
-        }
-        let mut normal = Normal::new(blocks);
-        parts.iter().for_each(|part| normal += &part.normal);
-        Self { state, value: parts.iter().map(|p| p.value).sum(), normal, parts }
-    }
 }
 
 /// Why a solve ended.
@@ -77,43 +59,83 @@ impl Ending {
 const FIRST_DAMPING: f64 = 1e-3;
 const LAST_DAMPING: f64 = 1e6;
 
-/// Lowers the sum of `terms` from `point` in at most `iterations` steps, calling `visit` at every point that is lower than the
-/// one before; ends when that returns false (Marquardt, 1963).
-pub(crate) fn solve(
-    terms: &[Box<dyn Term>],
-    mut point: Point,
-    iterations: usize,
-    last_gain: f64,
-    mut visit: impl FnMut(&Point) -> bool,
-) -> (Point, Ending) {
-    let blocks = point.normal.blocks().to_vec();
-    let mut damping = FIRST_DAMPING;
-    let mut rejected = false;
-    for _ in 0..iterations {
-        let Some((step, gain)) = step(&point.normal, damping) else {
-            return (point, Ending::Stuck);
+/// Terms, and what is to be found at their least.
+pub(crate) struct Problem {
+    pub(crate) terms: Vec<Box<dyn Term>>,
+    pub(crate) blocks: Vec<Block>,
+    /// Where the object may be off from its model besides: displacements that states do not hold, and that are eliminated.
+    pub(crate) patches: Option<Arc<Patches>>,
+}
+
+impl Problem {
+    /// The terms at `state`, whose light is solved for.
+    pub(crate) fn at(&self, mut state: State) -> Point {
+        let displaced = self.patches.as_ref().map(|patches| Block::Patches(patches.count()));
+        let all: Vec<Block> = self.blocks.iter().copied().chain(displaced).collect();
+        let linearise = |term: &dyn Term| {
+            let light = term.light(&state);
+            let state = State { light: light.unwrap_or(state.light), ..state.clone() };
+            let apart = displaced.is_none_or(|block| !term.depends_on(block));
+            let mut normal = Normal::new(if apart { &self.blocks } else { &all });
+            let value = term.linearise(&state, &mut normal);
+            (Part { name: term.name(), value, normal }, light)
         };
-        if gain < last_gain {
-            // Small because it is held back, not because there is nothing to gain?
-            return (point, if rejected { Ending::Stuck } else { Ending::Converged });
+        let (mut parts, lights): (Vec<Part>, Vec<Option<Light>>) =
+            self.terms.par_iter().map(|term| linearise(term.as_ref())).unzip();
+        if let Some(light) = lights.into_iter().flatten().next() {
+            state.light = light;
         }
-        let next = Point::new(terms, point.state.moved_all(&blocks, step.as_slice()), &blocks);
-        if next.value < point.value {
-            point = next;
-            rejected = false;
-            damping = (damping / 10.0).max(1e-6);
-            if !visit(&point) {
-                return (point, Ending::Stopped);
+        let mut normal = Normal::new(&all);
+        parts.iter().for_each(|part| normal += &part.normal);
+        let mut value = parts.iter().map(|p| p.value).sum();
+        if let Some(patches) = &self.patches {
+            normal.add_precision(all[all.len() - 1], patches.precision());
+            if let Some((rest, gain)) = normal.without_last() {
+                normal = rest;
+                value -= gain;
             }
-        } else {
-            rejected = true;
-            damping *= 8.0;
-            if damping > LAST_DAMPING {
-                return (point, Ending::Stuck);
-            }
+            parts.iter_mut().for_each(|part| part.normal.truncate(&self.blocks));
         }
+        Point { state, value, normal, parts }
     }
-    (point, Ending::Iterations)
+
+    /// Lowers the sum of the terms from `point` in at most `iterations` steps, calling `visit` at every point that is lower than the
+    /// one before; ends when that returns false (Marquardt, 1963).
+    pub(crate) fn solve(
+        &self,
+        mut point: Point,
+        iterations: usize,
+        last_gain: f64,
+        mut visit: impl FnMut(&Point) -> bool,
+    ) -> (Point, Ending) {
+        let mut damping = FIRST_DAMPING;
+        let mut rejected = false;
+        for _ in 0..iterations {
+            let Some((step, gain)) = step(&point.normal, damping) else {
+                return (point, Ending::Stuck);
+            };
+            if gain < last_gain {
+                // Small because it is held back, not because there is nothing to gain?
+                return (point, if rejected { Ending::Stuck } else { Ending::Converged });
+            }
+            let next = self.at(point.state.moved_all(point.normal.blocks(), step.as_slice()));
+            if next.value < point.value {
+                point = next;
+                rejected = false;
+                damping = (damping / 10.0).max(1e-6);
+                if !visit(&point) {
+                    return (point, Ending::Stopped);
+                }
+            } else {
+                rejected = true;
+                damping *= 8.0;
+                if damping > LAST_DAMPING {
+                    return (point, Ending::Stuck);
+                }
+            }
+        }
+        (point, Ending::Iterations)
+    }
 }
 
 /// −(H + μ diag H)⁻¹ g and the decrease that it promises; `None` if H is not positive definite.
@@ -124,4 +146,92 @@ fn step(normal: &Normal, damping: f64) -> Option<(DVector<f64>, f64)> {
     let step = -damped.cholesky()?.solve(&gradient);
     let gain = -gradient.dot(&step) - 0.5 * step.dot(&(&scaled * &step));
     Some((step.component_mul(&scale), gain))
+}
+
+#[cfg(test)]
+mod tests {
+    use prehend_geometry::SplitMix64;
+
+    use super::*;
+    use crate::synth::default_scene;
+    use crate::term::ModelSettings;
+
+    /// Measurements that are linear in the object's twist and the displacements of patches.
+    struct Linear {
+        residuals: DVector<f64>,
+        by_twist: DMatrix<f64>,
+        by_patches: DMatrix<f64>,
+        weight: f64,
+    }
+
+    impl Term for Linear {
+        fn name(&self) -> &'static str {
+            "linear"
+        }
+
+        fn value(&self, _state: &State) -> f64 {
+            0.5 * self.weight * self.residuals.norm_squared()
+        }
+
+        fn depends_on(&self, _block: Block) -> bool {
+            true
+        }
+
+        fn linearise(&self, state: &State, normal: &mut Normal) -> f64 {
+            let count = self.by_patches.ncols() / 3;
+            for (i, residual) in self.residuals.iter().enumerate() {
+                let of = |matrix: &DMatrix<f64>| matrix.row(i).iter().copied().collect::<Vec<_>>();
+                let (twist, patches) = (of(&self.by_twist), of(&self.by_patches));
+                let row = [
+                    (Block::ObjectPose, twist.as_slice()),
+                    (Block::Patches(count), patches.as_slice()),
+                ];
+                normal.add_row(&row, *residual, self.weight);
+            }
+            self.value(state)
+        }
+    }
+
+    #[test]
+    fn eliminating_patches_is_integrating_them_out() {
+        let scene = default_scene(1).unwrap();
+        let state = State::new(&scene.observation, &scene.object, &scene.truth).unwrap();
+        let settings = ModelSettings::default();
+        let patches = Patches::new(&scene.observation, state.centre().z, &settings).unwrap();
+        let mut random = SplitMix64::new(5);
+        let (rows, size) = (40, 3 * patches.count());
+        let mut matrix =
+            |columns, scale: f64| DMatrix::from_fn(rows, columns, |_, _| scale * random.normal());
+        let (by_twist, by_patches) = (matrix(6, 1.0), matrix(size, 1.0));
+        let residuals = matrix(1, 1e-3).column(0).into_owned();
+        let weight = 0.5e-3f64.powi(-2);
+        let prior = patches.precision().clone().cholesky().unwrap().inverse();
+        let covariance =
+            &by_patches * prior.kronecker(&DMatrix::identity(3, 3)) * by_patches.transpose()
+                + DMatrix::identity(rows, rows) / weight;
+        let information = covariance.cholesky().unwrap().inverse();
+        let expected = (
+            0.5 * residuals.dot(&(&information * &residuals)),
+            by_twist.tr_mul(&(&information * &residuals)),
+            by_twist.tr_mul(&(&information * &by_twist)),
+        );
+        let linear = Linear { residuals, by_twist, by_patches, weight };
+        let problem = Problem {
+            terms: vec![Box::new(linear)],
+            blocks: vec![Block::ObjectPose],
+            patches: Some(Arc::new(patches)),
+        };
+        let point = problem.at(state);
+        assert_eq!(point.normal.blocks(), [Block::ObjectPose]);
+        assert!((point.value / expected.0 - 1.0).abs() < 1e-8);
+        let close = |a: &DMatrix<f64>, b: &DMatrix<f64>| (a - b).amax() < 1e-8 * b.amax();
+        let gradient = |g: &DVector<f64>| DMatrix::from_column_slice(6, 1, g.as_slice());
+        assert!(close(&gradient(point.normal.gradient()), &gradient(&expected.1)));
+        assert!(close(point.normal.hessian(), &expected.2));
+        // At fixed patches there is more information, and more to pay.
+        let rigid = Problem { patches: None, ..problem }.at(point.state.clone());
+        assert!(rigid.value > point.value);
+        assert!(rigid.normal.hessian()[(0, 0)] > point.normal.hessian()[(0, 0)]);
+        assert_eq!(point.parts[0].normal.hessian(), rigid.normal.hessian());
+    }
 }

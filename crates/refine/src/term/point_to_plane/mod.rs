@@ -6,14 +6,15 @@ mod smooth_field;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use nalgebra::{SMatrix, SVector, Vector2, Vector3};
+use nalgebra::{SVector, Vector2, Vector3};
 use prehend_render::{DepthImage, Mask};
 use rayon::prelude::*;
 
 pub use self::scatter::Scatter;
 use self::smooth_field::{Fit, SmoothField};
 use super::depth::masked_depths;
-use super::{Term, share};
+use super::patch_sums::PatchSums;
+use super::{Patches, Term, share};
 use crate::{Block, Cauchy, Normal, Object, Observation, RefineError, State};
 
 /// Settings of [`PointToPlaneTerm`].
@@ -60,6 +61,8 @@ pub struct PointToPlaneTerm {
     object: Arc<Object>,
     points: Vec<Point>,
     field: Option<SmoothField>,
+    /// Where the object may be off from its model.
+    patches: Option<Arc<Patches>>,
     settings: PointToPlaneSettings,
 }
 
@@ -135,7 +138,12 @@ impl PointToPlaneTerm {
         }
         let places: Vec<_> = points.iter().map(|p| p.ray.push(1.0) * p.depth).collect();
         let field = SmoothField::new(&places, settings.deviation, settings.smoothness);
-        Ok(Self { object, points, field, settings })
+        Ok(Self { object, points, field, patches: None, settings })
+    }
+
+    /// The same where the object may be off from its model in `patches`.
+    pub(crate) fn with_patches(self, patches: Arc<Patches>) -> Self {
+        Self { patches: Some(patches), ..self }
     }
 
     /// Of each point at `state`; none of those that are nearest to nothing.
@@ -209,6 +217,10 @@ impl Term for PointToPlaneTerm {
         self.cost(&self.fit(&self.residuals(state)))
     }
 
+    fn depends_on(&self, _block: Block) -> bool {
+        true
+    }
+
     fn linearise(&self, state: &State, normal: &mut Normal) -> f64 {
         let residuals = self.residuals(state);
         let fit = self.fit(&residuals);
@@ -225,17 +237,31 @@ impl Term for PointToPlaneTerm {
             row
         };
         let rows: Vec<[f64; N]> = self.points.iter().zip(&residuals).map(row).collect();
-        let mut gradient = SVector::<f64, N>::zeros();
-        let mut hessian = SMatrix::<f64, N, N>::zeros();
-        for ((row, weight), left) in rows.iter().zip(&fit.weights).zip(&fit.left) {
+        let patches = self.patches.as_ref();
+        let patches = patches.filter(|p| normal.offset(Block::Patches(p.count())).is_some());
+        let count = patches.map_or(0, |patches| patches.count());
+        let patch = |i: usize| {
+            let (column, row) = self.points[i].pixel;
+            patches.and_then(|patches| patches.at(column, row))
+        };
+        let mut sums = PatchSums::<N>::new(count);
+        for (i, ((row, weight), left)) in rows.iter().zip(&fit.weights).zip(&fit.left).enumerate() {
             let row = SVector::from(*row);
+            let (gradient, hessian) = sums.of(patch(i));
             gradient.axpy(weight * left, &row, 1.0);
             hessian.ger(*weight, &row, &row, 1.0);
         }
+        let (gradient, mut hessian) = sums.equations();
         if let Some(field) = &self.field {
-            hessian -= field.lost(&fit, &rows);
+            let derivatives = |i: usize| {
+                let at = patch(i).map(PatchSums::<N>::place);
+                let displaced = at.into_iter().flat_map(move |at| at..at + 3).zip(rows[i]);
+                rows[i].into_iter().enumerate().chain(displaced)
+            };
+            hessian -= field.lost(&fit, hessian.nrows(), derivatives);
         }
-        normal.add(&[Block::ObjectPose, Block::Camera], &gradient, &hessian);
+        let blocks = [Block::ObjectPose, Block::Camera, Block::Patches(count)];
+        normal.add_dynamic(&blocks, &gradient, &hessian);
         self.cost(&fit)
     }
 }

@@ -1,6 +1,6 @@
 //! A smooth field by which measurements at places are off.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn, SMatrix, Vector3};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector3};
 
 /// Coefficients that the field is described by, at most.
 const MOST_COEFFICIENTS: usize = 24;
@@ -89,20 +89,22 @@ impl SmoothField {
         Some(fit)
     }
 
-    /// The information that residuals with derivatives `rows`, one a place, lose because they may also be the field. With the
-    /// weights of the fit it is never more than there is.
-    pub(super) fn lost<const N: usize>(&self, fit: &Fit, rows: &[[f64; N]]) -> SMatrix<f64, N, N> {
-        let Some(information) = &fit.information else { return SMatrix::zeros() };
-        let mut shared = DMatrix::zeros(self.features.nrows(), N);
-        for (feature, (weight, row)) in
-            self.features.column_iter().zip(fit.weights.iter().zip(rows))
-        {
-            for (mut column, value) in shared.column_iter_mut().zip(row) {
-                column.axpy(weight * value, &feature, 1.0);
+    /// The information about `size` parameters that residuals lose because they may also be the field; `derivatives` are those of a
+    /// residual that are not zero. With the weights of the fit it is never more than there is.
+    pub(super) fn lost<I: Iterator<Item = (usize, f64)>>(
+        &self,
+        fit: &Fit,
+        size: usize,
+        derivatives: impl Fn(usize) -> I,
+    ) -> DMatrix<f64> {
+        let Some(information) = &fit.information else { return DMatrix::zeros(size, size) };
+        let mut shared = DMatrix::zeros(self.features.nrows(), size);
+        for (i, (feature, weight)) in self.features.column_iter().zip(&fit.weights).enumerate() {
+            for (parameter, derivative) in derivatives(i) {
+                shared.column_mut(parameter).axpy(weight * derivative, &feature, 1.0);
             }
         }
-        let lost = shared.tr_mul(&information.solve(&shared));
-        SMatrix::from_fn(|r, c| lost[(r, c)])
+        shared.tr_mul(&information.solve(&shared))
     }
 }
 
@@ -138,7 +140,7 @@ mod tests {
         let rows: Vec<[f64; 2]> = (0..40).map(|_| [random.normal(), random.normal()]).collect();
         let weight = 1.0 / 0.5e-3f64.powi(2);
         let fit = field.fit(&residuals, |_, _| weight).unwrap();
-        let lost = field.lost(&fit, &rows);
+        let lost = field.lost(&fit, 2, |i| rows[i].into_iter().enumerate());
         // The same with the covariance of all residuals.
         let covariance =
             field.features.tr_mul(&field.features) + DMatrix::identity(40, 40) / weight;

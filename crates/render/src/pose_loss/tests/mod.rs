@@ -6,6 +6,7 @@ mod occluder;
 mod picture;
 mod quick;
 mod rows;
+mod tiles;
 mod truth;
 
 use super::*;

@@ -1,0 +1,91 @@
+//! Normal equations by patch.
+
+use nalgebra::{DMatrix, DVector, SMatrix, SVector};
+
+/// Gradient and Gauss–Newton Hessian by `N` parameters of what each patch shows, the first three of which are the object's place.
+///
+/// A patch that is displaced does to what it shows what the object does when all of it is, so that its own derivatives are among
+/// those by the object's place.
+pub(super) struct PatchSums<const N: usize> {
+    /// Of each patch, and last of what is in none.
+    parts: Vec<(SVector<f64, N>, SMatrix<f64, N, N>)>,
+}
+
+impl<const N: usize> PatchSums<N> {
+    /// Of `count` patches, none of which shows anything.
+    pub(super) fn new(count: usize) -> Self {
+        Self { parts: vec![(SVector::zeros(), SMatrix::zeros()); count + 1] }
+    }
+
+    /// The sums of what is seen in `patch`, or in none.
+    pub(super) fn of(
+        &mut self,
+        patch: Option<usize>,
+    ) -> &mut (SVector<f64, N>, SMatrix<f64, N, N>) {
+        let none = self.parts.len() - 1;
+        &mut self.parts[patch.unwrap_or(none)]
+    }
+
+    /// Where the displacement of `patch` is among all parameters.
+    pub(super) fn place(patch: usize) -> usize {
+        N + 3 * patch
+    }
+
+    /// Gradient and Hessian by the parameters and by the displacements of all patches.
+    pub(super) fn equations(&self) -> (DVector<f64>, DMatrix<f64>) {
+        let size = Self::place(self.parts.len() - 1);
+        let (mut gradient, mut hessian) = (DVector::zeros(size), DMatrix::zeros(size, size));
+        for (patch, (g, h)) in self.parts.iter().enumerate() {
+            let mut all = gradient.fixed_rows_mut::<N>(0);
+            all += g;
+            let mut all = hessian.fixed_view_mut::<N, N>(0, 0);
+            all += h;
+            let at = Self::place(patch);
+            if at == size {
+                break;
+            }
+            let shift = h.fixed_columns::<3>(0);
+            gradient.fixed_rows_mut::<3>(at).copy_from(&g.fixed_rows::<3>(0));
+            hessian.fixed_view_mut::<3, 3>(at, at).copy_from(&shift.fixed_rows::<3>(0));
+            hessian.fixed_view_mut::<N, 3>(0, at).copy_from(&shift);
+            hessian.fixed_view_mut::<3, N>(at, 0).copy_from(&shift.transpose());
+        }
+        (gradient, hessian)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_patch_moves_what_it_shows_as_the_object_does() {
+        // Residuals with derivatives by the object's place and one thing more.
+        let rows = [
+            (Some(0), [1.0, -2.0, 0.5, 3.0]),
+            (Some(1), [0.5, 1.0, 2.0, -1.0]),
+            (Some(1), [-1.5, 0.25, 1.0, 2.0]),
+            (None, [2.0, 1.0, -1.0, 0.5]),
+        ];
+        let mut sums = PatchSums::<4>::new(2);
+        let mut expected = DMatrix::zeros(10, 10);
+        let mut pull = DVector::zeros(10);
+        for (residual, (patch, row)) in rows.iter().enumerate() {
+            let residual = residual as f64 - 1.5;
+            let (gradient, hessian) = sums.of(*patch);
+            let derivatives = SVector::from(*row);
+            *gradient += derivatives * residual;
+            *hessian += derivatives * derivatives.transpose();
+            let mut whole = DVector::zeros(10);
+            whole.rows_mut(0, 4).copy_from(&derivatives);
+            if let Some(patch) = patch {
+                whole.rows_mut(4 + 3 * patch, 3).copy_from(&derivatives.fixed_rows::<3>(0));
+            }
+            pull.axpy(residual, &whole, 1.0);
+            expected += &whole * whole.transpose();
+        }
+        let (gradient, hessian) = sums.equations();
+        assert!((gradient - pull).amax() < 1e-12);
+        assert!((hessian - expected).amax() < 1e-12);
+    }
+}

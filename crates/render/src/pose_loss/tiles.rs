@@ -1,0 +1,82 @@
+//! Sums by tiles of the image.
+
+use std::ops::Range;
+
+use super::Linearised;
+use super::sums::Sums;
+
+/// What the pixels of one square tile of the image bring to a loss.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tile {
+    /// How many tiles are left of it.
+    pub column: usize,
+    /// How many tiles are above it.
+    pub row: usize,
+    /// Its share of the loss, with derivatives by a twist of what it shows alone.
+    pub at: Linearised,
+}
+
+/// How an image is cut into square tiles, from its upper left corner on.
+#[derive(Clone, Copy)]
+pub(crate) struct Tiling {
+    side: usize,
+}
+
+impl Tiling {
+    /// One tile for all.
+    pub(crate) const WHOLE: Self = Self { side: usize::MAX };
+
+    /// Tiles of `side` pixels, at least one.
+    pub(crate) fn new(side: usize) -> Self {
+        Self { side: side.max(1) }
+    }
+
+    /// The parts of `range`, of columns or of rows, that lie in one tile each.
+    pub(crate) fn cut(self, range: Range<usize>) -> impl Iterator<Item = Range<usize>> {
+        let mut from = range.start;
+        std::iter::from_fn(move || {
+            let to = (from / self.side + 1).saturating_mul(self.side).min(range.end);
+            let part = from..to;
+            from = to;
+            (!part.is_empty()).then_some(part)
+        })
+    }
+}
+
+/// Sums over the pixels of some tiles.
+pub(crate) struct TileSums {
+    pub(crate) tiling: Tiling,
+    /// Column and row of a tile, and its sums.
+    sums: Vec<([usize; 2], Sums)>,
+}
+
+impl TileSums {
+    pub(crate) fn new(tiling: Tiling) -> Self {
+        Self { tiling, sums: Vec::new() }
+    }
+
+    /// The sums of the tile that has pixel (x, y).
+    pub(crate) fn at(&mut self, x: usize, y: usize) -> &mut Sums {
+        let tile = [x / self.tiling.side, y / self.tiling.side];
+        let known = self.sums.iter().position(|(other, _)| *other == tile);
+        let index = known.unwrap_or_else(|| {
+            self.sums.push((tile, Sums::new()));
+            self.sums.len() - 1
+        });
+        &mut self.sums[index].1
+    }
+
+    /// To be called after each image row: see [`Sums::end_row`].
+    pub(crate) fn end_row(&mut self) {
+        self.sums.iter_mut().for_each(|(_, sums)| sums.end_row());
+    }
+}
+
+impl IntoIterator for TileSums {
+    type Item = ([usize; 2], Sums);
+    type IntoIter = std::vec::IntoIter<Self::Item>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.sums.into_iter()
+    }
+}
