@@ -1,7 +1,7 @@
 //! Tables for people, as text and as Markdown.
 
 use super::calibration::Calibration;
-use super::comparison::Contrast;
+use super::comparison::{Comparison, Contrast};
 use super::kind::{INITIAL, Kind, TRUTH};
 use super::published::Published;
 use super::tables::{Block, ERRORS, Line, Tables};
@@ -72,6 +72,11 @@ fn sections(tables: &Tables) -> Vec<Section> {
         if objects.len() > 1 && tables.study != Kind::Robustness {
             let table = by_object(tables.study, block, &objects);
             add(format!("Noise {level}: means by object"), Body::Table(table));
+            if let Some(against) = against(tables.study, block) {
+                let heading = format!("mean over that of {against} by object, same frames");
+                let table = ratios_by_object(tables.study, block, &objects);
+                add(format!("Noise {level}: {heading} [95 % confidence]"), Body::Table(table));
+            }
         }
     }
     for calibration in &tables.calibrations {
@@ -162,8 +167,7 @@ fn medians(study: Kind, block: &Block) -> Table {
 }
 
 fn changes(study: Kind, block: &Block) -> Table {
-    let errors: Vec<usize> = SHOWN.into_iter().filter(|m| ERRORS.contains(m)).collect();
-    let metrics = present(block, &errors);
+    let metrics = errors_present(block);
     let mut out = table("change %", &metrics);
     for line in block.lines.iter().filter(|l| l.row != TRUTH && l.row != INITIAL) {
         let cell = |m: usize| {
@@ -179,40 +183,80 @@ fn changes(study: Kind, block: &Block) -> Table {
     out
 }
 
-/// Differences and ratios of the means of rows that are compared frame by frame.
-fn comparisons(study: Kind, block: &Block) -> Vec<(String, Table)> {
-    let Some(first) = block.comparisons.first() else { return Vec::new() };
-    let errors: Vec<usize> = SHOWN.into_iter().filter(|m| ERRORS.contains(m)).collect();
-    let metrics = present(block, &errors);
-    let against = match study {
+/// What rows of the block are compared with, frame by frame, if anything.
+fn against(study: Kind, block: &Block) -> Option<&str> {
+    let first = block.comparisons.first()?;
+    Some(match study {
         Kind::Robustness => study.reference().unwrap_or_default(),
         _ => first.reference.as_str(),
-    };
+    })
+}
+
+/// The errors that any row of the block has.
+fn errors_present(block: &Block) -> Vec<usize> {
+    let errors: Vec<usize> = SHOWN.into_iter().filter(|m| ERRORS.contains(m)).collect();
+    present(block, &errors)
+}
+
+/// Differences and ratios of the means of rows that are compared frame by frame.
+fn comparisons(study: Kind, block: &Block) -> Vec<(String, Table)> {
+    let Some(against) = against(study, block) else { return Vec::new() };
+    let metrics = errors_present(block);
     let make = |name: &str, cell: &dyn Fn(&Contrast) -> Option<String>| {
         let mut out = table(name, &metrics);
         for comparison in &block.comparisons {
-            let n = comparison.metrics.iter().flatten().map(|c| c.n).max().unwrap_or(0);
-            let cells = metrics.iter().map(|&m| {
-                comparison.metrics[m].as_ref().and_then(cell).unwrap_or_else(|| "-".into())
-            });
-            let label = row_label(study, &comparison.row);
-            let head = [label, format!("{n}/{}", block.frames)];
-            out.push(head.into_iter().chain(cells).collect());
+            out.push(compared(
+                row_label(study, &comparison.row),
+                comparison,
+                block,
+                &metrics,
+                cell,
+            ));
         }
         out
     };
-    let difference = make("difference", &|c| {
+    let difference = |c: &Contrast| {
         let show = |v: f64| if v < 0.0 { number(v) } else { format!("+{}", number(v)) };
         Some(with_interval(show(c.difference), c.difference_interval.map(|i| i.map(show))))
-    });
-    let ratio = make("ratio", &|c| {
-        let show = |v: f64| format!("{v:.2}");
-        Some(with_interval(show(c.ratio?), c.ratio_interval.map(|i| i.map(show))))
-    });
+    };
+    let heading =
+        |what: &str| format!("mean {what} that of {against}, same frames [95 % confidence]");
     vec![
-        (format!("mean less that of {against}, same frames [95 % confidence]"), difference),
-        (format!("mean over that of {against}, same frames [95 % confidence]"), ratio),
+        (heading("less"), make("difference", &difference)),
+        (heading("over"), make("ratio", &ratio)),
     ]
+}
+
+fn ratios_by_object(study: Kind, whole: &Block, objects: &[&Block]) -> Table {
+    let metrics = errors_present(whole);
+    let mut out = table("ratio", &metrics);
+    for block in objects {
+        let object = block.object.unwrap_or(0);
+        for comparison in &block.comparisons {
+            let label = format!("object {object}: {}", row_label(study, &comparison.row));
+            out.push(compared(label, comparison, block, &metrics, &ratio));
+        }
+    }
+    out
+}
+
+fn compared(
+    label: String,
+    comparison: &Comparison,
+    block: &Block,
+    metrics: &[usize],
+    cell: &dyn Fn(&Contrast) -> Option<String>,
+) -> Vec<String> {
+    let n = comparison.metrics.iter().flatten().map(|c| c.n).max().unwrap_or(0);
+    let cells = metrics
+        .iter()
+        .map(|&m| comparison.metrics[m].as_ref().and_then(cell).unwrap_or_else(|| "-".into()));
+    [label, format!("{n}/{}", block.frames)].into_iter().chain(cells).collect()
+}
+
+fn ratio(contrast: &Contrast) -> Option<String> {
+    let show = |v: f64| format!("{v:.2}");
+    Some(with_interval(show(contrast.ratio?), contrast.ratio_interval.map(|i| i.map(show))))
 }
 
 fn coverage(calibration: &Calibration) -> Table {
@@ -334,6 +378,8 @@ mod tests {
         assert!(said.contains("Noise low: mean less that of robust-icp, same frames"), "{said}");
         let ratios = said.split("mean over that of robust-icp").nth(1).unwrap();
         assert!(ratios.contains("combined  2/4  0.12 [0.12, 0.12]"), "{said}");
+        let by_object = said.split("mean over that of robust-icp by object").nth(1).unwrap();
+        assert!(by_object.contains("object 6: combined"), "{said}");
 
         let (design, records) = super::super::calibration::tests::calibrated(20);
         let said = text(&Tables::new(&design, &records));
