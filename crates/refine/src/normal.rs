@@ -14,6 +14,16 @@ pub struct Normal {
     entries: Vec<(usize, f64)>,
 }
 
+/// What [`Normal::without_last`] finds.
+pub(crate) struct Eliminated {
+    /// The equations of the other blocks.
+    pub(crate) rest: Normal,
+    /// How much lower the least value is.
+    pub(crate) gain: f64,
+    /// Logarithm of the determinant of the block's Hessian.
+    pub(crate) log_determinant: f64,
+}
+
 impl Normal {
     /// Empty equations over `blocks`, in that order.
     pub fn new(blocks: &[Block]) -> Self {
@@ -32,27 +42,24 @@ impl Normal {
         Some(self.blocks[..position].iter().map(|b| b.dimension()).sum())
     }
 
-    /// What is left if the last block takes the value at which the quadratic model of the sum is least: the equations of the
-    /// other blocks, and how much lower that value is. `None` if the last block is not determined.
-    pub(crate) fn without_last(&self) -> Option<(Self, f64)> {
+    /// What is left if the last block takes the value at which the quadratic model of the sum is least. `None` if that is not
+    /// determined.
+    pub(crate) fn without_last(&self) -> Option<Eliminated> {
         let (last, blocks) = self.blocks.split_last()?;
         let (n, m) = (self.gradient.len() - last.dimension(), last.dimension());
         let factor = self.hessian.view((n, n), (m, m)).clone_owned().cholesky()?;
-        let solved = |right: DMatrix<f64>| factor.l_dirty().solve_lower_triangular(&right);
-        let coupling = solved(self.hessian.view((n, 0), (m, n)).clone_owned())?;
-        let pull = solved(
-            self.gradient
-                .rows(n, m)
-                .clone_owned()
-                .reshape_generic(nalgebra::Dyn(m), nalgebra::Dyn(1)),
-        )?;
-        let left = Self {
+        let lower = factor.l_dirty();
+        let coupling =
+            lower.solve_lower_triangular(&self.hessian.view((n, 0), (m, n)).clone_owned())?;
+        let pull = lower.solve_lower_triangular(&self.gradient.rows(n, m).clone_owned())?;
+        let rest = Self {
             blocks: blocks.to_vec(),
-            gradient: self.gradient.rows(0, n) - coupling.tr_mul(&pull).column(0),
+            gradient: self.gradient.rows(0, n) - coupling.tr_mul(&pull),
             hessian: self.hessian.view((0, 0), (n, n)) - coupling.tr_mul(&coupling),
             entries: Vec::new(),
         };
-        Some((left, 0.5 * pull.norm_squared()))
+        let log_determinant = 2.0 * lower.diagonal().iter().map(|d| d.ln()).sum::<f64>();
+        Some(Eliminated { rest, gain: 0.5 * pull.norm_squared(), log_determinant })
     }
 
     /// Leaves the first `blocks` only, as if the others were fixed.
@@ -134,6 +141,9 @@ impl Normal {
     }
 
     /// The same of blocks whose size is not known beforehand.
+    ///
+    /// # Panics
+    /// If there are fewer numbers than the blocks have.
     pub fn add_dynamic(
         &mut self,
         blocks: &[Block],

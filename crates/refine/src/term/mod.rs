@@ -16,7 +16,7 @@ pub(crate) use depth::back_project;
 pub use depth::{DepthSettings, DepthTerm};
 pub use free_space::{FreeSpaceSettings, FreeSpaceTerm};
 pub use hand_depth::{HandDepthSettings, HandDepthTerm};
-pub use patches::ModelSettings;
+pub use patches::DeviationSettings;
 pub(crate) use patches::Patches;
 pub use penetration::{PenetrationSettings, PenetrationTerm};
 pub use physics::{PhysicsSettings, PhysicsTerm};

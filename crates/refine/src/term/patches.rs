@@ -1,33 +1,33 @@
 //! Patches of the object's surface that may each be off by themselves.
 
+use std::collections::BTreeSet;
+
 use nalgebra::{DMatrix, Vector3};
 
 use crate::Observation;
 
 /// How far the surface of an object is from that of its model.
 #[derive(Clone, Debug, PartialEq)]
-pub struct ModelSettings {
+pub struct DeviationSettings {
     /// Standard deviation of a place of the surface from where the model has it, in each direction \[m\]; zero if models are exact.
     pub deviation: f64,
     /// Distance over which that changes \[m\].
-    pub length: f64,
+    pub smoothness: f64,
 }
 
-impl Default for ModelSettings {
+impl Default for DeviationSettings {
     /// A scan, or a careful model, of a thing that fits into a hand.
     fn default() -> Self {
-        Self { deviation: 7e-4, length: 20e-3 }
+        Self { deviation: 7e-4, smoothness: 20e-3 }
     }
 }
 
-/// Patches at most, about: that many tiles of the image would cover the mask.
-const MOST_PATCHES: f64 = 30.0;
+/// Patches that would cover the mask if all were full, and at most.
+const FULL_PATCHES: f64 = 30.0;
+const MOST_PATCHES: usize = 64;
 
 /// Width of a patch at least, as a share of the distance over which the deviation changes.
 const LEAST_SIDE: f64 = 0.6;
-
-/// Tiles are so many pixels wide, or a multiple, to be of whole pixels in smaller images too.
-const UNIT: usize = 4;
 
 /// Measured depths that are farther than this share of the object's distance from it are of something else.
 const NEAR: f64 = 0.2;
@@ -50,27 +50,41 @@ pub(crate) struct Patches {
     numbers: Vec<Option<usize>>,
     /// Inverse of the covariance of the patches' displacements in one direction \[1/m²\].
     precision: DMatrix<f64>,
+    /// Logarithm of the determinant of that of all displacements.
+    log_determinant: f64,
 }
 
 impl Patches {
-    /// Of the object in `observation`, which is about `distance` from the camera \[m\] where no depth is measured. `None` if there is
-    /// nothing of it to be seen, or models are exact.
+    /// Of the object in `observation`, which is about `distance` from the camera \[m\] where no depth is measured; tiles are a multiple
+    /// of `unit` pixels wide, to be of whole pixels in images that are smaller by that. `None` if there is nothing of it to be seen, or models are
+    /// exact.
     pub(crate) fn new(
         observation: &Observation,
         distance: f64,
-        settings: &ModelSettings,
+        settings: &DeviationSettings,
+        unit: usize,
     ) -> Option<Self> {
-        let &ModelSettings { deviation, length } = settings;
-        if !(deviation > 0.0 && length > 0.0) {
+        let &DeviationSettings { deviation, smoothness } = settings;
+        if !(deviation > 0.0 && smoothness > 0.0) {
             return None;
         }
         let (mask, camera) = (&observation.mask, &observation.camera);
         let width = camera.width;
         let seen = || mask.pixels().iter().enumerate().filter(|(_, m)| **m).map(|(i, _)| i);
-        let least = LEAST_SIDE * length * camera.fx / distance;
-        let side = (seen().count() as f64 / MOST_PATCHES).sqrt().max(least);
-        let side = (side as usize).div_ceil(UNIT).max(1) * UNIT;
-        let tile = |pixel: usize| [pixel % width / side, pixel / width / side];
+        let tile = |pixel: usize, side: usize| [pixel % width / side, pixel / width / side];
+        let largest = width.max(camera.height);
+        let least = LEAST_SIDE * smoothness * camera.fx / distance;
+        let wanted = (seen().count() as f64 / FULL_PATCHES).sqrt().max(least);
+        let mut side = (wanted.min(largest as f64).ceil() as usize).max(1).next_multiple_of(unit);
+        // Specks of a mask would each have a tile of their own.
+        while side < largest {
+            let tiles: BTreeSet<[usize; 2]> = seen().map(|pixel| tile(pixel, side)).collect();
+            if tiles.len() <= MOST_PATCHES {
+                break;
+            }
+            side += side.div_ceil(4).next_multiple_of(unit);
+        }
+        let tile = |pixel: usize| tile(pixel, side);
         let first = [0, 1].map(|k| seen().map(|i| tile(i)[k]).min());
         let last = [0, 1].map(|k| seen().map(|i| tile(i)[k]).max());
         let ([Some(left), Some(top)], [Some(right), Some(bottom)]) = (first, last) else {
@@ -100,10 +114,12 @@ impl Patches {
         let covariance = DMatrix::from_fn(places.len(), places.len(), |i, j| {
             let squared = (places[i] - places[j]).norm_squared();
             let own = if i == j { OWN } else { 0.0 };
-            deviation.powi(2) * ((-0.5 * squared / length.powi(2)).exp() + own)
+            deviation.powi(2) * ((-0.5 * squared / smoothness.powi(2)).exp() + own)
         });
-        let precision = covariance.cholesky()?.inverse();
-        Some(Self { side, first: [left, top], columns, numbers, precision })
+        let factor = covariance.cholesky()?;
+        let log_determinant = -3.0 * factor.ln_determinant();
+        let precision = factor.inverse();
+        Some(Self { side, first: [left, top], columns, numbers, precision, log_determinant })
     }
 
     /// How many there are.
@@ -131,6 +147,11 @@ impl Patches {
         self.in_tile(x / self.side, y / self.side)
     }
 
+    /// Logarithm of the determinant of the information that all displacements have beforehand.
+    pub(crate) fn log_determinant(&self) -> f64 {
+        self.log_determinant
+    }
+
     /// Inverse of the covariance of the patches' displacements in one direction \[1/m²\].
     pub(crate) fn precision(&self) -> &DMatrix<f64> {
         &self.precision
@@ -146,16 +167,16 @@ mod tests {
     fn every_pixel_of_the_mask_is_in_a_patch_and_neighbours_are_off_alike() {
         let scene = default_scene(1).unwrap();
         let (observation, distance) = (&scene.observation, scene.truth.translation.z);
-        let settings = ModelSettings::default();
-        let patches = Patches::new(observation, distance, &settings).unwrap();
+        let settings = DeviationSettings::default();
+        let patches = Patches::new(observation, distance, &settings, 4).unwrap();
         let width = observation.camera.width;
         let mut seen = vec![0; patches.count()];
         for (pixel, _) in observation.mask.pixels().iter().enumerate().filter(|(_, m)| **m) {
             seen[patches.at(pixel % width, pixel / width).unwrap()] += 1;
         }
         assert!(seen.iter().all(|count| *count > 0), "{seen:?}");
-        assert!((8..=60).contains(&seen.len()), "{} patches", seen.len());
-        assert_eq!(patches.side() % UNIT, 0);
+        assert!((8..=MOST_PATCHES).contains(&seen.len()), "{} patches", seen.len());
+        assert_eq!(patches.side() % 4, 0);
         assert_eq!(patches.at(0, 0), None);
         let covariance = patches.precision().clone().cholesky().unwrap().inverse();
         let variance = settings.deviation.powi(2);
@@ -169,10 +190,27 @@ mod tests {
     #[test]
     fn an_exact_model_has_none() {
         let scene = default_scene(1).unwrap();
-        let settings = ModelSettings { deviation: 0.0, ..ModelSettings::default() };
-        assert!(Patches::new(&scene.observation, 0.5, &settings).is_none());
+        let settings = DeviationSettings { deviation: 0.0, ..DeviationSettings::default() };
+        assert!(Patches::new(&scene.observation, 0.5, &settings, 1).is_none());
         let mut unseen = scene.observation.clone();
         unseen.mask = prehend_render::Mask::filled(640, 480, false);
-        assert!(Patches::new(&unseen, 0.5, &ModelSettings::default()).is_none());
+        assert!(Patches::new(&unseen, 0.5, &DeviationSettings::default(), 1).is_none());
+    }
+
+    #[test]
+    fn specks_and_a_stiff_model_make_few() {
+        let scene = default_scene(1).unwrap();
+        let mut specks = scene.observation.clone();
+        let speck = |pixel: usize| pixel % 640 % 29 == 0 && pixel / 640 % 31 == 0;
+        let mask = (0..640 * 480).map(speck).collect();
+        specks.mask = prehend_render::Mask::new(640, 480, mask).unwrap();
+        let settings = DeviationSettings::default();
+        let patches = Patches::new(&specks, 0.5, &settings, 3).unwrap();
+        assert!(patches.count() <= MOST_PATCHES && patches.side() % 3 == 0);
+        for (smoothness, distance) in [(f64::INFINITY, 0.5), (20e-3, 0.0)] {
+            let settings = DeviationSettings { smoothness, ..settings.clone() };
+            let patches = Patches::new(&scene.observation, distance, &settings, 4).unwrap();
+            assert!((1..=2).contains(&patches.count()), "{}", patches.count());
+        }
     }
 }

@@ -139,7 +139,7 @@ struct Solved {
 }
 
 impl Solved {
-    /// Negative log-likelihood without what was known before \[nat\].
+    /// Negative log-likelihood without what was known before, of the model as it is \[nat\].
     fn misfit(&self) -> f64 {
         self.point.parts.iter().filter(|p| p.name != "prior").map(|p| p.value).sum()
     }
@@ -284,7 +284,8 @@ impl Tracker {
             RefineError::Setting { name: "accuracy", problem }
         })?;
         let carried = Arc::new(carried);
-        let mut problem = known.problem(state, &self.settings.stage, &self.settings.fused)?;
+        let (stage, fused) = (&self.settings.stage, &self.settings.fused);
+        let mut problem = known.problem(state, stage, fused, known.patches(state, stage, fused))?;
         problem.terms.retain(|t| t.name() != carried.name());
         problem.terms.insert(0, Box::new(Arc::clone(&carried)));
         Ok((problem, carried))
@@ -326,7 +327,9 @@ impl Tracker {
             best = state.clone();
             true
         })?;
-        let problem = known.problem(initial, &self.settings.stage, &self.settings.fused)?;
+        let (stage, settings) = (&self.settings.stage, &self.settings.fused);
+        let patches = known.patches(initial, stage, settings);
+        let problem = known.problem(initial, stage, settings, patches)?;
         Ok(self.solve(&problem, best, &Clock::start(None)))
     }
 

@@ -182,7 +182,8 @@ fn laplace(point: &Point) -> (Matrix6<f64>, f64) {
     let all = factor.inverse();
     let at = point.normal.offset(Block::ObjectPose).unwrap_or(0);
     let covariance = Matrix6::from_fn(|r, c| all[(at + r, at + c)]);
-    (covariance, -factor.log_determinant())
+    let displaced = point.displaced.as_ref().map_or(0.0, |displaced| displaced.log_determinant);
+    (covariance, -factor.log_determinant() - displaced)
 }
 
 /// Directions in which the pose of `point` is uncertain, the most uncertain first: twists about the object's centre that move
@@ -219,8 +220,17 @@ fn disagreements(point: &Point) -> Vec<Disagreement> {
         let factor = Factor::new(part.hessian(), 1e-3)?;
         Some(factor.squared_norm(part.gradient()).max(0.0).sqrt())
     };
+    // A sense is not to blame for what the model is off by.
+    let alone = |part: &super::solve::Part| {
+        let patches = &point.displaced.as_ref()?.patches;
+        let block = Block::Patches(patches.count());
+        part.normal.offset(block)?;
+        let mut normal = part.normal.clone();
+        normal.add_precision(block, patches.precision());
+        Some(normal.without_last()?.rest)
+    };
     let of = |part: &super::solve::Part| {
-        let distance = distance(&part.normal)?;
+        let distance = distance(alone(part).as_ref().unwrap_or(&part.normal))?;
         (distance > DISAGREES).then_some(Disagreement { evidence: part.name, distance })
     };
     point.parts.iter().filter_map(of).collect()

@@ -1,7 +1,7 @@
 //! The terms of a stage, for the evidence that an observation brings.
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use prehend_render::DepthImage;
 
@@ -32,8 +32,6 @@ pub(crate) struct Known<'a> {
     /// The segmented image, and smaller ones, by how many times smaller they are: stages share them. What may hide the
     /// object in them is the hand, and what was seen beside the mask.
     images: Mutex<BTreeMap<usize, Segmented>>,
-    /// Where the object may be off from its model, if it may; the first stage that asks for it finds it.
-    patches: OnceLock<Option<Arc<Patches>>>,
 }
 
 /// How far in front of the object something beside the mask must be to hide it \[m\]: what is seen there may be the
@@ -64,16 +62,7 @@ impl<'a> Known<'a> {
         let images = Mutex::new(BTreeMap::from([(1, image)]));
         let depth = Arc::new(observation.depth.clone());
         let coloured = observation.has_colours();
-        Ok(Self {
-            observation,
-            object,
-            robot,
-            hand,
-            coloured,
-            depth,
-            images,
-            patches: OnceLock::new(),
-        })
+        Ok(Self { observation, object, robot, hand, coloured, depth, images })
     }
 
     /// The segmented image, `factor` times smaller.
@@ -99,20 +88,32 @@ impl<'a> Known<'a> {
         term.scatter(state)
     }
 
-    /// What `stage` solves: all terms, a prior about `initial` among them, by the pose and all nuisances.
+    /// Where the object may be off from its model in `stage`, if it may; it is about as far away as at `initial`.
+    pub(crate) fn patches(
+        &self,
+        initial: &State,
+        stage: &Stage,
+        settings: &FusedSettings,
+    ) -> Option<Arc<Patches>> {
+        if !stage.model_deviates || !settings.nuisances.contains(&Nuisance::Model) {
+            return None;
+        }
+        let distance = initial.centre().z;
+        let unit = settings.rendering.downsample * stage.downsample;
+        Patches::new(self.observation, distance, &settings.model, unit).map(Arc::new)
+    }
+
+    /// What `stage` solves: all terms, a prior about `initial` among them, by the pose and all nuisances, `patches` among them.
     pub(crate) fn problem(
         &self,
         initial: &State,
         stage: &Stage,
         settings: &FusedSettings,
+        patches: Option<Arc<Patches>>,
     ) -> Result<Problem, RefineError> {
         let blocks = settings.blocks(self.robot.is_some(), initial);
-        let deviates = stage.model_deviates && settings.nuisances.contains(&Nuisance::Model);
-        let distance = initial.centre().z;
-        let patches = || Patches::new(self.observation, distance, &settings.model).map(Arc::new);
-        let patches = self.patches.get_or_init(patches).as_ref().filter(|_| deviates);
-        let terms = self.terms(initial, stage, settings, patches)?;
-        Ok(Problem { terms, blocks, patches: patches.cloned() })
+        let terms = self.terms(initial, stage, settings, patches.as_ref())?;
+        Ok(Problem { terms, blocks, patches })
     }
 
     fn terms(

@@ -6,7 +6,7 @@ use super::factor::Factor;
 use super::solve::Point;
 use crate::Block;
 
-/// Logarithm of the odds that everything but the object's pose is exactly as it is said to be, rather than off by its stated
+/// Logarithm of the odds that everything but the object's pose, its model too, is exactly as it is said to be, rather than off by its stated
 /// deviations.
 ///
 /// For a hypothesis nested in another the odds are the posterior's density there over the prior's (Dickey, 1971), both of
@@ -35,5 +35,10 @@ pub(super) fn log_odds_of_exact(point: &Point) -> Option<f64> {
     let found = of(all, &rest, &rest) - &coupling * through_pose * coupling.transpose();
     let misfit = 0.5 * offset.dot(&(&found * &offset));
     let determinants = Factor::new(&found, 0.0)?.log_determinant() - said.log_determinant();
-    Some(0.5 * determinants - misfit)
+    // The model is exact then too.
+    let of_model = point.displaced.as_ref().map_or(0.0, |displaced| {
+        let said = displaced.patches.log_determinant();
+        0.5 * (displaced.log_determinant - said) - displaced.gain
+    });
+    Some(0.5 * determinants - misfit + of_model)
 }

@@ -67,19 +67,18 @@ impl Fused {
             go_on
         };
         for (index, stage) in self.settings.stages.iter().enumerate() {
+            let patches = known.patches(&initial, stage, &settings);
             if stage.measured_scatter
                 && let Some(scatter) = known.scatter(&states[0], &self.settings)
             {
                 settings.depth.sigma = scatter.own.clamp(FINEST, COARSEST);
                 // The model's part of it is what patches are off by.
-                let deviates =
-                    stage.model_deviates && settings.nuisances.contains(&Nuisance::Model);
-                let model = if deviates { settings.model.deviation } else { 0.0 };
+                let model = patches.as_ref().map_or(0.0, |_| settings.model.deviation);
                 let shared = (scatter.shared.powi(2) - model.powi(2)).max(0.0).sqrt();
                 settings.depth.deviation = shared.min(COARSEST);
                 settings.depth.effective_points = settings.most_points;
             }
-            let problem = known.problem(&initial, stage, &settings)?;
+            let problem = known.problem(&initial, stage, &settings, patches)?;
             let solve_from = |state: &State| {
                 let start = problem.at(state.clone());
                 problem.solve(start, stage.iterations, stage.last_gain, |_| true)
@@ -141,15 +140,14 @@ impl Fused {
             };
             states = found.iter().map(as_said).collect();
             // Then depth's errors are not alike over whole patches either.
+            settings.depth.deviation = 0.0;
             if let Some(scatter) = known.scatter(&states[0], &self.settings) {
                 settings.depth.sigma = scatter.sigma.clamp(FINEST, COARSEST);
-                settings.depth.deviation = 0.0;
                 settings.depth.effective_points = scatter.effective_points;
             }
             let problem = Problem {
                 blocks: vec![Block::ObjectPose],
-                patches: None,
-                ..known.problem(&initial, last, &settings)?
+                ..known.problem(&initial, last, &settings, None)?
             };
             let solve_from = |state: &State| {
                 let start = problem.at(state.clone());

@@ -2,8 +2,8 @@
 
 use super::confidence::Width;
 use crate::term::{
-    FreeSpaceSettings, HandDepthSettings, ModelSettings, PenetrationSettings, PointToPlaneSettings,
-    PriorSettings, RenderingSettings, TactileSettings,
+    DeviationSettings, FreeSpaceSettings, HandDepthSettings, PenetrationSettings,
+    PointToPlaneSettings, PriorSettings, RenderingSettings, TactileSettings,
 };
 use crate::{Block, State};
 
@@ -144,7 +144,7 @@ pub struct FusedSettings {
     /// What makes the posterior as wide as errors are.
     pub width: Width,
     /// How far the object's surface may be from the model's, patch by patch, with [`Nuisance::Model`].
-    pub model: ModelSettings,
+    pub model: DeviationSettings,
     /// Colour and silhouette.
     pub rendering: RenderingSettings,
     /// Depth on the object. Its deviations and number of effective points are overwritten by what is measured, in stages with
@@ -231,7 +231,7 @@ impl Default for FusedSettings {
             most_points: 50.0,
             hopeless: 15.0,
             width: Width::default(),
-            model: ModelSettings::default(),
+            model: DeviationSettings::default(),
             rendering: RenderingSettings {
                 downsample: 1,
                 effective_pixels: 80.0,

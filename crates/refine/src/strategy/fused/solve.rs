@@ -7,18 +7,34 @@ use prehend_render::Light;
 use rayon::prelude::*;
 
 use super::factor::balanced;
+use crate::normal::Eliminated;
 use crate::term::Patches;
 use crate::{Block, Normal, State, Term};
 
 /// A state, the value of the terms there, and their derivatives.
+///
+/// Where patches are eliminated, value and derivatives are those at their best displacements, as far as the terms are linear in them: the
+/// derivatives leave out how that changes with the state.
 #[derive(Clone)]
 pub(crate) struct Point {
     pub(crate) state: State,
     /// Nats.
     pub(crate) value: f64,
     pub(crate) normal: Normal,
-    /// The same of each term.
+    /// The same of each term, with patches where the model has them.
     pub(crate) parts: Vec<Part>,
+    /// What was eliminated.
+    pub(crate) displaced: Option<Displaced>,
+}
+
+/// Patches that were displaced as is best.
+#[derive(Clone)]
+pub(crate) struct Displaced {
+    pub(crate) patches: Arc<Patches>,
+    /// How much lower the value is than with the model as it is \[nat\].
+    pub(crate) gain: f64,
+    /// Logarithm of the determinant of the Hessian by their displacements.
+    pub(crate) log_determinant: f64,
 }
 
 /// What one term brings.
@@ -27,6 +43,7 @@ pub(crate) struct Part {
     pub(crate) name: &'static str,
     /// Nats.
     pub(crate) value: f64,
+    /// By patches too if the term depends on them.
     pub(crate) normal: Normal,
 }
 
@@ -80,7 +97,7 @@ impl Problem {
             let value = term.linearise(&state, &mut normal);
             (Part { name: term.name(), value, normal }, light)
         };
-        let (mut parts, lights): (Vec<Part>, Vec<Option<Light>>) =
+        let (parts, lights): (Vec<Part>, Vec<Option<Light>>) =
             self.terms.par_iter().map(|term| linearise(term.as_ref())).unzip();
         if let Some(light) = lights.into_iter().flatten().next() {
             state.light = light;
@@ -88,15 +105,20 @@ impl Problem {
         let mut normal = Normal::new(&all);
         parts.iter().for_each(|part| normal += &part.normal);
         let mut value = parts.iter().map(|p| p.value).sum();
+        let mut found = None;
         if let Some(patches) = &self.patches {
             normal.add_precision(all[all.len() - 1], patches.precision());
-            if let Some((rest, gain)) = normal.without_last() {
-                normal = rest;
+            if let Some(eliminated) = normal.without_last() {
+                let Eliminated { rest, gain, log_determinant } = eliminated;
                 value -= gain;
+                normal = rest;
+                let patches = Arc::clone(patches);
+                found = Some(Displaced { patches, gain, log_determinant });
+            } else {
+                normal.truncate(&self.blocks);
             }
-            parts.iter_mut().for_each(|part| part.normal.truncate(&self.blocks));
         }
-        Point { state, value, normal, parts }
+        Point { state, value, normal, parts, displaced: found }
     }
 
     /// Lowers the sum of the terms from `point` in at most `iterations` steps, calling `visit` at every point that is lower than the
@@ -154,7 +176,7 @@ mod tests {
 
     use super::*;
     use crate::synth::default_scene;
-    use crate::term::ModelSettings;
+    use crate::term::DeviationSettings;
 
     /// Measurements that are linear in the object's twist and the displacements of patches.
     struct Linear {
@@ -196,8 +218,8 @@ mod tests {
     fn eliminating_patches_is_integrating_them_out() {
         let scene = default_scene(1).unwrap();
         let state = State::new(&scene.observation, &scene.object, &scene.truth).unwrap();
-        let settings = ModelSettings::default();
-        let patches = Patches::new(&scene.observation, state.centre().z, &settings).unwrap();
+        let settings = DeviationSettings::default();
+        let patches = Patches::new(&scene.observation, state.centre().z, &settings, 2).unwrap();
         let mut random = SplitMix64::new(5);
         let (rows, size) = (40, 3 * patches.count());
         let mut matrix =
@@ -232,6 +254,10 @@ mod tests {
         let rigid = Problem { patches: None, ..problem }.at(point.state.clone());
         assert!(rigid.value > point.value);
         assert!(rigid.normal.hessian()[(0, 0)] > point.normal.hessian()[(0, 0)]);
-        assert_eq!(point.parts[0].normal.hessian(), rigid.normal.hessian());
+        let alone = &point.parts[0].normal;
+        assert_eq!(
+            alone.hessian().view((0, 0), (6, 6)),
+            rigid.normal.hessian().view((0, 0), (6, 6))
+        );
     }
 }
