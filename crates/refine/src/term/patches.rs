@@ -201,12 +201,13 @@ mod tests {
     fn specks_and_a_stiff_model_make_few() {
         let scene = default_scene(1).unwrap();
         let mut specks = scene.observation.clone();
-        let speck = |pixel: usize| pixel % 640 % 29 == 0 && pixel / 640 % 31 == 0;
+        let speck =
+            |pixel: usize| (pixel % 640).is_multiple_of(29) && (pixel / 640).is_multiple_of(31);
         let mask = (0..640 * 480).map(speck).collect();
         specks.mask = prehend_render::Mask::new(640, 480, mask).unwrap();
         let settings = DeviationSettings::default();
         let patches = Patches::new(&specks, 0.5, &settings, 3).unwrap();
-        assert!(patches.count() <= MOST_PATCHES && patches.side() % 3 == 0);
+        assert!(patches.count() <= MOST_PATCHES && patches.side().is_multiple_of(3));
         for (smoothness, distance) in [(f64::INFINITY, 0.5), (20e-3, 0.0)] {
             let settings = DeviationSettings { smoothness, ..settings.clone() };
             let patches = Patches::new(&scene.observation, distance, &settings, 4).unwrap();
