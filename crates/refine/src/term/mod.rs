@@ -131,6 +131,39 @@ mod gradient_check {
         assert!(eigenvalues.min() > -1e-9 * eigenvalues.max(), "the matrix is indefinite");
     }
 
+    /// Where the fixture's object may be off, by tiles of whole pixels in images that are smaller by `unit`.
+    pub(super) fn patches(unit: usize) -> Arc<Patches> {
+        let settings = DeviationSettings::default();
+        Arc::new(
+            Patches::new(&SCENE.observation, SCENE.truth.translation.z, &settings, unit).unwrap(),
+        )
+    }
+
+    /// Asserts that by pose and camera `term` has the derivatives that it has without `patches`, that what these have adds up to what the
+    /// object's place has but for a share of `elsewhere`, and that the matrix is not indefinite.
+    pub(super) fn assert_by_patches(
+        term: &dyn Term,
+        state: &State,
+        patches: &Patches,
+        elsewhere: f64,
+    ) {
+        let rigid = [Block::ObjectPose, Block::Camera];
+        let mut alone = Normal::new(&rigid);
+        let mut all = Normal::new(&[rigid[0], rigid[1], Block::Patches(patches.count())]);
+        let (value, same) = (term.linearise(state, &mut alone), term.linearise(state, &mut all));
+        assert!((value / same - 1.0).abs() < 1e-5, "{value} {same}");
+        let gradient = all.gradient().rows(0, 11) - alone.gradient();
+        assert!(gradient.norm() < 1e-4 * alone.gradient().norm());
+        let hessian = all.hessian().view((0, 0), (11, 11)) - alone.hessian();
+        assert!(hessian.norm() < 1e-4 * alone.hessian().norm());
+        let place = alone.gradient().fixed_rows::<3>(0).into_owned();
+        let by_patch = (0..patches.count()).map(|k| all.gradient().fixed_rows::<3>(11 + 3 * k));
+        let sum = by_patch.fold(-place, |sum, by_patch| sum + by_patch);
+        assert!(sum.norm() <= elsewhere * place.norm(), "{sum:?} of {place:?}");
+        let eigenvalues = all.hessian().clone().symmetric_eigenvalues();
+        assert!(eigenvalues.min() > -1e-9 * eigenvalues.max(), "the matrix is indefinite");
+    }
+
     #[test]
     fn a_pose_is_not_changed_by_a_zero_twist() {
         let (_, state, _) = fixture(0);

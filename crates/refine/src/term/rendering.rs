@@ -237,7 +237,7 @@ fn apparent(state: &State) -> Isometry3<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::gradient_check::{assert_gradient, fixture};
+    use super::super::gradient_check::{assert_by_patches, assert_gradient, fixture, patches};
     use super::*;
 
     #[test]
@@ -254,6 +254,21 @@ mod tests {
             state.relight(&term);
             // The camera moves the object as its own pose does, with that gradient's error at this state.
             assert_gradient(&term, &state, Block::Camera, 5e-5, 0.1);
+        }
+    }
+
+    #[test]
+    fn patches_share_what_the_object_has() {
+        let (scene, mut state, hand) = fixture(1);
+        for downsample in [1, 2, 3, 4] {
+            let settings = RenderingSettings { downsample, ..RenderingSettings::default() };
+            let patches = patches(downsample);
+            let object = Arc::clone(&scene.object);
+            let term = RenderingTerm::new(&scene.observation, object, &hand, settings).unwrap();
+            let term = term.with_patches(Arc::clone(&patches), downsample);
+            state.relight(&term);
+            // Some of the object is drawn beside the mask.
+            assert_by_patches(&term, &state, &patches, 0.3);
         }
     }
 

@@ -52,7 +52,8 @@ pub(crate) struct Part {
 pub enum Ending {
     /// No step promised anything worth having.
     Converged,
-    /// No step along the way down led down.
+    /// No step along the way down led down. Where patches are eliminated, derivatives are not quite those of the value, and most ways end so, near
+    /// the bottom.
     Stuck,
     /// All iterations were used.
     Iterations,

@@ -28,8 +28,8 @@ pub struct PointToPlaneSettings {
     pub outlier: f64,
     /// How many independent measurements the points amount to at most: errors of neighbours are alike.
     pub effective_points: f64,
-    /// Standard deviation of the smooth field by which neighbouring points are off alike, as a depth camera and the model of
-    /// the object are; zero if there is none \[m\].
+    /// Standard deviation of the smooth field by which neighbouring points are off alike, as a depth camera and, unless it is
+    /// let off patch by patch, the model of the object are; zero if there is none \[m\].
     pub deviation: f64,
     /// Distance over which that field changes \[m\].
     pub smoothness: f64,
@@ -268,7 +268,7 @@ impl Term for PointToPlaneTerm {
 
 #[cfg(test)]
 mod tests {
-    use super::super::gradient_check::{assert_gradient, fixture};
+    use super::super::gradient_check::{assert_by_patches, assert_gradient, fixture, patches};
     use super::*;
 
     #[test]
@@ -290,6 +290,19 @@ mod tests {
             let near = State { t_cam_object: scene.truth, ..state };
             let twist = [1e-3, -2e-3, 1e-3, 0.02, -0.01, 0.01];
             check(&near.moved(Block::ObjectPose, &twist), 1e-3);
+        }
+    }
+
+    #[test]
+    fn patches_share_what_the_object_has() {
+        let (scene, state, hand) = fixture(1);
+        let patches = patches(2);
+        for deviation in [0.0, 1e-3] {
+            let settings = PointToPlaneSettings { deviation, ..Default::default() };
+            let object = Arc::clone(&scene.object);
+            let term = PointToPlaneTerm::new(&scene.observation, object, &hand, settings).unwrap();
+            let term = term.with_patches(Arc::clone(&patches));
+            assert_by_patches(&term, &state, &patches, 1e-9);
         }
     }
 

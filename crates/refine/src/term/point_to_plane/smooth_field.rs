@@ -14,7 +14,8 @@ const ROUNDS: usize = 3;
 /// A Gaussian process over space, with covariance τ² exp(−d²/2ℓ²) at distance d, through a few places that describe all others
 /// (Quiñonero-Candela and Rasmussen, 2005).
 ///
-/// It is what the errors of a depth camera and of an object's model have in common: neighbours are off alike.
+/// It is what the errors of a depth camera have in common, and of an object's model where nothing else accounts for that: neighbours are off
+/// alike.
 pub(super) struct SmoothField {
     /// A column for each place \[m\]: the field there is its product with coefficients, which are independent and of unit variance.
     features: DMatrix<f64>,
