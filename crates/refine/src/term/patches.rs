@@ -1,7 +1,5 @@
 //! Patches of the object's surface that may each be off by themselves.
 
-use std::collections::BTreeSet;
-
 use nalgebra::{DMatrix, Vector3};
 
 use crate::Observation;
@@ -70,36 +68,30 @@ impl Patches {
         }
         let (mask, camera) = (&observation.mask, &observation.camera);
         let width = camera.width;
-        let seen = || mask.pixels().iter().enumerate().filter(|(_, m)| **m).map(|(i, _)| i);
-        let tile = |pixel: usize, side: usize| [pixel % width / side, pixel / width / side];
+        let masked = mask.pixels().iter().enumerate().filter(|(_, m)| **m);
+        let seen: Vec<[usize; 2]> = masked.map(|(i, _)| [i % width, i / width]).collect();
         let largest = width.max(camera.height);
         let least = LEAST_SIDE * smoothness * camera.fx / distance;
-        let wanted = (seen().count() as f64 / FULL_PATCHES).sqrt().max(least);
+        let wanted = (seen.len() as f64 / FULL_PATCHES).sqrt().max(least);
         let mut side = (wanted.min(largest as f64).ceil() as usize).max(1).next_multiple_of(unit);
         // Specks of a mask would each have a tile of their own.
-        while side < largest {
-            let tiles: BTreeSet<[usize; 2]> = seen().map(|pixel| tile(pixel, side)).collect();
-            if tiles.len() <= MOST_PATCHES {
-                break;
-            }
+        while side < largest && tiles_of(&seen, side) > MOST_PATCHES {
             side += side.div_ceil(4).next_multiple_of(unit);
         }
-        let tile = |pixel: usize| tile(pixel, side);
-        let first = [0, 1].map(|k| seen().map(|i| tile(i)[k]).min());
-        let last = [0, 1].map(|k| seen().map(|i| tile(i)[k]).max());
+        let first = [0, 1].map(|k| seen.iter().map(|pixel| pixel[k] / side).min());
+        let last = [0, 1].map(|k| seen.iter().map(|pixel| pixel[k] / side).max());
         let ([Some(left), Some(top)], [Some(right), Some(bottom)]) = (first, last) else {
             return None;
         };
         let columns = right - left + 1;
         // Sums of places and numbers of pixels.
         let mut tiles = vec![(Vector3::zeros(), 0.0); columns * (bottom - top + 1)];
-        for pixel in seen() {
-            let [column, row] = tile(pixel);
-            let measured = f64::from(observation.depth.pixels()[pixel]);
+        for [x, y] in seen {
+            let measured = f64::from(observation.depth.pixels()[y * width + x]);
             let near = (measured - distance).abs() < NEAR * distance;
             let depth = if near { measured } else { distance };
-            let place = camera.unproject((pixel % width) as f64, (pixel / width) as f64, depth);
-            let (sum, count) = &mut tiles[(row - top) * columns + column - left];
+            let place = camera.unproject(x as f64, y as f64, depth);
+            let (sum, count) = &mut tiles[(y / side - top) * columns + x / side - left];
             *sum += place.coords;
             *count += 1.0;
         }
@@ -156,6 +148,15 @@ impl Patches {
     pub(crate) fn precision(&self) -> &DMatrix<f64> {
         &self.precision
     }
+}
+
+/// How many tiles of `side` pixels some pixels are in.
+fn tiles_of(pixels: &[[usize; 2]], side: usize) -> usize {
+    let columns = pixels.iter().map(|[x, _]| x / side + 1).max().unwrap_or(0);
+    let rows = pixels.iter().map(|[_, y]| y / side + 1).max().unwrap_or(0);
+    let mut tiles = vec![false; columns * rows];
+    pixels.iter().for_each(|[x, y]| tiles[y / side * columns + x / side] = true);
+    tiles.into_iter().filter(|seen| *seen).count()
 }
 
 #[cfg(test)]
