@@ -215,9 +215,8 @@ impl PoseLoss {
             }
         }
 
-        let (camera, also) = (&target.camera, &target.bounds);
         let task = ByTiles(Residuals { options: &self.options, target }, Tiling::new(side));
-        rayon::scope(|_| self.view(model, t_cam_object, center, camera, light, also, task))
+        self.compare(model, t_cam_object, center, light, target, task)
     }
 
     /// The picture whose difference from the target is the loss's residual (without occluder).
@@ -288,8 +287,24 @@ impl PoseLoss {
             }
         }
 
-        let (camera, also) = (&target.camera, &target.bounds);
         let task = Total::<DERIVATIVES>(Residuals { options: &self.options, target });
+        self.compare(model, pose, center, light, target, task)
+    }
+
+    /// Runs a task on the view of all that `target` is compared with.
+    fn compare<T: Task + Send>(
+        &self,
+        model: &RenderModel,
+        pose: &Isometry3<f64>,
+        center: &Point3<f64>,
+        light: &Light,
+        target: &Target,
+        task: T,
+    ) -> T::Output
+    where
+        T::Output: Send,
+    {
+        let (camera, also) = (&target.camera, &target.bounds);
         // One of rayon's threads takes all of it, or each of its parallel loops would hand over and wait.
         rayon::scope(|_| self.view(model, pose, center, camera, light, also, task))
     }
