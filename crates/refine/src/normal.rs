@@ -14,7 +14,7 @@ pub struct Normal {
     entries: Vec<(usize, f64)>,
 }
 
-/// What [`Normal::without_last`] finds.
+/// What [`Normal::without_patches`] finds.
 pub(crate) struct Eliminated {
     /// The equations of the other blocks.
     pub(crate) rest: Normal,
@@ -42,11 +42,19 @@ impl Normal {
         Some(self.blocks[..position].iter().map(|b| b.dimension()).sum())
     }
 
-    /// What is left if the last block takes the value at which the quadratic model of the sum is least. `None` if that is not
-    /// determined.
-    pub(crate) fn without_last(&self) -> Option<Eliminated> {
+    /// What is left if the last block, which is of [`Block::Patches`], takes the value at which the quadratic model of the sum is least.
+    /// Beforehand no displacement is likeliest, directions are independent, and the covariance in any one has the inverse `precision`, which is
+    /// added. `None` if the least is not determined.
+    pub(crate) fn without_patches(&mut self, precision: &DMatrix<f64>) -> Option<Eliminated> {
         let (last, blocks) = self.blocks.split_last()?;
         let (n, m) = (self.gradient.len() - last.dimension(), last.dimension());
+        for c in 0..precision.ncols() {
+            for r in 0..precision.nrows() {
+                for k in 0..3 {
+                    self.hessian[(n + 3 * r + k, n + 3 * c + k)] += precision[(r, c)];
+                }
+            }
+        }
         let factor = self.hessian.view((n, n), (m, m)).clone_owned().cholesky()?;
         let lower = factor.l_dirty();
         let coupling =
@@ -112,19 +120,6 @@ impl Normal {
         for (i, (difference, weight)) in parameters.iter().enumerate() {
             self.gradient[offset + i] += weight * difference;
             self.hessian[(offset + i, offset + i)] += weight;
-        }
-    }
-
-    /// Adds the information that displacements in `block` have before anything is seen: zero is likeliest, directions are independent, and
-    /// the covariance of any one has the inverse `precision`.
-    pub(crate) fn add_precision(&mut self, block: Block, precision: &DMatrix<f64>) {
-        let Some(offset) = self.offset(block) else { return };
-        for c in 0..precision.ncols() {
-            for r in 0..precision.nrows() {
-                for k in 0..3 {
-                    self.hessian[(offset + 3 * r + k, offset + 3 * c + k)] += precision[(r, c)];
-                }
-            }
         }
     }
 

@@ -223,11 +223,8 @@ fn disagreements(point: &Point) -> Vec<Disagreement> {
     // A sense is not to blame for what the model is off by.
     let alone = |part: &super::solve::Part| {
         let patches = &point.displaced.as_ref()?.patches;
-        let block = Block::Patches(patches.count());
-        part.normal.offset(block)?;
-        let mut normal = part.normal.clone();
-        normal.add_precision(block, patches.precision());
-        Some(normal.without_last()?.rest)
+        part.normal.offset(Block::Patches(patches.count()))?;
+        Some(part.normal.clone().without_patches(patches.precision())?.rest)
     };
     let of = |part: &super::solve::Part| {
         let distance = distance(alone(part).as_ref().unwrap_or(&part.normal))?;

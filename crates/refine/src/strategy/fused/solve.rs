@@ -108,8 +108,7 @@ impl Problem {
         let mut value = parts.iter().map(|p| p.value).sum();
         let mut found = None;
         if let Some(patches) = &self.patches {
-            normal.add_precision(all[all.len() - 1], patches.precision());
-            if let Some(eliminated) = normal.without_last() {
+            if let Some(eliminated) = normal.without_patches(patches.precision()) {
                 let Eliminated { rest, gain, log_determinant } = eliminated;
                 value -= gain;
                 normal = rest;
