@@ -166,8 +166,8 @@ pub fn standard_terms(
                 Box::new(DepthTerm::new(observation, object, hand, settings)?)
             }
             TermKind::Tactile => {
-                let settings = config.tactile.clone();
-                Box::new(TactileTerm::new(observation, object, Arc::clone(robot()?), settings)?)
+                let robot = Arc::clone(robot()?);
+                Box::new(TactileTerm::new(observation, object, robot, &config.tactile)?)
             }
         })
     };

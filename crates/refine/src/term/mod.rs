@@ -24,7 +24,7 @@ pub use point_to_plane::{PointToPlaneSettings, PointToPlaneTerm, Scatter};
 pub use prior::{Prior, PriorSettings};
 pub(crate) use rendering::Segmented;
 pub use rendering::{RenderingSettings, RenderingTerm};
-pub use tactile::{TactileSettings, TactileTerm};
+pub use tactile::{ContactSettings, Felt, TactileSettings, TactileTerm};
 
 use prehend_render::Light;
 

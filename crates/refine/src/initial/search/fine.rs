@@ -54,7 +54,7 @@ impl<'a> Fine<'a> {
                 observation,
                 Arc::clone(object),
                 Arc::clone(robot),
-                touch,
+                &touch,
             )?));
         }
         Ok(Self { observation, object, terms })

@@ -9,8 +9,8 @@ use super::settings::{Evidence, FusedSettings, Nuisance, Stage};
 use super::solve::Problem;
 use crate::refine::hand_depth;
 use crate::term::{
-    FreeSpaceTerm, HandDepthTerm, Patches, PenetrationTerm, PointToPlaneSettings, PointToPlaneTerm,
-    Prior, RenderingTerm, Scatter, Segmented, TactileTerm, Term,
+    Felt, FreeSpaceTerm, HandDepthTerm, Patches, PenetrationTerm, PointToPlaneSettings,
+    PointToPlaneTerm, Prior, RenderingTerm, Scatter, Segmented, TactileTerm, Term,
 };
 use crate::{Object, Observation, RefineError, Robot, State};
 
@@ -183,16 +183,15 @@ impl<'a> Known<'a> {
         let touch = wanted(Evidence::Touch);
         let quiet = stage.contact && wanted(Evidence::Quiet);
         if (touch || quiet) && !hand.forces.is_empty() {
-            let mut tactile = settings.tactile.clone();
-            tactile.outlier *= stage.tolerance;
+            let mut tactile = settings.tactile.clone().forgiving(stage.tolerance);
             if !touch {
-                tactile.effective_taxels = 0.0;
+                tactile.felt = Felt::Nothing;
             }
             if !quiet {
                 tactile.quiet_sigma = f64::INFINITY;
             }
             let robot = Arc::clone(robot);
-            terms.push(Box::new(TactileTerm::new(self.observation, object(), robot, tactile)?));
+            terms.push(Box::new(TactileTerm::new(self.observation, object(), robot, &tactile)?));
         }
         if stage.contact && wanted(Evidence::Penetration) {
             let penetration = settings.penetration.clone();

@@ -2,8 +2,8 @@
 
 use super::confidence::Width;
 use crate::term::{
-    DeviationSettings, FreeSpaceSettings, HandDepthSettings, PenetrationSettings,
-    PointToPlaneSettings, PriorSettings, RenderingSettings, TactileSettings,
+    ContactSettings, DeviationSettings, Felt, FreeSpaceSettings, HandDepthSettings,
+    PenetrationSettings, PointToPlaneSettings, PriorSettings, RenderingSettings, TactileSettings,
 };
 use crate::{Block, State};
 
@@ -247,7 +247,10 @@ impl Default for FusedSettings {
                 ..HandDepthSettings::default()
             },
             free_space: FreeSpaceSettings::default(),
-            tactile: TactileSettings { standoff: 1.5e-3, ..TactileSettings::default() },
+            tactile: TactileSettings {
+                felt: Felt::Contacts(ContactSettings::default()),
+                ..TactileSettings::default()
+            },
             penetration: PenetrationSettings::default(),
         }
     }
