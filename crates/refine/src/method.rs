@@ -116,7 +116,7 @@ macro_rules! fixed {
     };
 }
 
-static ABLATIONS: [Method; 21] = [
+static ABLATIONS: [Method; 23] = [
     without!("colour", Evidence::Colour),
     without!("silhouette", Evidence::Silhouette),
     without!("depth", Evidence::Depth),
@@ -125,6 +125,7 @@ static ABLATIONS: [Method; 21] = [
     without!("touch", Evidence::Touch),
     without!("quiet", Evidence::Quiet),
     without!("penetration", Evidence::Penetration),
+    without!("support", Evidence::Support),
     only!("colour", Evidence::Colour),
     only!("silhouette", Evidence::Silhouette),
     only!("depth", Evidence::Depth),
@@ -133,6 +134,7 @@ static ABLATIONS: [Method; 21] = [
     only!("touch", Evidence::Touch),
     only!("quiet", Evidence::Quiet),
     only!("penetration", Evidence::Penetration),
+    only!("support", Evidence::Support),
     fixed!("hand-pose", Nuisance::HandPose),
     fixed!("joints", Nuisance::Joints),
     fixed!("camera", Nuisance::Camera),

@@ -1,10 +1,12 @@
 //! Quasi-static analysis: could a body rest where it is?
 
 mod balance;
+mod compliant;
 
 use nalgebra::{Point3, Unit, Vector3, Vector6};
 
 pub use balance::{Balance, Support, friction_factor};
+pub use compliant::{CompliantBalance, CompliantSupport};
 
 use crate::error::SimulationError;
 use crate::state::State;

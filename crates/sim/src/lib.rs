@@ -52,7 +52,9 @@ pub use contact::registry::{LawEntry, LawParameter, LawRegistry};
 pub use contact::resting::RestingContact;
 pub use contact::stribeck::Stribeck;
 pub use contact::wrench::WrenchJacobian;
-pub use equilibrium::{Balance, Equilibrium, Support, friction_factor};
+pub use equilibrium::{
+    Balance, CompliantBalance, CompliantSupport, Equilibrium, Support, friction_factor,
+};
 pub use error::SimulationError;
 pub use integrator::{
     BackwardEuler, Integrator, RungeKutta4, SemiImplicitEuler, SubStepped, VelocityVerlet,

@@ -10,6 +10,7 @@ mod physics;
 mod point_to_plane;
 mod prior;
 mod rendering;
+mod support;
 mod tactile;
 
 pub(crate) use depth::back_project;
@@ -24,6 +25,7 @@ pub use point_to_plane::{PointToPlaneSettings, PointToPlaneTerm, Scatter};
 pub use prior::{Prior, PriorSettings};
 pub(crate) use rendering::Segmented;
 pub use rendering::{RenderingSettings, RenderingTerm};
+pub use support::{SupportSettings, SupportTerm};
 pub use tactile::{ContactSettings, Felt, TactileSettings, TactileTerm};
 
 use prehend_render::Light;

@@ -10,7 +10,7 @@ use super::solve::Problem;
 use crate::refine::hand_depth;
 use crate::term::{
     Felt, FreeSpaceTerm, HandDepthTerm, Patches, PenetrationTerm, PointToPlaneSettings,
-    PointToPlaneTerm, Prior, RenderingTerm, Scatter, Segmented, TactileTerm, Term,
+    PointToPlaneTerm, Prior, RenderingTerm, Scatter, Segmented, SupportTerm, TactileTerm, Term,
 };
 use crate::{Object, Observation, RefineError, Robot, State};
 
@@ -196,6 +196,10 @@ impl<'a> Known<'a> {
         if stage.contact && wanted(Evidence::Penetration) {
             let penetration = settings.penetration.clone();
             terms.push(Box::new(PenetrationTerm::new(object(), Arc::clone(robot), penetration)));
+        }
+        if stage.contact && wanted(Evidence::Support) && self.observation.gravity.is_some() {
+            let (robot, support) = (Arc::clone(robot), settings.support.clone());
+            terms.push(Box::new(SupportTerm::new(self.observation, object(), robot, support)?));
         }
         Ok(terms)
     }

@@ -3,7 +3,8 @@
 use super::confidence::Width;
 use crate::term::{
     ContactSettings, DeviationSettings, Felt, FreeSpaceSettings, HandDepthSettings,
-    PenetrationSettings, PointToPlaneSettings, PriorSettings, RenderingSettings, TactileSettings,
+    PenetrationSettings, PointToPlaneSettings, PriorSettings, RenderingSettings, SupportSettings,
+    TactileSettings,
 };
 use crate::{Block, State};
 
@@ -26,11 +27,13 @@ pub enum Evidence {
     Quiet,
     /// Hand and object are not in the same place.
     Penetration,
+    /// Contact forces within their friction cones hold the object.
+    Support,
 }
 
 impl Evidence {
     /// All kinds.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Colour,
         Self::Silhouette,
         Self::Depth,
@@ -39,6 +42,7 @@ impl Evidence {
         Self::Touch,
         Self::Quiet,
         Self::Penetration,
+        Self::Support,
     ];
 
     /// The name used in reports and on the command line.
@@ -52,6 +56,7 @@ impl Evidence {
             Self::Touch => "touch",
             Self::Quiet => "quiet",
             Self::Penetration => "penetration",
+            Self::Support => "support",
         }
     }
 }
@@ -158,6 +163,8 @@ pub struct FusedSettings {
     pub tactile: TactileSettings,
     /// Non-penetration.
     pub penetration: PenetrationSettings,
+    /// Feasibility of contact forces.
+    pub support: SupportSettings,
 }
 
 impl FusedSettings {
@@ -252,6 +259,7 @@ impl Default for FusedSettings {
                 ..TactileSettings::default()
             },
             penetration: PenetrationSettings::default(),
+            support: SupportSettings::default(),
         }
     }
 }

@@ -1,0 +1,338 @@
+//! Support: forces of the hand within friction cones hold the object.
+
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector, Point3, Unit, Vector3, Vector6};
+use prehend_geometry::robot::{ArticulatedRobot, RobotSample};
+use prehend_sim::{CompliantBalance, CompliantSupport, Support};
+use rayon::prelude::*;
+
+use super::Term;
+use crate::{Block, Normal, Object, Observation, RefineError, Robot, State};
+
+/// Settings of [`SupportTerm`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct SupportSettings {
+    /// Standard deviation of what is left unbalanced, as a share of all that acts on the object.
+    pub sigma: f64,
+    /// Coefficient of friction: a generous one, since only what no forces could hold is evidence.
+    pub friction: f64,
+    /// How far the surface may be from the hand and yet touch it, the less the farther \[m\]: errors of models and joints.
+    pub reach: f64,
+    /// Samples of the object's surface at most.
+    pub samples: usize,
+    /// Contact area that bears half of what it would if it did not yield \[m²\].
+    pub area: f64,
+    /// Share of the felt forces that certainly acts: taxels' gains are off, and the rest may be more, never less.
+    pub felt: f64,
+    /// A taxel that feels so much \[N\] is believed half: those that ring false feel less.
+    pub felt_force: f64,
+}
+
+impl Default for SupportSettings {
+    fn default() -> Self {
+        Self {
+            sigma: 0.2,
+            friction: 1.0,
+            reach: 5e-3,
+            samples: 500,
+            area: 1e-5,
+            felt: 0.5,
+            felt_force: 0.5,
+        }
+    }
+}
+
+/// Whether forces of the hand, where it is near the object, could balance weight and felt forces.
+///
+/// What the skin feels is a lower bound of what acts there; contacts off the skin are unseen, and may bear anything
+/// within their cones. So nothing is said of how strong the grasp is, only that the object would not stay where no contact
+/// opposes its weight or the fingers' pressure.
+pub struct SupportTerm {
+    object: Arc<Object>,
+    robot: Arc<Robot>,
+    gravity: Vector3<f64>,
+    felt: Vec<Felt>,
+    /// Weight and felt forces together \[N\].
+    size: f64,
+    settings: SupportSettings,
+}
+
+/// A force on the object, in the frame of the link that exerts it.
+struct Felt {
+    link: usize,
+    position: Point3<f64>,
+    force: Vector3<f64>,
+}
+
+/// A sample of the object that may touch the hand, in the camera frame.
+struct Near {
+    point: Point3<f64>,
+    sample: RobotSample,
+    support: CompliantSupport,
+    /// Relative change of its compliance by the distance \[1/m\].
+    stiffening: f64,
+}
+
+/// The balance of a state.
+struct Held {
+    hand: ArticulatedRobot,
+    /// Centre of mass, in the camera frame.
+    mass_centre: Point3<f64>,
+    near: Vec<Near>,
+    balance: CompliantBalance,
+}
+
+impl SupportTerm {
+    /// A term for `object` in the hand `robot` of `observation`.
+    ///
+    /// # Errors
+    /// If gravity or the hand is unknown, or the hand has a skin and its forces are not one a taxel.
+    pub fn new(
+        observation: &Observation,
+        object: Arc<Object>,
+        robot: Arc<Robot>,
+        settings: SupportSettings,
+    ) -> Result<Self, RefineError> {
+        let missing = |what| RefineError::Missing { what, term: "support" };
+        let gravity = observation.gravity.ok_or_else(|| missing("gravity"))?;
+        let hand = observation.hand.as_ref().ok_or_else(|| missing("hand state"))?;
+        robot.check_joints(&hand.joints)?;
+        if !hand.forces.is_empty() && hand.forces.len() != robot.taxels.len() {
+            let (forces, taxels) = (hand.forces.len(), robot.taxels.len());
+            return Err(RefineError::TaxelCount { forces, taxels });
+        }
+        let mut felt = Vec::new();
+        for (taxel, force) in robot.taxels.iter().zip(&hand.forces) {
+            let strength = force.norm_squared();
+            if strength == 0.0 {
+                continue;
+            }
+            let link = robot.tree.link_index(&taxel.link);
+            let link = link.ok_or_else(|| RefineError::TaxelLink { link: taxel.link.clone() })?;
+            let trust = strength / (strength + settings.felt_force.powi(2));
+            let force = -force * (trust * settings.felt);
+            felt.push(Felt { link, position: taxel.position, force });
+        }
+        let weight = object.inertial.mass * gravity.norm();
+        let size = weight + felt.iter().map(|f| f.force.norm()).sum::<f64>();
+        Ok(Self { object, robot, gravity, felt, size, settings })
+    }
+
+    /// What holds the object at `state`. A hand that cannot be posed holds nothing, and says nothing.
+    fn held(&self, state: &State) -> Option<Held> {
+        let hand = self.robot.articulated(&state.t_cam_hand, &state.joints).ok()?;
+        let mass_centre = state.t_cam_object * self.object.inertial.center_of_mass;
+        let samples = self.object.samples.par_iter().step_by(self.stride()).with_min_len(128);
+        let near: Vec<Near> = samples
+            .filter_map(|sample| {
+                let point = state.t_cam_object * sample.point;
+                self.near(point, state.t_cam_object * -sample.normal, &hand)
+            })
+            .collect();
+        let weight = self.gravity * self.object.inertial.mass;
+        let zero = Vector3::zeros();
+        let load = self.felt.iter().fold(self.wrench(&zero, &weight), |load, felt| {
+            let t_cam_link = hand.posed().t_world_links()[felt.link];
+            let arm = t_cam_link * felt.position - mass_centre;
+            load + self.wrench(&arm, &(t_cam_link * felt.force))
+        });
+        let supports: Vec<CompliantSupport> = near.iter().map(|near| near.support).collect();
+        let length = self.object.radius;
+        let balance = CompliantBalance::find(&supports, &mass_centre, length, &load);
+        Some(Held { hand, mass_centre, near, balance })
+    }
+
+    /// One sample in so many is looked at: they follow each other over the surface.
+    fn stride(&self) -> usize {
+        self.object.samples.len().div_ceil(self.settings.samples.max(1)).max(1)
+    }
+
+    /// A sample at `point` whose surface is pushed along `inward`, if it is near the hand and faces it.
+    fn near(
+        &self,
+        point: Point3<f64>,
+        inward: Vector3<f64>,
+        hand: &ArticulatedRobot,
+    ) -> Option<Near> {
+        let reach = self.settings.reach;
+        let sample = hand.sample_motion(&point, reach)?;
+        let apart = (sample.field.distance / reach).max(0.0);
+        let left = 1.0 - apart * apart;
+        if inward.dot(&sample.field.gradient) <= 0.0 || left <= 0.0 {
+            return None;
+        }
+        let normal = Unit::try_new(inward, 0.0)?;
+        let support = Support { position: point, normal, friction: self.settings.friction };
+        let area = self.object.area * self.stride() as f64 / self.object.samples.len() as f64;
+        let compliance = self.settings.area / (area * left * left);
+        let stiffening = 4.0 * apart / (left * reach);
+        Some(Near { point, sample, support: CompliantSupport { support, compliance }, stiffening })
+    }
+
+    /// Force and torque over the object's radius \[N\].
+    fn wrench(&self, arm: &Vector3<f64>, force: &Vector3<f64>) -> Vector6<f64> {
+        joined(force, &self.torque(arm, force))
+    }
+
+    /// Torque over the object's radius \[N\].
+    fn torque(&self, arm: &Vector3<f64>, force: &Vector3<f64>) -> Vector3<f64> {
+        arm.cross(force) / self.object.radius
+    }
+
+    /// Nats of a squared newton, times two.
+    fn weight(&self) -> f64 {
+        (self.size * self.settings.sigma).powi(-2)
+    }
+}
+
+fn joined(force: &Vector3<f64>, torque: &Vector3<f64>) -> Vector6<f64> {
+    Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z)
+}
+
+/// Velocities of a point at `arm` from the centre of a unit twist's motion, and the twist's rotation, one twist after the other.
+fn twists(arm: &Vector3<f64>) -> [(Vector3<f64>, Vector3<f64>); 6] {
+    std::array::from_fn(|k| match k {
+        0..3 => (Vector3::ith(k, 1.0), Vector3::zeros()),
+        _ => {
+            let turn = Vector3::ith(k - 3, 1.0);
+            (turn.cross(arm), turn)
+        }
+    })
+}
+
+/// Where the derivatives by the hand's pose and by its joints begin.
+const HAND: usize = 6;
+const JOINTS: usize = 12;
+
+impl Term for SupportTerm {
+    fn name(&self) -> &'static str {
+        "support"
+    }
+
+    fn value(&self, state: &State) -> f64 {
+        self.held(state).map_or(0.0, |held| self.weight() * held.balance.value)
+    }
+
+    fn linearise(&self, state: &State, normal: &mut Normal) -> f64 {
+        let Some(held) = self.held(state) else { return 0.0 };
+        let blocks = [Block::ObjectPose, Block::HandPose, Block::Joints(state.joints.len())];
+        let (jacobian, yielding) = self.derivatives(&held, state);
+        let (balance, weight) = (held.balance, self.weight());
+        let gradient = (jacobian.tr_mul(&balance.residual) - yielding) * weight;
+        let hessian = jacobian.tr_mul(&(balance.yielding * &jacobian)) * weight;
+        normal.add_dynamic(&blocks, &gradient, &hessian);
+        weight * balance.value
+    }
+}
+
+impl SupportTerm {
+    /// Derivatives of what is left unbalanced if each force keeps its pull: it turns with the object, and its support bears the
+    /// less, the more it yields. Beside it, what that changes in the residual's square and not in the value: forces
+    /// that are less cost less.
+    fn derivatives(&self, held: &Held, state: &State) -> (DMatrix<f64>, DVector<f64>) {
+        let (centre, mass_centre) = (state.centre(), held.mass_centre);
+        let parameters = JOINTS + state.joints.len();
+        let mut jacobian = DMatrix::zeros(6, parameters);
+        let mut yielding = DVector::zeros(parameters);
+        for (near, force) in held.near.iter().zip(&held.balance.forces) {
+            if *force == Vector3::zeros() {
+                continue;
+            }
+            let arm = near.point - mass_centre;
+            let (torque, wrench) = (self.torque(&arm, force), self.wrench(&arm, force));
+            let cost = 0.5 * near.support.compliance * force.norm_squared();
+            let mut add = |k: usize, distance: f64, turned: Vector6<f64>| {
+                let relative = near.stiffening * distance;
+                yielding[k] += cost * relative;
+                let mut column = jacobian.column_mut(k);
+                column += turned - wrench * relative;
+            };
+            for (k, (velocity, turn)) in twists(&(near.point.coords - centre)).iter().enumerate() {
+                let distance = near.sample.field.gradient.dot(velocity);
+                add(k, distance, joined(&turn.cross(force), &turn.cross(&torque)));
+                add(HAND + k, -distance, Vector6::zeros());
+            }
+            for (k, distance) in near.sample.joints.iter().enumerate() {
+                add(JOINTS + k, *distance, Vector6::zeros());
+            }
+        }
+        for felt in &self.felt {
+            let t_cam_link = held.hand.posed().t_world_links()[felt.link];
+            let (point, force) = (t_cam_link * felt.position, t_cam_link * felt.force);
+            let arm = point - mass_centre;
+            // By how fast its point goes away from the centre of mass, and how fast it turns.
+            let mut add = |k: usize, velocity: Vector3<f64>, turning: Vector3<f64>| {
+                let torque = self.torque(&velocity, &force) + self.torque(&arm, &turning);
+                let mut column = jacobian.column_mut(k);
+                column += joined(&turning, &torque);
+            };
+            for (k, (velocity, _)) in twists(&(mass_centre.coords - centre)).iter().enumerate() {
+                add(k, -velocity, Vector3::zeros());
+            }
+            for (k, (velocity, turn)) in twists(&(point.coords - centre)).iter().enumerate() {
+                add(HAND + k, *velocity, turn.cross(&force));
+            }
+            let end = point + force;
+            let tail = held.hand.velocities(felt.link, &point);
+            let head = held.hand.velocities(felt.link, &end);
+            for ((k, velocity), (_, of_head)) in tail.zip(head) {
+                add(JOINTS + k, velocity, of_head - velocity);
+            }
+        }
+        (jacobian, yielding)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::gradient_check::{assert_gradient, fixture};
+    use super::*;
+    use crate::synth::Scene;
+
+    fn term(scene: &Scene) -> SupportTerm {
+        let (object, robot) = (Arc::clone(&scene.object), Arc::clone(&scene.robot));
+        SupportTerm::new(&scene.observation, object, robot, SupportSettings::default()).unwrap()
+    }
+
+    #[test]
+    fn gradients_match_differences() {
+        for seed in 0..3 {
+            let (scene, state, _) = fixture(seed);
+            let term = term(scene);
+            assert!(term.value(&state) > 0.0);
+            for block in [Block::ObjectPose, Block::HandPose, Block::Joints(16)] {
+                assert_gradient(&term, &state, block, 1e-7, 1e-3);
+            }
+        }
+    }
+
+    #[test]
+    fn a_held_object_costs_nothing_and_one_beside_the_hand_does() {
+        let (scene, state, _) = fixture(0);
+        let term = term(scene);
+        let held = State { t_cam_object: scene.truth, ..state };
+        let free = held.moved(Block::ObjectPose, &[0.0, 0.0, -0.3, 0.0, 0.0, 0.0]);
+        let (held, free) = (term.value(&held), term.value(&free));
+        // All that acts is left: half a square over that of the deviation.
+        let all = 0.5 * SupportSettings::default().sigma.powi(-2);
+        println!("{held} {free} {all}");
+        assert!(held < 0.1 * all && free > 0.1 * all, "{held} {free} {all}");
+    }
+
+    #[test]
+    fn gravity_and_the_hand_are_needed() {
+        let (scene, ..) = fixture(0);
+        let refused = |change: fn(&mut Observation)| {
+            let mut observation = scene.observation.clone();
+            change(&mut observation);
+            let (object, robot) = (Arc::clone(&scene.object), Arc::clone(&scene.robot));
+            let term = SupportTerm::new(&observation, object, robot, SupportSettings::default());
+            term.err().unwrap().to_string()
+        };
+        assert!(refused(|o| o.gravity = None).contains("gravity"));
+        assert!(refused(|o| o.hand = None).contains("hand state"));
+        let short = |o: &mut Observation| o.hand.as_mut().unwrap().forces.truncate(5);
+        assert_eq!(refused(short), "5 taxel forces were given for 368 taxels");
+    }
+}
