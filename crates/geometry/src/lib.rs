@@ -41,7 +41,7 @@ pub use report::MeshReport;
 pub use robot::{PosedRobot, Robot, RobotShape};
 pub use robust::Kernel;
 pub use sample::SurfaceSample;
-pub use sdf::SdfGrid;
+pub use sdf::{GridCache, SdfGrid};
 pub use surface_distance::SurfaceDistance;
 pub use volume::{Overlap, UnionBody, VolumeError};
 pub use weld::Weld;

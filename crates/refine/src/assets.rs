@@ -4,9 +4,9 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use prehend_geometry::TriMesh;
 use prehend_geometry::hand::{Taxel, load_taxels};
 use prehend_geometry::robot::Robot as KinematicTree;
+use prehend_geometry::{GridCache, TriMesh};
 
 use crate::bop::{Dataset, DatasetError, Frame, Models, Tactile};
 use crate::observation::check_gravity;
@@ -49,12 +49,18 @@ pub struct Assets<'a> {
     seed: u64,
     objects: HashMap<u32, Arc<Object>>,
     robots: HashMap<(PathBuf, Option<PathBuf>), Arc<Robot>>,
+    cache: Option<GridCache>,
 }
 
 impl<'a> Assets<'a> {
     /// Nothing loaded yet; `seed` decides where objects' surfaces are sampled.
     pub fn new(dataset: &'a Dataset, seed: u64) -> Self {
-        Self { dataset, seed, objects: HashMap::new(), robots: HashMap::new() }
+        Self { dataset, seed, objects: HashMap::new(), robots: HashMap::new(), cache: None }
+    }
+
+    /// With what robots need kept between runs, where there is a `cache`.
+    pub fn with_cache(self, cache: Option<GridCache>) -> Self {
+        Self { cache, ..self }
     }
 
     /// The dataset.
@@ -183,7 +189,7 @@ impl<'a> Assets<'a> {
             Some(file) => load_taxels(file)?,
             None => Vec::new(),
         };
-        let robot = Arc::new(Robot::new(tree, skin)?);
+        let robot = Arc::new(Robot::cached(tree, skin, self.cache.as_ref())?);
         self.robots.insert(key, Arc::clone(&robot));
         Ok(robot)
     }

@@ -8,9 +8,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix3, Quaternion, Translation3, UnitQuaternion, Vector3};
-use prehend_geometry::TriMesh;
 use prehend_geometry::hand::{Taxel, load_taxels};
 use prehend_geometry::robot::Robot as KinematicTree;
+use prehend_geometry::{GridCache, TriMesh};
 use prehend_render::{Camera, DepthImage, Mask, RgbImage};
 use serde::Deserialize;
 
@@ -149,11 +149,15 @@ struct RobotLayout {
     forces: Option<Vec<[f64; 3]>>,
 }
 
-/// Reads the frame file `file` and everything it names.
+/// Reads the frame file `file` and everything it names; distance grids of the robot are kept in `cache`.
 ///
 /// # Errors
 /// If the file or one that it names is missing or broken, naming the file and the field.
-pub fn load(file: &Path, seed: u64) -> Result<FrameInput, FrameFileError> {
+pub fn load(
+    file: &Path,
+    seed: u64,
+    cache: Option<&GridCache>,
+) -> Result<FrameInput, FrameFileError> {
     let text = std::fs::read_to_string(file)
         .map_err(|source| FrameFileError::Read { file: file.into(), source })?;
     let layout: Layout = serde_json::from_str(&text)
@@ -215,7 +219,7 @@ pub fn load(file: &Path, seed: u64) -> Result<FrameInput, FrameFileError> {
                 joints,
                 forces: forces.iter().map(|&f| Vector3::from(f)).collect(),
             };
-            let robot = Robot::new(tree, skin).map_err(|e| asset(e.into()))?;
+            let robot = Robot::cached(tree, skin, cache).map_err(|e| asset(e.into()))?;
             (Some(Arc::new(robot)), Some(hand))
         }
     };

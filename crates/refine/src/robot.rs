@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use nalgebra::Isometry3;
+use prehend_geometry::GridCache;
 use prehend_geometry::hand::Taxel;
 use prehend_geometry::robot::{
     ArticulatedRobot, PosedRobot, Robot as KinematicTree, RobotError, RobotShape,
@@ -27,11 +28,20 @@ impl Robot {
     /// # Errors
     /// If the geometry of a link cannot be used.
     pub fn new(tree: KinematicTree, taxels: Vec<Taxel>) -> Result<Self, RobotError> {
-        let shape = Arc::new(RobotShape::new(
-            &tree,
-            RobotShape::DEFAULT_SPACING,
-            RobotShape::DEFAULT_MARGIN,
-        )?);
+        Self::cached(tree, taxels, None)
+    }
+
+    /// As [`Self::new`] has it, with distance grids from `cache` where it holds them; others are left there.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn cached(
+        tree: KinematicTree,
+        taxels: Vec<Taxel>,
+        cache: Option<&GridCache>,
+    ) -> Result<Self, RobotError> {
+        let (spacing, margin) = (RobotShape::DEFAULT_SPACING, RobotShape::DEFAULT_MARGIN);
+        let shape = Arc::new(RobotShape::cached(&tree, spacing, margin, cache)?);
         let links = tree.links().iter().enumerate();
         let bodies = links
             .flat_map(|(index, link)| link.parts.iter().map(move |part| (index, part)))

@@ -6,7 +6,7 @@ use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 
 use super::{Robot, RobotError};
-use crate::{ClosestPoints, SdfGrid, TriMesh};
+use crate::{ClosestPoints, GridCache, SdfGrid, TriMesh};
 
 /// The collision shape of one link, in the link frame.
 #[derive(Clone, Debug)]
@@ -17,7 +17,11 @@ pub struct LinkShape {
 }
 
 impl LinkShape {
-    fn new(parts: &[TriMesh], spacing: f64, margin: f64) -> Result<Self, String> {
+    fn new(
+        parts: &[TriMesh],
+        [spacing, margin]: [f64; 2],
+        cache: Option<&GridCache>,
+    ) -> Result<Self, String> {
         let closest = parts
             .iter()
             .map(|p| ClosestPoints::new(p).map_err(|e| e.to_string()))
@@ -26,7 +30,13 @@ impl LinkShape {
             closest.iter().map(ClosestPoints::bounds).reduce(|a, b| (a.0.inf(&b.0), a.1.sup(&b.1)));
         let grid = bounds
             .map(|bounds| {
-                SdfGrid::from_fn(bounds, spacing, margin, |p, _| union_distance(&closest, p))
+                let build = || {
+                    SdfGrid::from_fn(bounds, spacing, margin, |p, _| union_distance(&closest, p))
+                };
+                match cache {
+                    Some(cache) => cache.grid(parts, bounds, [spacing, margin], build),
+                    None => build(),
+                }
             })
             .transpose()
             .map_err(|e| e.to_string())?;
@@ -94,6 +104,19 @@ impl RobotShape {
     /// # Errors
     /// [`RobotError::Shape`], naming the link whose bodies cannot be used.
     pub fn new(robot: &Robot, spacing: f64, margin: f64) -> Result<Self, RobotError> {
+        Self::cached(robot, spacing, margin, None)
+    }
+
+    /// As [`Self::new`] has it, but that grids which `cache` holds are taken from there, and others left there.
+    ///
+    /// # Errors
+    /// As [`Self::new`]; none that has to do with the cache.
+    pub fn cached(
+        robot: &Robot,
+        spacing: f64,
+        margin: f64,
+        cache: Option<&GridCache>,
+    ) -> Result<Self, RobotError> {
         let links = robot.links();
         // For each link the first one of equal geometry.
         let first: Vec<usize> = (0..links.len())
@@ -105,7 +128,7 @@ impl RobotShape {
                 if first[l] != l {
                     return Ok(None);
                 }
-                LinkShape::new(&links[l].parts, spacing, margin)
+                LinkShape::new(&links[l].parts, [spacing, margin], cache)
                     .map(|shape| Some(Arc::new(shape)))
                     .map_err(|reason| RobotError::Shape { link: links[l].name.clone(), reason })
             })

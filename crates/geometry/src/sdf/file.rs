@@ -125,7 +125,7 @@ fn number(left: &mut &[u8], field: &'static str) -> Result<f64, (&'static str, S
 }
 
 /// Fowler, Noll and Vo's hash 1a, by words of eight bytes instead of one.
-fn hash(bytes: &[u8]) -> u64 {
+pub(super) fn hash(bytes: &[u8]) -> u64 {
     bytes.chunks(8).fold(0xcbf2_9ce4_8422_2325, |hash, chunk| {
         let mut word = [0; 8];
         word[..chunk.len()].copy_from_slice(chunk);

@@ -180,6 +180,25 @@ fn a_mesh_with_a_hole_serves_where_its_mass_is_given() {
     assert_eq!(said.err.matches("warning: object 5: the mesh is not closed").count(), 1);
 }
 
+#[test]
+fn what_is_kept_between_runs_changes_no_pose() {
+    let place = Workplace::new();
+    let refined = |out: &str, cache: &str| {
+        let arguments = format!("{REFINE} --out {out}");
+        let mut command = place.command(&arguments);
+        let status = command.env("PREHEND_CACHE", cache).output().unwrap().status;
+        assert!(status.success());
+        place.poses(out).iter().map(|row| row.t_cam_model).collect::<Vec<_>>()
+    };
+    let without = refined("without.csv", "");
+    let kept = || fs::read_dir(place.path("kept")).unwrap().count();
+    assert_eq!(refined("first.csv", "kept"), without);
+    let grids = kept();
+    assert!(grids > 0);
+    assert_eq!(refined("second.csv", "kept"), without);
+    assert_eq!(kept(), grids);
+}
+
 /// The same evidence as a dataset and as a frame file gives the same pose.
 #[test]
 fn a_frame_file_is_as_good_as_a_dataset() {

@@ -10,6 +10,7 @@ use prehend_refine::{
     AssetError, Assets, Observation, Robot, TermKind, inspect_object, inspect_pose,
 };
 
+use crate::cache;
 use crate::options::{Input, Job, label};
 use crate::outcome::Outcome;
 use crate::output::{complain, say};
@@ -27,7 +28,7 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let dataset = arguments.input.open()?;
     let (jobs, mut failures) = arguments.input.jobs()?;
-    let mut assets = Assets::new(&dataset, 0);
+    let mut assets = Assets::new(&dataset, 0).with_cache(cache::open());
     let mut report = Report::create(&arguments.report)?;
     let mut done = 0;
     let bar = progress::bar(jobs.len() as u64, "drawing");

@@ -18,6 +18,7 @@ use prehend_refine::{
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
+use crate::cache;
 use crate::options::{Job, Selection, beside, label};
 use crate::outcome::Outcome;
 use crate::output::{complain, say};
@@ -64,7 +65,7 @@ impl Run<'_> {
     pub(crate) fn run(&self) -> anyhow::Result<Outcome> {
         let dataset = self.selection.open()?;
         let (jobs, mut failures) = self.selection.jobs(self.poses)?;
-        let assets = Mutex::new(Assets::new(&dataset, self.seed));
+        let assets = Mutex::new(Assets::new(&dataset, self.seed).with_cache(cache::open()));
         let mut report = self.report.map(Report::create).transpose()?;
         let (mut journal, mut refined): (_, BTreeMap<usize, Refined>) =
             Journal::open(&beside(self.out, "journal"), &self.identity(&dataset)?, self.restart)?;

@@ -8,6 +8,7 @@ use prehend_refine::strategy::ConfidenceSummary;
 use prehend_refine::{frame_file, inspect_object, inspect_pose, refine_with};
 use serde_json::json;
 
+use crate::cache;
 use crate::outcome::Outcome;
 use crate::output::{complain, say};
 use crate::progress;
@@ -20,7 +21,7 @@ pub(crate) fn run(
     out: Option<&Path>,
     print: bool,
 ) -> anyhow::Result<Outcome> {
-    let input = frame_file::load(file, method.seed())?;
+    let input = frame_file::load(file, method.seed(), cache::open().as_ref())?;
     let mut config = method.config()?;
     // A frame brings what it has: terms whose evidence is absent drop out unless they were asked for.
     if !method.terms_given() {

@@ -15,6 +15,7 @@ use prehend_refine::bop::{
 use prehend_refine::initial::{NoiseLevel, PoseSearch, SearchSettings, Target, find_targets};
 use prehend_refine::{AssetError, Assets, Observation, RefineError, Robot};
 
+use crate::cache;
 use crate::options::{Selection, label};
 use crate::outcome::Outcome;
 use crate::output::say;
@@ -132,7 +133,7 @@ fn found(dataset: &Dataset, selection: &Selection, list: Option<&Path>) -> anyho
         .into_iter()
         .filter(|t| selection.admits(t.scene_id, t.im_id, t.obj_id))
         .collect();
-    let mut assets = Assets::new(dataset, 0);
+    let mut assets = Assets::new(dataset, 0).with_cache(cache::open());
     let mut searches = BTreeMap::new();
     let (mut rows, mut failures) = (Vec::new(), Vec::new());
     let bar = progress::bar(targets.len() as u64, "searching");

@@ -1,5 +1,6 @@
 //! The `prehend` command.
 
+mod cache;
 mod check;
 mod dataset;
 mod eval;
@@ -36,6 +37,9 @@ use clap::{Parser, Subcommand};
 ///   prehend check   --dataset DIR --poses init.csv
 ///   prehend refine  --dataset DIR --poses init.csv --out refined.csv --report out
 ///   prehend eval    --dataset DIR --poses refined.csv
+///
+/// What a hand needs is prepared once and kept in PREHEND_CACHE (default: prehend in the user's cache folder); set it empty to
+/// keep nothing.
 ///
 /// Exit codes: 0 all done; 1 nothing could be done; 2 some frames failed and the output has the others.
 #[derive(Parser)]

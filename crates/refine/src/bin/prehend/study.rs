@@ -15,6 +15,7 @@ use prehend_refine::study::{
 };
 use prehend_refine::{Assets, Config, Identity, Journal, Method, Times, Workers, join_times};
 
+use crate::cache;
 use crate::options::Selection;
 use crate::outcome::Outcome;
 use crate::output::say;
@@ -134,7 +135,7 @@ impl Run {
         let open: Vec<&Frame> =
             own.iter().copied().filter(|f| !records.contains_key(&f.index)).collect();
 
-        let assets = Mutex::new(Assets::new(&dataset, self.seed));
+        let assets = Mutex::new(Assets::new(&dataset, self.seed).with_cache(cache::open()));
         let threads = self.threads.map_or_else(rayon::current_num_threads, NonZeroUsize::get);
         let bar = progress::bar(own.len() as u64, kind.name());
         bar.set_position(records.len() as u64);

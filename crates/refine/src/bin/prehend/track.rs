@@ -16,6 +16,7 @@ use prehend_refine::tracker::{Following, Recovery, Tracked, Tracker, TrackerSett
 use prehend_refine::{AssetError, Assets, PlainPose};
 use serde_json::json;
 
+use crate::cache;
 use crate::initial::observed;
 use crate::options::{Selection, label};
 use crate::outcome::Outcome;
@@ -101,7 +102,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     }
     let dataset = arguments.selection.open()?;
     let (sequences, mut failures) = arguments.sequences(&dataset)?;
-    let mut assets = Assets::new(&dataset, 0);
+    let mut assets = Assets::new(&dataset, 0).with_cache(cache::open());
     let mut frames = Vec::new();
     for sequence in &sequences {
         let followed =
