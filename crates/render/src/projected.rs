@@ -24,6 +24,20 @@ impl Region {
         self.x1 - self.x0
     }
 
+    /// Its pixels in an image of `width` columns.
+    pub(crate) fn indices(&self, width: usize) -> impl Iterator<Item = usize> + use<> {
+        let Self { x0, y0, x1, y1 } = *self;
+        (y0..y1).flat_map(move |y| y * width + x0..y * width + x1)
+    }
+
+    /// The rectangle that it touches in an image whose pixels are blocks of `factor` by `factor`, incomplete ones cut off.
+    pub(crate) fn reduced(&self, factor: usize, width: usize, height: usize) -> Self {
+        let Self { x0, y0, x1, y1 } = *self;
+        let end = |last: usize, size: usize| last.div_ceil(factor).min(size);
+        let (x1, y1) = (end(x1, width), end(y1, height));
+        Self { x0: (x0 / factor).min(x1), y0: (y0 / factor).min(y1), x1, y1 }
+    }
+
     /// The same rectangle in an image of `factor` times the resolution.
     pub(crate) fn scaled(&self, factor: usize) -> Self {
         let Self { x0, y0, x1, y1 } = *self;

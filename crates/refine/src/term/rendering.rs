@@ -67,9 +67,9 @@ impl Segmented {
     ///
     /// # Errors
     /// If the images do not fit the camera or the mask is empty.
-    pub(crate) fn new(observation: &Observation, hand: &DepthImage) -> Result<Self, RefineError> {
+    pub(crate) fn new(observation: &Observation, hand: DepthImage) -> Result<Self, RefineError> {
         let target = Target::new(observation.camera, &observation.color, &observation.mask)
-            .and_then(|t| t.with_occluder(hand.clone()))
+            .and_then(|t| t.with_occluder(hand))
             .map_err(images)?;
         Ok(Self { target: Arc::new(target), brightness: brightness(observation) })
     }
@@ -120,7 +120,7 @@ impl RenderingTerm {
         hand: &DepthImage,
         settings: RenderingSettings,
     ) -> Result<Self, RefineError> {
-        let image = Segmented::new(observation, hand)?.downsampled(settings.downsample)?;
+        let image = Segmented::new(observation, hand.clone())?.downsampled(settings.downsample)?;
         Ok(Self::of(image, object, settings))
     }
 

@@ -71,10 +71,15 @@ impl Target {
     pub fn new(camera: Camera, image: &RgbImage, mask: &Mask) -> Result<Self, TargetError> {
         check(&camera, "image", image.width(), image.height())?;
         check(&camera, "mask", mask.width(), mask.height())?;
-        let coverage = mask.pixels().iter().map(|&m| if m { 1.0 } else { 0.0 }).collect();
-        let segmented = image.pixels().iter().zip(mask.pixels());
-        let color = segmented.map(|(c, &m)| if m { *c } else { [0.0; 3] }).collect();
-        Self::assemble(camera, color, coverage)
+        // Outside the mask's bounds, which is most of the image, all is zero.
+        let bounds = bounds(camera.width, mask.pixels(), |&m| m).ok_or(TargetError::EmptyMask)?;
+        let pixels = camera.width * camera.height;
+        let (mut color, mut coverage) = (vec![[0.0; 3]; pixels], vec![0.0; pixels]);
+        for at in bounds.indices(camera.width).filter(|at| mask.pixels()[*at]) {
+            color[at] = image.pixels()[at];
+            coverage[at] = 1.0;
+        }
+        Self::assemble(camera, color, coverage, bounds)
     }
 
     /// From a picture of the object over black and how much of each pixel the object covers (0..=1, row-major; a matte),
@@ -97,7 +102,8 @@ impl Target {
             coverage.into_iter().map(|a| if a > 0.0 { a.min(1.0) } else { 0.0 }).collect();
         let covered = image.pixels().iter().zip(&coverage);
         let color = covered.map(|(c, a)| if *a > 0.0 { *c } else { [0.0; 3] }).collect();
-        Self::assemble(camera, color, coverage)
+        let bounds = bounds(camera.width, &coverage, |&a| a > 0.0).ok_or(TargetError::EmptyMask)?;
+        Self::assemble(camera, color, coverage, bounds)
     }
 
     /// Adds measured depth; only what lies inside the mask is used.
@@ -137,22 +143,21 @@ impl Target {
         let factor = factor.clamp(1, self.camera.width.min(self.camera.height));
         let camera = self.camera.scaled(1.0 / factor as f64);
         let share = 1.0 / (factor * factor) as f32;
-        let (mut color, mut coverage) = (Vec::new(), Vec::new());
-        for y in 0..camera.height {
-            for x in 0..camera.width {
-                let (mut c, mut a) = ([0.0f32; 3], 0.0);
-                for sy in y * factor..(y + 1) * factor {
-                    for sx in x * factor..(x + 1) * factor {
-                        let at = sy * self.camera.width + sx;
-                        (0..3).for_each(|k| c[k] += share * self.color[at][k]);
-                        a += share * self.coverage[at];
-                    }
+        let pixels = camera.width * camera.height;
+        let (mut color, mut coverage) = (vec![[0.0f32; 3]; pixels], vec![0.0f32; pixels]);
+        let bounds = self.bounds.reduced(factor, camera.width, camera.height);
+        for small in bounds.indices(camera.width) {
+            let (x, y) = (small % camera.width, small / camera.width);
+            let (c, a) = (&mut color[small], &mut coverage[small]);
+            for sy in y * factor..(y + 1) * factor {
+                for sx in x * factor..(x + 1) * factor {
+                    let at = sy * self.camera.width + sx;
+                    (0..3).for_each(|k| c[k] += share * self.color[at][k]);
+                    *a += share * self.coverage[at];
                 }
-                color.push(c);
-                coverage.push(a);
             }
         }
-        let mut target = Self::assemble(camera, color, coverage)?;
+        let mut target = Self::assemble(camera, color, coverage, bounds)?;
         if let Some(depth) = &self.depth {
             target = target.with_depth(&depth.downsampled(factor))?;
         }
@@ -172,31 +177,36 @@ impl Target {
         1.0 / (3.0 * self.normalisation)
     }
 
+    /// A target that has nothing beyond `within`.
     fn assemble(
         camera: Camera,
         color: Vec<[f32; 3]>,
         coverage: Vec<f32>,
+        within: Region,
     ) -> Result<Self, TargetError> {
         camera.check()?;
-        if let Some(at) = color.iter().position(|c| c.iter().any(|v| !v.is_finite())) {
+        let finite = |at: &usize| color[*at].iter().all(|v| v.is_finite());
+        if let Some(at) = within.indices(camera.width).find(|at| !finite(at)) {
             return Err(TargetError::NotFinite { x: at % camera.width, y: at / camera.width });
         }
-        let mut bounds = Region { x0: usize::MAX, y0: usize::MAX, x1: 0, y1: 0 };
-        let mut area = 0.0f64;
-        for (at, &a) in coverage.iter().enumerate().filter(|(_, a)| **a > 0.0) {
-            let (x, y) = (at % camera.width, at / camera.width);
-            bounds.x0 = bounds.x0.min(x);
-            bounds.y0 = bounds.y0.min(y);
-            bounds.x1 = bounds.x1.max(x + 1);
-            bounds.y1 = bounds.y1.max(y + 1);
-            area += a as f64;
-        }
-        if area == 0.0 {
-            return Err(TargetError::EmptyMask);
-        }
+        // Blocks that were cut off may have been all that there was.
+        let bounds = bounds(camera.width, &coverage, |&a| a > 0.0).ok_or(TargetError::EmptyMask)?;
+        let area: f64 = bounds.indices(camera.width).map(|at| f64::from(coverage[at])).sum();
         let normalisation = 1.0 / (3.0 * area);
         Ok(Self { camera, color, coverage, depth: None, occluder: None, bounds, normalisation })
     }
+}
+
+/// The smallest rectangle around all pixels of an image of `width` columns that are `covered`.
+fn bounds<T>(width: usize, pixels: &[T], covered: impl Fn(&T) -> bool) -> Option<Region> {
+    let mut bounds: Option<Region> = None;
+    for (y, row) in pixels.chunks(width.max(1)).enumerate() {
+        let Some(x0) = row.iter().position(&covered) else { continue };
+        let x1 = row.iter().rposition(&covered).unwrap_or(x0) + 1;
+        let here = Region { x0, y0: y, x1, y1: y + 1 };
+        bounds = Some(bounds.map_or(here, |bounds| bounds.union(&here)));
+    }
+    bounds
 }
 
 fn check(

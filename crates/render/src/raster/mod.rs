@@ -178,10 +178,14 @@ pub(crate) fn rasterise(projected: &Projected, region: &Region) -> Vec<Visible> 
 /// drawn, nor are faces with a corner within a millimetre of its plane or behind it: cut large tables and walls into small faces.
 /// Meant for what is known and does not move during a refinement, such as the hand.
 pub fn depth_map(camera: &Camera, bodies: &[(&RenderModel, Isometry3<f64>)]) -> DepthImage {
+    let drawn = |(model, pose): &(&RenderModel, Isometry3<f64>)| {
+        let projected = Posed::new(model, camera, pose, 0.0).projected;
+        rasterise(&projected, &projected.region)
+    };
+    let drawn: Vec<Vec<Visible>> = bodies.par_iter().map(drawn).collect();
     let mut inverse = vec![0.0f32; camera.width * camera.height];
-    for (model, pose) in bodies {
-        let posed = Posed::new(model, camera, pose, 0.0);
-        for part in rasterise(&posed.projected, &posed.projected.region) {
+    for body in &drawn {
+        for part in body {
             let width = part.region.width();
             for (row, values) in part.inverse_z.chunks(width.max(1)).enumerate() {
                 let start = (part.region.y0 + row) * camera.width + part.region.x0;

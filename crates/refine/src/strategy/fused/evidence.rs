@@ -58,7 +58,7 @@ impl<'a> Known<'a> {
                 *nearest = depth + IN_FRONT;
             }
         }
-        let image = Segmented::new(observation, &occluder)?;
+        let image = Segmented::new(observation, occluder)?;
         let images = Mutex::new(BTreeMap::from([(1, image)]));
         let depth = Arc::new(observation.depth.clone());
         let coloured = observation.has_colours();
