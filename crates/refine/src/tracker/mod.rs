@@ -31,7 +31,7 @@ use crate::{CameraCorrection, Object, Observation, RefineError, Robot, State};
 /// that return to what is said of them within [`memory`](TrackerSettings::memory).
 ///
 /// A pose that does not fit is not believed ([`LossSettings`]); the object is then looked for ([`Recovery`]). A frame
-/// allocates: its terms, the hand's depth image and the renderer's buffers are made anew.
+/// allocates: its terms, the hand's depth image and the renderer's buffers are made anew, from memory that the allocator has at hand.
 ///
 /// ```
 /// use std::sync::Arc;
