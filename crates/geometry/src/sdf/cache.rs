@@ -8,7 +8,7 @@ use super::SdfGrid;
 use super::file::hash;
 use crate::TriMesh;
 
-/// Changes with whatever changes the grids of a link.
+/// Changes with whatever changes the grids of a link, of which a test below has some numbers.
 const VERSION: u32 = 1;
 
 /// A folder of distance grids, by what they were made of.
@@ -43,7 +43,7 @@ impl GridCache {
         let key = key(parts, [spacing, margin]);
         let file = self.folder.join(format!("{key:016x}.sdf"));
         let kept = SdfGrid::load(&file).ok();
-        // Two shapes of one hash would hardly have the same box.
+        // Grids of another shape by chance of the hash, one in 2⁶⁴, would need to have the same box besides.
         if let Some(grid) = kept.filter(|g| g.bounds() == bounds && g.spacing() == spacing) {
             return Ok(grid);
         }
@@ -118,6 +118,28 @@ mod tests {
         fixture.grid(0.003);
         Fixture::new(folder.path(), 0.011).grid(0.004);
         assert_eq!((fixture.built.get(), fixture.files().len()), (2, 3));
+    }
+
+    /// If this fails because grids are made otherwise now, raise [`VERSION`] with the numbers: files of before would go on being used.
+    #[test]
+    fn grids_are_those_of_this_version() {
+        let folder = tempfile::tempdir().unwrap();
+        let grid = Fixture::new(folder.path(), 0.01).grid(0.004);
+        let of = |x, y, z| grid.value(&Point3::new(x, y, z));
+        let found = [of(0.001, 0.002, 0.003), of(0.007, 0.001, -0.002), of(0.009, 0.014, 0.018)];
+        let expected = [-0.004_699_984_568_997, 0.002_099_450_285_912, 0.006_329_357_092_998];
+        let off = found.iter().zip(expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(VERSION == 1 && off < 1e-12, "{found:?}");
+    }
+
+    #[test]
+    fn a_shape_that_is_turned_in_its_box_is_another() {
+        let folder = tempfile::tempdir().unwrap();
+        let fixture = Fixture::new(folder.path(), 0.01);
+        let mut turned = fixture.parts.clone();
+        // Signs change in pairs, and nothing else.
+        turned[0].vertices.iter_mut().for_each(|v| *v = Point3::new(-v.x, -v.y, v.z));
+        assert_ne!(key(&fixture.parts, [0.004, 0.01]), key(&turned, [0.004, 0.01]));
     }
 
     #[test]

@@ -43,6 +43,21 @@ impl Default for SupportSettings {
     }
 }
 
+impl SupportSettings {
+    fn check(&self) -> Result<(), RefineError> {
+        let positive = [self.sigma, self.reach, self.area].iter().all(|v| *v > 0.0);
+        let not_negative =
+            [self.friction, self.felt, self.felt_force].iter().all(|v| *v >= 0.0 && v.is_finite());
+        if positive && not_negative {
+            return Ok(());
+        }
+        let problem = format!(
+            "{self:?}: deviation, reach and area have to be positive, friction and forces not negative"
+        );
+        Err(RefineError::Setting { name: "support", problem })
+    }
+}
+
 /// Whether forces of the hand, where it is near the object, could balance weight and felt forces.
 ///
 /// What the skin feels is a lower bound of what acts there; contacts off the skin are unseen, and may bear anything
@@ -52,14 +67,14 @@ pub struct SupportTerm {
     object: Arc<Object>,
     robot: Arc<Robot>,
     gravity: Vector3<f64>,
-    felt: Vec<Felt>,
+    felt: Vec<Push>,
     /// Weight and felt forces together \[N\].
     size: f64,
     settings: SupportSettings,
 }
 
 /// A force on the object, in the frame of the link that exerts it.
-struct Felt {
+struct Push {
     link: usize,
     position: Point3<f64>,
     force: Vector3<f64>,
@@ -87,13 +102,14 @@ impl SupportTerm {
     /// A term for `object` in the hand `robot` of `observation`.
     ///
     /// # Errors
-    /// If gravity or the hand is unknown, or the hand has a skin and its forces are not one a taxel.
+    /// If gravity or the hand is unknown, the hand has a skin and its forces are not one a taxel, or a setting is out of range.
     pub fn new(
         observation: &Observation,
         object: Arc<Object>,
         robot: Arc<Robot>,
         settings: SupportSettings,
     ) -> Result<Self, RefineError> {
+        settings.check()?;
         let missing = |what| RefineError::Missing { what, term: "support" };
         let gravity = observation.gravity.ok_or_else(|| missing("gravity"))?;
         let hand = observation.hand.as_ref().ok_or_else(|| missing("hand state"))?;
@@ -104,15 +120,15 @@ impl SupportTerm {
         }
         let mut felt = Vec::new();
         for (taxel, force) in robot.taxels.iter().zip(&hand.forces) {
-            let strength = force.norm_squared();
-            if strength == 0.0 {
+            let strength = force.norm();
+            if !(strength > 0.0 && strength.is_finite()) {
                 continue;
             }
             let link = robot.tree.link_index(&taxel.link);
             let link = link.ok_or_else(|| RefineError::TaxelLink { link: taxel.link.clone() })?;
-            let trust = strength / (strength + settings.felt_force.powi(2));
+            let trust = 1.0 / (1.0 + (settings.felt_force / strength).powi(2));
             let force = -force * (trust * settings.felt);
-            felt.push(Felt { link, position: taxel.position, force });
+            felt.push(Push { link, position: taxel.position, force });
         }
         let weight = object.inertial.mass * gravity.norm();
         let size = weight + felt.iter().map(|f| f.force.norm()).sum::<f64>();
@@ -180,9 +196,9 @@ impl SupportTerm {
         arm.cross(force) / self.object.radius
     }
 
-    /// Nats of a squared newton, times two.
-    fn weight(&self) -> f64 {
-        (self.size * self.settings.sigma).powi(-2)
+    /// Nats of half a squared newton; none where nothing acts.
+    fn nats(&self) -> f64 {
+        if self.size > 0.0 { (self.size * self.settings.sigma).powi(-2) } else { 0.0 }
     }
 }
 
@@ -211,18 +227,18 @@ impl Term for SupportTerm {
     }
 
     fn value(&self, state: &State) -> f64 {
-        self.held(state).map_or(0.0, |held| self.weight() * held.balance.value)
+        self.held(state).map_or(0.0, |held| self.nats() * held.balance.value)
     }
 
     fn linearise(&self, state: &State, normal: &mut Normal) -> f64 {
         let Some(held) = self.held(state) else { return 0.0 };
         let blocks = [Block::ObjectPose, Block::HandPose, Block::Joints(state.joints.len())];
         let (jacobian, yielding) = self.derivatives(&held, state);
-        let (balance, weight) = (held.balance, self.weight());
-        let gradient = (jacobian.tr_mul(&balance.residual) - yielding) * weight;
-        let hessian = jacobian.tr_mul(&(balance.yielding * &jacobian)) * weight;
+        let (balance, nats) = (held.balance, self.nats());
+        let gradient = (jacobian.tr_mul(&balance.residual) - yielding) * nats;
+        let hessian = jacobian.tr_mul(&(balance.yielding * &jacobian)) * nats;
         normal.add_dynamic(&blocks, &gradient, &hessian);
-        weight * balance.value
+        nats * balance.value
     }
 }
 
@@ -316,8 +332,47 @@ mod tests {
         let (held, free) = (term.value(&held), term.value(&free));
         // All that acts is left: half a square over that of the deviation.
         let all = 0.5 * SupportSettings::default().sigma.powi(-2);
-        println!("{held} {free} {all}");
         assert!(held < 0.1 * all && free > 0.1 * all, "{held} {free} {all}");
+    }
+
+    #[test]
+    fn what_a_finger_feels_pushes_the_object_away_from_it() {
+        let (scene, ..) = fixture(0);
+        let mut observation = scene.observation.clone();
+        let taxel = &scene.robot.taxels[100];
+        let forces = &mut observation.hand.as_mut().unwrap().forces;
+        forces.fill(Vector3::zeros());
+        // The object presses into the skin with 2 N: half of that, and as much as so strong a taxel is believed.
+        forces[100] = -2.0 * taxel.normal;
+        let (object, robot) = (Arc::clone(&scene.object), Arc::clone(&scene.robot));
+        let term = SupportTerm::new(&observation, object, robot, SupportSettings::default());
+        let [push] = &term.unwrap().felt[..] else { panic!("not one force") };
+        assert!((push.force - taxel.normal * (4.0 / 4.25)).norm() < 1e-12, "{}", push.force);
+    }
+
+    #[test]
+    fn where_nothing_acts_nothing_is_said() {
+        let (scene, state, _) = fixture(0);
+        let mut observation = scene.observation.clone();
+        observation.gravity = Some(Vector3::zeros());
+        let forces = &mut observation.hand.as_mut().unwrap().forces;
+        forces.fill(Vector3::repeat(f64::NAN));
+        let settings = SupportSettings::default();
+        let new = |settings| {
+            let (object, robot) = (Arc::clone(&scene.object), Arc::clone(&scene.robot));
+            SupportTerm::new(&observation, object, robot, settings)
+        };
+        let term = new(settings.clone()).unwrap();
+        let mut normal = Normal::new(&[Block::ObjectPose]);
+        assert_eq!((term.value(&state), term.linearise(&state, &mut normal)), (0.0, 0.0));
+        assert_eq!(normal.gradient().norm(), 0.0);
+        for wrong in [
+            SupportSettings { reach: 0.0, ..settings.clone() },
+            SupportSettings { area: f64::NAN, ..settings.clone() },
+            SupportSettings { friction: -1.0, ..settings },
+        ] {
+            assert!(matches!(new(wrong), Err(RefineError::Setting { name: "support", .. })));
+        }
     }
 
     #[test]

@@ -71,6 +71,7 @@ impl Target {
     pub fn new(camera: Camera, image: &RgbImage, mask: &Mask) -> Result<Self, TargetError> {
         check(&camera, "image", image.width(), image.height())?;
         check(&camera, "mask", mask.width(), mask.height())?;
+        camera.check()?;
         // Outside the mask's bounds, which is most of the image, all is zero.
         let bounds = bounds(camera.width, mask.pixels(), |&m| m).ok_or(TargetError::EmptyMask)?;
         let pixels = camera.width * camera.height;
@@ -97,6 +98,7 @@ impl Target {
             let (found, expected) = (coverage.len(), camera.width * camera.height);
             return Err(TargetError::Matte { found, expected });
         }
+        camera.check()?;
         // A NaN is not above zero and so becomes zero.
         let coverage: Vec<f32> =
             coverage.into_iter().map(|a| if a > 0.0 { a.min(1.0) } else { 0.0 }).collect();
@@ -184,7 +186,6 @@ impl Target {
         coverage: Vec<f32>,
         within: Region,
     ) -> Result<Self, TargetError> {
-        camera.check()?;
         let finite = |at: &usize| color[*at].iter().all(|v| v.is_finite());
         if let Some(at) = within.indices(camera.width).find(|at| !finite(at)) {
             return Err(TargetError::NotFinite { x: at % camera.width, y: at / camera.width });

@@ -15,8 +15,9 @@ pub struct CompliantSupport {
 
 /// The least of ½ |load + forces|² + ½ Σ compliance · force² over forces within their cones, torques over a length.
 ///
-/// Unlike [`Balance`](super::Balance), of which it is the limit for no compliance, it has one solution, and a value that is
-/// differentiable by all that it is of.
+/// Unlike [`Balance`](super::Balance), towards which it goes with less and less compliance, it has one solution, and a value that is
+/// differentiable by all that it is of. Meant for compliances of 1e-4 and more: far below that the problem is too stiff for Newton's method, and what is
+/// found may not be the least, though it is what its forces cost.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CompliantBalance {
     /// Force on the body at each support \[N\].
@@ -76,6 +77,10 @@ impl CompliantBalance {
             .iter()
             .map(|s| Projection::new(&dual.pull(s, &residual), &s.support).point / s.compliance)
             .collect();
+        let residual = supports
+            .iter()
+            .zip(&forces)
+            .fold(*load, |sum, (support, force)| sum + dual.wrench(support, force));
         let cost = supports.iter().zip(&forces).map(|(s, f)| s.compliance * f.norm_squared());
         let value = 0.5 * (residual.norm_squared() + cost.sum::<f64>());
         let yielding = at.hessian.cholesky().map_or_else(Matrix6::zeros, |factor| factor.inverse());
@@ -104,6 +109,12 @@ impl Dual<'_> {
         let arm = (support.support.position - self.centre) / self.length;
         let (force, torque) = (residual.fixed_rows::<3>(0), residual.fixed_rows::<3>(3));
         -(force + torque.cross(&arm))
+    }
+
+    /// Of `force` at `support`.
+    fn wrench(&self, support: &CompliantSupport, force: &Vector3<f64>) -> Vector6<f64> {
+        let torque = (support.support.position - self.centre).cross(force) / self.length;
+        Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z)
     }
 
     fn at(&self, residual: &Vector6<f64>) -> DualAt {
@@ -140,7 +151,7 @@ impl Projection {
         let pressure = pull.dot(&normal);
         let across = pull - normal * pressure;
         let slip = across.norm();
-        if slip <= friction * pressure {
+        if pressure >= 0.0 && slip <= friction * pressure {
             return Self { point: *pull, jacobian: Matrix3::identity() };
         }
         if friction * slip <= -pressure {
@@ -172,7 +183,7 @@ mod tests {
         let mut unit = || 2.0 * random.unit() - 1.0;
         let count = 2 + (4.0 * (1.0 + unit())) as usize;
         let supports = (0..count).map(|_| {
-            let normal = Unit::new_normalize(Vector3::new(unit(), unit(), 1.0 + unit()));
+            let normal = Unit::new_normalize(Vector3::new(unit(), unit(), 0.7 + unit()));
             let position = Point3::new(unit(), unit(), unit());
             let support = Support { position, normal, friction: 0.5 + 0.4 * unit() };
             CompliantSupport { support, compliance: compliance * (1.5 + unit()) }
@@ -193,9 +204,12 @@ mod tests {
         let found = solve(&[CompliantSupport { support, compliance: 0.5 }], &load);
         assert!((found.forces[0] - Vector3::new(0.0, 0.0, 2.0)).norm() < 1e-12);
         assert!((found.residual[2] + 1.0).abs() < 1e-12 && (found.value - 1.5).abs() < 1e-12);
-        // It cannot pull.
-        let pulled = solve(&[CompliantSupport { support, compliance: 0.5 }], &-load);
-        assert_eq!((pulled.forces[0], pulled.value), (Vector3::zeros(), 4.5));
+        // It cannot pull, and least of all without friction.
+        for friction in [0.5, 0.0] {
+            let support = Support { friction, ..support };
+            let pulled = solve(&[CompliantSupport { support, compliance: 0.5 }], &-load);
+            assert_eq!((pulled.forces[0], pulled.value), (Vector3::zeros(), 4.5));
+        }
     }
 
     #[test]
@@ -246,20 +260,29 @@ mod tests {
     }
 
     #[test]
-    fn without_compliance_it_is_the_balance() {
+    fn with_little_compliance_it_is_nearly_the_balance() {
         let mut random = SplitMix64::new(7);
         let mut open = 0;
-        for _ in 0..50 {
-            let (supports, load) = problem(&mut random, 1e-9);
+        for _ in 0..200 {
+            let (supports, load) = problem(&mut random, 1e-4);
             let hard: Vec<Support> = supports.iter().map(|s| s.support).collect();
             let mut scaled = load;
             scaled.fixed_rows_mut::<3>(3).scale_mut(LENGTH);
             let balance = Balance::find(&hard, &Point3::origin(), &scaled);
             let soft = solve(&supports, &load);
+            let cost = |forces: &[Vector3<f64>]| {
+                let costs = supports.iter().zip(forces);
+                0.5 * costs.map(|(s, f)| s.compliance * f.norm_squared()).sum::<f64>()
+            };
             open += i32::from(!balance.is_balanced());
-            assert_eq!(balance.is_balanced(), soft.value < 1e-6, "{soft:?}");
+            // What balances best and costs something is one of the choices, in a norm of torques of its own.
+            if balance.is_balanced() {
+                assert!(soft.value <= cost(&balance.forces) * (1.0 + 1e-9) + 1e-12);
+            } else {
+                assert!(soft.residual.norm() > 1e-6);
+            }
         }
-        assert!((5..45).contains(&open), "{open}");
+        assert!((20..180).contains(&open), "{open}");
     }
 
     #[test]

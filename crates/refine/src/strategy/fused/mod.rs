@@ -217,11 +217,14 @@ fn distinct(mut found: Vec<(Point, Ending)>, radius: f64) -> Vec<(Point, Ending)
 }
 
 /// At most `count` states away from `point` by multiples of `distance` of surface motion, along the directions in which the
-/// posterior is wider than that, the widest first.
+/// posterior is open so far, the widest first.
+///
+/// Out to four deviations: where geometry says little, a turn of a can, first solutions of hardly any difference in value lie farther apart
+/// than the curvature about the best of them has it.
 fn spread(point: &Point, distance: f64, radius: f64, count: usize) -> Vec<State> {
     let mut states = Vec::new();
     for (twist, deviation) in confidence::principal_directions(point, radius) {
-        let reach = (1.5 * deviation / distance) as usize;
+        let reach = (4.0 * deviation / distance) as usize;
         for step in 1..=reach.min(4) {
             for sign in [1.0, -1.0] {
                 let twist = twist * (sign * distance * step as f64);

@@ -11,7 +11,8 @@ use crate::Robot;
 /// How touched taxels become contacts.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ContactSettings {
-    /// Taxels of one link that feel force are of one contact if no farther apart \[m\].
+    /// Taxels of one link that feel force are of one contact if each is no farther from the next \[m\], and none is twice as far from the
+    /// strongest, or faces away from it.
     pub reach: f64,
     /// Standard deviation of the object's surface from the skin where it is touched \[m\]: the skin's compliance, the coarseness of
     /// its taxels, and how far the object is off from its model.
@@ -32,6 +33,7 @@ impl Default for ContactSettings {
 struct Touched {
     link: usize,
     position: Point3<f64>,
+    normal: Vector3<f64>,
     force: f64,
 }
 
@@ -48,9 +50,10 @@ pub(super) fn contacts(
     settings: &ContactSettings,
 ) -> Vec<Probe> {
     let touched = robot.taxels.iter().zip(links).zip(forces);
-    let touched = touched.filter_map(|((Taxel { position, .. }, link), force)| {
+    let touched = touched.filter_map(|((Taxel { position, normal, .. }, link), force)| {
         let force = force.norm();
-        (force > least).then_some(Touched { link: *link, position: *position, force })
+        let touched = Touched { link: *link, position: *position, normal: *normal, force };
+        (force > least && force.is_finite()).then_some(touched)
     });
     groups(touched.collect(), settings.reach)
         .iter()
@@ -58,7 +61,7 @@ pub(super) fn contacts(
             let force: f64 = group.iter().map(|t| t.force).sum();
             let sum = |sum: Vector3<f64>, t: &Touched| sum + t.position.coords * t.force;
             let centre = Point3::from(group.iter().fold(Vector3::zeros(), sum) / force);
-            let trust = force.powi(2) / (force.powi(2) + settings.force.powi(2));
+            let trust = 1.0 / (1.0 + (settings.force / force).powi(2));
             Probe {
                 link: group[0].link,
                 position: on_skin(robot, group[0].link, centre),
@@ -70,16 +73,22 @@ pub(super) fn contacts(
         .collect()
 }
 
-/// Those of `touched` that hang together, in their order.
+/// Those of `touched` that hang together about the strongest.
 fn groups(mut touched: Vec<Touched>, reach: f64) -> Vec<Vec<Touched>> {
+    touched.sort_by(|a, b| b.force.total_cmp(&a.force));
     let mut groups = Vec::new();
     while !touched.is_empty() {
         let mut group = vec![touched.remove(0)];
+        let Touched { link, position: strongest, normal, .. } = group[0];
         let mut looked_at = 0;
         while looked_at < group.len() {
-            let Touched { link, position, .. } = group[looked_at];
+            let place = group[looked_at].position;
             looked_at += 1;
-            let near = |t: &mut Touched| t.link == link && (t.position - position).norm() <= reach;
+            let near = |t: &mut Touched| {
+                let of_same = t.link == link && t.normal.dot(&normal) > 0.0;
+                let apart = (t.position - strongest).norm();
+                of_same && (t.position - place).norm() <= reach && apart <= 2.0 * reach
+            };
             group.extend(touched.extract_if(.., near));
         }
         groups.push(group);

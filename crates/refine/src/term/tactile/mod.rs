@@ -88,7 +88,7 @@ impl Probe {
     }
 }
 
-/// The paper's distance between the mesh and the taxels in contact, and the evidence of the others.
+/// The paper's distance between the mesh and the taxels in contact, or that of whole contacts ([`Felt`]), and the evidence of the other taxels.
 ///
 /// What is touched is drawn to the surface from either side; quiet taxels are pushed out of it, which the
 /// paper leaves unused. Both go through Cauchy's loss, because some taxels are dead and some ring false.
