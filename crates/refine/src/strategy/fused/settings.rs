@@ -199,7 +199,7 @@ impl Default for FusedSettings {
                     downsample: 4,
                     points: 250,
                     tolerance: 4.0,
-                    iterations: 8,
+                    iterations: 5,
                     last_gain: 0.3,
                     hypotheses: 14,
                     colour: true,
