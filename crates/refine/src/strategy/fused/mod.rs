@@ -13,6 +13,7 @@ mod tests;
 use std::sync::Arc;
 
 use nalgebra::Translation3;
+use prehend_autodiff::lie::so3_log;
 use rayon::prelude::*;
 
 pub(crate) use self::confidence::RIDGE;
@@ -117,11 +118,12 @@ impl Fused {
                 // what little is seen of the object may have led astray.
                 let mut turned_back = states[0].clone();
                 let moved = states[0].centre() - initial.centre();
-                states.truncate(next.hypotheses.saturating_sub(2).max(1));
+                states.truncate(KEPT.min(next.hypotheses.saturating_sub(2).max(1)));
                 turned_back.t_cam_object = Translation3::from(moved) * initial.t_cam_object;
                 states.extend([turned_back, initial.clone()]);
                 let more = next.hypotheses.saturating_sub(states.len());
-                states.extend(spread(&found[0].0, settings.spread, object.radius, more));
+                let point = &found[0].0;
+                states.extend(spread(point, &initial, settings.spread, object.radius, more));
             }
             go_on = step(&found[0].0, &mut trace);
             if !go_on {
@@ -185,6 +187,9 @@ impl Fused {
 const FINEST: f64 = 2e-4;
 const COARSEST: f64 = 3e-3;
 
+/// Solutions of geometry alone that are taken up: where they differ, starts spread about them say more than they do.
+const KEPT: usize = 4;
+
 /// How wide the posterior may be in any direction \[m of surface motion\], and how far depth points may be from the surface \[m\],
 /// for a first solution that needs no others beside it.
 const SETTLED_WIDTH: f64 = 6e-3;
@@ -216,19 +221,29 @@ fn distinct(mut found: Vec<(Point, Ending)>, radius: f64) -> Vec<(Point, Ending)
     kept
 }
 
-/// At most `count` states away from `point` by multiples of `distance` of surface motion, along the directions in which the
-/// posterior is open so far, the widest first.
+/// At most `count` states along the directions in which the posterior about `point` is open so far, the widest first: at multiples of
+/// `distance` of surface motion from where such a direction comes nearest to `initial`.
 ///
-/// Out to four deviations: where geometry says little, a turn of a can, first solutions of hardly any difference in value lie farther apart
-/// than the curvature about the best of them has it.
-fn spread(point: &Point, distance: f64, radius: f64, count: usize) -> Vec<State> {
+/// Geometry that leaves a turn open drifts along it, tens of degrees from where the initial pose was, so that is where to look first. And four
+/// deviations wide, since first solutions of hardly any difference in value lie farther apart than the curvature about the best of them has it.
+fn spread(point: &Point, initial: &State, distance: f64, radius: f64, count: usize) -> Vec<State> {
+    let state = &point.state;
+    let moved = initial.centre() - state.centre();
+    let turned = so3_log(&(initial.t_cam_object.rotation * state.t_cam_object.rotation.inverse()));
     let mut states = Vec::new();
     for (twist, deviation) in confidence::principal_directions(point, radius) {
-        let reach = (4.0 * deviation / distance) as usize;
-        for step in 1..=reach.min(4) {
-            for sign in [1.0, -1.0] {
-                let twist = twist * (sign * distance * step as f64);
-                states.push(point.state.moved(Block::ObjectPose, twist.as_slice()));
+        let (place, turn) = (twist.fixed_rows::<3>(0), twist.fixed_rows::<3>(3));
+        // The direction is a unit vector where turns count as what they move the surface by.
+        let nearest = place.dot(&moved) + radius * radius * turn.dot(&turned);
+        let reach = ((4.0 * deviation / distance) as i32).min(4);
+        if reach == 0 {
+            break;
+        }
+        let steps = std::iter::once(0).chain((1..=reach).flat_map(|step| [step, -step]));
+        for step in steps {
+            let along = nearest + distance * f64::from(step);
+            if along.abs() > 0.5 * distance {
+                states.push(state.moved(Block::ObjectPose, (twist * along).as_slice()));
             }
         }
     }
