@@ -2,13 +2,15 @@
 
 use std::sync::Arc;
 
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Vector3};
 use prehend_geometry::GridCache;
 use prehend_geometry::hand::Taxel;
 use prehend_geometry::robot::{
     ArticulatedRobot, PosedRobot, Robot as KinematicTree, RobotError, RobotShape,
 };
 use prehend_render::RenderModel;
+
+use crate::RefineError;
 
 /// A robot hand: kinematics, shape and skin.
 pub struct Robot {
@@ -88,6 +90,18 @@ impl Robot {
     pub fn check_joints(&self, joints: &[f64]) -> Result<(), RobotError> {
         let (given, expected) = (joints.len(), self.tree.joint_names().len());
         if given == expected { Ok(()) } else { Err(RobotError::JointCount { given, expected }) }
+    }
+
+    /// Whether `forces` has one for each taxel.
+    pub(crate) fn check_forces(&self, forces: &[Vector3<f64>]) -> Result<(), RefineError> {
+        let (forces, taxels) = (forces.len(), self.taxels.len());
+        if forces == taxels { Ok(()) } else { Err(RefineError::TaxelCount { forces, taxels }) }
+    }
+
+    /// The link that carries `taxel`.
+    pub(crate) fn link_of(&self, taxel: &Taxel) -> Result<usize, RefineError> {
+        let link = self.tree.link_index(&taxel.link);
+        link.ok_or_else(|| RefineError::TaxelLink { link: taxel.link.clone() })
     }
 
     /// What there is to draw of the hand, with link → camera poses.

@@ -114,9 +114,8 @@ impl SupportTerm {
         let gravity = observation.gravity.ok_or_else(|| missing("gravity"))?;
         let hand = observation.hand.as_ref().ok_or_else(|| missing("hand state"))?;
         robot.check_joints(&hand.joints)?;
-        if !hand.forces.is_empty() && hand.forces.len() != robot.taxels.len() {
-            let (forces, taxels) = (hand.forces.len(), robot.taxels.len());
-            return Err(RefineError::TaxelCount { forces, taxels });
+        if !hand.forces.is_empty() {
+            robot.check_forces(&hand.forces)?;
         }
         let mut felt = Vec::new();
         for (taxel, force) in robot.taxels.iter().zip(&hand.forces) {
@@ -124,8 +123,7 @@ impl SupportTerm {
             if !(strength > 0.0 && strength.is_finite()) {
                 continue;
             }
-            let link = robot.tree.link_index(&taxel.link);
-            let link = link.ok_or_else(|| RefineError::TaxelLink { link: taxel.link.clone() })?;
+            let link = robot.link_of(taxel)?;
             let trust = 1.0 / (1.0 + (settings.felt_force / strength).powi(2));
             let force = -force * (trust * settings.felt);
             felt.push(Push { link, position: taxel.position, force });

@@ -110,9 +110,8 @@ mod tests {
     use crate::synth::Scene;
 
     fn found(scene: &Scene, forces: &[Vector3<f64>]) -> Vec<Probe> {
-        let links: Vec<usize> = (scene.robot.taxels.iter())
-            .map(|taxel| scene.robot.tree.link_index(&taxel.link).unwrap())
-            .collect();
+        let taxels = scene.robot.taxels.iter();
+        let links: Vec<usize> = taxels.map(|t| scene.robot.link_of(t).unwrap()).collect();
         contacts(&scene.robot, &links, forces, 0.1, &ContactSettings::default())
     }
 

@@ -113,17 +113,9 @@ impl TactileTerm {
             .hand
             .as_ref()
             .ok_or(RefineError::Missing { what: "hand state", term: "tactile" })?;
-        if hand.forces.len() != robot.taxels.len() {
-            return Err(RefineError::TaxelCount {
-                forces: hand.forces.len(),
-                taxels: robot.taxels.len(),
-            });
-        }
+        robot.check_forces(&hand.forces)?;
         robot.check_joints(&hand.joints)?;
-        let links = robot.taxels.iter().map(|taxel| {
-            let link = robot.tree.link_index(&taxel.link);
-            link.ok_or_else(|| RefineError::TaxelLink { link: taxel.link.clone() })
-        });
+        let links = robot.taxels.iter().map(|taxel| robot.link_of(taxel));
         let links = links.collect::<Result<Vec<usize>, _>>()?;
         let probes = probes(&robot, &links, &hand.forces, settings);
         Ok(Self { object, robot, probes })
