@@ -64,15 +64,13 @@ pub struct Confidence {
 pub struct Width {
     /// What covariances are multiplied by.
     pub scale: f64,
-    /// Standard deviation that is added to the place, in each direction, for what no term models \[m\].
-    pub place: f64,
-    /// The same of the rotation, about each axis \[rad\].
+    /// Standard deviation that is added to the rotation about each axis, for what no term models \[rad\].
     pub turn: f64,
 }
 
 impl Default for Width {
     fn default() -> Self {
-        Self { scale: 1.2, place: 3.5e-4, turn: 0.45f64.to_radians() }
+        Self { scale: 1.4, turn: 0.39f64.to_radians() }
     }
 }
 
@@ -92,8 +90,8 @@ impl Confidence {
     /// Of the solutions `found`, the best first; `radius` turns radians into metres of surface motion.
     pub(crate) fn new(found: &[(Point, Ending)], width: Width, radius: f64) -> Self {
         let (best, ending) = &found[0];
-        let (place, turn) = (width.place.powi(2), width.turn.powi(2));
-        let more = Matrix6::from_diagonal(&Vector6::new(place, place, place, turn, turn, turn));
+        let turn = width.turn.powi(2);
+        let more = Matrix6::from_diagonal(&Vector6::new(0.0, 0.0, 0.0, turn, turn, turn));
         let bounds: Vec<(Matrix6<f64>, f64)> =
             found.iter().map(|(point, _)| laplace(point)).collect();
         let covariance = |bound: &Matrix6<f64>| bound * width.scale + more;

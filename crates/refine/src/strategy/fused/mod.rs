@@ -160,7 +160,7 @@ impl Fused {
         }
         // Where calibrations are exact, as in simulation, so are models.
         let width = match exact {
-            true => Width { place: 0.0, turn: 0.0, ..settings.width },
+            true => Width { turn: 0.0, ..settings.width },
             false => settings.width,
         };
         Ok((trace, Confidence::new(&found, width, object.radius)))
