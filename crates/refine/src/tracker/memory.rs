@@ -14,6 +14,10 @@ use crate::{CameraCorrection, State};
 /// Time within which an object that is not seen comes to rest, all but 1/e of its velocity \[s\].
 const COASTING: f64 = 0.25;
 
+/// What the level is multiplied by for every frame that the object is lost, and by all of them together at most.
+const GROWTH: f64 = 1.1;
+const MOST_GROWTH: f64 = 4.0;
+
 /// The last pose that was believed, and what was learnt with it.
 #[derive(Clone, Debug)]
 pub(super) struct Memory {
@@ -35,6 +39,8 @@ pub(super) struct Memory {
     layout: Layout,
     /// Running level of the misfit \[nat\].
     pub(super) level: f64,
+    /// Frames since then in which something was seen, but not believed.
+    pub(super) lost: i32,
 }
 
 /// What is expected of a frame before it is looked at.
@@ -70,7 +76,13 @@ impl Memory {
             covariance: posterior(point, layout, accuracy),
             layout,
             level,
+            lost: 0,
         }
+    }
+
+    /// The level that misfits are judged by: it grows while the object is lost, because circumstances may have changed for good.
+    pub(super) fn allowance(&self) -> f64 {
+        self.level * GROWTH.powi(self.lost).min(MOST_GROWTH)
     }
 
     /// The next of this memory: as [`new`](Self::new), and with the velocity between `prediction` and there.

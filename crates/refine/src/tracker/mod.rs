@@ -147,8 +147,6 @@ impl Solved {
 
 /// Part of the way that the level of misfits goes to the next one.
 const LEVEL_GAIN: f64 = 0.1;
-/// By how much of itself the level grows while an object is lost: circumstances may have changed for good.
-const LEVEL_GROWTH: f64 = 0.1;
 
 impl Tracker {
     /// A tracker that begins by searching, unless [`start_from`](Self::start_from) says where.
@@ -224,7 +222,7 @@ impl Tracker {
                 return Ok(outcome(prediction.state, Following::Predicted, spent));
             }
             let confidence = self.confidence(&solved);
-            let doubt = self.doubt(&solved, &confidence, Some(&carried), memory.level);
+            let doubt = self.doubt(&solved, &confidence, Some(&carried), memory.allowance());
             spent.judgement = clock.lap();
             if doubt.is_none() {
                 let motion = if in_hand { &self.settings.held } else { &self.settings.free };
@@ -237,7 +235,7 @@ impl Tracker {
         } else {
             Some(Doubt::Unseen)
         };
-        let again = self.recover(observation, &known, &prediction.state, memory.level)?;
+        let again = self.recover(observation, &known, &prediction.state, memory.allowance())?;
         spent.recovery = clock.lap();
         let doubt = doubt.unwrap_or(Doubt::Unseen);
         if let Some((solved, confidence)) = again {
@@ -246,7 +244,7 @@ impl Tracker {
             return Ok(found(solved, confidence, Following::Found, Some(doubt), spent));
         }
         if let Some(memory) = &mut self.memory {
-            memory.level *= 1.0 + LEVEL_GROWTH;
+            memory.lost = memory.lost.saturating_add(1);
         }
         Ok(lost(prediction.state, doubt, spent))
     }
@@ -305,8 +303,8 @@ impl Tracker {
         if !go_on() {
             return Solved { point: start, ending: Ending::Stopped, iterations };
         }
-        let (point, ending) = problem.solve(start, stage.iterations, stage.last_gain, |_| {
-            iterations += 1;
+        let (point, ending) = problem.solve(start, stage.iterations, stage.last_gain, |down| {
+            iterations += usize::from(down);
             go_on()
         });
         Solved { point, ending, iterations }
@@ -394,7 +392,7 @@ impl Tracker {
         if surprise > loss.surprise {
             return Some(Doubt::Surprise(surprise));
         }
-        let widest = confidence.unobserved.iter().map(|u| u.deviation).fold(0.0, f64::max);
+        let widest = confidence.widest(self.object.radius);
         (widest > loss.deviation).then_some(Doubt::Uncertain(widest))
     }
 

@@ -116,6 +116,31 @@ fn an_empty_mask_is_lost_and_a_full_one_found_again() {
 }
 
 #[test]
+fn what_is_believed_after_a_loss_has_bounds() {
+    let mut tracker = tracker(TrackerSettings::default());
+    track(&mut tracker, 0);
+    let memory = tracker.memory.as_mut().unwrap();
+    assert_eq!(memory.allowance(), memory.level);
+    memory.lost = 3;
+    let grown = memory.allowance();
+    assert!(grown > 1.2 * memory.level && grown < 1.5 * memory.level);
+    memory.lost = i32::MAX;
+    assert_eq!(memory.allowance(), 4.0 * memory.level);
+}
+
+#[test]
+fn an_uncertain_pose_is_doubted_at_any_limit() {
+    let loss = LossSettings { deviation: 1e-4, ..TrackerSettings::default().loss };
+    let settings = TrackerSettings { loss, recovery: Recovery::Off, ..Default::default() };
+    let mut tracker = tracker(settings);
+    track(&mut tracker, 0);
+    let tracked = track(&mut tracker, 1);
+    assert_eq!(tracked.following, Following::Lost);
+    let Some(Doubt::Uncertain(deviation)) = tracked.doubt else { panic!("{:?}", tracked.doubt) };
+    assert!(deviation > 1e-4 && deviation < 8e-3, "{deviation} m");
+}
+
+#[test]
 fn calibrations_carry_over() {
     let mut tracker = tracker(TrackerSettings::default());
     let wrong = 0.03;

@@ -13,7 +13,9 @@ use prehend_refine::study::{
     Design, Examined, Examiner, Failure, Frame, FrameRecord, Kind, Level, MethodSettings, RECORDS,
     Shard, Sweep, TIMES, Tables, merge, write_outputs,
 };
-use prehend_refine::{Assets, Config, Identity, Journal, Method, Times, Workers, join_times};
+use prehend_refine::{
+    Assets, Config, Identity, Journal, Method, StrategyKind, Times, Workers, join_times,
+};
 
 use crate::cache;
 use crate::options::Selection;
@@ -177,7 +179,13 @@ impl Run {
             if methods.iter().any(|(other, _)| other == name) {
                 bail!("method {name} is named twice");
             }
-            methods.push((name.to_owned(), Design::config(kind, method, self.iterations)));
+            let config = Design::config(kind, method, self.iterations);
+            if kind == Kind::Steps && config.strategy == StrategyKind::Fused {
+                bail!(
+                    "{name} has too few steps for the steps study: it ends when nothing is left to gain"
+                );
+            }
+            methods.push((name.to_owned(), config));
         }
         Ok(methods)
     }

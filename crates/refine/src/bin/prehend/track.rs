@@ -246,11 +246,15 @@ fn told(frames: &[Done]) -> String {
     if seconds.is_empty() {
         seconds = frames.iter().map(of).collect();
     }
-    let rate = seconds.len() as f64 / seconds.iter().sum::<f64>();
+    let total: f64 = seconds.iter().sum();
     seconds.sort_by(f64::total_cmp);
-    let median = 1e3 * seconds[seconds.len() / 2];
-    let mut text =
-        format!("{} frames tracked at {rate:.1} a second, median {median:.1} ms: ", frames.len());
+    let mut text = format!("{} frames tracked", frames.len());
+    // Without time for any of them they were only predicted.
+    if total > 0.0 {
+        let (rate, median) = (seconds.len() as f64 / total, 1e3 * seconds[seconds.len() / 2]);
+        text += &format!(" at {rate:.1} a second, median {median:.1} ms");
+    }
+    text += ": ";
     let all = [Following::Followed, Following::Predicted, Following::Found, Following::Lost];
     let counts: Vec<String> = all
         .into_iter()

@@ -128,6 +128,11 @@ impl Confidence {
         self.hypotheses[0].covariance
     }
 
+    /// Standard deviation along the direction that is known least \[m of surface motion\]; `radius` turns radians into that.
+    pub(crate) fn widest(&self, radius: f64) -> f64 {
+        directions(&self.covariance(), radius)[0].1
+    }
+
     /// Probability that the pose is right: within 5 mm and 5° of the true one.
     pub fn probability(&self) -> f64 {
         self.probability_within(5e-3, 5f64.to_radians())

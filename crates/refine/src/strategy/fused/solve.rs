@@ -121,14 +121,14 @@ impl Problem {
         Point { state, value, normal, parts, displaced: found }
     }
 
-    /// Lowers the sum of the terms from `point` in at most `iterations` steps, calling `visit` at every point that is lower than the
-    /// one before; ends when that returns false (Marquardt, 1963).
+    /// Lowers the sum of the terms from `point` in at most `iterations` steps (Marquardt, 1963), saying after each to `go_on` whether it led
+    /// down; ends when that returns false.
     pub(crate) fn solve(
         &self,
         mut point: Point,
         iterations: usize,
         last_gain: f64,
-        mut visit: impl FnMut(&Point) -> bool,
+        mut go_on: impl FnMut(bool) -> bool,
     ) -> (Point, Ending) {
         let mut damping = FIRST_DAMPING;
         let mut rejected = false;
@@ -141,19 +141,18 @@ impl Problem {
                 return (point, if rejected { Ending::Stuck } else { Ending::Converged });
             }
             let next = self.at(point.state.moved_all(point.normal.blocks(), step.as_slice()));
-            if next.value < point.value {
-                point = next;
-                rejected = false;
-                damping = (damping / 10.0).max(1e-6);
-                if !visit(&point) {
-                    return (point, Ending::Stopped);
-                }
-            } else {
-                rejected = true;
+            rejected = next.value.is_nan() || next.value >= point.value;
+            if rejected {
                 damping *= 8.0;
                 if damping > LAST_DAMPING {
                     return (point, Ending::Stuck);
                 }
+            } else {
+                point = next;
+                damping = (damping / 10.0).max(1e-6);
+            }
+            if !go_on(!rejected) {
+                return (point, Ending::Stopped);
             }
         }
         (point, Ending::Iterations)
@@ -212,6 +211,42 @@ mod tests {
             }
             self.value(state)
         }
+    }
+
+    /// Promises a way down where there is none.
+    struct Flat;
+
+    impl Term for Flat {
+        fn name(&self) -> &'static str {
+            "flat"
+        }
+
+        fn value(&self, _state: &State) -> f64 {
+            1.0
+        }
+
+        fn linearise(&self, state: &State, normal: &mut Normal) -> f64 {
+            for axis in 0..6 {
+                let row: [f64; 6] = std::array::from_fn(|k| f64::from(u8::from(k == axis)));
+                normal.add_row(&[(Block::ObjectPose, &row)], 1.0, 1.0);
+            }
+            self.value(state)
+        }
+    }
+
+    #[test]
+    fn a_solve_can_be_stopped_between_steps_that_lead_nowhere() {
+        let scene = default_scene(1).unwrap();
+        let state = State::new(&scene.observation, &scene.object, &scene.truth).unwrap();
+        let problem =
+            Problem { terms: vec![Box::new(Flat)], blocks: vec![Block::ObjectPose], patches: None };
+        let mut steps = Vec::new();
+        let (point, ending) = problem.solve(problem.at(state.clone()), 10, 1e-9, |down| {
+            steps.push(down);
+            steps.len() < 3
+        });
+        assert_eq!((ending, steps), (Ending::Stopped, vec![false; 3]));
+        assert_eq!(point.state.t_cam_object, state.t_cam_object);
     }
 
     #[test]
