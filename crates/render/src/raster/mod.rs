@@ -183,22 +183,21 @@ pub fn depth_map(camera: &Camera, bodies: &[(&RenderModel, Isometry3<f64>)]) -> 
         rasterise(&projected, &projected.region)
     };
     let drawn: Vec<Vec<Visible>> = bodies.par_iter().map(drawn).collect();
-    let mut inverse = vec![0.0f32; camera.width * camera.height];
+    let mut depth = DepthImage::filled(camera.width, camera.height, 0.0);
+    let nearest = depth.pixels_mut();
     for body in &drawn {
         for part in body {
             let width = part.region.width();
             for (row, values) in part.inverse_z.chunks(width.max(1)).enumerate() {
                 let start = (part.region.y0 + row) * camera.width + part.region.x0;
-                for (old, new) in inverse[start..start + width].iter_mut().zip(values) {
+                for (old, new) in nearest[start..start + width].iter_mut().zip(values) {
                     *old = old.max(*new);
                 }
             }
         }
     }
-    let mut depth = DepthImage::filled(camera.width, camera.height, 0.0);
-    for (z, w) in depth.pixels_mut().iter_mut().zip(inverse) {
-        *z = if w > 0.0 { 1.0 / w } else { 0.0 };
-    }
+    // So far 1/Z, which is what faces are flat in.
+    nearest.iter_mut().filter(|w| **w > 0.0).for_each(|w| *w = 1.0 / *w);
     depth
 }
 

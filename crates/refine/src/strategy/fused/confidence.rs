@@ -70,7 +70,7 @@ pub struct Width {
 
 impl Default for Width {
     fn default() -> Self {
-        Self { scale: 1.4, turn: 0.39f64.to_radians() }
+        Self { scale: 1.35, turn: 0.39f64.to_radians() }
     }
 }
 
