@@ -16,7 +16,7 @@ const COASTING: f64 = 0.25;
 
 /// What the level is multiplied by for every frame that the object is lost, and by all of them together at most.
 const GROWTH: f64 = 1.1;
-const MOST_GROWTH: f64 = 4.0;
+const MOST_GROWTH: f64 = 2.0;
 
 /// The last pose that was believed, and what was learnt with it.
 #[derive(Clone, Debug)]
@@ -39,7 +39,7 @@ pub(super) struct Memory {
     layout: Layout,
     /// Running level of the misfit \[nat\].
     pub(super) level: f64,
-    /// Frames since then in which something was seen, but not believed.
+    /// Frames in which something was seen, but not believed, less those in which it was believed again; not below zero.
     pub(super) lost: i32,
 }
 

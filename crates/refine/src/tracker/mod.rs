@@ -135,7 +135,10 @@ pub struct Tracked {
 struct Solved {
     point: Point,
     ending: Ending,
+    /// Steps down.
     iterations: usize,
+    /// Whether any step was tried.
+    tried: bool,
 }
 
 impl Solved {
@@ -180,6 +183,7 @@ impl Tracker {
         time: Duration,
     ) -> Result<Tracked, RefineError> {
         let mut clock = Clock::start(self.settings.budget);
+        let time = self.memory.as_ref().map_or(time, |memory| memory.time.max(time));
         if let (Some(robot), Some(hand)) = (&self.robot, &observation.hand) {
             robot.check_joints(&hand.joints)?;
         }
@@ -218,7 +222,7 @@ impl Tracker {
             }
             let solved = self.solve(&problem, prediction.state.clone(), &clock);
             spent.steps = clock.lap();
-            if solved.ending == Ending::Stopped && solved.iterations == 0 {
+            if solved.ending == Ending::Stopped && !solved.tried {
                 return Ok(outcome(prediction.state, Following::Predicted, spent));
             }
             let confidence = self.confidence(&solved);
@@ -228,19 +232,24 @@ impl Tracker {
                 let motion = if in_hand { &self.settings.held } else { &self.settings.free };
                 let level = memory.level + LEVEL_GAIN * (solved.misfit() - memory.level);
                 let next = self.remember(time, &solved, &told, in_hand, level);
-                self.memory = Some(Memory::followed(next, &prediction, motion));
+                let mut next = Memory::followed(next, &prediction, motion);
+                next.lost = (memory.lost - 1).max(0);
+                self.memory = Some(next);
                 return Ok(found(solved, confidence, Following::Followed, None, spent));
             }
             doubt
         } else {
             Some(Doubt::Unseen)
         };
-        let again = self.recover(observation, &known, &prediction.state, memory.allowance())?;
+        let again = self.recover(observation, &known, &prediction.state, &memory)?;
         spent.recovery = clock.lap();
         let doubt = doubt.unwrap_or(Doubt::Unseen);
         if let Some((solved, confidence)) = again {
-            let level = solved.misfit();
-            self.memory = Some(self.remember(time, &solved, &told, in_hand, level));
+            // The level of a pose found is not taken over at once: it may be a wrong one, and would then pass for right ever after.
+            let level = memory.level + LEVEL_GAIN * (solved.misfit() - memory.level);
+            let mut next = self.remember(time, &solved, &told, in_hand, level);
+            next.lost = memory.lost;
+            self.memory = Some(next);
             return Ok(found(solved, confidence, Following::Found, Some(doubt), spent));
         }
         if let Some(memory) = &mut self.memory {
@@ -262,8 +271,7 @@ impl Tracker {
         };
         let told = State::new(observation, &self.object, &initial)?;
         let known = Known::new(observation, &self.object, self.robot.as_ref())?;
-        let solved = self.estimate(observation, &known, &told)?;
-        let confidence = self.confidence(&solved);
+        let (solved, confidence) = self.estimate(observation, &known, &told)?;
         let in_hand = known.robot.is_some();
         self.memory = Some(self.remember(time, &solved, &told, in_hand, solved.misfit()));
         let spent = Spent { recovery: clock.lap(), ..Spent::default() };
@@ -301,34 +309,40 @@ impl Tracker {
             clock.has(step)
         };
         if !go_on() {
-            return Solved { point: start, ending: Ending::Stopped, iterations };
+            return Solved { point: start, ending: Ending::Stopped, iterations, tried: false };
         }
+        let mut tried = false;
         let (point, ending) = problem.solve(start, stage.iterations, stage.last_gain, |down| {
             iterations += usize::from(down);
+            tried = true;
             go_on()
         });
-        Solved { point, ending, iterations }
+        Solved { point, ending, iterations, tried }
     }
 
-    /// The whole fused estimator from `initial`, and the stage of tracking from there, with nothing carried over but
-    /// what `initial` has.
+    /// The whole fused estimator from `initial`, with nothing carried over but what `initial` has; and the stage of tracking from there, whose
+    /// misfit compares with that of other frames.
     fn estimate(
         &self,
         observation: &Observation,
         known: &Known<'_>,
         initial: &State,
-    ) -> Result<Solved, RefineError> {
+    ) -> Result<(Solved, Confidence), RefineError> {
         let fused = Fused { settings: self.settings.fused.clone() };
         let mut best = initial.clone();
         let robot = self.robot.as_ref();
-        fused.run(observation, &self.object, robot, initial.clone(), |state, _| {
-            best = state.clone();
-            true
-        })?;
+        let (_, confidence) =
+            fused.run(observation, &self.object, robot, initial.clone(), |state, _| {
+                best = state.clone();
+                true
+            })?;
         let (stage, settings) = (&self.settings.stage, &self.settings.fused);
         let patches = known.patches(initial, stage, settings);
         let problem = known.problem(initial, stage, settings, patches)?;
-        Ok(self.solve(&problem, best, &Clock::start(None)))
+        let mut solved = self.solve(&problem, best, &Clock::start(None));
+        // The estimator saw more of the frame than the stage of tracking does.
+        solved.point.state.t_cam_object = confidence.hypotheses[0].t_cam_object;
+        Ok((solved, confidence))
     }
 
     fn search(&mut self, observation: &Observation) -> Result<Isometry3<f64>, RefineError> {
@@ -343,16 +357,17 @@ impl Tracker {
         found.first().map(|f| f.t_cam_object).ok_or(RefineError::NothingFits)
     }
 
-    /// A pose that is believed, looked for from near to far.
+    /// A pose that is believed, looked for from near to far. One from anywhere must fit as if nothing had changed.
     fn recover(
         &mut self,
         observation: &Observation,
         known: &Known<'_>,
         predicted: &State,
-        level: f64,
+        memory: &Memory,
     ) -> Result<Option<(Solved, Confidence)>, RefineError> {
         let recovery = self.settings.recovery;
-        for reach in [Recovery::Near, Recovery::Anywhere] {
+        let levels = [(Recovery::Near, memory.allowance()), (Recovery::Anywhere, memory.level)];
+        for (reach, level) in levels {
             if reach > recovery {
                 break;
             }
@@ -367,8 +382,7 @@ impl Tracker {
             if start.centre().z <= 0.0 {
                 continue;
             }
-            let solved = self.estimate(observation, known, &start)?;
-            let confidence = self.confidence(&solved);
+            let (solved, confidence) = self.estimate(observation, known, &start)?;
             if self.doubt(&solved, &confidence, None, level).is_none() {
                 return Ok(Some((solved, confidence)));
             }
@@ -398,7 +412,7 @@ impl Tracker {
 
     fn confidence(&self, solved: &Solved) -> Confidence {
         let width = self.settings.fused.width;
-        Confidence::new(&[(solved.point.clone(), solved.ending)], width, self.object.radius)
+        Confidence::new(&[(solved.point.clone(), solved.ending)], width, self.object.radius, false)
     }
 
     fn remember(

@@ -74,7 +74,9 @@ pub struct TrackerSettings {
     pub held: MotionSettings,
     /// Motion in the camera frame, where no hand is known.
     pub free: MotionSettings,
-    /// Time within which what was learnt of calibrations is forgotten, all but 1/e \[s\].
+    /// Time within which what was learnt of calibrations is forgotten, all but 1/e \[s\]. Errors that frames share, such as a warp of depth or a
+    /// wrong model, count as new in every one of them: the longer they are remembered while nothing moves, the farther calibrations are
+    /// led astray.
     pub memory: f64,
     /// Time that following may take in a frame; without one it takes what it needs. A step that would not end in time is
     /// not begun, as far as the one before it tells.
@@ -105,7 +107,7 @@ impl Default for TrackerSettings {
             },
             held: MotionSettings { translation: 0.02, rotation: 0.2, gain: 0.1 },
             free: MotionSettings { translation: 0.3, rotation: 2.0, gain: 0.5 },
-            memory: 3.0,
+            memory: 0.2,
             budget: None,
             loss: LossSettings {
                 misfit_ratio: 2.5,

@@ -48,10 +48,10 @@ pub(crate) struct Arguments {
     /// Links of the hand that must touch the object at least
     #[arg(long, value_name = "N", default_value = "3", help_heading = "Objects and hand")]
     links: NonZeroUsize,
-    /// How much of the object must be within 5 mm of the hand, at least and at most \[cm²\]
+    /// How much of the object must be within 5 mm of the hand, at least and at most, in cm²
     #[arg(
         long,
-        value_name = "MIN,MAX",
+        value_names = ["MIN", "MAX"],
         value_delimiter = ',',
         num_args = 2,
         default_values_t = [20.0, 60.0],

@@ -188,6 +188,10 @@ impl Arguments {
         let object = assets.object(obj_id)?;
         let mut images = assets.dataset().scene(scene_id)?.images()?;
         images.retain(|id| *id >= first && self.selection.admits_image(scene_id, *id));
+        if images.is_empty() {
+            failures
+                .push(format!("scene {scene_id} object {obj_id}: no image from image {first} on"));
+        }
         let mut tracker: Option<Tracker> = None;
         let bar = progress::bar(images.len() as u64, "tracking");
         for im_id in images {

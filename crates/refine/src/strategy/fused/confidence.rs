@@ -37,7 +37,7 @@ pub struct Unobserved {
 pub struct Disagreement {
     /// The evidence's name.
     pub evidence: &'static str,
-    /// How far from its own optimum the pose is, in its own standard deviations.
+    /// How much farther from its own optimum the solution is than chance has it, in standard deviations.
     pub distance: f64,
 }
 
@@ -52,6 +52,8 @@ pub struct Confidence {
     pub disagreements: Vec<Disagreement>,
     /// Why the search ended.
     pub ending: Ending,
+    /// Whether all calibrations were found to be exact, and believed to be so.
+    pub exact: bool,
     /// Cramér and Rao's bound on the covariance, prior included (van Trees, 1968): the inverse of all information, with nothing
     /// added for what the models of sensors and object leave out. Units are those of [`covariance`](Self::covariance).
     pub bound: Matrix6<f64>,
@@ -83,18 +85,31 @@ pub(crate) const RIDGE: f64 = 1e-9;
 /// Standard deviation of surface motion from which a direction counts as unobserved \[m\].
 const UNOBSERVED: f64 = 8e-3;
 
-/// Distance from its optimum at which a sense counts as disagreeing, in its standard deviations.
+/// [`Disagreement::distance`] from which a sense counts as disagreeing, and from which covariances are widened by it: what is wrong
+/// with the observation, nobody knows, but errors are then as large as senses are apart.
 const DISAGREES: f64 = 5.0;
 
 impl Confidence {
-    /// Of the solutions `found`, the best first; `radius` turns radians into metres of surface motion.
-    pub(crate) fn new(found: &[(Point, Ending)], width: Width, radius: f64) -> Self {
+    /// Of the solutions `found`, the best first; `radius` turns radians into metres of surface motion. Calibrations are `exact` or as accurate as stated.
+    pub(crate) fn new(found: &[(Point, Ending)], width: Width, radius: f64, exact: bool) -> Self {
         let (best, ending) = &found[0];
-        let turn = width.turn.powi(2);
+        // Where calibrations are exact, as in simulation, so are models.
+        let turn = if exact { 0.0 } else { width.turn.powi(2) };
         let more = Matrix6::from_diagonal(&Vector6::new(0.0, 0.0, 0.0, turn, turn, turn));
         let bounds: Vec<(Matrix6<f64>, f64)> =
             found.iter().map(|(point, _)| laplace(point)).collect();
-        let covariance = |bound: &Matrix6<f64>| bound * width.scale + more;
+        let disagreements = disagreements(best);
+        let apart = disagreements.iter().map(|d| d.distance / DISAGREES).fold(1.0, f64::max);
+        let scale = width.scale * apart.powi(2);
+        let covariance = |k: usize| {
+            let (point, ending) = &found[k];
+            // What was cut short has some way left to go.
+            let left = match ending {
+                Ending::Iterations | Ending::Stopped => remaining(point),
+                Ending::Converged | Ending::Stuck => Vector6::zeros(),
+            };
+            bounds[k].0 * scale + more + left * left.transpose()
+        };
         // Laplace: the mass of a mode is its height times its volume.
         let logarithm = |k: usize| 0.5 * bounds[k].1 - found[k].0.value;
         let first = (0..found.len()).map(logarithm).fold(f64::NEG_INFINITY, f64::max);
@@ -102,22 +117,20 @@ impl Confidence {
         let mass = |k: usize| if first.is_finite() { (logarithm(k) - first).exp() } else { 1.0 };
         let masses: Vec<f64> = (0..found.len()).map(mass).collect();
         let total: f64 = masses.iter().sum();
-        let hypotheses: Vec<Hypothesis> = found
-            .iter()
-            .zip(&bounds)
-            .zip(&masses)
-            .map(|(((point, _), (bound, _)), mass)| Hypothesis {
-                t_cam_object: point.state.t_cam_object,
-                weight: mass / total,
-                value: point.value,
-                covariance: covariance(bound),
+        let hypotheses: Vec<Hypothesis> = (0..found.len())
+            .map(|k| Hypothesis {
+                t_cam_object: found[k].0.state.t_cam_object,
+                weight: masses[k] / total,
+                value: found[k].0.value,
+                covariance: covariance(k),
             })
             .collect();
         Self {
             unobserved: unobserved(&hypotheses[0].covariance, radius),
-            disagreements: disagreements(best),
+            disagreements,
             hypotheses,
             ending: *ending,
+            exact,
             bound: bounds[0].0,
             centre: best.state.centre(),
         }
@@ -189,6 +202,14 @@ fn laplace(point: &Point) -> (Matrix6<f64>, f64) {
     (covariance, -factor.log_determinant() - displaced)
 }
 
+/// The object's part of the step to where the quadratic model about `point` is least: a left twist about its centre \[m, rad\].
+fn remaining(point: &Point) -> Vector6<f64> {
+    let step = Factor::new(point.normal.hessian(), RIDGE)
+        .map(|factor| -factor.inverse() * point.normal.gradient());
+    let at = point.normal.offset(Block::ObjectPose).unwrap_or(0);
+    step.map_or_else(Vector6::zeros, |step| step.fixed_rows::<6>(at).into_owned())
+}
+
 /// Directions in which the pose of `point` is uncertain, the most uncertain first: twists about the object's centre that move
 /// its surface by a metre, with the standard deviation of that motion \[m\].
 pub(super) fn principal_directions(point: &Point, radius: f64) -> Vec<(Vector6<f64>, f64)> {
@@ -221,7 +242,10 @@ fn unobserved(covariance: &Matrix6<f64>, radius: f64) -> Vec<Unobserved> {
 fn disagreements(point: &Point) -> Vec<Disagreement> {
     let distance = |part: &crate::Normal| {
         let factor = Factor::new(part.hessian(), 1e-3)?;
-        Some(factor.squared_norm(part.gradient()).max(0.0).sqrt())
+        let squared = factor.squared_norm(part.gradient()).max(0.0);
+        // χ² of as many degrees of freedom as the sense says something of, at most; nearly normal like this (Fisher, 1922).
+        let degrees = part.hessian().diagonal().iter().filter(|d| **d > 0.0).count() as f64;
+        Some((2.0 * squared).sqrt() - (2.0 * degrees - 1.0).max(0.0).sqrt())
     };
     // A sense is not to blame for what the model is off by.
     let alone = |part: &super::solve::Part| {

@@ -6,13 +6,18 @@ use super::factor::Factor;
 use super::solve::Point;
 use crate::Block;
 
+/// Log odds from which calibrations count as exact. That is rare, and where little is measured of them odds are within some nats of even: up to 8
+/// without depth on the hand, whether they are exact or not; with it from 16 on if they are, below −50 if not.
+pub(super) const EXACT: f64 = 10.0;
+
 /// Logarithm of the odds that everything but the object's pose, its model too, is exactly as it is said to be, rather than off by its stated
 /// deviations.
 ///
 /// For a hypothesis nested in another the odds are the posterior's density there over the prior's (Dickey, 1971), both of
 /// what is estimated beside the pose, and both normal about `point`, the solution with everything estimated. Robust losses
 /// make far places less unlikely than that, but not so that the sign would change: exact calibrations lie within the
-/// posterior, wrong ones far outside of it.
+/// posterior, wrong ones far outside of it. A model that is off by as much as was said may still look exact, so the model speaks
+/// against exactness, but not for it.
 pub(super) fn log_odds_of_exact(point: &Point) -> Option<f64> {
     let prior = &point.parts.iter().find(|part| part.name == "prior")?.normal;
     let at = point.normal.offset(Block::ObjectPose)?;
@@ -35,10 +40,9 @@ pub(super) fn log_odds_of_exact(point: &Point) -> Option<f64> {
     let found = of(all, &rest, &rest) - &coupling * through_pose * coupling.transpose();
     let misfit = 0.5 * offset.dot(&(&found * &offset));
     let determinants = Factor::new(&found, 0.0)?.log_determinant() - said.log_determinant();
-    // The model is exact then too.
     let of_model = point.displaced.as_ref().map_or(0.0, |displaced| {
         let said = displaced.patches.log_determinant();
         0.5 * (displaced.log_determinant - said) - displaced.gain
     });
-    Some(0.5 * determinants - misfit + of_model)
+    Some(0.5 * determinants - misfit + f64::min(of_model, 0.0))
 }

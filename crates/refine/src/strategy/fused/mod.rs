@@ -131,7 +131,8 @@ impl Fused {
             }
         }
         let odds = || exactness::log_odds_of_exact(&found[0].0);
-        let exact = go_on && settings.exactness && odds().is_some_and(|odds| odds > 0.0);
+        let exact =
+            go_on && settings.exactness && odds().is_some_and(|odds| odds > exactness::EXACT);
         if exact {
             let last = &self.settings.stages[self.settings.stages.len() - 1];
             let as_said = |(point, _): &(Point, Ending)| State {
@@ -158,12 +159,7 @@ impl Fused {
             found = distinct(states.par_iter().map(solve_from).collect(), object.radius);
             step(&found[0].0, &mut trace);
         }
-        // Where calibrations are exact, as in simulation, so are models.
-        let width = match exact {
-            true => Width { turn: 0.0, ..settings.width },
-            false => settings.width,
-        };
-        Ok((trace, Confidence::new(&found, width, object.radius)))
+        Ok((trace, Confidence::new(&found, settings.width, object.radius, exact)))
     }
 
     /// The initial state and those it is turned to.

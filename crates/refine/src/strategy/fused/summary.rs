@@ -22,6 +22,8 @@ pub struct ConfidenceSummary {
     pub weights: Vec<f64>,
     /// Why the search ended.
     pub ending: String,
+    /// Whether all calibrations were found to be exact, and believed to be so.
+    pub exact: bool,
 }
 
 impl From<&Confidence> for ConfidenceSummary {
@@ -38,6 +40,7 @@ impl From<&Confidence> for ConfidenceSummary {
             disagreements: disagreements.map(|d| (d.evidence.to_owned(), d.distance)).collect(),
             weights: confidence.hypotheses.iter().map(|h| h.weight).collect(),
             ending: confidence.ending.name().to_owned(),
+            exact: confidence.exact,
         }
     }
 }

@@ -154,7 +154,9 @@ fn probes(
 ) -> Vec<Probe> {
     let is_touched = |force: &Vector3<f64>| force.norm() > settings.touch_force;
     let all = || robot.taxels.iter().zip(links).zip(forces);
-    let quiet = all().filter(|(_, force)| !is_touched(force)).map(|((taxel, link), _)| Probe {
+    // A force that is not a number is no silence.
+    let is_quiet = |force: &Vector3<f64>| force.norm() <= settings.touch_force;
+    let quiet = all().filter(|(_, force)| is_quiet(force)).map(|((taxel, link), _)| Probe {
         link: *link,
         position: taxel.position,
         touched: false,
