@@ -68,7 +68,7 @@ enum Command {
     Eval(eval::Arguments),
     /// Regenerate the paper's tables on a dataset, ours beside the published rows, or measure the fused estimator
     Study(Box<study::Arguments>),
-    /// Draw poses over their images, and warn about units and frames, before refining anything
+    /// Draw poses over their images, and warn about units and frames of the object, before refining anything
     Check(check::Arguments),
     /// Find the symmetries of models, and write them into models_info.json
     ///

@@ -52,11 +52,11 @@ pub(crate) struct Arguments {
     rate: f64,
     /// Write the poses here, as a BOP results file with a row an image; an existing one is replaced
     ///
-    /// The score is the probability that a pose is within 5 mm and 5°, and 0 where the object is lost: there the pose is
-    /// where it should be.
+    /// The score is the probability that a pose is within 5 mm and 5°, and 0 where the object is lost or there was no time to look: there the
+    /// pose is where it should be.
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     out: PathBuf,
-    /// Print JSON on standard output: poses, states, times and failures
+    /// Print JSON on standard output: poses, how they came about, times and failures
     #[arg(long, help_heading = "Output")]
     json: bool,
     /// Put times into the results' last column, which is -1 otherwise
