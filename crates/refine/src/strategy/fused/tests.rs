@@ -102,6 +102,44 @@ fn every_sense_may_be_absent() {
 }
 
 #[test]
+fn exactness_is_not_believed_where_little_speaks_for_it() {
+    let without = |kind| FusedSettings {
+        evidence: Evidence::ALL.into_iter().filter(|e| *e != kind).collect(),
+        ..FusedSettings::default()
+    };
+    let exact = |robot, settings| run(&SCENE.observation, robot, &turned(&OFF), settings).1.exact;
+    assert!(exact(Some(&SCENE.robot), FusedSettings::default()));
+    assert!(!exact(Some(&SCENE.robot), without(Evidence::HandDepth)));
+    assert!(!exact(None, FusedSettings::default()));
+}
+
+#[test]
+fn a_pose_that_senses_disagree_about_is_not_sure() {
+    let mut observation = SCENE.observation.clone();
+    if let Some(hand) = &mut observation.hand {
+        hand.t_cam_hand = Translation3::new(0.0, 0.0, 0.05) * hand.t_cam_hand;
+    }
+    let (pose, confidence) =
+        run(&observation, Some(&SCENE.robot), &turned(&OFF), FusedSettings::default());
+    println!("{:?} {:?} {}", errors(&pose), confidence.disagreements, confidence.probability());
+    assert!(!confidence.disagreements.is_empty());
+    assert!(confidence.probability() < 0.5);
+}
+
+#[test]
+fn a_solve_that_is_cut_short_is_not_sure() {
+    let mut settings = FusedSettings::default();
+    settings.stages.iter_mut().for_each(|stage| stage.iterations = 1);
+    let (_, hasty) = run(&SCENE.observation, Some(&SCENE.robot), &turned(&OFF), settings);
+    let (_, whole) =
+        run(&SCENE.observation, Some(&SCENE.robot), &turned(&OFF), FusedSettings::default());
+    println!("{} {}", hasty.mahalanobis(&SCENE.truth), whole.mahalanobis(&SCENE.truth));
+    assert!(hasty.mahalanobis(&SCENE.truth) < 5.0);
+    let widest = |confidence: &Confidence| confidence.widest(SCENE.object.radius);
+    assert!(widest(&hasty) > widest(&whole));
+}
+
+#[test]
 fn threads_make_no_difference() {
     let of = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
