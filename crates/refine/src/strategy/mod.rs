@@ -11,7 +11,7 @@ pub use fused::{
     Confidence, ConfidenceSummary, Disagreement, Ending, Evidence, Fused, FusedSettings,
     Hypothesis, Nuisance, Stage, Unobserved, Width,
 };
-pub(crate) use fused::{Factor, Known, Point, Problem, RIDGE};
+pub(crate) use fused::{Factor, Known, Point, Problem, RIDGE, beyond_chance};
 pub use heuristic::{Heuristic, HeuristicSettings};
 pub use icp::{Icp, IcpSettings};
 pub use robust_icp::{RobustIcp, RobustIcpSettings};

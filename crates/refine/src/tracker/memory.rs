@@ -14,9 +14,8 @@ use crate::{CameraCorrection, State};
 /// Time within which an object that is not seen comes to rest, all but 1/e of its velocity \[s\].
 const COASTING: f64 = 0.25;
 
-/// What the level is multiplied by for every frame that the object is lost, and by all of them together at most.
-const GROWTH: f64 = 1.1;
-const MOST_GROWTH: f64 = 2.0;
+/// By how much of itself the level grows with every frame that the object is lost. Slowly, or what is wrong for a moment would soon pass for right.
+const GROWTH: f64 = 0.02;
 
 /// The last pose that was believed, and what was learnt with it.
 #[derive(Clone, Debug)]
@@ -40,7 +39,7 @@ pub(super) struct Memory {
     /// Running level of the misfit \[nat\].
     pub(super) level: f64,
     /// Frames in which something was seen, but not believed, less those in which it was believed again; not below zero.
-    pub(super) lost: i32,
+    pub(super) lost: u32,
 }
 
 /// What is expected of a frame before it is looked at.
@@ -82,7 +81,7 @@ impl Memory {
 
     /// The level that misfits are judged by: it grows while the object is lost, because circumstances may have changed for good.
     pub(super) fn allowance(&self) -> f64 {
-        self.level * GROWTH.powi(self.lost).min(MOST_GROWTH)
+        self.level * (1.0 + GROWTH * f64::from(self.lost))
     }
 
     /// The next of this memory: as [`new`](Self::new), and with the velocity between `prediction` and there.

@@ -18,8 +18,10 @@ pub use self::clock::Spent;
 use self::memory::{Memory, Prediction};
 pub use self::settings::{LossSettings, MotionSettings, Recovery, TrackerSettings};
 use crate::initial::PoseSearch;
-use crate::strategy::{Confidence, Ending, Fused, Known, Point, Problem};
-use crate::term::Term;
+use crate::strategy::{
+    Confidence, Disagreement, Ending, Fused, Known, Point, Problem, beyond_chance,
+};
+use crate::term::{Prior, Term};
 use crate::{CameraCorrection, Object, Observation, RefineError, Robot, State};
 
 /// Follows one object through the frames of a camera.
@@ -171,8 +173,8 @@ impl Tracker {
         self.memory = None;
     }
 
-    /// The pose in the next frame, which was taken at `time`, counted from any moment; a time before the last frame's
-    /// counts as that.
+    /// The pose in the next frame, which was taken at `time`, counted from any moment; if it is before that of the
+    /// last frame, no time has passed.
     ///
     /// # Errors
     /// If the images do not fit each other, the hand's joints or forces do not fit the robot, or nothing is found to begin with.
@@ -183,7 +185,6 @@ impl Tracker {
         time: Duration,
     ) -> Result<Tracked, RefineError> {
         let mut clock = Clock::start(self.settings.budget);
-        let time = self.memory.as_ref().map_or(time, |memory| memory.time.max(time));
         if let (Some(robot), Some(hand)) = (&self.robot, &observation.hand) {
             robot.check_joints(&hand.joints)?;
         }
@@ -225,7 +226,7 @@ impl Tracker {
             if solved.ending == Ending::Stopped && !solved.tried {
                 return Ok(outcome(prediction.state, Following::Predicted, spent));
             }
-            let confidence = self.confidence(&solved);
+            let confidence = self.confidence(&solved, &told)?;
             let doubt = self.doubt(&solved, &confidence, Some(&carried), memory.allowance());
             spent.judgement = clock.lap();
             if doubt.is_none() {
@@ -233,7 +234,7 @@ impl Tracker {
                 let level = memory.level + LEVEL_GAIN * (solved.misfit() - memory.level);
                 let next = self.remember(time, &solved, &told, in_hand, level);
                 let mut next = Memory::followed(next, &prediction, motion);
-                next.lost = (memory.lost - 1).max(0);
+                next.lost = memory.lost.saturating_sub(1);
                 self.memory = Some(next);
                 return Ok(found(solved, confidence, Following::Followed, None, spent));
             }
@@ -410,9 +411,17 @@ impl Tracker {
         (widest > loss.deviation).then_some(Doubt::Uncertain(widest))
     }
 
-    fn confidence(&self, solved: &Solved) -> Confidence {
-        let width = self.settings.fused.width;
-        Confidence::new(&[(solved.point.clone(), solved.ending)], width, self.object.radius, false)
+    /// How sure `solved` is. Calibrations far from what is `told` of them disagree, also where the frames before have led them there.
+    fn confidence(&self, solved: &Solved, told: &State) -> Result<Confidence, RefineError> {
+        let fused = &self.settings.fused;
+        let state = &solved.point.state;
+        let calibrations = State { t_cam_object: told.t_cam_object, ..state.clone() };
+        let squared = 2.0 * Prior::new(told, &fused.accuracy)?.value(&calibrations);
+        let degrees = solved.point.normal.gradient().len().saturating_sub(6);
+        let distance = beyond_chance(squared, degrees);
+        let also = Some(Disagreement { evidence: "calibrations", distance });
+        let found = [(solved.point.clone(), solved.ending)];
+        Ok(Confidence::new(&found, fused.width, self.object.radius, false, also))
     }
 
     fn remember(

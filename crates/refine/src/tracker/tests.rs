@@ -116,16 +116,14 @@ fn an_empty_mask_is_lost_and_a_full_one_found_again() {
 }
 
 #[test]
-fn what_is_believed_after_a_loss_has_bounds() {
+fn a_moment_s_loss_makes_little_pass_for_right() {
     let mut tracker = tracker(TrackerSettings::default());
     track(&mut tracker, 0);
     let memory = tracker.memory.as_mut().unwrap();
     assert_eq!(memory.allowance(), memory.level);
-    memory.lost = 3;
+    memory.lost = 10;
     let grown = memory.allowance();
-    assert!(grown > 1.2 * memory.level && grown < 1.5 * memory.level);
-    memory.lost = i32::MAX;
-    assert_eq!(memory.allowance(), 2.0 * memory.level);
+    assert!(grown > 1.1 * memory.level && grown < 1.3 * memory.level);
 }
 
 /// With a mask that is somewhere else for a while something is found there, or nothing; but the object again when the mask is right again.
@@ -165,12 +163,28 @@ fn a_still_scene_does_not_wander_off() {
     }
     let mut at = |index: u64| {
         let tracked = tracker.track(&observation, Duration::from_millis(33 * index)).unwrap();
+        assert!(index == 0 || tracked.following == Following::Followed, "{:?}", tracked.doubt);
         tracked.t_cam_object
     };
     let poses: Vec<Isometry3<f64>> = (0..60).map(&mut at).collect();
     let wandered = pe_cm(&poses[59], &poses[1]);
     println!("{wandered} cm");
     assert!(wandered < 0.1, "{wandered} cm");
+}
+
+#[test]
+fn calibrations_that_were_led_astray_still_disagree() {
+    let mut tracker = tracker(TrackerSettings::default());
+    for index in 0..6 {
+        let mut observation = SEQUENCE.frames[index].observation.clone();
+        let hand = observation.hand.as_mut().unwrap();
+        hand.t_cam_hand.translation.z += 0.05;
+        let tracked = tracker.track(&observation, SEQUENCE.frames[index].time).unwrap();
+        let probability = tracked.confidence.as_ref().map_or(0.0, Confidence::probability);
+        let (pe, _) = errors(&tracked, index);
+        println!("{index}: {pe:.2} cm {:?} {probability:.2}", tracked.following);
+        assert!(probability < 0.8 || pe < 0.5, "frame {index}: {probability}, {pe} cm");
+    }
 }
 
 #[test]

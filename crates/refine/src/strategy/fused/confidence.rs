@@ -85,20 +85,28 @@ pub(crate) const RIDGE: f64 = 1e-9;
 /// Standard deviation of surface motion from which a direction counts as unobserved \[m\].
 const UNOBSERVED: f64 = 8e-3;
 
-/// [`Disagreement::distance`] from which a sense counts as disagreeing, and from which covariances are widened by it: what is wrong
-/// with the observation, nobody knows, but errors are then as large as senses are apart.
+/// [`Disagreement::distance`] from which a sense counts as disagreeing, and from which deviations are widened in proportion: what is wrong
+/// with the observation, nobody knows, so this is a rule of thumb.
 const DISAGREES: f64 = 5.0;
 
 impl Confidence {
     /// Of the solutions `found`, the best first; `radius` turns radians into metres of surface motion. Calibrations are `exact` or as accurate as stated.
-    pub(crate) fn new(found: &[(Point, Ending)], width: Width, radius: f64, exact: bool) -> Self {
+    /// `also` disagrees besides, if by enough.
+    pub(crate) fn new(
+        found: &[(Point, Ending)],
+        width: Width,
+        radius: f64,
+        exact: bool,
+        also: Option<Disagreement>,
+    ) -> Self {
         let (best, ending) = &found[0];
         // Where calibrations are exact, as in simulation, so are models.
         let turn = if exact { 0.0 } else { width.turn.powi(2) };
         let more = Matrix6::from_diagonal(&Vector6::new(0.0, 0.0, 0.0, turn, turn, turn));
         let bounds: Vec<(Matrix6<f64>, f64)> =
             found.iter().map(|(point, _)| laplace(point)).collect();
-        let disagreements = disagreements(best);
+        let mut disagreements = disagreements(best);
+        disagreements.extend(also.filter(|also| also.distance > DISAGREES));
         let apart = disagreements.iter().map(|d| d.distance / DISAGREES).fold(1.0, f64::max);
         let scale = width.scale * apart.powi(2);
         let covariance = |k: usize| {
@@ -207,7 +215,8 @@ fn remaining(point: &Point) -> Vector6<f64> {
     let step = Factor::new(point.normal.hessian(), RIDGE)
         .map(|factor| -factor.inverse() * point.normal.gradient());
     let at = point.normal.offset(Block::ObjectPose).unwrap_or(0);
-    step.map_or_else(Vector6::zeros, |step| step.fixed_rows::<6>(at).into_owned())
+    let step = step.map(|step| step.fixed_rows::<6>(at).into_owned());
+    step.filter(|step| step.iter().all(|v| v.is_finite())).unwrap_or_else(Vector6::zeros)
 }
 
 /// Directions in which the pose of `point` is uncertain, the most uncertain first: twists about the object's centre that move
@@ -238,14 +247,18 @@ fn unobserved(covariance: &Matrix6<f64>, radius: f64) -> Vec<Unobserved> {
         .collect()
 }
 
+/// By how many standard deviations `squared`, a χ² of so many `degrees` of freedom if nothing is wrong, is larger than usual (Fisher, 1922).
+pub(crate) fn beyond_chance(squared: f64, degrees: usize) -> f64 {
+    (2.0 * squared.max(0.0)).sqrt() - (2.0 * degrees as f64 - 1.0).max(0.0).sqrt()
+}
+
 /// Which evidence, the prior included, has its own optimum far away.
 fn disagreements(point: &Point) -> Vec<Disagreement> {
     let distance = |part: &crate::Normal| {
         let factor = Factor::new(part.hessian(), 1e-3)?;
-        let squared = factor.squared_norm(part.gradient()).max(0.0);
-        // χ² of as many degrees of freedom as the sense says something of, at most; nearly normal like this (Fisher, 1922).
-        let degrees = part.hessian().diagonal().iter().filter(|d| **d > 0.0).count() as f64;
-        Some((2.0 * squared).sqrt() - (2.0 * degrees - 1.0).max(0.0).sqrt())
+        // As many degrees of freedom as the sense says something of, at most.
+        let degrees = part.hessian().diagonal().iter().filter(|d| **d > 0.0).count();
+        Some(beyond_chance(factor.squared_norm(part.gradient()), degrees))
     };
     // A sense is not to blame for what the model is off by.
     let alone = |part: &super::solve::Part| {

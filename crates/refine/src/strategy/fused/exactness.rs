@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::confidence::RIDGE;
 use super::factor::Factor;
 use super::solve::Point;
 use crate::Block;
@@ -10,14 +11,13 @@ use crate::Block;
 /// without depth on the hand, whether they are exact or not; with it from 16 on if they are, below −50 if not.
 pub(super) const EXACT: f64 = 10.0;
 
-/// Logarithm of the odds that everything but the object's pose, its model too, is exactly as it is said to be, rather than off by its stated
-/// deviations.
+/// Logarithm of the odds that everything but the object's pose is exactly as it is said to be, rather than off by its stated deviations; less what
+/// speaks against an exact model. Nothing speaks for one: a model that is off by as much as was said may still look exact.
 ///
 /// For a hypothesis nested in another the odds are the posterior's density there over the prior's (Dickey, 1971), both of
-/// what is estimated beside the pose, and both normal about `point`, the solution with everything estimated. Robust losses
-/// make far places less unlikely than that, but not so that the sign would change: exact calibrations lie within the
-/// posterior, wrong ones far outside of it. A model that is off by as much as was said may still look exact, so the model speaks
-/// against exactness, but not for it.
+/// what is estimated beside the pose, and both normal, the posterior about the least of its quadratic model at `point`, the solution with
+/// everything estimated. Robust losses make far places less unlikely than that, but not by enough to matter: exact calibrations lie within the
+/// posterior, wrong ones far outside of it.
 pub(super) fn log_odds_of_exact(point: &Point) -> Option<f64> {
     let prior = &point.parts.iter().find(|part| part.name == "prior")?.normal;
     let at = point.normal.offset(Block::ObjectPose)?;
@@ -32,7 +32,8 @@ pub(super) fn log_odds_of_exact(point: &Point) -> Option<f64> {
     let said = of(prior.hessian(), &rest, &rest);
     let offset = DVector::from_fn(rest.len(), |r, _| prior.gradient()[rest[r]]);
     let said = Factor::new(&said, 0.0)?;
-    let offset = said.inverse() * offset;
+    let left = Factor::new(point.normal.hessian(), RIDGE)?.inverse() * point.normal.gradient();
+    let offset = said.inverse() * offset - left.select_rows(&rest);
     // With the pose integrated out, which is Schur's complement.
     let all = point.normal.hessian();
     let coupling = of(all, &rest, &pose);

@@ -16,8 +16,8 @@ use nalgebra::Translation3;
 use prehend_autodiff::lie::so3_log;
 use rayon::prelude::*;
 
-pub(crate) use self::confidence::RIDGE;
 pub use self::confidence::{Confidence, Disagreement, Hypothesis, Unobserved, Width};
+pub(crate) use self::confidence::{RIDGE, beyond_chance};
 pub(crate) use self::evidence::Known;
 pub(crate) use self::factor::Factor;
 pub use self::settings::{Evidence, FusedSettings, Nuisance, Stage};
@@ -159,7 +159,7 @@ impl Fused {
             found = distinct(states.par_iter().map(solve_from).collect(), object.radius);
             step(&found[0].0, &mut trace);
         }
-        Ok((trace, Confidence::new(&found, settings.width, object.radius, exact)))
+        Ok((trace, Confidence::new(&found, settings.width, object.radius, exact, None)))
     }
 
     /// The initial state and those it is turned to.

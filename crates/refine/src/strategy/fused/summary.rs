@@ -16,7 +16,7 @@ pub struct ConfidenceSummary {
     pub deviation_deg: [f64; 3],
     /// Standard deviations of surface motion along directions that the evidence says hardly anything of \[mm\].
     pub unobserved_mm: Vec<f64>,
-    /// Evidence that would rather have the pose elsewhere, and by how many of its standard deviations.
+    /// Evidence that would rather have the pose elsewhere, and by how many standard deviations beyond chance.
     pub disagreements: Vec<(String, f64)>,
     /// Shares of the posterior that the poses found have, the best first.
     pub weights: Vec<f64>,

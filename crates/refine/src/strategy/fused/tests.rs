@@ -128,11 +128,13 @@ fn a_pose_that_senses_disagree_about_is_not_sure() {
 
 #[test]
 fn a_solve_that_is_cut_short_is_not_sure() {
-    let mut settings = FusedSettings::default();
-    settings.stages.iter_mut().for_each(|stage| stage.iterations = 1);
-    let (_, hasty) = run(&SCENE.observation, Some(&SCENE.robot), &turned(&OFF), settings);
-    let (_, whole) =
-        run(&SCENE.observation, Some(&SCENE.robot), &turned(&OFF), FusedSettings::default());
+    let of = |iterations| {
+        let mut settings = FusedSettings { exactness: iterations == 0, ..Default::default() };
+        settings.stages.iter_mut().for_each(|stage| stage.iterations = iterations);
+        run(&SCENE.observation, Some(&SCENE.robot), &turned(&OFF), settings).1
+    };
+    assert!(!of(0).exact);
+    let (hasty, whole) = (of(1), of(10));
     println!("{} {}", hasty.mahalanobis(&SCENE.truth), whole.mahalanobis(&SCENE.truth));
     assert!(hasty.mahalanobis(&SCENE.truth) < 5.0);
     let widest = |confidence: &Confidence| confidence.widest(SCENE.object.radius);
