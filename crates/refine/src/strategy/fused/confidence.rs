@@ -212,10 +212,8 @@ fn laplace(point: &Point) -> (Matrix6<f64>, f64) {
 
 /// The object's part of the step to where the quadratic model about `point` is least: a left twist about its centre \[m, rad\].
 fn remaining(point: &Point) -> Vector6<f64> {
-    let step = Factor::new(point.normal.hessian(), RIDGE)
-        .map(|factor| -factor.inverse() * point.normal.gradient());
     let at = point.normal.offset(Block::ObjectPose).unwrap_or(0);
-    let step = step.map(|step| step.fixed_rows::<6>(at).into_owned());
+    let step = point.to_least().map(|step| step.fixed_rows::<6>(at).into_owned());
     step.filter(|step| step.iter().all(|v| v.is_finite())).unwrap_or_else(Vector6::zeros)
 }
 

@@ -6,7 +6,8 @@ use nalgebra::{DMatrix, DVector};
 use prehend_render::Light;
 use rayon::prelude::*;
 
-use super::factor::balanced;
+use super::confidence::RIDGE;
+use super::factor::{Factor, balanced};
 use crate::normal::Eliminated;
 use crate::term::Patches;
 use crate::{Block, Normal, State, Term};
@@ -25,6 +26,14 @@ pub(crate) struct Point {
     pub(crate) parts: Vec<Part>,
     /// What was eliminated.
     pub(crate) displaced: Option<Displaced>,
+}
+
+impl Point {
+    /// The step to where the quadratic model is least, by all that is solved for; `None` if it is not determined.
+    pub(super) fn to_least(&self) -> Option<DVector<f64>> {
+        let factor = Factor::new(self.normal.hessian(), RIDGE)?;
+        Some(-factor.inverse() * self.normal.gradient())
+    }
 }
 
 /// Patches that were displaced as is best.
