@@ -32,6 +32,14 @@ fn run(
     (last, confidence)
 }
 
+/// Settings with all evidence but one kind.
+fn without(kind: Evidence) -> FusedSettings {
+    FusedSettings {
+        evidence: Evidence::ALL.into_iter().filter(|e| *e != kind).collect(),
+        ..FusedSettings::default()
+    }
+}
+
 const OFF: [f64; 6] = [6e-3, -5e-3, 8e-3, 0.1, -0.08, 0.12];
 
 fn errors(pose: &Isometry3<f64>) -> (f64, f64) {
@@ -77,36 +85,28 @@ fn calibrations_that_are_off_are_estimated() {
 #[test]
 fn every_sense_may_be_absent() {
     let start = turned(&OFF);
-    let without = |change: &dyn Fn(&mut Observation)| {
+    let changed = |change: &dyn Fn(&mut Observation)| {
         let mut observation = SCENE.observation.clone();
         change(&mut observation);
         run(&observation, Some(&SCENE.robot), &start, FusedSettings::default()).0
     };
     let poses = [
-        ("touch", without(&|o| o.hand.as_mut().unwrap().forces.clear())),
-        ("hand", without(&|o| o.hand = None)),
-        ("gravity", without(&|o| o.gravity = None)),
-        ("depth", without(&|o| o.depth.pixels_mut().fill(0.0))),
-        ("colour", without(&|o| o.color.pixels_mut().fill([0.5; 3]))),
+        ("touch", changed(&|o| o.hand.as_mut().unwrap().forces.clear())),
+        ("hand", changed(&|o| o.hand = None)),
+        ("gravity", changed(&|o| o.gravity = None)),
+        ("depth", changed(&|o| o.depth.pixels_mut().fill(0.0))),
+        ("colour", changed(&|o| o.color.pixels_mut().fill([0.5; 3]))),
     ];
     for (sense, pose) in poses {
         let (pe, oe) = errors(&pose);
         assert!(pe < 0.5 && oe < 4.0, "without {sense}: {pe} cm, {oe}°");
     }
-    let no_colour = FusedSettings {
-        evidence: Evidence::ALL.into_iter().filter(|e| *e != Evidence::Colour).collect(),
-        ..FusedSettings::default()
-    };
-    let (pose, _) = run(&SCENE.observation, Some(&SCENE.robot), &start, no_colour);
+    let (pose, _) = run(&SCENE.observation, Some(&SCENE.robot), &start, without(Evidence::Colour));
     assert!(errors(&pose).0 < 0.3);
 }
 
 #[test]
 fn exactness_is_not_believed_where_little_speaks_for_it() {
-    let without = |kind| FusedSettings {
-        evidence: Evidence::ALL.into_iter().filter(|e| *e != kind).collect(),
-        ..FusedSettings::default()
-    };
     let exact = |robot, settings| run(&SCENE.observation, robot, &turned(&OFF), settings).1.exact;
     assert!(exact(Some(&SCENE.robot), FusedSettings::default()));
     assert!(!exact(Some(&SCENE.robot), without(Evidence::HandDepth)));
