@@ -1,11 +1,10 @@
-//! Times a refinement and its parts on the built-in scene, and tracking through a sequence of it: `cargo bench`.
+//! Times a refinement and its parts on the built-in scene, and tracking through a sequence of it:
+//! `cargo bench -p prehend`. Words after `--` pick what to time: `cargo bench -p prehend -- tracking fused`.
 
 use std::hint::black_box;
 use std::sync::{Arc, LazyLock};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use divan::Bencher;
-use divan::counter::ItemsCount;
 use prehend::refine::synth::{Scene, Sequence, default_scene, default_sequence};
 use prehend::refine::tracker::{Following, Spent, Tracked, Tracker, TrackerSettings};
 use prehend::refine::{
@@ -18,9 +17,62 @@ static SCENE: LazyLock<Scene> = LazyLock::new(|| default_scene(1).expect("the bu
 static SEQUENCE: LazyLock<Sequence> =
     LazyLock::new(|| default_sequence(1, 30).expect("the built-in sequence"));
 
-fn main() {
-    divan::main();
-    tell_shares();
+fn main() -> Result<(), RefineError> {
+    let words: Vec<String> = std::env::args().skip(1).filter(|w| !w.starts_with('-')).collect();
+    let wanted = |name: &str| words.is_empty() || words.iter().any(|word| name.contains(word));
+    println!("| what | median ms | fastest | slowest |\n|---|--:|--:|--:|");
+    let mut exhaustive = Config::combined();
+    exhaustive.heuristic.exhaustive = true;
+    let whole = [
+        // The default.
+        ("fused", 10, Config::default()),
+        // The paper's method, ending when nothing improves.
+        ("combined", 5, Config::combined()),
+        // As many iterations as the paper's standard setting runs.
+        ("combined, 400 iterations", 3, exhaustive),
+    ];
+    for (name, samples, config) in whole {
+        if wanted(name) {
+            let (observation, object) = (&SCENE.observation, &SCENE.object);
+            time(name, samples, || {
+                refine(observation, object, Some(&SCENE.robot), &SCENE.initial, &config).is_ok()
+            });
+        }
+    }
+    for kind in TermKind::ALL {
+        let (term, state) = prepared(kind)?;
+        let (value, linearize) = (format!("value, {kind}"), format!("linearize, {kind}"));
+        if wanted(&value) {
+            time(&value, 100, || term.value(&state));
+        }
+        if wanted(&linearize) {
+            time(&linearize, 100, || {
+                term.linearize(&state, &mut Normal::new(&[Block::ObjectPose]))
+            });
+        }
+    }
+    if wanted("tracking") {
+        let mut tracked = Vec::new();
+        time("tracking, 29 frames", 5, || {
+            tracked = tracker().and_then(follow).expect("a sequence that can be tracked");
+        });
+        tell_shares(&tracked);
+    }
+    Ok(())
+}
+
+/// Prints a row of times; `run` runs once more before, to warm up.
+fn time<T>(name: &str, samples: usize, mut run: impl FnMut() -> T) {
+    black_box(run());
+    let mut once = || {
+        let start = Instant::now();
+        black_box(run());
+        start.elapsed().as_secs_f64() * 1e3
+    };
+    let mut times: Vec<f64> = (0..samples).map(|_| once()).collect();
+    times.sort_by(f64::total_cmp);
+    let [fastest, median, slowest] = [0, samples / 2, samples - 1].map(|i| times[i]);
+    println!("| {name} | {median:.3} | {fastest:.3} | {slowest:.3} |");
 }
 
 /// A tracker that has found the object in the first frame.
@@ -38,21 +90,8 @@ fn follow(mut tracker: Tracker) -> Result<Vec<Tracked>, RefineError> {
     frames.iter().map(|frame| tracker.track(&frame.observation, frame.time)).collect()
 }
 
-/// Frames a second of a tracker, its first frame aside.
-#[divan::bench(sample_count = 5)]
-fn tracking(bencher: Bencher) {
-    bencher
-        .counter(ItemsCount::new(SEQUENCE.frames.len() - 1))
-        .with_inputs(|| tracker().expect("a first frame"))
-        .bench_values(|tracker| follow(tracker).is_ok());
-}
-
 /// Prints what the time of tracking goes into.
-fn tell_shares() {
-    if std::env::args().any(|argument| argument == "--list" || argument == "--test") {
-        return;
-    }
-    let tracked = tracker().and_then(follow).expect("a sequence that can be tracked");
+fn tell_shares(tracked: &[Tracked]) {
     let followed = tracked.iter().filter(|t| t.following == Following::Followed).count();
     let sum = |part: fn(&Spent) -> Duration| -> f64 {
         tracked.iter().map(|t| part(&t.spent).as_secs_f64()).sum()
@@ -68,7 +107,7 @@ fn tell_shares() {
     let parts = [
         ("preparation", sum(|s| s.preparation)),
         ("steps", sum(|s| s.steps)),
-        ("judgement", sum(|s| s.judgement)),
+        ("judgment", sum(|s| s.judgment)),
         ("recovery", sum(|s| s.recovery)),
     ];
     for (name, seconds) in parts {
@@ -76,65 +115,15 @@ fn tell_shares() {
     }
 }
 
-/// The fused estimator.
-#[divan::bench(sample_count = 10)]
-fn fused(bencher: Bencher) {
-    let config = Config::default();
+/// A term and the state that a refinement begins with, lit as the term sees it.
+fn prepared(kind: TermKind) -> Result<(Box<dyn prehend::refine::Term>, State), RefineError> {
+    let config = Config::of(&[kind]);
+    let mut state = State::new(&SCENE.observation, &SCENE.object, &SCENE.initial)?;
     let robot = Some(&SCENE.robot);
-    bencher.bench(|| {
-        refine(&SCENE.observation, &SCENE.object, robot, &SCENE.initial, &config).is_ok()
-    });
-}
-
-/// A whole refinement, ending when nothing improves.
-#[divan::bench(sample_count = 5)]
-fn refinement(bencher: Bencher) {
-    let config = Config::combined();
-    let robot = Some(&SCENE.robot);
-    bencher.bench(|| {
-        refine(&SCENE.observation, &SCENE.object, robot, &SCENE.initial, &config).is_ok()
-    });
-}
-
-/// Iterations that the paper's standard setting runs.
-#[divan::bench(sample_count = 3)]
-fn four_hundred_iterations(bencher: Bencher) {
-    let mut config = Config::combined();
-    config.heuristic.exhaustive = true;
-    let robot = Some(&SCENE.robot);
-    bencher.bench(|| {
-        refine(&SCENE.observation, &SCENE.object, robot, &SCENE.initial, &config).is_ok()
-    });
-}
-
-/// Value of one term at the initial pose.
-#[divan::bench(args = TermKind::ALL)]
-fn value(bencher: Bencher, kind: TermKind) {
-    let (term, state) = prepared(kind);
-    bencher.bench(|| black_box(term.value(&state)));
-}
-
-/// Value, gradient and Gauss–Newton matrix of one term at the initial pose.
-#[divan::bench(args = TermKind::ALL)]
-fn linearise(bencher: Bencher, kind: TermKind) {
-    let (term, state) = prepared(kind);
-    bencher.bench(|| {
-        let mut normal = Normal::new(&[Block::ObjectPose]);
-        black_box(term.linearise(&state, &mut normal))
-    });
-}
-
-fn prepared(kind: TermKind) -> (Box<dyn prehend::refine::Term>, State) {
-    let prepare = || {
-        let config = Config::of(&[kind]);
-        let mut state = State::new(&SCENE.observation, &SCENE.object, &SCENE.initial)?;
-        let robot = Some(&SCENE.robot);
-        let mut terms = standard_terms(&SCENE.observation, &SCENE.object, robot, &state, &config)?;
-        let term = terms.remove(0);
-        if let Some(light) = term.light(&state) {
-            state.light = light;
-        }
-        Ok::<_, prehend::refine::RefineError>((term, state))
-    };
-    prepare().expect("a term of the built-in scene")
+    let mut terms = standard_terms(&SCENE.observation, &SCENE.object, robot, &state, &config)?;
+    let term = terms.remove(0);
+    if let Some(light) = term.light(&state) {
+        state.light = light;
+    }
+    Ok((term, state))
 }

@@ -9,7 +9,7 @@ use prehend::geometry::sample::surface_samples;
 use prehend::geometry::{DistanceField, FieldSample, shapes};
 use prehend::sim::{
     Body, Compact, Contact, ContactLaw, Horizon, Integrator, Onset, Response, RigidBody,
-    SemiImplicitEuler, SimulationError, State, Surface, World, regularised_coulomb,
+    SemiImplicitEuler, SimulationError, State, Surface, World, regularized_coulomb,
 };
 
 /// Force grows with the square of the penetration. Stiffness per area \[N/m⁴\] and friction coefficient.
@@ -21,7 +21,7 @@ impl ContactLaw for Quadratic {
     }
     fn law<S: Scalar>(&self, p: &[S], contact: &Contact<S>) -> Response<S> {
         let normal = (p[0] * contact.gap * contact.gap).times(contact.area);
-        let tangential = regularised_coulomb(p[1], normal, &contact.slip, 1e-3);
+        let tangential = regularized_coulomb(p[1], normal, &contact.slip, 1e-3);
         Response { normal, tangential }
     }
     fn reach(&self) -> f64 {

@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 use anyhow::Context;
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
-use prehend::autodiff::optimise::{Adam, Criteria};
+use prehend::autodiff::optimize::{Adam, Criteria};
 use prehend::geometry::{Texture, TriMesh};
 use prehend::render::{
     BufferAdjoints, Camera, Lamp, Lighting, Material, RenderModel, Renderer, RgbImage, Scene,
@@ -20,7 +20,7 @@ use prehend::render::{
 const SIZE: usize = 48;
 const VIEWS: usize = 6;
 
-/// A vase around the y axis, with a grey texture wound around it.
+/// A vase around the y axis, with a gray texture wound around it.
 fn vase() -> TriMesh {
     let (columns, rows) = (48, 24);
     let mut mesh = TriMesh::default();
@@ -157,7 +157,7 @@ fn main() -> anyhow::Result<()> {
     };
     say("before", &start);
     let criteria = Criteria { iterations: 250, ..Adam::default().criteria };
-    let outcome = Adam { rate: 0.02, criteria, ..Adam::default() }.minimise(&start, loss)?;
+    let outcome = Adam { rate: 0.02, criteria, ..Adam::default() }.minimize(&start, loss)?;
     let found = &outcome.parameters;
     say("after ", found);
 

@@ -22,9 +22,9 @@ impl Term for Landmark {
         0.5 * offset.norm_squared() / self.sigma.powi(2)
     }
 
-    fn linearise(&self, state: &State, normal: &mut Normal) -> f64 {
+    fn linearize(&self, state: &State, normal: &mut Normal) -> f64 {
         let point = state.t_cam_object * self.on_object;
-        let arm = prehend::autodiff::lie::cross_matrix(&(point.coords - state.centre()));
+        let arm = prehend::autodiff::lie::cross_matrix(&(point.coords - state.center()));
         let mut rows = nalgebra::Matrix3x6::zeros();
         rows.fixed_columns_mut::<3>(0).fill_with_identity();
         rows.fixed_columns_mut::<3>(3).copy_from(&-arm);

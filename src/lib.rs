@@ -6,10 +6,14 @@
 //! - [`geometry`]: meshes, closest points, distance grids, robots from URDF, exact volumes;
 //! - [`sim`]: rigid bodies under penalty contact, differentiable;
 //! - [`render`]: a rasterizer with closed-form pose derivatives;
-//! - [`refine`](mod@refine): refining the 6-DoF pose of an object held in a robot hand.
+//! - `refine` (feature of that name, a default): refining the 6-DoF pose of an object held in a robot hand.
+//!
+//! Other features: `gpu` renders on graphics devices, `faer` solves sparse linear systems. [`nalgebra`] is the version that all of them speak.
 
+pub use nalgebra;
 pub use prehend_autodiff as autodiff;
 pub use prehend_geometry as geometry;
+#[cfg(feature = "refine")]
 pub use prehend_refine as refine;
 pub use prehend_render as render;
 pub use prehend_sim as sim;

@@ -25,9 +25,9 @@ fn the_pose_is_found() {
 
 #[test]
 fn every_term_lowers_its_own_value() {
-    // Some millimetres and degrees off: far inside the hand, contact alone knows no way out.
+    // Some millimeters and degrees off: far inside the hand, contact alone knows no way out.
     let delta = Vector6::new(3e-3, -2e-3, 4e-3, 0.04, -0.03, 0.05);
-    let start = perturb_about(&SCENE.truth, &(SCENE.truth * SCENE.object.centre).coords, &delta);
+    let start = perturb_about(&SCENE.truth, &(SCENE.truth * SCENE.object.center).coords, &delta);
     for kind in TermKind::ALL {
         let mut config = Config::of(&[kind]);
         config.heuristic.iterations = 40;

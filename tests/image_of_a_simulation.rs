@@ -25,7 +25,7 @@ impl DistanceField for Floor {
 
 const HORIZON: Horizon = Horizon { dt: 1e-4, steps: 1000 };
 
-/// A block, painted in smooth colours.
+/// A block, painted in smooth colors.
 fn block() -> TriMesh {
     let mut mesh = shapes::superellipsoid([0.04, 0.03, 0.05], [0.8, 0.8], 32);
     let color = |p: &Point3<f64>| [p.x, p.y, p.z].map(|v| (0.5 + 0.4 * (50.0 * v).sin()) as f32);

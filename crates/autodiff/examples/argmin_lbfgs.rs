@@ -1,12 +1,12 @@
 //! Throws a ball through the air at a target: by L-BFGS from the `argmin` crate, and by our own methods.
 //!
-//! Any optimiser that takes a function and its gradient can drive a simulation written over `Scalar`.
+//! Any optimizer that takes a function and its gradient can drive a simulation written over `Scalar`.
 
 use argmin::core::{CostFunction, Error, Executor, Gradient, State};
 use argmin::solver::linesearch::MoreThuenteLineSearch;
 use argmin::solver::quasinewton::LBFGS;
 use nalgebra::Vector3;
-use prehend_autodiff::optimise::{Adam, LevenbergMarquardt, NormalEquations};
+use prehend_autodiff::optimize::{Adam, LevenbergMarquardt, NormalEquations};
 use prehend_autodiff::{Scalar, gradient};
 
 /// Where the ball, thrown from the origin, is to be after the flight \[m\].
@@ -67,8 +67,8 @@ fn main() -> Result<(), Error> {
     let by_lbfgs = state.get_best_param().cloned().ok_or_else(|| Error::msg("no step was made"))?;
 
     let by_lm = LevenbergMarquardt::default()
-        .minimise(&start, |v| NormalEquations::forward::<3>(miss, v))?;
-    let by_adam = Adam { rate: 0.1, ..Adam::default() }.minimise(&start, |v| gradient(cost, v))?;
+        .minimize(&start, |v| NormalEquations::forward::<3>(miss, v))?;
+    let by_adam = Adam { rate: 0.1, ..Adam::default() }.minimize(&start, |v| gradient(cost, v))?;
 
     println!("method               iterations   miss [m]   velocity [m/s]");
     for (method, iterations, velocity) in [

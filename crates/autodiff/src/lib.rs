@@ -23,7 +23,7 @@
 //! | wanted | use |
 //! |---|---|
 //! | gradient | [`gradient`], [`gradient_into`] (allocates nothing), [`Recording`] for control |
-//! | Jacobian | [`jacobian`], [`forward_jacobian`], [`sparse`] by colouring |
+//! | Jacobian | [`jacobian`], [`forward_jacobian`], [`sparse`] by coloring |
 //! | Hessian, Hessian–vector product | [`hessian`], [`hessian_vector`], or `Fwd<N, Fwd<N>>` |
 //! | gradient through thousands of steps | [`checkpoint`], [`Scalar::recompute`] for one node a step |
 //! | derivative of a linear solve, of a root | [`solve`], [`implicit`] |
@@ -31,7 +31,7 @@
 //! | rotations and rigid motions | [`lie`], [`rigid`] |
 //! | local Jacobians on all cores, the same bits for any number of them | [`parallel`] |
 //! | where a NaN comes from | [`diagnose`] |
-//! | something to minimise with | [`optimise`] |
+//! | something to minimize with | [`optimize`] |
 //! | an independent derivative to test against | [`check`] |
 //!
 //! # A derivative of your own
@@ -60,7 +60,7 @@
 //!
 //! # Further
 //! [A checkpointed rollout](checkpoint), [a differentiable solve](implicit#a-differentiable-solve), and the
-//! example `argmin_lbfgs`, which aims a throw with the optimisers here and with those of `argmin`.
+//! example `argmin_lbfgs`, which aims a throw with the optimizers here and with those of `argmin`.
 //!
 //! A [`Var`] belongs to its [`Recording`] and thread: using it elsewhere is a panic that says so, never a wrong
 //! number. At singular points the derivative is documented (in [`Scalar`] and at each function), and a
@@ -79,7 +79,7 @@ mod lanes;
 pub mod lie;
 mod local;
 mod operand;
-pub mod optimise;
+pub mod optimize;
 pub mod parallel;
 mod real_field;
 mod recompute;

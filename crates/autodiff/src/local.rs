@@ -8,7 +8,7 @@ use crate::{CustomVjp, Fwd, Scalar, Var};
 /// A function of `N` numbers with `M` results: a rotation, a contact wrench, a term of a sum.
 ///
 /// [`Scalar::local`] applies it. For reverse mode it then costs one block node with a dense `M`×`N`
-/// Jacobian, which [`linearise`](Self::linearise) finds by forward mode unless it is overridden with
+/// Jacobian, which [`linearize`](Self::linearize) finds by forward mode unless it is overridden with
 /// something faster:
 ///
 /// ```
@@ -24,7 +24,7 @@ use crate::{CustomVjp, Fwd, Scalar, Var};
 ///         [(x + x.powi(3)).times(-self.stiffness)]
 ///     }
 ///
-///     fn linearise(&self, [x]: [f64; 1]) -> ([f64; 1], [[f64; 1]; 1]) {
+///     fn linearize(&self, [x]: [f64; 1]) -> ([f64; 1], [[f64; 1]; 1]) {
 ///         (self.evaluate([x]), [[-self.stiffness * (1.0 + 3.0 * x * x)]])
 ///     }
 /// }
@@ -39,7 +39,7 @@ pub trait LocalFunction<const N: usize, const M: usize> {
 
     /// The results and their Jacobian, one row a result.
     #[inline]
-    fn linearise(&self, x: [f64; N]) -> ([f64; M], [[f64; N]; M]) {
+    fn linearize(&self, x: [f64; N]) -> ([f64; M], [[f64; N]; M]) {
         let results = self.evaluate(Fwd::<N>::variables(x));
         (results.map(|y| y.value), results.map(|y| y.derivative))
     }
@@ -59,8 +59,8 @@ impl<const N: usize, const M: usize, F: LocalFunction<N, M>> LocalFunction<N, M>
     }
 
     #[inline]
-    fn linearise(&self, x: [f64; N]) -> ([f64; M], [[f64; N]; M]) {
-        (**self).linearise(x)
+    fn linearize(&self, x: [f64; N]) -> ([f64; M], [[f64; N]; M]) {
+        (**self).linearize(x)
     }
 
     #[inline]
@@ -95,10 +95,10 @@ pub(crate) fn sum_local<const K: usize, F: LocalFunction<K, 1>>(
     x: &[Var],
     terms: impl IntoIterator<Item = (F, [usize; K])>,
 ) -> Var {
-    let linearise = |(term, places): (F, [usize; K])| {
-        (places, term.linearise(places.map(|place| x[place].value)))
+    let linearize = |(term, places): (F, [usize; K])| {
+        (places, term.linearize(places.map(|place| x[place].value)))
     };
-    record_sum(x, terms.into_iter().map(linearise))
+    record_sum(x, terms.into_iter().map(linearize))
 }
 
 /// Records the sum of terms of `x`, given their places, values and slopes, as one node.
@@ -110,7 +110,7 @@ pub(crate) fn record_sum<const K: usize>(
     let mut sum = 0.0;
     let mut gradient = with_tape(|tape| tape.scratch(x.len()));
     gradient.fill(0.0);
-    // Neighbouring terms often share a number. What was touched last is held in a register, because reading
+    // Neighboring terms often share a number. What was touched last is held in a register, because reading
     // back what was just written would be the slowest part.
     let mut held = (0, 0.0);
     for (places, ([value], [slopes])) in terms {
@@ -228,7 +228,7 @@ mod tests {
             S::sum_local(&x, terms)
         }
         let x: Vec<f64> = (0..300).map(|i| (i * i % 11) as f64).collect();
-        // Neighbours on the tape; the other way round; a fused result, a constant and a repetition among them.
+        // Neighbors on the tape; the other way round; a fused result, a constant and a repetition among them.
         type Order<S> = fn(&mut [S]);
         let orders: [(Order<Var>, Order<f64>); 3] =
             [(|_| (), |_| ()), (<[Var]>::reverse, <[f64]>::reverse), (mix::<Var>, mix::<f64>)];

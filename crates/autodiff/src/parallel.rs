@@ -18,7 +18,7 @@ pub fn local_each<const N: usize, const M: usize>(
     function: &(impl LocalFunction<N, M> + Sync),
     inputs: &[[Var; N]],
 ) -> Vec<[Var; M]> {
-    let values = inputs.par_iter().map(|x| function.linearise(x.map(Var::value)));
+    let values = inputs.par_iter().map(|x| function.linearize(x.map(Var::value)));
     let blocks: Vec<_> = values.collect();
     let recorded = inputs.iter().zip(blocks).map(|(x, (values, jacobian))| {
         let group = push_block(x, M, jacobian.as_flattened());
@@ -36,7 +36,7 @@ pub fn sum_local<const K: usize, F: LocalFunction<K, 1> + Sync>(
     x: &[Var],
     terms: &[(F, [usize; K])],
 ) -> Var {
-    let linear = terms.par_iter().map(|(term, places)| term.linearise(places.map(|p| x[p].value)));
+    let linear = terms.par_iter().map(|(term, places)| term.linearize(places.map(|p| x[p].value)));
     let linear: Vec<_> = linear.collect();
     record_sum(x, terms.iter().map(|(_, places)| *places).zip(linear))
 }

@@ -287,7 +287,7 @@ mod tests {
     }
 
     #[test]
-    fn nalgebra_factorisations_work() {
+    fn nalgebra_factorizations_work() {
         let at = |x: &[Var]| {
             let m = Matrix3::new(x[0], x[1], x[2], x[1], x[3], x[1], x[2], x[1], x[0]);
             m.cholesky().map_or(Var::default(), |c| c.determinant().ln())

@@ -71,7 +71,7 @@ impl LocalFunction<7, 3> for Rotate {
 
     // Of w t + u × t + v with t = 2 u × v, which is what nalgebra evaluates.
     #[inline]
-    fn linearise(&self, [i, j, k, w, x, y, z]: [f64; 7]) -> ([f64; 3], [[f64; 7]; 3]) {
+    fn linearize(&self, [i, j, k, w, x, y, z]: [f64; 7]) -> ([f64; 3], [[f64; 7]; 3]) {
         let (u, v) = (Vector3::new(i, j, k), Vector3::new(x, y, z));
         let t = u.cross(&v) * 2.0;
         let (by_u, by_v) = (cross_matrix(&v), cross_matrix(&u));
@@ -93,7 +93,7 @@ impl LocalFunction<6, 3> for Cross {
     }
 
     #[inline]
-    fn linearise(&self, [a, b, c, x, y, z]: [f64; 6]) -> ([f64; 3], [[f64; 6]; 3]) {
+    fn linearize(&self, [a, b, c, x, y, z]: [f64; 6]) -> ([f64; 3], [[f64; 6]; 3]) {
         let jacobian =
             [[0.0, z, -y, 0.0, -c, b], [-z, 0.0, x, c, 0.0, -a], [y, -x, 0.0, -b, a, 0.0]];
         ([b * z - c * y, c * x - a * z, a * y - b * x], jacobian)
@@ -113,7 +113,7 @@ impl LocalFunction<7, 4> for Turn {
 
     // The product is linear in both factors; exp = (cos θ/2, s ω) has the derivative (−½ s ω, s 1 + s'/θ ω ωᵀ).
     #[inline]
-    fn linearise(&self, [i, j, k, w, x, y, z]: [f64; 7]) -> ([f64; 4], [[f64; 7]; 4]) {
+    fn linearize(&self, [i, j, k, w, x, y, z]: [f64; 7]) -> ([f64; 4], [[f64; 7]; 4]) {
         let omega = Vector3::new(x, y, z) * self.duration;
         let step = so3_exp(&omega);
         let (a, u) = (step.w, step.imag());
@@ -163,7 +163,7 @@ impl LocalFunction<10, 3> for Euler {
 
     // By a small turn θ of the body, R → (1 + [θ]×) R; then from θ to the quaternion's coordinates.
     #[inline]
-    fn linearise(&self, x: [f64; 10]) -> ([f64; 3], [[f64; 10]; 3]) {
+    fn linearize(&self, x: [f64; 10]) -> ([f64; 3], [[f64; 10]; 3]) {
         let q = quaternion([x[0], x[1], x[2], x[3]]);
         let (velocity, torque) = (Vector3::new(x[4], x[5], x[6]), Vector3::new(x[7], x[8], x[9]));
         // The value as `evaluate` computes it, to the last bit.
@@ -218,7 +218,7 @@ mod tests {
 
     /// Compares a function's own Jacobian with forward mode through its generic code, and its value.
     fn check<const N: usize, const M: usize>(function: &impl LocalFunction<N, M>, x: [f64; N]) {
-        let (values, jacobian) = function.linearise(x);
+        let (values, jacobian) = function.linearize(x);
         let forward = function.evaluate(Fwd::<N>::variables(x));
         for (row, (value, forward)) in values.iter().zip(forward).enumerate() {
             assert_eq!(*value, forward.value, "{x:?}");

@@ -1,4 +1,4 @@
-//! Sparse Jacobians at the price of a few directional derivatives, by colouring.
+//! Sparse Jacobians at the price of a few directional derivatives, by coloring.
 //!
 //! Columns that share no row can be differentiated together: what each row then holds is the derivative by the
 //! only one of them that it depends on. So [`Forward`] finds a tridiagonal Jacobian of any size
@@ -23,22 +23,22 @@
 //!
 //! let x = [0.1; 1000];
 //! let jacobian = Forward::new(Pattern::detect(forces, &x));
-//! assert_eq!(jacobian.colours(), 3);
+//! assert_eq!(jacobian.colors(), 3);
 //! let (values, entries) = jacobian.evaluate(forces, &x)?;
 //! assert_eq!((values.len(), entries.len()), (1000, 2998));
 //! # Ok::<(), prehend_autodiff::sparse::SparseError>(())
 //! ```
 //!
-//! [`Reverse`] does the same with rows: it is the one for matrices with a dense row. Both need many colours where
+//! [`Reverse`] does the same with rows: it is the one for matrices with a dense row. Both need many colors where
 //! a row and a column are dense. The entries come in the order of the [`Pattern`], which is that of CSR matrices.
 
-mod colouring;
+mod coloring;
 mod pattern;
 
 pub use pattern::Pattern;
 
 use crate::{Fwd, Recording, Var};
-use colouring::Colouring;
+use coloring::Coloring;
 
 /// Directions in one evaluation of [`Forward`].
 pub const LANES: usize = 8;
@@ -86,19 +86,19 @@ pub enum SparseError {
     },
 }
 
-/// Jacobians of one pattern by forward mode, [`LANES`] colours of columns an evaluation.
+/// Jacobians of one pattern by forward mode, [`LANES`] colors of columns an evaluation.
 ///
-/// The pattern is coloured once, greedily from the columns with the most neighbours (T. F. Coleman, J. J. Moré,
-/// SIAM J. Numer. Anal. 20 (1983)). There are at least as many colours as entries in the longest row.
+/// The pattern is colored once, greedily from the columns with the most neighbors (T. F. Coleman, J. J. Moré,
+/// SIAM J. Numer. Anal. 20 (1983)). There are at least as many colors as entries in the longest row.
 pub struct Forward {
     pattern: Pattern,
-    columns: Colouring,
+    columns: Coloring,
 }
 
 impl Forward {
-    /// Colours the columns of `pattern`.
+    /// Colors the columns of `pattern`.
     pub fn new(pattern: Pattern) -> Self {
-        let columns = Colouring::new(&pattern.transposed(), &pattern);
+        let columns = Coloring::new(&pattern.transposed(), &pattern);
         Self { pattern, columns }
     }
 
@@ -108,7 +108,7 @@ impl Forward {
     }
 
     /// Directional derivatives needed.
-    pub fn colours(&self) -> usize {
+    pub fn colors(&self) -> usize {
         self.columns.count
     }
 
@@ -117,7 +117,7 @@ impl Forward {
     /// # Errors
     /// [`SparseError::InputCount`] or [`SparseError::OutputCount`] if sizes do not match the pattern's, and
     /// [`SparseError::RowOutsidePattern`] if an entry outside the pattern was noticed. It goes unnoticed, and
-    /// is added to another, where its column has the colour of one in the row's pattern.
+    /// is added to another, where its column has the color of one in the row's pattern.
     pub fn evaluate(
         &self,
         f: impl Fn(&[Fwd<LANES>]) -> Vec<Fwd<LANES>>,
@@ -156,21 +156,21 @@ impl Forward {
     }
 }
 
-/// Jacobians of one pattern by reverse mode: one recording, and a sweep for each colour of rows.
+/// Jacobians of one pattern by reverse mode: one recording, and a sweep for each color of rows.
 ///
-/// The pattern is coloured as by [`Forward`], with rows for columns.
+/// The pattern is colored as by [`Forward`], with rows for columns.
 pub struct Reverse {
     pattern: Pattern,
-    /// Rows of each colour.
+    /// Rows of each color.
     groups: Vec<Vec<usize>>,
 }
 
 impl Reverse {
-    /// Colours the rows of `pattern`.
+    /// Colors the rows of `pattern`.
     pub fn new(pattern: Pattern) -> Self {
-        let rows = Colouring::new(&pattern, &pattern.transposed());
+        let rows = Coloring::new(&pattern, &pattern.transposed());
         let mut groups = vec![Vec::new(); rows.count];
-        rows.of_line.iter().enumerate().for_each(|(row, &colour)| groups[colour].push(row));
+        rows.of_line.iter().enumerate().for_each(|(row, &color)| groups[color].push(row));
         Self { pattern, groups }
     }
 
@@ -180,7 +180,7 @@ impl Reverse {
     }
 
     /// Sweeps needed.
-    pub fn colours(&self) -> usize {
+    pub fn colors(&self) -> usize {
         self.groups.len()
     }
 
@@ -189,7 +189,7 @@ impl Reverse {
     /// # Errors
     /// [`SparseError::InputCount`] or [`SparseError::OutputCount`] if sizes do not match the pattern's, and
     /// [`SparseError::ColumnOutsidePattern`] if an entry outside the pattern was noticed. It goes unnoticed, and
-    /// is added to another, where its row has the colour of one in the column's pattern.
+    /// is added to another, where its row has the color of one in the column's pattern.
     pub fn evaluate(
         &self,
         f: impl FnOnce(&[Var]) -> Vec<Var>,
@@ -279,11 +279,11 @@ mod tests {
             }
             assert!(entries.next().is_none());
         }
-        [forward.colours(), reverse.colours()]
+        [forward.colors(), reverse.colors()]
     }
 
     #[test]
-    fn tridiagonal_jacobians_need_three_colours() {
+    fn tridiagonal_jacobians_need_three_colors() {
         let depends: Vec<Vec<usize>> =
             (0..N).map(|i| (i.saturating_sub(1)..(i + 2).min(N)).collect()).collect();
         assert_eq!(assert_like_dense(&depends), [3, 3]);

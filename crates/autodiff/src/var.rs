@@ -102,7 +102,7 @@ impl Chain for Var {
         function: &impl LocalFunction<N, M>,
         x: [Self; N],
     ) -> [Self; M] {
-        let (values, jacobian) = function.linearise(x.map(Self::value));
+        let (values, jacobian) = function.linearize(x.map(Self::value));
         let group = match function.reverse_rule() {
             None => push_block(&x, M, jacobian.as_flattened()),
             Some(rule) => push_custom(&x, M, rule),

@@ -134,7 +134,7 @@ fn svd_vectors<S: Scalar>(x: &[S]) -> Vec<S> {
     all
 }
 
-/// Eigenvalues in ascending order, as nalgebra's order may change from a point to its neighbour.
+/// Eigenvalues in ascending order, as nalgebra's order may change from a point to its neighbor.
 fn eigenvalues<S: Scalar>(x: &[S]) -> Vec<S> {
     let sorted = |mut values: Vec<S>| {
         values.sort_by(|a, b| a.value().total_cmp(&b.value()));

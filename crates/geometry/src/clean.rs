@@ -21,7 +21,7 @@ impl TriMesh {
     /// oriented and facing outward; attributes are dropped. A face with a corner that is not finite is degenerate.
     ///
     /// A component is stray if it has less than 1 % of the faces of the largest and is open or encloses no volume:
-    /// scans carry a few such faces. Faces of no area whose corners differ are kept, since their neighbours need
+    /// scans carry a few such faces. Faces of no area whose corners differ are kept, since their neighbors need
     /// them. A closed shell that faces inward within no other is turned over with all it contains; a cavity stays a
     /// cavity. Holes are not filled and overlaps not resolved: the report says whether the result is watertight, and
     /// whether it [overlaps itself](MeshReport::overlaps_itself).

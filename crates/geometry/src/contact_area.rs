@@ -7,7 +7,7 @@ use crate::ClosestPoints;
 
 /// Samples that one thread takes at a time.
 const CHUNK: usize = 1024;
-/// How far queries look, in reaches: a longer distance answers for more neighbours, a shorter one is found sooner.
+/// How far queries look, in reaches: a longer distance answers for more neighbors, a shorter one is found sooner.
 const LOOK: f64 = 4.0;
 
 /// Area of a surface of `area` \[m²\] that lies closer than `reach` \[m\] to `surface`, inside or outside of it \[m²\].
@@ -77,7 +77,7 @@ mod tests {
     }
 
     #[test]
-    fn neighbours_answer_as_queries_do() {
+    fn neighbors_answer_as_queries_do() {
         let ball = icosphere(0.05, 4);
         let samples: Vec<_> =
             surface_samples(&ball, 20_000, 1).into_iter().map(|s| s.point).collect();

@@ -14,7 +14,7 @@ impl TriMesh {
     /// The faces through which an edge of another face passes, or an edge of which passes through another, ascending.
     ///
     /// Exactly decided for the coordinates as they are (adaptive predicates, Shewchuk 1997). Surfaces that only touch do
-    /// not count: neither neighbours along their common edge or corner, nor bodies that stand on one another, nor
+    /// not count: neither neighbors along their common edge or corner, nor bodies that stand on one another, nor
     /// faces that lie in one plane. A body wholly inside another crosses nothing either;
     /// [`MeshReport::nested_shells`](crate::MeshReport::nested_shells) counts those.
     ///
@@ -47,7 +47,7 @@ impl TriMesh {
 
 /// On which side of the plane through `t` the point `p` lies: exact in sign, zero on it.
 fn side(t: &Triangle, p: &Point3<f64>) -> f64 {
-    // The corner of a neighbour, which the predicate would take longer to find out.
+    // The corner of a neighbor, which the predicate would take longer to find out.
     if t.contains(p) {
         return 0.0;
     }
@@ -113,7 +113,7 @@ mod tests {
         let crossing = two.crossing_faces();
         assert!(crossing.len() > 40 && crossing.len() < 400, "{}", crossing.len());
         assert!(crossing.iter().any(|f| *f < n) && crossing.iter().any(|f| *f >= n));
-        // Spheres of equal size meet in the plane between their centres.
+        // Spheres of equal size meet in the plane between their centers.
         let middle = Vector3::new(0.6, 0.05, 0.025);
         let axis = middle.normalize();
         for f in crossing {

@@ -1,4 +1,4 @@
-//! Volume, mass, centre and inertia of a solid given by its closed surface.
+//! Volume, mass, center and inertia of a solid given by its closed surface.
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
@@ -12,9 +12,9 @@ pub struct MassProperties {
     pub volume: f64,
     /// Mass \[kg\].
     pub mass: f64,
-    /// Centre of mass \[m\].
+    /// Center of mass \[m\].
     pub center_of_mass: Point3<f64>,
-    /// Inertia about the centre of mass, along the axes of the mesh \[kg m²\].
+    /// Inertia about the center of mass, along the axes of the mesh \[kg m²\].
     pub inertia: Matrix3<f64>,
 }
 
@@ -71,10 +71,10 @@ pub(crate) fn mass_of_closed(mesh: &TriMesh, density: f64) -> Result<MassPropert
     if volume.is_nan() || volume <= 1e-12 * extent.powi(3) {
         return Err(MassError::NoVolume { volume });
     }
-    let centre = first / volume;
-    let covariance = (second - centre * centre.transpose() * volume) * density;
+    let center = first / volume;
+    let covariance = (second - center * center.transpose() * volume) * density;
     let inertia = Matrix3::identity() * covariance.trace() - covariance;
-    Ok(MassProperties { volume, mass: density * volume, center_of_mass: origin + centre, inertia })
+    Ok(MassProperties { volume, mass: density * volume, center_of_mass: origin + center, inertia })
 }
 
 impl MassProperties {
@@ -146,15 +146,15 @@ mod tests {
 
     #[test]
     fn corner_tetrahedron() {
-        // The unit corner tetrahedron: V = 1/6, centre 1/4, ∫x² = 1/60, ∫xy = 1/120.
+        // The unit corner tetrahedron: V = 1/6, center 1/4, ∫x² = 1/60, ∫xy = 1/120.
         let p = Point3::new;
         let vertices = vec![p(0., 0., 0.), p(1., 0., 0.), p(0., 1., 0.), p(0., 0., 1.)];
         let mesh = TriMesh::new(vertices, vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]);
         let mass = mass_properties(&mesh, 1.0).unwrap();
         assert!((mass.volume - 1.0 / 6.0).abs() < 1e-15);
         assert!((mass.center_of_mass - Point3::new(0.25, 0.25, 0.25)).norm() < 1e-15);
-        let about_centre = |raw: f64| raw - mass.volume / 16.0;
-        let (xx, xy) = (about_centre(1.0 / 60.0), about_centre(1.0 / 120.0));
+        let about_center = |raw: f64| raw - mass.volume / 16.0;
+        let (xx, xy) = (about_center(1.0 / 60.0), about_center(1.0 / 120.0));
         let expected = Matrix3::from_fn(|i, j| if i == j { 2.0 * xx } else { -xy });
         assert!((mass.inertia - expected).norm() < 1e-15);
     }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
-/// An indexed triangle mesh in metres, with optional per-vertex attributes.
+/// An indexed triangle mesh in meters, with optional per-vertex attributes.
 ///
 /// Attribute vectors, where present, have one entry a vertex; a position on a texture seam is stored
 /// once for each of its UVs (weld by position before asking topological questions).
@@ -18,7 +18,7 @@ pub struct TriMesh {
     pub normals: Option<Vec<Vector3<f64>>>,
     /// Texture coordinates, one a vertex; (0, 0) is the lower-left corner of the image, v points up.
     pub uvs: Option<Vec<[f32; 2]>>,
-    /// Colours in 0..=1 as stored in files (sRGB-encoded), one a vertex.
+    /// Colors in 0..=1 as stored in files (sRGB-encoded), one a vertex.
     pub colors: Option<Vec<[f32; 3]>>,
     /// The image that `uvs` refer to.
     pub texture: Option<Arc<Texture>>,
@@ -64,7 +64,7 @@ impl TriMesh {
         mesh
     }
 
-    /// Multiplies every coordinate by `factor` (0.001 brings millimetres to metres). A negative factor reflects the
+    /// Multiplies every coordinate by `factor` (0.001 brings millimeters to meters). A negative factor reflects the
     /// body; its faces and normals still look outward.
     pub fn scaled(mut self, factor: f64) -> Self {
         self.vertices.iter_mut().for_each(|v| v.coords *= factor);

@@ -1,4 +1,4 @@
-//! Which way faces look: neighbours alike, and shells outward.
+//! Which way faces look: neighbors alike, and shells outward.
 
 use nalgebra::{Point3, Vector3};
 
@@ -18,14 +18,14 @@ pub(crate) fn wedge(positions: &[Point3<f64>], face: &[u32; 3], origin: &Point3<
     a.dot(&b.cross(&c))
 }
 
-/// Makes neighbours agree and shells face outward, and counts the nested ones.
+/// Makes neighbors agree and shells face outward, and counts the nested ones.
 ///
 /// A closed shell within no other that encloses a negative volume is turned over, together with all shells
 /// within it: those keep facing the way they do relative to it, since a shell that faces inward inside another is a
-/// cavity. Open shells are turned over together, by the volume they span with the centre of the mesh: a hole
+/// cavity. Open shells are turned over together, by the volume they span with the center of the mesh: a hole
 /// leaves enough of a surface to tell.
 pub(crate) fn orient(positions: &[Point3<f64>], faces: &mut [[u32; 3]], report: &mut MeshReport) {
-    align_neighbours(faces, report);
+    align_neighbors(faces, report);
     let mut shells = Shells::new(positions, faces);
     let around = shells.around(positions, faces);
     let turn: Vec<bool> = (0..shells.list.len())
@@ -49,19 +49,19 @@ pub(crate) fn orient(positions: &[Point3<f64>], faces: &mut [[u32; 3]], report: 
     report.nested_shells = (0..shells.list.len()).filter(|s| !sound(s)).count();
 }
 
-/// Turns faces so that neighbours agree, following the majority of each component.
-fn align_neighbours(faces: &mut [[u32; 3]], report: &mut MeshReport) {
+/// Turns faces so that neighbors agree, following the majority of each component.
+fn align_neighbors(faces: &mut [[u32; 3]], report: &mut MeshReport) {
     let all = edges(faces);
     let pairs: Vec<&Edge> = all.iter().filter(|e| e.uses.len() == 2).collect();
     if pairs.iter().all(|e| e.is_manifold()) {
         return;
     }
     let mut turn = vec![false; faces.len()];
-    let mut neighbours: Vec<Vec<(u32, bool)>> = vec![Vec::new(); faces.len()];
+    let mut neighbors: Vec<Vec<(u32, bool)>> = vec![Vec::new(); faces.len()];
     for edge in &pairs {
         let [EdgeUse { face: f, forward, .. }, other] = [edge.uses[0], edge.uses[1]];
-        neighbours[f as usize].push((other.face, forward == other.forward));
-        neighbours[other.face as usize].push((f, forward == other.forward));
+        neighbors[f as usize].push((other.face, forward == other.forward));
+        neighbors[other.face as usize].push((f, forward == other.forward));
     }
     let mut reached = vec![false; faces.len()];
     for start in 0..faces.len() {
@@ -73,7 +73,7 @@ fn align_neighbours(faces: &mut [[u32; 3]], report: &mut MeshReport) {
         while next < component.len() {
             let f = component[next];
             next += 1;
-            for &(g, contrary) in &neighbours[f] {
+            for &(g, contrary) in &neighbors[f] {
                 let g = g as usize;
                 if !std::mem::replace(&mut reached[g], true) {
                     turn[g] = turn[f] ^ contrary;
@@ -116,16 +116,16 @@ impl Shells {
             open[of[edge.uses[0].face as usize] as usize] = true;
         }
         let n = positions.len().max(1) as f64;
-        let centre = positions.iter().fold(Vector3::zeros(), |s, p| s + p.coords / n).into();
+        let center = positions.iter().fold(Vector3::zeros(), |s, p| s + p.coords / n).into();
         let mut bounds = vec![Bounds::EMPTY; count];
         let mut first = vec![None; count];
-        // Volumes about a corner of the shell, those of open shells together and about the centre of all.
+        // Volumes about a corner of the shell, those of open shells together and about the center of all.
         let (mut signed, mut unsigned) = (vec![0.0; count], vec![0.0; count]);
         let (mut open_signed, mut open_unsigned) = (0.0, 0.0);
         for (face, &shell) in faces.iter().zip(&of) {
             let s = shell as usize;
             let origin = *first[s].get_or_insert(positions[face[0] as usize]);
-            let (own, central) = (wedge(positions, face, &origin), wedge(positions, face, &centre));
+            let (own, central) = (wedge(positions, face, &origin), wedge(positions, face, &center));
             signed[s] += own;
             unsigned[s] += own.abs();
             if open[s] {

@@ -29,7 +29,7 @@ pub(super) struct Side {
 pub(super) struct Plane<'a> {
     corners: [&'a Point3<f64>; 3],
     normal: Vector3<f64>,
-    /// What `normal` would be had its terms not cancelled: bounds its error.
+    /// What `normal` would be had its terms not canceled: bounds its error.
     bound: Vector3<f64>,
     /// How the points asked about move relative to the triangle: along or against the infinitesimal motion.
     motion: i8,

@@ -19,7 +19,7 @@ pub struct MeshReport {
     pub stray_components: usize,
     /// Faces of those.
     pub stray_faces: usize,
-    /// Faces turned over to agree with their neighbours.
+    /// Faces turned over to agree with their neighbors.
     pub flipped_faces: usize,
     /// Components turned over as a whole because they faced inward.
     pub inverted_shells: usize,
@@ -32,7 +32,7 @@ pub struct MeshReport {
     /// Vertices of the result in which surfaces touch without sharing an edge
     /// ([`topology::non_manifold_vertices`](crate::topology::non_manifold_vertices)).
     pub non_manifold_vertices: usize,
-    /// Faces of the result with three corners in a line: kept, since their neighbours need them.
+    /// Faces of the result with three corners in a line: kept, since their neighbors need them.
     pub flat_faces: usize,
     /// Faces of the result that other faces pass through
     /// ([`TriMesh::crossing_faces`](crate::TriMesh::crossing_faces)): where bodies overlap, or one overlaps itself.

@@ -14,8 +14,8 @@ use crate::{
     Config, HandReading, Inertial, Object, Observation, RefineError, Robot, StrategyKind, TermKind,
 };
 
-/// BOP models are in millimetres \[m\].
-const MILLIMETRE: f64 = 1e-3;
+/// BOP models are in millimeters \[m\].
+const MILLIMETER: f64 = 1e-3;
 
 /// Why an asset of a dataset, or a frame made of them, could not be had.
 #[derive(Debug, thiserror::Error)]
@@ -68,7 +68,7 @@ impl<'a> Assets<'a> {
         self.dataset
     }
 
-    /// The model of object `id`, in metres.
+    /// The model of object `id`, in meters.
     ///
     /// # Errors
     /// If the model is missing or broken.
@@ -195,7 +195,7 @@ impl<'a> Assets<'a> {
     }
 }
 
-/// The object `id` of `models`, in metres.
+/// The object `id` of `models`, in meters.
 ///
 /// Mass properties come from `models_info.json`. With a mass alone the density is taken as uniform, without
 /// one it is [`crate::DEFAULT_DENSITY`]; both need a closed mesh.
@@ -221,10 +221,10 @@ pub fn load_object(models: &Models, id: u32, seed: u64) -> Result<Object, AssetE
     })
 }
 
-/// The surface of object `id` of `models`, in metres.
+/// The surface of object `id` of `models`, in meters.
 ///
 /// # Errors
 /// If the model is missing or broken.
 pub fn load_mesh(models: &Models, id: u32) -> Result<TriMesh, AssetError> {
-    Ok(TriMesh::load(&models.mesh_path(id)?)?.scaled(MILLIMETRE))
+    Ok(TriMesh::load(&models.mesh_path(id)?)?.scaled(MILLIMETER))
 }

@@ -11,7 +11,7 @@ pub struct CameraCorrection {
     pub depth_scale: f64,
     /// What is to be added then \[m\].
     pub depth_bias: f64,
-    /// Where the centre of projection really is, right of where it is said to be, and below \[focal lengths\].
+    /// Where the center of projection really is, right of where it is said to be, and below \[focal lengths\].
     pub shift: Vector2<f64>,
     /// How much larger the images of things are than focal length and models say, as a part of their size.
     pub magnification: f64,
@@ -69,21 +69,21 @@ impl CameraCorrection {
         ])
     }
 
-    /// The pose at which the camera, as it is said to be, would see a thing of centre `centre` (camera frame) as it does
+    /// The pose at which the camera, as it is said to be, would see a thing of center `center` (camera frame) as it does
     /// see it at `pose`: nearer where images are larger, and shifted. To first order in the thing's size over its distance.
-    pub fn apparent(&self, pose: &Isometry3<f64>, centre: &Vector3<f64>) -> Isometry3<f64> {
-        Translation3::from(self.apparent_shift(centre)) * pose
+    pub fn apparent(&self, pose: &Isometry3<f64>, center: &Vector3<f64>) -> Isometry3<f64> {
+        Translation3::from(self.apparent_shift(center)) * pose
     }
 
-    fn apparent_shift(&self, centre: &Vector3<f64>) -> Vector3<f64> {
-        let z = centre.z / (1.0 + self.magnification);
-        Vector3::new(self.shift.x * z, self.shift.y * z, z - centre.z)
+    fn apparent_shift(&self, center: &Vector3<f64>) -> Vector3<f64> {
+        let z = center.z / (1.0 + self.magnification);
+        Vector3::new(self.shift.x * z, self.shift.y * z, z - center.z)
     }
 
     /// Derivatives of the place of [`apparent`](Self::apparent): by the place of the pose, then by the parameters.
-    pub fn apparent_jacobian(&self, centre: &Vector3<f64>) -> SMatrix<f64, 3, 8> {
+    pub fn apparent_jacobian(&self, center: &Vector3<f64>) -> SMatrix<f64, 3, 8> {
         let larger = 1.0 + self.magnification;
-        let z = centre.z / larger;
+        let z = center.z / larger;
         let mut jacobian = SMatrix::<f64, 3, 8>::zeros();
         jacobian.fixed_view_mut::<3, 3>(0, 0).fill_with_identity();
         jacobian[(0, 2)] = self.shift.x / larger;
@@ -128,11 +128,11 @@ mod tests {
     fn the_apparent_pose_and_its_derivatives() {
         let pose = Isometry3::translation(0.03, -0.02, 0.4);
         for correction in [CameraCorrection::default(), some()] {
-            let centre = pose.translation.vector;
-            let jacobian = correction.apparent_jacobian(&centre);
+            let center = pose.translation.vector;
+            let jacobian = correction.apparent_jacobian(&center);
             for row in 0..3 {
                 let of = |x: &[f64]| {
-                    let moved = centre + Vector3::new(x[0], x[1], x[2]);
+                    let moved = center + Vector3::new(x[0], x[1], x[2]);
                     let pose = Isometry3::from_parts(moved.into(), pose.rotation);
                     correction.changed(&x[3..]).apparent(&pose, &moved).translation.vector[row]
                 };

@@ -11,7 +11,7 @@ use crate::term::{DepthSettings, PhysicsSettings, RenderingSettings, TactileSett
 pub enum TermKind {
     /// Stability of the grasp, by simulation.
     Physics,
-    /// Colour and silhouette.
+    /// Color and silhouette.
     Rendering,
     /// Depth points.
     Depth,

@@ -43,9 +43,9 @@ pub enum RefineError {
         link: String,
     },
     /// The initial pose is unusable.
-    #[error("the initial pose puts the object's centre at depth {depth:.3} m, behind the camera")]
+    #[error("the initial pose puts the object's center at depth {depth:.3} m, behind the camera")]
     BehindCamera {
-        /// Depth of the centre \[m\].
+        /// Depth of the center \[m\].
         depth: f64,
     },
     /// The initial pose is not finite.

@@ -99,7 +99,7 @@ struct Layout {
     k: [f64; 9],
     rgb: PathBuf,
     depth: PathBuf,
-    /// Metres of one unit of the depth image.
+    /// Meters of one unit of the depth image.
     depth_unit_m: f64,
     mask: PathBuf,
     mesh: PathBuf,
@@ -113,16 +113,16 @@ struct Layout {
 #[derive(Clone, Copy, Deserialize)]
 enum Unit {
     #[serde(rename = "m")]
-    Metre,
+    Meter,
     #[serde(rename = "mm")]
-    Millimetre,
+    Millimeter,
 }
 
 impl Unit {
-    fn metres(self) -> f64 {
+    fn meters(self) -> f64 {
         match self {
-            Self::Metre => 1.0,
-            Self::Millimetre => 1e-3,
+            Self::Meter => 1.0,
+            Self::Millimeter => 1e-3,
         }
     }
 }
@@ -173,7 +173,7 @@ pub fn load(
         |source: AssetError| FrameFileError::Asset { file: file.into(), source: Box::new(source) };
 
     if !(layout.depth_unit_m.is_finite() && layout.depth_unit_m > 0.0) {
-        return Err(field("depth_unit_m", "must be a positive number of metres".into()));
+        return Err(field("depth_unit_m", "must be a positive number of meters".into()));
     }
     let color = RgbImage::load(&folder.join(&layout.rgb)).map_err(image)?;
     let depth =
@@ -190,7 +190,7 @@ pub fn load(
         }
     }
     let mesh = TriMesh::load(&folder.join(&layout.mesh)).map_err(|e| asset(e.into()))?;
-    let mesh = mesh.scaled(layout.mesh_unit.metres());
+    let mesh = mesh.scaled(layout.mesh_unit.meters());
     let name = folder.join(&layout.mesh).display().to_string();
     let object =
         Object::with_mass(&name, mesh, layout.mass_kg, seed).map_err(|e| asset(e.into()))?;
@@ -231,7 +231,7 @@ pub fn load(
 
 impl Pose {
     fn isometry(&self) -> Result<Isometry3<f64>, String> {
-        let scale = self.unit.metres();
+        let scale = self.unit.meters();
         let from_quaternion = |[w, x, y, z]: [f64; 4]| {
             let q = Quaternion::new(w, x, y, z);
             let norm = q.norm();

@@ -6,7 +6,7 @@ use prehend_render::depth_map;
 use crate::refine::hand_depth;
 use crate::{Object, Observation, Robot};
 
-/// Sizes between which an object's extent is believed to be in metres \[m\].
+/// Sizes between which an object's extent is believed to be in meters \[m\].
 const PLAUSIBLE_EXTENT: std::ops::Range<f64> = 5e-3..5.0;
 
 /// Warnings about an object's model, in plain sentences; empty if all looks well.
@@ -15,7 +15,7 @@ pub fn inspect_object(object: &Object) -> Vec<String> {
     let extent = 2.0 * object.radius;
     if !PLAUSIBLE_EXTENT.contains(&extent) {
         warnings.push(format!(
-            "the mesh is {extent:.4} m across: is it in metres, or in millimetres as BOP has it?"
+            "the mesh is {extent:.4} m across: is it in meters, or in millimeters as BOP has it?"
         ));
     }
     if object.inertial_assumed {
@@ -42,9 +42,9 @@ pub fn inspect_pose(
     t_cam_object: &Isometry3<f64>,
 ) -> Vec<String> {
     let mut warnings = Vec::new();
-    let centre = t_cam_object * object.centre;
-    if centre.z <= 0.0 {
-        warnings.push(format!("the object is behind the camera (z = {:.3} m)", centre.z));
+    let center = t_cam_object * object.center;
+    if center.z <= 0.0 {
+        warnings.push(format!("the object is behind the camera (z = {:.3} m)", center.z));
         return warnings;
     }
     if let (Some(robot), Some(hand)) = (robot, &observation.hand)

@@ -117,7 +117,7 @@ macro_rules! fixed {
 }
 
 static ABLATIONS: [Method; 23] = [
-    without!("colour", Evidence::Colour),
+    without!("color", Evidence::Color),
     without!("silhouette", Evidence::Silhouette),
     without!("depth", Evidence::Depth),
     without!("hand-depth", Evidence::HandDepth),
@@ -126,7 +126,7 @@ static ABLATIONS: [Method; 23] = [
     without!("quiet", Evidence::Quiet),
     without!("penetration", Evidence::Penetration),
     without!("support", Evidence::Support),
-    only!("colour", Evidence::Colour),
+    only!("color", Evidence::Color),
     only!("silhouette", Evidence::Silhouette),
     only!("depth", Evidence::Depth),
     only!("hand-depth", Evidence::HandDepth),
@@ -156,12 +156,12 @@ static METHODS: [Method; 17] = [
     },
     Method {
         name: "combined-free",
-        summary: "all four gradients, no regularisation, the last pose",
+        summary: "all four gradients, no regularization, the last pose",
         config: || free(Config::of(&TermKind::ALL)),
     },
     Method {
         name: "combined-free-best",
-        summary: "all four gradients, no regularisation, checkpointing",
+        summary: "all four gradients, no regularization, checkpointing",
         config: || free(Config::combined()),
     },
     alone!("depth", TermKind::Depth, false),
@@ -174,7 +174,7 @@ static METHODS: [Method; 17] = [
     alone!("physics-best", TermKind::Physics, true),
     Method {
         name: "physics-free",
-        summary: "this gradient alone, no regularisation, the last pose",
+        summary: "this gradient alone, no regularization, the last pose",
         config: || free(Config::of(&[TermKind::Physics])),
     },
     Method {

@@ -15,14 +15,14 @@ pub const DEFAULT_DENSITY: f64 = 500.0;
 /// Surface samples kept for contacts and for the mesh-to-cloud distance.
 const SURFACE_SAMPLES: usize = 1500;
 
-/// Mass, centre of mass and inertia of an object.
+/// Mass, center of mass and inertia of an object.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Inertial {
     /// Mass \[kg\].
     pub mass: f64,
-    /// Centre of mass in object coordinates \[m\].
+    /// Center of mass in object coordinates \[m\].
     pub center_of_mass: Point3<f64>,
-    /// Inertia about the centre of mass, in object axes \[kg m²\].
+    /// Inertia about the center of mass, in object axes \[kg m²\].
     pub inertia: Matrix3<f64>,
 }
 
@@ -30,7 +30,7 @@ pub struct Inertial {
 pub struct Object {
     /// Name for messages.
     pub name: String,
-    /// The mesh in metres, as loaded.
+    /// The mesh in meters, as loaded.
     pub mesh: TriMesh,
     /// What cleaning found and did.
     pub report: MeshReport,
@@ -38,9 +38,9 @@ pub struct Object {
     pub inertial: Inertial,
     /// Whether `inertial` was assumed (uniform [`DEFAULT_DENSITY`]) rather than given.
     pub inertial_assumed: bool,
-    /// Centre of the bounding box, in object coordinates \[m\].
-    pub centre: Point3<f64>,
-    /// Half the diagonal of the bounding box \[m\]: turns radians into metres of surface motion.
+    /// Center of the bounding box, in object coordinates \[m\].
+    pub center: Point3<f64>,
+    /// Half the diagonal of the bounding box \[m\]: turns radians into meters of surface motion.
     pub radius: f64,
     /// Surface area \[m²\].
     pub area: f64,
@@ -52,7 +52,7 @@ pub struct Object {
 }
 
 impl Object {
-    /// Prepares `mesh` (metres); without `inertial`, a uniform density is assumed. `seed` decides where
+    /// Prepares `mesh` (meters); without `inertial`, a uniform density is assumed. `seed` decides where
     /// the surface is sampled.
     ///
     /// # Errors
@@ -70,7 +70,7 @@ impl Object {
         })
     }
 
-    /// Prepares `mesh` (metres) of uniform density and mass `mass` \[kg\], or of an assumed density.
+    /// Prepares `mesh` (meters) of uniform density and mass `mass` \[kg\], or of an assumed density.
     ///
     /// # Errors
     /// If a face names a vertex that is not there, the mesh is open or has no area, or the mass is not positive.
@@ -114,7 +114,7 @@ impl Object {
         }
         let (inertial, inertial_assumed) = weigh(&uniform).map_err(|e| match e {
             MassError::NotClosed { edges } => fail(format!(
-                "the mesh is not closed ({edges} edges do not join two faces), so its mass, centre of \
+                "the mesh is not closed ({edges} edges do not join two faces), so its mass, center of \
                  mass and inertia must all be given"
             )),
             other => fail(other.to_string()),
@@ -129,7 +129,7 @@ impl Object {
             surface: ClosestPoints::new(&solid).map_err(|e| fail(e.to_string()))?,
             samples: surface_samples(&solid, SURFACE_SAMPLES, seed),
             model: RenderModel::new(&mesh).map_err(|e| fail(e.to_string()))?,
-            centre: nalgebra::center(&low, &high),
+            center: nalgebra::center(&low, &high),
             radius: 0.5 * (high - low).norm(),
             area: solid.area(),
             mesh,

@@ -19,7 +19,7 @@ pub struct HandReading {
 pub struct Observation {
     /// Intrinsics.
     pub camera: Camera,
-    /// Colour image.
+    /// Color image.
     pub color: RgbImage,
     /// Depth image \[m\], 0 where missing.
     pub depth: DepthImage,
@@ -32,11 +32,11 @@ pub struct Observation {
 }
 
 impl Observation {
-    /// Refuses images that have not the camera's size: the first of colour, depth and mask, and what is wrong.
+    /// Refuses images that have not the camera's size: the first of color, depth and mask, and what is wrong.
     pub(crate) fn check_sizes(&self) -> Result<(), (&'static str, String)> {
         let expected = (self.camera.width, self.camera.height);
         let sizes = [
-            ("colour image", self.color.width(), self.color.height()),
+            ("color image", self.color.width(), self.color.height()),
             ("depth image", self.depth.width(), self.depth.height()),
             ("mask", self.mask.width(), self.mask.height()),
         ];
@@ -49,12 +49,12 @@ impl Observation {
         Ok(())
     }
 
-    /// Whether the picture shows anything under the mask: one colour everywhere is what a camera gives that failed.
-    pub(crate) fn has_colours(&self) -> bool {
+    /// Whether the picture shows anything under the mask: one color everywhere is what a camera gives that failed.
+    pub(crate) fn has_colors(&self) -> bool {
         let masked = self.color.pixels().iter().zip(self.mask.pixels()).filter(|(_, m)| **m);
-        let mut colours = masked.map(|(colour, _)| colour);
-        let first = colours.next();
-        colours.any(|colour| Some(colour) != first)
+        let mut colors = masked.map(|(color, _)| color);
+        let first = colors.next();
+        colors.any(|color| Some(color) != first)
     }
 }
 

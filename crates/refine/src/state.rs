@@ -9,11 +9,11 @@ use crate::{CameraCorrection, Object, Observation, RefineError, Term};
 /// A named block of a [`State`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Block {
-    /// The object's pose: a left twist about its centre, in the camera frame \[m; rad\].
+    /// The object's pose: a left twist about its center, in the camera frame \[m; rad\].
     ObjectPose,
-    /// The hand's base pose: a left twist about the object's centre, in the camera frame \[m; rad\].
+    /// The hand's base pose: a left twist about the object's center, in the camera frame \[m; rad\].
     ///
-    /// About the object's centre because that is where an error of the camera–hand calibration acts.
+    /// About the object's center because that is where an error of the camera–hand calibration acts.
     HandPose,
     /// So many joint positions of the hand \[rad or m\].
     Joints(usize),
@@ -41,8 +41,8 @@ impl Block {
 pub struct State {
     /// Object coordinates → camera coordinates \[m\].
     pub t_cam_object: Isometry3<f64>,
-    /// Centre of the object's bounding box, in object coordinates \[m\].
-    pub object_centre: Point3<f64>,
+    /// Center of the object's bounding box, in object coordinates \[m\].
+    pub object_center: Point3<f64>,
     /// Hand base coordinates → camera coordinates \[m\].
     pub t_cam_hand: Isometry3<f64>,
     /// Joint positions of the hand \[rad or m\]; none without a hand.
@@ -81,22 +81,22 @@ impl State {
                 initial.translation,
                 UnitQuaternion::new_normalize(*initial.rotation.quaternion()),
             ),
-            object_centre: object.centre,
+            object_center: object.center,
             t_cam_hand: hand.map_or_else(Isometry3::identity, |h| h.t_cam_hand),
             joints: hand.map_or_else(Vec::new, |h| h.joints.clone()),
             camera: CameraCorrection::default(),
             light: Light::ambient(1.0),
         };
-        let depth = state.centre().z;
+        let depth = state.center().z;
         if depth <= 0.0 {
             return Err(RefineError::BehindCamera { depth });
         }
         Ok(state)
     }
 
-    /// The object's centre in the camera frame \[m\]: the point that twists turn about.
-    pub fn centre(&self) -> Vector3<f64> {
-        (self.t_cam_object * self.object_centre).coords
+    /// The object's center in the camera frame \[m\]: the point that twists turn about.
+    pub fn center(&self) -> Vector3<f64> {
+        (self.t_cam_object * self.object_center).coords
     }
 
     /// Lights the object as `term` sees it, if it sees any light.
@@ -107,7 +107,7 @@ impl State {
     }
 
     /// The state with `block` moved by `delta`, which has the block's dimension; twists are about
-    /// [`centre`](Self::centre).
+    /// [`center`](Self::center).
     ///
     /// # Panics
     /// If `delta` is shorter than the block.
@@ -121,7 +121,7 @@ impl State {
     /// If `delta` is shorter than the blocks together.
     pub fn moved_all(&self, blocks: &[Block], delta: &[f64]) -> Self {
         let mut state = self.clone();
-        let centre = self.centre();
+        let center = self.center();
         let mut rest = delta;
         for &block in blocks {
             let (part, others) = rest.split_at(block.dimension());
@@ -139,7 +139,7 @@ impl State {
                 }
                 Block::Patches(_) => continue,
             };
-            *pose = perturb_about(pose, &centre, &Vector6::from_column_slice(part));
+            *pose = perturb_about(pose, &center, &Vector6::from_column_slice(part));
             // Thousands of small steps must not let the quaternion drift off the unit sphere.
             pose.rotation.renormalize();
         }
@@ -162,8 +162,8 @@ mod tests {
             change(&mut observation);
             State::new(&observation, &scene.object, &scene.initial).unwrap_err().to_string()
         };
-        let colour = refused(&|o| o.color = RgbImage::filled(640, 479, [0.0; 3]));
-        assert!(colour.contains("the colour image has 640x479 pixels, the camera has 640x480"));
+        let color = refused(&|o| o.color = RgbImage::filled(640, 479, [0.0; 3]));
+        assert!(color.contains("the color image has 640x479 pixels, the camera has 640x480"));
         let depth = refused(&|o| o.depth = DepthImage::filled(320, 480, 1.0));
         assert!(depth.contains("the depth image has 320x480 pixels"), "{depth}");
         let mask = refused(&|o| o.mask = Mask::filled(1, 1, true));

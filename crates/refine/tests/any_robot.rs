@@ -42,8 +42,8 @@ impl Setting {
         let tree = KinematicTree::from_urdf_str(urdf, None).unwrap();
         let mass = Some(object.mass());
         let object = Object::with_mass(object.name(), object.mesh(), mass, 0).unwrap();
-        // Nothing but the bounding box's centre is known to be at the place.
-        let t_robot_object = place * Translation3::from(-object.centre.coords);
+        // Nothing but the bounding box's center is known to be at the place.
+        let t_robot_object = place * Translation3::from(-object.center.coords);
         Self {
             object: Arc::new(object),
             robot: Arc::new(Robot::new(tree, Vec::new()).unwrap()),
@@ -95,7 +95,7 @@ impl Setting {
     /// robot's frame.
     fn refined(&self, error: &Vector6<f64>) -> (f64, f64, Isometry3<f64>) {
         let truth = self.truth();
-        let initial = perturb_about(&truth, &(truth * self.object.centre).coords, error);
+        let initial = perturb_about(&truth, &(truth * self.object.center).coords, error);
         let terms = vec![TermKind::Physics, TermKind::Rendering, TermKind::Depth];
         let config = Config { checkpoint: true, ..Config::of(&terms) };
         let found = refine(&self.observation(), &self.object, Some(&self.robot), &initial, &config)
@@ -123,7 +123,7 @@ fn an_object_in_a_gripper_is_refined() {
     let half = 0.5 * (high.z - low.z);
     let place =
         Isometry3::new(Vector3::new(0.0, 0.0, 0.06), Vector3::x() * std::f64::consts::FRAC_PI_2);
-    // The fingers press in by a fifth of a millimetre.
+    // The fingers press in by a fifth of a millimeter.
     let setting = Setting::new(YcbObject::GelatinBox, GRIPPER, vec![half - 2e-4; 2], place);
     let error = Vector6::new(0.006, -0.007, 0.008, 0.08, -0.1, 0.06);
     let (pe, oe, _) = setting.refined(&error);

@@ -107,7 +107,7 @@ impl Fixture {
 }
 
 #[test]
-fn reads_everything_in_metres_and_newtons() {
+fn reads_everything_in_meters_and_newtons() {
     let fixture = Fixture::new();
     let dataset = fixture.open();
     assert_eq!(dataset.scenes().map(|s| s.images().unwrap()).collect::<Vec<_>>(), [[0, 3]]);

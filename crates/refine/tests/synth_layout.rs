@@ -143,7 +143,7 @@ fn inspect(root: &Path, rgb: &str, exact: bool) {
             image::DynamicImage::ImageLuma16(image) => image,
             other => panic!("{:?}", other.color()),
         };
-        // On the object, depth lies within its radius of its centre.
+        // On the object, depth lies within its radius of its center.
         let seen: Vec<f64> = depth
             .pixels()
             .zip(&told)

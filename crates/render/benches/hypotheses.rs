@@ -41,7 +41,7 @@ fn main() -> anyhow::Result<()> {
                     continue;
                 }
                 let poses: Vec<Hypothesis> = (0..count).map(hypothesis).collect();
-                let time = median(|| Ok(session.linearise(&poses)?[0].gradient[0]))?;
+                let time = median(|| Ok(session.linearize(&poses)?[0].gradient[0]))?;
                 columns += &format!(" {time:.2} |");
             }
             let area = problem.target.area();

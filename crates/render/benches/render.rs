@@ -53,7 +53,7 @@ fn main() -> anyhow::Result<()> {
                     let light = Light::headlight(0.5, 0.4);
                     let start = [Hypothesis { t_cam_object: guess(), light }];
                     let value = median(|| Ok(session.evaluate(&start)?[0].total))?;
-                    let all = median(|| Ok(session.linearise(&start)?[0].gradient[0]))?;
+                    let all = median(|| Ok(session.linearize(&start)?[0].gradient[0]))?;
                     println!(
                         "| {} | {name} | {} x {} | {} | {:.0} | {value:.3} | {all:.3} |",
                         backend.name(),

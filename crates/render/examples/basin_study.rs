@@ -12,7 +12,7 @@ use std::f64::consts::TAU;
 use bottle::{bottle, camera, direction, truth, uniform};
 use nalgebra::{DMatrix, DVector, Isometry3, Vector6};
 use prehend_autodiff::lie::{perturb_about, se3_left_jacobian};
-use prehend_autodiff::optimise::{Criteria, LevenbergMarquardt, NormalEquations};
+use prehend_autodiff::optimize::{Criteria, LevenbergMarquardt, NormalEquations};
 use prehend_render::{
     ContourOptions, DepthImage, Light, LossOptions, Mode, PoseLoss, RenderModel, RgbImage,
     SceneObject, Target, render_scene,
@@ -31,7 +31,7 @@ fn main() -> anyhow::Result<()> {
     let picture = Picture::new(&model);
     println!("| turned, shifted by | solved | with half hidden | iterations (median) |");
     println!("|---|--:|--:|--:|");
-    for (degrees, millimetres) in OFFSETS {
+    for (degrees, millimeters) in OFFSETS {
         let mut solved = [0, 0];
         let mut iterations = Vec::new();
         for (hidden, solved) in [false, true].into_iter().zip(&mut solved) {
@@ -39,7 +39,7 @@ fn main() -> anyhow::Result<()> {
                 .into_par_iter()
                 .map(|seed| {
                     let target = picture.target(hidden.then_some(seed))?;
-                    let start = start(seed, degrees.to_radians(), millimetres * 1e-3);
+                    let start = start(seed, degrees.to_radians(), millimeters * 1e-3);
                     let (end, count) = find(&model, start, &target)?;
                     let shift = (end.translation.vector - truth().translation.vector).norm();
                     let turn = end.rotation.angle_to(&truth().rotation);
@@ -51,7 +51,7 @@ fn main() -> anyhow::Result<()> {
         }
         iterations.sort_unstable();
         println!(
-            "| {degrees}°, {millimetres} mm | {} of {STARTS} | {} of {STARTS} | {} |",
+            "| {degrees}°, {millimeters} mm | {} of {STARTS} | {} of {STARTS} | {} |",
             solved[0],
             solved[1],
             iterations[iterations.len() / 2]
@@ -117,8 +117,8 @@ fn find(
             |x: &[f64]| perturb_about(&base, &center.coords, &Vector6::from_column_slice(x));
         let criteria = Criteria { iterations: 40, gradient: 0.0, step: 1e-5, decrease: 1e-5 };
         let solver = LevenbergMarquardt { damping: 1e-2, criteria };
-        let outcome = solver.minimise(&[0.0; 6], |x| {
-            let at = loss.linearise(model, &moved(x), &center, &Light::ambient(1.0), &level);
+        let outcome = solver.minimize(&[0.0; 6], |x| {
+            let at = loss.linearize(model, &moved(x), &center, &Light::ambient(1.0), &level);
             // By the twist that `x` is, instead of one on top of it.
             let jacobian = se3_left_jacobian(&Vector6::from_column_slice(x));
             NormalEquations {

@@ -4,7 +4,7 @@ use nalgebra::{Point3, Vector2, Vector3};
 
 /// A pinhole camera without distortion, in the OpenCV frame (x right, y down, z forward).
 ///
-/// Pixel centres lie at integer coordinates: the centre of the top-left pixel is (0, 0), and a point
+/// Pixel centers lie at integer coordinates: the center of the top-left pixel is (0, 0), and a point
 /// (X, Y, Z) \[m\] projects to `u = fx X/Z + cx`, `v = fy Y/Z + cy` \[px\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
@@ -172,7 +172,7 @@ mod tests {
         // The outer corner of the bottom-right pixel stays the outer corner.
         let (fine, coarse) = (camera.ray(639.5, 479.5), half.ray(319.5, 239.5));
         assert!((fine - coarse).norm() < 1e-12);
-        // Pixel (u, v) tripled has its centre in the middle sample of three.
+        // Pixel (u, v) tripled has its center in the middle sample of three.
         assert!(
             (camera.scaled(3.0).ray(3.0 * 10.0 + 1.0, 1.0) - camera.ray(10.0, 0.0)).norm() < 1e-12
         );

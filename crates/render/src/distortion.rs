@@ -102,7 +102,7 @@ impl Distortion {
     pub fn undistort(&self, seen: Vector2<f64>) -> Option<Vector2<f64>> {
         let mut ideal = seen;
         for _ in 0..50 {
-            let (value, slope) = self.linearise(ideal);
+            let (value, slope) = self.linearize(ideal);
             let residual = value - seen;
             // Also false for a NaN.
             if residual.norm() <= 1e-14 * (1.0 + seen.norm()) {
@@ -142,7 +142,7 @@ impl Distortion {
         bottom > 0.0 && top * bottom + 2.0 * s * turn > 0.0
     }
 
-    fn linearise(&self, ideal: Vector2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
+    fn linearize(&self, ideal: Vector2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
         let [x, y] = Fwd::<2>::variables([ideal.x, ideal.y]);
         let seen = self.distort(Vector2::new(x, y));
         (seen.map(|v| v.value), Matrix2::from_fn(|i, j| seen[i].derivative[j]))
@@ -164,7 +164,7 @@ impl Undistortion {
     pub fn new(source: Camera, distortion: &Distortion, target: Camera) -> Self {
         let place = |at: usize| {
             let (u, v) = ((at % target.width) as f64, (at / target.width) as f64);
-            let (seen, slope) = distortion.linearise(target.ray(u, v).xy());
+            let (seen, slope) = distortion.linearize(target.ray(u, v).xy());
             match distortion.shows(target.ray(u, v).xy(), &slope) {
                 true => [source.fx * seen.x + source.cx, source.fy * seen.y + source.cy]
                     .map(|p| p as f32),
@@ -180,7 +180,7 @@ impl Undistortion {
         &self.target
     }
 
-    /// Colours, interpolated bilinearly; black beyond the source's image.
+    /// Colors, interpolated bilinearly; black beyond the source's image.
     ///
     /// # Errors
     /// When the image does not have the size of the source camera.
@@ -191,7 +191,7 @@ impl Undistortion {
             if !(inside(x, image.width()) && inside(y, image.height())) {
                 return [0.0; 3];
             }
-            // The outer half of a border pixel has the colour of its centre.
+            // The outer half of a border pixel has the color of its center.
             let cell = |p: f32, size: usize| {
                 let p = p.clamp(0.0, size as f32 - 1.0);
                 let low = p as usize;

@@ -1,4 +1,4 @@
-//! Colour, depth and mask images, and their files.
+//! Color, depth and mask images, and their files.
 
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
@@ -50,7 +50,7 @@ pub enum ImageError {
     Scale {
         /// The file.
         path: PathBuf,
-        /// Metres per unit.
+        /// Meters per unit.
         scale: f64,
     },
 }
@@ -129,7 +129,7 @@ macro_rules! image_type {
 }
 
 image_type! {
-    /// A colour image, row-major from the top-left; channels in 0..=1 as stored in files.
+    /// A color image, row-major from the top-left; channels in 0..=1 as stored in files.
     RgbImage, [f32; 3], [0.0; 3]
 }
 image_type! {
@@ -142,7 +142,7 @@ image_type! {
 }
 
 impl RgbImage {
-    /// Reads a PNG or JPEG file; grey becomes three equal channels and alpha is dropped.
+    /// Reads a PNG or JPEG file; gray becomes three equal channels and alpha is dropped.
     ///
     /// # Errors
     /// When the file cannot be read or decoded.
@@ -194,10 +194,10 @@ impl RgbImage {
 }
 
 impl DepthImage {
-    /// Reads a 16-bit grey PNG file whose unit is `scale` metres (BOP: `depth_scale * 0.001`).
+    /// Reads a 16-bit gray PNG file whose unit is `scale` meters (BOP: `depth_scale * 0.001`).
     ///
     /// # Errors
-    /// When the file cannot be read, is not 16-bit grey, or `scale` is not positive.
+    /// When the file cannot be read, is not 16-bit gray, or `scale` is not positive.
     pub fn load(path: &Path, scale: f64) -> Result<Self, ImageError> {
         check_scale(path, scale)?;
         let image = match decode(path)? {
@@ -205,7 +205,7 @@ impl DepthImage {
             other => {
                 return Err(ImageError::Kind {
                     path: path.into(),
-                    expected: "16-bit grey",
+                    expected: "16-bit gray",
                     found: format!("{:?}", other.color()),
                 });
             }
@@ -214,7 +214,7 @@ impl DepthImage {
         Self::new(width, height, image.pixels().map(|p| (p.0[0] as f64 * scale) as f32).collect())
     }
 
-    /// Writes a 16-bit grey PNG file whose unit is `scale` metres; depths beyond 65535 units saturate. The file
+    /// Writes a 16-bit gray PNG file whose unit is `scale` meters; depths beyond 65535 units saturate. The file
     /// appears whole or not at all.
     ///
     /// # Errors
@@ -244,7 +244,7 @@ impl DepthImage {
 }
 
 impl Mask {
-    /// Reads a mask: a pixel is set where its grey value is not zero, as BOP has it.
+    /// Reads a mask: a pixel is set where its gray value is not zero, as BOP has it.
     ///
     /// # Errors
     /// When the file cannot be read or decoded.
@@ -255,7 +255,7 @@ impl Mask {
         Self::new(width, height, image.pixels().map(|p| p.0[0] > 0).collect())
     }
 
-    /// Writes an 8-bit grey file, 255 where set. The file appears whole or not at all.
+    /// Writes an 8-bit gray file, 255 where set. The file appears whole or not at all.
     ///
     /// # Errors
     /// When the format is unknown or the file cannot be written.

@@ -3,11 +3,11 @@
 //! [`PoseLoss`] compares a posed [`RenderModel`] with a segmented image and returns the loss, its
 //! gradient and the Gauss–Newton matrix by the six degrees of freedom of the pose, in either [`Mode`]; a [`Backend`] does so for
 //! thousands of poses at once, on this processor or a graphics device ([`backend::auto`]). [`Renderer`] renders
-//! whole scenes under any [`Shader`] and carries the derivatives of any loss back to poses, vertices, colours, textures,
+//! whole scenes under any [`Shader`] and carries the derivatives of any loss back to poses, vertices, colors, textures,
 //! camera and light, on the tape too. [`render_scene`] makes antialiased pictures, [`depth_map`] the z-buffer of what hides
 //! the object, and [`Undistortion`] pinhole images of those through a lens.
 //!
-//! Cameras follow OpenCV (x right, y down, z forward; pixel centres at integers); lengths are in metres; colours
+//! Cameras follow OpenCV (x right, y down, z forward; pixel centers at integers); lengths are in meters; colors
 //! are in 0..=1 as stored in files.
 
 pub mod backend;
@@ -42,7 +42,7 @@ pub use mode::{ContourOptions, Mode, SoftRasOptions};
 pub use model::{ModelError, RenderModel};
 pub use overlay::draw_outline;
 pub use pose_loss::{
-    Affine, Counts, DepthOptions, Linearised, Loss, LossOptions, OptionError, PoseImage, PoseLoss,
+    Affine, Counts, DepthOptions, Linearized, Loss, LossOptions, OptionError, PoseImage, PoseLoss,
     Robust, Target, TargetError, Tile,
 };
 pub use raster::depth_map;

@@ -6,7 +6,7 @@ use crate::pose_loss::Affine;
 
 /// First-order lighting, fixed in the camera frame.
 ///
-/// A surface with unit normal `n` (camera frame) and albedo `a` shows colour
+/// A surface with unit normal `n` (camera frame) and albedo `a` shows color
 /// `a_c * max(0, ambient_c + directional_c · n) + offset_c` in channel c: the first two bands of a spherical-harmonic
 /// irradiance map (Ramamoorthi and Hanrahan, "An efficient representation for irradiance environment maps",
 /// 2001), which also absorbs exposure and white balance.
@@ -16,18 +16,18 @@ pub struct Light {
     pub ambient: [f64; 3],
     /// Direction and strength of the light, per channel, pointing towards the light (camera frame).
     pub directional: [Vector3<f64>; 3],
-    /// Added to the object's colour whatever its albedo, per channel: haze, or the camera's black level.
+    /// Added to the object's color whatever its albedo, per channel: haze, or the camera's black level.
     pub offset: [f64; 3],
 }
 
 /// One observation for [`Light::fit`]: a visible surface point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LightSample {
-    /// Unlit surface colour.
+    /// Unlit surface color.
     pub albedo: [f32; 3],
     /// Unit normal, camera frame.
     pub normal: Vector3<f32>,
-    /// Colour in the image.
+    /// Color in the image.
     pub observed: [f32; 3],
 }
 
@@ -51,7 +51,7 @@ pub enum LightError {
 }
 
 impl Light {
-    /// The same light from everywhere: colours are shown as stored times `strength`.
+    /// The same light from everywhere: colors are shown as stored times `strength`.
     pub fn ambient(strength: f64) -> Self {
         Self { ambient: [strength; 3], directional: [Vector3::zeros(); 3], offset: [0.0; 3] }
     }
@@ -67,7 +67,7 @@ impl Light {
         (self.ambient[channel] + self.directional[channel].dot(normal)).max(0.0)
     }
 
-    /// The light that best explains `samples`: linear least squares of the observed colour against
+    /// The light that best explains `samples`: linear least squares of the observed color against
     /// `albedo (1, n)`, each channel by itself, in closed form.
     ///
     /// Five rounds of iteratively reweighted least squares with Cauchy weights (scale 2.4 times the median
@@ -90,7 +90,7 @@ impl Light {
         Self::fit_to(samples, ridge, true)
     }
 
-    /// The light under which a surface shows the colours of this one with gain and offset of `affine`.
+    /// The light under which a surface shows the colors of this one with gain and offset of `affine`.
     pub fn corrected(&self, affine: &Affine) -> Self {
         let mut light = *self;
         for k in 0..3 {

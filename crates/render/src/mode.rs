@@ -25,8 +25,8 @@ pub struct ContourOptions {
     /// into what lies behind. 0.645 (the square root of 5/12) blurs as much as a pixel that averages over its square;
     /// one adds a camera's own blur; more widens the basin of attraction. From 0.05 to 64; others count as the nearest.
     pub half_width: f64,
-    /// Where the colour of the surface jumps — at edges with separate normals, and at seams of its texture or its vertex
-    /// colours — a pixel within the band shows some of both sides, so that the jump has a derivative.
+    /// Where the color of the surface jumps — at edges with separate normals, and at seams of its texture or its vertex
+    /// colors — a pixel within the band shows some of both sides, so that the jump has a derivative.
     /// For one sample a pixel only: with more, jumps count in any case. Graphics devices do not support it.
     pub creases: bool,
 }
@@ -49,7 +49,7 @@ impl Default for ContourOptions {
     }
 }
 
-/// Settings of the SoftRas mode, named as in PyTorch3D. Distances are squared, in normalised device coordinates: the
+/// Settings of the SoftRas mode, named as in PyTorch3D. Distances are squared, in normalized device coordinates: the
 /// shorter side of the image is 2 long.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SoftRasOptions {

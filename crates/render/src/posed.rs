@@ -18,12 +18,12 @@ pub(crate) struct Posed<'a> {
     pub(crate) principal: [f32; 2],
     /// Rotation from the mesh into the camera frame.
     pub(crate) rotation: Matrix3<f32>,
-    /// The model's centre in the camera frame \[m\].
+    /// The model's center in the camera frame \[m\].
     pub(crate) center: Vector3<f32>,
     /// Welded vertices in the camera frame \[m\].
     pub(crate) position: Vec<Vector3<f32>>,
     pub(crate) projected: Projected<'a>,
-    /// Pyramid level of the texture, and its derivative by the centre's Z \[1/m\].
+    /// Pyramid level of the texture, and its derivative by the center's Z \[1/m\].
     pub(crate) level: f32,
     pub(crate) level_dz: f32,
 }
@@ -77,7 +77,7 @@ fn project(focal: [f32; 2], principal: [f32; 2], p: [f32; 3]) -> [f32; 3] {
     [focal[0] * p[0] * w + principal[0], focal[1] * p[1] * w + principal[1], w]
 }
 
-/// Pyramid level of the texture and its derivative by the centre's depth `z`. One level for the whole object, from its
+/// Pyramid level of the texture and its derivative by the center's depth `z`. One level for the whole object, from its
 /// distance: smooth in the pose, so that the loss is too.
 pub(crate) fn level(model: &RenderModel, camera: &Camera, z: f64) -> (f64, f64) {
     let crate::model::Albedo::Texture(map, _) = &model.albedo else { return (0.0, 0.0) };

@@ -11,13 +11,13 @@ use crate::mode::ContourOptions;
 use crate::model::RenderModel;
 use crate::posed::Posed;
 use crate::projected::Region;
-use crate::raster::{MISS, rasterise};
+use crate::raster::{MISS, rasterize};
 use crate::shading::SurfacePoint;
 
 /// A body of a picture.
 #[derive(Clone, Copy, Debug)]
 pub struct SceneObject<'a> {
-    /// Shape and colours.
+    /// Shape and colors.
     pub model: &'a RenderModel,
     /// Its pose, mesh to camera frame \[m\].
     pub t_cam_model: Isometry3<f64>,
@@ -26,16 +26,16 @@ pub struct SceneObject<'a> {
 /// A picture with what is seen where.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SceneImage {
-    /// Colour, antialiased.
+    /// Color, antialiased.
     pub color: RgbImage,
-    /// Z at pixel centres \[m\], 0 where there is nothing.
+    /// Z at pixel centers \[m\], 0 where there is nothing.
     pub depth: DepthImage,
-    /// Index of the body seen at each pixel centre, row-major; `None` where there is nothing.
+    /// Index of the body seen at each pixel center, row-major; `None` where there is nothing.
     pub object: Vec<Option<u32>>,
 }
 
-/// Renders `objects` under `light` over a background colour, averaging `samples` by `samples` rays a pixel (made
-/// odd, so that one passes through the pixel's centre; 3 is good).
+/// Renders `objects` under `light` over a background color, averaging `samples` by `samples` rays a pixel (made
+/// odd, so that one passes through the pixel's center; 3 is good).
 ///
 /// Bodies behind the camera or with a pose that is not finite are not drawn.
 pub fn render_scene(
@@ -55,9 +55,9 @@ pub fn render_scene(
     )
 }
 
-/// Like [`render_scene`], with a colour of one's own for every visible point and every pixel behind.
+/// Like [`render_scene`], with a color of one's own for every visible point and every pixel behind.
 ///
-/// `shade` gets the index of the body and the point with its unlit colour; `background` the column and row of a pixel.
+/// `shade` gets the index of the body and the point with its unlit color; `background` the column and row of a pixel.
 ///
 /// ```
 /// use nalgebra::{Isometry3, Vector3};
@@ -67,7 +67,7 @@ pub fn render_scene(
 /// let model = RenderModel::new(&cube)?;
 /// let camera = Camera { fx: 60.0, fy: 60.0, cx: 15.5, cy: 15.5, width: 32, height: 32 };
 /// let body = SceneObject { model: &model, t_cam_model: Isometry3::translation(0.0, 0.0, 0.5) };
-/// // Normals as colours, over a picture that darkens downwards.
+/// // Normals as colors, over a picture that darkens downwards.
 /// let picture = render_shaded(
 ///     &camera,
 ///     &[body],
@@ -123,7 +123,7 @@ impl Nearest {
 
     fn draw(&mut self, index: u32, scene: &Scene) {
         let width = self.region.width();
-        for part in rasterise(&scene.posed.projected, &scene.posed.projected.region) {
+        for part in rasterize(&scene.posed.projected, &scene.posed.projected.region) {
             for (i, &face) in part.face.iter().enumerate().filter(|(_, face)| **face != MISS) {
                 let (x, y) = part.position(i);
                 let at = (y - self.region.y0) * width + x - self.region.x0;
@@ -249,7 +249,7 @@ mod tests {
             SceneObject { model: &model, t_cam_model: Isometry3::translation(0.0, 0.0, 0.6) };
         let light = Light::headlight(0.25, 0.5);
         let picture = render_scene(&camera, &[object], &light, [0.0; 3], 1);
-        // Mid-grey faces the camera: 0.5 (0.25 + 0.5).
+        // Mid-gray faces the camera: 0.5 (0.25 + 0.5).
         let color = picture.color.get(15, 15).unwrap();
         color.iter().for_each(|c| assert!((c - 0.375).abs() < 1e-6));
     }

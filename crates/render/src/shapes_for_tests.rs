@@ -26,7 +26,7 @@ pub(crate) fn lump(radius: f64, rings: usize) -> TriMesh {
     })
 }
 
-/// Paints vertex colours that vary smoothly over about `period` \[m\].
+/// Paints vertex colors that vary smoothly over about `period` \[m\].
 pub(crate) fn painted(mut mesh: TriMesh, period: f64) -> TriMesh {
     let k = TAU / period;
     let color = |p: &Point3<f64>| {

@@ -126,7 +126,7 @@ fn textures_of_scans_are_the_right_way_up() {
         let samples = light_samples(&view.model, &view.truth, &target, 1, usize::MAX);
         let light = Light::fit(&samples, 1e-3).unwrap();
         let loss = pose_loss.evaluate(&view.model, &view.truth, &light, &target);
-        // The error with a colour that is right only on average.
+        // The error with a color that is right only on average.
         let plain = view.model.clone().with_uniform_color([0.5; 3]);
         let samples = light_samples(&plain, &view.truth, &target, 1, usize::MAX);
         let plain_light = Light::fit(&samples, 1e-3).unwrap();
@@ -149,7 +149,7 @@ fn textures_of_scans_are_the_right_way_up() {
 
 #[test]
 #[ignore = "reads PREHEND_DATA"]
-fn colour_mask_and_depth_lead_back_to_the_true_pose() {
+fn color_mask_and_depth_lead_back_to_the_true_pose() {
     let view = view("000006", 0);
     let target = view.target();
     let pose_loss = PoseLoss::new(
@@ -169,7 +169,7 @@ fn colour_mask_and_depth_lead_back_to_the_true_pose() {
         let samples = light_samples(&view.model, &guess, &target, 1, usize::MAX);
         let light = Light::fit(&samples, 1e-3).unwrap();
         let center = guess * view.model.center();
-        let at = pose_loss.linearise(&view.model, &guess, &center, &light, &target);
+        let at = pose_loss.linearize(&view.model, &guess, &center, &light, &target);
         let mut matrix = at.jtj * 2.0;
         (0..6).for_each(|i| matrix[(i, i)] *= 1.01);
         let step = -matrix.cholesky().unwrap().solve(&at.gradient);

@@ -1,4 +1,4 @@
-//! A rigid body: mass, inertia, centre of mass.
+//! A rigid body: mass, inertia, center of mass.
 
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3, Vector6};
 use prehend_autodiff::Scalar;
@@ -15,8 +15,8 @@ pub enum BodyError {
     /// The inertia is not symmetric and positive definite.
     #[error("inertia must be symmetric and positive definite")]
     Inertia,
-    /// The centre of mass is not finite.
-    #[error("centre of mass must be finite")]
+    /// The center of mass is not finite.
+    #[error("center of mass must be finite")]
     CenterOfMass,
     /// Points and areas differ in number.
     #[error("{points} surface points but {areas} areas")]
@@ -37,7 +37,7 @@ pub enum BodyError {
     },
 }
 
-/// Mass, inertia and centre of mass of a rigid body.
+/// Mass, inertia and center of mass of a rigid body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RigidBody<S: Scalar = f64> {
     mass: S,
@@ -47,8 +47,8 @@ pub struct RigidBody<S: Scalar = f64> {
 }
 
 impl<S: Scalar> RigidBody<S> {
-    /// A body of `mass` \[kg\], `inertia` about its centre of mass along the model's axes \[kg m²\] and
-    /// centre of mass `com` in its model frame \[m\].
+    /// A body of `mass` \[kg\], `inertia` about its center of mass along the model's axes \[kg m²\] and
+    /// center of mass `com` in its model frame \[m\].
     ///
     /// # Errors
     /// Unless the mass is positive, the inertia symmetric positive definite and everything finite.
@@ -76,19 +76,19 @@ impl<S: Scalar> RigidBody<S> {
         self.mass
     }
 
-    /// Inertia about the centre of mass, along the model's axes \[kg m²\].
+    /// Inertia about the center of mass, along the model's axes \[kg m²\].
     #[inline]
     pub fn inertia(&self) -> &Matrix3<S> {
         &self.inertia
     }
 
-    /// Centre of mass in the model frame \[m\].
+    /// Center of mass in the model frame \[m\].
     #[inline]
     pub fn com(&self) -> &Point3<f64> {
         &self.com
     }
 
-    /// Inertia about the centre of mass, along the world's axes \[kg m²\].
+    /// Inertia about the center of mass, along the world's axes \[kg m²\].
     #[inline]
     pub fn world_inertia(&self, rotation: &UnitQuaternion<S>) -> Matrix3<S> {
         let r = rotation.to_rotation_matrix();
@@ -102,8 +102,8 @@ impl<S: Scalar> RigidBody<S> {
         r.matrix() * self.inverse_inertia * r.matrix().transpose()
     }
 
-    /// Velocity of the centre of mass \[m/s\] and angular momentum \[kg m²/s\] of the body at `state` after `wrench` (about the
-    /// centre of mass) and `gravity` \[m/s²\] have acted on it for `dt` \[s\], world frame.
+    /// Velocity of the center of mass \[m/s\] and angular momentum \[kg m²/s\] of the body at `state` after `wrench` (about the
+    /// center of mass) and `gravity` \[m/s²\] have acted on it for `dt` \[s\], world frame.
     #[inline]
     pub(crate) fn kicked(
         &self,
@@ -123,7 +123,7 @@ impl<S: Scalar> RigidBody<S> {
         t_world_model * Translation3::from(self.com.coords.map(S::constant))
     }
 
-    /// `t_world_model` of a body whose centre-of-mass frame is at `t_world_com`.
+    /// `t_world_model` of a body whose center-of-mass frame is at `t_world_com`.
     #[inline]
     pub fn model_pose(&self, t_world_com: &Isometry3<S>) -> Isometry3<S> {
         t_world_com * Translation3::from(self.com.coords.map(|x| S::constant(-x)))

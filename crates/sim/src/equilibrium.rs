@@ -15,7 +15,7 @@ use crate::world::{ContactPair, World};
 /// Whether a body could rest where it is.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Equilibrium {
-    /// What acts on it in the simulation, by its contact laws, loads and gravity: force \[N\], torque about the centre
+    /// What acts on it in the simulation, by its contact laws, loads and gravity: force \[N\], torque about the center
     /// of mass \[N m\], world frame. Zero at rest.
     pub net: Vector6<f64>,
     /// Its points of contact.
@@ -60,11 +60,11 @@ impl World {
         let weight = Vector6::new(weight.x, weight.y, weight.z, 0.0, 0.0, 0.0);
         let load = found.load + weight;
         let supports = self.supports(body, states, friction, reach);
-        let centre = Point3::from(states[body].pose.translation.vector);
+        let center = Point3::from(states[body].pose.translation.vector);
         Ok(Equilibrium {
             net: self.wrenches(states, 0)[body] + weight,
-            balance: Balance::find(&supports, &centre, &load),
-            friction_factor: friction_factor(&supports, &centre, &load),
+            balance: Balance::find(&supports, &center, &load),
+            friction_factor: friction_factor(&supports, &center, &load),
             supports,
         })
     }
@@ -119,7 +119,7 @@ mod tests {
     use crate::fields::HalfSpace;
     use crate::{Body, Onset, Penalty, RigidBody, Surface};
 
-    /// A box of 0.5 kg, 6 cm wide and 4 cm high, on an incline; the centre of mass is in its middle.
+    /// A box of 0.5 kg, 6 cm wide and 4 cm high, on an incline; the center of mass is in its middle.
     fn incline(angle: f64) -> (World, Vec<State>) {
         let corners: Vec<Point3<f64>> = (0..8)
             .map(|i| {

@@ -14,7 +14,7 @@ use crate::scenes::{bowl, egg_on, ellipsoid, floor};
 use crate::{
     Body, Compact, Contact, ContactLaw, ContactPair, Horizon, Integrator, LocalLaw, Motion, Onset,
     Penalty, Response, RigidBody, SemiImplicitEuler, SimulationError, State, Step, Surface, World,
-    regularised_coulomb,
+    regularized_coulomb,
 };
 
 /// Pressure grows with a power of the depth, friction with that of the slip: a user's law of four parameters.
@@ -31,7 +31,7 @@ impl ContactLaw for Powers {
             * (p[1] * depth.times(1e4)).exp()
             * depth.times(contact.area)
             * (S::one() - p[2] * contact.normal_speed);
-        let tangential = regularised_coulomb(p[3], normal, &contact.slip, 3e-2);
+        let tangential = regularized_coulomb(p[3], normal, &contact.slip, 3e-2);
         Response { normal, tangential }
     }
 
@@ -66,8 +66,8 @@ impl Dice<'_> {
     }
 }
 
-fn sphere(centre: Point3<f64>, radius: f64) -> Arc<dyn DistanceField> {
-    Arc::new(SphereCavity { center: centre, radius }.inside_out())
+fn sphere(center: Point3<f64>, radius: f64) -> Arc<dyn DistanceField> {
+    Arc::new(SphereCavity { center: center, radius }.inside_out())
 }
 
 /// Points on a box with half sides `half`.

@@ -49,7 +49,7 @@
 //! # }
 //! ```
 //!
-//! The pose in a state is that of the centre of mass: [`RigidBody::at_rest`] makes a state from the pose of the model, and
+//! The pose in a state is that of the center of mass: [`RigidBody::at_rest`] makes a state from the pose of the model, and
 //! [`RigidBody::model_pose`] goes back, which is what a renderer needs. For held and driven bodies the two are the same.
 //!
 //! [`World::check_time_step`] sees only contacts already made, none of an impact to come. Where there are such, use

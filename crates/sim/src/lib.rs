@@ -9,7 +9,7 @@
 //! The [`guide`] goes from a world in ten lines to gradients of long rollouts.
 //!
 //! World-frame conventions: a pose perturbation is the left twist (translation, rotation) about the
-//! centre of mass, velocities are those of the centre of mass, in the world frame.
+//! center of mass, velocities are those of the center of mass, in the world frame.
 
 mod adjoint;
 mod body;
@@ -39,7 +39,7 @@ pub use adjoint::Compact;
 pub use body::{BodyError, RigidBody};
 pub use contact::LawError;
 pub use contact::approach::{ApproachDamped, ApproachPenalty};
-pub use contact::friction::regularised_coulomb;
+pub use contact::friction::regularized_coulomb;
 pub use contact::grain::Grained;
 pub use contact::graspd::GraspD;
 pub use contact::hertz::{Hertz, HertzPenalty};

@@ -18,7 +18,7 @@ const STEPS: f64 = 2.0;
 /// A world that only knows the samples near to a field. The others exert no force, so results are the same to the last bit.
 pub(crate) struct Near<S: Scalar> {
     world: Option<World<S>>,
-    /// For each contact, how far the samples are from their body's centre of mass \[m\].
+    /// For each contact, how far the samples are from their body's center of mass \[m\].
     radii: Vec<f64>,
     /// For each contact, the body with the samples as the field saw it when near ones were looked for.
     made_at: Vec<State>,

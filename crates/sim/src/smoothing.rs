@@ -1,4 +1,4 @@
-//! Randomised smoothing: values and gradients of a function averaged over Gaussian perturbations.
+//! Randomized smoothing: values and gradients of a function averaged over Gaussian perturbations.
 
 use nalgebra::SVector;
 use prehend_geometry::SplitMix64;

@@ -15,7 +15,7 @@ use crate::world::World;
 /// An initial velocity that a stable object withstands.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Perturbation {
-    /// Velocity of the centre of mass, world frame \[m/s\].
+    /// Velocity of the center of mass, world frame \[m/s\].
     pub linear: Vector3<f64>,
     /// Angular velocity, world frame \[rad/s\].
     pub angular: Vector3<f64>,
@@ -46,7 +46,7 @@ pub struct StabilityWeights {
     pub linear: f64,
     /// Per angular velocity \[s/rad\].
     pub angular: f64,
-    /// Per displacement of the centre of mass \[1/m\].
+    /// Per displacement of the center of mass \[1/m\].
     pub displacement: f64,
     /// Per rotation \[1/rad\].
     pub rotation: f64,
@@ -56,7 +56,7 @@ pub struct StabilityWeights {
 
 impl StabilityWeights {
     /// Relative to free fall under `gravity` \[m/s²\] for `time` \[s\], which velocity and displacement
-    /// then score 1 each at its end; rotations count as motion at `radius` \[m\] of the centre of mass.
+    /// then score 1 each at its end; rotations count as motion at `radius` \[m\] of the center of mass.
     pub fn relative_to_fall(gravity: f64, time: f64, radius: f64) -> Self {
         let (linear, displacement) = (1.0 / (gravity * time), 2.0 / (gravity * time * time));
         Self {
@@ -129,7 +129,7 @@ impl StabilityLoss {
     ///
     /// # Errors
     /// See [`Self::value`].
-    pub fn linearise(
+    pub fn linearize(
         &self,
         pose: &Isometry3<f64>,
         center: &Point3<f64>,
@@ -161,7 +161,7 @@ impl StabilityLoss {
             gradient += rollout.gradient;
             normal += rollout.normal;
         }
-        // A left twist about the centre moves the centre of mass by δt + δθ × (com − center).
+        // A left twist about the center moves the center of mass by δt + δθ × (com − center).
         let com = pose * self.world.bodies[self.object].com();
         let mut chain = Matrix6::identity();
         chain.fixed_view_mut::<3, 3>(0, 3).copy_from(&-cross_matrix(&(com - center)));
@@ -309,7 +309,7 @@ mod tests {
             let loss = loss_on(Arc::clone(field), penalty(), onset, averaging);
             let (pose, center) = (pose(), Point3::new(0.02, -0.01, 0.05));
             let StabilityJacobian { value, gradient, normal } =
-                loss.linearise(&pose, &center).unwrap();
+                loss.linearize(&pose, &center).unwrap();
             assert!((value - loss.value(&pose).unwrap()).abs() <= 1e-9 * value && value > 0.0);
             let differences = finite_difference_gradient(
                 |x| {
@@ -335,7 +335,7 @@ mod tests {
         for _ in 0..30 {
             let center = pose * loss.world.bodies[1].com();
             let StabilityJacobian { gradient, normal, .. } =
-                loss.linearise(&pose, &center).unwrap();
+                loss.linearize(&pose, &center).unwrap();
             let damped = normal + Matrix6::identity() * damping * normal.norm();
             let step = damped.cholesky().unwrap().solve(&(gradient * -0.5));
             let candidate = perturb_about(&pose, &center.coords, &step);
@@ -367,8 +367,8 @@ mod tests {
         let law =
             LawRegistry::default().create("penalty", &[2e7, 5e4, 0.5, 1e-2]).unwrap().unwrap();
         let by_name = loss_on(floor(), law.into(), onset, averaging);
-        let expected = loss(onset, averaging).linearise(&pose(), &Point3::origin());
-        assert_eq!(by_name.linearise(&pose(), &Point3::origin()), expected);
+        let expected = loss(onset, averaging).linearize(&pose(), &Point3::origin());
+        assert_eq!(by_name.linearize(&pose(), &Point3::origin()), expected);
     }
 
     #[test]
@@ -376,7 +376,7 @@ mod tests {
         let loss = loss(Onset::Softplus { width: 3e-4 }, Averaging::Mean);
         let run = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| loss.linearise(&pose(), &Point3::origin()))
+            pool.install(|| loss.linearize(&pose(), &Point3::origin()))
         };
         assert_eq!(run(1), run(3));
     }
@@ -387,7 +387,7 @@ mod tests {
         loss.perturbations.truncate(1);
         let high = Isometry3::translation(0.0, 0.0, 1.0);
         let StabilityJacobian { value, gradient, .. } =
-            loss.linearise(&high, &Point3::origin()).unwrap();
+            loss.linearize(&high, &Point3::origin()).unwrap();
         // Semi-implicit Euler falls g dt² n(n+1)/2: by (n+1)/n further than ½gt².
         let displacement = 21.0 / 20.0;
         assert!((value - (1.0 + displacement * displacement)).abs() < 1e-12, "{value}");
@@ -402,7 +402,7 @@ mod tests {
         let leaky = loss(Onset::Leaky { alpha: 0.1, band: 1e-2, steps }, Averaging::Final);
         assert_eq!(hard.value(&high), leaky.value(&high));
         let center = Point3::origin();
-        let gradient = |loss: &StabilityLoss| loss.linearise(&high, &center).unwrap().gradient;
+        let gradient = |loss: &StabilityLoss| loss.linearize(&high, &center).unwrap().gradient;
         assert!(gradient(&hard).norm() < 1e-12);
         // Lower would be better.
         assert!(gradient(&leaky).z > 1e-3);

@@ -9,9 +9,9 @@ use prehend_autodiff::{Fwd, Scalar};
 /// Where a body is and how it moves; plain numbers, or numbers that carry derivatives.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct State<S: Scalar = f64> {
-    /// `t_world_com`: origin at the centre of mass \[m\], axes of the model.
+    /// `t_world_com`: origin at the center of mass \[m\], axes of the model.
     pub pose: Isometry3<S>,
-    /// Velocity of the centre of mass, world frame \[m/s\].
+    /// Velocity of the center of mass, world frame \[m/s\].
     pub linear: Vector3<S>,
     /// Angular velocity, world frame \[rad/s\].
     pub angular: Vector3<S>,
@@ -69,7 +69,7 @@ impl<S: Scalar> State<S> {
         }
     }
 
-    /// The state of a frame fixed to the body at `offset` from its centre of mass, in the model's axes \[m\].
+    /// The state of a frame fixed to the body at `offset` from its center of mass, in the model's axes \[m\].
     #[inline]
     pub fn shifted(&self, offset: &Vector3<f64>) -> Self {
         let arm = self.pose.rotation * offset.map(S::constant);
@@ -80,7 +80,7 @@ impl<S: Scalar> State<S> {
     }
 
     /// Numbers that are zero and carry this state's derivatives, as a tangent vector: pose twist about the
-    /// centre of mass (translation \[m\], rotation \[rad\]), then linear \[m/s\] and angular \[rad/s\]
+    /// center of mass (translation \[m\], rotation \[rad\]), then linear \[m/s\] and angular \[rad/s\]
     /// velocity, world frame. First derivatives only.
     #[inline]
     pub fn tangent(&self) -> [S; 12] {
@@ -107,9 +107,9 @@ impl State {
     pub fn moved<S: Scalar>(&self, tangent: &[S; 12]) -> State<S> {
         let [x, y, z, rx, ry, rz, vx, vy, vz, wx, wy, wz] = *tangent;
         let State { pose, linear, angular } = self.lift::<S>();
-        let centre = pose.translation.vector;
+        let center = pose.translation.vector;
         State {
-            pose: perturb_about(&pose, &centre, &Vector6::new(x, y, z, rx, ry, rz)),
+            pose: perturb_about(&pose, &center, &Vector6::new(x, y, z, rx, ry, rz)),
             linear: linear + Vector3::new(vx, vy, vz),
             angular: angular + Vector3::new(wx, wy, wz),
         }
@@ -127,7 +127,7 @@ impl State {
         }
     }
 
-    /// This state with the six directions of its pose as variables: a twist about the centre of mass.
+    /// This state with the six directions of its pose as variables: a twist about the center of mass.
     pub fn pose_variables(&self) -> State<Fwd<6>> {
         let mut tangent = [Fwd::constant(0.0); 12];
         tangent[..6].copy_from_slice(&Fwd::<6>::variables([0.0; 6]));

@@ -13,7 +13,7 @@ pub struct SurfacePoint {
     pub area: f64,
 }
 
-/// Samples of a surface, sorted into blocks of neighbours.
+/// Samples of a surface, sorted into blocks of neighbors.
 ///
 /// Blocks out of reach of a contact cost one query of the distance field. The order of samples is part of the
 /// result's rounding, so it depends on nothing but the samples themselves.
@@ -24,13 +24,13 @@ pub struct Surface {
     area: f64,
 }
 
-/// Neighbouring samples and the ball they lie in.
+/// Neighboring samples and the ball they lie in.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Block {
     start: usize,
     end: usize,
     /// Model frame \[m\].
-    pub(crate) centre: Point3<f64>,
+    pub(crate) center: Point3<f64>,
     /// Infinite where nothing is known but that asking does not pay \[m\].
     pub(crate) radius: f64,
 }
@@ -84,7 +84,7 @@ impl Surface {
 
     /// No sample is farther from `point` than this \[m\].
     pub(crate) fn radius_about(&self, point: &Point3<f64>) -> f64 {
-        self.blocks.iter().map(|b| (b.centre - point).norm() + b.radius).fold(0.0, f64::max)
+        self.blocks.iter().map(|b| (b.center - point).norm() + b.radius).fold(0.0, f64::max)
     }
 
     /// The samples that `keep` wants, as one block that is never left out. What is not kept stays part of the area.
@@ -97,7 +97,7 @@ impl Surface {
         let points: Vec<SurfacePoint> =
             blocks.flat_map(|(_, points)| points.iter().filter(|p| keep(p)).copied()).collect();
         let all =
-            Block { start: 0, end: points.len(), centre: Point3::origin(), radius: f64::INFINITY };
+            Block { start: 0, end: points.len(), center: Point3::origin(), radius: f64::INFINITY };
         Self { blocks: vec![all], points, area: self.area }
     }
 
@@ -123,9 +123,9 @@ fn sort_into_blocks(points: &mut [SurfacePoint], start: usize, blocks: &mut Vec<
         sort_into_blocks(right, start + half, blocks);
         return;
     }
-    let centre = nalgebra::center(&lo, &hi);
-    let radius = points.iter().map(|p| (p.position - centre).norm()).fold(0.0, f64::max);
-    blocks.push(Block { start, end: start + points.len(), centre, radius });
+    let center = nalgebra::center(&lo, &hi);
+    let radius = points.iter().map(|p| (p.position - center).norm()).fold(0.0, f64::max);
+    blocks.push(Block { start, end: start + points.len(), center, radius });
 }
 
 #[cfg(test)]
@@ -144,7 +144,7 @@ mod tests {
         let mut seen = 0;
         for (block, samples) in surface.blocks() {
             assert!(!samples.is_empty() && samples.len() <= BLOCK);
-            let inside = |p: &SurfacePoint| (p.position - block.centre).norm() <= block.radius;
+            let inside = |p: &SurfacePoint| (p.position - block.center).norm() <= block.radius;
             assert!(samples.iter().all(inside) && block.radius < 0.8);
             seen += samples.len();
         }

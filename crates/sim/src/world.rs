@@ -215,7 +215,7 @@ impl<S: Scalar> World<S> {
         plain
     }
 
-    /// External and contact wrenches on every body at `states` (force \[N\], torque about the centre of mass \[N m\],
+    /// External and contact wrenches on every body at `states` (force \[N\], torque about the center of mass \[N m\],
     /// world frame), without gravity. `step` matters to onsets that leak in the first step only.
     ///
     /// Derivatives through contacts are first derivatives.
@@ -232,7 +232,7 @@ impl<S: Scalar> World<S> {
         wrenches
     }
 
-    /// Wrenches of `pair` on the body with the samples and on that with the field, each about its own centre of mass.
+    /// Wrenches of `pair` on the body with the samples and on that with the field, each about its own center of mass.
     pub fn contact_wrenches(
         &self,
         pair: &ContactPair<S>,

@@ -105,7 +105,7 @@ fn reverse<const N: usize>(
     }
 }
 
-/// What two neighbours in the Rosenbrock chain add.
+/// What two neighbors in the Rosenbrock chain add.
 struct RosenbrockTerm;
 
 impl LocalFunction<2, 1> for RosenbrockTerm {

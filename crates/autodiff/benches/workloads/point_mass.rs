@@ -19,7 +19,7 @@ const CREEP: f64 = 1e-4;
 const TARGET: [f64; 3] = [0.5, 0.2, 0.1];
 
 /// Squared distance from the target after a second of semi-implicit Euler steps, with a Hunt–Crossley
-/// penalty for the floor and regularised Coulomb friction \[m²\].
+/// penalty for the floor and regularized Coulomb friction \[m²\].
 #[inline]
 pub(crate) fn miss<T: RealField + Copy>(inputs: &[T; 9]) -> T {
     let [mut x, mut y, mut z, mut vx, mut vy, mut vz, stiffness, damping, friction] = *inputs;

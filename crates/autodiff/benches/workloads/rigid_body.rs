@@ -67,7 +67,7 @@ pub(crate) struct State<T> {
     pub(crate) angular_velocity: Vector3<T>,
 }
 
-/// A force \[N\] and its torque about the centre of mass \[N·m\], in world coordinates.
+/// A force \[N\] and its torque about the center of mass \[N·m\], in world coordinates.
 pub(crate) struct Wrench<T> {
     pub(crate) force: Vector3<T>,
     pub(crate) torque: Vector3<T>,
@@ -134,7 +134,7 @@ pub(crate) fn wrench<T: RealField + Copy>(state: &State<T>, scene: &Scene) -> Wr
 }
 
 /// What the floor does to one point of the body, if that is below it: a Hunt–Crossley penalty with
-/// regularised Coulomb friction.
+/// regularized Coulomb friction.
 #[inline]
 pub(crate) fn contact<T: RealField + Copy>(
     state: &State<T>,

@@ -1,4 +1,4 @@
-//! The Rosenbrock chain: many inputs, and a sum of small terms that each join two neighbours.
+//! The Rosenbrock chain: many inputs, and a sum of small terms that each join two neighbors.
 
 use std::ops::AddAssign;
 

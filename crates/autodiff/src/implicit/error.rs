@@ -45,6 +45,6 @@ pub enum ImplicitError {
         step: f64,
     },
     /// The Jacobian by the unknowns is singular, or it or the residual is not finite.
-    #[error("the equation cannot be linearised: {0}")]
+    #[error("the equation cannot be linearized: {0}")]
     Solve(#[from] SolveError),
 }

@@ -38,7 +38,7 @@
 //! ```
 
 mod error;
-mod linearisation;
+mod linearization;
 mod newton;
 mod residual;
 mod solution;

@@ -1,6 +1,6 @@
 //! A solver to find solutions with.
 
-use super::linearisation::{Linearisation, newton_step};
+use super::linearization::{Linearization, newton_step};
 use super::{ImplicitError, Residual};
 
 const MOST_ITERATIONS: usize = 100;
@@ -19,7 +19,7 @@ const BEFORE_LAST: f64 = 1e-3;
 /// Euclidean, so unknowns of very different size are better scaled by the caller.
 ///
 /// # Errors
-/// If F does not have as many components as there are unknowns, cannot be linearised where the iteration
+/// If F does not have as many components as there are unknowns, cannot be linearized where the iteration
 /// takes it, or no solution was found to the tolerance of [`solution`](super::solution).
 ///
 /// # Examples
@@ -45,7 +45,7 @@ pub fn newton(
     let mut x = start.to_vec();
     let mut iterations = 0;
     loop {
-        let at = Linearisation::new(equation, &x, p)?;
+        let at = Linearization::new(equation, &x, p)?;
         let excess = at.worst(&x).map_or(0.0, |(_, excess)| excess);
         let moved = |fraction: f64| -> Vec<f64> {
             x.iter().zip(&at.step).map(|(x, step)| x + fraction * step).collect()

@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::linearisation::Linearisation;
+use super::linearization::Linearization;
 use super::{ImplicitError, Residual};
 use crate::solve::Factored;
 use crate::{CustomJvp, CustomVjp, Fwd, Operand, Recording, Scalar, Var};
@@ -29,7 +29,7 @@ pub fn solution<S: Operand>(
     x: &[f64],
     p: &[S],
 ) -> Result<Vec<S>, ImplicitError> {
-    let at = Linearisation::new(&equation, x, &values(p))?;
+    let at = Linearization::new(&equation, x, &values(p))?;
     match at.worst(x) {
         Some((unknown, excess)) if excess > 1.0 => {
             Err(ImplicitError::NotASolution { unknown, value: x[unknown], step: at.step[unknown] })
@@ -38,7 +38,7 @@ pub fn solution<S: Operand>(
     }
 }
 
-/// As [`solution`], with the Jacobian ∂F/∂x that a solver has already factorised, dense or sparse.
+/// As [`solution`], with the Jacobian ∂F/∂x that a solver has already factorized, dense or sparse.
 ///
 /// The caller answers for `x` being a solution and `jacobian` being F's there: F is not evaluated.
 ///

@@ -112,19 +112,19 @@ fn jacobian_blocks<S: Scalar>(twist: &Vector6<S>) -> (Matrix3<S>, Matrix3<S>) {
     )
 }
 
-/// Moves `pose` by the left twist `delta` about the point `centre`:
+/// Moves `pose` by the left twist `delta` about the point `center`:
 /// Trans(c) · exp(δ) · Trans(−c) · T.
 ///
-/// `centre` \[m\] is in the frame that `pose` maps into; ‖δ_translation‖ is to first order how far the
-/// centre moves.
+/// `center` \[m\] is in the frame that `pose` maps into; ‖δ_translation‖ is to first order how far the
+/// center moves.
 #[inline]
 pub fn perturb_about<S: Scalar>(
     pose: &Isometry3<S>,
-    centre: &Vector3<S>,
+    center: &Vector3<S>,
     delta: &Vector6<S>,
 ) -> Isometry3<S> {
     let motion = se3_exp(delta);
-    let offset = centre + motion.translation.vector - motion.rotation * centre;
+    let offset = center + motion.translation.vector - motion.rotation * center;
     Isometry3::from_parts(Translation3::from(offset), motion.rotation) * pose
 }
 
@@ -271,14 +271,14 @@ mod tests {
     }
 
     #[test]
-    fn perturbing_about_a_centre_moves_it_by_the_translation() {
+    fn perturbing_about_a_center_moves_it_by_the_translation() {
         let pose = se3_exp(&twist(&POINTS[3]));
-        let centre = Vector3::new(0.2, -0.1, 0.7);
+        let center = Vector3::new(0.2, -0.1, 0.7);
         let delta = Vector6::new(1e-3, -2e-3, 5e-4, 0.0, 0.0, 0.0);
-        let moved = perturb_about(&pose, &centre, &delta) * (pose.inverse() * Point3::from(centre));
-        assert!((moved.coords - centre - delta.fixed_rows::<3>(0)).norm() < 1e-15);
+        let moved = perturb_about(&pose, &center, &delta) * (pose.inverse() * Point3::from(center));
+        assert!((moved.coords - center - delta.fixed_rows::<3>(0)).norm() < 1e-15);
         let turn = Vector6::new(0.0, 0.0, 0.0, 0.3, -0.2, 0.1);
-        let still = perturb_about(&pose, &centre, &turn) * (pose.inverse() * Point3::from(centre));
-        assert!((still.coords - centre).norm() < 1e-15);
+        let still = perturb_about(&pose, &center, &turn) * (pose.inverse() * Point3::from(center));
+        assert!((still.coords - center).norm() < 1e-15);
     }
 }

@@ -9,7 +9,7 @@ use super::factored::{Factored, Factors};
 use super::pattern::Pattern;
 use crate::Operand;
 
-/// Factorises a dense square matrix by Gaussian elimination with partial pivoting.
+/// Factorizes a dense square matrix by Gaussian elimination with partial pivoting.
 ///
 /// # Errors
 /// If `a` is not square, holds a number that is not finite, or is singular to working precision.

@@ -41,13 +41,13 @@ pub enum SolveError {
         /// The estimate of [`Factored::condition`](super::Factored::condition); infinite when a pivot is zero.
         condition: f64,
     },
-    /// A Cholesky factorisation met a pivot that is not positive.
-    #[error("the matrix is not positive definite (step {step} of its Cholesky factorisation)")]
+    /// A Cholesky factorization met a pivot that is not positive.
+    #[error("the matrix is not positive definite (step {step} of its Cholesky factorization)")]
     NotPositiveDefinite {
         /// The step of the elimination, in the order that it chose.
         step: usize,
     },
-    /// The factorisation needs more memory than there is, or more entries than can be counted.
-    #[error("the matrix is too large to factorise")]
+    /// The factorization needs more memory than there is, or more entries than can be counted.
+    #[error("the matrix is too large to factorize")]
     TooLarge,
 }

@@ -1,4 +1,4 @@
-//! A factorised matrix, and the derivatives of solving with it.
+//! A factorized matrix, and the derivatives of solving with it.
 
 use std::fmt;
 use std::sync::Arc;
@@ -11,14 +11,14 @@ use super::condition;
 use super::pattern::Pattern;
 use crate::{CustomJvp, CustomVjp, Operand};
 
-/// What a factorisation is asked for: solves with the matrix and its transpose, in place, for any number
+/// What a factorization is asked for: solves with the matrix and its transpose, in place, for any number
 /// of right-hand sides.
 pub(super) trait Factors: Send + Sync + 'static {
     fn solve(&self, rhs: &mut DMatrix<f64>);
     fn solve_transpose(&self, rhs: &mut DMatrix<f64>);
 }
 
-/// A factorised square matrix, to be solved with as often as needed. Cheap to clone if it is constant.
+/// A factorized square matrix, to be solved with as often as needed. Cheap to clone if it is constant.
 ///
 /// Made by [`lu`](super::lu) and, with the cargo feature `faer`, `SparseSolver::factor`.
 #[derive(Clone)]
@@ -34,13 +34,13 @@ impl<S: Operand> Factored<S> {
     pub(super) fn new(
         pattern: Pattern,
         mut entries: Vec<S>,
-        factorise: impl FnOnce(&[f64]) -> Result<Arc<dyn Factors>, SolveError>,
+        factorize: impl FnOnce(&[f64]) -> Result<Arc<dyn Factors>, SolveError>,
     ) -> Result<Self, SolveError> {
         let values: Vec<f64> = entries.iter().map(|entry| entry.value()).collect();
         if !values.iter().all(|value| value.is_finite()) {
             return Err(SolveError::NotFinite("matrix"));
         }
-        let factors = factorise(&values)?;
+        let factors = factorize(&values)?;
         let condition = condition::estimate(&pattern, &values, factors.as_ref());
         if condition > condition::LARGEST {
             return Err(SolveError::Singular { condition });
@@ -246,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn one_factorisation_serves_many_solves() {
+    fn one_factorization_serves_many_solves() {
         let run = |p: &[Var]| {
             let (a, b) = system(p);
             let factored = lu(&a).unwrap();

@@ -1,6 +1,6 @@
 //! Linear solves with derivatives that do not go through the solver.
 //!
-//! A matrix is factorised once, in `f64`, and both derivatives of x = A⁻¹ b reuse its factors: tangents
+//! A matrix is factorized once, in `f64`, and both derivatives of x = A⁻¹ b reuse its factors: tangents
 //! are dx = A⁻¹ (db − dA x); adjoints are λ = A⁻ᵀ x̄, b̄ += λ, Ā −= λ xᵀ (M. B. Giles, "Collected matrix
 //! derivative results for forward and reverse mode algorithmic differentiation", 2008).
 //! A solve is one operation on the tape, whatever its size.
@@ -23,7 +23,7 @@
 //! # Ok::<(), SolveError>(())
 //! ```
 //!
-//! `SparseSolver` does the same for a sparse matrix, whose pattern is analysed once for all the matrices
+//! `SparseSolver` does the same for a sparse matrix, whose pattern is analyzed once for all the matrices
 //! that share it. It needs the cargo feature `faer`, which is off by default because faer takes long to
 //! compile.
 

@@ -1,4 +1,4 @@
-//! Bodies of the workloads: closed, facing outward, in metres.
+//! Bodies of the workloads: closed, facing outward, in meters.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 

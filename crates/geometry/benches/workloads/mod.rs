@@ -45,7 +45,7 @@ pub(crate) struct Scenes {
     pub(crate) posed: Vec<TriMesh>,
     pub(crate) cubes: Vec<overlap::Cubes>,
     pub(crate) registration: Registration,
-    pub(crate) neighbours: KdTree,
+    pub(crate) neighbors: KdTree,
     pub(crate) target: CloudTarget,
 }
 
@@ -56,7 +56,7 @@ impl Scenes {
         let body = bodies::body();
         let links = bodies::hand();
         let registration = Registration::new(&body);
-        let (neighbours, target) = registration.prepared();
+        let (neighbors, target) = registration.prepared();
         let mut hand = TriMesh::default();
         links.iter().for_each(|link| hand.append(link));
         Self {
@@ -69,7 +69,7 @@ impl Scenes {
             posed: overlap::poses().iter().map(|pose| body.transformed(pose)).collect(),
             cubes: overlap::cubes(),
             registration,
-            neighbours,
+            neighbors,
             target,
             body,
             links,
@@ -113,7 +113,7 @@ impl<'a> Comparisons<'a> {
             poses: overlap::in_poses(links, &scenes.posed),
             cubes: overlap::of_cubes(&scenes.cubes),
             cloud: cloud::build(&scenes.registration),
-            nearest: cloud::nearest(&scenes.registration, &scenes.neighbours),
+            nearest: cloud::nearest(&scenes.registration, &scenes.neighbors),
             registration: cloud::registration(&scenes.registration, &scenes.target),
         }
     }

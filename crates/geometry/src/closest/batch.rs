@@ -1,4 +1,4 @@
-//! Many queries at once: neighbours in space follow each other, so that each starts from the last one's answer.
+//! Many queries at once: neighbors in space follow each other, so that each starts from the last one's answer.
 
 use nalgebra::Point3;
 use rayon::prelude::*;

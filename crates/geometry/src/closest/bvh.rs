@@ -97,7 +97,7 @@ impl Node {
         x * x + y * y + z * z
     }
 
-    /// A ball around what lane `lane` holds: centre, from that of the mesh, and radius \[m\].
+    /// A ball around what lane `lane` holds: center, from that of the mesh, and radius \[m\].
     pub(super) fn ball(&self, lane: usize) -> (Vector3<f64>, f64) {
         let at =
             |v: &[f32x8; 3]| Vector3::from([0, 1, 2].map(|i| f64::from(v[i].to_array()[lane])));
@@ -174,7 +174,7 @@ fn principal_axes(triangles: &[[Vector3<f64>; 3]]) -> Matrix3<f64> {
 
 /// Up to a hundredth along each axis, by the number of a face.
 ///
-/// The builder merges nearest neighbours; among equal boxes (a strip of equal triangles, faces on top of each other) it
+/// The builder merges nearest neighbors; among equal boxes (a strip of equal triangles, faces on top of each other) it
 /// takes quadratic time and may build a chain. What it gets has no equals. Only the tree's shape depends on it: the
 /// boxes that queries look at are made from the triangles.
 fn jitter(face: usize) -> Vector3<f64> {

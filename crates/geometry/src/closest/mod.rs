@@ -98,7 +98,7 @@ impl Closest {
 pub enum SignMethod {
     /// Angle-weighted pseudo-normals: exact on a closed two-manifold that does not cross itself.
     PseudoNormal,
-    /// Generalised winding number above one half: for open, non-manifold or self-overlapping meshes.
+    /// Generalized winding number above one half: for open, non-manifold or self-overlapping meshes.
     WindingNumber,
 }
 

@@ -6,7 +6,7 @@ use wide::f32x8;
 /// Triangles measured together.
 pub(super) const LANES: usize = 8;
 
-/// A query point in every lane, from the centre of the mesh \[m\].
+/// A query point in every lane, from the center of the mesh \[m\].
 pub(super) type Point8 = [f32x8; 3];
 
 /// Up to eight triangles, each in a frame of its own: from corner `a`, x runs along the longest side, y in the plane
@@ -28,7 +28,7 @@ pub(super) struct Pack {
 }
 
 impl Pack {
-    /// Packs at most [`LANES`] triangles by their corners \[m\] from the centre of the mesh; the first of them is
+    /// Packs at most [`LANES`] triangles by their corners \[m\] from the center of the mesh; the first of them is
     /// number `first` in the tree.
     pub(super) fn new(triangles: &[[Vector3<f64>; 3]], first: u32) -> Self {
         let mut columns = [[0.0f32; LANES]; 19];

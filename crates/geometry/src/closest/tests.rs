@@ -1,7 +1,7 @@
 use super::*;
 use crate::SplitMix64;
 
-/// Within half a metre of the origin along each axis.
+/// Within half a meter of the origin along each axis.
 fn point(random: &mut SplitMix64) -> Point3<f64> {
     Point3::from([(); 3].map(|()| random.unit() - 0.5))
 }

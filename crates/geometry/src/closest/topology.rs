@@ -119,7 +119,7 @@ fn fans_are_single(corners: &[[u32; 3]], partners: &[Option<usize>], vertex_coun
         let Some(first) = start[v] else { return true };
         let mut half_edge = first;
         for turned in 1..=degree[v] {
-            // The half-edge that enters the vertex, seen from the neighbouring face, leaves it.
+            // The half-edge that enters the vertex, seen from the neighboring face, leaves it.
             let entering = half_edge - half_edge % 3 + (half_edge % 3 + 2) % 3;
             match partners[entering] {
                 Some(next) => half_edge = next,

@@ -1,4 +1,4 @@
-//! The generalised winding number: inside or outside of a mesh that need not be closed.
+//! The generalized winding number: inside or outside of a mesh that need not be closed.
 
 use std::f64::consts::PI;
 
@@ -8,7 +8,7 @@ use super::bvh::{Bvh, Child, child};
 use super::pack::LANES;
 use super::triangle::Triangle;
 
-/// A group of triangles seen from afar: its area vector at its centre of area.
+/// A group of triangles seen from afar: its area vector at its center of area.
 #[derive(Clone, Copy, Debug)]
 struct Dipole {
     center: Vector3<f64>,
@@ -32,7 +32,7 @@ impl Winding {
     pub(super) fn new(bvh: &Bvh) -> Self {
         let none = Dipole { center: Vector3::zeros(), area_vector: Vector3::zeros(), radius: 0.0 };
         let mut dipoles = vec![[none; LANES]; bvh.nodes.len()];
-        // (area, area-weighted centre, area vector) of each node; children come after their parents.
+        // (area, area-weighted center, area vector) of each node; children come after their parents.
         let mut sums = vec![(0.0, Vector3::zeros(), Vector3::zeros()); bvh.nodes.len()];
         for n in (0..bvh.nodes.len()).rev() {
             let node = &bvh.nodes[n];

@@ -9,14 +9,14 @@ use super::{CloudError, PointCloud};
 pub struct DepthPoints {
     /// The points \[m\] in the camera frame, row by row from the top.
     pub cloud: PointCloud,
-    /// The pixel each comes from, row-major: to look up its colour or mask.
+    /// The pixel each comes from, row-major: to look up its color or mask.
     pub pixels: Vec<u32>,
 }
 
 /// Back-projects a row-major `depth` image, z in the camera frame \[m\], of `width` columns.
 ///
 /// `ray` is the camera: the direction X/Z (third component one) through a column and a row of the image, where
-/// pixel centres are at integers; for a pinhole ((u − cx)/fx, (v − cy)/fy, 1). Pixels that measured nothing,
+/// pixel centers are at integers; for a pinhole ((u − cx)/fx, (v − cy)/fy, 1). Pixels that measured nothing,
 /// being zero, negative or not finite, give no point; set those outside a mask to zero.
 ///
 /// ```

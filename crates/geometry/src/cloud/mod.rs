@@ -1,4 +1,4 @@
-//! Point clouds: back-projected depth, neighbours, normals and downsampling.
+//! Point clouds: back-projected depth, neighbors, normals and downsampling.
 
 mod back_projection;
 mod kd_tree;
@@ -8,7 +8,7 @@ mod voxels;
 use nalgebra::{Isometry3, Point3, Vector3};
 
 pub use back_projection::{DepthPoints, back_project};
-pub use kd_tree::{KdTree, Neighbour};
+pub use kd_tree::{KdTree, Neighbor};
 pub use normals::estimate_normals;
 
 /// Points, and the unit normals of the surface they lie on where those are known.
@@ -75,10 +75,10 @@ impl PointCloud {
     /// As [`KdTree::new`].
     pub fn with_estimated_normals(
         mut self,
-        neighbours: usize,
+        neighbors: usize,
         sensor: &Point3<f64>,
     ) -> Result<Self, CloudError> {
-        self.normals = Some(estimate_normals(&KdTree::new(&self.points)?, neighbours, sensor));
+        self.normals = Some(estimate_normals(&KdTree::new(&self.points)?, neighbors, sensor));
         Ok(self)
     }
 

@@ -5,18 +5,18 @@ use rayon::prelude::*;
 
 use super::KdTree;
 
-/// How much narrower than long a neighbourhood may be before it counts as a line (ratio of variances).
+/// How much narrower than long a neighborhood may be before it counts as a line (ratio of variances).
 const LINE: f64 = 1e-10;
 
 /// The unit normal at every point of `tree`, towards `sensor` \[m\] (the origin for a cloud in its camera's frame).
 ///
-/// The direction of least variance of the `neighbours` points nearest to each, itself among them (Hoppe et al.,
+/// The direction of least variance of the `neighbors` points nearest to each, itself among them (Hoppe et al.,
 /// "Surface reconstruction from unorganized points", 1992); 10 to 30 are usual, more for noisier clouds. Zero
 /// where they lie on a line or a point, which have no normal. The sign is towards the sensor, which sees the
 /// surface from outside.
 pub fn estimate_normals(
     tree: &KdTree,
-    neighbours: usize,
+    neighbors: usize,
     sensor: &Point3<f64>,
 ) -> Vec<Vector3<f64>> {
     let points = tree.points();
@@ -24,7 +24,7 @@ pub fn estimate_normals(
         .par_iter()
         .with_min_len(256)
         .map(|p| {
-            let near = tree.k_nearest(p, neighbours);
+            let near = tree.k_nearest(p, neighbors);
             let normal = least_variance(near.iter().map(|n| points[n.index] - p));
             if normal.dot(&(sensor - p)) < 0.0 { -normal } else { normal }
         })

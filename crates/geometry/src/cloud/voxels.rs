@@ -5,7 +5,7 @@ use nalgebra::{Point3, Vector3};
 use super::{CloudError, PointCloud};
 
 impl PointCloud {
-    /// The mean of the points in each cube of edge `size` \[m\], with the normalised mean of their normals.
+    /// The mean of the points in each cube of edge `size` \[m\], with the normalized mean of their normals.
     ///
     /// The cubes are those of a grid through the origin, so a cube's mean does not depend on what else is in the
     /// cloud; they come in the order of their z, y and x. A mean normal is zero where normals cancel.

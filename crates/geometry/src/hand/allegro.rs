@@ -88,7 +88,7 @@ pub(super) fn link(i: Option<usize>) -> (f64, Vec<Part>) {
     fn phalanx(length: f64) -> Part {
         cuboid([0.0196, 0.0275, length], [0.0, 0.0, 0.5 * length])
     }
-    /// A 4×4 module whose centre stands at `x` and `z` of the link and `y` beside its middle.
+    /// A 4×4 module whose center stands at `x` and `z` of the link and `y` beside its middle.
     fn pad(x: f64, y: f64, z: f64) -> Part {
         cuboid(PAD_44, [x, y, z])
     }
@@ -121,7 +121,7 @@ pub(super) fn link(i: Option<usize>) -> (f64, Vec<Part>) {
             (0.0731, vec![body, tip(0.0315), pad(0.0132, -0.0002, 0.008)])
         }
         i => match i % 4 {
-            // Centred in the 20.4 mm up to the next joint, to which the lengthening adds 4 mm below it.
+            // Centered in the 20.4 mm up to the next joint, to which the lengthening adds 4 mm below it.
             0 => (0.0127, vec![cuboid([0.0196, 0.0275, 0.0164], [0.0, 0.0, 0.0112])]),
             1 => (
                 0.0719,
@@ -198,7 +198,7 @@ fn triple([x, y, z]: [f64; 3]) -> String {
     format!("{x} {y} {z}")
 }
 
-/// Centres and URDF geometry elements of a part; capsules stand along z.
+/// Centers and URDF geometry elements of a part; capsules stand along z.
 fn primitives(part: &Part) -> Vec<([f64; 3], String)> {
     match *part {
         Part::Box { size, center } => vec![(center, format!("<box size=\"{}\"/>", triple(size)))],
@@ -217,9 +217,9 @@ fn rounded(x: f64) -> f64 {
     (x * 1e9).round() / 1e9
 }
 
-/// Centre of mass \[m\] and inertia about it \[kg m²\] of parts of one density; their overlaps count twice.
+/// Center of mass \[m\] and inertia about it \[kg m²\] of parts of one density; their overlaps count twice.
 fn inertia(mass: f64, parts: &[Part]) -> (Vector3<f64>, Matrix3<f64>) {
-    // Volume, centre and second moments ∫ x² over each part's own centre.
+    // Volume, center and second moments ∫ x² over each part's own center.
     let moments: Vec<(f64, Vector3<f64>, Vector3<f64>)> = parts
         .iter()
         .map(|part| match *part {

@@ -34,7 +34,7 @@ pub(super) fn distance(part: &Part, p: &Vector3<f64>) -> f64 {
     }
 }
 
-/// Points of a surface, neighbours at most `step` \[m\] apart on each face.
+/// Points of a surface, neighbors at most `step` \[m\] apart on each face.
 pub(super) fn dense(mesh: &TriMesh, step: f64) -> Vec<Point3<f64>> {
     let mut points = Vec::new();
     for face in 0..mesh.faces.len() {

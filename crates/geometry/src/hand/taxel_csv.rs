@@ -44,7 +44,7 @@ pub enum TaxelError {
 const COLUMNS: [&str; 9] = ["idx", "patch", "link", "x_m", "y_m", "z_m", "nx", "ny", "nz"];
 
 /// Reads a taxel list with the columns `idx` (from 0, rising by one), `patch`, `link`, `x_m`, `y_m`, `z_m`
-/// (position in the link frame \[m\]), `nx`, `ny`, `nz` (outward normal, normalised here), in any order; other
+/// (position in the link frame \[m\]), `nx`, `ny`, `nz` (outward normal, normalized here), in any order; other
 /// columns are ignored.
 pub fn load_taxels(path: &Path) -> Result<Vec<Taxel>, TaxelError> {
     let wrap = |source| TaxelError::Csv { path: path.to_owned(), source };

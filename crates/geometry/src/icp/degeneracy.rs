@@ -6,15 +6,15 @@ use super::NormalEquations;
 
 /// The eigenvalues and eigenvectors of the 6×6 normal matrix: how firmly the matches hold each motion.
 ///
-/// Rotations count by the arc at `length` from the centre, and the matrix is divided by the sum of weights. So an
-/// eigenvalue is a number, about the mean squared change of the residuals \[m²\] for each squared metre of motion:
+/// Rotations count by the arc at `length` from the center, and the matrix is divided by the sum of weights. So an
+/// eigenvalue is a number, about the mean squared change of the residuals \[m²\] for each squared meter of motion:
 /// at most about two, ⅓ for a translation of a ball by point-to-plane, zero for a motion along which the surface
 /// slides on itself. (Gelfand et al., "Geometrically stable sampling for the ICP algorithm", 2003.)
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Degeneracy {
-    /// The centre that twists turn about \[m\], in the target's frame.
-    pub centre: Point3<f64>,
-    /// Root mean square distance of the source points from their centre \[m\].
+    /// The center that twists turn about \[m\], in the target's frame.
+    pub center: Point3<f64>,
+    /// Root mean square distance of the source points from their center \[m\].
     pub length: f64,
     /// Eigenvalues \[1\], ascending.
     pub eigenvalues: [f64; 6],
@@ -24,8 +24,8 @@ pub struct Degeneracy {
 }
 
 impl Degeneracy {
-    /// Of `equations` about `centre`, for a source of root mean square radius `length` \[m\].
-    pub fn new(equations: &NormalEquations, centre: Point3<f64>, length: f64) -> Self {
+    /// Of `equations` about `center`, for a source of root mean square radius `length` \[m\].
+    pub fn new(equations: &NormalEquations, center: Point3<f64>, length: f64) -> Self {
         let scale = scaling(length);
         let weight = if equations.weight > 0.0 { equations.weight } else { 1.0 };
         let scaled =
@@ -35,7 +35,7 @@ impl Degeneracy {
         let mut order = [0, 1, 2, 3, 4, 5];
         order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
         Self {
-            centre,
+            center,
             length,
             eigenvalues: order.map(|i| eigen.eigenvalues[i].max(0.0)),
             directions: order.map(|i| {
@@ -63,7 +63,7 @@ impl Degeneracy {
     }
 }
 
-/// What brings the columns of a twist to metres of motion.
+/// What brings the columns of a twist to meters of motion.
 fn scaling(length: f64) -> Vector6<f64> {
     let turn = if length > 0.0 { 1.0 / length } else { 1.0 };
     Vector6::new(1.0, 1.0, 1.0, turn, turn, turn)
@@ -81,8 +81,8 @@ mod tests {
         let mut sums = NormalEquations::new();
         for (p, normal) in points {
             let target = Match { point: Point3::from(p - shift), normal: *normal };
-            let (p, centre) = (Point3::from(*p), Point3::origin());
-            sums.add(Metric::PointToPlane, Kernel::Squared, &p, &target, &centre);
+            let (p, center) = (Point3::from(*p), Point3::origin());
+            sums.add(Metric::PointToPlane, Kernel::Squared, &p, &target, &center);
         }
         sums
     }
@@ -100,7 +100,7 @@ mod tests {
         let free = report.unconstrained(1e-6);
         assert_eq!(free.len(), 3);
         assert!(free.iter().all(|v| v.fixed_rows::<3>(0).norm() < 1e-9));
-        // Unit size: one radian at 5 cm is 5 cm, so a metre is 20 radians.
+        // Unit size: one radian at 5 cm is 5 cm, so a meter is 20 radians.
         assert!(free.iter().all(|v| (v.fixed_rows::<3>(3).norm() - 20.0).abs() < 1e-9));
         for e in &report.eigenvalues[3..] {
             assert!((e - 1.0 / 3.0).abs() < 0.02, "{e}");

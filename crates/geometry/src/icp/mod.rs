@@ -42,7 +42,7 @@ pub struct IcpSettings {
     pub max_distance: f64,
     /// Steps taken at most; none evaluates the initial pose.
     pub max_iterations: usize,
-    /// Converged once a step moves the source's centre by no more than this \[m\] …
+    /// Converged once a step moves the source's center by no more than this \[m\] …
     pub translation_tolerance: f64,
     /// … and turns it by no more than this \[rad\].
     pub rotation_tolerance: f64,
@@ -120,7 +120,7 @@ pub enum IcpError {
 /// Aligns the points `source` \[m\] to `target`, from `t_target_source`.
 ///
 /// Each step matches every point with the closest of the target and makes one Gauss–Newton step of the robust
-/// least-squares problem, by a left twist about the centre of the source. The result is the same to the last bit
+/// least-squares problem, by a left twist about the center of the source. The result is the same to the last bit
 /// for any number of threads.
 ///
 /// # Errors
@@ -139,7 +139,7 @@ pub fn align(
     let mut pose = *t_target_source;
     let (mut iterations, mut converged) = (0, false);
     loop {
-        let (equations, degeneracy) = problem.linearise(&pose, iterations)?;
+        let (equations, degeneracy) = problem.linearize(&pose, iterations)?;
         if converged || iterations == settings.max_iterations {
             return Ok(Alignment {
                 t_target_source: pose,
@@ -152,7 +152,7 @@ pub fn align(
             });
         }
         let step = degeneracy.step(&equations, settings.least_eigenvalue);
-        pose = perturb_about(&pose, &degeneracy.centre.coords, &step);
+        pose = perturb_about(&pose, &degeneracy.center.coords, &step);
         pose.rotation.renormalize();
         iterations += 1;
         converged = is_small(&step, settings);
@@ -162,9 +162,9 @@ pub fn align(
 struct Problem<'a, T: Target> {
     target: &'a T,
     settings: &'a IcpSettings,
-    /// Source points with what the target remembers of them, in an order in which neighbours follow each other.
+    /// Source points with what the target remembers of them, in an order in which neighbors follow each other.
     points: Vec<(Point3<f64>, T::Memory)>,
-    centre: Point3<f64>,
+    center: Point3<f64>,
     length: f64,
 }
 
@@ -176,27 +176,27 @@ impl<'a, T: Target> Problem<'a, T> {
     ) -> Result<Self, IcpError> {
         let order = KdTree::new(source)?;
         let count = source.len().max(1) as f64;
-        let centre = Point3::from(source.iter().map(|p| p.coords).sum::<Vector3<f64>>() / count);
-        let square: f64 = source.iter().map(|p| (p - centre).norm_squared()).sum();
+        let center = Point3::from(source.iter().map(|p| p.coords).sum::<Vector3<f64>>() / count);
+        let square: f64 = source.iter().map(|p| (p - center).norm_squared()).sum();
         let points = order.order().map(|i| (source[i], T::Memory::default())).collect();
-        Ok(Self { target, settings, points, centre, length: (square / count).sqrt() })
+        Ok(Self { target, settings, points, center, length: (square / count).sqrt() })
     }
 
     /// Matches the points at `pose` and sums their equations.
-    fn linearise(
+    fn linearize(
         &mut self,
         pose: &Isometry3<f64>,
         iteration: usize,
     ) -> Result<(NormalEquations, Degeneracy), IcpError> {
         let IcpSettings { metric, kernel, max_distance, .. } = *self.settings;
-        let (target, centre) = (self.target, pose * self.centre);
+        let (target, center) = (self.target, pose * self.center);
         let rotation = pose.rotation.to_rotation_matrix();
         let of_chunk = |chunk: &mut [(Point3<f64>, T::Memory)]| {
             let mut sums = NormalEquations::new();
             for (point, memory) in chunk {
                 let moved = rotation * *point + pose.translation.vector;
                 let Some(found) = target.closest(&moved, max_distance, memory) else { continue };
-                sums.add(metric, kernel, &moved, &found, &centre);
+                sums.add(metric, kernel, &moved, &found, &center);
             }
             sums
         };
@@ -206,7 +206,7 @@ impl<'a, T: Target> Problem<'a, T> {
         if equations.inliers == 0 {
             return Err(IcpError::NoMatches { points: self.points.len(), max_distance, iteration });
         }
-        let degeneracy = Degeneracy::new(&equations, centre, self.length);
+        let degeneracy = Degeneracy::new(&equations, center, self.length);
         Ok((equations, degeneracy))
     }
 }

@@ -10,13 +10,13 @@ use crate::Kernel;
 pub enum Metric {
     /// Between the two points (Besl and McKay, "A method for registration of 3-D shapes", 1992).
     PointToPoint,
-    /// From the source point to the plane through the target point (Chen and Medioni, "Object modelling by
+    /// From the source point to the plane through the target point (Chen and Medioni, "Object modeling by
     /// registration of multiple range images", 1992): surfaces may slide, which converges far faster.
     #[default]
     PointToPlane,
 }
 
-/// A sum of robust losses of matches, with its derivatives by a left twist about a centre, translation first.
+/// A sum of robust losses of matches, with its derivatives by a left twist about a center, translation first.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NormalEquations {
     /// Σ ρ(r²) \[m²\].
@@ -46,7 +46,7 @@ impl NormalEquations {
         }
     }
 
-    /// Adds the match `target` of the source point `point` \[m\], the source being turned about `centre` \[m\], all
+    /// Adds the match `target` of the source point `point` \[m\], the source being turned about `center` \[m\], all
     /// three in the target's frame. A match without normal has no plane and adds nothing to that metric.
     #[inline]
     pub fn add(
@@ -55,9 +55,9 @@ impl NormalEquations {
         kernel: Kernel,
         point: &Point3<f64>,
         target: &Match,
-        centre: &Point3<f64>,
+        center: &Point3<f64>,
     ) {
-        let (residual, arm) = (point - target.point, point - centre);
+        let (residual, arm) = (point - target.point, point - center);
         match metric {
             Metric::PointToPlane => {
                 let n = &target.normal;
@@ -111,7 +111,7 @@ impl NormalEquations {
         Some(weight)
     }
 
-    /// Adds the sums of other matches about the same centre.
+    /// Adds the sums of other matches about the same center.
     pub fn merge(&mut self, other: &Self) {
         self.cost += other.cost;
         self.gradient += other.gradient;
@@ -146,18 +146,18 @@ mod tests {
         [range.clone(), range.clone(), range].prop_map(Vector3::from)
     }
 
-    fn moved(point: &Point3<f64>, centre: &Point3<f64>, twist: &[f64]) -> Point3<f64> {
+    fn moved(point: &Point3<f64>, center: &Point3<f64>, twist: &[f64]) -> Point3<f64> {
         let delta = Vector6::from_column_slice(twist);
-        perturb_about(&Isometry3::identity(), &centre.coords, &delta) * point
+        perturb_about(&Isometry3::identity(), &center.coords, &delta) * point
     }
 
     proptest! {
         #[test]
         fn gradient_and_matrix_match_differences(
             pairs in prop::collection::vec((vector(-1.0..1.0), vector(-1.0..1.0), vector(-1.0..1.0)), 1..6),
-            centre in vector(-1.0..1.0),
+            center in vector(-1.0..1.0),
         ) {
-            let centre = Point3::from(centre);
+            let center = Point3::from(center);
             let matches: Vec<_> = pairs
                 .iter()
                 .filter(|(_, _, n)| n.norm() > 0.1)
@@ -166,7 +166,7 @@ mod tests {
             for metric in [Metric::PointToPoint, Metric::PointToPlane] {
                 let residuals = |twist: &[f64]| -> Vec<f64> {
                     matches.iter().flat_map(|(p, m)| {
-                        let r = moved(p, &centre, twist) - m.point;
+                        let r = moved(p, &center, twist) - m.point;
                         match metric {
                             Metric::PointToPoint => vec![r.x, r.y, r.z],
                             Metric::PointToPlane => vec![r.dot(&m.normal)],
@@ -177,7 +177,7 @@ mod tests {
                     let sums = |twist: &[f64]| {
                         let mut sums = NormalEquations::new();
                         for (p, m) in &matches {
-                            sums.add(metric, kernel, &moved(p, &centre, twist), m, &centre);
+                            sums.add(metric, kernel, &moved(p, &center, twist), m, &center);
                         }
                         sums
                     };

@@ -108,7 +108,7 @@ fn robust_kernels_forgive_clutter() {
 
 #[test]
 fn what_cannot_be_known_is_reported_and_left_alone() {
-    // Spin of a cylinder about its axis; every turn of a sphere; its bevelled ends hold the superellipsoid.
+    // Spin of a cylinder about its axis; every turn of a sphere; its beveled ends hold the superellipsoid.
     let shapes = [
         (cylinder(0.03, 0.08, 256), 1),
         (sphere(0.04, 256), 3),

@@ -1,8 +1,8 @@
 //! Mesh files: PLY, OBJ + MTL, STL, glTF in; PLY, OBJ + MTL and GLB out.
 //!
 //! Companion files (materials, textures, buffers) are read from the folder of the mesh only, see [`folder::inside`];
-//! [`limits`] bound what a file may ask for. Lengths stay in the unit of the file: scale the result where a file is not in metres
-//! (`mesh.scaled(1e-3)` for BOP models in millimetres).
+//! [`limits`] bound what a file may ask for. Lengths stay in the unit of the file: scale the result where a file is not in meters
+//! (`mesh.scaled(1e-3)` for BOP models in millimeters).
 
 mod base64;
 mod error;
@@ -69,7 +69,7 @@ fn read(path: &Path) -> Result<Vec<u8>, MeshError> {
         .map_err(|source| MeshError::Read { path: path.into(), source })
 }
 
-/// Rejects what no later stage can use and normalises stored normals.
+/// Rejects what no later stage can use and normalizes stored normals.
 fn checked(mut mesh: TriMesh, path: &Path) -> Result<TriMesh, MeshError> {
     let (vertices, faces) = (mesh.vertices.len(), mesh.faces.len());
     if vertices == 0 || faces == 0 {

@@ -1,4 +1,4 @@
-//! MTL: of each material its diffuse colour (`Kd`) and image (`map_Kd`); `tobj`'s own reader panics on short lines.
+//! MTL: of each material its diffuse color (`Kd`) and image (`map_Kd`); `tobj`'s own reader panics on short lines.
 
 use std::collections::HashMap;
 
@@ -28,14 +28,14 @@ pub(super) fn parse(bytes: &[u8]) -> Result<(Vec<Material>, HashMap<String, usiz
             material.diffuse_texture = Some(value.to_owned());
             continue;
         }
-        // Spectral and CIE XYZ colours are written by nobody.
+        // Spectral and CIE XYZ colors are written by nobody.
         let numbers: Option<Vec<f32>> = value
             .split_whitespace()
             .map(|v| v.parse().ok().filter(|c: &f32| c.is_finite()))
             .collect();
         match numbers.as_deref() {
             // A single number stands for all three.
-            Some(&[grey]) => material.diffuse = Some([grey; 3]),
+            Some(&[gray]) => material.diffuse = Some([gray; 3]),
             Some(&[r, g, b]) => material.diffuse = Some([r, g, b]),
             _ => return fault("Kd is not three numbers"),
         }
@@ -48,7 +48,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn colours_and_images_by_name() {
+    fn colors_and_images_by_name() {
         let text = "# two\r\nnewmtl a b\r\n Kd 0.5 1 0\r\nKa 1 1\r\nNs x\r\nnewmtl c\nKd 0.25\nmap_Kd  my tex.png \n";
         let (materials, places) = parse(text.as_bytes()).unwrap();
         assert_eq!((places["a b"], places["c"]), (0, 1));

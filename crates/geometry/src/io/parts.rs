@@ -1,4 +1,4 @@
-//! Joins the differently coloured parts of one file into a mesh with a single texture.
+//! Joins the differently colored parts of one file into a mesh with a single texture.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -9,16 +9,16 @@ use crate::{Texture, TriMesh};
 
 /// Geometry under one material.
 pub(super) struct Part {
-    /// Geometry and, where the file has them, UVs and vertex colours.
+    /// Geometry and, where the file has them, UVs and vertex colors.
     pub(super) mesh: TriMesh,
     /// The image that the UVs of `mesh` refer to.
     pub(super) texture: Option<Arc<Texture>>,
-    /// The colour of the material where it has no image, a factor on vertex colours.
+    /// The color of the material where it has no image, a factor on vertex colors.
     pub(super) color: [f32; 3],
 }
 
 /// One mesh of all `parts`. A texture that all share stays as it is; several become one image, in which a plain
-/// colour is a tile too; without any, plain colours become vertex colours.
+/// color is a tile too; without any, plain colors become vertex colors.
 pub(super) fn join(parts: Vec<Part>, path: &Path) -> Result<TriMesh, MeshError> {
     let first = parts.iter().find_map(|p| p.texture.clone());
     let Some(first) = first else { return Ok(join_plain(parts)) };
@@ -48,7 +48,7 @@ fn join_plain(mut parts: Vec<Part>) -> TriMesh {
 }
 
 /// Stacks the images of `parts` from the top down, each within a border of repeated pixels so that filtering does
-/// not mix neighbours, and moves the UVs along.
+/// not mix neighbors, and moves the UVs along.
 fn into_atlas(mut parts: Vec<Part>, path: &Path) -> Result<Vec<Part>, MeshError> {
     let mut tiles: Vec<Arc<Texture>> = Vec::new();
     let mut tile_of = Vec::new();
@@ -122,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn several_textures_become_one_image_with_the_same_colours() {
+    fn several_textures_become_one_image_with_the_same_colors() {
         let path = Path::new("m.glb");
         let image = |w: usize, h: usize, k: u8| {
             Arc::new(Texture {
@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn a_shared_texture_stays_and_plain_colours_reach_the_vertices() {
+    fn a_shared_texture_stays_and_plain_colors_reach_the_vertices() {
         let a = Arc::new(Texture { width: 1, height: 1, pixels: vec![[1, 2, 3]] });
         let repeated = [[0.0, 2.0]; 3];
         let mesh = join(

@@ -11,7 +11,7 @@ use super::{MeshError, companion};
 use crate::Texture;
 
 impl Texture {
-    /// Reads a PNG or JPEG image; grey images become RGB, alpha is dropped.
+    /// Reads a PNG or JPEG image; gray images become RGB, alpha is dropped.
     ///
     /// # Errors
     /// [`MeshError::Texture`] where the file is missing, not an image, or larger than [`limits`](crate::limits) allow.

@@ -20,7 +20,7 @@ fn lids(canvas: &mut Canvas, form: &Form, label: Area) {
             canvas.rectangle([0.0, y, width, y + 2.5], (shade << 16) | (shade << 8) | (shade + 8));
         }
     }
-    // A tab across one sector of the top, and a coloured dot on the bottom, break the symmetry of the lids.
+    // A tab across one sector of the top, and a colored dot on the bottom, break the symmetry of the lids.
     canvas.rectangle([0.12 * width, height - 24.0, 0.30 * width, height], 0x7d8288);
     canvas.rectangle([0.55 * width, 4.0, 0.72 * width, 18.0], 0x4a5058);
 }
@@ -79,7 +79,7 @@ pub(super) fn tuna(canvas: &mut Canvas, form: &Form) {
     facts(canvas, part(label, [0.60, 0.08, 0.72, 0.9]), BLUE, 24);
     canvas.small_print(part(label, [0.75, 0.2, 0.88, 0.86]), 6, 25, 0xffffff);
     canvas.bar_code(part(label, [0.91, 0.15, 0.99, 0.85]), 26);
-    // The lid carries the name's colours too: a blue ring and a yellow sector.
+    // The lid carries the name's colors too: a blue ring and a yellow sector.
     let top = form.sheet()[1];
     canvas.rectangle([0.0, top - 34.0, girth, top - 20.0], BLUE);
     canvas.rectangle([0.0, top - 34.0, 0.25 * girth, top - 20.0], 0xf6d34c);

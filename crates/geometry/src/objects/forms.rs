@@ -1,4 +1,4 @@
-//! The shapes of the built-in objects and how painted millimetres map onto them.
+//! The shapes of the built-in objects and how painted millimeters map onto them.
 
 use nalgebra::Vector3;
 
@@ -26,13 +26,13 @@ const CELL: f64 = 0.012;
 const COLUMNS: usize = 64;
 
 impl Form {
-    /// The mesh \[m\] with texture coordinates, its bounding box centred on the origin.
+    /// The mesh \[m\] with texture coordinates, its bounding box centered on the origin.
     pub(super) fn mesh(&self) -> TriMesh {
         let mut mesh = match self {
             Self::Carton { size, bulge, radius } => rounded_box(&RoundedBox {
-                size: metres(*size),
+                size: meters(*size),
                 radius: radius * 1e-3,
-                bulge: metres(*bulge),
+                bulge: meters(*bulge),
                 arc_steps: 2,
                 cell: CELL,
             }),
@@ -97,7 +97,7 @@ impl Form {
     }
 }
 
-fn metres(mm: [f64; 3]) -> Vector3<f64> {
+fn meters(mm: [f64; 3]) -> Vector3<f64> {
     Vector3::from(mm) * 1e-3
 }
 

@@ -1,4 +1,4 @@
-//! Outlines of the tins and bottles from the bottom's centre to the top's \[mm\], fitted to the measured sizes and
+//! Outlines of the tins and bottles from the bottom's center to the top's \[mm\], fitted to the measured sizes and
 //! volumes: heights and radii of round ones, [`Row`]s of oval ones.
 
 use super::forms::Row;

@@ -1,10 +1,10 @@
-//! A canvas measured in millimetres, on which the objects' textures are painted.
+//! A canvas measured in millimeters, on which the objects' textures are painted.
 
 use crate::Texture;
 
 use super::lettering::glyph;
 
-/// An sRGB colour as 0xRRGGBB.
+/// An sRGB color as 0xRRGGBB.
 pub(super) type Color = u32;
 
 /// A rectangle \[mm\]: left, bottom, right, top.
@@ -14,7 +14,7 @@ pub(super) type Area = [f64; 4];
 pub(super) struct Canvas {
     width: usize,
     height: usize,
-    /// Pixels a millimetre.
+    /// Pixels a millimeter.
     scale: f64,
     pixels: Vec<[f32; 3]>,
 }
@@ -24,7 +24,7 @@ fn channels(color: Color) -> [f32; 3] {
 }
 
 impl Canvas {
-    /// A canvas of `size` \[mm\] in one colour, its longer side `pixels` wide.
+    /// A canvas of `size` \[mm\] in one color, its longer side `pixels` wide.
     pub(super) fn new(size: [f64; 2], pixels: usize, color: Color) -> Self {
         let scale = pixels as f64 / size[0].max(size[1]);
         let [width, height] = size.map(|s| ((s * scale).round() as usize).max(1));
@@ -98,7 +98,7 @@ impl Canvas {
         });
     }
 
-    /// A line of text, centred in `area` and as large as fits, in letters of 5 × 7 blocks.
+    /// A line of text, centered in `area` and as large as fits, in letters of 5 × 7 blocks.
     pub(super) fn text(&mut self, area: Area, text: &str, color: Color) {
         let columns = (6 * text.len()).saturating_sub(1).max(1) as f64;
         let block = ((area[2] - area[0]) / columns).min((area[3] - area[1]) / 7.0);
@@ -172,7 +172,7 @@ impl Canvas {
     }
 }
 
-/// A number in 0..1 that depends on its arguments alone (the finaliser of SplitMix64).
+/// A number in 0..1 that depends on its arguments alone (the finalizer of SplitMix64).
 pub(super) fn hash(seed: u64, i: i64, j: i64) -> f64 {
     let mut h = seed
         ^ (i as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15)

@@ -1,4 +1,4 @@
-//! The catalogue: names, numbers, masses and shapes.
+//! The catalog: names, numbers, masses and shapes.
 
 use std::sync::Arc;
 
@@ -84,7 +84,7 @@ impl YcbObject {
         self.entry().mass
     }
 
-    /// The textured surface \[m\]: one closed body, z up, its bounding box centred on the origin, the front at +x (of
+    /// The textured surface \[m\]: one closed body, z up, its bounding box centered on the origin, the front at +x (of
     /// lying cartons the top).
     pub fn mesh(self) -> TriMesh {
         let entry = self.entry();
@@ -177,7 +177,7 @@ mod tests {
     ];
 
     #[test]
-    fn closed_centred_and_of_the_real_size_and_volume() {
+    fn closed_centered_and_of_the_real_size_and_volume() {
         for (object, (name, low, high, volume)) in YcbObject::ALL.into_iter().zip(MEASURED) {
             assert_eq!(object.name(), name);
             assert_eq!(YcbObject::from_name(name), Some(object));
@@ -203,7 +203,7 @@ mod tests {
         for object in YcbObject::ALL {
             let Texture { width, height, pixels } = object.texture();
             assert_eq!((width.max(height), pixels.len()), (TEXTURE_PIXELS, width * height));
-            // Half a turn must change the colour of a good part of the sheet.
+            // Half a turn must change the color of a good part of the sheet.
             let differs = |i: &usize| {
                 let (row, column) = (i / width, i % width);
                 let other = pixels[row * width + (column + width / 2) % width];

@@ -27,7 +27,7 @@ use crate::{DistanceField, FieldSample};
 #[derive(Clone, Debug)]
 pub struct ArticulatedRobot {
     posed: PosedRobot,
-    centre: Point3<f64>,
+    center: Point3<f64>,
     /// Joints that move, in the world.
     screws: Vec<Screw>,
     /// For each link the screws that move it, from the base to the link.
@@ -102,8 +102,8 @@ impl ArticulatedRobot {
             screws.push(Screw { variable: index, angular, linear });
         }
         let posed = PosedRobot::new(shape, poses)?;
-        let centre = Point3::from(t_world_base.translation.vector);
-        Ok(Self { posed, centre, screws, paths, variables: joints.len() })
+        let center = Point3::from(t_world_base.translation.vector);
+        Ok(Self { posed, center, screws, paths, variables: joints.len() })
     }
 
     /// The robot in its pose, for everything but derivatives.
@@ -119,7 +119,7 @@ impl ArticulatedRobot {
     pub fn sample_motion(&self, point: &Point3<f64>, reach: f64) -> Option<RobotSample> {
         let (link, field) = self.posed.sample_link(point, reach)?;
         let g = field.gradient;
-        let torque = -(point - self.centre).cross(&g);
+        let torque = -(point - self.center).cross(&g);
         let base = Vector6::new(-g.x, -g.y, -g.z, torque.x, torque.y, torque.z);
         let mut joints = DVector::zeros(self.variables);
         for (variable, velocity) in self.velocities(link, point) {
@@ -162,7 +162,7 @@ impl ArticulatedRobot {
         }
         for i in 0..3 {
             let axis = Vector3::ith(i, 1.0);
-            let first = -axis.cross(&(point - self.centre));
+            let first = -axis.cross(&(point - self.center));
             directions.push(Direction { row: 6 + i, first, turn: -axis });
         }
         for &s in &self.paths[sample.link] {

@@ -290,7 +290,7 @@ mod tests {
             };
             for i in 0..3 {
                 let (Some((a, plus)), Some((b, minus))) = (around(1.0, i), around(-1.0, i)) else {
-                    panic!("a neighbour of {p} is out of reach");
+                    panic!("a neighbor of {p} is out of reach");
                 };
                 // On a crease between links there is no derivative.
                 if a == link && b == link {
@@ -311,7 +311,7 @@ mod tests {
         let robot = posed(0.0, 0.002);
         let palm = robot.t_world_links()[1];
         let at = |x: f64, y: f64, z: f64| palm * Point3::new(x, y, z);
-        // Half a millimetre under the finger's buried end, 5.5 mm under the palm's top.
+        // Half a millimeter under the finger's buried end, 5.5 mm under the palm's top.
         let near_buried = robot.surface_distance(&at(0.0, 0.0, 0.0345), 1.0).unwrap();
         assert!(near_buried > 0.005, "{near_buried}");
         // Far from the finger, inside and outside of the palm's side.

@@ -75,7 +75,7 @@ impl SdfGrid {
     /// Samples any signed distance of a shape within `bounds` \[m\].
     ///
     /// `distance` gets a point and an upper bound of the unsigned distance there (infinite where none
-    /// is known): that of the neighbouring sample plus the step between them.
+    /// is known): that of the neighboring sample plus the step between them.
     ///
     /// # Errors
     /// As [`Self::build`].
@@ -100,7 +100,7 @@ impl SdfGrid {
     }
 }
 
-/// Samples `i` along x; each search starts from the answer of a neighbour.
+/// Samples `i` along x; each search starts from the answer of a neighbor.
 fn sample_slab(mesh: &ClosestPoints, lattice: &Lattice, i: usize, slab: &mut [f64]) {
     let nz = lattice.dims()[2];
     let mut row_hint = None;
@@ -118,7 +118,7 @@ fn sample_slab(mesh: &ClosestPoints, lattice: &Lattice, i: usize, slab: &mut [f6
 }
 
 /// How much wider than asked for the band is searched, so that rounding decides nothing: a sample that is not found is then
-/// farther away than its neighbours from it, and on their side of the surface.
+/// farther away than its neighbors from it, and on their side of the surface.
 const ROUNDING: f64 = 1.0 + 1e-9;
 
 /// Samples within the band, the first along x being number `first`; the rest is left alone.
@@ -178,7 +178,7 @@ fn sample_band(
 
 /// Gives the samples outside of the band its width and their sign.
 ///
-/// Such a sample is farther from the surface than its neighbours from it, so that on a closed surface no crossing
+/// Such a sample is farther from the surface than its neighbors from it, so that on a closed surface no crossing
 /// lies between: the sign is theirs. Where the surface may be open it is asked for.
 fn fill_outside(mesh: &ClosestPoints, lattice: &Lattice, band: f64, values: &mut [f64]) {
     let [nx, ny, nz] = lattice.dims();

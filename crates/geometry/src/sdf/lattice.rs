@@ -73,7 +73,7 @@ impl Lattice {
         Ok(Self { origin, spacing, dims })
     }
 
-    /// Samples every `spacing` \[m\] over `bounds` \[m\] and at least `margin` \[m\] around them, centred, so that a symmetric
+    /// Samples every `spacing` \[m\] over `bounds` \[m\] and at least `margin` \[m\] around them, centered, so that a symmetric
     /// shape has symmetric samples.
     ///
     /// # Errors

@@ -77,7 +77,7 @@ pub struct RoundedBox {
     pub size: Vector3<f64>,
     /// Radius of edges and corners \[m\], limited to half the smallest size.
     pub radius: f64,
-    /// How far the centre of the faces across x, y and z stands out beyond `size`/2 \[m\], on each side, falling
+    /// How far the center of the faces across x, y and z stands out beyond `size`/2 \[m\], on each side, falling
     /// parabolically to zero at the edges as on a filled carton.
     pub bulge: Vector3<f64>,
     /// Rows of cells from a face to the middle of an edge's rounding.

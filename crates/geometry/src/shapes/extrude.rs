@@ -95,7 +95,7 @@ fn crossing(points: &[Point2<f64>]) -> Option<(usize, usize)> {
     let meet = |i: usize, j: usize| {
         let ((a, b), (c, d)) = (side(i), side(j));
         if (i + 1) % n == j {
-            // Neighbours: one of the outer ends on the other side, or no length at all.
+            // Neighbors: one of the outer ends on the other side, or no length at all.
             return a == b || c == d || between(a, b, d) || between(c, d, a);
         }
         let touch = between(a, b, c) || between(a, b, d) || between(c, d, a) || between(c, d, b);

@@ -123,7 +123,7 @@ pub fn smoothed(sections: &[Section], rounds: usize) -> Vec<Section> {
     rows
 }
 
-/// Inserts sections until neighbours are at most `step` \[m\] apart along the outline.
+/// Inserts sections until neighbors are at most `step` \[m\] apart along the outline.
 pub fn subdivided(sections: &[Section], step: f64) -> Vec<Section> {
     let mut rows = Vec::from_iter(sections.first().copied());
     for pair in sections.windows(2) {

@@ -34,9 +34,9 @@ pub fn cone(radii: [f64; 2], height: f64, segments: usize) -> TriMesh {
 /// vertices lie on the true surface.
 pub fn capsule(radius: f64, half_length: f64, segments: usize, rows: usize) -> TriMesh {
     let rows = rows.max(1);
-    let arc = |i: usize, centre: f64, sign: f64| {
+    let arc = |i: usize, center: f64, sign: f64| {
         let (s, c) = (FRAC_PI_2 * i as f64 / rows as f64).sin_cos();
-        [radius * if i == rows { 0.0 } else { c }, centre + sign * radius * s]
+        [radius * if i == rows { 0.0 } else { c }, center + sign * radius * s]
     };
     let bottom = (0..=rows).rev().map(|i| arc(i, -half_length, -1.0));
     let top = (0..=rows).map(|i| arc(i, half_length, 1.0));

@@ -100,15 +100,15 @@ impl SurfaceDistance {
         self.sums(t_cloud_mesh, add).iter().sum()
     }
 
-    /// The distance \[m²\] and its derivatives by a left twist of the mesh about `centre` \[m\] (in the cloud's frame),
+    /// The distance \[m²\] and its derivatives by a left twist of the mesh about `center` \[m\] (in the cloud's frame),
     /// with the mesh at `t_cloud_mesh`.
     pub fn pose_derivatives(
         &self,
         t_cloud_mesh: &Isometry3<f64>,
-        centre: &Point3<f64>,
+        center: &Point3<f64>,
     ) -> PoseDerivatives {
         let add = |sum: &mut PoseDerivatives, pair: &Pair, share: f64| {
-            sum.add(pair, centre, self.kernel, share);
+            sum.add(pair, center, self.kernel, share);
         };
         let sums = self.sums(t_cloud_mesh, add);
         let mut total = PoseDerivatives::default();

@@ -6,7 +6,7 @@ use prehend_autodiff::lie::cross_matrix;
 use super::pair::Pair;
 use crate::Kernel;
 
-/// A distance and its derivatives by a left twist of the mesh about a centre, translation \[m\] first, rotation
+/// A distance and its derivatives by a left twist of the mesh about a center, translation \[m\] first, rotation
 /// \[rad\] last, at zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoseDerivatives {
@@ -33,8 +33,8 @@ impl PoseDerivatives {
     ///
     /// With the mesh moved by δ = (ρ, ω), the point y = p − c moves in the mesh's frame by
     /// −(ρ + ω × y) + ½ ω × (ρ + ω × y); the squared distance d² has gradient 2 r by it, and Hessian 2 P.
-    pub(super) fn add(&mut self, pair: &Pair, centre: &Point3<f64>, kernel: Kernel, share: f64) {
-        let (r, y) = (pair.offset(), pair.point - centre);
+    pub(super) fn add(&mut self, pair: &Pair, center: &Point3<f64>, kernel: Kernel, share: f64) {
+        let (r, y) = (pair.offset(), pair.point - center);
         let r2 = r.norm_squared();
         let weight = share * kernel.weight(r2);
         self.value += share * 2.0 * kernel.loss(r2);
@@ -64,7 +64,7 @@ impl PoseDerivatives {
         self.hessian += slope * slope.transpose() * (share * kernel.weight_slope(r2));
     }
 
-    /// Adds the sums of other matches about the same centre.
+    /// Adds the sums of other matches about the same center.
     pub(super) fn merge(&mut self, other: &Self) {
         self.value += other.value;
         self.gradient += other.gradient;

@@ -52,11 +52,11 @@ proptest! {
     fn pose_derivatives_match_differences(seed in any::<u64>(), points in 1_usize..12) {
         let mesh = mesh(seed);
         let cloud: Vec<_> = vectors(points, seed ^ 1).into_iter().map(|v| Point3::from(v * 2.0)).collect();
-        let (base, centre) = (pose(seed ^ 2), Point3::from(vectors(1, seed ^ 3)[0]));
+        let (base, center) = (pose(seed ^ 2), Point3::from(vectors(1, seed ^ 3)[0]));
         let step = 1e-5;
         for kernel in kernels(1.7) {
             let distance = SurfaceDistance::new(&mesh, &cloud).unwrap().with_kernel(kernel).unwrap();
-            let moved = |x: &[f64]| perturb_about(&base, &centre.coords, &Vector6::from_column_slice(x));
+            let moved = |x: &[f64]| perturb_about(&base, &center.coords, &Vector6::from_column_slice(x));
             let matching = distance.matching(&base);
             let smooth = (0..12).all(|i| {
                 let mut x = [0.0; 6];
@@ -64,7 +64,7 @@ proptest! {
                 distance.matching(&moved(&x)) == matching
             });
             prop_assume!(smooth);
-            let at = distance.pose_derivatives(&base, &centre);
+            let at = distance.pose_derivatives(&base, &center);
             prop_assert!((at.value - distance.value(&base)).abs() <= 1e-12 * at.value);
             let reference = finite_difference_gradient(|x| distance.value(&moved(x)), &[0.0; 6], step);
             for (g, r) in at.gradient.iter().zip(&reference) {
@@ -74,7 +74,7 @@ proptest! {
             let second = |x: &[f64]| {
                 let delta = Vector6::from_column_slice(x);
                 let twist = prehend_autodiff::lie::se3_left_jacobian(&delta);
-                let there = distance.pose_derivatives(&moved(x), &centre).gradient;
+                let there = distance.pose_derivatives(&moved(x), &center).gradient;
                 (twist.transpose() * there).iter().copied().collect::<Vec<_>>()
             };
             let rows = finite_difference_jacobian(second, &[0.0; 6], step);
@@ -146,10 +146,10 @@ fn newton_steps_bring_a_mesh_back_to_its_samples() {
     let mut t = se3_exp(&Vector6::new(2e-3, -1e-3, 1e-3, 0.03, -0.02, 0.05));
     let start = distance.value(&t);
     for _ in 0..8 {
-        let centre = Point3::from(t.translation.vector);
-        let at = distance.pose_derivatives(&t, &centre);
+        let center = Point3::from(t.translation.vector);
+        let at = distance.pose_derivatives(&t, &center);
         let step = at.gauss_newton.lu().solve(&-at.gradient).unwrap();
-        t = perturb_about(&t, &centre.coords, &step);
+        t = perturb_about(&t, &center.coords, &step);
     }
     assert!(distance.value(&t) < 1e-3 * start, "{} {start}", distance.value(&t));
     assert!(t.translation.vector.norm() < 5e-5 && t.rotation.angle() < 2e-3, "{t}");

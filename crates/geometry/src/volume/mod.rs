@@ -14,7 +14,7 @@
 //! let t = Isometry3::translation(0.09, 0.0, 0.0);
 //! let shared = cube.overlap(&cube, &t, &Point3::from(t.translation.vector))?;
 //! assert!((shared.volume - 1e-4).abs() < 1e-15);
-//! // Moving the second cube along x takes a slice of 10 cm × 10 cm off, per metre.
+//! // Moving the second cube along x takes a slice of 10 cm × 10 cm off, per meter.
 //! assert!((shared.gradient.x + 0.01).abs() < 1e-15);
 //! # Ok::<(), prehend_geometry::VolumeError>(())
 //! ```

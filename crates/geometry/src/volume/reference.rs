@@ -81,7 +81,7 @@ fn capsule(from: Vector3<f64>, to: Vector3<f64>, r: f64) -> TriMesh {
     from_rows(vertices, columns, poles)
 }
 
-/// Four fingers of four capsules about a palm of one; all overlap their neighbours.
+/// Four fingers of four capsules about a palm of one; all overlap their neighbors.
 fn hand() -> Vec<TriMesh> {
     let radius = 0.062;
     let mut parts = Vec::new();

@@ -262,7 +262,7 @@ fn degenerate_boxes_share_what_they_should() {
 }
 
 #[test]
-fn a_body_shares_all_of_itself_and_nothing_with_its_neighbour() {
+fn a_body_shares_all_of_itself_and_nothing_with_its_neighbor() {
     let ball = icosphere(0.05, 4);
     let own = signed_volume(&ball);
     assert!((intersection_volume(from_ref(&ball), &ball).unwrap() / own - 1.0).abs() < 1e-13);
@@ -298,7 +298,7 @@ fn moving_a_box_changes_the_volume_by_the_side_inside() {
     let expected = [-0.25, 0.0, 0.0, 0.0, 0.0, 0.0];
     assert!((found.volume - 0.0625).abs() < 1e-15);
     assert!((found.gradient - nalgebra::Vector6::from(expected)).norm() < 1e-15, "{found:?}");
-    // About another centre, a turn also moves it.
+    // About another center, a turn also moves it.
     let found = a.overlap(&b, &pose, &Point3::new(0.5, 0.0, 0.1)).unwrap();
     assert!((found.gradient[5] - 0.2 * 0.25).abs() < 1e-15);
     let nowhere = Isometry3::translation(f64::NAN, 0.0, 0.0);

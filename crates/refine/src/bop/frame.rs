@@ -18,7 +18,7 @@ pub struct Frame<'a> {
     im_id: u32,
     /// The camera as the estimator is told it.
     pub intrinsics: Intrinsics,
-    /// Millimetres per stored depth value.
+    /// Millimeters per stored depth value.
     pub depth_scale: f64,
 }
 
@@ -39,7 +39,7 @@ impl<'a> Frame<'a> {
         self.im_id
     }
 
-    /// The colour image (`rgb/*.png`, else `*.jpg` or `*.jpeg`).
+    /// The color image (`rgb/*.png`, else `*.jpg` or `*.jpeg`).
     ///
     /// # Errors
     /// [`DatasetError::Missing`] naming the PNG file when there is none.
@@ -85,7 +85,7 @@ impl<'a> Frame<'a> {
         }
     }
 
-    /// Reads the colour image.
+    /// Reads the color image.
     ///
     /// # Errors
     /// When it is absent or does not decode.
@@ -117,7 +117,7 @@ impl<'a> Frame<'a> {
         if mask.count() > 0 { Ok(mask) } else { Err(DatasetError::EmptyMask { file }) }
     }
 
-    /// The image as an [`Observation`] of camera, colour, depth and mask; gravity and the hand are left out.
+    /// The image as an [`Observation`] of camera, color, depth and mask; gravity and the hand are left out.
     ///
     /// # Errors
     /// The first of those of [`Frame::rgb`], [`Frame::depth`] and [`Frame::mask`], and

@@ -320,7 +320,7 @@ mod tests {
     }
 
     #[test]
-    fn poses_are_checked_and_brought_to_metres() {
+    fn poses_are_checked_and_brought_to_meters() {
         let f = file(
             r#"{"0": {"R": [0, -1, 0, 1, 0, 0, 0, 0, 1], "t": [1, 2, 3], "flat": [[1, 0, 0], [0, 2, 0], [0, 0, 1]]}}"#,
         );

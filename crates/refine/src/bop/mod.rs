@@ -1,7 +1,7 @@
 //! BOP datasets: what an estimator may read ([`Dataset`]), the truth a scorer may read
 //! ([`GroundTruth`]), and results files ([`read_results`], [`write_results`]).
 //!
-//! Files are in millimetres; everything these modules return is in metres. Two files extend the
+//! Files are in millimeters; everything these modules return is in meters. Two files extend the
 //! BOP layout: `scene_bodies.json` (gravity, and the known robot with its joint angles) and
 //! `scene_tactile.json` (taxel forces). A file is read when something of it is first asked for, so
 //! a missing or broken one disturbs only what needs it.

@@ -10,7 +10,7 @@ use super::error::DatasetError;
 use super::models::Models;
 use crate::metrics::{Symmetries, diameter};
 
-/// Diameter and bounds of a model of these `vertices` \[m\], as `models_info.json` has them, in millimetres.
+/// Diameter and bounds of a model of these `vertices` \[m\], as `models_info.json` has them, in millimeters.
 pub fn extent_to_bop(vertices: &[Point3<f64>]) -> Map<String, Value> {
     let first = vertices.first().copied().unwrap_or_default();
     let (low, high) =

@@ -13,7 +13,7 @@ use super::pose::{
 };
 use crate::metrics::{ContinuousSymmetry, Symmetries};
 
-/// A folder with `obj_000001.ply`, … (millimetres) and `models_info.json`.
+/// A folder with `obj_000001.ply`, … (millimeters) and `models_info.json`.
 #[derive(Debug)]
 pub struct Models {
     dir: PathBuf,
@@ -29,9 +29,9 @@ pub struct ModelInfo {
     pub symmetries: Symmetries,
     /// Mass \[kg\] (`mass_kg`, not part of BOP), if known.
     pub mass: Option<f64>,
-    /// Centre of mass \[m\] (`com_mm`, not part of BOP), if known.
+    /// Center of mass \[m\] (`com_mm`, not part of BOP), if known.
     pub center_of_mass: Option<Point3<f64>>,
-    /// Inertia about the centre of mass \[kg m²\] (`inertia_kg_m2`, not part of BOP), if known.
+    /// Inertia about the center of mass \[kg m²\] (`inertia_kg_m2`, not part of BOP), if known.
     pub inertia: Option<Matrix3<f64>>,
 }
 
@@ -85,7 +85,7 @@ impl Models {
 }
 
 impl Symmetries {
-    /// As `models_info.json` has them: `symmetries_discrete` and `symmetries_continuous`, in millimetres; what there is
+    /// As `models_info.json` has them: `symmetries_discrete` and `symmetries_continuous`, in millimeters; what there is
     /// none of is left out.
     pub fn to_bop(&self) -> Map<String, Value> {
         let motion = |m: &Isometry3<f64>| {
@@ -158,7 +158,7 @@ fn symmetries(entry: &Entry<'_>) -> Result<Symmetries, DatasetError> {
     Ok(symmetries)
 }
 
-/// A row-major 4×4 motion with its translation in millimetres.
+/// A row-major 4×4 motion with its translation in millimeters.
 fn motion(entry: &Entry<'_>) -> Result<Isometry3<f64>, DatasetError> {
     let m: [f64; 16] = entry.numbers()?;
     if m[12..] != [0.0, 0.0, 0.0, 1.0] {

@@ -1,4 +1,4 @@
-//! Poses as BOP writes them: nine row-major rotation entries and a translation in millimetres.
+//! Poses as BOP writes them: nine row-major rotation entries and a translation in millimeters.
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion};
 use thiserror::Error;
@@ -77,7 +77,7 @@ pub fn rotation_to_row_major(rotation: &UnitQuaternion<f64>) -> [f64; 9] {
     std::array::from_fn(|i| m[(i / 3, i % 3)])
 }
 
-/// A translation \[m\] of three millimetre values.
+/// A translation \[m\] of three millimeter values.
 ///
 /// # Errors
 /// [`PoseFault::NotFinite`].
@@ -87,13 +87,13 @@ pub fn translation_from_mm(t_mm: &[f64; 3]) -> Result<Translation3<f64>, PoseFau
     Ok(Translation3::new(x, y, z))
 }
 
-/// The millimetre values of a translation \[m\].
+/// The millimeter values of a translation \[m\].
 pub fn translation_to_mm(translation: &Translation3<f64>) -> [f64; 3] {
     let t = translation.vector;
     [t.x * 1000.0, t.y * 1000.0, t.z * 1000.0]
 }
 
-/// The pose \[m\] of a row-major rotation and a millimetre translation.
+/// The pose \[m\] of a row-major rotation and a millimeter translation.
 ///
 /// # Errors
 /// Those of [`rotation_from_row_major`] and [`translation_from_mm`].

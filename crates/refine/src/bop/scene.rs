@@ -12,7 +12,7 @@ use prehend_render::Camera;
 /// Force units of `scene_tactile.json` per newton.
 pub const UNITS_PER_NEWTON: f64 = 1000.0;
 
-/// A pinhole camera without skew \[px\]; pixel centres lie at integer coordinates.
+/// A pinhole camera without skew \[px\]; pixel centers lie at integer coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Intrinsics {
     /// Focal length along columns.

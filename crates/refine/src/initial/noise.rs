@@ -16,7 +16,7 @@ pub enum NoiseLevel {
     Low,
     /// The paper's higher level: mean PE 2.21 cm, mean OE 15.25°, the same in all directions.
     High,
-    /// As estimators from colour images err: 17 to 40 mm, of which more than 95 % along the view ray, and 2.5° to
+    /// As estimators from color images err: 17 to 40 mm, of which more than 95 % along the view ray, and 2.5° to
     /// 6.6°; the ranges of MegaPose's errors on a scene of YCB-V.
     Ray,
 }

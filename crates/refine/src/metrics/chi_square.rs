@@ -1,6 +1,6 @@
 //! The χ² distribution.
 
-/// Probability that a χ² variable of `degrees` degrees of freedom is at most `value`: the regularised lower incomplete gamma
+/// Probability that a χ² variable of `degrees` degrees of freedom is at most `value`: the regularized lower incomplete gamma
 /// function by its series (Abramowitz and Stegun, 6.5.29). NaN for a value that is not a number.
 pub fn chi_square_cdf(value: f64, degrees: u32) -> f64 {
     let (a, x) = (0.5 * f64::from(degrees), 0.5 * value);

@@ -1,6 +1,6 @@
 //! Metrics: how far a pose is from the truth, how it touches the hand, and tables of such numbers.
 //!
-//! Distances are in metres unless a name ends in its unit. Definitions: PE, OE, CA and IV of the paper
+//! Distances are in meters unless a name ends in its unit. Definitions: PE, OE, CA and IV of the paper
 //! this project follows; ADD and ADI of Hinterstoisser et al. (ACCV 2012); MSSD and MSPD of the BOP
 //! challenge (Hodaň et al., ECCVW 2020).
 

@@ -1,4 +1,4 @@
-//! Exact nearest neighbours among a fixed set of points.
+//! Exact nearest neighbors among a fixed set of points.
 
 use nalgebra::Point3;
 use prehend_geometry::KdTree;

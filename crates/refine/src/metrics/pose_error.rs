@@ -17,7 +17,7 @@ pub fn oe_deg(estimate: &Isometry3<f64>, truth: &Isometry3<f64>) -> f64 {
 }
 
 /// The smallest orientation error \[deg\] over all orientations that symmetry makes equal to the truth;
-/// for an axis of revolution this is exact, not discretised.
+/// for an axis of revolution this is exact, not discretized.
 pub fn oe_symmetric_deg(
     estimate: &Isometry3<f64>,
     truth: &Isometry3<f64>,
@@ -93,7 +93,7 @@ mod tests {
         assert!(
             (oe_symmetric_deg(&estimate, &truth, &symmetries) - 0.3_f64.to_degrees()).abs() < 1e-9
         );
-        // Discretised, the same comes out to within half a step.
+        // Discretized, the same comes out to within half a step.
         let best = symmetries
             .transforms()
             .iter()

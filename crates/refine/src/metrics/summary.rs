@@ -57,7 +57,7 @@ pub struct Summary {
     pub per_object: BTreeMap<u32, Statistics>,
 }
 
-/// Summarises rows; the order of the rows does not change medians, and means only in their last digits.
+/// Summarizes rows; the order of the rows does not change medians, and means only in their last digits.
 pub fn summarize(rows: &[ScoredRow]) -> Summary {
     let mut groups: BTreeMap<u32, Vec<&ScoredRow>> = BTreeMap::new();
     for row in rows {

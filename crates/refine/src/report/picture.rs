@@ -32,7 +32,7 @@ impl FrameReport {
         refined: &RefinedPose,
     ) -> Self {
         let iterations = refined.trace.iterations.len().saturating_sub(1);
-        let moved = refined.t_cam_object * object.centre - initial * object.centre;
+        let moved = refined.t_cam_object * object.center - initial * object.center;
         let turned = refined.t_cam_object.rotation.angle_to(&initial.rotation).to_degrees();
         Self {
             picture: before_and_after(observation, object, initial, &refined.t_cam_object),

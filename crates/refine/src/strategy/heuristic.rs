@@ -115,7 +115,7 @@ impl Candidate {
         let light = term.light(state);
         let state = &State { light: light.unwrap_or(state.light), ..state.clone() };
         let mut normal = Normal::new(&[Block::ObjectPose]);
-        let value = term.linearise(state, &mut normal);
+        let value = term.linearize(state, &mut normal);
         let (step, length) = preconditioned_step(&normal, radius, length);
         let value_after = term.value(&state.moved(Block::ObjectPose, step.as_slice()));
         Self { light, value, value_after, step, length }
@@ -147,11 +147,11 @@ mod tests {
         }
 
         fn value(&self, state: &State) -> f64 {
-            0.5 * self.precision * (state.centre() - self.place).norm_squared()
+            0.5 * self.precision * (state.center() - self.place).norm_squared()
         }
 
-        fn linearise(&self, state: &State, normal: &mut Normal) -> f64 {
-            let offset = (state.centre() - self.place) * self.precision;
+        fn linearize(&self, state: &State, normal: &mut Normal) -> f64 {
+            let offset = (state.center() - self.place) * self.precision;
             let mut gradient = Vector6::zeros();
             gradient.fixed_rows_mut::<3>(0).copy_from(&offset);
             let mut hessian = Matrix6::zeros();
@@ -168,7 +168,7 @@ mod tests {
     fn run(terms: &[Box<dyn Term>], settings: HeuristicSettings) -> (State, Trace) {
         let start = State {
             t_cam_object: Isometry3::translation(0.03, 0.01, 0.5),
-            object_centre: Point3::origin(),
+            object_center: Point3::origin(),
             t_cam_hand: Isometry3::identity(),
             joints: Vec::new(),
             camera: CameraCorrection::default(),
@@ -183,9 +183,9 @@ mod tests {
     }
 
     #[test]
-    fn one_term_is_minimised() {
+    fn one_term_is_minimized() {
         let (state, trace) = run(&[spring(0.0, 1e-3)], HeuristicSettings::default());
-        assert!((state.centre() - Vector3::new(0.0, 0.0, 0.5)).norm() < 1e-5);
+        assert!((state.center() - Vector3::new(0.0, 0.0, 0.5)).norm() < 1e-5);
         assert!(trace.iterations.len() < 60);
         assert_eq!(trace.iterations[0].weights, [1.0]);
     }
@@ -195,7 +195,7 @@ mod tests {
         // The sum is least at 0.01 · (1/3²) / (1/1² + 1/3²) = 1 mm.
         let terms = [spring(0.0, 1e-3), spring(0.01, 3e-3)];
         let (state, trace) = run(&terms, HeuristicSettings::default());
-        assert!((state.centre().x - 1e-3).abs() < 1e-4, "{}", state.centre().x);
+        assert!((state.center().x - 1e-3).abs() < 1e-4, "{}", state.center().x);
         let sum: f64 = trace.iterations.iter().map(|i| i.weights.iter().sum::<f64>()).sum();
         assert!((sum - trace.iterations.len() as f64).abs() < 1.0);
     }

@@ -87,11 +87,11 @@ fn pairs<T: Sync>(
 
 /// Adds the mean squared distance of `pairs` \[m²\] with its derivatives, and returns it.
 fn add(normal: &mut Normal, state: &State, pairs: &[(Point3<f64>, Point3<f64>)]) -> f64 {
-    let centre = state.centre().into();
+    let center = state.center().into();
     let mut sums = NormalEquations::new();
     for (surface, cloud) in pairs {
         let target = Match { point: *cloud, normal: Vector3::zeros() };
-        sums.add(Metric::PointToPoint, Kernel::Squared, surface, &target, &centre);
+        sums.add(Metric::PointToPoint, Kernel::Squared, surface, &target, &center);
     }
     // The sums are of half the squares.
     let share = 2.0 / pairs.len().max(1) as f64;

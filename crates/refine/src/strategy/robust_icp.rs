@@ -39,7 +39,7 @@ impl Default for RobustIcpSettings {
 /// of the distances from the points to the planes of the faces found. The scale of the weights shrinks
 /// geometrically from the first to the last over the first three quarters of the iterations. Of visibility it knows
 /// one thing: a depth point is not of a face that looks away from the camera, and such a match counts for
-/// nothing. It knows nothing of colour, touch, the mask's outline and the hand.
+/// nothing. It knows nothing of color, touch, the mask's outline and the hand.
 pub struct RobustIcp {
     /// Settings.
     pub settings: RobustIcpSettings,
@@ -93,7 +93,7 @@ fn match_all(
     kernel: Kernel,
 ) -> NormalEquations {
     let t_object_cam = state.t_cam_object.inverse();
-    let centre = state.centre().into();
+    let center = state.center().into();
     let of_point = |point: &mut Point| -> Option<(Point3<f64>, Match)> {
         let local = t_object_cam * point.place;
         let face = point.face.unwrap_or(u32::MAX);
@@ -107,7 +107,7 @@ fn match_all(
     let matches: Vec<_> = cloud.par_iter_mut().with_min_len(64).filter_map(of_point).collect();
     let mut sums = NormalEquations::new();
     for (surface, target) in &matches {
-        sums.add(Metric::PointToPlane, kernel, surface, target, &centre);
+        sums.add(Metric::PointToPlane, kernel, surface, target, &center);
     }
     sums
 }

@@ -4,7 +4,7 @@ use nalgebra::{Matrix6, Vector6};
 
 use crate::Normal;
 
-/// −(H + μ)⁻¹ g in units where a radian counts `radius` metres, no longer than `limit`; and its length
+/// −(H + μ)⁻¹ g in units where a radian counts `radius` meters, no longer than `limit`; and its length
 /// in these units \[m\]. μ is a thousandth of the mean curvature.
 pub(crate) fn preconditioned_step(normal: &Normal, radius: f64, limit: f64) -> (Vector6<f64>, f64) {
     damped_step(normal, radius, 1e-3, limit)

@@ -7,12 +7,12 @@ use serde::{Deserialize, Serialize};
 use crate::Object;
 use crate::strategy::Confidence;
 
-/// A pose being near the truth: how far its centre may be off \[m\] and by how much it may be turned \[°\].
+/// A pose being near the truth: how far its center may be off \[m\] and by how much it may be turned \[°\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Event {
     /// Its name in tables and files.
     pub name: &'static str,
-    /// Largest distance of the object's centre from where it truly is \[m\].
+    /// Largest distance of the object's center from where it truly is \[m\].
     pub distance: f64,
     /// Largest angle \[°\].
     pub angle_deg: f64,
@@ -33,11 +33,11 @@ pub const EVENTS: [Event; 7] = [
 
 /// What was believed of one pose, and how far off it is.
 ///
-/// Distances are of the centre of the object's bounding box, about which the covariance turns, not of the model's origin as PE is;
+/// Distances are of the center of the object's bounding box, about which the covariance turns, not of the model's origin as PE is;
 /// a symmetric object that is turned into itself counts as turned.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Belief {
-    /// Distance of the object's centre from where it truly is \[mm\].
+    /// Distance of the object's center from where it truly is \[mm\].
     pub distance_mm: f64,
     /// Angle between the pose and the true one \[°\].
     pub angle_deg: f64,
@@ -64,7 +64,7 @@ impl Belief {
     pub fn new(confidence: &Confidence, object: &Object, truth: &Isometry3<f64>) -> Self {
         let best = &confidence.hypotheses[0];
         let pose = &best.t_cam_object;
-        let off = truth * object.centre - pose * object.centre;
+        let off = truth * object.center - pose * object.center;
         let turn = so3_log(&(truth.rotation * pose.rotation.inverse()));
         let bound = |first: usize| confidence.bound.fixed_view::<3, 3>(first, first).trace().sqrt();
         Self {
@@ -113,7 +113,7 @@ fn squared<const N: usize>(
     covariance: &SMatrix<f64, N, N>,
     error: &SVector<f64, N>,
 ) -> Option<f64> {
-    // Metres and radians may be of different sizes: what is inverted is the correlation.
+    // Meters and radians may be of different sizes: what is inverted is the correlation.
     let scale = covariance.diagonal().map(|v| v.sqrt().recip());
     let correlation = SMatrix::from_fn(|r, c| covariance[(r, c)] * scale[r] * scale[c]);
     let scaled = error.component_mul(&scale);

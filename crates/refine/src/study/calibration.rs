@@ -35,7 +35,7 @@ pub struct Calibration {
     pub method: String,
     /// Poses of which something was believed.
     pub n: usize,
-    /// Root mean squares of what the centre is off \[mm\] and of the angle \[°\], and Cramér and Rao's bounds on them.
+    /// Root mean squares of what the center is off \[mm\] and of the angle \[°\], and Cramér and Rao's bounds on them.
     pub errors: [RootMeanSquare; 2],
     /// How often the truth is within the posterior's ellipsoids.
     pub coverage: Vec<Coverage>,

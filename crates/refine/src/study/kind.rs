@@ -62,7 +62,7 @@ impl Kind {
             Self::Main => "Main study: baselines, the combined method and the fused estimator",
             Self::Gradients => "Gradients study: each kind of evidence alone, and all together",
             Self::Noise => "Noise study: the same at several levels of noise",
-            Self::Steps => "Steps study: no regularisation, no checkpoint, all iterations",
+            Self::Steps => "Steps study: no regularization, no checkpoint, all iterations",
             Self::Evidence => "Evidence study: fused with less evidence, and with less estimated",
             Self::Confidence => {
                 "Confidence study: the fused estimator's posterior beside the truth"

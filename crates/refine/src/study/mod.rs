@@ -1,7 +1,7 @@
 //! Studies: the paper's tables, regenerated on a dataset, and what measures the fused estimator.
 //!
 //! A [`Design`] says what is compared on which initial poses; an [`Examiner`] takes one frame after another and makes a
-//! [`FrameRecord`] of each; [`Tables`] summarise the records beside the [`published()`] figures, and [`write_outputs`] writes
+//! [`FrameRecord`] of each; [`Tables`] summarize the records beside the [`published()`] figures, and [`write_outputs`] writes
 //! them down. Everything follows from design and records: they may come from one process or from many.
 
 mod belief;

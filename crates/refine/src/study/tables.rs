@@ -110,7 +110,7 @@ pub struct Failure {
 }
 
 impl Tables {
-    /// Summarises the records of a study, by frame.
+    /// Summarizes the records of a study, by frame.
     pub fn new(design: &Design, records: &BTreeMap<usize, FrameRecord>) -> Self {
         let (rows, pairs) = (design.rows(), design.pairs());
         let mut blocks = Vec::new();

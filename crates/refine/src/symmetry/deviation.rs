@@ -13,7 +13,7 @@ pub(super) struct Shape {
     surface: ClosestPoints,
     /// Points of the surface relative to its centroid, each with its unit normal.
     samples: Vec<(Vector3<f64>, Vector3<f64>)>,
-    centre: Point3<f64>,
+    center: Point3<f64>,
     /// Second moments of the surface about its centroid, per area \[m²\].
     moments: Matrix3<f64>,
     /// How far a point may lie off \[m\], and how many may lie farther.
@@ -26,20 +26,20 @@ impl Shape {
     pub(super) fn new(mesh: &TriMesh, settings: &SymmetrySettings) -> Result<Self, ClosestError> {
         let surface = ClosestPoints::new(mesh)?;
         let samples = surface_samples(mesh, settings.samples.max(1), 0);
-        let (centre, moments) = moments(mesh);
-        let place = |s: &SurfaceSample| (s.point - centre, s.normal);
+        let (center, moments) = moments(mesh);
+        let place = |s: &SurfaceSample| (s.point - center, s.normal);
         // Twice the largest distance from the centroid is the diameter of what is symmetric at all.
-        let radius = mesh.vertices.iter().map(|v| (v - centre).norm()).fold(0.0, f64::max);
+        let radius = mesh.vertices.iter().map(|v| (v - center).norm()).fold(0.0, f64::max);
         let tolerance = settings.tolerance * 2.0 * radius;
         let paint = settings.color_tolerance.and_then(|most| Paint::new(mesh, tolerance, most));
         let exempt = (settings.exempt * samples.len() as f64) as usize;
         let samples = samples.iter().map(place).collect();
-        Ok(Self { surface, samples, centre, moments, tolerance, exempt, paint })
+        Ok(Self { surface, samples, center, moments, tolerance, exempt, paint })
     }
 
     /// The centroid of the surface, which every symmetry leaves where it is \[m\].
-    pub(super) fn centre(&self) -> Point3<f64> {
-        self.centre
+    pub(super) fn center(&self) -> Point3<f64> {
+        self.center
     }
 
     /// Directions of the principal axes of the surface's second moments.
@@ -57,10 +57,10 @@ impl Shape {
         let reach = slack * self.tolerance;
         let matrix = turn.to_rotation_matrix();
         let far = |(x, _): &&(Vector3<f64>, Vector3<f64>)| {
-            self.surface.closest(&(self.centre + matrix * x), reach).is_none()
+            self.surface.closest(&(self.center + matrix * x), reach).is_none()
         };
         self.samples.iter().filter(far).nth(self.exempt).is_none()
-            && self.paint.as_ref().is_none_or(|paint| paint.fits(&self.centre, &matrix))
+            && self.paint.as_ref().is_none_or(|paint| paint.fits(&self.center, &matrix))
     }
 
     /// The rotation nearest to `turn` at which every `stride`-th sample lies on the surface best, in the least-squares
@@ -99,10 +99,10 @@ impl Shape {
         let (mut sum, mut count) = (0.0, 0);
         for (x, normal) in self.samples.iter().step_by(stride) {
             let (arm, normal) = (turn * x, turn * normal);
-            let Some(closest) = self.surface.closest(&(self.centre + arm), f64::INFINITY) else {
+            let Some(closest) = self.surface.closest(&(self.center + arm), f64::INFINITY) else {
                 continue;
             };
-            let residual = (self.centre + arm - closest.point).dot(&normal);
+            let residual = (self.center + arm - closest.point).dot(&normal);
             let row = arm.cross(&normal);
             hessian += row * row.transpose();
             gradient += row * residual;
@@ -139,6 +139,6 @@ fn moments(mesh: &TriMesh) -> (Point3<f64>, Matrix3<f64>) {
         second += (squares + sum * sum.transpose()) * (weight / 12.0);
     }
     let area = f64::max(area, f64::MIN_POSITIVE);
-    let centre = first / area;
-    (centre.into(), second / area - centre * centre.transpose())
+    let center = first / area;
+    (center.into(), second / area - center * center.transpose())
 }

@@ -24,7 +24,7 @@ pub struct SymmetrySettings {
     pub tolerance: f64,
     /// The fraction of the surface that may lie farther off: dents and tabs of real objects.
     pub exempt: f64,
-    /// How much the mean colour of the surface (0..=1, each patch blurred to the size of the tolerance) may differ, root
+    /// How much the mean color of the surface (0..=1, each patch blurred to the size of the tolerance) may differ, root
     /// mean square; `None` looks at the shape alone.
     pub color_tolerance: Option<f64>,
     /// Points of the surface that are compared.
@@ -57,17 +57,17 @@ pub fn find_symmetries(
         [axis] => discrete::flip(&shape, axis).into_iter().collect(),
         _ => Vec::new(),
     };
-    let centre = shape.centre();
-    let continuous = axes.into_iter().map(|axis| ContinuousSymmetry { axis, point: centre });
+    let center = shape.center();
+    let continuous = axes.into_iter().map(|axis| ContinuousSymmetry { axis, point: center });
     Ok(Symmetries {
         continuous: continuous.collect(),
-        discrete: discrete.into_iter().map(|r| about(&centre, &r)).collect(),
+        discrete: discrete.into_iter().map(|r| about(&center, &r)).collect(),
     })
 }
 
-/// The rotation `turn` about `centre`, as a motion.
-fn about(centre: &Point3<f64>, turn: &UnitQuaternion<f64>) -> nalgebra::Isometry3<f64> {
-    let shift = centre.coords - turn * centre.coords;
+/// The rotation `turn` about `center`, as a motion.
+fn about(center: &Point3<f64>, turn: &UnitQuaternion<f64>) -> nalgebra::Isometry3<f64> {
+    let shift = center.coords - turn * center.coords;
     nalgebra::Isometry3::from_parts(shift.into(), *turn)
 }
 

@@ -1,13 +1,13 @@
-//! The colours of a surface, as seen from some way off.
+//! The colors of a surface, as seen from some way off.
 
 use nalgebra::{Point3, Rotation3, Vector3};
 use prehend_geometry::sample::surface_samples;
 use prehend_geometry::{KdTree, SurfaceSample, TriMesh};
 
-/// Samples of the colours.
+/// Samples of the colors.
 const SAMPLES: usize = 6000;
 
-/// Blurred colours of points spread over a surface.
+/// Blurred colors of points spread over a surface.
 pub(super) struct Paint {
     tree: KdTree,
     colors: Vec<Vector3<f64>>,
@@ -15,8 +15,8 @@ pub(super) struct Paint {
 }
 
 impl Paint {
-    /// The colours of `mesh`, blurred over `radius` \[m\]; `most` is the difference that still counts as the same.
-    /// `None` for a mesh without colours.
+    /// The colors of `mesh`, blurred over `radius` \[m\]; `most` is the difference that still counts as the same.
+    /// `None` for a mesh without colors.
     pub(super) fn new(mesh: &TriMesh, radius: f64, most: f64) -> Option<Self> {
         let samples = surface_samples(mesh, SAMPLES, 1);
         let sharp: Vec<Vector3<f64>> =
@@ -31,11 +31,11 @@ impl Paint {
         Some(Self { tree, colors, most })
     }
 
-    /// Whether the colours are the same after the rotation `turn` about `centre`.
-    pub(super) fn fits(&self, centre: &Point3<f64>, turn: &Rotation3<f64>) -> bool {
+    /// Whether the colors are the same after the rotation `turn` about `center`.
+    pub(super) fn fits(&self, center: &Point3<f64>, turn: &Rotation3<f64>) -> bool {
         let points = self.tree.points();
         let difference = |(point, color): (&Point3<f64>, &Vector3<f64>)| {
-            let there = centre + turn * (point - centre);
+            let there = center + turn * (point - center);
             let found = self.tree.nearest(&there, f64::INFINITY);
             found.map_or(0.0, |n| (self.colors[n.index] - color).norm_squared() / 3.0)
         };
@@ -44,7 +44,7 @@ impl Paint {
     }
 }
 
-/// The colour of `mesh` at `sample`, from its texture or else its vertices.
+/// The color of `mesh` at `sample`, from its texture or else its vertices.
 fn color(mesh: &TriMesh, sample: &SurfaceSample) -> Option<Vector3<f64>> {
     let corners = mesh.faces[sample.face as usize];
     let weighted = corners.into_iter().zip(sample.barycentric);

@@ -1,4 +1,4 @@
-//! What the JSON files of a dataset say. Lengths in millimetres, as BOP has them.
+//! What the JSON files of a dataset say. Lengths in millimeters, as BOP has them.
 
 use nalgebra::{Isometry3, Vector3};
 use prehend_geometry::TriMesh;
@@ -8,7 +8,7 @@ use serde_json::{Map, Value, json};
 use crate::Inertial;
 use crate::bop::{UNITS_PER_NEWTON, extent_to_bop, rotation_to_row_major, translation_to_mm};
 
-/// Millimetres of one unit of the depth images.
+/// Millimeters of one unit of the depth images.
 pub(super) const DEPTH_SCALE: f64 = 0.1;
 /// Forces are clipped at this many units, as sensors do.
 const FORCE_LIMIT: f64 = 10_000.0;
@@ -74,7 +74,7 @@ pub(super) fn touch(forces: &[Vector3<f64>], taxels: &str) -> Value {
     json!({ "body": "hand", "taxels": taxels, "force": force })
 }
 
-/// Entry of `models_info.json`; `mesh` in metres.
+/// Entry of `models_info.json`; `mesh` in meters.
 pub(super) fn model(mesh: &TriMesh, inertial: &Inertial) -> Value {
     let mut fields = extent_to_bop(&mesh.vertices);
     let rows = inertial.inertia.row_iter().map(|r| r.iter().copied().collect());

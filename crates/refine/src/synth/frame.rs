@@ -33,7 +33,7 @@ pub(super) struct Recorded<'a> {
 }
 
 impl Recorded<'_> {
-    /// Writes the images to the scene's folders, colour as JPEG of that quality or, if that is 0, as PNG.
+    /// Writes the images to the scene's folders, color as JPEG of that quality or, if that is 0, as PNG.
     ///
     /// # Errors
     /// When one cannot be written; those before it are there then.

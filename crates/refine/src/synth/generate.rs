@@ -276,7 +276,7 @@ impl<'s> Scene<'_, 's> {
             visible: &shot.visible,
             joint_names: self.hand.robot.tree.joint_names(),
         };
-        let quality = self.settings.sensor.colour.jpeg_quality;
+        let quality = self.settings.sensor.color.jpeg_quality;
         let entries = recorded.write(&self.dir, im_id, quality)?;
         Ok(write_atomically(&self.entry(im_id), to_text(&entries).as_bytes())?)
     }

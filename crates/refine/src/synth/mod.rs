@@ -33,7 +33,7 @@ pub use ready_made::ready_made_moments;
 pub use scene::{Scene, default_scene};
 pub(crate) use sensor::smooth_field;
 pub use sensor::{
-    BackgroundSettings, CalibrationSettings, ColourSettings, DepthSettings, LightSettings,
+    BackgroundSettings, CalibrationSettings, ColorSettings, DepthSettings, LightSettings,
     MaskSettings, ModelSettings, SensorSettings, SettingError, TouchSettings, ViewpointSettings,
 };
 pub use sequence::{Sequence, SequenceFrame, default_sequence};

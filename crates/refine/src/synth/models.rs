@@ -11,7 +11,7 @@ use super::folder::make;
 use crate::bop::write_atomically;
 use crate::{AssetError, Inertial};
 
-/// Writes `obj_*.ply` in millimetres, with textures beside them, and `models_info.json` to the folder `dir`.
+/// Writes `obj_*.ply` in millimeters, with textures beside them, and `models_info.json` to the folder `dir`.
 ///
 /// # Errors
 /// When a file cannot be written.

@@ -68,7 +68,7 @@ pub fn default_scene(seed: u64) -> Result<Scene, AssetError> {
     };
     let scale = |k: usize| if k < 3 { INITIAL_TRANSLATION } else { INITIAL_ROTATION } / 3f64.sqrt();
     let error = Vector6::from_fn(|k, _| scale(k) * noise.normal());
-    let initial = perturb_about(&truth, &(truth * object.centre).coords, &error);
+    let initial = perturb_about(&truth, &(truth * object.center).coords, &error);
     let (object, obj_id) = (Arc::new(object), grasp.object.bop_id());
     Ok(Scene { observation, object, obj_id, robot, urdf, truth, initial })
 }

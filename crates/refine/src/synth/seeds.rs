@@ -21,7 +21,7 @@ pub(super) enum Use {
 
 /// A seed for one `purpose`, one object and one number.
 pub(super) fn seed(seed: u64, purpose: Use, obj_id: u32, number: u32) -> u64 {
-    // The finaliser of SplitMix64 after each word, so that near words give unrelated seeds.
+    // The finalizer of SplitMix64 after each word, so that near words give unrelated seeds.
     let words = [seed, purpose as u64, u64::from(obj_id), u64::from(number)];
     words.into_iter().fold(0_u64, |state, word| {
         let mut z = (state ^ word).wrapping_add(0x9e37_79b9_7f4a_7c15);

@@ -7,14 +7,14 @@ use prehend_render::{Camera, DepthImage, Light, Mask, RgbImage, SceneObject, ren
 
 use crate::{Object, Robot};
 
-/// Standard deviation of a colour channel.
+/// Standard deviation of a color channel.
 const COLOR_NOISE: f64 = 0.02;
 /// Standard deviation of a depth pixel \[m\].
 const DEPTH_NOISE: f64 = 1.5e-3;
 /// Taxels this far from the object \[m\] still feel it: skin deforms.
 const TOUCH_REACH: f64 = 2e-3;
 
-/// Colour, depth and mask of the grasp under a light that the estimator is not told.
+/// Color, depth and mask of the grasp under a light that the estimator is not told.
 pub(super) fn photograph(
     camera: &Camera,
     object: &Object,

@@ -53,7 +53,7 @@ pub fn default_sequence(seed: u64, count: usize) -> Result<Sequence, AssetError>
     let (start, joints) = observation
         .hand
         .map_or_else(|| (Isometry3::identity(), Vec::new()), |hand| (hand.t_cam_hand, hand.joints));
-    let centre = (truth * object.centre).coords;
+    let center = (truth * object.center).coords;
     let mut noise = SplitMix64::new(seed ^ 0x5e9);
     let frame = |index: usize| {
         let time = STEP * index as u32;
@@ -66,7 +66,7 @@ pub fn default_sequence(seed: u64, count: usize) -> Result<Sequence, AssetError>
             TURN * (0.8 * phase).sin(),
             0.5 * TURN * (1.1 * phase).sin(),
         );
-        let t_cam_hand = perturb_about(&start, &centre, &sway);
+        let t_cam_hand = perturb_about(&start, &center, &sway);
         let slide = Vector3::new(0.0, 0.0, SLIDE * (1.7 * phase).sin());
         let t_hand_object = start.inverse() * truth;
         let truth = t_cam_hand * Isometry3::from(slide) * t_hand_object;
@@ -92,8 +92,8 @@ mod tests {
         let sequence = default_sequence(1, 4).unwrap();
         let place = |frame: &SequenceFrame| -> (Point3<f64>, Point3<f64>) {
             let hand = frame.observation.hand.as_ref().unwrap().t_cam_hand;
-            let centre = frame.truth * sequence.object.centre;
-            (centre, hand.inverse() * centre)
+            let center = frame.truth * sequence.object.center;
+            (center, hand.inverse() * center)
         };
         for pair in sequence.frames.windows(2) {
             let ((a, in_hand), (b, next_in_hand)) = (place(&pair[0]), place(&pair[1]));

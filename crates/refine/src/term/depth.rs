@@ -20,7 +20,7 @@ pub struct DepthSettings {
     pub sigma: f64,
     /// Distance at which a point counts as an outlier \[m\].
     pub outlier: f64,
-    /// How many independent measurements the points of one frame amount to: neighbouring depth errors
+    /// How many independent measurements the points of one frame amount to: neighboring depth errors
     /// are correlated, so 2000 points are not 2000 witnesses. The two directions have half of them each.
     pub effective_points: f64,
 }
@@ -155,13 +155,13 @@ impl Term for DepthTerm {
             + self.unseen(&losses.1)
     }
 
-    fn linearise(&self, state: &State, normal: &mut Normal) -> f64 {
+    fn linearize(&self, state: &State, normal: &mut Normal) -> f64 {
         let cauchy = Cauchy { scale: self.settings.outlier };
-        let centre = state.centre();
+        let center = state.center();
         let (to_mesh, to_cloud) = self.matches(state, |pair| {
             let residual = pair.cloud - pair.surface;
             let r2 = residual.norm_squared();
-            let arm = pair.surface.coords - centre;
+            let arm = pair.surface.coords - center;
             (cauchy.loss(r2), cauchy.weight(r2), residual, arm)
         });
         let mut value = self.unseen(&to_cloud);

@@ -53,7 +53,7 @@ impl FreeSpaceTerm {
 
     /// Calls `f` with the place of each sample (camera frame) and how far it is in front of measured depth \[m\].
     fn in_front(&self, state: &State, mut f: impl FnMut(&Vector3<f64>, &Vector3<f64>, f64)) {
-        let apparent = state.camera.apparent(&state.t_cam_object, &state.centre());
+        let apparent = state.camera.apparent(&state.t_cam_object, &state.center());
         for sample in self.object.samples.iter().step_by(self.stride()) {
             let normal = state.t_cam_object * sample.normal;
             let point = (state.t_cam_object * sample.point).coords;
@@ -83,7 +83,7 @@ impl FreeSpaceTerm {
         self.object.samples.len().div_ceil(self.settings.samples.max(1)).max(1)
     }
 
-    /// Nats of one square metre.
+    /// Nats of one square meter.
     fn share(&self) -> f64 {
         let count = self.object.samples.len().div_ceil(self.stride()).max(1) as f64;
         share(self.settings.effective_samples, count, self.settings.sigma)
@@ -102,14 +102,14 @@ impl Term for FreeSpaceTerm {
         self.share() * value
     }
 
-    fn linearise(&self, state: &State, normal: &mut Normal) -> f64 {
+    fn linearize(&self, state: &State, normal: &mut Normal) -> f64 {
         let cauchy = Cauchy { scale: self.settings.outlier };
-        let (share, centre) = (self.share(), state.centre());
+        let (share, center) = (self.share(), state.center());
         let mut value = 0.0;
         self.in_front(state, |point, depth, beyond| {
             value += cauchy.loss(beyond * beyond);
             // Which pixel a sample falls on is taken as it is: depth's steps have no derivative.
-            let turn = (point - centre).cross(&Vector3::z());
+            let turn = (point - center).cross(&Vector3::z());
             let object = [0.0, 0.0, -1.0, -turn.x, -turn.y, -turn.z];
             let mut camera = SVector::<f64, 5>::zeros();
             camera.fixed_rows_mut::<2>(0).copy_from(&depth.xy());
@@ -141,7 +141,7 @@ mod tests {
             let towards = Vector6::new(0.0, 0.0, -6e-3, 0.0, 0.0, 0.0);
             let state = state.moved(Block::ObjectPose, towards.as_slice());
             let mut depth = scene.observation.depth.clone();
-            depth.pixels_mut().fill(state.centre().z as f32 - 0.02);
+            depth.pixels_mut().fill(state.center().z as f32 - 0.02);
             let term = term(depth);
             assert!(term.value(&state) > 0.0);
             for block in [Block::ObjectPose, Block::Camera] {

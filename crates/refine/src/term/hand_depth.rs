@@ -92,7 +92,7 @@ impl HandDepthTerm {
         self.points.par_iter().with_min_len(32).map(sample).collect()
     }
 
-    /// Nats of one square metre.
+    /// Nats of one square meter.
     fn share(&self) -> f64 {
         let count = self.points.len().max(1) as f64;
         share(self.settings.effective_points, count, self.settings.sigma)
@@ -119,15 +119,15 @@ impl Term for HandDepthTerm {
         self.share() * losses.sum::<f64>()
     }
 
-    fn linearise(&self, state: &State, normal: &mut Normal) -> f64 {
+    fn linearize(&self, state: &State, normal: &mut Normal) -> f64 {
         let cauchy = Cauchy { scale: self.settings.outlier };
-        let (share, centre) = (self.share(), state.centre());
+        let (share, center) = (self.share(), state.center());
         let mut value = 0.0;
         for (sample, (ray, depth)) in self.samples(state).iter().zip(&self.points) {
             value += self.loss(sample.as_ref().map(|(_, s)| s.field.distance));
             let Some((point, sample)) = sample else { continue };
             let (distance, n) = (sample.field.distance, sample.field.gradient);
-            let turn = (point.coords - centre).cross(&n);
+            let turn = (point.coords - center).cross(&n);
             let hand = -Vector6::new(n.x, n.y, n.z, turn.x, turn.y, turn.z);
             let camera = state.camera.point_jacobian(ray, *depth).tr_mul(&n);
             let weight = share * cauchy.weight(distance * distance);

@@ -46,7 +46,7 @@ pub trait Term: Send + Sync {
     /// The term at `state`; adds its gradient and Gauss–Newton Hessian by the requested blocks to `normal`.
     ///
     /// Blocks that it is constant in, or not differentiable by, are left as they are.
-    fn linearise(&self, state: &State, normal: &mut Normal) -> f64;
+    fn linearize(&self, state: &State, normal: &mut Normal) -> f64;
 
     /// Whether the term may change with `block`, so that room is needed for derivatives by it.
     fn depends_on(&self, block: Block) -> bool {
@@ -93,10 +93,10 @@ mod gradient_check {
         (scene, state, hand)
     }
 
-    /// Steps of a block's parameters that move the surface about as far as a metre would.
+    /// Steps of a block's parameters that move the surface about as far as a meter would.
     fn scales(block: Block) -> Vec<f64> {
         match block {
-            // Radians move the surface by a tenth of what metres do.
+            // Radians move the surface by a tenth of what meters do.
             Block::ObjectPose | Block::HandPose => vec![1.0, 1.0, 1.0, 10.0, 10.0, 10.0],
             Block::Joints(count) => vec![10.0; count],
             Block::Camera => vec![2.0, 1.0, 2.0, 2.0, 10.0],
@@ -113,7 +113,7 @@ mod gradient_check {
         tolerance: f64,
     ) {
         let mut normal = Normal::new(&[block]);
-        let value = term.linearise(state, &mut normal);
+        let value = term.linearize(state, &mut normal);
         assert!((value - term.value(state)).abs() <= 1e-9 * value.abs(), "the two values differ");
         let scales = scales(block);
         let scaled = |x: &[f64]| {
@@ -152,7 +152,7 @@ mod gradient_check {
         let rigid = [Block::ObjectPose, Block::Camera];
         let mut alone = Normal::new(&rigid);
         let mut all = Normal::new(&[rigid[0], rigid[1], Block::Patches(patches.count())]);
-        let (value, same) = (term.linearise(state, &mut alone), term.linearise(state, &mut all));
+        let (value, same) = (term.linearize(state, &mut alone), term.linearize(state, &mut all));
         assert!((value / same - 1.0).abs() < 1e-5, "{value} {same}");
         let gradient = all.gradient().rows(0, 11) - alone.gradient();
         assert!(gradient.norm() < 1e-4 * alone.gradient().norm());

@@ -34,7 +34,7 @@ const NEAR: f64 = 0.2;
 const OWN: f64 = 1e-3;
 
 /// What an observation shows of the object, cut into patches by square tiles of the image, where the object may be off from its
-/// model: each patch is displaced, and neighbours alike, by a Gaussian process over space.
+/// model: each patch is displaced, and neighbors alike, by a Gaussian process over space.
 ///
 /// Patches are of the image rather than of the model, so that only what is seen has any.
 #[derive(Clone, Debug)]
@@ -165,7 +165,7 @@ mod tests {
     use crate::synth::default_scene;
 
     #[test]
-    fn every_pixel_of_the_mask_is_in_a_patch_and_neighbours_are_off_alike() {
+    fn every_pixel_of_the_mask_is_in_a_patch_and_neighbors_are_off_alike() {
         let scene = default_scene(1).unwrap();
         let (observation, distance) = (&scene.observation, scene.truth.translation.z);
         let settings = DeviationSettings::default();

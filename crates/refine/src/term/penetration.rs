@@ -15,7 +15,7 @@ pub struct PenetrationSettings {
     /// Standard deviation of the depth to which a patch of [`area`](Self::area) is pressed in \[m\]: the compliance of
     /// skin and pads, and the errors of the models.
     pub sigma: f64,
-    /// Area of a patch whose depth is independent of its neighbours' \[m²\].
+    /// Area of a patch whose depth is independent of its neighbors' \[m²\].
     pub area: f64,
 }
 
@@ -52,7 +52,7 @@ impl PenetrationTerm {
         samples.filter_map(|s| deep(&s.point, &hand)).collect()
     }
 
-    /// Nats of one square metre of depth at one sample.
+    /// Nats of one square meter of depth at one sample.
     fn share(&self) -> f64 {
         let area = self.object.area / self.object.samples.len().max(1) as f64;
         area / self.settings.area / self.settings.sigma.powi(2)
@@ -69,12 +69,12 @@ impl Term for PenetrationTerm {
         0.5 * self.share() * depths.iter().map(|(_, s)| s.field.distance.powi(2)).sum::<f64>()
     }
 
-    fn linearise(&self, state: &State, normal: &mut Normal) -> f64 {
-        let (share, centre) = (self.share(), state.centre());
+    fn linearize(&self, state: &State, normal: &mut Normal) -> f64 {
+        let (share, center) = (self.share(), state.center());
         let mut value = 0.0;
         for (point, sample) in self.inside(state) {
             let (distance, n) = (sample.field.distance, sample.field.gradient);
-            let turn = (point.coords - centre).cross(&n);
+            let turn = (point.coords - center).cross(&n);
             let object = Vector6::new(n.x, n.y, n.z, turn.x, turn.y, turn.z);
             let hand = -object;
             let row = [

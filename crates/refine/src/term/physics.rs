@@ -26,7 +26,7 @@ pub struct PhysicsSettings {
     pub damping_ratio: f64,
     /// Coefficient of friction.
     pub friction: f64,
-    /// Slip speed that regularises friction \[m/s\].
+    /// Slip speed that regularizes friction \[m/s\].
     pub slip_scale: f64,
     /// Length of a rollout \[s\].
     pub time: f64,
@@ -63,11 +63,11 @@ const BLOWN_UP: f64 = f64::MAX;
 ///
 /// L_DP is how fast and how far the object has moved after a short rollout under gravity and penalty
 /// contact with the hand, from rest and from two small pushes, relative to free fall. It enters through
-/// a logarithm: one centimetre of penetration throws the object out at hundreds of g, and must count as
+/// a logarithm: one centimeter of penetration throws the object out at hundreds of g, and must count as
 /// wrong, not as a thousand times more wrong than everything the camera says.
 pub struct PhysicsTerm {
     stability: StabilityLoss,
-    initial_centre: Vector3<f64>,
+    initial_center: Vector3<f64>,
     settings: PhysicsSettings,
 }
 
@@ -120,12 +120,12 @@ impl PhysicsTerm {
             perturbations: Perturbation::rest_and_diagonal(settings.perturbation),
             weights: StabilityWeights::relative_to_fall(g, settings.time, object.radius),
         };
-        Ok(Self { stability, initial_centre: initial.centre(), settings })
+        Ok(Self { stability, initial_center: initial.center(), settings })
     }
 
     /// The rollouts with steps short enough for the contacts at `pose`.
     ///
-    /// Penetration of some millimetres makes contact and friction so stiff that steps which suit a held
+    /// Penetration of some millimeters makes contact and friction so stiff that steps which suit a held
     /// object would be unstable, and their derivatives meaningless.
     fn stable(&self, pose: &Isometry3<f64>) -> StabilityLoss {
         let mut stability = self.stability.clone();
@@ -137,7 +137,7 @@ impl PhysicsTerm {
 
     fn displacement(&self, state: &State) -> (Vector3<f64>, f64) {
         let precision = self.settings.displacement_sigma.powi(-2);
-        (state.centre() - self.initial_centre, precision)
+        (state.center() - self.initial_center, precision)
     }
 
     /// Nats of a stability loss.
@@ -158,13 +158,13 @@ impl Term for PhysicsTerm {
         self.nats(loss) + 0.5 * precision * moved.norm_squared()
     }
 
-    fn linearise(&self, state: &State, normal: &mut Normal) -> f64 {
+    fn linearize(&self, state: &State, normal: &mut Normal) -> f64 {
         let pose = &state.t_cam_object;
-        let centre = Point3::from(state.centre());
+        let center = Point3::from(state.center());
         let (moved, precision) = self.displacement(state);
         // A rollout that blew up has no derivative.
         let StabilityJacobian { value: loss, gradient, normal: jtj } =
-            self.stable(pose).linearise(pose, &centre).unwrap_or(StabilityJacobian {
+            self.stable(pose).linearize(pose, &center).unwrap_or(StabilityJacobian {
                 value: BLOWN_UP,
                 gradient: Vector6::zeros(),
                 normal: Matrix6::zeros(),
@@ -208,15 +208,15 @@ mod tests {
         for depth in [0.0, 2e-3, 5e-3] {
             let twist = Vector6::new(toward_palm.x, toward_palm.y, toward_palm.z, 0.0, 0.0, 0.0);
             let pose = held.moved(Block::ObjectPose, (twist * depth).as_slice());
-            let linearised = |steps| {
+            let linearized = |steps| {
                 let settings = PhysicsSettings { steps, ..PhysicsSettings::default() };
                 let term =
                     PhysicsTerm::new(observation, &scene.object, robot, &held, settings).unwrap();
                 let mut normal = Normal::new(&[Block::ObjectPose]);
-                (term.linearise(&pose, &mut normal), normal.gradient().clone())
+                (term.linearize(&pose, &mut normal), normal.gradient().clone())
             };
-            let (value, gradient) = linearised(PhysicsSettings::default().steps);
-            let (fine_value, fine_gradient) = linearised((2000, 2000));
+            let (value, gradient) = linearized(PhysicsSettings::default().steps);
+            let (fine_value, fine_gradient) = linearized((2000, 2000));
             let cosine = gradient.normalize().dot(&fine_gradient.normalize());
             assert!((value - fine_value).abs() < 0.05 * fine_value, "{value} {fine_value}");
             // First-order integration of a stiff contact: close, not equal. Unstable steps gave −0.35.

@@ -11,7 +11,7 @@ use crate::{Block, CameraCorrection, Normal, RefineError, State};
 ///
 #[derive(Clone, Debug, PartialEq)]
 pub struct PriorSettings {
-    /// The object's centre in each direction of the camera frame \[m\].
+    /// The object's center in each direction of the camera frame \[m\].
     pub object_translation: [f64; 3],
     /// The object's rotation about each axis of the camera frame \[rad\].
     pub object_rotation: [f64; 3],
@@ -25,7 +25,7 @@ pub struct PriorSettings {
     pub depth_scale: f64,
     /// Depth \[m\].
     pub depth_bias: f64,
-    /// The centre of projection, across and down \[focal lengths\].
+    /// The center of projection, across and down \[focal lengths\].
     pub shift: f64,
     /// The size of images, as a part of it: errors of the focal length and of the model's size.
     pub magnification: f64,
@@ -47,7 +47,7 @@ impl PriorSettings {
 }
 
 impl Default for PriorSettings {
-    /// An initial pose that is good to some centimetres and some tens of degrees, and a robot of common accuracy.
+    /// An initial pose that is good to some centimeters and some tens of degrees, and a robot of common accuracy.
     fn default() -> Self {
         Self {
             object_translation: [0.03; 3],
@@ -91,7 +91,7 @@ impl Prior {
         }
         let precision = |sigma: f64| sigma.powi(-2);
         Ok(Self {
-            object: (state.centre(), state.t_cam_object),
+            object: (state.center(), state.t_cam_object),
             hand: state.t_cam_hand,
             joints: state.joints.clone(),
             precision_object: Vector6::from_vec(object).map(precision),
@@ -102,12 +102,12 @@ impl Prior {
     }
 
     /// How far `pose` has been moved from `from`, as (displacement of the point that was at `point`, rotation vector),
-    /// and the derivatives by a left twist of `pose` about `centre`.
+    /// and the derivatives by a left twist of `pose` about `center`.
     pub(crate) fn deviation(
         pose: &Isometry3<f64>,
         from: &Isometry3<f64>,
         point: &Vector3<f64>,
-        centre: &Vector3<f64>,
+        center: &Vector3<f64>,
     ) -> (Vector6<f64>, Matrix6<f64>) {
         let motion = pose * from.inverse();
         let place = (motion * Point3::from(*point)).coords;
@@ -116,17 +116,17 @@ impl Prior {
         deviation.fixed_rows_mut::<3>(0).copy_from(&(place - point));
         deviation.fixed_rows_mut::<3>(3).copy_from(&turn);
         let mut jacobian = Matrix6::identity();
-        jacobian.fixed_view_mut::<3, 3>(0, 3).copy_from(&-cross_matrix(&(place - centre)));
+        jacobian.fixed_view_mut::<3, 3>(0, 3).copy_from(&-cross_matrix(&(place - center)));
         jacobian.fixed_view_mut::<3, 3>(3, 3).copy_from(&so3_left_jacobian_inverse(&turn));
         (deviation, jacobian)
     }
 
     /// How the object and the hand deviate.
     fn poses(&self, state: &State) -> [PoseDeviation; 2] {
-        let (centre, from) = &self.object;
-        let now = state.centre();
+        let (center, from) = &self.object;
+        let now = state.center();
         let of = |block, pose, from, precision| {
-            let (deviation, jacobian) = Self::deviation(pose, from, centre, &now);
+            let (deviation, jacobian) = Self::deviation(pose, from, center, &now);
             PoseDeviation { block, deviation, jacobian, precision }
         };
         [
@@ -167,7 +167,7 @@ impl Term for Prior {
         0.5 * (of_poses.sum::<f64>() + of_numbers.sum::<f64>())
     }
 
-    fn linearise(&self, state: &State, normal: &mut Normal) -> f64 {
+    fn linearize(&self, state: &State, normal: &mut Normal) -> f64 {
         for PoseDeviation { block, deviation, jacobian, precision } in self.poses(state) {
             let weighted = Matrix6::from_diagonal(&precision) * jacobian;
             normal.add(&[block], &weighted.tr_mul(&deviation), &jacobian.tr_mul(&weighted));

@@ -17,14 +17,14 @@ use crate::{Block, Normal, Object, Observation, RefineError, State};
 pub struct RenderingSettings {
     /// The image is made smaller by this factor.
     pub downsample: usize,
-    /// Whether colours are compared.
-    pub colour: bool,
-    /// Standard deviation of a colour, relative to the object's brightness in the image: exposure is
+    /// Whether colors are compared.
+    pub color: bool,
+    /// Standard deviation of a color, relative to the object's brightness in the image: exposure is
     /// unknown, and a dark image is no better evidence than a bright one.
     pub sigma: f64,
     /// Standard deviation of the silhouette's coverage of a pixel (0..=1).
     pub mask_sigma: f64,
-    /// Colour residual beyond which an outlier is forgiven, in standard deviations.
+    /// Color residual beyond which an outlier is forgiven, in standard deviations.
     pub outlier: f64,
     /// How many independent measurements the pixels amount to: the errors of shading, texture and
     /// segmentation reach over whole patches.
@@ -44,7 +44,7 @@ impl Default for RenderingSettings {
     fn default() -> Self {
         Self {
             downsample: 2,
-            colour: true,
+            color: true,
             sigma: 0.15,
             mask_sigma: 0.3,
             outlier: 2.0,
@@ -58,7 +58,7 @@ impl Default for RenderingSettings {
 #[derive(Clone)]
 pub(crate) struct Segmented {
     target: Arc<Target>,
-    /// Root mean square of the colours under the mask.
+    /// Root mean square of the colors under the mask.
     brightness: f64,
 }
 
@@ -103,8 +103,8 @@ pub struct RenderingTerm {
     /// Nats per unit of the renderer's loss.
     scale: f64,
     light_ridge: f64,
-    /// Whether colours are compared.
-    colour: bool,
+    /// Whether colors are compared.
+    color: bool,
     /// Where the object may be off from its model, and the width of the patches' tiles in the image at hand \[px\].
     patches: Option<(Arc<Patches>, usize)>,
 }
@@ -129,7 +129,7 @@ impl RenderingTerm {
         let Segmented { target, brightness } = image;
         let sigma = settings.sigma * brightness;
         let options = LossOptions {
-            color_weight: if settings.colour { 1.0 } else { 0.0 },
+            color_weight: if settings.color { 1.0 } else { 0.0 },
             mask_weight: (sigma / settings.mask_sigma).powi(2),
             // Or a pose could lower its loss by hiding behind the hand.
             hidden_is_missed: true,
@@ -148,7 +148,7 @@ impl RenderingTerm {
             ),
             scale: 0.5 * settings.effective_pixels / (sigma * sigma),
             light_ridge: settings.light_ridge,
-            colour: settings.colour,
+            color: settings.color,
             patches: None,
         }
     }
@@ -160,7 +160,7 @@ impl RenderingTerm {
     }
 }
 
-/// Root mean square of the colours under the mask; never zero.
+/// Root mean square of the colors under the mask; never zero.
 fn brightness(observation: &Observation) -> f64 {
     let pixels = observation.color.pixels().iter().zip(observation.mask.pixels());
     let (sum, count) = pixels
@@ -184,13 +184,13 @@ impl Term for RenderingTerm {
         true
     }
 
-    fn linearise(&self, state: &State, normal: &mut Normal) -> f64 {
-        let centre = state.centre();
+    fn linearize(&self, state: &State, normal: &mut Normal) -> f64 {
+        let center = state.center();
         let (model, seen) = (&self.object.model, apparent(state));
-        let turning = seen * self.object.centre;
+        let turning = seen * self.object.center;
         // The object appears shifted, and turned as it is.
         let mut seen_by_state = SMatrix::<f64, 6, 11>::zeros();
-        let place = state.camera.apparent_jacobian(&centre);
+        let place = state.camera.apparent_jacobian(&center);
         seen_by_state.fixed_view_mut::<3, 3>(0, 0).copy_from(&place.fixed_columns::<3>(0));
         seen_by_state.fixed_view_mut::<3, 5>(0, 6).copy_from(&place.fixed_columns::<5>(3));
         seen_by_state.fixed_view_mut::<3, 3>(3, 3).fill_with_identity();
@@ -202,7 +202,7 @@ impl Term for RenderingTerm {
         // One tile for all if nobody asks for more.
         let side = patches.map_or(usize::MAX, |(_, side)| *side);
         let tiles =
-            self.loss.linearise_tiles(model, &seen, &turning, &state.light, &self.target, side);
+            self.loss.linearize_tiles(model, &seen, &turning, &state.light, &self.target, side);
         let mut sums = PatchSums::<11>::new(count);
         let mut value = 0.0;
         for Tile { column, row, at } in tiles {
@@ -219,7 +219,7 @@ impl Term for RenderingTerm {
     }
 
     fn light(&self, state: &State) -> Option<Light> {
-        if !self.colour {
+        if !self.color {
             return None;
         }
         let (model, pose) = (&self.object.model, apparent(state));
@@ -232,7 +232,7 @@ impl Term for RenderingTerm {
 
 /// Where the object appears to be to the camera as it is said to be.
 fn apparent(state: &State) -> Isometry3<f64> {
-    state.camera.apparent(&state.t_cam_object, &state.centre())
+    state.camera.apparent(&state.t_cam_object, &state.center())
 }
 
 #[cfg(test)]

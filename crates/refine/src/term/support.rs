@@ -92,8 +92,8 @@ struct Near {
 /// The balance of a state.
 struct Held {
     hand: ArticulatedRobot,
-    /// Centre of mass, in the camera frame.
-    mass_centre: Point3<f64>,
+    /// Center of mass, in the camera frame.
+    mass_center: Point3<f64>,
     near: Vec<Near>,
     balance: CompliantBalance,
 }
@@ -136,7 +136,7 @@ impl SupportTerm {
     /// What holds the object at `state`. A hand that cannot be posed holds nothing, and says nothing.
     fn held(&self, state: &State) -> Option<Held> {
         let hand = self.robot.articulated(&state.t_cam_hand, &state.joints).ok()?;
-        let mass_centre = state.t_cam_object * self.object.inertial.center_of_mass;
+        let mass_center = state.t_cam_object * self.object.inertial.center_of_mass;
         let samples = self.object.samples.par_iter().step_by(self.stride()).with_min_len(128);
         let near: Vec<Near> = samples
             .filter_map(|sample| {
@@ -148,13 +148,13 @@ impl SupportTerm {
         let zero = Vector3::zeros();
         let load = self.felt.iter().fold(self.wrench(&zero, &weight), |load, felt| {
             let t_cam_link = hand.posed().t_world_links()[felt.link];
-            let arm = t_cam_link * felt.position - mass_centre;
+            let arm = t_cam_link * felt.position - mass_center;
             load + self.wrench(&arm, &(t_cam_link * felt.force))
         });
         let supports: Vec<CompliantSupport> = near.iter().map(|near| near.support).collect();
         let length = self.object.radius;
-        let balance = CompliantBalance::find(&supports, &mass_centre, length, &load);
-        Some(Held { hand, mass_centre, near, balance })
+        let balance = CompliantBalance::find(&supports, &mass_center, length, &load);
+        Some(Held { hand, mass_center, near, balance })
     }
 
     /// One sample in so many is looked at: they follow each other over the surface.
@@ -204,7 +204,7 @@ fn joined(force: &Vector3<f64>, torque: &Vector3<f64>) -> Vector6<f64> {
     Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z)
 }
 
-/// Velocities of a point at `arm` from the centre of a unit twist's motion, and the twist's rotation, one twist after the other.
+/// Velocities of a point at `arm` from the center of a unit twist's motion, and the twist's rotation, one twist after the other.
 fn twists(arm: &Vector3<f64>) -> [(Vector3<f64>, Vector3<f64>); 6] {
     std::array::from_fn(|k| match k {
         0..3 => (Vector3::ith(k, 1.0), Vector3::zeros()),
@@ -228,7 +228,7 @@ impl Term for SupportTerm {
         self.held(state).map_or(0.0, |held| self.nats() * held.balance.value)
     }
 
-    fn linearise(&self, state: &State, normal: &mut Normal) -> f64 {
+    fn linearize(&self, state: &State, normal: &mut Normal) -> f64 {
         let Some(held) = self.held(state) else { return 0.0 };
         let blocks = [Block::ObjectPose, Block::HandPose, Block::Joints(state.joints.len())];
         let (jacobian, yielding) = self.derivatives(&held, state);
@@ -245,7 +245,7 @@ impl SupportTerm {
     /// less, the more it yields. Beside it, what that changes in the residual's square and not in the value: forces
     /// that are less cost less.
     fn derivatives(&self, held: &Held, state: &State) -> (DMatrix<f64>, DVector<f64>) {
-        let (centre, mass_centre) = (state.centre(), held.mass_centre);
+        let (center, mass_center) = (state.center(), held.mass_center);
         let parameters = JOINTS + state.joints.len();
         let mut jacobian = DMatrix::zeros(6, parameters);
         let mut yielding = DVector::zeros(parameters);
@@ -253,7 +253,7 @@ impl SupportTerm {
             if *force == Vector3::zeros() {
                 continue;
             }
-            let arm = near.point - mass_centre;
+            let arm = near.point - mass_center;
             let (torque, wrench) = (self.torque(&arm, force), self.wrench(&arm, force));
             let cost = 0.5 * near.support.compliance * force.norm_squared();
             let mut add = |k: usize, distance: f64, turned: Vector6<f64>| {
@@ -262,7 +262,7 @@ impl SupportTerm {
                 let mut column = jacobian.column_mut(k);
                 column += turned - wrench * relative;
             };
-            for (k, (velocity, turn)) in twists(&(near.point.coords - centre)).iter().enumerate() {
+            for (k, (velocity, turn)) in twists(&(near.point.coords - center)).iter().enumerate() {
                 let distance = near.sample.field.gradient.dot(velocity);
                 add(k, distance, joined(&turn.cross(force), &turn.cross(&torque)));
                 add(HAND + k, -distance, Vector6::zeros());
@@ -274,17 +274,17 @@ impl SupportTerm {
         for felt in &self.felt {
             let t_cam_link = held.hand.posed().t_world_links()[felt.link];
             let (point, force) = (t_cam_link * felt.position, t_cam_link * felt.force);
-            let arm = point - mass_centre;
-            // By how fast its point goes away from the centre of mass, and how fast it turns.
+            let arm = point - mass_center;
+            // By how fast its point goes away from the center of mass, and how fast it turns.
             let mut add = |k: usize, velocity: Vector3<f64>, turning: Vector3<f64>| {
                 let torque = self.torque(&velocity, &force) + self.torque(&arm, &turning);
                 let mut column = jacobian.column_mut(k);
                 column += joined(&turning, &torque);
             };
-            for (k, (velocity, _)) in twists(&(mass_centre.coords - centre)).iter().enumerate() {
+            for (k, (velocity, _)) in twists(&(mass_center.coords - center)).iter().enumerate() {
                 add(k, -velocity, Vector3::zeros());
             }
-            for (k, (velocity, turn)) in twists(&(point.coords - centre)).iter().enumerate() {
+            for (k, (velocity, turn)) in twists(&(point.coords - center)).iter().enumerate() {
                 add(HAND + k, *velocity, turn.cross(&force));
             }
             let end = point + force;
@@ -362,7 +362,7 @@ mod tests {
         };
         let term = new(settings.clone()).unwrap();
         let mut normal = Normal::new(&[Block::ObjectPose]);
-        assert_eq!((term.value(&state), term.linearise(&state, &mut normal)), (0.0, 0.0));
+        assert_eq!((term.value(&state), term.linearize(&state, &mut normal)), (0.0, 0.0));
         assert_eq!(normal.gradient().norm(), 0.0);
         for wrong in [
             SupportSettings { reach: 0.0, ..settings.clone() },

@@ -45,7 +45,7 @@ impl Layout {
 /// A Gaussian about a state, with all its correlations: half the squared deviations from it, whitened.
 pub(super) struct Carried {
     mean: State,
-    centre: Vector3<f64>,
+    center: Vector3<f64>,
     layout: Layout,
     /// What whitens deviations: inverse of the lower Cholesky factor of the covariance.
     whitener: DMatrix<f64>,
@@ -58,7 +58,7 @@ impl Carried {
     pub(super) fn new(mean: State, layout: Layout, covariance: &DMatrix<f64>) -> Option<Self> {
         let whitener = Factor::new(covariance, RIDGE)?.whitener()?;
         let object = covariance.fixed_view::<6, 6>(0, 0).into_owned().try_inverse()?;
-        Some(Self { centre: mean.centre(), mean, layout, whitener, object })
+        Some(Self { center: mean.center(), mean, layout, whitener, object })
     }
 
     /// How far the object of `state` is from where it was foreseen, in standard deviations.
@@ -73,7 +73,7 @@ impl Carried {
         from: &Isometry3<f64>,
         state: &State,
     ) -> (Vector6<f64>, Matrix6<f64>) {
-        Prior::deviation(pose, from, &self.centre, &state.centre())
+        Prior::deviation(pose, from, &self.center, &state.center())
     }
 
     /// Deviations of `state`, whitened, and the derivatives of the object's and the hand's by their twists.
@@ -105,7 +105,7 @@ impl Term for std::sync::Arc<Carried> {
         0.5 * self.whitened(state).0.norm_squared()
     }
 
-    fn linearise(&self, state: &State, normal: &mut Normal) -> f64 {
+    fn linearize(&self, state: &State, normal: &mut Normal) -> f64 {
         let (residuals, by_object, by_hand) = self.whitened(state);
         let joints = Block::Joints(self.layout.joints);
         let (from, to) = (self.layout.offset(joints), self.layout.offset(Block::Camera));
@@ -153,7 +153,7 @@ mod tests {
         assert!((found - expected).abs() < 1e-3 * expected, "{found} {expected}");
         let state = start.moved_all(&blocks, &off);
         let mut normal = Normal::new(&blocks);
-        let value = carried.linearise(&state, &mut normal);
+        let value = carried.linearize(&state, &mut normal);
         assert!((value - carried.value(&state)).abs() < 1e-12 * value);
         let of = |x: &[f64]| carried.value(&state.moved_all(&blocks, x));
         let reference = finite_difference_gradient(of, &vec![0.0; n], 1e-6);

@@ -10,7 +10,7 @@ pub struct Spent {
     /// Evaluating terms and solving for steps.
     pub steps: Duration,
     /// Covariances and checks.
-    pub judgement: Duration,
+    pub judgment: Duration,
     /// Finding an object that was not followed: all that it takes.
     pub recovery: Duration,
 }
@@ -18,7 +18,7 @@ pub struct Spent {
 impl Spent {
     /// All of it.
     pub fn total(&self) -> Duration {
-        self.preparation + self.steps + self.judgement + self.recovery
+        self.preparation + self.steps + self.judgment + self.recovery
     }
 }
 

@@ -30,7 +30,7 @@ pub(super) struct Memory {
     hand_error: Isometry3<f64>,
     /// Joint positions as they are, less those that were said.
     joint_errors: Vec<f64>,
-    /// Twist about the object's centre, in the camera frame of then, relative to the hand where that was known
+    /// Twist about the object's center, in the camera frame of then, relative to the hand where that was known
     /// \[m/s; rad/s\].
     velocity: Vector6<f64>,
     /// Of the solution: see [`Layout`].
@@ -93,8 +93,8 @@ impl Memory {
         next.velocity = prediction.velocity;
         if prediction.seconds > 0.0 {
             let moved = next.state.t_cam_object * prediction.rest.inverse();
-            let rest = prediction.rest * next.state.object_centre;
-            let off = next.state.centre() - rest.coords;
+            let rest = prediction.rest * next.state.object_center;
+            let off = next.state.center() - rest.coords;
             let turn = so3_log(&moved.rotation);
             let measured =
                 Vector6::new(off.x, off.y, off.z, turn.x, turn.y, turn.z) / prediction.seconds;
@@ -126,10 +126,10 @@ impl Memory {
             (Isometry3::identity(), Vector6::zeros())
         };
         let rest = with_hand * self.state.t_cam_object;
-        let centre = (rest * self.state.object_centre).coords;
+        let center = (rest * self.state.object_center).coords;
         let coasting = COASTING * (1.0 - (-seconds / COASTING).exp());
         let mut state = told.clone();
-        state.t_cam_object = perturb_about(&rest, &centre, &(velocity * coasting));
+        state.t_cam_object = perturb_about(&rest, &center, &(velocity * coasting));
         state.light = self.state.light;
         if in_hand {
             state.t_cam_hand = told.t_cam_hand * part(&self.hand_error, kept);

@@ -107,7 +107,7 @@ impl std::fmt::Display for Doubt {
                 write!(f, "a misfit of {value:.0} nats where {level:.0} are usual")
             }
             Self::Surprise(sigmas) => write!(f, "{sigmas:.0} deviations from where it should be"),
-            Self::Uncertain(metres) => write!(f, "uncertain by {:.0} mm", metres * 1e3),
+            Self::Uncertain(meters) => write!(f, "uncertain by {:.0} mm", meters * 1e3),
         }
     }
 }
@@ -215,7 +215,7 @@ impl Tracker {
         let (object, robot) = (Arc::clone(&self.object), self.robot.clone());
         let known = Known::new(observation, &object, robot.as_ref())?;
         let mut spent = Spent::default();
-        let doubt = if prediction.state.centre().z > 0.0 {
+        let doubt = if prediction.state.center().z > 0.0 {
             let (problem, carried) = self.prepare(&known, &prediction)?;
             spent.preparation = clock.lap();
             if !clock.has(Duration::ZERO) {
@@ -228,7 +228,7 @@ impl Tracker {
             }
             let confidence = self.confidence(&solved, &told)?;
             let doubt = self.doubt(&solved, &confidence, Some(&carried), memory.allowance());
-            spent.judgement = clock.lap();
+            spent.judgment = clock.lap();
             if doubt.is_none() {
                 let motion = if in_hand { &self.settings.held } else { &self.settings.free };
                 let level = memory.level + LEVEL_GAIN * (solved.misfit() - memory.level);
@@ -380,7 +380,7 @@ impl Tracker {
                     Err(error) => return Err(error),
                 }
             }
-            if start.centre().z <= 0.0 {
+            if start.center().z <= 0.0 {
                 continue;
             }
             let (solved, confidence) = self.estimate(observation, known, &start)?;

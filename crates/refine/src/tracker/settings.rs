@@ -100,7 +100,7 @@ impl Default for TrackerSettings {
                 iterations: 4,
                 last_gain: 0.02,
                 hypotheses: 1,
-                colour: true,
+                color: true,
                 measured_scatter: false,
                 model_deviates: true,
                 contact: true,

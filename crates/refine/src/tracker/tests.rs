@@ -108,7 +108,7 @@ fn an_empty_mask_is_lost_and_a_full_one_found_again() {
     let lost = tracker.track(&observation, SEQUENCE.frames[1].time).unwrap();
     assert_eq!((lost.following, lost.doubt), (Following::Lost, Some(Doubt::Unseen)));
     assert_eq!(track(&mut tracker, 2).following, Following::Followed);
-    // Neither colour nor depth under the mask.
+    // Neither color nor depth under the mask.
     let mut observation = SEQUENCE.frames[3].observation.clone();
     observation.depth.pixels_mut().fill(0.0);
     let blind = tracker.track(&observation, SEQUENCE.frames[3].time).unwrap();

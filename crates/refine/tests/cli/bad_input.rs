@@ -99,12 +99,12 @@ fn images() {
     table(
         &[
             Fault {
-                name: "missing colour",
+                name: "missing color",
                 make: |p| p.remove(RGB),
                 expected: &["scene 1 image 0 object 5: ", "rgb/000000.png: no such file"],
             },
             Fault {
-                name: "truncated colour",
+                name: "truncated color",
                 make: |p| p.truncate(RGB, 0.5),
                 expected: &["ds/test/000001/rgb/000000.png: "],
             },
@@ -124,7 +124,7 @@ fn images() {
                     let file = p.path(DEPTH);
                     Mask::filled(640, 480, true).save(&file).unwrap();
                 },
-                expected: &["object 5: ds/test/000001/depth/000000.png: expected 16-bit grey"],
+                expected: &["object 5: ds/test/000001/depth/000000.png: expected 16-bit gray"],
             },
             Fault {
                 name: "no depth",
@@ -241,7 +241,7 @@ fn rows() {
                 make: |p| column(p, 5, "0 0 -500"),
                 expected: &[
                     "scene 1 image 0 object 5: ",
-                    "object's centre at depth -0.",
+                    "object's center at depth -0.",
                     "behind the camera",
                 ],
             },

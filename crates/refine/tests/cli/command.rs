@@ -277,7 +277,7 @@ fn help_names_what_is_needed() {
     let place = Workplace::new();
     let help = place.succeed("--help");
     assert!(
-        ["refine", "initial", "eval", "check", "millimetres", "Exit codes"]
+        ["refine", "initial", "eval", "check", "millimeters", "Exit codes"]
             .iter()
             .all(|w| help.contains(w))
     );

@@ -1,4 +1,4 @@
-//! The body that the studies and benchmarks look at: a bottle with vertex colours and a label.
+//! The body that the studies and benchmarks look at: a bottle with vertex colors and a label.
 
 use std::f64::consts::{PI, TAU};
 
@@ -93,7 +93,7 @@ pub(crate) fn guess() -> Isometry3<f64> {
 /// A number that looks random in 0..1, for each `seed` another.
 #[allow(dead_code)]
 pub(crate) fn uniform(seed: u64) -> f64 {
-    // The finaliser of SplitMix64 (Steele, Lea and Flood, 2014).
+    // The finalizer of SplitMix64 (Steele, Lea and Flood, 2014).
     let mut z = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);

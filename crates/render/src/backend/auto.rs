@@ -1,7 +1,7 @@
 //! The best device at hand, with the processor to fall back on.
 
 use super::{Backend, BackendError, Cpu, Hypothesis, PoseProblem, Session};
-use crate::pose_loss::{Linearised, Loss, PoseImage};
+use crate::pose_loss::{Linearized, Loss, PoseImage};
 
 /// Another backend while it works, and the processor from its first failure on.
 ///
@@ -79,8 +79,8 @@ impl Session for FallbackSession {
         self.run(|session| session.evaluate(hypotheses))
     }
 
-    fn linearise(&mut self, hypotheses: &[Hypothesis]) -> Result<Vec<Linearised>, BackendError> {
-        self.run(|session| session.linearise(hypotheses))
+    fn linearize(&mut self, hypotheses: &[Hypothesis]) -> Result<Vec<Linearized>, BackendError> {
+        self.run(|session| session.linearize(hypotheses))
     }
 
     fn render(&mut self, hypothesis: &Hypothesis) -> Result<PoseImage, BackendError> {
@@ -117,10 +117,10 @@ mod tests {
             panic!("asked after its failure")
         }
 
-        fn linearise(&mut self, h: &[Hypothesis]) -> Result<Vec<Linearised>, BackendError> {
+        fn linearize(&mut self, h: &[Hypothesis]) -> Result<Vec<Linearized>, BackendError> {
             self.1 += 1;
             assert!(self.1 <= 2, "asked after its failure");
-            if self.1 == 1 { self.0.linearise(&h[..0]) } else { Err(lost()) }
+            if self.1 == 1 { self.0.linearize(&h[..0]) } else { Err(lost()) }
         }
 
         fn render(&mut self, _: &Hypothesis) -> Result<PoseImage, BackendError> {
@@ -148,17 +148,17 @@ mod tests {
         let target = Arc::new(target_of(&model, &t_cam_object, &light, None, 0.5));
         let mut problem = PoseProblem { model: Arc::new(model), target, loss: PoseLoss::default() };
         let hypotheses = [Hypothesis { t_cam_object, light }];
-        let expected = problem.linearise(&hypotheses).unwrap();
+        let expected = problem.linearize(&hypotheses).unwrap();
         let mut session = WithFallback(FragileBackend(true)).prepare(&problem).unwrap();
         // The device's own answer, then the processor's.
-        assert_eq!(session.linearise(&hypotheses).unwrap(), []);
+        assert_eq!(session.linearize(&hypotheses).unwrap(), []);
         assert_eq!(session.name(), "fragile");
-        assert_eq!(session.linearise(&hypotheses).unwrap(), expected);
-        assert_eq!(session.linearise(&hypotheses).unwrap(), expected);
+        assert_eq!(session.linearize(&hypotheses).unwrap(), expected);
+        assert_eq!(session.linearize(&hypotheses).unwrap(), expected);
         assert_eq!(session.name(), "CPU");
         assert_eq!(session.evaluate(&hypotheses).unwrap()[0], expected[0].loss);
         assert!(session.render(&hypotheses[0]).is_ok());
         let mut session = WithFallback(FragileBackend(false)).prepare(&problem).unwrap();
-        assert_eq!(session.linearise(&hypotheses).unwrap(), expected);
+        assert_eq!(session.linearize(&hypotheses).unwrap(), expected);
     }
 }

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::{Backend, BackendError, Hypothesis, PoseProblem, Session};
-use crate::pose_loss::{Linearised, Loss, PoseImage};
+use crate::pose_loss::{Linearized, Loss, PoseImage};
 
 /// All cores of this processor. Never fails.
 #[derive(Clone, Copy, Debug, Default)]
@@ -32,10 +32,10 @@ impl Session for PoseProblem {
         Ok(hypotheses.par_iter().map(one).collect())
     }
 
-    fn linearise(&mut self, hypotheses: &[Hypothesis]) -> Result<Vec<Linearised>, BackendError> {
+    fn linearize(&mut self, hypotheses: &[Hypothesis]) -> Result<Vec<Linearized>, BackendError> {
         let one = |h: &Hypothesis| {
             let center = h.t_cam_object * self.model.center();
-            self.loss.linearise(&self.model, &h.t_cam_object, &center, &h.light, &self.target)
+            self.loss.linearize(&self.model, &h.t_cam_object, &center, &h.light, &self.target)
         };
         Ok(hypotheses.par_iter().map(one).collect())
     }

@@ -18,7 +18,7 @@ pub use gpu::Gpu;
 
 use crate::light::Light;
 use crate::model::RenderModel;
-use crate::pose_loss::{Linearised, Loss, PoseImage, PoseLoss, Target};
+use crate::pose_loss::{Linearized, Loss, PoseImage, PoseLoss, Target};
 
 /// What many poses have in common.
 #[derive(Clone, Debug)]
@@ -65,7 +65,7 @@ pub struct Hypothesis {
 ///         light: Light::headlight(0.5, 0.5),
 ///     })
 ///     .collect();
-/// assert_eq!(session.linearise(&hypotheses)?.len(), 100);
+/// assert_eq!(session.linearize(&hypotheses)?.len(), 100);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub trait Backend: Send + Sync {
@@ -91,12 +91,12 @@ pub trait Session: Send {
     /// When the device fails.
     fn evaluate(&mut self, hypotheses: &[Hypothesis]) -> Result<Vec<Loss>, BackendError>;
 
-    /// The loss of each hypothesis with its derivatives by the twist about the model's centre
+    /// The loss of each hypothesis with its derivatives by the twist about the model's center
     /// ([`RenderModel::center`], posed).
     ///
     /// # Errors
     /// When the device fails.
-    fn linearise(&mut self, hypotheses: &[Hypothesis]) -> Result<Vec<Linearised>, BackendError>;
+    fn linearize(&mut self, hypotheses: &[Hypothesis]) -> Result<Vec<Linearized>, BackendError>;
 
     /// The picture of one hypothesis.
     ///

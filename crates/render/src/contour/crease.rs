@@ -1,4 +1,4 @@
-//! Creases: edges in view at which the colour of the surface jumps, because normals, texture coordinates or colours do.
+//! Creases: edges in view at which the color of the surface jumps, because normals, texture coordinates or colors do.
 
 use super::outline::{Foot, PIECE, Piece, clip};
 use super::pixel::Scene;
@@ -101,7 +101,7 @@ impl Scene<'_> {
     /// Blends in what lies beyond a crease, at pixel (x, y) that shows `own` of this
     /// inverse depth.
     ///
-    /// The colour of the surface jumps at the crease by that of the foot, so the pixel gains as much of the jump as its
+    /// The color of the surface jumps at the crease by that of the foot, so the pixel gains as much of the jump as its
     /// distance says.
     pub(crate) fn soften<const DERIVATIVES: bool>(
         &self,

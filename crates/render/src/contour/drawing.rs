@@ -57,7 +57,7 @@ pub(crate) struct Drawing {
     pub(crate) step: Step,
     /// Whether creases are blended.
     pub(crate) creases: bool,
-    /// Slopes of the image are those between the sides of a pixel; otherwise those at its centre.
+    /// Slopes of the image are those between the sides of a pixel; otherwise those at its center.
     pub(crate) footprint: bool,
 }
 

@@ -88,7 +88,7 @@ pub(super) struct Cut {
     /// Signed distance of the pixel from it \[px\], positive outside, and its unit normal.
     pub(super) distance: f32,
     pub(super) outward: [f32; 2],
-    /// The surface's colour at it.
+    /// The surface's color at it.
     pub(super) color: [f32; 3],
 }
 
@@ -103,13 +103,13 @@ impl Cut {
 }
 
 impl Scene<'_> {
-    /// Rows of the colour of pixel (x, y) of depth `z` that shows `face` as `shaded`, from the differences of the colours seen
+    /// Rows of the color of pixel (x, y) of depth `z` that shows `face` as `shaded`, from the differences of the colors seen
     /// at its opposite sides.
     ///
-    /// At its centre the slope of a print, or of the light on a narrow bevel, says little about a pixel as large as its details,
+    /// At its center the slope of a print, or of the light on a narrow bevel, says little about a pixel as large as its details,
     /// and jumps from pixel to pixel. The differences of pixels side by side add up to that between the sides of all of
     /// them, and that is what the mean over an area changes by when what it shows moves. Two faces that meet between two
-    /// pixels each have half a say in the colour there, so a jump of colour counts, too.
+    /// pixels each have half a say in the color there, so a jump of color counts, too.
     ///
     /// Of a pixel through which a contour runs only the part inside counts; that the contour moves is left to the caller.
     pub(super) fn rows_over_footprint(
@@ -134,7 +134,7 @@ impl Scene<'_> {
             self.continue_over_border(face, [x, y], around, &mut sides);
         }
         if let Some(cut) = cut {
-            // The sides that are left and the contour itself close a polygon, so that a uniform colour has no slope.
+            // The sides that are left and the contour itself close a polygon, so that a uniform color has no slope.
             for (side, step) in sides.iter_mut().zip(STEPS) {
                 let share = cut.left_of(step);
                 (0..3).for_each(|k| side[k] = share * (side[k] - cut.color[k]));
@@ -169,7 +169,7 @@ impl Scene<'_> {
         }
     }
 
-    /// Rows of the colour of a pixel through which an inner contour runs: those of the part of it that shows the near surface,
+    /// Rows of the color of a pixel through which an inner contour runs: those of the part of it that shows the near surface,
     /// and of the part that shows the far one. The border of both moves with the contour, whose signed distance has row `ds`.
     pub(super) fn rows_across(
         &self,
@@ -211,7 +211,7 @@ impl Scene<'_> {
         b.map(|v| v / sum)
     }
 
-    /// The colour there.
+    /// The color there.
     fn within(&self, face: u32, at: [f32; 2]) -> [f32; 3] {
         let b = self.clamped(face, at);
         shade::<false>(&self.posed, &self.lighting, face as usize, b).color

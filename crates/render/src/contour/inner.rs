@@ -57,8 +57,8 @@ pub(crate) fn inner_contours(
 impl Scene<'_> {
     /// Blends the near and the far surface across an inner contour, at pixel (x, y) that shows `own`.
     ///
-    /// On the far side the near surface has the colour of the foot; on the near side the far surface has the
-    /// colour of the pixel beyond the contour.
+    /// On the far side the near surface has the color of the foot; on the near side the far surface has the
+    /// color of the pixel beyond the contour.
     pub(crate) fn cross<const DERIVATIVES: bool>(
         &self,
         x: f32,

@@ -5,7 +5,7 @@ use super::vec3::{Vec3, cross, dot, mix, scale, sub};
 use crate::pose_loss::Row;
 
 /// Surfaces are taken to be inclined to the viewing ray by at least this sine: of what is seen at a grazing angle, a
-/// pixel's centre says little, and its derivatives would grow without bound.
+/// pixel's center says little, and its derivatives would grow without bound.
 pub(crate) const GRAZING: f32 = 1e-3;
 
 #[inline(always)]
@@ -58,7 +58,7 @@ impl Motion {
         Self { gradients: [first, second], arm, z_row: row(along, cross(arm, along)) }
     }
 
-    /// Derivative of colour channel `k`.
+    /// Derivative of color channel `k`.
     #[inline(always)]
     pub(crate) fn color_row(&self, shaded: &Shaded, k: usize) -> Row {
         let [first, second] = self.gradients;
@@ -68,8 +68,8 @@ impl Motion {
     }
 }
 
-/// Adds to a colour's row that the texture's level follows the depth of the model's centre: `level` times (0, 0, 1) and
-/// arm × (0, 0, 1), with the centre's position `arm` from where twists turn.
+/// Adds to a color's row that the texture's level follows the depth of the model's center: `level` times (0, 0, 1) and
+/// arm × (0, 0, 1), with the center's position `arm` from where twists turn.
 #[inline(always)]
 pub(crate) fn add_level(row: &mut Row, level: f32, arm: Vec3) {
     row[2] += level;

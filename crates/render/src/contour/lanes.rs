@@ -11,7 +11,7 @@ use super::vec3::{Vec3, vec3};
 use crate::model::{Albedo, Cell, Mipmap, Texel};
 use crate::pose_loss::{LANES, Lane, LaneSums, Patch, Pixel, Residuals, get, put};
 
-/// Three vectors, or colours, of each pixel.
+/// Three vectors, or colors, of each pixel.
 type Nine = [Lane; 9];
 
 /// Pixels inside faces that wait until there are enough of them.
@@ -28,7 +28,7 @@ pub(crate) struct Waiting {
     pub(crate) patch: Patch,
 }
 
-/// Unlit colours.
+/// Unlit colors.
 struct Colors {
     color: [Lane; 3],
     along: [[Lane; 3]; 2],
@@ -88,7 +88,7 @@ impl Waiting {
     }
 }
 
-/// Blended pixels whose colours wait until there are enough of them.
+/// Blended pixels whose colors wait until there are enough of them.
 pub(crate) struct Blended {
     arch: Arch,
     patch: Patch,
@@ -99,7 +99,7 @@ impl Blended {
         Self { arch: Arch::new(), patch: Patch::new() }
     }
 
-    /// Adds the colour of the pixel with index `at`; true if there is room for no other.
+    /// Adds the color of the pixel with index `at`; true if there is room for no other.
     #[inline]
     pub(crate) fn push<const DERIVATIVES: bool>(&mut self, at: usize, pixel: &Pixel) -> bool {
         let l = self.patch.count;
@@ -200,7 +200,7 @@ impl Waiting {
         }
     }
 
-    /// Unlit colours.
+    /// Unlit colors.
     #[inline(always)]
     fn color(&mut self, scene: &Scene) {
         match &scene.posed.model.albedo {
@@ -242,7 +242,7 @@ impl Waiting {
         }
     }
 
-    /// Lit colours, and rows.
+    /// Lit colors, and rows.
     #[inline(always)]
     fn shade<const DERIVATIVES: bool>(&mut self, scene: &Scene) {
         let posed = &scene.posed;

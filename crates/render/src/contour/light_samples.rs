@@ -8,9 +8,9 @@ use crate::light::LightSample;
 use crate::model::RenderModel;
 use crate::pose_loss::Target;
 use crate::posed::Posed;
-use crate::raster::{Visible, rasterise};
+use crate::raster::{Visible, rasterize};
 
-/// What [`Light::fit`](crate::Light::fit) needs: unlit colour, normal and observed colour where the object is seen inside the
+/// What [`Light::fit`](crate::Light::fit) needs: unlit color, normal and observed color where the object is seen inside the
 /// mask, and `margin` pixels to the left, to the right, above and below too; of `most` of these pixels at most, spread evenly over them.
 pub fn light_samples(
     model: &RenderModel,
@@ -20,7 +20,7 @@ pub fn light_samples(
     most: usize,
 ) -> Vec<LightSample> {
     let posed = Posed::new(model, &target.camera, t_cam_object, 0.0);
-    let visible = rasterise(&posed.projected, &posed.projected.region);
+    let visible = rasterize(&posed.projected, &posed.projected.region);
     let pixels = inner_pixels(&visible, target, margin);
     let step = pixels.len().div_ceil(most.max(1)).max(1);
     let sample = |&(face, x, y): &(usize, usize, usize)| {
@@ -38,7 +38,7 @@ pub fn light_samples(
 fn inner_pixels(visible: &[Visible], target: &Target, margin: usize) -> Vec<(usize, usize, usize)> {
     let seen = |x: usize, y: usize| Visible::at(visible, x, y);
     let inside = |x: usize, y: usize| {
-        let shift = |centre: usize, by: usize| (centre + by).checked_sub(margin);
+        let shift = |center: usize, by: usize| (center + by).checked_sub(margin);
         let steps = [[0, 1], [2, 1], [1, 0], [1, 2]].map(|step| step.map(|by| by * margin));
         steps.iter().all(|[dx, dy]| match (shift(x, *dx), shift(y, *dy)) {
             (Some(x), Some(y)) => seen(x, y).is_some(),

@@ -1,9 +1,9 @@
 //! The contour mode: a hard z-buffer inside the object and a smooth step across its outline.
 //!
-//! A pixel shows α C with the colour C of the surface and a coverage α that falls smoothly from one to zero over a narrow
+//! A pixel shows α C with the color C of the surface and a coverage α that falls smoothly from one to zero over a narrow
 //! band around the object's outline (the background of a segmented image is black). All derivatives by the pose are in
 //! closed form. Where the object hides farther parts of itself, the two surfaces are blended likewise
-//! (α C_near + (1−α) C_far). At a pixel's centre jumps of colour at creases and texture seams are part of the value, but not of
+//! (α C_near + (1−α) C_far). At a pixel's center jumps of color at creases and texture seams are part of the value, but not of
 //! the derivative, unless the options ask for them to be softened likewise. Samples within pixels have their slopes between
 //! their sides instead (`footprint.rs`), jumps included.
 
@@ -73,7 +73,7 @@ impl<'a> ContourView<'a> {
         let projected = &posed.projected;
         let region = projected.region.union(also);
         let (visible, silhouette) = rayon::join(
-            || raster::rasterise(projected, &region),
+            || raster::rasterize(projected, &region),
             || match projected.region == Region::EMPTY {
                 true => Silhouette::default(),
                 false => outline(projected, &region, reach),

@@ -5,7 +5,7 @@ use crate::model::NONE;
 use crate::projected::Region;
 use crate::raster::{MISS, Visible};
 
-/// A pixel, and the outline near it and its neighbours.
+/// A pixel, and the outline near it and its neighbors.
 #[derive(Clone, Copy)]
 pub(super) struct Place<'a> {
     pub(super) x: usize,
@@ -47,7 +47,7 @@ pub(super) struct Bands<'a> {
     view: &'a ContourView<'a>,
     pub(super) visible: &'a Visible,
     outline: Band,
-    /// The first pixel's index in the outline's band, which has a row more above and below where slopes look at neighbours.
+    /// The first pixel's index in the outline's band, which has a row more above and below where slopes look at neighbors.
     start: usize,
     /// Of inner contours and creases, if there are any.
     inner: Option<Band>,
@@ -59,7 +59,7 @@ impl<'a> Bands<'a> {
         let visible = &view.visible[block];
         let width = view.scene.drawing.step.reach();
         let rows = visible.region;
-        // Pixels over whose area slopes are taken look at their neighbours.
+        // Pixels over whose area slopes are taken look at their neighbors.
         let beyond = usize::from(view.scene.drawing.footprint);
         let around = Region { y0: rows.y0.saturating_sub(beyond), y1: rows.y1 + beyond, ..rows };
         // A contour between a pixel and the next is less than a pixel away.

@@ -92,7 +92,7 @@ pub(crate) fn outline(projected: &Projected, region: &Region, margin: f32) -> Si
         let corners = [corner, (corner + 1) % 3];
         let d = [b[0] - a[0], b[1] - a[1]];
         let length = d[0].hypot(d[1]);
-        // Shorter edges are spanned by their neighbours' ends.
+        // Shorter edges are spanned by their neighbors' ends.
         if length > 1e-4 && length.is_finite() {
             let outward = [-sign * d[1] / length, sign * d[0] / length];
             candidates.push((Piece { face, corners, a, b, range: [0.0, 1.0], outward }, length));

@@ -65,7 +65,7 @@ impl Scene<'_> {
         pixel
     }
 
-    /// A pixel that no face covers, next to the outline: it shows the colour of the nearest outline point.
+    /// A pixel that no face covers, next to the outline: it shows the color of the nearest outline point.
     #[inline]
     pub(crate) fn outside<const DERIVATIVES: bool>(
         &self,
@@ -82,7 +82,7 @@ impl Scene<'_> {
         pixel
     }
 
-    /// The unblended pixel (x, y) of a face. Its rows are those at its centre, or over its area if what is `around` is given.
+    /// The unblended pixel (x, y) of a face. Its rows are those at its center, or over its area if what is `around` is given.
     #[inline]
     pub(crate) fn interior<const DERIVATIVES: bool>(
         &self,
@@ -118,7 +118,7 @@ impl Scene<'_> {
         pixel
     }
 
-    /// The unblended colour of the foot on a contour.
+    /// The unblended color of the foot on a contour.
     #[inline]
     pub(crate) fn at_foot<const DERIVATIVES: bool>(&self, piece: &Piece, foot: &Foot) -> Pixel {
         let (b, point, ends) = self.on_edge(piece, foot.t);
@@ -137,13 +137,13 @@ impl Scene<'_> {
         pixel
     }
 
-    /// Colour of a face at pixel (x, y), unblended.
+    /// Color of a face at pixel (x, y), unblended.
     pub(crate) fn color(&self, face: u32, x: f32, y: f32) -> [f32; 3] {
         let b = barycentric(self.posed.projected.corners(face as usize), x, y);
         shade::<false>(&self.posed, &self.lighting, face as usize, b).color
     }
 
-    /// The visible point of a face at pixel (x, y), with its unlit colour.
+    /// The visible point of a face at pixel (x, y), with its unlit color.
     pub(crate) fn point(&self, face: u32, x: f32, y: f32) -> SurfacePoint<f32> {
         let corners = self.posed.projected.corners(face as usize);
         let b = barycentric(corners, x, y);
@@ -163,7 +163,7 @@ impl Scene<'_> {
         posed_normal(&self.posed, face, b)
     }
 
-    /// Rows of the colour of an outline point, whose material point slides along the edge by `slide`.
+    /// Rows of the color of an outline point, whose material point slides along the edge by `slide`.
     #[inline]
     fn foot_rows(&self, piece: &Piece, shaded: &Shaded, slide: &Row, pixel: &mut Pixel) {
         let arm = self.level_arm();
@@ -179,7 +179,7 @@ impl Scene<'_> {
         }
     }
 
-    /// The model's centre from where twists turn.
+    /// The model's center from where twists turn.
     #[inline(always)]
     pub(crate) fn level_arm(&self) -> Vec3 {
         vec3(&(self.posed.center - self.twist_center))

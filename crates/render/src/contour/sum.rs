@@ -1,4 +1,4 @@
-//! Residuals of a window of a block of rows, the quick way: pixels inside faces many at a time, and the colours of the others likewise.
+//! Residuals of a window of a block of rows, the quick way: pixels inside faces many at a time, and the colors of the others likewise.
 
 use super::ContourView;
 use super::lanes::{Blended, Waiting};

@@ -1,4 +1,4 @@
-//! Colour of a surface point and its derivatives along the surface and with the normal.
+//! Color of a surface point and its derivatives along the surface and with the normal.
 
 #![allow(clippy::needless_range_loop)] // loops over lanes index several arrays alike
 
@@ -32,7 +32,7 @@ impl Lighting {
     }
 }
 
-/// Unlit colour with its derivatives by the barycentric coordinates of corners 1 and 2 (corner 0 taking up the rest), and
+/// Unlit color with its derivatives by the barycentric coordinates of corners 1 and 2 (corner 0 taking up the rest), and
 /// by the pyramid level of the texture.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Unlit {
@@ -45,7 +45,7 @@ pub(crate) struct Unlit {
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Shaded {
     pub(crate) color: [f32; 3],
-    /// Derivatives of the colour by the barycentric coordinates of corners 1 and 2.
+    /// Derivatives of the color by the barycentric coordinates of corners 1 and 2.
     pub(crate) along: [[f32; 3]; 2],
     /// Derivative by a rotation of the surface under the fixed light, camera frame.
     pub(crate) turning: [Vec3; 3],
@@ -54,7 +54,7 @@ pub(crate) struct Shaded {
 }
 
 impl Unlit {
-    /// Between the colours of three corners.
+    /// Between the colors of three corners.
     #[inline(always)]
     pub(crate) fn between(corners: &[Vec3; 3], b: [f32; 3]) -> Self {
         let [first, second, third] = *corners;
@@ -82,7 +82,7 @@ pub(crate) fn coordinates(uv: &[[f32; 2]; 3], b: [f32; 3]) -> [f32; 2] {
     ]
 }
 
-/// Unlit colour at barycentric coordinates `b` of a face.
+/// Unlit color at barycentric coordinates `b` of a face.
 #[inline]
 pub(crate) fn albedo(posed: &Posed, face: usize, b: [f32; 3]) -> Unlit {
     match &posed.model.albedo {
@@ -97,7 +97,7 @@ pub(crate) fn albedo(posed: &Posed, face: usize, b: [f32; 3]) -> Unlit {
 }
 
 /// Smooth normal between those of a face's corners, on the side seen (`side` is 1 for the outside, −1 for the inside):
-/// unit vector, and length before normalising.
+/// unit vector, and length before normalizing.
 #[inline(always)]
 pub(crate) fn normal(corners: &[Vec3; 3], side: f32, b: [f32; 3]) -> (Vec3, f32) {
     let sum = add(mix(b[0], corners[0], b[1], corners[1]), scale(corners[2], b[2]));
@@ -112,7 +112,7 @@ pub(crate) fn posed_normal(posed: &Posed, face: usize, b: [f32; 3]) -> Vec3 {
     vec3(&(posed.rotation * Vector3::from(normal(&corners, side, b).0)))
 }
 
-/// Lit colour at barycentric coordinates `b` of a face with normals `corners` at its corners.
+/// Lit color at barycentric coordinates `b` of a face with normals `corners` at its corners.
 #[inline(always)]
 pub(crate) fn lit<const DERIVATIVES: bool>(
     lighting: &Lighting,
@@ -149,7 +149,7 @@ pub(crate) fn lit<const DERIVATIVES: bool>(
     out
 }
 
-/// Lit colour at barycentric coordinates `b` of a face.
+/// Lit color at barycentric coordinates `b` of a face.
 #[inline]
 pub(crate) fn shade<const DERIVATIVES: bool>(
     posed: &Posed,

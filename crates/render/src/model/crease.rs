@@ -6,7 +6,7 @@ use super::{Albedo, Edge, NONE, RenderModel};
 const LEAST_TURN: f32 = 1e-3;
 
 impl RenderModel {
-    /// Lists the creases anew; to be called when normals or colours have changed.
+    /// Lists the creases anew; to be called when normals or colors have changed.
     pub(super) fn find_creases(&mut self) {
         let jumps = |edge: &Edge| edge.other != NONE && self.jumps(edge);
         let indices = self.edges.iter().enumerate().filter(|(_, edge)| jumps(edge));
@@ -45,7 +45,7 @@ mod tests {
         assert!(RenderModel::new(&mesh).unwrap().creases.len() >= 12);
         let smooth = RenderModel::new(&painted(lump(0.05, 40), 0.05)).unwrap();
         assert!(smooth.creases.is_empty());
-        // A texture with seams, and the same body in one colour.
+        // A texture with seams, and the same body in one color.
         let printed = RenderModel::new(&textured_box([32, 32], [3.0, 4.0])).unwrap();
         let plain = printed.clone().with_uniform_color([0.5; 3]);
         assert!(printed.creases.len() >= plain.creases.len());

@@ -15,7 +15,7 @@ impl RenderModel {
         &self.faces
     }
 
-    /// A colour a welded vertex, if the model is coloured by vertices. Where a mesh has several colours at one place,
+    /// A color a welded vertex, if the model is colored by vertices. Where a mesh has several colors at one place,
     /// that of the last face there.
     pub fn vertex_colors(&self) -> Option<Vec<[f32; 3]>> {
         let Albedo::Corners(corners) = &self.albedo else { return None };
@@ -33,7 +33,7 @@ impl RenderModel {
         Some((width, height, &map.levels[0].texels))
     }
 
-    /// The one colour of the model, if it has but one.
+    /// The one color of the model, if it has but one.
     pub fn uniform_color(&self) -> Option<[f32; 3]> {
         match &self.albedo {
             Albedo::Uniform(color) => Some(*color),
@@ -41,7 +41,7 @@ impl RenderModel {
         }
     }
 
-    /// The same topology with other welded vertices \[m\]. Normals follow them. The [centre](Self::center), the
+    /// The same topology with other welded vertices \[m\]. Normals follow them. The [center](Self::center), the
     /// [radius](Self::radius) and the choice of texture levels stay those of the original, so that images
     /// change smoothly.
     ///
@@ -65,12 +65,12 @@ impl RenderModel {
         Ok(self)
     }
 
-    /// The same shape with a colour a welded vertex (0..=1).
+    /// The same shape with a color a welded vertex (0..=1).
     ///
     /// # Errors
     /// When there are not as many.
     pub fn with_colors(mut self, colors: &[[f32; 3]]) -> Result<Self, ModelError> {
-        expect("colours", colors.len(), self.positions.len())?;
+        expect("colors", colors.len(), self.positions.len())?;
         let corners = self.faces.iter().map(|f| f.map(|v| colors[v as usize])).collect();
         self.albedo = Albedo::Corners(corners);
         self.texel_density = 0.0;
@@ -91,7 +91,7 @@ impl RenderModel {
         Ok(self)
     }
 
-    /// The same shape in one colour (0..=1).
+    /// The same shape in one color (0..=1).
     pub fn with_uniform_color(mut self, color: [f32; 3]) -> Self {
         self.albedo = Albedo::Uniform(color);
         self.texel_density = 0.0;

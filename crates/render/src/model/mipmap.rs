@@ -16,10 +16,10 @@ pub(crate) struct Level {
     pub(super) texels: Vec<[f32; 3]>,
 }
 
-/// A filtered colour and its derivatives, per channel.
+/// A filtered color and its derivatives, per channel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Texel {
-    /// Colour.
+    /// Color.
     pub(crate) color: [f32; 3],
     /// By the first texture coordinate.
     pub(crate) du: [f32; 3],
@@ -65,7 +65,7 @@ impl Mipmap {
         self.levels.iter().map(|l| (l.width, l.height, l.texels.as_slice()))
     }
 
-    /// Colour at texture coordinates (`u`, `v`) (v up, repeating) on pyramid level `level` (0 the finest,
+    /// Color at texture coordinates (`u`, `v`) (v up, repeating) on pyramid level `level` (0 the finest,
     /// fractions blend).
     #[inline]
     pub(crate) fn sample(&self, u: f32, v: f32, level: f32) -> Texel {
@@ -130,7 +130,7 @@ impl Texel {
     }
 }
 
-/// Where a point lies between texel centres.
+/// Where a point lies between texel centers.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Cell {
     /// Share of the way from the left to the right texels, and from the upper to the lower.
@@ -169,7 +169,7 @@ impl Level {
         })
     }
 
-    /// Bilinear colour, and derivatives by (u, v) with no entry for the level.
+    /// Bilinear color, and derivatives by (u, v) with no entry for the level.
     #[inline]
     fn sample(&self, u: f32, v: f32) -> Texel {
         let cell = self.cell(u, v);

@@ -38,8 +38,8 @@ pub enum ModelError {
         /// Vertices of the mesh.
         vertices: usize,
     },
-    /// A vertex's position, texture coordinates or colour are infinite or not numbers.
-    #[error("vertex {vertex} has a position, texture coordinate or colour that is not finite")]
+    /// A vertex's position, texture coordinates or color are infinite or not numbers.
+    #[error("vertex {vertex} has a position, texture coordinate or color that is not finite")]
     NotFinite {
         /// The vertex.
         vertex: usize,
@@ -57,7 +57,7 @@ pub enum ModelError {
     /// Numbers that should take the place of the model's own are not as many.
     #[error("{found} {what} given, the model has {expected}")]
     Count {
-        /// `"positions"`, `"colours"` or `"texels"`.
+        /// `"positions"`, `"colors"` or `"texels"`.
         what: &'static str,
         /// Numbers given.
         found: usize,
@@ -76,12 +76,12 @@ pub enum ModelError {
     },
 }
 
-/// Where the unlit colours come from.
+/// Where the unlit colors come from.
 #[derive(Clone, Debug)]
 pub(crate) enum Albedo {
-    /// One colour.
+    /// One color.
     Uniform([f32; 3]),
-    /// A colour for each corner of each face.
+    /// A color for each corner of each face.
     Corners(Vec<[[f32; 3]; 3]>),
     /// A texture, and its coordinates for each corner of each face.
     Texture(Mipmap, Vec<[[f32; 2]; 3]>),
@@ -100,20 +100,20 @@ pub struct RenderModel {
     /// Unit normals of each face's corners, mesh frame.
     pub(crate) normals: Vec<[Vector3<f32>; 3]>,
     pub(crate) edges: Vec<Edge>,
-    /// Edges at which normals, texture coordinates or colours jump.
+    /// Edges at which normals, texture coordinates or colors jump.
     pub(crate) creases: Vec<u32>,
     pub(crate) albedo: Albedo,
     /// Every edge has two faces: what faces away from the camera cannot be seen.
     pub(crate) closed: bool,
-    /// Texels a metre of surface, 0 without a texture.
+    /// Texels a meter of surface, 0 without a texture.
     pub(crate) texel_density: f64,
     center: Point3<f64>,
     radius: f64,
 }
 
 impl RenderModel {
-    /// Prepares `mesh` (metres). Colour comes from the texture if there is one with coordinates, else from
-    /// the vertex colours, else it is mid-grey. Normals are computed, smooth across edges flatter than 37.5
+    /// Prepares `mesh` (meters). Color comes from the texture if there is one with coordinates, else from
+    /// the vertex colors, else it is mid-gray. Normals are computed, smooth across edges flatter than 37.5
     /// degrees; those of the mesh are not used. Faces without an area are dropped. A mesh whose edges all have two
     /// faces is drawn from outside only, any other from both sides.
     ///
@@ -159,7 +159,7 @@ impl RenderModel {
         Ok(model)
     }
 
-    /// Centre of the bounding box, mesh frame \[m\].
+    /// Center of the bounding box, mesh frame \[m\].
     pub fn center(&self) -> Point3<f64> {
         self.center
     }
@@ -244,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn texel_density_is_texels_a_metre() {
+    fn texel_density_is_texels_a_meter() {
         let mut mesh = triangle();
         mesh.uvs = Some(vec![[0.0, 0.0], [0.5, 0.0], [0.0, 0.5]]);
         mesh.texture = Some(Arc::new(prehend_geometry::Texture {

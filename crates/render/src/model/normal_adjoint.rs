@@ -7,7 +7,7 @@ use super::{CREASE, RenderModel, topology};
 impl RenderModel {
     /// Carries adjoints of the corner normals (one entry a face) back to the vertices and adds them to `positions`.
     ///
-    /// A corner's normal is the normalised sum of the normals of the faces about it, weighted by their angles
+    /// A corner's normal is the normalized sum of the normals of the faces about it, weighted by their angles
     /// ([`topology::corner_normals`]); which faces take part is taken as given. What has no direction has no derivative.
     pub(crate) fn add_normal_adjoint(
         &self,

@@ -32,7 +32,7 @@ impl Mipmap {
         })
     }
 
-    /// The colour that `taps` add up to.
+    /// The color that `taps` add up to.
     #[inline]
     pub(crate) fn blend<S: Scalar>(&self, taps: &[Tap<S>; 8]) -> [S; 3] {
         let mut color = [S::zero(); 3];
@@ -133,7 +133,7 @@ mod tests {
 
     #[test]
     fn the_pyramid_passes_adjoints_down() {
-        // A texel's derivative is the change of the sampled colour when it alone is set.
+        // A texel's derivative is the change of the sampled color when it alone is set.
         let map = map();
         let (u, v, level) = (0.93, 0.13, 1.7);
         let mut by_level = map.zeros();

@@ -3,7 +3,7 @@
 use nalgebra::{Point3, Vector3};
 use prehend_geometry::topology;
 
-/// Marks an absent neighbour in [`Edge`].
+/// Marks an absent neighbor in [`Edge`].
 pub(crate) const NONE: u32 = u32::MAX;
 
 /// An edge of the welded mesh, directed as its first face runs through it.

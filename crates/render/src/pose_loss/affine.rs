@@ -1,6 +1,6 @@
-//! A gain and an offset of each colour channel that change with the pose, and are eliminated.
+//! A gain and an offset of each color channel that change with the pose, and are eliminated.
 //!
-//! For each pose the loss is minimised over them. By the envelope theorem the gradient of that minimum is the plain one of
+//! For each pose the loss is minimized over them. By the envelope theorem the gradient of that minimum is the plain one of
 //! the corrected picture, and its Gauss–Newton matrix is the Schur complement of the corrections in the joint normal
 //! equations.
 
@@ -11,7 +11,7 @@ use super::pixel::{Pixel, Seen, View, scaled_sum};
 use super::residuals::Residuals;
 use super::sums::Sums;
 
-/// A correction of the rendered object's colours: `gain * colour + offset` in each channel.
+/// A correction of the rendered object's colors: `gain * color + offset` in each channel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Affine {
     /// Factor of each channel, at least 0: no light turns bright into dark.
@@ -27,14 +27,14 @@ impl Default for Affine {
     }
 }
 
-/// Pull towards no correction, relative to the pixels' own: decides between gain and offset for an object of one colour.
+/// Pull towards no correction, relative to the pixels' own: decides between gain and offset for an object of one color.
 const PULL: f64 = 1e-9;
 
 /// Rounds of reweighting with a robust kernel at most, and the change of a correction that ends them.
 const ROUNDS: usize = 20;
 const SETTLED: f64 = 1e-6;
 
-/// Sums of the loss minimised over the correction.
+/// Sums of the loss minimized over the correction.
 pub(crate) struct Corrected {
     pub(crate) sums: Sums,
     pub(crate) affine: Affine,
@@ -42,8 +42,8 @@ pub(crate) struct Corrected {
     pub(crate) reduction: Matrix6<f64>,
 }
 
-/// The normal equations of one channel: Σ w of the squares and products of what gain and offset multiply (colour and
-/// coverage), of these with the observed colour, and of these with the rows.
+/// The normal equations of one channel: Σ w of the squares and products of what gain and offset multiply (color and
+/// coverage), of these with the observed color, and of these with the rows.
 #[derive(Clone, Copy, Default)]
 struct Channel {
     square: Matrix2<f64>,
@@ -53,7 +53,7 @@ struct Channel {
 
 type Channels = [Channel; 3];
 
-/// Colour and coverage of a pixel before the correction.
+/// Color and coverage of a pixel before the correction.
 type Raw = ([f32; 3], f32);
 
 fn merged(all: Vec<Channels>) -> Channels {
@@ -136,7 +136,7 @@ impl Residuals<'_> {
         (sums, channels)
     }
 
-    /// Index, colour and coverage of the pixels that show the object, block by block.
+    /// Index, color and coverage of the pixels that show the object, block by block.
     fn drawn(&self, view: &impl View) -> Vec<Vec<(usize, Raw)>> {
         let width = self.target.camera.width;
         let blocks = (0..view.blocks()).into_par_iter().map(|block| {

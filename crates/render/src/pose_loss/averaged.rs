@@ -6,7 +6,7 @@ use super::pixel::{Pixel, Row, Seen, View, scaled_sum};
 
 /// A view whose pixels are the means of `samples` by `samples` pixels of a finer one.
 ///
-/// A camera's pixel averages over its area, and so do the colours, the coverage and the rows of these: creases, fine
+/// A camera's pixel averages over its area, and so do the colors, the coverage and the rows of these: creases, fine
 /// texture and folds count for as much of a pixel as they fill. Depth is the mean over the part that shows a face, by the weight
 /// that it has there, so that it does not jump as an outline passes over the samples.
 pub(crate) struct Averaged<V> {
@@ -17,7 +17,7 @@ pub(crate) struct Averaged<V> {
 /// Sums over fine pixels.
 #[derive(Clone, Copy, Default)]
 struct Accumulated {
-    /// Colours, coverage and weight of depth, with their rows.
+    /// Colors, coverage and weight of depth, with their rows.
     sum: Pixel,
     /// Depth times its weight, with its row, where a face is hit.
     weighted: f32,
@@ -242,7 +242,7 @@ mod tests {
         for mode in [Mode::default(), Mode::SoftRas(soft)] {
             let loss = PoseLoss::new(mode, full_options()).with_samples(2);
             let center = guess * model.center();
-            let at = loss.linearise(&model, &guess, &center, &lamp(), &target);
+            let at = loss.linearize(&model, &guess, &center, &lamp(), &target);
             for axis in 0..3 {
                 let step = 4e-5;
                 let value = |s: f64| {

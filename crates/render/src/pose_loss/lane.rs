@@ -1,4 +1,4 @@
-//! Numbers of many pixels side by side, for loops that the compiler vectorises.
+//! Numbers of many pixels side by side, for loops that the compiler vectorizes.
 //!
 //! The number of lanes is the same on every machine, and so are the results: only how many of them one instruction
 //! treats differs. (For the same reason nothing here multiplies and adds in one rounding.)

@@ -60,13 +60,13 @@ const MOST_SAMPLES: usize = 16;
 /// let target = Target::new(camera, &seen.color, &mask)?;
 /// // The box is believed 5 mm too far to the right: the loss falls to the left.
 /// let pose = Isometry3::translation(0.005, 0.0, 0.4);
-/// let at = loss.linearise(&model, &pose, &(pose * model.center()), &light, &target);
+/// let at = loss.linearize(&model, &pose, &(pose * model.center()), &light, &target);
 /// assert!(at.loss.total > 0.0 && at.gradient[0] > 0.0);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
 /// Stateless but for its settings, which [`PoseLoss::check`] checks; share it freely between threads. Faces with a corner
-/// behind the camera, or within a millimetre of its plane, are not drawn. Results do not depend on the number of
+/// behind the camera, or within a millimeter of its plane, are not drawn. Results do not depend on the number of
 /// threads. A pose that is not finite, or puts the object behind the camera or outside the image, renders nothing:
 /// the loss is then that of the whole mask missed, with zero gradient.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -75,8 +75,8 @@ pub struct PoseLoss {
     pub mode: Mode,
     /// What is compared.
     pub options: LossOptions,
-    /// The object is drawn with so many samples a pixel, across and down (1..=16). One takes the colour at the pixel's
-    /// centre, and its derivative, for that of the whole pixel; with more the loss is nearer to that of a camera, whose pixels
+    /// The object is drawn with so many samples a pixel, across and down (1..=16). One takes the color at the pixel's
+    /// center, and its derivative, for that of the whole pixel; with more the loss is nearer to that of a camera, whose pixels
     /// average over creases and fine texture, and takes longer accordingly. In the contour mode the derivatives are then those of
     /// such averages, from differences between the sides of samples: true to some per cent of a camera's with four.
     pub samples: usize,
@@ -89,12 +89,12 @@ impl Default for PoseLoss {
 }
 
 /// The loss of a pose: weighted squared residuals over three times the area of the target's mask \[px\], so that
-/// without further channels it is the mean squared error over the mask's pixels and colour channels.
+/// without further channels it is the mean squared error over the mask's pixels and color channels.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Loss {
     /// Sum of the three below.
     pub total: f64,
-    /// Share of the colour.
+    /// Share of the color.
     pub color: f64,
     /// Share of the mask.
     pub mask: f64,
@@ -105,23 +105,23 @@ pub struct Loss {
 }
 
 impl Loss {
-    /// From the sums of colour, mask and depth over all pixels of the target.
+    /// From the sums of color, mask and depth over all pixels of the target.
     pub(crate) fn new([color, mask, depth]: [f64; 3], counts: Counts, target: &Target) -> Self {
-        let [color, mask, depth] = [color, mask, depth].map(|sum| sum * target.normalisation);
+        let [color, mask, depth] = [color, mask, depth].map(|sum| sum * target.normalization);
         Self { total: color + mask + depth, color, mask, depth, counts }
     }
 }
 
-/// A loss with its derivatives by a left twist of the pose, (translation \[m\], rotation \[rad\]), about a given centre.
+/// A loss with its derivatives by a left twist of the pose, (translation \[m\], rotation \[rad\]), about a given center.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Linearised {
+pub struct Linearized {
     /// The loss.
     pub loss: Loss,
     /// Its gradient, 2 Jᵀr / N.
     pub gradient: Vector6<f64>,
     /// JᵀJ / N: the Gauss–Newton approximation of half the loss's Hessian, so that the step is −(2 `jtj`)⁻¹ `gradient`.
     pub jtj: Matrix6<f64>,
-    /// The correction of the colours at which the loss is least, with [`LossOptions::affine`];
+    /// The correction of the colors at which the loss is least, with [`LossOptions::affine`];
     /// [`Light::corrected`] makes a light of it.
     pub affine: Option<Affine>,
 }
@@ -129,13 +129,13 @@ pub struct Linearised {
 /// A picture of the object alone, as the mode sees it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PoseImage {
-    /// Colour blended with the black background.
+    /// Color blended with the black background.
     pub color: RgbImage,
     /// Coverage α in 0..=1, row-major.
     pub coverage: Vec<f32>,
-    /// Z of the surface at pixel centres \[m\], 0 where there is none; with several samples a pixel, their mean.
+    /// Z of the surface at pixel centers \[m\], 0 where there is none; with several samples a pixel, their mean.
     pub depth: DepthImage,
-    /// Unit normal at pixel centres, or the sample next to them, as shading sees it, towards the camera (camera frame), row-major; zero where there is
+    /// Unit normal at pixel centers, or the sample next to them, as shading sees it, towards the camera (camera frame), row-major; zero where there is
     /// no surface.
     pub normal: Vec<[f32; 3]>,
     /// The face there, counting those that the model draws, row-major.
@@ -166,29 +166,29 @@ impl PoseLoss {
     }
 
     /// The loss, its gradient and the Gauss–Newton matrix by the twist about `center` (camera frame \[m\]).
-    pub fn linearise(
+    pub fn linearize(
         &self,
         model: &RenderModel,
         t_cam_object: &Isometry3<f64>,
         center: &Point3<f64>,
         light: &Light,
         target: &Target,
-    ) -> Linearised {
+    ) -> Linearized {
         let all = self.sum::<true>(model, t_cam_object, center, light, target);
-        let (right, jtj) = all.sums.equations(target.normalisation);
-        Linearised {
+        let (right, jtj) = all.sums.equations(target.normalization);
+        Linearized {
             loss: all.sums.loss(target),
             gradient: right * 2.0,
-            jtj: jtj - all.reduction * target.normalisation,
+            jtj: jtj - all.reduction * target.normalization,
             affine: self.options.affine.then_some(all.affine),
         }
     }
 
     /// The loss by square tiles of the image, `side` pixels wide and high from its upper left corner on, each with the derivatives by a twist of
     /// what is seen in it alone: for bodies that are not quite rigid, or models that are not quite the body. Together the
-    /// tiles are what [`linearise`](Self::linearise) gives; tiles to which no pixel is drawn or missed may be left out. Colours are not
+    /// tiles are what [`linearize`](Self::linearize) gives; tiles to which no pixel is drawn or missed may be left out. Colors are not
     /// corrected as [`LossOptions::affine`] would have it, since that is not of one tile.
-    pub fn linearise_tiles(
+    pub fn linearize_tiles(
         &self,
         model: &RenderModel,
         t_cam_object: &Isometry3<f64>,
@@ -206,9 +206,9 @@ impl PoseLoss {
                 let Self(residuals, tiling) = self;
                 let target = residuals.target;
                 let tile = |([column, row], sums): ([usize; 2], Sums)| {
-                    let (right, jtj) = sums.equations(target.normalisation);
+                    let (right, jtj) = sums.equations(target.normalization);
                     let loss = sums.loss(target);
-                    let at = Linearised { loss, gradient: right * 2.0, jtj, affine: None };
+                    let at = Linearized { loss, gradient: right * 2.0, jtj, affine: None };
                     Tile { column, row, at }
                 };
                 residuals.by_tiles::<true>(view, tiling).into_iter().map(tile).collect()

@@ -5,27 +5,27 @@ use super::lane::{LANES, Lane};
 /// What a [`PoseLoss`](super::PoseLoss) consists of, whatever the mode.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LossOptions {
-    /// Weight of the squared colour difference a channel. Zero leaves it out.
+    /// Weight of the squared color difference a channel. Zero leaves it out.
     pub color_weight: f64,
     /// Weight of the squared difference between the object's coverage (0..=1) and the mask, relative to one
-    /// colour channel of weight one. Zero leaves it out.
+    /// color channel of weight one. Zero leaves it out.
     pub mask_weight: f64,
     /// Comparison of depth, if the target has any.
     pub depth: Option<DepthOptions>,
-    /// Treatment of large colour residuals.
+    /// Treatment of large color residuals.
     pub robust: Robust,
     /// What becomes of a pixel of the mask where a known body lies in front of the rendered object: `false`
     /// gives it no residual; `true` counts it as missed, like a pixel that the object does not cover, so that hiding
     /// behind the body does not lower the loss. Neither has a derivative.
     pub hidden_is_missed: bool,
-    /// Minimises the loss of each pose over a gain and an offset of the object's colours in each channel, for images whose
+    /// Minimizes the loss of each pose over a gain and an offset of the object's colors in each channel, for images whose
     /// exposure, white balance or black level is not known. Costs about another evaluation; with a robust kernel, one for
     /// each round of reweighting.
     pub affine: bool,
 }
 
 impl Default for LossOptions {
-    /// The mean squared error of the colour alone.
+    /// The mean squared error of the color alone.
     fn default() -> Self {
         Self {
             color_weight: 1.0,
@@ -41,7 +41,7 @@ impl Default for LossOptions {
 /// How depth enters the loss: as `weight * (dz / scale)²` where both depths exist.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DepthOptions {
-    /// Weight relative to one colour channel.
+    /// Weight relative to one color channel.
     pub weight: f64,
     /// Depth difference that counts as one unit \[m\].
     pub scale: f64,
@@ -54,10 +54,10 @@ pub struct DepthOptions {
 pub enum Robust {
     /// r².
     None,
-    /// r² up to the scale k (colour units), then 2 k |r| − k² (Huber, "Robust estimation of a location
+    /// r² up to the scale k (color units), then 2 k |r| − k² (Huber, "Robust estimation of a location
     /// parameter", 1964).
     Huber(f64),
-    /// k² ln(1 + r²/k²) with scale k (colour units).
+    /// k² ln(1 + r²/k²) with scale k (color units).
     Cauchy(f64),
 }
 

@@ -12,7 +12,7 @@ pub(crate) fn scaled_sum(p: f32, a: &Row, q: f32, b: &Row) -> Row {
     std::array::from_fn(|i| p * a[i] + q * b[i])
 }
 
-/// What a pixel shows of the object: colour and coverage after blending with the black background, the
+/// What a pixel shows of the object: color and coverage after blending with the black background, the
 /// depth of the surface there, and their derivatives by the twist.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Pixel {
@@ -33,9 +33,9 @@ pub(crate) struct Pixel {
 /// A pixel with what kind of pixel it is.
 pub(crate) struct Seen {
     pub(crate) pixel: Pixel,
-    /// A face covers the pixel's centre.
+    /// A face covers the pixel's center.
     pub(crate) hit: bool,
-    /// The centre lies within the contour band.
+    /// The center lies within the contour band.
     pub(crate) near_outline: bool,
 }
 
@@ -55,7 +55,7 @@ pub(crate) trait View: Sync {
         each: impl FnMut(usize, usize, Option<Seen>),
     );
 
-    /// Calls `each` for every pixel of one block whose centre shows a face, with its column and row, the face (of the
+    /// Calls `each` for every pixel of one block whose center shows a face, with its column and row, the face (of the
     /// model's faces drawn) and the unit normal there (camera frame).
     fn faces(&self, block: usize, each: impl FnMut(usize, usize, u32, [f32; 3]));
 

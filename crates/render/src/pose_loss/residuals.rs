@@ -129,7 +129,7 @@ impl Residuals<'_> {
         }
     }
 
-    /// Counts pixel `at`, which nothing hides, and adds all of its residuals but those of the colour.
+    /// Counts pixel `at`, which nothing hides, and adds all of its residuals but those of the color.
     #[inline]
     pub(crate) fn add_but_color<const DERIVATIVES: bool>(
         &self,
@@ -169,7 +169,7 @@ impl Residuals<'_> {
         }
     }
 
-    /// Adds the residuals of the colours of pixels side by side.
+    /// Adds the residuals of the colors of pixels side by side.
     #[inline(always)]
     pub(crate) fn add_colors<const DERIVATIVES: bool>(&self, sums: &mut LaneSums, patch: &Patch) {
         let options = self.options;

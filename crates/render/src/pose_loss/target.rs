@@ -4,12 +4,12 @@ use crate::camera::{Camera, CameraError};
 use crate::image::{DepthImage, Mask, RgbImage};
 use crate::projected::Region;
 
-/// A segmented image: colour where the object is, black elsewhere, with optional depth and the depth of
+/// A segmented image: color where the object is, black elsewhere, with optional depth and the depth of
 /// known bodies that may hide the object.
 #[derive(Clone, Debug)]
 pub struct Target {
     pub(crate) camera: Camera,
-    /// Observed colour inside the mask, zero outside.
+    /// Observed color inside the mask, zero outside.
     pub(crate) color: Vec<[f32; 3]>,
     /// Share of the pixel that the mask covers, 0..=1.
     pub(crate) coverage: Vec<f32>,
@@ -19,7 +19,7 @@ pub struct Target {
     /// Around all covered pixels.
     pub(crate) bounds: Region,
     /// One over three times the covered area; pose-independent.
-    pub(crate) normalisation: f64,
+    pub(crate) normalization: f64,
 }
 
 /// Why images make no target.
@@ -47,8 +47,8 @@ pub enum TargetError {
         /// Pixels of the camera.
         expected: usize,
     },
-    /// A colour under the mask is infinite or not a number.
-    #[error("pixel ({x}, {y}) has a colour that is not finite")]
+    /// A color under the mask is infinite or not a number.
+    #[error("pixel ({x}, {y}) has a color that is not finite")]
     NotFinite {
         /// Column.
         x: usize,
@@ -64,10 +64,10 @@ pub enum TargetError {
 }
 
 impl Target {
-    /// The object's colours: `image` where `mask` is set, black elsewhere.
+    /// The object's colors: `image` where `mask` is set, black elsewhere.
     ///
     /// # Errors
-    /// When the camera is impossible, a size differs from the camera's, no pixel of the mask is set, or a colour under it is not finite.
+    /// When the camera is impossible, a size differs from the camera's, no pixel of the mask is set, or a color under it is not finite.
     pub fn new(camera: Camera, image: &RgbImage, mask: &Mask) -> Result<Self, TargetError> {
         check(&camera, "image", image.width(), image.height())?;
         check(&camera, "mask", mask.width(), mask.height())?;
@@ -87,7 +87,7 @@ impl Target {
     /// which unlike a binary mask places the outline within the pixel.
     ///
     /// # Errors
-    /// When the camera is impossible, a size differs from the camera's, nothing is covered, or a colour where something is is not finite.
+    /// When the camera is impossible, a size differs from the camera's, nothing is covered, or a color where something is is not finite.
     pub fn from_matte(
         camera: Camera,
         image: &RgbImage,
@@ -136,7 +136,7 @@ impl Target {
         Ok(self)
     }
 
-    /// The target with one pixel for every block of `factor` by `factor`: means of colour and coverage, medians
+    /// The target with one pixel for every block of `factor` by `factor`: means of color and coverage, medians
     /// of depth. `factor` is at least one and at most the shorter side.
     ///
     /// # Errors
@@ -176,7 +176,7 @@ impl Target {
 
     /// Area of the mask \[px\].
     pub fn area(&self) -> f64 {
-        1.0 / (3.0 * self.normalisation)
+        1.0 / (3.0 * self.normalization)
     }
 
     /// A target that has nothing beyond `within`.
@@ -193,8 +193,8 @@ impl Target {
         // Blocks that were cut off may have been all that there was.
         let bounds = bounds(camera.width, &coverage, |&a| a > 0.0).ok_or(TargetError::EmptyMask)?;
         let area: f64 = bounds.indices(camera.width).map(|at| f64::from(coverage[at])).sum();
-        let normalisation = 1.0 / (3.0 * area);
-        Ok(Self { camera, color, coverage, depth: None, occluder: None, bounds, normalisation })
+        let normalization = 1.0 / (3.0 * area);
+        Ok(Self { camera, color, coverage, depth: None, occluder: None, bounds, normalization })
     }
 }
 
@@ -259,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn downsampling_keeps_the_total_of_colour_and_coverage() {
+    fn downsampling_keeps_the_total_of_color_and_coverage() {
         let image = RgbImage::filled(4, 2, [0.5, 0.25, 1.0]);
         let mut mask = Mask::filled(4, 2, false);
         mask.pixels_mut()[1] = true;

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::Linearised;
+use super::Linearized;
 use super::sums::Sums;
 
 /// What the pixels of one square tile of the image bring to a loss.
@@ -13,7 +13,7 @@ pub struct Tile {
     /// How many tiles are above it.
     pub row: usize,
     /// Its share of the loss, with derivatives by a twist of what it shows alone.
-    pub at: Linearised,
+    pub at: Linearized,
 }
 
 /// How an image is cut into square tiles, from its upper left corner on.

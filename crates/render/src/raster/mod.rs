@@ -31,14 +31,14 @@ fn span(a: f32, b: f32, c: f32) -> [f32; 2] {
     [if c < low { c } else { low }, if c > high { c } else { high }]
 }
 
-/// The pixel centres from `low` to `high` among those from `first` to `last`, if any.
+/// The pixel centers from `low` to `high` among those from `first` to `last`, if any.
 #[inline(always)]
-fn centres([low, high]: [f32; 2], first: usize, last: usize) -> Option<(usize, usize)> {
+fn centers([low, high]: [f32; 2], first: usize, last: usize) -> Option<(usize, usize)> {
     let (first, last) = (first as f32, last as f32 - 1.0);
     let low = if low > first { low } else { first };
     let high = if high < last { high } else { last };
     let (start, end) = (ceil(low), high as i32);
-    // Most faces of a fine mesh lie between pixel centres. (One branch, not two.)
+    // Most faces of a fine mesh lie between pixel centers. (One branch, not two.)
     ((low <= high) & (start <= end)).then_some((start as usize, end as usize))
 }
 
@@ -102,8 +102,8 @@ impl Visible {
     pub(crate) fn draw(&mut self, projected: &Projected, face: u32) {
         let [a, b, c] = projected.corners(face as usize);
         let region = self.region;
-        let Some((y0, y1)) = centres(span(a[1], b[1], c[1]), region.y0, region.y1) else { return };
-        let Some((x0, x1)) = centres(span(a[0], b[0], c[0]), region.x0, region.x1) else { return };
+        let Some((y0, y1)) = centers(span(a[1], b[1], c[1]), region.y0, region.y1) else { return };
+        let Some((x0, x1)) = centers(span(a[0], b[0], c[0]), region.x0, region.x1) else { return };
         let area = signed_area(&[a, b, c]);
         let scale = 1.0 / area;
         let width = region.width();
@@ -142,7 +142,7 @@ pub(crate) fn bin(projected: &Projected, region: &Region) -> Vec<Vec<u32>> {
     let mut bins: Vec<Vec<u32>> = (0..count).map(|_| Vec::with_capacity(expected)).collect();
     for (f, _) in projected.facing.iter().enumerate().filter(|(_, facing)| **facing != 0) {
         let [a, b, c] = projected.corners(f);
-        let Some((top, bottom)) = centres(span(a[1], b[1], c[1]), region.y0, region.y1) else {
+        let Some((top, bottom)) = centers(span(a[1], b[1], c[1]), region.y0, region.y1) else {
             continue;
         };
         for bin in &mut bins[(top - region.y0) / BAND..=(bottom - region.y0) / BAND] {
@@ -159,7 +159,7 @@ pub(crate) fn band(region: &Region, index: usize) -> Region {
 }
 
 /// Visible faces over `region`, band by band, in parallel.
-pub(crate) fn rasterise(projected: &Projected, region: &Region) -> Vec<Visible> {
+pub(crate) fn rasterize(projected: &Projected, region: &Region) -> Vec<Visible> {
     bin(projected, region)
         .par_iter()
         .enumerate()
@@ -171,16 +171,16 @@ pub(crate) fn rasterise(projected: &Projected, region: &Region) -> Vec<Visible> 
         .collect()
 }
 
-/// Depth of the nearest surface of several posed models per pixel centre: Z in the camera frame \[m\], 0 where
+/// Depth of the nearest surface of several posed models per pixel center: Z in the camera frame \[m\], 0 where
 /// there is none.
 ///
 /// Each body is given with `t_cam_body`. Bodies behind the camera, or with a pose that is not finite, are not
-/// drawn, nor are faces with a corner within a millimetre of its plane or behind it: cut large tables and walls into small faces.
+/// drawn, nor are faces with a corner within a millimeter of its plane or behind it: cut large tables and walls into small faces.
 /// Meant for what is known and does not move during a refinement, such as the hand.
 pub fn depth_map(camera: &Camera, bodies: &[(&RenderModel, Isometry3<f64>)]) -> DepthImage {
     let drawn = |(model, pose): &(&RenderModel, Isometry3<f64>)| {
         let projected = Posed::new(model, camera, pose, 0.0).projected;
-        rasterise(&projected, &projected.region)
+        rasterize(&projected, &projected.region)
     };
     let drawn: Vec<Vec<Visible>> = bodies.par_iter().map(drawn).collect();
     let mut depth = DepthImage::filled(camera.width, camera.height, 0.0);

@@ -8,7 +8,7 @@ use crate::projected::{Projected, signed_area};
 /// Faces side by side.
 const LANES: usize = 32;
 
-/// Faces may cover at most so many pixel centres across and down to be treated here.
+/// Faces may cover at most so many pixel centers across and down to be treated here.
 const ACROSS: usize = 3;
 
 impl Visible {
@@ -48,11 +48,11 @@ impl NullaryFnOnce for DrawAll<'_> {
 struct SideBySide {
     corners: [[f32; LANES]; 9],
     large: [bool; LANES],
-    /// The first pixel centre that may be covered.
+    /// The first pixel center that may be covered.
     first: [i32; LANES],
-    /// A bit for each of the centres from there on that is covered, row by row.
+    /// A bit for each of the centers from there on that is covered, row by row.
     covered: [u32; LANES],
-    /// 1/Z at these centres.
+    /// 1/Z at these centers.
     inverse_z: [[f32; LANES]; ACROSS * ACROSS],
 }
 

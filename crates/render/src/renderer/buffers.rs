@@ -22,15 +22,15 @@ pub struct Buffers {
     pub width: usize,
     /// Rows.
     pub height: usize,
-    /// Colour over the background.
+    /// Color over the background.
     pub color: Vec<[f64; 3]>,
     /// Coverage, 0..=1.
     pub alpha: Vec<f64>,
-    /// Z of the nearest face that contains the pixel's centre \[m\], 0 where there is none.
+    /// Z of the nearest face that contains the pixel's center \[m\], 0 where there is none.
     pub depth: Vec<f64>,
     /// Its unit normal on the side that is seen, camera frame; zero where there is none.
     pub normal: Vec<Vector3<f64>>,
-    /// The nearest face that contains the pixel's centre.
+    /// The nearest face that contains the pixel's center.
     pub face: Vec<Option<FaceId>>,
 }
 
@@ -57,7 +57,7 @@ impl Buffers {
         self.face[at] = pixel.face.map(id);
     }
 
-    /// The colours as an image.
+    /// The colors as an image.
     ///
     /// # Errors
     /// When the lists were changed to another length.
@@ -78,7 +78,7 @@ impl Buffers {
 /// Derivatives of a loss by the images of [`Buffers`], one entry a pixel; an empty list stands for zeros.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct BufferAdjoints {
-    /// By the colour.
+    /// By the color.
     pub color: Vec<[f64; 3]>,
     /// By the coverage.
     pub alpha: Vec<f64>,

@@ -14,7 +14,7 @@ use crate::contour::{
 };
 use crate::mode::ContourOptions;
 use crate::projected::Region;
-use crate::raster::{MISS, Visible, rasterise};
+use crate::raster::{MISS, Visible, rasterize};
 
 /// Visible faces, and the contours near each pixel.
 pub(super) struct Contours {
@@ -36,7 +36,7 @@ pub(super) struct Block {
     side: Vec<f32>,
 }
 
-/// What was decided about a pixel: which face is at its centre, and which contours are near.
+/// What was decided about a pixel: which face is at its center, and which contours are near.
 #[derive(Clone, Copy)]
 pub(super) struct Decision<'a> {
     pub(super) face: Option<usize>,
@@ -123,7 +123,7 @@ impl Contours {
         let edges = std::mem::take(&mut flat.creases);
         let projected = frame.projected(&mut flat);
         let region = projected.region;
-        let visible = rasterise(&projected, &region);
+        let visible = rasterize(&projected, &region);
         let (mut pieces, mut inner, mut folds) = (Vec::new(), Vec::new(), Vec::new());
         if region != Region::EMPTY {
             let silhouette = outline(&projected, &region, half_width);
@@ -261,7 +261,7 @@ fn step_back(frame: &Frame, step: &Step, by_share: f64, by_distance: f64, sums: 
     if by_share == 0.0 && by_distance == 0.0 {
         return;
     }
-    let (_, [of_share, of_distance]) = step.foot.linearise(foot_inputs(frame, &step.piece));
+    let (_, [of_share, of_distance]) = step.foot.linearize(foot_inputs(frame, &step.piece));
     let by = |i: usize| by_share * of_share[i] + by_distance * of_distance[i];
     let face = sums.face(step.piece.face as usize);
     face.position[corners[0]] += Vector3::new(by(0), by(1), by(2));

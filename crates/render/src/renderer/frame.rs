@@ -15,12 +15,12 @@ use crate::projected::{Projected, Region};
 pub(super) struct Body {
     pub(super) model: Arc<RenderModel>,
     pub(super) rotation: Matrix3<f64>,
-    /// The model's centre \[m\].
+    /// The model's center \[m\].
     pub(super) center: Vector3<f64>,
     /// Where its faces and vertices start among those of all.
     pub(super) first_face: usize,
     pub(super) first_vertex: usize,
-    /// Pyramid level of the texture, and its derivative by the centre's Z \[1/m\].
+    /// Pyramid level of the texture, and its derivative by the center's Z \[1/m\].
     pub(super) level: f64,
     pub(super) level_dz: f64,
 }
@@ -40,7 +40,7 @@ pub(super) struct Frame {
 /// The same scene projected in f32, for the discrete part: what is visible.
 pub(super) struct Flat {
     edges: Vec<Edge>,
-    /// Those at which normals or colours of an object jump.
+    /// Those at which normals or colors of an object jump.
     pub(super) creases: Vec<Edge>,
     /// Column, row \[px\] and 1/Z \[1/m\]; 1/Z is 0 where it is not in front of the camera.
     pub(super) screen: Vec<[f32; 3]>,

@@ -176,7 +176,7 @@ mod tests {
             [([64.0, 30.0], [0.0, 1.0]), ([64.0, 30.0], [0.7, 0.9]), ([0.0, 20.0], [0.0, 1.0])]
         {
             (foot.pixel, foot.range) = (pixel, range);
-            let (_, jacobian) = foot.linearise(edge);
+            let (_, jacobian) = foot.linearize(edge);
             for k in 0..2 {
                 let difference = finite_difference_gradient(
                     |x| foot.evaluate(std::array::from_fn(|i| x[i]))[k],
@@ -197,7 +197,7 @@ mod tests {
         let middle = [0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])];
         let at = |distance: f64| {
             let pixel = [middle[0] + distance * normal[0], middle[1] + distance * normal[1]];
-            Foot { pixel, range: [0.0, 1.0], outward: normal, side: 1.0 }.linearise(edge)
+            Foot { pixel, range: [0.0, 1.0], outward: normal, side: 1.0 }.linearize(edge)
         };
         let (on, beside) = (at(0.0), at(0.01));
         assert!(on.0[1].abs() < 1e-12);

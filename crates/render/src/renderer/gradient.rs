@@ -20,7 +20,7 @@ pub struct SceneGradient {
     pub extrinsics: Vector6<f64>,
     /// By the shader's parameters.
     pub shader: Vec<f64>,
-    /// By the background's colour.
+    /// By the background's color.
     pub background: [f64; 3],
 }
 
@@ -28,9 +28,9 @@ pub struct SceneGradient {
 #[derive(Clone, Debug)]
 pub struct ObjectGradient {
     /// By a left twist of the pose, (translation \[m\], rotation \[rad\]) about
-    /// [its centre](super::PosedModel::center), along the axes of the camera.
+    /// [its center](super::PosedModel::center), along the axes of the camera.
     pub twist: Vector6<f64>,
-    /// By its one colour, if it has but one.
+    /// By its one color, if it has but one.
     pub uniform_color: [f64; 3],
     model: Arc<RenderModel>,
     rotation: Matrix3<f64>,
@@ -38,7 +38,7 @@ pub struct ObjectGradient {
     in_camera: Vec<Vector3<f64>>,
     /// By the corner normals, mesh frame; empty where nothing depends on them.
     normals: Vec<[Vector3<f64>; 3]>,
-    /// By the colours of vertices.
+    /// By the colors of vertices.
     colors: Vec<[f64; 3]>,
     /// By the texels of each level.
     by_level: Vec<Vec<[f64; 3]>>,
@@ -56,7 +56,7 @@ impl ObjectGradient {
         out
     }
 
-    /// By a colour of each welded vertex ([`RenderModel::with_colors`]); empty if the model is not coloured by vertices.
+    /// By a color of each welded vertex ([`RenderModel::with_colors`]); empty if the model is not colored by vertices.
     pub fn colors(&self) -> &[[f64; 3]] {
         &self.colors
     }
@@ -132,7 +132,7 @@ impl SceneGradient {
                     torque += (vertex - body.center).cross(adjoint);
                 }
             }
-            // The level of the texture follows the centre's depth and the mean focal length.
+            // The level of the texture follows the center's depth and the mean focal length.
             if body.level_dz != 0.0 {
                 let by_z = sums.level * body.level_dz;
                 force.z += by_z;

@@ -1,7 +1,7 @@
 //! Pictures of whole scenes, with the derivatives of any loss by everything that makes them.
 //!
 //! [`Renderer::render`] makes the images of a [`Scene`]; [`Rendering::vjp`] carries a loss's derivatives by their pixels
-//! back to poses, vertices, colours, texels, camera, light and background.
+//! back to poses, vertices, colors, texels, camera, light and background.
 //! What is visible is decided in f32, by the code that also serves the loss of a pose; everything that has a derivative is
 //! computed in f64. A [`Mode`] is one file (`contour`, `softras`), which says what places on which faces a pixel shows, with
 //! what weights. Results do not depend on the number of threads.
@@ -174,7 +174,7 @@ impl<Sh: Shader> Rendering<Sh> {
     /// The derivatives of a loss by the scene, given those by the images: the vector–Jacobian product.
     ///
     /// Visibility is part of the values, but its changes have no derivative beyond the blending of the mode; nor have
-    /// jumps of colour at creases and texture seams.
+    /// jumps of color at creases and texture seams.
     ///
     /// # Panics
     /// If a list of adjoints is neither empty nor has one entry a pixel.

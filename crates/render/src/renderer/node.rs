@@ -17,7 +17,7 @@ pub struct SceneVars {
     pub poses: Vec<(usize, Isometry3<Var>)>,
     /// Welded vertices of objects, as [`RenderModel::positions`] \[m\].
     pub positions: Vec<(usize, Vec<Vector3<Var>>)>,
-    /// Colours of welded vertices, as [`RenderModel::with_colors`].
+    /// Colors of welded vertices, as [`RenderModel::with_colors`].
     pub colors: Vec<(usize, Vec<[Var; 3]>)>,
     /// Texels of objects, as [`RenderModel::texture`].
     pub texels: Vec<(usize, Vec<[Var; 3]>)>,
@@ -25,14 +25,14 @@ pub struct SceneVars {
     pub intrinsics: Option<[Var; 4]>,
     /// Parameters of the shader.
     pub shader: Option<Vec<Var>>,
-    /// Colour of the background.
+    /// Color of the background.
     pub background: Option<[Var; 3]>,
 }
 
 /// Images on the tape, row-major, one entry a pixel, as in [`Buffers`](super::Buffers).
 #[derive(Clone, Debug)]
 pub struct BufferVars {
-    /// Colour over the background.
+    /// Color over the background.
     pub color: Vec<[Var; 3]>,
     /// Coverage.
     pub alpha: Vec<Var>,
@@ -71,7 +71,7 @@ pub enum RecordError {
 
 /// A group of inputs of the node.
 enum Input {
-    /// With the pose's rotation and the offset of the model's centre from its origin, camera frame.
+    /// With the pose's rotation and the offset of the model's center from its origin, camera frame.
     Pose {
         object: usize,
         rotation: UnitQuaternion<f64>,
@@ -137,7 +137,7 @@ fn rounded(triples: &[[Var; 3]]) -> Vec<[f32; 3]> {
 impl<Sh: Shader + Clone + 'static> Renderer<Sh> {
     /// Renders `scene` with `vars` in the place of its own numbers, and records the images as one node of the tape.
     ///
-    /// A loss of how a body looks after a simulation is differentiated by where it started, say. Vertices, colours and
+    /// A loss of how a body looks after a simulation is differentiated by where it started, say. Vertices, colors and
     /// texels are rounded to f32.
     ///
     /// # Errors
@@ -242,7 +242,7 @@ mod tests {
         let model = |mesh| Arc::new(RenderModel::new(mesh).unwrap());
         let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.4, -0.7, 0.3));
         let pose = Isometry3::from_parts(Vector3::new(0.01, 0.0, 0.4).into(), turn);
-        // Away from its origin, so that turns about origin and centre differ.
+        // Away from its origin, so that turns about origin and center differ.
         let mut mesh = painted(lump(0.05, 10), 0.1);
         mesh.vertices.iter_mut().for_each(|p| p.x += 0.03);
         Scene::new(camera)

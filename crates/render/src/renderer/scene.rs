@@ -10,14 +10,14 @@ use crate::model::RenderModel;
 /// A model at a place.
 #[derive(Clone, Debug)]
 pub struct PosedModel {
-    /// Shape and colours.
+    /// Shape and colors.
     pub model: Arc<RenderModel>,
     /// Its pose, mesh to camera frame \[m\].
     pub t_cam_model: Isometry3<f64>,
 }
 
 impl PosedModel {
-    /// Centre of the model in the camera frame \[m\], about which its twist turns.
+    /// Center of the model in the camera frame \[m\], about which its twist turns.
     pub fn center(&self) -> Point3<f64> {
         self.t_cam_model * self.model.center()
     }
@@ -30,7 +30,7 @@ pub struct Scene {
     pub camera: Camera,
     /// The models; faces refer to them by their place in this list.
     pub objects: Vec<PosedModel>,
-    /// Colour where there is nothing.
+    /// Color where there is nothing.
     pub background: [f64; 3],
 }
 

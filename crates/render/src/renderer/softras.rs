@@ -25,7 +25,7 @@ pub(super) struct Block {
     /// Where the faces of each pixel start in `faces`, and the end.
     start: Vec<u32>,
     faces: Vec<u32>,
-    /// The nearest that contains the pixel's centre, or [`NONE`].
+    /// The nearest that contains the pixel's center, or [`NONE`].
     inside: Vec<u32>,
 }
 
@@ -43,7 +43,7 @@ pub(super) struct Trace {
     spreads: Vec<Spread>,
     /// Π (1 − p).
     clear: f64,
-    /// The background's share of the colour.
+    /// The background's share of the color.
     background: f64,
     /// The face whose depth all weights but the background's are relative to.
     drifting: Option<usize>,
@@ -64,7 +64,7 @@ impl SoftFaces {
         Self { settings, screen, blocks }
     }
 
-    /// The faces of a pixel, and the one at its centre.
+    /// The faces of a pixel, and the one at its center.
     pub(super) fn decision(&self, block: usize, i: usize) -> (&[u32], Option<u32>) {
         let block = &self.blocks[block];
         let faces = &block.faces[block.start[i] as usize..block.start[i + 1] as usize];

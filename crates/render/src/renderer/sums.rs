@@ -15,7 +15,7 @@ pub(super) struct FaceAdjoint {
     pub(super) albedo: [[f64; 3]; 3],
 }
 
-/// A place of a texture that a sample has looked up, and the adjoint of the colour found.
+/// A place of a texture that a sample has looked up, and the adjoint of the color found.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TexelUse {
     pub(super) object: u32,
@@ -30,7 +30,7 @@ pub(super) struct BodySums {
     pub(super) turn: Vector3<f64>,
     /// Of the pyramid level.
     pub(super) level: f64,
-    /// Of its one colour.
+    /// Of its one color.
     pub(super) uniform: [f64; 3],
 }
 

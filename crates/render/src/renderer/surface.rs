@@ -1,4 +1,4 @@
-//! A lit point of a surface, from barycentric coordinates to colour and back.
+//! A lit point of a surface, from barycentric coordinates to color and back.
 
 use nalgebra::Vector3;
 use prehend_autodiff::Fwd;
@@ -22,7 +22,7 @@ pub(super) struct Sample {
     pub(super) face: usize,
     pub(super) body: usize,
     pub(super) b: [f64; 3],
-    /// Sum of the corner normals, camera frame, before it is turned to the visible side and normalised.
+    /// Sum of the corner normals, camera frame, before it is turned to the visible side and normalized.
     normal_sum: Vector3<f64>,
     pub(super) point: SurfacePoint<f64>,
     pub(super) color: [f64; 3],
@@ -59,7 +59,7 @@ impl<Sh: Shader> Lit<'_, Sh> {
         Sample { face, body: body_index, b, normal_sum, point, color }
     }
 
-    /// Carries adjoints of the colour and the normal of `sample` back: adds to `sums`, and returns those of the
+    /// Carries adjoints of the color and the normal of `sample` back: adds to `sums`, and returns those of the
     /// barycentric coordinates.
     #[inline]
     pub(super) fn sample_back(

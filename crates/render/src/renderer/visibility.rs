@@ -10,17 +10,17 @@ pub(super) struct Part {
     pub(super) face: usize,
     /// Perspective-correct barycentric coordinates, unless the mode's options say otherwise.
     pub(super) b: [f64; 3],
-    /// Its weight in the pixel's colour. Parts of weight zero are not lit.
+    /// Its weight in the pixel's color. Parts of weight zero are not lit.
     pub(super) weight: f64,
 }
 
 /// What the parts make of a pixel.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Blend {
-    /// Weight of the background's colour.
+    /// Weight of the background's color.
     pub(super) background: f64,
     pub(super) alpha: f64,
-    /// The part at the pixel's centre (which gives the normal and the face) and its depth \[m\].
+    /// The part at the pixel's center (which gives the normal and the face) and its depth \[m\].
     pub(super) center: Option<(usize, f64)>,
 }
 

@@ -1,6 +1,6 @@
 // Sorts the faces of each hypothesis into tiles: count, scan, scatter. The order within a tile is left open.
 
-// First and last tile of the pixel centres in the box around a face and its reach.
+// First and last tile of the pixel centers in the box around a face and its reach.
 struct TileSpan {
     first: vec2<u32>,
     last: vec2<u32>,
@@ -20,7 +20,7 @@ fn tile_span(h: u32, face: u32) -> TileSpan {
     let high = max(max(c[0].xy, c[1].xy), c[2].xy) + base + params.reach;
     let first = max(ceil(low), vec2<f32>(region.xy));
     let last = min(floor(high), vec2<f32>(region.zw) - 1.0);
-    // Most faces of a fine mesh lie between pixel centres.
+    // Most faces of a fine mesh lie between pixel centers.
     if all(first <= last) {
         span.some = true;
         span.first = vec2<u32>(first) / TILE;

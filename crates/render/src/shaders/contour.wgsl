@@ -45,7 +45,7 @@ fn interior(h: u32, p: vec2<f32>, face: u32, inverse_z: f32) -> Pixel {
 // Surfaces are taken to be inclined to the viewing ray by at least this sine.
 const GRAZING: f32 = 1e-3;
 
-// Rows of colour and depth at a surface point seen through a fixed pixel: the barycentric coordinate of corner i of the point
+// Rows of color and depth at a surface point seen through a fixed pixel: the barycentric coordinate of corner i of the point
 // on ray X is c_i·X / n·X with c_1 = e2 x p0 and c_2 = p0 x e1, so it changes by -(c_i - b_i n)/(n·X)·v, and the depth by
 // n·v/(n·d).
 fn interior_rows(
@@ -95,7 +95,7 @@ fn on_edge(h: u32, piece: u32, t: f32) -> EdgePoint {
     return EdgePoint(share, start + (end - start) * share, start, end);
 }
 
-// The unblended colour of the foot on a contour.
+// The unblended color of the foot on a contour.
 fn at_foot(h: u32, piece: u32, foot: Foot) -> Pixel {
     let e = on_edge(h, piece, foot.t);
     let face = pieces[piece].face;
@@ -174,8 +174,8 @@ fn fade(h: u32, piece: u32, foot: Foot, side: f32, pixel: ptr<function, Pixel>) 
     }
 }
 
-// Blends the near and the far surface across an inner contour: on the far side the near surface has the colour of the
-// foot, on the near side the far surface has the colour of the pixel beyond the contour.
+// Blends the near and the far surface across an inner contour: on the far side the near surface has the color of the
+// foot, on the near side the far surface has the color of the pixel beyond the contour.
 fn cross_contour(h: u32, p: vec2<f32>, own: Pixel, piece: u32) -> Pixel {
     let foot = foot_of(pieces[piece].a, pieces[piece].b, pieces[piece].range, p);
     let side = select(-1.0, 1.0, own.z > pieces[piece].split);

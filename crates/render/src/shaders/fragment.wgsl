@@ -31,7 +31,7 @@ struct Fragment {
     // 1 where a weight depends on the corners, 0 where it is clamped; likewise for their sum.
     free: vec3<f32>,
     sum_free: f32,
-    // The pixel's centre lies inside the face; the face counts here.
+    // The pixel's center lies inside the face; the face counts here.
     inside: bool,
     kept: bool,
 }

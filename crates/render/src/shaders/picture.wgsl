@@ -1,6 +1,6 @@
 // The picture of one hypothesis.
 
-// Colour, coverage, depth, normal, and the face plus one (0 where there is none).
+// Color, coverage, depth, normal, and the face plus one (0 where there is none).
 const PICTURE_COLUMNS: u32 = 9u;
 
 fn store_picture(h: u32, pixel: Pixel, at: vec2<u32>) {

@@ -77,7 +77,7 @@ fn find_pieces(@builtin(global_invocation_id) id: vec3<u32>) {
     let segment = segments[h * params.segment_capacity + id.x];
     let d = segment.b - segment.a;
     let length = sqrt(dot(d, d));
-    // Shorter edges are spanned by their neighbours' ends. The upper limit is for what has no finite length.
+    // Shorter edges are spanned by their neighbors' ends. The upper limit is for what has no finite length.
     if !(length > 1e-4 && length < 1e30) {
         return;
     }

@@ -1,13 +1,13 @@
 // What a pixel shows of the posed object, in either mode.
 
 struct Pixel {
-    // What is seen at all, and whether a face covers the pixel's centre or it lies within the contour band.
+    // What is seen at all, and whether a face covers the pixel's center or it lies within the contour band.
     some: bool,
     hit: bool,
     near_outline: bool,
-    // The face at the centre, if one covers it.
+    // The face at the center, if one covers it.
     face: u32,
-    // Colour and coverage after blending with the black background.
+    // Color and coverage after blending with the black background.
     color: vec3<f32>,
     coverage: f32,
     // Z of the surface, or outside of the nearest outline point [m], and the weight of the depth.
@@ -19,12 +19,12 @@ struct Pixel {
     depth_weight_row: Row,
 }
 
-// Colour rows from those of the barycentric coordinates of corners 1 and 2.
+// Color rows from those of the barycentric coordinates of corners 1 and 2.
 fn color_rows(h: u32, shaded: Shaded, moving_1: Row, moving_2: Row, pixel: ptr<function, Pixel>) {
     for (var k = 0u; k < 3u; k++) {
         var row = scaled_sum(shaded.along_1[k], moving_1, shaded.along_2[k], moving_2);
         row.angular += shaded.turning[k];
-        // The texture's level follows the depth of the model's centre, which a rotation about it leaves alone.
+        // The texture's level follows the depth of the model's center, which a rotation about it leaves alone.
         row.linear.z += shaded.level[k] * hypotheses[h].level_dz;
         (*pixel).color_rows[k] = row;
     }

@@ -3,12 +3,12 @@
 
 const NONE: u32 = 0xffffffffu;
 
-// How the unlit colours are stored.
+// How the unlit colors are stored.
 const ALBEDO_UNIFORM: u32 = 0u;
 const ALBEDO_CORNERS: u32 = 1u;
 const ALBEDO_TEXTURE: u32 = 2u;
 
-// Robust costs of a colour residual.
+// Robust costs of a color residual.
 const ROBUST_NONE: u32 = 0u;
 const ROBUST_HUBER: u32 = 1u;
 const ROBUST_CAUCHY: u32 = 2u;
@@ -71,7 +71,7 @@ struct Params {
 struct Hypothesis {
     // Rotation from the mesh into the camera frame, by columns.
     rotation: mat3x3<f32>,
-    // The model's centre in the camera frame [m], about which twists turn.
+    // The model's center in the camera frame [m], about which twists turn.
     center: vec3<f32>,
     // Whether everything is finite.
     alive: u32,
@@ -82,17 +82,17 @@ struct Hypothesis {
     // No channel depends on the normal.
     flat_light: u32,
     offset: vec3<f32>,
-    // Pyramid level of the texture, and its derivative by the centre's Z.
+    // Pyramid level of the texture, and its derivative by the center's Z.
     level: f32,
     level_dz: f32,
-    // The projected centre: its pixel, which screen positions are relative to, and the rest [px]. Zero in the contour mode,
+    // The projected center: its pixel, which screen positions are relative to, and the rest [px]. Zero in the contour mode,
     // where screen positions are those of the image.
     image_center: vec4<f32>,
 }
 
 struct Corner {
     normal: vec3<f32>,
-    // Colour, or texture coordinates.
+    // Color, or texture coordinates.
     paint: vec3<f32>,
 }
 

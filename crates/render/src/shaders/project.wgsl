@@ -34,7 +34,7 @@ fn project(
             let w = 1.0 / p.z;
             let center = hypotheses[h].center;
             if (params.soft_flags & SOFT_MODE) != 0u && center.z > NEAR {
-                // Barycentric coordinates of narrow faces magnify rounding, so these are relative to the centre.
+                // Barycentric coordinates of narrow faces magnify rounding, so these are relative to the center.
                 let ratio = center.xy / center.z;
                 let arm = hypotheses[h].rotation * positions[vertex].xyz;
                 let shift = params.focal * (arm.xy - ratio * arm.z) * w;

@@ -1,6 +1,6 @@
 // Residuals of the pixels of a tile against the target, and their sums. See `pose_loss/residuals.rs`.
 
-// Columns of the sums: losses of colour, mask and depth, the gradient, the upper triangle of JᵀJ row by row, and numbers of
+// Columns of the sums: losses of color, mask and depth, the gradient, the upper triangle of JᵀJ row by row, and numbers of
 // pixels covered, near the outline, hidden, missed, and with depth.
 const SUM_COLOR: u32 = 0u;
 const SUM_MASK: u32 = 1u;
@@ -58,7 +58,7 @@ fn add_residual(sums: ptr<function, Equations>, row: Row, r: f32, weight: f32) {
     }
 }
 
-// The cost of a pixel of the mask that shows nothing of the object: colour, mask.
+// The cost of a pixel of the mask that shows nothing of the object: color, mask.
 fn missed_cost(goal_pixel: TargetPixel) -> vec2<f32> {
     var color = 0.0;
     for (var k = 0u; k < 3u; k++) {

@@ -1,4 +1,4 @@
-// Derivatives by a twist (translation, rotation) about the model's centre, camera frame.
+// Derivatives by a twist (translation, rotation) about the model's center, camera frame.
 
 struct Row {
     linear: vec3<f32>,

@@ -2,7 +2,7 @@
 
 // Weight of the background.
 const BACKGROUND: f32 = 1e-10;
-// What has a smaller share of the pixel is left out: 64 such fragments are less than 1e-6 of its colour.
+// What has a smaller share of the pixel is left out: 64 such fragments are less than 1e-6 of its color.
 const LEAST_SHARE: f32 = 1e-8;
 const MOST_FACES: u32 = 64u;
 
@@ -14,7 +14,7 @@ struct Nearest {
     count: u32,
     z: array<f32, 64>,
     face: array<u32, 64>,
-    // The nearest that contains the pixel's centre.
+    // The nearest that contains the pixel's center.
     inside_z: f32,
     inside: u32,
 }

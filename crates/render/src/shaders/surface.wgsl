@@ -1,4 +1,4 @@
-// Colour of a surface point and its derivatives along the surface and with the normal.
+// Color of a surface point and its derivatives along the surface and with the normal.
 
 // Whether derivatives are wanted; without them the compiler drops their computation.
 override DERIVATIVES: bool = true;
@@ -31,7 +31,7 @@ fn barycentric(c: mat3x3<f32>, p: vec2<f32>) -> vec3<f32> {
     return weights / sum;
 }
 
-// Unlit colour and its derivatives by the barycentric coordinates and the level, in the fields of `Shaded`.
+// Unlit color and its derivatives by the barycentric coordinates and the level, in the fields of `Shaded`.
 fn albedo(h: u32, face: u32, b: vec3<f32>) -> Shaded {
     var out: Shaded;
     if params.albedo_kind == ALBEDO_UNIFORM {
@@ -56,7 +56,7 @@ fn albedo(h: u32, face: u32, b: vec3<f32>) -> Shaded {
     return out;
 }
 
-// Smooth unit normal on the side seen, mesh frame, and in w the sign of that side over the length before normalising.
+// Smooth unit normal on the side seen, mesh frame, and in w the sign of that side over the length before normalizing.
 fn normal_at(face: u32, b: vec3<f32>, seen_inside: bool) -> vec4<f32> {
     let sum = corners[3u * face].normal * b.x
         + corners[3u * face + 1u].normal * b.y
@@ -65,7 +65,7 @@ fn normal_at(face: u32, b: vec3<f32>, seen_inside: bool) -> vec4<f32> {
     return vec4<f32>(sum * factor, factor);
 }
 
-// Lit colour at barycentric coordinates b of a face; `seen_inside` says which side is seen.
+// Lit color at barycentric coordinates b of a face; `seen_inside` says which side is seen.
 fn shade(h: u32, face: u32, b: vec3<f32>, seen_inside: bool) -> Shaded {
     var out = albedo(h, face, b);
     if hypotheses[h].flat_light != 0u {

@@ -27,7 +27,7 @@ struct Results {
     pieces: atomic<u32>,
     // Keeps the values apart from the atomics.
     unused: u32,
-    // Sums of each hypothesis (see `residuals.wgsl`), or a picture: colour, coverage and depth of each pixel.
+    // Sums of each hypothesis (see `residuals.wgsl`), or a picture: color, coverage and depth of each pixel.
     values: array<f32>,
 }
 

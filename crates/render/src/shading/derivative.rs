@@ -31,7 +31,7 @@ impl Chunks {
     }
 }
 
-/// The gradient of `adjoint` · colour by position, normal and albedo.
+/// The gradient of `adjoint` · color by position, normal and albedo.
 #[inline]
 pub(crate) fn by_point(
     shader: &impl Shader,
@@ -56,7 +56,7 @@ pub(crate) fn by_point(
     }
 }
 
-/// Adds the gradient of `adjoint` · colour by the parameters to `gradient`.
+/// Adds the gradient of `adjoint` · color by the parameters to `gradient`.
 #[inline]
 pub(crate) fn by_parameters(
     shader: &impl Shader,

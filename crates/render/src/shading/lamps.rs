@@ -31,7 +31,7 @@ pub enum Lamp {
 pub enum Material {
     /// Equally in all directions.
     Lambert,
-    /// With a highlight of the lamp's colour (J. F. Blinn, "Models of light reflection for computer synthesized
+    /// With a highlight of the lamp's color (J. F. Blinn, "Models of light reflection for computer synthesized
     /// pictures", 1977).
     BlinnPhong {
         /// Strength of the highlight.
@@ -44,7 +44,7 @@ pub enum Material {
 /// Ambient light and any number of lamps on one material.
 ///
 /// With albedo a, unit normal n, unit direction to the eye v, and for lamp l the unit direction to it s and the strength
-/// e (divided by the squared distance in metres where it falls off), the colour of each channel is
+/// e (divided by the squared distance in meters where it falls off), the color of each channel is
 /// `a ambient + Σ_l e max(0, n·s) (a + specular max(0, n·h)^shininess)`, h = (s + v)/|s + v|. The highlight is part of the
 /// reflectance (T. Akenine-Möller and others, "Real-Time Rendering", 3rd edition, 2008, section 7.5.2), so that it fades
 /// where the light grazes instead of ending there. There are no shadows.

@@ -1,4 +1,4 @@
-//! How light makes a colour of a surface point.
+//! How light makes a color of a surface point.
 
 mod derivative;
 mod first_order;
@@ -17,13 +17,13 @@ pub struct SurfacePoint<S> {
     pub position: Vector3<S>,
     /// Unit normal towards the side that is seen, camera frame; zero where the surface has none.
     pub normal: Vector3<S>,
-    /// Unlit colour, 0..=1.
+    /// Unlit color, 0..=1.
     pub albedo: [S; 3],
 }
 
 /// What lights a scene: one function, generic over the scalar, from which the renderer takes all derivatives.
 ///
-/// Colours above one are kept: pictures clamp when they are saved. A shader of fog, whose density and colour can be
+/// Colors above one are kept: pictures clamp when they are saved. A shader of fog, whose density and color can be
 /// estimated from images:
 ///
 /// ```
@@ -52,7 +52,7 @@ pub trait Shader: Send + Sync {
         Vec::new()
     }
 
-    /// The colour of `point`, for `parameters` as many as [`parameters`](Self::parameters) gives.
+    /// The color of `point`, for `parameters` as many as [`parameters`](Self::parameters) gives.
     fn shade<S: Scalar>(&self, parameters: &[S], point: &SurfacePoint<S>) -> [S; 3];
 }
 

@@ -92,7 +92,7 @@ mod tests {
     use crate::camera::Camera;
     use crate::mode::SoftRasOptions;
 
-    /// In which a pixel is a unit of normalised device coordinates.
+    /// In which a pixel is a unit of normalized device coordinates.
     const CAMERA: Camera = Camera { fx: 1.0, fy: 1.0, cx: 0.0, cy: 0.0, width: 2, height: 2 };
 
     fn flags(perspective_correct: bool, clip_barycentric: bool) -> SoftRasOptions {

@@ -4,7 +4,7 @@ use super::face::Face;
 use super::number::Number;
 use super::settings::Settings;
 
-/// A face as seen from a pixel centre p.
+/// A face as seen from a pixel center p.
 ///
 /// With the corners v_i relative to p, the edge functions are E_0 = v_1 × v_2, E_1 = v_2 × v_0 and E_2 = v_0 × v_1
 /// (positive inside), the weights W_i = s_i E_i with s_i = 1/Z_i if the perspective is corrected and s_i = 1 if not,
@@ -19,7 +19,7 @@ pub(crate) struct Fragment<T> {
     pub(crate) distance: T,
     /// Barycentric coordinates, in the image, of the nearest point on the edges.
     pub(crate) foot: [T; 3],
-    /// From the pixel centre to that point \[px\].
+    /// From the pixel center to that point \[px\].
     pub(crate) to_foot: [T; 2],
     /// One over the sum of the weights.
     pub(crate) inverse_sum: T,
@@ -29,7 +29,7 @@ pub(crate) struct Fragment<T> {
     pub(crate) sum_active: T,
 }
 
-/// Of each lane, whether the face counts there, and whether the pixel's centre lies inside it.
+/// Of each lane, whether the face counts there, and whether the pixel's center lies inside it.
 #[derive(Clone, Copy)]
 pub(crate) struct Extent<M> {
     pub(crate) kept: M,

@@ -51,7 +51,7 @@ impl Problem {
 
     fn gradient(&self, pose: &Isometry3<f64>) -> Vector6<f64> {
         let loss = PoseLoss::new(Mode::SoftRas(self.options), LossOptions::default());
-        loss.linearise(&self.model, pose, &self.center, &lamp(), &self.target).gradient
+        loss.linearize(&self.model, pose, &self.center, &lamp(), &self.target).gradient
     }
 
     fn at(&self, axis: usize, step: f64) -> Isometry3<f64> {
@@ -68,7 +68,7 @@ impl Problem {
             .iter()
             .zip(&self.target.color)
             .flat_map(|(p, seen)| (0..3).map(|k| (p.color[k] - f64::from(seen[k])).powi(2)));
-        (squares.sum::<f64>() * self.target.normalisation, most)
+        (squares.sum::<f64>() * self.target.normalization, most)
     }
 
     fn difference(&self, axis: usize, low: f64, high: f64) -> f64 {

@@ -16,9 +16,9 @@ pub(super) struct Lit<T> {
     pub(super) color: [T; 3],
     /// Unit normal on the side that is seen, mesh frame.
     pub(super) normal: [T; 3],
-    /// By which a turn of the normal along the light changes the colour.
+    /// By which a turn of the normal along the light changes the color.
     pub(super) turning: [T; 3],
-    /// Derivatives of the colour by the barycentric coordinates of corners 1 and 2.
+    /// Derivatives of the color by the barycentric coordinates of corners 1 and 2.
     pub(super) along: [[T; 3]; 2],
     /// By the pyramid level of the texture.
     pub(super) level: [T; 3],
@@ -30,7 +30,7 @@ fn between<T: Number>(corners: [f32; 3], b: [T; 3]) -> T {
     b[0] * b[0].like(corners[0]) + b[1] * b[0].like(corners[1]) + b[2] * b[0].like(corners[2])
 }
 
-/// Unlit colour, derivatives by the coordinates of corners 1 and 2 and by the level.
+/// Unlit color, derivatives by the coordinates of corners 1 and 2 and by the level.
 #[inline(always)]
 fn unlit<T: Number>(posed: &Posed, face: usize, b: [T; 3]) -> ([T; 3], [[T; 3]; 2], [T; 3]) {
     let is = |value: f32| b[0].like(value);

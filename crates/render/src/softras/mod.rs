@@ -1,9 +1,9 @@
 //! The SoftRas mode: every face spreads beyond its border, and the nearest of them are blended by depth (Liu et al.,
 //! "Soft Rasterizer: A Differentiable Renderer for Image-based 3D Reasoning", 2019), with the semantics of PyTorch3D
-//! (Ravi et al., "Accelerating 3D Deep Learning with PyTorch3D", 2020): its mesh rasterizer and its softmax blend of colours.
+//! (Ravi et al., "Accelerating 3D Deep Learning with PyTorch3D", 2020): its mesh rasterizer and its softmax blend of colors.
 //!
-//! For each pixel and face, d is the squared distance from the pixel's centre to the face's borders, negative inside; the
-//! face is kept if it contains the centre or d is below the blur radius. Of the kept, the K nearest by the depth
+//! For each pixel and face, d is the squared distance from the pixel's center to the face's borders, negative inside; the
+//! face is kept if it contains the center or d is below the blur radius. Of the kept, the K nearest by the depth
 //! z = Σ b_i Z_i count, where the barycentric coordinates b are perspective-correct and clipped if the options say so. With
 //! p = sigmoid(−d/σ) and ζ = (z_far − z)/(z_far − z_near), the pixel shows Σ w C / (Σ w + δ), w = p exp((ζ − ζ_max)/γ),
 //! over a black background of weight δ = max(exp((ε − ζ_max)/γ), ε), ε = 1e-10, and its coverage is 1 − Π (1 − p).
@@ -14,20 +14,20 @@
 //!   clipping, where coordinates then sum up to one exactly.
 //! - The faces of an open mesh are lit by a normal towards the camera, as in the other mode. Those of a closed one keep
 //!   their outward normals, seen from inside too.
-//! - The depth that is compared and shown is that of the nearest face that contains the pixel's centre, because the
-//!   nearest of the spread faces is biased towards the camera on slanted surfaces. Where no face contains the centre it is
+//! - The depth that is compared and shown is that of the nearest face that contains the pixel's center, because the
+//!   nearest of the spread faces is biased towards the camera on slanted surfaces. Where no face contains the center it is
 //!   that of the nearest kept face, and has no weight in a loss.
 //!
 //! Derivatives are those of the picture, to six digits of differences over the smallest steps. But the picture jumps, which
 //! no derivative shows (nor do PyTorch3D's):
 //! - Where a face turns over. Its area changes sign, and with it the signs of all edge functions, so that a point beside
-//!   the face is clamped to the opposite border: colour and depth jump all over the blur radius. Coarse meshes under a wide
+//!   the face is clamped to the opposite border: color and depth jump all over the blur radius. Coarse meshes under a wide
 //!   blur have few but large ones. For 144 faces and a blur of σ = 1e-3, the gradient's cosine with differences over ±5 mrad
 //!   and ±0.5 mm is 0.90; with the jump of the one face that turns over in between taken into account, 0.99999.
-//! - Where a face enters or leaves the K nearest or the blur radius. Where it is the only one there, its colour does not fade
+//! - Where a face enters or leaves the K nearest or the blur radius. Where it is the only one there, its color does not fade
 //!   until p is about δ, long beyond the default radius.
 //!
-//! Lengths in the image are pixels inside; the options are in normalised device coordinates, in which the shorter
+//! Lengths in the image are pixels inside; the options are in normalized device coordinates, in which the shorter
 //! side of the image is 2 long.
 
 mod adjoint;
@@ -240,7 +240,7 @@ where
     }
 }
 
-/// The faces at the pixels' centres.
+/// The faces at the pixels' centers.
 struct Centers<F>(F);
 
 impl<F: FnMut(usize, usize, u32, [f32; 3])> EachRun for Centers<F> {

@@ -1,4 +1,4 @@
-//! The equations of the mode once more, for tests: in f64 and normalised device coordinates, every face at every pixel.
+//! The equations of the mode once more, for tests: in f64 and normalized device coordinates, every face at every pixel.
 
 use nalgebra::{Isometry3, Vector2, Vector3};
 
@@ -20,7 +20,7 @@ pub(super) struct NaiveFragment {
     pub(super) distance: f64,
 }
 
-/// The face with corners (x, y, Z), x and y in normalised device coordinates, if it counts at `p`.
+/// The face with corners (x, y, Z), x and y in normalized device coordinates, if it counts at `p`.
 pub(super) fn naive_fragment(
     corners: [[f64; 3]; 3],
     p: [f64; 2],
@@ -62,7 +62,7 @@ pub(super) fn naive_fragment(
     kept.then_some(NaiveFragment { face: 0, b: coordinates, z: depth, distance })
 }
 
-/// The unlit colour at barycentric coordinates of a face. (Of a texture in f32.)
+/// The unlit color at barycentric coordinates of a face. (Of a texture in f32.)
 fn naive_albedo(posed: &Posed, face: usize, b: [f64; 3]) -> [f64; 3] {
     match &posed.model.albedo {
         Albedo::Corners(corners) => {
@@ -79,7 +79,7 @@ pub(super) fn naive_areas(model: &RenderModel, pose: &Isometry3<f64>, camera: &C
     naive_faces(model, pose, camera).into_iter().map(area).collect()
 }
 
-/// The corners of all faces: x and y in normalised device coordinates, and Z.
+/// The corners of all faces: x and y in normalized device coordinates, and Z.
 fn naive_faces(model: &RenderModel, pose: &Isometry3<f64>, camera: &Camera) -> Vec<[[f64; 3]; 3]> {
     let scale = 2.0 / camera.width.min(camera.height) as f64;
     let place = |p: &Vector3<f32>| {
@@ -101,7 +101,7 @@ pub(super) struct NaivePixel {
     pub(super) alpha: f64,
     /// Twice the index of each face, one more if it is seen from outside.
     pub(super) faces: Vec<usize>,
-    /// Depth of the nearest face around the pixel's centre.
+    /// Depth of the nearest face around the pixel's center.
     pub(super) depth: Option<f64>,
     /// That face.
     pub(super) inside: Option<usize>,

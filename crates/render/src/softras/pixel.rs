@@ -18,7 +18,7 @@ use crate::contour::{Lighting, posed_normal};
 use crate::pose_loss::{Pixel, Seen};
 use crate::posed::Posed;
 
-/// What has a smaller share of the pixel is left out: 64 such fragments are less than 1e-6 of its colour.
+/// What has a smaller share of the pixel is left out: 64 such fragments are less than 1e-6 of its color.
 pub(crate) const LEAST_SHARE: f32 = 1e-8;
 
 /// A posed, lit model with the faces that are drawn, and the point about which twists turn (camera frame).
@@ -42,7 +42,7 @@ pub(crate) struct Pixels<T> {
     color: [T; 3],
     coverage: T,
     z: T,
-    /// 1 where a face contains the pixel's centre, else 0.
+    /// 1 where a face contains the pixel's center, else 0.
     hit: T,
     color_rows: [TwistRow<T>; 3],
     coverage_row: TwistRow<T>,
@@ -81,7 +81,7 @@ impl<T: Number> Pixels<T> {
 }
 
 impl Scene<'_> {
-    /// The pixels of `run`, from (column, row) on. Leaves each fragment's share of the colour in the weight of its part.
+    /// The pixels of `run`, from (column, row) on. Leaves each fragment's share of the color in the weight of its part.
     #[inline(always)]
     pub(crate) fn pixels<const DERIVATIVES: bool, T: Number>(
         &self,
@@ -140,7 +140,7 @@ impl Scene<'_> {
         })
     }
 
-    /// Rows of colour, coverage and depth, from each fragment's share of the colour (in the weight of its part).
+    /// Rows of color, coverage and depth, from each fragment's share of the color (in the weight of its part).
     ///
     /// With the shares ω = w/D, dC = Σ ω (dC_k + (C_k − C) d ln w_k), d ln w = −(1 − p)/σ dd − dz/(γ (z_far − z_near)),
     /// and dα = −(1 − α) Σ p/σ dd.
@@ -249,7 +249,7 @@ impl Scene<'_> {
             for n in 0..3 {
                 out[n + 3] = out[n + 3] + turn[n];
             }
-            // The texture's level follows the depth of the model's centre: (0, 0, 1) and center × (0, 0, 1).
+            // The texture's level follows the depth of the model's center: (0, 0, 1) and center × (0, 0, 1).
             let level = level[k] * is(self.posed.level_dz);
             out[2] = out[2] + level;
             out[3] = out[3] + level * is(arm.y);

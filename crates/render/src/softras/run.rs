@@ -27,7 +27,7 @@ pub(crate) struct Run<T: Number> {
     pub(crate) candidates: Vec<Candidate<T>>,
     /// How many faces there are at each pixel.
     count: T,
-    /// The nearest that contains the pixel's centre: its depth, infinite if there is none, and place in the list.
+    /// The nearest that contains the pixel's center: its depth, infinite if there is none, and place in the list.
     pub(crate) inside_z: T,
     pub(crate) inside: T,
 }
@@ -119,7 +119,7 @@ impl<T: Number> Run<T> {
         here.map(|candidate| candidate.face)
     }
 
-    /// The nearest face that the pixel's centre lies inside, and the barycentric coordinates there.
+    /// The nearest face that the pixel's center lies inside, and the barycentric coordinates there.
     #[inline(always)]
     pub(crate) fn inside(&self, lane: usize) -> Option<(u32, [f32; 3])> {
         let candidate = self.candidates.get(self.inside.lanes()[lane] as usize)?;

@@ -11,7 +11,7 @@ const SMALL: f64 = 1e-8;
 /// Inverse depth and weight of the background.
 pub(crate) const BACKGROUND: f64 = 1e-10;
 
-/// [`SoftRasOptions`] with lengths in pixels instead of normalised device coordinates (NDC).
+/// [`SoftRasOptions`] with lengths in pixels instead of normalized device coordinates (NDC).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Settings {
     /// Faces are kept nearer than this \[px²\].
@@ -40,7 +40,7 @@ pub(crate) struct Settings {
 impl Settings {
     /// Values that would divide by zero are moved to the nearest that do not.
     pub(crate) fn new(options: &SoftRasOptions, camera: &Camera) -> Self {
-        // Pixels per unit of normalised device coordinates.
+        // Pixels per unit of normalized device coordinates.
         let scale = 0.5 * camera.width.min(camera.height) as f64;
         let area = scale * scale;
         let blur = (options.blur_radius.max(0.0) * area) as f32;

@@ -210,7 +210,7 @@ fn rows_are_derivatives_of_the_naive_pixels() {
             }
         }
         println!("{}: {used} used, {left_out} left out", case.name);
-        for ([dot, ours, theirs], name) in sums.iter().zip(["colour", "coverage", "depth"]) {
+        for ([dot, ours, theirs], name) in sums.iter().zip(["color", "coverage", "depth"]) {
             let cosine = dot / (ours * theirs).sqrt();
             println!("  {name}: cosine {cosine:.6}, ratio {:.5}", (ours / theirs).sqrt());
             // Nothing but opaque pixels says nothing of coverage.
@@ -225,10 +225,10 @@ fn rows_are_derivatives_of_the_naive_pixels() {
     assert!(wrong.is_empty(), "{wrong:?}");
 }
 
-/// Depth \[m\], corners and colour.
+/// Depth \[m\], corners and color.
 type Flat = (f64, [[f64; 2]; 3], [f32; 3]);
 
-/// Triangles in the plane Z = `depth`, corners in normalised device coordinates about the centre of a 64² image.
+/// Triangles in the plane Z = `depth`, corners in normalized device coordinates about the center of a 64² image.
 fn flat_picture(
     triangles: &[Flat],
     options: &SoftRasOptions,
@@ -265,12 +265,12 @@ fn left_of(x: f64) -> [[f64; 2]; 3] {
 fn one_triangle_is_a_sigmoid_of_the_squared_distance() {
     let options = SoftRasOptions::default();
     let color = [0.25, 0.5, 1.0];
-    // The pixel at the image's centre lies 0.02 right of the edge: d = 4e-4 = 4 σ.
+    // The pixel at the image's center lies 0.02 right of the edge: d = 4e-4 = 4 σ.
     let picture = flat_picture(&[(1.0, left_of(-0.02), color)], &options);
     let pixel = picture(32, 32).unwrap();
     let p = 1.0 / (1.0 + 4.0f32.exp());
     assert!((pixel.coverage - p).abs() < 1e-5, "{pixel:?}");
-    // Colours are divided by the weights, so that they do not fade.
+    // Colors are divided by the weights, so that they do not fade.
     (0..3).for_each(|k| assert!((pixel.color[k] - color[k]).abs() < 1e-5));
     assert!((pixel.z - 1.0).abs() < 1e-6 && pixel.depth_weight == 0.0);
     // The next pixel to the right is 0.05125 away: d = 2.6e-3 is beyond the blur radius of 9.2e-4.
@@ -335,7 +335,7 @@ fn the_gradient_of_the_loss_is_that_of_its_values() {
             UnitQuaternion::from_scaled_axis(Vector3::new(0.08, -0.05, 0.07)) * pose().rotation,
         );
         let center = guess * model.center();
-        let at = loss.linearise(&model, &guess, &center, &lamp(), &target);
+        let at = loss.linearize(&model, &guess, &center, &lamp(), &target);
         assert_eq!(at.loss, loss.evaluate(&model, &guess, &lamp(), &target));
         let scale = Vector6::new(1.0, 1.0, 1.0, 25.0, 25.0, 25.0);
         let difference = Vector6::from_fn(|axis, _| {
@@ -373,7 +373,7 @@ fn results_do_not_depend_on_the_number_of_threads() {
     let guess = Translation3::new(0.003, -0.002, 0.004) * pose();
     let run = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| loss.linearise(&model, &guess, &Point3::origin(), &lamp(), &target))
+        pool.install(|| loss.linearize(&model, &guess, &Point3::origin(), &lamp(), &target))
     };
     assert_eq!(run(1), run(4));
 }
@@ -393,7 +393,7 @@ fn what_cannot_be_seen_shows_nothing_and_odd_settings_stay_finite() {
         Isometry3::translation(f64::NAN, 0.0, 0.4),
     ];
     for pose in poses {
-        let at = loss(plain).linearise(&model, &pose, &Point3::origin(), &lamp(), &target);
+        let at = loss(plain).linearize(&model, &pose, &Point3::origin(), &lamp(), &target);
         assert_eq!((at.loss.counts.covered, at.gradient), (0, Vector6::zeros()));
         assert_eq!(at.loss.counts.missed, target.area() as usize);
     }
@@ -412,7 +412,7 @@ fn what_cannot_be_seen_shows_nothing_and_odd_settings_stay_finite() {
         },
     ];
     for options in odd {
-        let at = loss(options).linearise(&model, &pose(), &Point3::origin(), &lamp(), &target);
+        let at = loss(options).linearize(&model, &pose(), &Point3::origin(), &lamp(), &target);
         assert!(at.loss.total.is_finite(), "{options:?} {at:?}");
         assert!(at.gradient.iter().all(|v| v.is_finite()), "{options:?} {at:?}");
     }

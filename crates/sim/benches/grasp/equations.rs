@@ -4,7 +4,7 @@ use nalgebra::{Quaternion, Unit, UnitQuaternion, Vector3, Vector6};
 use prehend_autodiff::Scalar;
 use prehend_sim::{
     Contact, ContactLaw, Integrator, Response, RigidBody, SimulationError, State, Step, World,
-    regularised_coulomb,
+    regularized_coulomb,
 };
 
 /// Stiffness \[N/m\], damping on approach \[N s/m\] and friction coefficient of a sample.
@@ -29,7 +29,7 @@ impl ContactLaw for SmoothedPenalty {
         let speed = contact.normal_speed;
         let approach = speed.select(speed.value() < 0.0, S::zero());
         let normal = -(p[0] * contact.gap + p[1] * approach);
-        Response { normal, tangential: regularised_coulomb(p[2], normal, &contact.slip, 1e-2) }
+        Response { normal, tangential: regularized_coulomb(p[2], normal, &contact.slip, 1e-2) }
     }
 
     fn reach(&self) -> f64 {
@@ -37,7 +37,7 @@ impl ContactLaw for SmoothedPenalty {
     }
 }
 
-/// Semi-implicit Euler: Euler's equations in the body's frame, the quaternion advanced by its rate and normalised.
+/// Semi-implicit Euler: Euler's equations in the body's frame, the quaternion advanced by its rate and normalized.
 pub(crate) struct FirstOrder;
 
 impl Integrator for FirstOrder {

@@ -1,7 +1,7 @@
 //! An ellipsoid that settles between a palm and five fingers: the scene that simulators are compared on.
 //!
 //! Everybody integrates the same equations on the same numbers: a grid of the hand's signed distance interpolated
-//! linearly, samples of equal weight, a penalty with damping on approach, regularised Coulomb friction, and
+//! linearly, samples of equal weight, a penalty with damping on approach, regularized Coulomb friction, and
 //! semi-implicit Euler with the rotation advanced to first order.
 
 mod equations;

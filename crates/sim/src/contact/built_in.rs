@@ -17,7 +17,7 @@ const fn parameter(name: &'static str, unit: &'static str, meaning: &'static str
 const STIFFNESS: LawParameter = parameter("stiffness", "N/m^3", "pressure per depth");
 const DAMPING: LawParameter = parameter("damping", "N s/m^3", "pressure per approach speed");
 const FRICTION: LawParameter = parameter("friction", "", "friction coefficient");
-const SLIP_SCALE: LawParameter = parameter("slip_scale", "m/s", "slip speed that regularises it");
+const SLIP_SCALE: LawParameter = parameter("slip_scale", "m/s", "slip speed that regularizes it");
 const KINETIC: LawParameter =
     parameter("kinetic_friction", "", "friction coefficient in fast slip");
 const STRIBECK: LawParameter = parameter("stribeck_speed", "m/s", "slip speed between the two");

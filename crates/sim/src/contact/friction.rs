@@ -1,11 +1,11 @@
-//! Coulomb friction, regularised so that it is smooth at zero slip and never leaves the cone.
+//! Coulomb friction, regularized so that it is smooth at zero slip and never leaves the cone.
 
 use nalgebra::Vector3;
 use prehend_autodiff::Scalar;
 
 /// √(|slip|² + `slip_scale`²) \[m/s\]: smooth everywhere and never below |slip|.
 #[inline]
-pub fn regularised_speed<S: Scalar>(slip: &Vector3<S>, slip_scale: f64) -> S {
+pub fn regularized_speed<S: Scalar>(slip: &Vector3<S>, slip_scale: f64) -> S {
     let [x, y, z] = [slip.x, slip.y, slip.z];
     (x * x + y * y + z * z + S::constant(slip_scale * slip_scale)).sqrt()
 }
@@ -15,13 +15,13 @@ pub fn regularised_speed<S: Scalar>(slip: &Vector3<S>, slip_scale: f64) -> S {
 /// Its length is below μ f_n for every u; below v_s it acts like a viscous force (a body at rest on an
 /// incline creeps at v_s tanθ/√(μ² − tan²θ)).
 #[inline]
-pub fn regularised_coulomb<S: Scalar>(
+pub fn regularized_coulomb<S: Scalar>(
     coefficient: S,
     normal_force: S,
     slip: &Vector3<S>,
     slip_scale: f64,
 ) -> Vector3<S> {
-    let scale = -(coefficient * normal_force) / regularised_speed(slip, slip_scale);
+    let scale = -(coefficient * normal_force) / regularized_speed(slip, slip_scale);
     Vector3::new(slip.x * scale, slip.y * scale, slip.z * scale)
 }
 
@@ -35,7 +35,7 @@ mod tests {
     fn friction_stays_inside_the_cone_at_every_speed() {
         for exponent in -12..6 {
             let speed = 10f64.powi(exponent);
-            let force = regularised_coulomb(0.5, 3.0, &Vector3::new(speed, 0.0, -speed), 1e-3);
+            let force = regularized_coulomb(0.5, 3.0, &Vector3::new(speed, 0.0, -speed), 1e-3);
             assert!(force.norm() <= 1.5 && force.x < 0.0 && force.z > 0.0);
         }
     }
@@ -44,7 +44,7 @@ mod tests {
     fn friction_at_rest_is_viscous_and_finite() {
         let [x, y, z] = Fwd::<3>::variables([0.0; 3]);
         let (mu, normal) = (Fwd::constant(0.5), Fwd::constant(2.0));
-        let force = regularised_coulomb(mu, normal, &Vector3::new(x, y, z), 1e-2);
+        let force = regularized_coulomb(mu, normal, &Vector3::new(x, y, z), 1e-2);
         assert_eq!(force.x.value, 0.0);
         assert!((force.x.derivative[0] + 100.0).abs() < 1e-12);
         assert_eq!(force.x.derivative[1], 0.0);

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 use prehend_autodiff::Scalar;
 
 use super::error::LawError;
-use super::friction::regularised_speed;
+use super::friction::regularized_speed;
 use super::law::{Contact, ContactLaw, Isotropic, IsotropicLaw, Response};
 
 /// `law` with the friction of a grained surface: its own coefficient μ along the unit direction a of the
@@ -17,8 +17,8 @@ use super::law::{Contact, ContactLaw, Isotropic, IsotropicLaw, Response};
 ///
 /// f_t = −f_n·P M u/√(|u|² + v_s²) with the friction tensor M = μ·(a aᵀ + r (I − a aᵀ)) and P the projection
 /// across the normal: linear anisotropic friction (A. Zmitrowicz, "A theoretical model of anisotropic dry
-/// friction", Wear 73, 1981), regularised as in
-/// [`regularised_coulomb`](super::friction::regularised_coulomb). M is positive, so every slip is braked. On
+/// friction", Wear 73, 1981), regularized as in
+/// [`regularized_coulomb`](super::friction::regularized_coulomb). M is positive, so every slip is braked. On
 /// a surface that holds a, the force stays inside the elliptic cone (f_a/μ)² + (f_b/rμ)² ≤ f_n² and reaches
 /// it in fast slip. On a tilted one the tensor turns smoothly into the coefficient r·μ of every direction,
 /// where a is the normal. Where the coefficient depends on speed, both directions do.
@@ -69,7 +69,7 @@ impl<L: IsotropicLaw> ContactLaw for Grained<L> {
     fn law<S: Scalar>(&self, p: &[S], contact: &Contact<S>) -> Response<S> {
         let &[ref inner @ .., across] = p else { return Response::zero() };
         let normal = self.law.normal_force(inner, contact);
-        let speed = regularised_speed(&contact.slip, self.law.slip_scale());
+        let speed = regularized_speed(&contact.slip, self.law.slip_scale());
         let scale = -(self.law.friction_coefficient(inner, speed) * normal) / speed;
         let (a, n, u) = (&self.direction, &contact.normal, &contact.slip);
         let slip_along = u.x.times(a.x) + u.y.times(a.y) + u.z.times(a.z);

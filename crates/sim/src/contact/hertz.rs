@@ -27,7 +27,7 @@ pub type HertzPenalty = Isotropic<Hertz>;
 
 impl HertzPenalty {
     /// `stiffness` per area \[N/m^{7/2}\] > 0, `friction` coefficient ≥ 0, and the slip speed `slip_scale`
-    /// \[m/s\] > 0 that regularises friction.
+    /// \[m/s\] > 0 that regularizes friction.
     ///
     /// # Errors
     /// Names the parameter that is out of its range.

@@ -27,7 +27,7 @@ pub type HuntCrossleyPenalty = Isotropic<HuntCrossley>;
 
 impl HuntCrossleyPenalty {
     /// `stiffness` per area \[N/m^{2+n}\] > 0, `damping` c \[s/m\] ≥ 0, `exponent` n ≥ 1 (real), `friction`
-    /// coefficient ≥ 0, and the slip speed `slip_scale` \[m/s\] > 0 that regularises friction.
+    /// coefficient ≥ 0, and the slip speed `slip_scale` \[m/s\] > 0 that regularizes friction.
     ///
     /// # Errors
     /// Names the parameter that is out of its range.

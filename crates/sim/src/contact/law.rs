@@ -4,7 +4,7 @@ use nalgebra::{Vector3, Vector6};
 use prehend_autodiff::{Fwd, Scalar};
 
 use super::error::LawError;
-use super::friction::{regularised_coulomb, regularised_speed};
+use super::friction::{regularized_coulomb, regularized_speed};
 use super::patch::Patch;
 use super::wrench::{self, WrenchJacobian};
 
@@ -99,7 +99,7 @@ pub trait ContactLaw: Send + Sync {
 
 /// An isotropic law: friction opposes slip, with a coefficient that may depend on its speed.
 ///
-/// [`Isotropic`] makes a [`ContactLaw`] of it, with friction regularised and never outside the cone; it also
+/// [`Isotropic`] makes a [`ContactLaw`] of it, with friction regularized and never outside the cone; it also
 /// gives any of them stick–slip ([`Isotropic::with_stribeck`]) or anisotropic friction
 /// ([`Isotropic::with_grain`]). A law whose pressure is that of an exponential spring:
 ///
@@ -133,7 +133,7 @@ pub trait IsotropicLaw: Send + Sync {
     /// Normal force \[N\], never negative.
     fn normal_force<S: Scalar>(&self, p: &[S], contact: &Contact<S>) -> S;
 
-    /// Friction coefficient at a (regularised) slip speed \[m/s\].
+    /// Friction coefficient at a (regularized) slip speed \[m/s\].
     fn friction_coefficient<S: Scalar>(&self, p: &[S], slip_speed: S) -> S;
 
     /// Slip speed v_s at which friction has reached 1/√2 of its bound \[m/s\], positive.
@@ -169,10 +169,10 @@ impl<L: IsotropicLaw> ContactLaw for Isotropic<L> {
     #[inline]
     fn law<S: Scalar>(&self, p: &[S], contact: &Contact<S>) -> Response<S> {
         let normal = self.0.normal_force(p, contact);
-        let speed = regularised_speed(&contact.slip, self.0.slip_scale());
+        let speed = regularized_speed(&contact.slip, self.0.slip_scale());
         let coefficient = self.0.friction_coefficient(p, speed);
         let tangential =
-            regularised_coulomb(coefficient, normal, &contact.slip, self.0.slip_scale());
+            regularized_coulomb(coefficient, normal, &contact.slip, self.0.slip_scale());
         Response { normal, tangential }
     }
 
@@ -213,7 +213,7 @@ pub trait LocalLaw: Send + Sync + sealed::Sealed {
     fn response_with_derivative(&self, p: &[Fwd<6>], contact: &Contact<Fwd<6>>)
     -> Response<Fwd<6>>;
 
-    /// Force \[N\], then torque about the centre of mass \[N m\], of all contacts of `patch`, in the field's frame.
+    /// Force \[N\], then torque about the center of mass \[N m\], of all contacts of `patch`, in the field's frame.
     fn wrench(&self, p: &[f64], patch: &Patch<'_>) -> Vector6<f64>;
 
     /// [`LocalLaw::wrench`] with its derivatives by the state, and by the parameters if `by_params`.

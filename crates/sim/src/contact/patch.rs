@@ -17,7 +17,7 @@ const MIN_GRADIENT: f64 = 1e-9;
 pub struct Patch<'a> {
     /// The samples that may touch.
     pub surface: &'a Surface,
-    /// Centre of mass of the body that carries them, in its model frame \[m\].
+    /// Center of mass of the body that carries them, in its model frame \[m\].
     pub com: Point3<f64>,
     /// The body's state, as the field sees it.
     pub state: State,
@@ -43,7 +43,7 @@ impl Patch<'_> {
     #[inline]
     fn may_touch(&self, block: &Block, reach: f64) -> bool {
         let within = reach + self.field.steepest() * block.radius;
-        block.radius.is_infinite() || self.distance_within(&block.centre, within)
+        block.radius.is_infinite() || self.distance_within(&block.center, within)
     }
 
     #[inline]

@@ -25,7 +25,7 @@ pub type Penalty = Isotropic<KelvinVoigt>;
 
 impl Penalty {
     /// `stiffness` per area \[N/m³\] > 0, `damping` per area \[N s/m³\] ≥ 0, `friction` coefficient ≥ 0,
-    /// and the slip speed `slip_scale` \[m/s\] > 0 that regularises friction.
+    /// and the slip speed `slip_scale` \[m/s\] > 0 that regularizes friction.
     ///
     /// # Errors
     /// Names the parameter that is out of its range.

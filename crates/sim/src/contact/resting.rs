@@ -7,7 +7,7 @@ use super::error::LawError;
 /// ```
 /// use prehend_sim::{Penalty, RestingContact};
 ///
-/// // 300 g on 4 cm², half a millimetre deep, that bounces back at 45 % of its speed.
+/// // 300 g on 4 cm², half a millimeter deep, that bounces back at 45 % of its speed.
 /// let resting =
 ///     RestingContact { mass: 0.3, gravity: 9.81, penetration: 5e-4, contact_area: 4e-4 };
 /// let law = Penalty::from_resting(&resting, 0.45, 0.5, 1e-3)?;

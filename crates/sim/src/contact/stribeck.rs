@@ -9,7 +9,7 @@ use super::law::{Contact, Isotropic, IsotropicLaw};
 /// μ(u) = μ_k + (μ_s − μ_k)·exp(−(u/u_st)²) (the Stribeck curve in the Gaussian form of B. Armstrong-Hélouvry,
 /// P. Dupont and C. Canudas de Wit, Automatica 30(7), 1994).
 ///
-/// Friction never exceeds μ_s f_n. It is regularised like all friction here, so the static peak shows only for
+/// Friction never exceeds μ_s f_n. It is regularized like all friction here, so the static peak shows only for
 /// u_st several times the slip scale v_s.
 ///
 /// ```

@@ -10,10 +10,10 @@ use super::law::{Contact, ContactLaw};
 use super::onset::OnsetSample;
 use super::patch::{Patch, Touch};
 
-/// A wrench about the centre of mass with its derivatives.
+/// A wrench about the center of mass with its derivatives.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WrenchJacobian {
-    /// Force \[N\], then torque about the centre of mass \[N m\].
+    /// Force \[N\], then torque about the center of mass \[N m\].
     pub wrench: Vector6<f64>,
     /// One row for each component of the wrench: derivatives along the directions of [`State::tangent`](crate::State::tangent).
     pub by_state: [[f64; 12]; 6],
@@ -60,7 +60,7 @@ impl LocalFunction<12, 6> for WrenchJacobian {
     }
 
     #[inline]
-    fn linearise(&self, _: [f64; 12]) -> ([f64; 6], [[f64; 12]; 6]) {
+    fn linearize(&self, _: [f64; 12]) -> ([f64; 6], [[f64; 12]; 6]) {
         (self.wrench.into(), self.by_state)
     }
 

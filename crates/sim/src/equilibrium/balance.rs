@@ -18,9 +18,9 @@ pub struct Support {
 pub struct Balance {
     /// Force on the body at each support \[N\], within its cone. Where more than one choice balances, one of them.
     pub forces: Vec<Vector3<f64>>,
-    /// What load and forces add up to: force \[N\], torque about the centre \[N m\].
+    /// What load and forces add up to: force \[N\], torque about the center \[N m\].
     pub residual: Vector6<f64>,
-    /// Length of the residual over that of the load, torques over the supports' mean distance from the centre counting
+    /// Length of the residual over that of the load, torques over the supports' mean distance from the center counting
     /// as forces; zero without load.
     pub relative: f64,
 }
@@ -38,20 +38,20 @@ const LARGEST_FACTOR: f64 = 1e4;
 
 impl Balance {
     /// Of all forces within the cones of `supports`, those that leave the least of `load` (force \[N\] and torque about
-    /// `centre` \[N m\]), in least squares.
+    /// `center` \[N m\]), in least squares.
     ///
     /// The active-set method for non-negative least squares (C. L. Lawson, R. J. Hanson, "Solving least squares
     /// problems", 1974, chapter 23) over all rays of the cones, of which at most six are in use: each round adds the
     /// one that reduces the residual fastest, which is known in closed form. Cones are thus true ones, not pyramids.
-    pub fn find(supports: &[Support], centre: &Point3<f64>, load: &Vector6<f64>) -> Self {
-        let problem = Problem::new(supports, centre, load);
+    pub fn find(supports: &[Support], center: &Point3<f64>, load: &Vector6<f64>) -> Self {
+        let problem = Problem::new(supports, center, load);
         let rays = problem.solve();
         let mut forces = vec![Vector3::zeros(); supports.len()];
         for ray in &rays {
             forces[ray.support] += ray.direction * ray.length;
         }
         let sum = |sum: Vector6<f64>, (support, force): (&Support, &Vector3<f64>)| {
-            sum + wrench(&(support.position - centre), force)
+            sum + wrench(&(support.position - center), force)
         };
         let residual = supports.iter().zip(&forces).fold(*load, sum);
         let size = problem.load.norm();
@@ -65,7 +65,7 @@ impl Balance {
     }
 }
 
-/// The least factor on all friction coefficients of `supports` with which forces balance `load` about `centre`: below
+/// The least factor on all friction coefficients of `supports` with which forces balance `load` about `center`: below
 /// one there is a reserve, above one friction is too little. Infinite if friction does not help.
 ///
 /// Two fingers hold a wedge that tapers upwards by 0.3 rad: friction has to be the tangent of that.
@@ -83,11 +83,11 @@ impl Balance {
 /// let factor = friction_factor(&[finger(1.0), finger(-1.0)], &Point3::origin(), &weight);
 /// assert!((factor * 0.5 - 0.3_f64.tan()).abs() < 1e-4);
 /// ```
-pub fn friction_factor(supports: &[Support], centre: &Point3<f64>, load: &Vector6<f64>) -> f64 {
+pub fn friction_factor(supports: &[Support], center: &Point3<f64>, load: &Vector6<f64>) -> f64 {
     let balanced = |factor: f64| {
         let scaled = |s: &Support| Support { friction: factor * s.friction, ..*s };
         let supports: Vec<Support> = supports.iter().map(scaled).collect();
-        Balance::find(&supports, centre, load).is_balanced()
+        Balance::find(&supports, center, load).is_balanced()
     };
     if balanced(0.0) {
         return 0.0;
@@ -125,8 +125,8 @@ struct Problem<'a> {
 }
 
 impl<'a> Problem<'a> {
-    fn new(supports: &'a [Support], centre: &Point3<f64>, load: &Vector6<f64>) -> Self {
-        let arms: Vec<Vector3<f64>> = supports.iter().map(|s| s.position - centre).collect();
+    fn new(supports: &'a [Support], center: &Point3<f64>, load: &Vector6<f64>) -> Self {
+        let arms: Vec<Vector3<f64>> = supports.iter().map(|s| s.position - center).collect();
         let mean = arms.iter().map(Vector3::norm).sum::<f64>() / arms.len().max(1) as f64;
         let length = if mean > 0.0 { mean } else { 1.0 };
         let mut problem = Self { supports, arms, length, load: Vector6::zeros() };

@@ -22,7 +22,7 @@ pub struct CompliantSupport {
 pub struct CompliantBalance {
     /// Force on the body at each support \[N\].
     pub forces: Vec<Vector3<f64>>,
-    /// What load and forces add up to: force \[N\], torque about the centre over the length \[N\]. Also the derivative of the value by
+    /// What load and forces add up to: force \[N\], torque about the center over the length \[N\]. Also the derivative of the value by
     /// the load, given in the same way.
     pub residual: Vector6<f64>,
     /// The least \[N²\].
@@ -37,18 +37,18 @@ const MOST_STEPS: usize = 100;
 const TOLERANCE: f64 = 1e-12;
 
 impl CompliantBalance {
-    /// Balances `load`, a force \[N\] and a torque about `centre` over `length` \[m\], by `supports`.
+    /// Balances `load`, a force \[N\] and a torque about `center` over `length` \[m\], by `supports`.
     ///
     /// The dual problem is smooth and has six unknowns, the residual: least of ½ |y|² − y · load + Σ |Π(−Wᵀy)|² / 2c, where W makes a wrench of
     /// a force, c is a support's compliance and Π projects onto its cone. Newton's method solves it in a few steps; the
     /// forces are Π(−Wᵀy) / c.
     pub fn find(
         supports: &[CompliantSupport],
-        centre: &Point3<f64>,
+        center: &Point3<f64>,
         length: f64,
         load: &Vector6<f64>,
     ) -> Self {
-        let dual = Dual { supports, centre: *centre, length, load: *load };
+        let dual = Dual { supports, center: *center, length, load: *load };
         let mut residual = *load;
         let mut at = dual.at(&residual);
         for _ in 0..MOST_STEPS {
@@ -91,7 +91,7 @@ impl CompliantBalance {
 /// The dual function.
 struct Dual<'a> {
     supports: &'a [CompliantSupport],
-    centre: Point3<f64>,
+    center: Point3<f64>,
     length: f64,
     load: Vector6<f64>,
 }
@@ -106,14 +106,14 @@ struct DualAt {
 impl Dual<'_> {
     /// Where a residual pulls the force of `support`: −Wᵀy.
     fn pull(&self, support: &CompliantSupport, residual: &Vector6<f64>) -> Vector3<f64> {
-        let arm = (support.support.position - self.centre) / self.length;
+        let arm = (support.support.position - self.center) / self.length;
         let (force, torque) = (residual.fixed_rows::<3>(0), residual.fixed_rows::<3>(3));
         -(force + torque.cross(&arm))
     }
 
     /// Of `force` at `support`.
     fn wrench(&self, support: &CompliantSupport, force: &Vector3<f64>) -> Vector6<f64> {
-        let torque = (support.support.position - self.centre).cross(force) / self.length;
+        let torque = (support.support.position - self.center).cross(force) / self.length;
         Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z)
     }
 
@@ -127,7 +127,7 @@ impl Dual<'_> {
                 continue;
             }
             let mut wrench = Matrix6x3::zeros();
-            let arm = (support.support.position - self.centre) / self.length;
+            let arm = (support.support.position - self.center) / self.length;
             wrench.fixed_view_mut::<3, 3>(0, 0).fill_with_identity();
             wrench.fixed_view_mut::<3, 3>(3, 0).copy_from(&arm.cross_matrix());
             value += 0.5 * projection.point.norm_squared() / support.compliance;

@@ -55,7 +55,7 @@ impl Integrator for BackwardEuler {
             leaky.onset = pair.onset;
         }
         equations.lifted = &leaky;
-        let inverse = equations.linearise(&solution).1.try_inverse();
+        let inverse = equations.linearize(&solution).1.try_inverse();
         let inverse = inverse.ok_or_else(|| equations.unsolved(&solution, 0))?;
         Ok(carried(world, states, &equations, &solution, &inverse))
     }

@@ -19,7 +19,7 @@ use crate::world::{Step, World};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RungeKutta4;
 
-/// Of a body: position of the centre of mass, its velocity, rotation vector, and angular momentum; or their rates.
+/// Of a body: position of the center of mass, its velocity, rotation vector, and angular momentum; or their rates.
 type Change<S> = [Vector3<S>; 4];
 
 impl Integrator for RungeKutta4 {

@@ -21,7 +21,7 @@ pub struct Body<S: Scalar = f64> {
     pub surface: Option<Arc<Surface>>,
     /// Signed distance to it, in its model frame: what the samples of others touch.
     pub field: Option<Arc<dyn DistanceField>>,
-    /// External wrench: force \[N\] and torque about the centre of mass \[N m\], world frame.
+    /// External wrench: force \[N\] and torque about the center of mass \[N m\], world frame.
     pub load: Vector6<S>,
 }
 
@@ -59,12 +59,12 @@ impl<S: Scalar> Body<S> {
         Self::new(name, Motion::Free(body))
     }
 
-    /// A body that stays as it is. Its centre of mass is the origin of its model frame.
+    /// A body that stays as it is. Its center of mass is the origin of its model frame.
     pub fn held(name: &str) -> Self {
         Self::new(name, Motion::Held)
     }
 
-    /// A body on a given course. Its centre of mass is the origin of its model frame.
+    /// A body on a given course. Its center of mass is the origin of its model frame.
     pub fn driven(name: &str, course: impl Course + 'static) -> Self {
         Self::new(name, Motion::Driven(Arc::new(course)))
     }
@@ -92,7 +92,7 @@ impl<S: Scalar> Body<S> {
         }
     }
 
-    /// Centre of mass in the model frame \[m\].
+    /// Center of mass in the model frame \[m\].
     #[inline]
     pub fn com(&self) -> Point3<f64> {
         self.rigid().map_or_else(Point3::origin, |body| *body.com())

@@ -24,7 +24,7 @@ fn slide(
     scheme.course(&world, &start, horizon, BODY)
 }
 
-/// Below the friction angle regularised friction creeps at a constant speed.
+/// Below the friction angle regularized friction creeps at a constant speed.
 pub(crate) fn creep(scheme: &Scheme, law: &Law) -> Vec<Row> {
     let Some(creep) = law.creep else { return Vec::new() };
     let spec = Spec { damping: 1.0, friction: 0.5, slip_scale: 1e-2, ..SLAB };

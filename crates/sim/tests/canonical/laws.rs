@@ -27,7 +27,7 @@ pub(crate) struct Spec {
     pub(crate) damping: f64,
     /// Coefficient of friction in steady slip.
     pub(crate) friction: f64,
-    /// Slip speed that regularises friction \[m/s\].
+    /// Slip speed that regularizes friction \[m/s\].
     pub(crate) slip_scale: f64,
 }
 
@@ -146,7 +146,7 @@ pub(crate) const LAWS: &[Law] = &[
     },
 ];
 
-/// tanθ/√(μ² − tan²θ), of friction regularised as √(u² + v_s²).
+/// tanθ/√(μ² − tan²θ), of friction regularized as √(u² + v_s²).
 fn smooth_creep(friction: f64, slope: f64) -> f64 {
     slope / (friction * friction - slope * slope).sqrt()
 }

@@ -1,4 +1,4 @@
-//! Painlevé's rod: a rod whose tip slides ahead of its centre of mass on a rough floor.
+//! Painlevé's rod: a rod whose tip slides ahead of its center of mass on a rough floor.
 //!
 //! With half length l, angle θ to the floor and I = m l²/3 a normal impulse P changes the tip's velocity by
 //! p P/m across the floor's plane and by q P/m along it. In slip p = 1 + 3 cos²θ − 3μ sinθ cosθ and q = 3 sinθ cosθ −
@@ -21,7 +21,7 @@ const HALF_LENGTH: f64 = 0.5;
 const MASS: f64 = 1.0;
 const SPEED: f64 = 1.0;
 
-/// The tip from the centre of mass, at 60°.
+/// The tip from the center of mass, at 60°.
 fn tip() -> Vector3<f64> {
     let (sine, cosine) = 60f64.to_radians().sin_cos();
     Vector3::new(HALF_LENGTH * cosine, 0.0, -HALF_LENGTH * sine)

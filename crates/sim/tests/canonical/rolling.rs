@@ -36,7 +36,7 @@ pub(crate) fn bowling_ball(scheme: &Scheme, law: &Law) -> Vec<Row> {
     let start = above_floor(height, Vector3::new(speed, 0.0, 0.0));
     let horizon = Horizon { dt: 2e-5, steps: 5000 };
     let course = scheme.course(&world, &start, horizon, BODY);
-    // Slip falls linearly from v₀: its last hundredth, which regularised friction blurs, is extrapolated.
+    // Slip falls linearly from v₀: its last hundredth, which regularized friction blurs, is extrapolated.
     let slipping = course.iter().take_while(|s| s.linear.x - s.angular.y * RADIUS > 0.01 * speed);
     let rolls = slipping.count() as f64 * horizon.dt / 0.99;
     vec![

@@ -57,14 +57,14 @@ pub(crate) fn rigid(mass: f64, inertia: f64) -> RigidBody {
     RigidBody::new(mass, Matrix3::identity() * inertia, Point3::origin()).unwrap()
 }
 
-/// Four feet in the plane of the centre of mass, so that friction tips nothing.
+/// Four feet in the plane of the center of mass, so that friction tips nothing.
 pub(crate) fn slab(law: &Law, spec: &Spec, gravity: Vector3<f64>) -> World {
     let feet = [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)];
     let feet = feet.map(|(x, y)| Point3::new(0.05 * x, 0.05 * y, 0.0));
     on_floor(law, spec, Onset::Hard, gravity, &feet, 1e-3)
 }
 
-/// What carries the slab: it sinks in by half a millimetre under gravity.
+/// What carries the slab: it sinks in by half a millimeter under gravity.
 pub(crate) const SLAB: Spec = Spec {
     mass: 0.3,
     depth: 5e-4,

@@ -1,4 +1,4 @@
-//! Cholesky factorisation of sparse matrices, of which the lower triangle is read.
+//! Cholesky factorization of sparse matrices, of which the lower triangle is read.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use super::columns;
 use crate::solve::SolveError;
 use crate::solve::factored::Factors;
 
-pub(super) fn analyse(
+pub(super) fn analyze(
     matrix: &SymbolicSparseColMat<usize>,
 ) -> Result<SymbolicCholesky<usize>, SolveError> {
     let (ordering, blocks) = (Default::default(), Default::default());
@@ -21,8 +21,8 @@ pub(super) fn analyse(
         .map_err(|_| SolveError::TooLarge)
 }
 
-/// The factors of a matrix of the pattern that was analysed.
-pub(super) fn factorise(
+/// The factors of a matrix of the pattern that was analyzed.
+pub(super) fn factorize(
     analysis: Arc<SymbolicCholesky<usize>>,
     matrix: &SparseColMat<usize, f64>,
 ) -> Result<Arc<dyn Factors>, SolveError> {

@@ -13,14 +13,14 @@ use super::columns;
 use crate::solve::SolveError;
 use crate::solve::factored::Factors;
 
-pub(super) fn analyse(
+pub(super) fn analyze(
     matrix: &SymbolicSparseColMat<usize>,
 ) -> Result<SymbolicLu<usize>, SolveError> {
     factorize_symbolic_lu(matrix.as_ref(), Default::default()).map_err(|_| SolveError::TooLarge)
 }
 
-/// The factors of a matrix of the pattern that was analysed.
-pub(super) fn factorise(
+/// The factors of a matrix of the pattern that was analyzed.
+pub(super) fn factorize(
     analysis: Arc<SymbolicLu<usize>>,
     matrix: &SparseColMat<usize, f64>,
 ) -> Result<Arc<dyn Factors>, SolveError> {

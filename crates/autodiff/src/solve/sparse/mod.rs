@@ -1,4 +1,4 @@
-//! Sparse matrices, factorised by faer.
+//! Sparse matrices, factorized by faer.
 
 mod cholesky;
 mod lu;
@@ -16,7 +16,7 @@ use super::factored::Factored;
 use super::pattern::{Pattern, Place};
 use crate::Operand;
 
-/// A factorisation prepared for all the matrices that have their entries in the same places.
+/// A factorization prepared for all the matrices that have their entries in the same places.
 ///
 /// Finding the order of elimination and the places that fill in is done once, here; a simulation that
 /// changes the values from step to step calls only [`factor`](Self::factor). Runs on one thread, and needs
@@ -57,7 +57,7 @@ enum Analysis {
 }
 
 impl SparseSolver {
-    /// Prepares LU factorisations, with partial pivoting, of matrices of `size` rows and columns whose
+    /// Prepares LU factorizations, with partial pivoting, of matrices of `size` rows and columns whose
     /// entries stand at `places` (row, column). Entries that share a place add up.
     ///
     /// # Errors
@@ -68,10 +68,10 @@ impl SparseSolver {
             .enumerate()
             .map(|(entry, &(row, column))| Place { entry, row, column })
             .collect();
-        Self::new(size, places, standing, |matrix| Ok(Analysis::Lu(Arc::new(lu::analyse(matrix)?))))
+        Self::new(size, places, standing, |matrix| Ok(Analysis::Lu(Arc::new(lu::analyze(matrix)?))))
     }
 
-    /// Prepares Cholesky factorisations of symmetric positive definite matrices of `size` rows and
+    /// Prepares Cholesky factorizations of symmetric positive definite matrices of `size` rows and
     /// columns whose entries stand at `places` (row, column). Entries that share a place add up.
     ///
     /// Only entries on and below the diagonal are read, and carry derivatives; an entry below it stands
@@ -91,7 +91,7 @@ impl SparseSolver {
             .flatten()
             .collect();
         Self::new(size, places, standing, |matrix| {
-            Ok(Analysis::Cholesky(Arc::new(cholesky::analyse(matrix)?)))
+            Ok(Analysis::Cholesky(Arc::new(cholesky::analyze(matrix)?)))
         })
     }
 
@@ -99,7 +99,7 @@ impl SparseSolver {
         size: usize,
         places: &[(usize, usize)],
         standing: Arc<[Place]>,
-        analyse: impl FnOnce(&SymbolicSparseColMat<usize>) -> Result<Analysis, SolveError>,
+        analyze: impl FnOnce(&SymbolicSparseColMat<usize>) -> Result<Analysis, SolveError>,
     ) -> Result<Self, SolveError> {
         let pairs: Vec<_> = places.iter().map(|&(row, column)| Pair::new(row, column)).collect();
         let (matrix, order) = SymbolicSparseColMat::try_new_from_indices(size, size, &pairs)
@@ -109,12 +109,12 @@ impl SparseSolver {
                 }
                 CreationError::Generic(_) => SolveError::TooLarge,
             })?;
-        let analysis = analyse(&matrix)?;
+        let analysis = analyze(&matrix)?;
         let pattern = Pattern::Sparse { size, places: standing };
         Ok(Self { entries: places.len(), pattern, matrix, order, analysis })
     }
 
-    /// Factorises the matrix with these entries, in the order in which their places were given.
+    /// Factorizes the matrix with these entries, in the order in which their places were given.
     ///
     /// # Errors
     /// If the number of entries is wrong, one is not finite, or the matrix is singular to working
@@ -131,8 +131,8 @@ impl SparseSolver {
             let matrix = SparseColMat::new_from_argsort(self.matrix.clone(), &self.order, values)
                 .map_err(|_| SolveError::TooLarge)?;
             match &self.analysis {
-                Analysis::Lu(analysis) => lu::factorise(analysis.clone(), &matrix),
-                Analysis::Cholesky(analysis) => cholesky::factorise(analysis.clone(), &matrix),
+                Analysis::Lu(analysis) => lu::factorize(analysis.clone(), &matrix),
+                Analysis::Cholesky(analysis) => cholesky::factorize(analysis.clone(), &matrix),
             }
         })
     }
@@ -167,7 +167,7 @@ mod tests {
         a
     }
 
-    /// A grid of `side` × `side` points, each coupled with its neighbours; some places occur twice.
+    /// A grid of `side` × `side` points, each coupled with its neighbors; some places occur twice.
     fn grid(side: usize) -> Vec<(usize, usize)> {
         let mut places = Vec::new();
         for k in 0..side * side {

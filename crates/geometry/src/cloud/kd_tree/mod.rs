@@ -1,4 +1,4 @@
-//! Exact nearest neighbours among a fixed set of points.
+//! Exact nearest neighbors among a fixed set of points.
 
 mod build;
 mod probe;
@@ -14,14 +14,14 @@ use crate::closest::triangle::Triangle;
 
 /// A point of a cloud near a query.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Neighbour {
+pub struct Neighbor {
     /// Index of the point in the cloud.
     pub index: usize,
     /// Its squared distance from the query \[m²\].
     pub distance_squared: f64,
 }
 
-/// A balanced k-d tree over points: exact neighbours of points, and of triangles.
+/// A balanced k-d tree over points: exact neighbors of points, and of triangles.
 ///
 /// Every answer is a function of the points and the query alone: of points at exactly equal distance the one
 /// of lowest index counts as nearer, whatever the hint. Four branches leave each node, cut by medians along the
@@ -70,7 +70,7 @@ impl KdTree {
     /// The point nearest to `query` within `max_distance` \[m\], which may be infinite; `None` too for a query
     /// that is not finite or farther than 1e18 m, whose square leaves single precision.
     #[inline]
-    pub fn nearest(&self, query: &Point3<f64>, max_distance: f64) -> Option<Neighbour> {
+    pub fn nearest(&self, query: &Point3<f64>, max_distance: f64) -> Option<Neighbor> {
         let probe = PointProbe::new(query)?;
         self.search(&probe, Nearest::within(max_distance)?).found()
     }
@@ -83,7 +83,7 @@ impl KdTree {
         query: &Point3<f64>,
         max_distance: f64,
         hint: usize,
-    ) -> Option<Neighbour> {
+    ) -> Option<Neighbor> {
         let probe = PointProbe::new(query)?;
         let mut best = Nearest::within(max_distance)?;
         if let Some(point) = self.points.get(hint) {
@@ -99,7 +99,7 @@ impl KdTree {
         query: &Point3<f64>,
         max_distance: f64,
         hint: Option<usize>,
-    ) -> Option<(Neighbour, f64)> {
+    ) -> Option<(Neighbor, f64)> {
         let probe = PointProbe::new(query)?;
         let mut alone = Alone::within(max_distance)?;
         if let Some((hint, point)) = hint.and_then(|i| Some((i, self.points.get(i)?))) {
@@ -112,7 +112,7 @@ impl KdTree {
     }
 
     /// The `k` points nearest to `query`, nearest first; fewer where the cloud has fewer.
-    pub fn k_nearest(&self, query: &Point3<f64>, k: usize) -> Vec<Neighbour> {
+    pub fn k_nearest(&self, query: &Point3<f64>, k: usize) -> Vec<Neighbor> {
         let limit = k.min(self.points.len());
         match PointProbe::new(query) {
             Some(probe) if limit > 0 => self.search(&probe, Best::new(limit)).found(),
@@ -121,7 +121,7 @@ impl KdTree {
     }
 
     /// Every point within `radius` \[m\] of `query`, nearest first.
-    pub fn within(&self, query: &Point3<f64>, radius: f64) -> Vec<Neighbour> {
+    pub fn within(&self, query: &Point3<f64>, radius: f64) -> Vec<Neighbor> {
         match (PointProbe::new(query), Every::within(radius)) {
             (Some(probe), Some(every)) => self.search(&probe, every).found(),
             _ => Vec::new(),
@@ -136,7 +136,7 @@ impl KdTree {
         corners: [Point3<f64>; 3],
         max_distance: f64,
         hint: Option<usize>,
-    ) -> Option<Neighbour> {
+    ) -> Option<Neighbor> {
         let triangle = Triangle::new(corners, 0);
         let probe = TriangleProbe::new(&corners, &triangle)?;
         let mut best = Nearest::within(max_distance)?;

@@ -1,4 +1,4 @@
-//! What neighbours are asked of: a point or a triangle.
+//! What neighbors are asked of: a point or a triangle.
 
 use nalgebra::{Point3, Vector3};
 

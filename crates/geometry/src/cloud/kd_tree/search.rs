@@ -1,7 +1,7 @@
 //! Branch and bound over the tree, and what may be collected on the way.
 
 use super::probe::Probe;
-use super::{KdTree, Neighbour};
+use super::{KdTree, Neighbor};
 
 /// Deepest tree: 4¹⁶ leaves of eight exceed the number of points there may be. Each level leaves three siblings.
 const STACK: usize = 3 * 16 + 4;
@@ -82,9 +82,9 @@ impl Nearest {
     }
 
     #[inline]
-    pub(super) fn found(self) -> Option<Neighbour> {
+    pub(super) fn found(self) -> Option<Neighbor> {
         (self.index != u32::MAX)
-            .then_some(Neighbour { index: self.index as usize, distance_squared: self.d2 })
+            .then_some(Neighbor { index: self.index as usize, distance_squared: self.d2 })
     }
 }
 
@@ -118,7 +118,7 @@ impl Alone {
 
     /// The nearest point, and the squared distance of the next or of the limit \[m²\].
     #[inline]
-    pub(super) fn found(self) -> Option<(Neighbour, f64)> {
+    pub(super) fn found(self) -> Option<(Neighbor, f64)> {
         Some((self.nearest.found()?, self.others))
     }
 }
@@ -156,8 +156,8 @@ impl Best {
         Self { k, found: Vec::with_capacity(k) }
     }
 
-    pub(super) fn found(self) -> Vec<Neighbour> {
-        neighbours(self.found)
+    pub(super) fn found(self) -> Vec<Neighbor> {
+        neighbors(self.found)
     }
 }
 
@@ -189,9 +189,9 @@ impl Every {
         Some(Self { limit: squared(radius)?.min(f64::MAX), found: Vec::new() })
     }
 
-    pub(super) fn found(mut self) -> Vec<Neighbour> {
+    pub(super) fn found(mut self) -> Vec<Neighbor> {
         self.found.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        neighbours(self.found)
+        neighbors(self.found)
     }
 }
 
@@ -205,8 +205,8 @@ impl Collect for Every {
     }
 }
 
-fn neighbours(found: Vec<(f64, u32)>) -> Vec<Neighbour> {
-    let neighbour =
-        |(distance_squared, index)| Neighbour { index: index as usize, distance_squared };
-    found.into_iter().map(neighbour).collect()
+fn neighbors(found: Vec<(f64, u32)>) -> Vec<Neighbor> {
+    let neighbor =
+        |(distance_squared, index)| Neighbor { index: index as usize, distance_squared };
+    found.into_iter().map(neighbor).collect()
 }

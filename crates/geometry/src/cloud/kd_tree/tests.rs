@@ -16,11 +16,11 @@ fn cloud(n: usize, seed: u64, lattice: bool) -> Vec<Point3<f64>> {
 fn sorted(
     distance_squared: impl Fn(&Point3<f64>) -> f64,
     points: &[Point3<f64>],
-) -> Vec<Neighbour> {
+) -> Vec<Neighbor> {
     let mut all: Vec<_> = points
         .iter()
         .enumerate()
-        .map(|(index, p)| Neighbour { index, distance_squared: distance_squared(p) })
+        .map(|(index, p)| Neighbor { index, distance_squared: distance_squared(p) })
         .collect();
     all.sort_by(|a, b| {
         a.distance_squared.total_cmp(&b.distance_squared).then(a.index.cmp(&b.index))
@@ -68,8 +68,8 @@ proptest! {
         let points = cloud(n, seed, false);
         let tree = KdTree::new(&points).unwrap();
         for corners in cloud(30, seed ^ 2, false).chunks_exact(3) {
-            let centre = corners[0];
-            let corners = [0, 1, 2].map(|i| centre + (corners[i] - centre) * size);
+            let center = corners[0];
+            let corners = [0, 1, 2].map(|i| center + (corners[i] - center) * size);
             let triangle = Triangle::new(corners, 0);
             let all = sorted(|p| triangle.closest(&p.coords).distance_squared, &points);
             prop_assert_eq!(tree.nearest_to_triangle(corners, f64::INFINITY, None), Some(all[0]));
@@ -96,7 +96,7 @@ fn larger_trees_agree_too() {
 fn many_equal_points_and_none() {
     let same = KdTree::new(&vec![Point3::new(1.0, 2.0, 2.0); 1000]).unwrap();
     let nearest = same.nearest_from(&Point3::origin(), 3.0, 500);
-    assert_eq!(nearest, Some(Neighbour { index: 0, distance_squared: 9.0 }));
+    assert_eq!(nearest, Some(Neighbor { index: 0, distance_squared: 9.0 }));
     assert_eq!(same.within(&Point3::origin(), 3.0).len(), 1000);
     assert_eq!(same.k_nearest(&Point3::origin(), 3).iter().map(|n| n.index).sum::<usize>(), 3);
 

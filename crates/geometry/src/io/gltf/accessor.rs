@@ -34,7 +34,7 @@ impl Buffers<'_> {
         })
     }
 
-    /// The accessor's elements, each of at least `width` components, normalised integers in 0..=1 or −1..=1.
+    /// The accessor's elements, each of at least `width` components, normalized integers in 0..=1 or −1..=1.
     pub(super) fn floats_as<T>(
         &self,
         accessor: &Accessor,

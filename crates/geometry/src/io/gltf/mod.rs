@@ -1,6 +1,6 @@
-//! glTF 2.0 and GLB: triangles, node transforms, base-colour textures (embedded or beside the file).
+//! glTF 2.0 and GLB: triangles, node transforms, base-color textures (embedded or beside the file).
 //!
-//! The colour factor of a textured material is not applied.
+//! The color factor of a textured material is not applied.
 
 mod accessor;
 
@@ -283,7 +283,7 @@ impl Reader<'_> {
 mod tests {
     use super::*;
 
-    /// A triangle under a node that doubles, mirrors in x and moves; `image` as its base colour.
+    /// A triangle under a node that doubles, mirrors in x and moves; `image` as its base color.
     fn document(image: &str, buffer_uri: &str, buffer_length: usize) -> String {
         let uri = if buffer_uri.is_empty() {
             String::new()

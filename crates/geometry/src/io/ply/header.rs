@@ -44,7 +44,7 @@ impl Number {
         }
     }
 
-    /// What a stored colour value of this type means in 0..=1.
+    /// What a stored color value of this type means in 0..=1.
     pub(super) fn color(self, value: f64) -> f32 {
         let full = match self {
             Self::U8 | Self::I8 => 255.0,

@@ -1,6 +1,6 @@
 //! PLY, ASCII and binary of either byte order (Turk, "The PLY Polygon File Format", 1994).
 //!
-//! Beyond positions and faces this reads normals, vertex colours, texture coordinates of vertices
+//! Beyond positions and faces this reads normals, vertex colors, texture coordinates of vertices
 //! (`texture_u`/`texture_v`, `s`/`t`, `u`/`v`) or of face corners (`texcoord`), and
 //! `comment TextureFile NAME`. Unknown elements and properties are skipped.
 

@@ -48,7 +48,7 @@ const UNSIGNED_INT: u32 = 5125;
 impl TriMesh {
     /// Writes GLB with every attribute the mesh has, in single precision; the texture goes inside as PNG.
     ///
-    /// Vertex colours are written as they are (sRGB-encoded), though glTF takes them for linear ones: this library
+    /// Vertex colors are written as they are (sRGB-encoded), though glTF takes them for linear ones: this library
     /// reads the same numbers again, a viewer shows them lighter.
     ///
     /// # Errors

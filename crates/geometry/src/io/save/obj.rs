@@ -7,7 +7,7 @@ use crate::TriMesh;
 use crate::io::MeshError;
 
 impl TriMesh {
-    /// Writes OBJ with normals, UVs and vertex colours (after the positions, as most programs read them); a texture
+    /// Writes OBJ with normals, UVs and vertex colors (after the positions, as most programs read them); a texture
     /// becomes `STEM.png`, named by `STEM.mtl`.
     ///
     /// # Errors

@@ -7,7 +7,7 @@ use crate::TriMesh;
 use crate::io::MeshError;
 
 impl TriMesh {
-    /// Writes binary PLY with every attribute the mesh has: positions in double precision, colours rounded to 8
+    /// Writes binary PLY with every attribute the mesh has: positions in double precision, colors rounded to 8
     /// bits, the texture as `STEM.png` beside it.
     ///
     /// # Errors

@@ -121,7 +121,7 @@ fn ball(closed: bool) -> ClosestPoints {
 
 #[test]
 fn samples_at_the_very_edge_of_the_band_have_the_right_sign() {
-    // Samples on the faces of the cube, whose neighbours inside are a band away but for rounding.
+    // Samples on the faces of the cube, whose neighbors inside are a band away but for rounding.
     for (size, spacing) in [(0.4, 0.1), (0.6, 0.1), (0.3, 0.05), (3.3, 0.3)] {
         let mesh = ClosestPoints::new(&cuboid(Vector3::repeat(size))).unwrap();
         let grid = SdfGrid::build_band(&mesh, spacing, 2.0 * spacing, spacing).unwrap();

@@ -45,7 +45,7 @@ pub(crate) struct Arguments {
     /// Seed of the errors
     #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Poses")]
     seed: u64,
-    /// Find the objects from depth, mask, colour and touch alone; where a scene says nothing of its hand, without touch
+    /// Find the objects from depth, mask, color and touch alone; where a scene says nothing of its hand, without touch
     #[arg(long, help_heading = "Poses")]
     search: bool,
     /// What to search for, as BOP's test_targets_bop19.json has it

@@ -22,13 +22,13 @@ use clap::{Parser, Subcommand};
 
 /// Refine the poses of objects held in a robot hand, from RGB-D, touch and physics
 ///
-/// A vision system says where an object in a hand is, and is off by centimetres. Given that pose, the
+/// A vision system says where an object in a hand is, and is off by centimeters. Given that pose, the
 /// segmented RGB-D image, the object's mesh, the hand's joint angles and, if there are, its tactile
 /// sensors, `prehend refine` finds the pose that agrees with all of them.
 ///
 /// Datasets are in BOP format (https://bop.felk.cvut.cz), extended by scene_bodies.json (gravity, and
 /// the hand's URDF, pose and joints) and scene_tactile.json (taxel forces). Poses are BOP results files
-/// with the columns scene_id,im_id,obj_id,score,R,t,time: R row-major, t in millimetres, object to
+/// with the columns scene_id,im_id,obj_id,score,R,t,time: R row-major, t in millimeters, object to
 /// camera (x right, y down, z forward).
 ///
 /// A first session:

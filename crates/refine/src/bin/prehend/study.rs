@@ -37,7 +37,7 @@ enum What {
     Gradients(Run),
     /// The robust ICP, the combined method and the fused estimator at all levels of noise
     Noise(Run),
-    /// The combined method after more and more steps: no regularisation, no checkpoint, all iterations
+    /// The combined method after more and more steps: no regularization, no checkpoint, all iterations
     Steps(Run),
     /// The fused estimator without each kind of evidence, with one kind alone, and with calibrations believed
     Evidence(Run),

@@ -15,7 +15,7 @@ use crate::progress;
 
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Folder of obj_000001.ply, … in millimetres, such as a dataset's models/
+    /// Folder of obj_000001.ply, … in millimeters, such as a dataset's models/
     #[arg(long, value_name = "DIR", help_heading = "Input")]
     models: PathBuf,
     /// Only this object; may be repeated
@@ -24,7 +24,7 @@ pub(crate) struct Arguments {
     /// How far the surface may be off, as a fraction of the diameter
     #[arg(long, value_name = "FRACTION", default_value_t = SymmetrySettings::default().tolerance, help_heading = "Method")]
     tolerance: f64,
-    /// Compare colours too: how much they may differ, root mean square, of 0 to 1 (0.05 is good) [default: shape alone]
+    /// Compare colors too: how much they may differ, root mean square, of 0 to 1 (0.05 is good) [default: shape alone]
     #[arg(long, value_name = "DIFFERENCE", help_heading = "Method")]
     color: Option<f64>,
     /// Write them into models_info.json, in place of those that were there

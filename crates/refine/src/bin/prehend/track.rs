@@ -287,7 +287,7 @@ fn summary(frame: &Done) -> serde_json::Value {
         "milliseconds": {
             "preparation": milliseconds(spent.preparation),
             "steps": milliseconds(spent.steps),
-            "judgement": milliseconds(spent.judgement),
+            "judgment": milliseconds(spent.judgment),
             "recovery": milliseconds(spent.recovery),
         },
         "t_cam_model_mm": pose.translation_m.map(|v| v * 1e3),

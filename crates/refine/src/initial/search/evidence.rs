@@ -11,7 +11,7 @@ use crate::{Observation, RefineError, Robot};
 
 /// Depth points that normals are estimated from, at most.
 const POINTS: usize = 2500;
-/// Neighbours that a normal is estimated from.
+/// Neighbors that a normal is estimated from.
 const NEIGHBOURS: usize = 24;
 /// Points on the hand's surface that the object must not reach.
 const HAND_POINTS: usize = 300;
@@ -75,7 +75,7 @@ fn shuffled<T: Copy>(items: Vec<T>) -> Vec<T> {
     // Multiples of the golden ratio fill the unit interval evenly.
     let key = |i: usize| (i as f64 * 0.618_033_988_749_895).fract();
     order.sort_by(|&a, &b| key(a).total_cmp(&key(b)));
-    // Neighbours in that order are far apart in the list; a stride makes beginnings even too.
+    // Neighbors in that order are far apart in the list; a stride makes beginnings even too.
     order.into_iter().map(|i| items[i]).collect()
 }
 
@@ -158,7 +158,7 @@ impl SightMap {
     }
 }
 
-/// Fills in the distances to the object in two sweeps, by steps to the eight neighbours.
+/// Fills in the distances to the object in two sweeps, by steps to the eight neighbors.
 fn measure_away(pixels: &mut [Sight], width: usize) {
     let height = pixels.len() / width;
     let mut relax = |x: usize, y: usize, forwards: bool| {

@@ -19,7 +19,7 @@ const LONGEST: f64 = 10e-3;
 /// Steps shorter than this end a descent \[m\].
 const SHORTEST: f64 = 50e-6;
 
-/// Depth, colour and, where there is a skin, touch.
+/// Depth, color and, where there is a skin, touch.
 pub(super) struct Fine<'a> {
     observation: &'a Observation,
     object: &'a Object,
@@ -77,7 +77,7 @@ impl<'a> Fine<'a> {
         for _ in 0..steps {
             let normal = planned.get_or_insert_with(|| {
                 let mut normal = Normal::new(&[Block::ObjectPose]);
-                self.terms.iter().for_each(|t| _ = t.linearise(&state, &mut normal));
+                self.terms.iter().for_each(|t| _ = t.linearize(&state, &mut normal));
                 normal
             });
             let (step, length): (Vector6<f64>, f64) =

@@ -39,11 +39,11 @@ pub struct Found {
 ///    and the hand outside of it. The score is of depth points and their normals, touched taxels, the hand inside the
 ///    object, and surface where the camera sees something else: all by a lattice of signed distances.
 /// 2. The best that differ from each other turn too, and are scored again on more points.
-/// 3. Those left are scored by the terms of the refinement at a low resolution. Only here colour counts, which
+/// 3. Those left are scored by the terms of the refinement at a low resolution. Only here color counts, which
 ///    tells the front of a carton from its back; therefore stage 2 keeps many.
 /// 4. Gauss–Newton steps of the sum of the terms, at a low and then at the full resolution.
 ///
-/// The terms are depth, colour and, where there is a skin, touch. Only what an estimator may know is read: nothing
+/// The terms are depth, color and, where there is a skin, touch. Only what an estimator may know is read: nothing
 /// here takes a pose of the object. A hand that is not known hides what its depth says it hides in stages 1 and 2, and
 /// nothing in the terms: without it, small and much hidden objects are often found turned.
 ///
@@ -122,10 +122,10 @@ impl PoseSearch {
         let placed: Vec<Scored> = spread_rotations(settings.rotations)
             .par_iter()
             .flat_map_iter(|rotation| {
-                let centred = rough.centred(rotation);
+                let centered = rough.centered(rotation);
                 let points = settings.rough_points;
                 let scored = shifts.iter().map(|shift| {
-                    let mut start = centred;
+                    let mut start = centered;
                     start.translation.vector += shift;
                     let pose = rough.settle(&start, points, 20e-3, settings.slides, true);
                     (pose, rough.score(&pose, points, 15e-3))

@@ -28,7 +28,7 @@ pub(super) struct Rough<'a> {
 impl Rough<'_> {
     /// Where the object is in view with the rotation `rotation` if the mean of what faces the camera is at the mean of
     /// the depth points.
-    pub(super) fn centred(&self, rotation: &UnitQuaternion<f64>) -> Isometry3<f64> {
+    pub(super) fn centered(&self, rotation: &UnitQuaternion<f64>) -> Isometry3<f64> {
         let points = &self.evidence.points;
         let mean = points.iter().map(|(p, _)| p.coords).sum::<Vector3<f64>>() / points.len() as f64;
         let towards = -mean.normalize();
@@ -83,8 +83,8 @@ impl Rough<'_> {
     ) -> Isometry3<f64> {
         let mut pose = *pose;
         for _ in 0..steps {
-            let centre = (pose * self.object.centre).coords;
-            let (gradient, matrix) = self.equations(&pose, &centre, points, scale, slide);
+            let center = (pose * self.object.center).coords;
+            let (gradient, matrix) = self.equations(&pose, &center, points, scale, slide);
             let mut step = Vector6::zeros();
             if slide {
                 let matrix: Matrix3<f64> = matrix.fixed_view::<3, 3>(0, 0).into_owned();
@@ -106,7 +106,7 @@ impl Rough<'_> {
             if !step.iter().all(|x| x.is_finite()) {
                 break;
             }
-            pose = perturb_about(&pose, &centre, &step);
+            pose = perturb_about(&pose, &center, &step);
             pose.rotation.renormalize();
         }
         pose
@@ -115,7 +115,7 @@ impl Rough<'_> {
     fn equations(
         &self,
         pose: &Isometry3<f64>,
-        centre: &Vector3<f64>,
+        center: &Vector3<f64>,
         points: usize,
         scale: f64,
         slide: bool,
@@ -131,7 +131,7 @@ impl Rough<'_> {
             // The surface moves with the object: the distance of a fixed point changes the other way.
             let n = -(pose.rotation * g);
             let w = share * cauchy.weight(distance * distance);
-            let turn = if slide { Vector3::zeros() } else { (p.coords - centre).cross(&n) };
+            let turn = if slide { Vector3::zeros() } else { (p.coords - center).cross(&n) };
             let row = Vector6::new(n.x, n.y, n.z, turn.x, turn.y, turn.z);
             gradient += row * (w * distance);
             for (i, mut column) in matrix.column_iter_mut().enumerate() {

@@ -18,14 +18,14 @@ pub struct Hypothesis {
     pub weight: f64,
     /// Negative logarithm of the posterior, up to a constant \[nat\].
     pub value: f64,
-    /// Covariance of a left twist about the object's centre, in the camera frame \[m², m rad, rad²\].
+    /// Covariance of a left twist about the object's center, in the camera frame \[m², m rad, rad²\].
     pub covariance: Matrix6<f64>,
 }
 
 /// A direction that the evidence says little of: only the prior holds the pose there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Unobserved {
-    /// Twist about the object's centre, in the camera frame, of unit length where a rotation counts by how far it moves
+    /// Twist about the object's center, in the camera frame, of unit length where a rotation counts by how far it moves
     /// the surface.
     pub twist: Vector6<f64>,
     /// Standard deviation along it \[m of surface motion\].
@@ -57,8 +57,8 @@ pub struct Confidence {
     /// Cramér and Rao's bound on the covariance, prior included (van Trees, 1968): the inverse of all information, with nothing
     /// added for what the models of sensors and object leave out. Units are those of [`covariance`](Self::covariance).
     pub bound: Matrix6<f64>,
-    /// Centre of the object, about which twists turn (camera frame) \[m\].
-    centre: Vector3<f64>,
+    /// Center of the object, about which twists turn (camera frame) \[m\].
+    center: Vector3<f64>,
 }
 
 /// What makes posteriors as wide as errors are, besides the information that there is.
@@ -90,7 +90,7 @@ const UNOBSERVED: f64 = 8e-3;
 const DISAGREES: f64 = 5.0;
 
 impl Confidence {
-    /// Of the solutions `found`, the best first; `radius` turns radians into metres of surface motion. Calibrations are `exact` or as accurate as stated.
+    /// Of the solutions `found`, the best first; `radius` turns radians into meters of surface motion. Calibrations are `exact` or as accurate as stated.
     /// `also` disagrees besides, if by enough.
     pub(crate) fn new(
         found: &[(Point, Ending)],
@@ -140,11 +140,11 @@ impl Confidence {
             ending: *ending,
             exact,
             bound: bounds[0].0,
-            centre: best.state.centre(),
+            center: best.state.center(),
         }
     }
 
-    /// Covariance of the pose's error: a left twist about the object's centre in the camera frame \[m², m rad, rad²\].
+    /// Covariance of the pose's error: a left twist about the object's center in the camera frame \[m², m rad, rad²\].
     pub fn covariance(&self) -> Matrix6<f64> {
         self.hypotheses[0].covariance
     }
@@ -162,15 +162,15 @@ impl Confidence {
     /// Probability that the true pose is within `distance` \[m\] and `angle` \[rad\] of the best one, all hypotheses
     /// considered. By sampling; always the same for the same posterior.
     pub fn probability_within(&self, distance: f64, angle: f64) -> f64 {
-        let place = self.hypotheses[0].t_cam_object.inverse() * Point3::from(self.centre);
+        let place = self.hypotheses[0].t_cam_object.inverse() * Point3::from(self.center);
         let mut random = SplitMix64::new(0);
         let of = |hypothesis: &Hypothesis, random: &mut SplitMix64| {
             let Some(factor) = hypothesis.covariance.cholesky() else { return 0.0 };
             let root = factor.l();
             let inside = (0..SAMPLES).filter(|_| {
                 let twist = root * Vector6::from_fn(|_, _| random.normal());
-                let centre = (hypothesis.t_cam_object * place).coords;
-                let pose = perturb_about(&hypothesis.t_cam_object, &centre, &twist);
+                let center = (hypothesis.t_cam_object * place).coords;
+                let pose = perturb_about(&hypothesis.t_cam_object, &center, &twist);
                 let (off, turn) = self.deviation(&pose);
                 off.norm() <= distance && turn.norm() <= angle
             });
@@ -179,12 +179,12 @@ impl Confidence {
         self.hypotheses.iter().map(|h| h.weight * of(h, &mut random)).sum()
     }
 
-    /// How far `pose` is from the best one: displacement of the object's centre \[m\] and rotation vector \[rad\].
+    /// How far `pose` is from the best one: displacement of the object's center \[m\] and rotation vector \[rad\].
     fn deviation(&self, pose: &Isometry3<f64>) -> (Vector3<f64>, Vector3<f64>) {
         let best = &self.hypotheses[0].t_cam_object;
-        let place = best.inverse() * Point3::from(self.centre);
+        let place = best.inverse() * Point3::from(self.center);
         let turn = so3_log(&(pose.rotation * best.rotation.inverse()));
-        ((pose * place).coords - self.centre, turn)
+        ((pose * place).coords - self.center, turn)
     }
 
     /// How far `pose` is from the best one, in standard deviations: the square is χ² of six degrees of freedom if the
@@ -210,23 +210,23 @@ fn laplace(point: &Point) -> (Matrix6<f64>, f64) {
     (covariance, -factor.log_determinant() - displaced)
 }
 
-/// The object's part of the step to where the quadratic model about `point` is least: a left twist about its centre \[m, rad\].
+/// The object's part of the step to where the quadratic model about `point` is least: a left twist about its center \[m, rad\].
 fn remaining(point: &Point) -> Vector6<f64> {
     let at = point.normal.offset(Block::ObjectPose).unwrap_or(0);
     let step = point.to_least().map(|step| step.fixed_rows::<6>(at).into_owned());
     step.filter(|step| step.iter().all(|v| v.is_finite())).unwrap_or_else(Vector6::zeros)
 }
 
-/// Directions in which the pose of `point` is uncertain, the most uncertain first: twists about the object's centre that move
-/// its surface by a metre, with the standard deviation of that motion \[m\].
+/// Directions in which the pose of `point` is uncertain, the most uncertain first: twists about the object's center that move
+/// its surface by a meter, with the standard deviation of that motion \[m\].
 pub(super) fn principal_directions(point: &Point, radius: f64) -> Vec<(Vector6<f64>, f64)> {
     directions(&laplace(point).0, radius)
 }
 
 fn directions(covariance: &Matrix6<f64>, radius: f64) -> Vec<(Vector6<f64>, f64)> {
     let scale = Vector6::new(1.0, 1.0, 1.0, radius, radius, radius);
-    let metres = Matrix6::from_fn(|r, c| covariance[(r, c)] * scale[r] * scale[c]);
-    let eigen = metres.symmetric_eigen();
+    let meters = Matrix6::from_fn(|r, c| covariance[(r, c)] * scale[r] * scale[c]);
+    let eigen = meters.symmetric_eigen();
     let mut found: Vec<_> = (0..6)
         .map(|k| {
             let twist: Vector6<f64> = eigen.eigenvectors.column(k).component_div(&scale);

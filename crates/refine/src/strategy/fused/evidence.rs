@@ -25,8 +25,8 @@ pub(crate) struct Known<'a> {
     pub(crate) robot: Option<&'a Arc<Robot>>,
     /// Depth image of the hand alone.
     pub(super) hand: DepthImage,
-    /// Whether there are colours to compare.
-    coloured: bool,
+    /// Whether there are colors to compare.
+    colored: bool,
     /// Depth as measured.
     depth: Arc<DepthImage>,
     /// The segmented image, and smaller ones, by how many times smaller they are: stages share them. What may hide the
@@ -61,8 +61,8 @@ impl<'a> Known<'a> {
         let image = Segmented::new(observation, occluder)?;
         let images = Mutex::new(BTreeMap::from([(1, image)]));
         let depth = Arc::new(observation.depth.clone());
-        let coloured = observation.has_colours();
-        Ok(Self { observation, object, robot, hand, coloured, depth, images })
+        let colored = observation.has_colors();
+        Ok(Self { observation, object, robot, hand, colored, depth, images })
     }
 
     /// The segmented image, `factor` times smaller.
@@ -98,7 +98,7 @@ impl<'a> Known<'a> {
         if !stage.model_deviates || !settings.nuisances.contains(&Nuisance::Model) {
             return None;
         }
-        let distance = initial.centre().z;
+        let distance = initial.center().z;
         let unit = settings.rendering.downsample * stage.downsample;
         Patches::new(self.observation, distance, &settings.model, unit).map(Arc::new)
     }
@@ -128,13 +128,13 @@ impl<'a> Known<'a> {
         let camera = self.observation.camera;
         let mut terms: Vec<Box<dyn Term>> =
             vec![Box::new(Prior::new(initial, &settings.accuracy)?)];
-        let colour = stage.colour && wanted(Evidence::Colour) && self.coloured;
+        let color = stage.color && wanted(Evidence::Color) && self.colored;
         let silhouette = wanted(Evidence::Silhouette);
-        if colour || silhouette {
+        if color || silhouette {
             let mut rendering = settings.rendering.clone();
             rendering.downsample *= stage.downsample;
             rendering.outlier *= stage.tolerance;
-            rendering.colour = colour;
+            rendering.color = color;
             if !silhouette {
                 rendering.mask_sigma = f64::INFINITY;
             }

@@ -99,7 +99,7 @@ impl Fused {
                 solve_all(&states)
             };
             found = distinct(found, object.radius);
-            // Not by the first stage, which sees no colours.
+            // Not by the first stage, which sees no colors.
             if index > 0 {
                 let limit = found[0].0.value + settings.hopeless;
                 // One that is still on its way down is not judged yet, and the best stays whatever its value.
@@ -114,10 +114,10 @@ impl Fused {
             if index == 0
                 && let Some(next) = settings.stages.get(1)
             {
-                // Where it is, geometry finds well; how it is turned, colours may say better from where they were told. And
+                // Where it is, geometry finds well; how it is turned, colors may say better from where they were told. And
                 // what little is seen of the object may have led astray.
                 let mut turned_back = states[0].clone();
-                let moved = states[0].centre() - initial.centre();
+                let moved = states[0].center() - initial.center();
                 states.truncate(KEPT.min(next.hypotheses.saturating_sub(2).max(1)));
                 turned_back.t_cam_object = Translation3::from(moved) * initial.t_cam_object;
                 states.extend([turned_back, initial.clone()]);
@@ -208,7 +208,7 @@ fn distinct(mut found: Vec<(Point, Ending)>, radius: f64) -> Vec<(Point, Ending)
         let state = &solution.0.state;
         let same = |(other, _): &(Point, Ending)| {
             let turn = state.t_cam_object.rotation.angle_to(&other.state.t_cam_object.rotation);
-            (state.centre() - other.state.centre()).norm() + radius * turn < SAME
+            (state.center() - other.state.center()).norm() + radius * turn < SAME
         };
         if !kept.iter().any(same) {
             kept.push(solution);
@@ -224,7 +224,7 @@ fn distinct(mut found: Vec<(Point, Ending)>, radius: f64) -> Vec<(Point, Ending)
 /// deviations wide, since first solutions of hardly any difference in value lie farther apart than the curvature about the best of them has it.
 fn spread(point: &Point, initial: &State, distance: f64, radius: f64, count: usize) -> Vec<State> {
     let state = &point.state;
-    let moved = initial.centre() - state.centre();
+    let moved = initial.center() - state.center();
     let turned = so3_log(&(initial.t_cam_object.rotation * state.t_cam_object.rotation.inverse()));
     let mut states = Vec::new();
     for (twist, deviation) in confidence::principal_directions(point, radius) {

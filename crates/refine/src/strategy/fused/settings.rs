@@ -11,8 +11,8 @@ use crate::{Block, State};
 /// A kind of evidence that the fused estimator weighs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Evidence {
-    /// Colours on the object.
-    Colour,
+    /// Colors on the object.
+    Color,
     /// The outline of the object's mask.
     Silhouette,
     /// Depth on the object.
@@ -34,7 +34,7 @@ pub enum Evidence {
 impl Evidence {
     /// All kinds.
     pub const ALL: [Self; 9] = [
-        Self::Colour,
+        Self::Color,
         Self::Silhouette,
         Self::Depth,
         Self::HandDepth,
@@ -48,7 +48,7 @@ impl Evidence {
     /// The name used in reports and on the command line.
     pub fn name(self) -> &'static str {
         match self {
-            Self::Colour => "colour",
+            Self::Color => "color",
             Self::Silhouette => "silhouette",
             Self::Depth => "depth",
             Self::HandDepth => "hand-depth",
@@ -68,7 +68,7 @@ pub enum Nuisance {
     HandPose,
     /// The hand's joint positions.
     Joints,
-    /// Depth scale and bias, centre of projection and size of images.
+    /// Depth scale and bias, center of projection and size of images.
     Camera,
     /// How the object differs from its model.
     Model,
@@ -106,7 +106,7 @@ pub struct Stage {
     pub downsample: usize,
     /// Depth points used at most.
     pub points: usize,
-    /// Distances and colour differences count as outliers only from so many times their final limits on.
+    /// Distances and color differences count as outliers only from so many times their final limits on.
     pub tolerance: f64,
     /// Iterations at most.
     pub iterations: usize,
@@ -114,8 +114,8 @@ pub struct Stage {
     pub last_gain: f64,
     /// How many of the best hypotheses the stage takes up.
     pub hypotheses: usize,
-    /// Whether colours are compared, which have many minima.
-    pub colour: bool,
+    /// Whether colors are compared, which have many minima.
+    pub color: bool,
     /// Whether the scatter of depth points about the best solution so far says how much depth is to be trusted.
     pub measured_scatter: bool,
     /// Whether the object may differ from its model, where it is asked: [`Nuisance::Model`].
@@ -142,15 +142,15 @@ pub struct FusedSettings {
     pub spread: f64,
     /// Whether to ask the evidence if calibrations are exact.
     pub exactness: bool,
-    /// Independent measurements that depth points amount to beside the errors that neighbours share, where both were measured.
+    /// Independent measurements that depth points amount to beside the errors that neighbors share, where both were measured.
     pub most_points: f64,
-    /// Hypotheses that are so much behind the best one after a stage, colours considered, are given up \[nat\].
+    /// Hypotheses that are so much behind the best one after a stage, colors considered, are given up \[nat\].
     pub hopeless: f64,
     /// What makes the posterior as wide as errors are.
     pub width: Width,
     /// How far the object's surface may be from the model's, patch by patch, with [`Nuisance::Model`].
     pub model: DeviationSettings,
-    /// Colour and silhouette.
+    /// Color and silhouette.
     pub rendering: RenderingSettings,
     /// Depth on the object. Its deviations and number of effective points are overwritten by what is measured, in stages with
     /// [`Stage::measured_scatter`] and where calibrations are exact.
@@ -190,7 +190,7 @@ impl Default for FusedSettings {
                     iterations: 10,
                     last_gain: 1.0,
                     hypotheses: 7,
-                    colour: false,
+                    color: false,
                     measured_scatter: false,
                     model_deviates: false,
                     contact: false,
@@ -202,7 +202,7 @@ impl Default for FusedSettings {
                     iterations: 5,
                     last_gain: 0.3,
                     hypotheses: 14,
-                    colour: true,
+                    color: true,
                     measured_scatter: false,
                     model_deviates: false,
                     contact: true,
@@ -214,7 +214,7 @@ impl Default for FusedSettings {
                     iterations: 8,
                     last_gain: 0.1,
                     hypotheses: 5,
-                    colour: true,
+                    color: true,
                     measured_scatter: true,
                     model_deviates: false,
                     contact: true,
@@ -226,7 +226,7 @@ impl Default for FusedSettings {
                     iterations: 10,
                     last_gain: 0.02,
                     hypotheses: 3,
-                    colour: true,
+                    color: true,
                     measured_scatter: true,
                     model_deviates: true,
                     contact: true,

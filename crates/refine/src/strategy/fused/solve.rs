@@ -99,16 +99,16 @@ impl Problem {
     pub(crate) fn at(&self, mut state: State) -> Point {
         let displaced = self.patches.as_ref().map(|patches| Block::Patches(patches.count()));
         let all: Vec<Block> = self.blocks.iter().copied().chain(displaced).collect();
-        let linearise = |term: &dyn Term| {
+        let linearize = |term: &dyn Term| {
             let light = term.light(&state);
             let state = State { light: light.unwrap_or(state.light), ..state.clone() };
             let apart = displaced.is_none_or(|block| !term.depends_on(block));
             let mut normal = Normal::new(if apart { &self.blocks } else { &all });
-            let value = term.linearise(&state, &mut normal);
+            let value = term.linearize(&state, &mut normal);
             (Part { name: term.name(), value, normal }, light)
         };
         let (parts, lights): (Vec<Part>, Vec<Option<Light>>) =
-            self.terms.par_iter().map(|term| linearise(term.as_ref())).unzip();
+            self.terms.par_iter().map(|term| linearize(term.as_ref())).unzip();
         if let Some(light) = lights.into_iter().flatten().next() {
             state.light = light;
         }
@@ -207,7 +207,7 @@ mod tests {
             true
         }
 
-        fn linearise(&self, state: &State, normal: &mut Normal) -> f64 {
+        fn linearize(&self, state: &State, normal: &mut Normal) -> f64 {
             let count = self.by_patches.ncols() / 3;
             for (i, residual) in self.residuals.iter().enumerate() {
                 let of = |matrix: &DMatrix<f64>| matrix.row(i).iter().copied().collect::<Vec<_>>();
@@ -234,7 +234,7 @@ mod tests {
             1.0
         }
 
-        fn linearise(&self, state: &State, normal: &mut Normal) -> f64 {
+        fn linearize(&self, state: &State, normal: &mut Normal) -> f64 {
             for axis in 0..6 {
                 let row: [f64; 6] = std::array::from_fn(|k| f64::from(u8::from(k == axis)));
                 normal.add_row(&[(Block::ObjectPose, &row)], 1.0, 1.0);
@@ -263,7 +263,7 @@ mod tests {
         let scene = default_scene(1).unwrap();
         let state = State::new(&scene.observation, &scene.object, &scene.truth).unwrap();
         let settings = DeviationSettings::default();
-        let patches = Patches::new(&scene.observation, state.centre().z, &settings, 2).unwrap();
+        let patches = Patches::new(&scene.observation, state.center().z, &settings, 2).unwrap();
         let mut random = SplitMix64::new(5);
         let (rows, size) = (40, 3 * patches.count());
         let mut matrix =

@@ -10,7 +10,7 @@ use super::Confidence;
 pub struct ConfidenceSummary {
     /// Probability that the pose is within 5 mm and 5° of the true one.
     pub probability: f64,
-    /// Standard deviations of the place of the object's centre in the camera frame \[mm\].
+    /// Standard deviations of the place of the object's center in the camera frame \[mm\].
     pub deviation_mm: [f64; 3],
     /// Standard deviations of the rotation about the axes of the camera frame \[°\].
     pub deviation_deg: [f64; 3],

@@ -47,14 +47,14 @@ fn errors(pose: &Isometry3<f64>) -> (f64, f64) {
 }
 
 #[test]
-fn exact_calibrations_are_recognised_and_errors_are_as_large_as_promised() {
+fn exact_calibrations_are_recognized_and_errors_are_as_large_as_promised() {
     let (pose, confidence) =
         run(&SCENE.observation, Some(&SCENE.robot), &turned(&OFF), FusedSettings::default());
     let (pe, oe) = errors(&pose);
     assert!(pe < 0.05 && oe < 0.5, "{pe} cm, {oe}°");
     let covariance = confidence.covariance();
     let deviation = covariance.fixed_view::<3, 3>(0, 0).trace().sqrt();
-    // Nuisances of millimetres have not been left open.
+    // Nuisances of millimeters have not been left open.
     assert!(deviation < 5e-4, "{deviation} m");
     assert!(confidence.mahalanobis(&SCENE.truth) < 6.0);
     assert!(confidence.probability_within(5e-3, 0.09) > 0.99);
@@ -95,13 +95,13 @@ fn every_sense_may_be_absent() {
         ("hand", changed(&|o| o.hand = None)),
         ("gravity", changed(&|o| o.gravity = None)),
         ("depth", changed(&|o| o.depth.pixels_mut().fill(0.0))),
-        ("colour", changed(&|o| o.color.pixels_mut().fill([0.5; 3]))),
+        ("color", changed(&|o| o.color.pixels_mut().fill([0.5; 3]))),
     ];
     for (sense, pose) in poses {
         let (pe, oe) = errors(&pose);
         assert!(pe < 0.5 && oe < 4.0, "without {sense}: {pe} cm, {oe}°");
     }
-    let (pose, _) = run(&SCENE.observation, Some(&SCENE.robot), &start, without(Evidence::Colour));
+    let (pose, _) = run(&SCENE.observation, Some(&SCENE.robot), &start, without(Evidence::Color));
     assert!(errors(&pose).0 < 0.3);
 }
 

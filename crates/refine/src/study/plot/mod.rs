@@ -116,7 +116,7 @@ fn failed(tables: &Tables, level: &str) -> String {
     }
 }
 
-/// Colours that stay apart, also for most colour-blind people (Okabe and Ito), and then some.
+/// Colors that stay apart, also for most color-blind people (Okabe and Ito), and then some.
 fn color(k: usize) -> RGBColor {
     const COLORS: [RGBColor; 10] = [
         RGBColor(0, 0, 0),

@@ -12,8 +12,8 @@ pub(super) fn depth(image: &mut DepthImage, share: f64, random: &mut SplitMix64)
     patches(width, height, share, random, |k| image.pixels_mut()[k] = 0.0);
 }
 
-/// A share of the patches is grey.
-pub(super) fn colour(image: &mut RgbImage, share: f64, random: &mut SplitMix64) {
+/// A share of the patches is gray.
+pub(super) fn color(image: &mut RgbImage, share: f64, random: &mut SplitMix64) {
     let (width, height) = (image.width(), image.height());
     patches(width, height, share, random, |k| image.pixels_mut()[k] = [0.5; 3]);
 }
@@ -58,7 +58,7 @@ mod tests {
         // Patches, not pixels.
         assert!((0..640).step_by(8).all(|x| (0..8).all(|d| some[x] == some[x + d])));
         let mut image = RgbImage::filled(64, 48, [0.1, 0.2, 0.3]);
-        colour(&mut image, 1.0, &mut SplitMix64::new(4));
+        color(&mut image, 1.0, &mut SplitMix64::new(4));
         assert!(image.pixels().iter().all(|p| *p == [0.5; 3]));
     }
 }

@@ -24,8 +24,8 @@ use crate::bop::ResultRow;
 pub enum Sweep {
     /// Depth noise, as a multiple of a realistic sensor's.
     DepthNoise,
-    /// Colour noise, as a multiple of a realistic sensor's.
-    ColourNoise,
+    /// Color noise, as a multiple of a realistic sensor's.
+    ColorNoise,
     /// How much of the object is still to be seen beside a block in front of it \[%\].
     Visibility,
     /// The hand is elsewhere than is said \[mm\].
@@ -40,8 +40,8 @@ pub enum Sweep {
     FalseTaxels,
     /// Share of the image without depth, in patches \[%\].
     MissingDepth,
-    /// Share of the image that is grey, in patches \[%\].
-    MissingColour,
+    /// Share of the image that is gray, in patches \[%\].
+    MissingColor,
     /// Whether there is no touch: 100 %, or 0.
     MissingTouch,
     /// Whether nothing is known of the hand, touch included: 100 %, or 0.
@@ -52,7 +52,7 @@ impl Sweep {
     /// All kinds.
     pub const ALL: [Self; 12] = [
         Self::DepthNoise,
-        Self::ColourNoise,
+        Self::ColorNoise,
         Self::Visibility,
         Self::HandPosition,
         Self::HandRotation,
@@ -60,7 +60,7 @@ impl Sweep {
         Self::DeadTaxels,
         Self::FalseTaxels,
         Self::MissingDepth,
-        Self::MissingColour,
+        Self::MissingColor,
         Self::MissingTouch,
         Self::MissingHand,
     ];
@@ -69,7 +69,7 @@ impl Sweep {
     pub fn name(self) -> &'static str {
         match self {
             Self::DepthNoise => "depth-noise",
-            Self::ColourNoise => "colour-noise",
+            Self::ColorNoise => "color-noise",
             Self::Visibility => "visibility",
             Self::HandPosition => "hand-position",
             Self::HandRotation => "hand-rotation",
@@ -77,7 +77,7 @@ impl Sweep {
             Self::DeadTaxels => "dead-taxels",
             Self::FalseTaxels => "false-taxels",
             Self::MissingDepth => "missing-depth",
-            Self::MissingColour => "missing-colour",
+            Self::MissingColor => "missing-color",
             Self::MissingTouch => "missing-touch",
             Self::MissingHand => "missing-hand",
         }
@@ -87,7 +87,7 @@ impl Sweep {
     pub fn axis(self) -> &'static str {
         match self {
             Self::DepthNoise => "depth noise, times a realistic sensor's",
-            Self::ColourNoise => "colour noise, times a realistic sensor's",
+            Self::ColorNoise => "color noise, times a realistic sensor's",
             Self::Visibility => "part of the object that is visible, %",
             Self::HandPosition => "error of the hand's place, mm",
             Self::HandRotation => "error of the hand's orientation, °",
@@ -95,7 +95,7 @@ impl Sweep {
             Self::DeadTaxels => "taxels that feel nothing, %",
             Self::FalseTaxels => "taxels that feel what is not there, %",
             Self::MissingDepth => "image without depth, %",
-            Self::MissingColour => "image without colour, %",
+            Self::MissingColor => "image without color, %",
             Self::MissingTouch => "touch missing, %",
             Self::MissingHand => "hand unknown, %",
         }
@@ -104,14 +104,14 @@ impl Sweep {
     /// The amounts that the study takes; of the first one, nothing is wrong.
     pub fn amounts(self) -> &'static [f64] {
         match self {
-            Self::DepthNoise | Self::ColourNoise => &[1.0, 2.0, 4.0, 8.0],
+            Self::DepthNoise | Self::ColorNoise => &[1.0, 2.0, 4.0, 8.0],
             Self::Visibility => &[100.0, 75.0, 50.0, 25.0, 10.0],
             Self::HandPosition => &[0.0, 2.0, 5.0, 10.0],
             Self::HandRotation | Self::Joints => &[0.0, 1.0, 2.0, 5.0],
             Self::DeadTaxels | Self::FalseTaxels | Self::MissingDepth => {
                 &[0.0, 25.0, 50.0, 75.0, 100.0]
             }
-            Self::MissingColour => &[0.0, 50.0, 100.0],
+            Self::MissingColor => &[0.0, 50.0, 100.0],
             Self::MissingTouch | Self::MissingHand => &[0.0, 100.0],
         }
     }
@@ -126,7 +126,7 @@ impl Sweep {
         let share = 1e-2 * amount;
         match self {
             Self::DepthNoise => noise::depth(&mut observation.depth, amount, random),
-            Self::ColourNoise => noise::colour(&mut observation.color, amount, random),
+            Self::ColorNoise => noise::color(&mut observation.color, amount, random),
             Self::Visibility => occlusion::block(observation, share, random),
             Self::HandPosition => hand::shift(observation, 1e-3 * amount, random),
             Self::HandRotation => hand::turn(observation, amount.to_radians(), random),
@@ -134,7 +134,7 @@ impl Sweep {
             Self::DeadTaxels => touch::silence(observation, share, random),
             Self::FalseTaxels => touch::invent(observation, share, random),
             Self::MissingDepth => missing::depth(&mut observation.depth, share, random),
-            Self::MissingColour => missing::colour(&mut observation.color, share, random),
+            Self::MissingColor => missing::color(&mut observation.color, share, random),
             Self::MissingTouch => {
                 observation.hand.iter_mut().for_each(|hand| hand.forces.clear());
             }
@@ -176,7 +176,7 @@ pub(super) mod tests {
     use nalgebra::{Isometry3, Vector3};
     use prehend_render::{Camera, DepthImage, Mask, RgbImage};
 
-    /// A square object half a metre away in the middle of a small picture, before a wall.
+    /// A square object half a meter away in the middle of a small picture, before a wall.
     pub(in super::super) fn square() -> Observation {
         let (width, height) = (80, 60);
         let inside = |k: usize| (30..50).contains(&(k % width)) && (20..40).contains(&(k / width));
@@ -210,7 +210,7 @@ pub(super) mod tests {
                 sweep.disturb(&mut other, amount, 6);
                 assert!(same(&once, &again), "{sweep} {amount}");
                 assert_eq!(same(&once, &square()), k == 0, "{sweep} {amount}");
-                let all = [Sweep::DeadTaxels, Sweep::MissingDepth, Sweep::MissingColour];
+                let all = [Sweep::DeadTaxels, Sweep::MissingDepth, Sweep::MissingColor];
                 let whole = amount == 100.0 && all.contains(&sweep);
                 let decided = k == 0 || whole || sweep >= Sweep::MissingTouch;
                 assert_eq!(same(&once, &other), decided, "{sweep} {amount}");

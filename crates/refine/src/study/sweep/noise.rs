@@ -5,7 +5,7 @@ use prehend_render::{DepthImage, RgbImage};
 
 use crate::synth::smooth_field;
 
-/// Standard deviations of a realistic depth camera's noise at half a metre, of single pixels and with a correlation \[m\]; both
+/// Standard deviations of a realistic depth camera's noise at half a meter, of single pixels and with a correlation \[m\]; both
 /// grow with the square of the depth.
 const WHITE: f64 = 3e-4;
 const CORRELATED: f64 = 8e-4;
@@ -13,7 +13,7 @@ const CORRELATED: f64 = 8e-4;
 const CORRELATION: f64 = 3.0;
 
 /// Standard deviation of a realistic camera's noise of each channel.
-const COLOUR: f64 = 0.01;
+const COLOR: f64 = 0.01;
 
 /// What has to be added to noise of deviation one to make it `factor` times as much.
 fn added(factor: f64) -> f64 {
@@ -35,9 +35,9 @@ pub(super) fn depth(image: &mut DepthImage, factor: f64, random: &mut SplitMix64
 }
 
 /// As [`depth`].
-pub(super) fn colour(image: &mut RgbImage, factor: f64, random: &mut SplitMix64) {
+pub(super) fn color(image: &mut RgbImage, factor: f64, random: &mut SplitMix64) {
     for channel in image.pixels_mut().iter_mut().flatten() {
-        let error = added(factor) * COLOUR * random.normal();
+        let error = added(factor) * COLOR * random.normal();
         *channel = (f64::from(*channel) + error).clamp(0.0, 1.0) as f32;
     }
 }
@@ -60,9 +60,9 @@ mod tests {
             let found = deviation(image.pixels(), 1.0);
             assert!((found / expected - 1.0).abs() < 0.05, "{found} {expected}");
             let mut image = RgbImage::filled(100, 100, [0.5; 3]);
-            colour(&mut image, factor, &mut random());
+            color(&mut image, factor, &mut random());
             let found = deviation(image.pixels().as_flattened(), 0.5);
-            assert!((found / added(factor) / COLOUR - 1.0).abs() < 0.05, "{found}");
+            assert!((found / added(factor) / COLOR - 1.0).abs() < 0.05, "{found}");
         }
         let mut nothing = DepthImage::filled(64, 40, 0.0);
         depth(&mut nothing, 8.0, &mut random());

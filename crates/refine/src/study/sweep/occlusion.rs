@@ -7,8 +7,8 @@ use crate::Observation;
 /// How far in front of the object the block is \[m\].
 const AHEAD: f64 = 0.03;
 
-/// A grey block with a straight edge in front of the object, from one side, that leaves `visible` of the mask's pixels to be seen:
-/// it is in the depth and the colour image, and the mask knows of it.
+/// A gray block with a straight edge in front of the object, from one side, that leaves `visible` of the mask's pixels to be seen:
+/// it is in the depth and the color image, and the mask knows of it.
 pub(super) fn block(observation: &mut Observation, visible: f64, random: &mut SplitMix64) {
     let width = observation.camera.width;
     let angle = std::f64::consts::TAU * random.unit();

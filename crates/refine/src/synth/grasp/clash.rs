@@ -21,7 +21,7 @@ pub(super) struct Clash {
 struct Link {
     shape: std::sync::Arc<prehend_geometry::robot::LinkShape>,
     points: Vec<Point3<f64>>,
-    centre: Point3<f64>,
+    center: Point3<f64>,
     radius: f64,
 }
 
@@ -44,8 +44,8 @@ impl Clash {
             shape.parts().iter().for_each(|p| mesh.append(p));
             let points = surface_samples(&mesh, SAMPLES, 0).into_iter().map(|s| s.point).collect();
             let (low, high) = grid.bounds();
-            let (centre, radius) = (nalgebra::center(&low, &high), 0.5 * (high - low).norm());
-            bodies.push(Link { shape: shape.clone(), points, centre, radius });
+            let (center, radius) = (nalgebra::center(&low, &high), 0.5 * (high - low).norm());
+            bodies.push(Link { shape: shape.clone(), points, center, radius });
             numbers.push(link);
         }
         let mut pairs = Vec::new();
@@ -74,7 +74,7 @@ impl Pair {
         let [a, b] = self.bodies.map(|i| &bodies[i]);
         let [t_a, t_b] = self.links.map(|l| &poses[l]);
         let t_b_a = t_b.inverse() * t_a;
-        if (t_b_a * a.centre - b.centre).norm() > a.radius + b.radius + reach {
+        if (t_b_a * a.center - b.center).norm() > a.radius + b.radius + reach {
             return false;
         }
         let Some(grid) = b.shape.grid() else { return false };

@@ -170,11 +170,11 @@ fn lever(
     for (link, shape) in robot.shape.links().iter().enumerate() {
         let Some(grid) = shape.grid() else { continue };
         let (low, high) = grid.bounds();
-        let centre: Point3<f64> = poses[link] * nalgebra::center(&low, &high);
+        let center: Point3<f64> = poses[link] * nalgebra::center(&low, &high);
         let own = skeleton.path(link).iter().filter_map(|&j| screws[j]);
         let velocity: Option<Vector3<f64>> = own
             .filter(|s| s.variable == variable)
-            .map(|s| s.velocity(&centre))
+            .map(|s| s.velocity(&center))
             .reduce(|a, b| a + b);
         if let Some(velocity) = velocity {
             sum += velocity.norm();

@@ -246,9 +246,9 @@ impl<'a> Grasper<'a> {
 
     /// How far the object has moved between two poses, unless it has slipped.
     fn moved(&self, from: &Isometry3<f64>, to: &Isometry3<f64>) -> Result<(f64, f64), GraspFault> {
-        let centre: Point3<f64> = *self.setup.body.com();
+        let center: Point3<f64> = *self.setup.body.com();
         let (distance, angle) =
-            ((to * centre - from * centre).norm(), from.rotation.angle_to(&to.rotation));
+            ((to * center - from * center).norm(), from.rotation.angle_to(&to.rotation));
         let stays = distance <= self.settings.slip_distance && angle <= self.settings.slip_angle;
         if stays { Ok((distance, angle)) } else { Err(GraspFault::Slipped { distance, angle }) }
     }

@@ -21,7 +21,7 @@ const NEAR_PALM: f64 = 0.03;
 /// An object as it is placed.
 pub(super) struct Placement {
     probes: Vec<Point3<f64>>,
-    centre: Point3<f64>,
+    center: Point3<f64>,
     /// Axes from the longest to the shortest, in the object's frame.
     axes: UnitQuaternion<f64>,
     half_length: f64,
@@ -45,10 +45,10 @@ impl Placement {
         let column = |k: usize| eigen.eigenvectors.column(order[k]).into_owned();
         let (long, middle) = (column(0), column(1));
         let turn = Matrix3::from_columns(&[long, middle, long.cross(&middle)]);
-        let along = |p: &Point3<f64>| (p - object.centre).dot(&long).abs();
+        let along = |p: &Point3<f64>| (p - object.center).dot(&long).abs();
         Self {
             half_length: probes.iter().map(along).fold(0.0, f64::max),
-            centre: object.centre,
+            center: object.center,
             axes: UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turn)),
             probes,
         }
@@ -110,7 +110,7 @@ impl Placement {
         let at = |height: f64| {
             let middle = long * slide + across;
             let middle = Vector3::new(middle.x, middle.y, height);
-            let shift = middle - t_palm_object * self.centre.coords;
+            let shift = middle - t_palm_object * self.center.coords;
             preshape.t_hand_palm * Isometry3::from_parts(Translation3::from(shift), t_palm_object)
         };
         let hand = robot.posed(&Isometry3::identity(), &joints)?;

@@ -72,13 +72,13 @@ impl Preshape {
         let middle = |l: &(f64, f64)| if bounded(l) { 0.5 * (l.0 + l.1) } else { 0.0 };
         let middle: Vec<f64> = limits.iter().map(middle).collect();
         let skeleton = Skeleton::new(tree);
-        let centres: Vec<Option<Point3<f64>>> = (robot.shape.links().iter())
+        let centers: Vec<Option<Point3<f64>>> = (robot.shape.links().iter())
             .map(|shape| {
                 let (low, high) = shape.grid()?.bounds();
                 Some(nalgebra::center(&low, &high))
             })
             .collect();
-        let solid = || centres.iter().enumerate().filter_map(|(l, c)| Some((l, (*c)?)));
+        let solid = || centers.iter().enumerate().filter_map(|(l, c)| Some((l, (*c)?)));
         let poses = tree.forward_kinematics(&middle);
         // Fingertips: links with a shape that move no other such link.
         let moves = |link: usize, other: usize| {
@@ -89,7 +89,7 @@ impl Preshape {
             .map(|(link, _)| link)
             .filter(|&l| !skeleton.path(l).is_empty() && !solid().any(|(o, _)| moves(l, o)))
             .collect();
-        let tip = |&l: &usize| poses[l] * centres[l].unwrap_or_default();
+        let tip = |&l: &usize| poses[l] * centers[l].unwrap_or_default();
         let sum: Vector3<f64> = tips.iter().map(|l| tip(l).coords).sum();
         let focus = Point3::from(sum / tips.len().max(1) as f64);
 

@@ -11,9 +11,9 @@ pub struct GraspSettings {
     pub stiffness: f64,
     /// Coefficient of friction; skins of rubber have 0.7 to 1.
     pub friction: f64,
-    /// Slip speed that regularises friction \[m/s\]: what is held creeps by a fraction of it.
+    /// Slip speed that regularizes friction \[m/s\]: what is held creeps by a fraction of it.
     pub slip_speed: f64,
-    /// Distance between neighbouring samples of the object's surface \[m\].
+    /// Distance between neighboring samples of the object's surface \[m\].
     pub sample_spacing: f64,
     /// Time step of the simulation \[s\].
     pub time_step: f64,

@@ -140,7 +140,7 @@ impl<'a> Simulation<'a> {
         self.setup.body.model_pose(&self.states[self.object].pose)
     }
 
-    /// Speed of the object's centre of mass \[m/s\] and its angular speed \[rad/s\].
+    /// Speed of the object's center of mass \[m/s\] and its angular speed \[rad/s\].
     pub(super) fn speed(&self) -> (f64, f64) {
         let State { linear, angular, .. } = &self.states[self.object];
         (linear.norm(), angular.norm())

@@ -29,7 +29,7 @@ impl BackgroundSettings {
         Self { distance: 1.4, slope: 0.3, things: 14, pattern: 0.04 }
     }
 
-    /// Colour and depth of a random room without the hand.
+    /// Color and depth of a random room without the hand.
     pub(super) fn draw(&self, camera: &Camera, noise: &mut SplitMix64) -> (RgbImage, DepthImage) {
         let (width, height) = (camera.width, camera.height);
         let mut color = RgbImage::filled(width, height, muted(noise));
@@ -68,15 +68,15 @@ impl BackgroundSettings {
     }
 }
 
-/// A dull colour.
+/// A dull color.
 fn muted(noise: &mut SplitMix64) -> [f32; 3] {
-    let grey = 0.1 + 0.6 * noise.unit();
-    [0; 3].map(|_| (grey + 0.05 * noise.normal()).clamp(0.02, 0.95) as f32)
+    let gray = 0.1 + 0.6 * noise.unit();
+    [0; 3].map(|_| (gray + 0.05 * noise.normal()).clamp(0.02, 0.95) as f32)
 }
 
 /// A rounded box that stands somewhere.
 struct Thing {
-    centre: [f32; 2],
+    center: [f32; 2],
     half: [f32; 2],
     turn: [f32; 2],
     /// Exponent of the outline: 2 an ellipse, more a box.
@@ -88,12 +88,12 @@ struct Thing {
 impl Thing {
     fn random(camera: &Camera, depth: f32, noise: &mut SplitMix64) -> Self {
         let (width, height) = (camera.width as f64, camera.height as f64);
-        let centre = [width * noise.unit(), height * noise.unit()].map(|v| v as f32);
+        let center = [width * noise.unit(), height * noise.unit()].map(|v| v as f32);
         let half = [0; 2].map(|_| (width * (0.03 + 0.12 * noise.unit())) as f32);
         let angle = (std::f64::consts::PI * noise.unit()) as f32;
         let power = if noise.unit() < 0.3 { 2 } else { 8 };
         let color = muted(noise).map(|c| (c + 0.07 * noise.normal() as f32).clamp(0.0, 1.0));
-        Self { centre, half, turn: [angle.cos(), angle.sin()], power, color, depth }
+        Self { center, half, turn: [angle.cos(), angle.sin()], power, color, depth }
     }
 
     fn draw(&self, color: &mut RgbImage, depth: &mut DepthImage) {
@@ -102,9 +102,9 @@ impl Thing {
         let span = |middle: f32, size: usize| {
             (middle - reach).max(0.0) as usize..((middle + reach).max(0.0) as usize).min(size)
         };
-        for y in span(self.centre[1], height) {
-            for x in span(self.centre[0], width) {
-                let (dx, dy) = (x as f32 - self.centre[0], y as f32 - self.centre[1]);
+        for y in span(self.center[1], height) {
+            for x in span(self.center[0], width) {
+                let (dx, dy) = (x as f32 - self.center[0], y as f32 - self.center[1]);
                 let a = (self.turn[0] * dx + self.turn[1] * dy) / self.half[0];
                 let b = (self.turn[0] * dy - self.turn[1] * dx) / self.half[1];
                 let outside = a.powi(self.power) + b.powi(self.power) - 1.0;
@@ -123,7 +123,7 @@ mod tests {
     use crate::synth::sensor::ViewpointSettings;
 
     #[test]
-    fn every_pixel_has_a_colour_and_lies_behind_the_hand() {
+    fn every_pixel_has_a_color_and_lies_behind_the_hand() {
         let camera = ViewpointSettings::preset().camera(320, 240);
         let mut noise = SplitMix64::new(8);
         for settings in [BackgroundSettings::clean(), BackgroundSettings::realistic()] {

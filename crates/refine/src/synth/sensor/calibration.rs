@@ -18,7 +18,7 @@ pub struct CalibrationSettings {
     pub hand_translation: f64,
     /// Turn of the hand in the camera frame, each axis \[deg\].
     pub hand_rotation_deg: f64,
-    /// Joint positions \[deg\], of prismatic joints in thousandths of `joint_deg` metres.
+    /// Joint positions \[deg\], of prismatic joints in thousandths of `joint_deg` meters.
     pub joint_deg: f64,
 }
 

@@ -14,9 +14,9 @@ pub struct DepthSettings {
     pub scale: f64,
     /// Standard deviation of a smooth warp that changes over a third of the image, the same through a grasp \[m\].
     pub warp: f64,
-    /// Standard deviation of noise of single pixels, at half a metre; it grows with the square of the depth \[m\].
+    /// Standard deviation of noise of single pixels, at half a meter; it grows with the square of the depth \[m\].
     pub noise: f64,
-    /// Standard deviation of noise with a correlation over `correlation` pixels, at half a metre \[m\].
+    /// Standard deviation of noise with a correlation over `correlation` pixels, at half a meter \[m\].
     pub correlated_noise: f64,
     /// Reach of the correlated noise \[px\].
     pub correlation: f64,
@@ -197,10 +197,10 @@ pub(super) struct DepthBias {
     warp: Vec<f32>,
 }
 
-/// Neighbours that differ by more lie on different surfaces \[m\].
+/// Neighbors that differ by more lie on different surfaces \[m\].
 const EDGE: f32 = 0.01;
 
-/// The least depth of the pixel and its eight neighbours.
+/// The least depth of the pixel and its eight neighbors.
 fn nearest_around(depth: &DepthImage, x: usize, y: usize) -> f32 {
     let (width, height) = (depth.width(), depth.height());
     let mut least = f32::INFINITY;
@@ -246,7 +246,7 @@ mod tests {
 
     const SIZE: (usize, usize) = (320, 240);
 
-    /// A square at half a metre before a wall at one metre.
+    /// A square at half a meter before a wall at one meter.
     fn step() -> (Camera, DepthImage) {
         let camera = ViewpointSettings::preset().camera(SIZE.0, SIZE.1);
         let mut depth = DepthImage::filled(SIZE.0, SIZE.1, 1.0);

@@ -15,7 +15,7 @@ pub struct LightSettings {
     pub lamps: u32,
     /// Share of the light that comes from everywhere.
     pub ambient_share: f64,
-    /// Standard deviation of a lamp's colour per channel.
+    /// Standard deviation of a lamp's color per channel.
     pub tint: f64,
     /// Strength of the highlights.
     pub gloss: f64,
@@ -89,7 +89,7 @@ struct Lamp {
 const SHININESS: i32 = 24;
 
 impl Lights {
-    /// The colour of a point of unlit colour `albedo`.
+    /// The color of a point of unlit color `albedo`.
     pub(super) fn shade(&self, point: &SurfacePoint<f32>, albedo: [f32; 3]) -> [f32; 3] {
         let normal = point.normal;
         // The ground gives back less light than the sky gives.
@@ -128,16 +128,16 @@ impl Shadow {
     /// Distance of the lamp from the object \[m\], and how deep below what it sees shadows begin.
     const DISTANCE: f64 = 1.2;
     const BIAS: f32 = 4e-3;
-    /// Pixels along each side of the lamp's picture, which spans half a metre.
+    /// Pixels along each side of the lamp's picture, which spans half a meter.
     const PIXELS: usize = 320;
 
     fn new(
         towards: &Vector3<f64>,
-        centre: &Point3<f64>,
+        center: &Point3<f64>,
         bodies: &[(&RenderModel, Isometry3<f64>)],
     ) -> Self {
         let up = Vector3::new(0.3, -1.0, 0.1);
-        let t_lamp_cam = look_at(&(centre + towards * Self::DISTANCE), centre, &up, 0.0);
+        let t_lamp_cam = look_at(&(center + towards * Self::DISTANCE), center, &up, 0.0);
         let focal = Self::PIXELS as f64 * Self::DISTANCE / 0.5;
         let (middle, size) = (0.5 * (Self::PIXELS as f64 - 1.0), Self::PIXELS);
         let camera =

@@ -45,7 +45,7 @@ impl MaskSettings {
         let outside = distance_to(visible, true, reach);
         let inside = distance_to(visible, false, reach);
         for (i, set) in mask.pixels_mut().iter_mut().enumerate() {
-            // The outline runs half a pixel from the centres beside it.
+            // The outline runs half a pixel from the centers beside it.
             let signed = if *set { 0.5 - inside[i] } else { outside[i] - 0.5 };
             let mut border = self.wobble as f32 * wobble[i];
             if hand.pixels()[i] && leaks[i] > limit {
@@ -57,7 +57,7 @@ impl MaskSettings {
     }
 }
 
-/// Distance of each pixel's centre from that of the nearest one whose value is `value` \[px\], `reach` + 1 where there is
+/// Distance of each pixel's center from that of the nearest one whose value is `value` \[px\], `reach` + 1 where there is
 /// none within `reach` columns and rows. Exact: rows first, then columns (Saito and Toriwaki, 1994).
 fn distance_to(mask: &Mask, value: bool, reach: usize) -> Vec<f32> {
     let (width, height) = (mask.width(), mask.height());

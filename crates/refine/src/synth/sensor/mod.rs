@@ -2,7 +2,7 @@
 
 mod background;
 mod calibration;
-mod colour;
+mod color;
 mod deformation;
 mod depth;
 mod field;
@@ -15,7 +15,7 @@ mod viewpoint;
 
 pub use background::BackgroundSettings;
 pub use calibration::CalibrationSettings;
-pub use colour::ColourSettings;
+pub use color::ColorSettings;
 pub use deformation::ModelSettings;
 pub use depth::DepthSettings;
 pub(crate) use field::smooth_field;

@@ -90,7 +90,7 @@ impl<'a> Rig<'a> {
         };
         let told = Observation {
             camera: self.errors.camera(&self.camera),
-            color: self.settings.colour.expose(&color, noise),
+            color: self.settings.color.expose(&color, noise),
             depth: self.settings.depth.measure(&depth, &self.camera, &self.depth, noise),
             mask: self.settings.mask.segment(&visible, &hand, noise),
             gravity: Some(gravity),
@@ -100,7 +100,7 @@ impl<'a> Rig<'a> {
         Shot { told, truth, hand: (t_cam_hand, moment.joints.clone()), whole, visible }
     }
 
-    /// Light, colour and depth without the camera's faults; the first of `bodies` is the object.
+    /// Light, color and depth without the camera's faults; the first of `bodies` is the object.
     fn look(
         &self,
         bodies: &[(&RenderModel, Isometry3<f64>)],
@@ -142,13 +142,13 @@ struct Seen {
     hand: Mask,
 }
 
-/// Colours of the hand's parts.
+/// Colors of the hand's parts.
 struct Paint {
     tones: [[f32; 3]; 3],
 }
 
 impl Paint {
-    /// Black anodised metal, grey plastic and black rubber, each a little different every time.
+    /// Black anodized metal, gray plastic and black rubber, each a little different every time.
     fn random(noise: &mut SplitMix64) -> Self {
         let tones = [[0.21, 0.22, 0.24], [0.42, 0.43, 0.44], [0.14, 0.14, 0.15]].map(|tone| {
             let lighter = 0.8 + 0.5 * noise.unit() as f32;

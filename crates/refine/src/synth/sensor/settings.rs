@@ -5,7 +5,7 @@ use serde_json::Value;
 use thiserror::Error;
 
 use super::{
-    BackgroundSettings, CalibrationSettings, ColourSettings, DepthSettings, LightSettings,
+    BackgroundSettings, CalibrationSettings, ColorSettings, DepthSettings, LightSettings,
     MaskSettings, ModelSettings, TouchSettings, ViewpointSettings,
 };
 
@@ -30,8 +30,8 @@ pub struct SensorSettings {
     pub light: LightSettings,
     /// What is behind the hand.
     pub background: BackgroundSettings,
-    /// The colour images.
-    pub colour: ColourSettings,
+    /// The color images.
+    pub color: ColorSettings,
     /// The depth images.
     pub depth: DepthSettings,
     /// The masks.
@@ -68,13 +68,13 @@ pub enum SettingError {
 }
 
 impl SensorSettings {
-    /// Little noise in colour and depth; exact calibration and model.
+    /// Little noise in color and depth; exact calibration and model.
     pub fn clean() -> Self {
         Self {
             viewpoint: ViewpointSettings::preset(),
             light: LightSettings::clean(),
             background: BackgroundSettings::clean(),
-            colour: ColourSettings::clean(),
+            color: ColorSettings::clean(),
             depth: DepthSettings::clean(),
             mask: MaskSettings::clean(),
             touch: TouchSettings::clean(),
@@ -89,7 +89,7 @@ impl SensorSettings {
             viewpoint: ViewpointSettings::preset(),
             light: LightSettings::realistic(),
             background: BackgroundSettings::realistic(),
-            colour: ColourSettings::realistic(),
+            color: ColorSettings::realistic(),
             depth: DepthSettings::realistic(),
             mask: MaskSettings::realistic(),
             touch: TouchSettings::realistic(),
@@ -177,7 +177,7 @@ mod tests {
             ("depth.noise", "nan", "finite"),
             ("depth.hole_share", "1.5", "a share between 0 and 1"),
             ("light.lamps", "1.5", "a whole number"),
-            ("colour.jpeg_quality", "300", "within the setting's range"),
+            ("color.jpeg_quality", "300", "within the setting's range"),
         ] {
             let error = settings.set(key, value).unwrap_err().to_string();
             assert!(error.contains(said), "{key}={value}: {error}");

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ViewpointSettings {
-    /// Nearest distance from the object's centre \[m\].
+    /// Nearest distance from the object's center \[m\].
     pub nearest: f64,
     /// Farthest distance \[m\].
     pub farthest: f64,
@@ -52,11 +52,11 @@ impl ViewpointSettings {
         noise: &mut SplitMix64,
     ) -> Isometry3<f64> {
         let Some((object, t_hand_object)) = bodies.first() else { return Isometry3::identity() };
-        let centre = t_hand_object * object.center();
+        let center = t_hand_object * object.center();
         let coarse = camera.scaled(COARSE_WIDTH / camera.width as f64);
         let mut best: Option<(f64, Isometry3<f64>)> = None;
         for _ in 0..TRIES {
-            let candidate = self.candidate(&centre, gravity, noise);
+            let candidate = self.candidate(&center, gravity, noise);
             let seen = visible_share(&coarse, bodies, &candidate);
             if seen >= 1.0 - self.hidden_share {
                 return candidate;
@@ -70,12 +70,12 @@ impl ViewpointSettings {
 
     fn candidate(
         &self,
-        centre: &Point3<f64>,
+        center: &Point3<f64>,
         gravity: &Vector3<f64>,
         noise: &mut SplitMix64,
     ) -> Isometry3<f64> {
         let mut spread = |scale: f64| Vector3::from_fn(|_, _| scale * noise.normal());
-        let (towards, aim) = (spread(1.0), centre + spread(self.aim));
+        let (towards, aim) = (spread(1.0), center + spread(self.aim));
         let distance = self.nearest + (self.farthest - self.nearest) * noise.unit();
         let away = towards.try_normalize(1e-9).unwrap_or_else(Vector3::x);
         let roll = (self.roll_deg * noise.normal()).to_radians();

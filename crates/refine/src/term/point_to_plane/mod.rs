@@ -26,9 +26,9 @@ pub struct PointToPlaneSettings {
     pub sigma: f64,
     /// Distance at which a point counts as an outlier \[m\].
     pub outlier: f64,
-    /// How many independent measurements the points amount to at most: errors of neighbours are alike.
+    /// How many independent measurements the points amount to at most: errors of neighbors are alike.
     pub effective_points: f64,
-    /// Standard deviation of the smooth field by which neighbouring points are off alike, as a depth camera and, unless it is
+    /// Standard deviation of the smooth field by which neighboring points are off alike, as a depth camera and, unless it is
     /// let off patch by patch, the model of the object are; zero if there is none \[m\].
     pub deviation: f64,
     /// Distance over which that field changes \[m\].
@@ -192,7 +192,7 @@ impl PointToPlaneTerm {
         self.share() * fit.left.iter().map(|left| cauchy.loss(left * left)).sum::<f64>() + fit.cost
     }
 
-    /// Nats of one square metre.
+    /// Nats of one square meter.
     fn share(&self) -> f64 {
         share(self.settings.effective_points, self.points.len() as f64, self.settings.sigma)
     }
@@ -200,7 +200,7 @@ impl PointToPlaneTerm {
 
 /// Whether the pixels at this distance around (x, y), in eight directions, are in the mask or outside the image.
 fn within(mask: &Mask, [x, y]: [usize; 2], distance: usize) -> bool {
-    let at = |centre: usize, step: usize| (centre + step * distance).checked_sub(distance);
+    let at = |center: usize, step: usize| (center + step * distance).checked_sub(distance);
     let steps = (0..3).flat_map(|i| (0..3).map(move |j| (i, j)));
     steps.into_iter().all(|(i, j)| match (at(x, i), at(y, j)) {
         (Some(x), Some(y)) => mask.get(x, y).unwrap_or(true),
@@ -221,14 +221,14 @@ impl Term for PointToPlaneTerm {
         true
     }
 
-    fn linearise(&self, state: &State, normal: &mut Normal) -> f64 {
+    fn linearize(&self, state: &State, normal: &mut Normal) -> f64 {
         let residuals = self.residuals(state);
         let fit = self.fit(&residuals);
-        let centre = state.centre();
+        let center = state.center();
         let row = |(point, residual): (&Point, &Option<Residual>)| {
             let mut row = [0.0; N];
             let Some(Residual { surface, away, .. }) = residual else { return row };
-            let turn = (surface - centre).cross(away);
+            let turn = (surface - center).cross(away);
             let camera = state.camera.point_jacobian(&point.ray, point.depth).tr_mul(away);
             for k in 0..3 {
                 (row[k], row[3 + k]) = (-away[k], -turn[k]);

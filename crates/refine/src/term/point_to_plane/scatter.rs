@@ -17,7 +17,7 @@ pub struct Scatter {
     pub effective_points: f64,
 }
 
-/// Patches that the mask's bounding box is cut into, about, to judge how alike the errors of neighbours are.
+/// Patches that the mask's bounding box is cut into, about, to judge how alike the errors of neighbors are.
 const PATCHES: f64 = 36.0;
 
 /// Points and patches by which scatter can be judged.

@@ -14,7 +14,7 @@ const ROUNDS: usize = 3;
 /// A Gaussian process over space, with covariance τ² exp(−d²/2ℓ²) at distance d, through a few places that describe all others
 /// (Quiñonero-Candela and Rasmussen, 2005).
 ///
-/// It is what the errors of a depth camera have in common, and of an object's model where nothing else accounts for that: neighbours are off
+/// It is what the errors of a depth camera have in common, and of an object's model where nothing else accounts for that: neighbors are off
 /// alike.
 pub(super) struct SmoothField {
     /// A column for each place \[m\]: the field there is its product with coefficients, which are independent and of unit variance.
@@ -154,7 +154,7 @@ mod tests {
         let kept = j.tr_mul(&j) * weight - lost;
         let expected = j.tr_mul(&(inverse * &j));
         assert!((kept - &expected).amax() < 1e-9 * expected.amax());
-        // Neighbours are off nearly alike, those far apart are not.
+        // Neighbors are off nearly alike, those far apart are not.
         let alike = |i: usize, j: usize| covariance[(i, j)] / 1e-6;
         assert!(
             (alike(10, 11) - (-0.5f64 * (places[10] - places[11]).norm_squared() / 4e-4).exp())

@@ -37,11 +37,11 @@ struct Touched {
     force: f64,
 }
 
-/// Where the skin of `robot` feels `forces` \[N\] above `least`: one probe for each group of neighbours, at their centre of
+/// Where the skin of `robot` feels `forces` \[N\] above `least`: one probe for each group of neighbors, at their center of
 /// force, on the skin.
 ///
 /// A contact presses on all taxels around it, which lie beneath the skin and to its sides, each at a distance of its own from what
-/// touches. Their centre of force is where it does.
+/// touches. Their center of force is where it does.
 pub(super) fn contacts(
     robot: &Robot,
     links: &[usize],
@@ -60,11 +60,11 @@ pub(super) fn contacts(
         .map(|group| {
             let force: f64 = group.iter().map(|t| t.force).sum();
             let sum = |sum: Vector3<f64>, t: &Touched| sum + t.position.coords * t.force;
-            let centre = Point3::from(group.iter().fold(Vector3::zeros(), sum) / force);
+            let center = Point3::from(group.iter().fold(Vector3::zeros(), sum) / force);
             let trust = 1.0 / (1.0 + (settings.force / force).powi(2));
             Probe {
                 link: group[0].link,
-                position: on_skin(robot, group[0].link, centre),
+                position: on_skin(robot, group[0].link, center),
                 touched: true,
                 weight: trust / settings.sigma.powi(2),
                 outlier: settings.outlier,
@@ -133,7 +133,7 @@ mod tests {
         }
         let [contact] = &found(scene, &forces)[..] else { panic!("not one contact") };
         let lifted = contact.position - middle;
-        // On the skin above: taxels of flat pads lie less than a millimetre beneath it.
+        // On the skin above: taxels of flat pads lie less than a millimeter beneath it.
         assert!(lifted.coords.dot(&corner.normal) > 2e-4 && lifted.coords.norm() < 1e-3);
         assert!(lifted.coords.cross(&corner.normal).norm() < 1e-4, "{lifted}");
         // Four newtons count four fifths with half at two.

@@ -21,14 +21,14 @@ pub enum Felt {
     /// Each that it is near the surface, as in the paper.
     Taxels {
         /// Standard deviation of a touched taxel from the object's surface \[m\]: a contact spreads over
-        /// the taxels around it, so a touched taxel may itself be a few millimetres away.
+        /// the taxels around it, so a touched taxel may itself be a few millimeters away.
         sigma: f64,
         /// How many independent measurements they amount to at most: one contact lights up a whole patch.
         effective: f64,
         /// Distance at which one counts as an outlier (a false one) \[m\].
         outlier: f64,
     },
-    /// Neighbours together that the skin touches the surface at their centre of force.
+    /// Neighbors together that the skin touches the surface at their center of force.
     Contacts(ContactSettings),
 }
 
@@ -76,7 +76,7 @@ struct Probe {
     position: Point3<f64>,
     /// Whether it is on the surface; else it is not inside.
     touched: bool,
-    /// Nats of half a square metre.
+    /// Nats of half a square meter.
     weight: f64,
     /// Distance at which it counts as an outlier \[m\].
     outlier: f64,
@@ -130,7 +130,7 @@ impl TactileTerm {
             let point = hand.posed().t_world_links()[probe.link] * probe.position;
             let local = t_object_cam * point;
             // Far outside everything a quiet taxel says nothing, and no exact distance is needed.
-            if !probe.touched && (local - self.object.centre).norm() > reach {
+            if !probe.touched && (local - self.object.center).norm() > reach {
                 continue;
             }
             let (distance, closest) = self.object.surface.signed_distance(&local);
@@ -206,15 +206,15 @@ impl Term for TactileTerm {
         value
     }
 
-    fn linearise(&self, state: &State, normal: &mut Normal) -> f64 {
-        let centre = state.centre();
+    fn linearize(&self, state: &State, normal: &mut Normal) -> f64 {
+        let center = state.center();
         let mut value = 0.0;
         let mut joints = vec![0.0; state.joints.len()];
         self.residuals(state, |hand, probe, r| {
             let squared = r.distance.powi(2);
             value += probe.weight * probe.cauchy().loss(squared);
             let n = r.gradient;
-            let turn = (r.point.coords - centre).cross(&n);
+            let turn = (r.point.coords - center).cross(&n);
             // Only where the taxels are relative to the object matters: moving the object by a twist is
             // moving the hand by its opposite.
             let of_hand = Vector6::new(n.x, n.y, n.z, turn.x, turn.y, turn.z);

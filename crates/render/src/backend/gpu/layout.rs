@@ -7,7 +7,7 @@ use bytemuck::{Pod, Zeroable};
 /// Most levels of a texture's pyramid: enough for 8 million texels a side.
 pub(super) const LEVELS: usize = 24;
 
-/// How the unlit colours are stored.
+/// How the unlit colors are stored.
 pub(super) const ALBEDO_UNIFORM: u32 = 0;
 pub(super) const ALBEDO_CORNERS: u32 = 1;
 pub(super) const ALBEDO_TEXTURE: u32 = 2;
@@ -39,7 +39,7 @@ pub(super) const SUM_MISSED: usize = 33;
 pub(super) const SUM_WITH_DEPTH: usize = 34;
 pub(super) const SUM_COLUMNS: usize = 35;
 
-/// Colour, coverage, depth, normal and face plus one of a pixel of a picture.
+/// Color, coverage, depth, normal and face plus one of a pixel of a picture.
 pub(super) const PICTURE_COLUMNS: usize = 9;
 
 #[repr(C)]

@@ -18,7 +18,7 @@ use super::work::{self, BUDGET, Capacity, Work};
 use crate::backend::{BackendError, Hypothesis, PoseProblem, Session};
 use crate::image::{DepthImage, RgbImage};
 use crate::mode::Mode;
-use crate::pose_loss::{Counts, Linearised, Loss, PoseImage, unpacked};
+use crate::pose_loss::{Counts, Linearized, Loss, PoseImage, unpacked};
 
 /// How long a call back may take once the device is done.
 const PATIENCE: Duration = Duration::from_secs(1);
@@ -255,13 +255,13 @@ impl GpuSession {
         Loss::new(shares, counts, &self.problem.target)
     }
 
-    fn linearised(&self, sums: &[f32]) -> Linearised {
+    fn linearized(&self, sums: &[f32]) -> Linearized {
         // In the order of the processor's own sums.
         const { assert!(SUM_JTJ == SUM_GRADIENT + 6) };
         let entries = std::array::from_fn(|i| f64::from(sums[SUM_GRADIENT + i]));
-        let (right, jtj) = unpacked(&entries, self.problem.target.normalisation);
+        let (right, jtj) = unpacked(&entries, self.problem.target.normalization);
         let gradient = right * 2.0;
-        Linearised { loss: self.loss(sums), gradient, jtj, affine: None }
+        Linearized { loss: self.loss(sums), gradient, jtj, affine: None }
     }
 }
 
@@ -275,9 +275,9 @@ impl Session for GpuSession {
         Ok(sums.chunks_exact(SUM_COLUMNS).map(|s| self.loss(s)).collect())
     }
 
-    fn linearise(&mut self, hypotheses: &[Hypothesis]) -> Result<Vec<Linearised>, BackendError> {
+    fn linearize(&mut self, hypotheses: &[Hypothesis]) -> Result<Vec<Linearized>, BackendError> {
         let sums = self.sums(hypotheses, Wanted::Derivatives)?;
-        Ok(sums.chunks_exact(SUM_COLUMNS).map(|s| self.linearised(s)).collect())
+        Ok(sums.chunks_exact(SUM_COLUMNS).map(|s| self.linearized(s)).collect())
     }
 
     fn render(&mut self, hypothesis: &Hypothesis) -> Result<PoseImage, BackendError> {

@@ -18,7 +18,7 @@ use crate::model::RenderModel;
 use crate::pose_loss::tests::{
     Noise, camera, full_options, lamp, pose, target_of, textured_box, twisted,
 };
-use crate::pose_loss::{Linearised, LossOptions, PoseLoss, Robust};
+use crate::pose_loss::{Linearized, LossOptions, PoseLoss, Robust};
 use crate::raster::depth_map;
 use crate::shapes_for_tests::{lump, painted, torus};
 
@@ -133,7 +133,7 @@ fn grazing_surfaces_agree_with_the_processor() {
         let turn = along * UnitQuaternion::from_scaled_axis(Vector3::x() * sine.acos());
         let t_cam_object = Isometry3::from_parts((ray * 0.4).into(), turn);
         let h = [Hypothesis { t_cam_object, light }];
-        let (c, g) = (problem.linearise(&h).unwrap()[0], session.linearise(&h).unwrap()[0]);
+        let (c, g) = (problem.linearize(&h).unwrap()[0], session.linearize(&h).unwrap()[0]);
         assert!(c.loss.counts.covered > 0, "{sine}");
         assert_eq!(c.loss.counts, g.loss.counts);
         println!("sine {sine}: loss, gradient, JtJ {:?}", errors(&c, &g));
@@ -152,10 +152,10 @@ fn error(a: impl Iterator<Item = f64>, b: impl Iterator<Item = f64>) -> f64 {
 }
 
 /// Relative errors of the loss, the gradient and JᵀJ, with rotations scaled to lengths at 4 cm.
-fn errors(cpu: &Linearised, gpu: &Linearised) -> [f64; 3] {
+fn errors(cpu: &Linearized, gpu: &Linearized) -> [f64; 3] {
     let s = Vector6::new(1.0, 1.0, 1.0, 25.0, 25.0, 25.0);
-    let gradient = |l: &Linearised| l.gradient.component_mul(&s);
-    let jtj = |l: &Linearised| l.jtj.component_mul(&(s * s.transpose()));
+    let gradient = |l: &Linearized| l.gradient.component_mul(&s);
+    let jtj = |l: &Linearized| l.jtj.component_mul(&(s * s.transpose()));
     [
         error([cpu.loss.total].into_iter(), [gpu.loss.total].into_iter()),
         error(gradient(cpu).iter().copied(), gradient(gpu).iter().copied()),
@@ -249,8 +249,8 @@ fn agree(test: &str, cases: Vec<Case>) {
             problem.target = Arc::new(target);
         }
         let mut session = gpu.prepare(&problem).unwrap();
-        let cpu = problem.linearise(&hypotheses).unwrap();
-        let gpu = session.linearise(&hypotheses).unwrap();
+        let cpu = problem.linearize(&hypotheses).unwrap();
+        let gpu = session.linearize(&hypotheses).unwrap();
         let mut worst = [0.0f64; 3];
         for (c, g) in cpu.iter().zip(&gpu) {
             let errors = errors(c, g);
@@ -261,8 +261,8 @@ fn agree(test: &str, cases: Vec<Case>) {
         assert!(worst_image < 1e-4 && worst.iter().all(|e| *e < 1e-4), "{name}");
         // Without derivatives the losses are the same.
         let values = session.evaluate(&hypotheses).unwrap();
-        for (value, linearised) in values.iter().zip(&gpu) {
-            let difference = (value.total - linearised.loss.total).abs();
+        for (value, linearized) in values.iter().zip(&gpu) {
+            let difference = (value.total - linearized.loss.total).abs();
             assert!(difference <= 1e-6 * value.total, "{name}");
         }
     }
@@ -286,7 +286,7 @@ fn what_cannot_be_seen_misses_the_whole_mask() {
         poses.iter().map(|p| Hypothesis { t_cam_object: *p, light: lamp() }).collect();
     all.insert(2, hypotheses[0]);
     let mut session = gpu.prepare(&problem).unwrap();
-    let (cpu, gpu) = (problem.linearise(&all).unwrap(), session.linearise(&all).unwrap());
+    let (cpu, gpu) = (problem.linearize(&all).unwrap(), session.linearize(&all).unwrap());
     for (i, (c, g)) in cpu.iter().zip(&gpu).enumerate() {
         assert_eq!(c.loss.counts, g.loss.counts, "{i}");
         assert!(errors(c, g).iter().all(|e| *e < 1e-4), "{i}: {c:?} {g:?}");
@@ -297,11 +297,11 @@ fn what_cannot_be_seen_misses_the_whole_mask() {
     // The camera inside the object, and in its surface: whatever is seen, everything stays finite.
     let inside = [0.0, 0.03, 0.046, 0.06]
         .map(|z| Hypothesis { t_cam_object: Isometry3::translation(0.0, 0.0, z), light: lamp() });
-    for at in session.linearise(&inside).unwrap() {
+    for at in session.linearize(&inside).unwrap() {
         assert!(at.loss.total.is_finite() && at.gradient.iter().all(|v| v.is_finite()));
         assert!(at.jtj.iter().all(|v| v.is_finite()));
     }
-    assert_eq!(session.linearise(&[]).unwrap(), []);
+    assert_eq!(session.linearize(&[]).unwrap(), []);
 }
 
 #[test]
@@ -312,15 +312,15 @@ fn results_repeat_to_the_bit_whatever_the_batch() {
     let Case { problem, hypotheses, .. } =
         case("torus", &mesh, lamp(), contour(1.0), full, Vector3::zeros(), 70);
     let mut session = gpu.prepare(&problem).unwrap();
-    let all = session.linearise(&hypotheses).unwrap();
-    assert_eq!(session.linearise(&hypotheses).unwrap(), all);
+    let all = session.linearize(&hypotheses).unwrap();
+    assert_eq!(session.linearize(&hypotheses).unwrap(), all);
     for (i, h) in hypotheses.iter().enumerate().step_by(23) {
-        assert_eq!(session.linearise(std::slice::from_ref(h)).unwrap()[0], all[i], "{i}");
+        assert_eq!(session.linearize(std::slice::from_ref(h)).unwrap()[0], all[i], "{i}");
     }
-    assert_eq!(session.linearise(&hypotheses[3..50]).unwrap(), all[3..50]);
+    assert_eq!(session.linearize(&hypotheses[3..50]).unwrap(), all[3..50]);
     let mut cpu = problem.clone();
     let worst =
-        cpu.linearise(&hypotheses).unwrap().iter().zip(&all).fold([0.0f64; 3], |w, (c, g)| {
+        cpu.linearize(&hypotheses).unwrap().iter().zip(&all).fold([0.0f64; 3], |w, (c, g)| {
             let e = errors(c, g);
             std::array::from_fn(|i| w[i].max(e[i]))
         });
@@ -335,15 +335,15 @@ fn buffers_that_are_too_small_grow_and_large_batches_are_split() {
     let mesh = painted(torus(0.04, 0.015, 30), 0.05);
     let Case { problem, hypotheses, .. } =
         case("torus", &mesh, lamp(), contour(1.0), full_options(), Vector3::zeros(), 9);
-    let expected = gpu.prepare(&problem).unwrap().linearise(&hypotheses).unwrap();
+    let expected = gpu.prepare(&problem).unwrap().linearize(&hypotheses).unwrap();
     let mut session = GpuSession::new(gpu.device.clone(), &problem).unwrap();
     session.capacity = Capacity { entries: 1, segments: 1, pieces: 1 };
-    let grown = session.linearise(&hypotheses).unwrap();
+    let grown = session.linearize(&hypotheses).unwrap();
     assert_eq!(grown, expected);
     assert!(session.capacity.segments > 50 && session.capacity.pieces > 50);
     // Enough for two hypotheses at a time.
     session.budget = 3_000_000;
-    assert_eq!(session.linearise(&hypotheses).unwrap(), expected);
+    assert_eq!(session.linearize(&hypotheses).unwrap(), expected);
     session.capacity = Capacity { entries: 1, segments: 1, pieces: 1 };
     let picture = session.render(&hypotheses[0]).unwrap();
     assert_eq!(picture, gpu.prepare(&problem).unwrap().render(&hypotheses[0]).unwrap());
@@ -352,7 +352,7 @@ fn buffers_that_are_too_small_grow_and_large_batches_are_split() {
     assert!(matches!(session.evaluate(&hypotheses), Err(BackendError::TooLarge { .. })));
     // A picture's needs do not depend on the sums' being there first.
     session.budget = 1 << 30;
-    assert_eq!(session.linearise(&hypotheses).unwrap(), expected);
+    assert_eq!(session.linearize(&hypotheses).unwrap(), expected);
 }
 
 #[test]
@@ -365,13 +365,13 @@ fn a_lost_device_is_an_error_and_the_processor_takes_over() {
     let Case { mut problem, hypotheses, .. } = cases().remove(0);
     let mut bare = gpu.prepare(&problem).unwrap();
     let mut safe = WithFallback(gpu.clone()).prepare(&problem).unwrap();
-    let (expected, ours) = (problem.linearise(&hypotheses).unwrap(), safe.linearise(&hypotheses));
+    let (expected, ours) = (problem.linearize(&hypotheses).unwrap(), safe.linearize(&hypotheses));
     assert!(ours.unwrap().iter().zip(&expected).all(|(g, c)| errors(c, g)[1] < 1e-4));
-    bare.linearise(&hypotheses).unwrap();
+    bare.linearize(&hypotheses).unwrap();
     gpu.device.device.destroy();
-    let lost = bare.linearise(&hypotheses);
+    let lost = bare.linearize(&hypotheses);
     assert!(matches!(lost, Err(BackendError::Device { .. })), "{lost:?}");
-    assert_eq!(safe.linearise(&hypotheses).unwrap(), expected);
+    assert_eq!(safe.linearize(&hypotheses).unwrap(), expected);
     assert_eq!(safe.render(&hypotheses[0]).unwrap(), problem.render(&hypotheses[0]).unwrap());
     assert!(matches!(gpu.prepare(&problem), Err(BackendError::Device { .. })));
 }

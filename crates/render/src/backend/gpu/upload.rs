@@ -25,7 +25,7 @@ pub(super) fn faces(model: &RenderModel) -> Vec<[u32; 4]> {
     model.faces.iter().map(|&[a, b, c]| [a, b, c, 0]).collect()
 }
 
-/// Normal and colour or texture coordinates of each corner, three a face.
+/// Normal and color or texture coordinates of each corner, three a face.
 pub(super) fn corners(model: &RenderModel) -> Vec<Corner> {
     let paint = |face: usize, k: usize| match &model.albedo {
         Albedo::Uniform(_) => [0.0; 3],

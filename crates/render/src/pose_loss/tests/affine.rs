@@ -1,4 +1,4 @@
-//! The loss minimised over a correction of the colours.
+//! The loss minimized over a correction of the colors.
 
 use super::*;
 
@@ -32,11 +32,11 @@ fn the_correction_is_the_best_and_makes_a_light() {
     let center = guess * model.center();
     let free = PoseLoss::new(Mode::default(), LossOptions { affine: true, ..full_options() });
     let fixed = PoseLoss::new(Mode::default(), full_options());
-    let at = free.linearise(&model, &guess, &center, &lamp(), &target);
+    let at = free.linearize(&model, &guess, &center, &lamp(), &target);
     assert_eq!(free.evaluate(&model, &guess, &lamp(), &target), at.loss);
     let affine = at.affine.unwrap();
     let under = |affine: &Affine| {
-        fixed.linearise(&model, &guess, &center, &lamp().corrected(affine), &target)
+        fixed.linearize(&model, &guess, &center, &lamp().corrected(affine), &target)
     };
     let corrected = under(&affine);
     assert!((corrected.loss.total - at.loss.total).abs() < 1e-6 * at.loss.total);
@@ -68,11 +68,11 @@ fn bright_does_not_become_dark() {
     let free = PoseLoss::new(Mode::default(), LossOptions { affine: true, ..full_options() });
     let fixed = PoseLoss::new(Mode::default(), full_options());
     let center = guess * model.center();
-    let at = free.linearise(&model, &guess, &center, &lamp(), &negative);
+    let at = free.linearize(&model, &guess, &center, &lamp(), &negative);
     let affine = at.affine.unwrap();
     assert_eq!(affine.gain, [0.0; 3]);
     let light = lamp().corrected(&affine);
-    let corrected = fixed.linearise(&model, &guess, &center, &light, &negative);
+    let corrected = fixed.linearize(&model, &guess, &center, &light, &negative);
     assert!((corrected.loss.total - at.loss.total).abs() < 1e-6 * at.loss.total);
     assert!(at.jtj.symmetric_eigenvalues().min() > -1e-9 * at.jtj.norm());
     let (cosine, error) = compare_gradient(&free, &model, &guess, &lamp(), &negative);
@@ -84,7 +84,7 @@ fn with_nothing_to_correct_nothing_is() {
     let (model, _, target) = problem(64);
     let loss = PoseLoss::new(Mode::default(), LossOptions { affine: true, ..full_options() });
     let away = Isometry3::translation(9.0, 0.0, 0.4);
-    let at = loss.linearise(&model, &away, &Point3::origin(), &lamp(), &target);
+    let at = loss.linearize(&model, &away, &Point3::origin(), &lamp(), &target);
     assert_eq!(at.affine, Some(Affine::default()));
     assert_eq!((at.gradient, at.jtj), (Vector6::zeros(), Matrix6::zeros()));
 }

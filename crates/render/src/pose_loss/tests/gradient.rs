@@ -33,7 +33,7 @@ fn gradients_match_differences_of_the_value() {
 
 #[test]
 fn creases_that_blend_have_derivatives() {
-    // The light jumps at every edge of the boxes, and so do the colours of one.
+    // The light jumps at every edge of the boxes, and so do the colors of one.
     let mut colored = cuboid(Vector3::new(0.06, 0.08, 0.1));
     let color = |i: usize| [0.3 + 0.1 * (i % 5) as f32, 0.9 - 0.2 * (i % 4) as f32, 0.5];
     colored.colors = Some((0..colored.vertices.len()).map(color).collect());
@@ -92,7 +92,7 @@ fn contours_inside_the_object_have_derivatives() {
     }
 }
 
-/// A sheet that reaches beyond the image on all sides, with a colour that changes evenly across it.
+/// A sheet that reaches beyond the image on all sides, with a color that changes evenly across it.
 #[test]
 fn slopes_go_on_over_the_border_of_the_image() {
     let corner = |x: f64, y: f64| Point3::new(x, y, 0.0);
@@ -112,7 +112,7 @@ fn slopes_go_on_over_the_border_of_the_image() {
         for samples in [1, 2, 4] {
             let loss = PoseLoss::new(contour(0.645), LossOptions::default()).with_samples(samples);
             let light = Light::ambient(1.0);
-            let at = loss.linearise(&model, &pose, &center, &light, &target);
+            let at = loss.linearize(&model, &pose, &center, &light, &target);
             let value = |s: f64| {
                 let pose = twisted(&pose, &center, &unit(0, s));
                 loss.evaluate(&model, &pose, &light, &target).total

@@ -108,7 +108,7 @@ fn compare_gradient(
     target: &Target,
 ) -> (f64, f64) {
     let center = pose * model.center();
-    let at = loss.linearise(model, pose, &center, light, target);
+    let at = loss.linearize(model, pose, &center, light, target);
     let scale = Vector6::new(1.0, 1.0, 1.0, 25.0, 25.0, 25.0);
     let difference = Vector6::from_fn(|axis, _| {
         let step = if axis < 3 { 4e-5 } else { 1e-3 };
@@ -139,7 +139,7 @@ pub(crate) fn full_options() -> LossOptions {
 }
 
 #[test]
-fn evaluate_is_the_value_of_linearise_and_zero_at_the_truth() {
+fn evaluate_is_the_value_of_linearize_and_zero_at_the_truth() {
     let model = RenderModel::new(&painted(lump(0.045, 60), 0.05)).unwrap();
     let truth = pose(&mut Noise(5));
     let target = target_of(&model, &truth, &lamp(), None, 0.5);
@@ -147,8 +147,8 @@ fn evaluate_is_the_value_of_linearise_and_zero_at_the_truth() {
     let guess =
         twisted(&truth, &(truth * model.center()), &[0.002, -0.003, 0.004, 0.02, 0.05, -0.04]);
     let value = loss.evaluate(&model, &guess, &lamp(), &target);
-    let linearised = loss.linearise(&model, &guess, &Point3::origin(), &lamp(), &target);
-    assert_eq!(value, linearised.loss);
+    let linearized = loss.linearize(&model, &guess, &Point3::origin(), &lamp(), &target);
+    assert_eq!(value, linearized.loss);
     assert!((value.total - value.color - value.mask - value.depth).abs() < 1e-15);
     assert!(value.color > 1e-4 && value.mask > 1e-4 && value.depth > 1e-4);
     let at_truth = PoseLoss::default().evaluate(&model, &truth, &lamp(), &target);
@@ -170,7 +170,7 @@ fn gauss_newton_steps_find_the_pose() {
         let loss = PoseLoss::default();
         for _ in 0..12 {
             let c = guess * model.center();
-            let at = loss.linearise(&model, &guess, &c, &lamp(), &target);
+            let at = loss.linearize(&model, &guess, &c, &lamp(), &target);
             let damped = at.jtj * 2.0 + Matrix6::from_diagonal(&at.jtj.diagonal()) * 1e-3;
             let step = -(damped.cholesky().unwrap().solve(&at.gradient));
             guess = twisted(&guess, &c, &step.into());
@@ -192,7 +192,7 @@ fn what_cannot_be_seen_misses_the_whole_mask() {
         vec![Isometry3::translation(0.0, 0.0, -0.4), Isometry3::translation(9.0, 0.0, 0.4)];
     poses.extend([f64::NAN, f64::INFINITY].map(|v| Isometry3::translation(v, 0.0, v)));
     for pose in poses {
-        let at = loss.linearise(&model, &pose, &Point3::origin(), &lamp(), &target);
+        let at = loss.linearize(&model, &pose, &Point3::origin(), &lamp(), &target);
         assert_eq!((at.loss.counts.missed, at.loss.counts.covered), (area, 0));
         assert_eq!((at.gradient, at.jtj), (Vector6::zeros(), Matrix6::zeros()));
         assert!((at.loss.mask - 0.5 / 3.0).abs() < 1e-9 && at.loss.color > 0.05);
@@ -200,7 +200,7 @@ fn what_cannot_be_seen_misses_the_whole_mask() {
     // The camera inside the object, and in its surface: whatever is seen, everything stays finite.
     for z in [0.0, 0.03, 0.046, 0.06] {
         let pose = Isometry3::translation(0.0, 0.0, z);
-        let at = loss.linearise(&model, &pose, &Point3::origin(), &lamp(), &target);
+        let at = loss.linearize(&model, &pose, &Point3::origin(), &lamp(), &target);
         assert!(at.loss.total.is_finite() && at.gradient.iter().all(|v| v.is_finite()));
         assert!(at.jtj.iter().all(|v| v.is_finite()));
     }
@@ -218,7 +218,7 @@ fn results_do_not_depend_on_the_number_of_threads() {
     for loss in losses {
         let run = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| loss.linearise(&model, &guess, &Point3::origin(), &lamp(), &target))
+            pool.install(|| loss.linearize(&model, &guess, &Point3::origin(), &lamp(), &target))
         };
         assert_eq!(run(1), run(4));
     }

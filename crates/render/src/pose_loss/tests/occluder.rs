@@ -24,7 +24,7 @@ fn a_known_occluder_silences_what_it_hides() {
     assert!(loss.evaluate(&model, &truth, &lamp(), &blind).total > 20.0 * at_truth);
     // Hidden altogether: neither covered pixels nor derivatives.
     let wall = target.with_occluder(DepthImage::filled(160, 120, 0.2)).unwrap();
-    let nothing = loss.linearise(&model, &guess, &Point3::origin(), &lamp(), &wall);
+    let nothing = loss.linearize(&model, &guess, &Point3::origin(), &lamp(), &wall);
     assert_eq!(nothing.gradient, Vector6::zeros());
     assert_eq!(nothing.loss.counts.covered, 0);
     // Hidden pixels of the mask cost nothing, or as much as if the object were not there at all.
@@ -32,7 +32,7 @@ fn a_known_occluder_silences_what_it_hides() {
         PoseLoss::new(Mode::default(), LossOptions { hidden_is_missed: true, ..full_options() });
     let away = Isometry3::translation(9.0, 0.0, 0.4);
     let missed = counting.evaluate(&model, &away, &lamp(), &wall).total;
-    let hidden = counting.linearise(&model, &guess, &Point3::origin(), &lamp(), &wall);
+    let hidden = counting.linearize(&model, &guess, &Point3::origin(), &lamp(), &wall);
     assert!((hidden.loss.total - missed).abs() < 1e-9 && missed > 0.1);
     assert!(nothing.loss.total < 0.2 * missed, "{nothing:?}");
     assert_eq!(hidden.gradient, Vector6::zeros());

@@ -1,4 +1,4 @@
-//! What a picture of the object shows besides its colours.
+//! What a picture of the object shows besides its colors.
 
 use super::*;
 

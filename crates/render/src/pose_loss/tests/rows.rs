@@ -7,7 +7,7 @@ use crate::contour::Band;
 #[derive(Clone)]
 struct Sample {
     hit: bool,
-    /// The face whose colour it shows.
+    /// The face whose color it shows.
     face: u32,
     pixel: Pixel,
 }

@@ -11,9 +11,9 @@ fn tiles_add_up_and_each_has_the_derivatives_of_its_own_share() {
     let guess = twisted(&truth, &center, &[0.002, 0.001, -0.004, 0.03, -0.04, 0.03]);
     let loss = PoseLoss { options: full_options(), ..PoseLoss::default() };
     let tiles = |pose: &Isometry3<f64>, side| {
-        loss.linearise_tiles(&model, pose, &center, &lamp(), &target, side)
+        loss.linearize_tiles(&model, pose, &center, &lamp(), &target, side)
     };
-    let whole = loss.linearise(&model, &guess, &center, &lamp(), &target);
+    let whole = loss.linearize(&model, &guess, &center, &lamp(), &target);
     let single = tiles(&guess, usize::MAX);
     assert_eq!((single.len(), single[0].column, single[0].row), (1, 0, 0));
     assert_eq!(single[0].at, whole);

@@ -80,7 +80,7 @@ impl Scene<'_> {
                     (0..3).for_each(|k| sum += f64::from(ours[k] - theirs[k]).powi(2));
                 }
             }
-            sum * target.normalisation
+            sum * target.normalization
         };
         // A tenth of a pixel either way, also where rotations move most: where two outlines are less than a pixel apart, the
         // loss bends within a pixel.
@@ -94,7 +94,7 @@ impl Scene<'_> {
         let scale = Vector6::new(1.0, 1.0, 1.0, arm, arm, arm);
         let b = difference.component_mul(&scale);
         let loss = PoseLoss::new(mode, LossOptions::default()).with_samples(samples);
-        let at = loss.linearise(self.model, guess, &center, &self.light, &target);
+        let at = loss.linearize(self.model, guess, &center, &self.light, &target);
         let a = at.gradient.component_mul(&scale);
         (a.dot(&b) / (a.norm() * b.norm()), (a - b).norm() / b.norm())
     }
@@ -170,7 +170,7 @@ fn gradients_of_shading_are_true_with_samples_in_the_pixel() {
     assert!(fine.0 > 0.9995 && fine.1 < 0.02, "{fine:?}");
 }
 
-/// A sharp print is seen by single pixels at their centres; samples within them see it between their sides.
+/// A sharp print is seen by single pixels at their centers; samples within them see it between their sides.
 #[test]
 fn gradients_of_prints_are_true_with_samples_in_the_pixel() {
     let rough = worst("print", (contour(0.645), 1), Light::ambient(0.9), |m| m);
@@ -216,7 +216,7 @@ fn supersampled_error(
     for (ours, theirs) in picture.color.pixels().iter().zip(&target.color) {
         (0..3).for_each(|k| sum += f64::from(ours[k] - theirs[k]).powi(2));
     }
-    sum * target.normalisation
+    sum * target.normalization
 }
 
 #[test]
@@ -252,7 +252,7 @@ fn gradients_match_differences_of_supersampled_pictures() {
             // A step of half-width 0.645 blurs as much as a pixel's box; one pixel is the default.
             for (half_width, limit) in [(0.645, 0.03), (1.0, 0.035)] {
                 let loss = PoseLoss::new(contour(half_width), LossOptions::default());
-                let at = loss.linearise(&model, &guess, &center, &light, &target);
+                let at = loss.linearize(&model, &guess, &center, &light, &target);
                 let a = at.gradient.component_mul(&scale);
                 let cosine = a.dot(&b) / (a.norm() * b.norm());
                 let error = (a - b).norm() / b.norm();

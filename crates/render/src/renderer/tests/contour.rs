@@ -5,7 +5,7 @@ use super::*;
 use crate::contour::{Inner, Piece};
 
 /// What was decided about a pixel. None where the nearest point of a contour is the end of a piece within an edge, which is
-/// where the visibility of the contour changes, and on faces seen within 3 degrees of their plane, where colours are so steep
+/// where the visibility of the contour changes, and on faces seen within 3 degrees of their plane, where colors are so steep
 /// that differences are no measure.
 pub(super) fn decision(frame: &Frame, contours: &Contours, place: Place) -> Option<Vec<u32>> {
     let Decision { face, edge, inner, crease } = contours.decision(place.block, place.i);

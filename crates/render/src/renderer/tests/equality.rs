@@ -4,10 +4,10 @@ use super::*;
 use crate::pose_loss::{PoseImage, PoseLoss};
 
 /// Compares each pixel. `slope` \[1/px\] is how steeply each of our pixels changes as the image shifts. Returns the norm of the
-/// difference of colours, relative to the norm of the picture.
+/// difference of colors, relative to the norm of the picture.
 ///
 /// The loss of a pose rounds projected vertices to f32, which shifts faces by up to a unit in the last place of 96 px, 8e-6 px:
-/// colours that are steep in the image, on faces seen at a grazing angle, change with it. All else agrees to
+/// colors that are steep in the image, on faces seen at a grazing angle, change with it. All else agrees to
 /// `rounding`.
 fn compare(ours: &Buffers, theirs: &PoseImage, rounding: f64, slope: impl Fn(usize) -> f64) -> f64 {
     let (mut off, mut all) = (0.0, 0.0);

@@ -64,7 +64,7 @@ fn lighting() -> Lighting {
     }
 }
 
-/// A coloured torus and a textured lump (both without creases), each partly before the other, and a grey box behind both.
+/// A colored torus and a textured lump (both without creases), each partly before the other, and a gray box behind both.
 fn scene() -> Scene {
     let model = |mesh: &TriMesh| Arc::new(RenderModel::new(mesh).unwrap());
     let mut scene = Scene::new(camera())
@@ -333,7 +333,7 @@ fn the_inside_of_an_open_mesh_matches_differences() {
 
 #[test]
 fn singular_points_have_finite_derivatives() {
-    // The box's outline runs through pixel centres, exactly: 31.5 ± 10 columns and 23.5 ± 10 rows.
+    // The box's outline runs through pixel centers, exactly: 31.5 ± 10 columns and 23.5 ± 10 rows.
     let camera = Camera { fx: 100.0, fy: 100.0, cx: 31.0, cy: 23.0, width: 64, height: 48 };
     let model = RenderModel::new(&cuboid(Vector3::repeat(0.125))).unwrap();
     let pose = Isometry3::translation(0.0, 0.0, 0.6875);

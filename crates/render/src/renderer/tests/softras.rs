@@ -4,7 +4,7 @@ use super::super::softras::SoftFaces;
 use super::*;
 
 /// Which faces count at a pixel, each with the branches that lead to its distance and coordinates, which is the nearest, and
-/// which is at the centre.
+/// which is at the center.
 pub(super) fn decision(frame: &Frame, faces: &SoftFaces, place: Place) -> Vec<u32> {
     let (all, inside) = faces.decision(place.block, place.i);
     let at = [place.x as f64, place.y as f64];
@@ -29,7 +29,7 @@ fn the_background_has_the_weight_delta() {
     let before_black = renderer.render(&scene).buffers;
     scene.background = [1.0; 3];
     let before_white = renderer.render(&scene).buffers;
-    // Beyond the border a pixel shows the surface's colour, until the presence of the face is like δ = 1e-10.
+    // Beyond the border a pixel shows the surface's color, until the presence of the face is like δ = 1e-10.
     let mut partly = 0;
     for i in 0..before_black.alpha.len() {
         let share = before_white.color[i][0] - before_black.color[i][0];

@@ -74,7 +74,7 @@ impl Equations<'_> {
 
     fn newton(&self, mut x: DVector<f64>) -> Result<DVector<f64>, SimulationError> {
         for iteration in 1..=MOST_ITERATIONS {
-            let (residual, jacobian) = self.linearise(&x);
+            let (residual, jacobian) = self.linearize(&x);
             let tolerance = LAST.0 + LAST.1 * x.amax();
             let factors = jacobian.lu();
             let Some(change) = factors.solve(&-&residual) else {
@@ -129,7 +129,7 @@ impl Equations<'_> {
     }
 
     /// The residual and its Jacobian.
-    pub(super) fn linearise(&self, x: &DVector<f64>) -> (DVector<f64>, DMatrix<f64>) {
+    pub(super) fn linearize(&self, x: &DVector<f64>) -> (DVector<f64>, DMatrix<f64>) {
         let dt = self.step.dt;
         let ends = self.ends(x);
         let mut slots = vec![None; ends.len()];

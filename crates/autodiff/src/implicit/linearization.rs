@@ -13,13 +13,13 @@ const CHUNK: usize = 8;
 const RELATIVE: f64 = 1e-6;
 const ABSOLUTE: f64 = 1e-9;
 
-/// The factorised Jacobian by the unknowns, and the Newton step −J⁻¹ F.
-pub(super) struct Linearisation {
+/// The factorized Jacobian by the unknowns, and the Newton step −J⁻¹ F.
+pub(super) struct Linearization {
     pub(super) jacobian: Factored<f64>,
     pub(super) step: DVector<f64>,
 }
 
-impl Linearisation {
+impl Linearization {
     pub(super) fn new(
         equation: &impl Residual,
         x: &[f64],

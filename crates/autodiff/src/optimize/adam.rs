@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use super::error::check_setting;
 use super::iterate::{Method, Trial, iterate, unobserved};
-use super::{Criteria, Iteration, OptimiseError, Outcome};
+use super::{Criteria, Iteration, OptimizeError, Outcome};
 
 /// D. P. Kingma, J. Ba, "Adam: a method for stochastic optimization", ICLR 2015, algorithm 1.
 ///
@@ -35,29 +35,29 @@ impl Default for Adam {
 }
 
 impl Adam {
-    /// Minimises `objective`, which returns its value and gradient, from `start`.
+    /// Minimizes `objective`, which returns its value and gradient, from `start`.
     ///
     /// # Errors
     /// If a setting is out of range, `start` is empty or not finite, the objective is not finite there,
     /// or a gradient has the wrong length.
-    pub fn minimise(
+    pub fn minimize(
         &self,
         start: &[f64],
         objective: impl FnMut(&[f64]) -> (f64, Vec<f64>),
-    ) -> Result<Outcome, OptimiseError> {
-        self.minimise_observed(start, objective, unobserved)
+    ) -> Result<Outcome, OptimizeError> {
+        self.minimize_observed(start, objective, unobserved)
     }
 
-    /// As [`minimise`](Self::minimise), with an observer that sees every iteration and may end it all.
+    /// As [`minimize`](Self::minimize), with an observer that sees every iteration and may end it all.
     ///
     /// # Errors
-    /// As for [`minimise`](Self::minimise).
-    pub fn minimise_observed(
+    /// As for [`minimize`](Self::minimize).
+    pub fn minimize_observed(
         &self,
         start: &[f64],
         objective: impl FnMut(&[f64]) -> (f64, Vec<f64>),
         observe: impl FnMut(&Iteration) -> ControlFlow<()>,
-    ) -> Result<Outcome, OptimiseError> {
+    ) -> Result<Outcome, OptimizeError> {
         for (name, value) in [("rate", self.rate), ("epsilon", self.epsilon)] {
             let inside = value > 0.0 && value.is_finite();
             check_setting(name, value, "positive and finite", inside)?;
@@ -125,7 +125,7 @@ mod tests {
     fn rosenbrock_is_approached() {
         let criteria = Criteria { iterations: 5000, ..Adam::default().criteria };
         let found = Adam { rate: 0.02, criteria, ..Adam::default() }
-            .minimise(&[-1.2, 1.0], |x| gradient(|x| half_square(rosenbrock(x)), x))
+            .minimize(&[-1.2, 1.0], |x| gradient(|x| half_square(rosenbrock(x)), x))
             .unwrap();
         assert!(found.parameters.iter().all(|x| (x - 1.0).abs() < 1e-4), "{found:?}");
     }
@@ -137,7 +137,7 @@ mod tests {
         let criteria = Criteria { iterations: 2, ..Adam::default().criteria };
         let (mut calls, mut path) = (0, Vec::new());
         let adam = Adam { rate: 0.1, criteria, ..Adam::default() };
-        adam.minimise_observed(
+        adam.minimize_observed(
             &[0.0],
             |_| {
                 calls += 1;
@@ -157,7 +157,7 @@ mod tests {
     fn it_crosses_a_kink_and_returns_the_best_point() {
         let mut lowest = f64::INFINITY;
         let found = Adam::default()
-            .minimise(&[1.0, -0.5], |x| {
+            .minimize(&[1.0, -0.5], |x| {
                 let value = x[0].abs() + 100.0 * x[1].abs();
                 lowest = lowest.min(value);
                 (value, vec![x[0].signum(), 100.0 * x[1].signum()])
@@ -170,10 +170,10 @@ mod tests {
     #[test]
     fn it_slows_down_where_the_objective_is_not_finite() {
         let found = Adam { rate: 8.0, ..Adam::default() }
-            .minimise(&[3.0], |x| (x[0] - x[0].ln(), vec![1.0 - 1.0 / x[0]]))
+            .minimize(&[3.0], |x| (x[0] - x[0].ln(), vec![1.0 - 1.0 / x[0]]))
             .unwrap();
         assert!((found.parameters[0] - 1.0).abs() < 1e-3, "{found:?}");
-        let never = Adam::default().minimise(&[0.0], |x| {
+        let never = Adam::default().minimize(&[0.0], |x| {
             if x[0] == 0.0 { (1.0, vec![1.0]) } else { (f64::NAN, vec![1.0]) }
         });
         let never = never.unwrap();
@@ -188,8 +188,8 @@ mod tests {
             ("beta2", Adam { beta2: -0.1, ..Adam::default() }),
             ("epsilon", Adam { epsilon: f64::NAN, ..Adam::default() }),
         ] {
-            let refused = adam.minimise(&[1.0], |x| (x[0], vec![1.0]));
-            assert!(matches!(refused, Err(OptimiseError::Setting { name: n, .. }) if n == name));
+            let refused = adam.minimize(&[1.0], |x| (x[0], vec![1.0]));
+            assert!(matches!(refused, Err(OptimizeError::Setting { name: n, .. }) if n == name));
         }
     }
 }

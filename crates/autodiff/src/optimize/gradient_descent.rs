@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use super::error::check_setting;
 use super::iterate::{Method, Trial, iterate, unobserved};
-use super::{Criteria, Iteration, OptimiseError, Outcome};
+use super::{Criteria, Iteration, OptimizeError, Outcome};
 
 /// Steps of `rate` times the negative gradient, whose rate adapts.
 ///
@@ -27,29 +27,29 @@ impl Default for GradientDescent {
 }
 
 impl GradientDescent {
-    /// Minimises `objective`, which returns its value and gradient, from `start`.
+    /// Minimizes `objective`, which returns its value and gradient, from `start`.
     ///
     /// # Errors
     /// If a setting is out of range, `start` is empty or not finite, the objective is not finite there,
     /// or a gradient has the wrong length.
-    pub fn minimise(
+    pub fn minimize(
         &self,
         start: &[f64],
         objective: impl FnMut(&[f64]) -> (f64, Vec<f64>),
-    ) -> Result<Outcome, OptimiseError> {
-        self.minimise_observed(start, objective, unobserved)
+    ) -> Result<Outcome, OptimizeError> {
+        self.minimize_observed(start, objective, unobserved)
     }
 
-    /// As [`minimise`](Self::minimise), with an observer that sees every iteration and may end it all.
+    /// As [`minimize`](Self::minimize), with an observer that sees every iteration and may end it all.
     ///
     /// # Errors
-    /// As for [`minimise`](Self::minimise).
-    pub fn minimise_observed(
+    /// As for [`minimize`](Self::minimize).
+    pub fn minimize_observed(
         &self,
         start: &[f64],
         objective: impl FnMut(&[f64]) -> (f64, Vec<f64>),
         observe: impl FnMut(&Iteration) -> ControlFlow<()>,
-    ) -> Result<Outcome, OptimiseError> {
+    ) -> Result<Outcome, OptimizeError> {
         let inside = self.rate > 0.0 && self.rate.is_finite();
         check_setting("rate", self.rate, "positive and finite", inside)?;
         iterate(Descent { rate: self.rate }, &self.criteria, start, objective, observe)
@@ -92,7 +92,7 @@ mod tests {
         for rate in [1e-6, 1.0, 1e6] {
             let mut last = f64::INFINITY;
             let found = GradientDescent { rate, criteria }
-                .minimise_observed(
+                .minimize_observed(
                     &[-1.2, 1.0],
                     |x| gradient(|x| half_square(rosenbrock(x)), x),
                     |iteration| {
@@ -111,7 +111,7 @@ mod tests {
     fn it_does_not_step_out_of_the_domain() {
         let mut bad = 0;
         let found = GradientDescent { rate: 100.0, ..Default::default() }
-            .minimise(&[10.0], |x| {
+            .minimize(&[10.0], |x| {
                 bad += usize::from(x[0] <= 0.0);
                 (x[0] - x[0].ln(), vec![1.0 - 1.0 / x[0]])
             })
@@ -123,7 +123,7 @@ mod tests {
     #[test]
     fn landing_at_the_same_height_across_the_valley_is_not_convergence() {
         let found = GradientDescent { rate: 1.0, ..Default::default() }
-            .minimise(&[1.0], |x| (x[0] * x[0], vec![2.0 * x[0]]))
+            .minimize(&[1.0], |x| (x[0] * x[0], vec![2.0 * x[0]]))
             .unwrap();
         assert_eq!((found.stop, found.parameters), (Stop::Gradient, vec![0.0]));
     }
@@ -132,14 +132,14 @@ mod tests {
     fn a_rate_out_of_range_is_refused() {
         for rate in [0.0, -1.0, f64::NAN, f64::INFINITY] {
             let refused = GradientDescent { rate, ..Default::default() }
-                .minimise(&[1.0], |x| (x[0], vec![1.0]));
-            assert!(matches!(refused, Err(OptimiseError::Setting { name: "rate", .. })));
+                .minimize(&[1.0], |x| (x[0], vec![1.0]));
+            assert!(matches!(refused, Err(OptimizeError::Setting { name: "rate", .. })));
         }
     }
 
     #[test]
     fn a_gradient_of_the_wrong_sign_ends_with_short_steps() {
-        let found = GradientDescent::default().minimise(&[1.0], |x| (x[0], vec![-1.0])).unwrap();
+        let found = GradientDescent::default().minimize(&[1.0], |x| (x[0], vec![-1.0])).unwrap();
         assert_eq!((found.stop, found.parameters), (Stop::Step, vec![1.0]));
     }
 }

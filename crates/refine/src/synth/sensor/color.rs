@@ -1,13 +1,13 @@
-//! What a colour camera makes of the light that reaches it.
+//! What a color camera makes of the light that reaches it.
 
 use prehend_geometry::SplitMix64;
 use prehend_render::RgbImage;
 use serde::{Deserialize, Serialize};
 
-/// Faults of the colour images. Zero takes any of them away.
+/// Faults of the color images. Zero takes any of them away.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct ColourSettings {
+pub struct ColorSettings {
     /// Standard deviation of the exposure \[stops\].
     pub exposure: f64,
     /// Standard deviation of the gain of each channel.
@@ -22,7 +22,7 @@ pub struct ColourSettings {
     pub jpeg_quality: u8,
 }
 
-impl ColourSettings {
+impl ColorSettings {
     pub(super) fn clean() -> Self {
         Self {
             exposure: 0.0,
@@ -133,7 +133,7 @@ mod tests {
     fn noise_and_gains_are_as_strong_as_asked_for() {
         let flat = RgbImage::filled(100, 100, [0.4; 3]);
         let mut noise = SplitMix64::new(6);
-        let clean = ColourSettings::clean().expose(&flat, &mut noise);
+        let clean = ColorSettings::clean().expose(&flat, &mut noise);
         let spread = |image: &RgbImage| {
             let mean = image.pixels().iter().map(|p| p[0]).sum::<f32>() / 1e4;
             let square = image.pixels().iter().map(|p| (p[0] - mean).powi(2)).sum::<f32>() / 1e4;
@@ -141,7 +141,7 @@ mod tests {
         };
         let (mean, sigma) = spread(&clean);
         assert!((mean - 0.4).abs() < 1e-3 && (sigma - 0.01).abs() < 5e-4, "{mean} {sigma}");
-        let settings = ColourSettings::realistic();
+        let settings = ColorSettings::realistic();
         let means: Vec<f32> =
             (0..40).map(|_| spread(&settings.expose(&flat, &mut noise)).0).collect();
         let stops: f32 = means.iter().map(|m| (m / 0.4).log2().powi(2)).sum::<f32>() / 40.0;

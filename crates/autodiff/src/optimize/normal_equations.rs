@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::OptimiseError;
+use super::OptimizeError;
 use super::iterate::Evaluation;
 use crate::{Fwd, forward_jacobian};
 
@@ -65,14 +65,14 @@ impl Evaluation for NormalEquations {
         self.value.is_finite() && self.gradient.iter().chain(matrix).all(|entry| entry.is_finite())
     }
 
-    fn check_shape(&self, expected: usize) -> Result<(), OptimiseError> {
+    fn check_shape(&self, expected: usize) -> Result<(), OptimizeError> {
         let found = self.gradient.len();
         if found != expected {
-            return Err(OptimiseError::GradientLength { expected, found });
+            return Err(OptimizeError::GradientLength { expected, found });
         }
         let (rows, columns) = self.matrix.shape();
         if (rows, columns) != (expected, expected) {
-            return Err(OptimiseError::MatrixShape { expected, rows, columns });
+            return Err(OptimizeError::MatrixShape { expected, rows, columns });
         }
         Ok(())
     }

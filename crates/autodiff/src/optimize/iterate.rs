@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use super::{Criteria, Iteration, OptimiseError, Outcome, Stop};
+use super::{Criteria, Iteration, OptimizeError, Outcome, Stop};
 
 /// Least ratio of actual to predicted decrease at which a step is taken (Armijo's condition).
 const SUFFICIENT_GAIN: f64 = 1e-4;
@@ -16,12 +16,12 @@ pub(super) trait Evaluation {
         self.value().is_finite() && self.gradient().iter().all(|g| g.is_finite())
     }
 
-    fn check_shape(&self, expected: usize) -> Result<(), OptimiseError> {
+    fn check_shape(&self, expected: usize) -> Result<(), OptimizeError> {
         let found = self.gradient().len();
         if found == expected {
             Ok(())
         } else {
-            Err(OptimiseError::GradientLength { expected, found })
+            Err(OptimizeError::GradientLength { expected, found })
         }
     }
 }
@@ -65,13 +65,13 @@ pub(super) fn iterate<M: Method>(
     start: &[f64],
     mut objective: impl FnMut(&[f64]) -> M::Evaluation,
     mut observe: impl FnMut(&Iteration) -> ControlFlow<()>,
-) -> Result<Outcome, OptimiseError> {
+) -> Result<Outcome, OptimizeError> {
     criteria.check()?;
     if start.is_empty() {
-        return Err(OptimiseError::NoParameters);
+        return Err(OptimizeError::NoParameters);
     }
     if let Some(index) = start.iter().position(|x| !x.is_finite()) {
-        return Err(OptimiseError::StartNotFinite { index });
+        return Err(OptimizeError::StartNotFinite { index });
     }
     let mut evaluate = |x: &[f64]| {
         let evaluation = objective(x);
@@ -81,7 +81,7 @@ pub(super) fn iterate<M: Method>(
     let mut x = start.to_vec();
     let mut here = evaluate(&x)?;
     if !here.is_finite() {
-        return Err(OptimiseError::ObjectiveNotFinite);
+        return Err(OptimizeError::ObjectiveNotFinite);
     }
     let mut best =
         Outcome { parameters: x.clone(), value: here.value(), iterations: 0, stop: Stop::Gradient };
@@ -167,17 +167,17 @@ mod tests {
     #[test]
     fn bad_input_is_refused() {
         let refused = |start: &[f64], f: fn(&[f64]) -> (f64, Vec<f64>)| {
-            GradientDescent::default().minimise(start, f).unwrap_err()
+            GradientDescent::default().minimize(start, f).unwrap_err()
         };
-        assert_eq!(refused(&[], bowl), OptimiseError::NoParameters);
-        assert_eq!(refused(&[0.0, f64::NAN], bowl), OptimiseError::StartNotFinite { index: 1 });
+        assert_eq!(refused(&[], bowl), OptimizeError::NoParameters);
+        assert_eq!(refused(&[0.0, f64::NAN], bowl), OptimizeError::StartNotFinite { index: 1 });
         for f in [|_: &[f64]| (f64::NAN, vec![1.0]), |_: &[f64]| (1.0, vec![f64::INFINITY])] {
-            assert_eq!(refused(&[1.0], f), OptimiseError::ObjectiveNotFinite);
+            assert_eq!(refused(&[1.0], f), OptimizeError::ObjectiveNotFinite);
         }
-        let expected = OptimiseError::GradientLength { expected: 2, found: 1 };
+        let expected = OptimizeError::GradientLength { expected: 2, found: 1 };
         assert_eq!(refused(&[1.0, 1.0], |x| (x[0], vec![1.0])), expected);
         // Also later on the way.
-        let expected = OptimiseError::GradientLength { expected: 1, found: 0 };
+        let expected = OptimizeError::GradientLength { expected: 1, found: 0 };
         let shrinking = |x: &[f64]| if x[0] == 1.0 { bowl(x) } else { (0.0, vec![]) };
         assert_eq!(refused(&[1.0], shrinking), expected);
     }
@@ -186,8 +186,8 @@ mod tests {
     fn tolerances_must_not_be_negative() {
         for bad in [-1.0, f64::NAN] {
             let criteria = Criteria { step: bad, ..Criteria::default() };
-            let refused = GradientDescent { criteria, ..Default::default() }.minimise(&[1.0], bowl);
-            assert!(matches!(refused, Err(OptimiseError::Setting { name: "step", .. })));
+            let refused = GradientDescent { criteria, ..Default::default() }.minimize(&[1.0], bowl);
+            assert!(matches!(refused, Err(OptimizeError::Setting { name: "step", .. })));
         }
     }
 
@@ -197,14 +197,14 @@ mod tests {
         let stop = |criteria| {
             let method = GradientDescent { rate: 0.01, criteria };
             // An offset, so that the relative decrease becomes small before the steps do.
-            method.minimise(&[3.0, 4.0], |x| (bowl(x).0 + 1.0, bowl(x).1)).unwrap()
+            method.minimize(&[3.0, 4.0], |x| (bowl(x).0 + 1.0, bowl(x).1)).unwrap()
         };
         assert_eq!(stop(Criteria { gradient: 1e-3, ..never }).stop, Stop::Gradient);
         assert_eq!(stop(Criteria { step: 1e-3, ..never }).stop, Stop::Step);
         assert_eq!(stop(Criteria { decrease: 1e-3, ..never }).stop, Stop::Decrease);
         let ended = stop(Criteria { iterations: 3, ..never });
         assert_eq!((ended.stop, ended.iterations), (Stop::Iterations, 3));
-        let at_once = GradientDescent::default().minimise(&[0.0], bowl).unwrap();
+        let at_once = GradientDescent::default().minimize(&[0.0], bowl).unwrap();
         assert_eq!((at_once.stop, at_once.iterations), (Stop::Gradient, 0));
     }
 
@@ -212,7 +212,7 @@ mod tests {
     fn an_observer_ends_it_early() {
         let mut seen = Vec::new();
         let found = GradientDescent::default()
-            .minimise_observed(&[3.0, 4.0], bowl, |iteration| {
+            .minimize_observed(&[3.0, 4.0], bowl, |iteration| {
                 seen.push(iteration.number);
                 if iteration.number == 2 {
                     ControlFlow::Break(())

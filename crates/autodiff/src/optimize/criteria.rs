@@ -1,6 +1,6 @@
-//! When an optimisation has gone far enough.
+//! When an optimization has gone far enough.
 
-use super::OptimiseError;
+use super::OptimizeError;
 use super::error::check_setting;
 
 /// When to stop. A tolerance of 0 never stops early, except that a gradient of exactly 0 always does.
@@ -26,7 +26,7 @@ impl Default for Criteria {
 }
 
 impl Criteria {
-    pub(super) fn check(&self) -> Result<(), OptimiseError> {
+    pub(super) fn check(&self) -> Result<(), OptimizeError> {
         let tolerances =
             [("gradient", self.gradient), ("step", self.step), ("decrease", self.decrease)];
         tolerances

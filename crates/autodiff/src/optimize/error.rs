@@ -1,12 +1,12 @@
-//! Why an optimisation could not run.
+//! Why an optimization could not run.
 
 use thiserror::Error;
 
-/// Input that no optimisation can start or continue with.
+/// Input that no optimization can start or continue with.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
-pub enum OptimiseError {
+pub enum OptimizeError {
     /// The start holds no parameters.
-    #[error("there are no parameters to optimise")]
+    #[error("there are no parameters to optimize")]
     NoParameters,
     /// A parameter of the start is infinite or NaN.
     #[error("parameter {index} of the start is not finite")]
@@ -53,6 +53,6 @@ pub(super) fn check_setting(
     value: f64,
     range: &'static str,
     inside: bool,
-) -> Result<(), OptimiseError> {
-    if inside { Ok(()) } else { Err(OptimiseError::Setting { name, value, range }) }
+) -> Result<(), OptimizeError> {
+    if inside { Ok(()) } else { Err(OptimizeError::Setting { name, value, range }) }
 }

@@ -1,4 +1,4 @@
-//! Small optimisers for differentiable simulation, on plain `&[f64]` parameters.
+//! Small optimizers for differentiable simulation, on plain `&[f64]` parameters.
 //!
 //! | the objective is | use |
 //! |---|---|
@@ -7,13 +7,13 @@
 //! | noisy, kinked or badly scaled, as through contacts | [`Adam`] |
 //!
 //! For anything more (quasi-Newton methods, bounds) [`gradient`](crate::gradient) plugs into a general
-//! optimisation library; the example `argmin_lbfgs` does so.
+//! optimization library; the example `argmin_lbfgs` does so.
 //!
 //! An objective returns its value and gradient, or its [`NormalEquations`], at the parameters that it
 //! is given:
 //!
 //! ```
-//! use prehend_autodiff::optimise::{GradientDescent, LevenbergMarquardt, NormalEquations};
+//! use prehend_autodiff::optimize::{GradientDescent, LevenbergMarquardt, NormalEquations};
 //! use prehend_autodiff::{Scalar, gradient};
 //!
 //! fn residuals<S: Scalar>(x: &[S]) -> Vec<S> {
@@ -24,13 +24,13 @@
 //! }
 //!
 //! let start = [1.0, 1.0];
-//! let slow = GradientDescent::default().minimise(&start, |x| gradient(energy, x))?;
+//! let slow = GradientDescent::default().minimize(&start, |x| gradient(energy, x))?;
 //! let fast = LevenbergMarquardt::default()
-//!     .minimise(&start, |x| NormalEquations::forward::<2>(residuals, x))?;
+//!     .minimize(&start, |x| NormalEquations::forward::<2>(residuals, x))?;
 //! for x in [slow.parameters, fast.parameters] {
 //!     assert!((x[0] - 3.0).abs() < 1e-6 && (x[1] - 2.0).abs() < 1e-6);
 //! }
-//! # Ok::<(), prehend_autodiff::optimise::OptimiseError>(())
+//! # Ok::<(), prehend_autodiff::optimize::OptimizeError>(())
 //! ```
 //!
 //! Rotations enter as exponential coordinates, for instance `so3_exp(x) * reference` with
@@ -52,7 +52,7 @@ mod test_problems;
 
 pub use adam::Adam;
 pub use criteria::Criteria;
-pub use error::OptimiseError;
+pub use error::OptimizeError;
 pub use gradient_descent::GradientDescent;
 pub use least_squares::LevenbergMarquardt;
 pub use normal_equations::NormalEquations;

@@ -1,6 +1,6 @@
-//! What an optimisation says of itself, on the way and at the end.
+//! What an optimization says of itself, on the way and at the end.
 
-/// Why an optimisation ended.
+/// Why an optimization ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stop {
     /// The gradient vanished to within [`Criteria::gradient`](super::Criteria::gradient).
@@ -34,7 +34,7 @@ pub struct Iteration<'a> {
     pub taken: bool,
 }
 
-/// How an optimisation ended.
+/// How an optimization ended.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outcome {
     /// The parameters of the lowest value seen.

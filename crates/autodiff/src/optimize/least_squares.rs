@@ -6,7 +6,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::error::check_setting;
 use super::iterate::{Method, Trial, iterate, unobserved};
-use super::{Criteria, Iteration, NormalEquations, OptimiseError, Outcome};
+use super::{Criteria, Iteration, NormalEquations, OptimizeError, Outcome};
 
 /// Less damping is dropped, so that the last steps are Gauss and Newton's own; where those cannot be
 /// computed, this much is enough.
@@ -21,7 +21,7 @@ const LEAST_DAMPING: f64 = 1e-8;
 /// in what it determines; what it does not stays about where it was.
 ///
 /// ```
-/// use prehend_autodiff::optimise::{LevenbergMarquardt, NormalEquations};
+/// use prehend_autodiff::optimize::{LevenbergMarquardt, NormalEquations};
 /// use prehend_autodiff::Scalar;
 ///
 /// // Amount and rate of a decay, from what was left at three times.
@@ -32,9 +32,9 @@ const LEAST_DAMPING: f64 = 1e-8;
 /// }
 ///
 /// let fit = LevenbergMarquardt::default()
-///     .minimise(&[1.0, 0.0], |x| NormalEquations::forward::<2>(decay, x))?;
+///     .minimize(&[1.0, 0.0], |x| NormalEquations::forward::<2>(decay, x))?;
 /// assert!((fit.parameters[0] - 16.0).abs() < 1e-9 && (fit.parameters[1] - 1.0).abs() < 1e-9);
-/// # Ok::<(), prehend_autodiff::optimise::OptimiseError>(())
+/// # Ok::<(), prehend_autodiff::optimize::OptimizeError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LevenbergMarquardt {
@@ -56,29 +56,29 @@ impl LevenbergMarquardt {
         Self { damping: 0.0, ..Self::default() }
     }
 
-    /// Minimises ½‖r‖² from `start`, given its normal equations at any point.
+    /// Minimizes ½‖r‖² from `start`, given its normal equations at any point.
     ///
     /// # Errors
     /// If a setting is out of range, `start` is empty or not finite, the normal equations are not finite
     /// there, or have the wrong shape anywhere.
-    pub fn minimise(
+    pub fn minimize(
         &self,
         start: &[f64],
         objective: impl FnMut(&[f64]) -> NormalEquations,
-    ) -> Result<Outcome, OptimiseError> {
-        self.minimise_observed(start, objective, unobserved)
+    ) -> Result<Outcome, OptimizeError> {
+        self.minimize_observed(start, objective, unobserved)
     }
 
-    /// As [`minimise`](Self::minimise), with an observer that sees every iteration and may end it all.
+    /// As [`minimize`](Self::minimize), with an observer that sees every iteration and may end it all.
     ///
     /// # Errors
-    /// As for [`minimise`](Self::minimise).
-    pub fn minimise_observed(
+    /// As for [`minimize`](Self::minimize).
+    pub fn minimize_observed(
         &self,
         start: &[f64],
         objective: impl FnMut(&[f64]) -> NormalEquations,
         observe: impl FnMut(&Iteration) -> ControlFlow<()>,
-    ) -> Result<Outcome, OptimiseError> {
+    ) -> Result<Outcome, OptimizeError> {
         let inside = self.damping >= 0.0 && self.damping.is_finite();
         check_setting("damping", self.damping, "finite and at least 0", inside)?;
         let scale = DVector::zeros(start.len());
@@ -166,7 +166,7 @@ mod tests {
     fn rosenbrock_is_solved_to_rounding() {
         for method in both() {
             let found = method
-                .minimise(&[-1.2, 1.0], |x| NormalEquations::forward::<2>(rosenbrock, x))
+                .minimize(&[-1.2, 1.0], |x| NormalEquations::forward::<2>(rosenbrock, x))
                 .unwrap();
             assert_eq!(found.stop, Stop::Gradient);
             assert!(found.iterations < 40, "{found:?}");
@@ -178,7 +178,7 @@ mod tests {
     fn powell_singular_is_reached_though_its_jacobian_loses_rank_there() {
         for method in both() {
             let found = method
-                .minimise(&[3.0, -1.0, 0.0, 1.0], |x| NormalEquations::forward::<3>(powell, x))
+                .minimize(&[3.0, -1.0, 0.0, 1.0], |x| NormalEquations::forward::<3>(powell, x))
                 .unwrap();
             assert_eq!(found.stop, Stop::Gradient);
             assert!(found.iterations < 40, "{found:?}");
@@ -190,7 +190,7 @@ mod tests {
     fn a_badly_scaled_fit_with_residuals_left_reaches_the_published_value() {
         for method in both() {
             let found = method
-                .minimise(&[0.02, 4000.0, 250.0], |x| NormalEquations::forward::<3>(meyer, x))
+                .minimize(&[0.02, 4000.0, 250.0], |x| NormalEquations::forward::<3>(meyer, x))
                 .unwrap();
             assert!((2.0 * found.value - 87.9458).abs() < 1e-4, "{found:?}");
             assert_ne!(found.stop, Stop::Iterations);
@@ -203,7 +203,7 @@ mod tests {
             let scaled = |x: &[Fwd<2>]| rosenbrock(&[x[0], x[1] * Fwd::constant(unit)]);
             let mut values = Vec::new();
             LevenbergMarquardt::default()
-                .minimise_observed(
+                .minimize_observed(
                     &[-1.2, 1.0 / unit],
                     |x| NormalEquations::forward(scaled, x),
                     |iteration| {
@@ -215,9 +215,9 @@ mod tests {
             values
         };
         // A power of two, so that rounding is the same as well.
-        let (metres, other) = (path(1.0), path(1.0 / 1024.0));
-        assert!(metres.len() > 10);
-        assert_eq!(metres[..10], other[..10]);
+        let (meters, other) = (path(1.0), path(1.0 / 1024.0));
+        assert!(meters.len() > 10);
+        assert_eq!(meters[..10], other[..10]);
     }
 
     const POINTS: [[f64; 3]; 4] =
@@ -241,7 +241,7 @@ mod tests {
                 })
                 .collect()
         };
-        let found = method.minimise(&[0.0; 3], |x| NormalEquations::forward(residuals, x)).unwrap();
+        let found = method.minimize(&[0.0; 3], |x| NormalEquations::forward(residuals, x)).unwrap();
         assert_ne!(found.stop, Stop::Iterations);
         rotation(&found.parameters)
     }
@@ -286,7 +286,7 @@ mod tests {
         }
         for method in both() {
             let found = method
-                .minimise(&[1.0, 2.0, 7.0], |x| NormalEquations::forward::<3>(residuals, x))
+                .minimize(&[1.0, 2.0, 7.0], |x| NormalEquations::forward::<3>(residuals, x))
                 .unwrap();
             assert_eq!(found.stop, Stop::Gradient);
             for (x, expected) in found.parameters.iter().zip([1.5, 2.5, 7.0]) {
@@ -297,7 +297,7 @@ mod tests {
 
     #[test]
     fn pivots_of_mere_rounding_make_no_huge_steps() {
-        // One weighted sum seen twice: JᵀJ has rank 1, but the factorisation may not notice.
+        // One weighted sum seen twice: JᵀJ has rank 1, but the factorization may not notice.
         for case in 1..200 {
             let weights = [1.0, 2.0, 3.0].map(|i| 2.0 + (f64::from(case) * i).sin());
             let residuals = |x: &[Fwd<3>]| {
@@ -306,7 +306,7 @@ mod tests {
                 vec![sum, sum * Fwd::constant(0.3)]
             };
             let found = LevenbergMarquardt::gauss_newton()
-                .minimise(&[0.0; 3], |x| NormalEquations::forward(residuals, x))
+                .minimize(&[0.0; 3], |x| NormalEquations::forward(residuals, x))
                 .unwrap();
             // Each parameter takes its third of the sum.
             for (x, weight) in found.parameters.iter().zip(weights) {
@@ -320,7 +320,7 @@ mod tests {
         for method in both() {
             let (mut last, mut refused) = ((f64::INFINITY, vec![-1.2, 1.0]), 0);
             method
-                .minimise_observed(
+                .minimize_observed(
                     &[-1.2, 1.0],
                     |x| NormalEquations::forward::<2>(rosenbrock, x),
                     |iteration| {
@@ -348,7 +348,7 @@ mod tests {
         for method in both() {
             let mut bad = 0;
             let found = method
-                .minimise(&[9.0], |x| {
+                .minimize(&[9.0], |x| {
                     bad += usize::from(x[0] < 0.0);
                     NormalEquations::forward::<1>(residuals, x)
                 })
@@ -367,7 +367,7 @@ mod tests {
             let line = |x: &[Fwd<1>]| {
                 [1.0, 2.0, 6.0].map(|y| (x[0] - Fwd::constant(y)) * Fwd::constant(0.1)).to_vec()
             };
-            let found = method.minimise(&[100.0], |x| NormalEquations::forward(line, x)).unwrap();
+            let found = method.minimize(&[100.0], |x| NormalEquations::forward(line, x)).unwrap();
             assert!((found.parameters[0] - 3.0).abs() < 1e-6, "{found:?}");
             assert!(found.iterations < 20 && found.stop != Stop::Iterations, "{found:?}");
         }
@@ -376,10 +376,10 @@ mod tests {
     #[test]
     fn bad_damping_and_matrices_are_refused() {
         let method = LevenbergMarquardt { damping: -1.0, ..Default::default() };
-        let refused = method.minimise(&[1.0], |x| NormalEquations::forward::<2>(rosenbrock, x));
-        assert!(matches!(refused, Err(OptimiseError::Setting { name: "damping", .. })));
+        let refused = method.minimize(&[1.0], |x| NormalEquations::forward::<2>(rosenbrock, x));
+        assert!(matches!(refused, Err(OptimizeError::Setting { name: "damping", .. })));
         let with_matrix = |matrix: DMatrix<f64>| {
-            LevenbergMarquardt::default().minimise(&[1.0], |_| NormalEquations {
+            LevenbergMarquardt::default().minimize(&[1.0], |_| NormalEquations {
                 value: 1.0,
                 gradient: DVector::repeat(1, 1.0),
                 matrix: matrix.clone(),
@@ -387,9 +387,9 @@ mod tests {
         };
         assert_eq!(
             with_matrix(DMatrix::identity(2, 2)),
-            Err(OptimiseError::MatrixShape { expected: 1, rows: 2, columns: 2 })
+            Err(OptimizeError::MatrixShape { expected: 1, rows: 2, columns: 2 })
         );
         let infinite = DMatrix::repeat(1, 1, f64::INFINITY);
-        assert_eq!(with_matrix(infinite), Err(OptimiseError::ObjectiveNotFinite));
+        assert_eq!(with_matrix(infinite), Err(OptimizeError::ObjectiveNotFinite));
     }
 }
