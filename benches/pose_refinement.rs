@@ -6,7 +6,7 @@ use std::sync::{Arc, LazyLock};
 use std::time::{Duration, Instant};
 
 use prehend::refine::synth::{Scene, Sequence, default_scene, default_sequence};
-use prehend::refine::tracker::{Following, Spent, Tracked, Tracker, TrackerSettings};
+use prehend::refine::tracker::{Spent, TrackStatus, Tracked, Tracker, TrackerSettings};
 use prehend::refine::{
     Block, Config, Normal, RefineError, State, TermKind, refine, standard_terms,
 };
@@ -92,7 +92,7 @@ fn follow(mut tracker: Tracker) -> Result<Vec<Tracked>, RefineError> {
 
 /// Prints what the time of tracking goes into.
 fn tell_shares(tracked: &[Tracked]) {
-    let followed = tracked.iter().filter(|t| t.following == Following::Followed).count();
+    let followed = tracked.iter().filter(|t| t.following == TrackStatus::Followed).count();
     let sum = |part: fn(&Spent) -> Duration| -> f64 {
         tracked.iter().map(|t| part(&t.spent).as_secs_f64()).sum()
     };

@@ -112,9 +112,9 @@ fn main() -> anyhow::Result<()> {
         let (mut sum, mut gradient) = (0.0, vec![0.0; x.len()]);
         let Ok(model) = model_of(x).map(Arc::new) else { return (f64::NAN, gradient) };
         let renderer = Renderer::new(light_of(x));
-        for (i, photograph) in photographs.iter().enumerate() {
+        for (i, render_rgbd) in photographs.iter().enumerate() {
             let rendering = renderer.render(&view(&model, i));
-            let shown = rendering.buffers.color.iter().zip(photograph);
+            let shown = rendering.buffers.color.iter().zip(render_rgbd);
             let residual: Vec<[f64; 3]> =
                 shown.map(|(a, b)| [0, 1, 2].map(|k| a[k] - b[k])).collect();
             sum += residual.iter().flatten().map(|r| r * r).sum::<f64>();

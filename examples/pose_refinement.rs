@@ -7,11 +7,11 @@ use std::time::Instant;
 
 use anyhow::{Context, ensure};
 use nalgebra::Isometry3;
-use prehend::geometry::{ClosestPoints, UnionBody};
+use prehend::geometry::{ClosestPoints, SolidUnion};
 use prehend::refine::metrics::{ContactModel, Table, oe_deg, pe_cm};
 use prehend::refine::report::before_and_after;
 use prehend::refine::synth::default_scene;
-use prehend::refine::{Config, HandReading, refine};
+use prehend::refine::{Config, HandMeasurement, refine};
 
 fn main() -> anyhow::Result<()> {
     let seed = std::env::args()
@@ -28,8 +28,8 @@ fn main() -> anyhow::Result<()> {
     let seconds = start.elapsed().as_secs_f64();
 
     let hand = observation.hand.as_ref().context("the frame has a hand")?;
-    let HandReading { t_cam_hand, joints, .. } = hand;
-    let body = UnionBody::new(&scene.robot.posed(t_cam_hand, joints)?.mesh_parts())?;
+    let HandMeasurement { t_cam_hand, joints, .. } = hand;
+    let body = SolidUnion::new(&scene.robot.posed(t_cam_hand, joints)?.mesh_parts())?;
     let surface = ClosestPoints::new(&body.mesh())?;
     let contact = ContactModel::new(&scene.object.mesh);
     let header = ["", "PE cm", "OE °", "CA cm²", "IV cm³"].map(str::to_owned).to_vec();

@@ -242,7 +242,7 @@ mod tests {
     fn size_does_not_matter_and_a_visitor_may_stop() {
         for scale in [1e-300, 1e-3, 1.0, 1e307] {
             let mut random = SplitMix64::new(5);
-            let mut vector = || Vector3::from_fn(|_, _| random.unit());
+            let mut vector = || Vector3::from_fn(|_, _| random.uniform());
             let boxes: Vec<Bounds> = (0..300)
                 .map(|_| {
                     let low = Point3::from(vector() * scale);

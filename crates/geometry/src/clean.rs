@@ -71,7 +71,7 @@ impl TriMesh {
             !faces.is_empty() && report.open_edges == 0 && report.non_manifold_edges == 0;
         let clean = compacted(&TriMesh::new(weld.positions, faces));
         report.flat_faces = (0..clean.faces.len()).filter(|f| is_flat(&clean, *f)).count();
-        report.crossing_faces = clean.crossing_faces().len();
+        report.self_intersections = clean.self_intersections().len();
         (clean, report)
     }
 }

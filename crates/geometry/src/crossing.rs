@@ -20,7 +20,7 @@ impl TriMesh {
     ///
     /// # Panics
     /// If a face refers to a vertex that the mesh has not.
-    pub fn crossing_faces(&self) -> Vec<u32> {
+    pub fn self_intersections(&self) -> Vec<u32> {
         let boxes: Vec<Bounds> =
             (0..self.faces.len()).map(|f| Bounds::of(&self.triangle(f))).collect();
         let tree = BoxTree::new(&boxes);
@@ -90,19 +90,19 @@ mod tests {
 
     #[test]
     fn sound_and_touching_bodies_do_not_cross() {
-        assert!(icosphere(1.0, 3).crossing_faces().is_empty());
+        assert!(icosphere(1.0, 3).self_intersections().is_empty());
         let mut stack = cuboid([2.0, 2.0, 1.0], [0.0; 3]);
         stack.append(&cuboid([1.0; 3], [0.3, 0.3, 1.0]));
         stack.append(&cuboid([1.0; 3], [1.5, 1.5, 0.0]));
-        assert!(stack.crossing_faces().is_empty());
+        assert!(stack.self_intersections().is_empty());
         // Vertices stored for each face anew change nothing.
         let sphere = icosphere(1.0, 2);
         let separate = TriMesh::new(
             sphere.faces.iter().flatten().map(|&v| sphere.vertices[v as usize]).collect(),
             (0..sphere.faces.len() as u32).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect(),
         );
-        assert!(separate.crossing_faces().is_empty());
-        assert!(TriMesh::default().crossing_faces().is_empty());
+        assert!(separate.self_intersections().is_empty());
+        assert!(TriMesh::default().self_intersections().is_empty());
     }
 
     #[test]
@@ -110,7 +110,7 @@ mod tests {
         let mut two = icosphere(1.0, 3);
         let n = two.faces.len() as u32;
         two.append(&icosphere(1.0, 3).transformed(&Isometry3::translation(1.2, 0.1, 0.05)));
-        let crossing = two.crossing_faces();
+        let crossing = two.self_intersections();
         assert!(crossing.len() > 40 && crossing.len() < 400, "{}", crossing.len());
         assert!(crossing.iter().any(|f| *f < n) && crossing.iter().any(|f| *f >= n));
         // Spheres of equal size meet in the plane between their centers.
@@ -126,7 +126,7 @@ mod tests {
     #[test]
     fn pairs_agree_with_solving_for_the_piercing_point() {
         let mut random = SplitMix64::new(11);
-        let mut point = || Point3::new(random.unit(), random.unit(), random.unit());
+        let mut point = || Point3::new(random.uniform(), random.uniform(), random.uniform());
         let by_solving = |edge: [Point3<f64>; 2], t: &Triangle| {
             let (d, u, v) = (edge[1] - edge[0], t[1] - t[0], t[2] - t[0]);
             let solved =

@@ -121,7 +121,7 @@ mod tests {
     fn sums_and_products_of_integers_are_exact() {
         // Integers of 40 bits and fractions of 40 more: the parts of a product do not fit in a double.
         let mut random = SplitMix64::new(1);
-        let mut integer = || ((random.unit() - 0.5) * (1_u64 << 41) as f64).round();
+        let mut integer = || ((random.uniform() - 0.5) * (1_u64 << 41) as f64).round();
         for _ in 0..2000 {
             let [a, b, c, d] = std::array::from_fn(|_| integer());
             let small = 2.0_f64.powi(-50);

@@ -28,7 +28,7 @@ pub trait DistanceField: Send + Sync {
 
     /// How much the field rises over a length at most: 1 for a distance, a little more where it is interpolated. A field that
     /// is no distance (a height above terrain) must say so, or what is near to it is overlooked.
-    fn steepest(&self) -> f64 {
+    fn lipschitz_bound(&self) -> f64 {
         1.25
     }
 }

@@ -271,7 +271,7 @@ mod tests {
             icosphere(1.0, 2).transformed(&nalgebra::Isometry3::translation(1.0, 0.0, 0.0));
         let (clean, report) = together(&[icosphere(1.0, 2), inside_out(second)]).cleaned();
         assert_eq!((report.inverted_shells, report.nested_shells), (1, 0));
-        assert!(report.crossing_faces > 10 && report.overlaps_itself());
+        assert!(report.self_intersections > 10 && report.overlaps_itself());
         let one = crate::mass::signed_volume(&icosphere(1.0, 2));
         assert!((crate::mass::signed_volume(&clean) - 2.0 * one).abs() < 1e-9);
     }

@@ -177,7 +177,7 @@ mod tests {
         let mut random = SplitMix64::new(2);
         let mut decided = [0; 3];
         for _ in 0..3000 {
-            let mut integer = |bits: i32| ((random.unit() - 0.5) * 2f64.powi(bits)).round();
+            let mut integer = |bits: i32| ((random.uniform() - 0.5) * 2f64.powi(bits)).round();
             // Points of a plane through the first, nudged by nothing or one unit.
             let mut vector = |bits: i32| Vector3::from_fn(|_, _| integer(bits));
             let (a, u, v) = (Point3::from(vector(30)), vector(20), vector(20));
@@ -207,7 +207,8 @@ mod tests {
         let motion = Vector3::new(2f64.powi(-12), 2f64.powi(-24), 2f64.powi(-36));
         let mut random = SplitMix64::new(3);
         for _ in 0..5000 {
-            let mut point = || Point3::from(Vector3::from_fn(|_, _| (3.0 * random.unit()).floor()));
+            let mut point =
+                || Point3::from(Vector3::from_fn(|_, _| (3.0 * random.uniform()).floor()));
             let p: [Point3<f64>; 4] = std::array::from_fn(|_| point());
             let [a, b, c, d] = &p;
             let moved = d + motion;

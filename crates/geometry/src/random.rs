@@ -13,7 +13,7 @@ impl SplitMix64 {
     }
 
     /// Uniform in 0..1, 1 excluded.
-    pub fn unit(&mut self) -> f64 {
+    pub fn uniform(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -24,8 +24,8 @@ impl SplitMix64 {
 
     /// Normally distributed with mean 0 and standard deviation 1 (Box and Muller, 1958).
     pub fn normal(&mut self) -> f64 {
-        let radius = (-2.0 * (1.0 - self.unit()).ln()).sqrt();
-        radius * (std::f64::consts::TAU * self.unit()).cos()
+        let radius = (-2.0 * (1.0 - self.uniform()).ln()).sqrt();
+        radius * (std::f64::consts::TAU * self.uniform()).cos()
     }
 }
 
@@ -40,6 +40,6 @@ mod tests {
         let mean = normal.iter().sum::<f64>() / 2e4;
         let variance = normal.iter().map(|v| v * v).sum::<f64>() / 2e4;
         assert!(mean.abs() < 0.03 && (variance - 1.0).abs() < 0.04, "{mean} {variance}");
-        assert_ne!(SplitMix64::new(1).unit(), SplitMix64::new(2).unit());
+        assert_ne!(SplitMix64::new(1).uniform(), SplitMix64::new(2).uniform());
     }
 }

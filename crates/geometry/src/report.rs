@@ -35,8 +35,8 @@ pub struct MeshReport {
     /// Faces of the result with three corners in a line: kept, since their neighbors need them.
     pub flat_faces: usize,
     /// Faces of the result that other faces pass through
-    /// ([`TriMesh::crossing_faces`](crate::TriMesh::crossing_faces)): where bodies overlap, or one overlaps itself.
-    pub crossing_faces: usize,
+    /// ([`TriMesh::self_intersections`](crate::TriMesh::self_intersections)): where bodies overlap, or one overlaps itself.
+    pub self_intersections: usize,
     /// Closed components of the result that lie within others so that space is enclosed twice, or a negative number of
     /// times: a body inside a body, where a cavity would be sound.
     pub nested_shells: usize,
@@ -48,7 +48,7 @@ impl MeshReport {
     /// Whether some space is enclosed more than once, so that the sum of tetrahedra is not the volume of the solid and
     /// the nearest surface may be a buried one: faces that cross, or shells within shells.
     pub fn overlaps_itself(&self) -> bool {
-        self.crossing_faces + self.nested_shells > 0
+        self.self_intersections + self.nested_shells > 0
     }
 }
 
@@ -72,7 +72,7 @@ impl fmt::Display for MeshReport {
             (self.non_manifold_edges, "non-manifold edges"),
             (self.non_manifold_vertices, "non-manifold vertices"),
             (self.flat_faces, "flat faces"),
-            (self.crossing_faces, "crossing faces"),
+            (self.self_intersections, "crossing faces"),
             (self.nested_shells, "nested shells"),
         ]);
         let or = |text: String, none: &str| if text.is_empty() { none.to_owned() } else { text };
@@ -97,7 +97,7 @@ mod tests {
         let sound = MeshReport { components: 1, watertight: true, ..MeshReport::default() };
         assert_eq!(sound.to_string(), "nothing to repair; watertight, 1 component: nothing wrong");
         let poor = MeshReport { welded_vertices: 3, open_edges: 4, components: 2, ..sound };
-        let poor = MeshReport { watertight: false, crossing_faces: 2, ..poor };
+        let poor = MeshReport { watertight: false, self_intersections: 2, ..poor };
         assert_eq!(
             poor.to_string(),
             "3 vertices welded; not watertight, 2 components: 4 open edges, 2 crossing faces"

@@ -6,14 +6,14 @@
 /// robust loss function", 2019. `scale` is in the residual's unit, \[m\] for distances, and positive.
 ///
 /// ```
-/// use prehend_geometry::Kernel;
+/// use prehend_geometry::RobustKernel;
 ///
-/// let cauchy = Kernel::Cauchy { scale: 2.0 };
+/// let cauchy = RobustKernel::Cauchy { scale: 2.0 };
 /// assert_eq!(cauchy.weight(0.0), 1.0);
 /// assert_eq!(cauchy.weight(4.0), 0.5);
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum Kernel {
+pub enum RobustKernel {
     /// ½ r²: every residual counts in full.
     #[default]
     Squared,
@@ -39,7 +39,7 @@ pub enum Kernel {
     },
 }
 
-impl Kernel {
+impl RobustKernel {
     /// The loss ρ of the squared residual `r2`.
     #[inline]
     pub fn loss(self, r2: f64) -> f64 {
@@ -73,7 +73,7 @@ impl Kernel {
 
     /// dw/dr², never positive: what the exact Hessian has beyond the Gauss–Newton matrix.
     #[inline]
-    pub fn weight_slope(self, r2: f64) -> f64 {
+    pub fn weight_derivative(self, r2: f64) -> f64 {
         match self {
             Self::Squared => 0.0,
             Self::Huber { scale } if r2 <= scale * scale => 0.0,
@@ -117,13 +117,13 @@ pub(crate) mod tests {
     use proptest::prelude::*;
 
     /// Every kernel, at `scale`.
-    pub(crate) fn kernels(scale: f64) -> [Kernel; 5] {
+    pub(crate) fn kernels(scale: f64) -> [RobustKernel; 5] {
         [
-            Kernel::Squared,
-            Kernel::Huber { scale },
-            Kernel::Cauchy { scale },
-            Kernel::GemanMcClure { scale },
-            Kernel::Tukey { scale },
+            RobustKernel::Squared,
+            RobustKernel::Huber { scale },
+            RobustKernel::Cauchy { scale },
+            RobustKernel::GemanMcClure { scale },
+            RobustKernel::Tukey { scale },
         ]
     }
 
@@ -138,7 +138,7 @@ pub(crate) mod tests {
                 let weight = 2.0 * slope(&|x| kernel.loss(x));
                 prop_assert!((weight - kernel.weight(r2)).abs() < 1e-7, "{:?}", kernel);
                 let bend = slope(&|x| kernel.weight(x));
-                prop_assert!((bend - kernel.weight_slope(r2)).abs() < 1e-5, "{:?}", kernel);
+                prop_assert!((bend - kernel.weight_derivative(r2)).abs() < 1e-5, "{:?}", kernel);
             }
         }
     }
@@ -153,16 +153,16 @@ pub(crate) mod tests {
                 assert!((0.0..=1.0).contains(&kernel.weight(r * r)));
             }
         }
-        assert_eq!(Kernel::Tukey { scale: 0.3 }.weight(1.0), 0.0);
-        let far = [0.09_f64, 100.0].map(|r2| Kernel::Tukey { scale: 0.3 }.loss(r2));
+        assert_eq!(RobustKernel::Tukey { scale: 0.3 }.weight(1.0), 0.0);
+        let far = [0.09_f64, 100.0].map(|r2| RobustKernel::Tukey { scale: 0.3 }.loss(r2));
         assert!((far[0] - far[1]).abs() < 1e-16);
     }
 
     #[test]
     fn scales_must_be_positive() {
-        assert!(Kernel::Squared.is_valid() && Kernel::Huber { scale: 1.0 }.is_valid());
+        assert!(RobustKernel::Squared.is_valid() && RobustKernel::Huber { scale: 1.0 }.is_valid());
         for scale in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-            assert!(!Kernel::Cauchy { scale }.is_valid());
+            assert!(!RobustKernel::Cauchy { scale }.is_valid());
         }
     }
 }

@@ -34,13 +34,13 @@ pub fn surface_samples(mesh: &TriMesh, n: usize, seed: u64) -> Vec<SurfaceSample
     let (mut face, mut before) = (0, 0.0);
     let mut samples = Vec::with_capacity(n);
     for i in 0..n {
-        let at = (i as f64 + random.unit()) / n as f64 * total;
+        let at = (i as f64 + random.uniform()) / n as f64 * total;
         while face < last && before + areas[face] <= at {
             before += areas[face];
             face += 1;
         }
         // Osada et al., "Shape distributions" (2002), §4.2: uniform in a triangle from two uniform numbers.
-        let (root, along) = (random.unit().sqrt(), random.unit());
+        let (root, along) = (random.uniform().sqrt(), random.uniform());
         let barycentric = [1.0 - root, root * (1.0 - along), root * along];
         let corners = mesh.triangle(face);
         let coords = corners

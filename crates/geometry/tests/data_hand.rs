@@ -3,14 +3,14 @@
 use std::path::PathBuf;
 
 use prehend_geometry::hand::{JOINT_NAMES, Taxel, allegro_xela_urdf, load_taxels, taxels};
-use urdf_rs::{Geometry, Robot};
+use urdf_rs::{Geometry, Robot as Urdf};
 
 fn hands() -> PathBuf {
     let fallback = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data");
     PathBuf::from(std::env::var("PREHEND_DATA").unwrap_or_else(|_| fallback.into())).join("hands")
 }
 
-fn robots() -> (Robot, Robot) {
+fn robots() -> (Urdf, Urdf) {
     let ours = urdf_rs::read_from_string(&allegro_xela_urdf()).expect("own URDF");
     (ours, urdf_rs::read_file(hands().join("allegro_xela_right.urdf")).expect("reference URDF"))
 }
@@ -22,7 +22,7 @@ fn joints_agree_exactly() {
     assert_eq!(ours.joints.len(), reference.joints.len());
     for name in JOINT_NAMES {
         let find =
-            |robot: &Robot| robot.joints.iter().find(|j| j.name == name).cloned().expect(name);
+            |robot: &Urdf| robot.joints.iter().find(|j| j.name == name).cloned().expect(name);
         let (a, b) = (find(&ours), find(&reference));
         assert_eq!((a.parent.link, a.child.link), (b.parent.link, b.child.link), "{name}");
         assert_eq!(

@@ -8,7 +8,9 @@ use std::time::Instant;
 
 use nalgebra::{Isometry3, Matrix4, Point3, Vector3};
 use prehend_geometry::hand::{Taxel, load_taxels};
-use prehend_geometry::{ClosestPoints, DistanceField, PosedRobot, Robot, RobotShape, TriMesh};
+use prehend_geometry::{
+    ClosestPoints, DistanceField, KinematicTree, PosedRobot, RobotShape, TriMesh,
+};
 use serde_json::Value;
 
 fn data(path: &str) -> PathBuf {
@@ -30,7 +32,7 @@ fn matrix(value: &Value) -> Matrix4<f64> {
 }
 
 /// The joint vector of positions listed for joint_0.0 to joint_15.0.
-fn joints(robot: &Robot, q: &Value) -> Vec<f64> {
+fn joints(robot: &KinematicTree, q: &Value) -> Vec<f64> {
     let state: BTreeMap<_, _> =
         numbers(q).into_iter().enumerate().map(|(i, q)| (format!("joint_{i}.0"), q)).collect();
     robot.joint_vector(&state).unwrap()
@@ -47,7 +49,7 @@ fn forward_kinematics_match_the_golden_poses() {
     let mut compared = 0;
     let mut worst: f64 = 0.0;
     for (key, file) in robots {
-        let robot = Robot::from_urdf_file(data(file)).unwrap();
+        let robot = KinematicTree::from_urdf_file(data(file)).unwrap();
         for entry in golden.as_array().unwrap() {
             let poses = robot.forward_kinematics(&joints(&robot, &entry["q"]));
             for (link, expected) in entry[key].as_object().unwrap() {
@@ -78,7 +80,7 @@ fn taxels() -> Vec<Option<(String, Point3<f64>)>> {
 #[test]
 #[ignore = "reads PREHEND_DATA"]
 fn taxel_distances_match_the_golden_ones() {
-    let robot = Robot::from_urdf_file(data("hands/allegro_xela_right.urdf")).unwrap();
+    let robot = KinematicTree::from_urdf_file(data("hands/allegro_xela_right.urdf")).unwrap();
     let taxels = taxels();
     let frames = json("bop/inhand/inhand_frames.json");
     let mut worst: f64 = 0.0;
@@ -109,7 +111,7 @@ fn taxel_distances_match_the_golden_ones() {
 #[ignore = "reads PREHEND_DATA"]
 fn a_hand_is_built_and_queried_quickly() {
     for file in ["hands/allegro_xela_right.urdf", "mujoco/hand/allegro_right_xela.urdf"] {
-        let robot = Robot::from_urdf_file(data(file)).unwrap();
+        let robot = KinematicTree::from_urdf_file(data(file)).unwrap();
         let start = Instant::now();
         let shape =
             RobotShape::new(&robot, RobotShape::DEFAULT_SPACING, RobotShape::DEFAULT_MARGIN)
@@ -174,7 +176,7 @@ fn closest_points_are_found_quickly() {
         let start = Instant::now();
         let warm_sum: f64 = surface
             .iter()
-            .filter_map(|(p, face)| tree.closest_from(&(p + direction), f64::INFINITY, *face))
+            .filter_map(|(p, face)| tree.closest_with_hint(&(p + direction), f64::INFINITY, *face))
             .map(|c| c.distance)
             .sum();
         let warm = start.elapsed().as_secs_f64() * 1e3;

@@ -111,7 +111,7 @@ fn check(name: &str, mesh: &TriMesh, n: usize, step: usize) {
     let (center, half) = (nalgebra::center(&lo, &hi), (hi - lo) * 0.75);
     let mut random = SplitMix64::new(29);
     let mut points: Vec<Point3<f64>> =
-        (0..n).map(|_| center + half.map(|h| h * (2.0 * random.unit() - 1.0))).collect();
+        (0..n).map(|_| center + half.map(|h| h * (2.0 * random.uniform() - 1.0))).collect();
     let surface = prehend_geometry::sample::surface_samples(mesh, n, 31);
     points.extend(surface.iter().map(|s| s.point + s.normal * (0.001 * random.normal())));
     let wrong: Vec<String> = points

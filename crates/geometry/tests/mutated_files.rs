@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use nalgebra::{Point3, Vector3};
-use prehend_geometry::{Robot, SplitMix64, Texture, TriMesh};
+use prehend_geometry::{KinematicTree, SplitMix64, Texture, TriMesh};
 
 fn tetrahedron() -> TriMesh {
     let p = Point3::new;
@@ -19,7 +19,7 @@ fn tetrahedron() -> TriMesh {
 /// Hands `original` to `read` with bytes replaced, removed and repeated at places chosen by a fixed sequence.
 fn mutations(original: &[u8], count: usize, mut read: impl FnMut(Vec<u8>)) {
     let mut random = SplitMix64::new(1);
-    let mut next = |below: usize| (random.unit() * below as f64) as usize;
+    let mut next = |below: usize| (random.uniform() * below as f64) as usize;
     for _ in 0..count {
         let mut bytes = original.to_vec();
         for _ in 0..=next(3) {
@@ -57,7 +57,7 @@ fn reads(bytes: &[u8], path: &Path) -> bool {
             assert!(mesh.colors.as_ref().is_none_or(|c| c.len() == mesh.vertices.len()));
             // What was read is fit for the next steps, too.
             let (clean, report) = mesh.cleaned();
-            assert!(report.crossing_faces <= clean.faces.len(), "{report}");
+            assert!(report.self_intersections <= clean.faces.len(), "{report}");
             prehend_geometry::mass::mass_properties(&clean, 1.0).ok();
             true
         }
@@ -149,7 +149,7 @@ fn robot_descriptions() {
         <link name="c"><collision><geometry><sphere radius="1"/></geometry></collision></link>
         <joint name="p" type="revolute"><parent link="a"/><child link="b"/><origin xyz="0 0 1"/><axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
         <joint name="q" type="prismatic"><parent link="b"/><child link="c"/><axis xyz="0 1 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/><mimic joint="p" multiplier="0.5" offset="0.1"/></joint></robot>"#;
-    let read = |text: &str| Robot::from_urdf_str(text, Some(folder.path()));
+    let read = |text: &str| KinematicTree::from_urdf_str(text, Some(folder.path()));
     assert_eq!(read(text).unwrap().joint_limits(), [(-1.0, 1.0)]);
     let (mut accepted, mut refused) = (0, 0);
     mutations(text.as_bytes(), 2000, |bytes| match read(&String::from_utf8_lossy(&bytes)) {

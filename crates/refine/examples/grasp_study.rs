@@ -10,9 +10,9 @@ use cpu_time::ProcessTime;
 use nalgebra::{Isometry3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use prehend_geometry::hand::{allegro_xela_urdf, taxels};
 use prehend_geometry::objects::YcbObject;
-use prehend_geometry::robot::Robot as Tree;
+use prehend_geometry::robot::Hand as Tree;
 use prehend_refine::synth::{Grasp, GraspSettings, Grasper};
-use prehend_refine::{Object, Robot};
+use prehend_refine::{Hand, Object};
 use prehend_render::{Camera, Light, RenderModel, SceneObject, render_scene};
 
 const FRAMES: usize = 100;
@@ -22,7 +22,7 @@ fn main() -> anyhow::Result<()> {
     let tries: u64 = arguments.next().map_or(Ok(20), |n| n.parse()).context("TRIES")?;
     let folder = arguments.next().map(PathBuf::from);
     let only = arguments.next();
-    let robot = Robot::new(Tree::from_urdf_str(&allegro_xela_urdf(), None)?, taxels())?;
+    let robot = Hand::new(Tree::from_urdf_str(&allegro_xela_urdf(), None)?, taxels())?;
     println!(
         "{:22} {:>9} {:>6} {:>6} {:>6} {:>6} {:>6} {:>8} {:>8}  faults",
         "object", "grasps", "IV", "CA", "links", "mm", "°", "s/grasp", "frames/s"
@@ -82,7 +82,7 @@ fn main() -> anyhow::Result<()> {
 }
 
 /// Three views side by side.
-fn draw(robot: &Robot, object: &RenderModel, grasp: &Grasp) -> prehend_render::RgbImage {
+fn draw(robot: &Hand, object: &RenderModel, grasp: &Grasp) -> prehend_render::RgbImage {
     let (width, height) = (420, 420);
     let camera = Camera { fx: 620.0, fy: 620.0, cx: 209.5, cy: 209.5, width, height };
     let mut picture = prehend_render::RgbImage::filled(3 * width, height, [0.0; 3]);

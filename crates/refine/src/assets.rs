@@ -5,13 +5,14 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use prehend_geometry::hand::{Taxel, load_taxels};
-use prehend_geometry::robot::Robot as KinematicTree;
+use prehend_geometry::robot::KinematicTree;
 use prehend_geometry::{GridCache, TriMesh};
 
 use crate::bop::{Dataset, DatasetError, Frame, Models, Tactile};
 use crate::observation::check_gravity;
 use crate::{
-    Config, HandReading, Inertial, Object, Observation, RefineError, Robot, StrategyKind, TermKind,
+    Config, Hand, HandMeasurement, Inertial, Object, Observation, RefineError, StrategyKind,
+    TermKind,
 };
 
 /// BOP models are in millimeters \[m\].
@@ -48,7 +49,7 @@ pub struct Assets<'a> {
     dataset: &'a Dataset,
     seed: u64,
     objects: HashMap<u32, Arc<Object>>,
-    robots: HashMap<(PathBuf, Option<PathBuf>), Arc<Robot>>,
+    robots: HashMap<(PathBuf, Option<PathBuf>), Arc<Hand>>,
     cache: Option<GridCache>,
 }
 
@@ -92,7 +93,7 @@ impl<'a> Assets<'a> {
         frame: &Frame<'_>,
         instance: usize,
         terms: &[TermKind],
-    ) -> Result<(Observation, Option<Arc<Robot>>), AssetError> {
+    ) -> Result<(Observation, Option<Arc<Hand>>), AssetError> {
         let mut observation = frame.observation(instance)?;
         let needed = terms.iter().any(|t| matches!(t, TermKind::Physics | TermKind::Tactile));
         let bodies = match frame.bodies() {
@@ -129,7 +130,7 @@ impl<'a> Assets<'a> {
         let joints = robot.tree.joint_vector(&body.joints);
         let joints = joints.map_err(|e| frame.bodies_fault("bodies[0].joints", e))?;
         observation.gravity = Some(bodies.gravity);
-        observation.hand = Some(HandReading {
+        observation.hand = Some(HandMeasurement {
             t_cam_hand: body.t_cam_base,
             joints,
             forces: tactile.map_or_else(Vec::new, |t| t.force),
@@ -145,7 +146,7 @@ impl<'a> Assets<'a> {
         &mut self,
         frame: &Frame<'_>,
         instance: usize,
-    ) -> Result<(Observation, Option<Arc<Robot>>), AssetError> {
+    ) -> Result<(Observation, Option<Arc<Hand>>), AssetError> {
         let absent = |error: &DatasetError| {
             matches!(error, DatasetError::Missing { .. } | DatasetError::NoEntry { .. })
         };
@@ -166,7 +167,7 @@ impl<'a> Assets<'a> {
         frame: &Frame<'_>,
         instance: usize,
         config: &Config,
-    ) -> Result<(Observation, Option<Arc<Robot>>), AssetError> {
+    ) -> Result<(Observation, Option<Arc<Hand>>), AssetError> {
         match config.strategy {
             StrategyKind::Fused => self.whole_observation(frame, instance),
             StrategyKind::Heuristic | StrategyKind::Icp | StrategyKind::RobustIcp => {
@@ -179,7 +180,7 @@ impl<'a> Assets<'a> {
     ///
     /// # Errors
     /// If a file is missing or broken.
-    pub fn robot(&mut self, urdf: &Path, taxels: Option<&Path>) -> Result<Arc<Robot>, AssetError> {
+    pub fn robot(&mut self, urdf: &Path, taxels: Option<&Path>) -> Result<Arc<Hand>, AssetError> {
         let key = (urdf.to_owned(), taxels.map(Path::to_owned));
         if let Some(robot) = self.robots.get(&key) {
             return Ok(Arc::clone(robot));
@@ -189,7 +190,7 @@ impl<'a> Assets<'a> {
             Some(file) => load_taxels(file)?,
             None => Vec::new(),
         };
-        let robot = Arc::new(Robot::cached(tree, skin, self.cache.as_ref())?);
+        let robot = Arc::new(Hand::cached(tree, skin, self.cache.as_ref())?);
         self.robots.insert(key, Arc::clone(&robot));
         Ok(robot)
     }

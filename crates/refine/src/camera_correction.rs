@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Matrix3x5, Point3, SMatrix, Translation3, Vector2, Vec
 ///
 /// The default changes nothing. The parameters of [`Block::Camera`](crate::Block::Camera) are the fields, in order.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CameraCorrection {
+pub struct CameraCalibrationError {
     /// What measured depth has to be multiplied by.
     pub depth_scale: f64,
     /// What is to be added then \[m\].
@@ -17,13 +17,13 @@ pub struct CameraCorrection {
     pub magnification: f64,
 }
 
-impl Default for CameraCorrection {
+impl Default for CameraCalibrationError {
     fn default() -> Self {
         Self { depth_scale: 1.0, depth_bias: 0.0, shift: Vector2::zeros(), magnification: 0.0 }
     }
 }
 
-impl CameraCorrection {
+impl CameraCalibrationError {
     /// Number of parameters.
     pub const DIMENSION: usize = 5;
 
@@ -103,14 +103,14 @@ mod tests {
 
     use super::*;
 
-    fn some() -> CameraCorrection {
-        CameraCorrection::default().changed(&[0.01, 2e-3, 3e-3, -1e-3, 4e-3])
+    fn some() -> CameraCalibrationError {
+        CameraCalibrationError::default().changed(&[0.01, 2e-3, 3e-3, -1e-3, 4e-3])
     }
 
     #[test]
     fn points_and_their_derivatives() {
         let (ray, depth) = (Vector2::new(0.1, -0.2), 0.5);
-        let plain = CameraCorrection::default();
+        let plain = CameraCalibrationError::default();
         assert_eq!(plain.point(&ray, depth), Point3::new(0.05, -0.1, 0.5));
         assert_eq!(plain.parameters(), [0.0; 5]);
         for correction in [plain, some()] {
@@ -127,7 +127,7 @@ mod tests {
     #[test]
     fn the_apparent_pose_and_its_derivatives() {
         let pose = Isometry3::translation(0.03, -0.02, 0.4);
-        for correction in [CameraCorrection::default(), some()] {
+        for correction in [CameraCalibrationError::default(), some()] {
             let center = pose.translation.vector;
             let jacobian = correction.apparent_jacobian(&center);
             for row in 0..3 {
@@ -146,7 +146,7 @@ mod tests {
     #[test]
     fn a_point_is_where_it_appears() {
         // What is at `apparent` in the camera as it is said to be, is seen along the ray that the true one gives.
-        let correction = CameraCorrection { depth_scale: 1.0, depth_bias: 0.0, ..some() };
+        let correction = CameraCalibrationError { depth_scale: 1.0, depth_bias: 0.0, ..some() };
         let place = Vector3::new(0.03, -0.02, 0.4);
         let at = correction.apparent(&Isometry3::from(place), &place).translation.vector;
         let ray = Vector2::new(at.x / at.z, at.y / at.z);

@@ -163,6 +163,6 @@ impl Config {
     pub fn set_exhaustive(&mut self) {
         self.heuristic.exhaustive = true;
         self.icp.last_step = f64::NEG_INFINITY;
-        self.fused.stages.iter_mut().for_each(|s| s.last_gain = f64::NEG_INFINITY);
+        self.fused.stages.iter_mut().for_each(|s| s.min_decrease = f64::NEG_INFINITY);
     }
 }

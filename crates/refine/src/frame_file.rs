@@ -9,14 +9,14 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use prehend_geometry::hand::{Taxel, load_taxels};
-use prehend_geometry::robot::Robot as KinematicTree;
+use prehend_geometry::robot::KinematicTree;
 use prehend_geometry::{GridCache, TriMesh};
 use prehend_render::{Camera, DepthImage, Mask, RgbImage};
 use serde::Deserialize;
 
 use crate::bop::rotation_from_row_major;
 use crate::observation::check_gravity;
-use crate::{AssetError, HandReading, Object, Observation, Robot, TermKind};
+use crate::{AssetError, Hand, HandMeasurement, Object, Observation, TermKind};
 
 /// Why a frame file could not be used.
 #[derive(Debug, thiserror::Error)]
@@ -72,7 +72,7 @@ pub struct FrameInput {
     /// The object.
     pub object: Object,
     /// The hand, if the file describes one.
-    pub robot: Option<Arc<Robot>>,
+    pub robot: Option<Arc<Hand>>,
     /// The initial pose, object → camera \[m\].
     pub t_cam_object: Isometry3<f64>,
 }
@@ -214,12 +214,12 @@ pub fn load(
                 return Err(field("robot.forces", reason));
             }
             let t_cam_hand = r.base_pose.isometry();
-            let hand = HandReading {
+            let hand = HandMeasurement {
                 t_cam_hand: t_cam_hand.map_err(|reason| field("robot.base_pose", reason))?,
                 joints,
                 forces: forces.iter().map(|&f| Vector3::from(f)).collect(),
             };
-            let robot = Robot::cached(tree, skin, cache).map_err(|e| asset(e.into()))?;
+            let robot = Hand::cached(tree, skin, cache).map_err(|e| asset(e.into()))?;
             (Some(Arc::new(robot)), Some(hand))
         }
     };

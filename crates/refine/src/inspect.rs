@@ -4,7 +4,7 @@ use nalgebra::Isometry3;
 use prehend_render::depth_map;
 
 use crate::refine::hand_depth;
-use crate::{Object, Observation, Robot};
+use crate::{Hand, Object, Observation};
 
 /// Sizes between which an object's extent is believed to be in meters \[m\].
 const PLAUSIBLE_EXTENT: std::ops::Range<f64> = 5e-3..5.0;
@@ -38,7 +38,7 @@ pub fn inspect_object(object: &Object) -> Vec<String> {
 pub fn inspect_pose(
     observation: &Observation,
     object: &Object,
-    robot: Option<&Robot>,
+    robot: Option<&Hand>,
     t_cam_object: &Isometry3<f64>,
 ) -> Vec<String> {
     let mut warnings = Vec::new();

@@ -1,6 +1,6 @@
 //! Refines the 6-DoF pose of an object held in a robot hand, from RGB-D, touch and physics.
 //!
-//! [`refine`] takes an [`Observation`], an [`Object`], a [`Robot`] and an initial pose, and returns a
+//! [`refine`] takes an [`Observation`], an [`Object`], a [`Hand`] and an initial pose, and returns a
 //! [`RefinedPose`]. The evidence comes from [`Term`]s over a common [`State`]; [`strategy`] walks downhill.
 //!
 //! ```
@@ -51,7 +51,7 @@ pub mod tracker;
 mod workers;
 
 pub use assets::{AssetError, Assets, load_mesh, load_object};
-pub use camera_correction::CameraCorrection;
+pub use camera_correction::CameraCalibrationError;
 pub use config::{Config, StrategyKind, TermKind};
 pub use error::RefineError;
 pub use identity::Identity;
@@ -60,10 +60,10 @@ pub use journal::{Journal, JournalError};
 pub use method::Method;
 pub use normal::Normal;
 pub use object::{DEFAULT_DENSITY, Inertial, Object};
-pub use observation::{HandReading, Observation};
+pub use observation::{HandMeasurement, Observation};
 pub use plain_pose::PlainPose;
 pub use refine::{Progress, RefinedPose, refine, refine_with, standard_terms};
-pub use robot::Robot;
+pub use robot::Hand;
 pub use robust::Cauchy;
 pub use scoring::Scorer;
 pub use state::{Block, State};

@@ -14,8 +14,8 @@ pub struct Normal {
     entries: Vec<(usize, f64)>,
 }
 
-/// What [`Normal::without_patches`] finds.
-pub(crate) struct Eliminated {
+/// What [`Normal::marginalize`] finds.
+pub(crate) struct SchurComplement {
     /// The equations of the other blocks.
     pub(crate) rest: Normal,
     /// How much lower the least value is.
@@ -42,10 +42,10 @@ impl Normal {
         Some(self.blocks[..position].iter().map(|b| b.dimension()).sum())
     }
 
-    /// What is left if the last block, which is of [`Block::Patches`], takes the value at which the quadratic model of the sum is least.
+    /// What is left if the last block, which is of [`Block::SurfacePatches`], takes the value at which the quadratic model of the sum is least.
     /// Beforehand no displacement is likeliest, directions are independent, and the covariance in any one has the inverse `precision`, which is
     /// added. `None` if the least is not determined.
-    pub(crate) fn without_patches(&mut self, precision: &DMatrix<f64>) -> Option<Eliminated> {
+    pub(crate) fn marginalize(&mut self, precision: &DMatrix<f64>) -> Option<SchurComplement> {
         let (last, blocks) = self.blocks.split_last()?;
         let (n, m) = (self.gradient.len() - last.dimension(), last.dimension());
         for c in 0..precision.ncols() {
@@ -67,7 +67,7 @@ impl Normal {
             entries: Vec::new(),
         };
         let log_determinant = 2.0 * lower.diagonal().iter().map(|d| d.ln()).sum::<f64>();
-        Some(Eliminated { rest, gain: 0.5 * pull.norm_squared(), log_determinant })
+        Some(SchurComplement { rest, gain: 0.5 * pull.norm_squared(), log_determinant })
     }
 
     /// Leaves the first `blocks` only, as if the others were fixed.

@@ -5,7 +5,7 @@ use prehend_render::{Camera, DepthImage, Mask, RgbImage};
 
 /// Where the hand is said to be, and what it feels.
 #[derive(Clone, Debug)]
-pub struct HandReading {
+pub struct HandMeasurement {
     /// Hand base coordinates → camera coordinates \[m\].
     pub t_cam_hand: Isometry3<f64>,
     /// Joint positions in the order of the robot's joints \[rad\].
@@ -28,7 +28,7 @@ pub struct Observation {
     /// Gravitational acceleration \[m/s²\], where known.
     pub gravity: Option<Vector3<f64>>,
     /// The hand, where known.
-    pub hand: Option<HandReading>,
+    pub hand: Option<HandMeasurement>,
 }
 
 impl Observation {

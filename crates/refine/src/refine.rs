@@ -5,10 +5,10 @@ use std::sync::Arc;
 use nalgebra::Isometry3;
 use prehend_render::{DepthImage, depth_map};
 
-use crate::strategy::{Confidence, Fused, Heuristic, Icp, RobustIcp};
+use crate::strategy::{Fused, Heuristic, Icp, Posterior, RobustIcp};
 use crate::term::{DepthTerm, PhysicsTerm, RenderingTerm, TactileTerm, Term};
 use crate::trace::{Iteration, Trace};
-use crate::{Config, Object, Observation, RefineError, Robot, State, StrategyKind, TermKind};
+use crate::{Config, Hand, Object, Observation, RefineError, State, StrategyKind, TermKind};
 
 /// The outcome of a refinement.
 #[derive(Clone, Debug)]
@@ -20,7 +20,7 @@ pub struct RefinedPose {
     /// What happened on the way.
     pub trace: Trace,
     /// How sure the pose is; only the fused estimator knows.
-    pub confidence: Option<Confidence>,
+    pub confidence: Option<Posterior>,
 }
 
 /// Progress of a refinement under way.
@@ -44,7 +44,7 @@ pub struct Progress {
 pub fn refine(
     observation: &Observation,
     object: &Arc<Object>,
-    robot: Option<&Arc<Robot>>,
+    robot: Option<&Arc<Hand>>,
     initial: &Isometry3<f64>,
     config: &Config,
 ) -> Result<RefinedPose, RefineError> {
@@ -58,7 +58,7 @@ pub fn refine(
 pub fn refine_with(
     observation: &Observation,
     object: &Arc<Object>,
-    robot: Option<&Arc<Robot>>,
+    robot: Option<&Arc<Hand>>,
     initial: &Isometry3<f64>,
     config: &Config,
     mut observe: impl FnMut(Progress) -> bool,
@@ -140,7 +140,7 @@ pub fn refine_with(
 pub fn standard_terms(
     observation: &Observation,
     object: &Arc<Object>,
-    robot: Option<&Arc<Robot>>,
+    robot: Option<&Arc<Hand>>,
     initial: &State,
     config: &Config,
 ) -> Result<Vec<Box<dyn Term>>, RefineError> {
@@ -175,7 +175,7 @@ pub fn standard_terms(
 }
 
 /// Depth image of the hand alone \[m\], 0 where it is not. The hand's joints must have been checked.
-pub(crate) fn hand_depth(observation: &Observation, robot: Option<&Robot>) -> DepthImage {
+pub(crate) fn hand_depth(observation: &Observation, robot: Option<&Hand>) -> DepthImage {
     let camera = &observation.camera;
     match (robot, &observation.hand) {
         (Some(robot), Some(hand)) => {

@@ -6,14 +6,14 @@ use nalgebra::{Isometry3, Vector3};
 use prehend_geometry::GridCache;
 use prehend_geometry::hand::Taxel;
 use prehend_geometry::robot::{
-    ArticulatedRobot, PosedRobot, Robot as KinematicTree, RobotError, RobotShape,
+    ArticulatedRobot, KinematicTree, PosedRobot, RobotError, RobotShape,
 };
 use prehend_render::RenderModel;
 
 use crate::RefineError;
 
 /// A robot hand: kinematics, shape and skin.
-pub struct Robot {
+pub struct Hand {
     /// Joints and links.
     pub tree: KinematicTree,
     /// Collision geometry with one cached distance grid a link.
@@ -24,7 +24,7 @@ pub struct Robot {
     bodies: Vec<(usize, RenderModel)>,
 }
 
-impl Robot {
+impl Hand {
     /// Prepares the shape of `tree`; this builds a distance grid for every link.
     ///
     /// # Errors
@@ -162,7 +162,7 @@ mod tests {
         let urdf = r#"<robot name="r"><link name="palm"><collision><geometry>
             <mesh filename="flat.obj"/></geometry></collision></link></robot>"#;
         let refused = KinematicTree::from_urdf_str(urdf, Some(dir.path()))
-            .and_then(|tree| Robot::new(tree, Vec::new()).map(|_| ()));
+            .and_then(|tree| Hand::new(tree, Vec::new()).map(|_| ()));
         println!("{refused:?}");
         assert!(refused.unwrap_err().to_string().contains("link 'palm'"));
     }

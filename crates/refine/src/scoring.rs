@@ -4,8 +4,8 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use nalgebra::Isometry3;
-use prehend_geometry::robot::Robot as KinematicTree;
-use prehend_geometry::{ClosestPoints, TriMesh, UnionBody};
+use prehend_geometry::robot::KinematicTree;
+use prehend_geometry::{ClosestPoints, SolidUnion, TriMesh};
 use prehend_render::{DepthImage, RenderModel, depth_map};
 
 use crate::RefineError;
@@ -23,7 +23,7 @@ struct Model {
 
 /// The hand where it truly is in one image, as one body: its parts overlap each other.
 struct TrueHand {
-    body: UnionBody,
+    body: SolidUnion,
     surface: ClosestPoints,
     /// Contact of the objects where they truly are, by object and true pose: an image may show one twice.
     truths: Vec<(u32, Isometry3<f64>, Contact)>,
@@ -160,7 +160,7 @@ impl<'a> Scorer<'a> {
                 link.parts.iter().map(move |part| part.transformed(&pose))
             })
             .collect();
-        let body = UnionBody::new(&parts)?;
+        let body = SolidUnion::new(&parts)?;
         let surface = ClosestPoints::new(&body.mesh())?;
         Ok(Some(TrueHand { body, surface, truths: Vec::new() }))
     }

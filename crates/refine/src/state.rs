@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3, Vector6};
 use prehend_autodiff::lie::perturb_about;
 use prehend_render::Light;
 
-use crate::{CameraCorrection, Object, Observation, RefineError, Term};
+use crate::{CameraCalibrationError, Object, Observation, RefineError, Term};
 
 /// A named block of a [`State`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -17,11 +17,11 @@ pub enum Block {
     HandPose,
     /// So many joint positions of the hand \[rad or m\].
     Joints(usize),
-    /// How the camera differs from what is said of it: see [`CameraCorrection`].
+    /// How the camera differs from what is said of it: see [`CameraCalibrationError`].
     Camera,
     /// Displacements of so many patches of the object's surface from where the model has them, in the camera frame \[m\]. No state
     /// holds them: they are eliminated.
-    Patches(usize),
+    SurfacePatches(usize),
 }
 
 impl Block {
@@ -30,8 +30,8 @@ impl Block {
         match self {
             Self::ObjectPose | Self::HandPose => 6,
             Self::Joints(count) => count,
-            Self::Camera => CameraCorrection::DIMENSION,
-            Self::Patches(count) => 3 * count,
+            Self::Camera => CameraCalibrationError::DIMENSION,
+            Self::SurfacePatches(count) => 3 * count,
         }
     }
 }
@@ -48,7 +48,7 @@ pub struct State {
     /// Joint positions of the hand \[rad or m\]; none without a hand.
     pub joints: Vec<f64>,
     /// How the camera differs from what is said of it.
-    pub camera: CameraCorrection,
+    pub camera: CameraCalibrationError,
     /// Light on the object, in the camera frame. Not a block: [`Term::light`](crate::Term::light)
     /// solves for it in closed form.
     pub light: Light,
@@ -84,7 +84,7 @@ impl State {
             object_center: object.center,
             t_cam_hand: hand.map_or_else(Isometry3::identity, |h| h.t_cam_hand),
             joints: hand.map_or_else(Vec::new, |h| h.joints.clone()),
-            camera: CameraCorrection::default(),
+            camera: CameraCalibrationError::default(),
             light: Light::ambient(1.0),
         };
         let depth = state.center().z;
@@ -137,7 +137,7 @@ impl State {
                     state.camera = state.camera.changed(part);
                     continue;
                 }
-                Block::Patches(_) => continue,
+                Block::SurfacePatches(_) => continue,
             };
             *pose = perturb_about(pose, &center, &Vector6::from_column_slice(part));
             // Thousands of small steps must not let the quaternion drift off the unit sphere.

@@ -7,9 +7,9 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3, Vector6};
 use prehend_autodiff::lie::perturb_about;
 use prehend_geometry::objects::YcbObject;
-use prehend_geometry::robot::Robot as KinematicTree;
+use prehend_geometry::robot::KinematicTree;
 use prehend_refine::metrics::{oe_deg, pe_cm};
-use prehend_refine::{Config, HandReading, Object, Observation, Robot, TermKind, refine};
+use prehend_refine::{Config, Hand, HandMeasurement, Object, Observation, TermKind, refine};
 use prehend_render::{Camera, Light, Mask, RenderModel, SceneObject, render_scene};
 
 const GRIPPER: &str = r#"<robot name="gripper">
@@ -31,7 +31,7 @@ const CAMERA: Camera =
 /// What is held or carried by what, and where.
 struct Setting {
     object: Arc<Object>,
-    robot: Arc<Robot>,
+    robot: Arc<Hand>,
     joints: Vec<f64>,
     t_robot_object: Isometry3<f64>,
     t_cam_robot: Isometry3<f64>,
@@ -46,7 +46,7 @@ impl Setting {
         let t_robot_object = place * Translation3::from(-object.center.coords);
         Self {
             object: Arc::new(object),
-            robot: Arc::new(Robot::new(tree, Vec::new()).unwrap()),
+            robot: Arc::new(Hand::new(tree, Vec::new()).unwrap()),
             joints,
             t_robot_object,
             t_cam_robot: look_at(&Point3::new(0.35, 0.15, 0.25), &place.translation.vector.into()),
@@ -83,7 +83,7 @@ impl Setting {
             depth: seen.depth,
             mask,
             gravity: Some(self.t_cam_robot.rotation * Vector3::new(0.0, 0.0, -9.81)),
-            hand: Some(HandReading {
+            hand: Some(HandMeasurement {
                 t_cam_hand: self.t_cam_robot,
                 joints: self.joints.clone(),
                 forces: Vec::new(),

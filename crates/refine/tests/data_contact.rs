@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 use prehend_geometry::shapes::{capsule, cuboid};
-use prehend_geometry::{ClosestPoints, Robot, TriMesh, UnionBody};
+use prehend_geometry::{ClosestPoints, KinematicTree, SolidUnion, TriMesh};
 use prehend_refine::bop::{Dataset, GroundTruth, read_results};
 use prehend_refine::metrics::{CONTACT_SAMPLES, ContactModel};
 use serde_json::Value;
@@ -39,7 +39,7 @@ fn motion(v: &Value) -> Isometry3<f64> {
 }
 
 /// The hand's primitives in the camera frame.
-fn hand_parts(robot: &Robot, hand: &Value, frame: &Value) -> Vec<TriMesh> {
+fn hand_parts(robot: &KinematicTree, hand: &Value, frame: &Value) -> Vec<TriMesh> {
     let names = list(&frame["joint_names"]).iter().map(|n| n.as_str().unwrap().to_owned());
     let q = names.zip(list(&frame["q"]).iter().map(|v| v.as_f64().unwrap())).collect();
     let t_base_link = robot.forward_kinematics(&robot.joint_vector(&q).unwrap());
@@ -67,7 +67,7 @@ fn hand_parts(robot: &Robot, hand: &Value, frame: &Value) -> Vec<TriMesh> {
 #[ignore = "reads PREHEND_DATA"]
 fn golden_contact_of_the_inhand_frames() {
     let hand = json(&data("hands/allegro_xela_right.json"));
-    let robot = Robot::from_urdf_file(data("hands/allegro_xela_right.urdf")).unwrap();
+    let robot = KinematicTree::from_urdf_file(data("hands/allegro_xela_right.urdf")).unwrap();
     let root = data("bop/inhand");
     let dataset = Dataset::open(&root).unwrap();
     let truth = GroundTruth::new(&dataset);
@@ -81,7 +81,7 @@ fn golden_contact_of_the_inhand_frames() {
         let (im_id, obj_id) = (id("im_id"), id("obj_id"));
         let mesh = TriMesh::load(&truth.models().mesh_path(obj_id).unwrap()).unwrap().scaled(1e-3);
         let model = ContactModel::new(&mesh);
-        let body = UnionBody::new(&hand_parts(&robot, &hand, frame)).unwrap();
+        let body = SolidUnion::new(&hand_parts(&robot, &hand, frame)).unwrap();
         let surface = ClosestPoints::new(&body.mesh()).unwrap();
         for (set, rows) in sets.iter().zip(&results) {
             let row = rows.iter().find(|r| r.im_id == im_id);

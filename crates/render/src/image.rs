@@ -4,7 +4,7 @@ use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
 use image::{DynamicImage, ImageFormat};
-use prehend_geometry::write_whole;
+use prehend_geometry::write_atomic;
 
 /// Why an image could not be read, written or built.
 #[derive(Debug, thiserror::Error)]
@@ -174,7 +174,7 @@ impl RgbImage {
         image::codecs::jpeg::JpegEncoder::new_with_quality(&mut bytes, quality.clamp(1, 100))
             .encode(&self.to_bytes(), width, height, image::ExtendedColorType::Rgb8)
             .map_err(|source| ImageError::Codec { path: path.into(), source })?;
-        write_whole(path, &bytes).map_err(|source| ImageError::Io { path: path.into(), source })
+        write_atomic(path, &bytes).map_err(|source| ImageError::Io { path: path.into(), source })
     }
 
     /// Three bytes a pixel.
@@ -297,7 +297,7 @@ fn encode(path: &Path, image: Option<DynamicImage>) -> Result<(), ImageError> {
     if let Some(image) = image {
         image.write_to(&mut bytes, format).map_err(codec)?;
     }
-    write_whole(path, bytes.get_ref())
+    write_atomic(path, bytes.get_ref())
         .map_err(|source| ImageError::Io { path: path.into(), source })
 }
 

@@ -4,14 +4,14 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use prehend_autodiff::Fwd;
-use prehend_geometry::robot::{LinkShape, Robot, RobotShape};
+use prehend_geometry::robot::{KinematicTree, LinkShape, RobotShape};
 use prehend_geometry::{DistanceField, FieldSample};
 
 use crate::error::SimulationError;
 use crate::state::State;
 use crate::world::{Body, World};
 
-/// Positions and velocities of a robot's joints, in the order of [`Robot::joint_names`].
+/// Positions and velocities of a robot's joints, in the order of [`KinematicTree::joint_names`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointState {
     /// Positions \[rad or m\].
@@ -22,7 +22,7 @@ pub struct JointState {
 
 /// A robot whose joints follow a given course.
 struct DrivenRobot<C> {
-    robot: Robot,
+    robot: KinematicTree,
     t_world_base: Isometry3<f64>,
     joints: C,
 }
@@ -67,7 +67,7 @@ impl DistanceField for LinkField {
 
 impl World {
     /// Adds the links of `robot` that have a shape as driven bodies with a distance field, named after them, and returns
-    /// the number of each link's body, in the order of [`Robot::links`]. The base stands at `t_world_base`; `joints` says
+    /// the number of each link's body, in the order of [`KinematicTree::links`]. The base stands at `t_world_base`; `joints` says
     /// how the joints are and move at a time \[s\], and limits are not enforced.
     ///
     /// [`World::drive`] brings states to their start. Distances reach as far as the margin of `shape`.
@@ -77,7 +77,7 @@ impl World {
     /// the rollout says that the link's state is not finite.
     pub fn add_robot(
         &mut self,
-        robot: &Robot,
+        robot: &KinematicTree,
         shape: &RobotShape,
         t_world_base: &Isometry3<f64>,
         joints: impl Fn(f64) -> JointState + Send + Sync + 'static,
@@ -128,7 +128,7 @@ mod tests {
     fn arm(
         joints: impl Fn(f64) -> JointState + Send + Sync + 'static,
     ) -> (World, Vec<Option<usize>>) {
-        let robot = Robot::from_urdf_str(ARM, None).unwrap();
+        let robot = KinematicTree::from_urdf_str(ARM, None).unwrap();
         let shape = RobotShape::new(&robot, 0.004, 0.012).unwrap();
         let base = Isometry3::new(Vector3::new(0.1, -0.2, 0.3), Vector3::new(0.0, 0.0, 0.5));
         let mut world = World::new(Vector3::zeros());
@@ -196,7 +196,7 @@ mod tests {
 
     #[test]
     fn what_does_not_fit_is_refused() {
-        let robot = Robot::from_urdf_str(ARM, None).unwrap();
+        let robot = KinematicTree::from_urdf_str(ARM, None).unwrap();
         let shape = RobotShape::new(&robot, 0.01, 0.01).unwrap();
         let mut world = World::new(Vector3::zeros());
         let short = |_: f64| JointState { position: vec![0.0; 2], velocity: vec![0.0] };

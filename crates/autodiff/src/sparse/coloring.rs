@@ -17,8 +17,7 @@ pub(super) struct Coloring {
 impl Coloring {
     /// Colors the rows of `lines`, whose transpose is `crossing`: greedily, those with the most neighbors first.
     pub(super) fn new(lines: &Pattern, crossing: &Pattern) -> Self {
-        let neighbors =
-            |line: usize| lines.row(line).iter().flat_map(|&other| crossing.row(other));
+        let neighbors = |line: usize| lines.row(line).iter().flat_map(|&other| crossing.row(other));
         let count = lines.rows();
         let mut last_seen_from = vec![usize::MAX; count];
         let degrees: Vec<usize> = (0..count)

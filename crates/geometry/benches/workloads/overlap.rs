@@ -3,7 +3,7 @@
 use std::slice::from_ref;
 
 use nalgebra::{Isometry3, Point3, Vector3};
-use prehend_geometry::{SplitMix64, TriMesh, UnionBody};
+use prehend_geometry::{SolidUnion, SplitMix64, TriMesh};
 
 use super::table::Comparison;
 
@@ -54,7 +54,7 @@ pub(super) fn poses() -> Vec<Isometry3<f64>> {
     let mut pose = || {
         let mut vector = || Vector3::from_fn(|_, _| random.normal());
         let (axis, shift) = (vector().normalize(), vector() * 0.015);
-        Isometry3::new(shift, axis * (random.unit() * std::f64::consts::PI))
+        Isometry3::new(shift, axis * (random.uniform() * std::f64::consts::PI))
     };
     std::iter::once(Isometry3::identity()).chain((1..200).map(|_| pose())).collect()
 }
@@ -120,11 +120,11 @@ fn cube(size: f64, low: Vector3<f64>) -> TriMesh {
     TriMesh::new((0..8).map(corner).collect(), faces.into_iter().flatten().collect())
 }
 
-fn prepared(parts: &[TriMesh]) -> UnionBody {
-    UnionBody::new(parts).expect("closed parts")
+fn prepared(parts: &[TriMesh]) -> SolidUnion {
+    SolidUnion::new(parts).expect("closed parts")
 }
 
 /// \[cm³\]
-fn shared(union: &UnionBody, body: &TriMesh) -> f64 {
+fn shared(union: &SolidUnion, body: &TriMesh) -> f64 {
     union.intersection_volume(body).map_or(f64::NAN, |volume| volume * CM3_PER_M3)
 }

@@ -24,7 +24,7 @@ pub(crate) fn query_sets(body: &TriMesh) -> [QuerySet; 3] {
     let (low, high) = body.bounds().expect("a body with vertices");
     let middle = nalgebra::center(&low, &high);
     let around = (0..COUNT)
-        .map(|_| middle + (high - low).map(|size| 1.5 * size * (random.unit() - 0.5)))
+        .map(|_| middle + (high - low).map(|size| 1.5 * size * (random.uniform() - 0.5)))
         .collect();
     let on = on.into_iter().map(|s| s.point).collect();
     [("on surface", on), ("near", near), ("1.5× box", around)]
@@ -43,9 +43,9 @@ pub(crate) fn on_surface(mesh: &TriMesh, count: usize, seed: u64) -> Vec<Sample>
         .collect();
     (0..count)
         .map(|_| {
-            let at = random.unit() * total;
+            let at = random.uniform() * total;
             let face = sums.partition_point(|&sum| sum <= at);
-            let (root, along) = (random.unit().sqrt(), random.unit());
+            let (root, along) = (random.uniform().sqrt(), random.uniform());
             let [a, b, c] = mesh.triangle(face);
             let point = a + (b - a) * (root * (1.0 - along)) + (c - a) * (root * along);
             Sample { point, normal: mesh.area_vector(face).normalize() }

@@ -19,7 +19,7 @@ impl Tetrahedron {
         let faces = vec![[0, 2, 1], [0, 3, 2], [0, 1, 3], [1, 2, 3]];
         let mesh = TriMesh::new(corners.map(Point3::from).to_vec(), faces);
         let mut random = SplitMix64::new(0);
-        let mut coordinate = || 5.0 * random.unit() - 2.0;
+        let mut coordinate = || 5.0 * random.uniform() - 2.0;
         let mut point = || Point3::new(coordinate(), coordinate(), coordinate());
         Self { mesh, points: (0..200_000).map(|_| point()).collect() }
     }

@@ -119,7 +119,7 @@ mod tests {
         let bounds = (Point3::new(-0.25, -0.25, -0.25), Point3::new(0.25, 0.25, 0.25));
         let mut random = crate::SplitMix64::new(2);
         let mut points: Vec<Point3<f64>> =
-            (0..500).map(|_| Point3::from([(); 3].map(|()| random.unit() - 0.5))).collect();
+            (0..500).map(|_| Point3::from([(); 3].map(|()| random.uniform() - 0.5))).collect();
         points.extend([Point3::new(f64::NAN, 1e300, -1e300), Point3::new(f64::INFINITY, 0.0, 0.0)]);
         let order = along_a_curve(&points, &bounds);
         let mut all = order.clone();
@@ -135,7 +135,7 @@ mod tests {
         let mut random = crate::SplitMix64::new(4);
         for bits in [0, 3, 11, 12, 30, 32] {
             let keys: Vec<u32> =
-                (0..3000).map(|_| (random.unit() * 2_f64.powi(bits)) as u32).collect();
+                (0..3000).map(|_| (random.uniform() * 2_f64.powi(bits)) as u32).collect();
             let mut expected: Vec<u32> = (0..3000).collect();
             expected.sort_by_key(|&i| keys[i as usize]);
             assert_eq!(sorted(&keys), expected);

@@ -108,7 +108,7 @@ mod tests {
     use crate::{SplitMix64, TriMesh};
 
     fn vector(random: &mut SplitMix64) -> Vector3<f64> {
-        Vector3::from([(); 3].map(|()| random.unit() - 0.5))
+        Vector3::from([(); 3].map(|()| random.uniform() - 0.5))
     }
 
     /// Query, corner, corner, corner.

@@ -195,7 +195,7 @@ impl ClosestPoints {
     /// As [`Self::closest`], trying `face` first: the answer for a nearby point, or for this point a
     /// moment ago, spares most of the search. The answer does not depend on the hint; a face that does not exist is none.
     #[inline]
-    pub fn closest_from(
+    pub fn closest_with_hint(
         &self,
         point: &Point3<f64>,
         max_distance: f64,

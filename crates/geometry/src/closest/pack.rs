@@ -137,7 +137,7 @@ mod tests {
     fn agrees_with_double_precision_however_thin_the_triangle() {
         let mut random = SplitMix64::new(23);
         let mut vector =
-            |scale: f64| Vector3::from([(); 3].map(|()| scale * (random.unit() - 0.5)));
+            |scale: f64| Vector3::from([(); 3].map(|()| scale * (random.uniform() - 0.5)));
         for case in 0..3000 {
             let (a, b) = (vector(1.0), vector(1.0));
             let c = match case % 6 {

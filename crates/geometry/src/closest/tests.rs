@@ -3,7 +3,7 @@ use crate::SplitMix64;
 
 /// Within half a meter of the origin along each axis.
 fn point(random: &mut SplitMix64) -> Point3<f64> {
-    Point3::from([(); 3].map(|()| random.unit() - 0.5))
+    Point3::from([(); 3].map(|()| random.uniform() - 0.5))
 }
 
 /// A closed bumpy ball of `2 n (n - 1)` faces, seams and poles shared.
@@ -64,7 +64,7 @@ fn agrees_with_every_triangle_in_turn() {
             assert!(tree.closest(&p, expected * 1.001).is_some());
             // Any hint, good or bad, leaves the distance alone.
             for hint in [0, found.face, 500, u32::MAX] {
-                let hinted = tree.closest_from(&p, f64::INFINITY, hint).unwrap();
+                let hinted = tree.closest_with_hint(&p, f64::INFINITY, hint).unwrap();
                 assert_eq!(hinted, found);
             }
         }
@@ -197,9 +197,9 @@ fn the_sign_holds_on_thin_tetrahedra() {
         for _ in 0..50 {
             let flat = |p: Point3<f64>| Point3::new(p.x, p.y, p.z * thickness);
             let turn = nalgebra::Rotation3::from_euler_angles(
-                random.unit() - 0.5,
-                random.unit() - 0.5,
-                random.unit() - 0.5,
+                random.uniform() - 0.5,
+                random.uniform() - 0.5,
+                random.uniform() - 0.5,
             );
             let corners = [(); 4].map(|()| turn * flat(point(&mut random)));
             let volume = (corners[1] - corners[0])

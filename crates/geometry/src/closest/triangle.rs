@@ -164,7 +164,7 @@ mod tests {
     #[test]
     fn every_region_agrees_with_a_dense_lattice() {
         let mut random = SplitMix64::new(1);
-        let mut next = || random.unit() - 0.5;
+        let mut next = || random.uniform() - 0.5;
         let mut seen = [false; 7];
         for case in 0..200 {
             let mut point = || Point3::new(next(), next(), next());

@@ -49,7 +49,7 @@ mod tests {
 
     fn cloud(n: usize) -> PointCloud {
         let mut random = SplitMix64::new(5);
-        let mut next = || 0.2 * random.unit() - 0.1;
+        let mut next = || 0.2 * random.uniform() - 0.1;
         let points = (0..n).map(|_| Point3::new(next(), next(), next())).collect();
         PointCloud { points, normals: Some(vec![Vector3::z(); n]) }
     }

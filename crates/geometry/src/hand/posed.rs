@@ -5,11 +5,11 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use super::allegro::{Part, link, link_name};
 use super::{JOINT_COUNT, JOINT_NAMES, allegro_xela_urdf};
 use crate::shapes::{capsule, cuboid};
-use crate::{Robot, TriMesh};
+use crate::{KinematicTree, TriMesh};
 
 /// `t_base_link` of links 0–15.
 pub(super) fn link_poses(q: &[f64; JOINT_COUNT]) -> Vec<Isometry3<f64>> {
-    let robot = Robot::from_urdf_str(&allegro_xela_urdf(), None).unwrap();
+    let robot = KinematicTree::from_urdf_str(&allegro_xela_urdf(), None).unwrap();
     let state = JOINT_NAMES.map(str::to_owned).into_iter().zip(*q).collect();
     let poses = robot.forward_kinematics(&robot.joint_vector(&state).unwrap());
     (0..JOINT_COUNT).map(|i| poses[robot.link_index(&link_name(Some(i))).unwrap()]).collect()

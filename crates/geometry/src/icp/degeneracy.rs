@@ -73,7 +73,7 @@ fn scaling(length: f64) -> Vector6<f64> {
 mod tests {
     use super::super::{Match, Metric};
     use super::*;
-    use crate::{Kernel, SplitMix64};
+    use crate::{RobustKernel, SplitMix64};
     use nalgebra::Vector3;
 
     /// Point-to-plane matches of `points` with themselves, shifted by `shift`.
@@ -82,7 +82,7 @@ mod tests {
         for (p, normal) in points {
             let target = Match { point: Point3::from(p - shift), normal: *normal };
             let (p, center) = (Point3::from(*p), Point3::origin());
-            sums.add(Metric::PointToPlane, Kernel::Squared, &p, &target, &center);
+            sums.add(Metric::PointToPlane, RobustKernel::Squared, &p, &target, &center);
         }
         sums
     }

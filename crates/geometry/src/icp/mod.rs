@@ -23,10 +23,10 @@ use rayon::prelude::*;
 
 pub use self::degeneracy::Degeneracy;
 pub use self::normal_equations::{Metric, NormalEquations};
-pub use self::target::{CloudTarget, Match, MeshTarget, Target, Vicinity};
+pub use self::target::{CloudTarget, Match, MatchCache, MeshTarget, Target};
 use crate::closest::ClosestError;
 use crate::cloud::CloudError;
-use crate::{KdTree, Kernel};
+use crate::{KdTree, RobustKernel};
 
 /// Source points whose sums are formed one after the other: sums do not depend on the number of threads.
 const CHUNK: usize = 1024;
@@ -37,7 +37,7 @@ pub struct IcpSettings {
     /// Which distance of a match counts.
     pub metric: Metric,
     /// How large residuals are forgiven.
-    pub kernel: Kernel,
+    pub kernel: RobustKernel,
     /// Points farther from the target count for nothing \[m\]; may be infinite.
     pub max_distance: f64,
     /// Steps taken at most; none evaluates the initial pose.
@@ -54,7 +54,7 @@ impl Default for IcpSettings {
     fn default() -> Self {
         Self {
             metric: Metric::PointToPlane,
-            kernel: Kernel::Squared,
+            kernel: RobustKernel::Squared,
             max_distance: 0.02,
             max_iterations: 50,
             translation_tolerance: 1e-6,

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix6, Point3, Vector3, Vector6};
 
 use super::Match;
-use crate::Kernel;
+use crate::RobustKernel;
 
 /// Which distance of a match counts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -52,7 +52,7 @@ impl NormalEquations {
     pub fn add(
         &mut self,
         metric: Metric,
-        kernel: Kernel,
+        kernel: RobustKernel,
         point: &Point3<f64>,
         target: &Match,
         center: &Point3<f64>,
@@ -99,7 +99,7 @@ impl NormalEquations {
 
     /// Adds the loss and returns the weight, or `None` where it is zero.
     #[inline]
-    fn weigh(&mut self, kernel: Kernel, r2: f64) -> Option<f64> {
+    fn weigh(&mut self, kernel: RobustKernel, r2: f64) -> Option<f64> {
         self.cost += kernel.loss(r2);
         let weight = kernel.weight(r2);
         if weight <= 0.0 {
@@ -187,7 +187,7 @@ mod tests {
                         // Tukey and Huber bend where they are joined.
                         prop_assert!((g - r).abs() < 1e-5, "{:?} {:?}: {} {}", metric, kernel, g, r);
                     }
-                    if kernel == Kernel::Squared && !matches.is_empty() {
+                    if kernel == RobustKernel::Squared && !matches.is_empty() {
                         let rows = finite_difference_jacobian(residuals, &[0.0; 6], 1e-3);
                         let matrix = Matrix6::from_fn(|i, j| rows.iter().map(|r| r[i] * r[j]).sum());
                         prop_assert!((matrix - at.matrix).norm() < 1e-8, "{:?}", metric);
@@ -203,9 +203,15 @@ mod tests {
         let (origin, far) = (Point3::origin(), Point3::new(0.0, 0.0, 1.0));
         let target = Match { point: far, normal: Vector3::zeros() };
         let mut sums = NormalEquations::new();
-        sums.add(Metric::PointToPlane, Kernel::Squared, &origin, &target, &origin);
+        sums.add(Metric::PointToPlane, RobustKernel::Squared, &origin, &target, &origin);
         assert_eq!(sums, NormalEquations::default());
-        sums.add(Metric::PointToPoint, Kernel::Tukey { scale: 0.5 }, &origin, &target, &origin);
+        sums.add(
+            Metric::PointToPoint,
+            RobustKernel::Tukey { scale: 0.5 },
+            &origin,
+            &target,
+            &origin,
+        );
         assert_eq!((sums.inliers, sums.weight, sums.rms()), (0, 0.0, 0.0));
         assert!((sums.cost - 0.25 / 6.0).abs() < 1e-16);
     }

@@ -72,14 +72,14 @@ impl CloudTarget {
 
 /// An answer of a [`CloudTarget`], and how far from there it holds.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Vicinity {
+pub struct MatchCache {
     nearest: Option<usize>,
     query: Point3<f64>,
     /// No other point is nearer to `query` than this \[m\].
     others: f64,
 }
 
-impl Vicinity {
+impl MatchCache {
     /// Whether the nearest point, `point`, is still that of `query`: by the triangle inequality no other can be
     /// nearer before the two ways, of the query and to the point, add up to the distance of the others.
     #[inline]
@@ -92,14 +92,14 @@ impl Vicinity {
 }
 
 impl Target for CloudTarget {
-    type Memory = Vicinity;
+    type Memory = MatchCache;
 
     #[inline]
     fn closest(
         &self,
         query: &Point3<f64>,
         max_distance: f64,
-        memory: &mut Vicinity,
+        memory: &mut MatchCache,
     ) -> Option<Match> {
         let points = self.tree.points();
         let index = match memory.nearest {
@@ -107,7 +107,7 @@ impl Target for CloudTarget {
             last => {
                 let found = self.tree.nearest_alone(query, max_distance, last);
                 let (nearest, others) = found.map(|(n, d2)| (n.index, d2.sqrt())).unzip();
-                *memory = Vicinity { nearest, query: *query, others: others.unwrap_or(0.0) };
+                *memory = MatchCache { nearest, query: *query, others: others.unwrap_or(0.0) };
                 nearest?
             }
         };
@@ -151,7 +151,7 @@ impl Target for MeshTarget {
         memory: &mut Option<u32>,
     ) -> Option<Match> {
         let found = match *memory {
-            Some(face) => self.surface.closest_from(query, max_distance, face)?,
+            Some(face) => self.surface.closest_with_hint(query, max_distance, face)?,
             None => self.surface.closest(query, max_distance)?,
         };
         *memory = Some(found.face);

@@ -177,7 +177,7 @@ fn bad_input_is_named() {
     assert!(matches!(error(&seen, lost, good), IcpError::Setting { name: "t_target_source", .. }));
     let bad = IcpSettings { max_distance: f64::NAN, ..good };
     assert!(matches!(error(&seen, start, bad), IcpError::Setting { name: "max_distance", .. }));
-    let bad = IcpSettings { kernel: Kernel::Tukey { scale: 0.0 }, ..good };
+    let bad = IcpSettings { kernel: RobustKernel::Tukey { scale: 0.0 }, ..good };
     assert_eq!(error(&seen, start, bad), IcpError::Setting { name: "kernel", value: 0.0 });
     let nowhere = [Point3::new(0.0, 0.0, f64::NAN)];
     assert_eq!(error(&nowhere, start, good), CloudError::Coordinate { index: 0 }.into());

@@ -23,7 +23,7 @@ use std::path::{Path, PathBuf};
 
 use crate::TriMesh;
 pub use error::MeshError;
-pub use whole::write_whole;
+pub use whole::write_atomic;
 
 impl TriMesh {
     /// Reads a mesh by the extension of `path`: `.ply`, `.obj`, `.stl`, `.gltf` or `.glb`, in the file's unit.

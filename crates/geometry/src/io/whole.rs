@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 ///
 /// # Errors
 /// What the system said; a file that was there before is then unchanged, and no other is left.
-pub fn write_whole(path: &Path, content: &[u8]) -> io::Result<()> {
+pub fn write_atomic(path: &Path, content: &[u8]) -> io::Result<()> {
     WholeFile::write(path, content)?.commit()
 }
 
@@ -64,14 +64,14 @@ mod tests {
         let target = folder.path().join("a.bin");
         drop(WholeFile::write(&target, b"x").unwrap());
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
-        write_whole(&target, b"a much longer first version").unwrap();
-        write_whole(&target, b"second").unwrap();
+        write_atomic(&target, b"a much longer first version").unwrap();
+        write_atomic(&target, b"second").unwrap();
         assert_eq!(std::fs::read(&target).unwrap(), b"second");
-        assert!(write_whole(&folder.path().join("no/a.bin"), b"y").is_err());
+        assert!(write_atomic(&folder.path().join("no/a.bin"), b"y").is_err());
         // A folder in the way stops the rename.
         let taken = folder.path().join("taken");
         std::fs::create_dir(&taken).unwrap();
-        assert!(write_whole(&taken, b"y").is_err());
+        assert!(write_atomic(&taken, b"y").is_err());
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2);
     }
 }

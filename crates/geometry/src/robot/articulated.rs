@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector, Isometry3, Point3, Vector3, Vector6};
 
-use super::{Drive, Motion, PosedRobot, Robot, RobotError, RobotShape};
+use super::{Drive, KinematicTree, Motion, PosedRobot, RobotError, RobotShape};
 use crate::{DistanceField, FieldSample};
 
 /// A robot posed by its base and its joints: a [`PosedRobot`] that knows how each link moves.
@@ -12,14 +12,14 @@ use crate::{DistanceField, FieldSample};
 /// ```
 /// # use std::sync::Arc;
 /// # use nalgebra::{Isometry3, Point3};
-/// # use prehend_geometry::robot::{ArticulatedRobot, Robot, RobotShape};
-/// let robot = Robot::from_urdf_str(r#"<robot name="lever"><link name="base"/>
+/// # use prehend_geometry::robot::{ArticulatedRobot, KinematicTree, RobotShape};
+/// let robot = KinematicTree::from_urdf_str(r#"<robot name="lever"><link name="base"/>
 ///     <link name="arm"><collision><geometry><box size="0.2 0.02 0.02"/></geometry></collision></link>
 ///     <joint name="q" type="continuous"><parent link="base"/><child link="arm"/><axis xyz="0 0 1"/></joint>
 ///     </robot>"#, None)?;
 /// let shape = Arc::new(RobotShape::new(&robot, 0.002, 0.02)?);
 /// let posed = ArticulatedRobot::new(&robot, shape, &Isometry3::identity(), &[0.0])?;
-/// let sample = posed.sample_motion(&Point3::new(0.05, 0.02, 0.0), 0.02).ok_or("out of reach")?;
+/// let sample = posed.distance_with_gradient(&Point3::new(0.05, 0.02, 0.0), 0.02).ok_or("out of reach")?;
 /// // The arm, 5 cm from its joint, comes nearer by 5 cm a radian.
 /// assert!((sample.field.distance - 0.01).abs() < 1e-4 && (sample.joints[0] + 0.05).abs() < 1e-3);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -71,13 +71,13 @@ struct Direction {
 
 impl ArticulatedRobot {
     /// Poses `robot` with its base at `t_world_base` and its joints at `joints` \[rad or m\], limits not enforced
-    /// ([`Robot::check_joints`] tells).
+    /// ([`KinematicTree::check_joints`] tells).
     ///
     /// # Errors
     /// [`RobotError::JointCount`] or [`RobotError::Number`] for the joints, [`RobotError::PoseCount`] where `shape` is
     /// that of another robot, [`RobotError::Number`] for a base that is not finite.
     pub fn new(
-        robot: &Robot,
+        robot: &KinematicTree,
         shape: Arc<RobotShape>,
         t_world_base: &Isometry3<f64>,
         joints: &[f64],
@@ -116,13 +116,13 @@ impl ArticulatedRobot {
     ///
     /// A link that moves by v at the point changes the distance by −∇φ·v. Exact for the links' grids; where
     /// two links are equally near the gradient is that of one of them.
-    pub fn sample_motion(&self, point: &Point3<f64>, reach: f64) -> Option<RobotSample> {
+    pub fn distance_with_gradient(&self, point: &Point3<f64>, reach: f64) -> Option<RobotSample> {
         let (link, field) = self.posed.sample_link(point, reach)?;
         let g = field.gradient;
         let torque = -(point - self.center).cross(&g);
         let base = Vector6::new(-g.x, -g.y, -g.z, torque.x, torque.y, torque.z);
         let mut joints = DVector::zeros(self.variables);
-        for (variable, velocity) in self.velocities(link, point) {
+        for (variable, velocity) in self.point_jacobian(link, point) {
             joints[variable] -= g.dot(&velocity);
         }
         Some(RobotSample { link, field, base, joints })
@@ -133,7 +133,7 @@ impl ArticulatedRobot {
     ///
     /// # Panics
     /// If there is no such link.
-    pub fn velocities(
+    pub fn point_jacobian(
         &self,
         link: usize,
         point: &Point3<f64>,
@@ -214,7 +214,7 @@ mod tests {
         </robot>"#;
 
     struct Setting {
-        robot: Robot,
+        robot: KinematicTree,
         shape: Arc<RobotShape>,
         base: Isometry3<f64>,
         joints: [f64; 2],
@@ -222,7 +222,7 @@ mod tests {
 
     impl Setting {
         fn new(joints: [f64; 2]) -> Self {
-            let robot = Robot::from_urdf_str(ARM, None).unwrap();
+            let robot = KinematicTree::from_urdf_str(ARM, None).unwrap();
             let shape = Arc::new(RobotShape::new(&robot, 0.004, 0.02).unwrap());
             let base = Isometry3::new(Vector3::new(0.3, -0.2, 0.5), Vector3::new(0.4, 1.0, -0.7));
             Self { robot, shape, base, joints }
@@ -243,7 +243,7 @@ mod tests {
             let links = posed.posed().t_world_links().to_vec();
             (0..240)
                 .map(|i| {
-                    let mut unit = || random.unit() - 0.5;
+                    let mut unit = || random.uniform() - 0.5;
                     links[i % links.len()] * Point3::new(0.09 * unit(), 0.1 * unit(), 0.14 * unit())
                 })
                 .collect()
@@ -265,7 +265,7 @@ mod tests {
             let robot = setting.at(&[0.0; 11]);
             let (mut checked, mut of_link, mut errors) = (0, [0; 5], Vec::new());
             for point in setting.points() {
-                let Some(sample) = robot.sample_motion(&point, 0.02) else { continue };
+                let Some(sample) = robot.distance_with_gradient(&point, 0.02) else { continue };
                 let hessian = robot.hessian(&point, &sample);
                 let gradient = |s: &RobotSample| {
                     let mut all = s.field.gradient.as_slice().to_vec();
@@ -279,7 +279,7 @@ mod tests {
                         let mut x = [0.0; 11];
                         x[i] = sign * step;
                         let p = point + Vector3::new(x[0], x[1], x[2]);
-                        let s = setting.at(&x).sample_motion(&p, 0.021);
+                        let s = setting.at(&x).distance_with_gradient(&p, 0.021);
                         s.filter(|s| s.link == sample.link)
                     };
                     // Next to a crease between links there is no derivative.
@@ -313,14 +313,14 @@ mod tests {
         let robot = setting.at(&[0.0; 11]);
         let mut errors = Vec::new();
         for point in setting.points().into_iter().take(80) {
-            let Some(sample) = robot.sample_motion(&point, 0.015) else { continue };
+            let Some(sample) = robot.distance_with_gradient(&point, 0.015) else { continue };
             let hessian = robot.hessian(&point, &sample);
             let step = 4e-6;
             let value = |moves: [(usize, f64); 2]| {
                 let mut x = [0.0; 11];
                 moves.iter().for_each(|(i, d)| x[*i] += d * step);
                 let p = point + Vector3::new(x[0], x[1], x[2]);
-                let s = setting.at(&x).sample_motion(&p, 0.02)?;
+                let s = setting.at(&x).distance_with_gradient(&p, 0.02)?;
                 (s.link == sample.link).then_some(s.field.distance)
             };
             for i in 0..11 {

@@ -77,12 +77,12 @@ mod tests {
 
     use super::*;
     use crate::hand::{JOINT_COUNT, allegro_xela_urdf};
-    use crate::robot::{Robot, RobotShape};
+    use crate::robot::{KinematicTree, RobotShape};
     use crate::{ClosestPoints, SplitMix64};
 
     #[test]
     fn it_is_the_closest_point_of_all_bodies_in_one_mesh() {
-        let robot = Robot::from_urdf_str(&allegro_xela_urdf(), None).unwrap();
+        let robot = KinematicTree::from_urdf_str(&allegro_xela_urdf(), None).unwrap();
         // A coarse grid: it does not enter here.
         let shape = Arc::new(RobotShape::new(&robot, 0.01, 0.01).unwrap());
         let base = Isometry3::new(Vector3::new(0.3, -0.2, 0.5), Vector3::new(0.4, 1.0, -0.7));
@@ -91,7 +91,7 @@ mod tests {
         let posed = PosedRobot::new(shape, poses).unwrap();
         let whole = ClosestPoints::new(&posed.mesh()).unwrap();
         let mut random = SplitMix64::new(2);
-        let mut unit = || random.unit() - 0.5;
+        let mut unit = || random.uniform() - 0.5;
         let points: Vec<_> = (0..2000)
             .map(|_| base * Point3::new(0.3 * unit(), 0.4 * unit(), 0.5 * unit()))
             .collect();

@@ -114,7 +114,7 @@ fn resolve(file: &str, asset_dir: Option<&Path>) -> Result<PathBuf, String> {
 mod tests {
     use std::f64::consts::PI;
 
-    use super::super::Robot;
+    use super::super::KinematicTree;
     use crate::ClosestPoints;
     use crate::closest::SignMethod;
     use crate::mass::signed_volume;
@@ -135,7 +135,7 @@ mod tests {
         std::fs::write(root.path().join("b.obj"), obj).unwrap();
         let read = |file: &str| {
             let xml = link(&format!("<mesh filename=\"{file}\" scale=\"1 -2 1\"/>"));
-            Robot::from_urdf_str(&xml, Some(&folder)).map_err(|e| e.to_string())
+            KinematicTree::from_urdf_str(&xml, Some(&folder)).map_err(|e| e.to_string())
         };
         for file in [
             "meshes/a.obj",
@@ -155,7 +155,7 @@ mod tests {
         let missing = read("meshes/c.obj").unwrap_err();
         assert!(missing.contains("link 'l'") && missing.contains("meshes/c.obj"), "{missing}");
         assert!(read("http://x/a.obj").unwrap_err().contains("only package://"));
-        assert!(Robot::from_urdf_str(&link("<mesh filename=\"a.obj\"/>"), None).is_err());
+        assert!(KinematicTree::from_urdf_str(&link("<mesh filename=\"a.obj\"/>"), None).is_err());
         #[cfg(unix)]
         {
             std::os::unix::fs::symlink(root.path().join("b.obj"), folder.join("out.obj")).unwrap();
@@ -176,7 +176,7 @@ mod tests {
             ("<sphere radius=\"1\"/>", 2208, 4.0 / 3.0 * PI, 0.008),
             ("<capsule radius=\"1\" length=\"2\"/>", 2304, (2.0 + 4.0 / 3.0) * PI, 0.008),
         ] {
-            let robot = Robot::from_urdf_str(&link(geometry), None).unwrap();
+            let robot = KinematicTree::from_urdf_str(&link(geometry), None).unwrap();
             let part = &robot.links()[0].parts[0];
             assert_eq!(part.faces.len(), faces, "{geometry}");
             assert_eq!(ClosestPoints::new(part).unwrap().sign_method(), SignMethod::PseudoNormal);
@@ -190,7 +190,8 @@ mod tests {
         for geometry in
             ["<box size=\"1 0 3\"/>", "<sphere radius=\"-1\"/>", "<sphere radius=\"NaN\"/>"]
         {
-            let message = Robot::from_urdf_str(&link(geometry), None).unwrap_err().to_string();
+            let message =
+                KinematicTree::from_urdf_str(&link(geometry), None).unwrap_err().to_string();
             assert!(message.contains("link 'l'") && message.contains("positive"), "{message}");
         }
     }

@@ -3,16 +3,16 @@
 use nalgebra::{Isometry3, Matrix6xX, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use prehend_autodiff::Scalar;
 
-use super::{Drive, Joint, Motion, Robot};
+use super::{Drive, Joint, KinematicTree, Motion};
 
-impl Robot {
-    /// Pose `t_base_link` of every link in the frame of the root link, in the order of [`Robot::links`].
+impl KinematicTree {
+    /// Pose `t_base_link` of every link in the frame of the root link, in the order of [`KinematicTree::links`].
     ///
-    /// `joints` are the positions \[rad or m\] in the order of [`Robot::joint_names`]; limits are not enforced.
+    /// `joints` are the positions \[rad or m\] in the order of [`KinematicTree::joint_names`]; limits are not enforced.
     /// Derivatives pass through exactly, at zero too.
     ///
     /// # Panics
-    /// If `joints` has not one entry a name ([`Robot::joint_vector`] makes one that has).
+    /// If `joints` has not one entry a name ([`KinematicTree::joint_vector`] makes one that has).
     pub fn forward_kinematics<S: Scalar>(&self, joints: &[S]) -> Vec<Isometry3<S>> {
         assert_eq!(joints.len(), self.variables.len(), "one position a joint name");
         let mut poses = vec![Isometry3::identity(); self.links.len()];
@@ -99,13 +99,13 @@ mod tests {
         <joint name="q3" type="revolute"><parent link="l2"/><child link="l3"/><origin xyz="0 0 0.0384"/><axis xyz="0 1 0"/><mimic joint="q1" multiplier="0.7" offset="0.1"/><limit lower="0" upper="2" velocity="1" effort="1"/></joint>
         </robot>"#;
 
-    fn finger() -> Robot {
-        Robot::from_urdf_str(FINGER, None).unwrap()
+    fn finger() -> KinematicTree {
+        KinematicTree::from_urdf_str(FINGER, None).unwrap()
     }
 
     #[test]
     fn a_planar_chain_has_its_textbook_pose() {
-        let robot = Robot::from_urdf_str(
+        let robot = KinematicTree::from_urdf_str(
             r#"<robot name="two"><link name="a"/><link name="b"/><link name="c"/>
             <joint name="p" type="continuous"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/></joint>
             <joint name="q" type="continuous"><parent link="b"/><child link="c"/><origin xyz="2 0 0"/><axis xyz="0 0 1"/></joint></robot>"#,

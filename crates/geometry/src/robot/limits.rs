@@ -1,6 +1,6 @@
 //! Joint limits: checking and clamping joint vectors.
 
-use super::{Drive, Joint, Robot, RobotError};
+use super::{Drive, Joint, KinematicTree, RobotError};
 
 /// Positions that an entry of the joint vector may take.
 #[derive(Clone, Debug)]
@@ -56,7 +56,7 @@ impl Range {
     }
 }
 
-impl Robot {
+impl KinematicTree {
     /// Smallest and largest position \[rad or m\] of each entry of the joint vector, infinite where there is no limit.
     ///
     /// The limits of joints that mimic an entry count too, so that none of them leaves its own.
@@ -64,7 +64,7 @@ impl Robot {
         self.ranges.iter().map(|r| (r.lower, r.upper)).collect()
     }
 
-    /// Whether `joints` holds one finite position for each of [`Robot::joint_names`], all within their limits.
+    /// Whether `joints` holds one finite position for each of [`KinematicTree::joint_names`], all within their limits.
     ///
     /// # Errors
     /// [`RobotError::JointCount`], [`RobotError::Number`] or [`RobotError::OutsideLimits`], naming the joint.
@@ -113,7 +113,7 @@ impl Robot {
 mod tests {
     use super::*;
 
-    fn robot(mimic_limit: &str, last: &str) -> Result<Robot, RobotError> {
+    fn robot(mimic_limit: &str, last: &str) -> Result<KinematicTree, RobotError> {
         let xml = format!(
             r#"<robot name="r"><link name="a"/><link name="b"/><link name="c"/><link name="d"/><link name="e"/>
             <joint name="p" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/><limit lower="-1" upper="2" effort="1" velocity="1"/></joint>
@@ -121,7 +121,7 @@ mod tests {
             <joint name="r" type="continuous"><parent link="c"/><child link="d"/><axis xyz="0 0 1"/></joint>
             <joint name="s" type="revolute"><parent link="d"/><child link="e"/><axis xyz="0 0 1"/>{last}</joint></robot>"#
         );
-        Robot::from_urdf_str(&xml, None)
+        KinematicTree::from_urdf_str(&xml, None)
     }
 
     fn limit(lower: f64, upper: f64) -> String {

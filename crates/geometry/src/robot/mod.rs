@@ -82,7 +82,7 @@ pub struct Joint {
 
 /// A tree of links and joints with one root, the base.
 #[derive(Clone, Debug)]
-pub struct Robot {
+pub struct KinematicTree {
     name: String,
     links: Vec<Link>,
     joints: Vec<Joint>,
@@ -95,7 +95,7 @@ pub struct Robot {
     ranges: Vec<limits::Range>,
 }
 
-impl Robot {
+impl KinematicTree {
     /// Name of the robot.
     pub fn name(&self) -> &str {
         &self.name

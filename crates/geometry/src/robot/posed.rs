@@ -32,7 +32,7 @@ struct Solid {
 }
 
 impl PosedRobot {
-    /// Poses a robot: `t_world_links` are the link poses in the order of [`super::Robot::links`], such
+    /// Poses a robot: `t_world_links` are the link poses in the order of [`super::KinematicTree::links`], such
     /// as forward kinematics times the pose of the base, in whatever frame the queries will be.
     ///
     /// # Errors
@@ -79,7 +79,7 @@ impl PosedRobot {
         &self.shape
     }
 
-    /// Pose of every link, in the order of [`super::Robot::links`].
+    /// Pose of every link, in the order of [`super::KinematicTree::links`].
     pub fn t_world_links(&self) -> &[Isometry3<f64>] {
         &self.t_world_links
     }
@@ -215,7 +215,7 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::*;
-    use crate::robot::Robot;
+    use crate::robot::KinematicTree;
 
     /// Two boxes that overlap across a joint and a sphere at the end.
     const HAND: &str = r#"<robot name="hand"><link name="empty"/>
@@ -227,7 +227,7 @@ mod tests {
         </robot>"#;
 
     fn posed(angle: f64, spacing: f64) -> PosedRobot {
-        let robot = Robot::from_urdf_str(HAND, None).unwrap();
+        let robot = KinematicTree::from_urdf_str(HAND, None).unwrap();
         let shape = Arc::new(RobotShape::new(&robot, spacing, 0.012).unwrap());
         let base = Isometry3::new(Vector3::new(0.3, -0.2, 0.5), Vector3::new(0.4, 1.0, -0.7));
         let poses = robot.forward_kinematics(&[angle]).iter().map(|t| base * t).collect();

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 
-use super::{Robot, RobotError};
+use super::{KinematicTree, RobotError};
 use crate::{ClosestPoints, GridCache, SdfGrid, TriMesh};
 
 /// The collision shape of one link, in the link frame.
@@ -103,7 +103,7 @@ impl RobotShape {
     ///
     /// # Errors
     /// [`RobotError::Shape`], naming the link whose bodies cannot be used.
-    pub fn new(robot: &Robot, spacing: f64, margin: f64) -> Result<Self, RobotError> {
+    pub fn new(robot: &KinematicTree, spacing: f64, margin: f64) -> Result<Self, RobotError> {
         Self::cached(robot, spacing, margin, None)
     }
 
@@ -112,7 +112,7 @@ impl RobotShape {
     /// # Errors
     /// As [`Self::new`]; none that has to do with the cache.
     pub fn cached(
-        robot: &Robot,
+        robot: &KinematicTree,
         spacing: f64,
         margin: f64,
         cache: Option<&GridCache>,
@@ -141,12 +141,12 @@ impl RobotShape {
         Ok(Self { names: links.iter().map(|l| l.name.clone()).collect(), links: shapes })
     }
 
-    /// Names of the links, in the order of [`Robot::links`].
+    /// Names of the links, in the order of [`KinematicTree::links`].
     pub fn link_names(&self) -> &[String] {
         &self.names
     }
 
-    /// Shapes of the links, in the order of [`Robot::links`].
+    /// Shapes of the links, in the order of [`KinematicTree::links`].
     pub fn links(&self) -> &[Arc<LinkShape>] {
         &self.links
     }

@@ -1,4 +1,4 @@
-//! From URDF text to a [`Robot`].
+//! From URDF text to a [`KinematicTree`].
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
@@ -7,11 +7,11 @@ use std::path::Path;
 use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
 use urdf_rs::JointType;
 
-use super::{Drive, Joint, Link, Motion, Robot, RobotError, collision, limits, tree};
+use super::{Drive, Joint, KinematicTree, Link, Motion, RobotError, collision, limits, tree};
 use crate::io::folder::read_limited;
 use crate::limits::{MAX_URDF_BYTES, MAX_URDF_DEPTH};
 
-impl Robot {
+impl KinematicTree {
     /// Reads a URDF file; mesh files are looked for in its folder.
     ///
     /// # Errors
@@ -249,9 +249,9 @@ pub(super) fn isometry(
 mod tests {
     use super::*;
 
-    fn arm(joints: &str) -> Result<Robot, RobotError> {
+    fn arm(joints: &str) -> Result<KinematicTree, RobotError> {
         let links: String = "abc".chars().map(|c| format!("<link name=\"{c}\"/>")).collect();
-        Robot::from_urdf_str(&format!("<robot name=\"arm\">{links}{joints}</robot>"), None)
+        KinematicTree::from_urdf_str(&format!("<robot name=\"arm\">{links}{joints}</robot>"), None)
     }
 
     fn joint(name: &str, kind: &str, parent: &str, child: &str, more: &str) -> String {
@@ -313,22 +313,29 @@ mod tests {
         assert!(
             message(turning("<mimic joint=\"p\"/>")).contains("mimic joint 'p' is part of a cycle")
         );
-        assert!(matches!(Robot::from_urdf_str("<robot", None), Err(RobotError::Urdf { .. })));
-        assert!(matches!(Robot::from_urdf_str("", None), Err(RobotError::Urdf { .. })));
-        assert!(matches!(Robot::from_urdf_file("/nowhere/x.urdf"), Err(RobotError::Read { .. })));
+        assert!(matches!(
+            KinematicTree::from_urdf_str("<robot", None),
+            Err(RobotError::Urdf { .. })
+        ));
+        assert!(matches!(KinematicTree::from_urdf_str("", None), Err(RobotError::Urdf { .. })));
+        assert!(matches!(
+            KinematicTree::from_urdf_file("/nowhere/x.urdf"),
+            Err(RobotError::Read { .. })
+        ));
     }
 
     #[test]
     fn text_that_nests_without_end_is_refused() {
         for tag in ["<link name=\"l\">", "<x>", "<!-- > --><gazebo>"] {
             let xml = format!("<robot name=\"r\">{}", tag.repeat(200_000));
-            let error = Robot::from_urdf_str(&xml, None).unwrap_err();
+            let error = KinematicTree::from_urdf_str(&xml, None).unwrap_err();
             assert!(matches!(error, RobotError::TooLarge { limit: MAX_URDF_DEPTH, .. }), "{error}");
         }
         // Many tags side by side are no nest, nor are comments and values that look like tags.
         let link = |k: i32| format!("<!-- <a> --><link name=\"l{k}\"></link><x y='<>'/>");
         let links: String = (0..300).map(link).collect();
-        let error = Robot::from_urdf_str(&format!("<robot name=\"r\">{links}</robot>"), None);
+        let error =
+            KinematicTree::from_urdf_str(&format!("<robot name=\"r\">{links}</robot>"), None);
         assert!(matches!(error, Err(RobotError::Roots { .. })));
     }
 

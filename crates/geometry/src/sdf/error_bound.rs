@@ -44,7 +44,7 @@ impl SdfGrid {
                     worst = worst.max((self.evaluate(&p).distance - exact).abs());
                 }
                 measured = measured.max(worst);
-                certain = certain.max(worst + (1.0 + self.steepest([i, j, k])) * to_half);
+                certain = certain.max(worst + (1.0 + self.lipschitz_bound([i, j, k])) * to_half);
             }
             (measured, certain)
         };
@@ -55,7 +55,7 @@ impl SdfGrid {
     }
 
     /// An upper bound of the spline's slope within a cell \[1\].
-    fn steepest(&self, cell: [usize; 3]) -> f64 {
+    fn lipschitz_bound(&self, cell: [usize; 3]) -> f64 {
         let [_, ny, nz] = self.dims();
         let strides = [(ny + 2) * (nz + 2), nz + 2, 1];
         let first: usize = (0..3).map(|a| cell[a] * strides[a]).sum();
@@ -90,7 +90,7 @@ mod tests {
             let bound = grid.error_bound(&mesh, 0.006);
             let mut worst = 0.0_f64;
             for _ in 0..20_000 {
-                let p = Point3::from([(); 3].map(|()| 0.08 * (random.unit() - 0.5)));
+                let p = Point3::from([(); 3].map(|()| 0.08 * (random.uniform() - 0.5)));
                 let exact = mesh.signed_distance(&p).0;
                 if exact.abs() <= 0.006 {
                     worst = worst.max((grid.evaluate(&p).distance - exact + 0.001).abs());

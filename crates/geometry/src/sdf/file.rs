@@ -11,7 +11,7 @@ use nalgebra::Point3;
 
 use super::{Lattice, MAX_SAMPLES, SdfGrid};
 use crate::io::folder::read_limited;
-use crate::{MeshError, write_whole};
+use crate::{MeshError, write_atomic};
 
 const MAGIC: &[u8; 8] = b"PREHSDF\0";
 const VERSION: u32 = 2;
@@ -25,7 +25,7 @@ impl SdfGrid {
     /// # Errors
     /// [`MeshError::Write`].
     pub fn save(&self, path: &Path) -> Result<(), MeshError> {
-        write_whole(path, &self.to_bytes())
+        write_atomic(path, &self.to_bytes())
             .map_err(|source| MeshError::Write { path: path.into(), source })
     }
 

@@ -11,7 +11,7 @@ pub use self::pose::PoseDerivatives;
 use crate::closest::ClosestError;
 use crate::closest::triangle::Triangle;
 use crate::cloud::CloudError;
-use crate::{ClosestPoints, KdTree, Kernel, TriMesh};
+use crate::{ClosestPoints, KdTree, RobustKernel, TriMesh};
 
 /// Matches whose sums are formed one after the other: sums do not depend on the number of threads.
 const CHUNK: usize = 512;
@@ -21,7 +21,7 @@ const CHUNK: usize = 512;
 ///
 /// Equation 2 of the method this project implements. It is continuous in the pose of the mesh and in its vertices,
 /// and differentiable wherever each point has one nearest triangle and each triangle one nearest point; elsewhere
-/// the derivatives are those of one of the nearest. A [`Kernel`] other than the squared one replaces d² by twice
+/// the derivatives are those of one of the nearest. A [`RobustKernel`] other than the squared one replaces d² by twice
 /// its loss, so that outliers of either side count less.
 ///
 /// ```
@@ -43,7 +43,7 @@ pub struct SurfaceDistance {
     cloud: KdTree,
     /// The points of the cloud one near the other, so that a match is a good guess for the next.
     order: Vec<usize>,
-    kernel: Kernel,
+    kernel: RobustKernel,
 }
 
 /// Why two things have no distance.
@@ -60,7 +60,7 @@ pub enum SurfaceDistanceError {
     NoPoints,
     /// A kernel without a scale.
     #[error("the scale of a kernel must be positive and finite, not {0}")]
-    Kernel(f64),
+    RobustKernel(f64),
 }
 
 impl SurfaceDistance {
@@ -79,17 +79,17 @@ impl SurfaceDistance {
             faces: mesh.faces.clone(),
             order: cloud.order().collect(),
             cloud,
-            kernel: Kernel::Squared,
+            kernel: RobustKernel::Squared,
         })
     }
 
     /// The same with twice the loss of `kernel` for each squared distance.
     ///
     /// # Errors
-    /// [`SurfaceDistanceError::Kernel`] for a scale that is not positive and finite.
-    pub fn with_kernel(self, kernel: Kernel) -> Result<Self, SurfaceDistanceError> {
+    /// [`SurfaceDistanceError::RobustKernel`] for a scale that is not positive and finite.
+    pub fn with_kernel(self, kernel: RobustKernel) -> Result<Self, SurfaceDistanceError> {
         if !kernel.is_valid() {
-            return Err(SurfaceDistanceError::Kernel(kernel.scale().unwrap_or(f64::NAN)));
+            return Err(SurfaceDistanceError::RobustKernel(kernel.scale().unwrap_or(f64::NAN)));
         }
         Ok(Self { kernel, ..self })
     }
@@ -153,7 +153,7 @@ impl SurfaceDistance {
             let (mut sum, mut last) = (A::default(), 0);
             for &i in &self.order[piece] {
                 let local = t_mesh_cloud * points[i];
-                let found = self.surface.closest_from(&local, f64::INFINITY, last);
+                let found = self.surface.closest_with_hint(&local, f64::INFINITY, last);
                 let pair = found.map_or(Pair::NOWHERE, |closest| {
                     last = closest.face;
                     Pair::new(self.corners(t_cloud_mesh, closest.face), &closest, points[i])

@@ -4,7 +4,7 @@ use nalgebra::{Matrix6, Point3, SMatrix, Vector6};
 use prehend_autodiff::lie::cross_matrix;
 
 use super::pair::Pair;
-use crate::Kernel;
+use crate::RobustKernel;
 
 /// A distance and its derivatives by a left twist of the mesh about a center, translation \[m\] first, rotation
 /// \[rad\] last, at zero.
@@ -33,7 +33,13 @@ impl PoseDerivatives {
     ///
     /// With the mesh moved by δ = (ρ, ω), the point y = p − c moves in the mesh's frame by
     /// −(ρ + ω × y) + ½ ω × (ρ + ω × y); the squared distance d² has gradient 2 r by it, and Hessian 2 P.
-    pub(super) fn add(&mut self, pair: &Pair, center: &Point3<f64>, kernel: Kernel, share: f64) {
+    pub(super) fn add(
+        &mut self,
+        pair: &Pair,
+        center: &Point3<f64>,
+        kernel: RobustKernel,
+        share: f64,
+    ) {
         let (r, y) = (pair.offset(), pair.point - center);
         let r2 = r.norm_squared();
         let weight = share * kernel.weight(r2);
@@ -61,7 +67,7 @@ impl PoseDerivatives {
         bend.fixed_view_mut::<3, 3>(0, 3).copy_from(&mixed);
         bend.fixed_view_mut::<3, 3>(3, 0).copy_from(&mixed.transpose());
         self.hessian += bend;
-        self.hessian += slope * slope.transpose() * (share * kernel.weight_slope(r2));
+        self.hessian += slope * slope.transpose() * (share * kernel.weight_derivative(r2));
     }
 
     /// Adds the sums of other matches about the same center.

@@ -10,7 +10,7 @@ use proptest::prelude::*;
 
 fn vectors(n: usize, seed: u64) -> Vec<Vector3<f64>> {
     let mut random = SplitMix64::new(seed);
-    (0..n).map(|_| Vector3::from_fn(|_, _| 2.0 * random.unit() - 1.0)).collect()
+    (0..n).map(|_| Vector3::from_fn(|_, _| 2.0 * random.uniform() - 1.0)).collect()
 }
 
 /// A few faces, open or closed.
@@ -195,7 +195,7 @@ fn bad_input_is_named() {
     let nowhere = [Point3::new(f64::NAN, 0.0, 0.0)];
     assert!(matches!(new(&mesh, &nowhere), Err(SurfaceDistanceError::Cloud(_))));
     let good = new(&mesh, &[Point3::origin()]).unwrap();
-    let error = good.clone().with_kernel(Kernel::Huber { scale: -1.0 }).err();
-    assert_eq!(error, Some(SurfaceDistanceError::Kernel(-1.0)));
+    let error = good.clone().with_kernel(RobustKernel::Huber { scale: -1.0 }).err();
+    assert_eq!(error, Some(SurfaceDistanceError::RobustKernel(-1.0)));
     assert!(good.value(&Isometry3::translation(f64::NAN, 0.0, 0.0)).is_nan());
 }

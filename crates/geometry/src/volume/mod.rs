@@ -8,9 +8,9 @@
 //!
 //! ```
 //! use nalgebra::{Isometry3, Point3, Vector3};
-//! use prehend_geometry::{UnionBody, shapes};
+//! use prehend_geometry::{SolidUnion, shapes};
 //!
-//! let cube = UnionBody::new(&[shapes::cuboid(Vector3::repeat(0.1))])?;
+//! let cube = SolidUnion::new(&[shapes::cuboid(Vector3::repeat(0.1))])?;
 //! let t = Isometry3::translation(0.09, 0.0, 0.0);
 //! let shared = cube.overlap(&cube, &t, &Point3::from(t.translation.vector))?;
 //! assert!((shared.volume - 1e-4).abs() < 1e-15);
@@ -71,13 +71,13 @@ pub enum VolumeError {
 
 /// Volume of the part of `b` that lies inside any of `parts` \[m³\], all in one frame.
 ///
-/// Parts may overlap each other, as the links of a hand do. Prepare a [`UnionBody`] to intersect several meshes
+/// Parts may overlap each other, as the links of a hand do. Prepare a [`SolidUnion`] to intersect several meshes
 /// with the same parts.
 ///
 /// # Errors
-/// As [`UnionBody::new`] and [`UnionBody::intersection_volume`].
+/// As [`SolidUnion::new`] and [`SolidUnion::intersection_volume`].
 pub fn intersection_volume(parts: &[TriMesh], b: &TriMesh) -> Result<f64, VolumeError> {
-    UnionBody::new(parts)?.intersection_volume(b)
+    SolidUnion::new(parts)?.intersection_volume(b)
 }
 
 /// The union of closed meshes, computed once.
@@ -85,12 +85,12 @@ pub fn intersection_volume(parts: &[TriMesh], b: &TriMesh) -> Result<f64, Volume
 /// Shells of one mesh are united like parts are; one that faces inward is a cavity of the shell it lies in. A single
 /// shell that runs through itself is not resolved: what it winds about twice counts twice.
 #[derive(Clone, Debug)]
-pub struct UnionBody {
+pub struct SolidUnion {
     /// `None` for the union of nothing.
     chain: Option<Chain>,
 }
 
-impl UnionBody {
+impl SolidUnion {
     /// The union of `parts`, each a closed mesh that faces outward; they may overlap, touch, coincide or be apart.
     ///
     /// # Errors
@@ -128,7 +128,7 @@ impl UnionBody {
 
     /// Volume of the part of `b` inside the union \[m³\], `b` in the frame of the parts; 0 where they are apart or only touch.
     ///
-    /// Shells of `b` that overlap count once. Use [`UnionBody::overlap`] for one body in many poses.
+    /// Shells of `b` that overlap count once. Use [`SolidUnion::overlap`] for one body in many poses.
     ///
     /// # Errors
     /// [`VolumeError`] where `b` is open, flat, inverted or not finite.
@@ -148,7 +148,7 @@ impl UnionBody {
     /// [`VolumeError::Invalid`] where the pose is not finite.
     pub fn overlap(
         &self,
-        other: &UnionBody,
+        other: &SolidUnion,
         t_self_other: &Isometry3<f64>,
         center: &Point3<f64>,
     ) -> Result<Overlap, VolumeError> {

@@ -263,9 +263,9 @@ mod tests {
                 let a = std::f64::consts::TAU * f64::from(k) / f64::from(n);
                 Point2::new(r * a.cos(), r * a.sin())
             };
-            let outer: Vec<_> = (0..n).map(|k| corner(k, 1.0 + random.unit())).collect();
+            let outer: Vec<_> = (0..n).map(|k| corner(k, 1.0 + random.uniform())).collect();
             let inner: Vec<_> =
-                (0..n).rev().map(|k| corner(k, 0.2 + 0.2 * random.unit())).collect();
+                (0..n).rev().map(|k| corner(k, 0.2 + 0.2 * random.uniform())).collect();
             // Middles of sides make straight corners.
             let outer: Vec<_> = (0..outer.len())
                 .flat_map(|k| {

@@ -8,7 +8,7 @@ use nalgebra::{Isometry3, Point3, Rotation3, Translation3, Unit, UnitQuaternion,
 use prehend_autodiff::lie::perturb_about;
 
 use super::tests::{cuboid, icosphere};
-use super::{UnionBody, intersection_volume};
+use super::{SolidUnion, intersection_volume};
 use crate::mass::signed_volume;
 use crate::{SplitMix64, TriMesh};
 
@@ -119,7 +119,7 @@ fn object() -> TriMesh {
 
 fn random_pose(random: &mut SplitMix64, shift: f64) -> Isometry3<f64> {
     let axis = Unit::new_normalize(Vector3::from_fn(|_, _| random.normal()));
-    let turn = UnitQuaternion::from_axis_angle(&axis, PI * random.unit());
+    let turn = UnitQuaternion::from_axis_angle(&axis, PI * random.uniform());
     Isometry3::from_parts(
         Translation3::from(Vector3::from_fn(|_, _| shift * random.normal())),
         turn,
@@ -147,7 +147,7 @@ fn reference_cases() {
     assert!((volume - 408.323_172_238).abs() < 1e-9, "{volume:.9}");
 
     let (parts, object) = (hand(), object());
-    let body = UnionBody::new(&parts).unwrap();
+    let body = SolidUnion::new(&parts).unwrap();
     assert!((1e6 * body.volume() - 372.708_287_870).abs() < 1e-9, "{:.9}", 1e6 * body.volume());
     let volume = 1e6 * body.intersection_volume(&object).unwrap();
     assert!((volume - 22.644_258_041).abs() < 1e-9, "{volume:.9}");
@@ -162,7 +162,7 @@ fn reference_cases() {
 fn two_hundred_poses_agree_with_another_library() {
     let a = bumpy(40, 21, PHASES[0]);
     let b = bumpy(36, 19, PHASES[1]);
-    let [body, other] = [&a, &b].map(|m| UnionBody::new(std::slice::from_ref(m)).unwrap());
+    let [body, other] = [&a, &b].map(|m| SolidUnion::new(std::slice::from_ref(m)).unwrap());
     let mut random = SplitMix64::new(11);
     let (mut compared, mut empty) = (0, 0);
     for _ in 0..200 {
@@ -189,7 +189,7 @@ fn random_convex_bodies_agree_with_another_library() {
     for _ in 0..100 {
         // Spheres stretched at random, fine and coarse.
         let mut body = |levels: usize| {
-            let scale = Vector3::from_fn(|_, _| 0.02 + 0.1 * random.unit());
+            let scale = Vector3::from_fn(|_, _| 0.02 + 0.1 * random.uniform());
             let mut mesh = icosphere(1.0, levels);
             mesh.vertices.iter_mut().for_each(|p| p.coords.component_mul_assign(&scale));
             mesh.transformed(&random_pose(&mut random, 0.03))
@@ -206,11 +206,11 @@ fn random_convex_bodies_agree_with_another_library() {
 #[test]
 fn derivative_agrees_with_differences() {
     let bodies = [
-        UnionBody::new(&[bumpy(40, 21, PHASES[0])]).unwrap(),
-        UnionBody::new(&hand()).unwrap(),
-        UnionBody::new(&[cuboid([0.06, 0.05, 0.04], [0.01, 0.0, 0.02])]).unwrap(),
+        SolidUnion::new(&[bumpy(40, 21, PHASES[0])]).unwrap(),
+        SolidUnion::new(&hand()).unwrap(),
+        SolidUnion::new(&[cuboid([0.06, 0.05, 0.04], [0.01, 0.0, 0.02])]).unwrap(),
     ];
-    let other = UnionBody::new(&[bumpy(36, 19, PHASES[1])]).unwrap();
+    let other = SolidUnion::new(&[bumpy(36, 19, PHASES[1])]).unwrap();
     let mut random = SplitMix64::new(13);
     for body in &bodies {
         for _ in 0..8 {
@@ -246,8 +246,8 @@ fn bits_are_the_same_on_any_thread_and_for_any_pool() {
     let (parts, object) = (hand(), bumpy(40, 21, PHASES[0]));
     let pose = random_pose(&mut SplitMix64::new(14), 0.01);
     let bits = || {
-        let body = UnionBody::new(&parts).unwrap();
-        let other = UnionBody::new(std::slice::from_ref(&object)).unwrap();
+        let body = SolidUnion::new(&parts).unwrap();
+        let other = SolidUnion::new(std::slice::from_ref(&object)).unwrap();
         let found = body.overlap(&other, &pose, &Point3::origin()).unwrap();
         let numbers = found.gradient.iter().chain([&found.volume]).map(|v| v.to_bits());
         let mesh = body.mesh();

@@ -70,7 +70,7 @@ fn solids_whose_boxes_overlap_but_which_do_not_meet_give_zero() {
 #[test]
 fn overlapping_parts_count_once() {
     let parts: Vec<_> = (0..7).map(|k| cuboid([1.0; 3], [0.3 * f64::from(k), 0.0, 0.0])).collect();
-    let body = UnionBody::new(&parts).unwrap();
+    let body = SolidUnion::new(&parts).unwrap();
     assert!((body.volume() - 2.8).abs() < 1e-9);
     assert!((crate::mass::mass_properties(&body.mesh(), 1.0).unwrap().volume - 2.8).abs() < 1e-9);
     let volume = body.intersection_volume(&cuboid([10.0, 0.5, 2.0], [0.0; 3])).unwrap();
@@ -86,7 +86,7 @@ fn parts_that_touch_join_into_one() {
     ] {
         for (center, inside) in [([1.0, 0.0, 0.0], 1.0), ([1.0, 1.0, 0.0], 0.5), ([1.0; 3], 0.25)] {
             let parts = [[0.0; 3], center].map(|c| cuboid([1.0; 3], c).transformed(&t));
-            assert!((UnionBody::new(&parts).unwrap().volume() - 2.0).abs() < 1e-9);
+            assert!((SolidUnion::new(&parts).unwrap().volume() - 2.0).abs() < 1e-9);
             check(&parts, &cuboid([4.0; 3], [0.5; 3]).transformed(&t), 2.0);
             check(&parts, &cuboid([1.0; 3], center.map(|c| 0.5 * c)).transformed(&t), inside);
         }
@@ -109,10 +109,10 @@ fn cylinder_and_two_spheres_with_coinciding_rings_unite() {
     ];
     let whole = shapes::capsule(r, 0.5 * h, columns, columns / 4).welded();
     let palm = cuboid([0.0414, 0.112, 0.0448], [0.0, 0.045, -0.0231]);
-    let volume = |parts: &[TriMesh]| UnionBody::new(parts).unwrap().volume();
+    let volume = |parts: &[TriMesh]| SolidUnion::new(parts).unwrap().volume();
     let mut random = SplitMix64::new(3);
     for _ in 0..40 {
-        let mut vector = |s: f64| Vector3::from_fn(|_, _| s * (2.0 * random.unit() - 1.0));
+        let mut vector = |s: f64| Vector3::from_fn(|_, _| s * (2.0 * random.uniform() - 1.0));
         let t = Isometry3::new(vector(0.3), vector(2.0));
         let parts = |list: &[TriMesh]| list.iter().map(|p| p.transformed(&t)).collect::<Vec<_>>();
         let (pieces, whole, palm) = (parts(&pieces), whole.transformed(&t), palm.transformed(&t));
@@ -129,13 +129,14 @@ fn cylinder_and_two_spheres_with_coinciding_rings_unite() {
 
 #[test]
 fn built_in_hand_unites_in_any_joint_state() {
-    let robot = crate::Robot::from_urdf_str(&crate::hand::allegro_xela_urdf(), None).unwrap();
+    let robot =
+        crate::KinematicTree::from_urdf_str(&crate::hand::allegro_xela_urdf(), None).unwrap();
     let unite = |base: &Isometry3<f64>, q: &[f64]| {
         let poses = robot.forward_kinematics(q);
         let parts: Vec<TriMesh> = (robot.links().iter().zip(&poses))
             .flat_map(|(link, t)| link.parts.iter().map(move |p| p.transformed(&(base * t))))
             .collect();
-        let body = UnionBody::new(&parts).unwrap();
+        let body = SolidUnion::new(&parts).unwrap();
         let separate: f64 = parts.iter().map(signed_volume).sum();
         assert!(body.volume() > 0.5 * separate && body.volume() < separate);
     };
@@ -162,8 +163,8 @@ fn built_in_hand_unites_in_any_joint_state() {
     unite(&base, &q);
     let mut random = SplitMix64::new(5);
     for _ in 0..50 {
-        let q = q.map(|q| q + 0.2 * (random.unit() - 0.5));
-        let mut vector = |s: f64| Vector3::from_fn(|_, _| s * (2.0 * random.unit() - 1.0));
+        let q = q.map(|q| q + 0.2 * (random.uniform() - 0.5));
+        let mut vector = |s: f64| Vector3::from_fn(|_, _| s * (2.0 * random.uniform() - 1.0));
         let base = Isometry3::new(vector(0.3) + Vector3::z(), vector(2.0));
         unite(&base, &q);
     }
@@ -267,7 +268,7 @@ fn a_body_shares_all_of_itself_and_nothing_with_its_neighbor() {
     let own = signed_volume(&ball);
     assert!((intersection_volume(from_ref(&ball), &ball).unwrap() / own - 1.0).abs() < 1e-13);
     // Twice the same part is that part.
-    let twice = UnionBody::new(&[ball.clone(), ball.clone()]).unwrap();
+    let twice = SolidUnion::new(&[ball.clone(), ball.clone()]).unwrap();
     assert!((twice.volume() / own - 1.0).abs() < 1e-13);
     assert!((twice.intersection_volume(&ball).unwrap() / own - 1.0).abs() < 1e-13);
 }
@@ -291,7 +292,7 @@ fn a_cavity_belongs_to_the_shell_around_it() {
 #[test]
 fn moving_a_box_changes_the_volume_by_the_side_inside() {
     let (a, b) = (cuboid([1.0; 3], [0.0; 3]), cuboid([0.5; 3], [0.0; 3]));
-    let [a, b] = [a, b].map(|m| UnionBody::new(&[m]).unwrap());
+    let [a, b] = [a, b].map(|m| SolidUnion::new(&[m]).unwrap());
     let pose = Isometry3::translation(0.5, 0.2, 0.1);
     let found = a.overlap(&b, &pose, &Point3::new(0.5, 0.2, 0.1)).unwrap();
     // The lower half of the small box is inside.
@@ -311,14 +312,14 @@ fn moving_a_box_changes_the_volume_by_the_side_inside() {
 fn the_surface_of_a_union_is_what_lies_outside_once() {
     // A bar through a cube leaves a hole in two of its sides.
     let parts = [cuboid([1.0; 3], [0.0; 3]), cuboid([0.4, 0.3, 2.0], [0.1, 0.05, 0.0])];
-    let mesh = UnionBody::new(&parts).unwrap().mesh();
+    let mesh = SolidUnion::new(&parts).unwrap().mesh();
     assert!((mesh.area() - (6.0 + 1.4)).abs() < 1e-12, "{}", mesh.area());
     assert_eq!(crate::mass::closedness(&mesh), 0);
     // Two balls: each face of the union lies on one and outside the other.
     let (r, d) = (0.05, 0.06);
     let t = Isometry3::new(Vector3::new(d, 0.0, 0.0), Vector3::new(0.1, 0.2, 0.3));
     let balls = [icosphere(r, 4), icosphere(r, 4).transformed(&t)];
-    let mesh = UnionBody::new(&balls).unwrap().mesh();
+    let mesh = SolidUnion::new(&balls).unwrap().mesh();
     assert_eq!(crate::mass::closedness(&mesh), 0);
     let zones = 2.0 * std::f64::consts::TAU * r * (r + 0.5 * d);
     assert!((mesh.area() / zones - 1.0).abs() < 5e-3, "{} {zones}", mesh.area());

@@ -9,7 +9,7 @@ use super::error::DatasetError;
 /// # Errors
 /// [`DatasetError::Write`] naming `path`; a file that was there before is then unchanged.
 pub fn write_atomically(path: &Path, contents: &[u8]) -> Result<(), DatasetError> {
-    prehend_geometry::write_whole(path, contents).map_err(|e| fault(path, e))
+    prehend_geometry::write_atomic(path, contents).map_err(|e| fault(path, e))
 }
 
 /// Whether [`write_atomically`] could write `path` now, to know before long work; leaves nothing behind.

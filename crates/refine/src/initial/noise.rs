@@ -96,7 +96,7 @@ fn isotropic(length: f64, angle: f64, random: &mut SplitMix64) -> (Vector3<f64>,
 
 fn along_ray(place: &Vector3<f64>, random: &mut SplitMix64) -> (Vector3<f64>, Vector3<f64>) {
     let ray = place.try_normalize(0.0).unwrap_or_else(Vector3::z);
-    let mut between = |low: f64, high: f64| low + (high - low) * random.unit();
+    let mut between = |low: f64, high: f64| low + (high - low) * random.uniform();
     let length = between(17e-3, 40e-3);
     let share = between(RAY_SHARE, 1.0);
     let side = if between(0.0, 1.0) < 0.5 { -1.0 } else { 1.0 };

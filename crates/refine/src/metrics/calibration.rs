@@ -57,7 +57,7 @@ pub fn calibration_error_by_chance(
     let mut sum = 0.0;
     for _ in 0..DRAWS {
         let drawn: Vec<Prediction> =
-            predictions.iter().map(|&(p, _)| (p, random.unit() < p)).collect();
+            predictions.iter().map(|&(p, _)| (p, random.uniform() < p)).collect();
         sum += calibration_error(&drawn, bins)?;
     }
     Some(sum / DRAWS as f64)

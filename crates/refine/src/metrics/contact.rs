@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Point3};
 use prehend_geometry::sample::surface_samples;
-use prehend_geometry::{ClosestPoints, TriMesh, UnionBody, VolumeError, contact_area};
+use prehend_geometry::{ClosestPoints, SolidUnion, TriMesh, VolumeError, contact_area};
 
 /// Surface samples closer to the hand than this count as contact \[m\].
 pub const CONTACT_DISTANCE: f64 = 0.005;
@@ -39,7 +39,7 @@ impl ContactModel {
     pub fn intersection_volume_cm3(
         &self,
         t_cam_model: &Isometry3<f64>,
-        hand: &UnionBody,
+        hand: &SolidUnion,
     ) -> Result<f64, VolumeError> {
         Ok(1e6 * hand.intersection_volume(&self.solid.transformed(t_cam_model))?)
     }
@@ -64,7 +64,7 @@ mod tests {
     #[test]
     fn a_cube_sunk_into_another() {
         let model = ContactModel::new(&cube());
-        let hand = UnionBody::new(&[cube()]).unwrap();
+        let hand = SolidUnion::new(&[cube()]).unwrap();
         // Shifted by 9 cm along x: 10 x 10 x 1 cm³ are shared.
         let pose = Isometry3::translation(0.09, 0.0, 0.0);
         assert!((model.intersection_volume_cm3(&pose, &hand).unwrap() - 100.0).abs() < 1e-6);
@@ -83,7 +83,7 @@ mod tests {
     fn an_open_object_has_no_volume() {
         let mut open = cube();
         open.faces.pop();
-        let hand = UnionBody::new(&[cube()]).unwrap();
+        let hand = SolidUnion::new(&[cube()]).unwrap();
         let result =
             ContactModel::new(&open).intersection_volume_cm3(&Isometry3::identity(), &hand);
         assert!(matches!(result, Err(VolumeError::NotClosed { .. })));

@@ -4,7 +4,7 @@ use nalgebra::Isometry3;
 use prehend_render::{RgbImage, draw_outline};
 
 use super::curves::loss_curves;
-use crate::{Object, Observation, RefinedPose, Robot};
+use crate::{Hand, Object, Observation, RefinedPose};
 
 /// Outline of the initial pose.
 const BEFORE: [f32; 3] = [1.0, 0.25, 0.2];
@@ -65,7 +65,7 @@ pub fn before_and_after(
 pub fn outline_picture(
     observation: &Observation,
     object: &Object,
-    robot: Option<&Robot>,
+    robot: Option<&Hand>,
     t_cam_object: &Isometry3<f64>,
 ) -> RgbImage {
     let mut image = brightened(observation);

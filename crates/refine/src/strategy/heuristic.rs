@@ -133,7 +133,7 @@ mod tests {
     use nalgebra::{Isometry3, Matrix6, Point3, Vector3};
 
     use super::*;
-    use crate::CameraCorrection;
+    use crate::CameraCalibrationError;
 
     /// Half the squared distance of the object from a place, over a variance.
     struct Spring {
@@ -171,7 +171,7 @@ mod tests {
             object_center: Point3::origin(),
             t_cam_hand: Isometry3::identity(),
             joints: Vec::new(),
-            camera: CameraCorrection::default(),
+            camera: CameraCalibrationError::default(),
             light: Light::ambient(1.0),
         };
         let mut last = start.clone();

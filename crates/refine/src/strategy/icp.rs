@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 use prehend_geometry::icp::{Match, Metric, NormalEquations};
-use prehend_geometry::{KdTree, Kernel};
+use prehend_geometry::{KdTree, RobustKernel};
 use rayon::prelude::*;
 
 use super::step::preconditioned_step;
@@ -91,7 +91,7 @@ fn add(normal: &mut Normal, state: &State, pairs: &[(Point3<f64>, Point3<f64>)])
     let mut sums = NormalEquations::new();
     for (surface, cloud) in pairs {
         let target = Match { point: *cloud, normal: Vector3::zeros() };
-        sums.add(Metric::PointToPoint, Kernel::Squared, surface, &target, &center);
+        sums.add(Metric::PointToPoint, RobustKernel::Squared, surface, &target, &center);
     }
     // The sums are of half the squares.
     let share = 2.0 / pairs.len().max(1) as f64;

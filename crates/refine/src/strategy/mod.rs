@@ -8,10 +8,10 @@ mod step;
 mod walk;
 
 pub use fused::{
-    Confidence, ConfidenceSummary, Disagreement, Ending, Evidence, Fused, FusedSettings,
-    Hypothesis, Nuisance, Stage, Unobserved, Width,
+    CovarianceInflation, Evidence, Fused, FusedSettings, Hypothesis, Inconsistency, Nuisance,
+    Posterior, PosteriorSummary, Stage, Termination, UnobservableDirection,
 };
-pub(crate) use fused::{Factor, Known, Point, Problem, RIDGE, beyond_chance};
+pub(crate) use fused::{Factor, FrameContext, Point, Problem, RIDGE, chi_square_z};
 pub use heuristic::{Heuristic, HeuristicSettings};
 pub use icp::{Icp, IcpSettings};
 pub use robust_icp::{RobustIcp, RobustIcpSettings};

@@ -1,7 +1,7 @@
 //! A strong, simple baseline: robust point-to-plane iterative closest points.
 
 use nalgebra::{Point3, Vector3};
-use prehend_geometry::Kernel;
+use prehend_geometry::RobustKernel;
 use prehend_geometry::icp::{Match, Metric, NormalEquations};
 use rayon::prelude::*;
 
@@ -68,7 +68,7 @@ impl RobustIcp {
         let advance = |state: &State, index: usize| {
             let done = (index as f64 / shrinking.max(1.0)).min(1.0);
             let scale = first_scale * (last_scale / first_scale).powf(done);
-            let sums = match_all(&mut cloud, object, state, Kernel::Cauchy { scale });
+            let sums = match_all(&mut cloud, object, state, RobustKernel::Cauchy { scale });
             let mut normal = Normal::new(&[Block::ObjectPose]);
             normal.add(&[Block::ObjectPose], &sums.gradient, &sums.matrix);
             let step = damped_step(&normal, object.radius, damping, f64::INFINITY);
@@ -90,14 +90,14 @@ fn match_all(
     cloud: &mut [Point],
     object: &Object,
     state: &State,
-    kernel: Kernel,
+    kernel: RobustKernel,
 ) -> NormalEquations {
     let t_object_cam = state.t_cam_object.inverse();
     let center = state.center().into();
     let of_point = |point: &mut Point| -> Option<(Point3<f64>, Match)> {
         let local = t_object_cam * point.place;
         let face = point.face.unwrap_or(u32::MAX);
-        let closest = object.surface.closest_from(&local, f64::INFINITY, face)?;
+        let closest = object.surface.closest_with_hint(&local, f64::INFINITY, face)?;
         point.face = Some(closest.face);
         let normal: Vector3<f64> = state.t_cam_object * object.normals[closest.face as usize];
         let surface = state.t_cam_object * closest.point;

@@ -5,7 +5,7 @@ use prehend_autodiff::lie::so3_log;
 use serde::{Deserialize, Serialize};
 
 use crate::Object;
-use crate::strategy::Confidence;
+use crate::strategy::Posterior;
 
 /// A pose being near the truth: how far its center may be off \[m\] and by how much it may be turned \[°\].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,7 +36,7 @@ pub const EVENTS: [Event; 7] = [
 /// Distances are of the center of the object's bounding box, about which the covariance turns, not of the model's origin as PE is;
 /// a symmetric object that is turned into itself counts as turned.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Belief {
+pub struct PredictedPosterior {
     /// Distance of the object's center from where it truly is \[mm\].
     pub distance_mm: f64,
     /// Angle between the pose and the true one \[°\].
@@ -59,9 +59,9 @@ pub struct Belief {
     pub ending: String,
 }
 
-impl Belief {
+impl PredictedPosterior {
     /// Of `confidence` in the pose of `object`, when `truth` is where it truly is (object → camera \[m\]).
-    pub fn new(confidence: &Confidence, object: &Object, truth: &Isometry3<f64>) -> Self {
+    pub fn new(confidence: &Posterior, object: &Object, truth: &Isometry3<f64>) -> Self {
         let best = &confidence.hypotheses[0];
         let pose = &best.t_cam_object;
         let off = truth * object.center - pose * object.center;
@@ -154,7 +154,7 @@ mod tests {
         let (observation, robot) = (&scene.observation, Some(&scene.robot));
         let refined = refine(observation, &scene.object, robot, &scene.initial, &config).unwrap();
         let confidence = refined.confidence.unwrap();
-        let belief = Belief::new(&confidence, &scene.object, &scene.truth);
+        let belief = PredictedPosterior::new(&confidence, &scene.object, &scene.truth);
         assert!(belief.is_finite(), "{belief:?}");
         // Nothing is as sure as the bound.
         let covariance = confidence.covariance();
@@ -167,7 +167,7 @@ mod tests {
         assert!(belief.within.iter().all(|p| (0.0..=1.0).contains(p)));
         assert!(belief.within[0] <= belief.within[1] && belief.within[1] <= belief.within[2]);
         assert!(belief.within[6] <= belief.within[2].min(belief.within[5]) + 1e-12);
-        let own = Belief::new(&confidence, &scene.object, &refined.t_cam_object);
+        let own = PredictedPosterior::new(&confidence, &scene.object, &refined.t_cam_object);
         assert!(EVENTS.iter().all(|event| own.came(event)));
         assert!(own.squared.iter().all(|s| s.unwrap() < 1e-12));
     }

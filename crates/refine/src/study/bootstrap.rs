@@ -17,7 +17,7 @@ pub fn resampled_means(columns: &[Vec<Option<f64>>], seed: u64) -> Vec<Vec<f64>>
         let mut random = SplitMix64::new(seed ^ (r as u64).wrapping_mul(0xd134_2543_de82_ef95));
         let mut counts = vec![0_u32; rows];
         for _ in 0..rows {
-            counts[((random.unit() * rows as f64) as usize).min(rows - 1)] += 1;
+            counts[((random.uniform() * rows as f64) as usize).min(rows - 1)] += 1;
         }
         columns.iter().map(|column| weighted_mean(column, &counts)).collect()
     };

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::belief::{Belief, EVENTS};
+use super::belief::{EVENTS, PredictedPosterior};
 use super::bootstrap::{interval, resampled_means};
 use super::design::Design;
 use super::kind::Kind;
@@ -20,7 +20,7 @@ pub(super) const BINS: usize = 10;
 /// Nominal probabilities of the ellipsoids.
 const NOMINAL: [f64; 3] = [0.5, 0.9, 0.95];
 
-/// Of what ellipsoids are, with their degrees of freedom, in the order of [`Belief::squared`].
+/// Of what ellipsoids are, with their degrees of freedom, in the order of [`PredictedPosterior::squared`].
 pub(super) const ELLIPSOIDS: [(&str, u32); 3] = [("pose", 6), ("place", 3), ("orientation", 3)];
 
 /// Seeds of the resampling and of chance.
@@ -109,7 +109,7 @@ pub(super) fn calibrations(
     design: &Design,
     records: &BTreeMap<usize, FrameRecord>,
 ) -> Vec<Calibration> {
-    if design.study != Kind::Confidence {
+    if design.study != Kind::Posterior {
         return Vec::new();
     }
     let mut levels: Vec<Option<&str>> =
@@ -126,14 +126,14 @@ pub(super) fn beliefs<'a>(
     records: &'a BTreeMap<usize, FrameRecord>,
     level: Option<&str>,
     method: &str,
-) -> Vec<&'a Belief> {
+) -> Vec<&'a PredictedPosterior> {
     let of_level = records.values().filter(|r| level.is_none_or(|level| r.level == level));
     of_level.filter_map(|r| r.outcome(method)?.belief.as_ref()).collect()
 }
 
 /// The smallest probabilities of ellipsoids that hold the truth, sorted: uniform if the posterior is right. What has no covariance
 /// has none that does.
-pub(super) fn holding(beliefs: &[&Belief], of: usize) -> Vec<f64> {
+pub(super) fn holding(beliefs: &[&PredictedPosterior], of: usize) -> Vec<f64> {
     let degrees = ELLIPSOIDS[of].1;
     let mut found: Vec<f64> = beliefs
         .iter()
@@ -206,10 +206,10 @@ impl Calibration {
     }
 }
 
-fn coverage(beliefs: &[&Belief]) -> Vec<Coverage> {
+fn coverage(beliefs: &[&PredictedPosterior]) -> Vec<Coverage> {
     let each = || (0..ELLIPSOIDS.len()).flat_map(|of| NOMINAL.map(|nominal| (of, nominal)));
     let column = |(of, nominal): (usize, f64)| -> Vec<Option<f64>> {
-        let probability = |b: &&Belief| {
+        let probability = |b: &&PredictedPosterior| {
             b.squared[of].map_or(f64::INFINITY, |s| chi_square_cdf(s, ELLIPSOIDS[of].1))
         };
         beliefs.iter().map(|b| Some(f64::from(u8::from(probability(b) <= nominal)))).collect()
@@ -279,7 +279,7 @@ pub(super) mod tests {
     /// A study whose method is as sure as it should be: two levels of `n` frames each.
     pub(in super::super) fn calibrated(n: usize) -> (Design, BTreeMap<usize, FrameRecord>) {
         let (mut design, records) = example();
-        design.study = Kind::Confidence;
+        design.study = Kind::Posterior;
         design.methods = vec![MethodSettings { name: "combined".into(), settings: String::new() }];
         let mut random = SplitMix64::new(1);
         let mut made = BTreeMap::new();
@@ -288,9 +288,9 @@ pub(super) mod tests {
             record.outcomes.retain(|o| o.row != "icp");
             let draw: Vec<f64> = (0..6).map(|_| random.normal().powi(2)).collect();
             let [place, turn] = [0, 3].map(|k| draw[k..k + 3].iter().sum::<f64>());
-            let (probability, fate) = (random.unit(), random.unit());
+            let (probability, fate) = (random.uniform(), random.uniform());
             let off = if fate < probability { 0.5 } else { 20.0 };
-            record.outcomes[2].belief = Some(Belief {
+            record.outcomes[2].belief = Some(PredictedPosterior {
                 distance_mm: off,
                 angle_deg: off,
                 bounds: [1.0, 2.0],
@@ -363,7 +363,7 @@ pub(super) mod tests {
     fn without_beliefs_there_is_no_calibration() {
         let (mut design, records) = example();
         assert!(calibrations(&design, &records).is_empty());
-        design.study = Kind::Confidence;
+        design.study = Kind::Posterior;
         assert!(calibrations(&design, &records).is_empty());
     }
 }

@@ -134,7 +134,7 @@ impl Design {
                 .flat_map(|sweep| sweep.amounts().iter().map(|&amount| (*sweep, amount)))
                 .flat_map(|(sweep, amount)| {
                     names.clone().map(move |method| Trial {
-                        rows: vec![disturbed(&method, sweep, amount)],
+                        rows: vec![perturbed(&method, sweep, amount)],
                         fault: (amount != sweep.amounts()[0]).then_some((sweep, amount)),
                         method,
                     })
@@ -188,7 +188,7 @@ impl Design {
 }
 
 /// The row of a method when so much of something is wrong with the observation.
-pub(super) fn disturbed(method: &str, sweep: Sweep, amount: f64) -> String {
+pub(super) fn perturbed(method: &str, sweep: Sweep, amount: f64) -> String {
     format!("{method} {sweep} {amount}")
 }
 

@@ -6,17 +6,17 @@ use std::time::Instant;
 
 use nalgebra::Isometry3;
 
-use super::belief::Belief;
+use super::belief::PredictedPosterior;
 use super::design::{Design, Frame, Trial};
 use super::kind::{INITIAL, Kind, TRUTH};
 use super::record::{FrameRecord, RowOutcome};
 use super::sweep::Sweep;
 use crate::bop::ResultRow;
-use crate::strategy::Confidence;
+use crate::strategy::Posterior;
 use crate::{AssetError, Assets, Config, Object, PlainPose, Scorer, refine_with};
 
 /// Takes frames one by one; several may share the assets.
-pub struct Examiner<'a> {
+pub struct Runner<'a> {
     design: &'a Design,
     methods: &'a [(String, Config)],
     assets: &'a Mutex<Assets<'a>>,
@@ -40,10 +40,10 @@ struct Refined {
     poses: Vec<Pose>,
     seconds: f64,
     object: Arc<Object>,
-    confidence: Option<Confidence>,
+    confidence: Option<Posterior>,
 }
 
-impl<'a> Examiner<'a> {
+impl<'a> Runner<'a> {
     /// One that runs `methods`, those of the design, with their settings.
     pub fn new(
         design: &'a Design,
@@ -73,7 +73,7 @@ impl<'a> Examiner<'a> {
                 continue;
             }
             let (mut found, time) = self.run(frame, &trial);
-            found.iter_mut().for_each(|outcome| outcome.disturbed = trial.fault.is_some());
+            found.iter_mut().for_each(|outcome| outcome.perturbed = trial.fault.is_some());
             if trial.fault.is_none() {
                 seconds.extend(time.map(|time| (trial.method.clone(), time)));
                 undisturbed.insert(trial.method, found.clone());
@@ -119,7 +119,7 @@ impl<'a> Examiner<'a> {
                 else {
                     continue;
                 };
-                let belief = Belief::new(&confidence, &refined.object, &truth);
+                let belief = PredictedPosterior::new(&confidence, &refined.object, &truth);
                 if belief.is_finite() {
                     outcome.belief = Some(belief);
                 } else if outcome.failed.is_none() {
@@ -132,7 +132,7 @@ impl<'a> Examiner<'a> {
 
     /// Whether the study is of what methods believe.
     fn believes(&self) -> bool {
-        self.design.study == Kind::Confidence
+        self.design.study == Kind::Posterior
     }
 
     /// What a method makes of a frame with which something may be wrong.
@@ -151,7 +151,7 @@ impl<'a> Examiner<'a> {
             (object, observation, robot)
         };
         if let Some((sweep, amount)) = fault {
-            sweep.disturb(&mut observation, amount, sweep.seed(row));
+            sweep.perturb(&mut observation, amount, sweep.seed(row));
         }
         let steps = &self.design.steps;
         let mut poses: Vec<Pose> = Vec::new();

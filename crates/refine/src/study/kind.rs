@@ -21,7 +21,7 @@ pub enum Kind {
     /// The fused estimator with less evidence, and with less estimated.
     Evidence,
     /// Whether the fused estimator's posterior is right.
-    Confidence,
+    Posterior,
     /// What faults of the observation do.
     Robustness,
 }
@@ -39,7 +39,7 @@ impl Kind {
         Self::Noise,
         Self::Steps,
         Self::Evidence,
-        Self::Confidence,
+        Self::Posterior,
         Self::Robustness,
     ];
 
@@ -51,7 +51,7 @@ impl Kind {
             Self::Noise => "noise",
             Self::Steps => "steps",
             Self::Evidence => "evidence",
-            Self::Confidence => "confidence",
+            Self::Posterior => "confidence",
             Self::Robustness => "robustness",
         }
     }
@@ -64,9 +64,7 @@ impl Kind {
             Self::Noise => "Noise study: the same at several levels of noise",
             Self::Steps => "Steps study: no regularization, no checkpoint, all iterations",
             Self::Evidence => "Evidence study: fused with less evidence, and with less estimated",
-            Self::Confidence => {
-                "Confidence study: the fused estimator's posterior beside the truth"
-            }
+            Self::Posterior => "Confidence study: the fused estimator's posterior beside the truth",
             Self::Robustness => "Robustness study: what faults of the observation do",
         }
     }
@@ -89,7 +87,7 @@ impl Kind {
             Self::Evidence => {
                 ["fused"].into_iter().chain(Method::ablations().iter().map(|m| m.name)).collect()
             }
-            Self::Confidence => vec!["fused"],
+            Self::Posterior => vec!["fused"],
             Self::Robustness => vec!["robust-icp", "fused"],
         }
     }
@@ -107,7 +105,7 @@ impl Kind {
     pub fn levels(self) -> &'static [&'static str] {
         match self {
             Self::Gradients | Self::Evidence | Self::Robustness => &["low"],
-            Self::Main | Self::Noise | Self::Steps | Self::Confidence => &["low", "high"],
+            Self::Main | Self::Noise | Self::Steps | Self::Posterior => &["low", "high"],
         }
     }
 

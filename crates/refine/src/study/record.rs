@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::belief::Belief;
+use super::belief::PredictedPosterior;
 use crate::PlainPose;
 use crate::metrics::PoseScore;
 
@@ -37,10 +37,10 @@ pub struct RowOutcome {
     pub score: Option<PoseScore>,
     /// What was believed of the pose; in the confidence study.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub belief: Option<Belief>,
+    pub belief: Option<PredictedPosterior>,
     /// Whether something was made wrong with the observation: a failure is a finding then.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub disturbed: bool,
+    pub perturbed: bool,
     /// Why there is no pose or no score.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub failed: Option<String>,
@@ -55,7 +55,7 @@ impl FrameRecord {
 
     /// Whether any row failed with whose observation nothing was made wrong.
     pub fn failed(&self) -> bool {
-        self.outcomes.iter().any(|o| o.failed.is_some() && !o.disturbed)
+        self.outcomes.iter().any(|o| o.failed.is_some() && !o.perturbed)
     }
 
     /// The outcome of a row.

@@ -106,7 +106,7 @@ pub struct Failure {
     pub reason: String,
     /// Whether something was made wrong with the observations: that a method cannot do without is a finding then.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
-    pub disturbed: bool,
+    pub perturbed: bool,
 }
 
 impl Tables {
@@ -142,7 +142,7 @@ impl Tables {
                 frame: format!("a row of the initial poses of level {}", level.name),
                 rows: rows.clone(),
                 reason: reason.clone(),
-                disturbed: false,
+                perturbed: false,
             }));
             failures.extend(of_level.iter().flat_map(|record| failures_of(record)));
         }
@@ -169,7 +169,7 @@ fn failures_of(record: &FrameRecord) -> Vec<Failure> {
     let mut found: Vec<Failure> = Vec::new();
     for outcome in &record.outcomes {
         let Some(reason) = &outcome.failed else { continue };
-        let same = |f: &&mut Failure| f.reason == *reason && f.disturbed == outcome.disturbed;
+        let same = |f: &&mut Failure| f.reason == *reason && f.perturbed == outcome.perturbed;
         match found.iter_mut().find(same) {
             Some(same) => same.rows.push(outcome.row.clone()),
             None => found.push(Failure {
@@ -178,7 +178,7 @@ fn failures_of(record: &FrameRecord) -> Vec<Failure> {
                 frame: record.label(),
                 rows: vec![outcome.row.clone()],
                 reason: reason.clone(),
-                disturbed: outcome.disturbed,
+                perturbed: outcome.perturbed,
             }),
         }
     }

@@ -16,7 +16,7 @@ use super::plan::{Subject, SynthSettings, settle};
 use super::scene_files::{NAMES, SceneFiles, from_text, to_text};
 use super::seeds::{Use, seed, sequence};
 use super::sensor::Rig;
-use super::{Moment, SynthError};
+use super::{GraspSnapshot, SynthError};
 use crate::AssetError;
 use crate::bop::{Dataset, DatasetError, GroundTruth, ResultRow, write_atomically, write_results};
 use crate::initial::NoiseLevel;
@@ -74,7 +74,7 @@ pub fn generate<'s, G>(
     progress: &(dyn Fn(u64) + Sync),
 ) -> Result<Made, SynthError>
 where
-    G: Fn(u64) -> Result<Vec<Moment>, String> + Sync,
+    G: Fn(u64) -> Result<Vec<GraspSnapshot>, String> + Sync,
 {
     check(subjects, settings)?;
     make(dir)?;
@@ -139,7 +139,7 @@ fn write_both_models(
     let truth = subjects.iter().map(|s| (s.obj_id, (s.object.mesh.clone(), &s.object.inertial)));
     let told = subjects.iter().map(|s| {
         let mut noise = sequence(settings.seed, Use::Model, s.obj_id, 0);
-        let mesh = settings.sensor.model.imitate(&s.object.mesh, &mut noise);
+        let mesh = settings.sensor.model.perturb_model(&s.object.mesh, &mut noise);
         (s.obj_id, (mesh, &s.object.inertial))
     });
     write_models(&dir.join("models"), &told.collect::<BTreeMap<_, _>>())?;
@@ -162,7 +162,7 @@ impl<'s> Scene<'_, 's> {
         progress: &(dyn Fn(u64) + Sync),
     ) -> Result<Vec<GraspFailure>, SynthError>
     where
-        G: Fn(u64) -> Result<Vec<Moment>, String> + Sync,
+        G: Fn(u64) -> Result<Vec<GraspSnapshot>, String> + Sync,
     {
         remove(&self.dir.join(SPENT_JOURNAL))?;
         let journal = self.dir.join(JOURNAL);
@@ -216,7 +216,7 @@ impl<'s> Scene<'_, 's> {
         progress: &(dyn Fn(u64) + Sync),
     ) -> Result<Option<GraspFailure>, SynthError>
     where
-        G: Fn(u64) -> Result<Vec<Moment>, String>,
+        G: Fn(u64) -> Result<Vec<GraspSnapshot>, String>,
     {
         let (from, obj_id) = (self.settings.seed, self.subject.obj_id);
         let fail = |reason: String| {
@@ -246,7 +246,7 @@ impl<'s> Scene<'_, 's> {
     }
 
     /// What is wrong with moments that are not of this hand.
-    fn misfit(&self, moments: &[Moment]) -> Option<String> {
+    fn misfit(&self, moments: &[GraspSnapshot]) -> Option<String> {
         let robot = &self.hand.robot;
         let (joints, taxels) = (robot.tree.joint_names().len(), robot.taxels.len());
         if moments.is_empty() {
@@ -262,7 +262,7 @@ impl<'s> Scene<'_, 's> {
         })
     }
 
-    fn frame(&self, rig: &Rig, moment: &Moment, im_id: u32) -> Result<(), SynthError> {
+    fn frame(&self, rig: &Rig, moment: &GraspSnapshot, im_id: u32) -> Result<(), SynthError> {
         let obj_id = self.subject.obj_id;
         let mut noise = sequence(self.settings.seed, Use::Frame, obj_id, im_id);
         let shot = rig.shoot(moment, &mut noise);

@@ -5,11 +5,11 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use prehend_geometry::hand::{Taxel, allegro_xela_urdf, load_taxels, taxels};
-use prehend_geometry::robot::Robot as KinematicTree;
+use prehend_geometry::robot::KinematicTree;
 
 use super::folder::make;
 use crate::bop::{DatasetError, write_atomically};
-use crate::{AssetError, Robot};
+use crate::{AssetError, Hand};
 
 /// The hand's files, relative to the dataset.
 pub(super) const URDF: &str = "hand/hand.urdf";
@@ -18,7 +18,7 @@ pub(super) const TAXELS: &str = "hand/taxels.csv";
 /// A hand, and what is needed to describe it in a dataset.
 pub struct HandFiles {
     /// The hand.
-    pub robot: Robot,
+    pub robot: Hand,
     /// Its URDF.
     urdf: String,
     /// Mesh files that the URDF names: relative to its folder, and their content.
@@ -32,7 +32,7 @@ impl HandFiles {
     /// If it cannot be prepared.
     pub fn built_in() -> Result<Self, AssetError> {
         let urdf = allegro_xela_urdf();
-        let robot = Robot::new(KinematicTree::from_urdf_str(&urdf, None)?, taxels())?;
+        let robot = Hand::new(KinematicTree::from_urdf_str(&urdf, None)?, taxels())?;
         Ok(Self { robot, urdf, meshes: Vec::new() })
     }
 
@@ -61,7 +61,7 @@ impl HandFiles {
                 meshes.push((relative, content));
             }
         }
-        Ok(Self { robot: Robot::new(tree, skin)?, urdf: text, meshes })
+        Ok(Self { robot: Hand::new(tree, skin)?, urdf: text, meshes })
     }
 
     /// Writes the hand's files to the dataset at `root`.

@@ -1,6 +1,6 @@
 //! Made-up frames whose truth is known: to try things on, to test with, and to measure methods by.
 //!
-//! [`default_scene`] is one ready-made frame, [`default_sequence`] many of them; [`generate`] makes whole datasets of [`Moment`]s as sensors would see them
+//! [`default_scene`] is one ready-made frame, [`default_sequence`] many of them; [`generate`] makes whole datasets of [`GraspSnapshot`]s as sensors would see them
 //! ([`SensorSettings`]).
 
 mod annotation;
@@ -27,7 +27,7 @@ pub use error::SynthError;
 pub use generate::{GraspFailure, Made, generate};
 pub use grasp::{Grasp, GraspError, GraspFault, GraspSettings, Grasper, Preshape};
 pub use hand_files::HandFiles;
-pub use moment::Moment;
+pub use moment::GraspSnapshot;
 pub use plan::{Subject, SynthSettings};
 pub use ready_made::ready_made_moments;
 pub use scene::{Scene, default_scene};

@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Vector3};
 
 /// One moment of an object held in a hand.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Moment {
+pub struct GraspSnapshot {
     /// Object coordinates → hand base coordinates \[m\].
     pub t_hand_object: Isometry3<f64>,
     /// Joint positions in the order of the robot's joint names \[rad; m\].

@@ -4,9 +4,9 @@ use nalgebra::{Isometry3, Vector3};
 use prehend_geometry::SplitMix64;
 use prehend_geometry::hand::{JOINT_NAMES, default_grasp};
 
-use super::Moment;
+use super::GraspSnapshot;
 use super::sensing::feel;
-use crate::{AssetError, Object, Robot};
+use crate::{AssetError, Hand, Object};
 
 /// `count` moments of `object` where the built-in bottle lies in the built-in hand ([`default_grasp`]), while gravity turns
 /// about the hand; taxels feel what is near them.
@@ -17,10 +17,10 @@ use crate::{AssetError, Object, Robot};
 /// If `robot` is not the built-in hand.
 pub fn ready_made_moments(
     object: &Object,
-    robot: &Robot,
+    robot: &Hand,
     seed: u64,
     count: usize,
-) -> Result<Vec<Moment>, AssetError> {
+) -> Result<Vec<GraspSnapshot>, AssetError> {
     let grasp = default_grasp();
     let joints = JOINT_NAMES.iter().map(|n| (*n).to_owned()).zip(grasp.joints).collect();
     let joints = robot.tree.joint_vector(&joints)?;
@@ -29,7 +29,7 @@ pub fn ready_made_moments(
     let mut down = Vector3::from_fn(|_, _| noise.normal());
     let moment = |_| {
         down = down.normalize() + Vector3::from_fn(|_, _| 0.1 * noise.normal());
-        Moment {
+        GraspSnapshot {
             t_hand_object: grasp.t_base_object,
             joints: joints.clone(),
             gravity: down.normalize() * 9.81,

@@ -6,12 +6,12 @@ use nalgebra::{Isometry3, Point3, Vector3, Vector6};
 use prehend_autodiff::lie::perturb_about;
 use prehend_geometry::SplitMix64;
 use prehend_geometry::hand::{JOINT_NAMES, allegro_xela_urdf, default_grasp, taxels};
-use prehend_geometry::robot::Robot as KinematicTree;
+use prehend_geometry::robot::KinematicTree;
 use prehend_render::Camera;
 
-use super::sensing::{feel, photograph};
+use super::sensing::{feel, render_rgbd};
 use super::sensor::look_at;
-use crate::{AssetError, HandReading, Object, Observation, Robot};
+use crate::{AssetError, Hand, HandMeasurement, Object, Observation};
 
 /// A frame whose truth is known.
 pub struct Scene {
@@ -22,7 +22,7 @@ pub struct Scene {
     /// Its number among the models of a dataset.
     pub obj_id: u32,
     /// The hand.
-    pub robot: Arc<Robot>,
+    pub robot: Arc<Hand>,
     /// The hand as URDF text.
     pub urdf: String,
     /// The true pose, object → camera \[m\].
@@ -47,7 +47,7 @@ pub fn default_scene(seed: u64) -> Result<Scene, AssetError> {
     let tree = KinematicTree::from_urdf_str(&urdf, None)?;
     let joints = JOINT_NAMES.iter().map(|n| (*n).to_owned()).zip(grasp.joints).collect();
     let joints = tree.joint_vector(&joints)?;
-    let robot = Arc::new(Robot::new(tree, taxels())?);
+    let robot = Arc::new(Hand::new(tree, taxels())?);
 
     let camera = Camera { fx: 580.0, fy: 580.0, cx: 319.5, cy: 239.5, width: 640, height: 480 };
     let t_cam_hand =
@@ -55,7 +55,7 @@ pub fn default_scene(seed: u64) -> Result<Scene, AssetError> {
     let truth = t_cam_hand * grasp.t_base_object;
     let mut noise = SplitMix64::new(seed);
     let (color, depth, mask) =
-        photograph(&camera, &object, &robot, &truth, &t_cam_hand, &joints, &mut noise);
+        render_rgbd(&camera, &object, &robot, &truth, &t_cam_hand, &joints, &mut noise);
     let forces = feel(&object, &robot, &truth, &t_cam_hand, &joints);
     let observation = Observation {
         camera,
@@ -64,7 +64,7 @@ pub fn default_scene(seed: u64) -> Result<Scene, AssetError> {
         mask,
         // The hand's −z hangs down: fingers up, as if presenting the bottle.
         gravity: Some(t_cam_hand.rotation * Vector3::new(0.0, 0.0, -9.81)),
-        hand: Some(HandReading { t_cam_hand, joints, forces }),
+        hand: Some(HandMeasurement { t_cam_hand, joints, forces }),
     };
     let scale = |k: usize| if k < 3 { INITIAL_TRANSLATION } else { INITIAL_ROTATION } / 3f64.sqrt();
     let error = Vector6::from_fn(|k, _| scale(k) * noise.normal());

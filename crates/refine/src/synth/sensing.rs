@@ -5,7 +5,7 @@ use prehend_geometry::SplitMix64;
 use prehend_geometry::hand::Taxel;
 use prehend_render::{Camera, DepthImage, Light, Mask, RgbImage, SceneObject, render_scene};
 
-use crate::{Object, Robot};
+use crate::{Hand, Object};
 
 /// Standard deviation of a color channel.
 const COLOR_NOISE: f64 = 0.02;
@@ -15,10 +15,10 @@ const DEPTH_NOISE: f64 = 1.5e-3;
 const TOUCH_REACH: f64 = 2e-3;
 
 /// Color, depth and mask of the grasp under a light that the estimator is not told.
-pub(super) fn photograph(
+pub(super) fn render_rgbd(
     camera: &Camera,
     object: &Object,
-    robot: &Robot,
+    robot: &Hand,
     truth: &Isometry3<f64>,
     t_cam_hand: &Isometry3<f64>,
     joints: &[f64],
@@ -52,7 +52,7 @@ pub(super) fn photograph(
 /// Force on each taxel \[N\], in its link's frame: the nearer the object, the more.
 pub(super) fn feel(
     object: &Object,
-    robot: &Robot,
+    robot: &Hand,
     truth: &Isometry3<f64>,
     t_cam_hand: &Isometry3<f64>,
     joints: &[f64],

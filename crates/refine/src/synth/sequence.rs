@@ -7,9 +7,9 @@ use nalgebra::{Isometry3, Vector3, Vector6};
 use prehend_autodiff::lie::perturb_about;
 use prehend_geometry::SplitMix64;
 
-use super::sensing::{feel, photograph};
+use super::sensing::{feel, render_rgbd};
 use super::{Scene, default_scene};
-use crate::{AssetError, HandReading, Object, Observation, Robot};
+use crate::{AssetError, Hand, HandMeasurement, Object, Observation};
 
 /// One moment of a [`Sequence`].
 pub struct SequenceFrame {
@@ -26,7 +26,7 @@ pub struct Sequence {
     /// The object.
     pub object: Arc<Object>,
     /// The hand.
-    pub robot: Arc<Robot>,
+    pub robot: Arc<Hand>,
     /// A pose to start from in the first frame.
     pub initial: Isometry3<f64>,
     /// In order of time.
@@ -71,9 +71,9 @@ pub fn default_sequence(seed: u64, count: usize) -> Result<Sequence, AssetError>
         let t_hand_object = start.inverse() * truth;
         let truth = t_cam_hand * Isometry3::from(slide) * t_hand_object;
         let (color, depth, mask) =
-            photograph(&camera, &object, &robot, &truth, &t_cam_hand, &joints, &mut noise);
+            render_rgbd(&camera, &object, &robot, &truth, &t_cam_hand, &joints, &mut noise);
         let forces = feel(&object, &robot, &truth, &t_cam_hand, &joints);
-        let hand = HandReading { t_cam_hand, joints: joints.clone(), forces };
+        let hand = HandMeasurement { t_cam_hand, joints: joints.clone(), forces };
         let observation = Observation { camera, color, depth, mask, gravity, hand: Some(hand) };
         SequenceFrame { time, observation, truth }
     };

@@ -77,7 +77,7 @@ impl DepthTerm {
             .zip(&self.nearest[0])
             .filter_map(|(p, nearest)| {
                 let (query, face) = (t_object_cam * p, nearest.load(Ordering::Relaxed));
-                let closest = self.object.surface.closest_from(&query, f64::INFINITY, face)?;
+                let closest = self.object.surface.closest_with_hint(&query, f64::INFINITY, face)?;
                 nearest.store(closest.face, Ordering::Relaxed);
                 let surface = state.t_cam_object * closest.point;
                 Some(f(Pair { surface, cloud: *p }))
@@ -95,7 +95,7 @@ impl DepthTerm {
                     return None;
                 }
                 let point = nearest.load(Ordering::Relaxed) as usize;
-                let found = self.tree.nearest_from(&surface, f64::INFINITY, point)?.index;
+                let found = self.tree.nearest_with_hint(&surface, f64::INFINITY, point)?.index;
                 nearest.store(found as u32, Ordering::Relaxed);
                 Some(f(Pair { surface, cloud: self.tree.points()[found] }))
             })

@@ -8,7 +8,7 @@ use prehend_render::DepthImage;
 use rayon::prelude::*;
 
 use super::{Term, share};
-use crate::{Block, Cauchy, Normal, Observation, Robot, State};
+use crate::{Block, Cauchy, Hand, Normal, Observation, State};
 
 /// Settings of [`HandDepthTerm`].
 #[derive(Clone, Debug, PartialEq)]
@@ -36,7 +36,7 @@ impl Default for HandDepthSettings {
 /// What the camera sees of the hand says where it is relative to the object in the same image, which is what touch
 /// needs to know, whatever depth's common errors are.
 pub struct HandDepthTerm {
-    robot: Arc<Robot>,
+    robot: Arc<Hand>,
     points: Vec<(Vector2<f64>, f64)>,
     settings: HandDepthSettings,
 }
@@ -46,7 +46,7 @@ impl HandDepthTerm {
     /// is then zero.
     pub fn new(
         observation: &Observation,
-        robot: Arc<Robot>,
+        robot: Arc<Hand>,
         hand: &DepthImage,
         settings: HandDepthSettings,
     ) -> Self {
@@ -87,7 +87,7 @@ impl HandDepthTerm {
         let reach = 2.0 * self.settings.reach;
         let sample = |(ray, depth): &(Vector2<f64>, f64)| {
             let point = state.camera.point(ray, *depth);
-            Some((point, hand.sample_motion(&point, reach)?))
+            Some((point, hand.distance_with_gradient(&point, reach)?))
         };
         self.points.par_iter().with_min_len(32).map(sample).collect()
     }

@@ -17,16 +17,16 @@ pub(crate) use depth::back_project;
 pub use depth::{DepthSettings, DepthTerm};
 pub use free_space::{FreeSpaceSettings, FreeSpaceTerm};
 pub use hand_depth::{HandDepthSettings, HandDepthTerm};
-pub use patches::DeviationSettings;
-pub(crate) use patches::Patches;
+pub use patches::ModelErrorSettings;
+pub(crate) use patches::SurfacePatches;
 pub use penetration::{PenetrationSettings, PenetrationTerm};
 pub use physics::{PhysicsSettings, PhysicsTerm};
-pub use point_to_plane::{PointToPlaneSettings, PointToPlaneTerm, Scatter};
+pub use point_to_plane::{NoiseEstimate, PointToPlaneSettings, PointToPlaneTerm};
 pub use prior::{Prior, PriorSettings};
 pub(crate) use rendering::Segmented;
 pub use rendering::{RenderingSettings, RenderingTerm};
 pub use support::{SupportSettings, SupportTerm};
-pub use tactile::{ContactSettings, Felt, TactileSettings, TactileTerm};
+pub use tactile::{ContactSettings, TactileSettings, TactileTerm, TouchModel};
 
 use prehend_render::Light;
 
@@ -50,7 +50,7 @@ pub trait Term: Send + Sync {
 
     /// Whether the term may change with `block`, so that room is needed for derivatives by it.
     fn depends_on(&self, block: Block) -> bool {
-        !matches!(block, Block::Patches(_))
+        !matches!(block, Block::SurfacePatches(_))
     }
 
     /// The light that suits the term best at `state`, solved for in closed form, if it sees any. No other term does, so it is
@@ -100,7 +100,7 @@ mod gradient_check {
             Block::ObjectPose | Block::HandPose => vec![1.0, 1.0, 1.0, 10.0, 10.0, 10.0],
             Block::Joints(count) => vec![10.0; count],
             Block::Camera => vec![2.0, 1.0, 2.0, 2.0, 10.0],
-            Block::Patches(count) => vec![1.0; 3 * count],
+            Block::SurfacePatches(count) => vec![1.0; 3 * count],
         }
     }
 
@@ -134,10 +134,11 @@ mod gradient_check {
     }
 
     /// Where the fixture's object may be off, by tiles of whole pixels in images that are smaller by `unit`.
-    pub(super) fn patches(unit: usize) -> Arc<Patches> {
-        let settings = DeviationSettings::default();
+    pub(super) fn patches(unit: usize) -> Arc<SurfacePatches> {
+        let settings = ModelErrorSettings::default();
         Arc::new(
-            Patches::new(&SCENE.observation, SCENE.truth.translation.z, &settings, unit).unwrap(),
+            SurfacePatches::new(&SCENE.observation, SCENE.truth.translation.z, &settings, unit)
+                .unwrap(),
         )
     }
 
@@ -146,12 +147,12 @@ mod gradient_check {
     pub(super) fn assert_by_patches(
         term: &dyn Term,
         state: &State,
-        patches: &Patches,
+        patches: &SurfacePatches,
         elsewhere: f64,
     ) {
         let rigid = [Block::ObjectPose, Block::Camera];
         let mut alone = Normal::new(&rigid);
-        let mut all = Normal::new(&[rigid[0], rigid[1], Block::Patches(patches.count())]);
+        let mut all = Normal::new(&[rigid[0], rigid[1], Block::SurfacePatches(patches.count())]);
         let (value, same) = (term.linearize(state, &mut alone), term.linearize(state, &mut all));
         assert!((value / same - 1.0).abs() < 1e-5, "{value} {same}");
         let gradient = all.gradient().rows(0, 11) - alone.gradient();

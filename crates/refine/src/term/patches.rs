@@ -6,14 +6,14 @@ use crate::Observation;
 
 /// How far the surface of an object is from that of its model.
 #[derive(Clone, Debug, PartialEq)]
-pub struct DeviationSettings {
+pub struct ModelErrorSettings {
     /// Standard deviation of a place of the surface from where the model has it, in each direction \[m\]; zero if models are exact.
     pub deviation: f64,
     /// Distance over which that changes \[m\].
     pub smoothness: f64,
 }
 
-impl Default for DeviationSettings {
+impl Default for ModelErrorSettings {
     /// A scan, or a careful model, of a thing that fits into a hand.
     fn default() -> Self {
         Self { deviation: 7e-4, smoothness: 20e-3 }
@@ -38,7 +38,7 @@ const OWN: f64 = 1e-3;
 ///
 /// Patches are of the image rather than of the model, so that only what is seen has any.
 #[derive(Clone, Debug)]
-pub(crate) struct Patches {
+pub(crate) struct SurfacePatches {
     /// Width of a tile \[px\].
     side: usize,
     /// The first tile's column and row, and how many columns there are.
@@ -52,17 +52,17 @@ pub(crate) struct Patches {
     log_determinant: f64,
 }
 
-impl Patches {
+impl SurfacePatches {
     /// Of the object in `observation`, which is about `distance` from the camera \[m\] where no depth is measured; tiles are a multiple
     /// of `unit` pixels wide, to be of whole pixels in images that are smaller by that. `None` if there is nothing of it to be seen, or models are
     /// exact.
     pub(crate) fn new(
         observation: &Observation,
         distance: f64,
-        settings: &DeviationSettings,
+        settings: &ModelErrorSettings,
         unit: usize,
     ) -> Option<Self> {
-        let &DeviationSettings { deviation, smoothness } = settings;
+        let &ModelErrorSettings { deviation, smoothness } = settings;
         if !(deviation > 0.0 && smoothness > 0.0) {
             return None;
         }
@@ -168,8 +168,8 @@ mod tests {
     fn every_pixel_of_the_mask_is_in_a_patch_and_neighbors_are_off_alike() {
         let scene = default_scene(1).unwrap();
         let (observation, distance) = (&scene.observation, scene.truth.translation.z);
-        let settings = DeviationSettings::default();
-        let patches = Patches::new(observation, distance, &settings, 4).unwrap();
+        let settings = ModelErrorSettings::default();
+        let patches = SurfacePatches::new(observation, distance, &settings, 4).unwrap();
         let width = observation.camera.width;
         let mut seen = vec![0; patches.count()];
         for (pixel, _) in observation.mask.pixels().iter().enumerate().filter(|(_, m)| **m) {
@@ -191,11 +191,11 @@ mod tests {
     #[test]
     fn an_exact_model_has_none() {
         let scene = default_scene(1).unwrap();
-        let settings = DeviationSettings { deviation: 0.0, ..DeviationSettings::default() };
-        assert!(Patches::new(&scene.observation, 0.5, &settings, 1).is_none());
+        let settings = ModelErrorSettings { deviation: 0.0, ..ModelErrorSettings::default() };
+        assert!(SurfacePatches::new(&scene.observation, 0.5, &settings, 1).is_none());
         let mut unseen = scene.observation.clone();
         unseen.mask = prehend_render::Mask::filled(640, 480, false);
-        assert!(Patches::new(&unseen, 0.5, &DeviationSettings::default(), 1).is_none());
+        assert!(SurfacePatches::new(&unseen, 0.5, &ModelErrorSettings::default(), 1).is_none());
     }
 
     #[test]
@@ -206,12 +206,12 @@ mod tests {
             |pixel: usize| (pixel % 640).is_multiple_of(29) && (pixel / 640).is_multiple_of(31);
         let mask = (0..640 * 480).map(speck).collect();
         specks.mask = prehend_render::Mask::new(640, 480, mask).unwrap();
-        let settings = DeviationSettings::default();
-        let patches = Patches::new(&specks, 0.5, &settings, 3).unwrap();
+        let settings = ModelErrorSettings::default();
+        let patches = SurfacePatches::new(&specks, 0.5, &settings, 3).unwrap();
         assert!(patches.count() <= MOST_PATCHES && patches.side().is_multiple_of(3));
         for (smoothness, distance) in [(f64::INFINITY, 0.5), (20e-3, 0.0)] {
-            let settings = DeviationSettings { smoothness, ..settings.clone() };
-            let patches = Patches::new(&scene.observation, distance, &settings, 4).unwrap();
+            let settings = ModelErrorSettings { smoothness, ..settings.clone() };
+            let patches = SurfacePatches::new(&scene.observation, distance, &settings, 4).unwrap();
             assert!((1..=2).contains(&patches.count()), "{}", patches.count());
         }
     }

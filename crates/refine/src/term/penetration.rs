@@ -7,7 +7,7 @@ use prehend_geometry::robot::{ArticulatedRobot, RobotSample};
 use rayon::prelude::*;
 
 use super::Term;
-use crate::{Block, Normal, Object, Robot, State};
+use crate::{Block, Hand, Normal, Object, State};
 
 /// Settings of [`PenetrationTerm`].
 #[derive(Clone, Debug, PartialEq)]
@@ -28,13 +28,13 @@ impl Default for PenetrationSettings {
 /// Depths to which samples of the object's surface lie in the hand.
 pub struct PenetrationTerm {
     object: Arc<Object>,
-    robot: Arc<Robot>,
+    robot: Arc<Hand>,
     settings: PenetrationSettings,
 }
 
 impl PenetrationTerm {
     /// A term for `object` in the hand `robot`.
-    pub fn new(object: Arc<Object>, robot: Arc<Robot>, settings: PenetrationSettings) -> Self {
+    pub fn new(object: Arc<Object>, robot: Arc<Hand>, settings: PenetrationSettings) -> Self {
         Self { object, robot, settings }
     }
 
@@ -45,7 +45,7 @@ impl PenetrationTerm {
         };
         let deep = |point: &Point3<f64>, hand: &ArticulatedRobot| {
             let point = state.t_cam_object * point;
-            let sample = hand.sample_motion(&point, 0.0)?;
+            let sample = hand.distance_with_gradient(&point, 0.0)?;
             (sample.field.distance < 0.0).then_some((point, sample))
         };
         let samples = self.object.samples.par_iter().with_min_len(128);

@@ -9,7 +9,7 @@ use prehend_sim::{
 };
 
 use super::Term;
-use crate::{Block, Normal, Object, Observation, RefineError, Robot, State};
+use crate::{Block, Hand, Normal, Object, Observation, RefineError, State};
 
 /// Settings of the physics term.
 #[derive(Clone, Debug, PartialEq)]
@@ -79,7 +79,7 @@ impl PhysicsTerm {
     pub fn new(
         observation: &Observation,
         object: &Object,
-        robot: &Robot,
+        robot: &Hand,
         initial: &State,
         settings: PhysicsSettings,
     ) -> Result<Self, RefineError> {

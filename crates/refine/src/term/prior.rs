@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Matrix6, Point3, Vector3, Vector6};
 use prehend_autodiff::lie::{cross_matrix, so3_left_jacobian_inverse, so3_log};
 
 use super::Term;
-use crate::{Block, CameraCorrection, Normal, RefineError, State};
+use crate::{Block, CameraCalibrationError, Normal, RefineError, State};
 
 /// Stated accuracies: standard deviations of what a [`State`] holds from what it begins with. All are positive; what is known exactly has a
 /// tiny one.
@@ -41,7 +41,7 @@ impl PriorSettings {
             Block::Camera => {
                 vec![self.depth_scale, self.depth_bias, self.shift, self.shift, self.magnification]
             }
-            Block::Patches(_) => Vec::new(),
+            Block::SurfacePatches(_) => Vec::new(),
         }
     }
 }
@@ -71,7 +71,7 @@ pub struct Prior {
     precision_object: Vector6<f64>,
     precision_hand: Vector6<f64>,
     precision_joints: f64,
-    precision_camera: [f64; CameraCorrection::DIMENSION],
+    precision_camera: [f64; CameraCalibrationError::DIMENSION],
 }
 
 impl Prior {

@@ -9,7 +9,7 @@ use prehend_render::{
 };
 
 use super::patch_sums::PatchSums;
-use super::{Patches, Term};
+use super::{SurfacePatches, Term};
 use crate::{Block, Normal, Object, Observation, RefineError, State};
 
 /// Settings of the rendering term.
@@ -106,7 +106,7 @@ pub struct RenderingTerm {
     /// Whether colors are compared.
     color: bool,
     /// Where the object may be off from its model, and the width of the patches' tiles in the image at hand \[px\].
-    patches: Option<(Arc<Patches>, usize)>,
+    patches: Option<(Arc<SurfacePatches>, usize)>,
 }
 
 impl RenderingTerm {
@@ -132,7 +132,7 @@ impl RenderingTerm {
             color_weight: if settings.color { 1.0 } else { 0.0 },
             mask_weight: (sigma / settings.mask_sigma).powi(2),
             // Or a pose could lower its loss by hiding behind the hand.
-            hidden_is_missed: true,
+            penalize_occluded: true,
             robust: Robust::Cauchy(settings.outlier * sigma),
             ..LossOptions::default()
         };
@@ -154,7 +154,7 @@ impl RenderingTerm {
     }
 
     /// The same where the object may be off from its model in `patches`; the image is `downsample` times smaller than theirs.
-    pub(crate) fn with_patches(self, patches: Arc<Patches>, downsample: usize) -> Self {
+    pub(crate) fn with_patches(self, patches: Arc<SurfacePatches>, downsample: usize) -> Self {
         let side = patches.side() / downsample;
         Self { patches: Some((patches, side)), ..self }
     }
@@ -194,8 +194,8 @@ impl Term for RenderingTerm {
         seen_by_state.fixed_view_mut::<3, 3>(0, 0).copy_from(&place.fixed_columns::<3>(0));
         seen_by_state.fixed_view_mut::<3, 5>(0, 6).copy_from(&place.fixed_columns::<5>(3));
         seen_by_state.fixed_view_mut::<3, 3>(3, 3).fill_with_identity();
-        let requested = |(patches, _): &&(Arc<Patches>, usize)| {
-            normal.offset(Block::Patches(patches.count())).is_some()
+        let requested = |(patches, _): &&(Arc<SurfacePatches>, usize)| {
+            normal.offset(Block::SurfacePatches(patches.count())).is_some()
         };
         let patches = self.patches.as_ref().filter(requested);
         let count = patches.map_or(0, |(patches, _)| patches.count());
@@ -213,7 +213,7 @@ impl Term for RenderingTerm {
             value += self.scale * at.loss.total;
         }
         let (gradient, hessian) = sums.equations();
-        let blocks = [Block::ObjectPose, Block::Camera, Block::Patches(count)];
+        let blocks = [Block::ObjectPose, Block::Camera, Block::SurfacePatches(count)];
         normal.add_dynamic(&blocks, &gradient, &hessian);
         value
     }

@@ -8,7 +8,7 @@ use prehend_sim::{CompliantBalance, CompliantSupport, Support};
 use rayon::prelude::*;
 
 use super::Term;
-use crate::{Block, Normal, Object, Observation, RefineError, Robot, State};
+use crate::{Block, Hand, Normal, Object, Observation, RefineError, State};
 
 /// Settings of [`SupportTerm`].
 #[derive(Clone, Debug, PartialEq)]
@@ -65,7 +65,7 @@ impl SupportSettings {
 /// opposes its weight or the fingers' pressure.
 pub struct SupportTerm {
     object: Arc<Object>,
-    robot: Arc<Robot>,
+    robot: Arc<Hand>,
     gravity: Vector3<f64>,
     felt: Vec<Push>,
     /// Weight and felt forces together \[N\].
@@ -106,7 +106,7 @@ impl SupportTerm {
     pub fn new(
         observation: &Observation,
         object: Arc<Object>,
-        robot: Arc<Robot>,
+        robot: Arc<Hand>,
         settings: SupportSettings,
     ) -> Result<Self, RefineError> {
         settings.check()?;
@@ -170,7 +170,7 @@ impl SupportTerm {
         hand: &ArticulatedRobot,
     ) -> Option<Near> {
         let reach = self.settings.reach;
-        let sample = hand.sample_motion(&point, reach)?;
+        let sample = hand.distance_with_gradient(&point, reach)?;
         let apart = (sample.field.distance / reach).max(0.0);
         let left = 1.0 - apart * apart;
         if inward.dot(&sample.field.gradient) <= 0.0 || left <= 0.0 {
@@ -288,8 +288,8 @@ impl SupportTerm {
                 add(HAND + k, *velocity, turn.cross(&force));
             }
             let end = point + force;
-            let tail = held.hand.velocities(felt.link, &point);
-            let head = held.hand.velocities(felt.link, &end);
+            let tail = held.hand.point_jacobian(felt.link, &point);
+            let head = held.hand.point_jacobian(felt.link, &end);
             for ((k, velocity), (_, of_head)) in tail.zip(head) {
                 add(JOINTS + k, velocity, of_head - velocity);
             }

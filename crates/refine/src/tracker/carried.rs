@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, Vector3, Vector6};
 
 use crate::strategy::{Factor, RIDGE};
 use crate::term::{Prior, Term};
-use crate::{Block, CameraCorrection, Normal, State};
+use crate::{Block, CameraCalibrationError, Normal, State};
 
 /// Where the parts of a vector of all that a state holds begin: object, hand, joints, camera.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,7 +21,7 @@ impl Layout {
     }
 
     pub(super) fn len(self) -> usize {
-        POSES + self.joints + CameraCorrection::DIMENSION
+        POSES + self.joints + CameraCalibrationError::DIMENSION
     }
 
     /// Its blocks, in order.
@@ -37,13 +37,13 @@ impl Layout {
             Block::Joints(_) => POSES,
             Block::Camera => POSES + self.joints,
             // None of these is carried.
-            Block::Patches(_) => self.len(),
+            Block::SurfacePatches(_) => self.len(),
         }
     }
 }
 
 /// A Gaussian about a state, with all its correlations: half the squared deviations from it, whitened.
-pub(super) struct Carried {
+pub(super) struct GaussianPrior {
     mean: State,
     center: Vector3<f64>,
     layout: Layout,
@@ -53,7 +53,7 @@ pub(super) struct Carried {
     object: Matrix6<f64>,
 }
 
-impl Carried {
+impl GaussianPrior {
     /// About `mean`, whose deviations have that covariance \[m, rad\]; `None` if it is not positive definite.
     pub(super) fn new(mean: State, layout: Layout, covariance: &DMatrix<f64>) -> Option<Self> {
         let whitener = Factor::new(covariance, RIDGE)?.whitener()?;
@@ -96,7 +96,7 @@ impl Carried {
     }
 }
 
-impl Term for std::sync::Arc<Carried> {
+impl Term for std::sync::Arc<GaussianPrior> {
     fn name(&self) -> &'static str {
         "prior"
     }
@@ -140,7 +140,7 @@ mod tests {
         let n = layout.len();
         let mixed = DMatrix::from_fn(n, n, |r, c| ((r * 7 + c * 3) as f64).sin());
         let covariance = (&mixed * mixed.transpose() + DMatrix::identity(n, n)) * 1e-4;
-        let carried = Carried::new(start.clone(), layout, &covariance).unwrap();
+        let carried = GaussianPrior::new(start.clone(), layout, &covariance).unwrap();
         let carried = std::sync::Arc::new(carried);
         assert!(carried.value(&start) < 1e-20 && carried.surprise(&start) < 1e-9);
         let blocks = [Block::ObjectPose, Block::HandPose, Block::Joints(16), Block::Camera];

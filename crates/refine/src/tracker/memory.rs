@@ -6,10 +6,10 @@ use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, UnitQuaternion, Vector3, Ve
 use prehend_autodiff::lie::{perturb_about, so3_log};
 
 use super::carried::Layout;
-use super::settings::{MotionSettings, TrackerSettings};
+use super::settings::{ProcessNoise, TrackerSettings};
 use crate::strategy::{Factor, Point, RIDGE};
 use crate::term::PriorSettings;
-use crate::{CameraCorrection, State};
+use crate::{CameraCalibrationError, State};
 
 /// Time within which an object that is not seen comes to rest, all but 1/e of its velocity \[s\].
 const COASTING: f64 = 0.25;
@@ -85,11 +85,7 @@ impl Memory {
     }
 
     /// The next of this memory: as [`new`](Self::new), and with the velocity between `prediction` and there.
-    pub(super) fn followed(
-        mut next: Self,
-        prediction: &Prediction,
-        motion: &MotionSettings,
-    ) -> Self {
+    pub(super) fn followed(mut next: Self, prediction: &Prediction, motion: &ProcessNoise) -> Self {
         next.velocity = prediction.velocity;
         if prediction.seconds > 0.0 {
             let moved = next.state.t_cam_object * prediction.rest.inverse();
@@ -137,7 +133,7 @@ impl Memory {
             state.joints.iter_mut().zip(errors).for_each(|(q, error)| *q += kept * error);
         }
         let camera = self.state.camera.parameters().map(|p| kept * p);
-        state.camera = CameraCorrection::default().changed(&camera);
+        state.camera = CameraCalibrationError::default().changed(&camera);
         let stated = variances(&settings.fused.accuracy, layout);
         let covariance = if layout == self.layout {
             let carry = carrier(&with_hand.rotation, kept, layout);

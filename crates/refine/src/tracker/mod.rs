@@ -12,17 +12,17 @@ use std::time::{Duration, Instant};
 
 use nalgebra::Isometry3;
 
-use self::carried::Carried;
+use self::carried::GaussianPrior;
 use self::clock::Clock;
 pub use self::clock::Spent;
 use self::memory::{Memory, Prediction};
-pub use self::settings::{LossSettings, MotionSettings, Recovery, TrackerSettings};
+pub use self::settings::{GatingSettings, ProcessNoise, Recovery, TrackerSettings};
 use crate::initial::PoseSearch;
 use crate::strategy::{
-    Confidence, Disagreement, Ending, Fused, Known, Point, Problem, beyond_chance,
+    FrameContext, Fused, Inconsistency, Point, Posterior, Problem, Termination, chi_square_z,
 };
 use crate::term::{Prior, Term};
-use crate::{CameraCorrection, Object, Observation, RefineError, Robot, State};
+use crate::{CameraCalibrationError, Hand, Object, Observation, RefineError, State};
 
 /// Follows one object through the frames of a camera.
 ///
@@ -32,13 +32,13 @@ use crate::{CameraCorrection, Object, Observation, RefineError, Robot, State};
 /// the joints' positions and corrections of the camera. It is a Kalman filter whose update is iterated, with calibrations
 /// that return to what is said of them within [`memory`](TrackerSettings::memory).
 ///
-/// A pose that does not fit is not believed ([`LossSettings`]); the object is then looked for ([`Recovery`]). A frame
+/// A pose that does not fit is not believed ([`GatingSettings`]); the object is then looked for ([`Recovery`]). A frame
 /// allocates: its terms, the hand's depth image and the renderer's buffers are made anew, from memory that the allocator has at hand.
 ///
 /// ```
 /// use std::sync::Arc;
 /// use prehend_refine::synth::default_sequence;
-/// use prehend_refine::tracker::{Following, Tracker, TrackerSettings};
+/// use prehend_refine::tracker::{TrackStatus, Tracker, TrackerSettings};
 ///
 /// let sequence = default_sequence(1, 2)?;
 /// let robot = Some(Arc::clone(&sequence.robot));
@@ -46,13 +46,13 @@ use crate::{CameraCorrection, Object, Observation, RefineError, Robot, State};
 /// tracker.start_from(&sequence.initial);
 /// for frame in &sequence.frames {
 ///     let tracked = tracker.track(&frame.observation, frame.time)?;
-///     assert_ne!(tracked.following, Following::Lost);
+///     assert_ne!(tracked.following, TrackStatus::Lost);
 /// }
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct Tracker {
     object: Arc<Object>,
-    robot: Option<Arc<Robot>>,
+    robot: Option<Arc<Hand>>,
     settings: TrackerSettings,
     /// Where to begin; the search says where if it is not known.
     initial: Option<Isometry3<f64>>,
@@ -63,7 +63,7 @@ pub struct Tracker {
 
 /// How a frame's pose came about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Following {
+pub enum TrackStatus {
     /// From the frame before.
     Followed,
     /// It is where the object should be: there was no time to look at the frame.
@@ -74,7 +74,7 @@ pub enum Following {
     Lost,
 }
 
-impl Following {
+impl TrackStatus {
     /// The name used in reports.
     pub fn name(self) -> &'static str {
         match self {
@@ -88,7 +88,7 @@ impl Following {
 
 /// Why a pose was not believed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Doubt {
+pub enum RejectionReason {
     /// The mask is empty, or the object would be behind the camera.
     Unseen,
     /// The evidence fits so badly \[nat\], its level being the other number.
@@ -99,7 +99,7 @@ pub enum Doubt {
     Uncertain(f64),
 }
 
-impl std::fmt::Display for Doubt {
+impl std::fmt::Display for RejectionReason {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Unseen => write!(f, "nothing of the object is seen"),
@@ -120,11 +120,11 @@ pub struct Tracked {
     /// The same with the hand, its joints and the camera as they are estimated to be.
     pub state: State,
     /// How the pose came about.
-    pub following: Following,
+    pub following: TrackStatus,
     /// How sure it is, unless it was only predicted.
-    pub confidence: Option<Confidence>,
+    pub confidence: Option<Posterior>,
     /// Why the object was not followed, if it was tried.
-    pub doubt: Option<Doubt>,
+    pub doubt: Option<RejectionReason>,
     /// Steps down that were made, all stages together.
     pub iterations: usize,
     /// What the evidence is from fitting perfectly \[nat\].
@@ -136,7 +136,7 @@ pub struct Tracked {
 /// A pose that was solved for.
 struct Solved {
     point: Point,
-    ending: Ending,
+    ending: Termination,
     /// Steps down.
     iterations: usize,
     /// Whether any step was tried.
@@ -160,7 +160,7 @@ impl Tracker {
     /// [`RefineError::Setting`] for a setting out of range.
     pub fn new(
         object: Arc<Object>,
-        robot: Option<Arc<Robot>>,
+        robot: Option<Arc<Hand>>,
         settings: TrackerSettings,
     ) -> Result<Self, RefineError> {
         settings.check()?;
@@ -200,31 +200,31 @@ impl Tracker {
                 let told = State {
                     t_cam_hand: hand.map_or(memory.state.t_cam_hand, |h| h.t_cam_hand),
                     joints: hand.map_or_else(Vec::new, |h| h.joints.clone()),
-                    camera: CameraCorrection::default(),
+                    camera: CameraCalibrationError::default(),
                     ..memory.state.clone()
                 };
                 let state = memory.predict(time, &told, in_hand, &self.settings).state;
-                return Ok(lost(state, Doubt::Unseen, Spent::default()));
+                return Ok(lost(state, RejectionReason::Unseen, Spent::default()));
             }
             Err(error) => return Err(error),
         };
         let prediction = memory.predict(time, &told, in_hand, &self.settings);
         if !clock.has(Duration::ZERO) {
-            return Ok(outcome(prediction.state, Following::Predicted, Spent::default()));
+            return Ok(outcome(prediction.state, TrackStatus::Predicted, Spent::default()));
         }
         let (object, robot) = (Arc::clone(&self.object), self.robot.clone());
-        let known = Known::new(observation, &object, robot.as_ref())?;
+        let known = FrameContext::new(observation, &object, robot.as_ref())?;
         let mut spent = Spent::default();
         let doubt = if prediction.state.center().z > 0.0 {
             let (problem, carried) = self.prepare(&known, &prediction)?;
             spent.preparation = clock.lap();
             if !clock.has(Duration::ZERO) {
-                return Ok(outcome(prediction.state, Following::Predicted, spent));
+                return Ok(outcome(prediction.state, TrackStatus::Predicted, spent));
             }
             let solved = self.solve(&problem, prediction.state.clone(), &clock);
             spent.steps = clock.lap();
-            if solved.ending == Ending::Stopped && !solved.tried {
-                return Ok(outcome(prediction.state, Following::Predicted, spent));
+            if solved.ending == Termination::Stopped && !solved.tried {
+                return Ok(outcome(prediction.state, TrackStatus::Predicted, spent));
             }
             let confidence = self.confidence(&solved, &told)?;
             let doubt = self.doubt(&solved, &confidence, Some(&carried), memory.allowance());
@@ -236,22 +236,22 @@ impl Tracker {
                 let mut next = Memory::followed(next, &prediction, motion);
                 next.lost = memory.lost.saturating_sub(1);
                 self.memory = Some(next);
-                return Ok(found(solved, confidence, Following::Followed, None, spent));
+                return Ok(found(solved, confidence, TrackStatus::Followed, None, spent));
             }
             doubt
         } else {
-            Some(Doubt::Unseen)
+            Some(RejectionReason::Unseen)
         };
         let again = self.recover(observation, &known, &prediction.state, &memory)?;
         spent.recovery = clock.lap();
-        let doubt = doubt.unwrap_or(Doubt::Unseen);
+        let doubt = doubt.unwrap_or(RejectionReason::Unseen);
         if let Some((solved, confidence)) = again {
             // The level of a pose found is not taken over at once: it may be a wrong one, and would then pass for right ever after.
             let level = memory.level + LEVEL_GAIN * (solved.misfit() - memory.level);
             let mut next = self.remember(time, &solved, &told, in_hand, level);
             next.lost = memory.lost;
             self.memory = Some(next);
-            return Ok(found(solved, confidence, Following::Found, Some(doubt), spent));
+            return Ok(found(solved, confidence, TrackStatus::Found, Some(doubt), spent));
         }
         if let Some(memory) = &mut self.memory {
             memory.lost = memory.lost.saturating_add(1);
@@ -271,22 +271,22 @@ impl Tracker {
             None => self.search(observation)?,
         };
         let told = State::new(observation, &self.object, &initial)?;
-        let known = Known::new(observation, &self.object, self.robot.as_ref())?;
+        let known = FrameContext::new(observation, &self.object, self.robot.as_ref())?;
         let (solved, confidence) = self.estimate(observation, &known, &told)?;
         let in_hand = known.robot.is_some();
         self.memory = Some(self.remember(time, &solved, &told, in_hand, solved.misfit()));
         let spent = Spent { recovery: clock.lap(), ..Spent::default() };
-        Ok(found(solved, confidence, Following::Found, None, spent))
+        Ok(found(solved, confidence, TrackStatus::Found, None, spent))
     }
 
     /// The terms of a frame, and the one among them that carries what was known before.
     fn prepare(
         &self,
-        known: &Known<'_>,
+        known: &FrameContext<'_>,
         prediction: &Prediction,
-    ) -> Result<(Problem, Arc<Carried>), RefineError> {
+    ) -> Result<(Problem, Arc<GaussianPrior>), RefineError> {
         let Prediction { state, covariance, layout, .. } = prediction;
-        let carried = Carried::new(state.clone(), *layout, covariance).ok_or_else(|| {
+        let carried = GaussianPrior::new(state.clone(), *layout, covariance).ok_or_else(|| {
             let problem = "does not allow for a prediction".to_owned();
             RefineError::Setting { name: "accuracy", problem }
         })?;
@@ -310,10 +310,10 @@ impl Tracker {
             clock.has(step)
         };
         if !go_on() {
-            return Solved { point: start, ending: Ending::Stopped, iterations, tried: false };
+            return Solved { point: start, ending: Termination::Stopped, iterations, tried: false };
         }
         let mut tried = false;
-        let (point, ending) = problem.solve(start, stage.iterations, stage.last_gain, |down| {
+        let (point, ending) = problem.solve(start, stage.iterations, stage.min_decrease, |down| {
             iterations += usize::from(down);
             tried = true;
             go_on()
@@ -326,9 +326,9 @@ impl Tracker {
     fn estimate(
         &self,
         observation: &Observation,
-        known: &Known<'_>,
+        known: &FrameContext<'_>,
         initial: &State,
-    ) -> Result<(Solved, Confidence), RefineError> {
+    ) -> Result<(Solved, Posterior), RefineError> {
         let fused = Fused { settings: self.settings.fused.clone() };
         let mut best = initial.clone();
         let robot = self.robot.as_ref();
@@ -362,10 +362,10 @@ impl Tracker {
     fn recover(
         &mut self,
         observation: &Observation,
-        known: &Known<'_>,
+        known: &FrameContext<'_>,
         predicted: &State,
         memory: &Memory,
-    ) -> Result<Option<(Solved, Confidence)>, RefineError> {
+    ) -> Result<Option<(Solved, Posterior)>, RefineError> {
         let recovery = self.settings.recovery;
         let levels = [(Recovery::Near, memory.allowance()), (Recovery::Anywhere, memory.level)];
         for (reach, level) in levels {
@@ -395,33 +395,33 @@ impl Tracker {
     fn doubt(
         &self,
         solved: &Solved,
-        confidence: &Confidence,
-        carried: Option<&Carried>,
+        confidence: &Posterior,
+        carried: Option<&GaussianPrior>,
         level: f64,
-    ) -> Option<Doubt> {
+    ) -> Option<RejectionReason> {
         let (loss, misfit) = (&self.settings.loss, solved.misfit());
         if misfit.is_nan() || misfit > loss.misfit_ratio * level + loss.misfit_margin {
-            return Some(Doubt::Misfit(misfit, level));
+            return Some(RejectionReason::Misfit(misfit, level));
         }
         let surprise = carried.map_or(0.0, |c| c.surprise(&solved.point.state));
         if surprise > loss.surprise {
-            return Some(Doubt::Surprise(surprise));
+            return Some(RejectionReason::Surprise(surprise));
         }
         let widest = confidence.widest(self.object.radius);
-        (widest > loss.deviation).then_some(Doubt::Uncertain(widest))
+        (widest > loss.deviation).then_some(RejectionReason::Uncertain(widest))
     }
 
     /// How sure `solved` is. Calibrations far from what is `told` of them disagree, also where the frames before have led them there.
-    fn confidence(&self, solved: &Solved, told: &State) -> Result<Confidence, RefineError> {
+    fn confidence(&self, solved: &Solved, told: &State) -> Result<Posterior, RefineError> {
         let fused = &self.settings.fused;
         let state = &solved.point.state;
         let calibrations = State { t_cam_object: told.t_cam_object, ..state.clone() };
         let squared = 2.0 * Prior::new(told, &fused.accuracy)?.value(&calibrations);
         let degrees = solved.point.normal.gradient().len().saturating_sub(6);
-        let distance = beyond_chance(squared, degrees);
-        let also = Some(Disagreement { evidence: "calibrations", distance });
+        let distance = chi_square_z(squared, degrees);
+        let also = Some(Inconsistency { evidence: "calibrations", distance });
         let found = [(solved.point.clone(), solved.ending)];
-        Ok(Confidence::new(&found, fused.width, self.object.radius, false, also))
+        Ok(Posterior::new(&found, fused.width, self.object.radius, false, also))
     }
 
     fn remember(
@@ -437,7 +437,7 @@ impl Tracker {
 }
 
 /// A pose that nothing was made of but a prediction.
-fn outcome(state: State, following: Following, spent: Spent) -> Tracked {
+fn outcome(state: State, following: TrackStatus, spent: Spent) -> Tracked {
     Tracked {
         t_cam_object: state.t_cam_object,
         state,
@@ -450,15 +450,15 @@ fn outcome(state: State, following: Following, spent: Spent) -> Tracked {
     }
 }
 
-fn lost(state: State, doubt: Doubt, spent: Spent) -> Tracked {
-    Tracked { doubt: Some(doubt), ..outcome(state, Following::Lost, spent) }
+fn lost(state: State, doubt: RejectionReason, spent: Spent) -> Tracked {
+    Tracked { doubt: Some(doubt), ..outcome(state, TrackStatus::Lost, spent) }
 }
 
 fn found(
     solved: Solved,
-    confidence: Confidence,
-    following: Following,
-    doubt: Option<Doubt>,
+    confidence: Posterior,
+    following: TrackStatus,
+    doubt: Option<RejectionReason>,
     spent: Spent,
 ) -> Tracked {
     let (misfit, iterations) = (solved.misfit(), solved.iterations);

@@ -8,7 +8,7 @@ use crate::strategy::{FusedSettings, Stage};
 
 /// What is known of how an object moves from frame to frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MotionSettings {
+pub struct ProcessNoise {
     /// Standard deviation of a velocity that was not foreseen, in each direction \[m/s\].
     pub translation: f64,
     /// Of a rate of rotation that was not foreseen, about each axis \[rad/s\].
@@ -19,7 +19,7 @@ pub struct MotionSettings {
 
 /// When a pose is not believed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LossSettings {
+pub struct GatingSettings {
     /// The misfit may be so many times its running level,
     pub misfit_ratio: f64,
     /// and so much more \[nat\].
@@ -71,9 +71,9 @@ pub struct TrackerSettings {
     /// The one stage that follows the object.
     pub stage: Stage,
     /// Motion relative to a hand that is known.
-    pub held: MotionSettings,
+    pub held: ProcessNoise,
     /// Motion in the camera frame, where no hand is known.
-    pub free: MotionSettings,
+    pub free: ProcessNoise,
     /// Time within which what was learnt of calibrations is forgotten, all but 1/e \[s\]. Errors that frames share, such as a warp of depth or a
     /// wrong model, count as new in every one of them: the longer they are remembered while nothing moves, the farther calibrations are
     /// led astray.
@@ -82,7 +82,7 @@ pub struct TrackerSettings {
     /// not begun, as far as the one before it tells.
     pub budget: Option<Duration>,
     /// When a pose is not believed.
-    pub loss: LossSettings,
+    pub loss: GatingSettings,
     /// What is done then.
     pub recovery: Recovery,
     /// How poses are searched for.
@@ -98,18 +98,18 @@ impl Default for TrackerSettings {
                 points: 400,
                 tolerance: 1.0,
                 iterations: 4,
-                last_gain: 0.02,
+                min_decrease: 0.02,
                 hypotheses: 1,
                 color: true,
                 measured_scatter: false,
                 model_deviates: true,
                 contact: true,
             },
-            held: MotionSettings { translation: 0.02, rotation: 0.2, gain: 0.1 },
-            free: MotionSettings { translation: 0.3, rotation: 2.0, gain: 0.5 },
+            held: ProcessNoise { translation: 0.02, rotation: 0.2, gain: 0.1 },
+            free: ProcessNoise { translation: 0.3, rotation: 2.0, gain: 0.5 },
             memory: 0.2,
             budget: None,
-            loss: LossSettings {
+            loss: GatingSettings {
                 misfit_ratio: 2.5,
                 misfit_margin: 40.0,
                 surprise: 8.0,

@@ -29,7 +29,7 @@ fn a_moving_hand_is_followed() {
     let mut tracker = tracker(TrackerSettings { recovery: Recovery::Off, ..Default::default() });
     for index in 0..SEQUENCE.frames.len() {
         let tracked = track(&mut tracker, index);
-        let expected = if index == 0 { Following::Found } else { Following::Followed };
+        let expected = if index == 0 { TrackStatus::Found } else { TrackStatus::Followed };
         assert_eq!(tracked.following, expected, "frame {index}: {:?}", tracked.doubt);
         let (pe, oe) = errors(&tracked, index);
         println!("{index}: {pe:.3} cm {oe:.2}° {:.0} nats {}", tracked.misfit, tracked.iterations);
@@ -50,7 +50,7 @@ fn without_a_hand_the_camera_is_enough() {
         let tracked = tracker.track(&observation, frame.time).unwrap();
         let (pe, oe) = errors(&tracked, index);
         println!("{index}: {pe:.3} cm {oe:.2}° {:?} {}", tracked.following, tracked.misfit);
-        assert!(pe < 0.6 && oe < 6.0 && tracked.following != Following::Lost, "frame {index}");
+        assert!(pe < 0.6 && oe < 6.0 && tracked.following != TrackStatus::Lost, "frame {index}");
     }
 }
 
@@ -66,15 +66,15 @@ fn a_jump_is_noticed_and_recovered_from() {
         let time = SEQUENCE.frames[3].time;
         tracker.track(&observation, time).unwrap()
     };
-    let careful = MotionSettings { translation: 0.05, rotation: 0.5, gain: 0.5 };
+    let careful = ProcessNoise { translation: 0.05, rotation: 0.5, gain: 0.5 };
     let settings = TrackerSettings { free: careful, ..Default::default() };
-    let mut hopeless = tracker(TrackerSettings { recovery: Recovery::Off, ..settings.clone() });
-    let lost = jump(&mut hopeless);
-    assert!(lost.following == Following::Lost && lost.doubt.is_some(), "{:?}", lost.following);
+    let mut prune_margin = tracker(TrackerSettings { recovery: Recovery::Off, ..settings.clone() });
+    let lost = jump(&mut prune_margin);
+    assert!(lost.following == TrackStatus::Lost && lost.doubt.is_some(), "{:?}", lost.following);
     let mut tracker = tracker(settings);
     let found = jump(&mut tracker);
     let (pe, oe) = errors(&found, 23);
-    assert_eq!(found.following, Following::Found, "{:?}", found.doubt);
+    assert_eq!(found.following, TrackStatus::Found, "{:?}", found.doubt);
     assert!(pe < 0.6 && oe < 6.0, "{pe} cm, {oe}°");
     assert!(found.doubt.is_some() && found.spent.recovery > Duration::ZERO);
 }
@@ -87,7 +87,7 @@ fn without_time_the_prediction_is_returned() {
     let hand = |k: usize| SEQUENCE.frames[k].observation.hand.as_ref().unwrap().t_cam_hand;
     for index in 1..4 {
         let predicted = track(&mut tracker, index);
-        assert_eq!(predicted.following, Following::Predicted);
+        assert_eq!(predicted.following, TrackStatus::Predicted);
         assert!(predicted.confidence.is_none() && predicted.iterations == 0);
         // The hand carries the object along.
         let expected = hand(index) * hand(0).inverse() * first.t_cam_object;
@@ -96,7 +96,7 @@ fn without_time_the_prediction_is_returned() {
         assert!(pe < 0.05 && oe < 0.1, "{pe} cm, {oe}°");
     }
     tracker.settings.budget = None;
-    assert_eq!(track(&mut tracker, 4).following, Following::Followed);
+    assert_eq!(track(&mut tracker, 4).following, TrackStatus::Followed);
 }
 
 #[test]
@@ -106,8 +106,8 @@ fn an_empty_mask_is_lost_and_a_full_one_found_again() {
     let mut observation = SEQUENCE.frames[1].observation.clone();
     observation.mask.pixels_mut().fill(false);
     let lost = tracker.track(&observation, SEQUENCE.frames[1].time).unwrap();
-    assert_eq!((lost.following, lost.doubt), (Following::Lost, Some(Doubt::Unseen)));
-    assert_eq!(track(&mut tracker, 2).following, Following::Followed);
+    assert_eq!((lost.following, lost.doubt), (TrackStatus::Lost, Some(RejectionReason::Unseen)));
+    assert_eq!(track(&mut tracker, 2).following, TrackStatus::Followed);
     // Neither color nor depth under the mask.
     let mut observation = SEQUENCE.frames[3].observation.clone();
     observation.depth.pixels_mut().fill(0.0);
@@ -143,7 +143,7 @@ fn wrong_masks_do_not_lead_astray_for_good() {
         let tracked = tracker.track(&observation, frame.time).unwrap();
         let (pe, oe) = errors(&tracked, index);
         println!("{index}: {pe:.3} cm {oe:.2}° {:?} {:?}", tracked.following, tracked.doubt);
-        assert!(index > 5 || tracked.following == Following::Lost, "frame {index}");
+        assert!(index > 5 || tracked.following == TrackStatus::Lost, "frame {index}");
     }
     let tracked = (14..18).map(|index| track(&mut tracker, index)).last().unwrap();
     let (pe, oe) = errors(&tracked, 17);
@@ -163,7 +163,7 @@ fn a_still_scene_does_not_wander_off() {
     }
     let mut at = |index: u64| {
         let tracked = tracker.track(&observation, Duration::from_millis(33 * index)).unwrap();
-        assert!(index == 0 || tracked.following == Following::Followed, "{:?}", tracked.doubt);
+        assert!(index == 0 || tracked.following == TrackStatus::Followed, "{:?}", tracked.doubt);
         tracked.t_cam_object
     };
     let poses: Vec<Isometry3<f64>> = (0..60).map(&mut at).collect();
@@ -180,7 +180,7 @@ fn calibrations_that_were_led_astray_still_disagree() {
         let hand = observation.hand.as_mut().unwrap();
         hand.t_cam_hand.translation.z += 0.05;
         let tracked = tracker.track(&observation, SEQUENCE.frames[index].time).unwrap();
-        let probability = tracked.confidence.as_ref().map_or(0.0, Confidence::probability);
+        let probability = tracked.confidence.as_ref().map_or(0.0, Posterior::probability);
         let (pe, _) = errors(&tracked, index);
         println!("{index}: {pe:.2} cm {:?} {probability:.2}", tracked.following);
         assert!(probability < 0.8 || pe < 0.5, "frame {index}: {probability}, {pe} cm");
@@ -189,13 +189,15 @@ fn calibrations_that_were_led_astray_still_disagree() {
 
 #[test]
 fn an_uncertain_pose_is_doubted_at_any_limit() {
-    let loss = LossSettings { deviation: 1e-4, ..TrackerSettings::default().loss };
+    let loss = GatingSettings { deviation: 1e-4, ..TrackerSettings::default().loss };
     let settings = TrackerSettings { loss, recovery: Recovery::Off, ..Default::default() };
     let mut tracker = tracker(settings);
     track(&mut tracker, 0);
     let tracked = track(&mut tracker, 1);
-    assert_eq!(tracked.following, Following::Lost);
-    let Some(Doubt::Uncertain(deviation)) = tracked.doubt else { panic!("{:?}", tracked.doubt) };
+    assert_eq!(tracked.following, TrackStatus::Lost);
+    let Some(RejectionReason::Uncertain(deviation)) = tracked.doubt else {
+        panic!("{:?}", tracked.doubt)
+    };
     assert!(deviation > 1e-4 && deviation < 8e-3, "{deviation} m");
 }
 
@@ -238,5 +240,5 @@ fn faults_of_a_frame_are_errors_and_change_nothing() {
     observation.hand.as_mut().unwrap().forces.pop();
     let error = tracker.track(&observation, SEQUENCE.frames[1].time).unwrap_err();
     assert!(matches!(error, RefineError::TaxelCount { .. }));
-    assert_eq!(track(&mut tracker, 1).following, Following::Followed);
+    assert_eq!(track(&mut tracker, 1).following, TrackStatus::Followed);
 }

@@ -79,7 +79,7 @@ impl Scene<'_> {
         let step = self.drawing.step;
         let (alpha, slope) = step.at(side * distance, inner.piece.outward);
         // Depth counts for nothing at the step itself.
-        let (weight, weight_slope) = falling_step(step.reach() - 2.0 * distance, step.reach());
+        let (weight, weight_derivative) = falling_step(step.reach() - 2.0 * distance, step.reach());
         let mut out = own;
         for k in 0..3 {
             out.color[k] = alpha * near.color[k] + (1.0 - alpha) * far.color[k];
@@ -95,7 +95,7 @@ impl Scene<'_> {
             if let Some(layers) = layers {
                 out.color_rows = self.rows_across([x, y], inner, &foot, side, layers, &ds);
             }
-            out.depth_weight_row = ds.map(|v| -2.0 * side * weight_slope * v);
+            out.depth_weight_row = ds.map(|v| -2.0 * side * weight_derivative * v);
         }
         out
     }

@@ -17,7 +17,7 @@ pub struct LossOptions {
     /// What becomes of a pixel of the mask where a known body lies in front of the rendered object: `false`
     /// gives it no residual; `true` counts it as missed, like a pixel that the object does not cover, so that hiding
     /// behind the body does not lower the loss. Neither has a derivative.
-    pub hidden_is_missed: bool,
+    pub penalize_occluded: bool,
     /// Minimizes the loss of each pose over a gain and an offset of the object's colors in each channel, for images whose
     /// exposure, white balance or black level is not known. Costs about another evaluation; with a robust kernel, one for
     /// each round of reweighting.
@@ -32,7 +32,7 @@ impl Default for LossOptions {
             mask_weight: 0.0,
             depth: None,
             robust: Robust::None,
-            hidden_is_missed: false,
+            penalize_occluded: false,
             affine: false,
         }
     }

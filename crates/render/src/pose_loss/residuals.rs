@@ -79,7 +79,7 @@ impl Residuals<'_> {
             return false;
         }
         sums.counts.hidden += 1;
-        if self.options.hidden_is_missed && self.target.coverage[at] > 0.0 {
+        if self.options.penalize_occluded && self.target.coverage[at] > 0.0 {
             self.miss(sums, at);
         }
         true

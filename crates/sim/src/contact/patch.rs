@@ -42,7 +42,7 @@ impl Patch<'_> {
     /// Whether a point of `block` may be nearer to the field than `reach`.
     #[inline]
     fn may_touch(&self, block: &Block, reach: f64) -> bool {
-        let within = reach + self.field.steepest() * block.radius;
+        let within = reach + self.field.lipschitz_bound() * block.radius;
         block.radius.is_infinite() || self.distance_within(&block.center, within)
     }
 
@@ -55,7 +55,7 @@ impl Patch<'_> {
 
     /// The samples that may touch, for a law that reaches to `cutoff`, before one of them has moved by `margin` \[m\].
     pub(crate) fn near(&self, cutoff: f64, margin: f64) -> Surface {
-        let reach = cutoff + self.onset.band() + self.field.steepest() * margin;
+        let reach = cutoff + self.onset.band() + self.field.lipschitz_bound() * margin;
         let near = |point: &SurfacePoint| self.distance_within(&point.position, reach);
         self.surface.only(near, |block| self.may_touch(block, reach))
     }

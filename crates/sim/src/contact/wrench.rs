@@ -345,7 +345,7 @@ mod tests {
                 let hessian = nalgebra::Matrix3::zeros();
                 (distance <= reach).then_some(FieldSample { distance, gradient, hessian })
             }
-            fn steepest(&self) -> f64 {
+            fn lipschitz_bound(&self) -> f64 {
                 2.3
             }
         }

@@ -146,7 +146,7 @@ impl<'a> Problem<'a> {
         let small = OPTIMAL * self.load.norm();
         for _ in 0..MOST_RAYS {
             let Some(best) = self
-                .steepest(&residual)
+                .lipschitz_bound(&residual)
                 .filter(|ray| -ray.wrench.dot(&residual) > small * ray.wrench.norm())
             else {
                 break;
@@ -166,7 +166,7 @@ impl<'a> Problem<'a> {
     }
 
     /// The ray of all cones along which the residual falls fastest, by unit length of its wrench.
-    fn steepest(&self, residual: &Vector6<f64>) -> Option<Ray> {
+    fn lipschitz_bound(&self, residual: &Vector6<f64>) -> Option<Ray> {
         let (force, torque) = (residual.fixed_rows::<3>(0), residual.fixed_rows::<3>(3));
         let ray = |(index, (support, arm)): (usize, (&Support, &Vector3<f64>))| {
             // −∂(|residual|²/2)/∂(force at the support).
@@ -258,7 +258,7 @@ mod tests {
     #[test]
     fn what_is_found_is_best() {
         let mut random = SplitMix64::new(7);
-        let mut unit = || 2.0 * random.unit() - 1.0;
+        let mut unit = || 2.0 * random.uniform() - 1.0;
         let (mut balanced, mut unbalanced) = (0, 0);
         for count in (2..10).cycle().take(200) {
             let supports: Vec<Support> = (0..count)
@@ -279,7 +279,7 @@ mod tests {
             // Optimal: the residual is orthogonal to the forces, and no ray of a cone reduces it.
             let used = residual - problem.load;
             assert!(used.dot(&residual).abs() < 1e-8 * problem.load.norm_squared());
-            let ray = problem.steepest(&residual).unwrap();
+            let ray = problem.lipschitz_bound(&residual).unwrap();
             let left = -ray.wrench.dot(&residual) / ray.wrench.norm();
             assert!(left < 1e-7 * problem.load.norm(), "{count}: {left:e}");
             for (support, force) in supports.iter().zip(&found.forces) {

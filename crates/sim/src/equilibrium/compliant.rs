@@ -180,7 +180,7 @@ mod tests {
 
     /// Supports about the origin and a load, at random.
     fn problem(random: &mut SplitMix64, compliance: f64) -> (Vec<CompliantSupport>, Vector6<f64>) {
-        let mut unit = || 2.0 * random.unit() - 1.0;
+        let mut unit = || 2.0 * random.uniform() - 1.0;
         let count = 2 + (4.0 * (1.0 + unit())) as usize;
         let supports = (0..count).map(|_| {
             let normal = Unit::new_normalize(Vector3::new(unit(), unit(), 0.7 + unit()));
@@ -232,7 +232,7 @@ mod tests {
             assert!((value - found.value).abs() < 1e-9 && (left - found.residual).norm() < 1e-9);
             for _ in 0..50 {
                 let nudged = |(s, f): (&CompliantSupport, &Vector3<f64>)| {
-                    let nudge = Vector3::from_fn(|_, _| 0.2 * (random.unit() - 0.5));
+                    let nudge = Vector3::from_fn(|_, _| 0.2 * (random.uniform() - 0.5));
                     Projection::new(&(f + nudge), &s.support).point
                 };
                 let other: Vec<_> = supports.iter().zip(&found.forces).map(nudged).collect();

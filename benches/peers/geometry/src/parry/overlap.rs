@@ -2,7 +2,7 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use prehend_geometry::{TriMesh, UnionBody};
+use prehend_geometry::{TriMesh, SolidUnion};
 
 use super::NAME;
 use super::parry::math::Pose;
@@ -18,7 +18,7 @@ pub(crate) fn add<'a>(to: &mut Comparisons<'a>, scenes: &'a Scenes) {
     let [a, b] = &scenes.pair;
     let a = solid(a);
     to.pair.add(NAME, move || shared(&a, b) * CM3, |volume| vec![volume]);
-    let hand = solid(&UnionBody::new(&scenes.links).expect("closed links").mesh());
+    let hand = solid(&SolidUnion::new(&scenes.links).expect("closed links").mesh());
     let (own, body) = (hand.clone(), &scenes.body);
     to.grasp.add(NAME, move || shared(&own, body) * CM3, |volume| vec![volume]);
     let all = move || scenes.posed.iter().map(|body| shared(&hand, body) * CM3).collect();

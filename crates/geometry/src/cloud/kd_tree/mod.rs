@@ -78,7 +78,7 @@ impl KdTree {
     /// As [`Self::nearest`], trying the point `hint` first: the answer for a nearby query spares most of the
     /// search. The answer does not depend on the hint.
     #[inline]
-    pub fn nearest_from(
+    pub fn nearest_with_hint(
         &self,
         query: &Point3<f64>,
         max_distance: f64,
@@ -92,7 +92,7 @@ impl KdTree {
         self.search(&probe, best).found()
     }
 
-    /// As [`Self::nearest_from`], with the squared distance \[m²\] that no other point is nearer than.
+    /// As [`Self::nearest_with_hint`], with the squared distance \[m²\] that no other point is nearer than.
     #[inline]
     pub(crate) fn nearest_alone(
         &self,

@@ -206,7 +206,6 @@ impl Collect for Every {
 }
 
 fn neighbors(found: Vec<(f64, u32)>) -> Vec<Neighbor> {
-    let neighbor =
-        |(distance_squared, index)| Neighbor { index: index as usize, distance_squared };
+    let neighbor = |(distance_squared, index)| Neighbor { index: index as usize, distance_squared };
     found.into_iter().map(neighbor).collect()
 }

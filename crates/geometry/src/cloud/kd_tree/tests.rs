@@ -6,17 +6,14 @@ use proptest::prelude::*;
 fn cloud(n: usize, seed: u64, lattice: bool) -> Vec<Point3<f64>> {
     let mut random = SplitMix64::new(seed);
     let mut next = || {
-        let x = random.unit() - 0.5;
+        let x = random.uniform() - 0.5;
         if lattice { (8.0 * x).round() / 8.0 } else { x }
     };
     (0..n).map(|_| Point3::new(next(), next(), 0.1 * next())).collect()
 }
 
 /// All points by distance, then index.
-fn sorted(
-    distance_squared: impl Fn(&Point3<f64>) -> f64,
-    points: &[Point3<f64>],
-) -> Vec<Neighbor> {
+fn sorted(distance_squared: impl Fn(&Point3<f64>) -> f64, points: &[Point3<f64>]) -> Vec<Neighbor> {
     let mut all: Vec<_> = points
         .iter()
         .enumerate()
@@ -44,11 +41,11 @@ proptest! {
         for (i, q) in queries.iter().map(|q| q * 1.3 + offset).enumerate() {
             let all = sorted(|p| (q - p).norm_squared(), &points);
             prop_assert_eq!(tree.nearest(&q, f64::INFINITY), Some(all[0]));
-            prop_assert_eq!(tree.nearest_from(&q, f64::INFINITY, 7 * i), Some(all[0]));
+            prop_assert_eq!(tree.nearest_with_hint(&q, f64::INFINITY, 7 * i), Some(all[0]));
             let near: Vec<_> =
                 all.iter().copied().take_while(|m| m.distance_squared <= reach * reach).collect();
             prop_assert_eq!(tree.nearest(&q, reach), near.first().copied());
-            prop_assert_eq!(tree.nearest_from(&q, reach, i), near.first().copied());
+            prop_assert_eq!(tree.nearest_with_hint(&q, reach, i), near.first().copied());
             let next = all.get(1).map_or(f64::INFINITY, |m| m.distance_squared);
             let alone = near.first().map(|m| (*m, next.min(reach * reach)));
             prop_assert_eq!(tree.nearest_alone(&q, reach, None), alone);
@@ -87,7 +84,7 @@ fn larger_trees_agree_too() {
     let tree = KdTree::new(&points).unwrap();
     for (i, q) in cloud(50, 4, false).iter().enumerate() {
         let all = sorted(|p| (q - p).norm_squared(), &points);
-        assert_eq!(tree.nearest_from(q, f64::INFINITY, i), Some(all[0]));
+        assert_eq!(tree.nearest_with_hint(q, f64::INFINITY, i), Some(all[0]));
         assert_eq!(tree.k_nearest(q, 25), &all[..25]);
     }
 }
@@ -95,14 +92,14 @@ fn larger_trees_agree_too() {
 #[test]
 fn many_equal_points_and_none() {
     let same = KdTree::new(&vec![Point3::new(1.0, 2.0, 2.0); 1000]).unwrap();
-    let nearest = same.nearest_from(&Point3::origin(), 3.0, 500);
+    let nearest = same.nearest_with_hint(&Point3::origin(), 3.0, 500);
     assert_eq!(nearest, Some(Neighbor { index: 0, distance_squared: 9.0 }));
     assert_eq!(same.within(&Point3::origin(), 3.0).len(), 1000);
     assert_eq!(same.k_nearest(&Point3::origin(), 3).iter().map(|n| n.index).sum::<usize>(), 3);
 
     let none = KdTree::new(&[]).unwrap();
     assert_eq!(none.nearest(&Point3::origin(), f64::INFINITY), None);
-    assert_eq!(none.nearest_from(&Point3::origin(), f64::INFINITY, 0), None);
+    assert_eq!(none.nearest_with_hint(&Point3::origin(), f64::INFINITY, 0), None);
     assert!(none.k_nearest(&Point3::origin(), 3).is_empty());
     assert!(none.within(&Point3::origin(), f64::INFINITY).is_empty());
 }

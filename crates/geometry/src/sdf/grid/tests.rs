@@ -175,8 +175,8 @@ fn derivatives_match_differences_at_random_points_of_a_band() {
     let mut random = crate::SplitMix64::new(37);
     for _ in 0..300 {
         // A difference must not leave the cell.
-        let index = grid.dims().map(|n| (random.unit() * (n - 1) as f64).floor());
-        let within = [(); 3].map(|()| 0.1 + 0.8 * random.unit());
+        let index = grid.dims().map(|n| (random.uniform() * (n - 1) as f64).floor());
+        let within = [(); 3].map(|()| 0.1 + 0.8 * random.uniform());
         let offset = (Vector3::from(index) + Vector3::from(within)) * grid.spacing();
         let p = grid.extent().0 + offset;
         let (s, step) = (grid.evaluate(&p), 1e-6);

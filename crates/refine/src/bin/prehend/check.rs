@@ -7,7 +7,7 @@ use clap::Args;
 use prehend_refine::bop::{DatasetError, Frame, ResultRow};
 use prehend_refine::report::{Report, outline_picture};
 use prehend_refine::{
-    AssetError, Assets, Observation, Robot, TermKind, inspect_object, inspect_pose,
+    AssetError, Assets, Hand, Observation, TermKind, inspect_object, inspect_pose,
 };
 
 use crate::cache;
@@ -66,7 +66,7 @@ fn check(
 }
 
 /// What a frame brings, and what it lacks.
-type Sensed = (Observation, Option<Arc<Robot>>, Vec<String>);
+type Sensed = (Observation, Option<Arc<Hand>>, Vec<String>);
 
 /// The frame with all that it brings; a warning where it has no hand or no touch, as plain BOP datasets.
 fn sensed(

@@ -9,7 +9,7 @@ use std::time::Instant;
 use prehend_refine::bop::{Dataset, ResultRow, share_image_times, write_results};
 use prehend_refine::identity::{SENSED, canonical, dataset_fingerprint, file_fingerprint};
 use prehend_refine::report::{FrameReport, Report};
-use prehend_refine::strategy::ConfidenceSummary;
+use prehend_refine::strategy::PosteriorSummary;
 use prehend_refine::trace::Trace;
 use prehend_refine::{
     AssetError, Assets, Config, Identity, Journal, PlainPose, RefinedPose, Times, Workers,
@@ -50,7 +50,7 @@ struct Refined {
     warnings: Vec<String>,
     object_warnings: Vec<String>,
     /// How sure the pose is, where the method knows.
-    confidence: Option<ConfidenceSummary>,
+    confidence: Option<PosteriorSummary>,
     /// Kept only if something will be made of it: it is long.
     trace: Option<Trace>,
 }
@@ -197,7 +197,7 @@ impl Run<'_> {
             iterations: pose.trace.iterations.len().saturating_sub(1),
             warnings: inspect_pose(&observation, &object, robot.map(Arc::as_ref), &row.t_cam_model),
             object_warnings: inspect_object(&object),
-            confidence: pose.confidence.as_ref().map(ConfidenceSummary::from),
+            confidence: pose.confidence.as_ref().map(PosteriorSummary::from),
             trace: self.keeps_trace().then_some(pose.trace),
         };
         Ok(Done { refined, seconds })

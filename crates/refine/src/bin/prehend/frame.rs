@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use prehend_refine::bop::write_atomically;
-use prehend_refine::strategy::ConfidenceSummary;
+use prehend_refine::strategy::PosteriorSummary;
 use prehend_refine::{frame_file, inspect_object, inspect_pose, refine_with};
 use serde_json::json;
 
@@ -55,7 +55,7 @@ pub(crate) fn run(
         "terms": config.terms.iter().map(|t| t.name()).collect::<Vec<_>>(),
         "iteration": refined.iteration,
         "warnings": warnings,
-        "confidence": refined.confidence.as_ref().map(ConfidenceSummary::from),
+        "confidence": refined.confidence.as_ref().map(PosteriorSummary::from),
         "trace": refined.trace,
     });
     let text = format!("{document:#}");

@@ -13,7 +13,7 @@ use prehend_refine::bop::{
     Dataset, DatasetError, GroundTruth, ResultRow, check_writable, share_image_times, write_results,
 };
 use prehend_refine::initial::{NoiseLevel, PoseSearch, SearchSettings, Target, find_targets};
-use prehend_refine::{AssetError, Assets, Observation, RefineError, Robot};
+use prehend_refine::{AssetError, Assets, Hand, Observation, RefineError};
 
 use crate::cache;
 use crate::options::{Selection, label};
@@ -178,7 +178,7 @@ pub(crate) fn observed(
     scene_id: u32,
     im_id: u32,
     instance: usize,
-) -> Result<(Observation, Option<Arc<Robot>>), AssetError> {
+) -> Result<(Observation, Option<Arc<Hand>>), AssetError> {
     let frame = assets.dataset().frame(scene_id, im_id)?;
     assets.whole_observation(&frame, instance)
 }

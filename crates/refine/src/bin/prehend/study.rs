@@ -10,7 +10,7 @@ use clap::{Args, Subcommand};
 use prehend_refine::bop::{Dataset, DatasetError};
 use prehend_refine::identity::{SENSED, TRUTH, canonical, dataset_fingerprint};
 use prehend_refine::study::{
-    Design, Examined, Examiner, Failure, Frame, FrameRecord, Kind, Level, MethodSettings, RECORDS,
+    Design, Examined, Failure, Frame, FrameRecord, Kind, Level, MethodSettings, RECORDS, Runner,
     Shard, Sweep, TIMES, Tables, merge, write_outputs,
 };
 use prehend_refine::{
@@ -42,7 +42,7 @@ enum What {
     /// The fused estimator without each kind of evidence, with one kind alone, and with calibrations believed
     Evidence(Run),
     /// Whether the fused estimator's covariances and probabilities are right
-    Confidence(Run),
+    Posterior(Run),
     /// The robust ICP and the fused estimator when more and more is wrong with the sensors
     Robustness(Robustness),
     /// Put the shards of a study together
@@ -111,7 +111,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         What::Noise(run) => run.study(Kind::Noise, &[]),
         What::Steps(run) => run.study(Kind::Steps, &[]),
         What::Evidence(run) => run.study(Kind::Evidence, &[]),
-        What::Confidence(run) => run.study(Kind::Confidence, &[]),
+        What::Posterior(run) => run.study(Kind::Posterior, &[]),
         What::Robustness(Robustness { run, sweeps }) => {
             let mut sweeps = sweeps.clone().unwrap_or_else(|| Sweep::ALL.to_vec());
             sweeps.sort_unstable();
@@ -145,7 +145,7 @@ impl Run {
         Workers::new(open.len(), threads)?.run(
             &open,
             || {
-                let mut examiner = Examiner::new(&design, &methods, &assets);
+                let mut examiner = Runner::new(&design, &methods, &assets);
                 move |frame: &&Frame| examiner.examine(frame)
             },
             |frame, Examined { record, seconds }| -> anyhow::Result<()> {
@@ -291,7 +291,7 @@ fn outcome(tables: &Tables, records: &BTreeMap<usize, FrameRecord>) -> Outcome {
         failures: tables
             .failures
             .iter()
-            .filter(|failure| !failure.disturbed)
+            .filter(|failure| !failure.perturbed)
             .map(Failure::sentence)
             .collect(),
     }

@@ -11,8 +11,8 @@ use clap::Args;
 use nalgebra::Isometry3;
 use prehend_refine::bop::{Dataset, ResultRow, check_writable, share_image_times, write_results};
 use prehend_refine::initial::find_targets;
-use prehend_refine::strategy::Confidence;
-use prehend_refine::tracker::{Following, Recovery, Tracked, Tracker, TrackerSettings};
+use prehend_refine::strategy::Posterior;
+use prehend_refine::tracker::{Recovery, TrackStatus, Tracked, Tracker, TrackerSettings};
 use prehend_refine::{AssetError, Assets, PlainPose};
 use serde_json::json;
 
@@ -220,13 +220,13 @@ impl Arguments {
             match frame() {
                 Ok(tracked) => {
                     bar.set_message(tracked.following.name());
-                    if let (Following::Lost, Some(doubt)) = (tracked.following, tracked.doubt) {
+                    if let (TrackStatus::Lost, Some(doubt)) = (tracked.following, tracked.doubt) {
                         bar.suspend(|| {
                             complain(format!("warning: {}: lost: {doubt}", label(&row)))
                         });
                     }
                     row.t_cam_model = tracked.t_cam_object;
-                    row.score = tracked.confidence.as_ref().map_or(0.0, Confidence::probability);
+                    row.score = tracked.confidence.as_ref().map_or(0.0, Posterior::probability);
                     if self.time {
                         row.time = tracked.spent.total().as_secs_f64();
                     }
@@ -244,7 +244,7 @@ impl Arguments {
 /// What became of `frames`, which are not empty.
 fn told(frames: &[Done]) -> String {
     // To find an object takes far longer than to follow it, and is rare.
-    let rare = |f: &&Done| matches!(f.tracked.following, Following::Found | Following::Lost);
+    let rare = |f: &&Done| matches!(f.tracked.following, TrackStatus::Found | TrackStatus::Lost);
     let of = |f: &Done| f.tracked.spent.total().as_secs_f64();
     let mut seconds: Vec<f64> = frames.iter().filter(|f| !rare(f)).map(of).collect();
     if seconds.is_empty() {
@@ -259,7 +259,8 @@ fn told(frames: &[Done]) -> String {
         text += &format!(" at {rate:.1} a second, median {median:.1} ms");
     }
     text += ": ";
-    let all = [Following::Followed, Following::Predicted, Following::Found, Following::Lost];
+    let all =
+        [TrackStatus::Followed, TrackStatus::Predicted, TrackStatus::Found, TrackStatus::Lost];
     let counts: Vec<String> = all
         .into_iter()
         .map(|f| (f, frames.iter().filter(|d| d.tracked.following == f).count()))

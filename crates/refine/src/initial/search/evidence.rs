@@ -7,7 +7,7 @@ use prehend_geometry::sample::surface_samples;
 use prehend_render::{Camera, DepthImage};
 
 use crate::term::back_project;
-use crate::{Observation, RefineError, Robot};
+use crate::{Hand, Observation, RefineError};
 
 /// Depth points that normals are estimated from, at most.
 const POINTS: usize = 2500;
@@ -31,16 +31,16 @@ pub(super) struct Evidence {
 }
 
 impl Evidence {
-    /// What `observation` says; taxels with more than `touch_force` \[N\] are touched. `hand` is the depth image
+    /// What `observation` says; taxels with more than `contact_threshold` \[N\] are touched. `hand` is the depth image
     /// of the hand alone.
     ///
     /// # Errors
     /// If no pixel of the mask has a depth, or forces and taxels do not match.
     pub(super) fn new(
         observation: &Observation,
-        robot: Option<&Robot>,
+        robot: Option<&Hand>,
         hand: &DepthImage,
-        touch_force: f64,
+        contact_threshold: f64,
     ) -> Result<Self, RefineError> {
         let places = back_project(observation, POINTS)?;
         let tree = KdTree::new(&places).map_err(|_| RefineError::NoDepth)?;
@@ -55,7 +55,8 @@ impl Evidence {
                 let link = link.and_then(|i| posed.t_world_links().get(i));
                 let link =
                     link.ok_or_else(|| RefineError::TaxelLink { link: taxel.link.clone() })?;
-                let list = if force.norm() > touch_force { &mut touched } else { &mut outside };
+                let list =
+                    if force.norm() > contact_threshold { &mut touched } else { &mut outside };
                 list.push(link * taxel.position);
             }
         }

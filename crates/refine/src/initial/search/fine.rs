@@ -10,7 +10,7 @@ use crate::strategy::preconditioned_step;
 use crate::term::{
     DepthSettings, DepthTerm, RenderingSettings, RenderingTerm, TactileSettings, TactileTerm, Term,
 };
-use crate::{Block, Normal, Object, Observation, RefineError, Robot, State};
+use crate::{Block, Hand, Normal, Object, Observation, RefineError, State};
 
 /// Depth points of the depth term at resolution 1.
 const DEPTH_POINTS: usize = 800;
@@ -20,13 +20,13 @@ const LONGEST: f64 = 10e-3;
 const SHORTEST: f64 = 50e-6;
 
 /// Depth, color and, where there is a skin, touch.
-pub(super) struct Fine<'a> {
+pub(super) struct FineScorer<'a> {
     observation: &'a Observation,
     object: &'a Object,
     terms: Vec<Box<dyn Term>>,
 }
 
-impl<'a> Fine<'a> {
+impl<'a> FineScorer<'a> {
     /// The terms with an image smaller by `resolution`, and fewer depth points.
     ///
     /// # Errors
@@ -34,7 +34,7 @@ impl<'a> Fine<'a> {
     pub(super) fn new(
         observation: &'a Observation,
         object: &'a Arc<Object>,
-        robot: Option<&Arc<Robot>>,
+        robot: Option<&Arc<Hand>>,
         hand: &Arc<DepthImage>,
         resolution: usize,
         settings: &SearchSettings,
@@ -48,8 +48,8 @@ impl<'a> Fine<'a> {
         ];
         let feels = observation.hand.as_ref().is_some_and(|hand| !hand.forces.is_empty());
         if let (Some(robot), true) = (robot, feels) {
-            let touch_force = settings.touch_force;
-            let touch = TactileSettings { touch_force, ..TactileSettings::default() };
+            let contact_threshold = settings.contact_threshold;
+            let touch = TactileSettings { contact_threshold, ..TactileSettings::default() };
             terms.push(Box::new(TactileTerm::new(
                 observation,
                 Arc::clone(object),

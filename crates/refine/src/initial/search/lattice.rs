@@ -87,7 +87,7 @@ mod tests {
         let lattice = DistanceLattice::new(&object, 48);
         let mut random = SplitMix64::new(2);
         for _ in 0..2000 {
-            let p = Point3::from(Vector3::from_fn(|_, _| random.unit() - 0.5) * 0.22);
+            let p = Point3::from(Vector3::from_fn(|_, _| random.uniform() - 0.5) * 0.22);
             let (distance, gradient) = lattice.sample(&p);
             let exact = object.surface.signed_distance(&p).0;
             let out = (p.coords.abs() - Vector3::new(0.06, 0.07, 0.13)).max();

@@ -14,12 +14,12 @@ use rayon::prelude::*;
 pub use self::settings::SearchSettings;
 
 use self::evidence::Evidence;
-use self::fine::Fine;
+use self::fine::FineScorer;
 use self::lattice::DistanceLattice;
-use self::rough::Rough;
+use self::rough::CoarseScorer;
 use crate::refine::hand_depth;
 use crate::rotations::spread_rotations;
-use crate::{Object, Observation, RefineError, Robot, State};
+use crate::{Hand, Object, Observation, RefineError, State};
 
 /// A pose that a search ends with.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -77,7 +77,7 @@ impl PoseSearch {
     pub fn run(
         &self,
         observation: &Observation,
-        robot: Option<&Arc<Robot>>,
+        robot: Option<&Arc<Hand>>,
     ) -> Result<Vec<Found>, RefineError> {
         let settings = &self.settings;
         // The checks that every refinement makes.
@@ -91,12 +91,14 @@ impl PoseSearch {
         }
         let hand = Arc::new(hand_depth(observation, robot.map(Arc::as_ref)));
         let evidence =
-            Evidence::new(observation, robot.map(Arc::as_ref), &hand, settings.touch_force)?;
-        let rough = Rough { object: &self.object, lattice: &self.lattice, evidence: &evidence };
+            Evidence::new(observation, robot.map(Arc::as_ref), &hand, settings.contact_threshold)?;
+        let rough =
+            CoarseScorer { object: &self.object, lattice: &self.lattice, evidence: &evidence };
         let placed = self.place(&rough);
         let turned = self.turn(&rough, &placed);
-        let judge =
-            |resolution| Fine::new(observation, &self.object, robot, &hand, resolution, settings);
+        let judge = |resolution| {
+            FineScorer::new(observation, &self.object, robot, &hand, resolution, settings)
+        };
         let coarse = judge(settings.coarse_resolution)?;
         let seen = evaluate(&turned, |pose| (*pose, coarse.value(pose)));
         let seen = distinct(seen, settings.seen, 6e-3, 6.0);
@@ -113,7 +115,7 @@ impl PoseSearch {
     }
 
     /// Stage 1.
-    fn place(&self, rough: &Rough) -> Vec<Scored> {
+    fn place(&self, rough: &CoarseScorer) -> Vec<Scored> {
         let settings = &self.settings;
         let reach = settings.reach * self.object.radius;
         let shifts: Vec<Vector3<f64>> = (0..9)
@@ -141,7 +143,7 @@ impl PoseSearch {
     }
 
     /// Stage 2.
-    fn turn(&self, rough: &Rough, placed: &[Scored]) -> Vec<Scored> {
+    fn turn(&self, rough: &CoarseScorer, placed: &[Scored]) -> Vec<Scored> {
         let settings = &self.settings;
         let points = settings.points;
         let turned = evaluate(placed, |pose| {

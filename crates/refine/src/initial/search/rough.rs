@@ -19,13 +19,13 @@ const TOUCH_WEIGHT: f64 = 0.3;
 const OUTSIDE_WEIGHT: f64 = 2.0;
 
 /// An object and what is known of where it is.
-pub(super) struct Rough<'a> {
+pub(super) struct CoarseScorer<'a> {
     pub(super) object: &'a Object,
     pub(super) lattice: &'a DistanceLattice,
     pub(super) evidence: &'a Evidence,
 }
 
-impl Rough<'_> {
+impl CoarseScorer<'_> {
     /// Where the object is in view with the rotation `rotation` if the mean of what faces the camera is at the mean of
     /// the depth points.
     pub(super) fn centered(&self, rotation: &UnitQuaternion<f64>) -> Isometry3<f64> {

@@ -37,7 +37,7 @@ pub struct SearchSettings {
     /// Steps of its second half.
     pub last_steps: usize,
     /// Force above which a taxel counts as touched \[N\].
-    pub touch_force: f64,
+    pub contact_threshold: f64,
 }
 
 impl Default for SearchSettings {
@@ -58,7 +58,7 @@ impl Default for SearchSettings {
             middle_steps: 10,
             last: 4,
             last_steps: 12,
-            touch_force: 0.1,
+            contact_threshold: 0.1,
         }
     }
 }
@@ -85,7 +85,8 @@ impl SearchSettings {
             let problem = format!("is {}, must be from 8 to 256", self.cells);
             return Err(RefineError::Setting { name: "cells", problem });
         }
-        for (name, value) in [("reach", self.reach), ("touch_force", self.touch_force)] {
+        for (name, value) in [("reach", self.reach), ("contact_threshold", self.contact_threshold)]
+        {
             if !(value.is_finite() && value >= 0.0) {
                 let problem = format!("is {value}, must be finite and not negative");
                 return Err(RefineError::Setting { name, problem });

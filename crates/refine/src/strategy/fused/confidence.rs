@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Matrix6, Point3, Vector3, Vector6};
 use prehend_autodiff::lie::{perturb_about, so3_log};
 use prehend_geometry::SplitMix64;
 
-use super::Ending;
+use super::Termination;
 use super::factor::Factor;
 use super::solve::Point;
 use crate::Block;
@@ -24,7 +24,7 @@ pub struct Hypothesis {
 
 /// A direction that the evidence says little of: only the prior holds the pose there.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Unobserved {
+pub struct UnobservableDirection {
     /// Twist about the object's center, in the camera frame, of unit length where a rotation counts by how far it moves
     /// the surface.
     pub twist: Vector6<f64>,
@@ -34,7 +34,7 @@ pub struct Unobserved {
 
 /// A sense that would rather have the pose elsewhere.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Disagreement {
+pub struct Inconsistency {
     /// The evidence's name.
     pub evidence: &'static str,
     /// How much farther from its own optimum the solution is than chance has it, in standard deviations.
@@ -43,15 +43,15 @@ pub struct Disagreement {
 
 /// What is known of how good a pose is.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Confidence {
+pub struct Posterior {
     /// The poses found, that of the lowest value first.
     pub hypotheses: Vec<Hypothesis>,
     /// Directions that are hardly observed.
-    pub unobserved: Vec<Unobserved>,
+    pub unobserved: Vec<UnobservableDirection>,
     /// Senses that disagree with the pose.
-    pub disagreements: Vec<Disagreement>,
+    pub disagreements: Vec<Inconsistency>,
     /// Why the search ended.
-    pub ending: Ending,
+    pub ending: Termination,
     /// Whether all calibrations were found to be exact, and believed to be so.
     pub exact: bool,
     /// Cramér and Rao's bound on the covariance, prior included (van Trees, 1968): the inverse of all information, with nothing
@@ -63,14 +63,14 @@ pub struct Confidence {
 
 /// What makes posteriors as wide as errors are, besides the information that there is.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Width {
+pub struct CovarianceInflation {
     /// What covariances are multiplied by.
     pub scale: f64,
     /// Standard deviation that is added to the rotation about each axis, for what no term models \[rad\].
     pub turn: f64,
 }
 
-impl Default for Width {
+impl Default for CovarianceInflation {
     fn default() -> Self {
         Self { scale: 1.35, turn: 0.39f64.to_radians() }
     }
@@ -85,19 +85,19 @@ pub(crate) const RIDGE: f64 = 1e-9;
 /// Standard deviation of surface motion from which a direction counts as unobserved \[m\].
 const UNOBSERVED: f64 = 8e-3;
 
-/// [`Disagreement::distance`] from which a sense counts as disagreeing, and from which deviations are widened in proportion: what is wrong
+/// [`Inconsistency::distance`] from which a sense counts as disagreeing, and from which deviations are widened in proportion: what is wrong
 /// with the observation, nobody knows, so this is a rule of thumb.
 const DISAGREES: f64 = 5.0;
 
-impl Confidence {
+impl Posterior {
     /// Of the solutions `found`, the best first; `radius` turns radians into meters of surface motion. Calibrations are `exact` or as accurate as stated.
     /// `also` disagrees besides, if by enough.
     pub(crate) fn new(
-        found: &[(Point, Ending)],
-        width: Width,
+        found: &[(Point, Termination)],
+        width: CovarianceInflation,
         radius: f64,
         exact: bool,
-        also: Option<Disagreement>,
+        also: Option<Inconsistency>,
     ) -> Self {
         let (best, ending) = &found[0];
         // Where calibrations are exact, as in simulation, so are models.
@@ -113,8 +113,8 @@ impl Confidence {
             let (point, ending) = &found[k];
             // What was cut short has some way left to go.
             let left = match ending {
-                Ending::Iterations | Ending::Stopped => remaining(point),
-                Ending::Converged | Ending::Stuck => Vector6::zeros(),
+                Termination::Iterations | Termination::Stopped => remaining(point),
+                Termination::Converged | Termination::Stuck => Vector6::zeros(),
             };
             bounds[k].0 * scale + more + left * left.transpose()
         };
@@ -213,7 +213,7 @@ fn laplace(point: &Point) -> (Matrix6<f64>, f64) {
 /// The object's part of the step to where the quadratic model about `point` is least: a left twist about its center \[m, rad\].
 fn remaining(point: &Point) -> Vector6<f64> {
     let at = point.normal.offset(Block::ObjectPose).unwrap_or(0);
-    let step = point.to_least().map(|step| step.fixed_rows::<6>(at).into_owned());
+    let step = point.gauss_newton_step().map(|step| step.fixed_rows::<6>(at).into_owned());
     step.filter(|step| step.iter().all(|v| v.is_finite())).unwrap_or_else(Vector6::zeros)
 }
 
@@ -237,36 +237,36 @@ fn directions(covariance: &Matrix6<f64>, radius: f64) -> Vec<(Vector6<f64>, f64)
     found
 }
 
-fn unobserved(covariance: &Matrix6<f64>, radius: f64) -> Vec<Unobserved> {
+fn unobserved(covariance: &Matrix6<f64>, radius: f64) -> Vec<UnobservableDirection> {
     directions(covariance, radius)
         .into_iter()
         .filter(|(_, deviation)| *deviation > UNOBSERVED)
-        .map(|(twist, deviation)| Unobserved { twist, deviation })
+        .map(|(twist, deviation)| UnobservableDirection { twist, deviation })
         .collect()
 }
 
 /// By how many standard deviations `squared`, a χ² of so many `degrees` of freedom if nothing is wrong, is larger than usual (Fisher, 1922).
-pub(crate) fn beyond_chance(squared: f64, degrees: usize) -> f64 {
+pub(crate) fn chi_square_z(squared: f64, degrees: usize) -> f64 {
     (2.0 * squared.max(0.0)).sqrt() - (2.0 * degrees as f64 - 1.0).max(0.0).sqrt()
 }
 
 /// Which evidence, the prior included, has its own optimum far away.
-fn disagreements(point: &Point) -> Vec<Disagreement> {
+fn disagreements(point: &Point) -> Vec<Inconsistency> {
     let distance = |part: &crate::Normal| {
         let factor = Factor::new(part.hessian(), 1e-3)?;
         // As many degrees of freedom as the sense says something of, at most.
         let degrees = part.hessian().diagonal().iter().filter(|d| **d > 0.0).count();
-        Some(beyond_chance(factor.squared_norm(part.gradient()), degrees))
+        Some(chi_square_z(factor.mahalanobis_squared(part.gradient()), degrees))
     };
     // A sense is not to blame for what the model is off by.
     let alone = |part: &super::solve::Part| {
         let patches = &point.displaced.as_ref()?.patches;
-        part.normal.offset(Block::Patches(patches.count()))?;
-        Some(part.normal.clone().without_patches(patches.precision())?.rest)
+        part.normal.offset(Block::SurfacePatches(patches.count()))?;
+        Some(part.normal.clone().marginalize(patches.precision())?.rest)
     };
     let of = |part: &super::solve::Part| {
         let distance = distance(alone(part).as_ref().unwrap_or(&part.normal))?;
-        (distance > DISAGREES).then_some(Disagreement { evidence: part.name, distance })
+        (distance > DISAGREES).then_some(Inconsistency { evidence: part.name, distance })
     };
     point.parts.iter().filter_map(of).collect()
 }

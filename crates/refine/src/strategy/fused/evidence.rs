@@ -9,20 +9,21 @@ use super::settings::{Evidence, FusedSettings, Nuisance, Stage};
 use super::solve::Problem;
 use crate::refine::hand_depth;
 use crate::term::{
-    Felt, FreeSpaceTerm, HandDepthTerm, Patches, PenetrationTerm, PointToPlaneSettings,
-    PointToPlaneTerm, Prior, RenderingTerm, Scatter, Segmented, SupportTerm, TactileTerm, Term,
+    FreeSpaceTerm, HandDepthTerm, NoiseEstimate, PenetrationTerm, PointToPlaneSettings,
+    PointToPlaneTerm, Prior, RenderingTerm, Segmented, SupportTerm, SurfacePatches, TactileTerm,
+    Term, TouchModel,
 };
-use crate::{Object, Observation, RefineError, Robot, State};
+use crate::{Hand, Object, Observation, RefineError, State};
 
 /// Depth points that their scatter is judged by.
 const SCATTERED: usize = 1200;
 
 /// What is known of one frame.
-pub(crate) struct Known<'a> {
+pub(crate) struct FrameContext<'a> {
     pub(super) observation: &'a Observation,
     pub(super) object: &'a Arc<Object>,
     /// The robot, if its state is known too.
-    pub(crate) robot: Option<&'a Arc<Robot>>,
+    pub(crate) robot: Option<&'a Arc<Hand>>,
     /// Depth image of the hand alone.
     pub(super) hand: DepthImage,
     /// Whether there are colors to compare.
@@ -38,11 +39,11 @@ pub(crate) struct Known<'a> {
 /// object itself, where the mask falls short.
 const IN_FRONT: f32 = 10e-3;
 
-impl<'a> Known<'a> {
+impl<'a> FrameContext<'a> {
     pub(crate) fn new(
         observation: &'a Observation,
         object: &'a Arc<Object>,
-        robot: Option<&'a Arc<Robot>>,
+        robot: Option<&'a Arc<Hand>>,
     ) -> Result<Self, RefineError> {
         let robot = robot.filter(|_| observation.hand.is_some());
         let hand = hand_depth(observation, robot.map(Arc::as_ref));
@@ -77,7 +78,7 @@ impl<'a> Known<'a> {
     }
 
     /// How depth points scatter about the object at `state`; `None` without enough depth, or if it is not used.
-    pub(super) fn scatter(&self, state: &State, settings: &FusedSettings) -> Option<Scatter> {
+    pub(super) fn scatter(&self, state: &State, settings: &FusedSettings) -> Option<NoiseEstimate> {
         if !settings.evidence.contains(&Evidence::Depth) {
             return None;
         }
@@ -94,13 +95,13 @@ impl<'a> Known<'a> {
         initial: &State,
         stage: &Stage,
         settings: &FusedSettings,
-    ) -> Option<Arc<Patches>> {
+    ) -> Option<Arc<SurfacePatches>> {
         if !stage.model_deviates || !settings.nuisances.contains(&Nuisance::Model) {
             return None;
         }
         let distance = initial.center().z;
         let unit = settings.rendering.downsample * stage.downsample;
-        Patches::new(self.observation, distance, &settings.model, unit).map(Arc::new)
+        SurfacePatches::new(self.observation, distance, &settings.model, unit).map(Arc::new)
     }
 
     /// What `stage` solves: all terms, a prior about `initial` among them, by the pose and all nuisances, `patches` among them.
@@ -109,7 +110,7 @@ impl<'a> Known<'a> {
         initial: &State,
         stage: &Stage,
         settings: &FusedSettings,
-        patches: Option<Arc<Patches>>,
+        patches: Option<Arc<SurfacePatches>>,
     ) -> Result<Problem, RefineError> {
         let blocks = settings.blocks(self.robot.is_some(), initial);
         let terms = self.terms(initial, stage, settings, patches.as_ref())?;
@@ -121,7 +122,7 @@ impl<'a> Known<'a> {
         initial: &State,
         stage: &Stage,
         settings: &FusedSettings,
-        patches: Option<&Arc<Patches>>,
+        patches: Option<&Arc<SurfacePatches>>,
     ) -> Result<Vec<Box<dyn Term>>, RefineError> {
         let wanted = |kind| settings.evidence.contains(&kind);
         let object = || Arc::clone(self.object);
@@ -185,10 +186,10 @@ impl<'a> Known<'a> {
         if (touch || quiet) && !hand.forces.is_empty() {
             let mut tactile = settings.tactile.clone().forgiving(stage.tolerance);
             if !touch {
-                tactile.felt = Felt::Nothing;
+                tactile.felt = TouchModel::Nothing;
             }
             if !quiet {
-                tactile.quiet_sigma = f64::INFINITY;
+                tactile.no_contact_sigma = f64::INFINITY;
             }
             let robot = Arc::clone(robot);
             terms.push(Box::new(TactileTerm::new(self.observation, object(), robot, &tactile)?));

@@ -31,7 +31,7 @@ pub(super) fn log_odds_of_exact(point: &Point) -> Option<f64> {
     let said = of(prior.hessian(), &rest, &rest);
     let offset = DVector::from_fn(rest.len(), |r, _| prior.gradient()[rest[r]]);
     let said = Factor::new(&said, 0.0)?;
-    let offset = said.inverse() * offset + point.to_least()?.select_rows(&rest);
+    let offset = said.inverse() * offset + point.gauss_newton_step()?.select_rows(&rest);
     // With the pose integrated out, which is Schur's complement.
     let all = point.normal.hessian();
     let coupling = of(all, &rest, &pose);

@@ -11,7 +11,7 @@ pub(crate) struct Factor {
 impl Factor {
     /// Of `matrix` with `ridge` of its diagonal added; `None` if it is not positive definite.
     pub(crate) fn new(matrix: &DMatrix<f64>, ridge: f64) -> Option<Self> {
-        let (scaled, scale) = balanced(matrix);
+        let (scaled, scale) = jacobi_scaled(matrix);
         let n = scale.len();
         let factor = (scaled + DMatrix::identity(n, n) * ridge).cholesky()?;
         Some(Self { factor, scale })
@@ -45,14 +45,14 @@ impl Factor {
     }
 
     /// gᵀ H⁻¹ g of a `gradient` g.
-    pub(crate) fn squared_norm(&self, gradient: &DVector<f64>) -> f64 {
+    pub(crate) fn mahalanobis_squared(&self, gradient: &DVector<f64>) -> f64 {
         let gradient = gradient.component_mul(&self.scale);
         gradient.dot(&self.factor.solve(&gradient))
     }
 }
 
 /// `matrix` with its diagonal scaled to one, and what its rows and columns were multiplied by.
-pub(super) fn balanced(matrix: &DMatrix<f64>) -> (DMatrix<f64>, DVector<f64>) {
+pub(super) fn jacobi_scaled(matrix: &DMatrix<f64>) -> (DMatrix<f64>, DVector<f64>) {
     let scale = matrix.diagonal().map(|d| if d > 0.0 { d.sqrt().recip() } else { 1.0 });
     let n = scale.len();
     (DMatrix::from_fn(n, n, |r, c| matrix[(r, c)] * scale[r] * scale[c]), scale)
@@ -74,7 +74,7 @@ mod tests {
         assert!((factor.log_determinant() - expected).abs() < 1e-9);
         let gradient = DVector::from_vec(vec![1.0, -2.0, 0.5]);
         let expected = gradient.dot(&(factor.inverse() * &gradient));
-        assert!((factor.squared_norm(&gradient) / expected - 1.0).abs() < 1e-9);
+        assert!((factor.mahalanobis_squared(&gradient) / expected - 1.0).abs() < 1e-9);
         let whitener = factor.whitener().unwrap();
         let unit = &whitener * &matrix * whitener.transpose() - DMatrix::identity(3, 3);
         assert!(unit.amax() < 1e-6, "{unit}");

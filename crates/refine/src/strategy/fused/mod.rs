@@ -16,17 +16,19 @@ use nalgebra::Translation3;
 use prehend_autodiff::lie::so3_log;
 use rayon::prelude::*;
 
-pub use self::confidence::{Confidence, Disagreement, Hypothesis, Unobserved, Width};
-pub(crate) use self::confidence::{RIDGE, beyond_chance};
-pub(crate) use self::evidence::Known;
+pub use self::confidence::{
+    CovarianceInflation, Hypothesis, Inconsistency, Posterior, UnobservableDirection,
+};
+pub(crate) use self::confidence::{RIDGE, chi_square_z};
+pub(crate) use self::evidence::FrameContext;
 pub(crate) use self::factor::Factor;
 pub use self::settings::{Evidence, FusedSettings, Nuisance, Stage};
-pub use self::solve::Ending;
+pub use self::solve::Termination;
 pub(crate) use self::solve::{Point, Problem};
-pub use self::summary::ConfidenceSummary;
-use crate::term::Scatter;
+pub use self::summary::PosteriorSummary;
+use crate::term::NoiseEstimate;
 use crate::trace::{Iteration, Trace};
-use crate::{Block, Object, Observation, RefineError, Robot, State};
+use crate::{Block, Hand, Object, Observation, RefineError, State};
 
 /// Gauss–Newton on all evidence at once, with the quantities that are not known exactly estimated beside the pose.
 ///
@@ -46,15 +48,15 @@ impl Fused {
         &self,
         observation: &Observation,
         object: &Arc<Object>,
-        robot: Option<&Arc<Robot>>,
+        robot: Option<&Arc<Hand>>,
         initial: State,
         mut visit: impl FnMut(&State, &Iteration) -> bool,
-    ) -> Result<(Trace, Confidence), RefineError> {
+    ) -> Result<(Trace, Posterior), RefineError> {
         let mut settings = self.settings.clone();
         if settings.stages.is_empty() {
             return Err(RefineError::Setting { name: "stages", problem: "are missing".into() });
         }
-        let known = Known::new(observation, object, robot)?;
+        let known = FrameContext::new(observation, object, robot)?;
         let mut states = self.starts(&initial);
         let mut trace = Trace::new(["posterior"].into_iter());
         let mut found = Vec::new();
@@ -77,12 +79,12 @@ impl Fused {
                 let model = patches.as_ref().map_or(0.0, |_| settings.model.deviation);
                 let shared = (scatter.shared.powi(2) - model.powi(2)).max(0.0).sqrt();
                 settings.depth.deviation = shared.min(COARSEST);
-                settings.depth.effective_points = settings.most_points;
+                settings.depth.effective_points = settings.max_effective_samples;
             }
             let problem = known.problem(&initial, stage, &settings, patches)?;
             let solve_from = |state: &State| {
                 let start = problem.at(state.clone());
-                problem.solve(start, stage.iterations, stage.last_gain, |_| true)
+                problem.solve(start, stage.iterations, stage.min_decrease, |_| true)
             };
             states.truncate(stage.hypotheses.max(1));
             let solve_all =
@@ -101,11 +103,11 @@ impl Fused {
             found = distinct(found, object.radius);
             // Not by the first stage, which sees no colors.
             if index > 0 {
-                let limit = found[0].0.value + settings.hopeless;
+                let limit = found[0].0.value + settings.prune_margin;
                 // One that is still on its way down is not judged yet, and the best stays whatever its value.
                 let mut best = true;
                 found.retain(|(point, ending)| {
-                    let kept = best || *ending == Ending::Iterations || point.value <= limit;
+                    let kept = best || *ending == Termination::Iterations || point.value <= limit;
                     best = false;
                     kept
                 });
@@ -135,7 +137,7 @@ impl Fused {
             go_on && settings.exactness && odds().is_some_and(|odds| odds > exactness::EXACT);
         if exact {
             let last = &self.settings.stages[self.settings.stages.len() - 1];
-            let as_said = |(point, _): &(Point, Ending)| State {
+            let as_said = |(point, _): &(Point, Termination)| State {
                 t_cam_hand: initial.t_cam_hand,
                 joints: initial.joints.clone(),
                 camera: initial.camera,
@@ -154,12 +156,12 @@ impl Fused {
             };
             let solve_from = |state: &State| {
                 let start = problem.at(state.clone());
-                problem.solve(start, last.iterations, last.last_gain, |_| true)
+                problem.solve(start, last.iterations, last.min_decrease, |_| true)
             };
             found = distinct(states.par_iter().map(solve_from).collect(), object.radius);
             step(&found[0].0, &mut trace);
         }
-        Ok((trace, Confidence::new(&found, settings.width, object.radius, exact, None)))
+        Ok((trace, Posterior::new(&found, settings.width, object.radius, exact, None)))
     }
 
     /// The initial state and those it is turned to.
@@ -195,18 +197,18 @@ const SETTLED_SCATTER: f64 = 1.5e-3;
 const SAME: f64 = 2e-3;
 
 /// Whether `point` leaves no direction open and the surface lies where depth was measured.
-fn settled(point: &Point, scatter: impl FnOnce() -> Option<Scatter>, radius: f64) -> bool {
+fn settled(point: &Point, scatter: impl FnOnce() -> Option<NoiseEstimate>, radius: f64) -> bool {
     let widest = confidence::principal_directions(point, radius)[0].1;
     widest < SETTLED_WIDTH && scatter().is_some_and(|scatter| scatter.sigma < SETTLED_SCATTER)
 }
 
 /// Solutions of which no two are the same pose, the one of the lowest value first.
-fn distinct(mut found: Vec<(Point, Ending)>, radius: f64) -> Vec<(Point, Ending)> {
+fn distinct(mut found: Vec<(Point, Termination)>, radius: f64) -> Vec<(Point, Termination)> {
     found.sort_by(|a, b| a.0.value.total_cmp(&b.0.value));
-    let mut kept: Vec<(Point, Ending)> = Vec::new();
+    let mut kept: Vec<(Point, Termination)> = Vec::new();
     for solution in found {
         let state = &solution.0.state;
-        let same = |(other, _): &(Point, Ending)| {
+        let same = |(other, _): &(Point, Termination)| {
             let turn = state.t_cam_object.rotation.angle_to(&other.state.t_cam_object.rotation);
             (state.center() - other.state.center()).norm() + radius * turn < SAME
         };

@@ -1,10 +1,10 @@
 //! Settings of the fused estimator.
 
-use super::confidence::Width;
+use super::confidence::CovarianceInflation;
 use crate::term::{
-    ContactSettings, DeviationSettings, Felt, FreeSpaceSettings, HandDepthSettings,
-    PenetrationSettings, PointToPlaneSettings, PriorSettings, RenderingSettings, SupportSettings,
-    TactileSettings,
+    ContactSettings, FreeSpaceSettings, HandDepthSettings, ModelErrorSettings, PenetrationSettings,
+    PointToPlaneSettings, PriorSettings, RenderingSettings, SupportSettings, TactileSettings,
+    TouchModel,
 };
 use crate::{Block, State};
 
@@ -111,7 +111,7 @@ pub struct Stage {
     /// Iterations at most.
     pub iterations: usize,
     /// The stage ends when the next step promises less than so many nats.
-    pub last_gain: f64,
+    pub min_decrease: f64,
     /// How many of the best hypotheses the stage takes up.
     pub hypotheses: usize,
     /// Whether colors are compared, which have many minima.
@@ -143,13 +143,13 @@ pub struct FusedSettings {
     /// Whether to ask the evidence if calibrations are exact.
     pub exactness: bool,
     /// Independent measurements that depth points amount to beside the errors that neighbors share, where both were measured.
-    pub most_points: f64,
+    pub max_effective_samples: f64,
     /// Hypotheses that are so much behind the best one after a stage, colors considered, are given up \[nat\].
-    pub hopeless: f64,
+    pub prune_margin: f64,
     /// What makes the posterior as wide as errors are.
-    pub width: Width,
+    pub width: CovarianceInflation,
     /// How far the object's surface may be from the model's, patch by patch, with [`Nuisance::Model`].
-    pub model: DeviationSettings,
+    pub model: ModelErrorSettings,
     /// Color and silhouette.
     pub rendering: RenderingSettings,
     /// Depth on the object. Its deviations and number of effective points are overwritten by what is measured, in stages with
@@ -188,7 +188,7 @@ impl Default for FusedSettings {
                     points: 200,
                     tolerance: 8.0,
                     iterations: 10,
-                    last_gain: 1.0,
+                    min_decrease: 1.0,
                     hypotheses: 7,
                     color: false,
                     measured_scatter: false,
@@ -200,7 +200,7 @@ impl Default for FusedSettings {
                     points: 250,
                     tolerance: 4.0,
                     iterations: 5,
-                    last_gain: 0.3,
+                    min_decrease: 0.3,
                     hypotheses: 14,
                     color: true,
                     measured_scatter: false,
@@ -212,7 +212,7 @@ impl Default for FusedSettings {
                     points: 600,
                     tolerance: 2.0,
                     iterations: 8,
-                    last_gain: 0.1,
+                    min_decrease: 0.1,
                     hypotheses: 5,
                     color: true,
                     measured_scatter: true,
@@ -224,7 +224,7 @@ impl Default for FusedSettings {
                     points: 1200,
                     tolerance: 1.0,
                     iterations: 10,
-                    last_gain: 0.02,
+                    min_decrease: 0.02,
                     hypotheses: 3,
                     color: true,
                     measured_scatter: true,
@@ -235,10 +235,10 @@ impl Default for FusedSettings {
             turns: 20f64.to_radians(),
             spread: 10e-3,
             exactness: true,
-            most_points: 50.0,
-            hopeless: 15.0,
-            width: Width::default(),
-            model: DeviationSettings::default(),
+            max_effective_samples: 50.0,
+            prune_margin: 15.0,
+            width: CovarianceInflation::default(),
+            model: ModelErrorSettings::default(),
             rendering: RenderingSettings {
                 downsample: 1,
                 effective_pixels: 80.0,
@@ -255,7 +255,7 @@ impl Default for FusedSettings {
             },
             free_space: FreeSpaceSettings::default(),
             tactile: TactileSettings {
-                felt: Felt::Contacts(ContactSettings::default()),
+                felt: TouchModel::Contacts(ContactSettings::default()),
                 ..TactileSettings::default()
             },
             penetration: PenetrationSettings::default(),

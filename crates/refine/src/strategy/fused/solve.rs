@@ -7,9 +7,9 @@ use prehend_render::Light;
 use rayon::prelude::*;
 
 use super::confidence::RIDGE;
-use super::factor::{Factor, balanced};
-use crate::normal::Eliminated;
-use crate::term::Patches;
+use super::factor::{Factor, jacobi_scaled};
+use crate::normal::SchurComplement;
+use crate::term::SurfacePatches;
 use crate::{Block, Normal, State, Term};
 
 /// A state, the value of the terms there, and their derivatives.
@@ -30,7 +30,7 @@ pub(crate) struct Point {
 
 impl Point {
     /// The step to where the quadratic model is least, by all that is solved for; `None` if it is not determined.
-    pub(super) fn to_least(&self) -> Option<DVector<f64>> {
+    pub(super) fn gauss_newton_step(&self) -> Option<DVector<f64>> {
         let factor = Factor::new(self.normal.hessian(), RIDGE)?;
         Some(-factor.inverse() * self.normal.gradient())
     }
@@ -39,7 +39,7 @@ impl Point {
 /// Patches that were displaced as is best.
 #[derive(Clone)]
 pub(crate) struct Displaced {
-    pub(crate) patches: Arc<Patches>,
+    pub(crate) patches: Arc<SurfacePatches>,
     /// How much lower the value is than with the model as it is \[nat\].
     pub(crate) gain: f64,
     /// Logarithm of the determinant of the Hessian by their displacements.
@@ -58,7 +58,7 @@ pub(crate) struct Part {
 
 /// Why a solve ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Ending {
+pub enum Termination {
     /// No step promised anything worth having.
     Converged,
     /// No step along the way down led down. Where patches are eliminated, derivatives are not quite those of the value, and most ways end so, near
@@ -70,7 +70,7 @@ pub enum Ending {
     Stopped,
 }
 
-impl Ending {
+impl Termination {
     /// The name used in reports.
     pub fn name(self) -> &'static str {
         match self {
@@ -91,13 +91,13 @@ pub(crate) struct Problem {
     pub(crate) terms: Vec<Box<dyn Term>>,
     pub(crate) blocks: Vec<Block>,
     /// Where the object may be off from its model besides: displacements that states do not hold, and that are eliminated.
-    pub(crate) patches: Option<Arc<Patches>>,
+    pub(crate) patches: Option<Arc<SurfacePatches>>,
 }
 
 impl Problem {
     /// The terms at `state`, whose light is solved for.
     pub(crate) fn at(&self, mut state: State) -> Point {
-        let displaced = self.patches.as_ref().map(|patches| Block::Patches(patches.count()));
+        let displaced = self.patches.as_ref().map(|patches| Block::SurfacePatches(patches.count()));
         let all: Vec<Block> = self.blocks.iter().copied().chain(displaced).collect();
         let linearize = |term: &dyn Term| {
             let light = term.light(&state);
@@ -117,8 +117,8 @@ impl Problem {
         let mut value = parts.iter().map(|p| p.value).sum();
         let mut found = None;
         if let Some(patches) = &self.patches {
-            if let Some(eliminated) = normal.without_patches(patches.precision()) {
-                let Eliminated { rest, gain, log_determinant } = eliminated;
+            if let Some(eliminated) = normal.marginalize(patches.precision()) {
+                let SchurComplement { rest, gain, log_determinant } = eliminated;
                 value -= gain;
                 normal = rest;
                 let patches = Arc::clone(patches);
@@ -136,41 +136,41 @@ impl Problem {
         &self,
         mut point: Point,
         iterations: usize,
-        last_gain: f64,
+        min_decrease: f64,
         mut go_on: impl FnMut(bool) -> bool,
-    ) -> (Point, Ending) {
+    ) -> (Point, Termination) {
         let mut damping = FIRST_DAMPING;
         let mut rejected = false;
         for _ in 0..iterations {
             let Some((step, gain)) = step(&point.normal, damping) else {
-                return (point, Ending::Stuck);
+                return (point, Termination::Stuck);
             };
-            if gain < last_gain {
+            if gain < min_decrease {
                 // Small because it is held back, not because there is nothing to gain?
-                return (point, if rejected { Ending::Stuck } else { Ending::Converged });
+                return (point, if rejected { Termination::Stuck } else { Termination::Converged });
             }
             let next = self.at(point.state.moved_all(point.normal.blocks(), step.as_slice()));
             rejected = next.value.is_nan() || next.value >= point.value;
             if rejected {
                 damping *= 8.0;
                 if damping > LAST_DAMPING {
-                    return (point, Ending::Stuck);
+                    return (point, Termination::Stuck);
                 }
             } else {
                 point = next;
                 damping = (damping / 10.0).max(1e-6);
             }
             if !go_on(!rejected) {
-                return (point, Ending::Stopped);
+                return (point, Termination::Stopped);
             }
         }
-        (point, Ending::Iterations)
+        (point, Termination::Iterations)
     }
 }
 
 /// −(H + μ diag H)⁻¹ g and the decrease that it promises; `None` if H is not positive definite.
 fn step(normal: &Normal, damping: f64) -> Option<(DVector<f64>, f64)> {
-    let (scaled, scale) = balanced(normal.hessian());
+    let (scaled, scale) = jacobi_scaled(normal.hessian());
     let gradient = normal.gradient().component_mul(&scale);
     let damped = &scaled + DMatrix::identity(scale.len(), scale.len()) * damping;
     let step = -damped.cholesky()?.solve(&gradient);
@@ -184,7 +184,7 @@ mod tests {
 
     use super::*;
     use crate::synth::default_scene;
-    use crate::term::DeviationSettings;
+    use crate::term::ModelErrorSettings;
 
     /// Measurements that are linear in the object's twist and the displacements of patches.
     struct Linear {
@@ -214,7 +214,7 @@ mod tests {
                 let (twist, patches) = (of(&self.by_twist), of(&self.by_patches));
                 let row = [
                     (Block::ObjectPose, twist.as_slice()),
-                    (Block::Patches(count), patches.as_slice()),
+                    (Block::SurfacePatches(count), patches.as_slice()),
                 ];
                 normal.add_row(&row, *residual, self.weight);
             }
@@ -254,7 +254,7 @@ mod tests {
             steps.push(down);
             steps.len() < 3
         });
-        assert_eq!((ending, steps), (Ending::Stopped, vec![false; 3]));
+        assert_eq!((ending, steps), (Termination::Stopped, vec![false; 3]));
         assert_eq!(point.state.t_cam_object, state.t_cam_object);
     }
 
@@ -262,8 +262,9 @@ mod tests {
     fn eliminating_patches_is_integrating_them_out() {
         let scene = default_scene(1).unwrap();
         let state = State::new(&scene.observation, &scene.object, &scene.truth).unwrap();
-        let settings = DeviationSettings::default();
-        let patches = Patches::new(&scene.observation, state.center().z, &settings, 2).unwrap();
+        let settings = ModelErrorSettings::default();
+        let patches =
+            SurfacePatches::new(&scene.observation, state.center().z, &settings, 2).unwrap();
         let mut random = SplitMix64::new(5);
         let (rows, size) = (40, 3 * patches.count());
         let mut matrix =

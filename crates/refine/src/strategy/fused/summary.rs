@@ -3,11 +3,11 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::Confidence;
+use super::Posterior;
 
-/// What reports and files say of a [`Confidence`].
+/// What reports and files say of a [`Posterior`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ConfidenceSummary {
+pub struct PosteriorSummary {
     /// Probability that the pose is within 5 mm and 5° of the true one.
     pub probability: f64,
     /// Standard deviations of the place of the object's center in the camera frame \[mm\].
@@ -26,8 +26,8 @@ pub struct ConfidenceSummary {
     pub exact: bool,
 }
 
-impl From<&Confidence> for ConfidenceSummary {
-    fn from(confidence: &Confidence) -> Self {
+impl From<&Posterior> for PosteriorSummary {
+    fn from(confidence: &Posterior) -> Self {
         let covariance = confidence.covariance();
         let deviation =
             |first: usize| Vector3::from_fn(|k, _| covariance[(first + k, first + k)].sqrt());

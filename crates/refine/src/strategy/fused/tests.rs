@@ -15,10 +15,10 @@ fn turned(twist: &[f64; 6]) -> State {
 
 fn run(
     observation: &Observation,
-    robot: Option<&Arc<Robot>>,
+    robot: Option<&Arc<Hand>>,
     start: &State,
     settings: FusedSettings,
-) -> (Isometry3<f64>, Confidence) {
+) -> (Isometry3<f64>, Posterior) {
     let start = State::new(observation, &SCENE.object, &start.t_cam_object).unwrap();
     let mut last = start.t_cam_object;
     let fused = Fused { settings };
@@ -137,7 +137,7 @@ fn a_solve_that_is_cut_short_is_not_sure() {
     let (hasty, whole) = (of(1), of(10));
     println!("{} {}", hasty.mahalanobis(&SCENE.truth), whole.mahalanobis(&SCENE.truth));
     assert!(hasty.mahalanobis(&SCENE.truth) < 5.0);
-    let widest = |confidence: &Confidence| confidence.widest(SCENE.object.radius);
+    let widest = |confidence: &Posterior| confidence.widest(SCENE.object.radius);
     assert!(widest(&hasty) > widest(&whole));
 }
 

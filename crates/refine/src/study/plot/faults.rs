@@ -2,7 +2,7 @@
 
 use plotters::prelude::*;
 
-use super::super::design::{Design, disturbed};
+use super::super::design::{Design, perturbed};
 use super::super::sweep::Sweep;
 use super::super::tables::{Block, Estimate, Tables};
 use super::{Area, Drawn, color, legend, page, swatch, tick};
@@ -22,7 +22,7 @@ pub(super) fn draw(
 ) -> Result<String, String> {
     let title = format!("{}, noise {}: {sweep}", tables.study.title(), block.level);
     let amounts = sweep.amounts();
-    let rows = |method: &str| amounts.iter().map(|&a| disturbed(method, sweep, a)).collect();
+    let rows = |method: &str| amounts.iter().map(|&a| perturbed(method, sweep, a)).collect();
     let methods: Vec<(&str, Vec<String>)> =
         design.methods.iter().map(|m| (m.name.as_str(), rows(&m.name))).collect();
     let mut legend = format!(

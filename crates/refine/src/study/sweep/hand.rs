@@ -25,7 +25,7 @@ pub(super) fn turn(observation: &mut Observation, angle: f64, random: &mut Split
 /// Moves every joint by `angle` \[rad\], one way or the other.
 pub(super) fn bend(observation: &mut Observation, angle: f64, random: &mut SplitMix64) {
     for joint in observation.hand.iter_mut().flat_map(|hand| &mut hand.joints) {
-        *joint += if random.unit() < 0.5 { angle } else { -angle };
+        *joint += if random.uniform() < 0.5 { angle } else { -angle };
     }
 }
 

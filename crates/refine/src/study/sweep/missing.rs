@@ -29,7 +29,7 @@ fn patches(
     let edge = (PATCH * width / 640).max(1);
     for top in (0..height).step_by(edge) {
         for left in (0..width).step_by(edge) {
-            if random.unit() >= share {
+            if random.uniform() >= share {
                 continue;
             }
             for y in top..height.min(top + edge) {

@@ -117,7 +117,7 @@ impl Sweep {
     }
 
     /// Makes `amount` of the fault, in the unit of [`axis`](Self::axis). `seed` decides which one.
-    pub fn disturb(self, observation: &mut Observation, amount: f64, seed: u64) {
+    pub fn perturb(self, observation: &mut Observation, amount: f64, seed: u64) {
         if amount == self.amounts()[0] {
             return;
         }
@@ -147,7 +147,7 @@ impl Sweep {
         let words = [self as u64, row.scene_id.into(), row.im_id.into(), row.obj_id.into()];
         // A number of one sequence seeds the next, so that near words give unrelated seeds.
         words.into_iter().fold(0, |state, word| {
-            (SplitMix64::new(state ^ word).unit() * (1_u64 << 53) as f64) as u64
+            (SplitMix64::new(state ^ word).uniform() * (1_u64 << 53) as f64) as u64
         })
     }
 }
@@ -172,7 +172,7 @@ impl FromStr for Sweep {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::HandReading;
+    use crate::HandMeasurement;
     use nalgebra::{Isometry3, Vector3};
     use prehend_render::{Camera, DepthImage, Mask, RgbImage};
 
@@ -188,7 +188,7 @@ pub(super) mod tests {
             depth: DepthImage::new(width, height, depth).unwrap(),
             mask: Mask::new(width, height, (0..count).map(inside).collect()).unwrap(),
             gravity: None,
-            hand: Some(HandReading {
+            hand: Some(HandMeasurement {
                 t_cam_hand: Isometry3::translation(0.0, 0.1, 0.5),
                 joints: vec![0.2; 16],
                 forces: (0..100).map(|k| Vector3::z() * f64::from(k % 2)).collect(),
@@ -205,9 +205,9 @@ pub(super) mod tests {
         for sweep in Sweep::ALL {
             for (k, &amount) in sweep.amounts().iter().enumerate() {
                 let [mut once, mut again, mut other] = [square(), square(), square()];
-                sweep.disturb(&mut once, amount, 5);
-                sweep.disturb(&mut again, amount, 5);
-                sweep.disturb(&mut other, amount, 6);
+                sweep.perturb(&mut once, amount, 5);
+                sweep.perturb(&mut again, amount, 5);
+                sweep.perturb(&mut other, amount, 6);
                 assert!(same(&once, &again), "{sweep} {amount}");
                 assert_eq!(same(&once, &square()), k == 0, "{sweep} {amount}");
                 let all = [Sweep::DeadTaxels, Sweep::MissingDepth, Sweep::MissingColor];

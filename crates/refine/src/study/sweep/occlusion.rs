@@ -11,7 +11,7 @@ const AHEAD: f64 = 0.03;
 /// it is in the depth and the color image, and the mask knows of it.
 pub(super) fn block(observation: &mut Observation, visible: f64, random: &mut SplitMix64) {
     let width = observation.camera.width;
-    let angle = std::f64::consts::TAU * random.unit();
+    let angle = std::f64::consts::TAU * random.uniform();
     let (across, down) = (angle.cos(), angle.sin());
     let along = |k: usize| across * (k % width) as f64 + down * (k / width) as f64;
     let mask = observation.mask.pixels();

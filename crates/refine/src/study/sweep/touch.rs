@@ -9,7 +9,7 @@ use crate::Observation;
 /// A share of the taxels feels nothing.
 pub(super) fn silence(observation: &mut Observation, share: f64, random: &mut SplitMix64) {
     for force in observation.hand.iter_mut().flat_map(|hand| &mut hand.forces) {
-        if random.unit() < share {
+        if random.uniform() < share {
             *force = Vector3::zeros();
         }
     }
@@ -21,7 +21,7 @@ pub(super) fn invent(observation: &mut Observation, share: f64, random: &mut Spl
     let sizes: Vec<f64> = hand.forces.iter().map(|f| f.norm()).filter(|&f| f > 0.0).collect();
     let mean = if sizes.is_empty() { 1.0 } else { sizes.iter().sum::<f64>() / sizes.len() as f64 };
     for force in &mut hand.forces {
-        let (chosen, size) = (random.unit() < share, -mean * (1.0 - random.unit()).ln());
+        let (chosen, size) = (random.uniform() < share, -mean * (1.0 - random.uniform()).ln());
         let invented = size * direction(random);
         if chosen {
             *force = invented;

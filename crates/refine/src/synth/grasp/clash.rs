@@ -4,8 +4,8 @@ use nalgebra::{Isometry3, Point3};
 use prehend_geometry::TriMesh;
 use prehend_geometry::sample::surface_samples;
 
-use super::skeleton::Skeleton;
-use crate::Robot;
+use super::skeleton::KinematicPaths;
+use crate::Hand;
 
 /// Surface samples of a link.
 const SAMPLES: usize = 150;
@@ -13,7 +13,7 @@ const SAMPLES: usize = 150;
 const APART: f64 = 2e-3;
 
 /// Pairs of links that should stay apart.
-pub(super) struct Clash {
+pub(super) struct SelfCollision {
     bodies: Vec<Link>,
     pairs: Vec<Pair>,
 }
@@ -33,9 +33,9 @@ struct Pair {
     variables: Vec<usize>,
 }
 
-impl Clash {
+impl SelfCollision {
     /// The links that are apart with the hand at `open`.
-    pub(super) fn new(robot: &Robot, skeleton: &Skeleton, open: &[Isometry3<f64>]) -> Self {
+    pub(super) fn new(robot: &Hand, skeleton: &KinematicPaths, open: &[Isometry3<f64>]) -> Self {
         let mut bodies = Vec::new();
         let mut numbers = Vec::new();
         for (link, shape) in robot.shape.links().iter().enumerate() {

@@ -2,17 +2,17 @@
 
 use nalgebra::{DMatrix, DVector, Isometry3, Point3, Vector3};
 
-use super::clash::Clash;
+use super::clash::SelfCollision;
 use super::simulation::Simulation;
-use super::skeleton::{Screw, Skeleton};
+use super::skeleton::{KinematicPaths, Screw};
 use super::{GraspSettings, Preshape};
-use crate::Robot;
+use crate::Hand;
 
 /// Which joints close, how fast, and where they stop.
 pub(super) struct Drive<'a> {
-    robot: &'a Robot,
-    skeleton: Skeleton,
-    clash: Clash,
+    robot: &'a Hand,
+    skeleton: KinematicPaths,
+    clash: SelfCollision,
     limits: Vec<(f64, f64)>,
     /// Of each joint \[rad/s or m/s\], signed.
     speed: Vec<f64>,
@@ -37,9 +37,9 @@ pub(super) struct Effort {
 }
 
 impl<'a> Drive<'a> {
-    pub(super) fn new(robot: &'a Robot, preshape: &Preshape, settings: &GraspSettings) -> Self {
+    pub(super) fn new(robot: &'a Hand, preshape: &Preshape, settings: &GraspSettings) -> Self {
         let tree = &robot.tree;
-        let skeleton = Skeleton::new(tree);
+        let skeleton = KinematicPaths::new(tree);
         let middle = |i: usize| {
             // Where the hand is half closed.
             let (lower, upper) = tree.joint_limits()[i];
@@ -49,10 +49,10 @@ impl<'a> Drive<'a> {
         };
         let joints: Vec<f64> = (0..preshape.open.len()).map(middle).collect();
         let poses = tree.forward_kinematics(&joints);
-        let screws = Skeleton::screws(tree, &poses);
+        let screws = KinematicPaths::screws(tree, &poses);
         let lever = (0..joints.len()).map(|v| lever(robot, &skeleton, &screws, &poses, v));
         let lever = lever.collect();
-        let clash = Clash::new(robot, &skeleton, &tree.forward_kinematics(&preshape.open));
+        let clash = SelfCollision::new(robot, &skeleton, &tree.forward_kinematics(&preshape.open));
         Self {
             robot,
             clash,
@@ -73,7 +73,7 @@ impl<'a> Drive<'a> {
     /// τ_limit is the torque that the same contacts would exert if they pushed with the grip.
     pub(super) fn change(&self, simulation: &Simulation<'_>, effort: &Effort) -> Vec<f64> {
         let count = self.speed.len();
-        let screws = Skeleton::screws(&self.robot.tree, simulation.poses());
+        let screws = KinematicPaths::screws(&self.robot.tree, simulation.poses());
         // Torques against closing, and the forces that make them.
         let mut resisting = vec![0.0; count];
         let mut pressing = vec![0.0; count];
@@ -160,8 +160,8 @@ impl<'a> Drive<'a> {
 }
 
 fn lever(
-    robot: &Robot,
-    skeleton: &Skeleton,
+    robot: &Hand,
+    skeleton: &KinematicPaths,
     screws: &[Option<Screw>],
     poses: &[Isometry3<f64>],
     variable: usize,

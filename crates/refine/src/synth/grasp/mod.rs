@@ -17,16 +17,16 @@ mod trajectory;
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use prehend_geometry::sample::surface_samples;
-use prehend_geometry::{ClosestPoints, SplitMix64, UnionBody};
+use prehend_geometry::{ClosestPoints, SolidUnion, SplitMix64};
 use prehend_sim::{Penalty, RigidBody, SurfacePoint};
 
 pub use fault::{GraspError, GraspFault};
 pub use preshape::Preshape;
 pub use settings::GraspSettings;
 
-use super::Moment;
+use super::GraspSnapshot;
 use crate::metrics::ContactModel;
-use crate::{Object, Robot};
+use crate::{Hand, Object};
 use drive::{Drive, Effort};
 use placement::{Placed, Placement};
 use simulation::{Medium, Setup, Simulation};
@@ -84,7 +84,7 @@ impl<'a> Grasper<'a> {
     /// If a setting is out of its range, the pre-shape is not the robot's, nothing closes, a taxel is on no link, or the
     /// object cannot be simulated.
     pub fn new(
-        robot: &'a Robot,
+        robot: &'a Hand,
         object: &Object,
         settings: &GraspSettings,
     ) -> Result<Self, GraspError> {
@@ -129,8 +129,9 @@ impl<'a> Grasper<'a> {
         let Placed { joints, t_hand_object } = placed.ok_or(GraspFault::NoRoom)?;
         let weight = self.setup.body.mass() * self.settings.gravity;
         let pace = self.preshape.speed.iter();
-        let pace =
-            pace.map(|_| 1.0 + self.settings.speed_spread * (2.0 * random.unit() - 1.0)).collect();
+        let pace = pace
+            .map(|_| 1.0 + self.settings.speed_spread * (2.0 * random.uniform() - 1.0))
+            .collect();
         let grip = self.settings.grip + self.settings.grip_per_weight * weight;
         let effort = Effort { pace, grip };
         let mut simulation = Simulation::new(&self.setup, &joints, &t_hand_object)?;
@@ -187,7 +188,7 @@ impl<'a> Grasper<'a> {
         first_seed: u64,
         tries: u64,
         steps: usize,
-    ) -> Result<(Grasp, Vec<Moment>), GraspFault> {
+    ) -> Result<(Grasp, Vec<GraspSnapshot>), GraspFault> {
         self.first(first_seed, tries, |seed| {
             let grasp = self.grasp(seed)?;
             let moments = self.trajectory(&grasp, seed, steps)?;
@@ -273,7 +274,7 @@ impl<'a> Grasper<'a> {
         t_hand_object: &Isometry3<f64>,
     ) -> Result<(f64, f64), GraspFault> {
         let hand = self.setup.robot.posed(&Isometry3::identity(), joints)?;
-        let hand = UnionBody::new(&hand.mesh_parts())?;
+        let hand = SolidUnion::new(&hand.mesh_parts())?;
         let volume = self.contact.intersection_volume_cm3(t_hand_object, &hand)?;
         if volume > self.settings.intersection_volume {
             return Err(GraspFault::TooDeep { volume });

@@ -5,7 +5,7 @@ use prehend_geometry::SplitMix64;
 use prehend_geometry::robot::{PosedRobot, RobotError};
 
 use super::{GraspSettings, Preshape};
-use crate::{Object, Robot};
+use crate::{Hand, Object};
 
 /// Points of the object that must stay clear of the hand.
 const PROBES: usize = 600;
@@ -59,7 +59,7 @@ impl Placement {
     /// The longest axis of aligned placements lies along that about which fingers wrap, their faces towards the palm.
     pub(super) fn draw(
         &self,
-        robot: &Robot,
+        robot: &Hand,
         preshape: &Preshape,
         settings: &GraspSettings,
         random: &mut SplitMix64,
@@ -78,20 +78,20 @@ impl Placement {
 
     fn draw_one(
         &self,
-        robot: &Robot,
+        robot: &Hand,
         preshape: &Preshape,
         settings: &GraspSettings,
         random: &mut SplitMix64,
     ) -> Result<Placed, RobotError> {
-        let both_ways = |random: &mut SplitMix64| 2.0 * random.unit() - 1.0;
+        let both_ways = |random: &mut SplitMix64| 2.0 * random.uniform() - 1.0;
         let open = preshape.open.iter().zip(&preshape.spread);
         let open: Vec<f64> = open.map(|(q, s)| q + s * both_ways(random)).collect();
         let joints = robot.tree.clamp_joints(&open)?;
-        let aligned = random.unit() < settings.aligned;
+        let aligned = random.uniform() < settings.aligned;
         let t_palm_axes = if aligned {
             let quarter = std::f64::consts::FRAC_PI_2;
-            let roll = quarter * (4.0 * random.unit()).floor();
-            let flip = if random.unit() < 0.5 { -1.0 } else { 1.0 };
+            let roll = quarter * (4.0 * random.uniform()).floor();
+            let flip = if random.uniform() < 0.5 { -1.0 } else { 1.0 };
             let long = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), flip * quarter);
             let tilt = Vector3::from_fn(|_, _| settings.tilt * random.normal());
             UnitQuaternion::from_scaled_axis(tilt)
@@ -106,7 +106,7 @@ impl Placement {
         let slide = 0.6 * both_ways(random) * (self.half_length - 0.04).max(0.0);
         let long = t_palm_axes * Vector3::x();
         let across = Vector3::new(random.normal(), random.normal(), 0.0) * settings.offset;
-        let clearance = settings.clearance * random.unit().powi(2) + 1e-3;
+        let clearance = settings.clearance * random.uniform().powi(2) + 1e-3;
         let at = |height: f64| {
             let middle = long * slide + across;
             let middle = Vector3::new(middle.x, middle.y, height);

@@ -2,11 +2,11 @@
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use prehend_geometry::hand::JOINT_NAMES;
-use prehend_geometry::robot::Robot as Tree;
+use prehend_geometry::robot::KinematicTree as Tree;
 
 use super::GraspError;
-use super::skeleton::Skeleton;
-use crate::Robot;
+use super::skeleton::KinematicPaths;
+use crate::Hand;
 
 /// The open hand and the way it closes. Joints are in the order of the robot's joint names.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,7 +32,7 @@ impl Preshape {
     ///
     /// # Errors
     /// As [`Preshape::guess`].
-    pub fn of(robot: &Robot) -> Result<Self, GraspError> {
+    pub fn of(robot: &Hand) -> Result<Self, GraspError> {
         match Self::built_in(&robot.tree) {
             Some(own) => Ok(own),
             None => Self::guess(robot),
@@ -65,13 +65,13 @@ impl Preshape {
     ///
     /// # Errors
     /// [`GraspError::NoFingers`] if no joint does so.
-    pub fn guess(robot: &Robot) -> Result<Self, GraspError> {
+    pub fn guess(robot: &Hand) -> Result<Self, GraspError> {
         let tree = &robot.tree;
         let limits = tree.joint_limits();
         let bounded = |&(lower, upper): &(f64, f64)| lower.is_finite() && upper.is_finite();
         let middle = |l: &(f64, f64)| if bounded(l) { 0.5 * (l.0 + l.1) } else { 0.0 };
         let middle: Vec<f64> = limits.iter().map(middle).collect();
-        let skeleton = Skeleton::new(tree);
+        let skeleton = KinematicPaths::new(tree);
         let centers: Vec<Option<Point3<f64>>> = (robot.shape.links().iter())
             .map(|shape| {
                 let (low, high) = shape.grid()?.bounds();
@@ -93,7 +93,7 @@ impl Preshape {
         let sum: Vector3<f64> = tips.iter().map(|l| tip(l).coords).sum();
         let focus = Point3::from(sum / tips.len().max(1) as f64);
 
-        let screws = Skeleton::screws(tree, &poses);
+        let screws = KinematicPaths::screws(tree, &poses);
         let driven = |link: usize, variable: usize| {
             let own = skeleton.path(link).iter();
             own.filter_map(|&j| screws[j]).any(|s| s.variable == variable)

@@ -11,7 +11,7 @@ use prehend_sim::{
     SemiImplicitEuler, SimulationError, State, Step, SubStepped, Surface, SurfacePoint, World,
 };
 
-use crate::Robot;
+use crate::Hand;
 
 /// Samples farther from the hand than this are left out until something has moved \[m\]. Links' grids reach farther.
 const NEAR: f64 = 10e-3;
@@ -25,7 +25,7 @@ const EXPLICIT_PARTS: usize = 1 << 12;
 
 /// What stays the same for all simulations of an object in a hand.
 pub(super) struct Setup<'a> {
-    pub(super) robot: &'a Robot,
+    pub(super) robot: &'a Hand,
     pub(super) body: RigidBody,
     pub(super) samples: Vec<SurfacePoint>,
     pub(super) law: Penalty,
@@ -120,7 +120,7 @@ impl<'a> Simulation<'a> {
         states.push(setup.body.at_rest(t_hand_object));
         let joints = joints.to_vec();
         let mut new = Self { setup, world, states, object, links, joints, poses, steps: 0 };
-        new.look_around()?;
+        new.update_broad_phase()?;
         for body in 0..object {
             new.world.touch(object, body, Arc::new(setup.law), Onset::Hard)?;
         }
@@ -179,7 +179,7 @@ impl<'a> Simulation<'a> {
             }
         }
         self.world.bodies[self.object].load = load;
-        self.look_around()?;
+        self.update_broad_phase()?;
         self.states = self.stepped()?;
         self.steps += 1;
         Ok(())
@@ -214,7 +214,7 @@ impl<'a> Simulation<'a> {
     }
 
     /// Keeps the samples that may touch before the next look.
-    fn look_around(&mut self) -> Result<(), SimulationError> {
+    fn update_broad_phase(&mut self) -> Result<(), SimulationError> {
         let t_object_hand = self.t_hand_object().inverse();
         let moved = |solid: &Solid| {
             let now = t_object_hand * self.poses[solid.link];

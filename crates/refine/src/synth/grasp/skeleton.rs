@@ -1,10 +1,10 @@
 //! How the joints move the links.
 
 use nalgebra::{Isometry3, Point3, Vector3};
-use prehend_geometry::robot::{Drive, Motion, Robot};
+use prehend_geometry::robot::{Drive, KinematicTree, Motion};
 
 /// Which joints move which link.
-pub(super) struct Skeleton {
+pub(super) struct KinematicPaths {
     /// Joints between the root and each link.
     paths: Vec<Vec<usize>>,
 }
@@ -27,8 +27,8 @@ impl Screw {
     }
 }
 
-impl Skeleton {
-    pub(super) fn new(robot: &Robot) -> Self {
+impl KinematicPaths {
+    pub(super) fn new(robot: &KinematicTree) -> Self {
         let path = |link: usize| {
             let mut path = Vec::new();
             let mut current = link;
@@ -50,14 +50,14 @@ impl Skeleton {
     }
 
     /// Entries of the joint vector that move one of two links relative to the other.
-    pub(super) fn between(&self, robot: &Robot, a: usize, b: usize) -> Vec<usize> {
+    pub(super) fn between(&self, robot: &KinematicTree, a: usize, b: usize) -> Vec<usize> {
         let (a, b) = (&self.paths[a], &self.paths[b]);
         let own = a.iter().filter(|j| !b.contains(j)).chain(b.iter().filter(|j| !a.contains(j)));
         own.filter_map(|&j| variable(robot, j)).collect()
     }
 
     /// The screw of every joint (none for those that do not move) with the links at `poses`.
-    pub(super) fn screws(robot: &Robot, poses: &[Isometry3<f64>]) -> Vec<Option<Screw>> {
+    pub(super) fn screws(robot: &KinematicTree, poses: &[Isometry3<f64>]) -> Vec<Option<Screw>> {
         let screw = |joint: &prehend_geometry::robot::Joint| {
             let Drive::Variable { index: variable, multiplier, .. } = joint.drive else {
                 return None;
@@ -75,7 +75,7 @@ impl Skeleton {
     }
 }
 
-fn variable(robot: &Robot, joint: usize) -> Option<usize> {
+fn variable(robot: &KinematicTree, joint: usize) -> Option<usize> {
     match robot.joints()[joint].drive {
         Drive::Variable { index, .. } => Some(index),
         Drive::None => None,
@@ -90,10 +90,11 @@ mod tests {
 
     #[test]
     fn screws_are_the_columns_of_the_jacobian() {
-        let robot = Robot::from_urdf_str(&allegro_xela_urdf(), None).unwrap();
+        let robot = KinematicTree::from_urdf_str(&allegro_xela_urdf(), None).unwrap();
         let joints: Vec<f64> = (0..16).map(|i| 0.3 + 0.05 * f64::from(i)).collect();
         let poses = robot.forward_kinematics(&joints);
-        let (skeleton, screws) = (Skeleton::new(&robot), Skeleton::screws(&robot, &poses));
+        let (skeleton, screws) =
+            (KinematicPaths::new(&robot), KinematicPaths::screws(&robot, &poses));
         let link = robot.link_index("link_15.0").unwrap();
         let point = Point3::new(0.01, 0.02, 0.03);
         let jacobian = robot.jacobian(&joints, link, &point);

@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::GraspError;
 use super::simulation::Touch;
-use crate::Robot;
+use crate::Hand;
 
 /// The taxels of a hand by link.
 pub(super) struct Skin {
@@ -21,7 +21,7 @@ struct Spot {
 }
 
 impl Skin {
-    pub(super) fn new(robot: &Robot, reach: f64) -> Result<Self, GraspError> {
+    pub(super) fn new(robot: &Hand, reach: f64) -> Result<Self, GraspError> {
         let mut by_link: Vec<Vec<Spot>> = Vec::new();
         by_link.resize_with(robot.tree.links().len(), Vec::new);
         for (taxel, t) in robot.taxels.iter().enumerate() {
@@ -65,14 +65,14 @@ impl Skin {
 #[cfg(test)]
 mod tests {
     use prehend_geometry::hand::{allegro_xela_urdf, taxels};
-    use prehend_geometry::robot::Robot as Tree;
+    use prehend_geometry::robot::KinematicTree as Tree;
 
     use super::*;
 
     #[test]
     fn contacts_on_pads_are_felt_whole_and_others_not_at_all() {
         let tree = Tree::from_urdf_str(&allegro_xela_urdf(), None).unwrap();
-        let robot = Robot::new(tree, taxels()).unwrap();
+        let robot = Hand::new(tree, taxels()).unwrap();
         let skin = Skin::new(&robot, 8e-3).unwrap();
         let poses = robot.tree.forward_kinematics(&[0.3; 16]);
         let link = robot.tree.link_index("link_2.0").unwrap();

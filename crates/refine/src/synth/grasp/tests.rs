@@ -2,12 +2,12 @@ use std::sync::LazyLock;
 
 use prehend_geometry::hand::{allegro_xela_urdf, taxels};
 use prehend_geometry::objects::YcbObject;
-use prehend_geometry::robot::Robot as Tree;
+use prehend_geometry::robot::KinematicTree as Tree;
 
 use super::*;
 
-static HAND: LazyLock<Robot> = LazyLock::new(|| {
-    Robot::new(Tree::from_urdf_str(&allegro_xela_urdf(), None).unwrap(), taxels()).unwrap()
+static HAND: LazyLock<Hand> = LazyLock::new(|| {
+    Hand::new(Tree::from_urdf_str(&allegro_xela_urdf(), None).unwrap(), taxels()).unwrap()
 });
 
 /// Two fingers that slide towards each other before a plate.
@@ -90,7 +90,7 @@ fn the_same_seed_gives_the_same_bits_on_any_number_of_threads() {
 
 #[test]
 fn a_gripper_of_two_sliding_fingers_holds_a_brick() {
-    let robot = Robot::new(Tree::from_urdf_str(GRIPPER, None).unwrap(), Vec::new()).unwrap();
+    let robot = Hand::new(Tree::from_urdf_str(GRIPPER, None).unwrap(), Vec::new()).unwrap();
     let preshape = Preshape::guess(&robot).unwrap();
     assert_eq!(preshape.open, [0.0, 0.0]);
     assert!(preshape.speed.iter().all(|s| *s > 0.0));
@@ -118,7 +118,7 @@ fn settings_and_robots_that_cannot_grasp_are_refused() {
     let error = Grasper::new(&HAND, &brick, &short).map(|_| ()).unwrap_err();
     assert!(matches!(error, GraspError::Preshape { found: 3, expected: 16, .. }), "{error}");
     let post = r#"<robot name="post"><link name="post"><collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision></link></robot>"#;
-    let post = Robot::new(Tree::from_urdf_str(post, None).unwrap(), Vec::new()).unwrap();
+    let post = Hand::new(Tree::from_urdf_str(post, None).unwrap(), Vec::new()).unwrap();
     assert!(matches!(
         Grasper::new(&post, &brick, &GraspSettings::default()).map(|_| ()),
         Err(GraspError::NoFingers)

@@ -6,7 +6,7 @@ use prehend_geometry::SplitMix64;
 use super::drive::Effort;
 use super::simulation::{Medium, Simulation};
 use super::{Grasp, GraspFault, Grasper, random_direction};
-use crate::synth::Moment;
+use crate::synth::GraspSnapshot;
 
 /// Waves that make up the turning of the hand, and the grip's rise and fall, an axis.
 const WAVES: usize = 3;
@@ -29,7 +29,7 @@ impl Grasper<'_> {
         grasp: &Grasp,
         seed: u64,
         steps: usize,
-    ) -> Result<Vec<Moment>, GraspFault> {
+    ) -> Result<Vec<GraspSnapshot>, GraspFault> {
         let mut random = SplitMix64::new(seed);
         let settings = &self.settings;
         let down = random_direction(&mut random) * settings.gravity;
@@ -57,7 +57,7 @@ impl Grasper<'_> {
             let t_hand_object = simulation.t_hand_object();
             self.moved(start.get_or_insert(t_hand_object), &t_hand_object)?;
             if (step - settling).is_multiple_of(inner) && moments.len() < steps {
-                moments.push(Moment {
+                moments.push(GraspSnapshot {
                     t_hand_object,
                     joints: simulation.joints().to_vec(),
                     gravity,
@@ -82,8 +82,8 @@ impl Waves {
     fn new(random: &mut SplitMix64) -> Self {
         let (low, high) = FREQUENCIES;
         Self(std::array::from_fn(|_| {
-            let rate = std::f64::consts::TAU * (low + (high - low) * random.unit());
-            (rate, std::f64::consts::TAU * random.unit())
+            let rate = std::f64::consts::TAU * (low + (high - low) * random.uniform());
+            (rate, std::f64::consts::TAU * random.uniform())
         }))
     }
 

@@ -34,7 +34,7 @@ impl BackgroundSettings {
         let (width, height) = (camera.width, camera.height);
         let mut color = RgbImage::filled(width, height, muted(noise));
         let mut depth = DepthImage::filled(width, height, 0.0);
-        let distance = self.distance * (0.75 + 0.5 * noise.unit());
+        let distance = self.distance * (0.75 + 0.5 * noise.uniform());
         let [right, down] = [0; 2].map(|_| self.slope * noise.normal());
         for (i, z) in depth.pixels_mut().iter_mut().enumerate() {
             let ray = camera.ray((i % width) as f64, (i / width) as f64);
@@ -42,9 +42,9 @@ impl BackgroundSettings {
             let opening = (1.0 - right * ray.x - down * ray.y).max(0.25);
             *z = (distance / opening) as f32;
         }
-        let things = (f64::from(self.things) * (0.5 + 0.5 * noise.unit())) as u32;
+        let things = (f64::from(self.things) * (0.5 + 0.5 * noise.uniform())) as u32;
         // From the back to the front.
-        let mut order: Vec<f64> = (0..things).map(|_| noise.unit()).collect();
+        let mut order: Vec<f64> = (0..things).map(|_| noise.uniform()).collect();
         order.sort_by(f64::total_cmp);
         for before in order {
             let thing = Thing::random(camera, (distance * (0.95 - 0.3 * before)) as f32, noise);
@@ -60,7 +60,7 @@ impl BackgroundSettings {
         let (width, height) = (color.width(), color.height());
         for (cell, share) in [(0.2, 0.8), (0.02, 0.5)] {
             let field = smooth_field(width, height, cell * width as f64, noise);
-            let weight = [0; 3].map(|_| (share * self.pattern * (0.7 + noise.unit())) as f32);
+            let weight = [0; 3].map(|_| (share * self.pattern * (0.7 + noise.uniform())) as f32);
             for (pixel, value) in color.pixels_mut().iter_mut().zip(field) {
                 (0..3).for_each(|c| pixel[c] = (pixel[c] + weight[c] * value).clamp(0.0, 1.0));
             }
@@ -70,7 +70,7 @@ impl BackgroundSettings {
 
 /// A dull color.
 fn muted(noise: &mut SplitMix64) -> [f32; 3] {
-    let gray = 0.1 + 0.6 * noise.unit();
+    let gray = 0.1 + 0.6 * noise.uniform();
     [0; 3].map(|_| (gray + 0.05 * noise.normal()).clamp(0.02, 0.95) as f32)
 }
 
@@ -88,10 +88,10 @@ struct Thing {
 impl Thing {
     fn random(camera: &Camera, depth: f32, noise: &mut SplitMix64) -> Self {
         let (width, height) = (camera.width as f64, camera.height as f64);
-        let center = [width * noise.unit(), height * noise.unit()].map(|v| v as f32);
-        let half = [0; 2].map(|_| (width * (0.03 + 0.12 * noise.unit())) as f32);
-        let angle = (std::f64::consts::PI * noise.unit()) as f32;
-        let power = if noise.unit() < 0.3 { 2 } else { 8 };
+        let center = [width * noise.uniform(), height * noise.uniform()].map(|v| v as f32);
+        let half = [0; 2].map(|_| (width * (0.03 + 0.12 * noise.uniform())) as f32);
+        let angle = (std::f64::consts::PI * noise.uniform()) as f32;
+        let power = if noise.uniform() < 0.3 { 2 } else { 8 };
         let color = muted(noise).map(|c| (c + 0.07 * noise.normal() as f32).clamp(0.0, 1.0));
         Self { center, half, turn: [angle.cos(), angle.sin()], power, color, depth }
     }

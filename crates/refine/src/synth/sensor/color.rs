@@ -50,7 +50,7 @@ impl ColorSettings {
         let exposure = (self.exposure * noise.normal()).exp2();
         let gain = [0; 3]
             .map(|_| (exposure * (1.0 + self.white_balance * noise.normal()).max(0.1)) as f32);
-        let mut picture = blurred(truth, self.blur * (0.4 + 0.6 * noise.unit()));
+        let mut picture = blurred(truth, self.blur * (0.4 + 0.6 * noise.uniform()));
         let (dark, shot) = ((self.noise * self.noise) as f32, self.shot_noise as f32);
         let noisy = dark > 0.0 || shot > 0.0;
         for pixel in picture.pixels_mut() {

@@ -28,7 +28,11 @@ impl ModelSettings {
     /// A model of `truth` as someone might have made it, the same for the same `noise`.
     ///
     /// Places move by a sum of plane waves, which does not depend on the mesh: seams stay closed.
-    pub(in crate::synth) fn imitate(&self, truth: &TriMesh, noise: &mut SplitMix64) -> TriMesh {
+    pub(in crate::synth) fn perturb_model(
+        &self,
+        truth: &TriMesh,
+        noise: &mut SplitMix64,
+    ) -> TriMesh {
         const WAVES: usize = 24;
         let scale = 1.0 + self.scale * noise.normal();
         let waves: Vec<_> = (0..WAVES)
@@ -37,7 +41,7 @@ impl ModelSettings {
                 let mut direction = || Vector3::from_fn(|_, _| noise.normal());
                 // Lengths between 0.6 and 2 times the one asked for.
                 let (wave, displacement) = (direction().normalize(), direction());
-                let (length, phase) = (0.5 + 1.1 * noise.unit(), noise.unit());
+                let (length, phase) = (0.5 + 1.1 * noise.uniform(), noise.uniform());
                 (wave * (number * length), std::f64::consts::TAU * phase, displacement)
             })
             .collect();
@@ -70,7 +74,7 @@ mod tests {
         let settings = ModelSettings { scale: 0.0, ..ModelSettings::realistic() };
         let (mut square, mut volumes) = (0.0, 0.0);
         for seed in 0..6 {
-            let model = settings.imitate(&truth, &mut SplitMix64::new(seed));
+            let model = settings.perturb_model(&truth, &mut SplitMix64::new(seed));
             assert!(mass_properties(&model.cleaned().0, 500.0).is_ok());
             // The same numbers pick the same places on both, as the faces' areas hardly change.
             for sample in surface_samples(&truth, 400, 1) {
@@ -84,7 +88,7 @@ mod tests {
         }
         assert!((square.sqrt() - 7e-4).abs() < 2e-4, "{}", square.sqrt());
         assert!((volumes - 1.0).abs() < 0.02, "{volumes}");
-        let exact = ModelSettings::clean().imitate(&truth, &mut SplitMix64::new(3));
+        let exact = ModelSettings::clean().perturb_model(&truth, &mut SplitMix64::new(3));
         assert_eq!(exact.vertices, truth.vertices);
     }
 }

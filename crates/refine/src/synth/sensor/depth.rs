@@ -148,8 +148,8 @@ impl DepthSettings {
         let before = depth.clone();
         for (i, z) in depth.pixels_mut().iter_mut().enumerate() {
             let least = nearest_around(&before, i % width, i / width);
-            if *z - least > EDGE && noise.unit() < self.flying_share {
-                *z = least + (*z - least) * noise.unit() as f32;
+            if *z - least > EDGE && noise.uniform() < self.flying_share {
+                *z = least + (*z - least) * noise.uniform() as f32;
             }
         }
     }
@@ -171,7 +171,7 @@ impl DepthSettings {
                 let angle = sine.asin().to_degrees();
                 // From none at twice the angle to all at zero.
                 let share = 1.0 - 0.5 * angle / self.grazing_deg;
-                *l |= share > 0.0 && noise.unit() < share;
+                *l |= share > 0.0 && noise.uniform() < share;
             }
         }
         if self.baseline > 0.0 {

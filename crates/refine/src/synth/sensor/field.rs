@@ -19,7 +19,7 @@ pub(crate) fn smooth_field(
     // The weights' squares sum to 0.46 between knots and 0.5 on them.
     let scale = 1.0 / 0.479f32;
     // A random phase, so that knots are nowhere in particular.
-    let (left, top) = (noise.unit(), noise.unit());
+    let (left, top) = (noise.uniform(), noise.uniform());
     let across: Vec<_> = (0..width).map(|x| place(x as f64 / cell + left)).collect();
     let mut values = Vec::with_capacity(width * height);
     let mut blended = vec![0.0f32; columns];

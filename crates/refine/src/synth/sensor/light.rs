@@ -60,7 +60,7 @@ impl LightSettings {
         let spread = Vector3::from_fn(|_, _| noise.normal());
         // Mostly from above and from the camera's side, so that what is seen is lit.
         let towards = spread.normalize() + up * 0.7 - Vector3::z() * 0.7;
-        let strength = if index == 0 { 1.0 } else { 0.2 + 0.4 * noise.unit() };
+        let strength = if index == 0 { 1.0 } else { 0.2 + 0.4 * noise.uniform() };
         Lamp { towards: towards.normalize().cast(), strength: self.tinted(strength, noise) }
     }
 

@@ -12,14 +12,14 @@ use super::SensorSettings;
 use super::calibration::Miscalibration;
 use super::depth::DepthBias;
 use super::touch::TaxelCondition;
-use crate::synth::Moment;
-use crate::{HandReading, Object, Observation, Robot};
+use crate::synth::GraspSnapshot;
+use crate::{Hand, HandMeasurement, Object, Observation};
 
 /// Sensors with the faults that stay the same through a grasp.
 pub(in crate::synth) struct Rig<'a> {
     settings: &'a SensorSettings,
     object: &'a Object,
-    robot: &'a Robot,
+    robot: &'a Hand,
     camera: Camera,
     errors: Miscalibration,
     depth: DepthBias,
@@ -49,7 +49,7 @@ impl<'a> Rig<'a> {
     pub(in crate::synth) fn new(
         settings: &'a SensorSettings,
         object: &'a Object,
-        robot: &'a Robot,
+        robot: &'a Hand,
         (width, height): (usize, usize),
         noise: &mut SplitMix64,
     ) -> Self {
@@ -67,7 +67,7 @@ impl<'a> Rig<'a> {
     }
 
     /// A frame of `moment`, whose joints and taxels are those of the robot.
-    pub(in crate::synth) fn shoot(&self, moment: &Moment, noise: &mut SplitMix64) -> Shot {
+    pub(in crate::synth) fn shoot(&self, moment: &GraspSnapshot, noise: &mut SplitMix64) -> Shot {
         let identity = Isometry3::identity();
         let mut bodies: Vec<(&RenderModel, Isometry3<f64>)> =
             vec![(&self.object.model, moment.t_hand_object)];
@@ -83,7 +83,7 @@ impl<'a> Rig<'a> {
         for (set, z) in whole.pixels_mut().iter_mut().zip(alone.pixels()) {
             *set |= *z > 0.0;
         }
-        let reading = HandReading {
+        let reading = HandMeasurement {
             t_cam_hand: self.errors.hand(&t_cam_hand),
             joints: self.errors.joints(&moment.joints),
             forces: self.settings.touch.feel(&moment.taxel_forces, &self.taxels, noise),
@@ -151,7 +151,7 @@ impl Paint {
     /// Black anodized metal, gray plastic and black rubber, each a little different every time.
     fn random(noise: &mut SplitMix64) -> Self {
         let tones = [[0.21, 0.22, 0.24], [0.42, 0.43, 0.44], [0.14, 0.14, 0.15]].map(|tone| {
-            let lighter = 0.8 + 0.5 * noise.unit() as f32;
+            let lighter = 0.8 + 0.5 * noise.uniform() as f32;
             tone.map(|v: f32| v * lighter)
         });
         Self { tones }
@@ -163,7 +163,7 @@ impl Paint {
 }
 
 /// Whether each of the robot's joints is prismatic.
-fn slides(robot: &Robot) -> Vec<bool> {
+fn slides(robot: &Hand) -> Vec<bool> {
     let moved_by = |variable: usize| move |drive: &Drive| matches!(drive, Drive::Variable { index, .. } if *index == variable);
     let prismatic = |variable: usize| {
         let mut joints = robot.tree.joints().iter();

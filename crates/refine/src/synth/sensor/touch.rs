@@ -58,9 +58,9 @@ impl TouchSettings {
     /// How each of `count` taxels is disposed through a grasp.
     pub(super) fn condition(&self, count: usize, noise: &mut SplitMix64) -> Vec<TaxelCondition> {
         let one = |_| {
-            let (fate, gain) = (noise.unit(), 1.0 + self.gain * (2.0 * noise.unit() - 1.0));
+            let (fate, gain) = (noise.uniform(), 1.0 + self.gain * (2.0 * noise.uniform() - 1.0));
             let direction = Vector3::new(noise.normal(), noise.normal(), noise.normal());
-            let size = -self.false_force * (1.0 - noise.unit()).ln();
+            let size = -self.false_force * (1.0 - noise.uniform()).ln();
             let wrong = fate >= self.dead_share && fate < self.dead_share + self.false_share;
             TaxelCondition {
                 gain: if fate < self.dead_share { 0.0 } else { gain },

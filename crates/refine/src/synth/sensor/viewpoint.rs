@@ -76,7 +76,7 @@ impl ViewpointSettings {
     ) -> Isometry3<f64> {
         let mut spread = |scale: f64| Vector3::from_fn(|_, _| scale * noise.normal());
         let (towards, aim) = (spread(1.0), center + spread(self.aim));
-        let distance = self.nearest + (self.farthest - self.nearest) * noise.unit();
+        let distance = self.nearest + (self.farthest - self.nearest) * noise.uniform();
         let away = towards.try_normalize(1e-9).unwrap_or_else(Vector3::x);
         let roll = (self.roll_deg * noise.normal()).to_radians();
         look_at(&(aim + away * distance), &aim, &-gravity, roll)

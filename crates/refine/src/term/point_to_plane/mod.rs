@@ -10,11 +10,11 @@ use nalgebra::{SVector, Vector2, Vector3};
 use prehend_render::{DepthImage, Mask};
 use rayon::prelude::*;
 
-pub use self::scatter::Scatter;
+pub use self::scatter::NoiseEstimate;
 use self::smooth_field::{Fit, SmoothField};
 use super::depth::masked_depths;
 use super::patch_sums::PatchSums;
-use super::{Patches, Term, share};
+use super::{SurfacePatches, Term, share};
 use crate::{Block, Cauchy, Normal, Object, Observation, RefineError, State};
 
 /// Settings of [`PointToPlaneTerm`].
@@ -53,7 +53,7 @@ impl Default for PointToPlaneSettings {
 }
 
 /// Distances from the masked depth points to the planes that touch the surface where it is nearest to them (Chen and
-/// Medioni, 1992), where the points are as the state corrects the camera ([`CameraCorrection`](crate::CameraCorrection)).
+/// Medioni, 1992), where the points are as the state corrects the camera ([`CameraCalibrationError`](crate::CameraCalibrationError)).
 ///
 /// A depth point is not of a face that looks away from the camera: such a match counts as it is far, and pulls nothing. What
 /// the points' errors have in common, a smooth field, is eliminated.
@@ -62,7 +62,7 @@ pub struct PointToPlaneTerm {
     points: Vec<Point>,
     field: Option<SmoothField>,
     /// Where the object may be off from its model.
-    patches: Option<Arc<Patches>>,
+    patches: Option<Arc<SurfacePatches>>,
     settings: PointToPlaneSettings,
 }
 
@@ -142,7 +142,7 @@ impl PointToPlaneTerm {
     }
 
     /// The same where the object may be off from its model in `patches`.
-    pub(crate) fn with_patches(self, patches: Arc<Patches>) -> Self {
+    pub(crate) fn with_patches(self, patches: Arc<SurfacePatches>) -> Self {
         Self { patches: Some(patches), ..self }
     }
 
@@ -152,7 +152,7 @@ impl PointToPlaneTerm {
         let residual = |point: &Point| {
             let place = state.camera.point(&point.ray, point.depth);
             let (query, face) = (t_object_cam * place, point.face.load(Ordering::Relaxed));
-            let closest = self.object.surface.closest_from(&query, f64::INFINITY, face)?;
+            let closest = self.object.surface.closest_with_hint(&query, f64::INFINITY, face)?;
             point.face.store(closest.face, Ordering::Relaxed);
             let normal = state.t_cam_object * self.object.normals[closest.face as usize];
             let surface = (state.t_cam_object * closest.point).coords;
@@ -238,7 +238,7 @@ impl Term for PointToPlaneTerm {
         };
         let rows: Vec<[f64; N]> = self.points.iter().zip(&residuals).map(row).collect();
         let patches = self.patches.as_ref();
-        let patches = patches.filter(|p| normal.offset(Block::Patches(p.count())).is_some());
+        let patches = patches.filter(|p| normal.offset(Block::SurfacePatches(p.count())).is_some());
         let count = patches.map_or(0, |patches| patches.count());
         let patch = |i: usize| {
             let (column, row) = self.points[i].pixel;
@@ -260,7 +260,7 @@ impl Term for PointToPlaneTerm {
             };
             hessian -= field.lost(&fit, hessian.nrows(), derivatives);
         }
-        let blocks = [Block::ObjectPose, Block::Camera, Block::Patches(count)];
+        let blocks = [Block::ObjectPose, Block::Camera, Block::SurfacePatches(count)];
         normal.add_dynamic(&blocks, &gradient, &hessian);
         self.cost(&fit)
     }

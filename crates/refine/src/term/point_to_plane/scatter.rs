@@ -6,7 +6,7 @@ use super::{PointToPlaneTerm, Residual};
 
 /// How depth points scatter about a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Scatter {
+pub struct NoiseEstimate {
     /// Standard deviation of a point \[m\].
     pub sigma: f64,
     /// The part of it that the points of a patch have in common \[m\].
@@ -37,7 +37,7 @@ impl PointToPlaneTerm {
     ///
     /// Where errors are alike within patches, their means scatter more than means of independent errors would: so many patches as
     /// there are, and as many measurements a patch as the variance of the means is smaller than that of the points.
-    pub fn scatter(&self, state: &State) -> Option<Scatter> {
+    pub fn scatter(&self, state: &State) -> Option<NoiseEstimate> {
         let pixels = || self.points.iter().map(|point| point.pixel);
         let (left, right) = (pixels().map(|p| p.0).min()?, pixels().map(|p| p.0).max()?);
         let (top, bottom) = (pixels().map(|p| p.1).min()?, pixels().map(|p| p.1).max()?);
@@ -65,7 +65,7 @@ impl PointToPlaneTerm {
         }
         let (number, count) = (patches.len() as f64, self.points.len() as f64);
         let own = ((of_points - of_means) * total / (total - number)).max(0.0);
-        Some(Scatter {
+        Some(NoiseEstimate {
             sigma: of_points.sqrt(),
             // Means of a few points scatter even if these have nothing in common.
             shared: (of_means - own * number / total).max(0.0).sqrt(),

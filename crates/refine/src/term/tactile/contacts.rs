@@ -6,7 +6,7 @@ use prehend_geometry::hand::Taxel;
 use prehend_geometry::robot::RobotShape;
 
 use super::Probe;
-use crate::Robot;
+use crate::Hand;
 
 /// How touched taxels become contacts.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,7 +43,7 @@ struct Touched {
 /// A contact presses on all taxels around it, which lie beneath the skin and to its sides, each at a distance of its own from what
 /// touches. Their center of force is where it does.
 pub(super) fn contacts(
-    robot: &Robot,
+    robot: &Hand,
     links: &[usize],
     forces: &[Vector3<f64>],
     least: f64,
@@ -97,7 +97,7 @@ fn groups(mut touched: Vec<Touched>, reach: f64) -> Vec<Vec<Touched>> {
 }
 
 /// The point of the skin of `link` that is nearest to `point`, or `point` itself where the link has no shape near.
-fn on_skin(robot: &Robot, link: usize, point: Point3<f64>) -> Point3<f64> {
+fn on_skin(robot: &Hand, link: usize, point: Point3<f64>) -> Point3<f64> {
     let grid = robot.shape.links()[link].grid();
     let sample = grid.and_then(|grid| grid.sample(&point, RobotShape::DEFAULT_MARGIN));
     sample.map_or(point, |s| point - s.gradient * s.distance)

@@ -11,11 +11,11 @@ use prehend_geometry::robot::ArticulatedRobot;
 pub use self::contacts::ContactSettings;
 use self::contacts::contacts;
 use super::{Term, share};
-use crate::{Block, Cauchy, Normal, Object, Observation, RefineError, Robot, State};
+use crate::{Block, Cauchy, Hand, Normal, Object, Observation, RefineError, State};
 
 /// What taxels that feel force say.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Felt {
+pub enum TouchModel {
     /// Nothing: they are as good as dead.
     Nothing,
     /// Each that it is near the surface, as in the paper.
@@ -36,11 +36,11 @@ pub enum Felt {
 #[derive(Clone, Debug, PartialEq)]
 pub struct TactileSettings {
     /// Force above which a taxel counts as touched, the paper's γ \[N\].
-    pub touch_force: f64,
+    pub contact_threshold: f64,
     /// What touched taxels say.
-    pub felt: Felt,
+    pub felt: TouchModel,
     /// Standard deviation of how deep a quiet taxel may lie inside the object \[m\].
-    pub quiet_sigma: f64,
+    pub no_contact_sigma: f64,
     /// Depth at which a quiet taxel counts as an outlier (a dead one) \[m\].
     pub quiet_outlier: f64,
 }
@@ -48,9 +48,9 @@ pub struct TactileSettings {
 impl Default for TactileSettings {
     fn default() -> Self {
         Self {
-            touch_force: 0.1,
-            felt: Felt::Taxels { sigma: 3e-3, effective: 8.0, outlier: 10e-3 },
-            quiet_sigma: 1e-3,
+            contact_threshold: 0.1,
+            felt: TouchModel::Taxels { sigma: 3e-3, effective: 8.0, outlier: 10e-3 },
+            no_contact_sigma: 1e-3,
             quiet_outlier: 10e-3,
         }
     }
@@ -61,9 +61,9 @@ impl TactileSettings {
     pub(crate) fn forgiving(mut self, factor: f64) -> Self {
         self.quiet_outlier *= factor;
         match &mut self.felt {
-            Felt::Nothing => {}
-            Felt::Taxels { outlier, .. } => *outlier *= factor,
-            Felt::Contacts(contacts) => contacts.outlier *= factor,
+            TouchModel::Nothing => {}
+            TouchModel::Taxels { outlier, .. } => *outlier *= factor,
+            TouchModel::Contacts(contacts) => contacts.outlier *= factor,
         }
         self
     }
@@ -88,13 +88,13 @@ impl Probe {
     }
 }
 
-/// The paper's distance between the mesh and the taxels in contact, or that of whole contacts ([`Felt`]), and the evidence of the other taxels.
+/// The paper's distance between the mesh and the taxels in contact, or that of whole contacts ([`TouchModel`]), and the evidence of the other taxels.
 ///
 /// What is touched is drawn to the surface from either side; quiet taxels are pushed out of it, which the
 /// paper leaves unused. Both go through Cauchy's loss, because some taxels are dead and some ring false.
 pub struct TactileTerm {
     object: Arc<Object>,
-    robot: Arc<Robot>,
+    robot: Arc<Hand>,
     probes: Vec<Probe>,
 }
 
@@ -106,7 +106,7 @@ impl TactileTerm {
     pub fn new(
         observation: &Observation,
         object: Arc<Object>,
-        robot: Arc<Robot>,
+        robot: Arc<Hand>,
         settings: &TactileSettings,
     ) -> Result<Self, RefineError> {
         let hand = observation
@@ -147,25 +147,25 @@ impl TactileTerm {
 
 /// What taxels on `links` that feel `forces` say of where they are.
 fn probes(
-    robot: &Robot,
+    robot: &Hand,
     links: &[usize],
     forces: &[Vector3<f64>],
     settings: &TactileSettings,
 ) -> Vec<Probe> {
-    let is_touched = |force: &Vector3<f64>| force.norm() > settings.touch_force;
+    let is_touched = |force: &Vector3<f64>| force.norm() > settings.contact_threshold;
     let all = || robot.taxels.iter().zip(links).zip(forces);
     // A force that is not a number is no silence.
-    let is_quiet = |force: &Vector3<f64>| force.norm() <= settings.touch_force;
+    let is_quiet = |force: &Vector3<f64>| force.norm() <= settings.contact_threshold;
     let quiet = all().filter(|(_, force)| is_quiet(force)).map(|((taxel, link), _)| Probe {
         link: *link,
         position: taxel.position,
         touched: false,
-        weight: settings.quiet_sigma.powi(-2),
+        weight: settings.no_contact_sigma.powi(-2),
         outlier: settings.quiet_outlier,
     });
     let mut probes: Vec<Probe> = match &settings.felt {
-        Felt::Nothing => Vec::new(),
-        Felt::Taxels { sigma, effective, outlier } => {
+        TouchModel::Nothing => Vec::new(),
+        TouchModel::Taxels { sigma, effective, outlier } => {
             let touched = all().filter(|(_, force)| is_touched(force));
             let weight = share(*effective, touched.clone().count().max(1) as f64, *sigma);
             let probe = |((taxel, link), _): ((&Taxel, &usize), _)| Probe {
@@ -177,7 +177,9 @@ fn probes(
             };
             touched.map(probe).collect()
         }
-        Felt::Contacts(contact) => contacts(robot, links, forces, settings.touch_force, contact),
+        TouchModel::Contacts(contact) => {
+            contacts(robot, links, forces, settings.contact_threshold, contact)
+        }
     };
     probes.extend(quiet);
     probes
@@ -220,7 +222,7 @@ impl Term for TactileTerm {
             let of_hand = Vector6::new(n.x, n.y, n.z, turn.x, turn.y, turn.z);
             let of_object = -of_hand;
             joints.fill(0.0);
-            for (joint, velocity) in hand.velocities(probe.link, &r.point) {
+            for (joint, velocity) in hand.point_jacobian(probe.link, &r.point) {
                 joints[joint] += n.dot(&velocity);
             }
             let row = [
@@ -252,7 +254,7 @@ mod tests {
     #[test]
     fn gradients_match_differences() {
         let default = TactileSettings::default();
-        let contacts = Felt::Contacts(ContactSettings::default());
+        let contacts = TouchModel::Contacts(ContactSettings::default());
         for felt in [default.felt.clone(), contacts] {
             let settings = TactileSettings { felt, ..default.clone() };
             for seed in 0..3 {

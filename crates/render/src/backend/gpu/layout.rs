@@ -71,7 +71,7 @@ pub(super) struct Params {
     pub(super) depth_truncation: f32,
     pub(super) robust_kind: u32,
     pub(super) robust_scale: f32,
-    pub(super) hidden_is_missed: u32,
+    pub(super) penalize_occluded: u32,
     pub(super) reach: f32,
     pub(super) blur: f32,
     pub(super) sharpness: f32,

@@ -102,7 +102,7 @@ mod tests {
                     depth_truncation,
                     robust_kind,
                     robust_scale,
-                    hidden_is_missed,
+                    penalize_occluded,
                     reach,
                     blur,
                     sharpness,

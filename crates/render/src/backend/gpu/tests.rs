@@ -94,7 +94,7 @@ fn cases() -> Vec<Case> {
     let lump = painted(lump(0.045, 60), 0.05);
     let torus = painted(torus(0.04, 0.015, 60), 0.05);
     let robust = |robust: Robust| LossOptions { robust, ..full };
-    let hidden = LossOptions { hidden_is_missed: true, ..robust(Robust::Huber(0.05)) };
+    let hidden = LossOptions { penalize_occluded: true, ..robust(Robust::Huber(0.05)) };
     let one = contour(1.0);
     vec![
         case("painted lump", &lump, lamp(), one, plain, none, 4),

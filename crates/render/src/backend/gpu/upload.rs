@@ -173,7 +173,7 @@ fn set_loss(params: &mut Params, options: &LossOptions, has_depth: bool) {
     };
     params.robust_kind = kind;
     params.robust_scale = scale as f32;
-    params.hidden_is_missed = options.hidden_is_missed.into();
+    params.penalize_occluded = options.penalize_occluded.into();
 }
 
 /// A hypothesis; one that is not finite is marked so that nothing of it is computed with.

@@ -29,7 +29,7 @@ fn a_known_occluder_silences_what_it_hides() {
     assert_eq!(nothing.loss.counts.covered, 0);
     // Hidden pixels of the mask cost nothing, or as much as if the object were not there at all.
     let counting =
-        PoseLoss::new(Mode::default(), LossOptions { hidden_is_missed: true, ..full_options() });
+        PoseLoss::new(Mode::default(), LossOptions { penalize_occluded: true, ..full_options() });
     let away = Isometry3::translation(9.0, 0.0, 0.4);
     let missed = counting.evaluate(&model, &away, &lamp(), &wall).total;
     let hidden = counting.linearize(&model, &guess, &Point3::origin(), &lamp(), &wall);

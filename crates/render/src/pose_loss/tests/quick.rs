@@ -41,8 +41,8 @@ fn is_the_same_as_pixel_by_pixel() {
         let target = target_of(&model, &truth, &lamp(), Some(hand), 0.0);
         let center = truth * model.center();
         let guess = twisted(&truth, &center, &[0.004, 0.002, -0.01, 0.1, -0.1, 0.1]);
-        for hidden_is_missed in [false, true] {
-            let options = LossOptions { hidden_is_missed, ..full_options() };
+        for penalize_occluded in [false, true] {
+            let options = LossOptions { penalize_occluded, ..full_options() };
             let residuals = Residuals { options: &options, target: &target };
             let drawing = ContourOptions { creases: crease, ..Default::default() }.drawing(1);
             let (camera, bounds) = (&target.camera, &target.bounds);

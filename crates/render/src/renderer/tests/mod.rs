@@ -100,8 +100,9 @@ fn decisions<Sh: Shader>(rendering: &Rendering<Sh>) -> Vec<Option<Vec<u32>>> {
 
 fn adjoints(pixels: usize) -> BufferAdjoints {
     let mut random = SplitMix64::new(5);
-    let mut list =
-        |scale: f64| -> Vec<f64> { (0..pixels).map(|_| scale * (random.unit() - 0.3)).collect() };
+    let mut list = |scale: f64| -> Vec<f64> {
+        (0..pixels).map(|_| scale * (random.uniform() - 0.3)).collect()
+    };
     let (r, g, b) = (list(1.0), list(1.0), list(1.0));
     let (alpha, depth) = (list(1.0), list(10.0));
     let (x, y, z) = (list(0.2), list(0.2), list(0.2));
@@ -176,7 +177,7 @@ fn check_edit(
 fn poses_and_extrinsics_match_differences() {
     let random = |seed: u64| {
         let mut random = SplitMix64::new(seed);
-        Vector6::from_fn(|i, _| (random.unit() - 0.5) * if i < 3 { 0.05 } else { 1.0 })
+        Vector6::from_fn(|i, _| (random.uniform() - 0.5) * if i < 3 { 0.05 } else { 1.0 })
     };
     for object in 0..3 {
         let direction = random(object as u64);
@@ -284,7 +285,7 @@ fn colors_and_texels_match_differences() {
         let mut random = SplitMix64::new(4);
         let mut out = values.to_vec();
         for value in out.iter_mut().flatten() {
-            *value += sign * 0.02 * (random.unit() as f32 - 0.3);
+            *value += sign * 0.02 * (random.uniform() as f32 - 0.3);
         }
         out
     };
