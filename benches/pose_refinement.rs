@@ -5,11 +5,13 @@ use std::hint::black_box;
 use std::sync::{Arc, LazyLock};
 use std::time::{Duration, Instant};
 
-use prehend::refine::synth::{Scene, Sequence, default_scene, default_sequence};
+use prehend::refine::RefineError;
+use prehend::refine::problem::{Block, Normal, State};
+use prehend::refine::refine;
+use prehend::refine::scene::{Scene, Sequence, default_scene, default_sequence};
+use prehend::refine::standard_terms;
 use prehend::refine::tracker::{Spent, TrackStatus, Tracked, Tracker, TrackerSettings};
-use prehend::refine::{
-    Block, Config, Normal, RefineError, State, TermKind, refine, standard_terms,
-};
+use prehend::refine::{Config, TermKind};
 
 static SCENE: LazyLock<Scene> = LazyLock::new(|| default_scene(1).expect("the built-in scene"));
 
@@ -116,7 +118,9 @@ fn tell_shares(tracked: &[Tracked]) {
 }
 
 /// A term and the state that a refinement begins with, lit as the term sees it.
-fn prepared(kind: TermKind) -> Result<(Box<dyn prehend::refine::Term>, State), RefineError> {
+fn prepared(
+    kind: TermKind,
+) -> Result<(Box<dyn prehend::refine::factor::Term>, State), RefineError> {
     let config = Config::of(&[kind]);
     let mut state = State::new(&SCENE.observation, &SCENE.object, &SCENE.initial)?;
     let robot = Some(&SCENE.robot);

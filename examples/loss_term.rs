@@ -1,9 +1,12 @@
 //! Adds a term of one's own to the four: a gripper camera's hint of where the bottle's cap is.
 
 use nalgebra::{Matrix6, Point3, Vector6};
+use prehend::refine::Config;
+use prehend::refine::factor::Term;
+use prehend::refine::problem::{Block, Normal, State};
+use prehend::refine::scene::default_scene;
+use prehend::refine::standard_terms;
 use prehend::refine::strategy::{Heuristic, HeuristicSettings};
-use prehend::refine::synth::default_scene;
-use prehend::refine::{Block, Config, Normal, State, Term, standard_terms};
 
 /// A point of the object is believed to be at a place, with standard deviation `sigma` \[m\].
 struct Landmark {

@@ -8,10 +8,12 @@ use std::time::Instant;
 use anyhow::{Context, ensure};
 use nalgebra::Isometry3;
 use prehend::geometry::{ClosestPoints, SolidUnion};
-use prehend::refine::metrics::{ContactModel, Table, oe_deg, pe_cm};
-use prehend::refine::report::before_and_after;
-use prehend::refine::synth::default_scene;
-use prehend::refine::{Config, HandMeasurement, refine};
+use prehend::refine::Config;
+use prehend::refine::evaluate::metrics::{ContactModel, Table, oe_deg, pe_cm};
+use prehend::refine::evaluate::report::before_and_after;
+use prehend::refine::refine;
+use prehend::refine::scene::HandMeasurement;
+use prehend::refine::scene::default_scene;
 
 fn main() -> anyhow::Result<()> {
     let seed = std::env::args()

@@ -2,9 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use prehend::refine::bop::{Dataset, ResultRow, read_results};
-use prehend::refine::metrics::PoseScore;
-use prehend::refine::{Assets, Config, Scorer, refine};
+use prehend::refine::Config;
+use prehend::refine::data::Assets;
+use prehend::refine::data::bop::{Dataset, ResultRow, read_results};
+use prehend::refine::evaluate::Scorer;
+use prehend::refine::evaluate::metrics::PoseScore;
+use prehend::refine::refine;
 
 /// Means of PE, OE and |ΔIV| before and after refining every pose of `poses`, and how many there are.
 fn before_and_after(dataset: &Path, poses: &str) -> (usize, [f64; 3], [f64; 3]) {

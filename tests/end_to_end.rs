@@ -4,9 +4,12 @@ use std::sync::LazyLock;
 
 use nalgebra::Vector6;
 use prehend::autodiff::lie::perturb_about;
-use prehend::refine::metrics::{oe_deg, pe_cm};
-use prehend::refine::synth::{Scene, default_scene};
-use prehend::refine::{Config, RefineError, RefinedPose, TermKind, refine};
+use prehend::refine::RefineError;
+use prehend::refine::RefinedPose;
+use prehend::refine::evaluate::metrics::{oe_deg, pe_cm};
+use prehend::refine::refine;
+use prehend::refine::scene::{Scene, default_scene};
+use prehend::refine::{Config, TermKind};
 
 static SCENE: LazyLock<Scene> = LazyLock::new(|| default_scene(1).expect("the built-in scene"));
 
@@ -45,7 +48,7 @@ fn every_term_lowers_its_own_value() {
 fn the_checkpoint_is_the_pose_of_lowest_rendering_value() {
     let refined = run(&Config::combined()).unwrap();
     let rendering = refined.trace.terms.iter().position(|t| t == "rendering").unwrap();
-    let value = |i: &prehend::refine::trace::Iteration| i.values[rendering];
+    let value = |i: &prehend::refine::strategy::Iteration| i.values[rendering];
     let lowest = refined.trace.iterations.iter().map(value).fold(f64::INFINITY, f64::min);
     assert_eq!(value(&refined.trace.iterations[refined.iteration]), lowest);
 }

@@ -10,9 +10,9 @@ use cpu_time::ProcessTime;
 use nalgebra::{Isometry3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use prehend_geometry::hand::{allegro_xela_urdf, taxels};
 use prehend_geometry::objects::YcbObject;
-use prehend_geometry::robot::Hand as Tree;
+use prehend_geometry::robot::KinematicTree as Tree;
+use prehend_refine::scene::{Hand, Object};
 use prehend_refine::synth::{Grasp, GraspSettings, Grasper};
-use prehend_refine::{Hand, Object};
 use prehend_render::{Camera, Light, RenderModel, SceneObject, render_scene};
 
 const FRAMES: usize = 100;

@@ -5,7 +5,8 @@
 use std::path::PathBuf;
 
 use anyhow::Context;
-use prehend_refine::synth::{default_scene, write_dataset};
+use prehend_refine::scene::default_scene;
+use prehend_refine::synth::write_dataset;
 
 fn main() -> anyhow::Result<()> {
     let mut arguments = std::env::args().skip(1);

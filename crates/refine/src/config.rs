@@ -3,8 +3,8 @@
 use std::fmt;
 use std::str::FromStr;
 
+use crate::factor::{DepthSettings, PhysicsSettings, RenderingSettings, TactileSettings};
 use crate::strategy::{FusedSettings, HeuristicSettings, IcpSettings, RobustIcpSettings};
-use crate::term::{DepthSettings, PhysicsSettings, RenderingSettings, TactileSettings};
 
 /// One of the four kinds of evidence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -1,7 +1,7 @@
 //! Named ways to refine a pose: what `--method` picks and what studies compare.
 
+use crate::config::{Config, StrategyKind, TermKind};
 use crate::strategy::{Evidence, FusedSettings, Nuisance};
-use crate::{Config, StrategyKind, TermKind};
 
 /// A way to refine a pose, with all of its settings.
 #[derive(Clone, Copy, Debug)]

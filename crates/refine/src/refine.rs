@@ -5,10 +5,13 @@ use std::sync::Arc;
 use nalgebra::Isometry3;
 use prehend_render::{DepthImage, depth_map};
 
+use crate::config::{Config, StrategyKind, TermKind};
+use crate::error::RefineError;
+use crate::factor::{DepthTerm, PhysicsTerm, RenderingTerm, TactileTerm, Term};
+use crate::problem::State;
+use crate::scene::{Hand, Object, Observation};
 use crate::strategy::{Fused, Heuristic, Icp, Posterior, RobustIcp};
-use crate::term::{DepthTerm, PhysicsTerm, RenderingTerm, TactileTerm, Term};
-use crate::trace::{Iteration, Trace};
-use crate::{Config, Hand, Object, Observation, RefineError, State, StrategyKind, TermKind};
+use crate::strategy::{Iteration, Trace};
 
 /// The outcome of a refinement.
 #[derive(Clone, Debug)]

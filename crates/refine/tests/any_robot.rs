@@ -8,8 +8,10 @@ use nalgebra::{Isometry3, Point3, Rotation3, Translation3, UnitQuaternion, Vecto
 use prehend_autodiff::lie::perturb_about;
 use prehend_geometry::objects::YcbObject;
 use prehend_geometry::robot::KinematicTree;
-use prehend_refine::metrics::{oe_deg, pe_cm};
-use prehend_refine::{Config, Hand, HandMeasurement, Object, Observation, TermKind, refine};
+use prehend_refine::evaluate::metrics::{oe_deg, pe_cm};
+use prehend_refine::refine;
+use prehend_refine::scene::{Hand, HandMeasurement, Object, Observation};
+use prehend_refine::{Config, TermKind};
 use prehend_render::{Camera, Light, Mask, RenderModel, SceneObject, render_scene};
 
 const GRIPPER: &str = r#"<robot name="gripper">

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use image::{ImageBuffer, Luma, Rgb};
 use nalgebra::{Isometry3, Vector3};
-use prehend_refine::bop::{Dataset, DatasetError, GroundTruth, UNITS_PER_NEWTON};
+use prehend_refine::data::bop::{Dataset, DatasetError, GroundTruth, UNITS_PER_NEWTON};
 
 const R: &str = "[0, -1, 0, 1, 0, 0, 0, 0, 1]";
 

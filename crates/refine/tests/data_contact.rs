@@ -9,8 +9,8 @@ use std::path::{Path, PathBuf};
 use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 use prehend_geometry::shapes::{capsule, cuboid};
 use prehend_geometry::{ClosestPoints, KinematicTree, SolidUnion, TriMesh};
-use prehend_refine::bop::{Dataset, GroundTruth, read_results};
-use prehend_refine::metrics::{CONTACT_SAMPLES, ContactModel};
+use prehend_refine::data::bop::{Dataset, GroundTruth, read_results};
+use prehend_refine::evaluate::metrics::{CONTACT_SAMPLES, ContactModel};
 use serde_json::Value;
 
 fn data(name: &str) -> PathBuf {

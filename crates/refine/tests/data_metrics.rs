@@ -8,9 +8,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use prehend_geometry::TriMesh;
-use prehend_refine::Scorer;
-use prehend_refine::bop::{Dataset, GroundTruth, JsonFile, read_results, write_results};
-use prehend_refine::metrics::{PoseScore, ScoredModel, ScoredRow, summarize};
+use prehend_refine::data::bop::{Dataset, GroundTruth, JsonFile, read_results, write_results};
+use prehend_refine::evaluate::Scorer;
+use prehend_refine::evaluate::metrics::{PoseScore, ScoredModel, ScoredRow, summarize};
 
 fn data(name: &str) -> PathBuf {
     let default = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data");

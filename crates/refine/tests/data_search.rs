@@ -5,10 +5,11 @@
 use std::path::PathBuf;
 use std::time::Instant;
 
-use prehend_refine::Assets;
-use prehend_refine::bop::{Dataset, GroundTruth};
-use prehend_refine::initial::{PoseSearch, SearchSettings, find_targets};
-use prehend_refine::metrics::{oe_symmetric_deg, pe_cm};
+use prehend_refine::data::Assets;
+use prehend_refine::data::bop::{Dataset, GroundTruth};
+use prehend_refine::data::find_targets;
+use prehend_refine::evaluate::metrics::{oe_symmetric_deg, pe_cm};
+use prehend_refine::search::{PoseSearch, SearchSettings};
 
 fn data(name: &str) -> PathBuf {
     let default = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data");

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use image::GenericImageView;
 use prehend_geometry::objects::YcbObject;
-use prehend_refine::Object;
+use prehend_refine::scene::Object;
 use prehend_refine::synth::{
     HandFiles, Made, SensorSettings, Subject, SynthError, SynthSettings, generate,
     ready_made_moments,

@@ -5,8 +5,9 @@ use prehend_render::Light;
 use rayon::prelude::*;
 
 use super::step::preconditioned_step;
-use crate::trace::{Iteration, Trace};
-use crate::{Block, Normal, State, Term};
+use crate::factor::Term;
+use crate::problem::{Block, Normal, State};
+use crate::strategy::{Iteration, Trace};
 
 /// Settings of the heuristic.
 #[derive(Clone, Debug, PartialEq)]
@@ -133,7 +134,7 @@ mod tests {
     use nalgebra::{Isometry3, Matrix6, Point3, Vector3};
 
     use super::*;
-    use crate::CameraCalibrationError;
+    use crate::scene::CameraCalibrationError;
 
     /// Half the squared distance of the object from a place, over a variance.
     struct Spring {

@@ -7,9 +7,11 @@ use rayon::prelude::*;
 
 use super::step::preconditioned_step;
 use super::walk::{Advance, walk};
-use crate::term::back_project;
-use crate::trace::{Iteration, Trace};
-use crate::{Block, Normal, Object, Observation, RefineError, State};
+use crate::error::RefineError;
+use crate::factor::back_project;
+use crate::problem::{Block, Normal, State};
+use crate::scene::{Object, Observation};
+use crate::strategy::{Iteration, Trace};
 
 /// Settings of [`Icp`].
 #[derive(Clone, Debug, PartialEq)]
@@ -104,8 +106,8 @@ mod tests {
     use nalgebra::Vector6;
 
     use super::*;
-    use crate::metrics::{oe_deg, pe_cm};
-    use crate::synth::default_scene;
+    use crate::evaluate::metrics::{oe_deg, pe_cm};
+    use crate::scene::default_scene;
 
     #[test]
     fn it_descends_and_its_own_optimum_is_not_the_truth() {

@@ -5,6 +5,7 @@ mod heuristic;
 mod icp;
 mod robust_icp;
 mod step;
+mod trace;
 mod walk;
 
 pub use fused::{
@@ -16,3 +17,4 @@ pub use heuristic::{Heuristic, HeuristicSettings};
 pub use icp::{Icp, IcpSettings};
 pub use robust_icp::{RobustIcp, RobustIcpSettings};
 pub(crate) use step::preconditioned_step;
+pub use trace::{Iteration, Trace};

@@ -7,9 +7,11 @@ use rayon::prelude::*;
 
 use super::step::damped_step;
 use super::walk::{Advance, walk};
-use crate::term::back_project;
-use crate::trace::{Iteration, Trace};
-use crate::{Block, Normal, Object, Observation, RefineError, State};
+use crate::error::RefineError;
+use crate::factor::back_project;
+use crate::problem::{Block, Normal, State};
+use crate::scene::{Object, Observation};
+use crate::strategy::{Iteration, Trace};
 
 /// Settings of [`RobustIcp`].
 #[derive(Clone, Debug, PartialEq)]
@@ -118,8 +120,8 @@ mod tests {
 
     use super::super::{Icp, IcpSettings};
     use super::*;
-    use crate::metrics::{oe_deg, pe_cm};
-    use crate::synth::{Scene, default_scene};
+    use crate::evaluate::metrics::{oe_deg, pe_cm};
+    use crate::scene::{Scene, default_scene};
 
     fn start(scene: &Scene, offset: &Vector6<f64>) -> State {
         let truth = State::new(&scene.observation, &scene.object, &scene.truth).unwrap();

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix6, Vector6};
 
-use crate::Normal;
+use crate::problem::Normal;
 
 /// −(H + μ)⁻¹ g in units where a radian counts `radius` meters, no longer than `limit`; and its length
 /// in these units \[m\]. μ is a thousandth of the mean curvature.

@@ -2,8 +2,8 @@
 
 use nalgebra::Vector6;
 
-use crate::trace::{Iteration, Trace};
-use crate::{Block, State};
+use crate::problem::{Block, State};
+use crate::strategy::{Iteration, Trace};
 
 /// What a strategy makes of a state.
 pub(super) struct Advance {

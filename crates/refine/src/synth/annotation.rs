@@ -5,8 +5,8 @@ use prehend_geometry::TriMesh;
 use prehend_render::{Camera, DepthImage, Mask};
 use serde_json::{Map, Value, json};
 
-use crate::Inertial;
-use crate::bop::{UNITS_PER_NEWTON, extent_to_bop, rotation_to_row_major, translation_to_mm};
+use crate::data::bop::{UNITS_PER_NEWTON, extent_to_bop, rotation_to_row_major, translation_to_mm};
+use crate::scene::Inertial;
 
 /// Millimeters of one unit of the depth images.
 pub(super) const DEPTH_SCALE: f64 = 0.1;

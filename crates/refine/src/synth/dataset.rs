@@ -5,14 +5,14 @@ use std::path::Path;
 
 use prehend_render::{Mask, depth_map};
 
-use super::Scene;
 use super::folder::make;
 use super::frame::{FRAME_FOLDERS, Recorded};
 use super::hand_files::{TAXELS, URDF, taxel_table};
 use super::models::write_models;
 use super::scene_files::SceneFiles;
-use crate::AssetError;
-use crate::bop::{ResultRow, write_atomically, write_results};
+use crate::data::AssetError;
+use crate::data::bop::{ResultRow, write_atomically, write_results};
+use crate::scene::Scene;
 
 /// The only scene.
 const SCENE_ID: u32 = 1;
@@ -83,9 +83,10 @@ fn silhouette(scene: &Scene) -> Mask {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bop::{Dataset, GroundTruth, read_results};
-    use crate::synth::default_scene;
-    use crate::{Assets, TermKind};
+    use crate::config::TermKind;
+    use crate::data::Assets;
+    use crate::data::bop::{Dataset, GroundTruth, read_results};
+    use crate::scene::default_scene;
     use nalgebra::Isometry3;
     use std::fs;
 

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
-use crate::AssetError;
-use crate::bop::DatasetError;
+use crate::data::AssetError;
+use crate::data::bop::DatasetError;
 
 /// Why a dataset could not be made.
 #[derive(Debug, Error)]

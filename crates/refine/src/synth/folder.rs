@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use crate::bop::DatasetError;
+use crate::data::bop::DatasetError;
 
 /// Makes the folder and those above it, where they are absent.
 pub(super) fn make(folder: &Path) -> Result<(), DatasetError> {

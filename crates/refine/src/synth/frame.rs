@@ -8,8 +8,9 @@ use prehend_render::Mask;
 use super::annotation;
 use super::hand_files::{TAXELS, URDF};
 use super::scene_files::Entries;
-use crate::bop::DatasetError;
-use crate::{AssetError, Observation};
+use crate::data::AssetError;
+use crate::data::bop::DatasetError;
+use crate::scene::Observation;
 
 /// The folders of a scene.
 pub(super) const FRAME_FOLDERS: [&str; 4] = ["rgb", "depth", "mask", "mask_visib"];

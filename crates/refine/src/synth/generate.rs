@@ -17,9 +17,11 @@ use super::scene_files::{NAMES, SceneFiles, from_text, to_text};
 use super::seeds::{Use, seed, sequence};
 use super::sensor::Rig;
 use super::{GraspSnapshot, SynthError};
-use crate::AssetError;
-use crate::bop::{Dataset, DatasetError, GroundTruth, ResultRow, write_atomically, write_results};
-use crate::initial::NoiseLevel;
+use crate::data::AssetError;
+use crate::data::bop::{
+    Dataset, DatasetError, GroundTruth, ResultRow, write_atomically, write_results,
+};
+use crate::evaluate::NoiseLevel;
 
 /// What became of a dataset.
 #[derive(Clone, Debug, Default, PartialEq)]

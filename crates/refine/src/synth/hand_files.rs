@@ -8,8 +8,9 @@ use prehend_geometry::hand::{Taxel, allegro_xela_urdf, load_taxels, taxels};
 use prehend_geometry::robot::KinematicTree;
 
 use super::folder::make;
-use crate::bop::{DatasetError, write_atomically};
-use crate::{AssetError, Hand};
+use crate::data::AssetError;
+use crate::data::bop::{DatasetError, write_atomically};
+use crate::scene::Hand;
 
 /// The hand's files, relative to the dataset.
 pub(super) const URDF: &str = "hand/hand.urdf";
@@ -47,7 +48,9 @@ impl HandFiles {
         let skin = taxels.map(load_taxels).transpose()?.unwrap_or_default();
         for taxel in &skin {
             if tree.link_index(&taxel.link).is_none() {
-                return Err(crate::RefineError::TaxelLink { link: taxel.link.clone() }.into());
+                return Err(
+                    crate::error::RefineError::TaxelLink { link: taxel.link.clone() }.into()
+                );
             }
         }
         let text = fs::read_to_string(urdf).map_err(|e| DatasetError::reading(urdf, &e))?;

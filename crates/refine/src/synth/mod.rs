@@ -15,12 +15,9 @@ mod models;
 mod moment;
 mod plan;
 mod ready_made;
-mod scene;
 mod scene_files;
 mod seeds;
-mod sensing;
 mod sensor;
-mod sequence;
 
 pub use dataset::write_dataset;
 pub use error::SynthError;
@@ -30,10 +27,8 @@ pub use hand_files::HandFiles;
 pub use moment::GraspSnapshot;
 pub use plan::{Subject, SynthSettings};
 pub use ready_made::ready_made_moments;
-pub use scene::{Scene, default_scene};
 pub(crate) use sensor::smooth_field;
 pub use sensor::{
     BackgroundSettings, CalibrationSettings, ColorSettings, DepthSettings, LightSettings,
     MaskSettings, ModelSettings, SensorSettings, SettingError, TouchSettings, ViewpointSettings,
 };
-pub use sequence::{Sequence, SequenceFrame, default_sequence};

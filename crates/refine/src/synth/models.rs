@@ -8,8 +8,9 @@ use serde_json::{Map, Value};
 
 use super::annotation;
 use super::folder::make;
-use crate::bop::write_atomically;
-use crate::{AssetError, Inertial};
+use crate::data::AssetError;
+use crate::data::bop::write_atomically;
+use crate::scene::Inertial;
 
 /// Writes `obj_*.ply` in millimeters, with textures beside them, and `models_info.json` to the folder `dir`.
 ///

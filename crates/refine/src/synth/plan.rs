@@ -9,9 +9,9 @@ use serde_json::{Map, Value, json};
 use super::folder::fault;
 use super::hand_files::HandFiles;
 use super::{SensorSettings, SynthError};
-use crate::Object;
-use crate::bop::{DatasetError, write_atomically};
-use crate::identity::{fingerprint, program};
+use crate::data::bop::{DatasetError, write_atomically};
+use crate::data::identity::{fingerprint, program};
+use crate::scene::Object;
 
 /// An object of a dataset in the making.
 pub struct Subject {

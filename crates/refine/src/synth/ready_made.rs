@@ -5,8 +5,9 @@ use prehend_geometry::SplitMix64;
 use prehend_geometry::hand::{JOINT_NAMES, default_grasp};
 
 use super::GraspSnapshot;
-use super::sensing::feel;
-use crate::{AssetError, Hand, Object};
+use crate::data::AssetError;
+use crate::scene::feel;
+use crate::scene::{Hand, Object};
 
 /// `count` moments of `object` where the built-in bottle lies in the built-in hand ([`default_grasp`]), while gravity turns
 /// about the hand; taxels feel what is near them.

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;
 
-use crate::bop::{DatasetError, write_atomically};
+use crate::data::bop::{DatasetError, write_atomically};
 
 /// What one image adds to each of its scene's files: the file's name and the entry as JSON.
 pub(super) type Entries = Vec<(&'static str, String)>;

@@ -2,9 +2,10 @@
 
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, Vector3, Vector6};
 
+use crate::factor::{Prior, Term};
+use crate::problem::{Block, Normal, State};
+use crate::scene::CameraCalibrationError;
 use crate::strategy::{Factor, RIDGE};
-use crate::term::{Prior, Term};
-use crate::{Block, CameraCalibrationError, Normal, State};
 
 /// Where the parts of a vector of all that a state holds begin: object, hand, joints, camera.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -130,7 +131,7 @@ mod tests {
     use prehend_autodiff::check::{compare_gradients, finite_difference_gradient};
 
     use super::*;
-    use crate::synth::default_scene;
+    use crate::scene::default_scene;
 
     #[test]
     fn it_is_a_gaussian_with_the_derivatives_it_says() {

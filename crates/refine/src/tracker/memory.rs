@@ -7,9 +7,10 @@ use prehend_autodiff::lie::{perturb_about, so3_log};
 
 use super::carried::Layout;
 use super::settings::{ProcessNoise, TrackerSettings};
+use crate::factor::PriorSettings;
+use crate::problem::State;
+use crate::scene::CameraCalibrationError;
 use crate::strategy::{Factor, Point, RIDGE};
-use crate::term::PriorSettings;
-use crate::{CameraCalibrationError, State};
 
 /// Time within which an object that is not seen comes to rest, all but 1/e of its velocity \[s\].
 const COASTING: f64 = 0.25;

@@ -17,12 +17,14 @@ use self::clock::Clock;
 pub use self::clock::Spent;
 use self::memory::{Memory, Prediction};
 pub use self::settings::{GatingSettings, ProcessNoise, Recovery, TrackerSettings};
-use crate::initial::PoseSearch;
+use crate::error::RefineError;
+use crate::factor::{Prior, Term};
+use crate::problem::State;
+use crate::scene::{CameraCalibrationError, Hand, Object, Observation};
+use crate::search::PoseSearch;
 use crate::strategy::{
     FrameContext, Fused, Inconsistency, Point, Posterior, Problem, Termination, chi_square_z,
 };
-use crate::term::{Prior, Term};
-use crate::{CameraCalibrationError, Hand, Object, Observation, RefineError, State};
 
 /// Follows one object through the frames of a camera.
 ///
@@ -37,7 +39,7 @@ use crate::{CameraCalibrationError, Hand, Object, Observation, RefineError, Stat
 ///
 /// ```
 /// use std::sync::Arc;
-/// use prehend_refine::synth::default_sequence;
+/// use prehend_refine::scene::default_sequence;
 /// use prehend_refine::tracker::{TrackStatus, Tracker, TrackerSettings};
 ///
 /// let sequence = default_sequence(1, 2)?;

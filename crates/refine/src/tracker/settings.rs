@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
-use crate::RefineError;
-use crate::initial::SearchSettings;
+use crate::error::RefineError;
+use crate::search::SearchSettings;
 use crate::strategy::{FusedSettings, Stage};
 
 /// What is known of how an object moves from frame to frame.

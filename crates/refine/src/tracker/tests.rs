@@ -1,8 +1,8 @@
 use std::sync::LazyLock;
 
 use super::*;
-use crate::metrics::{oe_deg, pe_cm};
-use crate::synth::{Sequence, default_sequence};
+use crate::evaluate::metrics::{oe_deg, pe_cm};
+use crate::scene::{Sequence, default_sequence};
 
 static SEQUENCE: LazyLock<Sequence> = LazyLock::new(|| default_sequence(1, 24).unwrap());
 

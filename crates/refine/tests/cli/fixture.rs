@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::OnceLock;
 
-use prehend_refine::bop::{ResultRow, read_results};
-use prehend_refine::synth::{default_scene, write_dataset};
+use prehend_refine::data::bop::{ResultRow, read_results};
+use prehend_refine::scene::default_scene;
+use prehend_refine::synth::write_dataset;
 use serde_json::Value;
 
 /// Two images of one scene, made once a test run.

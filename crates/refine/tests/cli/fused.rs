@@ -1,7 +1,7 @@
 //! `prehend refine` with its default method, the fused estimator.
 
-use prehend_refine::metrics::{oe_deg, pe_cm};
-use prehend_refine::synth::default_scene;
+use prehend_refine::evaluate::metrics::{oe_deg, pe_cm};
+use prehend_refine::scene::default_scene;
 use serde_json::Value;
 
 use crate::fixture::Workplace;

@@ -4,11 +4,11 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use clap::Args;
-use prehend_refine::bop::{DatasetError, Frame, ResultRow};
-use prehend_refine::report::{Report, outline_picture};
-use prehend_refine::{
-    AssetError, Assets, Hand, Observation, TermKind, inspect_object, inspect_pose,
-};
+use prehend_refine::TermKind;
+use prehend_refine::data::bop::{DatasetError, Frame, ResultRow};
+use prehend_refine::data::{AssetError, Assets};
+use prehend_refine::evaluate::report::{Report, outline_picture};
+use prehend_refine::scene::{Hand, Observation, inspect_object, inspect_pose};
 
 use crate::cache;
 use crate::options::{Input, Job, label};

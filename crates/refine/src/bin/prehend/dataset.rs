@@ -6,15 +6,15 @@ use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
-use prehend_refine::bop::{Dataset, ResultRow, share_image_times, write_results};
-use prehend_refine::identity::{SENSED, canonical, dataset_fingerprint, file_fingerprint};
-use prehend_refine::report::{FrameReport, Report};
+use prehend_refine::Config;
+use prehend_refine::data::bop::{Dataset, ResultRow, share_image_times, write_results};
+use prehend_refine::data::identity::{SENSED, canonical, dataset_fingerprint, file_fingerprint};
+use prehend_refine::data::{AssetError, Assets, Identity, Journal, PlainPose, Times, Workers};
+use prehend_refine::evaluate::report::{FrameReport, Report};
+use prehend_refine::scene::{inspect_object, inspect_pose};
 use prehend_refine::strategy::PosteriorSummary;
-use prehend_refine::trace::Trace;
-use prehend_refine::{
-    AssetError, Assets, Config, Identity, Journal, PlainPose, RefinedPose, Times, Workers,
-    inspect_object, inspect_pose, refine_with,
-};
+use prehend_refine::strategy::Trace;
+use prehend_refine::{RefinedPose, refine_with};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 

@@ -1,8 +1,8 @@
 //! `prehend eval`.
 
 use clap::Args;
-use prehend_refine::Scorer;
-use prehend_refine::metrics::summarize;
+use prehend_refine::evaluate::Scorer;
+use prehend_refine::evaluate::metrics::summarize;
 use serde_json::json;
 
 use crate::options::{Input, label};

@@ -3,9 +3,11 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use prehend_refine::bop::write_atomically;
+use prehend_refine::data::bop::write_atomically;
+use prehend_refine::data::frame_file;
+use prehend_refine::refine_with;
+use prehend_refine::scene::{inspect_object, inspect_pose};
 use prehend_refine::strategy::PosteriorSummary;
-use prehend_refine::{frame_file, inspect_object, inspect_pose, refine_with};
 use serde_json::json;
 
 use crate::cache;

@@ -9,11 +9,15 @@ use std::sync::Arc;
 use anyhow::bail;
 use clap::Args;
 use nalgebra::Isometry3;
-use prehend_refine::bop::{
+use prehend_refine::RefineError;
+use prehend_refine::data::bop::{
     Dataset, DatasetError, GroundTruth, ResultRow, check_writable, share_image_times, write_results,
 };
-use prehend_refine::initial::{NoiseLevel, PoseSearch, SearchSettings, Target, find_targets};
-use prehend_refine::{AssetError, Assets, Hand, Observation, RefineError};
+use prehend_refine::data::{AssetError, Assets};
+use prehend_refine::data::{Target, find_targets};
+use prehend_refine::evaluate::NoiseLevel;
+use prehend_refine::scene::{Hand, Observation};
+use prehend_refine::search::{PoseSearch, SearchSettings};
 
 use crate::cache;
 use crate::options::{Selection, label};

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use clap::Args;
-use prehend_refine::bop::{Dataset, DatasetError, ReadResults, ResultRow, read_results};
+use prehend_refine::data::bop::{Dataset, DatasetError, ReadResults, ResultRow, read_results};
 
 /// A dataset, and which of its images and objects are meant.
 #[derive(Args)]

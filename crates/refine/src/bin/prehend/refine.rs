@@ -5,8 +5,9 @@ use std::path::PathBuf;
 
 use anyhow::bail;
 use clap::Args;
-use prehend_refine::bop::check_writable;
-use prehend_refine::{self as refine, Config, StrategyKind, TermKind};
+use prehend_refine::data::bop::check_writable;
+use prehend_refine::{self as refine};
+use prehend_refine::{Config, StrategyKind, TermKind};
 
 use crate::options::Selection;
 use crate::outcome::Outcome;

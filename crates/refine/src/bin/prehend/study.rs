@@ -7,15 +7,15 @@ use std::sync::Mutex;
 
 use anyhow::{anyhow, bail};
 use clap::{Args, Subcommand};
-use prehend_refine::bop::{Dataset, DatasetError};
-use prehend_refine::identity::{SENSED, TRUTH, canonical, dataset_fingerprint};
-use prehend_refine::study::{
+use prehend_refine::Method;
+use prehend_refine::data::bop::{Dataset, DatasetError};
+use prehend_refine::data::identity::{SENSED, TRUTH, canonical, dataset_fingerprint};
+use prehend_refine::data::{Assets, Identity, Journal, Times, Workers, join_times};
+use prehend_refine::evaluate::study::{
     Design, Examined, Failure, Frame, FrameRecord, Kind, Level, MethodSettings, RECORDS, Runner,
     Shard, Sweep, TIMES, Tables, merge, write_outputs,
 };
-use prehend_refine::{
-    Assets, Config, Identity, Journal, Method, StrategyKind, Times, Workers, join_times,
-};
+use prehend_refine::{Config, StrategyKind};
 
 use crate::cache;
 use crate::options::Selection;

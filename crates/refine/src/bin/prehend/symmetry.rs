@@ -4,10 +4,10 @@ use std::path::PathBuf;
 
 use anyhow::bail;
 use clap::Args;
-use prehend_refine::bop::{Models, write_symmetries};
-use prehend_refine::load_mesh;
-use prehend_refine::metrics::Symmetries;
-use prehend_refine::symmetry::{SymmetrySettings, find_symmetries};
+use prehend_refine::data::bop::{Models, write_symmetries};
+use prehend_refine::data::load_mesh;
+use prehend_refine::evaluate::metrics::Symmetries;
+use prehend_refine::evaluate::symmetry::{SymmetrySettings, find_symmetries};
 
 use crate::outcome::Outcome;
 use crate::output::say;

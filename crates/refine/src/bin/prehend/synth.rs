@@ -7,7 +7,7 @@ use anyhow::{Context, anyhow, bail};
 use clap::{Args, ValueEnum};
 use prehend_geometry::TriMesh;
 use prehend_geometry::objects::YcbObject;
-use prehend_refine::Object;
+use prehend_refine::scene::Object;
 use prehend_refine::synth::{
     GraspSettings, Grasper, HandFiles, SensorSettings, Subject, SynthSettings, generate,
 };

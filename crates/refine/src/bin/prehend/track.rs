@@ -9,11 +9,13 @@ use std::time::Duration;
 use anyhow::bail;
 use clap::Args;
 use nalgebra::Isometry3;
-use prehend_refine::bop::{Dataset, ResultRow, check_writable, share_image_times, write_results};
-use prehend_refine::initial::find_targets;
+use prehend_refine::data::bop::{
+    Dataset, ResultRow, check_writable, share_image_times, write_results,
+};
+use prehend_refine::data::find_targets;
+use prehend_refine::data::{AssetError, Assets, PlainPose};
 use prehend_refine::strategy::Posterior;
 use prehend_refine::tracker::{Recovery, TrackStatus, Tracked, Tracker, TrackerSettings};
-use prehend_refine::{AssetError, Assets, PlainPose};
 use serde_json::json;
 
 use crate::cache;

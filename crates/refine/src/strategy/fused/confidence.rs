@@ -7,7 +7,7 @@ use prehend_geometry::SplitMix64;
 use super::Termination;
 use super::factor::Factor;
 use super::solve::Point;
-use crate::Block;
+use crate::problem::Block;
 
 /// A pose that the search came upon.
 #[derive(Clone, Debug, PartialEq)]
@@ -252,7 +252,7 @@ pub(crate) fn chi_square_z(squared: f64, degrees: usize) -> f64 {
 
 /// Which evidence, the prior included, has its own optimum far away.
 fn disagreements(point: &Point) -> Vec<Inconsistency> {
-    let distance = |part: &crate::Normal| {
+    let distance = |part: &crate::problem::Normal| {
         let factor = Factor::new(part.hessian(), 1e-3)?;
         // As many degrees of freedom as the sense says something of, at most.
         let degrees = part.hessian().diagonal().iter().filter(|d| **d > 0.0).count();

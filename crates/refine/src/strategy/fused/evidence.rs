@@ -7,13 +7,15 @@ use prehend_render::DepthImage;
 
 use super::settings::{Evidence, FusedSettings, Nuisance, Stage};
 use super::solve::Problem;
-use crate::refine::hand_depth;
-use crate::term::{
+use crate::error::RefineError;
+use crate::factor::{
     FreeSpaceTerm, HandDepthTerm, NoiseEstimate, PenetrationTerm, PointToPlaneSettings,
     PointToPlaneTerm, Prior, RenderingTerm, Segmented, SupportTerm, SurfacePatches, TactileTerm,
     Term, TouchModel,
 };
-use crate::{Hand, Object, Observation, RefineError, State};
+use crate::problem::State;
+use crate::refine::hand_depth;
+use crate::scene::{Hand, Object, Observation};
 
 /// Depth points that their scatter is judged by.
 const SCATTERED: usize = 1200;

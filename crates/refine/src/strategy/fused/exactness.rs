@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::factor::Factor;
 use super::solve::Point;
-use crate::Block;
+use crate::problem::Block;
 
 /// Log odds from which calibrations count as exact. That is rare, and where little is measured of them odds are within some nats of even: up to 8
 /// without depth on the hand, whether they are exact or not; with it from 16 on if they are, below −50 if not.

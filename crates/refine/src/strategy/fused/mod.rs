@@ -26,9 +26,11 @@ pub use self::settings::{Evidence, FusedSettings, Nuisance, Stage};
 pub use self::solve::Termination;
 pub(crate) use self::solve::{Point, Problem};
 pub use self::summary::PosteriorSummary;
-use crate::term::NoiseEstimate;
-use crate::trace::{Iteration, Trace};
-use crate::{Block, Hand, Object, Observation, RefineError, State};
+use crate::error::RefineError;
+use crate::factor::NoiseEstimate;
+use crate::problem::{Block, State};
+use crate::scene::{Hand, Object, Observation};
+use crate::strategy::{Iteration, Trace};
 
 /// Gauss–Newton on all evidence at once, with the quantities that are not known exactly estimated beside the pose.
 ///

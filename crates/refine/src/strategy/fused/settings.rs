@@ -1,12 +1,12 @@
 //! Settings of the fused estimator.
 
 use super::confidence::CovarianceInflation;
-use crate::term::{
+use crate::factor::{
     ContactSettings, FreeSpaceSettings, HandDepthSettings, ModelErrorSettings, PenetrationSettings,
     PointToPlaneSettings, PriorSettings, RenderingSettings, SupportSettings, TactileSettings,
     TouchModel,
 };
-use crate::{Block, State};
+use crate::problem::{Block, State};
 
 /// A kind of evidence that the fused estimator weighs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

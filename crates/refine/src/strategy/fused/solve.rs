@@ -8,9 +8,10 @@ use rayon::prelude::*;
 
 use super::confidence::RIDGE;
 use super::factor::{Factor, jacobi_scaled};
-use crate::normal::SchurComplement;
-use crate::term::SurfacePatches;
-use crate::{Block, Normal, State, Term};
+use crate::factor::SurfacePatches;
+use crate::factor::Term;
+use crate::problem::SchurComplement;
+use crate::problem::{Block, Normal, State};
 
 /// A state, the value of the terms there, and their derivatives.
 ///
@@ -183,8 +184,8 @@ mod tests {
     use prehend_geometry::SplitMix64;
 
     use super::*;
-    use crate::synth::default_scene;
-    use crate::term::ModelErrorSettings;
+    use crate::factor::ModelErrorSettings;
+    use crate::scene::default_scene;
 
     /// Measurements that are linear in the object's twist and the displacements of patches.
     struct Linear {

@@ -3,8 +3,8 @@ use std::sync::{Arc, LazyLock};
 use nalgebra::{Isometry3, Translation3, Vector3};
 
 use super::*;
-use crate::metrics::{oe_deg, pe_cm};
-use crate::synth::{Scene, default_scene};
+use crate::evaluate::metrics::{oe_deg, pe_cm};
+use crate::scene::{Scene, default_scene};
 
 static SCENE: LazyLock<Scene> = LazyLock::new(|| default_scene(1).unwrap());
 

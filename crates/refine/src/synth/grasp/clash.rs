@@ -5,7 +5,7 @@ use prehend_geometry::TriMesh;
 use prehend_geometry::sample::surface_samples;
 
 use super::skeleton::KinematicPaths;
-use crate::Hand;
+use crate::scene::Hand;
 
 /// Surface samples of a link.
 const SAMPLES: usize = 150;

@@ -6,7 +6,7 @@ use super::clash::SelfCollision;
 use super::simulation::Simulation;
 use super::skeleton::{KinematicPaths, Screw};
 use super::{GraspSettings, Preshape};
-use crate::Hand;
+use crate::scene::Hand;
 
 /// Which joints close, how fast, and where they stop.
 pub(super) struct Drive<'a> {

@@ -25,8 +25,8 @@ pub use preshape::Preshape;
 pub use settings::GraspSettings;
 
 use super::GraspSnapshot;
-use crate::metrics::ContactModel;
-use crate::{Hand, Object};
+use crate::evaluate::metrics::ContactModel;
+use crate::scene::{Hand, Object};
 use drive::{Drive, Effort};
 use placement::{Placed, Placement};
 use simulation::{Medium, Setup, Simulation};

@@ -5,7 +5,7 @@ use prehend_geometry::SplitMix64;
 use prehend_geometry::robot::{PosedRobot, RobotError};
 
 use super::{GraspSettings, Preshape};
-use crate::{Hand, Object};
+use crate::scene::{Hand, Object};
 
 /// Points of the object that must stay clear of the hand.
 const PROBES: usize = 600;

@@ -6,7 +6,7 @@ use prehend_geometry::robot::KinematicTree as Tree;
 
 use super::GraspError;
 use super::skeleton::KinematicPaths;
-use crate::Hand;
+use crate::scene::Hand;
 
 /// The open hand and the way it closes. Joints are in the order of the robot's joint names.
 #[derive(Clone, Debug, PartialEq)]

@@ -11,7 +11,7 @@ use prehend_sim::{
     SemiImplicitEuler, SimulationError, State, Step, SubStepped, Surface, SurfacePoint, World,
 };
 
-use crate::Hand;
+use crate::scene::Hand;
 
 /// Samples farther from the hand than this are left out until something has moved \[m\]. Links' grids reach farther.
 const NEAR: f64 = 10e-3;

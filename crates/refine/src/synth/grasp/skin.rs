@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::GraspError;
 use super::simulation::Touch;
-use crate::Hand;
+use crate::scene::Hand;
 
 /// The taxels of a hand by link.
 pub(super) struct Skin {

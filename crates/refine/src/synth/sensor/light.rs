@@ -5,7 +5,7 @@ use prehend_geometry::SplitMix64;
 use prehend_render::{Camera, DepthImage, RenderModel, SurfacePoint, depth_map};
 use serde::{Deserialize, Serialize};
 
-use super::viewpoint::look_at;
+use crate::scene::look_at;
 
 /// What lights the scene.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

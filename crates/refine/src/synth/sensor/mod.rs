@@ -25,4 +25,3 @@ pub(super) use rig::Rig;
 pub use settings::{SensorSettings, SettingError};
 pub use touch::TouchSettings;
 pub use viewpoint::ViewpointSettings;
-pub(super) use viewpoint::look_at;

@@ -12,8 +12,8 @@ use super::SensorSettings;
 use super::calibration::Miscalibration;
 use super::depth::DepthBias;
 use super::touch::TaxelCondition;
+use crate::scene::{Hand, HandMeasurement, Object, Observation};
 use crate::synth::GraspSnapshot;
-use crate::{Hand, HandMeasurement, Object, Observation};
 
 /// Sensors with the faults that stay the same through a grasp.
 pub(in crate::synth) struct Rig<'a> {

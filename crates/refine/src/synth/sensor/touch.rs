@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 use prehend_geometry::SplitMix64;
 use serde::{Deserialize, Serialize};
 
-use crate::bop::UNITS_PER_NEWTON;
+use crate::data::bop::UNITS_PER_NEWTON;
 
 /// Faults of the taxels. Forces are in sensor units, 1000 a newton.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

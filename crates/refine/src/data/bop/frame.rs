@@ -1,0 +1,173 @@
+//! One image of a scene.
+
+use std::fs;
+use std::path::PathBuf;
+
+use super::dataset::Scene;
+use super::error::DatasetError;
+use super::json::LazyJson;
+use super::scene::{Intrinsics, SceneBodies, Tactile};
+use crate::scene::Observation;
+use prehend_render::{DepthImage, Mask, RgbImage};
+
+/// One image: its camera, and access to everything else an estimator may know about it. Each part is
+/// read when asked for and fails on its own.
+#[derive(Clone, Copy, Debug)]
+pub struct Frame<'a> {
+    scene: &'a Scene,
+    im_id: u32,
+    /// The camera as the estimator is told it.
+    pub intrinsics: Intrinsics,
+    /// Millimeters per stored depth value.
+    pub depth_scale: f64,
+}
+
+impl<'a> Frame<'a> {
+    pub(crate) fn new(scene: &'a Scene, im_id: u32) -> Result<Self, DatasetError> {
+        let entry = scene.camera.get()?.entry(im_id)?;
+        let depth_scale = entry.find("depth_scale")?.map_or(Ok(1.0), |e| e.positive())?;
+        Ok(Self { scene, im_id, intrinsics: Intrinsics::parse(&entry.get("cam_K")?)?, depth_scale })
+    }
+
+    /// The scene's id.
+    pub fn scene_id(&self) -> u32 {
+        self.scene.id()
+    }
+
+    /// The image's id.
+    pub fn im_id(&self) -> u32 {
+        self.im_id
+    }
+
+    /// The color image (`rgb/*.png`, else `*.jpg` or `*.jpeg`).
+    ///
+    /// # Errors
+    /// [`DatasetError::Missing`] naming the PNG file when there is none.
+    pub fn rgb_path(&self) -> Result<PathBuf, DatasetError> {
+        let stem = self.scene.dir().join("rgb").join(format!("{:06}", self.im_id));
+        let mut candidates = ["png", "jpg", "jpeg"].into_iter().map(|e| stem.with_extension(e));
+        candidates
+            .find(|p| p.is_file())
+            .ok_or_else(|| DatasetError::Missing { file: stem.with_extension("png") })
+    }
+
+    /// The depth image, whether or not it exists.
+    pub fn depth_path(&self) -> PathBuf {
+        self.scene.dir().join("depth").join(format!("{:06}.png", self.im_id))
+    }
+
+    /// The mask of an object's visible part.
+    ///
+    /// Mask files are numbered by the order of the objects in the ground truth, which estimators must not
+    /// read. So the only mask of an image is taken for any `instance`; among several, the one whose number
+    /// is `instance`, the index of the object's row among that image's rows of the results file
+    /// ([`super::ReadResults::instances`]). Results for images with several masks must list the objects in
+    /// the order of the masks.
+    ///
+    /// # Errors
+    /// [`DatasetError::Missing`] naming the file.
+    pub fn mask_path(&self, instance: usize) -> Result<PathBuf, DatasetError> {
+        let dir = self.scene.dir().join("mask_visib");
+        let prefix = format!("{:06}_", self.im_id);
+        let expected = dir.join(format!("{prefix}{instance:06}.png"));
+        let Ok(listing) = fs::read_dir(&dir) else {
+            return Err(DatasetError::Missing { file: expected });
+        };
+        let mut masks = listing.flatten().map(|f| f.path()).filter(|p| {
+            p.file_name()
+                .and_then(|n| n.to_str())
+                .is_some_and(|n| n.starts_with(&prefix) && n.ends_with(".png"))
+        });
+        match (masks.next(), masks.next()) {
+            (Some(only), None) => Ok(only),
+            _ if expected.is_file() => Ok(expected),
+            _ => Err(DatasetError::Missing { file: expected }),
+        }
+    }
+
+    /// Reads the color image.
+    ///
+    /// # Errors
+    /// When it is absent or does not decode.
+    pub fn rgb(&self) -> Result<RgbImage, DatasetError> {
+        RgbImage::load(&self.rgb_path()?).map_err(DatasetError::from)
+    }
+
+    /// Reads the depth image.
+    ///
+    /// # Errors
+    /// When it is absent or does not decode, and [`DatasetError::NoDepth`] when it measures nothing.
+    pub fn depth(&self) -> Result<DepthImage, DatasetError> {
+        let file = self.depth_path();
+        let depth = DepthImage::load(&file, self.depth_scale * 1e-3)?;
+        if depth.pixels().iter().all(|&z| z == 0.0) {
+            Err(DatasetError::NoDepth { file })
+        } else {
+            Ok(depth)
+        }
+    }
+
+    /// Reads the mask that [`Frame::mask_path`] finds.
+    ///
+    /// # Errors
+    /// When it is absent or does not decode, and [`DatasetError::EmptyMask`] when no pixel is set.
+    pub fn mask(&self, instance: usize) -> Result<Mask, DatasetError> {
+        let file = self.mask_path(instance)?;
+        let mask = Mask::load(&file)?;
+        if mask.count() > 0 { Ok(mask) } else { Err(DatasetError::EmptyMask { file }) }
+    }
+
+    /// The image as an [`Observation`] of camera, color, depth and mask; gravity and the hand are left out.
+    ///
+    /// # Errors
+    /// The first of those of [`Frame::rgb`], [`Frame::depth`] and [`Frame::mask`], and
+    /// [`DatasetError::ImageSize`].
+    pub fn observation(&self, instance: usize) -> Result<Observation, DatasetError> {
+        let (rgb, depth, mask) = (self.rgb()?, self.depth()?, self.mask(instance)?);
+        let other_size = (rgb.width(), rgb.height());
+        let check = |file: PathBuf, size: (usize, usize)| {
+            if size == other_size {
+                return Ok(());
+            }
+            Err(DatasetError::ImageSize { file, size, other: self.rgb_path()?, other_size })
+        };
+        check(self.depth_path(), (depth.width(), depth.height()))?;
+        check(self.mask_path(instance)?, (mask.width(), mask.height()))?;
+        let camera = self.intrinsics.camera(rgb.width(), rgb.height());
+        Ok(Observation { camera, color: rgb, depth, mask, gravity: None, hand: None })
+    }
+
+    /// Gravity and the known robots, from `scene_bodies.json`.
+    ///
+    /// # Errors
+    /// When the file is absent or broken, or lacks the image or one of its fields.
+    pub fn bodies(&self) -> Result<SceneBodies, DatasetError> {
+        SceneBodies::parse(&self.scene.bodies.get()?.entry(self.im_id)?, self.scene.root())
+    }
+
+    /// Taxel forces, from `scene_tactile.json`.
+    ///
+    /// # Errors
+    /// When the file is absent or broken, or lacks the image or one of its fields.
+    pub fn tactile(&self) -> Result<Tactile, DatasetError> {
+        Tactile::parse(&self.scene.tactile.get()?.entry(self.im_id)?, self.scene.root())
+    }
+
+    /// An error about `field` of this image's entry of `scene_bodies.json`.
+    pub(crate) fn bodies_fault(&self, field: &str, problem: impl ToString) -> DatasetError {
+        self.fault(&self.scene.bodies, field, problem)
+    }
+
+    /// An error about `field` of this image's entry of `scene_tactile.json`.
+    pub(crate) fn tactile_fault(&self, field: &str, problem: impl ToString) -> DatasetError {
+        self.fault(&self.scene.tactile, field, problem)
+    }
+
+    fn fault(&self, file: &LazyJson, field: &str, problem: impl ToString) -> DatasetError {
+        DatasetError::Field {
+            file: file.path().to_owned(),
+            field: format!("{}.{field}", self.im_id),
+            problem: problem.to_string(),
+        }
+    }
+}

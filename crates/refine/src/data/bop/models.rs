@@ -1,0 +1,259 @@
+//! The folder of object models: meshes and `models_info.json`.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use nalgebra::{Isometry3, Matrix3, Point3, Unit, Vector3};
+use serde_json::{Map, Value, json};
+
+use super::error::DatasetError;
+use super::json::{Entry, LazyJson};
+use super::pose::{
+    rotation_from_row_major, rotation_to_row_major, translation_from_mm, translation_to_mm,
+};
+use crate::evaluate::metrics::{ContinuousSymmetry, Symmetries};
+
+/// A folder with `obj_000001.ply`, … (millimeters) and `models_info.json`.
+#[derive(Debug)]
+pub struct Models {
+    dir: PathBuf,
+    info: LazyJson,
+}
+
+/// What `models_info.json` says of one object, in the model frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ModelInfo {
+    /// Largest distance between two vertices \[m\].
+    pub diameter: f64,
+    /// Motions that map the object onto itself.
+    pub symmetries: Symmetries,
+    /// Mass \[kg\] (`mass_kg`, not part of BOP), if known.
+    pub mass: Option<f64>,
+    /// Center of mass \[m\] (`com_mm`, not part of BOP), if known.
+    pub center_of_mass: Option<Point3<f64>>,
+    /// Inertia about the center of mass \[kg m²\] (`inertia_kg_m2`, not part of BOP), if known.
+    pub inertia: Option<Matrix3<f64>>,
+}
+
+impl Models {
+    /// The models in `dir`; nothing is read yet.
+    pub fn new(dir: PathBuf) -> Self {
+        let info = LazyJson::new(dir.join("models_info.json"));
+        Self { dir, info }
+    }
+
+    /// The folder.
+    pub fn dir(&self) -> &Path {
+        &self.dir
+    }
+
+    /// The mesh file of an object \[mm\].
+    ///
+    /// # Errors
+    /// [`DatasetError::UnknownObject`] naming the file that is not there.
+    pub fn mesh_path(&self, obj_id: u32) -> Result<PathBuf, DatasetError> {
+        let file = self.dir.join(format!("obj_{obj_id:06}.ply"));
+        if file.is_file() { Ok(file) } else { Err(DatasetError::UnknownObject { file, obj_id }) }
+    }
+
+    /// The ids of all objects with a mesh, ascending.
+    ///
+    /// # Errors
+    /// When the folder cannot be listed.
+    pub fn object_ids(&self) -> Result<Vec<u32>, DatasetError> {
+        let listing = fs::read_dir(&self.dir).map_err(|e| DatasetError::reading(&self.dir, &e))?;
+        let id = |name: &str| name.strip_prefix("obj_")?.strip_suffix(".ply")?.parse().ok();
+        let mut ids: Vec<u32> =
+            listing.flatten().filter_map(|f| id(f.file_name().to_str()?)).collect();
+        ids.sort_unstable();
+        Ok(ids)
+    }
+
+    /// What is known of an object.
+    ///
+    /// # Errors
+    /// When `models_info.json` is absent or broken, [`DatasetError::UnknownObject`] when it does not list
+    /// the object, or a field is malformed.
+    pub fn info(&self, obj_id: u32) -> Result<ModelInfo, DatasetError> {
+        let file = self.info.get()?;
+        let entry = file.entry(obj_id).map_err(|e| match e {
+            DatasetError::NoEntry { file, .. } => DatasetError::UnknownObject { file, obj_id },
+            other => other,
+        })?;
+        ModelInfo::parse(&entry)
+    }
+}
+
+impl Symmetries {
+    /// As `models_info.json` has them: `symmetries_discrete` and `symmetries_continuous`, in millimeters; what there is
+    /// none of is left out.
+    pub fn to_bop(&self) -> Map<String, Value> {
+        let motion = |m: &Isometry3<f64>| {
+            let [r, t] = [
+                rotation_to_row_major(&m.rotation).to_vec(),
+                translation_to_mm(&m.translation).to_vec(),
+            ];
+            let rows = r.chunks(3).zip(&t).flat_map(|(row, t)| [row[0], row[1], row[2], *t]);
+            rows.chain([0.0, 0.0, 0.0, 1.0]).collect::<Vec<f64>>()
+        };
+        let axis = |c: &ContinuousSymmetry| json!({ "axis": c.axis.as_slice(), "offset": (c.point.coords * 1e3).as_slice() });
+        let mut fields = Map::new();
+        if !self.discrete.is_empty() {
+            fields.insert("symmetries_discrete".into(), self.discrete.iter().map(motion).collect());
+        }
+        if !self.continuous.is_empty() {
+            let axes: Vec<Value> = self.continuous.iter().map(axis).collect();
+            fields.insert("symmetries_continuous".into(), axes.into());
+        }
+        fields
+    }
+}
+
+impl ModelInfo {
+    fn parse(entry: &Entry<'_>) -> Result<Self, DatasetError> {
+        Ok(Self {
+            diameter: entry.get("diameter")?.positive()? / 1000.0,
+            symmetries: symmetries(entry)?,
+            mass: entry.find("mass_kg")?.map(|e| e.positive()).transpose()?,
+            center_of_mass: entry
+                .find("com_mm")?
+                .map(|e| Ok::<_, DatasetError>(Point3::from(e.vector()? / 1000.0)))
+                .transpose()?,
+            inertia: entry.find("inertia_kg_m2")?.map(|e| inertia(&e)).transpose()?,
+        })
+    }
+}
+
+fn inertia(entry: &Entry<'_>) -> Result<Matrix3<f64>, DatasetError> {
+    let matrix = Matrix3::from_row_slice(&entry.numbers::<9>()?);
+    if (matrix - matrix.transpose()).amax() > 1e-6 * matrix.amax() {
+        return Err(entry.error("is not symmetric"));
+    }
+    let matrix = (matrix + matrix.transpose()) * 0.5;
+    if matrix.cholesky().is_none() {
+        return Err(entry.error("is not positive definite"));
+    }
+    Ok(matrix)
+}
+
+fn symmetries(entry: &Entry<'_>) -> Result<Symmetries, DatasetError> {
+    let mut symmetries = Symmetries::default();
+    if let Some(list) = entry.find("symmetries_discrete")? {
+        for item in list.items()? {
+            symmetries.discrete.push(motion(&item)?);
+        }
+    }
+    if let Some(list) = entry.find("symmetries_continuous")? {
+        for item in list.items()? {
+            let axis = item.get("axis")?;
+            let direction = Unit::try_new(axis.vector()?, 1e-9)
+                .ok_or_else(|| axis.error("has no direction"))?;
+            let offset =
+                item.find("offset")?.map_or(Ok(Vector3::zeros()), |e| e.vector())? / 1000.0;
+            symmetries
+                .continuous
+                .push(ContinuousSymmetry { axis: direction, point: Point3::from(offset) });
+        }
+    }
+    Ok(symmetries)
+}
+
+/// A row-major 4×4 motion with its translation in millimeters.
+fn motion(entry: &Entry<'_>) -> Result<Isometry3<f64>, DatasetError> {
+    let m: [f64; 16] = entry.numbers()?;
+    if m[12..] != [0.0, 0.0, 0.0, 1.0] {
+        return Err(entry.error("the last row must be 0 0 0 1"));
+    }
+    let r = [m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]];
+    let rotation = rotation_from_row_major(&r).map_err(|e| entry.error(e))?;
+    let translation = translation_from_mm(&[m[3], m[7], m[11]]).map_err(|e| entry.error(e))?;
+    Ok(Isometry3::from_parts(translation, rotation))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn models(info: &str) -> (tempfile::TempDir, Models) {
+        let dir = tempfile::tempdir().unwrap();
+        fs::write(dir.path().join("models_info.json"), info).unwrap();
+        fs::write(dir.path().join("obj_000012.ply"), "ply").unwrap();
+        let models = Models::new(dir.path().to_path_buf());
+        (dir, models)
+    }
+
+    #[test]
+    fn reads_units_symmetries_and_optional_fields() {
+        let (_dir, models) = models(
+            r#"{"12": {"diameter": 120.5, "mass_kg": 0.5, "com_mm": [1, 2, 3],
+                "inertia_kg_m2": [[2e-3, 1e-5, 0], [1e-5, 3e-3, 0], [0, 0, 4e-3]],
+                "symmetries_discrete": [[-1, 0, 0, 7, 0, -1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]],
+                "symmetries_continuous": [{"axis": [0, 0, 2], "offset": [5, 0, 0]}]},
+              "3": {"diameter": 10}}"#,
+        );
+        let info = models.info(12).unwrap();
+        assert!((info.diameter - 0.1205).abs() < 1e-16);
+        assert_eq!(
+            (info.mass, info.center_of_mass),
+            (Some(0.5), Some(Point3::new(0.001, 0.002, 0.003)))
+        );
+        assert_eq!(info.inertia.unwrap()[(0, 1)], 1e-5);
+        assert!((info.symmetries.discrete[0].translation.vector.x - 0.007).abs() < 1e-18);
+        assert_eq!(info.symmetries.continuous[0].axis.into_inner(), Vector3::z());
+        assert_eq!(info.symmetries.continuous[0].point, Point3::new(0.005, 0.0, 0.0));
+        let plain = models.info(3).unwrap();
+        assert_eq!((plain.mass, plain.center_of_mass, plain.inertia), (None, None, None));
+        assert_eq!(plain.symmetries, Symmetries::default());
+        assert_eq!(models.object_ids().unwrap(), [12]);
+    }
+
+    #[test]
+    fn symmetries_read_back_as_written() {
+        let turn = Isometry3::new(Vector3::new(0.001, -0.02, 0.3), Vector3::new(0.2, 0.1, -3.0));
+        let axis = ContinuousSymmetry {
+            axis: Unit::new_normalize(Vector3::new(0.1, 0.2, 0.9)),
+            point: Point3::new(0.01, -0.02, 0.003),
+        };
+        let written = Symmetries { discrete: vec![turn], continuous: vec![axis] };
+        let mut info = written.to_bop();
+        info.insert("diameter".into(), 1.0.into());
+        let (_dir, models) = models(&json!({ "1": info }).to_string());
+        let read = models.info(1).unwrap().symmetries;
+        let error = read.discrete[0].to_homogeneous() - turn.to_homogeneous();
+        assert!(error.amax() < 1e-14, "{error}");
+        assert!((read.continuous[0].axis.dot(&written.continuous[0].axis) - 1.0).abs() < 1e-15);
+        assert!((read.continuous[0].point - written.continuous[0].point).norm() < 1e-15);
+        assert!(Symmetries::default().to_bop().is_empty());
+    }
+
+    #[test]
+    fn unknown_objects_and_bad_fields_are_errors() {
+        let (dir, models) = models(
+            r#"{"1": {"diameter": -1}, "2": {"diameter": 1, "mass_kg": "heavy"},
+                "3": {"diameter": 1, "inertia_kg_m2": [[1, 0, 0], [0, -1, 0], [0, 0, 1]]},
+                "4": {"diameter": 1, "inertia_kg_m2": [[1, 2, 0], [0, 1, 0], [0, 0, 1]]},
+                "5": {"diameter": 1, "symmetries_continuous": [{"axis": [0, 0, 0]}]},
+                "6": {"diameter": 1, "symmetries_discrete": [[1, 0, 0, 0, 0, 2, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]]},
+                "7": {"diameter": 1, "symmetries_discrete": [[1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 1, 1]]}}"#,
+        );
+        for (id, problem) in [
+            (1, "1.diameter: must be above zero"),
+            (2, "2.mass_kg: is not a finite number"),
+            (3, "3.inertia_kg_m2: is not positive definite"),
+            (4, "4.inertia_kg_m2: is not symmetric"),
+            (5, "5.symmetries_continuous[0].axis: has no direction"),
+            (6, "6.symmetries_discrete[0]: not orthonormal"),
+            (7, "7.symmetries_discrete[0]: the last row must be 0 0 0 1"),
+        ] {
+            let error = models.info(id).unwrap_err().to_string();
+            assert!(error.contains(problem), "{error}");
+        }
+        assert!(matches!(models.info(8), Err(DatasetError::UnknownObject { obj_id: 8, .. })));
+        let error = models.mesh_path(8).unwrap_err();
+        assert!(error.to_string().contains("obj_000008.ply: unknown object id 8"), "{error}");
+        assert_eq!(models.mesh_path(12), Ok(dir.path().join("obj_000012.ply")));
+        let none = Models::new(dir.path().join("none"));
+        assert!(matches!(none.info(12), Err(DatasetError::Missing { .. })));
+        assert!(matches!(none.object_ids(), Err(DatasetError::Missing { .. })));
+    }
+}

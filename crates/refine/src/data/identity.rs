@@ -1,0 +1,152 @@
+//! What decides the results of a run, in words that can be compared.
+
+use std::fs;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+
+use crate::data::bop::{Dataset, DatasetError};
+
+/// Facts by name. Two runs with equal facts have equal results.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Identity(Map<String, Value>);
+
+impl Identity {
+    /// The fields of a structure, or of a JSON object, as facts; and the version of this program.
+    pub fn of(facts: &impl Serialize) -> Self {
+        let mut map = match serde_json::to_value(facts) {
+            Ok(Value::Object(map)) => map,
+            Ok(other) => Map::from_iter([("value".to_owned(), other)]),
+            Err(error) => Map::from_iter([("error".to_owned(), error.to_string().into())]),
+        };
+        map.insert("program".into(), program().into());
+        Self(map)
+    }
+
+    /// The facts as JSON.
+    pub fn to_value(&self) -> Value {
+        Value::Object(self.0.clone())
+    }
+
+    /// One line for every fact that `other` has otherwise, as `name: ours | theirs`; those named in `except` may differ.
+    pub fn differences(&self, other: &Self, except: &[&str]) -> Vec<String> {
+        let mut names: Vec<&String> = self.0.keys().chain(other.0.keys()).collect();
+        names.sort_unstable();
+        names.dedup();
+        names
+            .into_iter()
+            .filter(|name| {
+                !except.contains(&name.as_str()) && self.0.get(*name) != other.0.get(*name)
+            })
+            .map(|name| {
+                let text = |map: &Map<String, Value>| match map.get(name) {
+                    None => "absent".to_owned(),
+                    Some(Value::String(text)) => text.clone(),
+                    Some(value) => value.to_string(),
+                };
+                let (ours, theirs) = excerpts(&text(&self.0), &text(&other.0));
+                format!("{name}: {ours} | {theirs}")
+            })
+            .collect()
+    }
+}
+
+/// Where two texts differ first, with some of what is before and after.
+fn excerpts(a: &str, b: &str) -> (String, String) {
+    const BEFORE: usize = 30;
+    const LENGTH: usize = 60;
+    let common = a.chars().zip(b.chars()).take_while(|(a, b)| a == b).count();
+    let excerpt = |text: &str| -> String {
+        let skipped = if text.chars().count() > LENGTH { common.saturating_sub(BEFORE) } else { 0 };
+        text.chars().skip(skipped).take(LENGTH).collect()
+    };
+    (excerpt(a), excerpt(b))
+}
+
+/// The version of this program, and a fingerprint of the very build.
+pub(crate) fn program() -> String {
+    let build = std::env::current_exe().and_then(fs::read).map(|bytes| fingerprint(&bytes));
+    let build = build.unwrap_or_else(|_| "unknown".into());
+    format!("{} {build}", env!("CARGO_PKG_VERSION"))
+}
+
+/// A fingerprint of some bytes against accidental change: FNV-1a, 64 bits.
+pub fn fingerprint(bytes: &[u8]) -> String {
+    format!("{:016x}", hash(OFFSET, bytes))
+}
+
+const OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
+
+fn hash(seed: u64, bytes: &[u8]) -> u64 {
+    bytes.iter().fold(seed, |h, &b| (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3))
+}
+
+/// The fingerprint of a file.
+///
+/// # Errors
+/// If it cannot be read.
+pub fn file_fingerprint(file: &Path) -> Result<String, DatasetError> {
+    Ok(fingerprint(&fs::read(file).map_err(|e| DatasetError::reading(file, &e))?))
+}
+
+/// What a split's JSON files say to estimators.
+pub const SENSED: [&str; 3] = ["scene_camera.json", "scene_bodies.json", "scene_tactile.json"];
+/// What they say to scorers.
+pub const TRUTH: [&str; 2] = ["scene_gt.json", "scene_bodies_gt.json"];
+
+/// A fingerprint of the files of all scenes that are called as one of `names` ([`SENSED`], [`TRUTH`]), and of the models'
+/// `models_info.json`; not of pictures and meshes, which are many.
+///
+/// # Errors
+/// If a file is there and cannot be read.
+pub fn dataset_fingerprint(dataset: &Dataset, names: &[&str]) -> Result<String, DatasetError> {
+    let scenes = dataset.scenes().flat_map(|s| names.iter().map(|name| s.dir().join(name)));
+    let models = dataset.models().dir().join("models_info.json");
+    let mut sum = OFFSET;
+    for file in scenes.chain([models]) {
+        let name = file.strip_prefix(dataset.root()).unwrap_or(&file);
+        sum = hash(sum, name.to_string_lossy().as_bytes());
+        match fs::read(&file) {
+            Ok(bytes) => sum = hash(sum, &bytes),
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+                sum = hash(sum, b"absent")
+            }
+            Err(error) => return Err(DatasetError::reading(&file, &error)),
+        }
+    }
+    Ok(format!("{sum:016x}"))
+}
+
+/// The folder of a dataset in the one way of writing it, where the system knows it.
+pub fn canonical(path: &Path) -> String {
+    fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf()).display().to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn fingerprints_are_those_of_fnv() {
+        assert_eq!(fingerprint(b""), "cbf29ce484222325");
+        assert_eq!(fingerprint(b"a"), "af63dc4c8601ec8c");
+        assert_eq!(fingerprint(b"foobar"), "85944171f73967e8");
+    }
+
+    #[test]
+    fn differences_are_named_and_long_texts_cut_to_where_they_differ() {
+        let long = |sigma: &str| format!("Config {{ {} sigma: {sigma}, tail }}", "x".repeat(200));
+        let one = Identity::of(&json!({ "seed": 1, "only": true, "config": long("0.5") }));
+        let other = Identity::of(&json!({ "seed": 2, "config": long("inf") }));
+        let said = one.differences(&other, &[]);
+        assert_eq!(said.len(), 3, "{said:?}");
+        assert!(said[0].contains("sigma: 0.5") && said[0].contains("sigma: inf"), "{}", said[0]);
+        assert!(said[0].len() < 150);
+        assert_eq!(said[1..], ["only: true | absent", "seed: 1 | 2"]);
+        assert_eq!(one.differences(&other, &["config", "only", "seed"]), [""; 0]);
+        assert_eq!(one.differences(&one, &[]), [""; 0]);
+    }
+}

@@ -1,0 +1,135 @@
+//! How long frames took: a file of its own, because no two runs take the same time.
+
+use std::collections::BTreeMap;
+use std::fs::{self, File, OpenOptions};
+use std::io::{Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+use crate::data::bop::DatasetError;
+
+const HEADER: &str = "index,frame,method,seconds\n";
+
+/// A CSV file of seconds by frame and method, appended to as frames are finished; it appears with the first of them.
+#[derive(Debug)]
+pub struct Times {
+    path: PathBuf,
+    file: Option<File>,
+    seconds: BTreeMap<(usize, String), f64>,
+}
+
+impl Times {
+    /// The file at `path`; with `keep` what it holds is kept, as far as its lines are whole, else it is removed.
+    ///
+    /// # Errors
+    /// If it cannot be read or written.
+    pub fn open(path: &Path, keep: bool) -> Result<Self, DatasetError> {
+        let fault = |e: std::io::Error| write_fault(path, &e);
+        let mut times = Self { path: path.into(), file: None, seconds: BTreeMap::new() };
+        if !path.exists() {
+            return Ok(times);
+        }
+        let text = if keep { fs::read_to_string(path).map_err(fault)? } else { String::new() };
+        let whole = text.rfind('\n').map_or(0, |end| end + 1);
+        if !text.starts_with(HEADER) {
+            fs::remove_file(path).map_err(fault)?;
+            return Ok(times);
+        }
+        let mut file = OpenOptions::new().write(true).open(path).map_err(fault)?;
+        file.set_len(whole as u64).and_then(|()| file.seek(SeekFrom::End(0))).map_err(fault)?;
+        times.file = Some(file);
+        for line in text[..whole].lines().skip(1) {
+            let fields: Vec<&str> = line.split(',').collect();
+            if let [index, _, method, time] = fields.as_slice()
+                && let (Ok(index), Ok(time)) = (index.parse(), time.parse())
+            {
+                times.seconds.insert((index, (*method).to_owned()), time);
+            }
+        }
+        Ok(times)
+    }
+
+    /// Adds what a frame took; `frame` and `method` are without commas.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn add(
+        &mut self,
+        index: usize,
+        frame: &str,
+        method: &str,
+        seconds: f64,
+    ) -> Result<(), DatasetError> {
+        let fault = |e: std::io::Error| write_fault(&self.path, &e);
+        self.seconds.insert((index, method.into()), seconds);
+        let mut line = format!("{index},{frame},{method},{seconds:.4}\n");
+        let file = match &mut self.file {
+            Some(file) => file,
+            none => {
+                line.insert_str(0, HEADER);
+                none.insert(File::create(&self.path).map_err(fault)?)
+            }
+        };
+        file.write_all(line.as_bytes()).map_err(fault)
+    }
+
+    /// What `method` took for a frame \[s\], where that is known.
+    pub fn of(&self, index: usize, method: &str) -> Option<f64> {
+        self.seconds.get(&(index, method.to_owned())).copied()
+    }
+
+    /// Mean time of a frame by method \[s\], and the number of frames.
+    pub fn means(&self) -> BTreeMap<&str, (f64, usize)> {
+        let mut means: BTreeMap<&str, (f64, usize)> = BTreeMap::new();
+        for ((_, method), seconds) in &self.seconds {
+            let (sum, count) = means.entry(method).or_default();
+            (*sum, *count) = (*sum + seconds, *count + 1);
+        }
+        means.values_mut().for_each(|(sum, count)| *sum /= *count as f64);
+        means
+    }
+}
+
+/// Joins such files into one.
+///
+/// # Errors
+/// If the new one cannot be written; files that are absent are left out.
+pub fn join_times(files: &[PathBuf], out: &Path) -> Result<(), DatasetError> {
+    let mut lines: Vec<String> = Vec::new();
+    for text in files.iter().filter_map(|file| fs::read_to_string(file).ok()) {
+        lines.extend(text.lines().skip(1).map(str::to_owned));
+    }
+    lines.sort_by_key(|line| line.split(',').next().and_then(|i| i.parse::<usize>().ok()));
+    let body: String = lines.into_iter().map(|line| line + "\n").collect();
+    crate::data::bop::write_atomically(out, format!("{HEADER}{body}").as_bytes())
+}
+
+fn write_fault(path: &Path, error: &std::io::Error) -> DatasetError {
+    DatasetError::Write { file: path.to_path_buf(), problem: error.to_string() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn survive_an_interruption() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("times.csv");
+        let mut times = Times::open(&path, false).unwrap();
+        times.add(0, "scene 1 image 0 object 5", "depth", 1.0).unwrap();
+        times.add(1, "scene 1 image 1 object 5", "depth", 2.0).unwrap();
+        times.add(1, "scene 1 image 1 object 5", "physics", 7.0).unwrap();
+        assert_eq!(times.means()["depth"], (1.5, 2));
+        drop(times);
+        let text = fs::read_to_string(&path).unwrap();
+        fs::write(&path, &text[..text.len() - 3]).unwrap();
+        let times = Times::open(&path, true).unwrap();
+        assert_eq!(times.of(1, "depth"), Some(2.0));
+        assert_eq!(times.of(1, "physics"), None);
+        drop(times);
+        let joined = dir.path().join("joined.csv");
+        join_times(&[path.clone(), dir.path().join("absent")], &joined).unwrap();
+        assert_eq!(fs::read_to_string(joined).unwrap().lines().count(), 3);
+        assert!(Times::open(&path, false).unwrap().means().is_empty());
+    }
+}

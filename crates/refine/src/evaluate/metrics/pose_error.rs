@@ -1,0 +1,127 @@
+//! Errors of a pose by itself.
+
+use nalgebra::{Isometry3, UnitQuaternion};
+
+use super::symmetry::Symmetries;
+
+/// Position error: the distance of the two model origins \[cm\].
+pub fn pe_cm(estimate: &Isometry3<f64>, truth: &Isometry3<f64>) -> f64 {
+    (estimate.translation.vector - truth.translation.vector).norm() * 100.0
+}
+
+/// Orientation error: the angle acos(2⟨q̂, q⟩² − 1) between two orientations \[deg\], evaluated as
+/// 2 atan2(|v|, |w|) of the relative quaternion, which keeps full precision at small angles.
+pub fn oe_deg(estimate: &Isometry3<f64>, truth: &Isometry3<f64>) -> f64 {
+    let q = estimate.rotation.inverse() * truth.rotation;
+    (2.0 * q.imag().norm().atan2(q.w.abs())).to_degrees()
+}
+
+/// The smallest orientation error \[deg\] over all orientations that symmetry makes equal to the truth;
+/// for an axis of revolution this is exact, not discretized.
+pub fn oe_symmetric_deg(
+    estimate: &Isometry3<f64>,
+    truth: &Isometry3<f64>,
+    symmetries: &Symmetries,
+) -> f64 {
+    let relative = estimate.rotation.inverse() * truth.rotation;
+    let mut least = f64::INFINITY;
+    for discrete in symmetries.discrete_with_identity() {
+        if symmetries.continuous.is_empty() {
+            least = least.min(angle(&(relative * discrete.rotation)));
+        }
+        for continuous in &symmetries.continuous {
+            // The truth may be turned to relative · spin · discrete; an angle does not change when factors
+            // are cycled, so the spin acts on q, and its best value leaves the swing of q about the axis.
+            let q = discrete.rotation * relative;
+            let along = q.imag().dot(&continuous.axis);
+            let swing = (q.imag() - along * continuous.axis.into_inner()).norm();
+            least = least.min(2.0 * swing.atan2(q.w.hypot(along)));
+        }
+    }
+    least.to_degrees()
+}
+
+fn angle(q: &UnitQuaternion<f64>) -> f64 {
+    2.0 * q.imag().norm().atan2(q.w.abs())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::evaluate::metrics::ContinuousSymmetry;
+    use nalgebra::{Point3, Translation3, Unit, Vector3};
+
+    fn pose(x: f64, axis_angle: [f64; 3]) -> Isometry3<f64> {
+        let rotation = UnitQuaternion::from_scaled_axis(Vector3::from(axis_angle));
+        Isometry3::from_parts(Translation3::new(x, 0.01, 0.5), rotation)
+    }
+
+    #[test]
+    fn errors_of_known_poses() {
+        let (a, b) = (pose(0.0, [0.0; 3]), pose(0.03, [0.0, 0.6, 0.0]));
+        assert!((pe_cm(&a, &b) - 3.0).abs() < 1e-12);
+        assert!((oe_deg(&a, &b) - 0.6_f64.to_degrees()).abs() < 1e-12);
+        assert!((oe_deg(&pose(0.0, [0.0, 0.0, 1e-9]), &a) - 1e-9_f64.to_degrees()).abs() < 1e-20);
+    }
+
+    #[test]
+    fn equals_the_definition_and_ignores_the_sign_of_a_quaternion() {
+        let (a, b) = (pose(0.0, [2.0, -1.0, 1.5]), pose(0.0, [-0.4, 0.3, 0.9]));
+        let dot = a.rotation.coords.dot(&b.rotation.coords);
+        let defined = (2.0 * dot * dot - 1.0).acos().to_degrees();
+        assert!((oe_deg(&a, &b) - defined).abs() < 1e-9);
+        let mut flipped = b;
+        flipped.rotation = UnitQuaternion::new_unchecked(-b.rotation.into_inner());
+        assert!((oe_deg(&a, &flipped) - defined).abs() < 1e-9);
+    }
+
+    #[test]
+    fn symmetry_never_adds_and_forgives_what_it_should() {
+        let axis = Unit::new_normalize(Vector3::new(0.2, -0.4, 1.0));
+        let spin = UnitQuaternion::from_axis_angle(&axis, 2.1);
+        let tilt =
+            UnitQuaternion::from_axis_angle(&Unit::new_normalize(axis.cross(&Vector3::x())), 0.3);
+        let truth = pose(0.0, [0.5, 1.0, -0.3]);
+        let mut estimate = truth;
+        estimate.rotation = truth.rotation * tilt * spin;
+        let mut symmetries = Symmetries::default();
+        assert!(
+            (oe_symmetric_deg(&estimate, &truth, &symmetries) - oe_deg(&estimate, &truth)).abs()
+                < 1e-12
+        );
+        symmetries.continuous.push(ContinuousSymmetry { axis, point: Point3::origin() });
+        assert!(
+            (oe_symmetric_deg(&estimate, &truth, &symmetries) - 0.3_f64.to_degrees()).abs() < 1e-9
+        );
+        // Discretized, the same comes out to within half a step.
+        let best = symmetries
+            .transforms()
+            .iter()
+            .map(|s| oe_deg(&estimate, &(truth * s)))
+            .fold(f64::INFINITY, f64::min);
+        assert!((best - 0.3_f64.to_degrees()).abs() < 0.5 && best >= 0.3_f64.to_degrees() - 1e-9);
+
+        let half_turn = Isometry3::rotation(Vector3::z() * std::f64::consts::PI);
+        let discrete = Symmetries { discrete: vec![half_turn], continuous: vec![] };
+        let turned = truth * half_turn;
+        assert!(
+            oe_deg(&turned, &truth) > 179.9 && oe_symmetric_deg(&turned, &truth, &discrete) < 1e-9
+        );
+    }
+
+    #[test]
+    fn discrete_and_continuous_symmetries_combine() {
+        let flip = Isometry3::rotation(Vector3::x() * std::f64::consts::PI);
+        let symmetries = Symmetries {
+            discrete: vec![flip],
+            continuous: vec![ContinuousSymmetry {
+                axis: Vector3::z_axis(),
+                point: Point3::origin(),
+            }],
+        };
+        let truth = pose(0.0, [0.5, 1.0, -0.3]);
+        let estimate = truth * Isometry3::rotation(Vector3::z() * 1.3) * flip;
+        assert!(oe_deg(&estimate, &truth) > 90.0);
+        assert!(oe_symmetric_deg(&estimate, &truth, &symmetries) < 1e-9);
+    }
+}

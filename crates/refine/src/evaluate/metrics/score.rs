@@ -1,0 +1,176 @@
+//! All metrics of one pose together.
+
+use nalgebra::{Isometry3, Point3};
+use serde::{Deserialize, Serialize};
+
+use super::add::{add, adi};
+use super::nearest::NearestPoint;
+use super::pose_error::{oe_deg, oe_symmetric_deg, pe_cm};
+use super::recall::Recall;
+use super::surface_distance::{mspd, mssd};
+use super::symmetry::Symmetries;
+use super::vsd::VSD_TOLERANCES;
+use crate::data::bop::Intrinsics;
+
+/// Headings of the columns of [`PoseScore::values`], with units.
+pub const COLUMNS: [&str; 13] = [
+    "PE cm",
+    "OE °",
+    "OEsym °",
+    "ADD mm",
+    "ADI mm",
+    "MSSD mm",
+    "MSPD px",
+    "CA cm²",
+    "IV cm³",
+    "|ΔCA| cm²",
+    "|ΔIV| cm³",
+    "VSD",
+    "AR",
+];
+
+/// The metrics of one pose; what was not computed is `None`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PoseScore {
+    /// Position error \[cm\].
+    pub pe_cm: Option<f64>,
+    /// Orientation error \[deg\].
+    pub oe_deg: Option<f64>,
+    /// Orientation error up to symmetry \[deg\].
+    pub oe_symmetric_deg: Option<f64>,
+    /// Average distance of corresponding points \[mm\].
+    pub add_mm: Option<f64>,
+    /// Average distance to the nearest point \[mm\].
+    pub adi_mm: Option<f64>,
+    /// Maximum surface distance up to symmetry \[mm\].
+    pub mssd_mm: Option<f64>,
+    /// Maximum projected distance up to symmetry \[px\].
+    pub mspd_px: Option<f64>,
+    /// Contact area \[cm²\].
+    pub ca_cm2: Option<f64>,
+    /// Intersection volume with the hand \[cm³\].
+    pub iv_cm3: Option<f64>,
+    /// Deviation of the contact area from that of the true pose \[cm²\].
+    pub delta_ca_cm2: Option<f64>,
+    /// Deviation of the intersection volume from that of the true pose \[cm³\].
+    pub delta_iv_cm3: Option<f64>,
+    /// Visible surface discrepancy, the mean over BOP's ten tolerances (0..=1).
+    pub vsd: Option<f64>,
+    /// Recalls of BOP's three metrics over their thresholds (0..=1).
+    pub recall: Option<Recall>,
+}
+
+impl PoseScore {
+    /// The metrics in the order of [`COLUMNS`].
+    pub fn values(&self) -> [Option<f64>; COLUMNS.len()] {
+        [
+            self.pe_cm,
+            self.oe_deg,
+            self.oe_symmetric_deg,
+            self.add_mm,
+            self.adi_mm,
+            self.mssd_mm,
+            self.mspd_px,
+            self.ca_cm2,
+            self.iv_cm3,
+            self.delta_ca_cm2,
+            self.delta_iv_cm3,
+            self.vsd,
+            self.recall.map(|r| r.average()),
+        ]
+    }
+
+    /// Adds contact area and intersection volume, and their deviations from those of the true pose.
+    pub fn with_contact(
+        mut self,
+        ca_cm2: f64,
+        iv_cm3: f64,
+        true_ca_cm2: f64,
+        true_iv_cm3: f64,
+    ) -> Self {
+        (self.ca_cm2, self.iv_cm3) = (Some(ca_cm2), Some(iv_cm3));
+        self.delta_ca_cm2 = Some((ca_cm2 - true_ca_cm2).abs());
+        self.delta_iv_cm3 = Some((iv_cm3 - true_iv_cm3).abs());
+        self
+    }
+
+    /// Adds the visible surface discrepancy, `vsd` for each of BOP's tolerances, and with it the recalls; `diameter` is the
+    /// object's \[m\], `width` the image's \[px\].
+    pub fn with_visible_surface(
+        mut self,
+        vsd: &[f64; VSD_TOLERANCES.len()],
+        diameter: f64,
+        width: usize,
+    ) -> Self {
+        self.vsd = Some(vsd.iter().sum::<f64>() / vsd.len() as f64);
+        self.recall = self
+            .mssd_mm
+            .zip(self.mspd_px)
+            .map(|(mssd, mspd)| Recall::new(vsd, 1e-3 * mssd, diameter, mspd, width));
+        self
+    }
+}
+
+/// What scoring needs to know of an object, prepared once for many poses.
+#[derive(Debug)]
+pub struct ScoredModel {
+    points: Vec<Point3<f64>>,
+    nearest: NearestPoint,
+    symmetries: Symmetries,
+    transforms: Vec<Isometry3<f64>>,
+}
+
+impl ScoredModel {
+    /// A model by its vertices \[m\], as the mesh file lists them (BOP weighs repeated vertices by their
+    /// number), and its symmetries.
+    pub fn new(points: Vec<Point3<f64>>, symmetries: Symmetries) -> Self {
+        Self {
+            nearest: NearestPoint::new(&points),
+            transforms: symmetries.transforms(),
+            points,
+            symmetries,
+        }
+    }
+
+    /// All metrics that need no hand.
+    pub fn score(
+        &self,
+        estimate: &Isometry3<f64>,
+        truth: &Isometry3<f64>,
+        camera: &Intrinsics,
+    ) -> PoseScore {
+        PoseScore {
+            pe_cm: Some(pe_cm(estimate, truth)),
+            oe_deg: Some(oe_deg(estimate, truth)),
+            oe_symmetric_deg: Some(oe_symmetric_deg(estimate, truth, &self.symmetries)),
+            add_mm: Some(1e3 * add(estimate, truth, &self.points)),
+            adi_mm: Some(1e3 * adi(estimate, truth, &self.points, &self.nearest)),
+            mssd_mm: Some(1e3 * mssd(estimate, truth, &self.points, &self.transforms)),
+            mspd_px: Some(mspd(estimate, truth, &self.points, &self.transforms, camera)),
+            ..PoseScore::default()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector3;
+
+    #[test]
+    fn units_and_order_match_the_headings() {
+        let points = vec![Point3::new(-0.05, 0.0, 0.0), Point3::new(0.05, 0.0, 0.0)];
+        let model = ScoredModel::new(points, Symmetries::default());
+        let camera = Intrinsics { fx: 500.0, fy: 500.0, cx: 0.0, cy: 0.0 };
+        let truth = Isometry3::translation(0.0, 0.0, 0.5);
+        let estimate = Isometry3::new(Vector3::new(0.0, 0.01, 0.5), Vector3::y() * 0.0);
+        let score = model.score(&estimate, &truth, &camera).with_contact(3.0, 2.0, 4.5, 0.5);
+        let score = score.with_visible_surface(&[0.24; 10], 0.11, 800);
+        // Of ten thresholds each, VSD is under six, MSSD (5.5 mm, 11 mm …) and MSPD (6.25 px, 12.5 px …) under nine.
+        let recall = (0.6 + 0.9 + 0.9) / 3.0;
+        let expected = [1.0, 0.0, 0.0, 10.0, 10.0, 10.0, 10.0, 3.0, 2.0, 1.5, 1.5, 0.24, recall];
+        for ((value, expected), name) in score.values().into_iter().zip(expected).zip(COLUMNS) {
+            assert!((value.unwrap() - expected).abs() < 1e-9, "{name}: {value:?}");
+        }
+    }
+}

@@ -1,0 +1,114 @@
+//! One page that shows a run.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use prehend_render::{ImageError, RgbImage};
+use thiserror::Error;
+
+use super::FrameReport;
+use crate::data::bop::{DatasetError, write_atomically};
+
+/// Why a report could not be written.
+#[derive(Debug, Error)]
+pub enum ReportError {
+    /// The folder cannot be made.
+    #[error("{folder}: {source}")]
+    Folder {
+        /// The folder.
+        folder: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// A picture cannot be written.
+    #[error(transparent)]
+    Picture(#[from] ImageError),
+    /// The page or a chart cannot be written.
+    #[error(transparent)]
+    Write(#[from] DatasetError),
+}
+
+/// A folder of pictures with an `index.html`.
+pub struct Report {
+    folder: PathBuf,
+    body: String,
+    count: usize,
+}
+
+impl Report {
+    /// Makes the folder.
+    ///
+    /// # Errors
+    /// If it cannot be made.
+    pub fn create(folder: &Path) -> Result<Self, ReportError> {
+        std::fs::create_dir_all(folder)
+            .map_err(|source| ReportError::Folder { folder: folder.into(), source })?;
+        Ok(Self { folder: folder.into(), body: String::new(), count: 0 })
+    }
+
+    /// Adds a refined frame.
+    ///
+    /// # Errors
+    /// If a picture cannot be written.
+    pub fn add(&mut self, title: &str, frame: &FrameReport) -> Result<(), ReportError> {
+        let name = self.picture(&frame.picture)?;
+        let curves = format!("{}.svg", name.trim_end_matches(".png"));
+        write_atomically(&self.folder.join(&curves), frame.curves.as_bytes())?;
+        let (title, caption) = (escape(title), escape(&frame.caption));
+        let _ = writeln!(
+            self.body,
+            "<section><h2>{title}</h2><p>{caption}</p><div><figure><img src=\"{name}\" alt=\"\">\
+             <figcaption><b class=before>initial</b> and <b class=after>refined</b> \
+             outline</figcaption></figure><img src=\"{curves}\" alt=\"loss curves\"></div></section>"
+        );
+        Ok(())
+    }
+
+    /// Adds a picture with remarks.
+    ///
+    /// # Errors
+    /// If the picture cannot be written.
+    pub fn add_picture(
+        &mut self,
+        title: &str,
+        picture: &RgbImage,
+        remarks: &[String],
+    ) -> Result<(), ReportError> {
+        let name = self.picture(picture)?;
+        let remarks: String = remarks.iter().map(|r| format!("<li>{}</li>", escape(r))).collect();
+        let title = escape(title);
+        let _ = writeln!(
+            self.body,
+            "<section><h2>{title}</h2><ul>{remarks}</ul><img src=\"{name}\" alt=\"\"></section>"
+        );
+        Ok(())
+    }
+
+    /// Writes the page and returns its path.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn finish(self) -> Result<PathBuf, ReportError> {
+        let page = self.folder.join("index.html");
+        let html = format!("{HEAD}{}</body></html>\n", self.body);
+        write_atomically(&page, html.as_bytes())?;
+        Ok(page)
+    }
+
+    fn picture(&mut self, picture: &RgbImage) -> Result<String, ReportError> {
+        let name = format!("{:04}.png", self.count);
+        self.count += 1;
+        picture.save(&self.folder.join(&name))?;
+        Ok(name)
+    }
+}
+
+const HEAD: &str = "<!doctype html><html lang=en><meta charset=utf-8><title>Prehend</title><style>\
+    body{font:15px/1.4 system-ui,sans-serif;margin:2em auto;max-width:1400px;color:#222}\
+    section{border-top:1px solid #ddd;padding:.5em 0}section>div{display:flex;flex-wrap:wrap;gap:1em}\
+    h2{font-size:1.1em;margin:.5em 0}figure{margin:0}img{max-width:100%}\
+    .before{color:#d33}.after{color:#2a4}li{color:#a40}</style><body><h1>Prehend</h1>\n";
+
+fn escape(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+}

@@ -1,0 +1,144 @@
+//! Overlays: the object's outline at a pose over the image.
+
+use nalgebra::Isometry3;
+use prehend_render::{RgbImage, draw_outline};
+
+use super::curves::loss_curves;
+use crate::refine::RefinedPose;
+use crate::scene::{Hand, Object, Observation};
+
+/// Outline of the initial pose.
+const BEFORE: [f32; 3] = [1.0, 0.25, 0.2];
+/// Outline of the refined pose.
+const AFTER: [f32; 3] = [0.2, 1.0, 0.35];
+/// Outline of the hand.
+const HAND: [f32; 3] = [0.35, 0.6, 1.0];
+
+/// The pictures of one refined frame.
+pub struct FrameReport {
+    /// The initial pose's outline beside the refined one's.
+    pub picture: RgbImage,
+    /// Loss curves, as SVG.
+    pub curves: String,
+    /// What to say below.
+    pub caption: String,
+}
+
+impl FrameReport {
+    /// Draws a refinement that began at `initial`.
+    pub fn draw(
+        observation: &Observation,
+        object: &Object,
+        initial: &Isometry3<f64>,
+        refined: &RefinedPose,
+    ) -> Self {
+        let iterations = refined.trace.iterations.len().saturating_sub(1);
+        let moved = refined.t_cam_object * object.center - initial * object.center;
+        let turned = refined.t_cam_object.rotation.angle_to(&initial.rotation).to_degrees();
+        Self {
+            picture: before_and_after(observation, object, initial, &refined.t_cam_object),
+            curves: loss_curves(&refined.trace),
+            caption: format!(
+                "moved {:.1} mm and {turned:.1}°; pose of iteration {} of {iterations}",
+                moved.norm() * 1e3,
+                refined.iteration
+            ),
+        }
+    }
+}
+
+/// The image around the object twice: with the outline at `before`, and with that at `after`.
+pub fn before_and_after(
+    observation: &Observation,
+    object: &Object,
+    before: &Isometry3<f64>,
+    after: &Isometry3<f64>,
+) -> RgbImage {
+    let mut left = brightened(observation);
+    let mut right = left.clone();
+    draw_outline(&mut left, &observation.camera, &object.model, before, BEFORE, 1.5);
+    draw_outline(&mut right, &observation.camera, &object.model, after, AFTER, 1.5);
+    let window = window(observation);
+    beside(&crop(&left, window), &crop(&right, window))
+}
+
+/// The whole image with the outline at `t_cam_object`, and the hand's in blue where it is known.
+pub fn outline_picture(
+    observation: &Observation,
+    object: &Object,
+    robot: Option<&Hand>,
+    t_cam_object: &Isometry3<f64>,
+) -> RgbImage {
+    let mut image = brightened(observation);
+    if let (Some(robot), Some(hand)) = (robot, &observation.hand) {
+        for (model, pose) in robot.render_bodies(&hand.t_cam_hand, &hand.joints) {
+            draw_outline(&mut image, &observation.camera, model, &pose, HAND, 1.0);
+        }
+    }
+    draw_outline(&mut image, &observation.camera, &object.model, t_cam_object, BEFORE, 1.5);
+    image
+}
+
+/// The image, brightened if it is dark, so that people see something.
+fn brightened(observation: &Observation) -> RgbImage {
+    let mut image = observation.color.clone();
+    let masked = image.pixels().iter().zip(observation.mask.pixels()).filter(|(_, m)| **m);
+    let mut values: Vec<f32> = masked.map(|(c, _)| c.iter().copied().fold(0.0, f32::max)).collect();
+    values.sort_by(f32::total_cmp);
+    let bright = values.get(values.len() * 9 / 10).copied().unwrap_or(1.0);
+    let gain = (0.9 / bright.max(0.05)).max(1.0);
+    image.pixels_mut().iter_mut().flatten().for_each(|v| *v = (*v * gain).min(1.0));
+    image
+}
+
+/// Left, top, width and height of the mask's surroundings \[px\].
+fn window(observation: &Observation) -> [usize; 4] {
+    let mask = &observation.mask;
+    let (width, height) = (mask.width(), mask.height());
+    let (mut low, mut high) = ([width, height], [0, 0]);
+    for (i, _) in mask.pixels().iter().enumerate().filter(|(_, m)| **m) {
+        let at = [i % width, i / width];
+        for k in 0..2 {
+            low[k] = low[k].min(at[k]);
+            high[k] = high[k].max(at[k] + 1);
+        }
+    }
+    if low[0] >= high[0] {
+        return [0, 0, width, height];
+    }
+    // Square and half as large again, so that the hand and a misplaced outline are in view.
+    let side = (high[0] - low[0]).max(high[1] - low[1]) * 3 / 2;
+    let begin = |k: usize, size: usize| {
+        ((low[k] + high[k]) / 2).saturating_sub(side / 2).min(size.saturating_sub(side))
+    };
+    [begin(0, width), begin(1, height), side.min(width), side.min(height)]
+}
+
+fn crop(image: &RgbImage, [left, top, width, height]: [usize; 4]) -> RgbImage {
+    let mut out = RgbImage::filled(width, height, [0.0; 3]);
+    for y in 0..height {
+        for x in 0..width {
+            if let Some(pixel) = image.get(left + x, top + y) {
+                out.pixels_mut()[y * width + x] = pixel;
+            }
+        }
+    }
+    out
+}
+
+/// Two images of one size side by side with a light gap.
+fn beside(left: &RgbImage, right: &RgbImage) -> RgbImage {
+    const GAP: usize = 6;
+    let width = left.width() + GAP + right.width();
+    let mut out = RgbImage::filled(width, left.height(), [1.0; 3]);
+    for y in 0..left.height() {
+        for x in 0..left.width() {
+            out.pixels_mut()[y * width + x] = left.pixels()[y * left.width() + x];
+        }
+        for x in 0..right.width() {
+            out.pixels_mut()[y * width + left.width() + GAP + x] =
+                right.pixels()[y * right.width() + x];
+        }
+    }
+    out
+}

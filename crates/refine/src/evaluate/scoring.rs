@@ -1,0 +1,252 @@
+//! Scoring poses of a dataset against its truth.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+use nalgebra::Isometry3;
+use prehend_geometry::robot::KinematicTree;
+use prehend_geometry::{ClosestPoints, SolidUnion, TriMesh};
+use prehend_render::{DepthImage, RenderModel, depth_map};
+
+use crate::data::bop::{Dataset, DatasetError, GroundTruth, ResultRow};
+use crate::data::{AssetError, load_mesh};
+use crate::error::RefineError;
+use crate::evaluate::metrics::{ContactModel, ScoredModel, ScoredRow, diameter, vsd};
+
+/// An evaluation model, prepared once.
+struct Model {
+    scored: ScoredModel,
+    contact: ContactModel,
+    drawn: RenderModel,
+    diameter: f64,
+}
+
+/// The hand where it truly is in one image, as one body: its parts overlap each other.
+struct TrueHand {
+    body: SolidUnion,
+    surface: ClosestPoints,
+    /// Contact of the objects where they truly are, by object and true pose: an image may show one twice.
+    truths: Vec<(u32, Isometry3<f64>, Contact)>,
+}
+
+/// How an object in some pose touches the hand.
+#[derive(Clone, Copy)]
+struct Contact {
+    area_cm2: f64,
+    volume_cm3: f64,
+}
+
+/// Scores poses of one dataset.
+pub struct Scorer<'a> {
+    truth: GroundTruth<'a>,
+    dataset: &'a Dataset,
+    trees: HashMap<PathBuf, KinematicTree>,
+    models: HashMap<u32, Model>,
+    /// Scene, image and hand of the row scored last: rows come image by image, and hands are large.
+    hand: Option<((u32, u32), Option<TrueHand>)>,
+    /// The same with the image's depth.
+    depth: Option<((u32, u32), Option<DepthImage>)>,
+}
+
+impl<'a> Scorer<'a> {
+    /// A scorer of poses on the split that `dataset` shows.
+    pub fn new(dataset: &'a Dataset) -> Self {
+        Self {
+            truth: GroundTruth::new(dataset),
+            dataset,
+            trees: HashMap::new(),
+            models: HashMap::new(),
+            hand: None,
+            depth: None,
+        }
+    }
+
+    /// Where the object of `row` truly is; among several such objects, the one nearest to the pose of `row`.
+    ///
+    /// # Errors
+    /// If a file that scoring needs is missing or broken, or the image shows no such object.
+    pub fn true_pose(&self, row: &ResultRow) -> Result<Isometry3<f64>, AssetError> {
+        Ok(self.truth.pose(row.scene_id, row.im_id, row.obj_id, &row.t_cam_model)?)
+    }
+
+    /// The score of `row`; contact metrics only where the scene says where the hand is.
+    ///
+    /// # Errors
+    /// If a file that scoring needs is missing or broken.
+    pub fn score(&mut self, row: &ResultRow) -> Result<ScoredRow, AssetError> {
+        let (scene, image) = (row.scene_id, row.im_id);
+        let truth = self.true_pose(row)?;
+        let camera = self.dataset.frame(scene, image)?.intrinsics;
+        self.prepare_model(row.obj_id)?;
+        self.prepare_hand(scene, image)?;
+        self.prepare_depth(scene, image)?;
+        let model = &self.models[&row.obj_id];
+        let mut score = model.scored.score(&row.t_cam_model, &truth, &camera);
+        if let Some((_, Some(sensed))) = &self.depth {
+            let camera = camera.camera(sensed.width(), sensed.height());
+            let draw = |pose: &Isometry3<f64>| depth_map(&camera, &[(&model.drawn, *pose)]);
+            let errors =
+                vsd(&camera, sensed, &draw(&row.t_cam_model), &draw(&truth), model.diameter);
+            score = score.with_visible_surface(&errors, model.diameter, camera.width);
+        }
+        if let Some((_, Some(hand))) = &mut self.hand {
+            let estimate = hand.contact(&model.contact, &row.t_cam_model)?;
+            let truth = hand.true_contact(row.obj_id, &model.contact, &truth)?;
+            score = score.with_contact(
+                estimate.area_cm2,
+                estimate.volume_cm3,
+                truth.area_cm2,
+                truth.volume_cm3,
+            );
+        }
+        Ok(ScoredRow { scene_id: scene, im_id: image, obj_id: row.obj_id, score })
+    }
+
+    fn prepare_model(&mut self, id: u32) -> Result<(), AssetError> {
+        if self.models.contains_key(&id) {
+            return Ok(());
+        }
+        let mesh = load_mesh(self.truth.models(), id)?;
+        let (symmetries, diameter) = match self.truth.models().info(id) {
+            Ok(info) => (info.symmetries, info.diameter),
+            Err(DatasetError::Missing { .. } | DatasetError::UnknownObject { .. }) => {
+                (Default::default(), diameter(&mesh.vertices))
+            }
+            // Without its symmetries, a symmetric object would be scored wrongly.
+            Err(broken) => return Err(broken.into()),
+        };
+        let contact = ContactModel::new(&mesh);
+        let drawn = RenderModel::new(&mesh)
+            .map_err(|e| RefineError::Object { object: format!("{id}"), reason: e.to_string() })?;
+        let scored = ScoredModel::new(mesh.vertices, symmetries);
+        self.models.insert(id, Model { scored, contact, drawn, diameter });
+        Ok(())
+    }
+
+    /// A dataset without depth, or an image of which nothing was measured, has no visible surface discrepancy.
+    fn prepare_depth(&mut self, scene: u32, image: u32) -> Result<(), AssetError> {
+        if self.depth.as_ref().is_none_or(|(of, _)| *of != (scene, image)) {
+            let depth = match self.dataset.frame(scene, image)?.depth() {
+                Ok(depth) => Some(depth),
+                Err(DatasetError::Missing { .. } | DatasetError::NoDepth { .. }) => None,
+                Err(broken) => return Err(broken.into()),
+            };
+            self.depth = Some(((scene, image), depth));
+        }
+        Ok(())
+    }
+
+    fn prepare_hand(&mut self, scene: u32, image: u32) -> Result<(), AssetError> {
+        if self.hand.as_ref().is_none_or(|(of, _)| *of != (scene, image)) {
+            self.hand = Some(((scene, image), self.true_hand(scene, image)?));
+        }
+        Ok(())
+    }
+
+    fn true_hand(&mut self, scene: u32, image: u32) -> Result<Option<TrueHand>, AssetError> {
+        if !self.truth.has_bodies(scene)? {
+            return Ok(None);
+        }
+        let bodies = self.truth.bodies(scene, image)?;
+        let [body] = bodies.bodies.as_slice() else { return Ok(None) };
+        let tree = self.tree(&body.urdf)?;
+        let poses = tree.forward_kinematics(&tree.joint_vector(&body.joints)?);
+        let parts: Vec<TriMesh> = tree
+            .links()
+            .iter()
+            .zip(poses)
+            .flat_map(|(link, t_base_link)| {
+                let pose = body.t_cam_base * t_base_link;
+                link.parts.iter().map(move |part| part.transformed(&pose))
+            })
+            .collect();
+        let body = SolidUnion::new(&parts)?;
+        let surface = ClosestPoints::new(&body.mesh())?;
+        Ok(Some(TrueHand { body, surface, truths: Vec::new() }))
+    }
+
+    /// The robot's description alone: contact is measured exactly, so no distance grid is needed.
+    fn tree(&mut self, urdf: &Path) -> Result<&KinematicTree, AssetError> {
+        if !self.trees.contains_key(urdf) {
+            self.trees.insert(urdf.to_owned(), KinematicTree::from_urdf_file(urdf)?);
+        }
+        Ok(&self.trees[urdf])
+    }
+}
+
+impl TrueHand {
+    fn contact(
+        &self,
+        model: &ContactModel,
+        t_cam_model: &Isometry3<f64>,
+    ) -> Result<Contact, AssetError> {
+        Ok(Contact {
+            area_cm2: model.contact_area_cm2(t_cam_model, &self.surface),
+            volume_cm3: model.intersection_volume_cm3(t_cam_model, &self.body)?,
+        })
+    }
+
+    fn true_contact(
+        &mut self,
+        obj_id: u32,
+        model: &ContactModel,
+        truth: &Isometry3<f64>,
+    ) -> Result<Contact, AssetError> {
+        let known = self.truths.iter().find(|(id, pose, _)| *id == obj_id && pose == truth);
+        if let Some((.., contact)) = known {
+            return Ok(*contact);
+        }
+        let contact = self.contact(model, truth)?;
+        self.truths.push((obj_id, *truth, contact));
+        Ok(contact)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+    use crate::scene::default_scene;
+    use crate::synth::write_dataset;
+
+    #[test]
+    fn caches_do_not_show_in_the_scores_and_a_broken_list_does() {
+        let dir = tempfile::tempdir().unwrap();
+        let scenes = [1, 2].map(|seed| default_scene(seed).unwrap());
+        write_dataset(dir.path(), &scenes).unwrap();
+        let dataset = Dataset::open(dir.path()).unwrap();
+        let scene_id = dataset.scenes().next().unwrap().id();
+        let images = dataset.scene(scene_id).unwrap().images().unwrap();
+        let row = |k: usize, t_cam_model| ResultRow {
+            scene_id,
+            im_id: images[k],
+            obj_id: scenes[k].obj_id,
+            score: 1.0,
+            t_cam_model,
+            time: 1.0,
+        };
+        // The same image twice, another one, and the first again.
+        let rows = [
+            row(0, scenes[0].initial),
+            row(0, scenes[0].truth),
+            row(1, scenes[1].initial),
+            row(0, scenes[0].initial),
+        ];
+        let mut scorer = Scorer::new(&dataset);
+        let json = |s: &ScoredRow| serde_json::to_string(s).unwrap();
+        for row in &rows {
+            let alone = Scorer::new(&dataset).score(row).unwrap();
+            assert_eq!(json(&scorer.score(row).unwrap()), json(&alone));
+            let (_, hand) = scorer.hand.as_ref().unwrap();
+            assert_eq!(hand.as_ref().unwrap().truths.len(), 1);
+        }
+
+        let info = GroundTruth::new(&dataset).models().dir().join("models_info.json");
+        fs::write(&info, "{").unwrap();
+        let error = Scorer::new(&dataset).score(&rows[0]).unwrap_err().to_string();
+        assert!(error.contains("models_info.json"), "{error}");
+        fs::remove_file(&info).unwrap();
+        Scorer::new(&dataset).score(&rows[0]).unwrap();
+    }
+}

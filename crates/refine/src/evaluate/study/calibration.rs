@@ -1,0 +1,369 @@
+//! How well what was believed agrees with what was so.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::belief::{EVENTS, PredictedPosterior};
+use super::bootstrap::{interval, resampled_means};
+use super::design::Design;
+use super::kind::Kind;
+use super::record::FrameRecord;
+use crate::evaluate::metrics::{
+    Bin, Prediction, area_under_roc, area_under_roc_error, brier_score, calibration_error,
+    calibration_error_by_chance, chi_square_cdf, equal_count_bins,
+};
+
+/// Bins of equal counts that calibration errors are made of.
+pub(super) const BINS: usize = 10;
+
+/// Nominal probabilities of the ellipsoids.
+const NOMINAL: [f64; 3] = [0.5, 0.9, 0.95];
+
+/// Of what ellipsoids are, with their degrees of freedom, in the order of [`PredictedPosterior::squared`].
+pub(super) const ELLIPSOIDS: [(&str, u32); 3] = [("pose", 6), ("place", 3), ("orientation", 3)];
+
+/// Seeds of the resampling and of chance.
+const SEED: u64 = 3;
+
+/// The calibration of one method.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Calibration {
+    /// Level of noise; `None` for all together.
+    pub level: Option<String>,
+    /// The method.
+    pub method: String,
+    /// Poses of which something was believed.
+    pub n: usize,
+    /// Root mean squares of what the center is off \[mm\] and of the angle \[°\], and Cramér and Rao's bounds on them.
+    pub errors: [RootMeanSquare; 2],
+    /// How often the truth is within the posterior's ellipsoids.
+    pub coverage: Vec<Coverage>,
+    /// Predicted probabilities, by event.
+    pub events: Vec<EventCalibration>,
+    /// Poses that are not within 5 mm and 5°.
+    pub failures: usize,
+    /// Area under the receiver operating characteristic of failures, ranked by the predicted probability of being within 5 mm
+    /// and 5°; nothing without failures, or with nothing else.
+    pub auroc: Option<f64>,
+    /// Its confidence interval, 95 %.
+    pub auroc_interval: Option<[f64; 2]>,
+}
+
+/// A root mean square over poses, beside what information allows.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct RootMeanSquare {
+    /// Of what, with its unit.
+    pub of: &'static str,
+    /// As found.
+    pub found: f64,
+    /// The median of what was squared.
+    pub median: f64,
+    /// Cramér and Rao's bound, averaged in the same way.
+    pub bound: f64,
+}
+
+impl RootMeanSquare {
+    fn new(of: &'static str, found: Vec<f64>, bounds: &[f64]) -> Self {
+        let root = |of: &[f64]| (of.iter().map(|v| v * v).sum::<f64>() / of.len() as f64).sqrt();
+        let (bound, mut sorted) = (root(bounds), found);
+        sorted.sort_by(f64::total_cmp);
+        Self { of, found: root(&sorted), median: sorted[sorted.len() / 2], bound }
+    }
+}
+
+/// How often the truth is within ellipsoids that should hold it with some probability.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Coverage {
+    /// Of what: pose, place or orientation.
+    pub of: &'static str,
+    /// Probability that it should be.
+    pub nominal: f64,
+    /// Share of the poses where it is.
+    pub share: f64,
+    /// Confidence interval of the share, 95 %.
+    pub interval: Option<[f64; 2]>,
+}
+
+/// Predicted probabilities of one event.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct EventCalibration {
+    /// The event.
+    pub event: &'static str,
+    /// Mean predicted probability.
+    pub predicted: f64,
+    /// Share of the poses where it came about.
+    pub share: f64,
+    /// Expected calibration error over ten bins of equal counts.
+    pub calibration_error: f64,
+    /// What the calibration error would be on average if the probabilities were right.
+    pub by_chance: f64,
+    /// Mean squared error of the probabilities.
+    pub brier: f64,
+    /// The bins.
+    pub bins: Vec<Bin>,
+}
+
+/// Calibrations by level and method, and where there are several levels, of all together.
+pub(super) fn calibrations(
+    design: &Design,
+    records: &BTreeMap<usize, FrameRecord>,
+) -> Vec<Calibration> {
+    if design.study != Kind::Posterior {
+        return Vec::new();
+    }
+    let mut levels: Vec<Option<&str>> =
+        design.levels.iter().map(|l| Some(l.name.as_str())).collect();
+    if levels.len() > 1 {
+        levels.push(None);
+    }
+    let each = levels.iter().flat_map(|level| design.methods.iter().map(move |m| (*level, m)));
+    each.filter_map(|(level, method)| Calibration::new(level, &method.name, records)).collect()
+}
+
+/// What `method` believed at a level, or at all.
+pub(super) fn beliefs<'a>(
+    records: &'a BTreeMap<usize, FrameRecord>,
+    level: Option<&str>,
+    method: &str,
+) -> Vec<&'a PredictedPosterior> {
+    let of_level = records.values().filter(|r| level.is_none_or(|level| r.level == level));
+    of_level.filter_map(|r| r.outcome(method)?.belief.as_ref()).collect()
+}
+
+/// The smallest probabilities of ellipsoids that hold the truth, sorted: uniform if the posterior is right. What has no covariance
+/// has none that does.
+pub(super) fn holding(beliefs: &[&PredictedPosterior], of: usize) -> Vec<f64> {
+    let degrees = ELLIPSOIDS[of].1;
+    let mut found: Vec<f64> = beliefs
+        .iter()
+        .map(|b| b.squared[of].map_or(f64::INFINITY, |s| chi_square_cdf(s, degrees)))
+        .collect();
+    found.sort_by(f64::total_cmp);
+    found
+}
+
+impl Calibration {
+    /// `None` if nothing was believed.
+    fn new(
+        level: Option<&str>,
+        method: &str,
+        records: &BTreeMap<usize, FrameRecord>,
+    ) -> Option<Self> {
+        let beliefs = beliefs(records, level, method);
+        let n = beliefs.len();
+        let mut events = Vec::new();
+        for (k, event) in EVENTS.iter().enumerate() {
+            let predictions: Vec<Prediction> =
+                beliefs.iter().map(|b| (b.within[k], b.came(event))).collect();
+            events.push(EventCalibration {
+                event: event.name,
+                predicted: predictions.iter().map(|p| p.0).sum::<f64>() / n as f64,
+                share: predictions.iter().filter(|p| p.1).count() as f64 / n as f64,
+                calibration_error: calibration_error(&predictions, BINS)?,
+                by_chance: calibration_error_by_chance(&predictions, BINS, SEED)?,
+                brier: brier_score(&predictions)?,
+                bins: equal_count_bins(&predictions, BINS),
+            });
+        }
+        let (last, within) = (EVENTS.len() - 1, &EVENTS[EVENTS.len() - 1]);
+        let failing: Vec<Prediction> =
+            beliefs.iter().map(|b| (1.0 - b.within[last], !b.came(within))).collect();
+        let failures = failing.iter().filter(|f| f.1).count();
+        let auroc = area_under_roc(&failing);
+        Some(Self {
+            level: level.map(str::to_owned),
+            method: method.into(),
+            n,
+            errors: [
+                RootMeanSquare::new(
+                    "place mm",
+                    beliefs.iter().map(|b| b.distance_mm).collect(),
+                    &beliefs.iter().map(|b| b.bounds[0]).collect::<Vec<_>>(),
+                ),
+                RootMeanSquare::new(
+                    "orientation °",
+                    beliefs.iter().map(|b| b.angle_deg).collect(),
+                    &beliefs.iter().map(|b| b.bounds[1]).collect::<Vec<_>>(),
+                ),
+            ],
+            coverage: coverage(&beliefs),
+            events,
+            failures,
+            auroc,
+            auroc_interval: auroc.map(|area| {
+                let half = 1.96 * area_under_roc_error(area, failures, n - failures);
+                [(area - half).max(0.0), (area + half).min(1.0)]
+            }),
+        })
+    }
+
+    /// How headings name it.
+    pub(super) fn label(&self) -> String {
+        let level =
+            self.level.as_ref().map_or("all noise".into(), |level| format!("Noise {level}"));
+        format!("{level}, {}", self.method)
+    }
+}
+
+fn coverage(beliefs: &[&PredictedPosterior]) -> Vec<Coverage> {
+    let each = || (0..ELLIPSOIDS.len()).flat_map(|of| NOMINAL.map(|nominal| (of, nominal)));
+    let column = |(of, nominal): (usize, f64)| -> Vec<Option<f64>> {
+        let probability = |b: &&PredictedPosterior| {
+            b.squared[of].map_or(f64::INFINITY, |s| chi_square_cdf(s, ELLIPSOIDS[of].1))
+        };
+        beliefs.iter().map(|b| Some(f64::from(u8::from(probability(b) <= nominal)))).collect()
+    };
+    let columns: Vec<Vec<Option<f64>>> = each().map(column).collect();
+    let means = resampled_means(&columns, SEED);
+    each()
+        .zip(columns.iter().zip(&means))
+        .map(|((of, nominal), (column, means))| Coverage {
+            of: ELLIPSOIDS[of].0,
+            nominal,
+            share: column.iter().flatten().sum::<f64>() / column.len() as f64,
+            interval: interval(means),
+        })
+        .collect()
+}
+
+/// All numbers as CSV, one a line.
+pub(super) fn csv(calibrations: &[Calibration]) -> Result<Vec<u8>, ::csv::Error> {
+    let mut out = ::csv::Writer::from_writer(Vec::new());
+    out.write_record(["level", "method", "n", "what", "of", "value", "low", "high"])?;
+    for c in calibrations {
+        let mut line = |what: &str, of: &str, value: f64, interval: Option<[f64; 2]>| {
+            let end = |k: usize| interval.map_or_else(String::new, |i| i[k].to_string());
+            out.write_record([
+                c.level.as_deref().unwrap_or(""),
+                &c.method,
+                &c.n.to_string(),
+                what,
+                of,
+                &value.to_string(),
+                &end(0),
+                &end(1),
+            ])
+        };
+        for error in &c.errors {
+            line("root mean square", error.of, error.found, None)?;
+            line("median", error.of, error.median, None)?;
+            line("bound", error.of, error.bound, None)?;
+        }
+        for part in &c.coverage {
+            let what = format!("coverage of {} %", 100.0 * part.nominal);
+            line(&what, part.of, part.share, part.interval)?;
+        }
+        for event in &c.events {
+            line("predicted", event.event, event.predicted, None)?;
+            line("share", event.event, event.share, None)?;
+            line("calibration error", event.event, event.calibration_error, None)?;
+            line("calibration error by chance", event.event, event.by_chance, None)?;
+            line("brier", event.event, event.brier, None)?;
+        }
+        line("failures", "", c.failures as f64, None)?;
+        if let Some(auroc) = c.auroc {
+            line("auroc", "failures", auroc, c.auroc_interval)?;
+        }
+    }
+    out.into_inner().map_err(|e| e.into_error().into())
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::super::design::MethodSettings;
+    use super::super::tables::tests::example;
+    use super::*;
+    use prehend_geometry::SplitMix64;
+
+    /// A study whose method is as sure as it should be: two levels of `n` frames each.
+    pub(in super::super) fn calibrated(n: usize) -> (Design, BTreeMap<usize, FrameRecord>) {
+        let (mut design, records) = example();
+        design.study = Kind::Posterior;
+        design.methods = vec![MethodSettings { name: "combined".into(), settings: String::new() }];
+        let mut random = SplitMix64::new(1);
+        let mut made = BTreeMap::new();
+        for index in 0..2 * n {
+            let mut record = records[&(3 * (index / n))].clone();
+            record.outcomes.retain(|o| o.row != "icp");
+            let draw: Vec<f64> = (0..6).map(|_| random.normal().powi(2)).collect();
+            let [place, turn] = [0, 3].map(|k| draw[k..k + 3].iter().sum::<f64>());
+            let (probability, fate) = (random.uniform(), random.uniform());
+            let off = if fate < probability { 0.5 } else { 20.0 };
+            record.outcomes[2].belief = Some(PredictedPosterior {
+                distance_mm: off,
+                angle_deg: off,
+                bounds: [1.0, 2.0],
+                squared: [Some(place + turn), Some(place), Some(turn)],
+                within: [probability; EVENTS.len()],
+                hypotheses: 1,
+                weight: 1.0,
+                unobserved: 0,
+                disagreements: Vec::new(),
+                ending: "converged".into(),
+            });
+            made.insert(index, record);
+        }
+        (design, made)
+    }
+
+    #[test]
+    fn a_right_posterior_is_called_right() {
+        let (design, records) = calibrated(1000);
+        let found = calibrations(&design, &records);
+        let levels: Vec<Option<&str>> = found.iter().map(|c| c.level.as_deref()).collect();
+        assert_eq!(levels, [Some("low"), Some("high"), None]);
+        let all = &found[2];
+        assert_eq!(all.n, 2000);
+        assert_eq!(all.coverage.len(), 9);
+        assert_eq!(all.errors.map(|e| e.bound), [1.0, 2.0]);
+        let of_failures = all.failures as f64 / 2000.0;
+        let expected = (400.0 * of_failures + 0.25 * (1.0 - of_failures)).sqrt();
+        assert!((all.errors[0].found - expected).abs() < 1e-9);
+        for part in &all.coverage {
+            // Three standard errors of a share of 2000.
+            let error = 3.0 * (part.nominal * (1.0 - part.nominal) / 2000.0).sqrt();
+            assert!((part.share - part.nominal).abs() < error, "{part:?}");
+            let [low, high] = part.interval.unwrap();
+            assert!(low < part.share && part.share < high);
+        }
+        for event in &all.events {
+            assert!(event.calibration_error < 2.0 * event.by_chance, "{event:?}");
+            assert!((event.predicted - event.share).abs() < 0.03 && event.bins.len() == BINS);
+            // Of uniform probabilities, p (1 − p) is a sixth.
+            assert!((event.brier - 1.0 / 6.0).abs() < 0.02);
+        }
+        // Failures of probability 1 − p, ranked by p: the area is 5/6.
+        assert!((all.auroc.unwrap() - 5.0 / 6.0).abs() < 0.03, "{:?}", all.auroc);
+        assert!(all.failures > 900 && all.failures < 1100);
+    }
+
+    #[test]
+    fn too_sure_is_seen_and_a_singular_covariance_covers_nothing() {
+        let (design, mut records) = calibrated(200);
+        for record in records.values_mut() {
+            let belief = record.outcomes[2].belief.as_mut().unwrap();
+            belief.squared = [belief.squared[0].map(|s| 4.0 * s), None, belief.squared[2]];
+            belief.within = [1.0; EVENTS.len()];
+        }
+        let found = calibrations(&design, &records);
+        let coverage = &found[2].coverage;
+        assert!(coverage[1].share < 0.5, "{:?}", coverage[1]);
+        assert!(coverage[3..6].iter().all(|c| c.share == 0.0));
+        let event = &found[2].events[0];
+        assert!(event.calibration_error > 0.4 && event.by_chance == 0.0);
+        assert_eq!(found[2].auroc, Some(0.5));
+        let text = String::from_utf8(csv(&found).unwrap()).unwrap();
+        assert_eq!(text.lines().count(), 1 + 3 * (6 + 9 + 7 * 5 + 2));
+        assert!(text.contains("\n,combined,400,auroc,failures,0.5,"), "{text}");
+        assert!(text.contains("\nlow,combined,200,coverage of 95 %,place,0,0,0\n"), "{text}");
+    }
+
+    #[test]
+    fn without_beliefs_there_is_no_calibration() {
+        let (mut design, records) = example();
+        assert!(calibrations(&design, &records).is_empty());
+        design.study = Kind::Posterior;
+        assert!(calibrations(&design, &records).is_empty());
+    }
+}

@@ -1,0 +1,147 @@
+//! The studies: the paper's four, and those that measure the fused estimator.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+use crate::method::Method;
+
+/// Which study.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kind {
+    /// Baselines, the combined method and the fused estimator.
+    Main,
+    /// Each gradient alone and all together.
+    Gradients,
+    /// Robust ICP, the combined method and the fused estimator at several levels of noise.
+    Noise,
+    /// The combined method, free to move, after more and more steps.
+    Steps,
+    /// The fused estimator with less evidence, and with less estimated.
+    Evidence,
+    /// Whether the fused estimator's posterior is right.
+    Posterior,
+    /// What faults of the observation do.
+    Robustness,
+}
+
+/// The true pose, as a row of a table.
+pub(super) const TRUTH: &str = "truth";
+/// The initial pose, as a row of a table.
+pub(super) const INITIAL: &str = "initial";
+
+impl Kind {
+    /// All studies.
+    pub const ALL: [Self; 7] = [
+        Self::Main,
+        Self::Gradients,
+        Self::Noise,
+        Self::Steps,
+        Self::Evidence,
+        Self::Posterior,
+        Self::Robustness,
+    ];
+
+    /// Its name in commands and files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Main => "main",
+            Self::Gradients => "gradients",
+            Self::Noise => "noise",
+            Self::Steps => "steps",
+            Self::Evidence => "evidence",
+            Self::Posterior => "confidence",
+            Self::Robustness => "robustness",
+        }
+    }
+
+    /// What it shows, as a heading.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Main => "Main study: baselines, the combined method and the fused estimator",
+            Self::Gradients => "Gradients study: each kind of evidence alone, and all together",
+            Self::Noise => "Noise study: the same at several levels of noise",
+            Self::Steps => "Steps study: no regularization, no checkpoint, all iterations",
+            Self::Evidence => "Evidence study: fused with less evidence, and with less estimated",
+            Self::Posterior => "Confidence study: the fused estimator's posterior beside the truth",
+            Self::Robustness => "Robustness study: what faults of the observation do",
+        }
+    }
+
+    /// The methods compared unless others are asked for, by name and in the order of the paper's table.
+    pub fn methods(self) -> Vec<&'static str> {
+        match self {
+            Self::Main => vec!["icp", "icp-best", "robust-icp", "combined", "fused"],
+            Self::Gradients => vec![
+                "depth",
+                "tactile",
+                "rendering",
+                "physics",
+                "physics-best",
+                "robust-icp",
+                "combined",
+            ],
+            Self::Noise => vec!["robust-icp", "combined", "fused"],
+            Self::Steps => vec!["combined-free"],
+            Self::Evidence => {
+                ["fused"].into_iter().chain(Method::ablations().iter().map(|m| m.name)).collect()
+            }
+            Self::Posterior => vec!["fused"],
+            Self::Robustness => vec!["robust-icp", "fused"],
+        }
+    }
+
+    /// The method that the others are compared with, frame by frame.
+    pub fn reference(self) -> Option<&'static str> {
+        match self {
+            Self::Steps => None,
+            Self::Evidence => Some("fused"),
+            _ => Some("robust-icp"),
+        }
+    }
+
+    /// The levels of noise that the paper has in this table, or that the study takes if it is not the paper's.
+    pub fn levels(self) -> &'static [&'static str] {
+        match self {
+            Self::Gradients | Self::Evidence | Self::Robustness => &["low"],
+            Self::Main | Self::Noise | Self::Steps | Self::Posterior => &["low", "high"],
+        }
+    }
+
+    /// The iterations at which poses are compared if the last one is `iterations`; the paper's 100, 200, 400, 600 and
+    /// 1000 for 1000.
+    pub(super) fn steps(iterations: usize) -> Vec<usize> {
+        let mut steps: Vec<usize> =
+            [1, 2, 4, 6, 10].iter().map(|tenths| iterations * tenths / 10).collect();
+        steps.retain(|&step| step > 0);
+        steps.dedup();
+        steps
+    }
+}
+
+impl fmt::Display for Kind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn all_methods_exist() {
+        for kind in Kind::ALL {
+            for name in kind.methods().into_iter().chain(kind.reference()) {
+                assert!(Method::named(name).is_some(), "{name}");
+            }
+        }
+    }
+
+    #[test]
+    fn steps_are_those_of_the_paper() {
+        assert_eq!(Kind::steps(1000), [100, 200, 400, 600, 1000]);
+        assert_eq!(Kind::steps(5), [1, 2, 3, 5]);
+    }
+}

@@ -1,0 +1,103 @@
+//! Shards of a study put together.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use thiserror::Error;
+
+use super::design::{Design, Shard};
+use super::output::RECORDS;
+use super::record::FrameRecord;
+use crate::data::Identity;
+use crate::data::{Journal, JournalError};
+
+/// Why shards do not make a study.
+#[derive(Debug, Error)]
+pub enum MergeError {
+    /// The records of a shard cannot be read.
+    #[error(transparent)]
+    Journal(#[from] JournalError),
+    /// The file is no record of a study.
+    #[error("{}: not the records of a study", file.display())]
+    NotAStudy {
+        /// The file.
+        file: PathBuf,
+    },
+    /// Two shards are of different studies.
+    #[error(
+        "{} and {} are of different studies:\n  {}",
+        first.display(), other.display(), differences.join("\n  ")
+    )]
+    Different {
+        /// The first shard.
+        first: PathBuf,
+        /// The one that differs.
+        other: PathBuf,
+        /// What differs, a line each.
+        differences: Vec<String>,
+    },
+    /// Frames are missing.
+    #[error("{missing} of {frames} frames are in none of the shards, the first is frame {first} ({})", shards.join(", "))]
+    Incomplete {
+        /// How many are missing.
+        missing: usize,
+        /// How many there are.
+        frames: usize,
+        /// The first missing one.
+        first: usize,
+        /// The shards that are there.
+        shards: Vec<String>,
+    },
+    /// There is nothing to merge.
+    #[error("no shards were given")]
+    Nothing,
+}
+
+/// Facts in which shards of one study may differ: where they ran, and which part they are.
+const FREE: [&str; 2] = ["dataset", "shard"];
+
+/// The whole study that shards in `folders` make: its design and its records.
+///
+/// # Errors
+/// If a folder holds no records, or they are of different studies, or frames are missing.
+pub fn merge(folders: &[PathBuf]) -> Result<(Design, BTreeMap<usize, FrameRecord>), MergeError> {
+    let mut first: Option<(PathBuf, Identity, Design)> = None;
+    let mut records: BTreeMap<usize, FrameRecord> = BTreeMap::new();
+    let mut shards = Vec::new();
+    for folder in folders {
+        let file = folder.join(RECORDS);
+        let (identity, found) = Journal::read::<FrameRecord>(&file)?;
+        let design = design(&file, &identity)?;
+        shards.push(format!("{}: {}", folder.display(), design.shard));
+        for (index, record) in found {
+            // Of two attempts at a frame, the one that succeeded.
+            if records.get(&index).is_none_or(FrameRecord::failed) {
+                records.insert(index, record);
+            }
+        }
+        if let Some((one, known, _)) = &first {
+            let differences = known.differences(&identity, &FREE);
+            if !differences.is_empty() {
+                let (first, other) = (one.clone(), file);
+                return Err(MergeError::Different { first, other, differences });
+            }
+        } else {
+            first = Some((file, identity, design));
+        }
+    }
+    let (.., mut design) = first.ok_or(MergeError::Nothing)?;
+    design.shard = Shard::WHOLE;
+    let frames = design.frames();
+    let missing: Vec<usize> = (0..frames).filter(|index| !records.contains_key(index)).collect();
+    match missing.first() {
+        Some(&first) => {
+            Err(MergeError::Incomplete { missing: missing.len(), frames, first, shards })
+        }
+        None => Ok((design, records)),
+    }
+}
+
+fn design(file: &Path, identity: &Identity) -> Result<Design, MergeError> {
+    serde_json::from_value(identity.to_value())
+        .map_err(|_| MergeError::NotAStudy { file: file.to_path_buf() })
+}

@@ -1,0 +1,166 @@
+//! Errors over the amount of a fault.
+
+use plotters::prelude::*;
+
+use super::super::design::{Design, perturbed};
+use super::super::sweep::Sweep;
+use super::super::tables::{Block, Estimate, Tables};
+use super::{Area, Drawn, color, legend, page, swatch, tick};
+use crate::evaluate::metrics::COLUMNS;
+
+/// Panels: a metric, and whether its median is drawn instead of its mean.
+const PANELS: [(usize, bool); 4] = [(0, false), (1, false), (0, true), (1, true)];
+
+/// A point of a curve: amount, value, and the ends of the mean's interval.
+type Point = (f64, f64, [f64; 2]);
+
+pub(super) fn draw(
+    design: &Design,
+    tables: &Tables,
+    block: &Block,
+    sweep: Sweep,
+) -> Result<String, String> {
+    let title = format!("{}, noise {}: {sweep}", tables.study.title(), block.level);
+    let amounts = sweep.amounts();
+    let rows = |method: &str| amounts.iter().map(|&a| perturbed(method, sweep, a)).collect();
+    let methods: Vec<(&str, Vec<String>)> =
+        design.methods.iter().map(|m| (m.name.as_str(), rows(&m.name))).collect();
+    let mut legend = format!(
+        "means of {} frames with 95 % confidence above, medians below, dotted: initial pose",
+        block.frames
+    );
+    // A plot must not look complete when it is not.
+    for (method, rows) in &methods {
+        let lacks = |(row, amount): (&String, &f64)| {
+            let line = block.lines.iter().find(|l| l.row == *row)?;
+            let lacking = block.frames - line.n;
+            (lacking > 0).then(|| format!("{lacking} at {}", tick(*amount)))
+        };
+        let lacking: Vec<String> = rows.iter().zip(amounts).filter_map(lacks).collect();
+        if !lacking.is_empty() {
+            legend += &format!("; {method} failed: {}", lacking.join(", "));
+        }
+    }
+    page(&title, &legend, 340, |k, area| {
+        let (metric, median) = PANELS[k];
+        let of = |row: &str| -> Option<Estimate> {
+            block.lines.iter().find(|l| l.row == row)?.metrics[metric]
+        };
+        let point = |(&amount, row): (&f64, &String)| -> Option<Point> {
+            let e = of(row)?;
+            let value = if median { e.median } else { e.mean };
+            let interval = e.interval.filter(|_| !median);
+            Some((amount, value, interval.unwrap_or([value; 2])))
+        };
+        let curves: Vec<(&str, Vec<Point>)> = methods
+            .iter()
+            .map(|(name, rows)| (*name, amounts.iter().zip(rows).filter_map(point).collect()))
+            .collect();
+        let initial = of("initial").map(|e| if median { e.median } else { e.mean });
+        panel(area, sweep, PANELS[k], &curves, initial, k == 0)
+    })
+}
+
+fn panel(
+    area: &Area<'_>,
+    sweep: Sweep,
+    (metric, median): (usize, bool),
+    curves: &[(&str, Vec<Point>)],
+    initial: Option<f64>,
+    named: bool,
+) -> Drawn {
+    let values = curves.iter().flat_map(|(_, points)| points.iter().map(|p| p.2[1]));
+    let top = values.chain(initial).fold(0.0, f64::max);
+    let top = if top > 0.0 { 1.08 * top } else { 1.0 };
+    let amounts = sweep.amounts();
+    let (left, right) = amounts
+        .iter()
+        .fold((f64::INFINITY, 0.0_f64), |(low, high), &amount| (low.min(amount), high.max(amount)));
+    let margin = 0.02 * (right - left);
+    let mut chart = ChartBuilder::on(area)
+        .margin(8)
+        .margin_right(24)
+        .x_label_area_size(44)
+        .y_label_area_size(64)
+        .build_cartesian_2d(left - margin..right + margin, 0.0..top)?;
+    let what = if median { "median" } else { "mean" };
+    chart
+        .configure_mesh()
+        .light_line_style(WHITE)
+        .x_labels(8)
+        .y_labels(6)
+        .x_label_formatter(&|x| tick(*x))
+        .y_label_formatter(&|y| tick(*y))
+        .label_style(("sans-serif", 14))
+        .x_desc(sweep.axis())
+        .y_desc(format!("{what} {}", COLUMNS[metric]))
+        .draw()?;
+    if let Some(initial) = initial {
+        let level = [(left, initial), (right, initial)];
+        chart.draw_series(DashedLineSeries::new(level, 2, 4, BLACK.mix(0.6).stroke_width(1)))?;
+    }
+    for (k, (name, points)) in curves.iter().enumerate() {
+        let style = color(k + 1).stroke_width(2);
+        let line = points.iter().map(|&(x, y, _)| (x, y));
+        let series = chart.draw_series(LineSeries::new(line, style).point_size(3))?;
+        if named {
+            series.label(*name).legend(move |at| swatch(at, style));
+        }
+        chart.draw_series(
+            points
+                .iter()
+                .map(|&(x, _, [low, high])| PathElement::new([(x, low), (x, high)], style)),
+        )?;
+    }
+    if named {
+        legend(&mut chart, SeriesLabelPosition::UpperMiddle)?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::kind::Kind;
+    use super::super::super::record::RowOutcome;
+    use super::super::super::tables::tests::example;
+    use super::super::plots;
+    use super::*;
+
+    #[test]
+    fn every_sweep_has_a_plot_that_says_what_failed() {
+        let (mut design, mut records) = example();
+        design.study = Kind::Robustness;
+        design.sweeps = vec![Sweep::Visibility, Sweep::MissingDepth];
+        let trials = design.trials();
+        for record in records.values_mut() {
+            let made = trials.iter().map(|trial| {
+                let like = if trial.method == "icp" { "icp" } else { "combined" };
+                let known = record.outcome(like).unwrap();
+                RowOutcome { row: trial.rows[0].clone(), ..known.clone() }
+            });
+            let made: Vec<RowOutcome> = made.collect();
+            record.outcomes.truncate(2);
+            record.outcomes.extend(made);
+        }
+        let tables = Tables::new(&design, &records);
+        let drawn = plots(&design, &tables, &records);
+        let names: Vec<&str> = drawn.iter().map(|(name, _)| name.as_str()).collect();
+        assert_eq!(
+            names,
+            [
+                "visibility-low.svg",
+                "missing-depth-low.svg",
+                "visibility-high.svg",
+                "missing-depth-high.svg"
+            ]
+        );
+        for (name, svg) in &drawn {
+            let svg = svg.as_ref().unwrap();
+            for word in ["combined", "icp", "mean PE cm", "median OE °"] {
+                assert!(svg.contains(word), "{name}: {word}");
+            }
+            assert_eq!(svg.contains("icp failed: 2 at"), name.contains("low"), "{name}");
+            assert!(!svg.contains("NaN"));
+        }
+    }
+}

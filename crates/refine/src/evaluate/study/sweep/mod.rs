@@ -1,0 +1,239 @@
+//! What can be wrong with an observation, by kind and amount: the faults of the robustness study.
+
+mod hand;
+mod missing;
+mod noise;
+mod occlusion;
+mod touch;
+
+use std::fmt;
+use std::str::FromStr;
+
+use prehend_geometry::SplitMix64;
+use serde::{Deserialize, Serialize};
+
+use crate::data::bop::ResultRow;
+use crate::scene::Observation;
+
+/// A kind of fault that is swept from none to much.
+///
+/// Faults come on top of what is already wrong with an observation. A frame's fault is the same for every method, and of a
+/// greater amount it is the same one, only more of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Sweep {
+    /// Depth noise, as a multiple of a realistic sensor's.
+    DepthNoise,
+    /// Color noise, as a multiple of a realistic sensor's.
+    ColorNoise,
+    /// How much of the object is still to be seen beside a block in front of it \[%\].
+    Visibility,
+    /// The hand is elsewhere than is said \[mm\].
+    HandPosition,
+    /// The hand is turned about its base otherwise than is said \[°\].
+    HandRotation,
+    /// All joints are off, either way \[°\].
+    Joints,
+    /// Share of the taxels that feel nothing \[%\].
+    DeadTaxels,
+    /// Share of the taxels that feel what is not there \[%\].
+    FalseTaxels,
+    /// Share of the image without depth, in patches \[%\].
+    MissingDepth,
+    /// Share of the image that is gray, in patches \[%\].
+    MissingColor,
+    /// Whether there is no touch: 100 %, or 0.
+    MissingTouch,
+    /// Whether nothing is known of the hand, touch included: 100 %, or 0.
+    MissingHand,
+}
+
+impl Sweep {
+    /// All kinds.
+    pub const ALL: [Self; 12] = [
+        Self::DepthNoise,
+        Self::ColorNoise,
+        Self::Visibility,
+        Self::HandPosition,
+        Self::HandRotation,
+        Self::Joints,
+        Self::DeadTaxels,
+        Self::FalseTaxels,
+        Self::MissingDepth,
+        Self::MissingColor,
+        Self::MissingTouch,
+        Self::MissingHand,
+    ];
+
+    /// Its name in commands, tables and files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::DepthNoise => "depth-noise",
+            Self::ColorNoise => "color-noise",
+            Self::Visibility => "visibility",
+            Self::HandPosition => "hand-position",
+            Self::HandRotation => "hand-rotation",
+            Self::Joints => "joints",
+            Self::DeadTaxels => "dead-taxels",
+            Self::FalseTaxels => "false-taxels",
+            Self::MissingDepth => "missing-depth",
+            Self::MissingColor => "missing-color",
+            Self::MissingTouch => "missing-touch",
+            Self::MissingHand => "missing-hand",
+        }
+    }
+
+    /// What the amounts are, with their unit.
+    pub fn axis(self) -> &'static str {
+        match self {
+            Self::DepthNoise => "depth noise, times a realistic sensor's",
+            Self::ColorNoise => "color noise, times a realistic sensor's",
+            Self::Visibility => "part of the object that is visible, %",
+            Self::HandPosition => "error of the hand's place, mm",
+            Self::HandRotation => "error of the hand's orientation, °",
+            Self::Joints => "error of every joint, °",
+            Self::DeadTaxels => "taxels that feel nothing, %",
+            Self::FalseTaxels => "taxels that feel what is not there, %",
+            Self::MissingDepth => "image without depth, %",
+            Self::MissingColor => "image without color, %",
+            Self::MissingTouch => "touch missing, %",
+            Self::MissingHand => "hand unknown, %",
+        }
+    }
+
+    /// The amounts that the study takes; of the first one, nothing is wrong.
+    pub fn amounts(self) -> &'static [f64] {
+        match self {
+            Self::DepthNoise | Self::ColorNoise => &[1.0, 2.0, 4.0, 8.0],
+            Self::Visibility => &[100.0, 75.0, 50.0, 25.0, 10.0],
+            Self::HandPosition => &[0.0, 2.0, 5.0, 10.0],
+            Self::HandRotation | Self::Joints => &[0.0, 1.0, 2.0, 5.0],
+            Self::DeadTaxels | Self::FalseTaxels | Self::MissingDepth => {
+                &[0.0, 25.0, 50.0, 75.0, 100.0]
+            }
+            Self::MissingColor => &[0.0, 50.0, 100.0],
+            Self::MissingTouch | Self::MissingHand => &[0.0, 100.0],
+        }
+    }
+
+    /// Makes `amount` of the fault, in the unit of [`axis`](Self::axis). `seed` decides which one.
+    pub fn perturb(self, observation: &mut Observation, amount: f64, seed: u64) {
+        if amount == self.amounts()[0] {
+            return;
+        }
+        let mut random = SplitMix64::new(seed);
+        let random = &mut random;
+        let share = 1e-2 * amount;
+        match self {
+            Self::DepthNoise => noise::depth(&mut observation.depth, amount, random),
+            Self::ColorNoise => noise::color(&mut observation.color, amount, random),
+            Self::Visibility => occlusion::block(observation, share, random),
+            Self::HandPosition => hand::shift(observation, 1e-3 * amount, random),
+            Self::HandRotation => hand::turn(observation, amount.to_radians(), random),
+            Self::Joints => hand::bend(observation, amount.to_radians(), random),
+            Self::DeadTaxels => touch::silence(observation, share, random),
+            Self::FalseTaxels => touch::invent(observation, share, random),
+            Self::MissingDepth => missing::depth(&mut observation.depth, share, random),
+            Self::MissingColor => missing::color(&mut observation.color, share, random),
+            Self::MissingTouch => {
+                observation.hand.iter_mut().for_each(|hand| hand.forces.clear());
+            }
+            Self::MissingHand => observation.hand = None,
+        }
+    }
+
+    /// A seed for this fault on the frame of `row`.
+    pub(super) fn seed(self, row: &ResultRow) -> u64 {
+        let words = [self as u64, row.scene_id.into(), row.im_id.into(), row.obj_id.into()];
+        // A number of one sequence seeds the next, so that near words give unrelated seeds.
+        words.into_iter().fold(0, |state, word| {
+            (SplitMix64::new(state ^ word).uniform() * (1_u64 << 53) as f64) as u64
+        })
+    }
+}
+
+impl fmt::Display for Sweep {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for Sweep {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        Self::ALL.into_iter().find(|s| s.name() == text).ok_or_else(|| {
+            let names: Vec<&str> = Self::ALL.iter().map(|s| s.name()).collect();
+            format!("unknown sweep {text:?}: one of {}", names.join(", "))
+        })
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use crate::scene::HandMeasurement;
+    use nalgebra::{Isometry3, Vector3};
+    use prehend_render::{Camera, DepthImage, Mask, RgbImage};
+
+    /// A square object half a meter away in the middle of a small picture, before a wall.
+    pub(in super::super) fn square() -> Observation {
+        let (width, height) = (80, 60);
+        let inside = |k: usize| (30..50).contains(&(k % width)) && (20..40).contains(&(k / width));
+        let count = width * height;
+        let depth = (0..count).map(|k| if inside(k) { 0.5 } else { 1.0 }).collect();
+        Observation {
+            camera: Camera { fx: 80.0, fy: 80.0, cx: 39.5, cy: 29.5, width, height },
+            color: RgbImage::filled(width, height, [0.6, 0.3, 0.2]),
+            depth: DepthImage::new(width, height, depth).unwrap(),
+            mask: Mask::new(width, height, (0..count).map(inside).collect()).unwrap(),
+            gravity: None,
+            hand: Some(HandMeasurement {
+                t_cam_hand: Isometry3::translation(0.0, 0.1, 0.5),
+                joints: vec![0.2; 16],
+                forces: (0..100).map(|k| Vector3::z() * f64::from(k % 2)).collect(),
+            }),
+        }
+    }
+
+    fn same(a: &Observation, b: &Observation) -> bool {
+        format!("{a:?}") == format!("{b:?}")
+    }
+
+    #[test]
+    fn the_first_amount_is_nothing_and_every_other_is_something_that_repeats() {
+        for sweep in Sweep::ALL {
+            for (k, &amount) in sweep.amounts().iter().enumerate() {
+                let [mut once, mut again, mut other] = [square(), square(), square()];
+                sweep.perturb(&mut once, amount, 5);
+                sweep.perturb(&mut again, amount, 5);
+                sweep.perturb(&mut other, amount, 6);
+                assert!(same(&once, &again), "{sweep} {amount}");
+                assert_eq!(same(&once, &square()), k == 0, "{sweep} {amount}");
+                let all = [Sweep::DeadTaxels, Sweep::MissingDepth, Sweep::MissingColor];
+                let whole = amount == 100.0 && all.contains(&sweep);
+                let decided = k == 0 || whole || sweep >= Sweep::MissingTouch;
+                assert_eq!(same(&once, &other), decided, "{sweep} {amount}");
+                assert!(once.check_sizes().is_ok());
+            }
+        }
+    }
+
+    #[test]
+    fn names_are_read_back_and_seeds_differ() {
+        for sweep in Sweep::ALL {
+            assert_eq!(sweep.name().parse(), Ok(sweep));
+            let json = serde_json::to_string(&sweep).unwrap();
+            assert_eq!(json, format!("\"{sweep}\""));
+        }
+        assert!("smell".parse::<Sweep>().unwrap_err().contains("one of depth-noise, "));
+        let mut seeds = std::collections::BTreeSet::new();
+        for sweep in Sweep::ALL {
+            for (scene_id, im_id, obj_id) in [(0, 0, 0), (0, 0, 1), (0, 1, 0), (1, 0, 0)] {
+                let t_cam_model = Isometry3::identity();
+                let row = ResultRow { scene_id, im_id, obj_id, score: 0.0, t_cam_model, time: 0.0 };
+                assert!(seeds.insert(sweep.seed(&row)));
+            }
+        }
+    }
+}

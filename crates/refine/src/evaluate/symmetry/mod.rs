@@ -1,0 +1,75 @@
+//! Finds the symmetries of a mesh, in the form that BOP's `models_info.json` has them.
+//!
+//! A symmetry is a rotation about the centroid of the surface that brings the surface back onto itself. Rotations
+//! spread over all of SO(3) are drawn to their nearest such rotation; what arrives within the tolerance is one. An axis
+//! about which every turn is a symmetry makes the object one of revolution.
+
+mod axes;
+mod candidates;
+mod deviation;
+mod discrete;
+mod paint;
+
+use nalgebra::{Point3, UnitQuaternion};
+use prehend_geometry::TriMesh;
+use prehend_geometry::closest::ClosestError;
+
+use self::deviation::Shape;
+use crate::evaluate::metrics::{ContinuousSymmetry, Symmetries};
+
+/// What counts as the same.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SymmetrySettings {
+    /// How far the surface may lie from where the symmetry says, as a fraction of the diameter.
+    pub tolerance: f64,
+    /// The fraction of the surface that may lie farther off: dents and tabs of real objects.
+    pub exempt: f64,
+    /// How much the mean color of the surface (0..=1, each patch blurred to the size of the tolerance) may differ, root
+    /// mean square; `None` looks at the shape alone.
+    pub color_tolerance: Option<f64>,
+    /// Points of the surface that are compared.
+    pub samples: usize,
+}
+
+impl Default for SymmetrySettings {
+    fn default() -> Self {
+        Self { tolerance: 0.025, exempt: 0.01, color_tolerance: None, samples: 1000 }
+    }
+}
+
+/// The symmetries of `mesh` \[m\], the identity left out.
+///
+/// A body of revolution has its axis, and one half turn across it where that is a symmetry too; a sphere has three axes,
+/// because BOP does not combine axes. Rotations whose angle is nearly a whole fraction of a turn (to twelfths) are
+/// made so where the tolerance allows it.
+///
+/// # Errors
+/// If the mesh cannot be searched.
+pub fn find_symmetries(
+    mesh: &TriMesh,
+    settings: &SymmetrySettings,
+) -> Result<Symmetries, ClosestError> {
+    let shape = Shape::new(mesh, settings)?;
+    let found = candidates::symmetric_rotations(&shape);
+    let axes = axes::axes_of_revolution(&shape, &found);
+    let discrete = match axes.as_slice() {
+        [] => discrete::finite(&shape, found),
+        [axis] => discrete::flip(&shape, axis).into_iter().collect(),
+        _ => Vec::new(),
+    };
+    let center = shape.center();
+    let continuous = axes.into_iter().map(|axis| ContinuousSymmetry { axis, point: center });
+    Ok(Symmetries {
+        continuous: continuous.collect(),
+        discrete: discrete.into_iter().map(|r| about(&center, &r)).collect(),
+    })
+}
+
+/// The rotation `turn` about `center`, as a motion.
+fn about(center: &Point3<f64>, turn: &UnitQuaternion<f64>) -> nalgebra::Isometry3<f64> {
+    let shift = center.coords - turn * center.coords;
+    nalgebra::Isometry3::from_parts(shift.into(), *turn)
+}
+
+#[cfg(test)]
+mod tests;

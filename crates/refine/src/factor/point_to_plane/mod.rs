@@ -1,0 +1,320 @@
+//! Depth points on the planes of the surface nearest to them.
+
+mod scatter;
+mod smooth_field;
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use nalgebra::{SVector, Vector2, Vector3};
+use prehend_render::{DepthImage, Mask};
+use rayon::prelude::*;
+
+pub use self::scatter::NoiseEstimate;
+use self::smooth_field::{Fit, SmoothField};
+use super::depth::masked_depths;
+use super::patch_sums::PatchSums;
+use super::{SurfacePatches, Term, share};
+use crate::error::RefineError;
+use crate::problem::{Block, Cauchy, Normal, State};
+use crate::scene::{Object, Observation};
+
+/// Settings of [`PointToPlaneTerm`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct PointToPlaneSettings {
+    /// Depth points used at most, spread evenly over the mask.
+    pub points: usize,
+    /// Standard deviation of a depth point from the surface \[m\].
+    pub sigma: f64,
+    /// Distance at which a point counts as an outlier \[m\].
+    pub outlier: f64,
+    /// How many independent measurements the points amount to at most: errors of neighbors are alike.
+    pub effective_points: f64,
+    /// Standard deviation of the smooth field by which neighboring points are off alike, as a depth camera and, unless it is
+    /// let off patch by patch, the model of the object are; zero if there is none \[m\].
+    pub deviation: f64,
+    /// Distance over which that field changes \[m\].
+    pub smoothness: f64,
+    /// Points so near to the mask's border are left out \[px\], if at least a quarter of all is left then: there depth is of what
+    /// is in front or behind, or of both.
+    pub margin: usize,
+}
+
+impl Default for PointToPlaneSettings {
+    fn default() -> Self {
+        Self {
+            points: 1000,
+            sigma: 1e-3,
+            outlier: 4e-3,
+            effective_points: 60.0,
+            deviation: 0.0,
+            smoothness: 20e-3,
+            margin: 2,
+        }
+    }
+}
+
+/// Distances from the masked depth points to the planes that touch the surface where it is nearest to them (Chen and
+/// Medioni, 1992), where the points are as the state corrects the camera ([`CameraCalibrationError`](crate::scene::CameraCalibrationError)).
+///
+/// A depth point is not of a face that looks away from the camera: such a match counts as it is far, and pulls nothing. What
+/// the points' errors have in common, a smooth field, is eliminated.
+pub struct PointToPlaneTerm {
+    object: Arc<Object>,
+    points: Vec<Point>,
+    field: Option<SmoothField>,
+    /// Where the object may be off from its model.
+    patches: Option<Arc<SurfacePatches>>,
+    settings: PointToPlaneSettings,
+}
+
+/// A depth point.
+struct Point {
+    /// Its column and row.
+    pixel: (usize, usize),
+    /// Its direction, (x/z, y/z).
+    ray: Vector2<f64>,
+    /// Its depth as measured \[m\].
+    depth: f64,
+    /// The face that was nearest last: where a search begins changes how long it takes, not what it finds.
+    face: AtomicU32,
+}
+
+/// Parameters of the object's pose and the camera together.
+const N: usize = 11;
+
+/// A point seen from the surface.
+struct Residual {
+    /// Signed distance from the surface \[m\].
+    distance: f64,
+    /// Whether the point can be of the face that is nearest.
+    faces_camera: bool,
+    /// Nearest place of the surface \[m\], and the outward direction from there to the point (camera frame).
+    surface: Vector3<f64>,
+    away: Vector3<f64>,
+}
+
+/// How far in front of the hand a point must be to be of something else \[m\].
+const IN_FRONT: f64 = 6e-3;
+
+/// The share of points that must be left without those near the border.
+const LEAST_SHARE: f64 = 0.25;
+
+/// Points that are worth a task of their own.
+const TASK: usize = 64;
+
+impl PointToPlaneTerm {
+    /// Takes the masked depth of `observation`; `hand` is the depth image of the hand alone, where masks may have leaked
+    /// onto it.
+    ///
+    /// # Errors
+    /// If no pixel of the mask, beside the hand, has a depth.
+    pub fn new(
+        observation: &Observation,
+        object: Arc<Object>,
+        hand: &DepthImage,
+        settings: PointToPlaneSettings,
+    ) -> Result<Self, RefineError> {
+        let camera = &observation.camera;
+        let point = |(x, y, depth): (usize, usize, f64)| Point {
+            pixel: (x, y),
+            ray: camera.unproject(x as f64, y as f64, 1.0).coords.xy(),
+            depth,
+            face: AtomicU32::new(u32::MAX),
+        };
+        let of_object = |&(x, y, depth): &(usize, usize, f64)| {
+            let hand = hand.get(x, y).map_or(0.0, f64::from);
+            hand == 0.0 || depth < hand - IN_FRONT
+        };
+        let mut depths = masked_depths(observation, settings.points)?;
+        depths.retain(of_object);
+        let inside =
+            |&(x, y, _): &(usize, usize, f64)| within(&observation.mask, [x, y], settings.margin);
+        let central: Vec<_> = depths.iter().copied().filter(inside).collect();
+        // Of an object that is hardly more than border, that must do.
+        let depths =
+            if central.len() as f64 > LEAST_SHARE * depths.len() as f64 { central } else { depths };
+        let points: Vec<Point> = depths.into_iter().map(point).collect();
+        if points.is_empty() {
+            return Err(RefineError::NoDepth);
+        }
+        let places: Vec<_> = points.iter().map(|p| p.ray.push(1.0) * p.depth).collect();
+        let field = SmoothField::new(&places, settings.deviation, settings.smoothness);
+        Ok(Self { object, points, field, patches: None, settings })
+    }
+
+    /// The same where the object may be off from its model in `patches`.
+    pub(crate) fn with_patches(self, patches: Arc<SurfacePatches>) -> Self {
+        Self { patches: Some(patches), ..self }
+    }
+
+    /// Of each point at `state`; none of those that are nearest to nothing.
+    fn residuals(&self, state: &State) -> Vec<Option<Residual>> {
+        let t_object_cam = state.t_cam_object.inverse();
+        let residual = |point: &Point| {
+            let place = state.camera.point(&point.ray, point.depth);
+            let (query, face) = (t_object_cam * place, point.face.load(Ordering::Relaxed));
+            let closest = self.object.surface.closest_with_hint(&query, f64::INFINITY, face)?;
+            point.face.store(closest.face, Ordering::Relaxed);
+            let normal = state.t_cam_object * self.object.normals[closest.face as usize];
+            let surface = (state.t_cam_object * closest.point).coords;
+            let offset = place.coords - surface;
+            let distance = offset.norm().copysign(normal.dot(&offset));
+            let faces_camera = normal.dot(&surface) < 0.0;
+            let away = if distance.abs() > 1e-9 { offset / distance } else { normal };
+            Some(Residual { distance, faces_camera, surface, away })
+        };
+        self.points.par_iter().with_min_len(TASK).map(residual).collect()
+    }
+
+    /// The field that the distances are best seen with, and what it leaves of them.
+    fn fit(&self, residuals: &[Option<Residual>]) -> Fit {
+        let distance = |r: &Option<Residual>| r.as_ref().map_or(0.0, |r| r.distance);
+        let distances: Vec<f64> = residuals.iter().map(distance).collect();
+        let (cauchy, share) = (self.cauchy(), self.share());
+        let usable = |i: usize| residuals[i].as_ref().is_some_and(|r| r.faces_camera);
+        let weight =
+            |i: usize, left: f64| if usable(i) { share * cauchy.weight(left * left) } else { 0.0 };
+        let fitted = self.field.as_ref().and_then(|field| field.fit(&distances, weight));
+        let mut fit = fitted.unwrap_or_else(|| Fit::without_field(&distances, weight));
+        // What is not of the surface says nothing of the field either.
+        for i in (0..distances.len()).filter(|i| !usable(*i)) {
+            fit.left[i] = distances[i];
+        }
+        fit
+    }
+
+    fn cauchy(&self) -> Cauchy {
+        Cauchy { scale: self.settings.outlier }
+    }
+
+    /// Nats at the fitted field.
+    fn cost(&self, fit: &Fit) -> f64 {
+        let cauchy = self.cauchy();
+        self.share() * fit.left.iter().map(|left| cauchy.loss(left * left)).sum::<f64>() + fit.cost
+    }
+
+    /// Nats of one square meter.
+    fn share(&self) -> f64 {
+        share(self.settings.effective_points, self.points.len() as f64, self.settings.sigma)
+    }
+}
+
+/// Whether the pixels at this distance around (x, y), in eight directions, are in the mask or outside the image.
+fn within(mask: &Mask, [x, y]: [usize; 2], distance: usize) -> bool {
+    let at = |center: usize, step: usize| (center + step * distance).checked_sub(distance);
+    let steps = (0..3).flat_map(|i| (0..3).map(move |j| (i, j)));
+    steps.into_iter().all(|(i, j)| match (at(x, i), at(y, j)) {
+        (Some(x), Some(y)) => mask.get(x, y).unwrap_or(true),
+        _ => true,
+    })
+}
+
+impl Term for PointToPlaneTerm {
+    fn name(&self) -> &'static str {
+        "depth"
+    }
+
+    fn value(&self, state: &State) -> f64 {
+        self.cost(&self.fit(&self.residuals(state)))
+    }
+
+    fn depends_on(&self, _block: Block) -> bool {
+        true
+    }
+
+    fn linearize(&self, state: &State, normal: &mut Normal) -> f64 {
+        let residuals = self.residuals(state);
+        let fit = self.fit(&residuals);
+        let center = state.center();
+        let row = |(point, residual): (&Point, &Option<Residual>)| {
+            let mut row = [0.0; N];
+            let Some(Residual { surface, away, .. }) = residual else { return row };
+            let turn = (surface - center).cross(away);
+            let camera = state.camera.point_jacobian(&point.ray, point.depth).tr_mul(away);
+            for k in 0..3 {
+                (row[k], row[3 + k]) = (-away[k], -turn[k]);
+            }
+            row[6..].copy_from_slice(camera.as_slice());
+            row
+        };
+        let rows: Vec<[f64; N]> = self.points.iter().zip(&residuals).map(row).collect();
+        let patches = self.patches.as_ref();
+        let patches = patches.filter(|p| normal.offset(Block::SurfacePatches(p.count())).is_some());
+        let count = patches.map_or(0, |patches| patches.count());
+        let patch = |i: usize| {
+            let (column, row) = self.points[i].pixel;
+            patches.and_then(|patches| patches.at(column, row))
+        };
+        let mut sums = PatchSums::<N>::new(count);
+        for (i, ((row, weight), left)) in rows.iter().zip(&fit.weights).zip(&fit.left).enumerate() {
+            let row = SVector::from(*row);
+            let (gradient, hessian) = sums.of(patch(i));
+            gradient.axpy(weight * left, &row, 1.0);
+            hessian.ger(*weight, &row, &row, 1.0);
+        }
+        let (gradient, mut hessian) = sums.equations();
+        if let Some(field) = &self.field {
+            let derivatives = |i: usize| {
+                let at = patch(i).map(PatchSums::<N>::place);
+                let displaced = at.into_iter().flat_map(move |at| at..at + 3).zip(rows[i]);
+                rows[i].into_iter().enumerate().chain(displaced)
+            };
+            hessian -= field.lost(&fit, hessian.nrows(), derivatives);
+        }
+        let blocks = [Block::ObjectPose, Block::Camera, Block::SurfacePatches(count)];
+        normal.add_dynamic(&blocks, &gradient, &hessian);
+        self.cost(&fit)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::gradient_check::{assert_by_patches, assert_gradient, fixture, patches};
+    use super::*;
+
+    #[test]
+    fn gradients_match_differences() {
+        for seed in 0..3 {
+            let (scene, mut state, hand) = fixture(seed);
+            state.camera = state.camera.changed(&[2e-3, 1e-3, 1e-3, -1e-3, 2e-3]);
+            let check = |state: &State, deviation: f64| {
+                let settings = PointToPlaneSettings { deviation, ..Default::default() };
+                let (observation, object) = (&scene.observation, Arc::clone(&scene.object));
+                let term = PointToPlaneTerm::new(observation, object, &hand, settings).unwrap();
+                for block in [Block::ObjectPose, Block::Camera] {
+                    // What the few points pull that were matched with faces that look away is left out.
+                    assert_gradient(&term, state, block, 1e-8, 0.03);
+                }
+            };
+            check(&state, 0.0);
+            // Near the truth, where a field may account for what is left.
+            let near = State { t_cam_object: scene.truth, ..state };
+            let twist = [1e-3, -2e-3, 1e-3, 0.02, -0.01, 0.01];
+            check(&near.moved(Block::ObjectPose, &twist), 1e-3);
+        }
+    }
+
+    #[test]
+    fn patches_share_what_the_object_has() {
+        let (scene, state, hand) = fixture(1);
+        let patches = patches(2);
+        for deviation in [0.0, 1e-3] {
+            let settings = PointToPlaneSettings { deviation, ..Default::default() };
+            let object = Arc::clone(&scene.object);
+            let term = PointToPlaneTerm::new(&scene.observation, object, &hand, settings).unwrap();
+            let term = term.with_patches(Arc::clone(&patches));
+            assert_by_patches(&term, &state, &patches, 1e-9);
+        }
+    }
+
+    #[test]
+    fn the_truth_is_near_the_minimum() {
+        let (scene, state, hand) = fixture(0);
+        let object = Arc::clone(&scene.object);
+        let settings = PointToPlaneSettings::default();
+        let term = PointToPlaneTerm::new(&scene.observation, object, &hand, settings).unwrap();
+        let truth = State { t_cam_object: scene.truth, ..state.clone() };
+        assert!(term.value(&truth) < 0.3 * term.value(&state));
+    }
+}

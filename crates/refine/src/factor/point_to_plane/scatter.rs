@@ -1,0 +1,76 @@
+//! How depth points scatter about a surface.
+
+use crate::problem::State;
+
+use super::{PointToPlaneTerm, Residual};
+
+/// How depth points scatter about a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NoiseEstimate {
+    /// Standard deviation of a point \[m\].
+    pub sigma: f64,
+    /// The part of it that the points of a patch have in common \[m\].
+    pub shared: f64,
+    /// The part that is each point's own \[m\].
+    pub own: f64,
+    /// How many independent measurements the points amount to.
+    pub effective_points: f64,
+}
+
+/// Patches that the mask's bounding box is cut into, about, to judge how alike the errors of neighbors are.
+const PATCHES: f64 = 36.0;
+
+/// Points and patches by which scatter can be judged.
+const LEAST_POINTS: usize = 3;
+const LEAST_PATCHES: usize = 6;
+
+/// Number, sum and sum of squares of the residuals in a patch.
+#[derive(Clone, Copy, Default)]
+struct Patch {
+    count: usize,
+    sum: f64,
+    squares: f64,
+}
+
+impl PointToPlaneTerm {
+    /// How the points scatter about the surface at `state`, which should be the best there is; `None` if there are too few.
+    ///
+    /// Where errors are alike within patches, their means scatter more than means of independent errors would: so many patches as
+    /// there are, and as many measurements a patch as the variance of the means is smaller than that of the points.
+    pub fn scatter(&self, state: &State) -> Option<NoiseEstimate> {
+        let pixels = || self.points.iter().map(|point| point.pixel);
+        let (left, right) = (pixels().map(|p| p.0).min()?, pixels().map(|p| p.0).max()?);
+        let (top, bottom) = (pixels().map(|p| p.1).min()?, pixels().map(|p| p.1).max()?);
+        let area = ((right - left + 1) * (bottom - top + 1)) as f64;
+        let side = (area / PATCHES).sqrt().max(1.0);
+        let patch = |from: usize, to: usize| ((to - from) as f64 / side) as usize;
+        let across = patch(left, right) + 1;
+        let mut patches = vec![Patch::default(); across * (patch(top, bottom) + 1)];
+        let limit = self.settings.outlier;
+        for (point, residual) in self.points.iter().zip(self.residuals(state)) {
+            let Some(Residual { distance, faces_camera: true, .. }) = residual else { continue };
+            let residual = distance.clamp(-limit, limit);
+            let (x, y) = point.pixel;
+            let patch = &mut patches[patch(top, y) * across + patch(left, x)];
+            patch.count += 1;
+            patch.sum += residual;
+            patch.squares += residual * residual;
+        }
+        patches.retain(|patch| patch.count >= LEAST_POINTS);
+        let total = patches.iter().map(|patch| patch.count).sum::<usize>() as f64;
+        let of_means = patches.iter().map(|p| p.sum * p.sum / p.count as f64).sum::<f64>() / total;
+        let of_points = patches.iter().map(|patch| patch.squares).sum::<f64>() / total;
+        if !(of_means > 0.0 && patches.len() >= LEAST_PATCHES) {
+            return None;
+        }
+        let (number, count) = (patches.len() as f64, self.points.len() as f64);
+        let own = ((of_points - of_means) * total / (total - number)).max(0.0);
+        Some(NoiseEstimate {
+            sigma: of_points.sqrt(),
+            // Means of a few points scatter even if these have nothing in common.
+            shared: (of_means - own * number / total).max(0.0).sqrt(),
+            own: own.sqrt(),
+            effective_points: (number * of_points / of_means).min(count),
+        })
+    }
+}

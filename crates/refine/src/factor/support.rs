@@ -1,0 +1,393 @@
+//! Support: forces of the hand within friction cones hold the object.
+
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector, Point3, Unit, Vector3, Vector6};
+use prehend_geometry::robot::{ArticulatedRobot, RobotSample};
+use prehend_sim::{CompliantBalance, CompliantSupport, Support};
+use rayon::prelude::*;
+
+use super::Term;
+use crate::error::RefineError;
+use crate::problem::{Block, Normal, State};
+use crate::scene::{Hand, Object, Observation};
+
+/// Settings of [`SupportTerm`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct SupportSettings {
+    /// Standard deviation of what is left unbalanced, as a share of all that acts on the object.
+    pub sigma: f64,
+    /// Coefficient of friction: a generous one, since only what no forces could hold is evidence.
+    pub friction: f64,
+    /// How far the surface may be from the hand and yet touch it, the less the farther \[m\]: errors of models and joints.
+    pub reach: f64,
+    /// Samples of the object's surface at most.
+    pub samples: usize,
+    /// Contact area that bears half of what it would if it did not yield \[m²\].
+    pub area: f64,
+    /// Share of the felt forces that certainly acts: taxels' gains are off, and the rest may be more, never less.
+    pub felt: f64,
+    /// A taxel that feels so much \[N\] is believed half: those that ring false feel less.
+    pub felt_force: f64,
+}
+
+impl Default for SupportSettings {
+    fn default() -> Self {
+        Self {
+            sigma: 0.2,
+            friction: 1.0,
+            reach: 5e-3,
+            samples: 500,
+            area: 1e-5,
+            felt: 0.5,
+            felt_force: 0.5,
+        }
+    }
+}
+
+impl SupportSettings {
+    fn check(&self) -> Result<(), RefineError> {
+        let positive = [self.sigma, self.reach, self.area].iter().all(|v| *v > 0.0);
+        let not_negative =
+            [self.friction, self.felt, self.felt_force].iter().all(|v| *v >= 0.0 && v.is_finite());
+        if positive && not_negative {
+            return Ok(());
+        }
+        let problem = format!(
+            "{self:?}: deviation, reach and area have to be positive, friction and forces not negative"
+        );
+        Err(RefineError::Setting { name: "support", problem })
+    }
+}
+
+/// Whether forces of the hand, where it is near the object, could balance weight and felt forces.
+///
+/// What the skin feels is a lower bound of what acts there; contacts off the skin are unseen, and may bear anything
+/// within their cones. So nothing is said of how strong the grasp is, only that the object would not stay where no contact
+/// opposes its weight or the fingers' pressure.
+pub struct SupportTerm {
+    object: Arc<Object>,
+    robot: Arc<Hand>,
+    gravity: Vector3<f64>,
+    felt: Vec<Push>,
+    /// Weight and felt forces together \[N\].
+    size: f64,
+    settings: SupportSettings,
+}
+
+/// A force on the object, in the frame of the link that exerts it.
+struct Push {
+    link: usize,
+    position: Point3<f64>,
+    force: Vector3<f64>,
+}
+
+/// A sample of the object that may touch the hand, in the camera frame.
+struct Near {
+    point: Point3<f64>,
+    sample: RobotSample,
+    support: CompliantSupport,
+    /// Relative change of its compliance by the distance \[1/m\].
+    stiffening: f64,
+}
+
+/// The balance of a state.
+struct Held {
+    hand: ArticulatedRobot,
+    /// Center of mass, in the camera frame.
+    mass_center: Point3<f64>,
+    near: Vec<Near>,
+    balance: CompliantBalance,
+}
+
+impl SupportTerm {
+    /// A term for `object` in the hand `robot` of `observation`.
+    ///
+    /// # Errors
+    /// If gravity or the hand is unknown, the hand has a skin and its forces are not one a taxel, or a setting is out of range.
+    pub fn new(
+        observation: &Observation,
+        object: Arc<Object>,
+        robot: Arc<Hand>,
+        settings: SupportSettings,
+    ) -> Result<Self, RefineError> {
+        settings.check()?;
+        let missing = |what| RefineError::Missing { what, term: "support" };
+        let gravity = observation.gravity.ok_or_else(|| missing("gravity"))?;
+        let hand = observation.hand.as_ref().ok_or_else(|| missing("hand state"))?;
+        robot.check_joints(&hand.joints)?;
+        if !hand.forces.is_empty() {
+            robot.check_forces(&hand.forces)?;
+        }
+        let mut felt = Vec::new();
+        for (taxel, force) in robot.taxels.iter().zip(&hand.forces) {
+            let strength = force.norm();
+            if !(strength > 0.0 && strength.is_finite()) {
+                continue;
+            }
+            let link = robot.link_of(taxel)?;
+            let trust = 1.0 / (1.0 + (settings.felt_force / strength).powi(2));
+            let force = -force * (trust * settings.felt);
+            felt.push(Push { link, position: taxel.position, force });
+        }
+        let weight = object.inertial.mass * gravity.norm();
+        let size = weight + felt.iter().map(|f| f.force.norm()).sum::<f64>();
+        Ok(Self { object, robot, gravity, felt, size, settings })
+    }
+
+    /// What holds the object at `state`. A hand that cannot be posed holds nothing, and says nothing.
+    fn held(&self, state: &State) -> Option<Held> {
+        let hand = self.robot.articulated(&state.t_cam_hand, &state.joints).ok()?;
+        let mass_center = state.t_cam_object * self.object.inertial.center_of_mass;
+        let samples = self.object.samples.par_iter().step_by(self.stride()).with_min_len(128);
+        let near: Vec<Near> = samples
+            .filter_map(|sample| {
+                let point = state.t_cam_object * sample.point;
+                self.near(point, state.t_cam_object * -sample.normal, &hand)
+            })
+            .collect();
+        let weight = self.gravity * self.object.inertial.mass;
+        let zero = Vector3::zeros();
+        let load = self.felt.iter().fold(self.wrench(&zero, &weight), |load, felt| {
+            let t_cam_link = hand.posed().t_world_links()[felt.link];
+            let arm = t_cam_link * felt.position - mass_center;
+            load + self.wrench(&arm, &(t_cam_link * felt.force))
+        });
+        let supports: Vec<CompliantSupport> = near.iter().map(|near| near.support).collect();
+        let length = self.object.radius;
+        let balance = CompliantBalance::find(&supports, &mass_center, length, &load);
+        Some(Held { hand, mass_center, near, balance })
+    }
+
+    /// One sample in so many is looked at: they follow each other over the surface.
+    fn stride(&self) -> usize {
+        self.object.samples.len().div_ceil(self.settings.samples.max(1)).max(1)
+    }
+
+    /// A sample at `point` whose surface is pushed along `inward`, if it is near the hand and faces it.
+    fn near(
+        &self,
+        point: Point3<f64>,
+        inward: Vector3<f64>,
+        hand: &ArticulatedRobot,
+    ) -> Option<Near> {
+        let reach = self.settings.reach;
+        let sample = hand.distance_with_gradient(&point, reach)?;
+        let apart = (sample.field.distance / reach).max(0.0);
+        let left = 1.0 - apart * apart;
+        if inward.dot(&sample.field.gradient) <= 0.0 || left <= 0.0 {
+            return None;
+        }
+        let normal = Unit::try_new(inward, 0.0)?;
+        let support = Support { position: point, normal, friction: self.settings.friction };
+        let area = self.object.area * self.stride() as f64 / self.object.samples.len() as f64;
+        let compliance = self.settings.area / (area * left * left);
+        let stiffening = 4.0 * apart / (left * reach);
+        Some(Near { point, sample, support: CompliantSupport { support, compliance }, stiffening })
+    }
+
+    /// Force and torque over the object's radius \[N\].
+    fn wrench(&self, arm: &Vector3<f64>, force: &Vector3<f64>) -> Vector6<f64> {
+        joined(force, &self.torque(arm, force))
+    }
+
+    /// Torque over the object's radius \[N\].
+    fn torque(&self, arm: &Vector3<f64>, force: &Vector3<f64>) -> Vector3<f64> {
+        arm.cross(force) / self.object.radius
+    }
+
+    /// Nats of half a squared newton; none where nothing acts.
+    fn nats(&self) -> f64 {
+        if self.size > 0.0 { (self.size * self.settings.sigma).powi(-2) } else { 0.0 }
+    }
+}
+
+fn joined(force: &Vector3<f64>, torque: &Vector3<f64>) -> Vector6<f64> {
+    Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z)
+}
+
+/// Velocities of a point at `arm` from the center of a unit twist's motion, and the twist's rotation, one twist after the other.
+fn twists(arm: &Vector3<f64>) -> [(Vector3<f64>, Vector3<f64>); 6] {
+    std::array::from_fn(|k| match k {
+        0..3 => (Vector3::ith(k, 1.0), Vector3::zeros()),
+        _ => {
+            let turn = Vector3::ith(k - 3, 1.0);
+            (turn.cross(arm), turn)
+        }
+    })
+}
+
+/// Where the derivatives by the hand's pose and by its joints begin.
+const HAND: usize = 6;
+const JOINTS: usize = 12;
+
+impl Term for SupportTerm {
+    fn name(&self) -> &'static str {
+        "support"
+    }
+
+    fn value(&self, state: &State) -> f64 {
+        self.held(state).map_or(0.0, |held| self.nats() * held.balance.value)
+    }
+
+    fn linearize(&self, state: &State, normal: &mut Normal) -> f64 {
+        let Some(held) = self.held(state) else { return 0.0 };
+        let blocks = [Block::ObjectPose, Block::HandPose, Block::Joints(state.joints.len())];
+        let (jacobian, yielding) = self.derivatives(&held, state);
+        let (balance, nats) = (held.balance, self.nats());
+        let gradient = (jacobian.tr_mul(&balance.residual) - yielding) * nats;
+        let hessian = jacobian.tr_mul(&(balance.yielding * &jacobian)) * nats;
+        normal.add_dynamic(&blocks, &gradient, &hessian);
+        nats * balance.value
+    }
+}
+
+impl SupportTerm {
+    /// Derivatives of what is left unbalanced if each force keeps its pull: it turns with the object, and its support bears the
+    /// less, the more it yields. Beside it, what that changes in the residual's square and not in the value: forces
+    /// that are less cost less.
+    fn derivatives(&self, held: &Held, state: &State) -> (DMatrix<f64>, DVector<f64>) {
+        let (center, mass_center) = (state.center(), held.mass_center);
+        let parameters = JOINTS + state.joints.len();
+        let mut jacobian = DMatrix::zeros(6, parameters);
+        let mut yielding = DVector::zeros(parameters);
+        for (near, force) in held.near.iter().zip(&held.balance.forces) {
+            if *force == Vector3::zeros() {
+                continue;
+            }
+            let arm = near.point - mass_center;
+            let (torque, wrench) = (self.torque(&arm, force), self.wrench(&arm, force));
+            let cost = 0.5 * near.support.compliance * force.norm_squared();
+            let mut add = |k: usize, distance: f64, turned: Vector6<f64>| {
+                let relative = near.stiffening * distance;
+                yielding[k] += cost * relative;
+                let mut column = jacobian.column_mut(k);
+                column += turned - wrench * relative;
+            };
+            for (k, (velocity, turn)) in twists(&(near.point.coords - center)).iter().enumerate() {
+                let distance = near.sample.field.gradient.dot(velocity);
+                add(k, distance, joined(&turn.cross(force), &turn.cross(&torque)));
+                add(HAND + k, -distance, Vector6::zeros());
+            }
+            for (k, distance) in near.sample.joints.iter().enumerate() {
+                add(JOINTS + k, *distance, Vector6::zeros());
+            }
+        }
+        for felt in &self.felt {
+            let t_cam_link = held.hand.posed().t_world_links()[felt.link];
+            let (point, force) = (t_cam_link * felt.position, t_cam_link * felt.force);
+            let arm = point - mass_center;
+            // By how fast its point goes away from the center of mass, and how fast it turns.
+            let mut add = |k: usize, velocity: Vector3<f64>, turning: Vector3<f64>| {
+                let torque = self.torque(&velocity, &force) + self.torque(&arm, &turning);
+                let mut column = jacobian.column_mut(k);
+                column += joined(&turning, &torque);
+            };
+            for (k, (velocity, _)) in twists(&(mass_center.coords - center)).iter().enumerate() {
+                add(k, -velocity, Vector3::zeros());
+            }
+            for (k, (velocity, turn)) in twists(&(point.coords - center)).iter().enumerate() {
+                add(HAND + k, *velocity, turn.cross(&force));
+            }
+            let end = point + force;
+            let tail = held.hand.point_jacobian(felt.link, &point);
+            let head = held.hand.point_jacobian(felt.link, &end);
+            for ((k, velocity), (_, of_head)) in tail.zip(head) {
+                add(JOINTS + k, velocity, of_head - velocity);
+            }
+        }
+        (jacobian, yielding)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::gradient_check::{assert_gradient, fixture};
+    use super::*;
+    use crate::scene::Scene;
+
+    fn term(scene: &Scene) -> SupportTerm {
+        let (object, robot) = (Arc::clone(&scene.object), Arc::clone(&scene.robot));
+        SupportTerm::new(&scene.observation, object, robot, SupportSettings::default()).unwrap()
+    }
+
+    #[test]
+    fn gradients_match_differences() {
+        for seed in 0..3 {
+            let (scene, state, _) = fixture(seed);
+            let term = term(scene);
+            assert!(term.value(&state) > 0.0);
+            for block in [Block::ObjectPose, Block::HandPose, Block::Joints(16)] {
+                assert_gradient(&term, &state, block, 1e-7, 1e-3);
+            }
+        }
+    }
+
+    #[test]
+    fn a_held_object_costs_nothing_and_one_beside_the_hand_does() {
+        let (scene, state, _) = fixture(0);
+        let term = term(scene);
+        let held = State { t_cam_object: scene.truth, ..state };
+        let free = held.moved(Block::ObjectPose, &[0.0, 0.0, -0.3, 0.0, 0.0, 0.0]);
+        let (held, free) = (term.value(&held), term.value(&free));
+        // All that acts is left: half a square over that of the deviation.
+        let all = 0.5 * SupportSettings::default().sigma.powi(-2);
+        assert!(held < 0.1 * all && free > 0.1 * all, "{held} {free} {all}");
+    }
+
+    #[test]
+    fn what_a_finger_feels_pushes_the_object_away_from_it() {
+        let (scene, ..) = fixture(0);
+        let mut observation = scene.observation.clone();
+        let taxel = &scene.robot.taxels[100];
+        let forces = &mut observation.hand.as_mut().unwrap().forces;
+        forces.fill(Vector3::zeros());
+        // The object presses into the skin with 2 N: half of that, and as much as so strong a taxel is believed.
+        forces[100] = -2.0 * taxel.normal;
+        let (object, robot) = (Arc::clone(&scene.object), Arc::clone(&scene.robot));
+        let term = SupportTerm::new(&observation, object, robot, SupportSettings::default());
+        let [push] = &term.unwrap().felt[..] else { panic!("not one force") };
+        assert!((push.force - taxel.normal * (4.0 / 4.25)).norm() < 1e-12, "{}", push.force);
+    }
+
+    #[test]
+    fn where_nothing_acts_nothing_is_said() {
+        let (scene, state, _) = fixture(0);
+        let mut observation = scene.observation.clone();
+        observation.gravity = Some(Vector3::zeros());
+        let forces = &mut observation.hand.as_mut().unwrap().forces;
+        forces.fill(Vector3::repeat(f64::NAN));
+        let settings = SupportSettings::default();
+        let new = |settings| {
+            let (object, robot) = (Arc::clone(&scene.object), Arc::clone(&scene.robot));
+            SupportTerm::new(&observation, object, robot, settings)
+        };
+        let term = new(settings.clone()).unwrap();
+        let mut normal = Normal::new(&[Block::ObjectPose]);
+        assert_eq!((term.value(&state), term.linearize(&state, &mut normal)), (0.0, 0.0));
+        assert_eq!(normal.gradient().norm(), 0.0);
+        for wrong in [
+            SupportSettings { reach: 0.0, ..settings.clone() },
+            SupportSettings { area: f64::NAN, ..settings.clone() },
+            SupportSettings { friction: -1.0, ..settings },
+        ] {
+            assert!(matches!(new(wrong), Err(RefineError::Setting { name: "support", .. })));
+        }
+    }
+
+    #[test]
+    fn gravity_and_the_hand_are_needed() {
+        let (scene, ..) = fixture(0);
+        let refused = |change: fn(&mut Observation)| {
+            let mut observation = scene.observation.clone();
+            change(&mut observation);
+            let (object, robot) = (Arc::clone(&scene.object), Arc::clone(&scene.robot));
+            let term = SupportTerm::new(&observation, object, robot, SupportSettings::default());
+            term.err().unwrap().to_string()
+        };
+        assert!(refused(|o| o.gravity = None).contains("gravity"));
+        assert!(refused(|o| o.hand = None).contains("hand state"));
+        let short = |o: &mut Observation| o.hand.as_mut().unwrap().forces.truncate(5);
+        assert_eq!(refused(short), "5 taxel forces were given for 368 taxels");
+    }
+}

@@ -1,0 +1,172 @@
+//! The robot hand, prepared once and shared by all frames.
+
+use std::sync::Arc;
+
+use nalgebra::{Isometry3, Vector3};
+use prehend_geometry::GridCache;
+use prehend_geometry::hand::Taxel;
+use prehend_geometry::robot::{
+    ArticulatedRobot, KinematicTree, PosedRobot, RobotError, RobotShape,
+};
+use prehend_render::RenderModel;
+
+use crate::error::RefineError;
+
+/// A robot hand: kinematics, shape and skin.
+pub struct Hand {
+    /// Joints and links.
+    pub tree: KinematicTree,
+    /// Collision geometry with one cached distance grid a link.
+    pub shape: Arc<RobotShape>,
+    /// Tactile sensors, in link frames; empty without a skin.
+    pub taxels: Vec<Taxel>,
+    /// Every collision body with the index of its link, for drawing.
+    bodies: Vec<(usize, RenderModel)>,
+}
+
+impl Hand {
+    /// Prepares the shape of `tree`; this builds a distance grid for every link.
+    ///
+    /// # Errors
+    /// If the geometry of a link cannot be used.
+    pub fn new(tree: KinematicTree, taxels: Vec<Taxel>) -> Result<Self, RobotError> {
+        Self::cached(tree, taxels, None)
+    }
+
+    /// As [`Self::new`] has it, with distance grids from `cache` where it holds them; others are left there.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn cached(
+        tree: KinematicTree,
+        taxels: Vec<Taxel>,
+        cache: Option<&GridCache>,
+    ) -> Result<Self, RobotError> {
+        let (spacing, margin) = (RobotShape::DEFAULT_SPACING, RobotShape::DEFAULT_MARGIN);
+        let shape = Arc::new(RobotShape::cached(&tree, spacing, margin, cache)?);
+        let links = tree.links().iter().enumerate();
+        let bodies = links
+            .flat_map(|(index, link)| link.parts.iter().map(move |part| (index, part)))
+            .map(|(index, part)| {
+                let fault = |e: prehend_render::ModelError| RobotError::Shape {
+                    link: tree.links()[index].name.clone(),
+                    reason: e.to_string(),
+                };
+                Ok((index, RenderModel::new(part).map_err(fault)?))
+            })
+            .collect::<Result<_, RobotError>>()?;
+        Ok(Self { tree, shape, taxels, bodies })
+    }
+
+    /// The hand with its base at `t_cam_hand` and its joints at `joints` \[rad\].
+    ///
+    /// # Errors
+    /// If there is not one joint position a joint, or a pose is not finite.
+    pub fn posed(
+        &self,
+        t_cam_hand: &Isometry3<f64>,
+        joints: &[f64],
+    ) -> Result<PosedRobot, RobotError> {
+        self.check_joints(joints)?;
+        PosedRobot::new(Arc::clone(&self.shape), self.link_poses(t_cam_hand, joints))
+    }
+
+    /// The hand with its base at `t_cam_hand` and its joints at `joints` \[rad\], knowing how each link moves.
+    ///
+    /// # Errors
+    /// If there is not one joint position a joint, or a number is not finite.
+    pub fn articulated(
+        &self,
+        t_cam_hand: &Isometry3<f64>,
+        joints: &[f64],
+    ) -> Result<ArticulatedRobot, RobotError> {
+        ArticulatedRobot::new(&self.tree, Arc::clone(&self.shape), t_cam_hand, joints)
+    }
+
+    /// Whether `joints` has one position for each of [`joint_names`](KinematicTree::joint_names).
+    ///
+    /// # Errors
+    /// [`RobotError::JointCount`].
+    pub fn check_joints(&self, joints: &[f64]) -> Result<(), RobotError> {
+        let (given, expected) = (joints.len(), self.tree.joint_names().len());
+        if given == expected { Ok(()) } else { Err(RobotError::JointCount { given, expected }) }
+    }
+
+    /// Whether `forces` has one for each taxel.
+    pub(crate) fn check_forces(&self, forces: &[Vector3<f64>]) -> Result<(), RefineError> {
+        let (forces, taxels) = (forces.len(), self.taxels.len());
+        if forces == taxels { Ok(()) } else { Err(RefineError::TaxelCount { forces, taxels }) }
+    }
+
+    /// The link that carries `taxel`.
+    pub(crate) fn link_of(&self, taxel: &Taxel) -> Result<usize, RefineError> {
+        let link = self.tree.link_index(&taxel.link);
+        link.ok_or_else(|| RefineError::TaxelLink { link: taxel.link.clone() })
+    }
+
+    /// What there is to draw of the hand, with link → camera poses.
+    ///
+    /// # Panics
+    /// If there is not one joint position a joint: see [`check_joints`](Self::check_joints).
+    pub fn render_bodies(
+        &self,
+        t_cam_hand: &Isometry3<f64>,
+        joints: &[f64],
+    ) -> Vec<(&RenderModel, Isometry3<f64>)> {
+        let poses = self.link_poses(t_cam_hand, joints);
+        self.bodies.iter().map(|(link, model)| (model, poses[*link])).collect()
+    }
+
+    fn link_poses(&self, t_cam_hand: &Isometry3<f64>, joints: &[f64]) -> Vec<Isometry3<f64>> {
+        self.tree.forward_kinematics(joints).iter().map(|t| t_cam_hand * t).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::{Config, TermKind};
+    use crate::error::RefineError;
+    use crate::refine;
+    use crate::scene::default_scene;
+    use crate::scene::inspect_pose;
+
+    #[test]
+    fn a_wrong_number_of_joints_is_an_error_for_every_term() {
+        let scene = default_scene(1).unwrap();
+        let mut observation = scene.observation.clone();
+        observation.hand.as_mut().unwrap().joints.pop();
+        for kind in [TermKind::Rendering, TermKind::Depth, TermKind::Physics, TermKind::Tactile] {
+            let config = Config::of(&[kind]);
+            let robot = Some(&scene.robot);
+            let error = refine(&observation, &scene.object, robot, &scene.initial, &config);
+            let error = error.unwrap_err();
+            assert!(
+                matches!(
+                    error,
+                    RefineError::Robot(RobotError::JointCount { given: 15, expected: 16 })
+                ),
+                "{error}"
+            );
+        }
+        let posed = scene.robot.posed(&Isometry3::identity(), &[0.0; 17]);
+        assert!(matches!(posed, Err(RobotError::JointCount { given: 17, expected: 16 })));
+        let warnings =
+            inspect_pose(&observation, &scene.object, Some(&scene.robot), &scene.initial);
+        assert!(warnings.iter().any(|w| w.contains("15 joint positions")), "{warnings:?}");
+    }
+
+    #[test]
+    fn a_part_that_cannot_be_drawn_is_an_error() {
+        // A flat triangle without any area, as a mesh file may hold.
+        let dir = tempfile::tempdir().unwrap();
+        std::fs::write(dir.path().join("flat.obj"), "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n")
+            .unwrap();
+        let urdf = r#"<robot name="r"><link name="palm"><collision><geometry>
+            <mesh filename="flat.obj"/></geometry></collision></link></robot>"#;
+        let refused = KinematicTree::from_urdf_str(urdf, Some(dir.path()))
+            .and_then(|tree| Hand::new(tree, Vec::new()).map(|_| ()));
+        println!("{refused:?}");
+        assert!(refused.unwrap_err().to_string().contains("link 'palm'"));
+    }
+}

@@ -1,0 +1,22 @@
+//! What there is: one [`Observation`], the [`Object`] whose pose is sought, the [`Hand`] that holds it, and the errors of the camera.
+
+mod calibration;
+mod example;
+mod hand;
+mod inspect;
+mod look_at;
+mod object;
+mod observation;
+mod sensing;
+mod sequence;
+
+pub use calibration::CameraCalibrationError;
+pub use example::{Scene, default_scene};
+pub use hand::Hand;
+pub use inspect::{inspect_object, inspect_pose};
+pub(crate) use look_at::look_at;
+pub use object::{DEFAULT_DENSITY, Inertial, Object};
+pub(crate) use observation::check_gravity;
+pub use observation::{HandMeasurement, Observation};
+pub(crate) use sensing::feel;
+pub use sequence::{Sequence, SequenceFrame, default_sequence};

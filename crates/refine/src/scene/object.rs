@@ -1,0 +1,160 @@
+//! The object whose pose is sought, prepared for every term.
+
+use nalgebra::{Matrix3, Point3, Vector3};
+use prehend_geometry::closest::ClosestPoints;
+use prehend_geometry::mass::{MassError, MassProperties, mass_properties};
+use prehend_geometry::sample::{SurfaceSample, surface_samples};
+use prehend_geometry::{MeshReport, TriMesh};
+use prehend_render::RenderModel;
+
+use crate::error::RefineError;
+
+/// Assumed where an object's mass is unknown \[kg/m³\].
+pub const DEFAULT_DENSITY: f64 = 500.0;
+
+/// Surface samples kept for contacts and for the mesh-to-cloud distance.
+const SURFACE_SAMPLES: usize = 1500;
+
+/// Mass, center of mass and inertia of an object.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Inertial {
+    /// Mass \[kg\].
+    pub mass: f64,
+    /// Center of mass in object coordinates \[m\].
+    pub center_of_mass: Point3<f64>,
+    /// Inertia about the center of mass, in object axes \[kg m²\].
+    pub inertia: Matrix3<f64>,
+}
+
+/// An object model: geometry, appearance, mass, and what the terms precompute from them.
+pub struct Object {
+    /// Name for messages.
+    pub name: String,
+    /// The mesh in meters, as loaded.
+    pub mesh: TriMesh,
+    /// What cleaning found and did.
+    pub report: MeshReport,
+    /// Mass and its distribution.
+    pub inertial: Inertial,
+    /// Whether `inertial` was assumed (uniform [`DEFAULT_DENSITY`]) rather than given.
+    pub inertial_assumed: bool,
+    /// Center of the bounding box, in object coordinates \[m\].
+    pub center: Point3<f64>,
+    /// Half the diagonal of the bounding box \[m\]: turns radians into meters of surface motion.
+    pub radius: f64,
+    /// Surface area \[m²\].
+    pub area: f64,
+    pub(crate) surface: ClosestPoints,
+    /// Outward unit normal of each face that `surface` may answer; zero for a face without area.
+    pub(crate) normals: Vec<Vector3<f64>>,
+    pub(crate) samples: Vec<SurfaceSample>,
+    pub(crate) model: RenderModel,
+}
+
+impl Object {
+    /// Prepares `mesh` (meters); without `inertial`, a uniform density is assumed. `seed` decides where
+    /// the surface is sampled.
+    ///
+    /// # Errors
+    /// If a face names a vertex that is not there, the mesh has no area, or is open where a mass has to be assumed. With `inertial`, an open mesh
+    /// serves: inside is then where its winding number is above one half.
+    pub fn new(
+        name: &str,
+        mesh: TriMesh,
+        inertial: Option<Inertial>,
+        seed: u64,
+    ) -> Result<Self, RefineError> {
+        Self::build(name, mesh, seed, |uniform| match inertial {
+            Some(given) => Ok((given, false)),
+            None => Ok((uniform()?.into(), true)),
+        })
+    }
+
+    /// Prepares `mesh` (meters) of uniform density and mass `mass` \[kg\], or of an assumed density.
+    ///
+    /// # Errors
+    /// If a face names a vertex that is not there, the mesh is open or has no area, or the mass is not positive.
+    pub fn with_mass(
+        name: &str,
+        mesh: TriMesh,
+        mass: Option<f64>,
+        seed: u64,
+    ) -> Result<Self, RefineError> {
+        Self::build(name, mesh, seed, |uniform| {
+            let uniform = uniform()?;
+            match mass {
+                Some(mass) => Ok((uniform.with_mass(mass)?.into(), false)),
+                None => Ok((uniform.into(), true)),
+            }
+        })
+    }
+
+    fn build(
+        name: &str,
+        mesh: TriMesh,
+        seed: u64,
+        weigh: impl FnOnce(
+            &dyn Fn() -> Result<MassProperties, MassError>,
+        ) -> Result<(Inertial, bool), MassError>,
+    ) -> Result<Self, RefineError> {
+        let fail = |reason: String| RefineError::Object { object: name.to_owned(), reason };
+        let count = mesh.vertices.len();
+        let outside = |f: &[u32; 3]| f.iter().any(|&v| v as usize >= count);
+        if let Some(face) = mesh.faces.iter().position(outside) {
+            let [a, b, c] = mesh.faces[face];
+            return Err(fail(format!(
+                "face {face} joins vertices {a}, {b} and {c}, but the mesh has {count}"
+            )));
+        }
+        let (solid, report) = mesh.cleaned();
+        let (low, high) = solid.bounds().ok_or_else(|| fail("the mesh has no faces".into()))?;
+        let uniform = || mass_properties(&solid, DEFAULT_DENSITY);
+        if solid.area() <= 1e-12 * (high - low).norm_squared() {
+            return Err(fail("the mesh is degenerate: its faces have no area".into()));
+        }
+        let (inertial, inertial_assumed) = weigh(&uniform).map_err(|e| match e {
+            MassError::NotClosed { edges } => fail(format!(
+                "the mesh is not closed ({edges} edges do not join two faces), so its mass, center of \
+                 mass and inertia must all be given"
+            )),
+            other => fail(other.to_string()),
+        })?;
+        if !(inertial.mass.is_finite() && inertial.mass > 0.0) {
+            return Err(fail(format!("the mass {} kg is not positive", inertial.mass)));
+        }
+        let unit = |f| solid.area_vector(f).try_normalize(0.0).unwrap_or_else(Vector3::zeros);
+        Ok(Self {
+            name: name.to_owned(),
+            normals: (0..solid.faces.len()).map(unit).collect(),
+            surface: ClosestPoints::new(&solid).map_err(|e| fail(e.to_string()))?,
+            samples: surface_samples(&solid, SURFACE_SAMPLES, seed),
+            model: RenderModel::new(&mesh).map_err(|e| fail(e.to_string()))?,
+            center: nalgebra::center(&low, &high),
+            radius: 0.5 * (high - low).norm(),
+            area: solid.area(),
+            mesh,
+            report,
+            inertial,
+            inertial_assumed,
+        })
+    }
+}
+
+impl From<MassProperties> for Inertial {
+    fn from(m: MassProperties) -> Self {
+        Self { mass: m.mass, center_of_mass: m.center_of_mass, inertia: m.inertia }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_face_beyond_the_vertices_is_an_error() {
+        let corners = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]].map(Point3::from);
+        let mesh = TriMesh::new(corners.to_vec(), vec![[0, 1, 2], [0, 1, 3]]);
+        let error = Object::new("sheet", mesh, None, 0).map(|_| ()).unwrap_err().to_string();
+        assert!(error.contains("object sheet: face 1 joins vertices 0, 1 and 3"), "{error}");
+    }
+}

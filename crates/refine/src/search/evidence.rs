@@ -1,0 +1,229 @@
+//! What the sensors say, in the form that very many hypotheses are judged by.
+
+use nalgebra::{Point3, Vector3};
+use prehend_geometry::KdTree;
+use prehend_geometry::cloud::estimate_normals;
+use prehend_geometry::sample::surface_samples;
+use prehend_render::{Camera, DepthImage};
+
+use crate::error::RefineError;
+use crate::factor::back_project;
+use crate::scene::{Hand, Observation};
+
+/// Depth points that normals are estimated from, at most.
+const POINTS: usize = 2500;
+/// Neighbors that a normal is estimated from.
+const NEIGHBOURS: usize = 24;
+/// Points on the hand's surface that the object must not reach.
+const HAND_POINTS: usize = 300;
+/// Columns at most of the map of what is seen where.
+const MAP_WIDTH: usize = 160;
+
+/// Everything in the camera frame \[m\].
+pub(super) struct Evidence {
+    /// Points on the object's visible surface with their normals (zero where unknown), in no particular order.
+    pub(super) points: Vec<(Point3<f64>, Vector3<f64>)>,
+    /// Taxels that the object touches.
+    pub(super) touched: Vec<Point3<f64>>,
+    /// Points of the hand, quiet taxels among them, that are not inside the object.
+    pub(super) outside: Vec<Point3<f64>>,
+    /// What is seen where.
+    pub(super) map: SightMap,
+}
+
+impl Evidence {
+    /// What `observation` says; taxels with more than `contact_threshold` \[N\] are touched. `hand` is the depth image
+    /// of the hand alone.
+    ///
+    /// # Errors
+    /// If no pixel of the mask has a depth, or forces and taxels do not match.
+    pub(super) fn new(
+        observation: &Observation,
+        robot: Option<&Hand>,
+        hand: &DepthImage,
+        contact_threshold: f64,
+    ) -> Result<Self, RefineError> {
+        let places = back_project(observation, POINTS)?;
+        let tree = KdTree::new(&places).map_err(|_| RefineError::NoDepth)?;
+        let normals = estimate_normals(&tree, NEIGHBOURS, &Point3::origin());
+        let (mut touched, mut outside) = (Vec::new(), Vec::new());
+        if let (Some(robot), Some(reading)) = (robot, &observation.hand) {
+            let posed = robot.posed(&reading.t_cam_hand, &reading.joints)?;
+            let surface = surface_samples(&posed.mesh(), HAND_POINTS, 0);
+            outside.extend(surface.iter().map(|s| s.point));
+            for (taxel, force) in robot.taxels.iter().zip(&reading.forces) {
+                let link = robot.tree.link_index(&taxel.link);
+                let link = link.and_then(|i| posed.t_world_links().get(i));
+                let link =
+                    link.ok_or_else(|| RefineError::TaxelLink { link: taxel.link.clone() })?;
+                let list =
+                    if force.norm() > contact_threshold { &mut touched } else { &mut outside };
+                list.push(link * taxel.position);
+            }
+        }
+        let map = SightMap::new(observation, hand);
+        Ok(Self {
+            points: shuffled(places.into_iter().zip(normals).collect()),
+            touched,
+            outside,
+            map,
+        })
+    }
+}
+
+/// `items` in an order of which every beginning is spread over all of them.
+fn shuffled<T: Copy>(items: Vec<T>) -> Vec<T> {
+    let mut order: Vec<usize> = (0..items.len()).collect();
+    // Multiples of the golden ratio fill the unit interval evenly.
+    let key = |i: usize| (i as f64 * 0.618_033_988_749_895).fract();
+    order.sort_by(|&a, &b| key(a).total_cmp(&key(b)));
+    // Neighbors in that order are far apart in the list; a stride makes beginnings even too.
+    order.into_iter().map(|i| items[i]).collect()
+}
+
+/// What the camera sees where, at a low resolution.
+pub(super) struct SightMap {
+    camera: Camera,
+    pixels: Vec<Sight>,
+}
+
+#[derive(Clone, Copy)]
+struct Sight {
+    /// Whether the object is seen here.
+    object: bool,
+    /// Nearest depth of anything here \[m\], 0 where unknown.
+    depth: f32,
+    /// Distance to the nearest pixel of the object \[px\].
+    away: f32,
+}
+
+impl SightMap {
+    fn new(observation: &Observation, hand: &DepthImage) -> Self {
+        let full = &observation.camera;
+        let factor = full.width.div_ceil(MAP_WIDTH).max(1);
+        let (width, height) = ((full.width / factor).max(1), (full.height / factor).max(1));
+        let at = |x: usize, y: usize| {
+            let (x, y) = (x * factor + factor / 2, y * factor + factor / 2);
+            let object = observation.mask.get(x, y).unwrap_or(false);
+            let measured = observation.depth.get(x, y).unwrap_or(0.0);
+            let known = if object { 0.0 } else { hand.get(x, y).unwrap_or(0.0) };
+            let depth = match (measured > 0.0, known > 0.0) {
+                (true, true) => measured.min(known),
+                (true, false) => measured,
+                _ => known,
+            };
+            Sight { object, depth, away: if object { 0.0 } else { f32::MAX } }
+        };
+        let mut pixels: Vec<Sight> =
+            (0..width * height).map(|i| at(i % width, i / width)).collect();
+        measure_away(&mut pixels, width);
+        // Pixel (x, y) of the map is pixel (x factor + factor/2, …) of the image.
+        let (scale, middle) = (1.0 / factor as f64, (factor / 2) as f64);
+        let camera = Camera {
+            fx: full.fx * scale,
+            fy: full.fy * scale,
+            cx: (full.cx - middle) * scale,
+            cy: (full.cy - middle) * scale,
+            width,
+            height,
+        };
+        Self { camera, pixels }
+    }
+
+    /// How far \[m\] a surface point of the object that faces the camera is from where it could be, by what is seen;
+    /// 0 where something hides it, or outside the image.
+    #[inline]
+    pub(super) fn conflict(&self, point: &Point3<f64>) -> f64 {
+        /// Surface this far behind what is seen there is hidden by it \[m\].
+        const HIDDEN: f64 = 5e-3;
+        let Some(pixel) = self.camera.project(point) else { return 1.0 };
+        let (u, v) = (pixel.x.round(), pixel.y.round());
+        let (width, height) = (self.camera.width as f64, self.camera.height as f64);
+        if u < 0.0 || v < 0.0 || u >= width || v >= height {
+            return 0.0;
+        }
+        let sight = &self.pixels[v as usize * self.camera.width + u as usize];
+        let depth = f64::from(sight.depth);
+        if sight.object {
+            // In front of what is seen it would be seen; behind, a nearer part of the object may hide it.
+            let ahead = depth - point.z;
+            return match depth > 0.0 {
+                true if ahead > 0.0 => ahead,
+                true => -0.5 * ahead,
+                false => 0.0,
+            };
+        }
+        if depth > 0.0 && depth < point.z - HIDDEN {
+            return 0.0;
+        }
+        f64::from(sight.away) * point.z / self.camera.fx
+    }
+}
+
+/// Fills in the distances to the object in two sweeps, by steps to the eight neighbors.
+fn measure_away(pixels: &mut [Sight], width: usize) {
+    let height = pixels.len() / width;
+    let mut relax = |x: usize, y: usize, forwards: bool| {
+        let sign = if forwards { -1_isize } else { 1 };
+        let steps = [(sign, 0), (-1, sign), (0, sign), (1, sign)];
+        for (dx, dy) in steps {
+            let (nx, ny) = (x as isize + dx, y as isize + dy);
+            if nx < 0 || ny < 0 || nx >= width as isize || ny >= height as isize {
+                continue;
+            }
+            let length = if dx != 0 && dy != 0 { std::f32::consts::SQRT_2 } else { 1.0 };
+            let through = pixels[ny as usize * width + nx as usize].away + length;
+            let own = &mut pixels[y * width + x].away;
+            *own = own.min(through);
+        }
+    };
+    for y in 0..height {
+        (0..width).for_each(|x| relax(x, y, true));
+    }
+    for y in (0..height).rev() {
+        (0..width).rev().for_each(|x| relax(x, y, false));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::refine::hand_depth;
+    use crate::scene::default_scene;
+
+    #[test]
+    fn the_truth_is_in_no_conflict_and_a_shifted_pose_is() {
+        let scene = default_scene(1).unwrap();
+        let hand = hand_depth(&scene.observation, Some(&scene.robot));
+        let evidence = Evidence::new(&scene.observation, Some(&scene.robot), &hand, 0.1).unwrap();
+        assert!(evidence.points.len() > 1000 && evidence.touched.len() > 3);
+        let mean = |shift: Vector3<f64>| {
+            let facing = scene.object.samples.iter().filter_map(|s| {
+                let (p, n) = (scene.truth * s.point + shift, scene.truth * s.normal);
+                (n.dot(&p.coords) < -0.3 * p.coords.norm()).then_some(p)
+            });
+            let conflicts: Vec<f64> = facing.map(|p| evidence.map.conflict(&p)).collect();
+            conflicts.iter().sum::<f64>() / conflicts.len() as f64
+        };
+        let truth = mean(Vector3::zeros());
+        assert!(truth < 3e-3, "{truth}");
+        for shift in [Vector3::x() * 0.03, Vector3::y() * -0.03, Vector3::z() * -0.03] {
+            assert!(mean(shift) > 3.0 * truth, "{shift}: {}", mean(shift));
+        }
+        let inside = |p: &Point3<f64>| {
+            scene.object.surface.signed_distance(&scene.truth.inverse_transform_point(p)).0 < -3e-3
+        };
+        let wrong = evidence.outside.iter().filter(|p| inside(p)).count();
+        assert!(wrong * 20 < evidence.outside.len(), "{wrong}");
+    }
+
+    #[test]
+    fn distances_away_are_those_of_straight_and_diagonal_steps() {
+        let far = Sight { object: false, depth: 0.0, away: f32::MAX };
+        let mut pixels = vec![far; 5 * 4];
+        pixels[5 + 1].away = 0.0;
+        measure_away(&mut pixels, 5);
+        assert_eq!((pixels[0].away, pixels[9].away), (std::f32::consts::SQRT_2, 3.0));
+        assert_eq!(pixels[19].away, 2.0 * std::f32::consts::SQRT_2 + 1.0);
+    }
+}

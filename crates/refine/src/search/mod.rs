@@ -1,0 +1,189 @@
+//! The pose of a known object in a hand, from sensors alone.
+
+mod evidence;
+mod fine;
+mod lattice;
+mod rotations;
+mod rough;
+mod settings;
+
+use std::sync::Arc;
+
+use nalgebra::{Isometry3, Vector3};
+use rayon::prelude::*;
+
+pub(crate) use self::rotations::spread_rotations;
+pub use self::settings::SearchSettings;
+
+use self::evidence::Evidence;
+use self::fine::FineScorer;
+use self::lattice::DistanceLattice;
+use self::rough::CoarseScorer;
+use crate::error::RefineError;
+use crate::problem::State;
+use crate::refine::hand_depth;
+use crate::scene::{Hand, Object, Observation};
+
+/// A pose that a search ends with.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Found {
+    /// Object coordinates → camera coordinates \[m\].
+    pub t_cam_object: Isometry3<f64>,
+    /// The sum of the terms there \[nats\]; the lower the better.
+    pub value: f64,
+}
+
+/// Visuo-tactile global search: finds an object without any initial pose, training or randomness.
+///
+/// Hypotheses are rotations spread over all there are, each at several places about the masked depth. They are
+/// scored and pruned in stages, each dearer than the one before and of fewer hypotheses:
+///
+/// 1. Rotation held, each slides by a few robust steps until the depth points and the touched taxels lie on the surface
+///    and the hand outside of it. The score is of depth points and their normals, touched taxels, the hand inside the
+///    object, and surface where the camera sees something else: all by a lattice of signed distances.
+/// 2. The best that differ from each other turn too, and are scored again on more points.
+/// 3. Those left are scored by the terms of the refinement at a low resolution. Only here color counts, which
+///    tells the front of a carton from its back; therefore stage 2 keeps many.
+/// 4. Gauss–Newton steps of the sum of the terms, at a low and then at the full resolution.
+///
+/// The terms are depth, color and, where there is a skin, touch. Only what an estimator may know is read: nothing
+/// here takes a pose of the object. A hand that is not known hides what its depth says it hides in stages 1 and 2, and
+/// nothing in the terms: without it, small and much hidden objects are often found turned.
+///
+/// The result does not depend on the number of threads. Poses that look and feel alike (a symmetry) are
+/// equally good; one of them comes first.
+pub struct PoseSearch {
+    object: Arc<Object>,
+    lattice: DistanceLattice,
+    settings: SearchSettings,
+}
+
+/// A hypothesis and how badly it fits.
+type Scored = (Isometry3<f64>, f64);
+
+impl PoseSearch {
+    /// Prepares the search for `object`, which takes a tenth of a second and serves all frames.
+    ///
+    /// # Errors
+    /// [`RefineError::Setting`] for a setting out of range.
+    pub fn new(object: Arc<Object>, settings: SearchSettings) -> Result<Self, RefineError> {
+        settings.check()?;
+        let lattice = DistanceLattice::new(&object, settings.cells);
+        Ok(Self { object, lattice, settings })
+    }
+
+    /// Searches in `observation`; the best pose comes first, and others that differ from it follow.
+    ///
+    /// # Errors
+    /// If no pixel of the mask has a depth, no pose fits at all, the images do not fit each other, or the hand's joints or forces
+    /// do not fit the robot.
+    pub fn run(
+        &self,
+        observation: &Observation,
+        robot: Option<&Arc<Hand>>,
+    ) -> Result<Vec<Found>, RefineError> {
+        let settings = &self.settings;
+        // The checks that every refinement makes.
+        State::new(observation, &self.object, &Isometry3::translation(0.0, 0.0, 1e3))?;
+        if let (Some(robot), Some(hand)) = (robot, &observation.hand) {
+            robot.check_joints(&hand.joints)?;
+            let (forces, taxels) = (hand.forces.len(), robot.taxels.len());
+            if forces > 0 && forces != taxels {
+                return Err(RefineError::TaxelCount { forces, taxels });
+            }
+        }
+        let hand = Arc::new(hand_depth(observation, robot.map(Arc::as_ref)));
+        let evidence =
+            Evidence::new(observation, robot.map(Arc::as_ref), &hand, settings.contact_threshold)?;
+        let rough =
+            CoarseScorer { object: &self.object, lattice: &self.lattice, evidence: &evidence };
+        let placed = self.place(&rough);
+        let turned = self.turn(&rough, &placed);
+        let judge = |resolution| {
+            FineScorer::new(observation, &self.object, robot, &hand, resolution, settings)
+        };
+        let coarse = judge(settings.coarse_resolution)?;
+        let seen = evaluate(&turned, |pose| (*pose, coarse.value(pose)));
+        let seen = distinct(seen, settings.seen, 6e-3, 6.0);
+        let middle = judge(settings.middle_resolution)?;
+        let moved = evaluate(&seen, |pose| middle.descend(pose, settings.middle_steps));
+        let moved = distinct(moved, settings.last, 3e-3, 3.0);
+        let full = judge(1)?;
+        let last = evaluate(&moved, |pose| full.descend(pose, settings.last_steps));
+        let last = distinct(last, settings.last, 1e-3, 1.0);
+        if last.is_empty() {
+            return Err(RefineError::NothingFits);
+        }
+        Ok(last.into_iter().map(|(t_cam_object, value)| Found { t_cam_object, value }).collect())
+    }
+
+    /// Stage 1.
+    fn place(&self, rough: &CoarseScorer) -> Vec<Scored> {
+        let settings = &self.settings;
+        let reach = settings.reach * self.object.radius;
+        let shifts: Vec<Vector3<f64>> = (0..9)
+            .map(|i| Vector3::new(f64::from(i % 3 - 1), f64::from(i / 3 - 1), 0.0) * reach)
+            .collect();
+        let placed: Vec<Scored> = spread_rotations(settings.rotations)
+            .par_iter()
+            .flat_map_iter(|rotation| {
+                let centered = rough.centered(rotation);
+                let points = settings.rough_points;
+                let scored = shifts.iter().map(|shift| {
+                    let mut start = centered;
+                    start.translation.vector += shift;
+                    let pose = rough.settle(&start, points, 20e-3, settings.slides, true);
+                    (pose, rough.score(&pose, points, 15e-3))
+                });
+                // Two of the places a rotation: nearly all end in the same one.
+                let mut scored: Vec<Scored> = scored.collect();
+                scored.sort_by(|a, b| a.1.total_cmp(&b.1));
+                scored.truncate(2);
+                scored
+            })
+            .collect();
+        distinct(placed, settings.placed, 10e-3, 8.0)
+    }
+
+    /// Stage 2.
+    fn turn(&self, rough: &CoarseScorer, placed: &[Scored]) -> Vec<Scored> {
+        let settings = &self.settings;
+        let points = settings.points;
+        let turned = evaluate(placed, |pose| {
+            let pose = rough.settle(pose, points / 2, 15e-3, settings.turns, false);
+            let pose = rough.settle(&pose, points, 7e-3, settings.turns / 2, false);
+            (pose, rough.score(&pose, points, 10e-3))
+        });
+        distinct(turned, settings.turned, 6e-3, 6.0)
+    }
+}
+
+/// `f` of every pose, in the same order.
+fn evaluate(poses: &[Scored], f: impl Fn(&Isometry3<f64>) -> Scored + Sync) -> Vec<Scored> {
+    poses.par_iter().with_max_len(1).map(|(pose, _)| f(pose)).collect()
+}
+
+/// The best `limit` of `poses`, best first, without those within `distance` \[m\] and `angle` \[°\] of a better one.
+fn distinct(mut poses: Vec<Scored>, limit: usize, distance: f64, angle: f64) -> Vec<Scored> {
+    poses.retain(|(_, score)| score.is_finite());
+    // The sort keeps the order of equals, so the result is always the same.
+    poses.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let least = (0.5 * angle.to_radians()).cos();
+    let mut kept: Vec<Scored> = Vec::new();
+    for (pose, score) in poses {
+        if kept.len() >= limit {
+            break;
+        }
+        let near = |(other, _): &Scored| {
+            let apart = (other.translation.vector - pose.translation.vector).norm();
+            apart < distance && other.rotation.coords.dot(&pose.rotation.coords).abs() > least
+        };
+        if !kept.iter().any(near) {
+            kept.push((pose, score));
+        }
+    }
+    kept
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,66 @@
+use super::*;
+use crate::evaluate::metrics::{oe_deg, pe_cm};
+use crate::scene::{Scene, default_scene};
+use std::sync::LazyLock;
+
+static SCENE: LazyLock<Scene> = LazyLock::new(|| default_scene(1).unwrap());
+
+fn search(settings: SearchSettings) -> Result<Vec<Found>, RefineError> {
+    PoseSearch::new(Arc::clone(&SCENE.object), settings)?
+        .run(&SCENE.observation, Some(&SCENE.robot))
+}
+
+#[test]
+fn the_bottle_is_found_from_sensors_alone() {
+    let found = search(SearchSettings::default()).unwrap();
+    let best = &found[0].t_cam_object;
+    let (pe, oe) = (pe_cm(best, &SCENE.truth), oe_deg(best, &SCENE.truth));
+    assert!(pe < 0.3 && oe < 3.0, "{pe} cm, {oe}°");
+    assert!(found.windows(2).all(|f| f[0].value <= f[1].value));
+}
+
+#[test]
+fn vision_alone_finds_it_too() {
+    let mut observation = SCENE.observation.clone();
+    observation.hand = None;
+    let search = PoseSearch::new(Arc::clone(&SCENE.object), SearchSettings::default()).unwrap();
+    let best = search.run(&observation, None).unwrap()[0].t_cam_object;
+    let (pe, oe) = (pe_cm(&best, &SCENE.truth), oe_deg(&best, &SCENE.truth));
+    assert!(pe < 0.3 && oe < 3.0, "{pe} cm, {oe}°");
+}
+
+#[test]
+fn any_number_of_threads_finds_the_same() {
+    let few =
+        SearchSettings { rotations: 200, placed: 40, turned: 16, ..SearchSettings::default() };
+    let found = [1, 2, 3].map(|threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| search(few.clone())).unwrap()
+    });
+    assert_eq!(found[0], found[1]);
+    assert_eq!(found[0], found[2]);
+}
+
+#[test]
+fn bad_input_is_an_error() {
+    let none = SearchSettings { rotations: 0, ..SearchSettings::default() };
+    let error = search(none).unwrap_err().to_string();
+    assert!(error.contains("rotations must be above zero"), "{error}");
+    let nan = SearchSettings { reach: f64::NAN, ..SearchSettings::default() };
+    assert!(search(nan).unwrap_err().to_string().contains("reach is NaN"));
+
+    let search = PoseSearch::new(Arc::clone(&SCENE.object), SearchSettings::default()).unwrap();
+    let refused = |change: &dyn Fn(&mut Observation)| {
+        let mut observation = SCENE.observation.clone();
+        change(&mut observation);
+        search.run(&observation, Some(&SCENE.robot)).unwrap_err()
+    };
+    let dark = refused(&|o| o.depth.pixels_mut().fill(0.0));
+    assert!(matches!(dark, RefineError::NoDepth));
+    let empty = refused(&|o| o.mask.pixels_mut().fill(false));
+    assert!(matches!(empty, RefineError::EmptyMask));
+    let forces = refused(&|o| {
+        o.hand.as_mut().unwrap().forces.pop();
+    });
+    assert!(matches!(forces, RefineError::TaxelCount { .. }));
+}
