@@ -5,13 +5,11 @@ use std::hint::black_box;
 use std::sync::{Arc, LazyLock};
 use std::time::{Duration, Instant};
 
-use prehend::refine::RefineError;
-use prehend::refine::problem::{Block, Normal, State};
-use prehend::refine::refine;
+use prehend::refine::problem::{Block, NormalEquations, State};
 use prehend::refine::scene::{Scene, Sequence, default_scene, default_sequence};
-use prehend::refine::standard_terms;
-use prehend::refine::tracker::{Spent, TrackStatus, Tracked, Tracker, TrackerSettings};
-use prehend::refine::{Config, TermKind};
+use prehend::refine::strategy::{Fused, GradientKind, Heuristic};
+use prehend::refine::tracker::{Timing, TrackStatus, Tracked, Tracker, TrackerSettings};
+use prehend::refine::{Frame, RefineError, Strategy, refine};
 
 static SCENE: LazyLock<Scene> = LazyLock::new(|| default_scene(1).expect("the built-in scene"));
 
@@ -23,33 +21,32 @@ fn main() -> Result<(), RefineError> {
     let words: Vec<String> = std::env::args().skip(1).filter(|w| !w.starts_with('-')).collect();
     let wanted = |name: &str| words.is_empty() || words.iter().any(|word| name.contains(word));
     println!("| what | median ms | fastest | slowest |\n|---|--:|--:|--:|");
-    let mut exhaustive = Config::combined();
-    exhaustive.heuristic.exhaustive = true;
-    let whole = [
+    let frame = Frame::new(&SCENE.observation, &SCENE.object, Some(&SCENE.hand))?;
+    let (fused, combined) = (Fused::default(), Heuristic::combined());
+    let exhaustive = Heuristic { exhaustive: true, ..combined.clone() };
+    let whole: [(&str, usize, &dyn Strategy); 3] = [
         // The default.
-        ("fused", 10, Config::default()),
+        ("fused", 10, &fused),
         // The paper's method, ending when nothing improves.
-        ("combined", 5, Config::combined()),
+        ("combined", 5, &combined),
         // As many iterations as the paper's standard setting runs.
-        ("combined, 400 iterations", 3, exhaustive),
+        ("combined, 400 iterations", 3, &exhaustive),
     ];
-    for (name, samples, config) in whole {
+    for (name, samples, strategy) in whole {
         if wanted(name) {
-            let (observation, object) = (&SCENE.observation, &SCENE.object);
-            time(name, samples, || {
-                refine(observation, object, Some(&SCENE.robot), &SCENE.initial, &config).is_ok()
-            });
+            time(name, samples, || refine(&frame, &SCENE.initial, strategy).is_ok());
         }
     }
-    for kind in TermKind::ALL {
-        let (term, state) = prepared(kind)?;
-        let (value, linearize) = (format!("value, {kind}"), format!("linearize, {kind}"));
-        if wanted(&value) {
-            time(&value, 100, || term.value(&state));
+    let state = State::new(&frame, &SCENE.initial)?;
+    for kind in GradientKind::ALL {
+        let factor = Heuristic::of(&[kind]).factors(&frame, &state)?.remove(0);
+        let (cost, linearize) = (format!("cost, {kind}"), format!("linearize, {kind}"));
+        if wanted(&cost) {
+            time(&cost, 100, || factor.cost(&state));
         }
         if wanted(&linearize) {
             time(&linearize, 100, || {
-                term.linearize(&state, &mut Normal::new(&[Block::ObjectPose]))
+                factor.linearize(&state, &mut NormalEquations::new(&[Block::ObjectPose]))
             });
         }
     }
@@ -79,7 +76,7 @@ fn time<T>(name: &str, samples: usize, mut run: impl FnMut() -> T) {
 
 /// A tracker that has found the object in the first frame.
 fn tracker() -> Result<Tracker, RefineError> {
-    let (object, robot) = (Arc::clone(&SEQUENCE.object), Arc::clone(&SEQUENCE.robot));
+    let (object, robot) = (Arc::clone(&SEQUENCE.object), Arc::clone(&SEQUENCE.hand));
     let mut tracker = Tracker::new(object, Some(robot), TrackerSettings::default())?;
     tracker.start_from(&SEQUENCE.initial);
     tracker.track(&SEQUENCE.frames[0].observation, SEQUENCE.frames[0].time)?;
@@ -94,11 +91,11 @@ fn follow(mut tracker: Tracker) -> Result<Vec<Tracked>, RefineError> {
 
 /// Prints what the time of tracking goes into.
 fn tell_shares(tracked: &[Tracked]) {
-    let followed = tracked.iter().filter(|t| t.following == TrackStatus::Followed).count();
-    let sum = |part: fn(&Spent) -> Duration| -> f64 {
-        tracked.iter().map(|t| part(&t.spent).as_secs_f64()).sum()
+    let followed = tracked.iter().filter(|t| t.status == TrackStatus::Tracked).count();
+    let sum = |part: fn(&Timing) -> Duration| -> f64 {
+        tracked.iter().map(|t| part(&t.timing).as_secs_f64()).sum()
     };
-    let total = sum(Spent::total);
+    let total = sum(Timing::total);
     let iterations: usize = tracked.iter().map(|t| t.iterations).sum();
     let frames = tracked.len() as f64;
     println!(
@@ -109,25 +106,10 @@ fn tell_shares(tracked: &[Tracked]) {
     let parts = [
         ("preparation", sum(|s| s.preparation)),
         ("steps", sum(|s| s.steps)),
-        ("judgment", sum(|s| s.judgment)),
+        ("validation", sum(|s| s.validation)),
         ("recovery", sum(|s| s.recovery)),
     ];
     for (name, seconds) in parts {
         println!("  {name:<12} {:6.2} ms {:4.0} %", 1e3 * seconds / frames, 1e2 * seconds / total);
     }
-}
-
-/// A term and the state that a refinement begins with, lit as the term sees it.
-fn prepared(
-    kind: TermKind,
-) -> Result<(Box<dyn prehend::refine::factor::Term>, State), RefineError> {
-    let config = Config::of(&[kind]);
-    let mut state = State::new(&SCENE.observation, &SCENE.object, &SCENE.initial)?;
-    let robot = Some(&SCENE.robot);
-    let mut terms = standard_terms(&SCENE.observation, &SCENE.object, robot, &state, &config)?;
-    let term = terms.remove(0);
-    if let Some(light) = term.light(&state) {
-        state.light = light;
-    }
-    Ok((term, state))
 }

@@ -6,10 +6,11 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 use prehend::autodiff::{Fwd, Recording, Scalar};
 use prehend::geometry::sample::surface_samples;
-use prehend::geometry::{DistanceField, FieldSample, shapes};
+use prehend::geometry::shapes;
 use prehend::sim::{
-    Body, Compact, Contact, ContactLaw, Horizon, Integrator, Onset, Response, RigidBody,
-    SemiImplicitEuler, SimulationError, State, Surface, World, regularized_coulomb,
+    Body, Contact, ContactBodies, ContactLaw, GapSmoothing, HalfSpace, Integrator, Response,
+    RigidBody, SemiImplicitEuler, SimulationError, State, StepCheckpointed, Surface, TimeSteps,
+    World, regularized_coulomb,
 };
 
 /// Force grows with the square of the penetration. Stiffness per area \[N/m⁴\] and friction coefficient.
@@ -29,19 +30,8 @@ impl ContactLaw for Quadratic {
     }
 }
 
-/// The half-space z < 0.
-struct Floor;
-
-impl DistanceField for Floor {
-    fn sample(&self, point: &Point3<f64>, reach: f64) -> Option<FieldSample> {
-        let sample =
-            FieldSample { distance: point.z, gradient: Vector3::z(), hessian: Matrix3::zeros() };
-        (point.z <= reach).then_some(sample)
-    }
-}
-
 /// Down, and up again.
-const DROP: Horizon = Horizon { dt: 1e-4, steps: 1000 };
+const DROP: TimeSteps = TimeSteps { dt: 1e-4, steps: 1000 };
 const RADIUS: f64 = 0.05;
 
 /// A ball on the floor, and the states of both.
@@ -52,11 +42,12 @@ fn ball_on_floor(law: Quadratic) -> anyhow::Result<(World, [State; 2])> {
     let inertia = Matrix3::identity() * (0.4 * mass * RADIUS * RADIUS);
     let rigid = RigidBody::new(mass, inertia, Point3::origin())?;
     let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-    let floor = world.add(Body::held("floor").with_field(Arc::new(Floor)));
+    let field = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
     let surface = Surface::uniform(&points, ball.area())?;
-    let ball = world.add(Body::free("ball", rigid).with_surface(surface));
-    // A smooth onset, or the moment of impact jumps from one time step to the next.
-    world.touch(ball, floor, Arc::new(law), Onset::Softplus { width: 5e-5 })?;
+    let samples = world.add(Body::free("ball", rigid).with_surface(surface));
+    let bodies = ContactBodies { samples, field };
+    // Smooth, or the moment of impact jumps from one time step to the next.
+    world.add_contact(bodies, Arc::new(law), GapSmoothing::Softplus { width: 5e-5 })?;
     let resting = rigid.at_rest(&Isometry3::translation(0.0, 0.0, RADIUS));
     Ok((world, [State::at_rest(Isometry3::identity()), resting]))
 }
@@ -69,7 +60,7 @@ fn height<S: Scalar>(
     [drop, stiffness]: [S; 2],
 ) -> Result<S, SimulationError> {
     let mut world = world.lift();
-    world.contacts[0].params[0] = stiffness;
+    world.contacts[0].params_mut()[0] = stiffness;
     let mut states = states.each_ref().map(|state| state.lift());
     states[1].pose.translation.z += drop;
     let end = world.simulate(integrator, &states, DROP, |_, _| ())?;
@@ -85,16 +76,16 @@ fn main() -> anyhow::Result<()> {
     println!("dropped from 10 mm, after 0.1 s the ball is at {:.4} m", forward.value);
 
     // Reverse mode: one node a step.
-    let compact = Compact::new(euler, &world)?;
+    let checkpointed = StepCheckpointed::new(euler, &world)?;
     let recording = Recording::start();
     let inputs = recording.variables(at);
-    let adjoints = recording.gradient(height(&world, &states, &compact, inputs)?);
+    let adjoints = recording.gradient(height(&world, &states, &checkpointed, inputs)?);
     let reverse = inputs.map(|x| adjoints.wrt(x));
 
     for (i, name) in ["drop", "stiffness"].into_iter().enumerate() {
-        let off = |share: f64| {
+        let off = |fraction: f64| {
             let mut x = at;
-            x[i] *= 1.0 + share;
+            x[i] *= 1.0 + fraction;
             height(&world, &states, &euler, x)
         };
         let difference = (off(1e-6)? - off(-1e-6)?) / (2e-6 * at[i]);

@@ -8,12 +8,11 @@ use std::time::Instant;
 use anyhow::{Context, ensure};
 use nalgebra::Isometry3;
 use prehend::geometry::{ClosestPoints, SolidUnion};
-use prehend::refine::Config;
 use prehend::refine::evaluate::metrics::{ContactModel, Table, oe_deg, pe_cm};
 use prehend::refine::evaluate::report::before_and_after;
-use prehend::refine::refine;
 use prehend::refine::scene::HandMeasurement;
 use prehend::refine::scene::default_scene;
+use prehend::refine::{Frame, Method, refine};
 
 fn main() -> anyhow::Result<()> {
     let seed = std::env::args()
@@ -24,14 +23,14 @@ fn main() -> anyhow::Result<()> {
     let scene = default_scene(seed)?;
 
     let start = Instant::now();
-    let config = Config::default();
-    let (observation, robot) = (&scene.observation, Some(&scene.robot));
-    let refined = refine(observation, &scene.object, robot, &scene.initial, &config)?;
+    let observation = &scene.observation;
+    let frame = Frame::new(observation, &scene.object, Some(&scene.hand))?;
+    let refined = refine(&frame, &scene.initial, &Method::default())?;
     let seconds = start.elapsed().as_secs_f64();
 
     let hand = observation.hand.as_ref().context("the frame has a hand")?;
     let HandMeasurement { t_cam_hand, joints, .. } = hand;
-    let body = SolidUnion::new(&scene.robot.posed(t_cam_hand, joints)?.mesh_parts())?;
+    let body = SolidUnion::new(&scene.hand.posed(t_cam_hand, joints)?.mesh_parts())?;
     let surface = ClosestPoints::new(&body.mesh())?;
     let contact = ContactModel::new(&scene.object.mesh);
     let header = ["", "PE cm", "OE °", "CA cm²", "IV cm³"].map(str::to_owned).to_vec();
@@ -48,20 +47,21 @@ fn main() -> anyhow::Result<()> {
         Ok(())
     };
     row("initial pose", &scene.initial)?;
-    row("refined pose", &refined.t_cam_object)?;
+    row("refined pose", refined.t_cam_object())?;
     row("true pose", &scene.truth)?;
     println!("\n{table}");
-    let probability = refined.confidence.map_or(f64::NAN, |confidence| confidence.probability());
+    let probability =
+        refined.posterior.as_ref().map_or(f64::NAN, |posterior| posterior.probability());
     println!("{seconds:.2} s. Within 5 mm and 5° with a probability of {probability:.3}.");
 
     let picture = Path::new("out/pose_refinement.png");
     std::fs::create_dir_all("out")?;
-    before_and_after(observation, &scene.object, &scene.initial, &refined.t_cam_object)
+    before_and_after(observation, &scene.object, &scene.initial, refined.t_cam_object())
         .save(picture)?;
     println!("Before and after: {}", picture.display());
 
     ensure!(
-        pe_cm(&refined.t_cam_object, &scene.truth) < 0.5 * pe_cm(&scene.initial, &scene.truth),
+        pe_cm(refined.t_cam_object(), &scene.truth) < 0.5 * pe_cm(&scene.initial, &scene.truth),
         "the refinement should have halved the position error"
     );
     Ok(())

@@ -2,12 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use prehend::refine::Config;
-use prehend::refine::data::Assets;
 use prehend::refine::data::bop::{Dataset, ResultRow, read_results};
+use prehend::refine::data::{Assets, Sensor};
 use prehend::refine::evaluate::Scorer;
 use prehend::refine::evaluate::metrics::PoseScore;
-use prehend::refine::refine;
+use prehend::refine::{Frame, Method, refine};
 
 /// Means of PE, OE and |ΔIV| before and after refining every pose of `poses`, and how many there are.
 fn before_and_after(dataset: &Path, poses: &str) -> (usize, [f64; 3], [f64; 3]) {
@@ -15,16 +14,16 @@ fn before_and_after(dataset: &Path, poses: &str) -> (usize, [f64; 3], [f64; 3]) 
     let rows = read_results(&dataset.join(poses)).expect("the poses read").rows;
     let mut assets = Assets::new(&data, 0);
     let mut scorer = Scorer::new(&data);
-    let config = Config::combined();
+    let method = Method::combined();
     let (mut before, mut after) = ([0.0; 3], [0.0; 3]);
     for row in &rows {
         let object = assets.object(row.obj_id).expect("the model loads");
         let frame = data.frame(row.scene_id, row.im_id).expect("the frame is listed");
-        let (observation, robot) =
-            assets.observation(&frame, 0, &config.terms).expect("the frame loads");
-        let refined = refine(&observation, &object, robot.as_ref(), &row.t_cam_model, &config)
-            .expect("the frame refines");
-        let refined = ResultRow { t_cam_model: refined.t_cam_object, ..row.clone() };
+        let (observation, hand) =
+            assets.observation(&frame, 0, &Sensor::required_by(&method)).expect("the frame loads");
+        let frame = Frame::new(&observation, &object, hand.as_ref()).expect("the frame fits");
+        let refined = refine(&frame, &row.t_cam_model, &method).expect("the frame refines");
+        let refined = ResultRow { t_cam_model: *refined.t_cam_object(), ..row.clone() };
         for (sum, row) in [(&mut before, row), (&mut after, &refined)] {
             let score = scorer.score(row).expect("the pose can be scored").score;
             for (sum, value) in sum.iter_mut().zip(figures(&score)) {

@@ -4,39 +4,40 @@ use std::sync::LazyLock;
 
 use nalgebra::Vector6;
 use prehend::autodiff::lie::perturb_about;
-use prehend::refine::RefineError;
-use prehend::refine::RefinedPose;
 use prehend::refine::evaluate::metrics::{oe_deg, pe_cm};
-use prehend::refine::refine;
 use prehend::refine::scene::{Scene, default_scene};
-use prehend::refine::{Config, TermKind};
+use prehend::refine::strategy::{Fused, GradientKind, Heuristic};
+use prehend::refine::{Estimate, Frame, RefineError, Strategy, refine};
 
 static SCENE: LazyLock<Scene> = LazyLock::new(|| default_scene(1).expect("the built-in scene"));
 
-fn run(config: &Config) -> Result<RefinedPose, RefineError> {
-    refine(&SCENE.observation, &SCENE.object, Some(&SCENE.robot), &SCENE.initial, config)
+fn frame() -> Frame<'static> {
+    Frame::new(&SCENE.observation, &SCENE.object, Some(&SCENE.hand)).expect("the frame fits")
+}
+
+fn run(strategy: &dyn Strategy) -> Result<Estimate, RefineError> {
+    refine(&frame(), &SCENE.initial, strategy)
 }
 
 #[test]
 fn the_pose_is_found() {
-    for config in [Config::default(), Config::combined()] {
-        let pose = run(&config).unwrap().t_cam_object;
+    let (fused, combined) = (Fused::default(), Heuristic::combined());
+    let strategies: [&dyn Strategy; 2] = [&fused, &combined];
+    for (name, strategy) in ["fused", "combined"].iter().zip(strategies) {
+        let pose = *run(strategy).unwrap().t_cam_object();
         let (pe, oe) = (pe_cm(&pose, &SCENE.truth), oe_deg(&pose, &SCENE.truth));
-        assert!(pe < 0.1 && oe < 1.5, "{}: {pe} cm, {oe}°", config.strategy);
+        assert!(pe < 0.1 && oe < 1.5, "{name}: {pe} cm, {oe}°");
     }
 }
 
 #[test]
-fn every_term_lowers_its_own_value() {
+fn every_gradient_lowers_its_own_cost() {
     // Some millimeters and degrees off: far inside the hand, contact alone knows no way out.
     let delta = Vector6::new(3e-3, -2e-3, 4e-3, 0.04, -0.03, 0.05);
     let start = perturb_about(&SCENE.truth, &(SCENE.truth * SCENE.object.center).coords, &delta);
-    for kind in TermKind::ALL {
-        let mut config = Config::of(&[kind]);
-        config.heuristic.iterations = 40;
-        let robot = Some(&SCENE.robot);
-        let refined = refine(&SCENE.observation, &SCENE.object, robot, &start, &config);
-        let trace = refined.unwrap().trace;
+    for kind in GradientKind::ALL {
+        let alone = Heuristic { iterations: 40, ..Heuristic::of(&[kind]) };
+        let trace = refine(&frame(), &start, &alone).unwrap().trace;
         let value = |i: usize| trace.iterations[i].values[0];
         let last = trace.iterations.len() - 1;
         println!("{kind}: {} to {}", value(0), value(last));
@@ -45,8 +46,8 @@ fn every_term_lowers_its_own_value() {
 }
 
 #[test]
-fn the_checkpoint_is_the_pose_of_lowest_rendering_value() {
-    let refined = run(&Config::combined()).unwrap();
+fn the_checkpoint_is_the_pose_of_lowest_rendering_cost() {
+    let refined = run(&Heuristic::combined()).unwrap();
     let rendering = refined.trace.terms.iter().position(|t| t == "rendering").unwrap();
     let value = |i: &prehend::refine::strategy::Iteration| i.values[rendering];
     let lowest = refined.trace.iterations.iter().map(value).fold(f64::INFINITY, f64::min);
@@ -55,11 +56,10 @@ fn the_checkpoint_is_the_pose_of_lowest_rendering_value() {
 
 #[test]
 fn poses_are_the_same_for_any_number_of_threads() {
-    let mut config = Config::combined();
-    config.heuristic.iterations = 12;
+    let short = Heuristic { iterations: 12, ..Heuristic::combined() };
     let poses = [1, 2, 5].map(|threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let pose = pool.install(|| run(&config)).unwrap().t_cam_object;
+        let pose = *pool.install(|| run(&short)).unwrap().t_cam_object();
         (pose.translation.vector, *pose.rotation.quaternion())
     });
     assert_eq!(poses[0], poses[1]);
@@ -70,22 +70,20 @@ fn poses_are_the_same_for_any_number_of_threads() {
 fn without_a_hand_vision_alone_still_works() {
     let mut observation = SCENE.observation.clone();
     (observation.hand, observation.gravity) = (None, None);
-    let vision = Config::of(&[TermKind::Rendering, TermKind::Depth]);
-    for config in [vision, Config::default()] {
-        let refined = refine(&observation, &SCENE.object, None, &SCENE.initial, &config).unwrap();
-        assert!(pe_cm(&refined.t_cam_object, &SCENE.truth) < 0.5);
+    let frame = Frame::new(&observation, &SCENE.object, None).unwrap();
+    let vision = Heuristic::of(&[GradientKind::Rendering, GradientKind::Depth]);
+    let strategies: [&dyn Strategy; 2] = [&vision, &Fused::default()];
+    for strategy in strategies {
+        let refined = refine(&frame, &SCENE.initial, strategy).unwrap();
+        assert!(pe_cm(refined.t_cam_object(), &SCENE.truth) < 0.5);
     }
-    let all = refine(&observation, &SCENE.object, None, &SCENE.initial, &Config::combined());
+    let all = refine(&frame, &SCENE.initial, &Heuristic::combined());
     assert!(matches!(all, Err(RefineError::Missing { .. })));
 }
 
 #[test]
 fn unusable_poses_are_refused() {
-    let refuse = |initial| {
-        let config = Config::default();
-        refine(&SCENE.observation, &SCENE.object, Some(&SCENE.robot), &initial, &config)
-            .unwrap_err()
-    };
+    let refuse = |initial| refine(&frame(), &initial, &Fused::default()).unwrap_err();
     let mut behind = SCENE.initial;
     behind.translation.z = -0.4;
     assert!(matches!(refuse(behind), RefineError::BehindCamera { .. }));

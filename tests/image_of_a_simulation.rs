@@ -7,23 +7,14 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
 use prehend::autodiff::check::finite_difference_gradient;
 use prehend::autodiff::{Scalar, Var, gradient};
-use prehend::geometry::{DistanceField, FieldSample, TriMesh, shapes};
+use prehend::geometry::{TriMesh, shapes};
 use prehend::render::{Camera, Light, RenderModel, Renderer, Scene, SceneVars};
 use prehend::sim::{
-    Body, Horizon, Onset, Penalty, RigidBody, SemiImplicitEuler, State, Surface, World,
+    Body, ContactBodies, Coulomb, GapSmoothing, HalfSpace, KelvinVoigt, Law, RigidBody,
+    SemiImplicitEuler, State, Surface, TimeSteps, World,
 };
 
-/// The half-space z < 0.
-struct Floor;
-
-impl DistanceField for Floor {
-    fn sample(&self, point: &Point3<f64>, reach: f64) -> Option<FieldSample> {
-        let (gradient, hessian) = (Vector3::z(), Matrix3::zeros());
-        (point.z <= reach).then_some(FieldSample { distance: point.z, gradient, hessian })
-    }
-}
-
-const HORIZON: Horizon = Horizon { dt: 1e-4, steps: 1000 };
+const TIME_STEPS: TimeSteps = TimeSteps { dt: 1e-4, steps: 1000 };
 
 /// A block, painted in smooth colors.
 fn block() -> TriMesh {
@@ -36,11 +27,13 @@ fn block() -> TriMesh {
 fn world(mesh: &TriMesh) -> World {
     let rigid = RigidBody::new(0.2, Matrix3::identity() * 2e-4, Point3::origin()).unwrap();
     let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-    let floor = world.add(Body::held("floor").with_field(Arc::new(Floor)));
+    let field = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
     let surface = Surface::uniform(&mesh.vertices, mesh.area()).unwrap();
-    let block = world.add(Body::free("block", rigid).with_surface(surface));
-    let law = Penalty::new(2e6, 1e3, 0.4, 5e-2).unwrap();
-    world.touch(block, floor, Arc::new(law), Onset::Softplus { width: 5e-4 }).unwrap();
+    let samples = world.add(Body::free("block", rigid).with_surface(surface));
+    let spring = KelvinVoigt { stiffness: 2e6, damping: 1e3 };
+    let law = Law::new(spring, Coulomb { friction: 0.4, slip_scale: 5e-2 }).unwrap();
+    let smoothing = GapSmoothing::Softplus { width: 5e-4 };
+    world.add_contact(ContactBodies { samples, field }, Arc::new(law), smoothing).unwrap();
     world
 }
 
@@ -49,9 +42,9 @@ fn end<S: Scalar>(world: &World, tangent: &[S]) -> Isometry3<S> {
     let mut start = State::at_rest(Isometry3::translation(0.0, 0.0, 0.08));
     start.linear = Vector3::new(0.3, 0.0, -0.4);
     start.angular = Vector3::new(1.0, 3.0, -2.0);
-    let held = State::at_rest(Isometry3::identity()).lift();
-    let thrown = start.moved(&std::array::from_fn(|i| tangent[i]));
-    let states = world.lift().simulate(&SemiImplicitEuler, &[held, thrown], HORIZON, |_, _| ());
+    let still = State::at_rest(Isometry3::identity()).lift();
+    let thrown = start.retract(&std::array::from_fn(|i| tangent[i]));
+    let states = world.lift().simulate(&SemiImplicitEuler, &[still, thrown], TIME_STEPS, |_, _| ());
     states.unwrap()[1].pose
 }
 

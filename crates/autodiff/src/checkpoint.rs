@@ -31,7 +31,11 @@ mod schedule;
 
 use std::cell::RefCell;
 
-use crate::{CustomVjp, Recording, Scalar, Var, custom};
+use crate::record::custom;
+use crate::recording::Recording;
+use crate::scalar::Scalar;
+use crate::var::Var;
+use crate::vjp::CustomVjp;
 use schedule::Snapshots;
 
 /// One step of a loop, written once for all scalars.
@@ -133,7 +137,7 @@ mod tests {
 
     use super::*;
     use crate::check::finite_difference_gradient;
-    use crate::{Fwd, block};
+    use crate::fwd::Fwd;
 
     /// Every way for an output to depend on its inputs: joined, fused, passed on, swapped, constant, and
     /// several outputs fused with one parameter.
@@ -186,6 +190,15 @@ mod tests {
         by.chain([output.value().to_bits()]).collect()
     }
 
+    /// A node of its own.
+    struct Identity;
+
+    impl CustomVjp for Identity {
+        fn vjp(&self, output_adjoints: &[f64], input_adjoints: &mut [f64]) {
+            input_adjoints[0] += output_adjoints[0];
+        }
+    }
+
     #[test]
     fn bits_are_those_of_the_recorded_loop_whatever_the_snapshots() {
         for weights in [
@@ -198,7 +211,9 @@ mod tests {
                     let mut state = state.to_vec();
                     for index in 0..steps {
                         Mixed::default().advance(index, &mut state, parameters);
-                        state.iter_mut().for_each(|x| *x = block(&[*x], &[x.value()], &[1.0])[0]);
+                        state
+                            .iter_mut()
+                            .for_each(|x| *x = custom(&[*x], &[x.value()], Identity)[0]);
                     }
                     state
                 });
@@ -216,7 +231,7 @@ mod tests {
     fn gradients_match_forward_mode_and_differences() {
         let (steps, weights) = (23, [1.0, -2.0, 0.5, 0.3, 0.7, 0.9, 1.1, 0.8]);
         let x: [f64; 10] = std::array::from_fn(|i| [&STATE[..], &PARAMETERS].concat()[i]);
-        let (value, reverse) = crate::gradient(
+        let (value, reverse) = crate::recording::gradient(
             |x| loss(&rollout(Mixed::default(), steps, 3, &x[..8], &x[8..]), &weights),
             &x,
         );
@@ -286,8 +301,10 @@ mod tests {
                 state[1] = (state[1] * S::zero()).sqrt();
             }
         }
-        let (_, gradient) =
-            crate::gradient(|x| rollout(Roots, 3, 1, &x[..2], &x[2..])[0], &[1.0, 2.0, 1.0]);
+        let (_, gradient) = crate::recording::gradient(
+            |x| rollout(Roots, 3, 1, &x[..2], &x[2..])[0],
+            &[1.0, 2.0, 1.0],
+        );
         assert_eq!(gradient, [8.0, 0.0, 12.0]);
     }
 
@@ -304,7 +321,7 @@ mod tests {
             let middle = rollout(Power, 4, 2, &x[..1], &x[1..]);
             rollout(Power, 3, 1, &middle, &x[1..])[0] * x[1]
         };
-        let (value, gradient) = crate::gradient(value, &[3.0, 2.0]);
+        let (value, gradient) = crate::recording::gradient(value, &[3.0, 2.0]);
         assert_eq!((value, gradient), (768.0, vec![256.0, 3072.0]));
     }
 }

@@ -1,8 +1,8 @@
 //! Forward mode: a value with its derivatives along `N` directions.
 
-use crate::Scalar;
-use crate::chain::Chain;
+use crate::differentiable::Differentiable;
 use crate::real_field::impl_real_field;
+use crate::scalar::Scalar;
 
 /// A number and its partial derivatives with respect to `N` inputs, carried forward.
 ///
@@ -46,11 +46,11 @@ fn along<T: Scalar>(slope: T, derivative: T) -> T {
 /// Whether [`along`] is no more than a product: plain numbers with finite slopes. Looking once at the slopes
 /// costs half as much as looking at every derivative.
 #[inline(always)]
-fn is_tame<T: Scalar>(slopes: &[T]) -> bool {
+fn all_finite<T: Scalar>(slopes: &[T]) -> bool {
     T::ORDER == 0 && slopes.iter().all(|slope| slope.value().is_finite())
 }
 
-impl<const N: usize, T: Scalar> Chain for Fwd<N, T> {
+impl<const N: usize, T: Scalar> Differentiable for Fwd<N, T> {
     type Inner = T;
 
     #[inline(always)]
@@ -70,20 +70,20 @@ impl<const N: usize, T: Scalar> Chain for Fwd<N, T> {
 
     #[inline(always)]
     fn unary(self, value: T, slope: T) -> Self {
-        let derivative = if is_tame(&[slope]) {
+        let derivative = if all_finite(&[slope]) {
             slope.scale_lanes(self.derivative)
         } else {
-            wild_unary(self.derivative, slope)
+            unary_not_finite(self.derivative, slope)
         };
         Self { value, derivative }
     }
 
     #[inline(always)]
     fn binary(self, other: Self, value: T, [da, db]: [T; 2]) -> Self {
-        let derivative = if is_tame(&[da, db]) {
+        let derivative = if all_finite(&[da, db]) {
             T::combine_lanes([da, db], self.derivative, other.derivative)
         } else {
-            wild_binary(self.derivative, other.derivative, da, db)
+            binary_not_finite(self.derivative, other.derivative, da, db)
         };
         Self { value, derivative }
     }
@@ -102,24 +102,25 @@ impl<const N: usize, T: Scalar> Chain for Fwd<N, T> {
 
 #[cold]
 #[inline(never)]
-fn wild_unary<const N: usize, T: Scalar>(a: [T; N], slope: T) -> [T; N] {
+fn unary_not_finite<const N: usize, T: Scalar>(a: [T; N], slope: T) -> [T; N] {
     a.map(|d| along(slope, d))
 }
 
 #[cold]
 #[inline(never)]
-fn wild_binary<const N: usize, T: Scalar>(a: [T; N], b: [T; N], da: T, db: T) -> [T; N] {
+fn binary_not_finite<const N: usize, T: Scalar>(a: [T; N], b: [T; N], da: T, db: T) -> [T; N] {
     std::array::from_fn(|i| along(da, a[i]) + along(db, b[i]))
 }
 
-impl_real_field!([const N: usize, T: Scalar] Fwd<N, T>);
+impl_real_field!([const N: usize, T: Scalar] Fwd<N, T> {});
 
 #[cfg(test)]
 mod tests {
     use nalgebra::{ComplexField, RealField, Vector3};
 
     use super::*;
-    use crate::{Scalar, check::finite_difference_gradient};
+    use crate::check::finite_difference_gradient;
+    use crate::scalar::Scalar;
 
     #[test]
     fn every_smooth_operation_matches_differences() {

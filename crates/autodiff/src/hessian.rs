@@ -2,14 +2,17 @@
 
 use nalgebra::DMatrix;
 
-use crate::{Fwd, Recording, Scalar, Var};
+use crate::fwd::Fwd;
+use crate::recording::Recording;
+use crate::scalar::Scalar;
+use crate::var::Var;
 
 /// Columns of the Hessian that one recording carries.
 const LANES: usize = 4;
 
 /// A number with derivatives along `N` directions, on the tape: what [`hessian`] and [`hessian_vector`] run
 /// a function with.
-pub type Second<const N: usize> = Fwd<N, Var>;
+pub type HessianScalar<const N: usize> = Fwd<N, Var>;
 
 /// Value, gradient and Hessian of `f` at `x`.
 ///
@@ -26,7 +29,7 @@ pub type Second<const N: usize> = Fwd<N, Var>;
 /// assert_eq!(h.as_slice(), [10.0, 6.0, 6.0, 0.0]);
 /// ```
 pub fn hessian(
-    f: impl Fn(&[Second<LANES>]) -> Second<LANES>,
+    f: impl Fn(&[HessianScalar<LANES>]) -> HessianScalar<LANES>,
     x: &[f64],
 ) -> (f64, Vec<f64>, DMatrix<f64>) {
     let mut gradient = vec![0.0; x.len()];
@@ -59,7 +62,7 @@ pub fn hessian(
 /// # Panics
 /// If `direction` is not as long as `x`.
 pub fn hessian_vector(
-    f: impl FnOnce(&[Second<1>]) -> Second<1>,
+    f: impl FnOnce(&[HessianScalar<1>]) -> HessianScalar<1>,
     x: &[f64],
     direction: &[f64],
 ) -> (f64, Vec<f64>, Vec<f64>) {
@@ -81,7 +84,8 @@ mod tests {
 
     use super::*;
     use crate::check::finite_difference_jacobian;
-    use crate::{gradient, lie};
+    use crate::lie;
+    use crate::recording::gradient;
 
     fn energy<S: Scalar>(x: &[S]) -> S {
         let rotation = lie::so3_exp(&Vector3::new(x[0], x[1], x[2]));
@@ -133,9 +137,9 @@ mod tests {
 
     #[test]
     fn constants_have_no_derivatives() {
-        let (value, gradient, h) = hessian(|_| Second::constant(2.0), &[1.0, 1.0]);
+        let (value, gradient, h) = hessian(|_| HessianScalar::constant(2.0), &[1.0, 1.0]);
         assert_eq!((value, gradient), (2.0, vec![0.0, 0.0]));
         assert_eq!(h.norm(), 0.0);
-        assert_eq!(hessian(|_| Second::constant(2.0), &[]).0, 2.0);
+        assert_eq!(hessian(|_| HessianScalar::constant(2.0), &[]).0, 2.0);
     }
 }

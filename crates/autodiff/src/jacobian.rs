@@ -2,7 +2,10 @@
 
 use nalgebra::DMatrix;
 
-use crate::{Fwd, Recording, Scalar, Var};
+use crate::fwd::Fwd;
+use crate::recording::Recording;
+use crate::scalar::Scalar;
+use crate::var::Var;
 
 /// Values of `f` at `x` and their Jacobian (outputs × inputs) by reverse mode: one recording, and one
 /// sweep for every four outputs.

@@ -18,7 +18,7 @@
 //! ```
 //!
 //! Forward mode needs no memory and wins up to some 16 inputs on plain code. Reverse mode costs a few
-//! evaluations whatever the number of inputs; what makes it fast is to record little: see blocks below.
+//! evaluations whatever the number of inputs; what makes it fast is to record little: see [below](#a-derivative-of-your-own).
 //!
 //! | wanted | use |
 //! |---|---|
@@ -27,15 +27,21 @@
 //! | Hessian, Hessian–vector product | [`hessian`], [`hessian_vector`], or `Fwd<N, Fwd<N>>` |
 //! | gradient through thousands of steps | [`checkpoint`], [`Scalar::recompute`] for one node a step |
 //! | derivative of a linear solve, of a root | [`solve`], [`implicit`] |
-//! | an operation with its own derivative | [`LocalFunction`], [`block`], [`custom`], [`preaccumulate`] |
+//! | an operation with its own derivative | [`LocalFunction`], [`CustomVjp`]: see [below](#a-derivative-of-your-own) |
 //! | rotations and rigid motions | [`lie`], [`rigid`] |
 //! | local Jacobians on all cores, the same bits for any number of them | [`parallel`] |
-//! | where a NaN comes from | [`diagnose`] |
 //! | something to minimize with | [`optimize`] |
 //! | an independent derivative to test against | [`check`] |
 //!
 //! # A derivative of your own
-//! A [`LocalFunction`] of few numbers is generic code that may bring its Jacobian. Reverse mode records it as one
+//!
+//! | the operation | implement | apply with |
+//! |---|---|---|
+//! | takes a fixed, small number of scalars | [`LocalFunction`] | [`Scalar::local`], [`Scalar::sum_local`] |
+//! | takes many numbers and knows its vector–Jacobian product: an image, a point set | [`CustomVjp`] | [`custom`] |
+//! | is generic code, too long to keep on the tape: a time step | [`Recompute`] | [`Scalar::recompute`] |
+//!
+//! A [`LocalFunction`] is the default: generic code that may bring its Jacobian. Reverse mode records it as one
 //! block, without what is inside. Here a contact force and its slope, with the slope left to forward mode:
 //!
 //! ```
@@ -55,22 +61,20 @@
 //! assert!((by[0] - 1.5 * force / 0.01).abs() < 1e-9 * by[0]);
 //! ```
 //!
-//! Images, point sets and solvers are operations of many numbers: implement [`CustomVjp`] and record with
-//! [`custom`].
+//! [`Operand`] is the bound of the operations that bring a derivative for both modes ([`solve`], [`implicit`]).
 //!
 //! # Further
-//! [A checkpointed rollout](checkpoint), [a differentiable solve](implicit#a-differentiable-solve), and the
-//! example `argmin_lbfgs`, which aims a throw with the optimizers here and with those of `argmin`.
+//! [A checkpointed rollout](checkpoint), [a differentiable solve](implicit#a-differentiable-solve).
 //!
 //! A [`Var`] belongs to its [`Recording`] and thread: using it elsewhere is a panic that says so, never a wrong
 //! number. At singular points the derivative is documented (in [`Scalar`] and at each function), and a
 //! branch that is not taken contributes nothing, not even a NaN.
 
 mod arena;
-mod chain;
+mod arithmetic;
 pub mod check;
 pub mod checkpoint;
-pub mod diagnose;
+mod differentiable;
 mod fwd;
 mod hessian;
 pub mod implicit;
@@ -81,9 +85,13 @@ mod local;
 mod operand;
 pub mod optimize;
 pub mod parallel;
+mod quadratic;
 mod real_field;
 mod recompute;
+mod recomputed;
+mod record;
 mod recording;
+mod reverse;
 pub mod rigid;
 mod scalar;
 pub mod solve;
@@ -95,13 +103,15 @@ mod var;
 mod vjp;
 
 pub use fwd::Fwd;
-pub use hessian::{Second, hessian, hessian_vector};
+pub use hessian::{HessianScalar, hessian, hessian_vector};
 pub use jacobian::{forward_jacobian, jacobian};
-pub use local::{LocalFunction, preaccumulate};
+pub use local::LocalFunction;
 pub use operand::{CustomJvp, Operand};
+pub use quadratic::Quadratic;
 pub use recompute::Recompute;
+pub use record::custom;
 pub use recording::{Adjoints, Recording, gradient, gradient_into};
 pub use scalar::Scalar;
 pub use tape::TapeStatistics;
 pub use var::Var;
-pub use vjp::{CustomVjp, block, custom};
+pub use vjp::CustomVjp;

@@ -1,7 +1,11 @@
 //! One way for every scalar through an operation that brings its own derivative.
 
-use crate::chain::Chain;
-use crate::{CustomVjp, Fwd, Scalar, Var, custom};
+use crate::differentiable::Differentiable;
+use crate::fwd::Fwd;
+use crate::record::custom;
+use crate::scalar::Scalar;
+use crate::var::Var;
+use crate::vjp::CustomVjp;
 
 /// The forward derivative of an operation with many inputs and outputs.
 pub trait CustomJvp {
@@ -52,7 +56,7 @@ plain_operand!(f64);
 impl<const N: usize> Operand for Fwd<N> {
     #[inline]
     fn is_constant(self) -> bool {
-        Chain::is_constant(self)
+        Differentiable::is_constant(self)
     }
 
     fn operation(
@@ -81,7 +85,7 @@ impl<const N: usize> Operand for Fwd<N> {
 impl Operand for Var {
     #[inline]
     fn is_constant(self) -> bool {
-        Chain::is_constant(self)
+        Differentiable::is_constant(self)
     }
 
     fn operation(
@@ -99,7 +103,7 @@ impl Operand for Var {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Recording;
+    use crate::recording::Recording;
 
     /// y = (a b, a + b).
     struct ProductAndSum([f64; 2]);

@@ -6,26 +6,9 @@
 
 use rayon::prelude::*;
 
-use crate::local::record_sum;
-use crate::tape::push_block;
-use crate::{LocalFunction, Var};
-
-/// `function` of each of `inputs`, one block each, evaluated by the threads of rayon's current pool.
-///
-/// # Panics
-/// If a number belongs to another recording.
-pub fn local_each<const N: usize, const M: usize>(
-    function: &(impl LocalFunction<N, M> + Sync),
-    inputs: &[[Var; N]],
-) -> Vec<[Var; M]> {
-    let values = inputs.par_iter().map(|x| function.linearize(x.map(Var::value)));
-    let blocks: Vec<_> = values.collect();
-    let recorded = inputs.iter().zip(blocks).map(|(x, (values, jacobian))| {
-        let group = push_block(x, M, jacobian.as_flattened());
-        std::array::from_fn(|i| group.var(i, values[i]))
-    });
-    recorded.collect()
-}
+use crate::local::LocalFunction;
+use crate::record::record_sum;
+use crate::var::Var;
 
 /// [`Scalar::sum_local`](crate::Scalar::sum_local), its terms evaluated by the threads of rayon's current
 /// pool.
@@ -46,7 +29,8 @@ mod tests {
     use rayon::ThreadPoolBuilder;
 
     use super::*;
-    use crate::{Recording, Scalar, gradient};
+    use crate::recording::{Recording, gradient};
+    use crate::scalar::Scalar;
 
     struct Bend(f64);
 
@@ -64,24 +48,11 @@ mod tests {
     fn bits_do_not_depend_on_threads() {
         let x: Vec<f64> = (0..502).map(|i| (i as f64 * 0.37).sin()).collect();
         let expected = gradient(|x| Var::sum_local(x, terms()), &x);
-        let blocks = |x: &[Var]| {
-            let inputs: Vec<_> = (0..500).map(|i| [x[i], x[i + 1], x[i + 2]]).collect();
-            local_each(&Bend(3.0), &inputs).into_iter().flatten().fold(Var::default(), |a, b| a + b)
-        };
-        let serial = gradient(
-            |x| {
-                let local = |i: usize| Var::local(&Bend(3.0), [x[i], x[i + 1], x[i + 2]])[0];
-                (0..500).map(local).fold(Var::default(), |a, b| a + b)
-            },
-            &x,
-        );
         for threads in [1, 2, 5] {
             let pool = ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             // The recording stays on the thread that starts it.
-            let (sum, each) =
-                pool.install(|| (gradient(|x| sum_local(x, &terms()), &x), gradient(blocks, &x)));
+            let sum = pool.install(|| gradient(|x| sum_local(x, &terms()), &x));
             assert_eq!(sum, expected, "{threads} threads");
-            assert_eq!(each, serial, "{threads} threads");
         }
     }
 

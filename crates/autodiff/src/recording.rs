@@ -5,10 +5,10 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use nalgebra::DMatrix;
 
-use crate::Var;
-use crate::chain::through;
+use crate::differentiable::chain;
 use crate::sweep::sweep;
 use crate::tape::{Outputs, Tape, TapeStatistics, push_variables, with_tape, with_tape_if_alive};
+use crate::var::Var;
 
 /// Tags of recordings, unique over all threads (until 2³² recordings have been made); 0 means constant.
 static NEXT_RECORDING: AtomicU32 = AtomicU32::new(1);
@@ -117,7 +117,7 @@ impl Recording {
         });
         sweep::<1>(self.recording, adjoints.as_chunks_mut().0, |adjoints| {
             for &(var, seed) in outputs.iter().filter(|(var, _)| var.recording != 0) {
-                adjoints[(var.node - base) as usize][0] += through(var.coefficient, seed);
+                adjoints[(var.node - base) as usize][0] += chain(var.coefficient, seed);
             }
         });
         Adjoints { recording: self.recording, base, adjoints }
@@ -168,7 +168,7 @@ impl Recording {
                         let var = outputs[output];
                         if var.recording != 0 {
                             lanes[(var.node - start.node) as usize][row - first] +=
-                                through(var.coefficient, weight);
+                                chain(var.coefficient, weight);
                         }
                     }
                 }
@@ -257,7 +257,10 @@ mod tests {
 
     use super::*;
     use crate::check::finite_difference_gradient;
-    use crate::{Fwd, Scalar, lie};
+    use crate::fwd::Fwd;
+    use crate::lie;
+    use crate::scalar::Scalar;
+    use crate::tape::push_block;
 
     fn rigid<S: Scalar>(x: &[S]) -> S {
         let rotation = lie::so3_exp(&Vector3::new(x[0], x[1], x[2]));
@@ -328,7 +331,8 @@ mod tests {
         let stale = Recording::start().variable(1.0);
         let recording = Recording::start();
         let [x, y] = recording.variables([2.0, 3.0]);
-        let refused = std::panic::catch_unwind(|| crate::block(&[x, stale], &[1.0], &[7.0; 2]));
+        let refused =
+            std::panic::catch_unwind(|| push_block(&[x, stale], 1, &[7.0; 2]).var(0, 1.0));
         assert!(refused.is_err());
         assert_eq!(recording.gradient(x * y).wrt(x), 3.0);
     }

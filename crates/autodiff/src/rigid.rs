@@ -8,8 +8,9 @@
 use nalgebra::{Matrix3, Matrix3x4, Quaternion, UnitQuaternion, Vector3};
 
 use crate::lie::{cross_matrix, so3_exp};
+use crate::local::LocalFunction;
+use crate::scalar::Scalar;
 use crate::stumpff::stumpff;
-use crate::{LocalFunction, Scalar};
 
 /// `rotation * vector`.
 #[inline]
@@ -24,17 +25,18 @@ pub fn cross<S: Scalar>(a: &Vector3<S>, b: &Vector3<S>) -> Vector3<S> {
     Vector3::from(S::local(&Cross, [a.x, a.y, a.z, b.x, b.y, b.z]))
 }
 
-/// exp(`turn` · `duration`) · `rotation`: the exponential step of a body that turns with angular velocity
-/// `turn` \[rad/s\] in the frame that `rotation` maps into, for `duration` \[s\].
+/// exp(`velocity` · `duration`) · `rotation`: the exponential step of a body with angular velocity `velocity` \[rad/s\],
+/// in the frame that `rotation` maps into, for `duration` \[s\].
 #[inline]
-pub fn turn<S: Scalar>(
+pub fn integrate_rotation<S: Scalar>(
     rotation: &UnitQuaternion<S>,
-    turn: &Vector3<S>,
+    velocity: &Vector3<S>,
     duration: f64,
 ) -> UnitQuaternion<S> {
     let [i, j, k, w] = rotation.coords.into();
-    let turned = S::local(&Turn { duration }, [i, j, k, w, turn.x, turn.y, turn.z]);
-    UnitQuaternion::new_unchecked(Quaternion::from_vector(turned.into()))
+    let [x, y, z] = (*velocity).into();
+    let after = S::local(&IntegrateRotation { duration }, [i, j, k, w, x, y, z]);
+    UnitQuaternion::new_unchecked(Quaternion::from_vector(after.into()))
 }
 
 /// Angular acceleration \[rad/s²\] of a free body by Euler's equation, α = I⁻¹ (τ − ω × I ω), I = R diag(J) Rᵀ.
@@ -100,11 +102,11 @@ impl LocalFunction<6, 3> for Cross {
     }
 }
 
-struct Turn {
+struct IntegrateRotation {
     duration: f64,
 }
 
-impl LocalFunction<7, 4> for Turn {
+impl LocalFunction<7, 4> for IntegrateRotation {
     #[inline]
     fn evaluate<S: Scalar>(&self, [i, j, k, w, x, y, z]: [S; 7]) -> [S; 4] {
         let step = so3_exp(&Vector3::new(x, y, z).map(|rate| rate.times(self.duration)));
@@ -184,7 +186,7 @@ impl LocalFunction<10, 3> for Euler {
         let by_turn = by_torque * cross_matrix(&torque)
             - gyroscopic * cross_matrix(&velocity)
             - cross_matrix(&acceleration);
-        let by_rotation = by_turn * turn_of_coordinates(&q);
+        let by_rotation = by_turn * rotation_vector_jacobian(&q);
         let row = |r| {
             std::array::from_fn(|c: usize| match c {
                 0..4 => by_rotation[(r, c)],
@@ -196,10 +198,10 @@ impl LocalFunction<10, 3> for Euler {
     }
 }
 
-/// The small turn θ \[rad\] that a change of a unit quaternion's coordinates (i, j, k, w) means,
-/// θ = 2 vec(dq q̄), as a matrix: for Jacobians that are easier to write by a turn of the body.
+/// ∂θ/∂q of the left rotation vector θ \[rad\] by the coordinates (i, j, k, w) of a unit quaternion, θ = 2 vec(dq q̄): takes a
+/// Jacobian by θ to one by q.
 #[inline]
-pub fn turn_of_coordinates(rotation: &UnitQuaternion<f64>) -> Matrix3x4<f64> {
+pub fn rotation_vector_jacobian(rotation: &UnitQuaternion<f64>) -> Matrix3x4<f64> {
     let (w, v) = (rotation.w, rotation.imag());
     let by_vector = (Matrix3::from_diagonal_element(w) + cross_matrix(&v)) * 2.0;
     let mut turn = Matrix3x4::zeros();
@@ -214,7 +216,9 @@ mod tests {
 
     use super::*;
     use crate::check::finite_difference_jacobian;
-    use crate::{Fwd, Recording, Var};
+    use crate::fwd::Fwd;
+    use crate::recording::Recording;
+    use crate::var::Var;
 
     /// Compares a function's own Jacobian with forward mode through its generic code, and its value.
     fn check<const N: usize, const M: usize>(function: &impl LocalFunction<N, M>, x: [f64; N]) {
@@ -253,7 +257,7 @@ mod tests {
             check(&Rotate, [i, j, k, w, 0.4, -1.2, 2.0]);
             for velocity in VELOCITIES {
                 let [x, y, z] = velocity;
-                check(&Turn { duration: 0.5 }, unit([i, j, k, w, x, y, z]));
+                check(&IntegrateRotation { duration: 0.5 }, unit([i, j, k, w, x, y, z]));
                 check(&Cross, [x, y, z, 0.3, w, -1.0]);
             }
         }
@@ -296,7 +300,7 @@ mod tests {
             let (rotated, turned) = if plain {
                 (rotation * v, so3_exp(&(v * Var::from(0.1))) * rotation)
             } else {
-                (rotate(&rotation, &v), turn(&rotation, &v, 0.1))
+                (rotate(&rotation, &v), integrate_rotation(&rotation, &v, 0.1))
             };
             let [sum, end] = [rotated, turned.inverse() * cross(&rotated, &v)].map(|v| v.sum());
             let out = sum * end.sin();

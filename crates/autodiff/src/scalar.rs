@@ -2,7 +2,9 @@
 
 use nalgebra::RealField;
 
-use crate::{LocalFunction, Recompute, lanes};
+use crate::lanes;
+use crate::local::LocalFunction;
+use crate::recompute::Recompute;
 
 /// A real number that may carry derivatives.
 ///

@@ -5,7 +5,7 @@
 //! cₖ = 1/k! − x cₖ₊₂ and dcₖ/dx = (k cₖ₊₂ − cₖ₊₁)/2. Every coefficient of the exponential maps is one
 //! of them (K. Stumpff, "Himmelsmechanik", vol. 1, 1959, ch. 5, for the functions themselves).
 
-use crate::Scalar;
+use crate::scalar::Scalar;
 
 /// Below this |x| the series is used. Above, the closed forms of c₀ to c₅ lose at most four bits to
 /// cancellation; from 1 on they would lose seven.
@@ -87,7 +87,7 @@ pub(crate) fn stumpff_2_to_5<S: Scalar>(x: S) -> [S; 4] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Fwd;
+    use crate::fwd::Fwd;
 
     /// x and c₀ to c₇, computed with 60 digits.
     #[rustfmt::skip]

@@ -3,7 +3,7 @@
 use std::rc::Rc;
 
 use crate::arena::Mark;
-use crate::chain::through;
+use crate::differentiable::chain;
 use crate::tape::{Entry, Group, Kind, Start, Tape, with_tape};
 
 /// Adjoints of one node, one a seed.
@@ -84,7 +84,7 @@ fn run<const K: usize, const CAREFUL: bool>(recording: u32, adjoints: &mut [Lane
             {
                 if coefficient != 0.0 {
                     sweep.adjoints[(parent - sweep.start.node) as usize][lane] +=
-                        through(coefficient, adjoint);
+                        chain(coefficient, adjoint);
                 }
             }
         }
@@ -214,5 +214,5 @@ fn add<const K: usize>(a: Lanes<K>, b: Lanes<K>) -> Lanes<K> {
 /// What flows back through `slope`: just the product, or looking carefully.
 #[inline]
 fn carry_over<const K: usize, const CAREFUL: bool>(slope: f64, adjoint: Lanes<K>) -> Lanes<K> {
-    adjoint.map(|a| if CAREFUL { through(slope, a) } else { slope * a })
+    adjoint.map(|a| if CAREFUL { chain(slope, a) } else { slope * a })
 }

@@ -8,8 +8,9 @@ use std::cell::{Cell, RefCell};
 use std::rc::Rc;
 
 use crate::arena::{Arena, Mark};
-use crate::chain::{through, unless_still};
-use crate::{CustomVjp, Var};
+use crate::differentiable::{chain, chain_active};
+use crate::var::Var;
+use crate::vjp::CustomVjp;
 
 /// What the sweep reads: 24 bytes for a node of two parents.
 #[derive(Clone, Copy)]
@@ -159,7 +160,7 @@ fn complete<R>(tape: &RefCell<Tape>, f: impl FnOnce(&mut Tape) -> R) -> R {
 /// Records the join of two active numbers with partial derivatives `slopes`.
 #[inline(always)]
 pub(crate) fn push(value: f64, [a, b]: [Var; 2], slopes: [f64; 2]) -> Var {
-    let flows = [unless_still(slopes[0], a.coefficient), unless_still(slopes[1], b.coefficient)];
+    let flows = [chain_active(slopes[0], a.coefficient), chain_active(slopes[1], b.coefficient)];
     let entry = Entry { slopes: flows, parents: [a.node, b.node] };
     // As little as possible in here: what `with` is given must stay small enough to be inlined.
     let (node, recording) = END.with(|end| {
@@ -212,7 +213,7 @@ pub(crate) fn push_block(inputs: &[Var], outputs: usize, jacobian: &[f64]) -> Ou
             }
             for row in jacobian.chunks_exact(inputs.len()) {
                 slopes.extend(
-                    row.iter().zip(inputs).map(|(&slope, var)| through(slope, var.coefficient)),
+                    row.iter().zip(inputs).map(|(&slope, var)| chain(slope, var.coefficient)),
                 );
             }
         });
@@ -247,7 +248,7 @@ fn push_sparse_block(inputs: &[Var], outputs: usize, jacobian: &[f64]) -> Output
             let slopes = tape.slopes.room(count * outputs);
             for row in jacobian.chunks_exact(inputs.len()) {
                 let pairs = row.iter().zip(inputs).filter(|(_, var)| active(var));
-                slopes.extend(pairs.map(|(&slope, var)| through(slope, var.coefficient)));
+                slopes.extend(pairs.map(|(&slope, var)| chain(slope, var.coefficient)));
             }
         });
         group

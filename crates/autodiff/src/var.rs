@@ -1,11 +1,4 @@
-//! Reverse mode: a number that remembers where on the tape it came from.
-
-use crate::chain::{Chain, unless_still};
-use crate::local::sum_local;
-use crate::real_field::impl_real_field;
-use crate::recompute::recompute;
-use crate::tape::{push, push_block, push_custom, refuse_foreign};
-use crate::{LocalFunction, Recompute, Scalar};
+//! The number of reverse mode, which knows where on the tape it came from.
 
 /// A number on the thread's tape.
 ///
@@ -34,16 +27,6 @@ impl Var {
         self.value
     }
 
-    /// The result of an operation on two numbers with the same node.
-    #[inline(always)]
-    fn fuse(self, other: Self, value: f64, [da, db]: [f64; 2]) -> Self {
-        if self.recording != other.recording {
-            refuse_foreign();
-        }
-        let coefficient = unless_still(da, self.coefficient) + unless_still(db, other.coefficient);
-        Self { value, coefficient, ..self }
-    }
-
     /// The node whose adjoint is this number's derivative; none for a constant.
     ///
     /// # Panics
@@ -57,71 +40,3 @@ impl Var {
         Some(self.node)
     }
 }
-
-impl Chain for Var {
-    type Inner = f64;
-
-    #[inline]
-    fn lift(value: f64) -> Self {
-        Self { value, coefficient: 0.0, node: 0, recording: 0 }
-    }
-
-    #[inline]
-    fn primal(self) -> f64 {
-        self.value
-    }
-
-    #[inline]
-    fn is_constant(self) -> bool {
-        self.recording == 0
-    }
-
-    #[inline(always)]
-    fn unary(self, value: f64, slope: f64) -> Self {
-        // A constant stays one: its coefficient is never looked at.
-        let coefficient = unless_still(slope, self.coefficient);
-        Self { value, coefficient, ..self }
-    }
-
-    #[inline(always)]
-    fn binary(self, other: Self, value: f64, [da, db]: [f64; 2]) -> Self {
-        match (self.is_constant(), other.is_constant()) {
-            (_, true) => self.unary(value, da),
-            (true, false) => other.unary(value, db),
-            (false, false) => {
-                if self.node == other.node {
-                    return self.fuse(other, value, [da, db]);
-                }
-                push(value, [self, other], [da, db])
-            }
-        }
-    }
-
-    #[inline]
-    fn local<const N: usize, const M: usize>(
-        function: &impl LocalFunction<N, M>,
-        x: [Self; N],
-    ) -> [Self; M] {
-        let (values, jacobian) = function.linearize(x.map(Self::value));
-        let group = match function.reverse_rule() {
-            None => push_block(&x, M, jacobian.as_flattened()),
-            Some(rule) => push_custom(&x, M, rule),
-        };
-        std::array::from_fn(|i| group.var(i, values[i]))
-    }
-
-    #[inline]
-    fn sum_local<const K: usize, F: LocalFunction<K, 1>>(
-        x: &[Self],
-        terms: impl IntoIterator<Item = (F, [usize; K])>,
-    ) -> Self {
-        sum_local(x, terms)
-    }
-
-    #[inline]
-    fn recompute<F: Recompute>(function: F, x: &[Self]) -> Result<Vec<Self>, F::Error> {
-        recompute(function, x)
-    }
-}
-
-impl_real_field!([] Var);

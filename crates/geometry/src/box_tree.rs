@@ -196,8 +196,9 @@ impl BoxTree {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::TriMesh;
+    use crate::random::SplitMix64;
     use crate::volume::tests::icosphere;
-    use crate::{SplitMix64, TriMesh};
     use nalgebra::{Isometry3, Vector3};
 
     fn bounds(mesh: &TriMesh, face: usize) -> Bounds {

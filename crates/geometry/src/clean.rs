@@ -4,10 +4,11 @@ use std::collections::HashSet;
 
 use nalgebra::Point3;
 
+use crate::mesh::TriMesh;
 use crate::orient::{compacted, orient, wedge};
+use crate::report::MeshReport;
 use crate::topology::{components, edges, is_collapsed, non_manifold_vertices};
 use crate::weld::is_finite;
-use crate::{MeshReport, TriMesh};
 
 /// Components with fewer faces than this fraction of the largest are stray if open or hollow.
 const STRAY_FRACTION: f64 = 0.01;
@@ -24,7 +25,7 @@ impl TriMesh {
     /// scans carry a few such faces. Faces of no area whose corners differ are kept, since their neighbors need
     /// them. A closed shell that faces inward within no other is turned over with all it contains; a cavity stays a
     /// cavity. Holes are not filled and overlaps not resolved: the report says whether the result is watertight, and
-    /// whether it [overlaps itself](MeshReport::overlaps_itself).
+    /// whether it [overlaps itself](MeshReport::self_intersections).
     ///
     /// ```
     /// # use prehend_geometry::shapes;

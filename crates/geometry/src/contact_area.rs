@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Point3};
 use rayon::prelude::*;
 
-use crate::ClosestPoints;
+use crate::closest::ClosestPoints;
 
 /// Samples that one thread takes at a time.
 const CHUNK: usize = 1024;

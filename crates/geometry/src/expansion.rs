@@ -115,7 +115,7 @@ fn two_product(a: f64, b: f64) -> (f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::SplitMix64;
+    use crate::random::SplitMix64;
 
     #[test]
     fn sums_and_products_of_integers_are_exact() {

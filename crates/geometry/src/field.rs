@@ -20,14 +20,13 @@ pub trait DistanceField: Send + Sync {
     /// Culling happens here, before any arithmetic that carries derivatives.
     fn sample(&self, point: &Point3<f64>, reach: f64) -> Option<FieldSample>;
 
-    /// The distance alone, the same number as [`Self::sample`]'s, for whoever needs no derivative; fields that can be quicker
-    /// about it are.
+    /// The distance alone, bit for bit that of [`Self::sample`]. Override it where that is faster.
     fn distance(&self, point: &Point3<f64>, reach: f64) -> Option<f64> {
         self.sample(point, reach).map(|s| s.distance)
     }
 
-    /// How much the field rises over a length at most: 1 for a distance, a little more where it is interpolated. A field that
-    /// is no distance (a height above terrain) must say so, or what is near to it is overlooked.
+    /// An upper bound of the field's Lipschitz constant \[1\]: 1 for an exact distance, a little more for an interpolated one. A
+    /// field that is not a distance, such as the height above terrain, must return its own, or contacts are missed.
     fn lipschitz_bound(&self) -> f64 {
         1.25
     }

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
-use crate::TriMesh;
+use crate::mesh::TriMesh;
 use crate::topology::edges;
 
 /// Mass properties of a solid of uniform density, in the frame of its mesh.

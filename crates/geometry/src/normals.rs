@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use crate::TriMesh;
+use crate::mesh::TriMesh;
 
 /// Faces that meet at a larger angle than this are shaded apart [rad].
 const CREASE_ANGLE: f64 = 40.0 * std::f64::consts::PI / 180.0;

@@ -158,7 +158,7 @@ fn exact_triple(u: Arrow<'_>, v: Arrow<'_>, w: Arrow<'_>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::SplitMix64;
+    use crate::random::SplitMix64;
 
     /// The same in integers, of which the coordinates are multiples.
     fn integer_triple(u: Arrow<'_>, v: Arrow<'_>, w: Arrow<'_>) -> i128 {

@@ -105,6 +105,18 @@ impl RobustKernel {
         }
     }
 
+    /// The kernel with `factor` times the scale.
+    pub fn widened(mut self, factor: f64) -> Self {
+        match &mut self {
+            Self::Squared => {}
+            Self::Huber { scale }
+            | Self::Cauchy { scale }
+            | Self::GemanMcClure { scale }
+            | Self::Tukey { scale } => *scale *= factor,
+        }
+        self
+    }
+
     /// Whether the scale is positive and finite.
     pub fn is_valid(self) -> bool {
         self.scale().is_none_or(|s| s > 0.0 && s.is_finite())

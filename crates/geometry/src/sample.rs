@@ -2,7 +2,8 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::{SplitMix64, TriMesh};
+use crate::mesh::TriMesh;
+use crate::random::SplitMix64;
 
 /// A point on a mesh's surface.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -4,8 +4,8 @@ use std::collections::HashMap;
 
 use nalgebra::{Point3, Vector3};
 
-use crate::TriMesh;
 use crate::box_tree::Bounds;
+use crate::mesh::TriMesh;
 
 /// Positions closer than this fraction of the bounding box's diagonal count as one.
 const RELATIVE_TOLERANCE: f64 = 1e-9;

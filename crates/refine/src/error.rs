@@ -20,13 +20,13 @@ pub enum RefineError {
     /// No depth where the object is.
     #[error("no pixel of the object's mask has a depth")]
     NoDepth,
-    /// A term needs something that was not observed.
-    #[error("the {term} term needs the {what}, which the observation lacks")]
+    /// A factor needs something that was not observed.
+    #[error("the {factor} factor needs the {what}, which the observation lacks")]
     Missing {
         /// What is missing.
         what: &'static str,
-        /// The term that needs it.
-        term: &'static str,
+        /// The factor that needs it.
+        factor: &'static str,
     },
     /// Forces and taxels do not match.
     #[error("{forces} taxel forces were given for {taxels} taxels")]
@@ -51,9 +51,9 @@ pub enum RefineError {
     /// The initial pose is not finite.
     #[error("the initial pose is not finite")]
     NotFinite,
-    /// No term was asked for.
-    #[error("no term to refine by")]
-    NoTerms,
+    /// No factor was asked for.
+    #[error("no factor to refine by")]
+    NoFactors,
     /// A search has come to nothing.
     #[error("no pose of the object fits what is seen")]
     NothingFits,

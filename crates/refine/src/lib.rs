@@ -1,24 +1,24 @@
 //! Refines the 6-DoF pose of an object held in a robot hand, from RGB-D, touch and physics.
 //!
-//! [`refine`] takes an [`Observation`], an [`Object`], a [`Hand`] and an initial pose, and returns a
-//! [`RefinedPose`].
+//! [`refine`] takes a [`Frame`] (an [`Observation`] of an [`Object`] in a [`Hand`]), an initial pose and a [`Strategy`] such as a
+//! [`Method`], and returns an [`Estimate`]: pose, posterior and trace.
 //!
 //! ```
 //! use prehend_refine::scene::default_scene;
-//! use prehend_refine::{Config, refine};
+//! use prehend_refine::{Frame, Method, refine};
 //!
 //! let scene = default_scene(1)?;
-//! let config = Config::default();
-//! let robot = Some(&scene.robot);
-//! let refined = refine(&scene.observation, &scene.object, robot, &scene.initial, &config)?;
-//! println!("{}", refined.t_cam_object);
+//! let frame = Frame::new(&scene.observation, &scene.object, Some(&scene.hand))?;
+//! let estimate = refine(&frame, &scene.initial, &Method::default())?;
+//! let posterior = estimate.posterior.as_ref().ok_or("only other methods have none")?;
+//! println!("{} with probability {:.2}", estimate.t_cam_object(), posterior.probability());
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
 //! | module | what it holds |
 //! |---|---|
 //! | [`scene`] | what there is: observation, object, hand |
-//! | [`problem`] | state, normal equations |
+//! | [`problem`] | state, factors, noise models, normal equations, solver |
 //! | [`factor`] | one kind of evidence a file |
 //! | [`strategy`] | ways from an initial pose to a refined one; [`Method`] names them |
 //! | [`search`] | poses to start from, by sensors alone |
@@ -27,7 +27,6 @@
 //! | [`evaluate`] | metrics, symmetries, reports, studies |
 //! | [`synth`] | made-up datasets whose truth is known |
 
-mod config;
 pub mod data;
 mod error;
 pub mod evaluate;
@@ -41,10 +40,9 @@ pub mod strategy;
 pub mod synth;
 pub mod tracker;
 
-pub use config::{Config, StrategyKind, TermKind};
 pub use error::RefineError;
-pub use factor::Term;
-pub use method::Method;
-pub use problem::{Block, Normal, State};
-pub use refine::{Progress, RefinedPose, refine, refine_with, standard_terms};
-pub use scene::{Hand, Object, Observation};
+pub use method::{Method, NamedMethod};
+pub use problem::{Factor, State};
+pub use refine::refine;
+pub use scene::{Frame, Hand, Object, Observation};
+pub use strategy::{Estimate, Strategy};

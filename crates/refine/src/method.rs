@@ -1,31 +1,141 @@
-//! Named ways to refine a pose: what `--method` picks and what studies compare.
+//! Ways to refine a pose, and their names: what `--method` picks and what studies compare.
 
-use crate::config::{Config, StrategyKind, TermKind};
-use crate::strategy::{Evidence, FusedSettings, Nuisance};
+use crate::error::RefineError;
+use crate::problem::State;
+use crate::scene::Frame;
+use crate::strategy::{
+    Estimate, Fused, FusedSettings, GradientKind, Heuristic, Icp, Modality, Nuisance, Observer,
+    RobustIcp, Strategy,
+};
 
-/// A way to refine a pose, with all of its settings.
+/// A strategy with all of its settings.
+#[derive(Clone, Debug)]
+pub enum Method {
+    /// All evidence in one least-squares problem; the default.
+    Fused(Box<Fused>),
+    /// The paper's heuristic.
+    Heuristic(Box<Heuristic>),
+    /// The paper's ICP, point to point; it uses depth alone.
+    Icp(Icp),
+    /// Robust point-to-plane ICP; it uses depth alone.
+    RobustIcp(RobustIcp),
+}
+
+impl Default for Method {
+    fn default() -> Self {
+        Fused::default().into()
+    }
+}
+
+impl Method {
+    /// The paper's method with all four gradients, which returns the pose whose rendering fits best.
+    pub fn combined() -> Self {
+        Heuristic::combined().into()
+    }
+
+    /// The method called `name`, if there is one: see [`NamedMethod`].
+    pub fn named(name: &str) -> Option<Self> {
+        NamedMethod::find(name).map(NamedMethod::method)
+    }
+
+    /// Sets how many steps are tried at most: of the fused estimator, by every solve of each stage.
+    pub fn set_iterations(&mut self, iterations: usize) {
+        match self {
+            Self::Fused(fused) => {
+                let stages = fused.settings.stages.iter_mut();
+                stages.for_each(|stage| stage.solver.iterations = iterations);
+            }
+            Self::Heuristic(heuristic) => heuristic.iterations = iterations,
+            Self::Icp(icp) => icp.iterations = iterations,
+            Self::RobustIcp(icp) => icp.iterations = iterations,
+        }
+    }
+
+    /// Makes all the steps however small they become; the robust ICP always does.
+    pub fn set_exhaustive(&mut self) {
+        match self {
+            Self::Fused(fused) => {
+                let stages = fused.settings.stages.iter_mut();
+                stages.for_each(|stage| stage.solver.min_decrease = 0.0);
+            }
+            Self::Heuristic(heuristic) => heuristic.exhaustive = true,
+            Self::Icp(icp) => icp.step_tolerance = f64::NEG_INFINITY,
+            Self::RobustIcp(_) => {}
+        }
+    }
+
+    fn strategy(&self) -> &dyn Strategy {
+        match self {
+            Self::Fused(fused) => fused.as_ref(),
+            Self::Heuristic(heuristic) => heuristic.as_ref(),
+            Self::Icp(icp) => icp,
+            Self::RobustIcp(icp) => icp,
+        }
+    }
+}
+
+impl Strategy for Method {
+    fn run(
+        &self,
+        frame: &Frame<'_>,
+        initial: &State,
+        observe: &mut Observer<'_>,
+    ) -> Result<Estimate, RefineError> {
+        self.strategy().run(frame, initial, observe)
+    }
+
+    fn iterations(&self) -> usize {
+        self.strategy().iterations()
+    }
+}
+
+impl From<Fused> for Method {
+    fn from(fused: Fused) -> Self {
+        Self::Fused(Box::new(fused))
+    }
+}
+
+impl From<Heuristic> for Method {
+    fn from(heuristic: Heuristic) -> Self {
+        Self::Heuristic(Box::new(heuristic))
+    }
+}
+
+impl From<Icp> for Method {
+    fn from(icp: Icp) -> Self {
+        Self::Icp(icp)
+    }
+}
+
+impl From<RobustIcp> for Method {
+    fn from(icp: RobustIcp) -> Self {
+        Self::RobustIcp(icp)
+    }
+}
+
+/// A method with a name.
 #[derive(Clone, Copy, Debug)]
-pub struct Method {
+pub struct NamedMethod {
     /// Short name, as options and tables have it.
     pub name: &'static str,
     /// What it is, in one line.
     pub summary: &'static str,
-    config: fn() -> Config,
+    method: fn() -> Method,
 }
 
-impl Method {
+impl NamedMethod {
     /// The fused estimator, the default.
     pub const FUSED: Self = Self {
         name: "fused",
         summary: "all evidence in one least-squares problem, with calibrations estimated",
-        config: Config::default,
+        method: Method::default,
     };
 
     /// The paper's method.
     pub const COMBINED: Self = Self {
         name: "combined",
         summary: "all four gradients, checkpointing",
-        config: Config::combined,
+        method: Method::combined,
     };
 
     /// All methods, in the order of the paper's tables.
@@ -39,158 +149,154 @@ impl Method {
         &ABLATIONS
     }
 
-    /// The method called `name`, ablations included.
-    pub fn named(name: &str) -> Option<&'static Self> {
+    /// The method called `name`, ablations included. `colour` stands for `color`, as it was spelled before.
+    pub fn find(name: &str) -> Option<&'static Self> {
+        let name = name.replace("colour", "color");
         METHODS.iter().chain(&ABLATIONS).find(|m| m.name == name)
     }
 
-    /// Its settings.
-    pub fn config(&self) -> Config {
-        (self.config)()
+    /// The method, with its settings.
+    pub fn method(&self) -> Method {
+        (self.method)()
     }
 }
 
 /// One gradient alone.
 macro_rules! alone {
-    ($name:literal, $term:expr, $checkpoint:literal) => {
-        Method {
+    ($name:literal, $gradient:expr, $checkpoint:literal) => {
+        NamedMethod {
             name: $name,
             summary: if $checkpoint {
                 "this gradient alone, checkpointing"
             } else {
                 "this gradient alone, the last pose"
             },
-            config: || Config { checkpoint: $checkpoint, ..Config::of(&[$term]) },
+            method: || Heuristic { checkpoint: $checkpoint, ..Heuristic::of(&[$gradient]) }.into(),
         }
     };
 }
 
 /// Without the pull to the initial pose.
-fn free(mut config: Config) -> Config {
-    config.physics.displacement_sigma = f64::INFINITY;
-    config
-}
-
-/// A strategy that does not combine gradients.
-fn baseline(strategy: StrategyKind, checkpoint: bool) -> Config {
-    Config { strategy, checkpoint, ..Config::default() }
+fn free(mut heuristic: Heuristic) -> Method {
+    heuristic.stability.displacement_sigma = f64::INFINITY;
+    heuristic.into()
 }
 
 /// The fused estimator with other settings.
-fn fused(change: impl FnOnce(&mut FusedSettings)) -> Config {
-    let mut config = baseline(StrategyKind::Fused, false);
-    change(&mut config.fused);
-    config
+fn fused(change: impl FnOnce(&mut FusedSettings)) -> Method {
+    let mut settings = FusedSettings::default();
+    change(&mut settings);
+    Fused::new(settings).into()
 }
 
-/// All evidence but one kind.
+/// All modalities but one.
 macro_rules! without {
-    ($name:literal, $kind:expr) => {
-        Method {
+    ($name:literal, $modality:expr) => {
+        NamedMethod {
             name: concat!("fused-without-", $name),
             summary: concat!("fused, all evidence but ", $name),
-            config: || fused(|settings| settings.evidence.retain(|kind| *kind != $kind)),
+            method: || fused(|settings| settings.modalities.retain(|m| *m != $modality)),
         }
     };
 }
 
-/// One kind of evidence, and the prior.
+/// One modality, and the prior.
 macro_rules! only {
-    ($name:literal, $kind:expr) => {
-        Method {
+    ($name:literal, $modality:expr) => {
+        NamedMethod {
             name: concat!("fused-only-", $name),
             summary: concat!("fused, no evidence but ", $name, " and the prior"),
-            config: || fused(|settings| settings.evidence = vec![$kind]),
+            method: || fused(|settings| settings.modalities = vec![$modality]),
         }
     };
 }
 
-/// One group of quantities believed as they are said to be.
+/// One group of quantities believed as they are stated.
 macro_rules! fixed {
     ($name:literal, $group:expr) => {
-        Method {
+        NamedMethod {
             name: concat!("fused-fixed-", $name),
             summary: concat!("fused, ", $name, " not estimated"),
-            config: || fused(|settings| settings.nuisances.retain(|group| *group != $group)),
+            method: || fused(|settings| settings.nuisances.retain(|group| *group != $group)),
         }
     };
 }
 
-static ABLATIONS: [Method; 23] = [
-    without!("color", Evidence::Color),
-    without!("silhouette", Evidence::Silhouette),
-    without!("depth", Evidence::Depth),
-    without!("hand-depth", Evidence::HandDepth),
-    without!("free-space", Evidence::FreeSpace),
-    without!("touch", Evidence::Touch),
-    without!("quiet", Evidence::Quiet),
-    without!("penetration", Evidence::Penetration),
-    without!("support", Evidence::Support),
-    only!("color", Evidence::Color),
-    only!("silhouette", Evidence::Silhouette),
-    only!("depth", Evidence::Depth),
-    only!("hand-depth", Evidence::HandDepth),
-    only!("free-space", Evidence::FreeSpace),
-    only!("touch", Evidence::Touch),
-    only!("quiet", Evidence::Quiet),
-    only!("penetration", Evidence::Penetration),
-    only!("support", Evidence::Support),
+static ABLATIONS: [NamedMethod; 23] = [
+    without!("color", Modality::Color),
+    without!("silhouette", Modality::Silhouette),
+    without!("depth", Modality::Depth),
+    without!("hand-depth", Modality::HandDepth),
+    without!("free-space", Modality::FreeSpace),
+    without!("touch", Modality::Touch),
+    without!("quiet", Modality::Quiet),
+    without!("penetration", Modality::Penetration),
+    without!("support", Modality::Support),
+    only!("color", Modality::Color),
+    only!("silhouette", Modality::Silhouette),
+    only!("depth", Modality::Depth),
+    only!("hand-depth", Modality::HandDepth),
+    only!("free-space", Modality::FreeSpace),
+    only!("touch", Modality::Touch),
+    only!("quiet", Modality::Quiet),
+    only!("penetration", Modality::Penetration),
+    only!("support", Modality::Support),
     fixed!("hand-pose", Nuisance::HandPose),
     fixed!("joints", Nuisance::Joints),
     fixed!("camera", Nuisance::Camera),
     fixed!("model", Nuisance::Model),
-    Method {
+    NamedMethod {
         name: "fused-fixed-all",
         summary: "fused, nothing estimated but the pose",
-        config: || fused(|settings| settings.nuisances.clear()),
+        method: || fused(|settings| settings.nuisances.clear()),
     },
 ];
 
-static METHODS: [Method; 17] = [
-    Method::FUSED,
-    Method::COMBINED,
-    Method {
+static METHODS: [NamedMethod; 17] = [
+    NamedMethod::FUSED,
+    NamedMethod::COMBINED,
+    NamedMethod {
         name: "combined-last",
         summary: "all four gradients, the last pose",
-        config: || Config::of(&TermKind::ALL),
+        method: || Heuristic::of(&GradientKind::ALL).into(),
     },
-    Method {
+    NamedMethod {
         name: "combined-free",
         summary: "all four gradients, no regularization, the last pose",
-        config: || free(Config::of(&TermKind::ALL)),
+        method: || free(Heuristic::of(&GradientKind::ALL)),
     },
-    Method {
+    NamedMethod {
         name: "combined-free-best",
         summary: "all four gradients, no regularization, checkpointing",
-        config: || free(Config::combined()),
+        method: || free(Heuristic::combined()),
     },
-    alone!("depth", TermKind::Depth, false),
-    alone!("depth-best", TermKind::Depth, true),
-    alone!("tactile", TermKind::Tactile, false),
-    alone!("tactile-best", TermKind::Tactile, true),
-    alone!("rendering", TermKind::Rendering, false),
-    alone!("rendering-best", TermKind::Rendering, true),
-    alone!("physics", TermKind::Physics, false),
-    alone!("physics-best", TermKind::Physics, true),
-    Method {
+    alone!("depth", GradientKind::Depth, false),
+    alone!("depth-best", GradientKind::Depth, true),
+    alone!("tactile", GradientKind::Tactile, false),
+    alone!("tactile-best", GradientKind::Tactile, true),
+    alone!("rendering", GradientKind::Rendering, false),
+    alone!("rendering-best", GradientKind::Rendering, true),
+    alone!("physics", GradientKind::Physics, false),
+    alone!("physics-best", GradientKind::Physics, true),
+    NamedMethod {
         name: "physics-free",
         summary: "this gradient alone, no regularization, the last pose",
-        config: || free(Config::of(&[TermKind::Physics])),
+        method: || free(Heuristic::of(&[GradientKind::Physics])),
     },
-    Method {
+    NamedMethod {
         name: "icp",
         summary: "the paper's ICP, point to point, the last pose",
-        config: || baseline(StrategyKind::Icp, false),
+        method: || Icp::default().into(),
     },
-    Method {
+    NamedMethod {
         name: "icp-best",
         summary: "the paper's ICP, point to point, checkpointing",
-        config: || baseline(StrategyKind::Icp, true),
+        method: || Icp { checkpoint: true, ..Icp::default() }.into(),
     },
-    Method {
+    NamedMethod {
         name: "robust-icp",
         summary: "robust point-to-plane ICP, a strong baseline, the last pose",
-        config: || baseline(StrategyKind::RobustIcp, false),
+        method: || RobustIcp::default().into(),
     },
 ];
 
@@ -200,29 +306,52 @@ mod tests {
 
     #[test]
     fn names_are_unique_and_found() {
-        let all = || Method::all().iter().chain(Method::ablations());
+        let all = || NamedMethod::all().iter().chain(NamedMethod::ablations());
         for method in all() {
             assert_eq!(all().filter(|m| m.name == method.name).count(), 1);
-            assert_eq!(Method::named(method.name).map(|m| m.summary), Some(method.summary));
+            let found = NamedMethod::find(method.name);
+            assert_eq!(found.map(|m| m.summary), Some(method.summary));
         }
-        assert!(Method::named("guess").is_none());
+        assert!(NamedMethod::find("guess").is_none());
+        let old = NamedMethod::find("fused-without-colour").map(|m| m.name);
+        assert_eq!(old, Some("fused-without-color"));
     }
 
     #[test]
-    fn every_kind_of_evidence_and_every_nuisance_has_its_ablations() {
-        let settings = |name: &str| Method::named(name).unwrap().config().fused;
+    fn every_modality_and_every_nuisance_has_its_ablations() {
+        let settings = |name: &str| match Method::named(name) {
+            Some(Method::Fused(fused)) => fused.settings,
+            _ => panic!("{name}"),
+        };
         let all = settings("fused");
-        for kind in Evidence::ALL {
-            let without = settings(&format!("fused-without-{}", kind.name()));
-            assert_eq!(without.evidence.len(), all.evidence.len() - 1);
-            assert!(!without.evidence.contains(&kind));
-            assert_eq!(settings(&format!("fused-only-{}", kind.name())).evidence, [kind]);
+        for modality in Modality::ALL {
+            let without = settings(&format!("fused-without-{}", modality.name()));
+            assert_eq!(without.modalities.len(), all.modalities.len() - 1);
+            assert!(!without.modalities.contains(&modality));
+            let only = settings(&format!("fused-only-{}", modality.name()));
+            assert_eq!(only.modalities, [modality]);
         }
         for group in Nuisance::ALL {
             let fixed = settings(&format!("fused-fixed-{}", group.name()));
             assert_eq!(fixed.nuisances.len(), all.nuisances.len() - 1);
-            assert!(!fixed.nuisances.contains(&group) && fixed.evidence == all.evidence);
+            assert!(!fixed.nuisances.contains(&group) && fixed.modalities == all.modalities);
         }
         assert!(settings("fused-fixed-all").nuisances.is_empty());
+    }
+
+    #[test]
+    fn iterations_are_set() {
+        for method in NamedMethod::all() {
+            let mut method = method.method();
+            method.set_iterations(7);
+            match &method {
+                Method::Fused(fused) => {
+                    assert!(fused.settings.stages.iter().all(|s| s.solver.iterations == 7));
+                    // What is counted are stages.
+                    assert_eq!(method.iterations(), 5);
+                }
+                other => assert_eq!(other.iterations(), 7),
+            }
+        }
     }
 }

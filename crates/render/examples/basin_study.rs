@@ -115,7 +115,13 @@ fn find(
         let (base, center) = (pose, pose * model.center());
         let moved =
             |x: &[f64]| perturb_about(&base, &center.coords, &Vector6::from_column_slice(x));
-        let criteria = Criteria { iterations: 40, gradient: 0.0, step: 1e-5, decrease: 1e-5 };
+        let criteria = Criteria {
+            iterations: 40,
+            gradient: 0.0,
+            step: 1e-5,
+            decrease: 1e-5,
+            ..Criteria::default()
+        };
         let solver = LevenbergMarquardt { damping: 1e-2, criteria };
         let outcome = solver.minimize(&[0.0; 6], |x| {
             let at = loss.linearize(model, &moved(x), &center, &Light::ambient(1.0), &level);
@@ -127,7 +133,7 @@ fn find(
                 matrix: DMatrix::from_column_slice(
                     6,
                     6,
-                    (jacobian.tr_mul(&at.jtj) * jacobian * 2.0).as_slice(),
+                    (jacobian.tr_mul(&at.hessian) * jacobian).as_slice(),
                 ),
             }
         })?;

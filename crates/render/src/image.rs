@@ -14,7 +14,7 @@ pub enum ImageError {
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the operating system.
         source: std::io::Error,
     },
     /// The file's contents are no image this crate reads, or cannot be encoded.
@@ -22,7 +22,7 @@ pub enum ImageError {
     Codec {
         /// The file.
         path: PathBuf,
-        /// What the codec said.
+        /// The error of the codec.
         source: image::ImageError,
     },
     /// The file holds another kind of pixel.
@@ -152,8 +152,7 @@ impl RgbImage {
         Self::new(width, height, image.pixels().map(|p| p.0).collect())
     }
 
-    /// Writes 8 bits a channel as PNG or JPEG, by the extension; values are clamped to 0..=1. The file appears
-    /// whole or not at all.
+    /// Writes 8 bits a channel as PNG or JPEG, by the extension, atomically; values are clamped to 0..=1.
     ///
     /// # Errors
     /// When the format is unknown or the file cannot be written.
@@ -163,8 +162,7 @@ impl RgbImage {
         encode(path, image.map(DynamicImage::ImageRgb8))
     }
 
-    /// Writes 8 bits a channel as JPEG of quality `quality` (1..=100, clamped); values are clamped to 0..=1. The file
-    /// appears whole or not at all.
+    /// Writes 8 bits a channel as JPEG of quality `quality` (1..=100, clamped), atomically; values are clamped to 0..=1.
     ///
     /// # Errors
     /// When the file cannot be written.
@@ -214,8 +212,7 @@ impl DepthImage {
         Self::new(width, height, image.pixels().map(|p| (p.0[0] as f64 * scale) as f32).collect())
     }
 
-    /// Writes a 16-bit gray PNG file whose unit is `scale` meters; depths beyond 65535 units saturate. The file
-    /// appears whole or not at all.
+    /// Writes a 16-bit gray PNG file whose unit is `scale` meters, atomically; depths beyond 65535 units saturate.
     ///
     /// # Errors
     /// When `scale` is not positive or the file cannot be written.
@@ -255,7 +252,7 @@ impl Mask {
         Self::new(width, height, image.pixels().map(|p| p.0[0] > 0).collect())
     }
 
-    /// Writes an 8-bit gray file, 255 where set. The file appears whole or not at all.
+    /// Writes an 8-bit gray file, 255 where set, atomically.
     ///
     /// # Errors
     /// When the format is unknown or the file cannot be written.
@@ -289,7 +286,7 @@ fn decode(path: &Path) -> Result<DynamicImage, ImageError> {
     reader.decode().map_err(|source| ImageError::Codec { path: path.into(), source })
 }
 
-/// Encodes in memory, so that the file appears whole or not at all.
+/// Encodes in memory, to write the file atomically.
 fn encode(path: &Path, image: Option<DynamicImage>) -> Result<(), ImageError> {
     let codec = |source| ImageError::Codec { path: path.into(), source };
     let format = ImageFormat::from_path(path).map_err(codec)?;

@@ -42,8 +42,8 @@ pub use mode::{ContourOptions, Mode, SoftRasOptions};
 pub use model::{ModelError, RenderModel};
 pub use overlay::draw_outline;
 pub use pose_loss::{
-    Affine, Counts, DepthOptions, Linearized, Loss, LossOptions, OptionError, PoseImage, PoseLoss,
-    Robust, Target, TargetError, Tile,
+    Counts, DepthOptions, Linearized, Loss, LossOptions, OptionError, PoseImage, PoseLoss, Target,
+    TargetError, Tile,
 };
 pub use raster::depth_map;
 pub use renderer::{

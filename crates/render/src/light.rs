@@ -1,8 +1,6 @@
 //! First-order lighting: an ambient term and one directional light a channel.
 
-use nalgebra::{Matrix5, Vector3, Vector5};
-
-use crate::pose_loss::Affine;
+use nalgebra::{Matrix4, Vector3, Vector4};
 
 /// First-order lighting, fixed in the camera frame.
 ///
@@ -78,73 +76,39 @@ impl Light {
     /// # Errors
     /// With fewer than four samples, or when a channel is undetermined.
     pub fn fit(samples: &[LightSample], ridge: f64) -> Result<Self, LightError> {
-        Self::fit_to(samples, ridge, false)
-    }
-
-    /// Like [`Self::fit`], with an [`offset`](Self::offset) that is fitted too and pulled to zero like the directional
-    /// part: for images whose black is not zero.
-    ///
-    /// # Errors
-    /// With fewer than five samples, or when a channel is undetermined.
-    pub fn fit_with_offset(samples: &[LightSample], ridge: f64) -> Result<Self, LightError> {
-        Self::fit_to(samples, ridge, true)
-    }
-
-    /// The light under which a surface shows the colors of this one with gain and offset of `affine`.
-    pub fn corrected(&self, affine: &Affine) -> Self {
-        let mut light = *self;
-        for k in 0..3 {
-            let gain = affine.gain[k];
-            light.ambient[k] *= gain;
-            light.directional[k] *= gain;
-            light.offset[k] = gain * self.offset[k] + affine.offset[k];
-        }
-        light
-    }
-
-    fn fit_to(samples: &[LightSample], ridge: f64, offset: bool) -> Result<Self, LightError> {
-        let needed = if offset { 5 } else { 4 };
-        if samples.len() < needed {
-            return Err(LightError::TooFew { found: samples.len(), needed });
+        if samples.len() < 4 {
+            return Err(LightError::TooFew { found: samples.len(), needed: 4 });
         }
         let mut light = Self::ambient(0.0);
         for channel in 0..3 {
-            let solution = fit_channel(samples, channel, ridge, offset)
-                .ok_or(LightError::Undetermined { channel })?;
+            let solution =
+                fit_channel(samples, channel, ridge).ok_or(LightError::Undetermined { channel })?;
             light.ambient[channel] = solution[0];
             light.directional[channel] = Vector3::new(solution[1], solution[2], solution[3]);
-            light.offset[channel] = solution[4];
         }
         Ok(light)
     }
 }
 
-fn fit_channel(
-    samples: &[LightSample],
-    channel: usize,
-    ridge: f64,
-    offset: bool,
-) -> Option<Vector5<f64>> {
-    // Without an offset its column is zero, and so is the solution.
-    let constant = if offset { 1.0 } else { 0.0 };
+fn fit_channel(samples: &[LightSample], channel: usize, ridge: f64) -> Option<Vector4<f64>> {
     let row = |s: &LightSample| {
         let n = s.normal.cast::<f64>();
         let a = s.albedo[channel] as f64;
-        Vector5::new(a, a * n.x, a * n.y, a * n.z, constant)
+        Vector4::new(a, a * n.x, a * n.y, a * n.z)
     };
     let albedo_squared: f64 = samples.iter().map(|s| (s.albedo[channel] as f64).powi(2)).sum();
     let mut weights = vec![1.0; samples.len()];
-    let mut solution = Vector5::zeros();
+    let mut solution = Vector4::zeros();
     for _ in 0..6 {
-        let mut normal = Matrix5::zeros();
-        let mut right = Vector5::zeros();
+        let mut normal = Matrix4::zeros();
+        let mut right = Vector4::zeros();
         for (sample, weight) in samples.iter().zip(&weights) {
             let row = row(sample);
             normal += row * row.transpose() * *weight;
             right += row * (*weight * sample.observed[channel] as f64);
         }
         // The ambient entry gets a pull too faint to matter, which keeps the matrix definite.
-        for (i, scale) in [1e-9, ridge, ridge, ridge, ridge].into_iter().enumerate() {
+        for (i, scale) in [1e-9, ridge, ridge, ridge].into_iter().enumerate() {
             normal[(i, i)] += scale.max(1e-9) * albedo_squared;
         }
         solution = normal.cholesky()?.solve(&right);
@@ -198,23 +162,6 @@ mod tests {
                 assert!((fitted.directional[c] - light.directional[c]).norm() < 2e-3, "{fitted:?}");
             }
         }
-    }
-
-    #[test]
-    fn an_offset_is_told_from_the_light() {
-        let light = Light { offset: [0.05, 0.0, -0.02], ..Light::headlight(0.5, 0.3) };
-        let mut samples = samples(&light, 0);
-        for sample in &mut samples {
-            (0..3).for_each(|c| sample.observed[c] += light.offset[c] as f32);
-        }
-        let fitted = Light::fit_with_offset(&samples, 0.0).unwrap();
-        for c in 0..3 {
-            assert!((fitted.ambient[c] - light.ambient[c]).abs() < 2e-3, "{fitted:?}");
-            assert!((fitted.offset[c] - light.offset[c]).abs() < 2e-3, "{fitted:?}");
-        }
-        assert_eq!(Light::fit(&samples, 0.0).unwrap().offset, [0.0; 3]);
-        let few = Light::fit_with_offset(&samples[..4], 0.0);
-        assert_eq!(few, Err(LightError::TooFew { found: 4, needed: 5 }));
     }
 
     #[test]

@@ -170,7 +170,7 @@ fn color_mask_and_depth_lead_back_to_the_true_pose() {
         let light = Light::fit(&samples, 1e-3).unwrap();
         let center = guess * view.model.center();
         let at = pose_loss.linearize(&view.model, &guess, &center, &light, &target);
-        let mut matrix = at.jtj * 2.0;
+        let mut matrix = at.hessian;
         (0..6).for_each(|i| matrix[(i, i)] *= 1.01);
         let step = -matrix.cholesky().unwrap().solve(&at.gradient);
         let about = Translation3::from(center.coords);

@@ -8,19 +8,19 @@ mod grasp;
 use std::hint::black_box;
 use std::time::Instant;
 
-use grasp::{Derivatives, FirstOrder, Grasp, horizon, loss, start};
+use grasp::{Derivatives, FirstOrder, Grasp, loss, start, time_steps};
 use prehend_autodiff::{Fwd, Scalar, gradient};
-use prehend_sim::{LeakSteps, Onset, State, World};
+use prehend_sim::{GapSmoothing, LeakSteps, State, World};
 
 fn main() -> anyhow::Result<()> {
     let grasp = Grasp::new();
-    let graspd = forward_mode(&grasp.world(2000, Onset::grasp_d())?, 20)?;
+    let graspd = forward_mode(&grasp.world(2000, GapSmoothing::grasp_d())?, 20)?;
     anyhow::ensure!(close(&graspd, &grasp::LEAKY_REFERENCE, 1e-6), "{graspd:?}");
     println!("| samples | steps | run | ms | M contact-points·steps/s | × forward |");
     println!("|--:|--:|---|--:|--:|--:|");
-    let leak = Onset::Leaky { alpha: 0.1, band: 2e-3, steps: LeakSteps::All };
+    let leak = GapSmoothing::Leaky { alpha: 0.1, band: 2e-3, steps: LeakSteps::All };
     for count in [500, 2000, 8000] {
-        let hard = grasp.world(count, Onset::Hard)?;
+        let hard = grasp.world(count, GapSmoothing::Hard)?;
         let leaky = grasp.world(count, leak)?;
         for steps in [20, 100] {
             let expected = forward_mode(&hard, steps)?;
@@ -52,14 +52,15 @@ fn main() -> anyhow::Result<()> {
 }
 
 fn value(world: &World, steps: usize) -> anyhow::Result<f64> {
-    let end = world.simulate(&FirstOrder, &start(), horizon(steps), |_, _| ())?;
+    let end = world.simulate(&FirstOrder, &start(), time_steps(steps), |_, _| ())?;
     Ok(loss(&end[1]))
 }
 
 fn forward_mode(world: &World, steps: usize) -> anyhow::Result<Derivatives> {
     let [hand, ellipsoid] = start();
     let states = [hand.lift(), ellipsoid.pose_variables()];
-    let end = world.lift::<Fwd<6>>().simulate(&FirstOrder, &states, horizon(steps), |_, _| ())?;
+    let end =
+        world.lift::<Fwd<6>>().simulate(&FirstOrder, &states, time_steps(steps), |_, _| ())?;
     let Fwd { value, derivative } = loss(&end[1]);
     Ok((value, derivative))
 }
@@ -71,8 +72,8 @@ fn adjoint(world: &World, steps: usize) -> anyhow::Result<Derivatives> {
         |x| {
             let mut tangent = [Scalar::constant(0.0); 12];
             tangent[..6].copy_from_slice(x);
-            let states: [State<_>; 2] = [hand.lift(), ellipsoid.moved(&tangent)];
-            match world.lift().simulate(&FirstOrder, &states, horizon(steps), |_, _| ()) {
+            let states: [State<_>; 2] = [hand.lift(), ellipsoid.retract(&tangent)];
+            match world.lift().simulate(&FirstOrder, &states, time_steps(steps), |_, _| ()) {
                 Ok(end) => loss(&end[1]),
                 Err(error) => {
                     failure = Some(error);

@@ -11,14 +11,13 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 use prehend_autodiff::{Fwd, Scalar};
-use prehend_geometry::{DistanceField, FieldSample};
 use prehend_sim::{
-    Body, Contact, ContactLaw, Horizon, Integrator, Onset, Response, RigidBody, SemiImplicitEuler,
-    SimulationError, State, Surface, World,
+    Body, Contact, ContactBodies, ContactLaw, GapSmoothing, HalfSpace, Integrator, Response,
+    RigidBody, SemiImplicitEuler, SimulationError, State, Surface, TimeSteps, World,
 };
 use rayon::prelude::*;
 
-/// Greatest depth \[m\] of an impact at [`SPEED`] with a hard onset.
+/// Greatest depth \[m\] of an impact at [`SPEED`] without smoothing.
 const DEPTH: f64 = 5e-3;
 /// Speed of the point \[m/s\].
 const SPEED: f64 = 1.0;
@@ -56,16 +55,6 @@ impl ContactLaw for Power {
     }
 }
 
-/// The half-space z < 0.
-struct Floor;
-
-impl DistanceField for Floor {
-    fn sample(&self, point: &Point3<f64>, reach: f64) -> Option<FieldSample> {
-        let (gradient, hessian) = (Vector3::z(), Matrix3::zeros());
-        (point.z <= reach).then_some(FieldSample { distance: point.z, gradient, hessian })
-    }
-}
-
 /// Errors over all phases.
 struct Errors {
     /// Of the derivative: the median and the worst.
@@ -78,26 +67,30 @@ struct Errors {
 fn study(
     integrator: &impl Integrator,
     exponent: f64,
-    onset: Onset,
+    smoothing: GapSmoothing,
     steps_per_contact: f64,
 ) -> Result<Errors, Box<dyn Error>> {
     let mut world = World::new(Vector3::zeros());
-    let floor = world.add(Body::held("floor").with_field(Arc::new(Floor)));
+    let field = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
     let rigid = RigidBody::new(1.0, Matrix3::identity(), Point3::origin())?;
     let surface = Surface::new(&[Point3::origin()], &[1.0])?;
     let point = world.add(Body::free("point", rigid).with_surface(surface));
-    world.touch(point, floor, Arc::new(Power::new(exponent)), onset)?;
+    world.add_contact(
+        ContactBodies { samples: point, field },
+        Arc::new(Power::new(exponent)),
+        smoothing,
+    )?;
     let world = world.lift::<Fwd<1>>();
 
     let dt = std::f64::consts::PI * DEPTH / SPEED / steps_per_contact;
-    let horizon = Horizon { dt, steps: (TIME / dt).round() as usize };
+    let time_steps = TimeSteps { dt, steps: (TIME / dt).round() as usize };
     let bounce = |phase: usize| {
         let height = 1.0 + SPEED * dt * phase as f64 / PHASES as f64;
         let mut start = State::at_rest(Isometry3::identity()).lift::<Fwd<1>>();
         start.pose.translation.z = Fwd::variable(height, 0);
         start.linear.z = Fwd::constant(-SPEED);
         let still = State::at_rest(Isometry3::identity()).lift();
-        let end = world.simulate(integrator, &[still, start], horizon, |_, _| ())?;
+        let end = world.simulate(integrator, &[still, start], time_steps, |_, _| ())?;
         let slope = end[point].pose.translation.z.derivative[0];
         Ok([(slope + 1.0).abs(), (end[point].linear.z.value - SPEED).abs()])
     };
@@ -115,19 +108,19 @@ fn study(
 }
 
 fn table(name: &str, integrator: &impl Integrator) -> Result<(), Box<dyn Error>> {
-    let soft = |width: f64| Onset::Softplus { width };
+    let soft = |width: f64| GapSmoothing::Softplus { width };
     let rows = [
-        ("linear, hard", 1.0, Onset::Hard),
+        ("linear, hard", 1.0, GapSmoothing::Hard),
         ("linear, softplus 0.25 mm", 1.0, soft(2.5e-4)),
         ("linear, softplus 1 mm", 1.0, soft(1e-3)),
-        ("power 3/2, hard", 1.5, Onset::Hard),
-        ("power 2, hard", 2.0, Onset::Hard),
-        ("power 3, hard", 3.0, Onset::Hard),
+        ("power 3/2, hard", 1.5, GapSmoothing::Hard),
+        ("power 2, hard", 2.0, GapSmoothing::Hard),
+        ("power 3, hard", 3.0, GapSmoothing::Hard),
     ];
-    for (contact, exponent, onset) in rows {
+    for (contact, exponent, smoothing) in rows {
         for steps_per_contact in [10.0, 20.0, 50.0, 100.0] {
             let Errors { median, worst, speed } =
-                study(integrator, exponent, onset, steps_per_contact)?;
+                study(integrator, exponent, smoothing, steps_per_contact)?;
             println!(
                 "{name:<20} {contact:<25} {steps_per_contact:>13} {median:>9.1e} {worst:>9.1e} {speed:>9.1e}"
             );
@@ -149,9 +142,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_softened_onset_has_right_derivatives_and_a_kink_wrong_ones() {
-        let study = |onset| study(&SemiImplicitEuler, 1.0, onset, 20.0).unwrap();
-        let (soft, hard) = (study(Onset::Softplus { width: 1e-3 }), study(Onset::Hard));
+    fn a_smoothed_gap_has_right_derivatives_and_a_kink_wrong_ones() {
+        let study = |smoothing| study(&SemiImplicitEuler, 1.0, smoothing, 20.0).unwrap();
+        let (soft, hard) =
+            (study(GapSmoothing::Softplus { width: 1e-3 }), study(GapSmoothing::Hard));
         assert!(soft.worst <= 1e-3 && soft.speed < 1e-3, "{} {}", soft.worst, soft.speed);
         // The value of either is fine.
         assert!((hard.median - 0.64).abs() < 0.02 && hard.speed < 0.1, "{}", hard.median);

@@ -8,16 +8,18 @@ use prehend_autodiff::{Recompute, Scalar, Var, checkpoint};
 
 use crate::error::SimulationError;
 use crate::integrator::Integrator;
-use crate::numbers::{STATE, numbers_of, states_of};
-use crate::rollout::Horizon;
+use crate::parameters::{STATE, coordinates_of, states_of};
 use crate::state::State;
-use crate::world::{Body, ContactPair, Motion, Step, World};
+use crate::time::{Step, TimeSteps};
+use crate::world::World;
+use crate::world::body::{Body, Motion};
+use crate::world::contact_pair::ContactPair;
 
 /// An integrator each of whose steps [`Var`] records as one node.
 ///
 /// The node keeps the numbers that the step began with, and the sweep records the step again: some 540 bytes for a free
-/// body on a held one, 1240 if every number of their world varies, where plain recording takes 14 kB. States, masses,
-/// loads, gravity and parameters of laws may come from anywhere on the tape and may be others at each step. Numbers
+/// body on a kinematic one, 1240 if every parameter of their world varies, where plain recording takes 14 kB. States, masses,
+/// external wrenches, gravity and parameters of laws may come from anywhere on the tape and may be others at each step. Numbers
 /// without derivatives are simulated by `integrator` as it is.
 ///
 /// ```
@@ -33,15 +35,15 @@ use crate::world::{Body, ContactPair, Motion, Step, World};
 /// let mut lifted = world.lift::<Var>();
 /// lifted.gravity.z = recording.variable(-9.81);
 /// let start = [State::at_rest(Isometry3::identity()).lift()];
-/// let integrator = Compact::new(SemiImplicitEuler, &world)?;
-/// let end = lifted.simulate(&integrator, &start, Horizon { dt: 1e-3, steps: 1000 }, |_, _| ())?;
+/// let integrator = StepCheckpointed::new(SemiImplicitEuler, &world)?;
+/// let end = lifted.simulate(&integrator, &start, TimeSteps { dt: 1e-3, steps: 1000 }, |_, _| ())?;
 /// let by_gravity = recording.gradient(end[ball].linear.z).wrt(lifted.gravity.z);
 /// assert!((by_gravity - 1.0).abs() < 1e-12);
 /// # Ok(())
 /// # }
 /// ```
 #[derive(Debug)]
-pub struct Compact<I> {
+pub struct StepCheckpointed<I> {
     scene: Arc<Scene<I>>,
 }
 
@@ -50,43 +52,42 @@ pub struct Compact<I> {
 struct Scene<I> {
     integrator: I,
     world: World,
-    /// Of the world.
-    numbers: Vec<f64>,
+    parameters: Vec<f64>,
 }
 
-/// Numbers of a world that are not its scene's constants, by their places.
+/// Parameters of a world that are not its scene's constants, by their places.
 struct Changes<S> {
     places: Box<[u32]>,
-    numbers: Vec<S>,
+    values: Vec<S>,
 }
 
 impl<I: Integrator> Scene<I> {
     fn new<S: Scalar>(integrator: I, world: &World<S>) -> Result<Arc<Self>, SimulationError> {
-        let numbers: Vec<f64> = world.numbers().into_iter().map(S::value).collect();
-        Ok(Arc::new(Self { world: world.with_numbers(&numbers)?, numbers, integrator }))
+        let parameters: Vec<f64> = world.parameters().into_iter().map(S::value).collect();
+        Ok(Arc::new(Self { world: world.with_parameters(&parameters)?, parameters, integrator }))
     }
 
     fn changes<S: Scalar>(&self, world: &World<S>) -> Changes<S> {
         // A constant less its value is the constant 0.
         let changed = |x: S, own: f64| x.value() != own || !x.plus(-own).is_constant_zero();
-        let all = (0..).zip(world.numbers()).zip(&self.numbers);
+        let all = (0..).zip(world.parameters()).zip(&self.parameters);
         let changes = all.filter(|((_, x), own)| changed(*x, **own)).map(|(change, _)| change);
-        let (places, numbers): (Vec<u32>, _) = changes.unzip();
-        Changes { places: places.into(), numbers }
+        let (places, values): (Vec<u32>, _) = changes.unzip();
+        Changes { places: places.into(), values }
     }
 
-    /// This scene's world with `numbers` at `places`.
-    fn world<S: Scalar>(&self, places: &[u32], numbers: &[S]) -> Result<World<S>, SimulationError> {
-        let mut all: Vec<S> = self.numbers.iter().map(|&x| S::constant(x)).collect();
-        for (&place, &number) in places.iter().zip(numbers) {
-            all[place as usize] = number;
+    /// This scene's world with `values` at `places`.
+    fn world<S: Scalar>(&self, places: &[u32], values: &[S]) -> Result<World<S>, SimulationError> {
+        let mut all: Vec<S> = self.parameters.iter().map(|&x| S::constant(x)).collect();
+        for (&place, &value) in places.iter().zip(values) {
+            all[place as usize] = value;
         }
-        self.world.with_numbers(&all)
+        self.world.with_parameters(&all)
     }
 }
 
-impl<I: Integrator> Compact<I> {
-    /// `integrator` for `world` and others that differ from it in numbers only.
+impl<I: Integrator> StepCheckpointed<I> {
+    /// `integrator` for `world` and others that differ from it in parameters only.
     ///
     /// # Errors
     /// If a body of the world has an impossible mass or inertia.
@@ -95,9 +96,9 @@ impl<I: Integrator> Compact<I> {
     }
 }
 
-impl<I: Integrator + Send + 'static> Integrator for Compact<I> {
+impl<I: Integrator + Send + 'static> Integrator for StepCheckpointed<I> {
     /// # Errors
-    /// As the integrator within, and if the world differs from the one of [`Compact::new`] in more than numbers.
+    /// As the integrator within, and if the world differs from the one of [`StepCheckpointed::new`] in more than parameters.
     fn step<S: Scalar>(
         &self,
         world: &World<S>,
@@ -110,20 +111,20 @@ impl<I: Integrator + Send + 'static> Integrator for Compact<I> {
         if !has_parts_of(world, &self.scene.world) {
             return Err(SimulationError::AnotherWorld);
         }
-        let Changes { places, numbers } = self.scene.changes(world);
-        let x: Vec<S> = numbers_of(states).chain(numbers).collect();
+        let Changes { places, values } = self.scene.changes(world);
+        let x: Vec<S> = coordinates_of(states).chain(values).collect();
         let function = OneStep { scene: Arc::clone(&self.scene), places, step };
         let after = S::recompute(function, &x)?;
         let mut after = states_of(&after);
         let next = |(body, state): (&Body<S>, &State<S>)| match body.motion {
             Motion::Free(_) => after.next().unwrap_or(*state),
-            Motion::Held | Motion::Driven(_) => *state,
+            Motion::Kinematic | Motion::Driven(_) => *state,
         };
         Ok(world.bodies.iter().zip(states).map(next).collect())
     }
 }
 
-/// One step as a function of the states' numbers and of the world's at `places`, to the states of free bodies.
+/// One step as a function of the states' coordinates and of the world's parameters at `places`, to the states of free bodies.
 struct OneStep<I> {
     scene: Arc<Scene<I>>,
     places: Box<[u32]>,
@@ -134,16 +135,16 @@ impl<I: Integrator + Send + 'static> Recompute for OneStep<I> {
     type Error = SimulationError;
 
     fn evaluate<S: Scalar>(&self, x: &[S]) -> Result<Vec<S>, SimulationError> {
-        let (states, numbers) = x.split_at(STATE * self.scene.world.bodies.len());
-        let world = self.scene.world(&self.places, numbers)?;
+        let (states, values) = x.split_at(STATE * self.scene.world.bodies.len());
+        let world = self.scene.world(&self.places, values)?;
         let states: Vec<State<S>> = states_of(states).collect();
         let next = self.scene.integrator.step(&world, &states, self.step)?;
         let free = world.bodies.iter().zip(next).filter(|(body, _)| body.rigid().is_some());
-        Ok(free.flat_map(|(_, state)| state.numbers()).collect())
+        Ok(free.flat_map(|(_, state)| state.coordinates()).collect())
     }
 }
 
-/// Whether `a` is made of the same surfaces, fields, laws and courses as `b`.
+/// Whether `a` is made of the same surfaces, fields, laws and trajectories as `b`.
 fn has_parts_of<S: Scalar>(a: &World<S>, b: &World) -> bool {
     fn same<T: ?Sized>(a: Option<&Arc<T>>, b: Option<&Arc<T>>) -> bool {
         match (a, b) {
@@ -155,7 +156,7 @@ fn has_parts_of<S: Scalar>(a: &World<S>, b: &World) -> bool {
     let body = |(a, b): (&Body<S>, &Body)| {
         let motion = match (&a.motion, &b.motion) {
             (Motion::Free(a), Motion::Free(b)) => a.com() == b.com(),
-            (Motion::Held, Motion::Held) => true,
+            (Motion::Kinematic, Motion::Kinematic) => true,
             (Motion::Driven(a), Motion::Driven(b)) => Arc::ptr_eq(a, b),
             _ => false,
         };
@@ -164,9 +165,8 @@ fn has_parts_of<S: Scalar>(a: &World<S>, b: &World) -> bool {
             && same(a.field.as_ref(), b.field.as_ref())
     };
     let pair = |(a, b): (&ContactPair<S>, &ContactPair)| {
-        let touch =
-            (a.samples, a.field, a.onset, a.share) == (b.samples, b.field, b.onset, b.share);
-        touch && a.params.len() == b.params.len() && Arc::ptr_eq(&a.law, &b.law)
+        (a.bodies, a.smoothing, a.weight) == (b.bodies, b.smoothing, b.weight)
+            && Arc::ptr_eq(a.law(), b.law())
     };
     a.bodies.len() == b.bodies.len()
         && a.contacts.len() == b.contacts.len()
@@ -176,7 +176,7 @@ fn has_parts_of<S: Scalar>(a: &World<S>, b: &World) -> bool {
 
 impl World<Var> {
     /// The last states of a rollout from `initial`, as one node that holds no more than `snapshots` states: for rollouts
-    /// too long even for [`Compact`]. The sweep simulates again between them, see [`checkpoint::rollout`]; the
+    /// too long even for [`StepCheckpointed`]. The sweep simulates again between them, see [`checkpoint::rollout`]; the
     /// gradient does not depend on `snapshots`, to the last bit.
     ///
     /// ```
@@ -191,10 +191,10 @@ impl World<Var> {
     /// let recording = Recording::start();
     /// let mut start = [State::at_rest(Isometry3::identity()).lift()];
     /// start[ball].linear.x = recording.variable(2.0);
-    /// let horizon = Horizon { dt: 1e-3, steps: 2000 };
-    /// let snapshots = checkpoint::snapshots_for(horizon.steps, 2);
+    /// let time_steps = TimeSteps { dt: 1e-3, steps: 2000 };
+    /// let snapshots = checkpoint::snapshots_for(time_steps.steps, 2);
     /// let lifted = world.lift::<Var>();
-    /// let end = lifted.simulate_checkpointed(SemiImplicitEuler, &start, horizon, snapshots)?;
+    /// let end = lifted.simulate_checkpointed(SemiImplicitEuler, &start, time_steps, snapshots)?;
     /// let by_speed = recording.gradient(end[ball].pose.translation.x).wrt(start[ball].linear.x);
     /// assert!((by_speed - 2.0).abs() < 1e-12);
     /// # Ok(())
@@ -207,16 +207,16 @@ impl World<Var> {
         &self,
         integrator: impl Integrator + 'static,
         initial: &[State<Var>],
-        Horizon { dt, steps }: Horizon,
+        TimeSteps { dt, steps }: TimeSteps,
         snapshots: usize,
     ) -> Result<Vec<State<Var>>, SimulationError> {
         self.check(initial, dt)?;
         let scene = Scene::new(integrator, self)?;
-        let Changes { places, numbers } = scene.changes(self);
+        let Changes { places, values } = scene.changes(self);
         let failure = Rc::new(RefCell::new(None));
         let step = Steps { scene, places, dt, failure: Rc::clone(&failure) };
-        let initial: Vec<Var> = numbers_of(&self.started(initial)).collect();
-        let end = checkpoint::rollout(step, steps, snapshots, &initial, &numbers);
+        let initial: Vec<Var> = coordinates_of(&self.started(initial)).collect();
+        let end = checkpoint::rollout(step, steps, snapshots, &initial, &values);
         match failure.take() {
             Some(error) => Err(error),
             None => Ok(states_of(&end).collect()),
@@ -224,7 +224,7 @@ impl World<Var> {
     }
 }
 
-/// Steps as functions of the states' numbers and of the world's at `places`.
+/// Steps as functions of the states' coordinates and of the world's parameters at `places`.
 struct Steps<I> {
     scene: Arc<Scene<I>>,
     places: Box<[u32]>,
@@ -237,26 +237,28 @@ impl<I: Integrator + 'static> Steps<I> {
     fn step<S: Scalar>(
         &self,
         index: usize,
-        numbers: &[S],
+        coordinates: &[S],
         parameters: &[S],
     ) -> Result<Vec<State<S>>, SimulationError> {
         let world = self.scene.world(&self.places, parameters)?;
-        let states: Vec<State<S>> = states_of(numbers).collect();
+        let states: Vec<State<S>> = states_of(coordinates).collect();
         world.advance(&self.scene.integrator, &states, Step { index, dt: self.dt })
     }
 }
 
 impl<I: Integrator + 'static> checkpoint::Step for Steps<I> {
-    fn advance<S: Scalar>(&self, index: usize, numbers: &mut [S], parameters: &[S]) {
+    fn advance<S: Scalar>(&self, index: usize, coordinates: &mut [S], parameters: &[S]) {
         if self.failure.borrow().is_some() {
             return;
         }
-        match self.step(index, numbers, parameters) {
-            Ok(states) => numbers.iter_mut().zip(numbers_of(&states)).for_each(|(x, y)| *x = y),
+        match self.step(index, coordinates, parameters) {
+            Ok(states) => {
+                coordinates.iter_mut().zip(coordinates_of(&states)).for_each(|(x, y)| *x = y)
+            }
             Err(error) => {
                 *self.failure.borrow_mut() = Some(error);
                 // Should it fail in the sweep only, derivatives are NaN.
-                numbers.iter_mut().for_each(|x| *x = x.times(f64::NAN));
+                coordinates.iter_mut().for_each(|x| *x = x.times(f64::NAN));
             }
         }
     }

@@ -1,23 +1,20 @@
 //! Penalty contact between surface samples of a body and a signed distance field.
 
-pub mod approach;
-mod built_in;
-mod error;
+pub mod composite;
+pub mod dynamic;
+pub mod error;
 pub mod friction;
-pub mod grain;
+pub mod gap_smoothing;
 pub mod graspd;
-pub mod hertz;
-pub mod hunt_crossley;
 pub mod law;
 #[cfg(test)]
 pub(crate) mod law_checks;
-pub mod onset;
+pub mod normal;
+pub mod parameters;
 pub mod patch;
-pub mod penalty;
+pub mod point;
+pub mod range;
 pub mod registry;
-pub mod resting;
 pub mod restitution;
-pub mod stribeck;
+pub mod static_target;
 pub mod wrench;
-
-pub use error::LawError;

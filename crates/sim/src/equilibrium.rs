@@ -1,33 +1,33 @@
 //! Quasi-static analysis: could a body rest where it is?
 
-mod balance;
-mod compliant;
+pub(crate) mod balance;
+pub(crate) mod compliant;
 
 use nalgebra::{Point3, Unit, Vector3, Vector6};
 
-pub use balance::{Balance, Support, friction_factor};
-pub use compliant::{CompliantBalance, CompliantSupport};
-
 use crate::error::SimulationError;
 use crate::state::State;
-use crate::world::{ContactPair, World};
+use crate::world::World;
+use crate::world::body_id::BodyId;
+use crate::world::contact_pair::{ContactBodies, ContactPair};
+use balance::{Support, WrenchBalance, friction_factor};
 
 /// Whether a body could rest where it is.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Equilibrium {
-    /// What acts on it in the simulation, by its contact laws, loads and gravity: force \[N\], torque about the center
+    /// What acts on it in the simulation, by contact laws, the external wrench and gravity: force \[N\], torque about the center
     /// of mass \[N m\], world frame. Zero at rest.
     pub net: Vector6<f64>,
     /// Its points of contact.
     pub supports: Vec<Support>,
-    /// Forces at these points that balance loads and gravity, whatever the contact laws say.
-    pub balance: Balance,
+    /// Forces at these points that balance the external wrench and gravity, whatever the contact laws say.
+    pub balance: WrenchBalance,
     /// The least factor on the friction coefficient with which they do; see [`friction_factor`].
     pub friction_factor: f64,
 }
 
 impl Equilibrium {
-    /// Whether forces within the friction cones balance loads and gravity.
+    /// Whether forces within the friction cones balance the external wrench and gravity.
     pub fn is_possible(&self) -> bool {
         self.balance.is_balanced()
     }
@@ -35,7 +35,7 @@ impl Equilibrium {
 
 impl World {
     /// Whether forces at the contacts of `body`, within friction cones of coefficient `friction`, could hold it at
-    /// `states` under loads and gravity. Samples no farther than `reach` \[m\] are in contact.
+    /// `states` under its external wrench and gravity. Samples no farther than `reach` \[m\] are in contact.
     ///
     /// Velocities matter to [`Equilibrium::net`] only.
     ///
@@ -43,7 +43,7 @@ impl World {
     /// If there is no such body, it is not free, or there is not one state for each body.
     pub fn equilibrium(
         &self,
-        body: usize,
+        body: BodyId,
         states: &[State],
         friction: f64,
         reach: f64,
@@ -52,30 +52,30 @@ impl World {
         if states.len() != bodies {
             return Err(SimulationError::States { states: states.len(), bodies });
         }
-        let found = self.bodies.get(body).ok_or(SimulationError::NoBody { body, bodies })?;
+        let found = self.body(body)?;
         let Some(rigid) = found.rigid() else {
             return Err(SimulationError::NotFree { body: found.name.clone() });
         };
         let weight = self.gravity * rigid.mass();
         let weight = Vector6::new(weight.x, weight.y, weight.z, 0.0, 0.0, 0.0);
-        let load = found.load + weight;
+        let load = found.external_wrench + weight;
         let supports = self.supports(body, states, friction, reach);
         let center = Point3::from(states[body].pose.translation.vector);
         Ok(Equilibrium {
             net: self.wrenches(states, 0)[body] + weight,
-            balance: Balance::find(&supports, &center, &load),
+            balance: WrenchBalance::find(&supports, &center, &load),
             friction_factor: friction_factor(&supports, &center, &load),
             supports,
         })
     }
 
     /// Where samples of `body` touch others, and theirs touch it.
-    fn supports(&self, body: usize, states: &[State], friction: f64, reach: f64) -> Vec<Support> {
+    fn supports(&self, body: BodyId, states: &[State], friction: f64, reach: f64) -> Vec<Support> {
         let mut supports = Vec::new();
         for pair in &self.contacts {
             let sign = match body {
-                _ if pair.samples == body => 1.0,
-                _ if pair.field == body => -1.0,
+                _ if pair.bodies.samples == body => 1.0,
+                _ if pair.bodies.field == body => -1.0,
                 _ => continue,
             };
             for (position, outward) in self.touching(pair, states, reach) {
@@ -94,11 +94,12 @@ impl World {
         states: &[State],
         reach: f64,
     ) -> Vec<(Point3<f64>, Vector3<f64>)> {
-        let (body, other) = (&self.bodies[pair.samples], &self.bodies[pair.field]);
+        let ContactBodies { samples, field } = pair.bodies;
+        let (body, other) = (&self.bodies[samples], &self.bodies[field]);
+        let (t_world_com, t_world_field) = (states[samples].pose, states[field].pose);
         let (Some(surface), Some(field)) = (&body.surface, &other.field) else {
             return Vec::new();
         };
-        let (t_world_com, t_world_field) = (states[pair.samples].pose, states[pair.field].pose);
         let place = |position: &Point3<f64>| t_world_com * (position - body.com().coords);
         let touch = |position: Point3<f64>| {
             let local = t_world_field.inverse_transform_point(&position) + other.com().coords;
@@ -116,8 +117,8 @@ mod tests {
     use nalgebra::{Isometry3, Matrix3};
 
     use super::*;
-    use crate::fields::HalfSpace;
-    use crate::{Body, Onset, Penalty, RigidBody, Surface};
+    use crate::scenes::{floor, on_ground, penalty};
+    use crate::{Body, GapSmoothing, RigidBody, Surface};
 
     /// A box of 0.5 kg, 6 cm wide and 4 cm high, on an incline; the center of mass is in its middle.
     fn incline(angle: f64) -> (World, Vec<State>) {
@@ -128,13 +129,10 @@ mod tests {
             })
             .collect();
         let rigid = RigidBody::new(0.5, Matrix3::identity() * 1e-4, Point3::origin()).unwrap();
-        let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-        let slope = Arc::new(HalfSpace { normal: Vector3::z() });
-        let slope = world.add(Body::held("slope").with_field(slope));
-        let surface = Surface::uniform(&corners, 1e-2).unwrap();
-        let block = world.add(Body::free("block", rigid).with_surface(surface));
-        let law = Arc::new(Penalty::new(1e6, 1e3, 0.5, 1e-3).unwrap());
-        world.touch(block, slope, law, Onset::Hard).unwrap();
+        let law = Arc::new(penalty(1e6, 1e3, 0.5, 1e-3));
+        let block =
+            Body::free("block", rigid).with_surface(Surface::uniform(&corners, 1e-2).unwrap());
+        let world = on_ground(Vector3::z() * -9.81, floor(), block, law, GapSmoothing::Hard);
         let tilt = Isometry3::rotation(Vector3::new(0.0, angle, 0.0));
         let states = [Isometry3::identity(), Isometry3::translation(0.0, 0.0, 0.02)]
             .map(|pose| State::at_rest(tilt * pose));
@@ -147,7 +145,7 @@ mod tests {
         for fraction in [0.0, 0.5, 0.99, 1.01, 1.5] {
             let slope = fraction * friction;
             let (world, states) = incline(slope.atan());
-            let found = world.equilibrium(1, &states, friction, 1e-9).unwrap();
+            let found = world.equilibrium(BodyId(1), &states, friction, 1e-9).unwrap();
             assert_eq!(found.supports.len(), 4);
             assert_eq!(found.is_possible(), fraction < 1.0, "{fraction}: {:?}", found.balance);
             assert!((found.friction_factor - fraction).abs() < 1e-4, "{}", found.friction_factor);
@@ -168,7 +166,7 @@ mod tests {
         // Wider by half than high: it tips at tan θ = 3/2.
         let factor = |slope: f64| {
             let (world, states) = incline(slope.atan());
-            world.equilibrium(1, &states, 1.0, 1e-9).unwrap().friction_factor
+            world.equilibrium(BodyId(1), &states, 1.0, 1e-9).unwrap().friction_factor
         };
         assert!((factor(1.45) - 1.45).abs() < 1e-3);
         assert_eq!(factor(1.55), f64::INFINITY);
@@ -178,7 +176,7 @@ mod tests {
     fn a_body_in_free_space_has_nothing_but_its_weight() {
         let (world, mut states) = incline(0.1);
         states[1].pose.translation.z += 1.0;
-        let found = world.equilibrium(1, &states, 0.5, 1e-3).unwrap();
+        let found = world.equilibrium(BodyId(1), &states, 0.5, 1e-3).unwrap();
         let weight = Vector6::new(0.0, 0.0, -9.81 * 0.5, 0.0, 0.0, 0.0);
         assert_eq!((found.net, found.balance.residual), (weight, weight));
         assert!(found.supports.is_empty() && !found.is_possible());
@@ -189,8 +187,9 @@ mod tests {
     fn the_supporting_body_feels_the_same_points_from_the_other_side() {
         let (mut world, states) = incline(0.2);
         let rigid = *world.bodies[1].rigid().unwrap();
-        world.bodies[0].motion = crate::Motion::Free(rigid);
-        let [below, above] = [0, 1].map(|b| world.equilibrium(b, &states, 0.5, 1e-9).unwrap());
+        world.bodies[0].motion = crate::world::body::Motion::Free(rigid);
+        let [below, above] =
+            [0, 1].map(|b| world.equilibrium(BodyId(b), &states, 0.5, 1e-9).unwrap());
         for (a, b) in below.supports.iter().zip(&above.supports) {
             assert!((a.position - b.position).norm() < 1e-15 && a.normal == -b.normal);
         }
@@ -200,9 +199,11 @@ mod tests {
     #[test]
     fn impossible_questions_are_refused() {
         let (world, states) = incline(0.1);
-        let ask = |body, states: &[State]| world.equilibrium(body, states, 0.5, 1e-3).unwrap_err();
-        assert_eq!(ask(2, &states), SimulationError::NoBody { body: 2, bodies: 2 });
-        assert_eq!(ask(0, &states), SimulationError::NotFree { body: "slope".to_owned() });
+        let ask = |body, states: &[State]| {
+            world.equilibrium(BodyId(body), states, 0.5, 1e-3).unwrap_err()
+        };
+        assert_eq!(ask(2, &states), SimulationError::NoBody { body: BodyId(2), bodies: 2 });
+        assert_eq!(ask(0, &states), SimulationError::NotFree { body: "ground".to_owned() });
         assert_eq!(ask(1, &states[..1]), SimulationError::States { states: 1, bodies: 2 });
     }
 }

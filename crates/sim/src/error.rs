@@ -3,16 +3,17 @@
 use thiserror::Error;
 
 use crate::body::BodyError;
-use crate::contact::LawError;
+use crate::contact::error::LawError;
+use crate::world::body_id::BodyId;
 
 /// Why a simulation cannot be set up or cannot go on.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum SimulationError {
-    /// There is no body of that number.
+    /// A body is not of this world.
     #[error("there is no body {body}: the world has {bodies}")]
     NoBody {
-        /// The number.
-        body: usize,
+        /// Which body.
+        body: BodyId,
         /// How many there are.
         bodies: usize,
     },
@@ -36,8 +37,8 @@ pub enum SimulationError {
     },
     /// A parameter of a contact is out of its range.
     #[error(transparent)]
-    Parameter(#[from] LawError),
-    /// A body that forces should move is held or driven.
+    Law(#[from] LawError),
+    /// A body that forces should move is kinematic or driven.
     #[error("body '{body}' is not free to move")]
     NotFree {
         /// Its name.
@@ -54,9 +55,9 @@ pub enum SimulationError {
         /// How many bodies.
         bodies: usize,
     },
-    /// Numbers of a world that are too few or too many.
-    #[error("{given} numbers for a world of {expected}")]
-    Numbers {
+    /// Parameters of a world that are too few or too many.
+    #[error("{given} parameters for a world of {expected}")]
+    Parameters {
         /// How many were given.
         given: usize,
         /// How many it has.
@@ -70,7 +71,7 @@ pub enum SimulationError {
         /// What is wrong.
         error: BodyError,
     },
-    /// A world that differs in more than numbers from the one its integrator was made for.
+    /// A world that differs in more than parameters from the one its integrator was made for.
     #[error("the integrator was made for a world of other bodies or contacts")]
     AnotherWorld,
     /// The time step is not a positive number.
@@ -104,7 +105,7 @@ pub enum SimulationError {
     },
     /// Contacts are too stiff or damped for the parts into which a step may be divided.
     #[error(
-        "the contacts of step {step}, at {time} s, need {needed} parts of it, and {most} are allowed"
+        "the contacts of step {step}, at {time} s, need {needed} parts of it, and {max_substeps} are allowed"
     )]
     SubSteps {
         /// Number of the step.
@@ -114,9 +115,9 @@ pub enum SimulationError {
         /// Parts that would be needed.
         needed: f64,
         /// Parts that are allowed.
-        most: usize,
+        max_substeps: usize,
     },
-    /// A robot, its shape and the course of its joints do not belong together.
+    /// A robot, its shape and the trajectory of its joints do not belong together.
     #[error("{found} {what} for a robot that has {expected}")]
     Robot {
         /// What was counted.

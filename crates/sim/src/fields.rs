@@ -1,63 +1,102 @@
-//! Analytic distance fields for tests.
+//! Analytic distance fields.
 
-use nalgebra::{Matrix3, Point3, Vector3};
+use nalgebra::{Matrix3, Point3, Unit, Vector3};
 use prehend_geometry::{DistanceField, FieldSample};
 
-/// A half-space; `normal` points out of it.
-pub(crate) struct HalfSpace {
-    pub(crate) normal: Vector3<f64>,
+/// A half-space: everything below a plane.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HalfSpace {
+    /// Unit normal of the plane, out of the half-space.
+    pub normal: Unit<Vector3<f64>>,
+    /// Coordinate of the plane along the normal \[m\].
+    pub height: f64,
 }
 
 impl HalfSpace {
-    /// Everything below z = 0.
-    pub(crate) fn floor() -> Self {
-        Self { normal: Vector3::z() }
+    /// The half-space z < 0.
+    pub fn floor() -> Self {
+        Self { normal: Vector3::z_axis(), height: 0.0 }
     }
 }
 
 impl DistanceField for HalfSpace {
     fn sample(&self, point: &Point3<f64>, reach: f64) -> Option<FieldSample> {
-        let distance = self.normal.dot(&point.coords);
-        let (gradient, hessian) = (self.normal, Matrix3::zeros());
+        let distance = self.normal.dot(&point.coords) - self.height;
+        let (gradient, hessian) = (self.normal.into_inner(), Matrix3::zeros());
         (distance <= reach).then_some(FieldSample { distance, gradient, hessian })
     }
 }
 
-/// Everything outside of a sphere.
-#[derive(Clone)]
-pub(crate) struct SphereCavity {
-    pub(crate) center: Point3<f64>,
-    pub(crate) radius: f64,
+/// A solid sphere. At its center the gradient is NaN, which is no contact.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sphere {
+    /// Its center \[m\].
+    pub center: Point3<f64>,
+    /// Its radius \[m\].
+    pub radius: f64,
+}
+
+impl DistanceField for Sphere {
+    fn sample(&self, point: &Point3<f64>, reach: f64) -> Option<FieldSample> {
+        let offset = point - self.center;
+        let length = offset.norm();
+        let distance = length - self.radius;
+        let gradient = offset / length;
+        let hessian = (Matrix3::identity() - gradient * gradient.transpose()) / length;
+        (distance <= reach).then_some(FieldSample { distance, gradient, hessian })
+    }
+}
+
+/// Everything outside of a sphere. At its center the gradient is NaN, which is no contact.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SphereCavity {
+    /// Center of the sphere \[m\].
+    pub center: Point3<f64>,
+    /// Radius of the sphere \[m\].
+    pub radius: f64,
 }
 
 impl DistanceField for SphereCavity {
     fn sample(&self, point: &Point3<f64>, reach: f64) -> Option<FieldSample> {
-        let offset = point - self.center;
-        let length = offset.norm();
-        let distance = self.radius - length;
-        if distance > reach {
-            return None;
-        }
-        let n = offset / length;
-        let hessian = -(Matrix3::identity() - n * n.transpose()) / length;
-        Some(FieldSample { distance, gradient: -n, hessian })
-    }
-}
-
-/// What a field leaves free.
-pub(crate) struct Complement<F>(F);
-
-impl SphereCavity {
-    /// The sphere itself.
-    pub(crate) fn inside_out(self) -> Complement<Self> {
-        Complement(self)
-    }
-}
-
-impl<F: DistanceField> DistanceField for Complement<F> {
-    fn sample(&self, point: &Point3<f64>, reach: f64) -> Option<FieldSample> {
-        let FieldSample { distance, gradient, hessian } = self.0.sample(point, f64::INFINITY)?;
+        let Self { center, radius } = *self;
+        let FieldSample { distance, gradient, hessian } =
+            Sphere { center, radius }.sample(point, f64::INFINITY)?;
         let sample = FieldSample { distance: -distance, gradient: -gradient, hessian: -hessian };
         (sample.distance <= reach).then_some(sample)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use prehend_autodiff::check::{compare_gradients, finite_difference_jacobian};
+
+    use super::*;
+
+    #[test]
+    fn derivatives_match_differences() {
+        let (center, radius) = (Point3::new(0.1, -0.2, 0.3), 0.7);
+        let normal = Unit::new_normalize(Vector3::new(1.0, 2.0, -0.5));
+        let fields: [&dyn DistanceField; 3] = [
+            &HalfSpace { normal, height: 0.4 },
+            &Sphere { center, radius },
+            &SphereCavity { center, radius },
+        ];
+        for field in fields {
+            let at = [0.3, 0.5, -0.4];
+            let sample = |x: &[f64]| field.sample(&Point3::from_slice(x), f64::INFINITY).unwrap();
+            let numbers = |x: &[f64]| {
+                let FieldSample { distance, gradient, .. } = sample(x);
+                vec![distance, gradient.x, gradient.y, gradient.z]
+            };
+            let FieldSample { distance, gradient, hessian } = sample(&at);
+            let differences = finite_difference_jacobian(numbers, &at, 1e-6);
+            assert!(compare_gradients(gradient.as_slice(), &differences[0]).relative < 1e-8);
+            for row in 0..3 {
+                let exact: Vec<f64> = hessian.row(row).iter().copied().collect();
+                let error = exact.iter().zip(&differences[1 + row]).map(|(a, b)| (a - b).abs());
+                assert!(error.fold(0.0, f64::max) < 1e-8);
+            }
+            assert!(field.sample(&at.into(), distance - 1e-9).is_none());
+        }
     }
 }

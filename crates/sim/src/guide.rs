@@ -2,26 +2,17 @@
 //!
 //! # A world
 //! Bodies, what touches what, gravity. Samples of one body's surface touch the distance field of another; a field is a
-//! grid made of a mesh ([`SdfGrid`](prehend_geometry::SdfGrid)) or a few lines of your own:
+//! grid made of a mesh ([`SdfGrid`](prehend_geometry::SdfGrid)), one of [`fields`](crate::fields), or a
+//! [`DistanceField`](prehend_geometry::DistanceField) of your own:
 //!
 //! ```
 //! use std::sync::Arc;
 //!
 //! use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
-//! use prehend_geometry::{DistanceField, FieldSample};
 //! use prehend_sim::{
-//!     Body, Horizon, Onset, Penalty, RigidBody, SemiImplicitEuler, State, Surface, World,
+//!     Body, ContactBodies, Coulomb, GapSmoothing, HalfSpace, KelvinVoigt, Law, RigidBody,
+//!     SemiImplicitEuler, State, Surface, TimeSteps, World,
 //! };
-//!
-//! /// The half-space z < 0.
-//! struct Floor;
-//!
-//! impl DistanceField for Floor {
-//!     fn sample(&self, point: &Point3<f64>, reach: f64) -> Option<FieldSample> {
-//!         let (distance, gradient, hessian) = (point.z, Vector3::z(), Matrix3::zeros());
-//!         (distance <= reach).then_some(FieldSample { distance, gradient, hessian })
-//!     }
-//! }
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let com = Point3::new(0.0, 0.0, -5e-3);
@@ -30,18 +21,20 @@
 //! let feet = feet.map(|(x, y)| Point3::new(0.03 * x, 0.03 * y, -0.02));
 //!
 //! let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-//! let floor = world.add(Body::held("floor").with_field(Arc::new(Floor)));
+//! let floor = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
 //! let surface = Surface::uniform(&feet, 4e-4)?;
 //! let stool = world.add(Body::free("stool", rigid).with_surface(surface));
-//! let law = Arc::new(Penalty::new(1e7, 1e5, 0.5, 1e-2)?);
-//! world.touch(stool, floor, law, Onset::Softplus { width: 5e-5 })?;
+//! let spring = KelvinVoigt { stiffness: 1e7, damping: 1e5 };
+//! let law = Law::new(spring, Coulomb { friction: 0.5, slip_scale: 1e-2 })?;
+//! let bodies = ContactBodies { samples: stool, field: floor };
+//! world.add_contact(bodies, Arc::new(law), GapSmoothing::Softplus { width: 5e-5 })?;
 //!
 //! let t_world_stool = Isometry3::translation(0.0, 0.0, 0.02);
 //! let mut start = [State::at_rest(Isometry3::identity()), rigid.at_rest(&t_world_stool)];
 //! start[stool].linear.x = 0.3;
-//! world.check_time_step(&start, 1e-3)?;
-//! let horizon = Horizon { dt: 1e-3, steps: 200 };
-//! let end = world.simulate(&SemiImplicitEuler, &start, horizon, |_, _| ())?;
+//! world.check_time_step(&SemiImplicitEuler, &start, 1e-3)?;
+//! let time_steps = TimeSteps { dt: 1e-3, steps: 200 };
+//! let end = world.simulate(&SemiImplicitEuler, &start, time_steps, |_, _| ())?;
 //! // It slid to a halt: v²/2μg.
 //! let slid = rigid.model_pose(&end[stool].pose).translation.x;
 //! assert!((slid - 0.3 * 0.3 / (2.0 * 0.5 * 9.81)).abs() < 2e-3, "{slid}");
@@ -50,14 +43,14 @@
 //! ```
 //!
 //! The pose in a state is that of the center of mass: [`RigidBody::at_rest`] makes a state from the pose of the model, and
-//! [`RigidBody::model_pose`] goes back, which is what a renderer needs. For held and driven bodies the two are the same.
+//! [`RigidBody::model_pose`] goes back, which is what a renderer needs. For kinematic and driven bodies the two are the same.
 //!
 //! [`World::check_time_step`] sees only contacts already made, none of an impact to come. Where there are such, use
 //! [`SubStepped`](crate::SubStepped).
 //!
-//! # Bodies on a course
-//! [`Body::driven`] puts a body on a course in time, such as a robot's link. [`World::simulate`] moves it by itself, to
-//! time 0 before the first step too: what you give as its state does not matter.
+//! # Bodies on a trajectory
+//! [`Body::driven`] puts a body, such as a robot's link, on a [`Trajectory`](crate::Trajectory). [`World::simulate`] moves it, to
+//! time 0 before the first step too: the state given for it does not matter.
 //!
 //! ```
 //! # use nalgebra::{Isometry3, Vector3};
@@ -70,14 +63,14 @@
 //!     state
 //! }));
 //! let start = [State::at_rest(Isometry3::identity())];
-//! let horizon = Horizon { dt: 1e-3, steps: 500 };
-//! let end = world.simulate(&SemiImplicitEuler, &start, horizon, |_, _| ())?;
+//! let time_steps = TimeSteps { dt: 1e-3, steps: 500 };
+//! let end = world.simulate(&SemiImplicitEuler, &start, time_steps, |_, _| ())?;
 //! assert!((end[table].pose.translation.x - 0.05).abs() < 1e-12);
 //! # Ok(())
 //! # }
 //! ```
 //!
-//! # Contact both ways
+//! # Symmetric contact
 //! Two bodies that both have samples and fields touch both ways, each with half of the force: corners of either are
 //! felt. Each direction's law sees the axes of its own field's body.
 //!
@@ -85,24 +78,18 @@
 //! # use std::sync::Arc;
 //! # use nalgebra::{Isometry3, Matrix3, Point3, Vector1, Vector3};
 //! # use prehend_autodiff::{Fwd, Scalar};
-//! # use prehend_geometry::{DistanceField, FieldSample};
 //! # use prehend_sim::*;
-//! # struct Floor;
-//! # impl DistanceField for Floor {
-//! #     fn sample(&self, point: &Point3<f64>, reach: f64) -> Option<FieldSample> {
-//! #         let (distance, gradient, hessian) = (point.z, Vector3::z(), Matrix3::zeros());
-//! #         (distance <= reach).then_some(FieldSample { distance, gradient, hessian })
-//! #     }
-//! # }
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin())?;
 //! # let surface = Arc::new(Surface::uniform(&[Point3::origin()], 1e-4)?);
 //! # let mut world = World::new(Vector3::zeros());
 //! // Half-spaces, for brevity, the upper one upside down.
-//! let body = |name| Body::free(name, rigid).with_surface(surface.clone()).with_field(Arc::new(Floor));
+//! let body = |name| Body::free(name, rigid).with_surface(surface.clone()).with_field(Arc::new(HalfSpace::floor()));
 //! let (lower, upper) = (world.add(body("lower")), world.add(body("upper")));
-//! let law: Arc<dyn LocalLaw> = Arc::new(Penalty::new(1e7, 1e5, 0.5, 1e-2)?);
-//! world.touch_both_ways(lower, upper, &law, Onset::Hard)?;
+//! let spring = KelvinVoigt { stiffness: 1e7, damping: 1e5 };
+//! let friction = Coulomb { friction: 0.5, slip_scale: 1e-2 };
+//! let law: Arc<dyn DynContactLaw> = Arc::new(Law::new(spring, friction)?);
+//! world.add_symmetric_contact(lower, upper, &law, GapSmoothing::Hard)?;
 //! let turned = Isometry3::new(Vector3::new(0.0, 0.0, -1e-3), Vector3::x() * std::f64::consts::PI);
 //! let states = [Isometry3::identity(), turned].map(|pose| rigid.at_rest(&pose));
 //! // 1e7 N/m³ · 1 mm · 1 cm², half of it each way.
@@ -120,31 +107,25 @@
 //! # use std::sync::Arc;
 //! # use nalgebra::{Isometry3, Matrix3, Point3, Vector1, Vector3};
 //! # use prehend_autodiff::{Fwd, Scalar};
-//! # use prehend_geometry::{DistanceField, FieldSample};
 //! # use prehend_sim::*;
-//! # struct Floor;
-//! # impl DistanceField for Floor {
-//! #     fn sample(&self, point: &Point3<f64>, reach: f64) -> Option<FieldSample> {
-//! #         let (distance, gradient, hessian) = (point.z, Vector3::z(), Matrix3::zeros());
-//! #         (distance <= reach).then_some(FieldSample { distance, gradient, hessian })
-//! #     }
-//! # }
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin())?;
 //! # let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-//! # let floor = world.add(Body::held("floor").with_field(Arc::new(Floor)));
+//! # let floor = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
 //! # let feet = [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)];
 //! # let feet = feet.map(|(x, y)| Point3::new(0.03 * x, 0.03 * y, -0.02));
 //! # let surface = Surface::uniform(&feet, 4e-4)?;
 //! # let stool = world.add(Body::free("stool", rigid).with_surface(surface));
-//! # let law = Arc::new(Penalty::new(1e7, 1e5, 0.5, 1e-2)?);
-//! # world.touch(stool, floor, law, Onset::Softplus { width: 5e-5 })?;
+//! # let spring = KelvinVoigt { stiffness: 1e7, damping: 1e5 };
+//! # let law = Arc::new(Law::new(spring, Coulomb { friction: 0.5, slip_scale: 1e-2 })?);
+//! # let bodies = ContactBodies { samples: stool, field: floor };
+//! # world.add_contact(bodies, law, GapSmoothing::Softplus { width: 5e-5 })?;
 //! # let above = rigid.at_rest(&Isometry3::translation(0.0, 0.0, 0.021));
 //! # let start = [State::at_rest(Isometry3::identity()), above];
-//! let horizon = Horizon { dt: 1e-2, steps: 50 };
-//! let divided = SubStepped { integrator: SemiImplicitEuler, most: 256 };
-//! let a = world.simulate(&BackwardEuler, &start, horizon, |_, _| ())?;
-//! let b = world.simulate(&divided, &start, horizon, |_, _| ())?;
+//! let time_steps = TimeSteps { dt: 1e-2, steps: 50 };
+//! let divided = SubStepped { integrator: SemiImplicitEuler, max_substeps: 256 };
+//! let a = world.simulate(&BackwardEuler, &start, time_steps, |_, _| ())?;
+//! let b = world.simulate(&divided, &start, time_steps, |_, _| ())?;
 //! assert!((a[stool].pose.translation.z - b[stool].pose.translation.z).abs() < 1e-4);
 //! # Ok(())
 //! # }
@@ -158,30 +139,24 @@
 //! # use std::sync::Arc;
 //! # use nalgebra::{Isometry3, Matrix3, Point3, Vector1, Vector3};
 //! # use prehend_autodiff::{Fwd, Scalar};
-//! # use prehend_geometry::{DistanceField, FieldSample};
 //! # use prehend_sim::*;
-//! # struct Floor;
-//! # impl DistanceField for Floor {
-//! #     fn sample(&self, point: &Point3<f64>, reach: f64) -> Option<FieldSample> {
-//! #         let (distance, gradient, hessian) = (point.z, Vector3::z(), Matrix3::zeros());
-//! #         (distance <= reach).then_some(FieldSample { distance, gradient, hessian })
-//! #     }
-//! # }
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin())?;
 //! # let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-//! # let floor = world.add(Body::held("floor").with_field(Arc::new(Floor)));
+//! # let floor = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
 //! # let feet = [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)];
 //! # let feet = feet.map(|(x, y)| Point3::new(0.03 * x, 0.03 * y, -0.02));
 //! # let surface = Surface::uniform(&feet, 4e-4)?;
 //! # let stool = world.add(Body::free("stool", rigid).with_surface(surface));
-//! # let law = Arc::new(Penalty::new(1e7, 1e5, 0.5, 1e-2)?);
-//! # world.touch(stool, floor, law, Onset::Hard)?;
+//! # let spring = KelvinVoigt { stiffness: 1e7, damping: 1e5 };
+//! # let law = Arc::new(Law::new(spring, Coulomb { friction: 0.5, slip_scale: 1e-2 })?);
+//! # let bodies = ContactBodies { samples: stool, field: floor };
+//! # world.add_contact(bodies, law, GapSmoothing::Hard)?;
 //! # let stands = rigid.at_rest(&Isometry3::translation(0.0, 0.0, 0.02));
 //! # let states = [State::at_rest(Isometry3::identity()), stands];
 //! // Friction coefficient 0.5; samples within 0.1 mm are in contact.
 //! assert!(world.equilibrium(stool, &states, 0.5, 1e-4)?.is_possible());
-//! world.bodies[stool].load.x = 2.0; // More than μ m g.
+//! world.bodies[stool].external_wrench.x = 2.0; // More than μ m g.
 //! assert!(!world.equilibrium(stool, &states, 0.5, 1e-4)?.is_possible());
 //! # Ok(())
 //! # }
@@ -195,15 +170,7 @@
 //! # use std::sync::Arc;
 //! # use nalgebra::{Isometry3, Matrix3, Point3, Vector1, Vector3};
 //! # use prehend_autodiff::{Fwd, Scalar};
-//! # use prehend_geometry::{DistanceField, FieldSample};
 //! # use prehend_sim::*;
-//! # struct Floor;
-//! # impl DistanceField for Floor {
-//! #     fn sample(&self, point: &Point3<f64>, reach: f64) -> Option<FieldSample> {
-//! #         let (distance, gradient, hessian) = (point.z, Vector3::z(), Matrix3::zeros());
-//! #         (distance <= reach).then_some(FieldSample { distance, gradient, hessian })
-//! #     }
-//! # }
 //! /// Pressure by the square of the depth, and a film whose drag grows with slip.
 //! struct Wet([f64; 2]);
 //!
@@ -222,19 +189,20 @@
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin())?;
 //! # let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-//! # let floor = world.add(Body::held("floor").with_field(Arc::new(Floor)));
+//! # let floor = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
 //! # let surface = Surface::uniform(&[Point3::origin()], 1e-4)?;
 //! # let puck = world.add(Body::free("puck", rigid).with_surface(surface));
 //! # let below = rigid.at_rest(&Isometry3::translation(0.0, 0.0, -1e-3));
 //! # let mut start = vec![State::at_rest(Isometry3::identity()), below];
 //! # start[puck].linear.x = 0.3;
-//! # let horizon = Horizon { dt: 1e-3, steps: 200 };
+//! # let time_steps = TimeSteps { dt: 1e-3, steps: 200 };
 //!
-//! world.touch(puck, floor, Arc::new(Wet([1.962e10, 0.5])), Onset::Hard)?;
+//! let bodies = ContactBodies { samples: puck, field: floor };
+//! world.add_contact(bodies, Arc::new(Wet([1.962e10, 0.5])), GapSmoothing::Hard)?;
 //! let mut lifted = world.lift::<Fwd<1>>();
-//! lifted.contacts[0].params[1].derivative = [1.0];
+//! lifted.contacts[0].params_mut()[1].derivative = [1.0];
 //! let start: Vec<_> = start.iter().map(State::lift).collect();
-//! let end = lifted.simulate(&SemiImplicitEuler, &start, horizon, |_, _| ())?;
+//! let end = lifted.simulate(&SemiImplicitEuler, &start, time_steps, |_, _| ())?;
 //! // v = v₀ exp(−c g t), by c:
 //! let speed = end[puck].linear.x;
 //! assert!((speed.derivative[0] / (-9.81 * 0.2 * speed.value) - 1.0).abs() < 1e-2);
@@ -247,28 +215,28 @@
 //! # Gradients, forward
 //! Write what you want to know once over the scalar: [`World::lift`] makes constants of a world, and any of its numbers may then
 //! be replaced by one that carries derivatives. [`Fwd`](prehend_autodiff::Fwd) is for few inputs. A mass or inertia is
-//! replaced together with its body: [`RigidBody::new`]. All numbers in a row: [`World::numbers`].
+//! replaced together with its body: [`RigidBody::new`]. All of them in a row: [`World::parameters`].
 //!
 //! ```
 //! # use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 //! use prehend_autodiff::{Fwd, Recording, Scalar};
-//! use prehend_sim::{Compact, Integrator, Motion, SimulationError};
-//! # use prehend_sim::{Body, Horizon, RigidBody, SemiImplicitEuler, State, World};
+//! use prehend_sim::{StepCheckpointed, Integrator, Motion, SimulationError};
+//! # use prehend_sim::{Body, TimeSteps, RigidBody, SemiImplicitEuler, State, World};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
 //! # let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin())?;
 //! # let ball = world.add(Body::free("ball", rigid));
-//! # world.bodies[ball].load.z = 1.0;
+//! # world.bodies[ball].external_wrench.z = 1.0;
 //! # let start = [rigid.at_rest(&Isometry3::identity())];
-//! # let horizon = Horizon { dt: 1e-3, steps: 100 };
+//! # let time_steps = TimeSteps { dt: 1e-3, steps: 100 };
 //! // Height after a while, by the speed at the start and the mass.
 //! fn height<S: Scalar>(
 //!     world: &World,
 //!     start: &[State],
 //!     integrator: &impl Integrator,
 //!     [speed, mass]: [S; 2],
-//!     horizon: Horizon,
+//!     time_steps: TimeSteps,
 //! ) -> Result<S, SimulationError> {
 //!     let mut world = world.lift::<S>();
 //!     if let Motion::Free(body) = &mut world.bodies[0].motion {
@@ -277,33 +245,33 @@
 //!     }
 //!     let mut start: Vec<State<S>> = start.iter().map(State::lift).collect();
 //!     start[0].linear.z = speed;
-//!     let end = world.simulate(integrator, &start, horizon, |_, _| ())?;
+//!     let end = world.simulate(integrator, &start, time_steps, |_, _| ())?;
 //!     Ok(end[0].pose.translation.z)
 //! }
 //!
 //! let forward =
-//!     height(&world, &start, &SemiImplicitEuler, Fwd::<2>::variables([0.5, 0.2]), horizon)?;
+//!     height(&world, &start, &SemiImplicitEuler, Fwd::<2>::variables([0.5, 0.2]), time_steps)?;
 //! assert!((forward.derivative[0] - 0.1).abs() < 1e-12);
 //!
 //! // Reverse mode, for many inputs: the same function, with one node a step.
-//! let integrator = Compact::new(SemiImplicitEuler, &world)?;
+//! let integrator = StepCheckpointed::new(SemiImplicitEuler, &world)?;
 //! let recording = Recording::start();
 //! let inputs = recording.variables([0.5, 0.2]);
 //! let adjoints =
-//!     recording.gradient(height(&world, &start, &integrator, inputs, horizon)?);
+//!     recording.gradient(height(&world, &start, &integrator, inputs, time_steps)?);
 //! assert!((adjoints.wrt(inputs[1]) - forward.derivative[1]).abs() < 1e-12);
 //! # Ok(())
 //! # }
 //! ```
 //!
 //! A rollout over [`Var`](prehend_autodiff::Var) with a plain integrator gives the same gradient and records every operation;
-//! [`Compact`](crate::Compact) keeps a few hundred bytes a step. For rollouts too long even for that,
+//! [`StepCheckpointed`](crate::StepCheckpointed) keeps a few hundred bytes a step. For rollouts too long even for that,
 //! [`World::simulate_checkpointed`] is one node that holds as many states as you allow.
 //!
 //! # Together with other losses
 //! The states of a rollout over `Var` are numbers on the tape like all others. Their poses go on into a renderer's
 //! operation, a network or a sum of squares, where they come from may be anything as well, and one sweep goes back
-//! through all of it. Loads that a controller computes from the states are one more line between two steps:
+//! through all of it. Wrenches that a controller computes from the states are one more line between two steps:
 //!
 //! ```
 //! # use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
@@ -313,14 +281,14 @@
 //! # let mut world = World::new(Vector3::zeros());
 //! # let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin())?;
 //! # let ball = world.add(Body::free("ball", rigid));
-//! let integrator = Compact::new(SemiImplicitEuler, &world)?;
+//! let integrator = StepCheckpointed::new(SemiImplicitEuler, &world)?;
 //! let recording = Recording::start();
 //! let gain = recording.variable(2.0);
 //! let mut lifted = world.lift::<Var>();
 //! let mut states = vec![rigid.at_rest(&Isometry3::translation(1.0, 0.0, 0.0)).lift()];
 //! let mut loss = Var::from(0.0);
 //! for index in 0..30 {
-//!     lifted.bodies[ball].load.x = -gain * states[ball].pose.translation.x;
+//!     lifted.bodies[ball].external_wrench.x = -gain * states[ball].pose.translation.x;
 //!     states = lifted.step(&integrator, &states, Step { index, dt: 1e-2 })?;
 //!     loss += states[ball].pose.translation.vector.norm_squared();
 //! }
@@ -331,29 +299,23 @@
 //! ```
 //!
 //! # Contacts not yet made
-//! A leaky onset has the forces of a hard one, but gradients feel samples that do not touch yet:
+//! Leaky smoothing has the forces of none, but gradients feel samples that do not touch yet:
 //!
 //! ```
 //! # use std::sync::Arc;
 //! # use nalgebra::{Isometry3, Matrix3, Point3, Vector1, Vector3};
 //! # use prehend_autodiff::{Fwd, Scalar};
-//! # use prehend_geometry::{DistanceField, FieldSample};
 //! # use prehend_sim::*;
-//! # struct Floor;
-//! # impl DistanceField for Floor {
-//! #     fn sample(&self, point: &Point3<f64>, reach: f64) -> Option<FieldSample> {
-//! #         let (distance, gradient, hessian) = (point.z, Vector3::z(), Matrix3::zeros());
-//! #         (distance <= reach).then_some(FieldSample { distance, gradient, hessian })
-//! #     }
-//! # }
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin())?;
 //! # let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-//! # let floor = world.add(Body::held("floor").with_field(Arc::new(Floor)));
+//! # let floor = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
 //! # let surface = Surface::uniform(&[Point3::origin()], 4e-4)?;
 //! # let stool = world.add(Body::free("stool", rigid).with_surface(surface));
-//! # let law = Arc::new(Penalty::new(1e7, 1e5, 0.5, 1e-2)?);
-//! # world.touch(stool, floor, law, Onset::Leaky { alpha: 0.1, band: 5e-3, steps: LeakSteps::All })?;
+//! # let spring = KelvinVoigt { stiffness: 1e7, damping: 1e5 };
+//! # let law = Arc::new(Law::new(spring, Coulomb { friction: 0.5, slip_scale: 1e-2 })?);
+//! let smoothing = GapSmoothing::Leaky { alpha: 0.1, band: 5e-3, steps: LeakSteps::All };
+//! world.add_contact(ContactBodies { samples: stool, field: floor }, law, smoothing)?;
 //! # let above = rigid.at_rest(&Isometry3::translation(0.0, 0.0, 1e-3));
 //! # let states = [State::at_rest(Isometry3::identity()), above];
 //! let mut lifted: Vec<State<Fwd<1>>> = states.iter().map(State::lift).collect();
@@ -370,23 +332,17 @@
 //! # use std::sync::Arc;
 //! # use nalgebra::{Isometry3, Matrix3, Point3, Vector1, Vector3};
 //! # use prehend_autodiff::{Fwd, Scalar};
-//! # use prehend_geometry::{DistanceField, FieldSample};
 //! # use prehend_sim::*;
-//! # struct Floor;
-//! # impl DistanceField for Floor {
-//! #     fn sample(&self, point: &Point3<f64>, reach: f64) -> Option<FieldSample> {
-//! #         let (distance, gradient, hessian) = (point.z, Vector3::z(), Matrix3::zeros());
-//! #         (distance <= reach).then_some(FieldSample { distance, gradient, hessian })
-//! #     }
-//! # }
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin())?;
 //! # let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-//! # let floor = world.add(Body::held("floor").with_field(Arc::new(Floor)));
+//! # let floor = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
 //! # let surface = Surface::uniform(&[Point3::origin()], 4e-4)?;
 //! # let stool = world.add(Body::free("stool", rigid).with_surface(surface));
-//! # let law = Arc::new(Penalty::new(1e7, 1e5, 0.5, 1e-2)?);
-//! # world.touch(stool, floor, law, Onset::Hard)?;
+//! # let spring = KelvinVoigt { stiffness: 1e7, damping: 1e5 };
+//! # let law = Arc::new(Law::new(spring, Coulomb { friction: 0.5, slip_scale: 1e-2 })?);
+//! # let bodies = ContactBodies { samples: stool, field: floor };
+//! # world.add_contact(bodies, law, GapSmoothing::Hard)?;
 //! let smoothing = Smoothing::new(Vector1::new(1e-3), 200, 7)?;
 //! let force = |height: &Vector1<f64>| {
 //!     let body = rigid.at_rest(&Isometry3::translation(0.0, 0.0, height.x));
@@ -400,9 +356,9 @@
 //! ```
 //!
 //! # What derivatives mean
-//! Those of [`Onset::Hard`](crate::Onset::Hard) are exact for the steps that were taken, but the moment of an impact jumps from one
-//! step to the next; [`Onset::Softplus`](crate::Onset::Softplus) makes the contact smooth, and fields should be C².
-//! Derivatives of [`Onset::Leaky`](crate::Onset::Leaky) are not those of the forces, on purpose. At rest, at gap zero and
+//! Those of [`GapSmoothing::Hard`](crate::GapSmoothing::Hard) are exact for the steps that were taken, but the moment of an impact jumps from one
+//! step to the next; [`GapSmoothing::Softplus`](crate::GapSmoothing::Softplus) makes the contact smooth, and fields should be C².
+//! Derivatives of [`GapSmoothing::Leaky`](crate::GapSmoothing::Leaky) are not those of the forces, on purpose. At rest, at gap zero and
 //! where a field has no gradient they are finite.
 #[cfg(doc)]
 use crate::{Body, RigidBody, World};

@@ -1,24 +1,17 @@
 //! How states advance in time.
 
-mod backward_euler;
-mod runge_kutta;
-mod semi_implicit;
-mod sub_stepped;
-#[cfg(test)]
-mod tests;
-mod velocity_verlet;
+pub(crate) mod backward_euler;
+pub(crate) mod runge_kutta;
+pub(crate) mod semi_implicit;
+pub(crate) mod sub_stepped;
+pub(crate) mod velocity_verlet;
 
 use prehend_autodiff::Scalar;
 
-pub use backward_euler::BackwardEuler;
-pub use runge_kutta::RungeKutta4;
-pub use semi_implicit::SemiImplicitEuler;
-pub use sub_stepped::SubStepped;
-pub use velocity_verlet::VelocityVerlet;
-
 use crate::error::SimulationError;
 use crate::state::State;
-use crate::world::{Step, World};
+use crate::time::Step;
+use crate::world::World;
 
 /// A time stepping scheme, written once over the scalar: plain numbers simulate, others differentiate.
 ///
@@ -58,16 +51,16 @@ pub trait Integrator: Sync {
         step: Step,
     ) -> Result<Vec<State<S>>, SimulationError>;
 
-    /// The largest dt·max(ω, damping rate) for which linear contacts are stable, where ω and the damping rate are as in
-    /// [`World::contact_frequency`]; infinite for a scheme that is stable always.
+    /// The largest dt·max(ω, c) at which linear contacts of angular frequency ω and damping rate c
+    /// ([`World::contact_frequency`]) are stable, whatever the smaller of the two; infinite for a scheme that is stable always.
     ///
     /// The default suits semi-implicit and higher-order explicit schemes (explicit Euler has no such limit: it is unstable).
     fn stability_limit(&self) -> f64 {
         1.0
     }
 
-    /// Whether a step looks at forces at its start alone. Then samples that are out of reach there may be left out.
-    fn needs_forces_at_start_only(&self) -> bool {
+    /// Whether a step evaluates forces once, at its start. Then samples that are out of reach there may be left out.
+    fn evaluates_forces_once(&self) -> bool {
         false
     }
 }

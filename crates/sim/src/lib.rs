@@ -2,7 +2,7 @@
 //!
 //! A rigid [`RigidBody`] carries surface samples ([`SurfacePoint`]) that touch a
 //! [`DistanceField`](prehend_geometry::DistanceField). A [`ContactLaw`], written once over a generic scalar, turns gap and slip into
-//! force; an [`Onset`] says how contact begins. Forces and their derivatives are gathered into one
+//! force; a [`GapSmoothing`] says how contact begins. The built-in [`Law`]s are products of a [`NormalLaw`] and a [`FrictionLaw`]. Forces and their derivatives are gathered into one
 //! wrench a step ([`contact::wrench`]), so that a rollout of a [`World`] carries exact derivatives by its initial states
 //! and by every number of the world. [`StabilityLoss`] measures by such rollouts how far an object is from resting.
 //!
@@ -13,17 +13,15 @@
 
 mod adjoint;
 mod body;
+mod broad_phase;
 pub mod contact;
+mod contact_frequency;
 mod equilibrium;
 mod error;
-#[cfg(test)]
-mod fields;
-#[cfg(test)]
-mod gradients;
+pub mod fields;
 pub mod guide;
 mod integrator;
-mod near;
-mod numbers;
+mod parameters;
 mod robot;
 mod rollout;
 #[cfg(test)]
@@ -32,38 +30,52 @@ mod smoothing;
 mod stability;
 mod state;
 mod surface;
-mod time_step;
+mod time;
 mod world;
 
-pub use adjoint::Compact;
+pub use adjoint::StepCheckpointed;
 pub use body::{BodyError, RigidBody};
-pub use contact::LawError;
-pub use contact::approach::{ApproachDamped, ApproachPenalty};
-pub use contact::friction::regularized_coulomb;
-pub use contact::grain::Grained;
-pub use contact::graspd::GraspD;
-pub use contact::hertz::{Hertz, HertzPenalty};
-pub use contact::hunt_crossley::{HuntCrossley, HuntCrossleyPenalty};
-pub use contact::law::{Contact, ContactLaw, Isotropic, IsotropicLaw, LocalLaw, Response};
-pub use contact::onset::{LeakSteps, Onset, OnsetSample};
+pub use contact::composite::Law;
+pub use contact::dynamic::DynContactLaw;
+pub use contact::error::LawError;
+pub use contact::friction::anisotropic::AnisotropicFriction;
+pub use contact::friction::coulomb::Coulomb;
+pub use contact::friction::stribeck::Stribeck;
+pub use contact::friction::{FrictionCoefficient, FrictionLaw, regularized_coulomb};
+pub use contact::gap_smoothing::{GapSmoothing, LeakSteps, SmoothedGap};
+pub use contact::graspd::{GraspD, GraspDParameters};
+pub use contact::law::ContactLaw;
+pub use contact::normal::NormalLaw;
+pub use contact::normal::approach_damped::ApproachDamped;
+pub use contact::normal::hertz::Hertz;
+pub use contact::normal::hunt_crossley::{Bounce, HuntCrossley};
+pub use contact::normal::kelvin_voigt::KelvinVoigt;
+pub use contact::parameters::{LawParameter, ParameterArray, Parameters};
 pub use contact::patch::Patch;
-pub use contact::penalty::{KelvinVoigt, Penalty};
-pub use contact::registry::{LawEntry, LawParameter, LawRegistry};
-pub use contact::resting::RestingContact;
-pub use contact::stribeck::Stribeck;
+pub use contact::point::{Contact, Response};
+pub use contact::range::ParameterRange;
+pub use contact::registry::{LawEntry, LawRegistry};
+pub use contact::static_target::StaticContactTarget;
 pub use contact::wrench::WrenchJacobian;
-pub use equilibrium::{
-    Balance, CompliantBalance, CompliantSupport, Equilibrium, Support, friction_factor,
-};
+pub use contact_frequency::StepError;
+pub use equilibrium::Equilibrium;
+pub use equilibrium::balance::{Support, WrenchBalance, friction_factor};
+pub use equilibrium::compliant::{CompliantBalance, CompliantSupport};
 pub use error::SimulationError;
-pub use integrator::{
-    BackwardEuler, Integrator, RungeKutta4, SemiImplicitEuler, SubStepped, VelocityVerlet,
-};
+pub use fields::{HalfSpace, Sphere, SphereCavity};
+pub use integrator::Integrator;
+pub use integrator::backward_euler::BackwardEuler;
+pub use integrator::runge_kutta::RungeKutta4;
+pub use integrator::semi_implicit::SemiImplicitEuler;
+pub use integrator::sub_stepped::SubStepped;
+pub use integrator::velocity_verlet::VelocityVerlet;
 pub use robot::JointState;
-pub use rollout::Horizon;
 pub use smoothing::{SmoothedGradient, Smoothing, SmoothingError};
 pub use stability::{Averaging, Perturbation, StabilityJacobian, StabilityLoss, StabilityWeights};
 pub use state::State;
 pub use surface::{Surface, SurfacePoint};
-pub use time_step::StepError;
-pub use world::{Body, ContactPair, Course, Motion, Step, World};
+pub use time::{Step, TimeSteps};
+pub use world::World;
+pub use world::body::{Body, Motion, Trajectory};
+pub use world::body_id::BodyId;
+pub use world::contact_pair::{ContactBodies, ContactPair};

@@ -9,7 +9,9 @@ use prehend_geometry::{DistanceField, FieldSample};
 
 use crate::error::SimulationError;
 use crate::state::State;
-use crate::world::{Body, World};
+use crate::world::World;
+use crate::world::body::Body;
+use crate::world::body_id::BodyId;
 
 /// Positions and velocities of a robot's joints, in the order of [`KinematicTree::joint_names`].
 #[derive(Clone, Debug, PartialEq)]
@@ -20,7 +22,7 @@ pub struct JointState {
     pub velocity: Vec<f64>,
 }
 
-/// A robot whose joints follow a given course.
+/// A robot whose joints follow a trajectory.
 struct DrivenRobot<C> {
     robot: KinematicTree,
     t_world_base: Isometry3<f64>,
@@ -67,7 +69,7 @@ impl DistanceField for LinkField {
 
 impl World {
     /// Adds the links of `robot` that have a shape as driven bodies with a distance field, named after them, and returns
-    /// the number of each link's body, in the order of [`KinematicTree::links`]. The base stands at `t_world_base`; `joints` says
+    /// each link's body, in the order of [`KinematicTree::links`]. The base stands at `t_world_base`; `joints` says
     /// how the joints are and move at a time \[s\], and limits are not enforced.
     ///
     /// [`World::drive`] brings states to their start. Distances reach as far as the margin of `shape`.
@@ -81,7 +83,7 @@ impl World {
         shape: &RobotShape,
         t_world_base: &Isometry3<f64>,
         joints: impl Fn(f64) -> JointState + Send + Sync + 'static,
-    ) -> Result<Vec<Option<usize>>, SimulationError> {
+    ) -> Result<Vec<Option<BodyId>>, SimulationError> {
         let mismatch = |what, found, expected| SimulationError::Robot { what, found, expected };
         let (found, expected) = (shape.links().len(), robot.links().len());
         if found != expected {
@@ -114,8 +116,8 @@ mod tests {
     use prehend_autodiff::lie::so3_log;
 
     use super::*;
-    use crate::scenes::ellipsoid;
-    use crate::{Horizon, Onset, Penalty, RigidBody, SemiImplicitEuler, Surface};
+    use crate::scenes::{ellipsoid, penalty};
+    use crate::{ContactBodies, GapSmoothing, RigidBody, SemiImplicitEuler, Surface, TimeSteps};
 
     /// A post on which an arm turns and slides out.
     const ARM: &str = r#"<robot name="arm"><link name="post"/>
@@ -127,7 +129,7 @@ mod tests {
 
     fn arm(
         joints: impl Fn(f64) -> JointState + Send + Sync + 'static,
-    ) -> (World, Vec<Option<usize>>) {
+    ) -> (World, Vec<Option<BodyId>>) {
         let robot = KinematicTree::from_urdf_str(ARM, None).unwrap();
         let shape = RobotShape::new(&robot, 0.004, 0.012).unwrap();
         let base = Isometry3::new(Vector3::new(0.1, -0.2, 0.3), Vector3::new(0.0, 0.0, 0.5));
@@ -146,7 +148,7 @@ mod tests {
     #[test]
     fn links_move_as_their_poses_do() {
         let (world, links) = arm(waving);
-        assert_eq!(links, [None, Some(0), Some(1)]);
+        assert_eq!(links, [None, Some(BodyId(0)), Some(BodyId(1))]);
         assert_eq!(world.bodies[1].name, "tip");
         let at = |time: f64| {
             let mut states = vec![State::at_rest(Isometry3::identity()); 2];
@@ -177,15 +179,18 @@ mod tests {
         let surface = Surface::uniform(&ellipsoid(400, [radius; 3]), 0.0113).unwrap();
         let ball = world.add(Body::free("ball", rigid).with_surface(surface));
         // Critically damped, or nearly: the ball keeps to the finger rather than bounce off.
-        let law = Arc::new(Penalty::new(1e8, 1e6, 0.5, 1e-2).unwrap());
-        world.touch(ball, tip, law, Onset::Softplus { width: 1e-4 }).unwrap();
+        let law = Arc::new(penalty(1e8, 1e6, 0.5, 1e-2));
+        let (bodies, smoothing) =
+            (ContactBodies { samples: ball, field: tip }, GapSmoothing::Softplus { width: 1e-4 });
+        world.add_contact(bodies, law, smoothing).unwrap();
         let mut states = vec![State::at_rest(Isometry3::identity()); 3];
         world.drive(&mut states, 0.0);
         let ahead = Vector3::new(0.04 + radius + 0.002, 0.0, 0.0);
         states[ball].pose = states[tip].pose * nalgebra::Translation3::from(ahead);
         let axis = states[tip].pose.rotation * Vector3::x();
-        let run =
-            world.rollout(&SemiImplicitEuler, &states, Horizon { dt: 1e-4, steps: 1000 }).unwrap();
+        let run = world
+            .rollout(&SemiImplicitEuler, &states, TimeSteps { dt: 1e-4, steps: 1000 })
+            .unwrap();
         let end = run.last().unwrap();
         assert!(run[20][ball].linear.norm() < 1e-5);
         assert!((end[tip].linear - axis * speed).norm() < 1e-12);
@@ -210,8 +215,8 @@ mod tests {
             velocity: vec![0.0; if t > 0.5 { 1 } else { 2 }],
         });
         let states = vec![State::at_rest(Isometry3::identity()); 2];
-        let horizon = Horizon { dt: 0.2, steps: 5 };
-        let lost = world.rollout(&SemiImplicitEuler, &states, horizon).unwrap_err();
+        let time_steps = TimeSteps { dt: 0.2, steps: 5 };
+        let lost = world.rollout(&SemiImplicitEuler, &states, time_steps).unwrap_err();
         assert!(matches!(lost, SimulationError::NotFinite { step: 3, .. }), "{lost}");
     }
 }

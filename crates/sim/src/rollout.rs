@@ -2,23 +2,15 @@
 
 use prehend_autodiff::Scalar;
 
+use crate::broad_phase::BroadPhase;
 use crate::error::SimulationError;
 use crate::integrator::Integrator;
-use crate::near::Near;
 use crate::state::State;
-use crate::world::{Step, World};
-
-/// How long and how finely a rollout is.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Horizon {
-    /// Time step \[s\].
-    pub dt: f64,
-    /// Number of steps.
-    pub steps: usize,
-}
+use crate::time::{Step, TimeSteps};
+use crate::world::World;
 
 impl<S: Scalar> World<S> {
-    /// The states of all bodies at 0, dt, …, `steps`·dt, from `initial`; driven bodies start where their course does.
+    /// The states of all bodies at 0, dt, …, `steps`·dt, from `initial`; driven bodies start where their trajectory does.
     ///
     /// Over `f64` this simulates; over [`Fwd`](prehend_autodiff::Fwd) it carries sensitivities to few inputs, over
     /// [`Var`](prehend_autodiff::Var) it records what the adjoint needs.
@@ -30,11 +22,11 @@ impl<S: Scalar> World<S> {
         &self,
         integrator: &impl Integrator,
         initial: &[State<S>],
-        horizon: Horizon,
+        time_steps: TimeSteps,
     ) -> Result<Vec<Vec<State<S>>>, SimulationError> {
-        let mut states = Vec::with_capacity(horizon.steps + 1);
+        let mut states = Vec::with_capacity(time_steps.steps + 1);
         states.push(self.started(initial));
-        self.simulate(integrator, initial, horizon, |_, next| states.push(next.to_vec()))?;
+        self.simulate(integrator, initial, time_steps, |_, next| states.push(next.to_vec()))?;
         Ok(states)
     }
 
@@ -46,16 +38,16 @@ impl<S: Scalar> World<S> {
         &self,
         integrator: &impl Integrator,
         initial: &[State<S>],
-        Horizon { dt, steps }: Horizon,
+        TimeSteps { dt, steps }: TimeSteps,
         mut visit: impl FnMut(Step, &[State<S>]),
     ) -> Result<Vec<State<S>>, SimulationError> {
         self.check(initial, dt)?;
         let mut states = self.started(initial);
-        let mut near = Near::new(self);
+        let mut near = BroadPhase::new(self);
         for index in 0..steps {
             let step = Step { index, dt };
-            let known = integrator.needs_forces_at_start_only();
-            let world = if known { near.world(self, &states, dt) } else { self };
+            let once = integrator.evaluates_forces_once();
+            let world = if once { near.world(self, &states, dt) } else { self };
             states = world.advance(integrator, &states, step)?;
             visit(step, &states);
         }
@@ -90,7 +82,7 @@ impl<S: Scalar> World<S> {
         Ok(next)
     }
 
-    /// The states with driven bodies where their courses start.
+    /// The states with driven bodies where their trajectories start.
     pub(crate) fn started(&self, initial: &[State<S>]) -> Vec<State<S>> {
         let mut states = initial.to_vec();
         self.drive(&mut states, 0.0);
@@ -126,47 +118,18 @@ impl<S: Scalar> World<S> {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use nalgebra::{Isometry3, Vector3};
+    use prehend_autodiff::Fwd;
 
     use super::*;
     use crate::scenes::{bowl, egg_on};
-    use crate::{Onset, SemiImplicitEuler};
-    use prehend_autodiff::check::{compare_gradients, finite_difference_jacobian};
-    use prehend_autodiff::lie::so3_log;
-
-    #[test]
-    fn sensitivities_match_differences_on_smooth_fields() {
-        let (world, states) = egg_on(bowl(), Onset::Softplus { width: 3e-4 });
-        let horizon = Horizon { dt: 1e-3, steps: 30 };
-        let mut lifted: Vec<State<_>> = states.iter().map(|s| s.lift()).collect();
-        lifted[1] = states[1].variables();
-        let run = world.lift().rollout(&SemiImplicitEuler, &lifted, horizon).unwrap();
-        let end = run.last().unwrap()[1];
-        let state = end.value();
-        assert!((state.linear - (states[1].linear + world.gravity * 0.03)).norm() > 0.05);
-        let differences = finite_difference_jacobian(
-            |x| {
-                let mut moved = states.clone();
-                moved[1] = states[1].moved(&std::array::from_fn::<f64, 12, _>(|i| x[i]));
-                let run = world.rollout(&SemiImplicitEuler, &moved, horizon).unwrap();
-                let end = run.last().unwrap()[1];
-                let turn = so3_log(&(end.pose.rotation * state.pose.rotation.inverse()));
-                let parts = [end.pose.translation.vector, turn, end.linear, end.angular];
-                parts.iter().flat_map(|v| v.iter().copied()).collect()
-            },
-            &[0.0; 12],
-            2e-6,
-        );
-        for (row, reference) in differences.iter().enumerate() {
-            let exact: Vec<f64> = end.sensitivity().row(row).iter().copied().collect();
-            let error = compare_gradients(&exact, reference);
-            assert!(error.relative < 1e-6, "row {row}: {error:?}");
-        }
-    }
+    use crate::{GapSmoothing, LawError, LawRegistry, Motion, SemiImplicitEuler};
 
     #[test]
     fn parameters_out_of_range_and_missing_states_are_refused() {
-        let (mut world, states) = egg_on(bowl(), Onset::Hard);
+        let (mut world, states) = egg_on(bowl(), GapSmoothing::Hard);
         let step = |world: &World, states: &[State], dt| {
             world.step(&SemiImplicitEuler, states, Step { index: 0, dt }).map(|_| ()).unwrap_err()
         };
@@ -176,31 +139,61 @@ mod tests {
         );
         assert_eq!(step(&world, &states, -1.0), SimulationError::TimeStep(-1.0));
         for (bad, message) in [
-            (vec![-1e7, 2e4, 0.6], "stiffness must be positive, is -10000000"),
-            (vec![1e7, f64::NAN, 0.6], "parameter of a contact must be finite, is NaN"),
-            (vec![1e7], "number of parameters must be the law's, is 1"),
+            ([-1e7, 2e4, 0.6], "stiffness must be positive, is -10000000"),
+            ([1e7, 2e4, -0.1], "friction must be zero or positive, is -0.1"),
+            ([1e7, f64::NAN, 0.6], "parameter of a contact must be finite, is NaN"),
         ] {
-            world.contacts[0].params = bad;
+            world.contacts[0].set_params(&bad).unwrap();
             assert_eq!(step(&world, &states, 1e-3).to_string(), message);
+        }
+        let error = world.contacts[0].set_params(&[1e7]).unwrap_err();
+        assert_eq!(error, LawError::Count { given: 1, expected: 3 });
+    }
+
+    #[test]
+    fn parameters_of_friction_out_of_range_are_refused_after_lifting_and_with_parameters() {
+        let registry = LawRegistry::default();
+        for (name, values, parts) in [
+            ("penalty_grain", &[5e6, 2e4, 0.6, 0.5, 1e-2, 1.0, 0.0, 0.0][..], 2),
+            ("penalty_stribeck", &[5e6, 2e4, 0.6, 0.3, 0.05, 1e-2], 3),
+        ] {
+            let (mut world, states) = egg_on(bowl(), GapSmoothing::Hard);
+            world.contacts[0].set_law(registry.create(name, values).unwrap().unwrap().into());
+            let (step, good) = (Step { index: 0, dt: 1e-3 }, world.parameters());
+            for (k, parameter) in
+                registry.entry(name).unwrap().parameters[2..][..parts].iter().enumerate()
+            {
+                let mut bad = good.clone();
+                bad[good.len() - parts + k] = -1.0;
+                let changed = world.with_parameters(&bad).unwrap();
+                let refused = changed.step(&SemiImplicitEuler, &states, step).unwrap_err();
+                assert!(
+                    matches!(refused, SimulationError::Law(e) if e.name() == Some(parameter.name))
+                );
+                let mut lifted = world.lift::<Fwd<1>>();
+                lifted.contacts[0].params_mut()[2 + k] = Fwd::constant(-1.0);
+                let states: Vec<_> = states.iter().map(State::lift).collect();
+                assert_eq!(lifted.step(&SemiImplicitEuler, &states, step).unwrap_err(), refused);
+            }
         }
     }
 
     #[test]
-    fn driven_bodies_start_on_their_course() {
-        let (mut world, states) = egg_on(bowl(), Onset::Hard);
-        let course = |time: f64| State::at_rest(Isometry3::translation(0.0, 0.0, time - 0.3));
-        world.bodies[0].motion = crate::Motion::Driven(std::sync::Arc::new(course));
+    fn driven_bodies_start_on_their_trajectory() {
+        let (mut world, states) = egg_on(bowl(), GapSmoothing::Hard);
+        let rising = |time: f64| State::at_rest(Isometry3::translation(0.0, 0.0, time - 0.3));
+        world.bodies[0].motion = Motion::Driven(Arc::new(rising));
         let run =
-            world.rollout(&SemiImplicitEuler, &states, Horizon { dt: 0.1, steps: 2 }).unwrap();
+            world.rollout(&SemiImplicitEuler, &states, TimeSteps { dt: 0.1, steps: 2 }).unwrap();
         let heights = [0, 1, 2].map(|i: usize| run[i][0].pose.translation.z);
         assert!((heights[0] + 0.3).abs() < 1e-15 && (heights[2] + 0.1).abs() < 1e-15);
     }
 
     #[test]
     fn bad_starts_and_blow_ups_say_where() {
-        let (world, states) = egg_on(bowl(), Onset::Hard);
+        let (world, states) = egg_on(bowl(), GapSmoothing::Hard);
         let roll = |states: &[State], dt| {
-            world.rollout(&SemiImplicitEuler, states, Horizon { dt, steps: 2000 })
+            world.rollout(&SemiImplicitEuler, states, TimeSteps { dt, steps: 2000 })
         };
         assert_eq!(roll(&states, 0.0).unwrap_err(), SimulationError::TimeStep(0.0));
         let error = roll(&states[..1], 1e-3).unwrap_err();

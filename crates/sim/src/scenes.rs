@@ -1,13 +1,24 @@
-//! Small worlds for tests.
+//! Small worlds for tests; `tests/rollouts` includes this file too, hence imports through the façade.
 
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 use prehend_geometry::DistanceField;
 
-use crate::contact::law::LocalLaw;
-use crate::fields::{HalfSpace, SphereCavity};
-use crate::{Body, Onset, Penalty, RigidBody, State, Surface, World};
+use crate::{
+    Body, ContactBodies, Coulomb, DynContactLaw, GapSmoothing, HalfSpace, KelvinVoigt, Law,
+    RigidBody, SphereCavity, State, Surface, World,
+};
+
+/// Kelvin and Voigt's normal law with Coulomb friction, the law of most tests.
+pub(crate) fn penalty(
+    stiffness: f64,
+    damping: f64,
+    friction: f64,
+    slip_scale: f64,
+) -> Law<KelvinVoigt, Coulomb> {
+    Law::new(KelvinVoigt { stiffness, damping }, Coulomb { friction, slip_scale }).unwrap()
+}
 
 /// The half-space z < 0.
 pub(crate) fn floor() -> Arc<dyn DistanceField> {
@@ -29,16 +40,32 @@ pub(crate) fn ellipsoid(count: usize, axes: [f64; 3]) -> Vec<Point3<f64>> {
     (0..count).map(point).collect()
 }
 
-/// Body 0 is `field`, held; body 1 an egg of 0.2 kg that spins and has just touched it.
-pub(crate) fn egg_on(field: Arc<dyn DistanceField>, onset: Onset) -> (World, Vec<State>) {
+/// A world of a kinematic body with `field`, and of `body`, which touches it.
+pub(crate) fn on_ground(
+    gravity: Vector3<f64>,
+    field: Arc<dyn DistanceField>,
+    body: Body,
+    law: Arc<dyn DynContactLaw>,
+    smoothing: GapSmoothing,
+) -> World {
+    let mut world = World::new(gravity);
+    let field = world.add(Body::kinematic("ground").with_field(field));
+    let samples = world.add(body);
+    world.add_contact(ContactBodies { samples, field }, law, smoothing).unwrap();
+    world
+}
+
+/// Body 0 is `field`, kinematic; body 1 an egg of 0.2 kg that spins and has just touched it.
+pub(crate) fn egg_on(
+    field: Arc<dyn DistanceField>,
+    smoothing: GapSmoothing,
+) -> (World, Vec<State>) {
     let inertia = Matrix3::from_diagonal(&Vector3::new(6e-5, 9e-5, 5e-5));
     let rigid = RigidBody::new(0.2, inertia, Point3::new(1e-3, -2e-3, 3e-3)).unwrap();
     let surface = Surface::uniform(&ellipsoid(60, [0.03, 0.025, 0.02]), 6e-3).unwrap();
-    let mut world = World::new(Vector3::new(0.3, -0.2, -9.81));
-    let ground = world.add(Body::held("ground").with_field(field));
-    let egg = world.add(Body::free("egg", rigid).with_surface(surface));
-    let law: Arc<dyn LocalLaw> = Arc::new(Penalty::new(5e6, 2e4, 0.6, 2e-2).unwrap());
-    world.touch(egg, ground, law, onset).unwrap();
+    let egg = Body::free("egg", rigid).with_surface(surface);
+    let law = Arc::new(penalty(5e6, 2e4, 0.6, 2e-2));
+    let world = on_ground(Vector3::new(0.3, -0.2, -9.81), field, egg, law, smoothing);
     let pose = Isometry3::new(Vector3::new(0.002, 0.001, 0.0195), Vector3::new(0.1, 0.2, 0.3));
     let mut state = rigid.at_rest(&pose);
     state.linear = Vector3::new(0.05, 0.02, -0.1);

@@ -5,12 +5,13 @@ use prehend_autodiff::lie::{cross_matrix, so3_log};
 use prehend_autodiff::{Fwd, Scalar};
 use rayon::prelude::*;
 
+use crate::contact_frequency::StepError;
 use crate::error::SimulationError;
-use crate::integrator::SemiImplicitEuler;
-use crate::rollout::Horizon;
+use crate::integrator::semi_implicit::SemiImplicitEuler;
 use crate::state::State;
-use crate::time_step::StepError;
+use crate::time::TimeSteps;
 use crate::world::World;
+use crate::world::body_id::BodyId;
 
 /// An initial velocity that a stable object withstands.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -78,10 +79,10 @@ pub struct StabilityLoss {
     pub world: World,
     /// States of all bodies; the object's own is replaced.
     pub states: Vec<State>,
-    /// Number of the object's body.
-    pub object: usize,
+    /// The object's body.
+    pub object: BodyId,
     /// Length of a rollout.
-    pub horizon: Horizon,
+    pub time_steps: TimeSteps,
     /// Initial velocities.
     pub perturbations: Vec<Perturbation>,
     /// Scales of the residuals.
@@ -91,8 +92,7 @@ pub struct StabilityLoss {
 /// A [`StabilityLoss`] with its derivatives by a left twist (translation \[m\], rotation \[rad\]) of the object's pose.
 ///
 /// With the residuals r and their Jacobian J the loss is |r|² and the gradient 2Jᵀr, so the Gauss–Newton step solves
-/// JᵀJ δ = −gradient/2. Under a leaky onset these are the leaky derivatives, in forward mode: an asymmetric leak counts as
-/// symmetric.
+/// JᵀJ δ = −gradient/2. Under leaky smoothing these are the leaky derivatives.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StabilityJacobian {
     /// The loss.
@@ -102,6 +102,9 @@ pub struct StabilityJacobian {
     /// JᵀJ.
     pub normal: Matrix6<f64>,
 }
+
+/// Fraction of the longest stable step that is used, 1 of √5 − 1: derivatives of rollouts at the limit grow.
+const SAFETY: f64 = 1.0 / 1.236;
 
 impl StabilityLoss {
     /// The loss with the object at `pose` (`t_world_model`); dimensionless.
@@ -173,16 +176,19 @@ impl StabilityLoss {
         })
     }
 
-    /// Whether the time step resolves the contacts with the object at rest at `pose`.
+    /// Checks that the time step resolves the contacts with the object at rest at `pose`: dt·ω ≤ 1 for their
+    /// [`World::contact_frequency`] ω.
     ///
     /// # Errors
-    /// With the longest step that does: see [`World::check_time_step`].
+    /// With the longest step that does.
     pub fn check(&self, pose: &Isometry3<f64>) -> Result<(), StepError> {
         let mut states = self.states.clone();
         if let Some(rigid) = self.world.bodies[self.object].rigid() {
             states[self.object] = rigid.at_rest(pose);
         }
-        self.world.check_time_step(&states, self.horizon.dt)
+        let dt = self.time_steps.dt;
+        let check = self.world.check_time_step(&SemiImplicitEuler, &states, dt / SAFETY);
+        check.map_err(|StepError { limit, .. }| StepError { dt, limit: SAFETY * limit })
     }
 
     fn count(&self) -> f64 {
@@ -197,9 +203,8 @@ impl StabilityLoss {
         if self.perturbations.is_empty() {
             return Err(SimulationError::NoPerturbations);
         }
-        let (body, bodies) = (self.object, self.world.bodies.len());
-        let body = self.world.bodies.get(body).ok_or(SimulationError::NoBody { body, bodies })?;
-        let states = self.states.len();
+        let body = self.world.body(self.object)?;
+        let (states, bodies) = (self.states.len(), self.world.bodies.len());
         if states != bodies {
             return Err(SimulationError::States { states, bodies });
         }
@@ -217,11 +222,11 @@ impl StabilityLoss {
         initial: &[State<S>],
         mut visit: impl FnMut(f64, SVector<S, 12>),
     ) -> Result<(), SimulationError> {
-        let (start, steps) = (&initial[self.object], self.horizon.steps);
+        let (start, steps) = (&initial[self.object], self.time_steps.steps);
         let residual = |states: &[State<S>]| self.residual(start, &states[self.object]);
         let every = self.weights.averaging == Averaging::Mean;
         let weight = 1.0 / steps.max(1) as f64;
-        let last = world.simulate(&SemiImplicitEuler, initial, self.horizon, |_, states| {
+        let last = world.simulate(&SemiImplicitEuler, initial, self.time_steps, |_, states| {
             if every {
                 visit(weight, residual(states));
             }
@@ -257,41 +262,40 @@ mod tests {
     use prehend_geometry::DistanceField;
 
     use super::*;
-    use crate::fields::SphereCavity;
-    use crate::scenes::{ellipsoid, floor};
-    use crate::{Body, LawRegistry, LeakSteps, LocalLaw, Onset, Penalty, RigidBody, Surface};
+    use crate::scenes::{ellipsoid, floor, on_ground, penalty};
+    use crate::{
+        Body, DynContactLaw, GapSmoothing, LawRegistry, LeakSteps, RigidBody, SphereCavity, Surface,
+    };
 
     fn loss_on(
         field: Arc<dyn DistanceField>,
-        law: Arc<dyn LocalLaw>,
-        onset: Onset,
+        law: Arc<dyn DynContactLaw>,
+        smoothing: GapSmoothing,
         averaging: Averaging,
     ) -> StabilityLoss {
         let inertia = Matrix3::from_diagonal(&Vector3::new(6e-5, 9e-5, 5e-5));
         let rigid = RigidBody::new(0.2, inertia, Point3::new(0.001, -0.002, 0.003)).unwrap();
         let surface = Surface::uniform(&ellipsoid(200, [0.03, 0.025, 0.02]), 6e-3).unwrap();
-        let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-        let hand = world.add(Body::held("hand").with_field(field));
-        let object = world.add(Body::free("object", rigid).with_surface(surface));
-        world.touch(object, hand, law, onset).unwrap();
+        let object = Body::free("object", rigid).with_surface(surface);
+        let world = on_ground(Vector3::z() * -9.81, field, object, law, smoothing);
         let mut weights = StabilityWeights::relative_to_fall(9.81, 0.02, 0.02);
         weights.averaging = averaging;
         StabilityLoss {
             world,
             states: vec![State::at_rest(Isometry3::identity()); 2],
-            object,
-            horizon: Horizon { dt: 1e-3, steps: 20 },
+            object: BodyId(1),
+            time_steps: TimeSteps { dt: 1e-3, steps: 20 },
             perturbations: Perturbation::rest_and_diagonal(0.01),
             weights,
         }
     }
 
-    fn penalty() -> Arc<dyn LocalLaw> {
-        Arc::new(Penalty::new(2e7, 5e4, 0.5, 1e-2).unwrap())
+    fn law() -> Arc<dyn DynContactLaw> {
+        Arc::new(penalty(2e7, 5e4, 0.5, 1e-2))
     }
 
-    fn loss(onset: Onset, averaging: Averaging) -> StabilityLoss {
-        loss_on(floor(), penalty(), onset, averaging)
+    fn loss(smoothing: GapSmoothing, averaging: Averaging) -> StabilityLoss {
+        loss_on(floor(), law(), smoothing, averaging)
     }
 
     fn pose() -> Isometry3<f64> {
@@ -305,8 +309,8 @@ mod tests {
         for (field, averaging) in
             fields.iter().flat_map(|f| [(f, Averaging::Final), (f, Averaging::Mean)])
         {
-            let onset = Onset::Softplus { width: 3e-4 };
-            let loss = loss_on(Arc::clone(field), penalty(), onset, averaging);
+            let smoothing = GapSmoothing::Softplus { width: 3e-4 };
+            let loss = loss_on(Arc::clone(field), law(), smoothing, averaging);
             let (pose, center) = (pose(), Point3::new(0.02, -0.01, 0.05));
             let StabilityJacobian { value, gradient, normal } =
                 loss.linearize(&pose, &center).unwrap();
@@ -328,7 +332,7 @@ mod tests {
 
     #[test]
     fn damped_gauss_newton_steps_settle_a_hovering_object() {
-        let loss = loss(Onset::Softplus { width: 3e-4 }, Averaging::Final);
+        let loss = loss(GapSmoothing::Softplus { width: 3e-4 }, Averaging::Final);
         let mut pose = Isometry3::translation(0.0, 0.0, 0.0203);
         let (before, mut damping) = (loss.value(&pose).unwrap(), 1e-3);
         let mut now = before;
@@ -352,28 +356,28 @@ mod tests {
     #[test]
     fn too_long_a_step_is_refused_with_one_that_passes() {
         let pose = pose();
-        let mut loss = loss(Onset::Hard, Averaging::Final);
+        let mut loss = loss(GapSmoothing::Hard, Averaging::Final);
         assert_eq!(loss.check(&pose), Ok(()));
-        loss.horizon.dt = 1.0;
+        loss.time_steps.dt = 1.0;
         let error = loss.check(&pose).unwrap_err();
         assert!(error.limit > 1e-3 && error.limit < 1.0, "{error}");
-        loss.horizon.dt = 0.999 * error.limit;
+        loss.time_steps.dt = 0.999 * error.limit;
         assert_eq!(loss.check(&pose), Ok(()));
     }
 
     #[test]
     fn a_law_by_name_gives_the_same_loss() {
-        let (onset, averaging) = (Onset::Softplus { width: 3e-4 }, Averaging::Mean);
+        let (smoothing, averaging) = (GapSmoothing::Softplus { width: 3e-4 }, Averaging::Mean);
         let law =
             LawRegistry::default().create("penalty", &[2e7, 5e4, 0.5, 1e-2]).unwrap().unwrap();
-        let by_name = loss_on(floor(), law.into(), onset, averaging);
-        let expected = loss(onset, averaging).linearize(&pose(), &Point3::origin());
+        let by_name = loss_on(floor(), law.into(), smoothing, averaging);
+        let expected = loss(smoothing, averaging).linearize(&pose(), &Point3::origin());
         assert_eq!(by_name.linearize(&pose(), &Point3::origin()), expected);
     }
 
     #[test]
     fn results_are_identical_on_any_number_of_threads() {
-        let loss = loss(Onset::Softplus { width: 3e-4 }, Averaging::Mean);
+        let loss = loss(GapSmoothing::Softplus { width: 3e-4 }, Averaging::Mean);
         let run = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| loss.linearize(&pose(), &Point3::origin()))
@@ -383,7 +387,7 @@ mod tests {
 
     #[test]
     fn free_fall_scores_one_for_velocity_and_one_for_displacement() {
-        let mut loss = loss(Onset::Hard, Averaging::Final);
+        let mut loss = loss(GapSmoothing::Hard, Averaging::Final);
         loss.perturbations.truncate(1);
         let high = Isometry3::translation(0.0, 0.0, 1.0);
         let StabilityJacobian { value, gradient, .. } =
@@ -397,9 +401,9 @@ mod tests {
     #[test]
     fn a_leak_changes_the_gradient_and_not_the_value() {
         let high = Isometry3::translation(0.0, 0.0, 0.025);
-        let hard = loss(Onset::Hard, Averaging::Final);
+        let hard = loss(GapSmoothing::Hard, Averaging::Final);
         let steps = LeakSteps::All;
-        let leaky = loss(Onset::Leaky { alpha: 0.1, band: 1e-2, steps }, Averaging::Final);
+        let leaky = loss(GapSmoothing::Leaky { alpha: 0.1, band: 1e-2, steps }, Averaging::Final);
         assert_eq!(hard.value(&high), leaky.value(&high));
         let center = Point3::origin();
         let gradient = |loss: &StabilityLoss| loss.linearize(&high, &center).unwrap().gradient;
@@ -410,9 +414,9 @@ mod tests {
 
     #[test]
     fn a_loss_of_something_that_cannot_move_is_refused() {
-        let mut loss = loss(Onset::Hard, Averaging::Final);
-        loss.object = 0;
+        let mut loss = loss(GapSmoothing::Hard, Averaging::Final);
+        loss.object = BodyId(0);
         let error = loss.value(&pose()).unwrap_err();
-        assert_eq!(error, SimulationError::NotFree { body: "hand".to_owned() });
+        assert_eq!(error, SimulationError::NotFree { body: "ground".to_owned() });
     }
 }

@@ -103,8 +103,8 @@ fn less<S: Scalar>(a: &Vector3<S>, value: &Vector3<f64>) -> Vector3<S> {
 }
 
 impl State {
-    /// The state `tangent` away, in the order of [`State::tangent`].
-    pub fn moved<S: Scalar>(&self, tangent: &[S; 12]) -> State<S> {
+    /// The state `tangent` away (the retraction of the manifold of states), in the order of [`State::tangent`].
+    pub fn retract<S: Scalar>(&self, tangent: &[S; 12]) -> State<S> {
         let [x, y, z, rx, ry, rz, vx, vy, vz, wx, wy, wz] = *tangent;
         let State { pose, linear, angular } = self.lift::<S>();
         let center = pose.translation.vector;
@@ -131,12 +131,12 @@ impl State {
     pub fn pose_variables(&self) -> State<Fwd<6>> {
         let mut tangent = [Fwd::constant(0.0); 12];
         tangent[..6].copy_from_slice(&Fwd::<6>::variables([0.0; 6]));
-        self.moved(&tangent)
+        self.retract(&tangent)
     }
 
     /// This state with all its twelve directions as variables.
     pub fn variables(&self) -> State<Fwd<12>> {
-        self.moved(&Fwd::variables([0.0; 12]))
+        self.retract(&Fwd::variables([0.0; 12]))
     }
 }
 
@@ -167,7 +167,7 @@ mod tests {
         let variables = state(0.7).variables();
         assert!((variables.sensitivity() - SMatrix::<f64, 12, 12>::identity()).norm() < 1e-14);
         assert!(variables.tangent().iter().all(|x| x.value == 0.0));
-        assert_eq!(variables.value(), state(0.7).moved(&[0.0; 12]));
+        assert_eq!(variables.value(), state(0.7).retract(&[0.0; 12]));
     }
 
     #[test]
@@ -180,7 +180,7 @@ mod tests {
             let at = |s: &State| {
                 let step = [s.linear * time, s.angular * time];
                 let [t, r] = step;
-                s.moved(&[t.x, t.y, t.z, r.x, r.y, r.z, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]).pose
+                s.retract(&[t.x, t.y, t.z, r.x, r.y, r.z, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]).pose
             };
             (at(&frame).inverse() * at(&body) * nalgebra::Point3::from(point)).coords
         };
@@ -202,7 +202,7 @@ mod tests {
         let differences = finite_difference_jacobian(
             |x| {
                 let moved =
-                    body.moved(&std::array::from_fn::<f64, 12, _>(|i| x[i])).seen_from(&frame);
+                    body.retract(&std::array::from_fn::<f64, 12, _>(|i| x[i])).seen_from(&frame);
                 let turn = prehend_autodiff::lie::so3_log(
                     &(moved.pose.rotation * value.pose.rotation.inverse()),
                 );

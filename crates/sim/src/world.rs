@@ -1,6 +1,8 @@
 //! Bodies, what acts on them and what touches what.
 
-mod body;
+pub(crate) mod body;
+pub(crate) mod body_id;
+pub(crate) mod contact_pair;
 
 use std::fmt;
 use std::sync::Arc;
@@ -8,78 +10,15 @@ use std::sync::Arc;
 use nalgebra::{Vector3, Vector6};
 use prehend_autodiff::Scalar;
 
-pub use body::{Body, Course, Motion};
-
-use crate::contact::LawError;
-use crate::contact::law::LocalLaw;
-use crate::contact::onset::Onset;
+use crate::contact::dynamic::DynContactLaw;
+use crate::contact::gap_smoothing::GapSmoothing;
 use crate::contact::patch::Patch;
 use crate::contact::wrench::stack;
 use crate::error::SimulationError;
 use crate::state::State;
-use crate::surface::Surface;
-
-/// Samples of one body that touch the field of another.
-#[derive(Clone)]
-pub struct ContactPair<S: Scalar = f64> {
-    /// The body with the samples.
-    pub samples: usize,
-    /// The body with the field.
-    pub field: usize,
-    /// Force of a contact.
-    pub law: Arc<dyn LocalLaw>,
-    /// Parameters of the law, in its order.
-    pub params: Vec<S>,
-    /// How contact begins.
-    pub onset: Onset,
-    /// Factor on the forces: a half where both bodies have samples and fields, so that together they count once.
-    pub share: f64,
-    /// Those of the samples that are near enough to touch for now; all if nothing is known.
-    pub(crate) near: Option<Arc<Surface>>,
-}
-
-impl<S: Scalar> ContactPair<S> {
-    /// Whether the law takes these parameters.
-    pub(crate) fn check(&self) -> Result<(), LawError> {
-        let values: Vec<f64> = self.params.iter().map(|p| p.value()).collect();
-        if values.len() != self.law.parameters().len() {
-            let (name, range) = ("number of parameters", "the law's");
-            return Err(LawError { name, range, value: values.len() as f64 });
-        }
-        if let Some(&value) = values.iter().find(|value| !value.is_finite()) {
-            return Err(LawError { name: "parameter of a contact", range: "finite", value });
-        }
-        self.law.check_parameters(&values)
-    }
-}
-
-/// Moment of a simulation.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Step {
-    /// Number of the step, from 0.
-    pub index: usize,
-    /// Time step \[s\].
-    pub dt: f64,
-}
-
-impl Step {
-    /// Time at its start \[s\].
-    pub fn time(&self) -> f64 {
-        self.index as f64 * self.dt
-    }
-
-    /// The step that follows.
-    #[must_use]
-    pub fn after(self) -> Self {
-        Self { index: self.index + 1, ..self }
-    }
-
-    /// The step divided into `parts` equal ones.
-    pub fn parts(self, parts: usize) -> impl Iterator<Item = Self> {
-        let (first, dt) = (self.index * parts, self.dt / parts as f64);
-        (first..first + parts).map(move |index| Self { index, dt })
-    }
-}
+use body::{Body, Motion};
+use body_id::BodyId;
+use contact_pair::{ContactBodies, ContactPair};
 
 /// Bodies, their contacts, and gravity: plain data, over plain numbers or numbers that carry derivatives.
 ///
@@ -101,25 +40,24 @@ impl World {
         Self { bodies: Vec::new(), contacts: Vec::new(), gravity }
     }
 
-    /// Adds a body and returns its number.
-    pub fn add(&mut self, body: Body) -> usize {
+    /// Adds a body.
+    pub fn add(&mut self, body: Body) -> BodyId {
         self.bodies.push(body);
-        self.bodies.len() - 1
+        BodyId(self.bodies.len() - 1)
     }
 
-    /// Lets the samples of body `samples` touch the field of body `field`.
+    /// Lets the samples of one body touch the field of another.
     ///
     /// # Errors
-    /// If there is no such body, it has no samples or no field, the two are the same, or the onset's parameters are
+    /// If there is no such body, it has no samples or no field, the two are the same, or the parameters of `smoothing` are
     /// out of their range.
-    pub fn touch(
+    pub fn add_contact(
         &mut self,
-        samples: usize,
-        field: usize,
-        law: Arc<dyn LocalLaw>,
-        onset: Onset,
+        bodies: ContactBodies,
+        law: Arc<dyn DynContactLaw>,
+        smoothing: GapSmoothing,
     ) -> Result<(), SimulationError> {
-        let pair = self.pair(samples, field, law, onset)?;
+        let pair = self.pair(bodies, law, smoothing)?;
         self.contacts.push(pair);
         Ok(())
     }
@@ -127,45 +65,40 @@ impl World {
     /// Lets two bodies touch both ways, samples on field, each with half of the force.
     ///
     /// # Errors
-    /// See [`World::touch`].
-    pub fn touch_both_ways(
+    /// See [`World::add_contact`].
+    pub fn add_symmetric_contact(
         &mut self,
-        a: usize,
-        b: usize,
-        law: &Arc<dyn LocalLaw>,
-        onset: Onset,
+        a: BodyId,
+        b: BodyId,
+        law: &Arc<dyn DynContactLaw>,
+        smoothing: GapSmoothing,
     ) -> Result<(), SimulationError> {
-        let there = self.pair(a, b, Arc::clone(law), onset)?;
-        let back = self.pair(b, a, Arc::clone(law), onset)?;
-        self.contacts.extend([there, back].map(|pair| ContactPair { share: 0.5, ..pair }));
+        let there = ContactBodies { samples: a, field: b };
+        let pair = |bodies| self.pair(bodies, Arc::clone(law), smoothing);
+        let mut both = [pair(there)?, pair(there.swapped())?];
+        both.iter_mut().for_each(|pair| pair.weight = 0.5);
+        self.contacts.extend(both);
         Ok(())
     }
 
     fn pair(
         &self,
-        samples: usize,
-        field: usize,
-        law: Arc<dyn LocalLaw>,
-        onset: Onset,
+        bodies: ContactBodies,
+        law: Arc<dyn DynContactLaw>,
+        smoothing: GapSmoothing,
     ) -> Result<ContactPair, SimulationError> {
-        for body in [samples, field] {
-            if body >= self.bodies.len() {
-                return Err(SimulationError::NoBody { body, bodies: self.bodies.len() });
-            }
+        let (samples, field) = (self.body(bodies.samples)?, self.body(bodies.field)?);
+        if bodies.samples == bodies.field {
+            return Err(SimulationError::Itself { body: samples.name.clone() });
         }
-        let name = |body: usize| self.bodies[body].name.clone();
-        if samples == field {
-            return Err(SimulationError::Itself { body: name(samples) });
+        if samples.surface.is_none() {
+            return Err(SimulationError::NoSamples { body: samples.name.clone() });
         }
-        if self.bodies[samples].surface.is_none() {
-            return Err(SimulationError::NoSamples { body: name(samples) });
+        if field.field.is_none() {
+            return Err(SimulationError::NoField { body: field.name.clone() });
         }
-        if self.bodies[field].field.is_none() {
-            return Err(SimulationError::NoField { body: name(field) });
-        }
-        onset.check()?;
-        let params = law.parameters().to_vec();
-        Ok(ContactPair { samples, field, law, params, onset, share: 1.0, near: None })
+        smoothing.check()?;
+        Ok(ContactPair::new(bodies, law, smoothing))
     }
 
     /// The same world in constants of another scalar.
@@ -175,59 +108,52 @@ impl World {
 }
 
 impl<S: Scalar> World<S> {
+    /// The body `id`, if it is of this world.
+    pub(crate) fn body(&self, id: BodyId) -> Result<&Body<S>, SimulationError> {
+        let no_body = SimulationError::NoBody { body: id, bodies: self.bodies.len() };
+        self.bodies.get(id.index()).ok_or(no_body)
+    }
+
+    /// The bodies that forces move.
+    pub(crate) fn free_bodies(&self) -> Vec<BodyId> {
+        let free = |id: &BodyId| self.bodies[*id].rigid().is_some();
+        (0..self.bodies.len()).map(BodyId).filter(free).collect()
+    }
+
     /// The same world, each number through `f`.
     pub(crate) fn map<T: Scalar>(&self, f: impl Fn(S) -> T) -> World<T> {
-        let body = |body: &Body<S>| Body {
-            name: body.name.clone(),
-            motion: match &body.motion {
-                Motion::Free(rigid) => Motion::Free(rigid.map(&f)),
-                Motion::Held => Motion::Held,
-                Motion::Driven(course) => Motion::Driven(Arc::clone(course)),
-            },
-            surface: body.surface.clone(),
-            field: body.field.clone(),
-            load: body.load.map(&f),
-        };
-        let pair = |pair: &ContactPair<S>| ContactPair {
-            samples: pair.samples,
-            field: pair.field,
-            law: Arc::clone(&pair.law),
-            params: pair.params.iter().map(|&p| f(p)).collect(),
-            onset: pair.onset,
-            share: pair.share,
-            near: pair.near.clone(),
-        };
         World {
-            bodies: self.bodies.iter().map(body).collect(),
-            contacts: self.contacts.iter().map(pair).collect(),
+            bodies: self.bodies.iter().map(|body| body.map(&f)).collect(),
+            contacts: self.contacts.iter().map(|pair| pair.map(&f)).collect(),
             gravity: self.gravity.map(&f),
         }
     }
 
-    /// The same world as values alone: without derivatives, and without onsets that leak, which are for derivatives.
+    /// The same world as values alone: without derivatives, and without leaks, which are for derivatives.
     pub(crate) fn plain(&self) -> World {
         let mut plain = self.map(S::value);
         for pair in &mut plain.contacts {
-            if let Onset::Leaky { .. } | Onset::AsymmetricLeaky { .. } = pair.onset {
-                pair.onset = Onset::Hard;
+            if pair.smoothing.leaks() {
+                pair.smoothing = GapSmoothing::Hard;
             }
         }
         plain
     }
 
     /// External and contact wrenches on every body at `states` (force \[N\], torque about the center of mass \[N m\],
-    /// world frame), without gravity. `step` matters to onsets that leak in the first step only.
+    /// world frame), without gravity. `step` matters to leaks in the first step only.
     ///
     /// Derivatives through contacts are first derivatives.
     ///
     /// # Panics
     /// If there are fewer states than bodies.
     pub fn wrenches(&self, states: &[State<S>], step: usize) -> Vec<Vector6<S>> {
-        let mut wrenches: Vec<Vector6<S>> = self.bodies.iter().map(|body| body.load).collect();
+        let mut wrenches: Vec<Vector6<S>> =
+            self.bodies.iter().map(|body| body.external_wrench).collect();
         for pair in &self.contacts {
             let [on_samples, on_field] = self.contact_wrenches(pair, states, step);
-            wrenches[pair.samples] += on_samples;
-            wrenches[pair.field] += on_field;
+            wrenches[pair.bodies.samples] += on_samples;
+            wrenches[pair.bodies.field] += on_field;
         }
         wrenches
     }
@@ -239,45 +165,45 @@ impl<S: Scalar> World<S> {
         states: &[State<S>],
         step: usize,
     ) -> [Vector6<S>; 2] {
-        let surface = pair.near.as_ref().or(self.bodies[pair.samples].surface.as_ref());
-        let (Some(surface), Some(field)) = (surface, &self.bodies[pair.field].field) else {
+        let surface = pair.near.as_ref().or(self.bodies[pair.bodies.samples].surface.as_ref());
+        let (Some(surface), Some(field)) = (surface, &self.bodies[pair.bodies.field].field) else {
             return [Vector6::zeros(); 2];
         };
         let seen = self.seen(pair, states);
         let patch = Patch {
             surface,
-            com: self.bodies[pair.samples].com(),
+            com: self.bodies[pair.bodies.samples].com(),
             state: seen.value(),
             field: field.as_ref(),
-            onset: pair.onset.at_step(step),
+            smoothing: pair.smoothing.at_step(step),
         };
         let [fx, fy, fz, tx, ty, tz] = local_wrench(pair, &seen, &patch);
-        let (state, base) = (&states[pair.samples], &states[pair.field]);
+        let (state, base) = (&states[pair.bodies.samples], &states[pair.bodies.field]);
         let rotation = base.pose.rotation;
-        let force = rotation * Vector3::new(fx, fy, fz).map(|x| x.times(pair.share));
-        let torque = rotation * Vector3::new(tx, ty, tz).map(|x| x.times(pair.share));
+        let force = rotation * Vector3::new(fx, fy, fz).map(|x| x.times(pair.weight));
+        let torque = rotation * Vector3::new(tx, ty, tz).map(|x| x.times(pair.weight));
         let offset = state.pose.translation.vector - base.pose.translation.vector;
         [stack(&force, &torque), stack(&-force, &-(torque + offset.cross(&force)))]
     }
 
     /// The body with the samples as the field sees it, in the model frame of the body with the field.
     fn seen(&self, pair: &ContactPair<S>, states: &[State<S>]) -> State<S> {
-        let com = self.bodies[pair.field].com();
-        states[pair.samples].seen_from(&states[pair.field].shifted(&-com.coords))
+        let com = self.bodies[pair.bodies.field].com();
+        states[pair.bodies.samples].seen_from(&states[pair.bodies.field].shifted(&-com.coords))
     }
 
     /// [`World::seen`] without derivatives: nothing is recorded.
     pub(crate) fn seen_value(&self, pair: &ContactPair<S>, states: &[State<S>]) -> State {
-        let com = self.bodies[pair.field].com();
-        let frame = states[pair.field].value().shifted(&-com.coords);
-        states[pair.samples].value().seen_from(&frame)
+        let com = self.bodies[pair.bodies.field].com();
+        let frame = states[pair.bodies.field].value().shifted(&-com.coords);
+        states[pair.bodies.samples].value().seen_from(&frame)
     }
 
     /// Moves the bodies that forces do not move to where they are at `time` \[s\].
     pub fn drive(&self, states: &mut [State<S>], time: f64) {
         for (body, state) in self.bodies.iter().zip(states) {
-            if let Motion::Driven(course) = &body.motion {
-                *state = course.state(time).lift();
+            if let Motion::Driven(trajectory) = &body.motion {
+                *state = trajectory.state(time).lift();
             }
         }
     }
@@ -287,14 +213,14 @@ impl<S: Scalar> World<S> {
 /// carry.
 fn local_wrench<S: Scalar>(pair: &ContactPair<S>, seen: &State<S>, patch: &Patch<'_>) -> [S; 6] {
     const { assert!(S::ORDER <= 1, "contacts have first derivatives only: no nested scalars") };
-    let values: Vec<f64> = pair.params.iter().map(|p| p.value()).collect();
+    let values: Vec<f64> = pair.params().iter().map(|p| p.value()).collect();
     if S::ORDER == 0 {
-        return pair.law.wrench(&values, patch).map(S::constant).into();
+        return pair.law().wrench(&values, patch).map(S::constant).into();
     }
     // Zeros that carry the parameters' derivatives.
-    let moved: Vec<S> = pair.params.iter().map(|p| p.plus(-p.value())).collect();
+    let moved: Vec<S> = pair.params().iter().map(|p| p.plus(-p.value())).collect();
     let by_params = moved.iter().any(|p| !p.is_constant_zero());
-    let jacobian = pair.law.wrench_jacobian(&values, patch, by_params);
+    let jacobian = pair.law().wrench_jacobian(&values, patch, by_params);
     let mut wrench = S::local(&jacobian, seen.tangent());
     for (by_param, moved) in jacobian.by_params.iter().zip(moved) {
         for (component, slope) in wrench.iter_mut().zip(by_param.iter()) {
@@ -307,7 +233,10 @@ fn local_wrench<S: Scalar>(pair: &ContactPair<S>, seen: &State<S>, patch: &Patch
 impl<S: Scalar> fmt::Debug for World<S> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let names: Vec<&str> = self.bodies.iter().map(|body| body.name.as_str()).collect();
-        let pairs = self.contacts.iter().map(|pair| (names[pair.samples], names[pair.field]));
+        let pairs = self
+            .contacts
+            .iter()
+            .map(|pair| [pair.bodies.samples, pair.bodies.field].map(|id| names[id]));
         f.debug_struct("World")
             .field("bodies", &names)
             .field("contacts", &pairs.collect::<Vec<_>>())
@@ -323,9 +252,8 @@ mod tests {
     use prehend_autodiff::check::{compare_gradients, finite_difference_jacobian};
 
     use super::*;
-    use crate::fields::SphereCavity;
-    use crate::scenes::{egg_on, ellipsoid, floor};
-    use crate::{Penalty, RigidBody};
+    use crate::scenes::{egg_on, ellipsoid, floor, penalty};
+    use crate::{RigidBody, Sphere, SphereCavity, Surface};
 
     /// A pebble in a cup, both free, turned and moving; they touch both ways.
     fn pebble_in_cup() -> (World, Vec<State>) {
@@ -333,7 +261,7 @@ mod tests {
         let inertia = Matrix3::from_diagonal(&Vector3::new(6e-5, 9e-5, 5e-5));
         let rigid = |com| RigidBody::new(0.2, inertia, com).unwrap();
         let cavity = Arc::new(SphereCavity { center: Point3::new(0.0, 0.0, 0.05), radius: 0.05 });
-        let ball = Arc::new(SphereCavity { center: Point3::origin(), radius: 0.02 }.inside_out());
+        let ball = Arc::new(Sphere { center: Point3::origin(), radius: 0.02 });
         let pebble_points: Vec<Point3<f64>> = ellipsoid(90, [0.02; 3]);
         let cup_points: Vec<Point3<f64>> = ellipsoid(90, [0.05; 3])
             .iter()
@@ -348,12 +276,14 @@ mod tests {
             .with_field(ball)
             .with_surface(surface(&pebble_points));
         let (cup, pebble) = (world.add(cup), world.add(pebble));
-        let law: Arc<dyn LocalLaw> = Arc::new(Penalty::new(5e6, 2e4, 0.6, 2e-2).unwrap());
-        world.touch_both_ways(pebble, cup, &law, Onset::Softplus { width: 3e-4 }).unwrap();
+        let law: Arc<dyn DynContactLaw> = Arc::new(penalty(5e6, 2e4, 0.6, 2e-2));
+        world
+            .add_symmetric_contact(pebble, cup, &law, GapSmoothing::Softplus { width: 3e-4 })
+            .unwrap();
         let cup_pose = Isometry3::new(Vector3::new(0.3, 0.2, 0.1), Vector3::new(0.4, -0.7, 1.0));
         let pebble_pose = cup_pose
             * Isometry3::new(Vector3::new(2e-3, 1e-3, 0.0192), Vector3::new(0.5, 0.1, -0.2));
-        let state = |body: usize, pose: &Isometry3<f64>, sign: f64| {
+        let state = |body: BodyId, pose: &Isometry3<f64>, sign: f64| {
             let mut state = world.bodies[body].rigid().unwrap().at_rest(pose);
             state.linear = Vector3::new(0.05, -0.1, 0.02) * sign;
             state.angular = Vector3::new(1.0, 2.0, -1.5) * sign;
@@ -374,7 +304,7 @@ mod tests {
                 |x| {
                     let mut states = states.clone();
                     let tangent = std::array::from_fn::<f64, 12, _>(|i| x[i]);
-                    states[moving] = states[moving].moved(&tangent);
+                    states[moving] = states[moving].retract(&tangent);
                     world.wrenches(&states, 0).iter().flat_map(|w| w.iter().copied()).collect()
                 },
                 &[0.0; 12],
@@ -406,20 +336,20 @@ mod tests {
 
     #[test]
     fn every_parameter_has_its_derivative() {
-        let (world, states) = egg_on(floor(), Onset::Hard);
+        let (world, states) = egg_on(floor(), GapSmoothing::Hard);
         let mut states = states;
         states[1].pose.translation.z -= 1e-3;
         let wrench = |p: &[f64]| {
             let mut world = world.clone();
-            world.contacts[0].params = p[..3].to_vec();
-            world.bodies[1].load = Vector6::repeat(p[3]);
+            world.contacts[0].set_params(&p[..3]).unwrap();
+            world.bodies[1].external_wrench = Vector6::repeat(p[3]);
             world.wrenches(&states, 0)[1].iter().copied().collect::<Vec<f64>>()
         };
         let at = [5e6, 2e4, 0.6, 0.3];
         let mut lifted = world.lift::<Fwd<4>>();
         let variables = Fwd::variables(at);
-        lifted.contacts[0].params = variables[..3].to_vec();
-        lifted.bodies[1].load = Vector6::repeat(variables[3]);
+        lifted.contacts[0].set_params(&variables[..3]).unwrap();
+        lifted.bodies[1].external_wrench = Vector6::repeat(variables[3]);
         let constants: Vec<State<Fwd<4>>> = states.iter().map(State::lift).collect();
         let exact = lifted.wrenches(&constants, 0)[1];
         // Scaled, so that one step suits all.
@@ -438,10 +368,13 @@ mod tests {
 
     #[test]
     fn impossible_contacts_are_refused() {
-        let (mut world, _) = egg_on(floor(), Onset::Hard);
-        let law: Arc<dyn LocalLaw> = Arc::new(Penalty::new(1.0, 0.0, 0.0, 1.0).unwrap());
-        let mut touch = |a, b| world.touch(a, b, Arc::clone(&law), Onset::Hard).unwrap_err();
-        assert_eq!(touch(1, 2), SimulationError::NoBody { body: 2, bodies: 2 });
+        let (mut world, _) = egg_on(floor(), GapSmoothing::Hard);
+        let law: Arc<dyn DynContactLaw> = Arc::new(penalty(1.0, 0.0, 0.0, 1.0));
+        let mut touch = |samples, field| {
+            let bodies = ContactBodies { samples: BodyId(samples), field: BodyId(field) };
+            world.add_contact(bodies, Arc::clone(&law), GapSmoothing::Hard).unwrap_err()
+        };
+        assert_eq!(touch(1, 2), SimulationError::NoBody { body: BodyId(2), bodies: 2 });
         assert_eq!(touch(1, 1), SimulationError::Itself { body: "egg".to_owned() });
         assert_eq!(touch(0, 1), SimulationError::NoSamples { body: "ground".to_owned() });
     }

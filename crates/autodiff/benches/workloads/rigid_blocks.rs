@@ -32,7 +32,7 @@ pub(crate) fn miss<S: Scalar>(inputs: &[S; 12], scene: &Scene) -> S {
         let acceleration = rigid::angular_acceleration(&rotation, &spin, &torque, &inertia);
         spin += acceleration.map(|rate| rate.times(STEP));
         position += velocity.map(|rate| rate.times(STEP));
-        rotation = rigid::turn(&rotation, &spin, STEP);
+        rotation = rigid::integrate_rotation(&rotation, &spin, STEP);
     }
     let offset = position - Vector3::from(TARGET.map(S::constant));
     let tilt = S::one() - rigid::rotate(&rotation, &Vector3::z()).z;
@@ -96,7 +96,7 @@ impl LocalFunction<11, 6> for Contacts<'_> {
             }
             by[1][2] += cross_matrix(&f) * cross;
         }
-        let turn = rigid::turn_of_coordinates(&pose.rotation);
+        let turn = rigid::rotation_vector_jacobian(&pose.rotation);
         let jacobian = std::array::from_fn(|row| {
             let (part, row) = (row / 3, row % 3);
             let [velocity, spin, by_turn] = &by[part];

@@ -6,7 +6,7 @@ use super::so3::{
     cross_matrix, cross_matrix_squared, inverse_coefficient, so3_exp, so3_left_jacobian_inverse,
     so3_log,
 };
-use crate::Scalar;
+use crate::scalar::Scalar;
 use crate::stumpff::{stumpff, stumpff_2_to_5};
 
 #[inline]
@@ -112,6 +112,14 @@ fn jacobian_blocks<S: Scalar>(twist: &Vector6<S>) -> (Matrix3<S>, Matrix3<S>) {
     )
 }
 
+/// The row (d, a × d): the derivative of d · p by a left twist of the point p about a center, `arm` a = p − center \[m\] and
+/// `direction` d. It is also the wrench (force, torque) about the center of the force d at p.
+#[inline]
+pub fn twist_row<S: Scalar>(arm: &Vector3<S>, direction: &Vector3<S>) -> Vector6<S> {
+    let torque = arm.cross(direction);
+    Vector6::new(direction.x, direction.y, direction.z, torque.x, torque.y, torque.z)
+}
+
 /// Moves `pose` by the left twist `delta` about the point `center`:
 /// Trans(c) · exp(δ) · Trans(−c) · T.
 ///
@@ -133,8 +141,8 @@ mod tests {
     use nalgebra::Point3;
 
     use super::*;
-    use crate::Fwd;
     use crate::check::finite_difference_jacobian;
+    use crate::fwd::Fwd;
     use crate::lie::so3_left_jacobian;
 
     fn twist<S: Scalar>(x: &[S]) -> Vector6<S> {
@@ -191,6 +199,19 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn twist_rows_are_derivatives_along_a_direction() {
+        let (center, point) = (Vector3::new(0.2, -0.1, 0.7), Point3::new(0.5, 0.3, -0.4));
+        let direction = Vector3::new(0.6, -1.2, 0.3);
+        let along = |delta: &[f64]| {
+            let moved = perturb_about(&Isometry3::identity(), &center, &twist(delta)) * point;
+            vec![direction.dot(&moved.coords)]
+        };
+        let differences = finite_difference_jacobian(along, &[0.0; 6], 1e-4);
+        let row = twist_row(&(point.coords - center), &direction);
+        row.iter().zip(&differences[0]).for_each(|(a, b)| assert!((a - b).abs() < 1e-10));
     }
 
     #[test]

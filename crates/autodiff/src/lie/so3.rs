@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
-use crate::Scalar;
+use crate::scalar::Scalar;
 use crate::stumpff::{SERIES_BELOW, polynomial, stumpff, stumpff_2_to_5};
 
 /// Below this squared sine of half the angle, the logarithm uses the series of the arctangent.
@@ -108,7 +108,7 @@ mod tests {
     use std::f64::consts::PI;
 
     use super::*;
-    use crate::Fwd;
+    use crate::fwd::Fwd;
 
     /// Zero, around it, on both sides of the switches between formulas, and around π.
     const ANGLES: [f64; 13] = [

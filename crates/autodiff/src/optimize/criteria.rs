@@ -16,19 +16,32 @@ pub struct Criteria {
     /// Change of the value by the trial step, relative to the value. Where the method predicts the
     /// change, the prediction must be as small, too.
     pub decrease: f64,
+    /// Decrease that the method predicts of the next step, in units of the objective; a step that promises less is not tried.
+    /// Half the squared Newton decrement of an undamped least-squares step.
+    pub predicted_decrease: f64,
 }
 
 impl Default for Criteria {
-    /// 200 iterations, gradient 1e-10, step 1e-12, decrease 1e-14.
+    /// 200 iterations, gradient 1e-10, step 1e-12, decrease 1e-14, any predicted decrease.
     fn default() -> Self {
-        Self { iterations: 200, gradient: 1e-10, step: 1e-12, decrease: 1e-14 }
+        Self {
+            iterations: 200,
+            gradient: 1e-10,
+            step: 1e-12,
+            decrease: 1e-14,
+            predicted_decrease: 0.0,
+        }
     }
 }
 
 impl Criteria {
     pub(super) fn check(&self) -> Result<(), OptimizeError> {
-        let tolerances =
-            [("gradient", self.gradient), ("step", self.step), ("decrease", self.decrease)];
+        let tolerances = [
+            ("gradient", self.gradient),
+            ("step", self.step),
+            ("decrease", self.decrease),
+            ("predicted_decrease", self.predicted_decrease),
+        ];
         tolerances
             .into_iter()
             .try_for_each(|(name, value)| check_setting(name, value, "at least 0", value >= 0.0))

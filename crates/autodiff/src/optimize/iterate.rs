@@ -58,35 +58,70 @@ pub(super) trait Method {
     fn refused(&mut self);
 }
 
-/// Runs `method` from `start` until one of the criteria is met.
+/// Where parameters live: what a step does to them.
+pub(super) trait Domain<P> {
+    /// The parameters after `step`.
+    fn retract(&self, x: &P, step: &[f64]) -> P;
+
+    /// The size of the parameters, which steps are relative to.
+    fn norm(&self, x: &P) -> f64;
+}
+
+/// Plain vectors.
+pub(super) struct Plain;
+
+impl Domain<Vec<f64>> for Plain {
+    fn retract(&self, x: &Vec<f64>, step: &[f64]) -> Vec<f64> {
+        x.iter().zip(step).map(|(x, h)| x + h).collect()
+    }
+
+    fn norm(&self, x: &Vec<f64>) -> f64 {
+        norm(x)
+    }
+}
+
+/// Runs `method` on plain vectors from `start` until one of the criteria is met.
 pub(super) fn iterate<M: Method>(
-    mut method: M,
+    method: M,
     criteria: &Criteria,
     start: &[f64],
     mut objective: impl FnMut(&[f64]) -> M::Evaluation,
-    mut observe: impl FnMut(&Iteration) -> ControlFlow<()>,
+    observe: impl FnMut(&Iteration) -> ControlFlow<()>,
 ) -> Result<Outcome, OptimizeError> {
-    criteria.check()?;
     if start.is_empty() {
         return Err(OptimizeError::NoParameters);
     }
     if let Some(index) = start.iter().position(|x| !x.is_finite()) {
         return Err(OptimizeError::StartNotFinite { index });
     }
-    let mut evaluate = |x: &[f64]| {
+    let mut evaluate = |x: &Vec<f64>| {
         let evaluation = objective(x);
         evaluation.check_shape(start.len()).map(|()| evaluation)
     };
-
-    let mut x = start.to_vec();
-    let mut here = evaluate(&x)?;
+    criteria.check()?;
+    let start = start.to_vec();
+    let here = evaluate(&start)?;
     if !here.is_finite() {
         return Err(OptimizeError::ObjectiveNotFinite);
     }
+    Ok(iterate_on(&Plain, method, criteria, (start, here), evaluate, observe)?.0)
+}
+
+/// Runs `method` on parameters that live in `domain` from `start`, where the objective has been evaluated, until one of the
+/// criteria is met. Returns the evaluation at the last parameters beside the best.
+pub(super) fn iterate_on<P: Clone, M: Method>(
+    domain: &impl Domain<P>,
+    mut method: M,
+    criteria: &Criteria,
+    (mut x, mut here): (P, M::Evaluation),
+    mut evaluate: impl FnMut(&P) -> Result<M::Evaluation, OptimizeError>,
+    mut observe: impl FnMut(&Iteration<P>) -> ControlFlow<()>,
+) -> Result<(Outcome<P>, M::Evaluation), OptimizeError> {
     let mut best =
         Outcome { parameters: x.clone(), value: here.value(), iterations: 0, stop: Stop::Gradient };
     // Reported only if the gradient has not vanished as well, which says more.
     let mut settled = None;
+    let mut refused = false;
     best.stop = loop {
         let gradient = largest(here.gradient());
         if gradient <= criteria.gradient {
@@ -101,14 +136,18 @@ pub(super) fn iterate<M: Method>(
         let Some(Trial { step, predicted }) = method.propose(&here) else {
             break Stop::Step;
         };
+        if predicted.is_some_and(|p| p < criteria.predicted_decrease) {
+            // Small because it is held back, not because there is nothing to gain?
+            break if refused { Stop::Step } else { Stop::Decrease };
+        }
         best.iterations += 1;
-        let moved: Vec<f64> = x.iter().zip(&step).map(|(x, h)| x + h).collect();
+        let moved = domain.retract(&x, &step);
         let there = evaluate(&moved)?;
 
         let length = norm(&step);
         let change = here.value() - there.value();
         let small = criteria.decrease * here.value().abs();
-        if length < criteria.step * (norm(&x) + criteria.step) {
+        if length < criteria.step * (domain.norm(&x) + criteria.step) {
             settled = Some(Stop::Step);
         } else if change.abs() < small && predicted.is_none_or(|p| p < small) {
             settled = Some(Stop::Decrease);
@@ -116,12 +155,13 @@ pub(super) fn iterate<M: Method>(
 
         let gain = predicted.map_or(1.0, |p| change / p);
         let taken = there.is_finite() && gain >= SUFFICIENT_GAIN;
+        refused = !taken;
         if taken {
             method.taken(gain);
             x = moved;
             here = there;
             if here.value() < best.value {
-                best.parameters.copy_from_slice(&x);
+                best.parameters.clone_from(&x);
                 best.value = here.value();
             }
         } else {
@@ -139,7 +179,7 @@ pub(super) fn iterate<M: Method>(
             break Stop::Observer;
         }
     };
-    Ok(best)
+    Ok((best, here))
 }
 
 /// The observer of those who want none.
@@ -193,7 +233,13 @@ mod tests {
 
     #[test]
     fn each_criterion_stops_for_its_own_reason() {
-        let never = Criteria { iterations: 1000, gradient: 0.0, step: 0.0, decrease: 0.0 };
+        let never = Criteria {
+            iterations: 1000,
+            gradient: 0.0,
+            step: 0.0,
+            decrease: 0.0,
+            predicted_decrease: 0.0,
+        };
         let stop = |criteria| {
             let method = GradientDescent { rate: 0.01, criteria };
             // An offset, so that the relative decrease becomes small before the steps do.
@@ -202,6 +248,7 @@ mod tests {
         assert_eq!(stop(Criteria { gradient: 1e-3, ..never }).stop, Stop::Gradient);
         assert_eq!(stop(Criteria { step: 1e-3, ..never }).stop, Stop::Step);
         assert_eq!(stop(Criteria { decrease: 1e-3, ..never }).stop, Stop::Decrease);
+        assert_eq!(stop(Criteria { predicted_decrease: 1e-3, ..never }).stop, Stop::Decrease);
         let ended = stop(Criteria { iterations: 3, ..never });
         assert_eq!((ended.stop, ended.iterations), (Stop::Iterations, 3));
         let at_once = GradientDescent::default().minimize(&[0.0], bowl).unwrap();

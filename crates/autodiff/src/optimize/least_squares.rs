@@ -1,11 +1,13 @@
 //! Levenberg–Marquardt, and Gauss–Newton as its undamped case.
 
+use std::marker::PhantomData;
 use std::ops::ControlFlow;
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::error::check_setting;
-use super::iterate::{Method, Trial, iterate, unobserved};
+use super::iterate::{Domain, Evaluation, Method, Trial, iterate, iterate_on, unobserved};
+use super::problem::{LeastSquares, Linearized, QuadraticModel};
 use super::{Criteria, Iteration, NormalEquations, OptimizeError, Outcome};
 
 /// Less damping is dropped, so that the last steps are Gauss and Newton's own; where those cannot be
@@ -76,41 +78,131 @@ impl LevenbergMarquardt {
     pub fn minimize_observed(
         &self,
         start: &[f64],
-        objective: impl FnMut(&[f64]) -> NormalEquations,
+        mut objective: impl FnMut(&[f64]) -> NormalEquations,
         observe: impl FnMut(&Iteration) -> ControlFlow<()>,
     ) -> Result<Outcome, OptimizeError> {
+        self.check()?;
+        let objective = |x: &[f64]| Linearized(objective(x));
+        iterate(self.damped(start.len()), &self.criteria, start, objective, observe)
+    }
+
+    fn check(&self) -> Result<(), OptimizeError> {
         let inside = self.damping >= 0.0 && self.damping.is_finite();
-        check_setting("damping", self.damping, "finite and at least 0", inside)?;
-        let scale = DVector::zeros(start.len());
-        let damped = Damped { damping: self.damping, growth: 2.0, scale };
-        iterate(damped, &self.criteria, start, objective, observe)
+        check_setting("damping", self.damping, "finite and at least 0", inside)
+    }
+
+    /// Minimizes `problem`, whose parameters lie on a manifold, from `start`, where it has been linearized.
+    ///
+    /// A tolerance of [`Criteria::step`] is absolute here, in the units of the tangent space. Returns the outcome and the
+    /// linearization there.
+    ///
+    /// ```
+    /// use nalgebra::{DMatrix, DVector, UnitQuaternion, Vector3};
+    /// use prehend_autodiff::lie::so3_log;
+    /// use prehend_autodiff::optimize::{LeastSquares, LevenbergMarquardt, NormalEquations};
+    ///
+    /// /// The mean of rotations.
+    /// struct Mean<'a>(&'a [UnitQuaternion<f64>]);
+    ///
+    /// impl LeastSquares for Mean<'_> {
+    ///     type Point = UnitQuaternion<f64>;
+    ///     type Linearization = NormalEquations;
+    ///
+    ///     fn linearize(&self, at: &UnitQuaternion<f64>) -> NormalEquations {
+    ///         let residuals = self.0.iter().map(|q| so3_log(&(at * q.inverse())));
+    ///         let residuals: Vec<f64> = residuals.flat_map(|r| [r.x, r.y, r.z]).collect();
+    ///         // To first order a rotation on the left adds to the difference.
+    ///         let jacobian = DMatrix::from_fn(residuals.len(), 3, |r, c| f64::from(r % 3 == c));
+    ///         NormalEquations::from_jacobian(&residuals, &jacobian)
+    ///     }
+    ///     fn retract(&self, at: &UnitQuaternion<f64>, step: &[f64]) -> UnitQuaternion<f64> {
+    ///         UnitQuaternion::from_scaled_axis(Vector3::from_column_slice(step)) * at
+    ///     }
+    /// }
+    ///
+    /// let seen = [0.1, 0.2, 0.6].map(|angle| UnitQuaternion::from_euler_angles(angle, 0.0, 0.0));
+    /// let problem = Mean(&seen);
+    /// let start = problem.linearize(&seen[0]);
+    /// let (found, _) = LevenbergMarquardt::default()
+    ///     .minimize_on(&problem, seen[0], start, |_| std::ops::ControlFlow::Continue(()))?;
+    /// assert!((found.parameters.euler_angles().0 - 0.3).abs() < 1e-9);
+    /// # Ok::<(), prehend_autodiff::optimize::OptimizeError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// If a setting is out of range, the linearization is not finite at the start, or has the wrong shape anywhere.
+    pub fn minimize_on<P: LeastSquares>(
+        &self,
+        problem: &P,
+        start: P::Point,
+        linearized: P::Linearization,
+        observe: impl FnMut(&Iteration<P::Point>) -> ControlFlow<()>,
+    ) -> Result<(Outcome<P::Point>, P::Linearization), OptimizeError> {
+        self.check()?;
+        self.criteria.check()?;
+        let linearized = Linearized(linearized);
+        let count = linearized.gradient().len();
+        linearized.check_shape(count)?;
+        if !linearized.is_finite() {
+            return Err(OptimizeError::ObjectiveNotFinite);
+        }
+        let evaluate = |x: &P::Point| {
+            let linearized = Linearized(problem.linearize(x));
+            linearized.check_shape(count).map(|()| linearized)
+        };
+        let start = (start, linearized);
+        let method = self.damped(count);
+        let domain = Manifold(problem);
+        let (outcome, last) =
+            iterate_on(&domain, method, &self.criteria, start, evaluate, observe)?;
+        Ok((outcome, last.0))
+    }
+
+    fn damped<M>(&self, parameters: usize) -> Damped<M> {
+        let scale = DVector::zeros(parameters);
+        Damped { damping: self.damping, growth: 2.0, scale, model: PhantomData }
     }
 }
 
-struct Damped {
+/// Where the parameters of a problem live.
+struct Manifold<'a, P>(&'a P);
+
+impl<P: LeastSquares> Domain<P::Point> for Manifold<'_, P> {
+    fn retract(&self, x: &P::Point, step: &[f64]) -> P::Point {
+        self.0.retract(x, step)
+    }
+
+    fn norm(&self, _: &P::Point) -> f64 {
+        1.0
+    }
+}
+
+struct Damped<M> {
     /// λ.
     damping: f64,
     /// By how much λ grows at the next failure: faster with each in a row.
     growth: f64,
     /// The diagonal of D.
     scale: DVector<f64>,
+    model: PhantomData<M>,
 }
 
-impl Method for Damped {
-    type Evaluation = NormalEquations;
+impl<M: QuadraticModel> Method for Damped<M> {
+    type Evaluation = Linearized<M>;
 
-    fn propose(&mut self, here: &NormalEquations) -> Option<Trial> {
-        self.scale.zip_apply(&here.matrix.diagonal(), |scale, entry| *scale = scale.max(entry));
+    fn propose(&mut self, Linearized(here): &Linearized<M>) -> Option<Trial> {
+        let (gradient, hessian) = (here.gradient(), here.hessian());
+        self.scale.zip_apply(&hessian.diagonal(), |scale, entry| *scale = scale.max(entry));
         // A parameter without any effect yet has no scale of its own, and no gradient to move it.
         let scale = self.scale.map(|entry| if entry > 0.0 { entry } else { 1.0 });
         loop {
             let damping = &scale * self.damping;
-            let mut matrix = here.matrix.clone();
+            let mut matrix = hessian.clone();
             for i in 0..matrix.nrows() {
                 matrix[(i, i)] += damping[i];
             }
-            if let Some(step) = solve(matrix, &here.gradient) {
-                let predicted = 0.5 * step.dot(&(damping.component_mul(&step) + &here.gradient));
+            if let Some(step) = solve(matrix, gradient) {
+                let predicted = 0.5 * step.dot(&(damping.component_mul(&step) + gradient));
                 let step = (-step).as_slice().to_vec();
                 return Some(Trial { step, predicted: Some(predicted) });
             }
@@ -328,7 +420,7 @@ mod tests {
                             assert!(iteration.value < last.0);
                         } else {
                             refused += 1;
-                            assert_eq!(iteration.parameters, last.1);
+                            assert_eq!(*iteration.parameters, last.1);
                         }
                         last = (iteration.value, iteration.parameters.to_vec());
                         ControlFlow::Continue(())

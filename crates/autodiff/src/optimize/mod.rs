@@ -7,7 +7,7 @@
 //! | noisy, kinked or badly scaled, as through contacts | [`Adam`] |
 //!
 //! For anything more (quasi-Newton methods, bounds) [`gradient`](crate::gradient) plugs into a general
-//! optimization library; the example `argmin_lbfgs` does so.
+//! optimization library; `benches/peers/autodiff/examples/argmin_lbfgs.rs` does so.
 //!
 //! An objective returns its value and gradient, or its [`NormalEquations`], at the parameters that it
 //! is given:
@@ -33,8 +33,9 @@
 //! # Ok::<(), prehend_autodiff::optimize::OptimizeError>(())
 //! ```
 //!
-//! Rotations enter as exponential coordinates, for instance `so3_exp(x) * reference` with
-//! [`so3_exp`](crate::lie::so3_exp), which are regular up to an angle of 2π from the reference.
+//! Poses and other parameters on a manifold are a [`LeastSquares`] problem with a retraction of its own
+//! ([`LevenbergMarquardt::minimize_on`]); for the other methods rotations enter as exponential coordinates, for instance
+//! `so3_exp(x) * reference` with [`so3_exp`](crate::lie::so3_exp), which are regular up to an angle of 2π from the reference.
 //!
 //! An iteration is one trial step and one evaluation of the objective. A trial at which the value or a
 //! derivative is not finite is never taken, and the next one is shorter.
@@ -46,6 +47,7 @@ mod gradient_descent;
 mod iterate;
 mod least_squares;
 mod normal_equations;
+mod problem;
 mod report;
 #[cfg(test)]
 mod test_problems;
@@ -56,4 +58,5 @@ pub use error::OptimizeError;
 pub use gradient_descent::GradientDescent;
 pub use least_squares::LevenbergMarquardt;
 pub use normal_equations::NormalEquations;
+pub use problem::{LeastSquares, QuadraticModel};
 pub use report::{Iteration, Outcome, Stop};

@@ -2,8 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::OptimizeError;
-use super::iterate::Evaluation;
+use super::problem::QuadraticModel;
 use crate::{Fwd, forward_jacobian};
 
 /// The value ½‖r‖² of a least-squares problem at a point, with its derivatives as far as the Jacobian J
@@ -51,30 +50,17 @@ impl NormalEquations {
     }
 }
 
-impl Evaluation for NormalEquations {
+impl QuadraticModel for NormalEquations {
     fn value(&self) -> f64 {
         self.value
     }
 
-    fn gradient(&self) -> &[f64] {
-        self.gradient.as_slice()
+    fn gradient(&self) -> &DVector<f64> {
+        &self.gradient
     }
 
-    fn is_finite(&self) -> bool {
-        let matrix = self.matrix.as_slice();
-        self.value.is_finite() && self.gradient.iter().chain(matrix).all(|entry| entry.is_finite())
-    }
-
-    fn check_shape(&self, expected: usize) -> Result<(), OptimizeError> {
-        let found = self.gradient.len();
-        if found != expected {
-            return Err(OptimizeError::GradientLength { expected, found });
-        }
-        let (rows, columns) = self.matrix.shape();
-        if (rows, columns) != (expected, expected) {
-            return Err(OptimizeError::MatrixShape { expected, rows, columns });
-        }
-        Ok(())
+    fn hessian(&self) -> &DMatrix<f64> {
+        &self.matrix
     }
 }
 

@@ -5,11 +5,13 @@
 pub enum Stop {
     /// The gradient vanished to within [`Criteria::gradient`](super::Criteria::gradient).
     Gradient,
-    /// The trial step was shorter than [`Criteria::step`](super::Criteria::step) asks, or there was none.
+    /// The trial step was shorter than [`Criteria::step`](super::Criteria::step) asks, or there was none, or refused steps
+    /// became so short that they promised nothing.
     ///
     /// Either the parameters have converged, or no step downhill was found however short.
     Step,
-    /// The value settled to within [`Criteria::decrease`](super::Criteria::decrease).
+    /// The value settled to within [`Criteria::decrease`](super::Criteria::decrease), or the next step promised less than
+    /// [`Criteria::predicted_decrease`](super::Criteria::predicted_decrease).
     Decrease,
     /// [`Criteria::iterations`](super::Criteria::iterations) were used up.
     Iterations,
@@ -19,11 +21,11 @@ pub enum Stop {
 
 /// One iteration, as the observer sees it.
 #[derive(Clone, Copy, Debug)]
-pub struct Iteration<'a> {
+pub struct Iteration<'a, P = Vec<f64>> {
     /// Counts from 1.
     pub number: usize,
     /// The parameters after the iteration.
-    pub parameters: &'a [f64],
+    pub parameters: &'a P,
     /// The objective there.
     pub value: f64,
     /// Largest absolute entry of the gradient there.
@@ -36,9 +38,9 @@ pub struct Iteration<'a> {
 
 /// How an optimization ended.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Outcome {
+pub struct Outcome<P = Vec<f64>> {
     /// The parameters of the lowest value seen.
-    pub parameters: Vec<f64>,
+    pub parameters: P,
     /// The objective there.
     pub value: f64,
     /// Trial steps made.

@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::factored::Factors;
+use super::factors::Factors;
 use super::pattern::Pattern;
 
 /// Beyond this condition number a solution has at most about three digits, and a singular matrix cannot

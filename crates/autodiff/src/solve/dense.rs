@@ -5,9 +5,10 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, Dim, Dyn, LU, Matrix, PermutationSequence, RawStorage};
 
 use super::SolveError;
-use super::factored::{Factored, Factors};
+use super::factored::Factored;
+use super::factors::Factors;
 use super::pattern::Pattern;
-use crate::Operand;
+use crate::operand::Operand;
 
 /// Factorizes a dense square matrix by Gaussian elimination with partial pivoting.
 ///

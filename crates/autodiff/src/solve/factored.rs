@@ -8,15 +8,10 @@ use nalgebra::{DMatrix, DefaultAllocator, Dim, Matrix, OMatrix, RawStorage};
 
 use super::SolveError;
 use super::condition;
+use super::factors::Factors;
 use super::pattern::Pattern;
-use crate::{CustomJvp, CustomVjp, Operand};
-
-/// What a factorization is asked for: solves with the matrix and its transpose, in place, for any number
-/// of right-hand sides.
-pub(super) trait Factors: Send + Sync + 'static {
-    fn solve(&self, rhs: &mut DMatrix<f64>);
-    fn solve_transpose(&self, rhs: &mut DMatrix<f64>);
-}
+use crate::operand::{CustomJvp, Operand};
+use crate::vjp::CustomVjp;
 
 /// A factorized square matrix, to be solved with as often as needed. Cheap to clone if it is constant.
 ///
@@ -176,8 +171,11 @@ mod tests {
 
     use super::*;
     use crate::check::{compare_gradients, finite_difference_gradient};
+    use crate::fwd::Fwd;
+    use crate::recording::{Recording, gradient};
+    use crate::scalar::Scalar;
     use crate::solve::lu;
-    use crate::{Fwd, Recording, Scalar, Var, gradient};
+    use crate::var::Var;
 
     /// Three entries of A and one of b vary, two of A together; the first pivot is zero.
     fn system<S: Operand>(p: &[S]) -> (Matrix3<S>, Matrix3x2<S>) {

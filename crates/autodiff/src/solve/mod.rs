@@ -31,6 +31,7 @@ mod condition;
 mod dense;
 mod error;
 mod factored;
+mod factors;
 mod pattern;
 #[cfg(feature = "faer")]
 mod sparse;

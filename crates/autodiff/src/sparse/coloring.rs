@@ -6,7 +6,7 @@
 
 use std::cmp::Reverse;
 
-use super::Pattern;
+use super::pattern::Pattern;
 
 /// A color for each line; lines of one color meet no crossing line twice.
 pub(super) struct Coloring {

@@ -1,7 +1,10 @@
 //! Where a Jacobian may be other than zero.
 
-use super::{LANES, SparseError};
-use crate::Fwd;
+use super::error::SparseError;
+use crate::fwd::Fwd;
+
+/// Directions in one evaluation of [`Forward`](super::Forward).
+pub const LANES: usize = 8;
 
 /// The entries of a matrix that may differ from zero, in compressed rows (CSR).
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -120,7 +123,7 @@ impl Pattern {
 mod tests {
 
     use super::*;
-    use crate::Scalar;
+    use crate::scalar::Scalar;
 
     #[test]
     fn rows_are_sorted_and_checked() {

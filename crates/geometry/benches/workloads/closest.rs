@@ -46,7 +46,7 @@ pub(crate) fn queries<'a>(
         .iter()
         .map(|p| tree.closest(&(p + step), f64::INFINITY).map_or(0, |found| found.face))
         .collect();
-    let warm = move || tree.closest_many_from(points, f64::INFINITY, &before);
+    let warm = move || tree.closest_many_with_hints(points, f64::INFINITY, &before);
     job.add("ours, from the face 1 mm before", warm, distances);
     job
 }

@@ -18,7 +18,7 @@ impl ClosestPoints {
 
     /// As [`Self::closest_many`], each from a face of its own, such as the answer before the points moved a little;
     /// points without a hint start from scratch.
-    pub fn closest_many_from(
+    pub fn closest_many_with_hints(
         &self,
         points: &[Point3<f64>],
         max_distance: f64,
@@ -117,7 +117,7 @@ mod tests {
     fn the_curve_visits_every_point_once_and_octants_one_by_one() {
         assert_eq!((spread(0x3ff), spread(5)), (0x0924_9249, 0b1000001));
         let bounds = (Point3::new(-0.25, -0.25, -0.25), Point3::new(0.25, 0.25, 0.25));
-        let mut random = crate::SplitMix64::new(2);
+        let mut random = crate::random::SplitMix64::new(2);
         let mut points: Vec<Point3<f64>> =
             (0..500).map(|_| Point3::from([(); 3].map(|()| random.uniform() - 0.5))).collect();
         points.extend([Point3::new(f64::NAN, 1e300, -1e300), Point3::new(f64::INFINITY, 0.0, 0.0)]);
@@ -132,7 +132,7 @@ mod tests {
 
     #[test]
     fn sorting_by_counting_is_sorting() {
-        let mut random = crate::SplitMix64::new(4);
+        let mut random = crate::random::SplitMix64::new(4);
         for bits in [0, 3, 11, 12, 30, 32] {
             let keys: Vec<u32> =
                 (0..3000).map(|_| (random.uniform() * 2_f64.powi(bits)) as u32).collect();

@@ -15,7 +15,7 @@ use wide::f32x8;
 
 use super::pack::{LANES, Pack, Point8, dot3};
 use super::triangle::Triangle;
-use crate::TriMesh;
+use crate::mesh::TriMesh;
 
 /// Largest number of faces a child reference can address.
 pub(super) const MAX_FACES: usize = 1 << 28;

@@ -105,7 +105,8 @@ impl ClosestPoints {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{SplitMix64, TriMesh};
+    use crate::mesh::TriMesh;
+    use crate::random::SplitMix64;
 
     fn vector(random: &mut SplitMix64) -> Vector3<f64> {
         Vector3::from([(); 3].map(|()| random.uniform() - 0.5))

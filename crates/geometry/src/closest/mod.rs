@@ -12,12 +12,13 @@ mod winding;
 use nalgebra::{Point3, Vector3};
 
 pub use self::derivative::ClosestDerivative;
+pub use self::triangle::Feature;
 
 use self::bvh::{Bvh, MAX_FACES};
 use self::topology::PseudoNormals;
 use self::winding::Winding;
-use crate::TriMesh;
 use crate::mass::signed_volume;
+use crate::mesh::TriMesh;
 
 /// Why closest points of a mesh cannot be prepared.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -49,17 +50,6 @@ pub enum ClosestError {
         /// The limit.
         limit: usize,
     },
-}
-
-/// The part of a triangle a closest point lies on, by the triangle's own corner numbers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Feature {
-    /// Corner 0, 1 or 2.
-    Vertex(u8),
-    /// The edge from corner i to corner i + 1 (modulo 3).
-    Edge(u8),
-    /// The interior.
-    Face,
 }
 
 /// A closest point of a mesh.

@@ -130,8 +130,8 @@ fn frame(corners: &[Vector3<f64>; 3]) -> [f64; 19] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::SplitMix64;
     use crate::closest::triangle::Triangle;
+    use crate::random::SplitMix64;
 
     #[test]
     fn agrees_with_double_precision_however_thin_the_triangle() {

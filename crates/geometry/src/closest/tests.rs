@@ -1,5 +1,5 @@
 use super::*;
-use crate::SplitMix64;
+use crate::random::SplitMix64;
 
 /// Within half a meter of the origin along each axis.
 fn point(random: &mut SplitMix64) -> Point3<f64> {
@@ -84,7 +84,7 @@ fn batches_keep_the_order_whatever_the_threads() {
         assert_eq!(pool.install(|| tree.closest_many(&points, 0.5)), alone);
         assert_eq!(pool.install(|| tree.signed_distance_many(&points)), signed);
         let hints = vec![77; 2000];
-        assert_eq!(pool.install(|| tree.closest_many_from(&points, 0.5, &hints)), alone);
+        assert_eq!(pool.install(|| tree.closest_many_with_hints(&points, 0.5, &hints)), alone);
     }
 }
 

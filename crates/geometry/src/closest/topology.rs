@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use crate::TriMesh;
+use crate::mesh::TriMesh;
 use crate::topology::{edges, is_collapsed};
 
 /// Cosine between the normals of two faces below which they are back to back: 150 degrees.

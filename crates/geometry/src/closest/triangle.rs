@@ -2,7 +2,16 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::Feature;
+/// The part of a triangle a closest point lies on, by the triangle's own corner numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Feature {
+    /// Corner 0, 1 or 2.
+    Vertex(u8),
+    /// The edge from corner i to corner i + 1 (modulo 3).
+    Edge(u8),
+    /// The interior.
+    Face,
+}
 
 /// A triangle prepared for repeated closest-point queries.
 #[derive(Clone, Debug)]
@@ -44,13 +53,6 @@ impl Triangle {
         let norm = area.norm();
         let normal = if norm > 0.0 { area / norm } else { Vector3::zeros() };
         Self { a: a.coords, ab, ac, normal, face, sliver: norm <= SLIVER * longest }
-    }
-
-    /// Squared distance from `p` to the plane of the triangle \[m²\]: a cheap lower bound (zero without a normal).
-    #[inline]
-    pub(crate) fn plane_distance_squared(&self, p: &Vector3<f64>) -> f64 {
-        let d = (p - self.a).dot(&self.normal);
-        d * d
     }
 
     #[inline]
@@ -147,7 +149,7 @@ impl Triangle {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::SplitMix64;
+    use crate::random::SplitMix64;
 
     /// Smallest distance over a fine lattice of barycentric coordinates: an upper bound.
     fn lattice(t: &Triangle, p: &Vector3<f64>, n: usize) -> f64 {

@@ -1,13 +1,10 @@
-//! Point clouds: back-projected depth, neighbors, normals and downsampling.
+//! Point clouds: neighbors and normals.
 
-mod back_projection;
 mod kd_tree;
 mod normals;
-mod voxels;
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
-pub use back_projection::{DepthPoints, back_project};
 pub use kd_tree::{KdTree, Neighbor};
 pub use normals::estimate_normals;
 
@@ -45,41 +42,12 @@ pub enum CloudError {
         /// Points of the cloud.
         points: usize,
     },
-    /// A depth image that is no rectangle.
-    #[error("a depth image of {pixels} pixels has no whole number of rows {width} wide")]
-    DepthSize {
-        /// Pixels given.
-        pixels: usize,
-        /// Columns.
-        width: usize,
-    },
-    /// Voxels without size, or too small to be counted.
-    #[error("voxels of {size} m are not positive, or too small for points {farthest} m away")]
-    VoxelSize {
-        /// Their edge \[m\].
-        size: f64,
-        /// Largest coordinate of the cloud \[m\].
-        farthest: f64,
-    },
 }
 
 impl PointCloud {
     /// A cloud without normals.
     pub fn new(points: Vec<Point3<f64>>) -> Self {
         Self { points, normals: None }
-    }
-
-    /// The cloud with the normals of [`estimate_normals`].
-    ///
-    /// # Errors
-    /// As [`KdTree::new`].
-    pub fn with_estimated_normals(
-        mut self,
-        neighbors: usize,
-        sensor: &Point3<f64>,
-    ) -> Result<Self, CloudError> {
-        self.normals = Some(estimate_normals(&KdTree::new(&self.points)?, neighbors, sensor));
-        Ok(self)
     }
 
     /// The cloud moved by `t_new_cloud`, which maps its coordinates into the new frame.

@@ -4,8 +4,9 @@ use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::allegro::{Part, link, link_name};
 use super::{JOINT_COUNT, JOINT_NAMES, allegro_xela_urdf};
+use crate::mesh::TriMesh;
+use crate::robot::KinematicTree;
 use crate::shapes::{capsule, cuboid};
-use crate::{KinematicTree, TriMesh};
 
 /// `t_base_link` of links 0–15.
 pub(super) fn link_poses(q: &[f64; JOINT_COUNT]) -> Vec<Isometry3<f64>> {

@@ -28,8 +28,9 @@ impl Degeneracy {
     pub fn new(equations: &NormalEquations, center: Point3<f64>, length: f64) -> Self {
         let scale = scaling(length);
         let weight = if equations.weight > 0.0 { equations.weight } else { 1.0 };
-        let scaled =
-            Matrix6::from_fn(|i, j| equations.matrix[(i, j)] * scale[i] * scale[j] / weight);
+        let scaled = Matrix6::from_fn(|i, j| {
+            equations.quadratic.hessian[(i, j)] * scale[i] * scale[j] / weight
+        });
         // Rounding may have left the two triangles apart.
         let eigen = ((scaled + scaled.transpose()) * 0.5).symmetric_eigen();
         let mut order = [0, 1, 2, 3, 4, 5];
@@ -58,7 +59,7 @@ impl Degeneracy {
         let least = least.max(1e-14);
         let held = self.directions.iter().zip(&self.eigenvalues).filter(|(_, e)| **e >= least);
         held.fold(Vector6::zeros(), |step, (v, e)| {
-            step - v * (v.dot(&equations.gradient) / (e * equations.weight))
+            step - v * (v.dot(&equations.quadratic.gradient) / (e * equations.weight))
         })
     }
 }
@@ -73,7 +74,8 @@ fn scaling(length: f64) -> Vector6<f64> {
 mod tests {
     use super::super::{Match, Metric};
     use super::*;
-    use crate::{RobustKernel, SplitMix64};
+    use crate::random::SplitMix64;
+    use crate::robust::RobustKernel;
     use nalgebra::Vector3;
 
     /// Point-to-plane matches of `points` with themselves, shifted by `shift`.

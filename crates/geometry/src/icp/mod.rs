@@ -25,8 +25,8 @@ pub use self::degeneracy::Degeneracy;
 pub use self::normal_equations::{Metric, NormalEquations};
 pub use self::target::{CloudTarget, Match, MatchCache, MeshTarget, Target};
 use crate::closest::ClosestError;
-use crate::cloud::CloudError;
-use crate::{KdTree, RobustKernel};
+use crate::cloud::{CloudError, KdTree};
+use crate::robust::RobustKernel;
 
 /// Source points whose sums are formed one after the other: sums do not depend on the number of threads.
 const CHUNK: usize = 1024;
@@ -146,7 +146,7 @@ pub fn align(
                 iterations,
                 converged,
                 rms: equations.rms(),
-                cost: equations.cost,
+                cost: equations.quadratic.value,
                 inliers: equations.inliers,
                 degeneracy,
             });

@@ -1,9 +1,11 @@
 //! Residuals of matches, and their derivatives by a left twist of the source.
 
-use nalgebra::{Matrix6, Point3, Vector3, Vector6};
+use nalgebra::{Point3, Vector3};
+use prehend_autodiff::Quadratic;
+use prehend_autodiff::lie::twist_row;
 
 use super::Match;
-use crate::RobustKernel;
+use crate::robust::RobustKernel;
 
 /// Which distance of a match counts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -19,12 +21,8 @@ pub enum Metric {
 /// A sum of robust losses of matches, with its derivatives by a left twist about a center, translation first.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NormalEquations {
-    /// Σ ρ(r²) \[m²\].
-    pub cost: f64,
-    /// Derivative of the cost.
-    pub gradient: Vector6<f64>,
-    /// Gauss–Newton matrix Σ w JᵀJ.
-    pub matrix: Matrix6<f64>,
+    /// Σ ρ(r²) \[m²\] and its derivatives.
+    pub quadratic: Quadratic<6>,
     /// Σ w.
     pub weight: f64,
     /// Σ r² over the inliers \[m²\].
@@ -36,14 +34,7 @@ pub struct NormalEquations {
 impl NormalEquations {
     /// Of no matches.
     pub fn new() -> Self {
-        Self {
-            cost: 0.0,
-            gradient: Vector6::zeros(),
-            matrix: Matrix6::zeros(),
-            weight: 0.0,
-            squares: 0.0,
-            inliers: 0,
-        }
+        Self { quadratic: Quadratic::zeros(), weight: 0.0, squares: 0.0, inliers: 0 }
     }
 
     /// Adds the match `target` of the source point `point` \[m\], the source being turned about `center` \[m\], all
@@ -65,23 +56,17 @@ impl NormalEquations {
                     return;
                 }
                 let r = residual.dot(n);
-                let Some(w) = self.weigh(kernel, r * r) else { return };
-                let turn = arm.cross(n);
-                let row = Vector6::new(n.x, n.y, n.z, turn.x, turn.y, turn.z);
-                self.gradient += row * (w * r);
-                // Column by column: nalgebra would hand a 6×6 product to its routine for large matrices.
-                for (i, mut column) in self.matrix.column_iter_mut().enumerate() {
-                    column += row * (w * row[i]);
+                if let Some((loss, weight)) = self.weigh(kernel, r * r) {
+                    self.quadratic.add_robust_row(&twist_row(&arm, n), r, loss, weight);
                 }
             }
             Metric::PointToPoint => {
-                let Some(w) = self.weigh(kernel, residual.norm_squared()) else { return };
-                let turn = arm.cross(&residual);
-                self.gradient +=
-                    Vector6::new(residual.x, residual.y, residual.z, turn.x, turn.y, turn.z) * w;
+                let Some((loss, w)) = self.weigh(kernel, residual.norm_squared()) else { return };
+                self.quadratic.value += loss;
+                self.quadratic.gradient += twist_row(&arm, &residual) * w;
                 // JᵀJ of J = (1, −[a]×), whose blocks are 1, −[a]× and a² − aaᵀ.
                 let a = arm * w;
-                let m = &mut self.matrix;
+                let m = &mut self.quadratic.hessian;
                 for i in 0..3 {
                     let (j, k) = ((i + 1) % 3, (i + 2) % 3);
                     m[(i, i)] += w;
@@ -97,25 +82,23 @@ impl NormalEquations {
         }
     }
 
-    /// Adds the loss and returns the weight, or `None` where it is zero.
+    /// Counts a match and returns its loss and weight, or adds the loss alone and returns `None` where the weight is zero.
     #[inline]
-    fn weigh(&mut self, kernel: RobustKernel, r2: f64) -> Option<f64> {
-        self.cost += kernel.loss(r2);
-        let weight = kernel.weight(r2);
+    fn weigh(&mut self, kernel: RobustKernel, r2: f64) -> Option<(f64, f64)> {
+        let (loss, weight) = (kernel.loss(r2), kernel.weight(r2));
         if weight <= 0.0 {
+            self.quadratic.value += loss;
             return None;
         }
         self.weight += weight;
         self.squares += r2;
         self.inliers += 1;
-        Some(weight)
+        Some((loss, weight))
     }
 
     /// Adds the sums of other matches about the same center.
     pub fn merge(&mut self, other: &Self) {
-        self.cost += other.cost;
-        self.gradient += other.gradient;
-        self.matrix += other.matrix;
+        self.quadratic += &other.quadratic;
         self.weight += other.weight;
         self.squares += other.squares;
         self.inliers += other.inliers;
@@ -137,7 +120,7 @@ impl Default for NormalEquations {
 mod tests {
     use super::*;
     use crate::robust::tests::kernels;
-    use nalgebra::Isometry3;
+    use nalgebra::{Isometry3, Matrix6, Vector6};
     use prehend_autodiff::check::{finite_difference_gradient, finite_difference_jacobian};
     use prehend_autodiff::lie::perturb_about;
     use proptest::prelude::*;
@@ -182,15 +165,15 @@ mod tests {
                         sums
                     };
                     let at = sums(&[0.0; 6]);
-                    let reference = finite_difference_gradient(|x| sums(x).cost, &[0.0; 6], 1e-4);
-                    for (g, r) in at.gradient.iter().zip(&reference) {
+                    let reference = finite_difference_gradient(|x| sums(x).quadratic.value, &[0.0; 6], 1e-4);
+                    for (g, r) in at.quadratic.gradient.iter().zip(&reference) {
                         // Tukey and Huber bend where they are joined.
                         prop_assert!((g - r).abs() < 1e-5, "{:?} {:?}: {} {}", metric, kernel, g, r);
                     }
                     if kernel == RobustKernel::Squared && !matches.is_empty() {
                         let rows = finite_difference_jacobian(residuals, &[0.0; 6], 1e-3);
                         let matrix = Matrix6::from_fn(|i, j| rows.iter().map(|r| r[i] * r[j]).sum());
-                        prop_assert!((matrix - at.matrix).norm() < 1e-8, "{:?}", metric);
+                        prop_assert!((matrix - at.quadratic.hessian).norm() < 1e-8, "{:?}", metric);
                         prop_assert_eq!(at.inliers, matches.len());
                     }
                 }
@@ -213,6 +196,6 @@ mod tests {
             &origin,
         );
         assert_eq!((sums.inliers, sums.weight, sums.rms()), (0, 0.0, 0.0));
-        assert!((sums.cost - 0.25 / 6.0).abs() < 1e-16);
+        assert!((sums.quadratic.value - 0.25 / 6.0).abs() < 1e-16);
     }
 }

@@ -3,7 +3,9 @@
 use nalgebra::{Point3, Vector3};
 
 use super::IcpError;
-use crate::{ClosestPoints, KdTree, PointCloud, TriMesh};
+use crate::closest::ClosestPoints;
+use crate::cloud::{KdTree, PointCloud};
+use crate::mesh::TriMesh;
 
 /// The point of a target that is closest to a query.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -105,7 +107,7 @@ impl Target for CloudTarget {
         let index = match memory.nearest {
             Some(last) if memory.holds(query, &points[last], max_distance) => last,
             last => {
-                let found = self.tree.nearest_alone(query, max_distance, last);
+                let found = self.tree.nearest_and_next(query, max_distance, last);
                 let (nearest, others) = found.map(|(n, d2)| (n.index, d2.sqrt())).unzip();
                 *memory = MatchCache { nearest, query: *query, others: others.unwrap_or(0.0) };
                 nearest?

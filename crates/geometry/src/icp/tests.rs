@@ -1,8 +1,10 @@
 use super::*;
+use crate::cloud::PointCloud;
+use crate::mesh::TriMesh;
+use crate::random::SplitMix64;
 use crate::robust::tests::kernels;
 use crate::sample::surface_samples;
 use crate::shapes::{cuboid, cylinder, sphere, superellipsoid};
-use crate::{PointCloud, SplitMix64, TriMesh};
 use prehend_autodiff::lie::se3_exp;
 use proptest::prelude::*;
 

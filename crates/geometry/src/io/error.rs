@@ -10,7 +10,7 @@ pub enum MeshError {
     Read {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the operating system.
         source: std::io::Error,
     },
     /// The file could not be written; nothing was left behind.
@@ -18,7 +18,7 @@ pub enum MeshError {
     Write {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the operating system.
         source: std::io::Error,
     },
     /// The extension is none of ply, obj, stl, gltf, glb.

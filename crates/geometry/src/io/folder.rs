@@ -31,7 +31,7 @@ pub(crate) fn inside(folder: &Path, name: &str) -> Result<PathBuf, &'static str>
 /// The content of a plain file of at most `limit` bytes: neither a pipe, which may never end, nor a device.
 ///
 /// # Errors
-/// What the system said; [`io::ErrorKind::FileTooLarge`] beyond the limit.
+/// The error of the operating system; [`io::ErrorKind::FileTooLarge`] beyond the limit.
 pub(crate) fn read_limited(path: &Path, limit: usize) -> io::Result<Vec<u8>> {
     let too_large = |size: u64| {
         let message = format!("{size} bytes, more than the limit of {limit}");

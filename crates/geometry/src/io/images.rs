@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::limits::MAX_PIXELS;
 use super::{MeshError, texture};
-use crate::Texture;
+use crate::mesh::Texture;
 
 /// Images decoded so far, by name.
 pub(super) struct Images<'a> {

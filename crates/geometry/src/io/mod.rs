@@ -4,6 +4,7 @@
 //! [`limits`] bound what a file may ask for. Lengths stay in the unit of the file: scale the result where a file is not in meters
 //! (`mesh.scaled(1e-3)` for BOP models in millimeters).
 
+mod atomic;
 mod base64;
 mod error;
 pub(crate) mod folder;
@@ -17,13 +18,12 @@ mod ply;
 mod save;
 mod stl;
 mod texture;
-mod whole;
 
 use std::path::{Path, PathBuf};
 
-use crate::TriMesh;
+use crate::mesh::TriMesh;
+pub use atomic::write_atomic;
 pub use error::MeshError;
-pub use whole::write_atomic;
 
 impl TriMesh {
     /// Reads a mesh by the extension of `path`: `.ply`, `.obj`, `.stl`, `.gltf` or `.glb`, in the file's unit.

@@ -10,7 +10,7 @@ use tobj::{LoadError, LoadOptions, Material, Mesh};
 use super::images::Images;
 use super::parts::{Part, join};
 use super::{MeshError, mtl, texture};
-use crate::TriMesh;
+use crate::mesh::TriMesh;
 
 const OPTIONS: LoadOptions =
     LoadOptions { single_index: true, triangulate: true, ignore_points: true, ignore_lines: true };

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::MeshError;
 use super::limits::MAX_PIXELS;
-use crate::{Texture, TriMesh};
+use crate::mesh::{Texture, TriMesh};
 
 /// Geometry under one material.
 pub(super) struct Part {

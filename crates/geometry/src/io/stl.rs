@@ -8,7 +8,7 @@ use nalgebra::Point3;
 
 use super::MeshError;
 use super::limits::MAX_ELEMENTS;
-use crate::TriMesh;
+use crate::mesh::TriMesh;
 
 pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshError> {
     let mut content = Cursor::new(as_its_kind(bytes));

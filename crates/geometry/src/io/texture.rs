@@ -8,7 +8,7 @@ use image::{ImageFormat, ImageReader, RgbImage};
 use super::folder::read_limited;
 use super::limits::{MAX_FILE_BYTES, MAX_PIXELS};
 use super::{MeshError, companion};
-use crate::Texture;
+use crate::mesh::Texture;
 
 impl Texture {
     /// Reads a PNG or JPEG image; gray images become RGB, alpha is dropped.

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use crate::TriMesh;
+use crate::mesh::TriMesh;
 use crate::shapes::{
     BoxFace, RoundedBox, Section, loft, meridian_lengths, rounded_box, smoothed, subdivided,
 };

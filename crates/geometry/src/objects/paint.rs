@@ -1,6 +1,6 @@
 //! A canvas measured in millimeters, on which the objects' textures are painted.
 
-use crate::Texture;
+use crate::mesh::Texture;
 
 use super::lettering::glyph;
 

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::{Texture, TriMesh};
+use crate::mesh::{Texture, TriMesh};
 
 use super::forms::{Form, Row};
 use super::outlines::{BLEACH, MUSTARD, POTTED, SOUP, TUNA};

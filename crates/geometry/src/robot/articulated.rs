@@ -3,9 +3,10 @@
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector, Isometry3, Point3, Vector3, Vector6};
+use prehend_autodiff::lie::twist_row;
 
 use super::{Drive, KinematicTree, Motion, PosedRobot, RobotError, RobotShape};
-use crate::{DistanceField, FieldSample};
+use crate::field::{DistanceField, FieldSample};
 
 /// A robot posed by its base and its joints: a [`PosedRobot`] that knows how each link moves.
 ///
@@ -119,8 +120,7 @@ impl ArticulatedRobot {
     pub fn distance_with_gradient(&self, point: &Point3<f64>, reach: f64) -> Option<RobotSample> {
         let (link, field) = self.posed.sample_link(point, reach)?;
         let g = field.gradient;
-        let torque = -(point - self.center).cross(&g);
-        let base = Vector6::new(-g.x, -g.y, -g.z, torque.x, torque.y, torque.z);
+        let base = -twist_row(&(point - self.center), &g);
         let mut joints = DVector::zeros(self.variables);
         for (variable, velocity) in self.point_jacobian(link, point) {
             joints[variable] -= g.dot(&velocity);
@@ -198,7 +198,7 @@ mod tests {
     use prehend_autodiff::lie::perturb_about;
 
     use super::*;
-    use crate::SplitMix64;
+    use crate::random::SplitMix64;
 
     /// A tilted base, a swing, a slide, and a finger that bends twice as one joint says.
     const ARM: &str = r#"<robot name="arm"><link name="base"/>

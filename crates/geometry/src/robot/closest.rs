@@ -1,7 +1,6 @@
 //! The closest point of a whole robot.
 
 use nalgebra::Point3;
-use rayon::prelude::*;
 
 use super::PosedRobot;
 use super::shape::box_distance;
@@ -58,15 +57,6 @@ impl PosedRobot {
         }
         best
     }
-
-    /// Closest points of many points, in their order, in parallel.
-    pub fn closest_many(
-        &self,
-        points: &[Point3<f64>],
-        max_distance: f64,
-    ) -> Vec<Option<RobotClosest>> {
-        points.par_iter().with_min_len(64).map(|p| self.closest(p, max_distance)).collect()
-    }
 }
 
 #[cfg(test)]
@@ -76,9 +66,10 @@ mod tests {
     use nalgebra::{Isometry3, Vector3};
 
     use super::*;
+    use crate::closest::ClosestPoints;
     use crate::hand::{JOINT_COUNT, allegro_xela_urdf};
+    use crate::random::SplitMix64;
     use crate::robot::{KinematicTree, RobotShape};
-    use crate::{ClosestPoints, SplitMix64};
 
     #[test]
     fn it_is_the_closest_point_of_all_bodies_in_one_mesh() {
@@ -95,8 +86,8 @@ mod tests {
         let points: Vec<_> = (0..2000)
             .map(|_| base * Point3::new(0.3 * unit(), 0.4 * unit(), 0.5 * unit()))
             .collect();
-        for (p, found) in points.iter().zip(posed.closest_many(&points, 1.0)) {
-            let found = found.unwrap();
+        for p in &points {
+            let found = posed.closest(p, 1.0).unwrap();
             let expected = whole.closest(p, 1.0).unwrap();
             assert!((found.closest.distance - expected.distance).abs() < 1e-14);
             assert!(((p - found.closest.point).norm() - found.closest.distance).abs() < 1e-14);

@@ -9,9 +9,10 @@ use std::path::{Path, PathBuf};
 use nalgebra::{Point3, Vector3};
 use urdf_rs::Geometry;
 
-use super::{RobotError, urdf};
+use super::{RobotError, origin};
 use crate::io::folder;
-use crate::{TriMesh, shapes};
+use crate::mesh::TriMesh;
+use crate::shapes;
 
 /// Columns of facets around a cylinder, a capsule or a sphere.
 const COLUMNS: usize = 48;
@@ -26,7 +27,7 @@ pub(super) fn parts(
         .iter()
         .map(|collision| {
             let mesh = geometry(&link.name, &collision.geometry, asset_dir)?;
-            Ok(mesh.transformed(&urdf::isometry(&owner, &collision.origin)?))
+            Ok(mesh.transformed(&origin::isometry(&owner, &collision.origin)?))
         })
         .collect()
 }
@@ -115,8 +116,7 @@ mod tests {
     use std::f64::consts::PI;
 
     use super::super::KinematicTree;
-    use crate::ClosestPoints;
-    use crate::closest::SignMethod;
+    use crate::closest::{ClosestPoints, SignMethod};
     use crate::mass::signed_volume;
 
     fn link(geometry: &str) -> String {

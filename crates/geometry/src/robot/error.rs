@@ -10,13 +10,13 @@ pub enum RobotError {
     Read {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the operating system.
         source: std::io::Error,
     },
     /// The description is not valid URDF.
     #[error("invalid URDF: {message}")]
     Urdf {
-        /// What the parser said.
+        /// The error of the parser.
         message: String,
     },
     /// An error in the description that was read from a file.

@@ -6,6 +6,7 @@ mod collision;
 mod error;
 mod kinematics;
 mod limits;
+mod origin;
 mod posed;
 mod shape;
 mod tree;
@@ -21,7 +22,7 @@ pub use error::RobotError;
 pub use posed::PosedRobot;
 pub use shape::{LinkShape, RobotShape};
 
-use crate::TriMesh;
+use crate::mesh::TriMesh;
 
 /// A rigid body of a robot.
 #[derive(Clone, Debug)]

@@ -6,7 +6,9 @@ use nalgebra::{Isometry3, Point3};
 
 use super::shape::box_distance;
 use super::{RobotError, RobotShape};
-use crate::{DistanceField, FieldSample, SdfGrid, TriMesh};
+use crate::field::{DistanceField, FieldSample};
+use crate::mesh::TriMesh;
+use crate::sdf::SdfGrid;
 
 /// A [`RobotShape`] with a pose for every link.
 ///

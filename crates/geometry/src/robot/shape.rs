@@ -6,7 +6,9 @@ use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 
 use super::{KinematicTree, RobotError};
-use crate::{ClosestPoints, GridCache, SdfGrid, TriMesh};
+use crate::closest::ClosestPoints;
+use crate::mesh::TriMesh;
+use crate::sdf::{GridCache, SdfGrid};
 
 /// The collision shape of one link, in the link frame.
 #[derive(Clone, Debug)]

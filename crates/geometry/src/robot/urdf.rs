@@ -4,9 +4,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::path::Path;
 
-use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
+use nalgebra::{Unit, Vector3};
 use urdf_rs::JointType;
 
+use super::origin::{finite, isometry};
 use super::{Drive, Joint, KinematicTree, Link, Motion, RobotError, collision, limits, tree};
 use crate::io::folder::read_limited;
 use crate::limits::{MAX_URDF_BYTES, MAX_URDF_DEPTH};
@@ -218,31 +219,6 @@ fn drive(
         })?;
     }
     Err(RobotError::Cycle { kind: "mimic joint", name: joint.name.clone() })
-}
-
-fn finite(
-    owner: &dyn Fn() -> String,
-    field: &'static str,
-    numbers: &[f64],
-) -> Result<(), RobotError> {
-    if numbers.iter().all(|x| x.is_finite()) {
-        return Ok(());
-    }
-    Err(RobotError::Number { owner: owner(), field, requirement: "must be finite" })
-}
-
-/// An origin tag: URDF's roll, pitch and yaw turn about the fixed axes x, y and z in this order.
-pub(super) fn isometry(
-    owner: &dyn Fn() -> String,
-    pose: &urdf_rs::Pose,
-) -> Result<Isometry3<f64>, RobotError> {
-    finite(owner, "origin xyz", &pose.xyz.0)?;
-    finite(owner, "origin rpy", &pose.rpy.0)?;
-    let [roll, pitch, yaw] = pose.rpy.0;
-    Ok(Isometry3::from_parts(
-        Translation3::from(Vector3::from(pose.xyz.0)),
-        UnitQuaternion::from_euler_angles(roll, pitch, yaw),
-    ))
 }
 
 #[cfg(test)]

@@ -4,8 +4,7 @@ use nalgebra::Point3;
 use rayon::prelude::*;
 
 use super::{Lattice, SdfError, SdfGrid};
-use crate::ClosestPoints;
-use crate::closest::SignMethod;
+use crate::closest::{ClosestPoints, SignMethod};
 
 /// Samples along the side of the blocks that a narrow band is looked for in.
 const BLOCK: usize = 4;
@@ -28,19 +27,6 @@ impl SdfGrid {
             sample_slab(mesh, &lattice, i, slab);
         });
         Self::from_samples(lattice, &values, mesh.bounds(), f64::INFINITY)
-    }
-
-    /// As [`Self::build_band_on`], with samples up to at least `margin` \[m\] around the mesh.
-    ///
-    /// # Errors
-    /// [`SdfError`] for lengths that make no sense or too many samples.
-    pub fn build_band(
-        mesh: &ClosestPoints,
-        spacing: f64,
-        margin: f64,
-        band: f64,
-    ) -> Result<Self, SdfError> {
-        Self::build_band_on(mesh, Lattice::around(mesh.bounds(), spacing, margin)?, band)
     }
 
     /// Samples the signed distance to a mesh where it is at most `band` \[m\] in absolute value, at a fraction of the

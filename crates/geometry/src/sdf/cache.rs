@@ -6,14 +6,14 @@ use nalgebra::Point3;
 
 use super::SdfGrid;
 use super::file::hash;
-use crate::TriMesh;
+use crate::mesh::TriMesh;
 
 /// Changes with whatever changes the grids of a link, of which a test below has some numbers.
 const VERSION: u32 = 1;
 
 /// A folder of distance grids, by what they were made of.
 ///
-/// Any number of processes may share one: a grid is written whole or not at all, and the same one by whoever writes it.
+/// Any number of processes may share one: grids are written atomically, and the same one by whoever writes it.
 /// What is damaged, or another version's, is made anew. A folder that cannot be written is as good as none. Nothing is ever
 /// removed.
 #[derive(Clone, Debug)]
@@ -73,7 +73,7 @@ mod tests {
     use std::fs;
 
     use super::*;
-    use crate::ClosestPoints;
+    use crate::closest::ClosestPoints;
     use crate::sdf::SdfError;
     use crate::shapes::cuboid;
 

@@ -1,8 +1,8 @@
 //! Distance grids in files.
 //!
 //! Little-endian: `PREHSDF` and a zero byte; version (u32); samples along each axis (3 × u32); first sample \[m\] (3 ×
-//! f64); spacing \[m\] (f64); smallest and largest corner of the shape's box \[m\] (6 × f64); band and offset \[m\] (2 × f64,
-//! the band infinite for none); spline coefficients (f64, two more than samples along each axis, the last axis
+//! f64); spacing \[m\] (f64); smallest and largest corner of the shape's box \[m\] (6 × f64); band \[m\] (f64,
+//! infinite for none); spline coefficients (f64, two more than samples along each axis, the last axis
 //! fastest); and a hash of all that by 64-bit words after the first 8 bytes (u64).
 
 use std::path::Path;
@@ -11,16 +11,16 @@ use nalgebra::Point3;
 
 use super::{Lattice, MAX_SAMPLES, SdfGrid};
 use crate::io::folder::read_limited;
-use crate::{MeshError, write_atomic};
+use crate::io::{MeshError, write_atomic};
 
 const MAGIC: &[u8; 8] = b"PREHSDF\0";
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 
 /// No grid takes more: a spare coefficient on both sides of each axis at most doubles it.
 const MAX_BYTES: usize = 128 + 8 * (8 * MAX_SAMPLES);
 
 impl SdfGrid {
-    /// Writes the grid to a file, whole or not at all.
+    /// Writes the grid to a file, atomically.
     ///
     /// # Errors
     /// [`MeshError::Write`].
@@ -49,7 +49,7 @@ impl SdfGrid {
         let origin = self.lattice.origin();
         let header = [self.spacing()];
         let bounds = self.bounds.0.iter().chain(self.bounds.1.iter());
-        let numbers = origin.iter().chain(&header).chain(bounds).chain([&self.band, &self.offset]);
+        let numbers = origin.iter().chain(&header).chain(bounds).chain([&self.band]);
         numbers.chain(&self.coefficients).for_each(|x| bytes.extend(x.to_le_bytes()));
         bytes.extend(hash(&bytes[MAGIC.len()..]).to_le_bytes());
         bytes
@@ -83,10 +83,6 @@ impl SdfGrid {
         if band.is_nan() || band < spacing {
             return Err(("band", format!("{band} m is narrower than the spacing")));
         }
-        let offset = number(&mut left, "offset")?;
-        if !offset.is_finite() {
-            return Err(("offset", format!("{offset} m is not finite")));
-        }
         // The lattice keeps this from overflowing.
         let count: usize = dims.iter().map(|n| n + 2).product();
         if left.len() != 8 * count + 8 {
@@ -105,7 +101,7 @@ impl SdfGrid {
         if !coefficients.iter().all(|c| c.is_finite()) {
             return Err(("coefficients", "not all are finite".into()));
         }
-        Ok(Self { lattice, coefficients, bounds, band, offset })
+        Ok(Self { lattice, coefficients, bounds, band })
     }
 }
 
@@ -140,12 +136,13 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::*;
-    use crate::ClosestPoints;
+    use crate::closest::ClosestPoints;
     use crate::shapes::cuboid;
 
     fn grid() -> SdfGrid {
         let mesh = ClosestPoints::new(&cuboid(Vector3::new(0.4, 0.5, 0.6))).unwrap();
-        SdfGrid::build_band(&mesh, 0.1, 0.2, 0.15).unwrap().dilated(0.01).unwrap()
+        let lattice = Lattice::around(mesh.bounds(), 0.1, 0.2).unwrap();
+        SdfGrid::build_band_on(&mesh, lattice, 0.15).unwrap()
     }
 
     #[test]
@@ -185,7 +182,6 @@ mod tests {
         assert_eq!(changed(48, &(-1.0_f64).to_le_bytes()), "lattice");
         assert_eq!(changed(56, &9.0_f64.to_le_bytes()), "bounds");
         assert_eq!(changed(104, &f64::NAN.to_le_bytes()), "band");
-        assert_eq!(changed(112, &f64::INFINITY.to_le_bytes()), "offset");
         assert_eq!(changed(200, &[1, 2, 3]), "hash");
         // Two signs, and nothing else.
         let mut bytes = whole.clone();

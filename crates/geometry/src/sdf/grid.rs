@@ -2,9 +2,9 @@
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
+use super::Lattice;
 use super::spline::{Basis, prefilter};
-use super::{Lattice, SdfError};
-use crate::{DistanceField, FieldSample};
+use crate::field::{DistanceField, FieldSample};
 
 /// A signed distance on a uniform grid, interpolated by a tricubic B-spline (twice continuously
 /// differentiable everywhere, through every sample).
@@ -24,8 +24,6 @@ pub struct SdfGrid {
     pub(super) bounds: (Point3<f64>, Point3<f64>),
     /// Samples are cut off at this distance \[m\]; infinite for none.
     pub(super) band: f64,
-    /// What has been taken off the distance since \[m\].
-    pub(super) offset: f64,
 }
 
 impl SdfGrid {
@@ -37,7 +35,7 @@ impl SdfGrid {
         band: f64,
     ) -> Self {
         let coefficients = prefilter(samples, lattice.dims());
-        Self { lattice, coefficients, bounds, band, offset: 0.0 }
+        Self { lattice, coefficients, bounds, band }
     }
 
     /// Where the samples lie.
@@ -55,32 +53,9 @@ impl SdfGrid {
         self.lattice.dims()
     }
 
-    /// Smallest and largest value that samples were not cut off at \[m\]: infinite for a grid that is exact throughout.
-    pub fn band(&self) -> (f64, f64) {
-        (-self.band - self.offset, self.band - self.offset)
-    }
-
-    /// The shape grown by `offset` \[m\] all around (or shrunk by a negative one): the distance less the offset, with
-    /// the same derivatives up to rounding.
-    ///
-    /// Outside this is the true distance to the grown shape. Inside, and for a shape shrunk across its medial axis, it is
-    /// a lower bound of the depth, as any offset of a distance is. The grid does not grow: its margin shrinks by the offset.
-    ///
-    /// # Errors
-    /// [`SdfError::Length`] for an offset that is not finite.
-    pub fn dilated(mut self, offset: f64) -> Result<Self, SdfError> {
-        if !offset.is_finite() {
-            return Err(SdfError::Length { name: "offset", value: offset, requirement: "finite" });
-        }
-        // The weights of a point's coefficients sum to one.
-        self.coefficients.iter_mut().for_each(|c| *c -= offset);
-        self.offset += offset;
-        let (lo, hi) = self.bounds;
-        let half = (hi - lo) * 0.5;
-        // A shrunk shape may vanish; its box becomes a point.
-        let grow = half.map(|h| offset.max(-h));
-        self.bounds = (lo - grow, hi + grow);
-        Ok(self)
+    /// The distance at which samples are cut off \[m\]: infinite for a grid that is exact throughout.
+    pub fn band(&self) -> f64 {
+        self.band
     }
 
     /// Smallest and largest corner of the box around the shape, without the margin \[m\].

@@ -4,7 +4,7 @@ use std::f64::consts::FRAC_PI_4;
 
 use nalgebra::{Point3, Vector3};
 
-use crate::TriMesh;
+use crate::mesh::TriMesh;
 
 /// A face of a box, by its outward normal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

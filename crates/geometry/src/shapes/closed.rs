@@ -2,8 +2,8 @@
 
 use std::collections::BTreeSet;
 
-use crate::TriMesh;
 use crate::mass::signed_volume;
+use crate::mesh::TriMesh;
 use crate::topology::{Edge, edges, is_collapsed};
 
 /// Signed volume \[m³\] of a mesh that must be, after welding, one closed body without holes facing outward.

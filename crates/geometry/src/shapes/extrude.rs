@@ -2,7 +2,7 @@
 
 use nalgebra::{Point2, Point3};
 
-use crate::TriMesh;
+use crate::mesh::TriMesh;
 
 /// Why an outline bounds no face.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]

@@ -4,7 +4,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use nalgebra::Point3;
 
-use crate::TriMesh;
+use crate::mesh::TriMesh;
 
 /// One horizontal cross-section, |x/a|ⁿ + |y/b|ⁿ = 1.
 #[derive(Clone, Copy, Debug, PartialEq)]

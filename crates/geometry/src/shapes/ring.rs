@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use nalgebra::Point3;
 
-use crate::TriMesh;
+use crate::mesh::TriMesh;
 
 /// The surface swept by turning the closed `profile`, pairs (radius, z) \[m\] counter-clockwise with the radius to
 /// the right, around z in `segments` columns (at least three), the first at +x.

@@ -3,7 +3,7 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use super::{Section, loft};
-use crate::TriMesh;
+use crate::mesh::TriMesh;
 
 /// The surface swept by turning `profile`, pairs (radius, z) \[m\] from the bottom along the outline to the
 /// top, around z in `segments` columns; closed and unrolled as [`loft`] says.

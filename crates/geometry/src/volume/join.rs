@@ -7,7 +7,7 @@ use nalgebra::Point3;
 use super::arrangement::{Arrangement, Cut, Piercing};
 use super::chain::{Chain, SIDES};
 use super::polygon::fill;
-use crate::TriMesh;
+use crate::mesh::TriMesh;
 use crate::topology::is_collapsed;
 
 /// The surface that winds a + b − ab times about a point about which `a` and `b` wind a and b times.

@@ -34,8 +34,8 @@ use nalgebra::{Isometry3, Point3};
 use self::chain::{Chain, volume};
 use self::join::{beside, compact, union};
 pub use self::overlap::Overlap;
-use crate::TriMesh;
 use crate::mass::{MassError, MassProperties, mass_of_closed};
+use crate::mesh::TriMesh;
 use crate::topology::{components, edges, is_collapsed};
 
 /// Why an intersection volume could not be computed.

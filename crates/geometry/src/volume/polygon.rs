@@ -195,7 +195,7 @@ fn clip(mut ring: Vec<Corner>, triangles: &mut Vec<[u32; 3]>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::SplitMix64;
+    use crate::random::SplitMix64;
 
     /// Fills rings of points in a plane seen from `normal` and checks area, direction and boundary.
     fn check(rings: &[Vec<Point2<f64>>], expected: f64) {

@@ -10,7 +10,8 @@ use prehend_autodiff::lie::perturb_about;
 use super::tests::{cuboid, icosphere};
 use super::{SolidUnion, intersection_volume};
 use crate::mass::signed_volume;
-use crate::{SplitMix64, TriMesh};
+use crate::mesh::TriMesh;
+use crate::random::SplitMix64;
 
 /// Nine significant digits, as the files of the reference cases have.
 fn as_in_file(mut mesh: TriMesh) -> TriMesh {

@@ -4,7 +4,8 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use super::*;
 use crate::mass::signed_volume;
-use crate::{SplitMix64, shapes};
+use crate::random::SplitMix64;
+use crate::shapes;
 
 /// A closed box of `size` about `center`, with eight vertices.
 pub(crate) fn cuboid(size: [f64; 3], center: [f64; 3]) -> TriMesh {
@@ -129,8 +130,8 @@ fn cylinder_and_two_spheres_with_coinciding_rings_unite() {
 
 #[test]
 fn built_in_hand_unites_in_any_joint_state() {
-    let robot =
-        crate::KinematicTree::from_urdf_str(&crate::hand::allegro_xela_urdf(), None).unwrap();
+    let robot = crate::robot::KinematicTree::from_urdf_str(&crate::hand::allegro_xela_urdf(), None)
+        .unwrap();
     let unite = |base: &Isometry3<f64>, q: &[f64]| {
         let poses = robot.forward_kinematics(q);
         let parts: Vec<TriMesh> = (robot.links().iter().zip(&poses))

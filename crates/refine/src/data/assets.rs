@@ -1,18 +1,19 @@
-//! Objects and robots of a dataset, each loaded once and shared by all frames.
+//! Objects and hands of a dataset, each loaded once and shared by all frames.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use prehend_geometry::hand::{Taxel, load_taxels};
+use prehend_geometry::hand::load_taxels;
 use prehend_geometry::robot::KinematicTree;
 use prehend_geometry::{GridCache, TriMesh};
 
-use crate::config::{Config, StrategyKind, TermKind};
 use crate::data::bop::{Dataset, DatasetError, Frame, Models, Tactile};
 use crate::error::RefineError;
+use crate::method::Method;
 use crate::scene::check_gravity;
 use crate::scene::{Hand, HandMeasurement, Inertial, Object, Observation};
+use crate::strategy::GradientKind;
 
 /// BOP models are in millimeters \[m\].
 const MILLIMETER: f64 = 1e-3;
@@ -43,22 +44,44 @@ pub enum AssetError {
     Refine(#[from] RefineError),
 }
 
-/// The objects and robots of a dataset.
+/// What a frame may bring beside color, depth and mask, each in a file of its own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sensor {
+    /// Pose and joints of the hand, and gravity: `scene_bodies.json`.
+    Hand,
+    /// Taxel forces, which need the hand: `scene_tactile.json`.
+    Touch,
+}
+
+impl Sensor {
+    /// The sensors without which a refinement by `method` cannot begin.
+    pub fn required_by(method: &Method) -> Vec<Self> {
+        let Method::Heuristic(heuristic) = method else { return Vec::new() };
+        let sensor = |gradient: &GradientKind| match gradient {
+            GradientKind::Physics => Some(Self::Hand),
+            GradientKind::Tactile => Some(Self::Touch),
+            GradientKind::Rendering | GradientKind::Depth => None,
+        };
+        heuristic.gradients.iter().filter_map(sensor).collect()
+    }
+}
+
+/// The objects and hands of a dataset.
 pub struct Assets<'a> {
     dataset: &'a Dataset,
     seed: u64,
     objects: HashMap<u32, Arc<Object>>,
-    robots: HashMap<(PathBuf, Option<PathBuf>), Arc<Hand>>,
+    hands: HashMap<(PathBuf, Option<PathBuf>), Arc<Hand>>,
     cache: Option<GridCache>,
 }
 
 impl<'a> Assets<'a> {
     /// Nothing loaded yet; `seed` decides where objects' surfaces are sampled.
     pub fn new(dataset: &'a Dataset, seed: u64) -> Self {
-        Self { dataset, seed, objects: HashMap::new(), robots: HashMap::new(), cache: None }
+        Self { dataset, seed, objects: HashMap::new(), hands: HashMap::new(), cache: None }
     }
 
-    /// With what robots need kept between runs, where there is a `cache`.
+    /// With the distance grids of hands kept between runs in `cache`, if there is one.
     pub fn with_cache(self, cache: Option<GridCache>) -> Self {
         Self { cache, ..self }
     }
@@ -81,52 +104,42 @@ impl<'a> Assets<'a> {
         Ok(object)
     }
 
-    /// The frame as an [`Observation`] with what `terms` need, and the robot if the frame says where it is.
-    ///
-    /// A hand that no term needs is still known to hide the object, so it is taken along where it is given.
+    /// The frame with every sensor that it brings, and the hand if the frame says where it is. A sensor whose file or
+    /// entry is absent is left out, unless it is in `required`.
     ///
     /// # Errors
-    /// If a file that is needed is missing or broken.
+    /// If a file that is there is broken, or a required one is missing.
     pub fn observation(
         &mut self,
         frame: &Frame<'_>,
         instance: usize,
-        terms: &[TermKind],
+        required: &[Sensor],
     ) -> Result<(Observation, Option<Arc<Hand>>), AssetError> {
         let mut observation = frame.observation(instance)?;
-        let needed = terms.iter().any(|t| matches!(t, TermKind::Physics | TermKind::Tactile));
-        let bodies = match frame.bodies() {
-            Err(DatasetError::Missing { .. }) if !needed => return Ok((observation, None)),
-            bodies => bodies?,
+        let Some(bodies) = present(frame.bodies(), !required.is_empty())? else {
+            return Ok((observation, None));
         };
+        let tactile = present(frame.tactile(), required.contains(&Sensor::Touch))?;
         let [body] = bodies.bodies.as_slice() else {
-            let found = bodies.bodies.len();
-            return Err(frame
-                .bodies_fault("bodies", format!("expected one hand, found {found}"))
-                .into());
+            let problem = format!("expected one hand, found {}", bodies.bodies.len());
+            return Err(frame.bodies_fault("bodies", problem).into());
         };
-        if terms.contains(&TermKind::Physics) {
-            check_gravity(&bodies.gravity).map_err(|e| frame.bodies_fault("gravity", e))?;
-        }
-        let touch = terms.contains(&TermKind::Tactile);
-        let tactile = touch.then(|| frame.tactile()).transpose()?;
-        if let Some(Tactile { body: named, .. }) = &tactile
-            && *named != body.name
+        check_gravity(&bodies.gravity).map_err(|e| frame.bodies_fault("gravity", e))?;
+        if let Some(Tactile { body: named, .. }) = tactile.as_ref().filter(|t| t.body != body.name)
         {
             let problem = format!("names {named:?}, but the hand is {:?}", body.name);
             return Err(frame.tactile_fault("body", problem).into());
         }
-        let robot = self.robot(&body.urdf, tactile.as_ref().map(|t| t.taxels.as_path()))?;
-        if let Some(Tactile { taxels, force, .. }) = &tactile
-            && force.len() != robot.taxels.len()
+        let hand = self.hand(&body.urdf, tactile.as_ref().map(|t| t.taxels.as_path()))?;
+        let taxels = hand.taxels.len();
+        if let Some(Tactile { taxels: file, force, .. }) =
+            tactile.as_ref().filter(|t| t.force.len() != taxels)
         {
-            let (expected, found) = (robot.taxels.len(), force.len());
-            let file = taxels.display();
-            let problem =
-                format!("expected {expected} forces, one a taxel of {file}, found {found}");
+            let (file, found) = (file.display(), force.len());
+            let problem = format!("expected {taxels} forces, one a taxel of {file}, found {found}");
             return Err(frame.tactile_fault("force", problem).into());
         }
-        let joints = robot.tree.joint_vector(&body.joints);
+        let joints = hand.tree.joint_vector(&body.joints);
         let joints = joints.map_err(|e| frame.bodies_fault("bodies[0].joints", e))?;
         observation.gravity = Some(bodies.gravity);
         observation.hand = Some(HandMeasurement {
@@ -134,64 +147,28 @@ impl<'a> Assets<'a> {
             joints,
             forces: tactile.map_or_else(Vec::new, |t| t.force),
         });
-        Ok((observation, Some(robot)))
+        Ok((observation, Some(hand)))
     }
 
-    /// The frame as [`observation`](Self::observation) has it, with every sense that it brings and none that it must.
-    ///
-    /// # Errors
-    /// If a file that is there is broken.
-    pub fn whole_observation(
-        &mut self,
-        frame: &Frame<'_>,
-        instance: usize,
-    ) -> Result<(Observation, Option<Arc<Hand>>), AssetError> {
-        let absent = |error: &DatasetError| {
-            matches!(error, DatasetError::Missing { .. } | DatasetError::NoEntry { .. })
-        };
-        if frame.bodies().is_err_and(|e| absent(&e)) {
-            return Ok((frame.observation(instance)?, None));
-        }
-        let feels = !frame.tactile().is_err_and(|e| absent(&e));
-        let terms: &[TermKind] = if feels { &[TermKind::Tactile] } else { &[] };
-        self.observation(frame, instance, terms)
-    }
-
-    /// The frame with what a refinement by `config` uses.
-    ///
-    /// # Errors
-    /// If a file that it needs is missing, or one that is there is broken.
-    pub fn observation_for(
-        &mut self,
-        frame: &Frame<'_>,
-        instance: usize,
-        config: &Config,
-    ) -> Result<(Observation, Option<Arc<Hand>>), AssetError> {
-        match config.strategy {
-            StrategyKind::Fused => self.whole_observation(frame, instance),
-            StrategyKind::Heuristic | StrategyKind::Icp | StrategyKind::RobustIcp => {
-                self.observation(frame, instance, &config.terms)
-            }
-        }
-    }
-
-    /// The robot of `urdf` with the skin of `taxels`.
-    ///
-    /// # Errors
-    /// If a file is missing or broken.
-    pub fn robot(&mut self, urdf: &Path, taxels: Option<&Path>) -> Result<Arc<Hand>, AssetError> {
+    /// The hand of `urdf` with the taxels of a table.
+    fn hand(&mut self, urdf: &Path, taxels: Option<&Path>) -> Result<Arc<Hand>, AssetError> {
         let key = (urdf.to_owned(), taxels.map(Path::to_owned));
-        if let Some(robot) = self.robots.get(&key) {
-            return Ok(Arc::clone(robot));
+        if let Some(hand) = self.hands.get(&key) {
+            return Ok(Arc::clone(hand));
         }
         let tree = KinematicTree::from_urdf_file(urdf)?;
-        let skin: Vec<Taxel> = match taxels {
-            Some(file) => load_taxels(file)?,
-            None => Vec::new(),
-        };
-        let robot = Arc::new(Hand::cached(tree, skin, self.cache.as_ref())?);
-        self.robots.insert(key, Arc::clone(&robot));
-        Ok(robot)
+        let skin = taxels.map(load_taxels).transpose()?.unwrap_or_default();
+        let hand = Arc::new(Hand::cached(tree, skin, self.cache.as_ref())?);
+        self.hands.insert(key, Arc::clone(&hand));
+        Ok(hand)
+    }
+}
+
+/// What was read; `None` where the file or its entry is absent and need not be there.
+fn present<T>(read: Result<T, DatasetError>, required: bool) -> Result<Option<T>, DatasetError> {
+    match read {
+        Err(DatasetError::Missing { .. } | DatasetError::NoEntry { .. }) if !required => Ok(None),
+        read => read.map(Some),
     }
 }
 
@@ -202,7 +179,7 @@ impl<'a> Assets<'a> {
 ///
 /// # Errors
 /// If the model is missing or broken, or `models_info.json` is.
-pub fn load_object(models: &Models, id: u32, seed: u64) -> Result<Object, AssetError> {
+fn load_object(models: &Models, id: u32, seed: u64) -> Result<Object, AssetError> {
     let mesh = load_mesh(models, id)?;
     let name = models.mesh_path(id)?.display().to_string();
     let info = match models.info(id) {

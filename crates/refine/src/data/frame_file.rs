@@ -14,58 +14,10 @@ use prehend_geometry::{GridCache, TriMesh};
 use prehend_render::{Camera, DepthImage, Mask, RgbImage};
 use serde::Deserialize;
 
-use crate::config::TermKind;
-use crate::data::AssetError;
-use crate::data::bop::rotation_from_row_major;
+use crate::data::bop::{DatasetError, rotation_from_row_major};
 use crate::scene::check_gravity;
 use crate::scene::{Hand, HandMeasurement, Object, Observation};
-
-/// Why a frame file could not be used.
-#[derive(Debug, thiserror::Error)]
-pub enum FrameFileError {
-    /// The file cannot be read.
-    #[error("{file}: {source}")]
-    Read {
-        /// The file.
-        file: PathBuf,
-        /// The system's reason.
-        source: std::io::Error,
-    },
-    /// The file is not of the format.
-    #[error("{file}: {source}")]
-    Json {
-        /// The file.
-        file: PathBuf,
-        /// What is wrong and where.
-        source: serde_json::Error,
-    },
-    /// A field has an impossible value.
-    #[error("{file}: {field}: {reason}")]
-    Field {
-        /// The file.
-        file: PathBuf,
-        /// The field.
-        field: &'static str,
-        /// What is wrong with it.
-        reason: String,
-    },
-    /// A file that the frame names is at fault.
-    #[error("{file}: {source}")]
-    Asset {
-        /// The frame file.
-        file: PathBuf,
-        /// What is wrong with the other file.
-        source: Box<AssetError>,
-    },
-    /// An image that the frame names is at fault.
-    #[error("{file}: {source}")]
-    Image {
-        /// The frame file.
-        file: PathBuf,
-        /// What is wrong with the image.
-        source: prehend_render::ImageError,
-    },
-}
+use crate::strategy::GradientKind;
 
 /// A frame ready to be refined.
 pub struct FrameInput {
@@ -80,12 +32,84 @@ pub struct FrameInput {
 }
 
 impl FrameInput {
-    /// Whether the frame brings the evidence that a term needs.
-    pub fn offers(&self, term: TermKind) -> bool {
-        match term {
-            TermKind::Rendering | TermKind::Depth => true,
-            TermKind::Physics => self.robot.is_some() && self.observation.gravity.is_some(),
-            TermKind::Tactile => {
+    /// Reads the frame file `file` and everything it names; distance grids of the robot are kept in `cache`.
+    ///
+    /// # Errors
+    /// If the file or one that it names is missing or broken, naming the file and the field.
+    pub fn load(file: &Path, seed: u64, cache: Option<&GridCache>) -> Result<Self, DatasetError> {
+        let fault = |problem: &dyn std::fmt::Display| DatasetError::malformed(file, problem);
+        let field = |field: &str, problem: String| DatasetError::Field {
+            file: file.into(),
+            field: field.into(),
+            problem,
+        };
+        let text = std::fs::read_to_string(file).map_err(|e| fault(&e))?;
+        let layout: Layout = serde_json::from_str(&text).map_err(|e| fault(&e))?;
+        let folder = file.parent().unwrap_or(Path::new("."));
+
+        if !(layout.depth_unit_m.is_finite() && layout.depth_unit_m > 0.0) {
+            return Err(field("depth_unit_m", "must be a positive number of meters".into()));
+        }
+        let color = RgbImage::load(&folder.join(&layout.rgb)).map_err(|e| fault(&e))?;
+        let depth = DepthImage::load(&folder.join(&layout.depth), layout.depth_unit_m)
+            .map_err(|e| fault(&e))?;
+        let mask = Mask::load(&folder.join(&layout.mask)).map_err(|e| fault(&e))?;
+        let camera = Camera::from_k(layout.k, color.width(), color.height())
+            .map_err(|e| field("K", e.to_string()))?;
+        let sizes =
+            [("depth", depth.width(), depth.height()), ("mask", mask.width(), mask.height())];
+        for (name, width, height) in sizes {
+            if (width, height) != (color.width(), color.height()) {
+                let (w, h) = (color.width(), color.height());
+                let reason = format!("the image is {width}x{height} pixels, rgb is {w}x{h}");
+                return Err(field(name, reason));
+            }
+        }
+        let mesh = TriMesh::load(&folder.join(&layout.mesh)).map_err(|e| fault(&e))?;
+        let mesh = mesh.scaled(layout.mesh_unit.meters());
+        let name = folder.join(&layout.mesh).display().to_string();
+        let object = Object::with_mass(&name, mesh, layout.mass_kg, seed).map_err(|e| fault(&e))?;
+        let t_cam_object = layout.pose.isometry().map_err(|reason| field("pose", reason))?;
+        let (robot, hand) = match &layout.robot {
+            None => (None, None),
+            Some(r) => {
+                let tree = KinematicTree::from_urdf_file(folder.join(&r.urdf));
+                let tree = tree.map_err(|e| fault(&e))?;
+                let joints = tree.joint_vector(&r.joints);
+                let joints = joints.map_err(|e| field("robot.joints", e.to_string()))?;
+                let skin: Vec<Taxel> = match &r.taxels {
+                    Some(csv) => load_taxels(&folder.join(csv)).map_err(|e| fault(&e))?,
+                    None => Vec::new(),
+                };
+                let forces = r.forces.as_deref().unwrap_or_default();
+                if !forces.is_empty() && forces.len() != skin.len() {
+                    let (expected, found) = (skin.len(), forces.len());
+                    let reason =
+                        format!("expected one force for each of {expected} taxels, found {found}");
+                    return Err(field("robot.forces", reason));
+                }
+                let t_cam_hand = r.base_pose.isometry();
+                let hand = HandMeasurement {
+                    t_cam_hand: t_cam_hand.map_err(|reason| field("robot.base_pose", reason))?,
+                    joints,
+                    forces: forces.iter().map(|&f| Vector3::from(f)).collect(),
+                };
+                let robot = Hand::cached(tree, skin, cache).map_err(|e| fault(&e))?;
+                (Some(Arc::new(robot)), Some(hand))
+            }
+        };
+        let gravity = layout.gravity.map(Vector3::from);
+        gravity.map_or(Ok(()), |g| check_gravity(&g)).map_err(|reason| field("gravity", reason))?;
+        let observation = Observation { camera, color, depth, mask, gravity, hand };
+        Ok(Self { observation, object, robot, t_cam_object })
+    }
+
+    /// Whether the frame brings the evidence that a gradient needs.
+    pub fn offers(&self, gradient: GradientKind) -> bool {
+        match gradient {
+            GradientKind::Rendering | GradientKind::Depth => true,
+            GradientKind::Physics => self.robot.is_some() && self.observation.gravity.is_some(),
+            GradientKind::Tactile => {
                 self.observation.hand.as_ref().is_some_and(|hand| !hand.forces.is_empty())
             }
         }
@@ -149,86 +173,6 @@ struct RobotLayout {
     taxels: Option<PathBuf>,
     /// Force of the object on each taxel, in its link's frame \[N\].
     forces: Option<Vec<[f64; 3]>>,
-}
-
-/// Reads the frame file `file` and everything it names; distance grids of the robot are kept in `cache`.
-///
-/// # Errors
-/// If the file or one that it names is missing or broken, naming the file and the field.
-pub fn load(
-    file: &Path,
-    seed: u64,
-    cache: Option<&GridCache>,
-) -> Result<FrameInput, FrameFileError> {
-    let text = std::fs::read_to_string(file)
-        .map_err(|source| FrameFileError::Read { file: file.into(), source })?;
-    let layout: Layout = serde_json::from_str(&text)
-        .map_err(|source| FrameFileError::Json { file: file.into(), source })?;
-    let folder = file.parent().unwrap_or(Path::new("."));
-    let field = |field: &'static str, reason: String| FrameFileError::Field {
-        file: file.into(),
-        field,
-        reason,
-    };
-    let image = |source| FrameFileError::Image { file: file.into(), source };
-    let asset =
-        |source: AssetError| FrameFileError::Asset { file: file.into(), source: Box::new(source) };
-
-    if !(layout.depth_unit_m.is_finite() && layout.depth_unit_m > 0.0) {
-        return Err(field("depth_unit_m", "must be a positive number of meters".into()));
-    }
-    let color = RgbImage::load(&folder.join(&layout.rgb)).map_err(image)?;
-    let depth =
-        DepthImage::load(&folder.join(&layout.depth), layout.depth_unit_m).map_err(image)?;
-    let mask = Mask::load(&folder.join(&layout.mask)).map_err(image)?;
-    let camera = Camera::from_k(layout.k, color.width(), color.height())
-        .map_err(|e| field("K", e.to_string()))?;
-    let sizes = [("depth", depth.width(), depth.height()), ("mask", mask.width(), mask.height())];
-    for (name, width, height) in sizes {
-        if (width, height) != (color.width(), color.height()) {
-            let (w, h) = (color.width(), color.height());
-            let reason = format!("the image is {width}x{height} pixels, rgb is {w}x{h}");
-            return Err(field(name, reason));
-        }
-    }
-    let mesh = TriMesh::load(&folder.join(&layout.mesh)).map_err(|e| asset(e.into()))?;
-    let mesh = mesh.scaled(layout.mesh_unit.meters());
-    let name = folder.join(&layout.mesh).display().to_string();
-    let object =
-        Object::with_mass(&name, mesh, layout.mass_kg, seed).map_err(|e| asset(e.into()))?;
-    let t_cam_object = layout.pose.isometry().map_err(|reason| field("pose", reason))?;
-    let (robot, hand) = match &layout.robot {
-        None => (None, None),
-        Some(r) => {
-            let tree = KinematicTree::from_urdf_file(folder.join(&r.urdf));
-            let tree = tree.map_err(|e| asset(e.into()))?;
-            let joints = tree.joint_vector(&r.joints);
-            let joints = joints.map_err(|e| field("robot.joints", e.to_string()))?;
-            let skin: Vec<Taxel> = match &r.taxels {
-                Some(csv) => load_taxels(&folder.join(csv)).map_err(|e| asset(e.into()))?,
-                None => Vec::new(),
-            };
-            let forces = r.forces.as_deref().unwrap_or_default();
-            if !forces.is_empty() && forces.len() != skin.len() {
-                let (expected, found) = (skin.len(), forces.len());
-                let reason =
-                    format!("expected one force for each of {expected} taxels, found {found}");
-                return Err(field("robot.forces", reason));
-            }
-            let t_cam_hand = r.base_pose.isometry();
-            let hand = HandMeasurement {
-                t_cam_hand: t_cam_hand.map_err(|reason| field("robot.base_pose", reason))?,
-                joints,
-                forces: forces.iter().map(|&f| Vector3::from(f)).collect(),
-            };
-            let robot = Hand::cached(tree, skin, cache).map_err(|e| asset(e.into()))?;
-            (Some(Arc::new(robot)), Some(hand))
-        }
-    };
-    let gravity = layout.gravity.map(Vector3::from);
-    gravity.map_or(Ok(()), |g| check_gravity(&g)).map_err(|reason| field("gravity", reason))?;
-    let observation = Observation { camera, color, depth, mask, gravity, hand };
-    Ok(FrameInput { observation, object, robot, t_cam_object })
 }
 
 impl Pose {

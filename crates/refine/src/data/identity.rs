@@ -1,4 +1,4 @@
-//! What decides the results of a run, in words that can be compared.
+//! The settings and inputs that determine the results of a run, as facts to be compared.
 
 use std::fs;
 use std::path::Path;
@@ -25,13 +25,8 @@ impl Identity {
         Self(map)
     }
 
-    /// The facts as JSON.
-    pub fn to_value(&self) -> Value {
-        Value::Object(self.0.clone())
-    }
-
-    /// One line for every fact that `other` has otherwise, as `name: ours | theirs`; those named in `except` may differ.
-    pub fn differences(&self, other: &Self, except: &[&str]) -> Vec<String> {
+    /// One line for every fact in which `other` differs, as `name: ours | theirs`; those named in `except` may differ.
+    pub(crate) fn differences(&self, other: &Self, except: &[&str]) -> Vec<String> {
         let mut names: Vec<&String> = self.0.keys().chain(other.0.keys()).collect();
         names.sort_unstable();
         names.dedup();
@@ -73,7 +68,7 @@ pub(crate) fn program() -> String {
 }
 
 /// A fingerprint of some bytes against accidental change: FNV-1a, 64 bits.
-pub fn fingerprint(bytes: &[u8]) -> String {
+pub(crate) fn fingerprint(bytes: &[u8]) -> String {
     format!("{:016x}", hash(OFFSET, bytes))
 }
 
@@ -91,9 +86,9 @@ pub fn file_fingerprint(file: &Path) -> Result<String, DatasetError> {
     Ok(fingerprint(&fs::read(file).map_err(|e| DatasetError::reading(file, &e))?))
 }
 
-/// What a split's JSON files say to estimators.
+/// JSON files of a scene that estimators read.
 pub const SENSED: [&str; 3] = ["scene_camera.json", "scene_bodies.json", "scene_tactile.json"];
-/// What they say to scorers.
+/// JSON files of a scene that only scoring reads.
 pub const TRUTH: [&str; 2] = ["scene_gt.json", "scene_bodies_gt.json"];
 
 /// A fingerprint of the files of all scenes that are called as one of `names` ([`SENSED`], [`TRUTH`]), and of the models'

@@ -12,8 +12,8 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::data::Identity;
 use crate::data::bop::{DatasetError, write_atomically};
+use crate::data::identity::Identity;
 
 /// Why a journal cannot be used.
 #[derive(Debug, Error)]
@@ -170,7 +170,7 @@ impl Journal {
     ///
     /// # Errors
     /// If it cannot be written; the journal is then as it was.
-    pub fn settle<E: Serialize>(self, entries: &BTreeMap<usize, E>) -> Result<(), JournalError> {
+    pub fn compact<E: Serialize>(self, entries: &BTreeMap<usize, E>) -> Result<(), JournalError> {
         Self::write(&self.path, &self.identity, entries)
     }
 
@@ -298,9 +298,9 @@ mod tests {
             drop(journal);
             assert_eq!(fs::read(&cut).unwrap(), whole, "cut at {length}");
         }
-        // Settled, it is in order, and still a journal.
+        // Compacted, it is in order, and still a journal.
         let (journal, all): (_, Entries) = Journal::open(&path, &identity(1), false).unwrap();
-        journal.settle(&all).unwrap();
+        journal.compact(&all).unwrap();
         let (said, again): (_, Entries) = Journal::read(&path).unwrap();
         assert_eq!((said, again), (identity(1), all));
         assert!(fs::read_to_string(&path).unwrap().contains("}\n{\"index\":0,"));

@@ -1,19 +1,29 @@
-//! Files: BOP datasets, single frames, what a dataset's objects and hands are loaded into, and what a long run remembers.
+//! Files: BOP datasets, single frames, what a dataset's objects and hands are loaded into, and what a long run keeps; and
+//! what scores and made-up datasets share: symmetries, contact, noise.
 
 mod assets;
 pub mod bop;
-pub mod frame_file;
+mod contact;
+mod frame_file;
 pub mod identity;
 mod journal;
+mod noise;
 mod pose;
+mod smooth_field;
+mod symmetry;
 mod targets;
 mod times;
 mod workers;
 
-pub use assets::{AssetError, Assets, load_mesh, load_object};
+pub use assets::{AssetError, Assets, Sensor, load_mesh};
+pub use contact::{CONTACT_SAMPLES, ContactModel};
+pub use frame_file::FrameInput;
 pub use identity::Identity;
 pub use journal::{Journal, JournalError};
+pub use noise::NoiseLevel;
 pub use pose::PlainPose;
+pub(crate) use smooth_field::smooth_field;
+pub use symmetry::{ContinuousSymmetry, Symmetries};
 pub use targets::{Target, find_targets};
 pub use times::{Times, join_times};
 pub use workers::Workers;

@@ -1,9 +1,9 @@
-//! Poses as plain numbers.
+//! Poses as plain numbers, for JSON files.
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 
-/// A pose as it is kept in files of ours: every bit of it returns.
+/// A pose for serialization: reading restores every bit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlainPose {
     /// Rotation, real part first.

@@ -1,4 +1,4 @@
-//! Which objects are to be found in which images.
+//! Targets: the objects to be localized, by image.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -8,7 +8,7 @@ use serde::Deserialize;
 
 use crate::data::bop::{Dataset, DatasetError};
 
-/// One object to be found in one image.
+/// One object to be localized in one image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Target {
     /// Scene of the split.

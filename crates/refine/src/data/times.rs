@@ -1,4 +1,4 @@
-//! How long frames took: a file of its own, because no two runs take the same time.
+//! Run times by frame and method, in a file of their own: they differ between runs, results do not.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File, OpenOptions};
@@ -48,7 +48,7 @@ impl Times {
         Ok(times)
     }
 
-    /// Adds what a frame took; `frame` and `method` are without commas.
+    /// Adds the time of a frame; `frame` and `method` are without commas.
     ///
     /// # Errors
     /// If it cannot be written.
@@ -72,7 +72,7 @@ impl Times {
         file.write_all(line.as_bytes()).map_err(fault)
     }
 
-    /// What `method` took for a frame \[s\], where that is known.
+    /// Time of `method` on a frame \[s\], if known.
     pub fn of(&self, index: usize, method: &str) -> Option<f64> {
         self.seconds.get(&(index, method.to_owned())).copied()
     }

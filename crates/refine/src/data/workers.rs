@@ -1,4 +1,4 @@
-//! Frames side by side.
+//! Frames in parallel.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc;
@@ -8,17 +8,17 @@ use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 /// Main threads have as much; Rayon's own default is a quarter of it.
 const STACK_BYTES: usize = 8 << 20;
 
-/// Threads that each do whole frames.
+/// Thread pools that each process whole frames.
 ///
-/// A frame alone on a thread waits for no other thread; only where there are fewer frames than threads do several threads
-/// share a frame. Results do not depend on it.
+/// There is one pool per thread; with fewer frames than threads, the threads are divided among as many pools as frames.
+/// Results do not depend on the number of threads.
 #[derive(Debug)]
 pub struct Workers {
     pools: Vec<ThreadPool>,
 }
 
 impl Workers {
-    /// Workers for so many frames; `threads` in all.
+    /// Workers for `frames` frames with `threads` threads in total.
     ///
     /// # Errors
     /// If the system gives no threads.

@@ -8,10 +8,10 @@ use prehend_geometry::robot::KinematicTree;
 use prehend_geometry::{ClosestPoints, SolidUnion, TriMesh};
 use prehend_render::{DepthImage, RenderModel, depth_map};
 
-use crate::data::bop::{Dataset, DatasetError, GroundTruth, ResultRow};
-use crate::data::{AssetError, load_mesh};
+use crate::data::bop::{Dataset, DatasetError, GroundTruth, ResultRow, diameter};
+use crate::data::{AssetError, ContactModel, load_mesh};
 use crate::error::RefineError;
-use crate::evaluate::metrics::{ContactModel, ScoredModel, ScoredRow, diameter, vsd};
+use crate::evaluate::metrics::{ScoredModel, ScoredRow, vsd};
 
 /// An evaluation model, prepared once.
 struct Model {
@@ -76,14 +76,16 @@ impl<'a> Scorer<'a> {
     pub fn score(&mut self, row: &ResultRow) -> Result<ScoredRow, AssetError> {
         let (scene, image) = (row.scene_id, row.im_id);
         let truth = self.true_pose(row)?;
-        let camera = self.dataset.frame(scene, image)?.intrinsics;
+        let frame = self.dataset.frame(scene, image)?;
         self.prepare_model(row.obj_id)?;
         self.prepare_hand(scene, image)?;
         self.prepare_depth(scene, image)?;
         let model = &self.models[&row.obj_id];
+        let sensed = self.depth.as_ref().and_then(|(_, depth)| depth.as_ref());
+        let (width, height) = sensed.map_or((0, 0), |image| (image.width(), image.height()));
+        let camera = frame.camera(width, height);
         let mut score = model.scored.score(&row.t_cam_model, &truth, &camera);
-        if let Some((_, Some(sensed))) = &self.depth {
-            let camera = camera.camera(sensed.width(), sensed.height());
+        if let Some(sensed) = sensed {
             let draw = |pose: &Isometry3<f64>| depth_map(&camera, &[(&model.drawn, *pose)]);
             let errors =
                 vsd(&camera, sensed, &draw(&row.t_cam_model), &draw(&truth), model.diameter);

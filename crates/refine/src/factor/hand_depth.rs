@@ -2,33 +2,29 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Vector2, Vector6};
+use nalgebra::{Point3, Vector2};
+use prehend_autodiff::lie::twist_row;
 use prehend_geometry::robot::RobotSample;
-use prehend_render::DepthImage;
 use rayon::prelude::*;
 
-use super::{Term, share};
-use crate::problem::{Block, Cauchy, Normal, State};
-use crate::scene::{Hand, Observation};
+use crate::error::RefineError;
+use crate::problem::{Block, Factor, NoiseModel, Rows, State};
+use crate::scene::{Frame, Hand};
 
-/// Settings of [`HandDepthTerm`].
+/// Settings of [`HandDepthFactor`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct HandDepthSettings {
     /// Depth points used at most, spread evenly over the hand.
     pub points: usize,
-    /// Standard deviation of a depth point from the hand \[m\].
-    pub sigma: f64,
-    /// Distance at which a point counts as an outlier \[m\].
-    pub outlier: f64,
-    /// How far a depth point may be from where the hand is said to be \[m\]: beyond, it is of something else.
+    /// Distances of depth points from the hand \[m\].
+    pub noise: NoiseModel,
+    /// How far a depth point may be from where the hand is measured to be \[m\]: beyond, it is of something else.
     pub reach: f64,
-    /// How many independent measurements the points amount to at most.
-    pub effective_points: f64,
 }
 
 impl Default for HandDepthSettings {
     fn default() -> Self {
-        Self { points: 500, sigma: 1e-3, outlier: 3e-3, reach: 15e-3, effective_points: 60.0 }
+        Self { points: 500, noise: NoiseModel::cauchy(1e-3, 3e-3, 60.0), reach: 15e-3 }
     }
 }
 
@@ -36,21 +32,24 @@ impl Default for HandDepthSettings {
 ///
 /// What the camera sees of the hand says where it is relative to the object in the same image, which is what touch
 /// needs to know, whatever depth's common errors are.
-pub struct HandDepthTerm {
-    robot: Arc<Hand>,
+pub struct HandDepthFactor {
+    hand: Arc<Hand>,
+    /// Directions (x/z, y/z) and depths \[m\].
     points: Vec<(Vector2<f64>, f64)>,
     settings: HandDepthSettings,
 }
 
-impl HandDepthTerm {
-    /// Takes the depth of `observation` near `hand`, the depth image of the hand alone. There may be none: the term
-    /// is then zero.
-    pub fn new(
-        observation: &Observation,
-        robot: Arc<Hand>,
-        hand: &DepthImage,
-        settings: HandDepthSettings,
-    ) -> Self {
+/// Pixels around the object's mask that are not taken for the hand.
+const MARGIN: usize = 3;
+
+impl HandDepthFactor {
+    /// Of the depth of `frame` where the hand is. There may be none: the cost is then zero.
+    ///
+    /// # Errors
+    /// If the hand is unknown.
+    pub fn new(frame: &Frame<'_>, settings: &HandDepthSettings) -> Result<Self, RefineError> {
+        let (robot, _) = frame.require_hand("hand-depth")?;
+        let (observation, hand) = (frame.observation(), frame.hand_depth());
         let (depth, camera) = (&observation.depth, &observation.camera);
         let mask = observation.mask.pixels();
         let width = depth.width();
@@ -77,12 +76,12 @@ impl HandDepthTerm {
             (camera.unproject(x, y, 1.0).coords.xy(), f64::from(depth.pixels()[pixel]))
         };
         let points = of_hand.iter().step_by(step).map(point).collect();
-        Self { robot, points, settings }
+        Ok(Self { hand: Arc::clone(robot), points, settings: settings.clone() })
     }
 
     /// Each point that is near the hand with what is known of its distance.
-    fn samples(&self, state: &State) -> Vec<Option<(nalgebra::Point3<f64>, RobotSample)>> {
-        let Ok(hand) = self.robot.articulated(&state.t_cam_hand, &state.joints) else {
+    fn samples(&self, state: &State) -> Vec<Option<(Point3<f64>, RobotSample)>> {
+        let Ok(hand) = self.hand.articulated(&state.t_cam_hand, &state.joints) else {
             return Vec::new();
         };
         let reach = 2.0 * self.settings.reach;
@@ -92,54 +91,30 @@ impl HandDepthTerm {
         };
         self.points.par_iter().with_min_len(32).map(sample).collect()
     }
-
-    /// Nats of one square meter.
-    fn share(&self) -> f64 {
-        let count = self.points.len().max(1) as f64;
-        share(self.settings.effective_points, count, self.settings.sigma)
-    }
-
-    /// Loss of a sample; points out of reach are as bad as those at its end.
-    fn loss(&self, distance: Option<f64>) -> f64 {
-        let cauchy = Cauchy { scale: self.settings.outlier };
-        cauchy.loss(distance.unwrap_or(2.0 * self.settings.reach).powi(2))
-    }
 }
 
-/// Pixels around the object's mask that are not taken for the hand.
-const MARGIN: usize = 3;
-
-impl Term for HandDepthTerm {
+impl Factor for HandDepthFactor {
     fn name(&self) -> &'static str {
         "hand-depth"
     }
 
-    fn value(&self, state: &State) -> f64 {
-        let samples = self.samples(state);
-        let losses = samples.iter().map(|s| self.loss(s.as_ref().map(|(_, s)| s.field.distance)));
-        self.share() * losses.sum::<f64>()
-    }
-
-    fn linearize(&self, state: &State, normal: &mut Normal) -> f64 {
-        let cauchy = Cauchy { scale: self.settings.outlier };
-        let (share, center) = (self.share(), state.center());
-        let mut value = 0.0;
+    fn rows(&self, state: &State, rows: &mut Rows<'_>) {
+        let weighting = self.settings.noise.weighting(self.points.len());
         for (sample, (ray, depth)) in self.samples(state).iter().zip(&self.points) {
-            value += self.loss(sample.as_ref().map(|(_, s)| s.field.distance));
-            let Some((point, sample)) = sample else { continue };
-            let (distance, n) = (sample.field.distance, sample.field.gradient);
-            let turn = (point.coords - center).cross(&n);
-            let hand = -Vector6::new(n.x, n.y, n.z, turn.x, turn.y, turn.z);
-            let camera = state.camera.point_jacobian(ray, *depth).tr_mul(&n);
-            let weight = share * cauchy.weight(distance * distance);
-            let row = [
-                (Block::HandPose, hand.as_slice()),
-                (Block::Joints(state.joints.len()), sample.joints.as_slice()),
-                (Block::Camera, camera.as_slice()),
-            ];
-            normal.add_row(&row, distance, weight);
+            let Some((point, sample)) = sample else {
+                // Points out of reach are as bad as those at its end.
+                rows.add_constant(weighting.cost(2.0 * self.settings.reach));
+                continue;
+            };
+            let normal = &sample.field.gradient;
+            rows.add(sample.field.distance, &weighting, |row| {
+                let hand = -twist_row(&(point.coords - state.center()), normal);
+                row.block(Block::HandPose, hand.as_slice());
+                row.block(Block::Joints(state.joints.len()), sample.joints.as_slice());
+                let camera = state.camera.point_jacobian(ray, *depth).tr_mul(normal);
+                row.block(Block::Camera, camera.as_slice());
+            });
         }
-        share * value
     }
 }
 
@@ -151,18 +126,13 @@ mod tests {
     #[test]
     fn gradients_match_differences() {
         for seed in 0..3 {
-            let (scene, mut state, hand) = fixture(seed);
+            let (frame, mut state) = fixture(seed);
             state.camera = state.camera.changed(&[2e-3, 1e-3, 1e-3, -1e-3, 2e-3]);
             state.joints.iter_mut().enumerate().for_each(|(i, q)| *q += 0.01 * (i as f64).sin());
-            let term = HandDepthTerm::new(
-                &scene.observation,
-                Arc::clone(&scene.robot),
-                &hand,
-                HandDepthSettings::default(),
-            );
-            assert!(term.points.len() > 100);
+            let factor = HandDepthFactor::new(&frame, &HandDepthSettings::default()).unwrap();
+            assert!(factor.points.len() > 100);
             for block in [Block::HandPose, Block::Joints(16), Block::Camera] {
-                assert_gradient(&term, &state, block, 1e-7, 0.02);
+                assert_gradient(&factor, &state, block, 1e-7, 0.02);
             }
         }
     }

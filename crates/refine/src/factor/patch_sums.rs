@@ -1,6 +1,8 @@
-//! Normal equations by patch.
+//! NormalEquations equations by patch.
 
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
+
+use crate::problem::{Block, NormalEquations};
 
 /// Gradient and Gauss–Newton Hessian by `N` parameters of what each patch shows, the first three of which are the object's place.
 ///
@@ -31,6 +33,12 @@ impl<const N: usize> PatchSums<N> {
         N + 3 * patch
     }
 
+    /// Adds all to `equations`: by object pose and camera, and by the displacements of all patches, if there are any.
+    pub(super) fn add_to(&self, equations: &mut NormalEquations) {
+        let (gradient, hessian) = self.equations();
+        add_to(equations, &gradient, &hessian);
+    }
+
     /// Gradient and Hessian by the parameters and by the displacements of all patches.
     pub(super) fn equations(&self) -> (DVector<f64>, DMatrix<f64>) {
         let size = Self::place(self.parts.len() - 1);
@@ -51,6 +59,21 @@ impl<const N: usize> PatchSums<N> {
             hessian.fixed_view_mut::<3, N>(at, 0).copy_from(&shift.transpose());
         }
         (gradient, hessian)
+    }
+}
+
+/// Adds derivatives by object pose, camera and, if there are more of them, the displacements of patches.
+pub(super) fn add_to(
+    equations: &mut NormalEquations,
+    gradient: &DVector<f64>,
+    hessian: &DMatrix<f64>,
+) {
+    let blocks = [Block::ObjectPose, Block::Camera];
+    let rigid: usize = blocks.iter().map(|block| block.dimension()).sum();
+    if gradient.len() > rigid {
+        equations.add_with_auxiliary(&blocks, gradient, hessian);
+    } else {
+        equations.add_dynamic(&blocks, gradient, hessian);
     }
 }
 

@@ -2,15 +2,15 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Point3, Vector6};
+use nalgebra::Point3;
 use prehend_geometry::robot::{ArticulatedRobot, RobotSample};
 use rayon::prelude::*;
 
-use super::Term;
-use crate::problem::{Block, Normal, State};
-use crate::scene::{Hand, Object};
+use crate::error::RefineError;
+use crate::problem::{Block, Factor, NoiseModel, Rows, State, Weighting};
+use crate::scene::{Frame, Hand, Object};
 
-/// Settings of [`PenetrationTerm`].
+/// Settings of [`PenetrationFactor`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct PenetrationSettings {
     /// Standard deviation of the depth to which a patch of [`area`](Self::area) is pressed in \[m\]: the compliance of
@@ -27,21 +27,31 @@ impl Default for PenetrationSettings {
 }
 
 /// Depths to which samples of the object's surface lie in the hand.
-pub struct PenetrationTerm {
+pub struct PenetrationFactor {
     object: Arc<Object>,
-    robot: Arc<Hand>,
-    settings: PenetrationSettings,
+    hand: Arc<Hand>,
+    /// Of one sample.
+    weighting: Weighting,
 }
 
-impl PenetrationTerm {
-    /// A term for `object` in the hand `robot`.
-    pub fn new(object: Arc<Object>, robot: Arc<Hand>, settings: PenetrationSettings) -> Self {
-        Self { object, robot, settings }
+impl PenetrationFactor {
+    /// Of the object and the hand of `frame`.
+    ///
+    /// # Errors
+    /// If the hand is unknown.
+    pub fn new(frame: &Frame<'_>, settings: &PenetrationSettings) -> Result<Self, RefineError> {
+        let (hand, _) = frame.require_hand("penetration")?;
+        let (object, hand) = (Arc::clone(frame.object()), Arc::clone(hand));
+        let area = object.area / object.samples.len().max(1) as f64;
+        let patch = NoiseModel::gaussian(settings.sigma).weighting(1);
+        let weighting =
+            Weighting { information: area / settings.area * patch.information, ..patch };
+        Ok(Self { object, hand, weighting })
     }
 
     /// The samples inside the hand, in the camera frame.
     fn inside(&self, state: &State) -> Vec<(Point3<f64>, RobotSample)> {
-        let Ok(hand) = self.robot.articulated(&state.t_cam_hand, &state.joints) else {
+        let Ok(hand) = self.hand.articulated(&state.t_cam_hand, &state.joints) else {
             return Vec::new();
         };
         let deep = |point: &Point3<f64>, hand: &ArticulatedRobot| {
@@ -52,41 +62,20 @@ impl PenetrationTerm {
         let samples = self.object.samples.par_iter().with_min_len(128);
         samples.filter_map(|s| deep(&s.point, &hand)).collect()
     }
-
-    /// Nats of one square meter of depth at one sample.
-    fn share(&self) -> f64 {
-        let area = self.object.area / self.object.samples.len().max(1) as f64;
-        area / self.settings.area / self.settings.sigma.powi(2)
-    }
 }
 
-impl Term for PenetrationTerm {
+impl Factor for PenetrationFactor {
     fn name(&self) -> &'static str {
         "penetration"
     }
 
-    fn value(&self, state: &State) -> f64 {
-        let depths = self.inside(state);
-        0.5 * self.share() * depths.iter().map(|(_, s)| s.field.distance.powi(2)).sum::<f64>()
-    }
-
-    fn linearize(&self, state: &State, normal: &mut Normal) -> f64 {
-        let (share, center) = (self.share(), state.center());
-        let mut value = 0.0;
+    fn rows(&self, state: &State, rows: &mut Rows<'_>) {
         for (point, sample) in self.inside(state) {
-            let (distance, n) = (sample.field.distance, sample.field.gradient);
-            let turn = (point.coords - center).cross(&n);
-            let object = Vector6::new(n.x, n.y, n.z, turn.x, turn.y, turn.z);
-            let hand = -object;
-            let row = [
-                (Block::ObjectPose, object.as_slice()),
-                (Block::HandPose, hand.as_slice()),
-                (Block::Joints(state.joints.len()), sample.joints.as_slice()),
-            ];
-            normal.add_row(&row, distance, share);
-            value += distance * distance;
+            rows.add(sample.field.distance, &self.weighting, |row| {
+                row.relative_point(state, &point, &sample.field.gradient);
+                row.block(Block::Joints(state.joints.len()), sample.joints.as_slice());
+            });
         }
-        0.5 * share * value
     }
 }
 
@@ -98,12 +87,11 @@ mod tests {
     #[test]
     fn gradients_match_differences() {
         for seed in 0..3 {
-            let (scene, state, _) = fixture(seed);
-            let (object, robot) = (Arc::clone(&scene.object), Arc::clone(&scene.robot));
-            let term = PenetrationTerm::new(object, robot, PenetrationSettings::default());
-            assert!(term.value(&state) > 0.0, "nothing touches");
+            let (frame, state) = fixture(seed);
+            let factor = PenetrationFactor::new(&frame, &PenetrationSettings::default()).unwrap();
+            assert!(factor.cost(&state) > 0.0, "nothing touches");
             for block in [Block::ObjectPose, Block::HandPose, Block::Joints(16)] {
-                assert_gradient(&term, &state, block, 1e-7, 1e-3);
+                assert_gradient(&factor, &state, block, 1e-7, 1e-3);
             }
         }
     }

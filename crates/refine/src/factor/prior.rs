@@ -1,16 +1,14 @@
 //! What is known beforehand: of the pose, and of how accurate calibrations are.
 
-use nalgebra::{Isometry3, Matrix6, Point3, Vector3, Vector6};
+use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, Point3, Vector3, Vector6};
 use prehend_autodiff::lie::{cross_matrix, so3_left_jacobian_inverse, so3_log};
 
-use super::Term;
 use crate::error::RefineError;
-use crate::problem::{Block, Normal, State};
+use crate::problem::{Block, Factor, NoiseModel, RIDGE, Rows, ScaledCholesky, State};
 use crate::scene::CameraCalibrationError;
 
 /// Stated accuracies: standard deviations of what a [`State`] holds from what it begins with. All are positive; what is known exactly has a
 /// tiny one.
-///
 #[derive(Clone, Debug, PartialEq)]
 pub struct PriorSettings {
     /// The object's center in each direction of the camera frame \[m\].
@@ -27,24 +25,32 @@ pub struct PriorSettings {
     pub depth_scale: f64,
     /// Depth \[m\].
     pub depth_bias: f64,
-    /// The center of projection, across and down \[focal lengths\].
-    pub shift: f64,
+    /// The principal point, across and down \[focal lengths\].
+    pub principal_point: f64,
     /// The size of images, as a part of it: errors of the focal length and of the model's size.
-    pub magnification: f64,
+    pub focal_scale: f64,
 }
 
 impl PriorSettings {
     /// Standard deviations of the parameters of `block`, in their order.
-    pub(crate) fn deviations(&self, block: Block) -> Vec<f64> {
+    pub(crate) fn sigmas(&self, block: Block) -> Vec<f64> {
         match block {
             Block::ObjectPose => [self.object_translation, self.object_rotation].concat(),
             Block::HandPose => [[self.hand_translation; 3], [self.hand_rotation; 3]].concat(),
             Block::Joints(count) => vec![self.joints; count],
-            Block::Camera => {
-                vec![self.depth_scale, self.depth_bias, self.shift, self.shift, self.magnification]
-            }
-            Block::SurfacePatches(_) => Vec::new(),
+            Block::Camera => vec![
+                self.depth_scale,
+                self.depth_bias,
+                self.principal_point,
+                self.principal_point,
+                self.focal_scale,
+            ],
         }
+    }
+
+    /// The same of all that a state with `layout` holds.
+    pub(crate) fn all_sigmas(&self, layout: Layout) -> DVector<f64> {
+        DVector::from_vec(layout.blocks().map(|block| self.sigmas(block)).concat())
     }
 }
 
@@ -59,132 +65,187 @@ impl Default for PriorSettings {
             joints: 0.014,
             depth_scale: 4e-3,
             depth_bias: 1e-3,
-            shift: 1.7e-3,
-            magnification: 4e-3,
+            principal_point: 1.7e-3,
+            focal_scale: 4e-3,
         }
     }
 }
 
-/// Half the squared deviations from a state, over their variances.
-pub struct Prior {
-    object: (Vector3<f64>, Isometry3<f64>),
-    hand: Isometry3<f64>,
-    joints: Vec<f64>,
-    precision_object: Vector6<f64>,
-    precision_hand: Vector6<f64>,
-    precision_joints: f64,
-    precision_camera: [f64; CameraCalibrationError::DIMENSION],
+/// Where the parts of a vector of all that a state holds begin: object, hand, joints, camera.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Layout {
+    joints: usize,
 }
 
-impl Prior {
-    /// A prior about `state`.
+/// Twists of the object, then of the hand.
+const POSES: usize = 12;
+
+impl Layout {
+    pub(crate) fn new(joints: usize) -> Self {
+        Self { joints }
+    }
+
+    pub(crate) fn len(self) -> usize {
+        POSES + self.joints + CameraCalibrationError::DIMENSION
+    }
+
+    /// Its blocks, in order.
+    pub(crate) fn blocks(self) -> [Block; 4] {
+        [Block::ObjectPose, Block::HandPose, Block::Joints(self.joints), Block::Camera]
+    }
+
+    /// Where `block` begins.
+    pub(crate) fn offset(self, block: Block) -> usize {
+        match block {
+            Block::ObjectPose => 0,
+            Block::HandPose => 6,
+            Block::Joints(_) => POSES,
+            Block::Camera => POSES + self.joints,
+        }
+    }
+}
+
+/// A Gaussian about a state: ½‖W d‖² of the deviations d from it, with W the inverse of the lower Cholesky factor of their
+/// covariance. Deviations of poses are displacement of the point at the object's center, and rotation vector.
+pub struct GaussianPrior {
+    mean: State,
+    center: Vector3<f64>,
+    layout: Layout,
+    whitener: Whitener,
+    /// Inverse of the covariance of the object's deviation.
+    object_information: Matrix6<f64>,
+}
+
+/// The square root of the information.
+enum Whitener {
+    /// Of independent deviations.
+    Diagonal(DVector<f64>),
+    /// Lower triangular.
+    Full(DMatrix<f64>),
+}
+
+impl GaussianPrior {
+    /// Independent deviations from `mean`, as large as `settings` state.
     ///
     /// # Errors
-    /// If a deviation is not a positive number.
-    pub fn new(state: &State, settings: &PriorSettings) -> Result<Self, RefineError> {
-        let of = |block| settings.deviations(block);
-        let (object, hand) = (of(Block::ObjectPose), of(Block::HandPose));
-        let camera = of(Block::Camera);
-        let all =
-            object.iter().chain(&hand).chain(&camera).chain(std::iter::once(&settings.joints));
-        if let Some(wrong) = all.into_iter().find(|v| v.is_nan() || **v <= 0.0) {
+    /// If a standard deviation is not a positive number.
+    pub fn independent(mean: State, settings: &PriorSettings) -> Result<Self, RefineError> {
+        let layout = Layout::new(mean.joints.len());
+        let sigmas = settings.all_sigmas(layout);
+        if let Some(wrong) = sigmas.iter().find(|v| v.is_nan() || **v <= 0.0) {
             let problem = format!("a standard deviation of {wrong} is not positive");
             return Err(RefineError::Setting { name: "prior", problem });
         }
-        let precision = |sigma: f64| sigma.powi(-2);
+        let information = sigmas.fixed_rows::<6>(0).map(|sigma| sigma.powi(-2));
         Ok(Self {
-            object: (state.center(), state.t_cam_object),
-            hand: state.t_cam_hand,
-            joints: state.joints.clone(),
-            precision_object: Vector6::from_vec(object).map(precision),
-            precision_hand: Vector6::from_vec(hand).map(precision),
-            precision_joints: precision(settings.joints),
-            precision_camera: std::array::from_fn(|k| precision(camera[k])),
+            center: mean.center(),
+            mean,
+            layout,
+            whitener: Whitener::Diagonal(sigmas.map(f64::recip)),
+            object_information: Matrix6::from_diagonal(&information),
         })
     }
 
-    /// How far `pose` has been moved from `from`, as (displacement of the point that was at `point`, rotation vector),
-    /// and the derivatives by a left twist of `pose` about `center`.
-    pub(crate) fn deviation(
+    /// Correlated deviations from `mean`, whose parts are those of `layout`, of this covariance \[m, rad\]; `None` if it is not
+    /// positive definite.
+    pub(crate) fn correlated(
+        mean: State,
+        layout: Layout,
+        covariance: &DMatrix<f64>,
+    ) -> Option<Self> {
+        let whitener = Whitener::Full(ScaledCholesky::new(covariance, RIDGE)?.whitener()?);
+        let object = covariance.fixed_view::<6, 6>(0, 0).into_owned().try_inverse()?;
+        Some(Self { center: mean.center(), mean, layout, whitener, object_information: object })
+    }
+
+    /// Mahalanobis distance of the object of `state` from the mean.
+    pub(crate) fn innovation(&self, state: &State) -> f64 {
+        let (off, _) = self.deviation(&state.t_cam_object, &self.mean.t_cam_object, state);
+        off.dot(&(self.object_information * off)).max(0.0).sqrt()
+    }
+
+    /// How far `pose` has been moved from `from`, as (displacement of the point that was at the object's center, rotation
+    /// vector), and the derivatives by a left twist of `pose` about the center of `state`.
+    fn deviation(
+        &self,
         pose: &Isometry3<f64>,
         from: &Isometry3<f64>,
-        point: &Vector3<f64>,
-        center: &Vector3<f64>,
+        state: &State,
     ) -> (Vector6<f64>, Matrix6<f64>) {
         let motion = pose * from.inverse();
-        let place = (motion * Point3::from(*point)).coords;
+        let place = (motion * Point3::from(self.center)).coords;
         let turn = so3_log(&motion.rotation);
         let mut deviation = Vector6::zeros();
-        deviation.fixed_rows_mut::<3>(0).copy_from(&(place - point));
+        deviation.fixed_rows_mut::<3>(0).copy_from(&(place - self.center));
         deviation.fixed_rows_mut::<3>(3).copy_from(&turn);
         let mut jacobian = Matrix6::identity();
-        jacobian.fixed_view_mut::<3, 3>(0, 3).copy_from(&-cross_matrix(&(place - center)));
+        let arm = place - state.center();
+        jacobian.fixed_view_mut::<3, 3>(0, 3).copy_from(&-cross_matrix(&arm));
         jacobian.fixed_view_mut::<3, 3>(3, 3).copy_from(&so3_left_jacobian_inverse(&turn));
         (deviation, jacobian)
     }
-
-    /// How the object and the hand deviate.
-    fn poses(&self, state: &State) -> [PoseDeviation; 2] {
-        let (center, from) = &self.object;
-        let now = state.center();
-        let of = |block, pose, from, precision| {
-            let (deviation, jacobian) = Self::deviation(pose, from, center, &now);
-            PoseDeviation { block, deviation, jacobian, precision }
-        };
-        [
-            of(Block::ObjectPose, &state.t_cam_object, from, self.precision_object),
-            of(Block::HandPose, &state.t_cam_hand, &self.hand, self.precision_hand),
-        ]
-    }
-
-    /// Deviation and precision of every joint and every parameter of the camera.
-    fn numbers(&self, state: &State) -> [(Block, Vec<(f64, f64)>); 2] {
-        let joints = state.joints.iter().zip(&self.joints);
-        let joints: Vec<_> = joints.map(|(q, from)| (q - from, self.precision_joints)).collect();
-        let camera = state.camera.parameters().into_iter().zip(self.precision_camera);
-        [(Block::Joints(joints.len()), joints), (Block::Camera, camera.collect())]
-    }
 }
 
-/// How far a pose is from where it is believed to be.
-struct PoseDeviation {
-    block: Block,
-    deviation: Vector6<f64>,
-    /// Derivatives of the deviation by the block.
-    jacobian: Matrix6<f64>,
-    precision: Vector6<f64>,
-}
-
-impl Term for Prior {
+impl Factor for GaussianPrior {
     fn name(&self) -> &'static str {
         "prior"
     }
 
-    fn value(&self, state: &State) -> f64 {
-        let poses = self.poses(state);
-        let of_poses =
-            poses.iter().map(|p| p.deviation.component_mul(&p.deviation).dot(&p.precision));
-        let numbers = self.numbers(state);
-        let of_numbers = numbers.iter().flat_map(|(_, all)| all).map(|(e, p)| e * e * p);
-        0.5 * (of_poses.sum::<f64>() + of_numbers.sum::<f64>())
-    }
-
-    fn linearize(&self, state: &State, normal: &mut Normal) -> f64 {
-        for PoseDeviation { block, deviation, jacobian, precision } in self.poses(state) {
-            let weighted = Matrix6::from_diagonal(&precision) * jacobian;
-            normal.add(&[block], &weighted.tr_mul(&deviation), &jacobian.tr_mul(&weighted));
+    fn rows(&self, state: &State, rows: &mut Rows<'_>) {
+        let (object, by_object) =
+            self.deviation(&state.t_cam_object, &self.mean.t_cam_object, state);
+        let (hand, by_hand) = self.deviation(&state.t_cam_hand, &self.mean.t_cam_hand, state);
+        let joints = state.joints.iter().zip(&self.mean.joints).take(self.layout.joints);
+        let camera = state.camera.parameters().into_iter().zip(self.mean.camera.parameters());
+        let numbers = joints.map(|(now, then)| now - then).chain(camera.map(|(a, b)| a - b));
+        let all = object.iter().chain(&hand).copied().chain(numbers);
+        let deviations = DVector::from_iterator(self.layout.len(), all);
+        let unit = NoiseModel::gaussian(1.0).weighting(1);
+        match &self.whitener {
+            Whitener::Diagonal(roots) => {
+                for block in self.layout.blocks() {
+                    let from = self.layout.offset(block);
+                    for at in 0..block.dimension() {
+                        let root = roots[from + at];
+                        rows.add(root * deviations[from + at], &unit, |row| match block {
+                            Block::ObjectPose => {
+                                row.block(block, (by_object.row(at).transpose() * root).as_slice());
+                            }
+                            Block::HandPose => {
+                                row.block(block, (by_hand.row(at).transpose() * root).as_slice());
+                            }
+                            Block::Joints(_) | Block::Camera => row.parameter(block, at, root),
+                        });
+                    }
+                }
+            }
+            Whitener::Full(whitener) => {
+                let residuals = whitener * deviations;
+                let joints = Block::Joints(self.layout.joints);
+                let (from, to) = (self.layout.offset(joints), self.layout.offset(Block::Camera));
+                for (k, residual) in residuals.iter().enumerate() {
+                    rows.add(*residual, &unit, |row| {
+                        let all: Vec<f64> = whitener.row(k).iter().copied().collect();
+                        let object = by_object.tr_mul(&Vector6::from_column_slice(&all[..6]));
+                        let hand = by_hand.tr_mul(&Vector6::from_column_slice(&all[6..POSES]));
+                        row.block(Block::ObjectPose, object.as_slice());
+                        row.block(Block::HandPose, hand.as_slice());
+                        row.block(joints, &all[from..to]);
+                        row.block(Block::Camera, &all[to..]);
+                    });
+                }
+            }
         }
-        for (block, numbers) in self.numbers(state) {
-            normal.add_diagonal(block, &numbers);
-        }
-        self.value(state)
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use prehend_autodiff::check::{compare_gradients, finite_difference_gradient};
+
     use super::super::gradient_check::{assert_gradient, fixture};
     use super::*;
+    use crate::problem::NormalEquations;
 
     fn settings() -> PriorSettings {
         PriorSettings {
@@ -195,23 +256,23 @@ mod tests {
             joints: 0.014,
             depth_scale: 5e-3,
             depth_bias: 1e-3,
-            shift: 2e-3,
-            magnification: 4e-3,
+            principal_point: 2e-3,
+            focal_scale: 4e-3,
         }
     }
 
     #[test]
-    fn gradients_match_differences_also_at_the_start() {
-        let (_, start, _) = fixture(0);
-        let prior = Prior::new(&start, &settings()).unwrap();
-        assert!(prior.value(&start) < 1e-20);
+    fn gradients_match_differences_also_at_the_mean() {
+        let (_, start) = fixture(0);
+        let prior = GaussianPrior::independent(start.clone(), &settings()).unwrap();
+        assert!(prior.cost(&start) < 1e-20);
         let blocks = [Block::ObjectPose, Block::HandPose, Block::Joints(16), Block::Camera];
         let all = |scale: f64| -> Vec<f64> {
             let count: usize = blocks.iter().map(|b| b.dimension()).sum();
             (0..count).map(|i| scale * (i as f64 * 1.7).sin()).collect()
         };
         for scale in [1e-3, 0.1] {
-            let state = start.moved_all(&blocks, &all(scale));
+            let state = start.retract(&blocks, &all(scale));
             for block in blocks {
                 assert_gradient(&prior, &state, block, 1e-6, 1e-5);
             }
@@ -220,8 +281,56 @@ mod tests {
 
     #[test]
     fn deviations_must_be_positive() {
-        let (_, start, _) = fixture(0);
+        let (_, start) = fixture(0);
         let none = PriorSettings { joints: 0.0, ..settings() };
-        assert!(Prior::new(&start, &none).is_err());
+        assert!(GaussianPrior::independent(start, &none).is_err());
+    }
+
+    #[test]
+    fn independent_deviations_are_those_of_a_diagonal_covariance() {
+        let (_, start) = fixture(0);
+        let layout = Layout::new(16);
+        let variances = settings().all_sigmas(layout).map(|sigma| sigma.powi(2));
+        let covariance = DMatrix::from_diagonal(&variances);
+        let full = GaussianPrior::correlated(start.clone(), layout, &covariance).unwrap();
+        let diagonal = GaussianPrior::independent(start.clone(), &settings()).unwrap();
+        let off: Vec<f64> = (0..layout.len()).map(|k| 0.01 * (k as f64 * 1.3).cos()).collect();
+        let state = start.retract(&layout.blocks(), &off);
+        let mut equations = [0, 1].map(|_| NormalEquations::new(&layout.blocks()));
+        let costs = [
+            full.linearize(&state, &mut equations[0]),
+            diagonal.linearize(&state, &mut equations[1]),
+        ];
+        assert!((costs[0] / costs[1] - 1.0).abs() < 1e-8);
+        let difference = equations[0].hessian() - equations[1].hessian();
+        assert!(difference.amax() < 1e-7 * equations[1].hessian().amax());
+        assert!((full.innovation(&state) / diagonal.innovation(&state) - 1.0).abs() < 1e-8);
+    }
+
+    #[test]
+    fn correlated_deviations_have_their_covariance_and_derivatives() {
+        let (_, start) = fixture(0);
+        let layout = Layout::new(16);
+        let n = layout.len();
+        let mixed = DMatrix::from_fn(n, n, |r, c| ((r * 7 + c * 3) as f64).sin());
+        let covariance = (&mixed * mixed.transpose() + DMatrix::identity(n, n)) * 1e-4;
+        let prior = GaussianPrior::correlated(start.clone(), layout, &covariance).unwrap();
+        assert!(prior.cost(&start) < 1e-20 && prior.innovation(&start) < 1e-9);
+        let blocks = layout.blocks();
+        let off: Vec<f64> = (0..n).map(|k| 0.02 * (k as f64 * 1.3).cos()).collect();
+        // Small deviations are the parameters of the blocks themselves.
+        let little: Vec<f64> = off.iter().map(|v| v * 1e-4).collect();
+        let x = DVector::from_vec(little.clone());
+        let expected = 0.5 * x.dot(&covariance.lu().solve(&x).unwrap());
+        let found = prior.cost(&start.retract(&blocks, &little));
+        assert!((found - expected).abs() < 1e-3 * expected, "{found} {expected}");
+        let state = start.retract(&blocks, &off);
+        let mut equations = NormalEquations::new(&blocks);
+        let cost = prior.linearize(&state, &mut equations);
+        assert!((cost - prior.cost(&state)).abs() < 1e-12 * cost);
+        let of = |x: &[f64]| prior.cost(&state.retract(&blocks, x));
+        let reference = finite_difference_gradient(of, &vec![0.0; n], 1e-6);
+        let found: Vec<f64> = equations.gradient().iter().copied().collect();
+        assert!(compare_gradients(&found, &reference).relative < 1e-5);
     }
 }

@@ -3,31 +3,32 @@
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, SMatrix};
+use prehend_geometry::RobustKernel;
 use prehend_render::{
-    ContourOptions, DepthImage, Light, LossOptions, Mode, PoseLoss, Robust, Target, TargetError,
-    Tile, light_samples,
+    ContourOptions, Light, LossOptions, Mode, PoseLoss, Target, Tile, light_samples,
 };
 
 use super::patch_sums::PatchSums;
-use super::{SurfacePatches, Term};
 use crate::error::RefineError;
-use crate::problem::{Block, Normal, State};
-use crate::scene::{Object, Observation};
+use crate::problem::{Factor, NormalEquations, State, SurfacePatches};
+use crate::scene::{Frame, Object, Occluders};
 
-/// Settings of the rendering term.
+/// Settings of [`RenderingFactor`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct RenderingSettings {
     /// The image is made smaller by this factor.
     pub downsample: usize,
     /// Whether colors are compared.
     pub color: bool,
+    /// What may hide the object.
+    pub occluders: Occluders,
     /// Standard deviation of a color, relative to the object's brightness in the image: exposure is
     /// unknown, and a dark image is no better evidence than a bright one.
     pub sigma: f64,
-    /// Standard deviation of the silhouette's coverage of a pixel (0..=1).
+    /// Standard deviation of the silhouette's coverage of a pixel (0..=1); infinite for a mask that says nothing.
     pub mask_sigma: f64,
-    /// Color residual beyond which an outlier is forgiven, in standard deviations.
-    pub outlier: f64,
+    /// Width of Cauchy's kernel of a color \[standard deviations\].
+    pub kernel_width: f64,
     /// How many independent measurements the pixels amount to: the errors of shading, texture and
     /// segmentation reach over whole patches.
     pub effective_pixels: f64,
@@ -47,58 +48,22 @@ impl Default for RenderingSettings {
         Self {
             downsample: 2,
             color: true,
+            occluders: Occluders::Hand,
             sigma: 0.15,
             mask_sigma: 0.3,
-            outlier: 2.0,
+            kernel_width: 2.0,
             effective_pixels: 200.0,
             light_ridge: 1e-2,
         }
     }
 }
 
-/// The segmented image that a [`RenderingTerm`] compares with, made once for all terms of one size of image.
-#[derive(Clone)]
-pub(crate) struct Segmented {
-    target: Arc<Target>,
-    /// Root mean square of the colors under the mask.
-    brightness: f64,
-}
-
-impl Segmented {
-    /// The object in `observation`; `hand` is the depth image of what may hide it.
-    ///
-    /// # Errors
-    /// If the images do not fit the camera or the mask is empty.
-    pub(crate) fn new(observation: &Observation, hand: DepthImage) -> Result<Self, RefineError> {
-        let target = Target::new(observation.camera, &observation.color, &observation.mask)
-            .and_then(|t| t.with_occluder(hand))
-            .map_err(images)?;
-        Ok(Self { target: Arc::new(target), brightness: brightness(observation) })
-    }
-
-    /// The same made smaller by `factor`.
-    ///
-    /// # Errors
-    /// If nothing of the mask is left.
-    pub(crate) fn downsampled(&self, factor: usize) -> Result<Self, RefineError> {
-        let target = match factor {
-            1 => Arc::clone(&self.target),
-            _ => Arc::new(self.target.downsampled(factor).map_err(images)?),
-        };
-        Ok(Self { target, ..*self })
-    }
-}
-
-fn images(error: TargetError) -> RefineError {
-    RefineError::Images(error.to_string())
-}
-
 /// The paper's L_DR with what it leaves open filled in.
 ///
-/// Light: solved for in closed form at every pose ([`Term::light`]), because it is unknown. Hand: where
+/// Light: unknown, so eliminated in closed form at every state (variable projection: Golub and Pereyra, 1973). Hand: where
 /// it hides the object there is no residual. Silhouette: coverage is compared with the mask, so that an
 /// object as dark as the black outside the mask still has an outline.
-pub struct RenderingTerm {
+pub struct RenderingFactor {
     object: Arc<Object>,
     target: Arc<Target>,
     loss: PoseLoss,
@@ -111,48 +76,32 @@ pub struct RenderingTerm {
     patches: Option<(Arc<SurfacePatches>, usize)>,
 }
 
-impl RenderingTerm {
-    /// Prepares the segmented image of `observation`; `hand` is the depth image of the hand alone.
+impl RenderingFactor {
+    /// Of the segmented image of `frame`.
     ///
     /// # Errors
-    /// If the images do not fit the camera or the mask is empty.
-    pub fn new(
-        observation: &Observation,
-        object: Arc<Object>,
-        hand: &DepthImage,
-        settings: RenderingSettings,
-    ) -> Result<Self, RefineError> {
-        let image = Segmented::new(observation, hand.clone())?.downsampled(settings.downsample)?;
-        Ok(Self::of(image, object, settings))
-    }
-
-    /// A term for `image`, which has the size that it should have.
-    pub(crate) fn of(image: Segmented, object: Arc<Object>, settings: RenderingSettings) -> Self {
-        let Segmented { target, brightness } = image;
-        let sigma = settings.sigma * brightness;
+    /// If the images do not fit the camera or nothing of the mask is left.
+    pub fn new(frame: &Frame<'_>, settings: &RenderingSettings) -> Result<Self, RefineError> {
+        let image = frame.segmented(settings.occluders, settings.downsample)?;
+        let sigma = settings.sigma * image.brightness;
         let options = LossOptions {
             color_weight: if settings.color { 1.0 } else { 0.0 },
             mask_weight: (sigma / settings.mask_sigma).powi(2),
             // Or a pose could lower its loss by hiding behind the hand.
             penalize_occluded: true,
-            robust: Robust::Cauchy(settings.outlier * sigma),
+            kernel: RobustKernel::Cauchy { scale: settings.kernel_width * sigma },
             ..LossOptions::default()
         };
-        Self {
-            object,
-            target,
-            loss: PoseLoss::new(
-                Mode::Contour(ContourOptions {
-                    half_width: HALF_WIDTH,
-                    ..ContourOptions::default()
-                }),
-                options,
-            ),
-            scale: 0.5 * settings.effective_pixels / (sigma * sigma),
+        let contour = ContourOptions { half_width: HALF_WIDTH, ..ContourOptions::default() };
+        Ok(Self {
+            object: Arc::clone(frame.object()),
+            target: image.target,
+            loss: PoseLoss::new(Mode::Contour(contour), options),
+            scale: settings.effective_pixels / (sigma * sigma),
             light_ridge: settings.light_ridge,
             color: settings.color,
             patches: None,
-        }
+        })
     }
 
     /// The same where the object may be off from its model in `patches`; the image is `downsample` times smaller than theirs.
@@ -160,134 +109,145 @@ impl RenderingTerm {
         let side = patches.side() / downsample;
         Self { patches: Some((patches, side)), ..self }
     }
-}
 
-/// Root mean square of the colors under the mask; never zero.
-fn brightness(observation: &Observation) -> f64 {
-    let pixels = observation.color.pixels().iter().zip(observation.mask.pixels());
-    let (sum, count) = pixels
-        .filter(|(_, m)| **m)
-        .flat_map(|(c, _)| c)
-        .fold((0.0, 0.0), |(s, n), &v| (s + f64::from(v).powi(2), n + 1.0));
-    (sum / f64::max(count, 1.0)).sqrt().max(0.02)
-}
-
-impl Term for RenderingTerm {
-    fn name(&self) -> &'static str {
-        "rendering"
+    /// The light that fits the image best at `state`: white and the same from everywhere if colors are not compared, or too
+    /// little is in view.
+    pub fn light(&self, state: &State) -> Light {
+        if !self.color {
+            return Light::ambient(1.0);
+        }
+        // Four unknowns a channel do not need every pixel.
+        let model = &self.object.model;
+        let seen = reprojected(state);
+        let samples = light_samples(model, &seen, &self.target, LIGHT_MARGIN, LIGHT_SAMPLES);
+        Light::fit(&samples, self.light_ridge).unwrap_or_else(|_| Light::ambient(1.0))
     }
 
-    fn value(&self, state: &State) -> f64 {
-        let (model, seen) = (&self.object.model, apparent(state));
-        self.scale * self.loss.evaluate(model, &seen, &state.light, &self.target).total
+    /// The cost under a `light`.
+    fn lit_cost(&self, state: &State, light: &Light) -> f64 {
+        let (model, seen) = (&self.object.model, reprojected(state));
+        self.scale * self.loss.evaluate(model, &seen, light, &self.target).total
     }
 
-    fn depends_on(&self, _block: Block) -> bool {
-        true
-    }
-
-    fn linearize(&self, state: &State, normal: &mut Normal) -> f64 {
+    /// The cost and its derivatives under a `light`.
+    fn lit_linearize(&self, state: &State, light: &Light, equations: &mut NormalEquations) -> f64 {
         let center = state.center();
-        let (model, seen) = (&self.object.model, apparent(state));
+        let (model, seen) = (&self.object.model, reprojected(state));
         let turning = seen * self.object.center;
-        // The object appears shifted, and turned as it is.
+        // The object is seen shifted, and turned as it is.
         let mut seen_by_state = SMatrix::<f64, 6, 11>::zeros();
-        let place = state.camera.apparent_jacobian(&center);
+        let place = state.camera.reprojected_jacobian(&center);
         seen_by_state.fixed_view_mut::<3, 3>(0, 0).copy_from(&place.fixed_columns::<3>(0));
         seen_by_state.fixed_view_mut::<3, 5>(0, 6).copy_from(&place.fixed_columns::<5>(3));
         seen_by_state.fixed_view_mut::<3, 3>(3, 3).fill_with_identity();
-        let requested = |(patches, _): &&(Arc<SurfacePatches>, usize)| {
-            normal.offset(Block::SurfacePatches(patches.count())).is_some()
-        };
-        let patches = self.patches.as_ref().filter(requested);
+        let patches = self.patches.as_ref().filter(|_| equations.auxiliary() > 0);
         let count = patches.map_or(0, |(patches, _)| patches.count());
         // One tile for all if nobody asks for more.
         let side = patches.map_or(usize::MAX, |(_, side)| *side);
-        let tiles =
-            self.loss.linearize_tiles(model, &seen, &turning, &state.light, &self.target, side);
+        let tiles = self.loss.linearize_tiles(model, &seen, &turning, light, &self.target, side);
         let mut sums = PatchSums::<11>::new(count);
-        let mut value = 0.0;
+        let mut cost = 0.0;
         for Tile { column, row, at } in tiles {
             let patch = patches.and_then(|(patches, _)| patches.in_tile(column, row));
             let (gradient, hessian) = sums.of(patch);
             *gradient += seen_by_state.tr_mul(&at.gradient) * self.scale;
-            *hessian += seen_by_state.tr_mul(&at.jtj) * seen_by_state * (2.0 * self.scale);
-            value += self.scale * at.loss.total;
+            *hessian += seen_by_state.tr_mul(&at.hessian) * seen_by_state * self.scale;
+            cost += self.scale * at.loss.total;
         }
-        let (gradient, hessian) = sums.equations();
-        let blocks = [Block::ObjectPose, Block::Camera, Block::SurfacePatches(count)];
-        normal.add_dynamic(&blocks, &gradient, &hessian);
-        value
-    }
-
-    fn light(&self, state: &State) -> Option<Light> {
-        if !self.color {
-            return None;
-        }
-        let (model, pose) = (&self.object.model, apparent(state));
-        // Four unknowns a channel do not need every pixel.
-        let samples = light_samples(model, &pose, &self.target, LIGHT_MARGIN, LIGHT_SAMPLES);
-        // With too little in view the light stays what it was.
-        Light::fit(&samples, self.light_ridge).ok()
+        sums.add_to(equations);
+        cost
     }
 }
 
-/// Where the object appears to be to the camera as it is said to be.
-fn apparent(state: &State) -> Isometry3<f64> {
-    state.camera.apparent(&state.t_cam_object, &state.center())
+/// Where the object is to a camera without calibration errors that sees it as the true one does.
+fn reprojected(state: &State) -> Isometry3<f64> {
+    state.camera.reprojected(&state.t_cam_object, &state.center())
+}
+
+impl Factor for RenderingFactor {
+    fn name(&self) -> &'static str {
+        "rendering"
+    }
+
+    fn cost(&self, state: &State) -> f64 {
+        self.lit_cost(state, &self.light(state))
+    }
+
+    fn linearize(&self, state: &State, equations: &mut NormalEquations) -> f64 {
+        self.lit_linearize(state, &self.light(state), equations)
+    }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::gradient_check::{assert_by_patches, assert_gradient, fixture, patches};
+    use super::super::gradient_check::{
+        assert_by_patches, assert_gradient, fixture, patches, scene,
+    };
     use super::*;
+    use crate::problem::Block;
+
+    fn factor(frame: &Frame<'_>) -> RenderingFactor {
+        RenderingFactor::new(frame, &RenderingSettings::default()).unwrap()
+    }
+
+    /// Derivatives are those at a fixed light.
+    struct Lit<'a> {
+        factor: &'a RenderingFactor,
+        light: Light,
+    }
+
+    impl<'a> Lit<'a> {
+        fn as_at(factor: &'a RenderingFactor, state: &State) -> Self {
+            Self { factor, light: factor.light(state) }
+        }
+    }
+
+    impl Factor for Lit<'_> {
+        fn name(&self) -> &'static str {
+            "lit"
+        }
+
+        fn cost(&self, state: &State) -> f64 {
+            self.factor.lit_cost(state, &self.light)
+        }
+
+        fn linearize(&self, state: &State, equations: &mut NormalEquations) -> f64 {
+            self.factor.lit_linearize(state, &self.light, equations)
+        }
+    }
 
     #[test]
     fn gradient_matches_differences() {
         for seed in 0..3 {
-            let (scene, mut state, hand) = fixture(seed);
-            let object = Arc::clone(&scene.object);
-            let settings = RenderingSettings::default();
-            let term = RenderingTerm::new(&scene.observation, object, &hand, settings).unwrap();
-            state.relight(&term);
+            let (frame, mut state) = fixture(seed);
+            let factor = factor(&frame);
             // Pixels are in single precision and texture has kinks: a step of some hundredths of a pixel.
-            assert_gradient(&term, &state, Block::ObjectPose, 5e-5, 0.03);
+            assert_gradient(&Lit::as_at(&factor, &state), &state, Block::ObjectPose, 5e-5, 0.03);
             state.camera = state.camera.changed(&[0.0, 0.0, 1e-3, -1e-3, 3e-3]);
-            state.relight(&term);
             // The camera moves the object as its own pose does, with that gradient's error at this state.
-            assert_gradient(&term, &state, Block::Camera, 5e-5, 0.1);
+            assert_gradient(&Lit::as_at(&factor, &state), &state, Block::Camera, 5e-5, 0.1);
         }
     }
 
     #[test]
     fn patches_share_what_the_object_has() {
-        let (scene, mut state, hand) = fixture(1);
+        let (frame, state) = fixture(1);
         for downsample in [1, 2, 3, 4] {
             let settings = RenderingSettings { downsample, ..RenderingSettings::default() };
             let patches = patches(downsample);
-            let object = Arc::clone(&scene.object);
-            let term = RenderingTerm::new(&scene.observation, object, &hand, settings).unwrap();
-            let term = term.with_patches(Arc::clone(&patches), downsample);
-            state.relight(&term);
+            let factor = RenderingFactor::new(&frame, &settings).unwrap();
+            let factor = factor.with_patches(Arc::clone(&patches), downsample);
             // Some of the object is drawn beside the mask.
-            assert_by_patches(&term, &state, &patches, 0.3);
+            assert_by_patches(&factor, &state, &patches, 0.3);
         }
     }
 
     #[test]
     fn the_light_is_found_and_the_truth_fits_best() {
-        let (scene, state, hand) = fixture(0);
-        let object = Arc::clone(&scene.object);
-        let settings = RenderingSettings::default();
-        let term = RenderingTerm::new(&scene.observation, object, &hand, settings).unwrap();
-        let lit = |mut state: State| {
-            state.relight(&term);
-            state
-        };
-        let truth = State { t_cam_object: scene.truth, ..state.clone() };
-        let unlit = term.value(&truth);
-        let (truth, off) = (lit(truth), lit(state));
-        assert!(term.value(&truth) < 0.5 * term.value(&off));
-        assert!(term.value(&truth) < unlit);
+        let (frame, state) = fixture(0);
+        let factor = factor(&frame);
+        let truth = State { t_cam_object: scene().truth, ..state.clone() };
+        assert!(factor.cost(&truth) < 0.5 * factor.cost(&state));
+        assert!(factor.cost(&truth) < factor.lit_cost(&truth, &Light::ambient(1.0)));
     }
 }

@@ -7,12 +7,11 @@ use prehend_geometry::robot::{ArticulatedRobot, RobotSample};
 use prehend_sim::{CompliantBalance, CompliantSupport, Support};
 use rayon::prelude::*;
 
-use super::Term;
 use crate::error::RefineError;
-use crate::problem::{Block, Normal, State};
-use crate::scene::{Hand, Object, Observation};
+use crate::problem::{Block, Factor, NormalEquations, State};
+use crate::scene::{Frame, Hand, Object};
 
-/// Settings of [`SupportTerm`].
+/// Settings of [`SupportFactor`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct SupportSettings {
     /// Standard deviation of what is left unbalanced, as a share of all that acts on the object.
@@ -65,7 +64,7 @@ impl SupportSettings {
 /// What the skin feels is a lower bound of what acts there; contacts off the skin are unseen, and may bear anything
 /// within their cones. So nothing is said of how strong the grasp is, only that the object would not stay where no contact
 /// opposes its weight or the fingers' pressure.
-pub struct SupportTerm {
+pub struct SupportFactor {
     object: Arc<Object>,
     robot: Arc<Hand>,
     gravity: Vector3<f64>,
@@ -100,22 +99,18 @@ struct Held {
     balance: CompliantBalance,
 }
 
-impl SupportTerm {
-    /// A term for `object` in the hand `robot` of `observation`.
+impl SupportFactor {
+    /// Of the object in the hand of `frame`.
     ///
     /// # Errors
     /// If gravity or the hand is unknown, the hand has a skin and its forces are not one a taxel, or a setting is out of range.
-    pub fn new(
-        observation: &Observation,
-        object: Arc<Object>,
-        robot: Arc<Hand>,
-        settings: SupportSettings,
-    ) -> Result<Self, RefineError> {
+    pub fn new(frame: &Frame<'_>, settings: &SupportSettings) -> Result<Self, RefineError> {
         settings.check()?;
-        let missing = |what| RefineError::Missing { what, term: "support" };
-        let gravity = observation.gravity.ok_or_else(|| missing("gravity"))?;
-        let hand = observation.hand.as_ref().ok_or_else(|| missing("hand state"))?;
-        robot.check_joints(&hand.joints)?;
+        let missing = RefineError::Missing { what: "gravity", factor: "support" };
+        let gravity = frame.observation().gravity.ok_or(missing)?;
+        let (robot, hand) = frame.require_hand("support")?;
+        let (object, robot) = (Arc::clone(frame.object()), Arc::clone(robot));
+        let settings = settings.clone();
         if !hand.forces.is_empty() {
             robot.check_forces(&hand.forces)?;
         }
@@ -221,28 +216,28 @@ fn twists(arm: &Vector3<f64>) -> [(Vector3<f64>, Vector3<f64>); 6] {
 const HAND: usize = 6;
 const JOINTS: usize = 12;
 
-impl Term for SupportTerm {
+impl Factor for SupportFactor {
     fn name(&self) -> &'static str {
         "support"
     }
 
-    fn value(&self, state: &State) -> f64 {
+    fn cost(&self, state: &State) -> f64 {
         self.held(state).map_or(0.0, |held| self.nats() * held.balance.value)
     }
 
-    fn linearize(&self, state: &State, normal: &mut Normal) -> f64 {
+    fn linearize(&self, state: &State, equations: &mut NormalEquations) -> f64 {
         let Some(held) = self.held(state) else { return 0.0 };
         let blocks = [Block::ObjectPose, Block::HandPose, Block::Joints(state.joints.len())];
         let (jacobian, yielding) = self.derivatives(&held, state);
         let (balance, nats) = (held.balance, self.nats());
         let gradient = (jacobian.tr_mul(&balance.residual) - yielding) * nats;
-        let hessian = jacobian.tr_mul(&(balance.yielding * &jacobian)) * nats;
-        normal.add_dynamic(&blocks, &gradient, &hessian);
+        let hessian = jacobian.tr_mul(&(balance.residual_jacobian * &jacobian)) * nats;
+        equations.add_dynamic(&blocks, &gradient, &hessian);
         nats * balance.value
     }
 }
 
-impl SupportTerm {
+impl SupportFactor {
     /// Derivatives of what is left unbalanced if each force keeps its pull: it turns with the object, and its support bears the
     /// less, the more it yields. Beside it, what that changes in the residual's square and not in the value: forces
     /// that are less cost less.
@@ -302,21 +297,26 @@ impl SupportTerm {
 
 #[cfg(test)]
 mod tests {
-    use super::super::gradient_check::{assert_gradient, fixture};
+    use super::super::gradient_check::{assert_gradient, fixture, scene};
     use super::*;
-    use crate::scene::Scene;
+    use crate::scene::Observation;
 
-    fn term(scene: &Scene) -> SupportTerm {
-        let (object, robot) = (Arc::clone(&scene.object), Arc::clone(&scene.robot));
-        SupportTerm::new(&scene.observation, object, robot, SupportSettings::default()).unwrap()
+    fn factor(frame: &Frame<'_>) -> SupportFactor {
+        SupportFactor::new(frame, &SupportSettings::default()).unwrap()
+    }
+
+    /// Of the built-in scene, with another observation.
+    fn seen(observation: &Observation) -> SupportFactor {
+        let scene = scene();
+        factor(&Frame::new(observation, &scene.object, Some(&scene.hand)).unwrap())
     }
 
     #[test]
     fn gradients_match_differences() {
         for seed in 0..3 {
-            let (scene, state, _) = fixture(seed);
-            let term = term(scene);
-            assert!(term.value(&state) > 0.0);
+            let (frame, state) = fixture(seed);
+            let term = factor(&frame);
+            assert!(term.cost(&state) > 0.0);
             for block in [Block::ObjectPose, Block::HandPose, Block::Joints(16)] {
                 assert_gradient(&term, &state, block, 1e-7, 1e-3);
             }
@@ -325,11 +325,11 @@ mod tests {
 
     #[test]
     fn a_held_object_costs_nothing_and_one_beside_the_hand_does() {
-        let (scene, state, _) = fixture(0);
-        let term = term(scene);
-        let held = State { t_cam_object: scene.truth, ..state };
-        let free = held.moved(Block::ObjectPose, &[0.0, 0.0, -0.3, 0.0, 0.0, 0.0]);
-        let (held, free) = (term.value(&held), term.value(&free));
+        let (frame, state) = fixture(0);
+        let term = factor(&frame);
+        let held = State { t_cam_object: scene().truth, ..state };
+        let free = held.retract(&[Block::ObjectPose], &[0.0, 0.0, -0.3, 0.0, 0.0, 0.0]);
+        let (held, free) = (term.cost(&held), term.cost(&free));
         // All that acts is left: half a square over that of the deviation.
         let all = 0.5 * SupportSettings::default().sigma.powi(-2);
         assert!(held < 0.1 * all && free > 0.1 * all, "{held} {free} {all}");
@@ -337,53 +337,50 @@ mod tests {
 
     #[test]
     fn what_a_finger_feels_pushes_the_object_away_from_it() {
-        let (scene, ..) = fixture(0);
+        let scene = scene();
         let mut observation = scene.observation.clone();
-        let taxel = &scene.robot.taxels[100];
+        let taxel = &scene.hand.taxels[100];
         let forces = &mut observation.hand.as_mut().unwrap().forces;
         forces.fill(Vector3::zeros());
         // The object presses into the skin with 2 N: half of that, and as much as so strong a taxel is believed.
         forces[100] = -2.0 * taxel.normal;
-        let (object, robot) = (Arc::clone(&scene.object), Arc::clone(&scene.robot));
-        let term = SupportTerm::new(&observation, object, robot, SupportSettings::default());
-        let [push] = &term.unwrap().felt[..] else { panic!("not one force") };
+        let [push] = &seen(&observation).felt[..] else { panic!("not one force") };
         assert!((push.force - taxel.normal * (4.0 / 4.25)).norm() < 1e-12, "{}", push.force);
     }
 
     #[test]
     fn where_nothing_acts_nothing_is_said() {
-        let (scene, state, _) = fixture(0);
+        let (_, state) = fixture(0);
+        let scene = scene();
         let mut observation = scene.observation.clone();
         observation.gravity = Some(Vector3::zeros());
         let forces = &mut observation.hand.as_mut().unwrap().forces;
         forces.fill(Vector3::repeat(f64::NAN));
+        let frame = Frame::new(&observation, &scene.object, Some(&scene.hand)).unwrap();
         let settings = SupportSettings::default();
-        let new = |settings| {
-            let (object, robot) = (Arc::clone(&scene.object), Arc::clone(&scene.robot));
-            SupportTerm::new(&observation, object, robot, settings)
-        };
-        let term = new(settings.clone()).unwrap();
-        let mut normal = Normal::new(&[Block::ObjectPose]);
-        assert_eq!((term.value(&state), term.linearize(&state, &mut normal)), (0.0, 0.0));
-        assert_eq!(normal.gradient().norm(), 0.0);
+        let factor = SupportFactor::new(&frame, &settings).unwrap();
+        let mut equations = NormalEquations::new(&[Block::ObjectPose]);
+        assert_eq!((factor.cost(&state), factor.linearize(&state, &mut equations)), (0.0, 0.0));
+        assert_eq!(equations.gradient().norm(), 0.0);
         for wrong in [
             SupportSettings { reach: 0.0, ..settings.clone() },
             SupportSettings { area: f64::NAN, ..settings.clone() },
             SupportSettings { friction: -1.0, ..settings },
         ] {
-            assert!(matches!(new(wrong), Err(RefineError::Setting { name: "support", .. })));
+            let refused = SupportFactor::new(&frame, &wrong);
+            assert!(matches!(refused, Err(RefineError::Setting { name: "support", .. })));
         }
     }
 
     #[test]
     fn gravity_and_the_hand_are_needed() {
-        let (scene, ..) = fixture(0);
+        let scene = scene();
         let refused = |change: fn(&mut Observation)| {
             let mut observation = scene.observation.clone();
             change(&mut observation);
-            let (object, robot) = (Arc::clone(&scene.object), Arc::clone(&scene.robot));
-            let term = SupportTerm::new(&observation, object, robot, SupportSettings::default());
-            term.err().unwrap().to_string()
+            let frame = Frame::new(&observation, &scene.object, Some(&scene.hand)).unwrap();
+            let factor = SupportFactor::new(&frame, &SupportSettings::default());
+            factor.err().unwrap().to_string()
         };
         assert!(refused(|o| o.gravity = None).contains("gravity"));
         assert!(refused(|o| o.hand = None).contains("hand state"));

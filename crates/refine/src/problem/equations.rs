@@ -2,37 +2,70 @@
 
 use nalgebra::{DMatrix, DMatrixView, DVector, DVectorView, SMatrix, SVector};
 
-use crate::problem::Block;
+use super::{Block, Row};
 
-/// Gradient and Gauss–Newton Hessian of a sum of terms over the requested blocks.
+/// Gradient Jᵀr and Gauss–Newton Hessian JᵀJ of ½‖r‖², a sum of factors, by the parameters of some blocks.
 #[derive(Clone, Debug)]
-pub struct Normal {
+pub struct NormalEquations {
     blocks: Vec<Block>,
+    /// Number of the blocks' parameters.
+    dimension: usize,
+    /// Number of parameters that no state holds and that are eliminated: displacements of surface patches. They come last, and
+    /// have room once something depends on them.
+    auxiliary: usize,
     gradient: DVector<f64>,
     hessian: DMatrix<f64>,
-    /// Scratch of [`add_row`](Self::add_row): place and derivative of each parameter of a row.
+    /// Place and derivative of each parameter of the row begun last.
     entries: Vec<(usize, f64)>,
 }
 
-/// What [`Normal::marginalize`] finds.
+/// What [`NormalEquations::marginalize`] finds.
 pub(crate) struct SchurComplement {
-    /// The equations of the other blocks.
-    pub(crate) rest: Normal,
+    /// The equations of the blocks.
+    pub(crate) rest: NormalEquations,
     /// How much lower the least value is.
     pub(crate) gain: f64,
-    /// Logarithm of the determinant of the block's Hessian.
+    /// Logarithm of the determinant of the auxiliary parameters' Hessian.
     pub(crate) log_determinant: f64,
 }
 
-impl Normal {
+impl NormalEquations {
     /// Empty equations over `blocks`, in that order.
     pub fn new(blocks: &[Block]) -> Self {
+        Self::with_auxiliary(blocks, 0)
+    }
+
+    /// Empty equations over `blocks`, and over `auxiliary` parameters if a factor depends on them.
+    pub(crate) fn with_auxiliary(blocks: &[Block], auxiliary: usize) -> Self {
         let n = blocks.iter().map(|b| b.dimension()).sum();
         Self {
             blocks: blocks.to_vec(),
+            dimension: n,
+            auxiliary,
             gradient: DVector::zeros(n),
             hessian: DMatrix::zeros(n, n),
             entries: Vec::new(),
+        }
+    }
+
+    /// Number of auxiliary parameters that may be added to.
+    pub(crate) fn auxiliary(&self) -> usize {
+        self.auxiliary
+    }
+
+    /// Whether a factor has added derivatives by auxiliary parameters.
+    pub(crate) fn has_auxiliary(&self) -> bool {
+        self.gradient.len() > self.dimension
+    }
+
+    /// Makes room for the auxiliary parameters.
+    fn grow(&mut self) {
+        let n = self.dimension + self.auxiliary;
+        if self.gradient.len() < n {
+            let old = std::mem::replace(&mut self.gradient, DVector::zeros(n));
+            self.gradient.rows_mut(0, old.len()).copy_from(&old);
+            let old = std::mem::replace(&mut self.hessian, DMatrix::zeros(n, n));
+            self.hessian.view_mut((0, 0), old.shape()).copy_from(&old);
         }
     }
 
@@ -42,12 +75,12 @@ impl Normal {
         Some(self.blocks[..position].iter().map(|b| b.dimension()).sum())
     }
 
-    /// What is left if the last block, which is of [`Block::SurfacePatches`], takes the value at which the quadratic model of the sum is least.
-    /// Beforehand no displacement is likeliest, directions are independent, and the covariance in any one has the inverse `precision`, which is
-    /// added. `None` if the least is not determined.
+    /// Eliminates the auxiliary parameters, displacements in three directions each, by the Schur complement. Their prior is a
+    /// Gaussian of mean zero, independent by direction; `precision`, the inverse of its covariance in one direction, is added.
+    /// `None` if the sum is singular.
     pub(crate) fn marginalize(&mut self, precision: &DMatrix<f64>) -> Option<SchurComplement> {
-        let (last, blocks) = self.blocks.split_last()?;
-        let (n, m) = (self.gradient.len() - last.dimension(), last.dimension());
+        self.grow();
+        let (n, m) = (self.dimension, self.auxiliary);
         for c in 0..precision.ncols() {
             for r in 0..precision.nrows() {
                 for k in 0..3 {
@@ -61,7 +94,9 @@ impl Normal {
             lower.solve_lower_triangular(&self.hessian.view((n, 0), (m, n)).clone_owned())?;
         let pull = lower.solve_lower_triangular(&self.gradient.rows(n, m).clone_owned())?;
         let rest = Self {
-            blocks: blocks.to_vec(),
+            blocks: self.blocks.clone(),
+            dimension: n,
+            auxiliary: 0,
             gradient: self.gradient.rows(0, n) - coupling.tr_mul(&pull),
             hessian: self.hessian.view((0, 0), (n, n)) - coupling.tr_mul(&coupling),
             entries: Vec::new(),
@@ -70,13 +105,14 @@ impl Normal {
         Some(SchurComplement { rest, gain: 0.5 * pull.norm_squared(), log_determinant })
     }
 
-    /// Leaves the first `blocks` only, as if the others were fixed.
-    pub(crate) fn truncate(&mut self, blocks: &[Block]) {
-        let n = blocks.iter().map(|b| b.dimension()).sum();
-        if n < self.gradient.len() {
-            self.blocks.truncate(blocks.len());
-            self.gradient = self.gradient.rows(0, n).clone_owned();
-            self.hessian = self.hessian.view((0, 0), (n, n)).clone_owned();
+    /// Drops the auxiliary parameters, as if they were zero.
+    pub(crate) fn without_auxiliary(self) -> Self {
+        let n = self.dimension;
+        Self {
+            auxiliary: 0,
+            gradient: self.gradient.rows(0, n).clone_owned(),
+            hessian: self.hessian.view((0, 0), (n, n)).clone_owned(),
+            ..self
         }
     }
 
@@ -95,16 +131,32 @@ impl Normal {
         &self.blocks
     }
 
-    /// Adds what half the square of `residual`, times `weight`, brings; `row` has its derivatives by some blocks.
-    ///
-    /// Parts that belong to blocks nobody requested are dropped.
-    pub fn add_row(&mut self, row: &[(Block, &[f64])], residual: f64, weight: f64) {
+    /// Begins a row, the derivatives of a residual.
+    #[inline]
+    pub(super) fn begin_row(&mut self) -> Row<'_> {
         self.entries.clear();
-        for &(block, derivatives) in row {
-            if let Some(offset) = self.offset(block) {
-                self.entries.extend(derivatives.iter().enumerate().map(|(i, &d)| (offset + i, d)));
-            }
+        Row { equations: self }
+    }
+
+    /// Derivatives of the row begun last by the parameters of `block`; dropped if nobody requested it.
+    #[inline]
+    pub(super) fn push_entries(&mut self, block: Block, derivatives: &[f64]) {
+        if let Some(offset) = self.offset(block) {
+            self.entries.extend(derivatives.iter().enumerate().map(|(i, &d)| (offset + i, d)));
         }
+    }
+
+    /// The same by one parameter of `block`.
+    #[inline]
+    pub(super) fn push_entry(&mut self, block: Block, index: usize, derivative: f64) {
+        if let Some(offset) = self.offset(block) {
+            self.entries.push((offset + index, derivative));
+        }
+    }
+
+    /// Adds ½ `weight` r² of the residual r whose derivatives are the row begun last.
+    #[inline]
+    pub(super) fn finish_row(&mut self, residual: f64, weight: f64) {
         for &(i, d) in &self.entries {
             self.gradient[i] += weight * residual * d;
             let column = &mut self.hessian.column_mut(i);
@@ -114,16 +166,7 @@ impl Normal {
         }
     }
 
-    /// Adds half the squares of a block's parameters from a place, given each one's (difference, weight).
-    pub fn add_diagonal(&mut self, block: Block, parameters: &[(f64, f64)]) {
-        let Some(offset) = self.offset(block) else { return };
-        for (i, (difference, weight)) in parameters.iter().enumerate() {
-            self.gradient[offset + i] += weight * difference;
-            self.hessian[(offset + i, offset + i)] += weight;
-        }
-    }
-
-    /// Adds the gradient and Hessian of a term whose parameters are those of `blocks`, concatenated.
+    /// Adds the gradient and Hessian of a factor whose parameters are those of `blocks`, concatenated.
     ///
     /// Parts that belong to blocks nobody requested are dropped.
     pub fn add<const N: usize>(
@@ -132,7 +175,7 @@ impl Normal {
         gradient: &SVector<f64, N>,
         hessian: &SMatrix<f64, N, N>,
     ) {
-        self.add_views(blocks, &gradient.as_view(), &hessian.as_view());
+        self.add_views(blocks, 0, &gradient.as_view(), &hessian.as_view());
     }
 
     /// The same of blocks whose size is not known beforehand.
@@ -145,17 +188,29 @@ impl Normal {
         gradient: &DVector<f64>,
         hessian: &DMatrix<f64>,
     ) {
-        self.add_views(blocks, &gradient.as_view(), &hessian.as_view());
+        self.add_views(blocks, 0, &gradient.as_view(), &hessian.as_view());
+    }
+
+    /// The same with derivatives by all auxiliary parameters, after those by the blocks.
+    pub(crate) fn add_with_auxiliary(
+        &mut self,
+        blocks: &[Block],
+        gradient: &DVector<f64>,
+        hessian: &DMatrix<f64>,
+    ) {
+        self.grow();
+        self.add_views(blocks, self.auxiliary, &gradient.as_view(), &hessian.as_view());
     }
 
     fn add_views(
         &mut self,
         blocks: &[Block],
+        auxiliary: usize,
         gradient: &DVectorView<f64>,
         hessian: &DMatrixView<f64>,
     ) {
         let mut local = 0;
-        let places: Vec<(usize, usize, usize)> = blocks
+        let mut places: Vec<(usize, usize, usize)> = blocks
             .iter()
             .filter_map(|&b| {
                 let from = local;
@@ -163,6 +218,9 @@ impl Normal {
                 self.offset(b).map(|to| (from, to, b.dimension()))
             })
             .collect();
+        if auxiliary > 0 {
+            places.push((local, self.dimension, auxiliary));
+        }
         for &(row_from, row_to, rows) in &places {
             for r in 0..rows {
                 self.gradient[row_to + r] += gradient[row_from + r];
@@ -179,9 +237,12 @@ impl Normal {
     }
 }
 
-impl std::ops::AddAssign<&Self> for Normal {
-    /// Adds equations over the same blocks, or the first of them.
+impl std::ops::AddAssign<&Self> for NormalEquations {
+    /// Adds equations over the same blocks.
     fn add_assign(&mut self, other: &Self) {
+        if other.has_auxiliary() {
+            self.grow();
+        }
         let n = other.gradient.len();
         let mut gradient = self.gradient.rows_mut(0, n);
         gradient += &other.gradient;
@@ -196,14 +257,14 @@ mod tests {
 
     #[test]
     fn parts_land_in_their_blocks() {
-        let mut normal = Normal::new(&[Block::HandPose, Block::ObjectPose]);
+        let mut normal = NormalEquations::new(&[Block::HandPose, Block::ObjectPose]);
         let gradient = SVector::<f64, 12>::from_fn(|r, _| r as f64);
         let hessian = SMatrix::<f64, 12, 12>::from_fn(|r, c| (r * 100 + c) as f64);
         normal.add(&[Block::ObjectPose, Block::HandPose], &gradient, &hessian);
         assert_eq!((normal.gradient()[0], normal.gradient()[6]), (6.0, 0.0));
         assert_eq!(normal.hessian()[(0, 7)], 601.0);
 
-        let mut pose_only = Normal::new(&[Block::ObjectPose]);
+        let mut pose_only = NormalEquations::new(&[Block::ObjectPose]);
         pose_only.add(&[Block::HandPose, Block::ObjectPose], &gradient, &hessian);
         assert_eq!((pose_only.gradient()[0], pose_only.hessian()[(0, 1)]), (6.0, 607.0));
     }

@@ -1,10 +1,26 @@
-//! The least-squares problem: a [`State`] in [`Block`]s of parameters, and the [`NormalEquations`] of the factors.
+//! The least-squares problem: [`Factor`]s over a [`State`] in [`Block`]s of parameters, the [`NormalEquations`] that they
+//! add to, and the solver.
 
 mod equations;
-mod robust;
+mod factor;
+mod least_squares;
+mod noise;
+mod patches;
+mod rows;
+mod scaled_cholesky;
 mod state;
 
-pub use equations::Normal;
+pub use equations::NormalEquations;
 pub(crate) use equations::SchurComplement;
-pub use robust::Cauchy;
+pub use factor::Factor;
+pub use least_squares::{Contribution, Linearization, Problem, Solution, Solver, Termination};
+pub use noise::{NoiseModel, Weighting};
+pub use patches::ModelErrorSettings;
+pub(crate) use patches::SurfacePatches;
+pub use rows::{Row, Rows};
+pub(crate) use scaled_cholesky::ScaledCholesky;
 pub use state::{Block, State};
+
+/// Part of the diagonal that is added to a Gauss–Newton matrix before it is inverted: what nothing is known of must not be
+/// infinite.
+pub(crate) const RIDGE: f64 = 1e-9;

@@ -12,14 +12,19 @@ pub struct CameraCalibrationError {
     /// What is to be added then \[m\].
     pub depth_bias: f64,
     /// Where the center of projection really is, right of where it is said to be, and below \[focal lengths\].
-    pub shift: Vector2<f64>,
+    pub principal_point: Vector2<f64>,
     /// How much larger the images of things are than focal length and models say, as a part of their size.
-    pub magnification: f64,
+    pub focal_scale: f64,
 }
 
 impl Default for CameraCalibrationError {
     fn default() -> Self {
-        Self { depth_scale: 1.0, depth_bias: 0.0, shift: Vector2::zeros(), magnification: 0.0 }
+        Self {
+            depth_scale: 1.0,
+            depth_bias: 0.0,
+            principal_point: Vector2::zeros(),
+            focal_scale: 0.0,
+        }
     }
 }
 
@@ -29,8 +34,8 @@ impl CameraCalibrationError {
 
     /// The parameters, zero where nothing is corrected.
     pub fn parameters(&self) -> [f64; Self::DIMENSION] {
-        let [x, y] = self.shift.into();
-        [self.depth_scale - 1.0, self.depth_bias, x, y, self.magnification]
+        let [x, y] = self.principal_point.into();
+        [self.depth_scale - 1.0, self.depth_bias, x, y, self.focal_scale]
     }
 
     /// With `change` added to the parameters.
@@ -42,23 +47,23 @@ impl CameraCalibrationError {
         Self {
             depth_scale: self.depth_scale + change[0],
             depth_bias: self.depth_bias + change[1],
-            shift: self.shift + Vector2::new(change[2], change[3]),
-            magnification: self.magnification + change[4],
+            principal_point: self.principal_point + Vector2::new(change[2], change[3]),
+            focal_scale: self.focal_scale + change[4],
         }
     }
 
     /// Where a point is \[m\] that the camera, as it is said to be, sees along `ray` (x/z, y/z) at `depth` \[m\].
     pub fn point(&self, ray: &Vector2<f64>, depth: f64) -> Point3<f64> {
         let z = self.depth_scale * depth + self.depth_bias;
-        let true_ray = (ray - self.shift) / (1.0 + self.magnification);
+        let true_ray = (ray - self.principal_point) / (1.0 + self.focal_scale);
         Point3::new(true_ray.x * z, true_ray.y * z, z)
     }
 
     /// Derivatives of [`point`](Self::point) by the parameters.
     pub fn point_jacobian(&self, ray: &Vector2<f64>, depth: f64) -> Matrix3x5<f64> {
         let z = self.depth_scale * depth + self.depth_bias;
-        let larger = 1.0 + self.magnification;
-        let true_ray = (ray - self.shift) / larger;
+        let larger = 1.0 + self.focal_scale;
+        let true_ray = (ray - self.principal_point) / larger;
         let along = Vector3::new(true_ray.x, true_ray.y, 1.0);
         Matrix3x5::from_columns(&[
             along * depth,
@@ -71,27 +76,28 @@ impl CameraCalibrationError {
 
     /// The pose at which the camera, as it is said to be, would see a thing of center `center` (camera frame) as it does
     /// see it at `pose`: nearer where images are larger, and shifted. To first order in the thing's size over its distance.
-    pub fn apparent(&self, pose: &Isometry3<f64>, center: &Vector3<f64>) -> Isometry3<f64> {
-        Translation3::from(self.apparent_shift(center)) * pose
+    pub fn reprojected(&self, pose: &Isometry3<f64>, center: &Vector3<f64>) -> Isometry3<f64> {
+        Translation3::from(self.reprojected_shift(center)) * pose
     }
 
-    fn apparent_shift(&self, center: &Vector3<f64>) -> Vector3<f64> {
-        let z = center.z / (1.0 + self.magnification);
-        Vector3::new(self.shift.x * z, self.shift.y * z, z - center.z)
+    fn reprojected_shift(&self, center: &Vector3<f64>) -> Vector3<f64> {
+        let z = center.z / (1.0 + self.focal_scale);
+        Vector3::new(self.principal_point.x * z, self.principal_point.y * z, z - center.z)
     }
 
-    /// Derivatives of the place of [`apparent`](Self::apparent): by the place of the pose, then by the parameters.
-    pub fn apparent_jacobian(&self, center: &Vector3<f64>) -> SMatrix<f64, 3, 8> {
-        let larger = 1.0 + self.magnification;
+    /// Derivatives of the place of [`reprojected`](Self::reprojected): by the place of the pose, then by the parameters.
+    pub fn reprojected_jacobian(&self, center: &Vector3<f64>) -> SMatrix<f64, 3, 8> {
+        let larger = 1.0 + self.focal_scale;
         let z = center.z / larger;
         let mut jacobian = SMatrix::<f64, 3, 8>::zeros();
         jacobian.fixed_view_mut::<3, 3>(0, 0).fill_with_identity();
-        jacobian[(0, 2)] = self.shift.x / larger;
-        jacobian[(1, 2)] = self.shift.y / larger;
+        jacobian[(0, 2)] = self.principal_point.x / larger;
+        jacobian[(1, 2)] = self.principal_point.y / larger;
         jacobian[(2, 2)] = 1.0 / larger;
         jacobian[(0, 5)] = z;
         jacobian[(1, 6)] = z;
-        let nearer = Vector3::new(self.shift.x, self.shift.y, 1.0) * (-z / larger);
+        let nearer =
+            Vector3::new(self.principal_point.x, self.principal_point.y, 1.0) * (-z / larger);
         jacobian.fixed_view_mut::<3, 1>(0, 7).copy_from(&nearer);
         jacobian
     }
@@ -129,12 +135,12 @@ mod tests {
         let pose = Isometry3::translation(0.03, -0.02, 0.4);
         for correction in [CameraCalibrationError::default(), some()] {
             let center = pose.translation.vector;
-            let jacobian = correction.apparent_jacobian(&center);
+            let jacobian = correction.reprojected_jacobian(&center);
             for row in 0..3 {
                 let of = |x: &[f64]| {
                     let moved = center + Vector3::new(x[0], x[1], x[2]);
                     let pose = Isometry3::from_parts(moved.into(), pose.rotation);
-                    correction.changed(&x[3..]).apparent(&pose, &moved).translation.vector[row]
+                    correction.changed(&x[3..]).reprojected(&pose, &moved).translation.vector[row]
                 };
                 let reference = finite_difference_gradient(of, &[0.0; 8], 1e-6);
                 let found: Vec<f64> = jacobian.row(row).iter().copied().collect();
@@ -145,10 +151,10 @@ mod tests {
 
     #[test]
     fn a_point_is_where_it_appears() {
-        // What is at `apparent` in the camera as it is said to be, is seen along the ray that the true one gives.
+        // What is at `reprojected` in the camera as it is said to be, is seen along the ray that the true one gives.
         let correction = CameraCalibrationError { depth_scale: 1.0, depth_bias: 0.0, ..some() };
         let place = Vector3::new(0.03, -0.02, 0.4);
-        let at = correction.apparent(&Isometry3::from(place), &place).translation.vector;
+        let at = correction.reprojected(&Isometry3::from(place), &place).translation.vector;
         let ray = Vector2::new(at.x / at.z, at.y / at.z);
         assert!((correction.point(&ray, place.z).coords - place).norm() < 1e-12);
     }

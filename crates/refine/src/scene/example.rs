@@ -11,7 +11,7 @@ use prehend_render::Camera;
 
 use super::look_at;
 use super::sensing::{feel, render_rgbd};
-use crate::data::AssetError;
+use crate::error::RefineError;
 use crate::scene::{Hand, HandMeasurement, Object, Observation};
 
 /// A frame whose truth is known.
@@ -23,7 +23,7 @@ pub struct Scene {
     /// Its number among the models of a dataset.
     pub obj_id: u32,
     /// The hand.
-    pub robot: Arc<Hand>,
+    pub hand: Arc<Hand>,
     /// The hand as URDF text.
     pub urdf: String,
     /// The true pose, object → camera \[m\].
@@ -40,7 +40,7 @@ const INITIAL_ROTATION: f64 = 0.26;
 ///
 /// # Errors
 /// If the built-in assets cannot be prepared.
-pub fn default_scene(seed: u64) -> Result<Scene, AssetError> {
+pub fn default_scene(seed: u64) -> Result<Scene, RefineError> {
     let grasp = default_grasp();
     let mesh = grasp.object.mesh();
     let object = Object::with_mass(grasp.object.name(), mesh, Some(grasp.object.mass()), 0)?;
@@ -48,7 +48,7 @@ pub fn default_scene(seed: u64) -> Result<Scene, AssetError> {
     let tree = KinematicTree::from_urdf_str(&urdf, None)?;
     let joints = JOINT_NAMES.iter().map(|n| (*n).to_owned()).zip(grasp.joints).collect();
     let joints = tree.joint_vector(&joints)?;
-    let robot = Arc::new(Hand::new(tree, taxels())?);
+    let hand = Arc::new(Hand::new(tree, taxels())?);
 
     let camera = Camera { fx: 580.0, fy: 580.0, cx: 319.5, cy: 239.5, width: 640, height: 480 };
     let t_cam_hand =
@@ -56,8 +56,8 @@ pub fn default_scene(seed: u64) -> Result<Scene, AssetError> {
     let truth = t_cam_hand * grasp.t_base_object;
     let mut noise = SplitMix64::new(seed);
     let (color, depth, mask) =
-        render_rgbd(&camera, &object, &robot, &truth, &t_cam_hand, &joints, &mut noise);
-    let forces = feel(&object, &robot, &truth, &t_cam_hand, &joints);
+        render_rgbd(&camera, &object, &hand, &truth, &t_cam_hand, &joints, &mut noise);
+    let forces = feel(&object, &hand, &truth, &t_cam_hand, &joints);
     let observation = Observation {
         camera,
         color,
@@ -71,5 +71,5 @@ pub fn default_scene(seed: u64) -> Result<Scene, AssetError> {
     let error = Vector6::from_fn(|k, _| scale(k) * noise.normal());
     let initial = perturb_about(&truth, &(truth * object.center).coords, &error);
     let (object, obj_id) = (Arc::new(object), grasp.object.bop_id());
-    Ok(Scene { observation, object, obj_id, robot, urdf, truth, initial })
+    Ok(Scene { observation, object, obj_id, hand, urdf, truth, initial })
 }

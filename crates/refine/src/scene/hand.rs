@@ -125,34 +125,20 @@ impl Hand {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{Config, TermKind};
-    use crate::error::RefineError;
-    use crate::refine;
-    use crate::scene::default_scene;
-    use crate::scene::inspect_pose;
+    use crate::scene::{Frame, default_scene, inspect_pose};
 
     #[test]
-    fn a_wrong_number_of_joints_is_an_error_for_every_term() {
+    fn a_wrong_number_of_joints_is_an_error() {
         let scene = default_scene(1).unwrap();
         let mut observation = scene.observation.clone();
         observation.hand.as_mut().unwrap().joints.pop();
-        for kind in [TermKind::Rendering, TermKind::Depth, TermKind::Physics, TermKind::Tactile] {
-            let config = Config::of(&[kind]);
-            let robot = Some(&scene.robot);
-            let error = refine(&observation, &scene.object, robot, &scene.initial, &config);
-            let error = error.unwrap_err();
-            assert!(
-                matches!(
-                    error,
-                    RefineError::Robot(RobotError::JointCount { given: 15, expected: 16 })
-                ),
-                "{error}"
-            );
-        }
-        let posed = scene.robot.posed(&Isometry3::identity(), &[0.0; 17]);
+        let hand = Some(&scene.hand);
+        let refused = Frame::new(&observation, &scene.object, hand).map(|_| ()).unwrap_err();
+        let expected = RobotError::JointCount { given: 15, expected: 16 }.to_string();
+        assert_eq!(refused.to_string(), expected);
+        let posed = scene.hand.posed(&Isometry3::identity(), &[0.0; 17]);
         assert!(matches!(posed, Err(RobotError::JointCount { given: 17, expected: 16 })));
-        let warnings =
-            inspect_pose(&observation, &scene.object, Some(&scene.robot), &scene.initial);
+        let warnings = inspect_pose(&observation, &scene.object, Some(&scene.hand), &scene.initial);
         assert!(warnings.iter().any(|w| w.contains("15 joint positions")), "{warnings:?}");
     }
 

@@ -3,8 +3,8 @@
 use nalgebra::Isometry3;
 use prehend_render::depth_map;
 
-use crate::refine::hand_depth;
-use crate::scene::{Hand, Object, Observation};
+use super::frame::hand_depth;
+use super::{Hand, Object, Observation};
 
 /// Sizes between which an object's extent is believed to be in meters \[m\].
 const PLAUSIBLE_EXTENT: std::ops::Range<f64> = 5e-3..5.0;
@@ -54,7 +54,7 @@ pub fn inspect_pose(
         return warnings;
     }
     let rendered = depth_map(&observation.camera, &[(&object.model, *t_cam_object)]);
-    let hand = hand_depth(observation, robot);
+    let hand = hand_depth(&observation.camera, robot.zip(observation.hand.as_ref()));
     let mut ratios = Vec::new();
     let (mut overlap, mut union) = (0_usize, 0_usize);
     let pixels = rendered.pixels().iter().zip(hand.pixels());

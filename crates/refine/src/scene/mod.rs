@@ -2,16 +2,19 @@
 
 mod calibration;
 mod example;
+mod frame;
 mod hand;
 mod inspect;
 mod look_at;
 mod object;
 mod observation;
+mod segmented;
 mod sensing;
 mod sequence;
 
 pub use calibration::CameraCalibrationError;
 pub use example::{Scene, default_scene};
+pub use frame::{Frame, Occluders};
 pub use hand::Hand;
 pub use inspect::{inspect_object, inspect_pose};
 pub(crate) use look_at::look_at;

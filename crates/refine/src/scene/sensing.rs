@@ -18,14 +18,14 @@ const TOUCH_REACH: f64 = 2e-3;
 pub(crate) fn render_rgbd(
     camera: &Camera,
     object: &Object,
-    robot: &Hand,
+    hand: &Hand,
     truth: &Isometry3<f64>,
     t_cam_hand: &Isometry3<f64>,
     joints: &[f64],
     noise: &mut SplitMix64,
 ) -> (RgbImage, DepthImage, Mask) {
     let mut bodies = vec![SceneObject { model: &object.model, t_cam_model: *truth }];
-    for (model, t_cam_model) in robot.render_bodies(t_cam_hand, joints) {
+    for (model, t_cam_model) in hand.render_bodies(t_cam_hand, joints) {
         bodies.push(SceneObject { model, t_cam_model });
     }
     let toward = Vector3::new(-0.4, -0.7, -0.6).normalize();
@@ -52,18 +52,18 @@ pub(crate) fn render_rgbd(
 /// Force on each taxel \[N\], in its link's frame: the nearer the object, the more.
 pub(crate) fn feel(
     object: &Object,
-    robot: &Hand,
+    hand: &Hand,
     truth: &Isometry3<f64>,
     t_cam_hand: &Isometry3<f64>,
     joints: &[f64],
 ) -> Vec<Vector3<f64>> {
     let t_object_hand = truth.inverse() * t_cam_hand;
-    let links = robot.tree.forward_kinematics(joints);
+    let links = hand.tree.forward_kinematics(joints);
     let force = |taxel: &Taxel| {
-        let place = robot.tree.link_index(&taxel.link).and_then(|i| links.get(i))?;
+        let place = hand.tree.link_index(&taxel.link).and_then(|i| links.get(i))?;
         let point = t_object_hand * place * taxel.position;
         let (distance, _) = object.surface.signed_distance(&point);
         Some(-taxel.normal * (TOUCH_REACH - distance).max(0.0) / TOUCH_REACH)
     };
-    robot.taxels.iter().map(|t| force(t).unwrap_or_else(Vector3::zeros)).collect()
+    hand.taxels.iter().map(|t| force(t).unwrap_or_else(Vector3::zeros)).collect()
 }

@@ -9,7 +9,7 @@ use prehend_geometry::SplitMix64;
 
 use super::sensing::{feel, render_rgbd};
 use super::{Scene, default_scene};
-use crate::data::AssetError;
+use crate::error::RefineError;
 use crate::scene::{Hand, HandMeasurement, Object, Observation};
 
 /// One moment of a [`Sequence`].
@@ -27,7 +27,7 @@ pub struct Sequence {
     /// The object.
     pub object: Arc<Object>,
     /// The hand.
-    pub robot: Arc<Hand>,
+    pub hand: Arc<Hand>,
     /// A pose to start from in the first frame.
     pub initial: Isometry3<f64>,
     /// In order of time.
@@ -48,8 +48,8 @@ const SLIDE: f64 = 2e-3;
 ///
 /// # Errors
 /// If the built-in assets cannot be prepared.
-pub fn default_sequence(seed: u64, count: usize) -> Result<Sequence, AssetError> {
-    let Scene { observation, object, robot, truth, initial, .. } = default_scene(seed)?;
+pub fn default_sequence(seed: u64, count: usize) -> Result<Sequence, RefineError> {
+    let Scene { observation, object, hand, truth, initial, .. } = default_scene(seed)?;
     let (camera, gravity) = (observation.camera, observation.gravity);
     let (start, joints) = observation
         .hand
@@ -72,14 +72,14 @@ pub fn default_sequence(seed: u64, count: usize) -> Result<Sequence, AssetError>
         let t_hand_object = start.inverse() * truth;
         let truth = t_cam_hand * Isometry3::from(slide) * t_hand_object;
         let (color, depth, mask) =
-            render_rgbd(&camera, &object, &robot, &truth, &t_cam_hand, &joints, &mut noise);
-        let forces = feel(&object, &robot, &truth, &t_cam_hand, &joints);
+            render_rgbd(&camera, &object, &hand, &truth, &t_cam_hand, &joints, &mut noise);
+        let forces = feel(&object, &hand, &truth, &t_cam_hand, &joints);
         let hand = HandMeasurement { t_cam_hand, joints: joints.clone(), forces };
         let observation = Observation { camera, color, depth, mask, gravity, hand: Some(hand) };
         SequenceFrame { time, observation, truth }
     };
     let frames: Vec<SequenceFrame> = (0..count).map(frame).collect();
-    Ok(Sequence { object, robot, initial, frames })
+    Ok(Sequence { object, hand, initial, frames })
 }
 
 #[cfg(test)]

@@ -7,13 +7,12 @@ use prehend_geometry::sample::surface_samples;
 use prehend_render::{Camera, DepthImage};
 
 use crate::error::RefineError;
-use crate::factor::back_project;
-use crate::scene::{Hand, Observation};
+use crate::scene::{Frame, Observation};
 
 /// Depth points that normals are estimated from, at most.
 const POINTS: usize = 2500;
 /// Neighbors that a normal is estimated from.
-const NEIGHBOURS: usize = 24;
+const NEIGHBORS: usize = 24;
 /// Points on the hand's surface that the object must not reach.
 const HAND_POINTS: usize = 300;
 /// Columns at most of the map of what is seen where.
@@ -32,36 +31,30 @@ pub(super) struct Evidence {
 }
 
 impl Evidence {
-    /// What `observation` says; taxels with more than `contact_threshold` \[N\] are touched. `hand` is the depth image
-    /// of the hand alone.
+    /// What `frame` shows; taxels with more than `contact_threshold` \[N\] are touched.
     ///
     /// # Errors
     /// If no pixel of the mask has a depth, or forces and taxels do not match.
-    pub(super) fn new(
-        observation: &Observation,
-        robot: Option<&Hand>,
-        hand: &DepthImage,
-        contact_threshold: f64,
-    ) -> Result<Self, RefineError> {
-        let places = back_project(observation, POINTS)?;
+    pub(super) fn new(frame: &Frame<'_>, contact_threshold: f64) -> Result<Self, RefineError> {
+        let places = frame.masked_points(POINTS)?;
         let tree = KdTree::new(&places).map_err(|_| RefineError::NoDepth)?;
-        let normals = estimate_normals(&tree, NEIGHBOURS, &Point3::origin());
+        let normals = estimate_normals(&tree, NEIGHBORS, &Point3::origin());
         let (mut touched, mut outside) = (Vec::new(), Vec::new());
-        if let (Some(robot), Some(reading)) = (robot, &observation.hand) {
+        if let Some((robot, reading)) = frame.hand() {
+            if !reading.forces.is_empty() {
+                robot.check_forces(&reading.forces)?;
+            }
             let posed = robot.posed(&reading.t_cam_hand, &reading.joints)?;
             let surface = surface_samples(&posed.mesh(), HAND_POINTS, 0);
             outside.extend(surface.iter().map(|s| s.point));
             for (taxel, force) in robot.taxels.iter().zip(&reading.forces) {
-                let link = robot.tree.link_index(&taxel.link);
-                let link = link.and_then(|i| posed.t_world_links().get(i));
-                let link =
-                    link.ok_or_else(|| RefineError::TaxelLink { link: taxel.link.clone() })?;
+                let link = posed.t_world_links()[robot.link_of(taxel)?];
                 let list =
                     if force.norm() > contact_threshold { &mut touched } else { &mut outside };
                 list.push(link * taxel.position);
             }
         }
-        let map = SightMap::new(observation, hand);
+        let map = SightMap::new(frame.observation(), frame.hand_depth());
         Ok(Self {
             points: shuffled(places.into_iter().zip(normals).collect()),
             touched,
@@ -188,14 +181,13 @@ fn measure_away(pixels: &mut [Sight], width: usize) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::refine::hand_depth;
     use crate::scene::default_scene;
 
     #[test]
     fn the_truth_is_in_no_conflict_and_a_shifted_pose_is() {
         let scene = default_scene(1).unwrap();
-        let hand = hand_depth(&scene.observation, Some(&scene.robot));
-        let evidence = Evidence::new(&scene.observation, Some(&scene.robot), &hand, 0.1).unwrap();
+        let frame = Frame::new(&scene.observation, &scene.object, Some(&scene.hand)).unwrap();
+        let evidence = Evidence::new(&frame, 0.1).unwrap();
         assert!(evidence.points.len() > 1000 && evidence.touched.len() > 3);
         let mean = |shift: Vector3<f64>| {
             let facing = scene.object.samples.iter().filter_map(|s| {

@@ -20,17 +20,15 @@ use self::fine::FineScorer;
 use self::lattice::DistanceLattice;
 use self::rough::CoarseScorer;
 use crate::error::RefineError;
-use crate::problem::State;
-use crate::refine::hand_depth;
-use crate::scene::{Hand, Object, Observation};
+use crate::scene::{Frame, Object};
 
 /// A pose that a search ends with.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Found {
+pub struct PoseCandidate {
     /// Object coordinates → camera coordinates \[m\].
     pub t_cam_object: Isometry3<f64>,
-    /// The sum of the terms there \[nats\]; the lower the better.
-    pub value: f64,
+    /// The sum of the costs there \[nat\]; the lower the better.
+    pub cost: f64,
 }
 
 /// Visuo-tactile global search: finds an object without any initial pose, training or randomness.
@@ -72,38 +70,20 @@ impl PoseSearch {
         Ok(Self { object, lattice, settings })
     }
 
-    /// Searches in `observation`; the best pose comes first, and others that differ from it follow.
+    /// Searches in `frame`, which must be of this object; the best pose comes first, and others that differ from it follow.
     ///
     /// # Errors
-    /// If no pixel of the mask has a depth, no pose fits at all, the images do not fit each other, or the hand's joints or forces
-    /// do not fit the robot.
-    pub fn run(
-        &self,
-        observation: &Observation,
-        robot: Option<&Arc<Hand>>,
-    ) -> Result<Vec<Found>, RefineError> {
+    /// If no pixel of the mask has a depth, no pose fits at all, or the hand's forces do not fit its skin.
+    pub fn run(&self, frame: &Frame<'_>) -> Result<Vec<PoseCandidate>, RefineError> {
         let settings = &self.settings;
-        // The checks that every refinement makes.
-        State::new(observation, &self.object, &Isometry3::translation(0.0, 0.0, 1e3))?;
-        if let (Some(robot), Some(hand)) = (robot, &observation.hand) {
-            robot.check_joints(&hand.joints)?;
-            let (forces, taxels) = (hand.forces.len(), robot.taxels.len());
-            if forces > 0 && forces != taxels {
-                return Err(RefineError::TaxelCount { forces, taxels });
-            }
-        }
-        let hand = Arc::new(hand_depth(observation, robot.map(Arc::as_ref)));
-        let evidence =
-            Evidence::new(observation, robot.map(Arc::as_ref), &hand, settings.contact_threshold)?;
+        let evidence = Evidence::new(frame, settings.contact_threshold)?;
         let rough =
             CoarseScorer { object: &self.object, lattice: &self.lattice, evidence: &evidence };
         let placed = self.place(&rough);
         let turned = self.turn(&rough, &placed);
-        let judge = |resolution| {
-            FineScorer::new(observation, &self.object, robot, &hand, resolution, settings)
-        };
+        let judge = |resolution| FineScorer::new(frame, resolution, settings);
         let coarse = judge(settings.coarse_resolution)?;
-        let seen = evaluate(&turned, |pose| (*pose, coarse.value(pose)));
+        let seen = evaluate(&turned, |pose| (*pose, coarse.cost(pose)));
         let seen = distinct(seen, settings.seen, 6e-3, 6.0);
         let middle = judge(settings.middle_resolution)?;
         let moved = evaluate(&seen, |pose| middle.descend(pose, settings.middle_steps));
@@ -114,7 +94,10 @@ impl PoseSearch {
         if last.is_empty() {
             return Err(RefineError::NothingFits);
         }
-        Ok(last.into_iter().map(|(t_cam_object, value)| Found { t_cam_object, value }).collect())
+        Ok(last
+            .into_iter()
+            .map(|(t_cam_object, cost)| PoseCandidate { t_cam_object, cost })
+            .collect())
     }
 
     /// Stage 1.

@@ -2,10 +2,10 @@
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, UnitQuaternion, Vector3, Vector6};
 use prehend_autodiff::lie::perturb_about;
+use prehend_geometry::RobustKernel;
 
 use super::evidence::Evidence;
 use super::lattice::DistanceLattice;
-use crate::problem::Cauchy;
 use crate::scene::Object;
 
 /// What a mismatch of normals by one radian counts as \[m\].
@@ -121,7 +121,7 @@ impl CoarseScorer<'_> {
         scale: f64,
         slide: bool,
     ) -> (Vector6<f64>, Matrix6<f64>) {
-        let cauchy = Cauchy { scale };
+        let kernel = RobustKernel::Cauchy { scale };
         let inverse = pose.inverse();
         let (mut gradient, mut matrix) = (Vector6::zeros(), Matrix6::zeros());
         let mut add = |p: &Point3<f64>, share: f64, inside_only: bool| {
@@ -131,7 +131,7 @@ impl CoarseScorer<'_> {
             }
             // The surface moves with the object: the distance of a fixed point changes the other way.
             let n = -(pose.rotation * g);
-            let w = share * cauchy.weight(distance * distance);
+            let w = share * kernel.weight(distance * distance);
             let turn = if slide { Vector3::zeros() } else { (p.coords - center).cross(&n) };
             let row = Vector6::new(n.x, n.y, n.z, turn.x, turn.y, turn.z);
             gradient += row * (w * distance);

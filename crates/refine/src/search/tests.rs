@@ -1,13 +1,13 @@
 use super::*;
 use crate::evaluate::metrics::{oe_deg, pe_cm};
-use crate::scene::{Scene, default_scene};
+use crate::scene::{Observation, Scene, default_scene};
 use std::sync::LazyLock;
 
 static SCENE: LazyLock<Scene> = LazyLock::new(|| default_scene(1).unwrap());
 
-fn search(settings: SearchSettings) -> Result<Vec<Found>, RefineError> {
-    PoseSearch::new(Arc::clone(&SCENE.object), settings)?
-        .run(&SCENE.observation, Some(&SCENE.robot))
+fn search(settings: SearchSettings) -> Result<Vec<PoseCandidate>, RefineError> {
+    let frame = Frame::new(&SCENE.observation, &SCENE.object, Some(&SCENE.hand))?;
+    PoseSearch::new(Arc::clone(&SCENE.object), settings)?.run(&frame)
 }
 
 #[test]
@@ -16,7 +16,7 @@ fn the_bottle_is_found_from_sensors_alone() {
     let best = &found[0].t_cam_object;
     let (pe, oe) = (pe_cm(best, &SCENE.truth), oe_deg(best, &SCENE.truth));
     assert!(pe < 0.3 && oe < 3.0, "{pe} cm, {oe}°");
-    assert!(found.windows(2).all(|f| f[0].value <= f[1].value));
+    assert!(found.windows(2).all(|f| f[0].cost <= f[1].cost));
 }
 
 #[test]
@@ -24,7 +24,8 @@ fn vision_alone_finds_it_too() {
     let mut observation = SCENE.observation.clone();
     observation.hand = None;
     let search = PoseSearch::new(Arc::clone(&SCENE.object), SearchSettings::default()).unwrap();
-    let best = search.run(&observation, None).unwrap()[0].t_cam_object;
+    let frame = Frame::new(&observation, &SCENE.object, None).unwrap();
+    let best = search.run(&frame).unwrap()[0].t_cam_object;
     let (pe, oe) = (pe_cm(&best, &SCENE.truth), oe_deg(&best, &SCENE.truth));
     assert!(pe < 0.3 && oe < 3.0, "{pe} cm, {oe}°");
 }
@@ -53,12 +54,11 @@ fn bad_input_is_an_error() {
     let refused = |change: &dyn Fn(&mut Observation)| {
         let mut observation = SCENE.observation.clone();
         change(&mut observation);
-        search.run(&observation, Some(&SCENE.robot)).unwrap_err()
+        let frame = Frame::new(&observation, &SCENE.object, Some(&SCENE.hand)).unwrap();
+        search.run(&frame).unwrap_err()
     };
     let dark = refused(&|o| o.depth.pixels_mut().fill(0.0));
     assert!(matches!(dark, RefineError::NoDepth));
-    let empty = refused(&|o| o.mask.pixels_mut().fill(false));
-    assert!(matches!(empty, RefineError::EmptyMask));
     let forces = refused(&|o| {
         o.hand.as_mut().unwrap().forces.pop();
     });

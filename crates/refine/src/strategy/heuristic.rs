@@ -1,30 +1,64 @@
 //! The paper's heuristic: a candidate step along every gradient, weighted by what each one achieves.
 
+use std::fmt;
+use std::str::FromStr;
+use std::sync::Arc;
+
 use nalgebra::Vector6;
-use prehend_render::Light;
 use rayon::prelude::*;
 
+use super::estimate::Recorder;
 use super::step::preconditioned_step;
-use crate::factor::Term;
-use crate::problem::{Block, Normal, State};
-use crate::strategy::{Iteration, Trace};
+use super::{Estimate, Iteration, Observer, Strategy};
+use crate::error::RefineError;
+use crate::factor::{
+    ChamferDepthFactor, ChamferDepthSettings, RenderingFactor, RenderingSettings, StabilityFactor,
+    StabilitySettings, TactileFactor, TactileSettings,
+};
+use crate::problem::{Block, Factor, NormalEquations, State};
+use crate::scene::Frame;
 
-/// Settings of the heuristic.
-#[derive(Clone, Debug, PartialEq)]
-pub struct HeuristicSettings {
-    /// Iterations at most.
-    pub iterations: usize,
-    /// Length of the first candidate steps \[m\]; a rotation counts by how far it moves the object's surface.
-    pub first_step: f64,
-    /// The search ends when candidate steps are shorter than this \[m\].
-    pub last_step: f64,
-    /// Always run all the iterations, however small the steps become.
-    pub exhaustive: bool,
+/// One of the paper's four gradients.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum GradientKind {
+    /// Stability of the grasp, by simulation: [`StabilityFactor`].
+    Physics,
+    /// Color and silhouette: [`RenderingFactor`].
+    Rendering,
+    /// Depth points: [`ChamferDepthFactor`].
+    Depth,
+    /// Taxels: [`TactileFactor`].
+    Tactile,
 }
 
-impl Default for HeuristicSettings {
-    fn default() -> Self {
-        Self { iterations: 400, first_step: 5e-3, last_step: 2e-6, exhaustive: false }
+impl GradientKind {
+    /// All four, in the order of the paper.
+    pub const ALL: [Self; 4] = [Self::Physics, Self::Rendering, Self::Depth, Self::Tactile];
+
+    /// The name used in reports and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Physics => "physics",
+            Self::Rendering => "rendering",
+            Self::Depth => "depth",
+            Self::Tactile => "tactile",
+        }
+    }
+}
+
+impl fmt::Display for GradientKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for GradientKind {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        Self::ALL.into_iter().find(|k| k.name() == text).ok_or_else(|| {
+            format!("unknown term {text:?}: one of physics, rendering, depth, tactile")
+        })
     }
 }
 
@@ -36,55 +70,116 @@ impl Default for HeuristicSettings {
 ///
 /// - *Scales of the gradients.* A step is −(Hᵢ + μ)⁻¹ gᵢ with the term's own Gauss–Newton matrix Hᵢ, so
 ///   translations and rotations of any term come out in the right proportion.
-/// - *Scales of the losses.* Terms are in nats ([`Term`]), so that ΔLᵢ of different terms compare.
+/// - *Scales of the losses.* Terms are in nats ([`Factor`]), so that ΔLᵢ of different terms compare.
 /// - *Step lengths.* Steps are at most a common length that grows by a tenth while the sum of the terms
 ///   reaches new lows, shrinks by a tenth when it does not, and by half when nothing improves. Without it
 ///   the terms take turns in pulling the pose all the way to their own optimum, and the weights, which
 ///   always sum to one, never let it rest.
+#[derive(Clone)]
 pub struct Heuristic {
-    /// Settings.
-    pub settings: HeuristicSettings,
+    /// Gradients to use.
+    pub gradients: Vec<GradientKind>,
+    /// Return the pose of lowest rendering cost seen, instead of the last one.
+    pub checkpoint: bool,
+    /// Iterations at most.
+    pub iterations: usize,
+    /// Length of the first candidate steps \[m\]; a rotation counts by how far it moves the object's surface.
+    pub first_step: f64,
+    /// The walk ends when candidate steps are shorter than this \[m\].
+    pub step_tolerance: f64,
+    /// Always run all the iterations, however small the steps become.
+    pub exhaustive: bool,
+    /// Of the physics gradient.
+    pub stability: StabilitySettings,
+    /// Of the rendering gradient, and of the checkpoint.
+    pub rendering: RenderingSettings,
+    /// Of the depth gradient.
+    pub depth: ChamferDepthSettings,
+    /// Of the tactile gradient.
+    pub tactile: TactileSettings,
+    /// Factors of one's own.
+    pub factors: Vec<Arc<dyn Factor>>,
 }
 
 impl Heuristic {
-    /// Walks from `state`, calling `visit` at every pose; `radius` is the object's \[m\].
+    /// Over some gradients; returns the last pose.
+    pub fn of(gradients: &[GradientKind]) -> Self {
+        Self {
+            gradients: gradients.to_vec(),
+            checkpoint: false,
+            iterations: 400,
+            first_step: 5e-3,
+            step_tolerance: 2e-6,
+            exhaustive: false,
+            stability: StabilitySettings::default(),
+            rendering: RenderingSettings::default(),
+            depth: ChamferDepthSettings::default(),
+            tactile: TactileSettings::default(),
+            factors: Vec::new(),
+        }
+    }
+
+    /// The paper's method: all four gradients; returns the pose whose rendering fits best.
+    pub fn combined() -> Self {
+        Self { checkpoint: true, ..Self::of(&GradientKind::ALL) }
+    }
+
+    /// With a factor of one's own.
+    pub fn with(mut self, factor: impl Factor + 'static) -> Self {
+        self.factors.push(Arc::new(factor));
+        self
+    }
+
+    /// The factors of a frame, in the order of the gradients, then one's own.
     ///
-    /// Ends when `visit` returns false.
-    pub fn run(
+    /// # Errors
+    /// If the frame lacks what one of them needs.
+    pub fn factors(
         &self,
-        terms: &[Box<dyn Term>],
+        frame: &Frame<'_>,
+        initial: &State,
+    ) -> Result<Vec<Arc<dyn Factor>>, RefineError> {
+        let factor = |kind: &GradientKind| -> Result<Arc<dyn Factor>, RefineError> {
+            Ok(match kind {
+                GradientKind::Physics => {
+                    Arc::new(StabilityFactor::new(frame, initial, self.stability.clone())?)
+                }
+                GradientKind::Rendering => Arc::new(RenderingFactor::new(frame, &self.rendering)?),
+                GradientKind::Depth => Arc::new(ChamferDepthFactor::new(frame, &self.depth)?),
+                GradientKind::Tactile => Arc::new(TactileFactor::new(frame, &self.tactile)?),
+            })
+        };
+        let mut factors: Vec<_> = self.gradients.iter().map(factor).collect::<Result<_, _>>()?;
+        factors.extend(self.factors.iter().cloned());
+        if factors.is_empty() { Err(RefineError::NoFactors) } else { Ok(factors) }
+    }
+
+    /// Walks from `state`, down `factors`; `radius` is the object's \[m\].
+    fn walk(
+        &self,
+        factors: &[Arc<dyn Factor>],
         mut state: State,
         radius: f64,
-        mut visit: impl FnMut(&State, &Iteration) -> bool,
-    ) -> Trace {
-        let settings = &self.settings;
-        let mut trace = Trace::new(terms.iter().map(|t| t.name()));
-        let mut length = settings.first_step;
+        recorder: &mut Recorder<'_, '_>,
+    ) {
+        let mut length = self.first_step;
         let mut least = f64::INFINITY;
-        for index in 0..=settings.iterations {
-            let candidates: Vec<Candidate> = terms
+        for index in 0..=self.iterations {
+            let candidates: Vec<Candidate> = factors
                 .par_iter()
-                .map(|t| Candidate::of(t.as_ref(), &state, radius, length))
+                .map(|factor| Candidate::of(factor.as_ref(), &state, radius, length))
                 .collect();
-            if let Some(light) = candidates.iter().find_map(|c| c.light) {
-                state.light = light;
-            }
-            let total: f64 = candidates.iter().map(|c| c.value).sum();
+            let total: f64 = candidates.iter().map(|c| c.cost).sum();
             let gain: f64 = candidates.iter().map(Candidate::gain).sum();
-            let weights = candidates.iter().map(|c| if gain > 0.0 { c.gain() / gain } else { 0.0 });
-            let iteration = Iteration {
-                index,
-                values: candidates.iter().map(|c| c.value).collect(),
-                weights: weights.collect(),
-                step: length,
-            };
-            let go_on = visit(&state, &iteration);
+            let weight = |c: &Candidate| if gain > 0.0 { c.gain() / gain } else { 0.0 };
+            let weights: Vec<f64> = candidates.iter().map(weight).collect();
             let step: Vector6<f64> =
-                iteration.weights.iter().zip(&candidates).map(|(&a, c)| c.step * a).sum();
-            trace.iterations.push(iteration);
+                weights.iter().zip(&candidates).map(|(&a, c)| c.step * a).sum();
+            let values = candidates.iter().map(|c| c.cost).collect();
+            let go_on = recorder.visit(&state, Iteration { index, values, weights, step: length });
             let longest = candidates.iter().map(|c| c.length).fold(0.0, f64::max);
-            let done = length.min(longest) < settings.last_step;
-            if !go_on || (done && !settings.exhaustive) {
+            let done = length.min(longest) < self.step_tolerance;
+            if go_on.is_break() || (done && !self.exhaustive) {
                 break;
             }
             length *= match gain > 0.0 {
@@ -92,110 +187,144 @@ impl Heuristic {
                 true => 0.9,
                 false => 0.5,
             };
-            length = length.clamp(0.5 * settings.last_step, settings.first_step);
+            length = length.clamp(0.5 * self.step_tolerance, self.first_step);
             least = least.min(total);
-            state = state.moved(Block::ObjectPose, step.as_slice());
+            state = state.retract(&[Block::ObjectPose], step.as_slice());
         }
-        trace
     }
 }
 
-/// A step along one term's gradient and what it does to that term.
+impl Strategy for Heuristic {
+    fn run(
+        &self,
+        frame: &Frame<'_>,
+        initial: &State,
+        observe: &mut Observer<'_>,
+    ) -> Result<Estimate, RefineError> {
+        let factors = self.factors(frame, initial)?;
+        let judge = Recorder::judge(frame, self.checkpoint, &self.rendering)?;
+        // The gradients' names rather than the factors', as options and files have them.
+        let gradients = self.gradients.iter().map(|gradient| gradient.name());
+        let names = gradients.chain(self.factors.iter().map(|factor| factor.name()));
+        let mut recorder = Recorder::new(names, initial, self.iterations, judge, observe);
+        self.walk(&factors, initial.clone(), frame.object().radius, &mut recorder);
+        Ok(recorder.estimate(None))
+    }
+
+    fn iterations(&self) -> usize {
+        self.iterations
+    }
+}
+
+impl fmt::Debug for Heuristic {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Heuristic")
+            .field("gradients", &self.gradients)
+            .field("checkpoint", &self.checkpoint)
+            .field("iterations", &self.iterations)
+            .field("first_step", &self.first_step)
+            .field("step_tolerance", &self.step_tolerance)
+            .field("exhaustive", &self.exhaustive)
+            .field("stability", &self.stability)
+            .field("rendering", &self.rendering)
+            .field("depth", &self.depth)
+            .field("tactile", &self.tactile)
+            .field("factors", &self.factors.iter().map(|factor| factor.name()).collect::<Vec<_>>())
+            .finish()
+    }
+}
+
+/// A step along one factor's gradient and what it does to that factor.
 struct Candidate {
-    /// Light under which the term is judged, if it sees any.
-    light: Option<Light>,
-    value: f64,
-    value_after: f64,
+    cost: f64,
+    cost_after: f64,
     step: Vector6<f64>,
     /// Length of `step`, where a rotation counts by how far it moves the object's surface \[m\].
     length: f64,
 }
 
 impl Candidate {
-    fn of(term: &dyn Term, state: &State, radius: f64, length: f64) -> Self {
-        let light = term.light(state);
-        let state = &State { light: light.unwrap_or(state.light), ..state.clone() };
-        let mut normal = Normal::new(&[Block::ObjectPose]);
-        let value = term.linearize(state, &mut normal);
-        let (step, length) = preconditioned_step(&normal, radius, length);
-        let value_after = term.value(&state.moved(Block::ObjectPose, step.as_slice()));
-        Self { light, value, value_after, step, length }
+    fn of(factor: &dyn Factor, state: &State, radius: f64, length: f64) -> Self {
+        let mut equations = NormalEquations::new(&[Block::ObjectPose]);
+        let cost = factor.linearize(state, &mut equations);
+        let (step, length) = preconditioned_step(&equations, radius, length);
+        let cost_after = factor.cost(&state.retract(&[Block::ObjectPose], step.as_slice()));
+        Self { cost, cost_after, step, length }
     }
 
-    /// How much the step improves the term's own value; 0 if it does not.
+    /// How much the step improves the factor's own cost; 0 if it does not.
     fn gain(&self) -> f64 {
-        let gain = self.value - self.value_after;
+        let gain = self.cost - self.cost_after;
         if gain.is_finite() { gain.max(0.0) } else { 0.0 }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::{Isometry3, Matrix6, Point3, Vector3};
+    use std::ops::ControlFlow;
+
+    use nalgebra::{Isometry3, Point3, Vector3};
 
     use super::*;
+    use crate::problem::{NoiseModel, Rows};
     use crate::scene::CameraCalibrationError;
+    use crate::strategy::Trace;
 
     /// Half the squared distance of the object from a place, over a variance.
     struct Spring {
         place: Vector3<f64>,
-        precision: f64,
+        noise: NoiseModel,
     }
 
-    impl Term for Spring {
+    impl Factor for Spring {
         fn name(&self) -> &'static str {
             "spring"
         }
 
-        fn value(&self, state: &State) -> f64 {
-            0.5 * self.precision * (state.center() - self.place).norm_squared()
-        }
-
-        fn linearize(&self, state: &State, normal: &mut Normal) -> f64 {
-            let offset = (state.center() - self.place) * self.precision;
-            let mut gradient = Vector6::zeros();
-            gradient.fixed_rows_mut::<3>(0).copy_from(&offset);
-            let mut hessian = Matrix6::zeros();
-            (0..3).for_each(|k| hessian[(k, k)] = self.precision);
-            normal.add(&[Block::ObjectPose], &gradient, &hessian);
-            self.value(state)
+        fn rows(&self, state: &State, rows: &mut Rows<'_>) {
+            let offset = state.center() - self.place;
+            for k in 0..3 {
+                rows.add(offset[k], &self.noise.weighting(1), |row| {
+                    row.parameter(Block::ObjectPose, k, 1.0);
+                });
+            }
         }
     }
 
-    fn spring(x: f64, sigma: f64) -> Box<dyn Term> {
-        Box::new(Spring { place: Vector3::new(x, 0.0, 0.5), precision: sigma.powi(-2) })
+    fn spring(x: f64, sigma: f64) -> Arc<dyn Factor> {
+        let noise = NoiseModel::gaussian(sigma);
+        Arc::new(Spring { place: Vector3::new(x, 0.0, 0.5), noise })
     }
 
-    fn run(terms: &[Box<dyn Term>], settings: HeuristicSettings) -> (State, Trace) {
+    fn run(factors: &[Arc<dyn Factor>], heuristic: &Heuristic) -> (State, Trace) {
         let start = State {
             t_cam_object: Isometry3::translation(0.03, 0.01, 0.5),
             object_center: Point3::origin(),
             t_cam_hand: Isometry3::identity(),
             joints: Vec::new(),
             camera: CameraCalibrationError::default(),
-            light: Light::ambient(1.0),
         };
-        let mut last = start.clone();
-        let trace = Heuristic { settings }.run(terms, start, 0.1, |state, _| {
-            last = state.clone();
-            true
-        });
-        (last, trace)
+        let names = factors.iter().map(|factor| factor.name());
+        let mut observe = |_: &_| ControlFlow::Continue(());
+        let mut recorder = Recorder::new(names, &start, 0, None, &mut observe);
+        heuristic.walk(factors, start.clone(), 0.1, &mut recorder);
+        let estimate = recorder.estimate(None);
+        (estimate.state, estimate.trace)
     }
 
     #[test]
-    fn one_term_is_minimized() {
-        let (state, trace) = run(&[spring(0.0, 1e-3)], HeuristicSettings::default());
+    fn one_factor_is_minimized() {
+        let (state, trace) = run(&[spring(0.0, 1e-3)], &Heuristic::of(&[]));
         assert!((state.center() - Vector3::new(0.0, 0.0, 0.5)).norm() < 1e-5);
         assert!(trace.iterations.len() < 60);
         assert_eq!(trace.iterations[0].weights, [1.0]);
     }
 
     #[test]
-    fn terms_that_disagree_come_to_rest_near_the_minimum_of_their_sum() {
+    fn factors_that_disagree_come_to_rest_near_the_minimum_of_their_sum() {
         // The sum is least at 0.01 · (1/3²) / (1/1² + 1/3²) = 1 mm.
-        let terms = [spring(0.0, 1e-3), spring(0.01, 3e-3)];
-        let (state, trace) = run(&terms, HeuristicSettings::default());
+        let factors = [spring(0.0, 1e-3), spring(0.01, 3e-3)];
+        let (state, trace) = run(&factors, &Heuristic::of(&[]));
         assert!((state.center().x - 1e-3).abs() < 1e-4, "{}", state.center().x);
         let sum: f64 = trace.iterations.iter().map(|i| i.weights.iter().sum::<f64>()).sum();
         assert!((sum - trace.iterations.len() as f64).abs() < 1.0);
@@ -203,8 +332,7 @@ mod tests {
 
     #[test]
     fn exhaustive_runs_use_every_iteration() {
-        let settings =
-            HeuristicSettings { iterations: 80, exhaustive: true, ..HeuristicSettings::default() };
-        assert_eq!(run(&[spring(0.0, 1e-3)], settings).1.iterations.len(), 81);
+        let heuristic = Heuristic { iterations: 80, exhaustive: true, ..Heuristic::of(&[]) };
+        assert_eq!(run(&[spring(0.0, 1e-3)], &heuristic).1.iterations.len(), 81);
     }
 }

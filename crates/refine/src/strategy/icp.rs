@@ -1,35 +1,16 @@
 //! The paper's first baseline: point-to-point iterative closest points.
 
 use nalgebra::{Point3, Vector3};
-use prehend_geometry::icp::{Match, Metric, NormalEquations};
-use prehend_geometry::{KdTree, RobustKernel};
+use prehend_geometry::{KdTree, RobustKernel, icp};
 use rayon::prelude::*;
 
-use super::step::preconditioned_step;
-use super::walk::{Advance, walk};
+use super::estimate::Recorder;
+use super::step::{StepRule, walk};
+use super::{Estimate, Observer, Strategy};
 use crate::error::RefineError;
-use crate::factor::back_project;
-use crate::problem::{Block, Normal, State};
-use crate::scene::{Object, Observation};
-use crate::strategy::{Iteration, Trace};
-
-/// Settings of [`Icp`].
-#[derive(Clone, Debug, PartialEq)]
-pub struct IcpSettings {
-    /// Iterations at most; as many as the other methods have.
-    pub iterations: usize,
-    /// Depth points used at most, spread evenly over the mask.
-    pub points: usize,
-    /// The search ends when a step is shorter than this \[m\]; a rotation counts by how far it moves the object's
-    /// surface.
-    pub last_step: f64,
-}
-
-impl Default for IcpSettings {
-    fn default() -> Self {
-        Self { iterations: 400, points: 1500, last_step: 2e-6 }
-    }
-}
+use crate::factor::RenderingSettings;
+use crate::problem::{Block, NormalEquations, State};
+use crate::scene::Frame;
 
 /// Point-to-point ICP (Besl and McKay, 1992) between the masked depth points P and the whole surface of the model.
 ///
@@ -38,28 +19,42 @@ impl Default for IcpSettings {
 /// depth point. Then it makes the Gauss–Newton step of the mean squared distance of all pairs, both ways counting
 /// the same. Nothing is known of what the camera can see: samples on the far side and behind fingers are
 /// matched too and drag the object towards the camera, which makes this the weak baseline that it is in the paper.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Icp {
-    /// Settings.
-    pub settings: IcpSettings,
+    /// Iterations at most; as many as the other methods have.
+    pub iterations: usize,
+    /// Depth points used at most, spread evenly over the mask.
+    pub points: usize,
+    /// The walk ends when a step is shorter than this \[m\]; a rotation counts by how far it moves the object's
+    /// surface.
+    pub step_tolerance: f64,
+    /// Return the pose of lowest rendering cost seen, instead of the last one.
+    pub checkpoint: bool,
 }
 
-impl Icp {
-    /// Walks from `state`, calling `visit` at every pose; ends when that returns false. The trace's value is Eq. 2
-    /// over the samples \[m²\].
-    ///
-    /// # Errors
-    /// If no pixel of the mask has a depth.
-    pub fn run(
+impl Default for Icp {
+    fn default() -> Self {
+        Self { iterations: 400, points: 1500, step_tolerance: 2e-6, checkpoint: false }
+    }
+}
+
+impl Strategy for Icp {
+    /// The trace's value is Eq. 2 over the samples \[m²\].
+    fn run(
         &self,
-        observation: &Observation,
-        object: &Object,
-        state: State,
-        visit: impl FnMut(&State, &Iteration) -> bool,
-    ) -> Result<Trace, RefineError> {
-        let IcpSettings { iterations, points, last_step } = self.settings;
-        let cloud = KdTree::new(&back_project(observation, points)?);
+        frame: &Frame<'_>,
+        initial: &State,
+        observe: &mut Observer<'_>,
+    ) -> Result<Estimate, RefineError> {
+        let object = frame.object();
+        let cloud = KdTree::new(&frame.masked_points(self.points)?);
         let cloud = cloud.map_err(|_| RefineError::NoDepth)?;
-        let advance = |state: &State, _| {
+        let judge = Recorder::judge(frame, self.checkpoint, &RenderingSettings::default())?;
+        let names = std::iter::once("icp");
+        let mut recorder = Recorder::new(names, initial, self.iterations, judge, observe);
+        let rule =
+            StepRule { iterations: self.iterations, tolerance: self.step_tolerance, damping: 1e-3 };
+        walk(&mut recorder, initial.clone(), object.radius, &rule, |state, _, equations| {
             let t_object_cam = state.t_cam_object.inverse();
             let to_mesh = pairs(cloud.points(), |p| {
                 let closest = object.surface.closest(&(t_object_cam * p), f64::INFINITY)?;
@@ -70,12 +65,13 @@ impl Icp {
                 let nearest = cloud.nearest(&surface, f64::INFINITY)?;
                 Some((surface, cloud.points()[nearest.index]))
             });
-            let mut normal = Normal::new(&[Block::ObjectPose]);
-            let value = add(&mut normal, state, &to_mesh) + add(&mut normal, state, &to_cloud);
-            let step = preconditioned_step(&normal, object.radius, f64::INFINITY);
-            Advance { value, step }
-        };
-        Ok(walk("icp", state, iterations, last_step, advance, visit))
+            add(equations, state, &to_mesh) + add(equations, state, &to_cloud)
+        });
+        Ok(recorder.estimate(None))
+    }
+
+    fn iterations(&self) -> usize {
+        self.iterations
     }
 }
 
@@ -88,22 +84,27 @@ fn pairs<T: Sync>(
 }
 
 /// Adds the mean squared distance of `pairs` \[m²\] with its derivatives, and returns it.
-fn add(normal: &mut Normal, state: &State, pairs: &[(Point3<f64>, Point3<f64>)]) -> f64 {
+fn add(
+    equations: &mut NormalEquations,
+    state: &State,
+    pairs: &[(Point3<f64>, Point3<f64>)],
+) -> f64 {
     let center = state.center().into();
-    let mut sums = NormalEquations::new();
+    let mut sums = icp::NormalEquations::new();
     for (surface, cloud) in pairs {
-        let target = Match { point: *cloud, normal: Vector3::zeros() };
-        sums.add(Metric::PointToPoint, RobustKernel::Squared, surface, &target, &center);
+        let target = icp::Match { point: *cloud, normal: Vector3::zeros() };
+        sums.add(icp::Metric::PointToPoint, RobustKernel::Squared, surface, &target, &center);
     }
     // The sums are of half the squares.
     let share = 2.0 / pairs.len().max(1) as f64;
-    normal.add(&[Block::ObjectPose], &(sums.gradient * share), &(sums.matrix * share));
-    sums.cost * share
+    let sums = sums.quadratic;
+    equations.add(&[Block::ObjectPose], &(sums.gradient * share), &(sums.hessian * share));
+    sums.value * share
 }
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::Vector6;
+    use std::ops::ControlFlow;
 
     use super::*;
     use crate::evaluate::metrics::{oe_deg, pe_cm};
@@ -112,23 +113,16 @@ mod tests {
     #[test]
     fn it_descends_and_its_own_optimum_is_not_the_truth() {
         let scene = default_scene(1).unwrap();
-        let start = State::new(&scene.observation, &scene.object, &scene.truth).unwrap();
-        let start = start
-            .moved(Block::ObjectPose, Vector6::new(4e-3, -3e-3, 5e-3, 0.05, 0.0, 0.04).as_slice());
-        let mut last = start.clone();
-        let icp = Icp { settings: IcpSettings::default() };
-        let trace = icp
-            .run(&scene.observation, &scene.object, start, |state, _| {
-                last = state.clone();
-                true
-            })
-            .unwrap();
-        let values: Vec<f64> = trace.iterations.iter().map(|i| i.values[0]).collect();
+        let frame = Frame::new(&scene.observation, &scene.object, Some(&scene.hand)).unwrap();
+        let start = State::new(&frame, &scene.truth).unwrap();
+        let start = start.retract(&[Block::ObjectPose], &[4e-3, -3e-3, 5e-3, 0.05, 0.0, 0.04]);
+        let found = Icp::default().run(&frame, &start, &mut |_| ControlFlow::Continue(())).unwrap();
+        let values: Vec<f64> = found.trace.iterations.iter().map(|i| i.values[0]).collect();
         // Closest points are matched anew at each step, so the value hardly ever rises.
         assert!(values.windows(2).all(|v| v[1] <= v[0] * (1.0 + 1e-3)), "{values:?}");
         assert!(values[values.len() - 1] < 0.9 * values[0]);
-        let (pe, oe) =
-            (pe_cm(&last.t_cam_object, &scene.truth), oe_deg(&last.t_cam_object, &scene.truth));
+        let pose = found.t_cam_object();
+        let (pe, oe) = (pe_cm(pose, &scene.truth), oe_deg(pose, &scene.truth));
         // Matched with what cannot be seen, it leaves even a good pose.
         assert!(pe > 0.5 && pe < 10.0, "{pe} cm, {oe}°");
     }
@@ -138,9 +132,9 @@ mod tests {
         let scene = default_scene(1).unwrap();
         let mut observation = scene.observation.clone();
         observation.depth.pixels_mut().fill(0.0);
-        let start = State::new(&observation, &scene.object, &scene.truth).unwrap();
-        let icp = Icp { settings: IcpSettings::default() };
-        let refused = icp.run(&observation, &scene.object, start, |_, _| true);
+        let frame = Frame::new(&observation, &scene.object, None).unwrap();
+        let start = State::new(&frame, &scene.truth).unwrap();
+        let refused = Icp::default().run(&frame, &start, &mut |_| ControlFlow::Continue(()));
         assert!(matches!(refused, Err(RefineError::NoDepth)));
     }
 }

@@ -1,20 +1,20 @@
-//! Ways from an initial pose to a refined one.
+//! Ways from an initial pose to a refined one, one a file: each implements [`Strategy`].
 
+mod estimate;
 mod fused;
 mod heuristic;
 mod icp;
 mod robust_icp;
 mod step;
 mod trace;
-mod walk;
 
+pub use estimate::{Estimate, Observer, Progress, Strategy};
 pub use fused::{
-    CovarianceInflation, Evidence, Fused, FusedSettings, Hypothesis, Inconsistency, Nuisance,
-    Posterior, PosteriorSummary, Stage, Termination, UnobservableDirection,
+    CovarianceInflation, Fused, FusedSettings, Hypothesis, Inconsistency, Modality, Nuisance,
+    Posterior, PosteriorSummary, Stage, UnobservableDirection,
 };
-pub(crate) use fused::{Factor, FrameContext, Point, Problem, RIDGE, chi_square_z};
-pub use heuristic::{Heuristic, HeuristicSettings};
-pub use icp::{Icp, IcpSettings};
-pub use robust_icp::{RobustIcp, RobustIcpSettings};
-pub(crate) use step::preconditioned_step;
+pub(crate) use fused::{chi_square_z, problem_of, surface_patches};
+pub use heuristic::{GradientKind, Heuristic};
+pub use icp::Icp;
+pub use robust_icp::RobustIcp;
 pub use trace::{Iteration, Trace};

@@ -1,21 +1,25 @@
 //! A strong, simple baseline: robust point-to-plane iterative closest points.
 
 use nalgebra::{Point3, Vector3};
-use prehend_geometry::RobustKernel;
-use prehend_geometry::icp::{Match, Metric, NormalEquations};
+use prehend_geometry::{RobustKernel, icp};
 use rayon::prelude::*;
 
-use super::step::damped_step;
-use super::walk::{Advance, walk};
+use super::estimate::Recorder;
+use super::step::{StepRule, walk};
+use super::{Estimate, Observer, Strategy};
 use crate::error::RefineError;
-use crate::factor::back_project;
-use crate::problem::{Block, Normal, State};
-use crate::scene::{Object, Observation};
-use crate::strategy::{Iteration, Trace};
+use crate::problem::{Block, State};
+use crate::scene::{Frame, Object};
 
-/// Settings of [`RobustIcp`].
+/// Point-to-plane ICP (Chen and Medioni, 1992) from the masked depth points to the model, under Cauchy's weights.
+///
+/// Each iteration matches every depth point with the closest point of the surface and makes one Gauss–Newton step
+/// of the distances from the points to the planes of the faces found. The scale of the weights shrinks
+/// geometrically from the first to the last over the first three quarters of the iterations. Of visibility it knows
+/// one thing: a depth point is not of a face that looks away from the camera, and such a match counts for
+/// nothing. It knows nothing of color, touch, the mask's outline and the hand.
 #[derive(Clone, Debug, PartialEq)]
-pub struct RobustIcpSettings {
+pub struct RobustIcp {
     /// Iterations; all are made, for the scale shrinks over them.
     pub iterations: usize,
     /// Depth points used at most, spread evenly over the mask.
@@ -29,55 +33,41 @@ pub struct RobustIcpSettings {
     pub damping: f64,
 }
 
-impl Default for RobustIcpSettings {
+impl Default for RobustIcp {
     fn default() -> Self {
         Self { iterations: 60, points: 3000, first_scale: 10e-3, last_scale: 2e-3, damping: 0.05 }
     }
 }
 
-/// Point-to-plane ICP (Chen and Medioni, 1992) from the masked depth points to the model, under Cauchy's weights.
-///
-/// Each iteration matches every depth point with the closest point of the surface and makes one Gauss–Newton step
-/// of the distances from the points to the planes of the faces found. The scale of the weights shrinks
-/// geometrically from the first to the last over the first three quarters of the iterations. Of visibility it knows
-/// one thing: a depth point is not of a face that looks away from the camera, and such a match counts for
-/// nothing. It knows nothing of color, touch, the mask's outline and the hand.
-pub struct RobustIcp {
-    /// Settings.
-    pub settings: RobustIcpSettings,
-}
-
-impl RobustIcp {
-    /// Walks from `state`, calling `visit` at every pose; ends when that returns false. The trace's value is the
-    /// root mean square distance of the matches \[m\].
-    ///
-    /// # Errors
-    /// If no pixel of the mask has a depth.
-    pub fn run(
+impl Strategy for RobustIcp {
+    /// The trace's value is the root mean square distance of the matches \[m\].
+    fn run(
         &self,
-        observation: &Observation,
-        object: &Object,
-        state: State,
-        visit: impl FnMut(&State, &Iteration) -> bool,
-    ) -> Result<Trace, RefineError> {
-        let RobustIcpSettings { iterations, points, first_scale, last_scale, damping } =
-            self.settings;
-        let mut cloud: Vec<Point> = back_project(observation, points)?
-            .into_iter()
-            .map(|place| Point { place, face: None })
-            .collect();
+        frame: &Frame<'_>,
+        initial: &State,
+        observe: &mut Observer<'_>,
+    ) -> Result<Estimate, RefineError> {
+        let &Self { iterations, points, first_scale, last_scale, damping } = self;
+        let object = frame.object();
+        let point = |place| Point { place, face: None };
+        let mut cloud: Vec<Point> = frame.masked_points(points)?.into_iter().map(point).collect();
         let shrinking = 0.75 * iterations as f64;
-        let advance = |state: &State, index: usize| {
+        let names = std::iter::once("robust-icp");
+        let mut recorder = Recorder::new(names, initial, iterations, None, observe);
+        // A step of no length at all says only that no point counts any more.
+        let rule = StepRule { iterations, tolerance: 0.0, damping };
+        walk(&mut recorder, initial.clone(), object.radius, &rule, |state, index, equations| {
             let done = (index as f64 / shrinking.max(1.0)).min(1.0);
             let scale = first_scale * (last_scale / first_scale).powf(done);
             let sums = match_all(&mut cloud, object, state, RobustKernel::Cauchy { scale });
-            let mut normal = Normal::new(&[Block::ObjectPose]);
-            normal.add(&[Block::ObjectPose], &sums.gradient, &sums.matrix);
-            let step = damped_step(&normal, object.radius, damping, f64::INFINITY);
-            Advance { value: sums.rms(), step }
-        };
-        // A step of no length at all says only that no point counts any more.
-        Ok(walk("robust-icp", state, iterations, 0.0, advance, visit))
+            equations.add(&[Block::ObjectPose], &sums.quadratic.gradient, &sums.quadratic.hessian);
+            sums.rms()
+        });
+        Ok(recorder.estimate(None))
+    }
+
+    fn iterations(&self) -> usize {
+        self.iterations
     }
 }
 
@@ -93,10 +83,10 @@ fn match_all(
     object: &Object,
     state: &State,
     kernel: RobustKernel,
-) -> NormalEquations {
+) -> icp::NormalEquations {
     let t_object_cam = state.t_cam_object.inverse();
     let center = state.center().into();
-    let of_point = |point: &mut Point| -> Option<(Point3<f64>, Match)> {
+    let of_point = |point: &mut Point| -> Option<(Point3<f64>, icp::Match)> {
         let local = t_object_cam * point.place;
         let face = point.face.unwrap_or(u32::MAX);
         let closest = object.surface.closest_with_hint(&local, f64::INFINITY, face)?;
@@ -104,68 +94,53 @@ fn match_all(
         let normal: Vector3<f64> = state.t_cam_object * object.normals[closest.face as usize];
         let surface = state.t_cam_object * closest.point;
         let faces_camera = normal.dot(&surface.coords) < 0.0;
-        faces_camera.then_some((surface, Match { point: point.place, normal }))
+        faces_camera.then_some((surface, icp::Match { point: point.place, normal }))
     };
     let matches: Vec<_> = cloud.par_iter_mut().with_min_len(64).filter_map(of_point).collect();
-    let mut sums = NormalEquations::new();
+    let mut sums = icp::NormalEquations::new();
     for (surface, target) in &matches {
-        sums.add(Metric::PointToPlane, kernel, surface, target, &center);
+        sums.add(icp::Metric::PointToPlane, kernel, surface, target, &center);
     }
     sums
 }
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::{Isometry3, Vector6};
+    use std::ops::ControlFlow;
 
-    use super::super::{Icp, IcpSettings};
+    use nalgebra::Isometry3;
+
+    use super::super::Icp;
     use super::*;
     use crate::evaluate::metrics::{oe_deg, pe_cm};
     use crate::scene::{Scene, default_scene};
 
-    fn start(scene: &Scene, offset: &Vector6<f64>) -> State {
-        let truth = State::new(&scene.observation, &scene.object, &scene.truth).unwrap();
-        truth.moved(Block::ObjectPose, offset.as_slice())
-    }
-
-    fn robust(scene: &Scene, start: State) -> Isometry3<f64> {
-        let mut last = start.t_cam_object;
-        let robust = RobustIcp { settings: RobustIcpSettings::default() };
-        let trace = robust
-            .run(&scene.observation, &scene.object, start, |state, _| {
-                last = state.t_cam_object;
-                true
-            })
-            .unwrap();
-        assert_eq!(trace.iterations.len(), 61);
-        last
+    /// Where a strategy ends that begins `offset` from the truth, and in how many iterations.
+    fn found(strategy: &dyn Strategy, scene: &Scene, offset: &[f64; 6]) -> (Isometry3<f64>, usize) {
+        let frame = Frame::new(&scene.observation, &scene.object, None).unwrap();
+        let truth = State::new(&frame, &scene.truth).unwrap();
+        let start = truth.retract(&[Block::ObjectPose], offset);
+        let found = strategy.run(&frame, &start, &mut |_| ControlFlow::Continue(())).unwrap();
+        (*found.t_cam_object(), found.trace.iterations.len())
     }
 
     #[test]
     fn small_offsets_are_undone() {
         let scene = default_scene(1).unwrap();
-        for offset in [
-            Vector6::new(5e-3, 0.0, 0.0, 0.0, 0.08, 0.0),
-            Vector6::new(0.0, -6e-3, 4e-3, 0.06, 0.0, -0.05),
-        ] {
-            let found = robust(&scene, start(&scene, &offset));
+        for offset in [[5e-3, 0.0, 0.0, 0.0, 0.08, 0.0], [0.0, -6e-3, 4e-3, 0.06, 0.0, -0.05]] {
+            let (found, iterations) = found(&RobustIcp::default(), &scene, &offset);
             let (pe, oe) = (pe_cm(&found, &scene.truth), oe_deg(&found, &scene.truth));
             assert!(pe < 0.1 && oe < 1.0, "{pe} cm, {oe}°");
+            assert_eq!(iterations, 61);
         }
     }
 
     #[test]
     fn it_beats_the_weak_baseline() {
         let scene = default_scene(2).unwrap();
-        let start = start(&scene, &Vector6::new(5e-3, 4e-3, -4e-3, 0.05, -0.04, 0.03));
-        let mut weak = start.t_cam_object;
-        Icp { settings: IcpSettings::default() }
-            .run(&scene.observation, &scene.object, start.clone(), |state, _| {
-                weak = state.t_cam_object;
-                true
-            })
-            .unwrap();
-        let strong = robust(&scene, start);
+        let offset = [5e-3, 4e-3, -4e-3, 0.05, -0.04, 0.03];
+        let (weak, _) = found(&Icp::default(), &scene, &offset);
+        let (strong, _) = found(&RobustIcp::default(), &scene, &offset);
         assert!(pe_cm(&strong, &scene.truth) < 0.3 * pe_cm(&weak, &scene.truth));
     }
 }

@@ -5,13 +5,10 @@ use std::path::Path;
 
 use prehend_render::{Mask, depth_map};
 
-use super::folder::make;
-use super::frame::{FRAME_FOLDERS, Recorded};
+use super::files::{FRAME_FOLDERS, FrameFiles, SceneFiles, write_models};
 use super::hand_files::{TAXELS, URDF, taxel_table};
-use super::models::write_models;
-use super::scene_files::SceneFiles;
 use crate::data::AssetError;
-use crate::data::bop::{ResultRow, write_atomically, write_results};
+use crate::data::bop::{ResultRow, create_folder, write_atomically, write_results};
 use crate::scene::Scene;
 
 /// The only scene.
@@ -29,14 +26,14 @@ const SCENE_ID: u32 = 1;
 pub fn write_dataset(dir: &Path, scenes: &[Scene]) -> Result<(), AssetError> {
     let scene_dir = dir.join("test").join(format!("{SCENE_ID:06}"));
     for folder in FRAME_FOLDERS.map(|name| scene_dir.join(name)) {
-        make(&folder)?;
+        create_folder(&folder)?;
     }
     let mut files = SceneFiles::default();
     let mut objects = BTreeMap::new();
     let mut rows = Vec::new();
     for (im_id, scene) in (0_u32..).zip(scenes) {
         let seen = &scene.observation;
-        let recorded = Recorded {
+        let recorded = FrameFiles {
             told: seen,
             obj_id: scene.obj_id,
             truth: &scene.truth,
@@ -45,9 +42,9 @@ pub fn write_dataset(dir: &Path, scenes: &[Scene]) -> Result<(), AssetError> {
             world: seen.hand.as_ref().map(|hand| &hand.t_cam_hand),
             whole: &silhouette(scene),
             visible: &seen.mask,
-            joint_names: scene.robot.tree.joint_names(),
+            joint_names: scene.hand.tree.joint_names(),
         };
-        files.add(im_id, &recorded.write(&scene_dir, im_id, 0)?);
+        files.add(im_id as usize, &recorded.write(&scene_dir, im_id, 0)?);
         objects.insert(scene.obj_id, (scene.object.mesh.clone(), &scene.object.inertial));
         rows.push(ResultRow {
             scene_id: SCENE_ID,
@@ -63,9 +60,9 @@ pub fn write_dataset(dir: &Path, scenes: &[Scene]) -> Result<(), AssetError> {
         write_models(&dir.join(folder), &objects)?;
     }
     if let Some(scene) = scenes.first() {
-        make(&dir.join("hand"))?;
+        create_folder(&dir.join("hand"))?;
         write_atomically(&dir.join(URDF), scene.urdf.as_bytes())?;
-        write_atomically(&dir.join(TAXELS), taxel_table(&scene.robot.taxels).as_bytes())?;
+        write_atomically(&dir.join(TAXELS), taxel_table(&scene.hand.taxels).as_bytes())?;
     }
     Ok(write_results(&dir.join("init.csv"), &rows)?)
 }
@@ -83,9 +80,8 @@ fn silhouette(scene: &Scene) -> Mask {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::TermKind;
-    use crate::data::Assets;
     use crate::data::bop::{Dataset, GroundTruth, read_results};
+    use crate::data::{Assets, Sensor};
     use crate::scene::default_scene;
     use nalgebra::Isometry3;
     use std::fs;
@@ -103,7 +99,7 @@ mod tests {
         let dataset = Dataset::open(dir.path()).unwrap();
         let mut assets = Assets::new(&dataset, 0);
         let frame = dataset.frame(1, 0).unwrap();
-        let (seen, robot) = assets.observation(&frame, 0, &TermKind::ALL).unwrap();
+        let (seen, robot) = assets.observation(&frame, 0, &[Sensor::Hand, Sensor::Touch]).unwrap();
         let given = &scene.observation;
         assert_eq!((seen.camera, &seen.mask), (given.camera, &given.mask));
         assert!(seen.gravity.unwrap().metric_distance(&given.gravity.unwrap()) < 1e-12);
@@ -123,7 +119,7 @@ mod tests {
             let clipped = b.map(|v| v.clamp(-10.0, 10.0));
             a.metric_distance(&clipped) < 1e-12
         }));
-        assert_eq!(robot.unwrap().taxels.len(), scene.robot.taxels.len());
+        assert_eq!(robot.unwrap().taxels.len(), scene.hand.taxels.len());
 
         let object = assets.object(scene.obj_id).unwrap();
         assert!(!object.inertial_assumed);

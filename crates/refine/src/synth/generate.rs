@@ -1,38 +1,37 @@
-//! Whole datasets, made frame by frame and gone on with after any interruption.
+//! Generates whole datasets frame by frame; an interrupted run is resumed.
 
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use super::folder::{fault, make, remove, sweep};
-use super::frame::{FRAME_FOLDERS, Recorded};
-use super::hand_files::HandFiles;
-use super::models::write_models;
-use super::plan::{Subject, SynthSettings, settle};
-use super::scene_files::{NAMES, SceneFiles, from_text, to_text};
-use super::seeds::{Use, seed, sequence};
-use super::sensor::Rig;
-use super::{GraspSnapshot, SynthError};
-use crate::data::AssetError;
-use crate::data::bop::{
-    Dataset, DatasetError, GroundTruth, ResultRow, write_atomically, write_results,
+use super::error::SynthError;
+use super::files::{
+    Entries, FRAME_FOLDERS, FrameFiles, NAMES, SceneFiles, remove_temporary, write_models,
 };
-use crate::evaluate::NoiseLevel;
+use super::hand_files::HandFiles;
+use super::plan::{Subject, SynthSettings, Use, check_plan, seed, sequence};
+use super::sensor::Rig;
+use super::snapshot::GraspSnapshot;
+use crate::data::bop::{
+    Dataset, DatasetError, GroundTruth, ResultRow, create_folder, write_atomically, write_results,
+};
+use crate::data::{AssetError, Identity, Journal, NoiseLevel};
 
-/// What became of a dataset.
+/// What a dataset holds.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Made {
+pub struct DatasetSummary {
     /// Frames that are there.
     pub frames: u64,
     /// Grasps that could not be made: their frames are not there.
     pub failures: Vec<GraspFailure>,
 }
 
-/// A grasp that could not be made.
+/// A grasp that could not be summary.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GraspFailure {
     /// The object.
@@ -43,11 +42,9 @@ pub struct GraspFailure {
     pub reason: String,
 }
 
-/// Frames that are done, one small file each, until their scene is complete.
-const JOURNAL: &str = ".frames";
-/// The journal of a complete scene on its way out.
-const SPENT_JOURNAL: &str = ".frames.spent";
-/// Grasps of a complete scene that could not be made.
+/// The journal of the frames that are done, until their scene is complete.
+const JOURNAL: &str = ".frames.journal";
+/// Grasps of a complete scene that could not be summary.
 const FAILURES: &str = "synth_failures.json";
 
 /// Makes a dataset at `dir`: a scene of the split `test` for each of `subjects`, which bears the object's number.
@@ -56,8 +53,7 @@ const FAILURES: &str = "synth_failures.json";
 /// why there is none. The same seed must give the same moments. `progress` hears of every number of frames that are done.
 ///
 /// Frames appear one by one, in any order. Interrupted at any moment and called again with the same arguments, this
-/// goes on with what is missing; the files are the same as without interruption, and for any number of threads. (Two
-/// processes must not work at the same folder at once.) Grasps that cannot be made are listed in the result and in
+/// goes on with what is missing; the files are the same as without interruption, and for any number of threads. Grasps that cannot be made are listed in the result and in
 /// `synth_failures.json` of their scene.
 ///
 /// `models/` and `scene_bodies.json` hold what the estimator is told, `models_eval/`, `mask/`, `scene_gt.json`,
@@ -74,27 +70,27 @@ pub fn generate<'s, G>(
     settings: &SynthSettings,
     prepare: impl Fn(&'s Subject) -> Result<G, String>,
     progress: &(dyn Fn(u64) + Sync),
-) -> Result<Made, SynthError>
+) -> Result<DatasetSummary, SynthError>
 where
     G: Fn(u64) -> Result<Vec<GraspSnapshot>, String> + Sync,
 {
     check(subjects, settings)?;
-    make(dir)?;
-    settle(dir, hand, subjects, settings)?;
+    create_folder(dir)?;
+    check_plan(dir, hand, subjects, settings)?;
     hand.write(dir)?;
     write_both_models(dir, subjects, settings)?;
     for folder in ["", "hand", "models", "models_eval"] {
-        sweep(&dir.join(folder))?;
+        remove_temporary(&dir.join(folder))?;
     }
-    let mut made = Made::default();
+    let mut summary = DatasetSummary::default();
     for subject in subjects {
         let scene = Scene { dir: scene_dir(dir, subject), hand, subject, settings };
         let failures = scene.complete(&prepare, progress)?;
         let failed: usize = failures.iter().map(|f| f.images.len()).sum();
-        made.frames += u64::from(settings.frames) - failed as u64;
-        made.failures.extend(failures);
+        summary.frames += u64::from(settings.frames) - failed as u64;
+        summary.failures.extend(failures);
     }
-    if made.frames > 0 {
+    if summary.frames > 0 {
         for (name, purpose, noise) in [
             ("init_low.csv", Use::InitialLow, NoiseLevel::Low),
             ("init_high.csv", Use::InitialHigh, NoiseLevel::High),
@@ -106,7 +102,7 @@ where
             }
         }
     }
-    Ok(made)
+    Ok(summary)
 }
 
 fn check(subjects: &[Subject], settings: &SynthSettings) -> Result<(), SynthError> {
@@ -148,6 +144,9 @@ fn write_both_models(
     write_models(&dir.join("models_eval"), &truth.collect::<BTreeMap<_, _>>())
 }
 
+/// Entries of the frames that are done, by image.
+type Frames = BTreeMap<usize, Entries>;
+
 /// A scene in the making.
 struct Scene<'a, 's> {
     dir: PathBuf,
@@ -157,7 +156,7 @@ struct Scene<'a, 's> {
 }
 
 impl<'s> Scene<'_, 's> {
-    /// Makes what is missing; returns the grasps that could not be made.
+    /// Makes what is missing; returns the grasps that could not be summary.
     fn complete<G>(
         &self,
         prepare: &impl Fn(&'s Subject) -> Result<G, String>,
@@ -166,48 +165,48 @@ impl<'s> Scene<'_, 's> {
     where
         G: Fn(u64) -> Result<Vec<GraspSnapshot>, String> + Sync,
     {
-        remove(&self.dir.join(SPENT_JOURNAL))?;
         let journal = self.dir.join(JOURNAL);
         let all = u64::from(self.settings.frames);
         if !journal.exists() && NAMES.iter().any(|name| self.dir.join(name).exists()) {
             progress(all);
             return self.read_failures();
         }
-        for folder in FRAME_FOLDERS.into_iter().chain([JOURNAL]) {
-            make(&self.dir.join(folder))?;
-            sweep(&self.dir.join(folder))?;
+        for folder in FRAME_FOLDERS.map(|name| self.dir.join(name)) {
+            create_folder(&folder)?;
+            remove_temporary(&folder)?;
         }
-        sweep(&self.dir)?;
-        let missing = self.missing();
-        progress(all - missing.values().map(|ids| ids.len() as u64).sum::<u64>());
+        remove_temporary(&self.dir)?;
+        let obj_id = self.subject.obj_id;
+        let identity = Identity::of(&json!({ "command": "synth", "object": obj_id }));
+        let (journal, done) = Journal::open::<Entries>(&journal, &identity, false)?;
+        progress(done.len() as u64);
+        let missing = self.missing(&done);
+        let state = Mutex::new((journal, done));
         let mut failures = Vec::new();
         if !missing.is_empty() {
-            let obj_id = self.subject.obj_id;
             let source =
                 prepare(self.subject).map_err(|reason| SynthError::Object { obj_id, reason })?;
             let attempts: Vec<Result<Option<GraspFailure>, SynthError>> = missing
                 .into_par_iter()
-                .map(|(grasp, images)| self.grasp(&source, grasp, images, progress))
+                .map(|(grasp, images)| self.grasp(&source, grasp, images, &state, progress))
                 .collect();
             for attempt in attempts {
                 failures.extend(attempt?);
             }
         }
-        self.finish(&failures)?;
+        let (journal, done) = state.into_inner().unwrap_or_else(PoisonError::into_inner);
+        self.write(&done, &failures)?;
+        journal.discard()?;
         Ok(failures)
     }
 
     /// Images that are not in the journal, by grasp.
-    fn missing(&self) -> BTreeMap<u32, Vec<u32>> {
+    fn missing(&self, done: &Frames) -> BTreeMap<u32, Vec<u32>> {
         let mut missing: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
-        for im_id in (0..self.settings.frames).filter(|id| !self.entry(*id).is_file()) {
+        for im_id in (0..self.settings.frames).filter(|&id| !done.contains_key(&(id as usize))) {
             missing.entry(im_id / self.settings.frames_per_grasp).or_default().push(im_id);
         }
         missing
-    }
-
-    fn entry(&self, im_id: u32) -> PathBuf {
-        self.dir.join(JOURNAL).join(format!("{im_id:06}"))
     }
 
     fn grasp<G>(
@@ -215,6 +214,7 @@ impl<'s> Scene<'_, 's> {
         source: &G,
         grasp: u32,
         images: Vec<u32>,
+        state: &Mutex<(Journal, Frames)>,
         progress: &(dyn Fn(u64) + Sync),
     ) -> Result<Option<GraspFailure>, SynthError>
     where
@@ -240,7 +240,12 @@ impl<'s> Scene<'_, 's> {
             let shares = self.settings.frames_per_grasp as usize;
             let share = im_id as usize % shares;
             let moment = &moments[(2 * share + 1) * moments.len() / (2 * shares)];
-            self.frame(&rig, moment, im_id)?;
+            let entries = self.frame(&rig, moment, im_id)?;
+            {
+                let mut state = state.lock().unwrap_or_else(PoisonError::into_inner);
+                let (journal, done) = &mut *state;
+                done.insert(im_id as usize, journal.append(im_id as usize, &entries)?);
+            }
             progress(1);
             Ok::<(), SynthError>(())
         })?;
@@ -264,11 +269,12 @@ impl<'s> Scene<'_, 's> {
         })
     }
 
-    fn frame(&self, rig: &Rig, moment: &GraspSnapshot, im_id: u32) -> Result<(), SynthError> {
+    /// Writes the images of one frame; returns its entries in the files of the scene.
+    fn frame(&self, rig: &Rig, moment: &GraspSnapshot, im_id: u32) -> Result<Entries, AssetError> {
         let obj_id = self.subject.obj_id;
         let mut noise = sequence(self.settings.seed, Use::Frame, obj_id, im_id);
-        let shot = rig.shoot(moment, &mut noise);
-        let recorded = Recorded {
+        let shot = rig.capture(moment, &mut noise);
+        let files = FrameFiles {
             told: &shot.told,
             obj_id,
             truth: &shot.truth,
@@ -279,32 +285,20 @@ impl<'s> Scene<'_, 's> {
             joint_names: self.hand.robot.tree.joint_names(),
         };
         let quality = self.settings.sensor.color.jpeg_quality;
-        let entries = recorded.write(&self.dir, im_id, quality)?;
-        Ok(write_atomically(&self.entry(im_id), to_text(&entries).as_bytes())?)
+        files.write(&self.dir, im_id, quality)
     }
 
-    /// Writes the scene's own files from the journal, which then goes.
-    fn finish(&self, failures: &[GraspFailure]) -> Result<(), SynthError> {
+    /// Writes the scene's own files.
+    fn write(&self, frames: &Frames, failures: &[GraspFailure]) -> Result<(), SynthError> {
         let mut files = SceneFiles::default();
-        for im_id in 0..self.settings.frames {
-            let path = self.entry(im_id);
-            let text = match fs::read_to_string(&path) {
-                Err(e) if e.kind() == std::io::ErrorKind::NotFound => continue,
-                text => text.map_err(|e| DatasetError::reading(&path, &e))?,
-            };
-            let entries = from_text(&text)
-                .ok_or_else(|| DatasetError::malformed(&path, "is no entry of a journal"))?;
-            files.add(im_id, &entries);
+        for (&im_id, entries) in frames {
+            files.add(im_id, entries);
         }
         if !failures.is_empty() {
             let text = serde_json::to_string_pretty(failures).unwrap_or_default();
             write_atomically(&self.dir.join(FAILURES), format!("{text}\n").as_bytes())?;
         }
-        files.write(&self.dir)?;
-        let (journal, spent) = (self.dir.join(JOURNAL), self.dir.join(SPENT_JOURNAL));
-        // In one step: half a journal would look like an interrupted scene.
-        fs::rename(&journal, &spent).map_err(|e| fault(&journal, &e))?;
-        Ok(remove(&spent)?)
+        Ok(files.write(&self.dir)?)
     }
 
     fn read_failures(&self) -> Result<Vec<GraspFailure>, SynthError> {

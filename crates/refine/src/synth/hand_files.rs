@@ -7,9 +7,8 @@ use std::path::{Path, PathBuf};
 use prehend_geometry::hand::{Taxel, allegro_xela_urdf, load_taxels, taxels};
 use prehend_geometry::robot::KinematicTree;
 
-use super::folder::make;
 use crate::data::AssetError;
-use crate::data::bop::{DatasetError, write_atomically};
+use crate::data::bop::{DatasetError, create_folder, write_atomically};
 use crate::scene::Hand;
 
 /// The hand's files, relative to the dataset.
@@ -69,10 +68,10 @@ impl HandFiles {
 
     /// Writes the hand's files to the dataset at `root`.
     pub(super) fn write(&self, root: &Path) -> Result<(), DatasetError> {
-        make(&root.join("hand"))?;
+        create_folder(&root.join("hand"))?;
         for (relative, content) in &self.meshes {
             let file = root.join("hand").join(relative);
-            make(file.parent().unwrap_or(root))?;
+            create_folder(file.parent().unwrap_or(root))?;
             write_atomically(&file, content)?;
         }
         if !self.robot.taxels.is_empty() {

@@ -1,14 +1,15 @@
-//! What a dataset is made of, kept beside it.
+//! The settings of a dataset, kept beside it in `synth.json`, and the random sequences that follow from its seed.
 
 use std::fs;
 use std::path::Path;
 
-use prehend_geometry::TriMesh;
+use prehend_geometry::{SplitMix64, TriMesh};
 use serde_json::{Map, Value, json};
 
-use super::folder::fault;
+use super::error::SynthError;
+use super::files::fault;
 use super::hand_files::HandFiles;
-use super::{SensorSettings, SynthError};
+use super::sensor::SensorSettings;
 use crate::data::bop::{DatasetError, write_atomically};
 use crate::data::identity::{fingerprint, program};
 use crate::scene::Object;
@@ -32,11 +33,11 @@ pub struct SynthSettings {
     pub width: usize,
     /// Rows of the images.
     pub height: usize,
-    /// What the sensors are like.
+    /// Sensor models.
     pub sensor: SensorSettings,
-    /// Decides everything that is random.
+    /// Seed of all random numbers.
     pub seed: u64,
-    /// Settings of whatever makes the grasps: not looked at, only kept and compared.
+    /// Settings of the grasp generator: only stored and compared.
     pub grasp: Value,
 }
 
@@ -61,7 +62,7 @@ const FILE: &str = "synth.json";
 ///
 /// # Errors
 /// [`SynthError::OtherSettings`], [`SynthError::Occupied`], or when the file cannot be read or written.
-pub(super) fn settle(
+pub(super) fn check_plan(
     dir: &Path,
     hand: &HandFiles,
     subjects: &[Subject],
@@ -136,6 +137,40 @@ fn mesh_bytes(mesh: &TriMesh) -> impl Iterator<Item = u8> + '_ {
     places.chain(faces).chain(uvs).chain(texels)
 }
 
+/// Purpose of a random sequence: each purpose has a sequence of its own, so that none depends on how many numbers another uses.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Use {
+    /// The object model that the estimator is given, by object.
+    Model = 1,
+    /// The grasp and its trajectory, by object and grasp.
+    Grasp,
+    /// Sensor faults that last through a grasp, by object and grasp.
+    Rig,
+    /// What differs from frame to frame, by object and frame.
+    Frame,
+    /// Initial poses of the lower level, by object and frame.
+    InitialLow,
+    /// Initial poses of the higher level, by object and frame.
+    InitialHigh,
+}
+
+/// A seed for one `purpose`, one object and one number.
+pub(super) fn seed(seed: u64, purpose: Use, obj_id: u32, number: u32) -> u64 {
+    // The finalizer of SplitMix64 after each word, so that near words give unrelated seeds.
+    let words = [seed, purpose as u64, u64::from(obj_id), u64::from(number)];
+    words.into_iter().fold(0_u64, |state, word| {
+        let mut z = (state ^ word).wrapping_add(0x9e37_79b9_7f4a_7c15);
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    })
+}
+
+/// The sequence of [`seed`].
+pub(super) fn sequence(from: u64, purpose: Use, obj_id: u32, number: u32) -> SplitMix64 {
+    SplitMix64::new(seed(from, purpose, obj_id, number))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -150,5 +185,17 @@ mod tests {
         let less = json!({"a": 1, "b": {"c": 0.5}});
         assert_eq!(difference(&old, &less, "").unwrap().0, "b.d");
         assert_eq!(difference(&less, &old, "").unwrap().1, "null");
+    }
+
+    #[test]
+    fn seeds_differ_in_every_argument() {
+        let mut seen = std::collections::BTreeSet::new();
+        for from in 0..4 {
+            for purpose in [Use::Model, Use::Grasp, Use::Rig, Use::Frame, Use::InitialHigh] {
+                for obj_id in 1..10 {
+                    (0..50).for_each(|n| assert!(seen.insert(seed(from, purpose, obj_id, n))));
+                }
+            }
+        }
     }
 }

@@ -4,21 +4,21 @@ use std::time::{Duration, Instant};
 
 /// What the time of a frame went into.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Spent {
+pub struct Timing {
     /// Preparing images, points and terms.
     pub preparation: Duration,
     /// Evaluating terms and solving for steps.
     pub steps: Duration,
     /// Covariances and checks.
-    pub judgment: Duration,
+    pub validation: Duration,
     /// Finding an object that was not followed: all that it takes.
     pub recovery: Duration,
 }
 
-impl Spent {
+impl Timing {
     /// All of it.
     pub fn total(&self) -> Duration {
-        self.preparation + self.steps + self.judgment + self.recovery
+        self.preparation + self.steps + self.validation + self.recovery
     }
 }
 

@@ -5,12 +5,10 @@ use std::time::Duration;
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, UnitQuaternion, Vector3, Vector6};
 use prehend_autodiff::lie::{perturb_about, so3_log};
 
-use super::carried::Layout;
 use super::settings::{ProcessNoise, TrackerSettings};
-use crate::factor::PriorSettings;
-use crate::problem::State;
+use crate::factor::{Layout, PriorSettings};
+use crate::problem::{Linearization, RIDGE, ScaledCholesky, State};
 use crate::scene::CameraCalibrationError;
-use crate::strategy::{Factor, Point, RIDGE};
 
 /// Time within which an object that is not seen comes to rest, all but 1/e of its velocity \[s\].
 const COASTING: f64 = 0.25;
@@ -20,7 +18,7 @@ const GROWTH: f64 = 0.02;
 
 /// The last pose that was believed, and what was learnt with it.
 #[derive(Clone, Debug)]
-pub(super) struct Memory {
+pub(super) struct TrackState {
     /// When that was.
     pub(super) time: Duration,
     /// The solution of that frame.
@@ -49,31 +47,31 @@ pub(super) struct Prediction {
     pub(super) covariance: DMatrix<f64>,
     pub(super) layout: Layout,
     /// Where the object would be without its velocity.
-    rest: Isometry3<f64>,
+    zero_velocity_pose: Isometry3<f64>,
     velocity: Vector6<f64>,
     seconds: f64,
 }
 
-impl Memory {
-    /// Of `point`, the solution of a frame in which the hand was said to be as in `told`, and known if `in_hand`.
+impl TrackState {
+    /// Of `point`, the solution of a frame in which the hand was said to be as in `nominal`, and known if `in_hand`.
     pub(super) fn new(
         time: Duration,
-        point: &Point,
-        told: &State,
+        at: &Linearization,
+        nominal: &State,
         in_hand: bool,
-        accuracy: &PriorSettings,
+        prior: &PriorSettings,
         level: f64,
     ) -> Self {
-        let layout = Layout::new(if in_hand { told.joints.len() } else { 0 });
-        let joints = point.state.joints.iter().zip(&told.joints);
+        let layout = Layout::new(if in_hand { nominal.joints.len() } else { 0 });
+        let joints = at.state.joints.iter().zip(&nominal.joints);
         Self {
             time,
-            state: point.state.clone(),
+            state: at.state.clone(),
             in_hand,
-            hand_error: told.t_cam_hand.inverse() * point.state.t_cam_hand,
+            hand_error: nominal.t_cam_hand.inverse() * at.state.t_cam_hand,
             joint_errors: joints.map(|(is, said)| is - said).collect(),
             velocity: Vector6::zeros(),
-            covariance: posterior(point, layout, accuracy),
+            covariance: posterior(at, layout, prior),
             layout,
             level,
             lost: 0,
@@ -89,8 +87,8 @@ impl Memory {
     pub(super) fn followed(mut next: Self, prediction: &Prediction, motion: &ProcessNoise) -> Self {
         next.velocity = prediction.velocity;
         if prediction.seconds > 0.0 {
-            let moved = next.state.t_cam_object * prediction.rest.inverse();
-            let rest = prediction.rest * next.state.object_center;
+            let moved = next.state.t_cam_object * prediction.zero_velocity_pose.inverse();
+            let rest = prediction.zero_velocity_pose * next.state.object_center;
             let off = next.state.center() - rest.coords;
             let turn = so3_log(&moved.rotation);
             let measured =
@@ -100,21 +98,21 @@ impl Memory {
         next
     }
 
-    /// What is expected at `time` where the hand is said to be as in `told`, and known if `in_hand`.
+    /// What is expected at `time` where the hand is said to be as in `nominal`, and known if `in_hand`.
     pub(super) fn predict(
         &self,
         time: Duration,
-        told: &State,
+        nominal: &State,
         in_hand: bool,
         settings: &TrackerSettings,
     ) -> Prediction {
         let seconds = time.saturating_sub(self.time).as_secs_f64();
-        let motion = if in_hand { &settings.held } else { &settings.free };
-        let layout = Layout::new(if in_hand { told.joints.len() } else { 0 });
-        let kept = (-seconds / settings.memory).exp();
+        let motion = settings.motion(in_hand);
+        let layout = Layout::new(if in_hand { nominal.joints.len() } else { 0 });
+        let kept = (-seconds / settings.calibration_time_constant).exp();
         let (with_hand, velocity) = if in_hand == self.in_hand {
             let moved = match in_hand {
-                true => told.t_cam_hand * self.hand_error * self.state.t_cam_hand.inverse(),
+                true => nominal.t_cam_hand * self.hand_error * self.state.t_cam_hand.inverse(),
                 false => Isometry3::identity(),
             };
             (moved, both(&moved.rotation, &self.velocity))
@@ -125,20 +123,19 @@ impl Memory {
         let rest = with_hand * self.state.t_cam_object;
         let center = (rest * self.state.object_center).coords;
         let coasting = COASTING * (1.0 - (-seconds / COASTING).exp());
-        let mut state = told.clone();
+        let mut state = nominal.clone();
         state.t_cam_object = perturb_about(&rest, &center, &(velocity * coasting));
-        state.light = self.state.light;
         if in_hand {
-            state.t_cam_hand = told.t_cam_hand * part(&self.hand_error, kept);
+            state.t_cam_hand = nominal.t_cam_hand * part(&self.hand_error, kept);
             let errors = self.joint_errors.iter();
             state.joints.iter_mut().zip(errors).for_each(|(q, error)| *q += kept * error);
         }
         let camera = self.state.camera.parameters().map(|p| kept * p);
         state.camera = CameraCalibrationError::default().changed(&camera);
-        let stated = variances(&settings.fused.accuracy, layout);
+        let stated = variances(&settings.fused.prior, layout);
         let covariance = if layout == self.layout {
-            let carry = carrier(&with_hand.rotation, kept, layout);
-            &carry * &self.covariance * carry.transpose()
+            let transition = transition(&with_hand.rotation, kept, layout);
+            &transition * &self.covariance * transition.transpose()
         } else {
             let mut fresh = DMatrix::from_diagonal(&stated);
             fresh.view_mut((0, 0), (6, 6)).copy_from(&self.covariance.view((0, 0), (6, 6)));
@@ -152,7 +149,7 @@ impl Memory {
             growth[3 + k] = (motion.rotation * seconds).powi(2);
         }
         let covariance = covariance + DMatrix::from_diagonal(&growth);
-        Prediction { state, covariance, layout, rest, velocity, seconds }
+        Prediction { state, covariance, layout, zero_velocity_pose: rest, velocity, seconds }
     }
 }
 
@@ -169,31 +166,32 @@ fn both(turn: &UnitQuaternion<f64>, twist: &Vector6<f64>) -> Vector6<f64> {
 }
 
 /// What takes deviations of one frame to those of the next: twists turn with the hand, calibrations fade.
-fn carrier(turn: &UnitQuaternion<f64>, kept: f64, layout: Layout) -> DMatrix<f64> {
+fn transition(turn: &UnitQuaternion<f64>, kept: f64, layout: Layout) -> DMatrix<f64> {
     let n = layout.len();
-    let mut carrier = DMatrix::identity(n, n) * kept;
+    let mut transition = DMatrix::identity(n, n) * kept;
     let turn: Matrix3<f64> = turn.to_rotation_matrix().into_inner();
     for k in 0..4 {
         let factor = if k < 2 { 1.0 } else { kept };
-        carrier.fixed_view_mut::<3, 3>(3 * k, 3 * k).copy_from(&(turn * factor));
+        transition.fixed_view_mut::<3, 3>(3 * k, 3 * k).copy_from(&(turn * factor));
     }
-    carrier
+    transition
 }
 
 /// Stated variances.
-fn variances(accuracy: &PriorSettings, layout: Layout) -> DVector<f64> {
-    let all = layout.blocks().into_iter().flat_map(|block| accuracy.deviations(block));
-    DVector::from_iterator(layout.len(), all.map(|sigma| sigma.powi(2)))
+fn variances(prior: &PriorSettings, layout: Layout) -> DVector<f64> {
+    prior.all_sigmas(layout).map(|sigma| sigma.powi(2))
 }
 
 /// Covariance of what was solved for, and the stated one of the rest.
-fn posterior(point: &Point, layout: Layout, accuracy: &PriorSettings) -> DMatrix<f64> {
-    let mut covariance = DMatrix::from_diagonal(&variances(accuracy, layout));
-    let Some(factor) = Factor::new(point.normal.hessian(), RIDGE) else { return covariance };
+fn posterior(at: &Linearization, layout: Layout, prior: &PriorSettings) -> DMatrix<f64> {
+    let mut covariance = DMatrix::from_diagonal(&variances(prior, layout));
+    let Some(factor) = ScaledCholesky::new(at.equations.hessian(), RIDGE) else {
+        return covariance;
+    };
     let all = factor.inverse();
     let n = all.nrows();
     let mut places = Vec::with_capacity(n);
-    for block in point.normal.blocks() {
+    for block in at.equations.blocks() {
         places.extend((0..block.dimension()).map(|k| layout.offset(*block) + k));
     }
     for r in 0..n {

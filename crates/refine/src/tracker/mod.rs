@@ -1,29 +1,31 @@
 //! An object followed from frame to frame.
 
-mod carried;
 mod clock;
 mod memory;
 mod settings;
 #[cfg(test)]
 mod tests;
+mod tracked;
 
+use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use nalgebra::Isometry3;
+use prehend_autodiff::optimize::LeastSquares;
 
-use self::carried::GaussianPrior;
 use self::clock::Clock;
-pub use self::clock::Spent;
-use self::memory::{Memory, Prediction};
+pub use self::clock::Timing;
+use self::memory::{Prediction, TrackState};
 pub use self::settings::{GatingSettings, ProcessNoise, Recovery, TrackerSettings};
+pub use self::tracked::{Rejection, TrackStatus, Tracked};
 use crate::error::RefineError;
-use crate::factor::{Prior, Term};
-use crate::problem::State;
-use crate::scene::{CameraCalibrationError, Hand, Object, Observation};
+use crate::factor::GaussianPrior;
+use crate::problem::{Factor, Problem, Solution, State, Termination};
+use crate::scene::{CameraCalibrationError, Frame, Hand, Object, Observation};
 use crate::search::PoseSearch;
 use crate::strategy::{
-    FrameContext, Fused, Inconsistency, Point, Posterior, Problem, Termination, chi_square_z,
+    Fused, Inconsistency, Posterior, Strategy, chi_square_z, problem_of, surface_patches,
 };
 
 /// Follows one object through the frames of a camera.
@@ -32,7 +34,7 @@ use crate::strategy::{
 /// if it went on as it did, relative to the hand where that is known, because the hand moves the object. What was learnt
 /// before comes in as a Gaussian about that prediction, with all its correlations: poses, calibration of the hand, errors of
 /// the joints' positions and corrections of the camera. It is a Kalman filter whose update is iterated, with calibrations
-/// that return to what is said of them within [`memory`](TrackerSettings::memory).
+/// that return to what is said of them within [`calibration_time_constant`](TrackerSettings::calibration_time_constant).
 ///
 /// A pose that does not fit is not believed ([`GatingSettings`]); the object is then looked for ([`Recovery`]). A frame
 /// allocates: its terms, the hand's depth image and the renderer's buffers are made anew, from memory that the allocator has at hand.
@@ -43,116 +45,43 @@ use crate::strategy::{
 /// use prehend_refine::tracker::{TrackStatus, Tracker, TrackerSettings};
 ///
 /// let sequence = default_sequence(1, 2)?;
-/// let robot = Some(Arc::clone(&sequence.robot));
+/// let robot = Some(Arc::clone(&sequence.hand));
 /// let mut tracker = Tracker::new(Arc::clone(&sequence.object), robot, TrackerSettings::default())?;
 /// tracker.start_from(&sequence.initial);
 /// for frame in &sequence.frames {
 ///     let tracked = tracker.track(&frame.observation, frame.time)?;
-///     assert_ne!(tracked.following, TrackStatus::Lost);
+///     assert_ne!(tracked.status, TrackStatus::Lost);
 /// }
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct Tracker {
     object: Arc<Object>,
-    robot: Option<Arc<Hand>>,
+    hand: Option<Arc<Hand>>,
     settings: TrackerSettings,
+    /// Factors of all frames besides.
+    factors: Vec<Arc<dyn Factor>>,
     /// Where to begin; the search says where if it is not known.
     initial: Option<Isometry3<f64>>,
-    memory: Option<Memory>,
+    track: Option<TrackState>,
     /// Made when it is first needed.
     search: Option<PoseSearch>,
 }
 
-/// How a frame's pose came about.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum TrackStatus {
-    /// From the frame before.
-    Followed,
-    /// It is where the object should be: there was no time to look at the frame.
-    Predicted,
-    /// It was found anew: the first of all, or after a loss.
-    Found,
-    /// It is where the object should be, and it does not seem to be there.
-    Lost,
-}
-
-impl TrackStatus {
-    /// The name used in reports.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Followed => "followed",
-            Self::Predicted => "predicted",
-            Self::Found => "found",
-            Self::Lost => "lost",
-        }
-    }
-}
-
-/// Why a pose was not believed.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum RejectionReason {
-    /// The mask is empty, or the object would be behind the camera.
-    Unseen,
-    /// The evidence fits so badly \[nat\], its level being the other number.
-    Misfit(f64, f64),
-    /// The object would have moved so many standard deviations of the prediction.
-    Surprise(f64),
-    /// The pose is so uncertain \[m of surface motion\].
-    Uncertain(f64),
-}
-
-impl std::fmt::Display for RejectionReason {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Unseen => write!(f, "nothing of the object is seen"),
-            Self::Misfit(value, level) => {
-                write!(f, "a misfit of {value:.0} nats where {level:.0} are usual")
-            }
-            Self::Surprise(sigmas) => write!(f, "{sigmas:.0} deviations from where it should be"),
-            Self::Uncertain(meters) => write!(f, "uncertain by {:.0} mm", meters * 1e3),
-        }
-    }
-}
-
-/// A frame's outcome.
-#[derive(Clone, Debug)]
-pub struct Tracked {
-    /// Object coordinates → camera coordinates \[m\].
-    pub t_cam_object: Isometry3<f64>,
-    /// The same with the hand, its joints and the camera as they are estimated to be.
-    pub state: State,
-    /// How the pose came about.
-    pub following: TrackStatus,
-    /// How sure it is, unless it was only predicted.
-    pub confidence: Option<Posterior>,
-    /// Why the object was not followed, if it was tried.
-    pub doubt: Option<RejectionReason>,
-    /// Steps down that were made, all stages together.
-    pub iterations: usize,
-    /// What the evidence is from fitting perfectly \[nat\].
-    pub misfit: f64,
-    /// What the time was spent on.
-    pub spent: Spent,
-}
-
 /// A pose that was solved for.
 struct Solved {
-    point: Point,
-    ending: Termination,
-    /// Steps down.
-    iterations: usize,
+    solution: Solution,
     /// Whether any step was tried.
     tried: bool,
 }
 
 impl Solved {
-    /// Negative log-likelihood without what was known before, of the model as it is \[nat\].
-    fn misfit(&self) -> f64 {
-        self.point.parts.iter().filter(|p| p.name != "prior").map(|p| p.value).sum()
+    /// Cost without what was known before, of the model as it is \[nat\].
+    fn cost(&self) -> f64 {
+        self.solution.at.cost_of_factors()
     }
 }
 
-/// Part of the way that the level of misfits goes to the next one.
+/// Part of the way that the running mean of costs goes to the next one.
 const LEVEL_GAIN: f64 = 0.1;
 
 impl Tracker {
@@ -162,24 +91,31 @@ impl Tracker {
     /// [`RefineError::Setting`] for a setting out of range.
     pub fn new(
         object: Arc<Object>,
-        robot: Option<Arc<Hand>>,
+        hand: Option<Arc<Hand>>,
         settings: TrackerSettings,
     ) -> Result<Self, RefineError> {
         settings.check()?;
-        Ok(Self { object, robot, settings, initial: None, memory: None, search: None })
+        let factors = Vec::new();
+        Ok(Self { object, hand, settings, factors, initial: None, track: None, search: None })
+    }
+
+    /// With a factor of one's own, in every frame.
+    pub fn with(mut self, factor: impl Factor + 'static) -> Self {
+        self.factors.push(Arc::new(factor));
+        self
     }
 
     /// Forgets all, and begins anew at `t_cam_object` \[m\] in the next frame.
     pub fn start_from(&mut self, t_cam_object: &Isometry3<f64>) {
         self.initial = Some(*t_cam_object);
-        self.memory = None;
+        self.track = None;
     }
 
     /// The pose in the next frame, which was taken at `time`, counted from any moment; if it is before that of the
     /// last frame, no time has passed.
     ///
     /// # Errors
-    /// If the images do not fit each other, the hand's joints or forces do not fit the robot, or nothing is found to begin with.
+    /// If the images do not fit each other, the hand's joints or forces do not fit the hand, or nothing is found to begin with.
     /// The tracker is then as it was before.
     pub fn track(
         &mut self,
@@ -187,168 +123,164 @@ impl Tracker {
         time: Duration,
     ) -> Result<Tracked, RefineError> {
         let mut clock = Clock::start(self.settings.budget);
-        if let (Some(robot), Some(hand)) = (&self.robot, &observation.hand) {
-            robot.check_joints(&hand.joints)?;
-        }
-        let Some(memory) = self.memory.clone() else {
-            return self.begin(observation, time, &mut clock);
-        };
-        let in_hand = self.robot.is_some() && observation.hand.is_some();
-        let told = match State::new(observation, &self.object, &memory.state.t_cam_object) {
-            Ok(told) => told,
-            Err(RefineError::EmptyMask) => {
-                // Where the hand is said to be needs no mask.
-                let hand = observation.hand.as_ref();
-                let told = State {
-                    t_cam_hand: hand.map_or(memory.state.t_cam_hand, |h| h.t_cam_hand),
-                    joints: hand.map_or_else(Vec::new, |h| h.joints.clone()),
-                    camera: CameraCalibrationError::default(),
-                    ..memory.state.clone()
-                };
-                let state = memory.predict(time, &told, in_hand, &self.settings).state;
-                return Ok(lost(state, RejectionReason::Unseen, Spent::default()));
+        let (object, hand) = (Arc::clone(&self.object), self.hand.clone());
+        let frame = match Frame::new(observation, &object, hand.as_ref()) {
+            Ok(frame) => frame,
+            Err(RefineError::EmptyMask) if self.track.is_some() => {
+                return Ok(self.predict_unseen(observation, time));
             }
             Err(error) => return Err(error),
         };
-        let prediction = memory.predict(time, &told, in_hand, &self.settings);
+        let Some(track) = self.track.clone() else { return self.begin(&frame, time, &mut clock) };
+        let in_hand = frame.hand().is_some();
+        let nominal = State::new(&frame, &track.state.t_cam_object)?;
+        let prediction = track.predict(time, &nominal, in_hand, &self.settings);
+        let predicted = prediction.state.clone();
         if !clock.has(Duration::ZERO) {
-            return Ok(outcome(prediction.state, TrackStatus::Predicted, Spent::default()));
+            return Ok(Tracked::predicted(predicted, Timing::default()));
         }
-        let (object, robot) = (Arc::clone(&self.object), self.robot.clone());
-        let known = FrameContext::new(observation, &object, robot.as_ref())?;
-        let mut spent = Spent::default();
-        let doubt = if prediction.state.center().z > 0.0 {
-            let (problem, carried) = self.prepare(&known, &prediction)?;
-            spent.preparation = clock.lap();
+        let mut timing = Timing::default();
+        let rejection = if predicted.center().z > 0.0 {
+            let (problem, prior) = self.prepare(&frame, &prediction)?;
+            timing.preparation = clock.lap();
             if !clock.has(Duration::ZERO) {
-                return Ok(outcome(prediction.state, TrackStatus::Predicted, spent));
+                return Ok(Tracked::predicted(predicted, timing));
             }
-            let solved = self.solve(&problem, prediction.state.clone(), &clock);
-            spent.steps = clock.lap();
-            if solved.ending == Termination::Stopped && !solved.tried {
-                return Ok(outcome(prediction.state, TrackStatus::Predicted, spent));
+            let solved = self.solve(&problem, &predicted, &clock);
+            timing.steps = clock.lap();
+            if solved.solution.termination == Termination::Aborted && !solved.tried {
+                return Ok(Tracked::predicted(predicted, timing));
             }
-            let confidence = self.confidence(&solved, &told)?;
-            let doubt = self.doubt(&solved, &confidence, Some(&carried), memory.allowance());
-            spent.judgment = clock.lap();
-            if doubt.is_none() {
-                let motion = if in_hand { &self.settings.held } else { &self.settings.free };
-                let level = memory.level + LEVEL_GAIN * (solved.misfit() - memory.level);
-                let next = self.remember(time, &solved, &told, in_hand, level);
-                let mut next = Memory::followed(next, &prediction, motion);
-                next.lost = memory.lost.saturating_sub(1);
-                self.memory = Some(next);
-                return Ok(found(solved, confidence, TrackStatus::Followed, None, spent));
-            }
-            doubt
+            let posterior = self.posterior(&solved, &nominal)?;
+            let rejection = self.gate(&solved, &posterior, Some(&prior), track.allowance());
+            timing.validation = clock.lap();
+            let Some(rejection) = rejection else {
+                let motion = self.settings.motion(in_hand);
+                let level = track.level + LEVEL_GAIN * (solved.cost() - track.level);
+                let next = self.remember(time, &solved, &nominal, in_hand, level);
+                let mut next = TrackState::followed(next, &prediction, motion);
+                next.lost = track.lost.saturating_sub(1);
+                self.track = Some(next);
+                return Ok(Tracked::solved(solved, posterior, TrackStatus::Tracked, None, timing));
+            };
+            rejection
         } else {
-            Some(RejectionReason::Unseen)
+            Rejection::Unseen
         };
-        let again = self.recover(observation, &known, &prediction.state, &memory)?;
-        spent.recovery = clock.lap();
-        let doubt = doubt.unwrap_or(RejectionReason::Unseen);
-        if let Some((solved, confidence)) = again {
+        let again = self.recover(&frame, &predicted, &track)?;
+        timing.recovery = clock.lap();
+        if let Some((solved, posterior)) = again {
             // The level of a pose found is not taken over at once: it may be a wrong one, and would then pass for right ever after.
-            let level = memory.level + LEVEL_GAIN * (solved.misfit() - memory.level);
-            let mut next = self.remember(time, &solved, &told, in_hand, level);
-            next.lost = memory.lost;
-            self.memory = Some(next);
-            return Ok(found(solved, confidence, TrackStatus::Found, Some(doubt), spent));
+            let level = track.level + LEVEL_GAIN * (solved.cost() - track.level);
+            let mut next = self.remember(time, &solved, &nominal, in_hand, level);
+            next.lost = track.lost;
+            self.track = Some(next);
+            let status = TrackStatus::Relocalized;
+            return Ok(Tracked::solved(solved, posterior, status, Some(rejection), timing));
         }
-        if let Some(memory) = &mut self.memory {
-            memory.lost = memory.lost.saturating_add(1);
+        if let Some(track) = &mut self.track {
+            track.lost = track.lost.saturating_add(1);
         }
-        Ok(lost(prediction.state, doubt, spent))
+        Ok(Tracked::lost(predicted, rejection, timing))
+    }
+
+    /// Where the object should be in a frame that shows nothing of it. Where the hand is measured to be needs no mask.
+    fn predict_unseen(&self, observation: &Observation, time: Duration) -> Tracked {
+        let Some(track) = &self.track else { unreachable!("there is a track") };
+        let hand = observation.hand.as_ref();
+        let nominal = State {
+            t_cam_hand: hand.map_or(track.state.t_cam_hand, |h| h.t_cam_hand),
+            joints: hand.map_or_else(Vec::new, |h| h.joints.clone()),
+            camera: CameraCalibrationError::default(),
+            ..track.state.clone()
+        };
+        let in_hand = self.hand.is_some() && hand.is_some();
+        let state = track.predict(time, &nominal, in_hand, &self.settings).state;
+        Tracked::lost(state, Rejection::Unseen, Timing::default())
     }
 
     /// The first frame.
     fn begin(
         &mut self,
-        observation: &Observation,
+        frame: &Frame<'_>,
         time: Duration,
         clock: &mut Clock,
     ) -> Result<Tracked, RefineError> {
         let initial = match self.initial {
             Some(pose) => pose,
-            None => self.search(observation)?,
+            None => self.search(frame)?,
         };
-        let told = State::new(observation, &self.object, &initial)?;
-        let known = FrameContext::new(observation, &self.object, self.robot.as_ref())?;
-        let (solved, confidence) = self.estimate(observation, &known, &told)?;
-        let in_hand = known.robot.is_some();
-        self.memory = Some(self.remember(time, &solved, &told, in_hand, solved.misfit()));
-        let spent = Spent { recovery: clock.lap(), ..Spent::default() };
-        Ok(found(solved, confidence, TrackStatus::Found, None, spent))
+        let nominal = State::new(frame, &initial)?;
+        let (solved, posterior) = self.estimate(frame, &nominal)?;
+        let (in_hand, level) = (frame.hand().is_some(), solved.cost());
+        self.track = Some(self.remember(time, &solved, &nominal, in_hand, level));
+        let timing = Timing { recovery: clock.lap(), ..Timing::default() };
+        Ok(Tracked::solved(solved, posterior, TrackStatus::Relocalized, None, timing))
     }
 
-    /// The terms of a frame, and the one among them that carries what was known before.
+    /// The problem of a frame, and its prior, which is the prediction.
     fn prepare(
         &self,
-        known: &FrameContext<'_>,
+        frame: &Frame<'_>,
         prediction: &Prediction,
     ) -> Result<(Problem, Arc<GaussianPrior>), RefineError> {
         let Prediction { state, covariance, layout, .. } = prediction;
-        let carried = GaussianPrior::new(state.clone(), *layout, covariance).ok_or_else(|| {
+        let prior = GaussianPrior::correlated(state.clone(), *layout, covariance);
+        let prior = Arc::new(prior.ok_or_else(|| {
             let problem = "does not allow for a prediction".to_owned();
-            RefineError::Setting { name: "accuracy", problem }
-        })?;
-        let carried = Arc::new(carried);
-        let (stage, fused) = (&self.settings.stage, &self.settings.fused);
-        let mut problem = known.problem(state, stage, fused, known.patches(state, stage, fused))?;
-        problem.terms.retain(|t| t.name() != carried.name());
-        problem.terms.insert(0, Box::new(Arc::clone(&carried)));
-        Ok((problem, carried))
+            RefineError::Setting { name: "prior", problem }
+        })?);
+        let problem = self.stage_problem(frame, state)?;
+        Ok((problem.with_prior(Arc::clone(&prior) as Arc<dyn Factor>), prior))
+    }
+
+    /// The problem of the stage of tracking, with the stated prior about `initial`.
+    fn stage_problem(&self, frame: &Frame<'_>, initial: &State) -> Result<Problem, RefineError> {
+        let (stage, settings) = (&self.settings.stage, &self.settings.fused);
+        let patches = surface_patches(frame, initial, stage, settings);
+        problem_of(frame, initial, stage, settings, patches, &self.factors)
     }
 
     /// Steps down from `start` until the clock says otherwise.
-    fn solve(&self, problem: &Problem, start: State, clock: &Clock) -> Solved {
-        let stage = &self.settings.stage;
+    fn solve(&self, problem: &Problem, start: &State, clock: &Clock) -> Solved {
         let mut before = Instant::now();
-        let mut iterations = 0;
-        let start = problem.at(start);
+        let start = problem.linearize(start);
         let mut go_on = || {
             let step = before.elapsed();
             before += step;
-            clock.has(step)
+            if clock.has(step) { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
         };
-        if !go_on() {
-            return Solved { point: start, ending: Termination::Stopped, iterations, tried: false };
+        if go_on().is_break() {
+            let termination = Termination::Aborted;
+            let solution = Solution { at: start, termination, iterations: 0 };
+            return Solved { solution, tried: false };
         }
         let mut tried = false;
-        let (point, ending) = problem.solve(start, stage.iterations, stage.min_decrease, |down| {
-            iterations += usize::from(down);
+        let solution = problem.solve(start, &self.settings.stage.solver, |_| {
             tried = true;
             go_on()
         });
-        Solved { point, ending, iterations, tried }
+        Solved { solution, tried }
     }
 
-    /// The whole fused estimator from `initial`, with nothing carried over but what `initial` has; and the stage of tracking from there, whose
-    /// misfit compares with that of other frames.
+    /// The whole fused estimator from `initial`, with nothing carried over but what `initial` has; linearized as frames that are
+    /// tracked are, so that costs compare.
     fn estimate(
         &self,
-        observation: &Observation,
-        known: &FrameContext<'_>,
+        frame: &Frame<'_>,
         initial: &State,
     ) -> Result<(Solved, Posterior), RefineError> {
-        let fused = Fused { settings: self.settings.fused.clone() };
-        let mut best = initial.clone();
-        let robot = self.robot.as_ref();
-        let (_, confidence) =
-            fused.run(observation, &self.object, robot, initial.clone(), |state, _| {
-                best = state.clone();
-                true
-            })?;
-        let (stage, settings) = (&self.settings.stage, &self.settings.fused);
-        let patches = known.patches(initial, stage, settings);
-        let problem = known.problem(initial, stage, settings, patches)?;
-        let mut solved = self.solve(&problem, best, &Clock::start(None));
-        // The estimator saw more of the frame than the stage of tracking does.
-        solved.point.state.t_cam_object = confidence.hypotheses[0].t_cam_object;
-        Ok((solved, confidence))
+        let fused = Fused::new(self.settings.fused.clone());
+        let fused = self.factors.iter().cloned().fold(fused, Fused::with_shared);
+        let estimate = fused.run(frame, initial, &mut |_| ControlFlow::Continue(()))?;
+        let problem = self.stage_problem(frame, initial)?;
+        let posterior = estimate.posterior.ok_or(RefineError::NothingFits)?;
+        let (at, termination) = (problem.linearize(&estimate.state), posterior.termination);
+        let solution = Solution { at, termination, iterations: estimate.iteration };
+        Ok((Solved { solution, tried: true }, posterior))
     }
 
-    fn search(&mut self, observation: &Observation) -> Result<Isometry3<f64>, RefineError> {
+    fn search(&mut self, frame: &Frame<'_>) -> Result<Isometry3<f64>, RefineError> {
         let search = match &mut self.search {
             Some(search) => search,
             none => {
@@ -356,27 +288,26 @@ impl Tracker {
                 none.insert(PoseSearch::new(object, settings)?)
             }
         };
-        let found = search.run(observation, self.robot.as_ref())?;
+        let found = search.run(frame)?;
         found.first().map(|f| f.t_cam_object).ok_or(RefineError::NothingFits)
     }
 
     /// A pose that is believed, looked for from near to far. One from anywhere must fit as if nothing had changed.
     fn recover(
         &mut self,
-        observation: &Observation,
-        known: &FrameContext<'_>,
+        frame: &Frame<'_>,
         predicted: &State,
-        memory: &Memory,
+        track: &TrackState,
     ) -> Result<Option<(Solved, Posterior)>, RefineError> {
         let recovery = self.settings.recovery;
-        let levels = [(Recovery::Near, memory.allowance()), (Recovery::Anywhere, memory.level)];
+        let levels = [(Recovery::Near, track.allowance()), (Recovery::Anywhere, track.level)];
         for (reach, level) in levels {
             if reach > recovery {
                 break;
             }
             let mut start = predicted.clone();
             if reach == Recovery::Anywhere {
-                match self.search(observation) {
+                match self.search(frame) {
                     Ok(pose) => start.t_cam_object = pose,
                     Err(RefineError::NothingFits | RefineError::NoDepth) => break,
                     Err(error) => return Err(error),
@@ -385,91 +316,55 @@ impl Tracker {
             if start.center().z <= 0.0 {
                 continue;
             }
-            let (solved, confidence) = self.estimate(observation, known, &start)?;
-            if self.doubt(&solved, &confidence, None, level).is_none() {
-                return Ok(Some((solved, confidence)));
+            let (solved, posterior) = self.estimate(frame, &start)?;
+            if self.gate(&solved, &posterior, None, level).is_none() {
+                return Ok(Some((solved, posterior)));
             }
         }
         Ok(None)
     }
 
     /// Why `solved` should not be believed, if so.
-    fn doubt(
+    fn gate(
         &self,
         solved: &Solved,
-        confidence: &Posterior,
-        carried: Option<&GaussianPrior>,
+        posterior: &Posterior,
+        prior: Option<&GaussianPrior>,
         level: f64,
-    ) -> Option<RejectionReason> {
-        let (loss, misfit) = (&self.settings.loss, solved.misfit());
-        if misfit.is_nan() || misfit > loss.misfit_ratio * level + loss.misfit_margin {
-            return Some(RejectionReason::Misfit(misfit, level));
+    ) -> Option<Rejection> {
+        let (gating, cost) = (&self.settings.gating, solved.cost());
+        if cost.is_nan() || cost > gating.cost_ratio * level + gating.cost_margin {
+            return Some(Rejection::Cost(cost, level));
         }
-        let surprise = carried.map_or(0.0, |c| c.surprise(&solved.point.state));
-        if surprise > loss.surprise {
-            return Some(RejectionReason::Surprise(surprise));
+        let innovation = prior.map_or(0.0, |prior| prior.innovation(&solved.solution.at.state));
+        if innovation > gating.innovation_gate {
+            return Some(Rejection::Innovation(innovation));
         }
-        let widest = confidence.widest(self.object.radius);
-        (widest > loss.deviation).then_some(RejectionReason::Uncertain(widest))
+        let widest = posterior.widest(self.object.radius);
+        (widest > gating.max_sigma).then_some(Rejection::Uncertain(widest))
     }
 
-    /// How sure `solved` is. Calibrations far from what is `told` of them disagree, also where the frames before have led them there.
-    fn confidence(&self, solved: &Solved, told: &State) -> Result<Posterior, RefineError> {
-        let fused = &self.settings.fused;
-        let state = &solved.point.state;
-        let calibrations = State { t_cam_object: told.t_cam_object, ..state.clone() };
-        let squared = 2.0 * Prior::new(told, &fused.accuracy)?.value(&calibrations);
-        let degrees = solved.point.normal.gradient().len().saturating_sub(6);
-        let distance = chi_square_z(squared, degrees);
-        let also = Some(Inconsistency { evidence: "calibrations", distance });
-        let found = [(solved.point.clone(), solved.ending)];
-        Ok(Posterior::new(&found, fused.width, self.object.radius, false, also))
+    /// The posterior of `solved`. Calibrations far from `nominal` are inconsistent, also where the frames before have led them there.
+    fn posterior(&self, solved: &Solved, nominal: &State) -> Result<Posterior, RefineError> {
+        let (fused, at) = (&self.settings.fused, &solved.solution.at);
+        let calibrations = State { t_cam_object: nominal.t_cam_object, ..at.state.clone() };
+        let stated = GaussianPrior::independent(nominal.clone(), &fused.prior)?;
+        let degrees = at.equations.gradient().len().saturating_sub(6);
+        let distance = chi_square_z(2.0 * stated.cost(&calibrations), degrees);
+        let also = Some(Inconsistency { factor: "calibrations", distance });
+        let found = [solved.solution.clone()];
+        Ok(Posterior::new(&found, fused.inflation, self.object.radius, false, also))
     }
 
     fn remember(
         &self,
         time: Duration,
         solved: &Solved,
-        told: &State,
+        nominal: &State,
         in_hand: bool,
         level: f64,
-    ) -> Memory {
-        Memory::new(time, &solved.point, told, in_hand, &self.settings.fused.accuracy, level)
-    }
-}
-
-/// A pose that nothing was made of but a prediction.
-fn outcome(state: State, following: TrackStatus, spent: Spent) -> Tracked {
-    Tracked {
-        t_cam_object: state.t_cam_object,
-        state,
-        following,
-        confidence: None,
-        doubt: None,
-        iterations: 0,
-        misfit: f64::NAN,
-        spent,
-    }
-}
-
-fn lost(state: State, doubt: RejectionReason, spent: Spent) -> Tracked {
-    Tracked { doubt: Some(doubt), ..outcome(state, TrackStatus::Lost, spent) }
-}
-
-fn found(
-    solved: Solved,
-    confidence: Posterior,
-    following: TrackStatus,
-    doubt: Option<RejectionReason>,
-    spent: Spent,
-) -> Tracked {
-    let (misfit, iterations) = (solved.misfit(), solved.iterations);
-    let state = solved.point.state;
-    Tracked {
-        iterations,
-        misfit,
-        doubt,
-        confidence: Some(confidence),
-        ..outcome(state, following, spent)
+    ) -> TrackState {
+        let prior = &self.settings.fused.prior;
+        TrackState::new(time, &solved.solution.at, nominal, in_hand, prior, level)
     }
 }

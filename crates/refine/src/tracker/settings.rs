@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use crate::error::RefineError;
+use crate::problem::Solver;
 use crate::search::SearchSettings;
 use crate::strategy::{FusedSettings, Stage};
 
@@ -20,14 +21,14 @@ pub struct ProcessNoise {
 /// When a pose is not believed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GatingSettings {
-    /// The misfit may be so many times its running level,
-    pub misfit_ratio: f64,
+    /// The cost may be so many times its running mean,
+    pub cost_ratio: f64,
     /// and so much more \[nat\].
-    pub misfit_margin: f64,
+    pub cost_margin: f64,
     /// Standard deviations of the prediction that the object may be away from it.
-    pub surprise: f64,
+    pub innovation_gate: f64,
     /// Standard deviation of the pose in the direction in which it is largest \[m of surface motion\].
-    pub deviation: f64,
+    pub max_sigma: f64,
 }
 
 /// How far a tracker goes to find an object that it has lost. Finding takes far longer than following, and the budget does
@@ -71,18 +72,18 @@ pub struct TrackerSettings {
     /// The one stage that follows the object.
     pub stage: Stage,
     /// Motion relative to a hand that is known.
-    pub held: ProcessNoise,
+    pub in_hand: ProcessNoise,
     /// Motion in the camera frame, where no hand is known.
     pub free: ProcessNoise,
     /// Time within which what was learnt of calibrations is forgotten, all but 1/e \[s\]. Errors that frames share, such as a warp of depth or a
     /// wrong model, count as new in every one of them: the longer they are remembered while nothing moves, the farther calibrations are
     /// led astray.
-    pub memory: f64,
+    pub calibration_time_constant: f64,
     /// Time that following may take in a frame; without one it takes what it needs. A step that would not end in time is
     /// not begun, as far as the one before it tells.
     pub budget: Option<Duration>,
     /// When a pose is not believed.
-    pub loss: GatingSettings,
+    pub gating: GatingSettings,
     /// What is done then.
     pub recovery: Recovery,
     /// How poses are searched for.
@@ -96,24 +97,23 @@ impl Default for TrackerSettings {
             stage: Stage {
                 downsample: 4,
                 points: 400,
-                tolerance: 1.0,
-                iterations: 4,
-                min_decrease: 0.02,
+                kernel_scale: 1.0,
+                solver: Solver { iterations: 4, min_decrease: 0.02 },
                 hypotheses: 1,
                 color: true,
-                measured_scatter: false,
-                model_deviates: true,
+                measured_noise: false,
+                model_error: true,
                 contact: true,
             },
-            held: ProcessNoise { translation: 0.02, rotation: 0.2, gain: 0.1 },
+            in_hand: ProcessNoise { translation: 0.02, rotation: 0.2, gain: 0.1 },
             free: ProcessNoise { translation: 0.3, rotation: 2.0, gain: 0.5 },
-            memory: 0.2,
+            calibration_time_constant: 0.2,
             budget: None,
-            loss: GatingSettings {
-                misfit_ratio: 2.5,
-                misfit_margin: 40.0,
-                surprise: 8.0,
-                deviation: 12e-3,
+            gating: GatingSettings {
+                cost_ratio: 2.5,
+                cost_margin: 40.0,
+                innovation_gate: 8.0,
+                max_sigma: 12e-3,
             },
             recovery: Recovery::Anywhere,
             search: SearchSettings::default(),
@@ -122,24 +122,29 @@ impl Default for TrackerSettings {
 }
 
 impl TrackerSettings {
+    /// Of an object in a hand that is known, or of one anywhere.
+    pub(super) fn motion(&self, in_hand: bool) -> &ProcessNoise {
+        if in_hand { &self.in_hand } else { &self.free }
+    }
+
     pub(super) fn check(&self) -> Result<(), RefineError> {
         let positive = [
-            ("held.translation", self.held.translation),
-            ("held.rotation", self.held.rotation),
+            ("in_hand.translation", self.in_hand.translation),
+            ("in_hand.rotation", self.in_hand.rotation),
             ("free.translation", self.free.translation),
             ("free.rotation", self.free.rotation),
-            ("memory", self.memory),
-            ("loss.misfit_ratio", self.loss.misfit_ratio),
-            ("loss.misfit_margin", self.loss.misfit_margin),
-            ("loss.surprise", self.loss.surprise),
-            ("loss.deviation", self.loss.deviation),
+            ("calibration_time_constant", self.calibration_time_constant),
+            ("gating.cost_ratio", self.gating.cost_ratio),
+            ("gating.cost_margin", self.gating.cost_margin),
+            ("gating.innovation_gate", self.gating.innovation_gate),
+            ("gating.max_sigma", self.gating.max_sigma),
         ];
         for (name, value) in positive {
             if value.is_nan() || value <= 0.0 {
                 return Err(RefineError::Setting { name, problem: format!("is {value}") });
             }
         }
-        for (name, gain) in [("held.gain", self.held.gain), ("free.gain", self.free.gain)] {
+        for (name, gain) in [("in_hand.gain", self.in_hand.gain), ("free.gain", self.free.gain)] {
             if !(0.0..=1.0).contains(&gain) {
                 let problem = format!("is {gain}, not between 0 and 1");
                 return Err(RefineError::Setting { name, problem });
@@ -157,8 +162,8 @@ mod tests {
     fn settings_out_of_range_are_named() {
         let mut settings = TrackerSettings::default();
         assert!(settings.check().is_ok());
-        settings.memory = 0.0;
-        assert_eq!(settings.check().unwrap_err().to_string(), "memory is 0");
+        settings.calibration_time_constant = 0.0;
+        assert_eq!(settings.check().unwrap_err().to_string(), "calibration_time_constant is 0");
         settings = TrackerSettings::default();
         settings.free.gain = f64::NAN;
         assert!(settings.check().unwrap_err().to_string().contains("free.gain is NaN"));

@@ -7,7 +7,7 @@ use crate::scene::{Sequence, default_sequence};
 static SEQUENCE: LazyLock<Sequence> = LazyLock::new(|| default_sequence(1, 24).unwrap());
 
 fn tracker(settings: TrackerSettings) -> Tracker {
-    let robot = Some(Arc::clone(&SEQUENCE.robot));
+    let robot = Some(Arc::clone(&SEQUENCE.hand));
     let mut tracker = Tracker::new(Arc::clone(&SEQUENCE.object), robot, settings).unwrap();
     tracker.start_from(&SEQUENCE.initial);
     tracker
@@ -29,28 +29,28 @@ fn a_moving_hand_is_followed() {
     let mut tracker = tracker(TrackerSettings { recovery: Recovery::Off, ..Default::default() });
     for index in 0..SEQUENCE.frames.len() {
         let tracked = track(&mut tracker, index);
-        let expected = if index == 0 { TrackStatus::Found } else { TrackStatus::Followed };
-        assert_eq!(tracked.following, expected, "frame {index}: {:?}", tracked.doubt);
+        let expected = if index == 0 { TrackStatus::Relocalized } else { TrackStatus::Tracked };
+        assert_eq!(tracked.status, expected, "frame {index}: {:?}", tracked.rejection);
         let (pe, oe) = errors(&tracked, index);
-        println!("{index}: {pe:.3} cm {oe:.2}° {:.0} nats {}", tracked.misfit, tracked.iterations);
+        println!("{index}: {pe:.3} cm {oe:.2}° {:.0} nats {}", tracked.cost, tracked.iterations);
         assert!(pe < 0.2 && oe < 2.0, "frame {index}: {pe} cm, {oe}°");
-        let confidence = tracked.confidence.unwrap();
-        assert!(confidence.covariance().cholesky().is_some());
+        let posterior = tracked.posterior.unwrap();
+        assert!(posterior.covariance().cholesky().is_some());
     }
 }
 
 #[test]
 fn without_a_hand_the_camera_is_enough() {
     let mut tracker = tracker(TrackerSettings { recovery: Recovery::Off, ..Default::default() });
-    tracker.robot = None;
+    tracker.hand = None;
     for index in 0..12 {
         let frame = &SEQUENCE.frames[index];
         let mut observation = frame.observation.clone();
         observation.hand = None;
         let tracked = tracker.track(&observation, frame.time).unwrap();
         let (pe, oe) = errors(&tracked, index);
-        println!("{index}: {pe:.3} cm {oe:.2}° {:?} {}", tracked.following, tracked.misfit);
-        assert!(pe < 0.6 && oe < 6.0 && tracked.following != TrackStatus::Lost, "frame {index}");
+        println!("{index}: {pe:.3} cm {oe:.2}° {:?} {}", tracked.status, tracked.cost);
+        assert!(pe < 0.6 && oe < 6.0 && tracked.status != TrackStatus::Lost, "frame {index}");
     }
 }
 
@@ -62,21 +62,21 @@ fn a_jump_is_noticed_and_recovered_from() {
         let frame = &SEQUENCE.frames[23];
         let mut observation = frame.observation.clone();
         observation.hand = SEQUENCE.frames[3].observation.hand.clone();
-        tracker.robot = None;
+        tracker.hand = None;
         let time = SEQUENCE.frames[3].time;
         tracker.track(&observation, time).unwrap()
     };
     let careful = ProcessNoise { translation: 0.05, rotation: 0.5, gain: 0.5 };
     let settings = TrackerSettings { free: careful, ..Default::default() };
-    let mut prune_margin = tracker(TrackerSettings { recovery: Recovery::Off, ..settings.clone() });
-    let lost = jump(&mut prune_margin);
-    assert!(lost.following == TrackStatus::Lost && lost.doubt.is_some(), "{:?}", lost.following);
+    let mut hopeless = tracker(TrackerSettings { recovery: Recovery::Off, ..settings.clone() });
+    let lost = jump(&mut hopeless);
+    assert!(lost.status == TrackStatus::Lost && lost.rejection.is_some(), "{:?}", lost.status);
     let mut tracker = tracker(settings);
     let found = jump(&mut tracker);
     let (pe, oe) = errors(&found, 23);
-    assert_eq!(found.following, TrackStatus::Found, "{:?}", found.doubt);
+    assert_eq!(found.status, TrackStatus::Relocalized, "{:?}", found.rejection);
     assert!(pe < 0.6 && oe < 6.0, "{pe} cm, {oe}°");
-    assert!(found.doubt.is_some() && found.spent.recovery > Duration::ZERO);
+    assert!(found.rejection.is_some() && found.timing.recovery > Duration::ZERO);
 }
 
 #[test]
@@ -87,8 +87,8 @@ fn without_time_the_prediction_is_returned() {
     let hand = |k: usize| SEQUENCE.frames[k].observation.hand.as_ref().unwrap().t_cam_hand;
     for index in 1..4 {
         let predicted = track(&mut tracker, index);
-        assert_eq!(predicted.following, TrackStatus::Predicted);
-        assert!(predicted.confidence.is_none() && predicted.iterations == 0);
+        assert_eq!(predicted.status, TrackStatus::Predicted);
+        assert!(predicted.posterior.is_none() && predicted.iterations == 0);
         // The hand carries the object along.
         let expected = hand(index) * hand(0).inverse() * first.t_cam_object;
         let (pe, oe) =
@@ -96,7 +96,7 @@ fn without_time_the_prediction_is_returned() {
         assert!(pe < 0.05 && oe < 0.1, "{pe} cm, {oe}°");
     }
     tracker.settings.budget = None;
-    assert_eq!(track(&mut tracker, 4).following, TrackStatus::Followed);
+    assert_eq!(track(&mut tracker, 4).status, TrackStatus::Tracked);
 }
 
 #[test]
@@ -106,8 +106,8 @@ fn an_empty_mask_is_lost_and_a_full_one_found_again() {
     let mut observation = SEQUENCE.frames[1].observation.clone();
     observation.mask.pixels_mut().fill(false);
     let lost = tracker.track(&observation, SEQUENCE.frames[1].time).unwrap();
-    assert_eq!((lost.following, lost.doubt), (TrackStatus::Lost, Some(RejectionReason::Unseen)));
-    assert_eq!(track(&mut tracker, 2).following, TrackStatus::Followed);
+    assert_eq!((lost.status, lost.rejection), (TrackStatus::Lost, Some(Rejection::Unseen)));
+    assert_eq!(track(&mut tracker, 2).status, TrackStatus::Tracked);
     // Neither color nor depth under the mask.
     let mut observation = SEQUENCE.frames[3].observation.clone();
     observation.depth.pixels_mut().fill(0.0);
@@ -119,11 +119,11 @@ fn an_empty_mask_is_lost_and_a_full_one_found_again() {
 fn a_moment_s_loss_makes_little_pass_for_right() {
     let mut tracker = tracker(TrackerSettings::default());
     track(&mut tracker, 0);
-    let memory = tracker.memory.as_mut().unwrap();
-    assert_eq!(memory.allowance(), memory.level);
-    memory.lost = 10;
-    let grown = memory.allowance();
-    assert!(grown > 1.1 * memory.level && grown < 1.3 * memory.level);
+    let level = tracker.track.as_mut().unwrap();
+    assert_eq!(level.allowance(), level.level);
+    level.lost = 10;
+    let grown = level.allowance();
+    assert!(grown > 1.1 * level.level && grown < 1.3 * level.level);
 }
 
 /// With a mask that is somewhere else for a while something is found there, or nothing; but the object again when the mask is right again.
@@ -142,12 +142,12 @@ fn wrong_masks_do_not_lead_astray_for_good() {
         }
         let tracked = tracker.track(&observation, frame.time).unwrap();
         let (pe, oe) = errors(&tracked, index);
-        println!("{index}: {pe:.3} cm {oe:.2}° {:?} {:?}", tracked.following, tracked.doubt);
-        assert!(index > 5 || tracked.following == TrackStatus::Lost, "frame {index}");
+        println!("{index}: {pe:.3} cm {oe:.2}° {:?} {:?}", tracked.status, tracked.rejection);
+        assert!(index > 5 || tracked.status == TrackStatus::Lost, "frame {index}");
     }
     let tracked = (14..18).map(|index| track(&mut tracker, index)).last().unwrap();
     let (pe, oe) = errors(&tracked, 17);
-    assert!(pe < 0.2 && oe < 2.0, "{:?} {:?}: {pe} cm, {oe}°", tracked.following, tracked.doubt);
+    assert!(pe < 0.2 && oe < 2.0, "{:?} {:?}: {pe} cm, {oe}°", tracked.status, tracked.rejection);
 }
 
 /// Errors that all frames share, as those of a camera are, are not counted again in each.
@@ -163,7 +163,7 @@ fn a_still_scene_does_not_wander_off() {
     }
     let mut at = |index: u64| {
         let tracked = tracker.track(&observation, Duration::from_millis(33 * index)).unwrap();
-        assert!(index == 0 || tracked.following == TrackStatus::Followed, "{:?}", tracked.doubt);
+        assert!(index == 0 || tracked.status == TrackStatus::Tracked, "{:?}", tracked.rejection);
         tracked.t_cam_object
     };
     let poses: Vec<Isometry3<f64>> = (0..60).map(&mut at).collect();
@@ -180,30 +180,31 @@ fn calibrations_that_were_led_astray_still_disagree() {
         let hand = observation.hand.as_mut().unwrap();
         hand.t_cam_hand.translation.z += 0.05;
         let tracked = tracker.track(&observation, SEQUENCE.frames[index].time).unwrap();
-        let probability = tracked.confidence.as_ref().map_or(0.0, Posterior::probability);
+        let probability = tracked.posterior.as_ref().map_or(0.0, Posterior::probability);
         let (pe, _) = errors(&tracked, index);
-        println!("{index}: {pe:.2} cm {:?} {probability:.2}", tracked.following);
+        println!("{index}: {pe:.2} cm {:?} {probability:.2}", tracked.status);
         assert!(probability < 0.8 || pe < 0.5, "frame {index}: {probability}, {pe} cm");
     }
 }
 
 #[test]
 fn an_uncertain_pose_is_doubted_at_any_limit() {
-    let loss = GatingSettings { deviation: 1e-4, ..TrackerSettings::default().loss };
-    let settings = TrackerSettings { loss, recovery: Recovery::Off, ..Default::default() };
+    let gating = GatingSettings { max_sigma: 1e-4, ..TrackerSettings::default().gating };
+    let settings = TrackerSettings { gating, recovery: Recovery::Off, ..Default::default() };
     let mut tracker = tracker(settings);
     track(&mut tracker, 0);
     let tracked = track(&mut tracker, 1);
-    assert_eq!(tracked.following, TrackStatus::Lost);
-    let Some(RejectionReason::Uncertain(deviation)) = tracked.doubt else {
-        panic!("{:?}", tracked.doubt)
+    assert_eq!(tracked.status, TrackStatus::Lost);
+    let Some(Rejection::Uncertain(deviation)) = tracked.rejection else {
+        panic!("{:?}", tracked.rejection)
     };
     assert!(deviation > 1e-4 && deviation < 8e-3, "{deviation} m");
 }
 
 #[test]
 fn calibrations_carry_over() {
-    let mut tracker = tracker(TrackerSettings { memory: 3.0, ..Default::default() });
+    let mut tracker =
+        tracker(TrackerSettings { calibration_time_constant: 3.0, ..Default::default() });
     let wrong = 0.03;
     let observation = |index: usize| {
         let mut observation = SEQUENCE.frames[index].observation.clone();
@@ -240,5 +241,5 @@ fn faults_of_a_frame_are_errors_and_change_nothing() {
     observation.hand.as_mut().unwrap().forces.pop();
     let error = tracker.track(&observation, SEQUENCE.frames[1].time).unwrap_err();
     assert!(matches!(error, RefineError::TaxelCount { .. }));
-    assert_eq!(track(&mut tracker, 1).following, TrackStatus::Followed);
+    assert_eq!(track(&mut tracker, 1).status, TrackStatus::Tracked);
 }

@@ -14,12 +14,8 @@ const RGB: &str = "ds/test/000001/rgb/000000.png";
 const DEPTH: &str = "ds/test/000001/depth/000000.png";
 const MASK: &str = "ds/test/000001/mask_visib/000000_000000.png";
 
-/// A fault, and what the summary must say of it.
-struct Fault {
-    name: &'static str,
-    make: fn(&Workplace),
-    expected: &'static [&'static str],
-}
+/// The name of a fault, how it is made, and what the summary must say of it.
+type Fault = (&'static str, fn(&Workplace), &'static [&'static str]);
 
 /// Three frames: image 0, where the faults are, image 1 of the same scene, and another scene.
 fn workplace() -> Workplace {
@@ -33,19 +29,19 @@ fn workplace() -> Workplace {
 
 /// Runs each fault: image 0 fails as expected, and the frames `survivors` are refined nevertheless.
 fn table(faults: &[Fault], survivors: &[(u32, u32)]) {
-    for fault in faults {
+    for (name, make, expected) in faults {
         let place = workplace();
-        (fault.make)(&place);
+        make(&place);
         let before = place.listing();
         let said = place.prehend(REFINE);
-        let (name, err) = (fault.name, &said.err);
+        let err = &said.err;
         assert_eq!(said.code, 2, "{name}: {err}");
         let failed = 3 - survivors.len();
         assert!(
             err.contains(&format!("{} done, {failed} failed:", survivors.len())),
             "{name}: {err}"
         );
-        for expected in fault.expected {
+        for expected in *expected {
             assert!(err.contains(expected), "{name}: no {expected:?} in: {err}");
         }
         let done: Vec<_> =
@@ -98,71 +94,63 @@ fn other_hand(place: &Workplace, edit: impl FnOnce(String) -> String) {
 fn images() {
     table(
         &[
-            Fault {
-                name: "missing color",
-                make: |p| p.remove(RGB),
-                expected: &["scene 1 image 0 object 5: ", "rgb/000000.png: no such file"],
-            },
-            Fault {
-                name: "truncated color",
-                make: |p| p.truncate(RGB, 0.5),
-                expected: &["ds/test/000001/rgb/000000.png: "],
-            },
-            Fault {
-                name: "missing depth",
-                make: |p| p.remove(DEPTH),
-                expected: &["ds/test/000001/depth/000000.png: no such file"],
-            },
-            Fault {
-                name: "truncated depth",
-                make: |p| p.truncate(DEPTH, 0.9),
-                expected: &["ds/test/000001/depth/000000.png: "],
-            },
-            Fault {
-                name: "depth of eight bits",
-                make: |p| {
+            (
+                "missing color",
+                |p| p.remove(RGB),
+                &["scene 1 image 0 object 5: ", "rgb/000000.png: no such file"],
+            ),
+            ("truncated color", |p| p.truncate(RGB, 0.5), &["ds/test/000001/rgb/000000.png: "]),
+            (
+                "missing depth",
+                |p| p.remove(DEPTH),
+                &["ds/test/000001/depth/000000.png: no such file"],
+            ),
+            ("truncated depth", |p| p.truncate(DEPTH, 0.9), &["ds/test/000001/depth/000000.png: "]),
+            (
+                "depth of eight bits",
+                |p| {
                     let file = p.path(DEPTH);
                     Mask::filled(640, 480, true).save(&file).unwrap();
                 },
-                expected: &["object 5: ds/test/000001/depth/000000.png: expected 16-bit gray"],
-            },
-            Fault {
-                name: "no depth",
-                make: |p| {
+                &["object 5: ds/test/000001/depth/000000.png: expected 16-bit gray"],
+            ),
+            (
+                "no depth",
+                |p| {
                     let file = p.path(DEPTH);
                     DepthImage::filled(640, 480, 0.0).save(&file, 1e-4).unwrap();
                 },
-                expected: &["ds/test/000001/depth/000000.png: every depth is zero"],
-            },
-            Fault {
-                name: "depth of another size",
-                make: |p| {
+                &["ds/test/000001/depth/000000.png: every depth is zero"],
+            ),
+            (
+                "depth of another size",
+                |p| {
                     let file = p.path(DEPTH);
                     DepthImage::filled(320, 240, 0.5).save(&file, 1e-4).unwrap();
                 },
-                expected: &["depth/000000.png: is 320x240 pixels but", "000000.png is 640x480"],
-            },
-            Fault {
-                name: "missing mask",
-                make: |p| p.remove(MASK),
-                expected: &["ds/test/000001/mask_visib/000000_000000.png: no such file"],
-            },
-            Fault {
-                name: "truncated mask",
-                make: |p| p.truncate(MASK, 0.6),
-                expected: &["ds/test/000001/mask_visib/000000_000000.png: "],
-            },
-            Fault {
-                name: "empty mask",
-                make: |p| {
+                &["depth/000000.png: is 320x240 pixels but", "000000.png is 640x480"],
+            ),
+            (
+                "missing mask",
+                |p| p.remove(MASK),
+                &["ds/test/000001/mask_visib/000000_000000.png: no such file"],
+            ),
+            (
+                "truncated mask",
+                |p| p.truncate(MASK, 0.6),
+                &["ds/test/000001/mask_visib/000000_000000.png: "],
+            ),
+            (
+                "empty mask",
+                |p| {
                     let file = p.path(MASK);
                     Mask::filled(640, 480, false).save(&file).unwrap();
                 },
-                expected: &["mask_visib/000000_000000.png: the mask is empty"],
-            },
-            Fault {
-                name: "no depth in the mask",
-                make: |p| {
+                &["mask_visib/000000_000000.png: the mask is empty"],
+            ),
+            (
+                "no depth in the mask",
+                |p| {
                     let file = p.path(DEPTH);
                     let mask = p.path(MASK);
                     let mut depth = DepthImage::load(&file, 1e-4).unwrap();
@@ -171,8 +159,8 @@ fn images() {
                     pixels.filter(|(_, m)| **m).for_each(|(z, _)| *z = 0.0);
                     depth.save(&file, 1e-4).unwrap();
                 },
-                expected: &["no pixel of the object's mask has a depth"],
-            },
+                &["no pixel of the object's mask has a depth"],
+            ),
         ],
         &OTHERS,
     );
@@ -182,69 +170,65 @@ fn images() {
 fn rows() {
     table(
         &[
-            Fault {
-                name: "too few columns",
-                make: |p| row(p, "1,0,5,1"),
-                expected: &["init.csv: line 2: row: expected 7 columns, found 4"],
-            },
-            Fault {
-                name: "too many columns",
-                make: |p| row(p, "1,0,5,1,2,3,4,5"),
-                expected: &["init.csv: line 2: row: expected 7 columns, found 8"],
-            },
-            Fault {
-                name: "text for an id",
-                make: |p| column(p, 1, "zero"),
-                expected: &["init.csv: line 2: im_id: \"zero\" is not an id"],
-            },
-            Fault {
-                name: "text in a rotation",
-                make: |p| column(p, 4, "1 0 0 0 1 0 0 0 x"),
-                expected: &["init.csv: line 2: R: \"x\" is not a number"],
-            },
-            Fault {
-                name: "NaN in a translation",
-                make: |p| column(p, 5, "0 nan 500"),
-                expected: &["init.csv: line 2: t: value 1 is not finite"],
-            },
-            Fault {
-                name: "no rotation",
-                make: |p| column(p, 4, "1 0 0 0 1 0 0 0 2"),
-                expected: &["init.csv: line 2: R: not orthonormal"],
-            },
-            Fault {
-                name: "mirror image",
-                make: |p| column(p, 4, "1 0 0 0 1 0 0 0 -1"),
-                expected: &["init.csv: line 2: R: a reflection"],
-            },
-            Fault {
-                name: "unknown scene",
-                make: |p| column(p, 0, "9"),
-                expected: &["scene 9 image 0 object 5: ds/test: no scene 9"],
-            },
-            Fault {
-                name: "unknown image",
-                make: |p| column(p, 1, "7"),
-                expected: &[
-                    "scene 1 image 7 object 5: ds/test/000001/scene_camera.json: no entry \"7\"",
-                ],
-            },
-            Fault {
-                name: "unknown object",
-                make: |p| column(p, 2, "8"),
-                expected: &[
-                    "scene 1 image 0 object 8: ds/models/obj_000008.ply: unknown object id 8",
-                ],
-            },
-            Fault {
-                name: "behind the camera",
-                make: |p| column(p, 5, "0 0 -500"),
-                expected: &[
+            (
+                "too few columns",
+                |p| row(p, "1,0,5,1"),
+                &["init.csv: line 2: row: expected 7 columns, found 4"],
+            ),
+            (
+                "too many columns",
+                |p| row(p, "1,0,5,1,2,3,4,5"),
+                &["init.csv: line 2: row: expected 7 columns, found 8"],
+            ),
+            (
+                "text for an id",
+                |p| column(p, 1, "zero"),
+                &["init.csv: line 2: im_id: \"zero\" is not an id"],
+            ),
+            (
+                "text in a rotation",
+                |p| column(p, 4, "1 0 0 0 1 0 0 0 x"),
+                &["init.csv: line 2: R: \"x\" is not a number"],
+            ),
+            (
+                "NaN in a translation",
+                |p| column(p, 5, "0 nan 500"),
+                &["init.csv: line 2: t: value 1 is not finite"],
+            ),
+            (
+                "no rotation",
+                |p| column(p, 4, "1 0 0 0 1 0 0 0 2"),
+                &["init.csv: line 2: R: not orthonormal"],
+            ),
+            (
+                "mirror image",
+                |p| column(p, 4, "1 0 0 0 1 0 0 0 -1"),
+                &["init.csv: line 2: R: a reflection"],
+            ),
+            (
+                "unknown scene",
+                |p| column(p, 0, "9"),
+                &["scene 9 image 0 object 5: ds/test: no scene 9"],
+            ),
+            (
+                "unknown image",
+                |p| column(p, 1, "7"),
+                &["scene 1 image 7 object 5: ds/test/000001/scene_camera.json: no entry \"7\""],
+            ),
+            (
+                "unknown object",
+                |p| column(p, 2, "8"),
+                &["scene 1 image 0 object 8: ds/models/obj_000008.ply: unknown object id 8"],
+            ),
+            (
+                "behind the camera",
+                |p| column(p, 5, "0 0 -500"),
+                &[
                     "scene 1 image 0 object 5: ",
                     "object's center at depth -0.",
                     "behind the camera",
                 ],
-            },
+            ),
         ],
         &OTHERS,
     );
@@ -254,53 +238,51 @@ fn rows() {
 fn entries_of_an_image() {
     table(
         &[
-            Fault {
-                name: "NaN in the intrinsics",
-                make: |p| {
+            (
+                "NaN in the intrinsics",
+                |p| {
                     let file = format!("{SCENE}/scene_camera.json");
                     p.replace(&file, "580.0", "NaN");
                 },
-                expected: &["scene_camera.json: 0.cam_K[0]: is not a finite number"],
-            },
-            Fault {
-                name: "no intrinsics",
-                make: |p| entry(p, "scene_camera.json", |e| e["cam_K"] = json!(null)),
-                expected: &["ds/test/000001/scene_camera.json: 0.cam_K: is missing"],
-            },
-            Fault {
-                name: "no image in the bodies",
-                make: |p| {
+                &["scene_camera.json: 0.cam_K[0]: is not a finite number"],
+            ),
+            (
+                "no intrinsics",
+                |p| entry(p, "scene_camera.json", |e| e["cam_K"] = json!(null)),
+                &["ds/test/000001/scene_camera.json: 0.cam_K: is missing"],
+            ),
+            (
+                "no image in the bodies",
+                |p| {
                     p.edit_json(&format!("{SCENE}/scene_bodies.json"), |all| {
                         all.as_object_mut().unwrap().remove("0");
                     });
                 },
-                expected: &["scene_bodies.json: no entry \"0\""],
-            },
-            Fault {
-                name: "hand not rotated",
-                make: |p| {
-                    entry(p, "scene_bodies.json", |e| e["bodies"][0]["cam_R_b2c"][0] = json!(3))
-                },
-                expected: &["scene_bodies.json: 0.bodies[0].cam_R_b2c: not orthonormal"],
-            },
-            Fault {
-                name: "no gravity",
-                make: |p| entry(p, "scene_bodies.json", |e| e["gravity"] = json!([0, 0, 0])),
-                expected: &["scene_bodies.json: 0.gravity: 0.000e0 m/s² is no gravity"],
-            },
-            Fault {
-                name: "two hands",
-                make: |p| {
+                &["scene_bodies.json: no entry \"0\""],
+            ),
+            (
+                "hand not rotated",
+                |p| entry(p, "scene_bodies.json", |e| e["bodies"][0]["cam_R_b2c"][0] = json!(3)),
+                &["scene_bodies.json: 0.bodies[0].cam_R_b2c: not orthonormal"],
+            ),
+            (
+                "no gravity",
+                |p| entry(p, "scene_bodies.json", |e| e["gravity"] = json!([0, 0, 0])),
+                &["scene_bodies.json: 0.gravity: 0.000e0 m/s² is no gravity"],
+            ),
+            (
+                "two hands",
+                |p| {
                     entry(p, "scene_bodies.json", |e| {
                         let hand = e["bodies"][0].clone();
                         e["bodies"].as_array_mut().unwrap().push(hand);
                     });
                 },
-                expected: &["scene_bodies.json: 0.bodies: expected one hand, found 2"],
-            },
-            Fault {
-                name: "missing joint",
-                make: |p| {
+                &["scene_bodies.json: 0.bodies: expected one hand, found 2"],
+            ),
+            (
+                "missing joint",
+                |p| {
                     entry(p, "scene_bodies.json", |e| {
                         let joints = e["bodies"][0]["joints"].as_object_mut().unwrap();
                         let first = joints.keys().next().unwrap().clone();
@@ -308,56 +290,52 @@ fn entries_of_an_image() {
                         joints.remove(&first);
                     });
                 },
-                expected: &["scene_bodies.json: 0.bodies[0].joints: joint 'joint_0.0' is missing"],
-            },
-            Fault {
-                name: "text for a joint",
-                make: |p| {
+                &["scene_bodies.json: 0.bodies[0].joints: joint 'joint_0.0' is missing"],
+            ),
+            (
+                "text for a joint",
+                |p| {
                     entry(p, "scene_bodies.json", |e| {
                         e["bodies"][0]["joints"]["joint_0.0"] = json!("bent")
                     })
                 },
-                expected: &[
-                    "scene_bodies.json: 0.bodies[0].joints.joint_0.0: is not a finite number",
-                ],
-            },
-            Fault {
-                name: "no image in the touch",
-                make: |p| {
+                &["scene_bodies.json: 0.bodies[0].joints.joint_0.0: is not a finite number"],
+            ),
+            (
+                "no image in the touch",
+                |p| {
                     p.edit_json(&format!("{SCENE}/scene_tactile.json"), |all| {
                         all.as_object_mut().unwrap().remove("0");
                     });
                 },
-                expected: &["scene_tactile.json: no entry \"0\""],
-            },
-            Fault {
-                name: "a force too few",
-                make: |p| {
+                &["scene_tactile.json: no entry \"0\""],
+            ),
+            (
+                "a force too few",
+                |p| {
                     entry(p, "scene_tactile.json", |e| {
                         e["force"].as_array_mut().unwrap().pop();
                     });
                 },
-                expected: &[
+                &[
                     "scene_tactile.json: 0.force: expected 368 forces, one a taxel of ds/hand/taxels.csv, found 367",
                 ],
-            },
-            Fault {
-                name: "forces of another body",
-                make: |p| entry(p, "scene_tactile.json", |e| e["body"] = json!("left_hand")),
-                expected: &[
-                    "scene_tactile.json: 0.body: names \"left_hand\", but the hand is \"hand\"",
-                ],
-            },
-            Fault {
-                name: "a force of two numbers",
-                make: |p| entry(p, "scene_tactile.json", |e| e["force"][5] = json!([0, 1])),
-                expected: &["scene_tactile.json: 0.force[5]: expected 3 numbers, found 2"],
-            },
-            Fault {
-                name: "taxels absent",
-                make: |p| entry(p, "scene_tactile.json", |e| e["taxels"] = json!("hand/none.csv")),
-                expected: &["ds/hand/none.csv: "],
-            },
+            ),
+            (
+                "forces of another body",
+                |p| entry(p, "scene_tactile.json", |e| e["body"] = json!("left_hand")),
+                &["scene_tactile.json: 0.body: names \"left_hand\", but the hand is \"hand\""],
+            ),
+            (
+                "a force of two numbers",
+                |p| entry(p, "scene_tactile.json", |e| e["force"][5] = json!([0, 1])),
+                &["scene_tactile.json: 0.force[5]: expected 3 numbers, found 2"],
+            ),
+            (
+                "taxels absent",
+                |p| entry(p, "scene_tactile.json", |e| e["taxels"] = json!("hand/none.csv")),
+                &["ds/hand/none.csv: "],
+            ),
         ],
         &OTHERS,
     );
@@ -367,56 +345,56 @@ fn entries_of_an_image() {
 fn models_and_hands() {
     table(
         &[
-            Fault {
-                name: "no ply",
-                make: |p| {
+            (
+                "no ply",
+                |p| {
                     other_object(p, |_| ());
                     p.write("ds/models/obj_000006.ply", "no mesh");
                 },
-                expected: &["ds/models/obj_000006.ply: "],
-            },
-            Fault {
-                name: "truncated ply",
-                make: |p| {
+                &["ds/models/obj_000006.ply: "],
+            ),
+            (
+                "truncated ply",
+                |p| {
                     other_object(p, |_| ());
                     p.truncate("ds/models/obj_000006.ply", 0.5);
                 },
-                expected: &["ds/models/obj_000006.ply: "],
-            },
-            Fault {
-                name: "texture missing",
-                make: |p| {
+                &["ds/models/obj_000006.ply: "],
+            ),
+            (
+                "texture missing",
+                |p| {
                     other_object(p, |_| ());
                     p.remove("ds/models/obj_000006.png");
                 },
-                expected: &["ds/models/obj_000006.ply: texture obj_000006.png: "],
-            },
-            Fault {
-                name: "all faces flat",
-                make: |p| {
+                &["ds/models/obj_000006.ply: texture obj_000006.png: "],
+            ),
+            (
+                "all faces flat",
+                |p| {
                     other_object(p, |m| {
                         m.vertices.iter_mut().for_each(|v| *v = Point3::new(v.x, 0.0, 0.0));
                     })
                 },
-                expected: &["ds/models/obj_000006.ply: the mesh is degenerate"],
-            },
-            Fault {
-                name: "all in one point",
-                make: |p| {
+                &["ds/models/obj_000006.ply: the mesh is degenerate"],
+            ),
+            (
+                "all in one point",
+                |p| {
                     other_object(p, |m| {
                         m.vertices.iter_mut().for_each(|v| *v = Point3::origin());
                     })
                 },
-                expected: &["ds/models/obj_000006.ply: the mesh "],
-            },
-            Fault {
-                name: "not a number in the mesh",
-                make: |p| other_object(p, |m| m.vertices[3].y = f64::NAN),
-                expected: &["ds/models/obj_000006.ply: "],
-            },
-            Fault {
-                name: "open without inertia",
-                make: |p| {
+                &["ds/models/obj_000006.ply: the mesh "],
+            ),
+            (
+                "not a number in the mesh",
+                |p| other_object(p, |m| m.vertices[3].y = f64::NAN),
+                &["ds/models/obj_000006.ply: "],
+            ),
+            (
+                "open without inertia",
+                |p| {
                     other_object(p, |m| {
                         m.faces.pop();
                     });
@@ -424,38 +402,38 @@ fn models_and_hands() {
                         info["6"].as_object_mut().unwrap().remove("inertia_kg_m2");
                     });
                 },
-                expected: &[
+                &[
                     "ds/models/obj_000006.ply: the mesh is not closed (3 edges",
                     "inertia must all be given",
                 ],
-            },
-            Fault {
-                name: "text for a mass",
-                make: |p| {
+            ),
+            (
+                "text for a mass",
+                |p| {
                     other_object(p, |_| ());
                     p.edit_json("ds/models/models_info.json", |info| {
                         info["6"]["mass_kg"] = json!("heavy")
                     });
                 },
-                expected: &["ds/models/models_info.json: 6.mass_kg: is not a finite number"],
-            },
-            Fault {
-                name: "hand absent",
-                make: |p| {
+                &["ds/models/models_info.json: 6.mass_kg: is not a finite number"],
+            ),
+            (
+                "hand absent",
+                |p| {
                     entry(p, "scene_bodies.json", |e| {
                         e["bodies"][0]["urdf"] = json!("hand/none.urdf")
                     })
                 },
-                expected: &["ds/hand/none.urdf"],
-            },
-            Fault {
-                name: "hand of broken XML",
-                make: |p| other_hand(p, |urdf| urdf.replacen("</link>", "", 1)),
-                expected: &["ds/hand/other.urdf: invalid URDF: "],
-            },
-            Fault {
-                name: "hand with a missing mesh",
-                make: |p| {
+                &["ds/hand/none.urdf"],
+            ),
+            (
+                "hand of broken XML",
+                |p| other_hand(p, |urdf| urdf.replacen("</link>", "", 1)),
+                &["ds/hand/other.urdf: invalid URDF: "],
+            ),
+            (
+                "hand with a missing mesh",
+                |p| {
                     other_hand(p, |urdf| {
                         let (a, rest) = urdf.split_once("<collision>").unwrap();
                         let (_, b) = rest.split_once("</collision>").unwrap();
@@ -463,11 +441,11 @@ fn models_and_hands() {
                         format!("{a}<collision>{mesh}</collision>{b}")
                     })
                 },
-                expected: &[
+                &[
                     "ds/hand/other.urdf: link '",
                     "collision mesh 'palm.stl': no such file in ds/hand",
                 ],
-            },
+            ),
         ],
         &OTHERS,
     );
@@ -477,34 +455,34 @@ fn models_and_hands() {
 fn files_of_a_scene() {
     table(
         &[
-            Fault {
-                name: "no camera file",
-                make: |p| p.remove(&format!("{SCENE}/scene_camera.json")),
-                expected: &[
+            (
+                "no camera file",
+                |p| p.remove(&format!("{SCENE}/scene_camera.json")),
+                &[
                     "scene 1 image 0 object 5: ds/test/000001/scene_camera.json: no such file",
                     "scene 1 image 1 object 5: ",
                 ],
-            },
-            Fault {
-                name: "camera file is no JSON",
-                make: |p| p.truncate(&format!("{SCENE}/scene_camera.json"), 0.5),
-                expected: &["ds/test/000001/scene_camera.json: not valid JSON: "],
-            },
-            Fault {
-                name: "no bodies file",
-                make: |p| p.remove(&format!("{SCENE}/scene_bodies.json")),
-                expected: &["ds/test/000001/scene_bodies.json: no such file"],
-            },
-            Fault {
-                name: "no tactile file",
-                make: |p| p.remove(&format!("{SCENE}/scene_tactile.json")),
-                expected: &["ds/test/000001/scene_tactile.json: no such file"],
-            },
-            Fault {
-                name: "tactile file is a list",
-                make: |p| p.write(&format!("{SCENE}/scene_tactile.json"), "[1]"),
-                expected: &["scene_tactile.json: the top level is not a JSON object"],
-            },
+            ),
+            (
+                "camera file is no JSON",
+                |p| p.truncate(&format!("{SCENE}/scene_camera.json"), 0.5),
+                &["ds/test/000001/scene_camera.json: not valid JSON: "],
+            ),
+            (
+                "no bodies file",
+                |p| p.remove(&format!("{SCENE}/scene_bodies.json")),
+                &["ds/test/000001/scene_bodies.json: no such file"],
+            ),
+            (
+                "no tactile file",
+                |p| p.remove(&format!("{SCENE}/scene_tactile.json")),
+                &["ds/test/000001/scene_tactile.json: no such file"],
+            ),
+            (
+                "tactile file is a list",
+                |p| p.write(&format!("{SCENE}/scene_tactile.json"), "[1]"),
+                &["scene_tactile.json: the top level is not a JSON object"],
+            ),
         ],
         &[(2, 1)],
     );

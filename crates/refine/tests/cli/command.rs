@@ -73,7 +73,7 @@ fn methods_are_picked_by_name_and_changed_by_options() {
     let last = trace("--method icp-best --no-checkpoint --iterations 5");
     assert_eq!(last["t_cam_model_mm"], weak["t_cam_model_mm"]);
     let help = place.succeed("refine --help");
-    for method in prehend_refine::Method::all() {
+    for method in prehend_refine::NamedMethod::all() {
         assert!(help.contains(&format!("  {} ", method.name)), "{}", method.name);
     }
 }
@@ -286,6 +286,50 @@ fn help_names_what_is_needed() {
     assert!(help.contains("prehend refine --frame <FILE> [OPTIONS]"));
     let said = place.prehend("refine --dataset ds --out r.csv");
     assert!(said.code == 1 && said.err.contains("--poses <FILE>"), "{}", said.err);
+}
+
+/// clap prints the default of an option that has one; no text may say it again.
+#[test]
+fn no_help_text_names_a_default_twice() {
+    let place = Workplace::empty();
+    let study =
+        ["main", "gradients", "noise", "steps", "evidence", "confidence", "robustness", "merge"];
+    let commands = ["refine", "initial", "track", "eval", "check", "symmetry", "synth"]
+        .map(str::to_owned)
+        .into_iter()
+        .chain(study.map(|name| format!("study {name}")));
+    for command in commands {
+        for length in ["-h", "--help"] {
+            let help = place.succeed(&format!("{command} {length}"));
+            // An option begins with its name, and lasts to the next one.
+            let mut option = String::new();
+            for line in help.lines().chain(["  -"]) {
+                if line.trim_start().starts_with('-') {
+                    let count = option.to_lowercase().matches("default").count();
+                    assert!(count <= 1, "{command} {length}: {option}");
+                    option.clear();
+                }
+                option += line;
+            }
+        }
+    }
+}
+
+/// Names of before the spelling was made one.
+#[test]
+fn old_names_of_methods_and_faults_still_work() {
+    let place = Workplace::new();
+    let refine = "refine --dataset ds --poses ds/init.csv --image 0 --iterations 1";
+    place.succeed(&format!("{refine} --method fused-without-colour --out old.csv"));
+    place.succeed(&format!("{refine} --method fused-without-color --out new.csv"));
+    assert_eq!(place.read("old.csv"), place.read("new.csv"));
+    place.succeed(
+        "study robustness --dataset ds --poses low=ds/init.csv --image 0 --iterations 1 \
+         --methods fused-only-colour --sweeps missing-colour --out old",
+    );
+    let records = place.read("old/records.jsonl");
+    assert!(records.contains("fused-only-color missing-color 50") && !records.contains("colour"));
+    place.succeed("study posterior --help");
 }
 
 #[test]

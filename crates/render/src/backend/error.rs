@@ -16,7 +16,7 @@ pub enum BackendError {
     Device {
         /// The device's name.
         device: String,
-        /// What the driver said.
+        /// The error of the driver.
         reason: String,
     },
     /// The problem does not fit the device.

@@ -1,6 +1,6 @@
 //! Which settings of a loss make sense.
 
-use super::options::{LossOptions, Robust};
+use super::options::LossOptions;
 use super::{MOST_SAMPLES, PoseLoss};
 use crate::mode::{ContourOptions, Mode, SoftRasOptions};
 
@@ -76,15 +76,14 @@ impl LossOptions {
             let limit = depth.truncation;
             check("depth.truncation", limit, "above 0, or infinite", limit > 0.0)?;
         }
-        match self.robust {
-            Robust::None => Ok(()),
-            Robust::Huber(k) | Robust::Cauchy(k) => positive("robust", k),
-        }
+        self.kernel.scale().map_or(Ok(()), |scale| positive("kernel.scale", scale))
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use prehend_geometry::RobustKernel;
+
     use super::*;
     use crate::pose_loss::DepthOptions;
 
@@ -101,9 +100,10 @@ mod tests {
             let mode = Mode::Contour(ContourOptions { half_width, ..ContourOptions::default() });
             assert_eq!(named(mode, plain), "half_width");
         }
-        for k in [0.0, -1.0, f64::NAN, 1e-25] {
-            assert_eq!(named(soft, LossOptions { robust: Robust::Huber(k), ..plain }), "robust");
-            assert_eq!(named(soft, LossOptions { robust: Robust::Cauchy(k), ..plain }), "robust");
+        for scale in [0.0, -1.0, f64::NAN, 1e-25] {
+            for kernel in [RobustKernel::Huber { scale }, RobustKernel::Cauchy { scale }] {
+                assert_eq!(named(soft, LossOptions { kernel, ..plain }), "kernel.scale");
+            }
         }
         let depth = DepthOptions { weight: 1.0, scale: 0.02, truncation: f64::INFINITY };
         let with = |depth: DepthOptions| LossOptions { depth: Some(depth), ..plain };

@@ -1,8 +1,8 @@
 //! The loss of a pose: a posed object compared with a segmented image, with derivatives by the pose in closed form.
 
-mod affine;
 mod averaged;
 mod check;
+mod kernel;
 mod lane;
 mod options;
 mod pixel;
@@ -15,12 +15,10 @@ mod tiles;
 
 use nalgebra::{Isometry3, Matrix6, Point3, Vector6};
 
-pub use affine::Affine;
-use affine::Corrected;
 use averaged::Averaged;
 pub use check::OptionError;
 pub(crate) use lane::{LANES, Lane, Patch, get, put};
-pub use options::{DepthOptions, LossOptions, Robust};
+pub use options::{DepthOptions, LossOptions};
 pub(crate) use pixel::{Pixel, Row, Seen, View, scaled_sum};
 pub(crate) use residuals::Residuals;
 pub use sums::Counts;
@@ -88,8 +86,9 @@ impl Default for PoseLoss {
     }
 }
 
-/// The loss of a pose: weighted squared residuals over three times the area of the target's mask \[px\], so that
-/// without further channels it is the mean squared error over the mask's pixels and color channels.
+/// The loss of a pose: (1/N) Σ w ρ(r) with the kernel ρ (½ r² where none is asked for) and N three times the area of the
+/// target's mask \[px\], so that without further channels it is half the mean squared error over the mask's pixels and color
+/// channels.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Loss {
     /// Sum of the three below.
@@ -117,13 +116,10 @@ impl Loss {
 pub struct Linearized {
     /// The loss.
     pub loss: Loss,
-    /// Its gradient, 2 Jᵀr / N.
+    /// Its gradient, Jᵀ W r / N.
     pub gradient: Vector6<f64>,
-    /// JᵀJ / N: the Gauss–Newton approximation of half the loss's Hessian, so that the step is −(2 `jtj`)⁻¹ `gradient`.
-    pub jtj: Matrix6<f64>,
-    /// The correction of the colors at which the loss is least, with [`LossOptions::affine`];
-    /// [`Light::corrected`] makes a light of it.
-    pub affine: Option<Affine>,
+    /// Its Gauss–Newton Hessian, Jᵀ W J / N: the step is −`hessian`⁻¹ `gradient`.
+    pub hessian: Matrix6<f64>,
 }
 
 /// A picture of the object alone, as the mode sees it.
@@ -162,7 +158,7 @@ impl PoseLoss {
         target: &Target,
     ) -> Loss {
         let all = self.sum::<false>(model, t_cam_object, &Point3::origin(), light, target);
-        all.sums.loss(target)
+        all.loss(target)
     }
 
     /// The loss, its gradient and the Gauss–Newton matrix by the twist about `center` (camera frame \[m\]).
@@ -175,19 +171,12 @@ impl PoseLoss {
         target: &Target,
     ) -> Linearized {
         let all = self.sum::<true>(model, t_cam_object, center, light, target);
-        let (right, jtj) = all.sums.equations(target.normalization);
-        Linearized {
-            loss: all.sums.loss(target),
-            gradient: right * 2.0,
-            jtj: jtj - all.reduction * target.normalization,
-            affine: self.options.affine.then_some(all.affine),
-        }
+        all.linearized(target)
     }
 
     /// The loss by square tiles of the image, `side` pixels wide and high from its upper left corner on, each with the derivatives by a twist of
     /// what is seen in it alone: for bodies that are not quite rigid, or models that are not quite the body. Together the
-    /// tiles are what [`linearize`](Self::linearize) gives; tiles to which no pixel is drawn or missed may be left out. Colors are not
-    /// corrected as [`LossOptions::affine`] would have it, since that is not of one tile.
+    /// tiles are what [`linearize`](Self::linearize) gives; tiles to which no pixel is drawn or missed may be left out.
     pub fn linearize_tiles(
         &self,
         model: &RenderModel,
@@ -205,11 +194,10 @@ impl PoseLoss {
             fn run(self, view: &impl View) -> Vec<Tile> {
                 let Self(residuals, tiling) = self;
                 let target = residuals.target;
-                let tile = |([column, row], sums): ([usize; 2], Sums)| {
-                    let (right, jtj) = sums.equations(target.normalization);
-                    let loss = sums.loss(target);
-                    let at = Linearized { loss, gradient: right * 2.0, jtj, affine: None };
-                    Tile { column, row, at }
+                let tile = |([column, row], sums): ([usize; 2], Sums)| Tile {
+                    column,
+                    row,
+                    at: sums.linearized(target),
                 };
                 residuals.by_tiles::<true>(view, tiling).into_iter().map(tile).collect()
             }
@@ -276,13 +264,13 @@ impl PoseLoss {
         center: &Point3<f64>,
         light: &Light,
         target: &Target,
-    ) -> Corrected {
+    ) -> Sums {
         struct Total<'a, const DERIVATIVES: bool>(Residuals<'a>);
 
         impl<const DERIVATIVES: bool> Task for Total<'_, DERIVATIVES> {
-            type Output = Corrected;
+            type Output = Sums;
 
-            fn run(self, view: &impl View) -> Corrected {
+            fn run(self, view: &impl View) -> Sums {
                 self.0.total::<DERIVATIVES>(view)
             }
         }

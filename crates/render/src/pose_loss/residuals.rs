@@ -5,10 +5,9 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use nalgebra::Matrix6;
 use rayon::prelude::*;
 
-use super::affine::{Affine, Corrected};
+use super::kernel;
 use super::lane::{LANES, Patch};
 use super::options::{DepthOptions, LossOptions};
 use super::pixel::{Seen, View};
@@ -25,17 +24,8 @@ pub(crate) struct Residuals<'a> {
 }
 
 impl Residuals<'_> {
-    /// Sums the residuals over all pixels of a view, under the best correction if the options ask for one.
-    pub(crate) fn total<const DERIVATIVES: bool>(&self, view: &impl View) -> Corrected {
-        if self.options.affine {
-            return self.corrected::<DERIVATIVES>(view);
-        }
-        let (affine, reduction) = (Affine::default(), Matrix6::zeros());
-        Corrected { sums: self.sum::<DERIVATIVES>(view), affine, reduction }
-    }
-
     /// Sums the residuals over all pixels of a view.
-    fn sum<const DERIVATIVES: bool>(&self, view: &impl View) -> Sums {
+    pub(crate) fn total<const DERIVATIVES: bool>(&self, view: &impl View) -> Sums {
         let tiles = self.by_tiles::<DERIVATIVES>(view, Tiling::WHOLE);
         let mut total = Sums::new();
         tiles.into_iter().for_each(|(_, sums)| total.merge(&sums));
@@ -67,9 +57,10 @@ impl Residuals<'_> {
     fn miss(&self, sums: &mut Sums, at: usize) {
         let coverage = self.target.coverage[at];
         for c in self.target.color[at] {
-            sums.color += self.options.color_weight * self.options.robust.cost(c).0 as f64;
+            let (loss, _) = kernel::loss_and_weight(self.options.kernel, c);
+            sums.color += self.options.color_weight * loss as f64;
         }
-        sums.mask += self.options.mask_weight * (coverage * coverage) as f64;
+        sums.mask += 0.5 * self.options.mask_weight * (coverage * coverage) as f64;
     }
 
     /// Whether a known body lies in front of depth `z` \[m\] at pixel `at`; if so, it is counted.
@@ -104,8 +95,8 @@ impl Residuals<'_> {
             let observed = self.target.color[at];
             for k in 0..3 {
                 let r = pixel.color[k] - observed[k];
-                let (cost, weight) = options.robust.cost(r);
-                sums.color += (color_weight * cost) as f64;
+                let (loss, weight) = kernel::loss_and_weight(options.kernel, r);
+                sums.color += (color_weight * loss) as f64;
                 if DERIVATIVES {
                     sums.add(&pixel.color_rows[k], r, color_weight * weight);
                 }
@@ -143,7 +134,7 @@ impl Residuals<'_> {
         sums.counts.contour += usize::from(*near_outline);
         if mask_weight > 0.0 {
             let r = pixel.coverage - self.target.coverage[at];
-            sums.mask += (mask_weight * r * r) as f64;
+            sums.mask += (0.5 * mask_weight * r * r) as f64;
             if DERIVATIVES && pixel.coverage < 1.0 {
                 sums.add(&pixel.coverage_row, r, mask_weight);
             }
@@ -157,7 +148,7 @@ impl Residuals<'_> {
             let bounded = difference.max(-limit).min(limit);
             let r = pixel.depth_weight * bounded * scale;
             let weight = options.weight as f32;
-            sums.depth += (weight * r * r) as f64;
+            sums.depth += (0.5 * weight * r * r) as f64;
             sums.counts.depth += 1;
             if DERIVATIVES {
                 let along = if bounded == difference { pixel.depth_weight * scale } else { 0.0 };
@@ -186,11 +177,11 @@ impl Residuals<'_> {
                 for l in 0..LANES {
                     residuals[k][l] = patch.color[k][l] - residuals[k][l];
                 }
-                let mut costs = [0.0; LANES];
-                options.robust.costs(&residuals[k], &mut costs, &mut weights[k]);
+                let mut losses = [0.0; LANES];
+                kernel::lanes(options.kernel, &residuals[k], &mut losses, &mut weights[k]);
                 for l in 0..LANES {
                     let weight = color_weight * used[l];
-                    sums.color[l] += (weight * costs[l]) as f64;
+                    sums.color[l] += (weight * losses[l]) as f64;
                     weights[k][l] *= weight;
                 }
             }
@@ -209,7 +200,7 @@ impl Residuals<'_> {
             let mask_weight = options.mask_weight as f32;
             for l in 0..patch.count {
                 let r = 1.0 - self.target.coverage[patch.at[l]];
-                sums.mask[l] += (mask_weight * r * r) as f64;
+                sums.mask[l] += (0.5 * mask_weight * r * r) as f64;
             }
         }
         if let Some((options, depth)) = self.depth() {
@@ -226,7 +217,7 @@ impl Residuals<'_> {
                 let bounded = difference.max(-limit).min(limit);
                 let r = bounded * scale;
                 let weight = if measured[l] > 0.0 { options.weight as f32 } else { 0.0 };
-                sums.depth[l] += (weight * r * r) as f64;
+                sums.depth[l] += (0.5 * weight * r * r) as f64;
                 let along = if bounded == difference { scale } else { 0.0 };
                 for i in 0..6 {
                     rows[i][l] = patch.z_row[i][l] * along;

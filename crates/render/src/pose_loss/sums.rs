@@ -1,13 +1,13 @@
-//! Sums of squared residuals and their normal equations.
+//! Sums of losses and their normal equations.
 
 #![allow(clippy::needless_range_loop)] // loops over lanes index several arrays alike
 
 use nalgebra::{Matrix6, Vector6};
 
-use super::Loss;
 use super::lane::{LANES, Lane};
 use super::pixel::Row;
 use super::target::Target;
+use super::{Linearized, Loss};
 
 /// Numbers of pixels by what became of them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -149,8 +149,14 @@ impl Sums {
         Loss::new([self.color, self.mask, self.depth], self.counts, target)
     }
 
+    /// The loss with its derivatives.
+    pub(crate) fn linearized(&self, target: &Target) -> Linearized {
+        let (gradient, hessian) = self.equations(target.normalization);
+        Linearized { loss: self.loss(target), gradient, hessian }
+    }
+
     /// Σ w r J and Σ w JᵀJ, each times `factor`.
-    pub(crate) fn equations(&self, factor: f64) -> (Vector6<f64>, Matrix6<f64>) {
+    pub(super) fn equations(&self, factor: f64) -> (Vector6<f64>, Matrix6<f64>) {
         unpacked(&self.equations, factor)
     }
 }

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::pixel::Pixel;
 use crate::camera::Camera;
-use crate::image::{DepthImage, ImageError, RgbImage};
+use crate::image::{ImageError, RgbImage};
 
 /// A face of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -64,14 +64,6 @@ impl Buffers {
     pub fn to_rgb(&self) -> Result<RgbImage, ImageError> {
         let pixels = self.color.iter().map(|c| c.map(|v| v as f32)).collect();
         RgbImage::new(self.width, self.height, pixels)
-    }
-
-    /// The depth as an image.
-    ///
-    /// # Errors
-    /// When the list was changed to another length.
-    pub fn to_depth(&self) -> Result<DepthImage, ImageError> {
-        DepthImage::new(self.width, self.height, self.depth.iter().map(|z| *z as f32).collect())
     }
 }
 

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
-use prehend_autodiff::rigid::turn_of_coordinates;
+use prehend_autodiff::rigid::rotation_vector_jacobian;
 use prehend_autodiff::{CustomVjp, Var, custom};
 
 use super::{BufferAdjoints, Renderer, Rendering, Scene, SceneGradient};
@@ -93,7 +93,7 @@ impl Input {
                 let twist = &gradient.objects[*object].twist;
                 let force = Vector3::new(twist[0], twist[1], twist[2]);
                 let torque = Vector3::new(twist[3], twist[4], twist[5]) + arm.cross(&force);
-                let coordinates = turn_of_coordinates(rotation).tr_mul(&torque);
+                let coordinates = rotation_vector_jacobian(rotation).tr_mul(&torque);
                 force.iter().chain(coordinates.iter()).copied().collect()
             }
             Self::Positions(object) => {

@@ -8,10 +8,12 @@ const ALBEDO_UNIFORM: u32 = 0u;
 const ALBEDO_CORNERS: u32 = 1u;
 const ALBEDO_TEXTURE: u32 = 2u;
 
-// Robust costs of a color residual.
-const ROBUST_NONE: u32 = 0u;
-const ROBUST_HUBER: u32 = 1u;
-const ROBUST_CAUCHY: u32 = 2u;
+// Robust kernels of a color residual.
+const KERNEL_SQUARED: u32 = 0u;
+const KERNEL_HUBER: u32 = 1u;
+const KERNEL_CAUCHY: u32 = 2u;
+const KERNEL_GEMAN_MCCLURE: u32 = 3u;
+const KERNEL_TUKEY: u32 = 4u;
 
 // Flags of the SoftRas mode.
 const SOFT_MODE: u32 = 1u;
@@ -50,9 +52,9 @@ struct Params {
     depth_weight: f32,
     depth_scale: f32,
     depth_truncation: f32,
-    robust_kind: u32,
-    robust_scale: f32,
-    hidden_is_missed: u32,
+    kernel_kind: u32,
+    kernel_scale: f32,
+    penalize_occluded: u32,
     // SoftRas, in pixels: how far beyond its border a face may be kept [px], and its square [px²]; 1/σ [1/px²]; how fast the
     // logarithm of a weight falls with depth [1/m], and the depth of the background [m]; the least double area of a face and
     // squared length of an edge [px²].

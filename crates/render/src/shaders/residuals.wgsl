@@ -1,12 +1,12 @@
 // Residuals of the pixels of a tile against the target, and their sums. See `pose_loss/residuals.rs`.
 
-// Columns of the sums: losses of color, mask and depth, the gradient, the upper triangle of JᵀJ row by row, and numbers of
+// Columns of the sums: losses of color, mask and depth, the gradient, the upper triangle of the Hessian row by row, and numbers of
 // pixels covered, near the outline, hidden, missed, and with depth.
 const SUM_COLOR: u32 = 0u;
 const SUM_MASK: u32 = 1u;
 const SUM_DEPTH: u32 = 2u;
 const SUM_GRADIENT: u32 = 3u;
-const SUM_JTJ: u32 = 9u;
+const SUM_HESSIAN: u32 = 9u;
 const SUM_COVERED: u32 = 30u;
 const SUM_CONTOUR: u32 = 31u;
 const SUM_HIDDEN: u32 = 32u;
@@ -25,22 +25,37 @@ fn log_1p(x: f32) -> f32 {
     return log(1.0 + x);
 }
 
-// The cost of residual r, and the weight w with derivative 2 w r.
-fn robust_cost(r: f32) -> vec2<f32> {
-    let k = params.robust_scale;
-    if params.robust_kind == ROBUST_NONE || (params.robust_kind == ROBUST_HUBER && abs(r) <= k) {
-        return vec2<f32>(r * r, 1.0);
-    }
-    if params.robust_kind == ROBUST_HUBER {
-        return vec2<f32>(2.0 * k * abs(r) - k * k, k / abs(r));
-    }
+// The loss ρ of residual r, and the weight w with dρ/dr = w r.
+fn robust_loss(r: f32) -> vec2<f32> {
+    let k = params.kernel_scale;
     let x = r * r / (k * k);
-    return vec2<f32>(k * k * log_1p(x), 1.0 / (1.0 + x));
+    switch params.kernel_kind {
+        case KERNEL_HUBER: {
+            if abs(r) <= k {
+                return vec2<f32>(0.5 * r * r, 1.0);
+            }
+            return vec2<f32>(k * abs(r) - 0.5 * k * k, k / abs(r));
+        }
+        case KERNEL_CAUCHY: {
+            return vec2<f32>(0.5 * k * k * log_1p(x), 1.0 / (1.0 + x));
+        }
+        case KERNEL_GEMAN_MCCLURE: {
+            let shrink = 1.0 / (1.0 + x);
+            return vec2<f32>(0.5 * r * r * shrink, shrink * shrink);
+        }
+        case KERNEL_TUKEY: {
+            let u = min(x, 1.0);
+            return vec2<f32>(k * k / 6.0 * u * (3.0 - u * (3.0 - u)), (1.0 - u) * (1.0 - u));
+        }
+        default: {
+            return vec2<f32>(0.5 * r * r, 1.0);
+        }
+    }
 }
 
 struct Equations {
     gradient: array<f32, 6>,
-    jtj: array<f32, 21>,
+    hessian: array<f32, 21>,
 }
 
 fn add_residual(sums: ptr<function, Equations>, row: Row, r: f32, weight: f32) {
@@ -52,20 +67,20 @@ fn add_residual(sums: ptr<function, Equations>, row: Row, r: f32, weight: f32) {
         let scaled_entry = weight * v[i];
         (*sums).gradient[i] += scaled_entry * r;
         for (var j = i; j < 6u; j++) {
-            (*sums).jtj[at] += scaled_entry * v[j];
+            (*sums).hessian[at] += scaled_entry * v[j];
             at += 1u;
         }
     }
 }
 
-// The cost of a pixel of the mask that shows nothing of the object: color, mask.
-fn missed_cost(goal_pixel: TargetPixel) -> vec2<f32> {
+// The loss of a pixel of the mask that shows nothing of the object: color, mask.
+fn missed_loss(goal_pixel: TargetPixel) -> vec2<f32> {
     var color = 0.0;
     for (var k = 0u; k < 3u; k++) {
-        color += robust_cost(goal_pixel.color[k]).x;
+        color += robust_loss(goal_pixel.color[k]).x;
     }
     let coverage = goal_pixel.coverage;
-    return vec2<f32>(params.color_weight * color, params.mask_weight * coverage * coverage);
+    return vec2<f32>(params.color_weight * color, 0.5 * params.mask_weight * coverage * coverage);
 }
 
 // Writes the sums of one pixel to this thread's row.
@@ -76,19 +91,19 @@ fn store_pixel_sums(lane: u32, pixel: Pixel, goal_pixel: TargetPixel) {
     }
     if !pixel.some {
         if goal_pixel.coverage > 0.0 {
-            let cost = missed_cost(goal_pixel);
-            tile_sums[row + SUM_COLOR] = cost.x;
-            tile_sums[row + SUM_MASK] = cost.y;
+            let loss = missed_loss(goal_pixel);
+            tile_sums[row + SUM_COLOR] = loss.x;
+            tile_sums[row + SUM_MASK] = loss.y;
             tile_sums[row + SUM_MISSED] = 1.0;
         }
         return;
     }
     if goal_pixel.occluder > 0.0 && goal_pixel.occluder < pixel.z {
         tile_sums[row + SUM_HIDDEN] = 1.0;
-        if params.hidden_is_missed != 0u && goal_pixel.coverage > 0.0 {
-            let cost = missed_cost(goal_pixel);
-            tile_sums[row + SUM_COLOR] = cost.x;
-            tile_sums[row + SUM_MASK] = cost.y;
+        if params.penalize_occluded != 0u && goal_pixel.coverage > 0.0 {
+            let loss = missed_loss(goal_pixel);
+            tile_sums[row + SUM_COLOR] = loss.x;
+            tile_sums[row + SUM_MASK] = loss.y;
         }
         return;
     }
@@ -96,20 +111,20 @@ fn store_pixel_sums(lane: u32, pixel: Pixel, goal_pixel: TargetPixel) {
     tile_sums[row + SUM_CONTOUR] = select(0.0, 1.0, pixel.near_outline);
     var equations: Equations;
     if params.color_weight > 0.0 {
-        var cost_sum = 0.0;
+        var loss_sum = 0.0;
         for (var k = 0u; k < 3u; k++) {
             let r = pixel.color[k] - goal_pixel.color[k];
-            let cost = robust_cost(r);
-            cost_sum += params.color_weight * cost.x;
+            let loss = robust_loss(r);
+            loss_sum += params.color_weight * loss.x;
             if DERIVATIVES {
-                add_residual(&equations, pixel.color_rows[k], r, params.color_weight * cost.y);
+                add_residual(&equations, pixel.color_rows[k], r, params.color_weight * loss.y);
             }
         }
-        tile_sums[row + SUM_COLOR] = cost_sum;
+        tile_sums[row + SUM_COLOR] = loss_sum;
     }
     if params.mask_weight > 0.0 {
         let r = pixel.coverage - goal_pixel.coverage;
-        tile_sums[row + SUM_MASK] = params.mask_weight * r * r;
+        tile_sums[row + SUM_MASK] = 0.5 * params.mask_weight * r * r;
         if DERIVATIVES && pixel.coverage < 1.0 {
             add_residual(&equations, pixel.coverage_row, r, params.mask_weight);
         }
@@ -119,7 +134,7 @@ fn store_pixel_sums(lane: u32, pixel: Pixel, goal_pixel: TargetPixel) {
         let difference = pixel.z - goal_pixel.depth;
         let bounded = clamp(difference, -params.depth_truncation, params.depth_truncation);
         let r = pixel.depth_weight * bounded * scale;
-        tile_sums[row + SUM_DEPTH] = params.depth_weight * r * r;
+        tile_sums[row + SUM_DEPTH] = 0.5 * params.depth_weight * r * r;
         tile_sums[row + SUM_WITH_DEPTH] = 1.0;
         if DERIVATIVES {
             let along = select(0.0, pixel.depth_weight * scale, bounded == difference);
@@ -133,7 +148,7 @@ fn store_pixel_sums(lane: u32, pixel: Pixel, goal_pixel: TargetPixel) {
             tile_sums[row + SUM_GRADIENT + i] = equations.gradient[i];
         }
         for (var i = 0u; i < 21u; i++) {
-            tile_sums[row + SUM_JTJ + i] = equations.jtj[i];
+            tile_sums[row + SUM_HESSIAN + i] = equations.hessian[i];
         }
     }
 }

@@ -26,18 +26,6 @@ impl Shader for Light {
     }
 }
 
-impl Light {
-    /// The light with the given [`Shader::parameters`].
-    pub fn from_parameters(parameters: &[f64; 15]) -> Self {
-        let p = parameters;
-        Self {
-            ambient: [p[0], p[5], p[10]],
-            directional: [0, 5, 10].map(|i| Vector3::new(p[i + 1], p[i + 2], p[i + 3])),
-            offset: [p[4], p[9], p[14]],
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -56,6 +44,5 @@ mod tests {
                 assert!((value - expected).abs() < 1e-15);
             }
         }
-        assert_eq!(Light::from_parameters(&parameters.try_into().unwrap()), light);
     }
 }

@@ -68,7 +68,7 @@ impl Problem {
             .iter()
             .zip(&self.target.color)
             .flat_map(|(p, seen)| (0..3).map(|k| (p.color[k] - f64::from(seen[k])).powi(2)));
-        (squares.sum::<f64>() * self.target.normalization, most)
+        (0.5 * squares.sum::<f64>() * self.target.normalization, most)
     }
 
     fn difference(&self, axis: usize, low: f64, high: f64) -> f64 {

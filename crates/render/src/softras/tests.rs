@@ -355,7 +355,7 @@ fn the_gradient_of_the_loss_is_that_of_its_values() {
         println!("cosine {cosine:.6}, ratio {:.5}", a.norm() / b.norm());
         assert!(cosine > 0.9999, "{cosine} {a} {b}");
         assert!((a.norm() / b.norm() - 1.0).abs() < 0.02);
-        assert!(at.jtj.iter().all(|v| v.is_finite()));
+        assert!(at.hessian.iter().all(|v| v.is_finite()));
     }
 }
 

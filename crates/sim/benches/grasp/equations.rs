@@ -41,7 +41,7 @@ impl ContactLaw for SmoothedPenalty {
 pub(crate) struct FirstOrder;
 
 impl Integrator for FirstOrder {
-    fn needs_forces_at_start_only(&self) -> bool {
+    fn evaluates_forces_once(&self) -> bool {
         true
     }
 

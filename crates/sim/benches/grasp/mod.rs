@@ -14,7 +14,9 @@ use nalgebra::{
 };
 use prehend_autodiff::Scalar;
 use prehend_geometry::DistanceField;
-use prehend_sim::{Body, Horizon, LocalLaw, Onset, RigidBody, State, Surface, World};
+use prehend_sim::{
+    Body, ContactBodies, DynContactLaw, GapSmoothing, RigidBody, State, Surface, TimeSteps, World,
+};
 
 pub(crate) use equations::FirstOrder;
 use equations::SmoothedPenalty;
@@ -40,7 +42,7 @@ impl Grasp {
     }
 
     /// Hand (body 0) and ellipsoid (body 1) with `count` samples.
-    pub(crate) fn world(&self, count: usize, onset: Onset) -> anyhow::Result<World> {
+    pub(crate) fn world(&self, count: usize, smoothing: GapSmoothing) -> anyhow::Result<World> {
         let squares = AXES.map(|a| a * a);
         let moments = [squares[1] + squares[2], squares[0] + squares[2], squares[0] + squares[1]];
         let inertia = Matrix3::from_diagonal(&(Vector3::from(moments) * (MASS / 5.0)));
@@ -48,10 +50,10 @@ impl Grasp {
         // Weights are in the law: a sample stands for itself.
         let surface = Surface::new(&spiral(count), &vec![1.0; count])?;
         let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-        let hand = world.add(Body::held("hand").with_field(Arc::clone(&self.field)));
-        let object = world.add(Body::free("ellipsoid", rigid).with_surface(surface));
-        let law: Arc<dyn LocalLaw> = Arc::new(SmoothedPenalty::shared_by(count));
-        world.touch(object, hand, law, onset)?;
+        let field = world.add(Body::kinematic("hand").with_field(Arc::clone(&self.field)));
+        let samples = world.add(Body::free("ellipsoid", rigid).with_surface(surface));
+        let law: Arc<dyn DynContactLaw> = Arc::new(SmoothedPenalty::shared_by(count));
+        world.add_contact(ContactBodies { samples, field }, law, smoothing)?;
         Ok(world)
     }
 }
@@ -64,8 +66,8 @@ pub(crate) fn start() -> [State; 2] {
     [State::at_rest(Isometry3::identity()), State { pose, linear, angular }]
 }
 
-pub(crate) fn horizon(steps: usize) -> Horizon {
-    Horizon { dt: STEP, steps }
+pub(crate) fn time_steps(steps: usize) -> TimeSteps {
+    TimeSteps { dt: STEP, steps }
 }
 
 /// How far from the target, and how fast, the ellipsoid ends.

@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix3, Point3, Quaternion, UnitQuaternion, Vector3};
 use prehend_geometry::{DistanceField, FieldSample};
-use prehend_sim::{Body, LocalLaw, Onset, RigidBody, State, Surface, World};
+use prehend_sim::{
+    Body, ContactBodies, DynContactLaw, GapSmoothing, RigidBody, State, Surface, World,
+};
 
 /// Mass of the object \[kg\].
 const MASS: f64 = 0.2;
@@ -89,8 +91,12 @@ impl DistanceField for Hand {
 /// Number of the object's body.
 pub(crate) const OBJECT: usize = 1;
 
-/// The hand, held, and the object with `count` samples of one unit of area together.
-pub(crate) fn world(count: usize, law: Arc<dyn LocalLaw>, onset: Onset) -> anyhow::Result<World> {
+/// The hand, kinematic, and the object with `count` samples of one unit of area together.
+pub(crate) fn world(
+    count: usize,
+    law: Arc<dyn DynContactLaw>,
+    smoothing: GapSmoothing,
+) -> anyhow::Result<World> {
     let golden = std::f64::consts::PI * (1.0 + 5f64.sqrt());
     let point = |i: usize| {
         let place = i as f64 + 0.5;
@@ -104,9 +110,10 @@ pub(crate) fn world(count: usize, law: Arc<dyn LocalLaw>, onset: Onset) -> anyho
     let inertia = Matrix3::from_diagonal(&Vector3::new(b + c, a + c, a + b));
     let rigid = RigidBody::new(MASS, inertia, Point3::origin())?;
     let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-    world.add(Body::held("hand").with_field(Arc::new(Hand)));
-    world.add(Body::free("object", rigid).with_surface(Surface::uniform(&points, 1.0)?));
-    world.touch(OBJECT, 0, law, onset)?;
+    let field = world.add(Body::kinematic("hand").with_field(Arc::new(Hand)));
+    let object = Body::free("object", rigid).with_surface(Surface::uniform(&points, 1.0)?);
+    let samples = world.add(object);
+    world.add_contact(ContactBodies { samples, field }, law, smoothing)?;
     Ok(world)
 }
 

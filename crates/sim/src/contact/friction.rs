@@ -1,7 +1,46 @@
-//! Coulomb friction, regularized so that it is smooth at zero slip and never leaves the cone.
+//! Friction laws: the force across the normal.
+
+pub mod anisotropic;
+pub mod coulomb;
+pub mod stribeck;
 
 use nalgebra::Vector3;
 use prehend_autodiff::Scalar;
+
+use super::parameters::Parameters;
+use super::point::Contact;
+
+/// Force across the normal: the other factor of a [`Law`](super::composite::Law).
+pub trait FrictionLaw: Parameters {
+    /// Force across the normal \[N\] of a contact pressed by `normal_force` \[N\], with parameters `p`.
+    fn force<S: Scalar>(
+        &self,
+        p: Self::Params<S>,
+        normal_force: S,
+        contact: &Contact<S>,
+    ) -> Vector3<S>;
+}
+
+/// A friction coefficient that may depend on the slip speed, regularized by √(|u|² + v_s²) for slip u and slip scale v_s.
+pub trait FrictionCoefficient: Parameters {
+    /// The coefficient at a regularized slip speed √(|u|² + v_s²) \[m/s\], with parameters `p`.
+    fn coefficient<S: Scalar>(&self, p: Self::Params<S>, speed: S) -> S;
+
+    /// Slip scale v_s, at which friction has 1/√2 of its bound \[m/s\], positive.
+    fn slip_scale(&self) -> f64;
+
+    /// The force of isotropic friction with this coefficient \[N\]: see [`regularized_coulomb`].
+    #[inline]
+    fn isotropic_force<S: Scalar>(
+        &self,
+        p: Self::Params<S>,
+        normal_force: S,
+        slip: &Vector3<S>,
+    ) -> Vector3<S> {
+        let coefficient = self.coefficient(p, regularized_speed(slip, self.slip_scale()));
+        regularized_coulomb(coefficient, normal_force, slip, self.slip_scale())
+    }
+}
 
 /// √(|slip|² + `slip_scale`²) \[m/s\]: smooth everywhere and never below |slip|.
 #[inline]

@@ -6,8 +6,13 @@ use prehend_autodiff::{Fwd, Scalar};
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
 
-use super::law::{Contact, ContactLaw};
-use super::resting::RestingContact;
+use super::composite::Law;
+use super::error::LawError;
+use super::friction::coulomb::Coulomb;
+use super::law::ContactLaw;
+use super::normal::NormalLaw;
+use super::point::Contact;
+use super::static_target::StaticContactTarget;
 
 /// Gap, normal speed, slip and normal.
 const INPUTS: usize = 8;
@@ -16,6 +21,15 @@ const DIRECTIONS: usize = 16;
 
 /// Sizes on which inputs vary: differences are taken in these units.
 const SCALES: [f64; INPUTS] = [1e-3, 0.1, 0.1, 0.1, 0.1, 1.0, 1.0, 1.0];
+
+/// 300 g that sink in by half a millimeter.
+pub(crate) const TARGET: StaticContactTarget =
+    StaticContactTarget { mass: 0.3, gravity: 9.81, penetration: 5e-4, contact_area: 4e-4 };
+
+/// `normal` without friction.
+pub(crate) fn frictionless<N: NormalLaw>(normal: Result<N, LawError>) -> Law<N, Coulomb> {
+    Law::new(normal.unwrap(), Coulomb { friction: 0.0, slip_scale: 1e-3 }).unwrap()
+}
 
 /// What a law claims of itself.
 #[derive(Clone, Copy, Debug)]
@@ -38,17 +52,17 @@ pub(crate) fn load(law: &impl ContactLaw, area: f64, depth: f64) -> f64 {
     law.law(law.params(), &Contact { gap: -depth, normal_speed: 0.0, slip, normal, area }).normal
 }
 
-/// Coefficient of restitution of the body of `resting` that hits its contact at `speed` \[m/s\], without gravity,
+/// Coefficient of restitution of the body of `target` that hits its contact at `speed` \[m/s\], without gravity,
 /// by integration.
-pub(crate) fn bounce(law: &impl ContactLaw, resting: &RestingContact, speed: f64) -> f64 {
-    let (slip, normal, area) = (Vector3::zeros(), Vector3::z(), resting.contact_area);
+pub(crate) fn bounce(law: &impl ContactLaw, target: &StaticContactTarget, speed: f64) -> f64 {
+    let (slip, normal, area) = (Vector3::zeros(), Vector3::z(), target.contact_area);
     let acceleration = |[gap, normal_speed]: [f64; 2]| {
         let contact = Contact { gap, normal_speed, slip, normal, area };
-        law.law(law.params(), &contact).normal / resting.mass
+        law.law(law.params(), &contact).normal / target.mass
     };
     let rate = |x: [f64; 2]| [x[1], acceleration(x)];
     let along = |x: [f64; 2], k: [f64; 2], h: f64| [x[0] + h * k[0], x[1] + h * k[1]];
-    let dt = 1e-4 * (resting.penetration / resting.gravity).sqrt();
+    let dt = 1e-4 * (target.penetration / target.gravity).sqrt();
     let mut x = [0.0, -speed];
     for _ in 0..1_000_000 {
         let k1 = rate(x);

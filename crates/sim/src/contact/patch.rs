@@ -4,8 +4,8 @@ use nalgebra::{Matrix3, Point3, Vector3};
 use prehend_autodiff::Fwd;
 use prehend_geometry::{DistanceField, FieldSample};
 
-use super::law::Contact;
-use super::onset::{Onset, OnsetSample};
+use super::gap_smoothing::{GapSmoothing, SmoothedGap};
+use super::point::Contact;
 use crate::state::State;
 use crate::surface::{Block, Surface, SurfacePoint};
 
@@ -24,14 +24,14 @@ pub struct Patch<'a> {
     /// Whose surface is at distance zero.
     pub field: &'a dyn DistanceField,
     /// How contact begins.
-    pub onset: Onset,
+    pub smoothing: GapSmoothing,
 }
 
 /// A point in contact: what both the value and its derivative start from.
 pub(super) struct Touch {
     pub(super) arm: Vector3<f64>,
     pub(super) velocity: Vector3<f64>,
-    pub(super) onset: OnsetSample,
+    pub(super) smoothing: SmoothedGap,
     pub(super) normal: Vector3<f64>,
     pub(super) length: f64,
     pub(super) area: f64,
@@ -55,13 +55,13 @@ impl Patch<'_> {
 
     /// The samples that may touch, for a law that reaches to `cutoff`, before one of them has moved by `margin` \[m\].
     pub(crate) fn near(&self, cutoff: f64, margin: f64) -> Surface {
-        let reach = cutoff + self.onset.band() + self.field.lipschitz_bound() * margin;
+        let reach = cutoff + self.smoothing.band() + self.field.lipschitz_bound() * margin;
         let near = |point: &SurfacePoint| self.distance_within(&point.position, reach);
         self.surface.only(near, |block| self.may_touch(block, reach))
     }
 
     /// Calls `visit` with every point in contact, in order; with `pressing_only` without those that exert no force and only
-    /// leak. Points beyond `cutoff` and the onset's band exert no force, so leaving out blocks of them changes nothing.
+    /// leak. Points beyond `cutoff` and the band of the smoothing exert no force, so leaving out blocks of them changes nothing.
     /// Says whether every distance was a number.
     #[inline(always)]
     pub(super) fn for_each_touch(
@@ -72,8 +72,8 @@ impl Patch<'_> {
     ) -> bool {
         let State { pose, linear, angular } = &self.state;
         let (translation, rotation) = (pose.translation.vector, pose.rotation.to_rotation_matrix());
-        let reach = cutoff + self.onset.band();
-        let skips = pressing_only && self.onset.leaks();
+        let reach = cutoff + self.smoothing.band();
+        let skips = pressing_only && self.smoothing.leaks();
         for (block, points) in self.surface.blocks() {
             if !self.may_touch(block, reach) {
                 continue;
@@ -90,14 +90,14 @@ impl Patch<'_> {
                 if distance.is_nan() {
                     return false;
                 }
-                let Some(onset) = self.onset.at(distance - cutoff) else { continue };
+                let Some(smoothing) = self.smoothing.at(distance - cutoff) else { continue };
                 let length = gradient.norm();
                 if length.is_nan() || length < MIN_GRADIENT {
                     continue;
                 }
                 let (normal, area) = (gradient / length, point.area);
                 let velocity = linear + angular.cross(&arm);
-                visit(&Touch { arm, velocity, onset, normal, length, area, hessian });
+                visit(&Touch { arm, velocity, smoothing, normal, length, area, hessian });
             }
         }
         true
@@ -110,8 +110,8 @@ impl Touch {
     pub(super) fn contact(&self, cutoff: f64) -> Contact<f64> {
         let speed = self.velocity.dot(&self.normal);
         Contact {
-            gap: cutoff + self.onset.gap,
-            normal_speed: self.onset.activation * speed,
+            gap: cutoff + self.smoothing.gap,
+            normal_speed: self.smoothing.activation * speed,
             slip: self.velocity - self.normal * speed,
             normal: self.normal,
             area: self.area,
@@ -129,9 +129,9 @@ impl Touch {
         let normal = self.lifted_normal();
         let u: Vector3<Fwd<6>> = Vector3::from_fn(|i, _| Fwd::variable(self.velocity[i], 3 + i));
         let speed = u.x * normal.x + u.y * normal.y + u.z * normal.z;
-        let activation = along_gradient(self.onset.activation, self.onset.activation_slope);
+        let activation = along_gradient(self.smoothing.activation, self.smoothing.activation_slope);
         Contact {
-            gap: along_gradient(cutoff + self.onset.gap, self.onset.slope),
+            gap: along_gradient(cutoff + self.smoothing.gap, self.smoothing.slope),
             normal_speed: activation * speed,
             slip: Vector3::from_fn(|i, _| u[i] - normal[i] * speed),
             normal,

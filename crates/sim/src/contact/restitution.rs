@@ -5,7 +5,7 @@
 //! per area.
 
 /// Coefficient of restitution of the clamped Kelvin–Voigt contact
-/// ([`KelvinVoigt`](super::penalty::KelvinVoigt)): e = exp(−2ζ/√(1−ζ²)·acos ζ) for a damping ratio ζ ≥ 0,
+/// ([`KelvinVoigt`](super::normal::kelvin_voigt::KelvinVoigt)): e = exp(−2ζ/√(1−ζ²)·acos ζ) for a damping ratio ζ ≥ 0,
 /// continued by exp(−2ζ/√(ζ²−1)·acosh ζ) beyond critical damping (exp(−2) ≈ 0.135 at ζ = 1, about 1/(4ζ²) far
 /// beyond).
 pub fn restitution(ratio: f64) -> f64 {
@@ -19,7 +19,7 @@ pub fn damping_ratio(restitution_coefficient: f64) -> f64 {
 }
 
 /// Coefficient of restitution of the Kelvin–Voigt contact that damps approach only
-/// ([`ApproachDamped`](super::approach::ApproachDamped)): e = exp(−ζ/√(1−ζ²)·acos ζ), continued by
+/// ([`ApproachDamped`](super::normal::approach_damped::ApproachDamped)): e = exp(−ζ/√(1−ζ²)·acos ζ), continued by
 /// exp(−ζ/√(ζ²−1)·acosh ζ) beyond critical damping (about 1/(2ζ) far beyond).
 pub fn approach_restitution(ratio: f64) -> f64 {
     (-logarithmic_loss(ratio)).exp()

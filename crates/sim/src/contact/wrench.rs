@@ -1,14 +1,12 @@
 //! The total contact wrench on a body and its derivative, gathered point by point.
 
-use std::rc::Rc;
-
 use nalgebra::{Matrix3, Vector3, Vector6};
 use prehend_autodiff::lie::cross_matrix;
-use prehend_autodiff::{CustomVjp, Fwd, LocalFunction, Scalar};
+use prehend_autodiff::{Fwd, LocalFunction, Scalar};
 
-use super::law::{Contact, ContactLaw};
-use super::onset::OnsetSample;
+use super::law::ContactLaw;
 use super::patch::{Patch, Touch};
+use super::point::Contact;
 
 /// A wrench about the center of mass with its derivatives.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,33 +17,6 @@ pub struct WrenchJacobian {
     pub by_state: [[f64; 12]; 6],
     /// Derivative of the wrench by each parameter of the law; empty if not asked for.
     pub by_params: Vec<Vector6<f64>>,
-    /// Contacts whose part in `by_state` reverse mode passes on in one direction only.
-    pub(crate) one_sided: Vec<OneSided>,
-}
-
-/// A contact not yet made under [`Onset::AsymmetricLeaky`](super::onset::Onset::AsymmetricLeaky).
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct OneSided {
-    onset: OnsetSample,
-    /// Derivative of the wrench by the effective gap.
-    wrench: Vector6<f64>,
-    /// Derivative of the gap by the body's twist.
-    gap: Vector6<f64>,
-}
-
-impl OneSided {
-    /// The contact `touch`, whose force depends on its position as `by_position` says.
-    fn new(touch: &Touch, by_position: &Matrix3<f64>) -> Self {
-        let Touch { arm, normal, length, onset, .. } = touch;
-        let gradient = normal * *length;
-        // Without contact the gap alone matters: the derivative by position is that by the gap times ∇φ.
-        let force = by_position * normal / (length * onset.slope);
-        Self {
-            onset: *onset,
-            wrench: stack(&force, &arm.cross(&force)),
-            gap: stack(&gradient, &arm.cross(&gradient)),
-        }
-    }
 }
 
 /// The wrench as a function of the state's tangent, to first order about where it was found.
@@ -62,33 +33,6 @@ impl LocalFunction<12, 6> for WrenchJacobian {
     #[inline]
     fn linearize(&self, _: [f64; 12]) -> ([f64; 6], [[f64; 12]; 6]) {
         (self.wrench.into(), self.by_state)
-    }
-
-    fn reverse_rule(&self) -> Option<Rc<dyn CustomVjp>> {
-        let (by_state, one_sided) = (self.by_state, self.one_sided.clone());
-        (!one_sided.is_empty())
-            .then(|| -> Rc<dyn CustomVjp> { Rc::new(Rule { by_state, one_sided }) })
-    }
-}
-
-/// Reverse mode with contacts that leak in one direction only.
-struct Rule {
-    by_state: [[f64; 12]; 6],
-    one_sided: Vec<OneSided>,
-}
-
-impl CustomVjp for Rule {
-    fn vjp(&self, output_adjoints: &[f64], input_adjoints: &mut [f64]) {
-        for (adjoint, row) in output_adjoints.iter().zip(&self.by_state) {
-            input_adjoints.iter_mut().zip(row).for_each(|(sum, slope)| *sum += adjoint * slope);
-        }
-        let adjoint = Vector6::from_column_slice(output_adjoints);
-        for OneSided { onset, wrench, gap } in &self.one_sided {
-            let by_gap = adjoint.dot(wrench);
-            // What the Jacobian has let through already is taken back.
-            let change = onset.pull_back(by_gap, 0.0) - onset.slope * by_gap;
-            input_adjoints.iter_mut().zip(gap).for_each(|(sum, slope)| *sum += change * slope);
-        }
     }
 }
 
@@ -122,7 +66,6 @@ pub(crate) fn wrench_jacobian<L: ContactLaw>(
     let mut wrench = Vector6::zeros();
     // Force and torque by position, turn, velocity and spin of the body.
     let mut by = [[Matrix3::<f64>::zeros(); 4]; 2];
-    let mut one_sided = Vec::new();
     let mut param_slopes = vec![Vector6::zeros(); if by_params { p.len() } else { 0 }];
     let sound = patch.for_each_touch(cutoff, false, |touch| {
         let contact = touch.lifted(cutoff);
@@ -144,9 +87,6 @@ pub(crate) fn wrench_jacobian<L: ContactLaw>(
         // Torque r×f: the arm turns with the body, δ(r×f) = (δθ×r)×f + r×δf.
         by[1][1] += cross_times(&f, &cross_matrix(arm));
         wrench += stack(&f, &touch.arm.cross(&f));
-        if touch.onset.closes_only && touch.onset.slope > 0.0 {
-            one_sided.push(OneSided::new(touch, &by_position));
-        }
         add_param_slopes(law, p, touch, cutoff, &mut param_slopes);
     });
     if !sound {
@@ -155,7 +95,7 @@ pub(crate) fn wrench_jacobian<L: ContactLaw>(
     let by_state = std::array::from_fn(|row| {
         std::array::from_fn(|column| by[row / 3][column / 3][(row % 3, column % 3)])
     });
-    WrenchJacobian { wrench, by_state, by_params: param_slopes, one_sided }
+    WrenchJacobian { wrench, by_state, by_params: param_slopes }
 }
 
 /// Adds the derivatives of one contact's wrench by the parameters, six at a time.
@@ -217,24 +157,24 @@ mod tests {
     use std::sync::Arc;
 
     use nalgebra::{Isometry3, Point3, Vector3, Vector6};
+    use prehend_autodiff::Fwd;
     use prehend_autodiff::check::{compare_gradients, finite_difference_jacobian};
-    use prehend_autodiff::{Fwd, Scalar, Var};
     use prehend_geometry::{DistanceField, FieldSample};
 
-    use crate::scenes::{bowl, egg_on, floor};
-    use crate::{LeakSteps, LocalLaw, Onset, Patch, Penalty, State, Surface, WrenchJacobian};
+    use crate::scenes::{bowl, egg_on, floor, penalty};
+    use crate::{DynContactLaw, GapSmoothing, LeakSteps, Patch, State, Surface, WrenchJacobian};
 
     /// A single sample, with the state of the egg but at `height` above the floor.
     fn sample_at<R>(
         height: f64,
         field: &dyn DistanceField,
-        onset: Onset,
+        smoothing: GapSmoothing,
         f: impl Fn(&Patch<'_>) -> R,
     ) -> R {
         let surface = Surface::new(&[Point3::origin()], &[1e-4]).unwrap();
-        let (_, states) = egg_on(floor(), onset);
+        let (_, states) = egg_on(floor(), smoothing);
         let state = State { pose: Isometry3::translation(0.0, 0.0, height), ..states[1] };
-        f(&Patch { surface: &surface, com: Point3::origin(), state, field, onset })
+        f(&Patch { surface: &surface, com: Point3::origin(), state, field, smoothing })
     }
 
     fn is_finite(jacobian: &WrenchJacobian) -> bool {
@@ -244,8 +184,8 @@ mod tests {
     #[test]
     fn derivatives_match_differences() {
         for field in [floor(), bowl()] {
-            for onset in [Onset::Hard, Onset::Softplus { width: 5e-4 }] {
-                let (world, mut states) = egg_on(Arc::clone(&field), onset);
+            for smoothing in [GapSmoothing::Hard, GapSmoothing::Softplus { width: 5e-4 }] {
+                let (world, mut states) = egg_on(Arc::clone(&field), smoothing);
                 states[1].pose.translation.z -= 1e-3;
                 let wrench = |state: State| world.wrenches(&[states[0], state], 0)[1];
                 let mut lifted: Vec<State<Fwd<12>>> = states.iter().map(State::lift).collect();
@@ -256,7 +196,7 @@ mod tests {
                 assert!(value.z > 0.0);
                 let differences = finite_difference_jacobian(
                     |x| {
-                        let moved = states[1].moved(&std::array::from_fn::<f64, 12, _>(|i| x[i]));
+                        let moved = states[1].retract(&std::array::from_fn::<f64, 12, _>(|i| x[i]));
                         wrench(moved).iter().copied().collect()
                     },
                     &[0.0; 12],
@@ -264,7 +204,7 @@ mod tests {
                 );
                 for (row, reference) in differences.iter().enumerate() {
                     let error = compare_gradients(&exact[row].derivative, reference);
-                    assert!(error.relative < 1e-6, "{onset:?} row {row}: {error:?}");
+                    assert!(error.relative < 1e-6, "{smoothing:?} row {row}: {error:?}");
                 }
             }
         }
@@ -272,50 +212,23 @@ mod tests {
 
     #[test]
     fn a_leak_adds_stiffness_and_no_force() {
-        let law = Penalty::new(2e7, 1e4, 0.5, 1e-2).unwrap();
-        let jacobian = |onset| {
-            sample_at(1e-3, floor().as_ref(), onset, |patch| {
-                law.wrench_jacobian(law.parameters(), patch, true)
+        let law = penalty(2e7, 1e4, 0.5, 1e-2);
+        let jacobian = |smoothing| {
+            sample_at(1e-3, floor().as_ref(), smoothing, |patch| {
+                law.wrench_jacobian(law.params(), patch, true)
             })
         };
-        let leaky = jacobian(Onset::Leaky { alpha: 0.1, band: 2e-3, steps: LeakSteps::All });
+        let leaky = jacobian(GapSmoothing::Leaky { alpha: 0.1, band: 2e-3, steps: LeakSteps::All });
         assert_eq!(leaky.wrench, Vector6::zeros());
         assert!((leaky.by_state[2][2] + 0.1 * 2e7 * 1e-4).abs() < 1e-9);
         assert!(leaky.by_state.iter().all(|row| row[6..].iter().all(|slope| *slope == 0.0)));
-        let hard = jacobian(Onset::Hard);
+        let hard = jacobian(GapSmoothing::Hard);
         let zero = WrenchJacobian {
             wrench: Vector6::zeros(),
             by_state: [[0.0; 12]; 6],
             by_params: vec![Vector6::zeros(); 3],
-            one_sided: Vec::new(),
         };
         assert_eq!(hard, zero);
-    }
-
-    #[test]
-    fn an_asymmetric_leak_passes_on_only_what_closes_the_gap() {
-        let gradient = |onset, sign: f64| {
-            let (world, mut states) = egg_on(floor(), onset);
-            states[1].pose.translation.z += 2e-3;
-            let height = |x: &[Var]| {
-                let mut tangent = [Var::constant(0.0); 12];
-                tangent[..6].copy_from_slice(x);
-                let states = [states[0].lift(), states[1].moved(&tangent)];
-                world.lift().wrenches(&states, 0)[1].z.times(sign)
-            };
-            prehend_autodiff::gradient(height, &[0.0; 6]).1
-        };
-        let (alpha, band, steps) = (0.1, 1e-2, LeakSteps::All);
-        let symmetric = |sign| gradient(Onset::Leaky { alpha, band, steps }, sign);
-        let asymmetric = |sign| gradient(Onset::AsymmetricLeaky { alpha, band, steps }, sign);
-        // The lift falls with the height. To have less of it, the gap would have to open.
-        assert!(symmetric(1.0)[2] < -1.0);
-        assert!(asymmetric(1.0).iter().all(|slope| slope.abs() < 1e-12));
-        let closed = |sign| gradient(Onset::AsymmetricLeaky { alpha: 0.0, band, steps }, sign);
-        assert_eq!(closed(-1.0), [0.0; 6]);
-        for (a, b) in asymmetric(-1.0).iter().zip(symmetric(-1.0)) {
-            assert!((a - b).abs() < 1e-9 * b.abs().max(1.0), "{a} {b}");
-        }
     }
 
     #[test]
@@ -327,10 +240,10 @@ mod tests {
                 Some(FieldSample { distance: f64::NAN, gradient, hessian })
             }
         }
-        let law = Penalty::new(2e7, 1e4, 0.5, 1e-2).unwrap();
-        sample_at(0.0, &Broken, Onset::Hard, |patch| {
-            assert!(law.wrench(law.parameters(), patch).iter().all(|w| w.is_nan()));
-            let jacobian = law.wrench_jacobian(law.parameters(), patch, false);
+        let law = penalty(2e7, 1e4, 0.5, 1e-2);
+        sample_at(0.0, &Broken, GapSmoothing::Hard, |patch| {
+            assert!(law.wrench(law.params(), patch).iter().all(|w| w.is_nan()));
+            let jacobian = law.wrench_jacobian(law.params(), patch, false);
             assert!(jacobian.wrench.iter().all(|w| w.is_nan()));
         });
     }
@@ -349,15 +262,15 @@ mod tests {
                 2.3
             }
         }
-        let law = Penalty::new(2e7, 1e4, 0.5, 1e-2).unwrap();
+        let law = penalty(2e7, 1e4, 0.5, 1e-2);
         let row: Vec<Point3<f64>> =
             (0..16).map(|i| Point3::new(0.02 * f64::from(i), 0.0, 0.55)).collect();
         let whole = Surface::uniform(&row, 16e-4).unwrap();
         let state = State::at_rest(Isometry3::identity());
-        let (com, onset) = (Point3::origin(), Onset::Hard);
+        let (com, smoothing) = (Point3::origin(), GapSmoothing::Hard);
         let wrench = |surface: &Surface| {
-            let patch = Patch { surface, com, state, field: &Slope, onset };
-            law.wrench(law.parameters(), &patch)
+            let patch = Patch { surface, com, state, field: &Slope, smoothing };
+            law.wrench(law.params(), &patch)
         };
         let singly = row.iter().map(|p| wrench(&Surface::new(&[*p], &[1e-4]).unwrap()));
         let singly = singly.fold(Vector6::zeros(), |sum: Vector6<f64>, w| sum + w);
@@ -373,17 +286,17 @@ mod tests {
                 Some(FieldSample { distance: -1e-3, gradient, hessian })
             }
         }
-        let law = Penalty::new(2e7, 1e4, 0.5, 1e-2).unwrap();
-        let leaky = Onset::Leaky { alpha: 0.1, band: 2e-3, steps: LeakSteps::All };
-        for onset in [Onset::Hard, Onset::Softplus { width: 1e-4 }, leaky] {
-            let jacobian = |patch: &Patch<'_>| law.wrench_jacobian(law.parameters(), patch, true);
+        let law = penalty(2e7, 1e4, 0.5, 1e-2);
+        let leaky = GapSmoothing::Leaky { alpha: 0.1, band: 2e-3, steps: LeakSteps::All };
+        for smoothing in [GapSmoothing::Hard, GapSmoothing::Softplus { width: 1e-4 }, leaky] {
+            let jacobian = |patch: &Patch<'_>| law.wrench_jacobian(law.params(), patch, true);
             // ∇φ = 0 gives no contact; φ = 0 without slip, finite ones.
-            assert_eq!(sample_at(0.0, &Flat, onset, jacobian).wrench, Vector6::zeros());
+            assert_eq!(sample_at(0.0, &Flat, smoothing, jacobian).wrench, Vector6::zeros());
             let rest = |patch: &Patch<'_>| {
                 let state = State::at_rest(Isometry3::identity());
                 jacobian(&Patch { state, ..*patch })
             };
-            assert!(is_finite(&sample_at(0.0, floor().as_ref(), onset, rest)));
+            assert!(is_finite(&sample_at(0.0, floor().as_ref(), smoothing, rest)));
         }
     }
 }

@@ -15,7 +15,7 @@ pub struct Support {
 
 /// The forces that come nearest to balancing a load.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Balance {
+pub struct WrenchBalance {
     /// Force on the body at each support \[N\], within its cone. Where more than one choice balances, one of them.
     pub forces: Vec<Vector3<f64>>,
     /// What load and forces add up to: force \[N\], torque about the center \[N m\].
@@ -36,7 +36,7 @@ const MOST_RAYS: usize = 2000;
 /// Largest factor on friction coefficients that is tried.
 const LARGEST_FACTOR: f64 = 1e4;
 
-impl Balance {
+impl WrenchBalance {
     /// Of all forces within the cones of `supports`, those that leave the least of `load` (force \[N\] and torque about
     /// `center` \[N m\]), in least squares.
     ///
@@ -87,7 +87,7 @@ pub fn friction_factor(supports: &[Support], center: &Point3<f64>, load: &Vector
     let balanced = |factor: f64| {
         let scaled = |s: &Support| Support { friction: factor * s.friction, ..*s };
         let supports: Vec<Support> = supports.iter().map(scaled).collect();
-        Balance::find(&supports, center, load).is_balanced()
+        WrenchBalance::find(&supports, center, load).is_balanced()
     };
     if balanced(0.0) {
         return 0.0;
@@ -146,7 +146,7 @@ impl<'a> Problem<'a> {
         let small = OPTIMAL * self.load.norm();
         for _ in 0..MOST_RAYS {
             let Some(best) = self
-                .lipschitz_bound(&residual)
+                .steepest_ray(&residual)
                 .filter(|ray| -ray.wrench.dot(&residual) > small * ray.wrench.norm())
             else {
                 break;
@@ -166,7 +166,7 @@ impl<'a> Problem<'a> {
     }
 
     /// The ray of all cones along which the residual falls fastest, by unit length of its wrench.
-    fn lipschitz_bound(&self, residual: &Vector6<f64>) -> Option<Ray> {
+    fn steepest_ray(&self, residual: &Vector6<f64>) -> Option<Ray> {
         let (force, torque) = (residual.fixed_rows::<3>(0), residual.fixed_rows::<3>(3));
         let ray = |(index, (support, arm)): (usize, (&Support, &Vector3<f64>))| {
             // −∂(|residual|²/2)/∂(force at the support).
@@ -247,11 +247,11 @@ mod tests {
             let factor = friction_factor(&wedge(angle, 0.5), &Point3::origin(), &weight);
             assert!((factor * 0.5 / angle.tan() - 1.0).abs() < 1e-4, "{angle}: {factor}");
             let enough = wedge(angle, 1.05 * angle.tan());
-            let balance = Balance::find(&enough, &Point3::origin(), &weight);
+            let balance = WrenchBalance::find(&enough, &Point3::origin(), &weight);
             assert!(balance.is_balanced(), "{balance:?}");
             assert!((balance.forces[0].z - 1.0).abs() < 1e-6);
             let little = wedge(angle, 0.95 * angle.tan());
-            assert!(!Balance::find(&little, &Point3::origin(), &weight).is_balanced());
+            assert!(!WrenchBalance::find(&little, &Point3::origin(), &weight).is_balanced());
         }
     }
 
@@ -268,7 +268,7 @@ mod tests {
                 })
                 .collect();
             let load = Vector6::from_fn(|i, _| if i == 2 { -2.0 } else { 0.5 * unit() });
-            let found = Balance::find(&supports, &Point3::origin(), &load);
+            let found = WrenchBalance::find(&supports, &Point3::origin(), &load);
             if found.is_balanced() {
                 balanced += 1
             } else {
@@ -279,7 +279,7 @@ mod tests {
             // Optimal: the residual is orthogonal to the forces, and no ray of a cone reduces it.
             let used = residual - problem.load;
             assert!(used.dot(&residual).abs() < 1e-8 * problem.load.norm_squared());
-            let ray = problem.lipschitz_bound(&residual).unwrap();
+            let ray = problem.steepest_ray(&residual).unwrap();
             let left = -ray.wrench.dot(&residual) / ray.wrench.norm();
             assert!(left < 1e-7 * problem.load.norm(), "{count}: {left:e}");
             for (support, force) in supports.iter().zip(&found.forces) {
@@ -294,12 +294,12 @@ mod tests {
     #[test]
     fn nothing_balances_without_supports_and_no_load_needs_none() {
         let weight = Vector6::new(0.0, 0.0, -2.0, 0.0, 0.0, 0.0);
-        let alone = Balance::find(&[], &Point3::origin(), &weight);
+        let alone = WrenchBalance::find(&[], &Point3::origin(), &weight);
         assert_eq!((alone.residual, alone.relative, alone.is_balanced()), (weight, 1.0, false));
         assert_eq!(friction_factor(&[], &Point3::origin(), &weight), f64::INFINITY);
-        let lost = Balance::find(&wedge(0.3, 0.1), &Point3::origin(), &(weight * f64::NAN));
+        let lost = WrenchBalance::find(&wedge(0.3, 0.1), &Point3::origin(), &(weight * f64::NAN));
         assert!(!lost.is_balanced());
-        let still = Balance::find(&wedge(0.3, 0.1), &Point3::origin(), &Vector6::zeros());
+        let still = WrenchBalance::find(&wedge(0.3, 0.1), &Point3::origin(), &Vector6::zeros());
         assert!(still.is_balanced() && still.forces == [Vector3::zeros(); 2]);
     }
 }

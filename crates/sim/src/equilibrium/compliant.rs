@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Matrix6, Matrix6x3, Point3, Vector3, Vector6};
 
-use super::Support;
+use super::balance::Support;
 
 /// A support that bears the less, the more it yields.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,7 +15,7 @@ pub struct CompliantSupport {
 
 /// The least of ½ |load + forces|² + ½ Σ compliance · force² over forces within their cones, torques over a length.
 ///
-/// Unlike [`Balance`](super::Balance), towards which it goes with less and less compliance, it has one solution, and a value that is
+/// Unlike [`WrenchBalance`](super::WrenchBalance), towards which it goes with less and less compliance, it has one solution, and a value that is
 /// differentiable by all that it is of. Meant for compliances of 1e-4 and more: far below that the problem is too stiff for Newton's method, and what is
 /// found may not be the least, though it is what its forces cost.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,7 +28,7 @@ pub struct CompliantBalance {
     /// The least \[N²\].
     pub value: f64,
     /// Derivative of the residual by the load, given in the same way.
-    pub yielding: Matrix6<f64>,
+    pub residual_jacobian: Matrix6<f64>,
 }
 
 const MOST_STEPS: usize = 100;
@@ -83,8 +83,9 @@ impl CompliantBalance {
             .fold(*load, |sum, (support, force)| sum + dual.wrench(support, force));
         let cost = supports.iter().zip(&forces).map(|(s, f)| s.compliance * f.norm_squared());
         let value = 0.5 * (residual.norm_squared() + cost.sum::<f64>());
-        let yielding = at.hessian.cholesky().map_or_else(Matrix6::zeros, |factor| factor.inverse());
-        Self { forces, residual, value, yielding }
+        let residual_jacobian =
+            at.hessian.cholesky().map_or_else(Matrix6::zeros, |factor| factor.inverse());
+        Self { forces, residual, value, residual_jacobian }
     }
 }
 
@@ -174,7 +175,7 @@ mod tests {
     use prehend_geometry::SplitMix64;
 
     use super::*;
-    use crate::equilibrium::Balance;
+    use crate::equilibrium::WrenchBalance;
 
     const LENGTH: f64 = 0.7;
 
@@ -254,7 +255,7 @@ mod tests {
                 let slope = (plus.value - minus.value) / (2.0 * step);
                 assert!((slope - found.residual[k]).abs() < 1e-6);
                 let bend = (plus.residual - minus.residual) / (2.0 * step);
-                assert!((bend - found.yielding.column(k)).norm() < 1e-4, "{bend}");
+                assert!((bend - found.residual_jacobian.column(k)).norm() < 1e-4, "{bend}");
             }
         }
     }
@@ -268,7 +269,7 @@ mod tests {
             let hard: Vec<Support> = supports.iter().map(|s| s.support).collect();
             let mut scaled = load;
             scaled.fixed_rows_mut::<3>(3).scale_mut(LENGTH);
-            let balance = Balance::find(&hard, &Point3::origin(), &scaled);
+            let balance = WrenchBalance::find(&hard, &Point3::origin(), &scaled);
             let soft = solve(&supports, &load);
             let cost = |forces: &[Vector3<f64>]| {
                 let costs = supports.iter().zip(forces);
@@ -289,6 +290,6 @@ mod tests {
     fn nothing_holds_without_supports() {
         let load = Vector6::new(0.0, 0.0, -2.0, 0.1, 0.0, 0.0);
         let found = solve(&[], &load);
-        assert_eq!((found.residual, found.yielding), (load, Matrix6::identity()));
+        assert_eq!((found.residual, found.residual_jacobian), (load, Matrix6::identity()));
     }
 }

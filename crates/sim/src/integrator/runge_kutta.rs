@@ -7,14 +7,15 @@ use prehend_autodiff::lie::so3_exp;
 use super::Integrator;
 use crate::error::SimulationError;
 use crate::state::State;
-use crate::world::{Step, World};
+use crate::time::Step;
+use crate::world::World;
 
 /// The classic Runge–Kutta method, fourth order on smooth forces, four evaluations of them a step.
 ///
 /// Rotations are R = exp(θ) R₀ with the rotation vector θ from the start of the step, whose rate is
 /// dexp⁻¹(θ) ω = ω − θ×ω/2 + θ×(θ×ω)/12 to the order that counts (H. Munthe-Kaas, "High order Runge–Kutta methods on
 /// manifolds", Appl. Numer. Math. 29, 1999). Angular momentum L = I(R)ω is what is integrated, so it is conserved to
-/// rounding. Driven bodies are where they are at each stage. Forces with kinks, such as a hard onset, cost the order
+/// rounding. Driven bodies are where they are at each stage. Forces with kinks, such as those of unsmoothed gaps, cost the order
 /// in the steps that cross them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RungeKutta4;

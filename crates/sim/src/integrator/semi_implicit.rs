@@ -8,9 +8,10 @@ use super::Integrator;
 use crate::body::RigidBody;
 use crate::error::SimulationError;
 use crate::state::State;
-use crate::world::{Step, World};
+use crate::time::Step;
+use crate::world::World;
 
-/// Semi-implicit Euler, first order: the standard for stiff penalty contact, stable for dt·ω < 2.
+/// Semi-implicit Euler, first order: the standard for stiff penalty contact.
 ///
 /// The rotational part is kept in momentum form, L = I(R)ω: L' = L + dt τ, R' = exp(dt I(R)⁻¹L') R,
 /// ω' = I(R')⁻¹L'. The gyroscopic term thus comes from the turning inertia, and angular momentum is conserved to
@@ -34,11 +35,13 @@ impl Integrator for SemiImplicitEuler {
         Ok(next.collect())
     }
 
-    /// Stable for (dt ω)² + 2 dt c < 4 at damping rate c: at 2 without damping, at √5 − 1 with the worst.
-    fn needs_forces_at_start_only(&self) -> bool {
+    fn evaluates_forces_once(&self) -> bool {
         true
     }
 
+    /// √5 − 1. An oscillator ẍ = −ω²x − c ẋ is multiplied each step by a matrix of trace 2 − dt c − (dt ω)² and determinant
+    /// 1 − dt c, whose eigenvalues are inside the unit circle for (dt ω)² + 2 dt c < 4 (Jury's criterion). That is dt ω < 2
+    /// without damping; for a given dt·max(ω, c) = s the worst is ω = c, with s² + 2s < 4.
     fn stability_limit(&self) -> f64 {
         1.236
     }

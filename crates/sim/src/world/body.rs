@@ -21,8 +21,8 @@ pub struct Body<S: Scalar = f64> {
     pub surface: Option<Arc<Surface>>,
     /// Signed distance to it, in its model frame: what the samples of others touch.
     pub field: Option<Arc<dyn DistanceField>>,
-    /// External wrench: force \[N\] and torque about the center of mass \[N m\], world frame.
-    pub load: Vector6<S>,
+    /// Force \[N\] and torque about the center of mass \[N m\] besides gravity and contacts, world frame.
+    pub external_wrench: Vector6<S>,
 }
 
 /// What moves a body.
@@ -30,19 +30,19 @@ pub struct Body<S: Scalar = f64> {
 pub enum Motion<S: Scalar = f64> {
     /// Forces.
     Free(RigidBody<S>),
-    /// Nothing: it keeps its state, whose velocity (a conveyor's, say) is felt by what touches it.
-    Held,
-    /// A given course, whatever the forces: a link of a robot whose joints are driven.
-    Driven(Arc<dyn Course>),
+    /// Nothing but whoever sets its state. What touches it feels the state's velocity, a conveyor's for instance.
+    Kinematic,
+    /// A trajectory, whatever the forces: a link of a robot whose joints are driven.
+    Driven(Arc<dyn Trajectory>),
 }
 
-/// A course in time: state of the model frame, in the world.
-pub trait Course: Send + Sync {
+/// State of a model frame in the world as a function of time.
+pub trait Trajectory: Send + Sync {
     /// The state at `time` \[s\].
     fn state(&self, time: f64) -> State;
 }
 
-impl<F: Fn(f64) -> State + Send + Sync> Course for F {
+impl<F: Fn(f64) -> State + Send + Sync> Trajectory for F {
     fn state(&self, time: f64) -> State {
         self(time)
     }
@@ -50,8 +50,8 @@ impl<F: Fn(f64) -> State + Send + Sync> Course for F {
 
 impl<S: Scalar> Body<S> {
     fn new(name: &str, motion: Motion<S>) -> Self {
-        let load = Vector6::zeros();
-        Self { name: name.to_owned(), motion, surface: None, field: None, load }
+        let external_wrench = Vector6::zeros();
+        Self { name: name.to_owned(), motion, surface: None, field: None, external_wrench }
     }
 
     /// A body that forces move.
@@ -59,14 +59,14 @@ impl<S: Scalar> Body<S> {
         Self::new(name, Motion::Free(body))
     }
 
-    /// A body that stays as it is. Its center of mass is the origin of its model frame.
-    pub fn held(name: &str) -> Self {
-        Self::new(name, Motion::Held)
+    /// A body that keeps the state it is given. Its center of mass is the origin of its model frame.
+    pub fn kinematic(name: &str) -> Self {
+        Self::new(name, Motion::Kinematic)
     }
 
-    /// A body on a given course. Its center of mass is the origin of its model frame.
-    pub fn driven(name: &str, course: impl Course + 'static) -> Self {
-        Self::new(name, Motion::Driven(Arc::new(course)))
+    /// A body on a trajectory. Its center of mass is the origin of its model frame.
+    pub fn driven(name: &str, trajectory: impl Trajectory + 'static) -> Self {
+        Self::new(name, Motion::Driven(Arc::new(trajectory)))
     }
 
     /// The same body with samples of its surface.
@@ -88,7 +88,7 @@ impl<S: Scalar> Body<S> {
     pub fn rigid(&self) -> Option<&RigidBody<S>> {
         match &self.motion {
             Motion::Free(body) => Some(body),
-            Motion::Held | Motion::Driven(_) => None,
+            Motion::Kinematic | Motion::Driven(_) => None,
         }
     }
 
@@ -96,5 +96,20 @@ impl<S: Scalar> Body<S> {
     #[inline]
     pub fn com(&self) -> Point3<f64> {
         self.rigid().map_or_else(Point3::origin, |body| *body.com())
+    }
+
+    /// The same body, each number through `f`.
+    pub(super) fn map<T: Scalar>(&self, f: impl Fn(S) -> T) -> Body<T> {
+        Body {
+            name: self.name.clone(),
+            motion: match &self.motion {
+                Motion::Free(rigid) => Motion::Free(rigid.map(&f)),
+                Motion::Kinematic => Motion::Kinematic,
+                Motion::Driven(trajectory) => Motion::Driven(Arc::clone(trajectory)),
+            },
+            surface: self.surface.clone(),
+            field: self.field.clone(),
+            external_wrench: self.external_wrench.map(&f),
+        }
     }
 }

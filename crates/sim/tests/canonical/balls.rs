@@ -5,12 +5,12 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use prehend_autodiff::{Fwd, Scalar};
-use prehend_sim::{Body, Horizon, LocalLaw, Onset, State, Surface, World};
+use prehend_sim::{Body, DynContactLaw, GapSmoothing, Sphere, State, Surface, TimeSteps, World};
 
 use crate::integrators::{INPUTS, Scheme};
 use crate::laws::{G, Law, Spec};
 use crate::rows::Row;
-use crate::scene::{BODY, Ball, above_floor, on_floor, rigid};
+use crate::scene::{BODY, above_floor, on_floor, rigid};
 
 const MASS: f64 = 0.3;
 const RADIUS: f64 = 0.02;
@@ -23,16 +23,24 @@ fn elastic(duration: f64, samples: usize, friction: f64) -> Spec {
 }
 
 /// Two balls that touch both ways, with samples at `points`, without gravity.
-fn two_balls(law: &Law, spec: &Spec, onset: Onset, points: [&[Point3<f64>]; 2]) -> World {
+fn two_balls(
+    law: &Law,
+    spec: &Spec,
+    smoothing: GapSmoothing,
+    points: [&[Point3<f64>]; 2],
+) -> World {
     let mut world = World::new(Vector3::zeros());
     let inertia = 0.4 * MASS * RADIUS * RADIUS;
     let [a, b] = points.map(|points| {
         let surface = Surface::new(points, &vec![spec.area; points.len()]).unwrap();
         let ball = Body::free("ball", rigid(MASS, inertia));
-        world.add(ball.with_surface(surface).with_field(Arc::new(Ball(RADIUS))))
+        world.add(
+            ball.with_surface(surface)
+                .with_field(Arc::new(Sphere { center: Point3::origin(), radius: RADIUS })),
+        )
     });
-    let law: Arc<dyn LocalLaw> = (law.build)(spec);
-    world.touch_both_ways(a, b, &law, onset).unwrap();
+    let law: Arc<dyn DynContactLaw> = (law.build)(spec);
+    world.add_symmetric_contact(a, b, &law, smoothing).unwrap();
     world
 }
 
@@ -49,7 +57,7 @@ pub(crate) fn momentum(scheme: &Scheme, law: &Law) -> Vec<Row> {
     };
     let points: Vec<Point3<f64>> = (0..150).map(point).collect();
     let spec = Spec { damping: 0.3, ..elastic(5e-3, 4, 0.5) };
-    let world = two_balls(law, &spec, Onset::Hard, [&points, &points]);
+    let world = two_balls(law, &spec, GapSmoothing::Hard, [&points, &points]);
     let mut start = [
         ball_at(Vector3::new(-0.021, 0.0, 0.005), Vector3::new(0.5, 0.1, 0.0)),
         ball_at(Vector3::new(0.021, 0.01, 0.0), Vector3::new(-0.3, 0.0, 0.2)),
@@ -63,8 +71,8 @@ pub(crate) fn momentum(scheme: &Scheme, law: &Law) -> Vec<Row> {
             sum(&|s| s.pose.translation.vector.cross(&(s.linear * MASS)) + s.angular * inertia),
         ]
     };
-    let horizon = Horizon { dt: 5e-5, steps: 1000 };
-    let end = scheme.end(&world, &start, horizon);
+    let time_steps = TimeSteps { dt: 5e-5, steps: 1000 };
+    let end = scheme.end(&world, &start, time_steps);
     let ([p0, l0], [p1, l1]) = (momenta(&start), momenta(&end));
     let hit = (end[0].linear - start[0].linear).norm() > 0.05;
     let lost = |a: Vector3<f64>, b: Vector3<f64>| if hit { (a - b).norm() } else { f64::NAN };
@@ -81,24 +89,24 @@ fn varied(state: &State, directions: &[(usize, usize)]) -> State<Fwd<INPUTS>> {
     for &(direction, input) in directions {
         tangent[direction] = Fwd::variable(0.0, input);
     }
-    state.moved(&tangent)
+    state.retract(&tangent)
 }
 
 /// A point that comes from y₀ at −1 m/s bounces off a floor; after T, ∂y/∂y₀ = −1 and ∂y/∂v₀ = −T up to the
-/// duration of contact. At 20 steps a contact the onset is softened by ε = 1.3 |v| dt. Where the scheme itself takes
+/// duration of contact. At 20 steps a contact the gap is smoothed by ε = 1.3 |v| dt. Where the scheme itself takes
 /// energy, so that the point leaves with a speed e, ∂y/∂y₀ = −e.
 pub(crate) fn bounce_gradients(scheme: &Scheme, law: &Law) -> Vec<Row> {
     let (duration, time) = (1.6e-2, 2.0);
     let dt = duration / 20.0;
-    let onset = Onset::Softplus { width: 1.3 * dt };
+    let smoothing = GapSmoothing::Softplus { width: 1.3 * dt };
     let spec = elastic(duration, 1, 0.0);
     let point = [Point3::origin()];
-    let world = on_floor(law, &spec, onset, Vector3::zeros(), &point, 1e-3);
-    let horizon = Horizon { dt, steps: (time / dt).round() as usize };
+    let world = on_floor(law, &spec, smoothing, Vector3::zeros(), &point, 1e-3);
+    let time_steps = TimeSteps { dt, steps: (time / dt).round() as usize };
     let bounces = (0..20).map(|phase| {
         let start = above_floor(1.0 + dt * f64::from(phase) / 20.0, -Vector3::z());
         let start = [start[0].lift(), varied(&start[BODY], &[(2, 0), (8, 1)])];
-        let end = scheme.method.differentiate(&world, &start, horizon).unwrap()[BODY];
+        let end = scheme.method.differentiate(&world, &start, time_steps).unwrap()[BODY];
         let [by_height, by_speed, ..] = end.pose.translation.z.derivative;
         let speed = if scheme.keeps_energy { 1.0 } else { end.linear.z.value };
         [by_height, by_speed, speed]
@@ -124,16 +132,16 @@ pub(crate) fn bounce_gradients(scheme: &Scheme, law: &Law) -> Vec<Row> {
 pub(crate) fn exchange(scheme: &Scheme, law: &Law) -> Vec<Row> {
     let (duration, time) = (1e-2, 1.0);
     let dt = duration / 20.0;
-    let onset = Onset::Softplus { width: 1.3 * dt };
+    let smoothing = GapSmoothing::Softplus { width: 1.3 * dt };
     let poles = [Point3::new(RADIUS, 0.0, 0.0), Point3::new(-RADIUS, 0.0, 0.0)];
-    let world = two_balls(law, &elastic(duration, 1, 0.0), onset, [&poles[..1], &poles[1..]]);
+    let world = two_balls(law, &elastic(duration, 1, 0.0), smoothing, [&poles[..1], &poles[1..]]);
     let start = [
         ball_at(Vector3::new(-0.5, 0.0, 0.0), Vector3::x()),
         ball_at(Vector3::zeros(), Vector3::zeros()),
     ];
     let varied = [varied(&start[0], &[(0, 0), (6, 2)]), varied(&start[1], &[(0, 1), (6, 3)])];
-    let horizon = Horizon { dt, steps: (time / dt).round() as usize };
-    let end = scheme.method.differentiate(&world, &varied, horizon).unwrap();
+    let time_steps = TimeSteps { dt, steps: (time / dt).round() as usize };
+    let end = scheme.method.differentiate(&world, &varied, time_steps).unwrap();
     let second = end[1].pose.translation.x.derivative;
     let [slow, fast] = [0, 1].map(|ball: usize| end[ball].linear.x.value);
     let e = if scheme.keeps_energy { 1.0 } else { fast - slow };

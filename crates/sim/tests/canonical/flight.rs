@@ -1,7 +1,7 @@
 //! Bodies that touch nothing.
 
 use nalgebra::{Isometry3, Matrix3, Point3, UnitQuaternion, Vector3};
-use prehend_sim::{Body, Horizon, RigidBody, State, World};
+use prehend_sim::{Body, RigidBody, State, TimeSteps, World};
 
 use crate::integrators::Scheme;
 use crate::laws::G;
@@ -12,9 +12,9 @@ use crate::scene::{down, rigid};
 pub(crate) fn free_fall(scheme: &Scheme) -> Vec<Row> {
     let mut world = World::new(down());
     world.add(Body::free("body", rigid(0.3, 1e-3)));
-    let horizon = Horizon { dt: 1e-3, steps: 1000 };
-    let end = scheme.end(&world, &[State::at_rest(Isometry3::identity())], horizon)[0];
-    let (dt, n) = (horizon.dt, horizon.steps as f64);
+    let time_steps = TimeSteps { dt: 1e-3, steps: 1000 };
+    let end = scheme.end(&world, &[State::at_rest(Isometry3::identity())], time_steps)[0];
+    let (dt, n) = (time_steps.dt, time_steps.steps as f64);
     let height = -G * dt * dt * n * (n + scheme.fall_lead) / 2.0;
     vec![
         Row::new("velocity −n g dt [m/s]", end.linear.z, -n * G * dt, 1e-9),
@@ -44,8 +44,8 @@ pub(crate) fn precession(scheme: &Scheme) -> Vec<Row> {
     let spin = Vector3::new(1.2, 0.0, 5.0);
     let (world, start) = spinning(Vector3::new(2e-3, 2e-3, 1e-3), tilt, spin);
     let momentum = angular_momentum(&world, &start);
-    let horizon = Horizon { dt: 1e-4, steps: 8000 };
-    let end = scheme.end(&world, &[start], horizon)[0];
+    let time_steps = TimeSteps { dt: 1e-4, steps: 8000 };
+    let end = scheme.end(&world, &[start], time_steps)[0];
     let across = |state: &State| {
         let axis = state.pose.rotation * Vector3::z();
         axis - momentum * (axis.dot(&momentum) / momentum.norm_squared())
@@ -78,13 +78,13 @@ pub(crate) fn flip(scheme: &Scheme) -> Vec<Row> {
     let modulus2 =
         (i2 - i1) * (energy2 * i3 - momentum2) / ((i3 - i2) * (momentum2 - energy2 * i1));
     let expected = 2.0 * complete_elliptic(modulus2) / rate;
-    let horizon = Horizon { dt: 1e-5, steps: 140_000 };
-    let course = scheme.course(&world, &[start], horizon, 0);
+    let time_steps = TimeSteps { dt: 1e-5, steps: 140_000 };
+    let course = scheme.course(&world, &[start], time_steps, 0);
     let middle = |s: &State| s.pose.rotation.inverse_transform_vector(&s.angular).y;
     // Moments at which the spin about the middle axis passes zero.
     let mut turns = course.windows(2).enumerate().filter_map(|(i, pair)| {
         let (a, b) = (middle(&pair[0]), middle(&pair[1]));
-        (a * b <= 0.0).then(|| (i as f64 + a / (a - b)) * horizon.dt)
+        (a * b <= 0.0).then(|| (i as f64 + a / (a - b)) * time_steps.dt)
     });
     let (first, second) = (turns.next().unwrap(), turns.next().unwrap_or(f64::NAN));
     vec![Row::relative("time between flips 2K/p [s]", second - first, expected, 2e-3)]

@@ -4,8 +4,8 @@ use std::f64::consts::SQRT_2;
 
 use prehend_autodiff::Fwd;
 use prehend_sim::{
-    BackwardEuler, Horizon, Integrator, RungeKutta4, SemiImplicitEuler, SimulationError, State,
-    Step, VelocityVerlet, World,
+    BackwardEuler, Integrator, RungeKutta4, SemiImplicitEuler, SimulationError, State, Step,
+    TimeSteps, VelocityVerlet, World,
 };
 
 /// An integrator.
@@ -67,7 +67,7 @@ pub(crate) trait Method: Sync {
         &self,
         world: &World,
         start: &[State],
-        horizon: Horizon,
+        time_steps: TimeSteps,
         visit: &mut dyn FnMut(&[State]),
     ) -> Result<Vec<State>, SimulationError>;
 
@@ -75,7 +75,7 @@ pub(crate) trait Method: Sync {
         &self,
         world: &World,
         start: &[State<Fwd<INPUTS>>],
-        horizon: Horizon,
+        time_steps: TimeSteps,
     ) -> Result<Vec<State<Fwd<INPUTS>>>, SimulationError>;
 }
 
@@ -84,26 +84,26 @@ impl<I: Integrator> Method for I {
         &self,
         world: &World,
         start: &[State],
-        horizon: Horizon,
+        time_steps: TimeSteps,
         visit: &mut dyn FnMut(&[State]),
     ) -> Result<Vec<State>, SimulationError> {
-        world.simulate(self, start, horizon, |_: Step, states| visit(states))
+        world.simulate(self, start, time_steps, |_: Step, states| visit(states))
     }
 
     fn differentiate(
         &self,
         world: &World,
         start: &[State<Fwd<INPUTS>>],
-        horizon: Horizon,
+        time_steps: TimeSteps,
     ) -> Result<Vec<State<Fwd<INPUTS>>>, SimulationError> {
-        world.lift().simulate(self, start, horizon, |_, _| ())
+        world.lift().simulate(self, start, time_steps, |_, _| ())
     }
 }
 
 impl Scheme {
-    /// The states after `horizon`.
-    pub(crate) fn end(&self, world: &World, start: &[State], horizon: Horizon) -> Vec<State> {
-        self.method.simulate(world, start, horizon, &mut |_| ()).unwrap()
+    /// The states after `time_steps`.
+    pub(crate) fn end(&self, world: &World, start: &[State], time_steps: TimeSteps) -> Vec<State> {
+        self.method.simulate(world, start, time_steps, &mut |_| ()).unwrap()
     }
 
     /// The states of body `body` at 0, dt, ….
@@ -111,12 +111,12 @@ impl Scheme {
         &self,
         world: &World,
         start: &[State],
-        horizon: Horizon,
+        time_steps: TimeSteps,
         body: usize,
     ) -> Vec<State> {
         let mut course = vec![start[body]];
         self.method
-            .simulate(world, start, horizon, &mut |states| course.push(states[body]))
+            .simulate(world, start, time_steps, &mut |states| course.push(states[body]))
             .unwrap();
         course
     }

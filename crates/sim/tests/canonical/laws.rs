@@ -6,7 +6,8 @@ use prehend_sim::contact::restitution::{
     approach_restitution, hunt_crossley_restitution, restitution,
 };
 use prehend_sim::{
-    ApproachPenalty, GraspD, HertzPenalty, HuntCrossleyPenalty, LocalLaw, Penalty, RestingContact,
+    ApproachDamped, Coulomb, DynContactLaw, GraspD, GraspDParameters, Hertz, HuntCrossley,
+    KelvinVoigt, Law as Product, NormalLaw, StaticContactTarget, Stribeck,
 };
 
 /// Gravity \[m/s²\].
@@ -32,8 +33,8 @@ pub(crate) struct Spec {
 }
 
 impl Spec {
-    fn resting(&self) -> RestingContact {
-        RestingContact {
+    fn target(&self) -> StaticContactTarget {
+        StaticContactTarget {
             mass: self.mass,
             gravity: G,
             penetration: self.depth,
@@ -43,19 +44,25 @@ impl Spec {
 
     /// Stiffness per area of a law whose pressure grows with this power of the depth.
     fn stiffness(&self, exponent: f64) -> f64 {
-        self.resting().stiffness(exponent)
+        self.target().stiffness(exponent)
     }
 
     /// Damping per area of a linear law.
     fn damping(&self) -> f64 {
-        self.resting().damping(self.damping)
+        self.target().damping(self.damping)
+    }
+
+    /// `normal` with Coulomb friction.
+    fn with_coulomb(&self, normal: impl NormalLaw + 'static) -> Arc<dyn DynContactLaw> {
+        let friction = Coulomb { friction: self.friction, slip_scale: self.slip_scale };
+        Arc::new(Product::new(normal, friction).unwrap())
     }
 }
 
 /// A contact law.
 pub(crate) struct Law {
     pub(crate) name: &'static str,
-    pub(crate) build: fn(&Spec) -> Arc<dyn LocalLaw>,
+    pub(crate) build: fn(&Spec) -> Arc<dyn DynContactLaw>,
     /// Dampings at which bounces are measured.
     pub(crate) dampings: &'static [f64],
     /// Coefficient of restitution of a body that comes at 1 m/s, by damping.
@@ -75,7 +82,7 @@ pub(crate) const LAWS: &[Law] = &[
     Law {
         name: "penalty",
         build: |s| {
-            Arc::new(Penalty::new(s.stiffness(1.0), s.damping(), s.friction, s.slip_scale).unwrap())
+            s.with_coulomb(KelvinVoigt { stiffness: s.stiffness(1.0), damping: s.damping() })
         },
         dampings: ZETAS,
         restitution,
@@ -86,8 +93,7 @@ pub(crate) const LAWS: &[Law] = &[
     Law {
         name: "approach-damped",
         build: |s| {
-            let (stiffness, damping) = (s.stiffness(1.0), s.damping());
-            Arc::new(ApproachPenalty::new(stiffness, damping, s.friction, s.slip_scale).unwrap())
+            s.with_coulomb(ApproachDamped { stiffness: s.stiffness(1.0), damping: s.damping() })
         },
         dampings: ZETAS,
         restitution: approach_restitution,
@@ -100,7 +106,10 @@ pub(crate) const LAWS: &[Law] = &[
         build: |s| {
             let stiffness = s.stiffness(1.0) * s.area;
             let gain = s.friction * stiffness / s.slip_scale;
-            Arc::new(GraspD::new(stiffness, gain, s.friction, 0.0).unwrap())
+            let friction = s.friction;
+            Arc::new(
+                GraspD::new(GraspDParameters { stiffness, gain, friction, offset: 0.0 }).unwrap(),
+            )
         },
         dampings: &[0.0],
         restitution: |_| 1.0,
@@ -110,7 +119,7 @@ pub(crate) const LAWS: &[Law] = &[
     },
     Law {
         name: "Hertz",
-        build: |s| Arc::new(HertzPenalty::new(s.stiffness(1.5), s.friction, s.slip_scale).unwrap()),
+        build: |s| s.with_coulomb(Hertz { stiffness: s.stiffness(1.5) }),
         dampings: &[0.0],
         restitution: |_| 1.0,
         settles: false,
@@ -121,8 +130,7 @@ pub(crate) const LAWS: &[Law] = &[
         name: "Hunt–Crossley",
         build: |s| {
             let stiffness = s.stiffness(1.5);
-            let law = HuntCrossleyPenalty::new(stiffness, s.damping, 1.5, s.friction, s.slip_scale);
-            Arc::new(law.unwrap())
+            s.with_coulomb(HuntCrossley { stiffness, damping: s.damping, exponent: 1.5 })
         },
         dampings: ZETAS,
         restitution: |damping| hunt_crossley_restitution(damping, 1.0),
@@ -134,9 +142,14 @@ pub(crate) const LAWS: &[Law] = &[
         name: "penalty, Stribeck",
         build: |s| {
             let (stiffness, damping) = (s.stiffness(1.0), s.damping());
-            let law = Penalty::new(stiffness, damping, 1.2 * s.friction, s.slip_scale).unwrap();
-            // Sticks only well below the speeds at which a problem slides.
-            Arc::new(law.with_stribeck(s.friction, 1e-3).unwrap())
+            let friction = Stribeck {
+                friction: 1.2 * s.friction,
+                kinetic_friction: s.friction,
+                // Sticks only well below the speeds at which a problem slides.
+                stribeck_speed: 1e-3,
+                slip_scale: s.slip_scale,
+            };
+            Arc::new(Product::new(KelvinVoigt { stiffness, damping }, friction).unwrap())
         },
         dampings: ZETAS,
         restitution,

@@ -10,7 +10,7 @@
 //! whatever the elastic law.
 
 use nalgebra::{Point3, Vector3};
-use prehend_sim::{Horizon, Onset, State, World};
+use prehend_sim::{GapSmoothing, State, TimeSteps, World};
 
 use crate::integrators::Scheme;
 use crate::laws::{G, Law, Spec};
@@ -47,7 +47,7 @@ fn rod(law: &Law, friction: f64) -> World {
         slip_scale: 5e-3,
     };
     let inertia = MASS * HALF_LENGTH * HALF_LENGTH / 3.0;
-    on_floor(law, &spec, Onset::Hard, down(), &[Point3::from(tip())], inertia)
+    on_floor(law, &spec, GapSmoothing::Hard, down(), &[Point3::from(tip())], inertia)
 }
 
 /// States with the tip at `height`, sliding.
@@ -66,8 +66,8 @@ pub(crate) fn jam(scheme: &Scheme, law: &Law) -> Vec<Row> {
     let friction = 2.0;
     let [p, q, stick] = responses(friction);
     let (world, start) = (rod(law, friction), sliding(0.0));
-    let horizon = Horizon { dt: 2e-8, steps: 50_000 };
-    let course = scheme.course(&world, &start, horizon, BODY);
+    let time_steps = TimeSteps { dt: 2e-8, steps: 50_000 };
+    let course = scheme.course(&world, &start, time_steps, BODY);
     let motion: Vec<_> = course.iter().map(tip_motion).collect();
     let touched = motion.iter().position(|(x, _)| x.z < 0.0).unwrap_or(motion.len());
     let leaves = motion[touched..].iter().find(|(x, _)| x.z > 0.0);
@@ -88,8 +88,8 @@ pub(crate) fn slide(scheme: &Scheme, law: &Law) -> Vec<Row> {
     let touching = -tip().z;
     let height = carrying_height(&world, MASS * G / p, touching - 1e-6, touching);
     let start = sliding(height - touching);
-    let horizon = Horizon { dt: 1e-7, steps: 2000 };
-    let end = scheme.end(&world, &start, horizon);
-    let force = world.wrenches(&end, horizon.steps)[BODY].z;
+    let time_steps = TimeSteps { dt: 1e-7, steps: 2000 };
+    let end = scheme.end(&world, &start, time_steps);
+    let force = world.wrenches(&end, time_steps.steps)[BODY].z;
     vec![Row::relative("normal force m g/p [N]", force, MASS * G / p, 0.01)]
 }

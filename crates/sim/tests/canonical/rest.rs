@@ -1,7 +1,7 @@
 //! Contact along the normal: rest, bounce and the longest stable step.
 
 use nalgebra::Vector3;
-use prehend_sim::Horizon;
+use prehend_sim::TimeSteps;
 
 use crate::integrators::Scheme;
 use crate::laws::{G, Law, Spec};
@@ -14,9 +14,9 @@ pub(crate) fn rest(scheme: &Scheme, law: &Law) -> Vec<Row> {
     let world = slab(law, &spec, down());
     // From touching where motion dies out; else it should stay where it is carried.
     let start = if law.settles { 0.0 } else { -spec.depth };
-    let horizon = Horizon { dt: 1e-4, steps: 10_000 };
-    let end = scheme.end(&world, &above_floor(start, Vector3::zeros()), horizon);
-    let force = world.wrenches(&end, horizon.steps)[BODY].z;
+    let time_steps = TimeSteps { dt: 1e-4, steps: 10_000 };
+    let end = scheme.end(&world, &above_floor(start, Vector3::zeros()), time_steps);
+    let force = world.wrenches(&end, time_steps.steps)[BODY].z;
     vec![
         Row::new("depth δ [mm]", -1e3 * end[BODY].pose.translation.z, 1e3 * spec.depth, 1e-9),
         Row::new("force Σkδ = m g [N]", force, spec.mass * G, 1e-9),
@@ -26,10 +26,10 @@ pub(crate) fn rest(scheme: &Scheme, law: &Law) -> Vec<Row> {
 /// Speed after over speed before, without gravity.
 pub(crate) fn restitution(scheme: &Scheme, law: &Law) -> Vec<Row> {
     let period = std::f64::consts::TAU / (G / SLAB.depth).sqrt();
-    let horizon = Horizon { dt: period / 20_000.0, steps: 20_000 };
+    let time_steps = TimeSteps { dt: period / 20_000.0, steps: 20_000 };
     let bounce = |&damping: &f64| {
         let world = slab(law, &Spec { damping, ..SLAB }, Vector3::zeros());
-        let end = scheme.end(&world, &above_floor(0.0, -Vector3::z()), horizon)[BODY];
+        let end = scheme.end(&world, &above_floor(0.0, -Vector3::z()), time_steps)[BODY];
         let left = end.pose.translation.z > 0.0;
         let measured = if left { end.linear.z } else { f64::NAN };
         Row::new(format!("e at damping {damping}"), measured, (law.restitution)(damping), 1e-3)
@@ -45,8 +45,8 @@ pub(crate) fn stability_limit(scheme: &Scheme, law: &Law) -> Vec<Row> {
     let nudge = 1e-5 * SLAB.depth;
     let growth = |product: f64| {
         let start = above_floor(-SLAB.depth + nudge, Vector3::zeros());
-        let horizon = Horizon { dt: product / omega, steps: 1000 };
-        let course = scheme.course(&world, &start, horizon, BODY);
+        let time_steps = TimeSteps { dt: product / omega, steps: 1000 };
+        let course = scheme.course(&world, &start, time_steps, BODY);
         let off = course.iter().map(|s| (s.pose.translation.z + SLAB.depth).abs());
         off.fold(0.0, f64::max) / nudge
     };

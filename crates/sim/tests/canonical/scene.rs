@@ -3,52 +3,29 @@
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
-use prehend_geometry::{DistanceField, FieldSample};
-use prehend_sim::{Body, Onset, RigidBody, State, Surface, World};
+use prehend_sim::{Body, ContactBodies, GapSmoothing, HalfSpace, RigidBody, State, Surface, World};
 
 use crate::laws::{G, Law, Spec};
-
-/// The half-space z < 0.
-pub(crate) struct Floor;
-
-impl DistanceField for Floor {
-    fn sample(&self, point: &Point3<f64>, reach: f64) -> Option<FieldSample> {
-        let (gradient, hessian) = (Vector3::z(), Matrix3::zeros());
-        (point.z <= reach).then_some(FieldSample { distance: point.z, gradient, hessian })
-    }
-}
-
-/// A ball about the origin, by its radius.
-pub(crate) struct Ball(pub(crate) f64);
-
-impl DistanceField for Ball {
-    fn sample(&self, point: &Point3<f64>, reach: f64) -> Option<FieldSample> {
-        let length = point.coords.norm();
-        let distance = length - self.0;
-        let gradient = point.coords / length;
-        let hessian = (Matrix3::identity() - gradient * gradient.transpose()) / length;
-        (distance <= reach).then_some(FieldSample { distance, gradient, hessian })
-    }
-}
 
 /// Number of the free body in [`on_floor`].
 pub(crate) const BODY: usize = 1;
 
-/// A body of isotropic `inertia` \[kg m²\] with samples at `points`, free above a held floor.
+/// A body of isotropic `inertia` \[kg m²\] with samples at `points`, free above a kinematic floor.
 pub(crate) fn on_floor(
     law: &Law,
     spec: &Spec,
-    onset: Onset,
+    smoothing: GapSmoothing,
     gravity: Vector3<f64>,
     points: &[Point3<f64>],
     inertia: f64,
 ) -> World {
     let mut world = World::new(gravity);
-    let floor = world.add(Body::held("floor").with_field(Arc::new(Floor)));
+    let field = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
     let rigid = rigid(spec.mass, inertia);
     let surface = Surface::new(points, &vec![spec.area; points.len()]).unwrap();
-    let body = world.add(Body::free("body", rigid).with_surface(surface));
-    world.touch(body, floor, (law.build)(spec), onset).unwrap();
+    let samples = world.add(Body::free("body", rigid).with_surface(surface));
+    let bodies = ContactBodies { samples, field };
+    world.add_contact(bodies, (law.build)(spec), smoothing).unwrap();
     world
 }
 
@@ -61,7 +38,7 @@ pub(crate) fn rigid(mass: f64, inertia: f64) -> RigidBody {
 pub(crate) fn slab(law: &Law, spec: &Spec, gravity: Vector3<f64>) -> World {
     let feet = [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)];
     let feet = feet.map(|(x, y)| Point3::new(0.05 * x, 0.05 * y, 0.0));
-    on_floor(law, spec, Onset::Hard, gravity, &feet, 1e-3)
+    on_floor(law, spec, GapSmoothing::Hard, gravity, &feet, 1e-3)
 }
 
 /// What carries the slab: it sinks in by half a millimeter under gravity.

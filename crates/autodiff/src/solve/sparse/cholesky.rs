@@ -11,7 +11,7 @@ use nalgebra::DMatrix;
 
 use super::columns;
 use crate::solve::SolveError;
-use crate::solve::factored::Factors;
+use crate::solve::factors::Factors;
 
 pub(super) fn analyze(
     matrix: &SymbolicSparseColMat<usize>,

@@ -14,7 +14,7 @@ use nalgebra::DMatrix;
 use super::SolveError;
 use super::factored::Factored;
 use super::pattern::{Pattern, Place};
-use crate::Operand;
+use crate::operand::Operand;
 
 /// A factorization prepared for all the matrices that have their entries in the same places.
 ///
@@ -150,8 +150,11 @@ mod tests {
 
     use super::*;
     use crate::check::compare_gradients;
+    use crate::fwd::Fwd;
+    use crate::recording::gradient;
+    use crate::scalar::Scalar;
     use crate::solve::lu;
-    use crate::{Fwd, Scalar, Var, gradient};
+    use crate::var::Var;
 
     /// Numbers in (−1, 1), the same on every run.
     fn number(seed: usize) -> f64 {

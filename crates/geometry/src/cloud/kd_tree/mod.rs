@@ -7,21 +7,12 @@ mod search;
 use nalgebra::Point3;
 
 use self::build::{Leaf, Node};
-use self::probe::{PointProbe, TriangleProbe};
-use self::search::{Alone, Best, Collect, Every, Nearest};
+use self::probe::Probe;
+pub use self::search::Neighbor;
+use self::search::{Collect, KNearest, Nearest, NearestAndNext, WithinRadius, search};
 use super::CloudError;
-use crate::closest::triangle::Triangle;
 
-/// A point of a cloud near a query.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Neighbor {
-    /// Index of the point in the cloud.
-    pub index: usize,
-    /// Its squared distance from the query \[m²\].
-    pub distance_squared: f64,
-}
-
-/// A balanced k-d tree over points: exact neighbors of points, and of triangles.
+/// A balanced k-d tree over points: exact neighbors of points.
 ///
 /// Every answer is a function of the points and the query alone: of points at exactly equal distance the one
 /// of lowest index counts as nearer, whatever the hint. Four branches leave each node, cut by medians along the
@@ -71,8 +62,8 @@ impl KdTree {
     /// that is not finite or farther than 1e18 m, whose square leaves single precision.
     #[inline]
     pub fn nearest(&self, query: &Point3<f64>, max_distance: f64) -> Option<Neighbor> {
-        let probe = PointProbe::new(query)?;
-        self.search(&probe, Nearest::within(max_distance)?).found()
+        let probe = Probe::new(query)?;
+        search(&self.nodes, &self.leaves, &probe, Nearest::within(max_distance)?).found()
     }
 
     /// As [`Self::nearest`], trying the point `hint` first: the answer for a nearby query spares most of the
@@ -84,66 +75,50 @@ impl KdTree {
         max_distance: f64,
         hint: usize,
     ) -> Option<Neighbor> {
-        let probe = PointProbe::new(query)?;
+        let probe = Probe::new(query)?;
         let mut best = Nearest::within(max_distance)?;
         if let Some(point) = self.points.get(hint) {
             best.offer((query - point).norm_squared(), hint as u32);
         }
-        self.search(&probe, best).found()
+        search(&self.nodes, &self.leaves, &probe, best).found()
     }
 
     /// As [`Self::nearest_with_hint`], with the squared distance \[m²\] that no other point is nearer than.
     #[inline]
-    pub(crate) fn nearest_alone(
+    pub(crate) fn nearest_and_next(
         &self,
         query: &Point3<f64>,
         max_distance: f64,
         hint: Option<usize>,
     ) -> Option<(Neighbor, f64)> {
-        let probe = PointProbe::new(query)?;
-        let mut alone = Alone::within(max_distance)?;
+        let probe = Probe::new(query)?;
+        let mut alone = NearestAndNext::within(max_distance)?;
         if let Some((hint, point)) = hint.and_then(|i| Some((i, self.points.get(i)?))) {
             let d2 = (query - point).norm_squared();
             if d2 <= alone.limit() {
                 alone.offer(d2, hint as u32);
             }
         }
-        self.search(&probe, alone).found()
+        search(&self.nodes, &self.leaves, &probe, alone).found()
     }
 
     /// The `k` points nearest to `query`, nearest first; fewer where the cloud has fewer.
     pub fn k_nearest(&self, query: &Point3<f64>, k: usize) -> Vec<Neighbor> {
         let limit = k.min(self.points.len());
-        match PointProbe::new(query) {
-            Some(probe) if limit > 0 => self.search(&probe, Best::new(limit)).found(),
+        match Probe::new(query) {
+            Some(probe) if limit > 0 => {
+                search(&self.nodes, &self.leaves, &probe, KNearest::new(limit)).found()
+            }
             _ => Vec::new(),
         }
     }
 
     /// Every point within `radius` \[m\] of `query`, nearest first.
     pub fn within(&self, query: &Point3<f64>, radius: f64) -> Vec<Neighbor> {
-        match (PointProbe::new(query), Every::within(radius)) {
-            (Some(probe), Some(every)) => self.search(&probe, every).found(),
+        match (Probe::new(query), WithinRadius::new(radius)) {
+            (Some(probe), Some(every)) => search(&self.nodes, &self.leaves, &probe, every).found(),
             _ => Vec::new(),
         }
-    }
-
-    /// The point nearest to any part of the triangle of `corners` \[m\], within `max_distance` \[m\];
-    /// `None` too for corners that are not finite. `hint`, a point expected to be near, is tried first and
-    /// does not change the answer.
-    pub fn nearest_to_triangle(
-        &self,
-        corners: [Point3<f64>; 3],
-        max_distance: f64,
-        hint: Option<usize>,
-    ) -> Option<Neighbor> {
-        let triangle = Triangle::new(corners, 0);
-        let probe = TriangleProbe::new(&corners, &triangle)?;
-        let mut best = Nearest::within(max_distance)?;
-        if let Some((hint, point)) = hint.and_then(|i| Some((i, self.points.get(i)?))) {
-            best.offer(triangle.closest(&point.coords).distance_squared, hint as u32);
-        }
-        self.search(&probe, best).found()
     }
 }
 

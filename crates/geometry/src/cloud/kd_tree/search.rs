@@ -1,7 +1,16 @@
 //! Branch and bound over the tree, and what may be collected on the way.
 
+use super::build::{Leaf, Node};
 use super::probe::Probe;
-use super::{KdTree, Neighbor};
+
+/// A point of a cloud near a query.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Neighbor {
+    /// Index of the point in the cloud.
+    pub index: usize,
+    /// Its squared distance from the query \[m²\].
+    pub distance_squared: f64,
+}
 
 /// Deepest tree: 4¹⁶ leaves of eight exceed the number of points there may be. Each level leaves three siblings.
 const STACK: usize = 3 * 16 + 4;
@@ -14,47 +23,51 @@ pub(super) trait Collect {
     fn offer(&mut self, d2: f64, index: u32);
 }
 
-impl KdTree {
-    #[inline]
-    pub(super) fn search<C: Collect>(&self, probe: &impl Probe, mut collect: C) -> C {
-        let mut bound = prune_bound(collect.limit());
-        let mut stack = [(0_u32, 0.0_f32); STACK];
-        let mut len = 1;
-        while len > 0 {
-            len -= 1;
-            let (at, distance) = stack[len];
-            if distance > bound {
-                continue;
+/// Offers `collect` the points of every leaf within its limit.
+#[inline]
+pub(super) fn search<C: Collect>(
+    nodes: &[Node],
+    leaves: &[Leaf],
+    probe: &Probe,
+    mut collect: C,
+) -> C {
+    let mut bound = prune_bound(collect.limit());
+    let mut stack = [(0_u32, 0.0_f32); STACK];
+    let mut len = 1;
+    while len > 0 {
+        len -= 1;
+        let (at, distance) = stack[len];
+        if distance > bound {
+            continue;
+        }
+        let Some(node) = nodes.get(at as usize) else {
+            let leaf = &leaves[at as usize - nodes.len()];
+            let distances = probe.to_points(leaf);
+            for (&d2, &index) in distances.iter().zip(&leaf.indices) {
+                if d2 <= collect.limit() {
+                    collect.offer(d2, index);
+                }
             }
-            let Some(node) = self.nodes.get(at as usize) else {
-                let leaf = &self.leaves[at as usize - self.nodes.len()];
-                let distances = probe.distances_squared(leaf, collect.limit());
-                for (&d2, &index) in distances.iter().zip(&leaf.indices) {
-                    if d2 <= collect.limit() {
-                        collect.offer(d2, index);
-                    }
+            bound = prune_bound(collect.limit());
+            continue;
+        };
+        let distances = probe.to_boxes(node);
+        let first = len;
+        for (lane, &d) in distances.iter().enumerate() {
+            // The box of a leaf without points is infinitely far.
+            if d <= bound && d < f32::INFINITY {
+                // Farthest first: the nearest ends on top of the stack.
+                let mut place = len;
+                while place > first && stack[place - 1].1 < d {
+                    stack[place] = stack[place - 1];
+                    place -= 1;
                 }
-                bound = prune_bound(collect.limit());
-                continue;
-            };
-            let distances = probe.interval().distances_squared(node);
-            let first = len;
-            for (lane, &d) in distances.iter().enumerate() {
-                // The box of a leaf without points is infinitely far.
-                if d <= bound && d < f32::INFINITY {
-                    // Farthest first: the nearest ends on top of the stack.
-                    let mut place = len;
-                    while place > first && stack[place - 1].1 < d {
-                        stack[place] = stack[place - 1];
-                        place -= 1;
-                    }
-                    stack[place] = (4 * at + 1 + lane as u32, d);
-                    len += 1;
-                }
+                stack[place] = (4 * at + 1 + lane as u32, d);
+                len += 1;
             }
         }
-        collect
     }
+    collect
 }
 
 /// A single-precision squared bound that no box holding something within `squared` exceeds: the five roundings
@@ -103,13 +116,13 @@ impl Collect for Nearest {
 }
 
 /// The nearest point, and how far all others are.
-pub(super) struct Alone {
+pub(super) struct NearestAndNext {
     nearest: Nearest,
     /// Squared distance that none of the others is nearer than \[m²\].
     others: f64,
 }
 
-impl Alone {
+impl NearestAndNext {
     #[inline]
     pub(super) fn within(max_distance: f64) -> Option<Self> {
         let nearest = Nearest::within(max_distance)?;
@@ -123,7 +136,7 @@ impl Alone {
     }
 }
 
-impl Collect for Alone {
+impl Collect for NearestAndNext {
     #[inline]
     fn limit(&self) -> f64 {
         self.others
@@ -145,12 +158,12 @@ impl Collect for Alone {
 }
 
 /// The k nearest points, in order.
-pub(super) struct Best {
+pub(super) struct KNearest {
     k: usize,
     found: Vec<(f64, u32)>,
 }
 
-impl Best {
+impl KNearest {
     /// At least one.
     pub(super) fn new(k: usize) -> Self {
         Self { k, found: Vec::with_capacity(k) }
@@ -161,7 +174,7 @@ impl Best {
     }
 }
 
-impl Collect for Best {
+impl Collect for KNearest {
     fn limit(&self) -> f64 {
         if self.found.len() < self.k { f64::MAX } else { self.found[self.k - 1].0 }
     }
@@ -179,13 +192,13 @@ impl Collect for Best {
 }
 
 /// All points within a distance.
-pub(super) struct Every {
+pub(super) struct WithinRadius {
     limit: f64,
     found: Vec<(f64, u32)>,
 }
 
-impl Every {
-    pub(super) fn within(radius: f64) -> Option<Self> {
+impl WithinRadius {
+    pub(super) fn new(radius: f64) -> Option<Self> {
         Some(Self { limit: squared(radius)?.min(f64::MAX), found: Vec::new() })
     }
 
@@ -195,7 +208,7 @@ impl Every {
     }
 }
 
-impl Collect for Every {
+impl Collect for WithinRadius {
     fn limit(&self) -> f64 {
         self.limit
     }

@@ -1,5 +1,5 @@
 use super::*;
-use crate::SplitMix64;
+use crate::random::SplitMix64;
 use proptest::prelude::*;
 
 /// Points on a lattice, so that ties are common, or spread out.
@@ -48,31 +48,10 @@ proptest! {
             prop_assert_eq!(tree.nearest_with_hint(&q, reach, i), near.first().copied());
             let next = all.get(1).map_or(f64::INFINITY, |m| m.distance_squared);
             let alone = near.first().map(|m| (*m, next.min(reach * reach)));
-            prop_assert_eq!(tree.nearest_alone(&q, reach, None), alone);
-            prop_assert_eq!(tree.nearest_alone(&q, reach, Some(i)), alone);
+            prop_assert_eq!(tree.nearest_and_next(&q, reach, None), alone);
+            prop_assert_eq!(tree.nearest_and_next(&q, reach, Some(i)), alone);
             prop_assert_eq!(tree.within(&q, reach), near);
             prop_assert_eq!(tree.k_nearest(&q, 9), &all[..all.len().min(9)]);
-        }
-    }
-
-    #[test]
-    fn the_point_nearest_to_a_triangle_agrees_with_exhaustive_search(
-        n in 1_usize..400,
-        seed in any::<u64>(),
-        size in prop::sample::select(vec![0.0, 1e-3, 0.1, 1.0]),
-        reach in 0.0..0.6_f64,
-    ) {
-        let points = cloud(n, seed, false);
-        let tree = KdTree::new(&points).unwrap();
-        for corners in cloud(30, seed ^ 2, false).chunks_exact(3) {
-            let center = corners[0];
-            let corners = [0, 1, 2].map(|i| center + (corners[i] - center) * size);
-            let triangle = Triangle::new(corners, 0);
-            let all = sorted(|p| triangle.closest(&p.coords).distance_squared, &points);
-            prop_assert_eq!(tree.nearest_to_triangle(corners, f64::INFINITY, None), Some(all[0]));
-            let near = (all[0].distance_squared <= reach * reach).then_some(all[0]);
-            prop_assert_eq!(tree.nearest_to_triangle(corners, reach, None), near);
-            prop_assert_eq!(tree.nearest_to_triangle(corners, reach, Some(n / 2)), near);
         }
     }
 }
@@ -114,7 +93,5 @@ fn queries_without_meaning_find_nothing() {
     assert!(
         tree.k_nearest(&nowhere, 3).is_empty() && tree.k_nearest(&Point3::origin(), 0).is_empty()
     );
-    let corners = [Point3::origin(), nowhere, Point3::origin()];
-    assert_eq!(tree.nearest_to_triangle(corners, f64::INFINITY, None), None);
     assert_eq!(tree.within(&Point3::origin(), f64::INFINITY).len(), 100);
 }

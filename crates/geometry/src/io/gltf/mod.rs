@@ -17,7 +17,7 @@ use super::images::Images;
 use super::limits::{MAX_ELEMENTS, MAX_FILE_BYTES};
 use super::parts::{Part, join};
 use super::{MeshError, base64, texture};
-use crate::{Texture, TriMesh};
+use crate::mesh::{Texture, TriMesh};
 
 pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshError> {
     check_container(bytes).map_err(|e| MeshError::malformed(path, "glb header", e))?;

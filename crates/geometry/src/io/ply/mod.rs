@@ -17,7 +17,7 @@ use self::header::Element;
 use super::images::Images;
 use super::limits::MAX_ELEMENTS;
 use super::{MeshError, texture};
-use crate::TriMesh;
+use crate::mesh::TriMesh;
 
 /// Which properties of the vertex element hold what.
 struct VertexLayout {

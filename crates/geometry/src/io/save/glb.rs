@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use super::invalid;
-use crate::TriMesh;
 use crate::io::MeshError;
+use crate::mesh::TriMesh;
 
 /// The binary chunk as it grows, and the JSON lists that describe it.
 #[derive(Default)]

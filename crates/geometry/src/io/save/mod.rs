@@ -7,9 +7,9 @@ mod ply;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::whole::WholeFile;
+use super::atomic::AtomicFile;
 use super::{MeshError, extension};
-use crate::TriMesh;
+use crate::mesh::TriMesh;
 
 impl TriMesh {
     /// Writes the mesh by the extension of `path`: `.ply` ([`TriMesh::save_ply`]), `.obj` ([`TriMesh::save_obj`]) or
@@ -72,10 +72,10 @@ impl TriMesh {
         let all = || -> io::Result<()> {
             let mut ready = Vec::new();
             for (file, content) in &beside {
-                ready.push(WholeFile::write(file, content)?);
+                ready.push(AtomicFile::write(file, content)?);
             }
-            ready.push(WholeFile::write(path, mesh)?);
-            ready.into_iter().try_for_each(WholeFile::commit)
+            ready.push(AtomicFile::write(path, mesh)?);
+            ready.into_iter().try_for_each(AtomicFile::commit)
         };
         all().map_err(|source| MeshError::Write { path: path.into(), source })
     }
@@ -91,7 +91,7 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::Texture;
+    use crate::mesh::Texture;
     use nalgebra::{Point3, Vector3};
 
     fn full() -> TriMesh {

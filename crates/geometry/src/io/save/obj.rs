@@ -3,8 +3,8 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use crate::TriMesh;
 use crate::io::MeshError;
+use crate::mesh::TriMesh;
 
 impl TriMesh {
     /// Writes OBJ with normals, UVs and vertex colors (after the positions, as most programs read them); a texture

@@ -3,8 +3,8 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use crate::TriMesh;
 use crate::io::MeshError;
+use crate::mesh::TriMesh;
 
 impl TriMesh {
     /// Writes binary PLY with every attribute the mesh has: positions in double precision, colors rounded to 8

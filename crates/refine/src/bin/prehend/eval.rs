@@ -1,17 +1,17 @@
 //! `prehend eval`.
 
+use std::process::ExitCode;
+
 use clap::Args;
 use prehend_refine::evaluate::Scorer;
 use prehend_refine::evaluate::metrics::summarize;
 use serde_json::json;
 
 use crate::options::{Input, label};
-use crate::outcome::Outcome;
-use crate::output::say;
-use crate::progress;
+use crate::terminal::{exit_code, progress, say};
 
 #[derive(Args)]
-pub(crate) struct Arguments {
+pub(crate) struct Eval {
     #[command(flatten)]
     input: Input,
     /// Print JSON, with the score of every pose, instead of tables
@@ -19,26 +19,28 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
-    let dataset = arguments.input.open()?;
-    let (jobs, mut failures) = arguments.input.jobs()?;
-    let mut scorer = Scorer::new(&dataset);
-    let mut rows = Vec::new();
-    let bar = progress::bar(jobs.len() as u64, "scoring");
-    for job in &jobs {
-        match scorer.score(&job.row) {
-            Ok(row) => rows.push(row),
-            Err(error) => failures.push(format!("{}: {error}", label(&job.row))),
+impl Eval {
+    pub(crate) fn run(self) -> anyhow::Result<ExitCode> {
+        let dataset = self.input.open()?;
+        let (jobs, mut failures) = self.input.jobs()?;
+        let mut scorer = Scorer::new(&dataset);
+        let mut rows = Vec::new();
+        let bar = progress(jobs.len(), "scoring");
+        for job in &jobs {
+            match scorer.score(&job.row) {
+                Ok(row) => rows.push(row),
+                Err(error) => failures.push(format!("{}: {error}", label(&job.row))),
+            }
+            bar.inc(1);
         }
-        bar.inc(1);
+        bar.finish_and_clear();
+        let summary = summarize(&rows);
+        if self.json {
+            let document = json!({ "poses": rows, "summary": summary, "failures": failures });
+            say(format!("{document:#}"))?;
+        } else if !rows.is_empty() {
+            say(summary.text(|id| format!("object {id}")))?;
+        }
+        Ok(exit_code(rows.len(), &failures))
     }
-    bar.finish_and_clear();
-    let summary = summarize(&rows);
-    if arguments.json {
-        let document = json!({ "poses": rows, "summary": summary, "failures": failures });
-        say(format!("{document:#}"))?;
-    } else if !rows.is_empty() {
-        say(summary.text(|id| format!("object {id}")))?;
-    }
-    Ok(Outcome { done: rows.len(), failures })
 }

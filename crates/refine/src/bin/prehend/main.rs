@@ -1,19 +1,14 @@
 //! The `prehend` command.
 
-mod cache;
 mod check;
-mod dataset;
 mod eval;
-mod frame;
 mod initial;
 mod options;
-mod outcome;
-mod output;
-mod progress;
 mod refine;
 mod study;
 mod symmetry;
 mod synth;
+mod terminal;
 mod track;
 
 use std::process::ExitCode;
@@ -44,7 +39,7 @@ use clap::{Parser, Subcommand};
 /// Exit codes: 0 all done; 1 nothing could be done; 2 some frames failed and the output has the others.
 #[derive(Parser)]
 #[command(name = "prehend", version, verbatim_doc_comment)]
-struct Arguments {
+struct Prehend {
     #[command(subcommand)]
     command: Command,
 }
@@ -52,60 +47,57 @@ struct Arguments {
 #[derive(Subcommand)]
 enum Command {
     /// Refine initial poses: all those of a dataset, or one described by a JSON file
-    Refine(Box<refine::Arguments>),
+    Refine(Box<refine::Refine>),
     /// Make initial poses: the true ones with errors, or found by a search from sensors alone
-    Initial(initial::Arguments),
+    Initial(initial::Initial),
     /// Follow objects through the images of scenes, taken for the frames of a camera
     ///
     /// An image's pose comes from the one before it; an object that is lost is looked for.
-    Track(Box<track::Arguments>),
+    Track(Box<track::Track>),
     /// Score poses against a dataset's ground truth
     ///
     /// Prints means and medians, overall and by object, of PE and OE (position and rotation error), of
     /// ADD, ADI, MSSD, MSPD and VSD, of AR (BOP's average recall, over the poses given), and of CA and IV
     /// (contact area and intersection volume with the hand).
     /// Where the dataset has models_eval/ or scene_bodies_gt.json, those count as the truth.
-    Eval(eval::Arguments),
+    Eval(eval::Eval),
     /// Regenerate the paper's tables on a dataset, ours beside the published rows, or measure the fused estimator
-    Study(Box<study::Arguments>),
+    Study(Box<study::Study>),
     /// Draw poses over their images, and warn about units and frames of the object, before refining anything
-    Check(check::Arguments),
+    Check(check::Check),
     /// Find the symmetries of models, and write them into models_info.json
     ///
     /// Scores that are free of symmetries (MSSD, MSPD, the symmetric OE) take them from there.
-    Symmetry(symmetry::Arguments),
-    /// Make a dataset of objects in a hand: images, touch and truth
+    Symmetry(symmetry::Symmetry),
+    /// Make a synthetic dataset of objects in a hand: images, touch and ground truth
     ///
     /// Interrupted at any moment and run again with the same options, it goes on with what is missing; the files are
     /// the same in the end.
-    Synth(Box<synth::Arguments>),
+    Synth(Box<synth::Synth>),
 }
 
 fn main() -> ExitCode {
-    let arguments = match Arguments::try_parse() {
-        Ok(arguments) => arguments,
+    let prehend = match Prehend::try_parse() {
+        Ok(prehend) => prehend,
         Err(error) => {
             // A closed pipe is no reason to complain.
             let _ = error.print();
             return ExitCode::from(u8::from(error.use_stderr()));
         }
     };
-    let outcome = match arguments.command {
-        Command::Refine(arguments) => refine::run(&arguments),
-        Command::Initial(arguments) => initial::run(&arguments),
-        Command::Track(arguments) => track::run(&arguments),
-        Command::Eval(arguments) => eval::run(&arguments),
-        Command::Study(arguments) => study::run(&arguments),
-        Command::Check(arguments) => check::run(&arguments),
-        Command::Symmetry(arguments) => symmetry::run(&arguments),
-        Command::Synth(arguments) => synth::run(&arguments),
+    let ended = match prehend.command {
+        Command::Refine(refine) => refine.run(),
+        Command::Initial(initial) => initial.run(),
+        Command::Track(track) => track.run(),
+        Command::Eval(eval) => eval.run(),
+        Command::Study(study) => study.run(),
+        Command::Check(check) => check.run(),
+        Command::Symmetry(symmetry) => symmetry.run(),
+        Command::Synth(synth) => synth.run(),
     };
-    match outcome {
-        Ok(outcome) => outcome.exit_code(),
-        Err(error) => {
-            // The messages of our errors contain those of their causes.
-            output::complain(format!("error: {error}"));
-            ExitCode::from(1)
-        }
-    }
+    ended.unwrap_or_else(|error| {
+        // The messages of our errors contain those of their causes.
+        terminal::complain(format!("error: {error}"));
+        ExitCode::from(1)
+    })
 }

@@ -1,5 +1,6 @@
 //! Options that several commands share.
 
+use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 use anyhow::bail;
@@ -61,6 +62,12 @@ impl Selection {
         admits(&self.scene, scene_id) && admits(&self.image, im_id)
     }
 
+    /// The filters in words, to be compared with those of an interrupted run.
+    pub(crate) fn filters(&self) -> String {
+        let Self { scene, image, object, .. } = self;
+        format!("scenes {scene:?} images {image:?} objects {object:?}")
+    }
+
     /// The rows of the results file `poses` that are meant, and what is wrong with the others.
     pub(crate) fn jobs(&self, poses: &Path) -> anyhow::Result<(Vec<Job>, Vec<String>)> {
         let ReadResults { rows, instances, errors } = read_results(poses)?;
@@ -96,6 +103,14 @@ impl Input {
     pub(crate) fn jobs(&self) -> anyhow::Result<(Vec<Job>, Vec<String>)> {
         self.selection.jobs(&self.poses)
     }
+}
+
+/// Lets all computations use so many threads; all cores without a number.
+pub(crate) fn limit_threads(threads: Option<NonZeroUsize>) -> anyhow::Result<()> {
+    if let Some(threads) = threads {
+        rayon::ThreadPoolBuilder::new().num_threads(threads.get()).build_global()?;
+    }
+    Ok(())
 }
 
 /// How messages name a row.

@@ -3,28 +3,25 @@
 use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
+use std::process::ExitCode;
 use std::sync::Mutex;
 
 use anyhow::{anyhow, bail};
 use clap::{Args, Subcommand};
-use prehend_refine::Method;
-use prehend_refine::data::bop::{Dataset, DatasetError};
+use prehend_refine::data::bop::{Dataset, create_folder};
 use prehend_refine::data::identity::{SENSED, TRUTH, canonical, dataset_fingerprint};
 use prehend_refine::data::{Assets, Identity, Journal, Times, Workers, join_times};
 use prehend_refine::evaluate::study::{
-    Design, Examined, Failure, Frame, FrameRecord, Kind, Level, MethodSettings, RECORDS, Runner,
-    Shard, Sweep, TIMES, Tables, merge, write_outputs,
+    Design, Failure, Frame, FrameRecord, FrameResult, Kind, Level, MethodSettings, RECORDS, Runner,
+    Shard, Sweep, TIMES, merge, write_outputs,
 };
-use prehend_refine::{Config, StrategyKind};
+use prehend_refine::{Method, NamedMethod};
 
-use crate::cache;
 use crate::options::Selection;
-use crate::outcome::Outcome;
-use crate::output::say;
-use crate::progress;
+use crate::terminal::{cache, exit_code, progress, say};
 
 #[derive(Args)]
-pub(crate) struct Arguments {
+pub(crate) struct Study {
     #[command(subcommand)]
     what: What,
 }
@@ -42,6 +39,7 @@ enum What {
     /// The fused estimator without each kind of evidence, with one kind alone, and with calibrations believed
     Evidence(Run),
     /// Whether the fused estimator's covariances and probabilities are right
+    #[command(name = "confidence", alias = "posterior")]
     Posterior(Run),
     /// The robust ICP and the fused estimator when more and more is wrong with the sensors
     Robustness(Robustness),
@@ -104,30 +102,32 @@ struct Merge {
     restart: bool,
 }
 
-pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
-    match &arguments.what {
-        What::Main(run) => run.study(Kind::Main, &[]),
-        What::Gradients(run) => run.study(Kind::Gradients, &[]),
-        What::Noise(run) => run.study(Kind::Noise, &[]),
-        What::Steps(run) => run.study(Kind::Steps, &[]),
-        What::Evidence(run) => run.study(Kind::Evidence, &[]),
-        What::Posterior(run) => run.study(Kind::Posterior, &[]),
-        What::Robustness(Robustness { run, sweeps }) => {
-            let mut sweeps = sweeps.clone().unwrap_or_else(|| Sweep::ALL.to_vec());
-            sweeps.sort_unstable();
-            sweeps.dedup();
-            run.study(Kind::Robustness, &sweeps)
+impl Study {
+    pub(crate) fn run(self) -> anyhow::Result<ExitCode> {
+        match self.what {
+            What::Main(run) => run.study(Kind::Main, &[]),
+            What::Gradients(run) => run.study(Kind::Gradients, &[]),
+            What::Noise(run) => run.study(Kind::Noise, &[]),
+            What::Steps(run) => run.study(Kind::Steps, &[]),
+            What::Evidence(run) => run.study(Kind::Evidence, &[]),
+            What::Posterior(run) => run.study(Kind::Posterior, &[]),
+            What::Robustness(Robustness { run, sweeps }) => {
+                let mut sweeps = sweeps.unwrap_or_else(|| Sweep::ALL.to_vec());
+                sweeps.sort_unstable();
+                sweeps.dedup();
+                run.study(Kind::Robustness, &sweeps)
+            }
+            What::Merge(merge) => merge.run(),
         }
-        What::Merge(merge) => merge.run(),
     }
 }
 
 impl Run {
-    fn study(&self, kind: Kind, sweeps: &[Sweep]) -> anyhow::Result<Outcome> {
+    fn study(&self, kind: Kind, sweeps: &[Sweep]) -> anyhow::Result<ExitCode> {
         let dataset = self.selection.open()?;
         let methods = self.methods(kind)?;
         let (design, frames) = self.design(kind, &dataset, &methods, sweeps)?;
-        make(&self.out)?;
+        create_folder(&self.out)?;
         let (mut journal, mut records): (_, BTreeMap<usize, FrameRecord>) =
             Journal::open(&self.out.join(RECORDS), &Identity::of(&design), self.restart)?;
         let mut times = Times::open(&self.out.join(TIMES), !records.is_empty())?;
@@ -137,18 +137,18 @@ impl Run {
         let open: Vec<&Frame> =
             own.iter().copied().filter(|f| !records.contains_key(&f.index)).collect();
 
-        let assets = Mutex::new(Assets::new(&dataset, self.seed).with_cache(cache::open()));
+        let assets = Mutex::new(Assets::new(&dataset, self.seed).with_cache(cache()));
         let threads = self.threads.map_or_else(rayon::current_num_threads, NonZeroUsize::get);
-        let bar = progress::bar(own.len() as u64, kind.name());
+        let bar = progress(own.len(), kind.name());
         bar.set_position(records.len() as u64);
         bar.reset_eta();
         Workers::new(open.len(), threads)?.run(
             &open,
             || {
-                let mut examiner = Runner::new(&design, &methods, &assets);
-                move |frame: &&Frame| examiner.examine(frame)
+                let mut runner = Runner::new(&design, &methods, &assets);
+                move |frame: &&Frame| runner.run(frame)
             },
-            |frame, Examined { record, seconds }| -> anyhow::Result<()> {
+            |frame, FrameResult { record, seconds }| -> anyhow::Result<()> {
                 // First the times: of a frame whose record is lost, a second line is no harm.
                 for (method, seconds) in seconds {
                     times.add(frame.index, &record.label(), &method, seconds)?;
@@ -159,11 +159,11 @@ impl Run {
             },
         )?;
         bar.finish_and_clear();
-        journal.settle(&records)?;
+        journal.compact(&records)?;
         finish(&self.out, &design, &records, &times)
     }
 
-    fn methods(&self, kind: Kind) -> anyhow::Result<Vec<(String, Config)>> {
+    fn methods(&self, kind: Kind) -> anyhow::Result<Vec<(String, Method)>> {
         let names: Vec<&str> = match &self.methods {
             Some(names) => names.iter().map(String::as_str).collect(),
             None => kind.methods(),
@@ -171,21 +171,22 @@ impl Run {
         if kind == Kind::Steps && names.len() != 1 {
             bail!("the steps study is of one method");
         }
-        let known = || Method::all().iter().map(|m| m.name).collect::<Vec<_>>().join(", ");
-        let mut methods: Vec<(String, Config)> = Vec::new();
+        let known = || NamedMethod::all().iter().map(|m| m.name).collect::<Vec<_>>().join(", ");
+        let mut methods: Vec<(String, Method)> = Vec::new();
         for name in names {
-            let method = Method::named(name)
+            let named = NamedMethod::find(name)
                 .ok_or_else(|| anyhow!("unknown method {name:?}: one of {}", known()))?;
+            let name = named.name;
             if methods.iter().any(|(other, _)| other == name) {
                 bail!("method {name} is named twice");
             }
-            let config = Design::config(kind, method, self.iterations);
-            if kind == Kind::Steps && config.strategy == StrategyKind::Fused {
+            let method = Design::method(kind, named, self.iterations);
+            if kind == Kind::Steps && matches!(method, Method::Fused(_)) {
                 bail!(
                     "{name} has too few steps for the steps study: it ends when nothing is left to gain"
                 );
             }
-            methods.push((name.to_owned(), config));
+            methods.push((name.to_owned(), method));
         }
         Ok(methods)
     }
@@ -194,7 +195,7 @@ impl Run {
         &self,
         kind: Kind,
         dataset: &Dataset,
-        methods: &[(String, Config)],
+        methods: &[(String, Method)],
         sweeps: &[Sweep],
     ) -> anyhow::Result<(Design, Vec<Frame>)> {
         let files: Vec<(String, PathBuf)> = if self.poses.is_empty() {
@@ -223,10 +224,9 @@ impl Run {
                 false => "no initial pose is of the scenes, images and objects asked for",
             });
         }
-        let Selection { scene, image, object, .. } = &self.selection;
-        let settings = |(name, config): &(String, Config)| MethodSettings {
+        let settings = |(name, method): &(String, Method)| MethodSettings {
             name: name.clone(),
-            settings: format!("{config:?}"),
+            settings: format!("{method:?}"),
         };
         let design = Design {
             study: kind,
@@ -237,7 +237,7 @@ impl Run {
                 .collect::<Result<Vec<_>, _>>()?
                 .join(" "),
             levels,
-            filters: format!("scenes {scene:?} images {image:?} objects {object:?}"),
+            filters: self.selection.filters(),
             methods: methods.iter().map(settings).collect(),
             steps: methods.first().map_or_else(Vec::new, |(_, c)| Design::steps(kind, c)),
             sweeps: sweeps.to_vec(),
@@ -250,9 +250,9 @@ impl Run {
 }
 
 impl Merge {
-    fn run(&self) -> anyhow::Result<Outcome> {
+    fn run(&self) -> anyhow::Result<ExitCode> {
         let (design, records) = merge(&self.shards)?;
-        make(&self.out)?;
+        create_folder(&self.out)?;
         let own = self.out.join(RECORDS);
         if own.exists() && !self.restart {
             bail!("{}: there is a study already (--restart replaces it)", own.display());
@@ -271,8 +271,8 @@ fn finish(
     design: &Design,
     records: &BTreeMap<usize, FrameRecord>,
     times: &Times,
-) -> anyhow::Result<Outcome> {
-    let (tables, files) = write_outputs(out, design, records)?;
+) -> anyhow::Result<ExitCode> {
+    let (failures, files) = write_outputs(out, design, records)?;
     say(std::fs::read_to_string(out.join("tables.txt"))?.trim_end())?;
     let means = times.means();
     if !means.is_empty() {
@@ -281,20 +281,10 @@ fn finish(
     }
     let names = files.iter().filter_map(|f| f.file_name()).map(|n| n.to_string_lossy());
     say(format!("{}: {}", out.display(), names.collect::<Vec<_>>().join(" ")))?;
-    Ok(outcome(&tables, records))
-}
-
-fn outcome(tables: &Tables, records: &BTreeMap<usize, FrameRecord>) -> Outcome {
-    Outcome {
-        done: records.values().filter(|r| !r.failed()).count(),
-        // What comes of a fault that the study itself makes is in its tables.
-        failures: tables
-            .failures
-            .iter()
-            .filter(|failure| !failure.perturbed)
-            .map(Failure::sentence)
-            .collect(),
-    }
+    let done = records.values().filter(|r| !r.failed()).count();
+    // What comes of a fault that the study itself makes is in its tables.
+    let failures = failures.iter().filter(|failure| !failure.perturbed);
+    Ok(exit_code(done, &failures.map(Failure::sentence).collect::<Vec<_>>()))
 }
 
 /// `LEVEL=FILE`, or a file whose name says the level: init_low.csv.
@@ -305,9 +295,4 @@ fn level_and_file(text: &str) -> (String, PathBuf) {
     }
     let stem = file.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
     (stem.strip_prefix("init_").map_or(stem.clone(), str::to_owned), file)
-}
-
-fn make(folder: &Path) -> Result<(), DatasetError> {
-    std::fs::create_dir_all(folder)
-        .map_err(|e| DatasetError::Write { file: folder.to_path_buf(), problem: e.to_string() })
 }

@@ -1,20 +1,18 @@
 //! `prehend symmetry`.
 
 use std::path::PathBuf;
+use std::process::ExitCode;
 
 use anyhow::bail;
 use clap::Args;
 use prehend_refine::data::bop::{Models, write_symmetries};
-use prehend_refine::data::load_mesh;
-use prehend_refine::evaluate::metrics::Symmetries;
+use prehend_refine::data::{Symmetries, load_mesh};
 use prehend_refine::evaluate::symmetry::{SymmetrySettings, find_symmetries};
 
-use crate::outcome::Outcome;
-use crate::output::say;
-use crate::progress;
+use crate::terminal::{exit_code, progress, say};
 
 #[derive(Args)]
-pub(crate) struct Arguments {
+pub(crate) struct Symmetry {
     /// Folder of obj_000001.ply, … in millimeters, such as a dataset's models/
     #[arg(long, value_name = "DIR", help_heading = "Input")]
     models: PathBuf,
@@ -32,38 +30,34 @@ pub(crate) struct Arguments {
     write: bool,
 }
 
-pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
-    let Arguments { tolerance, color, .. } = arguments;
-    if !(*tolerance > 0.0 && *tolerance < 0.5) {
-        bail!("--tolerance {tolerance}: must be above 0 and below 0.5");
-    }
-    if color.is_some_and(|c| !(0.0..=1.0).contains(&c)) {
-        bail!("--color: must be from 0 to 1");
-    }
-    let models = Models::new(arguments.models.clone());
-    let settings = SymmetrySettings {
-        tolerance: arguments.tolerance,
-        color_tolerance: arguments.color,
-        ..SymmetrySettings::default()
-    };
-    let ids = match arguments.object.as_slice() {
-        [] => models.object_ids()?,
-        ids => ids.to_vec(),
-    };
-    let (mut done, mut failures) = (0, Vec::new());
-    let bar = progress::bar(ids.len() as u64, "searching");
-    for id in ids {
-        match search(&models, id, &settings, arguments.write) {
-            Ok(symmetries) => {
-                bar.suspend(|| say(format!("object {id}: {}", describe(&symmetries))))?;
-                done += 1;
-            }
-            Err(error) => failures.push(format!("object {id}: {error}")),
+impl Symmetry {
+    pub(crate) fn run(self) -> anyhow::Result<ExitCode> {
+        let Self { tolerance, color, .. } = self;
+        if !(tolerance > 0.0 && tolerance < 0.5) {
+            bail!("--tolerance {tolerance}: must be above 0 and below 0.5");
         }
-        bar.inc(1);
+        if color.is_some_and(|c| !(0.0..=1.0).contains(&c)) {
+            bail!("--color: must be from 0 to 1");
+        }
+        let settings =
+            SymmetrySettings { tolerance, color_tolerance: color, ..SymmetrySettings::default() };
+        let models = Models::new(self.models);
+        let ids = if self.object.is_empty() { models.object_ids()? } else { self.object };
+        let (mut done, mut failures) = (0, Vec::new());
+        let bar = progress(ids.len(), "searching");
+        for id in ids {
+            match search(&models, id, &settings, self.write) {
+                Ok(symmetries) => {
+                    bar.suspend(|| say(format!("object {id}: {}", describe(&symmetries))))?;
+                    done += 1;
+                }
+                Err(error) => failures.push(format!("object {id}: {error}")),
+            }
+            bar.inc(1);
+        }
+        bar.finish_and_clear();
+        Ok(exit_code(done, &failures))
     }
-    bar.finish_and_clear();
-    Ok(Outcome { done, failures })
 }
 
 fn search(

@@ -2,6 +2,7 @@
 
 use std::num::{NonZeroU32, NonZeroUsize};
 use std::path::{Path, PathBuf};
+use std::process::ExitCode;
 
 use anyhow::{Context, anyhow, bail};
 use clap::{Args, ValueEnum};
@@ -13,12 +14,11 @@ use prehend_refine::synth::{
 };
 use serde_json::json;
 
-use crate::outcome::Outcome;
-use crate::output::say;
-use crate::progress;
+use crate::options::limit_threads;
+use crate::terminal::{exit_code, progress, say};
 
 #[derive(Args)]
-pub(crate) struct Arguments {
+pub(crate) struct Synth {
     /// Folder of the dataset: absent, empty, or one that was begun with the same settings and will be gone on with
     #[arg(long, value_name = "DIR", help_heading = "Output")]
     out: PathBuf,
@@ -95,102 +95,110 @@ enum Unit {
     Mm,
 }
 
-pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
-    let sensor = sensors(&arguments.sensor)?;
-    if arguments.sensor.iter().any(|s| s == "list") {
-        for (name, value) in sensor.names() {
-            say(format!("{name}={value}"))?;
+impl Synth {
+    pub(crate) fn run(self) -> anyhow::Result<ExitCode> {
+        let sensor = self.sensors()?;
+        if self.sensor.iter().any(|s| s == "list") {
+            for (name, value) in sensor.names() {
+                say(format!("{name}={value}"))?;
+            }
+            return Ok(ExitCode::SUCCESS);
         }
-        return Ok(Outcome { done: 1, failures: Vec::new() });
-    }
-    if let Some(threads) = arguments.threads {
-        rayon::ThreadPoolBuilder::new().num_threads(threads.get()).build_global()?;
-    }
-    let subjects = subjects(arguments)?;
-    let hand = match &arguments.hand {
-        Some(urdf) => HandFiles::load(urdf, arguments.taxels.as_deref())?,
-        None => HandFiles::built_in()?,
-    };
-    let (steps, tries) = (arguments.steps.get(), u64::from(arguments.tries.get()));
-    let &[least, most] = arguments.contact_area.as_slice() else {
-        bail!("--contact-area: expected two numbers, such as 20,60");
-    };
-    let grasping = GraspSettings {
-        links: arguments.links.get(),
-        contact_area: (least, most),
-        ..GraspSettings::default()
-    };
-    let settings = SynthSettings {
-        frames: arguments.frames.get(),
-        frames_per_grasp: arguments.frames_per_grasp.get(),
-        width: arguments.width.get(),
-        height: arguments.height.get(),
-        sensor,
-        seed: arguments.seed,
-        grasp: json!({ "steps": steps, "tries": tries, "settings": format!("{grasping:?}") }),
-    };
-    let total = u64::from(settings.frames) * subjects.len() as u64;
-    let bar = progress::bar(total, "frames");
-    let prepare = |subject: &'_ Subject| -> Result<_, String> {
-        let grasper = Grasper::new(&hand.robot, &subject.object, &grasping);
-        let grasper = grasper.map_err(|e| e.to_string())?;
-        Ok(move |seed| {
-            let sequence = grasper.sequence(seed, tries, steps);
-            sequence.map(|(_, moments)| moments).map_err(|e| e.to_string())
-        })
-    };
-    let made =
-        generate(&arguments.out, &hand, &subjects, &settings, prepare, &|done| bar.inc(done))?;
-    bar.finish_and_clear();
-    say(format!("{} frames of {total} in {}", made.frames, arguments.out.display()))?;
-    let failures = made.failures.iter().map(|f| {
-        let images: Vec<String> = f.images.iter().map(u32::to_string).collect();
-        format!("scene {} images {}: {}", f.obj_id, images.join(" "), f.reason)
-    });
-    Ok(Outcome { done: made.frames as usize, failures: failures.collect() })
-}
-
-/// The last preset named, with all single settings over it.
-fn sensors(given: &[String]) -> anyhow::Result<SensorSettings> {
-    let mut settings = SensorSettings::clean();
-    for word in given.iter().filter(|word| !word.contains('=')) {
-        match word.as_str() {
-            "clean" => settings = SensorSettings::clean(),
-            "realistic" => settings = SensorSettings::realistic(),
-            "list" => {}
-            _ => bail!("--sensor {word}: neither clean, realistic, list nor KEY=VALUE"),
-        }
-    }
-    for (key, value) in given.iter().filter_map(|word| word.split_once('=')) {
-        settings.set(key.trim(), value.trim())?;
-    }
-    Ok(settings)
-}
-
-fn subjects(arguments: &Arguments) -> anyhow::Result<Vec<Subject>> {
-    if !arguments.mesh.is_empty() {
-        let (meshes, masses) = (arguments.mesh.len(), arguments.mass.len());
-        if masses != 0 && masses != meshes {
-            bail!("--mass is given {masses} times for {meshes} meshes: give one for each, or none");
-        }
-        let mass = |i: usize| arguments.mass.get(i).copied();
-        let files = (1..).zip(&arguments.mesh);
-        return files
-            .enumerate()
-            .map(|(i, (id, file))| own(id, file, arguments.mesh_unit, mass(i)))
+        limit_threads(self.threads)?;
+        let subjects = self.subjects()?;
+        let hand = match &self.hand {
+            Some(urdf) => HandFiles::load(urdf, self.taxels.as_deref())?,
+            None => HandFiles::built_in()?,
+        };
+        let (steps, tries) = (self.steps.get(), u64::from(self.tries.get()));
+        let &[least, most] = self.contact_area.as_slice() else {
+            bail!("--contact-area: expected two numbers, such as 20,60");
+        };
+        let grasping = GraspSettings {
+            links: self.links.get(),
+            contact_area: (least, most),
+            ..GraspSettings::default()
+        };
+        let settings = SynthSettings {
+            frames: self.frames.get(),
+            frames_per_grasp: self.frames_per_grasp.get(),
+            width: self.width.get(),
+            height: self.height.get(),
+            sensor,
+            seed: self.seed,
+            grasp: json!({ "steps": steps, "tries": tries, "settings": format!("{grasping:?}") }),
+        };
+        let total = settings.frames as usize * subjects.len();
+        let bar = progress(total, "frames");
+        let prepare = |subject: &'_ Subject| -> Result<_, String> {
+            let grasper = Grasper::new(&hand.robot, &subject.object, &grasping);
+            let grasper = grasper.map_err(|e| e.to_string())?;
+            Ok(move |seed| {
+                let sequence = grasper.sequence(seed, tries, steps);
+                sequence.map(|(_, moments)| moments).map_err(|e| e.to_string())
+            })
+        };
+        let summary =
+            generate(&self.out, &hand, &subjects, &settings, prepare, &|done| bar.inc(done))?;
+        bar.finish_and_clear();
+        say(format!("{} frames of {total} in {}", summary.frames, self.out.display()))?;
+        let failures: Vec<String> = summary
+            .failures
+            .iter()
+            .map(|f| {
+                let images: Vec<String> = f.images.iter().map(u32::to_string).collect();
+                format!("scene {} images {}: {}", f.obj_id, images.join(" "), f.reason)
+            })
             .collect();
+        Ok(exit_code(summary.frames as usize, &failures))
     }
-    let chosen = match &arguments.objects {
-        None => YcbObject::ALL.to_vec(),
-        Some(names) => names.iter().map(|name| built_in(name)).collect::<Result<_, _>>()?,
-    };
-    chosen
-        .into_iter()
-        .map(|object| {
-            let prepared = Object::with_mass(object.name(), object.mesh(), Some(object.mass()), 0)?;
-            Ok(Subject { obj_id: object.bop_id(), object: prepared })
-        })
-        .collect()
+
+    /// The last preset named, with all single settings over it.
+    fn sensors(&self) -> anyhow::Result<SensorSettings> {
+        let given = &self.sensor;
+        let mut settings = SensorSettings::clean();
+        for word in given.iter().filter(|word| !word.contains('=')) {
+            match word.as_str() {
+                "clean" => settings = SensorSettings::clean(),
+                "realistic" => settings = SensorSettings::realistic(),
+                "list" => {}
+                _ => bail!("--sensor {word}: neither clean, realistic, list nor KEY=VALUE"),
+            }
+        }
+        for (key, value) in given.iter().filter_map(|word| word.split_once('=')) {
+            settings.set(key.trim(), value.trim())?;
+        }
+        Ok(settings)
+    }
+
+    fn subjects(&self) -> anyhow::Result<Vec<Subject>> {
+        if !self.mesh.is_empty() {
+            let (meshes, masses) = (self.mesh.len(), self.mass.len());
+            if masses != 0 && masses != meshes {
+                bail!(
+                    "--mass is given {masses} times for {meshes} meshes: give one for each, or none"
+                );
+            }
+            let mass = |i: usize| self.mass.get(i).copied();
+            let files = (1..).zip(&self.mesh);
+            return files
+                .enumerate()
+                .map(|(i, (id, file))| own(id, file, self.mesh_unit, mass(i)))
+                .collect();
+        }
+        let chosen = match &self.objects {
+            None => YcbObject::ALL.to_vec(),
+            Some(names) => names.iter().map(|name| built_in(name)).collect::<Result<_, _>>()?,
+        };
+        chosen
+            .into_iter()
+            .map(|object| {
+                let prepared =
+                    Object::with_mass(object.name(), object.mesh(), Some(object.mass()), 0)?;
+                Ok(Subject { obj_id: object.bop_id(), object: prepared })
+            })
+            .collect()
+    }
 }
 
 fn built_in(name: &str) -> anyhow::Result<YcbObject> {

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
+use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -12,25 +13,20 @@ use nalgebra::Isometry3;
 use prehend_refine::data::bop::{
     Dataset, ResultRow, check_writable, share_image_times, write_results,
 };
-use prehend_refine::data::find_targets;
-use prehend_refine::data::{AssetError, Assets, PlainPose};
+use prehend_refine::data::{AssetError, Assets, PlainPose, find_targets};
 use prehend_refine::strategy::Posterior;
 use prehend_refine::tracker::{Recovery, TrackStatus, Tracked, Tracker, TrackerSettings};
 use serde_json::json;
 
-use crate::cache;
-use crate::initial::observed;
-use crate::options::{Selection, label};
-use crate::outcome::Outcome;
-use crate::output::{complain, say};
-use crate::progress;
+use crate::options::{Selection, label, limit_threads};
+use crate::terminal::{cache, complain, exit_code, progress, say};
 
 #[derive(Args)]
 #[command(
     override_usage = "prehend track --dataset <DIR> --poses <FILE> --out <FILE> [OPTIONS]\n       \
                             prehend track --dataset <DIR> --search --out <FILE> [OPTIONS]"
 )]
-pub(crate) struct Arguments {
+pub(crate) struct Track {
     #[command(flatten)]
     selection: Selection,
     /// Begin at the first pose of every object of a scene in this BOP results file
@@ -93,46 +89,44 @@ struct Done {
     tracked: Tracked,
 }
 
-pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
-    check_writable(&arguments.out)?;
-    if !(arguments.rate.is_finite() && arguments.rate > 0.0) {
-        bail!("--rate: {} is no number of images a second", arguments.rate);
-    }
-    let settings = arguments.settings()?;
-    if let Some(threads) = arguments.threads {
-        rayon::ThreadPoolBuilder::new().num_threads(threads.get()).build_global()?;
-    }
-    let dataset = arguments.selection.open()?;
-    let (sequences, mut failures) = arguments.sequences(&dataset)?;
-    let mut assets = Assets::new(&dataset, 0).with_cache(cache::open());
-    let mut frames = Vec::new();
-    for sequence in &sequences {
-        let followed =
-            arguments.follow(&mut assets, sequence, &settings, &mut frames, &mut failures);
-        if let Err(error) = followed {
-            let Sequence { scene_id, obj_id, .. } = sequence;
-            failures.push(format!("scene {scene_id} object {obj_id}: {error}"));
+impl Track {
+    pub(crate) fn run(self) -> anyhow::Result<ExitCode> {
+        check_writable(&self.out)?;
+        if !(self.rate.is_finite() && self.rate > 0.0) {
+            bail!("--rate: {} is no number of images a second", self.rate);
         }
+        let settings = self.settings()?;
+        limit_threads(self.threads)?;
+        let dataset = self.selection.open()?;
+        let (sequences, mut failures) = self.sequences(&dataset)?;
+        let mut assets = Assets::new(&dataset, 0).with_cache(cache());
+        let mut frames = Vec::new();
+        for sequence in &sequences {
+            let followed =
+                self.follow(&mut assets, sequence, &settings, &mut frames, &mut failures);
+            if let Err(error) = followed {
+                let Sequence { scene_id, obj_id, .. } = sequence;
+                failures.push(format!("scene {scene_id} object {obj_id}: {error}"));
+            }
+        }
+        let out = self.out.display();
+        if frames.is_empty() {
+            failures.push(format!("there is no pose, {out} was not written"));
+        } else {
+            let mut rows: Vec<ResultRow> = frames.iter().map(|f| f.row.clone()).collect();
+            share_image_times(&mut rows);
+            write_results(&self.out, &rows)?;
+        }
+        if self.json {
+            let frames: Vec<_> = frames.iter().map(summary).collect();
+            let document = json!({ "frames": frames, "failures": failures });
+            say(format!("{document:#}"))?;
+        } else if !frames.is_empty() {
+            say(format!("{}, written to {out}", told(&frames)))?;
+        }
+        Ok(exit_code(frames.len(), &failures))
     }
-    let out = arguments.out.display();
-    if frames.is_empty() {
-        failures.push(format!("there is no pose, {out} was not written"));
-    } else {
-        let mut rows: Vec<ResultRow> = frames.iter().map(|f| f.row.clone()).collect();
-        share_image_times(&mut rows);
-        write_results(&arguments.out, &rows)?;
-    }
-    if arguments.json {
-        let frames: Vec<_> = frames.iter().map(summary).collect();
-        let document = json!({ "frames": frames, "failures": failures });
-        say(format!("{document:#}"))?;
-    } else if !frames.is_empty() {
-        say(format!("{}, written to {out}", told(&frames)))?;
-    }
-    Ok(Outcome { done: frames.len(), failures })
-}
 
-impl Arguments {
     fn settings(&self) -> anyhow::Result<TrackerSettings> {
         let budget = self.budget.map(|ms| Duration::try_from_secs_f64(ms * 1e-3));
         Ok(TrackerSettings {
@@ -195,7 +189,7 @@ impl Arguments {
                 .push(format!("scene {scene_id} object {obj_id}: no image from image {first} on"));
         }
         let mut tracker: Option<Tracker> = None;
-        let bar = progress::bar(images.len() as u64, "tracking");
+        let bar = progress(images.len(), "tracking");
         for im_id in images {
             let mut row = ResultRow {
                 scene_id,
@@ -206,7 +200,8 @@ impl Arguments {
                 time: -1.0,
             };
             let mut frame = || -> Result<Tracked, AssetError> {
-                let (observation, robot) = observed(assets, scene_id, im_id, instance)?;
+                let frame = assets.dataset().frame(scene_id, im_id)?;
+                let (observation, robot) = assets.observation(&frame, instance, &[])?;
                 let seconds = f64::from(im_id - first) / self.rate;
                 let time = Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX);
                 let tracker = match &mut tracker {
@@ -221,16 +216,16 @@ impl Arguments {
             };
             match frame() {
                 Ok(tracked) => {
-                    bar.set_message(tracked.following.name());
-                    if let (TrackStatus::Lost, Some(doubt)) = (tracked.following, tracked.doubt) {
+                    bar.set_message(tracked.status.name());
+                    if let (TrackStatus::Lost, Some(doubt)) = (tracked.status, tracked.rejection) {
                         bar.suspend(|| {
                             complain(format!("warning: {}: lost: {doubt}", label(&row)))
                         });
                     }
                     row.t_cam_model = tracked.t_cam_object;
-                    row.score = tracked.confidence.as_ref().map_or(0.0, Posterior::probability);
+                    row.score = tracked.posterior.as_ref().map_or(0.0, Posterior::probability);
                     if self.time {
-                        row.time = tracked.spent.total().as_secs_f64();
+                        row.time = tracked.timing.total().as_secs_f64();
                     }
                     frames.push(Done { row, tracked });
                 }
@@ -246,8 +241,8 @@ impl Arguments {
 /// What became of `frames`, which are not empty.
 fn told(frames: &[Done]) -> String {
     // To find an object takes far longer than to follow it, and is rare.
-    let rare = |f: &&Done| matches!(f.tracked.following, TrackStatus::Found | TrackStatus::Lost);
-    let of = |f: &Done| f.tracked.spent.total().as_secs_f64();
+    let rare = |f: &&Done| matches!(f.tracked.status, TrackStatus::Relocalized | TrackStatus::Lost);
+    let of = |f: &Done| f.tracked.timing.total().as_secs_f64();
     let mut seconds: Vec<f64> = frames.iter().filter(|f| !rare(f)).map(of).collect();
     if seconds.is_empty() {
         seconds = frames.iter().map(of).collect();
@@ -262,10 +257,10 @@ fn told(frames: &[Done]) -> String {
     }
     text += ": ";
     let all =
-        [TrackStatus::Followed, TrackStatus::Predicted, TrackStatus::Found, TrackStatus::Lost];
+        [TrackStatus::Tracked, TrackStatus::Predicted, TrackStatus::Relocalized, TrackStatus::Lost];
     let counts: Vec<String> = all
         .into_iter()
-        .map(|f| (f, frames.iter().filter(|d| d.tracked.following == f).count()))
+        .map(|f| (f, frames.iter().filter(|d| d.tracked.status == f).count()))
         .filter(|(_, count)| *count > 0)
         .map(|(following, count)| format!("{count} {}", following.name()))
         .collect();
@@ -277,21 +272,21 @@ fn summary(frame: &Done) -> serde_json::Value {
     let Done { row, tracked } = frame;
     let pose = PlainPose::from(&tracked.t_cam_object);
     let milliseconds = |d: Duration| 1e3 * d.as_secs_f64();
-    let spent = &tracked.spent;
+    let timing = &tracked.timing;
     json!({
         "scene_id": row.scene_id,
         "im_id": row.im_id,
         "obj_id": row.obj_id,
-        "following": tracked.following.name(),
-        "doubt": tracked.doubt.map(|d| d.to_string()),
+        "following": tracked.status.name(),
+        "doubt": tracked.rejection.map(|d| d.to_string()),
         "iterations": tracked.iterations,
-        "misfit": tracked.misfit.is_finite().then_some(tracked.misfit),
+        "misfit": tracked.cost.is_finite().then_some(tracked.cost),
         "probability_within_5mm_5deg": row.score,
         "milliseconds": {
-            "preparation": milliseconds(spent.preparation),
-            "steps": milliseconds(spent.steps),
-            "judgment": milliseconds(spent.judgment),
-            "recovery": milliseconds(spent.recovery),
+            "preparation": milliseconds(timing.preparation),
+            "steps": milliseconds(timing.steps),
+            "judgement": milliseconds(timing.validation),
+            "recovery": milliseconds(timing.recovery),
         },
         "t_cam_model_mm": pose.translation_m.map(|v| v * 1e3),
         "quaternion_wxyz": pose.quaternion_wxyz,

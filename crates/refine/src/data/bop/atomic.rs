@@ -34,6 +34,14 @@ pub fn check_writable(path: &Path) -> Result<(), DatasetError> {
         .map_err(|e| fault(path, e))
 }
 
+/// Makes the folder and those above it, where they are absent.
+///
+/// # Errors
+/// [`DatasetError::Write`] naming `folder`.
+pub fn create_folder(folder: &Path) -> Result<(), DatasetError> {
+    std::fs::create_dir_all(folder).map_err(|e| fault(folder, e))
+}
+
 fn fault(path: &Path, problem: impl ToString) -> DatasetError {
     DatasetError::Write { file: path.to_path_buf(), problem: problem.to_string() }
 }

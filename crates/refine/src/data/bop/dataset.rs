@@ -5,8 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::error::DatasetError;
-use super::frame::Frame;
-use super::json::LazyJson;
+use super::json::JsonFile;
 use super::models::Models;
 
 /// One split of a BOP dataset, without anything that tells the true poses: neither `scene_gt*.json`,
@@ -26,9 +25,9 @@ pub struct Scene {
     id: u32,
     dir: PathBuf,
     root: PathBuf,
-    pub(crate) camera: LazyJson,
-    pub(crate) bodies: LazyJson,
-    pub(crate) tactile: LazyJson,
+    pub(super) camera: JsonFile,
+    pub(super) bodies: JsonFile,
+    pub(super) tactile: JsonFile,
 }
 
 impl Dataset {
@@ -103,14 +102,6 @@ impl Dataset {
             .get(&scene_id)
             .ok_or_else(|| DatasetError::UnknownScene { dir: self.split_dir.clone(), scene_id })
     }
-
-    /// The image `im_id` of the scene `scene_id`.
-    ///
-    /// # Errors
-    /// Those of [`Dataset::scene`] and [`Scene::frame`].
-    pub fn frame(&self, scene_id: u32, im_id: u32) -> Result<Frame<'_>, DatasetError> {
-        self.scene(scene_id)?.frame(im_id)
-    }
 }
 
 impl Scene {
@@ -118,9 +109,9 @@ impl Scene {
         Self {
             id,
             root: root.to_path_buf(),
-            camera: LazyJson::new(dir.join("scene_camera.json")),
-            bodies: LazyJson::new(dir.join("scene_bodies.json")),
-            tactile: LazyJson::new(dir.join("scene_tactile.json")),
+            camera: JsonFile::new(dir.join("scene_camera.json")),
+            bodies: JsonFile::new(dir.join("scene_bodies.json")),
+            tactile: JsonFile::new(dir.join("scene_tactile.json")),
             dir,
         }
     }
@@ -136,7 +127,7 @@ impl Scene {
     }
 
     /// The dataset's folder, which paths inside the scene's files are relative to.
-    pub(crate) fn root(&self) -> &Path {
+    pub(super) fn root(&self) -> &Path {
         &self.root
     }
 
@@ -145,23 +136,14 @@ impl Scene {
     /// # Errors
     /// When that file is absent or broken, or one of its keys is no image id.
     pub fn images(&self) -> Result<Vec<u32>, DatasetError> {
-        let file = self.camera.get()?;
-        let id = |key: &str| {
-            key.parse().map_err(|_| {
-                DatasetError::malformed(file.path(), format!("{key:?} is not an image id"))
-            })
+        let id = |key: &String| {
+            let file = self.camera.path();
+            let fault = |_| DatasetError::malformed(file, format!("{key:?} is not an image id"));
+            key.parse().map_err(fault)
         };
-        let mut ids = file.keys().map(id).collect::<Result<Vec<u32>, _>>()?;
+        let mut ids = self.camera.root()?.keys().map(id).collect::<Result<Vec<u32>, _>>()?;
         ids.sort_unstable();
         Ok(ids)
-    }
-
-    /// The image `im_id`.
-    ///
-    /// # Errors
-    /// When `scene_camera.json` is absent or broken, or does not describe the image.
-    pub fn frame(&self, im_id: u32) -> Result<Frame<'_>, DatasetError> {
-        Frame::new(self, im_id)
     }
 }
 

@@ -3,12 +3,14 @@
 use std::fs;
 use std::path::PathBuf;
 
-use super::dataset::Scene;
+use prehend_render::{Camera, DepthImage, Mask, RgbImage};
+use serde::Deserialize;
+
+use super::dataset::{Dataset, Scene};
 use super::error::DatasetError;
-use super::json::LazyJson;
-use super::scene::{Intrinsics, SceneBodies, Tactile};
+use super::json::{JsonFile, Numbers, Positive};
+use super::scene::{SceneBodies, Tactile};
 use crate::scene::Observation;
-use prehend_render::{DepthImage, Mask, RgbImage};
 
 /// One image: its camera, and access to everything else an estimator may know about it. Each part is
 /// read when asked for and fails on its own.
@@ -16,17 +18,68 @@ use prehend_render::{DepthImage, Mask, RgbImage};
 pub struct Frame<'a> {
     scene: &'a Scene,
     im_id: u32,
-    /// The camera as the estimator is told it.
-    pub intrinsics: Intrinsics,
+    intrinsics: Intrinsics,
     /// Millimeters per stored depth value.
     pub depth_scale: f64,
 }
 
+#[derive(Deserialize)]
+struct CameraEntry {
+    #[serde(rename = "cam_K")]
+    intrinsics: Intrinsics,
+    depth_scale: Option<Positive>,
+}
+
+/// Entries of `cam_K`: fx, fy, cx, cy \[px\].
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(try_from = "Numbers<9>")]
+struct Intrinsics([f64; 4]);
+
+impl TryFrom<Numbers<9>> for Intrinsics {
+    type Error = &'static str;
+
+    fn try_from(k: Numbers<9>) -> Result<Self, &'static str> {
+        let [fx, skew, cx, s10, fy, cy, s20, s21, s22] = k.0;
+        if fx <= 0.0 || fy <= 0.0 {
+            return Err("focal lengths must be above zero");
+        }
+        if [skew, s10, s20, s21] != [0.0; 4] || s22 != 1.0 {
+            return Err("is not of the form [fx 0 cx; 0 fy cy; 0 0 1]");
+        }
+        Ok(Self([fx, fy, cx, cy]))
+    }
+}
+
+impl Dataset {
+    /// The image `im_id` of the scene `scene_id`.
+    ///
+    /// # Errors
+    /// Those of [`Dataset::scene`] and [`Scene::frame`].
+    pub fn frame(&self, scene_id: u32, im_id: u32) -> Result<Frame<'_>, DatasetError> {
+        self.scene(scene_id)?.frame(im_id)
+    }
+}
+
+impl Scene {
+    /// The image `im_id`.
+    ///
+    /// # Errors
+    /// When `scene_camera.json` is absent or broken, or does not describe the image.
+    pub fn frame(&self, im_id: u32) -> Result<Frame<'_>, DatasetError> {
+        Frame::new(self, im_id)
+    }
+}
+
 impl<'a> Frame<'a> {
-    pub(crate) fn new(scene: &'a Scene, im_id: u32) -> Result<Self, DatasetError> {
-        let entry = scene.camera.get()?.entry(im_id)?;
-        let depth_scale = entry.find("depth_scale")?.map_or(Ok(1.0), |e| e.positive())?;
-        Ok(Self { scene, im_id, intrinsics: Intrinsics::parse(&entry.get("cam_K")?)?, depth_scale })
+    fn new(scene: &'a Scene, im_id: u32) -> Result<Self, DatasetError> {
+        let CameraEntry { intrinsics, depth_scale } = scene.camera.entry(im_id)?;
+        Ok(Self { scene, im_id, intrinsics, depth_scale: depth_scale.map_or(1.0, |scale| scale.0) })
+    }
+
+    /// The camera that the estimator is told, for an image of `width` by `height` pixels: BOP keeps no sizes.
+    pub fn camera(&self, width: usize, height: usize) -> Camera {
+        let [fx, fy, cx, cy] = self.intrinsics.0;
+        Camera { fx, fy, cx, cy, width, height }
     }
 
     /// The scene's id.
@@ -52,21 +105,12 @@ impl<'a> Frame<'a> {
     }
 
     /// The depth image, whether or not it exists.
-    pub fn depth_path(&self) -> PathBuf {
+    fn depth_path(&self) -> PathBuf {
         self.scene.dir().join("depth").join(format!("{:06}.png", self.im_id))
     }
 
-    /// The mask of an object's visible part.
-    ///
-    /// Mask files are numbered by the order of the objects in the ground truth, which estimators must not
-    /// read. So the only mask of an image is taken for any `instance`; among several, the one whose number
-    /// is `instance`, the index of the object's row among that image's rows of the results file
-    /// ([`super::ReadResults::instances`]). Results for images with several masks must list the objects in
-    /// the order of the masks.
-    ///
-    /// # Errors
-    /// [`DatasetError::Missing`] naming the file.
-    pub fn mask_path(&self, instance: usize) -> Result<PathBuf, DatasetError> {
+    /// The file of an object's mask; see [`Frame::mask`].
+    fn mask_path(&self, instance: usize) -> Result<PathBuf, DatasetError> {
         let dir = self.scene.dir().join("mask_visib");
         let prefix = format!("{:06}_", self.im_id);
         let expected = dir.join(format!("{prefix}{instance:06}.png"));
@@ -107,7 +151,13 @@ impl<'a> Frame<'a> {
         }
     }
 
-    /// Reads the mask that [`Frame::mask_path`] finds.
+    /// Reads the mask of an object's visible part.
+    ///
+    /// Mask files are numbered by the order of the objects in the ground truth, which estimators must not
+    /// read. So the only mask of an image is taken for any `instance`; among several, the one whose number
+    /// is `instance`, the index of the object's row among that image's rows of the results file
+    /// ([`super::ReadResults::instances`]). Results for images with several masks must list the objects in
+    /// the order of the masks.
     ///
     /// # Errors
     /// When it is absent or does not decode, and [`DatasetError::EmptyMask`] when no pixel is set.
@@ -133,7 +183,7 @@ impl<'a> Frame<'a> {
         };
         check(self.depth_path(), (depth.width(), depth.height()))?;
         check(self.mask_path(instance)?, (mask.width(), mask.height()))?;
-        let camera = self.intrinsics.camera(rgb.width(), rgb.height());
+        let camera = self.camera(rgb.width(), rgb.height());
         Ok(Observation { camera, color: rgb, depth, mask, gravity: None, hand: None })
     }
 
@@ -142,7 +192,7 @@ impl<'a> Frame<'a> {
     /// # Errors
     /// When the file is absent or broken, or lacks the image or one of its fields.
     pub fn bodies(&self) -> Result<SceneBodies, DatasetError> {
-        SceneBodies::parse(&self.scene.bodies.get()?.entry(self.im_id)?, self.scene.root())
+        SceneBodies::read(&self.scene.bodies, self.im_id, self.scene.root())
     }
 
     /// Taxel forces, from `scene_tactile.json`.
@@ -150,7 +200,7 @@ impl<'a> Frame<'a> {
     /// # Errors
     /// When the file is absent or broken, or lacks the image or one of its fields.
     pub fn tactile(&self) -> Result<Tactile, DatasetError> {
-        Tactile::parse(&self.scene.tactile.get()?.entry(self.im_id)?, self.scene.root())
+        Tactile::read(&self.scene.tactile, self.im_id, self.scene.root())
     }
 
     /// An error about `field` of this image's entry of `scene_bodies.json`.
@@ -163,7 +213,7 @@ impl<'a> Frame<'a> {
         self.fault(&self.scene.tactile, field, problem)
     }
 
-    fn fault(&self, file: &LazyJson, field: &str, problem: impl ToString) -> DatasetError {
+    fn fault(&self, file: &JsonFile, field: &str, problem: impl ToString) -> DatasetError {
         DatasetError::Field {
             file: file.path().to_owned(),
             field: format!("{}.{field}", self.im_id),

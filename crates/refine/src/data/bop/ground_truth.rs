@@ -3,10 +3,11 @@
 use std::collections::BTreeMap;
 
 use nalgebra::Isometry3;
+use serde::Deserialize;
 
 use super::dataset::Dataset;
 use super::error::DatasetError;
-use super::json::{Entry, LazyJson};
+use super::json::{JsonFile, Millimeters, Rotation};
 use super::models::Models;
 use super::scene::SceneBodies;
 
@@ -21,9 +22,9 @@ pub struct GroundTruth<'a> {
 
 #[derive(Debug)]
 struct TrueScene {
-    objects: LazyJson,
-    info: LazyJson,
-    bodies: LazyJson,
+    objects: JsonFile,
+    info: JsonFile,
+    bodies: JsonFile,
 }
 
 /// An object where it truly is.
@@ -35,13 +36,27 @@ pub struct TrueObject {
     pub t_cam_model: Isometry3<f64>,
 }
 
+#[derive(Deserialize)]
+struct ObjectEntry {
+    obj_id: u32,
+    #[serde(rename = "cam_R_m2c")]
+    rotation: Rotation,
+    #[serde(rename = "cam_t_m2c")]
+    translation: Millimeters,
+}
+
+#[derive(Deserialize)]
+struct InfoEntry {
+    visib_fract: f64,
+}
+
 impl<'a> GroundTruth<'a> {
     /// The truth about the split that `dataset` shows; nothing is read yet.
     pub fn new(dataset: &'a Dataset) -> Self {
         let scene = |dir: &std::path::Path| TrueScene {
-            objects: LazyJson::new(dir.join("scene_gt.json")),
-            info: LazyJson::new(dir.join("scene_gt_info.json")),
-            bodies: LazyJson::new(dir.join("scene_bodies_gt.json")),
+            objects: JsonFile::new(dir.join("scene_gt.json")),
+            info: JsonFile::new(dir.join("scene_gt_info.json")),
+            bodies: JsonFile::new(dir.join("scene_bodies_gt.json")),
         };
         let eval = dataset.root().join("models_eval");
         let models = if eval.is_dir() { eval } else { dataset.models().dir().to_path_buf() };
@@ -62,8 +77,8 @@ impl<'a> GroundTruth<'a> {
     /// # Errors
     /// When `scene_gt.json` is absent or broken, or lacks the image or one of its fields.
     pub fn objects(&self, scene_id: u32, im_id: u32) -> Result<Vec<TrueObject>, DatasetError> {
-        let entry = self.scene(scene_id)?.objects.get()?.entry(im_id)?;
-        entry.items()?.iter().map(TrueObject::parse).collect()
+        let entries: Vec<ObjectEntry> = self.scene(scene_id)?.objects.entry(im_id)?;
+        Ok(entries.into_iter().map(TrueObject::from).collect())
     }
 
     /// The true pose of the object `obj_id`; among several such objects, of the one nearest to `estimate`.
@@ -105,15 +120,15 @@ impl<'a> GroundTruth<'a> {
         if !info.exists() {
             return Ok(None);
         }
-        let items = info.get()?.entry(im_id)?.items()?;
-        items.iter().map(|e| e.get("visib_fract")?.number()).collect::<Result<_, _>>().map(Some)
+        let entries: Vec<InfoEntry> = info.entry(im_id)?;
+        Ok(Some(entries.into_iter().map(|e| e.visib_fract).collect()))
     }
 
     /// Whether a scene says where its robots are.
     ///
     /// # Errors
     /// When there is no such scene.
-    pub fn has_bodies(&self, scene_id: u32) -> Result<bool, DatasetError> {
+    pub(crate) fn has_bodies(&self, scene_id: u32) -> Result<bool, DatasetError> {
         let told = &self.dataset.scene(scene_id)?.bodies;
         Ok(self.scene(scene_id)?.bodies.exists() || told.exists())
     }
@@ -126,7 +141,7 @@ impl<'a> GroundTruth<'a> {
     pub fn bodies(&self, scene_id: u32, im_id: u32) -> Result<SceneBodies, DatasetError> {
         let own = &self.scene(scene_id)?.bodies;
         let file = if own.exists() { own } else { &self.dataset.scene(scene_id)?.bodies };
-        SceneBodies::parse(&file.get()?.entry(im_id)?, self.dataset.root())
+        SceneBodies::read(file, im_id, self.dataset.root())
     }
 
     fn scene(&self, scene_id: u32) -> Result<&TrueScene, DatasetError> {
@@ -141,11 +156,9 @@ impl<'a> GroundTruth<'a> {
     }
 }
 
-impl TrueObject {
-    fn parse(entry: &Entry<'_>) -> Result<Self, DatasetError> {
-        Ok(Self {
-            obj_id: entry.get("obj_id")?.id()?,
-            t_cam_model: entry.pose("cam_R_m2c", "cam_t_m2c")?,
-        })
+impl From<ObjectEntry> for TrueObject {
+    fn from(entry: ObjectEntry) -> Self {
+        let t_cam_model = Isometry3::from_parts(entry.translation.0, entry.rotation.0);
+        Self { obj_id: entry.obj_id, t_cam_model }
     }
 }

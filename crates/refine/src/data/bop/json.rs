@@ -1,63 +1,104 @@
-//! JSON files keyed by image or object id, read so that a fault names its file and field.
+//! JSON files keyed by image or object id, read such that a fault names its file and field.
 //!
-//! Entries are looked at one by one: a fault in one image's entry leaves the others usable. That
-//! includes the `NaN` and `Infinity` that other writers emit and JSON does not know.
+//! Entries are converted one by one: a fault in the entry of one image leaves the others usable. That includes `NaN` and
+//! `Infinity`, which other writers emit and JSON does not know.
 
+use std::fmt;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::{Translation3, UnitQuaternion, Vector3};
+use serde::Deserialize;
+use serde::de::{DeserializeOwned, DeserializeSeed, Deserializer, Error, SeqAccess, Visitor};
 use serde_json::{Map, Value};
 
 use super::error::DatasetError;
-use super::pose::{rotation_from_row_major, translation_from_mm};
+use super::pose::{PoseFault, rotation_from_row_major, translation_from_mm};
 
-/// A JSON file whose top level is an object.
-#[derive(Clone, Debug)]
-pub struct JsonFile {
+/// A JSON file whose top level is an object; it is read once, when something of it is first asked for.
+#[derive(Debug)]
+pub(super) struct JsonFile {
     path: PathBuf,
-    root: Map<String, Value>,
+    root: OnceLock<Result<Map<String, Value>, DatasetError>>,
 }
 
 impl JsonFile {
-    /// Reads a file.
-    ///
-    /// # Errors
-    /// When it is absent, cannot be read, is not JSON, or its top level is no object.
-    pub fn read(path: &Path) -> Result<Self, DatasetError> {
-        let bytes = fs::read(path).map_err(|e| DatasetError::reading(path, &e))?;
-        let parsed = serde_json::from_slice(&bytes).or_else(|error| {
-            // Report the strict parser's complaint unless non-finite numbers were all that stopped it.
-            serde_json::from_slice(&false_for_non_finite(&bytes)).map_err(|_| error)
-        });
-        match parsed {
-            Ok(Value::Object(root)) => Ok(Self { path: path.to_path_buf(), root }),
-            Ok(_) => Err(DatasetError::malformed(path, "the top level is not a JSON object")),
-            Err(e) => Err(DatasetError::malformed(path, format!("not valid JSON: {e}"))),
-        }
+    pub(super) fn new(path: PathBuf) -> Self {
+        Self { path, root: OnceLock::new() }
     }
 
-    /// The file it was read from.
-    pub fn path(&self) -> &Path {
+    pub(super) fn path(&self) -> &Path {
         &self.path
     }
 
-    /// The top-level keys, in alphabetical order.
-    pub fn keys(&self) -> impl Iterator<Item = &str> {
-        self.root.keys().map(String::as_str)
+    /// Whether the file is there, readable or not.
+    pub(super) fn exists(&self) -> bool {
+        self.path.exists()
     }
 
-    /// The top-level entry of an image or object id.
+    /// The top-level object.
     ///
     /// # Errors
-    /// [`DatasetError::NoEntry`].
-    pub fn entry(&self, id: u32) -> Result<Entry<'_>, DatasetError> {
+    /// When the file is absent, cannot be read, is not JSON, or its top level is no object.
+    pub(super) fn root(&self) -> Result<&Map<String, Value>, DatasetError> {
+        self.root.get_or_init(|| read(&self.path)).as_ref().map_err(Clone::clone)
+    }
+
+    /// The entry of an image or object id.
+    ///
+    /// # Errors
+    /// Those of [`JsonFile::root`], [`DatasetError::NoEntry`], and [`DatasetError::Field`] for the first field that is
+    /// absent or not of its type.
+    pub(super) fn entry<T: DeserializeOwned>(&self, id: u32) -> Result<T, DatasetError> {
         let key = id.to_string();
-        match self.root.get(&key) {
-            Some(value) => Ok(Entry { file: &self.path, field: key, value }),
-            None => Err(DatasetError::NoEntry { file: self.path.clone(), key }),
-        }
+        let Some(value) = self.root()?.get(&key) else {
+            return Err(DatasetError::NoEntry { file: self.path.clone(), key });
+        };
+        serde_path_to_error::deserialize(value).map_err(|error| {
+            let (path, problem) = (error.path().to_string(), error.inner().to_string());
+            let (absent, problem) = plain(&problem);
+            let mut field = key;
+            if path != "." {
+                field += if path.starts_with('[') { "" } else { "." };
+                field += &path;
+            }
+            field.extend(absent.iter().flat_map(|name| [".", name]));
+            DatasetError::Field { file: self.path.clone(), field, problem }
+        })
+    }
+}
+
+/// What serde says of a value, in words that name no Rust type; first the name of the field if it is absent.
+fn plain(problem: &str) -> (Option<&str>, String) {
+    if let Some(name) = problem.strip_prefix("missing field `").and_then(|p| p.split('`').next()) {
+        return (Some(name), "is missing".into());
+    }
+    let Some((found, expected)) = problem.split_once(", expected ") else {
+        return (None, problem.into());
+    };
+    let kind = match expected {
+        "f64" => "a finite number",
+        "u32" => "an id",
+        "a sequence" => "a list",
+        "a map" => "an object",
+        _ if expected.starts_with("struct") => "an object",
+        other => other,
+    };
+    let absent = found == "invalid type: null";
+    (None, if absent { "is missing".into() } else { format!("is not {kind}") })
+}
+
+fn read(path: &Path) -> Result<Map<String, Value>, DatasetError> {
+    let bytes = fs::read(path).map_err(|e| DatasetError::reading(path, &e))?;
+    let parsed = serde_json::from_slice(&bytes).or_else(|error| {
+        // Report the strict parser's complaint unless non-finite numbers were all that stopped it.
+        serde_json::from_slice(&false_for_non_finite(&bytes)).map_err(|_| error)
+    });
+    match parsed {
+        Ok(Value::Object(root)) => Ok(root),
+        Ok(_) => Err(DatasetError::malformed(path, "the top level is not a JSON object")),
+        Err(e) => Err(DatasetError::malformed(path, format!("not valid JSON: {e}"))),
     }
 }
 
@@ -89,247 +130,225 @@ fn false_for_non_finite(bytes: &[u8]) -> Vec<u8> {
     out
 }
 
-/// A JSON file that is read when it is first asked for, once.
-#[derive(Debug)]
-pub(crate) struct LazyJson {
-    path: PathBuf,
-    content: OnceLock<Result<JsonFile, DatasetError>>,
-}
+/// `N` numbers; nested lists (a matrix as a list of rows) count as one flat list.
+pub(super) struct Numbers<const N: usize>(pub(super) [f64; N]);
 
-impl LazyJson {
-    pub(crate) fn new(path: PathBuf) -> Self {
-        Self { path, content: OnceLock::new() }
-    }
-
-    pub(crate) fn get(&self) -> Result<&JsonFile, DatasetError> {
-        self.content.get_or_init(|| JsonFile::read(&self.path)).as_ref().map_err(Clone::clone)
-    }
-
-    pub(crate) fn path(&self) -> &Path {
-        &self.path
-    }
-
-    /// Whether the file is there, readable or not.
-    pub(crate) fn exists(&self) -> bool {
-        self.path.exists()
-    }
-}
-
-/// A value inside a JSON file that knows where it stands.
-#[derive(Clone, Debug)]
-pub struct Entry<'a> {
-    file: &'a Path,
-    field: String,
-    value: &'a Value,
-}
-
-impl<'a> Entry<'a> {
-    /// A [`DatasetError::Field`] about this value.
-    pub fn error(&self, problem: impl ToString) -> DatasetError {
-        DatasetError::Field {
-            file: self.file.to_path_buf(),
-            field: self.field.clone(),
-            problem: problem.to_string(),
-        }
-    }
-
-    /// The member `name`, or `None` if absent or null.
-    ///
-    /// # Errors
-    /// When this value is no object.
-    pub fn find(&self, name: &str) -> Result<Option<Entry<'a>>, DatasetError> {
-        let members = self.value.as_object().ok_or_else(|| self.error("is not an object"))?;
-        Ok(members.get(name).filter(|v| !v.is_null()).map(|value| self.member(name, value)))
-    }
-
-    /// The member `name`.
-    ///
-    /// # Errors
-    /// When this value is no object or lacks the member.
-    pub fn get(&self, name: &str) -> Result<Entry<'a>, DatasetError> {
-        static ABSENT: Value = Value::Null;
-        self.find(name)?.ok_or_else(|| self.member(name, &ABSENT).error("is missing"))
-    }
-
-    /// All members with their names, in alphabetical order.
-    ///
-    /// # Errors
-    /// When this value is no object.
-    pub fn members(&self) -> Result<Vec<(&'a str, Entry<'a>)>, DatasetError> {
-        let members = self.value.as_object().ok_or_else(|| self.error("is not an object"))?;
-        Ok(members.iter().map(|(name, value)| (name.as_str(), self.member(name, value))).collect())
-    }
-
-    /// The elements of a list.
-    ///
-    /// # Errors
-    /// When this value is no list.
-    pub fn items(&self) -> Result<Vec<Entry<'a>>, DatasetError> {
-        let items = self.value.as_array().ok_or_else(|| self.error("is not a list"))?;
-        let at =
-            |(i, value)| Entry { file: self.file, field: format!("{}[{i}]", self.field), value };
-        Ok(items.iter().enumerate().map(at).collect())
-    }
-
-    /// A finite number.
-    ///
-    /// # Errors
-    /// When this value is none.
-    pub fn number(&self) -> Result<f64, DatasetError> {
-        self.value
-            .as_f64()
-            .filter(|v| v.is_finite())
-            .ok_or_else(|| self.error("is not a finite number"))
-    }
-
-    /// A number above zero.
-    ///
-    /// # Errors
-    /// When this value is none.
-    pub fn positive(&self) -> Result<f64, DatasetError> {
-        self.number()
-            .and_then(|v| if v > 0.0 { Ok(v) } else { Err(self.error("must be above zero")) })
-    }
-
-    /// An id: a whole number from 0.
-    ///
-    /// # Errors
-    /// When this value is none.
-    pub fn id(&self) -> Result<u32, DatasetError> {
-        let id = self.value.as_u64().and_then(|v| u32::try_from(v).ok());
-        id.ok_or_else(|| self.error("is not an id"))
-    }
-
-    /// A string.
-    ///
-    /// # Errors
-    /// When this value is none.
-    pub fn text(&self) -> Result<&'a str, DatasetError> {
-        self.value.as_str().ok_or_else(|| self.error("is not a string"))
-    }
-
-    /// `N` finite numbers; nested lists (a matrix as a list of rows) count as one flat list.
-    ///
-    /// # Errors
-    /// When this value is no list of numbers or has another length.
-    pub fn numbers<const N: usize>(&self) -> Result<[f64; N], DatasetError> {
+impl<'de, const N: usize> Deserialize<'de> for Numbers<N> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let mut values = Vec::with_capacity(N);
-        for item in self.items()? {
-            match item.value {
-                Value::Array(_) => {
-                    for inner in item.items()? {
-                        values.push(inner.number()?);
-                    }
-                }
-                _ => values.push(item.number()?),
-            }
-        }
+        Flat { out: &mut values, nested: false }.deserialize(deserializer)?;
         let found = values.len();
-        values.try_into().map_err(|_| self.error(format!("expected {N} numbers, found {found}")))
+        let array = values.try_into();
+        array
+            .map(Self)
+            .map_err(|_| D::Error::custom(format!("expected {N} numbers, found {found}")))
+    }
+}
+
+/// Appends a number, or those of a list, to `out`.
+struct Flat<'a> {
+    out: &'a mut Vec<f64>,
+    nested: bool,
+}
+
+impl<'de> DeserializeSeed<'de> for Flat<'_> {
+    type Value = ();
+
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<(), D::Error> {
+        deserializer.deserialize_any(self)
+    }
+}
+
+impl<'de> Visitor<'de> for Flat<'_> {
+    type Value = ();
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(if self.nested { "a finite number" } else { "a list" })
     }
 
-    /// The pose \[m\] of the members `rotation` (nine row-major entries) and `translation_mm`.
-    ///
-    /// # Errors
-    /// When one is absent, not finite, or no rotation.
-    pub fn pose(
-        &self,
-        rotation: &str,
-        translation_mm: &str,
-    ) -> Result<Isometry3<f64>, DatasetError> {
-        let (r, t) = (self.get(rotation)?, self.get(translation_mm)?);
-        Ok(Isometry3::from_parts(
-            translation_from_mm(&t.numbers()?).map_err(|e| t.error(e))?,
-            rotation_from_row_major(&r.numbers()?).map_err(|e| r.error(e))?,
-        ))
+    fn visit_f64<E: Error>(self, value: f64) -> Result<(), E> {
+        if !self.nested {
+            return Err(E::invalid_type(serde::de::Unexpected::Float(value), &self));
+        }
+        self.out.push(value);
+        Ok(())
     }
 
-    /// Three finite numbers as a vector, in the file's unit.
-    ///
-    /// # Errors
-    /// When this value is no list of three numbers.
-    pub fn vector(&self) -> Result<Vector3<f64>, DatasetError> {
-        self.numbers::<3>().map(Vector3::from)
+    fn visit_i64<E: Error>(self, value: i64) -> Result<(), E> {
+        self.visit_f64(value as f64)
     }
 
-    fn member(&self, name: &str, value: &'a Value) -> Entry<'a> {
-        Entry { file: self.file, field: format!("{}.{name}", self.field), value }
+    fn visit_u64<E: Error>(self, value: u64) -> Result<(), E> {
+        self.visit_f64(value as f64)
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<(), A::Error> {
+        while list.next_element_seed(Flat { out: &mut *self.out, nested: true })?.is_some() {}
+        Ok(())
+    }
+}
+
+/// A number above zero.
+#[derive(Clone, Copy, Deserialize)]
+#[serde(try_from = "f64")]
+pub(super) struct Positive(pub(super) f64);
+
+impl TryFrom<f64> for Positive {
+    type Error = &'static str;
+
+    fn try_from(value: f64) -> Result<Self, &'static str> {
+        if value > 0.0 { Ok(Self(value)) } else { Err("must be above zero") }
+    }
+}
+
+/// A vector in the unit of the file.
+#[derive(Deserialize)]
+#[serde(from = "Numbers<3>")]
+pub(super) struct Vector(pub(super) Vector3<f64>);
+
+impl From<Numbers<3>> for Vector {
+    fn from(numbers: Numbers<3>) -> Self {
+        Self(numbers.0.into())
+    }
+}
+
+/// A rotation of nine row-major entries.
+#[derive(Deserialize)]
+#[serde(try_from = "Numbers<9>")]
+pub(super) struct Rotation(pub(super) UnitQuaternion<f64>);
+
+impl TryFrom<Numbers<9>> for Rotation {
+    type Error = PoseFault;
+
+    fn try_from(numbers: Numbers<9>) -> Result<Self, PoseFault> {
+        rotation_from_row_major(&numbers.0).map(Self)
+    }
+}
+
+/// A translation \[m\] of three millimeter values.
+#[derive(Deserialize)]
+#[serde(try_from = "Numbers<3>")]
+pub(super) struct Millimeters(pub(super) Translation3<f64>);
+
+impl TryFrom<Numbers<3>> for Millimeters {
+    type Error = PoseFault;
+
+    fn try_from(numbers: Numbers<3>) -> Result<Self, PoseFault> {
+        translation_from_mm(&numbers.0).map(Self)
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeMap;
+
     use super::*;
 
-    fn file(text: &str) -> Result<JsonFile, DatasetError> {
+    fn file(text: &str) -> JsonFile {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("scene.json");
         fs::write(&path, text).unwrap();
-        JsonFile::read(&path)
+        let file = JsonFile::new(path);
+        let _ = file.root();
+        file
+    }
+
+    /// What is wrong with entry `id` as a `T`.
+    fn fault<T: DeserializeOwned>(file: &JsonFile, id: u32) -> String {
+        match file.entry::<T>(id).map(|_| ()).unwrap_err() {
+            DatasetError::Field { field, problem, .. } => format!("{field}: {problem}"),
+            other => other.to_string(),
+        }
     }
 
     #[test]
     fn broken_absent_and_misshapen_files_are_named() {
-        let error = file(r#"{"0": {"cam_K": [1,"#).unwrap_err();
+        let error = file(r#"{"0": {"cam_K": [1,"#).root().unwrap_err();
         assert!(matches!(&error, DatasetError::Malformed { .. }));
         assert!(error.to_string().contains("scene.json: not valid JSON"), "{error}");
-        assert!(matches!(file("[1, 2]"), Err(DatasetError::Malformed { .. })));
-        let absent = JsonFile::read(Path::new("no/such/scene.json")).unwrap_err();
-        assert_eq!(absent, DatasetError::Missing { file: "no/such/scene.json".into() });
+        assert!(matches!(file("[1, 2]").root(), Err(DatasetError::Malformed { .. })));
+        let absent = JsonFile::new("no/such/scene.json".into());
+        let expected = DatasetError::Missing { file: "no/such/scene.json".into() };
+        assert_eq!(absent.root().unwrap_err(), expected);
     }
 
     #[test]
     fn a_fault_names_its_field() {
-        let f = file(r#"{"3": {"a": [{"b": [1, 2]}], "s": 1, "n": "x", "i": -1}}"#).unwrap();
-        let e = f.entry(3).unwrap();
-        let at = |r: Result<(), DatasetError>| match r.unwrap_err() {
-            DatasetError::Field { field, problem, .. } => format!("{field}: {problem}"),
-            other => other.to_string(),
-        };
-        let b = e.get("a").unwrap().items().unwrap()[0].get("b").unwrap();
-        assert_eq!(at(b.numbers::<3>().map(drop)), "3.a[0].b: expected 3 numbers, found 2");
-        assert_eq!(at(e.get("zz").map(drop)), "3.zz: is missing");
-        assert_eq!(at(e.get("s").unwrap().text().map(drop)), "3.s: is not a string");
-        assert_eq!(at(e.get("n").unwrap().number().map(drop)), "3.n: is not a finite number");
-        assert_eq!(at(e.get("i").unwrap().id().map(drop)), "3.i: is not an id");
-        assert_eq!(at(e.get("i").unwrap().positive().map(drop)), "3.i: must be above zero");
-        assert_eq!(at(e.get("n").unwrap().items().map(drop)), "3.n: is not a list");
-        assert_eq!(at(e.get("n").unwrap().members().map(drop)), "3.n: is not an object");
-        assert!(matches!(f.entry(4), Err(DatasetError::NoEntry { key, .. }) if key == "4"));
+        #[derive(Deserialize)]
+        struct A {
+            #[expect(dead_code)]
+            a: Vec<B>,
+        }
+        #[derive(Deserialize)]
+        struct B {
+            #[expect(dead_code)]
+            b: Numbers<3>,
+        }
+        type Of<T> = BTreeMap<String, T>;
+        let f = file(
+            r#"{"3": {"a": [{"b": [1, 2]}]}, "4": {}, "5": {"s": 1}, "6": {"n": "x"}, "7": {"i": -1}}"#,
+        );
+        assert_eq!(fault::<A>(&f, 3), "3.a[0].b: expected 3 numbers, found 2");
+        assert_eq!(fault::<A>(&f, 4), "4.a: is missing");
+        assert_eq!(fault::<Of<String>>(&f, 5), "5.s: is not a string");
+        assert_eq!(fault::<Of<f64>>(&f, 6), "6.n: is not a finite number");
+        assert_eq!(fault::<Of<u32>>(&f, 7), "7.i: is not an id");
+        assert_eq!(fault::<Of<Positive>>(&f, 7), "7.i: must be above zero");
+        assert_eq!(fault::<Of<Vec<f64>>>(&f, 6), "6.n: is not a list");
+        assert_eq!(fault::<Of<Numbers<3>>>(&f, 5), "5.s: is not a list");
+        assert_eq!(fault::<Of<Of<f64>>>(&f, 6), "6.n: is not an object");
+        assert_eq!(fault::<Of<A>>(&f, 6), "6.n: is not an object");
+        let absent = f.entry::<A>(8).map(|_| ()).unwrap_err();
+        assert!(matches!(absent, DatasetError::NoEntry { key, .. } if key == "8"));
     }
 
     #[test]
     fn nan_spoils_only_its_own_field() {
-        let f = file(r#"{"0": {"t": [1, NaN, -Infinity], "name": "a NaN \" in a string"}, "1": {"t": [1, 2, 3]}}"#).unwrap();
-        let error = f.entry(0).unwrap().get("t").unwrap().numbers::<3>().unwrap_err();
-        assert!(error.to_string().contains("0.t[1]: is not a finite number"), "{error}");
-        assert_eq!(
-            f.entry(0).unwrap().get("name").unwrap().text().unwrap(),
-            "a NaN \" in a string"
+        #[derive(Debug, Deserialize, PartialEq)]
+        struct Named {
+            name: String,
+        }
+        #[derive(Deserialize)]
+        struct Placed {
+            t: Numbers<3>,
+        }
+        let f = file(
+            r#"{"0": {"t": [1, NaN, -Infinity], "name": "a NaN \" in a string"}, "1": {"t": [1, 2, 3]}}"#,
         );
-        assert_eq!(f.entry(1).unwrap().get("t").unwrap().numbers(), Ok([1.0, 2.0, 3.0]));
+        assert_eq!(fault::<Placed>(&f, 0), "0.t[1]: is not a finite number");
+        assert_eq!(f.entry(0), Ok(Named { name: "a NaN \" in a string".into() }));
+        assert_eq!(f.entry::<Placed>(1).map(|p| p.t.0), Ok([1.0, 2.0, 3.0]));
     }
 
     #[test]
     fn nan_in_an_optional_field_is_not_absence() {
-        let f = file(r#"{"0": {"scale": NaN, "none": null}}"#).unwrap();
-        let entry = f.entry(0).unwrap();
-        assert!(entry.find("none").unwrap().is_none());
-        let error = entry.find("scale").unwrap().unwrap().positive().unwrap_err();
-        assert!(error.to_string().contains("0.scale: is not a finite number"), "{error}");
+        #[derive(Deserialize)]
+        struct Scaled {
+            none: Option<Positive>,
+            scale: Option<Positive>,
+        }
+        let f = file(r#"{"0": {"scale": NaN, "none": null}, "1": {"scale": 2, "none": null}}"#);
+        assert_eq!(fault::<Scaled>(&f, 0), "0.scale: is not a finite number");
+        let read: Scaled = f.entry(1).unwrap();
+        assert!(read.none.is_none() && read.scale.is_some());
     }
 
     #[test]
     fn poses_are_checked_and_brought_to_meters() {
+        #[derive(Deserialize)]
+        struct Pose {
+            #[serde(rename = "R")]
+            rotation: Rotation,
+            t: Millimeters,
+        }
         let f = file(
-            r#"{"0": {"R": [0, -1, 0, 1, 0, 0, 0, 0, 1], "t": [1, 2, 3], "flat": [[1, 0, 0], [0, 2, 0], [0, 0, 1]]}}"#,
+            r#"{"0": {"R": [0, -1, 0, 1, 0, 0, 0, 0, 1], "t": [1, 2, 3]},
+                "1": {"R": [[1, 0, 0], [0, 2, 0], [0, 0, 1]], "t": [1, 2, 3]}}"#,
         );
-        let f = f.unwrap();
-        let e = f.entry(0).unwrap();
-        let pose = e.pose("R", "t").unwrap();
-        assert!((pose.translation.vector - Vector3::new(0.001, 0.002, 0.003)).norm() < 1e-18);
-        assert!((pose.rotation * Vector3::x() - Vector3::y()).norm() < 1e-15);
-        let error = e.pose("flat", "t").unwrap_err();
-        assert!(error.to_string().contains("0.flat: not orthonormal"), "{error}");
+        let pose: Pose = f.entry(0).unwrap();
+        assert!((pose.t.0.vector - Vector3::new(0.001, 0.002, 0.003)).norm() < 1e-18);
+        assert!((pose.rotation.0 * Vector3::x() - Vector3::y()).norm() < 1e-15);
+        let error = fault::<Pose>(&f, 1);
+        assert!(error.contains("1.R: not orthonormal"), "{error}");
     }
 }

@@ -12,25 +12,22 @@ mod error;
 mod frame;
 mod ground_truth;
 mod json;
-mod model_list;
 mod models;
+mod models_info;
 mod pose;
 mod results;
 mod scene;
 
-pub use atomic::{check_writable, write_atomically};
+pub use atomic::{check_writable, create_folder, write_atomically};
 pub use dataset::{Dataset, Scene};
 pub use error::DatasetError;
 pub use frame::Frame;
 pub use ground_truth::{GroundTruth, TrueObject};
-pub use json::{Entry, JsonFile};
-pub use model_list::{extent_to_bop, write_symmetries};
 pub use models::{ModelInfo, Models};
-pub use pose::{
-    PoseFault, ROTATION_TOLERANCE, pose_from_bop, rotation_from_row_major, rotation_to_row_major,
-    translation_from_mm, translation_to_mm,
-};
+pub use models_info::write_symmetries;
+pub(crate) use models_info::{diameter, extent_to_bop};
+pub(crate) use pose::{rotation_from_row_major, rotation_to_row_major, translation_to_mm};
 pub use results::{
     ReadResults, ResultRow, RowError, read_results, share_image_times, write_results,
 };
-pub use scene::{Body, Intrinsics, SceneBodies, Tactile, UNITS_PER_NEWTON};
+pub use scene::{Body, SceneBodies, Tactile, UNITS_PER_NEWTON};

@@ -4,20 +4,18 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Isometry3, Matrix3, Point3, Unit, Vector3};
-use serde_json::{Map, Value, json};
+use serde::Deserialize;
 
 use super::error::DatasetError;
-use super::json::{Entry, LazyJson};
-use super::pose::{
-    rotation_from_row_major, rotation_to_row_major, translation_from_mm, translation_to_mm,
-};
-use crate::evaluate::metrics::{ContinuousSymmetry, Symmetries};
+use super::json::{JsonFile, Numbers, Positive, Vector};
+use super::pose::{PoseFault, pose_from_bop};
+use crate::data::symmetry::{ContinuousSymmetry, Symmetries};
 
 /// A folder with `obj_000001.ply`, … (millimeters) and `models_info.json`.
 #[derive(Debug)]
 pub struct Models {
     dir: PathBuf,
-    info: LazyJson,
+    info: JsonFile,
 }
 
 /// What `models_info.json` says of one object, in the model frame.
@@ -38,7 +36,7 @@ pub struct ModelInfo {
 impl Models {
     /// The models in `dir`; nothing is read yet.
     pub fn new(dir: PathBuf) -> Self {
-        let info = LazyJson::new(dir.join("models_info.json"));
+        let info = JsonFile::new(dir.join("models_info.json"));
         Self { dir, info }
     }
 
@@ -75,104 +73,110 @@ impl Models {
     /// When `models_info.json` is absent or broken, [`DatasetError::UnknownObject`] when it does not list
     /// the object, or a field is malformed.
     pub fn info(&self, obj_id: u32) -> Result<ModelInfo, DatasetError> {
-        let file = self.info.get()?;
-        let entry = file.entry(obj_id).map_err(|e| match e {
+        let entry: InfoEntry = self.info.entry(obj_id).map_err(|e| match e {
             DatasetError::NoEntry { file, .. } => DatasetError::UnknownObject { file, obj_id },
             other => other,
         })?;
-        ModelInfo::parse(&entry)
+        Ok(entry.into())
     }
 }
 
-impl Symmetries {
-    /// As `models_info.json` has them: `symmetries_discrete` and `symmetries_continuous`, in millimeters; what there is
-    /// none of is left out.
-    pub fn to_bop(&self) -> Map<String, Value> {
-        let motion = |m: &Isometry3<f64>| {
-            let [r, t] = [
-                rotation_to_row_major(&m.rotation).to_vec(),
-                translation_to_mm(&m.translation).to_vec(),
-            ];
-            let rows = r.chunks(3).zip(&t).flat_map(|(row, t)| [row[0], row[1], row[2], *t]);
-            rows.chain([0.0, 0.0, 0.0, 1.0]).collect::<Vec<f64>>()
+#[derive(Deserialize)]
+struct InfoEntry {
+    diameter: Positive,
+    mass_kg: Option<Positive>,
+    com_mm: Option<Vector>,
+    inertia_kg_m2: Option<Inertia>,
+    symmetries_discrete: Option<Vec<Motion>>,
+    symmetries_continuous: Option<Vec<AxisEntry>>,
+}
+
+impl From<InfoEntry> for ModelInfo {
+    fn from(entry: InfoEntry) -> Self {
+        let discrete = entry.symmetries_discrete.into_iter().flatten().map(|m| m.0);
+        let axis = |entry: AxisEntry| ContinuousSymmetry {
+            axis: entry.axis.0,
+            point: entry.offset.map_or_else(Point3::origin, |o| Point3::from(o.0 / 1000.0)),
         };
-        let axis = |c: &ContinuousSymmetry| json!({ "axis": c.axis.as_slice(), "offset": (c.point.coords * 1e3).as_slice() });
-        let mut fields = Map::new();
-        if !self.discrete.is_empty() {
-            fields.insert("symmetries_discrete".into(), self.discrete.iter().map(motion).collect());
+        let continuous = entry.symmetries_continuous.into_iter().flatten().map(axis);
+        Self {
+            diameter: entry.diameter.0 / 1000.0,
+            symmetries: Symmetries {
+                discrete: discrete.collect(),
+                continuous: continuous.collect(),
+            },
+            mass: entry.mass_kg.map(|m| m.0),
+            center_of_mass: entry.com_mm.map(|c| Point3::from(c.0 / 1000.0)),
+            inertia: entry.inertia_kg_m2.map(|i| i.0),
         }
-        if !self.continuous.is_empty() {
-            let axes: Vec<Value> = self.continuous.iter().map(axis).collect();
-            fields.insert("symmetries_continuous".into(), axes.into());
-        }
-        fields
     }
 }
 
-impl ModelInfo {
-    fn parse(entry: &Entry<'_>) -> Result<Self, DatasetError> {
-        Ok(Self {
-            diameter: entry.get("diameter")?.positive()? / 1000.0,
-            symmetries: symmetries(entry)?,
-            mass: entry.find("mass_kg")?.map(|e| e.positive()).transpose()?,
-            center_of_mass: entry
-                .find("com_mm")?
-                .map(|e| Ok::<_, DatasetError>(Point3::from(e.vector()? / 1000.0)))
-                .transpose()?,
-            inertia: entry.find("inertia_kg_m2")?.map(|e| inertia(&e)).transpose()?,
-        })
+#[derive(Deserialize)]
+#[serde(try_from = "Numbers<9>")]
+struct Inertia(Matrix3<f64>);
+
+impl TryFrom<Numbers<9>> for Inertia {
+    type Error = &'static str;
+
+    fn try_from(numbers: Numbers<9>) -> Result<Self, &'static str> {
+        let matrix = Matrix3::from_row_slice(&numbers.0);
+        if (matrix - matrix.transpose()).amax() > 1e-6 * matrix.amax() {
+            return Err("is not symmetric");
+        }
+        let matrix = (matrix + matrix.transpose()) * 0.5;
+        matrix.cholesky().map(|_| Self(matrix)).ok_or("is not positive definite")
     }
 }
 
-fn inertia(entry: &Entry<'_>) -> Result<Matrix3<f64>, DatasetError> {
-    let matrix = Matrix3::from_row_slice(&entry.numbers::<9>()?);
-    if (matrix - matrix.transpose()).amax() > 1e-6 * matrix.amax() {
-        return Err(entry.error("is not symmetric"));
-    }
-    let matrix = (matrix + matrix.transpose()) * 0.5;
-    if matrix.cholesky().is_none() {
-        return Err(entry.error("is not positive definite"));
-    }
-    Ok(matrix)
+#[derive(Deserialize)]
+struct AxisEntry {
+    axis: Direction,
+    offset: Option<Vector>,
 }
 
-fn symmetries(entry: &Entry<'_>) -> Result<Symmetries, DatasetError> {
-    let mut symmetries = Symmetries::default();
-    if let Some(list) = entry.find("symmetries_discrete")? {
-        for item in list.items()? {
-            symmetries.discrete.push(motion(&item)?);
-        }
+#[derive(Deserialize)]
+#[serde(try_from = "Numbers<3>")]
+struct Direction(Unit<Vector3<f64>>);
+
+impl TryFrom<Numbers<3>> for Direction {
+    type Error = &'static str;
+
+    fn try_from(numbers: Numbers<3>) -> Result<Self, &'static str> {
+        Unit::try_new(numbers.0.into(), 1e-9).map(Self).ok_or("has no direction")
     }
-    if let Some(list) = entry.find("symmetries_continuous")? {
-        for item in list.items()? {
-            let axis = item.get("axis")?;
-            let direction = Unit::try_new(axis.vector()?, 1e-9)
-                .ok_or_else(|| axis.error("has no direction"))?;
-            let offset =
-                item.find("offset")?.map_or(Ok(Vector3::zeros()), |e| e.vector())? / 1000.0;
-            symmetries
-                .continuous
-                .push(ContinuousSymmetry { axis: direction, point: Point3::from(offset) });
-        }
-    }
-    Ok(symmetries)
 }
 
 /// A row-major 4×4 motion with its translation in millimeters.
-fn motion(entry: &Entry<'_>) -> Result<Isometry3<f64>, DatasetError> {
-    let m: [f64; 16] = entry.numbers()?;
-    if m[12..] != [0.0, 0.0, 0.0, 1.0] {
-        return Err(entry.error("the last row must be 0 0 0 1"));
+#[derive(Deserialize)]
+#[serde(try_from = "Numbers<16>")]
+struct Motion(Isometry3<f64>);
+
+impl TryFrom<Numbers<16>> for Motion {
+    type Error = MotionFault;
+
+    fn try_from(numbers: Numbers<16>) -> Result<Self, MotionFault> {
+        let m = numbers.0;
+        if m[12..] != [0.0, 0.0, 0.0, 1.0] {
+            return Err(MotionFault::LastRow);
+        }
+        let r = [m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]];
+        Ok(Self(pose_from_bop(&r, &[m[3], m[7], m[11]])?))
     }
-    let r = [m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]];
-    let rotation = rotation_from_row_major(&r).map_err(|e| entry.error(e))?;
-    let translation = translation_from_mm(&[m[3], m[7], m[11]]).map_err(|e| entry.error(e))?;
-    Ok(Isometry3::from_parts(translation, rotation))
+}
+
+#[derive(Debug, thiserror::Error)]
+enum MotionFault {
+    #[error("the last row must be 0 0 0 1")]
+    LastRow,
+    #[error(transparent)]
+    Pose(#[from] PoseFault),
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use serde_json::json;
 
     fn models(info: &str) -> (tempfile::TempDir, Models) {
         let dir = tempfile::tempdir().unwrap();

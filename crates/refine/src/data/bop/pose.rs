@@ -4,11 +4,11 @@ use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion};
 use thiserror::Error;
 
 /// Largest entry of RᵀR − I that still counts as rounding; beyond it the matrix is refused.
-pub const ROTATION_TOLERANCE: f64 = 1e-3;
+const ROTATION_TOLERANCE: f64 = 1e-3;
 
 /// Why numbers do not make a pose.
 #[derive(Clone, Debug, Error, PartialEq)]
-pub enum PoseFault {
+pub(crate) enum PoseFault {
     /// The wrong number of values.
     #[error("expected {expected} numbers, found {found}")]
     Count {
@@ -46,7 +46,7 @@ pub enum PoseFault {
 ///
 /// # Errors
 /// [`PoseFault::NotFinite`], [`PoseFault::NotOrthonormal`] or [`PoseFault::Reflection`].
-pub fn rotation_from_row_major(r: &[f64; 9]) -> Result<UnitQuaternion<f64>, PoseFault> {
+pub(crate) fn rotation_from_row_major(r: &[f64; 9]) -> Result<UnitQuaternion<f64>, PoseFault> {
     require_finite(r)?;
     let matrix = Matrix3::from_row_slice(r);
     let deviation = (matrix.transpose() * matrix - Matrix3::identity()).amax();
@@ -72,7 +72,7 @@ fn polar_factor(mut matrix: Matrix3<f64>) -> Matrix3<f64> {
 }
 
 /// The nine row-major entries of a rotation.
-pub fn rotation_to_row_major(rotation: &UnitQuaternion<f64>) -> [f64; 9] {
+pub(crate) fn rotation_to_row_major(rotation: &UnitQuaternion<f64>) -> [f64; 9] {
     let m = rotation.to_rotation_matrix().into_inner();
     std::array::from_fn(|i| m[(i / 3, i % 3)])
 }
@@ -81,14 +81,14 @@ pub fn rotation_to_row_major(rotation: &UnitQuaternion<f64>) -> [f64; 9] {
 ///
 /// # Errors
 /// [`PoseFault::NotFinite`].
-pub fn translation_from_mm(t_mm: &[f64; 3]) -> Result<Translation3<f64>, PoseFault> {
+pub(crate) fn translation_from_mm(t_mm: &[f64; 3]) -> Result<Translation3<f64>, PoseFault> {
     require_finite(t_mm)?;
     let [x, y, z] = t_mm.map(|v| v / 1000.0);
     Ok(Translation3::new(x, y, z))
 }
 
 /// The millimeter values of a translation \[m\].
-pub fn translation_to_mm(translation: &Translation3<f64>) -> [f64; 3] {
+pub(crate) fn translation_to_mm(translation: &Translation3<f64>) -> [f64; 3] {
     let t = translation.vector;
     [t.x * 1000.0, t.y * 1000.0, t.z * 1000.0]
 }
@@ -97,7 +97,7 @@ pub fn translation_to_mm(translation: &Translation3<f64>) -> [f64; 3] {
 ///
 /// # Errors
 /// Those of [`rotation_from_row_major`] and [`translation_from_mm`].
-pub fn pose_from_bop(r: &[f64; 9], t_mm: &[f64; 3]) -> Result<Isometry3<f64>, PoseFault> {
+pub(crate) fn pose_from_bop(r: &[f64; 9], t_mm: &[f64; 3]) -> Result<Isometry3<f64>, PoseFault> {
     Ok(Isometry3::from_parts(translation_from_mm(t_mm)?, rotation_from_row_major(r)?))
 }
 

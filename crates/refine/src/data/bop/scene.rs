@@ -1,64 +1,25 @@
-//! What an estimator may know about one image beside its pixels: camera, robot and touch.
+//! What an estimator may know about one image beside its pixels: robot and touch.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Isometry3, Vector3};
+use serde::Deserialize;
 
 use super::error::DatasetError;
-use super::json::Entry;
-use prehend_render::Camera;
+use super::json::{JsonFile, Millimeters, Rotation, Vector};
 
 /// Force units of `scene_tactile.json` per newton.
 pub const UNITS_PER_NEWTON: f64 = 1000.0;
 
-/// A pinhole camera without skew \[px\]; pixel centers lie at integer coordinates.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Intrinsics {
-    /// Focal length along columns.
-    pub fx: f64,
-    /// Focal length along rows.
-    pub fy: f64,
-    /// Column of the principal point.
-    pub cx: f64,
-    /// Row of the principal point.
-    pub cy: f64,
-}
-
-impl Intrinsics {
-    /// The camera of an image of `width` by `height` pixels.
-    pub fn camera(&self, width: usize, height: usize) -> Camera {
-        Camera { fx: self.fx, fy: self.fy, cx: self.cx, cy: self.cy, width, height }
-    }
-
-    /// The pixel (column, row) of a point of the camera frame (x right, y down, z forward) \[m\];
-    /// meaningless unless the point lies before the camera (z > 0).
-    #[inline]
-    pub fn project(&self, p: &Point3<f64>) -> [f64; 2] {
-        [self.fx * p.x / p.z + self.cx, self.fy * p.y / p.z + self.cy]
-    }
-
-    /// Reads `cam_K`, nine row-major entries.
-    pub(crate) fn parse(entry: &Entry<'_>) -> Result<Self, DatasetError> {
-        let [fx, skew, cx, s10, fy, cy, s20, s21, s22] = entry.numbers()?;
-        if fx <= 0.0 || fy <= 0.0 {
-            return Err(entry.error("focal lengths must be above zero"));
-        }
-        if [skew, s10, s20, s21] != [0.0; 4] || s22 != 1.0 {
-            return Err(entry.error("is not of the form [fx 0 cx; 0 fy cy; 0 0 1]"));
-        }
-        Ok(Self { fx, fy, cx, cy })
-    }
-}
-
-/// A robot (or other articulated body) whose shape, place and joint angles are known.
+/// A robot (or other articulated body) whose shape, pose and joint angles are known.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Body {
     /// Its name in the dataset.
     pub name: String,
     /// Its URDF file.
     pub urdf: PathBuf,
-    /// Maps coordinates of its base link into the camera frame \[m\].
+    /// Base link coordinates → camera coordinates \[m\].
     pub t_cam_base: Isometry3<f64>,
     /// Joint positions by name \[rad or m\].
     pub joints: BTreeMap<String, f64>,
@@ -73,25 +34,34 @@ pub struct SceneBodies {
     pub bodies: Vec<Body>,
 }
 
+#[derive(Deserialize)]
+struct BodiesEntry {
+    gravity: Vector,
+    bodies: Vec<BodyEntry>,
+}
+
+#[derive(Deserialize)]
+struct BodyEntry {
+    name: String,
+    urdf: String,
+    #[serde(rename = "cam_R_b2c")]
+    rotation: Rotation,
+    #[serde(rename = "cam_t_b2c")]
+    translation: Millimeters,
+    joints: BTreeMap<String, f64>,
+}
+
 impl SceneBodies {
-    /// Reads an entry; `root` is the folder that URDF paths are relative to.
-    pub(crate) fn parse(entry: &Entry<'_>, root: &Path) -> Result<Self, DatasetError> {
-        let body = |e: &Entry<'_>| -> Result<Body, DatasetError> {
-            let joints = e.get("joints")?.members()?;
-            Ok(Body {
-                name: e.get("name")?.text()?.to_owned(),
-                urdf: root.join(e.get("urdf")?.text()?),
-                t_cam_base: e.pose("cam_R_b2c", "cam_t_b2c")?,
-                joints: joints
-                    .into_iter()
-                    .map(|(name, value)| Ok((name.to_owned(), value.number()?)))
-                    .collect::<Result<_, DatasetError>>()?,
-            })
+    /// Reads the entry of image `im_id`; `root` is the folder that URDF paths are relative to.
+    pub(super) fn read(file: &JsonFile, im_id: u32, root: &Path) -> Result<Self, DatasetError> {
+        let BodiesEntry { gravity, bodies } = file.entry(im_id)?;
+        let body = |entry: BodyEntry| Body {
+            name: entry.name,
+            urdf: root.join(entry.urdf),
+            t_cam_base: Isometry3::from_parts(entry.translation.0, entry.rotation.0),
+            joints: entry.joints,
         };
-        Ok(Self {
-            gravity: entry.get("gravity")?.vector()?,
-            bodies: entry.get("bodies")?.items()?.iter().map(body).collect::<Result<_, _>>()?,
-        })
+        Ok(Self { gravity: gravity.0, bodies: bodies.into_iter().map(body).collect() })
     }
 
     /// The body called `name`.
@@ -100,7 +70,7 @@ impl SceneBodies {
     }
 }
 
-/// One image's entry of `scene_tactile.json`: what the skin of one body feels.
+/// One image's entry of `scene_tactile.json`: the taxel forces of one body.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tactile {
     /// Name of the body that carries the taxels.
@@ -111,17 +81,18 @@ pub struct Tactile {
     pub force: Vec<Vector3<f64>>,
 }
 
+#[derive(Deserialize)]
+struct TactileEntry {
+    body: String,
+    taxels: String,
+    force: Vec<Vector>,
+}
+
 impl Tactile {
-    /// Reads an entry; `root` is the folder that the taxel table's path is relative to.
-    pub(crate) fn parse(entry: &Entry<'_>, root: &Path) -> Result<Self, DatasetError> {
-        let force = entry.get("force")?.items()?;
-        Ok(Self {
-            body: entry.get("body")?.text()?.to_owned(),
-            taxels: root.join(entry.get("taxels")?.text()?),
-            force: force
-                .iter()
-                .map(|f| Ok(f.vector()? / UNITS_PER_NEWTON))
-                .collect::<Result<_, DatasetError>>()?,
-        })
+    /// Reads the entry of image `im_id`; `root` is the folder that the taxel table's path is relative to.
+    pub(super) fn read(file: &JsonFile, im_id: u32, root: &Path) -> Result<Self, DatasetError> {
+        let TactileEntry { body, taxels, force } = file.entry(im_id)?;
+        let force = force.into_iter().map(|f| f.0 / UNITS_PER_NEWTON).collect();
+        Ok(Self { body, taxels: root.join(taxels), force })
     }
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, UnitQuaternion};
 
-use super::symmetry::Symmetries;
+use crate::data::Symmetries;
 
 /// Position error: the distance of the two model origins \[cm\].
 pub fn pe_cm(estimate: &Isometry3<f64>, truth: &Isometry3<f64>) -> f64 {
@@ -12,8 +12,7 @@ pub fn pe_cm(estimate: &Isometry3<f64>, truth: &Isometry3<f64>) -> f64 {
 /// Orientation error: the angle acos(2⟨q̂, q⟩² − 1) between two orientations \[deg\], evaluated as
 /// 2 atan2(|v|, |w|) of the relative quaternion, which keeps full precision at small angles.
 pub fn oe_deg(estimate: &Isometry3<f64>, truth: &Isometry3<f64>) -> f64 {
-    let q = estimate.rotation.inverse() * truth.rotation;
-    (2.0 * q.imag().norm().atan2(q.w.abs())).to_degrees()
+    angle(&(estimate.rotation.inverse() * truth.rotation)).to_degrees()
 }
 
 /// The smallest orientation error \[deg\] over all orientations that symmetry makes equal to the truth;
@@ -48,7 +47,7 @@ fn angle(q: &UnitQuaternion<f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluate::metrics::ContinuousSymmetry;
+    use crate::data::ContinuousSymmetry;
     use nalgebra::{Point3, Translation3, Unit, Vector3};
 
     fn pose(x: f64, axis_angle: [f64; 3]) -> Isometry3<f64> {

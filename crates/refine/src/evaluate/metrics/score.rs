@@ -1,19 +1,17 @@
 //! All metrics of one pose together.
 
 use nalgebra::{Isometry3, Point3};
+use prehend_render::Camera;
 use serde::{Deserialize, Serialize};
 
-use super::add::{add, adi};
-use super::nearest::NearestPoint;
+use super::average_distance::{NearestPoint, add, adi};
+use super::maximum_distance::{mspd, mssd};
 use super::pose_error::{oe_deg, oe_symmetric_deg, pe_cm};
-use super::recall::Recall;
-use super::surface_distance::{mspd, mssd};
-use super::symmetry::Symmetries;
 use super::vsd::VSD_TOLERANCES;
-use crate::data::bop::Intrinsics;
+use crate::data::Symmetries;
 
 /// Headings of the columns of [`PoseScore::values`], with units.
-pub const COLUMNS: [&str; 13] = [
+pub(crate) const COLUMNS: [&str; 13] = [
     "PE cm",
     "OE °",
     "OEsym °",
@@ -57,11 +55,11 @@ pub struct PoseScore {
     /// Visible surface discrepancy, the mean over BOP's ten tolerances (0..=1).
     pub vsd: Option<f64>,
     /// Recalls of BOP's three metrics over their thresholds (0..=1).
-    pub recall: Option<Recall>,
+    pub(crate) recall: Option<Recall>,
 }
 
 impl PoseScore {
-    /// The metrics in the order of [`COLUMNS`].
+    /// The metrics in the order of the fields; of the recalls, BOP's average.
     pub fn values(&self) -> [Option<f64>; COLUMNS.len()] {
         [
             self.pe_cm,
@@ -81,7 +79,7 @@ impl PoseScore {
     }
 
     /// Adds contact area and intersection volume, and their deviations from those of the true pose.
-    pub fn with_contact(
+    pub(crate) fn with_contact(
         mut self,
         ca_cm2: f64,
         iv_cm3: f64,
@@ -96,7 +94,7 @@ impl PoseScore {
 
     /// Adds the visible surface discrepancy, `vsd` for each of BOP's tolerances, and with it the recalls; `diameter` is the
     /// object's \[m\], `width` the image's \[px\].
-    pub fn with_visible_surface(
+    pub(crate) fn with_visible_surface(
         mut self,
         vsd: &[f64; VSD_TOLERANCES.len()],
         diameter: f64,
@@ -108,6 +106,45 @@ impl PoseScore {
             .zip(self.mspd_px)
             .map(|(mssd, mspd)| Recall::new(vsd, 1e-3 * mssd, diameter, mspd, width));
         self
+    }
+}
+
+/// The fraction of its thresholds that one pose stays under, by metric; their means over all targets are BOP's
+/// average recalls.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Recall {
+    /// Of VSD: below 0.05, 0.1 … 0.5, for each of its ten tolerances.
+    pub(super) vsd: f64,
+    /// Of MSSD: below 0.05, 0.1 … 0.5 of the diameter.
+    pub(super) mssd: f64,
+    /// Of MSPD: below 5, 10 … 50 px in an image 640 px wide.
+    pub(super) mspd: f64,
+}
+
+impl Recall {
+    /// The recall of a pose by its errors: VSD for each tolerance, MSSD and `diameter` \[m\], MSPD and the image's
+    /// `width` \[px\].
+    fn new(
+        vsd: &[f64; VSD_TOLERANCES.len()],
+        mssd: f64,
+        diameter: f64,
+        mspd: f64,
+        width: usize,
+    ) -> Self {
+        let steps = |unit: f64, error: f64| {
+            let below = (1..=10).filter(|&k| error < unit * f64::from(k)).count();
+            below as f64 / 10.0
+        };
+        Self {
+            vsd: vsd.iter().map(|&e| steps(0.05, e)).sum::<f64>() / vsd.len() as f64,
+            mssd: steps(0.05 * diameter, mssd),
+            mspd: steps(5.0 * width as f64 / 640.0, mspd),
+        }
+    }
+
+    /// BOP's AR: the mean of the three.
+    fn average(&self) -> f64 {
+        (self.vsd + self.mssd + self.mspd) / 3.0
     }
 }
 
@@ -137,7 +174,7 @@ impl ScoredModel {
         &self,
         estimate: &Isometry3<f64>,
         truth: &Isometry3<f64>,
-        camera: &Intrinsics,
+        camera: &Camera,
     ) -> PoseScore {
         PoseScore {
             pe_cm: Some(pe_cm(estimate, truth)),
@@ -161,7 +198,7 @@ mod tests {
     fn units_and_order_match_the_headings() {
         let points = vec![Point3::new(-0.05, 0.0, 0.0), Point3::new(0.05, 0.0, 0.0)];
         let model = ScoredModel::new(points, Symmetries::default());
-        let camera = Intrinsics { fx: 500.0, fy: 500.0, cx: 0.0, cy: 0.0 };
+        let camera = Camera { fx: 500.0, fy: 500.0, cx: 0.0, cy: 0.0, width: 0, height: 0 };
         let truth = Isometry3::translation(0.0, 0.0, 0.5);
         let estimate = Isometry3::new(Vector3::new(0.0, 0.01, 0.5), Vector3::y() * 0.0);
         let score = model.score(&estimate, &truth, &camera).with_contact(3.0, 2.0, 4.5, 0.5);
@@ -172,5 +209,18 @@ mod tests {
         for ((value, expected), name) in score.values().into_iter().zip(expected).zip(COLUMNS) {
             assert!((value.unwrap() - expected).abs() < 1e-9, "{name}: {value:?}");
         }
+    }
+
+    #[test]
+    fn thresholds_are_strict_and_scale_with_object_and_image() {
+        let mut errors = [0.31; 10];
+        errors[9] = 0.0;
+        let recall = Recall::new(&errors, 0.021, 0.2, 12.0, 1280);
+        // 0.31 is below 0.35 … 0.5; 2.1 cm is below 3 cm … 10 cm; 12 px are below 20 … 100.
+        assert!((recall.vsd - (9.0 * 0.4 + 1.0) / 10.0).abs() < 1e-12, "{recall:?}");
+        assert_eq!((recall.mssd, recall.mspd), (0.8, 0.9));
+        assert!((recall.average() - (0.46 + 0.8 + 0.9) / 3.0).abs() < 1e-12);
+        assert_eq!(Recall::new(&[0.0; 10], 0.0, 0.2, 0.0, 640).average(), 1.0);
+        assert_eq!(Recall::new(&[1.0; 10], 1.0, 0.2, 1e9, 640).average(), 0.0);
     }
 }

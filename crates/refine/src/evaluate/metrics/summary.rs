@@ -33,7 +33,7 @@ pub struct Statistic {
 
 impl Statistic {
     /// The statistic of some values; `None` without values.
-    pub fn of(mut values: Vec<f64>) -> Option<Self> {
+    pub(crate) fn of(mut values: Vec<f64>) -> Option<Self> {
         let count = values.len();
         let mean = values.iter().sum::<f64>() / count as f64;
         values.sort_by(f64::total_cmp);
@@ -44,7 +44,7 @@ impl Statistic {
 }
 
 /// Statistics of every metric, in the order of [`COLUMNS`].
-pub type Statistics = [Option<Statistic>; COLUMNS.len()];
+pub(super) type Statistics = [Option<Statistic>; COLUMNS.len()];
 
 /// Statistics over all poses and over those of each object.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -81,7 +81,7 @@ fn statistics<'a>(rows: impl Iterator<Item = &'a ScoredRow> + Clone) -> Statisti
 
 /// Which average a table shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Average {
+enum Average {
     /// Arithmetic means.
     Mean,
     /// Medians.
@@ -91,7 +91,7 @@ pub enum Average {
 impl Summary {
     /// A table with a line an object and one over all poses. Metrics that no pose has are left out; `name` gives the
     /// label of an object id.
-    pub fn table(&self, average: Average, name: impl Fn(u32) -> String) -> Table {
+    fn table(&self, average: Average, name: impl Fn(u32) -> String) -> Table {
         let shown: Vec<usize> = (0..COLUMNS.len()).filter(|&c| self.overall[c].is_some()).collect();
         let cell = |s: &Option<Statistic>| match (s, average) {
             (None, _) => "-".to_owned(),

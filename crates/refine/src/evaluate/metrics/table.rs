@@ -23,7 +23,8 @@ impl Table {
     }
 
     /// The table in Markdown.
-    pub fn markdown(&self) -> String {
+    #[cfg(feature = "cli")]
+    pub(crate) fn markdown(&self) -> String {
         let line = |row: &[String]| {
             let cells = (0..self.header.len()).map(|i| row.get(i).map_or("", String::as_str));
             format!(

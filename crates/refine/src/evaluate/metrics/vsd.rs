@@ -4,10 +4,11 @@
 use prehend_render::{Camera, DepthImage};
 
 /// How far the measured surface may lie before a model's and still show it \[m\].
-pub const VISIBILITY_TOLERANCE: f64 = 15e-3;
+pub(super) const VISIBILITY_TOLERANCE: f64 = 15e-3;
 
 /// Tolerances of the misalignment, as fractions of the object's diameter.
-pub const VSD_TOLERANCES: [f64; 10] = [0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5];
+pub(super) const VSD_TOLERANCES: [f64; 10] =
+    [0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5];
 
 /// The share of the visible surface that is out of place, in 0..=1, for each of [`VSD_TOLERANCES`].
 ///
@@ -18,7 +19,7 @@ pub const VSD_TOLERANCES: [f64; 10] = [0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.
 ///
 /// # Panics
 /// If the images differ in size.
-pub fn vsd(
+pub(crate) fn vsd(
     camera: &Camera,
     sensed: &DepthImage,
     estimate: &DepthImage,

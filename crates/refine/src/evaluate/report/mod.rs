@@ -1,8 +1,11 @@
 //! Pictures of a run for people: before and after, loss curves, and one page that shows them all.
 
+#[cfg(feature = "cli")]
 mod curves;
+#[cfg(feature = "cli")]
 mod page;
 mod picture;
 
-pub use page::{Report, ReportError};
-pub use picture::{FrameReport, before_and_after, outline_picture};
+#[cfg(feature = "cli")]
+pub use page::{FrameReport, Report};
+pub use picture::{before_and_after, outline_picture};

@@ -3,29 +3,46 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use prehend_render::{ImageError, RgbImage};
-use thiserror::Error;
+use nalgebra::Isometry3;
+use prehend_render::RgbImage;
 
-use super::FrameReport;
-use crate::data::bop::{DatasetError, write_atomically};
+use super::curves::loss_curves;
+use super::picture::before_and_after;
+use crate::data::bop::{DatasetError, create_folder, write_atomically};
+use crate::scene::{Object, Observation};
+use crate::strategy::Trace;
 
-/// Why a report could not be written.
-#[derive(Debug, Error)]
-pub enum ReportError {
-    /// The folder cannot be made.
-    #[error("{folder}: {source}")]
-    Folder {
-        /// The folder.
-        folder: PathBuf,
-        /// The system's reason.
-        source: std::io::Error,
-    },
-    /// A picture cannot be written.
-    #[error(transparent)]
-    Picture(#[from] ImageError),
-    /// The page or a chart cannot be written.
-    #[error(transparent)]
-    Write(#[from] DatasetError),
+/// The pictures of one refined frame.
+pub struct FrameReport {
+    /// The initial pose's outline beside the refined one's.
+    pub picture: RgbImage,
+    /// Loss curves, as SVG.
+    pub curves: String,
+    /// What to say below.
+    pub caption: String,
+}
+
+impl FrameReport {
+    /// Draws a refinement that began at `initial`.
+    pub fn draw(
+        observation: &Observation,
+        object: &Object,
+        initial: &Isometry3<f64>,
+        (refined, iteration): (&Isometry3<f64>, usize),
+        trace: &Trace,
+    ) -> Self {
+        let iterations = trace.iterations.len().saturating_sub(1);
+        let moved = refined * object.center - initial * object.center;
+        let turned = refined.rotation.angle_to(&initial.rotation).to_degrees();
+        Self {
+            picture: before_and_after(observation, object, initial, refined),
+            curves: loss_curves(trace),
+            caption: format!(
+                "moved {:.1} mm and {turned:.1}°; pose of iteration {iteration} of {iterations}",
+                moved.norm() * 1e3,
+            ),
+        }
+    }
 }
 
 /// A folder of pictures with an `index.html`.
@@ -40,9 +57,8 @@ impl Report {
     ///
     /// # Errors
     /// If it cannot be made.
-    pub fn create(folder: &Path) -> Result<Self, ReportError> {
-        std::fs::create_dir_all(folder)
-            .map_err(|source| ReportError::Folder { folder: folder.into(), source })?;
+    pub fn create(folder: &Path) -> Result<Self, DatasetError> {
+        create_folder(folder)?;
         Ok(Self { folder: folder.into(), body: String::new(), count: 0 })
     }
 
@@ -50,7 +66,7 @@ impl Report {
     ///
     /// # Errors
     /// If a picture cannot be written.
-    pub fn add(&mut self, title: &str, frame: &FrameReport) -> Result<(), ReportError> {
+    pub fn add(&mut self, title: &str, frame: &FrameReport) -> Result<(), DatasetError> {
         let name = self.picture(&frame.picture)?;
         let curves = format!("{}.svg", name.trim_end_matches(".png"));
         write_atomically(&self.folder.join(&curves), frame.curves.as_bytes())?;
@@ -73,7 +89,7 @@ impl Report {
         title: &str,
         picture: &RgbImage,
         remarks: &[String],
-    ) -> Result<(), ReportError> {
+    ) -> Result<(), DatasetError> {
         let name = self.picture(picture)?;
         let remarks: String = remarks.iter().map(|r| format!("<li>{}</li>", escape(r))).collect();
         let title = escape(title);
@@ -88,17 +104,18 @@ impl Report {
     ///
     /// # Errors
     /// If it cannot be written.
-    pub fn finish(self) -> Result<PathBuf, ReportError> {
+    pub fn finish(self) -> Result<PathBuf, DatasetError> {
         let page = self.folder.join("index.html");
         let html = format!("{HEAD}{}</body></html>\n", self.body);
         write_atomically(&page, html.as_bytes())?;
         Ok(page)
     }
 
-    fn picture(&mut self, picture: &RgbImage) -> Result<String, ReportError> {
+    fn picture(&mut self, picture: &RgbImage) -> Result<String, DatasetError> {
         let name = format!("{:04}.png", self.count);
         self.count += 1;
-        picture.save(&self.folder.join(&name))?;
+        let file = self.folder.join(&name);
+        picture.save(&file).map_err(|e| DatasetError::Write { file, problem: e.to_string() })?;
         Ok(name)
     }
 }

@@ -3,8 +3,6 @@
 use nalgebra::Isometry3;
 use prehend_render::{RgbImage, draw_outline};
 
-use super::curves::loss_curves;
-use crate::refine::RefinedPose;
 use crate::scene::{Hand, Object, Observation};
 
 /// Outline of the initial pose.
@@ -13,39 +11,6 @@ const BEFORE: [f32; 3] = [1.0, 0.25, 0.2];
 const AFTER: [f32; 3] = [0.2, 1.0, 0.35];
 /// Outline of the hand.
 const HAND: [f32; 3] = [0.35, 0.6, 1.0];
-
-/// The pictures of one refined frame.
-pub struct FrameReport {
-    /// The initial pose's outline beside the refined one's.
-    pub picture: RgbImage,
-    /// Loss curves, as SVG.
-    pub curves: String,
-    /// What to say below.
-    pub caption: String,
-}
-
-impl FrameReport {
-    /// Draws a refinement that began at `initial`.
-    pub fn draw(
-        observation: &Observation,
-        object: &Object,
-        initial: &Isometry3<f64>,
-        refined: &RefinedPose,
-    ) -> Self {
-        let iterations = refined.trace.iterations.len().saturating_sub(1);
-        let moved = refined.t_cam_object * object.center - initial * object.center;
-        let turned = refined.t_cam_object.rotation.angle_to(&initial.rotation).to_degrees();
-        Self {
-            picture: before_and_after(observation, object, initial, &refined.t_cam_object),
-            curves: loss_curves(&refined.trace),
-            caption: format!(
-                "moved {:.1} mm and {turned:.1}°; pose of iteration {} of {iterations}",
-                moved.norm() * 1e3,
-                refined.iteration
-            ),
-        }
-    }
-}
 
 /// The image around the object twice: with the outline at `before`, and with that at `after`.
 pub fn before_and_after(

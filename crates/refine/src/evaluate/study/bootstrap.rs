@@ -4,14 +4,14 @@ use prehend_geometry::SplitMix64;
 use rayon::prelude::*;
 
 /// Resamples an interval is made of.
-pub const REPLICATES: usize = 2000;
+pub(super) const REPLICATES: usize = 2000;
 
 /// The mean of every column over each of [`REPLICATES`] resamples of the rows, drawn with replacement: the same rows for all
 /// columns, so that differences and ratios of columns are paired. Rows where a column has nothing do not count for it; a
 /// resample without any is NaN.
 ///
 /// Equal columns and seeds give equal results, whatever the number of threads.
-pub fn resampled_means(columns: &[Vec<Option<f64>>], seed: u64) -> Vec<Vec<f64>> {
+pub(super) fn resampled_means(columns: &[Vec<Option<f64>>], seed: u64) -> Vec<Vec<f64>> {
     let rows = columns.first().map_or(0, Vec::len);
     let replicate = |r: usize| -> Vec<f64> {
         let mut random = SplitMix64::new(seed ^ (r as u64).wrapping_mul(0xd134_2543_de82_ef95));
@@ -37,7 +37,7 @@ fn weighted_mean(column: &[Option<f64>], counts: &[u32]) -> f64 {
 }
 
 /// The middle 95 % of resampled statistics (the percentile interval); `None` if none is finite.
-pub fn interval(replicates: &[f64]) -> Option<[f64; 2]> {
+pub(super) fn interval(replicates: &[f64]) -> Option<[f64; 2]> {
     let mut sorted: Vec<f64> = replicates.iter().copied().filter(|v| v.is_finite()).collect();
     sorted.sort_by(f64::total_cmp);
     let quantile = |p: f64| {

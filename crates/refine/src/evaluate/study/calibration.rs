@@ -1,66 +1,67 @@
-//! How well what was believed agrees with what was so.
+//! Calibration of predicted posteriors: coverage, reliability, and ranking of failures.
 
 use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::belief::{EVENTS, PredictedPosterior};
 use super::bootstrap::{interval, resampled_means};
+use super::chi_square::chi_square_cdf;
 use super::design::Design;
 use super::kind::Kind;
-use super::record::FrameRecord;
-use crate::evaluate::metrics::{
+use super::posterior::{EVENTS, PredictedPosterior};
+use super::prediction::{
     Bin, Prediction, area_under_roc, area_under_roc_error, brier_score, calibration_error,
-    calibration_error_by_chance, chi_square_cdf, equal_count_bins,
+    calibration_error_by_chance, equal_count_bins,
 };
+use super::record::FrameRecord;
 
 /// Bins of equal counts that calibration errors are made of.
 pub(super) const BINS: usize = 10;
 
-/// Nominal probabilities of the ellipsoids.
+/// Nominal coverage of the ellipsoids.
 const NOMINAL: [f64; 3] = [0.5, 0.9, 0.95];
 
-/// Of what ellipsoids are, with their degrees of freedom, in the order of [`PredictedPosterior::squared`].
+/// Parts of the pose with an ellipsoid, and their degrees of freedom, in the order of [`PredictedPosterior::squared`].
 pub(super) const ELLIPSOIDS: [(&str, u32); 3] = [("pose", 6), ("place", 3), ("orientation", 3)];
 
-/// Seeds of the resampling and of chance.
+/// Seed of the bootstrap and of simulated outcomes.
 const SEED: u64 = 3;
 
 /// The calibration of one method.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Calibration {
+pub(super) struct Calibration {
     /// Level of noise; `None` for all together.
-    pub level: Option<String>,
+    pub(super) level: Option<String>,
     /// The method.
-    pub method: String,
-    /// Poses of which something was believed.
-    pub n: usize,
-    /// Root mean squares of what the center is off \[mm\] and of the angle \[°\], and Cramér and Rao's bounds on them.
-    pub errors: [RootMeanSquare; 2],
-    /// How often the truth is within the posterior's ellipsoids.
-    pub coverage: Vec<Coverage>,
-    /// Predicted probabilities, by event.
-    pub events: Vec<EventCalibration>,
+    pub(super) method: String,
+    /// Poses with a posterior.
+    pub(super) n: usize,
+    /// Root mean square errors of position \[mm\] and orientation \[°\] with their Cramér–Rao bounds.
+    pub(super) errors: [RootMeanSquare; 2],
+    /// Coverage of the posterior's ellipsoids.
+    pub(super) coverage: Vec<Coverage>,
+    /// Predicted probabilities by event.
+    pub(super) events: Vec<EventCalibration>,
     /// Poses that are not within 5 mm and 5°.
-    pub failures: usize,
+    pub(super) failures: usize,
     /// Area under the receiver operating characteristic of failures, ranked by the predicted probability of being within 5 mm
-    /// and 5°; nothing without failures, or with nothing else.
-    pub auroc: Option<f64>,
+    /// and 5°; `None` unless there are both failures and successes.
+    pub(super) auroc: Option<f64>,
     /// Its confidence interval, 95 %.
-    pub auroc_interval: Option<[f64; 2]>,
+    pub(super) auroc_interval: Option<[f64; 2]>,
 }
 
-/// A root mean square over poses, beside what information allows.
+/// A root mean square error over poses and its lower bound.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct RootMeanSquare {
-    /// Of what, with its unit.
-    pub of: &'static str,
-    /// As found.
-    pub found: f64,
-    /// The median of what was squared.
-    pub median: f64,
-    /// Cramér and Rao's bound, averaged in the same way.
-    pub bound: f64,
+pub(super) struct RootMeanSquare {
+    /// The error, with its unit.
+    pub(super) of: &'static str,
+    /// Root mean square.
+    pub(super) found: f64,
+    /// Median.
+    pub(super) median: f64,
+    /// Root mean square of the Cramér–Rao bounds.
+    pub(super) bound: f64,
 }
 
 impl RootMeanSquare {
@@ -72,39 +73,39 @@ impl RootMeanSquare {
     }
 }
 
-/// How often the truth is within ellipsoids that should hold it with some probability.
+/// Share of the true poses within a posterior ellipsoid of some nominal probability.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Coverage {
-    /// Of what: pose, place or orientation.
-    pub of: &'static str,
-    /// Probability that it should be.
-    pub nominal: f64,
-    /// Share of the poses where it is.
-    pub share: f64,
+pub(super) struct Coverage {
+    /// Part of the pose: pose, place or orientation.
+    pub(super) of: &'static str,
+    /// Nominal probability.
+    pub(super) nominal: f64,
+    /// Observed share.
+    pub(super) share: f64,
     /// Confidence interval of the share, 95 %.
-    pub interval: Option<[f64; 2]>,
+    pub(super) interval: Option<[f64; 2]>,
 }
 
 /// Predicted probabilities of one event.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct EventCalibration {
+pub(super) struct EventCalibration {
     /// The event.
-    pub event: &'static str,
+    pub(super) event: &'static str,
     /// Mean predicted probability.
-    pub predicted: f64,
-    /// Share of the poses where it came about.
-    pub share: f64,
+    pub(super) predicted: f64,
+    /// Observed frequency.
+    pub(super) share: f64,
     /// Expected calibration error over ten bins of equal counts.
-    pub calibration_error: f64,
-    /// What the calibration error would be on average if the probabilities were right.
-    pub by_chance: f64,
-    /// Mean squared error of the probabilities.
-    pub brier: f64,
+    pub(super) calibration_error: f64,
+    /// Mean calibration error of outcomes simulated from the predicted probabilities.
+    pub(super) by_chance: f64,
+    /// Brier score.
+    pub(super) brier: f64,
     /// The bins.
-    pub bins: Vec<Bin>,
+    pub(super) bins: Vec<Bin>,
 }
 
-/// Calibrations by level and method, and where there are several levels, of all together.
+/// Calibrations by level and method; where there are several levels, also over all of them.
 pub(super) fn calibrations(
     design: &Design,
     records: &BTreeMap<usize, FrameRecord>,
@@ -121,8 +122,8 @@ pub(super) fn calibrations(
     each.filter_map(|(level, method)| Calibration::new(level, &method.name, records)).collect()
 }
 
-/// What `method` believed at a level, or at all.
-pub(super) fn beliefs<'a>(
+/// The posteriors of `method` at a level, or at all levels.
+pub(super) fn posteriors<'a>(
     records: &'a BTreeMap<usize, FrameRecord>,
     level: Option<&str>,
     method: &str,
@@ -131,11 +132,11 @@ pub(super) fn beliefs<'a>(
     of_level.filter_map(|r| r.outcome(method)?.belief.as_ref()).collect()
 }
 
-/// The smallest probabilities of ellipsoids that hold the truth, sorted: uniform if the posterior is right. What has no covariance
-/// has none that does.
-pub(super) fn holding(beliefs: &[&PredictedPosterior], of: usize) -> Vec<f64> {
+/// Probability content of the smallest ellipsoids that contain the truth, sorted: uniform for a calibrated posterior. Infinite for a
+/// singular covariance.
+pub(super) fn ellipsoid_levels(posteriors: &[&PredictedPosterior], of: usize) -> Vec<f64> {
     let degrees = ELLIPSOIDS[of].1;
-    let mut found: Vec<f64> = beliefs
+    let mut found: Vec<f64> = posteriors
         .iter()
         .map(|b| b.squared[of].map_or(f64::INFINITY, |s| chi_square_cdf(s, degrees)))
         .collect();
@@ -144,18 +145,18 @@ pub(super) fn holding(beliefs: &[&PredictedPosterior], of: usize) -> Vec<f64> {
 }
 
 impl Calibration {
-    /// `None` if nothing was believed.
+    /// `None` without posteriors.
     fn new(
         level: Option<&str>,
         method: &str,
         records: &BTreeMap<usize, FrameRecord>,
     ) -> Option<Self> {
-        let beliefs = beliefs(records, level, method);
-        let n = beliefs.len();
+        let posteriors = posteriors(records, level, method);
+        let n = posteriors.len();
         let mut events = Vec::new();
         for (k, event) in EVENTS.iter().enumerate() {
             let predictions: Vec<Prediction> =
-                beliefs.iter().map(|b| (b.within[k], b.came(event))).collect();
+                posteriors.iter().map(|b| (b.within[k], b.occurred(event))).collect();
             events.push(EventCalibration {
                 event: event.name,
                 predicted: predictions.iter().map(|p| p.0).sum::<f64>() / n as f64,
@@ -168,7 +169,7 @@ impl Calibration {
         }
         let (last, within) = (EVENTS.len() - 1, &EVENTS[EVENTS.len() - 1]);
         let failing: Vec<Prediction> =
-            beliefs.iter().map(|b| (1.0 - b.within[last], !b.came(within))).collect();
+            posteriors.iter().map(|b| (1.0 - b.within[last], !b.occurred(within))).collect();
         let failures = failing.iter().filter(|f| f.1).count();
         let auroc = area_under_roc(&failing);
         Some(Self {
@@ -178,16 +179,16 @@ impl Calibration {
             errors: [
                 RootMeanSquare::new(
                     "place mm",
-                    beliefs.iter().map(|b| b.distance_mm).collect(),
-                    &beliefs.iter().map(|b| b.bounds[0]).collect::<Vec<_>>(),
+                    posteriors.iter().map(|b| b.distance_mm).collect(),
+                    &posteriors.iter().map(|b| b.bounds[0]).collect::<Vec<_>>(),
                 ),
                 RootMeanSquare::new(
                     "orientation °",
-                    beliefs.iter().map(|b| b.angle_deg).collect(),
-                    &beliefs.iter().map(|b| b.bounds[1]).collect::<Vec<_>>(),
+                    posteriors.iter().map(|b| b.angle_deg).collect(),
+                    &posteriors.iter().map(|b| b.bounds[1]).collect::<Vec<_>>(),
                 ),
             ],
-            coverage: coverage(&beliefs),
+            coverage: coverage(&posteriors),
             events,
             failures,
             auroc,
@@ -198,7 +199,7 @@ impl Calibration {
         })
     }
 
-    /// How headings name it.
+    /// The heading.
     pub(super) fn label(&self) -> String {
         let level =
             self.level.as_ref().map_or("all noise".into(), |level| format!("Noise {level}"));
@@ -206,13 +207,13 @@ impl Calibration {
     }
 }
 
-fn coverage(beliefs: &[&PredictedPosterior]) -> Vec<Coverage> {
+fn coverage(posteriors: &[&PredictedPosterior]) -> Vec<Coverage> {
     let each = || (0..ELLIPSOIDS.len()).flat_map(|of| NOMINAL.map(|nominal| (of, nominal)));
     let column = |(of, nominal): (usize, f64)| -> Vec<Option<f64>> {
         let probability = |b: &&PredictedPosterior| {
             b.squared[of].map_or(f64::INFINITY, |s| chi_square_cdf(s, ELLIPSOIDS[of].1))
         };
-        beliefs.iter().map(|b| Some(f64::from(u8::from(probability(b) <= nominal)))).collect()
+        posteriors.iter().map(|b| Some(f64::from(u8::from(probability(b) <= nominal)))).collect()
     };
     let columns: Vec<Vec<Option<f64>>> = each().map(column).collect();
     let means = resampled_means(&columns, SEED);
@@ -227,7 +228,7 @@ fn coverage(beliefs: &[&PredictedPosterior]) -> Vec<Coverage> {
         .collect()
 }
 
-/// All numbers as CSV, one a line.
+/// All numbers as CSV, one per line.
 pub(super) fn csv(calibrations: &[Calibration]) -> Result<Vec<u8>, ::csv::Error> {
     let mut out = ::csv::Writer::from_writer(Vec::new());
     out.write_record(["level", "method", "n", "what", "of", "value", "low", "high"])?;

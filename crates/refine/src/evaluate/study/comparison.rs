@@ -11,28 +11,28 @@ const SEED: u64 = 2;
 
 /// A row of a table compared with another one.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Comparison {
+pub(super) struct Comparison {
     /// The row.
-    pub row: String,
+    pub(super) row: String,
     /// What it is compared with.
-    pub reference: String,
+    pub(super) reference: String,
     /// By metric; `None` where no frame has both.
-    pub metrics: [Option<Contrast>; COLUMNS.len()],
+    pub(super) metrics: [Option<Contrast>; COLUMNS.len()],
 }
 
 /// The means of two rows over the frames that have both. Intervals are of paired resamples, 95 %.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Contrast {
+pub(super) struct Contrast {
     /// Frames that have both.
-    pub n: usize,
+    pub(super) n: usize,
     /// Mean of the row less that of the reference.
-    pub difference: f64,
+    pub(super) difference: f64,
     /// Confidence interval of the difference.
-    pub difference_interval: Option<[f64; 2]>,
+    pub(super) difference_interval: Option<[f64; 2]>,
     /// Mean of the row over that of the reference, unless that is zero.
-    pub ratio: Option<f64>,
+    pub(super) ratio: Option<f64>,
     /// Confidence interval of the ratio.
-    pub ratio_interval: Option<[f64; 2]>,
+    pub(super) ratio_interval: Option<[f64; 2]>,
 }
 
 /// Compares `pairs` of rows over some records.

@@ -36,12 +36,12 @@ pub(super) fn csv(tables: &Tables) -> Result<Vec<u8>, ::csv::Error> {
     let mut out = ::csv::Writer::from_writer(Vec::new());
     out.write_record(HEADER)?;
     let study = tables.study.name();
-    for block in &tables.blocks {
-        for line in &block.lines {
-            let compared = block.comparisons.iter().find(|c| c.row == line.row);
+    for table in &tables.all {
+        for row in &table.rows {
+            let compared = table.comparisons.iter().find(|c| c.row == row.name);
             for (m, metric) in tables.metrics.iter().enumerate() {
-                let published = line.published.and_then(|p| p[m]);
-                let Some(estimate) = &line.metrics[m] else { continue };
+                let published = row.published.and_then(|p| p[m]);
+                let Some(estimate) = &row.metrics[m] else { continue };
                 let [low, high] = ends(estimate.interval);
                 let change = estimate.change;
                 let [change_low, change_high] = ends(change.and_then(|c| c.interval));
@@ -52,11 +52,11 @@ pub(super) fn csv(tables: &Tables) -> Result<Vec<u8>, ::csv::Error> {
                 let [ratio_low, ratio_high] = ends(contrast.and_then(|c| c.ratio_interval));
                 out.write_record([
                     study.to_owned(),
-                    block.level.clone(),
-                    text(block.object),
-                    line.row.clone(),
+                    table.level.clone(),
+                    text(table.object),
+                    row.name.clone(),
                     (*metric).to_owned(),
-                    block.frames.to_string(),
+                    table.frames.to_string(),
                     estimate.n.to_string(),
                     estimate.mean.to_string(),
                     low,
@@ -109,8 +109,7 @@ mod tests {
         let (design, records) = example();
         let tables = Tables::new(&design, &records);
         let text = String::from_utf8(csv(&tables).unwrap()).unwrap();
-        let estimates =
-            tables.blocks.iter().flat_map(|b| &b.lines).flat_map(|l| l.metrics).flatten();
+        let estimates = tables.all.iter().flat_map(|b| &b.rows).flat_map(|l| l.metrics).flatten();
         assert_eq!(text.lines().count(), 1 + estimates.count() + tables.failures.len());
         assert!(
             text.contains(

@@ -8,12 +8,12 @@ use serde::{Deserialize, Serialize};
 
 use super::kind::{INITIAL, Kind, TRUTH};
 use super::sweep::Sweep;
-use crate::config::Config;
 use crate::data::bop::{DatasetError, ResultRow, read_results};
 use crate::data::identity::file_fingerprint;
-use crate::method::Method;
+use crate::method::{Method, NamedMethod};
+use crate::strategy::Strategy;
 
-/// Everything that decides a study's results.
+/// All inputs and settings that determine a study's results.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Design {
     /// Which study.
@@ -68,7 +68,7 @@ pub struct MethodSettings {
 pub(super) struct Trial {
     /// Name of the method.
     pub(super) method: String,
-    /// What is wrong with the observation, and how much of it; nothing to begin a sweep with.
+    /// The fault of the observation and its amount; `None` at the start of a sweep.
     pub(super) fault: Option<(Sweep, f64)>,
     /// The rows of the table that its poses make.
     pub(super) rows: Vec<String>,
@@ -116,12 +116,12 @@ impl Level {
 
 impl Design {
     /// The rows of the study's tables.
-    pub fn rows(&self) -> Vec<String> {
+    pub(super) fn rows(&self) -> Vec<String> {
         let compared = self.trials().into_iter().flat_map(|trial| trial.rows);
         [TRUTH, INITIAL].into_iter().map(str::to_owned).chain(compared).collect()
     }
 
-    /// What is done with a frame, in the order of the tables' rows.
+    /// The runs on a frame, in the order of the tables' rows.
     pub(super) fn trials(&self) -> Vec<Trial> {
         let names = self.methods.iter().map(|m| m.name.clone());
         match self.study {
@@ -161,34 +161,34 @@ impl Design {
     }
 
     /// The number of frames, all shards together.
-    pub fn frames(&self) -> usize {
+    pub(super) fn frames(&self) -> usize {
         self.levels.iter().map(|l| l.frames).sum()
     }
 
     /// The settings of a study's method; `iterations` replaces the number of iterations of the method itself. The steps
     /// study runs all of them, 1000 unless told otherwise.
-    pub fn config(study: Kind, method: &Method, iterations: Option<usize>) -> Config {
-        let mut config = method.config();
+    pub fn method(study: Kind, method: &NamedMethod, iterations: Option<usize>) -> Method {
+        let mut method = method.method();
         if study == Kind::Steps {
-            config.set_exhaustive();
-            config.set_iterations(1000);
+            method.set_exhaustive();
+            method.set_iterations(1000);
         }
         if let Some(iterations) = iterations {
-            config.set_iterations(iterations);
+            method.set_iterations(iterations);
         }
-        config
+        method
     }
 
     /// The iterations at which a study compares poses.
-    pub fn steps(study: Kind, config: &Config) -> Vec<usize> {
+    pub fn steps(study: Kind, method: &Method) -> Vec<usize> {
         match study {
-            Kind::Steps => Kind::steps(config.iterations()),
+            Kind::Steps => Kind::steps(method.iterations()),
             _ => Vec::new(),
         }
     }
 }
 
-/// The row of a method when so much of something is wrong with the observation.
+/// Name of the row of a method under a fault.
 pub(super) fn perturbed(method: &str, sweep: Sweep, amount: f64) -> String {
     format!("{method} {sweep} {amount}")
 }
@@ -202,11 +202,6 @@ pub struct Shard {
     pub count: usize,
 }
 
-/// No `i/n` with i below n.
-#[derive(Debug, thiserror::Error)]
-#[error("{0:?} is no shard: expected i/n with i from 0 to n-1, such as 0/4")]
-pub struct ShardFault(String);
-
 impl Shard {
     /// The whole study.
     pub const WHOLE: Self = Self { index: 0, count: 1 };
@@ -218,14 +213,16 @@ impl Shard {
 }
 
 impl FromStr for Shard {
-    type Err = ShardFault;
+    type Err = String;
 
-    fn from_str(text: &str) -> Result<Self, ShardFault> {
+    fn from_str(text: &str) -> Result<Self, String> {
         let parts =
             text.split_once('/').and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
         match parts {
             Some((index, count)) if index < count => Ok(Self { index, count }),
-            _ => Err(ShardFault(text.into())),
+            _ => {
+                Err(format!("{text:?} is no shard: expected i/n with i from 0 to n-1, such as 0/4"))
+            }
         }
     }
 }

@@ -4,8 +4,8 @@ use super::calibration::Calibration;
 use super::comparison::{Comparison, Contrast};
 use super::kind::{INITIAL, Kind, TRUTH};
 use super::published::Published;
-use super::tables::{Block, ERRORS, Line, Tables};
-use crate::evaluate::metrics::{COLUMNS, Table};
+use super::tables::{ERRORS, Row, Table, Tables};
+use crate::evaluate::metrics::{COLUMNS, Table as TextTable};
 
 /// The metrics of the paper, and the orientation error up to symmetry; the others are in the CSV and JSON files.
 const SHOWN: [usize; 7] = [0, 1, 2, 7, 8, 9, 10];
@@ -17,30 +17,27 @@ struct Section {
 }
 
 enum Body {
-    Table(Table),
+    Table(TextTable),
     List(Vec<String>),
 }
 
 /// The document as plain text.
 pub(super) fn text(tables: &Tables) -> String {
-    let mut out = format!("{}\n", tables.study.title());
-    for Section { title, body } in sections(tables) {
-        out += &format!("\n{title}\n\n");
-        match body {
-            Body::Table(table) => out += &table.to_string(),
-            Body::List(items) => items.iter().for_each(|item| out += &format!("- {item}\n")),
-        }
-    }
-    out
+    document(tables, ["", ""], TextTable::to_string)
 }
 
 /// The document as Markdown.
 pub(super) fn markdown(tables: &Tables) -> String {
-    let mut out = format!("# {}\n", tables.study.title());
+    document(tables, ["# ", "## "], TextTable::markdown)
+}
+
+/// The document with `marks` before its title and its headings.
+fn document(tables: &Tables, marks: [&str; 2], print: fn(&TextTable) -> String) -> String {
+    let mut out = format!("{}{}\n", marks[0], tables.study.title());
     for Section { title, body } in sections(tables) {
-        out += &format!("\n## {title}\n\n");
+        out += &format!("\n{}{title}\n\n", marks[1]);
         match body {
-            Body::Table(table) => out += &table.markdown(),
+            Body::Table(table) => out += &print(&table),
             Body::List(items) => items.iter().for_each(|item| out += &format!("- {item}\n")),
         }
     }
@@ -50,32 +47,32 @@ pub(super) fn markdown(tables: &Tables) -> String {
 fn sections(tables: &Tables) -> Vec<Section> {
     let mut sections = Vec::new();
     let mut add = |title: String, body: Body| sections.push(Section { title, body });
-    for block in tables.overall() {
-        let (level, frames) = (&block.level, block.frames);
+    for table in tables.overall() {
+        let (level, frames) = (&table.level, table.frames);
         add(
             format!("Noise {level}: means over {frames} frames [95 % confidence]"),
-            Body::Table(means(tables.study, block)),
+            Body::Table(means(tables.study, table)),
         );
-        add(format!("Noise {level}: medians"), Body::Table(medians(tables.study, block)));
+        add(format!("Noise {level}: medians"), Body::Table(medians(tables.study, table)));
         add(
             format!(
                 "Noise {level}: change of the mean against the initial pose, % [95 % confidence]"
             ),
-            Body::Table(changes(tables.study, block)),
+            Body::Table(changes(tables.study, table)),
         );
-        for (heading, table) in comparisons(tables.study, block) {
+        for (heading, table) in comparisons(tables.study, table) {
             add(format!("Noise {level}: {heading}"), Body::Table(table));
         }
-        let objects: Vec<&Block> =
-            tables.blocks.iter().filter(|b| b.level == *level && b.object.is_some()).collect();
+        let objects: Vec<&Table> =
+            tables.all.iter().filter(|b| b.level == *level && b.object.is_some()).collect();
         // Of many faults times many objects nobody reads a table.
         if objects.len() > 1 && tables.study != Kind::Robustness {
-            let table = by_object(tables.study, block, &objects);
-            add(format!("Noise {level}: means by object"), Body::Table(table));
-            if let Some(against) = against(tables.study, block) {
+            let means = by_object(tables.study, table, &objects);
+            add(format!("Noise {level}: means by object"), Body::Table(means));
+            if let Some(against) = against(tables.study, table) {
                 let heading = format!("mean over that of {against} by object, same frames");
-                let table = ratios_by_object(tables.study, block, &objects);
-                add(format!("Noise {level}: {heading} [95 % confidence]"), Body::Table(table));
+                let ratios = ratios_by_object(tables.study, table, &objects);
+                add(format!("Noise {level}: {heading} [95 % confidence]"), Body::Table(ratios));
             }
         }
     }
@@ -112,26 +109,26 @@ pub(super) fn row_label(study: Kind, row: &str) -> String {
     }
 }
 
-/// The metrics of `candidates` that any row of the block has.
-fn present(block: &Block, candidates: &[usize]) -> Vec<usize> {
-    let has = |m: &usize| block.lines.iter().any(|l| l.metrics[*m].is_some());
+/// The metrics of `candidates` that any row of the table has.
+fn present(table: &Table, candidates: &[usize]) -> Vec<usize> {
+    let has = |m: &usize| table.rows.iter().any(|r| r.metrics[*m].is_some());
     candidates.iter().copied().filter(has).collect()
 }
 
-fn table(first: &str, metrics: &[usize]) -> Table {
+fn text_table(first: &str, metrics: &[usize]) -> TextTable {
     let names = metrics.iter().map(|&m| COLUMNS[m]);
-    Table::new([first, "n"].into_iter().chain(names).map(str::to_owned).collect())
+    TextTable::new([first, "n"].into_iter().chain(names).map(str::to_owned).collect())
 }
 
 fn ours(
     label: String,
-    line: &Line,
+    row: &Row,
     frames: usize,
     metrics: &[usize],
     cell: impl Fn(usize) -> Option<String>,
 ) -> Vec<String> {
     let cells = metrics.iter().map(|&m| cell(m).unwrap_or_else(|| "-".into()));
-    [label, format!("{}/{frames}", line.n)].into_iter().chain(cells).collect()
+    [label, format!("{}/{frames}", row.n)].into_iter().chain(cells).collect()
 }
 
 /// A row of published figures, below ours.
@@ -140,75 +137,75 @@ fn theirs(values: &Published, metrics: &[usize], show: impl Fn(f64) -> String) -
     ["· published".to_owned(), String::new()].into_iter().chain(cells).collect()
 }
 
-fn means(study: Kind, block: &Block) -> Table {
-    let metrics = present(block, &SHOWN);
-    let mut out = table("mean", &metrics);
-    for line in &block.lines {
+fn means(study: Kind, table: &Table) -> TextTable {
+    let metrics = present(table, &SHOWN);
+    let mut out = text_table("mean", &metrics);
+    for row in &table.rows {
         let cell = |m: usize| {
-            let estimate = line.metrics[m].as_ref()?;
+            let estimate = row.metrics[m].as_ref()?;
             Some(with_interval(number(estimate.mean), estimate.interval.map(|i| i.map(number))))
         };
-        out.push(ours(row_label(study, &line.row), line, block.frames, &metrics, cell));
-        if let Some(published) = &line.published {
+        out.push(ours(row_label(study, &row.name), row, table.frames, &metrics, cell));
+        if let Some(published) = &row.published {
             out.push(theirs(published, &metrics, |v| format!("{v:.2}")));
         }
     }
     out
 }
 
-fn medians(study: Kind, block: &Block) -> Table {
-    let metrics = present(block, &SHOWN);
-    let mut out = table("median", &metrics);
-    for line in &block.lines {
-        let cell = |m: usize| line.metrics[m].map(|e| number(e.median));
-        out.push(ours(row_label(study, &line.row), line, block.frames, &metrics, cell));
+fn medians(study: Kind, table: &Table) -> TextTable {
+    let metrics = present(table, &SHOWN);
+    let mut out = text_table("median", &metrics);
+    for row in &table.rows {
+        let cell = |m: usize| row.metrics[m].map(|e| number(e.median));
+        out.push(ours(row_label(study, &row.name), row, table.frames, &metrics, cell));
     }
     out
 }
 
-fn changes(study: Kind, block: &Block) -> Table {
-    let metrics = errors_present(block);
-    let mut out = table("change %", &metrics);
-    for line in block.lines.iter().filter(|l| l.row != TRUTH && l.row != INITIAL) {
+fn changes(study: Kind, table: &Table) -> TextTable {
+    let metrics = errors_present(table);
+    let mut out = text_table("change %", &metrics);
+    for row in table.rows.iter().filter(|r| r.name != TRUTH && r.name != INITIAL) {
         let cell = |m: usize| {
-            let change = line.metrics[m].as_ref()?.change?;
+            let change = row.metrics[m].as_ref()?.change?;
             let show = |v: f64| format!("{v:+.1}");
             Some(with_interval(show(change.percent), change.interval.map(|i| i.map(show))))
         };
-        out.push(ours(row_label(study, &line.row), line, block.frames, &metrics, cell));
-        if let Some(published) = &line.published_change {
+        out.push(ours(row_label(study, &row.name), row, table.frames, &metrics, cell));
+        if let Some(published) = &row.published_change {
             out.push(theirs(published, &metrics, |v| format!("{v:+.0}")));
         }
     }
     out
 }
 
-/// What rows of the block are compared with, frame by frame, if anything.
-fn against(study: Kind, block: &Block) -> Option<&str> {
-    let first = block.comparisons.first()?;
+/// What rows of the table are compared with, frame by frame, if anything.
+fn against(study: Kind, table: &Table) -> Option<&str> {
+    let first = table.comparisons.first()?;
     Some(match study {
         Kind::Robustness => study.reference().unwrap_or_default(),
         _ => first.reference.as_str(),
     })
 }
 
-/// The errors that any row of the block has.
-fn errors_present(block: &Block) -> Vec<usize> {
+/// The errors that any row of the table has.
+fn errors_present(table: &Table) -> Vec<usize> {
     let errors: Vec<usize> = SHOWN.into_iter().filter(|m| ERRORS.contains(m)).collect();
-    present(block, &errors)
+    present(table, &errors)
 }
 
 /// Differences and ratios of the means of rows that are compared frame by frame.
-fn comparisons(study: Kind, block: &Block) -> Vec<(String, Table)> {
-    let Some(against) = against(study, block) else { return Vec::new() };
-    let metrics = errors_present(block);
+fn comparisons(study: Kind, table: &Table) -> Vec<(String, TextTable)> {
+    let Some(against) = against(study, table) else { return Vec::new() };
+    let metrics = errors_present(table);
     let make = |name: &str, cell: &dyn Fn(&Contrast) -> Option<String>| {
-        let mut out = table(name, &metrics);
-        for comparison in &block.comparisons {
+        let mut out = text_table(name, &metrics);
+        for comparison in &table.comparisons {
             out.push(compared(
                 row_label(study, &comparison.row),
                 comparison,
-                block,
+                table,
                 &metrics,
                 cell,
             ));
@@ -227,14 +224,14 @@ fn comparisons(study: Kind, block: &Block) -> Vec<(String, Table)> {
     ]
 }
 
-fn ratios_by_object(study: Kind, whole: &Block, objects: &[&Block]) -> Table {
+fn ratios_by_object(study: Kind, whole: &Table, objects: &[&Table]) -> TextTable {
     let metrics = errors_present(whole);
-    let mut out = table("ratio", &metrics);
-    for block in objects {
-        let object = block.object.unwrap_or(0);
-        for comparison in &block.comparisons {
+    let mut out = text_table("ratio", &metrics);
+    for table in objects {
+        let object = table.object.unwrap_or(0);
+        for comparison in &table.comparisons {
             let label = format!("object {object}: {}", row_label(study, &comparison.row));
-            out.push(compared(label, comparison, block, &metrics, &ratio));
+            out.push(compared(label, comparison, table, &metrics, &ratio));
         }
     }
     out
@@ -243,7 +240,7 @@ fn ratios_by_object(study: Kind, whole: &Block, objects: &[&Block]) -> Table {
 fn compared(
     label: String,
     comparison: &Comparison,
-    block: &Block,
+    table: &Table,
     metrics: &[usize],
     cell: &dyn Fn(&Contrast) -> Option<String>,
 ) -> Vec<String> {
@@ -251,7 +248,7 @@ fn compared(
     let cells = metrics
         .iter()
         .map(|&m| comparison.metrics[m].as_ref().and_then(cell).unwrap_or_else(|| "-".into()));
-    [label, format!("{n}/{}", block.frames)].into_iter().chain(cells).collect()
+    [label, format!("{n}/{}", table.frames)].into_iter().chain(cells).collect()
 }
 
 fn ratio(contrast: &Contrast) -> Option<String> {
@@ -259,9 +256,9 @@ fn ratio(contrast: &Contrast) -> Option<String> {
     Some(with_interval(show(contrast.ratio?), contrast.ratio_interval.map(|i| i.map(show))))
 }
 
-fn coverage(calibration: &Calibration) -> Table {
+fn coverage(calibration: &Calibration) -> TextTable {
     let mut out =
-        Table::new(["ellipsoid of", "should hold %", "holds %"].map(str::to_owned).into());
+        TextTable::new(["ellipsoid of", "should hold %", "holds %"].map(str::to_owned).into());
     for part in &calibration.coverage {
         let show = |v: f64| format!("{:.1}", 100.0 * v);
         let share = with_interval(show(part.share), part.interval.map(|i| i.map(show)));
@@ -270,9 +267,9 @@ fn coverage(calibration: &Calibration) -> Table {
     out
 }
 
-fn errors(calibration: &Calibration) -> Table {
+fn errors(calibration: &Calibration) -> TextTable {
     let header = ["error of", "root mean square", "Cramér–Rao bound", "median"];
-    let mut out = Table::new(header.map(str::to_owned).into());
+    let mut out = TextTable::new(header.map(str::to_owned).into());
     for error in &calibration.errors {
         let numbers = [error.found, error.bound, error.median].map(|v| format!("{v:.2}"));
         out.push([[error.of.to_owned()].as_slice(), &numbers].concat());
@@ -280,9 +277,9 @@ fn errors(calibration: &Calibration) -> Table {
     out
 }
 
-fn events(calibration: &Calibration) -> Table {
+fn events(calibration: &Calibration) -> TextTable {
     let header = ["within", "predicted %", "true %", "calibration error", "by chance", "Brier"];
-    let mut out = Table::new(header.map(str::to_owned).into());
+    let mut out = TextTable::new(header.map(str::to_owned).into());
     for event in &calibration.events {
         out.push(vec![
             event.event.into(),
@@ -309,15 +306,15 @@ fn failures(calibration: &Calibration) -> String {
     format!("{failures} of {n} poses are not within 5 mm and 5°; {area}")
 }
 
-fn by_object(study: Kind, overall: &Block, objects: &[&Block]) -> Table {
+fn by_object(study: Kind, overall: &Table, objects: &[&Table]) -> TextTable {
     let metrics = present(overall, &SHOWN);
-    let mut out = table("mean", &metrics);
-    for block in objects {
-        for line in &block.lines {
-            let object = block.object.map_or_else(String::new, |id| format!("object {id}: "));
-            let label = object + &row_label(study, &line.row);
-            let cell = |m: usize| line.metrics[m].map(|e| number(e.mean));
-            out.push(ours(label, line, block.frames, &metrics, cell));
+    let mut out = text_table("mean", &metrics);
+    for table in objects {
+        for row in &table.rows {
+            let object = table.object.map_or_else(String::new, |id| format!("object {id}: "));
+            let label = object + &row_label(study, &row.name);
+            let cell = |m: usize| row.metrics[m].map(|e| number(e.mean));
+            out.push(ours(label, row, table.frames, &metrics, cell));
         }
     }
     out

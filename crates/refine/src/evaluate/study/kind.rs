@@ -1,14 +1,16 @@
 //! The studies: the paper's four, and those that measure the fused estimator.
 
-use std::fmt;
-
 use serde::{Deserialize, Serialize};
+use strum::{Display, IntoStaticStr, VariantArray};
 
-use crate::method::Method;
+use crate::method::NamedMethod;
 
 /// Which study.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Display, IntoStaticStr, VariantArray,
+)]
 #[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
 pub enum Kind {
     /// Baselines, the combined method and the fused estimator.
     Main,
@@ -21,6 +23,8 @@ pub enum Kind {
     /// The fused estimator with less evidence, and with less estimated.
     Evidence,
     /// Whether the fused estimator's posterior is right.
+    #[serde(rename = "confidence", alias = "posterior")]
+    #[strum(serialize = "confidence")]
     Posterior,
     /// What faults of the observation do.
     Robustness,
@@ -32,32 +36,13 @@ pub(super) const TRUTH: &str = "truth";
 pub(super) const INITIAL: &str = "initial";
 
 impl Kind {
-    /// All studies.
-    pub const ALL: [Self; 7] = [
-        Self::Main,
-        Self::Gradients,
-        Self::Noise,
-        Self::Steps,
-        Self::Evidence,
-        Self::Posterior,
-        Self::Robustness,
-    ];
-
     /// Its name in commands and files.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Main => "main",
-            Self::Gradients => "gradients",
-            Self::Noise => "noise",
-            Self::Steps => "steps",
-            Self::Evidence => "evidence",
-            Self::Posterior => "confidence",
-            Self::Robustness => "robustness",
-        }
+        self.into()
     }
 
     /// What it shows, as a heading.
-    pub fn title(self) -> &'static str {
+    pub(super) fn title(self) -> &'static str {
         match self {
             Self::Main => "Main study: baselines, the combined method and the fused estimator",
             Self::Gradients => "Gradients study: each kind of evidence alone, and all together",
@@ -84,16 +69,17 @@ impl Kind {
             ],
             Self::Noise => vec!["robust-icp", "combined", "fused"],
             Self::Steps => vec!["combined-free"],
-            Self::Evidence => {
-                ["fused"].into_iter().chain(Method::ablations().iter().map(|m| m.name)).collect()
-            }
+            Self::Evidence => ["fused"]
+                .into_iter()
+                .chain(NamedMethod::ablations().iter().map(|m| m.name))
+                .collect(),
             Self::Posterior => vec!["fused"],
             Self::Robustness => vec!["robust-icp", "fused"],
         }
     }
 
     /// The method that the others are compared with, frame by frame.
-    pub fn reference(self) -> Option<&'static str> {
+    pub(super) fn reference(self) -> Option<&'static str> {
         match self {
             Self::Steps => None,
             Self::Evidence => Some("fused"),
@@ -102,7 +88,7 @@ impl Kind {
     }
 
     /// The levels of noise that the paper has in this table, or that the study takes if it is not the paper's.
-    pub fn levels(self) -> &'static [&'static str] {
+    pub(super) fn levels(self) -> &'static [&'static str] {
         match self {
             Self::Gradients | Self::Evidence | Self::Robustness => &["low"],
             Self::Main | Self::Noise | Self::Steps | Self::Posterior => &["low", "high"],
@@ -120,21 +106,15 @@ impl Kind {
     }
 }
 
-impl fmt::Display for Kind {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn all_methods_exist() {
-        for kind in Kind::ALL {
+        for kind in Kind::VARIANTS {
             for name in kind.methods().into_iter().chain(kind.reference()) {
-                assert!(Method::named(name).is_some(), "{name}");
+                assert!(NamedMethod::find(name).is_some(), "{name}");
             }
         }
     }

@@ -98,6 +98,7 @@ pub fn merge(folders: &[PathBuf]) -> Result<(Design, BTreeMap<usize, FrameRecord
 }
 
 fn design(file: &Path, identity: &Identity) -> Result<Design, MergeError> {
-    serde_json::from_value(identity.to_value())
+    serde_json::to_value(identity)
+        .and_then(serde_json::from_value)
         .map_err(|_| MergeError::NotAStudy { file: file.to_path_buf() })
 }

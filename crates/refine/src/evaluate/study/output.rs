@@ -9,7 +9,7 @@ use super::design::Design;
 use super::document::{markdown, text};
 use super::plot::plots;
 use super::record::FrameRecord;
-use super::tables::Tables;
+use super::tables::{Failure, Tables};
 use crate::data::bop::{DatasetError, write_atomically};
 
 /// The journal of a study, in order once it is complete: what `merge` reads.
@@ -17,8 +17,7 @@ pub const RECORDS: &str = "records.jsonl";
 /// Seconds by frame and method.
 pub const TIMES: &str = "times.csv";
 
-/// Writes the tables (`tables.txt`, `.md`, `.csv`, `.json`, and `calibration.csv` where something was believed) and the plots (`*.svg`) of a study to a folder and returns the
-/// tables, and the files.
+/// Writes the tables (`tables.txt`, `.md`, `.csv`, `.json`, and `calibration.csv` where something was believed) and the plots (`*.svg`) of a study to a folder and returns what failed, and the files.
 ///
 /// # Errors
 /// If a file cannot be written; each appears whole or not at all.
@@ -26,7 +25,7 @@ pub fn write_outputs(
     folder: &Path,
     design: &Design,
     records: &BTreeMap<usize, FrameRecord>,
-) -> Result<(Tables, Vec<PathBuf>), DatasetError> {
+) -> Result<(Vec<Failure>, Vec<PathBuf>), DatasetError> {
     let tables = Tables::new(design, records);
     let fault = |file: &Path, problem: String| DatasetError::Write { file: file.into(), problem };
     let mut files: Vec<(PathBuf, Vec<u8>)> = vec![
@@ -53,5 +52,5 @@ pub fn write_outputs(
     for (file, bytes) in &files {
         write_atomically(file, bytes)?;
     }
-    Ok((tables, files.into_iter().map(|(file, _)| file).collect()))
+    Ok((tables.failures, files.into_iter().map(|(file, _)| file).collect()))
 }

@@ -7,7 +7,7 @@ use super::kind::Kind;
 use crate::evaluate::metrics::COLUMNS;
 
 /// Means in the order of [`COLUMNS`]; what is not published is `None`.
-pub type Published = [Option<f64>; COLUMNS.len()];
+pub(super) type Published = [Option<f64>; COLUMNS.len()];
 
 /// A row: study, level, name, and PE, OE, CA, IV, |ΔCA|, |ΔIV|.
 type Row = (Kind, &'static str, &'static str, [f64; 6]);
@@ -56,7 +56,7 @@ const ROWS: [Row; 35] = [
 ];
 
 /// The published means of a row of a study at a level of noise (`low` and `high` are the paper's).
-pub fn published(study: Kind, level: &str, row: &str) -> Option<Published> {
+pub(super) fn published(study: Kind, level: &str, row: &str) -> Option<Published> {
     let (.., values) = ROWS.iter().find(|r| (r.0, r.1, r.2) == (study, level, row))?;
     let [pe, oe, ca, iv, delta_ca, delta_iv] = values.map(|v| (!v.is_nan()).then_some(v));
     Some([pe, oe, None, None, None, None, None, ca, iv, delta_ca, delta_iv, None, None])

@@ -1,12 +1,12 @@
-//! What a study keeps of a frame.
+//! Records of a study: one per frame.
 
 use serde::{Deserialize, Serialize};
 
-use super::belief::PredictedPosterior;
+use super::posterior::PredictedPosterior;
 use crate::data::PlainPose;
 use crate::evaluate::metrics::PoseScore;
 
-/// One initial pose, and what every method made of it.
+/// One initial pose and the results of all methods.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FrameRecord {
     /// Level of noise of the initial pose.
@@ -18,32 +18,32 @@ pub struct FrameRecord {
     /// The object.
     pub obj_id: u32,
     /// One a row of the study's table, in the design's order.
-    pub outcomes: Vec<RowOutcome>,
+    pub(super) outcomes: Vec<RowOutcome>,
 }
 
 /// One row of a table, for one frame.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct RowOutcome {
+pub(super) struct RowOutcome {
     /// Name of the row: `truth`, `initial`, a method, a number of steps, or a method with a fault.
-    pub row: String,
+    pub(super) row: String,
     /// The pose, object → camera.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub pose: Option<PlainPose>,
+    pub(super) pose: Option<PlainPose>,
     /// The iteration that the pose comes from.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub iteration: Option<usize>,
+    pub(super) iteration: Option<usize>,
     /// Its metrics.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub score: Option<PoseScore>,
-    /// What was believed of the pose; in the confidence study.
+    pub(super) score: Option<PoseScore>,
+    /// The predicted posterior; in the confidence study.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub belief: Option<PredictedPosterior>,
-    /// Whether something was made wrong with the observation: a failure is a finding then.
+    pub(super) belief: Option<PredictedPosterior>,
+    /// Whether a fault was added to the observation: a failure is then a finding.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub perturbed: bool,
+    pub(super) perturbed: bool,
     /// Why there is no pose or no score.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub failed: Option<String>,
+    pub(super) failed: Option<String>,
 }
 
 impl FrameRecord {
@@ -53,13 +53,13 @@ impl FrameRecord {
         format!("{level}: scene {scene_id} image {im_id} object {obj_id}")
     }
 
-    /// Whether any row failed with whose observation nothing was made wrong.
+    /// Whether any row without an added fault failed.
     pub fn failed(&self) -> bool {
         self.outcomes.iter().any(|o| o.failed.is_some() && !o.perturbed)
     }
 
     /// The outcome of a row.
-    pub fn outcome(&self, row: &str) -> Option<&RowOutcome> {
+    pub(super) fn outcome(&self, row: &str) -> Option<&RowOutcome> {
         self.outcomes.iter().find(|o| o.row == row)
     }
 }

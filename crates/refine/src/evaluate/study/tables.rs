@@ -22,73 +22,76 @@ pub(super) const ERRORS: [usize; 9] = [0, 1, 2, 3, 4, 5, 6, 9, 10];
 
 /// All tables of a study.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Tables {
+pub(super) struct Tables {
     /// Which study.
-    pub study: Kind,
+    pub(super) study: Kind,
     /// Names and units of the metrics.
-    pub metrics: [&'static str; COLUMNS.len()],
+    pub(super) metrics: [&'static str; COLUMNS.len()],
     /// By level, first over all objects and then by object.
-    pub blocks: Vec<Block>,
-    /// Whether what was believed is right; in the confidence study.
+    #[serde(rename = "blocks")]
+    pub(super) all: Vec<Table>,
+    /// Calibration of the posteriors; in the confidence study.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub calibrations: Vec<Calibration>,
+    pub(super) calibrations: Vec<Calibration>,
     /// What failed.
-    pub failures: Vec<Failure>,
+    pub(super) failures: Vec<Failure>,
 }
 
 /// One level of noise, over all objects or one.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Block {
+pub(super) struct Table {
     /// Level of noise.
-    pub level: String,
+    pub(super) level: String,
     /// The object; `None` for all.
-    pub object: Option<u32>,
+    pub(super) object: Option<u32>,
     /// Frames that were tried.
-    pub frames: usize,
-    /// One a row of the table.
-    pub lines: Vec<Line>,
+    pub(super) frames: usize,
+    /// The rows.
+    #[serde(rename = "lines")]
+    pub(super) rows: Vec<Row>,
     /// Rows compared frame by frame.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub comparisons: Vec<Comparison>,
+    pub(super) comparisons: Vec<Comparison>,
 }
 
 /// A row of a table.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Line {
+pub(super) struct Row {
     /// `truth`, `initial`, a method, a number of steps, or a method with a fault.
-    pub row: String,
+    #[serde(rename = "row")]
+    pub(super) name: String,
     /// Frames that have a score.
-    pub n: usize,
+    pub(super) n: usize,
     /// By metric; `None` where no frame has it.
-    pub metrics: [Option<Estimate>; COLUMNS.len()],
+    pub(super) metrics: [Option<Estimate>; COLUMNS.len()],
     /// The published means, over all objects.
-    pub published: Option<Published>,
+    pub(super) published: Option<Published>,
     /// The published change against the published initial pose \[%\].
-    pub published_change: Option<Published>,
+    pub(super) published_change: Option<Published>,
 }
 
 /// One metric of one row.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Estimate {
+pub(super) struct Estimate {
     /// Frames that have it.
-    pub n: usize,
+    pub(super) n: usize,
     /// Arithmetic mean.
-    pub mean: f64,
+    pub(super) mean: f64,
     /// Confidence interval of the mean, 95 %.
-    pub interval: Option<[f64; 2]>,
+    pub(super) interval: Option<[f64; 2]>,
     /// Median.
-    pub median: f64,
+    pub(super) median: f64,
     /// Change of the mean against the initial pose, over the frames that have both; for errors only.
-    pub change: Option<Change>,
+    pub(super) change: Option<Change>,
 }
 
 /// A relative change \[%\].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Change {
+pub(super) struct Change {
     /// 100 (mean after / mean before − 1).
-    pub percent: f64,
+    pub(super) percent: f64,
     /// Confidence interval, 95 %, of paired resamples.
-    pub interval: Option<[f64; 2]>,
+    pub(super) interval: Option<[f64; 2]>,
 }
 
 /// A frame, or a row of a file, without a result.
@@ -104,16 +107,16 @@ pub struct Failure {
     pub rows: Vec<String>,
     /// Why.
     pub reason: String,
-    /// Whether something was made wrong with the observations: that a method cannot do without is a finding then.
+    /// Whether a fault was added to the observation: the failure is then a finding.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub perturbed: bool,
 }
 
 impl Tables {
     /// Summarizes the records of a study, by frame.
-    pub fn new(design: &Design, records: &BTreeMap<usize, FrameRecord>) -> Self {
+    pub(super) fn new(design: &Design, records: &BTreeMap<usize, FrameRecord>) -> Self {
         let (rows, pairs) = (design.rows(), design.pairs());
-        let mut blocks = Vec::new();
+        let mut all = Vec::new();
         let mut failures = Vec::new();
         for level in &design.levels {
             let of_level: Vec<&FrameRecord> =
@@ -128,11 +131,11 @@ impl Tables {
                     .filter(|r| object.is_none_or(|id| id == r.obj_id))
                     .collect();
                 let unreadable = if object.is_none() { level.unreadable.len() } else { 0 };
-                blocks.push(Block {
+                all.push(Table {
                     level: level.name.clone(),
                     object,
                     frames: chosen.len() + unreadable,
-                    lines: lines(design.study, &level.name, object, &rows, &chosen),
+                    rows: table_rows(design.study, &level.name, object, &rows, &chosen),
                     comparisons: comparisons(&pairs, &chosen),
                 });
             }
@@ -147,12 +150,12 @@ impl Tables {
             failures.extend(of_level.iter().flat_map(|record| failures_of(record)));
         }
         let calibrations = calibrations(design, records);
-        Self { study: design.study, metrics: COLUMNS, blocks, calibrations, failures }
+        Self { study: design.study, metrics: COLUMNS, all, calibrations, failures }
     }
 
-    /// The blocks over all objects.
-    pub(super) fn overall(&self) -> impl Iterator<Item = &Block> {
-        self.blocks.iter().filter(|b| b.object.is_none())
+    /// The tables over all objects.
+    pub(super) fn overall(&self) -> impl Iterator<Item = &Table> {
+        self.all.iter().filter(|b| b.object.is_none())
     }
 }
 
@@ -187,13 +190,13 @@ fn failures_of(record: &FrameRecord) -> Vec<Failure> {
 
 type Column = Vec<Option<f64>>;
 
-fn lines(
+fn table_rows(
     study: Kind,
     level: &str,
     object: Option<u32>,
     rows: &[String],
     records: &[&FrameRecord],
-) -> Vec<Line> {
+) -> Vec<Row> {
     const METRICS: usize = COLUMNS.len();
     let column = |row: &str, metric: usize| -> Column {
         let value = |r: &&FrameRecord| r.outcome(row)?.score?.values()[metric];
@@ -240,8 +243,8 @@ fn lines(
                         Some(100.0 * (p / initial - 1.0))
                     })
                 });
-            Line {
-                row: row.clone(),
+            Row {
+                name: row.clone(),
                 n: records
                     .iter()
                     .filter(|f| f.outcome(row).is_some_and(|o| o.score.is_some()))
@@ -340,31 +343,31 @@ pub(super) mod tests {
     fn means_changes_and_failures_are_right() {
         let (design, records) = example();
         let tables = Tables::new(&design, &records);
-        let keys: Vec<_> = tables.blocks.iter().map(|b| (b.level.as_str(), b.object)).collect();
+        let keys: Vec<_> = tables.all.iter().map(|b| (b.level.as_str(), b.object)).collect();
         let each = [None, Some(5), Some(6)];
         assert_eq!(keys[..3], each.map(|o| ("low", o)));
         assert_eq!(keys[3..], each.map(|o| ("high", o)));
-        let low = &tables.blocks[0];
-        assert_eq!((low.frames, tables.blocks[1].frames), (4, 2));
-        let pe = |line: usize| low.lines[line].metrics[0].unwrap();
+        let low = &tables.all[0];
+        assert_eq!((low.frames, tables.all[1].frames), (4, 2));
+        let pe = |line: usize| low.rows[line].metrics[0].unwrap();
         assert_eq!((pe(1).mean, pe(1).median, pe(1).n), (2.0, 2.0, 3));
         let combined = pe(2).change.unwrap();
         assert!((combined.percent + 75.0).abs() < 1e-12);
         let [a, b] = combined.interval.unwrap();
         assert!((a + 75.0).abs() < 1e-9 && (b + 75.0).abs() < 1e-9, "not paired");
         // ICP has two frames, 2 and 4; the initial poses of these are 1 and 2.
-        assert_eq!((pe(3).mean, pe(3).n, low.lines[3].n), (3.0, 2, 2));
+        assert_eq!((pe(3).mean, pe(3).n, low.rows[3].n), (3.0, 2, 2));
         assert!((pe(3).change.unwrap().percent - 100.0).abs() < 1e-12);
         let [low_end, high_end] = pe(3).interval.unwrap();
         assert!(low_end == 2.0 && high_end == 4.0);
         assert_eq!(pe(1).change, None);
-        assert_eq!(low.lines[2].metrics[3], None);
+        assert_eq!(low.rows[2].metrics[3], None);
         // A contact area is neither good nor bad, and an initial error of zero cannot change by per cents.
-        assert_eq!(low.lines[2].metrics[7].unwrap().change, None);
-        assert_eq!(low.lines[0].published.unwrap()[7], Some(36.28));
-        let published = low.lines[2].published_change.unwrap();
+        assert_eq!(low.rows[2].metrics[7].unwrap().change, None);
+        assert_eq!(low.rows[0].published.unwrap()[7], Some(36.28));
+        let published = low.rows[2].published_change.unwrap();
         assert!((published[10].unwrap() + 73.06).abs() < 0.01 && published[7].is_none());
-        assert_eq!(tables.blocks[1].lines[2].published, None);
+        assert_eq!(tables.all[1].rows[2].published, None);
         let said: Vec<String> = tables.failures.iter().map(Failure::sentence).collect();
         assert_eq!(
             said[0],

@@ -5,8 +5,27 @@ use prehend_geometry::closest::{ClosestError, ClosestPoints};
 use prehend_geometry::sample::surface_samples;
 use prehend_geometry::{SurfaceSample, TriMesh};
 
-use super::SymmetrySettings;
 use super::paint::Paint;
+
+/// What counts as the same.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SymmetrySettings {
+    /// How far the surface may lie from where the symmetry says, as a fraction of the diameter.
+    pub tolerance: f64,
+    /// The fraction of the surface that may lie farther off: dents and tabs of real objects.
+    pub exempt: f64,
+    /// How much the mean color of the surface (0..=1, each patch blurred to the size of the tolerance) may differ, root
+    /// mean square; `None` looks at the shape alone.
+    pub color_tolerance: Option<f64>,
+    /// Points of the surface that are compared.
+    pub samples: usize,
+}
+
+impl Default for SymmetrySettings {
+    fn default() -> Self {
+        Self { tolerance: 0.025, exempt: 0.01, color_tolerance: None, samples: 1000 }
+    }
+}
 
 /// A surface, prepared for comparing it with itself.
 pub(super) struct Shape {

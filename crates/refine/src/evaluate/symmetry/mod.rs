@@ -14,28 +14,10 @@ use nalgebra::{Point3, UnitQuaternion};
 use prehend_geometry::TriMesh;
 use prehend_geometry::closest::ClosestError;
 
+pub use self::deviation::SymmetrySettings;
+
 use self::deviation::Shape;
-use crate::evaluate::metrics::{ContinuousSymmetry, Symmetries};
-
-/// What counts as the same.
-#[derive(Clone, Debug, PartialEq)]
-pub struct SymmetrySettings {
-    /// How far the surface may lie from where the symmetry says, as a fraction of the diameter.
-    pub tolerance: f64,
-    /// The fraction of the surface that may lie farther off: dents and tabs of real objects.
-    pub exempt: f64,
-    /// How much the mean color of the surface (0..=1, each patch blurred to the size of the tolerance) may differ, root
-    /// mean square; `None` looks at the shape alone.
-    pub color_tolerance: Option<f64>,
-    /// Points of the surface that are compared.
-    pub samples: usize,
-}
-
-impl Default for SymmetrySettings {
-    fn default() -> Self {
-        Self { tolerance: 0.025, exempt: 0.01, color_tolerance: None, samples: 1000 }
-    }
-}
+use crate::data::{ContinuousSymmetry, Symmetries};
 
 /// The symmetries of `mesh` \[m\], the identity left out.
 ///

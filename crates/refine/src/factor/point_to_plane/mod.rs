@@ -7,34 +7,29 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use nalgebra::{SVector, Vector2, Vector3};
-use prehend_render::{DepthImage, Mask};
+use prehend_autodiff::lie::twist_row;
+use prehend_render::Mask;
 use rayon::prelude::*;
 
 pub use self::scatter::NoiseEstimate;
 use self::smooth_field::{Fit, SmoothField};
-use super::depth::masked_depths;
-use super::patch_sums::PatchSums;
-use super::{SurfacePatches, Term, share};
+use super::patch_sums::{PatchSums, add_to};
 use crate::error::RefineError;
-use crate::problem::{Block, Cauchy, Normal, State};
-use crate::scene::{Object, Observation};
+use crate::problem::{Factor, NoiseModel, NormalEquations, State, SurfacePatches, Weighting};
+use crate::scene::{Frame, Object};
 
-/// Settings of [`PointToPlaneTerm`].
+/// Settings of [`PointToPlaneFactor`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct PointToPlaneSettings {
     /// Depth points used at most, spread evenly over the mask.
     pub points: usize,
-    /// Standard deviation of a depth point from the surface \[m\].
-    pub sigma: f64,
-    /// Distance at which a point counts as an outlier \[m\].
-    pub outlier: f64,
-    /// How many independent measurements the points amount to at most: errors of neighbors are alike.
-    pub effective_points: f64,
-    /// Standard deviation of the smooth field by which neighboring points are off alike, as a depth camera and, unless it is
-    /// let off patch by patch, the model of the object are; zero if there is none \[m\].
-    pub deviation: f64,
-    /// Distance over which that field changes \[m\].
-    pub smoothness: f64,
+    /// Distances of points from the surface \[m\].
+    pub noise: NoiseModel,
+    /// Standard deviation of the smooth field by which neighboring points are off alike \[m\]: errors of the depth camera and, unless
+    /// surface patches account for them, of the object's model; zero if there is none.
+    pub gp_sigma: f64,
+    /// Length scale of that field, a Gaussian process over space \[m\].
+    pub length_scale: f64,
     /// Points so near to the mask's border are left out \[px\], if at least a quarter of all is left then: there depth is of what
     /// is in front or behind, or of both.
     pub margin: usize,
@@ -44,11 +39,9 @@ impl Default for PointToPlaneSettings {
     fn default() -> Self {
         Self {
             points: 1000,
-            sigma: 1e-3,
-            outlier: 4e-3,
-            effective_points: 60.0,
-            deviation: 0.0,
-            smoothness: 20e-3,
+            noise: NoiseModel::cauchy(1e-3, 4e-3, 60.0),
+            gp_sigma: 0.0,
+            length_scale: 20e-3,
             margin: 2,
         }
     }
@@ -59,7 +52,7 @@ impl Default for PointToPlaneSettings {
 ///
 /// A depth point is not of a face that looks away from the camera: such a match counts as it is far, and pulls nothing. What
 /// the points' errors have in common, a smooth field, is eliminated.
-pub struct PointToPlaneTerm {
+pub struct PointToPlaneFactor {
     object: Arc<Object>,
     points: Vec<Point>,
     field: Option<SmoothField>,
@@ -103,19 +96,15 @@ const LEAST_SHARE: f64 = 0.25;
 /// Points that are worth a task of their own.
 const TASK: usize = 64;
 
-impl PointToPlaneTerm {
-    /// Takes the masked depth of `observation`; `hand` is the depth image of the hand alone, where masks may have leaked
-    /// onto it.
+impl PointToPlaneFactor {
+    /// Of the masked depth of `frame`, but where masks have leaked onto the hand.
     ///
     /// # Errors
     /// If no pixel of the mask, beside the hand, has a depth.
-    pub fn new(
-        observation: &Observation,
-        object: Arc<Object>,
-        hand: &DepthImage,
-        settings: PointToPlaneSettings,
-    ) -> Result<Self, RefineError> {
-        let camera = &observation.camera;
+    pub fn new(frame: &Frame<'_>, settings: &PointToPlaneSettings) -> Result<Self, RefineError> {
+        let (object, hand) = (Arc::clone(frame.object()), frame.hand_depth());
+        let (mask, camera) = (&frame.observation().mask, &frame.observation().camera);
+        let settings = settings.clone();
         let point = |(x, y, depth): (usize, usize, f64)| Point {
             pixel: (x, y),
             ray: camera.unproject(x as f64, y as f64, 1.0).coords.xy(),
@@ -126,10 +115,9 @@ impl PointToPlaneTerm {
             let hand = hand.get(x, y).map_or(0.0, f64::from);
             hand == 0.0 || depth < hand - IN_FRONT
         };
-        let mut depths = masked_depths(observation, settings.points)?;
+        let mut depths = frame.masked_depths(settings.points)?;
         depths.retain(of_object);
-        let inside =
-            |&(x, y, _): &(usize, usize, f64)| within(&observation.mask, [x, y], settings.margin);
+        let inside = |&(x, y, _): &(usize, usize, f64)| within(mask, [x, y], settings.margin);
         let central: Vec<_> = depths.iter().copied().filter(inside).collect();
         // Of an object that is hardly more than border, that must do.
         let depths =
@@ -139,7 +127,7 @@ impl PointToPlaneTerm {
             return Err(RefineError::NoDepth);
         }
         let places: Vec<_> = points.iter().map(|p| p.ray.push(1.0) * p.depth).collect();
-        let field = SmoothField::new(&places, settings.deviation, settings.smoothness);
+        let field = SmoothField::new(&places, settings.gp_sigma, settings.length_scale);
         Ok(Self { object, points, field, patches: None, settings })
     }
 
@@ -171,10 +159,9 @@ impl PointToPlaneTerm {
     fn fit(&self, residuals: &[Option<Residual>]) -> Fit {
         let distance = |r: &Option<Residual>| r.as_ref().map_or(0.0, |r| r.distance);
         let distances: Vec<f64> = residuals.iter().map(distance).collect();
-        let (cauchy, share) = (self.cauchy(), self.share());
+        let weighting = self.weighting();
         let usable = |i: usize| residuals[i].as_ref().is_some_and(|r| r.faces_camera);
-        let weight =
-            |i: usize, left: f64| if usable(i) { share * cauchy.weight(left * left) } else { 0.0 };
+        let weight = |i: usize, left: f64| if usable(i) { weighting.weight(left) } else { 0.0 };
         let fitted = self.field.as_ref().and_then(|field| field.fit(&distances, weight));
         let mut fit = fitted.unwrap_or_else(|| Fit::without_field(&distances, weight));
         // What is not of the surface says nothing of the field either.
@@ -184,19 +171,14 @@ impl PointToPlaneTerm {
         fit
     }
 
-    fn cauchy(&self) -> Cauchy {
-        Cauchy { scale: self.settings.outlier }
-    }
-
     /// Nats at the fitted field.
-    fn cost(&self, fit: &Fit) -> f64 {
-        let cauchy = self.cauchy();
-        self.share() * fit.left.iter().map(|left| cauchy.loss(left * left)).sum::<f64>() + fit.cost
+    fn cost_of(&self, fit: &Fit) -> f64 {
+        let weighting = self.weighting();
+        fit.left.iter().map(|left| weighting.cost(*left)).sum::<f64>() + fit.cost
     }
 
-    /// Nats of one square meter.
-    fn share(&self) -> f64 {
-        share(self.settings.effective_points, self.points.len() as f64, self.settings.sigma)
+    fn weighting(&self) -> Weighting {
+        self.settings.noise.weighting(self.points.len())
     }
 }
 
@@ -210,37 +192,30 @@ fn within(mask: &Mask, [x, y]: [usize; 2], distance: usize) -> bool {
     })
 }
 
-impl Term for PointToPlaneTerm {
+impl Factor for PointToPlaneFactor {
     fn name(&self) -> &'static str {
-        "depth"
+        "point-to-plane"
     }
 
-    fn value(&self, state: &State) -> f64 {
-        self.cost(&self.fit(&self.residuals(state)))
+    fn cost(&self, state: &State) -> f64 {
+        self.cost_of(&self.fit(&self.residuals(state)))
     }
 
-    fn depends_on(&self, _block: Block) -> bool {
-        true
-    }
-
-    fn linearize(&self, state: &State, normal: &mut Normal) -> f64 {
+    fn linearize(&self, state: &State, equations: &mut NormalEquations) -> f64 {
         let residuals = self.residuals(state);
         let fit = self.fit(&residuals);
         let center = state.center();
         let row = |(point, residual): (&Point, &Option<Residual>)| {
             let mut row = [0.0; N];
             let Some(Residual { surface, away, .. }) = residual else { return row };
-            let turn = (surface - center).cross(away);
+            let twist = twist_row(&(surface - center), &-away);
             let camera = state.camera.point_jacobian(&point.ray, point.depth).tr_mul(away);
-            for k in 0..3 {
-                (row[k], row[3 + k]) = (-away[k], -turn[k]);
-            }
+            row[..6].copy_from_slice(twist.as_slice());
             row[6..].copy_from_slice(camera.as_slice());
             row
         };
         let rows: Vec<[f64; N]> = self.points.iter().zip(&residuals).map(row).collect();
-        let patches = self.patches.as_ref();
-        let patches = patches.filter(|p| normal.offset(Block::SurfacePatches(p.count())).is_some());
+        let patches = self.patches.as_ref().filter(|_| equations.auxiliary() > 0);
         let count = patches.map_or(0, |patches| patches.count());
         let patch = |i: usize| {
             let (column, row) = self.points[i].pixel;
@@ -262,59 +237,59 @@ impl Term for PointToPlaneTerm {
             };
             hessian -= field.lost(&fit, hessian.nrows(), derivatives);
         }
-        let blocks = [Block::ObjectPose, Block::Camera, Block::SurfacePatches(count)];
-        normal.add_dynamic(&blocks, &gradient, &hessian);
-        self.cost(&fit)
+        add_to(equations, &gradient, &hessian);
+        self.cost_of(&fit)
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::gradient_check::{assert_by_patches, assert_gradient, fixture, patches};
+    use super::super::gradient_check::{
+        assert_by_patches, assert_gradient, fixture, patches, scene,
+    };
     use super::*;
+    use crate::problem::Block;
+
+    /// With a smooth field of this standard deviation \[m\].
+    fn factor(frame: &Frame<'_>, gp_sigma: f64) -> PointToPlaneFactor {
+        let settings = PointToPlaneSettings { gp_sigma, ..Default::default() };
+        PointToPlaneFactor::new(frame, &settings).unwrap()
+    }
 
     #[test]
     fn gradients_match_differences() {
         for seed in 0..3 {
-            let (scene, mut state, hand) = fixture(seed);
+            let (frame, mut state) = fixture(seed);
             state.camera = state.camera.changed(&[2e-3, 1e-3, 1e-3, -1e-3, 2e-3]);
-            let check = |state: &State, deviation: f64| {
-                let settings = PointToPlaneSettings { deviation, ..Default::default() };
-                let (observation, object) = (&scene.observation, Arc::clone(&scene.object));
-                let term = PointToPlaneTerm::new(observation, object, &hand, settings).unwrap();
+            let check = |state: &State, gp_sigma: f64| {
                 for block in [Block::ObjectPose, Block::Camera] {
                     // What the few points pull that were matched with faces that look away is left out.
-                    assert_gradient(&term, state, block, 1e-8, 0.03);
+                    assert_gradient(&factor(&frame, gp_sigma), state, block, 1e-8, 0.03);
                 }
             };
             check(&state, 0.0);
             // Near the truth, where a field may account for what is left.
-            let near = State { t_cam_object: scene.truth, ..state };
+            let near = State { t_cam_object: scene().truth, ..state };
             let twist = [1e-3, -2e-3, 1e-3, 0.02, -0.01, 0.01];
-            check(&near.moved(Block::ObjectPose, &twist), 1e-3);
+            check(&near.retract(&[Block::ObjectPose], &twist), 1e-3);
         }
     }
 
     #[test]
     fn patches_share_what_the_object_has() {
-        let (scene, state, hand) = fixture(1);
+        let (frame, state) = fixture(1);
         let patches = patches(2);
-        for deviation in [0.0, 1e-3] {
-            let settings = PointToPlaneSettings { deviation, ..Default::default() };
-            let object = Arc::clone(&scene.object);
-            let term = PointToPlaneTerm::new(&scene.observation, object, &hand, settings).unwrap();
-            let term = term.with_patches(Arc::clone(&patches));
-            assert_by_patches(&term, &state, &patches, 1e-9);
+        for gp_sigma in [0.0, 1e-3] {
+            let factor = factor(&frame, gp_sigma).with_patches(Arc::clone(&patches));
+            assert_by_patches(&factor, &state, &patches, 1e-9);
         }
     }
 
     #[test]
     fn the_truth_is_near_the_minimum() {
-        let (scene, state, hand) = fixture(0);
-        let object = Arc::clone(&scene.object);
-        let settings = PointToPlaneSettings::default();
-        let term = PointToPlaneTerm::new(&scene.observation, object, &hand, settings).unwrap();
-        let truth = State { t_cam_object: scene.truth, ..state.clone() };
-        assert!(term.value(&truth) < 0.3 * term.value(&state));
+        let (frame, state) = fixture(0);
+        let factor = factor(&frame, 0.0);
+        let truth = State { t_cam_object: scene().truth, ..state.clone() };
+        assert!(factor.cost(&truth) < 0.3 * factor.cost(&state));
     }
 }

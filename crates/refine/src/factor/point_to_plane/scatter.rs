@@ -2,19 +2,19 @@
 
 use crate::problem::State;
 
-use super::{PointToPlaneTerm, Residual};
+use super::{PointToPlaneFactor, Residual};
 
 /// How depth points scatter about a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NoiseEstimate {
     /// Standard deviation of a point \[m\].
     pub sigma: f64,
-    /// The part of it that the points of a patch have in common \[m\].
-    pub shared: f64,
-    /// The part that is each point's own \[m\].
-    pub own: f64,
+    /// The part of it that neighboring points have in common \[m\].
+    pub correlated: f64,
+    /// The part that is independent from point to point \[m\].
+    pub independent: f64,
     /// How many independent measurements the points amount to.
-    pub effective_points: f64,
+    pub effective_samples: f64,
 }
 
 /// Patches that the mask's bounding box is cut into, about, to judge how alike the errors of neighbors are.
@@ -32,12 +32,12 @@ struct Patch {
     squares: f64,
 }
 
-impl PointToPlaneTerm {
+impl PointToPlaneFactor {
     /// How the points scatter about the surface at `state`, which should be the best there is; `None` if there are too few.
     ///
     /// Where errors are alike within patches, their means scatter more than means of independent errors would: so many patches as
     /// there are, and as many measurements a patch as the variance of the means is smaller than that of the points.
-    pub fn scatter(&self, state: &State) -> Option<NoiseEstimate> {
+    pub fn noise_estimate(&self, state: &State) -> Option<NoiseEstimate> {
         let pixels = || self.points.iter().map(|point| point.pixel);
         let (left, right) = (pixels().map(|p| p.0).min()?, pixels().map(|p| p.0).max()?);
         let (top, bottom) = (pixels().map(|p| p.1).min()?, pixels().map(|p| p.1).max()?);
@@ -46,7 +46,7 @@ impl PointToPlaneTerm {
         let patch = |from: usize, to: usize| ((to - from) as f64 / side) as usize;
         let across = patch(left, right) + 1;
         let mut patches = vec![Patch::default(); across * (patch(top, bottom) + 1)];
-        let limit = self.settings.outlier;
+        let limit = self.settings.noise.kernel.scale().unwrap_or(f64::INFINITY);
         for (point, residual) in self.points.iter().zip(self.residuals(state)) {
             let Some(Residual { distance, faces_camera: true, .. }) = residual else { continue };
             let residual = distance.clamp(-limit, limit);
@@ -68,9 +68,9 @@ impl PointToPlaneTerm {
         Some(NoiseEstimate {
             sigma: of_points.sqrt(),
             // Means of a few points scatter even if these have nothing in common.
-            shared: (of_means - own * number / total).max(0.0).sqrt(),
-            own: own.sqrt(),
-            effective_points: (number * of_points / of_means).min(count),
+            correlated: (of_means - own * number / total).max(0.0).sqrt(),
+            independent: own.sqrt(),
+            effective_samples: (number * of_points / of_means).min(count),
         })
     }
 }

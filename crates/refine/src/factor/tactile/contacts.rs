@@ -1,11 +1,12 @@
 //! Where a skin is touched: taxels that feel force together.
 
 use nalgebra::{Point3, Vector3};
-use prehend_geometry::DistanceField;
 use prehend_geometry::hand::Taxel;
 use prehend_geometry::robot::RobotShape;
+use prehend_geometry::{DistanceField, RobustKernel};
 
 use super::Probe;
+use crate::problem::Weighting;
 use crate::scene::Hand;
 
 /// How touched taxels become contacts.
@@ -17,15 +18,15 @@ pub struct ContactSettings {
     /// Standard deviation of the object's surface from the skin where it is touched \[m\]: the skin's compliance, the coarseness of
     /// its taxels, and how far the object is off from its model.
     pub sigma: f64,
-    /// Distance at which a contact counts as an outlier \[m\].
-    pub outlier: f64,
+    /// Width of Cauchy's kernel, which forgives contacts far from the surface \[m\].
+    pub kernel_width: f64,
     /// A contact of this force \[N\] counts half: taxels that ring false feel less.
     pub force: f64,
 }
 
 impl Default for ContactSettings {
     fn default() -> Self {
-        Self { reach: 8e-3, sigma: 1.8e-3, outlier: 3e-3, force: 2.0 }
+        Self { reach: 8e-3, sigma: 1.8e-3, kernel_width: 3e-3, force: 2.0 }
     }
 }
 
@@ -66,8 +67,10 @@ pub(super) fn contacts(
                 link: group[0].link,
                 position: on_skin(robot, group[0].link, center),
                 touched: true,
-                weight: trust / settings.sigma.powi(2),
-                outlier: settings.outlier,
+                weighting: Weighting {
+                    information: trust / settings.sigma.powi(2),
+                    kernel: RobustKernel::Cauchy { scale: settings.kernel_width },
+                },
             }
         })
         .collect()
@@ -105,20 +108,20 @@ fn on_skin(robot: &Hand, link: usize, point: Point3<f64>) -> Point3<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::gradient_check::fixture;
+    use super::super::super::gradient_check::scene;
     use super::*;
     use crate::scene::Scene;
 
     fn found(scene: &Scene, forces: &[Vector3<f64>]) -> Vec<Probe> {
-        let taxels = scene.robot.taxels.iter();
-        let links: Vec<usize> = taxels.map(|t| scene.robot.link_of(t).unwrap()).collect();
-        contacts(&scene.robot, &links, forces, 0.1, &ContactSettings::default())
+        let taxels = scene.hand.taxels.iter();
+        let links: Vec<usize> = taxels.map(|t| scene.hand.link_of(t).unwrap()).collect();
+        contacts(&scene.hand, &links, forces, 0.1, &ContactSettings::default())
     }
 
     #[test]
     fn a_press_is_found_where_it_is() {
-        let (scene, _, _) = fixture(0);
-        let taxels = &scene.robot.taxels;
+        let scene = scene();
+        let taxels = &scene.hand.taxels;
         // In the middle of four taxels of a flat pad, each of which bears a quarter.
         let pad: Vec<&Taxel> = taxels.iter().filter(|t| t.patch == "11").collect();
         let corner = pad[5];
@@ -138,13 +141,13 @@ mod tests {
         assert!(lifted.coords.cross(&corner.normal).norm() < 1e-4, "{lifted}");
         // Four newtons count four fifths with half at two.
         let full = ContactSettings::default().sigma.powi(-2);
-        assert!((contact.weight / full - 0.8).abs() < 1e-12);
+        assert!((contact.weighting.information / full - 0.8).abs() < 1e-12);
     }
 
     #[test]
     fn presses_apart_are_apart_and_weak_ones_hardly_count() {
-        let (scene, _, _) = fixture(0);
-        let taxels = &scene.robot.taxels;
+        let scene = scene();
+        let taxels = &scene.hand.taxels;
         let first = |patch: &str| taxels.iter().position(|t| t.patch == patch).unwrap();
         let mut forces = vec![Vector3::zeros(); taxels.len()];
         // The first and the last of a pad, and one on another finger that rings false.
@@ -153,14 +156,14 @@ mod tests {
         forces[first("33")] = Vector3::new(0.2, 0.0, 0.0);
         let contacts = found(scene, &forces);
         assert_eq!(contacts.len(), 3);
-        assert!(contacts[2].weight < 0.02 * contacts[0].weight);
+        assert!(contacts[2].weighting.information < 0.02 * contacts[0].weighting.information);
     }
 
     #[test]
     fn contacts_of_a_grasp_lie_on_the_object() {
-        let (scene, _, _) = fixture(0);
+        let scene = scene();
         let hand = scene.observation.hand.as_ref().unwrap();
-        let posed = scene.robot.posed(&hand.t_cam_hand, &hand.joints).unwrap();
+        let posed = scene.hand.posed(&hand.t_cam_hand, &hand.joints).unwrap();
         let contacts = found(scene, &hand.forces);
         assert!(contacts.len() >= 3);
         for contact in contacts {

@@ -1,71 +1,60 @@
-//! Mesh-to-tactile: taxels that feel force touch the object, quiet taxels do not reach into it.
+//! Touch: taxels that feel force touch the object, inactive taxels are not inside it.
 
 mod contacts;
 
 use std::sync::Arc;
 
-use nalgebra::{Point3, Vector3, Vector6};
+use nalgebra::{Point3, Vector3};
 use prehend_geometry::hand::Taxel;
 use prehend_geometry::robot::ArticulatedRobot;
 
 pub use self::contacts::ContactSettings;
 use self::contacts::contacts;
-use super::{Term, share};
 use crate::error::RefineError;
-use crate::problem::{Block, Cauchy, Normal, State};
-use crate::scene::{Hand, Object, Observation};
+use crate::problem::{Block, Factor, NoiseModel, Rows, State, Weighting};
+use crate::scene::{Frame, Hand, Object};
 
 /// What taxels that feel force say.
 #[derive(Clone, Debug, PartialEq)]
 pub enum TouchModel {
     /// Nothing: they are as good as dead.
     Nothing,
-    /// Each that it is near the surface, as in the paper.
-    Taxels {
-        /// Standard deviation of a touched taxel from the object's surface \[m\]: a contact spreads over
-        /// the taxels around it, so a touched taxel may itself be a few millimeters away.
-        sigma: f64,
-        /// How many independent measurements they amount to at most: one contact lights up a whole patch.
-        effective: f64,
-        /// Distance at which one counts as an outlier (a false one) \[m\].
-        outlier: f64,
-    },
+    /// Each that it is near the surface, as in the paper. A contact spreads over the taxels around it, so that a touched taxel may be
+    /// a few millimeters away, and one contact lights up a whole patch.
+    Taxels(NoiseModel),
     /// Neighbors together that the skin touches the surface at their center of force.
     Contacts(ContactSettings),
 }
 
-/// Settings of the mesh-to-tactile term.
+/// Settings of [`TactileFactor`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct TactileSettings {
     /// Force above which a taxel counts as touched, the paper's γ \[N\].
     pub contact_threshold: f64,
     /// What touched taxels say.
-    pub felt: TouchModel,
-    /// Standard deviation of how deep a quiet taxel may lie inside the object \[m\].
-    pub no_contact_sigma: f64,
-    /// Depth at which a quiet taxel counts as an outlier (a dead one) \[m\].
-    pub quiet_outlier: f64,
+    pub touch: TouchModel,
+    /// Depths of inactive taxels inside the object \[m\]; the dead ones are outliers.
+    pub no_contact: NoiseModel,
 }
 
 impl Default for TactileSettings {
     fn default() -> Self {
         Self {
             contact_threshold: 0.1,
-            felt: TouchModel::Taxels { sigma: 3e-3, effective: 8.0, outlier: 10e-3 },
-            no_contact_sigma: 1e-3,
-            quiet_outlier: 10e-3,
+            touch: TouchModel::Taxels(NoiseModel::cauchy(3e-3, 10e-3, 8.0)),
+            no_contact: NoiseModel::cauchy(1e-3, 10e-3, f64::INFINITY),
         }
     }
 }
 
 impl TactileSettings {
-    /// With outliers only from `factor` times their limits on.
-    pub(crate) fn forgiving(mut self, factor: f64) -> Self {
-        self.quiet_outlier *= factor;
-        match &mut self.felt {
+    /// With kernels `factor` times as wide.
+    pub(crate) fn widened(mut self, factor: f64) -> Self {
+        self.no_contact = self.no_contact.widened(factor);
+        match &mut self.touch {
             TouchModel::Nothing => {}
-            TouchModel::Taxels { outlier, .. } => *outlier *= factor,
-            TouchModel::Contacts(contacts) => contacts.outlier *= factor,
+            TouchModel::Taxels(noise) => *noise = noise.widened(factor),
+            TouchModel::Contacts(contacts) => contacts.kernel_width *= factor,
         }
         self
     }
@@ -78,192 +67,138 @@ struct Probe {
     position: Point3<f64>,
     /// Whether it is on the surface; else it is not inside.
     touched: bool,
-    /// Nats of half a square meter.
-    weight: f64,
-    /// Distance at which it counts as an outlier \[m\].
-    outlier: f64,
+    weighting: Weighting,
 }
 
-impl Probe {
-    fn cauchy(&self) -> Cauchy {
-        Cauchy { scale: self.outlier }
-    }
-}
-
-/// The paper's distance between the mesh and the taxels in contact, or that of whole contacts ([`TouchModel`]), and the evidence of the other taxels.
+/// The paper's distance between the mesh and the taxels in contact, or that of whole contacts ([`TouchModel`]), and the evidence of the
+/// other taxels.
 ///
-/// What is touched is drawn to the surface from either side; quiet taxels are pushed out of it, which the
-/// paper leaves unused. Both go through Cauchy's loss, because some taxels are dead and some ring false.
-pub struct TactileTerm {
+/// What is touched is drawn to the surface from either side; inactive taxels are pushed out of it, which the
+/// paper leaves unused. Both have Cauchy's kernel, because some taxels are dead and some report false forces.
+pub struct TactileFactor {
     object: Arc<Object>,
-    robot: Arc<Hand>,
+    hand: Arc<Hand>,
     probes: Vec<Probe>,
 }
 
-impl TactileTerm {
-    /// Reads the taxels of `robot` from `observation`.
+/// Where a probe is.
+struct Measured {
+    /// From the surface, positive outside \[m\].
+    distance: f64,
+    /// Outward direction (camera frame).
+    outward: Vector3<f64>,
+    /// The probe (camera frame).
+    point: Point3<f64>,
+}
+
+impl TactileFactor {
+    /// Of the taxels of `frame`.
     ///
     /// # Errors
     /// If the hand is unknown, or its forces are not one a taxel.
-    pub fn new(
-        observation: &Observation,
-        object: Arc<Object>,
-        robot: Arc<Hand>,
-        settings: &TactileSettings,
-    ) -> Result<Self, RefineError> {
-        let hand = observation
-            .hand
-            .as_ref()
-            .ok_or(RefineError::Missing { what: "hand state", term: "tactile" })?;
-        robot.check_forces(&hand.forces)?;
-        robot.check_joints(&hand.joints)?;
-        let links = robot.taxels.iter().map(|taxel| robot.link_of(taxel));
+    pub fn new(frame: &Frame<'_>, settings: &TactileSettings) -> Result<Self, RefineError> {
+        let (hand, measured) = frame.require_hand("tactile")?;
+        hand.check_forces(&measured.forces)?;
+        let links = hand.taxels.iter().map(|taxel| hand.link_of(taxel));
         let links = links.collect::<Result<Vec<usize>, _>>()?;
-        let probes = probes(&robot, &links, &hand.forces, settings);
-        Ok(Self { object, robot, probes })
+        let probes = probes(hand, &links, &measured.forces, settings);
+        Ok(Self { object: Arc::clone(frame.object()), hand: Arc::clone(hand), probes })
     }
 
-    /// Calls `f` with each probe that matters. A hand that cannot be posed says nothing.
-    fn residuals(&self, state: &State, mut f: impl FnMut(&ArticulatedRobot, &Probe, Residual)) {
-        let Ok(hand) = self.robot.articulated(&state.t_cam_hand, &state.joints) else { return };
-        let t_object_cam = state.t_cam_object.inverse();
-        let reach = self.object.radius;
-        for probe in &self.probes {
-            let point = hand.posed().t_world_links()[probe.link] * probe.position;
-            let local = t_object_cam * point;
-            // Far outside everything a quiet taxel says nothing, and no exact distance is needed.
-            if !probe.touched && (local - self.object.center).norm() > reach {
-                continue;
-            }
-            let (distance, closest) = self.object.surface.signed_distance(&local);
-            if !probe.touched && distance >= 0.0 {
-                continue;
-            }
-            let along = (local - closest.point) * distance.signum();
-            let gradient =
-                along.try_normalize(1e-12).map_or_else(Vector3::zeros, |n| state.t_cam_object * n);
-            f(&hand, probe, Residual { distance, gradient, point });
+    /// Where `probe` is, if that costs anything.
+    fn measure(&self, state: &State, hand: &ArticulatedRobot, probe: &Probe) -> Option<Measured> {
+        let point = hand.posed().t_world_links()[probe.link] * probe.position;
+        let local = state.t_cam_object.inverse_transform_point(&point);
+        // Far outside everything an inactive taxel costs nothing, and no exact distance is needed.
+        if !probe.touched && (local - self.object.center).norm() > self.object.radius {
+            return None;
         }
+        let (distance, closest) = self.object.surface.signed_distance(&local);
+        if !probe.touched && distance >= 0.0 {
+            return None;
+        }
+        let along = (local - closest.point) * distance.signum();
+        let outward =
+            along.try_normalize(1e-12).map_or_else(Vector3::zeros, |n| state.t_cam_object * n);
+        Some(Measured { distance, outward, point })
     }
 }
 
 /// What taxels on `links` that feel `forces` say of where they are.
 fn probes(
-    robot: &Hand,
+    hand: &Hand,
     links: &[usize],
     forces: &[Vector3<f64>],
     settings: &TactileSettings,
 ) -> Vec<Probe> {
     let is_touched = |force: &Vector3<f64>| force.norm() > settings.contact_threshold;
-    let all = || robot.taxels.iter().zip(links).zip(forces);
     // A force that is not a number is no silence.
-    let is_quiet = |force: &Vector3<f64>| force.norm() <= settings.contact_threshold;
-    let quiet = all().filter(|(_, force)| is_quiet(force)).map(|((taxel, link), _)| Probe {
+    let is_inactive = |force: &Vector3<f64>| force.norm() <= settings.contact_threshold;
+    let all = || hand.taxels.iter().zip(links).zip(forces);
+    let probe = |(taxel, link): (&Taxel, &usize), touched, weighting| Probe {
         link: *link,
         position: taxel.position,
-        touched: false,
-        weight: settings.no_contact_sigma.powi(-2),
-        outlier: settings.quiet_outlier,
-    });
-    let mut probes: Vec<Probe> = match &settings.felt {
+        touched,
+        weighting,
+    };
+    let mut probes: Vec<Probe> = match &settings.touch {
         TouchModel::Nothing => Vec::new(),
-        TouchModel::Taxels { sigma, effective, outlier } => {
+        TouchModel::Taxels(noise) => {
             let touched = all().filter(|(_, force)| is_touched(force));
-            let weight = share(*effective, touched.clone().count().max(1) as f64, *sigma);
-            let probe = |((taxel, link), _): ((&Taxel, &usize), _)| Probe {
-                link: *link,
-                position: taxel.position,
-                touched: true,
-                weight,
-                outlier: *outlier,
-            };
-            touched.map(probe).collect()
+            let weighting = noise.weighting(touched.clone().count());
+            touched.map(|(taxel, _)| probe(taxel, true, weighting)).collect()
         }
         TouchModel::Contacts(contact) => {
-            contacts(robot, links, forces, settings.contact_threshold, contact)
+            contacts(hand, links, forces, settings.contact_threshold, contact)
         }
     };
-    probes.extend(quiet);
+    let inactive = all().filter(|(_, force)| is_inactive(force));
+    let weighting = settings.no_contact.weighting(inactive.clone().count());
+    probes.extend(inactive.map(|(taxel, _)| probe(taxel, false, weighting)));
     probes
 }
 
-/// Where a probe is.
-struct Residual {
-    /// From the surface, positive outside \[m\].
-    distance: f64,
-    /// Its derivative by the probe's place: the outward direction (camera frame).
-    gradient: Vector3<f64>,
-    /// The probe (camera frame).
-    point: Point3<f64>,
-}
-
-impl Term for TactileTerm {
+impl Factor for TactileFactor {
     fn name(&self) -> &'static str {
         "tactile"
     }
 
-    fn value(&self, state: &State) -> f64 {
-        let mut value = 0.0;
-        self.residuals(state, |_, probe, r| {
-            value += probe.weight * probe.cauchy().loss(r.distance.powi(2))
-        });
-        value
-    }
-
-    fn linearize(&self, state: &State, normal: &mut Normal) -> f64 {
-        let center = state.center();
-        let mut value = 0.0;
+    /// A hand that cannot be posed costs nothing.
+    fn rows(&self, state: &State, rows: &mut Rows<'_>) {
+        let Ok(hand) = self.hand.articulated(&state.t_cam_hand, &state.joints) else { return };
         let mut joints = vec![0.0; state.joints.len()];
-        self.residuals(state, |hand, probe, r| {
-            let squared = r.distance.powi(2);
-            value += probe.weight * probe.cauchy().loss(squared);
-            let n = r.gradient;
-            let turn = (r.point.coords - center).cross(&n);
-            // Only where the taxels are relative to the object matters: moving the object by a twist is
-            // moving the hand by its opposite.
-            let of_hand = Vector6::new(n.x, n.y, n.z, turn.x, turn.y, turn.z);
-            let of_object = -of_hand;
-            joints.fill(0.0);
-            for (joint, velocity) in hand.point_jacobian(probe.link, &r.point) {
-                joints[joint] += n.dot(&velocity);
-            }
-            let row = [
-                (Block::ObjectPose, of_object.as_slice()),
-                (Block::HandPose, of_hand.as_slice()),
-                (Block::Joints(joints.len()), joints.as_slice()),
-            ];
-            normal.add_row(&row, r.distance, probe.weight * probe.cauchy().weight(squared));
-        });
-        value
+        for probe in &self.probes {
+            let Some(measured) = self.measure(state, &hand, probe) else { continue };
+            let Measured { distance, outward, point } = measured;
+            rows.add(distance, &probe.weighting, |row| {
+                // The taxel moves with the hand.
+                row.relative_point(state, &point, &-outward);
+                joints.fill(0.0);
+                for (joint, velocity) in hand.point_jacobian(probe.link, &point) {
+                    joints[joint] += outward.dot(&velocity);
+                }
+                row.block(Block::Joints(joints.len()), &joints);
+            });
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::gradient_check::{assert_gradient, fixture};
+    use super::super::gradient_check::{assert_gradient, fixture, scene};
     use super::*;
-
-    fn term(
-        observation: &Observation,
-        settings: &TactileSettings,
-    ) -> Result<TactileTerm, RefineError> {
-        let (scene, _, _) = fixture(0);
-        let object = Arc::clone(&scene.object);
-        let robot = Arc::clone(&scene.robot);
-        TactileTerm::new(observation, object, robot, settings)
-    }
 
     #[test]
     fn gradients_match_differences() {
         let default = TactileSettings::default();
         let contacts = TouchModel::Contacts(ContactSettings::default());
-        for felt in [default.felt.clone(), contacts] {
-            let settings = TactileSettings { felt, ..default.clone() };
+        for touch in [default.touch.clone(), contacts] {
+            let settings = TactileSettings { touch, ..default.clone() };
             for seed in 0..3 {
-                let (scene, state, _) = fixture(seed);
-                let term = term(&scene.observation, &settings).unwrap();
+                let (frame, state) = fixture(seed);
+                let factor = TactileFactor::new(&frame, &settings).unwrap();
                 for block in [Block::ObjectPose, Block::HandPose, Block::Joints(16)] {
-                    assert_gradient(&term, &state, block, 1e-7, 1e-4);
+                    assert_gradient(&factor, &state, block, 1e-7, 1e-4);
                 }
             }
         }
@@ -271,15 +206,18 @@ mod tests {
 
     #[test]
     fn forces_must_fit_the_skin() {
-        let (scene, _, _) = fixture(0);
+        let scene = scene();
         let mut observation = scene.observation.clone();
+        let settings = TactileSettings::default();
         if let Some(hand) = &mut observation.hand {
             hand.forces.pop();
         }
-        let settings = TactileSettings::default();
-        let error = term(&observation, &settings).err().unwrap().to_string();
+        let frame = Frame::new(&observation, &scene.object, Some(&scene.hand)).unwrap();
+        let error = TactileFactor::new(&frame, &settings).err().unwrap().to_string();
         assert_eq!(error, "367 taxel forces were given for 368 taxels");
         observation.hand = None;
-        assert!(matches!(term(&observation, &settings), Err(RefineError::Missing { .. })));
+        let frame = Frame::new(&observation, &scene.object, Some(&scene.hand)).unwrap();
+        let refused = TactileFactor::new(&frame, &settings);
+        assert!(matches!(refused, Err(RefineError::Missing { .. })));
     }
 }

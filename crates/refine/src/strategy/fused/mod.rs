@@ -1,185 +1,84 @@
 //! The fused estimator: all evidence in one robust nonlinear least-squares problem.
 
-mod confidence;
-mod evidence;
-mod exactness;
-mod factor;
+mod calibration_test;
+mod factors;
+mod hypotheses;
+mod posterior;
 mod settings;
-mod solve;
 mod summary;
 #[cfg(test)]
 mod tests;
 
+use std::fmt;
+use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use nalgebra::Translation3;
-use prehend_autodiff::lie::so3_log;
+use prehend_autodiff::optimize::LeastSquares;
 use rayon::prelude::*;
 
-pub use self::confidence::{
+use self::factors::depth_noise;
+pub(crate) use self::factors::{problem_of, surface_patches};
+use self::hypotheses::{distinct, restarts, settled, spread};
+pub(crate) use self::posterior::chi_square_z;
+pub use self::posterior::{
     CovarianceInflation, Hypothesis, Inconsistency, Posterior, UnobservableDirection,
 };
-pub(crate) use self::confidence::{RIDGE, chi_square_z};
-pub(crate) use self::evidence::FrameContext;
-pub(crate) use self::factor::Factor;
-pub use self::settings::{Evidence, FusedSettings, Nuisance, Stage};
-pub use self::solve::Termination;
-pub(crate) use self::solve::{Point, Problem};
+pub use self::settings::{FusedSettings, Modality, Nuisance, Stage};
 pub use self::summary::PosteriorSummary;
+use super::estimate::Recorder;
+use super::{Estimate, Iteration, Observer, Strategy};
 use crate::error::RefineError;
-use crate::factor::NoiseEstimate;
-use crate::problem::{Block, State};
-use crate::scene::{Hand, Object, Observation};
-use crate::strategy::{Iteration, Trace};
+use crate::problem::{Factor, Linearization, Problem, Solution, State, Termination};
+use crate::scene::Frame;
 
 /// Gauss–Newton on all evidence at once, with the quantities that are not known exactly estimated beside the pose.
 ///
-/// Terms are negative log-likelihoods, so their sum is that of the posterior, up to a constant. From coarse to fine: small
-/// images and tolerant losses first.
+/// Factors are negative log-likelihoods, so their sum is that of the posterior, up to a constant. From coarse to fine: small
+/// images and wide kernels first. Factors of one's own join all stages:
+///
+/// ```
+/// # use prehend_refine::problem::{Factor, NoiseModel, Rows, State};
+/// # struct Height;
+/// # impl Factor for Height {
+/// #     fn name(&self) -> &'static str { "height" }
+/// # }
+/// use prehend_refine::strategy::Fused;
+///
+/// let fused = Fused::default().with(Height);
+/// ```
+#[derive(Clone, Default)]
 pub struct Fused {
     /// Settings.
     pub settings: FusedSettings,
+    /// Factors of one's own.
+    pub factors: Vec<Arc<dyn Factor>>,
 }
 
 impl Fused {
-    /// Walks from `initial`, calling `visit` with the best pose after every stage; ends when that returns false.
-    ///
-    /// # Errors
-    /// If the observation or the settings are at fault.
-    pub fn run(
-        &self,
-        observation: &Observation,
-        object: &Arc<Object>,
-        robot: Option<&Arc<Hand>>,
-        initial: State,
-        mut visit: impl FnMut(&State, &Iteration) -> bool,
-    ) -> Result<(Trace, Posterior), RefineError> {
-        let mut settings = self.settings.clone();
-        if settings.stages.is_empty() {
-            return Err(RefineError::Setting { name: "stages", problem: "are missing".into() });
-        }
-        let known = FrameContext::new(observation, object, robot)?;
-        let mut states = self.starts(&initial);
-        let mut trace = Trace::new(["posterior"].into_iter());
-        let mut found = Vec::new();
-        let mut go_on = true;
-        let mut step = |point: &Point, trace: &mut Trace| {
-            let index = trace.iterations.len();
-            let values = vec![point.value];
-            let iteration = Iteration { index, values, weights: vec![1.0], step: 0.0 };
-            let go_on = visit(&point.state, &iteration);
-            trace.iterations.push(iteration);
-            go_on
-        };
-        for (index, stage) in self.settings.stages.iter().enumerate() {
-            let patches = known.patches(&initial, stage, &settings);
-            if stage.measured_scatter
-                && let Some(scatter) = known.scatter(&states[0], &self.settings)
-            {
-                settings.depth.sigma = scatter.own.clamp(FINEST, COARSEST);
-                // The model's part of it is what patches are off by.
-                let model = patches.as_ref().map_or(0.0, |_| settings.model.deviation);
-                let shared = (scatter.shared.powi(2) - model.powi(2)).max(0.0).sqrt();
-                settings.depth.deviation = shared.min(COARSEST);
-                settings.depth.effective_points = settings.max_effective_samples;
-            }
-            let problem = known.problem(&initial, stage, &settings, patches)?;
-            let solve_from = |state: &State| {
-                let start = problem.at(state.clone());
-                problem.solve(start, stage.iterations, stage.min_decrease, |_| true)
-            };
-            states.truncate(stage.hypotheses.max(1));
-            let solve_all =
-                |states: &[State]| states.par_iter().map(solve_from).collect::<Vec<_>>();
-            found = if index == 0 {
-                let first = solve_from(&states[0]);
-                let scatter = || known.scatter(&first.0.state, &self.settings);
-                let others =
-                    if settled(&first.0, scatter, object.radius) { 1 } else { states.len() };
-                let mut all = solve_all(&states[1..others]);
-                all.insert(0, first);
-                all
-            } else {
-                solve_all(&states)
-            };
-            found = distinct(found, object.radius);
-            // Not by the first stage, which sees no colors.
-            if index > 0 {
-                let limit = found[0].0.value + settings.prune_margin;
-                // One that is still on its way down is not judged yet, and the best stays whatever its value.
-                let mut best = true;
-                found.retain(|(point, ending)| {
-                    let kept = best || *ending == Termination::Iterations || point.value <= limit;
-                    best = false;
-                    kept
-                });
-            }
-            states = found.iter().map(|(point, _)| point.state.clone()).collect();
-            if index == 0
-                && let Some(next) = settings.stages.get(1)
-            {
-                // Where it is, geometry finds well; how it is turned, colors may say better from where they were told. And
-                // what little is seen of the object may have led astray.
-                let mut turned_back = states[0].clone();
-                let moved = states[0].center() - initial.center();
-                states.truncate(KEPT.min(next.hypotheses.saturating_sub(2).max(1)));
-                turned_back.t_cam_object = Translation3::from(moved) * initial.t_cam_object;
-                states.extend([turned_back, initial.clone()]);
-                let more = next.hypotheses.saturating_sub(states.len());
-                let point = &found[0].0;
-                states.extend(spread(point, &initial, settings.spread, object.radius, more));
-            }
-            go_on = step(&found[0].0, &mut trace);
-            if !go_on {
-                break;
-            }
-        }
-        let odds = || exactness::log_odds_of_exact(&found[0].0);
-        let exact =
-            go_on && settings.exactness && odds().is_some_and(|odds| odds > exactness::EXACT);
-        if exact {
-            let last = &self.settings.stages[self.settings.stages.len() - 1];
-            let as_said = |(point, _): &(Point, Termination)| State {
-                t_cam_hand: initial.t_cam_hand,
-                joints: initial.joints.clone(),
-                camera: initial.camera,
-                ..point.state.clone()
-            };
-            states = found.iter().map(as_said).collect();
-            // Then depth's errors are not alike over whole patches either.
-            settings.depth.deviation = 0.0;
-            if let Some(scatter) = known.scatter(&states[0], &self.settings) {
-                settings.depth.sigma = scatter.sigma.clamp(FINEST, COARSEST);
-                settings.depth.effective_points = scatter.effective_points;
-            }
-            let problem = Problem {
-                blocks: vec![Block::ObjectPose],
-                ..known.problem(&initial, last, &settings, None)?
-            };
-            let solve_from = |state: &State| {
-                let start = problem.at(state.clone());
-                problem.solve(start, last.iterations, last.min_decrease, |_| true)
-            };
-            found = distinct(states.par_iter().map(solve_from).collect(), object.radius);
-            step(&found[0].0, &mut trace);
-        }
-        Ok((trace, Posterior::new(&found, settings.width, object.radius, exact, None)))
+    /// With these settings.
+    pub fn new(settings: FusedSettings) -> Self {
+        Self { settings, factors: Vec::new() }
     }
 
-    /// The initial state and those it is turned to.
-    fn starts(&self, initial: &State) -> Vec<State> {
-        let mut starts = vec![initial.clone()];
-        let angle = self.settings.turns;
-        if angle > 0.0 {
-            for axis in 0..3 {
-                for turn in [angle, -angle] {
-                    let mut twist = [0.0; 6];
-                    twist[3 + axis] = turn;
-                    starts.push(initial.moved(Block::ObjectPose, &twist));
-                }
-            }
-        }
-        starts
+    /// With a factor of one's own.
+    pub fn with(self, factor: impl Factor + 'static) -> Self {
+        self.with_shared(Arc::new(factor))
+    }
+
+    /// With a factor that others have, too.
+    pub fn with_shared(mut self, factor: Arc<dyn Factor>) -> Self {
+        self.factors.push(factor);
+        self
+    }
+}
+
+impl fmt::Debug for Fused {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Fused")
+            .field("settings", &self.settings)
+            .field("factors", &self.factors.iter().map(|factor| factor.name()).collect::<Vec<_>>())
+            .finish()
     }
 }
 
@@ -190,63 +89,171 @@ const COARSEST: f64 = 3e-3;
 /// Solutions of geometry alone that are taken up: where they differ, starts spread about them say more than they do.
 const KEPT: usize = 4;
 
-/// How wide the posterior may be in any direction \[m of surface motion\], and how far depth points may be from the surface \[m\],
-/// for a first solution that needs no others beside it.
-const SETTLED_WIDTH: f64 = 6e-3;
-const SETTLED_SCATTER: f64 = 1.5e-3;
-
-/// Surface motion between poses that are the same solution \[m\].
-const SAME: f64 = 2e-3;
-
-/// Whether `point` leaves no direction open and the surface lies where depth was measured.
-fn settled(point: &Point, scatter: impl FnOnce() -> Option<NoiseEstimate>, radius: f64) -> bool {
-    let widest = confidence::principal_directions(point, radius)[0].1;
-    widest < SETTLED_WIDTH && scatter().is_some_and(|scatter| scatter.sigma < SETTLED_SCATTER)
-}
-
-/// Solutions of which no two are the same pose, the one of the lowest value first.
-fn distinct(mut found: Vec<(Point, Termination)>, radius: f64) -> Vec<(Point, Termination)> {
-    found.sort_by(|a, b| a.0.value.total_cmp(&b.0.value));
-    let mut kept: Vec<(Point, Termination)> = Vec::new();
-    for solution in found {
-        let state = &solution.0.state;
-        let same = |(other, _): &(Point, Termination)| {
-            let turn = state.t_cam_object.rotation.angle_to(&other.state.t_cam_object.rotation);
-            (state.center() - other.state.center()).norm() + radius * turn < SAME
-        };
-        if !kept.iter().any(same) {
-            kept.push(solution);
+impl Strategy for Fused {
+    /// Every stage is an iteration.
+    fn run(
+        &self,
+        frame: &Frame<'_>,
+        initial: &State,
+        observe: &mut Observer<'_>,
+    ) -> Result<Estimate, RefineError> {
+        if self.settings.stages.is_empty() {
+            return Err(RefineError::Setting { name: "stages", problem: "are missing".into() });
         }
-    }
-    kept
-}
-
-/// At most `count` states along the directions in which the posterior about `point` is open so far, the widest first: at multiples of
-/// `distance` of surface motion from where such a direction comes nearest to `initial`.
-///
-/// Geometry that leaves a turn open drifts along it, tens of degrees from where the initial pose was, so that is where to look first. And four
-/// deviations wide, since first solutions of hardly any difference in value lie farther apart than the curvature about the best of them has it.
-fn spread(point: &Point, initial: &State, distance: f64, radius: f64, count: usize) -> Vec<State> {
-    let state = &point.state;
-    let moved = initial.center() - state.center();
-    let turned = so3_log(&(initial.t_cam_object.rotation * state.t_cam_object.rotation.inverse()));
-    let mut states = Vec::new();
-    for (twist, deviation) in confidence::principal_directions(point, radius) {
-        let (place, turn) = (twist.fixed_rows::<3>(0), twist.fixed_rows::<3>(3));
-        // The direction is a unit vector where turns count as what they move the surface by.
-        let nearest = place.dot(&moved) + radius * radius * turn.dot(&turned);
-        let reach = ((4.0 * deviation / distance) as i32).min(4);
-        if reach == 0 {
-            break;
-        }
-        let steps = std::iter::once(0).chain((1..=reach).flat_map(|step| [step, -step]));
-        for step in steps {
-            let along = nearest + distance * f64::from(step);
-            if along.abs() > 0.5 * distance {
-                states.push(state.moved(Block::ObjectPose, (twist * along).as_slice()));
+        let names = std::iter::once("posterior");
+        let mut recorder = Recorder::new(names, initial, self.iterations(), None, observe);
+        let mut walk = Walk { fused: self, frame, initial, settings: self.settings.clone() };
+        let mut states = restarts(initial, self.settings.restart_angle);
+        let mut found = Vec::new();
+        let mut go_on = ControlFlow::Continue(());
+        for index in 0..self.settings.stages.len() {
+            found = walk.stage(index, &states)?;
+            states = walk.next_starts(index, &found);
+            go_on = record(&mut recorder, &found[0]);
+            if go_on.is_break() {
+                break;
             }
         }
+        let exact = go_on.is_continue()
+            && self.settings.calibration_test
+            && calibration_test::is_exact(&found[0].at);
+        if exact {
+            found = walk.with_exact_calibrations(&found)?;
+            _ = record(&mut recorder, &found[0]);
+        }
+        let (radius, inflation) = (frame.object().radius, self.settings.inflation);
+        let posterior = Posterior::new(&found, inflation, radius, exact, None);
+        Ok(recorder.estimate(Some(posterior)))
     }
-    states.truncate(count);
-    states
+
+    /// Stages, and one more where calibrations turn out to be exact.
+    fn iterations(&self) -> usize {
+        self.settings.stages.len() + usize::from(self.settings.calibration_test)
+    }
+}
+
+/// Records the best solution of a stage.
+fn record(recorder: &mut Recorder<'_, '_>, best: &Solution) -> ControlFlow<()> {
+    let (index, values) = (recorder.count(), vec![best.at.cost]);
+    recorder.visit(&best.at.state, Iteration { index, values, weights: vec![1.0], step: 0.0 })
+}
+
+/// A refinement under way.
+struct Walk<'a> {
+    fused: &'a Fused,
+    frame: &'a Frame<'a>,
+    initial: &'a State,
+    /// With what was measured of depth's noise.
+    settings: FusedSettings,
+}
+
+impl Walk<'_> {
+    fn stages(&self) -> &[Stage] {
+        &self.fused.settings.stages
+    }
+
+    fn radius(&self) -> f64 {
+        self.frame.object().radius
+    }
+
+    /// The distinct solutions of stage `index` from `states`, the best one first.
+    fn stage(&mut self, index: usize, states: &[State]) -> Result<Vec<Solution>, RefineError> {
+        let (fused, frame, initial) = (self.fused, self.frame, self.initial);
+        let stage = &fused.settings.stages[index];
+        let patches = surface_patches(frame, initial, stage, &self.settings);
+        if stage.measured_noise {
+            self.measure_noise(&states[0], patches.is_some());
+        }
+        let problem = problem_of(frame, initial, stage, &self.settings, patches, &fused.factors)?;
+        let states = &states[..states.len().min(stage.hypotheses.max(1))];
+        let found = if index == 0 {
+            let first = solve_from(&problem, stage, &states[0]);
+            let noise = || depth_noise(frame, &first.at.state, &fused.settings);
+            let others = if settled(&first.at, noise, self.radius()) { 1 } else { states.len() };
+            let mut all = solve_all(&problem, stage, &states[1..others]);
+            all.insert(0, first);
+            all
+        } else {
+            solve_all(&problem, stage, states)
+        };
+        let mut found = distinct(found, self.radius());
+        // Not by the first stage, which sees no colors.
+        if index > 0 {
+            let limit = found[0].at.cost + self.settings.prune_margin;
+            // One that is still on its way down is not judged yet, and the best stays whatever its cost.
+            let mut best = true;
+            found.retain(|solution| {
+                let unfinished = solution.termination == Termination::Iterations;
+                let kept = best || unfinished || solution.at.cost <= limit;
+                best = false;
+                kept
+            });
+        }
+        Ok(found)
+    }
+
+    /// Takes the noise of depth from the residuals at `state`.
+    fn measure_noise(&mut self, state: &State, with_patches: bool) {
+        let Some(noise) = depth_noise(self.frame, state, &self.fused.settings) else { return };
+        let settings = &mut self.settings;
+        settings.depth.noise.sigma = noise.independent.clamp(FINEST, COARSEST);
+        // The model's part of it is what patches are off by.
+        let model = if with_patches { settings.model.gp_sigma } else { 0.0 };
+        let correlated = (noise.correlated.powi(2) - model.powi(2)).max(0.0).sqrt();
+        settings.depth.gp_sigma = correlated.min(COARSEST);
+        settings.depth.noise.effective_samples = settings.max_effective_samples;
+    }
+
+    /// Where the stage after `index` starts, which found these solutions.
+    fn next_starts(&self, index: usize, found: &[Solution]) -> Vec<State> {
+        let mut states: Vec<State> = found.iter().map(|found| found.at.state.clone()).collect();
+        let Some(next) = self.stages().get(1).filter(|_| index == 0) else { return states };
+        // Where it is, geometry finds well; how it is turned, colors may say better from where they were told. And
+        // what little is seen of the object may have led astray.
+        let initial = self.initial;
+        let mut turned_back = states[0].clone();
+        let moved = states[0].center() - initial.center();
+        states.truncate(KEPT.min(next.hypotheses.saturating_sub(2).max(1)));
+        turned_back.t_cam_object = Translation3::from(moved) * initial.t_cam_object;
+        states.extend([turned_back, initial.clone()]);
+        let more = next.hypotheses.saturating_sub(states.len());
+        let (best, spacing) = (&found[0].at, self.settings.restart_spacing);
+        states.extend(spread(best, initial, spacing, self.radius(), more));
+        states
+    }
+
+    /// The last stage once more, with all calibrations believed to be as stated.
+    fn with_exact_calibrations(
+        &mut self,
+        found: &[Solution],
+    ) -> Result<Vec<Solution>, RefineError> {
+        let initial = self.initial;
+        let nominal = |solution: &Solution| State {
+            t_cam_hand: initial.t_cam_hand,
+            joints: initial.joints.clone(),
+            camera: initial.camera,
+            ..solution.at.state.clone()
+        };
+        let states: Vec<State> = found.iter().map(nominal).collect();
+        // Then depth's errors are not alike over whole patches either.
+        self.settings.depth.gp_sigma = 0.0;
+        if let Some(noise) = depth_noise(self.frame, &states[0], &self.fused.settings) {
+            self.settings.depth.noise.sigma = noise.sigma.clamp(FINEST, COARSEST);
+            self.settings.depth.noise.effective_samples = noise.effective_samples;
+        }
+        let settings = FusedSettings { nuisances: Vec::new(), ..self.settings.clone() };
+        let last = &self.stages()[self.stages().len() - 1];
+        let own = &self.fused.factors;
+        let problem = problem_of(self.frame, initial, last, &settings, None, own)?;
+        Ok(distinct(solve_all(&problem, last, &states), self.radius()))
+    }
+}
+
+fn solve_from(problem: &Problem, stage: &Stage, state: &State) -> Solution {
+    let start: Linearization = problem.linearize(state);
+    problem.solve(start, &stage.solver, |_| ControlFlow::Continue(()))
+}
+
+fn solve_all(problem: &Problem, stage: &Stage, states: &[State]) -> Vec<Solution> {
+    states.par_iter().map(|state| solve_from(problem, stage, state)).collect()
 }

@@ -1,16 +1,17 @@
 //! Settings of the fused estimator.
 
-use super::confidence::CovarianceInflation;
+use super::posterior::CovarianceInflation;
 use crate::factor::{
-    ContactSettings, FreeSpaceSettings, HandDepthSettings, ModelErrorSettings, PenetrationSettings,
+    ContactSettings, FreeSpaceSettings, HandDepthSettings, PenetrationSettings,
     PointToPlaneSettings, PriorSettings, RenderingSettings, SupportSettings, TactileSettings,
     TouchModel,
 };
-use crate::problem::{Block, State};
+use crate::problem::{Block, ModelErrorSettings, NoiseModel, Solver, State};
+use crate::scene::Occluders;
 
-/// A kind of evidence that the fused estimator weighs.
+/// A sensor modality, or a constraint, that the fused estimator weighs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Evidence {
+pub enum Modality {
     /// Colors on the object.
     Color,
     /// The outline of the object's mask.
@@ -31,7 +32,7 @@ pub enum Evidence {
     Support,
 }
 
-impl Evidence {
+impl Modality {
     /// All kinds.
     pub const ALL: [Self; 9] = [
         Self::Color,
@@ -106,20 +107,18 @@ pub struct Stage {
     pub downsample: usize,
     /// Depth points used at most.
     pub points: usize,
-    /// Distances and color differences count as outliers only from so many times their final limits on.
-    pub tolerance: f64,
-    /// Iterations at most.
-    pub iterations: usize,
-    /// The stage ends when the next step promises less than so many nats.
-    pub min_decrease: f64,
+    /// Kernels of depth, color and touch are so many times as wide as at the end: graduated non-convexity.
+    pub kernel_scale: f64,
+    /// When a solve ends.
+    pub solver: Solver,
     /// How many of the best hypotheses the stage takes up.
     pub hypotheses: usize,
     /// Whether colors are compared, which have many minima.
     pub color: bool,
     /// Whether the scatter of depth points about the best solution so far says how much depth is to be trusted.
-    pub measured_scatter: bool,
+    pub measured_noise: bool,
     /// Whether the object may differ from its model, where it is asked: [`Nuisance::Model`].
-    pub model_deviates: bool,
+    pub model_error: bool,
     /// Whether hand and object may not be in the same place, which bars ways that lead through the hand.
     pub contact: bool,
 }
@@ -127,33 +126,33 @@ pub struct Stage {
 /// Settings of [`Fused`](super::Fused).
 #[derive(Clone, Debug, PartialEq)]
 pub struct FusedSettings {
-    /// Evidence to use, where the observation brings it.
-    pub evidence: Vec<Evidence>,
+    /// Modality to use, where the observation brings it.
+    pub modalities: Vec<Modality>,
     /// What is estimated beside the pose; the rest is believed as it is said to be.
     pub nuisances: Vec<Nuisance>,
     /// Stated accuracies.
-    pub accuracy: PriorSettings,
+    pub prior: PriorSettings,
     /// From coarse to fine.
     pub stages: Vec<Stage>,
     /// Angle of the turns about three axes, both ways, that hypotheses start with beside the initial pose where that alone leaves
     /// something open \[rad\]; zero for none.
-    pub turns: f64,
+    pub restart_angle: f64,
     /// Where the first stage leaves the pose open, further hypotheses are tried at this distance \[m of surface motion\].
-    pub spread: f64,
+    pub restart_spacing: f64,
     /// Whether to ask the evidence if calibrations are exact.
-    pub exactness: bool,
+    pub calibration_test: bool,
     /// Independent measurements that depth points amount to beside the errors that neighbors share, where both were measured.
     pub max_effective_samples: f64,
     /// Hypotheses that are so much behind the best one after a stage, colors considered, are given up \[nat\].
     pub prune_margin: f64,
     /// What makes the posterior as wide as errors are.
-    pub width: CovarianceInflation,
+    pub inflation: CovarianceInflation,
     /// How far the object's surface may be from the model's, patch by patch, with [`Nuisance::Model`].
     pub model: ModelErrorSettings,
     /// Color and silhouette.
     pub rendering: RenderingSettings,
     /// Depth on the object. Its deviations and number of effective points are overwritten by what is measured, in stages with
-    /// [`Stage::measured_scatter`] and where calibrations are exact.
+    /// [`Stage::measured_noise`] and where calibrations are exact.
     pub depth: PointToPlaneSettings,
     /// Depth on the hand.
     pub hand_depth: HandDepthSettings,
@@ -178,84 +177,82 @@ impl FusedSettings {
 
 impl Default for FusedSettings {
     fn default() -> Self {
+        let (depth, hand_depth) = (PointToPlaneSettings::default(), HandDepthSettings::default());
         Self {
-            evidence: Evidence::ALL.to_vec(),
+            modalities: Modality::ALL.to_vec(),
             nuisances: Nuisance::ALL.to_vec(),
-            accuracy: PriorSettings::default(),
+            prior: PriorSettings::default(),
             stages: vec![
                 Stage {
                     downsample: 4,
                     points: 200,
-                    tolerance: 8.0,
-                    iterations: 10,
-                    min_decrease: 1.0,
+                    kernel_scale: 8.0,
+                    solver: Solver { iterations: 10, min_decrease: 1.0 },
                     hypotheses: 7,
                     color: false,
-                    measured_scatter: false,
-                    model_deviates: false,
+                    measured_noise: false,
+                    model_error: false,
                     contact: false,
                 },
                 Stage {
                     downsample: 4,
                     points: 250,
-                    tolerance: 4.0,
-                    iterations: 5,
-                    min_decrease: 0.3,
+                    kernel_scale: 4.0,
+                    solver: Solver { iterations: 5, min_decrease: 0.3 },
                     hypotheses: 14,
                     color: true,
-                    measured_scatter: false,
-                    model_deviates: false,
+                    measured_noise: false,
+                    model_error: false,
                     contact: true,
                 },
                 Stage {
                     downsample: 4,
                     points: 600,
-                    tolerance: 2.0,
-                    iterations: 8,
-                    min_decrease: 0.1,
+                    kernel_scale: 2.0,
+                    solver: Solver { iterations: 8, min_decrease: 0.1 },
                     hypotheses: 5,
                     color: true,
-                    measured_scatter: true,
-                    model_deviates: false,
+                    measured_noise: true,
+                    model_error: false,
                     contact: true,
                 },
                 Stage {
                     downsample: 2,
                     points: 1200,
-                    tolerance: 1.0,
-                    iterations: 10,
-                    min_decrease: 0.02,
+                    kernel_scale: 1.0,
+                    solver: Solver { iterations: 10, min_decrease: 0.02 },
                     hypotheses: 3,
                     color: true,
-                    measured_scatter: true,
-                    model_deviates: true,
+                    measured_noise: true,
+                    model_error: true,
                     contact: true,
                 },
             ],
-            turns: 20f64.to_radians(),
-            spread: 10e-3,
-            exactness: true,
+            restart_angle: 20f64.to_radians(),
+            restart_spacing: 10e-3,
+            calibration_test: true,
             max_effective_samples: 50.0,
             prune_margin: 15.0,
-            width: CovarianceInflation::default(),
+            inflation: CovarianceInflation::default(),
             model: ModelErrorSettings::default(),
             rendering: RenderingSettings {
                 downsample: 1,
+                occluders: Occluders::Measured,
                 effective_pixels: 80.0,
                 mask_sigma: 0.6,
                 ..RenderingSettings::default()
             },
             depth: PointToPlaneSettings {
-                effective_points: 20.0,
-                ..PointToPlaneSettings::default()
+                noise: NoiseModel { effective_samples: 20.0, ..depth.noise },
+                ..depth
             },
             hand_depth: HandDepthSettings {
-                effective_points: 200.0,
-                ..HandDepthSettings::default()
+                noise: NoiseModel { effective_samples: 200.0, ..hand_depth.noise },
+                ..hand_depth
             },
             free_space: FreeSpaceSettings::default(),
             tactile: TactileSettings {
-                felt: TouchModel::Contacts(ContactSettings::default()),
+                touch: TouchModel::Contacts(ContactSettings::default()),
                 ..TactileSettings::default()
             },
             penetration: PenetrationSettings::default(),

@@ -27,20 +27,20 @@ pub struct PosteriorSummary {
 }
 
 impl From<&Posterior> for PosteriorSummary {
-    fn from(confidence: &Posterior) -> Self {
-        let covariance = confidence.covariance();
+    fn from(posterior: &Posterior) -> Self {
+        let covariance = posterior.covariance();
         let deviation =
             |first: usize| Vector3::from_fn(|k, _| covariance[(first + k, first + k)].sqrt());
-        let disagreements = confidence.disagreements.iter();
+        let inconsistencies = posterior.inconsistencies.iter();
         Self {
-            probability: confidence.probability(),
+            probability: posterior.probability(),
             deviation_mm: (deviation(0) * 1e3).into(),
             deviation_deg: deviation(3).map(f64::to_degrees).into(),
-            unobserved_mm: confidence.unobserved.iter().map(|u| u.deviation * 1e3).collect(),
-            disagreements: disagreements.map(|d| (d.evidence.to_owned(), d.distance)).collect(),
-            weights: confidence.hypotheses.iter().map(|h| h.weight).collect(),
-            ending: confidence.ending.name().to_owned(),
-            exact: confidence.exact,
+            unobserved_mm: posterior.unobservable.iter().map(|u| u.deviation * 1e3).collect(),
+            disagreements: inconsistencies.map(|d| (d.factor.to_owned(), d.distance)).collect(),
+            weights: posterior.hypotheses.iter().map(|h| h.weight).collect(),
+            ending: posterior.termination.name().to_owned(),
+            exact: posterior.exact,
         }
     }
 }

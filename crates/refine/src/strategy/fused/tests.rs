@@ -1,41 +1,38 @@
 use std::sync::{Arc, LazyLock};
 
-use nalgebra::{Isometry3, Translation3, Vector3};
+use nalgebra::{Isometry3, Point3, Translation3, Vector3};
 
 use super::*;
 use crate::evaluate::metrics::{oe_deg, pe_cm};
-use crate::scene::{Scene, default_scene};
+use crate::problem::{Block, NoiseModel, Rows};
+use crate::refine::refine;
+use crate::scene::{Frame, Hand, Observation, Scene, default_scene};
 
 static SCENE: LazyLock<Scene> = LazyLock::new(|| default_scene(1).unwrap());
 
-fn turned(twist: &[f64; 6]) -> State {
-    let state = State::new(&SCENE.observation, &SCENE.object, &SCENE.truth).unwrap();
-    state.moved(Block::ObjectPose, twist)
+fn turned(twist: &[f64; 6]) -> Isometry3<f64> {
+    let frame = Frame::new(&SCENE.observation, &SCENE.object, None).unwrap();
+    let state = State::new(&frame, &SCENE.truth).unwrap();
+    state.retract(&[Block::ObjectPose], twist).t_cam_object
 }
 
 fn run(
     observation: &Observation,
-    robot: Option<&Arc<Hand>>,
-    start: &State,
+    hand: Option<&Arc<Hand>>,
+    start: &Isometry3<f64>,
     settings: FusedSettings,
 ) -> (Isometry3<f64>, Posterior) {
-    let start = State::new(observation, &SCENE.object, &start.t_cam_object).unwrap();
-    let mut last = start.t_cam_object;
-    let fused = Fused { settings };
-    let (_, confidence) = fused
-        .run(observation, &SCENE.object, robot, start, |state, _| {
-            last = state.t_cam_object;
-            true
-        })
-        .unwrap();
-    assert_eq!(last, confidence.hypotheses[0].t_cam_object);
-    (last, confidence)
+    let frame = Frame::new(observation, &SCENE.object, hand).unwrap();
+    let found = refine(&frame, start, &Fused::new(settings)).unwrap();
+    let posterior = found.posterior.unwrap();
+    assert_eq!(found.state.t_cam_object, posterior.hypotheses[0].t_cam_object);
+    (found.state.t_cam_object, posterior)
 }
 
-/// Settings with all evidence but one kind.
-fn without(kind: Evidence) -> FusedSettings {
+/// Settings with all modalities but one.
+fn without(modality: Modality) -> FusedSettings {
     FusedSettings {
-        evidence: Evidence::ALL.into_iter().filter(|e| *e != kind).collect(),
+        modalities: Modality::ALL.into_iter().filter(|m| *m != modality).collect(),
         ..FusedSettings::default()
     }
 }
@@ -48,18 +45,18 @@ fn errors(pose: &Isometry3<f64>) -> (f64, f64) {
 
 #[test]
 fn exact_calibrations_are_recognized_and_errors_are_as_large_as_promised() {
-    let (pose, confidence) =
-        run(&SCENE.observation, Some(&SCENE.robot), &turned(&OFF), FusedSettings::default());
+    let (pose, posterior) =
+        run(&SCENE.observation, Some(&SCENE.hand), &turned(&OFF), FusedSettings::default());
     let (pe, oe) = errors(&pose);
     assert!(pe < 0.05 && oe < 0.5, "{pe} cm, {oe}°");
-    let covariance = confidence.covariance();
+    let covariance = posterior.covariance();
     let deviation = covariance.fixed_view::<3, 3>(0, 0).trace().sqrt();
     // Nuisances of millimeters have not been left open.
     assert!(deviation < 5e-4, "{deviation} m");
-    assert!(confidence.mahalanobis(&SCENE.truth) < 6.0);
-    assert!(confidence.probability_within(5e-3, 0.09) > 0.99);
+    assert!(posterior.mahalanobis(&SCENE.truth) < 6.0);
+    assert!(posterior.probability_within(5e-3, 0.09) > 0.99);
     let (near, far) =
-        (confidence.probability_within(1e-5, 1.0), confidence.probability_within(1e-3, 1.0));
+        (posterior.probability_within(1e-5, 1.0), posterior.probability_within(1e-3, 1.0));
     assert!(near < far, "{near} {far}");
 }
 
@@ -72,13 +69,12 @@ fn calibrations_that_are_off_are_estimated() {
         hand.joints.iter_mut().enumerate().for_each(|(i, q)| *q += 0.01 * (i as f64).cos());
     }
     let start = turned(&OFF);
-    let (pose, confidence) =
-        run(&observation, Some(&SCENE.robot), &start, FusedSettings::default());
+    let (pose, posterior) = run(&observation, Some(&SCENE.hand), &start, FusedSettings::default());
     let believed = FusedSettings { nuisances: Vec::new(), ..FusedSettings::default() };
-    let (naive, _) = run(&observation, Some(&SCENE.robot), &start, believed);
+    let (naive, _) = run(&observation, Some(&SCENE.hand), &start, believed);
     let ((pe, oe), (naive, _)) = (errors(&pose), errors(&naive));
     assert!(pe < 0.15 && oe < 1.5 && pe < naive, "{pe} cm, {oe}°, believing all {naive} cm");
-    let deviation = confidence.covariance().fixed_view::<3, 3>(0, 0).trace().sqrt();
+    let deviation = posterior.covariance().fixed_view::<3, 3>(0, 0).trace().sqrt();
     assert!(deviation > 5e-4, "{deviation} m");
 }
 
@@ -88,7 +84,7 @@ fn every_sense_may_be_absent() {
     let changed = |change: &dyn Fn(&mut Observation)| {
         let mut observation = SCENE.observation.clone();
         change(&mut observation);
-        run(&observation, Some(&SCENE.robot), &start, FusedSettings::default()).0
+        run(&observation, Some(&SCENE.hand), &start, FusedSettings::default()).0
     };
     let poses = [
         ("touch", changed(&|o| o.hand.as_mut().unwrap().forces.clear())),
@@ -101,15 +97,15 @@ fn every_sense_may_be_absent() {
         let (pe, oe) = errors(&pose);
         assert!(pe < 0.5 && oe < 4.0, "without {sense}: {pe} cm, {oe}°");
     }
-    let (pose, _) = run(&SCENE.observation, Some(&SCENE.robot), &start, without(Evidence::Color));
+    let (pose, _) = run(&SCENE.observation, Some(&SCENE.hand), &start, without(Modality::Color));
     assert!(errors(&pose).0 < 0.3);
 }
 
 #[test]
 fn exactness_is_not_believed_where_little_speaks_for_it() {
     let exact = |robot, settings| run(&SCENE.observation, robot, &turned(&OFF), settings).1.exact;
-    assert!(exact(Some(&SCENE.robot), FusedSettings::default()));
-    assert!(!exact(Some(&SCENE.robot), without(Evidence::HandDepth)));
+    assert!(exact(Some(&SCENE.hand), FusedSettings::default()));
+    assert!(!exact(Some(&SCENE.hand), without(Modality::HandDepth)));
     assert!(!exact(None, FusedSettings::default()));
 }
 
@@ -119,25 +115,26 @@ fn a_pose_that_senses_disagree_about_is_not_sure() {
     if let Some(hand) = &mut observation.hand {
         hand.t_cam_hand = Translation3::new(0.0, 0.0, 0.05) * hand.t_cam_hand;
     }
-    let (pose, confidence) =
-        run(&observation, Some(&SCENE.robot), &turned(&OFF), FusedSettings::default());
-    println!("{:?} {:?} {}", errors(&pose), confidence.disagreements, confidence.probability());
-    assert!(!confidence.disagreements.is_empty());
-    assert!(confidence.probability() < 0.5);
+    let (pose, posterior) =
+        run(&observation, Some(&SCENE.hand), &turned(&OFF), FusedSettings::default());
+    println!("{:?} {:?} {}", errors(&pose), posterior.inconsistencies, posterior.probability());
+    assert!(!posterior.inconsistencies.is_empty());
+    assert!(posterior.probability() < 0.5);
 }
 
 #[test]
 fn a_solve_that_is_cut_short_is_not_sure() {
     let of = |iterations| {
-        let mut settings = FusedSettings { exactness: iterations == 0, ..Default::default() };
-        settings.stages.iter_mut().for_each(|stage| stage.iterations = iterations);
-        run(&SCENE.observation, Some(&SCENE.robot), &turned(&OFF), settings).1
+        let mut settings =
+            FusedSettings { calibration_test: iterations == 0, ..Default::default() };
+        settings.stages.iter_mut().for_each(|stage| stage.solver.iterations = iterations);
+        run(&SCENE.observation, Some(&SCENE.hand), &turned(&OFF), settings).1
     };
     assert!(!of(0).exact);
     let (hasty, whole) = (of(1), of(10));
     println!("{} {}", hasty.mahalanobis(&SCENE.truth), whole.mahalanobis(&SCENE.truth));
     assert!(hasty.mahalanobis(&SCENE.truth) < 5.0);
-    let widest = |confidence: &Posterior| confidence.widest(SCENE.object.radius);
+    let widest = |posterior: &Posterior| posterior.widest(SCENE.object.radius);
     assert!(widest(&hasty) > widest(&whole));
 }
 
@@ -146,7 +143,7 @@ fn threads_make_no_difference() {
     let of = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
-            run(&SCENE.observation, Some(&SCENE.robot), &turned(&OFF), FusedSettings::default())
+            run(&SCENE.observation, Some(&SCENE.hand), &turned(&OFF), FusedSettings::default())
         })
     };
     assert_eq!(of(1), of(3));
@@ -155,11 +152,52 @@ fn threads_make_no_difference() {
 #[test]
 fn what_nothing_is_seen_of_is_said_to_be_unobserved() {
     let settings =
-        FusedSettings { evidence: vec![Evidence::Silhouette], ..FusedSettings::default() };
-    let (_, confidence) = run(&SCENE.observation, None, &turned(&[0.0; 6]), settings);
+        FusedSettings { modalities: vec![Modality::Silhouette], ..FusedSettings::default() };
+    let (_, posterior) = run(&SCENE.observation, None, &turned(&[0.0; 6]), settings);
     // The outline of a bottle says little of how it is turned about its axis, and of its distance.
-    assert!(!confidence.unobserved.is_empty());
+    assert!(!posterior.unobservable.is_empty());
     let (_, all) =
-        run(&SCENE.observation, Some(&SCENE.robot), &turned(&OFF), FusedSettings::default());
-    assert!(all.unobserved.is_empty(), "{:?}", all.unobserved);
+        run(&SCENE.observation, Some(&SCENE.hand), &turned(&OFF), FusedSettings::default());
+    assert!(all.unobservable.is_empty(), "{:?}", all.unobservable);
+}
+
+/// The object's center is known to be where it is not.
+struct Pull {
+    place: Vector3<f64>,
+    noise: NoiseModel,
+}
+
+impl Factor for Pull {
+    fn name(&self) -> &'static str {
+        "pull"
+    }
+
+    fn rows(&self, state: &State, rows: &mut Rows<'_>) {
+        let center = Point3::from(state.center());
+        for axis in 0..3 {
+            let offset = (center.coords - self.place)[axis];
+            rows.add(offset, &self.noise.weighting(1), |row| {
+                row.object_point(state, &center, &Vector3::ith(axis, 1.0));
+            });
+        }
+    }
+}
+
+#[test]
+fn a_factor_of_ones_own_moves_the_pose_and_changes_the_posterior() {
+    let frame = Frame::new(&SCENE.observation, &SCENE.object, Some(&SCENE.hand)).unwrap();
+    let pull = |offset: f64, sigma: f64| {
+        let place = (SCENE.truth * SCENE.object.center).coords + Vector3::x() * offset;
+        let fused = Fused::default().with(Pull { place, noise: NoiseModel::gaussian(sigma) });
+        let found = refine(&frame, &turned(&OFF), &fused).unwrap();
+        (errors(found.t_cam_object()).0, found.posterior.unwrap())
+    };
+    let plain = refine(&frame, &turned(&OFF), &Fused::default()).unwrap().posterior.unwrap();
+    let place = |p: &Posterior| p.covariance().fixed_view::<3, 3>(0, 0).trace().sqrt();
+    let (error, agreeing) = pull(0.0, 1e-5);
+    let (hinted, alone) = (place(&agreeing), place(&plain));
+    assert!(error < 0.02 && hinted < 0.7 * alone, "{error} cm, {hinted} m instead of {alone} m");
+    // Surer of a wrong place than all else is of the right one.
+    let (error, _) = pull(0.02, 2e-4);
+    assert!(error > 0.3, "{error} cm");
 }

@@ -2,17 +2,18 @@
 
 use nalgebra::{DMatrix, DVector, Isometry3, Point3, Vector3};
 
-use super::clash::SelfCollision;
+use super::kinematic_paths::{KinematicPaths, Screw};
+use super::preshape::Preshape;
+use super::self_collision::SelfCollision;
+use super::settings::GraspSettings;
 use super::simulation::Simulation;
-use super::skeleton::{KinematicPaths, Screw};
-use super::{GraspSettings, Preshape};
 use crate::scene::Hand;
 
 /// Which joints close, how fast, and where they stop.
 pub(super) struct Drive<'a> {
     robot: &'a Hand,
-    skeleton: KinematicPaths,
-    clash: SelfCollision,
+    paths: KinematicPaths,
+    self_collision: SelfCollision,
     limits: Vec<(f64, f64)>,
     /// Of each joint \[rad/s or m/s\], signed.
     speed: Vec<f64>,
@@ -39,7 +40,7 @@ pub(super) struct Effort {
 impl<'a> Drive<'a> {
     pub(super) fn new(robot: &'a Hand, preshape: &Preshape, settings: &GraspSettings) -> Self {
         let tree = &robot.tree;
-        let skeleton = KinematicPaths::new(tree);
+        let paths = KinematicPaths::new(tree);
         let middle = |i: usize| {
             // Where the hand is half closed.
             let (lower, upper) = tree.joint_limits()[i];
@@ -50,16 +51,17 @@ impl<'a> Drive<'a> {
         let joints: Vec<f64> = (0..preshape.open.len()).map(middle).collect();
         let poses = tree.forward_kinematics(&joints);
         let screws = KinematicPaths::screws(tree, &poses);
-        let lever = (0..joints.len()).map(|v| lever(robot, &skeleton, &screws, &poses, v));
+        let lever = (0..joints.len()).map(|v| lever(robot, &paths, &screws, &poses, v));
         let lever = lever.collect();
-        let clash = SelfCollision::new(robot, &skeleton, &tree.forward_kinematics(&preshape.open));
+        let self_collision =
+            SelfCollision::new(robot, &paths, &tree.forward_kinematics(&preshape.open));
         Self {
             robot,
-            clash,
+            self_collision,
             limits: tree.joint_limits(),
             speed: preshape.speed.clone(),
             lever,
-            skeleton,
+            paths,
             yield_ratio: settings.yield_ratio,
             dt: settings.time_step,
         }
@@ -80,7 +82,7 @@ impl<'a> Drive<'a> {
         let mut stiffness = DMatrix::<f64>::zeros(count, count);
         for touch in simulation.touches() {
             let mut along = DVector::<f64>::zeros(count);
-            for screw in self.skeleton.path(touch.link).iter().filter_map(|&j| screws[j]) {
+            for screw in self.paths.path(touch.link).iter().filter_map(|&j| screws[j]) {
                 let velocity = screw.velocity(&touch.point);
                 // The force on the link is opposite to that on the object.
                 let torque = velocity.dot(&touch.force) * self.speed[screw.variable].signum();
@@ -127,7 +129,7 @@ impl<'a> Drive<'a> {
                 change[v] = to.max(lower).min(upper) - from;
             }
         }
-        self.avoid_clashes(simulation, &mut change);
+        self.avoid_self_collision(simulation, &mut change);
         change
     }
 
@@ -138,14 +140,14 @@ impl<'a> Drive<'a> {
     }
 
     /// Stops joints that would drive links into each other.
-    fn avoid_clashes(&self, simulation: &Simulation<'_>, change: &mut [f64]) {
+    fn avoid_self_collision(&self, simulation: &Simulation<'_>, change: &mut [f64]) {
         if change.iter().all(|c| *c == 0.0) {
             return;
         }
         let joints: Vec<f64> =
             simulation.joints().iter().zip(change.iter()).map(|(q, d)| q + d).collect();
         let poses = self.robot.tree.forward_kinematics(&joints);
-        for variable in self.clash.stopped(&poses) {
+        for variable in self.self_collision.stopped(&poses) {
             // Opening is always allowed.
             if change[variable] * self.speed[variable] > 0.0 {
                 change[variable] = 0.0;
@@ -161,7 +163,7 @@ impl<'a> Drive<'a> {
 
 fn lever(
     robot: &Hand,
-    skeleton: &KinematicPaths,
+    paths: &KinematicPaths,
     screws: &[Option<Screw>],
     poses: &[Isometry3<f64>],
     variable: usize,
@@ -171,7 +173,7 @@ fn lever(
         let Some(grid) = shape.grid() else { continue };
         let (low, high) = grid.bounds();
         let center: Point3<f64> = poses[link] * nalgebra::center(&low, &high);
-        let own = skeleton.path(link).iter().filter_map(|&j| screws[j]);
+        let own = paths.path(link).iter().filter_map(|&j| screws[j]);
         let velocity: Option<Vector3<f64>> = own
             .filter(|s| s.variable == variable)
             .map(|s| s.velocity(&center))

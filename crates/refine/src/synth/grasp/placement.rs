@@ -4,7 +4,8 @@ use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaterni
 use prehend_geometry::SplitMix64;
 use prehend_geometry::robot::{PosedRobot, RobotError};
 
-use super::{GraspSettings, Preshape};
+use super::preshape::Preshape;
+use super::settings::GraspSettings;
 use crate::scene::{Hand, Object};
 
 /// Points of the object that must stay clear of the hand.

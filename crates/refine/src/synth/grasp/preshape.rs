@@ -4,8 +4,8 @@ use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaterni
 use prehend_geometry::hand::JOINT_NAMES;
 use prehend_geometry::robot::KinematicTree as Tree;
 
-use super::GraspError;
-use super::skeleton::KinematicPaths;
+use super::fault::GraspError;
+use super::kinematic_paths::KinematicPaths;
 use crate::scene::Hand;
 
 /// The open hand and the way it closes. Joints are in the order of the robot's joint names.
@@ -71,7 +71,7 @@ impl Preshape {
         let bounded = |&(lower, upper): &(f64, f64)| lower.is_finite() && upper.is_finite();
         let middle = |l: &(f64, f64)| if bounded(l) { 0.5 * (l.0 + l.1) } else { 0.0 };
         let middle: Vec<f64> = limits.iter().map(middle).collect();
-        let skeleton = KinematicPaths::new(tree);
+        let paths = KinematicPaths::new(tree);
         let centers: Vec<Option<Point3<f64>>> = (robot.shape.links().iter())
             .map(|shape| {
                 let (low, high) = shape.grid()?.bounds();
@@ -82,12 +82,12 @@ impl Preshape {
         let poses = tree.forward_kinematics(&middle);
         // Fingertips: links with a shape that move no other such link.
         let moves = |link: usize, other: usize| {
-            let (own, path) = (skeleton.path(link), skeleton.path(other));
+            let (own, path) = (paths.path(link), paths.path(other));
             link != other && own.iter().all(|j| path.contains(j)) && path.len() > own.len()
         };
         let tips: Vec<usize> = solid()
             .map(|(link, _)| link)
-            .filter(|&l| !skeleton.path(l).is_empty() && !solid().any(|(o, _)| moves(l, o)))
+            .filter(|&l| !paths.path(l).is_empty() && !solid().any(|(o, _)| moves(l, o)))
             .collect();
         let tip = |&l: &usize| poses[l] * centers[l].unwrap_or_default();
         let sum: Vector3<f64> = tips.iter().map(|l| tip(l).coords).sum();
@@ -95,7 +95,7 @@ impl Preshape {
 
         let screws = KinematicPaths::screws(tree, &poses);
         let driven = |link: usize, variable: usize| {
-            let own = skeleton.path(link).iter();
+            let own = paths.path(link).iter();
             own.filter_map(|&j| screws[j]).any(|s| s.variable == variable)
         };
         let away = |variable: usize, value: f64| {
@@ -136,14 +136,14 @@ impl Preshape {
         let speed: Vec<f64> = (0..count).map(speed).collect();
 
         // The palm: the nearest point of what no joint moves, or of the least moved.
-        let least = solid().map(|(l, _)| skeleton.path(l).len()).min().unwrap_or(0);
+        let least = solid().map(|(l, _)| paths.path(l).len()).min().unwrap_or(0);
         let surface = |link: usize| {
             let t = poses[link];
             let local = t.inverse() * focus;
             let closest = robot.shape.links()[link].closest().iter();
             closest.filter_map(move |c| c.closest(&local, f64::INFINITY)).map(move |c| t * c.point)
         };
-        let base = solid().map(|(l, _)| l).filter(|&l| skeleton.path(l).len() == least);
+        let base = solid().map(|(l, _)| l).filter(|&l| paths.path(l).len() == least);
         let origin = base.flat_map(surface).min_by(|a, b| {
             let distance = |p: &Point3<f64>| (p - focus).norm_squared();
             distance(a).total_cmp(&distance(b))
@@ -153,7 +153,7 @@ impl Preshape {
         // Fingers wrap about the direction in which closing moves their tips the least.
         let mut motion = Matrix3::from_diagonal_element(0.0) + out * out.transpose();
         for &link in &tips {
-            let velocity: Vector3<f64> = (skeleton.path(link).iter())
+            let velocity: Vector3<f64> = (paths.path(link).iter())
                 .filter_map(|&j| screws[j])
                 .map(|s| s.velocity(&tip(&link)) * speed[s.variable])
                 .sum();

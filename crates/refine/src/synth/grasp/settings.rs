@@ -1,6 +1,7 @@
 //! How grasps are made and what is asked of them.
 
-use super::{GraspError, Preshape};
+use super::fault::GraspError;
+use super::preshape::Preshape;
 
 /// Settings of a [`Grasper`](super::Grasper). The defaults suit a hand of human size and household objects.
 #[derive(Clone, Debug, PartialEq)]

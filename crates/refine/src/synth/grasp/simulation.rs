@@ -1,4 +1,4 @@
-//! The object as a free body among the links of a hand that moves as it is told.
+//! The object as a free body among the kinematically driven links of a hand.
 
 use std::sync::Arc;
 
@@ -7,8 +7,9 @@ use prehend_autodiff::lie::so3_log;
 use prehend_geometry::robot::LinkShape;
 use prehend_geometry::{DistanceField, FieldSample};
 use prehend_sim::{
-    BackwardEuler, Body, Contact, ContactLaw, Integrator, LocalLaw, Onset, Penalty, RigidBody,
-    SemiImplicitEuler, SimulationError, State, Step, SubStepped, Surface, SurfacePoint, World,
+    BackwardEuler, Body, BodyId, Contact, ContactBodies, DynContactLaw, GapSmoothing, Integrator,
+    RigidBody, SemiImplicitEuler, SimulationError, State, Step, SubStepped, Surface, SurfacePoint,
+    World,
 };
 
 use crate::scene::Hand;
@@ -28,9 +29,9 @@ pub(super) struct Setup<'a> {
     pub(super) robot: &'a Hand,
     pub(super) body: RigidBody,
     pub(super) samples: Vec<SurfacePoint>,
-    pub(super) law: Penalty,
+    pub(super) law: Arc<dyn DynContactLaw>,
     /// The same with softer friction, for steps that cannot be solved otherwise.
-    pub(super) soft_law: Penalty,
+    pub(super) soft_law: Arc<dyn DynContactLaw>,
     pub(super) time_step: f64,
     /// Time in which a floating object loses its speed \[s\].
     pub(super) damping_time: f64,
@@ -65,7 +66,7 @@ pub(super) struct Simulation<'a> {
     world: World,
     /// Of the bodies of the world.
     states: Vec<State>,
-    object: usize,
+    object: BodyId,
     /// Links with a shape, in the order of their bodies.
     links: Vec<Solid>,
     joints: Vec<f64>,
@@ -101,7 +102,7 @@ impl<'a> Simulation<'a> {
         let robot = setup.robot;
         let poses = robot.tree.forward_kinematics(joints);
         let mut world = World::new(Vector3::zeros());
-        let (mut links, mut states) = (Vec::new(), Vec::new());
+        let (mut links, mut fields, mut states) = (Vec::new(), Vec::new(), Vec::new());
         for (link, shape) in robot.shape.links().iter().enumerate() {
             let Some(grid) = shape.grid() else { continue };
             let (low, high) = grid.bounds();
@@ -111,7 +112,8 @@ impl<'a> Simulation<'a> {
                 ))
             };
             let field = Arc::new(LinkField(Arc::clone(shape)));
-            world.add(Body::held(&robot.tree.links()[link].name).with_field(field));
+            let body = Body::kinematic(&robot.tree.links()[link].name).with_field(field);
+            fields.push(world.add(body));
             states.push(State::at_rest(poses[link]));
             let (shape, corners) = (Arc::clone(shape), std::array::from_fn(corner));
             links.push(Solid { link, shape, corners, looked_at: None });
@@ -121,8 +123,9 @@ impl<'a> Simulation<'a> {
         let joints = joints.to_vec();
         let mut new = Self { setup, world, states, object, links, joints, poses, steps: 0 };
         new.update_broad_phase()?;
-        for body in 0..object {
-            new.world.touch(object, body, Arc::new(setup.law), Onset::Hard)?;
+        for field in fields {
+            let bodies = ContactBodies { samples: object, field };
+            new.world.add_contact(bodies, Arc::clone(&setup.law), GapSmoothing::Hard)?;
         }
         Ok(new)
     }
@@ -178,7 +181,7 @@ impl<'a> Simulation<'a> {
                 load.fixed_rows_mut::<3>(3).copy_from(&(inertia * state.angular * -rate));
             }
         }
-        self.world.bodies[self.object].load = load;
+        self.world.bodies[self.object].external_wrench = load;
         self.update_broad_phase()?;
         self.states = self.stepped()?;
         self.steps += 1;
@@ -189,28 +192,27 @@ impl<'a> Simulation<'a> {
     /// explicit steps as short as those need. Newton's method may fail where many samples make or lose contact at once.
     fn stepped(&mut self) -> Result<Vec<State>, SimulationError> {
         let step = || Step { index: self.steps, dt: self.setup.time_step };
-        let implicit = SubStepped { integrator: BackwardEuler, most: PARTS };
-        let explicit = SubStepped { integrator: SemiImplicitEuler, most: EXPLICIT_PARTS };
+        let implicit = SubStepped { integrator: BackwardEuler, max_substeps: PARTS };
+        let explicit = SubStepped { integrator: SemiImplicitEuler, max_substeps: EXPLICIT_PARTS };
         let unsolved = |error: &SimulationError| matches!(error, SimulationError::Unsolved { .. });
         match implicit.step(&self.world, &self.states, step()) {
             Err(error) if unsolved(&error) => {}
             done => return done,
         }
         let step = [step(), step()];
-        self.rub(self.setup.soft_law);
+        self.set_friction_law(&self.setup.soft_law);
         let [second, third] = step;
         let solved = match implicit.step(&self.world, &self.states, second) {
             Err(error) if unsolved(&error) => explicit.step(&self.world, &self.states, third),
             done => done,
         };
-        self.rub(self.setup.law);
+        self.set_friction_law(&self.setup.law);
         solved
     }
 
-    /// Lets all contacts follow `law`.
-    fn rub(&mut self, law: Penalty) {
-        let law: Arc<dyn LocalLaw> = Arc::new(law);
-        self.world.contacts.iter_mut().for_each(|pair| pair.law = Arc::clone(&law));
+    /// Replaces the law of all contacts.
+    fn set_friction_law(&mut self, law: &Arc<dyn DynContactLaw>) {
+        self.world.contacts.iter_mut().for_each(|pair| pair.set_law(Arc::clone(law)));
     }
 
     /// Keeps the samples that may touch before the next look.
@@ -274,7 +276,7 @@ impl<'a> Simulation<'a> {
                 let slip = relative - normal * normal_speed;
                 let contact =
                     Contact { gap: distance, normal_speed, slip, normal, area: sample.area };
-                let response = law.law(law.params(), &contact);
+                let response = law.response(law.params(), &contact);
                 touches.push(Touch {
                     link: solid.link,
                     point,

@@ -1,8 +1,8 @@
-//! What taxels feel of the contacts.
+//! Forces on taxels from contacts.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
-use super::GraspError;
+use super::fault::GraspError;
 use super::simulation::Touch;
 use crate::scene::Hand;
 

@@ -1,10 +1,13 @@
 use std::sync::LazyLock;
 
+use nalgebra::Vector3;
 use prehend_geometry::hand::{allegro_xela_urdf, taxels};
 use prehend_geometry::objects::YcbObject;
 use prehend_geometry::robot::KinematicTree as Tree;
 
+use super::simulation::{Medium, Simulation};
 use super::*;
+use crate::scene::{Hand, Object};
 
 static HAND: LazyLock<Hand> = LazyLock::new(|| {
     Hand::new(Tree::from_urdf_str(&allegro_xela_urdf(), None).unwrap(), taxels()).unwrap()

@@ -4,9 +4,10 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use prehend_geometry::SplitMix64;
 
 use super::drive::Effort;
+use super::fault::GraspFault;
+use super::grasper::{Grasp, Grasper, random_direction};
 use super::simulation::{Medium, Simulation};
-use super::{Grasp, GraspFault, Grasper, random_direction};
-use crate::synth::GraspSnapshot;
+use crate::synth::snapshot::GraspSnapshot;
 
 /// Waves that make up the turning of the hand, and the grip's rise and fall, an axis.
 const WAVES: usize = 3;

@@ -4,20 +4,20 @@ use prehend_geometry::SplitMix64;
 use prehend_render::{Camera, DepthImage, RgbImage};
 use serde::{Deserialize, Serialize};
 
-use super::field::smooth_field;
+use crate::data::smooth_field;
 
 /// The room behind the hand.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct BackgroundSettings {
+pub(in crate::synth) struct BackgroundSettings {
     /// Mean distance of the wall \[m\].
-    pub distance: f64,
+    pub(in crate::synth) distance: f64,
     /// Standard deviation of the wall's slopes.
-    pub slope: f64,
+    pub(in crate::synth) slope: f64,
     /// Things in front of the wall, at most.
-    pub things: u32,
+    pub(in crate::synth) things: u32,
     /// Standard deviation of the wall's pattern per channel.
-    pub pattern: f64,
+    pub(in crate::synth) pattern: f64,
 }
 
 impl BackgroundSettings {
@@ -120,7 +120,7 @@ impl Thing {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::synth::sensor::ViewpointSettings;
+    use crate::synth::sensor::viewpoint::ViewpointSettings;
 
     #[test]
     fn every_pixel_has_a_color_and_lies_behind_the_hand() {

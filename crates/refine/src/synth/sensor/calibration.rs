@@ -1,4 +1,4 @@
-//! What is wrong about what is known of the camera and the hand.
+//! Calibration errors of camera, hand pose and joints.
 
 use nalgebra::{Isometry3, Vector6};
 use prehend_autodiff::lie::se3_exp;
@@ -9,17 +9,17 @@ use serde::{Deserialize, Serialize};
 /// Standard deviations of the calibration's errors, which stay the same through a grasp.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct CalibrationSettings {
+pub(in crate::synth) struct CalibrationSettings {
     /// Focal lengths, relative.
-    pub focal: f64,
+    pub(in crate::synth) focal: f64,
     /// Principal point, each coordinate \[px\] of an image 640 px wide.
-    pub principal_px: f64,
+    pub(in crate::synth) principal_px: f64,
     /// Place of the hand in the camera frame, each axis \[m\].
-    pub hand_translation: f64,
+    pub(in crate::synth) hand_translation: f64,
     /// Turn of the hand in the camera frame, each axis \[deg\].
-    pub hand_rotation_deg: f64,
+    pub(in crate::synth) hand_rotation_deg: f64,
     /// Joint positions \[deg\], of prismatic joints in thousandths of `joint_deg` meters.
-    pub joint_deg: f64,
+    pub(in crate::synth) joint_deg: f64,
 }
 
 impl CalibrationSettings {

@@ -1,4 +1,4 @@
-//! What a color camera makes of the light that reaches it.
+//! A color camera: exposure, white balance, blur and noise.
 
 use prehend_geometry::SplitMix64;
 use prehend_render::RgbImage;
@@ -7,19 +7,19 @@ use serde::{Deserialize, Serialize};
 /// Faults of the color images. Zero takes any of them away.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct ColorSettings {
+pub(in crate::synth) struct ColorSettings {
     /// Standard deviation of the exposure \[stops\].
-    pub exposure: f64,
+    pub(in crate::synth) exposure: f64,
     /// Standard deviation of the gain of each channel.
-    pub white_balance: f64,
+    pub(in crate::synth) white_balance: f64,
     /// Standard deviation of the blur \[px\], at most.
-    pub blur: f64,
+    pub(in crate::synth) blur: f64,
     /// Standard deviation of the noise of each channel in the dark.
-    pub noise: f64,
+    pub(in crate::synth) noise: f64,
     /// Variance that noise gains with brightness, up to white.
-    pub shot_noise: f64,
+    pub(in crate::synth) shot_noise: f64,
     /// Quality of the JPEG files, 1 to 100; 0 for PNG, which loses nothing.
-    pub jpeg_quality: u8,
+    pub(in crate::synth) jpeg_quality: u8,
 }
 
 impl ColorSettings {

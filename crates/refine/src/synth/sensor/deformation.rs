@@ -7,13 +7,13 @@ use serde::{Deserialize, Serialize};
 /// How the model that the estimator is given differs from the object.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct ModelSettings {
+pub(in crate::synth) struct ModelSettings {
     /// Root mean square of the smooth displacement of the surface along its normal \[m\].
-    pub deviation: f64,
+    pub(in crate::synth) deviation: f64,
     /// Wavelength of that displacement \[m\].
-    pub wavelength: f64,
+    pub(in crate::synth) wavelength: f64,
     /// Standard deviation of the scale.
-    pub scale: f64,
+    pub(in crate::synth) scale: f64,
 }
 
 impl ModelSettings {

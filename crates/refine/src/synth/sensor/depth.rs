@@ -4,35 +4,35 @@ use prehend_geometry::SplitMix64;
 use prehend_render::{Camera, DepthImage};
 use serde::{Deserialize, Serialize};
 
-use super::field::smooth_field;
+use crate::data::smooth_field;
 
 /// Faults of the depth images. Zero takes any of them away.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct DepthSettings {
+pub(in crate::synth) struct DepthSettings {
     /// Standard deviation of the scale error, the same through a grasp.
-    pub scale: f64,
+    pub(in crate::synth) scale: f64,
     /// Standard deviation of a smooth warp that changes over a third of the image, the same through a grasp \[m\].
-    pub warp: f64,
+    pub(in crate::synth) warp: f64,
     /// Standard deviation of noise of single pixels, at half a meter; it grows with the square of the depth \[m\].
-    pub noise: f64,
+    pub(in crate::synth) noise: f64,
     /// Standard deviation of noise with a correlation over `correlation` pixels, at half a meter \[m\].
-    pub correlated_noise: f64,
+    pub(in crate::synth) correlated_noise: f64,
     /// Reach of the correlated noise \[px\].
-    pub correlation: f64,
+    pub(in crate::synth) correlation: f64,
     /// Steps of the disparity \[px\].
-    pub disparity_step: f64,
+    pub(in crate::synth) disparity_step: f64,
     /// Distance of the two eyes \[m\]: with the focal length it makes disparity of depth, and what only one of them sees has
     /// none.
-    pub baseline: f64,
+    pub(in crate::synth) baseline: f64,
     /// How far what is near spreads over what is behind it \[px\], at most.
-    pub fattening: f64,
+    pub(in crate::synth) fattening: f64,
     /// Share of the pixels at edges whose depth lies between that of both sides.
-    pub flying_share: f64,
+    pub(in crate::synth) flying_share: f64,
     /// Share of the pixels that are lost in patches.
-    pub hole_share: f64,
+    pub(in crate::synth) hole_share: f64,
     /// Angle of sight to surface below which half of the pixels are lost \[deg\].
-    pub grazing_deg: f64,
+    pub(in crate::synth) grazing_deg: f64,
 }
 
 impl DepthSettings {
@@ -242,7 +242,7 @@ fn upper_quantile(share: f64) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::synth::sensor::ViewpointSettings;
+    use crate::synth::sensor::viewpoint::ViewpointSettings;
 
     const SIZE: (usize, usize) = (320, 240);
 

@@ -10,17 +10,17 @@ use crate::scene::look_at;
 /// What lights the scene.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct LightSettings {
+pub(in crate::synth) struct LightSettings {
     /// Lamps beside the light from everywhere; the first is the strongest.
-    pub lamps: u32,
+    pub(in crate::synth) lamps: u32,
     /// Share of the light that comes from everywhere.
-    pub ambient_share: f64,
+    pub(in crate::synth) ambient_share: f64,
     /// Standard deviation of a lamp's color per channel.
-    pub tint: f64,
+    pub(in crate::synth) tint: f64,
     /// Strength of the highlights.
-    pub gloss: f64,
+    pub(in crate::synth) gloss: f64,
     /// Share of the first lamp's light that its shadow takes away.
-    pub shadow_share: f64,
+    pub(in crate::synth) shadow_share: f64,
 }
 
 impl LightSettings {

@@ -4,20 +4,20 @@ use prehend_geometry::SplitMix64;
 use prehend_render::Mask;
 use serde::{Deserialize, Serialize};
 
-use super::field::smooth_field;
+use crate::data::smooth_field;
 
 /// Faults of the masks. Zero takes any of them away.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct MaskSettings {
+pub(in crate::synth) struct MaskSettings {
     /// Standard deviation of the outline's place \[px\].
-    pub wobble: f64,
+    pub(in crate::synth) wobble: f64,
     /// Length along the outline over which it wobbles \[px\].
-    pub wobble_length: f64,
+    pub(in crate::synth) wobble_length: f64,
     /// How far the mask leaks onto the hand where it does \[px\].
-    pub leak: f64,
+    pub(in crate::synth) leak: f64,
     /// Share of the border with the hand where it leaks.
-    pub leak_share: f64,
+    pub(in crate::synth) leak_share: f64,
 }
 
 impl MaskSettings {

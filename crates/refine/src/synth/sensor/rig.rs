@@ -1,4 +1,4 @@
-//! The camera and the skin as they are through one grasp, and the frames they take.
+//! Camera and tactile sensors with the faults that last through one grasp, and the frames they capture.
 
 use nalgebra::{Isometry3, Vector3};
 use prehend_geometry::SplitMix64;
@@ -8,12 +8,12 @@ use prehend_render::{
     render_shaded,
 };
 
-use super::SensorSettings;
 use super::calibration::Miscalibration;
 use super::depth::DepthBias;
+use super::settings::SensorSettings;
 use super::touch::TaxelCondition;
 use crate::scene::{Hand, HandMeasurement, Object, Observation};
-use crate::synth::GraspSnapshot;
+use crate::synth::snapshot::GraspSnapshot;
 
 /// Sensors with the faults that stay the same through a grasp.
 pub(in crate::synth) struct Rig<'a> {
@@ -27,9 +27,9 @@ pub(in crate::synth) struct Rig<'a> {
     paint: Paint,
 }
 
-/// One frame: what is told, and what is true.
+/// One frame: measurements and ground truth.
 pub(in crate::synth) struct Shot {
-    /// What the estimator may know.
+    /// The measurements.
     pub(in crate::synth) told: Observation,
     /// Object → camera.
     pub(in crate::synth) truth: Isometry3<f64>,
@@ -66,8 +66,8 @@ impl<'a> Rig<'a> {
         }
     }
 
-    /// A frame of `moment`, whose joints and taxels are those of the robot.
-    pub(in crate::synth) fn shoot(&self, moment: &GraspSnapshot, noise: &mut SplitMix64) -> Shot {
+    /// Captures a frame of `moment`, whose joints and taxels are those of the hand.
+    pub(in crate::synth) fn capture(&self, moment: &GraspSnapshot, noise: &mut SplitMix64) -> Shot {
         let identity = Isometry3::identity();
         let mut bodies: Vec<(&RenderModel, Isometry3<f64>)> =
             vec![(&self.object.model, moment.t_hand_object)];
@@ -76,7 +76,7 @@ impl<'a> Rig<'a> {
         let t_cam_hand = viewpoint.choose(&self.camera, &bodies, &moment.gravity, noise);
         bodies.iter_mut().for_each(|(_, pose)| *pose = t_cam_hand * *pose);
         let gravity = t_cam_hand.rotation * moment.gravity;
-        let Seen { color, depth, visible, hand } = self.look(&bodies, &gravity, noise);
+        let Rendered { color, depth, visible, hand } = self.render_rgbd(&bodies, &gravity, noise);
 
         let alone = depth_map(&self.camera, &bodies[..1]);
         let mut whole = visible.clone();
@@ -86,7 +86,7 @@ impl<'a> Rig<'a> {
         let reading = HandMeasurement {
             t_cam_hand: self.errors.hand(&t_cam_hand),
             joints: self.errors.joints(&moment.joints),
-            forces: self.settings.touch.feel(&moment.taxel_forces, &self.taxels, noise),
+            forces: self.settings.touch.simulate_taxels(&moment.taxel_forces, &self.taxels, noise),
         };
         let told = Observation {
             camera: self.errors.camera(&self.camera),
@@ -100,13 +100,13 @@ impl<'a> Rig<'a> {
         Shot { told, truth, hand: (t_cam_hand, moment.joints.clone()), whole, visible }
     }
 
-    /// Light, color and depth without the camera's faults; the first of `bodies` is the object.
-    fn look(
+    /// Renders color and depth without the camera's faults; the first of `bodies` is the object.
+    fn render_rgbd(
         &self,
         bodies: &[(&RenderModel, Isometry3<f64>)],
         gravity: &Vector3<f64>,
         noise: &mut SplitMix64,
-    ) -> Seen {
+    ) -> Rendered {
         let (width, height) = (self.camera.width, self.camera.height);
         let lights = self.settings.light.draw(bodies, &-gravity, noise);
         let (wall, behind) = self.settings.background.draw(&self.camera, noise);
@@ -131,11 +131,11 @@ impl<'a> Rig<'a> {
             mask
         };
         let (visible, hand) = (mask_of(|body| body == 0), mask_of(|body| body > 0));
-        Seen { color: picture.color, depth, visible, hand }
+        Rendered { color: picture.color, depth, visible, hand }
     }
 }
 
-struct Seen {
+struct Rendered {
     color: RgbImage,
     depth: DepthImage,
     visible: Mask,

@@ -4,19 +4,24 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use thiserror::Error;
 
-use super::{
-    BackgroundSettings, CalibrationSettings, ColorSettings, DepthSettings, LightSettings,
-    MaskSettings, ModelSettings, TouchSettings, ViewpointSettings,
-};
+use super::background::BackgroundSettings;
+use super::calibration::CalibrationSettings;
+use super::color::ColorSettings;
+use super::deformation::ModelSettings;
+use super::depth::DepthSettings;
+use super::light::LightSettings;
+use super::mask::MaskSettings;
+use super::touch::TouchSettings;
+use super::viewpoint::ViewpointSettings;
 
-/// What the sensors are like.
+/// Settings of all sensor models.
 ///
 /// ```
 /// use prehend_refine::synth::SensorSettings;
 ///
 /// let mut sensors = SensorSettings::realistic();
 /// sensors.set("depth.scale", "0")?;
-/// assert_eq!(sensors.depth.scale, 0.0);
+/// assert!(sensors.names().contains(&("depth.scale".to_owned(), 0.0)));
 /// let unknown = sensors.set("depth.scael", "0").unwrap_err();
 /// assert!(unknown.to_string().contains("depth.scale"));
 /// # Ok::<(), prehend_refine::synth::SettingError>(())
@@ -25,23 +30,23 @@ use super::{
 #[serde(deny_unknown_fields)]
 pub struct SensorSettings {
     /// Where the camera stands.
-    pub viewpoint: ViewpointSettings,
+    pub(in crate::synth) viewpoint: ViewpointSettings,
     /// The light.
-    pub light: LightSettings,
+    pub(in crate::synth) light: LightSettings,
     /// What is behind the hand.
-    pub background: BackgroundSettings,
+    pub(in crate::synth) background: BackgroundSettings,
     /// The color images.
-    pub color: ColorSettings,
+    pub(in crate::synth) color: ColorSettings,
     /// The depth images.
-    pub depth: DepthSettings,
+    pub(in crate::synth) depth: DepthSettings,
     /// The masks.
-    pub mask: MaskSettings,
+    pub(in crate::synth) mask: MaskSettings,
     /// The taxels.
-    pub touch: TouchSettings,
+    pub(in crate::synth) touch: TouchSettings,
     /// What is known of camera, hand and joints.
-    pub calibration: CalibrationSettings,
+    pub(in crate::synth) calibration: CalibrationSettings,
     /// The object model that the estimator is given.
-    pub model: ModelSettings,
+    pub(in crate::synth) model: ModelSettings,
 }
 
 /// Why a setting could not be set.
@@ -83,7 +88,7 @@ impl SensorSettings {
         }
     }
 
-    /// What a robot with a stereo camera and a tactile skin sees.
+    /// A stereo camera and tactile sensors with realistic faults.
     pub fn realistic() -> Self {
         Self {
             viewpoint: ViewpointSettings::preset(),
@@ -109,6 +114,7 @@ impl SensorSettings {
             SettingError::Unknown { key: key.to_owned(), known }
         };
         let (group, name) = key.split_once('.').ok_or_else(unknown)?;
+        let group = if group == "colour" { "color" } else { group };
         let slot = all.get_mut(group).and_then(|g| g.get_mut(name)).ok_or_else(unknown)?;
         let wrong = |expected| SettingError::Value {
             key: key.to_owned(),
@@ -164,6 +170,8 @@ mod tests {
             settings.set(name, "1").unwrap();
         }
         assert!(settings.names().iter().all(|(_, v)| *v == 1.0));
+        settings.set("colour.blur", "2").unwrap();
+        assert_eq!(settings.color.blur, 2.0);
     }
 
     #[test]

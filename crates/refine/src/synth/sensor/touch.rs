@@ -1,4 +1,4 @@
-//! A tactile skin and its faults.
+//! Tactile sensors and their faults.
 
 use nalgebra::Vector3;
 use prehend_geometry::SplitMix64;
@@ -9,23 +9,23 @@ use crate::data::bop::UNITS_PER_NEWTON;
 /// Faults of the taxels. Forces are in sensor units, 1000 a newton.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct TouchSettings {
+pub(in crate::synth) struct TouchSettings {
     /// Share of the taxels that say nothing, the same ones through a grasp.
-    pub dead_share: f64,
+    pub(in crate::synth) dead_share: f64,
     /// Share of the taxels that feel what is not there, the same ones through a grasp.
-    pub false_share: f64,
+    pub(in crate::synth) false_share: f64,
     /// Mean size of what those feel \[units\].
-    pub false_force: f64,
+    pub(in crate::synth) false_force: f64,
     /// Largest error of a taxel's gain, uniform, the same through a grasp.
-    pub gain: f64,
+    pub(in crate::synth) gain: f64,
     /// Standard deviation of the noise of each axis \[units\].
-    pub noise: f64,
+    pub(in crate::synth) noise: f64,
     /// Forces smaller than this read as none \[units\].
-    pub threshold: f64,
+    pub(in crate::synth) threshold: f64,
     /// Step of the readings \[units\].
-    pub quantum: f64,
+    pub(in crate::synth) quantum: f64,
     /// Largest reading of an axis \[units\].
-    pub limit: f64,
+    pub(in crate::synth) limit: f64,
 }
 
 impl TouchSettings {
@@ -74,7 +74,7 @@ impl TouchSettings {
     }
 
     /// Readings \[N\] of taxels that bear `forces` \[N\].
-    pub(super) fn feel(
+    pub(super) fn simulate_taxels(
         &self,
         forces: &[Vector3<f64>],
         condition: &[TaxelCondition],
@@ -117,7 +117,7 @@ mod tests {
         let mut noise = SplitMix64::new(12);
         let forces = vec![Vector3::z() * force; 5000];
         let condition = settings.condition(forces.len(), &mut noise);
-        settings.feel(&forces, &condition, &mut noise)
+        settings.simulate_taxels(&forces, &condition, &mut noise)
     }
 
     #[test]

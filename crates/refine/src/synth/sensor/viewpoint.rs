@@ -9,19 +9,19 @@ use serde::{Deserialize, Serialize};
 /// Where cameras stand about the hand.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct ViewpointSettings {
+pub(in crate::synth) struct ViewpointSettings {
     /// Nearest distance from the object's center \[m\].
-    pub nearest: f64,
+    pub(in crate::synth) nearest: f64,
     /// Farthest distance \[m\].
-    pub farthest: f64,
+    pub(in crate::synth) farthest: f64,
     /// Focal length, as a share of the image's width.
-    pub focal_width_ratio: f64,
+    pub(in crate::synth) focal_width_ratio: f64,
     /// Standard deviation of where the camera aims, per axis \[m\].
-    pub aim: f64,
+    pub(in crate::synth) aim: f64,
     /// Standard deviation of the angle between the image's vertical and the world's \[deg\].
-    pub roll_deg: f64,
+    pub(in crate::synth) roll_deg: f64,
     /// Largest share of the object that the hand may hide, where a view with less can be found.
-    pub hidden_share: f64,
+    pub(in crate::synth) hidden_share: f64,
 }
 
 impl ViewpointSettings {

@@ -12,10 +12,12 @@ pub(super) const ALBEDO_UNIFORM: u32 = 0;
 pub(super) const ALBEDO_CORNERS: u32 = 1;
 pub(super) const ALBEDO_TEXTURE: u32 = 2;
 
-/// Robust costs.
-pub(super) const ROBUST_NONE: u32 = 0;
-pub(super) const ROBUST_HUBER: u32 = 1;
-pub(super) const ROBUST_CAUCHY: u32 = 2;
+/// Robust kernels.
+pub(super) const KERNEL_SQUARED: u32 = 0;
+pub(super) const KERNEL_HUBER: u32 = 1;
+pub(super) const KERNEL_CAUCHY: u32 = 2;
+pub(super) const KERNEL_GEMAN_MCCLURE: u32 = 3;
+pub(super) const KERNEL_TUKEY: u32 = 4;
 
 /// Flags of the SoftRas mode.
 pub(super) const SOFT_MODE: u32 = 1;
@@ -31,7 +33,7 @@ pub(super) const SUM_COLOR: usize = 0;
 pub(super) const SUM_MASK: usize = 1;
 pub(super) const SUM_DEPTH: usize = 2;
 pub(super) const SUM_GRADIENT: usize = 3;
-pub(super) const SUM_JTJ: usize = 9;
+pub(super) const SUM_HESSIAN: usize = 9;
 pub(super) const SUM_COVERED: usize = 30;
 pub(super) const SUM_CONTOUR: usize = 31;
 pub(super) const SUM_HIDDEN: usize = 32;
@@ -69,8 +71,8 @@ pub(super) struct Params {
     pub(super) depth_weight: f32,
     pub(super) depth_scale: f32,
     pub(super) depth_truncation: f32,
-    pub(super) robust_kind: u32,
-    pub(super) robust_scale: f32,
+    pub(super) kernel_kind: u32,
+    pub(super) kernel_scale: f32,
     pub(super) penalize_occluded: u32,
     pub(super) reach: f32,
     pub(super) blur: f32,

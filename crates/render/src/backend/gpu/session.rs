@@ -11,7 +11,7 @@ use super::device::{
 };
 use super::layout::{
     PICTURE_COLUMNS, Params, SUM_COLOR, SUM_COLUMNS, SUM_CONTOUR, SUM_COVERED, SUM_DEPTH,
-    SUM_GRADIENT, SUM_HIDDEN, SUM_JTJ, SUM_MASK, SUM_MISSED, SUM_WITH_DEPTH, Usage,
+    SUM_GRADIENT, SUM_HESSIAN, SUM_HIDDEN, SUM_MASK, SUM_MISSED, SUM_WITH_DEPTH, Usage,
 };
 use super::upload;
 use super::work::{self, BUDGET, Capacity, Work};
@@ -58,9 +58,6 @@ impl GpuSession {
         }
         if matches!(problem.loss.mode, Mode::Contour(options) if options.creases) {
             return Err(unsupported("creases that blend"));
-        }
-        if problem.loss.options.affine {
-            return Err(unsupported("an affine correction"));
         }
         if !upload::texels_fit(model) {
             return Err(unsupported("texels outside 0..=1"));
@@ -257,11 +254,10 @@ impl GpuSession {
 
     fn linearized(&self, sums: &[f32]) -> Linearized {
         // In the order of the processor's own sums.
-        const { assert!(SUM_JTJ == SUM_GRADIENT + 6) };
+        const { assert!(SUM_HESSIAN == SUM_GRADIENT + 6) };
         let entries = std::array::from_fn(|i| f64::from(sums[SUM_GRADIENT + i]));
-        let (right, jtj) = unpacked(&entries, self.problem.target.normalization);
-        let gradient = right * 2.0;
-        Linearized { loss: self.loss(sums), gradient, jtj, affine: None }
+        let (gradient, hessian) = unpacked(&entries, self.problem.target.normalization);
+        Linearized { loss: self.loss(sums), gradient, hessian }
     }
 }
 

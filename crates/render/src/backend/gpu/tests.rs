@@ -4,8 +4,8 @@
 use std::sync::{Arc, OnceLock};
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3, Vector6};
-use prehend_geometry::TriMesh;
 use prehend_geometry::shapes::cuboid;
+use prehend_geometry::{RobustKernel, TriMesh};
 
 use super::session::GpuSession;
 use super::work::Capacity;
@@ -18,7 +18,7 @@ use crate::model::RenderModel;
 use crate::pose_loss::tests::{
     Noise, camera, full_options, lamp, pose, target_of, textured_box, twisted,
 };
-use crate::pose_loss::{Linearized, LossOptions, PoseLoss, Robust};
+use crate::pose_loss::{Linearized, LossOptions, PoseLoss};
 use crate::raster::depth_map;
 use crate::shapes_for_tests::{lump, painted, torus};
 
@@ -93,8 +93,9 @@ fn cases() -> Vec<Case> {
     let (plain, full) = (LossOptions::default(), full_options());
     let lump = painted(lump(0.045, 60), 0.05);
     let torus = painted(torus(0.04, 0.015, 60), 0.05);
-    let robust = |robust: Robust| LossOptions { robust, ..full };
-    let hidden = LossOptions { penalize_occluded: true, ..robust(Robust::Huber(0.05)) };
+    let robust = |kernel: RobustKernel| LossOptions { kernel, ..full };
+    let hidden =
+        LossOptions { penalize_occluded: true, ..robust(RobustKernel::Huber { scale: 0.05 }) };
     let one = contour(1.0);
     vec![
         case("painted lump", &lump, lamp(), one, plain, none, 4),
@@ -103,8 +104,34 @@ fn cases() -> Vec<Case> {
         case("torus", &torus, lamp(), one, full, none, 6),
         case("torus, wide band", &torus, lamp(), contour(4.0), full, none, 4),
         case("open box", &without_two_faces(), lamp(), one, full, none, 4),
-        case("Cauchy", &lump, lamp(), contour(1.5), robust(Robust::Cauchy(0.1)), none, 2),
-        with_occluder(case("occluder", &lump, lamp(), one, robust(Robust::Huber(0.05)), none, 4)),
+        case(
+            "Geman–McClure",
+            &lump,
+            lamp(),
+            one,
+            robust(RobustKernel::GemanMcClure { scale: 0.2 }),
+            none,
+            2,
+        ),
+        case("Tukey", &lump, lamp(), one, robust(RobustKernel::Tukey { scale: 0.5 }), none, 2),
+        case(
+            "Cauchy",
+            &lump,
+            lamp(),
+            contour(1.5),
+            robust(RobustKernel::Cauchy { scale: 0.1 }),
+            none,
+            2,
+        ),
+        with_occluder(case(
+            "occluder",
+            &lump,
+            lamp(),
+            one,
+            robust(RobustKernel::Huber { scale: 0.05 }),
+            none,
+            4,
+        )),
         with_occluder(case("hidden is missed", &lump, lamp(), one, hidden, none, 2)),
         case("right border", &lump, lamp(), one, full, Vector3::new(0.11, 0.0, 0.0), 3),
         case("corner", &torus, lamp(), one, full, Vector3::new(-0.1, -0.08, 0.0), 3),
@@ -155,11 +182,11 @@ fn error(a: impl Iterator<Item = f64>, b: impl Iterator<Item = f64>) -> f64 {
 fn errors(cpu: &Linearized, gpu: &Linearized) -> [f64; 3] {
     let s = Vector6::new(1.0, 1.0, 1.0, 25.0, 25.0, 25.0);
     let gradient = |l: &Linearized| l.gradient.component_mul(&s);
-    let jtj = |l: &Linearized| l.jtj.component_mul(&(s * s.transpose()));
+    let hessian = |l: &Linearized| l.hessian.component_mul(&(s * s.transpose()));
     [
         error([cpu.loss.total].into_iter(), [gpu.loss.total].into_iter()),
         error(gradient(cpu).iter().copied(), gradient(gpu).iter().copied()),
-        error(jtj(cpu).iter().copied(), jtj(gpu).iter().copied()),
+        error(hessian(cpu).iter().copied(), hessian(gpu).iter().copied()),
     ]
 }
 
@@ -181,7 +208,7 @@ fn softras_cases() -> Vec<Case> {
     let wide = softras(|o| (o.sigma, o.blur_radius, o.gamma) = (1e-3, 5e-3, 1e-3));
     let flat = softras(|o| o.perspective_correct = false);
     let culled = softras(|o| o.cull_backfaces = true);
-    let robust = LossOptions { robust: Robust::Cauchy(0.1), ..full };
+    let robust = LossOptions { kernel: RobustKernel::Cauchy { scale: 0.1 }, ..full };
     vec![
         case("soft lump", &lump, lamp(), usual, full, none, 3),
         case("soft dense lump", &dense, lamp(), usual, full, none, 2),
@@ -291,7 +318,7 @@ fn what_cannot_be_seen_misses_the_whole_mask() {
         assert_eq!(c.loss.counts, g.loss.counts, "{i}");
         assert!(errors(c, g).iter().all(|e| *e < 1e-4), "{i}: {c:?} {g:?}");
         if i != 2 {
-            assert_eq!((g.gradient.norm(), g.jtj.norm()), (0.0, 0.0));
+            assert_eq!((g.gradient.norm(), g.hessian.norm()), (0.0, 0.0));
         }
     }
     // The camera inside the object, and in its surface: whatever is seen, everything stays finite.
@@ -299,7 +326,7 @@ fn what_cannot_be_seen_misses_the_whole_mask() {
         .map(|z| Hypothesis { t_cam_object: Isometry3::translation(0.0, 0.0, z), light: lamp() });
     for at in session.linearize(&inside).unwrap() {
         assert!(at.loss.total.is_finite() && at.gradient.iter().all(|v| v.is_finite()));
-        assert!(at.jtj.iter().all(|v| v.is_finite()));
+        assert!(at.hessian.iter().all(|v| v.is_finite()));
     }
     assert_eq!(session.linearize(&[]).unwrap(), []);
 }

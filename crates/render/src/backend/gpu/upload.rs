@@ -1,16 +1,18 @@
 //! Models, targets, settings and hypotheses in the form that the shaders read.
 
+use prehend_geometry::RobustKernel;
+
 use super::layout::{
-    ALBEDO_CORNERS, ALBEDO_TEXTURE, ALBEDO_UNIFORM, Corner, Edge, Hypothesis, LEVELS, Params,
-    ROBUST_CAUCHY, ROBUST_HUBER, ROBUST_NONE, SOFT_CLIP, SOFT_CULL, SOFT_MODE, SOFT_PERSPECTIVE,
-    TILE, TargetPixel,
+    ALBEDO_CORNERS, ALBEDO_TEXTURE, ALBEDO_UNIFORM, Corner, Edge, Hypothesis, KERNEL_CAUCHY,
+    KERNEL_GEMAN_MCCLURE, KERNEL_HUBER, KERNEL_SQUARED, KERNEL_TUKEY, LEVELS, Params, SOFT_CLIP,
+    SOFT_CULL, SOFT_MODE, SOFT_PERSPECTIVE, TILE, TargetPixel,
 };
 use crate::backend::{self, PoseProblem};
 use crate::camera::Camera;
 use crate::contour::LEAST_STEP;
 use crate::mode::{Mode, SoftRasOptions};
 use crate::model::{Albedo, RenderModel};
-use crate::pose_loss::{LossOptions, Robust, Target};
+use crate::pose_loss::{LossOptions, Target};
 use crate::posed;
 use crate::projected::Region;
 use crate::softras::Settings;
@@ -166,13 +168,14 @@ fn set_loss(params: &mut Params, options: &LossOptions, has_depth: bool) {
         // Shaders may assume that nothing is infinite.
         params.depth_truncation = depth.truncation.min(1e30) as f32;
     }
-    let (kind, scale) = match options.robust {
-        Robust::None => (ROBUST_NONE, 1.0),
-        Robust::Huber(k) => (ROBUST_HUBER, k),
-        Robust::Cauchy(k) => (ROBUST_CAUCHY, k),
+    params.kernel_kind = match options.kernel {
+        RobustKernel::Squared => KERNEL_SQUARED,
+        RobustKernel::Huber { .. } => KERNEL_HUBER,
+        RobustKernel::Cauchy { .. } => KERNEL_CAUCHY,
+        RobustKernel::GemanMcClure { .. } => KERNEL_GEMAN_MCCLURE,
+        RobustKernel::Tukey { .. } => KERNEL_TUKEY,
     };
-    params.robust_kind = kind;
-    params.robust_scale = scale as f32;
+    params.kernel_scale = options.kernel.scale().unwrap_or(1.0) as f32;
     params.penalize_occluded = options.penalize_occluded.into();
 }
 

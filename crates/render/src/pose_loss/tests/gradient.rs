@@ -13,8 +13,11 @@ fn gradients_match_differences_of_the_value() {
     let options = [
         (1.0, LossOptions::default()),
         (1.0, full_options()),
-        (1.5, LossOptions { robust: Robust::Cauchy(0.1), ..full_options() }),
-        (1.0, LossOptions { robust: Robust::Huber(0.05), ..LossOptions::default() }),
+        (1.5, LossOptions { kernel: RobustKernel::Cauchy { scale: 0.1 }, ..full_options() }),
+        (
+            1.0,
+            LossOptions { kernel: RobustKernel::Huber { scale: 0.05 }, ..LossOptions::default() },
+        ),
     ];
     for (name, mesh, light) in scenes {
         let model = RenderModel::new(&mesh).unwrap();

@@ -24,8 +24,8 @@ fn tiles_add_up_and_each_has_the_derivatives_of_its_own_share() {
         assert!((total / whole.loss.total - 1.0).abs() < 1e-5);
         let gradient: Vector6<f64> = parts.iter().map(|t| t.at.gradient).sum();
         assert!((gradient - whole.gradient).norm() < 1e-4 * whole.gradient.norm());
-        let jtj: Matrix6<f64> = parts.iter().map(|t| t.at.jtj).sum();
-        assert!((jtj - whole.jtj).norm() < 1e-5 * whole.jtj.norm());
+        let hessian: Matrix6<f64> = parts.iter().map(|t| t.at.hessian).sum();
+        assert!((hessian - whole.hessian).norm() < 1e-5 * whole.hessian.norm());
     }
     // The share of one tile, as the pose moves.
     let of = |pose: &Isometry3<f64>, tile: &Tile| {

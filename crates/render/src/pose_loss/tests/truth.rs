@@ -59,7 +59,7 @@ impl Scene<'_> {
         Target::new(self.camera, &whole, &mask).unwrap()
     }
 
-    /// Cosine and relative error of the gradient of the mean squared error, with rotations scaled to lengths at the model's radius.
+    /// Cosine and relative error of the gradient of half the mean squared error, with rotations scaled to lengths at the model's radius.
     pub(super) fn compare(
         &self,
         truth: &Isometry3<f64>,
@@ -80,7 +80,7 @@ impl Scene<'_> {
                     (0..3).for_each(|k| sum += f64::from(ours[k] - theirs[k]).powi(2));
                 }
             }
-            sum * target.normalization
+            0.5 * sum * target.normalization
         };
         // A tenth of a pixel either way, also where rotations move most: where two outlines are less than a pixel apart, the
         // loss bends within a pixel.
@@ -203,7 +203,7 @@ fn data_gradients_of_scans_are_true() {
     }
 }
 
-/// The mean squared error of a picture with 9 x 9 hard samples a pixel.
+/// Half the mean squared error of a picture with 9 x 9 hard samples a pixel.
 fn supersampled_error(
     model: &RenderModel,
     pose: &Isometry3<f64>,
@@ -216,7 +216,7 @@ fn supersampled_error(
     for (ours, theirs) in picture.color.pixels().iter().zip(&target.color) {
         (0..3).for_each(|k| sum += f64::from(ours[k] - theirs[k]).powi(2));
     }
-    sum * target.normalization
+    0.5 * sum * target.normalization
 }
 
 #[test]

@@ -7,7 +7,9 @@ use prehend_autodiff::{Fwd, Scalar};
 use crate::body::RigidBody;
 use crate::error::SimulationError;
 use crate::state::State;
-use crate::world::{Step, World};
+use crate::time::Step;
+use crate::world::World;
+use crate::world::body_id::BodyId;
 
 const MOST_ITERATIONS: usize = 60;
 
@@ -50,7 +52,7 @@ pub(super) struct Equations<'a> {
     pub(super) states: &'a [State],
     /// The states at the end, right for the bodies that are not free.
     pub(super) at_end: Vec<State>,
-    pub(super) free: Vec<usize>,
+    pub(super) free: Vec<BodyId>,
     pub(super) step: Step,
 }
 
@@ -59,7 +61,7 @@ impl Equations<'_> {
     /// which what will touch touches already.
     pub(super) fn solve(&self) -> Result<DVector<f64>, SimulationError> {
         let start = |flight: f64| {
-            let velocity = |&body: &usize| {
+            let velocity = |&body: &BodyId| {
                 let State { linear, angular, .. } = self.states[body];
                 let linear = linear + self.world.gravity * flight;
                 [linear.x, linear.y, linear.z, angular.x, angular.y, angular.z]
@@ -135,12 +137,12 @@ impl Equations<'_> {
         let mut slots = vec![None; ends.len()];
         self.free.iter().enumerate().for_each(|(slot, &body)| slots[body] = Some(slot));
         let mut wrenches: Vec<Vector6<f64>> =
-            self.world.bodies.iter().map(|body| body.load).collect();
+            self.world.bodies.iter().map(|body| body.external_wrench).collect();
         let mut by_velocity = DMatrix::zeros(x.len(), x.len());
         let mut states: Vec<State<Fwd<12>>> = ends.iter().map(State::lift).collect();
         for pair in &self.lifted.contacts {
             // The velocities of the one body in lanes 0..6, of the other in lanes 6..12.
-            let bodies = [pair.samples, pair.field];
+            let bodies = [pair.bodies.samples, pair.bodies.field];
             for (body, lane) in bodies.into_iter().zip([0, 6]) {
                 if let Some(slot) = slots[body] {
                     let at = velocity_at(x, slot);
@@ -194,7 +196,7 @@ impl Equations<'_> {
 
     /// The velocity of equal kinetic energy of 1 kg \[m/s\].
     fn norm(&self, velocities: &DVector<f64>) -> f64 {
-        let energy = |(slot, &body): (usize, &usize)| {
+        let energy = |(slot, &body): (usize, &BodyId)| {
             let rigid = self.world.bodies[body].rigid()?;
             let at = Vector6::from(velocity_at(velocities, slot));
             let (linear, angular) = (at.fixed_rows::<3>(0), at.fixed_rows::<3>(3));

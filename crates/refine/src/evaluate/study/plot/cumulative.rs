@@ -4,42 +4,42 @@ use std::collections::BTreeMap;
 
 use plotters::prelude::*;
 
-use super::super::document::row_label;
-use super::super::kind::TRUTH;
-use super::super::record::FrameRecord;
-use super::super::tables::{Block, Tables};
-use super::{Area, DEVIATIONS, Drawn, color, failed, legend, page, swatch, tick};
+use super::page::{Area, DEVIATIONS, Drawn, color, failed, legend, page, swatch, tick};
 use crate::evaluate::metrics::COLUMNS;
+use crate::evaluate::study::document::row_label;
+use crate::evaluate::study::kind::TRUTH;
+use crate::evaluate::study::record::FrameRecord;
+use crate::evaluate::study::tables::{Table, Tables};
 
 /// A row's label and its sorted errors.
 type Curve = (String, Vec<f64>);
 
 pub(super) fn draw(
     tables: &Tables,
-    block: &Block,
+    table: &Table,
     records: &BTreeMap<usize, FrameRecord>,
 ) -> Result<String, String> {
-    let title = format!("{}, noise {}", tables.study.title(), block.level);
+    let title = format!("{}, noise {}", tables.study.title(), table.level);
     let legend = format!(
         "share of {} frames whose error is at most so large; frames without a result never are{}",
-        block.frames,
-        failed(tables, &block.level)
+        table.frames,
+        failed(tables, &table.level)
     );
     let rows: Vec<&str> =
-        block.lines.iter().map(|l| l.row.as_str()).filter(|&row| row != TRUTH).collect();
+        table.rows.iter().map(|l| l.name.as_str()).filter(|&row| row != TRUTH).collect();
     page(&title, &legend, 340, |k, area| {
         let metric = DEVIATIONS[k];
         let curves: Vec<Curve> = rows
             .iter()
             .map(|row| {
-                let of_level = records.values().filter(|r| r.level == block.level);
+                let of_level = records.values().filter(|r| r.level == table.level);
                 let mut errors: Vec<f64> =
                     of_level.filter_map(|r| r.outcome(row)?.score?.values()[metric]).collect();
                 errors.sort_by(f64::total_cmp);
                 (row_label(tables.study, row), errors)
             })
             .collect();
-        panel(area, metric, &curves, block.frames, k == 0)
+        panel(area, metric, &curves, table.frames, k == 0)
     })
 }
 

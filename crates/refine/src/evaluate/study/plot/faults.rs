@@ -2,11 +2,11 @@
 
 use plotters::prelude::*;
 
-use super::super::design::{Design, perturbed};
-use super::super::sweep::Sweep;
-use super::super::tables::{Block, Estimate, Tables};
-use super::{Area, Drawn, color, legend, page, swatch, tick};
+use super::page::{Area, Drawn, color, legend, page, swatch, tick};
 use crate::evaluate::metrics::COLUMNS;
+use crate::evaluate::study::design::{Design, perturbed};
+use crate::evaluate::study::sweep::Sweep;
+use crate::evaluate::study::tables::{Estimate, Table, Tables};
 
 /// Panels: a metric, and whether its median is drawn instead of its mean.
 const PANELS: [(usize, bool); 4] = [(0, false), (1, false), (0, true), (1, true)];
@@ -17,23 +17,23 @@ type Point = (f64, f64, [f64; 2]);
 pub(super) fn draw(
     design: &Design,
     tables: &Tables,
-    block: &Block,
+    table: &Table,
     sweep: Sweep,
 ) -> Result<String, String> {
-    let title = format!("{}, noise {}: {sweep}", tables.study.title(), block.level);
+    let title = format!("{}, noise {}: {sweep}", tables.study.title(), table.level);
     let amounts = sweep.amounts();
     let rows = |method: &str| amounts.iter().map(|&a| perturbed(method, sweep, a)).collect();
     let methods: Vec<(&str, Vec<String>)> =
         design.methods.iter().map(|m| (m.name.as_str(), rows(&m.name))).collect();
     let mut legend = format!(
         "means of {} frames with 95 % confidence above, medians below, dotted: initial pose",
-        block.frames
+        table.frames
     );
     // A plot must not look complete when it is not.
     for (method, rows) in &methods {
         let lacks = |(row, amount): (&String, &f64)| {
-            let line = block.lines.iter().find(|l| l.row == *row)?;
-            let lacking = block.frames - line.n;
+            let line = table.rows.iter().find(|l| l.name == *row)?;
+            let lacking = table.frames - line.n;
             (lacking > 0).then(|| format!("{lacking} at {}", tick(*amount)))
         };
         let lacking: Vec<String> = rows.iter().zip(amounts).filter_map(lacks).collect();
@@ -44,7 +44,7 @@ pub(super) fn draw(
     page(&title, &legend, 340, |k, area| {
         let (metric, median) = PANELS[k];
         let of = |row: &str| -> Option<Estimate> {
-            block.lines.iter().find(|l| l.row == row)?.metrics[metric]
+            table.rows.iter().find(|l| l.name == row)?.metrics[metric]
         };
         let point = |(&amount, row): (&f64, &String)| -> Option<Point> {
             let e = of(row)?;
@@ -120,11 +120,11 @@ fn panel(
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::kind::Kind;
-    use super::super::super::record::RowOutcome;
-    use super::super::super::tables::tests::example;
-    use super::super::plots;
     use super::*;
+    use crate::evaluate::study::kind::Kind;
+    use crate::evaluate::study::plot::plots;
+    use crate::evaluate::study::record::RowOutcome;
+    use crate::evaluate::study::tables::tests::example;
 
     #[test]
     fn every_sweep_has_a_plot_that_says_what_failed() {

@@ -1,14 +1,14 @@
-//! What was predicted beside what was so.
+//! Reliability diagrams: observed frequency over predicted probability.
 
 use std::collections::BTreeMap;
 
 use plotters::prelude::*;
 
-use super::super::belief::EVENTS;
-use super::super::calibration::{Calibration, ELLIPSOIDS, beliefs, holding};
-use super::super::record::FrameRecord;
-use super::super::tables::Tables;
-use super::{Area, Drawn, color, legend, page, swatch};
+use super::page::{Area, Drawn, color, legend, page, swatch};
+use crate::evaluate::study::calibration::{Calibration, ELLIPSOIDS, ellipsoid_levels, posteriors};
+use crate::evaluate::study::posterior::EVENTS;
+use crate::evaluate::study::record::FrameRecord;
+use crate::evaluate::study::tables::Tables;
 
 /// A name and points, in per cent.
 type Curve = (String, Vec<(f64, f64)>);
@@ -27,7 +27,7 @@ pub(super) fn draw(
          last: share within ellipsoids of the posterior",
         calibration.n
     );
-    let believed = beliefs(records, calibration.level.as_deref(), &calibration.method);
+    let posteriors = posteriors(records, calibration.level.as_deref(), &calibration.method);
     page(&title, &legend, 420, |k, area| match PANELS.get(k) {
         Some(range) => {
             let events = &calibration.events[range.clone()];
@@ -43,9 +43,9 @@ pub(super) fn draw(
         }
         None => {
             let curve = |of: usize| -> Curve {
-                let holding = holding(&believed, of);
-                let total = holding.len().max(1) as f64;
-                let points = holding.iter().enumerate().filter(|(_, p)| p.is_finite());
+                let levels = ellipsoid_levels(&posteriors, of);
+                let total = levels.len().max(1) as f64;
+                let points = levels.iter().enumerate().filter(|(_, p)| p.is_finite());
                 let points =
                     points.map(|(count, p)| (100.0 * p, 100.0 * (count + 1) as f64 / total));
                 let (name, degrees) = ELLIPSOIDS[of];
@@ -98,9 +98,9 @@ fn panel(area: &Area<'_>, curves: &[Curve], x: &str, y: &str, marked: bool) -> D
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::calibration::tests::calibrated;
-    use super::super::plots;
     use super::*;
+    use crate::evaluate::study::calibration::tests::calibrated;
+    use crate::evaluate::study::plot::plots;
 
     #[test]
     fn every_level_has_a_diagram_with_all_events_and_ellipsoids() {

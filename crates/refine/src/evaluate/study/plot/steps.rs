@@ -2,9 +2,10 @@
 
 use plotters::prelude::*;
 
-use super::super::tables::{Block, Tables};
-use super::{Area, Drawn, STEPS, color, failed, legend, page, swatch, tick};
+use super::page::{Area, Drawn, STEPS, color, failed, legend, page, swatch, tick};
 use crate::evaluate::metrics::COLUMNS;
+use crate::evaluate::study::kind::INITIAL;
+use crate::evaluate::study::tables::{Row, Table, Tables};
 
 /// A point of a curve: steps, mean, and the ends of its interval.
 type Point = (f64, f64, [f64; 2]);
@@ -16,31 +17,30 @@ pub(super) fn draw(tables: &Tables) -> Result<String, String> {
     let legend = format!(
         "means and 95 % confidence by level of noise, dashed: published, 0 steps: initial pose{failures}"
     );
-    let blocks: Vec<&Block> = tables.overall().collect();
-    page(tables.study.title(), &legend, 340, |k, area| panel(area, STEPS[k], &blocks, k == 0))
+    let all: Vec<&Table> = tables.overall().collect();
+    page(tables.study.title(), &legend, 340, |k, area| panel(area, STEPS[k], &all, k == 0))
 }
 
 /// The number of steps of a row, the initial pose being 0.
 fn steps(row: &str) -> Option<f64> {
-    if row == super::super::kind::INITIAL { Some(0.0) } else { row.parse().ok() }
+    if row == INITIAL { Some(0.0) } else { row.parse().ok() }
 }
 
-fn ours(block: &Block, metric: usize) -> Vec<Point> {
-    let point = |line: &super::super::tables::Line| {
-        let estimate = line.metrics[metric]?;
-        Some((steps(&line.row)?, estimate.mean, estimate.interval.unwrap_or([estimate.mean; 2])))
+fn ours(table: &Table, metric: usize) -> Vec<Point> {
+    let point = |row: &Row| {
+        let estimate = row.metrics[metric]?;
+        Some((steps(&row.name)?, estimate.mean, estimate.interval.unwrap_or([estimate.mean; 2])))
     };
-    block.lines.iter().filter_map(point).collect()
+    table.rows.iter().filter_map(point).collect()
 }
 
-fn theirs(block: &Block, metric: usize) -> Vec<(f64, f64)> {
-    let point =
-        |line: &super::super::tables::Line| Some((steps(&line.row)?, line.published?[metric]?));
-    block.lines.iter().filter_map(point).collect()
+fn theirs(table: &Table, metric: usize) -> Vec<(f64, f64)> {
+    let point = |row: &Row| Some((steps(&row.name)?, row.published?[metric]?));
+    table.rows.iter().filter_map(point).collect()
 }
 
-fn panel(area: &Area<'_>, metric: usize, blocks: &[&Block], named: bool) -> Drawn {
-    let curves: Vec<Curves> = blocks.iter().map(|b| (ours(b, metric), theirs(b, metric))).collect();
+fn panel(area: &Area<'_>, metric: usize, all: &[&Table], named: bool) -> Drawn {
+    let curves: Vec<Curves> = all.iter().map(|b| (ours(b, metric), theirs(b, metric))).collect();
     let values = curves
         .iter()
         .flat_map(|(ours, theirs)| ours.iter().map(|p| p.2[1]).chain(theirs.iter().map(|p| p.1)));
@@ -64,13 +64,13 @@ fn panel(area: &Area<'_>, metric: usize, blocks: &[&Block], named: bool) -> Draw
         .x_desc("steps")
         .y_desc(COLUMNS[metric])
         .draw()?;
-    for (k, (block, (ours, theirs))) in blocks.iter().zip(&curves).enumerate() {
+    for (k, (table, (ours, theirs))) in all.iter().zip(&curves).enumerate() {
         let color = color(k + 1);
         let style = color.stroke_width(2);
         let line = ours.iter().map(|&(x, y, _)| (x, y));
         let series = chart.draw_series(LineSeries::new(line, style).point_size(3))?;
         if named {
-            series.label(format!("noise {}", block.level)).legend(move |at| swatch(at, style));
+            series.label(format!("noise {}", table.level)).legend(move |at| swatch(at, style));
         }
         chart.draw_series(
             ours.iter().map(|&(x, _, [low, high])| PathElement::new([(x, low), (x, high)], style)),

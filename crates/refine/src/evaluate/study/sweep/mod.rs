@@ -1,4 +1,4 @@
-//! What can be wrong with an observation, by kind and amount: the faults of the robustness study.
+//! Faults of an observation by kind and amount, for the robustness study.
 
 mod hand;
 mod missing;
@@ -6,11 +6,9 @@ mod noise;
 mod occlusion;
 mod touch;
 
-use std::fmt;
-use std::str::FromStr;
-
 use prehend_geometry::SplitMix64;
 use serde::{Deserialize, Serialize};
+use strum::{Display, EnumString, VariantArray, VariantNames};
 
 use crate::data::bop::ResultRow;
 use crate::scene::Observation;
@@ -19,12 +17,29 @@ use crate::scene::Observation;
 ///
 /// Faults come on top of what is already wrong with an observation. A frame's fault is the same for every method, and of a
 /// greater amount it is the same one, only more of it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    Serialize,
+    Deserialize,
+    Display,
+    EnumString,
+    VariantArray,
+    VariantNames,
+)]
 #[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case", parse_err_ty = String, parse_err_fn = unknown)]
 pub enum Sweep {
     /// Depth noise, as a multiple of a realistic sensor's.
     DepthNoise,
     /// Color noise, as a multiple of a realistic sensor's.
+    #[serde(alias = "colour-noise")]
+    #[strum(to_string = "color-noise", serialize = "colour-noise")]
     ColorNoise,
     /// How much of the object is still to be seen beside a block in front of it \[%\].
     Visibility,
@@ -41,6 +56,8 @@ pub enum Sweep {
     /// Share of the image without depth, in patches \[%\].
     MissingDepth,
     /// Share of the image that is gray, in patches \[%\].
+    #[serde(alias = "missing-colour")]
+    #[strum(to_string = "missing-color", serialize = "missing-colour")]
     MissingColor,
     /// Whether there is no touch: 100 %, or 0.
     MissingTouch,
@@ -50,41 +67,10 @@ pub enum Sweep {
 
 impl Sweep {
     /// All kinds.
-    pub const ALL: [Self; 12] = [
-        Self::DepthNoise,
-        Self::ColorNoise,
-        Self::Visibility,
-        Self::HandPosition,
-        Self::HandRotation,
-        Self::Joints,
-        Self::DeadTaxels,
-        Self::FalseTaxels,
-        Self::MissingDepth,
-        Self::MissingColor,
-        Self::MissingTouch,
-        Self::MissingHand,
-    ];
-
-    /// Its name in commands, tables and files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::DepthNoise => "depth-noise",
-            Self::ColorNoise => "color-noise",
-            Self::Visibility => "visibility",
-            Self::HandPosition => "hand-position",
-            Self::HandRotation => "hand-rotation",
-            Self::Joints => "joints",
-            Self::DeadTaxels => "dead-taxels",
-            Self::FalseTaxels => "false-taxels",
-            Self::MissingDepth => "missing-depth",
-            Self::MissingColor => "missing-color",
-            Self::MissingTouch => "missing-touch",
-            Self::MissingHand => "missing-hand",
-        }
-    }
+    pub const ALL: &'static [Self] = <Self as VariantArray>::VARIANTS;
 
     /// What the amounts are, with their unit.
-    pub fn axis(self) -> &'static str {
+    pub(super) fn axis(self) -> &'static str {
         match self {
             Self::DepthNoise => "depth noise, times a realistic sensor's",
             Self::ColorNoise => "color noise, times a realistic sensor's",
@@ -101,8 +87,8 @@ impl Sweep {
         }
     }
 
-    /// The amounts that the study takes; of the first one, nothing is wrong.
-    pub fn amounts(self) -> &'static [f64] {
+    /// The amounts that the study compares; the first one means no fault.
+    pub(super) fn amounts(self) -> &'static [f64] {
         match self {
             Self::DepthNoise | Self::ColorNoise => &[1.0, 2.0, 4.0, 8.0],
             Self::Visibility => &[100.0, 75.0, 50.0, 25.0, 10.0],
@@ -116,8 +102,8 @@ impl Sweep {
         }
     }
 
-    /// Makes `amount` of the fault, in the unit of [`axis`](Self::axis). `seed` decides which one.
-    pub fn perturb(self, observation: &mut Observation, amount: f64, seed: u64) {
+    /// Adds `amount` of the fault, in the unit of [`axis`](Self::axis); `seed` seeds its random numbers.
+    pub(super) fn perturb(self, observation: &mut Observation, amount: f64, seed: u64) {
         if amount == self.amounts()[0] {
             return;
         }
@@ -152,21 +138,9 @@ impl Sweep {
     }
 }
 
-impl fmt::Display for Sweep {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
-impl FromStr for Sweep {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        Self::ALL.into_iter().find(|s| s.name() == text).ok_or_else(|| {
-            let names: Vec<&str> = Self::ALL.iter().map(|s| s.name()).collect();
-            format!("unknown sweep {text:?}: one of {}", names.join(", "))
-        })
-    }
+fn unknown(text: &str) -> String {
+    let names = <Sweep as VariantNames>::VARIANTS;
+    format!("unknown sweep {text:?}: one of {}", names.join(", "))
 }
 
 #[cfg(test)]
@@ -202,7 +176,7 @@ pub(super) mod tests {
 
     #[test]
     fn the_first_amount_is_nothing_and_every_other_is_something_that_repeats() {
-        for sweep in Sweep::ALL {
+        for &sweep in Sweep::ALL {
             for (k, &amount) in sweep.amounts().iter().enumerate() {
                 let [mut once, mut again, mut other] = [square(), square(), square()];
                 sweep.perturb(&mut once, amount, 5);
@@ -221,14 +195,15 @@ pub(super) mod tests {
 
     #[test]
     fn names_are_read_back_and_seeds_differ() {
-        for sweep in Sweep::ALL {
-            assert_eq!(sweep.name().parse(), Ok(sweep));
+        for &sweep in Sweep::ALL {
+            assert_eq!(sweep.to_string().parse(), Ok(sweep));
             let json = serde_json::to_string(&sweep).unwrap();
             assert_eq!(json, format!("\"{sweep}\""));
         }
+        assert_eq!("missing-colour".parse(), Ok(Sweep::MissingColor));
         assert!("smell".parse::<Sweep>().unwrap_err().contains("one of depth-noise, "));
         let mut seeds = std::collections::BTreeSet::new();
-        for sweep in Sweep::ALL {
+        for &sweep in Sweep::ALL {
             for (scene_id, im_id, obj_id) in [(0, 0, 0), (0, 0, 1), (0, 1, 0), (1, 0, 0)] {
                 let t_cam_model = Isometry3::identity();
                 let row = ResultRow { scene_id, im_id, obj_id, score: 0.0, t_cam_model, time: 0.0 };

@@ -1,0 +1,255 @@
+//! Operations as a whole on the tape: one node for each of their results.
+
+use std::rc::Rc;
+
+use crate::local::LocalFunction;
+use crate::tape::{push_block, push_custom, with_tape};
+use crate::var::Var;
+use crate::vjp::CustomVjp;
+
+/// Records an operation on `inputs` with values `outputs`, differentiated by `operation`.
+///
+/// # Panics
+/// If an input belongs to another recording (see [`Var`]).
+pub fn custom(inputs: &[Var], outputs: &[f64], operation: impl CustomVjp) -> Vec<Var> {
+    // Nothing can flow back.
+    if outputs.is_empty() {
+        return Vec::new();
+    }
+    let group = push_custom(inputs, outputs.len(), Rc::new(operation));
+    outputs.iter().enumerate().map(|(i, &value)| group.var(i, value)).collect()
+}
+
+/// [`Scalar::local`](crate::Scalar::local) for [`Var`].
+#[inline]
+pub(crate) fn local<const N: usize, const M: usize>(
+    function: &impl LocalFunction<N, M>,
+    x: [Var; N],
+) -> [Var; M] {
+    let (values, jacobian) = function.linearize(x.map(Var::value));
+    let group = match function.reverse_rule() {
+        None => push_block(&x, M, jacobian.as_flattened()),
+        Some(rule) => push_custom(&x, M, rule),
+    };
+    std::array::from_fn(|i| group.var(i, values[i]))
+}
+
+/// [`Scalar::sum_local`](crate::Scalar::sum_local) for [`Var`].
+#[inline]
+pub(crate) fn sum_local<const K: usize, F: LocalFunction<K, 1>>(
+    x: &[Var],
+    terms: impl IntoIterator<Item = (F, [usize; K])>,
+) -> Var {
+    let linearize = |(term, places): (F, [usize; K])| {
+        (places, term.linearize(places.map(|place| x[place].value)))
+    };
+    record_sum(x, terms.into_iter().map(linearize))
+}
+
+/// Records the sum of terms of `x`, given their places, values and slopes, as one node.
+#[inline]
+pub(crate) fn record_sum<const K: usize>(
+    x: &[Var],
+    terms: impl Iterator<Item = ([usize; K], ([f64; 1], [[f64; K]; 1]))>,
+) -> Var {
+    let mut sum = 0.0;
+    let mut gradient = with_tape(|tape| tape.scratch(x.len()));
+    gradient.fill(0.0);
+    // Neighboring terms often share a number. What was touched last is held in a register, because reading
+    // back what was just written would be the slowest part.
+    let mut held = (0, 0.0);
+    for (places, ([value], [slopes])) in terms {
+        sum += value;
+        for (place, slope) in places.into_iter().zip(slopes) {
+            if place != held.0 {
+                gradient[held.0] = held.1;
+                held = (place, gradient[place]);
+            }
+            held.1 += slope;
+        }
+    }
+    if let Some(last) = gradient.get_mut(held.0) {
+        *last = held.1;
+    }
+    let node = push_block(x, 1, &gradient).var(0, sum);
+    with_tape(|tape| tape.keep(gradient));
+    node
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fwd::Fwd;
+    use crate::recording::{Recording, gradient};
+    use crate::scalar::Scalar;
+
+    struct Pair;
+
+    impl LocalFunction<2, 2> for Pair {
+        fn evaluate<S: Scalar>(&self, [a, b]: [S; 2]) -> [S; 2] {
+            [a.sin() * b, a / b]
+        }
+    }
+
+    struct Difference(f64);
+
+    impl LocalFunction<2, 1> for Difference {
+        fn evaluate<S: Scalar>(&self, [a, b]: [S; 2]) -> [S; 1] {
+            [(a - b).powi(2).times(self.0)]
+        }
+    }
+
+    fn through_pair<S: Scalar>(x: &[S], local: bool) -> S {
+        // A fused input, one that is used twice, and a constant.
+        let inputs = [[x[0].times(3.0), x[1]], [x[0] * x[1], x[0]], [x[1], S::constant(2.0)]];
+        let apply = |x| if local { S::local(&Pair, x) } else { Pair.evaluate(x) };
+        inputs.map(apply).into_iter().flatten().fold(S::zero(), |sum, y| sum + y * y)
+    }
+
+    #[test]
+    fn a_block_has_the_derivative_of_its_code() {
+        let x = [0.7, -1.3];
+        let (value, plain) = gradient(|x| through_pair(x, false), &x);
+        let (by_block, block) = gradient(|x| through_pair(x, true), &x);
+        assert_eq!(value, by_block);
+        plain.iter().zip(&block).for_each(|(a, b)| assert!((a - b).abs() < 1e-14, "{a} {b}"));
+        assert_eq!(through_pair(&x, true), value);
+        let forward = through_pair(&Fwd::<2>::variables(x), true);
+        assert!((forward.derivative[1] - plain[1]).abs() < 1e-14);
+    }
+
+    #[test]
+    fn a_rule_takes_the_place_of_the_jacobian() {
+        /// Twice the input; only gradients above zero pass.
+        struct OneWay;
+        impl LocalFunction<1, 1> for OneWay {
+            fn evaluate<S: Scalar>(&self, [x]: [S; 1]) -> [S; 1] {
+                [x.times(2.0)]
+            }
+            fn reverse_rule(&self) -> Option<Rc<dyn CustomVjp>> {
+                Some(Rc::new(OneWay))
+            }
+        }
+        impl CustomVjp for OneWay {
+            fn vjp(&self, output_adjoints: &[f64], input_adjoints: &mut [f64]) {
+                input_adjoints[0] += 2.0 * output_adjoints[0].max(0.0);
+            }
+        }
+        let slope = |sign: f64| {
+            gradient(|x| Var::local(&OneWay, [x[0] * x[1]])[0].times(sign), &[3.0, 5.0]).1
+        };
+        assert_eq!((slope(1.0), slope(-1.0)), (vec![10.0, 6.0], vec![0.0, 0.0]));
+        assert_eq!(<Fwd<1>>::local(&OneWay, [Fwd::variable(3.0, 0)])[0].derivative, [2.0]);
+    }
+
+    #[test]
+    fn constants_alone_record_nothing() {
+        let recording = Recording::start();
+        let [x] = recording.variables([1.0]);
+        let before = recording.statistics();
+        let [y, _] = Var::local(&Pair, [2.0, 3.0].map(Var::from));
+        assert_eq!(recording.statistics(), before);
+        assert_eq!((recording.gradient(y).wrt(x), recording.gradient(y).wrt(y)), (0.0, 0.0));
+    }
+
+    #[test]
+    fn a_sum_of_terms_is_one_node() {
+        let x: Vec<f64> = (0..20).map(|i| f64::from(i * i % 7)).collect();
+        let terms = || (0..19).map(|i| (Difference(f64::from(i as u32)), [i, (i * 5 + 1) % 20]));
+        let (plain_value, plain) = gradient(|x| crate::scalar::add_up(x, terms()), &x);
+        let (value, summed) = gradient(|x| Var::sum_local(x, terms()), &x);
+        assert_eq!((plain_value, &plain), (value, &summed));
+        assert_eq!(f64::sum_local(&x, terms()), value);
+        let recording = Recording::start();
+        let inputs = recording.variables_of(&x);
+        let _ = Var::sum_local(&inputs, terms());
+        assert_eq!(recording.statistics().nodes, x.len() + 1);
+    }
+
+    #[test]
+    fn long_blocks_find_their_parents_wherever_they_are() {
+        fn sum<S: Scalar>(x: &[S], order: fn(&mut [S])) -> S {
+            let mut x: Vec<S> = x.to_vec();
+            order(&mut x);
+            let terms = (0..299).map(|i| (Difference(1.0 + i as f64), [i, (i * 7 + 1) % 300]));
+            S::sum_local(&x, terms)
+        }
+        let x: Vec<f64> = (0..300).map(|i| (i * i % 11) as f64).collect();
+        // Neighbors on the tape; the other way round; a fused result, a constant and a repetition among them.
+        type Order<S> = fn(&mut [S]);
+        let orders: [(Order<Var>, Order<f64>); 3] =
+            [(|_| (), |_| ()), (<[Var]>::reverse, <[f64]>::reverse), (mix::<Var>, mix::<f64>)];
+        fn mix<S: Scalar>(x: &mut [S]) {
+            (x[10], x[70], x[200]) = (x[10].times(2.0), S::constant(0.5), x[201]);
+        }
+        for (order, plain_order) in orders {
+            let (value, gradient) = gradient(|x| sum(x, order), &x);
+            assert_eq!(value, sum(&x, plain_order));
+            let differences =
+                crate::check::finite_difference_gradient(|x| sum(x, plain_order), &x, 1e-3);
+            // Central differences of a quadratic function are exact but for rounding.
+            for (exact, difference) in gradient.iter().zip(&differences) {
+                assert!((exact - difference).abs() < 1e-5 * (1.0 + exact.abs()));
+            }
+        }
+    }
+
+    #[test]
+    #[should_panic(expected = "another recording")]
+    fn a_block_refuses_foreign_numbers() {
+        let stale = Recording::start().variable(1.0);
+        let recording = Recording::start();
+        let _ = Var::local(&Pair, [recording.variable(1.0), stale]);
+    }
+
+    struct Dot(Vec<f64>);
+
+    impl CustomVjp for Dot {
+        fn vjp(&self, output_adjoints: &[f64], input_adjoints: &mut [f64]) {
+            for (a, w) in input_adjoints.iter_mut().zip(&self.0) {
+                *a += output_adjoints[0] * w;
+            }
+        }
+    }
+
+    const WEIGHTS: [f64; 2] = [2.0, -3.0];
+
+    struct Weighted;
+
+    impl LocalFunction<2, 1> for Weighted {
+        fn evaluate<S: Scalar>(&self, [a, b]: [S; 2]) -> [S; 1] {
+            [a.times(WEIGHTS[0]) + b.times(WEIGHTS[1])]
+        }
+    }
+
+    #[test]
+    fn custom_and_local_operations_agree_with_plain_ones() {
+        let recording = Recording::start();
+        let [x, y] = recording.variables([0.4, -1.2]);
+        // An input that itself is a fused operation, and an output that is used twice.
+        let inputs = [x * x, y + y];
+        let weights = WEIGHTS;
+        let value = inputs[0].value() * weights[0] + inputs[1].value() * weights[1];
+        let plain = inputs[0] * Var::from(2.0) - inputs[1] * Var::from(3.0);
+        let by_vjp = custom(&inputs, &[value], Dot(weights.to_vec()))[0];
+        let by_local = Var::local(&Weighted, inputs)[0];
+        let gradients = [plain, by_vjp, by_local].map(|out| {
+            let adjoints = recording.gradient(out * out + x);
+            [adjoints.wrt(x), adjoints.wrt(y)]
+        });
+        for g in gradients {
+            for (a, b) in g.iter().zip(&gradients[0]) {
+                assert!((a - b).abs() < 1e-14, "{gradients:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn an_operation_without_outputs_does_not_hide_earlier_ones() {
+        let recording = Recording::start();
+        let x = recording.variable(0.4);
+        let y = custom(&[x], &[1.2], Dot(vec![3.0]))[0];
+        assert!(custom(&[x, y], &[], Dot(vec![])).is_empty());
+        assert_eq!(recording.gradient(y).wrt(x), 3.0);
+    }
+}

@@ -1,0 +1,85 @@
+//! Arithmetic in reverse mode.
+
+use crate::differentiable::{Differentiable, chain_active};
+use crate::local::LocalFunction;
+use crate::real_field::impl_real_field;
+use crate::recompute::Recompute;
+use crate::scalar::Scalar;
+use crate::tape::{push, refuse_foreign};
+use crate::var::Var;
+use crate::{recomputed, record};
+
+impl Var {
+    /// The result of an operation on two numbers with the same node.
+    #[inline(always)]
+    fn fuse(self, other: Self, value: f64, [da, db]: [f64; 2]) -> Self {
+        if self.recording != other.recording {
+            refuse_foreign();
+        }
+        let coefficient = chain_active(da, self.coefficient) + chain_active(db, other.coefficient);
+        Self { value, coefficient, ..self }
+    }
+}
+
+impl Differentiable for Var {
+    type Inner = f64;
+
+    #[inline]
+    fn lift(value: f64) -> Self {
+        Self { value, coefficient: 0.0, node: 0, recording: 0 }
+    }
+
+    #[inline]
+    fn primal(self) -> f64 {
+        self.value
+    }
+
+    #[inline]
+    fn is_constant(self) -> bool {
+        self.recording == 0
+    }
+
+    #[inline(always)]
+    fn unary(self, value: f64, slope: f64) -> Self {
+        // A constant stays one: its coefficient is never looked at.
+        let coefficient = chain_active(slope, self.coefficient);
+        Self { value, coefficient, ..self }
+    }
+
+    #[inline(always)]
+    fn binary(self, other: Self, value: f64, [da, db]: [f64; 2]) -> Self {
+        match (self.is_constant(), other.is_constant()) {
+            (_, true) => self.unary(value, da),
+            (true, false) => other.unary(value, db),
+            (false, false) => {
+                if self.node == other.node {
+                    return self.fuse(other, value, [da, db]);
+                }
+                push(value, [self, other], [da, db])
+            }
+        }
+    }
+}
+
+impl_real_field!([] Var {
+    #[inline]
+    fn local<const N: usize, const M: usize>(
+        function: &impl LocalFunction<N, M>,
+        x: [Self; N],
+    ) -> [Self; M] {
+        record::local(function, x)
+    }
+
+    #[inline]
+    fn sum_local<const K: usize, F: LocalFunction<K, 1>>(
+        x: &[Self],
+        terms: impl IntoIterator<Item = (F, [usize; K])>,
+    ) -> Self {
+        record::sum_local(x, terms)
+    }
+
+    #[inline]
+    fn recompute<F: Recompute>(function: F, x: &[Self]) -> Result<Vec<Self>, F::Error> {
+        recomputed::recompute(function, x)
+    }
+});

@@ -1,0 +1,74 @@
+//! `prehend refine --frame`: one frame described by a JSON file (docs/FRAME.md).
+
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::process::ExitCode;
+use std::sync::Arc;
+
+use prehend_refine::data::FrameInput;
+use prehend_refine::data::bop::write_atomically;
+use prehend_refine::scene::{inspect_object, inspect_pose};
+use prehend_refine::strategy::{PosteriorSummary, Strategy};
+use prehend_refine::{Frame, Method, State};
+use serde_json::json;
+
+use super::options::{MethodOptions, OutputOptions};
+use crate::terminal::{cache, complain, progress, say};
+
+/// Refines the frame of `file`; the pose goes to the output file, and to standard output without one or with `--json`.
+pub(super) fn refine_frame(
+    file: &Path,
+    output: &OutputOptions,
+    method: &MethodOptions,
+) -> anyhow::Result<ExitCode> {
+    let input = FrameInput::load(file, method.seed, cache().as_ref())?;
+    let mut configured = method.configured()?;
+    let mut terms = Vec::new();
+    if let Method::Heuristic(heuristic) = &mut configured {
+        // A frame brings what it has: gradients whose evidence is absent drop out unless they were asked for.
+        if !method.terms_given() {
+            heuristic.gradients.retain(|&g| input.offers(g));
+        }
+        terms = heuristic.gradients.iter().map(|g| g.name()).collect();
+    }
+    let object = Arc::new(input.object);
+    let robot = input.robot.as_ref();
+    let mut warnings = inspect_object(&object);
+    warnings.extend(inspect_pose(
+        &input.observation,
+        &object,
+        robot.map(Arc::as_ref),
+        &input.t_cam_object,
+    ));
+    warnings.iter().for_each(|warning| complain(format!("warning: {warning}")));
+    let frame = Frame::new(&input.observation, &object, robot)?;
+    let initial = State::new(&frame, &input.t_cam_object)?;
+    let bar = progress(configured.iterations(), "refining");
+    let refined = configured.run(&frame, &initial, &mut |p| {
+        bar.set_position(p.iteration as u64);
+        ControlFlow::Continue(())
+    })?;
+    bar.finish_and_clear();
+    let pose = refined.t_cam_object();
+    let q = pose.rotation.quaternion();
+    let matrix = pose.to_homogeneous();
+    let rows: Vec<Vec<f64>> = matrix.row_iter().map(|r| r.iter().copied().collect()).collect();
+    let document = json!({
+        "t_cam_object": rows,
+        "translation_m": pose.translation.vector.as_slice(),
+        "quaternion_wxyz": [q.w, q.i, q.j, q.k],
+        "terms": terms,
+        "iteration": refined.iteration,
+        "warnings": warnings,
+        "confidence": refined.posterior.as_ref().map(PosteriorSummary::from),
+        "trace": refined.trace,
+    });
+    let text = format!("{document:#}");
+    if let Some(out) = &output.out {
+        write_atomically(out, format!("{text}\n").as_bytes())?;
+    }
+    if output.out.is_none() || output.json {
+        say(&text)?;
+    }
+    Ok(ExitCode::SUCCESS)
+}

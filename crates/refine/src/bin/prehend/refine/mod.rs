@@ -1,0 +1,56 @@
+//! `prehend refine`.
+
+mod dataset;
+mod frame;
+mod options;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::bail;
+use clap::Args;
+use prehend_refine::data::bop::check_writable;
+
+use self::dataset::DatasetRun;
+use self::frame::refine_frame;
+use self::options::{MethodOptions, OutputOptions};
+use crate::options::{Input, Selection, limit_threads};
+
+#[derive(Args)]
+#[command(
+    override_usage = "prehend refine --dataset <DIR> --poses <FILE> --out <FILE> [OPTIONS]\n       \
+                            prehend refine --frame <FILE> [OPTIONS]"
+)]
+#[command(mut_arg("dataset", |a| a.required(false).required_unless_present("frame")))]
+pub(crate) struct Refine {
+    #[command(flatten)]
+    selection: Option<Selection>,
+    /// Poses on the dataset's images, as a BOP results file
+    #[arg(long, value_name = "FILE", required_unless_present = "frame", help_heading = "Input")]
+    poses: Option<PathBuf>,
+    /// Instead of a dataset, one frame described by a JSON file (see docs/FRAME.md)
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["Selection", "poses", "report"], help_heading = "Input")]
+    frame: Option<PathBuf>,
+    #[command(flatten)]
+    output: OutputOptions,
+    #[command(flatten)]
+    method: MethodOptions,
+}
+
+impl Refine {
+    pub(crate) fn run(self) -> anyhow::Result<ExitCode> {
+        let Self { selection, poses, frame, output, method } = self;
+        // What cannot be written must be known before the work, not after it.
+        if let Some(out) = &output.out {
+            check_writable(out)?;
+        }
+        limit_threads(method.threads)?;
+        if let Some(file) = frame {
+            return refine_frame(&file, &output, &method);
+        }
+        let (Some(selection), Some(poses)) = (selection, poses) else {
+            bail!("give --dataset, --poses and --out, or --frame");
+        };
+        DatasetRun::new(&Input { selection, poses }, &output, &method)?.run()
+    }
+}

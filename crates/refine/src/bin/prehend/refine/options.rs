@@ -1,0 +1,130 @@
+//! Options of `prehend refine`: how to refine, and what to write.
+
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+
+use anyhow::bail;
+use clap::Args;
+use prehend_refine::strategy::GradientKind;
+use prehend_refine::{Method, NamedMethod};
+
+/// What to write, and where.
+#[derive(Args)]
+pub(super) struct OutputOptions {
+    /// Write the refined poses here: a BOP results file, or JSON with --frame (then optional)
+    ///
+    /// The file appears whole or not at all, once all frames are done; an existing one is replaced. Until then
+    /// FILE.journal records the finished frames: after an interruption the same command resumes, and ends with
+    /// the same file. What frames took is in FILE.times.csv.
+    #[arg(long, value_name = "FILE", required_unless_present = "frame", help_heading = "Output")]
+    pub(super) out: Option<PathBuf>,
+    /// Write a web page here, with pictures of the poses before and after and loss curves
+    #[arg(long, value_name = "DIR", help_heading = "Output")]
+    pub(super) report: Option<PathBuf>,
+    /// Print JSON on standard output: poses, times, loss curves and failures
+    #[arg(long, help_heading = "Output")]
+    pub(super) json: bool,
+    /// Put times into the results' last column, which is -1 otherwise; frames are then refined one after another, each
+    /// with all threads
+    #[arg(long, conflicts_with = "frame", help_heading = "Output")]
+    pub(super) time: bool,
+    /// Discard what an interrupted run with other settings left, instead of refusing
+    #[arg(long, conflicts_with = "frame", help_heading = "Output")]
+    pub(super) restart: bool,
+}
+
+/// How to refine: a named method, changed by options.
+#[derive(Args)]
+pub(super) struct MethodOptions {
+    /// How to refine, with settings that the options below change [default: fused; with --terms, combined]
+    #[arg(
+        long,
+        value_name = "NAME",
+        value_parser = named,
+        long_help = method_help(),
+        help_heading = "Method"
+    )]
+    method: Option<&'static NamedMethod>,
+    /// Largest number of iterations, fused: in each of its stages; the search ends earlier when the steps become negligible
+    /// [default: up to 10 a stage; robust-icp: 60; others: 400]
+    #[arg(long, value_name = "N", help_heading = "Method")]
+    iterations: Option<usize>,
+    /// Run all the iterations, however small the steps become
+    #[arg(long, help_heading = "Method")]
+    exhaustive: bool,
+    /// Evidence to use, a list of physics, rendering, depth and tactile such as "rendering,depth"
+    /// [default: the method's; with --frame, of those what the frame brings]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = "Method")]
+    terms: Option<Vec<GradientKind>>,
+    /// Return the last pose instead of the one whose rendering fits best
+    #[arg(long, help_heading = "Method")]
+    no_checkpoint: bool,
+    /// Seed of the points sampled on the object's surface
+    #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Method")]
+    pub(super) seed: u64,
+    /// Worker threads; the poses are the same for any number [default: all cores]
+    #[arg(long, value_name = "N", help_heading = "Method")]
+    pub(super) threads: Option<NonZeroUsize>,
+}
+
+/// The method called `name`.
+fn named(name: &str) -> Result<&'static NamedMethod, String> {
+    NamedMethod::find(name).ok_or_else(|| {
+        let names: Vec<_> = NamedMethod::all().iter().map(|m| m.name).collect();
+        format!("unknown method: one of {}", names.join(", "))
+    })
+}
+
+/// What `--help` says of the methods.
+fn method_help() -> String {
+    let mut text = "How to refine, with settings that the options below change:\n".to_owned();
+    for method in NamedMethod::all() {
+        text += &format!("\n  {:<19} {}", method.name, method.summary);
+    }
+    text + "\n\n[default: fused; with --terms, combined]"
+        + "\n\nAlso fused-without-E, fused-only-E and fused-fixed-N, which `prehend study evidence` compares"
+}
+
+impl MethodOptions {
+    /// The method asked for, or the default.
+    pub(super) fn method(&self) -> &'static NamedMethod {
+        // Only the heuristic takes its evidence apart by terms.
+        let default =
+            if self.terms.is_some() { &NamedMethod::COMBINED } else { &NamedMethod::FUSED };
+        self.method.unwrap_or(default)
+    }
+
+    /// Whether the user says which terms to use.
+    pub(super) fn terms_given(&self) -> bool {
+        self.terms.is_some()
+    }
+
+    /// The settings of the method, changed by the other options.
+    pub(super) fn configured(&self) -> anyhow::Result<Method> {
+        let named = self.method();
+        let mut method = named.method();
+        if let Some(terms) = &self.terms {
+            let Method::Heuristic(heuristic) = &mut method else {
+                bail!("--terms: the method {} does not combine gradients", named.name);
+            };
+            heuristic.gradients.clone_from(terms);
+        }
+        if self.no_checkpoint {
+            match &mut method {
+                Method::Heuristic(heuristic) => heuristic.checkpoint = false,
+                Method::Icp(icp) => icp.checkpoint = false,
+                Method::RobustIcp(_) => {}
+                Method::Fused(_) => {
+                    bail!("--no-checkpoint: the method {} returns its last pose anyway", named.name)
+                }
+            }
+        }
+        if let Some(iterations) = self.iterations {
+            method.set_iterations(iterations);
+        }
+        if self.exhaustive {
+            method.set_exhaustive();
+        }
+        Ok(method)
+    }
+}

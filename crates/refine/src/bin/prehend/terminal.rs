@@ -1,0 +1,58 @@
+//! Standard output, standard error, progress and exit codes; and where preparations are kept between runs.
+
+use std::env;
+use std::io::{ErrorKind, Write};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use etcetera::BaseStrategy;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use prehend_geometry::GridCache;
+
+/// Prints `text` and a line break. That the reader has gone away (`prehend … | head`) is no error.
+pub(crate) fn say(text: impl std::fmt::Display) -> anyhow::Result<()> {
+    let mut out = std::io::stdout().lock();
+    match writeln!(out, "{text}").and_then(|()| out.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(error.into()),
+        _ => Ok(()),
+    }
+}
+
+/// Prints `text` and a line break on standard error; a failure to do so does not end the run.
+pub(crate) fn complain(text: impl std::fmt::Display) {
+    let _ = writeln!(std::io::stderr().lock(), "{text}");
+}
+
+/// A progress bar over `length` steps of `what` with rate and remaining time, on standard error; hidden where that is no
+/// terminal.
+pub(crate) fn progress(length: usize, what: &'static str) -> ProgressBar {
+    // indicatif hides a bar by itself where standard error is no terminal.
+    let bar = ProgressBar::with_draw_target(Some(length as u64), ProgressDrawTarget::stderr());
+    let template = "{msg} [{bar:30}] {pos}/{len} {per_sec}, {eta} left";
+    if let Ok(style) = ProgressStyle::with_template(template) {
+        bar.set_style(style.progress_chars("=> "));
+    }
+    bar.set_message(what);
+    bar
+}
+
+/// The exit code of a run over many frames, of which `done` succeeded: 0 without failures, 2 if some frames failed and 1 if
+/// all did. The failures, one line each, are printed to standard error.
+pub(crate) fn exit_code(done: usize, failures: &[String]) -> ExitCode {
+    if failures.is_empty() {
+        return ExitCode::SUCCESS;
+    }
+    complain(format!("\n{done} done, {} failed:", failures.len()));
+    failures.iter().for_each(|failure| complain(format!("  {failure}")));
+    ExitCode::from(if done > 0 { 2 } else { 1 })
+}
+
+/// The cache in the folder that `PREHEND_CACHE` names, none if that is empty, and by default in `prehend` in the user's cache
+/// folder.
+pub(crate) fn cache() -> Option<GridCache> {
+    let folder = match env::var_os("PREHEND_CACHE") {
+        Some(folder) => PathBuf::from(folder),
+        None => etcetera::choose_base_strategy().ok()?.cache_dir().join("prehend"),
+    };
+    (!folder.as_os_str().is_empty()).then(|| GridCache::new(folder))
+}

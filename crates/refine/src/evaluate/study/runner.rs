@@ -1,0 +1,212 @@
+//! Runs the methods of a study on a frame.
+
+use std::collections::BTreeMap;
+use std::ops::ControlFlow;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
+
+use nalgebra::Isometry3;
+
+use super::design::{Design, Frame, Trial};
+use super::kind::{INITIAL, Kind, TRUTH};
+use super::posterior::PredictedPosterior;
+use super::record::{FrameRecord, RowOutcome};
+use super::sweep::Sweep;
+use crate::data::bop::ResultRow;
+use crate::data::{AssetError, Assets, PlainPose, Sensor};
+use crate::evaluate::scoring::Scorer;
+use crate::method::Method;
+use crate::problem::State;
+use crate::scene::{self, Object};
+use crate::strategy::{Posterior, Strategy};
+
+/// Runs the methods of a study frame by frame; several runners may share the assets.
+pub struct Runner<'a> {
+    design: &'a Design,
+    methods: &'a [(String, Method)],
+    assets: &'a Mutex<Assets<'a>>,
+    scorer: Scorer<'a>,
+}
+
+/// A frame's record, and the seconds that each method took.
+pub struct FrameResult {
+    /// The record.
+    pub record: FrameRecord,
+    /// By method.
+    pub seconds: Vec<(String, f64)>,
+}
+
+/// A pose and the iteration it comes from.
+type Pose = (Isometry3<f64>, usize);
+
+/// The result of a method on a frame.
+struct Refined {
+    /// The poses that the study compares: one, or one for each number of steps.
+    poses: Vec<Pose>,
+    seconds: f64,
+    object: Arc<Object>,
+    posterior: Option<Posterior>,
+}
+
+impl<'a> Runner<'a> {
+    /// A runner of `methods`, those of the design, with their settings.
+    pub fn new(
+        design: &'a Design,
+        methods: &'a [(String, Method)],
+        assets: &'a Mutex<Assets<'a>>,
+    ) -> Self {
+        let dataset = assets.lock().unwrap_or_else(PoisonError::into_inner).dataset();
+        Self { design, methods, assets, scorer: Scorer::new(dataset) }
+    }
+
+    /// Runs all methods on a frame. What fails is in the record.
+    pub fn run(&mut self, frame: &Frame) -> FrameResult {
+        let row = &frame.row;
+        let mut seconds = Vec::new();
+        let mut outcomes = Vec::new();
+        let truth = self.scorer.true_pose(row).map(|pose| (pose, None));
+        outcomes.push(self.outcome(TRUTH, row, truth.map_err(|e| e.to_string())));
+        outcomes.push(self.outcome(INITIAL, row, Ok((row.t_cam_model, None))));
+        // Every sweep begins without a fault: that is run once for all of them.
+        let mut unperturbed: BTreeMap<String, Vec<RowOutcome>> = BTreeMap::new();
+        for trial in self.design.trials() {
+            if trial.fault.is_none()
+                && let Some(known) = unperturbed.get(&trial.method)
+            {
+                let renamed = known.iter().zip(trial.rows);
+                outcomes.extend(renamed.map(|(same, row)| RowOutcome { row, ..same.clone() }));
+                continue;
+            }
+            let (mut found, time) = self.run_trial(frame, &trial);
+            found.iter_mut().for_each(|outcome| outcome.perturbed = trial.fault.is_some());
+            if trial.fault.is_none() {
+                seconds.extend(time.map(|time| (trial.method.clone(), time)));
+                unperturbed.insert(trial.method, found.clone());
+            }
+            outcomes.extend(found);
+        }
+        let record = FrameRecord {
+            level: self.design.levels[frame.level].name.clone(),
+            scene_id: row.scene_id,
+            im_id: row.im_id,
+            obj_id: row.obj_id,
+            outcomes,
+        };
+        FrameResult { record, seconds }
+    }
+
+    /// The outcomes of the rows of a trial, and the seconds that it took.
+    fn run_trial(&mut self, frame: &Frame, trial: &Trial) -> (Vec<RowOutcome>, Option<f64>) {
+        let refined = self
+            .methods
+            .iter()
+            .find(|(name, _)| *name == trial.method)
+            .ok_or_else(|| format!("there is no method {}", trial.method))
+            .and_then(|(_, method)| {
+                self.refine(frame, method, trial.fault).map_err(|e| e.to_string())
+            });
+        let row = &frame.row;
+        let refined = match refined {
+            Ok(refined) => refined,
+            Err(reason) => {
+                let failed = |r: &String| self.outcome(r, row, Err(reason.clone()));
+                return (trial.rows.iter().map(failed).collect(), None);
+            }
+        };
+        let poses = trial.rows.iter().zip(&refined.poses);
+        let mut outcomes: Vec<RowOutcome> = poses
+            .map(|(name, (pose, at))| self.outcome(name, row, Ok((*pose, Some(*at)))))
+            .collect();
+        if let Some(posterior) = refined.posterior.filter(|_| self.needs_posterior()) {
+            for (outcome, (pose, _)) in outcomes.iter_mut().zip(&refined.poses) {
+                let Ok(truth) =
+                    self.scorer.true_pose(&ResultRow { t_cam_model: *pose, ..row.clone() })
+                else {
+                    continue;
+                };
+                let belief = PredictedPosterior::new(&posterior, &refined.object, &truth);
+                if belief.is_finite() {
+                    outcome.belief = Some(belief);
+                } else if outcome.failed.is_none() {
+                    outcome.failed = Some("the posterior is not finite".into());
+                }
+            }
+        }
+        (outcomes, Some(refined.seconds))
+    }
+
+    /// Whether the study compares posteriors with the truth.
+    fn needs_posterior(&self) -> bool {
+        self.design.study == Kind::Posterior
+    }
+
+    /// Refines a frame, with a fault of the observation if there is one.
+    fn refine(
+        &self,
+        frame: &Frame,
+        method: &Method,
+        fault: Option<(Sweep, f64)>,
+    ) -> Result<Refined, AssetError> {
+        let row = &frame.row;
+        let (object, mut observation, hand) = {
+            let mut assets = self.assets.lock().unwrap_or_else(PoisonError::into_inner);
+            let object = assets.object(row.obj_id)?;
+            let image = assets.dataset().frame(row.scene_id, row.im_id)?;
+            let required = Sensor::required_by(method);
+            let (observation, hand) = assets.observation(&image, frame.instance, &required)?;
+            (object, observation, hand)
+        };
+        if let Some((sweep, amount)) = fault {
+            sweep.perturb(&mut observation, amount, sweep.seed(row));
+        }
+        let steps = &self.design.steps;
+        let mut poses: Vec<Pose> = Vec::new();
+        let start = Instant::now();
+        let frame = scene::Frame::new(&observation, &object, hand.as_ref())?;
+        let initial = State::new(&frame, &row.t_cam_model)?;
+        let refined = method.run(&frame, &initial, &mut |p| {
+            // A run of fewer iterations would have come just as far: nothing in it looks ahead.
+            if steps.contains(&p.iteration) {
+                poses.push((p.t_cam_object, p.iteration));
+            }
+            ControlFlow::Continue(())
+        })?;
+        let seconds = start.elapsed().as_secs_f64();
+        // One pose without steps; with them, a run that ended early stays where it is.
+        poses.resize(steps.len().max(1), (*refined.t_cam_object(), refined.iteration));
+        let posterior = refined.posterior;
+        drop(frame);
+        Ok(Refined { poses, seconds, object, posterior })
+    }
+
+    fn outcome(
+        &mut self,
+        name: &str,
+        row: &ResultRow,
+        pose: Result<(Isometry3<f64>, Option<usize>), String>,
+    ) -> RowOutcome {
+        let failure = |reason: String| RowOutcome {
+            row: name.into(),
+            failed: Some(reason),
+            ..RowOutcome::default()
+        };
+        let (pose, iteration) = match pose {
+            Ok(found) => found,
+            Err(reason) => return failure(reason),
+        };
+        let plain = PlainPose::from(&pose);
+        if !plain.is_finite() {
+            return failure("the pose is not finite".into());
+        }
+        let scored = self.scorer.score(&ResultRow { t_cam_model: pose, ..row.clone() });
+        let (score, failed) = match scored {
+            Ok(scored) if scored.score.values().iter().flatten().all(|v| v.is_finite()) => {
+                (Some(scored.score), None)
+            }
+            Ok(_) => (None, Some("scoring: a metric is not finite".into())),
+            Err(error) => (None, Some(format!("scoring: {error}"))),
+        };
+        let row = name.into();
+        RowOutcome { row, pose: Some(plain), iteration, score, failed, ..RowOutcome::default() }
+    }
+}

@@ -1,0 +1,54 @@
+//! What one kind of evidence says of a state.
+
+use super::{NormalEquations, Rows, State};
+
+/// One kind of evidence: a negative log-likelihood of a [`State`] \[nat\], up to a constant.
+///
+/// A factor gives the [`rows`](Self::rows) of its residuals; cost and linearization follow. One whose cost is no sum of
+/// weighted residuals implements [`cost`](Self::cost) and [`linearize`](Self::linearize) instead.
+///
+/// ```
+/// use nalgebra::{Point3, Vector3};
+/// use prehend_refine::problem::{Factor, NoiseModel, Rows, State};
+///
+/// /// The object's center is believed to be at a height along `up` \[m\].
+/// struct Height {
+///     up: Vector3<f64>,
+///     height: f64,
+///     noise: NoiseModel,
+/// }
+///
+/// impl Factor for Height {
+///     fn name(&self) -> &'static str {
+///         "height"
+///     }
+///     fn rows(&self, state: &State, rows: &mut Rows<'_>) {
+///         let center = Point3::from(state.center());
+///         let above = self.up.dot(&center.coords) - self.height;
+///         rows.add(above, &self.noise.weighting(1), |row| row.object_point(state, &center, &self.up));
+///     }
+/// }
+/// ```
+pub trait Factor: Send + Sync {
+    /// A short name for reports.
+    fn name(&self) -> &'static str;
+
+    /// Adds the residuals at `state`, each with its noise and its derivatives by blocks of the state.
+    fn rows(&self, _state: &State, _rows: &mut Rows<'_>) {}
+
+    /// The cost at `state` \[nat\]. No derivative is computed.
+    fn cost(&self, state: &State) -> f64 {
+        let mut rows = Rows::cost_only();
+        self.rows(state, &mut rows);
+        rows.cost()
+    }
+
+    /// The cost at `state` \[nat\]; adds gradient and Gauss–Newton Hessian by the requested blocks to `equations`.
+    ///
+    /// Blocks that the cost is constant in, or not differentiable by, are left as they are.
+    fn linearize(&self, state: &State, equations: &mut NormalEquations) -> f64 {
+        let mut rows = Rows::linearized(equations);
+        self.rows(state, &mut rows);
+        rows.cost()
+    }
+}

@@ -1,0 +1,355 @@
+//! A sum of factors, and the way to its least value.
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector};
+use prehend_autodiff::optimize::{
+    Criteria, LeastSquares, LevenbergMarquardt, QuadraticModel, Stop,
+};
+use rayon::prelude::*;
+
+use super::{
+    Block, Factor, NormalEquations, RIDGE, ScaledCholesky, SchurComplement, State, SurfacePatches,
+};
+
+/// Factors, and the blocks of the state that are solved for.
+#[derive(Clone)]
+pub struct Problem {
+    /// What is known beforehand, if anything.
+    prior: Option<Arc<dyn Factor>>,
+    factors: Vec<Arc<dyn Factor>>,
+    blocks: Vec<Block>,
+    /// Where the object may be off from its model: displacements that states do not hold, and that are eliminated.
+    patches: Option<Arc<SurfacePatches>>,
+}
+
+/// A state, the cost there, and its derivatives.
+///
+/// Where surface patches are eliminated, cost and derivatives are those at their best displacements, as far as the factors are
+/// linear in them: the derivatives leave out how that changes with the state.
+#[derive(Clone)]
+pub struct Linearization {
+    /// Where it is.
+    pub state: State,
+    /// Sum of the costs \[nat\].
+    pub cost: f64,
+    /// Gradient and Gauss–Newton Hessian of the sum.
+    pub equations: NormalEquations,
+    /// What the prior contributes, if there is one.
+    pub prior: Option<Contribution>,
+    /// What each of the other factors contributes, in order.
+    pub factors: Vec<Contribution>,
+    /// What was eliminated.
+    pub(crate) marginal: Option<Marginal>,
+}
+
+/// What one factor contributes.
+#[derive(Clone)]
+pub struct Contribution {
+    /// The factor's name.
+    pub name: &'static str,
+    /// Its cost \[nat\].
+    pub cost: f64,
+    /// Its derivatives.
+    pub(crate) equations: NormalEquations,
+}
+
+/// Displacements of surface patches, eliminated.
+#[derive(Clone)]
+pub(crate) struct Marginal {
+    pub(crate) patches: Arc<SurfacePatches>,
+    /// How much lower the cost is than with the model as it is \[nat\].
+    pub(crate) gain: f64,
+    /// Logarithm of the determinant of the Hessian by the displacements.
+    pub(crate) log_determinant: f64,
+}
+
+impl Linearization {
+    /// The undamped step to the minimum of the quadratic model, by all blocks; `None` if it is not determined.
+    pub fn gauss_newton_step(&self) -> Option<DVector<f64>> {
+        let factor = ScaledCholesky::new(self.equations.hessian(), RIDGE)?;
+        Some(-factor.inverse() * self.equations.gradient())
+    }
+
+    /// Cost of all factors but the prior, of the model as it is \[nat\].
+    pub(crate) fn cost_of_factors(&self) -> f64 {
+        self.factors.iter().map(|part| part.cost).sum()
+    }
+}
+
+impl QuadraticModel for Linearization {
+    fn value(&self) -> f64 {
+        self.cost
+    }
+
+    fn gradient(&self) -> &DVector<f64> {
+        self.equations.gradient()
+    }
+
+    fn hessian(&self) -> &DMatrix<f64> {
+        self.equations.hessian()
+    }
+}
+
+/// Levenberg–Marquardt over the blocks of a problem.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Solver {
+    /// Steps tried at most.
+    pub iterations: usize,
+    /// The end is reached when the next step promises to lower the cost by less than this \[nat\].
+    pub min_decrease: f64,
+}
+
+/// Why a solve ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Termination {
+    /// The next step promises less than [`Solver::min_decrease`].
+    Converged,
+    /// Steps downhill did not lower the cost. Where surface patches are eliminated, derivatives are not quite those of the cost,
+    /// and most solves end so, near the minimum.
+    Stalled,
+    /// All iterations were used.
+    Iterations,
+    /// The observer ended it.
+    Aborted,
+}
+
+impl Termination {
+    /// The name used in reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Converged => "converged",
+            Self::Stalled => "stalled",
+            Self::Iterations => "iterations",
+            Self::Aborted => "aborted",
+        }
+    }
+}
+
+/// Where a solve ended.
+#[derive(Clone)]
+pub struct Solution {
+    /// The state of the lowest cost.
+    pub at: Linearization,
+    /// Why there were no more steps.
+    pub termination: Termination,
+    /// Steps that lowered the cost.
+    pub iterations: usize,
+}
+
+impl Problem {
+    /// The sum of `factors` over `blocks`.
+    pub fn new(factors: Vec<Arc<dyn Factor>>, blocks: Vec<Block>) -> Self {
+        Self { prior: None, factors, blocks, patches: None }
+    }
+
+    /// With what is known beforehand.
+    pub fn with_prior(self, prior: Arc<dyn Factor>) -> Self {
+        Self { prior: Some(prior), ..self }
+    }
+
+    /// The same where the object may be off from its model in `patches`.
+    pub(crate) fn with_patches(self, patches: Option<Arc<SurfacePatches>>) -> Self {
+        Self { patches, ..self }
+    }
+
+    /// Lowers the cost from `start` until `solver` is content, or `observe`, which hears after each step whether it lowered the
+    /// cost, breaks off.
+    pub fn solve(
+        &self,
+        start: Linearization,
+        solver: &Solver,
+        mut observe: impl FnMut(bool) -> ControlFlow<()>,
+    ) -> Solution {
+        let criteria = Criteria {
+            iterations: solver.iterations,
+            gradient: 0.0,
+            step: 0.0,
+            decrease: 0.0,
+            predicted_decrease: solver.min_decrease,
+        };
+        let method = LevenbergMarquardt { criteria, ..LevenbergMarquardt::default() };
+        let mut iterations = 0;
+        let state = start.state.clone();
+        let found = method.minimize_on(self, state, start.clone(), |iteration| {
+            iterations += usize::from(iteration.taken);
+            observe(iteration.taken)
+        });
+        // A start that cannot be linearized is where it ends.
+        let Ok((outcome, at)) = found else {
+            return Solution { at: start, termination: Termination::Stalled, iterations: 0 };
+        };
+        let termination = match outcome.stop {
+            Stop::Gradient | Stop::Decrease => Termination::Converged,
+            Stop::Step => Termination::Stalled,
+            Stop::Iterations => Termination::Iterations,
+            Stop::Observer => Termination::Aborted,
+        };
+        Solution { at, termination, iterations }
+    }
+}
+
+impl LeastSquares for Problem {
+    type Point = State;
+    type Linearization = Linearization;
+
+    /// The cost about `state`, factors side by side.
+    fn linearize(&self, state: &State) -> Linearization {
+        let auxiliary = self.patches.as_ref().map_or(0, |patches| 3 * patches.count());
+        let contribution = |factor: &dyn Factor| {
+            let mut equations = NormalEquations::with_auxiliary(&self.blocks, auxiliary);
+            let cost = factor.linearize(state, &mut equations);
+            Contribution { name: factor.name(), cost, equations }
+        };
+        let of_factors = self.factors.par_iter().map(|factor| contribution(factor.as_ref()));
+        let factors: Vec<Contribution> = of_factors.collect();
+        let prior = self.prior.as_ref().map(|prior| contribution(prior.as_ref()));
+        let mut equations = NormalEquations::with_auxiliary(&self.blocks, auxiliary);
+        let mut cost = 0.0;
+        for part in prior.iter().chain(&factors) {
+            equations += &part.equations;
+            cost += part.cost;
+        }
+        let mut marginal = None;
+        if let Some(patches) = &self.patches {
+            if let Some(complement) = equations.marginalize(patches.precision()) {
+                let SchurComplement { rest, gain, log_determinant } = complement;
+                cost -= gain;
+                equations = rest;
+                let patches = Arc::clone(patches);
+                marginal = Some(Marginal { patches, gain, log_determinant });
+            } else {
+                equations = equations.without_auxiliary();
+            }
+        }
+        Linearization { state: state.clone(), cost, equations, prior, factors, marginal }
+    }
+
+    fn retract(&self, state: &State, step: &[f64]) -> State {
+        state.retract(&self.blocks, step)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use prehend_geometry::SplitMix64;
+
+    use super::*;
+    use crate::problem::ModelErrorSettings;
+    use crate::scene::{Frame, default_scene};
+
+    /// Measurements that are linear in the object's twist and the displacements of patches.
+    struct Linear {
+        residuals: DVector<f64>,
+        by_twist: DMatrix<f64>,
+        by_patches: DMatrix<f64>,
+        weight: f64,
+    }
+
+    impl Factor for Linear {
+        fn name(&self) -> &'static str {
+            "linear"
+        }
+
+        fn cost(&self, _state: &State) -> f64 {
+            0.5 * self.weight * self.residuals.norm_squared()
+        }
+
+        fn linearize(&self, state: &State, equations: &mut NormalEquations) -> f64 {
+            let columns = self.by_twist.column_iter().chain(self.by_patches.column_iter());
+            let columns: Vec<_> = columns.map(|c| c.into_owned()).collect();
+            let j = DMatrix::from_columns(&columns);
+            let (gradient, hessian) = (j.tr_mul(&self.residuals), j.tr_mul(&j));
+            let (gradient, hessian) = (gradient * self.weight, hessian * self.weight);
+            if equations.auxiliary() > 0 {
+                equations.add_with_auxiliary(&[Block::ObjectPose], &gradient, &hessian);
+            } else {
+                equations.add_dynamic(&[Block::ObjectPose], &gradient, &hessian);
+            }
+            self.cost(state)
+        }
+    }
+
+    /// Promises a way down where there is none.
+    struct Flat;
+
+    impl Factor for Flat {
+        fn name(&self) -> &'static str {
+            "flat"
+        }
+
+        fn cost(&self, _state: &State) -> f64 {
+            1.0
+        }
+
+        fn linearize(&self, state: &State, equations: &mut NormalEquations) -> f64 {
+            let (gradient, hessian) = (DVector::repeat(6, 1.0), DMatrix::identity(6, 6));
+            equations.add_dynamic(&[Block::ObjectPose], &gradient, &hessian);
+            self.cost(state)
+        }
+    }
+
+    #[test]
+    fn a_solve_can_be_aborted_between_steps_that_lead_nowhere() {
+        let scene = default_scene(1).unwrap();
+        let frame = Frame::new(&scene.observation, &scene.object, None).unwrap();
+        let state = State::new(&frame, &scene.truth).unwrap();
+        let problem = Problem::new(vec![Arc::new(Flat)], vec![Block::ObjectPose]);
+        let mut steps = Vec::new();
+        let solver = Solver { iterations: 10, min_decrease: 1e-9 };
+        let solution = problem.solve(problem.linearize(&state), &solver, |down| {
+            steps.push(down);
+            if steps.len() < 3 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+        });
+        assert_eq!((solution.termination, steps), (Termination::Aborted, vec![false; 3]));
+        assert_eq!(solution.at.state.t_cam_object, state.t_cam_object);
+        assert_eq!(solution.iterations, 0);
+    }
+
+    #[test]
+    fn eliminating_patches_is_integrating_them_out() {
+        let scene = default_scene(1).unwrap();
+        let frame = Frame::new(&scene.observation, &scene.object, None).unwrap();
+        let state = State::new(&frame, &scene.truth).unwrap();
+        let settings = ModelErrorSettings::default();
+        let patches =
+            SurfacePatches::new(&scene.observation, state.center().z, &settings, 2).unwrap();
+        let mut random = SplitMix64::new(5);
+        let (rows, size) = (40, 3 * patches.count());
+        let mut matrix =
+            |columns, scale: f64| DMatrix::from_fn(rows, columns, |_, _| scale * random.normal());
+        let (by_twist, by_patches) = (matrix(6, 1.0), matrix(size, 1.0));
+        let residuals = matrix(1, 1e-3).column(0).into_owned();
+        let weight = 0.5e-3f64.powi(-2);
+        let prior = patches.precision().clone().cholesky().unwrap().inverse();
+        let covariance =
+            &by_patches * prior.kronecker(&DMatrix::identity(3, 3)) * by_patches.transpose()
+                + DMatrix::identity(rows, rows) / weight;
+        let information = covariance.cholesky().unwrap().inverse();
+        let expected = (
+            0.5 * residuals.dot(&(&information * &residuals)),
+            by_twist.tr_mul(&(&information * &residuals)),
+            by_twist.tr_mul(&(&information * &by_twist)),
+        );
+        let linear = Linear { residuals, by_twist, by_patches, weight };
+        let rigid = Problem::new(vec![Arc::new(linear)], vec![Block::ObjectPose]);
+        let problem = rigid.clone().with_patches(Some(Arc::new(patches)));
+        let at = problem.linearize(&state);
+        assert_eq!(at.equations.blocks(), [Block::ObjectPose]);
+        assert!((at.cost / expected.0 - 1.0).abs() < 1e-8);
+        let close = |a: &DMatrix<f64>, b: &DMatrix<f64>| (a - b).amax() < 1e-8 * b.amax();
+        let gradient = |g: &DVector<f64>| DMatrix::from_column_slice(6, 1, g.as_slice());
+        assert!(close(&gradient(at.equations.gradient()), &gradient(&expected.1)));
+        assert!(close(at.equations.hessian(), &expected.2));
+        // At fixed patches there is more information, and more to pay.
+        let rigid = rigid.linearize(&state);
+        assert!(rigid.cost > at.cost);
+        assert!(rigid.equations.hessian()[(0, 0)] > at.equations.hessian()[(0, 0)]);
+        let alone = &at.factors[0].equations;
+        assert_eq!(
+            alone.hessian().view((0, 0), (6, 6)),
+            rigid.equations.hessian().view((0, 0), (6, 6))
+        );
+    }
+}

@@ -1,0 +1,85 @@
+//! How residuals scatter.
+
+use prehend_geometry::RobustKernel;
+
+/// How the residuals of a factor scatter: what makes costs in nats of residuals.
+///
+/// n residuals r cost min(1, m/n) / σ² · Σ ρ(r²), where ρ is the kernel's loss (½ r² without one) and m the number of
+/// independent measurements that they amount to at most.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NoiseModel {
+    /// Standard deviation σ of a residual \[the residual's unit\]; infinite for one that says nothing.
+    pub sigma: f64,
+    /// What forgives outliers; its width is in the residual's unit.
+    pub kernel: RobustKernel,
+    /// Effective sample size m: errors of neighbors are alike, so that thousands of residuals are not thousands of witnesses.
+    pub effective_samples: f64,
+}
+
+impl NoiseModel {
+    /// Independent residuals of standard deviation `sigma`, normally distributed.
+    pub fn gaussian(sigma: f64) -> Self {
+        Self { sigma, kernel: RobustKernel::Squared, effective_samples: f64::INFINITY }
+    }
+
+    /// Residuals of standard deviation `sigma`; those beyond `width` are more and more forgiven (Cauchy). They amount to
+    /// at most `effective_samples` independent ones.
+    pub fn cauchy(sigma: f64, width: f64, effective_samples: f64) -> Self {
+        Self { sigma, kernel: RobustKernel::Cauchy { scale: width }, effective_samples }
+    }
+
+    /// With a kernel `factor` times as wide: graduated non-convexity (Blake and Zisserman, 1987).
+    pub fn widened(self, factor: f64) -> Self {
+        Self { kernel: self.kernel.widened(factor), ..self }
+    }
+
+    /// The weight of one of `count` residuals.
+    pub fn weighting(&self, count: usize) -> Weighting {
+        let independent = (self.effective_samples / count.max(1) as f64).min(1.0);
+        Weighting { information: independent / self.sigma.powi(2), kernel: self.kernel }
+    }
+}
+
+/// What a residual counts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Weighting {
+    /// Nats of half a squared unit.
+    pub information: f64,
+    /// What forgives outliers.
+    pub kernel: RobustKernel,
+}
+
+impl Weighting {
+    /// The cost of the residual `r` \[nat\].
+    #[inline]
+    pub fn cost(&self, r: f64) -> f64 {
+        self.information * self.kernel.loss(r * r)
+    }
+
+    /// The weight w of the residual `r` in iteratively reweighted least squares: gradient w r ∂r, Hessian w ∂r ∂rᵀ.
+    #[inline]
+    pub fn weight(&self, r: f64) -> f64 {
+        self.information * self.kernel.weight(r * r)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn many_residuals_amount_to_the_effective_number() {
+        let noise = NoiseModel::cauchy(2e-3, 1e-2, 10.0);
+        assert_eq!(noise.weighting(5).information, 2e-3f64.powi(-2));
+        assert_eq!(noise.weighting(40).information, 0.25 * 2e-3f64.powi(-2));
+        assert_eq!(NoiseModel::gaussian(f64::INFINITY).weighting(3).cost(1.0), 0.0);
+    }
+
+    #[test]
+    fn a_wider_kernel_forgives_less() {
+        let noise = NoiseModel::cauchy(1.0, 0.5, f64::INFINITY);
+        let wide = noise.widened(4.0).weighting(1);
+        assert_eq!(wide.weight(2.0), 0.5);
+        assert!(wide.cost(2.0) > noise.weighting(1).cost(2.0));
+    }
+}

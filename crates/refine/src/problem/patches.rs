@@ -1,0 +1,218 @@
+//! Patches of the object's surface that may each be off by themselves.
+
+use nalgebra::{DMatrix, Vector3};
+
+use crate::scene::Observation;
+
+/// How far the surface of an object is from that of its model.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ModelErrorSettings {
+    /// Standard deviation of a place of the surface from where the model has it, in each direction \[m\]; zero if models are exact.
+    pub gp_sigma: f64,
+    /// Length scale of its Gaussian process over the surface \[m\].
+    pub length_scale: f64,
+}
+
+impl Default for ModelErrorSettings {
+    /// A scan, or a careful model, of a thing that fits into a hand.
+    fn default() -> Self {
+        Self { gp_sigma: 7e-4, length_scale: 20e-3 }
+    }
+}
+
+/// Patches that would cover the mask if all were full, and at most.
+const FULL_PATCHES: f64 = 30.0;
+const MOST_PATCHES: usize = 64;
+
+/// Width of a patch at least, as a share of the distance over which the deviation changes.
+const LEAST_SIDE: f64 = 0.6;
+
+/// Measured depths that are farther than this share of the object's distance from it are of something else.
+const NEAR: f64 = 0.2;
+
+/// What is independent in patches however near they are, as a share of the variance; keeps their covariance regular.
+const OWN: f64 = 1e-3;
+
+/// What an observation shows of the object, cut into patches by square tiles of the image, where the object may be off from its
+/// model: each patch is displaced, and neighbors alike, by a Gaussian process over space.
+///
+/// Patches are of the image rather than of the model, so that only what is seen has any.
+#[derive(Clone, Debug)]
+pub(crate) struct SurfacePatches {
+    /// Width of a tile \[px\].
+    side: usize,
+    /// The first tile's column and row, and how many columns there are.
+    first: [usize; 2],
+    columns: usize,
+    /// Number of the patch in each tile, row-major.
+    numbers: Vec<Option<usize>>,
+    /// Inverse of the covariance of the patches' displacements in one direction \[1/m²\].
+    precision: DMatrix<f64>,
+    /// Logarithm of the determinant of that of all displacements.
+    log_determinant: f64,
+}
+
+impl SurfacePatches {
+    /// Of the object in `observation`, which is about `distance` from the camera \[m\] where no depth is measured; tiles are a multiple
+    /// of `unit` pixels wide, to be of whole pixels in images that are smaller by that. `None` if there is nothing of it to be seen, or models are
+    /// exact.
+    pub(crate) fn new(
+        observation: &Observation,
+        distance: f64,
+        settings: &ModelErrorSettings,
+        unit: usize,
+    ) -> Option<Self> {
+        let &ModelErrorSettings { gp_sigma, length_scale } = settings;
+        if !(gp_sigma > 0.0 && length_scale > 0.0) {
+            return None;
+        }
+        let (mask, camera) = (&observation.mask, &observation.camera);
+        let width = camera.width;
+        let masked = mask.pixels().iter().enumerate().filter(|(_, m)| **m);
+        let seen: Vec<[usize; 2]> = masked.map(|(i, _)| [i % width, i / width]).collect();
+        let largest = width.max(camera.height);
+        let least = LEAST_SIDE * length_scale * camera.fx / distance;
+        let wanted = (seen.len() as f64 / FULL_PATCHES).sqrt().max(least);
+        let mut side = (wanted.min(largest as f64).ceil() as usize).max(1).next_multiple_of(unit);
+        // Specks of a mask would each have a tile of their own.
+        while side < largest && tiles_of(&seen, side) > MOST_PATCHES {
+            side += side.div_ceil(4).next_multiple_of(unit);
+        }
+        let first = [0, 1].map(|k| seen.iter().map(|pixel| pixel[k] / side).min());
+        let last = [0, 1].map(|k| seen.iter().map(|pixel| pixel[k] / side).max());
+        let ([Some(left), Some(top)], [Some(right), Some(bottom)]) = (first, last) else {
+            return None;
+        };
+        let columns = right - left + 1;
+        // Sums of places and numbers of pixels.
+        let mut tiles = vec![(Vector3::zeros(), 0.0); columns * (bottom - top + 1)];
+        for [x, y] in seen {
+            let measured = f64::from(observation.depth.pixels()[y * width + x]);
+            let near = (measured - distance).abs() < NEAR * distance;
+            let depth = if near { measured } else { distance };
+            let place = camera.unproject(x as f64, y as f64, depth);
+            let (sum, count) = &mut tiles[(y / side - top) * columns + x / side - left];
+            *sum += place.coords;
+            *count += 1.0;
+        }
+        let mut places = Vec::new();
+        let number = |(sum, count): &(Vector3<f64>, f64)| {
+            (*count > 0.0).then(|| {
+                places.push(sum / *count);
+                places.len() - 1
+            })
+        };
+        let numbers = tiles.iter().map(number).collect();
+        let covariance = DMatrix::from_fn(places.len(), places.len(), |i, j| {
+            let squared = (places[i] - places[j]).norm_squared();
+            let own = if i == j { OWN } else { 0.0 };
+            gp_sigma.powi(2) * ((-0.5 * squared / length_scale.powi(2)).exp() + own)
+        });
+        let factor = covariance.cholesky()?;
+        let log_determinant = -3.0 * factor.ln_determinant();
+        let precision = factor.inverse();
+        Some(Self { side, first: [left, top], columns, numbers, precision, log_determinant })
+    }
+
+    /// How many there are.
+    pub(crate) fn count(&self) -> usize {
+        self.precision.nrows()
+    }
+
+    /// Width of a tile \[px\].
+    pub(crate) fn side(&self) -> usize {
+        self.side
+    }
+
+    /// The patch in a tile of the image.
+    pub(crate) fn in_tile(&self, column: usize, row: usize) -> Option<usize> {
+        let [left, top] = self.first;
+        let (column, row) = (column.checked_sub(left)?, row.checked_sub(top)?);
+        if column >= self.columns {
+            return None;
+        }
+        *self.numbers.get(row * self.columns + column)?
+    }
+
+    /// The patch at pixel (x, y).
+    pub(crate) fn at(&self, x: usize, y: usize) -> Option<usize> {
+        self.in_tile(x / self.side, y / self.side)
+    }
+
+    /// Logarithm of the determinant of the information that all displacements have beforehand.
+    pub(crate) fn log_determinant(&self) -> f64 {
+        self.log_determinant
+    }
+
+    /// Inverse of the covariance of the patches' displacements in one direction \[1/m²\].
+    pub(crate) fn precision(&self) -> &DMatrix<f64> {
+        &self.precision
+    }
+}
+
+/// How many tiles of `side` pixels some pixels are in.
+fn tiles_of(pixels: &[[usize; 2]], side: usize) -> usize {
+    let columns = pixels.iter().map(|[x, _]| x / side + 1).max().unwrap_or(0);
+    let rows = pixels.iter().map(|[_, y]| y / side + 1).max().unwrap_or(0);
+    let mut tiles = vec![false; columns * rows];
+    pixels.iter().for_each(|[x, y]| tiles[y / side * columns + x / side] = true);
+    tiles.into_iter().filter(|seen| *seen).count()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::default_scene;
+
+    #[test]
+    fn every_pixel_of_the_mask_is_in_a_patch_and_neighbors_are_off_alike() {
+        let scene = default_scene(1).unwrap();
+        let (observation, distance) = (&scene.observation, scene.truth.translation.z);
+        let settings = ModelErrorSettings::default();
+        let patches = SurfacePatches::new(observation, distance, &settings, 4).unwrap();
+        let width = observation.camera.width;
+        let mut seen = vec![0; patches.count()];
+        for (pixel, _) in observation.mask.pixels().iter().enumerate().filter(|(_, m)| **m) {
+            seen[patches.at(pixel % width, pixel / width).unwrap()] += 1;
+        }
+        assert!(seen.iter().all(|count| *count > 0), "{seen:?}");
+        assert!((8..=MOST_PATCHES).contains(&seen.len()), "{} patches", seen.len());
+        assert_eq!(patches.side() % 4, 0);
+        assert_eq!(patches.at(0, 0), None);
+        let covariance = patches.precision().clone().cholesky().unwrap().inverse();
+        let variance = settings.gp_sigma.powi(2);
+        assert!(covariance.diagonal().iter().all(|v| (v / variance - 1.0).abs() < 0.01));
+        let correlations =
+            covariance.upper_triangle() - DMatrix::from_diagonal(&covariance.diagonal());
+        assert!(correlations.max() > 0.5 * variance, "{}", correlations.max() / variance);
+        assert!(covariance.min() < 0.1 * variance);
+    }
+
+    #[test]
+    fn an_exact_model_has_none() {
+        let scene = default_scene(1).unwrap();
+        let settings = ModelErrorSettings { gp_sigma: 0.0, ..ModelErrorSettings::default() };
+        assert!(SurfacePatches::new(&scene.observation, 0.5, &settings, 1).is_none());
+        let mut unseen = scene.observation.clone();
+        unseen.mask = prehend_render::Mask::filled(640, 480, false);
+        assert!(SurfacePatches::new(&unseen, 0.5, &ModelErrorSettings::default(), 1).is_none());
+    }
+
+    #[test]
+    fn specks_and_a_stiff_model_make_few() {
+        let scene = default_scene(1).unwrap();
+        let mut specks = scene.observation.clone();
+        let speck =
+            |pixel: usize| (pixel % 640).is_multiple_of(29) && (pixel / 640).is_multiple_of(31);
+        let mask = (0..640 * 480).map(speck).collect();
+        specks.mask = prehend_render::Mask::new(640, 480, mask).unwrap();
+        let settings = ModelErrorSettings::default();
+        let patches = SurfacePatches::new(&specks, 0.5, &settings, 3).unwrap();
+        assert!(patches.count() <= MOST_PATCHES && patches.side().is_multiple_of(3));
+        for (length_scale, distance) in [(f64::INFINITY, 0.5), (20e-3, 0.0)] {
+            let settings = ModelErrorSettings { length_scale, ..settings.clone() };
+            let patches = SurfacePatches::new(&scene.observation, distance, &settings, 4).unwrap();
+            assert!((1..=2).contains(&patches.count()), "{}", patches.count());
+        }
+    }
+}

@@ -1,0 +1,91 @@
+//! The residuals of a factor, and their derivatives by blocks.
+
+use nalgebra::{Point3, Vector3, Vector6};
+use prehend_autodiff::lie::twist_row;
+
+use super::{Block, NormalEquations, State, Weighting};
+
+/// Where a factor adds its residuals: sums of their costs and, if asked for, normal equations.
+pub struct Rows<'a> {
+    equations: Option<&'a mut NormalEquations>,
+    cost: f64,
+}
+
+impl<'a> Rows<'a> {
+    /// Sums costs alone; derivatives are not asked for.
+    pub(super) fn cost_only() -> Self {
+        Self { equations: None, cost: 0.0 }
+    }
+
+    /// Sums costs, and derivatives in `equations`.
+    pub(super) fn linearized(equations: &'a mut NormalEquations) -> Self {
+        Self { equations: Some(equations), cost: 0.0 }
+    }
+
+    /// The cost so far \[nat\].
+    pub(super) fn cost(&self) -> f64 {
+        self.cost
+    }
+
+    /// Adds a residual; `jacobian`, which writes its derivatives, is called only where they are needed.
+    #[inline]
+    pub fn add(
+        &mut self,
+        residual: f64,
+        weighting: &Weighting,
+        jacobian: impl FnOnce(&mut Row<'_>),
+    ) {
+        self.cost += weighting.cost(residual);
+        if let Some(equations) = self.equations.as_deref_mut() {
+            let mut row = equations.begin_row();
+            jacobian(&mut row);
+            row.add(residual, weighting.weight(residual));
+        }
+    }
+
+    /// Adds a constant to the cost, of residuals that no state changes \[nat\].
+    pub fn add_constant(&mut self, cost: f64) {
+        self.cost += cost;
+    }
+}
+
+/// Derivatives of one residual.
+pub struct Row<'a> {
+    pub(super) equations: &'a mut NormalEquations,
+}
+
+impl Row<'_> {
+    /// Writes the derivatives by the parameters of `block`, all of them and once a block; they are dropped if nobody solves for it.
+    #[inline]
+    pub fn block(&mut self, block: Block, derivatives: &[f64]) {
+        self.equations.push_entries(block, derivatives);
+    }
+
+    /// Writes the derivative by one parameter of `block`, the only one of the block that counts.
+    #[inline]
+    pub fn parameter(&mut self, block: Block, index: usize, derivative: f64) {
+        self.equations.push_entry(block, index, derivative);
+    }
+
+    /// Derivatives by the object's pose of a residual that changes by `direction`·v while a point of the object, now at
+    /// `point`, moves by v (camera frame).
+    #[inline]
+    pub fn object_point(&mut self, state: &State, point: &Point3<f64>, direction: &Vector3<f64>) {
+        let twist = twist_row(&(point.coords - state.center()), direction);
+        self.block(Block::ObjectPose, twist.as_slice());
+    }
+
+    /// Derivatives by both poses of a residual that changes by `direction`·v while a point at `point` moves by v away from the hand
+    /// with the object: moving the hand by the same twist undoes it.
+    #[inline]
+    pub fn relative_point(&mut self, state: &State, point: &Point3<f64>, direction: &Vector3<f64>) {
+        let object: Vector6<f64> = twist_row(&(point.coords - state.center()), direction);
+        self.block(Block::ObjectPose, object.as_slice());
+        self.block(Block::HandPose, (-object).as_slice());
+    }
+
+    #[inline]
+    fn add(self, residual: f64, weight: f64) {
+        self.equations.finish_row(residual, weight);
+    }
+}

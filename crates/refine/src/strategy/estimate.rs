@@ -1,0 +1,127 @@
+//! What a strategy is.
+
+use std::ops::ControlFlow;
+
+use nalgebra::Isometry3;
+
+use super::{Iteration, Posterior, Trace};
+use crate::error::RefineError;
+use crate::factor::{RenderingFactor, RenderingSettings};
+use crate::problem::{Factor, State};
+use crate::scene::Frame;
+
+/// A way from an initial pose to a refined one.
+pub trait Strategy: Send + Sync {
+    /// Refines `initial`, calling `observe` at every iteration, which may break off.
+    ///
+    /// # Errors
+    /// If the frame lacks what the strategy or a factor needs, or a setting is out of range.
+    fn run(
+        &self,
+        frame: &Frame<'_>,
+        initial: &State,
+        observe: &mut Observer<'_>,
+    ) -> Result<Estimate, RefineError>;
+
+    /// Iterations at most.
+    fn iterations(&self) -> usize;
+}
+
+/// Hears of every iteration; a break ends the refinement with what has been found.
+pub type Observer<'a> = dyn FnMut(&Progress) -> ControlFlow<()> + 'a;
+
+/// Progress of a refinement under way.
+#[derive(Clone, Copy, Debug)]
+pub struct Progress {
+    /// Iterations done.
+    pub iteration: usize,
+    /// Iterations at most.
+    pub iterations: usize,
+    /// The pose that would be returned if the refinement ended here (object → camera \[m\]).
+    pub t_cam_object: Isometry3<f64>,
+}
+
+/// The outcome of a refinement.
+#[derive(Clone, Debug)]
+pub struct Estimate {
+    /// The pose, and whatever else was estimated.
+    pub state: State,
+    /// The iteration that it comes from.
+    pub iteration: usize,
+    /// How uncertain it is; only the fused estimator knows.
+    pub posterior: Option<Posterior>,
+    /// What happened on the way.
+    pub trace: Trace,
+}
+
+impl Estimate {
+    /// The pose: object coordinates → camera coordinates \[m\].
+    pub fn t_cam_object(&self) -> &Isometry3<f64> {
+        &self.state.t_cam_object
+    }
+}
+
+/// Records a walk: its trace, and the state that it is to return.
+pub(super) struct Recorder<'a, 'b> {
+    observe: &'a mut Observer<'b>,
+    iterations: usize,
+    /// What decides which state is the best, if not the last one.
+    judge: Option<RenderingFactor>,
+    lowest: f64,
+    best: State,
+    at: usize,
+    trace: Trace,
+}
+
+impl<'a, 'b> Recorder<'a, 'b> {
+    /// Of a walk from `initial` of at most `iterations`, whose values are called `names`. With a `judge`, the state of the lowest
+    /// cost by it is the best; else the last one is.
+    pub(super) fn new<'n>(
+        names: impl Iterator<Item = &'n str>,
+        initial: &State,
+        iterations: usize,
+        judge: Option<RenderingFactor>,
+        observe: &'a mut Observer<'b>,
+    ) -> Self {
+        let (best, trace) = (initial.clone(), Trace::new(names));
+        Self { observe, iterations, judge, lowest: f64::INFINITY, best, at: 0, trace }
+    }
+
+    /// The paper's checkpoint: the rendering factor of `frame`, if it is wanted.
+    ///
+    /// # Errors
+    /// If the images do not fit the camera.
+    pub(super) fn judge(
+        frame: &Frame<'_>,
+        checkpoint: bool,
+        settings: &RenderingSettings,
+    ) -> Result<Option<RenderingFactor>, RefineError> {
+        checkpoint.then(|| RenderingFactor::new(frame, settings)).transpose()
+    }
+
+    /// Records that the walk is at `state`.
+    pub(super) fn visit(&mut self, state: &State, iteration: Iteration) -> ControlFlow<()> {
+        let score = self.judge.as_ref().map(|judge| judge.cost(state));
+        if score.is_none_or(|score| score < self.lowest) {
+            self.lowest = score.unwrap_or(f64::INFINITY);
+            (self.best, self.at) = (state.clone(), iteration.index);
+        }
+        let progress = Progress {
+            iteration: iteration.index,
+            iterations: self.iterations,
+            t_cam_object: self.best.t_cam_object,
+        };
+        self.trace.iterations.push(iteration);
+        (self.observe)(&progress)
+    }
+
+    /// Iterations recorded.
+    pub(super) fn count(&self) -> usize {
+        self.trace.iterations.len()
+    }
+
+    /// The outcome.
+    pub(super) fn estimate(self, posterior: Option<Posterior>) -> Estimate {
+        Estimate { state: self.best, iteration: self.at, posterior, trace: self.trace }
+    }
+}

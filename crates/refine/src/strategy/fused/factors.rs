@@ -1,0 +1,133 @@
+//! The factors of a stage, for what a frame brings.
+
+use std::sync::Arc;
+
+use super::settings::{FusedSettings, Modality, Nuisance, Stage};
+use crate::error::RefineError;
+use crate::factor::{
+    FreeSpaceFactor, GaussianPrior, HandDepthFactor, NoiseEstimate, PenetrationFactor,
+    PointToPlaneFactor, PointToPlaneSettings, RenderingFactor, SupportFactor, TactileFactor,
+    TouchModel,
+};
+use crate::problem::{Factor, NoiseModel, Problem, State, SurfacePatches};
+use crate::scene::Frame;
+
+/// Depth points that their noise is estimated from.
+const NOISE_POINTS: usize = 1200;
+
+/// Noise of depth points about the object at `state`; `None` without enough depth, or if it is not used.
+pub(super) fn depth_noise(
+    frame: &Frame<'_>,
+    state: &State,
+    settings: &FusedSettings,
+) -> Option<NoiseEstimate> {
+    if !settings.modalities.contains(&Modality::Depth) {
+        return None;
+    }
+    let depth = PointToPlaneSettings { points: NOISE_POINTS, ..settings.depth.clone() };
+    PointToPlaneFactor::new(frame, &depth).ok()?.noise_estimate(state)
+}
+
+/// Where the object may be off from its model in `stage`, if it may; it is about as far away as at `initial`.
+pub(crate) fn surface_patches(
+    frame: &Frame<'_>,
+    initial: &State,
+    stage: &Stage,
+    settings: &FusedSettings,
+) -> Option<Arc<SurfacePatches>> {
+    if !stage.model_error || !settings.nuisances.contains(&Nuisance::Model) {
+        return None;
+    }
+    let distance = initial.center().z;
+    let unit = settings.rendering.downsample * stage.downsample;
+    SurfacePatches::new(frame.observation(), distance, &settings.model, unit).map(Arc::new)
+}
+
+/// What `stage` solves: all factors, the `own` ones among them, and a prior about `initial`, by the pose and all nuisances.
+pub(crate) fn problem_of(
+    frame: &Frame<'_>,
+    initial: &State,
+    stage: &Stage,
+    settings: &FusedSettings,
+    patches: Option<Arc<SurfacePatches>>,
+    own: &[Arc<dyn Factor>],
+) -> Result<Problem, RefineError> {
+    let prior = GaussianPrior::independent(initial.clone(), &settings.prior)?;
+    let mut factors = factors_of(frame, stage, settings, patches.as_ref())?;
+    factors.extend(own.iter().cloned());
+    let blocks = settings.blocks(frame.hand().is_some(), initial);
+    Ok(Problem::new(factors, blocks).with_prior(Arc::new(prior)).with_patches(patches))
+}
+
+/// The factors of `stage` for what `frame` brings.
+fn factors_of(
+    frame: &Frame<'_>,
+    stage: &Stage,
+    settings: &FusedSettings,
+    patches: Option<&Arc<SurfacePatches>>,
+) -> Result<Vec<Arc<dyn Factor>>, RefineError> {
+    let wanted = |modality| settings.modalities.contains(&modality);
+    let mut factors: Vec<Arc<dyn Factor>> = Vec::new();
+    let color = stage.color && wanted(Modality::Color) && frame.observation().has_colors();
+    let silhouette = wanted(Modality::Silhouette);
+    if color || silhouette {
+        let mut rendering = settings.rendering.clone();
+        rendering.downsample *= stage.downsample;
+        rendering.kernel_width *= stage.kernel_scale;
+        rendering.color = color;
+        if !silhouette {
+            rendering.mask_sigma = f64::INFINITY;
+        }
+        let mut factor = RenderingFactor::new(frame, &rendering)?;
+        if let Some(patches) = patches {
+            factor = factor.with_patches(Arc::clone(patches), rendering.downsample);
+        }
+        factors.push(Arc::new(factor));
+    }
+    if wanted(Modality::Depth) {
+        let depth = PointToPlaneSettings {
+            points: stage.points,
+            noise: settings.depth.noise.widened(stage.kernel_scale),
+            ..settings.depth.clone()
+        };
+        match PointToPlaneFactor::new(frame, &depth) {
+            Ok(mut factor) => {
+                if let Some(patches) = patches {
+                    factor = factor.with_patches(Arc::clone(patches));
+                }
+                factors.push(Arc::new(factor));
+            }
+            // Each modality may be absent.
+            Err(RefineError::NoDepth) => {}
+            Err(other) => return Err(other),
+        }
+    }
+    if wanted(Modality::FreeSpace) {
+        factors.push(Arc::new(FreeSpaceFactor::new(frame, &settings.free_space)));
+    }
+    let Some((_, hand)) = frame.hand() else { return Ok(factors) };
+    if wanted(Modality::HandDepth) {
+        let mut depth = settings.hand_depth.clone();
+        depth.points = stage.points / 3;
+        factors.push(Arc::new(HandDepthFactor::new(frame, &depth)?));
+    }
+    let touch = wanted(Modality::Touch);
+    let inactive = stage.contact && wanted(Modality::Quiet);
+    if (touch || inactive) && !hand.forces.is_empty() {
+        let mut tactile = settings.tactile.clone().widened(stage.kernel_scale);
+        if !touch {
+            tactile.touch = TouchModel::Nothing;
+        }
+        if !inactive {
+            tactile.no_contact = NoiseModel { sigma: f64::INFINITY, ..tactile.no_contact };
+        }
+        factors.push(Arc::new(TactileFactor::new(frame, &tactile)?));
+    }
+    if stage.contact && wanted(Modality::Penetration) {
+        factors.push(Arc::new(PenetrationFactor::new(frame, &settings.penetration)?));
+    }
+    if stage.contact && wanted(Modality::Support) && frame.observation().gravity.is_some() {
+        factors.push(Arc::new(SupportFactor::new(frame, &settings.support)?));
+    }
+    Ok(factors)
+}

@@ -1,0 +1,94 @@
+//! Where solves start, and which of their ends are the same.
+
+use prehend_autodiff::lie::so3_log;
+
+use super::posterior::principal_directions;
+use crate::factor::NoiseEstimate;
+use crate::problem::{Block, Linearization, Solution, State};
+
+/// The initial state, and those turned by `angle` \[rad\] about each axis of the camera frame, both ways; that alone if it is zero.
+pub(super) fn restarts(initial: &State, angle: f64) -> Vec<State> {
+    let mut starts = vec![initial.clone()];
+    if angle > 0.0 {
+        for axis in 0..3 {
+            for turn in [angle, -angle] {
+                let mut twist = [0.0; 6];
+                twist[3 + axis] = turn;
+                starts.push(initial.retract(&[Block::ObjectPose], &twist));
+            }
+        }
+    }
+    starts
+}
+
+/// How wide the posterior may be in any direction \[m of surface motion\], and how far depth points may be from the surface \[m\],
+/// for a first solution that needs no others beside it.
+const SETTLED_WIDTH: f64 = 6e-3;
+const SETTLED_SCATTER: f64 = 1.5e-3;
+
+/// Surface motion between poses that are the same solution \[m\].
+const SAME: f64 = 2e-3;
+
+/// Whether `point` leaves no direction open and the surface lies where depth was measured.
+pub(super) fn settled(
+    point: &Linearization,
+    noise: impl FnOnce() -> Option<NoiseEstimate>,
+    radius: f64,
+) -> bool {
+    let widest = principal_directions(point, radius)[0].1;
+    widest < SETTLED_WIDTH && noise().is_some_and(|noise| noise.sigma < SETTLED_SCATTER)
+}
+
+/// Solutions of which no two are the same pose, the one of the lowest value first.
+pub(super) fn distinct(mut found: Vec<Solution>, radius: f64) -> Vec<Solution> {
+    found.sort_by(|a, b| a.at.cost.total_cmp(&b.at.cost));
+    let mut kept: Vec<Solution> = Vec::new();
+    for solution in found {
+        let state = &solution.at.state;
+        let same = |other: &Solution| {
+            let other = &other.at;
+            let turn = state.t_cam_object.rotation.angle_to(&other.state.t_cam_object.rotation);
+            (state.center() - other.state.center()).norm() + radius * turn < SAME
+        };
+        if !kept.iter().any(same) {
+            kept.push(solution);
+        }
+    }
+    kept
+}
+
+/// At most `count` states along the directions in which the posterior about `point` is open so far, the widest first: at multiples of
+/// `distance` of surface motion from where such a direction comes nearest to `initial`.
+///
+/// Geometry that leaves a turn open drifts along it, tens of degrees from where the initial pose was, so that is where to look first. And four
+/// deviations wide, since first solutions of hardly any difference in value lie farther apart than the curvature about the best of them has it.
+pub(super) fn spread(
+    point: &Linearization,
+    initial: &State,
+    distance: f64,
+    radius: f64,
+    count: usize,
+) -> Vec<State> {
+    let state = &point.state;
+    let moved = initial.center() - state.center();
+    let turned = so3_log(&(initial.t_cam_object.rotation * state.t_cam_object.rotation.inverse()));
+    let mut states = Vec::new();
+    for (twist, deviation) in principal_directions(point, radius) {
+        let (place, turn) = (twist.fixed_rows::<3>(0), twist.fixed_rows::<3>(3));
+        // The direction is a unit vector where turns count as what they move the surface by.
+        let nearest = place.dot(&moved) + radius * radius * turn.dot(&turned);
+        let reach = ((4.0 * deviation / distance) as i32).min(4);
+        if reach == 0 {
+            break;
+        }
+        let steps = std::iter::once(0).chain((1..=reach).flat_map(|step| [step, -step]));
+        for step in steps {
+            let along = nearest + distance * f64::from(step);
+            if along.abs() > 0.5 * distance {
+                states.push(state.retract(&[Block::ObjectPose], (twist * along).as_slice()));
+            }
+        }
+    }
+    states.truncate(count);
+    states
+}

@@ -1,0 +1,267 @@
+//! How sure a pose is: the posterior around it, and what speaks against it.
+
+use nalgebra::{Isometry3, Matrix6, Point3, Vector3, Vector6};
+use prehend_autodiff::lie::{perturb_about, so3_log};
+use prehend_geometry::SplitMix64;
+
+use crate::problem::{
+    Block, Contribution, Linearization, NormalEquations, RIDGE, ScaledCholesky, Solution,
+    Termination,
+};
+
+/// A pose that the search came upon.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Hypothesis {
+    /// Object coordinates → camera coordinates \[m\].
+    pub t_cam_object: Isometry3<f64>,
+    /// Its share of the posterior among the hypotheses found.
+    pub weight: f64,
+    /// Negative logarithm of the posterior, up to a constant \[nat\].
+    pub cost: f64,
+    /// Covariance of a left twist about the object's center, in the camera frame \[m², m rad, rad²\].
+    pub covariance: Matrix6<f64>,
+}
+
+/// A direction that the evidence says little of: only the prior holds the pose there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UnobservableDirection {
+    /// Twist about the object's center, in the camera frame, of unit length where a rotation counts by how far it moves
+    /// the surface.
+    pub twist: Vector6<f64>,
+    /// Standard deviation along it \[m of surface motion\].
+    pub deviation: f64,
+}
+
+/// A sense that would rather have the pose elsewhere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Inconsistency {
+    /// The factor's name.
+    pub factor: &'static str,
+    /// How much farther from its own optimum the solution is than chance has it, in standard deviations.
+    pub distance: f64,
+}
+
+/// What is known of how good a pose is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Posterior {
+    /// The poses found, that of the lowest value first.
+    pub hypotheses: Vec<Hypothesis>,
+    /// Directions that are hardly observed.
+    pub unobservable: Vec<UnobservableDirection>,
+    /// Senses that disagree with the pose.
+    pub inconsistencies: Vec<Inconsistency>,
+    /// Why the search ended.
+    pub termination: Termination,
+    /// Whether all calibrations were found to be exact, and believed to be so.
+    pub exact: bool,
+    /// Cramér and Rao's bound on the covariance, prior included (van Trees, 1968): the inverse of all information, with nothing
+    /// added for what the models of sensors and object leave out. Units are those of [`covariance`](Self::covariance).
+    pub cramer_rao_bound: Matrix6<f64>,
+    /// Center of the object, about which twists turn (camera frame) \[m\].
+    center: Vector3<f64>,
+}
+
+/// What makes posteriors as wide as errors are, besides the information that there is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CovarianceInflation {
+    /// What covariances are multiplied by.
+    pub scale: f64,
+    /// Standard deviation that is added to the rotation about each axis, for what no term models \[rad\].
+    pub rotation_sigma: f64,
+}
+
+impl Default for CovarianceInflation {
+    fn default() -> Self {
+        Self { scale: 1.35, rotation_sigma: 0.39f64.to_radians() }
+    }
+}
+
+/// Random poses that stand for the posterior.
+const SAMPLES: usize = 512;
+
+/// Standard deviation of surface motion from which a direction counts as unobserved \[m\].
+const UNOBSERVED: f64 = 8e-3;
+
+/// [`Inconsistency::distance`] from which a sense counts as disagreeing, and from which deviations are widened in proportion: what is wrong
+/// with the observation, nobody knows, so this is a rule of thumb.
+const DISAGREES: f64 = 5.0;
+
+impl Posterior {
+    /// Of the solutions `found`, the best first; `radius` turns radians into meters of surface motion. Calibrations are `exact` or as accurate as stated.
+    /// `also` disagrees besides, if by enough.
+    pub(crate) fn new(
+        found: &[Solution],
+        inflation: CovarianceInflation,
+        radius: f64,
+        exact: bool,
+        also: Option<Inconsistency>,
+    ) -> Self {
+        let best = &found[0];
+        // Where calibrations are exact, as in simulation, so are models.
+        let turn = if exact { 0.0 } else { inflation.rotation_sigma.powi(2) };
+        let more = Matrix6::from_diagonal(&Vector6::new(0.0, 0.0, 0.0, turn, turn, turn));
+        let bounds: Vec<(Matrix6<f64>, f64)> =
+            found.iter().map(|solution| laplace(&solution.at)).collect();
+        let mut inconsistencies = inconsistencies(&best.at);
+        inconsistencies.extend(also.filter(|also| also.distance > DISAGREES));
+        let apart = inconsistencies.iter().map(|d| d.distance / DISAGREES).fold(1.0, f64::max);
+        let scale = inflation.scale * apart.powi(2);
+        let covariance = |k: usize| {
+            // What was cut short has some way left to go.
+            let left = match found[k].termination {
+                Termination::Iterations | Termination::Aborted => remaining(&found[k].at),
+                Termination::Converged | Termination::Stalled => Vector6::zeros(),
+            };
+            bounds[k].0 * scale + more + left * left.transpose()
+        };
+        // Laplace: the mass of a mode is its height times its volume.
+        let logarithm = |k: usize| 0.5 * bounds[k].1 - found[k].at.cost;
+        let first = (0..found.len()).map(logarithm).fold(f64::NEG_INFINITY, f64::max);
+        // A mode whose width is not known counts only where none is.
+        let mass = |k: usize| if first.is_finite() { (logarithm(k) - first).exp() } else { 1.0 };
+        let masses: Vec<f64> = (0..found.len()).map(mass).collect();
+        let total: f64 = masses.iter().sum();
+        let hypotheses: Vec<Hypothesis> = (0..found.len())
+            .map(|k| Hypothesis {
+                t_cam_object: found[k].at.state.t_cam_object,
+                weight: masses[k] / total,
+                cost: found[k].at.cost,
+                covariance: covariance(k),
+            })
+            .collect();
+        Self {
+            unobservable: unobservable(&hypotheses[0].covariance, radius),
+            inconsistencies,
+            hypotheses,
+            termination: best.termination,
+            exact,
+            cramer_rao_bound: bounds[0].0,
+            center: best.at.state.center(),
+        }
+    }
+
+    /// Covariance of the pose's error: a left twist about the object's center in the camera frame \[m², m rad, rad²\].
+    pub fn covariance(&self) -> Matrix6<f64> {
+        self.hypotheses[0].covariance
+    }
+
+    /// Standard deviation along the direction that is known least \[m of surface motion\]; `radius` turns radians into that.
+    pub(crate) fn widest(&self, radius: f64) -> f64 {
+        directions(&self.covariance(), radius)[0].1
+    }
+
+    /// Probability that the pose is right: within 5 mm and 5° of the true one.
+    pub fn probability(&self) -> f64 {
+        self.probability_within(5e-3, 5f64.to_radians())
+    }
+
+    /// Probability that the true pose is within `distance` \[m\] and `angle` \[rad\] of the best one, all hypotheses
+    /// considered. By sampling; always the same for the same posterior.
+    pub fn probability_within(&self, distance: f64, angle: f64) -> f64 {
+        let place = self.hypotheses[0].t_cam_object.inverse() * Point3::from(self.center);
+        let mut random = SplitMix64::new(0);
+        let of = |hypothesis: &Hypothesis, random: &mut SplitMix64| {
+            let Some(factor) = hypothesis.covariance.cholesky() else { return 0.0 };
+            let root = factor.l();
+            let inside = (0..SAMPLES).filter(|_| {
+                let twist = root * Vector6::from_fn(|_, _| random.normal());
+                let center = (hypothesis.t_cam_object * place).coords;
+                let pose = perturb_about(&hypothesis.t_cam_object, &center, &twist);
+                let (off, turn) = self.deviation(&pose);
+                off.norm() <= distance && turn.norm() <= angle
+            });
+            inside.count() as f64 / SAMPLES as f64
+        };
+        self.hypotheses.iter().map(|h| h.weight * of(h, &mut random)).sum()
+    }
+
+    /// How far `pose` is from the best one: displacement of the object's center \[m\] and rotation vector \[rad\].
+    fn deviation(&self, pose: &Isometry3<f64>) -> (Vector3<f64>, Vector3<f64>) {
+        let best = &self.hypotheses[0].t_cam_object;
+        let place = best.inverse() * Point3::from(self.center);
+        let turn = so3_log(&(pose.rotation * best.rotation.inverse()));
+        ((pose * place).coords - self.center, turn)
+    }
+
+    /// How far `pose` is from the best one, in standard deviations: the square is χ² of six degrees of freedom if the
+    /// posterior is right.
+    pub fn mahalanobis(&self, pose: &Isometry3<f64>) -> f64 {
+        let (off, turn) = self.deviation(pose);
+        let twist = Vector6::new(off.x, off.y, off.z, turn.x, turn.y, turn.z);
+        let factor = self.covariance().cholesky();
+        factor.map_or(f64::INFINITY, |factor| twist.dot(&factor.solve(&twist)).max(0.0).sqrt())
+    }
+}
+
+/// Covariance of the object's pose with all else integrated out, and the logarithm of the determinant of that of everything.
+fn laplace(point: &Linearization) -> (Matrix6<f64>, f64) {
+    // What nothing is known of, not even beforehand, must not be infinite.
+    let Some(factor) = ScaledCholesky::new(point.equations.hessian(), RIDGE) else {
+        return (Matrix6::identity(), f64::NEG_INFINITY);
+    };
+    let all = factor.inverse();
+    let at = point.equations.offset(Block::ObjectPose).unwrap_or(0);
+    let covariance = Matrix6::from_fn(|r, c| all[(at + r, at + c)]);
+    let eliminated = point.marginal.as_ref().map_or(0.0, |marginal| marginal.log_determinant);
+    (covariance, -factor.log_determinant() - eliminated)
+}
+
+/// The object's part of the step to where the quadratic model about `point` is least: a left twist about its center \[m, rad\].
+fn remaining(point: &Linearization) -> Vector6<f64> {
+    let at = point.equations.offset(Block::ObjectPose).unwrap_or(0);
+    let step = point.gauss_newton_step().map(|step| step.fixed_rows::<6>(at).into_owned());
+    step.filter(|step| step.iter().all(|v| v.is_finite())).unwrap_or_else(Vector6::zeros)
+}
+
+/// Directions in which the pose of `point` is uncertain, the most uncertain first: twists about the object's center that move
+/// its surface by a meter, with the standard deviation of that motion \[m\].
+pub(super) fn principal_directions(point: &Linearization, radius: f64) -> Vec<(Vector6<f64>, f64)> {
+    directions(&laplace(point).0, radius)
+}
+
+fn directions(covariance: &Matrix6<f64>, radius: f64) -> Vec<(Vector6<f64>, f64)> {
+    let scale = Vector6::new(1.0, 1.0, 1.0, radius, radius, radius);
+    let meters = Matrix6::from_fn(|r, c| covariance[(r, c)] * scale[r] * scale[c]);
+    let eigen = meters.symmetric_eigen();
+    let mut found: Vec<_> = (0..6)
+        .map(|k| {
+            let twist: Vector6<f64> = eigen.eigenvectors.column(k).component_div(&scale);
+            (twist, eigen.eigenvalues[k].max(0.0).sqrt())
+        })
+        .collect();
+    found.sort_by(|a, b| b.1.total_cmp(&a.1));
+    found
+}
+
+fn unobservable(covariance: &Matrix6<f64>, radius: f64) -> Vec<UnobservableDirection> {
+    directions(covariance, radius)
+        .into_iter()
+        .filter(|(_, deviation)| *deviation > UNOBSERVED)
+        .map(|(twist, deviation)| UnobservableDirection { twist, deviation })
+        .collect()
+}
+
+/// By how many standard deviations `squared`, a χ² of so many `degrees` of freedom if nothing is wrong, is larger than usual (Fisher, 1922).
+pub(crate) fn chi_square_z(squared: f64, degrees: usize) -> f64 {
+    (2.0 * squared.max(0.0)).sqrt() - (2.0 * degrees as f64 - 1.0).max(0.0).sqrt()
+}
+
+/// Which evidence, the prior included, has its own optimum far away.
+fn inconsistencies(point: &Linearization) -> Vec<Inconsistency> {
+    let distance = |equations: &NormalEquations| {
+        let factor = ScaledCholesky::new(equations.hessian(), 1e-3)?;
+        // As many degrees of freedom as the modality says something of, at most.
+        let degrees = equations.hessian().diagonal().iter().filter(|d| **d > 0.0).count();
+        Some(chi_square_z(factor.mahalanobis_squared(equations.gradient()), degrees))
+    };
+    // A modality is not to blame for what the model is off by.
+    let marginalized = |part: &Contribution| {
+        let patches = &point.marginal.as_ref().filter(|_| part.equations.has_auxiliary())?.patches;
+        Some(part.equations.clone().marginalize(patches.precision())?.rest)
+    };
+    let of = |part: &Contribution| {
+        let distance = distance(marginalized(part).as_ref().unwrap_or(&part.equations))?;
+        (distance > DISAGREES).then_some(Inconsistency { factor: part.name, distance })
+    };
+    point.prior.iter().chain(&point.factors).filter_map(of).collect()
+}

@@ -1,0 +1,191 @@
+//! The files of a dataset in the making: folders, images, one entry an image in each JSON file of a scene, and models.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::fs;
+use std::path::Path;
+
+use nalgebra::Isometry3;
+use prehend_geometry::TriMesh;
+use prehend_render::Mask;
+use serde_json::{Map, Value};
+
+use super::annotation;
+use super::hand_files::{TAXELS, URDF};
+use crate::data::AssetError;
+use crate::data::bop::{DatasetError, create_folder, write_atomically};
+use crate::scene::{Inertial, Observation};
+
+/// Removes what was being written in the folder when a process ended: such files are hidden and end in `.tmp`.
+pub(super) fn remove_temporary(folder: &Path) -> Result<(), DatasetError> {
+    let Ok(entries) = fs::read_dir(folder) else { return Ok(()) };
+    for entry in entries.flatten() {
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        if name.starts_with('.') && name.ends_with(".tmp") {
+            fs::remove_file(entry.path()).map_err(|e| fault(&entry.path(), &e))?;
+        }
+    }
+    Ok(())
+}
+
+pub(super) fn fault(path: &Path, error: &std::io::Error) -> DatasetError {
+    DatasetError::Write { file: path.to_owned(), problem: error.to_string() }
+}
+
+/// The folders of a scene.
+pub(super) const FRAME_FOLDERS: [&str; 4] = ["rgb", "depth", "mask", "mask_visib"];
+
+/// One image with its annotations.
+pub(super) struct FrameFiles<'a> {
+    /// The observation as the estimator gets it.
+    pub(super) told: &'a Observation,
+    pub(super) obj_id: u32,
+    /// Object → camera.
+    pub(super) truth: &'a Isometry3<f64>,
+    /// True hand base → camera and joint positions, where the dataset keeps them apart from the measured ones.
+    pub(super) true_hand: Option<(&'a Isometry3<f64>, &'a [f64])>,
+    /// World → camera, where there is a world.
+    pub(super) world: Option<&'a Isometry3<f64>>,
+    /// The unoccluded silhouette.
+    pub(super) whole: &'a Mask,
+    /// Its visible part.
+    pub(super) visible: &'a Mask,
+    pub(super) joint_names: &'a [String],
+}
+
+impl FrameFiles<'_> {
+    /// Writes the images to the scene's folders, color as JPEG of that quality or, if that is 0, as PNG.
+    ///
+    /// # Errors
+    /// When one cannot be written; those before it are there then.
+    pub(super) fn write(
+        &self,
+        scene_dir: &Path,
+        im_id: u32,
+        jpeg_quality: u8,
+    ) -> Result<Entries, AssetError> {
+        let (image, instance) = (format!("{im_id:06}.png"), format!("{im_id:06}_000000.png"));
+        let unit = annotation::DEPTH_SCALE * 1e-3;
+        let rgb = scene_dir.join("rgb").join(&image);
+        match jpeg_quality {
+            0 => self.told.color.save(&rgb),
+            quality => self.told.color.save_jpeg(&rgb.with_extension("jpg"), quality),
+        }
+        .map_err(DatasetError::from)?;
+        let depth = scene_dir.join("depth").join(&image);
+        self.told.depth.save(&depth, unit).map_err(DatasetError::from)?;
+        let mask = |folder: &str, mask: &Mask| {
+            mask.save(&scene_dir.join(folder).join(&instance)).map_err(DatasetError::from)
+        };
+        mask("mask_visib", &self.told.mask)?;
+        mask("mask", self.whole)?;
+        Ok(self.entries())
+    }
+
+    fn entries(&self) -> Entries {
+        let told = self.told;
+        let mut entries = vec![
+            ("scene_gt.json", annotation::truth(self.obj_id, self.truth)),
+            ("scene_gt_info.json", annotation::visibility(self.visible, self.whole, &told.depth)),
+            ("scene_camera.json", annotation::camera(&told.camera, self.world)),
+        ];
+        let gravity = told.gravity.unwrap_or_default();
+        let bodies = |t_cam_hand: &Isometry3<f64>, joints: &[f64]| {
+            annotation::bodies(&gravity, t_cam_hand, self.joint_names, joints, URDF)
+        };
+        if let Some(hand) = &told.hand {
+            entries.push(("scene_bodies.json", bodies(&hand.t_cam_hand, &hand.joints)));
+            if !hand.forces.is_empty() {
+                entries.push(("scene_tactile.json", annotation::touch(&hand.forces, TAXELS)));
+            }
+        }
+        if let Some((t_cam_hand, joints)) = self.true_hand {
+            entries.push(("scene_bodies_gt.json", bodies(t_cam_hand, joints)));
+        }
+        entries.into_iter().map(|(name, entry)| (name.into(), entry.to_string())).collect()
+    }
+}
+
+/// What one image adds to each of its scene's files: the file's name and the entry as JSON.
+pub(super) type Entries = Vec<(String, String)>;
+
+/// The files that have an entry for each image. The camera's comes last: a scene that has it has all.
+pub(super) const NAMES: [&str; 6] = [
+    "scene_gt.json",
+    "scene_gt_info.json",
+    "scene_bodies.json",
+    "scene_bodies_gt.json",
+    "scene_tactile.json",
+    "scene_camera.json",
+];
+
+/// The files of a scene in the making, with one line an image as BOP's own tools write them.
+#[derive(Default)]
+pub(super) struct SceneFiles {
+    text: BTreeMap<String, String>,
+}
+
+impl SceneFiles {
+    /// Adds an image; images come in ascending order.
+    pub(super) fn add(&mut self, im_id: usize, entries: &Entries) {
+        for (name, entry) in entries {
+            let text = self.text.entry(name.clone()).or_default();
+            let separator = if text.is_empty() { "{\n" } else { ",\n" };
+            // Writing to a string cannot fail.
+            let _ = write!(text, "{separator}  \"{im_id}\": {entry}");
+        }
+    }
+
+    /// Writes those files that have entries, each of them whole or not at all.
+    ///
+    /// # Errors
+    /// When one cannot be written.
+    pub(super) fn write(&self, scene_dir: &Path) -> Result<(), DatasetError> {
+        for name in NAMES {
+            if let Some(text) = self.text.get(name) {
+                write_atomically(&scene_dir.join(name), format!("{text}\n}}\n").as_bytes())?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Writes `obj_*.ply` in millimeters, with textures beside them, and `models_info.json` to the folder `dir`.
+///
+/// # Errors
+/// When a file cannot be written.
+pub(super) fn write_models(
+    dir: &Path,
+    models: &BTreeMap<u32, (TriMesh, &Inertial)>,
+) -> Result<(), AssetError> {
+    create_folder(dir)?;
+    let mut info = Map::new();
+    for (id, (mesh, inertial)) in models {
+        mesh.clone().scaled(1e3).save_ply(&dir.join(format!("obj_{id:06}.ply")))?;
+        info.insert(id.to_string(), annotation::model(mesh, inertial));
+    }
+    let text = format!("{:#}\n", Value::Object(info));
+    Ok(write_atomically(&dir.join("models_info.json"), text.as_bytes())?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_are_json_with_a_line_an_image() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut files = SceneFiles::default();
+        let entries = vec![
+            ("scene_gt.json".to_owned(), "[{\"a\":1}]".to_owned()),
+            ("scene_camera.json".to_owned(), "{}".to_owned()),
+        ];
+        files.add(9, &entries);
+        files.add(10, &entries);
+        files.write(dir.path()).unwrap();
+        let text = std::fs::read_to_string(dir.path().join("scene_gt.json")).unwrap();
+        assert_eq!(text, "{\n  \"9\": [{\"a\":1}],\n  \"10\": [{\"a\":1}]\n}\n");
+        assert!(!dir.path().join("scene_tactile.json").exists());
+    }
+}

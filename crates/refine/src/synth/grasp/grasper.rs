@@ -1,0 +1,289 @@
+//! Makes grasps: closes the hand around the object, and keeps what holds.
+
+use std::sync::Arc;
+
+use nalgebra::{Isometry3, Point3, Vector3};
+use prehend_geometry::sample::surface_samples;
+use prehend_geometry::{ClosestPoints, SolidUnion, SplitMix64};
+use prehend_sim::{Coulomb, DynContactLaw, KelvinVoigt, Law, LawError, RigidBody, SurfacePoint};
+
+use super::drive::{Drive, Effort};
+use super::fault::{GraspError, GraspFault};
+use super::placement::{Placed, Placement};
+use super::preshape::Preshape;
+use super::settings::GraspSettings;
+use super::simulation::{Medium, Setup, Simulation};
+use super::skin::Skin;
+use crate::data::ContactModel;
+use crate::scene::{Hand, Object};
+use crate::synth::snapshot::GraspSnapshot;
+
+/// An object at rest in a hand.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Grasp {
+    /// Joint positions in the order of the robot's joint names \[rad; m\].
+    pub joints: Vec<f64>,
+    /// Object coordinates → hand base coordinates \[m\].
+    pub t_hand_object: Isometry3<f64>,
+    /// Force at which fingers stop \[N\].
+    pub grip: f64,
+    /// Links that touch the object, by their number in the robot.
+    pub links: Vec<usize>,
+    /// What of the object's surface is within 5 mm of the hand \[cm²\].
+    pub contact_area: f64,
+    /// Volume that hand and object share \[cm³\].
+    pub intersection_volume: f64,
+    /// How far the object moved while gravity pulled in several directions \[m\].
+    pub drift: f64,
+    /// By what angle it turned then \[rad\].
+    pub turn: f64,
+}
+
+/// Makes grasps of one object by one hand.
+pub struct Grasper<'a> {
+    pub(super) settings: GraspSettings,
+    preshape: Preshape,
+    pub(super) setup: Setup<'a>,
+    pub(super) drive: Drive<'a>,
+    pub(super) skin: Skin,
+    placement: Placement,
+    contact: ContactModel,
+}
+
+/// Links that push with less than this do not count as touching \[N\].
+const TOUCHING: f64 = 0.05;
+/// Hand and object are at rest below this part of the joints' speeds, and below these speeds of the object \[m/s, rad/s\].
+const STILL: (f64, f64, f64) = (0.03, 2e-3, 0.05);
+/// When time is up the object may be so many times faster.
+const CREEPING: f64 = 5.0;
+/// For so long \[s\].
+const STILL_TIME: f64 = 0.1;
+/// By how much friction is softened where a step cannot be solved otherwise.
+const SOFTER: f64 = 20.0;
+/// Samples of an object's surface, at least and at most.
+const SAMPLES: (f64, f64) = (2e3, 4e4);
+
+impl<'a> Grasper<'a> {
+    /// Prepares grasps of `object` by `robot`.
+    ///
+    /// # Errors
+    /// If a setting is out of its range, the pre-shape is not the robot's, nothing closes, a taxel is on no link, or the
+    /// object cannot be simulated.
+    pub fn new(
+        robot: &'a Hand,
+        object: &Object,
+        settings: &GraspSettings,
+    ) -> Result<Self, GraspError> {
+        settings.check()?;
+        let preshape = match &settings.preshape {
+            Some(own) => own.clone(),
+            None => Preshape::of(robot)?,
+        };
+        preshape.check(robot.tree.joint_names().len())?;
+        let inertial = &object.inertial;
+        let body = RigidBody::new(inertial.mass, inertial.inertia, inertial.center_of_mass);
+        let body =
+            body.map_err(|reason| GraspError::Object { object: object.name.clone(), reason })?;
+        let count = (object.area / settings.sample_spacing.powi(2)).clamp(SAMPLES.0, SAMPLES.1);
+        let solid = object.mesh.cleaned().0;
+        let samples = surface_samples(&solid, count as usize, 0);
+        let area = object.area / samples.len().max(1) as f64;
+        let samples = samples.iter().map(|s| SurfacePoint { position: s.point, area }).collect();
+        // Backward Euler damps what is faster than its step: contacts need no damping of their own.
+        let spring = KelvinVoigt { stiffness: settings.stiffness, damping: 0.0 };
+        let law = |slip_scale| -> Result<Arc<dyn DynContactLaw>, LawError> {
+            let friction = Coulomb { friction: settings.friction, slip_scale };
+            Ok(Arc::new(Law::new(spring, friction)?))
+        };
+        let (law, soft_law) = (law(settings.slip_speed)?, law(SOFTER * settings.slip_speed)?);
+        let (time_step, damping_time) = (settings.time_step, settings.damping_time);
+        Ok(Self {
+            drive: Drive::new(robot, &preshape, settings),
+            skin: Skin::new(robot, settings.taxel_reach)?,
+            setup: Setup { robot, body, samples, law, soft_law, time_step, damping_time },
+            placement: Placement::new(object),
+            contact: ContactModel::new(&object.mesh),
+            settings: settings.clone(),
+            preshape,
+        })
+    }
+
+    /// The grasp that comes of `seed`, the same on every call and whatever the number of threads.
+    ///
+    /// # Errors
+    /// Why it is none.
+    pub fn grasp(&self, seed: u64) -> Result<Grasp, GraspFault> {
+        let mut random = SplitMix64::new(seed);
+        let placed =
+            self.placement.draw(self.setup.robot, &self.preshape, &self.settings, &mut random)?;
+        let Placed { joints, t_hand_object } = placed.ok_or(GraspFault::NoRoom)?;
+        let weight = self.setup.body.mass() * self.settings.gravity;
+        let pace = self.preshape.speed.iter();
+        let pace = pace
+            .map(|_| 1.0 + self.settings.speed_spread * (2.0 * random.uniform() - 1.0))
+            .collect();
+        let grip = self.settings.grip + self.settings.grip_per_weight * weight;
+        let effort = Effort { pace, grip };
+        let mut simulation = Simulation::new(&self.setup, &joints, &t_hand_object)?;
+        self.close(&mut simulation, &effort)?;
+        self.check_links(&simulation)?;
+        let (drift, turn) = self.hold(&mut simulation, &effort, &mut random)?;
+        self.check_rest(&simulation, 1.0)?;
+        let links = self.check_links(&simulation)?;
+        let (joints, t_hand_object) = (simulation.joints().to_vec(), simulation.t_hand_object());
+        let (contact_area, intersection_volume) = self.measure(&joints, &t_hand_object)?;
+        Ok(Grasp {
+            joints,
+            t_hand_object,
+            grip,
+            links,
+            contact_area,
+            intersection_volume,
+            drift,
+            turn,
+        })
+    }
+
+    /// The first grasp of the seeds from `first_seed` on, and its seed.
+    ///
+    /// # Errors
+    /// [`GraspFault::Exhausted`] if none of `tries` seeds leads to one.
+    pub fn search(&self, first_seed: u64, tries: u64) -> Result<(u64, Grasp), GraspFault> {
+        self.first(first_seed, tries, |seed| Ok((seed, self.grasp(seed)?)))
+    }
+
+    /// What `attempt` makes of the first seed from which it makes something.
+    fn first<T>(
+        &self,
+        first_seed: u64,
+        tries: u64,
+        attempt: impl Fn(u64) -> Result<T, GraspFault>,
+    ) -> Result<T, GraspFault> {
+        let mut last = GraspFault::NoContact { links: 0 };
+        for k in 0..tries {
+            match attempt(first_seed.wrapping_add(k)) {
+                Ok(found) => return Ok(found),
+                Err(fault) => last = fault,
+            }
+        }
+        Err(GraspFault::Exhausted { tries, last: Box::new(last) })
+    }
+
+    /// The first grasp of the seeds from `first_seed` on that holds through a motion of `steps` moments, and that motion.
+    ///
+    /// # Errors
+    /// [`GraspFault::Exhausted`] if none of `tries` seeds leads to one.
+    pub fn sequence(
+        &self,
+        first_seed: u64,
+        tries: u64,
+        steps: usize,
+    ) -> Result<(Grasp, Vec<GraspSnapshot>), GraspFault> {
+        self.first(first_seed, tries, |seed| {
+            let grasp = self.grasp(seed)?;
+            let moments = self.trajectory(&grasp, seed, steps)?;
+            Ok((grasp, moments))
+        })
+    }
+
+    /// Closes the hand around the floating object, until all is at rest or nearly so when time is up: some fingers go on
+    /// creeping, and whether the object is held will be seen.
+    fn close(&self, simulation: &mut Simulation<'_>, effort: &Effort) -> Result<(), GraspFault> {
+        let steps = |time: f64| (time / self.settings.time_step).ceil() as usize;
+        let mut still = 0;
+        for _ in 0..steps(self.settings.closing_time) {
+            let change = self.drive.change(simulation, effort);
+            simulation.advance(&change, Medium::Viscous)?;
+            let (speed, spin) = simulation.speed();
+            let rests =
+                self.drive.is_at_rest(&change, STILL.0) && speed < STILL.1 && spin < STILL.2;
+            still = if rests { still + 1 } else { 0 };
+            if still >= steps(STILL_TIME) {
+                return Ok(());
+            }
+        }
+        self.check_rest(simulation, CREEPING)
+    }
+
+    /// Whether the object moves no faster than this many times what counts as still.
+    fn check_rest(&self, simulation: &Simulation<'_>, times: f64) -> Result<(), GraspFault> {
+        let (speed, spin) = simulation.speed();
+        let rests = speed < times * STILL.1 && spin < times * STILL.2;
+        if rests { Ok(()) } else { Err(GraspFault::Restless) }
+    }
+
+    /// Lets gravity pull in several directions; how far the object moves and turns at most.
+    fn hold(
+        &self,
+        simulation: &mut Simulation<'_>,
+        effort: &Effort,
+        random: &mut SplitMix64,
+    ) -> Result<(f64, f64), GraspFault> {
+        let start = simulation.t_hand_object();
+        let (mut drift, mut turn) = (0.0, 0.0);
+        for _ in 0..self.settings.hold_directions {
+            let gravity = random_direction(random) * self.settings.gravity;
+            let steps = (self.settings.hold_time / self.settings.time_step).ceil() as usize;
+            for _ in 0..steps {
+                let change = self.drive.change(simulation, effort);
+                simulation.advance(&change, Medium::Gravity(gravity))?;
+                let (distance, angle) = self.moved(&start, &simulation.t_hand_object())?;
+                drift = distance.max(drift);
+                turn = angle.max(turn);
+            }
+        }
+        Ok((drift, turn))
+    }
+
+    /// How far the object has moved between two poses, unless it has slipped.
+    pub(super) fn moved(
+        &self,
+        from: &Isometry3<f64>,
+        to: &Isometry3<f64>,
+    ) -> Result<(f64, f64), GraspFault> {
+        let center: Point3<f64> = *self.setup.body.com();
+        let (distance, angle) =
+            ((to * center - from * center).norm(), from.rotation.angle_to(&to.rotation));
+        let stays = distance <= self.settings.slip_distance && angle <= self.settings.slip_angle;
+        if stays { Ok((distance, angle)) } else { Err(GraspFault::Slipped { distance, angle }) }
+    }
+
+    /// Links that touch, if they are enough.
+    fn check_links(&self, simulation: &Simulation<'_>) -> Result<Vec<usize>, GraspFault> {
+        let mut forces = vec![0.0; simulation.poses().len()];
+        for touch in simulation.touches() {
+            forces[touch.link] += touch.force.norm();
+        }
+        let links: Vec<usize> = (0..forces.len()).filter(|&l| forces[l] > TOUCHING).collect();
+        if links.len() < self.settings.links {
+            return Err(GraspFault::NoContact { links: links.len() });
+        }
+        Ok(links)
+    }
+
+    /// Contact area \[cm²\] and shared volume \[cm³\], within their bounds.
+    fn measure(
+        &self,
+        joints: &[f64],
+        t_hand_object: &Isometry3<f64>,
+    ) -> Result<(f64, f64), GraspFault> {
+        let hand = self.setup.robot.posed(&Isometry3::identity(), joints)?;
+        let hand = SolidUnion::new(&hand.mesh_parts())?;
+        let volume = self.contact.intersection_volume_cm3(t_hand_object, &hand)?;
+        if volume > self.settings.intersection_volume {
+            return Err(GraspFault::TooDeep { volume });
+        }
+        let surface = ClosestPoints::new(&hand.mesh())?;
+        let area = self.contact.contact_area_cm2(t_hand_object, &surface);
+        let (least, most) = self.settings.contact_area;
+        if !(least..=most).contains(&area) {
+            return Err(GraspFault::ContactArea { area });
+        }
+        Ok((area, volume))
+    }
+}
+
+pub(super) fn random_direction(random: &mut SplitMix64) -> Vector3<f64> {
+    let direction = Vector3::from_fn(|_, _| random.normal());
+    direction.try_normalize(1e-9).unwrap_or_else(Vector3::z)
+}

@@ -1,0 +1,118 @@
+//! What becomes of a frame.
+
+use std::fmt;
+
+use nalgebra::Isometry3;
+
+use super::{Solved, Timing};
+use crate::problem::State;
+use crate::strategy::Posterior;
+
+/// How a frame's pose came about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TrackStatus {
+    /// From the frame before.
+    Tracked,
+    /// It is where the object should be: there was no time to look at the frame.
+    Predicted,
+    /// It was found anew: the first of all, or after a loss.
+    Relocalized,
+    /// It is where the object should be, and it does not seem to be there.
+    Lost,
+}
+
+impl TrackStatus {
+    /// The name used in reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Tracked => "followed",
+            Self::Predicted => "predicted",
+            Self::Relocalized => "found",
+            Self::Lost => "lost",
+        }
+    }
+}
+
+/// Why a pose was not believed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Rejection {
+    /// The mask is empty, or the object would be behind the camera.
+    Unseen,
+    /// The cost is so high \[nat\], its running mean being the other number.
+    Cost(f64, f64),
+    /// The object would be so many standard deviations of the prediction away from it.
+    Innovation(f64),
+    /// The pose is so uncertain \[m of surface motion\].
+    Uncertain(f64),
+}
+
+impl fmt::Display for Rejection {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Unseen => write!(f, "nothing of the object is seen"),
+            Self::Cost(cost, mean) => {
+                write!(f, "a cost of {cost:.0} nats where {mean:.0} are usual")
+            }
+            Self::Innovation(sigmas) => {
+                write!(f, "{sigmas:.0} standard deviations from where it should be")
+            }
+            Self::Uncertain(meters) => write!(f, "uncertain by {:.0} mm", meters * 1e3),
+        }
+    }
+}
+
+/// A frame's outcome.
+#[derive(Clone, Debug)]
+pub struct Tracked {
+    /// Object coordinates → camera coordinates \[m\].
+    pub t_cam_object: Isometry3<f64>,
+    /// The same with the hand, its joints and the camera as they are estimated to be.
+    pub state: State,
+    /// How the pose came about.
+    pub status: TrackStatus,
+    /// How uncertain it is, unless it was only predicted.
+    pub posterior: Option<Posterior>,
+    /// Why the object was not tracked, if it was tried.
+    pub rejection: Option<Rejection>,
+    /// Steps that lowered the cost; of a pose found anew, the stage that it comes from.
+    pub iterations: usize,
+    /// Cost of the evidence, without what was known before \[nat\]; not a number if the frame was not looked at.
+    pub cost: f64,
+    /// What the time was spent on.
+    pub timing: Timing,
+}
+
+impl Tracked {
+    /// A pose that is only predicted.
+    pub(super) fn predicted(state: State, timing: Timing) -> Self {
+        Self {
+            t_cam_object: state.t_cam_object,
+            state,
+            status: TrackStatus::Predicted,
+            posterior: None,
+            rejection: None,
+            iterations: 0,
+            cost: f64::NAN,
+            timing,
+        }
+    }
+
+    /// A pose where the object should be and is not.
+    pub(super) fn lost(state: State, rejection: Rejection, timing: Timing) -> Self {
+        let (status, rejection) = (TrackStatus::Lost, Some(rejection));
+        Self { status, rejection, ..Self::predicted(state, timing) }
+    }
+
+    /// A pose that was solved for.
+    pub(super) fn solved(
+        solved: Solved,
+        posterior: Posterior,
+        status: TrackStatus,
+        rejection: Option<Rejection>,
+        timing: Timing,
+    ) -> Self {
+        let (cost, iterations) = (solved.cost(), solved.solution.iterations);
+        let predicted = Self::predicted(solved.solution.at.state, timing);
+        Self { iterations, cost, rejection, status, posterior: Some(posterior), ..predicted }
+    }
+}

@@ -1,0 +1,22 @@
+//! The library from outside: datasets read, scored and made; robots of any kind; golden values of independent tools.
+//!
+//! Tests in modules called `data_*` read `PREHEND_DATA` (default: `../shared/data` beside the repository) and are ignored by default.
+
+#![allow(clippy::unwrap_used)] // a test may panic; helpers outside test functions count as code to the lint
+
+mod any_robot;
+mod bop_dataset;
+mod data_contact;
+mod data_metrics;
+mod data_search;
+mod synth_layout;
+
+use std::path::PathBuf;
+
+/// A file or folder of the reference data.
+fn data(name: &str) -> PathBuf {
+    let default = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data");
+    let root =
+        std::env::var_os("PREHEND_DATA").map_or_else(|| PathBuf::from(default), PathBuf::from);
+    root.join(name)
+}

@@ -1,0 +1,276 @@
+//! Datasets of `synth` as an independent reader sees them: raw JSON and images, without this crate's reader.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use image::GenericImageView;
+use prehend_geometry::objects::YcbObject;
+use prehend_refine::scene::Object;
+use prehend_refine::synth::{
+    DatasetSummary, HandFiles, SensorSettings, Subject, SynthError, SynthSettings, generate,
+    ready_made_moments,
+};
+use serde_json::Value;
+
+const BOTTLE: u32 = 5;
+
+fn subject() -> Subject {
+    let object = YcbObject::MustardBottle;
+    let prepared = Object::with_mass(object.name(), object.mesh(), Some(object.mass()), 0);
+    Subject { obj_id: BOTTLE, object: prepared.unwrap() }
+}
+
+fn settings(sensor: SensorSettings) -> SynthSettings {
+    SynthSettings {
+        frames: 3,
+        frames_per_grasp: 2,
+        width: 320,
+        height: 240,
+        sensor,
+        ..Default::default()
+    }
+}
+
+fn make(
+    dir: &Path,
+    settings: &SynthSettings,
+    progress: &(dyn Fn(u64) + Sync),
+) -> Result<DatasetSummary, SynthError> {
+    let (hand, subjects) = (HandFiles::built_in().unwrap(), [subject()]);
+    let prepare = |subject: &Subject| {
+        let moments =
+            ready_made_moments(&subject.object, &hand.robot, 7, 5).map_err(|e| e.to_string());
+        Ok(move |_| moments.clone())
+    };
+    generate(dir, &hand, &subjects, settings, prepare, progress)
+}
+
+fn json(path: PathBuf) -> Value {
+    serde_json::from_str(&fs::read_to_string(&path).unwrap_or_else(|e| panic!("{path:?}: {e}")))
+        .unwrap()
+}
+
+fn numbers(value: &Value) -> Vec<f64> {
+    value.as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect()
+}
+
+/// Checks that nine numbers are a rotation.
+fn rotation(value: &Value) -> Vec<f64> {
+    let r = numbers(value);
+    assert_eq!(r.len(), 9);
+    for i in 0..3 {
+        for j in 0..3 {
+            let dot: f64 = (0..3).map(|k| r[3 * i + k] * r[3 * j + k]).sum();
+            assert!((dot - f64::from(u8::from(i == j))).abs() < 1e-9);
+        }
+    }
+    let determinant = r[0] * (r[4] * r[8] - r[5] * r[7]) - r[1] * (r[3] * r[8] - r[5] * r[6])
+        + r[2] * (r[3] * r[7] - r[4] * r[6]);
+    assert!((determinant - 1.0).abs() < 1e-9);
+    r
+}
+
+/// Rows of set pixels.
+fn mask(path: PathBuf) -> Vec<bool> {
+    let image = image::open(&path).unwrap_or_else(|e| panic!("{path:?}: {e}"));
+    assert_eq!(image.dimensions(), (320, 240));
+    image.to_luma8().pixels().map(|p| p.0[0] == 255).collect()
+}
+
+/// Left, top, width and height.
+fn bounds(mask: &[bool]) -> Vec<f64> {
+    let set = || (0..mask.len()).filter(|i| mask[*i]).map(|i| (i % 320, i / 320));
+    let (left, right) = (set().map(|p| p.0).min().unwrap(), set().map(|p| p.0).max().unwrap());
+    let (top, bottom) = (set().map(|p| p.1).min().unwrap(), set().map(|p| p.1).max().unwrap());
+    [left, top, right - left + 1, bottom - top + 1].map(|v| v as f64).to_vec()
+}
+
+fn count(mask: &[bool]) -> f64 {
+    mask.iter().filter(|m| **m).count() as f64
+}
+
+/// What holds at any preset; `exact` says whether what is told is also true.
+fn inspect(root: &Path, rgb: &str, exact: bool) {
+    let scene = root.join("test/000005");
+    let file = |name: &str| json(scene.join(name));
+    let [camera, gt, info, bodies, bodies_gt, tactile] = [
+        "scene_camera.json",
+        "scene_gt.json",
+        "scene_gt_info.json",
+        "scene_bodies.json",
+        "scene_bodies_gt.json",
+        "scene_tactile.json",
+    ]
+    .map(file);
+    for all in [&camera, &gt, &info, &bodies, &bodies_gt, &tactile] {
+        let mut keys: Vec<&String> = all.as_object().unwrap().keys().collect();
+        keys.sort();
+        assert_eq!(keys, ["0", "1", "2"]);
+    }
+    let models = json(root.join("models_eval/models_info.json"));
+    let size = models["5"]["size_z"].as_f64().unwrap();
+    // The bottle is 192 mm high.
+    assert!((185.0..200.0).contains(&size), "{size}");
+    assert!(
+        root.join("models/obj_000005.ply").is_file()
+            && root.join("models/obj_000005.png").is_file()
+    );
+    let table = fs::read_to_string(root.join("hand/taxels.csv")).unwrap();
+    let taxels = table.lines().count() - 1;
+    for im_id in 0..3 {
+        let key = im_id.to_string();
+        let image = |folder: &str, suffix: &str| scene.join(format!("{folder}/{im_id:06}{suffix}"));
+        let k = numbers(&camera[&key]["cam_K"]);
+        assert!(k.len() == 9 && k[0] > 200.0 && k[1] == 0.0 && k[8] == 1.0);
+        let unit = camera[&key]["depth_scale"].as_f64().unwrap();
+        assert!(camera[&key].get("cam_R_w2c").is_none());
+
+        let pose = &gt[&key][0];
+        assert_eq!(gt[&key].as_array().unwrap().len(), 1);
+        assert_eq!(pose["obj_id"], 5);
+        rotation(&pose["cam_R_m2c"]);
+        let t = numbers(&pose["cam_t_m2c"]);
+        assert!(t.len() == 3 && (300.0..800.0).contains(&t[2]), "{t:?} mm");
+
+        let color = image::open(image("rgb", rgb)).unwrap();
+        assert_eq!(color.dimensions(), (320, 240));
+        let (whole, told) =
+            (mask(image("mask", "_000000.png")), mask(image("mask_visib", "_000000.png")));
+        let depth = match image::open(image("depth", ".png")).unwrap() {
+            image::DynamicImage::ImageLuma16(image) => image,
+            other => panic!("{:?}", other.color()),
+        };
+        // On the object, depth lies within its radius of its center.
+        let seen: Vec<f64> = depth
+            .pixels()
+            .zip(&told)
+            .filter(|(z, m)| **m && z.0[0] > 0)
+            .map(|(z, _)| f64::from(z.0[0]) * unit)
+            .collect();
+        let near = seen.iter().filter(|z| (**z - t[2]).abs() < 120.0).count();
+        assert!(near as f64 > 0.9 * seen.len() as f64 && near > 300, "{near} of {}", seen.len());
+
+        let told_info = &info[&key][0];
+        let number = |name: &str| told_info[name].as_f64().unwrap();
+        assert_eq!(number("px_count_all"), count(&whole));
+        assert_eq!(numbers(&told_info["bbox_obj"]), bounds(&whole));
+        let ratio = number("px_count_visib") / number("px_count_all");
+        assert!((number("visib_fract") - ratio).abs() < 1e-12 && ratio > 0.2 && ratio <= 1.0);
+        assert!(number("px_count_valid") <= number("px_count_all"));
+        if exact {
+            assert!(whole.iter().zip(&told).all(|(w, v)| *w || !*v));
+            assert_eq!(number("px_count_visib"), count(&told));
+            assert_eq!(numbers(&told_info["bbox_visib"]), bounds(&told));
+            assert_eq!(bodies[&key], bodies_gt[&key]);
+        } else {
+            assert_ne!(number("px_count_visib"), count(&told));
+            assert_ne!(bodies[&key], bodies_gt[&key]);
+            assert!((0.5..2.0).contains(&(count(&told) / number("px_count_visib"))));
+        }
+        for told in [&bodies[&key], &bodies_gt[&key]] {
+            let gravity: f64 = numbers(&told["gravity"]).iter().map(|g| g * g).sum();
+            assert!((gravity.sqrt() - 9.81).abs() < 1e-9);
+            let hand = &told["bodies"][0];
+            rotation(&hand["cam_R_b2c"]);
+            assert!((200.0..900.0).contains(&numbers(&hand["cam_t_b2c"])[2]));
+            assert_eq!(hand["joints"].as_object().unwrap().len(), 16);
+            assert!(root.join(hand["urdf"].as_str().unwrap()).is_file());
+        }
+        let forces = tactile[&key]["force"].as_array().unwrap();
+        assert!(forces.len() == taxels && taxels == 368);
+        let strongest = forces.iter().flat_map(numbers).fold(0.0, |m: f64, f| m.max(f.abs()));
+        assert!((100.0..=10_000.0).contains(&strongest), "{strongest}");
+    }
+    for name in ["init_low.csv", "init_high.csv"] {
+        let text = fs::read_to_string(root.join(name)).unwrap();
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!((lines.len(), lines[0]), (4, "scene_id,im_id,obj_id,score,R,t,time"));
+        assert!(lines[3].starts_with("5,2,5,1,") && lines[3].ends_with(",-1"));
+    }
+    let hidden = tree(root).into_keys().filter(|p| p.to_string_lossy().contains("/."));
+    assert_eq!(hidden.count(), 0);
+}
+
+/// Every file with its content.
+fn tree(root: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut files = BTreeMap::new();
+    let mut folders = vec![root.to_path_buf()];
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else {
+                files.insert(path.strip_prefix(root).unwrap().into(), fs::read(&path).unwrap());
+            }
+        }
+    }
+    files
+}
+
+#[test]
+fn clean_datasets_have_the_layout_of_bop() {
+    let dir = tempfile::tempdir().unwrap();
+    let made = make(dir.path(), &settings(SensorSettings::clean()), &|_| ()).unwrap();
+    assert_eq!(made, DatasetSummary { frames: 3, failures: Vec::new() });
+    inspect(dir.path(), ".png", true);
+}
+
+#[test]
+fn realistic_datasets_tell_what_is_not_quite_true() {
+    let dir = tempfile::tempdir().unwrap();
+    make(dir.path(), &settings(SensorSettings::realistic()), &|_| ()).unwrap();
+    inspect(dir.path(), ".jpg", false);
+    let ply = |folder: &str| fs::read(dir.path().join(folder).join("obj_000005.ply")).unwrap();
+    assert_ne!(ply("models"), ply("models_eval"));
+}
+
+#[test]
+fn interrupted_datasets_end_as_others_do() {
+    let (whole, broken) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let settings = settings(SensorSettings::realistic());
+    make(whole.path(), &settings, &|_| ()).unwrap();
+    // Breaks off after the first frame, as a process that is killed would.
+    let interrupted = std::panic::catch_unwind(|| {
+        let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+        one.install(|| make(broken.path(), &settings, &|done| assert_eq!(done, 0, "interrupted")))
+    });
+    assert!(interrupted.is_err());
+    let before = tree(broken.path());
+    assert!(before.keys().any(|p| p.to_string_lossy().contains(".frames.journal")));
+    fs::write(broken.path().join("test/000005/rgb/.000002.jpg.1-1.tmp"), "half").unwrap();
+
+    let mut other = settings.clone();
+    other.sensor.set("depth.noise", "0.5").unwrap();
+    let refused = make(broken.path(), &other, &|_| ()).unwrap_err();
+    match &refused {
+        SynthError::OtherSettings { setting, given, .. } => {
+            assert_eq!((setting.as_str(), given.as_str()), ("sensor.depth.noise", "0.5"));
+        }
+        other => panic!("{other}"),
+    }
+    make(broken.path(), &settings, &|_| ()).unwrap();
+    let (one, two) = (tree(whole.path()), tree(broken.path()));
+    let names = |t: &BTreeMap<PathBuf, Vec<u8>>| t.keys().cloned().collect::<Vec<_>>();
+    assert_eq!(names(&one), names(&two));
+    for (name, content) in &one {
+        assert!(two[name] == *content, "{name:?} differs");
+    }
+    // Once complete, nothing is made again.
+    let again = std::sync::atomic::AtomicU64::new(0);
+    make(broken.path(), &settings, &|done| {
+        again.fetch_add(done, std::sync::atomic::Ordering::Relaxed);
+    })
+    .unwrap();
+    assert_eq!(again.into_inner(), 3);
+}
+
+#[test]
+fn folders_of_others_are_left_alone() {
+    let dir = tempfile::tempdir().unwrap();
+    fs::write(dir.path().join("thesis.tex"), "").unwrap();
+    let refused = make(dir.path(), &settings(SensorSettings::clean()), &|_| ()).unwrap_err();
+    assert!(matches!(refused, SynthError::Occupied { .. }), "{refused}");
+    assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
+}

@@ -1,0 +1,120 @@
+//! Leaving out samples that cannot touch for a while.
+
+use std::sync::Arc;
+
+use prehend_autodiff::Scalar;
+
+use crate::contact::patch::Patch;
+use crate::state::State;
+use crate::world::World;
+use crate::world::contact_pair::ContactPair;
+
+/// How far samples may move relative to a field before those near it are looked for anew \[m\]: the least and the most
+/// that pays.
+const MARGIN: [f64; 2] = [1e-3, 4e-3];
+
+/// Steps for which a search for near samples should serve.
+const STEPS: f64 = 2.0;
+
+/// A world that only knows the samples near to a field. The others exert no force, so results are the same to the last bit.
+pub(crate) struct BroadPhase<S: Scalar> {
+    world: Option<World<S>>,
+    /// For each contact, how far the samples are from their body's center of mass \[m\].
+    radii: Vec<f64>,
+    /// For each contact, the body with the samples as the field saw it when near ones were looked for.
+    made_at: Vec<State>,
+    /// How far samples may move until the next search \[m\].
+    margin: f64,
+}
+
+impl<S: Scalar> BroadPhase<S> {
+    pub(crate) fn new(full: &World<S>) -> Self {
+        let radius = |pair: &ContactPair<S>| {
+            let body = &full.bodies[pair.bodies.samples];
+            body.surface.as_ref().map_or(0.0, |surface| surface.radius_about(&body.com()))
+        };
+        let radii = full.contacts.iter().map(radius).collect();
+        Self { world: None, radii, made_at: Vec::new(), margin: 0.0 }
+    }
+
+    /// A world whose forces at `states` are those of `full`, for a step of `dt` \[s\].
+    pub(crate) fn world<'a>(
+        &'a mut self,
+        full: &'a World<S>,
+        states: &[State<S>],
+        dt: f64,
+    ) -> &'a World<S> {
+        let (mut moved, mut ahead): (f64, f64) = (0.0, 0.0);
+        for (index, (pair, radius)) in full.contacts.iter().zip(&self.radii).enumerate() {
+            let now = full.seen_value(pair, states);
+            ahead = ahead.max(now.linear.norm() + now.angular.norm() * radius);
+            if let Some(then) = self.made_at.get(index) {
+                let shift = now.pose.translation.vector - then.pose.translation.vector;
+                let turn = now.pose.rotation.angle_to(&then.pose.rotation);
+                moved = moved.max(shift.norm() + turn * radius);
+            }
+        }
+        if self.world.is_none() || moved.is_nan() || moved > self.margin {
+            self.margin = MARGIN[0].max(STEPS * ahead * dt);
+            if self.margin > MARGIN[1] {
+                self.world = None;
+                return full;
+            }
+            self.look(full, states);
+        }
+        self.world.as_ref().unwrap_or(full)
+    }
+
+    fn look(&mut self, full: &World<S>, states: &[State<S>]) {
+        let mut near = full.clone();
+        self.made_at.clear();
+        for pair in &mut near.contacts {
+            let state = full.seen_value(pair, states);
+            self.made_at.push(state);
+            let (body, other) =
+                (&full.bodies[pair.bodies.samples], &full.bodies[pair.bodies.field]);
+            if let (Some(surface), Some(field)) = (&body.surface, &other.field) {
+                let (com, smoothing) = (body.com(), pair.smoothing);
+                let patch = Patch { surface, com, state, field: field.as_ref(), smoothing };
+                pair.near = Some(Arc::new(patch.near(pair.law().reach(), self.margin)));
+            }
+        }
+        self.world = Some(near);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use crate::scenes::{bowl, egg_on, floor};
+    use crate::{
+        BackwardEuler, GapSmoothing, Integrator, RungeKutta4, SemiImplicitEuler, TimeSteps,
+        VelocityVerlet,
+    };
+
+    fn assert_same(integrator: &impl Integrator, gap: f64, dt: f64, steps: usize) {
+        for field in [bowl(), floor()] {
+            let (world, mut states) = egg_on(field, GapSmoothing::Softplus { width: 1e-5 });
+            states[1].pose.translation.z += gap;
+            states[1].linear = Vector3::zeros();
+            let mut expected = states.clone();
+            let compare = |step, states: &[_]| {
+                expected = world.step(integrator, &expected, step).unwrap();
+                assert_eq!(expected, states, "{step:?}");
+            };
+            world.simulate(integrator, &states, TimeSteps { dt, steps }, compare).unwrap();
+        }
+    }
+
+    #[test]
+    fn leaving_out_far_samples_changes_no_bit() {
+        for (gap, dt, steps) in [(0.0, 1e-3, 200), (3e-3, 2e-3, 30), (2e-3, 1e-2, 3)] {
+            assert_same(&SemiImplicitEuler, gap, dt, steps);
+            assert_same(&VelocityVerlet, gap, dt, steps.min(30));
+            assert_same(&RungeKutta4, gap, dt, steps.min(30));
+        }
+        // Forces at the end of a long step are of samples that were out of reach at its start.
+        assert_same(&BackwardEuler, 2e-3, 4e-2, 1);
+    }
+}

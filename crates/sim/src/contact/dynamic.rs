@@ -1,0 +1,106 @@
+//! Contact laws behind a pointer.
+
+use nalgebra::Vector6;
+use prehend_autodiff::Fwd;
+
+use super::error::LawError;
+use super::law::ContactLaw;
+use super::patch::Patch;
+use super::point::{Contact, Response};
+use super::wrench::{self, WrenchJacobian};
+
+mod sealed {
+    pub trait Sealed {}
+    impl<L: crate::contact::law::ContactLaw> Sealed for L {}
+}
+
+/// The object-safe twin of [`ContactLaw`], implemented for every law: forces at a contact and over all contacts of a
+/// surface, and their derivatives by forward mode. Loops over contacts are inside, where the law is known.
+pub trait DynContactLaw: Send + Sync + sealed::Sealed {
+    /// See [`ContactLaw::params`].
+    fn params(&self) -> &[f64];
+
+    /// See [`ContactLaw::reach`] \[m\].
+    fn reach(&self) -> f64;
+
+    /// See [`ContactLaw::check`].
+    ///
+    /// # Errors
+    /// Names the parameter that is out of its range.
+    fn check(&self, p: &[f64]) -> Result<(), LawError>;
+
+    /// Force at one contact, with parameters `p`.
+    fn response(&self, p: &[f64], contact: &Contact<f64>) -> Response<f64>;
+
+    /// Force at one contact with its derivatives along the directions that `contact` and `p` carry.
+    fn response_with_derivative(&self, p: &[Fwd<6>], contact: &Contact<Fwd<6>>)
+    -> Response<Fwd<6>>;
+
+    /// Force \[N\], then torque about the center of mass \[N m\], of all contacts of `patch`, in the field's frame.
+    fn wrench(&self, p: &[f64], patch: &Patch<'_>) -> Vector6<f64>;
+
+    /// [`DynContactLaw::wrench`] with its derivatives by the state, and by the parameters if `by_params`.
+    fn wrench_jacobian(&self, p: &[f64], patch: &Patch<'_>, by_params: bool) -> WrenchJacobian;
+}
+
+impl<L: ContactLaw> DynContactLaw for L {
+    #[inline]
+    fn params(&self) -> &[f64] {
+        ContactLaw::params(self)
+    }
+
+    #[inline]
+    fn reach(&self) -> f64 {
+        ContactLaw::reach(self)
+    }
+
+    fn check(&self, p: &[f64]) -> Result<(), LawError> {
+        ContactLaw::check(self, p)
+    }
+
+    #[inline]
+    fn response(&self, p: &[f64], contact: &Contact<f64>) -> Response<f64> {
+        self.law(p, contact)
+    }
+
+    #[inline]
+    fn response_with_derivative(
+        &self,
+        p: &[Fwd<6>],
+        contact: &Contact<Fwd<6>>,
+    ) -> Response<Fwd<6>> {
+        self.law(p, contact)
+    }
+
+    fn wrench(&self, p: &[f64], patch: &Patch<'_>) -> Vector6<f64> {
+        wrench::wrench(self, p, patch)
+    }
+
+    fn wrench_jacobian(&self, p: &[f64], patch: &Patch<'_>, by_params: bool) -> WrenchJacobian {
+        wrench::wrench_jacobian(self, p, patch, by_params)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+    use prehend_autodiff::Scalar;
+
+    use super::*;
+    use crate::scenes::penalty;
+
+    #[test]
+    fn the_object_safe_twin_gives_the_laws_own_derivatives() {
+        let law = penalty(3e7, 2e5, 0.7, 1e-2);
+        let boxed: Box<dyn DynContactLaw> = Box::new(law.clone());
+        let [gap, normal_speed, x, y, z, k] = Fwd::variables([-1e-3, -0.1, 0.02, 0.01, 0.0, 3e7]);
+        let normal = Vector3::z().map(Fwd::constant);
+        let contact =
+            Contact { gap, normal_speed, slip: Vector3::new(x, y, z), normal, area: 2e-5 };
+        let p = [k, Fwd::constant(2e5), Fwd::constant(0.7)];
+        let (own, twin) = (law.law(&p, &contact), boxed.response_with_derivative(&p, &contact));
+        assert_eq!(own.normal.derivative, twin.normal.derivative);
+        assert_eq!(own.tangential.x.derivative, twin.tangential.x.derivative);
+        assert_eq!((boxed.params(), boxed.reach()), (&[3e7, 2e5, 0.7][..], 0.0));
+    }
+}

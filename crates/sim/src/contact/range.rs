@@ -1,0 +1,52 @@
+//! Ranges of parameters.
+
+use super::error::LawError;
+
+/// What a parameter may be. Infinity and NaN are in none, but where a range says so.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub enum ParameterRange {
+    /// x > 0.
+    Positive,
+    /// x > 0 or infinite.
+    PositiveOrInfinite,
+    /// x ≥ 0.
+    NotNegative,
+    /// x ≥ 1.
+    AtLeastOne,
+    /// 0 ≤ x ≤ 1.
+    Fraction,
+    /// 0 < x ≤ 1.
+    PositiveFraction,
+    /// Every number.
+    Finite,
+}
+
+impl ParameterRange {
+    /// Checks that `value`, called `name` in the error, is in this range.
+    ///
+    /// # Errors
+    /// [`LawError::Range`] if it is not.
+    pub fn check(self, name: &'static str, value: f64) -> Result<(), LawError> {
+        let inside = match self {
+            Self::Positive => value > 0.0 && value.is_finite(),
+            Self::PositiveOrInfinite => value > 0.0,
+            Self::NotNegative => value >= 0.0 && value.is_finite(),
+            Self::AtLeastOne => value >= 1.0 && value.is_finite(),
+            Self::Fraction => (0.0..=1.0).contains(&value),
+            Self::PositiveFraction => value > 0.0 && value <= 1.0,
+            Self::Finite => value.is_finite(),
+        };
+        if inside { Ok(()) } else { Err(LawError::Range { name, range: self.as_str(), value }) }
+    }
+
+    fn as_str(self) -> &'static str {
+        match self {
+            Self::Positive | Self::PositiveOrInfinite => "positive",
+            Self::NotNegative => "zero or positive",
+            Self::AtLeastOne => "at least 1",
+            Self::Fraction => "in 0..=1",
+            Self::PositiveFraction => "above 0 and at most 1",
+            Self::Finite => "finite",
+        }
+    }
+}

@@ -1,0 +1,145 @@
+//! The parameters of a world and the coordinates of a state in a row, as functions of many numbers want them.
+
+use nalgebra::{
+    Isometry3, Matrix3, Quaternion, Translation3, Unit, UnitQuaternion, Vector3, Vector6,
+};
+use prehend_autodiff::Scalar;
+
+use crate::body::RigidBody;
+use crate::error::SimulationError;
+use crate::state::State;
+use crate::world::World;
+use crate::world::body::Motion;
+
+/// Coordinates of a state.
+pub(crate) const STATE: usize = 13;
+
+impl<S: Scalar> State<S> {
+    /// Translation, rotation as a quaternion x, y, z, w, linear and angular velocity.
+    pub(crate) fn coordinates(&self) -> [S; STATE] {
+        let [x, y, z] = self.pose.translation.vector.into();
+        let [qx, qy, qz, qw] = self.pose.rotation.coords.into();
+        let [vx, vy, vz] = self.linear.into();
+        let [wx, wy, wz] = self.angular.into();
+        [x, y, z, qx, qy, qz, qw, vx, vy, vz, wx, wy, wz]
+    }
+
+    /// The state of [`State::coordinates`].
+    pub(crate) fn from_coordinates(coordinates: &[S; STATE]) -> Self {
+        let [x, y, z, qx, qy, qz, qw, vx, vy, vz, wx, wy, wz] = *coordinates;
+        let rotation: UnitQuaternion<S> = Unit::new_unchecked(Quaternion::new(qw, qx, qy, qz));
+        State {
+            pose: Isometry3::from_parts(Translation3::new(x, y, z), rotation),
+            linear: Vector3::new(vx, vy, vz),
+            angular: Vector3::new(wx, wy, wz),
+        }
+    }
+}
+
+/// The coordinates of several states, one state after the other.
+pub(crate) fn coordinates_of<S: Scalar>(states: &[State<S>]) -> impl Iterator<Item = S> {
+    states.iter().flat_map(State::coordinates)
+}
+
+/// The states of [`coordinates_of`].
+pub(crate) fn states_of<S: Scalar>(coordinates: &[S]) -> impl Iterator<Item = State<S>> {
+    coordinates.as_chunks().0.iter().map(State::from_coordinates)
+}
+
+impl<S: Scalar> World<S> {
+    /// Everything by which a world can be differentiated, in a row.
+    ///
+    /// For each body: if it is free, its mass \[kg\] and its inertia xx, yy, zz, xy, xz, yz \[kg m²\]; then its external wrench,
+    /// force \[N\] and torque \[N m\]. Then gravity \[m/s²\]; then the law's parameters of each contact.
+    pub fn parameters(&self) -> Vec<S> {
+        let mut parameters = Vec::new();
+        for body in &self.bodies {
+            if let Some(rigid) = body.rigid() {
+                let i = rigid.inertia();
+                parameters.push(rigid.mass());
+                parameters.extend([i.m11, i.m22, i.m33, i.m12, i.m13, i.m23]);
+            }
+            parameters.extend(body.external_wrench.iter());
+        }
+        parameters.extend(self.gravity.iter());
+        parameters.extend(self.contacts.iter().flat_map(|pair| pair.params()));
+        parameters
+    }
+
+    /// The same bodies and contacts with other `parameters`, in the order of [`World::parameters`].
+    ///
+    /// # Errors
+    /// If there are too few or too many, or a body of such a mass or inertia is impossible.
+    pub fn with_parameters<T: Scalar>(
+        &self,
+        parameters: &[T],
+    ) -> Result<World<T>, SimulationError> {
+        let free = self.bodies.iter().filter(|body| body.rigid().is_some()).count();
+        let params: usize = self.contacts.iter().map(|pair| pair.params().len()).sum();
+        let expected = 7 * free + 6 * self.bodies.len() + 3 + params;
+        if parameters.len() != expected {
+            return Err(SimulationError::Parameters { given: parameters.len(), expected });
+        }
+        let mut world = self.map(|x| T::constant(x.value()));
+        let mut rest = parameters.iter().copied();
+        // There are as many as were counted.
+        let mut next = || rest.next().unwrap_or_default();
+        for body in &mut world.bodies {
+            if let Motion::Free(rigid) = &mut body.motion {
+                let mass = next();
+                let [xx, yy, zz, xy, xz, yz] = std::array::from_fn(|_| next());
+                let inertia = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
+                *rigid = RigidBody::new(mass, inertia, *rigid.com())
+                    .map_err(|error| SimulationError::Body { body: body.name.clone(), error })?;
+            }
+            body.external_wrench = Vector6::from_fn(|_, _| next());
+        }
+        world.gravity = Vector3::from_fn(|_, _| next());
+        world.contacts.iter_mut().flat_map(|pair| pair.params_mut()).for_each(|p| *p = next());
+        Ok(world)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use prehend_autodiff::Fwd;
+
+    use super::*;
+    use crate::scenes::{egg_on, floor};
+    use crate::{BodyError, GapSmoothing};
+
+    #[test]
+    fn parameters_come_back() {
+        let (mut world, states) = egg_on(floor(), GapSmoothing::Hard);
+        world.bodies[1].external_wrench = Vector6::new(1.0, 2.0, 3.0, 4.0, 5.0, 6.0);
+        let numbers = world.parameters();
+        assert_eq!(numbers.len(), 6 + 7 + 6 + 3 + 3);
+        let variables: [Fwd<25>; 25] = Fwd::variables(std::array::from_fn(|i| numbers[i]));
+        let lifted = world.with_parameters(&variables).unwrap();
+        for (place, number) in lifted.parameters().iter().enumerate() {
+            assert_eq!(number.value, numbers[place]);
+            assert_eq!(number.derivative, variables[place].derivative);
+        }
+        let again = world.with_parameters(&numbers).unwrap();
+        assert_eq!(again.bodies[1].rigid(), world.bodies[1].rigid());
+        assert_eq!(
+            (again.bodies[1].external_wrench, again.gravity),
+            (world.bodies[1].external_wrench, world.gravity)
+        );
+        assert_eq!(again.contacts[0].params(), world.contacts[0].params());
+        let numbers: Vec<f64> = coordinates_of(&states).collect();
+        assert!(states_of(&numbers).eq(states));
+    }
+
+    #[test]
+    fn wrong_parameters_are_refused() {
+        let (world, _) = egg_on(floor(), GapSmoothing::Hard);
+        let mut numbers = world.parameters();
+        let error = world.with_parameters(&numbers[1..]).unwrap_err();
+        assert_eq!(error, SimulationError::Parameters { given: 24, expected: 25 });
+        numbers[6] = -1.0;
+        let error = BodyError::Mass(-1.0);
+        let refused = world.with_parameters(&numbers).unwrap_err();
+        assert_eq!(refused, SimulationError::Body { body: "egg".to_owned(), error });
+    }
+}
