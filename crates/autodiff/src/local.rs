@@ -1,10 +1,7 @@
 //! Functions of few numbers, differentiated as a whole.
 
-use std::rc::Rc;
-
 use crate::fwd::Fwd;
 use crate::scalar::Scalar;
-use crate::vjp::CustomVjp;
 
 /// A function of `N` numbers with `M` results: a rotation, a contact wrench, a term of a sum.
 ///
@@ -44,13 +41,6 @@ pub trait LocalFunction<const N: usize, const M: usize> {
         let results = self.evaluate(Fwd::<N>::variables(x));
         (results.map(|y| y.value), results.map(|y| y.derivative))
     }
-
-    /// A rule for reverse mode that takes the place of the Jacobian, for derivatives that are not linear in the
-    /// adjoint: a gradient that is clipped, or let through in one direction only.
-    #[inline]
-    fn reverse_rule(&self) -> Option<Rc<dyn CustomVjp>> {
-        None
-    }
 }
 
 impl<const N: usize, const M: usize, F: LocalFunction<N, M>> LocalFunction<N, M> for &F {
@@ -62,10 +52,5 @@ impl<const N: usize, const M: usize, F: LocalFunction<N, M>> LocalFunction<N, M>
     #[inline]
     fn linearize(&self, x: [f64; N]) -> ([f64; M], [[f64; N]; M]) {
         (**self).linearize(x)
-    }
-
-    #[inline]
-    fn reverse_rule(&self) -> Option<Rc<dyn CustomVjp>> {
-        (**self).reverse_rule()
     }
 }

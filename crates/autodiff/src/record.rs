@@ -27,10 +27,7 @@ pub(crate) fn local<const N: usize, const M: usize>(
     x: [Var; N],
 ) -> [Var; M] {
     let (values, jacobian) = function.linearize(x.map(Var::value));
-    let group = match function.reverse_rule() {
-        None => push_block(&x, M, jacobian.as_flattened()),
-        Some(rule) => push_custom(&x, M, rule),
-    };
+    let group = push_block(&x, M, jacobian.as_flattened());
     std::array::from_fn(|i| group.var(i, values[i]))
 }
 
@@ -116,30 +113,6 @@ mod tests {
         assert_eq!(through_pair(&x, true), value);
         let forward = through_pair(&Fwd::<2>::variables(x), true);
         assert!((forward.derivative[1] - plain[1]).abs() < 1e-14);
-    }
-
-    #[test]
-    fn a_rule_takes_the_place_of_the_jacobian() {
-        /// Twice the input; only gradients above zero pass.
-        struct OneWay;
-        impl LocalFunction<1, 1> for OneWay {
-            fn evaluate<S: Scalar>(&self, [x]: [S; 1]) -> [S; 1] {
-                [x.times(2.0)]
-            }
-            fn reverse_rule(&self) -> Option<Rc<dyn CustomVjp>> {
-                Some(Rc::new(OneWay))
-            }
-        }
-        impl CustomVjp for OneWay {
-            fn vjp(&self, output_adjoints: &[f64], input_adjoints: &mut [f64]) {
-                input_adjoints[0] += 2.0 * output_adjoints[0].max(0.0);
-            }
-        }
-        let slope = |sign: f64| {
-            gradient(|x| Var::local(&OneWay, [x[0] * x[1]])[0].times(sign), &[3.0, 5.0]).1
-        };
-        assert_eq!((slope(1.0), slope(-1.0)), (vec![10.0, 6.0], vec![0.0, 0.0]));
-        assert_eq!(<Fwd<1>>::local(&OneWay, [Fwd::variable(3.0, 0)])[0].derivative, [2.0]);
     }
 
     #[test]

@@ -88,6 +88,7 @@ pub(super) fn iterate<M: Method>(
     mut objective: impl FnMut(&[f64]) -> M::Evaluation,
     observe: impl FnMut(&Iteration) -> ControlFlow<()>,
 ) -> Result<Outcome, OptimizeError> {
+    criteria.check()?;
     if start.is_empty() {
         return Err(OptimizeError::NoParameters);
     }
@@ -98,17 +99,16 @@ pub(super) fn iterate<M: Method>(
         let evaluation = objective(x);
         evaluation.check_shape(start.len()).map(|()| evaluation)
     };
-    criteria.check()?;
     let start = start.to_vec();
     let here = evaluate(&start)?;
-    if !here.is_finite() {
-        return Err(OptimizeError::ObjectiveNotFinite);
-    }
     Ok(iterate_on(&Plain, method, criteria, (start, here), evaluate, observe)?.0)
 }
 
 /// Runs `method` on parameters that live in `domain` from `start`, where the objective has been evaluated, until one of the
 /// criteria is met. Returns the evaluation at the last parameters beside the best.
+///
+/// # Errors
+/// If the objective is not finite at the start, or cannot be evaluated on the way.
 pub(super) fn iterate_on<P: Clone, M: Method>(
     domain: &impl Domain<P>,
     mut method: M,
@@ -117,6 +117,9 @@ pub(super) fn iterate_on<P: Clone, M: Method>(
     mut evaluate: impl FnMut(&P) -> Result<M::Evaluation, OptimizeError>,
     mut observe: impl FnMut(&Iteration<P>) -> ControlFlow<()>,
 ) -> Result<(Outcome<P>, M::Evaluation), OptimizeError> {
+    if !here.is_finite() {
+        return Err(OptimizeError::ObjectiveNotFinite);
+    }
     let mut best =
         Outcome { parameters: x.clone(), value: here.value(), iterations: 0, stop: Stop::Gradient };
     // Reported only if the gradient has not vanished as well, which says more.

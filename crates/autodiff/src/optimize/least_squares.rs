@@ -143,9 +143,6 @@ impl LevenbergMarquardt {
         let linearized = Linearized(linearized);
         let count = linearized.gradient().len();
         linearized.check_shape(count)?;
-        if !linearized.is_finite() {
-            return Err(OptimizeError::ObjectiveNotFinite);
-        }
         let evaluate = |x: &P::Point| {
             let linearized = Linearized(problem.linearize(x));
             linearized.check_shape(count).map(|()| linearized)

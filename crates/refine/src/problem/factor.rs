@@ -1,5 +1,7 @@
 //! What one kind of evidence says of a state.
 
+use std::fmt;
+
 use super::{NormalEquations, Rows, State};
 
 /// One kind of evidence: a negative log-likelihood of a [`State`] \[nat\], up to a constant.
@@ -50,5 +52,12 @@ pub trait Factor: Send + Sync {
         let mut rows = Rows::linearized(equations);
         self.rows(state, &mut rows);
         rows.cost()
+    }
+}
+
+/// The name.
+impl fmt::Debug for dyn Factor {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Debug::fmt(self.name(), f)
     }
 }

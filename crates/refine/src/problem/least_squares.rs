@@ -8,6 +8,7 @@ use prehend_autodiff::optimize::{
     Criteria, LeastSquares, LevenbergMarquardt, QuadraticModel, Stop,
 };
 use rayon::prelude::*;
+use strum::IntoStaticStr;
 
 use super::{
     Block, Factor, NormalEquations, RIDGE, ScaledCholesky, SchurComplement, State, SurfacePatches,
@@ -102,7 +103,8 @@ pub struct Solver {
 }
 
 /// Why a solve ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, IntoStaticStr)]
+#[strum(serialize_all = "lowercase")]
 pub enum Termination {
     /// The next step promises less than [`Solver::min_decrease`].
     Converged,
@@ -118,12 +120,7 @@ pub enum Termination {
 impl Termination {
     /// The name used in reports.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Converged => "converged",
-            Self::Stalled => "stalled",
-            Self::Iterations => "iterations",
-            Self::Aborted => "aborted",
-        }
+        self.into()
     }
 }
 
@@ -154,6 +151,11 @@ impl Problem {
         Self { patches, ..self }
     }
 
+    /// The cost at `state` of the model as it is \[nat\]. No derivative is computed.
+    pub fn cost(&self, state: &State) -> f64 {
+        self.prior.iter().chain(&self.factors).map(|factor| factor.cost(state)).sum()
+    }
+
     /// Lowers the cost from `start` until `solver` is content, or `observe`, which hears after each step whether it lowered the
     /// cost, breaks off.
     pub fn solve(
@@ -172,13 +174,14 @@ impl Problem {
         let method = LevenbergMarquardt { criteria, ..LevenbergMarquardt::default() };
         let mut iterations = 0;
         let state = start.state.clone();
-        let found = method.minimize_on(self, state, start.clone(), |iteration| {
+        let found = method.minimize_on(self, state.clone(), start, |iteration| {
             iterations += usize::from(iteration.taken);
             observe(iteration.taken)
         });
         // A start that cannot be linearized is where it ends.
         let Ok((outcome, at)) = found else {
-            return Solution { at: start, termination: Termination::Stalled, iterations: 0 };
+            let at = self.linearize(&state);
+            return Solution { at, termination: Termination::Stalled, iterations: 0 };
         };
         let termination = match outcome.stop {
             Stop::Gradient | Stop::Decrease => Termination::Converged,

@@ -23,7 +23,6 @@ const MIN_DECREASE: f64 = 1e-3;
 /// Depth, color and, where there is a skin, touch.
 pub(super) struct FineScorer<'a> {
     frame: &'a Frame<'a>,
-    factors: Vec<Arc<dyn Factor>>,
     problem: Problem,
 }
 
@@ -50,14 +49,13 @@ impl<'a> FineScorer<'a> {
             let touch = TactileSettings { contact_threshold, ..TactileSettings::default() };
             factors.push(Arc::new(TactileFactor::new(frame, &touch)?));
         }
-        let problem = Problem::new(factors.clone(), vec![Block::ObjectPose]);
-        Ok(Self { frame, factors, problem })
+        let problem = Problem::new(factors, vec![Block::ObjectPose]);
+        Ok(Self { frame, problem })
     }
 
     /// The sum of the costs at `pose` \[nat\]; infinite where the pose cannot be seen.
     pub(super) fn cost(&self, pose: &Isometry3<f64>) -> f64 {
-        let state = State::new(self.frame, pose);
-        state.map_or(f64::INFINITY, |state| self.factors.iter().map(|f| f.cost(&state)).sum())
+        State::new(self.frame, pose).map_or(f64::INFINITY, |state| self.problem.cost(&state))
     }
 
     /// `pose` after at most `steps` steps down, and the sum of the costs there.

@@ -1,11 +1,10 @@
 //! The paper's heuristic: a candidate step along every gradient, weighted by what each one achieves.
 
-use std::fmt;
-use std::str::FromStr;
 use std::sync::Arc;
 
 use nalgebra::Vector6;
 use rayon::prelude::*;
+use strum::{Display, EnumString, IntoStaticStr, VariantNames};
 
 use super::estimate::Recorder;
 use super::step::preconditioned_step;
@@ -19,7 +18,10 @@ use crate::problem::{Block, Factor, NormalEquations, State};
 use crate::scene::Frame;
 
 /// One of the paper's four gradients.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, Hash, Display, EnumString, IntoStaticStr, VariantNames,
+)]
+#[strum(serialize_all = "kebab-case", parse_err_ty = String, parse_err_fn = unknown)]
 pub enum GradientKind {
     /// Stability of the grasp, by simulation: [`StabilityFactor`].
     Physics,
@@ -37,29 +39,12 @@ impl GradientKind {
 
     /// The name used in reports and on the command line.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Physics => "physics",
-            Self::Rendering => "rendering",
-            Self::Depth => "depth",
-            Self::Tactile => "tactile",
-        }
+        self.into()
     }
 }
 
-impl fmt::Display for GradientKind {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
-impl FromStr for GradientKind {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        Self::ALL.into_iter().find(|k| k.name() == text).ok_or_else(|| {
-            format!("unknown term {text:?}: one of physics, rendering, depth, tactile")
-        })
-    }
+fn unknown(text: &str) -> String {
+    format!("unknown term {text:?}: one of {}", GradientKind::VARIANTS.join(", "))
 }
 
 /// The paper's heuristic.
@@ -75,7 +60,7 @@ impl FromStr for GradientKind {
 ///   reaches new lows, shrinks by a tenth when it does not, and by half when nothing improves. Without it
 ///   the terms take turns in pulling the pose all the way to their own optimum, and the weights, which
 ///   always sum to one, never let it rest.
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 pub struct Heuristic {
     /// Gradients to use.
     pub gradients: Vec<GradientKind>,
@@ -213,24 +198,6 @@ impl Strategy for Heuristic {
 
     fn iterations(&self) -> usize {
         self.iterations
-    }
-}
-
-impl fmt::Debug for Heuristic {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Heuristic")
-            .field("gradients", &self.gradients)
-            .field("checkpoint", &self.checkpoint)
-            .field("iterations", &self.iterations)
-            .field("first_step", &self.first_step)
-            .field("step_tolerance", &self.step_tolerance)
-            .field("exhaustive", &self.exhaustive)
-            .field("stability", &self.stability)
-            .field("rendering", &self.rendering)
-            .field("depth", &self.depth)
-            .field("tactile", &self.tactile)
-            .field("factors", &self.factors.iter().map(|factor| factor.name()).collect::<Vec<_>>())
-            .finish()
     }
 }
 

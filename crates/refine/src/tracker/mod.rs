@@ -124,12 +124,12 @@ impl Tracker {
     ) -> Result<Tracked, RefineError> {
         let mut clock = Clock::start(self.settings.budget);
         let (object, hand) = (Arc::clone(&self.object), self.hand.clone());
-        let frame = match Frame::new(observation, &object, hand.as_ref()) {
-            Ok(frame) => frame,
-            Err(RefineError::EmptyMask) if self.track.is_some() => {
-                return Ok(self.predict_unseen(observation, time));
+        let frame = match (Frame::new(observation, &object, hand.as_ref()), &self.track) {
+            (Ok(frame), _) => frame,
+            (Err(RefineError::EmptyMask), Some(track)) => {
+                return Ok(self.predict_unseen(track, observation, time));
             }
-            Err(error) => return Err(error),
+            (Err(error), _) => return Err(error),
         };
         let Some(track) = self.track.clone() else { return self.begin(&frame, time, &mut clock) };
         let in_hand = frame.hand().is_some();
@@ -185,8 +185,12 @@ impl Tracker {
     }
 
     /// Where the object should be in a frame that shows nothing of it. Where the hand is measured to be needs no mask.
-    fn predict_unseen(&self, observation: &Observation, time: Duration) -> Tracked {
-        let Some(track) = &self.track else { unreachable!("there is a track") };
+    fn predict_unseen(
+        &self,
+        track: &TrackState,
+        observation: &Observation,
+        time: Duration,
+    ) -> Tracked {
         let hand = observation.hand.as_ref();
         let nominal = State {
             t_cam_hand: hand.map_or(track.state.t_cam_hand, |h| h.t_cam_hand),
@@ -230,15 +234,20 @@ impl Tracker {
             let problem = "does not allow for a prediction".to_owned();
             RefineError::Setting { name: "prior", problem }
         })?);
-        let problem = self.stage_problem(frame, state)?;
-        Ok((problem.with_prior(Arc::clone(&prior) as Arc<dyn Factor>), prior))
+        Ok((self.stage_problem(frame, state, prior.clone())?, prior))
     }
 
-    /// The problem of the stage of tracking, with the stated prior about `initial`.
-    fn stage_problem(&self, frame: &Frame<'_>, initial: &State) -> Result<Problem, RefineError> {
+    /// The problem of the stage of tracking about `initial`.
+    fn stage_problem(
+        &self,
+        frame: &Frame<'_>,
+        initial: &State,
+        prior: Arc<GaussianPrior>,
+    ) -> Result<Problem, RefineError> {
         let (stage, settings) = (&self.settings.stage, &self.settings.fused);
         let patches = surface_patches(frame, initial, stage, settings);
-        problem_of(frame, initial, stage, settings, patches, &self.factors)
+        let problem = problem_of(frame, initial, stage, settings, patches, &self.factors)?;
+        Ok(problem.with_prior(prior))
     }
 
     /// Steps down from `start` until the clock says otherwise.
@@ -273,7 +282,8 @@ impl Tracker {
         let fused = Fused::new(self.settings.fused.clone());
         let fused = self.factors.iter().cloned().fold(fused, Fused::with_shared);
         let estimate = fused.run(frame, initial, &mut |_| ControlFlow::Continue(()))?;
-        let problem = self.stage_problem(frame, initial)?;
+        let prior = GaussianPrior::independent(initial.clone(), &self.settings.fused.prior)?;
+        let problem = self.stage_problem(frame, initial, Arc::new(prior))?;
         let posterior = estimate.posterior.ok_or(RefineError::NothingFits)?;
         let (at, termination) = (problem.linearize(&estimate.state), posterior.termination);
         let solution = Solution { at, termination, iterations: estimate.iteration };

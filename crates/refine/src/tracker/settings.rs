@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use strum::{EnumString, IntoStaticStr, VariantNames};
+
 use crate::error::RefineError;
 use crate::problem::Solver;
 use crate::search::SearchSettings;
@@ -33,7 +35,10 @@ pub struct GatingSettings {
 
 /// How far a tracker goes to find an object that it has lost. Finding takes far longer than following, and the budget does
 /// not hold for it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, EnumString, IntoStaticStr, VariantNames,
+)]
+#[strum(serialize_all = "kebab-case", parse_err_ty = String, parse_err_fn = unknown)]
 pub enum Recovery {
     /// The frame is lost; the next is tried from the prediction.
     Off,
@@ -46,22 +51,12 @@ pub enum Recovery {
 impl Recovery {
     /// The name used on the command line.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Off => "off",
-            Self::Near => "near",
-            Self::Anywhere => "anywhere",
-        }
+        self.into()
     }
 }
 
-impl std::str::FromStr for Recovery {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let all = [Self::Off, Self::Near, Self::Anywhere];
-        let found = all.into_iter().find(|r| r.name() == text);
-        found.ok_or_else(|| format!("unknown recovery {text:?}: one of off, near, anywhere"))
-    }
+fn unknown(text: &str) -> String {
+    format!("unknown recovery {text:?}: one of {}", Recovery::VARIANTS.join(", "))
 }
 
 /// Settings of [`Tracker`](super::Tracker).

@@ -3,19 +3,23 @@
 use std::fmt;
 
 use nalgebra::Isometry3;
+use strum::IntoStaticStr;
 
 use super::{Solved, Timing};
 use crate::problem::State;
 use crate::strategy::Posterior;
 
 /// How a frame's pose came about.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, IntoStaticStr)]
+#[strum(serialize_all = "lowercase")]
 pub enum TrackStatus {
     /// From the frame before.
+    #[strum(serialize = "followed")]
     Tracked,
     /// It is where the object should be: there was no time to look at the frame.
     Predicted,
     /// It was found anew: the first of all, or after a loss.
+    #[strum(serialize = "found")]
     Relocalized,
     /// It is where the object should be, and it does not seem to be there.
     Lost,
@@ -24,12 +28,7 @@ pub enum TrackStatus {
 impl TrackStatus {
     /// The name used in reports.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Tracked => "followed",
-            Self::Predicted => "predicted",
-            Self::Relocalized => "found",
-            Self::Lost => "lost",
-        }
+        self.into()
     }
 }
 

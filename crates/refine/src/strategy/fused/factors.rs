@@ -5,9 +5,8 @@ use std::sync::Arc;
 use super::settings::{FusedSettings, Modality, Nuisance, Stage};
 use crate::error::RefineError;
 use crate::factor::{
-    FreeSpaceFactor, GaussianPrior, HandDepthFactor, NoiseEstimate, PenetrationFactor,
-    PointToPlaneFactor, PointToPlaneSettings, RenderingFactor, SupportFactor, TactileFactor,
-    TouchModel,
+    FreeSpaceFactor, HandDepthFactor, NoiseEstimate, PenetrationFactor, PointToPlaneFactor,
+    PointToPlaneSettings, RenderingFactor, SupportFactor, TactileFactor, TouchModel,
 };
 use crate::problem::{Factor, NoiseModel, Problem, State, SurfacePatches};
 use crate::scene::Frame;
@@ -43,7 +42,7 @@ pub(crate) fn surface_patches(
     SurfacePatches::new(frame.observation(), distance, &settings.model, unit).map(Arc::new)
 }
 
-/// What `stage` solves: all factors, the `own` ones among them, and a prior about `initial`, by the pose and all nuisances.
+/// What `stage` solves but for the prior: all factors, the `own` ones among them, by the pose and all nuisances of `initial`.
 pub(crate) fn problem_of(
     frame: &Frame<'_>,
     initial: &State,
@@ -52,11 +51,10 @@ pub(crate) fn problem_of(
     patches: Option<Arc<SurfacePatches>>,
     own: &[Arc<dyn Factor>],
 ) -> Result<Problem, RefineError> {
-    let prior = GaussianPrior::independent(initial.clone(), &settings.prior)?;
     let mut factors = factors_of(frame, stage, settings, patches.as_ref())?;
     factors.extend(own.iter().cloned());
     let blocks = settings.blocks(frame.hand().is_some(), initial);
-    Ok(Problem::new(factors, blocks).with_prior(Arc::new(prior)).with_patches(patches))
+    Ok(Problem::new(factors, blocks).with_patches(patches))
 }
 
 /// The factors of `stage` for what `frame` brings.

@@ -9,7 +9,6 @@ mod summary;
 #[cfg(test)]
 mod tests;
 
-use std::fmt;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
@@ -29,6 +28,7 @@ pub use self::summary::PosteriorSummary;
 use super::estimate::Recorder;
 use super::{Estimate, Iteration, Observer, Strategy};
 use crate::error::RefineError;
+use crate::factor::GaussianPrior;
 use crate::problem::{Factor, Linearization, Problem, Solution, State, Termination};
 use crate::scene::Frame;
 
@@ -47,7 +47,7 @@ use crate::scene::Frame;
 ///
 /// let fused = Fused::default().with(Height);
 /// ```
-#[derive(Clone, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Fused {
     /// Settings.
     pub settings: FusedSettings,
@@ -73,15 +73,6 @@ impl Fused {
     }
 }
 
-impl fmt::Debug for Fused {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Fused")
-            .field("settings", &self.settings)
-            .field("factors", &self.factors.iter().map(|factor| factor.name()).collect::<Vec<_>>())
-            .finish()
-    }
-}
-
 /// Standard deviations of depth points that are believed when measured \[m\].
 const FINEST: f64 = 2e-4;
 const COARSEST: f64 = 3e-3;
@@ -102,7 +93,8 @@ impl Strategy for Fused {
         }
         let names = std::iter::once("posterior");
         let mut recorder = Recorder::new(names, initial, self.iterations(), None, observe);
-        let mut walk = Walk { fused: self, frame, initial, settings: self.settings.clone() };
+        let prior = Arc::new(GaussianPrior::independent(initial.clone(), &self.settings.prior)?);
+        let mut walk = Walk { fused: self, frame, initial, prior, settings: self.settings.clone() };
         let mut states = restarts(initial, self.settings.restart_angle);
         let mut found = Vec::new();
         let mut go_on = ControlFlow::Continue(());
@@ -143,6 +135,7 @@ struct Walk<'a> {
     fused: &'a Fused,
     frame: &'a Frame<'a>,
     initial: &'a State,
+    prior: Arc<GaussianPrior>,
     /// With what was measured of depth's noise.
     settings: FusedSettings,
 }
@@ -164,7 +157,8 @@ impl Walk<'_> {
         if stage.measured_noise {
             self.measure_noise(&states[0], patches.is_some());
         }
-        let problem = problem_of(frame, initial, stage, &self.settings, patches, &fused.factors)?;
+        let problem = problem_of(frame, initial, stage, &self.settings, patches, &fused.factors)?
+            .with_prior(self.prior.clone());
         let states = &states[..states.len().min(stage.hypotheses.max(1))];
         let found = if index == 0 {
             let first = solve_from(&problem, stage, &states[0]);
@@ -244,7 +238,8 @@ impl Walk<'_> {
         let settings = FusedSettings { nuisances: Vec::new(), ..self.settings.clone() };
         let last = &self.stages()[self.stages().len() - 1];
         let own = &self.fused.factors;
-        let problem = problem_of(self.frame, initial, last, &settings, None, own)?;
+        let problem = problem_of(self.frame, initial, last, &settings, None, own)?
+            .with_prior(self.prior.clone());
         Ok(distinct(solve_all(&problem, last, &states), self.radius()))
     }
 }

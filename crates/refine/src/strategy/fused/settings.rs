@@ -1,5 +1,7 @@
 //! Settings of the fused estimator.
 
+use strum::IntoStaticStr;
+
 use super::posterior::CovarianceInflation;
 use crate::factor::{
     ContactSettings, FreeSpaceSettings, HandDepthSettings, PenetrationSettings,
@@ -10,7 +12,8 @@ use crate::problem::{Block, ModelErrorSettings, NoiseModel, Solver, State};
 use crate::scene::Occluders;
 
 /// A sensor modality, or a constraint, that the fused estimator weighs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, IntoStaticStr)]
+#[strum(serialize_all = "kebab-case")]
 pub enum Modality {
     /// Colors on the object.
     Color,
@@ -48,22 +51,13 @@ impl Modality {
 
     /// The name used in reports and on the command line.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Color => "color",
-            Self::Silhouette => "silhouette",
-            Self::Depth => "depth",
-            Self::HandDepth => "hand-depth",
-            Self::FreeSpace => "free-space",
-            Self::Touch => "touch",
-            Self::Quiet => "quiet",
-            Self::Penetration => "penetration",
-            Self::Support => "support",
-        }
+        self.into()
     }
 }
 
 /// A group of quantities that are estimated beside the pose because they are not known exactly.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, IntoStaticStr)]
+#[strum(serialize_all = "kebab-case")]
 pub enum Nuisance {
     /// The hand's pose in the camera frame.
     HandPose,
@@ -81,12 +75,7 @@ impl Nuisance {
 
     /// The name used in reports and on the command line.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::HandPose => "hand-pose",
-            Self::Joints => "joints",
-            Self::Camera => "camera",
-            Self::Model => "model",
-        }
+        self.into()
     }
 
     /// Its block for a hand of `joints` joints; none of the model's, whose size depends on what is seen of the object.
