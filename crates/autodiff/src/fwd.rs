@@ -2,7 +2,7 @@
 
 use crate::differentiable::Differentiable;
 use crate::real_field::impl_real_field;
-use crate::scalar::Scalar;
+use crate::scalar::{LocalFunction, Scalar};
 
 /// A number and its partial derivatives with respect to `N` inputs, carried forward.
 ///
@@ -113,6 +113,18 @@ fn binary_not_finite<const N: usize, T: Scalar>(a: [T; N], b: [T; N], da: T, db:
 }
 
 impl_real_field!([const N: usize, T: Scalar] Fwd<N, T> {});
+
+/// The results of `function` and their Jacobian, one row a result: its own, or by forward mode.
+#[inline]
+pub(crate) fn linearize<const N: usize, const M: usize>(
+    function: &impl LocalFunction<N, M>,
+    x: [f64; N],
+) -> ([f64; M], [[f64; N]; M]) {
+    function.linearize(x).unwrap_or_else(|| {
+        let results = function.evaluate(Fwd::<N>::variables(x));
+        (results.map(|y| y.value), results.map(|y| y.derivative))
+    })
+}
 
 #[cfg(test)]
 mod tests {

@@ -29,7 +29,6 @@
 //! | derivative of a linear solve, of a root | [`solve`], [`implicit`] |
 //! | an operation with its own derivative | [`LocalFunction`], [`CustomVjp`]: see [below](#a-derivative-of-your-own) |
 //! | rotations and rigid motions | [`lie`], [`rigid`] |
-//! | local Jacobians on all cores, the same bits for any number of them | [`parallel`] |
 //! | something to minimize with | [`optimize`] |
 //! | an independent derivative to test against | [`check`] |
 //!
@@ -81,13 +80,10 @@ pub mod implicit;
 mod jacobian;
 mod lanes;
 pub mod lie;
-mod local;
 mod operand;
 pub mod optimize;
-pub mod parallel;
 mod quadratic;
 mod real_field;
-mod recompute;
 mod recomputed;
 mod record;
 mod recording;
@@ -105,13 +101,11 @@ mod vjp;
 pub use fwd::Fwd;
 pub use hessian::{HessianScalar, hessian, hessian_vector};
 pub use jacobian::{forward_jacobian, jacobian};
-pub use local::LocalFunction;
 pub use operand::{CustomJvp, Operand};
 pub use quadratic::Quadratic;
-pub use recompute::Recompute;
 pub use record::custom;
 pub use recording::{Adjoints, Recording, gradient, gradient_into};
-pub use scalar::Scalar;
+pub use scalar::{LocalFunction, Recompute, Scalar};
 pub use tape::TapeStatistics;
 pub use var::Var;
 pub use vjp::CustomVjp;

@@ -47,6 +47,25 @@ impl<const N: usize> Quadratic<N> {
             column += row * (weight * row[i]);
         }
     }
+
+    /// By parameters in other units: one of the new ones is `units` old ones. Zero holds a parameter.
+    pub fn in_units(&self, units: &SVector<f64, N>) -> Self {
+        Self {
+            value: self.value,
+            gradient: self.gradient.component_mul(units),
+            hessian: SMatrix::from_fn(|r, c| units[r] * self.hessian[(r, c)] * units[c]),
+        }
+    }
+
+    /// The damped Gauss–Newton step −(H + μ1)⁻¹g, μ being the part `damping` of the mean diagonal of H: directions that the
+    /// residuals leave open must not become long steps. Zero where H is not positive semidefinite, or a number not finite.
+    pub fn damped_step(&self, damping: f64) -> SVector<f64, N> {
+        let damping = damping * self.hessian.trace() / N as f64 + f64::MIN_POSITIVE;
+        let factor = (self.hessian + SMatrix::identity() * damping).cholesky();
+        let step = factor.map(|factor| -factor.solve(&self.gradient));
+        let step = step.filter(|step| step.iter().all(|x| x.is_finite()));
+        step.unwrap_or_else(SVector::zeros)
+    }
 }
 
 impl<const N: usize> std::ops::AddAssign<&Self> for Quadratic<N> {
@@ -55,5 +74,31 @@ impl<const N: usize> std::ops::AddAssign<&Self> for Quadratic<N> {
         self.value += other.value;
         self.gradient += other.gradient;
         self.hessian += other.hessian;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Matrix3, Vector3};
+
+    use super::*;
+
+    #[test]
+    fn damped_steps() {
+        let mut sum = Quadratic::<3>::zeros();
+        sum.add_row(&Vector3::new(2.0, 0.0, 0.0), 1.0, 1.0);
+        sum.add_row(&Vector3::new(0.0, 0.5, 0.1), -3.0, 2.0);
+        // Of the direction that is open, nothing; the others end as without damping.
+        let step = sum.damped_step(1e-12);
+        let open = Vector3::new(0.0, 0.1, -0.5);
+        assert!(step.dot(&open).abs() < 1e-6 && (step.x + 0.5).abs() < 1e-9, "{step}");
+        let left = sum.gradient + sum.hessian * step;
+        assert!(left.norm() < 1e-9, "{left}");
+        // A held parameter stays; the units of another change nothing without damping.
+        let units = Vector3::new(7.0, 3.0, 0.0);
+        let held = sum.in_units(&units).damped_step(1e-12).component_mul(&units);
+        assert!((held - Vector3::new(-0.5, 6.0, 0.0)).norm() < 1e-9, "{held}");
+        sum.hessian = -Matrix3::identity();
+        assert_eq!(sum.damped_step(0.1), Vector3::zeros());
     }
 }

@@ -1,8 +1,8 @@
 //! [`Recompute`] in reverse mode: a node that keeps its inputs and is recorded again in the sweep.
 
-use crate::recompute::Recompute;
 use crate::record::custom;
 use crate::recording::Recording;
+use crate::scalar::Recompute;
 use crate::var::Var;
 use crate::vjp::CustomVjp;
 

@@ -2,7 +2,8 @@
 
 use std::rc::Rc;
 
-use crate::local::LocalFunction;
+use crate::fwd::linearize;
+use crate::scalar::LocalFunction;
 use crate::tape::{push_block, push_custom, with_tape};
 use crate::var::Var;
 use crate::vjp::CustomVjp;
@@ -26,7 +27,7 @@ pub(crate) fn local<const N: usize, const M: usize>(
     function: &impl LocalFunction<N, M>,
     x: [Var; N],
 ) -> [Var; M] {
-    let (values, jacobian) = function.linearize(x.map(Var::value));
+    let (values, jacobian) = linearize(function, x.map(Var::value));
     let group = push_block(&x, M, jacobian.as_flattened());
     std::array::from_fn(|i| group.var(i, values[i]))
 }
@@ -37,25 +38,14 @@ pub(crate) fn sum_local<const K: usize, F: LocalFunction<K, 1>>(
     x: &[Var],
     terms: impl IntoIterator<Item = (F, [usize; K])>,
 ) -> Var {
-    let linearize = |(term, places): (F, [usize; K])| {
-        (places, term.linearize(places.map(|place| x[place].value)))
-    };
-    record_sum(x, terms.into_iter().map(linearize))
-}
-
-/// Records the sum of terms of `x`, given their places, values and slopes, as one node.
-#[inline]
-pub(crate) fn record_sum<const K: usize>(
-    x: &[Var],
-    terms: impl Iterator<Item = ([usize; K], ([f64; 1], [[f64; K]; 1]))>,
-) -> Var {
     let mut sum = 0.0;
     let mut gradient = with_tape(|tape| tape.scratch(x.len()));
     gradient.fill(0.0);
     // Neighboring terms often share a number. What was touched last is held in a register, because reading
     // back what was just written would be the slowest part.
     let mut held = (0, 0.0);
-    for (places, ([value], [slopes])) in terms {
+    for (term, places) in terms {
+        let ([value], [slopes]) = linearize(&term, places.map(|place| x[place].value));
         sum += value;
         for (place, slope) in places.into_iter().zip(slopes) {
             if place != held.0 {

@@ -254,6 +254,7 @@ pub fn gradient_into(f: impl FnOnce(&[Var]) -> Var, x: &[f64], gradient: &mut [f
 #[cfg(test)]
 mod tests {
     use nalgebra::{ComplexField, Isometry3, Matrix3, SimdValue, Translation3, Vector3};
+    use rayon::prelude::*;
 
     use super::*;
     use crate::check::finite_difference_gradient;
@@ -367,5 +368,18 @@ mod tests {
         let picked = unused.select(unused.value() > 1.0, x + y);
         let adjoints = recording.gradient(picked);
         assert_eq!((adjoints.wrt(x), adjoints.wrt(y)), (1.0, 1.0));
+    }
+
+    #[test]
+    fn a_worker_steals_no_recording() {
+        // A worker that waits for others may run foreign work in between; it must find its own tape whole.
+        let outer = Recording::start();
+        let x = outer.variable(0.4);
+        let slopes: Vec<f64> = (0..64)
+            .into_par_iter()
+            .map(|i| gradient(|v| v[0] * v[0], &[f64::from(i)]).1[0])
+            .collect();
+        assert_eq!(slopes[63], 126.0);
+        assert_eq!(outer.gradient(x * x).wrt(x), 0.8);
     }
 }

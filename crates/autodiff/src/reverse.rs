@@ -1,10 +1,8 @@
 //! Arithmetic in reverse mode.
 
 use crate::differentiable::{Differentiable, chain_active};
-use crate::local::LocalFunction;
 use crate::real_field::impl_real_field;
-use crate::recompute::Recompute;
-use crate::scalar::Scalar;
+use crate::scalar::{LocalFunction, Recompute, Scalar};
 use crate::tape::{push, refuse_foreign};
 use crate::var::Var;
 use crate::{recomputed, record};

@@ -8,8 +8,7 @@
 use nalgebra::{Matrix3, Matrix3x4, Quaternion, UnitQuaternion, Vector3};
 
 use crate::lie::{cross_matrix, so3_exp};
-use crate::local::LocalFunction;
-use crate::scalar::Scalar;
+use crate::scalar::{LocalFunction, Scalar};
 use crate::stumpff::stumpff;
 
 /// `rotation * vector`.
@@ -73,7 +72,7 @@ impl LocalFunction<7, 3> for Rotate {
 
     // Of w t + u × t + v with t = 2 u × v, which is what nalgebra evaluates.
     #[inline]
-    fn linearize(&self, [i, j, k, w, x, y, z]: [f64; 7]) -> ([f64; 3], [[f64; 7]; 3]) {
+    fn linearize(&self, [i, j, k, w, x, y, z]: [f64; 7]) -> Option<([f64; 3], [[f64; 7]; 3])> {
         let (u, v) = (Vector3::new(i, j, k), Vector3::new(x, y, z));
         let t = u.cross(&v) * 2.0;
         let (by_u, by_v) = (cross_matrix(&v), cross_matrix(&u));
@@ -82,7 +81,7 @@ impl LocalFunction<7, 3> for Rotate {
             [by_t * by_u * -2.0 - cross_matrix(&t), by_t * by_v * 2.0 + Matrix3::identity()];
         let row =
             |r| [du[(r, 0)], du[(r, 1)], du[(r, 2)], t[r], dv[(r, 0)], dv[(r, 1)], dv[(r, 2)]];
-        ((t * w + u.cross(&t) + v).into(), std::array::from_fn(row))
+        Some(((t * w + u.cross(&t) + v).into(), std::array::from_fn(row)))
     }
 }
 
@@ -95,10 +94,10 @@ impl LocalFunction<6, 3> for Cross {
     }
 
     #[inline]
-    fn linearize(&self, [a, b, c, x, y, z]: [f64; 6]) -> ([f64; 3], [[f64; 6]; 3]) {
+    fn linearize(&self, [a, b, c, x, y, z]: [f64; 6]) -> Option<([f64; 3], [[f64; 6]; 3])> {
         let jacobian =
             [[0.0, z, -y, 0.0, -c, b], [-z, 0.0, x, c, 0.0, -a], [y, -x, 0.0, -b, a, 0.0]];
-        ([b * z - c * y, c * x - a * z, a * y - b * x], jacobian)
+        Some(([b * z - c * y, c * x - a * z, a * y - b * x], jacobian))
     }
 }
 
@@ -115,7 +114,7 @@ impl LocalFunction<7, 4> for IntegrateRotation {
 
     // The product is linear in both factors; exp = (cos θ/2, s ω) has the derivative (−½ s ω, s 1 + s'/θ ω ωᵀ).
     #[inline]
-    fn linearize(&self, [i, j, k, w, x, y, z]: [f64; 7]) -> ([f64; 4], [[f64; 7]; 4]) {
+    fn linearize(&self, [i, j, k, w, x, y, z]: [f64; 7]) -> Option<([f64; 4], [[f64; 7]; 4])> {
         let omega = Vector3::new(x, y, z) * self.duration;
         let step = so3_exp(&omega);
         let (a, u) = (step.w, step.imag());
@@ -143,7 +142,7 @@ impl LocalFunction<7, 4> for IntegrateRotation {
             (0..3).for_each(|r| jacobian[r][4 + c] = column[r]);
             jacobian[3][4 + c] = da * w - du.dot(&v);
         }
-        ((step.into_inner() * Quaternion::new(w, i, j, k)).coords.into(), jacobian)
+        Some(((step.into_inner() * Quaternion::new(w, i, j, k)).coords.into(), jacobian))
     }
 }
 
@@ -165,7 +164,7 @@ impl LocalFunction<10, 3> for Euler {
 
     // By a small turn θ of the body, R → (1 + [θ]×) R; then from θ to the quaternion's coordinates.
     #[inline]
-    fn linearize(&self, x: [f64; 10]) -> ([f64; 3], [[f64; 10]; 3]) {
+    fn linearize(&self, x: [f64; 10]) -> Option<([f64; 3], [[f64; 10]; 3])> {
         let q = quaternion([x[0], x[1], x[2], x[3]]);
         let (velocity, torque) = (Vector3::new(x[4], x[5], x[6]), Vector3::new(x[7], x[8], x[9]));
         // The value as `evaluate` computes it, to the last bit.
@@ -194,7 +193,7 @@ impl LocalFunction<10, 3> for Euler {
                 _ => by_torque[(r, c - 7)],
             })
         };
-        (acceleration.into(), std::array::from_fn(row))
+        Some((acceleration.into(), std::array::from_fn(row)))
     }
 }
 
@@ -222,7 +221,7 @@ mod tests {
 
     /// Compares a function's own Jacobian with forward mode through its generic code, and its value.
     fn check<const N: usize, const M: usize>(function: &impl LocalFunction<N, M>, x: [f64; N]) {
-        let (values, jacobian) = function.linearize(x);
+        let (values, jacobian) = function.linearize(x).unwrap();
         let forward = function.evaluate(Fwd::<N>::variables(x));
         for (row, (value, forward)) in values.iter().zip(forward).enumerate() {
             assert_eq!(*value, forward.value, "{x:?}");

@@ -1,10 +1,8 @@
-//! The one scalar trait that simulation code is generic over.
+//! The one scalar trait that simulation code is generic over, and the functions that a scalar may differentiate as a whole.
 
 use nalgebra::RealField;
 
 use crate::lanes;
-use crate::local::LocalFunction;
-use crate::recompute::Recompute;
 
 /// A real number that may carry derivatives.
 ///
@@ -96,6 +94,97 @@ pub trait Scalar: RealField + Copy + Default {
     fn combine_lanes<const N: usize>(slopes: [Self; 2], a: [Self; N], b: [Self; N]) -> [Self; N] {
         std::array::from_fn(|i| slopes[0] * a[i] + slopes[1] * b[i])
     }
+}
+
+/// A function of `N` numbers with `M` results: a rotation, a contact wrench, a term of a sum.
+///
+/// [`Scalar::local`] applies it. For reverse mode it then costs one block node with a dense `M`×`N`
+/// Jacobian, found by forward mode unless [`linearize`](Self::linearize) has something faster:
+///
+/// ```
+/// use prehend_autodiff::{LocalFunction, Scalar, gradient};
+///
+/// /// Force of a spring that hardens as it is stretched.
+/// struct Spring {
+///     stiffness: f64,
+/// }
+///
+/// impl LocalFunction<1, 1> for Spring {
+///     fn evaluate<S: Scalar>(&self, [x]: [S; 1]) -> [S; 1] {
+///         [(x + x.powi(3)).times(-self.stiffness)]
+///     }
+///
+///     fn linearize(&self, [x]: [f64; 1]) -> Option<([f64; 1], [[f64; 1]; 1])> {
+///         Some((self.evaluate([x]), [[-self.stiffness * (1.0 + 3.0 * x * x)]]))
+///     }
+/// }
+///
+/// let spring = Spring { stiffness: 2.0 };
+/// let (force, slope) = gradient(|x| Scalar::local(&spring, [x[0]])[0], &[2.0]);
+/// assert_eq!((force, slope[0]), (-20.0, -26.0));
+/// ```
+pub trait LocalFunction<const N: usize, const M: usize> {
+    /// The results.
+    fn evaluate<S: Scalar>(&self, x: [S; N]) -> [S; M];
+
+    /// The results and their Jacobian, one row a result, where there is a faster way to them than forward mode.
+    #[inline]
+    fn linearize(&self, _x: [f64; N]) -> Option<([f64; M], [[f64; N]; M])> {
+        None
+    }
+}
+
+impl<const N: usize, const M: usize, F: LocalFunction<N, M>> LocalFunction<N, M> for &F {
+    #[inline]
+    fn evaluate<S: Scalar>(&self, x: [S; N]) -> [S; M] {
+        (**self).evaluate(x)
+    }
+
+    #[inline]
+    fn linearize(&self, x: [f64; N]) -> Option<([f64; M], [[f64; N]; M])> {
+        (**self).linearize(x)
+    }
+}
+
+/// A function of many numbers, such as a step of a simulation, written once for all scalars.
+///
+/// [`Scalar::recompute`] applies it. Reverse mode then records one node that keeps the numbers the function was
+/// given, and records what is inside only in the sweep, for as long as it takes to go back through it:
+///
+/// ```
+/// use std::convert::Infallible;
+/// use prehend_autodiff::{Recompute, Recording, Scalar};
+///
+/// /// The logistic map, many times.
+/// struct Map {
+///     times: usize,
+/// }
+///
+/// impl Recompute for Map {
+///     type Error = Infallible;
+///     fn evaluate<S: Scalar>(&self, x: &[S]) -> Result<Vec<S>, Infallible> {
+///         let step = |y: S, _| x[1] * y * (S::one() - y);
+///         Ok(vec![(0..self.times).fold(x[0], step)])
+///     }
+/// }
+///
+/// let recording = Recording::start();
+/// let [x, rate] = recording.variables([0.3, 2.5]);
+/// let Ok(y) = Scalar::recompute(Map { times: 100 }, &[x, rate]);
+/// assert_eq!(recording.statistics().nodes, 3);
+/// // The fixed point is 1 − 1/rate.
+/// assert!((recording.gradient(y[0]).wrt(rate) - 1.0 / 6.25).abs() < 1e-12);
+/// ```
+pub trait Recompute: 'static {
+    /// Why there are no results.
+    type Error;
+
+    /// The results. It is called again with the same numbers in the sweep, so they may depend on nothing
+    /// that changes; should it fail only there, derivatives are NaN.
+    ///
+    /// # Errors
+    /// If there are no results.
+    fn evaluate<S: Scalar>(&self, x: &[S]) -> Result<Vec<S>, Self::Error>;
 }
 
 /// [`Scalar::sum_local`] as plain generic code.

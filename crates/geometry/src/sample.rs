@@ -1,6 +1,8 @@
-//! Points spread uniformly over a surface.
+//! Points spread evenly over a surface, and rotations over all there are.
 
-use nalgebra::{Point3, Vector3};
+use std::f64::consts::TAU;
+
+use nalgebra::{Point3, Quaternion, UnitQuaternion, Vector3};
 
 use crate::mesh::TriMesh;
 use crate::random::SplitMix64;
@@ -57,6 +59,21 @@ pub fn surface_samples(mesh: &TriMesh, n: usize, seed: u64) -> Vec<SurfaceSample
         });
     }
     samples
+}
+
+/// `count` rotations along a super-Fibonacci spiral: M. Alexa, "Super-Fibonacci spirals: fast, low-discrepancy sampling
+/// of SO(3)", 2022, algorithm 1.
+pub fn spread_rotations(count: usize) -> Vec<UnitQuaternion<f64>> {
+    let (phi, psi) = (2.0_f64.sqrt(), 1.533_751_168_755_204_3);
+    let one = |i: usize| {
+        let s = i as f64 + 0.5;
+        let t = s / count as f64;
+        let (r, big_r) = (t.sqrt(), (1.0 - t).sqrt());
+        let (a, b) = (TAU * s / phi, TAU * s / psi);
+        let q = Quaternion::new(big_r * b.cos(), r * a.sin(), r * a.cos(), big_r * b.sin());
+        UnitQuaternion::new_normalize(q)
+    };
+    (0..count).map(one).collect()
 }
 
 #[cfg(test)]
@@ -124,5 +141,20 @@ mod tests {
                 .iter()
                 .all(|s| s.face != 0 && s.face as usize != odd.faces.len() - 1)
         );
+    }
+
+    #[test]
+    fn no_rotation_is_far_from_all_of_them() {
+        let rotations = spread_rotations(2000);
+        let mut random = SplitMix64::new(1);
+        let mut worst = 0.0_f64;
+        for _ in 0..500 {
+            let turn = Vector3::from_fn(|_, _| random.normal()) * 3.0;
+            let q = UnitQuaternion::from_scaled_axis(turn);
+            let nearest = rotations.iter().map(|r| r.angle_to(&q)).fold(f64::INFINITY, f64::min);
+            worst = worst.max(nearest.to_degrees());
+        }
+        // As many balls of 13.6° would just fill the space of rotations if balls could.
+        assert!((13.6..22.0).contains(&worst), "{worst}°");
     }
 }

@@ -60,7 +60,7 @@ impl LocalFunction<11, 6> for Contacts<'_> {
 
     /// A contact's force depends on four numbers, its height and velocity; how those depend on a small
     /// turn θ and the velocities of the body is linear algebra.
-    fn linearize(&self, x: [f64; 11]) -> ([f64; 6], [[f64; 11]; 6]) {
+    fn linearize(&self, x: [f64; 11]) -> Option<([f64; 6], [[f64; 11]; 6])> {
         let State { pose, velocity, angular_velocity } = state(x);
         let by_spin = cross_matrix(&angular_velocity);
         let (mut force, mut torque) = (Vector3::zeros(), Vector3::zeros());
@@ -108,7 +108,7 @@ impl LocalFunction<11, 6> for Contacts<'_> {
                 _ => spin[(row, column - 8)],
             })
         });
-        ([force.x, force.y, force.z, torque.x, torque.y, torque.z], jacobian)
+        Some(([force.x, force.y, force.z, torque.x, torque.y, torque.z], jacobian))
     }
 }
 

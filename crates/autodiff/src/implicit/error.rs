@@ -41,6 +41,8 @@ pub enum ImplicitError {
     NotConverged {
         /// Iterations taken.
         iterations: usize,
+        /// Euclidean length of the residual.
+        residual: f64,
         /// Euclidean length of the last Newton step.
         step: f64,
     },

@@ -25,8 +25,10 @@ impl Linearization {
         x: &[f64],
         p: &[f64],
     ) -> Result<Self, ImplicitError> {
-        let jacobian = lu(&jacobian(equation, x, p)?)?;
-        let step = newton_step(equation, &jacobian, x, p)?;
+        let residual = DVector::from_vec(equation.residual(x, p));
+        check_length(x, residual.len())?;
+        let jacobian = lu(&jacobian(equation, x, p))?;
+        let step = -jacobian.solve(&residual)?;
         Ok(Self { jacobian, step })
     }
 
@@ -37,27 +39,13 @@ impl Linearization {
     }
 }
 
-/// −J⁻¹ F(x, p).
-pub(super) fn newton_step(
-    equation: &impl Residual,
-    jacobian: &Factored<f64>,
-    x: &[f64],
-    p: &[f64],
-) -> Result<DVector<f64>, ImplicitError> {
-    let residual = DVector::from_vec(equation.residual(x, p));
-    check_length(x, residual.len())?;
-    Ok(-jacobian.solve(&residual)?)
-}
-
-/// ∂F/∂x by forward mode.
-fn jacobian(equation: &impl Residual, x: &[f64], p: &[f64]) -> Result<DMatrix<f64>, ImplicitError> {
+/// ∂F/∂x by forward mode, F having as many components as there are unknowns.
+pub(super) fn jacobian(equation: &impl Residual, x: &[f64], p: &[f64]) -> DMatrix<f64> {
     let p: Vec<Fwd<CHUNK>> = p.iter().map(|&p| Fwd::constant(p)).collect();
-    let (residual, jacobian) = forward_jacobian(|x| equation.residual(x, &p), x);
-    check_length(x, residual.len())?;
-    Ok(jacobian)
+    forward_jacobian(|x| equation.residual(x, &p), x).1
 }
 
-fn check_length(x: &[f64], found: usize) -> Result<(), ImplicitError> {
+pub(super) fn check_length(x: &[f64], found: usize) -> Result<(), ImplicitError> {
     if found == x.len() {
         Ok(())
     } else {

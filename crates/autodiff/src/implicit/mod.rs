@@ -44,6 +44,6 @@ mod residual;
 mod solution;
 
 pub use error::ImplicitError;
-pub use newton::newton;
+pub use newton::{Equations, newton, newton_on};
 pub use residual::Residual;
 pub use solution::{solution, solution_with};

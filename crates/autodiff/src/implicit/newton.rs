@@ -1,26 +1,50 @@
-//! A solver to find solutions with.
+//! Newton's method, to find solutions with.
 
-use super::linearization::{Linearization, newton_step};
+use nalgebra::{DMatrix, DVector, Dyn, LU};
+
+use super::linearization::{check_length, jacobian};
 use super::{ImplicitError, Residual};
+use crate::solve::SolveError;
 
-const MOST_ITERATIONS: usize = 100;
+const MOST_ITERATIONS: usize = 60;
 
 /// Shortest fraction of a Newton step.
 const SHORTEST: f64 = 1e-6;
 
-/// What is left of the tolerance of [`solution`](super::solution) before the last step, which then is
-/// exact to rounding where convergence is quadratic.
-const BEFORE_LAST: f64 = 1e-3;
+/// How much a shortened step has to lower the size of the residual, as a share of what a linear equation would (Armijo).
+const DECREASE: f64 = 1e-4;
+
+/// A Newton step so short, absolute and relative to the largest unknown, is the last: convergence is quadratic, so that what
+/// is left after it is rounding.
+const LAST: (f64, f64) = (1e-10, 1e-9);
+
+/// So many times the last step is as near as rounding may let it come.
+const ROUNDING: f64 = 1e3;
+
+/// As many equations F(x) = 0 as unknowns, for [`newton_on`].
+pub trait Equations {
+    /// F(x).
+    fn residual(&self, x: &DVector<f64>) -> DVector<f64>;
+
+    /// F(x) and ∂F/∂x.
+    fn linearize(&self, x: &DVector<f64>) -> (DVector<f64>, DMatrix<f64>);
+
+    /// The size of a residual, which every step has to lower. Without a unit that all equations share it is the length of
+    /// the Newton step J⁻¹F, `jacobian` being factorized where the step began: a measure that does not depend on the
+    /// units of F (P. Deuflhard, "Newton methods for nonlinear problems", 2004, chapter 3).
+    fn size(&self, residual: &DVector<f64>, jacobian: &LU<f64, Dyn, Dyn>) -> f64 {
+        jacobian.solve(residual).map_or(f64::INFINITY, |step| step.norm())
+    }
+}
 
 /// Solves F(x, p) = 0 by Newton's method from `start`.
 ///
-/// A step is halved until the next one, with the same Jacobian, gets shorter: a test that does not depend
-/// on the units of F (P. Deuflhard, "Newton methods for nonlinear problems", 2004, chapter 3). Lengths are
-/// Euclidean, so unknowns of very different size are better scaled by the caller.
+/// A step is halved until what is left of the equations gets smaller ([`Equations::size`]). Lengths are Euclidean, so
+/// unknowns of very different size are better scaled by the caller.
 ///
 /// # Errors
 /// If F does not have as many components as there are unknowns, cannot be linearized where the iteration
-/// takes it, or no solution was found to the tolerance of [`solution`](super::solution).
+/// takes it, or no solution was found.
 ///
 /// # Examples
 /// ```
@@ -42,30 +66,72 @@ pub fn newton(
     start: &[f64],
     p: &[f64],
 ) -> Result<Vec<f64>, ImplicitError> {
-    let mut x = start.to_vec();
+    check_length(start, equation.residual(start, p).len())?;
+    let x = newton_on(&At { equation, p }, DVector::from_column_slice(start))?;
+    Ok(x.as_slice().to_vec())
+}
+
+/// An equation at fixed parameters.
+struct At<'a, R> {
+    equation: &'a R,
+    p: &'a [f64],
+}
+
+impl<R: Residual> Equations for At<'_, R> {
+    fn residual(&self, x: &DVector<f64>) -> DVector<f64> {
+        DVector::from_vec(self.equation.residual(x.as_slice(), self.p))
+    }
+
+    fn linearize(&self, x: &DVector<f64>) -> (DVector<f64>, DMatrix<f64>) {
+        (self.residual(x), jacobian(self.equation, x.as_slice(), self.p))
+    }
+}
+
+/// Solves `equations` by Newton's method from `x`, as [`newton`] does, with a Jacobian and a measure of one's own.
+///
+/// # Errors
+/// If a Jacobian is singular, a number is not finite, or no step makes the residual smaller.
+pub fn newton_on(
+    equations: &impl Equations,
+    mut x: DVector<f64>,
+) -> Result<DVector<f64>, ImplicitError> {
     let mut iterations = 0;
     loop {
-        let at = Linearization::new(equation, &x, p)?;
-        let excess = at.worst(&x).map_or(0.0, |(_, excess)| excess);
-        let moved = |fraction: f64| -> Vec<f64> {
-            x.iter().zip(&at.step).map(|(x, step)| x + fraction * step).collect()
+        let (residual, jacobian) = equations.linearize(&x);
+        let factors = jacobian.lu();
+        let Some(step) = factors.solve(&-&residual) else {
+            return Err(SolveError::Singular { condition: f64::INFINITY }.into());
         };
-        if excess <= BEFORE_LAST {
-            return Ok(moved(1.0));
+        if !step.iter().all(|step| step.is_finite()) {
+            return Err(SolveError::NotFinite("Newton step").into());
         }
-        let length = at.step.norm();
-        let shortens = |fraction: &f64| {
-            newton_step(equation, &at.jacobian, &moved(*fraction), p)
-                .is_ok_and(|next| next.norm() <= (1.0 - 0.5 * fraction) * length)
+        let last = LAST.0 + LAST.1 * x.amax();
+        if step.amax() <= last {
+            return Ok(x + step);
+        }
+        let size = equations.size(&residual, &factors);
+        let shortened = |fraction: f64| {
+            let next = equations.residual(&(&x + &step * fraction));
+            let lower = equations.size(&next, &factors) <= (1.0 - DECREASE * fraction) * size;
+            lower.then_some((fraction, next))
         };
         let mut fractions = std::iter::successors(Some(1.0), |fraction| Some(0.5 * fraction))
             .take_while(|fraction| *fraction >= SHORTEST);
         iterations += 1;
-        match fractions.find(shortens) {
-            Some(fraction) if iterations < MOST_ITERATIONS => x = moved(fraction),
-            // As near as rounding lets it come.
-            _ if excess <= 1.0 => return Ok(x),
-            _ => return Err(ImplicitError::NotConverged { iterations, step: length }),
+        let (fraction, next) = match fractions.find_map(shortened) {
+            Some(found) if iterations < MOST_ITERATIONS => found,
+            _ if step.amax() <= ROUNDING * last => return Ok(x),
+            _ => {
+                let (residual, step) = (residual.norm(), step.norm());
+                return Err(ImplicitError::NotConverged { iterations, residual, step });
+            }
+        };
+        x += step * fraction;
+        // The old Jacobian is near enough to tell, and to take, a step shorter still.
+        if let Some(step) = factors.solve(&-next)
+            && step.amax() <= 1e-2 * last
+        {
+            return Ok(x + step);
         }
     }
 }

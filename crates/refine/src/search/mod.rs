@@ -3,16 +3,15 @@
 mod evidence;
 mod fine;
 mod lattice;
-mod rotations;
 mod rough;
 mod settings;
 
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Vector3};
+use prehend_geometry::sample::spread_rotations;
 use rayon::prelude::*;
 
-pub(crate) use self::rotations::spread_rotations;
 pub use self::settings::SearchSettings;
 
 use self::evidence::Evidence;
@@ -167,6 +166,3 @@ fn distinct(mut poses: Vec<Scored>, limit: usize, distance: f64, angle: f64) -> 
     }
     kept
 }
-
-#[cfg(test)]
-mod tests;

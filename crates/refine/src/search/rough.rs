@@ -1,7 +1,8 @@
 //! The cheap score of a hypothesis and the cheap steps that lower it.
 
-use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, UnitQuaternion, Vector3, Vector6};
-use prehend_autodiff::lie::perturb_about;
+use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3, Vector6};
+use prehend_autodiff::Quadratic;
+use prehend_autodiff::lie::{perturb_about, twist_row};
 use prehend_geometry::RobustKernel;
 
 use super::evidence::Evidence;
@@ -82,31 +83,15 @@ impl CoarseScorer<'_> {
         steps: usize,
         slide: bool,
     ) -> Isometry3<f64> {
+        // Radians count by how far they move the surface.
+        let turn = if slide { 0.0 } else { 1.0 / self.object.radius };
+        let units = Vector6::new(1.0, 1.0, 1.0, turn, turn, turn);
+        let damping = if slide { 6e-2 } else { 1.2e-2 };
         let mut pose = *pose;
         for _ in 0..steps {
             let center = (pose * self.object.center).coords;
-            let (gradient, matrix) = self.equations(&pose, &center, points, scale, slide);
-            let mut step = Vector6::zeros();
-            if slide {
-                let matrix: Matrix3<f64> = matrix.fixed_view::<3, 3>(0, 0).into_owned();
-                let damping = Matrix3::identity() * (1e-2 * matrix.trace() + f64::MIN_POSITIVE);
-                if let Some(factor) = (matrix + damping).cholesky() {
-                    let g: Vector3<f64> = gradient.fixed_rows::<3>(0).into_owned();
-                    step.fixed_rows_mut::<3>(0).copy_from(&-factor.solve(&g));
-                }
-            } else {
-                // Radians count by how far they move the surface.
-                let r = self.object.radius;
-                let unit = Vector6::new(1.0, 1.0, 1.0, 1.0 / r, 1.0 / r, 1.0 / r);
-                let matrix = Matrix6::from_fn(|i, j| unit[i] * matrix[(i, j)] * unit[j]);
-                let damping = Matrix6::identity() * (2e-3 * matrix.trace() + f64::MIN_POSITIVE);
-                if let Some(factor) = (matrix + damping).cholesky() {
-                    step = -factor.solve(&gradient.component_mul(&unit)).component_mul(&unit);
-                }
-            }
-            if !step.iter().all(|x| x.is_finite()) {
-                break;
-            }
+            let equations = self.equations(&pose, &center, points, scale);
+            let step = equations.in_units(&units).damped_step(damping).component_mul(&units);
             pose = perturb_about(&pose, &center, &step);
             pose.rotation.renormalize();
         }
@@ -119,25 +104,18 @@ impl CoarseScorer<'_> {
         center: &Vector3<f64>,
         points: usize,
         scale: f64,
-        slide: bool,
-    ) -> (Vector6<f64>, Matrix6<f64>) {
+    ) -> Quadratic<6> {
         let kernel = RobustKernel::Cauchy { scale };
         let inverse = pose.inverse();
-        let (mut gradient, mut matrix) = (Vector6::zeros(), Matrix6::zeros());
+        let mut sum = Quadratic::zeros();
         let mut add = |p: &Point3<f64>, share: f64, inside_only: bool| {
             let (distance, g) = self.lattice.sample(&(inverse * p));
             if inside_only && distance >= 0.0 {
                 return;
             }
             // The surface moves with the object: the distance of a fixed point changes the other way.
-            let n = -(pose.rotation * g);
-            let w = share * kernel.weight(distance * distance);
-            let turn = if slide { Vector3::zeros() } else { (p.coords - center).cross(&n) };
-            let row = Vector6::new(n.x, n.y, n.z, turn.x, turn.y, turn.z);
-            gradient += row * (w * distance);
-            for (i, mut column) in matrix.column_iter_mut().enumerate() {
-                column += row * (w * row[i]);
-            }
+            let row = twist_row(&(p.coords - center), &-(pose.rotation * g));
+            sum.add_row(&row, distance, share * kernel.weight(distance * distance));
         };
         let evidence = self.evidence;
         let used = evidence.points.len().min(points);
@@ -149,7 +127,7 @@ impl CoarseScorer<'_> {
             evidence.outside.iter().step_by(evidence.outside.len().div_ceil(points.max(1)).max(1));
         let weight = share(OUTSIDE_WEIGHT, points.min(evidence.outside.len()));
         outside.for_each(|p| add(p, weight, true));
-        (gradient, matrix)
+        sum
     }
 }
 

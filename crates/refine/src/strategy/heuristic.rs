@@ -2,12 +2,13 @@
 
 use std::sync::Arc;
 
-use nalgebra::Vector6;
+use nalgebra::{Matrix6, Vector6};
+use prehend_autodiff::Quadratic;
 use rayon::prelude::*;
 use strum::{Display, EnumString, IntoStaticStr, VariantNames};
 
 use super::estimate::Recorder;
-use super::step::preconditioned_step;
+use super::step::damped_step;
 use super::{Estimate, Iteration, Observer, Strategy};
 use crate::error::RefineError;
 use crate::factor::{
@@ -16,6 +17,9 @@ use crate::factor::{
 };
 use crate::problem::{Block, Factor, NormalEquations, State};
 use crate::scene::Frame;
+
+/// Damping of candidate steps, as a part of the mean curvature.
+const DAMPING: f64 = 1e-3;
 
 /// One of the paper's four gradients.
 #[derive(
@@ -214,7 +218,10 @@ impl Candidate {
     fn of(factor: &dyn Factor, state: &State, radius: f64, length: f64) -> Self {
         let mut equations = NormalEquations::new(&[Block::ObjectPose]);
         let cost = factor.linearize(state, &mut equations);
-        let (step, length) = preconditioned_step(&equations, radius, length);
+        let gradient = Vector6::from_column_slice(equations.gradient().as_slice());
+        let hessian = Matrix6::from_column_slice(equations.hessian().as_slice());
+        let equations = Quadratic { value: cost, gradient, hessian };
+        let (step, length) = damped_step(&equations, radius, DAMPING, length);
         let cost_after = factor.cost(&state.retract(&[Block::ObjectPose], step.as_slice()));
         Self { cost, cost_after, step, length }
     }

@@ -1,6 +1,7 @@
 //! The paper's first baseline: point-to-point iterative closest points.
 
 use nalgebra::{Point3, Vector3};
+use prehend_autodiff::Quadratic;
 use prehend_geometry::{KdTree, RobustKernel, icp};
 use rayon::prelude::*;
 
@@ -9,7 +10,7 @@ use super::step::{StepRule, walk};
 use super::{Estimate, Observer, Strategy};
 use crate::error::RefineError;
 use crate::factor::RenderingSettings;
-use crate::problem::{Block, NormalEquations, State};
+use crate::problem::State;
 use crate::scene::Frame;
 
 /// Point-to-point ICP (Besl and McKay, 1992) between the masked depth points P and the whole surface of the model.
@@ -54,7 +55,7 @@ impl Strategy for Icp {
         let mut recorder = Recorder::new(names, initial, self.iterations, judge, observe);
         let rule =
             StepRule { iterations: self.iterations, tolerance: self.step_tolerance, damping: 1e-3 };
-        walk(&mut recorder, initial.clone(), object.radius, &rule, |state, _, equations| {
+        walk(&mut recorder, initial.clone(), object.radius, &rule, |state, _| {
             let t_object_cam = state.t_cam_object.inverse();
             let to_mesh = pairs(cloud.points(), |p| {
                 let closest = object.surface.closest(&(t_object_cam * p), f64::INFINITY)?;
@@ -65,7 +66,9 @@ impl Strategy for Icp {
                 let nearest = cloud.nearest(&surface, f64::INFINITY)?;
                 Some((surface, cloud.points()[nearest.index]))
             });
-            add(equations, state, &to_mesh) + add(equations, state, &to_cloud)
+            let mut sum = mean_square(state, &to_mesh);
+            sum += &mean_square(state, &to_cloud);
+            (sum.value, sum)
         });
         Ok(recorder.estimate(None))
     }
@@ -83,12 +86,8 @@ fn pairs<T: Sync>(
     items.par_iter().with_min_len(64).filter_map(pair).collect()
 }
 
-/// Adds the mean squared distance of `pairs` \[m²\] with its derivatives, and returns it.
-fn add(
-    equations: &mut NormalEquations,
-    state: &State,
-    pairs: &[(Point3<f64>, Point3<f64>)],
-) -> f64 {
+/// The mean squared distance of `pairs` \[m²\].
+fn mean_square(state: &State, pairs: &[(Point3<f64>, Point3<f64>)]) -> Quadratic<6> {
     let center = state.center().into();
     let mut sums = icp::NormalEquations::new();
     for (surface, cloud) in pairs {
@@ -97,9 +96,8 @@ fn add(
     }
     // The sums are of half the squares.
     let share = 2.0 / pairs.len().max(1) as f64;
-    let sums = sums.quadratic;
-    equations.add(&[Block::ObjectPose], &(sums.gradient * share), &(sums.hessian * share));
-    sums.value * share
+    let Quadratic { value, gradient, hessian } = sums.quadratic;
+    Quadratic { value: value * share, gradient: gradient * share, hessian: hessian * share }
 }
 
 #[cfg(test)]
@@ -108,6 +106,7 @@ mod tests {
 
     use super::*;
     use crate::evaluate::metrics::{oe_deg, pe_cm};
+    use crate::problem::Block;
     use crate::scene::default_scene;
 
     #[test]

@@ -8,7 +8,7 @@ use super::estimate::Recorder;
 use super::step::{StepRule, walk};
 use super::{Estimate, Observer, Strategy};
 use crate::error::RefineError;
-use crate::problem::{Block, State};
+use crate::problem::State;
 use crate::scene::{Frame, Object};
 
 /// Point-to-plane ICP (Chen and Medioni, 1992) from the masked depth points to the model, under Cauchy's weights.
@@ -56,12 +56,11 @@ impl Strategy for RobustIcp {
         let mut recorder = Recorder::new(names, initial, iterations, None, observe);
         // A step of no length at all says only that no point counts any more.
         let rule = StepRule { iterations, tolerance: 0.0, damping };
-        walk(&mut recorder, initial.clone(), object.radius, &rule, |state, index, equations| {
+        walk(&mut recorder, initial.clone(), object.radius, &rule, |state, index| {
             let done = (index as f64 / shrinking.max(1.0)).min(1.0);
             let scale = first_scale * (last_scale / first_scale).powf(done);
             let sums = match_all(&mut cloud, object, state, RobustKernel::Cauchy { scale });
-            equations.add(&[Block::ObjectPose], &sums.quadratic.gradient, &sums.quadratic.hessian);
-            sums.rms()
+            (sums.rms(), sums.quadratic)
         });
         Ok(recorder.estimate(None))
     }
@@ -113,6 +112,7 @@ mod tests {
     use super::super::Icp;
     use super::*;
     use crate::evaluate::metrics::{oe_deg, pe_cm};
+    use crate::problem::Block;
     use crate::scene::{Scene, default_scene};
 
     /// Where a strategy ends that begins `offset` from the truth, and in how many iterations.

@@ -1,43 +1,29 @@
 //! Gauss–Newton steps of a pose.
 
-use nalgebra::{Matrix6, Vector6};
+use nalgebra::Vector6;
+use prehend_autodiff::Quadratic;
 
 use super::Iteration;
 use super::estimate::Recorder;
-use crate::problem::{Block, NormalEquations, State};
+use crate::problem::{Block, State};
 
-/// −(H + μ)⁻¹ g in units where a radian counts `radius` meters, no longer than `limit`; and its length
-/// in these units \[m\]. μ is a thousandth of the mean curvature.
-pub(super) fn preconditioned_step(
-    equations: &NormalEquations,
-    radius: f64,
-    limit: f64,
-) -> (Vector6<f64>, f64) {
-    damped_step(equations, radius, 1e-3, limit)
-}
-
-/// As [`preconditioned_step`], μ being the part `damping` of the mean curvature.
+/// The damped Gauss–Newton step in units where a radian counts `radius` meters, no longer than `limit`; and its length in these
+/// units \[m\].
 pub(super) fn damped_step(
-    equations: &NormalEquations,
+    equations: &Quadratic<6>,
     radius: f64,
     damping: f64,
     limit: f64,
 ) -> (Vector6<f64>, f64) {
-    let unit = Vector6::new(1.0, 1.0, 1.0, 1.0 / radius, 1.0 / radius, 1.0 / radius);
-    let gradient = Vector6::from_column_slice(equations.gradient().as_slice()).component_mul(&unit);
-    let hessian = Matrix6::from_column_slice(equations.hessian().as_slice());
-    let hessian = Matrix6::from_fn(|r, c| unit[r] * hessian[(r, c)] * unit[c]);
-    // Directions that the term says nothing about (a cylinder's spin) must not become long steps.
-    let damping = damping * hessian.trace() / 6.0 + f64::MIN_POSITIVE;
-    let step = (hessian + Matrix6::identity() * damping)
-        .cholesky()
-        .map_or_else(Vector6::zeros, |factor| -factor.solve(&gradient));
+    let turn = 1.0 / radius;
+    let units = Vector6::new(1.0, 1.0, 1.0, turn, turn, turn);
+    let step = equations.in_units(&units).damped_step(damping);
     let norm = step.norm();
-    if !(norm.is_finite() && norm > 0.0) {
+    if !(norm > 0.0 && norm.is_finite()) {
         return (Vector6::zeros(), 0.0);
     }
     let length = norm.min(limit);
-    (step.component_mul(&unit) * (length / norm), length)
+    (step.component_mul(&units) * (length / norm), length)
 }
 
 /// How a walk of steps that follow each other without any choice among them goes.
@@ -50,19 +36,18 @@ pub(super) struct StepRule {
     pub(super) damping: f64,
 }
 
-/// Makes damped Gauss–Newton steps of the object from `state` by the `equations` of every state and iteration, which returns the value
-/// that it lowers; `radius` is the object's \[m\].
+/// Makes damped Gauss–Newton steps of the object from `state` by the value and the `equations` at every state and iteration; `radius` is
+/// the object's \[m\].
 pub(super) fn walk(
     recorder: &mut Recorder<'_, '_>,
     mut state: State,
     radius: f64,
     rule: &StepRule,
-    mut equations: impl FnMut(&State, usize, &mut NormalEquations) -> f64,
+    mut equations: impl FnMut(&State, usize) -> (f64, Quadratic<6>),
 ) {
     for index in 0..=rule.iterations {
-        let mut sums = NormalEquations::new(&[Block::ObjectPose]);
-        let value = equations(&state, index, &mut sums);
-        let (step, length) = damped_step(&sums, radius, rule.damping, f64::INFINITY);
+        let (value, equations) = equations(&state, index);
+        let (step, length) = damped_step(&equations, radius, rule.damping, f64::INFINITY);
         let iteration = Iteration { index, values: vec![value], weights: vec![1.0], step: length };
         if recorder.visit(&state, iteration).is_break() || length <= rule.tolerance {
             break;

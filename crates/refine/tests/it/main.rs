@@ -1,4 +1,4 @@
-//! The library from outside: datasets read, scored and made; robots of any kind; golden values of independent tools.
+//! The library from outside: estimator, tracker, search and factors on the built-in scene; datasets read, scored and made; robots of any kind; golden values of independent tools.
 //!
 //! Tests in modules called `data_*` read `PREHEND_DATA` (default: `../shared/data` beside the repository) and are ignored by default.
 
@@ -9,7 +9,11 @@ mod bop_dataset;
 mod data_contact;
 mod data_metrics;
 mod data_search;
+mod factors;
+mod fused;
+mod search;
 mod synth_layout;
+mod tracker;
 
 use std::path::PathBuf;
 

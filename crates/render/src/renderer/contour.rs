@@ -2,7 +2,7 @@
 //! the loss of a pose.
 
 use nalgebra::Vector3;
-use prehend_autodiff::LocalFunction;
+use prehend_autodiff::{Fwd, LocalFunction};
 use rayon::prelude::*;
 
 use super::frame::{Flat, Frame};
@@ -261,8 +261,9 @@ fn step_back(frame: &Frame, step: &Step, by_share: f64, by_distance: f64, sums: 
     if by_share == 0.0 && by_distance == 0.0 {
         return;
     }
-    let (_, [of_share, of_distance]) = step.foot.linearize(foot_inputs(frame, &step.piece));
-    let by = |i: usize| by_share * of_share[i] + by_distance * of_distance[i];
+    let inputs = Fwd::<10>::variables(foot_inputs(frame, &step.piece));
+    let [share, distance] = step.foot.evaluate(inputs).map(|result| result.derivative);
+    let by = |i: usize| by_share * share[i] + by_distance * distance[i];
     let face = sums.face(step.piece.face as usize);
     face.position[corners[0]] += Vector3::new(by(0), by(1), by(2));
     face.position[corners[1]] += Vector3::new(by(3), by(4), by(5));

@@ -109,6 +109,7 @@ impl LocalFunction<10, 2> for Foot {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use prehend_autodiff::Fwd;
     use prehend_autodiff::check::finite_difference_gradient;
 
     const FACE: [f64; 9] = [-0.1, -0.05, 0.5, 0.12, -0.07, 0.6, 0.01, 0.11, 0.45];
@@ -176,7 +177,7 @@ mod tests {
             [([64.0, 30.0], [0.0, 1.0]), ([64.0, 30.0], [0.7, 0.9]), ([0.0, 20.0], [0.0, 1.0])]
         {
             (foot.pixel, foot.range) = (pixel, range);
-            let (_, jacobian) = foot.linearize(edge);
+            let jacobian = foot.evaluate(Fwd::<10>::variables(edge)).map(|y| y.derivative);
             for k in 0..2 {
                 let difference = finite_difference_gradient(
                     |x| foot.evaluate(std::array::from_fn(|i| x[i]))[k],
@@ -197,11 +198,12 @@ mod tests {
         let middle = [0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])];
         let at = |distance: f64| {
             let pixel = [middle[0] + distance * normal[0], middle[1] + distance * normal[1]];
-            Foot { pixel, range: [0.0, 1.0], outward: normal, side: 1.0 }.linearize(edge)
+            let foot = Foot { pixel, range: [0.0, 1.0], outward: normal, side: 1.0 };
+            foot.evaluate(Fwd::<10>::variables(edge))
         };
         let (on, beside) = (at(0.0), at(0.01));
-        assert!(on.0[1].abs() < 1e-12);
-        for (a, b) in on.1[1].iter().zip(&beside.1[1]) {
+        assert!(on[1].value.abs() < 1e-12);
+        for (a, b) in on[1].derivative.iter().zip(&beside[1].derivative) {
             assert!((a - b).abs() < 2e-3 * (1.0 + b.abs()), "{on:?} {beside:?}");
         }
     }

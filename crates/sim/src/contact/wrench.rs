@@ -31,8 +31,8 @@ impl LocalFunction<12, 6> for WrenchJacobian {
     }
 
     #[inline]
-    fn linearize(&self, _: [f64; 12]) -> ([f64; 6], [[f64; 12]; 6]) {
-        (self.wrench.into(), self.by_state)
+    fn linearize(&self, _: [f64; 12]) -> Option<([f64; 6], [[f64; 12]; 6])> {
+        Some((self.wrench.into(), self.by_state))
     }
 }
 

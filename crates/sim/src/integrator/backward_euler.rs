@@ -2,8 +2,9 @@
 
 mod equations;
 
-use equations::{Equations, arrived, excess};
+use equations::{ImplicitStep, arrived, excess};
 use nalgebra::{DMatrix, DVector, Matrix6};
+use prehend_autodiff::implicit::Equations as _;
 use prehend_autodiff::{LocalFunction, Scalar};
 
 use super::Integrator;
@@ -44,7 +45,7 @@ impl Integrator for BackwardEuler {
         let mut at_end = values.clone();
         plain.drive(&mut at_end, step.after().time());
         let mut equations =
-            Equations { world: &plain, lifted: &lifted, states: &values, at_end, free, step };
+            ImplicitStep { world: &plain, lifted: &lifted, states: &values, at_end, free, step };
         let solution = equations.solve()?;
         if S::ORDER == 0 {
             return Ok(carried(world, states, &equations, &solution, &DMatrix::zeros(0, 0)));
@@ -56,7 +57,7 @@ impl Integrator for BackwardEuler {
         }
         equations.lifted = &leaky;
         let inverse = equations.linearize(&solution).1.try_inverse();
-        let inverse = inverse.ok_or_else(|| equations.unsolved(&solution, 0))?;
+        let inverse = inverse.ok_or_else(|| equations.unsolved(0.0, 0))?;
         Ok(carried(world, states, &equations, &solution, &inverse))
     }
 
@@ -69,7 +70,7 @@ impl Integrator for BackwardEuler {
 fn carried<S: Scalar>(
     world: &World<S>,
     states: &[State<S>],
-    equations: &Equations<'_>,
+    equations: &ImplicitStep<'_>,
     solution: &DVector<f64>,
     inverse: &DMatrix<f64>,
 ) -> Vec<State<S>> {

@@ -1,10 +1,10 @@
 //! Rotations near every rotation, drawn to the symmetries next to them.
 
 use nalgebra::UnitQuaternion;
+use prehend_geometry::sample::spread_rotations;
 use rayon::prelude::*;
 
 use super::deviation::Shape;
-use crate::search::spread_rotations;
 
 /// Rotations that the search begins with: about 15° apart.
 const STARTS: usize = 3000;

@@ -1,6 +1,7 @@
 //! How far a rotation is from being a symmetry.
 
 use nalgebra::{Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
+use prehend_autodiff::Quadratic;
 use prehend_geometry::closest::{ClosestError, ClosestPoints};
 use prehend_geometry::sample::surface_samples;
 use prehend_geometry::{SurfaceSample, TriMesh};
@@ -93,12 +94,10 @@ impl Shape {
         let mut rms = f64::INFINITY;
         for _ in 0..iterations {
             let matrix = turn.to_rotation_matrix();
-            let (hessian, gradient, sum, count) = self.normal_equations(&matrix, stride);
+            let (equations, sum, count) = self.normal_equations(&matrix, stride);
             rms = (sum / f64::from(count.max(1))).sqrt();
             // Directions that the shape leaves free (the spin of a cylinder) must stay where they are.
-            let damping = Matrix3::identity() * (1e-3 * hessian.trace() + f64::MIN_POSITIVE);
-            let Some(factor) = (hessian + damping).cholesky() else { break };
-            let step = -factor.solve(&gradient);
+            let step = equations.damped_step(3e-3);
             let length = step.norm();
             turn = UnitQuaternion::from_scaled_axis(step * (0.3 / length).min(1.0)) * turn;
             if length < 1e-4 {
@@ -108,13 +107,9 @@ impl Shape {
         (turn, rms)
     }
 
-    /// Point to plane: JᵀJ and Jᵀr by a rotation on the left, Σr² and the number of samples.
-    fn normal_equations(
-        &self,
-        turn: &Rotation3<f64>,
-        stride: usize,
-    ) -> (Matrix3<f64>, Vector3<f64>, f64, u32) {
-        let (mut hessian, mut gradient) = (Matrix3::zeros(), Vector3::zeros());
+    /// Point to plane by a rotation on the left, the sum of squared distances and the number of samples.
+    fn normal_equations(&self, turn: &Rotation3<f64>, stride: usize) -> (Quadratic<3>, f64, u32) {
+        let mut equations = Quadratic::zeros();
         let (mut sum, mut count) = (0.0, 0);
         for (x, normal) in self.samples.iter().step_by(stride) {
             let (arm, normal) = (turn * x, turn * normal);
@@ -122,13 +117,11 @@ impl Shape {
                 continue;
             };
             let residual = (self.center + arm - closest.point).dot(&normal);
-            let row = arm.cross(&normal);
-            hessian += row * row.transpose();
-            gradient += row * residual;
+            equations.add_row(&arm.cross(&normal), residual, 1.0);
             sum += closest.distance_squared();
             count += 1;
         }
-        (hessian, gradient, sum, count)
+        (equations, sum, count)
     }
 
     /// How far `turn` moves the second moments, relative to themselves.

@@ -6,9 +6,6 @@ mod hypotheses;
 mod posterior;
 mod settings;
 mod summary;
-#[cfg(test)]
-mod tests;
-
 use std::ops::ControlFlow;
 use std::sync::Arc;
 

@@ -1,6 +1,7 @@
-//! The equations of an implicit step, and Newton's method for them.
+//! The equations of an implicit step.
 
-use nalgebra::{DMatrix, DVector, Matrix6, Vector3, Vector6};
+use nalgebra::{DMatrix, DVector, Dyn, LU, Matrix6, Vector3, Vector6};
+use prehend_autodiff::implicit::{Equations, ImplicitError, newton_on};
 use prehend_autodiff::lie::so3_exp;
 use prehend_autodiff::{Fwd, Scalar};
 
@@ -10,15 +11,6 @@ use crate::state::State;
 use crate::time::Step;
 use crate::world::World;
 use crate::world::body_id::BodyId;
-
-const MOST_ITERATIONS: usize = 60;
-
-/// Shortest fraction of a Newton step.
-const SHORTEST: f64 = 1e-6;
-
-/// A Newton step so short, absolute \[m/s, rad/s\] and relative, is the last: convergence is quadratic, so that what is
-/// left after it is rounding.
-const LAST: (f64, f64) = (1e-10, 1e-9);
 
 /// `state` after moving with `velocity` (linear, angular) for `dt`.
 pub(super) fn arrived<S: Scalar>(state: &State<S>, velocity: &[S; 6], dt: f64) -> State<S> {
@@ -46,7 +38,7 @@ pub(super) fn excess<S: Scalar>(
 }
 
 /// The equations of a step, for the velocities of the free bodies, one after the other.
-pub(super) struct Equations<'a> {
+pub(super) struct ImplicitStep<'a> {
     pub(super) world: &'a World,
     pub(super) lifted: &'a World<Fwd<12>>,
     pub(super) states: &'a [State],
@@ -56,7 +48,7 @@ pub(super) struct Equations<'a> {
     pub(super) step: Step,
 }
 
-impl Equations<'_> {
+impl ImplicitStep<'_> {
     /// Newton's method: first from the velocities at the start, then from those of a flight without contacts, in
     /// which what will touch touches already.
     pub(super) fn solve(&self) -> Result<DVector<f64>, SimulationError> {
@@ -68,47 +60,13 @@ impl Equations<'_> {
             };
             DVector::from_vec(self.free.iter().flat_map(velocity).collect())
         };
-        match self.newton(start(0.0)) {
-            Err(SimulationError::Unsolved { .. }) => self.newton(start(self.step.dt)),
-            solved => solved,
-        }
-    }
-
-    fn newton(&self, mut x: DVector<f64>) -> Result<DVector<f64>, SimulationError> {
-        for iteration in 1..=MOST_ITERATIONS {
-            let (residual, jacobian) = self.linearize(&x);
-            let tolerance = LAST.0 + LAST.1 * x.amax();
-            let factors = jacobian.lu();
-            let Some(change) = factors.solve(&-&residual) else {
-                return Err(self.unsolved(&x, iteration));
-            };
-            if change.amax() <= tolerance {
-                return Ok(x + change);
+        let solved = newton_on(self, start(0.0)).or_else(|_| newton_on(self, start(self.step.dt)));
+        solved.map_err(|error| match error {
+            ImplicitError::NotConverged { iterations, residual, .. } => {
+                self.unsolved(residual, iterations)
             }
-            let size = self.norm(&residual);
-            let shortened = |fraction: f64| {
-                let next = self.residual(&(&x + &change * fraction));
-                (self.norm(&next) <= (1.0 - 1e-4 * fraction) * size).then_some((fraction, next))
-            };
-            let mut fractions = std::iter::successors(Some(1.0), |fraction| Some(0.5 * fraction))
-                .take_while(|fraction| *fraction >= SHORTEST);
-            let Some((fraction, next)) = fractions.find_map(shortened) else {
-                return Err(self.unsolved(&x, iteration));
-            };
-            x += change * fraction;
-            // The old Jacobian is near enough to tell, and to take, a step shorter still.
-            if let Some(last) = factors.solve(&-next)
-                && last.amax() <= 1e-2 * tolerance
-            {
-                return Ok(x + last);
-            }
-        }
-        Err(self.unsolved(&x, MOST_ITERATIONS))
-    }
-
-    fn residual(&self, x: &DVector<f64>) -> DVector<f64> {
-        let wrenches = self.world.wrenches(&self.ends(x), self.step.index);
-        self.excesses(x, &wrenches)
+            _ => self.unsolved(self.residual(&start(0.0)).norm(), 0),
+        })
     }
 
     fn excesses(&self, x: &DVector<f64>, wrenches: &[Vector6<f64>]) -> DVector<f64> {
@@ -130,8 +88,44 @@ impl Equations<'_> {
         ends
     }
 
-    /// The residual and its Jacobian.
-    pub(super) fn linearize(&self, x: &DVector<f64>) -> (DVector<f64>, DMatrix<f64>) {
+    /// Derivative of the excesses, with that of the wrenches.
+    fn jacobian(
+        &self,
+        x: &DVector<f64>,
+        wrenches: &[Vector6<f64>],
+        wrenches_by_velocity: &DMatrix<f64>,
+    ) -> DMatrix<f64> {
+        let mut jacobian = DMatrix::zeros(x.len(), x.len());
+        for (slot, &body) in self.free.iter().enumerate() {
+            let Some(rigid) = self.lifted.bodies[body].rigid() else { continue };
+            // The body's own velocity in lanes 0..6, the wrench on it in lanes 6..12.
+            let at = velocity_at(x, slot);
+            let velocity = std::array::from_fn(|i| Fwd::variable(at[i], i));
+            let wrench = Vector6::from_fn(|i, _| Fwd::variable(wrenches[body][i], 6 + i));
+            let state = self.states[body].lift();
+            let excess = excess(rigid, self.lifted, &state, &velocity, &wrench, self.step.dt);
+            let by = |lane: usize| Matrix6::from_fn(|i, j| excess[i].derivative[lane + j]);
+            let mut rows = jacobian.fixed_rows_mut::<6>(6 * slot);
+            rows.copy_from(&(by(6) * wrenches_by_velocity.fixed_rows::<6>(6 * slot)));
+            let mut own = rows.fixed_columns_mut::<6>(6 * slot);
+            own += by(0);
+        }
+        jacobian
+    }
+
+    pub(super) fn unsolved(&self, residual: f64, iterations: usize) -> SimulationError {
+        let (step, time) = (self.step.index, self.step.time());
+        SimulationError::Unsolved { step, time, residual, iterations }
+    }
+}
+
+impl Equations for ImplicitStep<'_> {
+    fn residual(&self, x: &DVector<f64>) -> DVector<f64> {
+        let wrenches = self.world.wrenches(&self.ends(x), self.step.index);
+        self.excesses(x, &wrenches)
+    }
+
+    fn linearize(&self, x: &DVector<f64>) -> (DVector<f64>, DMatrix<f64>) {
         let dt = self.step.dt;
         let ends = self.ends(x);
         let mut slots = vec![None; ends.len()];
@@ -169,33 +163,8 @@ impl Equations<'_> {
         (self.excesses(x, &wrenches), self.jacobian(x, &wrenches, &by_velocity))
     }
 
-    /// Derivative of the excesses, with that of the wrenches.
-    fn jacobian(
-        &self,
-        x: &DVector<f64>,
-        wrenches: &[Vector6<f64>],
-        wrenches_by_velocity: &DMatrix<f64>,
-    ) -> DMatrix<f64> {
-        let mut jacobian = DMatrix::zeros(x.len(), x.len());
-        for (slot, &body) in self.free.iter().enumerate() {
-            let Some(rigid) = self.lifted.bodies[body].rigid() else { continue };
-            // The body's own velocity in lanes 0..6, the wrench on it in lanes 6..12.
-            let at = velocity_at(x, slot);
-            let velocity = std::array::from_fn(|i| Fwd::variable(at[i], i));
-            let wrench = Vector6::from_fn(|i, _| Fwd::variable(wrenches[body][i], 6 + i));
-            let state = self.states[body].lift();
-            let excess = excess(rigid, self.lifted, &state, &velocity, &wrench, self.step.dt);
-            let by = |lane: usize| Matrix6::from_fn(|i, j| excess[i].derivative[lane + j]);
-            let mut rows = jacobian.fixed_rows_mut::<6>(6 * slot);
-            rows.copy_from(&(by(6) * wrenches_by_velocity.fixed_rows::<6>(6 * slot)));
-            let mut own = rows.fixed_columns_mut::<6>(6 * slot);
-            own += by(0);
-        }
-        jacobian
-    }
-
     /// The velocity of equal kinetic energy of 1 kg \[m/s\].
-    fn norm(&self, velocities: &DVector<f64>) -> f64 {
+    fn size(&self, velocities: &DVector<f64>, _: &LU<f64, Dyn, Dyn>) -> f64 {
         let energy = |(slot, &body): (usize, &BodyId)| {
             let rigid = self.world.bodies[body].rigid()?;
             let at = Vector6::from(velocity_at(velocities, slot));
@@ -204,11 +173,6 @@ impl Equations<'_> {
             Some(rigid.mass() * linear.norm_squared() + angular.dot(&(inertia * angular)))
         };
         self.free.iter().enumerate().filter_map(energy).sum::<f64>().sqrt()
-    }
-
-    pub(super) fn unsolved(&self, x: &DVector<f64>, iterations: usize) -> SimulationError {
-        let (step, time) = (self.step.index, self.step.time());
-        SimulationError::Unsolved { step, time, residual: self.residual(x).norm(), iterations }
     }
 }
 

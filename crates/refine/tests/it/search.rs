@@ -1,7 +1,11 @@
-use super::*;
-use crate::evaluate::metrics::{oe_deg, pe_cm};
-use crate::scene::{Observation, Scene, default_scene};
-use std::sync::LazyLock;
+//! The search from sensors alone on the built-in scene.
+
+use std::sync::{Arc, LazyLock};
+
+use prehend_refine::evaluate::metrics::{oe_deg, pe_cm};
+use prehend_refine::scene::{Scene, default_scene};
+use prehend_refine::search::{PoseCandidate, PoseSearch, SearchSettings};
+use prehend_refine::{Frame, Observation, RefineError};
 
 static SCENE: LazyLock<Scene> = LazyLock::new(|| default_scene(1).unwrap());
 

@@ -1,12 +1,14 @@
+//! The fused estimator on the built-in scene.
+
 use std::sync::{Arc, LazyLock};
 
 use nalgebra::{Isometry3, Point3, Translation3, Vector3};
 
-use super::*;
-use crate::evaluate::metrics::{oe_deg, pe_cm};
-use crate::problem::{Block, NoiseModel, Rows};
-use crate::refine::refine;
-use crate::scene::{Frame, Hand, Observation, Scene, default_scene};
+use prehend_refine::evaluate::metrics::{oe_deg, pe_cm};
+use prehend_refine::problem::{Block, NoiseModel, Rows};
+use prehend_refine::scene::{Scene, default_scene};
+use prehend_refine::strategy::{Fused, FusedSettings, Modality, Posterior};
+use prehend_refine::{Factor, Frame, Hand, Observation, State, refine};
 
 static SCENE: LazyLock<Scene> = LazyLock::new(|| default_scene(1).unwrap());
 
@@ -134,8 +136,8 @@ fn a_solve_that_is_cut_short_is_not_sure() {
     let (hasty, whole) = (of(1), of(10));
     println!("{} {}", hasty.mahalanobis(&SCENE.truth), whole.mahalanobis(&SCENE.truth));
     assert!(hasty.mahalanobis(&SCENE.truth) < 5.0);
-    let widest = |posterior: &Posterior| posterior.widest(SCENE.object.radius);
-    assert!(widest(&hasty) > widest(&whole));
+    let variance = |posterior: &Posterior| posterior.covariance().fixed_view::<3, 3>(0, 0).trace();
+    assert!(variance(&hasty) > variance(&whole));
 }
 
 #[test]

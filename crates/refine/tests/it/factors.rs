@@ -1,0 +1,104 @@
+//! Factors, and a problem of one's own made of them.
+
+use std::ops::ControlFlow;
+use std::sync::{Arc, LazyLock};
+
+use nalgebra::Vector6;
+use prehend_autodiff::optimize::LeastSquares;
+use prehend_refine::evaluate::metrics::{oe_deg, pe_cm};
+use prehend_refine::factor::{
+    ChamferDepthFactor, ChamferDepthSettings, ContactSettings, FreeSpaceFactor, FreeSpaceSettings,
+    GaussianPrior, HandDepthFactor, HandDepthSettings, PenetrationFactor, PenetrationSettings,
+    PointToPlaneFactor, PointToPlaneSettings, PriorSettings, RenderingFactor, RenderingSettings,
+    StabilityFactor, StabilitySettings, SupportFactor, SupportSettings, TactileFactor,
+    TactileSettings, TouchModel,
+};
+use prehend_refine::problem::{Block, NormalEquations, Problem, Solver, Termination};
+use prehend_refine::scene::{Scene, default_scene};
+use prehend_refine::{Factor, Frame, RefineError, State};
+
+static SCENE: LazyLock<Scene> = LazyLock::new(|| default_scene(1).unwrap());
+
+fn frame() -> Frame<'static> {
+    Frame::new(&SCENE.observation, &SCENE.object, Some(&SCENE.hand)).unwrap()
+}
+
+/// Twists about the object's center in which a radian counts as much as a tenth of a meter.
+const UNITS: [f64; 6] = [1.0, 1.0, 1.0, 10.0, 10.0, 10.0];
+
+fn all(frame: &Frame<'_>, state: &State) -> Result<Vec<Arc<dyn Factor>>, RefineError> {
+    let touch = TouchModel::Contacts(ContactSettings::default());
+    let contacts = TactileSettings { touch, ..TactileSettings::default() };
+    Ok(vec![
+        Arc::new(ChamferDepthFactor::new(frame, &ChamferDepthSettings::default())?),
+        Arc::new(FreeSpaceFactor::new(frame, &FreeSpaceSettings::default())),
+        Arc::new(HandDepthFactor::new(frame, &HandDepthSettings::default())?),
+        Arc::new(PenetrationFactor::new(frame, &PenetrationSettings::default())?),
+        Arc::new(PointToPlaneFactor::new(frame, &PointToPlaneSettings::default())?),
+        Arc::new(RenderingFactor::new(frame, &RenderingSettings::default())?),
+        Arc::new(StabilityFactor::new(frame, state, StabilitySettings::default())?),
+        Arc::new(SupportFactor::new(frame, &SupportSettings::default())?),
+        Arc::new(TactileFactor::new(frame, &TactileSettings::default())?),
+        Arc::new(TactileFactor::new(frame, &contacts)?),
+        Arc::new(GaussianPrior::independent(state.clone(), &PriorSettings::default())?),
+    ])
+}
+
+#[test]
+fn every_factor_falls_along_its_gradient_as_fast_as_it_says() {
+    let frame = frame();
+    let initial = State::new(&frame, &SCENE.initial).unwrap();
+    let blocks = [Block::ObjectPose];
+    let off = initial.retract(&blocks, &[2e-3, -1e-3, 1e-3, 0.02, 0.01, -0.03]);
+    for factor in all(&frame, &initial).unwrap() {
+        let mut equations = NormalEquations::new(&blocks);
+        let cost = factor.linearize(&off, &mut equations);
+        let name = factor.name();
+        assert!((cost - factor.cost(&off)).abs() <= 1e-9 * cost.abs(), "{name}: {cost}");
+        // The hand's depth says nothing of the object.
+        let gradient = Vector6::from_column_slice(equations.gradient().as_slice());
+        let units = Vector6::from(UNITS);
+        let steepest: Vector6<f64> = -gradient.component_mul(&units);
+        let Some(direction) = steepest.try_normalize(0.0) else {
+            assert_eq!(name, "hand-depth");
+            continue;
+        };
+        let step = direction.component_mul(&units) * 1e-7;
+        let at = |step: Vector6<f64>| factor.cost(&off.retract(&blocks, step.as_slice()));
+        let (fallen, promised) = (at(-step) - at(step), -2.0 * gradient.dot(&step));
+        // Point-to-plane leaves out what few points pull that were matched with faces that look away.
+        assert!((fallen / promised - 1.0).abs() < 0.05, "{name}: {fallen} {promised}");
+    }
+}
+
+/// Depth, touch and the hand's shape, with the hand's pose not quite known: the object and the hand are found together.
+#[test]
+fn a_problem_of_ones_own_is_solved() {
+    let frame = frame();
+    let state = State::new(&frame, &SCENE.initial).unwrap();
+    let blocks = vec![Block::ObjectPose, Block::HandPose];
+    let factors: Vec<Arc<dyn Factor>> = vec![
+        Arc::new(PointToPlaneFactor::new(&frame, &PointToPlaneSettings::default()).unwrap()),
+        Arc::new(TactileFactor::new(&frame, &TactileSettings::default()).unwrap()),
+        Arc::new(PenetrationFactor::new(&frame, &PenetrationSettings::default()).unwrap()),
+    ];
+    let prior = GaussianPrior::independent(state.clone(), &PriorSettings::default()).unwrap();
+    let problem = Problem::new(factors, blocks.clone()).with_prior(Arc::new(prior));
+    let start = problem.linearize(&state);
+    let solver = Solver { iterations: 50, min_decrease: 1e-6 };
+    let solution = problem.solve(start.clone(), &solver, |_| ControlFlow::Continue(()));
+    assert_ne!(solution.termination, Termination::Iterations);
+    let (before, after) = (&start.state.t_cam_object, &solution.at.state.t_cam_object);
+    let error = |pose| (pe_cm(pose, &SCENE.truth), oe_deg(pose, &SCENE.truth));
+    println!("{:?} → {:?} in {} steps", error(before), error(after), solution.iterations);
+    assert!(error(after).0 < 0.2 && error(after).0 < 0.5 * error(before).0);
+    assert!(solution.at.cost < start.cost && problem.cost(&solution.at.state) < start.cost);
+    // Little is left to gain, and what each factor has to say adds up.
+    let step = solution.at.gauss_newton_step().unwrap();
+    let left = -0.5 * step.dot(solution.at.equations.gradient());
+    assert!(left < 0.01 * (start.cost - solution.at.cost), "{left} nats");
+    let parts = solution.at.prior.iter().chain(&solution.at.factors);
+    let (names, costs): (Vec<_>, Vec<_>) = parts.map(|part| (part.name, part.cost)).unzip();
+    assert_eq!(names, ["prior", "point-to-plane", "touch", "penetration"]);
+    assert!((costs.iter().sum::<f64>() - solution.at.cost).abs() < 1e-9 * solution.at.cost);
+}
