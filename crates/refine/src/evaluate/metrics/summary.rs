@@ -1,6 +1,6 @@
 //! Means and medians over many poses.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
 
@@ -59,62 +59,36 @@ pub struct Summary {
 
 /// Summarizes rows; the order of the rows does not change medians, and means only in their last digits.
 pub fn summarize(rows: &[ScoredRow]) -> Summary {
-    let mut groups: BTreeMap<u32, Vec<&ScoredRow>> = BTreeMap::new();
-    for row in rows {
-        groups.entry(row.obj_id).or_default().push(row);
-    }
+    let statistics = |of: &dyn Fn(&&ScoredRow) -> bool| -> Statistics {
+        let values = |c: usize| rows.iter().filter(of).filter_map(move |r| r.score.values()[c]);
+        std::array::from_fn(|column| Statistic::of(values(column).collect()))
+    };
+    let ids: BTreeSet<u32> = rows.iter().map(|row| row.obj_id).collect();
     Summary {
         columns: COLUMNS,
-        overall: statistics(rows.iter()),
-        per_object: groups
-            .into_iter()
-            .map(|(id, rows)| (id, statistics(rows.into_iter())))
-            .collect(),
+        overall: statistics(&|_| true),
+        per_object: ids.into_iter().map(|id| (id, statistics(&|r| r.obj_id == id))).collect(),
     }
-}
-
-fn statistics<'a>(rows: impl Iterator<Item = &'a ScoredRow> + Clone) -> Statistics {
-    std::array::from_fn(|column| {
-        Statistic::of(rows.clone().filter_map(|r| r.score.values()[column]).collect())
-    })
-}
-
-/// Which average a table shows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Average {
-    /// Arithmetic means.
-    Mean,
-    /// Medians.
-    Median,
 }
 
 impl Summary {
-    /// A table with a line an object and one over all poses. Metrics that no pose has are left out; `name` gives the
-    /// label of an object id.
-    fn table(&self, average: Average, name: impl Fn(u32) -> String) -> Table {
+    /// A table of averages with a line an object and one over all poses. Metrics that no pose has are left out; `name` gives
+    /// the label of an object id.
+    fn table(
+        &self,
+        title: &str,
+        average: fn(&Statistic) -> f64,
+        name: impl Fn(u32) -> String,
+    ) -> Table {
         let shown: Vec<usize> = (0..COLUMNS.len()).filter(|&c| self.overall[c].is_some()).collect();
-        let cell = |s: &Option<Statistic>| match (s, average) {
-            (None, _) => "-".to_owned(),
-            (Some(s), Average::Mean) => format!("{:.3}", s.mean),
-            (Some(s), Average::Median) => format!("{:.3}", s.median),
-        };
         let line = |label: String, group: &Statistics| {
             let count = group.iter().flatten().map(|s| s.count).max().unwrap_or(0);
-            [label, count.to_string()]
-                .into_iter()
-                .chain(shown.iter().map(|&c| cell(&group[c])))
-                .collect()
+            let cell = |s: &Statistic| format!("{:.3}", average(s));
+            let cells = shown.iter().map(|&c| group[c].as_ref().map_or_else(|| "-".into(), cell));
+            [label, count.to_string()].into_iter().chain(cells).collect()
         };
-        let title = match average {
-            Average::Mean => "means",
-            Average::Median => "medians",
-        };
-        let header = [title, "n"]
-            .into_iter()
-            .chain(shown.iter().map(|&c| COLUMNS[c]))
-            .map(str::to_owned)
-            .collect();
-        let mut table = Table::new(header);
+        let mut table =
+            Table::new([title, "n"].into_iter().chain(shown.iter().map(|&c| COLUMNS[c])));
         for (&id, group) in &self.per_object {
             table.push(line(name(id), group));
         }
@@ -124,7 +98,9 @@ impl Summary {
 
     /// The tables of means and medians, one below the other.
     pub fn text(&self, name: impl Fn(u32) -> String) -> String {
-        format!("{}\n{}", self.table(Average::Mean, &name), self.table(Average::Median, &name))
+        let (means, medians) =
+            (self.table("means", |s| s.mean, &name), self.table("medians", |s| s.median, &name));
+        format!("{means}\n{medians}")
     }
 }
 

@@ -13,8 +13,8 @@ pub struct Table {
 
 impl Table {
     /// A table without rows.
-    pub fn new(header: Vec<String>) -> Self {
-        Self { header, rows: Vec::new() }
+    pub fn new<S: Into<String>>(header: impl IntoIterator<Item = S>) -> Self {
+        Self { header: header.into_iter().map(Into::into).collect(), rows: Vec::new() }
     }
 
     /// Appends a row; missing cells are printed empty, surplus ones are left out.
@@ -69,13 +69,13 @@ mod tests {
 
     #[test]
     fn columns_line_up_by_characters() {
-        let mut table = Table::new(vec!["object".into(), "IV cm³".into()]);
+        let mut table = Table::new(["object", "IV cm³"]);
         table.push(vec!["mug".into(), "0.5".into()]);
         table.push(vec!["a longer name".into(), "12.25".into(), "surplus".into()]);
         table.push(vec!["short".into()]);
         let expected = "object         IV cm³\n-------------  ------\nmug               0.5\na longer name   12.25\nshort\n";
         assert_eq!(table.to_string(), expected);
-        let mut table = Table::new(vec!["object".into(), "|ΔIV|".into()]);
+        let mut table = Table::new(["object", "|ΔIV|"]);
         table.push(vec!["mug".into()]);
         assert_eq!(table.markdown(), "| object | \\|ΔIV\\| |\n|---|--:|\n| mug |  |\n");
     }

@@ -4,25 +4,64 @@ use prehend_geometry::SplitMix64;
 use rayon::prelude::*;
 
 /// Resamples an interval is made of.
-pub(super) const REPLICATES: usize = 2000;
+const REPLICATES: usize = 2000;
 
-/// The mean of every column over each of [`REPLICATES`] resamples of the rows, drawn with replacement: the same rows for all
-/// columns, so that differences and ratios of columns are paired. Rows where a column has nothing do not count for it; a
-/// resample without any is NaN.
-///
-/// Equal columns and seeds give equal results, whatever the number of threads.
-pub(super) fn resampled_means(columns: &[Vec<Option<f64>>], seed: u64) -> Vec<Vec<f64>> {
-    let rows = columns.first().map_or(0, Vec::len);
-    let replicate = |r: usize| -> Vec<f64> {
-        let mut random = SplitMix64::new(seed ^ (r as u64).wrapping_mul(0xd134_2543_de82_ef95));
-        let mut counts = vec![0_u32; rows];
-        for _ in 0..rows {
-            counts[((random.uniform() * rows as f64) as usize).min(rows - 1)] += 1;
-        }
-        columns.iter().map(|column| weighted_mean(column, &counts)).collect()
-    };
-    let replicates: Vec<Vec<f64>> = (0..REPLICATES).into_par_iter().map(replicate).collect();
-    (0..columns.len()).map(|c| replicates.iter().map(|r| r[c]).collect()).collect()
+/// Resamples of rows, drawn with replacement: the same rows for all columns, so that differences and ratios of columns are
+/// paired.
+pub(super) struct Resamples {
+    /// How often each row was drawn, by resample.
+    counts: Vec<Vec<u32>>,
+}
+
+impl Resamples {
+    /// Resamples of so many rows: equal ones for equal seeds, whatever the number of threads.
+    pub(super) fn new(rows: usize, seed: u64) -> Self {
+        let replicate = |r: usize| {
+            let mut random = SplitMix64::new(seed ^ (r as u64).wrapping_mul(0xd134_2543_de82_ef95));
+            let mut counts = vec![0_u32; rows];
+            for _ in 0..rows {
+                counts[((random.uniform() * rows as f64) as usize).min(rows - 1)] += 1;
+            }
+            counts
+        };
+        Self { counts: (0..REPLICATES).into_par_iter().map(replicate).collect() }
+    }
+
+    /// The mean of a column over each resample. Rows where it has nothing do not count; a resample without any is NaN.
+    pub(super) fn means(&self, column: &[Option<f64>]) -> Vec<f64> {
+        self.counts.par_iter().map(|counts| weighted_mean(column, counts)).collect()
+    }
+
+    /// Two columns over the rows that both have; `None` if there is none.
+    pub(super) fn pair(&self, columns: [&[Option<f64>]; 2]) -> Option<Pair> {
+        let both = || columns[0].iter().zip(columns[1]).map(|(a, b)| a.zip(*b));
+        let n = both().flatten().count();
+        let columns: [Vec<Option<f64>>; 2] =
+            [both().map(|b| Some(b?.0)).collect(), both().map(|b| Some(b?.1)).collect()];
+        let mean = |column: &Vec<Option<f64>>| column.iter().flatten().sum::<f64>() / n as f64;
+        (n > 0).then(|| Pair {
+            n,
+            means: columns.each_ref().map(mean),
+            resampled: columns.each_ref().map(|column| self.means(column)),
+        })
+    }
+}
+
+/// Two columns over the rows that both have.
+pub(super) struct Pair {
+    /// Number of rows.
+    pub(super) n: usize,
+    /// Arithmetic means.
+    pub(super) means: [f64; 2],
+    resampled: [Vec<f64>; 2],
+}
+
+impl Pair {
+    /// The [`interval`] of a function of both means.
+    pub(super) fn interval(&self, of: impl Fn(f64, f64) -> f64) -> Option<[f64; 2]> {
+        let [first, second] = &self.resampled;
+        interval(&first.iter().zip(second).map(|(&a, &b)| of(a, b)).collect::<Vec<_>>())
+    }
 }
 
 fn weighted_mean(column: &[Option<f64>], counts: &[u32]) -> f64 {
@@ -67,10 +106,10 @@ mod tests {
     #[test]
     fn the_mean_of_coins_is_binomial() {
         // 40 of 100: the mean of a resample is Binomial(100, 0.4)/100, whose 2.5 % and 97.5 % quantiles are 0.31 and 0.50.
-        let means = resampled_means(&[column(100, |i| f64::from(u8::from(i < 40)))], 1);
-        let [low, high] = interval(&means[0]).unwrap();
+        let means = Resamples::new(100, 1).means(&column(100, |i| f64::from(u8::from(i < 40))));
+        let [low, high] = interval(&means).unwrap();
         assert!((low - 0.31).abs() < 0.011 && (high - 0.50).abs() < 0.011, "{low} {high}");
-        let mean = means[0].iter().sum::<f64>() / REPLICATES as f64;
+        let mean = means.iter().sum::<f64>() / REPLICATES as f64;
         // Its standard error is √(0.24/100/2000) = 0.0011.
         assert!((mean - 0.4).abs() < 0.004, "{mean}");
     }
@@ -82,35 +121,39 @@ mod tests {
         let mean = sample.iter().sum::<f64>() / 400.0;
         let variance = sample.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / 399.0;
         let half = 1.96 * (variance / 400.0).sqrt();
-        let means = resampled_means(&[sample.into_iter().map(Some).collect()], 2);
-        let [low, high] = interval(&means[0]).unwrap();
+        let means = Resamples::new(400, 2).means(&column(400, |i| sample[i]));
+        let [low, high] = interval(&means).unwrap();
         assert!((low - (mean - half)).abs() < 0.1 * half, "{low} {}", mean - half);
         assert!((high - (mean + half)).abs() < 0.1 * half, "{high} {}", mean + half);
     }
 
     #[test]
     fn columns_are_paired_and_gaps_left_out() {
+        let resamples = Resamples::new(30, 3);
         let one = column(30, |i| 1.0 + i as f64);
-        let half = column(30, |i| 0.5 * (1.0 + i as f64));
+        let mut half = column(30, |i| 0.5 * (1.0 + i as f64));
+        half[7] = None;
+        let pair = resamples.pair([&one, &half]).unwrap();
+        assert!(pair.n == 29 && (pair.means[1] / pair.means[0] - 0.5).abs() < 1e-15);
+        let [low, high] = pair.interval(|a, b| b / a).unwrap();
+        assert!((low - 0.5).abs() < 1e-15 && (high - 0.5).abs() < 1e-15);
+        assert!(resamples.pair([&one, &[None; 30]]).is_none());
         let mut gaps = column(30, |_| 7.0);
         gaps[3..].fill(None);
-        let means = resampled_means(&[one, half, gaps], 3);
-        assert!(means[0].iter().zip(&means[1]).all(|(a, b)| (b / a - 0.5).abs() < 1e-15));
-        assert_eq!(interval(&means[2]), Some([7.0, 7.0]));
+        let means = resamples.means(&gaps);
+        assert_eq!(interval(&means), Some([7.0, 7.0]));
         // All three rows are missed by (27/30)³⁰ = 4 % of the resamples.
-        let missed = means[2].iter().filter(|m| m.is_nan()).count();
+        let missed = means.iter().filter(|m| m.is_nan()).count();
         assert!((60..110).contains(&missed), "{missed}");
-        assert!(resampled_means(&[], 0).is_empty());
     }
 
     #[test]
     fn threads_do_not_matter_and_seeds_do() {
-        let columns = [column(20, |i| i as f64)];
         let with = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| resampled_means(&columns, 9))
+            pool.install(|| Resamples::new(20, 9).counts)
         };
         assert_eq!(with(1), with(3));
-        assert_ne!(with(1), resampled_means(&columns, 10));
+        assert_ne!(with(1), Resamples::new(20, 10).counts);
     }
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::bootstrap::{interval, resampled_means};
+use super::bootstrap::{Resamples, interval};
 use super::chi_square::chi_square_cdf;
 use super::design::Design;
 use super::kind::Kind;
@@ -65,11 +65,12 @@ pub(super) struct RootMeanSquare {
 }
 
 impl RootMeanSquare {
-    fn new(of: &'static str, found: Vec<f64>, bounds: &[f64]) -> Self {
+    /// Of errors, each with its bound.
+    fn new(of: &'static str, errors: impl Iterator<Item = (f64, f64)>) -> Self {
         let root = |of: &[f64]| (of.iter().map(|v| v * v).sum::<f64>() / of.len() as f64).sqrt();
-        let (bound, mut sorted) = (root(bounds), found);
+        let (mut sorted, bounds): (Vec<f64>, Vec<f64>) = errors.unzip();
         sorted.sort_by(f64::total_cmp);
-        Self { of, found: root(&sorted), median: sorted[sorted.len() / 2], bound }
+        Self { of, found: root(&sorted), median: sorted[sorted.len() / 2], bound: root(&bounds) }
     }
 }
 
@@ -132,16 +133,14 @@ pub(super) fn posteriors<'a>(
     of_level.filter_map(|r| r.outcome(method)?.belief.as_ref()).collect()
 }
 
-/// Probability content of the smallest ellipsoids that contain the truth, sorted: uniform for a calibrated posterior. Infinite for a
+/// Probability content of the smallest ellipsoids that contain the truth: uniform for a calibrated posterior. Infinite for a
 /// singular covariance.
-pub(super) fn ellipsoid_levels(posteriors: &[&PredictedPosterior], of: usize) -> Vec<f64> {
-    let degrees = ELLIPSOIDS[of].1;
-    let mut found: Vec<f64> = posteriors
-        .iter()
-        .map(|b| b.squared[of].map_or(f64::INFINITY, |s| chi_square_cdf(s, degrees)))
-        .collect();
-    found.sort_by(f64::total_cmp);
-    found
+pub(super) fn ellipsoid_levels<'a>(
+    posteriors: &'a [&PredictedPosterior],
+    of: usize,
+) -> impl Iterator<Item = f64> + 'a {
+    let level = move |squared| chi_square_cdf(squared, ELLIPSOIDS[of].1);
+    posteriors.iter().map(move |b| b.squared[of].map_or(f64::INFINITY, level))
 }
 
 impl Calibration {
@@ -179,13 +178,11 @@ impl Calibration {
             errors: [
                 RootMeanSquare::new(
                     "place mm",
-                    posteriors.iter().map(|b| b.distance_mm).collect(),
-                    &posteriors.iter().map(|b| b.bounds[0]).collect::<Vec<_>>(),
+                    posteriors.iter().map(|b| (b.distance_mm, b.bounds[0])),
                 ),
                 RootMeanSquare::new(
                     "orientation °",
-                    posteriors.iter().map(|b| b.angle_deg).collect(),
-                    &posteriors.iter().map(|b| b.bounds[1]).collect::<Vec<_>>(),
+                    posteriors.iter().map(|b| (b.angle_deg, b.bounds[1])),
                 ),
             ],
             coverage: coverage(&posteriors),
@@ -208,70 +205,24 @@ impl Calibration {
 }
 
 fn coverage(posteriors: &[&PredictedPosterior]) -> Vec<Coverage> {
-    let each = || (0..ELLIPSOIDS.len()).flat_map(|of| NOMINAL.map(|nominal| (of, nominal)));
-    let column = |(of, nominal): (usize, f64)| -> Vec<Option<f64>> {
-        let probability = |b: &&PredictedPosterior| {
-            b.squared[of].map_or(f64::INFINITY, |s| chi_square_cdf(s, ELLIPSOIDS[of].1))
-        };
-        posteriors.iter().map(|b| Some(f64::from(u8::from(probability(b) <= nominal)))).collect()
-    };
-    let columns: Vec<Vec<Option<f64>>> = each().map(column).collect();
-    let means = resampled_means(&columns, SEED);
-    each()
-        .zip(columns.iter().zip(&means))
-        .map(|((of, nominal), (column, means))| Coverage {
+    let resamples = Resamples::new(posteriors.len(), SEED);
+    let share = |of: usize, nominal: f64| {
+        let within: Vec<Option<f64>> = ellipsoid_levels(posteriors, of)
+            .map(|level| Some(f64::from(u8::from(level <= nominal))))
+            .collect();
+        Coverage {
             of: ELLIPSOIDS[of].0,
             nominal,
-            share: column.iter().flatten().sum::<f64>() / column.len() as f64,
-            interval: interval(means),
-        })
-        .collect()
-}
-
-/// All numbers as CSV, one per line.
-pub(super) fn csv(calibrations: &[Calibration]) -> Result<Vec<u8>, ::csv::Error> {
-    let mut out = ::csv::Writer::from_writer(Vec::new());
-    out.write_record(["level", "method", "n", "what", "of", "value", "low", "high"])?;
-    for c in calibrations {
-        let mut line = |what: &str, of: &str, value: f64, interval: Option<[f64; 2]>| {
-            let end = |k: usize| interval.map_or_else(String::new, |i| i[k].to_string());
-            out.write_record([
-                c.level.as_deref().unwrap_or(""),
-                &c.method,
-                &c.n.to_string(),
-                what,
-                of,
-                &value.to_string(),
-                &end(0),
-                &end(1),
-            ])
-        };
-        for error in &c.errors {
-            line("root mean square", error.of, error.found, None)?;
-            line("median", error.of, error.median, None)?;
-            line("bound", error.of, error.bound, None)?;
+            share: within.iter().flatten().sum::<f64>() / within.len() as f64,
+            interval: interval(&resamples.means(&within)),
         }
-        for part in &c.coverage {
-            let what = format!("coverage of {} %", 100.0 * part.nominal);
-            line(&what, part.of, part.share, part.interval)?;
-        }
-        for event in &c.events {
-            line("predicted", event.event, event.predicted, None)?;
-            line("share", event.event, event.share, None)?;
-            line("calibration error", event.event, event.calibration_error, None)?;
-            line("calibration error by chance", event.event, event.by_chance, None)?;
-            line("brier", event.event, event.brier, None)?;
-        }
-        line("failures", "", c.failures as f64, None)?;
-        if let Some(auroc) = c.auroc {
-            line("auroc", "failures", auroc, c.auroc_interval)?;
-        }
-    }
-    out.into_inner().map_err(|e| e.into_error().into())
+    };
+    (0..ELLIPSOIDS.len()).flat_map(|of| NOMINAL.map(|nominal| share(of, nominal))).collect()
 }
 
 #[cfg(test)]
 pub(super) mod tests {
+    use super::super::csv::calibration_csv;
     use super::super::design::MethodSettings;
     use super::super::tables::tests::example;
     use super::*;
@@ -354,7 +305,7 @@ pub(super) mod tests {
         let event = &found[2].events[0];
         assert!(event.calibration_error > 0.4 && event.by_chance == 0.0);
         assert_eq!(found[2].auroc, Some(0.5));
-        let text = String::from_utf8(csv(&found).unwrap()).unwrap();
+        let text = String::from_utf8(calibration_csv(&found).unwrap()).unwrap();
         assert_eq!(text.lines().count(), 1 + 3 * (6 + 9 + 7 * 5 + 2));
         assert!(text.contains("\n,combined,400,auroc,failures,0.5,"), "{text}");
         assert!(text.contains("\nlow,combined,200,coverage of 95 %,place,0,0,0\n"), "{text}");

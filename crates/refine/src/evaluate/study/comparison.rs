@@ -2,9 +2,9 @@
 
 use serde::Serialize;
 
-use super::bootstrap::{interval, resampled_means};
-use super::record::FrameRecord;
-use crate::evaluate::metrics::{COLUMNS, Statistic};
+use super::bootstrap::Resamples;
+use super::record::{FrameRecord, column};
+use crate::evaluate::metrics::COLUMNS;
 
 /// Seed of the resampling.
 const SEED: u64 = 2;
@@ -37,43 +37,26 @@ pub(super) struct Contrast {
 
 /// Compares `pairs` of rows over some records.
 pub(super) fn comparisons(pairs: &[(String, String)], records: &[&FrameRecord]) -> Vec<Comparison> {
-    let column = |row: &str, metric: usize| -> Vec<Option<f64>> {
-        records.iter().map(|r| r.outcome(row)?.score?.values()[metric]).collect()
-    };
-    let mut columns: Vec<Vec<Option<f64>>> = Vec::new();
-    for (row, reference) in pairs {
-        for metric in 0..COLUMNS.len() {
-            let both = column(row, metric).into_iter().zip(column(reference, metric));
-            let both: Vec<Option<(f64, f64)>> = both.map(|(a, b)| a.zip(b)).collect();
-            columns.push(both.iter().map(|both| both.map(|b| b.0)).collect());
-            columns.push(both.iter().map(|both| both.map(|b| b.1)).collect());
-        }
-    }
-    let means = resampled_means(&columns, SEED);
-    let contrast = |at: usize| -> Option<Contrast> {
-        let mean = |k: usize| Statistic::of(columns[k].iter().flatten().copied().collect());
-        let (own, other) = (mean(at)?, mean(at + 1)?);
-        let resampled = || means[at].iter().zip(&means[at + 1]);
-        let differences: Vec<f64> = resampled().map(|(a, b)| a - b).collect();
-        let ratios: Vec<f64> = resampled().map(|(a, b)| a / b).collect();
-        let ratio = Some(own.mean / other.mean).filter(|r| r.is_finite());
+    let resamples = Resamples::new(records.len(), SEED);
+    let contrast = |row: &str, reference: &str, metric: usize| -> Option<Contrast> {
+        let columns = [row, reference].map(|row| column(records, row, metric));
+        let pair = resamples.pair(columns.each_ref().map(Vec::as_slice))?;
+        let [own, other] = pair.means;
+        let ratio = Some(own / other).filter(|r| r.is_finite());
         Some(Contrast {
-            n: own.count,
-            difference: own.mean - other.mean,
-            difference_interval: interval(&differences),
+            n: pair.n,
+            difference: own - other,
+            difference_interval: pair.interval(|own, other| own - other),
             ratio,
-            ratio_interval: ratio.and_then(|_| interval(&ratios)),
+            ratio_interval: ratio.and_then(|_| pair.interval(|own, other| own / other)),
         })
     };
-    pairs
-        .iter()
-        .enumerate()
-        .map(|(k, (row, reference))| Comparison {
-            row: row.clone(),
-            reference: reference.clone(),
-            metrics: std::array::from_fn(|m| contrast(2 * (k * COLUMNS.len() + m))),
-        })
-        .collect()
+    let compare = |(row, reference): &(String, String)| Comparison {
+        row: row.clone(),
+        reference: reference.clone(),
+        metrics: std::array::from_fn(|metric| contrast(row, reference, metric)),
+    };
+    pairs.iter().map(compare).collect()
 }
 
 #[cfg(test)]

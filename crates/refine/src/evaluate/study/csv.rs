@@ -1,40 +1,19 @@
-//! All numbers of a study's tables, one a line.
+//! All numbers of a study, one a line.
 
 use std::fmt::Display;
 
+use super::calibration::Calibration;
 use super::tables::Tables;
 
-const HEADER: [&str; 23] = [
-    "study",
-    "level",
-    "object",
-    "row",
-    "metric",
-    "frames",
-    "n",
-    "mean",
-    "mean_low",
-    "mean_high",
-    "median",
-    "change_percent",
-    "change_low",
-    "change_high",
-    "published_mean",
-    "reference",
-    "difference",
-    "difference_low",
-    "difference_high",
-    "ratio",
-    "ratio_low",
-    "ratio_high",
-    "note",
-];
+const COLUMNS: &str = "study,level,object,row,metric,frames,n,mean,mean_low,mean_high,median,\
+    change_percent,change_low,change_high,published_mean,reference,difference,difference_low,\
+    difference_high,ratio,ratio_low,ratio_high,note";
 
 /// The tables as CSV. A row that is compared with another one has that one's name, the difference of their means over the
 /// frames that have both, and their ratio. `object` is empty over all objects; failures come last, with their reason as the note.
 pub(super) fn csv(tables: &Tables) -> Result<Vec<u8>, ::csv::Error> {
     let mut out = ::csv::Writer::from_writer(Vec::new());
-    out.write_record(HEADER)?;
+    out.write_record(COLUMNS.split(','))?;
     let study = tables.study.name();
     for table in &tables.all {
         for row in &table.rows {
@@ -79,14 +58,54 @@ pub(super) fn csv(tables: &Tables) -> Result<Vec<u8>, ::csv::Error> {
         }
     }
     for failure in &tables.failures {
-        let mut record = vec![String::new(); HEADER.len()];
-        record[0] = study.into();
-        record[1].clone_from(&failure.level);
-        record[2] = text(failure.object);
-        record[3] = failure.rows.join(" ");
-        record[4] = "failed".into();
-        record[HEADER.len() - 1] = format!("{}: {}", failure.frame, failure.reason);
-        out.write_record(record)?;
+        let (object, rows) = (text(failure.object), failure.rows.join(" "));
+        let named = [study, &failure.level, &object, &rows, "failed"];
+        let reason = format!("{}: {}", failure.frame, failure.reason);
+        let empty = COLUMNS.split(',').count() - named.len() - 1;
+        let cells = named.into_iter().chain(std::iter::repeat_n("", empty)).chain([&*reason]);
+        out.write_record(cells)?;
+    }
+    out.into_inner().map_err(|e| e.into_error().into())
+}
+
+/// All numbers of calibrations as CSV, one a line.
+pub(super) fn calibration_csv(calibrations: &[Calibration]) -> Result<Vec<u8>, ::csv::Error> {
+    let mut out = ::csv::Writer::from_writer(Vec::new());
+    out.write_record(["level", "method", "n", "what", "of", "value", "low", "high"])?;
+    for c in calibrations {
+        let mut line = |what: &str, of: &str, value: f64, interval: Option<[f64; 2]>| {
+            let [low, high] = ends(interval);
+            out.write_record([
+                c.level.as_deref().unwrap_or(""),
+                &c.method,
+                &c.n.to_string(),
+                what,
+                of,
+                &value.to_string(),
+                &low,
+                &high,
+            ])
+        };
+        for error in &c.errors {
+            line("root mean square", error.of, error.found, None)?;
+            line("median", error.of, error.median, None)?;
+            line("bound", error.of, error.bound, None)?;
+        }
+        for part in &c.coverage {
+            let what = format!("coverage of {} %", 100.0 * part.nominal);
+            line(&what, part.of, part.share, part.interval)?;
+        }
+        for event in &c.events {
+            line("predicted", event.event, event.predicted, None)?;
+            line("share", event.event, event.share, None)?;
+            line("calibration error", event.event, event.calibration_error, None)?;
+            line("calibration error by chance", event.event, event.by_chance, None)?;
+            line("brier", event.event, event.brier, None)?;
+        }
+        line("failures", "", c.failures as f64, None)?;
+        if let Some(auroc) = c.auroc {
+            line("auroc", "failures", auroc, c.auroc_interval)?;
+        }
     }
     out.into_inner().map_err(|e| e.into_error().into())
 }

@@ -4,22 +4,11 @@ use super::calibration::Calibration;
 use super::comparison::{Comparison, Contrast};
 use super::kind::{INITIAL, Kind, TRUTH};
 use super::published::Published;
-use super::tables::{ERRORS, Row, Table, Tables};
+use super::tables::{ERRORS, Estimate, Row, Table, Tables};
 use crate::evaluate::metrics::{COLUMNS, Table as TextTable};
 
 /// The metrics of the paper, and the orientation error up to symmetry; the others are in the CSV and JSON files.
 const SHOWN: [usize; 7] = [0, 1, 2, 7, 8, 9, 10];
-
-/// A heading and what is below it.
-struct Section {
-    title: String,
-    body: Body,
-}
-
-enum Body {
-    Table(TextTable),
-    List(Vec<String>),
-}
 
 /// The document as plain text.
 pub(super) fn text(tables: &Tables) -> String {
@@ -34,46 +23,12 @@ pub(super) fn markdown(tables: &Tables) -> String {
 /// The document with `marks` before its title and its headings.
 fn document(tables: &Tables, marks: [&str; 2], print: fn(&TextTable) -> String) -> String {
     let mut out = format!("{}{}\n", marks[0], tables.study.title());
-    for Section { title, body } in sections(tables) {
-        out += &format!("\n{}{title}\n\n", marks[1]);
-        match body {
-            Body::Table(table) => out += &print(&table),
-            Body::List(items) => items.iter().for_each(|item| out += &format!("- {item}\n")),
-        }
-    }
-    out
-}
-
-fn sections(tables: &Tables) -> Vec<Section> {
-    let mut sections = Vec::new();
-    let mut add = |title: String, body: Body| sections.push(Section { title, body });
+    let mut add = |title: String, body: String| out += &format!("\n{}{title}\n\n{body}", marks[1]);
     for table in tables.overall() {
-        let (level, frames) = (&table.level, table.frames);
-        add(
-            format!("Noise {level}: means over {frames} frames [95 % confidence]"),
-            Body::Table(means(tables.study, table)),
-        );
-        add(format!("Noise {level}: medians"), Body::Table(medians(tables.study, table)));
-        add(
-            format!(
-                "Noise {level}: change of the mean against the initial pose, % [95 % confidence]"
-            ),
-            Body::Table(changes(tables.study, table)),
-        );
-        for (heading, table) in comparisons(tables.study, table) {
-            add(format!("Noise {level}: {heading}"), Body::Table(table));
-        }
         let objects: Vec<&Table> =
-            tables.all.iter().filter(|b| b.level == *level && b.object.is_some()).collect();
-        // Of many faults times many objects nobody reads a table.
-        if objects.len() > 1 && tables.study != Kind::Robustness {
-            let means = by_object(tables.study, table, &objects);
-            add(format!("Noise {level}: means by object"), Body::Table(means));
-            if let Some(against) = against(tables.study, table) {
-                let heading = format!("mean over that of {against} by object, same frames");
-                let ratios = ratios_by_object(tables.study, table, &objects);
-                add(format!("Noise {level}: {heading} [95 % confidence]"), Body::Table(ratios));
-            }
+            tables.all.iter().filter(|b| b.level == table.level && b.object.is_some()).collect();
+        for (title, body) in of_level(tables.study, table, &objects) {
+            add(format!("Noise {}: {title}", table.level), print(&body));
         }
     }
     for calibration in &tables.calibrations {
@@ -82,21 +37,95 @@ fn sections(tables: &Tables) -> Vec<Section> {
             "{label}: % of {} true poses within ellipsoids of the posterior [95 % confidence]",
             calibration.n
         );
-        add(title, Body::Table(coverage(calibration)));
+        add(title, print(&coverage(calibration)));
         add(
             format!("{label}: errors and what the information in the frames allows"),
-            Body::Table(errors(calibration)),
+            print(&errors(calibration)),
         );
-        add(format!("{label}: predicted probabilities"), Body::Table(events(calibration)));
-        add(format!("{label}: failures"), Body::List(vec![failures(calibration)]));
+        add(format!("{label}: predicted probabilities"), print(&events(calibration)));
+        add(format!("{label}: failures"), format!("- {}\n", failures(calibration)));
     }
-    let failed: Vec<String> = tables.failures.iter().map(|f| f.sentence()).collect();
-    if failed.is_empty() {
-        add("Failed".into(), Body::List(vec!["nothing".into()]));
-    } else {
-        add(format!("Failed: {}", failed.len()), Body::List(failed));
+    let failed: String = tables.failures.iter().map(|f| format!("- {}\n", f.sentence())).collect();
+    match tables.failures.len() {
+        0 => add("Failed".into(), "- nothing\n".into()),
+        count => add(format!("Failed: {count}"), failed),
     }
-    sections
+    out
+}
+
+/// The tables of a level of noise, with their headings: of `table`, which is over all objects, and of each of `objects`.
+fn of_level(study: Kind, table: &Table, objects: &[&Table]) -> Vec<(String, TextTable)> {
+    // Of many faults times many objects nobody reads a table.
+    let objects = if objects.len() > 1 && study != Kind::Robustness { objects } else { &[] };
+    let name = |row: &str| row_label(study, row);
+    let name_of_object = |object: &Table, row: &str| {
+        format!("object {}: {}", object.object.unwrap_or(0), row_label(study, row))
+    };
+    let shown = present(table, &SHOWN);
+    let errors: Vec<usize> = shown.iter().copied().filter(|m| ERRORS.contains(m)).collect();
+
+    let mut means = Lines::new("mean", &shown);
+    let mut medians = Lines::new("median", &shown);
+    for row in &table.rows {
+        means.add_row(name(&row.name), table, row, |e| {
+            Some(with_interval(number, e.mean, e.interval))
+        });
+        means.add_published(row.published, |v| format!("{v:.2}"));
+        medians.add_row(name(&row.name), table, row, |e| Some(number(e.median)));
+    }
+    let mut changes = Lines::new("change %", &errors);
+    for row in table.rows.iter().filter(|r| r.name != TRUTH && r.name != INITIAL) {
+        changes.add_row(name(&row.name), table, row, |e| {
+            let change = e.change?;
+            Some(with_interval(|v| format!("{v:+.1}"), change.percent, change.interval))
+        });
+        changes.add_published(row.published_change, |v| format!("{v:+.0}"));
+    }
+    let mut out = vec![
+        (format!("means over {} frames [95 % confidence]", table.frames), means.table),
+        ("medians".to_owned(), medians.table),
+        (
+            "change of the mean against the initial pose, % [95 % confidence]".to_owned(),
+            changes.table,
+        ),
+    ];
+
+    let against = table.comparisons.first().map(|first| match study {
+        Kind::Robustness => study.reference().unwrap_or_default(),
+        _ => first.reference.as_str(),
+    });
+    if let Some(against) = against {
+        let mut differences = Lines::new("difference", &errors);
+        let mut ratios = Lines::new("ratio", &errors);
+        for comparison in &table.comparisons {
+            differences.add_comparison(name(&comparison.row), table, comparison, difference);
+            ratios.add_comparison(name(&comparison.row), table, comparison, ratio);
+        }
+        let heading =
+            |what: &str| format!("mean {what} that of {against}, same frames [95 % confidence]");
+        out.extend([(heading("less"), differences.table), (heading("over"), ratios.table)]);
+    }
+    if objects.is_empty() {
+        return out;
+    }
+    let mut means = Lines::new("mean", &shown);
+    let mut ratios = Lines::new("ratio", &errors);
+    for object in objects {
+        for row in &object.rows {
+            let label = name_of_object(object, &row.name);
+            means.add_row(label, object, row, |e| Some(number(e.mean)));
+        }
+        for comparison in &object.comparisons {
+            let label = name_of_object(object, &comparison.row);
+            ratios.add_comparison(label, object, comparison, ratio);
+        }
+    }
+    out.push(("means by object".into(), means.table));
+    if let Some(against) = against {
+        let title = format!("mean over that of {against} by object, same frames [95 % confidence]");
+        out.push((title, ratios.table));
+    }
+    out
 }
 
 /// How tables and plots call a row.
@@ -115,161 +144,73 @@ fn present(table: &Table, candidates: &[usize]) -> Vec<usize> {
     candidates.iter().copied().filter(has).collect()
 }
 
-fn text_table(first: &str, metrics: &[usize]) -> TextTable {
-    let names = metrics.iter().map(|&m| COLUMNS[m]);
-    TextTable::new([first, "n"].into_iter().chain(names).map(str::to_owned).collect())
+/// A table of some metrics.
+struct Lines<'a> {
+    metrics: &'a [usize],
+    table: TextTable,
 }
 
-fn ours(
-    label: String,
-    row: &Row,
-    frames: usize,
-    metrics: &[usize],
-    cell: impl Fn(usize) -> Option<String>,
-) -> Vec<String> {
-    let cells = metrics.iter().map(|&m| cell(m).unwrap_or_else(|| "-".into()));
-    [label, format!("{}/{frames}", row.n)].into_iter().chain(cells).collect()
-}
+impl<'a> Lines<'a> {
+    fn new(first: &'static str, metrics: &'a [usize]) -> Self {
+        let names = metrics.iter().map(|&m| COLUMNS[m]);
+        Self { metrics, table: TextTable::new([first, "n"].into_iter().chain(names)) }
+    }
 
-/// A row of published figures, below ours.
-fn theirs(values: &Published, metrics: &[usize], show: impl Fn(f64) -> String) -> Vec<String> {
-    let cells = metrics.iter().map(|&m| values[m].map_or_else(|| "-".into(), &show));
-    ["· published".to_owned(), String::new()].into_iter().chain(cells).collect()
-}
+    fn add(&mut self, label: String, frames: String, cell: impl Fn(usize) -> Option<String>) {
+        let cells = self.metrics.iter().map(|&m| cell(m).unwrap_or_else(|| "-".into()));
+        self.table.push([label, frames].into_iter().chain(cells).collect());
+    }
 
-fn means(study: Kind, table: &Table) -> TextTable {
-    let metrics = present(table, &SHOWN);
-    let mut out = text_table("mean", &metrics);
-    for row in &table.rows {
-        let cell = |m: usize| {
-            let estimate = row.metrics[m].as_ref()?;
-            Some(with_interval(number(estimate.mean), estimate.interval.map(|i| i.map(number))))
-        };
-        out.push(ours(row_label(study, &row.name), row, table.frames, &metrics, cell));
-        if let Some(published) = &row.published {
-            out.push(theirs(published, &metrics, |v| format!("{v:.2}")));
+    fn add_row(
+        &mut self,
+        label: String,
+        table: &Table,
+        row: &Row,
+        cell: impl Fn(&Estimate) -> Option<String>,
+    ) {
+        self.add(label, format!("{}/{}", row.n, table.frames), |m| cell(row.metrics[m].as_ref()?));
+    }
+
+    /// A row of published figures, below ours.
+    fn add_published(&mut self, values: Option<Published>, show: impl Fn(f64) -> String) {
+        if let Some(values) = values {
+            self.add("· published".into(), String::new(), |m| values[m].map(&show));
         }
     }
-    out
-}
 
-fn medians(study: Kind, table: &Table) -> TextTable {
-    let metrics = present(table, &SHOWN);
-    let mut out = text_table("median", &metrics);
-    for row in &table.rows {
-        let cell = |m: usize| row.metrics[m].map(|e| number(e.median));
-        out.push(ours(row_label(study, &row.name), row, table.frames, &metrics, cell));
+    fn add_comparison(
+        &mut self,
+        label: String,
+        table: &Table,
+        comparison: &Comparison,
+        cell: impl Fn(&Contrast) -> Option<String>,
+    ) {
+        let n = comparison.metrics.iter().flatten().map(|c| c.n).max().unwrap_or(0);
+        let cell = |m: usize| cell(comparison.metrics[m].as_ref()?);
+        self.add(label, format!("{n}/{}", table.frames), cell);
     }
-    out
 }
 
-fn changes(study: Kind, table: &Table) -> TextTable {
-    let metrics = errors_present(table);
-    let mut out = text_table("change %", &metrics);
-    for row in table.rows.iter().filter(|r| r.name != TRUTH && r.name != INITIAL) {
-        let cell = |m: usize| {
-            let change = row.metrics[m].as_ref()?.change?;
-            let show = |v: f64| format!("{v:+.1}");
-            Some(with_interval(show(change.percent), change.interval.map(|i| i.map(show))))
-        };
-        out.push(ours(row_label(study, &row.name), row, table.frames, &metrics, cell));
-        if let Some(published) = &row.published_change {
-            out.push(theirs(published, &metrics, |v| format!("{v:+.0}")));
-        }
-    }
-    out
-}
-
-/// What rows of the table are compared with, frame by frame, if anything.
-fn against(study: Kind, table: &Table) -> Option<&str> {
-    let first = table.comparisons.first()?;
-    Some(match study {
-        Kind::Robustness => study.reference().unwrap_or_default(),
-        _ => first.reference.as_str(),
-    })
-}
-
-/// The errors that any row of the table has.
-fn errors_present(table: &Table) -> Vec<usize> {
-    let errors: Vec<usize> = SHOWN.into_iter().filter(|m| ERRORS.contains(m)).collect();
-    present(table, &errors)
-}
-
-/// Differences and ratios of the means of rows that are compared frame by frame.
-fn comparisons(study: Kind, table: &Table) -> Vec<(String, TextTable)> {
-    let Some(against) = against(study, table) else { return Vec::new() };
-    let metrics = errors_present(table);
-    let make = |name: &str, cell: &dyn Fn(&Contrast) -> Option<String>| {
-        let mut out = text_table(name, &metrics);
-        for comparison in &table.comparisons {
-            out.push(compared(
-                row_label(study, &comparison.row),
-                comparison,
-                table,
-                &metrics,
-                cell,
-            ));
-        }
-        out
-    };
-    let difference = |c: &Contrast| {
-        let show = |v: f64| if v < 0.0 { number(v) } else { format!("+{}", number(v)) };
-        Some(with_interval(show(c.difference), c.difference_interval.map(|i| i.map(show))))
-    };
-    let heading =
-        |what: &str| format!("mean {what} that of {against}, same frames [95 % confidence]");
-    vec![
-        (heading("less"), make("difference", &difference)),
-        (heading("over"), make("ratio", &ratio)),
-    ]
-}
-
-fn ratios_by_object(study: Kind, whole: &Table, objects: &[&Table]) -> TextTable {
-    let metrics = errors_present(whole);
-    let mut out = text_table("ratio", &metrics);
-    for table in objects {
-        let object = table.object.unwrap_or(0);
-        for comparison in &table.comparisons {
-            let label = format!("object {object}: {}", row_label(study, &comparison.row));
-            out.push(compared(label, comparison, table, &metrics, &ratio));
-        }
-    }
-    out
-}
-
-fn compared(
-    label: String,
-    comparison: &Comparison,
-    table: &Table,
-    metrics: &[usize],
-    cell: &dyn Fn(&Contrast) -> Option<String>,
-) -> Vec<String> {
-    let n = comparison.metrics.iter().flatten().map(|c| c.n).max().unwrap_or(0);
-    let cells = metrics
-        .iter()
-        .map(|&m| comparison.metrics[m].as_ref().and_then(cell).unwrap_or_else(|| "-".into()));
-    [label, format!("{n}/{}", table.frames)].into_iter().chain(cells).collect()
+fn difference(contrast: &Contrast) -> Option<String> {
+    let show = |v: f64| if v < 0.0 { number(v) } else { format!("+{}", number(v)) };
+    Some(with_interval(show, contrast.difference, contrast.difference_interval))
 }
 
 fn ratio(contrast: &Contrast) -> Option<String> {
-    let show = |v: f64| format!("{v:.2}");
-    Some(with_interval(show(contrast.ratio?), contrast.ratio_interval.map(|i| i.map(show))))
+    Some(with_interval(|v| format!("{v:.2}"), contrast.ratio?, contrast.ratio_interval))
 }
 
 fn coverage(calibration: &Calibration) -> TextTable {
-    let mut out =
-        TextTable::new(["ellipsoid of", "should hold %", "holds %"].map(str::to_owned).into());
+    let mut out = TextTable::new(["ellipsoid of", "should hold %", "holds %"]);
     for part in &calibration.coverage {
-        let show = |v: f64| format!("{:.1}", 100.0 * v);
-        let share = with_interval(show(part.share), part.interval.map(|i| i.map(show)));
+        let share = with_interval(|v| format!("{:.1}", 100.0 * v), part.share, part.interval);
         out.push(vec![part.of.into(), format!("{:.0}", 100.0 * part.nominal), share]);
     }
     out
 }
 
 fn errors(calibration: &Calibration) -> TextTable {
-    let header = ["error of", "root mean square", "Cramér–Rao bound", "median"];
-    let mut out = TextTable::new(header.map(str::to_owned).into());
+    let mut out = TextTable::new(["error of", "root mean square", "Cramér–Rao bound", "median"]);
     for error in &calibration.errors {
         let numbers = [error.found, error.bound, error.median].map(|v| format!("{v:.2}"));
         out.push([[error.of.to_owned()].as_slice(), &numbers].concat());
@@ -279,7 +220,7 @@ fn errors(calibration: &Calibration) -> TextTable {
 
 fn events(calibration: &Calibration) -> TextTable {
     let header = ["within", "predicted %", "true %", "calibration error", "by chance", "Brier"];
-    let mut out = TextTable::new(header.map(str::to_owned).into());
+    let mut out = TextTable::new(header);
     for event in &calibration.events {
         out.push(vec![
             event.event.into(),
@@ -295,35 +236,20 @@ fn events(calibration: &Calibration) -> TextTable {
 
 fn failures(calibration: &Calibration) -> String {
     let Calibration { n, failures, auroc, auroc_interval, .. } = calibration;
-    let area = auroc.map_or_else(
-        || "no area under a curve".to_owned(),
-        |area| {
-            let show = |v: f64| format!("{v:.3}");
-            let area = with_interval(show(area), auroc_interval.map(|i| i.map(show)));
-            format!("area under the curve of the predicted probability {area}")
-        },
-    );
+    let area = match *auroc {
+        None => "no area under a curve".to_owned(),
+        Some(area) => format!(
+            "area under the curve of the predicted probability {}",
+            with_interval(|v| format!("{v:.3}"), area, *auroc_interval)
+        ),
+    };
     format!("{failures} of {n} poses are not within 5 mm and 5°; {area}")
 }
 
-fn by_object(study: Kind, overall: &Table, objects: &[&Table]) -> TextTable {
-    let metrics = present(overall, &SHOWN);
-    let mut out = text_table("mean", &metrics);
-    for table in objects {
-        for row in &table.rows {
-            let object = table.object.map_or_else(String::new, |id| format!("object {id}: "));
-            let label = object + &row_label(study, &row.name);
-            let cell = |m: usize| row.metrics[m].map(|e| number(e.mean));
-            out.push(ours(label, row, table.frames, &metrics, cell));
-        }
-    }
-    out
-}
-
-fn with_interval(value: String, interval: Option<[String; 2]>) -> String {
+fn with_interval(show: impl Fn(f64) -> String, value: f64, interval: Option<[f64; 2]>) -> String {
     match interval {
-        Some([low, high]) => format!("{value} [{low}, {high}]"),
-        None => value,
+        Some([low, high]) => format!("{} [{}, {}]", show(value), show(low), show(high)),
+        None => show(value),
     }
 }
 

@@ -8,8 +8,7 @@ use thiserror::Error;
 use super::design::{Design, Shard};
 use super::output::RECORDS;
 use super::record::FrameRecord;
-use crate::data::Identity;
-use crate::data::{Journal, JournalError};
+use crate::data::{Identity, Journal, JournalError};
 
 /// Why shards do not make a study.
 #[derive(Debug, Error)]
@@ -17,40 +16,9 @@ pub enum MergeError {
     /// The records of a shard cannot be read.
     #[error(transparent)]
     Journal(#[from] JournalError),
-    /// The file is no record of a study.
-    #[error("{}: not the records of a study", file.display())]
-    NotAStudy {
-        /// The file.
-        file: PathBuf,
-    },
-    /// Two shards are of different studies.
-    #[error(
-        "{} and {} are of different studies:\n  {}",
-        first.display(), other.display(), differences.join("\n  ")
-    )]
-    Different {
-        /// The first shard.
-        first: PathBuf,
-        /// The one that differs.
-        other: PathBuf,
-        /// What differs, a line each.
-        differences: Vec<String>,
-    },
-    /// Frames are missing.
-    #[error("{missing} of {frames} frames are in none of the shards, the first is frame {first} ({})", shards.join(", "))]
-    Incomplete {
-        /// How many are missing.
-        missing: usize,
-        /// How many there are.
-        frames: usize,
-        /// The first missing one.
-        first: usize,
-        /// The shards that are there.
-        shards: Vec<String>,
-    },
-    /// There is nothing to merge.
-    #[error("no shards were given")]
-    Nothing,
+    /// The shards are not those of one study, or not all of them.
+    #[error("{0}")]
+    Shards(String),
 }
 
 /// Facts in which shards of one study may differ: where they ran, and which part they are.
@@ -78,27 +46,34 @@ pub fn merge(folders: &[PathBuf]) -> Result<(Design, BTreeMap<usize, FrameRecord
         if let Some((one, known, _)) = &first {
             let differences = known.differences(&identity, &FREE);
             if !differences.is_empty() {
-                let (first, other) = (one.clone(), file);
-                return Err(MergeError::Different { first, other, differences });
+                return Err(MergeError::Shards(format!(
+                    "{} and {} are of different studies:\n  {}",
+                    one.display(),
+                    file.display(),
+                    differences.join("\n  ")
+                )));
             }
         } else {
             first = Some((file, identity, design));
         }
     }
-    let (.., mut design) = first.ok_or(MergeError::Nothing)?;
+    let (.., mut design) =
+        first.ok_or_else(|| MergeError::Shards("no shards were given".into()))?;
     design.shard = Shard::WHOLE;
     let frames = design.frames();
     let missing: Vec<usize> = (0..frames).filter(|index| !records.contains_key(index)).collect();
     match missing.first() {
-        Some(&first) => {
-            Err(MergeError::Incomplete { missing: missing.len(), frames, first, shards })
-        }
         None => Ok((design, records)),
+        Some(first) => Err(MergeError::Shards(format!(
+            "{} of {frames} frames are in none of the shards, the first is frame {first} ({})",
+            missing.len(),
+            shards.join(", ")
+        ))),
     }
 }
 
 fn design(file: &Path, identity: &Identity) -> Result<Design, MergeError> {
-    serde_json::to_value(identity)
-        .and_then(serde_json::from_value)
-        .map_err(|_| MergeError::NotAStudy { file: file.to_path_buf() })
+    let design = serde_json::to_value(identity).and_then(serde_json::from_value);
+    let problem = || format!("{}: not the records of a study", file.display());
+    design.map_err(|_| MergeError::Shards(problem()))
 }

@@ -3,8 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::calibration;
-use super::csv::csv;
+use super::csv::{calibration_csv, csv};
 use super::design::Design;
 use super::document::{markdown, text};
 use super::plot::plots;
@@ -27,27 +26,24 @@ pub fn write_outputs(
     records: &BTreeMap<usize, FrameRecord>,
 ) -> Result<(Vec<Failure>, Vec<PathBuf>), DatasetError> {
     let tables = Tables::new(design, records);
-    let fault = |file: &Path, problem: String| DatasetError::Write { file: file.into(), problem };
-    let mut files: Vec<(PathBuf, Vec<u8>)> = vec![
-        (folder.join("tables.txt"), text(&tables).into_bytes()),
-        (folder.join("tables.md"), markdown(&tables).into_bytes()),
+    let json = serde_json::to_string_pretty(&tables).map_err(|e| e.to_string());
+    let mut outputs: Vec<(String, Result<Vec<u8>, String>)> = vec![
+        ("tables.txt".into(), Ok(text(&tables).into_bytes())),
+        ("tables.md".into(), Ok(markdown(&tables).into_bytes())),
+        ("tables.csv".into(), csv(&tables).map_err(|e| e.to_string())),
+        ("tables.json".into(), json.map(|json| (json + "\n").into_bytes())),
     ];
-    let file = folder.join("tables.csv");
-    let bytes = csv(&tables).map_err(|e| fault(&file, e.to_string()))?;
-    files.push((file, bytes));
-    let file = folder.join("tables.json");
-    let json = serde_json::to_string_pretty(&tables).map_err(|e| fault(&file, e.to_string()))?;
-    files.push((file, (json + "\n").into_bytes()));
     if !tables.calibrations.is_empty() {
-        let file = folder.join("calibration.csv");
-        let bytes =
-            calibration::csv(&tables.calibrations).map_err(|e| fault(&file, e.to_string()))?;
-        files.push((file, bytes));
+        let bytes = calibration_csv(&tables.calibrations).map_err(|e| e.to_string());
+        outputs.push(("calibration.csv".into(), bytes));
     }
-    for (name, plot) in plots(design, &tables, records) {
+    let plots = plots(design, &tables, records).into_iter();
+    outputs.extend(plots.map(|(name, svg)| (name, svg.map(String::into_bytes))));
+    let mut files = Vec::new();
+    for (name, bytes) in outputs {
         let file = folder.join(name);
-        let svg = plot.map_err(|e| fault(&file, e))?;
-        files.push((file, svg.into_bytes()));
+        let bytes = bytes.map_err(|problem| DatasetError::Write { file: file.clone(), problem })?;
+        files.push((file, bytes));
     }
     for (file, bytes) in &files {
         write_atomically(file, bytes)?;

@@ -63,3 +63,8 @@ impl FrameRecord {
         self.outcomes.iter().find(|o| o.row == row)
     }
 }
+
+/// A metric in a row of the table, by record.
+pub(super) fn column(records: &[&FrameRecord], row: &str, metric: usize) -> Vec<Option<f64>> {
+    records.iter().map(|record| record.outcome(row)?.score?.values()[metric]).collect()
+}

@@ -4,13 +4,13 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::bootstrap::{interval, resampled_means};
+use super::bootstrap::{Pair, Resamples, interval};
 use super::calibration::{Calibration, calibrations};
 use super::comparison::{Comparison, comparisons};
 use super::design::Design;
 use super::kind::{INITIAL, Kind, TRUTH};
 use super::published::{Published, published};
-use super::record::FrameRecord;
+use super::record::{FrameRecord, column};
 use crate::evaluate::metrics::{COLUMNS, Statistic};
 
 /// Seed of the resampling.
@@ -188,8 +188,6 @@ fn failures_of(record: &FrameRecord) -> Vec<Failure> {
     found
 }
 
-type Column = Vec<Option<f64>>;
-
 fn table_rows(
     study: Kind,
     level: &str,
@@ -197,76 +195,43 @@ fn table_rows(
     rows: &[String],
     records: &[&FrameRecord],
 ) -> Vec<Row> {
-    const METRICS: usize = COLUMNS.len();
-    let column = |row: &str, metric: usize| -> Column {
-        let value = |r: &&FrameRecord| r.outcome(row)?.score?.values()[metric];
-        records.iter().map(value).collect()
-    };
-    let mut values: Vec<Column> = Vec::new();
-    let mut before: Vec<Column> = Vec::new();
-    for row in rows {
-        for metric in 0..METRICS {
-            let own = column(row, metric);
-            let both = column(INITIAL, metric).into_iter().zip(&own);
-            before.push(both.map(|(initial, own)| own.and(initial)).collect());
-            values.push(own);
-        }
-    }
-    // The frames of both means are the same, and so are their resamples.
-    let after: Vec<Column> = values
-        .iter()
-        .zip(&before)
-        .map(|(own, initial)| own.iter().zip(initial).map(|(o, i)| i.and(*o)).collect())
-        .collect();
-    let count = values.len();
-    let columns: Vec<Column> = [values, before, after].concat();
-    let means = resampled_means(&columns, SEED);
-
-    let estimate = |k: usize, is_change: bool| -> Option<Estimate> {
+    let resamples = Resamples::new(records.len(), SEED);
+    let estimate = |row: &str, metric: usize| -> Option<Estimate> {
+        let own = column(records, row, metric);
         let Statistic { count: n, mean, median } =
-            Statistic::of(columns[k].iter().flatten().copied().collect())?;
-        let change =
-            is_change.then(|| change(&columns, &means, count + k, 2 * count + k)).flatten();
-        Some(Estimate { n, mean, interval: interval(&means[k]), median, change })
+            Statistic::of(own.iter().flatten().copied().collect())?;
+        let change = || Change::new(&resamples.pair([&column(records, INITIAL, metric), &own])?);
+        let compared = row != TRUTH && row != INITIAL && ERRORS.contains(&metric);
+        let change = if compared { change() } else { None };
+        Some(Estimate { n, mean, interval: interval(&resamples.means(&own)), median, change })
     };
-    let reference = published(study, level, INITIAL);
-    rows.iter()
-        .enumerate()
-        .map(|(r, row)| {
-            let compared = row != TRUTH && row != INITIAL;
-            let published = object.is_none().then(|| published(study, level, row)).flatten();
-            let published_change =
-                published.zip(reference).filter(|_| compared).map(|(p, initial)| {
-                    std::array::from_fn(|m| {
-                        let error = ERRORS.contains(&m);
-                        let (p, initial) = p[m].zip(initial[m]).filter(|_| error)?;
-                        Some(100.0 * (p / initial - 1.0))
-                    })
-                });
-            Row {
-                name: row.clone(),
-                n: records
-                    .iter()
-                    .filter(|f| f.outcome(row).is_some_and(|o| o.score.is_some()))
-                    .count(),
-                metrics: std::array::from_fn(|m| {
-                    estimate(r * METRICS + m, compared && ERRORS.contains(&m))
-                }),
-                published,
-                published_change,
-            }
-        })
-        .collect()
+    let of_paper = |row: &str| published(study, level, row).filter(|_| object.is_none());
+    let change_of_paper = |row: &str| -> Option<Published> {
+        let (own, initial) = (of_paper(row)?, of_paper(INITIAL)?);
+        let change = |m: usize| Some(percent(initial[m]?, own[m]?));
+        Some(std::array::from_fn(|m| ERRORS.contains(&m).then(|| change(m)).flatten()))
+    };
+    let make = |row: &String| Row {
+        name: row.clone(),
+        n: records.iter().filter_map(|r| r.outcome(row)?.score).count(),
+        metrics: std::array::from_fn(|metric| estimate(row, metric)),
+        published: of_paper(row),
+        published_change: change_of_paper(row).filter(|_| row != TRUTH && row != INITIAL),
+    };
+    rows.iter().map(make).collect()
 }
 
-/// The change from column `before` to column `after`; `None` if there is nothing, or nothing to improve.
-fn change(columns: &[Column], means: &[Vec<f64>], before: usize, after: usize) -> Option<Change> {
-    let mean = |k: usize| Statistic::of(columns[k].iter().flatten().copied().collect());
-    let percent = |before: f64, after: f64| 100.0 * (after / before - 1.0);
-    let whole = percent(mean(before)?.mean, mean(after)?.mean);
-    let paired: Vec<f64> =
-        means[before].iter().zip(&means[after]).map(|(&b, &a)| percent(b, a)).collect();
-    whole.is_finite().then(|| Change { percent: whole, interval: interval(&paired) })
+fn percent(before: f64, after: f64) -> f64 {
+    100.0 * (after / before - 1.0)
+}
+
+impl Change {
+    /// The change from the first of a pair to the second; `None` if there is nothing to improve.
+    fn new(pair: &Pair) -> Option<Self> {
+        let [before, after] = pair.means;
+        let change = Self { percent: percent(before, after), interval: pair.interval(percent) };
+        change.percent.is_finite().then_some(change)
+    }
 }
 
 #[cfg(test)]

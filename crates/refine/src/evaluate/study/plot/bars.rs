@@ -2,7 +2,7 @@
 
 use plotters::prelude::*;
 
-use super::page::{Area, DEVIATIONS, Drawn, color, failed, page, tick};
+use super::page::{Area, DEVIATIONS, Drawn, color, end, failed, page, tick};
 use crate::evaluate::metrics::COLUMNS;
 use crate::evaluate::study::document::row_label;
 use crate::evaluate::study::kind::TRUTH;
@@ -31,8 +31,7 @@ fn panel(area: &Area<'_>, metric: usize, rows: &[&Row], labels: &[String]) -> Dr
         let high = estimate.and_then(|e| e.interval).map(|i| i[1]);
         [estimate.map(|e| e.mean), high, row.published.and_then(|p| p[metric])]
     });
-    let top = ends.flatten().fold(0.0, f64::max);
-    let top = if top > 0.0 { 1.05 * top } else { 1.0 };
+    let top = end(ends.flatten(), 1.05);
     // Ranges of integers include their end here.
     let mut chart = ChartBuilder::on(area)
         .margin(8)

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use plotters::prelude::*;
 
-use super::page::{Area, DEVIATIONS, Drawn, color, failed, legend, page, swatch, tick};
+use super::page::{Area, Axes, DEVIATIONS, Drawn, Panel, color, end, failed, page};
 use crate::evaluate::metrics::COLUMNS;
 use crate::evaluate::study::document::row_label;
 use crate::evaluate::study::kind::TRUTH;
@@ -45,28 +45,12 @@ pub(super) fn draw(
 
 fn panel(area: &Area<'_>, metric: usize, curves: &[Curve], frames: usize, named: bool) -> Drawn {
     // Errors spread over decades: most frames are right, some are lost.
-    let largest = curves.iter().filter_map(|c| c.1.last()).copied().fold(0.0, f64::max);
-    let right = if largest > 0.0 { 1.1 * largest } else { 1.0 };
+    let right = end(curves.iter().filter_map(|c| c.1.last()).copied(), 1.1);
     let smallest =
         curves.iter().flat_map(|c| &c.1).copied().filter(|&v| v > 0.0).fold(right, f64::min);
     let left = smallest.clamp(1e-4 * right, 0.1 * right);
-    let mut chart = ChartBuilder::on(area)
-        .margin(8)
-        .margin_right(24)
-        .x_label_area_size(44)
-        .y_label_area_size(58)
-        .build_cartesian_2d((left..right).log_scale(), 0.0..100.0)?;
-    chart
-        .configure_mesh()
-        .light_line_style(WHITE)
-        .x_labels(8)
-        .y_labels(6)
-        .x_label_formatter(&|x| tick(*x))
-        .y_label_formatter(&|y| format!("{y:.0}"))
-        .label_style(("sans-serif", 14))
-        .x_desc(COLUMNS[metric])
-        .y_desc("% of frames")
-        .draw()?;
+    let axes = Axes { x: COLUMNS[metric], y: "% of frames", left: 58 };
+    let mut panel = Panel::new(area, (left..right).log_scale(), 0.0..100.0, &axes)?;
     let share = |count: usize| 100.0 * count as f64 / frames.max(1) as f64;
     for (k, (name, errors)) in curves.iter().enumerate() {
         let mut points = Vec::new();
@@ -78,14 +62,10 @@ fn panel(area: &Area<'_>, metric: usize, curves: &[Curve], frames: usize, named:
             points.insert(0, (left.min(first), 0.0));
             points.push((right, last));
         }
-        let style = color(k).stroke_width(2);
-        let series = chart.draw_series(LineSeries::new(points, style))?;
-        if named {
-            series.label(name).legend(move |at| swatch(at, style));
-        }
+        panel.line(points, color(k).stroke_width(2), false, named.then_some(name))?;
     }
     if named {
-        legend(&mut chart, SeriesLabelPosition::UpperLeft)?;
+        panel.legend(SeriesLabelPosition::UpperLeft)?;
     }
     Ok(())
 }

@@ -2,7 +2,7 @@
 
 use plotters::prelude::*;
 
-use super::page::{Area, Drawn, color, legend, page, swatch, tick};
+use super::page::{Area, Axes, Drawn, Mean, Panel, color, end, page, tick};
 use crate::evaluate::metrics::COLUMNS;
 use crate::evaluate::study::design::{Design, perturbed};
 use crate::evaluate::study::sweep::Sweep;
@@ -10,9 +10,6 @@ use crate::evaluate::study::tables::{Estimate, Table, Tables};
 
 /// Panels: a metric, and whether its median is drawn instead of its mean.
 const PANELS: [(usize, bool); 4] = [(0, false), (1, false), (0, true), (1, true)];
-
-/// A point of a curve: amount, value, and the ends of the mean's interval.
-type Point = (f64, f64, [f64; 2]);
 
 pub(super) fn draw(
     design: &Design,
@@ -46,13 +43,13 @@ pub(super) fn draw(
         let of = |row: &str| -> Option<Estimate> {
             table.rows.iter().find(|l| l.name == row)?.metrics[metric]
         };
-        let point = |(&amount, row): (&f64, &String)| -> Option<Point> {
+        let point = |(&amount, row): (&f64, &String)| -> Option<Mean> {
             let e = of(row)?;
             let value = if median { e.median } else { e.mean };
             let interval = e.interval.filter(|_| !median);
             Some((amount, value, interval.unwrap_or([value; 2])))
         };
-        let curves: Vec<(&str, Vec<Point>)> = methods
+        let curves: Vec<(&str, Vec<Mean>)> = methods
             .iter()
             .map(|(name, rows)| (*name, amounts.iter().zip(rows).filter_map(point).collect()))
             .collect();
@@ -65,55 +62,28 @@ fn panel(
     area: &Area<'_>,
     sweep: Sweep,
     (metric, median): (usize, bool),
-    curves: &[(&str, Vec<Point>)],
+    curves: &[(&str, Vec<Mean>)],
     initial: Option<f64>,
     named: bool,
 ) -> Drawn {
     let values = curves.iter().flat_map(|(_, points)| points.iter().map(|p| p.2[1]));
-    let top = values.chain(initial).fold(0.0, f64::max);
-    let top = if top > 0.0 { 1.08 * top } else { 1.0 };
-    let amounts = sweep.amounts();
-    let (left, right) = amounts
-        .iter()
-        .fold((f64::INFINITY, 0.0_f64), |(low, high), &amount| (low.min(amount), high.max(amount)));
+    let top = end(values.chain(initial), 1.08);
+    let amounts = sweep.amounts().iter().copied();
+    let (left, right) =
+        (amounts.clone().fold(f64::INFINITY, f64::min), amounts.fold(0.0, f64::max));
     let margin = 0.02 * (right - left);
-    let mut chart = ChartBuilder::on(area)
-        .margin(8)
-        .margin_right(24)
-        .x_label_area_size(44)
-        .y_label_area_size(64)
-        .build_cartesian_2d(left - margin..right + margin, 0.0..top)?;
-    let what = if median { "median" } else { "mean" };
-    chart
-        .configure_mesh()
-        .light_line_style(WHITE)
-        .x_labels(8)
-        .y_labels(6)
-        .x_label_formatter(&|x| tick(*x))
-        .y_label_formatter(&|y| tick(*y))
-        .label_style(("sans-serif", 14))
-        .x_desc(sweep.axis())
-        .y_desc(format!("{what} {}", COLUMNS[metric]))
-        .draw()?;
+    let what = format!("{} {}", if median { "median" } else { "mean" }, COLUMNS[metric]);
+    let axes = Axes { x: sweep.axis(), y: &what, left: 64 };
+    let mut panel = Panel::new(area, left - margin..right + margin, 0.0..top, &axes)?;
     if let Some(initial) = initial {
         let level = [(left, initial), (right, initial)];
-        chart.draw_series(DashedLineSeries::new(level, 2, 4, BLACK.mix(0.6).stroke_width(1)))?;
+        panel.dashes(level, [2, 4], BLACK.mix(0.6).stroke_width(1))?;
     }
     for (k, (name, points)) in curves.iter().enumerate() {
-        let style = color(k + 1).stroke_width(2);
-        let line = points.iter().map(|&(x, y, _)| (x, y));
-        let series = chart.draw_series(LineSeries::new(line, style).point_size(3))?;
-        if named {
-            series.label(*name).legend(move |at| swatch(at, style));
-        }
-        chart.draw_series(
-            points
-                .iter()
-                .map(|&(x, _, [low, high])| PathElement::new([(x, low), (x, high)], style)),
-        )?;
+        panel.means(points, color(k + 1).stroke_width(2), named.then_some(name))?;
     }
     if named {
-        legend(&mut chart, SeriesLabelPosition::UpperMiddle)?;
+        panel.legend(SeriesLabelPosition::UpperMiddle)?;
     }
     Ok(())
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use plotters::prelude::*;
 
-use super::page::{Area, Drawn, color, legend, page, swatch};
+use super::page::{Area, Axes, Drawn, Panel, color, page};
 use crate::evaluate::study::calibration::{Calibration, ELLIPSOIDS, ellipsoid_levels, posteriors};
 use crate::evaluate::study::posterior::EVENTS;
 use crate::evaluate::study::record::FrameRecord;
@@ -43,7 +43,8 @@ pub(super) fn draw(
         }
         None => {
             let curve = |of: usize| -> Curve {
-                let levels = ellipsoid_levels(&posteriors, of);
+                let mut levels: Vec<f64> = ellipsoid_levels(&posteriors, of).collect();
+                levels.sort_by(f64::total_cmp);
                 let total = levels.len().max(1) as f64;
                 let points = levels.iter().enumerate().filter(|(_, p)| p.is_finite());
                 let points =
@@ -65,35 +66,12 @@ pub(super) fn draw(
 }
 
 fn panel(area: &Area<'_>, curves: &[Curve], x: &str, y: &str, marked: bool) -> Drawn {
-    let mut chart = ChartBuilder::on(area)
-        .margin(8)
-        .margin_right(24)
-        .x_label_area_size(44)
-        .y_label_area_size(58)
-        .build_cartesian_2d(0.0..100.0, 0.0..100.0)?;
-    chart
-        .configure_mesh()
-        .light_line_style(WHITE)
-        .x_labels(6)
-        .y_labels(6)
-        .x_label_formatter(&|x| format!("{x:.0}"))
-        .y_label_formatter(&|y| format!("{y:.0}"))
-        .label_style(("sans-serif", 14))
-        .x_desc(x)
-        .y_desc(y)
-        .draw()?;
-    let right = [(0.0, 0.0), (100.0, 100.0)];
-    chart.draw_series(DashedLineSeries::new(right, 6, 5, BLACK.mix(0.5).stroke_width(1)))?;
+    let mut panel = Panel::new(area, 0.0..100.0, 0.0..100.0, &Axes { x, y, left: 58 })?;
+    panel.dashes([(0.0, 0.0), (100.0, 100.0)], [6, 5], BLACK.mix(0.5).stroke_width(1))?;
     for (k, (name, points)) in curves.iter().enumerate() {
-        let style = color(k + 1).stroke_width(2);
-        let line = LineSeries::new(points.iter().copied(), style);
-        chart
-            .draw_series(if marked { line.point_size(3) } else { line })?
-            .label(name)
-            .legend(move |at| swatch(at, style));
+        panel.line(points.clone(), color(k + 1).stroke_width(2), marked, Some(name))?;
     }
-    legend(&mut chart, SeriesLabelPosition::UpperLeft)?;
-    Ok(())
+    panel.legend(SeriesLabelPosition::UpperLeft)
 }
 
 #[cfg(test)]
