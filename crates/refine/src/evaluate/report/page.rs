@@ -1,6 +1,5 @@
 //! One page that shows a run.
 
-use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use nalgebra::Isometry3;
@@ -70,12 +69,14 @@ impl Report {
         let name = self.picture(&frame.picture)?;
         let curves = format!("{}.svg", name.trim_end_matches(".png"));
         write_atomically(&self.folder.join(&curves), frame.curves.as_bytes())?;
-        let (title, caption) = (escape(title), escape(&frame.caption));
-        let _ = writeln!(
-            self.body,
-            "<section><h2>{title}</h2><p>{caption}</p><div><figure><img src=\"{name}\" alt=\"\">\
-             <figcaption><b class=before>initial</b> and <b class=after>refined</b> \
-             outline</figcaption></figure><img src=\"{curves}\" alt=\"loss curves\"></div></section>"
+        let caption = escape(&frame.caption);
+        self.section(
+            title,
+            &format!(
+                "<p>{caption}</p><div><figure><img src=\"{name}\" alt=\"\">\
+                 <figcaption><b class=before>initial</b> and <b class=after>refined</b> \
+                 outline</figcaption></figure><img src=\"{curves}\" alt=\"loss curves\"></div>"
+            ),
         );
         Ok(())
     }
@@ -92,12 +93,12 @@ impl Report {
     ) -> Result<(), DatasetError> {
         let name = self.picture(picture)?;
         let remarks: String = remarks.iter().map(|r| format!("<li>{}</li>", escape(r))).collect();
-        let title = escape(title);
-        let _ = writeln!(
-            self.body,
-            "<section><h2>{title}</h2><ul>{remarks}</ul><img src=\"{name}\" alt=\"\"></section>"
-        );
+        self.section(title, &format!("<ul>{remarks}</ul><img src=\"{name}\" alt=\"\">"));
         Ok(())
+    }
+
+    fn section(&mut self, title: &str, content: &str) {
+        self.body += &format!("<section><h2>{}</h2>{content}</section>\n", escape(title));
     }
 
     /// Writes the page and returns its path.

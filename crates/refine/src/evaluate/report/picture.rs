@@ -12,6 +12,9 @@ const AFTER: [f32; 3] = [0.2, 1.0, 0.35];
 /// Outline of the hand.
 const HAND: [f32; 3] = [0.35, 0.6, 1.0];
 
+/// Light pixels between two pictures.
+const GAP: usize = 6;
+
 /// The image around the object twice: with the outline at `before`, and with that at `after`.
 pub fn before_and_after(
     observation: &Observation,
@@ -23,8 +26,11 @@ pub fn before_and_after(
     let mut right = left.clone();
     draw_outline(&mut left, &observation.camera, &object.model, before, BEFORE, 1.5);
     draw_outline(&mut right, &observation.camera, &object.model, after, AFTER, 1.5);
-    let window = window(observation);
-    beside(&crop(&left, window), &crop(&right, window))
+    let window @ [.., width, height] = window(observation);
+    let mut pair = RgbImage::filled(2 * width + GAP, height, [1.0; 3]);
+    copy(&left, window, &mut pair, 0);
+    copy(&right, window, &mut pair, width + GAP);
+    pair
 }
 
 /// The whole image with the outline at `t_cam_object`, and the hand's in blue where it is known.
@@ -79,31 +85,11 @@ fn window(observation: &Observation) -> [usize; 4] {
     [begin(0, width), begin(1, height), side.min(width), side.min(height)]
 }
 
-fn crop(image: &RgbImage, [left, top, width, height]: [usize; 4]) -> RgbImage {
-    let mut out = RgbImage::filled(width, height, [0.0; 3]);
+/// Copies `window` of one image into another, to column `column` of its top.
+fn copy(from: &RgbImage, [left, top, width, height]: [usize; 4], to: &mut RgbImage, column: usize) {
+    let row = to.width();
     for y in 0..height {
-        for x in 0..width {
-            if let Some(pixel) = image.get(left + x, top + y) {
-                out.pixels_mut()[y * width + x] = pixel;
-            }
-        }
+        let source = &from.pixels()[(top + y) * from.width() + left..][..width];
+        to.pixels_mut()[y * row + column..][..width].copy_from_slice(source);
     }
-    out
-}
-
-/// Two images of one size side by side with a light gap.
-fn beside(left: &RgbImage, right: &RgbImage) -> RgbImage {
-    const GAP: usize = 6;
-    let width = left.width() + GAP + right.width();
-    let mut out = RgbImage::filled(width, left.height(), [1.0; 3]);
-    for y in 0..left.height() {
-        for x in 0..left.width() {
-            out.pixels_mut()[y * width + x] = left.pixels()[y * left.width() + x];
-        }
-        for x in 0..right.width() {
-            out.pixels_mut()[y * width + left.width() + GAP + x] =
-                right.pixels()[y * right.width() + x];
-        }
-    }
-    out
 }

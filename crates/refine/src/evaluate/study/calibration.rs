@@ -237,7 +237,7 @@ pub(super) mod tests {
         let mut made = BTreeMap::new();
         for index in 0..2 * n {
             let mut record = records[&(3 * (index / n))].clone();
-            record.outcomes.retain(|o| o.row != "icp");
+            record.outcomes.retain(|o| o.row != "robust-icp");
             let draw: Vec<f64> = (0..6).map(|_| random.normal().powi(2)).collect();
             let [place, turn] = [0, 3].map(|k| draw[k..k + 3].iter().sum::<f64>());
             let (probability, fate) = (random.uniform(), random.uniform());

@@ -68,7 +68,7 @@ mod tests {
     fn only_frames_with_both_count_and_resamples_are_paired() {
         let (_, records) = example();
         let low: Vec<&FrameRecord> = records.values().filter(|r| r.level == "low").collect();
-        let pairs = [("combined".to_owned(), "icp".to_owned())];
+        let pairs = [("combined".to_owned(), "robust-icp".to_owned())];
         let found = &comparisons(&pairs, &low)[0];
         let pe = found.metrics[0].unwrap();
         // The second method lacks the last frame: 0.25 and 0.5 against 2 and 4.

@@ -261,13 +261,15 @@ mod tests {
     #[test]
     fn trials_and_pairs_follow_from_the_methods() {
         let (mut design, _) = super::super::tables::tests::example();
-        assert_eq!(design.rows(), ["truth", "initial", "combined", "icp"]);
-        // Neither method is the one to compare with.
-        assert_eq!(design.pairs(), []);
+        assert_eq!(design.rows(), ["truth", "initial", "combined", "robust-icp"]);
         let method = |name: &str| MethodSettings { name: name.into(), settings: String::new() };
         design.methods = vec![method("robust-icp"), method("fused")];
         let pair = |a: &str, b: &str| (a.to_owned(), b.to_owned());
         assert_eq!(design.pairs(), [pair("fused", "robust-icp")]);
+        design.study = Kind::Evidence;
+        assert_eq!(design.pairs(), [pair("robust-icp", "fused")]);
+        design.study = Kind::Steps;
+        assert_eq!(design.pairs(), []);
         design.study = Kind::Robustness;
         design.sweeps = vec![Sweep::MissingTouch, Sweep::Joints];
         let trials = design.trials();

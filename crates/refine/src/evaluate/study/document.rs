@@ -274,10 +274,10 @@ mod tests {
         let find = |whole: &str, start: &str| {
             whole.lines().map(words).find(|w| w.first().is_some_and(|w| w == start)).unwrap()
         };
-        for start in ["initial", "combined", "icp"] {
+        for start in ["initial", "combined", "robust-icp"] {
             assert_eq!(find(&text, start), find(&markdown, start));
         }
-        let icp = find(&text, "icp");
+        let icp = find(&text, "robust-icp");
         assert_eq!(icp[1..5], ["2/4", "3.00", "[2.00,", "4.00]"], "{text}");
         assert!(
             text.contains("· published") && markdown.contains("| · published |  | 0.62 | 6.69 |")
@@ -285,25 +285,22 @@ mod tests {
         let combined = ["combined", "3/4", "-75.0", "[-75.0,", "-75.0]"];
         assert!(text.lines().any(|line| words(line).starts_with(&combined.map(str::to_owned))));
         for whole in [&text, &markdown] {
-            assert!(whole.contains("- low: scene 1 image 2 object 6: icp: no pixel"), "{whole}");
+            assert!(
+                whole.contains("- low: scene 1 image 2 object 6: robust-icp: no pixel"),
+                "{whole}"
+            );
             assert!(whole.contains("object 6: combined"));
         }
+        let after = |heading: &str| text.split(heading).nth(1).unwrap();
+        assert!(text.contains("Noise low: mean less that of robust-icp, same frames"), "{text}");
+        let ratios = after("mean over that of robust-icp");
+        assert!(ratios.contains("combined  2/4  0.12 [0.12, 0.12]"), "{text}");
+        let by_object = after("mean over that of robust-icp by object");
+        assert!(by_object.contains("object 6: combined"), "{text}");
     }
 
     #[test]
-    fn comparisons_and_calibrations_are_told() {
-        let (mut design, mut records) = example();
-        design.methods[1].name = "robust-icp".into();
-        for record in records.values_mut() {
-            record.outcomes[3].row = "robust-icp".into();
-        }
-        let said = text(&Tables::new(&design, &records));
-        assert!(said.contains("Noise low: mean less that of robust-icp, same frames"), "{said}");
-        let ratios = said.split("mean over that of robust-icp").nth(1).unwrap();
-        assert!(ratios.contains("combined  2/4  0.12 [0.12, 0.12]"), "{said}");
-        let by_object = said.split("mean over that of robust-icp by object").nth(1).unwrap();
-        assert!(by_object.contains("object 6: combined"), "{said}");
-
+    fn calibrations_are_told() {
         let (design, records) = super::super::calibration::tests::calibrated(20);
         let said = text(&Tables::new(&design, &records));
         for words in ["all noise, combined: % of 40 true poses", "5 mm and 5°", "orientation"] {

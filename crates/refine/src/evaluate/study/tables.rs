@@ -239,7 +239,7 @@ pub(super) mod tests {
     use super::super::design::{Level, MethodSettings, Shard};
     use super::super::record::RowOutcome;
     use super::*;
-    use crate::evaluate::metrics::PoseScore;
+    use crate::evaluate::metrics::{Contact, PoseScore};
 
     /// Two levels, two objects, three frames each; at the first level one method fails on the last frame.
     pub(in super::super) fn example() -> (Design, BTreeMap<usize, FrameRecord>) {
@@ -256,7 +256,7 @@ pub(super) mod tests {
             annotations: "0".into(),
             levels: vec![level("low", &["line 9: R: 3 numbers"]), level("high", &[])],
             filters: String::new(),
-            methods: vec![method("combined"), method("icp")],
+            methods: vec![method("combined"), method("robust-icp")],
             steps: Vec::new(),
             sweeps: Vec::new(),
             seed: 0,
@@ -275,7 +275,10 @@ pub(super) mod tests {
                         oe_deg: Some(5.0),
                         ..Default::default()
                     }
-                    .with_contact(30.0 + factor, factor * initial, 30.0, 0.0),
+                    .with_contact(
+                        Contact { area_cm2: 30.0 + factor, volume_cm3: factor * initial },
+                        Contact { area_cm2: 30.0, volume_cm3: 0.0 },
+                    ),
                 ),
                 ..RowOutcome::default()
             };
@@ -283,11 +286,11 @@ pub(super) mod tests {
                 outcome("truth", 0.0),
                 outcome("initial", 1.0),
                 outcome("combined", 0.25),
-                outcome("icp", 2.0),
+                outcome("robust-icp", 2.0),
             ];
             if index == 2 {
                 outcomes[3] = RowOutcome {
-                    row: "icp".into(),
+                    row: "robust-icp".into(),
                     failed: Some("no pixel".into()),
                     ..RowOutcome::default()
                 };
@@ -336,8 +339,8 @@ pub(super) mod tests {
         let said: Vec<String> = tables.failures.iter().map(Failure::sentence).collect();
         assert_eq!(
             said[0],
-            "a row of the initial poses of level low: truth, initial, combined, icp: line 9: R: 3 numbers"
+            "a row of the initial poses of level low: truth, initial, combined, robust-icp: line 9: R: 3 numbers"
         );
-        assert_eq!(said[1..], ["low: scene 1 image 2 object 6: icp: no pixel"]);
+        assert_eq!(said[1..], ["low: scene 1 image 2 object 6: robust-icp: no pixel"]);
     }
 }

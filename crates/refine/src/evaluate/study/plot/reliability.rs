@@ -73,29 +73,3 @@ fn panel(area: &Area<'_>, curves: &[Curve], x: &str, y: &str, marked: bool) -> D
     }
     panel.legend(SeriesLabelPosition::UpperLeft)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::evaluate::study::calibration::tests::calibrated;
-    use crate::evaluate::study::plot::plots;
-
-    #[test]
-    fn every_level_has_a_diagram_with_all_events_and_ellipsoids() {
-        let (design, records) = calibrated(30);
-        let tables = Tables::new(&design, &records);
-        let drawn = plots(&design, &tables, &records);
-        for level in ["low", "high", "all"] {
-            let name = format!("reliability-{level}-combined.svg");
-            let svg = &drawn.iter().find(|(n, _)| *n == name).unwrap().1;
-            let svg = svg.as_ref().unwrap();
-            for event in &EVENTS {
-                assert!(svg.contains(&format!("{} (ECE", event.name)), "{}", event.name);
-            }
-            for (name, _) in ELLIPSOIDS {
-                assert!(svg.contains(&format!("{name} (χ²")), "{name}");
-            }
-            assert!(!svg.contains("NaN"));
-        }
-    }
-}

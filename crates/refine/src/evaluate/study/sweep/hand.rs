@@ -1,4 +1,4 @@
-//! A hand that is not where it is said to be.
+//! A hand that is not where it is said to be, and taxels that fail.
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use prehend_geometry::SplitMix64;
@@ -29,8 +29,31 @@ pub(super) fn bend(observation: &mut Observation, angle: f64, random: &mut Split
     }
 }
 
+/// A share of the taxels feels nothing.
+pub(super) fn silence(observation: &mut Observation, share: f64, random: &mut SplitMix64) {
+    for force in observation.hand.iter_mut().flat_map(|hand| &mut hand.forces) {
+        if random.uniform() < share {
+            *force = Vector3::zeros();
+        }
+    }
+}
+
+/// A share of the taxels feels forces that are not there, in any direction and on average as large as those that are.
+pub(super) fn invent(observation: &mut Observation, share: f64, random: &mut SplitMix64) {
+    let Some(hand) = &mut observation.hand else { return };
+    let sizes: Vec<f64> = hand.forces.iter().map(|f| f.norm()).filter(|&f| f > 0.0).collect();
+    let mean = if sizes.is_empty() { 1.0 } else { sizes.iter().sum::<f64>() / sizes.len() as f64 };
+    for force in &mut hand.forces {
+        let (chosen, size) = (random.uniform() < share, -mean * (1.0 - random.uniform()).ln());
+        let invented = size * direction(random);
+        if chosen {
+            *force = invented;
+        }
+    }
+}
+
 /// Any direction, none more likely than another.
-pub(super) fn direction(random: &mut SplitMix64) -> Vector3<f64> {
+fn direction(random: &mut SplitMix64) -> Vector3<f64> {
     let drawn = Vector3::from_fn(|_, _| random.normal());
     drawn.try_normalize(0.0).unwrap_or_else(Vector3::x)
 }
@@ -39,15 +62,17 @@ pub(super) fn direction(random: &mut SplitMix64) -> Vector3<f64> {
 mod tests {
     use super::super::tests::square;
     use super::*;
+    use crate::scene::HandMeasurement;
+
+    fn after(change: fn(&mut Observation, f64, &mut SplitMix64), amount: f64) -> HandMeasurement {
+        let mut observation = square();
+        change(&mut observation, amount, &mut SplitMix64::new(8));
+        observation.hand.unwrap()
+    }
 
     #[test]
     fn the_hand_is_off_by_what_was_asked_for() {
         let before = square().hand.unwrap();
-        let after = |change: fn(&mut Observation, f64, &mut SplitMix64), amount: f64| {
-            let mut observation = square();
-            change(&mut observation, amount, &mut SplitMix64::new(3));
-            observation.hand.unwrap()
-        };
         let shifted = after(shift, 0.01).t_cam_hand;
         let off = shifted.translation.vector - before.t_cam_hand.translation.vector;
         assert!((off.norm() - 0.01).abs() < 1e-12);
@@ -59,5 +84,25 @@ mod tests {
         let off: Vec<f64> = bent.iter().zip(&before.joints).map(|(a, b)| a - b).collect();
         assert!(off.iter().all(|d| (d.abs() - 0.02).abs() < 1e-12));
         assert!(off.iter().any(|&d| d > 0.0) && off.iter().any(|&d| d < 0.0));
+    }
+
+    #[test]
+    fn shares_of_the_taxels_fail_and_those_of_more_include_those_of_less() {
+        let before = square().hand.unwrap().forces;
+        for change in [silence, invent] {
+            let failed = |share: f64| -> Vec<bool> {
+                after(change, share).forces.iter().zip(&before).map(|(a, b)| a != b).collect()
+            };
+            let (some, more) = (failed(0.25), failed(0.75));
+            assert!(some.iter().zip(&more).all(|(some, more)| !some || *more));
+            let count = |failed: &[bool]| failed.iter().filter(|f| **f).count();
+            // Half of the taxels feel nothing to begin with.
+            let all = if after(change, 1.0).forces[0].norm() == 0.0 { 50 } else { 100 };
+            assert_eq!(count(&failed(1.0)), all);
+            assert!((all / 8..all / 2).contains(&count(&some)), "{}", count(&some));
+        }
+        let invented = after(invent, 1.0).forces;
+        let mean = invented.iter().map(|f| f.norm()).sum::<f64>() / 100.0;
+        assert!((0.7..1.4).contains(&mean), "{mean}");
     }
 }

@@ -1,10 +1,8 @@
 //! Faults of an observation by kind and amount, for the robustness study.
 
 mod hand;
-mod missing;
-mod noise;
+mod image;
 mod occlusion;
-mod touch;
 
 use prehend_geometry::SplitMix64;
 use serde::{Deserialize, Serialize};
@@ -111,16 +109,16 @@ impl Sweep {
         let random = &mut random;
         let share = 1e-2 * amount;
         match self {
-            Self::DepthNoise => noise::depth(&mut observation.depth, amount, random),
-            Self::ColorNoise => noise::color(&mut observation.color, amount, random),
+            Self::DepthNoise => image::add_depth_noise(&mut observation.depth, amount, random),
+            Self::ColorNoise => image::add_color_noise(&mut observation.color, amount, random),
             Self::Visibility => occlusion::block(observation, share, random),
             Self::HandPosition => hand::shift(observation, 1e-3 * amount, random),
             Self::HandRotation => hand::turn(observation, amount.to_radians(), random),
             Self::Joints => hand::bend(observation, amount.to_radians(), random),
-            Self::DeadTaxels => touch::silence(observation, share, random),
-            Self::FalseTaxels => touch::invent(observation, share, random),
-            Self::MissingDepth => missing::depth(&mut observation.depth, share, random),
-            Self::MissingColor => missing::color(&mut observation.color, share, random),
+            Self::DeadTaxels => hand::silence(observation, share, random),
+            Self::FalseTaxels => hand::invent(observation, share, random),
+            Self::MissingDepth => image::lose_depth(&mut observation.depth, share, random),
+            Self::MissingColor => image::lose_color(&mut observation.color, share, random),
             Self::MissingTouch => {
                 observation.hand.iter_mut().for_each(|hand| hand.forces.clear());
             }
