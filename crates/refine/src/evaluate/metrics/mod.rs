@@ -4,9 +4,9 @@
 //! this project follows; ADD and ADI of Hinterstoisser et al. (ACCV 2012); MSSD and MSPD of the BOP
 //! challenge (Hodaň et al., ECCVW 2020).
 
-mod point_distance;
 mod pose_error;
 mod score;
+mod scored_model;
 mod summary;
 mod table;
 mod vsd;
@@ -15,7 +15,8 @@ pub use pose_error::{oe_deg, oe_symmetric_deg, pe_cm};
 #[cfg(feature = "cli")]
 pub(crate) use score::COLUMNS;
 pub(crate) use score::Contact;
-pub use score::{PoseScore, ScoredModel};
+pub use score::PoseScore;
+pub use scored_model::ScoredModel;
 pub use summary::{ScoredRow, Statistic, Summary, summarize};
 pub use table::Table;
 pub(crate) use vsd::vsd;

@@ -84,41 +84,28 @@ mod tests {
         let mut estimate = truth;
         estimate.rotation = truth.rotation * tilt * spin;
         let mut symmetries = Symmetries::default();
-        assert!(
-            (oe_symmetric_deg(&estimate, &truth, &symmetries) - oe_deg(&estimate, &truth)).abs()
-                < 1e-12
-        );
+        let plain = oe_deg(&estimate, &truth);
+        assert!((oe_symmetric_deg(&estimate, &truth, &symmetries) - plain).abs() < 1e-12);
         symmetries.continuous.push(ContinuousSymmetry { axis, point: Point3::origin() });
-        assert!(
-            (oe_symmetric_deg(&estimate, &truth, &symmetries) - 0.3_f64.to_degrees()).abs() < 1e-9
-        );
+        let tilted = 0.3_f64.to_degrees();
+        assert!((oe_symmetric_deg(&estimate, &truth, &symmetries) - tilted).abs() < 1e-9);
         // Discretized, the same comes out to within half a step.
-        let best = symmetries
-            .transforms()
-            .iter()
-            .map(|s| oe_deg(&estimate, &(truth * s)))
-            .fold(f64::INFINITY, f64::min);
-        assert!((best - 0.3_f64.to_degrees()).abs() < 0.5 && best >= 0.3_f64.to_degrees() - 1e-9);
-
-        let half_turn = Isometry3::rotation(Vector3::z() * std::f64::consts::PI);
-        let discrete = Symmetries { discrete: vec![half_turn], continuous: vec![] };
-        let turned = truth * half_turn;
-        assert!(
-            oe_deg(&turned, &truth) > 179.9 && oe_symmetric_deg(&turned, &truth, &discrete) < 1e-9
-        );
+        let transforms = symmetries.transforms();
+        let discretized = transforms.iter().map(|s| oe_deg(&estimate, &(truth * s)));
+        let best = discretized.fold(f64::INFINITY, f64::min);
+        assert!((best - tilted).abs() < 0.5 && best >= tilted - 1e-9);
     }
 
     #[test]
     fn discrete_and_continuous_symmetries_combine() {
         let flip = Isometry3::rotation(Vector3::x() * std::f64::consts::PI);
-        let symmetries = Symmetries {
-            discrete: vec![flip],
-            continuous: vec![ContinuousSymmetry {
-                axis: Vector3::z_axis(),
-                point: Point3::origin(),
-            }],
-        };
         let truth = pose(0.0, [0.5, 1.0, -0.3]);
+        let mut symmetries = Symmetries { discrete: vec![flip], continuous: vec![] };
+        let turned = truth * flip;
+        assert!(oe_deg(&turned, &truth) > 179.9);
+        assert!(oe_symmetric_deg(&turned, &truth, &symmetries) < 1e-9);
+        let axis = ContinuousSymmetry { axis: Vector3::z_axis(), point: Point3::origin() };
+        symmetries.continuous.push(axis);
         let estimate = truth * Isometry3::rotation(Vector3::z() * 1.3) * flip;
         assert!(oe_deg(&estimate, &truth) > 90.0);
         assert!(oe_symmetric_deg(&estimate, &truth, &symmetries) < 1e-9);

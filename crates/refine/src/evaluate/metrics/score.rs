@@ -1,13 +1,8 @@
 //! All metrics of one pose together.
 
-use nalgebra::{Isometry3, Point3};
-use prehend_render::Camera;
 use serde::{Deserialize, Serialize};
 
-use super::point_distance::{NearestPoint, add, adi, mspd, mssd};
-use super::pose_error::{oe_deg, oe_symmetric_deg, pe_cm};
 use super::vsd::VSD_TOLERANCES;
-use crate::data::Symmetries;
 
 /// Headings of the columns of [`PoseScore::values`], with units.
 pub(crate) const COLUMNS: [&str; 13] = [
@@ -151,51 +146,13 @@ impl Recall {
     }
 }
 
-/// What scoring needs to know of an object, prepared once for many poses.
-#[derive(Debug)]
-pub struct ScoredModel {
-    points: Vec<Point3<f64>>,
-    nearest: NearestPoint,
-    symmetries: Symmetries,
-    transforms: Vec<Isometry3<f64>>,
-}
-
-impl ScoredModel {
-    /// A model by its vertices \[m\], as the mesh file lists them (BOP weighs repeated vertices by their
-    /// number), and its symmetries.
-    pub fn new(points: Vec<Point3<f64>>, symmetries: Symmetries) -> Self {
-        Self {
-            nearest: NearestPoint::new(&points),
-            transforms: symmetries.transforms(),
-            points,
-            symmetries,
-        }
-    }
-
-    /// All metrics that need no hand.
-    pub fn score(
-        &self,
-        estimate: &Isometry3<f64>,
-        truth: &Isometry3<f64>,
-        camera: &Camera,
-    ) -> PoseScore {
-        PoseScore {
-            pe_cm: Some(pe_cm(estimate, truth)),
-            oe_deg: Some(oe_deg(estimate, truth)),
-            oe_symmetric_deg: Some(oe_symmetric_deg(estimate, truth, &self.symmetries)),
-            add_mm: Some(1e3 * add(estimate, truth, &self.points)),
-            adi_mm: Some(1e3 * adi(estimate, truth, &self.points, &self.nearest)),
-            mssd_mm: Some(1e3 * mssd(estimate, truth, &self.points, &self.transforms)),
-            mspd_px: Some(mspd(estimate, truth, &self.points, &self.transforms, camera)),
-            ..PoseScore::default()
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::ScoredModel;
     use super::*;
-    use nalgebra::Vector3;
+    use crate::data::Symmetries;
+    use nalgebra::{Isometry3, Point3, Vector3};
+    use prehend_render::Camera;
 
     #[test]
     fn units_and_order_match_the_headings() {

@@ -1,7 +1,7 @@
 //! What a study compares, and on which frames.
 
 use std::fmt;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
@@ -103,14 +103,12 @@ impl Level {
         let poses = file_fingerprint(file)?;
         let read = read_results(file)?;
         let rows = read.rows.into_iter().zip(read.instances).filter(|(row, _)| admit(row));
-        let frames: Vec<Frame> = rows
-            .enumerate()
-            .map(|(k, (row, instance))| Frame { index: first + k, level, row, instance })
-            .collect();
-        let unreadable =
-            read.errors.iter().map(|e| format!("line {}: {}: {}", e.line, e.field, e.problem));
-        let unreadable = unreadable.collect();
-        Ok((Self { name: name.into(), poses, frames: frames.len(), unreadable }, frames))
+        let frame = |(k, (row, instance))| Frame { index: first + k, level, row, instance };
+        let frames: Vec<Frame> = rows.enumerate().map(frame).collect();
+        let unreadable = read.errors.iter();
+        let unreadable = unreadable.map(|e| format!("line {}: {}: {}", e.line, e.field, e.problem));
+        let (name, unreadable) = (name.into(), unreadable.collect());
+        Ok((Self { name, poses, frames: frames.len(), unreadable }, frames))
     }
 }
 
@@ -179,12 +177,14 @@ impl Design {
         method
     }
 
-    /// The iterations at which a study compares poses.
+    /// The iterations at which a study compares poses: the paper's 100, 200, 400, 600 and 1000 if the last one is 1000.
     pub fn steps(study: Kind, method: &Method) -> Vec<usize> {
-        match study {
-            Kind::Steps => Kind::steps(method.iterations()),
-            _ => Vec::new(),
-        }
+        let tenths: &[usize] = if study == Kind::Steps { &[1, 2, 4, 6, 10] } else { &[] };
+        let mut steps: Vec<usize> =
+            tenths.iter().map(|tenths| method.iterations() * tenths / 10).collect();
+        steps.retain(|&step| step > 0);
+        steps.dedup();
+        steps
     }
 }
 
@@ -233,15 +233,6 @@ impl fmt::Display for Shard {
     }
 }
 
-/// The file of initial poses at a level, as datasets have it: `init_low.csv`.
-impl Kind {
-    /// The levels of this study that a dataset brings, with their files.
-    pub fn levels_of(self, dataset: &Path) -> Vec<(String, PathBuf)> {
-        let file = |level: &&str| ((*level).to_owned(), dataset.join(format!("init_{level}.csv")));
-        self.levels().iter().map(file).filter(|(_, file)| file.is_file()).collect()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -256,6 +247,16 @@ mod tests {
         for text in ["3/3", "1", "a/2", "-1/2", "0/0"] {
             assert!(text.parse::<Shard>().is_err(), "{text}");
         }
+    }
+
+    #[test]
+    fn steps_are_those_of_the_paper() {
+        let named = NamedMethod::find("combined-free").unwrap();
+        let steps =
+            |study, iterations| Design::steps(study, &Design::method(study, named, iterations));
+        assert_eq!(steps(Kind::Steps, None), [100, 200, 400, 600, 1000]);
+        assert_eq!(steps(Kind::Steps, Some(5)), [1, 2, 3, 5]);
+        assert!(steps(Kind::Main, None).is_empty());
     }
 
     #[test]

@@ -33,17 +33,15 @@ fn document(tables: &Tables, marks: [&str; 2], print: fn(&TextTable) -> String) 
     }
     for calibration in &tables.calibrations {
         let label = calibration.label();
-        let title = format!(
-            "{label}: % of {} true poses within ellipsoids of the posterior [95 % confidence]",
-            calibration.n
-        );
-        add(title, print(&coverage(calibration)));
+        let mut add = |title: &str, body: String| add(format!("{label}: {title}"), body);
+        let poses = format!("% of {} true poses", calibration.n);
         add(
-            format!("{label}: errors and what the information in the frames allows"),
-            print(&errors(calibration)),
+            &format!("{poses} within ellipsoids of the posterior [95 % confidence]"),
+            print(&coverage(calibration)),
         );
-        add(format!("{label}: predicted probabilities"), print(&events(calibration)));
-        add(format!("{label}: failures"), format!("- {}\n", failures(calibration)));
+        add("errors and what the information in the frames allows", print(&errors(calibration)));
+        add("predicted probabilities", print(&events(calibration)));
+        add("failures", format!("- {}\n", failures(calibration)));
     }
     let failed: String = tables.failures.iter().map(|f| format!("- {}\n", f.sentence())).collect();
     match tables.failures.len() {
@@ -55,39 +53,29 @@ fn document(tables: &Tables, marks: [&str; 2], print: fn(&TextTable) -> String) 
 
 /// The tables of a level of noise, with their headings: of `table`, which is over all objects, and of each of `objects`.
 fn of_level(study: Kind, table: &Table, objects: &[&Table]) -> Vec<(String, TextTable)> {
-    // Of many faults times many objects nobody reads a table.
-    let objects = if objects.len() > 1 && study != Kind::Robustness { objects } else { &[] };
-    let name = |row: &str| row_label(study, row);
-    let name_of_object = |object: &Table, row: &str| {
-        format!("object {}: {}", object.object.unwrap_or(0), row_label(study, row))
-    };
     let shown = present(table, &SHOWN);
     let errors: Vec<usize> = shown.iter().copied().filter(|m| ERRORS.contains(m)).collect();
+    let lines = |heading, metrics| Lines::new(study, heading, metrics);
 
-    let mut means = Lines::new("mean", &shown);
-    let mut medians = Lines::new("median", &shown);
+    let [mut means, mut medians] = ["mean", "median"].map(|heading| lines(heading, &shown));
+    let mut changes = lines("change %", &errors);
     for row in &table.rows {
-        means.add_row(name(&row.name), table, row, |e| {
-            Some(with_interval(number, e.mean, e.interval))
-        });
+        means.add_row(table, row, |e| Some(with_interval(number, e.mean, e.interval)));
         means.add_published(row.published, |v| format!("{v:.2}"));
-        medians.add_row(name(&row.name), table, row, |e| Some(number(e.median)));
+        medians.add_row(table, row, |e| Some(number(e.median)));
+        if row.name != TRUTH && row.name != INITIAL {
+            let show = |v: f64| format!("{v:+.1}");
+            changes.add_row(table, row, |e| {
+                e.change.map(|change| with_interval(show, change.percent, change.interval))
+            });
+            changes.add_published(row.published_change, |v| format!("{v:+.0}"));
+        }
     }
-    let mut changes = Lines::new("change %", &errors);
-    for row in table.rows.iter().filter(|r| r.name != TRUTH && r.name != INITIAL) {
-        changes.add_row(name(&row.name), table, row, |e| {
-            let change = e.change?;
-            Some(with_interval(|v| format!("{v:+.1}"), change.percent, change.interval))
-        });
-        changes.add_published(row.published_change, |v| format!("{v:+.0}"));
-    }
+    let change = "change of the mean against the initial pose, % [95 % confidence]";
     let mut out = vec![
         (format!("means over {} frames [95 % confidence]", table.frames), means.table),
         ("medians".to_owned(), medians.table),
-        (
-            "change of the mean against the initial pose, % [95 % confidence]".to_owned(),
-            changes.table,
-        ),
+        (change.to_owned(), changes.table),
     ];
 
     let against = table.comparisons.first().map(|first| match study {
@@ -95,35 +83,32 @@ fn of_level(study: Kind, table: &Table, objects: &[&Table]) -> Vec<(String, Text
         _ => first.reference.as_str(),
     });
     if let Some(against) = against {
-        let mut differences = Lines::new("difference", &errors);
-        let mut ratios = Lines::new("ratio", &errors);
+        let mut differences = lines("difference", &errors);
+        let mut ratios = lines("ratio", &errors);
         for comparison in &table.comparisons {
-            differences.add_comparison(name(&comparison.row), table, comparison, difference);
-            ratios.add_comparison(name(&comparison.row), table, comparison, ratio);
+            differences.add_comparison(table, comparison, difference);
+            ratios.add_comparison(table, comparison, ratio);
         }
         let heading =
             |what: &str| format!("mean {what} that of {against}, same frames [95 % confidence]");
         out.extend([(heading("less"), differences.table), (heading("over"), ratios.table)]);
     }
-    if objects.is_empty() {
-        return out;
-    }
-    let mut means = Lines::new("mean", &shown);
-    let mut ratios = Lines::new("ratio", &errors);
-    for object in objects {
-        for row in &object.rows {
-            let label = name_of_object(object, &row.name);
-            means.add_row(label, object, row, |e| Some(number(e.mean)));
+    // Of many faults times many objects nobody reads a table.
+    if objects.len() > 1 && study != Kind::Robustness {
+        let (mut means, mut ratios) = (lines("mean", &shown), lines("ratio", &errors));
+        for table in objects {
+            for row in &table.rows {
+                means.add_row(table, row, |e| Some(number(e.mean)));
+            }
+            for comparison in &table.comparisons {
+                ratios.add_comparison(table, comparison, ratio);
+            }
         }
-        for comparison in &object.comparisons {
-            let label = name_of_object(object, &comparison.row);
-            ratios.add_comparison(label, object, comparison, ratio);
-        }
-    }
-    out.push(("means by object".into(), means.table));
-    if let Some(against) = against {
-        let title = format!("mean over that of {against} by object, same frames [95 % confidence]");
-        out.push((title, ratios.table));
+        out.push(("means by object".into(), means.table));
+        out.extend(against.map(|against| {
+            let what = format!("mean over that of {against} by object");
+            (format!("{what}, same frames [95 % confidence]"), ratios.table)
+        }));
     }
     out
 }
@@ -146,14 +131,15 @@ fn present(table: &Table, candidates: &[usize]) -> Vec<usize> {
 
 /// A table of some metrics.
 struct Lines<'a> {
+    study: Kind,
     metrics: &'a [usize],
     table: TextTable,
 }
 
 impl<'a> Lines<'a> {
-    fn new(first: &'static str, metrics: &'a [usize]) -> Self {
+    fn new(study: Kind, first: &'static str, metrics: &'a [usize]) -> Self {
         let names = metrics.iter().map(|&m| COLUMNS[m]);
-        Self { metrics, table: TextTable::new([first, "n"].into_iter().chain(names)) }
+        Self { study, metrics, table: TextTable::new([first, "n"].into_iter().chain(names)) }
     }
 
     fn add(&mut self, label: String, frames: String, cell: impl Fn(usize) -> Option<String>) {
@@ -161,14 +147,31 @@ impl<'a> Lines<'a> {
         self.table.push([label, frames].into_iter().chain(cells).collect());
     }
 
-    fn add_row(
+    /// Adds numbers of `n` frames of `table`.
+    fn add_ours(
         &mut self,
-        label: String,
         table: &Table,
-        row: &Row,
-        cell: impl Fn(&Estimate) -> Option<String>,
+        row: &str,
+        n: usize,
+        cell: impl Fn(usize) -> Option<String>,
     ) {
-        self.add(label, format!("{}/{}", row.n, table.frames), |m| cell(row.metrics[m].as_ref()?));
+        let object = table.object.map_or_else(String::new, |id| format!("object {id}: "));
+        let label = object + &row_label(self.study, row);
+        self.add(label, format!("{n}/{}", table.frames), cell);
+    }
+
+    fn add_row(&mut self, table: &Table, row: &Row, cell: impl Fn(&Estimate) -> Option<String>) {
+        self.add_ours(table, &row.name, row.n, |m| cell(row.metrics[m].as_ref()?));
+    }
+
+    fn add_comparison(
+        &mut self,
+        table: &Table,
+        comparison: &Comparison,
+        cell: impl Fn(&Contrast) -> Option<String>,
+    ) {
+        let n = comparison.metrics.iter().flatten().map(|c| c.n).max().unwrap_or(0);
+        self.add_ours(table, &comparison.row, n, |m| cell(comparison.metrics[m].as_ref()?));
     }
 
     /// A row of published figures, below ours.
@@ -176,18 +179,6 @@ impl<'a> Lines<'a> {
         if let Some(values) = values {
             self.add("· published".into(), String::new(), |m| values[m].map(&show));
         }
-    }
-
-    fn add_comparison(
-        &mut self,
-        label: String,
-        table: &Table,
-        comparison: &Comparison,
-        cell: impl Fn(&Contrast) -> Option<String>,
-    ) {
-        let n = comparison.metrics.iter().flatten().map(|c| c.n).max().unwrap_or(0);
-        let cell = |m: usize| cell(comparison.metrics[m].as_ref()?);
-        self.add(label, format!("{n}/{}", table.frames), cell);
     }
 }
 

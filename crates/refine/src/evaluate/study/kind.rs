@@ -1,5 +1,7 @@
 //! The studies: the paper's four, and those that measure the fused estimator.
 
+use std::path::{Path, PathBuf};
+
 use serde::{Deserialize, Serialize};
 use strum::{Display, IntoStaticStr, VariantArray};
 
@@ -58,21 +60,16 @@ impl Kind {
     pub fn methods(self) -> Vec<&'static str> {
         match self {
             Self::Main => vec!["icp", "icp-best", "robust-icp", "combined", "fused"],
-            Self::Gradients => vec![
-                "depth",
-                "tactile",
-                "rendering",
-                "physics",
-                "physics-best",
-                "robust-icp",
-                "combined",
-            ],
+            Self::Gradients => {
+                let each = ["depth", "tactile", "rendering", "physics", "physics-best"];
+                [&each[..], &["robust-icp", "combined"]].concat()
+            }
             Self::Noise => vec!["robust-icp", "combined", "fused"],
             Self::Steps => vec!["combined-free"],
-            Self::Evidence => ["fused"]
-                .into_iter()
-                .chain(NamedMethod::ablations().iter().map(|m| m.name))
-                .collect(),
+            Self::Evidence => {
+                let ablations = NamedMethod::ablations().iter().map(|m| m.name);
+                ["fused"].into_iter().chain(ablations).collect()
+            }
             Self::Posterior => vec!["fused"],
             Self::Robustness => vec!["robust-icp", "fused"],
         }
@@ -87,22 +84,15 @@ impl Kind {
         }
     }
 
-    /// The levels of noise that the paper has in this table, or that the study takes if it is not the paper's.
-    pub(super) fn levels(self) -> &'static [&'static str] {
-        match self {
+    /// The levels of noise that a dataset brings, with their files, `init_low.csv` and `init_high.csv`: those that the paper
+    /// has in this table, or that the study takes if it is not the paper's.
+    pub fn levels_of(self, dataset: &Path) -> Vec<(String, PathBuf)> {
+        let levels: &[&str] = match self {
             Self::Gradients | Self::Evidence | Self::Robustness => &["low"],
             Self::Main | Self::Noise | Self::Steps | Self::Posterior => &["low", "high"],
-        }
-    }
-
-    /// The iterations at which poses are compared if the last one is `iterations`; the paper's 100, 200, 400, 600 and
-    /// 1000 for 1000.
-    pub(super) fn steps(iterations: usize) -> Vec<usize> {
-        let mut steps: Vec<usize> =
-            [1, 2, 4, 6, 10].iter().map(|tenths| iterations * tenths / 10).collect();
-        steps.retain(|&step| step > 0);
-        steps.dedup();
-        steps
+        };
+        let file = |level: &&str| ((*level).to_owned(), dataset.join(format!("init_{level}.csv")));
+        levels.iter().map(file).filter(|(_, file)| file.is_file()).collect()
     }
 }
 
@@ -117,11 +107,5 @@ mod tests {
                 assert!(NamedMethod::find(name).is_some(), "{name}");
             }
         }
-    }
-
-    #[test]
-    fn steps_are_those_of_the_paper() {
-        assert_eq!(Kind::steps(1000), [100, 200, 400, 600, 1000]);
-        assert_eq!(Kind::steps(5), [1, 2, 3, 5]);
     }
 }

@@ -46,6 +46,13 @@ pub(super) struct RowOutcome {
     pub(super) failed: Option<String>,
 }
 
+impl RowOutcome {
+    /// A row without a pose, and why.
+    pub(super) fn failed(row: &str, reason: String) -> Self {
+        Self { row: row.into(), failed: Some(reason), ..Self::default() }
+    }
+}
+
 impl FrameRecord {
     /// How messages name the frame.
     pub fn label(&self) -> String {

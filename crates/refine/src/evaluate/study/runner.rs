@@ -64,9 +64,11 @@ impl<'a> Runner<'a> {
         let row = &frame.row;
         let mut seconds = Vec::new();
         let mut outcomes = Vec::new();
-        let truth = self.scorer.true_pose(row).map(|pose| (pose, None));
-        outcomes.push(self.outcome(TRUTH, row, truth.map_err(|e| e.to_string())));
-        outcomes.push(self.outcome(INITIAL, row, Ok((row.t_cam_model, None))));
+        outcomes.push(match self.scorer.true_pose(row) {
+            Ok(truth) => self.outcome(TRUTH, row, truth, None),
+            Err(error) => RowOutcome::failed(TRUTH, error.to_string()),
+        });
+        outcomes.push(self.outcome(INITIAL, row, row.t_cam_model, None));
         // Every sweep begins without a fault: that is run once for all of them.
         let mut unperturbed: BTreeMap<String, Vec<RowOutcome>> = BTreeMap::new();
         for trial in self.design.trials() {
@@ -97,47 +99,36 @@ impl<'a> Runner<'a> {
 
     /// The outcomes of the rows of a trial, and the seconds that it took.
     fn run_trial(&mut self, frame: &Frame, trial: &Trial) -> (Vec<RowOutcome>, Option<f64>) {
-        let refined = self
-            .methods
-            .iter()
-            .find(|(name, _)| *name == trial.method)
-            .ok_or_else(|| format!("there is no method {}", trial.method))
-            .and_then(|(_, method)| {
-                self.refine(frame, method, trial.fault).map_err(|e| e.to_string())
-            });
-        let row = &frame.row;
+        let refined = match self.methods.iter().find(|(name, _)| *name == trial.method) {
+            Some((_, method)) => {
+                self.refine(frame, method, trial.fault).map_err(|error| error.to_string())
+            }
+            None => Err(format!("there is no method {}", trial.method)),
+        };
         let refined = match refined {
             Ok(refined) => refined,
             Err(reason) => {
-                let failed = |r: &String| self.outcome(r, row, Err(reason.clone()));
+                let failed = |row: &String| RowOutcome::failed(row, reason.clone());
                 return (trial.rows.iter().map(failed).collect(), None);
             }
         };
-        let poses = trial.rows.iter().zip(&refined.poses);
-        let mut outcomes: Vec<RowOutcome> = poses
-            .map(|(name, (pose, at))| self.outcome(name, row, Ok((*pose, Some(*at)))))
-            .collect();
-        if let Some(posterior) = refined.posterior.filter(|_| self.needs_posterior()) {
-            for (outcome, (pose, _)) in outcomes.iter_mut().zip(&refined.poses) {
-                let Ok(truth) =
-                    self.scorer.true_pose(&ResultRow { t_cam_model: *pose, ..row.clone() })
-                else {
-                    continue;
-                };
-                let belief = PredictedPosterior::new(&posterior, &refined.object, &truth);
+        let posterior = refined.posterior.filter(|_| self.design.study == Kind::Posterior);
+        let mut outcomes = Vec::new();
+        for (name, &(pose, iteration)) in trial.rows.iter().zip(&refined.poses) {
+            let mut outcome = self.outcome(name, &frame.row, pose, Some(iteration));
+            let truth =
+                self.scorer.true_pose(&ResultRow { t_cam_model: pose, ..frame.row.clone() });
+            if let (Some(posterior), Ok(truth)) = (&posterior, truth) {
+                let belief = PredictedPosterior::new(posterior, &refined.object, &truth);
                 if belief.is_finite() {
                     outcome.belief = Some(belief);
                 } else if outcome.failed.is_none() {
                     outcome.failed = Some("the posterior is not finite".into());
                 }
             }
+            outcomes.push(outcome);
         }
         (outcomes, Some(refined.seconds))
-    }
-
-    /// Whether the study compares posteriors with the truth.
-    fn needs_posterior(&self) -> bool {
-        self.design.study == Kind::Posterior
     }
 
     /// Refines a frame, with a fault of the observation if there is one.
@@ -179,24 +170,17 @@ impl<'a> Runner<'a> {
         Ok(Refined { poses, seconds, object, posterior })
     }
 
+    /// The outcome of a row whose pose is `pose`.
     fn outcome(
         &mut self,
         name: &str,
         row: &ResultRow,
-        pose: Result<(Isometry3<f64>, Option<usize>), String>,
+        pose: Isometry3<f64>,
+        iteration: Option<usize>,
     ) -> RowOutcome {
-        let failure = |reason: String| RowOutcome {
-            row: name.into(),
-            failed: Some(reason),
-            ..RowOutcome::default()
-        };
-        let (pose, iteration) = match pose {
-            Ok(found) => found,
-            Err(reason) => return failure(reason),
-        };
         let plain = PlainPose::from(&pose);
         if !plain.is_finite() {
-            return failure("the pose is not finite".into());
+            return RowOutcome::failed(name, "the pose is not finite".into());
         }
         let scored = self.scorer.score(&ResultRow { t_cam_model: pose, ..row.clone() });
         let (score, failed) = match scored {

@@ -77,7 +77,8 @@ fn panel(
     let mut panel = Panel::new(area, left - margin..right + margin, 0.0..top, &axes)?;
     if let Some(initial) = initial {
         let level = [(left, initial), (right, initial)];
-        panel.dashes(level, [2, 4], BLACK.mix(0.6).stroke_width(1))?;
+        let style = BLACK.mix(0.6).stroke_width(1);
+        panel.chart.draw_series(DashedLineSeries::new(level, 2, 4, style))?;
     }
     for (k, (name, points)) in curves.iter().enumerate() {
         panel.means(points, color(k + 1).stroke_width(2), named.then_some(name))?;

@@ -32,9 +32,9 @@ pub(super) struct Axes<'a> {
 }
 
 /// A panel with curves.
-pub(super) struct Panel<'a, X: Ranged<ValueType = f64>>(
-    ChartContext<'a, SVGBackend<'a>, Cartesian2d<X, RangedCoordf64>>,
-);
+pub(super) struct Panel<'a, X: Ranged<ValueType = f64>> {
+    pub(super) chart: ChartContext<'a, SVGBackend<'a>, Cartesian2d<X, RangedCoordf64>>,
+}
 
 /// A point of a curve of means: place, mean, and the ends of the mean's interval.
 pub(super) type Mean = (f64, f64, [f64; 2]);
@@ -64,7 +64,7 @@ impl<'a, X: Ranged<ValueType = f64> + ValueFormatter<f64>> Panel<'a, X> {
             .x_desc(axes.x)
             .y_desc(axes.y)
             .draw()?;
-        Ok(Self(chart))
+        Ok(Self { chart })
     }
 
     /// Draws a line, with its points if they are `marked`; with a label it is in the legend.
@@ -76,7 +76,7 @@ impl<'a, X: Ranged<ValueType = f64> + ValueFormatter<f64>> Panel<'a, X> {
         label: Option<&str>,
     ) -> Drawn {
         let line = LineSeries::new(points, style).point_size(if marked { 3 } else { 0 });
-        let series = self.0.draw_series(line)?;
+        let series = self.chart.draw_series(line)?;
         if let Some(label) = label {
             let swatch = move |(x, y)| PathElement::new([(x, y), (x + 18, y)], style);
             series.label(label).legend(swatch);
@@ -93,30 +93,13 @@ impl<'a, X: Ranged<ValueType = f64> + ValueFormatter<f64>> Panel<'a, X> {
     ) -> Drawn {
         self.line(points.iter().map(|&(x, y, _)| (x, y)), style, true, label)?;
         let interval = |&(x, _, [low, high]): &Mean| PathElement::new([(x, low), (x, high)], style);
-        self.0.draw_series(points.iter().map(interval))?;
-        Ok(())
-    }
-
-    /// Draws a line of dashes with gaps between them \[px\].
-    pub(super) fn dashes(
-        &mut self,
-        points: impl IntoIterator<Item = (f64, f64), IntoIter: Clone>,
-        [dash, gap]: [u32; 2],
-        style: ShapeStyle,
-    ) -> Drawn {
-        self.0.draw_series(DashedLineSeries::new(points, dash, gap, style))?;
-        Ok(())
-    }
-
-    /// Draws circles around points.
-    pub(super) fn circles(&mut self, points: &[(f64, f64)], style: ShapeStyle) -> Drawn {
-        self.0.draw_series(points.iter().map(|&at| Circle::new(at, 4, style)))?;
+        self.chart.draw_series(points.iter().map(interval))?;
         Ok(())
     }
 
     /// Draws the legend of what has a label.
     pub(super) fn legend(&mut self, position: SeriesLabelPosition) -> Drawn {
-        self.0
+        self.chart
             .configure_series_labels()
             .position(position)
             .background_style(WHITE.mix(0.85))

@@ -54,20 +54,16 @@ pub(super) fn draw(
                 (name, [(0.0, 0.0)].into_iter().chain(points).collect())
             };
             let curves: Vec<Curve> = (0..ELLIPSOIDS.len()).map(curve).collect();
-            panel(
-                area,
-                &curves,
-                "nominal probability of the ellipsoid, %",
-                "holds the truth, %",
-                false,
-            )
+            let x = "nominal probability of the ellipsoid, %";
+            panel(area, &curves, x, "holds the truth, %", false)
         }
     })
 }
 
 fn panel(area: &Area<'_>, curves: &[Curve], x: &str, y: &str, marked: bool) -> Drawn {
     let mut panel = Panel::new(area, 0.0..100.0, 0.0..100.0, &Axes { x, y, left: 58 })?;
-    panel.dashes([(0.0, 0.0), (100.0, 100.0)], [6, 5], BLACK.mix(0.5).stroke_width(1))?;
+    let (ideal, style) = ([(0.0, 0.0), (100.0, 100.0)], BLACK.mix(0.5).stroke_width(1));
+    panel.chart.draw_series(DashedLineSeries::new(ideal, 6, 5, style))?;
     for (k, (name, points)) in curves.iter().enumerate() {
         panel.line(points.clone(), color(k + 1).stroke_width(2), marked, Some(name))?;
     }

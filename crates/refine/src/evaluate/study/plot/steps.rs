@@ -49,8 +49,9 @@ fn panel(area: &Area<'_>, metric: usize, all: &[&Table], named: bool) -> Drawn {
     for (k, (table, (ours, theirs))) in all.iter().zip(&curves).enumerate() {
         let (color, label) = (color(k + 1), format!("noise {}", table.level));
         panel.means(ours, color.stroke_width(2), named.then_some(&label))?;
-        panel.dashes(theirs.iter().copied(), [6, 5], color.stroke_width(1))?;
-        panel.circles(theirs, color.stroke_width(1))?;
+        let style = color.stroke_width(1);
+        panel.chart.draw_series(DashedLineSeries::new(theirs.iter().copied(), 6, 5, style))?;
+        panel.chart.draw_series(theirs.iter().map(|&at| Circle::new(at, 4, style)))?;
     }
     if named {
         panel.legend(SeriesLabelPosition::UpperRight)?;
