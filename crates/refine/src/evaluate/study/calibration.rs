@@ -1,7 +1,5 @@
 //! Calibration of predicted posteriors: coverage, reliability, and ranking of failures.
 
-use std::collections::BTreeMap;
-
 use serde::Serialize;
 
 use super::bootstrap::{Resamples, interval};
@@ -9,14 +7,8 @@ use super::chi_square::chi_square_cdf;
 use super::design::Design;
 use super::kind::Kind;
 use super::posterior::{EVENTS, PredictedPosterior};
-use super::prediction::{
-    Bin, Prediction, area_under_roc, area_under_roc_error, brier_score, calibration_error,
-    calibration_error_by_chance, equal_count_bins,
-};
-use super::record::FrameRecord;
-
-/// Bins of equal counts that calibration errors are made of.
-pub(super) const BINS: usize = 10;
+use super::prediction::{EventCalibration, Prediction, area_under_roc, area_under_roc_interval};
+use super::record::Records;
 
 /// Nominal coverage of the ellipsoids.
 const NOMINAL: [f64; 3] = [0.5, 0.9, 0.95];
@@ -24,7 +16,7 @@ const NOMINAL: [f64; 3] = [0.5, 0.9, 0.95];
 /// Parts of the pose with an ellipsoid, and their degrees of freedom, in the order of [`PredictedPosterior::squared`].
 pub(super) const ELLIPSOIDS: [(&str, u32); 3] = [("pose", 6), ("place", 3), ("orientation", 3)];
 
-/// Seed of the bootstrap and of simulated outcomes.
+/// Seed of the bootstrap.
 const SEED: u64 = 3;
 
 /// The calibration of one method.
@@ -87,30 +79,8 @@ pub(super) struct Coverage {
     pub(super) interval: Option<[f64; 2]>,
 }
 
-/// Predicted probabilities of one event.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub(super) struct EventCalibration {
-    /// The event.
-    pub(super) event: &'static str,
-    /// Mean predicted probability.
-    pub(super) predicted: f64,
-    /// Observed frequency.
-    pub(super) share: f64,
-    /// Expected calibration error over ten bins of equal counts.
-    pub(super) calibration_error: f64,
-    /// Mean calibration error of outcomes simulated from the predicted probabilities.
-    pub(super) by_chance: f64,
-    /// Brier score.
-    pub(super) brier: f64,
-    /// The bins.
-    pub(super) bins: Vec<Bin>,
-}
-
 /// Calibrations by level and method; where there are several levels, also over all of them.
-pub(super) fn calibrations(
-    design: &Design,
-    records: &BTreeMap<usize, FrameRecord>,
-) -> Vec<Calibration> {
+pub(super) fn calibrations(design: &Design, records: &Records) -> Vec<Calibration> {
     if design.study != Kind::Posterior {
         return Vec::new();
     }
@@ -125,7 +95,7 @@ pub(super) fn calibrations(
 
 /// The posteriors of `method` at a level, or at all levels.
 pub(super) fn posteriors<'a>(
-    records: &'a BTreeMap<usize, FrameRecord>,
+    records: &'a Records,
     level: Option<&str>,
     method: &str,
 ) -> Vec<&'a PredictedPosterior> {
@@ -145,54 +115,37 @@ pub(super) fn ellipsoid_levels<'a>(
 
 impl Calibration {
     /// `None` without posteriors.
-    fn new(
-        level: Option<&str>,
-        method: &str,
-        records: &BTreeMap<usize, FrameRecord>,
-    ) -> Option<Self> {
+    fn new(level: Option<&str>, method: &str, records: &Records) -> Option<Self> {
         let posteriors = posteriors(records, level, method);
         let n = posteriors.len();
-        let mut events = Vec::new();
-        for (k, event) in EVENTS.iter().enumerate() {
-            let predictions: Vec<Prediction> =
-                posteriors.iter().map(|b| (b.within[k], b.occurred(event))).collect();
-            events.push(EventCalibration {
-                event: event.name,
-                predicted: predictions.iter().map(|p| p.0).sum::<f64>() / n as f64,
-                share: predictions.iter().filter(|p| p.1).count() as f64 / n as f64,
-                calibration_error: calibration_error(&predictions, BINS)?,
-                by_chance: calibration_error_by_chance(&predictions, BINS, SEED)?,
-                brier: brier_score(&predictions)?,
-                bins: equal_count_bins(&predictions, BINS),
-            });
+        if n == 0 {
+            return None;
         }
-        let (last, within) = (EVENTS.len() - 1, &EVENTS[EVENTS.len() - 1]);
-        let failing: Vec<Prediction> =
-            posteriors.iter().map(|b| (1.0 - b.within[last], !b.occurred(within))).collect();
+        let place = posteriors.iter().map(|b| (b.distance_mm, b.bounds[0]));
+        let place = RootMeanSquare::new("place mm", place);
+        let orientation = posteriors.iter().map(|b| (b.angle_deg, b.bounds[1]));
+        let orientation = RootMeanSquare::new("orientation °", orientation);
+        let predictions = |k: usize| -> Vec<Prediction> {
+            posteriors.iter().map(|b| (b.within[k], b.occurred(&EVENTS[k]))).collect()
+        };
+        let events = EVENTS.iter().enumerate();
+        let events = events.map(|(k, event)| EventCalibration::new(event.name, &predictions(k)));
+        let failing: Vec<Prediction> = predictions(EVENTS.len() - 1)
+            .iter()
+            .map(|(probability, occurred)| (1.0 - probability, !occurred))
+            .collect();
         let failures = failing.iter().filter(|f| f.1).count();
         let auroc = area_under_roc(&failing);
         Some(Self {
             level: level.map(str::to_owned),
             method: method.into(),
             n,
-            errors: [
-                RootMeanSquare::new(
-                    "place mm",
-                    posteriors.iter().map(|b| (b.distance_mm, b.bounds[0])),
-                ),
-                RootMeanSquare::new(
-                    "orientation °",
-                    posteriors.iter().map(|b| (b.angle_deg, b.bounds[1])),
-                ),
-            ],
+            errors: [place, orientation],
             coverage: coverage(&posteriors),
-            events,
+            events: events.collect::<Option<_>>()?,
             failures,
             auroc,
-            auroc_interval: auroc.map(|area| {
-                let half = 1.96 * area_under_roc_error(area, failures, n - failures);
-                [(area - half).max(0.0), (area + half).min(1.0)]
-            }),
+            auroc_interval: auroc.map(|area| area_under_roc_interval(area, failures, n - failures)),
         })
     }
 
@@ -224,17 +177,18 @@ fn coverage(posteriors: &[&PredictedPosterior]) -> Vec<Coverage> {
 pub(super) mod tests {
     use super::super::csv::calibration_csv;
     use super::super::design::MethodSettings;
+    use super::super::prediction::BINS;
     use super::super::tables::tests::example;
     use super::*;
     use prehend_geometry::SplitMix64;
 
     /// A study whose method is as sure as it should be: two levels of `n` frames each.
-    pub(in super::super) fn calibrated(n: usize) -> (Design, BTreeMap<usize, FrameRecord>) {
+    pub(in super::super) fn calibrated(n: usize) -> (Design, Records) {
         let (mut design, records) = example();
         design.study = Kind::Posterior;
         design.methods = vec![MethodSettings { name: "combined".into(), settings: String::new() }];
         let mut random = SplitMix64::new(1);
-        let mut made = BTreeMap::new();
+        let mut made = Records::new();
         for index in 0..2 * n {
             let mut record = records[&(3 * (index / n))].clone();
             record.outcomes.retain(|o| o.row != "robust-icp");

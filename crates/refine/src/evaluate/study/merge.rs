@@ -1,13 +1,12 @@
 //! Shards of a study put together.
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
 use super::design::{Design, Shard};
 use super::output::RECORDS;
-use super::record::FrameRecord;
+use super::record::{FrameRecord, Records};
 use crate::data::{Identity, Journal, JournalError};
 
 /// Why shards do not make a study.
@@ -28,9 +27,9 @@ const FREE: [&str; 2] = ["dataset", "shard"];
 ///
 /// # Errors
 /// If a folder holds no records, or they are of different studies, or frames are missing.
-pub fn merge(folders: &[PathBuf]) -> Result<(Design, BTreeMap<usize, FrameRecord>), MergeError> {
+pub fn merge(folders: &[PathBuf]) -> Result<(Design, Records), MergeError> {
     let mut first: Option<(PathBuf, Identity, Design)> = None;
-    let mut records: BTreeMap<usize, FrameRecord> = BTreeMap::new();
+    let mut records = Records::new();
     let mut shards = Vec::new();
     for folder in folders {
         let file = folder.join(RECORDS);

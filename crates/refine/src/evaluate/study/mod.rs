@@ -26,7 +26,7 @@ pub use design::{Design, Frame, Level, MethodSettings, Shard};
 pub use kind::Kind;
 pub use merge::merge;
 pub use output::{RECORDS, TIMES, write_outputs};
-pub use record::FrameRecord;
+pub use record::{FrameRecord, Records};
 pub use runner::{FrameResult, Runner};
 pub use sweep::Sweep;
 pub use tables::Failure;

@@ -1,13 +1,12 @@
 //! What a study leaves in its folder.
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use super::csv::{calibration_csv, csv};
 use super::design::Design;
 use super::document::{markdown, text};
 use super::plot::plots;
-use super::record::FrameRecord;
+use super::record::Records;
 use super::tables::{Failure, Tables};
 use crate::data::bop::{DatasetError, write_atomically};
 
@@ -23,7 +22,7 @@ pub const TIMES: &str = "times.csv";
 pub fn write_outputs(
     folder: &Path,
     design: &Design,
-    records: &BTreeMap<usize, FrameRecord>,
+    records: &Records,
 ) -> Result<(Vec<Failure>, Vec<PathBuf>), DatasetError> {
     let tables = Tables::new(design, records);
     let json = serde_json::to_string_pretty(&tables).map_err(|e| e.to_string());

@@ -6,6 +6,12 @@ use serde::Serialize;
 /// A predicted probability, and whether the event occurred.
 pub(super) type Prediction = (f64, bool);
 
+/// Bins of equal counts that calibration errors are made of.
+pub(super) const BINS: usize = 10;
+
+/// Seed of simulated outcomes.
+const SEED: u64 = 3;
+
 /// Predictions of similar probability.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub(super) struct Bin {
@@ -17,9 +23,44 @@ pub(super) struct Bin {
     pub(super) share: f64,
 }
 
+/// Predicted probabilities of one event.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(super) struct EventCalibration {
+    /// The event.
+    pub(super) event: &'static str,
+    /// Mean predicted probability.
+    pub(super) predicted: f64,
+    /// Observed frequency.
+    pub(super) share: f64,
+    /// Expected calibration error over ten bins of equal counts.
+    pub(super) calibration_error: f64,
+    /// Mean calibration error of outcomes simulated from the predicted probabilities.
+    pub(super) by_chance: f64,
+    /// Brier score.
+    pub(super) brier: f64,
+    /// The bins.
+    pub(super) bins: Vec<Bin>,
+}
+
+impl EventCalibration {
+    /// Of the predictions of an event; `None` without any.
+    pub(super) fn new(event: &'static str, predictions: &[Prediction]) -> Option<Self> {
+        let n = predictions.len() as f64;
+        Some(Self {
+            event,
+            predicted: predictions.iter().map(|p| p.0).sum::<f64>() / n,
+            share: predictions.iter().filter(|p| p.1).count() as f64 / n,
+            calibration_error: calibration_error(predictions, BINS)?,
+            by_chance: calibration_error_by_chance(predictions, BINS)?,
+            brier: brier_score(predictions)?,
+            bins: equal_count_bins(predictions, BINS),
+        })
+    }
+}
+
 /// The predictions in the order of their probabilities, in `bins` bins of equal counts, to within one; fewer where there are
 /// fewer predictions.
-pub(super) fn equal_count_bins(predictions: &[Prediction], bins: usize) -> Vec<Bin> {
+fn equal_count_bins(predictions: &[Prediction], bins: usize) -> Vec<Bin> {
     let mut sorted = predictions.to_vec();
     sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
     let (total, bins) = (sorted.len(), bins.min(sorted.len()));
@@ -38,7 +79,7 @@ pub(super) fn equal_count_bins(predictions: &[Prediction], bins: usize) -> Vec<B
 
 /// Expected calibration error: the mean distance of predicted probability and share over [`equal_count_bins`], weighted by
 /// their counts (Naeini, Cooper and Hauskrecht, AAAI 2015, with bins of equal counts); `None` without predictions.
-pub(super) fn calibration_error(predictions: &[Prediction], bins: usize) -> Option<f64> {
+fn calibration_error(predictions: &[Prediction], bins: usize) -> Option<f64> {
     let total = predictions.len();
     let bins = equal_count_bins(predictions, bins);
     let off = |b: &Bin| b.n as f64 * (b.predicted - b.share).abs() / total as f64;
@@ -46,14 +87,9 @@ pub(super) fn calibration_error(predictions: &[Prediction], bins: usize) -> Opti
 }
 
 /// Mean [`calibration_error`] of outcomes drawn from the predicted probabilities: the bias of the estimate for so few predictions.
-/// Deterministic for a `seed`.
-pub(super) fn calibration_error_by_chance(
-    predictions: &[Prediction],
-    bins: usize,
-    seed: u64,
-) -> Option<f64> {
+fn calibration_error_by_chance(predictions: &[Prediction], bins: usize) -> Option<f64> {
     const DRAWS: usize = 200;
-    let mut random = SplitMix64::new(seed);
+    let mut random = SplitMix64::new(SEED);
     let mut sum = 0.0;
     for _ in 0..DRAWS {
         let drawn: Vec<Prediction> =
@@ -64,7 +100,7 @@ pub(super) fn calibration_error_by_chance(
 }
 
 /// Mean squared distance of predicted probability and outcome (Brier, 1950); `None` without predictions.
-pub(super) fn brier_score(predictions: &[Prediction]) -> Option<f64> {
+fn brier_score(predictions: &[Prediction]) -> Option<f64> {
     let square = |&(p, came): &Prediction| (p - f64::from(u8::from(came))).powi(2);
     let total = predictions.len();
     (total > 0).then(|| predictions.iter().map(square).sum::<f64>() / total as f64)
@@ -87,8 +123,14 @@ pub(super) fn area_under_roc(scores: &[Prediction]) -> Option<f64> {
     (positives > 0.0 && negatives > 0.0).then(|| wins / (positives * negatives))
 }
 
+/// Confidence interval, 95 %, of an [`area_under_roc`].
+pub(super) fn area_under_roc_interval(area: f64, positives: usize, negatives: usize) -> [f64; 2] {
+    let half = 1.96 * area_under_roc_error(area, positives, negatives);
+    [(area - half).max(0.0), (area + half).min(1.0)]
+}
+
 /// Standard error of [`area_under_roc`] (Hanley and McNeil, Radiology 1982, with their exponential model of scores).
-pub(super) fn area_under_roc_error(area: f64, positives: usize, negatives: usize) -> f64 {
+fn area_under_roc_error(area: f64, positives: usize, negatives: usize) -> f64 {
     let (p, n) = (positives as f64, negatives as f64);
     let square = area * area;
     let (q1, q2) = (area / (2.0 - area), 2.0 * square / (1.0 + area));
@@ -131,11 +173,11 @@ mod tests {
             (0..n).map(|k| ((k as f64 + 0.5) / n as f64, false)).collect()
         };
         let [few, many] =
-            [100, 10_000].map(|n| calibration_error_by_chance(&spread(n), 10, 3).unwrap());
+            [100, 10_000].map(|n| calibration_error_by_chance(&spread(n), 10).unwrap());
         // Of a bin of 10 whose variance is about 1/6 a count, the mean distance is √(2/π/60) = 0.10.
         assert!((few - 0.10).abs() < 0.015, "{few}");
         assert!((many - 0.1 * few).abs() < 0.2 * many, "{many}");
-        assert_eq!(calibration_error_by_chance(&[(1.0, true), (0.0, true)], 10, 3), Some(0.0));
+        assert_eq!(calibration_error_by_chance(&[(1.0, true), (0.0, true)], 10), Some(0.0));
     }
 
     #[test]

@@ -1,10 +1,15 @@
 //! Records of a study: one per frame.
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize};
 
 use super::posterior::PredictedPosterior;
 use crate::data::PlainPose;
 use crate::evaluate::metrics::PoseScore;
+
+/// The records of a study, by frame.
+pub type Records = BTreeMap<usize, FrameRecord>;
 
 /// One initial pose and the results of all methods.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

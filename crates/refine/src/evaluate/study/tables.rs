@@ -1,7 +1,5 @@
 //! Statistics of a study's records, beside the published figures.
 
-use std::collections::BTreeMap;
-
 use serde::Serialize;
 
 use super::bootstrap::{Pair, Resamples, interval};
@@ -10,7 +8,7 @@ use super::comparison::{Comparison, comparisons};
 use super::design::Design;
 use super::kind::{INITIAL, Kind, TRUTH};
 use super::published::{Published, published};
-use super::record::{FrameRecord, column};
+use super::record::{FrameRecord, Records, column};
 use crate::evaluate::metrics::{COLUMNS, Statistic};
 
 /// Seed of the resampling.
@@ -114,7 +112,7 @@ pub struct Failure {
 
 impl Tables {
     /// Summarizes the records of a study, by frame.
-    pub(super) fn new(design: &Design, records: &BTreeMap<usize, FrameRecord>) -> Self {
+    pub(super) fn new(design: &Design, records: &Records) -> Self {
         let (rows, pairs) = (design.rows(), design.pairs());
         let mut all = Vec::new();
         let mut failures = Vec::new();
@@ -156,6 +154,13 @@ impl Tables {
     /// The tables over all objects.
     pub(super) fn overall(&self) -> impl Iterator<Item = &Table> {
         self.all.iter().filter(|b| b.object.is_none())
+    }
+}
+
+impl Table {
+    /// The row called `name`.
+    pub(super) fn row(&self, name: &str) -> Option<&Row> {
+        self.rows.iter().find(|row| row.name == name)
     }
 }
 
@@ -242,7 +247,7 @@ pub(super) mod tests {
     use crate::evaluate::metrics::{Contact, PoseScore};
 
     /// Two levels, two objects, three frames each; at the first level one method fails on the last frame.
-    pub(in super::super) fn example() -> (Design, BTreeMap<usize, FrameRecord>) {
+    pub(in super::super) fn example() -> (Design, Records) {
         let level = |name: &str, unreadable: &[&str]| Level {
             name: name.into(),
             poses: "0".into(),
@@ -263,7 +268,7 @@ pub(super) mod tests {
             backend: "cpu".into(),
             shard: Shard::WHOLE,
         };
-        let mut records = BTreeMap::new();
+        let mut records = Records::new();
         for index in 0..6 {
             let (level, frame) = (index / 3, index % 3);
             let initial = (1 + frame) as f64 * (1 + level) as f64;

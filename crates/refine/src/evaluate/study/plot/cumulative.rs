@@ -1,24 +1,18 @@
 //! The share of frames with at most some error.
 
-use std::collections::BTreeMap;
-
 use plotters::prelude::*;
 
 use super::page::{Area, Axes, DEVIATIONS, Drawn, Panel, color, end, failed, page};
 use crate::evaluate::metrics::COLUMNS;
 use crate::evaluate::study::document::row_label;
 use crate::evaluate::study::kind::TRUTH;
-use crate::evaluate::study::record::FrameRecord;
+use crate::evaluate::study::record::Records;
 use crate::evaluate::study::tables::{Table, Tables};
 
 /// A row's label and its sorted errors.
 type Curve = (String, Vec<f64>);
 
-pub(super) fn draw(
-    tables: &Tables,
-    table: &Table,
-    records: &BTreeMap<usize, FrameRecord>,
-) -> Result<String, String> {
+pub(super) fn draw(tables: &Tables, table: &Table, records: &Records) -> Result<String, String> {
     let title = format!("{}, noise {}", tables.study.title(), table.level);
     let legend = format!(
         "share of {} frames whose error is at most so large; frames without a result never are{}",

@@ -7,18 +7,16 @@ mod page;
 mod reliability;
 mod steps;
 
-use std::collections::BTreeMap;
-
 use super::design::Design;
 use super::kind::Kind;
-use super::record::FrameRecord;
+use super::record::Records;
 use super::tables::Tables;
 
 /// File names and documents.
 pub(super) fn plots(
     design: &Design,
     tables: &Tables,
-    records: &BTreeMap<usize, FrameRecord>,
+    records: &Records,
 ) -> Vec<(String, Result<String, String>)> {
     let mut out = Vec::new();
     for table in tables.overall() {
@@ -57,10 +55,7 @@ mod tests {
     use crate::evaluate::study::tables::tests::example;
 
     /// The plots of a study, each of which must be a document that has all `words`.
-    fn drawn(
-        (design, records): &(Design, BTreeMap<usize, FrameRecord>),
-        words: &[&str],
-    ) -> Vec<(String, String)> {
+    fn drawn((design, records): &(Design, Records), words: &[&str]) -> Vec<(String, String)> {
         let check = |(name, svg): (String, Result<String, String>)| {
             let svg = svg.unwrap();
             assert!(svg.starts_with("<svg") && svg.trim_end().ends_with("</svg>"));

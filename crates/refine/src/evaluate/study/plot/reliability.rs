@@ -1,13 +1,11 @@
 //! Reliability diagrams: observed frequency over predicted probability.
 
-use std::collections::BTreeMap;
-
 use plotters::prelude::*;
 
 use super::page::{Area, Axes, Drawn, Panel, color, page};
 use crate::evaluate::study::calibration::{Calibration, ELLIPSOIDS, ellipsoid_levels, posteriors};
 use crate::evaluate::study::posterior::EVENTS;
-use crate::evaluate::study::record::FrameRecord;
+use crate::evaluate::study::record::Records;
 use crate::evaluate::study::tables::Tables;
 
 /// A name and points, in per cent.
@@ -19,7 +17,7 @@ const PANELS: [std::ops::Range<usize>; 3] = [0..3, 3..6, 6..EVENTS.len()];
 pub(super) fn draw(
     tables: &Tables,
     calibration: &Calibration,
-    records: &BTreeMap<usize, FrameRecord>,
+    records: &Records,
 ) -> Result<String, String> {
     let title = format!("{}: {}", tables.study.title(), calibration.label());
     let legend = format!(
