@@ -4,22 +4,36 @@ use serde::{Deserialize, Serialize};
 
 use super::vsd::VSD_TOLERANCES;
 
-/// Headings of the columns of [`PoseScore::values`], with units.
-pub(crate) const COLUMNS: [&str; 13] = [
-    "PE cm",
-    "OE °",
-    "OEsym °",
-    "ADD mm",
-    "ADI mm",
-    "MSSD mm",
-    "MSPD px",
-    "CA cm²",
-    "IV cm³",
-    "|ΔCA| cm²",
-    "|ΔIV| cm³",
-    "VSD",
-    "AR",
+/// A metric's heading, with its unit, and its value.
+type Metric = (&'static str, fn(&PoseScore) -> Option<f64>);
+
+/// The metrics in the order of their columns; of the recalls, BOP's average.
+const METRICS: [Metric; 13] = [
+    ("PE cm", |s| s.pe_cm),
+    ("OE °", |s| s.oe_deg),
+    ("OEsym °", |s| s.oe_symmetric_deg),
+    ("ADD mm", |s| s.add_mm),
+    ("ADI mm", |s| s.adi_mm),
+    ("MSSD mm", |s| s.mssd_mm),
+    ("MSPD px", |s| s.mspd_px),
+    ("CA cm²", |s| s.ca_cm2),
+    ("IV cm³", |s| s.iv_cm3),
+    ("|ΔCA| cm²", |s| s.delta_ca_cm2),
+    ("|ΔIV| cm³", |s| s.delta_iv_cm3),
+    ("VSD", |s| s.vsd),
+    ("AR", |s| s.recall.map(|r| r.average())),
 ];
+
+/// Headings of the columns of [`PoseScore::values`], with units.
+pub(crate) const COLUMNS: [&str; METRICS.len()] = {
+    let mut headings = [""; METRICS.len()];
+    let mut k = 0;
+    while k < headings.len() {
+        headings[k] = METRICS[k].0;
+        k += 1;
+    }
+    headings
+};
 
 /// The metrics of one pose; what was not computed is `None`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -55,21 +69,7 @@ pub struct PoseScore {
 impl PoseScore {
     /// The metrics in the order of the fields; of the recalls, BOP's average.
     pub fn values(&self) -> [Option<f64>; COLUMNS.len()] {
-        [
-            self.pe_cm,
-            self.oe_deg,
-            self.oe_symmetric_deg,
-            self.add_mm,
-            self.adi_mm,
-            self.mssd_mm,
-            self.mspd_px,
-            self.ca_cm2,
-            self.iv_cm3,
-            self.delta_ca_cm2,
-            self.delta_iv_cm3,
-            self.vsd,
-            self.recall.map(|r| r.average()),
-        ]
+        METRICS.map(|(_, value)| value(self))
     }
 
     /// Adds contact area and intersection volume, and their deviations from those of the true pose.

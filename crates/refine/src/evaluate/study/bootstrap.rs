@@ -49,9 +49,7 @@ impl Resamples {
 
 /// Two columns over the rows that both have.
 pub(super) struct Pair {
-    /// Number of rows.
     pub(super) n: usize,
-    /// Arithmetic means.
     pub(super) means: [f64; 2],
     resampled: [Vec<f64>; 2],
 }
@@ -104,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn the_mean_of_coins_is_binomial() {
+    fn intervals_are_those_of_the_textbook() {
         // 40 of 100: the mean of a resample is Binomial(100, 0.4)/100, whose 2.5 % and 97.5 % quantiles are 0.31 and 0.50.
         let means = Resamples::new(100, 1).means(&column(100, |i| f64::from(u8::from(i < 40))));
         let [low, high] = interval(&means).unwrap();
@@ -112,10 +110,7 @@ mod tests {
         let mean = means.iter().sum::<f64>() / REPLICATES as f64;
         // Its standard error is √(0.24/100/2000) = 0.0011.
         assert!((mean - 0.4).abs() < 0.004, "{mean}");
-    }
 
-    #[test]
-    fn the_interval_of_a_normal_sample_is_that_of_the_textbook() {
         let mut random = SplitMix64::new(5);
         let sample: Vec<f64> = (0..400).map(|_| 3.0 + 2.0 * random.normal()).collect();
         let mean = sample.iter().sum::<f64>() / 400.0;

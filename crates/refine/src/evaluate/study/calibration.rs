@@ -24,15 +24,12 @@ const SEED: u64 = 3;
 pub(super) struct Calibration {
     /// Level of noise; `None` for all together.
     pub(super) level: Option<String>,
-    /// The method.
     pub(super) method: String,
     /// Poses with a posterior.
     pub(super) n: usize,
     /// Root mean square errors of position \[mm\] and orientation \[°\] with their Cramér–Rao bounds.
     pub(super) errors: [RootMeanSquare; 2],
-    /// Coverage of the posterior's ellipsoids.
     pub(super) coverage: Vec<Coverage>,
-    /// Predicted probabilities by event.
     pub(super) events: Vec<EventCalibration>,
     /// Poses that are not within 5 mm and 5°.
     pub(super) failures: usize,
@@ -48,9 +45,7 @@ pub(super) struct Calibration {
 pub(super) struct RootMeanSquare {
     /// The error, with its unit.
     pub(super) of: &'static str,
-    /// Root mean square.
     pub(super) found: f64,
-    /// Median.
     pub(super) median: f64,
     /// Root mean square of the Cramér–Rao bounds.
     pub(super) bound: f64,
@@ -71,7 +66,6 @@ impl RootMeanSquare {
 pub(super) struct Coverage {
     /// Part of the pose: pose, place or orientation.
     pub(super) of: &'static str,
-    /// Nominal probability.
     pub(super) nominal: f64,
     /// Observed share.
     pub(super) share: f64,
@@ -176,9 +170,8 @@ fn coverage(posteriors: &[&PredictedPosterior]) -> Vec<Coverage> {
 #[cfg(test)]
 pub(super) mod tests {
     use super::super::csv::calibration_csv;
-    use super::super::design::MethodSettings;
     use super::super::prediction::BINS;
-    use super::super::tables::tests::example;
+    use super::super::tables::tests::{example, methods};
     use super::*;
     use prehend_geometry::SplitMix64;
 
@@ -186,7 +179,7 @@ pub(super) mod tests {
     pub(in super::super) fn calibrated(n: usize) -> (Design, Records) {
         let (mut design, records) = example();
         design.study = Kind::Posterior;
-        design.methods = vec![MethodSettings { name: "combined".into(), settings: String::new() }];
+        design.methods = methods(&["combined"]);
         let mut random = SplitMix64::new(1);
         let mut made = Records::new();
         for index in 0..2 * n {

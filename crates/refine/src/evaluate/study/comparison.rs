@@ -12,9 +12,7 @@ const SEED: u64 = 2;
 /// A row of a table compared with another one.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(super) struct Comparison {
-    /// The row.
     pub(super) row: String,
-    /// What it is compared with.
     pub(super) reference: String,
     /// By metric; `None` where no frame has both.
     pub(super) metrics: [Option<Contrast>; COLUMNS.len()],
@@ -27,11 +25,9 @@ pub(super) struct Contrast {
     pub(super) n: usize,
     /// Mean of the row less that of the reference.
     pub(super) difference: f64,
-    /// Confidence interval of the difference.
     pub(super) difference_interval: Option<[f64; 2]>,
     /// Mean of the row over that of the reference, unless that is zero.
     pub(super) ratio: Option<f64>,
-    /// Confidence interval of the ratio.
     pub(super) ratio_interval: Option<[f64; 2]>,
 }
 

@@ -19,41 +19,28 @@ pub(super) fn csv(tables: &Tables) -> Result<Vec<u8>, ::csv::Error> {
         for row in &table.rows {
             let compared = table.comparisons.iter().find(|c| c.row == row.name);
             for (m, metric) in tables.metrics.iter().enumerate() {
-                let published = row.published.and_then(|p| p[m]);
                 let Some(estimate) = &row.metrics[m] else { continue };
                 let [low, high] = ends(estimate.interval);
-                let change = estimate.change;
-                let [change_low, change_high] = ends(change.and_then(|c| c.interval));
+                let change = estimate.change.map(|c| c.percent);
+                let [change_low, change_high] = ends(estimate.change.and_then(|c| c.interval));
+                let published = row.published.and_then(|p| p[m]);
                 let contrast = compared.and_then(|c| c.metrics[m]);
-                let reference = compared.filter(|_| contrast.is_some());
+                let reference = compared.filter(|_| contrast.is_some()).map(|c| &c.reference);
+                let difference = contrast.map(|c| c.difference);
                 let [difference_low, difference_high] =
                     ends(contrast.and_then(|c| c.difference_interval));
+                let ratio = contrast.and_then(|c| c.ratio);
                 let [ratio_low, ratio_high] = ends(contrast.and_then(|c| c.ratio_interval));
-                out.write_record([
-                    study.to_owned(),
-                    table.level.clone(),
-                    text(table.object),
-                    row.name.clone(),
-                    (*metric).to_owned(),
-                    table.frames.to_string(),
-                    estimate.n.to_string(),
-                    estimate.mean.to_string(),
-                    low,
-                    high,
-                    estimate.median.to_string(),
-                    text(change.map(|c| c.percent)),
-                    change_low,
-                    change_high,
-                    text(published),
-                    text(reference.map(|c| &c.reference)),
-                    text(contrast.map(|c| c.difference)),
-                    difference_low,
-                    difference_high,
-                    text(contrast.and_then(|c| c.ratio)),
-                    ratio_low,
-                    ratio_high,
-                    String::new(),
-                ])?;
+                let (mean, median) = (Some(estimate.mean), Some(estimate.median));
+
+                let names = [study, &table.level, &text(table.object), &row.name, metric];
+                let counts = [table.frames, estimate.n].map(|n| n.to_string());
+                let own = [mean, low, high, median, change, change_low, change_high, published];
+                let other =
+                    [difference, difference_low, difference_high, ratio, ratio_low, ratio_high];
+                let cells = [&names.map(str::to_owned)[..], &counts, &own.map(text)];
+                let rest = [&[text(reference)][..], &other.map(text), &[String::new()]];
+                out.write_record([cells, rest].concat().concat())?;
             }
         }
     }
@@ -74,7 +61,7 @@ pub(super) fn calibration_csv(calibrations: &[Calibration]) -> Result<Vec<u8>, :
     out.write_record(["level", "method", "n", "what", "of", "value", "low", "high"])?;
     for c in calibrations {
         let mut line = |what: &str, of: &str, value: f64, interval: Option<[f64; 2]>| {
-            let [low, high] = ends(interval);
+            let [low, high] = ends(interval).map(text);
             out.write_record([
                 c.level.as_deref().unwrap_or(""),
                 &c.method,
@@ -114,8 +101,8 @@ fn text<T: Display>(value: Option<T>) -> String {
     value.map_or_else(String::new, |v| v.to_string())
 }
 
-fn ends(interval: Option<[f64; 2]>) -> [String; 2] {
-    [text(interval.map(|i| i[0])), text(interval.map(|i| i[1]))]
+fn ends(interval: Option<[f64; 2]>) -> [Option<f64>; 2] {
+    [interval.map(|i| i[0]), interval.map(|i| i[1])]
 }
 
 #[cfg(test)]

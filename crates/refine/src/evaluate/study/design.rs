@@ -66,7 +66,6 @@ pub struct MethodSettings {
 /// One run of a method on a frame.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Trial {
-    /// Name of the method.
     pub(super) method: String,
     /// The fault of the observation and its amount; `None` at the start of a sweep.
     pub(super) fault: Option<(Sweep, f64)>,
@@ -235,6 +234,7 @@ impl fmt::Display for Shard {
 
 #[cfg(test)]
 mod tests {
+    use super::super::tables::tests::{example, methods};
     use super::*;
 
     #[test]
@@ -261,10 +261,9 @@ mod tests {
 
     #[test]
     fn trials_and_pairs_follow_from_the_methods() {
-        let (mut design, _) = super::super::tables::tests::example();
+        let (mut design, _) = example();
         assert_eq!(design.rows(), ["truth", "initial", "combined", "robust-icp"]);
-        let method = |name: &str| MethodSettings { name: name.into(), settings: String::new() };
-        design.methods = vec![method("robust-icp"), method("fused")];
+        design.methods = methods(&["robust-icp", "fused"]);
         let pair = |a: &str, b: &str| (a.to_owned(), b.to_owned());
         assert_eq!(design.pairs(), [pair("fused", "robust-icp")]);
         design.study = Kind::Evidence;

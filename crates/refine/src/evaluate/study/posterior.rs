@@ -47,7 +47,6 @@ pub(super) struct PredictedPosterior {
     pub(super) squared: [Option<f64>; 3],
     /// Predicted probabilities of [`EVENTS`].
     pub(super) within: [f64; EVENTS.len()],
-    /// Number of hypotheses.
     pub(super) hypotheses: usize,
     /// Posterior probability of the best hypothesis.
     pub(super) weight: f64,

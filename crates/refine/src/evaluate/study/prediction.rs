@@ -19,26 +19,21 @@ pub(super) struct Bin {
     pub(super) n: usize,
     /// Mean of the predicted probabilities.
     pub(super) predicted: f64,
-    /// Observed frequency.
     pub(super) share: f64,
 }
 
 /// Predicted probabilities of one event.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(super) struct EventCalibration {
-    /// The event.
     pub(super) event: &'static str,
     /// Mean predicted probability.
     pub(super) predicted: f64,
-    /// Observed frequency.
     pub(super) share: f64,
     /// Expected calibration error over ten bins of equal counts.
     pub(super) calibration_error: f64,
     /// Mean calibration error of outcomes simulated from the predicted probabilities.
     pub(super) by_chance: f64,
-    /// Brier score.
     pub(super) brier: f64,
-    /// The bins.
     pub(super) bins: Vec<Bin>,
 }
 

@@ -21,7 +21,6 @@ pub(super) const ERRORS: [usize; 9] = [0, 1, 2, 3, 4, 5, 6, 9, 10];
 /// All tables of a study.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(super) struct Tables {
-    /// Which study.
     pub(super) study: Kind,
     /// Names and units of the metrics.
     pub(super) metrics: [&'static str; COLUMNS.len()],
@@ -31,14 +30,12 @@ pub(super) struct Tables {
     /// Calibration of the posteriors; in the confidence study.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(super) calibrations: Vec<Calibration>,
-    /// What failed.
     pub(super) failures: Vec<Failure>,
 }
 
 /// One level of noise, over all objects or one.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(super) struct Table {
-    /// Level of noise.
     pub(super) level: String,
     /// The object; `None` for all.
     pub(super) object: Option<u32>,
@@ -73,11 +70,9 @@ pub(super) struct Row {
 pub(super) struct Estimate {
     /// Frames that have it.
     pub(super) n: usize,
-    /// Arithmetic mean.
     pub(super) mean: f64,
     /// Confidence interval of the mean, 95 %.
     pub(super) interval: Option<[f64; 2]>,
-    /// Median.
     pub(super) median: f64,
     /// Change of the mean against the initial pose, over the frames that have both; for errors only.
     pub(super) change: Option<Change>,
@@ -246,6 +241,12 @@ pub(super) mod tests {
     use super::*;
     use crate::evaluate::metrics::{Contact, PoseScore};
 
+    /// Methods whose settings do not matter.
+    pub(in super::super) fn methods(names: &[&str]) -> Vec<MethodSettings> {
+        let method = |name: &&str| MethodSettings { name: (*name).into(), settings: String::new() };
+        names.iter().map(method).collect()
+    }
+
     /// Two levels, two objects, three frames each; at the first level one method fails on the last frame.
     pub(in super::super) fn example() -> (Design, Records) {
         let level = |name: &str, unreadable: &[&str]| Level {
@@ -254,14 +255,13 @@ pub(super) mod tests {
             frames: 3,
             unreadable: unreadable.iter().map(|&t| t.into()).collect(),
         };
-        let method = |name: &str| MethodSettings { name: name.into(), settings: String::new() };
         let design = Design {
             study: Kind::Main,
             dataset: "ds".into(),
             annotations: "0".into(),
             levels: vec![level("low", &["line 9: R: 3 numbers"]), level("high", &[])],
             filters: String::new(),
-            methods: vec![method("combined"), method("robust-icp")],
+            methods: methods(&["combined", "robust-icp"]),
             steps: Vec::new(),
             sweeps: Vec::new(),
             seed: 0,
@@ -272,20 +272,12 @@ pub(super) mod tests {
         for index in 0..6 {
             let (level, frame) = (index / 3, index % 3);
             let initial = (1 + frame) as f64 * (1 + level) as f64;
-            let outcome = |row: &str, factor: f64| RowOutcome {
-                row: row.into(),
-                score: Some(
-                    PoseScore {
-                        pe_cm: Some(factor * initial),
-                        oe_deg: Some(5.0),
-                        ..Default::default()
-                    }
-                    .with_contact(
-                        Contact { area_cm2: 30.0 + factor, volume_cm3: factor * initial },
-                        Contact { area_cm2: 30.0, volume_cm3: 0.0 },
-                    ),
-                ),
-                ..RowOutcome::default()
+            let outcome = |row: &str, factor: f64| {
+                let errors = [Some(factor * initial), Some(5.0)];
+                let score = PoseScore { pe_cm: errors[0], oe_deg: errors[1], ..Default::default() };
+                let touch = Contact { area_cm2: 30.0 + factor, volume_cm3: factor * initial };
+                let score = score.with_contact(touch, Contact { area_cm2: 30.0, volume_cm3: 0.0 });
+                RowOutcome { row: row.into(), score: Some(score), ..RowOutcome::default() }
             };
             let mut outcomes = vec![
                 outcome("truth", 0.0),
@@ -294,11 +286,7 @@ pub(super) mod tests {
                 outcome("robust-icp", 2.0),
             ];
             if index == 2 {
-                outcomes[3] = RowOutcome {
-                    row: "robust-icp".into(),
-                    failed: Some("no pixel".into()),
-                    ..RowOutcome::default()
-                };
+                outcomes[3] = RowOutcome::failed("robust-icp", "no pixel".into());
             }
             let record = FrameRecord {
                 level: design.levels[level].name.clone(),
