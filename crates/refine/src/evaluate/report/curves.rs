@@ -44,14 +44,9 @@ fn draw(trace: &Trace, svg: &mut String) -> Result<(), Box<dyn std::error::Error
         .x_desc("iteration")
         .y_desc("loss / initial loss")
         .draw()?;
-    let colors = [
-        RGBColor(31, 119, 180),
-        RGBColor(214, 39, 40),
-        RGBColor(44, 160, 44),
-        RGBColor(148, 103, 189),
-    ];
-    for (i, (name, points)) in trace.terms.iter().zip(curves).enumerate() {
-        let color = colors[i % colors.len()];
+    let colors = [(31, 119, 180), (214, 39, 40), (44, 160, 44), (148, 103, 189)];
+    let colors = colors.into_iter().map(|(r, g, b)| RGBColor(r, g, b)).cycle();
+    for ((name, points), color) in trace.terms.iter().zip(curves).zip(colors) {
         chart
             .draw_series(LineSeries::new(points, color.stroke_width(2)))?
             .label(name)

@@ -14,11 +14,11 @@ use crate::strategy::Trace;
 /// The pictures of one refined frame.
 pub struct FrameReport {
     /// The initial pose's outline beside the refined one's.
-    pub picture: RgbImage,
+    picture: RgbImage,
     /// Loss curves, as SVG.
-    pub curves: String,
+    curves: String,
     /// What to say below.
-    pub caption: String,
+    caption: String,
 }
 
 impl FrameReport {

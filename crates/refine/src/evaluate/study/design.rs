@@ -79,11 +79,11 @@ pub struct Frame {
     /// Number among all frames of the study.
     pub index: usize,
     /// Number of its level.
-    pub level: usize,
+    pub(super) level: usize,
     /// The initial pose.
-    pub row: ResultRow,
+    pub(super) row: ResultRow,
     /// Which of the image's rows it is.
-    pub instance: usize,
+    pub(super) instance: usize,
 }
 
 impl Level {

@@ -15,13 +15,13 @@ pub type Records = BTreeMap<usize, FrameRecord>;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FrameRecord {
     /// Level of noise of the initial pose.
-    pub level: String,
+    pub(super) level: String,
     /// Scene of the split.
-    pub scene_id: u32,
+    pub(super) scene_id: u32,
     /// Image of the scene.
-    pub im_id: u32,
+    pub(super) im_id: u32,
     /// The object.
-    pub obj_id: u32,
+    pub(super) obj_id: u32,
     /// One a row of the study's table, in the design's order.
     pub(super) outcomes: Vec<RowOutcome>,
 }

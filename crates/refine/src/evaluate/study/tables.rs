@@ -91,15 +91,15 @@ pub(super) struct Change {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Failure {
     /// Level of noise.
-    pub level: String,
+    pub(super) level: String,
     /// The object, where it is known.
-    pub object: Option<u32>,
+    pub(super) object: Option<u32>,
     /// Which frame.
-    pub frame: String,
+    pub(super) frame: String,
     /// Which rows of the table lack it.
-    pub rows: Vec<String>,
+    pub(super) rows: Vec<String>,
     /// Why.
-    pub reason: String,
+    pub(super) reason: String,
     /// Whether a fault was added to the observation: the failure is then a finding.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub perturbed: bool,
