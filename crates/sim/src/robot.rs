@@ -2,10 +2,9 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Isometry3, Vector3};
 use prehend_autodiff::Fwd;
-use prehend_geometry::robot::{KinematicTree, LinkShape, RobotShape};
-use prehend_geometry::{DistanceField, FieldSample};
+use prehend_geometry::robot::{KinematicTree, RobotShape};
 
 use crate::error::SimulationError;
 use crate::state::State;
@@ -54,19 +53,6 @@ impl<C: Fn(f64) -> JointState> DrivenRobot<C> {
     }
 }
 
-/// Distance to a link, in its frame.
-struct LinkField(Arc<LinkShape>);
-
-impl DistanceField for LinkField {
-    fn sample(&self, point: &Point3<f64>, reach: f64) -> Option<FieldSample> {
-        self.0.grid()?.sample(point, reach)
-    }
-
-    fn distance(&self, point: &Point3<f64>, reach: f64) -> Option<f64> {
-        self.0.grid()?.distance(point, reach)
-    }
-}
-
 impl World {
     /// Adds the links of `robot` that have a shape as driven bodies with a distance field, named after them, and returns
     /// each link's body, in the order of [`KinematicTree::links`]. The base stands at `t_world_base`; `joints` says
@@ -104,7 +90,7 @@ impl World {
             shape.grid()?;
             let driven = Arc::clone(&driven);
             let body = Body::driven(&robot.links()[link].name, move |t: f64| driven.link(link, t));
-            Some(self.add(body.with_field(Arc::new(LinkField(Arc::clone(shape))))))
+            Some(self.add(body.with_field(shape.clone())))
         });
         Ok(bodies.collect())
     }
@@ -112,7 +98,7 @@ impl World {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::Matrix3;
+    use nalgebra::{Matrix3, Point3};
     use prehend_autodiff::lie::so3_log;
 
     use super::*;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector, Isometry3, Point3, Vector3, Vector6};
 use prehend_autodiff::lie::twist_row;
 
-use super::{Drive, KinematicTree, Motion, PosedRobot, RobotError, RobotShape};
+use super::{KinematicTree, PosedRobot, RobotError, RobotShape, Screw};
 use crate::field::{DistanceField, FieldSample};
 
 /// A robot posed by its base and its joints: a [`PosedRobot`] that knows how each link moves.
@@ -31,19 +31,9 @@ pub struct ArticulatedRobot {
     center: Point3<f64>,
     /// Joints that move, in the world.
     screws: Vec<Screw>,
-    /// For each link the screws that move it, from the base to the link.
+    /// For each link the screws that move it, from the link to the base.
     paths: Vec<Vec<usize>>,
     variables: usize,
-}
-
-/// The motion of a joint by an entry of the joint vector: multiplier included, in the world frame.
-#[derive(Clone, Copy, Debug)]
-struct Screw {
-    variable: usize,
-    /// Rate of rotation \[1\].
-    angular: Vector3<f64>,
-    /// Velocity of the point of the body at the world's origin \[m/rad or 1\].
-    linear: Vector3<f64>,
 }
 
 /// A signed distance to a robot and its gradient by all that can move.
@@ -86,22 +76,7 @@ impl ArticulatedRobot {
         robot.check_finite(joints)?;
         let poses: Vec<Isometry3<f64>> =
             robot.forward_kinematics(joints).iter().map(|t| t_world_base * t).collect();
-        let mut screws = Vec::new();
-        let mut paths: Vec<Vec<usize>> = vec![Vec::new(); poses.len()];
-        for &j in &robot.order {
-            let joint = &robot.joints[j];
-            paths[joint.child] = paths[joint.parent].clone();
-            let Drive::Variable { index, multiplier, .. } = joint.drive else { continue };
-            let t_world_joint = poses[joint.parent] * joint.t_parent_joint;
-            let axis = t_world_joint.rotation * joint.axis.into_inner() * multiplier;
-            let (angular, linear) = match joint.motion {
-                Motion::Fixed => continue,
-                Motion::Revolute => (axis, t_world_joint.translation.vector.cross(&axis)),
-                Motion::Prismatic => (Vector3::zeros(), axis),
-            };
-            paths[joint.child].push(screws.len());
-            screws.push(Screw { variable: index, angular, linear });
-        }
+        let (screws, paths) = (robot.screws(&poses), robot.paths());
         let posed = PosedRobot::new(shape, poses)?;
         let center = Point3::from(t_world_base.translation.vector);
         Ok(Self { posed, center, screws, paths, variables: joints.len() })
@@ -138,9 +113,9 @@ impl ArticulatedRobot {
         link: usize,
         point: &Point3<f64>,
     ) -> impl Iterator<Item = (usize, Vector3<f64>)> {
-        let screws = self.paths[link].iter().map(|&s| &self.screws[s]);
-        let point = point.coords;
-        screws.map(move |s| (s.variable, s.linear + s.angular.cross(&point)))
+        let screws = self.paths[link].iter().rev().map(|&s| &self.screws[s]);
+        let point = *point;
+        screws.map(move |s| (s.variable, s.velocity(&point)))
     }
 
     /// Second derivatives of the distance of `sample`, taken at `point`: rows and columns are the point (3), the left
@@ -149,7 +124,6 @@ impl ArticulatedRobot {
     /// The twist enters by the exponential map; its Hessian is taken at zero. From the product of exponentials (Brockett
     /// 1984): the point in the frame of the undisturbed link is `exp(−Sₖ qₖ) … exp(−S₁ q₁) exp(−δ) p`.
     pub fn hessian(&self, point: &Point3<f64>, sample: &RobotSample) -> DMatrix<f64> {
-        let p = &point.coords;
         // From what acts first on the point to what acts last.
         let mut directions = Vec::new();
         for i in 0..3 {
@@ -165,9 +139,9 @@ impl ArticulatedRobot {
             let first = -axis.cross(&(point - self.center));
             directions.push(Direction { row: 6 + i, first, turn: -axis });
         }
-        for &s in &self.paths[sample.link] {
+        for &s in self.paths[sample.link].iter().rev() {
             let screw = &self.screws[s];
-            let first = -(screw.linear + screw.angular.cross(p));
+            let first = -screw.velocity(point);
             directions.push(Direction { row: 9 + screw.variable, first, turn: -screw.angular });
         }
         let (g, h) = (sample.field.gradient, sample.field.hessian);

@@ -8,6 +8,7 @@ mod kinematics;
 mod limits;
 mod origin;
 mod posed;
+mod screw;
 mod shape;
 mod tree;
 mod urdf;
@@ -20,6 +21,7 @@ pub use articulated::{ArticulatedRobot, RobotSample};
 pub use closest::RobotClosest;
 pub use error::RobotError;
 pub use posed::PosedRobot;
+pub use screw::Screw;
 pub use shape::{LinkShape, RobotShape};
 
 use crate::mesh::TriMesh;

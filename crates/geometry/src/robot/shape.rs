@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use super::{KinematicTree, RobotError};
 use crate::closest::ClosestPoints;
+use crate::field::{DistanceField, FieldSample};
 use crate::mesh::TriMesh;
 use crate::sdf::{GridCache, SdfGrid};
 
@@ -66,6 +67,17 @@ impl LinkShape {
     /// understates the depth, which never exceeds the depth in the union.
     pub fn signed_distance(&self, point: &Point3<f64>) -> f64 {
         union_distance(&self.closest, point)
+    }
+}
+
+/// That of the grid, in the link frame; nothing is near a link without bodies.
+impl DistanceField for LinkShape {
+    fn sample(&self, point: &Point3<f64>, reach: f64) -> Option<FieldSample> {
+        self.grid()?.sample(point, reach)
+    }
+
+    fn distance(&self, point: &Point3<f64>, reach: f64) -> Option<f64> {
+        self.grid()?.distance(point, reach)
     }
 }
 

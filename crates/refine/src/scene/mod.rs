@@ -21,5 +21,4 @@ pub(crate) use look_at::look_at;
 pub use object::{DEFAULT_DENSITY, Inertial, Object};
 pub(crate) use observation::check_gravity;
 pub use observation::{HandMeasurement, Observation};
-pub(crate) use sensing::feel;
 pub use sequence::{Sequence, SequenceFrame, default_sequence};

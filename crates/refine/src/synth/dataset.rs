@@ -5,10 +5,10 @@ use std::path::Path;
 
 use prehend_render::{Mask, depth_map};
 
-use super::files::{FRAME_FOLDERS, FrameFiles, SceneFiles, write_models};
-use super::hand_files::{TAXELS, URDF, taxel_table};
+use super::files::{FRAME_FOLDERS, FrameFiles, write_entries, write_models};
+use super::hand_files::write_hand;
 use crate::data::AssetError;
-use crate::data::bop::{ResultRow, create_folder, write_atomically, write_results};
+use crate::data::bop::{ResultRow, create_folder, write_results};
 use crate::scene::Scene;
 
 /// The only scene.
@@ -28,7 +28,7 @@ pub fn write_dataset(dir: &Path, scenes: &[Scene]) -> Result<(), AssetError> {
     for folder in FRAME_FOLDERS.map(|name| scene_dir.join(name)) {
         create_folder(&folder)?;
     }
-    let mut files = SceneFiles::default();
+    let mut frames = BTreeMap::new();
     let mut objects = BTreeMap::new();
     let mut rows = Vec::new();
     for (im_id, scene) in (0_u32..).zip(scenes) {
@@ -44,7 +44,7 @@ pub fn write_dataset(dir: &Path, scenes: &[Scene]) -> Result<(), AssetError> {
             visible: &seen.mask,
             joint_names: scene.hand.tree.joint_names(),
         };
-        files.add(im_id as usize, &recorded.write(&scene_dir, im_id, 0)?);
+        frames.insert(im_id as usize, recorded.write(&scene_dir, im_id, 0)?);
         objects.insert(scene.obj_id, (scene.object.mesh.clone(), &scene.object.inertial));
         rows.push(ResultRow {
             scene_id: SCENE_ID,
@@ -55,14 +55,12 @@ pub fn write_dataset(dir: &Path, scenes: &[Scene]) -> Result<(), AssetError> {
             time: -1.0,
         });
     }
-    files.write(&scene_dir)?;
+    write_entries(&scene_dir, &frames)?;
     for folder in ["models", "models_eval"] {
         write_models(&dir.join(folder), &objects)?;
     }
     if let Some(scene) = scenes.first() {
-        create_folder(&dir.join("hand"))?;
-        write_atomically(&dir.join(URDF), scene.urdf.as_bytes())?;
-        write_atomically(&dir.join(TAXELS), taxel_table(&scene.hand.taxels).as_bytes())?;
+        write_hand(dir, &scene.urdf, &scene.hand.taxels)?;
     }
     Ok(write_results(&dir.join("init.csv"), &rows)?)
 }

@@ -31,26 +31,9 @@ pub enum SynthError {
         /// The folder.
         dir: PathBuf,
     },
-    /// A number that must be above zero is not.
-    #[error("{setting} must be above zero")]
-    Zero {
-        /// The setting.
-        setting: &'static str,
-    },
-    /// Two objects have the same number.
-    #[error("two objects have the number {obj_id}")]
-    SameObject {
-        /// The number.
-        obj_id: u32,
-    },
-    /// An object cannot be used in this hand at all.
-    #[error("object {obj_id}: {reason}")]
-    Object {
-        /// The object's number.
-        obj_id: u32,
-        /// What is wrong.
-        reason: String,
-    },
+    /// A number is zero that must not be, two objects have the same number, or one cannot be used in this hand at all.
+    #[error("{0}")]
+    Argument(String),
     /// A file cannot be read or written, or an object prepared.
     #[error(transparent)]
     Asset(#[from] AssetError),

@@ -1,7 +1,6 @@
 //! The files of a dataset in the making: folders, images, one entry an image in each JSON file of a scene, and models.
 
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
@@ -16,21 +15,23 @@ use crate::data::AssetError;
 use crate::data::bop::{DatasetError, create_folder, write_atomically};
 use crate::scene::{Inertial, Observation};
 
-/// Removes what was being written in the folder when a process ended: such files are hidden and end in `.tmp`.
+/// Removes what was being written in the folder and below when a process ended: such files are hidden and end in `.tmp`.
 pub(super) fn remove_temporary(folder: &Path) -> Result<(), DatasetError> {
-    let Ok(entries) = fs::read_dir(folder) else { return Ok(()) };
+    let entries = fs::read_dir(folder).map_err(|e| DatasetError::reading(folder, &e))?;
     for entry in entries.flatten() {
-        let name = entry.file_name();
+        let (file, name) = (entry.path(), entry.file_name());
         let name = name.to_string_lossy();
-        if name.starts_with('.') && name.ends_with(".tmp") {
-            fs::remove_file(entry.path()).map_err(|e| fault(&entry.path(), &e))?;
+        if entry.file_type().is_ok_and(|t| t.is_dir()) {
+            remove_temporary(&file)?;
+        } else if name.starts_with('.') && name.ends_with(".tmp") {
+            let refused = |e: std::io::Error| DatasetError::Write {
+                file: file.clone(),
+                problem: e.to_string(),
+            };
+            fs::remove_file(&file).map_err(refused)?;
         }
     }
     Ok(())
-}
-
-pub(super) fn fault(path: &Path, error: &std::io::Error) -> DatasetError {
-    DatasetError::Write { file: path.to_owned(), problem: error.to_string() }
 }
 
 /// The folders of a scene.
@@ -85,30 +86,30 @@ impl FrameFiles<'_> {
 
     fn entries(&self) -> Entries {
         let told = self.told;
-        let mut entries = vec![
-            ("scene_gt.json", annotation::truth(self.obj_id, self.truth)),
-            ("scene_gt_info.json", annotation::visibility(self.visible, self.whole, &told.depth)),
-            ("scene_camera.json", annotation::camera(&told.camera, self.world)),
-        ];
+        let mut entries = Entries::new();
+        let mut add = |name: &str, entry: Value| entries.insert(name.to_owned(), entry);
+        add("scene_gt.json", annotation::truth(self.obj_id, self.truth));
+        add("scene_gt_info.json", annotation::visibility(self.visible, self.whole, &told.depth));
+        add("scene_camera.json", annotation::camera(&told.camera, self.world));
         let gravity = told.gravity.unwrap_or_default();
         let bodies = |t_cam_hand: &Isometry3<f64>, joints: &[f64]| {
             annotation::bodies(&gravity, t_cam_hand, self.joint_names, joints, URDF)
         };
         if let Some(hand) = &told.hand {
-            entries.push(("scene_bodies.json", bodies(&hand.t_cam_hand, &hand.joints)));
+            add("scene_bodies.json", bodies(&hand.t_cam_hand, &hand.joints));
             if !hand.forces.is_empty() {
-                entries.push(("scene_tactile.json", annotation::touch(&hand.forces, TAXELS)));
+                add("scene_tactile.json", annotation::touch(&hand.forces, TAXELS));
             }
         }
         if let Some((t_cam_hand, joints)) = self.true_hand {
-            entries.push(("scene_bodies_gt.json", bodies(t_cam_hand, joints)));
+            add("scene_bodies_gt.json", bodies(t_cam_hand, joints));
         }
-        entries.into_iter().map(|(name, entry)| (name.into(), entry.to_string())).collect()
+        entries
     }
 }
 
-/// What one image adds to each of its scene's files: the file's name and the entry as JSON.
-pub(super) type Entries = Vec<(String, String)>;
+/// What one image adds to each of its scene's files, by the file's name.
+pub(super) type Entries = Map<String, Value>;
 
 /// The files that have an entry for each image. The camera's comes last: a scene that has it has all.
 pub(super) const NAMES: [&str; 6] = [
@@ -120,35 +121,26 @@ pub(super) const NAMES: [&str; 6] = [
     "scene_camera.json",
 ];
 
-/// The files of a scene in the making, with one line an image as BOP's own tools write them.
-#[derive(Default)]
-pub(super) struct SceneFiles {
-    text: BTreeMap<String, String>,
-}
-
-impl SceneFiles {
-    /// Adds an image; images come in ascending order.
-    pub(super) fn add(&mut self, im_id: usize, entries: &Entries) {
-        for (name, entry) in entries {
-            let text = self.text.entry(name.clone()).or_default();
-            let separator = if text.is_empty() { "{\n" } else { ",\n" };
-            // Writing to a string cannot fail.
-            let _ = write!(text, "{separator}  \"{im_id}\": {entry}");
+/// Writes those of the scene's files that have entries, with one line an image as BOP's own tools write them; each of them
+/// whole or not at all.
+///
+/// # Errors
+/// When one cannot be written.
+pub(super) fn write_entries(
+    scene_dir: &Path,
+    frames: &BTreeMap<usize, Entries>,
+) -> Result<(), DatasetError> {
+    for name in NAMES {
+        let line = |(im_id, entries): (&usize, &Entries)| {
+            entries.get(name).map(|entry| format!("  \"{im_id}\": {entry}"))
+        };
+        let lines: Vec<String> = frames.iter().filter_map(line).collect();
+        if !lines.is_empty() {
+            let text = format!("{{\n{}\n}}\n", lines.join(",\n"));
+            write_atomically(&scene_dir.join(name), text.as_bytes())?;
         }
     }
-
-    /// Writes those files that have entries, each of them whole or not at all.
-    ///
-    /// # Errors
-    /// When one cannot be written.
-    pub(super) fn write(&self, scene_dir: &Path) -> Result<(), DatasetError> {
-        for name in NAMES {
-            if let Some(text) = self.text.get(name) {
-                write_atomically(&scene_dir.join(name), format!("{text}\n}}\n").as_bytes())?;
-            }
-        }
-        Ok(())
-    }
+    Ok(())
 }
 
 /// Writes `obj_*.ply` in millimeters, with textures beside them, and `models_info.json` to the folder `dir`.
@@ -176,15 +168,11 @@ mod tests {
     #[test]
     fn files_are_json_with_a_line_an_image() {
         let dir = tempfile::tempdir().unwrap();
-        let mut files = SceneFiles::default();
-        let entries = vec![
-            ("scene_gt.json".to_owned(), "[{\"a\":1}]".to_owned()),
-            ("scene_camera.json".to_owned(), "{}".to_owned()),
-        ];
-        files.add(9, &entries);
-        files.add(10, &entries);
-        files.write(dir.path()).unwrap();
-        let text = std::fs::read_to_string(dir.path().join("scene_gt.json")).unwrap();
+        let gt = ("scene_gt.json".to_owned(), serde_json::json!([{ "a": 1 }]));
+        let entries = Entries::from_iter([gt]);
+        let frames = BTreeMap::from([(9, entries.clone()), (10, entries)]);
+        write_entries(dir.path(), &frames).unwrap();
+        let text = fs::read_to_string(dir.path().join("scene_gt.json")).unwrap();
         assert_eq!(text, "{\n  \"9\": [{\"a\":1}],\n  \"10\": [{\"a\":1}]\n}\n");
         assert!(!dir.path().join("scene_tactile.json").exists());
     }

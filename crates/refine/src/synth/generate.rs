@@ -11,12 +11,12 @@ use serde_json::json;
 
 use super::error::SynthError;
 use super::files::{
-    Entries, FRAME_FOLDERS, FrameFiles, NAMES, SceneFiles, remove_temporary, write_models,
+    Entries, FRAME_FOLDERS, FrameFiles, NAMES, remove_temporary, write_entries, write_models,
 };
+use super::grasp::GraspSnapshot;
 use super::hand_files::HandFiles;
 use super::plan::{Subject, SynthSettings, Use, check_plan, seed, sequence};
 use super::sensor::Rig;
-use super::snapshot::GraspSnapshot;
 use crate::data::bop::{
     Dataset, DatasetError, GroundTruth, ResultRow, create_folder, write_atomically, write_results,
 };
@@ -31,7 +31,7 @@ pub struct DatasetSummary {
     pub failures: Vec<GraspFailure>,
 }
 
-/// A grasp that could not be summary.
+/// A grasp that could not be made.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GraspFailure {
     /// The object.
@@ -44,7 +44,7 @@ pub struct GraspFailure {
 
 /// The journal of the frames that are done, until their scene is complete.
 const JOURNAL: &str = ".frames.journal";
-/// Grasps of a complete scene that could not be summary.
+/// Grasps of a complete scene that could not be made.
 const FAILURES: &str = "synth_failures.json";
 
 /// Makes a dataset at `dir`: a scene of the split `test` for each of `subjects`, which bears the object's number.
@@ -77,15 +77,14 @@ where
     check(subjects, settings)?;
     create_folder(dir)?;
     check_plan(dir, hand, subjects, settings)?;
+    remove_temporary(dir)?;
     hand.write(dir)?;
     write_both_models(dir, subjects, settings)?;
-    for folder in ["", "hand", "models", "models_eval"] {
-        remove_temporary(&dir.join(folder))?;
-    }
     let mut summary = DatasetSummary::default();
     for subject in subjects {
-        let scene = Scene { dir: scene_dir(dir, subject), hand, subject, settings };
-        let failures = scene.complete(&prepare, progress)?;
+        let scene_dir = dir.join("test").join(format!("{:06}", subject.obj_id));
+        let scene = Scene { dir: scene_dir, hand, subject, settings, progress };
+        let failures = scene.complete(|| prepare(subject))?;
         let failed: usize = failures.iter().map(|f| f.images.len()).sum();
         summary.frames += u64::from(settings.frames) - failed as u64;
         summary.failures.extend(failures);
@@ -95,7 +94,7 @@ where
             ("init_low.csv", Use::InitialLow, NoiseLevel::Low),
             ("init_high.csv", Use::InitialHigh, NoiseLevel::High),
         ] {
-            let rows = initial_poses(dir, subjects, settings, purpose, noise)?;
+            let rows = initial_poses(dir, settings.seed, purpose, noise)?;
             write_results(&dir.join(name), &rows)?;
             if noise == NoiseLevel::Low {
                 write_targets(&dir.join("test_targets_bop19.json"), &rows)?;
@@ -114,19 +113,15 @@ fn check(subjects: &[Subject], settings: &SynthSettings) -> Result<(), SynthErro
         ("the number of objects", subjects.len()),
     ] {
         if value == 0 {
-            return Err(SynthError::Zero { setting });
+            return Err(SynthError::Argument(format!("{setting} must be above zero")));
         }
     }
     let mut ids: Vec<u32> = subjects.iter().map(|s| s.obj_id).collect();
     ids.sort_unstable();
     match ids.windows(2).find(|pair| pair[0] == pair[1]) {
-        Some(pair) => Err(SynthError::SameObject { obj_id: pair[0] }),
+        Some(pair) => Err(SynthError::Argument(format!("two objects have the number {}", pair[0]))),
         None => Ok(()),
     }
-}
-
-fn scene_dir(dir: &Path, subject: &Subject) -> PathBuf {
-    dir.join("test").join(format!("{:06}", subject.obj_id))
 }
 
 fn write_both_models(
@@ -144,98 +139,98 @@ fn write_both_models(
     write_models(&dir.join("models_eval"), &truth.collect::<BTreeMap<_, _>>())
 }
 
-/// Entries of the frames that are done, by image.
-type Frames = BTreeMap<usize, Entries>;
+/// What is known of a grasp: its moments, or why there are none.
+type Moments = Result<Vec<GraspSnapshot>, String>;
 
 /// A scene in the making.
-struct Scene<'a, 's> {
+struct Scene<'a> {
     dir: PathBuf,
     hand: &'a HandFiles,
-    subject: &'s Subject,
+    subject: &'a Subject,
     settings: &'a SynthSettings,
+    progress: &'a (dyn Fn(u64) + Sync),
 }
 
-impl<'s> Scene<'_, 's> {
-    /// Makes what is missing; returns the grasps that could not be summary.
-    fn complete<G>(
+impl Scene<'_> {
+    /// Makes what is missing; returns the grasps that could not be made.
+    fn complete<G: Fn(u64) -> Moments + Sync>(
         &self,
-        prepare: &impl Fn(&'s Subject) -> Result<G, String>,
-        progress: &(dyn Fn(u64) + Sync),
-    ) -> Result<Vec<GraspFailure>, SynthError>
-    where
-        G: Fn(u64) -> Result<Vec<GraspSnapshot>, String> + Sync,
-    {
+        prepare: impl FnOnce() -> Result<G, String>,
+    ) -> Result<Vec<GraspFailure>, SynthError> {
         let journal = self.dir.join(JOURNAL);
-        let all = u64::from(self.settings.frames);
+        let SynthSettings { frames, frames_per_grasp, .. } = *self.settings;
         if !journal.exists() && NAMES.iter().any(|name| self.dir.join(name).exists()) {
-            progress(all);
+            (self.progress)(u64::from(frames));
             return self.read_failures();
         }
-        for folder in FRAME_FOLDERS.map(|name| self.dir.join(name)) {
-            create_folder(&folder)?;
-            remove_temporary(&folder)?;
+        for folder in FRAME_FOLDERS {
+            create_folder(&self.dir.join(folder))?;
         }
-        remove_temporary(&self.dir)?;
         let obj_id = self.subject.obj_id;
         let identity = Identity::of(&json!({ "command": "synth", "object": obj_id }));
         let (journal, done) = Journal::open::<Entries>(&journal, &identity, false)?;
-        progress(done.len() as u64);
-        let missing = self.missing(&done);
+        (self.progress)(done.len() as u64);
+        // Images by grasp.
+        let mut missing: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+        for im_id in (0..frames).filter(|&id| !done.contains_key(&(id as usize))) {
+            missing.entry(im_id / frames_per_grasp).or_default().push(im_id);
+        }
         let state = Mutex::new((journal, done));
         let mut failures = Vec::new();
         if !missing.is_empty() {
-            let source =
-                prepare(self.subject).map_err(|reason| SynthError::Object { obj_id, reason })?;
-            let attempts: Vec<Result<Option<GraspFailure>, SynthError>> = missing
-                .into_par_iter()
-                .map(|(grasp, images)| self.grasp(&source, grasp, images, &state, progress))
-                .collect();
-            for attempt in attempts {
-                failures.extend(attempt?);
-            }
+            let source = prepare()
+                .map_err(|reason| SynthError::Argument(format!("object {obj_id}: {reason}")))?;
+            let attempt = |(grasp, images): (u32, Vec<u32>)| {
+                let reason = match self.moments(&source, grasp) {
+                    Ok(moments) => {
+                        self.frames(&moments, grasp, &images, &state)?;
+                        return Ok(None);
+                    }
+                    Err(reason) => reason,
+                };
+                (self.progress)(images.len() as u64);
+                Ok(Some(GraspFailure { obj_id, images, reason }))
+            };
+            let attempts: Vec<_> =
+                missing.into_par_iter().map(attempt).collect::<Result<_, SynthError>>()?;
+            failures.extend(attempts.into_iter().flatten());
         }
         let (journal, done) = state.into_inner().unwrap_or_else(PoisonError::into_inner);
-        self.write(&done, &failures)?;
+        if !failures.is_empty() {
+            let text = serde_json::to_string_pretty(&failures).unwrap_or_default();
+            write_atomically(&self.dir.join(FAILURES), format!("{text}\n").as_bytes())?;
+        }
+        write_entries(&self.dir, &done)?;
         journal.discard()?;
         Ok(failures)
     }
 
-    /// Images that are not in the journal, by grasp.
-    fn missing(&self, done: &Frames) -> BTreeMap<u32, Vec<u32>> {
-        let mut missing: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
-        for im_id in (0..self.settings.frames).filter(|&id| !done.contains_key(&(id as usize))) {
-            missing.entry(im_id / self.settings.frames_per_grasp).or_default().push(im_id);
+    /// The moments of a grasp, if they are of this hand.
+    fn moments(&self, source: &impl Fn(u64) -> Moments, grasp: u32) -> Moments {
+        let moments = source(seed(self.settings.seed, Use::Grasp, self.subject.obj_id, grasp))?;
+        if moments.is_empty() {
+            return Err("the grasp has no moments".into());
         }
-        missing
+        let robot = &self.hand.robot;
+        for moment in &moments {
+            robot.check_joints(&moment.joints).map_err(|e| e.to_string())?;
+            robot.check_forces(&moment.taxel_forces).map_err(|e| e.to_string())?;
+        }
+        Ok(moments)
     }
 
-    fn grasp<G>(
+    /// Makes the frames of one grasp.
+    fn frames(
         &self,
-        source: &G,
+        moments: &[GraspSnapshot],
         grasp: u32,
-        images: Vec<u32>,
-        state: &Mutex<(Journal, Frames)>,
-        progress: &(dyn Fn(u64) + Sync),
-    ) -> Result<Option<GraspFailure>, SynthError>
-    where
-        G: Fn(u64) -> Result<Vec<GraspSnapshot>, String>,
-    {
-        let (from, obj_id) = (self.settings.seed, self.subject.obj_id);
-        let fail = |reason: String| {
-            progress(images.len() as u64);
-            Ok(Some(GraspFailure { obj_id, images: images.clone(), reason }))
-        };
-        let moments = match source(seed(from, Use::Grasp, obj_id, grasp)) {
-            Ok(moments) => moments,
-            Err(reason) => return fail(reason),
-        };
-        if let Some(reason) = self.misfit(&moments) {
-            return fail(reason);
-        }
-        let size = (self.settings.width, self.settings.height);
-        let mut noise = sequence(from, Use::Rig, obj_id, grasp);
+        images: &[u32],
+        state: &Mutex<(Journal, BTreeMap<usize, Entries>)>,
+    ) -> Result<(), SynthError> {
+        let SynthSettings { width, height, seed, sensor, .. } = self.settings;
+        let mut noise = sequence(*seed, Use::Rig, self.subject.obj_id, grasp);
         let (object, robot) = (&self.subject.object, &self.hand.robot);
-        let rig = Rig::new(&self.settings.sensor, object, robot, size, &mut noise);
+        let rig = Rig::new(sensor, object, robot, (*width, *height), &mut noise);
         images.par_iter().try_for_each(|&im_id| {
             let shares = self.settings.frames_per_grasp as usize;
             let share = im_id as usize % shares;
@@ -246,26 +241,8 @@ impl<'s> Scene<'_, 's> {
                 let (journal, done) = &mut *state;
                 done.insert(im_id as usize, journal.append(im_id as usize, &entries)?);
             }
-            progress(1);
-            Ok::<(), SynthError>(())
-        })?;
-        Ok(None)
-    }
-
-    /// What is wrong with moments that are not of this hand.
-    fn misfit(&self, moments: &[GraspSnapshot]) -> Option<String> {
-        let robot = &self.hand.robot;
-        let (joints, taxels) = (robot.tree.joint_names().len(), robot.taxels.len());
-        if moments.is_empty() {
-            return Some("the grasp has no moments".into());
-        }
-        moments.iter().find_map(|m| {
-            let (given, felt) = (m.joints.len(), m.taxel_forces.len());
-            (given != joints || felt != taxels).then(|| {
-                format!(
-                    "a moment has {given} joints and {felt} forces, the hand {joints} joints and {taxels} taxels"
-                )
-            })
+            (self.progress)(1);
+            Ok(())
         })
     }
 
@@ -286,19 +263,6 @@ impl<'s> Scene<'_, 's> {
         };
         let quality = self.settings.sensor.color.jpeg_quality;
         files.write(&self.dir, im_id, quality)
-    }
-
-    /// Writes the scene's own files.
-    fn write(&self, frames: &Frames, failures: &[GraspFailure]) -> Result<(), SynthError> {
-        let mut files = SceneFiles::default();
-        for (&im_id, entries) in frames {
-            files.add(im_id, entries);
-        }
-        if !failures.is_empty() {
-            let text = serde_json::to_string_pretty(failures).unwrap_or_default();
-            write_atomically(&self.dir.join(FAILURES), format!("{text}\n").as_bytes())?;
-        }
-        Ok(files.write(&self.dir)?)
     }
 
     fn read_failures(&self) -> Result<Vec<GraspFailure>, SynthError> {
@@ -323,30 +287,27 @@ fn write_targets(file: &Path, rows: &[ResultRow]) -> Result<(), DatasetError> {
 /// Wrong poses of every frame that is there.
 fn initial_poses(
     dir: &Path,
-    subjects: &[Subject],
-    settings: &SynthSettings,
+    from: u64,
     purpose: Use,
     level: NoiseLevel,
 ) -> Result<Vec<ResultRow>, SynthError> {
     let dataset = Dataset::open_split(dir, "test")?;
     let truth = GroundTruth::new(&dataset);
-    let mut order: Vec<&Subject> = subjects.iter().collect();
-    order.sort_by_key(|s| s.obj_id);
     let mut rows = Vec::new();
-    for Subject { obj_id, .. } in order {
-        let scene = dataset.scene(*obj_id)?;
-        if !scene.dir().join("scene_camera.json").exists() {
-            continue;
-        }
+    for scene in dataset.scenes().filter(|s| s.dir().join("scene_camera.json").exists()) {
+        // That of its object, too.
+        let scene_id = scene.id();
         for im_id in scene.images()? {
-            for seen in truth.objects(*obj_id, im_id)? {
-                let mut noise = sequence(settings.seed, purpose, *obj_id, im_id);
+            for seen in truth.objects(scene_id, im_id)? {
+                let mut noise = sequence(from, purpose, scene_id, im_id);
+                let t_cam_model = level.perturb(&seen.t_cam_model, &mut noise);
+                let obj_id = seen.obj_id;
                 rows.push(ResultRow {
-                    scene_id: *obj_id,
+                    scene_id,
                     im_id,
-                    obj_id: *obj_id,
+                    obj_id,
                     score: 1.0,
-                    t_cam_model: level.perturb(&seen.t_cam_model, &mut noise),
+                    t_cam_model,
                     time: -1.0,
                 });
             }

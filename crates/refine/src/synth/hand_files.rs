@@ -45,13 +45,6 @@ impl HandFiles {
     pub fn load(urdf: &Path, taxels: Option<&Path>) -> Result<Self, AssetError> {
         let tree = KinematicTree::from_urdf_file(urdf)?;
         let skin = taxels.map(load_taxels).transpose()?.unwrap_or_default();
-        for taxel in &skin {
-            if tree.link_index(&taxel.link).is_none() {
-                return Err(
-                    crate::error::RefineError::TaxelLink { link: taxel.link.clone() }.into()
-                );
-            }
-        }
         let text = fs::read_to_string(urdf).map_err(|e| DatasetError::reading(urdf, &e))?;
         let folder = urdf.parent().unwrap_or(Path::new(""));
         let mut meshes: Vec<(PathBuf, Vec<u8>)> = Vec::new();
@@ -63,22 +56,19 @@ impl HandFiles {
                 meshes.push((relative, content));
             }
         }
-        Ok(Self { robot: Hand::new(tree, skin)?, urdf: text, meshes })
+        let robot = Hand::new(tree, skin)?;
+        robot.taxels.iter().try_for_each(|taxel| robot.link_of(taxel).map(|_| ()))?;
+        Ok(Self { robot, urdf: text, meshes })
     }
 
     /// Writes the hand's files to the dataset at `root`.
     pub(super) fn write(&self, root: &Path) -> Result<(), DatasetError> {
-        create_folder(&root.join("hand"))?;
         for (relative, content) in &self.meshes {
             let file = root.join("hand").join(relative);
             create_folder(file.parent().unwrap_or(root))?;
             write_atomically(&file, content)?;
         }
-        if !self.robot.taxels.is_empty() {
-            let table = taxel_table(&self.robot.taxels);
-            write_atomically(&root.join(TAXELS), table.as_bytes())?;
-        }
-        write_atomically(&root.join(URDF), self.urdf.as_bytes())
+        write_hand(root, &self.urdf, &self.robot.taxels)
     }
 
     /// All that describes the hand, to be compared.
@@ -87,6 +77,15 @@ impl HandFiles {
         let table = taxel_table(&self.robot.taxels).into_bytes();
         self.urdf.bytes().chain(table).chain(meshes)
     }
+}
+
+/// Writes a hand's description to the dataset at `root`.
+pub(super) fn write_hand(root: &Path, urdf: &str, skin: &[Taxel]) -> Result<(), DatasetError> {
+    create_folder(&root.join("hand"))?;
+    if !skin.is_empty() {
+        write_atomically(&root.join(TAXELS), taxel_table(skin).as_bytes())?;
+    }
+    write_atomically(&root.join(URDF), urdf.as_bytes())
 }
 
 /// What the `filename` attributes of a URDF say.
@@ -114,7 +113,7 @@ fn within(folder: &Path, name: &str) -> Option<PathBuf> {
 }
 
 /// The columns that [`prehend_geometry::hand::load_taxels`] reads.
-pub(super) fn taxel_table(taxels: &[Taxel]) -> String {
+fn taxel_table(taxels: &[Taxel]) -> String {
     let mut text = "idx,patch,link,x_m,y_m,z_m,nx,ny,nz\n".to_owned();
     for Taxel { index, patch, link, position: p, normal: n } in taxels {
         // Writing to a string cannot fail.

@@ -12,13 +12,11 @@ mod grasp;
 mod hand_files;
 mod plan;
 mod sensor;
-mod snapshot;
 
 pub use dataset::write_dataset;
 pub use error::SynthError;
 pub use generate::{DatasetSummary, GraspFailure, generate};
-pub use grasp::{Grasp, GraspError, GraspFault, GraspSettings, Grasper, Preshape};
+pub use grasp::{Grasp, GraspError, GraspFault, GraspSettings, GraspSnapshot, Grasper, Preshape};
 pub use hand_files::HandFiles;
 pub use plan::{Subject, SynthSettings};
 pub use sensor::{SensorSettings, SettingError};
-pub use snapshot::{GraspSnapshot, ready_made_moments};

@@ -7,7 +7,6 @@ use prehend_geometry::{SplitMix64, TriMesh};
 use serde_json::{Map, Value, json};
 
 use super::error::SynthError;
-use super::files::fault;
 use super::hand_files::HandFiles;
 use super::sensor::SensorSettings;
 use crate::data::bop::{DatasetError, write_atomically};
@@ -41,21 +40,6 @@ pub struct SynthSettings {
     pub grasp: Value,
 }
 
-impl Default for SynthSettings {
-    /// 40 frames of 640 × 480 pixels, four a grasp, from clean sensors.
-    fn default() -> Self {
-        Self {
-            frames: 40,
-            frames_per_grasp: 4,
-            width: 640,
-            height: 480,
-            sensor: SensorSettings::clean(),
-            seed: 0,
-            grasp: Value::Null,
-        }
-    }
-}
-
 const FILE: &str = "synth.json";
 
 /// Writes the plan to `dir`, or makes sure that it is the one which is there.
@@ -81,7 +65,7 @@ pub(super) fn check_plan(
             }
         };
     }
-    let mut entries = fs::read_dir(dir).map_err(|e| fault(dir, &e))?;
+    let mut entries = fs::read_dir(dir).map_err(|e| DatasetError::reading(dir, &e))?;
     // A run that ended before it had a plan may have left a temporary file.
     if entries.any(|e| e.is_ok_and(|e| !e.file_name().to_string_lossy().starts_with(".synth.json")))
     {

@@ -5,13 +5,15 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use image::GenericImageView;
+use nalgebra::{Rotation3, Vector3};
+use prehend_geometry::hand::{JOINT_NAMES, default_grasp};
 use prehend_geometry::objects::YcbObject;
-use prehend_refine::scene::Object;
+use prehend_refine::scene::{Hand, Object};
 use prehend_refine::synth::{
-    DatasetSummary, HandFiles, SensorSettings, Subject, SynthError, SynthSettings, generate,
-    ready_made_moments,
+    DatasetSummary, GraspSnapshot, HandFiles, SensorSettings, Subject, SynthError, SynthSettings,
+    generate,
 };
-use serde_json::Value;
+use serde_json::{Value, json};
 
 const BOTTLE: u32 = 5;
 
@@ -28,8 +30,28 @@ fn settings(sensor: SensorSettings) -> SynthSettings {
         width: 320,
         height: 240,
         sensor,
-        ..Default::default()
+        seed: 0,
+        grasp: json!("made up"),
     }
+}
+
+/// Moments of the bottle as it lies in the built-in hand, while gravity turns about the two.
+fn moments(hand: &Hand) -> Vec<GraspSnapshot> {
+    let grasp = default_grasp();
+    let joints = JOINT_NAMES.iter().map(|n| (*n).to_owned()).zip(grasp.joints).collect();
+    let joints = hand.tree.joint_vector(&joints).unwrap();
+    let pressed = |(i, t): (usize, &prehend_geometry::hand::Taxel)| match i % 20 {
+        0 => -0.5 * t.normal,
+        _ => Vector3::zeros(),
+    };
+    let taxel_forces: Vec<_> = hand.taxels.iter().enumerate().map(pressed).collect();
+    let moment = |i: usize| GraspSnapshot {
+        t_hand_object: grasp.t_base_object,
+        joints: joints.clone(),
+        gravity: Rotation3::new(Vector3::new(0.2, 0.1, 0.3) * i as f64) * Vector3::z() * -9.81,
+        taxel_forces: taxel_forces.clone(),
+    };
+    (0..5).map(moment).collect()
 }
 
 fn make(
@@ -38,11 +60,7 @@ fn make(
     progress: &(dyn Fn(u64) + Sync),
 ) -> Result<DatasetSummary, SynthError> {
     let (hand, subjects) = (HandFiles::built_in().unwrap(), [subject()]);
-    let prepare = |subject: &Subject| {
-        let moments =
-            ready_made_moments(&subject.object, &hand.robot, 7, 5).map_err(|e| e.to_string());
-        Ok(move |_| moments.clone())
-    };
+    let prepare = |_: &Subject| Ok(|_| Ok(moments(&hand.robot)));
     generate(dir, &hand, &subjects, settings, prepare, progress)
 }
 

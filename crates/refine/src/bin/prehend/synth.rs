@@ -133,10 +133,7 @@ impl Synth {
         let prepare = |subject: &'_ Subject| -> Result<_, String> {
             let grasper = Grasper::new(&hand.robot, &subject.object, &grasping);
             let grasper = grasper.map_err(|e| e.to_string())?;
-            Ok(move |seed| {
-                let sequence = grasper.sequence(seed, tries, steps);
-                sequence.map(|(_, moments)| moments).map_err(|e| e.to_string())
-            })
+            Ok(move |seed| grasper.sequence(seed, tries, steps).map_err(|e| e.to_string()))
         };
         let summary =
             generate(&self.out, &hand, &subjects, &settings, prepare, &|done| bar.inc(done))?;

@@ -1,10 +1,10 @@
 //! Fingers that close until they are resisted.
 
-use nalgebra::{DMatrix, DVector, Isometry3, Point3, Vector3};
+use nalgebra::{DMatrix, DVector, Isometry3};
+use prehend_geometry::robot::Screw;
 
-use super::kinematic_paths::{KinematicPaths, Screw};
 use super::preshape::Preshape;
-use super::self_collision::SelfCollision;
+use super::self_collision::{SelfCollision, ball};
 use super::settings::GraspSettings;
 use super::simulation::Simulation;
 use crate::scene::Hand;
@@ -12,7 +12,8 @@ use crate::scene::Hand;
 /// Which joints close, how fast, and where they stop.
 pub(super) struct Drive<'a> {
     robot: &'a Hand,
-    paths: KinematicPaths,
+    /// For each link the screws of the joints that move it.
+    paths: Vec<Vec<usize>>,
     self_collision: SelfCollision,
     limits: Vec<(f64, f64)>,
     /// Of each joint \[rad/s or m/s\], signed.
@@ -40,7 +41,7 @@ pub(super) struct Effort {
 impl<'a> Drive<'a> {
     pub(super) fn new(robot: &'a Hand, preshape: &Preshape, settings: &GraspSettings) -> Self {
         let tree = &robot.tree;
-        let paths = KinematicPaths::new(tree);
+        let paths = tree.paths();
         let middle = |i: usize| {
             // Where the hand is half closed.
             let (lower, upper) = tree.joint_limits()[i];
@@ -50,9 +51,9 @@ impl<'a> Drive<'a> {
         };
         let joints: Vec<f64> = (0..preshape.open.len()).map(middle).collect();
         let poses = tree.forward_kinematics(&joints);
-        let screws = KinematicPaths::screws(tree, &poses);
-        let lever = (0..joints.len()).map(|v| lever(robot, &paths, &screws, &poses, v));
-        let lever = lever.collect();
+        let screws = tree.screws(&poses);
+        let lever = |v| lever(robot, &paths, &screws, &poses, v);
+        let lever = (0..joints.len()).map(lever).collect();
         let self_collision =
             SelfCollision::new(robot, &paths, &tree.forward_kinematics(&preshape.open));
         Self {
@@ -75,14 +76,14 @@ impl<'a> Drive<'a> {
     /// τ_limit is the torque that the same contacts would exert if they pushed with the grip.
     pub(super) fn change(&self, simulation: &Simulation<'_>, effort: &Effort) -> Vec<f64> {
         let count = self.speed.len();
-        let screws = KinematicPaths::screws(&self.robot.tree, simulation.poses());
+        let screws = self.robot.tree.screws(simulation.poses());
         // Torques against closing, and the forces that make them.
         let mut resisting = vec![0.0; count];
         let mut pressing = vec![0.0; count];
         let mut stiffness = DMatrix::<f64>::zeros(count, count);
         for touch in simulation.touches() {
             let mut along = DVector::<f64>::zeros(count);
-            for screw in self.paths.path(touch.link).iter().filter_map(|&j| screws[j]) {
+            for screw in self.paths[touch.link].iter().map(|&s| &screws[s]) {
                 let velocity = screw.velocity(&touch.point);
                 // The force on the link is opposite to that on the object.
                 let torque = velocity.dot(&touch.force) * self.speed[screw.variable].signum();
@@ -161,24 +162,20 @@ impl<'a> Drive<'a> {
     }
 }
 
+/// Mean speed of the links that a joint moves, by their centers.
 fn lever(
     robot: &Hand,
-    paths: &KinematicPaths,
-    screws: &[Option<Screw>],
+    paths: &[Vec<usize>],
+    screws: &[Screw],
     poses: &[Isometry3<f64>],
     variable: usize,
 ) -> f64 {
     let (mut sum, mut count) = (0.0, 0);
     for (link, shape) in robot.shape.links().iter().enumerate() {
-        let Some(grid) = shape.grid() else { continue };
-        let (low, high) = grid.bounds();
-        let center: Point3<f64> = poses[link] * nalgebra::center(&low, &high);
-        let own = paths.path(link).iter().filter_map(|&j| screws[j]);
-        let velocity: Option<Vector3<f64>> = own
-            .filter(|s| s.variable == variable)
-            .map(|s| s.velocity(&center))
-            .reduce(|a, b| a + b);
-        if let Some(velocity) = velocity {
+        let Some((center, _)) = ball(shape) else { continue };
+        let own = paths[link].iter().map(|&s| &screws[s]).filter(|s| s.variable == variable);
+        let velocities = own.map(|s| s.velocity(&(poses[link] * center)));
+        if let Some(velocity) = velocities.reduce(|a, b| a + b) {
             sum += velocity.norm();
             count += 1;
         }

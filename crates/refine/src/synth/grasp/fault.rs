@@ -6,29 +6,14 @@ use prehend_geometry::robot::RobotError;
 use prehend_sim::{BodyError, LawError, SimulationError};
 use thiserror::Error;
 
+use crate::error::RefineError;
+
 /// Why no grasps of an object can be looked for.
 #[derive(Debug, Error)]
 pub enum GraspError {
-    /// A setting is out of its range.
-    #[error("the setting {name} must be {range}, is {value}")]
-    Setting {
-        /// Its name.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// What it must be.
-        range: &'static str,
-    },
-    /// The pre-shape is not that of the robot.
-    #[error("the pre-shape has {found} {what} for a robot with {expected} joints")]
-    Preshape {
-        /// What was counted.
-        what: &'static str,
-        /// How many there were.
-        found: usize,
-        /// How many there should be.
-        expected: usize,
-    },
+    /// A setting is out of its range, or the pre-shape is not that of the robot.
+    #[error("{0}")]
+    Setting(String),
     /// No joint of the robot closes around anything.
     #[error("the robot has no joint that would close its fingers")]
     NoFingers,
@@ -43,15 +28,9 @@ pub enum GraspError {
     /// The contact law was refused.
     #[error(transparent)]
     Law(#[from] LawError),
-    /// The robot's description is at fault.
+    /// The hand's skin is at fault.
     #[error(transparent)]
-    Robot(#[from] RobotError),
-    /// A taxel sits on a link that the robot lacks.
-    #[error("a taxel is on link {link}, which the robot lacks")]
-    TaxelLink {
-        /// Name of the link.
-        link: String,
-    },
+    Skin(#[from] RefineError),
 }
 
 /// Why one attempt at a grasp, or one trajectory, came to nothing. Another seed may do better.
@@ -60,12 +39,9 @@ pub enum GraspFault {
     /// The open hand lets the object nowhere near its palm.
     #[error("the fingers keep the object from the palm")]
     NoRoom,
-    /// Too few links touch the object.
-    #[error("{links} links touch the object")]
-    NoContact {
-        /// How many.
-        links: usize,
-    },
+    /// Only so many links touch the object.
+    #[error("{0} links touch the object")]
+    NoContact(usize),
     /// Hand or object still moved when time was up.
     #[error("hand and object did not come to rest")]
     Restless,
@@ -77,18 +53,12 @@ pub enum GraspFault {
         /// By what angle \[rad\].
         angle: f64,
     },
-    /// The contact area is out of its bounds.
-    #[error("the contact area is {area:.1} cm²")]
-    ContactArea {
-        /// The area \[cm²\].
-        area: f64,
-    },
-    /// Hand and object share too much volume.
-    #[error("hand and object share {volume:.2} cm³")]
-    TooDeep {
-        /// The volume \[cm³\].
-        volume: f64,
-    },
+    /// The contact area \[cm²\] is out of its bounds.
+    #[error("the contact area is {0:.1} cm²")]
+    ContactArea(f64),
+    /// Hand and object share too much volume \[cm³\].
+    #[error("hand and object share {0:.2} cm³")]
+    TooDeep(f64),
     /// None of so many attempts led to a grasp.
     #[error("no grasp after {tries} tries; the last: {last}")]
     Exhausted {

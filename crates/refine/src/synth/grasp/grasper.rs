@@ -14,9 +14,9 @@ use super::preshape::Preshape;
 use super::settings::GraspSettings;
 use super::simulation::{Medium, Setup, Simulation};
 use super::skin::Skin;
+use super::trajectory::GraspSnapshot;
 use crate::data::ContactModel;
 use crate::scene::{Hand, Object};
-use crate::synth::snapshot::GraspSnapshot;
 
 /// An object at rest in a hand.
 #[derive(Clone, Debug, PartialEq)]
@@ -144,32 +144,8 @@ impl<'a> Grasper<'a> {
         })
     }
 
-    /// The first grasp of the seeds from `first_seed` on, and its seed.
-    ///
-    /// # Errors
-    /// [`GraspFault::Exhausted`] if none of `tries` seeds leads to one.
-    pub fn search(&self, first_seed: u64, tries: u64) -> Result<(u64, Grasp), GraspFault> {
-        self.first(first_seed, tries, |seed| Ok((seed, self.grasp(seed)?)))
-    }
-
-    /// What `attempt` makes of the first seed from which it makes something.
-    fn first<T>(
-        &self,
-        first_seed: u64,
-        tries: u64,
-        attempt: impl Fn(u64) -> Result<T, GraspFault>,
-    ) -> Result<T, GraspFault> {
-        let mut last = GraspFault::NoContact { links: 0 };
-        for k in 0..tries {
-            match attempt(first_seed.wrapping_add(k)) {
-                Ok(found) => return Ok(found),
-                Err(fault) => last = fault,
-            }
-        }
-        Err(GraspFault::Exhausted { tries, last: Box::new(last) })
-    }
-
-    /// The first grasp of the seeds from `first_seed` on that holds through a motion of `steps` moments, and that motion.
+    /// `steps` moments of the first grasp of the seeds from `first_seed` on that holds through a
+    /// [`trajectory`](Self::trajectory).
     ///
     /// # Errors
     /// [`GraspFault::Exhausted`] if none of `tries` seeds leads to one.
@@ -178,12 +154,16 @@ impl<'a> Grasper<'a> {
         first_seed: u64,
         tries: u64,
         steps: usize,
-    ) -> Result<(Grasp, Vec<GraspSnapshot>), GraspFault> {
-        self.first(first_seed, tries, |seed| {
-            let grasp = self.grasp(seed)?;
-            let moments = self.trajectory(&grasp, seed, steps)?;
-            Ok((grasp, moments))
-        })
+    ) -> Result<Vec<GraspSnapshot>, GraspFault> {
+        let mut last = GraspFault::NoContact(0);
+        for k in 0..tries {
+            let seed = first_seed.wrapping_add(k);
+            match self.grasp(seed).and_then(|grasp| self.trajectory(&grasp, seed, steps)) {
+                Ok(moments) => return Ok(moments),
+                Err(fault) => last = fault,
+            }
+        }
+        Err(GraspFault::Exhausted { tries, last: Box::new(last) })
     }
 
     /// Closes the hand around the floating object, until all is at rest or nearly so when time is up: some fingers go on
@@ -256,7 +236,7 @@ impl<'a> Grasper<'a> {
         }
         let links: Vec<usize> = (0..forces.len()).filter(|&l| forces[l] > TOUCHING).collect();
         if links.len() < self.settings.links {
-            return Err(GraspFault::NoContact { links: links.len() });
+            return Err(GraspFault::NoContact(links.len()));
         }
         Ok(links)
     }
@@ -271,13 +251,13 @@ impl<'a> Grasper<'a> {
         let hand = SolidUnion::new(&hand.mesh_parts())?;
         let volume = self.contact.intersection_volume_cm3(t_hand_object, &hand)?;
         if volume > self.settings.intersection_volume {
-            return Err(GraspFault::TooDeep { volume });
+            return Err(GraspFault::TooDeep(volume));
         }
         let surface = ClosestPoints::new(&hand.mesh())?;
         let area = self.contact.contact_area_cm2(t_hand_object, &surface);
         let (least, most) = self.settings.contact_area;
         if !(least..=most).contains(&area) {
-            return Err(GraspFault::ContactArea { area });
+            return Err(GraspFault::ContactArea(area));
         }
         Ok((area, volume))
     }

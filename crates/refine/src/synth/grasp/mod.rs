@@ -7,7 +7,6 @@
 mod drive;
 mod fault;
 mod grasper;
-mod kinematic_paths;
 mod placement;
 mod preshape;
 mod self_collision;
@@ -22,3 +21,4 @@ pub use fault::{GraspError, GraspFault};
 pub use grasper::{Grasp, Grasper};
 pub use preshape::Preshape;
 pub use settings::GraspSettings;
+pub use trajectory::GraspSnapshot;

@@ -5,7 +5,7 @@ use prehend_geometry::hand::JOINT_NAMES;
 use prehend_geometry::robot::KinematicTree as Tree;
 
 use super::fault::GraspError;
-use super::kinematic_paths::KinematicPaths;
+use super::self_collision::ball;
 use crate::scene::Hand;
 
 /// The open hand and the way it closes. Joints are in the order of the robot's joint names.
@@ -71,32 +71,27 @@ impl Preshape {
         let bounded = |&(lower, upper): &(f64, f64)| lower.is_finite() && upper.is_finite();
         let middle = |l: &(f64, f64)| if bounded(l) { 0.5 * (l.0 + l.1) } else { 0.0 };
         let middle: Vec<f64> = limits.iter().map(middle).collect();
-        let paths = KinematicPaths::new(tree);
-        let centers: Vec<Option<Point3<f64>>> = (robot.shape.links().iter())
-            .map(|shape| {
-                let (low, high) = shape.grid()?.bounds();
-                Some(nalgebra::center(&low, &high))
-            })
-            .collect();
+        let paths = tree.paths();
+        let shapes = robot.shape.links().iter();
+        let centers: Vec<_> = shapes.map(|shape| ball(shape).map(|(c, _)| c)).collect();
         let solid = || centers.iter().enumerate().filter_map(|(l, c)| Some((l, (*c)?)));
         let poses = tree.forward_kinematics(&middle);
         // Fingertips: links with a shape that move no other such link.
         let moves = |link: usize, other: usize| {
-            let (own, path) = (paths.path(link), paths.path(other));
+            let (own, path) = (&paths[link], &paths[other]);
             link != other && own.iter().all(|j| path.contains(j)) && path.len() > own.len()
         };
         let tips: Vec<usize> = solid()
             .map(|(link, _)| link)
-            .filter(|&l| !paths.path(l).is_empty() && !solid().any(|(o, _)| moves(l, o)))
+            .filter(|&l| !paths[l].is_empty() && !solid().any(|(o, _)| moves(l, o)))
             .collect();
         let tip = |&l: &usize| poses[l] * centers[l].unwrap_or_default();
         let sum: Vector3<f64> = tips.iter().map(|l| tip(l).coords).sum();
         let focus = Point3::from(sum / tips.len().max(1) as f64);
 
-        let screws = KinematicPaths::screws(tree, &poses);
+        let screws = tree.screws(&poses);
         let driven = |link: usize, variable: usize| {
-            let own = paths.path(link).iter();
-            own.filter_map(|&j| screws[j]).any(|s| s.variable == variable)
+            paths[link].iter().any(|&s| screws[s].variable == variable)
         };
         let away = |variable: usize, value: f64| {
             let mut joints = middle.clone();
@@ -116,8 +111,7 @@ impl Preshape {
             return Err(GraspError::NoFingers);
         }
         let closes = |v: usize| nearer[v].abs() > CLOSES * best;
-        let turns =
-            |v: usize| screws.iter().flatten().any(|s| s.variable == v && s.angular.norm() > 0.0);
+        let turns = |v: usize| screws.iter().any(|s| s.variable == v && s.angular.norm() > 0.0);
         let count = limits.len();
         let open = |v: usize| match (closes(v), nearer[v] > 0.0) {
             (false, _) => middle[v],
@@ -136,14 +130,14 @@ impl Preshape {
         let speed: Vec<f64> = (0..count).map(speed).collect();
 
         // The palm: the nearest point of what no joint moves, or of the least moved.
-        let least = solid().map(|(l, _)| paths.path(l).len()).min().unwrap_or(0);
+        let least = solid().map(|(l, _)| paths[l].len()).min().unwrap_or(0);
         let surface = |link: usize| {
             let t = poses[link];
             let local = t.inverse() * focus;
             let closest = robot.shape.links()[link].closest().iter();
             closest.filter_map(move |c| c.closest(&local, f64::INFINITY)).map(move |c| t * c.point)
         };
-        let base = solid().map(|(l, _)| l).filter(|&l| paths.path(l).len() == least);
+        let base = solid().map(|(l, _)| l).filter(|&l| paths[l].len() == least);
         let origin = base.flat_map(surface).min_by(|a, b| {
             let distance = |p: &Point3<f64>| (p - focus).norm_squared();
             distance(a).total_cmp(&distance(b))
@@ -153,10 +147,9 @@ impl Preshape {
         // Fingers wrap about the direction in which closing moves their tips the least.
         let mut motion = Matrix3::from_diagonal_element(0.0) + out * out.transpose();
         for &link in &tips {
-            let velocity: Vector3<f64> = (paths.path(link).iter())
-                .filter_map(|&j| screws[j])
-                .map(|s| s.velocity(&tip(&link)) * speed[s.variable])
-                .sum();
+            let own = paths[link].iter().map(|&s| &screws[s]);
+            let velocity: Vector3<f64> =
+                own.map(|s| s.velocity(&tip(&link)) * speed[s.variable]).sum();
             if let Some(direction) = velocity.try_normalize(1e-12) {
                 motion += direction * direction.transpose();
             }
@@ -175,12 +168,11 @@ impl Preshape {
         let counts =
             [("open positions", &self.open), ("spreads", &self.spread), ("speeds", &self.speed)];
         for (what, list) in counts {
-            if list.len() != joints {
-                let (found, expected) = (list.len(), joints);
-                return Err(GraspError::Preshape { what, found, expected });
-            }
-            if let Some(&value) = list.iter().find(|v| !v.is_finite()) {
-                return Err(GraspError::Setting { name: "preshape", value, range: "finite" });
+            let found = list.len();
+            if found != joints || list.iter().any(|v| !v.is_finite()) {
+                return Err(GraspError::Setting(format!(
+                    "the pre-shape has {found} {what} for a robot with {joints} joints, or one is not finite"
+                )));
             }
         }
         let moves = self.speed.iter().any(|s| *s != 0.0);

@@ -1,10 +1,12 @@
 //! Collisions between links of the hand.
 
+use std::sync::Arc;
+
 use nalgebra::{Isometry3, Point3};
 use prehend_geometry::TriMesh;
+use prehend_geometry::robot::LinkShape;
 use prehend_geometry::sample::surface_samples;
 
-use super::kinematic_paths::KinematicPaths;
 use crate::scene::Hand;
 
 /// Surface samples of a link.
@@ -14,66 +16,65 @@ const APART: f64 = 2e-3;
 
 /// Pairs of links that should stay apart.
 pub(super) struct SelfCollision {
-    bodies: Vec<Link>,
+    links: Vec<Link>,
     pairs: Vec<Pair>,
 }
 
 struct Link {
-    shape: std::sync::Arc<prehend_geometry::robot::LinkShape>,
+    number: usize,
+    shape: Arc<LinkShape>,
     points: Vec<Point3<f64>>,
     center: Point3<f64>,
     radius: f64,
 }
 
 struct Pair {
-    /// Samples of the one against the field of the other: links and places in `bodies`.
+    /// Samples of the one against the field of the other: places in `links`.
     links: [usize; 2],
-    bodies: [usize; 2],
     /// Entries of the joint vector that move one relative to the other.
     variables: Vec<usize>,
 }
 
 impl SelfCollision {
     /// The links that are apart with the hand at `open`.
-    pub(super) fn new(robot: &Hand, paths: &KinematicPaths, open: &[Isometry3<f64>]) -> Self {
-        let mut bodies = Vec::new();
-        let mut numbers = Vec::new();
-        for (link, shape) in robot.shape.links().iter().enumerate() {
-            let Some(grid) = shape.grid() else { continue };
+    pub(super) fn new(robot: &Hand, paths: &[Vec<usize>], open: &[Isometry3<f64>]) -> Self {
+        let screws = robot.tree.screws(open);
+        let mut links = Vec::new();
+        for (number, shape) in robot.shape.links().iter().enumerate() {
+            let Some((center, radius)) = ball(shape) else { continue };
             let mut mesh = TriMesh::default();
             shape.parts().iter().for_each(|p| mesh.append(p));
             let points = surface_samples(&mesh, SAMPLES, 0).into_iter().map(|s| s.point).collect();
-            let (low, high) = grid.bounds();
-            let (center, radius) = (nalgebra::center(&low, &high), 0.5 * (high - low).norm());
-            bodies.push(Link { shape: shape.clone(), points, center, radius });
-            numbers.push(link);
+            links.push(Link { number, shape: shape.clone(), points, center, radius });
         }
         let mut pairs = Vec::new();
-        for (i, &a) in numbers.iter().enumerate() {
-            for (k, &b) in numbers.iter().enumerate() {
-                let variables = paths.between(&robot.tree, a, b);
-                let pair = Pair { links: [a, b], bodies: [i, k], variables };
-                if !pair.variables.is_empty() && !pair.meets(&bodies, open, APART) {
+        for i in 0..links.len() {
+            for k in 0..links.len() {
+                let [a, b] = [i, k].map(|l| &paths[links[l].number]);
+                let of_one = a.iter().filter(|s| !b.contains(s));
+                let of_one = of_one.chain(b.iter().filter(|s| !a.contains(s)));
+                let variables: Vec<usize> = of_one.map(|&s| screws[s].variable).collect();
+                let pair = Pair { links: [i, k], variables };
+                if !pair.variables.is_empty() && !pair.meets(&links, open, APART) {
                     pairs.push(pair);
                 }
             }
         }
-        Self { bodies, pairs }
+        Self { links, pairs }
     }
 
     /// Entries of the joint vector that bring links into each other at `poses`.
     pub(super) fn stopped(&self, poses: &[Isometry3<f64>]) -> Vec<usize> {
-        let meets = self.pairs.iter().filter(|pair| pair.meets(&self.bodies, poses, 0.0));
+        let meets = self.pairs.iter().filter(|pair| pair.meets(&self.links, poses, 0.0));
         meets.flat_map(|pair| pair.variables.iter().copied()).collect()
     }
 }
 
 impl Pair {
     /// Whether a sample of the one is within `reach` of the other.
-    fn meets(&self, bodies: &[Link], poses: &[Isometry3<f64>], reach: f64) -> bool {
-        let [a, b] = self.bodies.map(|i| &bodies[i]);
-        let [t_a, t_b] = self.links.map(|l| &poses[l]);
-        let t_b_a = t_b.inverse() * t_a;
+    fn meets(&self, links: &[Link], poses: &[Isometry3<f64>], reach: f64) -> bool {
+        let [a, b] = self.links.map(|l| &links[l]);
+        let t_b_a = poses[b.number].inverse() * poses[a.number];
         if (t_b_a * a.center - b.center).norm() > a.radius + b.radius + reach {
             return false;
         }
@@ -83,4 +84,10 @@ impl Pair {
             grid.lower_bound(&local) <= reach && grid.evaluate(&local).distance <= reach
         })
     }
+}
+
+/// Center and radius of a ball about a link that has a shape, link frame \[m\].
+pub(super) fn ball(shape: &LinkShape) -> Option<(Point3<f64>, f64)> {
+    let (low, high) = shape.grid()?.bounds();
+    Some((nalgebra::center(&low, &high), 0.5 * (high - low).norm()))
 }

@@ -83,15 +83,6 @@ struct Solid {
     looked_at: Option<Isometry3<f64>>,
 }
 
-/// Distance to a link, in its frame.
-struct LinkField(Arc<LinkShape>);
-
-impl DistanceField for LinkField {
-    fn sample(&self, point: &Point3<f64>, reach: f64) -> Option<FieldSample> {
-        self.0.grid()?.sample(point, reach)
-    }
-}
-
 impl<'a> Simulation<'a> {
     /// Hand and object at rest.
     pub(super) fn new(
@@ -111,11 +102,10 @@ impl<'a> Simulation<'a> {
                     |k, _| if i >> k & 1 == 0 { low[k] } else { high[k] },
                 ))
             };
-            let field = Arc::new(LinkField(Arc::clone(shape)));
-            let body = Body::kinematic(&robot.tree.links()[link].name).with_field(field);
+            let body = Body::kinematic(&robot.tree.links()[link].name).with_field(shape.clone());
             fields.push(world.add(body));
             states.push(State::at_rest(poses[link]));
-            let (shape, corners) = (Arc::clone(shape), std::array::from_fn(corner));
+            let (shape, corners) = (shape.clone(), std::array::from_fn(corner));
             links.push(Solid { link, shape, corners, looked_at: None });
         }
         let object = world.add(Body::free("object", setup.body));
@@ -191,23 +181,21 @@ impl<'a> Simulation<'a> {
     /// The states one time step later: by the implicit equations as they are, or else with softer friction, or else by
     /// explicit steps as short as those need. Newton's method may fail where many samples make or lose contact at once.
     fn stepped(&mut self) -> Result<Vec<State>, SimulationError> {
-        let step = || Step { index: self.steps, dt: self.setup.time_step };
+        let setup = self.setup;
+        let step = Step { index: self.steps, dt: setup.time_step };
         let implicit = SubStepped { integrator: BackwardEuler, max_substeps: PARTS };
         let explicit = SubStepped { integrator: SemiImplicitEuler, max_substeps: EXPLICIT_PARTS };
-        let unsolved = |error: &SimulationError| matches!(error, SimulationError::Unsolved { .. });
-        match implicit.step(&self.world, &self.states, step()) {
-            Err(error) if unsolved(&error) => {}
-            done => return done,
+        let unsolved = |done: &Result<_, _>| matches!(done, Err(SimulationError::Unsolved { .. }));
+        let mut done = implicit.step(&self.world, &self.states, step);
+        if unsolved(&done) {
+            self.set_friction_law(&setup.soft_law);
+            done = implicit.step(&self.world, &self.states, step);
+            if unsolved(&done) {
+                done = explicit.step(&self.world, &self.states, step);
+            }
+            self.set_friction_law(&setup.law);
         }
-        let step = [step(), step()];
-        self.set_friction_law(&self.setup.soft_law);
-        let [second, third] = step;
-        let solved = match implicit.step(&self.world, &self.states, second) {
-            Err(error) if unsolved(&error) => explicit.step(&self.world, &self.states, third),
-            done => done,
-        };
-        self.set_friction_law(&self.setup.law);
-        solved
+        done
     }
 
     /// Replaces the law of all contacts.
@@ -234,9 +222,7 @@ impl<'a> Simulation<'a> {
         let near = |sample: &&SurfacePoint| {
             self.links.iter().any(|solid| {
                 let local = solid.looked_at.map(|t| t.inverse_transform_point(&sample.position));
-                let grid = solid.shape.grid();
-                let found = local.zip(grid).and_then(|(local, grid)| grid.sample(&local, NEAR));
-                found.is_some()
+                local.is_some_and(|local| solid.shape.distance(&local, NEAR).is_some())
             })
         };
         let mut kept: Vec<SurfacePoint> = self.setup.samples.iter().filter(near).copied().collect();
@@ -266,8 +252,8 @@ impl<'a> Simulation<'a> {
             for (body, solid) in self.links.iter().enumerate() {
                 let link = &self.states[body];
                 let local = link.pose.inverse_transform_point(&point);
-                let found = solid.shape.grid().and_then(|grid| grid.sample(&local, 0.0));
-                let Some(FieldSample { distance, gradient, .. }) = found else { continue };
+                let Some(sample_of_link) = solid.shape.sample(&local, 0.0) else { continue };
+                let FieldSample { distance, gradient, .. } = sample_of_link;
                 let Some(normal) = gradient.try_normalize(1e-9) else { continue };
                 let normal = link.pose.rotation * normal;
                 let lever = point.coords - link.pose.translation.vector;

@@ -2,8 +2,8 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
-use super::fault::GraspError;
 use super::simulation::Touch;
+use crate::error::RefineError;
 use crate::scene::Hand;
 
 /// The taxels of a hand by link.
@@ -21,13 +21,12 @@ struct Spot {
 }
 
 impl Skin {
-    pub(super) fn new(robot: &Hand, reach: f64) -> Result<Self, GraspError> {
+    pub(super) fn new(robot: &Hand, reach: f64) -> Result<Self, RefineError> {
         let mut by_link: Vec<Vec<Spot>> = Vec::new();
         by_link.resize_with(robot.tree.links().len(), Vec::new);
         for (taxel, t) in robot.taxels.iter().enumerate() {
-            let link = robot.tree.link_index(&t.link);
-            let link = link.ok_or_else(|| GraspError::TaxelLink { link: t.link.clone() })?;
-            by_link[link].push(Spot { taxel, position: t.position, normal: t.normal });
+            let spot = Spot { taxel, position: t.position, normal: t.normal };
+            by_link[robot.link_of(t)?].push(spot);
         }
         Ok(Self { by_link, count: robot.taxels.len(), reach })
     }

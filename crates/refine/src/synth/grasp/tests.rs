@@ -26,6 +26,11 @@ fn object(ycb: YcbObject) -> Object {
     Object::with_mass(ycb.name(), ycb.mesh(), Some(ycb.mass()), 0).unwrap()
 }
 
+/// The first of eight seeds that leads to a grasp, and that grasp.
+fn first(grasper: &Grasper<'_>) -> (u64, Grasp) {
+    (0..8).find_map(|seed| Some((seed, grasper.grasp(seed).ok()?))).unwrap()
+}
+
 /// The forces of the contacts on the object at rest under `gravity`, and how far it has moved by then.
 fn loaded(
     grasper: &Grasper<'_>,
@@ -47,7 +52,7 @@ fn settled_grasps_keep_their_bounds_and_carry_the_weight() {
     for ycb in [YcbObject::TunaCan, YcbObject::MustardBottle] {
         let settings = GraspSettings::default();
         let grasper = Grasper::new(&HAND, &object(ycb), &settings).unwrap();
-        let (_, grasp) = grasper.search(0, 8).unwrap();
+        let (_, grasp) = first(&grasper);
         assert!(grasp.intersection_volume <= settings.intersection_volume, "{grasp:?}");
         assert!((20.0..=60.0).contains(&grasp.contact_area), "{grasp:?}");
         assert!(grasp.links.len() >= 3, "{grasp:?}");
@@ -67,7 +72,7 @@ fn settled_grasps_keep_their_bounds_and_carry_the_weight() {
 fn the_same_seed_gives_the_same_bits_on_any_number_of_threads() {
     let grasper =
         Grasper::new(&HAND, &object(YcbObject::TunaCan), &GraspSettings::default()).unwrap();
-    let (seed, grasp) = grasper.search(0, 8).unwrap();
+    let (seed, grasp) = first(&grasper);
     let run = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let again = pool.install(|| grasper.grasp(seed)).unwrap();
@@ -103,7 +108,7 @@ fn a_gripper_of_two_sliding_fingers_holds_a_brick() {
     let settings =
         GraspSettings { links: 2, contact_area: (10.0, 80.0), ..GraspSettings::default() };
     let grasper = Grasper::new(&robot, &object(YcbObject::FoamBrick), &settings).unwrap();
-    let (_, grasp) = grasper.search(0, 8).unwrap();
+    let (_, grasp) = first(&grasper);
     assert!([1, 2].iter().all(|l| grasp.links.contains(l)), "{grasp:?}");
     assert!(grasp.intersection_volume < 0.2 && grasp.drift < 2e-3, "{grasp:?}");
     let moments = grasper.trajectory(&grasp, 1, 3).unwrap();
@@ -119,7 +124,7 @@ fn settings_and_robots_that_cannot_grasp_are_refused() {
     let short = Preshape { open: vec![0.0; 3], ..Preshape::of(&HAND).unwrap() };
     let short = GraspSettings { preshape: Some(short), ..GraspSettings::default() };
     let error = Grasper::new(&HAND, &brick, &short).map(|_| ()).unwrap_err();
-    assert!(matches!(error, GraspError::Preshape { found: 3, expected: 16, .. }), "{error}");
+    assert!(error.to_string().contains("3 open positions for a robot with 16 joints"), "{error}");
     let post = r#"<robot name="post"><link name="post"><collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision></link></robot>"#;
     let post = Hand::new(Tree::from_urdf_str(post, None).unwrap(), Vec::new()).unwrap();
     assert!(matches!(

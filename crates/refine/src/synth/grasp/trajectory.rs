@@ -7,7 +7,19 @@ use super::drive::Effort;
 use super::fault::GraspFault;
 use super::grasper::{Grasp, Grasper, random_direction};
 use super::simulation::{Medium, Simulation};
-use crate::synth::snapshot::GraspSnapshot;
+
+/// One moment of an object held in a hand, as it truly is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GraspSnapshot {
+    /// Object coordinates → hand base coordinates \[m\].
+    pub t_hand_object: Isometry3<f64>,
+    /// Joint positions in the order of the robot's joint names \[rad; m\].
+    pub joints: Vec<f64>,
+    /// Gravity in hand base coordinates \[m/s²\].
+    pub gravity: Vector3<f64>,
+    /// Force of the object on each taxel, in the frame of the taxel's link \[N\].
+    pub taxel_forces: Vec<Vector3<f64>>,
+}
 
 /// Waves that make up the turning of the hand, and the grip's rise and fall, an axis.
 const WAVES: usize = 3;

@@ -2,33 +2,11 @@
 
 use prehend_geometry::SplitMix64;
 use prehend_render::{Camera, DepthImage, RgbImage};
-use serde::{Deserialize, Serialize};
 
+use super::settings::BackgroundSettings;
 use crate::data::smooth_field;
 
-/// The room behind the hand.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(in crate::synth) struct BackgroundSettings {
-    /// Mean distance of the wall \[m\].
-    pub(in crate::synth) distance: f64,
-    /// Standard deviation of the wall's slopes.
-    pub(in crate::synth) slope: f64,
-    /// Things in front of the wall, at most.
-    pub(in crate::synth) things: u32,
-    /// Standard deviation of the wall's pattern per channel.
-    pub(in crate::synth) pattern: f64,
-}
-
 impl BackgroundSettings {
-    pub(super) fn clean() -> Self {
-        Self { distance: 1.4, slope: 0.1, things: 0, pattern: 0.0 }
-    }
-
-    pub(super) fn realistic() -> Self {
-        Self { distance: 1.4, slope: 0.3, things: 14, pattern: 0.04 }
-    }
-
     /// Color and depth of a random room without the hand.
     pub(super) fn draw(&self, camera: &Camera, noise: &mut SplitMix64) -> (RgbImage, DepthImage) {
         let (width, height) = (camera.width, camera.height);
@@ -120,13 +98,14 @@ impl Thing {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::synth::sensor::viewpoint::ViewpointSettings;
+    use crate::synth::sensor::settings::SensorSettings;
 
     #[test]
     fn every_pixel_has_a_color_and_lies_behind_the_hand() {
-        let camera = ViewpointSettings::preset().camera(320, 240);
+        let camera = SensorSettings::clean().viewpoint.camera(320, 240);
         let mut noise = SplitMix64::new(8);
-        for settings in [BackgroundSettings::clean(), BackgroundSettings::realistic()] {
+        for settings in [SensorSettings::clean().background, SensorSettings::realistic().background]
+        {
             let (color, depth) = settings.draw(&camera, &mut noise);
             assert!(depth.pixels().iter().all(|z| (0.5..6.5).contains(z)));
             assert!(color.pixels().iter().flatten().all(|c| (0.0..=1.0).contains(c)));

@@ -4,45 +4,10 @@ use nalgebra::{Isometry3, Vector6};
 use prehend_autodiff::lie::se3_exp;
 use prehend_geometry::SplitMix64;
 use prehend_render::Camera;
-use serde::{Deserialize, Serialize};
 
-/// Standard deviations of the calibration's errors, which stay the same through a grasp.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(in crate::synth) struct CalibrationSettings {
-    /// Focal lengths, relative.
-    pub(in crate::synth) focal: f64,
-    /// Principal point, each coordinate \[px\] of an image 640 px wide.
-    pub(in crate::synth) principal_px: f64,
-    /// Place of the hand in the camera frame, each axis \[m\].
-    pub(in crate::synth) hand_translation: f64,
-    /// Turn of the hand in the camera frame, each axis \[deg\].
-    pub(in crate::synth) hand_rotation_deg: f64,
-    /// Joint positions \[deg\], of prismatic joints in thousandths of `joint_deg` meters.
-    pub(in crate::synth) joint_deg: f64,
-}
+use super::settings::CalibrationSettings;
 
 impl CalibrationSettings {
-    pub(super) fn clean() -> Self {
-        Self {
-            focal: 0.0,
-            principal_px: 0.0,
-            hand_translation: 0.0,
-            hand_rotation_deg: 0.0,
-            joint_deg: 0.0,
-        }
-    }
-
-    pub(super) fn realistic() -> Self {
-        Self {
-            focal: 3e-3,
-            principal_px: 1.0,
-            hand_translation: 2e-3,
-            hand_rotation_deg: 0.4,
-            joint_deg: 0.8,
-        }
-    }
-
     /// The errors of one grasp; `prismatic` says of each joint whether it slides.
     pub(super) fn draw(&self, prismatic: &[bool], noise: &mut SplitMix64) -> Miscalibration {
         let mut normal = |scale: f64| scale * noise.normal();
@@ -96,10 +61,11 @@ impl Miscalibration {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::synth::sensor::settings::SensorSettings;
 
     #[test]
     fn errors_are_as_large_as_asked_for() {
-        let (settings, mut noise) = (CalibrationSettings::realistic(), SplitMix64::new(13));
+        let (settings, mut noise) = (SensorSettings::realistic().calibration, SplitMix64::new(13));
         let camera = Camera { fx: 580.0, fy: 580.0, cx: 319.5, cy: 239.5, width: 640, height: 480 };
         let place = Isometry3::translation(0.1, 0.2, 0.5);
         let count = 400.0;
@@ -120,7 +86,7 @@ mod tests {
             all.iter().zip(&mut squares).for_each(|(e, sum)| *sum += e * e / count);
         }
         assert!(squares.iter().all(|s| (s.sqrt() - 1.0).abs() < 0.1), "{squares:?}");
-        let exact = CalibrationSettings::clean().draw(&[false], &mut noise);
+        let exact = SensorSettings::clean().calibration.draw(&[false], &mut noise);
         assert_eq!(exact.camera(&camera), camera);
         assert_eq!(exact.joints(&[0.7]), [0.7]);
         assert!((exact.hand(&place).translation.vector - place.translation.vector).norm() < 1e-15);

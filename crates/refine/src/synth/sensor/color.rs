@@ -2,49 +2,10 @@
 
 use prehend_geometry::SplitMix64;
 use prehend_render::RgbImage;
-use serde::{Deserialize, Serialize};
 
-/// Faults of the color images. Zero takes any of them away.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(in crate::synth) struct ColorSettings {
-    /// Standard deviation of the exposure \[stops\].
-    pub(in crate::synth) exposure: f64,
-    /// Standard deviation of the gain of each channel.
-    pub(in crate::synth) white_balance: f64,
-    /// Standard deviation of the blur \[px\], at most.
-    pub(in crate::synth) blur: f64,
-    /// Standard deviation of the noise of each channel in the dark.
-    pub(in crate::synth) noise: f64,
-    /// Variance that noise gains with brightness, up to white.
-    pub(in crate::synth) shot_noise: f64,
-    /// Quality of the JPEG files, 1 to 100; 0 for PNG, which loses nothing.
-    pub(in crate::synth) jpeg_quality: u8,
-}
+use super::settings::ColorSettings;
 
 impl ColorSettings {
-    pub(super) fn clean() -> Self {
-        Self {
-            exposure: 0.0,
-            white_balance: 0.0,
-            blur: 0.0,
-            noise: 0.01,
-            shot_noise: 0.0,
-            jpeg_quality: 0,
-        }
-    }
-
-    pub(super) fn realistic() -> Self {
-        Self {
-            exposure: 0.35,
-            white_balance: 0.06,
-            blur: 1.0,
-            noise: 0.01,
-            shot_noise: 2e-4,
-            jpeg_quality: 88,
-        }
-    }
-
     /// The picture that the camera takes.
     pub(super) fn expose(&self, truth: &RgbImage, noise: &mut SplitMix64) -> RgbImage {
         let exposure = (self.exposure * noise.normal()).exp2();
@@ -109,6 +70,7 @@ fn mean(weights: &[f32], pixel: impl Fn(usize, bool) -> [f32; 3]) -> [f32; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::synth::sensor::settings::SensorSettings;
 
     #[test]
     fn blur_keeps_the_mean_and_spreads_a_point() {
@@ -133,7 +95,7 @@ mod tests {
     fn noise_and_gains_are_as_strong_as_asked_for() {
         let flat = RgbImage::filled(100, 100, [0.4; 3]);
         let mut noise = SplitMix64::new(6);
-        let clean = ColorSettings::clean().expose(&flat, &mut noise);
+        let clean = SensorSettings::clean().color.expose(&flat, &mut noise);
         let spread = |image: &RgbImage| {
             let mean = image.pixels().iter().map(|p| p[0]).sum::<f32>() / 1e4;
             let square = image.pixels().iter().map(|p| (p[0] - mean).powi(2)).sum::<f32>() / 1e4;
@@ -141,7 +103,7 @@ mod tests {
         };
         let (mean, sigma) = spread(&clean);
         assert!((mean - 0.4).abs() < 1e-3 && (sigma - 0.01).abs() < 5e-4, "{mean} {sigma}");
-        let settings = ColorSettings::realistic();
+        let settings = SensorSettings::realistic().color;
         let means: Vec<f32> =
             (0..40).map(|_| spread(&settings.expose(&flat, &mut noise)).0).collect();
         let stops: f32 = means.iter().map(|m| (m / 0.4).log2().powi(2)).sum::<f32>() / 40.0;

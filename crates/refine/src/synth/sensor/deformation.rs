@@ -2,29 +2,10 @@
 
 use nalgebra::{Point3, Vector3};
 use prehend_geometry::{SplitMix64, TriMesh};
-use serde::{Deserialize, Serialize};
 
-/// How the model that the estimator is given differs from the object.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(in crate::synth) struct ModelSettings {
-    /// Root mean square of the smooth displacement of the surface along its normal \[m\].
-    pub(in crate::synth) deviation: f64,
-    /// Wavelength of that displacement \[m\].
-    pub(in crate::synth) wavelength: f64,
-    /// Standard deviation of the scale.
-    pub(in crate::synth) scale: f64,
-}
+use super::settings::ModelSettings;
 
 impl ModelSettings {
-    pub(super) fn clean() -> Self {
-        Self { deviation: 0.0, wavelength: 0.08, scale: 0.0 }
-    }
-
-    pub(super) fn realistic() -> Self {
-        Self { deviation: 7e-4, wavelength: 0.08, scale: 3e-3 }
-    }
-
     /// A model of `truth` as someone might have made it, the same for the same `noise`.
     ///
     /// Places move by a sum of plane waves, which does not depend on the mesh: seams stay closed.
@@ -64,6 +45,7 @@ impl ModelSettings {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::synth::sensor::settings::SensorSettings;
     use prehend_geometry::mass::mass_properties;
     use prehend_geometry::objects::YcbObject;
     use prehend_geometry::sample::surface_samples;
@@ -71,7 +53,7 @@ mod tests {
     #[test]
     fn models_deviate_by_as_much_as_asked_for_and_stay_closed() {
         let truth = YcbObject::SugarBox.mesh();
-        let settings = ModelSettings { scale: 0.0, ..ModelSettings::realistic() };
+        let settings = ModelSettings { scale: 0.0, ..SensorSettings::realistic().model };
         let (mut square, mut volumes) = (0.0, 0.0);
         for seed in 0..6 {
             let model = settings.perturb_model(&truth, &mut SplitMix64::new(seed));
@@ -88,7 +70,7 @@ mod tests {
         }
         assert!((square.sqrt() - 7e-4).abs() < 2e-4, "{}", square.sqrt());
         assert!((volumes - 1.0).abs() < 0.02, "{volumes}");
-        let exact = ModelSettings::clean().perturb_model(&truth, &mut SplitMix64::new(3));
+        let exact = SensorSettings::clean().model.perturb_model(&truth, &mut SplitMix64::new(3));
         assert_eq!(exact.vertices, truth.vertices);
     }
 }

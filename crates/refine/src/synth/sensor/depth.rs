@@ -2,72 +2,11 @@
 
 use prehend_geometry::SplitMix64;
 use prehend_render::{Camera, DepthImage};
-use serde::{Deserialize, Serialize};
 
+use super::settings::DepthSettings;
 use crate::data::smooth_field;
 
-/// Faults of the depth images. Zero takes any of them away.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(in crate::synth) struct DepthSettings {
-    /// Standard deviation of the scale error, the same through a grasp.
-    pub(in crate::synth) scale: f64,
-    /// Standard deviation of a smooth warp that changes over a third of the image, the same through a grasp \[m\].
-    pub(in crate::synth) warp: f64,
-    /// Standard deviation of noise of single pixels, at half a meter; it grows with the square of the depth \[m\].
-    pub(in crate::synth) noise: f64,
-    /// Standard deviation of noise with a correlation over `correlation` pixels, at half a meter \[m\].
-    pub(in crate::synth) correlated_noise: f64,
-    /// Reach of the correlated noise \[px\].
-    pub(in crate::synth) correlation: f64,
-    /// Steps of the disparity \[px\].
-    pub(in crate::synth) disparity_step: f64,
-    /// Distance of the two eyes \[m\]: with the focal length it makes disparity of depth, and what only one of them sees has
-    /// none.
-    pub(in crate::synth) baseline: f64,
-    /// How far what is near spreads over what is behind it \[px\], at most.
-    pub(in crate::synth) fattening: f64,
-    /// Share of the pixels at edges whose depth lies between that of both sides.
-    pub(in crate::synth) flying_share: f64,
-    /// Share of the pixels that are lost in patches.
-    pub(in crate::synth) hole_share: f64,
-    /// Angle of sight to surface below which half of the pixels are lost \[deg\].
-    pub(in crate::synth) grazing_deg: f64,
-}
-
 impl DepthSettings {
-    pub(super) fn clean() -> Self {
-        Self {
-            scale: 0.0,
-            warp: 0.0,
-            noise: 7e-4,
-            correlated_noise: 0.0,
-            correlation: 3.0,
-            disparity_step: 0.0,
-            baseline: 0.0,
-            fattening: 0.0,
-            flying_share: 0.0,
-            hole_share: 0.0,
-            grazing_deg: 0.0,
-        }
-    }
-
-    pub(super) fn realistic() -> Self {
-        Self {
-            scale: 4e-3,
-            warp: 1.5e-3,
-            noise: 3e-4,
-            correlated_noise: 8e-4,
-            correlation: 3.0,
-            disparity_step: 0.1,
-            baseline: 0.05,
-            fattening: 2.0,
-            flying_share: 0.35,
-            hole_share: 0.02,
-            grazing_deg: 12.0,
-        }
-    }
-
     /// What stays the same through a grasp.
     pub(super) fn bias(&self, camera: &Camera, noise: &mut SplitMix64) -> DepthBias {
         let scale = (1.0 + self.scale * noise.normal()) as f32;
@@ -242,13 +181,13 @@ fn upper_quantile(share: f64) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::synth::sensor::viewpoint::ViewpointSettings;
+    use crate::synth::sensor::settings::SensorSettings;
 
     const SIZE: (usize, usize) = (320, 240);
 
     /// A square at half a meter before a wall at one meter.
     fn step() -> (Camera, DepthImage) {
-        let camera = ViewpointSettings::preset().camera(SIZE.0, SIZE.1);
+        let camera = SensorSettings::clean().viewpoint.camera(SIZE.0, SIZE.1);
         let mut depth = DepthImage::filled(SIZE.0, SIZE.1, 1.0);
         for y in 60..180 {
             depth.pixels_mut()[y * SIZE.0 + 100..y * SIZE.0 + 220].fill(0.5);
@@ -264,7 +203,7 @@ mod tests {
     }
 
     fn without() -> DepthSettings {
-        DepthSettings { noise: 0.0, ..DepthSettings::clean() }
+        DepthSettings { noise: 0.0, ..SensorSettings::clean().depth }
     }
 
     #[test]
@@ -274,7 +213,7 @@ mod tests {
 
     #[test]
     fn clean_noise_has_its_strength_and_no_holes() {
-        let seen = measured(&DepthSettings::clean());
+        let seen = measured(&SensorSettings::clean().depth);
         let (mut sum, mut count) = (0.0, 0.0);
         for (z, t) in seen.pixels().iter().zip(step().1.pixels()).filter(|(_, t)| **t == 0.5) {
             sum += (z - t).powi(2);
@@ -323,7 +262,7 @@ mod tests {
         let share = holes.pixels().iter().filter(|z| **z == 0.0).count() as f64 / 76800.0;
         assert!((0.025..0.1).contains(&share), "{share}");
         let settings =
-            DepthSettings { baseline: 0.05, disparity_step: 0.5, ..DepthSettings::clean() };
+            DepthSettings { baseline: 0.05, disparity_step: 0.5, ..SensorSettings::clean().depth };
         let seen = measured(&settings);
         let disparity = 0.906 * 320.0 * 0.05;
         for z in seen.pixels().iter().filter(|z| **z > 0.0) {
@@ -337,7 +276,7 @@ mod tests {
     fn scale_and_warp_are_as_strong_as_asked_for() {
         let (camera, _) = step();
         let mut noise = SplitMix64::new(4);
-        let settings = DepthSettings::realistic();
+        let settings = SensorSettings::realistic().depth;
         let (mut scale, mut warp) = (0.0, 0.0);
         for _ in 0..100 {
             let bias = settings.bias(&camera, &mut noise);

@@ -3,35 +3,11 @@
 use nalgebra::{Isometry3, Point3, Vector3};
 use prehend_geometry::SplitMix64;
 use prehend_render::{Camera, DepthImage, RenderModel, SurfacePoint, depth_map};
-use serde::{Deserialize, Serialize};
 
+use super::settings::LightSettings;
 use crate::scene::look_at;
 
-/// What lights the scene.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(in crate::synth) struct LightSettings {
-    /// Lamps beside the light from everywhere; the first is the strongest.
-    pub(in crate::synth) lamps: u32,
-    /// Share of the light that comes from everywhere.
-    pub(in crate::synth) ambient_share: f64,
-    /// Standard deviation of a lamp's color per channel.
-    pub(in crate::synth) tint: f64,
-    /// Strength of the highlights.
-    pub(in crate::synth) gloss: f64,
-    /// Share of the first lamp's light that its shadow takes away.
-    pub(in crate::synth) shadow_share: f64,
-}
-
 impl LightSettings {
-    pub(super) fn clean() -> Self {
-        Self { lamps: 2, ambient_share: 0.5, tint: 0.03, gloss: 0.0, shadow_share: 0.0 }
-    }
-
-    pub(super) fn realistic() -> Self {
-        Self { lamps: 3, ambient_share: 0.4, tint: 0.08, gloss: 0.12, shadow_share: 0.7 }
-    }
-
     /// Random lamps about `bodies`, which are in camera coordinates.
     pub(super) fn draw(
         &self,
@@ -167,6 +143,7 @@ impl Shadow {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::synth::sensor::settings::SensorSettings;
     use prehend_geometry::shapes::cuboid;
 
     #[test]
@@ -182,7 +159,7 @@ mod tests {
     #[test]
     fn a_white_surface_is_about_as_bright_as_the_paper_it_is_drawn_on() {
         let mut noise = SplitMix64::new(5);
-        for settings in [LightSettings::clean(), LightSettings::realistic()] {
+        for settings in [SensorSettings::clean().light, SensorSettings::realistic().light] {
             let mut mean = 0.0;
             for _ in 0..50 {
                 let lights = settings.draw(&[], &-Vector3::y(), &mut noise);

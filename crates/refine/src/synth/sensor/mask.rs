@@ -2,33 +2,11 @@
 
 use prehend_geometry::SplitMix64;
 use prehend_render::Mask;
-use serde::{Deserialize, Serialize};
 
+use super::settings::MaskSettings;
 use crate::data::smooth_field;
 
-/// Faults of the masks. Zero takes any of them away.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(in crate::synth) struct MaskSettings {
-    /// Standard deviation of the outline's place \[px\].
-    pub(in crate::synth) wobble: f64,
-    /// Length along the outline over which it wobbles \[px\].
-    pub(in crate::synth) wobble_length: f64,
-    /// How far the mask leaks onto the hand where it does \[px\].
-    pub(in crate::synth) leak: f64,
-    /// Share of the border with the hand where it leaks.
-    pub(in crate::synth) leak_share: f64,
-}
-
 impl MaskSettings {
-    pub(super) fn clean() -> Self {
-        Self { wobble: 0.0, wobble_length: 12.0, leak: 0.0, leak_share: 0.0 }
-    }
-
-    pub(super) fn realistic() -> Self {
-        Self { wobble: 1.2, wobble_length: 12.0, leak: 5.0, leak_share: 0.25 }
-    }
-
     /// What a segmentation makes of an object at `visible` beside a hand at `hand`.
     pub(super) fn segment(&self, visible: &Mask, hand: &Mask, noise: &mut SplitMix64) -> Mask {
         let mut mask = visible.clone();
@@ -96,6 +74,7 @@ fn distance_to(mask: &Mask, value: bool, reach: usize) -> Vec<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::synth::sensor::settings::SensorSettings;
 
     /// A square of 60 × 60 with a hand over its right border.
     fn square() -> (Mask, Mask) {
@@ -127,8 +106,8 @@ mod tests {
     fn outlines_wobble_by_as_much_as_asked_for() {
         let (object, hand) = square();
         let mut noise = SplitMix64::new(9);
-        assert_eq!(MaskSettings::clean().segment(&object, &hand, &mut noise), object);
-        let settings = MaskSettings { wobble: 2.0, leak: 0.0, ..MaskSettings::realistic() };
+        assert_eq!(SensorSettings::clean().mask.segment(&object, &hand, &mut noise), object);
+        let settings = MaskSettings { wobble: 2.0, leak: 0.0, ..SensorSettings::realistic().mask };
         let mut square_sum = 0.0;
         let mut rows = 0.0;
         for _ in 0..20 {
@@ -146,7 +125,8 @@ mod tests {
     #[test]
     fn leaks_go_onto_the_hand_only() {
         let (object, hand) = square();
-        let settings = MaskSettings { wobble: 0.0, leak_share: 0.5, ..MaskSettings::realistic() };
+        let settings =
+            MaskSettings { wobble: 0.0, leak_share: 0.5, ..SensorSettings::realistic().mask };
         let mask = settings.segment(&object, &hand, &mut SplitMix64::new(10));
         let added = |onto: &Mask| {
             let all = mask.pixels().iter().zip(object.pixels()).zip(onto.pixels());

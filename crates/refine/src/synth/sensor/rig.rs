@@ -13,7 +13,7 @@ use super::depth::DepthBias;
 use super::settings::SensorSettings;
 use super::touch::TaxelCondition;
 use crate::scene::{Hand, HandMeasurement, Object, Observation};
-use crate::synth::snapshot::GraspSnapshot;
+use crate::synth::grasp::GraspSnapshot;
 
 /// Sensors with the faults that stay the same through a grasp.
 pub(in crate::synth) struct Rig<'a> {
@@ -164,10 +164,11 @@ impl Paint {
 
 /// Whether each of the robot's joints is prismatic.
 fn slides(robot: &Hand) -> Vec<bool> {
-    let moved_by = |variable: usize| move |drive: &Drive| matches!(drive, Drive::Variable { index, .. } if *index == variable);
-    let prismatic = |variable: usize| {
-        let mut joints = robot.tree.joints().iter();
-        joints.any(|j| j.motion == Motion::Prismatic && moved_by(variable)(&j.drive))
-    };
-    (0..robot.tree.joint_names().len()).map(prismatic).collect()
+    let mut slides = vec![false; robot.tree.joint_names().len()];
+    for joint in robot.tree.joints() {
+        if let (Motion::Prismatic, Drive::Variable { index, .. }) = (joint.motion, joint.drive) {
+            slides[index] = true;
+        }
+    }
+    slides
 }

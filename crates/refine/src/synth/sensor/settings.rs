@@ -1,108 +1,196 @@
-//! All settings of all sensors, by name.
+//! All settings of all sensors, by name, with their values in both presets.
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use thiserror::Error;
 
-use super::background::BackgroundSettings;
-use super::calibration::CalibrationSettings;
-use super::color::ColorSettings;
-use super::deformation::ModelSettings;
-use super::depth::DepthSettings;
-use super::light::LightSettings;
-use super::mask::MaskSettings;
-use super::touch::TouchSettings;
-use super::viewpoint::ViewpointSettings;
+/// Makes a structure of each group of settings, and [`SensorSettings`] of the groups.
+macro_rules! sensor_settings {
+    ($($(#[$about:meta])* $group:ident: $Group:ident {
+        $($(#[$what:meta])* $name:ident: $number:ty { clean: $clean:expr, realistic: $real:expr },)*
+    })*) => {
+        $(
+            $(#[$about])*
+            #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+            #[serde(deny_unknown_fields)]
+            pub(in crate::synth) struct $Group {
+                $($(#[$what])* pub(in crate::synth) $name: $number,)*
+            }
+        )*
 
-/// Settings of all sensor models.
-///
-/// ```
-/// use prehend_refine::synth::SensorSettings;
-///
-/// let mut sensors = SensorSettings::realistic();
-/// sensors.set("depth.scale", "0")?;
-/// assert!(sensors.names().contains(&("depth.scale".to_owned(), 0.0)));
-/// let unknown = sensors.set("depth.scael", "0").unwrap_err();
-/// assert!(unknown.to_string().contains("depth.scale"));
-/// # Ok::<(), prehend_refine::synth::SettingError>(())
-/// ```
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct SensorSettings {
-    /// Where the camera stands.
-    pub(in crate::synth) viewpoint: ViewpointSettings,
-    /// The light.
-    pub(in crate::synth) light: LightSettings,
-    /// What is behind the hand.
-    pub(in crate::synth) background: BackgroundSettings,
-    /// The color images.
-    pub(in crate::synth) color: ColorSettings,
-    /// The depth images.
-    pub(in crate::synth) depth: DepthSettings,
-    /// The masks.
-    pub(in crate::synth) mask: MaskSettings,
-    /// The taxels.
-    pub(in crate::synth) touch: TouchSettings,
-    /// What is known of camera, hand and joints.
-    pub(in crate::synth) calibration: CalibrationSettings,
-    /// The object model that the estimator is given.
-    pub(in crate::synth) model: ModelSettings,
+        /// Settings of all sensor models.
+        ///
+        /// ```
+        /// use prehend_refine::synth::SensorSettings;
+        ///
+        /// let mut sensors = SensorSettings::realistic();
+        /// sensors.set("depth.scale", "0")?;
+        /// assert!(sensors.names().contains(&("depth.scale".to_owned(), 0.0)));
+        /// let unknown = sensors.set("depth.scael", "0").unwrap_err();
+        /// assert!(unknown.to_string().contains("depth.scale"));
+        /// # Ok::<(), Box<dyn std::error::Error>>(())
+        /// ```
+        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+        #[serde(deny_unknown_fields)]
+        pub struct SensorSettings {
+            $($(#[$about])* pub(in crate::synth) $group: $Group,)*
+        }
+
+        impl SensorSettings {
+            /// Little noise in color and depth; exact calibration and model.
+            pub fn clean() -> Self {
+                Self { $($group: $Group { $($name: $clean),* }),* }
+            }
+
+            /// A stereo camera and tactile sensors with realistic faults.
+            pub fn realistic() -> Self {
+                Self { $($group: $Group { $($name: $real),* }),* }
+            }
+        }
+    };
 }
 
-/// Why a setting could not be set.
+sensor_settings! {
+    /// Where cameras stand about the hand.
+    viewpoint: ViewpointSettings {
+        /// Nearest distance from the object's center \[m\].
+        nearest: f64 { clean: 0.4, realistic: 0.4 },
+        /// Farthest distance \[m\].
+        farthest: f64 { clean: 0.6, realistic: 0.6 },
+        /// Focal length, as a share of the image's width.
+        focal_width_ratio: f64 { clean: 0.906, realistic: 0.906 },
+        /// Standard deviation of where the camera aims, per axis \[m\].
+        aim: f64 { clean: 0.015, realistic: 0.015 },
+        /// Standard deviation of the angle between the image's vertical and the world's \[deg\].
+        roll_deg: f64 { clean: 8.0, realistic: 8.0 },
+        /// Largest share of the object that the hand may hide, where a view with less can be found.
+        hidden_share: f64 { clean: 0.55, realistic: 0.55 },
+    }
+    /// What lights the scene.
+    light: LightSettings {
+        /// Lamps beside the light from everywhere; the first is the strongest.
+        lamps: u32 { clean: 2, realistic: 3 },
+        /// Share of the light that comes from everywhere.
+        ambient_share: f64 { clean: 0.5, realistic: 0.4 },
+        /// Standard deviation of a lamp's color per channel.
+        tint: f64 { clean: 0.03, realistic: 0.08 },
+        /// Strength of the highlights.
+        gloss: f64 { clean: 0.0, realistic: 0.12 },
+        /// Share of the first lamp's light that its shadow takes away.
+        shadow_share: f64 { clean: 0.0, realistic: 0.7 },
+    }
+    /// The room behind the hand.
+    background: BackgroundSettings {
+        /// Mean distance of the wall \[m\].
+        distance: f64 { clean: 1.4, realistic: 1.4 },
+        /// Standard deviation of the wall's slopes.
+        slope: f64 { clean: 0.1, realistic: 0.3 },
+        /// Things in front of the wall, at most.
+        things: u32 { clean: 0, realistic: 14 },
+        /// Standard deviation of the wall's pattern per channel.
+        pattern: f64 { clean: 0.0, realistic: 0.04 },
+    }
+    /// Faults of the color images. Zero takes any of them away.
+    color: ColorSettings {
+        /// Standard deviation of the exposure \[stops\].
+        exposure: f64 { clean: 0.0, realistic: 0.35 },
+        /// Standard deviation of the gain of each channel.
+        white_balance: f64 { clean: 0.0, realistic: 0.06 },
+        /// Standard deviation of the blur \[px\], at most.
+        blur: f64 { clean: 0.0, realistic: 1.0 },
+        /// Standard deviation of the noise of each channel in the dark.
+        noise: f64 { clean: 0.01, realistic: 0.01 },
+        /// Variance that noise gains with brightness, up to white.
+        shot_noise: f64 { clean: 0.0, realistic: 2e-4 },
+        /// Quality of the JPEG files, 1 to 100; 0 for PNG, which loses nothing.
+        jpeg_quality: u8 { clean: 0, realistic: 88 },
+    }
+    /// Faults of the depth images. Zero takes any of them away.
+    depth: DepthSettings {
+        /// Standard deviation of the scale error, the same through a grasp.
+        scale: f64 { clean: 0.0, realistic: 4e-3 },
+        /// Standard deviation of a smooth warp that changes over a third of the image, the same through a grasp \[m\].
+        warp: f64 { clean: 0.0, realistic: 1.5e-3 },
+        /// Standard deviation of noise of single pixels, at half a meter; it grows with the square of the depth \[m\].
+        noise: f64 { clean: 7e-4, realistic: 3e-4 },
+        /// Standard deviation of noise with a correlation over `correlation` pixels, at half a meter \[m\].
+        correlated_noise: f64 { clean: 0.0, realistic: 8e-4 },
+        /// Reach of the correlated noise \[px\].
+        correlation: f64 { clean: 3.0, realistic: 3.0 },
+        /// Steps of the disparity \[px\].
+        disparity_step: f64 { clean: 0.0, realistic: 0.1 },
+        /// Distance of the two eyes \[m\]: with the focal length it makes disparity of depth, and what only one of them sees has
+        /// none.
+        baseline: f64 { clean: 0.0, realistic: 0.05 },
+        /// How far what is near spreads over what is behind it \[px\], at most.
+        fattening: f64 { clean: 0.0, realistic: 2.0 },
+        /// Share of the pixels at edges whose depth lies between that of both sides.
+        flying_share: f64 { clean: 0.0, realistic: 0.35 },
+        /// Share of the pixels that are lost in patches.
+        hole_share: f64 { clean: 0.0, realistic: 0.02 },
+        /// Angle of sight to surface below which half of the pixels are lost \[deg\].
+        grazing_deg: f64 { clean: 0.0, realistic: 12.0 },
+    }
+    /// Faults of the masks. Zero takes any of them away.
+    mask: MaskSettings {
+        /// Standard deviation of the outline's place \[px\].
+        wobble: f64 { clean: 0.0, realistic: 1.2 },
+        /// Length along the outline over which it wobbles \[px\].
+        wobble_length: f64 { clean: 12.0, realistic: 12.0 },
+        /// How far the mask leaks onto the hand where it does \[px\].
+        leak: f64 { clean: 0.0, realistic: 5.0 },
+        /// Share of the border with the hand where it leaks.
+        leak_share: f64 { clean: 0.0, realistic: 0.25 },
+    }
+    /// Faults of the taxels. Forces are in sensor units, 1000 a newton.
+    touch: TouchSettings {
+        /// Share of the taxels that say nothing, the same ones through a grasp.
+        dead_share: f64 { clean: 0.0, realistic: 0.1 },
+        /// Share of the taxels that feel what is not there, the same ones through a grasp.
+        false_share: f64 { clean: 0.0, realistic: 0.03 },
+        /// Mean size of what those feel \[units\].
+        false_force: f64 { clean: 0.0, realistic: 250.0 },
+        /// Largest error of a taxel's gain, uniform, the same through a grasp.
+        gain: f64 { clean: 0.0, realistic: 0.25 },
+        /// Standard deviation of the noise of each axis \[units\].
+        noise: f64 { clean: 0.0, realistic: 8.0 },
+        /// Forces smaller than this read as none \[units\].
+        threshold: f64 { clean: 0.0, realistic: 30.0 },
+        /// Step of the readings \[units\].
+        quantum: f64 { clean: 1.0, realistic: 10.0 },
+        /// Largest reading of an axis \[units\].
+        limit: f64 { clean: 10_000.0, realistic: 10_000.0 },
+    }
+    /// Standard deviations of the calibration's errors, which stay the same through a grasp.
+    calibration: CalibrationSettings {
+        /// Focal lengths, relative.
+        focal: f64 { clean: 0.0, realistic: 3e-3 },
+        /// Principal point, each coordinate \[px\] of an image 640 px wide.
+        principal_px: f64 { clean: 0.0, realistic: 1.0 },
+        /// Place of the hand in the camera frame, each axis \[m\].
+        hand_translation: f64 { clean: 0.0, realistic: 2e-3 },
+        /// Turn of the hand in the camera frame, each axis \[deg\].
+        hand_rotation_deg: f64 { clean: 0.0, realistic: 0.4 },
+        /// Joint positions \[deg\], of prismatic joints in thousandths of `joint_deg` meters.
+        joint_deg: f64 { clean: 0.0, realistic: 0.8 },
+    }
+    /// How the model that the estimator is given differs from the object.
+    model: ModelSettings {
+        /// Root mean square of the smooth displacement of the surface along its normal \[m\].
+        deviation: f64 { clean: 0.0, realistic: 7e-4 },
+        /// Wavelength of that displacement \[m\].
+        wavelength: f64 { clean: 0.08, realistic: 0.08 },
+        /// Standard deviation of the scale.
+        scale: f64 { clean: 0.0, realistic: 3e-3 },
+    }
+}
+
+/// Why a setting could not be set: there is none of that name, or the value is not of its kind.
 #[derive(Clone, Debug, Error, PartialEq)]
-pub enum SettingError {
-    /// There is no such setting.
-    #[error("there is no sensor setting {key:?}; there are {}", known.join(", "))]
-    Unknown {
-        /// The name given.
-        key: String,
-        /// All names.
-        known: Vec<String>,
-    },
-    /// The value is no number of the setting's kind.
-    #[error("{key}: {value:?} is not {expected}")]
-    Value {
-        /// The setting.
-        key: String,
-        /// The value given.
-        value: String,
-        /// What it should be.
-        expected: &'static str,
-    },
-}
+#[error("{0}")]
+pub struct SettingError(String);
 
 impl SensorSettings {
-    /// Little noise in color and depth; exact calibration and model.
-    pub fn clean() -> Self {
-        Self {
-            viewpoint: ViewpointSettings::preset(),
-            light: LightSettings::clean(),
-            background: BackgroundSettings::clean(),
-            color: ColorSettings::clean(),
-            depth: DepthSettings::clean(),
-            mask: MaskSettings::clean(),
-            touch: TouchSettings::clean(),
-            calibration: CalibrationSettings::clean(),
-            model: ModelSettings::clean(),
-        }
-    }
-
-    /// A stereo camera and tactile sensors with realistic faults.
-    pub fn realistic() -> Self {
-        Self {
-            viewpoint: ViewpointSettings::preset(),
-            light: LightSettings::realistic(),
-            background: BackgroundSettings::realistic(),
-            color: ColorSettings::realistic(),
-            depth: DepthSettings::realistic(),
-            mask: MaskSettings::realistic(),
-            touch: TouchSettings::realistic(),
-            calibration: CalibrationSettings::realistic(),
-            model: ModelSettings::realistic(),
-        }
-    }
-
     /// Sets the setting `key`, such as `depth.noise`, to the number `value`.
     ///
     /// # Errors
@@ -110,27 +198,23 @@ impl SensorSettings {
     pub fn set(&mut self, key: &str, value: &str) -> Result<(), SettingError> {
         let mut all = self.to_json();
         let unknown = || {
-            let known = self.names().into_iter().map(|(name, _)| name).collect();
-            SettingError::Unknown { key: key.to_owned(), known }
+            let known: Vec<String> = self.names().into_iter().map(|(name, _)| name).collect();
+            let known = known.join(", ");
+            SettingError(format!("there is no sensor setting {key:?}; there are {known}"))
         };
         let (group, name) = key.split_once('.').ok_or_else(unknown)?;
         let group = if group == "colour" { "color" } else { group };
         let slot = all.get_mut(group).and_then(|g| g.get_mut(name)).ok_or_else(unknown)?;
-        let wrong = |expected| SettingError::Value {
-            key: key.to_owned(),
-            value: value.to_owned(),
-            expected,
-        };
+        let wrong = |expected| SettingError(format!("{key}: {value:?} is not {expected}"));
         if slot.is_u64() {
             let number: u32 = value.parse().map_err(|_| wrong("a whole number of at least 0"))?;
             *slot = Value::from(number);
         } else {
             let number: f64 = value.parse().map_err(|_| wrong("a number"))?;
-            let share = name.ends_with("_share");
             if !(number.is_finite() && number >= 0.0) {
                 return Err(wrong("a finite number of at least 0"));
             }
-            if share && number > 1.0 {
+            if name.ends_with("_share") && number > 1.0 {
                 return Err(wrong("a share between 0 and 1"));
             }
             *slot = Value::from(number);

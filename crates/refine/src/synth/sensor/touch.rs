@@ -2,59 +2,11 @@
 
 use nalgebra::Vector3;
 use prehend_geometry::SplitMix64;
-use serde::{Deserialize, Serialize};
 
+use super::settings::TouchSettings;
 use crate::data::bop::UNITS_PER_NEWTON;
 
-/// Faults of the taxels. Forces are in sensor units, 1000 a newton.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(in crate::synth) struct TouchSettings {
-    /// Share of the taxels that say nothing, the same ones through a grasp.
-    pub(in crate::synth) dead_share: f64,
-    /// Share of the taxels that feel what is not there, the same ones through a grasp.
-    pub(in crate::synth) false_share: f64,
-    /// Mean size of what those feel \[units\].
-    pub(in crate::synth) false_force: f64,
-    /// Largest error of a taxel's gain, uniform, the same through a grasp.
-    pub(in crate::synth) gain: f64,
-    /// Standard deviation of the noise of each axis \[units\].
-    pub(in crate::synth) noise: f64,
-    /// Forces smaller than this read as none \[units\].
-    pub(in crate::synth) threshold: f64,
-    /// Step of the readings \[units\].
-    pub(in crate::synth) quantum: f64,
-    /// Largest reading of an axis \[units\].
-    pub(in crate::synth) limit: f64,
-}
-
 impl TouchSettings {
-    pub(super) fn clean() -> Self {
-        Self {
-            dead_share: 0.0,
-            false_share: 0.0,
-            false_force: 0.0,
-            gain: 0.0,
-            noise: 0.0,
-            threshold: 0.0,
-            quantum: 1.0,
-            limit: 10_000.0,
-        }
-    }
-
-    pub(super) fn realistic() -> Self {
-        Self {
-            dead_share: 0.1,
-            false_share: 0.03,
-            false_force: 250.0,
-            gain: 0.25,
-            noise: 8.0,
-            threshold: 30.0,
-            quantum: 10.0,
-            limit: 10_000.0,
-        }
-    }
-
     /// How each of `count` taxels is disposed through a grasp.
     pub(super) fn condition(&self, count: usize, noise: &mut SplitMix64) -> Vec<TaxelCondition> {
         let one = |_| {
@@ -112,6 +64,7 @@ pub(super) struct TaxelCondition {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::synth::sensor::settings::SensorSettings;
 
     fn readings(settings: &TouchSettings, force: f64) -> Vec<Vector3<f64>> {
         let mut noise = SplitMix64::new(12);
@@ -122,15 +75,15 @@ mod tests {
 
     #[test]
     fn clean_skin_reads_the_force_to_a_unit_and_clips_it() {
-        let all = readings(&TouchSettings::clean(), -0.3504);
+        let all = readings(&SensorSettings::clean().touch, -0.3504);
         assert!(all.iter().all(|f| (f - Vector3::new(0.0, 0.0, -0.35)).norm() < 1e-12));
-        let strong = readings(&TouchSettings::clean(), 12.0);
+        let strong = readings(&SensorSettings::clean().touch, 12.0);
         assert!(strong.iter().all(|f| f.z == 10.0));
     }
 
     #[test]
     fn shares_of_dead_and_false_taxels_are_as_asked_for() {
-        let settings = TouchSettings::realistic();
+        let settings = SensorSettings::realistic().touch;
         let touched = readings(&settings, 1.0);
         let dead = touched.iter().filter(|f| f.norm() == 0.0).count() as f64 / 5000.0;
         assert!((dead - 0.1).abs() < 0.015, "{dead}");

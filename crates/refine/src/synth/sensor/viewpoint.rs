@@ -1,41 +1,13 @@
 //! Where the camera stands.
 
-use crate::scene::look_at;
 use nalgebra::{Isometry3, Point3, Vector3};
 use prehend_geometry::SplitMix64;
 use prehend_render::{Camera, RenderModel, depth_map};
-use serde::{Deserialize, Serialize};
 
-/// Where cameras stand about the hand.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(in crate::synth) struct ViewpointSettings {
-    /// Nearest distance from the object's center \[m\].
-    pub(in crate::synth) nearest: f64,
-    /// Farthest distance \[m\].
-    pub(in crate::synth) farthest: f64,
-    /// Focal length, as a share of the image's width.
-    pub(in crate::synth) focal_width_ratio: f64,
-    /// Standard deviation of where the camera aims, per axis \[m\].
-    pub(in crate::synth) aim: f64,
-    /// Standard deviation of the angle between the image's vertical and the world's \[deg\].
-    pub(in crate::synth) roll_deg: f64,
-    /// Largest share of the object that the hand may hide, where a view with less can be found.
-    pub(in crate::synth) hidden_share: f64,
-}
+use super::settings::ViewpointSettings;
+use crate::scene::look_at;
 
 impl ViewpointSettings {
-    pub(super) fn preset() -> Self {
-        Self {
-            nearest: 0.4,
-            farthest: 0.6,
-            focal_width_ratio: 0.906,
-            aim: 0.015,
-            roll_deg: 8.0,
-            hidden_share: 0.55,
-        }
-    }
-
     /// The true camera of an image of that size.
     pub(super) fn camera(&self, width: usize, height: usize) -> Camera {
         let focal = self.focal_width_ratio * width as f64;
@@ -119,6 +91,7 @@ fn visible_share(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::synth::sensor::settings::SensorSettings;
     use prehend_geometry::shapes::cuboid;
 
     #[test]
@@ -127,7 +100,7 @@ mod tests {
         let wall = RenderModel::new(&cuboid(Vector3::new(0.01, 0.3, 0.3))).unwrap();
         let bodies =
             [(&model, Isometry3::identity()), (&wall, Isometry3::translation(0.06, 0.0, 0.0))];
-        let settings = ViewpointSettings::preset();
+        let settings = SensorSettings::clean().viewpoint;
         let camera = settings.camera(640, 480);
         let mut noise = SplitMix64::new(1);
         for _ in 0..10 {
