@@ -5,6 +5,7 @@ use prehend_geometry::TriMesh;
 use prehend_render::{Camera, DepthImage, Mask};
 use serde_json::{Map, Value, json};
 
+use super::hand_files::{TAXELS, URDF};
 use crate::data::bop::{UNITS_PER_NEWTON, extent_to_bop, rotation_to_row_major, translation_to_mm};
 use crate::scene::Inertial;
 
@@ -51,19 +52,18 @@ pub(super) fn bodies(
     t_cam_hand: &Isometry3<f64>,
     names: &[String],
     joints: &[f64],
-    urdf: &str,
 ) -> Value {
     let joints: Map<String, Value> =
         names.iter().cloned().zip(joints.iter().map(|&q| json!(q))).collect();
     let mut body = pose("b2c", t_cam_hand);
     body.insert("name".into(), json!("hand"));
-    body.insert("urdf".into(), json!(urdf));
+    body.insert("urdf".into(), json!(URDF));
     body.insert("joints".into(), Value::Object(joints));
     json!({ "gravity": gravity.as_slice(), "bodies": [body] })
 }
 
 /// Entry of `scene_tactile.json`.
-pub(super) fn touch(forces: &[Vector3<f64>], taxels: &str) -> Value {
+pub(super) fn touch(forces: &[Vector3<f64>]) -> Value {
     // Whole units are written without a fraction.
     let units = |f: f64| {
         let units = (f * UNITS_PER_NEWTON).clamp(-FORCE_LIMIT, FORCE_LIMIT);
@@ -71,7 +71,7 @@ pub(super) fn touch(forces: &[Vector3<f64>], taxels: &str) -> Value {
         if (units - whole).abs() < 1e-9 { json!(whole as i64) } else { json!(units) }
     };
     let force: Vec<[Value; 3]> = forces.iter().map(|f| [f.x, f.y, f.z].map(units)).collect();
-    json!({ "body": "hand", "taxels": taxels, "force": force })
+    json!({ "body": "hand", "taxels": TAXELS, "force": force })
 }
 
 /// Entry of `models_info.json`; `mesh` in meters.
@@ -94,15 +94,12 @@ fn pose(suffix: &str, pose: &Isometry3<f64>) -> Map<String, Value> {
 
 /// Left, top, width and height of what is set, BOP's all −1 if nothing is.
 fn bounding_box(mask: &Mask) -> [i64; 4] {
-    let width = mask.width().max(1);
-    let set = mask.pixels().iter().enumerate().filter(|(_, set)| **set);
-    let bounds = set.map(|(i, _)| ((i % width) as i64, (i / width) as i64)).fold(
-        None,
-        |bounds: Option<[i64; 4]>, (x, y)| {
-            let [l, t, r, b] = bounds.unwrap_or([x, y, x, y]);
-            Some([l.min(x), t.min(y), r.max(x), b.max(y)])
-        },
-    );
+    let mut bounds: Option<[i64; 4]> = None;
+    for (i, _) in mask.pixels().iter().enumerate().filter(|(_, set)| **set) {
+        let (x, y) = ((i % mask.width()) as i64, (i / mask.width()) as i64);
+        let [l, t, r, b] = bounds.unwrap_or([x, y, x, y]);
+        bounds = Some([l.min(x), t.min(y), r.max(x), b.max(y)]);
+    }
     bounds.map_or([-1; 4], |[l, t, r, b]| [l, t, r - l + 1, b - t + 1])
 }
 

@@ -5,10 +5,10 @@ use std::path::Path;
 
 use prehend_render::{Mask, depth_map};
 
-use super::files::{FRAME_FOLDERS, FrameFiles, write_entries, write_models};
+use super::files::{FRAME_FOLDERS, Shot, initial, write_entries, write_models};
 use super::hand_files::write_hand;
 use crate::data::AssetError;
-use crate::data::bop::{ResultRow, create_folder, write_results};
+use crate::data::bop::{create_folder, write_results};
 use crate::scene::Scene;
 
 /// The only scene.
@@ -33,31 +33,25 @@ pub fn write_dataset(dir: &Path, scenes: &[Scene]) -> Result<(), AssetError> {
     let mut rows = Vec::new();
     for (im_id, scene) in (0_u32..).zip(scenes) {
         let seen = &scene.observation;
-        let recorded = FrameFiles {
-            told: seen,
-            obj_id: scene.obj_id,
-            truth: &scene.truth,
+        let shot = Shot {
+            told: seen.clone(),
+            truth: scene.truth,
             // Nothing else is known of these hands, and where they are is where the world is.
-            true_hand: None,
-            world: seen.hand.as_ref().map(|hand| &hand.t_cam_hand),
-            whole: &silhouette(scene),
-            visible: &seen.mask,
-            joint_names: scene.hand.tree.joint_names(),
+            hand: None,
+            world: seen.hand.as_ref().map(|hand| hand.t_cam_hand),
+            whole: silhouette(scene),
+            visible: seen.mask.clone(),
         };
-        frames.insert(im_id as usize, recorded.write(&scene_dir, im_id, 0)?);
-        objects.insert(scene.obj_id, (scene.object.mesh.clone(), &scene.object.inertial));
-        rows.push(ResultRow {
-            scene_id: SCENE_ID,
-            im_id,
-            obj_id: scene.obj_id,
-            score: 1.0,
-            t_cam_model: scene.initial,
-            time: -1.0,
-        });
+        let obj_id = scene.obj_id;
+        let entries = shot.write(&scene_dir, im_id, obj_id, &scene.hand.tree, 0)?;
+        frames.insert(im_id as usize, entries);
+        objects.insert(obj_id, &scene.object);
+        rows.push(initial(SCENE_ID, im_id, obj_id, scene.initial));
     }
     write_entries(&scene_dir, &frames)?;
     for folder in ["models", "models_eval"] {
-        write_models(&dir.join(folder), &objects)?;
+        let models = objects.iter().map(|(id, o)| (*id, o.mesh.clone(), &o.inertial));
+        write_models(&dir.join(folder), models)?;
     }
     if let Some(scene) = scenes.first() {
         write_hand(dir, &scene.urdf, &scene.hand.taxels)?;

@@ -11,27 +11,17 @@ use crate::data::{AssetError, JournalError};
 #[derive(Debug, Error)]
 pub enum SynthError {
     /// The folder holds a dataset that was begun with other settings.
-    #[error(
-        "{}: {setting} was {stored} when this dataset was begun, and now is {given}: give the same settings, or another folder",
-        file.display()
-    )]
+    #[error("{}: {difference}: give the same settings, or another folder", file.display())]
     OtherSettings {
         /// Where the dataset's settings are kept.
         file: PathBuf,
-        /// The first setting that differs, such as `sensor.depth.noise`.
-        setting: String,
-        /// Its value in the file, as JSON.
-        stored: String,
-        /// The value given now.
-        given: String,
+        /// The first setting that differs, and both its values.
+        difference: String,
     },
-    /// The folder holds something else.
-    #[error("{}: is not empty and has no synth.json: no dataset of ours to go on with", dir.display())]
-    Occupied {
-        /// The folder.
-        dir: PathBuf,
-    },
-    /// A number is zero that must not be, two objects have the same number, or one cannot be used in this hand at all.
+    /// This folder holds something else.
+    #[error("{}: is not empty and has no synth.json: no dataset of ours to go on with", .0.display())]
+    Occupied(PathBuf),
+    /// There are no objects, two have the same number, or one cannot be used in this hand at all.
     #[error("{0}")]
     Argument(String),
     /// A file cannot be read or written, or an object prepared.

@@ -6,13 +6,14 @@ use std::path::Path;
 
 use nalgebra::Isometry3;
 use prehend_geometry::TriMesh;
+use prehend_geometry::robot::KinematicTree;
 use prehend_render::Mask;
+use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 
 use super::annotation;
-use super::hand_files::{TAXELS, URDF};
 use crate::data::AssetError;
-use crate::data::bop::{DatasetError, create_folder, write_atomically};
+use crate::data::bop::{DatasetError, ResultRow, create_folder, write_atomically};
 use crate::scene::{Inertial, Observation};
 
 /// Removes what was being written in the folder and below when a process ended: such files are hidden and end in `.tmp`.
@@ -24,39 +25,46 @@ pub(super) fn remove_temporary(folder: &Path) -> Result<(), DatasetError> {
         if entry.file_type().is_ok_and(|t| t.is_dir()) {
             remove_temporary(&file)?;
         } else if name.starts_with('.') && name.ends_with(".tmp") {
-            let refused = |e: std::io::Error| DatasetError::Write {
-                file: file.clone(),
-                problem: e.to_string(),
-            };
-            fs::remove_file(&file).map_err(refused)?;
+            let removed = fs::remove_file(&file);
+            removed.map_err(|e| DatasetError::Write { file, problem: e.to_string() })?;
         }
     }
     Ok(())
 }
 
+/// What a JSON file holds, if it is there.
+pub(super) fn read_json<T: DeserializeOwned>(file: &Path) -> Result<Option<T>, DatasetError> {
+    match fs::read(file) {
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(None),
+        Err(e) => Err(DatasetError::reading(file, &e)),
+        Ok(bytes) => {
+            serde_json::from_slice(&bytes).map(Some).map_err(|e| DatasetError::malformed(file, e))
+        }
+    }
+}
+
 /// The folders of a scene.
 pub(super) const FRAME_FOLDERS: [&str; 4] = ["rgb", "depth", "mask", "mask_visib"];
 
-/// One image with its annotations.
-pub(super) struct FrameFiles<'a> {
+/// One frame: what is measured, and what is true.
+pub(super) struct Shot {
     /// The observation as the estimator gets it.
-    pub(super) told: &'a Observation,
-    pub(super) obj_id: u32,
+    pub(super) told: Observation,
     /// Object → camera.
-    pub(super) truth: &'a Isometry3<f64>,
-    /// True hand base → camera and joint positions, where the dataset keeps them apart from the measured ones.
-    pub(super) true_hand: Option<(&'a Isometry3<f64>, &'a [f64])>,
+    pub(super) truth: Isometry3<f64>,
+    /// Hand base → camera and joint positions, where the dataset keeps them apart from the measured ones.
+    pub(super) hand: Option<(Isometry3<f64>, Vec<f64>)>,
     /// World → camera, where there is a world.
-    pub(super) world: Option<&'a Isometry3<f64>>,
-    /// The unoccluded silhouette.
-    pub(super) whole: &'a Mask,
-    /// Its visible part.
-    pub(super) visible: &'a Mask,
-    pub(super) joint_names: &'a [String],
+    pub(super) world: Option<Isometry3<f64>>,
+    /// The object's silhouette, as far as it lies within the image.
+    pub(super) whole: Mask,
+    /// The part of it that nothing hides.
+    pub(super) visible: Mask,
 }
 
-impl FrameFiles<'_> {
-    /// Writes the images to the scene's folders, color as JPEG of that quality or, if that is 0, as PNG.
+impl Shot {
+    /// Writes the images to the scene's folders, color as JPEG of that quality or, if that is 0, as PNG; returns what they
+    /// add to the files of the scene.
     ///
     /// # Errors
     /// When one cannot be written; those before it are there then.
@@ -64,6 +72,8 @@ impl FrameFiles<'_> {
         &self,
         scene_dir: &Path,
         im_id: u32,
+        obj_id: u32,
+        hand: &KinematicTree,
         jpeg_quality: u8,
     ) -> Result<Entries, AssetError> {
         let (image, instance) = (format!("{im_id:06}.png"), format!("{im_id:06}_000000.png"));
@@ -80,28 +90,28 @@ impl FrameFiles<'_> {
             mask.save(&scene_dir.join(folder).join(&instance)).map_err(DatasetError::from)
         };
         mask("mask_visib", &self.told.mask)?;
-        mask("mask", self.whole)?;
-        Ok(self.entries())
+        mask("mask", &self.whole)?;
+        Ok(self.entries(obj_id, hand.joint_names()))
     }
 
-    fn entries(&self) -> Entries {
-        let told = self.told;
+    fn entries(&self, obj_id: u32, names: &[String]) -> Entries {
+        let Self { told, visible, whole, .. } = self;
         let mut entries = Entries::new();
         let mut add = |name: &str, entry: Value| entries.insert(name.to_owned(), entry);
-        add("scene_gt.json", annotation::truth(self.obj_id, self.truth));
-        add("scene_gt_info.json", annotation::visibility(self.visible, self.whole, &told.depth));
-        add("scene_camera.json", annotation::camera(&told.camera, self.world));
+        add("scene_gt.json", annotation::truth(obj_id, &self.truth));
+        add("scene_gt_info.json", annotation::visibility(visible, whole, &told.depth));
+        add("scene_camera.json", annotation::camera(&told.camera, self.world.as_ref()));
         let gravity = told.gravity.unwrap_or_default();
         let bodies = |t_cam_hand: &Isometry3<f64>, joints: &[f64]| {
-            annotation::bodies(&gravity, t_cam_hand, self.joint_names, joints, URDF)
+            annotation::bodies(&gravity, t_cam_hand, names, joints)
         };
         if let Some(hand) = &told.hand {
             add("scene_bodies.json", bodies(&hand.t_cam_hand, &hand.joints));
             if !hand.forces.is_empty() {
-                add("scene_tactile.json", annotation::touch(&hand.forces, TAXELS));
+                add("scene_tactile.json", annotation::touch(&hand.forces));
             }
         }
-        if let Some((t_cam_hand, joints)) = self.true_hand {
+        if let Some((t_cam_hand, joints)) = &self.hand {
             add("scene_bodies_gt.json", bodies(t_cam_hand, joints));
         }
         entries
@@ -147,18 +157,28 @@ pub(super) fn write_entries(
 ///
 /// # Errors
 /// When a file cannot be written.
-pub(super) fn write_models(
+pub(super) fn write_models<'a>(
     dir: &Path,
-    models: &BTreeMap<u32, (TriMesh, &Inertial)>,
+    models: impl Iterator<Item = (u32, TriMesh, &'a Inertial)>,
 ) -> Result<(), AssetError> {
     create_folder(dir)?;
     let mut info = Map::new();
-    for (id, (mesh, inertial)) in models {
-        mesh.clone().scaled(1e3).save_ply(&dir.join(format!("obj_{id:06}.ply")))?;
-        info.insert(id.to_string(), annotation::model(mesh, inertial));
+    for (id, mesh, inertial) in models {
+        info.insert(id.to_string(), annotation::model(&mesh, inertial));
+        mesh.scaled(1e3).save_ply(&dir.join(format!("obj_{id:06}.ply")))?;
     }
     let text = format!("{:#}\n", Value::Object(info));
     Ok(write_atomically(&dir.join("models_info.json"), text.as_bytes())?)
+}
+
+/// An initial pose for a file of them.
+pub(super) fn initial(
+    scene_id: u32,
+    im_id: u32,
+    obj_id: u32,
+    t_cam_model: Isometry3<f64>,
+) -> ResultRow {
+    ResultRow { scene_id, im_id, obj_id, score: 1.0, t_cam_model, time: -1.0 }
 }
 
 #[cfg(test)]

@@ -1,7 +1,6 @@
 //! Generates whole datasets frame by frame; an interrupted run is resumed.
 
-use std::collections::BTreeMap;
-use std::fs;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
@@ -11,7 +10,8 @@ use serde_json::json;
 
 use super::error::SynthError;
 use super::files::{
-    Entries, FRAME_FOLDERS, FrameFiles, NAMES, remove_temporary, write_entries, write_models,
+    Entries, FRAME_FOLDERS, NAMES, initial, read_json, remove_temporary, write_entries,
+    write_models,
 };
 use super::grasp::GraspSnapshot;
 use super::hand_files::HandFiles;
@@ -20,7 +20,7 @@ use super::sensor::Rig;
 use crate::data::bop::{
     Dataset, DatasetError, GroundTruth, ResultRow, create_folder, write_atomically, write_results,
 };
-use crate::data::{AssetError, Identity, Journal, NoiseLevel};
+use crate::data::{Identity, Journal, NoiseLevel};
 
 /// What a dataset holds.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -74,19 +74,26 @@ pub fn generate<'s, G>(
 where
     G: Fn(u64) -> Result<Vec<GraspSnapshot>, String> + Sync,
 {
-    check(subjects, settings)?;
+    check(subjects)?;
     create_folder(dir)?;
     check_plan(dir, hand, subjects, settings)?;
     remove_temporary(dir)?;
     hand.write(dir)?;
-    write_both_models(dir, subjects, settings)?;
+    let told = |s: &Subject| {
+        let mut noise = sequence(settings.seed, Use::Model, s.obj_id, 0);
+        settings.sensor.model.perturb_model(&s.object.mesh, &mut noise)
+    };
+    let models = |s: &'s Subject, mesh| (s.obj_id, mesh, &s.object.inertial);
+    write_models(&dir.join("models"), subjects.iter().map(|s| models(s, told(s))))?;
+    let exact = subjects.iter().map(|s| models(s, s.object.mesh.clone()));
+    write_models(&dir.join("models_eval"), exact)?;
     let mut summary = DatasetSummary::default();
     for subject in subjects {
         let scene_dir = dir.join("test").join(format!("{:06}", subject.obj_id));
         let scene = Scene { dir: scene_dir, hand, subject, settings, progress };
         let failures = scene.complete(|| prepare(subject))?;
         let failed: usize = failures.iter().map(|f| f.images.len()).sum();
-        summary.frames += u64::from(settings.frames) - failed as u64;
+        summary.frames += u64::from(settings.frames.get()) - failed as u64;
         summary.failures.extend(failures);
     }
     if summary.frames > 0 {
@@ -104,39 +111,13 @@ where
     Ok(summary)
 }
 
-fn check(subjects: &[Subject], settings: &SynthSettings) -> Result<(), SynthError> {
-    for (setting, value) in [
-        ("frames", settings.frames as usize),
-        ("frames per grasp", settings.frames_per_grasp as usize),
-        ("width", settings.width),
-        ("height", settings.height),
-        ("the number of objects", subjects.len()),
-    ] {
-        if value == 0 {
-            return Err(SynthError::Argument(format!("{setting} must be above zero")));
-        }
-    }
-    let mut ids: Vec<u32> = subjects.iter().map(|s| s.obj_id).collect();
-    ids.sort_unstable();
-    match ids.windows(2).find(|pair| pair[0] == pair[1]) {
-        Some(pair) => Err(SynthError::Argument(format!("two objects have the number {}", pair[0]))),
+fn check(subjects: &[Subject]) -> Result<(), SynthError> {
+    let mut ids = BTreeSet::new();
+    match subjects.iter().find(|s| !ids.insert(s.obj_id)) {
+        Some(s) => Err(SynthError::Argument(format!("two objects have the number {}", s.obj_id))),
+        None if ids.is_empty() => Err(SynthError::Argument("there are no objects".into())),
         None => Ok(()),
     }
-}
-
-fn write_both_models(
-    dir: &Path,
-    subjects: &[Subject],
-    settings: &SynthSettings,
-) -> Result<(), AssetError> {
-    let truth = subjects.iter().map(|s| (s.obj_id, (s.object.mesh.clone(), &s.object.inertial)));
-    let told = subjects.iter().map(|s| {
-        let mut noise = sequence(settings.seed, Use::Model, s.obj_id, 0);
-        let mesh = settings.sensor.model.perturb_model(&s.object.mesh, &mut noise);
-        (s.obj_id, (mesh, &s.object.inertial))
-    });
-    write_models(&dir.join("models"), &told.collect::<BTreeMap<_, _>>())?;
-    write_models(&dir.join("models_eval"), &truth.collect::<BTreeMap<_, _>>())
 }
 
 /// What is known of a grasp: its moments, or why there are none.
@@ -157,11 +138,11 @@ impl Scene<'_> {
         &self,
         prepare: impl FnOnce() -> Result<G, String>,
     ) -> Result<Vec<GraspFailure>, SynthError> {
-        let journal = self.dir.join(JOURNAL);
-        let SynthSettings { frames, frames_per_grasp, .. } = *self.settings;
+        let (journal, failures) = (self.dir.join(JOURNAL), self.dir.join(FAILURES));
+        let frames = self.settings.frames.get();
         if !journal.exists() && NAMES.iter().any(|name| self.dir.join(name).exists()) {
             (self.progress)(u64::from(frames));
-            return self.read_failures();
+            return Ok(read_json(&failures)?.unwrap_or_default());
         }
         for folder in FRAME_FOLDERS {
             create_folder(&self.dir.join(folder))?;
@@ -173,10 +154,10 @@ impl Scene<'_> {
         // Images by grasp.
         let mut missing: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
         for im_id in (0..frames).filter(|&id| !done.contains_key(&(id as usize))) {
-            missing.entry(im_id / frames_per_grasp).or_default().push(im_id);
+            missing.entry(im_id / self.settings.frames_per_grasp).or_default().push(im_id);
         }
         let state = Mutex::new((journal, done));
-        let mut failures = Vec::new();
+        let mut failed = Vec::new();
         if !missing.is_empty() {
             let source = prepare()
                 .map_err(|reason| SynthError::Argument(format!("object {obj_id}: {reason}")))?;
@@ -193,16 +174,16 @@ impl Scene<'_> {
             };
             let attempts: Vec<_> =
                 missing.into_par_iter().map(attempt).collect::<Result<_, SynthError>>()?;
-            failures.extend(attempts.into_iter().flatten());
+            failed.extend(attempts.into_iter().flatten());
         }
         let (journal, done) = state.into_inner().unwrap_or_else(PoisonError::into_inner);
-        if !failures.is_empty() {
-            let text = serde_json::to_string_pretty(&failures).unwrap_or_default();
-            write_atomically(&self.dir.join(FAILURES), format!("{text}\n").as_bytes())?;
+        if !failed.is_empty() {
+            let text = serde_json::to_string_pretty(&failed).unwrap_or_default();
+            write_atomically(&failures, format!("{text}\n").as_bytes())?;
         }
         write_entries(&self.dir, &done)?;
         journal.discard()?;
-        Ok(failures)
+        Ok(failed)
     }
 
     /// The moments of a grasp, if they are of this hand.
@@ -227,15 +208,19 @@ impl Scene<'_> {
         images: &[u32],
         state: &Mutex<(Journal, BTreeMap<usize, Entries>)>,
     ) -> Result<(), SynthError> {
-        let SynthSettings { width, height, seed, sensor, .. } = self.settings;
-        let mut noise = sequence(*seed, Use::Rig, self.subject.obj_id, grasp);
-        let (object, robot) = (&self.subject.object, &self.hand.robot);
-        let rig = Rig::new(sensor, object, robot, (*width, *height), &mut noise);
+        let &SynthSettings { width, height, seed, ref sensor, .. } = self.settings;
+        let &Subject { obj_id, ref object } = self.subject;
+        let robot = &self.hand.robot;
+        let size = (width.get(), height.get());
+        let rig =
+            Rig::new(sensor, object, robot, size, &mut sequence(seed, Use::Rig, obj_id, grasp));
+        let shares = self.settings.frames_per_grasp.get() as usize;
         images.par_iter().try_for_each(|&im_id| {
-            let shares = self.settings.frames_per_grasp as usize;
             let share = im_id as usize % shares;
             let moment = &moments[(2 * share + 1) * moments.len() / (2 * shares)];
-            let entries = self.frame(&rig, moment, im_id)?;
+            let shot = rig.capture(moment, &mut sequence(seed, Use::Frame, obj_id, im_id));
+            let quality = sensor.color.jpeg_quality;
+            let entries = shot.write(&self.dir, im_id, obj_id, &robot.tree, quality)?;
             {
                 let mut state = state.lock().unwrap_or_else(PoisonError::into_inner);
                 let (journal, done) = &mut *state;
@@ -244,36 +229,6 @@ impl Scene<'_> {
             (self.progress)(1);
             Ok(())
         })
-    }
-
-    /// Writes the images of one frame; returns its entries in the files of the scene.
-    fn frame(&self, rig: &Rig, moment: &GraspSnapshot, im_id: u32) -> Result<Entries, AssetError> {
-        let obj_id = self.subject.obj_id;
-        let mut noise = sequence(self.settings.seed, Use::Frame, obj_id, im_id);
-        let shot = rig.capture(moment, &mut noise);
-        let files = FrameFiles {
-            told: &shot.told,
-            obj_id,
-            truth: &shot.truth,
-            true_hand: Some((&shot.hand.0, &shot.hand.1)),
-            world: None,
-            whole: &shot.whole,
-            visible: &shot.visible,
-            joint_names: self.hand.robot.tree.joint_names(),
-        };
-        let quality = self.settings.sensor.color.jpeg_quality;
-        files.write(&self.dir, im_id, quality)
-    }
-
-    fn read_failures(&self) -> Result<Vec<GraspFailure>, SynthError> {
-        let file = self.dir.join(FAILURES);
-        match fs::read(&file) {
-            Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(Vec::new()),
-            Err(e) => Err(DatasetError::reading(&file, &e).into()),
-            Ok(bytes) => {
-                Ok(serde_json::from_slice(&bytes).map_err(|e| DatasetError::malformed(&file, e))?)
-            }
-        }
     }
 }
 
@@ -301,15 +256,7 @@ fn initial_poses(
             for seen in truth.objects(scene_id, im_id)? {
                 let mut noise = sequence(from, purpose, scene_id, im_id);
                 let t_cam_model = level.perturb(&seen.t_cam_model, &mut noise);
-                let obj_id = seen.obj_id;
-                rows.push(ResultRow {
-                    scene_id,
-                    im_id,
-                    obj_id,
-                    score: 1.0,
-                    t_cam_model,
-                    time: -1.0,
-                });
+                rows.push(initial(scene_id, im_id, seen.obj_id, t_cam_model));
             }
         }
     }

@@ -1,12 +1,14 @@
 //! The settings of a dataset, kept beside it in `synth.json`, and the random sequences that follow from its seed.
 
 use std::fs;
+use std::num::{NonZeroU32, NonZeroUsize};
 use std::path::Path;
 
 use prehend_geometry::{SplitMix64, TriMesh};
 use serde_json::{Map, Value, json};
 
 use super::error::SynthError;
+use super::files::read_json;
 use super::hand_files::HandFiles;
 use super::sensor::SensorSettings;
 use crate::data::bop::{DatasetError, write_atomically};
@@ -25,13 +27,13 @@ pub struct Subject {
 #[derive(Clone, Debug, PartialEq)]
 pub struct SynthSettings {
     /// Frames of each object.
-    pub frames: u32,
+    pub frames: NonZeroU32,
     /// Frames of each grasp, spread evenly over its moments.
-    pub frames_per_grasp: u32,
+    pub frames_per_grasp: NonZeroU32,
     /// Columns of the images.
-    pub width: usize,
+    pub width: NonZeroUsize,
     /// Rows of the images.
-    pub height: usize,
+    pub height: NonZeroUsize,
     /// Sensor models.
     pub sensor: SensorSettings,
     /// Seed of all random numbers.
@@ -54,22 +56,17 @@ pub(super) fn check_plan(
 ) -> Result<(), SynthError> {
     let plan = describe(hand, subjects, settings);
     let file = dir.join(FILE);
-    if file.is_file() {
-        let bytes = fs::read(&file).map_err(|e| DatasetError::reading(&file, &e))?;
-        let stored: Value =
-            serde_json::from_slice(&bytes).map_err(|e| DatasetError::malformed(&file, e))?;
+    if let Some(stored) = read_json::<Value>(&file)? {
         return match difference(&stored, &plan, "") {
             None => Ok(()),
-            Some((setting, stored, given)) => {
-                Err(SynthError::OtherSettings { file, setting, stored, given })
-            }
+            Some(difference) => Err(SynthError::OtherSettings { file, difference }),
         };
     }
     let mut entries = fs::read_dir(dir).map_err(|e| DatasetError::reading(dir, &e))?;
     // A run that ended before it had a plan may have left a temporary file.
     if entries.any(|e| e.is_ok_and(|e| !e.file_name().to_string_lossy().starts_with(".synth.json")))
     {
-        return Err(SynthError::Occupied { dir: dir.to_owned() });
+        return Err(SynthError::Occupied(dir.to_owned()));
     }
     Ok(write_atomically(&file, format!("{plan:#}\n").as_bytes())?)
 }
@@ -99,11 +96,13 @@ fn describe(hand: &HandFiles, subjects: &[Subject], settings: &SynthSettings) ->
 }
 
 /// The first place where two plans differ, and what they say there.
-fn difference(stored: &Value, given: &Value, place: &str) -> Option<(String, String, String)> {
+fn difference(stored: &Value, given: &Value, place: &str) -> Option<String> {
     let (Value::Object(old), Value::Object(new)) = (stored, given) else {
         // Through text, as the stored one came: whole numbers and fractions may be of different types.
         let (stored, given) = (stored.to_string(), given.to_string());
-        return (stored != given).then(|| (place.to_owned(), stored, given));
+        return (stored != given).then(|| {
+            format!("{place} was {stored} when this dataset was begun, and now is {given}")
+        });
     };
     let names = old.keys().chain(new.keys().filter(|name| !old.contains_key(*name)));
     names.into_iter().find_map(|name| {
@@ -165,10 +164,10 @@ mod tests {
         assert_eq!(difference(&old, &old.clone(), ""), None);
         let new = json!({"a": 1, "b": {"c": 0.25, "d": 2}});
         let found = difference(&old, &new, "").unwrap();
-        assert_eq!(found, ("b.c".to_owned(), "0.5".to_owned(), "0.25".to_owned()));
+        assert_eq!(found, "b.c was 0.5 when this dataset was begun, and now is 0.25");
         let less = json!({"a": 1, "b": {"c": 0.5}});
-        assert_eq!(difference(&old, &less, "").unwrap().0, "b.d");
-        assert_eq!(difference(&less, &old, "").unwrap().1, "null");
+        assert!(difference(&old, &less, "").unwrap().starts_with("b.d was 2 "));
+        assert!(difference(&less, &old, "").unwrap().starts_with("b.d was null "));
     }
 
     #[test]

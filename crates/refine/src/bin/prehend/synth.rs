@@ -120,15 +120,15 @@ impl Synth {
             ..GraspSettings::default()
         };
         let settings = SynthSettings {
-            frames: self.frames.get(),
-            frames_per_grasp: self.frames_per_grasp.get(),
-            width: self.width.get(),
-            height: self.height.get(),
+            frames: self.frames,
+            frames_per_grasp: self.frames_per_grasp,
+            width: self.width,
+            height: self.height,
             sensor,
             seed: self.seed,
             grasp: json!({ "steps": steps, "tries": tries, "settings": format!("{grasping:?}") }),
         };
-        let total = settings.frames as usize * subjects.len();
+        let total = settings.frames.get() as usize * subjects.len();
         let bar = progress(total, "frames");
         let prepare = |subject: &'_ Subject| -> Result<_, String> {
             let grasper = Grasper::new(&hand.robot, &subject.object, &grasping);

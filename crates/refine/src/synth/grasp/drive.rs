@@ -1,7 +1,9 @@
 //! Fingers that close until they are resisted.
 
-use nalgebra::{DMatrix, DVector, Isometry3};
-use prehend_geometry::robot::Screw;
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector};
+use prehend_geometry::robot::LinkShape;
 
 use super::preshape::Preshape;
 use super::self_collision::{SelfCollision, ball};
@@ -52,8 +54,18 @@ impl<'a> Drive<'a> {
         let joints: Vec<f64> = (0..preshape.open.len()).map(middle).collect();
         let poses = tree.forward_kinematics(&joints);
         let screws = tree.screws(&poses);
-        let lever = |v| lever(robot, &paths, &screws, &poses, v);
-        let lever = (0..joints.len()).map(lever).collect();
+        let lever = |v: usize| {
+            let speed = |(link, shape): (usize, &Arc<LinkShape>)| {
+                let center = poses[link] * ball(shape)?.0;
+                let own = paths[link].iter().map(|&s| &screws[s]).filter(|s| s.variable == v);
+                Some(own.map(|s| s.velocity(&center)).reduce(|a, b| a + b)?.norm())
+            };
+            let links = robot.shape.links().iter().enumerate();
+            let speeds: Vec<f64> = links.filter_map(speed).collect();
+            let mean = speeds.iter().sum::<f64>() / speeds.len() as f64;
+            // A joint whose links lie on its axis still has some size.
+            if speeds.is_empty() { 1.0 } else { mean.max(MIN_LEVER) }
+        };
         let self_collision =
             SelfCollision::new(robot, &paths, &tree.forward_kinematics(&preshape.open));
         Self {
@@ -61,7 +73,7 @@ impl<'a> Drive<'a> {
             self_collision,
             limits: tree.joint_limits(),
             speed: preshape.speed.clone(),
-            lever,
+            lever: (0..joints.len()).map(lever).collect(),
             paths,
             yield_ratio: settings.yield_ratio,
             dt: settings.time_step,
@@ -160,26 +172,4 @@ impl<'a> Drive<'a> {
     pub(super) fn is_at_rest(&self, change: &[f64], part: f64) -> bool {
         change.iter().zip(&self.speed).all(|(c, s)| c.abs() <= part * s.abs() * self.dt)
     }
-}
-
-/// Mean speed of the links that a joint moves, by their centers.
-fn lever(
-    robot: &Hand,
-    paths: &[Vec<usize>],
-    screws: &[Screw],
-    poses: &[Isometry3<f64>],
-    variable: usize,
-) -> f64 {
-    let (mut sum, mut count) = (0.0, 0);
-    for (link, shape) in robot.shape.links().iter().enumerate() {
-        let Some((center, _)) = ball(shape) else { continue };
-        let own = paths[link].iter().map(|&s| &screws[s]).filter(|s| s.variable == variable);
-        let velocities = own.map(|s| s.velocity(&(poses[link] * center)));
-        if let Some(velocity) = velocities.reduce(|a, b| a + b) {
-            sum += velocity.norm();
-            count += 1;
-        }
-    }
-    // A joint whose links lie on its axis still has some size.
-    if count == 0 { 1.0 } else { (sum / f64::from(count)).max(MIN_LEVER) }
 }

@@ -17,14 +17,9 @@ pub enum GraspError {
     /// No joint of the robot closes around anything.
     #[error("the robot has no joint that would close its fingers")]
     NoFingers,
-    /// The object cannot be simulated.
-    #[error("object {object}: {reason}")]
-    Object {
-        /// Its name.
-        object: String,
-        /// What is wrong with it.
-        reason: BodyError,
-    },
+    /// The object of that name cannot be simulated.
+    #[error("object {0}: {1}")]
+    Object(String, BodyError),
     /// The contact law was refused.
     #[error(transparent)]
     Law(#[from] LawError),
@@ -59,14 +54,9 @@ pub enum GraspFault {
     /// Hand and object share too much volume \[cm³\].
     #[error("hand and object share {0:.2} cm³")]
     TooDeep(f64),
-    /// None of so many attempts led to a grasp.
-    #[error("no grasp after {tries} tries; the last: {last}")]
-    Exhausted {
-        /// How many.
-        tries: u64,
-        /// What was wrong with the last one.
-        last: Box<GraspFault>,
-    },
+    /// None of so many attempts led to a grasp; the last failed for that reason.
+    #[error("no grasp after {0} tries; the last: {1}")]
+    Exhausted(u64, Box<GraspFault>),
     /// The simulation failed.
     #[error(transparent)]
     Simulation(#[from] SimulationError),

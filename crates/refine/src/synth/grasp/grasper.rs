@@ -5,11 +5,11 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Point3, Vector3};
 use prehend_geometry::sample::surface_samples;
 use prehend_geometry::{ClosestPoints, SolidUnion, SplitMix64};
-use prehend_sim::{Coulomb, DynContactLaw, KelvinVoigt, Law, LawError, RigidBody, SurfacePoint};
+use prehend_sim::{Coulomb, DynContactLaw, KelvinVoigt, Law, LawError, RigidBody};
 
 use super::drive::{Drive, Effort};
 use super::fault::{GraspError, GraspFault};
-use super::placement::{Placed, Placement};
+use super::placement::Placement;
 use super::preshape::Preshape;
 use super::settings::GraspSettings;
 use super::simulation::{Medium, Setup, Simulation};
@@ -45,7 +45,7 @@ pub struct Grasper<'a> {
     preshape: Preshape,
     pub(super) setup: Setup<'a>,
     pub(super) drive: Drive<'a>,
-    pub(super) skin: Skin,
+    pub(super) skin: Skin<'a>,
     placement: Placement,
     contact: ContactModel,
 }
@@ -82,13 +82,12 @@ impl<'a> Grasper<'a> {
         preshape.check(robot.tree.joint_names().len())?;
         let inertial = &object.inertial;
         let body = RigidBody::new(inertial.mass, inertial.inertia, inertial.center_of_mass);
-        let body =
-            body.map_err(|reason| GraspError::Object { object: object.name.clone(), reason })?;
+        let body = body.map_err(|reason| GraspError::Object(object.name.clone(), reason))?;
         let count = (object.area / settings.sample_spacing.powi(2)).clamp(SAMPLES.0, SAMPLES.1);
         let solid = object.mesh.cleaned().0;
         let samples = surface_samples(&solid, count as usize, 0);
         let area = object.area / samples.len().max(1) as f64;
-        let samples = samples.iter().map(|s| SurfacePoint { position: s.point, area }).collect();
+        let samples = samples.iter().map(|s| s.point).collect();
         // Backward Euler damps what is faster than its step: contacts need no damping of their own.
         let spring = KelvinVoigt { stiffness: settings.stiffness, damping: 0.0 };
         let law = |slip_scale| -> Result<Arc<dyn DynContactLaw>, LawError> {
@@ -100,7 +99,7 @@ impl<'a> Grasper<'a> {
         Ok(Self {
             drive: Drive::new(robot, &preshape, settings),
             skin: Skin::new(robot, settings.taxel_reach)?,
-            setup: Setup { robot, body, samples, law, soft_law, time_step, damping_time },
+            setup: Setup { robot, body, samples, area, law, soft_law, time_step, damping_time },
             placement: Placement::new(object),
             contact: ContactModel::new(&object.mesh),
             settings: settings.clone(),
@@ -114,15 +113,13 @@ impl<'a> Grasper<'a> {
     /// Why it is none.
     pub fn grasp(&self, seed: u64) -> Result<Grasp, GraspFault> {
         let mut random = SplitMix64::new(seed);
-        let placed =
-            self.placement.draw(self.setup.robot, &self.preshape, &self.settings, &mut random)?;
-        let Placed { joints, t_hand_object } = placed.ok_or(GraspFault::NoRoom)?;
-        let weight = self.setup.body.mass() * self.settings.gravity;
-        let pace = self.preshape.speed.iter();
-        let pace = pace
-            .map(|_| 1.0 + self.settings.speed_spread * (2.0 * random.uniform() - 1.0))
-            .collect();
-        let grip = self.settings.grip + self.settings.grip_per_weight * weight;
+        let (robot, settings) = (self.setup.robot, &self.settings);
+        let (joints, t_hand_object) =
+            self.placement.draw(robot, &self.preshape, settings, &mut random)?;
+        let weight = self.setup.body.mass() * settings.gravity;
+        let mut pace = |_: &f64| 1.0 + settings.speed_spread * (2.0 * random.uniform() - 1.0);
+        let pace = self.preshape.speed.iter().map(&mut pace).collect();
+        let grip = settings.grip + settings.grip_per_weight * weight;
         let effort = Effort { pace, grip };
         let mut simulation = Simulation::new(&self.setup, &joints, &t_hand_object)?;
         self.close(&mut simulation, &effort)?;
@@ -163,7 +160,7 @@ impl<'a> Grasper<'a> {
                 Err(fault) => last = fault,
             }
         }
-        Err(GraspFault::Exhausted { tries, last: Box::new(last) })
+        Err(GraspFault::Exhausted(tries, Box::new(last)))
     }
 
     /// Closes the hand around the floating object, until all is at rest or nearly so when time is up: some fingers go on

@@ -1,9 +1,10 @@
 //! Where the object is when the hand begins to close.
 
-use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use prehend_geometry::SplitMix64;
 use prehend_geometry::robot::{PosedRobot, RobotError};
 
+use super::fault::GraspFault;
 use super::preshape::Preshape;
 use super::settings::GraspSettings;
 use crate::scene::{Hand, Object};
@@ -28,12 +29,6 @@ pub(super) struct Placement {
     half_length: f64,
 }
 
-/// An open hand and an object before its palm.
-pub(super) struct Placed {
-    pub(super) joints: Vec<f64>,
-    pub(super) t_hand_object: Isometry3<f64>,
-}
-
 impl Placement {
     pub(super) fn new(object: &Object) -> Self {
         let every = object.samples.len().div_ceil(PROBES).max(1);
@@ -45,17 +40,17 @@ impl Placement {
         order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
         let column = |k: usize| eigen.eigenvectors.column(order[k]).into_owned();
         let (long, middle) = (column(0), column(1));
-        let turn = Matrix3::from_columns(&[long, middle, long.cross(&middle)]);
         let along = |p: &Point3<f64>| (p - object.center).dot(&long).abs();
         Self {
             half_length: probes.iter().map(along).fold(0.0, f64::max),
             center: object.center,
-            axes: UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turn)),
+            axes: UnitQuaternion::from_basis_unchecked(&[long, middle, long.cross(&middle)]),
             probes,
         }
     }
 
-    /// A random placement; nothing if the fingers are in the way time and again.
+    /// Joint positions of an open hand and a random pose of the object before its palm, unless the fingers are in the way time
+    /// and again.
     ///
     /// The longest axis of aligned placements lies along that about which fingers wrap, their faces towards the palm.
     pub(super) fn draw(
@@ -64,17 +59,17 @@ impl Placement {
         preshape: &Preshape,
         settings: &GraspSettings,
         random: &mut SplitMix64,
-    ) -> Result<Option<Placed>, RobotError> {
+    ) -> Result<(Vec<f64>, Isometry3<f64>), GraspFault> {
         let palm = Point3::from(preshape.t_hand_palm.translation.vector);
         for _ in 0..DRAWS {
-            let placed = self.draw_one(robot, preshape, settings, random)?;
-            let gap = |p: &Point3<f64>| (placed.t_hand_object * p - palm).norm();
+            let (joints, t_hand_object) = self.draw_one(robot, preshape, settings, random)?;
+            let gap = |p: &Point3<f64>| (t_hand_object * p - palm).norm();
             let gap = self.probes.iter().map(gap).fold(f64::INFINITY, f64::min);
             if gap < settings.clearance + NEAR_PALM {
-                return Ok(Some(placed));
+                return Ok((joints, t_hand_object));
             }
         }
-        Ok(None)
+        Err(GraspFault::NoRoom)
     }
 
     fn draw_one(
@@ -83,7 +78,7 @@ impl Placement {
         preshape: &Preshape,
         settings: &GraspSettings,
         random: &mut SplitMix64,
-    ) -> Result<Placed, RobotError> {
+    ) -> Result<(Vec<f64>, Isometry3<f64>), RobotError> {
         let both_ways = |random: &mut SplitMix64| 2.0 * random.uniform() - 1.0;
         let open = preshape.open.iter().zip(&preshape.spread);
         let open: Vec<f64> = open.map(|(q, s)| q + s * both_ways(random)).collect();
@@ -124,17 +119,13 @@ impl Placement {
             }
             height -= room;
         }
-        Ok(Placed { joints, t_hand_object: at(height) })
+        Ok((joints, at(height)))
     }
 
     fn distance(&self, hand: &PosedRobot, t_hand_object: &Isometry3<f64>) -> f64 {
-        let mut nearest = f64::INFINITY;
-        for probe in &self.probes {
-            let limit = if nearest.is_finite() { nearest } else { 2.0 * FAR };
-            if let Some(closest) = hand.closest(&(t_hand_object * probe), limit) {
-                nearest = nearest.min(closest.closest.distance);
-            }
-        }
-        nearest
+        self.probes.iter().fold(f64::INFINITY, |nearest, probe| {
+            let found = hand.closest(&(t_hand_object * probe), nearest.min(2.0 * FAR));
+            found.map_or(nearest, |closest| nearest.min(closest.closest.distance))
+        })
     }
 }

@@ -1,6 +1,6 @@
 //! How a hand opens before it grasps, and how its joints close.
 
-use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, Point3, UnitQuaternion, Vector3};
 use prehend_geometry::hand::JOINT_NAMES;
 use prehend_geometry::robot::KinematicTree as Tree;
 
@@ -110,24 +110,19 @@ impl Preshape {
         if best <= 0.0 {
             return Err(GraspError::NoFingers);
         }
-        let closes = |v: usize| nearer[v].abs() > CLOSES * best;
-        let turns = |v: usize| screws.iter().any(|s| s.variable == v && s.angular.norm() > 0.0);
-        let count = limits.len();
-        let open = |v: usize| match (closes(v), nearer[v] > 0.0) {
-            (false, _) => middle[v],
-            (true, true) => limits[v].0,
-            (true, false) => limits[v].1,
-        };
-        let open: Vec<f64> = (0..count).map(open).collect();
-        let speed = |v: usize| {
-            let fastest = if turns(v) { ANGULAR_SPEED } else { LINEAR_SPEED };
-            if closes(v) { fastest * nearer[v].signum() } else { 0.0 }
-        };
+        let (mut open, mut speed) = (middle, vec![0.0; limits.len()]);
+        for (v, (lower, upper)) in limits.iter().enumerate() {
+            if nearer[v].abs() > CLOSES * best {
+                let turns = screws.iter().any(|s| s.variable == v && s.angular.norm() > 0.0);
+                let fastest = if turns { ANGULAR_SPEED } else { LINEAR_SPEED };
+                open[v] = if nearer[v] > 0.0 { *lower } else { *upper };
+                speed[v] = fastest * nearer[v].signum();
+            }
+        }
         let spread = |(lower, upper): &(f64, f64)| {
             let range = upper - lower;
             if range.is_finite() { 0.05 * range } else { 0.0 }
         };
-        let speed: Vec<f64> = (0..count).map(speed).collect();
 
         // The palm: the nearest point of what no joint moves, or of the least moved.
         let least = solid().map(|(l, _)| paths[l].len()).min().unwrap_or(0);
@@ -187,9 +182,6 @@ fn frame(origin: &Point3<f64>, out: &Vector3<f64>, axis: &Vector3<f64>) -> Isome
         let other = if out.x.abs() < 0.9 { Vector3::x() } else { Vector3::y() };
         other.cross(out).normalize()
     });
-    let turn = Matrix3::from_columns(&[x, out.cross(&x), *out]);
-    Isometry3::from_parts(
-        Translation3::from(origin.coords),
-        UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turn)),
-    )
+    let turn = UnitQuaternion::from_basis_unchecked(&[x, out.cross(&x), *out]);
+    Isometry3::from_parts(origin.coords.into(), turn)
 }

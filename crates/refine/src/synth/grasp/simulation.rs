@@ -8,8 +8,7 @@ use prehend_geometry::robot::LinkShape;
 use prehend_geometry::{DistanceField, FieldSample};
 use prehend_sim::{
     BackwardEuler, Body, BodyId, Contact, ContactBodies, DynContactLaw, GapSmoothing, Integrator,
-    RigidBody, SemiImplicitEuler, SimulationError, State, Step, SubStepped, Surface, SurfacePoint,
-    World,
+    RigidBody, SemiImplicitEuler, SimulationError, State, Step, SubStepped, Surface, World,
 };
 
 use crate::scene::Hand;
@@ -28,7 +27,9 @@ const EXPLICIT_PARTS: usize = 1 << 12;
 pub(super) struct Setup<'a> {
     pub(super) robot: &'a Hand,
     pub(super) body: RigidBody,
-    pub(super) samples: Vec<SurfacePoint>,
+    /// Samples of its surface, object frame \[m\], and the area that each stands for \[m²\].
+    pub(super) samples: Vec<Point3<f64>>,
+    pub(super) area: f64,
     pub(super) law: Arc<dyn DynContactLaw>,
     /// The same with softer friction, for steps that cannot be solved otherwise.
     pub(super) soft_law: Arc<dyn DynContactLaw>,
@@ -219,19 +220,18 @@ impl<'a> Simulation<'a> {
         for solid in &mut self.links {
             solid.looked_at = Some(t_object_hand * self.poses[solid.link]);
         }
-        let near = |sample: &&SurfacePoint| {
+        let near = |point: &&Point3<f64>| {
             self.links.iter().any(|solid| {
-                let local = solid.looked_at.map(|t| t.inverse_transform_point(&sample.position));
+                let local = solid.looked_at.map(|t| t.inverse_transform_point(point));
                 local.is_some_and(|local| solid.shape.distance(&local, NEAR).is_some())
             })
         };
-        let mut kept: Vec<SurfacePoint> = self.setup.samples.iter().filter(near).copied().collect();
+        let mut kept: Vec<_> = self.setup.samples.iter().filter(near).copied().collect();
         // A surface must not be empty.
         if kept.is_empty() {
             kept.extend(self.setup.samples.first());
         }
-        let (points, areas): (Vec<_>, Vec<_>) = kept.iter().map(|s| (s.position, s.area)).unzip();
-        let surface = Surface::new(&points, &areas)
+        let surface = Surface::new(&kept, &vec![self.setup.area; kept.len()])
             .map_err(|error| SimulationError::Body { body: "object".to_owned(), error })?;
         self.world.bodies[self.object].surface = Some(Arc::new(surface));
         Ok(())

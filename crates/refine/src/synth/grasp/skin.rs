@@ -1,34 +1,27 @@
 //! Forces on taxels from contacts.
 
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Isometry3, Vector3};
+use prehend_geometry::hand::Taxel;
 
 use super::simulation::Touch;
 use crate::error::RefineError;
 use crate::scene::Hand;
 
 /// The taxels of a hand by link.
-pub(super) struct Skin {
-    by_link: Vec<Vec<Spot>>,
-    count: usize,
+pub(super) struct Skin<'a> {
+    taxels: &'a [Taxel],
+    /// Places in `taxels`.
+    by_link: Vec<Vec<usize>>,
     reach: f64,
 }
 
-struct Spot {
-    taxel: usize,
-    /// Link frame.
-    position: Point3<f64>,
-    normal: Vector3<f64>,
-}
-
-impl Skin {
-    pub(super) fn new(robot: &Hand, reach: f64) -> Result<Self, RefineError> {
-        let mut by_link: Vec<Vec<Spot>> = Vec::new();
-        by_link.resize_with(robot.tree.links().len(), Vec::new);
-        for (taxel, t) in robot.taxels.iter().enumerate() {
-            let spot = Spot { taxel, position: t.position, normal: t.normal };
-            by_link[robot.link_of(t)?].push(spot);
+impl<'a> Skin<'a> {
+    pub(super) fn new(robot: &'a Hand, reach: f64) -> Result<Self, RefineError> {
+        let mut by_link = vec![Vec::new(); robot.tree.links().len()];
+        for (number, taxel) in robot.taxels.iter().enumerate() {
+            by_link[robot.link_of(taxel)?].push(number);
         }
-        Ok(Self { by_link, count: robot.taxels.len(), reach })
+        Ok(Self { taxels: &robot.taxels, by_link, reach })
     }
 
     /// Force of the object on each taxel, in the frame of its link \[N\].
@@ -36,19 +29,20 @@ impl Skin {
     /// Each contact spreads over the taxels of its link within reach r, by weights (1 − (d/r)²)²·(n·n_t)⁺ that sum to one;
     /// d is the distance, n the normal of the contact and n_t that of the taxel. Where there is none it is not felt.
     pub(super) fn forces(&self, touches: &[Touch], poses: &[Isometry3<f64>]) -> Vec<Vector3<f64>> {
-        let mut forces = vec![Vector3::zeros(); self.count];
+        let mut forces = vec![Vector3::zeros(); self.taxels.len()];
         let mut weights: Vec<(usize, f64)> = Vec::new();
         for touch in touches {
             let pose = &poses[touch.link];
             let point = pose.inverse_transform_point(&touch.point);
             let normal = pose.rotation.inverse() * touch.normal;
             weights.clear();
-            for spot in &self.by_link[touch.link] {
-                let nearness =
-                    1.0 - (spot.position - point).norm_squared() / (self.reach * self.reach);
-                let facing = spot.normal.dot(&normal);
+            for &number in &self.by_link[touch.link] {
+                let taxel = &self.taxels[number];
+                let squared = (taxel.position - point).norm_squared();
+                let nearness = 1.0 - squared / (self.reach * self.reach);
+                let facing = taxel.normal.dot(&normal);
                 if nearness > 0.0 && facing > 0.0 {
-                    weights.push((spot.taxel, nearness * nearness * facing));
+                    weights.push((number, nearness * nearness * facing));
                 }
             }
             let sum: f64 = weights.iter().map(|(_, w)| w).sum();

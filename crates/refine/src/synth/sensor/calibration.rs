@@ -35,26 +35,23 @@ pub(super) struct Miscalibration {
 }
 
 impl Miscalibration {
-    /// The camera that the estimator is told.
-    pub(super) fn camera(&self, truth: &Camera) -> Camera {
-        let width = truth.width as f64;
-        Camera {
-            fx: truth.fx * self.focal[0],
-            fy: truth.fy * self.focal[1],
-            cx: truth.cx + self.principal[0] * width,
-            cy: truth.cy + self.principal[1] * width,
-            ..*truth
-        }
-    }
-
-    /// The hand's pose that the estimator is told.
-    pub(super) fn hand(&self, truth: &Isometry3<f64>) -> Isometry3<f64> {
-        truth * self.hand
-    }
-
-    /// The joint positions that the estimator is told.
-    pub(super) fn joints(&self, truth: &[f64]) -> Vec<f64> {
-        truth.iter().zip(&self.joints).map(|(q, error)| q + error).collect()
+    /// The camera, the hand's pose and the joint positions that the estimator is told.
+    pub(super) fn apply(
+        &self,
+        camera: &Camera,
+        t_cam_hand: &Isometry3<f64>,
+        joints: &[f64],
+    ) -> (Camera, Isometry3<f64>, Vec<f64>) {
+        let width = camera.width as f64;
+        let told = Camera {
+            fx: camera.fx * self.focal[0],
+            fy: camera.fy * self.focal[1],
+            cx: camera.cx + self.principal[0] * width,
+            cy: camera.cy + self.principal[1] * width,
+            ..*camera
+        };
+        let joints = joints.iter().zip(&self.joints).map(|(q, error)| q + error).collect();
+        (told, t_cam_hand * self.hand, joints)
     }
 }
 
@@ -72,9 +69,8 @@ mod tests {
         let mut squares = [0.0; 6];
         for _ in 0..count as usize {
             let errors = settings.draw(&[false, true], &mut noise);
-            let told = errors.camera(&camera);
-            let moved = place.inverse() * errors.hand(&place);
-            let joints = errors.joints(&[0.3, 0.1]);
+            let (told, hand, joints) = errors.apply(&camera, &place, &[0.3, 0.1]);
+            let moved = place.inverse() * hand;
             let all = [
                 (told.fx / 580.0 - 1.0) / settings.focal,
                 (told.cy - 239.5) / settings.principal_px,
@@ -87,8 +83,8 @@ mod tests {
         }
         assert!(squares.iter().all(|s| (s.sqrt() - 1.0).abs() < 0.1), "{squares:?}");
         let exact = SensorSettings::clean().calibration.draw(&[false], &mut noise);
-        assert_eq!(exact.camera(&camera), camera);
-        assert_eq!(exact.joints(&[0.7]), [0.7]);
-        assert!((exact.hand(&place).translation.vector - place.translation.vector).norm() < 1e-15);
+        let (told, hand, joints) = exact.apply(&camera, &place, &[0.7]);
+        assert_eq!((told, joints), (camera, vec![0.7]));
+        assert!((hand.translation.vector - place.translation.vector).norm() < 1e-15);
     }
 }

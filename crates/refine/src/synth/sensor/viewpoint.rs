@@ -27,18 +27,18 @@ impl ViewpointSettings {
         let Some((object, t_hand_object)) = bodies.first() else { return Isometry3::identity() };
         let center = t_hand_object * object.center();
         let coarse = camera.scaled(COARSE_WIDTH / camera.width as f64);
-        let mut best: Option<(f64, Isometry3<f64>)> = None;
+        let mut best = (-1.0, Isometry3::identity());
         for _ in 0..TRIES {
             let candidate = self.candidate(&center, gravity, noise);
             let seen = visible_share(&coarse, bodies, &candidate);
             if seen >= 1.0 - self.hidden_share {
                 return candidate;
             }
-            if best.is_none_or(|(most, _)| seen > most) {
-                best = Some((seen, candidate));
+            if seen > best.0 {
+                best = (seen, candidate);
             }
         }
-        best.map_or_else(Isometry3::identity, |(_, pose)| pose)
+        best.1
     }
 
     fn candidate(
