@@ -53,8 +53,8 @@ const FAILURES: &str = "synth_failures.json";
 /// why there is none. The same seed must give the same moments. `progress` hears of every number of frames that are done.
 ///
 /// Frames appear one by one, in any order. Interrupted at any moment and called again with the same arguments, this
-/// goes on with what is missing; the files are the same as without interruption, and for any number of threads. Grasps that cannot be made are listed in the result and in
-/// `synth_failures.json` of their scene.
+/// goes on with what is missing; the files are the same as without interruption, and for any number of threads. Grasps that
+/// cannot be made are listed in the result and in `synth_failures.json` of their scene.
 ///
 /// `models/` and `scene_bodies.json` hold what the estimator is told, `models_eval/`, `mask/`, `scene_gt.json`,
 /// `scene_gt_info.json` and `scene_bodies_gt.json` the truth; `init_low.csv` and `init_high.csv` are initial poses
@@ -161,20 +161,15 @@ impl Scene<'_> {
         if !missing.is_empty() {
             let source = prepare()
                 .map_err(|reason| SynthError::Argument(format!("object {obj_id}: {reason}")))?;
-            let attempt = |(grasp, images): (u32, Vec<u32>)| {
-                let reason = match self.moments(&source, grasp) {
-                    Ok(moments) => {
-                        self.frames(&moments, grasp, &images, &state)?;
-                        return Ok(None);
-                    }
-                    Err(reason) => reason,
-                };
-                (self.progress)(images.len() as u64);
-                Ok(Some(GraspFailure { obj_id, images, reason }))
+            let attempt = |(grasp, images): (u32, Vec<u32>)| match self.moments(&source, grasp) {
+                Ok(moments) => self.frames(&moments, grasp, &images, &state).map(|()| None),
+                Err(reason) => {
+                    (self.progress)(images.len() as u64);
+                    Ok(Some(GraspFailure { obj_id, images, reason }))
+                }
             };
-            let attempts: Vec<_> =
-                missing.into_par_iter().map(attempt).collect::<Result<_, SynthError>>()?;
-            failed.extend(attempts.into_iter().flatten());
+            let attempts = missing.into_par_iter().map(attempt);
+            failed = attempts.filter_map(Result::transpose).collect::<Result<_, SynthError>>()?;
         }
         let (journal, done) = state.into_inner().unwrap_or_else(PoisonError::into_inner);
         if !failed.is_empty() {

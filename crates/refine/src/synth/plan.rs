@@ -42,8 +42,6 @@ pub struct SynthSettings {
     pub grasp: Value,
 }
 
-const FILE: &str = "synth.json";
-
 /// Writes the plan to `dir`, or makes sure that it is the one which is there.
 ///
 /// # Errors
@@ -55,7 +53,7 @@ pub(super) fn check_plan(
     settings: &SynthSettings,
 ) -> Result<(), SynthError> {
     let plan = describe(hand, subjects, settings);
-    let file = dir.join(FILE);
+    let file = dir.join("synth.json");
     if let Some(stored) = read_json::<Value>(&file)? {
         return match difference(&stored, &plan, "") {
             None => Ok(()),

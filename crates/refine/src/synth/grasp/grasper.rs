@@ -75,10 +75,7 @@ impl<'a> Grasper<'a> {
         settings: &GraspSettings,
     ) -> Result<Self, GraspError> {
         settings.check()?;
-        let preshape = match &settings.preshape {
-            Some(own) => own.clone(),
-            None => Preshape::of(robot)?,
-        };
+        let preshape = settings.preshape.clone().map_or_else(|| Preshape::of(robot), Ok)?;
         preshape.check(robot.tree.joint_names().len())?;
         let inertial = &object.inertial;
         let body = RigidBody::new(inertial.mass, inertial.inertia, inertial.center_of_mass);

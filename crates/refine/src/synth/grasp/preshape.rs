@@ -33,10 +33,7 @@ impl Preshape {
     /// # Errors
     /// As [`Preshape::guess`].
     pub fn of(robot: &Hand) -> Result<Self, GraspError> {
-        match Self::built_in(&robot.tree) {
-            Some(own) => Ok(own),
-            None => Self::guess(robot),
-        }
+        Self::built_in(&robot.tree).map_or_else(|| Self::guess(robot), Ok)
     }
 
     /// Fingers nearly straight, the thumb opposite to them; finger roots and the thumb's two first joints keep still.

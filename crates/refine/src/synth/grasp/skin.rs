@@ -30,25 +30,24 @@ impl<'a> Skin<'a> {
     /// d is the distance, n the normal of the contact and n_t that of the taxel. Where there is none it is not felt.
     pub(super) fn forces(&self, touches: &[Touch], poses: &[Isometry3<f64>]) -> Vec<Vector3<f64>> {
         let mut forces = vec![Vector3::zeros(); self.taxels.len()];
-        let mut weights: Vec<(usize, f64)> = Vec::new();
         for touch in touches {
             let pose = &poses[touch.link];
             let point = pose.inverse_transform_point(&touch.point);
             let normal = pose.rotation.inverse() * touch.normal;
-            weights.clear();
-            for &number in &self.by_link[touch.link] {
+            let weight = |&number: &usize| {
                 let taxel = &self.taxels[number];
                 let squared = (taxel.position - point).norm_squared();
                 let nearness = 1.0 - squared / (self.reach * self.reach);
                 let facing = taxel.normal.dot(&normal);
-                if nearness > 0.0 && facing > 0.0 {
-                    weights.push((number, nearness * nearness * facing));
-                }
-            }
+                let felt = nearness > 0.0 && facing > 0.0;
+                felt.then_some((number, nearness * nearness * facing))
+            };
+            let near = self.by_link[touch.link].iter();
+            let weights: Vec<(usize, f64)> = near.filter_map(weight).collect();
             let sum: f64 = weights.iter().map(|(_, w)| w).sum();
             let force = pose.rotation.inverse() * -touch.force;
-            for (taxel, weight) in &weights {
-                forces[*taxel] += force * (weight / sum);
+            for (number, weight) in weights {
+                forces[number] += force * (weight / sum);
             }
         }
         forces

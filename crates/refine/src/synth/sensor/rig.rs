@@ -55,10 +55,9 @@ impl<'a> Rig<'a> {
 
     /// Captures a frame of `moment`, whose joints and taxels are those of the hand.
     pub(in crate::synth) fn capture(&self, moment: &GraspSnapshot, noise: &mut SplitMix64) -> Shot {
-        let identity = Isometry3::identity();
         let mut bodies: Vec<(&RenderModel, Isometry3<f64>)> =
             vec![(&self.object.model, moment.t_hand_object)];
-        bodies.extend(self.robot.render_bodies(&identity, &moment.joints));
+        bodies.extend(self.robot.render_bodies(&Isometry3::identity(), &moment.joints));
         let viewpoint = &self.settings.viewpoint;
         let t_cam_hand = viewpoint.choose(&self.camera, &bodies, &moment.gravity, noise);
         bodies.iter_mut().for_each(|(_, pose)| *pose = t_cam_hand * *pose);
