@@ -47,18 +47,14 @@ impl ContactModel {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Vector3;
+    use prehend_geometry::shapes::cuboid;
+
     use super::*;
 
-    /// A cube of edge 10 cm about the origin, outward.
+    /// A cube of edge 10 cm about the origin.
     fn cube() -> TriMesh {
-        let corner = |i: u32| [i & 1, i >> 1 & 1, i >> 2].map(|b| 0.1 * f64::from(b) - 0.05);
-        let vertices = (0..8).map(|i| Point3::from(corner(i))).collect();
-        let quads =
-            [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-        TriMesh::new(
-            vertices,
-            quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect(),
-        )
+        cuboid(Vector3::repeat(0.1))
     }
 
     #[test]

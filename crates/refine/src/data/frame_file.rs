@@ -4,11 +4,12 @@
 //! lost. `docs/FRAME.md` describes the format; paths are relative to the file's folder.
 
 use std::collections::BTreeMap;
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Matrix3, Quaternion, Translation3, UnitQuaternion, Vector3};
-use prehend_geometry::hand::{Taxel, load_taxels};
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
+use prehend_geometry::hand::load_taxels;
 use prehend_geometry::robot::KinematicTree;
 use prehend_geometry::{GridCache, TriMesh};
 use prehend_render::{Camera, DepthImage, Mask, RgbImage};
@@ -37,69 +38,56 @@ impl FrameInput {
     /// # Errors
     /// If the file or one that it names is missing or broken, naming the file and the field.
     pub fn load(file: &Path, seed: u64, cache: Option<&GridCache>) -> Result<Self, DatasetError> {
-        let fault = |problem: &dyn std::fmt::Display| DatasetError::malformed(file, problem);
-        let field = |field: &str, problem: String| DatasetError::Field {
-            file: file.into(),
-            field: field.into(),
-            problem,
-        };
+        let fault = |problem: &dyn Display| DatasetError::unusable(file, problem);
+        let field = |name: &str, problem: &dyn Display| DatasetError::field(file, name, problem);
         let text = std::fs::read_to_string(file).map_err(|e| fault(&e))?;
         let layout: Layout = serde_json::from_str(&text).map_err(|e| fault(&e))?;
         let folder = file.parent().unwrap_or(Path::new("."));
 
         if !(layout.depth_unit_m.is_finite() && layout.depth_unit_m > 0.0) {
-            return Err(field("depth_unit_m", "must be a positive number of meters".into()));
+            return Err(field("depth_unit_m", &"must be a positive number of meters"));
         }
         let color = RgbImage::load(&folder.join(&layout.rgb)).map_err(|e| fault(&e))?;
         let depth = DepthImage::load(&folder.join(&layout.depth), layout.depth_unit_m)
             .map_err(|e| fault(&e))?;
         let mask = Mask::load(&folder.join(&layout.mask)).map_err(|e| fault(&e))?;
-        let camera = Camera::from_k(layout.k, color.width(), color.height())
-            .map_err(|e| field("K", e.to_string()))?;
-        let sizes =
-            [("depth", depth.width(), depth.height()), ("mask", mask.width(), mask.height())];
-        for (name, width, height) in sizes {
-            if (width, height) != (color.width(), color.height()) {
-                let (w, h) = (color.width(), color.height());
-                let reason = format!("the image is {width}x{height} pixels, rgb is {w}x{h}");
-                return Err(field(name, reason));
+        let (w, h) = (color.width(), color.height());
+        let camera = Camera::from_k(layout.k, w, h).map_err(|e| field("K", &e))?;
+        for (name, width, height) in
+            [("depth", depth.width(), depth.height()), ("mask", mask.width(), mask.height())]
+        {
+            if (width, height) != (w, h) {
+                let problem = format!("the image is {width}x{height} pixels, rgb is {w}x{h}");
+                return Err(field(name, &problem));
             }
         }
-        let mesh = TriMesh::load(&folder.join(&layout.mesh)).map_err(|e| fault(&e))?;
+        let mesh_file = folder.join(&layout.mesh);
+        let mesh = TriMesh::load(&mesh_file).map_err(|e| fault(&e))?;
         let mesh = mesh.scaled(layout.mesh_unit.meters());
-        let name = folder.join(&layout.mesh).display().to_string();
+        let name = mesh_file.display().to_string();
         let object = Object::with_mass(&name, mesh, layout.mass_kg, seed).map_err(|e| fault(&e))?;
-        let t_cam_object = layout.pose.isometry().map_err(|reason| field("pose", reason))?;
-        let (robot, hand) = match &layout.robot {
-            None => (None, None),
-            Some(r) => {
-                let tree = KinematicTree::from_urdf_file(folder.join(&r.urdf));
-                let tree = tree.map_err(|e| fault(&e))?;
-                let joints = tree.joint_vector(&r.joints);
-                let joints = joints.map_err(|e| field("robot.joints", e.to_string()))?;
-                let skin: Vec<Taxel> = match &r.taxels {
-                    Some(csv) => load_taxels(&folder.join(csv)).map_err(|e| fault(&e))?,
-                    None => Vec::new(),
-                };
-                let forces = r.forces.as_deref().unwrap_or_default();
-                if !forces.is_empty() && forces.len() != skin.len() {
-                    let (expected, found) = (skin.len(), forces.len());
-                    let reason =
-                        format!("expected one force for each of {expected} taxels, found {found}");
-                    return Err(field("robot.forces", reason));
-                }
-                let t_cam_hand = r.base_pose.isometry();
-                let hand = HandMeasurement {
-                    t_cam_hand: t_cam_hand.map_err(|reason| field("robot.base_pose", reason))?,
-                    joints,
-                    forces: forces.iter().map(|&f| Vector3::from(f)).collect(),
-                };
-                let robot = Hand::cached(tree, skin, cache).map_err(|e| fault(&e))?;
-                (Some(Arc::new(robot)), Some(hand))
+        let t_cam_object = layout.pose.isometry().map_err(|e| field("pose", &e))?;
+        let (mut robot, mut hand) = (None, None);
+        if let Some(r) = &layout.robot {
+            let tree =
+                KinematicTree::from_urdf_file(folder.join(&r.urdf)).map_err(|e| fault(&e))?;
+            let joints = tree.joint_vector(&r.joints).map_err(|e| field("robot.joints", &e))?;
+            let skin = r.taxels.as_ref().map(|csv| load_taxels(&folder.join(csv))).transpose();
+            let skin = skin.map_err(|e| fault(&e))?.unwrap_or_default();
+            let forces = r.forces.as_deref().unwrap_or_default();
+            if !forces.is_empty() && forces.len() != skin.len() {
+                let (expected, found) = (skin.len(), forces.len());
+                let problem =
+                    format!("expected one force for each of {expected} taxels, found {found}");
+                return Err(field("robot.forces", &problem));
             }
-        };
+            let t_cam_hand = r.base_pose.isometry().map_err(|e| field("robot.base_pose", &e))?;
+            let forces = forces.iter().map(|&f| Vector3::from(f)).collect();
+            hand = Some(HandMeasurement { t_cam_hand, joints, forces });
+            robot = Some(Arc::new(Hand::cached(tree, skin, cache).map_err(|e| fault(&e))?));
+        }
         let gravity = layout.gravity.map(Vector3::from);
-        gravity.map_or(Ok(()), |g| check_gravity(&g)).map_err(|reason| field("gravity", reason))?;
+        gravity.iter().try_for_each(check_gravity).map_err(|e| field("gravity", &e))?;
         let observation = Observation { camera, color, depth, mask, gravity, hand };
         Ok(Self { observation, object, robot, t_cam_object })
     }
@@ -193,11 +181,9 @@ impl Pose {
                     if m[3] != [0.0, 0.0, 0.0, 1.0] {
                         return Err("the matrix's last row must be 0 0 0 1".into());
                     }
-                    let r = Matrix3::from_fn(|r, c| m[r][c]);
-                    let row_major: [f64; 9] = std::array::from_fn(|i| r[(i / 3, i % 3)]);
-                    let rotation =
-                        rotation_from_row_major(&row_major).map_err(|e| e.to_string())?;
-                    (rotation, Vector3::new(m[0][3], m[1][3], m[2][3]))
+                    let row_major = std::array::from_fn(|i| m[i / 3][i % 3]);
+                    let translation = Vector3::new(m[0][3], m[1][3], m[2][3]);
+                    (rotation_from_row_major(&row_major)?, translation)
                 }
                 (None, Some(wxyz), None) => from_quaternion(wxyz)?,
                 (None, None, Some([x, y, z, w])) => from_quaternion([w, x, y, z])?,

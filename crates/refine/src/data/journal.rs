@@ -10,67 +10,9 @@ use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
 use crate::data::bop::{DatasetError, write_atomically};
 use crate::data::identity::Identity;
-
-/// Why a journal cannot be used.
-#[derive(Debug, Error)]
-pub enum JournalError {
-    /// The journal is of a run with other settings or inputs.
-    #[error(
-        "{}: is of another run, which is not finished (there | here):\n  {}\n(--restart discards it)",
-        file.display(), differences.join("\n  ")
-    )]
-    OtherRun {
-        /// The journal.
-        file: PathBuf,
-        /// What differs, a line each.
-        differences: Vec<String>,
-    },
-    /// The file is something else.
-    #[error("{}: is no journal of this program", file.display())]
-    Foreign {
-        /// The file.
-        file: PathBuf,
-    },
-    /// A whole line is no entry: something else wrote into the file.
-    #[error("{}: line {line} is damaged (--restart discards the whole journal)", file.display())]
-    Damaged {
-        /// The journal.
-        file: PathBuf,
-        /// Number of the line, from 1.
-        line: usize,
-    },
-    /// Another process is writing it.
-    #[error("{}: another process is at work on it", file.display())]
-    Busy {
-        /// The journal.
-        file: PathBuf,
-    },
-    /// The system refuses.
-    #[error("{}: {source}", file.display())]
-    Io {
-        /// The journal.
-        file: PathBuf,
-        /// The system's reason.
-        source: io::Error,
-    },
-    /// An entry cannot be written such that it reads back.
-    #[error("{}: frame {index} cannot be recorded: {source}", file.display())]
-    Entry {
-        /// The journal.
-        file: PathBuf,
-        /// The frame.
-        index: usize,
-        /// What is wrong with it.
-        source: serde_json::Error,
-    },
-    /// The journal cannot be put in order.
-    #[error(transparent)]
-    Write(#[from] DatasetError),
-}
 
 /// A journal that is open for writing, by this process alone.
 #[derive(Debug)]
@@ -91,24 +33,21 @@ impl Journal {
     /// With `restart` it is emptied first, whatever it holds.
     ///
     /// # Errors
-    /// [`JournalError::OtherRun`] unless it is of a run with the same facts, [`JournalError::Foreign`],
-    /// [`JournalError::Damaged`], [`JournalError::Busy`] and [`JournalError::Io`].
+    /// If it is of a run with other facts, no journal, damaged, being written by another process, or cannot be read or
+    /// written.
     pub fn open<E: DeserializeOwned>(
         path: &Path,
         identity: &Identity,
         restart: bool,
-    ) -> Result<(Self, BTreeMap<usize, E>), JournalError> {
-        let fault = |source| JournalError::Io { file: path.into(), source };
+    ) -> Result<(Self, BTreeMap<usize, E>), DatasetError> {
+        let fault = |error: io::Error| DatasetError::unusable(path, error);
         let mut options = OpenOptions::new();
-        let mut file = options
-            .read(true)
-            .write(true)
-            .create(true)
-            .truncate(false)
-            .open(path)
-            .map_err(fault)?;
+        options.read(true).write(true).create(true).truncate(false);
+        let mut file = options.open(path).map_err(fault)?;
         match file.try_lock() {
-            Err(TryLockError::WouldBlock) => return Err(JournalError::Busy { file: path.into() }),
+            Err(TryLockError::WouldBlock) => {
+                return Err(DatasetError::unusable(path, "another process is at work on it"));
+            }
             // Some network file systems have no locks.
             Err(TryLockError::Error(e)) if e.kind() != ErrorKind::Unsupported => {
                 return Err(fault(e));
@@ -121,11 +60,13 @@ impl Journal {
         }
         let own = header(path, identity)?;
         let Parsed { header, entries, length } = parse(path, &bytes, &own)?;
-        if let Some(header) = &header {
-            let differences = header.differences(identity, &[]);
-            if !differences.is_empty() {
-                return Err(JournalError::OtherRun { file: path.into(), differences });
-            }
+        let differences = header.as_ref().map_or_else(Vec::new, |h| h.differences(identity, &[]));
+        if !differences.is_empty() {
+            let problem = format!(
+                "is of another run, which is not finished (there | here):\n  {}\n(--restart discards it)",
+                differences.join("\n  ")
+            );
+            return Err(DatasetError::unusable(path, problem));
         }
         file.set_len(length as u64).map_err(fault)?;
         file.seek(SeekFrom::End(0)).map_err(fault)?;
@@ -139,28 +80,27 @@ impl Journal {
     /// What a journal says of its run, and its entries; for reading alone.
     ///
     /// # Errors
-    /// [`JournalError::Io`], [`JournalError::Foreign`] and [`JournalError::Damaged`].
+    /// If it cannot be read, is no journal, or is damaged.
     pub fn read<E: DeserializeOwned>(
         path: &Path,
-    ) -> Result<(Identity, BTreeMap<usize, E>), JournalError> {
-        let bytes =
-            std::fs::read(path).map_err(|source| JournalError::Io { file: path.into(), source })?;
+    ) -> Result<(Identity, BTreeMap<usize, E>), DatasetError> {
+        let bytes = std::fs::read(path).map_err(|e| DatasetError::unusable(path, e))?;
         let Parsed { header, entries, .. } = parse(path, &bytes, "")?;
-        Ok((header.ok_or_else(|| JournalError::Foreign { file: path.into() })?, entries))
+        Ok((header.ok_or_else(|| foreign(path))?, entries))
     }
 
     /// Records a finished frame on disk and returns it as a resumed run would read it.
     ///
     /// # Errors
-    /// [`JournalError::Entry`] if it does not read back, and nothing is written; [`JournalError::Io`].
+    /// If it does not read back, and nothing is written; or if it cannot be written.
     pub fn append<E: Serialize + DeserializeOwned>(
         &mut self,
         index: usize,
         entry: &E,
-    ) -> Result<E, JournalError> {
-        let fault = |source| JournalError::Entry { file: self.path.clone(), index, source };
-        let text = serde_json::to_string(&Line { index, entry }).map_err(fault)?;
-        let back: Line<E> = serde_json::from_str(&text).map_err(fault)?;
+    ) -> Result<E, DatasetError> {
+        let text = line(&self.path, index, entry)?;
+        let back: Line<E> =
+            serde_json::from_str(&text).map_err(|e| unrecorded(&self.path, index, e))?;
         self.write_line(&text)?;
         Ok(back.entry)
     }
@@ -170,7 +110,7 @@ impl Journal {
     ///
     /// # Errors
     /// If it cannot be written; the journal is then as it was.
-    pub fn compact<E: Serialize>(self, entries: &BTreeMap<usize, E>) -> Result<(), JournalError> {
+    pub fn compact<E: Serialize>(self, entries: &BTreeMap<usize, E>) -> Result<(), DatasetError> {
         Self::write(&self.path, &self.identity, entries)
     }
 
@@ -182,40 +122,49 @@ impl Journal {
         path: &Path,
         identity: &Identity,
         entries: &BTreeMap<usize, E>,
-    ) -> Result<(), JournalError> {
+    ) -> Result<(), DatasetError> {
         let mut text = header(path, identity)? + "\n";
         for (&index, entry) in entries {
-            let line = serde_json::to_string(&Line { index, entry })
-                .map_err(|source| JournalError::Entry { file: path.into(), index, source })?;
-            text.push_str(&line);
+            text += &line(path, index, entry)?;
             text.push('\n');
         }
-        Ok(write_atomically(path, text.as_bytes())?)
+        write_atomically(path, text.as_bytes())
     }
 
     /// Removes the journal of a run whose output is complete.
     ///
     /// # Errors
     /// If it cannot be removed.
-    pub fn discard(self) -> Result<(), JournalError> {
-        std::fs::remove_file(&self.path)
-            .map_err(|source| JournalError::Io { file: self.path, source })
+    pub fn discard(self) -> Result<(), DatasetError> {
+        std::fs::remove_file(&self.path).map_err(|e| DatasetError::unusable(&self.path, e))
     }
 
     /// One call of the system a line, so that a kill leaves at most one broken line; and then to disk.
-    fn write_line(&mut self, text: &str) -> Result<(), JournalError> {
+    fn write_line(&mut self, text: &str) -> Result<(), DatasetError> {
         let line = format!("{text}\n");
         self.file
             .write_all(line.as_bytes())
             .and_then(|()| self.file.sync_data())
-            .map_err(|source| JournalError::Io { file: self.path.clone(), source })
+            .map_err(|e| DatasetError::unusable(&self.path, e))
     }
 }
 
 /// The first line of a run's journal.
-fn header(path: &Path, identity: &Identity) -> Result<String, JournalError> {
-    let fault = |source| JournalError::Entry { file: path.into(), index: 0, source };
-    serde_json::to_string(identity).map_err(fault)
+fn header(path: &Path, identity: &Identity) -> Result<String, DatasetError> {
+    serde_json::to_string(identity).map_err(|e| unrecorded(path, 0, e))
+}
+
+/// The line of a frame.
+fn line<E: Serialize>(path: &Path, index: usize, entry: &E) -> Result<String, DatasetError> {
+    serde_json::to_string(&Line { index, entry }).map_err(|e| unrecorded(path, index, e))
+}
+
+fn unrecorded(path: &Path, index: usize, error: serde_json::Error) -> DatasetError {
+    DatasetError::unusable(path, format!("frame {index} cannot be recorded: {error}"))
+}
+
+fn foreign(path: &Path) -> DatasetError {
+    DatasetError::unusable(path, "is no journal of this program")
 }
 
 /// What is whole in a journal.
@@ -232,22 +181,24 @@ fn parse<E: DeserializeOwned>(
     path: &Path,
     bytes: &[u8],
     own: &str,
-) -> Result<Parsed<E>, JournalError> {
-    let foreign = || JournalError::Foreign { file: path.into() };
+) -> Result<Parsed<E>, DatasetError> {
     let mut entries = BTreeMap::new();
     let mut lines = bytes.split_inclusive(|&b| b == b'\n').filter(|l| l.ends_with(b"\n"));
     let Some(first) = lines.next() else {
         return if own.as_bytes().starts_with(bytes) {
             Ok(Parsed { header: None, entries, length: 0 })
         } else {
-            Err(foreign())
+            Err(foreign(path))
         };
     };
-    let header = serde_json::from_slice(first).map_err(|_| foreign())?;
+    let header = serde_json::from_slice(first).map_err(|_| foreign(path))?;
     let mut length = first.len();
     for (number, line) in (2..).zip(lines) {
-        let Line { index, entry } = serde_json::from_slice(line)
-            .map_err(|_| JournalError::Damaged { file: path.into(), line: number })?;
+        let Line { index, entry } = serde_json::from_slice(line).map_err(|_| {
+            let problem =
+                format!("line {number} is damaged (--restart discards the whole journal)");
+            DatasetError::unusable(path, problem)
+        })?;
         entries.insert(index, entry);
         length += line.len();
     }
@@ -306,27 +257,35 @@ mod tests {
         assert!(fs::read_to_string(&path).unwrap().contains("}\n{\"index\":0,"));
     }
 
+    /// Why the journal at `path` cannot be opened for the run of this seed.
+    fn refused(path: &Path, seed: u64) -> String {
+        Journal::open::<Vec<f64>>(path, &identity(seed), false).unwrap_err().to_string()
+    }
+
     #[test]
     fn refuses_other_runs_other_files_and_other_processes() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("x.journal");
         let (mut journal, _): (_, Entries) = Journal::open(&path, &identity(1), false).unwrap();
         journal.append(0, &entry(0)).unwrap();
-        let busy = Journal::open::<Vec<f64>>(&path, &identity(1), false).unwrap_err();
-        assert!(matches!(&busy, JournalError::Busy { file } if *file == path));
+        let busy = refused(&path, 1);
+        assert!(busy.ends_with("x.journal: another process is at work on it"), "{busy}");
+        // What does not read back is not written either.
+        let before = fs::read(&path).unwrap();
+        let error = journal.append(3, &vec![f64::NAN]).unwrap_err().to_string();
+        assert!(error.contains("x.journal: frame 3 cannot be recorded: "), "{error}");
+        assert_eq!(fs::read(&path).unwrap(), before);
         drop(journal);
-        match Journal::open::<Vec<f64>>(&path, &identity(2), false).unwrap_err() {
-            JournalError::OtherRun { differences, .. } => assert_eq!(differences, ["seed: 1 | 2"]),
-            other => panic!("{other}"),
-        }
+        let other = refused(&path, 2);
+        assert!(other.contains("x.journal: is of another run"), "{other}");
+        assert!(other.contains("(there | here):\n  seed: 1 | 2\n(--restart"), "{other}");
         let (journal, found): (_, Entries) = Journal::open(&path, &identity(2), true).unwrap();
         assert!(found.is_empty());
         journal.discard().unwrap();
         assert!(!path.exists());
         for text in ["precious", "precious\n", "{\"precious\": 1}"] {
             fs::write(&path, text).unwrap();
-            let error = Journal::open::<Vec<f64>>(&path, &identity(1), false).unwrap_err();
-            assert!(matches!(error, JournalError::Foreign { .. }));
+            assert!(refused(&path, 1).ends_with("x.journal: is no journal of this program"));
             assert_eq!(fs::read_to_string(&path).unwrap(), text);
         }
     }
@@ -339,19 +298,8 @@ mod tests {
         Journal::write(&path, &identity(1), &entries).unwrap();
         let text = fs::read_to_string(&path).unwrap().replace("\"index\":1", "\"index\":x");
         fs::write(&path, &text).unwrap();
-        let error = Journal::open::<Vec<f64>>(&path, &identity(1), false).unwrap_err();
-        assert!(matches!(error, JournalError::Damaged { line: 3, .. }), "{error}");
+        let error = refused(&path, 1);
+        assert!(error.contains("x.journal: line 3 is damaged"), "{error}");
         assert_eq!(fs::read_to_string(&path).unwrap(), text);
-    }
-
-    #[test]
-    fn what_does_not_read_back_is_refused() {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("x.journal");
-        let (mut journal, _): (_, Entries) = Journal::open(&path, &identity(1), false).unwrap();
-        let before = fs::read(&path).unwrap();
-        let error = journal.append(3, &vec![f64::NAN]).unwrap_err();
-        assert!(matches!(error, JournalError::Entry { index: 3, .. }));
-        assert_eq!(fs::read(&path).unwrap(), before);
     }
 }

@@ -19,7 +19,7 @@ pub use assets::{AssetError, Assets, Sensor, load_mesh};
 pub use contact::{CONTACT_SAMPLES, ContactModel};
 pub use frame_file::FrameInput;
 pub use identity::Identity;
-pub use journal::{Journal, JournalError};
+pub use journal::Journal;
 pub use noise::NoiseLevel;
 pub use pose::PlainPose;
 pub(crate) use smooth_field::smooth_field;

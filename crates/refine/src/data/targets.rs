@@ -47,7 +47,7 @@ pub fn find_targets(dataset: &Dataset, file: Option<&Path>) -> Result<Vec<Target
     }
     let [obj_id] = dataset.models().object_ids()?[..] else {
         let problem = "no list of targets (--targets names one), and there is not just one object";
-        return Err(DatasetError::malformed(&own, problem));
+        return Err(DatasetError::unusable(&own, problem));
     };
     let mut targets = Vec::new();
     for scene in dataset.scenes() {
@@ -60,14 +60,14 @@ pub fn find_targets(dataset: &Dataset, file: Option<&Path>) -> Result<Vec<Target
 fn read(file: &Path) -> Result<Vec<Target>, DatasetError> {
     let bytes = fs::read(file).map_err(|e| DatasetError::reading(file, &e))?;
     let listed: Vec<Listed> =
-        serde_json::from_slice(&bytes).map_err(|e| DatasetError::malformed(file, e))?;
+        serde_json::from_slice(&bytes).map_err(|e| DatasetError::unusable(file, e))?;
     let mut targets = Vec::new();
     let mut in_image: BTreeMap<(u32, u32), usize> = BTreeMap::new();
     for Listed { scene_id, im_id, obj_id, inst_count } in listed {
         let count = inst_count.unwrap_or(1);
         if count > MOST_INSTANCES {
             let problem = format!("scene {scene_id} image {im_id}: inst_count is {count}");
-            return Err(DatasetError::malformed(file, problem));
+            return Err(DatasetError::unusable(file, problem));
         }
         let next = in_image.entry((scene_id, im_id)).or_default();
         for _ in 0..count {

@@ -1,11 +1,11 @@
 //! Run times by frame and method, in a file of their own: they differ between runs, results do not.
 
 use std::collections::BTreeMap;
-use std::fs::{self, File, OpenOptions};
-use std::io::{Seek, SeekFrom, Write};
+use std::fs::{self, OpenOptions};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use crate::data::bop::DatasetError;
+use crate::data::bop::{DatasetError, write_atomically};
 
 const HEADER: &str = "index,frame,method,seconds\n";
 
@@ -13,7 +13,6 @@ const HEADER: &str = "index,frame,method,seconds\n";
 #[derive(Debug)]
 pub struct Times {
     path: PathBuf,
-    file: Option<File>,
     seconds: BTreeMap<(usize, String), f64>,
 }
 
@@ -23,28 +22,22 @@ impl Times {
     /// # Errors
     /// If it cannot be read or written.
     pub fn open(path: &Path, keep: bool) -> Result<Self, DatasetError> {
-        let fault = |e: std::io::Error| write_fault(path, &e);
-        let mut times = Self { path: path.into(), file: None, seconds: BTreeMap::new() };
+        let fault = |e: std::io::Error| DatasetError::writing(path, e);
+        let mut times = Self { path: path.into(), seconds: BTreeMap::new() };
         if !path.exists() {
             return Ok(times);
         }
         let text = if keep { fs::read_to_string(path).map_err(fault)? } else { String::new() };
-        let whole = text.rfind('\n').map_or(0, |end| end + 1);
         if !text.starts_with(HEADER) {
             fs::remove_file(path).map_err(fault)?;
             return Ok(times);
         }
-        let mut file = OpenOptions::new().write(true).open(path).map_err(fault)?;
-        file.set_len(whole as u64).and_then(|()| file.seek(SeekFrom::End(0))).map_err(fault)?;
-        times.file = Some(file);
-        for line in text[..whole].lines().skip(1) {
-            let fields: Vec<&str> = line.split(',').collect();
-            if let [index, _, method, time] = fields.as_slice()
-                && let (Ok(index), Ok(time)) = (index.parse(), time.parse())
-            {
-                times.seconds.insert((index, (*method).to_owned()), time);
-            }
-        }
+        let whole = text.rfind('\n').map_or("", |end| &text[..=end]);
+        let file = OpenOptions::new().write(true).open(path).map_err(fault)?;
+        file.set_len(whole.len() as u64).map_err(fault)?;
+        let rows = csv::Reader::from_reader(whole.as_bytes()).into_deserialize();
+        let entry = |(index, _, method, seconds): (_, String, _, _)| ((index, method), seconds);
+        times.seconds = rows.flatten().map(entry).collect();
         Ok(times)
     }
 
@@ -59,17 +52,13 @@ impl Times {
         method: &str,
         seconds: f64,
     ) -> Result<(), DatasetError> {
-        let fault = |e: std::io::Error| write_fault(&self.path, &e);
         self.seconds.insert((index, method.into()), seconds);
-        let mut line = format!("{index},{frame},{method},{seconds:.4}\n");
-        let file = match &mut self.file {
-            Some(file) => file,
-            none => {
-                line.insert_str(0, HEADER);
-                none.insert(File::create(&self.path).map_err(fault)?)
-            }
-        };
-        file.write_all(line.as_bytes()).map_err(fault)
+        let header = if self.path.exists() { "" } else { HEADER };
+        let line = format!("{header}{index},{frame},{method},{seconds:.4}\n");
+        let mut options = OpenOptions::new();
+        let file = options.append(true).create(true).open(&self.path);
+        file.and_then(|mut file| file.write_all(line.as_bytes()))
+            .map_err(|e| DatasetError::writing(&self.path, e))
     }
 
     /// Time of `method` on a frame \[s\], if known.
@@ -100,11 +89,7 @@ pub fn join_times(files: &[PathBuf], out: &Path) -> Result<(), DatasetError> {
     }
     lines.sort_by_key(|line| line.split(',').next().and_then(|i| i.parse::<usize>().ok()));
     let body: String = lines.into_iter().map(|line| line + "\n").collect();
-    crate::data::bop::write_atomically(out, format!("{HEADER}{body}").as_bytes())
-}
-
-fn write_fault(path: &Path, error: &std::io::Error) -> DatasetError {
-    DatasetError::Write { file: path.to_path_buf(), problem: error.to_string() }
+    write_atomically(out, format!("{HEADER}{body}").as_bytes())
 }
 
 #[cfg(test)]

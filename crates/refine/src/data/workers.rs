@@ -32,14 +32,6 @@ impl Workers {
         Ok(Self { pools: (0..workers).map(pool).collect::<Result<_, _>>()? })
     }
 
-    /// One worker that has all threads: the frames come one after another.
-    ///
-    /// # Errors
-    /// If the system gives no threads.
-    pub fn together(threads: usize) -> Result<Self, ThreadPoolBuildError> {
-        Self::new(1, threads)
-    }
-
     /// Does all `jobs`, each by one of the workers that `worker` makes, and hands results to `done` on this thread as they
     /// come, in no particular order. Once `done` fails, no further job is begun.
     ///
@@ -116,7 +108,7 @@ mod tests {
     fn a_failure_ends_the_run() {
         let jobs: Vec<usize> = (0..1000).collect();
         let mut count = 0;
-        let ended = Workers::together(1).unwrap().run(
+        let ended = Workers::new(1, 1).unwrap().run(
             &jobs,
             || |&job: &usize| job,
             |_, job| {

@@ -64,7 +64,7 @@ impl CameraCalibrationError {
         let z = self.depth_scale * depth + self.depth_bias;
         let larger = 1.0 + self.focal_scale;
         let true_ray = (ray - self.principal_point) / larger;
-        let along = Vector3::new(true_ray.x, true_ray.y, 1.0);
+        let along = true_ray.push(1.0);
         Matrix3x5::from_columns(&[
             along * depth,
             along,
@@ -77,28 +77,21 @@ impl CameraCalibrationError {
     /// The pose at which the camera, as it is said to be, would see a thing of center `center` (camera frame) as it does
     /// see it at `pose`: nearer where images are larger, and shifted. To first order in the thing's size over its distance.
     pub fn reprojected(&self, pose: &Isometry3<f64>, center: &Vector3<f64>) -> Isometry3<f64> {
-        Translation3::from(self.reprojected_shift(center)) * pose
-    }
-
-    fn reprojected_shift(&self, center: &Vector3<f64>) -> Vector3<f64> {
         let z = center.z / (1.0 + self.focal_scale);
-        Vector3::new(self.principal_point.x * z, self.principal_point.y * z, z - center.z)
+        let [right, below] = (self.principal_point * z).into();
+        Translation3::new(right, below, z - center.z) * pose
     }
 
     /// Derivatives of the place of [`reprojected`](Self::reprojected): by the place of the pose, then by the parameters.
     pub fn reprojected_jacobian(&self, center: &Vector3<f64>) -> SMatrix<f64, 3, 8> {
         let larger = 1.0 + self.focal_scale;
         let z = center.z / larger;
-        let mut jacobian = SMatrix::<f64, 3, 8>::zeros();
-        jacobian.fixed_view_mut::<3, 3>(0, 0).fill_with_identity();
-        jacobian[(0, 2)] = self.principal_point.x / larger;
-        jacobian[(1, 2)] = self.principal_point.y / larger;
-        jacobian[(2, 2)] = 1.0 / larger;
+        let along = self.principal_point.push(1.0);
+        let mut jacobian = SMatrix::<f64, 3, 8>::identity();
+        jacobian.set_column(2, &(along / larger));
         jacobian[(0, 5)] = z;
         jacobian[(1, 6)] = z;
-        let nearer =
-            Vector3::new(self.principal_point.x, self.principal_point.y, 1.0) * (-z / larger);
-        jacobian.fixed_view_mut::<3, 1>(0, 7).copy_from(&nearer);
+        jacobian.set_column(7, &(along * (-z / larger)));
         jacobian
     }
 }
@@ -113,39 +106,33 @@ mod tests {
         CameraCalibrationError::default().changed(&[0.01, 2e-3, 3e-3, -1e-3, 4e-3])
     }
 
-    #[test]
-    fn points_and_their_derivatives() {
-        let (ray, depth) = (Vector2::new(0.1, -0.2), 0.5);
-        let plain = CameraCalibrationError::default();
-        assert_eq!(plain.point(&ray, depth), Point3::new(0.05, -0.1, 0.5));
-        assert_eq!(plain.parameters(), [0.0; 5]);
-        for correction in [plain, some()] {
-            let jacobian = correction.point_jacobian(&ray, depth);
-            for row in 0..3 {
-                let of = |x: &[f64]| correction.changed(x).point(&ray, depth)[row];
-                let reference = finite_difference_gradient(of, &[0.0; 5], 1e-6);
-                let found: Vec<f64> = jacobian.row(row).iter().copied().collect();
-                assert!(compare_gradients(&found, &reference).relative < 1e-6);
-            }
+    /// Compares a Jacobian with finite differences of `f` at zero.
+    fn check<const N: usize>(jacobian: &SMatrix<f64, 3, N>, f: impl Fn(&[f64]) -> Point3<f64>) {
+        for row in 0..3 {
+            let reference = finite_difference_gradient(|x: &[f64]| f(x)[row], &[0.0; N], 1e-6);
+            let found: Vec<f64> = jacobian.row(row).iter().copied().collect();
+            assert!(compare_gradients(&found, &reference).relative < 1e-6);
         }
     }
 
     #[test]
-    fn the_apparent_pose_and_its_derivatives() {
+    fn points_apparent_poses_and_their_derivatives() {
+        let (ray, depth) = (Vector2::new(0.1, -0.2), 0.5);
+        let plain = CameraCalibrationError::default();
+        assert_eq!(plain.point(&ray, depth), Point3::new(0.05, -0.1, 0.5));
+        assert_eq!(plain.parameters(), [0.0; 5]);
         let pose = Isometry3::translation(0.03, -0.02, 0.4);
-        for correction in [CameraCalibrationError::default(), some()] {
-            let center = pose.translation.vector;
-            let jacobian = correction.reprojected_jacobian(&center);
-            for row in 0..3 {
-                let of = |x: &[f64]| {
-                    let moved = center + Vector3::new(x[0], x[1], x[2]);
-                    let pose = Isometry3::from_parts(moved.into(), pose.rotation);
-                    correction.changed(&x[3..]).reprojected(&pose, &moved).translation.vector[row]
-                };
-                let reference = finite_difference_gradient(of, &[0.0; 8], 1e-6);
-                let found: Vec<f64> = jacobian.row(row).iter().copied().collect();
-                assert!(compare_gradients(&found, &reference).relative < 1e-6);
-            }
+        let center = pose.translation.vector;
+        for correction in [plain, some()] {
+            let point = |x: &[f64]| correction.changed(x).point(&ray, depth);
+            check(&correction.point_jacobian(&ray, depth), point);
+            let apparent = |x: &[f64]| {
+                let moved = center + Vector3::new(x[0], x[1], x[2]);
+                let pose = Isometry3::from_parts(moved.into(), pose.rotation);
+                let seen = correction.changed(&x[3..]).reprojected(&pose, &moved);
+                seen.translation.vector.into()
+            };
+            check(&correction.reprojected_jacobian(&center), apparent);
         }
     }
 

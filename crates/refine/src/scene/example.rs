@@ -9,10 +9,9 @@ use prehend_geometry::hand::{JOINT_NAMES, allegro_xela_urdf, default_grasp, taxe
 use prehend_geometry::robot::KinematicTree;
 use prehend_render::Camera;
 
-use super::look_at;
-use super::sensing::{feel, render_rgbd};
+use super::sensing::HeldObject;
+use super::{Hand, Object, Observation, look_at};
 use crate::error::RefineError;
-use crate::scene::{Hand, HandMeasurement, Object, Observation};
 
 /// A frame whose truth is known.
 pub struct Scene {
@@ -54,19 +53,11 @@ pub fn default_scene(seed: u64) -> Result<Scene, RefineError> {
     let t_cam_hand =
         look_at(&Point3::new(0.42, 0.12, 0.24), &Point3::new(0.04, 0.02, 0.03), &Vector3::z(), 0.0);
     let truth = t_cam_hand * grasp.t_base_object;
+    // The hand's −z hangs down: fingers up, as if presenting the bottle.
+    let gravity = Some(t_cam_hand.rotation * Vector3::new(0.0, 0.0, -9.81));
+    let held = HeldObject { camera, object: &object, hand: &hand, joints: &joints, gravity };
     let mut noise = SplitMix64::new(seed);
-    let (color, depth, mask) =
-        render_rgbd(&camera, &object, &hand, &truth, &t_cam_hand, &joints, &mut noise);
-    let forces = feel(&object, &hand, &truth, &t_cam_hand, &joints);
-    let observation = Observation {
-        camera,
-        color,
-        depth,
-        mask,
-        // The hand's −z hangs down: fingers up, as if presenting the bottle.
-        gravity: Some(t_cam_hand.rotation * Vector3::new(0.0, 0.0, -9.81)),
-        hand: Some(HandMeasurement { t_cam_hand, joints, forces }),
-    };
+    let observation = held.observe(&truth, &t_cam_hand, &mut noise);
     let scale = |k: usize| if k < 3 { INITIAL_TRANSLATION } else { INITIAL_ROTATION } / 3f64.sqrt();
     let error = Vector6::from_fn(|k, _| scale(k) * noise.normal());
     let initial = perturb_about(&truth, &(truth * object.center).coords, &error);

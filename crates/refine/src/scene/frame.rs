@@ -4,9 +4,8 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use nalgebra::Point3;
-use prehend_render::{Camera, DepthImage, depth_map};
+use prehend_render::{Camera, DepthImage, Target, TargetError, depth_map};
 
-use super::segmented::Segmented;
 use super::{Hand, HandMeasurement, Object, Observation};
 use crate::error::RefineError;
 
@@ -29,6 +28,14 @@ pub enum Occluders {
     Hand,
     /// The hand, and what depth shows nearer beside the mask.
     Measured,
+}
+
+/// The object in an image, with what may hide it.
+#[derive(Clone)]
+pub(crate) struct Segmented {
+    pub(crate) target: Arc<Target>,
+    /// Root mean square of the colors under the mask.
+    pub(crate) brightness: f64,
 }
 
 /// How far in front of the object something beside the mask must be to hide it \[m\]: what is seen there may be the
@@ -143,25 +150,25 @@ impl<'a> Frame<'a> {
         occluders: Occluders,
         factor: usize,
     ) -> Result<Segmented, RefineError> {
+        let fault = |error: TargetError| RefineError::Images(error.to_string());
         let mut images = self.segmented.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(image) = images.get(&(occluders, factor)) {
-            return Ok(image.clone());
+        if !images.contains_key(&(occluders, 1)) {
+            let occluder = match occluders {
+                Occluders::Hand => (**self.hand_depth()).clone(),
+                Occluders::Measured => self.measured_occluder(),
+            };
+            let Observation { camera, color, mask, .. } = self.observation;
+            let target = Target::new(*camera, color, mask).and_then(|t| t.with_occluder(occluder));
+            let target = Arc::new(target.map_err(fault)?);
+            let brightness = brightness(self.observation);
+            images.insert((occluders, 1), Segmented { target, brightness });
         }
-        let whole = match images.get(&(occluders, 1)) {
-            Some(image) => image.clone(),
-            None => {
-                let occluder = match occluders {
-                    Occluders::Hand => (**self.hand_depth()).clone(),
-                    Occluders::Measured => self.measured_occluder(),
-                };
-                let image = Segmented::new(self.observation, occluder)?;
-                images.insert((occluders, 1), image.clone());
-                image
-            }
-        };
-        let image = whole.downsampled(factor)?;
-        images.insert((occluders, factor), image.clone());
-        Ok(image)
+        if !images.contains_key(&(occluders, factor)) {
+            let Segmented { target, brightness } = images[&(occluders, 1)].clone();
+            let target = Arc::new(target.downsampled(factor).map_err(fault)?);
+            images.insert((occluders, factor), Segmented { target, brightness });
+        }
+        Ok(images[&(occluders, factor)].clone())
     }
 
     /// Depth of the hand and of what was measured beside the mask, whichever is nearer.
@@ -170,17 +177,24 @@ impl<'a> Frame<'a> {
         let Observation { depth, mask, .. } = self.observation;
         let seen = depth.pixels().iter().zip(mask.pixels());
         for (nearest, (depth, masked)) in occluder.pixels_mut().iter_mut().zip(seen) {
-            let known = *nearest > 0.0;
-            if depth.is_finite()
-                && *depth > 0.0
-                && !masked
-                && (!known || depth + IN_FRONT < *nearest)
-            {
-                *nearest = depth + IN_FRONT;
+            let front = depth + IN_FRONT;
+            let nearer = *nearest <= 0.0 || front < *nearest;
+            if !masked && depth.is_finite() && *depth > 0.0 && nearer {
+                *nearest = front;
             }
         }
         occluder
     }
+}
+
+/// Root mean square of the colors under the mask; never zero.
+fn brightness(observation: &Observation) -> f64 {
+    let pixels = observation.color.pixels().iter().zip(observation.mask.pixels());
+    let (sum, count) = pixels
+        .filter(|(_, m)| **m)
+        .flat_map(|(c, _)| c)
+        .fold((0.0, 0.0), |(s, n), &v| (s + f64::from(v).powi(2), n + 1.0));
+    (sum / f64::max(count, 1.0)).sqrt().max(0.02)
 }
 
 /// Depth image of a hand, whose joints must have been checked \[m\]; 0 where it is not.
@@ -201,7 +215,7 @@ mod tests {
     use crate::scene::default_scene;
 
     #[test]
-    fn images_of_another_size_are_named() {
+    fn images_of_another_size_and_an_empty_mask_are_named() {
         let scene = default_scene(1).unwrap();
         let refused = |change: &dyn Fn(&mut Observation)| {
             let mut observation = scene.observation.clone();
@@ -214,18 +228,7 @@ mod tests {
         assert!(depth.contains("the depth image has 320x480 pixels"), "{depth}");
         let mask = refused(&|o| o.mask = Mask::filled(1, 1, true));
         assert!(mask.contains("the mask has 1x1 pixels"), "{mask}");
-    }
-
-    #[test]
-    fn a_wrong_number_of_joints_and_an_empty_mask_are_errors() {
-        let scene = default_scene(1).unwrap();
-        let mut observation = scene.observation.clone();
-        observation.hand.as_mut().unwrap().joints.pop();
-        let refused = Frame::new(&observation, &scene.object, Some(&scene.hand)).map(|_| ());
-        let message = refused.unwrap_err().to_string();
-        assert!(message.contains("15") && message.contains("16"), "{message}");
-        observation.mask = Mask::filled(640, 480, false);
-        let refused = Frame::new(&observation, &scene.object, None).map(|_| ());
-        assert!(matches!(refused, Err(RefineError::EmptyMask)));
+        let empty = refused(&|o| o.mask = Mask::filled(640, 480, false));
+        assert_eq!(empty, RefineError::EmptyMask.to_string());
     }
 }

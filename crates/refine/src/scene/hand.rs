@@ -152,7 +152,6 @@ mod tests {
             <mesh filename="flat.obj"/></geometry></collision></link></robot>"#;
         let refused = KinematicTree::from_urdf_str(urdf, Some(dir.path()))
             .and_then(|tree| Hand::new(tree, Vec::new()).map(|_| ()));
-        println!("{refused:?}");
         assert!(refused.unwrap_err().to_string().contains("link 'palm'"));
     }
 }

@@ -8,7 +8,6 @@ mod inspect;
 mod look_at;
 mod object;
 mod observation;
-mod segmented;
 mod sensing;
 mod sequence;
 

@@ -64,10 +64,7 @@ impl Object {
         inertial: Option<Inertial>,
         seed: u64,
     ) -> Result<Self, RefineError> {
-        Self::build(name, mesh, seed, |uniform| match inertial {
-            Some(given) => Ok((given, false)),
-            None => Ok((uniform()?.into(), true)),
-        })
+        Self::build(name, mesh, inertial, None, seed)
     }
 
     /// Prepares `mesh` (meters) of uniform density and mass `mass` \[kg\], or of an assumed density.
@@ -80,22 +77,15 @@ impl Object {
         mass: Option<f64>,
         seed: u64,
     ) -> Result<Self, RefineError> {
-        Self::build(name, mesh, seed, |uniform| {
-            let uniform = uniform()?;
-            match mass {
-                Some(mass) => Ok((uniform.with_mass(mass)?.into(), false)),
-                None => Ok((uniform.into(), true)),
-            }
-        })
+        Self::build(name, mesh, None, mass, seed)
     }
 
     fn build(
         name: &str,
         mesh: TriMesh,
+        inertial: Option<Inertial>,
+        mass: Option<f64>,
         seed: u64,
-        weigh: impl FnOnce(
-            &dyn Fn() -> Result<MassProperties, MassError>,
-        ) -> Result<(Inertial, bool), MassError>,
     ) -> Result<Self, RefineError> {
         let fail = |reason: String| RefineError::Object { object: name.to_owned(), reason };
         let count = mesh.vertices.len();
@@ -108,11 +98,15 @@ impl Object {
         }
         let (solid, report) = mesh.cleaned();
         let (low, high) = solid.bounds().ok_or_else(|| fail("the mesh has no faces".into()))?;
-        let uniform = || mass_properties(&solid, DEFAULT_DENSITY);
         if solid.area() <= 1e-12 * (high - low).norm_squared() {
             return Err(fail("the mesh is degenerate: its faces have no area".into()));
         }
-        let (inertial, inertial_assumed) = weigh(&uniform).map_err(|e| match e {
+        let inertial_assumed = inertial.is_none() && mass.is_none();
+        let uniform = || {
+            let properties = mass_properties(&solid, DEFAULT_DENSITY)?;
+            mass.map_or(Ok(properties), |mass| properties.with_mass(mass)).map(Inertial::from)
+        };
+        let inertial = inertial.map_or_else(uniform, Ok).map_err(|e| match e {
             MassError::NotClosed { edges } => fail(format!(
                 "the mesh is not closed ({edges} edges do not join two faces), so its mass, center of \
                  mass and inertia must all be given"

@@ -3,9 +3,9 @@
 use nalgebra::{Isometry3, Vector3};
 use prehend_geometry::SplitMix64;
 use prehend_geometry::hand::Taxel;
-use prehend_render::{Camera, DepthImage, Light, Mask, RgbImage, SceneObject, render_scene};
+use prehend_render::{Camera, Light, Mask, SceneObject, render_scene};
 
-use crate::scene::{Hand, Object};
+use super::{Hand, HandMeasurement, Object, Observation};
 
 /// Standard deviation of a color channel.
 const COLOR_NOISE: f64 = 0.02;
@@ -14,39 +14,59 @@ const DEPTH_NOISE: f64 = 1.5e-3;
 /// Taxels this far from the object \[m\] still feel it: skin deforms.
 const TOUCH_REACH: f64 = 2e-3;
 
-/// Color, depth and mask of the grasp under a light that the estimator is not told.
-pub(crate) fn render_rgbd(
-    camera: &Camera,
-    object: &Object,
-    hand: &Hand,
-    truth: &Isometry3<f64>,
-    t_cam_hand: &Isometry3<f64>,
-    joints: &[f64],
-    noise: &mut SplitMix64,
-) -> (RgbImage, DepthImage, Mask) {
-    let mut bodies = vec![SceneObject { model: &object.model, t_cam_model: *truth }];
-    for (model, t_cam_model) in hand.render_bodies(t_cam_hand, joints) {
-        bodies.push(SceneObject { model, t_cam_model });
+/// An object in a hand before a camera.
+pub(super) struct HeldObject<'a> {
+    pub(super) camera: Camera,
+    pub(super) object: &'a Object,
+    pub(super) hand: &'a Hand,
+    /// Positions of the hand's joints \[rad\].
+    pub(super) joints: &'a [f64],
+    /// Gravity in the camera frame \[m/s²\].
+    pub(super) gravity: Option<Vector3<f64>>,
+}
+
+impl HeldObject<'_> {
+    /// What is sensed with the object and the hand's base in these poses, under a light that the estimator is not told.
+    pub(super) fn observe(
+        &self,
+        t_cam_object: &Isometry3<f64>,
+        t_cam_hand: &Isometry3<f64>,
+        noise: &mut SplitMix64,
+    ) -> Observation {
+        let Self { camera, object, hand, joints, gravity } = *self;
+        let mut bodies = vec![SceneObject { model: &object.model, t_cam_model: *t_cam_object }];
+        for (model, t_cam_model) in hand.render_bodies(t_cam_hand, joints) {
+            bodies.push(SceneObject { model, t_cam_model });
+        }
+        let toward = Vector3::new(-0.4, -0.7, -0.6).normalize();
+        let warm = [0.62, 0.58, 0.52];
+        let light = Light {
+            ambient: [0.42, 0.43, 0.46],
+            directional: warm.map(|s| toward * s),
+            offset: [0.0; 3],
+        };
+        let mut image = render_scene(&camera, &bodies, &light, [0.12, 0.13, 0.15], 3);
+        for value in image.color.pixels_mut().iter_mut().flatten() {
+            *value = (*value + (COLOR_NOISE * noise.normal()) as f32).clamp(0.0, 1.0);
+        }
+        for z in image.depth.pixels_mut().iter_mut().filter(|z| **z > 0.0) {
+            *z += (DEPTH_NOISE * noise.normal()) as f32;
+        }
+        let mut mask = Mask::filled(camera.width, camera.height, false);
+        for (m, body) in mask.pixels_mut().iter_mut().zip(&image.object) {
+            *m = *body == Some(0);
+        }
+        let forces = feel(object, hand, t_cam_object, t_cam_hand, joints);
+        let measured = HandMeasurement { t_cam_hand: *t_cam_hand, joints: joints.to_vec(), forces };
+        Observation {
+            camera,
+            color: image.color,
+            depth: image.depth,
+            mask,
+            gravity,
+            hand: Some(measured),
+        }
     }
-    let toward = Vector3::new(-0.4, -0.7, -0.6).normalize();
-    let warm = [0.62, 0.58, 0.52];
-    let light = Light {
-        ambient: [0.42, 0.43, 0.46],
-        directional: warm.map(|s| toward * s),
-        offset: [0.0; 3],
-    };
-    let mut image = render_scene(camera, &bodies, &light, [0.12, 0.13, 0.15], 3);
-    for value in image.color.pixels_mut().iter_mut().flatten() {
-        *value = (*value + (COLOR_NOISE * noise.normal()) as f32).clamp(0.0, 1.0);
-    }
-    for z in image.depth.pixels_mut().iter_mut().filter(|z| **z > 0.0) {
-        *z += (DEPTH_NOISE * noise.normal()) as f32;
-    }
-    let mut mask = Mask::filled(camera.width, camera.height, false);
-    for (m, body) in mask.pixels_mut().iter_mut().zip(&image.object) {
-        *m = *body == Some(0);
-    }
-    (image.color, image.depth, mask)
 }
 
 /// Force on each taxel \[N\], in its link's frame: the nearer the object, the more.

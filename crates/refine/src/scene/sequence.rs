@@ -7,10 +7,9 @@ use nalgebra::{Isometry3, Vector3, Vector6};
 use prehend_autodiff::lie::perturb_about;
 use prehend_geometry::SplitMix64;
 
-use super::sensing::{feel, render_rgbd};
-use super::{Scene, default_scene};
+use super::sensing::HeldObject;
+use super::{Hand, Object, Observation, Scene, default_scene};
 use crate::error::RefineError;
-use crate::scene::{Hand, HandMeasurement, Object, Observation};
 
 /// One moment of a [`Sequence`].
 pub struct SequenceFrame {
@@ -55,6 +54,7 @@ pub fn default_sequence(seed: u64, count: usize) -> Result<Sequence, RefineError
         .hand
         .map_or_else(|| (Isometry3::identity(), Vec::new()), |hand| (hand.t_cam_hand, hand.joints));
     let center = (truth * object.center).coords;
+    let held = HeldObject { camera, object: &object, hand: &hand, joints: &joints, gravity };
     let mut noise = SplitMix64::new(seed ^ 0x5e9);
     let frame = |index: usize| {
         let time = STEP * index as u32;
@@ -71,11 +71,7 @@ pub fn default_sequence(seed: u64, count: usize) -> Result<Sequence, RefineError
         let slide = Vector3::new(0.0, 0.0, SLIDE * (1.7 * phase).sin());
         let t_hand_object = start.inverse() * truth;
         let truth = t_cam_hand * Isometry3::from(slide) * t_hand_object;
-        let (color, depth, mask) =
-            render_rgbd(&camera, &object, &hand, &truth, &t_cam_hand, &joints, &mut noise);
-        let forces = feel(&object, &hand, &truth, &t_cam_hand, &joints);
-        let hand = HandMeasurement { t_cam_hand, joints: joints.clone(), forces };
-        let observation = Observation { camera, color, depth, mask, gravity, hand: Some(hand) };
+        let observation = held.observe(&truth, &t_cam_hand, &mut noise);
         SequenceFrame { time, observation, truth }
     };
     let frames: Vec<SequenceFrame> = (0..count).map(frame).collect();

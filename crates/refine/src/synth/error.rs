@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
+use crate::data::AssetError;
 use crate::data::bop::DatasetError;
-use crate::data::{AssetError, JournalError};
 
 /// Why a dataset could not be made.
 #[derive(Debug, Error)]
@@ -27,9 +27,6 @@ pub enum SynthError {
     /// A file cannot be read or written, or an object prepared.
     #[error(transparent)]
     Asset(#[from] AssetError),
-    /// The journal of the frames that are done cannot be used.
-    #[error(transparent)]
-    Journal(#[from] JournalError),
 }
 
 impl From<DatasetError> for SynthError {

@@ -84,7 +84,7 @@ impl Selection {
         if jobs.is_empty() && errors.is_empty() {
             bail!("{file}: no pose is of the scenes, images and objects asked for");
         }
-        Ok((jobs, errors.iter().map(ToString::to_string).collect()))
+        Ok((jobs, errors.iter().map(|error| format!("{file}: {error}")).collect()))
     }
 }
 

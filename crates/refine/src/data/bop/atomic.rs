@@ -9,7 +9,7 @@ use super::error::DatasetError;
 /// # Errors
 /// [`DatasetError::Write`] naming `path`; a file that was there before is then unchanged.
 pub fn write_atomically(path: &Path, contents: &[u8]) -> Result<(), DatasetError> {
-    prehend_geometry::write_atomic(path, contents).map_err(|e| fault(path, e))
+    prehend_geometry::write_atomic(path, contents).map_err(|e| DatasetError::writing(path, e))
 }
 
 /// Whether [`write_atomically`] could write `path` now, to know before long work; leaves nothing behind.
@@ -17,21 +17,20 @@ pub fn write_atomically(path: &Path, contents: &[u8]) -> Result<(), DatasetError
 /// # Errors
 /// [`DatasetError::Write`] naming `path`.
 pub fn check_writable(path: &Path) -> Result<(), DatasetError> {
+    let fault = |problem: &dyn std::fmt::Display| DatasetError::writing(path, problem);
     if path.is_dir() {
-        return Err(fault(path, "is a folder"));
+        return Err(fault(&"is a folder"));
     }
-    let name = path.file_name().ok_or_else(|| fault(path, "the path names no file"))?;
+    let name = path.file_name().ok_or_else(|| fault(&"the path names no file"))?;
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
     if let Some(folder) = folder.filter(|p| !p.is_dir()) {
-        return Err(fault(path, format!("there is no folder {}", folder.display())));
+        return Err(fault(&format!("there is no folder {}", folder.display())));
     }
     let mut hidden = std::ffi::OsString::from(".");
     hidden.push(name);
     hidden.push(format!(".{}.probe", std::process::id()));
     let probe = path.with_file_name(hidden);
-    std::fs::write(&probe, [])
-        .and_then(|()| std::fs::remove_file(&probe))
-        .map_err(|e| fault(path, e))
+    std::fs::write(&probe, []).and_then(|()| std::fs::remove_file(&probe)).map_err(|e| fault(&e))
 }
 
 /// Makes the folder and those above it, where they are absent.
@@ -39,11 +38,7 @@ pub fn check_writable(path: &Path) -> Result<(), DatasetError> {
 /// # Errors
 /// [`DatasetError::Write`] naming `folder`.
 pub fn create_folder(folder: &Path) -> Result<(), DatasetError> {
-    std::fs::create_dir_all(folder).map_err(|e| fault(folder, e))
-}
-
-fn fault(path: &Path, problem: impl ToString) -> DatasetError {
-    DatasetError::Write { file: path.to_path_buf(), problem: problem.to_string() }
+    std::fs::create_dir_all(folder).map_err(|e| DatasetError::writing(folder, e))
 }
 
 #[cfg(test)]

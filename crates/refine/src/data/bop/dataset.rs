@@ -36,18 +36,19 @@ impl Dataset {
     /// # Errors
     /// When the folder is absent, holds no scenes, or holds several splits of which none is `test`.
     pub fn open(root: &Path) -> Result<Self, DatasetError> {
-        let splits: Vec<String> = subfolders(root)?
-            .into_iter()
-            .filter(|name| {
-                subfolders(&root.join(name))
-                    .is_ok_and(|inner| inner.iter().any(|s| scene_id(s).is_some()))
-            })
-            .collect();
+        let mut splits = subfolders(root)?;
+        splits.retain(|name| {
+            let inner = subfolders(&root.join(name)).unwrap_or_default();
+            inner.iter().any(|s| scene_id(s).is_some())
+        });
         match splits.as_slice() {
-            [] => Err(DatasetError::NoScenes { dir: root.to_path_buf() }),
+            [] => Err(no_scenes(root)),
             [only] => Self::open_split(root, only),
             _ if splits.iter().any(|s| s == "test") => Self::open_split(root, "test"),
-            _ => Err(DatasetError::AmbiguousSplit { dir: root.to_path_buf(), splits }),
+            _ => {
+                let problem = format!("several splits, name one of {}", splits.join(", "));
+                Err(DatasetError::unusable(root, problem))
+            }
         }
     }
 
@@ -63,7 +64,7 @@ impl Dataset {
             .map(|(id, dir)| (id, Scene::new(id, dir, root)))
             .collect();
         if scenes.is_empty() {
-            return Err(DatasetError::NoScenes { dir: split_dir });
+            return Err(no_scenes(&split_dir));
         }
         Ok(Self {
             root: root.to_path_buf(),
@@ -96,11 +97,11 @@ impl Dataset {
     /// The scene `scene_id`.
     ///
     /// # Errors
-    /// [`DatasetError::UnknownScene`].
+    /// When the split holds no folder for it.
     pub fn scene(&self, scene_id: u32) -> Result<&Scene, DatasetError> {
         self.scenes
             .get(&scene_id)
-            .ok_or_else(|| DatasetError::UnknownScene { dir: self.split_dir.clone(), scene_id })
+            .ok_or_else(|| DatasetError::unusable(&self.split_dir, format!("no scene {scene_id}")))
     }
 }
 
@@ -138,13 +139,17 @@ impl Scene {
     pub fn images(&self) -> Result<Vec<u32>, DatasetError> {
         let id = |key: &String| {
             let file = self.camera.path();
-            let fault = |_| DatasetError::malformed(file, format!("{key:?} is not an image id"));
+            let fault = |_| DatasetError::unusable(file, format!("{key:?} is not an image id"));
             key.parse().map_err(fault)
         };
         let mut ids = self.camera.root()?.keys().map(id).collect::<Result<Vec<u32>, _>>()?;
         ids.sort_unstable();
         Ok(ids)
     }
+}
+
+fn no_scenes(dir: &Path) -> DatasetError {
+    DatasetError::unusable(dir, "no scene folders (expected, for example, test/000001)")
 }
 
 fn scene_id(name: &str) -> Option<u32> {

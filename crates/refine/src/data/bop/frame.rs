@@ -54,28 +54,20 @@ impl Dataset {
     /// The image `im_id` of the scene `scene_id`.
     ///
     /// # Errors
-    /// Those of [`Dataset::scene`] and [`Scene::frame`].
+    /// Those of [`Dataset::scene`], and when `scene_camera.json` is absent or broken, or does not describe the image.
     pub fn frame(&self, scene_id: u32, im_id: u32) -> Result<Frame<'_>, DatasetError> {
-        self.scene(scene_id)?.frame(im_id)
-    }
-}
-
-impl Scene {
-    /// The image `im_id`.
-    ///
-    /// # Errors
-    /// When `scene_camera.json` is absent or broken, or does not describe the image.
-    pub fn frame(&self, im_id: u32) -> Result<Frame<'_>, DatasetError> {
-        Frame::new(self, im_id)
-    }
-}
-
-impl<'a> Frame<'a> {
-    fn new(scene: &'a Scene, im_id: u32) -> Result<Self, DatasetError> {
+        let scene = self.scene(scene_id)?;
         let CameraEntry { intrinsics, depth_scale } = scene.camera.entry(im_id)?;
-        Ok(Self { scene, im_id, intrinsics, depth_scale: depth_scale.map_or(1.0, |scale| scale.0) })
+        Ok(Frame {
+            scene,
+            im_id,
+            intrinsics,
+            depth_scale: depth_scale.map_or(1.0, |scale| scale.0),
+        })
     }
+}
 
+impl Frame<'_> {
     /// The camera that the estimator is told, for an image of `width` by `height` pixels: BOP keeps no sizes.
     pub fn camera(&self, width: usize, height: usize) -> Camera {
         let [fx, fy, cx, cy] = self.intrinsics.0;
@@ -160,30 +152,34 @@ impl<'a> Frame<'a> {
     /// the order of the masks.
     ///
     /// # Errors
-    /// When it is absent or does not decode, and [`DatasetError::EmptyMask`] when no pixel is set.
+    /// When it is absent, does not decode, or no pixel is set.
     pub fn mask(&self, instance: usize) -> Result<Mask, DatasetError> {
         let file = self.mask_path(instance)?;
         let mask = Mask::load(&file)?;
-        if mask.count() > 0 { Ok(mask) } else { Err(DatasetError::EmptyMask { file }) }
+        if mask.count() == 0 {
+            return Err(DatasetError::unusable(&file, "the mask is empty"));
+        }
+        Ok(mask)
     }
 
     /// The image as an [`Observation`] of camera, color, depth and mask; gravity and the hand are left out.
     ///
     /// # Errors
     /// The first of those of [`Frame::rgb`], [`Frame::depth`] and [`Frame::mask`], and
-    /// [`DatasetError::ImageSize`].
+    /// images that differ in size.
     pub fn observation(&self, instance: usize) -> Result<Observation, DatasetError> {
         let (rgb, depth, mask) = (self.rgb()?, self.depth()?, self.mask(instance)?);
-        let other_size = (rgb.width(), rgb.height());
-        let check = |file: PathBuf, size: (usize, usize)| {
-            if size == other_size {
-                return Ok(());
-            }
-            Err(DatasetError::ImageSize { file, size, other: self.rgb_path()?, other_size })
-        };
-        check(self.depth_path(), (depth.width(), depth.height()))?;
-        check(self.mask_path(instance)?, (mask.width(), mask.height()))?;
-        let camera = self.camera(rgb.width(), rgb.height());
+        let (width, height) = (rgb.width(), rgb.height());
+        let sizes = [
+            (self.depth_path(), (depth.width(), depth.height())),
+            (self.mask_path(instance)?, (mask.width(), mask.height())),
+        ];
+        if let Some((file, (w, h))) = sizes.into_iter().find(|(_, size)| *size != (width, height)) {
+            let other = self.rgb_path()?;
+            let problem = format!("is {w}x{h} pixels but {} is {width}x{height}", other.display());
+            return Err(DatasetError::unusable(&file, problem));
+        }
+        let camera = self.camera(width, height);
         Ok(Observation { camera, color: rgb, depth, mask, gravity: None, hand: None })
     }
 
@@ -214,10 +210,6 @@ impl<'a> Frame<'a> {
     }
 
     fn fault(&self, file: &JsonFile, field: &str, problem: impl ToString) -> DatasetError {
-        DatasetError::Field {
-            file: file.path().to_owned(),
-            field: format!("{}.{field}", self.im_id),
-            problem: problem.to_string(),
-        }
+        DatasetError::field(file.path(), &format!("{}.{field}", self.im_id), problem)
     }
 }

@@ -7,8 +7,9 @@ use serde::Deserialize;
 
 use super::dataset::Dataset;
 use super::error::DatasetError;
-use super::json::{JsonFile, Millimeters, Rotation};
+use super::json::{JsonFile, Numbers, Rotation};
 use super::models::Models;
+use super::pose::translation_from_mm;
 use super::scene::SceneBodies;
 
 /// What scorers may read and estimators must not: `scene_gt.json`, `scene_gt_info.json`,
@@ -42,7 +43,7 @@ struct ObjectEntry {
     #[serde(rename = "cam_R_m2c")]
     rotation: Rotation,
     #[serde(rename = "cam_t_m2c")]
-    translation: Millimeters,
+    translation: Numbers<3>,
 }
 
 #[derive(Deserialize)]
@@ -78,7 +79,11 @@ impl<'a> GroundTruth<'a> {
     /// When `scene_gt.json` is absent or broken, or lacks the image or one of its fields.
     pub fn objects(&self, scene_id: u32, im_id: u32) -> Result<Vec<TrueObject>, DatasetError> {
         let entries: Vec<ObjectEntry> = self.scene(scene_id)?.objects.entry(im_id)?;
-        Ok(entries.into_iter().map(TrueObject::from).collect())
+        let object = |ObjectEntry { obj_id, rotation, translation }| {
+            let translation = translation_from_mm(&translation.0);
+            TrueObject { obj_id, t_cam_model: Isometry3::from_parts(translation, rotation.0) }
+        };
+        Ok(entries.into_iter().map(object).collect())
     }
 
     /// The true pose of the object `obj_id`; among several such objects, of the one nearest to `estimate`.
@@ -96,15 +101,13 @@ impl<'a> GroundTruth<'a> {
         let distance = |o: &TrueObject| {
             (o.t_cam_model.translation.vector - estimate.translation.vector).norm()
         };
+        let objects = &self.scene(scene_id)?.objects;
         self.objects(scene_id, im_id)?
             .into_iter()
             .filter(|o| o.obj_id == obj_id)
             .min_by(|a, b| distance(a).total_cmp(&distance(b)))
             .map(|o| o.t_cam_model)
-            .ok_or_else(|| DatasetError::UnknownObject {
-                file: self.scene_file(scene_id, "scene_gt.json"),
-                obj_id,
-            })
+            .ok_or_else(|| DatasetError::UnknownObject { file: objects.path().into(), obj_id })
     }
 
     /// The visible fraction of each object of an image, or `None` where the dataset does not give it.
@@ -145,20 +148,6 @@ impl<'a> GroundTruth<'a> {
     }
 
     fn scene(&self, scene_id: u32) -> Result<&TrueScene, DatasetError> {
-        let dir = || self.dataset.split_dir().to_path_buf();
-        self.scenes
-            .get(&scene_id)
-            .ok_or_else(|| DatasetError::UnknownScene { dir: dir(), scene_id })
-    }
-
-    fn scene_file(&self, scene_id: u32, name: &str) -> std::path::PathBuf {
-        self.dataset.scene(scene_id).map_or_else(|_| name.into(), |s| s.dir().join(name))
-    }
-}
-
-impl From<ObjectEntry> for TrueObject {
-    fn from(entry: ObjectEntry) -> Self {
-        let t_cam_model = Isometry3::from_parts(entry.translation.0, entry.rotation.0);
-        Self { obj_id: entry.obj_id, t_cam_model }
+        self.dataset.scene(scene_id).map(|scene| &self.scenes[&scene.id()])
     }
 }

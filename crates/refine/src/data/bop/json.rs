@@ -3,18 +3,17 @@
 //! Entries are converted one by one: a fault in the entry of one image leaves the others usable. That includes `NaN` and
 //! `Infinity`, which other writers emit and JSON does not know.
 
-use std::fmt;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-use nalgebra::{Translation3, UnitQuaternion, Vector3};
+use nalgebra::UnitQuaternion;
 use serde::Deserialize;
-use serde::de::{DeserializeOwned, DeserializeSeed, Deserializer, Error, SeqAccess, Visitor};
+use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 
 use super::error::DatasetError;
-use super::pose::{PoseFault, rotation_from_row_major, translation_from_mm};
+use super::pose::{exactly, rotation_from_row_major};
 
 /// A JSON file whose top level is an object; it is read once, when something of it is first asked for.
 #[derive(Debug)]
@@ -64,7 +63,7 @@ impl JsonFile {
                 field += &path;
             }
             field.extend(absent.iter().flat_map(|name| [".", name]));
-            DatasetError::Field { file: self.path.clone(), field, problem }
+            DatasetError::field(&self.path, &field, problem)
         })
     }
 }
@@ -97,8 +96,8 @@ fn read(path: &Path) -> Result<Map<String, Value>, DatasetError> {
     });
     match parsed {
         Ok(Value::Object(root)) => Ok(root),
-        Ok(_) => Err(DatasetError::malformed(path, "the top level is not a JSON object")),
-        Err(e) => Err(DatasetError::malformed(path, format!("not valid JSON: {e}"))),
+        Ok(_) => Err(DatasetError::unusable(path, "the top level is not a JSON object")),
+        Err(e) => Err(DatasetError::unusable(path, format!("not valid JSON: {e}"))),
     }
 }
 
@@ -130,61 +129,27 @@ fn false_for_non_finite(bytes: &[u8]) -> Vec<u8> {
     out
 }
 
-/// `N` numbers; nested lists (a matrix as a list of rows) count as one flat list.
+/// `N` numbers; a matrix may also be a list of rows.
+#[derive(Deserialize)]
+#[serde(try_from = "Vec<NumberOrRow>")]
 pub(super) struct Numbers<const N: usize>(pub(super) [f64; N]);
 
-impl<'de, const N: usize> Deserialize<'de> for Numbers<N> {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let mut values = Vec::with_capacity(N);
-        Flat { out: &mut values, nested: false }.deserialize(deserializer)?;
-        let found = values.len();
-        let array = values.try_into();
-        array
-            .map(Self)
-            .map_err(|_| D::Error::custom(format!("expected {N} numbers, found {found}")))
-    }
+#[derive(Deserialize)]
+#[serde(untagged, expecting = "is not a finite number")]
+enum NumberOrRow {
+    Number(f64),
+    Row(Vec<f64>),
 }
 
-/// Appends a number, or those of a list, to `out`.
-struct Flat<'a> {
-    out: &'a mut Vec<f64>,
-    nested: bool,
-}
+impl<const N: usize> TryFrom<Vec<NumberOrRow>> for Numbers<N> {
+    type Error = String;
 
-impl<'de> DeserializeSeed<'de> for Flat<'_> {
-    type Value = ();
-
-    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<(), D::Error> {
-        deserializer.deserialize_any(self)
-    }
-}
-
-impl<'de> Visitor<'de> for Flat<'_> {
-    type Value = ();
-
-    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(if self.nested { "a finite number" } else { "a list" })
-    }
-
-    fn visit_f64<E: Error>(self, value: f64) -> Result<(), E> {
-        if !self.nested {
-            return Err(E::invalid_type(serde::de::Unexpected::Float(value), &self));
-        }
-        self.out.push(value);
-        Ok(())
-    }
-
-    fn visit_i64<E: Error>(self, value: i64) -> Result<(), E> {
-        self.visit_f64(value as f64)
-    }
-
-    fn visit_u64<E: Error>(self, value: u64) -> Result<(), E> {
-        self.visit_f64(value as f64)
-    }
-
-    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<(), A::Error> {
-        while list.next_element_seed(Flat { out: &mut *self.out, nested: true })?.is_some() {}
-        Ok(())
+    fn try_from(list: Vec<NumberOrRow>) -> Result<Self, String> {
+        let flat = list.into_iter().flat_map(|entry| match entry {
+            NumberOrRow::Number(value) => vec![value],
+            NumberOrRow::Row(values) => values,
+        });
+        exactly(flat.collect()).map(Self)
     }
 }
 
@@ -201,46 +166,24 @@ impl TryFrom<f64> for Positive {
     }
 }
 
-/// A vector in the unit of the file.
-#[derive(Deserialize)]
-#[serde(from = "Numbers<3>")]
-pub(super) struct Vector(pub(super) Vector3<f64>);
-
-impl From<Numbers<3>> for Vector {
-    fn from(numbers: Numbers<3>) -> Self {
-        Self(numbers.0.into())
-    }
-}
-
 /// A rotation of nine row-major entries.
 #[derive(Deserialize)]
 #[serde(try_from = "Numbers<9>")]
 pub(super) struct Rotation(pub(super) UnitQuaternion<f64>);
 
 impl TryFrom<Numbers<9>> for Rotation {
-    type Error = PoseFault;
+    type Error = String;
 
-    fn try_from(numbers: Numbers<9>) -> Result<Self, PoseFault> {
+    fn try_from(numbers: Numbers<9>) -> Result<Self, String> {
         rotation_from_row_major(&numbers.0).map(Self)
-    }
-}
-
-/// A translation \[m\] of three millimeter values.
-#[derive(Deserialize)]
-#[serde(try_from = "Numbers<3>")]
-pub(super) struct Millimeters(pub(super) Translation3<f64>);
-
-impl TryFrom<Numbers<3>> for Millimeters {
-    type Error = PoseFault;
-
-    fn try_from(numbers: Numbers<3>) -> Result<Self, PoseFault> {
-        translation_from_mm(&numbers.0).map(Self)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use std::collections::BTreeMap;
+
+    use nalgebra::Vector3;
 
     use super::*;
 
@@ -264,9 +207,9 @@ mod tests {
     #[test]
     fn broken_absent_and_misshapen_files_are_named() {
         let error = file(r#"{"0": {"cam_K": [1,"#).root().unwrap_err();
-        assert!(matches!(&error, DatasetError::Malformed { .. }));
+        assert!(matches!(&error, DatasetError::Unusable { .. }));
         assert!(error.to_string().contains("scene.json: not valid JSON"), "{error}");
-        assert!(matches!(file("[1, 2]").root(), Err(DatasetError::Malformed { .. })));
+        assert!(matches!(file("[1, 2]").root(), Err(DatasetError::Unusable { .. })));
         let absent = JsonFile::new("no/such/scene.json".into());
         let expected = DatasetError::Missing { file: "no/such/scene.json".into() };
         assert_eq!(absent.root().unwrap_err(), expected);
@@ -311,44 +254,31 @@ mod tests {
         #[derive(Deserialize)]
         struct Placed {
             t: Numbers<3>,
+            scale: Option<Positive>,
         }
         let f = file(
-            r#"{"0": {"t": [1, NaN, -Infinity], "name": "a NaN \" in a string"}, "1": {"t": [1, 2, 3]}}"#,
+            r#"{"0": {"t": [1, NaN, -Infinity], "name": "a NaN \" in a string"}, "1": {"t": [1, 2, 3]},
+                "2": {"t": [1, 2, 3], "scale": null}, "3": {"t": [1, 2, 3], "scale": NaN}}"#,
         );
         assert_eq!(fault::<Placed>(&f, 0), "0.t[1]: is not a finite number");
         assert_eq!(f.entry(0), Ok(Named { name: "a NaN \" in a string".into() }));
         assert_eq!(f.entry::<Placed>(1).map(|p| p.t.0), Ok([1.0, 2.0, 3.0]));
+        // Nor does it count as the absence of an optional field.
+        assert!(f.entry::<Placed>(2).unwrap().scale.is_none());
+        assert_eq!(fault::<Placed>(&f, 3), "3.scale: is not a finite number");
     }
 
     #[test]
-    fn nan_in_an_optional_field_is_not_absence() {
-        #[derive(Deserialize)]
-        struct Scaled {
-            none: Option<Positive>,
-            scale: Option<Positive>,
-        }
-        let f = file(r#"{"0": {"scale": NaN, "none": null}, "1": {"scale": 2, "none": null}}"#);
-        assert_eq!(fault::<Scaled>(&f, 0), "0.scale: is not a finite number");
-        let read: Scaled = f.entry(1).unwrap();
-        assert!(read.none.is_none() && read.scale.is_some());
-    }
-
-    #[test]
-    fn poses_are_checked_and_brought_to_meters() {
-        #[derive(Deserialize)]
-        struct Pose {
-            #[serde(rename = "R")]
-            rotation: Rotation,
-            t: Millimeters,
-        }
+    fn rotations_are_checked_and_may_be_nested() {
         let f = file(
-            r#"{"0": {"R": [0, -1, 0, 1, 0, 0, 0, 0, 1], "t": [1, 2, 3]},
-                "1": {"R": [[1, 0, 0], [0, 2, 0], [0, 0, 1]], "t": [1, 2, 3]}}"#,
+            r#"{"0": [0, -1, 0, 1, 0, 0, 0, 0, 1], "1": [[0, -1, 0], [1, 0, 0], [0, 0, 1]],
+                "2": [[1, 0, 0], [0, 2, 0], [0, 0, 1]]}"#,
         );
-        let pose: Pose = f.entry(0).unwrap();
-        assert!((pose.t.0.vector - Vector3::new(0.001, 0.002, 0.003)).norm() < 1e-18);
-        assert!((pose.rotation.0 * Vector3::x() - Vector3::y()).norm() < 1e-15);
-        let error = fault::<Pose>(&f, 1);
-        assert!(error.contains("1.R: not orthonormal"), "{error}");
+        for id in [0, 1] {
+            let rotation: Rotation = f.entry(id).unwrap();
+            assert!((rotation.0 * Vector3::x() - Vector3::y()).norm() < 1e-15);
+        }
+        let error = fault::<Rotation>(&f, 2);
+        assert!(error.contains("2: not orthonormal"), "{error}");
     }
 }

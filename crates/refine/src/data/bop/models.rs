@@ -7,8 +7,8 @@ use nalgebra::{Isometry3, Matrix3, Point3, Unit, Vector3};
 use serde::Deserialize;
 
 use super::error::DatasetError;
-use super::json::{JsonFile, Numbers, Positive, Vector};
-use super::pose::{PoseFault, pose_from_bop};
+use super::json::{JsonFile, Numbers, Positive};
+use super::pose::pose_from_bop;
 use crate::data::symmetry::{ContinuousSymmetry, Symmetries};
 
 /// A folder with `obj_000001.ply`, … (millimeters) and `models_info.json`.
@@ -85,7 +85,7 @@ impl Models {
 struct InfoEntry {
     diameter: Positive,
     mass_kg: Option<Positive>,
-    com_mm: Option<Vector>,
+    com_mm: Option<Numbers<3>>,
     inertia_kg_m2: Option<Inertia>,
     symmetries_discrete: Option<Vec<Motion>>,
     symmetries_continuous: Option<Vec<AxisEntry>>,
@@ -94,9 +94,10 @@ struct InfoEntry {
 impl From<InfoEntry> for ModelInfo {
     fn from(entry: InfoEntry) -> Self {
         let discrete = entry.symmetries_discrete.into_iter().flatten().map(|m| m.0);
+        let point = |mm: Numbers<3>| Point3::from(mm.0) / 1000.0;
         let axis = |entry: AxisEntry| ContinuousSymmetry {
             axis: entry.axis.0,
-            point: entry.offset.map_or_else(Point3::origin, |o| Point3::from(o.0 / 1000.0)),
+            point: entry.offset.map_or_else(Point3::origin, point),
         };
         let continuous = entry.symmetries_continuous.into_iter().flatten().map(axis);
         Self {
@@ -106,7 +107,7 @@ impl From<InfoEntry> for ModelInfo {
                 continuous: continuous.collect(),
             },
             mass: entry.mass_kg.map(|m| m.0),
-            center_of_mass: entry.com_mm.map(|c| Point3::from(c.0 / 1000.0)),
+            center_of_mass: entry.com_mm.map(point),
             inertia: entry.inertia_kg_m2.map(|i| i.0),
         }
     }
@@ -132,7 +133,7 @@ impl TryFrom<Numbers<9>> for Inertia {
 #[derive(Deserialize)]
 struct AxisEntry {
     axis: Direction,
-    offset: Option<Vector>,
+    offset: Option<Numbers<3>>,
 }
 
 #[derive(Deserialize)]
@@ -153,24 +154,16 @@ impl TryFrom<Numbers<3>> for Direction {
 struct Motion(Isometry3<f64>);
 
 impl TryFrom<Numbers<16>> for Motion {
-    type Error = MotionFault;
+    type Error = String;
 
-    fn try_from(numbers: Numbers<16>) -> Result<Self, MotionFault> {
+    fn try_from(numbers: Numbers<16>) -> Result<Self, String> {
         let m = numbers.0;
         if m[12..] != [0.0, 0.0, 0.0, 1.0] {
-            return Err(MotionFault::LastRow);
+            return Err("the last row must be 0 0 0 1".into());
         }
         let r = [m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]];
-        Ok(Self(pose_from_bop(&r, &[m[3], m[7], m[11]])?))
+        pose_from_bop(&r, &[m[3], m[7], m[11]]).map(Self)
     }
-}
-
-#[derive(Debug, thiserror::Error)]
-enum MotionFault {
-    #[error("the last row must be 0 0 0 1")]
-    LastRow,
-    #[error(transparent)]
-    Pose(#[from] PoseFault),
 }
 
 #[cfg(test)]

@@ -49,14 +49,14 @@ pub fn write_symmetries(
     let mut list: Map<String, Value> = match fs::read(&file) {
         // Strictly: numbers that JSON does not know could not be written back.
         Ok(bytes) => serde_json::from_slice(&bytes)
-            .map_err(|e| DatasetError::malformed(&file, format!("not valid JSON: {e}")))?,
+            .map_err(|e| DatasetError::unusable(&file, format!("not valid JSON: {e}")))?,
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => Map::new(),
         Err(e) => return Err(DatasetError::reading(&file, &e)),
     };
     let entry =
         list.entry(obj_id.to_string()).or_insert_with(|| Value::Object(extent_to_bop(vertices)));
     let Value::Object(fields) = entry else {
-        return Err(DatasetError::malformed(&file, format!("{obj_id}: is no object")));
+        return Err(DatasetError::unusable(&file, format!("{obj_id}: is no object")));
     };
     for name in ["symmetries_discrete", "symmetries_continuous"] {
         fields.remove(name);

@@ -1,60 +1,25 @@
 //! Poses as BOP writes them: nine row-major rotation entries and a translation in millimeters.
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion};
-use thiserror::Error;
 
 /// Largest entry of RᵀR − I that still counts as rounding; beyond it the matrix is refused.
 const ROTATION_TOLERANCE: f64 = 1e-3;
 
-/// Why numbers do not make a pose.
-#[derive(Clone, Debug, Error, PartialEq)]
-pub(crate) enum PoseFault {
-    /// The wrong number of values.
-    #[error("expected {expected} numbers, found {found}")]
-    Count {
-        /// How many values the field needs.
-        expected: usize,
-        /// How many it has.
-        found: usize,
-    },
-    /// A value that is no number.
-    #[error("{text:?} is not a number")]
-    NotANumber {
-        /// The value as written.
-        text: String,
-    },
-    /// NaN or an infinity.
-    #[error("value {index} is not finite")]
-    NotFinite {
-        /// Position of the value in its field, from 0.
-        index: usize,
-    },
-    /// RᵀR differs from the identity by more than [`ROTATION_TOLERANCE`].
-    #[error(
-        "not orthonormal: RᵀR differs from the identity by {deviation:.4} (at most {ROTATION_TOLERANCE} allowed)"
-    )]
-    NotOrthonormal {
-        /// Largest entry of |RᵀR − I|.
-        deviation: f64,
-    },
-    /// An orthonormal matrix of determinant −1.
-    #[error("a reflection (determinant -1), not a rotation")]
-    Reflection,
-}
-
 /// The rotation of nine row-major entries; rounding is removed by the nearest rotation (polar factor).
 ///
 /// # Errors
-/// [`PoseFault::NotFinite`], [`PoseFault::NotOrthonormal`] or [`PoseFault::Reflection`].
-pub(crate) fn rotation_from_row_major(r: &[f64; 9]) -> Result<UnitQuaternion<f64>, PoseFault> {
+/// What is wrong with entries that are not finite, not orthonormal, or a reflection.
+pub(crate) fn rotation_from_row_major(r: &[f64; 9]) -> Result<UnitQuaternion<f64>, String> {
     require_finite(r)?;
     let matrix = Matrix3::from_row_slice(r);
     let deviation = (matrix.transpose() * matrix - Matrix3::identity()).amax();
     if deviation > ROTATION_TOLERANCE {
-        return Err(PoseFault::NotOrthonormal { deviation });
+        return Err(format!(
+            "not orthonormal: RᵀR differs from the identity by {deviation:.4} (at most {ROTATION_TOLERANCE} allowed)"
+        ));
     }
     if matrix.determinant() < 0.0 {
-        return Err(PoseFault::Reflection);
+        return Err("a reflection (determinant -1), not a rotation".into());
     }
     let nearest = polar_factor(matrix);
     Ok(UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(nearest)))
@@ -78,50 +43,39 @@ pub(crate) fn rotation_to_row_major(rotation: &UnitQuaternion<f64>) -> [f64; 9] 
 }
 
 /// A translation \[m\] of three millimeter values.
-///
-/// # Errors
-/// [`PoseFault::NotFinite`].
-pub(crate) fn translation_from_mm(t_mm: &[f64; 3]) -> Result<Translation3<f64>, PoseFault> {
-    require_finite(t_mm)?;
-    let [x, y, z] = t_mm.map(|v| v / 1000.0);
-    Ok(Translation3::new(x, y, z))
+pub(crate) fn translation_from_mm(t_mm: &[f64; 3]) -> Translation3<f64> {
+    t_mm.map(|v| v / 1000.0).into()
 }
 
 /// The millimeter values of a translation \[m\].
 pub(crate) fn translation_to_mm(translation: &Translation3<f64>) -> [f64; 3] {
-    let t = translation.vector;
-    [t.x * 1000.0, t.y * 1000.0, t.z * 1000.0]
+    (translation.vector * 1000.0).into()
 }
 
 /// The pose \[m\] of a row-major rotation and a millimeter translation.
 ///
 /// # Errors
-/// Those of [`rotation_from_row_major`] and [`translation_from_mm`].
-pub(crate) fn pose_from_bop(r: &[f64; 9], t_mm: &[f64; 3]) -> Result<Isometry3<f64>, PoseFault> {
-    Ok(Isometry3::from_parts(translation_from_mm(t_mm)?, rotation_from_row_major(r)?))
+/// Those of [`rotation_from_row_major`].
+pub(crate) fn pose_from_bop(r: &[f64; 9], t_mm: &[f64; 3]) -> Result<Isometry3<f64>, String> {
+    Ok(Isometry3::from_parts(translation_from_mm(t_mm), rotation_from_row_major(r)?))
 }
 
 /// `N` finite numbers separated by spaces.
-pub(crate) fn parse_numbers<const N: usize>(text: &str) -> Result<[f64; N], PoseFault> {
-    let mut values = [0.0; N];
-    let mut found = 0;
-    for word in text.split_whitespace() {
-        let value = word.parse().map_err(|_| PoseFault::NotANumber { text: word.to_owned() })?;
-        if let Some(slot) = values.get_mut(found) {
-            *slot = value;
-        }
-        found += 1;
-    }
-    if found != N {
-        return Err(PoseFault::Count { expected: N, found });
-    }
+pub(crate) fn parse_numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
+    let number = |word: &str| word.parse().map_err(|_| format!("{word:?} is not a number"));
+    let values = exactly(text.split_whitespace().map(number).collect::<Result<_, _>>()?)?;
     require_finite(&values)?;
     Ok(values)
 }
 
-fn require_finite(values: &[f64]) -> Result<(), PoseFault> {
+/// The values if there are `N`.
+pub(super) fn exactly<const N: usize>(values: Vec<f64>) -> Result<[f64; N], String> {
+    values.try_into().map_err(|v: Vec<f64>| format!("expected {N} numbers, found {}", v.len()))
+}
+
+fn require_finite(values: &[f64]) -> Result<(), String> {
     match values.iter().position(|v| !v.is_finite()) {
-        Some(index) => Err(PoseFault::NotFinite { index }),
+        Some(index) => Err(format!("value {index} is not finite")),
         None => Ok(()),
     }
 }
@@ -162,27 +116,27 @@ mod tests {
     #[test]
     fn refuses_what_is_no_rotation() {
         let r = rotation_to_row_major(&some_rotation());
-        let stretched = r.map(|v| v * 1.01);
-        assert!(matches!(
-            rotation_from_row_major(&stretched),
-            Err(PoseFault::NotOrthonormal { .. })
-        ));
-        assert_eq!(rotation_from_row_major(&r.map(|v| -v)), Err(PoseFault::Reflection));
         let mut nan = r;
         nan[4] = f64::NAN;
-        assert_eq!(rotation_from_row_major(&nan), Err(PoseFault::NotFinite { index: 4 }));
-        assert_eq!(
-            translation_from_mm(&[0.0, 0.0, f64::INFINITY]),
-            Err(PoseFault::NotFinite { index: 2 })
-        );
+        for (entries, expected) in [
+            (r.map(|v| v * 1.01), "not orthonormal: "),
+            (r.map(|v| -v), "a reflection"),
+            (nan, "value 4 is not finite"),
+        ] {
+            assert!(rotation_from_row_major(&entries).unwrap_err().starts_with(expected));
+        }
     }
 
     #[test]
     fn numbers_are_counted_and_named() {
-        assert_eq!(parse_numbers::<3>(" 1 2.5  -3e-2 "), Ok([1.0, 2.5, -0.03]));
-        assert_eq!(parse_numbers::<3>("1 2"), Err(PoseFault::Count { expected: 3, found: 2 }));
-        assert_eq!(parse_numbers::<3>("1 2 3 4"), Err(PoseFault::Count { expected: 3, found: 4 }));
-        assert_eq!(parse_numbers::<2>("1 2x"), Err(PoseFault::NotANumber { text: "2x".into() }));
-        assert_eq!(parse_numbers::<2>("nan 2"), Err(PoseFault::NotFinite { index: 0 }));
+        assert_eq!(parse_numbers(" 1 2.5  -3e-2 "), Ok([1.0, 2.5, -0.03]));
+        for (text, expected) in [
+            ("1 2", "expected 3 numbers, found 2"),
+            ("1 2 3 4", "expected 3 numbers, found 4"),
+            ("1 2x 3", "\"2x\" is not a number"),
+            ("nan 2 3", "value 0 is not finite"),
+        ] {
+            assert_eq!(parse_numbers::<3>(text).unwrap_err(), expected);
+        }
     }
 }

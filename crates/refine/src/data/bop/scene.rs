@@ -7,7 +7,8 @@ use nalgebra::{Isometry3, Vector3};
 use serde::Deserialize;
 
 use super::error::DatasetError;
-use super::json::{JsonFile, Millimeters, Rotation, Vector};
+use super::json::{JsonFile, Numbers, Rotation};
+use super::pose::translation_from_mm;
 
 /// Force units of `scene_tactile.json` per newton.
 pub const UNITS_PER_NEWTON: f64 = 1000.0;
@@ -36,7 +37,7 @@ pub struct SceneBodies {
 
 #[derive(Deserialize)]
 struct BodiesEntry {
-    gravity: Vector,
+    gravity: Numbers<3>,
     bodies: Vec<BodyEntry>,
 }
 
@@ -47,7 +48,7 @@ struct BodyEntry {
     #[serde(rename = "cam_R_b2c")]
     rotation: Rotation,
     #[serde(rename = "cam_t_b2c")]
-    translation: Millimeters,
+    translation: Numbers<3>,
     joints: BTreeMap<String, f64>,
 }
 
@@ -58,10 +59,13 @@ impl SceneBodies {
         let body = |entry: BodyEntry| Body {
             name: entry.name,
             urdf: root.join(entry.urdf),
-            t_cam_base: Isometry3::from_parts(entry.translation.0, entry.rotation.0),
+            t_cam_base: Isometry3::from_parts(
+                translation_from_mm(&entry.translation.0),
+                entry.rotation.0,
+            ),
             joints: entry.joints,
         };
-        Ok(Self { gravity: gravity.0, bodies: bodies.into_iter().map(body).collect() })
+        Ok(Self { gravity: gravity.0.into(), bodies: bodies.into_iter().map(body).collect() })
     }
 
     /// The body called `name`.
@@ -85,14 +89,14 @@ pub struct Tactile {
 struct TactileEntry {
     body: String,
     taxels: String,
-    force: Vec<Vector>,
+    force: Vec<Numbers<3>>,
 }
 
 impl Tactile {
     /// Reads the entry of image `im_id`; `root` is the folder that the taxel table's path is relative to.
     pub(super) fn read(file: &JsonFile, im_id: u32, root: &Path) -> Result<Self, DatasetError> {
         let TactileEntry { body, taxels, force } = file.entry(im_id)?;
-        let force = force.into_iter().map(|f| f.0 / UNITS_PER_NEWTON).collect();
+        let force = force.into_iter().map(|f| Vector3::from(f.0) / UNITS_PER_NEWTON).collect();
         Ok(Self { body, taxels: root.join(taxels), force })
     }
 }

@@ -104,9 +104,7 @@ impl Level {
         let rows = read.rows.into_iter().zip(read.instances).filter(|(row, _)| admit(row));
         let frame = |(k, (row, instance))| Frame { index: first + k, level, row, instance };
         let frames: Vec<Frame> = rows.enumerate().map(frame).collect();
-        let unreadable = read.errors.iter();
-        let unreadable = unreadable.map(|e| format!("line {}: {}: {}", e.line, e.field, e.problem));
-        let (name, unreadable) = (name.into(), unreadable.collect());
+        let (name, unreadable) = (name.into(), read.errors);
         Ok((Self { name, poses, frames: frames.len(), unreadable }, frames))
     }
 }

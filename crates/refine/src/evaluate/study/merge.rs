@@ -7,14 +7,15 @@ use thiserror::Error;
 use super::design::{Design, Shard};
 use super::output::RECORDS;
 use super::record::{FrameRecord, Records};
-use crate::data::{Identity, Journal, JournalError};
+use crate::data::bop::DatasetError;
+use crate::data::{Identity, Journal};
 
 /// Why shards do not make a study.
 #[derive(Debug, Error)]
 pub enum MergeError {
     /// The records of a shard cannot be read.
     #[error(transparent)]
-    Journal(#[from] JournalError),
+    Journal(#[from] DatasetError),
     /// The shards are not those of one study, or not all of them.
     #[error("{0}")]
     Shards(String),
