@@ -181,7 +181,10 @@ fn all_steps_are_of_one_run() {
     assert!(place.path("s10/steps.svg").is_file() && place.path("s10/means-init.svg").is_file());
     let said =
         place.prehend("study steps --dataset ds --poses ds/init.csv --methods nothing --out x");
-    assert!(said.code == 1 && said.err.contains("unknown method \"nothing\": one of fused"));
+    assert!(
+        said.code == 1
+            && said.err.contains("'nothing' for '--methods <LIST>': unknown method: one of fused")
+    );
 }
 
 /// Every line of the records but the first, the design.

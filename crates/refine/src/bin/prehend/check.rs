@@ -4,14 +4,13 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
-use prehend_refine::data::bop::ResultRow;
 use prehend_refine::data::{AssetError, Assets};
 use prehend_refine::evaluate::report::{Report, outline_picture};
 use prehend_refine::scene::{inspect_object, inspect_pose};
 use prehend_render::RgbImage;
 
 use crate::options::{Input, Job, label};
-use crate::terminal::{cache, complain, exit_code, progress, say};
+use crate::terminal::{cache, exit_code, progress, say, warn};
 
 #[derive(Args)]
 pub(crate) struct Check {
@@ -24,27 +23,25 @@ pub(crate) struct Check {
 
 impl Check {
     pub(crate) fn run(self) -> anyhow::Result<ExitCode> {
-        let dataset = self.input.open()?;
-        let (jobs, mut failures) = self.input.jobs()?;
+        let Input { selection, poses } = &self.input;
+        let dataset = selection.open()?;
+        let (jobs, mut failures) = selection.jobs(poses)?;
         let mut assets = Assets::new(&dataset, 0).with_cache(cache());
         let mut report = Report::create(&self.report)?;
         let mut done = 0;
         let bar = progress(jobs.len(), "drawing");
-        for job in &jobs {
+        for job in bar.wrap_iter(jobs.iter()) {
             match check(&mut assets, job) {
                 Ok((picture, warnings)) => {
                     for warning in &warnings {
-                        let text = format!("warning: {}: {warning}", label(&job.row));
-                        bar.suspend(|| complain(text));
+                        warn(&bar, label(&job.row), warning);
                     }
                     report.add_picture(&label(&job.row), &picture, &warnings)?;
                     done += 1;
                 }
                 Err(error) => failures.push(format!("{}: {error}", label(&job.row))),
             }
-            bar.inc(1);
         }
-        bar.finish_and_clear();
         if done > 0 {
             say(format!("{done} pictures; open {}", report.finish()?.display()))?;
         }
@@ -53,10 +50,8 @@ impl Check {
 }
 
 fn check(assets: &mut Assets<'_>, job: &Job) -> Result<(RgbImage, Vec<String>), AssetError> {
-    let ResultRow { scene_id, im_id, obj_id, t_cam_model, .. } = &job.row;
-    let object = assets.object(*obj_id)?;
-    let frame = assets.dataset().frame(*scene_id, *im_id)?;
-    let (observation, hand) = assets.observation(&frame, job.instance, &[])?;
+    let (object, observation, hand) = job.load(assets, &[])?;
+    let t_cam_model = &job.row.t_cam_model;
     let mut warnings = Vec::new();
     let touches = observation.hand.as_ref().is_some_and(|hand| !hand.forces.is_empty());
     // Plain BOP datasets have neither file.
@@ -66,7 +61,7 @@ fn check(assets: &mut Assets<'_>, job: &Job) -> Result<(RgbImage, Vec<String>), 
         Some(_) => None,
     };
     if let Some((name, terms)) = absent {
-        let file = assets.dataset().scene(*scene_id)?.dir().join(name);
+        let file = assets.dataset().scene(job.row.scene_id)?.dir().join(name);
         let file = file.display();
         warnings.push(format!("there is no {file}: --method combined needs --terms {terms}"));
     }

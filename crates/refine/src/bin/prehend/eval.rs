@@ -21,19 +21,17 @@ pub(crate) struct Eval {
 
 impl Eval {
     pub(crate) fn run(self) -> anyhow::Result<ExitCode> {
-        let dataset = self.input.open()?;
-        let (jobs, mut failures) = self.input.jobs()?;
+        let Input { selection, poses } = &self.input;
+        let dataset = selection.open()?;
+        let (jobs, mut failures) = selection.jobs(poses)?;
         let mut scorer = Scorer::new(&dataset);
         let mut rows = Vec::new();
-        let bar = progress(jobs.len(), "scoring");
-        for job in &jobs {
+        for job in progress(jobs.len(), "scoring").wrap_iter(jobs.iter()) {
             match scorer.score(&job.row) {
                 Ok(row) => rows.push(row),
                 Err(error) => failures.push(format!("{}: {error}", label(&job.row))),
             }
-            bar.inc(1);
         }
-        bar.finish_and_clear();
         let summary = summarize(&rows);
         if self.json {
             let document = json!({ "poses": rows, "summary": summary, "failures": failures });

@@ -11,13 +11,13 @@ use anyhow::bail;
 use clap::Args;
 use nalgebra::Isometry3;
 use prehend_refine::data::bop::{
-    Dataset, DatasetError, GroundTruth, ResultRow, check_writable, share_image_times, write_results,
+    Dataset, DatasetError, GroundTruth, ResultRow, TrueObject, check_writable,
 };
-use prehend_refine::data::{AssetError, Assets, NoiseLevel, Target, find_targets};
+use prehend_refine::data::{AssetError, Assets, NoiseLevel, Target};
 use prehend_refine::search::{PoseSearch, SearchSettings};
 use prehend_refine::{Frame, RefineError};
 
-use crate::options::{Selection, label, limit_threads};
+use crate::options::{Selection, label, limit_threads, write_poses};
 use crate::terminal::{cache, exit_code, progress, say};
 
 #[derive(Args)]
@@ -67,22 +67,19 @@ impl Initial {
         check_writable(&self.out)?;
         limit_threads(self.threads)?;
         let dataset = self.selection.open()?;
-        let (mut rows, mut failures) = match self.noise {
+        let (rows, mut failures) = match self.noise {
             Some(level) => self.perturbed(&dataset, level)?,
             None => self.found(&dataset)?,
         };
         if rows.is_empty() && failures.is_empty() {
             bail!("nothing is of the scenes, images and objects asked for");
         }
-        let out = self.out.display();
-        if rows.is_empty() {
-            failures.push(format!("there is no pose, {out} was not written"));
-        } else {
-            share_image_times(&mut rows);
-            write_results(&self.out, &rows)?;
-            say(format!("{} poses written to {out}", rows.len()))?;
+        let count = rows.len();
+        write_poses(&self.out, rows, &mut failures)?;
+        if count > 0 {
+            say(format!("{count} poses written to {}", self.out.display()))?;
         }
-        Ok(exit_code(rows.len(), &failures))
+        Ok(exit_code(count, &failures))
     }
 
     /// The true poses with errors of `level`.
@@ -91,24 +88,18 @@ impl Initial {
         let (mut rows, mut failures) = (Vec::new(), Vec::new());
         for scene in dataset.scenes() {
             let scene_id = scene.id();
-            for im_id in scene.images()? {
-                if !self.selection.admits_image(scene_id, im_id) {
-                    continue;
-                }
-                let objects = match truth.objects(scene_id, im_id) {
-                    Ok(objects) => objects,
-                    Err(error) => {
-                        failures.push(format!("scene {scene_id} image {im_id}: {error}"));
-                        continue;
-                    }
-                };
-                for (instance, object) in objects.iter().enumerate() {
-                    let obj_id = object.obj_id;
-                    if self.selection.admits(scene_id, im_id, obj_id) {
-                        let target = Target { scene_id, im_id, obj_id, instance };
-                        let t_cam_model =
-                            level.perturb_target(&object.t_cam_model, self.seed, &target);
-                        rows.push(row(&target, t_cam_model, 1.0, -1.0));
+            let mut images = scene.images()?;
+            images.retain(|id| self.selection.admits_image(scene_id, *id));
+            for im_id in images {
+                let objects = truth.objects(scene_id, im_id).unwrap_or_else(|error| {
+                    failures.push(format!("scene {scene_id} image {im_id}: {error}"));
+                    Vec::new()
+                });
+                for (instance, TrueObject { obj_id, t_cam_model }) in objects.iter().enumerate() {
+                    let target = Target { scene_id, im_id, obj_id: *obj_id, instance };
+                    if self.selection.admits(scene_id, im_id, *obj_id) {
+                        let pose = level.perturb_target(t_cam_model, self.seed, &target);
+                        rows.push(row(&target, pose, 1.0));
                     }
                 }
             }
@@ -118,41 +109,34 @@ impl Initial {
 
     /// The poses that the search finds.
     fn found(&self, dataset: &Dataset) -> anyhow::Result<Rows> {
-        let targets: Vec<Target> = find_targets(dataset, self.targets.as_deref())?
-            .into_iter()
-            .filter(|t| self.selection.admits(t.scene_id, t.im_id, t.obj_id))
-            .collect();
+        let targets = self.selection.targets(dataset, self.targets.as_deref())?;
         let mut assets = Assets::new(dataset, 0).with_cache(cache());
         let mut searches = BTreeMap::new();
         let (mut rows, mut failures) = (Vec::new(), Vec::new());
         let bar = progress(targets.len(), "searching");
-        for target in targets {
+        for target in bar.wrap_iter(targets.iter()) {
             match search_one(&mut assets, &mut searches, target) {
-                Ok((pose, cost)) => {
-                    // Of a results file's scores the higher is the better.
-                    rows.push(row(&target, pose, -cost, -1.0));
-                }
+                // Of a results file's scores the higher is the better.
+                Ok((pose, cost)) => rows.push(row(target, pose, -cost)),
                 Err(error) => {
-                    let row = row(&target, Isometry3::identity(), 0.0, -1.0);
+                    let row = row(target, Isometry3::identity(), 0.0);
                     failures.push(format!("{}: {error}", label(&row)));
                 }
             }
-            bar.inc(1);
         }
-        bar.finish_and_clear();
         Ok((rows, failures))
     }
 }
 
-fn row(target: &Target, t_cam_model: Isometry3<f64>, score: f64, time: f64) -> ResultRow {
+fn row(target: &Target, t_cam_model: Isometry3<f64>, score: f64) -> ResultRow {
     let Target { scene_id, im_id, obj_id, .. } = *target;
-    ResultRow { scene_id, im_id, obj_id, score, t_cam_model, time }
+    ResultRow { scene_id, im_id, obj_id, score, t_cam_model, time: -1.0 }
 }
 
 fn search_one(
     assets: &mut Assets<'_>,
     searches: &mut BTreeMap<u32, PoseSearch>,
-    target: Target,
+    target: &Target,
 ) -> Result<(Isometry3<f64>, f64), AssetError> {
     let frame = assets.dataset().frame(target.scene_id, target.im_id)?;
     let (observation, hand) = assets.observation(&frame, target.instance, &[])?;

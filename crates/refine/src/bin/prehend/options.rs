@@ -2,10 +2,15 @@
 
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use anyhow::bail;
 use clap::Args;
-use prehend_refine::data::bop::{Dataset, DatasetError, ReadResults, ResultRow, read_results};
+use prehend_refine::data::bop::{
+    Dataset, DatasetError, ReadResults, ResultRow, read_results, share_image_times, write_results,
+};
+use prehend_refine::data::{AssetError, Assets, Sensor, Target, find_targets};
+use prehend_refine::{Hand, NamedMethod, Object, Observation};
 
 /// A dataset, and which of its images and objects are meant.
 #[derive(Args)]
@@ -43,6 +48,20 @@ pub(crate) struct Job {
     pub(crate) instance: usize,
 }
 
+impl Job {
+    /// The object, and what its image shows, with the sensors of which those in `required` must be there.
+    pub(crate) fn load(
+        &self,
+        assets: &mut Assets<'_>,
+        required: &[Sensor],
+    ) -> Result<(Arc<Object>, Observation, Option<Arc<Hand>>), AssetError> {
+        let object = assets.object(self.row.obj_id)?;
+        let frame = assets.dataset().frame(self.row.scene_id, self.row.im_id)?;
+        let (observation, hand) = assets.observation(&frame, self.instance, required)?;
+        Ok((object, observation, hand))
+    }
+}
+
 impl Selection {
     /// The dataset.
     pub(crate) fn open(&self) -> Result<Dataset, DatasetError> {
@@ -68,6 +87,17 @@ impl Selection {
         format!("scenes {scene:?} images {image:?} objects {object:?}")
     }
 
+    /// The targets of the dataset, or those that `file` lists, that are meant.
+    pub(crate) fn targets(
+        &self,
+        dataset: &Dataset,
+        file: Option<&Path>,
+    ) -> Result<Vec<Target>, DatasetError> {
+        let mut targets = find_targets(dataset, file)?;
+        targets.retain(|t| self.admits(t.scene_id, t.im_id, t.obj_id));
+        Ok(targets)
+    }
+
     /// The rows of the results file `poses` that are meant, and what is wrong with the others.
     pub(crate) fn jobs(&self, poses: &Path) -> anyhow::Result<(Vec<Job>, Vec<String>)> {
         let ReadResults { rows, instances, errors } = read_results(poses)?;
@@ -88,21 +118,23 @@ impl Selection {
     }
 }
 
+/// Writes the poses to `out`; if there are none, that is a failure.
+pub(crate) fn write_poses(
+    out: &Path,
+    mut rows: Vec<ResultRow>,
+    failures: &mut Vec<String>,
+) -> Result<(), DatasetError> {
+    if rows.is_empty() {
+        failures.push(format!("there is no pose, {} was not written", out.display()));
+        return Ok(());
+    }
+    share_image_times(&mut rows);
+    write_results(out, &rows)
+}
+
 /// An empty list admits everything.
 fn admits(list: &[u32], id: u32) -> bool {
     list.is_empty() || list.contains(&id)
-}
-
-impl Input {
-    /// The dataset.
-    pub(crate) fn open(&self) -> Result<Dataset, DatasetError> {
-        self.selection.open()
-    }
-
-    /// See [`Selection::jobs`].
-    pub(crate) fn jobs(&self) -> anyhow::Result<(Vec<Job>, Vec<String>)> {
-        self.selection.jobs(&self.poses)
-    }
 }
 
 /// Lets all computations use so many threads; all cores without a number.
@@ -111,6 +143,14 @@ pub(crate) fn limit_threads(threads: Option<NonZeroUsize>) -> anyhow::Result<()>
         rayon::ThreadPoolBuilder::new().num_threads(threads.get()).build_global()?;
     }
     Ok(())
+}
+
+/// The method called `name`.
+pub(crate) fn named(name: &str) -> Result<&'static NamedMethod, String> {
+    NamedMethod::find(name).ok_or_else(|| {
+        let names: Vec<_> = NamedMethod::all().iter().map(|m| m.name).collect();
+        format!("unknown method: one of {}", names.join(", "))
+    })
 }
 
 /// How messages name a row.

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Mutex;
 
-use anyhow::{anyhow, bail};
+use anyhow::bail;
 use clap::{Args, Subcommand};
 use prehend_refine::data::bop::{Dataset, create_folder};
 use prehend_refine::data::identity::{SENSED, TRUTH, canonical, dataset_fingerprint};
@@ -17,7 +17,7 @@ use prehend_refine::evaluate::study::{
 };
 use prehend_refine::{Method, NamedMethod};
 
-use crate::options::Selection;
+use crate::options::{Selection, limit_threads, named};
 use crate::terminal::{cache, exit_code, progress, say};
 
 #[derive(Args)]
@@ -64,8 +64,14 @@ struct Run {
     #[arg(long, help_heading = "Output")]
     restart: bool,
     /// Methods to compare, such as "depth,combined" [default: those of the study]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = "Method")]
-    methods: Option<Vec<String>>,
+    #[arg(
+        long,
+        value_name = "LIST",
+        value_delimiter = ',',
+        value_parser = named,
+        help_heading = "Method"
+    )]
+    methods: Option<Vec<&'static NamedMethod>>,
     /// Iterations at most [default: the method's own; 1000 for steps]
     #[arg(long, value_name = "N", help_heading = "Method")]
     iterations: Option<usize>,
@@ -124,25 +130,24 @@ impl Study {
 
 impl Run {
     fn study(&self, kind: Kind, sweeps: &[Sweep]) -> anyhow::Result<ExitCode> {
+        limit_threads(self.threads)?;
         let dataset = self.selection.open()?;
         let methods = self.methods(kind)?;
-        let (design, frames) = self.design(kind, &dataset, &methods, sweeps)?;
+        let (design, mut frames) = self.design(kind, &dataset, &methods, sweeps)?;
         create_folder(&self.out)?;
         let (mut journal, mut records): (_, BTreeMap<usize, FrameRecord>) =
             Journal::open(&self.out.join(RECORDS), &Identity::of(&design), self.restart)?;
         let mut times = Times::open(&self.out.join(TIMES), !records.is_empty())?;
         // What failed is tried again.
         records.retain(|_, record| !record.failed());
-        let own: Vec<&Frame> = frames.iter().filter(|f| design.shard.holds(f.index)).collect();
-        let open: Vec<&Frame> =
-            own.iter().copied().filter(|f| !records.contains_key(&f.index)).collect();
+        frames.retain(|f| design.shard.holds(f.index));
+        let open: Vec<&Frame> = frames.iter().filter(|f| !records.contains_key(&f.index)).collect();
 
         let assets = Mutex::new(Assets::new(&dataset, self.seed).with_cache(cache()));
-        let threads = self.threads.map_or_else(rayon::current_num_threads, NonZeroUsize::get);
-        let bar = progress(own.len(), kind.name());
+        let bar = progress(frames.len(), kind.name());
         bar.set_position(records.len() as u64);
         bar.reset_eta();
-        Workers::new(open.len(), threads)?.run(
+        Workers::new(open.len(), rayon::current_num_threads())?.run(
             &open,
             || {
                 let mut runner = Runner::new(&design, &methods, &assets);
@@ -164,18 +169,15 @@ impl Run {
     }
 
     fn methods(&self, kind: Kind) -> anyhow::Result<Vec<(String, Method)>> {
-        let names: Vec<&str> = match &self.methods {
-            Some(names) => names.iter().map(String::as_str).collect(),
-            None => kind.methods(),
+        let chosen = match &self.methods {
+            Some(methods) => methods.clone(),
+            None => kind.methods().into_iter().filter_map(NamedMethod::find).collect(),
         };
-        if kind == Kind::Steps && names.len() != 1 {
+        if kind == Kind::Steps && chosen.len() != 1 {
             bail!("the steps study is of one method");
         }
-        let known = || NamedMethod::all().iter().map(|m| m.name).collect::<Vec<_>>().join(", ");
         let mut methods: Vec<(String, Method)> = Vec::new();
-        for name in names {
-            let named = NamedMethod::find(name)
-                .ok_or_else(|| anyhow!("unknown method {name:?}: one of {}", known()))?;
+        for named in chosen {
             let name = named.name;
             if methods.iter().any(|(other, _)| other == name) {
                 bail!("method {name} is named twice");

@@ -45,7 +45,7 @@ impl Symmetry {
         let ids = if self.object.is_empty() { models.object_ids()? } else { self.object };
         let (mut done, mut failures) = (0, Vec::new());
         let bar = progress(ids.len(), "searching");
-        for id in ids {
+        for id in bar.wrap_iter(ids.into_iter()) {
             match search(&models, id, &settings, self.write) {
                 Ok(symmetries) => {
                     bar.suspend(|| say(format!("object {id}: {}", describe(&symmetries))))?;
@@ -53,9 +53,7 @@ impl Symmetry {
                 }
                 Err(error) => failures.push(format!("object {id}: {error}")),
             }
-            bar.inc(1);
         }
-        bar.finish_and_clear();
         Ok(exit_code(done, &failures))
     }
 }

@@ -10,7 +10,8 @@ use prehend_geometry::TriMesh;
 use prehend_geometry::objects::YcbObject;
 use prehend_refine::scene::Object;
 use prehend_refine::synth::{
-    GraspSettings, Grasper, HandFiles, SensorSettings, Subject, SynthSettings, generate,
+    GraspFailure, GraspSettings, Grasper, HandFiles, SensorSettings, Subject, SynthSettings,
+    generate,
 };
 use serde_json::json;
 
@@ -139,14 +140,11 @@ impl Synth {
             generate(&self.out, &hand, &subjects, &settings, prepare, &|done| bar.inc(done))?;
         bar.finish_and_clear();
         say(format!("{} frames of {total} in {}", summary.frames, self.out.display()))?;
-        let failures: Vec<String> = summary
-            .failures
-            .iter()
-            .map(|f| {
-                let images: Vec<String> = f.images.iter().map(u32::to_string).collect();
-                format!("scene {} images {}: {}", f.obj_id, images.join(" "), f.reason)
-            })
-            .collect();
+        let told = |GraspFailure { obj_id, images, reason }: &GraspFailure| {
+            let images: Vec<String> = images.iter().map(u32::to_string).collect();
+            format!("scene {obj_id} images {}: {reason}", images.join(" "))
+        };
+        let failures: Vec<String> = summary.failures.iter().map(told).collect();
         Ok(exit_code(summary.frames as usize, &failures))
     }
 
@@ -169,32 +167,24 @@ impl Synth {
     }
 
     fn subjects(&self) -> anyhow::Result<Vec<Subject>> {
-        if !self.mesh.is_empty() {
-            let (meshes, masses) = (self.mesh.len(), self.mass.len());
-            if masses != 0 && masses != meshes {
-                bail!(
-                    "--mass is given {masses} times for {meshes} meshes: give one for each, or none"
-                );
-            }
-            let mass = |i: usize| self.mass.get(i).copied();
-            let files = (1..).zip(&self.mesh);
-            return files
-                .enumerate()
-                .map(|(i, (id, file))| own(id, file, self.mesh_unit, mass(i)))
-                .collect();
+        let (meshes, masses) = (self.mesh.len(), self.mass.len());
+        if masses != 0 && masses != meshes {
+            bail!("--mass is given {masses} times for {meshes} meshes: give one for each, or none");
+        }
+        if meshes > 0 {
+            let mass = |id: u32| self.mass.get(id as usize - 1).copied();
+            let numbered = (1..).zip(&self.mesh);
+            return numbered.map(|(id, file)| own(id, file, self.mesh_unit, mass(id))).collect();
         }
         let chosen = match &self.objects {
             None => YcbObject::ALL.to_vec(),
             Some(names) => names.iter().map(|name| built_in(name)).collect::<Result<_, _>>()?,
         };
-        chosen
-            .into_iter()
-            .map(|object| {
-                let prepared =
-                    Object::with_mass(object.name(), object.mesh(), Some(object.mass()), 0)?;
-                Ok(Subject { obj_id: object.bop_id(), object: prepared })
-            })
-            .collect()
+        let subject = |object: YcbObject| {
+            let prepared = Object::with_mass(object.name(), object.mesh(), Some(object.mass()), 0)?;
+            Ok(Subject { obj_id: object.bop_id(), object: prepared })
+        };
+        chosen.into_iter().map(subject).collect()
     }
 }
 

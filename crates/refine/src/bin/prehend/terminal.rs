@@ -23,8 +23,17 @@ pub(crate) fn complain(text: impl std::fmt::Display) {
     let _ = writeln!(std::io::stderr().lock(), "{text}");
 }
 
+/// Prints a warning about something of this name over the progress bar.
+pub(crate) fn warn(
+    bar: &ProgressBar,
+    name: impl std::fmt::Display,
+    warning: impl std::fmt::Display,
+) {
+    bar.suspend(|| complain(format!("warning: {name}: {warning}")));
+}
+
 /// A progress bar over `length` steps of `what` with rate and remaining time, on standard error; hidden where that is no
-/// terminal.
+/// terminal, and gone when it is dropped.
 pub(crate) fn progress(length: usize, what: &'static str) -> ProgressBar {
     // indicatif hides a bar by itself where standard error is no terminal.
     let bar = ProgressBar::with_draw_target(Some(length as u64), ProgressDrawTarget::stderr());

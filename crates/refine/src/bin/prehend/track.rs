@@ -10,16 +10,14 @@ use std::time::Duration;
 use anyhow::bail;
 use clap::Args;
 use nalgebra::Isometry3;
-use prehend_refine::data::bop::{
-    Dataset, ResultRow, check_writable, share_image_times, write_results,
-};
-use prehend_refine::data::{AssetError, Assets, PlainPose, find_targets};
+use prehend_refine::data::bop::{Dataset, ResultRow, check_writable};
+use prehend_refine::data::{AssetError, Assets, PlainPose, Target};
 use prehend_refine::strategy::Posterior;
 use prehend_refine::tracker::{Recovery, TrackStatus, Tracked, Tracker, TrackerSettings};
 use serde_json::json;
 
-use crate::options::{Selection, label, limit_threads};
-use crate::terminal::{cache, complain, exit_code, progress, say};
+use crate::options::{Job, Selection, label, limit_threads, write_poses};
+use crate::terminal::{cache, exit_code, progress, say, warn};
 
 #[derive(Args)]
 #[command(
@@ -109,20 +107,14 @@ impl Track {
                 failures.push(format!("scene {scene_id} object {obj_id}: {error}"));
             }
         }
-        let out = self.out.display();
-        if frames.is_empty() {
-            failures.push(format!("there is no pose, {out} was not written"));
-        } else {
-            let mut rows: Vec<ResultRow> = frames.iter().map(|f| f.row.clone()).collect();
-            share_image_times(&mut rows);
-            write_results(&self.out, &rows)?;
-        }
+        let rows = frames.iter().map(|f| f.row.clone()).collect();
+        write_poses(&self.out, rows, &mut failures)?;
         if self.json {
             let frames: Vec<_> = frames.iter().map(summary).collect();
             let document = json!({ "frames": frames, "failures": failures });
             say(format!("{document:#}"))?;
         } else if !frames.is_empty() {
-            say(format!("{}, written to {out}", told(&frames)))?;
+            say(format!("{}, written to {}", told(&frames), self.out.display()))?;
         }
         Ok(exit_code(frames.len(), &failures))
     }
@@ -138,28 +130,30 @@ impl Track {
 
     /// What to follow, in order, and what is wrong with rows of the poses.
     fn sequences(&self, dataset: &Dataset) -> anyhow::Result<(Vec<Sequence>, Vec<String>)> {
-        let (mut starts, mut faults) = (Vec::new(), Vec::new());
-        if let Some(poses) = &self.poses {
-            let (jobs, errors) = self.selection.jobs(poses)?;
-            faults = errors;
-            for job in jobs {
-                let ResultRow { scene_id, im_id, obj_id, t_cam_model, .. } = job.row;
-                let instance = job.instance;
-                let (first, initial) = (im_id, Some(t_cam_model));
-                starts.push(Sequence { scene_id, obj_id, instance, first, initial });
-            }
+        let (starts, faults): (Vec<Sequence>, Vec<String>) = if let Some(poses) = &self.poses {
+            let (jobs, faults) = self.selection.jobs(poses)?;
+            let start = |Job { row, instance }| Sequence {
+                scene_id: row.scene_id,
+                obj_id: row.obj_id,
+                instance,
+                first: row.im_id,
+                initial: Some(row.t_cam_model),
+            };
+            (jobs.into_iter().map(start).collect(), faults)
         } else {
-            for target in find_targets(dataset, self.targets.as_deref())? {
-                let (scene_id, obj_id, first) = (target.scene_id, target.obj_id, target.im_id);
-                if self.selection.admits(scene_id, first, obj_id) {
-                    let instance = target.instance;
-                    starts.push(Sequence { scene_id, obj_id, instance, first, initial: None });
-                }
-            }
-            if starts.is_empty() {
+            let targets = self.selection.targets(dataset, self.targets.as_deref())?;
+            if targets.is_empty() {
                 bail!("nothing is of the scenes, images and objects asked for");
             }
-        }
+            let start = |Target { scene_id, im_id, obj_id, instance }| Sequence {
+                scene_id,
+                obj_id,
+                instance,
+                first: im_id,
+                initial: None,
+            };
+            (targets.into_iter().map(start).collect(), Vec::new())
+        };
         let mut sequences = BTreeMap::new();
         for start in starts {
             let key = (start.scene_id, start.obj_id, start.instance);
@@ -190,7 +184,7 @@ impl Track {
         }
         let mut tracker: Option<Tracker> = None;
         let bar = progress(images.len(), "tracking");
-        for im_id in images {
+        for im_id in bar.wrap_iter(images.into_iter()) {
             let mut row = ResultRow {
                 scene_id,
                 im_id,
@@ -218,9 +212,7 @@ impl Track {
                 Ok(tracked) => {
                     bar.set_message(tracked.status.name());
                     if let (TrackStatus::Lost, Some(doubt)) = (tracked.status, tracked.rejection) {
-                        bar.suspend(|| {
-                            complain(format!("warning: {}: lost: {doubt}", label(&row)))
-                        });
+                        warn(&bar, label(&row), format!("lost: {doubt}"));
                     }
                     row.t_cam_model = tracked.t_cam_object;
                     row.score = tracked.posterior.as_ref().map_or(0.0, Posterior::probability);
@@ -231,9 +223,7 @@ impl Track {
                 }
                 Err(error) => failures.push(format!("{}: {error}", label(&row))),
             }
-            bar.inc(1);
         }
-        bar.finish_and_clear();
         Ok(())
     }
 }
@@ -255,17 +245,14 @@ fn told(frames: &[Done]) -> String {
         let (rate, median) = (seconds.len() as f64 / total, 1e3 * seconds[seconds.len() / 2]);
         text += &format!(" at {rate:.1} a second, median {median:.1} ms");
     }
-    text += ": ";
     let all =
         [TrackStatus::Tracked, TrackStatus::Predicted, TrackStatus::Relocalized, TrackStatus::Lost];
-    let counts: Vec<String> = all
-        .into_iter()
-        .map(|f| (f, frames.iter().filter(|d| d.tracked.status == f).count()))
-        .filter(|(_, count)| *count > 0)
-        .map(|(following, count)| format!("{count} {}", following.name()))
-        .collect();
-    text += &counts.join(", ");
-    text
+    let count = |status: TrackStatus| {
+        let count = frames.iter().filter(|d| d.tracked.status == status).count();
+        (count > 0).then(|| format!("{count} {}", status.name()))
+    };
+    let counts: Vec<String> = all.into_iter().filter_map(count).collect();
+    format!("{text}: {}", counts.join(", "))
 }
 
 fn summary(frame: &Done) -> serde_json::Value {

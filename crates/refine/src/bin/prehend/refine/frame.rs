@@ -5,8 +5,8 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
 
-use prehend_refine::data::FrameInput;
 use prehend_refine::data::bop::write_atomically;
+use prehend_refine::data::{FrameInput, PlainPose};
 use prehend_refine::scene::{inspect_object, inspect_pose};
 use prehend_refine::strategy::{PosteriorSummary, Strategy};
 use prehend_refine::{Frame, Method, State};
@@ -26,23 +26,18 @@ pub(super) fn refine_frame(
     let mut terms = Vec::new();
     if let Method::Heuristic(heuristic) = &mut configured {
         // A frame brings what it has: gradients whose evidence is absent drop out unless they were asked for.
-        if !method.terms_given() {
+        if method.terms.is_none() {
             heuristic.gradients.retain(|&g| input.offers(g));
         }
         terms = heuristic.gradients.iter().map(|g| g.name()).collect();
     }
-    let object = Arc::new(input.object);
-    let robot = input.robot.as_ref();
+    let FrameInput { observation, object, robot, t_cam_object } = input;
+    let object = Arc::new(object);
     let mut warnings = inspect_object(&object);
-    warnings.extend(inspect_pose(
-        &input.observation,
-        &object,
-        robot.map(Arc::as_ref),
-        &input.t_cam_object,
-    ));
+    warnings.extend(inspect_pose(&observation, &object, robot.as_deref(), &t_cam_object));
     warnings.iter().for_each(|warning| complain(format!("warning: {warning}")));
-    let frame = Frame::new(&input.observation, &object, robot)?;
-    let initial = State::new(&frame, &input.t_cam_object)?;
+    let frame = Frame::new(&observation, &object, robot.as_ref())?;
+    let initial = State::new(&frame, &t_cam_object)?;
     let bar = progress(configured.iterations(), "refining");
     let refined = configured.run(&frame, &initial, &mut |p| {
         bar.set_position(p.iteration as u64);
@@ -50,13 +45,13 @@ pub(super) fn refine_frame(
     })?;
     bar.finish_and_clear();
     let pose = refined.t_cam_object();
-    let q = pose.rotation.quaternion();
+    let PlainPose { translation_m, quaternion_wxyz } = pose.into();
     let matrix = pose.to_homogeneous();
     let rows: Vec<Vec<f64>> = matrix.row_iter().map(|r| r.iter().copied().collect()).collect();
     let document = json!({
         "t_cam_object": rows,
-        "translation_m": pose.translation.vector.as_slice(),
-        "quaternion_wxyz": [q.w, q.i, q.j, q.k],
+        "translation_m": translation_m,
+        "quaternion_wxyz": quaternion_wxyz,
         "terms": terms,
         "iteration": refined.iteration,
         "warnings": warnings,

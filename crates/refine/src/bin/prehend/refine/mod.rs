@@ -14,7 +14,7 @@ use prehend_refine::data::bop::check_writable;
 use self::dataset::DatasetRun;
 use self::frame::refine_frame;
 use self::options::{MethodOptions, OutputOptions};
-use crate::options::{Input, Selection, limit_threads};
+use crate::options::{Selection, limit_threads};
 
 #[derive(Args)]
 #[command(
@@ -39,18 +39,20 @@ pub(crate) struct Refine {
 
 impl Refine {
     pub(crate) fn run(self) -> anyhow::Result<ExitCode> {
-        let Self { selection, poses, frame, output, method } = self;
+        let Self { selection, poses, frame, output, method } = &self;
         // What cannot be written must be known before the work, not after it.
         if let Some(out) = &output.out {
             check_writable(out)?;
         }
         limit_threads(method.threads)?;
-        if let Some(file) = frame {
-            return refine_frame(&file, &output, &method);
+        match (frame, selection, poses, &output.out) {
+            (Some(file), ..) => refine_frame(file, output, method),
+            (None, Some(selection), Some(poses), Some(out)) => {
+                let configured = method.configured()?;
+                let options = method;
+                DatasetRun { selection, poses, out, output, options, method: configured }.run()
+            }
+            _ => bail!("give --dataset, --poses and --out, or --frame"),
         }
-        let (Some(selection), Some(poses)) = (selection, poses) else {
-            bail!("give --dataset, --poses and --out, or --frame");
-        };
-        DatasetRun::new(&Input { selection, poses }, &output, &method)?.run()
     }
 }

@@ -8,6 +8,8 @@ use clap::Args;
 use prehend_refine::strategy::GradientKind;
 use prehend_refine::{Method, NamedMethod};
 
+use crate::options::named;
+
 /// What to write, and where.
 #[derive(Args)]
 pub(super) struct OutputOptions {
@@ -55,7 +57,7 @@ pub(super) struct MethodOptions {
     /// Evidence to use, a list of physics, rendering, depth and tactile such as "rendering,depth"
     /// [default: the method's; with --frame, of those what the frame brings]
     #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = "Method")]
-    terms: Option<Vec<GradientKind>>,
+    pub(super) terms: Option<Vec<GradientKind>>,
     /// Return the last pose instead of the one whose rendering fits best
     #[arg(long, help_heading = "Method")]
     no_checkpoint: bool,
@@ -65,14 +67,6 @@ pub(super) struct MethodOptions {
     /// Worker threads; the poses are the same for any number [default: all cores]
     #[arg(long, value_name = "N", help_heading = "Method")]
     pub(super) threads: Option<NonZeroUsize>,
-}
-
-/// The method called `name`.
-fn named(name: &str) -> Result<&'static NamedMethod, String> {
-    NamedMethod::find(name).ok_or_else(|| {
-        let names: Vec<_> = NamedMethod::all().iter().map(|m| m.name).collect();
-        format!("unknown method: one of {}", names.join(", "))
-    })
 }
 
 /// What `--help` says of the methods.
@@ -92,11 +86,6 @@ impl MethodOptions {
         let default =
             if self.terms.is_some() { &NamedMethod::COMBINED } else { &NamedMethod::FUSED };
         self.method.unwrap_or(default)
-    }
-
-    /// Whether the user says which terms to use.
-    pub(super) fn terms_given(&self) -> bool {
-        self.terms.is_some()
     }
 
     /// The settings of the method, changed by the other options.
