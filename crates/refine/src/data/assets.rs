@@ -9,10 +9,10 @@ use prehend_geometry::robot::KinematicTree;
 use prehend_geometry::{GridCache, TriMesh};
 
 use crate::data::bop::{Dataset, DatasetError, Frame, Models, Tactile};
+use crate::data::targets::Target;
 use crate::error::RefineError;
 use crate::method::Method;
-use crate::scene::check_gravity;
-use crate::scene::{Hand, HandMeasurement, Inertial, Object, Observation};
+use crate::scene::{Hand, HandMeasurement, Inertial, Object, Observation, check_gravity};
 use crate::strategy::GradientKind;
 
 /// BOP models are in millimeters \[m\].
@@ -104,6 +104,21 @@ impl<'a> Assets<'a> {
         Ok(object)
     }
 
+    /// The object of `target`, and what its image shows: see [`Assets::observation`].
+    ///
+    /// # Errors
+    /// Those of [`Assets::object`] and [`Assets::observation`], and if there is no such image.
+    pub fn load(
+        &mut self,
+        target: &Target,
+        required: &[Sensor],
+    ) -> Result<(Arc<Object>, Observation, Option<Arc<Hand>>), AssetError> {
+        let object = self.object(target.obj_id)?;
+        let frame = self.dataset.frame(target.scene_id, target.im_id)?;
+        let (observation, hand) = self.observation(&frame, target.instance, required)?;
+        Ok((object, observation, hand))
+    }
+
     /// The frame with every sensor that it brings, and the hand if the frame says where it is. A sensor whose file or
     /// entry is absent is left out, unless it is in `required`.
     ///
@@ -125,15 +140,16 @@ impl<'a> Assets<'a> {
             return Err(frame.bodies_fault("bodies", problem).into());
         };
         check_gravity(&bodies.gravity).map_err(|e| frame.bodies_fault("gravity", e))?;
-        if let Some(Tactile { body: named, .. }) = tactile.as_ref().filter(|t| t.body != body.name)
+        if let Some(Tactile { body: named, .. }) = &tactile
+            && *named != body.name
         {
             let problem = format!("names {named:?}, but the hand is {:?}", body.name);
             return Err(frame.tactile_fault("body", problem).into());
         }
         let hand = self.hand(&body.urdf, tactile.as_ref().map(|t| t.taxels.as_path()))?;
         let taxels = hand.taxels.len();
-        if let Some(Tactile { taxels: file, force, .. }) =
-            tactile.as_ref().filter(|t| t.force.len() != taxels)
+        if let Some(Tactile { taxels: file, force, .. }) = &tactile
+            && force.len() != taxels
         {
             let (file, found) = (file.display(), force.len());
             let problem = format!("expected {taxels} forces, one a taxel of {file}, found {found}");
@@ -182,19 +198,17 @@ fn present<T>(read: Result<T, DatasetError>, required: bool) -> Result<Option<T>
 fn load_object(models: &Models, id: u32, seed: u64) -> Result<Object, AssetError> {
     let mesh = load_mesh(models, id)?;
     let name = models.mesh_path(id)?.display().to_string();
-    let info = match models.info(id) {
-        Ok(info) => Some(info),
+    let (mass, place) = match models.info(id) {
+        Ok(info) => (info.mass, info.center_of_mass.zip(info.inertia)),
         // BOP does not require the list of an estimator's models.
-        Err(DatasetError::Missing { .. } | DatasetError::UnknownObject { .. }) => None,
+        Err(DatasetError::Missing { .. } | DatasetError::UnknownObject { .. }) => (None, None),
         Err(broken) => return Err(broken.into()),
     };
-    let mass = info.as_ref().and_then(|i| i.mass);
-    let place = info.and_then(|i| Some((i.center_of_mass?, i.inertia?)));
-    Ok(match (mass, place) {
-        (Some(mass), Some((center_of_mass, inertia))) => {
+    Ok(match mass.zip(place) {
+        Some((mass, (center_of_mass, inertia))) => {
             Object::new(&name, mesh, Some(Inertial { mass, center_of_mass, inertia }), seed)?
         }
-        (mass, _) => Object::with_mass(&name, mesh, mass, seed)?,
+        None => Object::with_mass(&name, mesh, mass, seed)?,
     })
 }
 

@@ -1,6 +1,7 @@
 //! Targets: the objects to be localized, by image.
 
 use std::collections::BTreeMap;
+use std::fmt;
 use std::fs;
 use std::path::Path;
 
@@ -19,6 +20,12 @@ pub struct Target {
     pub obj_id: u32,
     /// Which of the image's targets it is, from 0: the instance that [`crate::data::bop::Frame::mask`] asks for.
     pub instance: usize,
+}
+
+impl fmt::Display for Target {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "scene {} image {} object {}", self.scene_id, self.im_id, self.obj_id)
+    }
 }
 
 /// BOP's list of targets, in the dataset's folder.

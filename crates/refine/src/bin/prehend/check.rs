@@ -9,7 +9,7 @@ use prehend_refine::evaluate::report::{Report, outline_picture};
 use prehend_refine::scene::{inspect_object, inspect_pose};
 use prehend_render::RgbImage;
 
-use crate::options::{Input, Job, label};
+use crate::options::{Input, Job};
 use crate::terminal::{cache, exit_code, progress, say, warn};
 
 #[derive(Args)]
@@ -34,12 +34,12 @@ impl Check {
             match check(&mut assets, job) {
                 Ok((picture, warnings)) => {
                     for warning in &warnings {
-                        warn(&bar, label(&job.row), warning);
+                        warn(&bar, job.target, warning);
                     }
-                    report.add_picture(&label(&job.row), &picture, &warnings)?;
+                    report.add_picture(&job.target.to_string(), &picture, &warnings)?;
                     done += 1;
                 }
-                Err(error) => failures.push(format!("{}: {error}", label(&job.row))),
+                Err(error) => failures.push(format!("{}: {error}", job.target)),
             }
         }
         if done > 0 {
@@ -50,7 +50,7 @@ impl Check {
 }
 
 fn check(assets: &mut Assets<'_>, job: &Job) -> Result<(RgbImage, Vec<String>), AssetError> {
-    let (object, observation, hand) = job.load(assets, &[])?;
+    let (object, observation, hand) = assets.load(&job.target, &[])?;
     let t_cam_model = &job.row.t_cam_model;
     let mut warnings = Vec::new();
     let touches = observation.hand.as_ref().is_some_and(|hand| !hand.forces.is_empty());
@@ -61,7 +61,7 @@ fn check(assets: &mut Assets<'_>, job: &Job) -> Result<(RgbImage, Vec<String>), 
         Some(_) => None,
     };
     if let Some((name, terms)) = absent {
-        let file = assets.dataset().scene(job.row.scene_id)?.dir().join(name);
+        let file = assets.dataset().scene(job.target.scene_id)?.dir().join(name);
         let file = file.display();
         warnings.push(format!("there is no {file}: --method combined needs --terms {terms}"));
     }

@@ -7,7 +7,7 @@ use prehend_refine::evaluate::Scorer;
 use prehend_refine::evaluate::metrics::summarize;
 use serde_json::json;
 
-use crate::options::{Input, label};
+use crate::options::Input;
 use crate::terminal::{exit_code, progress, say};
 
 #[derive(Args)]
@@ -29,7 +29,7 @@ impl Eval {
         for job in progress(jobs.len(), "scoring").wrap_iter(jobs.iter()) {
             match scorer.score(&job.row) {
                 Ok(row) => rows.push(row),
-                Err(error) => failures.push(format!("{}: {error}", label(&job.row))),
+                Err(error) => failures.push(format!("{}: {error}", job.target)),
             }
         }
         let summary = summarize(&rows);

@@ -17,10 +17,11 @@ use prehend_refine::data::{AssetError, Assets, NoiseLevel, Target};
 use prehend_refine::search::{PoseSearch, SearchSettings};
 use prehend_refine::{Frame, RefineError};
 
-use crate::options::{Selection, label, limit_threads, write_poses};
+use crate::options::{Selection, limit_threads, row, write_poses};
 use crate::terminal::{cache, exit_code, progress, say};
 
 #[derive(Args)]
+#[command(next_help_heading = "Poses")]
 #[command(
     override_usage = "prehend initial --dataset <DIR> --noise <LEVEL> --out <FILE> [OPTIONS]\n       \
                             prehend initial --dataset <DIR> --search --out <FILE> [OPTIONS]"
@@ -37,25 +38,24 @@ pub(crate) struct Initial {
         long,
         value_name = "LEVEL",
         required_unless_present = "search",
-        conflicts_with = "search",
-        help_heading = "Poses"
+        conflicts_with = "search"
     )]
     noise: Option<NoiseLevel>,
     /// Seed of the errors
-    #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Poses")]
+    #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
     /// Find the objects from depth, mask, color and touch alone; where a scene says nothing of its hand, without touch
-    #[arg(long, help_heading = "Poses")]
+    #[arg(long)]
     search: bool,
     /// What to search for, as BOP's test_targets_bop19.json has it
     /// [default: that file of the dataset, or the only object in every image]
-    #[arg(long, value_name = "FILE", requires = "search", help_heading = "Poses")]
+    #[arg(long, value_name = "FILE", requires = "search")]
     targets: Option<PathBuf>,
     /// Write the poses here, as a BOP results file; an existing one is replaced
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     out: PathBuf,
     /// Worker threads of the search; the poses are the same for any number [default: all cores]
-    #[arg(long, value_name = "N", help_heading = "Poses")]
+    #[arg(long, value_name = "N")]
     threads: Option<NonZeroUsize>,
 }
 
@@ -118,19 +118,11 @@ impl Initial {
             match search_one(&mut assets, &mut searches, target) {
                 // Of a results file's scores the higher is the better.
                 Ok((pose, cost)) => rows.push(row(target, pose, -cost)),
-                Err(error) => {
-                    let row = row(target, Isometry3::identity(), 0.0);
-                    failures.push(format!("{}: {error}", label(&row)));
-                }
+                Err(error) => failures.push(format!("{target}: {error}")),
             }
         }
         Ok((rows, failures))
     }
-}
-
-fn row(target: &Target, t_cam_model: Isometry3<f64>, score: f64) -> ResultRow {
-    let Target { scene_id, im_id, obj_id, .. } = *target;
-    ResultRow { scene_id, im_id, obj_id, score, t_cam_model, time: -1.0 }
 }
 
 fn search_one(
@@ -138,9 +130,7 @@ fn search_one(
     searches: &mut BTreeMap<u32, PoseSearch>,
     target: &Target,
 ) -> Result<(Isometry3<f64>, f64), AssetError> {
-    let frame = assets.dataset().frame(target.scene_id, target.im_id)?;
-    let (observation, hand) = assets.observation(&frame, target.instance, &[])?;
-    let object = assets.object(target.obj_id)?;
+    let (object, observation, hand) = assets.load(target, &[])?;
     let search = match searches.entry(target.obj_id) {
         Entry::Occupied(known) => known.into_mut(),
         Entry::Vacant(unknown) => {

@@ -2,64 +2,52 @@
 
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use anyhow::bail;
 use clap::Args;
+use nalgebra::Isometry3;
+use prehend_refine::NamedMethod;
 use prehend_refine::data::bop::{
     Dataset, DatasetError, ReadResults, ResultRow, read_results, share_image_times, write_results,
 };
-use prehend_refine::data::{AssetError, Assets, Sensor, Target, find_targets};
-use prehend_refine::{Hand, NamedMethod, Object, Observation};
+use prehend_refine::data::{Target, find_targets};
 
 /// A dataset, and which of its images and objects are meant.
 #[derive(Args)]
+#[command(next_help_heading = "Input")]
 pub(crate) struct Selection {
     /// BOP dataset: the folder that holds models/ and the split (such as test/)
-    #[arg(long, value_name = "DIR", help_heading = "Input")]
+    #[arg(long, value_name = "DIR")]
     pub(crate) dataset: PathBuf,
     /// Split of the dataset [default: test, or the only one]
-    #[arg(long, value_name = "NAME", requires = "dataset", help_heading = "Input")]
+    #[arg(long, value_name = "NAME", requires = "dataset")]
     pub(crate) split: Option<String>,
     /// Use only the poses of this scene; may be repeated
-    #[arg(long, value_name = "ID", requires = "dataset", help_heading = "Input")]
+    #[arg(long, value_name = "ID", requires = "dataset")]
     pub(crate) scene: Vec<u32>,
     /// Use only the poses of this image; may be repeated
-    #[arg(long, value_name = "ID", requires = "dataset", help_heading = "Input")]
+    #[arg(long, value_name = "ID", requires = "dataset")]
     pub(crate) image: Vec<u32>,
     /// Use only the poses of this object; may be repeated
-    #[arg(long, value_name = "ID", requires = "dataset", help_heading = "Input")]
+    #[arg(long, value_name = "ID", requires = "dataset")]
     pub(crate) object: Vec<u32>,
 }
 
 /// A dataset and poses on it.
 #[derive(Args)]
+#[command(next_help_heading = "Input")]
 pub(crate) struct Input {
     #[command(flatten)]
     pub(crate) selection: Selection,
     /// Poses on the dataset's images, as a BOP results file
-    #[arg(long, value_name = "FILE", help_heading = "Input")]
+    #[arg(long, value_name = "FILE")]
     pub(crate) poses: PathBuf,
 }
 
-/// A row of the results file and which of the image's rows it is.
+/// A row of the results file and the target that it is of.
 pub(crate) struct Job {
+    pub(crate) target: Target,
     pub(crate) row: ResultRow,
-    pub(crate) instance: usize,
-}
-
-impl Job {
-    /// The object, and what its image shows, with the sensors of which those in `required` must be there.
-    pub(crate) fn load(
-        &self,
-        assets: &mut Assets<'_>,
-        required: &[Sensor],
-    ) -> Result<(Arc<Object>, Observation, Option<Arc<Hand>>), AssetError> {
-        let object = assets.object(self.row.obj_id)?;
-        let frame = assets.dataset().frame(self.row.scene_id, self.row.im_id)?;
-        let (observation, hand) = assets.observation(&frame, self.instance, required)?;
-        Ok((object, observation, hand))
-    }
 }
 
 impl Selection {
@@ -105,12 +93,12 @@ impl Selection {
         if rows.is_empty() && errors.is_empty() {
             bail!("{file}: no poses: there is nothing but a header");
         }
-        let jobs: Vec<Job> = rows
-            .into_iter()
-            .zip(instances)
-            .filter(|(r, _)| self.admits(r.scene_id, r.im_id, r.obj_id))
-            .map(|(row, instance)| Job { row, instance })
-            .collect();
+        let job = |(row, instance): (ResultRow, usize)| {
+            let ResultRow { scene_id, im_id, obj_id, .. } = row;
+            Job { target: Target { scene_id, im_id, obj_id, instance }, row }
+        };
+        let mut jobs: Vec<Job> = rows.into_iter().zip(instances).map(job).collect();
+        jobs.retain(|Job { row, .. }| self.admits(row.scene_id, row.im_id, row.obj_id));
         if jobs.is_empty() && errors.is_empty() {
             bail!("{file}: no pose is of the scenes, images and objects asked for");
         }
@@ -132,6 +120,12 @@ pub(crate) fn write_poses(
     write_results(out, &rows)
 }
 
+/// The row of a results file that says where a target is, of unknown time.
+pub(crate) fn row(target: &Target, t_cam_model: Isometry3<f64>, score: f64) -> ResultRow {
+    let Target { scene_id, im_id, obj_id, .. } = *target;
+    ResultRow { scene_id, im_id, obj_id, score, t_cam_model, time: -1.0 }
+}
+
 /// An empty list admits everything.
 fn admits(list: &[u32], id: u32) -> bool {
     list.is_empty() || list.contains(&id)
@@ -151,11 +145,6 @@ pub(crate) fn named(name: &str) -> Result<&'static NamedMethod, String> {
         let names: Vec<_> = NamedMethod::all().iter().map(|m| m.name).collect();
         format!("unknown method: one of {}", names.join(", "))
     })
-}
-
-/// How messages name a row.
-pub(crate) fn label(row: &ResultRow) -> String {
-    format!("scene {} image {} object {}", row.scene_id, row.im_id, row.obj_id)
 }
 
 /// The file `extension` that accompanies the output `out`: out.csv.journal beside out.csv.

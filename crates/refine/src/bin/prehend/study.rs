@@ -50,6 +50,7 @@ enum What {
 /// The folder gets tables.txt, .md, .csv and .json, plots (*.svg), the poses and scores of every frame
 /// (records.jsonl) and what each took (times.csv). After an interruption the same command resumes.
 #[derive(Args)]
+#[command(next_help_heading = "Method")]
 struct Run {
     #[command(flatten)]
     selection: Selection,
@@ -64,19 +65,13 @@ struct Run {
     #[arg(long, help_heading = "Output")]
     restart: bool,
     /// Methods to compare, such as "depth,combined" [default: those of the study]
-    #[arg(
-        long,
-        value_name = "LIST",
-        value_delimiter = ',',
-        value_parser = named,
-        help_heading = "Method"
-    )]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = named)]
     methods: Option<Vec<&'static NamedMethod>>,
     /// Iterations at most [default: the method's own; 1000 for steps]
-    #[arg(long, value_name = "N", help_heading = "Method")]
+    #[arg(long, value_name = "N")]
     iterations: Option<usize>,
     /// Seed of the points sampled on objects' surfaces
-    #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Method")]
+    #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
     /// Do part i (from 0) of n only: frames i, i+n, …; `prehend study merge` puts parts together
     #[arg(long, value_name = "I/N", default_value_t = Shard::WHOLE, help_heading = "Running")]

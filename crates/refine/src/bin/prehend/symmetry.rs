@@ -12,6 +12,7 @@ use prehend_refine::evaluate::symmetry::{SymmetrySettings, find_symmetries};
 use crate::terminal::{exit_code, progress, say};
 
 #[derive(Args)]
+#[command(next_help_heading = "Method")]
 pub(crate) struct Symmetry {
     /// Folder of obj_000001.ply, … in millimeters, such as a dataset's models/
     #[arg(long, value_name = "DIR", help_heading = "Input")]
@@ -20,10 +21,10 @@ pub(crate) struct Symmetry {
     #[arg(long, value_name = "ID", help_heading = "Input")]
     object: Vec<u32>,
     /// How far the surface may be off, as a fraction of the diameter
-    #[arg(long, value_name = "FRACTION", default_value_t = SymmetrySettings::default().tolerance, help_heading = "Method")]
+    #[arg(long, value_name = "FRACTION", default_value_t = SymmetrySettings::default().tolerance)]
     tolerance: f64,
     /// Compare colors too: how much they may differ, root mean square, of 0 to 1 (0.05 is good) [default: shape alone]
-    #[arg(long, value_name = "DIFFERENCE", help_heading = "Method")]
+    #[arg(long, value_name = "DIFFERENCE")]
     color: Option<f64>,
     /// Write them into models_info.json, in place of those that were there
     #[arg(long, help_heading = "Output")]

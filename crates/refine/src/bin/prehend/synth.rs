@@ -19,6 +19,7 @@ use crate::options::limit_threads;
 use crate::terminal::{exit_code, progress, say};
 
 #[derive(Args)]
+#[command(next_help_heading = "Frames")]
 pub(crate) struct Synth {
     /// Folder of the dataset: absent, empty, or one that was begun with the same settings and will be gone on with
     #[arg(long, value_name = "DIR", help_heading = "Output")]
@@ -27,12 +28,7 @@ pub(crate) struct Synth {
     #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = "Objects and hand")]
     objects: Option<Vec<String>>,
     /// Instead of built-in objects, a closed mesh (PLY, OBJ, STL, glTF); may be repeated, numbered from 1
-    #[arg(
-        long,
-        value_name = "FILE",
-        conflicts_with = "objects",
-        help_heading = "Objects and hand"
-    )]
+    #[arg(long, value_name = "FILE", conflicts_with = "objects", help_heading = "Objects and hand")]
     mesh: Vec<PathBuf>,
     /// Unit of the meshes
     #[arg(long, value_name = "UNIT", default_value = "m", help_heading = "Objects and hand")]
@@ -60,33 +56,33 @@ pub(crate) struct Synth {
     )]
     contact_area: Vec<f64>,
     /// Frames of each object
-    #[arg(long, value_name = "N", default_value = "40", help_heading = "Frames")]
+    #[arg(long, value_name = "N", default_value = "40")]
     frames: NonZeroU32,
     /// Frames of each grasp, spread over its trajectory
-    #[arg(long, value_name = "N", default_value = "4", help_heading = "Frames")]
+    #[arg(long, value_name = "N", default_value = "4")]
     frames_per_grasp: NonZeroU32,
     /// Steps of each trajectory
-    #[arg(long, value_name = "N", default_value = "100", help_heading = "Frames")]
+    #[arg(long, value_name = "N", default_value = "100")]
     steps: NonZeroUsize,
     /// Grasps tried until one holds through its trajectory
-    #[arg(long, value_name = "N", default_value = "60", help_heading = "Frames")]
+    #[arg(long, value_name = "N", default_value = "60")]
     tries: NonZeroU32,
     /// Columns of the images
-    #[arg(long, value_name = "PX", default_value = "640", help_heading = "Frames")]
+    #[arg(long, value_name = "PX", default_value = "640")]
     width: NonZeroUsize,
     /// Rows of the images
-    #[arg(long, value_name = "PX", default_value = "480", help_heading = "Frames")]
+    #[arg(long, value_name = "PX", default_value = "480")]
     height: NonZeroUsize,
     /// `clean`, `realistic`, or one setting such as depth.noise=0.001; may be repeated, settings override
     ///
     /// `--sensor list` prints all settings and their values.
-    #[arg(long, value_name = "PRESET|KEY=VALUE", help_heading = "Frames")]
+    #[arg(long, value_name = "PRESET|KEY=VALUE")]
     sensor: Vec<String>,
     /// Decides everything that is random
-    #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Frames")]
+    #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
     /// Worker threads; the dataset is the same for any number [default: all cores]
-    #[arg(long, value_name = "N", help_heading = "Frames")]
+    #[arg(long, value_name = "N")]
     threads: Option<NonZeroUsize>,
 }
 

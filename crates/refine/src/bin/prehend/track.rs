@@ -16,10 +16,11 @@ use prehend_refine::strategy::Posterior;
 use prehend_refine::tracker::{Recovery, TrackStatus, Tracked, Tracker, TrackerSettings};
 use serde_json::json;
 
-use crate::options::{Job, Selection, label, limit_threads, write_poses};
+use crate::options::{Selection, limit_threads, row, write_poses};
 use crate::terminal::{cache, exit_code, progress, say, warn};
 
 #[derive(Args)]
+#[command(next_help_heading = "Input")]
 #[command(
     override_usage = "prehend track --dataset <DIR> --poses <FILE> --out <FILE> [OPTIONS]\n       \
                             prehend track --dataset <DIR> --search --out <FILE> [OPTIONS]"
@@ -28,23 +29,17 @@ pub(crate) struct Track {
     #[command(flatten)]
     selection: Selection,
     /// Begin at the first pose of every object of a scene in this BOP results file
-    #[arg(
-        long,
-        value_name = "FILE",
-        required_unless_present = "search",
-        conflicts_with = "search",
-        help_heading = "Input"
-    )]
+    #[arg(long, value_name = "FILE", required_unless_present = "search", conflicts_with = "search")]
     poses: Option<PathBuf>,
     /// Begin by searching for the objects in the first image
-    #[arg(long, help_heading = "Input")]
+    #[arg(long)]
     search: bool,
     /// What to search for, as BOP's test_targets_bop19.json has it
     /// [default: that file of the dataset, or the only object in every image]
-    #[arg(long, value_name = "FILE", requires = "search", help_heading = "Input")]
+    #[arg(long, value_name = "FILE", requires = "search")]
     targets: Option<PathBuf>,
     /// Images a second: those of a scene, in order of their ids, are the frames; ids that are missing count
-    #[arg(long, value_name = "HZ", default_value_t = 30.0, help_heading = "Input")]
+    #[arg(long, value_name = "HZ", default_value_t = 30.0)]
     rate: f64,
     /// Write the poses here, as a BOP results file with a row an image; an existing one is replaced
     ///
@@ -70,16 +65,8 @@ pub(crate) struct Track {
     threads: Option<NonZeroUsize>,
 }
 
-/// An object of a scene, to be followed from an image on.
-#[derive(Clone, Copy)]
-struct Sequence {
-    scene_id: u32,
-    obj_id: u32,
-    instance: usize,
-    first: u32,
-    /// The search says where if it is not known.
-    initial: Option<Isometry3<f64>>,
-}
+/// Where to begin to follow an object, and its pose there; the search finds it if it is not known.
+type Start = (Target, Option<Isometry3<f64>>);
 
 /// A frame that is done.
 struct Done {
@@ -96,14 +83,13 @@ impl Track {
         let settings = self.settings()?;
         limit_threads(self.threads)?;
         let dataset = self.selection.open()?;
-        let (sequences, mut failures) = self.sequences(&dataset)?;
+        let (starts, mut failures) = self.starts(&dataset)?;
         let mut assets = Assets::new(&dataset, 0).with_cache(cache());
         let mut frames = Vec::new();
-        for sequence in &sequences {
-            let followed =
-                self.follow(&mut assets, sequence, &settings, &mut frames, &mut failures);
+        for start in &starts {
+            let followed = self.follow(&mut assets, start, &settings, &mut frames, &mut failures);
             if let Err(error) = followed {
-                let Sequence { scene_id, obj_id, .. } = sequence;
+                let Target { scene_id, obj_id, .. } = start.0;
                 failures.push(format!("scene {scene_id} object {obj_id}: {error}"));
             }
         }
@@ -129,52 +115,38 @@ impl Track {
     }
 
     /// What to follow, in order, and what is wrong with rows of the poses.
-    fn sequences(&self, dataset: &Dataset) -> anyhow::Result<(Vec<Sequence>, Vec<String>)> {
-        let (starts, faults): (Vec<Sequence>, Vec<String>) = if let Some(poses) = &self.poses {
+    fn starts(&self, dataset: &Dataset) -> anyhow::Result<(Vec<Start>, Vec<String>)> {
+        let (starts, faults): (Vec<Start>, _) = if let Some(poses) = &self.poses {
             let (jobs, faults) = self.selection.jobs(poses)?;
-            let start = |Job { row, instance }| Sequence {
-                scene_id: row.scene_id,
-                obj_id: row.obj_id,
-                instance,
-                first: row.im_id,
-                initial: Some(row.t_cam_model),
-            };
-            (jobs.into_iter().map(start).collect(), faults)
+            (jobs.into_iter().map(|j| (j.target, Some(j.row.t_cam_model))).collect(), faults)
         } else {
             let targets = self.selection.targets(dataset, self.targets.as_deref())?;
             if targets.is_empty() {
                 bail!("nothing is of the scenes, images and objects asked for");
             }
-            let start = |Target { scene_id, im_id, obj_id, instance }| Sequence {
-                scene_id,
-                obj_id,
-                instance,
-                first: im_id,
-                initial: None,
-            };
-            (targets.into_iter().map(start).collect(), Vec::new())
+            (targets.into_iter().map(|target| (target, None)).collect(), Vec::new())
         };
-        let mut sequences = BTreeMap::new();
+        let mut earliest: BTreeMap<_, Start> = BTreeMap::new();
         for start in starts {
-            let key = (start.scene_id, start.obj_id, start.instance);
-            let earliest = sequences.entry(key).or_insert_with(|| start);
-            if start.first < earliest.first {
-                *earliest = start;
+            let Target { scene_id, obj_id, instance, im_id } = start.0;
+            let known = earliest.entry((scene_id, obj_id, instance)).or_insert(start);
+            if im_id < known.0.im_id {
+                *known = start;
             }
         }
-        Ok((sequences.into_values().collect(), faults))
+        Ok((earliest.into_values().collect(), faults))
     }
 
     /// Follows one object; the frames that are done join `frames`, those at fault `failures`.
     fn follow(
         &self,
         assets: &mut Assets<'_>,
-        sequence: &Sequence,
+        start: &Start,
         settings: &TrackerSettings,
         frames: &mut Vec<Done>,
         failures: &mut Vec<String>,
     ) -> Result<(), AssetError> {
-        let Sequence { scene_id, obj_id, instance, first, initial } = *sequence;
+        let (Target { scene_id, obj_id, im_id: first, .. }, initial) = *start;
         let object = assets.object(obj_id)?;
         let mut images = assets.dataset().scene(scene_id)?.images()?;
         images.retain(|id| *id >= first && self.selection.admits_image(scene_id, *id));
@@ -185,17 +157,9 @@ impl Track {
         let mut tracker: Option<Tracker> = None;
         let bar = progress(images.len(), "tracking");
         for im_id in bar.wrap_iter(images.into_iter()) {
-            let mut row = ResultRow {
-                scene_id,
-                im_id,
-                obj_id,
-                score: 0.0,
-                t_cam_model: Isometry3::identity(),
-                time: -1.0,
-            };
+            let target = Target { im_id, ..start.0 };
             let mut frame = || -> Result<Tracked, AssetError> {
-                let frame = assets.dataset().frame(scene_id, im_id)?;
-                let (observation, robot) = assets.observation(&frame, instance, &[])?;
+                let (_, observation, robot) = assets.load(&target, &[])?;
                 let seconds = f64::from(im_id - first) / self.rate;
                 let time = Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX);
                 let tracker = match &mut tracker {
@@ -212,16 +176,16 @@ impl Track {
                 Ok(tracked) => {
                     bar.set_message(tracked.status.name());
                     if let (TrackStatus::Lost, Some(doubt)) = (tracked.status, tracked.rejection) {
-                        warn(&bar, label(&row), format!("lost: {doubt}"));
+                        warn(&bar, target, format!("lost: {doubt}"));
                     }
-                    row.t_cam_model = tracked.t_cam_object;
-                    row.score = tracked.posterior.as_ref().map_or(0.0, Posterior::probability);
+                    let score = tracked.posterior.as_ref().map_or(0.0, Posterior::probability);
+                    let mut row = row(&target, tracked.t_cam_object, score);
                     if self.time {
                         row.time = tracked.timing.total().as_secs_f64();
                     }
                     frames.push(Done { row, tracked });
                 }
-                Err(error) => failures.push(format!("{}: {error}", label(&row))),
+                Err(error) => failures.push(format!("{target}: {error}")),
             }
         }
         Ok(())

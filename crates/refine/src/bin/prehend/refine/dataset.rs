@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use super::options::{MethodOptions, OutputOptions};
-use crate::options::{Job, Selection, beside, label, write_poses};
+use crate::options::{Job, Selection, beside, write_poses};
 use crate::terminal::{cache, exit_code, progress, say, warn};
 
 /// A refinement of a dataset's frames.
@@ -73,14 +73,14 @@ impl DatasetRun<'_> {
             |&(index, job), outcome| -> anyhow::Result<()> {
                 match outcome {
                     Ok((done, seconds)) => {
-                        let (id, label) = (job.row.obj_id, label(&job.row));
-                        if introduced.insert(id) {
-                            let object = format!("object {id}");
+                        let target = job.target;
+                        if introduced.insert(target.obj_id) {
+                            let object = format!("object {}", target.obj_id);
                             done.object_warnings.iter().for_each(|w| warn(&bar, &object, w));
                         }
-                        done.warnings.iter().for_each(|w| warn(&bar, &label, w));
+                        done.warnings.iter().for_each(|w| warn(&bar, target, w));
                         // First the time: of a frame whose record is lost, a second line is no harm.
-                        times.add(index, &label, name, seconds)?;
+                        times.add(index, &target.to_string(), name, seconds)?;
                         refined.insert(index, journal.append(index, &done)?);
                     }
                     // Not recorded: a resumed run tries again.
@@ -91,7 +91,7 @@ impl DatasetRun<'_> {
             },
         )?;
         bar.finish_and_clear();
-        failures.extend(failed.iter().map(|(&i, e)| format!("{}: {e}", label(&jobs[i].row))));
+        failures.extend(failed.iter().map(|(&i, e)| format!("{}: {e}", jobs[i].target)));
         let seconds = |index: usize| times.of(index, name);
         let row = |(&index, refined): (&usize, &Refined)| ResultRow {
             t_cam_model: (&refined.pose).into(),
@@ -149,7 +149,7 @@ impl DatasetRun<'_> {
     fn refine(&self, assets: &Mutex<Assets<'_>>, job: &Job) -> anyhow::Result<(Refined, f64)> {
         let (object, observation, hand) = {
             let mut assets = assets.lock().unwrap_or_else(PoisonError::into_inner);
-            job.load(&mut assets, &Sensor::required_by(&self.method))?
+            assets.load(&job.target, &Sensor::required_by(&self.method))?
         };
         let initial = &job.row.t_cam_model;
         let start = Instant::now();
@@ -185,15 +185,15 @@ impl DatasetRun<'_> {
             let job = &jobs[index];
             let mut drawn = || -> anyhow::Result<()> {
                 let required = Sensor::required_by(&self.method);
-                let (object, observation, _) = job.load(&mut assets, &required)?;
+                let (object, observation, _) = assets.load(&job.target, &required)?;
                 let pose = (&(&refined.pose).into(), refined.iteration);
                 let trace = refined.trace.clone().unwrap_or_default();
                 let initial = &job.row.t_cam_model;
                 let frame = FrameReport::draw(&observation, &object, initial, pose, &trace);
-                Ok(report.add(&label(&job.row), &frame)?)
+                Ok(report.add(&job.target.to_string(), &frame)?)
             };
             if let Err(error) = drawn() {
-                failures.push(format!("{}: report: {error}", label(&job.row)));
+                failures.push(format!("{}: report: {error}", job.target));
             }
         }
         report.finish()

@@ -17,6 +17,7 @@ use self::options::{MethodOptions, OutputOptions};
 use crate::options::{Selection, limit_threads};
 
 #[derive(Args)]
+#[command(next_help_heading = "Input")]
 #[command(
     override_usage = "prehend refine --dataset <DIR> --poses <FILE> --out <FILE> [OPTIONS]\n       \
                             prehend refine --frame <FILE> [OPTIONS]"
@@ -26,10 +27,10 @@ pub(crate) struct Refine {
     #[command(flatten)]
     selection: Option<Selection>,
     /// Poses on the dataset's images, as a BOP results file
-    #[arg(long, value_name = "FILE", required_unless_present = "frame", help_heading = "Input")]
+    #[arg(long, value_name = "FILE", required_unless_present = "frame")]
     poses: Option<PathBuf>,
     /// Instead of a dataset, one frame described by a JSON file (see docs/FRAME.md)
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["Selection", "poses", "report"], help_heading = "Input")]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["Selection", "poses", "report"])]
     frame: Option<PathBuf>,
     #[command(flatten)]
     output: OutputOptions,

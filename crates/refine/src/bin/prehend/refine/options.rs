@@ -12,60 +12,56 @@ use crate::options::named;
 
 /// What to write, and where.
 #[derive(Args)]
+#[command(next_help_heading = "Output")]
 pub(super) struct OutputOptions {
     /// Write the refined poses here: a BOP results file, or JSON with --frame (then optional)
     ///
     /// The file appears whole or not at all, once all frames are done; an existing one is replaced. Until then
     /// FILE.journal records the finished frames: after an interruption the same command resumes, and ends with
     /// the same file. What frames took is in FILE.times.csv.
-    #[arg(long, value_name = "FILE", required_unless_present = "frame", help_heading = "Output")]
+    #[arg(long, value_name = "FILE", required_unless_present = "frame")]
     pub(super) out: Option<PathBuf>,
     /// Write a web page here, with pictures of the poses before and after and loss curves
-    #[arg(long, value_name = "DIR", help_heading = "Output")]
+    #[arg(long, value_name = "DIR")]
     pub(super) report: Option<PathBuf>,
     /// Print JSON on standard output: poses, times, loss curves and failures
-    #[arg(long, help_heading = "Output")]
+    #[arg(long)]
     pub(super) json: bool,
     /// Put times into the results' last column, which is -1 otherwise; frames are then refined one after another, each
     /// with all threads
-    #[arg(long, conflicts_with = "frame", help_heading = "Output")]
+    #[arg(long, conflicts_with = "frame")]
     pub(super) time: bool,
     /// Discard what an interrupted run with other settings left, instead of refusing
-    #[arg(long, conflicts_with = "frame", help_heading = "Output")]
+    #[arg(long, conflicts_with = "frame")]
     pub(super) restart: bool,
 }
 
 /// How to refine: a named method, changed by options.
 #[derive(Args)]
+#[command(next_help_heading = "Method")]
 pub(super) struct MethodOptions {
     /// How to refine, with settings that the options below change [default: fused; with --terms, combined]
-    #[arg(
-        long,
-        value_name = "NAME",
-        value_parser = named,
-        long_help = method_help(),
-        help_heading = "Method"
-    )]
+    #[arg(long, value_name = "NAME", value_parser = named, long_help = method_help())]
     method: Option<&'static NamedMethod>,
     /// Largest number of iterations, fused: in each of its stages; the search ends earlier when the steps become negligible
     /// [default: up to 10 a stage; robust-icp: 60; others: 400]
-    #[arg(long, value_name = "N", help_heading = "Method")]
+    #[arg(long, value_name = "N")]
     iterations: Option<usize>,
     /// Run all the iterations, however small the steps become
-    #[arg(long, help_heading = "Method")]
+    #[arg(long)]
     exhaustive: bool,
     /// Evidence to use, a list of physics, rendering, depth and tactile such as "rendering,depth"
     /// [default: the method's; with --frame, of those what the frame brings]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = "Method")]
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
     pub(super) terms: Option<Vec<GradientKind>>,
     /// Return the last pose instead of the one whose rendering fits best
-    #[arg(long, help_heading = "Method")]
+    #[arg(long)]
     no_checkpoint: bool,
     /// Seed of the points sampled on the object's surface
-    #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Method")]
+    #[arg(long, value_name = "N", default_value_t = 0)]
     pub(super) seed: u64,
     /// Worker threads; the poses are the same for any number [default: all cores]
-    #[arg(long, value_name = "N", help_heading = "Method")]
+    #[arg(long, value_name = "N")]
     pub(super) threads: Option<NonZeroUsize>,
 }
 
