@@ -8,14 +8,14 @@ use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 use prehend_geometry::hand::load_taxels;
 use prehend_geometry::robot::KinematicTree;
 use prehend_geometry::{GridCache, TriMesh};
 use prehend_render::{Camera, DepthImage, Mask, RgbImage};
 use serde::Deserialize;
 
-use crate::data::bop::{DatasetError, rotation_from_row_major};
+use crate::data::bop::{DatasetError, Numbers, Positive, read_json, rotation_from_row_major};
 use crate::scene::check_gravity;
 use crate::scene::{Hand, HandMeasurement, Object, Observation};
 use crate::strategy::GradientKind;
@@ -40,19 +40,14 @@ impl FrameInput {
     pub fn load(file: &Path, seed: u64, cache: Option<&GridCache>) -> Result<Self, DatasetError> {
         let fault = |problem: &dyn Display| DatasetError::unusable(file, problem);
         let field = |name: &str, problem: &dyn Display| DatasetError::field(file, name, problem);
-        let text = std::fs::read_to_string(file).map_err(|e| fault(&e))?;
-        let layout: Layout = serde_json::from_str(&text).map_err(|e| fault(&e))?;
+        let layout: Layout = read_json(file)?;
         let folder = file.parent().unwrap_or(Path::new("."));
-
-        if !(layout.depth_unit_m.is_finite() && layout.depth_unit_m > 0.0) {
-            return Err(field("depth_unit_m", &"must be a positive number of meters"));
-        }
         let color = RgbImage::load(&folder.join(&layout.rgb)).map_err(|e| fault(&e))?;
-        let depth = DepthImage::load(&folder.join(&layout.depth), layout.depth_unit_m)
+        let depth = DepthImage::load(&folder.join(&layout.depth), layout.depth_unit_m.0)
             .map_err(|e| fault(&e))?;
         let mask = Mask::load(&folder.join(&layout.mask)).map_err(|e| fault(&e))?;
         let (w, h) = (color.width(), color.height());
-        let camera = Camera::from_k(layout.k, w, h).map_err(|e| field("K", &e))?;
+        let camera = Camera::from_k(layout.k.0, w, h).map_err(|e| field("K", &e))?;
         for (name, width, height) in
             [("depth", depth.width(), depth.height()), ("mask", mask.width(), mask.height())]
         {
@@ -66,7 +61,6 @@ impl FrameInput {
         let mesh = mesh.scaled(layout.mesh_unit.meters());
         let name = mesh_file.display().to_string();
         let object = Object::with_mass(&name, mesh, layout.mass_kg, seed).map_err(|e| fault(&e))?;
-        let t_cam_object = layout.pose.isometry().map_err(|e| field("pose", &e))?;
         let (mut robot, mut hand) = (None, None);
         if let Some(r) = &layout.robot {
             let tree =
@@ -81,15 +75,14 @@ impl FrameInput {
                     format!("expected one force for each of {expected} taxels, found {found}");
                 return Err(field("robot.forces", &problem));
             }
-            let t_cam_hand = r.base_pose.isometry().map_err(|e| field("robot.base_pose", &e))?;
-            let forces = forces.iter().map(|&f| Vector3::from(f)).collect();
-            hand = Some(HandMeasurement { t_cam_hand, joints, forces });
+            let forces = forces.iter().map(|f| Vector3::from(f.0)).collect();
+            hand = Some(HandMeasurement { t_cam_hand: r.base_pose.0, joints, forces });
             robot = Some(Arc::new(Hand::cached(tree, skin, cache).map_err(|e| fault(&e))?));
         }
-        let gravity = layout.gravity.map(Vector3::from);
+        let gravity = layout.gravity.map(|g| Vector3::from(g.0));
         gravity.iter().try_for_each(check_gravity).map_err(|e| field("gravity", &e))?;
         let observation = Observation { camera, color, depth, mask, gravity, hand };
-        Ok(Self { observation, object, robot, t_cam_object })
+        Ok(Self { observation, object, robot, t_cam_object: layout.pose.0 })
     }
 
     /// Whether the frame brings the evidence that a gradient needs.
@@ -110,17 +103,17 @@ impl FrameInput {
 struct Layout {
     /// Row-major 3×3 intrinsics \[px\].
     #[serde(rename = "K")]
-    k: [f64; 9],
+    k: Numbers<9>,
     rgb: PathBuf,
     depth: PathBuf,
     /// Meters of one unit of the depth image.
-    depth_unit_m: f64,
+    depth_unit_m: Positive,
     mask: PathBuf,
     mesh: PathBuf,
     mesh_unit: Unit,
     mass_kg: Option<f64>,
     pose: Pose,
-    gravity: Option<[f64; 3]>,
+    gravity: Option<Numbers<3>>,
     robot: Option<RobotLayout>,
 }
 
@@ -141,15 +134,20 @@ impl Unit {
     }
 }
 
-/// A pose into the camera frame: a 4×4 matrix, or a quaternion whose name says its order.
+/// A pose into the camera frame \[m\].
+#[derive(Deserialize)]
+#[serde(try_from = "PoseLayout")]
+struct Pose(Isometry3<f64>);
+
+/// A 4×4 matrix, or a quaternion whose name says its order.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Pose {
+struct PoseLayout {
     unit: Unit,
-    matrix: Option<[[f64; 4]; 4]>,
-    quaternion_wxyz: Option<[f64; 4]>,
-    quaternion_xyzw: Option<[f64; 4]>,
-    translation: Option<[f64; 3]>,
+    matrix: Option<Numbers<16>>,
+    quaternion_wxyz: Option<Numbers<4>>,
+    quaternion_xyzw: Option<Numbers<4>>,
+    translation: Option<Numbers<3>>,
 }
 
 #[derive(Deserialize)]
@@ -160,42 +158,40 @@ struct RobotLayout {
     joints: BTreeMap<String, f64>,
     taxels: Option<PathBuf>,
     /// Force of the object on each taxel, in its link's frame \[N\].
-    forces: Option<Vec<[f64; 3]>>,
+    forces: Option<Vec<Numbers<3>>>,
 }
 
-impl Pose {
-    fn isometry(&self) -> Result<Isometry3<f64>, String> {
-        let scale = self.unit.meters();
+impl TryFrom<PoseLayout> for Pose {
+    type Error = String;
+
+    fn try_from(layout: PoseLayout) -> Result<Self, String> {
         let from_quaternion = |[w, x, y, z]: [f64; 4]| {
             let q = Quaternion::new(w, x, y, z);
             let norm = q.norm();
-            if (norm - 1.0).abs() > 1e-3 || !norm.is_finite() {
+            if (norm - 1.0).abs() > 1e-3 {
                 return Err(format!("the quaternion has norm {norm}, not 1"));
             }
-            let [tx, ty, tz] = self.translation.ok_or("a quaternion needs a translation")?;
-            Ok((UnitQuaternion::new_normalize(q), Vector3::new(tx, ty, tz)))
+            let translation = layout.translation.ok_or("a quaternion needs a translation")?;
+            Ok((UnitQuaternion::new_normalize(q), translation.0))
         };
         let (rotation, translation) =
-            match (&self.matrix, self.quaternion_wxyz, self.quaternion_xyzw) {
+            match (layout.matrix, layout.quaternion_wxyz, layout.quaternion_xyzw) {
                 (Some(m), None, None) => {
-                    if m[3] != [0.0, 0.0, 0.0, 1.0] {
+                    if m.0[12..] != [0.0, 0.0, 0.0, 1.0] {
                         return Err("the matrix's last row must be 0 0 0 1".into());
                     }
-                    let row_major = std::array::from_fn(|i| m[i / 3][i % 3]);
-                    let translation = Vector3::new(m[0][3], m[1][3], m[2][3]);
-                    (rotation_from_row_major(&row_major)?, translation)
+                    let row_major = std::array::from_fn(|i| m.0[4 * (i / 3) + i % 3]);
+                    (rotation_from_row_major(&row_major)?, [m.0[3], m.0[7], m.0[11]])
                 }
-                (None, Some(wxyz), None) => from_quaternion(wxyz)?,
-                (None, None, Some([x, y, z, w])) => from_quaternion([w, x, y, z])?,
+                (None, Some(wxyz), None) => from_quaternion(wxyz.0)?,
+                (None, None, Some(Numbers([x, y, z, w]))) => from_quaternion([w, x, y, z])?,
                 _ => {
                     return Err(
                         "give exactly one of matrix, quaternion_wxyz and quaternion_xyzw".into()
                     );
                 }
             };
-        if !translation.iter().all(|v| v.is_finite()) {
-            return Err("the translation is not finite".into());
-        }
-        Ok(Isometry3::from_parts(Translation3::from(translation * scale), rotation))
+        let translation = Vector3::from(translation) * layout.unit.meters();
+        Ok(Self(Isometry3::from_parts(translation.into(), rotation)))
     }
 }

@@ -2,12 +2,11 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
-use std::fs;
 use std::path::Path;
 
 use serde::Deserialize;
 
-use crate::data::bop::{Dataset, DatasetError};
+use crate::data::bop::{Dataset, DatasetError, read_json};
 
 /// One object to be localized in one image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -65,9 +64,7 @@ pub fn find_targets(dataset: &Dataset, file: Option<&Path>) -> Result<Vec<Target
 }
 
 fn read(file: &Path) -> Result<Vec<Target>, DatasetError> {
-    let bytes = fs::read(file).map_err(|e| DatasetError::reading(file, &e))?;
-    let listed: Vec<Listed> =
-        serde_json::from_slice(&bytes).map_err(|e| DatasetError::unusable(file, e))?;
+    let listed: Vec<Listed> = read_json(file)?;
     let mut targets = Vec::new();
     let mut in_image: BTreeMap<(u32, u32), usize> = BTreeMap::new();
     for Listed { scene_id, im_id, obj_id, inst_count } in listed {
@@ -87,6 +84,8 @@ fn read(file: &Path) -> Result<Vec<Target>, DatasetError> {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     #[test]
@@ -104,7 +103,7 @@ mod tests {
             fs::write(&file, text).unwrap();
             read(&file).unwrap_err().to_string()
         };
-        assert!(refused("[{\"scene_id\": 1}]").contains("list.json: missing field `im_id`"));
+        assert!(refused("[{\"scene_id\": 1}]").contains("list.json: [0].im_id: is missing"));
         assert!(refused("{").contains("list.json"));
         let many = r#"[{"scene_id": 1, "im_id": 2, "obj_id": 7, "inst_count": 4000000000}]"#;
         assert!(refused(many).contains("inst_count is 4000000000"));

@@ -41,10 +41,6 @@ impl Fixture {
         let object = |t: &str| format!(r#"{{"cam_R_m2c": {R}, "cam_t_m2c": {t}, "obj_id": 7}}"#);
         let (a, b) = (object("[0, 0, 500]"), object("[100, 0, 500]"));
         fixture.scene("scene_gt.json", &format!(r#"{{"0": [{a}], "3": [{a}, {b}]}}"#));
-        fixture.scene(
-            "scene_gt_info.json",
-            r#"{"0": [{"visib_fract": 0.75}], "3": [{"visib_fract": 1}, {}]}"#,
-        );
         fixture.image("rgb/000000.png", |p| {
             ImageBuffer::from_pixel(4, 3, Rgb([255u8, 0, 51])).save(p).unwrap()
         });
@@ -156,7 +152,6 @@ fn truth_prefers_its_own_files_and_falls_back() {
     assert_eq!(truth.models().dir(), fixture.root().join("models"));
     assert_eq!(truth.bodies(4, 0).unwrap(), dataset.frame(4, 0).unwrap().bodies().unwrap());
     assert_eq!(truth.objects(4, 3).unwrap().len(), 2);
-    assert_eq!(truth.visible_fractions(4, 0), Ok(Some(vec![0.75])));
     // Of two equal objects the one near the estimate is meant.
     let near_second = Isometry3::translation(0.08, 0.0, 0.5);
     assert!((truth.pose(4, 3, 7, &near_second).unwrap().translation.vector.x - 0.1).abs() < 1e-15);
@@ -164,19 +159,16 @@ fn truth_prefers_its_own_files_and_falls_back() {
     let told = fs::read_to_string(fixture.root().join("test/000004/scene_bodies.json")).unwrap();
     fixture.scene("scene_bodies_gt.json", &told.replace("[1, 2, 500]", "[1, 2, 501]"));
     fixture.write("models_eval/models_info.json", "{}");
-    fixture.remove("scene_gt_info.json");
     let dataset = fixture.open();
     let truth = GroundTruth::new(&dataset);
     assert_eq!(truth.bodies(4, 0).unwrap().bodies[0].t_cam_base.translation.vector.z, 0.501);
     assert_eq!(truth.models().dir(), fixture.root().join("models_eval"));
-    assert_eq!(truth.visible_fractions(4, 0), Ok(None));
 }
 
 #[test]
 fn estimator_input_survives_without_the_truth() {
     let fixture = Fixture::new();
     fixture.remove("scene_gt.json");
-    fixture.remove("scene_gt_info.json");
     let dataset = fixture.open();
     let frame = dataset.frame(4, 3).unwrap();
     assert!(frame.observation(1).is_ok() && frame.bodies().is_ok());
@@ -256,9 +248,12 @@ fn one_image_with_a_bad_field_leaves_the_others() {
         (r#"{"cam_K": [NaN, 0, 1, 0, 500, 1, 0, 0, 1]}"#, "3.cam_K[0]: is not a finite number"),
         (
             r#"{"cam_K": [-500, 0, 1, 0, 500, 1, 0, 0, 1]}"#,
-            "4.cam_K: focal lengths must be above zero",
+            "4.cam_K: focal length fx is -500 px, expected more than zero",
         ),
-        (r#"{"cam_K": [500, 3, 1, 0, 500, 1, 0, 0, 1]}"#, "5.cam_K: is not of the form"),
+        (
+            r#"{"cam_K": [500, 3, 1, 0, 500, 1, 0, 0, 1]}"#,
+            "5.cam_K: camera matrix entry 1 is 3, expected 0 (row-major, no skew)",
+        ),
         (
             r#"{"cam_K": [500, 0, 1, 0, 500, 1, 0, 0, 1], "depth_scale": 0}"#,
             "6.depth_scale: must be above zero",

@@ -14,33 +14,31 @@ use prehend_refine::data::{Target, find_targets};
 
 /// A dataset, and which of its images and objects are meant.
 #[derive(Args)]
-#[command(next_help_heading = "Input")]
 pub(crate) struct Selection {
     /// BOP dataset: the folder that holds models/ and the split (such as test/)
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", help_heading = "Input")]
     pub(crate) dataset: PathBuf,
     /// Split of the dataset [default: test, or the only one]
-    #[arg(long, value_name = "NAME", requires = "dataset")]
+    #[arg(long, value_name = "NAME", requires = "dataset", help_heading = "Input")]
     pub(crate) split: Option<String>,
     /// Use only the poses of this scene; may be repeated
-    #[arg(long, value_name = "ID", requires = "dataset")]
+    #[arg(long, value_name = "ID", requires = "dataset", help_heading = "Input")]
     pub(crate) scene: Vec<u32>,
     /// Use only the poses of this image; may be repeated
-    #[arg(long, value_name = "ID", requires = "dataset")]
+    #[arg(long, value_name = "ID", requires = "dataset", help_heading = "Input")]
     pub(crate) image: Vec<u32>,
     /// Use only the poses of this object; may be repeated
-    #[arg(long, value_name = "ID", requires = "dataset")]
+    #[arg(long, value_name = "ID", requires = "dataset", help_heading = "Input")]
     pub(crate) object: Vec<u32>,
 }
 
 /// A dataset and poses on it.
 #[derive(Args)]
-#[command(next_help_heading = "Input")]
 pub(crate) struct Input {
     #[command(flatten)]
     pub(crate) selection: Selection,
     /// Poses on the dataset's images, as a BOP results file
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = "Input")]
     pub(crate) poses: PathBuf,
 }
 

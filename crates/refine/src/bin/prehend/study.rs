@@ -225,14 +225,11 @@ impl Run {
             name: name.clone(),
             settings: format!("{method:?}"),
         };
+        let fingerprint = |names: &[&str]| dataset_fingerprint(dataset, names);
         let design = Design {
             study: kind,
             dataset: canonical(dataset.split_dir()),
-            annotations: [&SENSED[..], &TRUTH]
-                .map(|names| dataset_fingerprint(dataset, names))
-                .into_iter()
-                .collect::<Result<Vec<_>, _>>()?
-                .join(" "),
+            annotations: format!("{} {}", fingerprint(&SENSED)?, fingerprint(&TRUTH)?),
             levels,
             filters: self.selection.filters(),
             methods: methods.iter().map(settings).collect(),

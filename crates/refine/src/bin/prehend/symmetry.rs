@@ -43,11 +43,19 @@ impl Symmetry {
         let settings =
             SymmetrySettings { tolerance, color_tolerance: color, ..SymmetrySettings::default() };
         let models = Models::new(self.models);
+        let search = |id: u32| -> anyhow::Result<Symmetries> {
+            let mesh = load_mesh(&models, id)?;
+            let symmetries = find_symmetries(&mesh, &settings)?;
+            if self.write {
+                write_symmetries(&models, id, &mesh.vertices, &symmetries)?;
+            }
+            Ok(symmetries)
+        };
         let ids = if self.object.is_empty() { models.object_ids()? } else { self.object };
         let (mut done, mut failures) = (0, Vec::new());
         let bar = progress(ids.len(), "searching");
         for id in bar.wrap_iter(ids.into_iter()) {
-            match search(&models, id, &settings, self.write) {
+            match search(id) {
                 Ok(symmetries) => {
                     bar.suspend(|| say(format!("object {id}: {}", describe(&symmetries))))?;
                     done += 1;
@@ -57,20 +65,6 @@ impl Symmetry {
         }
         Ok(exit_code(done, &failures))
     }
-}
-
-fn search(
-    models: &Models,
-    id: u32,
-    settings: &SymmetrySettings,
-    write: bool,
-) -> anyhow::Result<Symmetries> {
-    let mesh = load_mesh(models, id)?;
-    let symmetries = find_symmetries(&mesh, settings)?;
-    if write {
-        write_symmetries(models, id, &mesh.vertices, &symmetries)?;
-    }
-    Ok(symmetries)
 }
 
 /// Rotations by axis and angle, axes of revolution; what a person compares with the object in hand.

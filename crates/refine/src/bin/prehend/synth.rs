@@ -28,7 +28,12 @@ pub(crate) struct Synth {
     #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = "Objects and hand")]
     objects: Option<Vec<String>>,
     /// Instead of built-in objects, a closed mesh (PLY, OBJ, STL, glTF); may be repeated, numbered from 1
-    #[arg(long, value_name = "FILE", conflicts_with = "objects", help_heading = "Objects and hand")]
+    #[arg(
+        long,
+        value_name = "FILE",
+        conflicts_with = "objects",
+        help_heading = "Objects and hand"
+    )]
     mesh: Vec<PathBuf>,
     /// Unit of the meshes
     #[arg(long, value_name = "UNIT", default_value = "m", help_heading = "Objects and hand")]

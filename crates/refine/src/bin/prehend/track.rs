@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::Duration;
 
-use anyhow::bail;
+use anyhow::{anyhow, bail};
 use clap::Args;
 use nalgebra::Isometry3;
 use prehend_refine::data::bop::{Dataset, ResultRow, check_writable};
@@ -29,7 +29,12 @@ pub(crate) struct Track {
     #[command(flatten)]
     selection: Selection,
     /// Begin at the first pose of every object of a scene in this BOP results file
-    #[arg(long, value_name = "FILE", required_unless_present = "search", conflicts_with = "search")]
+    #[arg(
+        long,
+        value_name = "FILE",
+        required_unless_present = "search",
+        conflicts_with = "search"
+    )]
     poses: Option<PathBuf>,
     /// Begin by searching for the objects in the first image
     #[arg(long)]
@@ -80,7 +85,12 @@ impl Track {
         if !(self.rate.is_finite() && self.rate > 0.0) {
             bail!("--rate: {} is no number of images a second", self.rate);
         }
-        let settings = self.settings()?;
+        let budget = self.budget.map(|ms| Duration::try_from_secs_f64(ms * 1e-3)).transpose();
+        let settings = TrackerSettings {
+            budget: budget.map_err(|e| anyhow!("--budget: {e}"))?,
+            recovery: self.recovery,
+            ..TrackerSettings::default()
+        };
         limit_threads(self.threads)?;
         let dataset = self.selection.open()?;
         let (starts, mut failures) = self.starts(&dataset)?;
@@ -103,15 +113,6 @@ impl Track {
             say(format!("{}, written to {}", told(&frames), self.out.display()))?;
         }
         Ok(exit_code(frames.len(), &failures))
-    }
-
-    fn settings(&self) -> anyhow::Result<TrackerSettings> {
-        let budget = self.budget.map(|ms| Duration::try_from_secs_f64(ms * 1e-3));
-        Ok(TrackerSettings {
-            budget: budget.transpose().map_err(|e| anyhow::anyhow!("--budget: {e}"))?,
-            recovery: self.recovery,
-            ..TrackerSettings::default()
-        })
     }
 
     /// What to follow, in order, and what is wrong with rows of the poses.

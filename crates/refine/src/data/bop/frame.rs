@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::PathBuf;
 
-use prehend_render::{Camera, DepthImage, Mask, RgbImage};
+use prehend_render::{Camera, CameraError, DepthImage, Mask, RgbImage};
 use serde::Deserialize;
 
 use super::dataset::{Dataset, Scene};
@@ -30,23 +30,16 @@ struct CameraEntry {
     depth_scale: Option<Positive>,
 }
 
-/// Entries of `cam_K`: fx, fy, cx, cy \[px\].
+/// What `cam_K` says of a camera of unknown size.
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(try_from = "Numbers<9>")]
-struct Intrinsics([f64; 4]);
+struct Intrinsics(Camera);
 
 impl TryFrom<Numbers<9>> for Intrinsics {
-    type Error = &'static str;
+    type Error = CameraError;
 
-    fn try_from(k: Numbers<9>) -> Result<Self, &'static str> {
-        let [fx, skew, cx, s10, fy, cy, s20, s21, s22] = k.0;
-        if fx <= 0.0 || fy <= 0.0 {
-            return Err("focal lengths must be above zero");
-        }
-        if [skew, s10, s20, s21] != [0.0; 4] || s22 != 1.0 {
-            return Err("is not of the form [fx 0 cx; 0 fy cy; 0 0 1]");
-        }
-        Ok(Self([fx, fy, cx, cy]))
+    fn try_from(k: Numbers<9>) -> Result<Self, CameraError> {
+        Camera::from_k(k.0, 1, 1).map(Self)
     }
 }
 
@@ -70,18 +63,7 @@ impl Dataset {
 impl Frame<'_> {
     /// The camera that the estimator is told, for an image of `width` by `height` pixels: BOP keeps no sizes.
     pub fn camera(&self, width: usize, height: usize) -> Camera {
-        let [fx, fy, cx, cy] = self.intrinsics.0;
-        Camera { fx, fy, cx, cy, width, height }
-    }
-
-    /// The scene's id.
-    pub fn scene_id(&self) -> u32 {
-        self.scene.id()
-    }
-
-    /// The image's id.
-    pub fn im_id(&self) -> u32 {
-        self.im_id
+        Camera { width, height, ..self.intrinsics.0 }
     }
 
     /// The color image (`rgb/*.png`, else `*.jpg` or `*.jpeg`).

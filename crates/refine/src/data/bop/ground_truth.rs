@@ -12,8 +12,7 @@ use super::models::Models;
 use super::pose::translation_from_mm;
 use super::scene::SceneBodies;
 
-/// What scorers may read and estimators must not: `scene_gt.json`, `scene_gt_info.json`,
-/// `scene_bodies_gt.json` and `models_eval/`.
+/// What scorers may read and estimators must not: `scene_gt.json`, `scene_bodies_gt.json` and `models_eval/`.
 #[derive(Debug)]
 pub struct GroundTruth<'a> {
     dataset: &'a Dataset,
@@ -24,7 +23,6 @@ pub struct GroundTruth<'a> {
 #[derive(Debug)]
 struct TrueScene {
     objects: JsonFile,
-    info: JsonFile,
     bodies: JsonFile,
 }
 
@@ -46,17 +44,11 @@ struct ObjectEntry {
     translation: Numbers<3>,
 }
 
-#[derive(Deserialize)]
-struct InfoEntry {
-    visib_fract: f64,
-}
-
 impl<'a> GroundTruth<'a> {
     /// The truth about the split that `dataset` shows; nothing is read yet.
     pub fn new(dataset: &'a Dataset) -> Self {
         let scene = |dir: &std::path::Path| TrueScene {
             objects: JsonFile::new(dir.join("scene_gt.json")),
-            info: JsonFile::new(dir.join("scene_gt_info.json")),
             bodies: JsonFile::new(dir.join("scene_bodies_gt.json")),
         };
         let eval = dataset.root().join("models_eval");
@@ -110,30 +102,12 @@ impl<'a> GroundTruth<'a> {
             .ok_or_else(|| DatasetError::UnknownObject { file: objects.path().into(), obj_id })
     }
 
-    /// The visible fraction of each object of an image, or `None` where the dataset does not give it.
-    ///
-    /// # Errors
-    /// When `scene_gt_info.json` exists and is broken, or lacks the image or one of its fields.
-    pub fn visible_fractions(
-        &self,
-        scene_id: u32,
-        im_id: u32,
-    ) -> Result<Option<Vec<f64>>, DatasetError> {
-        let info = &self.scene(scene_id)?.info;
-        if !info.exists() {
-            return Ok(None);
-        }
-        let entries: Vec<InfoEntry> = info.entry(im_id)?;
-        Ok(Some(entries.into_iter().map(|e| e.visib_fract).collect()))
-    }
-
     /// Whether a scene says where its robots are.
     ///
     /// # Errors
     /// When there is no such scene.
     pub(crate) fn has_bodies(&self, scene_id: u32) -> Result<bool, DatasetError> {
-        let told = &self.dataset.scene(scene_id)?.bodies;
-        Ok(self.scene(scene_id)?.bodies.exists() || told.exists())
+        Ok(self.bodies_file(scene_id)?.exists())
     }
 
     /// The robots where they truly are: `scene_bodies_gt.json` where the scene has it, else what
@@ -142,9 +116,12 @@ impl<'a> GroundTruth<'a> {
     /// # Errors
     /// When the file is absent or broken, or lacks the image or one of its fields.
     pub fn bodies(&self, scene_id: u32, im_id: u32) -> Result<SceneBodies, DatasetError> {
+        SceneBodies::read(self.bodies_file(scene_id)?, im_id, self.dataset.root())
+    }
+
+    fn bodies_file(&self, scene_id: u32) -> Result<&JsonFile, DatasetError> {
         let own = &self.scene(scene_id)?.bodies;
-        let file = if own.exists() { own } else { &self.dataset.scene(scene_id)?.bodies };
-        SceneBodies::read(file, im_id, self.dataset.root())
+        Ok(if own.exists() { own } else { &self.dataset.scene(scene_id)?.bodies })
     }
 
     fn scene(&self, scene_id: u32) -> Result<&TrueScene, DatasetError> {

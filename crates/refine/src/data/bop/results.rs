@@ -252,15 +252,6 @@ mod tests {
     }
 
     #[test]
-    fn rounded_rotations_are_made_orthonormal() {
-        let c = std::f64::consts::FRAC_1_SQRT_2;
-        let results = read("4,0,7,1,0.7071 -0.7071 0 0.7071 0.7071 0 0 0 1,0 0 500,-1\n");
-        let m = results.rows[0].t_cam_model.rotation.to_rotation_matrix();
-        assert!((m[(0, 0)] - c).abs() < 1e-15 && (m[(1, 0)] - c).abs() < 1e-15);
-        assert!((results.rows[0].t_cam_model.translation.vector.z - 0.5).abs() < 1e-16);
-    }
-
-    #[test]
     fn instances_count_malformed_rows_too() {
         let results = read(&format!(
             "1,0,7,1,{IDENTITY},0 0 500,-1\n1,0,8,1,{IDENTITY},0 0,-1\n1,1,7,1,{IDENTITY},0 0 500,-1\n1,0,9,1,{IDENTITY},0 0 500,-1\n"
