@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use nalgebra::Isometry3;
 use prehend_geometry::hand::load_taxels;
 use prehend_geometry::robot::KinematicTree;
 use prehend_geometry::{GridCache, TriMesh};
@@ -12,7 +13,7 @@ use crate::data::bop::{Dataset, DatasetError, Frame, Models, Tactile};
 use crate::data::targets::Target;
 use crate::error::RefineError;
 use crate::method::Method;
-use crate::scene::{Hand, HandMeasurement, Inertial, Object, Observation, check_gravity};
+use crate::scene::{self, Hand, HandMeasurement, Inertial, Object, Observation, check_gravity};
 use crate::strategy::GradientKind;
 
 /// BOP models are in millimeters \[m\].
@@ -66,6 +67,46 @@ impl Sensor {
     }
 }
 
+/// A frame ready to be refined.
+pub struct FrameInput {
+    /// What was sensed.
+    pub observation: Observation,
+    /// The object.
+    pub object: Arc<Object>,
+    /// The hand, where it is known.
+    pub hand: Option<Arc<Hand>>,
+}
+
+impl FrameInput {
+    /// The frame.
+    ///
+    /// # Errors
+    /// Those of [`scene::Frame::new`].
+    pub fn frame(&self) -> Result<scene::Frame<'_>, RefineError> {
+        scene::Frame::new(&self.observation, &self.object, self.hand.as_ref())
+    }
+
+    /// Warnings about the object, then about its pose `t_cam_object`: see [`scene::inspect_object`] and [`scene::inspect_pose`].
+    pub fn warnings(&self, t_cam_object: &Isometry3<f64>) -> [Vec<String>; 2] {
+        let Self { observation, object, hand } = self;
+        [
+            scene::inspect_object(object),
+            scene::inspect_pose(observation, object, hand.as_deref(), t_cam_object),
+        ]
+    }
+
+    /// Whether the frame brings the evidence that a gradient needs.
+    pub fn offers(&self, gradient: GradientKind) -> bool {
+        match gradient {
+            GradientKind::Rendering | GradientKind::Depth => true,
+            GradientKind::Physics => self.hand.is_some() && self.observation.gravity.is_some(),
+            GradientKind::Tactile => {
+                self.observation.hand.as_ref().is_some_and(|hand| !hand.forces.is_empty())
+            }
+        }
+    }
+}
+
 /// The objects and hands of a dataset.
 pub struct Assets<'a> {
     dataset: &'a Dataset,
@@ -108,15 +149,11 @@ impl<'a> Assets<'a> {
     ///
     /// # Errors
     /// Those of [`Assets::object`] and [`Assets::observation`], and if there is no such image.
-    pub fn load(
-        &mut self,
-        target: &Target,
-        required: &[Sensor],
-    ) -> Result<(Arc<Object>, Observation, Option<Arc<Hand>>), AssetError> {
+    pub fn load(&mut self, target: &Target, required: &[Sensor]) -> Result<FrameInput, AssetError> {
         let object = self.object(target.obj_id)?;
         let frame = self.dataset.frame(target.scene_id, target.im_id)?;
         let (observation, hand) = self.observation(&frame, target.instance, required)?;
-        Ok((object, observation, hand))
+        Ok(FrameInput { observation, object, hand })
     }
 
     /// The frame with every sensor that it brings, and the hand if the frame says where it is. A sensor whose file or

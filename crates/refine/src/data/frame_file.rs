@@ -15,86 +15,64 @@ use prehend_geometry::{GridCache, TriMesh};
 use prehend_render::{Camera, DepthImage, Mask, RgbImage};
 use serde::Deserialize;
 
+use crate::data::assets::FrameInput;
 use crate::data::bop::{DatasetError, Numbers, Positive, read_json, rotation_from_row_major};
-use crate::scene::check_gravity;
-use crate::scene::{Hand, HandMeasurement, Object, Observation};
-use crate::strategy::GradientKind;
+use crate::scene::{Hand, HandMeasurement, Object, Observation, check_gravity};
 
-/// A frame ready to be refined.
-pub struct FrameInput {
-    /// What was sensed.
-    pub observation: Observation,
-    /// The object.
-    pub object: Object,
-    /// The hand, if the file describes one.
-    pub robot: Option<Arc<Hand>>,
-    /// The initial pose, object → camera \[m\].
-    pub t_cam_object: Isometry3<f64>,
-}
-
-impl FrameInput {
-    /// Reads the frame file `file` and everything it names; distance grids of the robot are kept in `cache`.
-    ///
-    /// # Errors
-    /// If the file or one that it names is missing or broken, naming the file and the field.
-    pub fn load(file: &Path, seed: u64, cache: Option<&GridCache>) -> Result<Self, DatasetError> {
-        let fault = |problem: &dyn Display| DatasetError::unusable(file, problem);
-        let field = |name: &str, problem: &dyn Display| DatasetError::field(file, name, problem);
-        let layout: Layout = read_json(file)?;
-        let folder = file.parent().unwrap_or(Path::new("."));
-        let color = RgbImage::load(&folder.join(&layout.rgb)).map_err(|e| fault(&e))?;
-        let depth = DepthImage::load(&folder.join(&layout.depth), layout.depth_unit_m.0)
-            .map_err(|e| fault(&e))?;
-        let mask = Mask::load(&folder.join(&layout.mask)).map_err(|e| fault(&e))?;
-        let (w, h) = (color.width(), color.height());
-        let camera = Camera::from_k(layout.k.0, w, h).map_err(|e| field("K", &e))?;
-        for (name, width, height) in
-            [("depth", depth.width(), depth.height()), ("mask", mask.width(), mask.height())]
-        {
-            if (width, height) != (w, h) {
-                let problem = format!("the image is {width}x{height} pixels, rgb is {w}x{h}");
-                return Err(field(name, &problem));
-            }
-        }
-        let mesh_file = folder.join(&layout.mesh);
-        let mesh = TriMesh::load(&mesh_file).map_err(|e| fault(&e))?;
-        let mesh = mesh.scaled(layout.mesh_unit.meters());
-        let name = mesh_file.display().to_string();
-        let object = Object::with_mass(&name, mesh, layout.mass_kg, seed).map_err(|e| fault(&e))?;
-        let (mut robot, mut hand) = (None, None);
-        if let Some(r) = &layout.robot {
-            let tree =
-                KinematicTree::from_urdf_file(folder.join(&r.urdf)).map_err(|e| fault(&e))?;
-            let joints = tree.joint_vector(&r.joints).map_err(|e| field("robot.joints", &e))?;
-            let skin = r.taxels.as_ref().map(|csv| load_taxels(&folder.join(csv))).transpose();
-            let skin = skin.map_err(|e| fault(&e))?.unwrap_or_default();
-            let forces = r.forces.as_deref().unwrap_or_default();
-            if !forces.is_empty() && forces.len() != skin.len() {
-                let (expected, found) = (skin.len(), forces.len());
-                let problem =
-                    format!("expected one force for each of {expected} taxels, found {found}");
-                return Err(field("robot.forces", &problem));
-            }
-            let forces = forces.iter().map(|f| Vector3::from(f.0)).collect();
-            hand = Some(HandMeasurement { t_cam_hand: r.base_pose.0, joints, forces });
-            robot = Some(Arc::new(Hand::cached(tree, skin, cache).map_err(|e| fault(&e))?));
-        }
-        let gravity = layout.gravity.map(|g| Vector3::from(g.0));
-        gravity.iter().try_for_each(check_gravity).map_err(|e| field("gravity", &e))?;
-        let observation = Observation { camera, color, depth, mask, gravity, hand };
-        Ok(Self { observation, object, robot, t_cam_object: layout.pose.0 })
-    }
-
-    /// Whether the frame brings the evidence that a gradient needs.
-    pub fn offers(&self, gradient: GradientKind) -> bool {
-        match gradient {
-            GradientKind::Rendering | GradientKind::Depth => true,
-            GradientKind::Physics => self.robot.is_some() && self.observation.gravity.is_some(),
-            GradientKind::Tactile => {
-                self.observation.hand.as_ref().is_some_and(|hand| !hand.forces.is_empty())
-            }
+/// Reads the frame file `file` and everything it names: the frame, and the initial pose (object → camera \[m\]). `seed` decides
+/// where the object's surface is sampled; distance grids of the hand are kept in `cache`.
+///
+/// # Errors
+/// If the file or one that it names is missing or broken, naming the file and the field.
+pub fn load_frame_file(
+    file: &Path,
+    seed: u64,
+    cache: Option<&GridCache>,
+) -> Result<(FrameInput, Isometry3<f64>), DatasetError> {
+    let fault = |problem: &dyn Display| DatasetError::unusable(file, problem);
+    let field = |name: &str, problem: &dyn Display| DatasetError::field(file, name, problem);
+    let layout: Layout = read_json(file)?;
+    let folder = file.parent().unwrap_or(Path::new("."));
+    let color = RgbImage::load(&folder.join(&layout.rgb)).map_err(|e| fault(&e))?;
+    let depth = DepthImage::load(&folder.join(&layout.depth), layout.depth_unit_m.0)
+        .map_err(|e| fault(&e))?;
+    let mask = Mask::load(&folder.join(&layout.mask)).map_err(|e| fault(&e))?;
+    let (w, h) = (color.width(), color.height());
+    let camera = Camera::from_k(layout.k.0, w, h).map_err(|e| field("K", &e))?;
+    for (name, width, height) in
+        [("depth", depth.width(), depth.height()), ("mask", mask.width(), mask.height())]
+    {
+        if (width, height) != (w, h) {
+            let problem = format!("the image is {width}x{height} pixels, rgb is {w}x{h}");
+            return Err(field(name, &problem));
         }
     }
+    let mesh_file = folder.join(&layout.mesh);
+    let mesh = TriMesh::load(&mesh_file).map_err(|e| fault(&e))?;
+    let mesh = mesh.scaled(layout.mesh_unit.meters());
+    let name = mesh_file.display().to_string();
+    let object = Object::with_mass(&name, mesh, layout.mass_kg, seed).map_err(|e| fault(&e))?;
+    let (mut hand, mut measured) = (None, None);
+    if let Some(r) = &layout.robot {
+        let tree = KinematicTree::from_urdf_file(folder.join(&r.urdf)).map_err(|e| fault(&e))?;
+        let joints = tree.joint_vector(&r.joints).map_err(|e| field("robot.joints", &e))?;
+        let skin = r.taxels.as_ref().map(|csv| load_taxels(&folder.join(csv))).transpose();
+        let skin = skin.map_err(|e| fault(&e))?.unwrap_or_default();
+        let forces = r.forces.as_deref().unwrap_or_default();
+        if !forces.is_empty() && forces.len() != skin.len() {
+            let (expected, found) = (skin.len(), forces.len());
+            let problem =
+                format!("expected one force for each of {expected} taxels, found {found}");
+            return Err(field("robot.forces", &problem));
+        }
+        let forces = forces.iter().map(|f| Vector3::from(f.0)).collect();
+        measured = Some(HandMeasurement { t_cam_hand: r.base_pose.0, joints, forces });
+        hand = Some(Arc::new(Hand::cached(tree, skin, cache).map_err(|e| fault(&e))?));
+    }
+    let gravity = layout.gravity.map(|g| Vector3::from(g.0));
+    gravity.iter().try_for_each(check_gravity).map_err(|e| field("gravity", &e))?;
+    let observation = Observation { camera, color, depth, mask, gravity, hand: measured };
+    Ok((FrameInput { observation, object: Arc::new(object), hand }, layout.pose.0))
 }
 
 /// The file's layout.

@@ -15,9 +15,9 @@ mod targets;
 mod times;
 mod workers;
 
-pub use assets::{AssetError, Assets, Sensor, load_mesh};
+pub use assets::{AssetError, Assets, FrameInput, Sensor, load_mesh};
 pub use contact::{CONTACT_SAMPLES, ContactModel};
-pub use frame_file::FrameInput;
+pub use frame_file::load_frame_file;
 pub use identity::Identity;
 pub use journal::Journal;
 pub use noise::NoiseLevel;

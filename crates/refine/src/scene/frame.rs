@@ -1,6 +1,7 @@
 //! One frame, with what all factors derive from it.
 
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use nalgebra::Point3;
@@ -152,7 +153,7 @@ impl<'a> Frame<'a> {
     ) -> Result<Segmented, RefineError> {
         let fault = |error: TargetError| RefineError::Images(error.to_string());
         let mut images = self.segmented.lock().unwrap_or_else(PoisonError::into_inner);
-        if !images.contains_key(&(occluders, 1)) {
+        if let Entry::Vacant(unknown) = images.entry((occluders, 1)) {
             let occluder = match occluders {
                 Occluders::Hand => (**self.hand_depth()).clone(),
                 Occluders::Measured => self.measured_occluder(),
@@ -161,7 +162,7 @@ impl<'a> Frame<'a> {
             let target = Target::new(*camera, color, mask).and_then(|t| t.with_occluder(occluder));
             let target = Arc::new(target.map_err(fault)?);
             let brightness = brightness(self.observation);
-            images.insert((occluders, 1), Segmented { target, brightness });
+            unknown.insert(Segmented { target, brightness });
         }
         if !images.contains_key(&(occluders, factor)) {
             let Segmented { target, brightness } = images[&(occluders, 1)].clone();

@@ -4,9 +4,8 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
-use prehend_refine::data::{AssetError, Assets};
+use prehend_refine::data::{AssetError, Assets, FrameInput};
 use prehend_refine::evaluate::report::{Report, outline_picture};
-use prehend_refine::scene::{inspect_object, inspect_pose};
 use prehend_render::RgbImage;
 
 use crate::options::{Input, Job};
@@ -50,12 +49,13 @@ impl Check {
 }
 
 fn check(assets: &mut Assets<'_>, job: &Job) -> Result<(RgbImage, Vec<String>), AssetError> {
-    let (object, observation, hand) = assets.load(&job.target, &[])?;
+    let input = assets.load(&job.target, &[])?;
+    let FrameInput { observation, object, hand } = &input;
     let t_cam_model = &job.row.t_cam_model;
     let mut warnings = Vec::new();
     let touches = observation.hand.as_ref().is_some_and(|hand| !hand.forces.is_empty());
     // Plain BOP datasets have neither file.
-    let absent = match &hand {
+    let absent = match hand {
         None => Some(("scene_bodies.json", "rendering,depth")),
         Some(_) if !touches => Some(("scene_tactile.json", "physics,rendering,depth")),
         Some(_) => None,
@@ -65,7 +65,6 @@ fn check(assets: &mut Assets<'_>, job: &Job) -> Result<(RgbImage, Vec<String>), 
         let file = file.display();
         warnings.push(format!("there is no {file}: --method combined needs --terms {terms}"));
     }
-    warnings.extend(inspect_object(&object));
-    warnings.extend(inspect_pose(&observation, &object, hand.as_deref(), t_cam_model));
-    Ok((outline_picture(&observation, &object, hand.as_deref(), t_cam_model), warnings))
+    warnings.extend(input.warnings(t_cam_model).concat());
+    Ok((outline_picture(observation, object, hand.as_deref(), t_cam_model), warnings))
 }

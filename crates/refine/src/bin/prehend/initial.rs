@@ -10,12 +10,12 @@ use std::sync::Arc;
 use anyhow::bail;
 use clap::Args;
 use nalgebra::Isometry3;
+use prehend_refine::RefineError;
 use prehend_refine::data::bop::{
     Dataset, DatasetError, GroundTruth, ResultRow, TrueObject, check_writable,
 };
 use prehend_refine::data::{AssetError, Assets, NoiseLevel, Target};
 use prehend_refine::search::{PoseSearch, SearchSettings};
-use prehend_refine::{Frame, RefineError};
 
 use crate::options::{Selection, limit_threads, row, write_poses};
 use crate::terminal::{cache, exit_code, progress, say};
@@ -130,14 +130,14 @@ fn search_one(
     searches: &mut BTreeMap<u32, PoseSearch>,
     target: &Target,
 ) -> Result<(Isometry3<f64>, f64), AssetError> {
-    let (object, observation, hand) = assets.load(target, &[])?;
+    let input = assets.load(target, &[])?;
     let search = match searches.entry(target.obj_id) {
         Entry::Occupied(known) => known.into_mut(),
         Entry::Vacant(unknown) => {
-            unknown.insert(PoseSearch::new(Arc::clone(&object), SearchSettings::default())?)
+            unknown.insert(PoseSearch::new(Arc::clone(&input.object), SearchSettings::default())?)
         }
     };
-    let found = search.run(&Frame::new(&observation, &object, hand.as_ref())?)?;
+    let found = search.run(&input.frame()?)?;
     let best = found.first().ok_or(RefineError::NothingFits)?;
     Ok((best.t_cam_object, best.cost))
 }

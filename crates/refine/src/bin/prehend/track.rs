@@ -11,7 +11,7 @@ use anyhow::{anyhow, bail};
 use clap::Args;
 use nalgebra::Isometry3;
 use prehend_refine::data::bop::{Dataset, ResultRow, check_writable};
-use prehend_refine::data::{AssetError, Assets, PlainPose, Target};
+use prehend_refine::data::{AssetError, Assets, FrameInput, PlainPose, Target};
 use prehend_refine::strategy::Posterior;
 use prehend_refine::tracker::{Recovery, TrackStatus, Tracked, Tracker, TrackerSettings};
 use serde_json::json;
@@ -160,13 +160,13 @@ impl Track {
         for im_id in bar.wrap_iter(images.into_iter()) {
             let target = Target { im_id, ..start.0 };
             let mut frame = || -> Result<Tracked, AssetError> {
-                let (_, observation, robot) = assets.load(&target, &[])?;
+                let FrameInput { observation, hand, .. } = assets.load(&target, &[])?;
                 let seconds = f64::from(im_id - first) / self.rate;
                 let time = Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX);
                 let tracker = match &mut tracker {
                     Some(tracker) => tracker,
                     none => {
-                        let mut new = Tracker::new(Arc::clone(&object), robot, settings.clone())?;
+                        let mut new = Tracker::new(Arc::clone(&object), hand, settings.clone())?;
                         initial.iter().for_each(|pose| new.start_from(pose));
                         none.insert(new)
                     }

@@ -1,7 +1,6 @@
 //! Results files of the BOP challenge: one estimated pose a row.
 
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
@@ -131,8 +130,7 @@ pub fn share_image_times(rows: &mut [ResultRow]) {
 /// [`DatasetError::Field`] for a row with a value that is not finite (nothing is written), and
 /// [`DatasetError::Write`].
 pub fn write_results(file: &Path, rows: &[ResultRow]) -> Result<(), DatasetError> {
-    let mut text = COLUMNS.join(",");
-    text.push('\n');
+    let mut text = COLUMNS.join(",") + "\n";
     for (i, row) in rows.iter().enumerate() {
         let ResultRow { scene_id, im_id, obj_id, score, t_cam_model, time } = row;
         let r = rotation_to_row_major(&t_cam_model.rotation);
@@ -145,13 +143,8 @@ pub fn write_results(file: &Path, rows: &[ResultRow]) -> Result<(), DatasetError
                 return Err(DatasetError::field(file, &field, "not finite"));
             }
         }
-        // Writing to a string cannot fail.
-        let _ = writeln!(
-            text,
-            "{scene_id},{im_id},{obj_id},{score},{},{},{time}",
-            spaced(&r),
-            spaced(&t_mm)
-        );
+        let (r, t) = (spaced(&r), spaced(&t_mm));
+        text += &format!("{scene_id},{im_id},{obj_id},{score},{r},{t},{time}\n");
     }
     write_atomically(file, text.as_bytes())
 }
@@ -200,21 +193,13 @@ mod tests {
         assert!(back.errors.is_empty());
         assert_eq!(back.rows.len(), 5);
         for (a, b) in rows.iter().zip(&back.rows) {
-            assert_eq!(
-                (a.scene_id, a.im_id, a.obj_id, a.score, a.time),
-                (b.scene_id, b.im_id, b.obj_id, b.score, b.time)
-            );
-            assert!(
-                (a.t_cam_model.translation.vector - b.t_cam_model.translation.vector).norm()
-                    < 1e-15
-            );
-            assert!(a.t_cam_model.rotation.angle_to(&b.t_cam_model.rotation) < 1e-14);
+            let (pose, read) = (a.t_cam_model, b.t_cam_model);
+            assert_eq!(*a, ResultRow { t_cam_model: pose, ..b.clone() });
+            assert!((pose.translation.vector - read.translation.vector).norm() < 1e-15);
+            assert!(pose.rotation.angle_to(&read.rotation) < 1e-14);
         }
-        assert!(
-            fs::read_to_string(&path)
-                .unwrap()
-                .starts_with("scene_id,im_id,obj_id,score,R,t,time\n4,0,7,1,")
-        );
+        let text = fs::read_to_string(&path).unwrap();
+        assert!(text.starts_with("scene_id,im_id,obj_id,score,R,t,time\n4,0,7,1,"));
     }
 
     #[test]

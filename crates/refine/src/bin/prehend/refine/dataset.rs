@@ -9,11 +9,12 @@ use std::time::Instant;
 use anyhow::bail;
 use prehend_refine::data::bop::{Dataset, DatasetError, ResultRow};
 use prehend_refine::data::identity::{SENSED, canonical, dataset_fingerprint, file_fingerprint};
-use prehend_refine::data::{Assets, Identity, Journal, PlainPose, Sensor, Times, Workers};
+use prehend_refine::data::{
+    Assets, FrameInput, Identity, Journal, PlainPose, Sensor, Times, Workers,
+};
 use prehend_refine::evaluate::report::{FrameReport, Report};
-use prehend_refine::scene::{inspect_object, inspect_pose};
 use prehend_refine::strategy::{PosteriorSummary, Trace};
-use prehend_refine::{Frame, Method, refine};
+use prehend_refine::{Method, refine};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
@@ -147,21 +148,21 @@ impl DatasetRun<'_> {
 
     /// Refines one frame; also returns the seconds that it took.
     fn refine(&self, assets: &Mutex<Assets<'_>>, job: &Job) -> anyhow::Result<(Refined, f64)> {
-        let (object, observation, hand) = {
+        let input = {
             let mut assets = assets.lock().unwrap_or_else(PoisonError::into_inner);
             assets.load(&job.target, &Sensor::required_by(&self.method))?
         };
         let initial = &job.row.t_cam_model;
         let start = Instant::now();
-        let frame = Frame::new(&observation, &object, hand.as_ref())?;
-        let found = refine(&frame, initial, &self.method)?;
+        let found = refine(&input.frame()?, initial, &self.method)?;
         let seconds = start.elapsed().as_secs_f64();
+        let [object_warnings, warnings] = input.warnings(initial);
         let refined = Refined {
             pose: PlainPose::from(found.t_cam_object()),
             iteration: found.iteration,
             iterations: found.trace.iterations.len().saturating_sub(1),
-            warnings: inspect_pose(&observation, &object, hand.as_deref(), initial),
-            object_warnings: inspect_object(&object),
+            warnings,
+            object_warnings,
             confidence: found.posterior.as_ref().map(PosteriorSummary::from),
             trace: self.keeps_trace().then_some(found.trace),
         };
@@ -185,7 +186,7 @@ impl DatasetRun<'_> {
             let job = &jobs[index];
             let mut drawn = || -> anyhow::Result<()> {
                 let required = Sensor::required_by(&self.method);
-                let (object, observation, _) = assets.load(&job.target, &required)?;
+                let FrameInput { object, observation, .. } = assets.load(&job.target, &required)?;
                 let pose = (&(&refined.pose).into(), refined.iteration);
                 let trace = refined.trace.clone().unwrap_or_default();
                 let initial = &job.row.t_cam_model;

@@ -3,13 +3,11 @@
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::process::ExitCode;
-use std::sync::Arc;
 
 use prehend_refine::data::bop::write_atomically;
-use prehend_refine::data::{FrameInput, PlainPose};
-use prehend_refine::scene::{inspect_object, inspect_pose};
+use prehend_refine::data::{PlainPose, load_frame_file};
 use prehend_refine::strategy::{PosteriorSummary, Strategy};
-use prehend_refine::{Frame, Method, State};
+use prehend_refine::{Method, State};
 use serde_json::json;
 
 use super::options::{MethodOptions, OutputOptions};
@@ -21,7 +19,7 @@ pub(super) fn refine_frame(
     output: &OutputOptions,
     method: &MethodOptions,
 ) -> anyhow::Result<ExitCode> {
-    let input = FrameInput::load(file, method.seed, cache().as_ref())?;
+    let (input, t_cam_object) = load_frame_file(file, method.seed, cache().as_ref())?;
     let mut configured = method.configured()?;
     let mut terms = Vec::new();
     if let Method::Heuristic(heuristic) = &mut configured {
@@ -31,12 +29,9 @@ pub(super) fn refine_frame(
         }
         terms = heuristic.gradients.iter().map(|g| g.name()).collect();
     }
-    let FrameInput { observation, object, robot, t_cam_object } = input;
-    let object = Arc::new(object);
-    let mut warnings = inspect_object(&object);
-    warnings.extend(inspect_pose(&observation, &object, robot.as_deref(), &t_cam_object));
+    let warnings = input.warnings(&t_cam_object).concat();
     warnings.iter().for_each(|warning| complain(format!("warning: {warning}")));
-    let frame = Frame::new(&observation, &object, robot.as_ref())?;
+    let frame = input.frame()?;
     let initial = State::new(&frame, &t_cam_object)?;
     let bar = progress(configured.iterations(), "refining");
     let refined = configured.run(&frame, &initial, &mut |p| {
