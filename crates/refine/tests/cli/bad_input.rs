@@ -634,7 +634,7 @@ fn frame_files_name_file_and_field() {
     Mask::filled(3, 2, true).save(&place.path("ds/small.png")).unwrap();
     for (text, expected) in [
         ("{".to_owned(), "error: ds/f.json: EOF"),
-        (with("depth_unit", json!(1)), "error: ds/f.json: unknown field `depth_unit`"),
+        (with("depth_unit", json!(1)), "error: ds/f.json: depth_unit: unknown field `depth_unit`"),
         (with("mesh_unit", json!("inch")), "error: ds/f.json: mesh_unit: unknown variant `inch`"),
         (with("depth_unit_m", json!(0)), "error: ds/f.json: depth_unit_m: must be above zero"),
         (with("K", json!([1, 2])), "error: ds/f.json: K: expected 9 numbers, found 2"),
