@@ -89,15 +89,15 @@ mod tests {
         sum.add_row(&Vector3::new(2.0, 0.0, 0.0), 1.0, 1.0);
         sum.add_row(&Vector3::new(0.0, 0.5, 0.1), -3.0, 2.0);
         // Of the direction that is open, nothing; the others end as without damping.
-        let step = sum.damped_step(1e-12);
+        let step = sum.damped_step(1e-9);
         let open = Vector3::new(0.0, 0.1, -0.5);
-        assert!(step.dot(&open).abs() < 1e-6 && (step.x + 0.5).abs() < 1e-9, "{step}");
+        assert!(step.dot(&open).abs() < 1e-5 && (step.x + 0.5).abs() < 1e-7, "{step}");
         let left = sum.gradient + sum.hessian * step;
-        assert!(left.norm() < 1e-9, "{left}");
+        assert!(left.norm() < 1e-6, "{left}");
         // A held parameter stays; the units of another change nothing without damping.
         let units = Vector3::new(7.0, 3.0, 0.0);
-        let held = sum.in_units(&units).damped_step(1e-12).component_mul(&units);
-        assert!((held - Vector3::new(-0.5, 6.0, 0.0)).norm() < 1e-9, "{held}");
+        let held = sum.in_units(&units).damped_step(1e-9).component_mul(&units);
+        assert!((held - Vector3::new(-0.5, 6.0, 0.0)).norm() < 1e-6, "{held}");
         sum.hessian = -Matrix3::identity();
         assert_eq!(sum.damped_step(0.1), Vector3::zeros());
     }

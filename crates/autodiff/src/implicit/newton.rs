@@ -96,6 +96,9 @@ pub fn newton_on(
     mut x: DVector<f64>,
 ) -> Result<DVector<f64>, ImplicitError> {
     let mut iterations = 0;
+    if x.is_empty() {
+        return Ok(x);
+    }
     loop {
         let (residual, jacobian) = equations.linearize(&x);
         let factors = jacobian.lu();

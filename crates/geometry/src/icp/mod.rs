@@ -236,6 +236,3 @@ fn check(settings: &IcpSettings, pose: &Isometry3<f64>) -> Result<(), IcpError> 
         None => Ok(()),
     }
 }
-
-#[cfg(test)]
-mod tests;

@@ -86,13 +86,6 @@ impl PosedRobot {
         &self.t_world_links
     }
 
-    /// Links that have a shape: index, world-to-link pose, and box in the link frame \[m\].
-    pub(super) fn solids(
-        &self,
-    ) -> impl Iterator<Item = (usize, &Isometry3<f64>, &(Point3<f64>, Point3<f64>))> {
-        self.solid.iter().map(|s| (s.link, &s.t_link_world, &s.bounds))
-    }
-
     /// Every collision body in the world frame: each a closed surface, overlapping others where links meet.
     pub fn mesh_parts(&self) -> Vec<TriMesh> {
         let links = self.shape.links().iter().zip(&self.t_world_links);
@@ -170,35 +163,6 @@ impl PosedRobot {
         let local = solid.t_link_world * point;
         let near = box_distance(&solid.bounds, &local) <= limit.max(0.0);
         near.then(|| self.shape.links()[solid.link].signed_distance(&local))
-    }
-
-    /// Unsigned distance to the surface of the union of all bodies \[m\], or `None` beyond `max_distance`.
-    ///
-    /// Exact outside of the robot. Inside, surfaces buried in other bodies are not surface of the
-    /// union: the nearest of the bodies' closest points that is not buried is taken, an upper bound
-    /// that is exact where the very nearest is not buried; if all are, the depth in the deepest
-    /// body, a lower bound.
-    pub fn surface_distance(&self, point: &Point3<f64>, max_distance: f64) -> Option<f64> {
-        let signed = self.signed_distance(point, max_distance)?;
-        if signed >= 0.0 {
-            return Some(signed);
-        }
-        let mut candidates: Vec<(f64, Point3<f64>)> = Vec::new();
-        for solid in &self.solid {
-            let local = solid.t_link_world * point;
-            let bodies = self.shape.links()[solid.link].closest().iter();
-            candidates.extend(bodies.filter_map(|body| {
-                let closest = body.closest(&local, max_distance)?;
-                Some((closest.distance, self.t_world_links[solid.link] * closest.point))
-            }));
-        }
-        candidates.sort_by(|a, b| a.0.total_cmp(&b.0));
-        // A point of a body's own surface lies within rounding of it: only deeper counts as buried.
-        let exposed = |p: &Point3<f64>| !self.signed_distance(p, 0.0).is_some_and(|d| d < -1e-9);
-        match candidates.iter().find(|(_, p)| exposed(p)) {
-            Some((distance, _)) => Some(*distance),
-            None => (-signed <= max_distance).then_some(-signed),
-        }
     }
 }
 
@@ -306,21 +270,6 @@ mod tests {
             }
         }
         assert!(checked > 200);
-    }
-
-    #[test]
-    fn buried_surfaces_do_not_count() {
-        let robot = posed(0.0, 0.002);
-        let palm = robot.t_world_links()[1];
-        let at = |x: f64, y: f64, z: f64| palm * Point3::new(x, y, z);
-        // Half a millimeter under the finger's buried end, 5.5 mm under the palm's top.
-        let near_buried = robot.surface_distance(&at(0.0, 0.0, 0.0345), 1.0).unwrap();
-        assert!(near_buried > 0.005, "{near_buried}");
-        // Far from the finger, inside and outside of the palm's side.
-        let inside = robot.surface_distance(&at(0.018, 0.0, -0.02), 1.0).unwrap();
-        let outside = robot.surface_distance(&at(0.023, 0.0, -0.02), 1.0).unwrap();
-        assert!((inside - 0.002).abs() < 1e-12 && (outside - 0.003).abs() < 1e-12);
-        assert!(robot.surface_distance(&at(0.023, 0.0, -0.02), 0.002).is_none());
     }
 
     #[test]

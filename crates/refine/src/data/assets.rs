@@ -86,7 +86,7 @@ impl FrameInput {
         scene::Frame::new(&self.observation, &self.object, self.hand.as_ref())
     }
 
-    /// Warnings about the object, then about its pose `t_cam_object`: see [`scene::inspect_object`] and [`scene::inspect_pose`].
+    /// Warnings about the object, then about its pose `t_cam_object`: units, frames, and what was assumed.
     pub fn warnings(&self, t_cam_object: &Isometry3<f64>) -> [Vec<String>; 2] {
         let Self { observation, object, hand } = self;
         [

@@ -35,7 +35,7 @@ impl Symmetries {
     /// All symmetries as single motions, the identity first: every discrete one (and the identity) alone
     /// or, where there are axes of revolution, followed by each of [`CONTINUOUS_STEPS`] rotations about
     /// each axis. Axes are not combined with one another, as in BOP.
-    pub(crate) fn transforms(&self) -> Vec<Isometry3<f64>> {
+    pub fn transforms(&self) -> Vec<Isometry3<f64>> {
         let mut spins: Vec<Isometry3<f64>> = Vec::new();
         for ContinuousSymmetry { axis, point } in &self.continuous {
             spins.extend((0..CONTINUOUS_STEPS).map(|i| {

@@ -30,7 +30,7 @@ impl Default for CameraCalibrationError {
 
 impl CameraCalibrationError {
     /// Number of parameters.
-    pub const DIMENSION: usize = 5;
+    pub(crate) const DIMENSION: usize = 5;
 
     /// The parameters, zero where nothing is corrected.
     pub fn parameters(&self) -> [f64; Self::DIMENSION] {
@@ -76,14 +76,18 @@ impl CameraCalibrationError {
 
     /// The pose at which the camera, as it is said to be, would see a thing of center `center` (camera frame) as it does
     /// see it at `pose`: nearer where images are larger, and shifted. To first order in the thing's size over its distance.
-    pub fn reprojected(&self, pose: &Isometry3<f64>, center: &Vector3<f64>) -> Isometry3<f64> {
+    pub(crate) fn reprojected(
+        &self,
+        pose: &Isometry3<f64>,
+        center: &Vector3<f64>,
+    ) -> Isometry3<f64> {
         let z = center.z / (1.0 + self.focal_scale);
         let [right, below] = (self.principal_point * z).into();
         Translation3::new(right, below, z - center.z) * pose
     }
 
     /// Derivatives of the place of [`reprojected`](Self::reprojected): by the place of the pose, then by the parameters.
-    pub fn reprojected_jacobian(&self, center: &Vector3<f64>) -> SMatrix<f64, 3, 8> {
+    pub(crate) fn reprojected_jacobian(&self, center: &Vector3<f64>) -> SMatrix<f64, 3, 8> {
         let larger = 1.0 + self.focal_scale;
         let z = center.z / larger;
         let along = self.principal_point.push(1.0);

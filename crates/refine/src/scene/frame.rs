@@ -118,7 +118,10 @@ impl<'a> Frame<'a> {
     ///
     /// # Errors
     /// [`RefineError::NoDepth`] if no pixel of the grid has a depth.
-    pub fn masked_depths(&self, limit: usize) -> Result<Vec<(usize, usize, f64)>, RefineError> {
+    pub(crate) fn masked_depths(
+        &self,
+        limit: usize,
+    ) -> Result<Vec<(usize, usize, f64)>, RefineError> {
         let Observation { depth, mask, .. } = self.observation;
         let at = |x: usize, y: usize| {
             let z = f64::from(depth.get(x, y)?);

@@ -10,7 +10,7 @@ use super::{Hand, Object, Observation};
 const PLAUSIBLE_EXTENT: std::ops::Range<f64> = 5e-3..5.0;
 
 /// Warnings about an object's model, in plain sentences; empty if all looks well.
-pub fn inspect_object(object: &Object) -> Vec<String> {
+pub(crate) fn inspect_object(object: &Object) -> Vec<String> {
     let mut warnings = Vec::new();
     let extent = 2.0 * object.radius;
     if !PLAUSIBLE_EXTENT.contains(&extent) {
@@ -35,7 +35,7 @@ pub fn inspect_object(object: &Object) -> Vec<String> {
 
 /// Warnings about units and frames at a pose (object → camera), in plain sentences; empty if all looks
 /// well. Those about the object alone are [`inspect_object`]'s.
-pub fn inspect_pose(
+pub(crate) fn inspect_pose(
     observation: &Observation,
     object: &Object,
     robot: Option<&Hand>,

@@ -10,7 +10,7 @@ use prehend_render::RenderModel;
 use crate::error::RefineError;
 
 /// Assumed where an object's mass is unknown \[kg/m³\].
-pub const DEFAULT_DENSITY: f64 = 500.0;
+const DEFAULT_DENSITY: f64 = 500.0;
 
 /// Surface samples kept for contacts and for the mesh-to-cloud distance.
 const SURFACE_SAMPLES: usize = 1500;
@@ -36,7 +36,7 @@ pub struct Object {
     pub report: MeshReport,
     /// Mass and its distribution.
     pub inertial: Inertial,
-    /// Whether `inertial` was assumed (uniform [`DEFAULT_DENSITY`]) rather than given.
+    /// Whether `inertial` was assumed (uniform 500 kg/m³) rather than given.
     pub inertial_assumed: bool,
     /// Center of the bounding box, in object coordinates \[m\].
     pub center: Point3<f64>,

@@ -38,7 +38,7 @@ pub(super) fn read_json<T: DeserializeOwned>(file: &Path) -> Result<Option<T>, D
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(None),
         Err(e) => Err(DatasetError::reading(file, &e)),
         Ok(bytes) => {
-            serde_json::from_slice(&bytes).map(Some).map_err(|e| DatasetError::malformed(file, e))
+            serde_json::from_slice(&bytes).map(Some).map_err(|e| DatasetError::unusable(file, e))
         }
     }
 }

@@ -11,9 +11,15 @@ mod data_metrics;
 mod data_search;
 mod factors;
 mod fused;
+mod icp;
+mod journal;
+mod pose_error;
+mod results;
 mod search;
+mod symmetry;
 mod synth_layout;
 mod tracker;
+mod written_dataset;
 
 use std::path::PathBuf;
 

@@ -76,6 +76,3 @@ fn about(center: &Point3<f64>, turn: &UnitQuaternion<f64>) -> Isometry3<f64> {
     let shift = center.coords - turn * center.coords;
     Isometry3::from_parts(shift.into(), *turn)
 }
-
-#[cfg(test)]
-mod tests;

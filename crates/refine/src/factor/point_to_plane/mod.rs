@@ -11,7 +11,7 @@ use prehend_autodiff::lie::twist_row;
 use prehend_render::Mask;
 use rayon::prelude::*;
 
-pub use self::scatter::NoiseEstimate;
+pub(crate) use self::scatter::NoiseEstimate;
 use self::smooth_field::{Fit, SmoothField};
 use super::patch_sums::{PatchSums, add_to};
 use crate::error::RefineError;

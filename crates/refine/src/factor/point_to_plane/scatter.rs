@@ -6,7 +6,7 @@ use super::{PointToPlaneFactor, Residual};
 
 /// How depth points scatter about a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct NoiseEstimate {
+pub(crate) struct NoiseEstimate {
     /// Standard deviation of a point \[m\].
     pub sigma: f64,
     /// The part of it that neighboring points have in common \[m\].
@@ -37,7 +37,7 @@ impl PointToPlaneFactor {
     ///
     /// Where errors are alike within patches, their means scatter more than means of independent errors would: so many patches as
     /// there are, and as many measurements a patch as the variance of the means is smaller than that of the points.
-    pub fn noise_estimate(&self, state: &State) -> Option<NoiseEstimate> {
+    pub(crate) fn noise_estimate(&self, state: &State) -> Option<NoiseEstimate> {
         let pixels = || self.points.iter().map(|point| point.pixel);
         let (left, right) = (pixels().map(|p| p.0).min()?, pixels().map(|p| p.0).max()?);
         let (top, bottom) = (pixels().map(|p| p.1).min()?, pixels().map(|p| p.1).max()?);

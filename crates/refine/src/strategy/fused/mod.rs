@@ -64,7 +64,7 @@ impl Fused {
     }
 
     /// With a factor that others have, too.
-    pub fn with_shared(mut self, factor: Arc<dyn Factor>) -> Self {
+    pub(crate) fn with_shared(mut self, factor: Arc<dyn Factor>) -> Self {
         self.factors.push(factor);
         self
     }

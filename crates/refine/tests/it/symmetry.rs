@@ -1,8 +1,11 @@
-use nalgebra::Vector3;
+//! Symmetries of meshes.
+
+use nalgebra::{Isometry3, Vector3};
+use prehend_geometry::TriMesh;
 use prehend_geometry::objects::YcbObject;
 use prehend_geometry::shapes::{cone, cuboid, cylinder, sphere};
-
-use super::*;
+use prehend_refine::data::Symmetries;
+use prehend_refine::evaluate::symmetry::{SymmetrySettings, find_symmetries};
 
 fn found(mesh: &TriMesh) -> Symmetries {
     find_symmetries(mesh, &SymmetrySettings::default()).unwrap()
