@@ -1,6 +1,7 @@
 //! Robots: kinematic trees with collision shapes, read from URDF.
 
 mod articulated;
+mod closest;
 mod collision;
 mod error;
 mod kinematics;
@@ -17,6 +18,7 @@ use std::collections::BTreeMap;
 use nalgebra::{Isometry3, Unit, Vector3};
 
 pub use articulated::{ArticulatedRobot, RobotSample};
+pub use closest::RobotClosest;
 pub use error::RobotError;
 pub use posed::PosedRobot;
 pub use screw::Screw;
