@@ -25,10 +25,10 @@ impl Linearization {
         x: &[f64],
         p: &[f64],
     ) -> Result<Self, ImplicitError> {
-        let residual = DVector::from_vec(equation.residual(x, p));
+        let (residual, jacobian) = linearize(equation, x, p);
         check_length(x, residual.len())?;
-        let jacobian = lu(&jacobian(equation, x, p))?;
-        let step = -jacobian.solve(&residual)?;
+        let jacobian = lu(&jacobian)?;
+        let step = -jacobian.solve(&DVector::from_vec(residual))?;
         Ok(Self { jacobian, step })
     }
 
@@ -39,10 +39,14 @@ impl Linearization {
     }
 }
 
-/// ∂F/∂x by forward mode, F having as many components as there are unknowns.
-pub(super) fn jacobian(equation: &impl Residual, x: &[f64], p: &[f64]) -> DMatrix<f64> {
+/// F and ∂F/∂x by forward mode.
+pub(super) fn linearize(
+    equation: &impl Residual,
+    x: &[f64],
+    p: &[f64],
+) -> (Vec<f64>, DMatrix<f64>) {
     let p: Vec<Fwd<CHUNK>> = p.iter().map(|&p| Fwd::constant(p)).collect();
-    forward_jacobian(|x| equation.residual(x, &p), x).1
+    forward_jacobian(|x| equation.residual(x, &p), x)
 }
 
 pub(super) fn check_length(x: &[f64], found: usize) -> Result<(), ImplicitError> {

@@ -1,8 +1,8 @@
 //! Newton's method, to find solutions with.
 
-use nalgebra::{DMatrix, DVector, Dyn, LU};
+use nalgebra::{DMatrix, DVector};
 
-use super::linearization::{check_length, jacobian};
+use super::linearization::{check_length, linearize};
 use super::{ImplicitError, Residual};
 use crate::solve::SolveError;
 
@@ -11,14 +11,11 @@ const MOST_ITERATIONS: usize = 60;
 /// Shortest fraction of a Newton step.
 const SHORTEST: f64 = 1e-6;
 
-/// How much a shortened step has to lower the size of the residual, as a share of what a linear equation would (Armijo).
-const DECREASE: f64 = 1e-4;
+/// Error of an unknown, absolute and relative, that the last step may take away: convergence is quadratic, so that what is left
+/// after it is rounding.
+const LAST: (f64, f64) = (1e-12, 1e-9);
 
-/// A Newton step so short, absolute and relative to the largest unknown, is the last: convergence is quadratic, so that what
-/// is left after it is rounding.
-const LAST: (f64, f64) = (1e-10, 1e-9);
-
-/// So many times the last step is as near as rounding may let it come.
+/// So many times that error is as near as rounding may let it come: what [`solution`](super::solution) tolerates.
 const ROUNDING: f64 = 1e3;
 
 /// As many equations F(x) = 0 as unknowns, for [`newton_on`].
@@ -29,17 +26,24 @@ pub trait Equations {
     /// F(x) and ∂F/∂x.
     fn linearize(&self, x: &DVector<f64>) -> (DVector<f64>, DMatrix<f64>);
 
-    /// The size of a residual, which every step has to lower. Without a unit that all equations share it is the length of
-    /// the Newton step J⁻¹F, `jacobian` being factorized where the step began: a measure that does not depend on the
+    /// The norm of a residual in a unit that all equations share, if there is one. A step then has to lower it (Armijo's
+    /// condition); without one, the length of the next Newton step with the same Jacobian, which does not depend on the
     /// units of F (P. Deuflhard, "Newton methods for nonlinear problems", 2004, chapter 3).
-    fn size(&self, residual: &DVector<f64>, jacobian: &LU<f64, Dyn, Dyn>) -> f64 {
-        jacobian.solve(residual).map_or(f64::INFINITY, |step| step.norm())
+    fn norm(&self, _residual: &DVector<f64>) -> Option<f64> {
+        None
+    }
+
+    /// The error `step` of `x` in multiples of what the last step may take away: by default 10⁻⁹ of each unknown plus 10⁻¹²
+    /// (in its unit).
+    fn error(&self, x: &DVector<f64>, step: &DVector<f64>) -> f64 {
+        let excess = |(x, step): (&f64, &f64)| step.abs() / (LAST.0 + LAST.1 * x.abs());
+        x.iter().zip(step).map(excess).fold(0.0, f64::max)
     }
 }
 
 /// Solves F(x, p) = 0 by Newton's method from `start`.
 ///
-/// A step is halved until what is left of the equations gets smaller ([`Equations::size`]). Lengths are Euclidean, so
+/// A step is halved until the next one, with the same Jacobian, gets shorter: see [`Equations::norm`]. Lengths are Euclidean, so
 /// unknowns of very different size are better scaled by the caller.
 ///
 /// # Errors
@@ -83,14 +87,16 @@ impl<R: Residual> Equations for At<'_, R> {
     }
 
     fn linearize(&self, x: &DVector<f64>) -> (DVector<f64>, DMatrix<f64>) {
-        (self.residual(x), jacobian(self.equation, x.as_slice(), self.p))
+        let (residual, jacobian) = linearize(self.equation, x.as_slice(), self.p);
+        (DVector::from_vec(residual), jacobian)
     }
 }
 
 /// Solves `equations` by Newton's method from `x`, as [`newton`] does, with a Jacobian and a measure of one's own.
 ///
 /// # Errors
-/// If a Jacobian is singular, a number is not finite, or no step makes the residual smaller.
+/// If residual or Jacobian are of another size than the unknowns, the Jacobian is singular, a number is not finite, or no step
+/// makes the residual smaller.
 pub fn newton_on(
     equations: &impl Equations,
     mut x: DVector<f64>,
@@ -101,6 +107,11 @@ pub fn newton_on(
     }
     loop {
         let (residual, jacobian) = equations.linearize(&x);
+        check_length(x.as_slice(), residual.len())?;
+        if jacobian.shape() != (x.len(), x.len()) {
+            let found = jacobian.nrows().max(jacobian.ncols());
+            return Err(ImplicitError::Jacobian { unknowns: x.len(), found });
+        }
         let factors = jacobian.lu();
         let Some(step) = factors.solve(&-&residual) else {
             return Err(SolveError::Singular { condition: f64::INFINITY }.into());
@@ -108,14 +119,17 @@ pub fn newton_on(
         if !step.iter().all(|step| step.is_finite()) {
             return Err(SolveError::NotFinite("Newton step").into());
         }
-        let last = LAST.0 + LAST.1 * x.amax();
-        if step.amax() <= last {
+        let error = equations.error(&x, &step);
+        if error <= 1.0 {
             return Ok(x + step);
         }
-        let size = equations.size(&residual, &factors);
+        let norm = equations.norm(&residual);
         let shortened = |fraction: f64| {
             let next = equations.residual(&(&x + &step * fraction));
-            let lower = equations.size(&next, &factors) <= (1.0 - DECREASE * fraction) * size;
+            let lower = match norm {
+                Some(norm) => equations.norm(&next)? <= (1.0 - 1e-4 * fraction) * norm,
+                None => factors.solve(&next)?.norm() <= (1.0 - 0.5 * fraction) * step.norm(),
+            };
             lower.then_some((fraction, next))
         };
         let mut fractions = std::iter::successors(Some(1.0), |fraction| Some(0.5 * fraction))
@@ -123,7 +137,7 @@ pub fn newton_on(
         iterations += 1;
         let (fraction, next) = match fractions.find_map(shortened) {
             Some(found) if iterations < MOST_ITERATIONS => found,
-            _ if step.amax() <= ROUNDING * last => return Ok(x),
+            _ if error <= ROUNDING => return Ok(x),
             _ => {
                 let (residual, step) = (residual.norm(), step.norm());
                 return Err(ImplicitError::NotConverged { iterations, residual, step });
@@ -132,7 +146,7 @@ pub fn newton_on(
         x += step * fraction;
         // The old Jacobian is near enough to tell, and to take, a step shorter still.
         if let Some(step) = factors.solve(&-next)
-            && step.amax() <= 1e-2 * last
+            && equations.error(&x, &step) <= 1e-2
         {
             return Ok(x + step);
         }
@@ -168,6 +182,24 @@ mod tests {
         for start in [0.5, 3.0, -40.0, 1e5] {
             let x = newton(&Arctangent, &[start, 1.0], &[0.25]).unwrap();
             assert!(x.iter().all(|x| (x - 0.25).abs() < 1e-15), "{start}: {x:?}");
+        }
+    }
+
+    /// x₀ = p, x₁² = 10⁻⁸: unknowns of very different size.
+    struct Apart;
+
+    impl Residual for Apart {
+        fn residual<S: Scalar>(&self, x: &[S], p: &[S]) -> Vec<S> {
+            vec![x[0] - p[0], x[1] * x[1] - S::constant(1e-8)]
+        }
+    }
+
+    #[test]
+    fn a_large_unknown_excuses_no_small_one() {
+        for p in [1.0, 1e5, 1e7] {
+            let x = newton(&Apart, &[p, 1.0], &[p]).unwrap();
+            assert!((x[1] - 1e-4).abs() < 1e-12, "{x:?}");
+            assert!(crate::implicit::solution(Apart, &x, &[p]).is_ok());
         }
     }
 

@@ -33,7 +33,7 @@ impl Symmetries {
     }
 
     /// All symmetries as single motions, the identity first: every discrete one (and the identity) alone
-    /// or, where there are axes of revolution, followed by each of [`CONTINUOUS_STEPS`] rotations about
+    /// or, where there are axes of revolution, followed by each of many rotations about
     /// each axis. Axes are not combined with one another, as in BOP.
     pub fn transforms(&self) -> Vec<Isometry3<f64>> {
         let mut spins: Vec<Isometry3<f64>> = Vec::new();

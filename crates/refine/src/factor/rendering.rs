@@ -60,8 +60,8 @@ impl Default for RenderingSettings {
 
 /// The paper's L_DR with what it leaves open filled in.
 ///
-/// Light: unknown, so eliminated in closed form at every state (variable projection: Golub and Pereyra, 1973). Hand: where
-/// it hides the object there is no residual. Silhouette: coverage is compared with the mask, so that an
+/// Light: unknown, so eliminated in closed form at every state (variable projection: Golub and Pereyra, 1973). Occluders: where
+/// one hides the object there is no residual, but pixels of the mask that the pose has hidden cost as much as missed ones. Silhouette: coverage is compared with the mask, so that an
 /// object as dark as the black outside the mask still has an outline.
 pub struct RenderingFactor {
     object: Arc<Object>,

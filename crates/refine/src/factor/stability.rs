@@ -13,7 +13,7 @@ use crate::error::RefineError;
 use crate::problem::{Block, Factor, NormalEquations, State};
 use crate::scene::Frame;
 
-/// Settings of the physics term.
+/// Settings of the stability factor.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StabilitySettings {
     /// Nats per unit of ln(1 + L_DP), where L_DP is 1 for an object in free fall.

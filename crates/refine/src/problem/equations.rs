@@ -1,4 +1,4 @@
-//! The normal equations that terms add to.
+//! The normal equations that factors add to.
 
 use nalgebra::{DMatrix, DMatrixView, DVector, DVectorView, SMatrix, SVector};
 
@@ -70,8 +70,15 @@ impl NormalEquations {
     }
 
     /// Where the parameters of `block` begin, or `None` if it was not requested.
+    ///
+    /// # Panics
+    /// For joints of another number than was requested.
     pub fn offset(&self, block: Block) -> Option<usize> {
-        let position = self.blocks.iter().position(|&b| b == block)?;
+        let Some(position) = self.blocks.iter().position(|&b| b == block) else {
+            let joints = |b: &Block| matches!(b, Block::Joints(_));
+            assert!(!joints(&block) || !self.blocks.iter().any(joints), "a hand has not {block:?}");
+            return None;
+        };
         Some(self.blocks[..position].iter().map(|b| b.dimension()).sum())
     }
 
@@ -141,6 +148,7 @@ impl NormalEquations {
     /// Derivatives of the row begun last by the parameters of `block`; dropped if nobody requested it.
     #[inline]
     pub(super) fn push_entries(&mut self, block: Block, derivatives: &[f64]) {
+        assert_eq!(derivatives.len(), block.dimension(), "derivatives by {block:?}");
         if let Some(offset) = self.offset(block) {
             self.entries.extend(derivatives.iter().enumerate().map(|(i, &d)| (offset + i, d)));
         }

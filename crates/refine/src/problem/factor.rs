@@ -1,6 +1,7 @@
 //! What one kind of evidence says of a state.
 
 use std::fmt;
+use std::sync::Arc;
 
 use super::{NormalEquations, Rows, State};
 
@@ -52,6 +53,24 @@ pub trait Factor: Send + Sync {
         let mut rows = Rows::linearized(equations);
         self.rows(state, &mut rows);
         rows.cost()
+    }
+}
+
+impl<F: Factor + ?Sized> Factor for Arc<F> {
+    fn name(&self) -> &'static str {
+        (**self).name()
+    }
+
+    fn rows(&self, state: &State, rows: &mut Rows<'_>) {
+        (**self).rows(state, rows);
+    }
+
+    fn cost(&self, state: &State) -> f64 {
+        (**self).cost(state)
+    }
+
+    fn linearize(&self, state: &State, equations: &mut NormalEquations) -> f64 {
+        (**self).linearize(state, equations)
     }
 }
 

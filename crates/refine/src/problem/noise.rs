@@ -33,7 +33,7 @@ impl NoiseModel {
         Self { kernel: self.kernel.widened(factor), ..self }
     }
 
-    /// The weight of one of `count` residuals.
+    /// The weight of one of `count` residuals; the number matters only where they amount to fewer independent ones.
     pub fn weighting(&self, count: usize) -> Weighting {
         let independent = (self.effective_samples / count.max(1) as f64).min(1.0);
         Weighting { information: independent / self.sigma.powi(2), kernel: self.kernel }

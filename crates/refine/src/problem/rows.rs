@@ -55,7 +55,10 @@ pub struct Row<'a> {
 }
 
 impl Row<'_> {
-    /// Writes the derivatives by the parameters of `block`, all of them and once a block; they are dropped if nobody solves for it.
+    /// Writes the derivatives by the parameters of `block`; they are dropped if nobody solves for it.
+    ///
+    /// # Panics
+    /// If there are not as many as the block has parameters, or the state has another number of joints.
     #[inline]
     pub fn block(&mut self, block: Block, derivatives: &[f64]) {
         self.equations.push_entries(block, derivatives);

@@ -33,7 +33,7 @@ impl Block {
     }
 }
 
-/// A point in the space that terms are functions of.
+/// A point in the space that factors are functions of.
 #[derive(Clone, Debug)]
 pub struct State {
     /// Object coordinates → camera coordinates \[m\].

@@ -41,7 +41,7 @@ impl CameraCalibrationError {
     /// With `change` added to the parameters.
     ///
     /// # Panics
-    /// If there are not [`DIMENSION`](Self::DIMENSION) changes.
+    /// If there are not five changes.
     pub fn changed(&self, change: &[f64]) -> Self {
         assert_eq!(change.len(), Self::DIMENSION, "one change a parameter");
         Self {

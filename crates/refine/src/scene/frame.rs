@@ -135,7 +135,7 @@ impl<'a> Frame<'a> {
         if depths.is_empty() { Err(RefineError::NoDepth) } else { Ok(depths) }
     }
 
-    /// The places of [`masked_depths`](Self::masked_depths) in the camera frame \[m\].
+    /// The places of measured depths within the mask in the camera frame \[m\].
     ///
     /// # Errors
     /// [`RefineError::NoDepth`] if no pixel of the grid has a depth.

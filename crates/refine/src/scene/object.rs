@@ -1,4 +1,4 @@
-//! The object whose pose is sought, prepared for every term.
+//! The object whose pose is sought, prepared for every factor.
 
 use nalgebra::{Matrix3, Point3, Vector3};
 use prehend_geometry::closest::ClosestPoints;
@@ -26,7 +26,7 @@ pub struct Inertial {
     pub inertia: Matrix3<f64>,
 }
 
-/// An object model: geometry, appearance, mass, and what the terms precompute from them.
+/// An object model: geometry, appearance, mass, and what the factors precompute from them.
 pub struct Object {
     /// Name for messages.
     pub name: String,

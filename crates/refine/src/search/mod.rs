@@ -1,8 +1,8 @@
 //! The pose of a known object in a hand, from sensors alone.
 
+mod distance_lattice;
 mod evidence;
 mod fine;
-mod lattice;
 mod rough;
 mod settings;
 
@@ -14,9 +14,9 @@ use rayon::prelude::*;
 
 pub use self::settings::SearchSettings;
 
+use self::distance_lattice::DistanceLattice;
 use self::evidence::Evidence;
 use self::fine::FineScorer;
-use self::lattice::DistanceLattice;
 use self::rough::CoarseScorer;
 use crate::error::RefineError;
 use crate::scene::{Frame, Object};
@@ -39,13 +39,13 @@ pub struct PoseCandidate {
 ///    and the hand outside of it. The score is of depth points and their normals, touched taxels, the hand inside the
 ///    object, and surface where the camera sees something else: all by a lattice of signed distances.
 /// 2. The best that differ from each other turn too, and are scored again on more points.
-/// 3. Those left are scored by the terms of the refinement at a low resolution. Only here color counts, which
+/// 3. Those left are scored by the factors of the refinement at a low resolution. Only here color counts, which
 ///    tells the front of a carton from its back; therefore stage 2 keeps many.
-/// 4. Gauss–Newton steps of the sum of the terms, at a low and then at the full resolution.
+/// 4. Gauss–Newton steps of the sum of the factors, at a low and then at the full resolution.
 ///
-/// The terms are depth, color and, where there is a skin, touch. Only what an estimator may know is read: nothing
+/// The factors are depth, color and, where there is a skin, touch. Only what an estimator may know is read: nothing
 /// here takes a pose of the object. A hand that is not known hides what its depth says it hides in stages 1 and 2, and
-/// nothing in the terms: without it, small and much hidden objects are often found turned.
+/// nothing in the factors: without it, small and much hidden objects are often found turned.
 ///
 /// The result does not depend on the number of threads. Poses that look and feel alike (a symmetry) are
 /// equally good; one of them comes first.

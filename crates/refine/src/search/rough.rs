@@ -5,8 +5,8 @@ use prehend_autodiff::Quadratic;
 use prehend_autodiff::lie::{perturb_about, twist_row};
 use prehend_geometry::RobustKernel;
 
+use super::distance_lattice::DistanceLattice;
 use super::evidence::Evidence;
-use super::lattice::DistanceLattice;
 use crate::scene::Object;
 
 /// What a mismatch of normals by one radian counts as \[m\].

@@ -24,7 +24,7 @@ pub struct SearchSettings {
     pub turns: usize,
     /// Hypotheses that stage 2 keeps.
     pub turned: usize,
-    /// The image is made smaller by this factor, beyond that of the rendering term, in stage 3.
+    /// The image is made smaller by this factor, beyond that of the rendering factor, in stage 3.
     pub coarse_resolution: usize,
     /// Hypotheses that stage 3 keeps.
     pub seen: usize,

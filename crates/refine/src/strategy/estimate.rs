@@ -48,7 +48,7 @@ pub struct Estimate {
     pub state: State,
     /// The iteration that it comes from.
     pub iteration: usize,
-    /// How uncertain it is; only the fused estimator knows.
+    /// How uncertain it is: some from the fused estimator, none from the other strategies.
     pub posterior: Option<Posterior>,
     /// What happened on the way.
     pub trace: Trace,
@@ -102,6 +102,16 @@ impl<'a, 'b> Recorder<'a, 'b> {
     /// Records that the walk is at `state`.
     pub(super) fn visit(&mut self, state: &State, iteration: Iteration) -> ControlFlow<()> {
         let score = self.judge.as_ref().map(|judge| judge.cost(state));
+        self.visit_judged(state, iteration, score)
+    }
+
+    /// The same with the judge's cost, if it is known: the state of the lowest is the best.
+    pub(super) fn visit_judged(
+        &mut self,
+        state: &State,
+        iteration: Iteration,
+        score: Option<f64>,
+    ) -> ControlFlow<()> {
         if score.is_none_or(|score| score < self.lowest) {
             self.lowest = score.unwrap_or(f64::INFINITY);
             (self.best, self.at) = (state.clone(), iteration.index);

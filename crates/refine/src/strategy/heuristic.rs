@@ -53,16 +53,16 @@ fn unknown(text: &str) -> String {
 
 /// The paper's heuristic.
 ///
-/// Each iteration takes one candidate step along the gradient of every term, measures the change ΔLᵢ of
-/// that term's own value, weighs it αᵢ ∝ max(0, −ΔLᵢ), Σαᵢ = 1, and applies the weighted sum of the steps.
+/// Each iteration takes one candidate step along the gradient of every factor, measures the change ΔLᵢ of
+/// that factor's own value, weighs it αᵢ ∝ max(0, −ΔLᵢ), Σαᵢ = 1, and applies the weighted sum of the steps.
 /// Three things that the paper leaves open are settled so:
 ///
-/// - *Scales of the gradients.* A step is −(Hᵢ + μ)⁻¹ gᵢ with the term's own Gauss–Newton matrix Hᵢ, so
-///   translations and rotations of any term come out in the right proportion.
-/// - *Scales of the losses.* Terms are in nats ([`Factor`]), so that ΔLᵢ of different terms compare.
-/// - *Step lengths.* Steps are at most a common length that grows by a tenth while the sum of the terms
+/// - *Scales of the gradients.* A step is −(Hᵢ + μ)⁻¹ gᵢ with the factor's own Gauss–Newton matrix Hᵢ, so
+///   translations and rotations of any factor come out in the right proportion.
+/// - *Scales of the losses.* Factors are in nats ([`Factor`]), so that ΔLᵢ of different factors compare.
+/// - *Step lengths.* Steps are at most a common length that grows by a tenth while the sum of the factors
 ///   reaches new lows, shrinks by a tenth when it does not, and by half when nothing improves. Without it
-///   the terms take turns in pulling the pose all the way to their own optimum, and the weights, which
+///   the factors take turns in pulling the pose all the way to their own optimum, and the weights, which
 ///   always sum to one, never let it rest.
 #[derive(Clone, Debug)]
 pub struct Heuristic {
@@ -143,6 +143,12 @@ impl Heuristic {
         if factors.is_empty() { Err(RefineError::NoFactors) } else { Ok(factors) }
     }
 
+    /// The factor whose lowest cost is the checkpoint, if it is among those that are walked down.
+    fn judged(&self) -> Option<usize> {
+        let rendering = |gradient: &GradientKind| *gradient == GradientKind::Rendering;
+        self.gradients.iter().position(rendering).filter(|_| self.checkpoint)
+    }
+
     /// Walks from `state`, down `factors`; `radius` is the object's \[m\].
     fn walk(
         &self,
@@ -151,6 +157,7 @@ impl Heuristic {
         radius: f64,
         recorder: &mut Recorder<'_, '_>,
     ) {
+        let judged = self.judged();
         let mut length = self.first_step;
         let mut least = f64::INFINITY;
         for index in 0..=self.iterations {
@@ -165,7 +172,15 @@ impl Heuristic {
             let step: Vector6<f64> =
                 weights.iter().zip(&candidates).map(|(&a, c)| c.step * a).sum();
             let values = candidates.iter().map(|c| c.cost).collect();
-            let go_on = recorder.visit(&state, Iteration { index, values, weights, step: length });
+            let iteration = Iteration { index, values, weights, step: length };
+            let go_on = match judged {
+                // What would judge has been computed.
+                Some(index) => {
+                    let score = candidates[index].cost;
+                    recorder.visit_judged(&state, iteration, Some(score))
+                }
+                None => recorder.visit(&state, iteration),
+            };
             let longest = candidates.iter().map(|c| c.length).fold(0.0, f64::max);
             let done = length.min(longest) < self.step_tolerance;
             if go_on.is_break() || (done && !self.exhaustive) {
@@ -191,7 +206,8 @@ impl Strategy for Heuristic {
         observe: &mut Observer<'_>,
     ) -> Result<Estimate, RefineError> {
         let factors = self.factors(frame, initial)?;
-        let judge = Recorder::judge(frame, self.checkpoint, &self.rendering)?;
+        let judged = self.judged();
+        let judge = Recorder::judge(frame, self.checkpoint && judged.is_none(), &self.rendering)?;
         // The gradients' names rather than the factors', as options and files have them.
         let gradients = self.gradients.iter().map(|gradient| gradient.name());
         let names = gradients.chain(self.factors.iter().map(|factor| factor.name()));

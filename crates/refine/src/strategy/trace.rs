@@ -7,21 +7,21 @@ use serde::{Deserialize, Deserializer, Serialize};
 pub struct Iteration {
     /// Number of the iteration; 0 is the initial pose.
     pub index: usize,
-    /// Value of each term \[nats\], NaN where it is not finite and was read from a file; a strategy without terms says
+    /// Value of each factor \[nats\], NaN where it is not finite and was read from a file; a strategy without factors says
     /// what its one value is.
     #[serde(deserialize_with = "null_as_nan")]
     pub values: Vec<f64>,
-    /// Weight αᵢ of each term's step.
+    /// Weight αᵢ of each factor's step.
     #[serde(deserialize_with = "null_as_nan")]
     pub weights: Vec<f64>,
-    /// Length limit of the steps \[m\]; for a strategy without terms, the length of the step taken next.
+    /// Length limit of the steps \[m\]; for a strategy without factors, the length of the step taken next.
     pub step: f64,
 }
 
 /// The history of a refinement.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Trace {
-    /// Names of the terms, in the order of `values` and `weights`.
+    /// Names of the factors, in the order of `values` and `weights`.
     pub terms: Vec<String>,
     /// All the iterations, the initial pose first.
     pub iterations: Vec<Iteration>,

@@ -5,9 +5,9 @@ use std::time::{Duration, Instant};
 /// What the time of a frame went into.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Timing {
-    /// Preparing images, points and terms.
+    /// Preparing images, points and factors.
     pub preparation: Duration,
-    /// Evaluating terms and solving for steps.
+    /// Evaluating factors and solving for steps.
     pub steps: Duration,
     /// Covariances and checks.
     pub validation: Duration,

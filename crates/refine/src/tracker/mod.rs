@@ -280,7 +280,7 @@ impl Tracker {
         initial: &State,
     ) -> Result<(Solved, Posterior), RefineError> {
         let fused = Fused::new(self.settings.fused.clone());
-        let fused = self.factors.iter().cloned().fold(fused, Fused::with_shared);
+        let fused = self.factors.iter().cloned().fold(fused, Fused::with);
         let estimate = fused.run(frame, initial, &mut |_| ControlFlow::Continue(()))?;
         let prior = GaussianPrior::independent(initial.clone(), &self.settings.fused.prior)?;
         let problem = self.stage_problem(frame, initial, Arc::new(prior))?;

@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 
 use image::{ImageBuffer, Luma, Rgb};
 use nalgebra::{Isometry3, Vector3};
-use prehend_refine::data::bop::{Dataset, DatasetError, GroundTruth, UNITS_PER_NEWTON};
+use prehend_refine::data::bop::{
+    Dataset, DatasetError, GroundTruth, SceneBodies, Tactile, UNITS_PER_NEWTON,
+};
 
 const R: &str = "[0, -1, 0, 1, 0, 0, 0, 0, 1]";
 
@@ -115,7 +117,7 @@ fn reads_everything_in_meters_and_newtons() {
     );
     assert_eq!(seen.depth.pixels(), [0.5; 12]);
     assert_eq!(seen.mask.count(), 1);
-    let bodies = frame.bodies().unwrap();
+    let bodies: SceneBodies = frame.bodies().unwrap();
     assert_eq!(bodies.gravity, Vector3::new(0.0, 9.81, 0.0));
     let hand = bodies.body("hand").unwrap();
     assert_eq!(hand.urdf, fixture.root().join("hand/hand.urdf"));
@@ -124,7 +126,7 @@ fn reads_everything_in_meters_and_newtons() {
         hand.joints.iter().map(|(n, &q)| (n.as_str(), q)).collect::<Vec<_>>(),
         [("a", -1.0), ("b", 0.5)]
     );
-    let tactile = frame.tactile().unwrap();
+    let tactile: Tactile = frame.tactile().unwrap();
     assert_eq!(tactile.force[1] * UNITS_PER_NEWTON, Vector3::new(100.0, -250.0, 10000.0));
     assert_eq!(tactile.taxels, fixture.root().join("hand/taxels.csv"));
     assert!(dataset.frame(4, 3).unwrap().rgb_path().unwrap().ends_with("rgb/000003.jpg"));

@@ -45,7 +45,7 @@ fn all(frame: &Frame<'_>, state: &State) -> Result<Vec<Arc<dyn Factor>>, RefineE
 }
 
 #[test]
-fn every_factor_falls_along_its_gradient_as_fast_as_it_says() {
+fn every_factor_changes_as_its_gradient_says() {
     let frame = frame();
     let initial = State::new(&frame, &SCENE.initial).unwrap();
     let blocks = [Block::ObjectPose];
@@ -55,21 +55,23 @@ fn every_factor_falls_along_its_gradient_as_fast_as_it_says() {
         let cost = factor.linearize(&off, &mut equations);
         let name = factor.name();
         assert!((cost - factor.cost(&off)).abs() <= 1e-9 * cost.abs(), "{name}: {cost}");
-        // The hand's depth says nothing of the object.
-        let gradient = Vector6::from_column_slice(equations.gradient().as_slice());
         let units = Vector6::from(UNITS);
-        let steepest: Vector6<f64> = -gradient.component_mul(&units);
-        let Some(direction) = steepest.try_normalize(0.0) else {
-            assert_eq!(name, "hand-depth");
-            continue;
-        };
+        let gradient = Vector6::from_column_slice(equations.gradient().as_slice());
+        let gradient = gradient.component_mul(&units);
         // Pictures are of single precision.
         let length = if name == "rendering" { 5e-5 } else { 1e-7 };
-        let step = direction.component_mul(&units) * length;
-        let at = |step: Vector6<f64>| factor.cost(&off.retract(&blocks, step.as_slice()));
-        let (fallen, promised) = (at(-step) - at(step), -2.0 * gradient.dot(&step));
+        let differences = Vector6::from_fn(|k, _| {
+            let at = |step: f64| {
+                let mut twist = [0.0; 6];
+                twist[k] = step * UNITS[k];
+                factor.cost(&off.retract(&blocks, &twist))
+            };
+            (at(length) - at(-length)) / (2.0 * length)
+        });
         // Point-to-plane leaves out what few points pull that were matched with faces that look away.
-        assert!((fallen / promised - 1.0).abs() < 0.05, "{name}: {fallen} {promised}");
+        let tolerance = if name == "point-to-plane" { 0.05 } else { 0.02 };
+        let error = (gradient - differences).norm();
+        assert!(error <= tolerance * differences.norm(), "{name}: {gradient} {differences}");
     }
 }
 

@@ -57,7 +57,8 @@ impl Integrator for BackwardEuler {
         }
         equations.lifted = &leaky;
         let inverse = equations.linearize(&solution).1.try_inverse();
-        let inverse = inverse.ok_or_else(|| equations.unsolved(0.0, 0))?;
+        let inverse =
+            inverse.ok_or_else(|| equations.unsolved(equations.residual(&solution).norm(), 0))?;
         Ok(carried(world, states, &equations, &solution, &inverse))
     }
 

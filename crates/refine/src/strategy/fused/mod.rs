@@ -58,14 +58,9 @@ impl Fused {
         Self { settings, factors: Vec::new() }
     }
 
-    /// With a factor of one's own.
-    pub fn with(self, factor: impl Factor + 'static) -> Self {
-        self.with_shared(Arc::new(factor))
-    }
-
-    /// With a factor that others have, too.
-    pub(crate) fn with_shared(mut self, factor: Arc<dyn Factor>) -> Self {
-        self.factors.push(factor);
+    /// With a factor of one's own; its noise model is believed as it is stated.
+    pub fn with(mut self, factor: impl Factor + 'static) -> Self {
+        self.factors.push(Arc::new(factor));
         self
     }
 }

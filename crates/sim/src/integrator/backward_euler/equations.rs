@@ -1,6 +1,6 @@
 //! The equations of an implicit step.
 
-use nalgebra::{DMatrix, DVector, Dyn, LU, Matrix6, Vector3, Vector6};
+use nalgebra::{DMatrix, DVector, Matrix6, Vector3, Vector6};
 use prehend_autodiff::implicit::{Equations, ImplicitError, newton_on};
 use prehend_autodiff::lie::so3_exp;
 use prehend_autodiff::{Fwd, Scalar};
@@ -164,7 +164,7 @@ impl Equations for ImplicitStep<'_> {
     }
 
     /// The velocity of equal kinetic energy of 1 kg \[m/s\].
-    fn size(&self, velocities: &DVector<f64>, _: &LU<f64, Dyn, Dyn>) -> f64 {
+    fn norm(&self, velocities: &DVector<f64>) -> Option<f64> {
         let energy = |(slot, &body): (usize, &BodyId)| {
             let rigid = self.world.bodies[body].rigid()?;
             let at = Vector6::from(velocity_at(velocities, slot));
@@ -172,7 +172,12 @@ impl Equations for ImplicitStep<'_> {
             let inertia = rigid.world_inertia(&self.states[body].pose.rotation);
             Some(rigid.mass() * linear.norm_squared() + angular.dot(&(inertia * angular)))
         };
-        self.free.iter().enumerate().filter_map(energy).sum::<f64>().sqrt()
+        Some(self.free.iter().enumerate().filter_map(energy).sum::<f64>().sqrt())
+    }
+
+    /// By the fastest body \[m/s, rad/s\].
+    fn error(&self, x: &DVector<f64>, step: &DVector<f64>) -> f64 {
+        step.amax() / (1e-10 + 1e-9 * x.amax())
     }
 }
 

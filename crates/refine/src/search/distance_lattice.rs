@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use crate::scene::Object;
 
 /// Signed distances at the nodes of a lattice around an object, interpolated linearly: a hundred thousand poses are
-/// judged by it, and a millimeter of error does no harm. Where it matters, the terms ask the exact surface.
+/// judged by it, and a millimeter of error does no harm. Where it matters, the factors ask the exact surface.
 pub(super) struct DistanceLattice {
     low: Point3<f64>,
     spacing: f64,

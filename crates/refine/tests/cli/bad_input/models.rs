@@ -1,0 +1,113 @@
+//! Faults of models and hands.
+
+use super::*;
+
+#[test]
+fn models_and_hands() {
+    table(
+        &[
+            (
+                "no ply",
+                |p| {
+                    other_object(p, |_| ());
+                    p.write("ds/models/obj_000006.ply", "no mesh");
+                },
+                &["ds/models/obj_000006.ply: "],
+            ),
+            (
+                "truncated ply",
+                |p| {
+                    other_object(p, |_| ());
+                    p.truncate("ds/models/obj_000006.ply", 0.5);
+                },
+                &["ds/models/obj_000006.ply: "],
+            ),
+            (
+                "texture missing",
+                |p| {
+                    other_object(p, |_| ());
+                    p.remove("ds/models/obj_000006.png");
+                },
+                &["ds/models/obj_000006.ply: texture obj_000006.png: "],
+            ),
+            (
+                "all faces flat",
+                |p| {
+                    other_object(p, |m| {
+                        m.vertices.iter_mut().for_each(|v| *v = Point3::new(v.x, 0.0, 0.0));
+                    })
+                },
+                &["ds/models/obj_000006.ply: the mesh is degenerate"],
+            ),
+            (
+                "all in one point",
+                |p| {
+                    other_object(p, |m| {
+                        m.vertices.iter_mut().for_each(|v| *v = Point3::origin());
+                    })
+                },
+                &["ds/models/obj_000006.ply: the mesh "],
+            ),
+            (
+                "not a number in the mesh",
+                |p| other_object(p, |m| m.vertices[3].y = f64::NAN),
+                &["ds/models/obj_000006.ply: "],
+            ),
+            (
+                "open without inertia",
+                |p| {
+                    other_object(p, |m| {
+                        m.faces.pop();
+                    });
+                    p.edit_json("ds/models/models_info.json", |info| {
+                        info["6"].as_object_mut().unwrap().remove("inertia_kg_m2");
+                    });
+                },
+                &[
+                    "ds/models/obj_000006.ply: the mesh is not closed (3 edges",
+                    "inertia must all be given",
+                ],
+            ),
+            (
+                "text for a mass",
+                |p| {
+                    other_object(p, |_| ());
+                    p.edit_json("ds/models/models_info.json", |info| {
+                        info["6"]["mass_kg"] = json!("heavy")
+                    });
+                },
+                &["ds/models/models_info.json: 6.mass_kg: is not a finite number"],
+            ),
+            (
+                "hand absent",
+                |p| {
+                    entry(p, "scene_bodies.json", |e| {
+                        e["bodies"][0]["urdf"] = json!("hand/none.urdf")
+                    })
+                },
+                &["ds/hand/none.urdf"],
+            ),
+            (
+                "hand of broken XML",
+                |p| other_hand(p, |urdf| urdf.replacen("</link>", "", 1)),
+                &["ds/hand/other.urdf: invalid URDF: "],
+            ),
+            (
+                "hand with a missing mesh",
+                |p| {
+                    other_hand(p, |urdf| {
+                        let (a, rest) = urdf.split_once("<collision>").unwrap();
+                        let (_, b) = rest.split_once("</collision>").unwrap();
+                        let mesh = "<geometry><mesh filename=\"palm.stl\"/></geometry>";
+                        format!("{a}<collision>{mesh}</collision>{b}")
+                    })
+                },
+                &[
+                    "ds/hand/other.urdf: link '",
+                    "collision mesh 'palm.stl': no such file in ds/hand",
+                ],
+            ),
+        ],
+        &OTHERS,
+    );
+}
