@@ -123,6 +123,11 @@ impl RenderingFactor {
         Light::fit(&samples, self.light_ridge).unwrap_or_else(|_| Light::ambient(1.0))
     }
 
+    /// Under the light that is best at `state`.
+    fn lit_at(&self, state: &State) -> Lit<'_> {
+        Lit { factor: self, light: self.light(state) }
+    }
+
     /// The cost under a `light`.
     fn lit_cost(&self, state: &State, light: &Light) -> f64 {
         let (model, seen) = (&self.object.model, reprojected(state));
@@ -170,11 +175,35 @@ impl Factor for RenderingFactor {
     }
 
     fn cost(&self, state: &State) -> f64 {
-        self.lit_cost(state, &self.light(state))
+        self.lit_at(state).cost(state)
     }
 
     fn linearize(&self, state: &State, equations: &mut NormalEquations) -> f64 {
-        self.lit_linearize(state, &self.light(state), equations)
+        self.lit_at(state).linearize(state, equations)
+    }
+
+    fn conditional_at(&self, state: &State) -> Option<Box<dyn Factor + '_>> {
+        Some(Box::new(self.lit_at(state)))
+    }
+}
+
+/// The factor under a light.
+struct Lit<'a> {
+    factor: &'a RenderingFactor,
+    light: Light,
+}
+
+impl Factor for Lit<'_> {
+    fn name(&self) -> &'static str {
+        self.factor.name()
+    }
+
+    fn cost(&self, state: &State) -> f64 {
+        self.factor.lit_cost(state, &self.light)
+    }
+
+    fn linearize(&self, state: &State, equations: &mut NormalEquations) -> f64 {
+        self.factor.lit_linearize(state, &self.light, equations)
     }
 }
 
@@ -190,42 +219,16 @@ mod tests {
         RenderingFactor::new(frame, &RenderingSettings::default()).unwrap()
     }
 
-    /// Derivatives are those at a fixed light.
-    struct Lit<'a> {
-        factor: &'a RenderingFactor,
-        light: Light,
-    }
-
-    impl<'a> Lit<'a> {
-        fn as_at(factor: &'a RenderingFactor, state: &State) -> Self {
-            Self { factor, light: factor.light(state) }
-        }
-    }
-
-    impl Factor for Lit<'_> {
-        fn name(&self) -> &'static str {
-            "lit"
-        }
-
-        fn cost(&self, state: &State) -> f64 {
-            self.factor.lit_cost(state, &self.light)
-        }
-
-        fn linearize(&self, state: &State, equations: &mut NormalEquations) -> f64 {
-            self.factor.lit_linearize(state, &self.light, equations)
-        }
-    }
-
     #[test]
     fn gradient_matches_differences() {
         for seed in 0..3 {
             let (frame, mut state) = fixture(seed);
             let factor = factor(&frame);
             // Pixels are in single precision and texture has kinks: a step of some hundredths of a pixel.
-            assert_gradient(&Lit::as_at(&factor, &state), &state, Block::ObjectPose, 5e-5, 0.03);
+            assert_gradient(&factor.lit_at(&state), &state, Block::ObjectPose, 5e-5, 0.03);
             state.camera = state.camera.changed(&[0.0, 0.0, 1e-3, -1e-3, 3e-3]);
             // The camera moves the object as its own pose does, with that gradient's error at this state.
-            assert_gradient(&Lit::as_at(&factor, &state), &state, Block::Camera, 5e-5, 0.1);
+            assert_gradient(&factor.lit_at(&state), &state, Block::Camera, 5e-5, 0.1);
         }
     }
 

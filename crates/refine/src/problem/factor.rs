@@ -54,6 +54,12 @@ pub trait Factor: Send + Sync {
         self.rows(state, &mut rows);
         rows.cost()
     }
+
+    /// The factor given what it eliminates in closed form (a light), which has the values that are best at `state`; none if it
+    /// eliminates nothing. Its gradient is that of its cost, and its cost takes less to compute.
+    fn conditional_at(&self, _state: &State) -> Option<Box<dyn Factor + '_>> {
+        None
+    }
 }
 
 impl<F: Factor + ?Sized> Factor for Arc<F> {
@@ -71,6 +77,10 @@ impl<F: Factor + ?Sized> Factor for Arc<F> {
 
     fn linearize(&self, state: &State, equations: &mut NormalEquations) -> f64 {
         (**self).linearize(state, equations)
+    }
+
+    fn conditional_at(&self, state: &State) -> Option<Box<dyn Factor + '_>> {
+        (**self).conditional_at(state)
     }
 }
 

@@ -232,6 +232,9 @@ struct Candidate {
 
 impl Candidate {
     fn of(factor: &dyn Factor, state: &State, radius: f64, length: f64) -> Self {
+        // The step is judged by what it was made for.
+        let conditional = factor.conditional_at(state);
+        let factor = conditional.as_deref().unwrap_or(factor);
         let mut equations = NormalEquations::new(&[Block::ObjectPose]);
         let cost = factor.linearize(state, &mut equations);
         let gradient = Vector6::from_column_slice(equations.gradient().as_slice());
