@@ -6,6 +6,7 @@
 #![allow(clippy::unwrap_used)] // a test may panic; helpers outside test functions count as code to the lint
 
 mod balls;
+mod compliant_balance;
 mod flight;
 mod friction;
 mod integrators;
