@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 use image::{DynamicImage, ImageFormat};
 use prehend_geometry::write_atomic;
 
+use crate::projected::Region;
+
 /// Why an image could not be read, written or built.
 #[derive(Debug, thiserror::Error)]
 pub enum ImageError {
@@ -270,6 +272,12 @@ impl Mask {
     /// Number of set pixels.
     pub fn count(&self) -> usize {
         self.pixels.iter().filter(|m| **m).count()
+    }
+
+    /// Left, top, width and height of the smallest rectangle around all set pixels, if there are any.
+    pub fn bounds(&self) -> Option<[usize; 4]> {
+        let Region { x0, y0, x1, y1 } = Region::around(self.width, &self.pixels, |&m| m)?;
+        Some([x0, y0, x1 - x0, y1 - y0])
     }
 }
 

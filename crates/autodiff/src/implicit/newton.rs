@@ -70,7 +70,6 @@ pub fn newton(
     start: &[f64],
     p: &[f64],
 ) -> Result<Vec<f64>, ImplicitError> {
-    check_length(start, equation.residual(start, p).len())?;
     let x = newton_on(&At { equation, p }, DVector::from_column_slice(start))?;
     Ok(x.as_slice().to_vec())
 }
@@ -102,15 +101,15 @@ pub fn newton_on(
     mut x: DVector<f64>,
 ) -> Result<DVector<f64>, ImplicitError> {
     let mut iterations = 0;
-    if x.is_empty() {
-        return Ok(x);
-    }
     loop {
         let (residual, jacobian) = equations.linearize(&x);
         check_length(x.as_slice(), residual.len())?;
         if jacobian.shape() != (x.len(), x.len()) {
             let found = jacobian.nrows().max(jacobian.ncols());
             return Err(ImplicitError::Jacobian { unknowns: x.len(), found });
+        }
+        if x.is_empty() {
+            return Ok(x);
         }
         let factors = jacobian.lu();
         let Some(step) = factors.solve(&-&residual) else {

@@ -1,6 +1,6 @@
 //! Forward kinematics over any scalar, and the geometric Jacobian.
 
-use nalgebra::{Isometry3, Matrix6xX, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix6xX, Point3, Quaternion, Translation3, UnitQuaternion};
 use prehend_autodiff::Scalar;
 
 use super::{Drive, Joint, KinematicTree, Motion};
@@ -33,26 +33,14 @@ impl KinematicTree {
     /// If `joints` has not one entry a name, or there is no such link.
     pub fn jacobian(&self, joints: &[f64], link: usize, point: &Point3<f64>) -> Matrix6xX<f64> {
         let poses = self.forward_kinematics(joints);
-        let tip = poses[link] * point;
+        let (screws, tip) = (self.screws(&poses), poses[link] * point);
         let mut jacobian = Matrix6xX::zeros(joints.len());
-        let mut current = link;
-        while let Some(joint) = self.joints.iter().find(|j| j.child == current) {
-            if let Drive::Variable { index, multiplier, .. } = joint.drive {
-                let t_base_joint = poses[joint.parent] * joint.t_parent_joint;
-                let axis = t_base_joint.rotation * joint.axis.into_inner() * multiplier;
-                let (linear, angular) = match joint.motion {
-                    Motion::Revolute => {
-                        (axis.cross(&(tip.coords - t_base_joint.translation.vector)), axis)
-                    }
-                    Motion::Prismatic => (axis, Vector3::zeros()),
-                    Motion::Fixed => (Vector3::zeros(), Vector3::zeros()),
-                };
-                for i in 0..3 {
-                    jacobian[(i, index)] += linear[i];
-                    jacobian[(i + 3, index)] += angular[i];
-                }
+        for screw in self.paths()[link].iter().map(|&s| &screws[s]) {
+            let (linear, mut column) = (screw.velocity(&tip), jacobian.column_mut(screw.variable));
+            for i in 0..3 {
+                column[i] += linear[i];
+                column[i + 3] += screw.angular[i];
             }
-            current = joint.parent;
         }
         jacobian
     }
@@ -86,6 +74,8 @@ fn constant<S: Scalar>(t: &Isometry3<f64>) -> Isometry3<S> {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Vector3;
+
     use super::*;
     use prehend_autodiff::{Fwd, Var, gradient};
 

@@ -1,4 +1,4 @@
-//! NormalEquations equations taken apart.
+//! Normal equations taken apart.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 

@@ -99,19 +99,14 @@ impl<'a, 'b> Recorder<'a, 'b> {
         checkpoint.then(|| RenderingFactor::new(frame, settings)).transpose()
     }
 
-    /// Records that the walk is at `state`.
-    pub(super) fn visit(&mut self, state: &State, iteration: Iteration) -> ControlFlow<()> {
-        let score = self.judge.as_ref().map(|judge| judge.cost(state));
-        self.visit_judged(state, iteration, score)
-    }
-
-    /// The same with the judge's cost, if it is known: the state of the lowest is the best.
-    pub(super) fn visit_judged(
+    /// Records that the walk is at `state`, with the judge's cost there if it is known already.
+    pub(super) fn visit(
         &mut self,
         state: &State,
         iteration: Iteration,
         score: Option<f64>,
     ) -> ControlFlow<()> {
+        let score = score.or_else(|| Some(self.judge.as_ref()?.cost(state)));
         if score.is_none_or(|score| score < self.lowest) {
             self.lowest = score.unwrap_or(f64::INFINITY);
             (self.best, self.at) = (state.clone(), iteration.index);

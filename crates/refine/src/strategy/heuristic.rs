@@ -173,14 +173,8 @@ impl Heuristic {
                 weights.iter().zip(&candidates).map(|(&a, c)| c.step * a).sum();
             let values = candidates.iter().map(|c| c.cost).collect();
             let iteration = Iteration { index, values, weights, step: length };
-            let go_on = match judged {
-                // What would judge has been computed.
-                Some(index) => {
-                    let score = candidates[index].cost;
-                    recorder.visit_judged(&state, iteration, Some(score))
-                }
-                None => recorder.visit(&state, iteration),
-            };
+            let score = judged.map(|judge| candidates[judge].cost);
+            let go_on = recorder.visit(&state, iteration, score);
             let longest = candidates.iter().map(|c| c.length).fold(0.0, f64::max);
             let done = length.min(longest) < self.step_tolerance;
             if go_on.is_break() || (done && !self.exhaustive) {

@@ -49,7 +49,7 @@ pub(super) fn walk(
         let (value, equations) = equations(&state, index);
         let (step, length) = damped_step(&equations, radius, rule.damping, f64::INFINITY);
         let iteration = Iteration { index, values: vec![value], weights: vec![1.0], step: length };
-        if recorder.visit(&state, iteration).is_break() || length <= rule.tolerance {
+        if recorder.visit(&state, iteration, None).is_break() || length <= rule.tolerance {
             break;
         }
         state = state.retract(&[Block::ObjectPose], step.as_slice());

@@ -94,13 +94,7 @@ fn pose(suffix: &str, pose: &Isometry3<f64>) -> Map<String, Value> {
 
 /// Left, top, width and height of what is set, BOP's all −1 if nothing is.
 fn bounding_box(mask: &Mask) -> [i64; 4] {
-    let mut bounds: Option<[i64; 4]> = None;
-    for (i, _) in mask.pixels().iter().enumerate().filter(|(_, set)| **set) {
-        let (x, y) = ((i % mask.width()) as i64, (i / mask.width()) as i64);
-        let [l, t, r, b] = bounds.unwrap_or([x, y, x, y]);
-        bounds = Some([l.min(x), t.min(y), r.max(x), b.max(y)]);
-    }
-    bounds.map_or([-1; 4], |[l, t, r, b]| [l, t, r - l + 1, b - t + 1])
+    mask.bounds().map_or([-1; 4], |bounds| bounds.map(|v| v as i64))
 }
 
 #[cfg(test)]

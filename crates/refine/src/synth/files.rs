@@ -13,7 +13,7 @@ use serde_json::{Map, Value};
 
 use super::annotation;
 use crate::data::AssetError;
-use crate::data::bop::{DatasetError, ResultRow, create_folder, write_atomically};
+use crate::data::bop::{self, DatasetError, ResultRow, create_folder, write_atomically};
 use crate::scene::{Inertial, Observation};
 
 /// Removes what was being written in the folder and below when a process ended: such files are hidden and end in `.tmp`.
@@ -34,12 +34,9 @@ pub(super) fn remove_temporary(folder: &Path) -> Result<(), DatasetError> {
 
 /// What a JSON file holds, if it is there.
 pub(super) fn read_json<T: DeserializeOwned>(file: &Path) -> Result<Option<T>, DatasetError> {
-    match fs::read(file) {
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(None),
-        Err(e) => Err(DatasetError::reading(file, &e)),
-        Ok(bytes) => {
-            serde_json::from_slice(&bytes).map(Some).map_err(|e| DatasetError::unusable(file, e))
-        }
+    match bop::read_json(file) {
+        Err(DatasetError::Missing { .. }) => Ok(None),
+        read => read.map(Some),
     }
 }
 

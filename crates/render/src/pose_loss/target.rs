@@ -73,7 +73,8 @@ impl Target {
         check(&camera, "mask", mask.width(), mask.height())?;
         camera.check()?;
         // Outside the mask's bounds, which is most of the image, all is zero.
-        let bounds = bounds(camera.width, mask.pixels(), |&m| m).ok_or(TargetError::EmptyMask)?;
+        let bounds =
+            Region::around(camera.width, mask.pixels(), |&m| m).ok_or(TargetError::EmptyMask)?;
         let pixels = camera.width * camera.height;
         let (mut color, mut coverage) = (vec![[0.0; 3]; pixels], vec![0.0; pixels]);
         for at in bounds.indices(camera.width).filter(|at| mask.pixels()[*at]) {
@@ -104,7 +105,8 @@ impl Target {
             coverage.into_iter().map(|a| if a > 0.0 { a.min(1.0) } else { 0.0 }).collect();
         let covered = image.pixels().iter().zip(&coverage);
         let color = covered.map(|(c, a)| if *a > 0.0 { *c } else { [0.0; 3] }).collect();
-        let bounds = bounds(camera.width, &coverage, |&a| a > 0.0).ok_or(TargetError::EmptyMask)?;
+        let bounds =
+            Region::around(camera.width, &coverage, |&a| a > 0.0).ok_or(TargetError::EmptyMask)?;
         Self::assemble(camera, color, coverage, bounds)
     }
 
@@ -191,23 +193,12 @@ impl Target {
             return Err(TargetError::NotFinite { x: at % camera.width, y: at / camera.width });
         }
         // Blocks that were cut off may have been all that there was.
-        let bounds = bounds(camera.width, &coverage, |&a| a > 0.0).ok_or(TargetError::EmptyMask)?;
+        let bounds =
+            Region::around(camera.width, &coverage, |&a| a > 0.0).ok_or(TargetError::EmptyMask)?;
         let area: f64 = bounds.indices(camera.width).map(|at| f64::from(coverage[at])).sum();
         let normalization = 1.0 / (3.0 * area);
         Ok(Self { camera, color, coverage, depth: None, occluder: None, bounds, normalization })
     }
-}
-
-/// The smallest rectangle around all pixels of an image of `width` columns that are `covered`.
-fn bounds<T>(width: usize, pixels: &[T], covered: impl Fn(&T) -> bool) -> Option<Region> {
-    let mut bounds: Option<Region> = None;
-    for (y, row) in pixels.chunks(width.max(1)).enumerate() {
-        let Some(x0) = row.iter().position(&covered) else { continue };
-        let x1 = row.iter().rposition(&covered).unwrap_or(x0) + 1;
-        let here = Region { x0, y0: y, x1, y1: y + 1 };
-        bounds = Some(bounds.map_or(here, |bounds| bounds.union(&here)));
-    }
-    bounds
 }
 
 fn check(

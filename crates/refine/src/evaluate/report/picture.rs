@@ -66,23 +66,17 @@ fn brightened(observation: &Observation) -> RgbImage {
 fn window(observation: &Observation) -> [usize; 4] {
     let mask = &observation.mask;
     let (width, height) = (mask.width(), mask.height());
-    let (mut low, mut high) = ([width, height], [0, 0]);
-    for (i, _) in mask.pixels().iter().enumerate().filter(|(_, m)| **m) {
-        let at = [i % width, i / width];
-        for k in 0..2 {
-            low[k] = low[k].min(at[k]);
-            high[k] = high[k].max(at[k] + 1);
-        }
-    }
-    if low[0] >= high[0] {
-        return [0, 0, width, height];
-    }
+    let Some([left, top, columns, rows]) = mask.bounds() else { return [0, 0, width, height] };
     // Square and half as large again, so that the hand and a misplaced outline are in view.
-    let side = (high[0] - low[0]).max(high[1] - low[1]) * 3 / 2;
-    let begin = |k: usize, size: usize| {
-        ((low[k] + high[k]) / 2).saturating_sub(side / 2).min(size.saturating_sub(side))
-    };
-    [begin(0, width), begin(1, height), side.min(width), side.min(height)]
+    let side = columns.max(rows) * 3 / 2;
+    let begin =
+        |center: usize, size: usize| center.saturating_sub(side / 2).min(size.saturating_sub(side));
+    [
+        begin(left + columns / 2, width),
+        begin(top + rows / 2, height),
+        side.min(width),
+        side.min(height),
+    ]
 }
 
 /// Copies `window` of one image into another, to column `column` of its top.

@@ -119,7 +119,8 @@ impl Strategy for Fused {
 /// Records the best solution of a stage.
 fn record(recorder: &mut Recorder<'_, '_>, best: &Solution) -> ControlFlow<()> {
     let (index, values) = (recorder.count(), vec![best.at.cost]);
-    recorder.visit(&best.at.state, Iteration { index, values, weights: vec![1.0], step: 0.0 })
+    let iteration = Iteration { index, values, weights: vec![1.0], step: 0.0 };
+    recorder.visit(&best.at.state, iteration, None)
 }
 
 /// A refinement under way.

@@ -24,23 +24,16 @@ pub(super) fn block(observation: &mut Observation, visible: f64, random: &mut Sp
     let nearest = depths.fold(f32::INFINITY, f32::min);
     let front = if nearest.is_finite() { (f64::from(nearest) - AHEAD).max(0.1) } else { 0.0 };
     // The block is a little larger than what is to be hidden of the object.
-    let (columns, rows) = (bounds(&object, |k| k % width), bounds(&object, |k| k / width));
-    let (Some(columns), Some(rows)) = (columns, rows) else { return };
-    let margin = ((columns[1] - columns[0]).max(rows[1] - rows[0])) / 10 + 1;
-    let within = |v: usize, [low, high]: [usize; 2]| v + margin >= low && v <= high + margin;
+    let Some([left, top, columns, rows]) = observation.mask.bounds() else { return };
+    let margin = (columns.max(rows) - 1) / 10 + 1;
+    let within = |v: usize, low: usize, size: usize| v + margin >= low && v < low + size + margin;
     for k in 0..observation.depth.pixels().len() {
-        if along(k) >= edge && within(k % width, columns) && within(k / width, rows) {
+        if along(k) >= edge && within(k % width, left, columns) && within(k / width, top, rows) {
             observation.mask.pixels_mut()[k] = false;
             observation.depth.pixels_mut()[k] = front as f32;
             observation.color.pixels_mut()[k] = [0.5; 3];
         }
     }
-}
-
-/// Smallest and largest of a coordinate.
-fn bounds(pixels: &[usize], of: impl Fn(usize) -> usize) -> Option<[usize; 2]> {
-    let of = |k: &usize| of(*k);
-    Some([pixels.iter().map(of).min()?, pixels.iter().map(of).max()?])
 }
 
 #[cfg(test)]
