@@ -8,9 +8,8 @@ use prehend::autodiff::{Fwd, Recording, Scalar};
 use prehend::geometry::sample::surface_samples;
 use prehend::geometry::shapes;
 use prehend::sim::{
-    Body, Contact, ContactBodies, ContactLaw, GapSmoothing, HalfSpace, Integrator, Response,
-    RigidBody, SemiImplicitEuler, SimulationError, State, StepCheckpointed, Surface, TimeSteps,
-    World, regularized_coulomb,
+    Body, Contact, ContactBodies, ContactLaw, GapSmoothing, HalfSpace, Response, RigidBody,
+    SimulationError, State, Surface, World, regularized_coulomb,
 };
 
 /// Force grows with the square of the penetration. Stiffness per area \[N/m⁴\] and friction coefficient.
@@ -30,8 +29,8 @@ impl ContactLaw for Quadratic {
     }
 }
 
-/// Down, and up again.
-const DROP: TimeSteps = TimeSteps { dt: 1e-4, steps: 1000 };
+/// Down, and up again \[s\].
+const TIME: f64 = 0.1;
 const RADIUS: f64 = 0.05;
 
 /// A ball on the floor, and the states of both.
@@ -46,8 +45,7 @@ fn ball_on_floor(law: Quadratic) -> anyhow::Result<(World, [State; 2])> {
     let surface = Surface::uniform(&points, ball.area())?;
     let samples = world.add(Body::free("ball", rigid).with_surface(surface));
     let bodies = ContactBodies { samples, field };
-    // Smooth, or the moment of impact jumps from one time step to the next.
-    world.add_contact(bodies, Arc::new(law), GapSmoothing::Softplus { width: 5e-5 })?;
+    world.add_contact(bodies, Arc::new(law), GapSmoothing::Hard)?;
     let resting = rigid.at_rest(&Isometry3::translation(0.0, 0.0, RADIUS));
     Ok((world, [State::at_rest(Isometry3::identity()), resting]))
 }
@@ -56,43 +54,38 @@ fn ball_on_floor(law: Quadratic) -> anyhow::Result<(World, [State; 2])> {
 fn height<S: Scalar>(
     world: &World,
     states: &[State; 2],
-    integrator: &impl Integrator,
     [drop, stiffness]: [S; 2],
 ) -> Result<S, SimulationError> {
     let mut world = world.lift();
     world.contacts[0].params_mut()[0] = stiffness;
     let mut states = states.each_ref().map(|state| state.lift());
     states[1].pose.translation.z += drop;
-    let end = world.simulate(integrator, &states, DROP, |_, _| ())?;
-    Ok(end[1].pose.translation.z)
+    Ok(world.simulate(&states, TIME)?[1].pose.translation.z)
 }
 
 fn main() -> anyhow::Result<()> {
     let (world, states) = ball_on_floor(Quadratic([1e10, 0.5]))?;
     let at = [0.01, 1e10];
 
-    let euler = SemiImplicitEuler;
-    let forward = height(&world, &states, &euler, Fwd::<2>::variables(at))?;
+    let forward = height(&world, &states, Fwd::<2>::variables(at))?;
     println!("dropped from 10 mm, after 0.1 s the ball is at {:.4} m", forward.value);
 
-    // Reverse mode: one node a step.
-    let checkpointed = StepCheckpointed::new(euler, &world)?;
     let recording = Recording::start();
     let inputs = recording.variables(at);
-    let adjoints = recording.gradient(height(&world, &states, &checkpointed, inputs)?);
+    let adjoints = recording.gradient(height(&world, &states, inputs)?);
     let reverse = inputs.map(|x| adjoints.wrt(x));
 
     for (i, name) in ["drop", "stiffness"].into_iter().enumerate() {
         let off = |fraction: f64| {
             let mut x = at;
             x[i] *= 1.0 + fraction;
-            height(&world, &states, &euler, x)
+            height(&world, &states, x)
         };
-        let difference = (off(1e-6)? - off(-1e-6)?) / (2e-6 * at[i]);
+        let difference = (off(1e-3)? - off(-1e-3)?) / (2e-3 * at[i]);
         let (forward, reverse) = (forward.derivative[i], reverse[i]);
         println!("d(height)/d({name})");
         println!("  forward {forward:.6e}, reverse {reverse:.6e}, differences {difference:.6e}");
-        anyhow::ensure!((forward - difference).abs() < 1e-4 * difference.abs());
+        anyhow::ensure!((forward - difference).abs() < 1e-3 * difference.abs());
         anyhow::ensure!((forward - reverse).abs() < 1e-9 * forward.abs());
     }
     Ok(())

@@ -44,8 +44,9 @@ fn end<S: Scalar>(world: &World, tangent: &[S]) -> Isometry3<S> {
     start.angular = Vector3::new(1.0, 3.0, -2.0);
     let still = State::at_rest(Isometry3::identity()).lift();
     let thrown = start.retract(&std::array::from_fn(|i| tangent[i]));
-    let states = world.lift().simulate(&SemiImplicitEuler, &[still, thrown], TIME_STEPS, |_, _| ());
-    states.unwrap()[1].pose
+    let states =
+        world.lift().simulate_with(&SemiImplicitEuler, &[still, thrown], TIME_STEPS, |_, _| ());
+    states.unwrap().states[1].pose
 }
 
 fn lifted<S: Scalar>(pose: &Isometry3<f64>) -> Isometry3<S> {

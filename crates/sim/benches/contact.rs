@@ -52,15 +52,17 @@ fn main() -> anyhow::Result<()> {
 }
 
 fn value(world: &World, steps: usize) -> anyhow::Result<f64> {
-    let end = world.simulate(&FirstOrder, &start(), time_steps(steps), |_, _| ())?;
+    let end = world.simulate_with(&FirstOrder, &start(), time_steps(steps), |_, _| ())?.states;
     Ok(loss(&end[1]))
 }
 
 fn forward_mode(world: &World, steps: usize) -> anyhow::Result<Derivatives> {
     let [hand, ellipsoid] = start();
     let states = [hand.lift(), ellipsoid.pose_variables()];
-    let end =
-        world.lift::<Fwd<6>>().simulate(&FirstOrder, &states, time_steps(steps), |_, _| ())?;
+    let end = world
+        .lift::<Fwd<6>>()
+        .simulate_with(&FirstOrder, &states, time_steps(steps), |_, _| ())?
+        .states;
     let Fwd { value, derivative } = loss(&end[1]);
     Ok((value, derivative))
 }
@@ -73,8 +75,8 @@ fn adjoint(world: &World, steps: usize) -> anyhow::Result<Derivatives> {
             let mut tangent = [Scalar::constant(0.0); 12];
             tangent[..6].copy_from_slice(x);
             let states: [State<_>; 2] = [hand.lift(), ellipsoid.retract(&tangent)];
-            match world.lift().simulate(&FirstOrder, &states, time_steps(steps), |_, _| ()) {
-                Ok(end) => loss(&end[1]),
+            match world.lift().simulate_with(&FirstOrder, &states, time_steps(steps), |_, _| ()) {
+                Ok(run) => loss(&run.states[1]),
                 Err(error) => {
                     failure = Some(error);
                     x[0]

@@ -90,7 +90,7 @@ fn study(
         start.pose.translation.z = Fwd::variable(height, 0);
         start.linear.z = Fwd::constant(-SPEED);
         let still = State::at_rest(Isometry3::identity()).lift();
-        let end = world.simulate(integrator, &[still, start], time_steps, |_, _| ())?;
+        let end = world.simulate_with(integrator, &[still, start], time_steps, |_, _| ())?.states;
         let slope = end[point].pose.translation.z.derivative[0];
         Ok([(slope + 1.0).abs(), (end[point].linear.z.value - SPEED).abs()])
     };

@@ -36,7 +36,7 @@ use crate::world::contact_pair::ContactPair;
 /// lifted.gravity.z = recording.variable(-9.81);
 /// let start = [State::at_rest(Isometry3::identity()).lift()];
 /// let integrator = StepCheckpointed::new(SemiImplicitEuler, &world)?;
-/// let end = lifted.simulate(&integrator, &start, TimeSteps { dt: 1e-3, steps: 1000 }, |_, _| ())?;
+/// let end = lifted.simulate_with(&integrator, &start, TimeSteps { dt: 1e-3, steps: 1000 }, |_, _| ())?.states;
 /// let by_gravity = recording.gradient(end[ball].linear.z).wrt(lifted.gravity.z);
 /// assert!((by_gravity - 1.0).abs() < 1e-12);
 /// # Ok(())
@@ -121,6 +121,14 @@ impl<I: Integrator + Send + 'static> Integrator for StepCheckpointed<I> {
             Motion::Kinematic | Motion::Driven(_) => *state,
         };
         Ok(world.bodies.iter().zip(states).map(next).collect())
+    }
+
+    fn stability_limit(&self) -> f64 {
+        self.scene.integrator.stability_limit()
+    }
+
+    fn controls_error(&self) -> bool {
+        self.scene.integrator.controls_error()
     }
 }
 
@@ -242,7 +250,7 @@ impl<I: Integrator + 'static> Steps<I> {
     ) -> Result<Vec<State<S>>, SimulationError> {
         let world = self.scene.world(&self.places, parameters)?;
         let states: Vec<State<S>> = states_of(coordinates).collect();
-        world.advance(&self.scene.integrator, &states, Step { index, dt: self.dt })
+        world.advance(&self.scene.integrator, &states, Step::new(index, self.dt))
     }
 }
 

@@ -88,6 +88,12 @@ impl<S: Scalar> RigidBody<S> {
         &self.com
     }
 
+    /// Radius of gyration about the center of mass, of all axes together: √(tr I / 2m) \[m\].
+    #[inline]
+    pub(crate) fn gyration_radius(&self) -> f64 {
+        (self.inertia.trace().value() / (2.0 * self.mass.value())).sqrt()
+    }
+
     /// Inertia about the center of mass, along the world's axes \[kg m²\].
     #[inline]
     pub fn world_inertia(&self, rotation: &UnitQuaternion<S>) -> Matrix3<S> {

@@ -103,7 +103,10 @@ mod tests {
                 expected = world.step(integrator, &expected, step).unwrap();
                 assert_eq!(expected, states, "{step:?}");
             };
-            world.simulate(integrator, &states, TimeSteps { dt, steps }, compare).unwrap();
+            world
+                .simulate_with(integrator, &states, TimeSteps { dt, steps }, compare)
+                .unwrap()
+                .states;
         }
     }
 

@@ -10,6 +10,7 @@ pub mod law;
 #[cfg(test)]
 pub(crate) mod law_checks;
 pub mod normal;
+pub(crate) mod onset;
 pub mod parameters;
 pub mod patch;
 pub mod point;

@@ -79,15 +79,58 @@ pub enum SimulationError {
     TimeStep(f64),
     /// A body's state is not finite: given so, or blown up.
     #[error(
-        "the state of body '{body}' is not finite after step {step}, at {time} s: bad input, or a time step too long for the contacts"
+        "the state of body '{body}' is not finite at {time} s{}: bad input, or a time step too long for the contacts",
+        touching(contact)
     )]
     NotFinite {
         /// Its name.
         body: String,
-        /// Steps that had been taken.
-        step: usize,
+        /// The body that presses hardest on it.
+        contact: Option<String>,
         /// Time \[s\].
         time: f64,
+    },
+    /// Contacts have made energy.
+    #[error(
+        "contacts have made {energy:.3e} J by {time} s, most of it in body '{body}'{}: a time step too long for them, or a \
+         law that is not passive",
+        touching(contact)
+    )]
+    Energy {
+        /// The body that moves with most energy.
+        body: String,
+        /// The body that presses hardest on it.
+        contact: Option<String>,
+        /// When it was noticed \[s\].
+        time: f64,
+        /// How much \[J\].
+        energy: f64,
+    },
+    /// Forces change so fast that no step is short enough, or one too many would be taken.
+    #[error(
+        "body '{body}'{} needs steps shorter than {dt:.3e} s at {time} s: a force that jumps, or contacts far too stiff",
+        touching(contact)
+    )]
+    Stalled {
+        /// The body that is accelerated most.
+        body: String,
+        /// The body that presses hardest on it.
+        contact: Option<String>,
+        /// Time \[s\].
+        time: f64,
+        /// The last step that was tried \[s\].
+        dt: f64,
+    },
+    /// A force that jumps at touch has derivatives that no step gets right.
+    #[error(
+        "the force between '{body}' and '{contact}' jumps at touch, so that derivatives through impacts would be wrong: let it \
+         fade in (GapSmoothing::Softplus), or choose a law whose damping grows with penetration (HuntCrossley)"
+    )]
+    ForceJumps {
+        /// The body with the samples.
+        body: String,
+        /// The body with the field.
+        contact: String,
     },
     /// An implicit step found no solution.
     #[error(
@@ -127,4 +170,8 @@ pub enum SimulationError {
         /// How many the robot has.
         expected: usize,
     },
+}
+
+fn touching(contact: &Option<String>) -> String {
+    contact.as_ref().map(|name| format!(", touching '{name}',")).unwrap_or_default()
 }

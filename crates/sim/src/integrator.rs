@@ -1,5 +1,6 @@
 //! How states advance in time.
 
+pub(crate) mod adaptive;
 pub(crate) mod backward_euler;
 pub(crate) mod runge_kutta;
 pub(crate) mod semi_implicit;
@@ -61,6 +62,11 @@ pub trait Integrator: Sync {
 
     /// Whether a step evaluates forces once, at its start. Then samples that are out of reach there may be left out.
     fn evaluates_forces_once(&self) -> bool {
+        false
+    }
+
+    /// Whether the scheme holds its error itself, whatever the step.
+    fn controls_error(&self) -> bool {
         false
     }
 }

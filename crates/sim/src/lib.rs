@@ -12,10 +12,12 @@
 //! center of mass, velocities are those of the center of mass, in the world frame.
 
 mod adjoint;
+mod audit;
 mod body;
 mod broad_phase;
 pub mod contact;
 mod contact_frequency;
+mod culprit;
 mod equilibrium;
 mod error;
 pub mod fields;
@@ -34,6 +36,7 @@ mod time;
 mod world;
 
 pub use adjoint::StepCheckpointed;
+pub use audit::Resolution;
 pub use body::{BodyError, RigidBody};
 pub use contact::composite::Law;
 pub use contact::dynamic::DynContactLaw;
@@ -64,12 +67,14 @@ pub use equilibrium::compliant::{CompliantBalance, CompliantSupport};
 pub use error::SimulationError;
 pub use fields::{HalfSpace, Sphere, SphereCavity};
 pub use integrator::Integrator;
+pub use integrator::adaptive::Adaptive;
 pub use integrator::backward_euler::BackwardEuler;
-pub use integrator::runge_kutta::RungeKutta4;
+pub use integrator::runge_kutta::classic::RungeKutta4;
 pub use integrator::semi_implicit::SemiImplicitEuler;
 pub use integrator::sub_stepped::SubStepped;
 pub use integrator::velocity_verlet::VelocityVerlet;
 pub use robot::JointState;
+pub use rollout::Simulation;
 pub use smoothing::{SmoothedGradient, Smoothing, SmoothingError};
 pub use stability::{Averaging, Perturbation, StabilityJacobian, StabilityLoss, StabilityWeights};
 pub use state::State;

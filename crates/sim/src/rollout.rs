@@ -2,54 +2,120 @@
 
 use prehend_autodiff::Scalar;
 
+use crate::audit::{Audit, Resolution};
 use crate::broad_phase::BroadPhase;
 use crate::error::SimulationError;
 use crate::integrator::Integrator;
+use crate::integrator::adaptive::Adaptive;
 use crate::state::State;
 use crate::time::{Step, TimeSteps};
 use crate::world::World;
 
+/// What a simulation with an integrator of one's own choice led to.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Simulation<T> {
+    /// The states: those at the end, or of every step.
+    pub states: T,
+    /// Whether the steps were short enough.
+    pub resolution: Resolution,
+}
+
 impl<S: Scalar> World<S> {
-    /// The states of all bodies at 0, dt, …, `steps`·dt, from `initial`; driven bodies start where their trajectory does.
+    /// The states of all bodies after `time` \[s\], from `initial`; driven bodies start where their trajectory does.
     ///
-    /// Over `f64` this simulates; over [`Fwd`](prehend_autodiff::Fwd) it carries sensitivities to few inputs, over
-    /// [`Var`](prehend_autodiff::Var) it records what the adjoint needs.
+    /// Steps are chosen and checked on the way, see [`Adaptive`]. Over `f64` this simulates; over
+    /// [`Fwd`](prehend_autodiff::Fwd) it carries sensitivities to few inputs, over [`Var`](prehend_autodiff::Var) it records
+    /// what the adjoint needs.
     ///
     /// # Errors
-    /// Unless there is one finite state for each body and the time step is positive; where a state stops being finite,
-    /// which one and when; if a step's equations were not solved.
+    /// Unless there is one finite state for each body and the time is positive; where forces jump or grow so that no step is short
+    /// enough, which body, contact and time.
+    pub fn simulate(
+        &self,
+        initial: &[State<S>],
+        time: f64,
+    ) -> Result<Vec<State<S>>, SimulationError> {
+        let once = TimeSteps { dt: time, steps: 1 };
+        self.march(&Adaptive::default(), initial, once, |_, _| Ok(()))
+    }
+
+    /// The states of all bodies at 0, dt, …, `steps`·dt, as [`World::simulate`] finds them.
+    ///
+    /// # Errors
+    /// See [`World::simulate`].
     pub fn rollout(
+        &self,
+        initial: &[State<S>],
+        time_steps: TimeSteps,
+    ) -> Result<Vec<Vec<State<S>>>, SimulationError> {
+        let mut states = vec![self.started(initial)];
+        self.march(&Adaptive::default(), initial, time_steps, |_, next| {
+            states.push(next.to_vec());
+            Ok(())
+        })?;
+        Ok(states)
+    }
+
+    /// [`World::simulate`] with the steps of `integrator`, each handed to `visit`, and a report on how well they resolve the
+    /// motion.
+    ///
+    /// # Errors
+    /// Unless there is one finite state for each body and the time step is positive; where a state stops being finite or
+    /// contacts make energy, which body, contact and time; if a step's equations were not solved.
+    pub fn simulate_with(
         &self,
         integrator: &impl Integrator,
         initial: &[State<S>],
         time_steps: TimeSteps,
-    ) -> Result<Vec<Vec<State<S>>>, SimulationError> {
-        let mut states = Vec::with_capacity(time_steps.steps + 1);
-        states.push(self.started(initial));
-        self.simulate(integrator, initial, time_steps, |_, next| states.push(next.to_vec()))?;
-        Ok(states)
+        mut visit: impl FnMut(Step, &[State<S>]),
+    ) -> Result<Simulation<Vec<State<S>>>, SimulationError> {
+        self.check(initial, time_steps.dt)?;
+        let initial = self.started(initial);
+        let mut audit = Audit::new(self, &initial);
+        let states = self.march(integrator, &initial, time_steps, |step, states| {
+            visit(step, states);
+            audit.step(step, states)
+        })?;
+        let end = time_steps.dt * time_steps.steps as f64;
+        let resolution = audit.finish(end, &states, integrator.controls_error())?;
+        Ok(Simulation { states, resolution })
     }
 
-    /// [`World::rollout`] that hands each step's states to `visit` instead of keeping them, and returns the last.
+    /// The states of [`World::simulate_with`] at 0, dt, …, `steps`·dt.
     ///
     /// # Errors
-    /// See [`World::rollout`].
-    pub fn simulate(
+    /// See [`World::simulate_with`].
+    pub fn rollout_with(
+        &self,
+        integrator: &impl Integrator,
+        initial: &[State<S>],
+        time_steps: TimeSteps,
+    ) -> Result<Simulation<Vec<Vec<State<S>>>>, SimulationError> {
+        let mut states = Vec::with_capacity(time_steps.steps + 1);
+        states.push(self.started(initial));
+        let keep = |_, next: &[State<S>]| states.push(next.to_vec());
+        let Simulation { resolution, .. } =
+            self.simulate_with(integrator, initial, time_steps, keep)?;
+        Ok(Simulation { states, resolution })
+    }
+
+    /// [`World::simulate_with`] without the report; an error of `visit` ends it.
+    pub(crate) fn march(
         &self,
         integrator: &impl Integrator,
         initial: &[State<S>],
         TimeSteps { dt, steps }: TimeSteps,
-        mut visit: impl FnMut(Step, &[State<S>]),
+        mut visit: impl FnMut(Step, &[State<S>]) -> Result<(), SimulationError>,
     ) -> Result<Vec<State<S>>, SimulationError> {
         self.check(initial, dt)?;
         let mut states = self.started(initial);
         let mut near = BroadPhase::new(self);
         for index in 0..steps {
-            let step = Step { index, dt };
+            let step = Step::new(index, dt);
             let once = integrator.evaluates_forces_once();
             let world = if once { near.world(self, &states, dt) } else { self };
             states = world.advance(integrator, &states, step)?;
-            visit(step, &states);
+            visit(step, &states)?;
         }
         Ok(states)
     }
@@ -57,7 +123,7 @@ impl<S: Scalar> World<S> {
     /// One step: the integrator's, then that of driven bodies.
     ///
     /// # Errors
-    /// As [`World::rollout`].
+    /// As [`World::simulate_with`], but for energy, which takes more than a step to tell.
     pub fn step(
         &self,
         integrator: &impl Integrator,
@@ -76,10 +142,11 @@ impl<S: Scalar> World<S> {
         step: Step,
     ) -> Result<Vec<State<S>>, SimulationError> {
         let mut next = integrator.step(self, states, step)?;
-        let after = step.after();
-        self.drive(&mut next, after.time());
-        self.check_finite(&next, after)?;
-        Ok(next)
+        self.drive(&mut next, step.end());
+        match next.iter().all(State::is_finite) {
+            true => Ok(next),
+            false => Err(self.not_finite(states, &next, step.end())),
+        }
     }
 
     /// The states with driven bodies where their trajectories start.
@@ -101,17 +168,9 @@ impl<S: Scalar> World<S> {
         for pair in &self.contacts {
             pair.check()?;
         }
-        self.check_finite(states, Step { index: 0, dt })
-    }
-
-    fn check_finite(&self, states: &[State<S>], step: Step) -> Result<(), SimulationError> {
-        match states.iter().position(|state| !state.is_finite()) {
-            Some(body) => Err(SimulationError::NotFinite {
-                body: self.bodies[body].name.clone(),
-                step: step.index,
-                time: step.time(),
-            }),
-            None => Ok(()),
+        match states.iter().all(State::is_finite) {
+            true => Ok(()),
+            false => Err(self.not_finite(states, states, 0.0)),
         }
     }
 }
@@ -131,7 +190,7 @@ mod tests {
     fn parameters_out_of_range_and_missing_states_are_refused() {
         let (mut world, states) = egg_on(bowl(), GapSmoothing::Hard);
         let step = |world: &World, states: &[State], dt| {
-            world.step(&SemiImplicitEuler, states, Step { index: 0, dt }).map(|_| ()).unwrap_err()
+            world.step(&SemiImplicitEuler, states, Step::new(0, dt)).map(|_| ()).unwrap_err()
         };
         assert_eq!(
             step(&world, &states[..1], 1e-3),
@@ -159,7 +218,7 @@ mod tests {
         ] {
             let (mut world, states) = egg_on(bowl(), GapSmoothing::Hard);
             world.contacts[0].set_law(registry.create(name, values).unwrap().unwrap().into());
-            let (step, good) = (Step { index: 0, dt: 1e-3 }, world.parameters());
+            let (step, good) = (Step::new(0, 1e-3), world.parameters());
             for (k, parameter) in
                 registry.entry(name).unwrap().parameters[2..][..parts].iter().enumerate()
             {
@@ -183,8 +242,10 @@ mod tests {
         let (mut world, states) = egg_on(bowl(), GapSmoothing::Hard);
         let rising = |time: f64| State::at_rest(Isometry3::translation(0.0, 0.0, time - 0.3));
         world.bodies[0].motion = Motion::Driven(Arc::new(rising));
-        let run =
-            world.rollout(&SemiImplicitEuler, &states, TimeSteps { dt: 0.1, steps: 2 }).unwrap();
+        let run = world
+            .rollout_with(&SemiImplicitEuler, &states, TimeSteps { dt: 0.1, steps: 2 })
+            .unwrap()
+            .states;
         let heights = [0, 1, 2].map(|i: usize| run[i][0].pose.translation.z);
         assert!((heights[0] + 0.3).abs() < 1e-15 && (heights[2] + 0.1).abs() < 1e-15);
     }
@@ -193,7 +254,7 @@ mod tests {
     fn bad_starts_and_blow_ups_say_where() {
         let (world, states) = egg_on(bowl(), GapSmoothing::Hard);
         let roll = |states: &[State], dt| {
-            world.rollout(&SemiImplicitEuler, states, TimeSteps { dt, steps: 2000 })
+            world.rollout_with(&SemiImplicitEuler, states, TimeSteps { dt, steps: 2000 })
         };
         assert_eq!(roll(&states, 0.0).unwrap_err(), SimulationError::TimeStep(0.0));
         let error = roll(&states[..1], 1e-3).unwrap_err();
@@ -203,10 +264,16 @@ mod tests {
         let error = roll(&lost, 1e-3).unwrap_err();
         assert_eq!(
             error,
-            SimulationError::NotFinite { body: "egg".to_owned(), step: 0, time: 0.0 }
+            SimulationError::NotFinite {
+                body: "egg".to_owned(),
+                contact: Some("ground".to_owned()),
+                time: 0.0
+            }
         );
         let mut wild = states.clone();
         wild[1].linear = Vector3::repeat(1e308);
-        assert!(matches!(roll(&wild, 1.0), Err(SimulationError::NotFinite { step: 1.., .. })));
+        assert!(
+            matches!(roll(&wild, 1.0), Err(SimulationError::NotFinite { time, .. }) if time > 0.5)
+        );
     }
 }

@@ -226,10 +226,11 @@ impl StabilityLoss {
         let residual = |states: &[State<S>]| self.residual(start, &states[self.object]);
         let every = self.weights.averaging == Averaging::Mean;
         let weight = 1.0 / steps.max(1) as f64;
-        let last = world.simulate(&SemiImplicitEuler, initial, self.time_steps, |_, states| {
+        let last = world.march(&SemiImplicitEuler, initial, self.time_steps, |_, states| {
             if every {
                 visit(weight, residual(states));
             }
+            Ok(())
         })?;
         if !every {
             visit(1.0, residual(&last));

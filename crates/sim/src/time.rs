@@ -5,26 +5,29 @@
 pub struct Step {
     /// Number of the step, from 0.
     pub index: usize,
+    /// Time at its start \[s\].
+    pub start: f64,
     /// Time step \[s\].
     pub dt: f64,
 }
 
 impl Step {
-    /// Time at its start \[s\].
-    pub fn time(&self) -> f64 {
-        self.index as f64 * self.dt
+    /// Step number `index` of equal ones of `dt` \[s\].
+    pub fn new(index: usize, dt: f64) -> Self {
+        Self { index, start: index as f64 * dt, dt }
     }
 
-    /// The step that follows.
-    #[must_use]
-    pub fn after(self) -> Self {
-        Self { index: self.index + 1, ..self }
+    /// Time at its end \[s\].
+    pub fn end(&self) -> f64 {
+        self.start + self.dt
     }
 
     /// The step divided into `parts` equal ones.
     pub fn parts(self, parts: usize) -> impl Iterator<Item = Self> {
-        let (first, dt) = (self.index * parts, self.dt / parts as f64);
-        (first..first + parts).map(move |index| Self { index, dt })
+        let dt = self.dt / parts as f64;
+        let part =
+            move |k| Self { index: self.index * parts + k, start: self.start + k as f64 * dt, dt };
+        (0..parts).map(part)
     }
 }
 

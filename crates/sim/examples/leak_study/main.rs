@@ -75,7 +75,9 @@ impl Drop {
     fn loss<S: Scalar>(&self, world: &World<S>, start: State<S>) -> Result<S, SimulationError> {
         let still = State::at_rest(Isometry3::identity()).lift();
         let states = [still, start];
-        let end = world.simulate(&SemiImplicitEuler, &states, self.time_steps, |_, _| ())?[OBJECT];
+        let end = world
+            .simulate_with(&SemiImplicitEuler, &states, self.time_steps, |_, _| ())?
+            .states[OBJECT];
         let target = Vector3::new(0.0, 0.0, 0.035).map(S::constant);
         let off = (end.pose.translation.vector - target).norm_squared();
         Ok(off.times(100.0) + end.linear.norm_squared() + end.angular.norm_squared())

@@ -60,6 +60,26 @@ impl Patch<'_> {
         self.surface.only(near, |block| self.may_touch(block, reach))
     }
 
+    /// Whether a sample may touch before one of them has moved by `margin` \[m\], for a law that reaches to `cutoff`.
+    pub(crate) fn is_near(&self, cutoff: f64, margin: f64) -> bool {
+        let reach = cutoff + self.smoothing.band() + self.field.lipschitz_bound() * margin;
+        self.surface.blocks().any(|(block, points)| {
+            let near = |point: &SurfacePoint| self.distance_within(&point.position, reach);
+            self.may_touch(block, reach) && points.iter().any(near)
+        })
+    }
+
+    /// Calls `visit` with gap \[m\] and area \[m²\] of every sample that is nearer than `reach`.
+    pub(crate) fn for_each_gap(&self, reach: f64, mut visit: impl FnMut(f64, f64)) {
+        let State { pose, .. } = &self.state;
+        for point in self.surface.points() {
+            let place = pose.translation.vector + pose.rotation * (point.position - self.com);
+            if let Some(gap) = self.field.distance(&Point3::from(place), reach) {
+                visit(gap, point.area);
+            }
+        }
+    }
+
     /// Calls `visit` with every point in contact, in order; with `pressing_only` without those that exert no force and only
     /// leak. Points beyond `cutoff` and the band of the smoothing exert no force, so leaving out blocks of them changes nothing.
     /// Says whether every distance was a number.

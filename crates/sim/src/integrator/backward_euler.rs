@@ -43,7 +43,7 @@ impl Integrator for BackwardEuler {
         let plain = world.plain();
         let lifted = plain.lift();
         let mut at_end = values.clone();
-        plain.drive(&mut at_end, step.after().time());
+        plain.drive(&mut at_end, step.end());
         let mut equations =
             ImplicitStep { world: &plain, lifted: &lifted, states: &values, at_end, free, step };
         let solution = equations.solve()?;
@@ -77,7 +77,7 @@ fn carried<S: Scalar>(
 ) -> Vec<State<S>> {
     let (free, dt) = (&equations.free, equations.step.dt);
     let mut next = states.to_vec();
-    world.drive(&mut next, equations.step.after().time());
+    world.drive(&mut next, equations.step.end());
     let velocity =
         |slot: usize| -> [S; 6] { std::array::from_fn(|i| S::constant(solution[6 * slot + i])) };
     for (slot, &body) in free.iter().enumerate() {
@@ -151,15 +151,20 @@ mod tests {
         for moving in 0..2 {
             let mut lifted: Vec<State<Fwd<12>>> = states.iter().map(State::lift).collect();
             lifted[moving] = states[moving].variables();
-            let run =
-                world.lift().simulate(&BackwardEuler, &lifted, time_steps, |_, _| ()).unwrap();
+            let run = world
+                .lift()
+                .simulate_with(&BackwardEuler, &lifted, time_steps, |_, _| ())
+                .unwrap()
+                .states;
             let differences = finite_difference_jacobian(
                 |x| {
                     let mut moved = states.clone();
                     let tangent = std::array::from_fn::<f64, 12, _>(|i| x[i]);
                     moved[moving] = states[moving].retract(&tangent);
-                    let run =
-                        world.simulate(&BackwardEuler, &moved, time_steps, |_, _| ()).unwrap();
+                    let run = world
+                        .simulate_with(&BackwardEuler, &moved, time_steps, |_, _| ())
+                        .unwrap()
+                        .states;
                     let velocities = run.iter().flat_map(|s| [s.linear, s.angular]);
                     velocities.flat_map(|v| [v.x, v.y, v.z]).collect()
                 },
@@ -172,7 +177,8 @@ mod tests {
                 assert!(error.relative < 1e-6, "body {moving}: {error:?}");
             }
         }
-        let plain = world.simulate(&BackwardEuler, &states, time_steps, |_, _| ()).unwrap();
+        let plain =
+            world.simulate_with(&BackwardEuler, &states, time_steps, |_, _| ()).unwrap().states;
         let momentum = |states: &[State]| states[0].linear * 0.5 + states[1].linear * 0.2;
         let gained = world.gravity * (0.7 * 6e-3);
         assert!((momentum(&plain) - momentum(&states) - gained).norm() < 1e-14);
@@ -186,7 +192,8 @@ mod tests {
         hit[1].pose.translation.z -= 1e-3;
         assert!(0.01 * world.contact_frequency(&hit) > 50.0);
         let time_steps = TimeSteps { dt: 0.01, steps: 300 };
-        let end = world.simulate(&BackwardEuler, &states, time_steps, |_, _| ()).unwrap()[1];
+        let end =
+            world.simulate_with(&BackwardEuler, &states, time_steps, |_, _| ()).unwrap().states[1];
         assert!(end.linear.norm() < 1e-3 && end.angular.norm() < 0.1, "{end:?}");
     }
 
@@ -197,7 +204,7 @@ mod tests {
             let (world, mut states) = egg_on(bowl(), smoothing);
             states[1].pose.translation.z += 5e-3;
             let lifted = [states[0].lift(), states[1].variables()];
-            let step = Step { index: 0, dt: 1e-3 };
+            let step = Step::new(0, 1e-3);
             BackwardEuler.step(&world.lift(), &lifted, step).unwrap()[1]
         });
         assert_eq!(ends[0].value(), ends[1].value());
@@ -210,7 +217,7 @@ mod tests {
     fn nothing_free_is_nothing_to_solve() {
         let (mut world, states) = egg_on(bowl(), GapSmoothing::Hard);
         world.bodies[1].motion = Motion::Kinematic;
-        let step = Step { index: 0, dt: 1e-3 };
+        let step = Step::new(0, 1e-3);
         assert_eq!(BackwardEuler.step(&world, &states, step).unwrap(), states);
     }
 }

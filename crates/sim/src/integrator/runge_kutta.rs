@@ -1,69 +1,84 @@
-//! The classic Runge–Kutta method, on the manifold of poses.
+//! Explicit Runge–Kutta methods, on the manifold of poses.
 
-use nalgebra::Vector3;
+pub(crate) mod classic;
+pub(super) mod dormand_prince;
+
+use nalgebra::{Vector3, Vector6};
 use prehend_autodiff::Scalar;
 use prehend_autodiff::lie::so3_exp;
 
-use super::Integrator;
-use crate::error::SimulationError;
 use crate::state::State;
 use crate::time::Step;
 use crate::world::World;
 
-/// The classic Runge–Kutta method, fourth order on smooth forces, four evaluations of them a step.
+/// Of a body: position of the center of mass, its velocity, rotation vector, and angular momentum; or their rates.
 ///
 /// Rotations are R = exp(θ) R₀ with the rotation vector θ from the start of the step, whose rate is
 /// dexp⁻¹(θ) ω = ω − θ×ω/2 + θ×(θ×ω)/12 to the order that counts (H. Munthe-Kaas, "High order Runge–Kutta methods on
 /// manifolds", Appl. Numer. Math. 29, 1999). Angular momentum L = I(R)ω is what is integrated, so it is conserved to
-/// rounding. Driven bodies are where they are at each stage. Forces with kinks, such as those of unsmoothed gaps, cost the order
-/// in the steps that cross them.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct RungeKutta4;
+/// rounding.
+pub(super) type Change<S> = [Vector3<S>; 4];
 
-/// Of a body: position of the center of mass, its velocity, rotation vector, and angular momentum; or their rates.
-type Change<S> = [Vector3<S>; 4];
+/// One step of an explicit method: where it starts, and the slopes of the stages so far.
+pub(super) struct Stages<'a, S: Scalar> {
+    world: &'a World<S>,
+    states: &'a [State<S>],
+    step: Step,
+    slopes: Vec<Vec<Change<S>>>,
+}
 
-impl Integrator for RungeKutta4 {
-    fn step<S: Scalar>(
-        &self,
-        world: &World<S>,
-        states: &[State<S>],
+impl<'a, S: Scalar> Stages<'a, S> {
+    /// The first stage, of a step that starts with `wrenches` on the bodies.
+    pub(super) fn new(
+        world: &'a World<S>,
+        states: &'a [State<S>],
+        wrenches: &[Vector6<S>],
         step: Step,
-    ) -> Result<Vec<State<S>>, SimulationError> {
+    ) -> Self {
         let none = vec![[Vector3::zeros(); 4]; states.len()];
-        let mut slope = rates(world, states, &none, step.index);
-        let mut sum = slope.clone();
-        for (fraction, weight) in [(0.5, 2.0), (0.5, 2.0), (1.0, 1.0)] {
-            let change = scaled(&slope, fraction * step.dt);
-            let mut stage = moved(world, states, &change);
-            world.drive(&mut stage, step.time() + fraction * step.dt);
-            slope = rates(world, &stage, &change, step.index);
-            for (sum, term) in sum.iter_mut().flatten().zip(scaled(&slope, weight).iter().flatten())
-            {
-                *sum += term;
+        let slopes = vec![rates(world, states, &none, wrenches)];
+        Self { world, states, step, slopes }
+    }
+
+    /// The states at `fraction` of the step, which `weights` of the slopes lead to, driven bodies where they are then; and the
+    /// wrenches there, whose slope is that of the next stage.
+    pub(super) fn stage(
+        &mut self,
+        fraction: f64,
+        weights: &[f64],
+    ) -> (Vec<State<S>>, Vec<Vector6<S>>) {
+        let change = self.combined(weights);
+        let mut states = moved(self.world, self.states, &change);
+        self.world.drive(&mut states, self.step.start + fraction * self.step.dt);
+        let wrenches = self.world.wrenches(&states, self.step.index);
+        self.slopes.push(rates(self.world, &states, &change, &wrenches));
+        (states, wrenches)
+    }
+
+    /// The states that `weights` of the slopes lead to.
+    pub(super) fn end(&self, weights: &[f64]) -> Vec<State<S>> {
+        moved(self.world, self.states, &self.combined(weights))
+    }
+
+    /// The step's length times the sum of the slopes with `weights`.
+    pub(super) fn combined(&self, weights: &[f64]) -> Vec<Change<S>> {
+        let mut sum = vec![[Vector3::zeros(); 4]; self.states.len()];
+        for (slopes, weight) in self.slopes.iter().zip(weights).filter(|(_, w)| **w != 0.0) {
+            for (sum, slope) in sum.iter_mut().flatten().zip(slopes.iter().flatten()) {
+                *sum += slope.map(|x| x.times(weight * self.step.dt));
             }
         }
-        Ok(moved(world, states, &scaled(&sum, step.dt / 6.0)))
-    }
-
-    /// The left half of the disc of radius 2.6 is inside the stability region, which ends at 2.83 on the imaginary axis.
-    fn stability_limit(&self) -> f64 {
-        2.6
+        sum
     }
 }
 
-fn scaled<S: Scalar>(rates: &[Change<S>], factor: f64) -> Vec<Change<S>> {
-    rates.iter().map(|rate| rate.map(|r| r.map(|x| x.times(factor)))).collect()
-}
-
-/// The rates of change at `states`, which `change` has led to.
+/// The rates of change at `states` under `wrenches`, where `change` has led to.
 fn rates<S: Scalar>(
     world: &World<S>,
     states: &[State<S>],
     change: &[Change<S>],
-    index: usize,
+    wrenches: &[Vector6<S>],
 ) -> Vec<Change<S>> {
-    let wrenches = world.wrenches(states, index);
     let rate = |body: usize| {
         let Some(rigid) = world.bodies[body].rigid() else { return [Vector3::zeros(); 4] };
         let (state, turn, wrench) = (&states[body], &change[body][2], &wrenches[body]);

@@ -28,7 +28,7 @@ use crate::world::body::Body;
 /// world.add(Body::free("stone", stone));
 /// let start = [stone.at_rest(&Isometry3::identity())];
 /// let integrator = SubStepped { integrator: SemiImplicitEuler, max_substeps: 32 };
-/// let run = world.rollout(&integrator, &start, TimeSteps { dt: 1e-2, steps: 100 })?;
+/// let run = world.rollout_with(&integrator, &start, TimeSteps { dt: 1e-2, steps: 100 })?.states;
 /// assert!((run[100][0].linear.z + 9.81).abs() < 1e-12);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -54,7 +54,7 @@ impl<I: Integrator> SubStepped<I> {
         let mut states = states.to_vec();
         for part in step.parts(parts) {
             states = self.integrator.step(world, &states, part)?;
-            world.drive(&mut states, part.after().time());
+            world.drive(&mut states, part.end());
         }
         Ok(states)
     }
@@ -91,7 +91,7 @@ impl<I: Integrator> Integrator for SubStepped<I> {
         let needed = self.demanded(world, states, step.dt);
         let max_substeps = self.max_substeps.max(1);
         if needed.is_nan() || needed > max_substeps as f64 {
-            let (step, time) = (step.index, step.time());
+            let (step, time) = (step.index, step.start);
             return Err(SimulationError::SubSteps { step, time, needed, max_substeps });
         }
         let mut parts = needed as usize;
@@ -124,7 +124,7 @@ mod tests {
         let (world, mut states) = egg_on(floor(), GapSmoothing::Hard);
         states[1].pose.translation.z += 1e-3;
         states[1].linear.z = -0.5;
-        let step = Step { index: 2, dt: 1e-2 };
+        let step = Step::new(2, 1e-2);
         let parts = |states: &[State]| {
             let euler = SubStepped { integrator: SemiImplicitEuler, max_substeps: 1000 };
             euler.demanded(&world, states, step.dt)
@@ -134,7 +134,8 @@ mod tests {
         let divided = SubStepped { integrator: SemiImplicitEuler, max_substeps: impact as usize };
         let done = divided.step(&world, &states, step).unwrap();
         let fine = TimeSteps { dt: step.dt / impact, steps: impact as usize };
-        let expected = world.simulate(&SemiImplicitEuler, &states, fine, |_, _| ()).unwrap();
+        let expected =
+            world.simulate_with(&SemiImplicitEuler, &states, fine, |_, _| ()).unwrap().states;
         assert_eq!(done, expected);
         let too_few = SubStepped { max_substeps: impact as usize - 1, ..divided };
         assert_eq!(

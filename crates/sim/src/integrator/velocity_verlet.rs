@@ -44,7 +44,7 @@ impl Integrator for VelocityVerlet {
                 *state = kicked(rigid, world, state, pose, wrench, dt);
             }
         }
-        world.drive(&mut next, step.after().time());
+        world.drive(&mut next, step.end());
         let after = world.wrenches(&next, step.index);
         let bodies = world.bodies.iter().zip(states).zip(before.iter().zip(&after));
         for (((body, state), (before, after)), next) in bodies.zip(&mut next) {

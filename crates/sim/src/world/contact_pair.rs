@@ -8,6 +8,7 @@ use super::body_id::BodyId;
 use crate::contact::dynamic::DynContactLaw;
 use crate::contact::error::LawError;
 use crate::contact::gap_smoothing::GapSmoothing;
+use crate::contact::onset::jumps;
 use crate::surface::Surface;
 
 /// The two sides of a contact.
@@ -93,6 +94,17 @@ impl<S: Scalar> ContactPair<S> {
             return Err(LawError::Range { name: "parameter of a contact", range: "finite", value });
         }
         self.law.check(&values)
+    }
+
+    /// Whether `body` is one of the two.
+    pub(crate) fn joins(&self, body: BodyId) -> bool {
+        self.bodies.samples == body || self.bodies.field == body
+    }
+
+    /// Whether the force jumps as a contact begins.
+    pub(crate) fn force_jumps(&self) -> bool {
+        let values: Vec<f64> = self.params.iter().map(|p| p.value()).collect();
+        jumps(self.law.as_ref(), &values, &self.smoothing)
     }
 
     /// The same contact, each number through `f`.

@@ -87,7 +87,9 @@ impl<I: Integrator> Method for I {
         time_steps: TimeSteps,
         visit: &mut dyn FnMut(&[State]),
     ) -> Result<Vec<State>, SimulationError> {
-        world.simulate(self, start, time_steps, |_: Step, states| visit(states))
+        world
+            .simulate_with(self, start, time_steps, |_: Step, states| visit(states))
+            .map(|run| run.states)
     }
 
     fn differentiate(
@@ -96,7 +98,7 @@ impl<I: Integrator> Method for I {
         start: &[State<Fwd<INPUTS>>],
         time_steps: TimeSteps,
     ) -> Result<Vec<State<Fwd<INPUTS>>>, SimulationError> {
-        world.lift().simulate(self, start, time_steps, |_, _| ())
+        world.lift().simulate_with(self, start, time_steps, |_, _| ()).map(|run| run.states)
     }
 }
 

@@ -1,7 +1,7 @@
 //! Contact along the normal: rest, bounce and the longest stable step.
 
 use nalgebra::Vector3;
-use prehend_sim::TimeSteps;
+use prehend_sim::{SimulationError, State, TimeSteps};
 
 use crate::integrators::Scheme;
 use crate::laws::{G, Law, Spec};
@@ -46,9 +46,15 @@ pub(crate) fn stability_limit(scheme: &Scheme, law: &Law) -> Vec<Row> {
     let growth = |product: f64| {
         let start = above_floor(-SLAB.depth + nudge, Vector3::zeros());
         let time_steps = TimeSteps { dt: product / omega, steps: 1000 };
-        let course = scheme.course(&world, &start, time_steps, BODY);
-        let off = course.iter().map(|s| (s.pose.translation.z + SLAB.depth).abs());
-        off.fold(0.0, f64::max) / nudge
+        let mut largest = 0.0;
+        let mut visit = |states: &[State]| {
+            largest = f64::max(largest, (states[BODY].pose.translation.z + SLAB.depth).abs());
+        };
+        match scheme.method.simulate(&world, &start, time_steps, &mut visit) {
+            // What makes energy grows.
+            Err(SimulationError::Energy { .. }) => f64::INFINITY,
+            run => run.map(|_| largest / nudge).unwrap(),
+        }
     };
     let Some(limit) = scheme.stable_below else {
         return vec![Row::at_most("growth at dt·ω = 100", growth(100.0), 1.0 + 1e-6)];

@@ -212,7 +212,9 @@ impl Scene {
     /// What is measured in the end.
     fn last<S: Scalar>(&self, integrator: &impl Integrator, x: &[S]) -> S {
         let (world, states) = self.set_up(x);
-        self.measure(&world.simulate(integrator, &states, TIME_STEPS, |_, _| ()).unwrap())
+        self.measure(
+            &world.simulate_with(integrator, &states, TIME_STEPS, |_, _| ()).unwrap().states,
+        )
     }
 
     /// What is measured over all steps, while a load swings whose six amplitudes are the last of `x`.
@@ -225,7 +227,7 @@ impl Scene {
             world.bodies[1].external_wrench = Vector6::from_fn(|i, _| {
                 load[i] + x[x.len() - 6 + i].times(swing * if i < 3 { 0.1 } else { 1e-3 })
             });
-            states = world.step(integrator, &states, Step { index, dt: TIME_STEPS.dt }).unwrap();
+            states = world.step(integrator, &states, Step::new(index, TIME_STEPS.dt)).unwrap();
             sum += self.measure(&states).times(1.0 / TIME_STEPS.steps as f64);
         }
         sum
@@ -373,7 +375,7 @@ fn bytes_a_step(scene: &Scene, integrator: &impl Integrator, saved: usize, world
     // Past the chunk in which a tape grows.
     let time_steps = TimeSteps { dt: 1e-5, steps: 4000 };
     let before = recording.statistics().bytes;
-    lifted.simulate(integrator, &states, time_steps, |_, _| ()).unwrap();
+    lifted.simulate_with(integrator, &states, time_steps, |_, _| ()).unwrap();
     (recording.statistics().bytes - before) / time_steps.steps + saved
 }
 
@@ -398,7 +400,7 @@ fn compact_steps_refuse_another_world_and_pass_errors_on() {
     let (other, _) = egg_on(floor(), GapSmoothing::Hard);
     let compact = StepCheckpointed::new(SemiImplicitEuler, &other).unwrap();
     let lifted: Vec<State<Var>> = states.iter().map(State::lift).collect();
-    let error = world.lift().simulate(&compact, &lifted, TIME_STEPS, |_, _| ()).unwrap_err();
+    let error = world.lift().simulate_with(&compact, &lifted, TIME_STEPS, |_, _| ()).unwrap_err();
     assert_eq!(error, SimulationError::AnotherWorld);
 
     let recording = Recording::start();
@@ -407,7 +409,7 @@ fn compact_steps_refuse_another_world_and_pass_errors_on() {
     let long = TimeSteps { dt: 1.0, steps: 10 };
     let compact = StepCheckpointed::new(SemiImplicitEuler, &world).unwrap();
     let world = world.lift::<Var>();
-    let blown_up = world.simulate(&compact, &wild, long, |_, _| ()).unwrap_err();
+    let blown_up = world.simulate_with(&compact, &wild, long, |_, _| ()).unwrap_err();
     assert!(matches!(blown_up, SimulationError::NotFinite { .. }));
     let whole = world.simulate_checkpointed(SemiImplicitEuler, &wild, long, 3);
     assert_eq!(whole.unwrap_err(), blown_up);

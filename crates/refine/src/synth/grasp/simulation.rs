@@ -183,7 +183,7 @@ impl<'a> Simulation<'a> {
     /// explicit steps as short as those need. Newton's method may fail where many samples make or lose contact at once.
     fn stepped(&mut self) -> Result<Vec<State>, SimulationError> {
         let setup = self.setup;
-        let step = Step { index: self.steps, dt: setup.time_step };
+        let step = Step::new(self.steps, setup.time_step);
         let implicit = SubStepped { integrator: BackwardEuler, max_substeps: PARTS };
         let explicit = SubStepped { integrator: SemiImplicitEuler, max_substeps: EXPLICIT_PARTS };
         let unsolved = |done: &Result<_, _>| matches!(done, Err(SimulationError::Unsolved { .. }));

@@ -114,7 +114,7 @@ impl ImplicitStep<'_> {
     }
 
     pub(super) fn unsolved(&self, residual: f64, iterations: usize) -> SimulationError {
-        let (step, time) = (self.step.index, self.step.time());
+        let (step, time) = (self.step.index, self.step.start);
         SimulationError::Unsolved { step, time, residual, iterations }
     }
 }

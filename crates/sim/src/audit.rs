@@ -1,0 +1,103 @@
+//! Whether the steps of a simulation were short enough.
+
+mod energy;
+mod roughness;
+
+use std::fmt;
+
+use prehend_autodiff::Scalar;
+
+use crate::error::SimulationError;
+use crate::state::State;
+use crate::time::Step;
+use crate::world::World;
+use crate::world::body_id::BodyId;
+use energy::EnergyBalance;
+use roughness::Roughness;
+
+/// Roughness up to which a simulation is resolved.
+const FINE: f64 = 0.1;
+
+/// How well the steps of a simulation resolved its contacts.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Resolution {
+    /// Steps that were taken.
+    pub steps: usize,
+    /// By how much the accelerations by contacts changed from one step to the next, relative to them, both as root mean squares
+    /// over the steps: about dt·ω for the fastest rate ω at which contacts do anything, 2 for an impact within one step.
+    /// Derivatives of a method of first order are off by about as much. None if the integrator holds its error itself.
+    pub roughness: Option<f64>,
+    /// The body with the largest such change, and when \[s\]; none if nothing touched.
+    pub roughest: Option<(String, f64)>,
+}
+
+impl Resolution {
+    /// Whether the steps were short enough, for values and derivatives: a roughness of no more than 0.1.
+    pub fn is_fine(&self) -> bool {
+        self.roughness.is_none_or(|roughness| roughness <= FINE)
+    }
+}
+
+impl fmt::Display for Resolution {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let steps = self.steps;
+        let Some(roughness) = self.roughness else {
+            return write!(f, "{steps} steps of an integrator that holds its error");
+        };
+        let percent = 100.0 * roughness;
+        write!(f, "{steps} steps, contact forces change by {percent:.1} % from one to the next")?;
+        match &self.roughest {
+            Some((body, time)) if !self.is_fine() => {
+                write!(f, ", most on '{body}' at {time:.4} s: too long for derivatives")
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Follows a simulation from step to step.
+pub(crate) struct Audit<'a, S: Scalar> {
+    world: &'a World<S>,
+    steps: usize,
+    roughness: Roughness,
+    energy: EnergyBalance,
+}
+
+impl<'a, S: Scalar> Audit<'a, S> {
+    /// Of a simulation from `initial`.
+    pub(crate) fn new(world: &'a World<S>, initial: &[State<S>]) -> Self {
+        let (roughness, energy) =
+            (Roughness::new(world, initial), EnergyBalance::new(world, initial));
+        Self { world, steps: 0, roughness, energy }
+    }
+
+    /// After `step` has led to `states`.
+    ///
+    /// # Errors
+    /// If contacts have made energy.
+    pub(crate) fn step(&mut self, step: Step, states: &[State<S>]) -> Result<(), SimulationError> {
+        self.steps += 1;
+        self.roughness.step(step, states);
+        self.energy.step(self.world, step, states)
+    }
+
+    /// What is to be said of the steps, by an integrator that `controls_error` or not, that have led to `states` at `time` \[s\].
+    ///
+    /// # Errors
+    /// If contacts have made energy.
+    pub(crate) fn finish(
+        mut self,
+        time: f64,
+        states: &[State<S>],
+        controls_error: bool,
+    ) -> Result<Resolution, SimulationError> {
+        self.energy.check(self.world, time, states)?;
+        let name = |body: BodyId| self.world.bodies[body].name.clone();
+        let roughest = self.roughness.roughest().map(|(body, time)| (name(body), time));
+        let steps = self.steps;
+        Ok(match controls_error {
+            true => Resolution { steps, roughness: None, roughest: None },
+            false => Resolution { steps, roughness: Some(self.roughness.mean()), roughest },
+        })
+    }
+}

@@ -1,0 +1,159 @@
+//! Whether contacts make energy.
+
+use nalgebra::Vector3;
+use prehend_autodiff::Scalar;
+
+use crate::contact::patch::Patch;
+use crate::contact::point::Contact;
+use crate::error::SimulationError;
+use crate::state::State;
+use crate::time::Step;
+use crate::world::World;
+use crate::world::body::Motion;
+use crate::world::body_id::BodyId;
+
+/// Part of the largest kinetic energy that contacts may seem to have made: methods of first order are off by as much where they
+/// are still of use.
+const TOLERANCE: f64 = 0.25;
+
+/// Steps from one look at the energy to the next.
+const EVERY: usize = 16;
+
+/// Nodes and weights of Gauss's quadrature with five points on 0..1.
+const GAUSS: [(f64, f64); 5] = [
+    (0.046_910_077_030_668, 0.118_463_442_528_095),
+    (0.230_765_344_947_158, 0.239_314_335_249_683),
+    (0.5, 0.284_444_444_444_444),
+    (0.769_234_655_052_842, 0.239_314_335_249_683),
+    (0.953_089_922_969_332, 0.118_463_442_528_095),
+];
+
+/// The energy of a world in which nothing but gravity, constant wrenches and contacts acts.
+pub(super) struct EnergyBalance {
+    /// Whether it is such a world: bodies on trajectories bring energy with them.
+    closed: bool,
+    initial: Vec<State>,
+    /// Steps since the last look.
+    since: usize,
+    /// Work of external torques \[J\].
+    work: f64,
+    /// The largest kinetic energy so far \[J\].
+    kinetic: f64,
+}
+
+impl EnergyBalance {
+    pub(super) fn new<S: Scalar>(world: &World<S>, initial: &[State<S>]) -> Self {
+        let initial: Vec<State> = initial.iter().map(State::value).collect();
+        let moves = |(motion, state): (&Motion<S>, &State)| match motion {
+            Motion::Free(_) => false,
+            Motion::Kinematic => {
+                state.linear != Vector3::zeros() || state.angular != Vector3::zeros()
+            }
+            Motion::Driven(_) => true,
+        };
+        let closed = !world.bodies.iter().map(|body| &body.motion).zip(&initial).any(moves);
+        Self { closed, initial, since: 0, work: 0.0, kinetic: 0.0 }
+    }
+
+    /// After `step` has led to `states`.
+    #[inline]
+    pub(super) fn step<S: Scalar>(
+        &mut self,
+        world: &World<S>,
+        step: Step,
+        states: &[State<S>],
+    ) -> Result<(), SimulationError> {
+        for (body, state) in world.bodies.iter().zip(states) {
+            let torque = body.external_wrench.fixed_rows::<3>(3).map(|x| x.value());
+            if torque != Vector3::zeros() {
+                self.work += torque.dot(&state.angular.map(|x| x.value())) * step.dt;
+            }
+        }
+        self.since += 1;
+        if self.since < EVERY {
+            return Ok(());
+        }
+        self.since = 0;
+        self.check(world, step.end(), states)
+    }
+
+    /// Compares the energy at `states` with that at the start.
+    pub(super) fn check<S: Scalar>(
+        &mut self,
+        world: &World<S>,
+        time: f64,
+        states: &[State<S>],
+    ) -> Result<(), SimulationError> {
+        let [mut kinetic, mut gain] = [0.0, -self.work];
+        for body in world.free_bodies() {
+            let (before, now) = (&self.initial[body], states[body].value());
+            let moving = kinetic_energy(world, body, &now);
+            kinetic += moving;
+            gain += moving
+                - kinetic_energy(world, body, before)
+                - work_of_pull(world, body, before, &now);
+        }
+        self.kinetic = self.kinetic.max(kinetic);
+        if !self.closed || gain <= TOLERANCE * self.kinetic {
+            return Ok(());
+        }
+        // What contacts had stored at the start they may give back.
+        let plain = world.plain();
+        let now: Vec<State> = states.iter().map(State::value).collect();
+        let stored = stored_energy(&plain, &self.initial);
+        let energy = gain - stored + stored_energy(&plain, &now);
+        if energy <= TOLERANCE * self.kinetic.max(stored) {
+            return Ok(());
+        }
+        let fastest = |a: &BodyId, b: &BodyId| {
+            let energy = |body: BodyId| kinetic_energy(world, body, &now[body]);
+            energy(*a).total_cmp(&energy(*b))
+        };
+        let body = world.free_bodies().into_iter().max_by(fastest).unwrap_or(BodyId(0));
+        let (body, contact) = plain.names(&now, body);
+        Err(SimulationError::Energy { body, contact, time, energy })
+    }
+}
+
+/// Kinetic energy of a free body \[J\].
+fn kinetic_energy<S: Scalar>(world: &World<S>, body: BodyId, state: &State) -> f64 {
+    let Some(rigid) = world.bodies[body].rigid() else { return 0.0 };
+    let spin = state.pose.rotation.inverse() * state.angular;
+    let inertia = rigid.inertia().map(|x| x.value());
+    0.5 * (rigid.mass().value() * state.linear.norm_squared() + spin.dot(&(inertia * spin)))
+}
+
+/// Work of gravity and the external force on a free body that has moved from `before` to `now` \[J\].
+fn work_of_pull<S: Scalar>(world: &World<S>, body: BodyId, before: &State, now: &State) -> f64 {
+    let Some(rigid) = world.bodies[body].rigid() else { return 0.0 };
+    let force =
+        world.gravity * rigid.mass() + world.bodies[body].external_wrench.fixed_rows::<3>(0);
+    let shift = now.pose.translation.vector - before.pose.translation.vector;
+    force.map(|x| x.value()).dot(&shift)
+}
+
+/// What resting contacts at `states` could give back \[J\]: the work of each sample's normal force from its gap to its reach.
+fn stored_energy(world: &World, states: &[State]) -> f64 {
+    let mut energy = 0.0;
+    for pair in &world.contacts {
+        let (body, other) = (&world.bodies[pair.bodies.samples], &world.bodies[pair.bodies.field]);
+        let (Some(surface), Some(field)) = (&body.surface, &other.field) else { continue };
+        let (com, state, smoothing) = (body.com(), world.seen_value(pair, states), pair.smoothing);
+        let reach = pair.law().reach();
+        Patch { surface, com, state, field: field.as_ref(), smoothing }.for_each_gap(
+            reach,
+            |gap, area| {
+                let depth = reach - gap;
+                let force = |fraction: f64| {
+                    let (slip, normal) = (Vector3::zeros(), Vector3::z());
+                    let gap = reach - fraction * depth;
+                    let contact = Contact { gap, normal_speed: 0.0, slip, normal, area };
+                    pair.law().response(pair.params(), &contact).normal
+                };
+                let mean: f64 = GAUSS.iter().map(|(node, weight)| weight * force(*node)).sum();
+                energy += pair.weight * depth * mean;
+            },
+        );
+    }
+    energy
+}

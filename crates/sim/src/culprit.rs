@@ -1,0 +1,71 @@
+//! Who is to blame when a simulation cannot go on.
+
+use prehend_autodiff::Scalar;
+
+use crate::error::SimulationError;
+use crate::state::State;
+use crate::world::World;
+use crate::world::body_id::BodyId;
+use crate::world::contact_pair::ContactPair;
+
+impl<S: Scalar> World<S> {
+    /// The error of `states` that led to `next`, not all finite, by `time` \[s\].
+    pub(crate) fn not_finite(
+        &self,
+        states: &[State<S>],
+        next: &[State<S>],
+        time: f64,
+    ) -> SimulationError {
+        let body = BodyId(next.iter().position(|state| !state.is_finite()).unwrap_or_default());
+        let (body, contact) = self.names(states, body);
+        SimulationError::NotFinite { body, contact, time }
+    }
+
+    /// The error of steps from `states` at `time` \[s\] that even with `dt` \[s\] are too long.
+    pub(crate) fn stalled(&self, states: &[State<S>], time: f64, dt: f64) -> SimulationError {
+        let acceleration = |body: &BodyId| {
+            let mass =
+                self.bodies[*body].rigid().map_or(f64::INFINITY, |rigid| rigid.mass().value());
+            let pairs = self.contacts.iter().filter(|pair| pair.joins(*body));
+            pairs.map(|pair| self.load(pair, states)).fold(0.0, f64::max) / mass
+        };
+        let free = self.free_bodies();
+        let hardest =
+            free.iter().max_by(|a, b| acceleration(a).total_cmp(&acceleration(b))).copied();
+        let (body, contact) = self.names(states, hardest.unwrap_or(BodyId(0)));
+        SimulationError::Stalled { body, contact, time, dt }
+    }
+
+    /// The name of a body, and that of the one that presses hardest on it of those that may touch it.
+    pub(crate) fn names(&self, states: &[State<S>], body: BodyId) -> (String, Option<String>) {
+        let pairs = self.contacts.iter().filter(|pair| pair.joins(body));
+        let loads = pairs.map(|pair| (pair, self.load(pair, states)));
+        let hardest = loads.max_by(|(_, a), (_, b)| a.total_cmp(b));
+        let other = hardest.map(|(pair, _)| {
+            let ends = pair.bodies;
+            if ends.samples == body { ends.field } else { ends.samples }
+        });
+        let name = |body: BodyId| self.bodies[body].name.clone();
+        (name(body), other.map(name))
+    }
+
+    /// The force of a contact \[N\], infinite if it is no number.
+    fn load(&self, pair: &ContactPair<S>, states: &[State<S>]) -> f64 {
+        let [on_samples, _] = self.contact_wrenches(pair, states, 1);
+        let force = on_samples.fixed_rows::<3>(0).map(|x| x.value()).norm();
+        if force.is_nan() { f64::INFINITY } else { force }
+    }
+
+    /// Whether derivatives through the beginning of every contact are right.
+    pub(crate) fn check_onsets(&self) -> Result<(), SimulationError> {
+        let jumps = |pair: &&ContactPair<S>| pair.force_jumps();
+        match self.contacts.iter().find(jumps) {
+            Some(pair) => {
+                let [body, contact] = [pair.bodies.samples, pair.bodies.field]
+                    .map(|body| self.bodies[body].name.clone());
+                Err(SimulationError::ForceJumps { body, contact })
+            }
+            None => Ok(()),
+        }
+    }
+}

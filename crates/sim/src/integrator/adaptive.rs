@@ -1,0 +1,100 @@
+//! The default integrator: steps as long as their error allows.
+
+mod error_norm;
+mod onset;
+mod planner;
+mod probe;
+mod travel;
+
+use prehend_autodiff::Scalar;
+
+use super::Integrator;
+use super::runge_kutta::dormand_prince;
+use crate::error::SimulationError;
+use crate::state::State;
+use crate::time::Step;
+use crate::world::World;
+use planner::Planner;
+
+/// Dormand and Prince's method of fifth order with steps that it chooses: what [`World::simulate`] uses.
+///
+/// Each step of a rollout is divided until the estimated error of every part is within the tolerances. Two errors are held:
+/// that of the states, and that of a *sensitivity*, the derivative of the states along a direction drawn at the start of the
+/// step. A part that resolves the motion may well be too long for its derivatives, where friction or damping decays within
+/// it; the sensitivity says so. Parts end where samples touch or let go, where derivatives of forces jump, and are never so long that a contact
+/// could be passed over: no sample moves by more than its clearance and a fiftieth of its body's size.
+///
+/// Parts are chosen by values alone, so that they are the same whatever the scalar. Derivatives are those of the parts that
+/// were taken.
+///
+/// No step is short enough for derivatives through a force that jumps at touch, such as damping that acts before there is
+/// penetration, since the time of touch has a derivative too. Such a contact is an error where derivatives are asked for: let the force fade in
+/// ([`GapSmoothing::Softplus`](crate::GapSmoothing::Softplus)), or take a law whose damping grows with penetration
+/// ([`HuntCrossley`](crate::HuntCrossley)).
+///
+/// ```
+/// use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
+/// use prehend_sim::{Adaptive, Body, RigidBody, TimeSteps, World};
+///
+/// let stone = RigidBody::new(1.0, Matrix3::identity(), Point3::origin())?;
+/// let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
+/// world.add(Body::free("stone", stone));
+/// let start = [stone.at_rest(&Isometry3::identity())];
+/// let integrator = Adaptive { tolerance: 1e-10, ..Adaptive::default() };
+/// let run = world.rollout_with(&integrator, &start, TimeSteps { dt: 0.1, steps: 10 })?.states;
+/// assert!((run[10][0].linear.z + 9.81).abs() < 1e-12);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Adaptive {
+    /// Error of a part of a step: of positions in multiples of the body's radius of gyration, of velocities in multiples of the
+    /// body's speed and of the speed of a fall through that radius.
+    pub tolerance: f64,
+    /// Error of the sensitivity in a part of a step, relative to its largest component, in the same units.
+    pub sensitivity_tolerance: f64,
+    /// Parts of a step at most.
+    pub max_parts: usize,
+}
+
+impl Default for Adaptive {
+    /// 10⁻⁶ for states and sensitivities, a million parts.
+    fn default() -> Self {
+        Self { tolerance: 1e-6, sensitivity_tolerance: 1e-6, max_parts: 1_000_000 }
+    }
+}
+
+impl Integrator for Adaptive {
+    /// # Errors
+    /// If a contact's force jumps at touch and derivatives are asked for; where steps would have to be too short or too many; where
+    /// a state stops being finite.
+    fn step<S: Scalar>(
+        &self,
+        world: &World<S>,
+        states: &[State<S>],
+        step: Step,
+    ) -> Result<Vec<State<S>>, SimulationError> {
+        if S::ORDER > 0 {
+            world.check_onsets()?;
+        }
+        let mut planner = Planner::new(self, world, states, step);
+        if S::ORDER == 0 {
+            while planner.advance()?.is_some() {}
+            return Ok(planner.states().map(|state| state.lift()).collect());
+        }
+        let mut states = states.to_vec();
+        let mut wrenches = world.wrenches(&states, step.index);
+        while let Some(part) = planner.advance()? {
+            let end = dormand_prince::step(world, &states, &wrenches, part);
+            (states, wrenches) = (end.states, end.wrenches);
+        }
+        Ok(states)
+    }
+
+    fn stability_limit(&self) -> f64 {
+        f64::INFINITY
+    }
+
+    fn controls_error(&self) -> bool {
+        true
+    }
+}

@@ -1,0 +1,124 @@
+//! How large an error is.
+
+use nalgebra::{Vector3, Vector6};
+
+use super::Adaptive;
+use super::planner::Probe;
+use crate::integrator::runge_kutta::dormand_prince::Trial;
+use crate::state::State;
+use crate::world::World;
+use crate::world::body_id::BodyId;
+
+/// Part of the fastest body's speed that counts for all: what is at rest may be hit by it.
+const SLOW: f64 = 0.1;
+/// Speed of a world in which nothing moves \[m/s\].
+const SLOWEST: f64 = 1e-9;
+
+/// Errors in multiples of what is tolerated.
+pub(super) struct ErrorNorm {
+    tolerance: f64,
+    sensitivity_tolerance: f64,
+    /// Of each body, if it is free.
+    scales: Vec<Option<Scale>>,
+}
+
+/// What counts as one for a body.
+#[derive(Clone, Copy)]
+struct Scale {
+    mass: f64,
+    /// Radius of gyration \[m\].
+    length: f64,
+    /// Speed of a fall through that radius \[m/s\].
+    speed: f64,
+}
+
+impl Scale {
+    /// The largest of a change of position \[m\], velocity \[m/s\], orientation \[rad\] and angular momentum \[kg m²/s\], with
+    /// velocities in multiples of `speed` \[m/s\].
+    fn largest(&self, change: [f64; 4], speed: f64) -> f64 {
+        let [position, velocity, turn, momentum] = change;
+        let spin = momentum / (self.mass * self.length * speed);
+        [position / self.length, velocity / speed, turn, spin].into_iter().fold(0.0, larger)
+    }
+
+    /// The speed at which `state` moves, its rotation with it \[m/s\].
+    fn speed_of(&self, state: &State<Probe>) -> f64 {
+        let norm = |v: &Vector3<Probe>| v.map(|x| x.value).norm();
+        norm(&state.linear) + self.length * norm(&state.angular)
+    }
+
+    /// The largest component of the sensitivity of `state`.
+    fn sensitivity(&self, state: &State<Probe>, speed: f64) -> f64 {
+        let tangent = state.tangent().map(|x| x.derivative[0]);
+        let [position, turn, velocity, spin] =
+            std::array::from_fn(|k| Vector3::from_column_slice(&tangent[3 * k..][..3]).norm());
+        let momentum = spin * self.mass * self.length * self.length;
+        self.largest([position, velocity, turn, momentum], speed)
+    }
+}
+
+/// The larger of two numbers, and what is no number rather than either.
+fn larger(a: f64, b: f64) -> f64 {
+    if a > b || a.is_nan() { a } else { b }
+}
+
+impl ErrorNorm {
+    /// Of a step that starts at `states`.
+    pub(super) fn new(settings: &Adaptive, world: &World, states: &[State]) -> Self {
+        let speeds = states.iter().map(|state| state.linear.norm());
+        let fastest = speeds.fold(0.0, f64::max);
+        let scale = |(body, wrench): (usize, &Vector6<f64>)| {
+            let rigid = world.bodies[body].rigid()?;
+            let length = rigid.gyration_radius();
+            let force = |wrench: &Vector6<f64>| wrench.fixed_rows::<3>(0).norm() / rigid.mass();
+            let constant = world.gravity.norm() + force(&world.bodies[body].external_wrench);
+            // Without gravity, what is pushed by contacts alone, or soon will be.
+            let acceleration = if constant > 0.0 { constant } else { force(wrench) };
+            let falling = (acceleration * length).sqrt();
+            let speed = falling.max(SLOW * fastest).max(SLOWEST);
+            Some(Scale { mass: rigid.mass(), length, speed })
+        };
+        let wrenches = world.wrenches(states, 0);
+        let scales: Vec<Option<Scale>> = wrenches.iter().enumerate().map(scale).collect();
+        let Adaptive { tolerance, sensitivity_tolerance, .. } = *settings;
+        Self { tolerance, sensitivity_tolerance, scales }
+    }
+
+    /// Units of the twelve coordinates of a body's tangent.
+    pub(super) fn units(&self, body: BodyId) -> [f64; 12] {
+        let Some(Scale { length, speed, .. }) = self.scales[body.index()] else { return [0.0; 12] };
+        let units = [length, 1.0, speed, speed / length];
+        std::array::from_fn(|i| units[i / 3])
+    }
+
+    /// A length to begin with: a tenth of the time in which accelerations change a velocity by as much as it counts.
+    pub(super) fn first_step(&self, world: &World, wrenches: &[Vector6<Probe>]) -> f64 {
+        let time = |(scale, wrench): (&Option<Scale>, &Vector6<Probe>)| {
+            let Scale { mass, length, speed } = (*scale)?;
+            let wrench = wrench.map(|w| w.value);
+            let (force, torque) = (wrench.fixed_rows::<3>(0), wrench.fixed_rows::<3>(3));
+            let linear = (world.gravity + force / mass).norm();
+            Some(0.1 * speed / linear.max(torque.norm() / (mass * length)))
+        };
+        self.scales.iter().zip(wrenches).filter_map(time).fold(f64::INFINITY, f64::min)
+    }
+
+    /// The error of `trial`, a step from `states`: at most one if it is tolerated, not a number if the step is none.
+    pub(super) fn of(&self, states: &[State<Probe>], trial: &Trial<Probe>) -> f64 {
+        let (mut error, mut slope_error, mut slope) = (0.0, 0.0, 0.0);
+        for (body, scale) in self.scales.iter().enumerate() {
+            let Some(scale) = scale else { continue };
+            let (start, end, change) = (&states[body], &trial.states[body], &trial.error[body]);
+            let speed = scale.speed + larger(scale.speed_of(start), scale.speed_of(end));
+            let norms = |part: fn(Probe) -> f64| change.each_ref().map(|v| v.map(part).norm());
+            error = larger(error, scale.largest(norms(|x| x.value), speed));
+            slope_error = larger(slope_error, scale.largest(norms(|x| x.derivative[0]), speed));
+            for state in [start, end] {
+                slope = larger(slope, scale.sensitivity(state, speed));
+            }
+        }
+        // Where everything is constant there is no error to compare.
+        let slope_error = if slope_error == 0.0 { 0.0 } else { slope_error / slope };
+        larger(error / self.tolerance, slope_error / self.sensitivity_tolerance)
+    }
+}

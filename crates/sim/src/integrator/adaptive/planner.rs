@@ -1,0 +1,163 @@
+//! Chooses the parts of a step.
+
+use nalgebra::Vector6;
+use prehend_autodiff::{Fwd, Scalar};
+
+use super::error_norm::ErrorNorm;
+use super::{Adaptive, onset, probe, travel};
+use crate::error::SimulationError;
+use crate::integrator::runge_kutta::dormand_prince;
+use crate::state::State;
+use crate::time::Step;
+use crate::world::World;
+
+/// Numbers that carry the derivative along the probe.
+pub(super) type Probe = Fwd<1>;
+
+/// The exponent by which the length of a step follows from its error, for an estimate of fourth order.
+const EXPONENT: f64 = -0.2;
+/// Margin that makes the next step likely to pass.
+const SAFETY: f64 = 0.9;
+/// Change of length from one step to the next, the least and the most.
+const CHANGE: [f64; 2] = [0.2, 5.0];
+/// Error of a part that ends just after a kink.
+const OVERSHOOT: f64 = 0.1;
+/// Times that a part is brought to a kink before it is only made shorter.
+const LOOKS: usize = 2;
+/// Error of a part that can only come from a kink.
+const KINK: f64 = 30.0;
+/// Shortest part, of the whole step or of the time that it starts at.
+const SHORTEST: f64 = 1e-13;
+
+/// A place where derivatives jump, such as a law that stops pulling: the error of a part that it lies in falls with its length,
+/// not with the fifth power.
+struct Kink {
+    /// End of the shortest part so far that it is known to lie in \[s\].
+    end: f64,
+    /// Length of a part that it may lie in \[s\].
+    tolerated: f64,
+    /// Length of parts without it \[s\].
+    resume: f64,
+}
+
+impl Kink {
+    /// The next part to try at `time` \[s\]: half of where it may be.
+    fn next(&self, time: f64) -> f64 {
+        (0.5 * (self.end - time)).max(self.tolerated)
+    }
+}
+
+/// Takes the parts of a step one after the other, over values and one sensitivity.
+pub(super) struct Planner {
+    settings: Adaptive,
+    world: World<Probe>,
+    plain: World,
+    whole: Step,
+    norm: ErrorNorm,
+    states: Vec<State<Probe>>,
+    wrenches: Vec<Vector6<Probe>>,
+    /// Parts taken, and the time that they have led to \[s\].
+    parts: usize,
+    time: f64,
+    /// Length of the next part \[s\].
+    dt: f64,
+    kink: Option<Kink>,
+}
+
+impl Planner {
+    pub(super) fn new<S: Scalar>(
+        settings: &Adaptive,
+        world: &World<S>,
+        states: &[State<S>],
+        whole: Step,
+    ) -> Self {
+        let plain = world.plain();
+        let lifted = plain.lift::<Probe>();
+        let values: Vec<State> = states.iter().map(State::value).collect();
+        let norm = ErrorNorm::new(settings, &plain, &values);
+        let states = probe::seeded(&plain, &values, &norm);
+        let wrenches = lifted.wrenches(&states, whole.index);
+        let dt = norm.first_step(&plain, &wrenches).min(whole.dt);
+        Self {
+            settings: *settings,
+            world: lifted,
+            plain,
+            whole,
+            norm,
+            states,
+            wrenches,
+            parts: 0,
+            time: whole.start,
+            dt,
+            kink: None,
+        }
+    }
+
+    /// The states that the parts have led to.
+    pub(super) fn states(&self) -> impl Iterator<Item = State> {
+        self.states.iter().map(State::value)
+    }
+
+    /// Takes the next part; none when the step is done.
+    ///
+    /// # Errors
+    /// If it would have to be too short, or one too many.
+    pub(super) fn advance(&mut self) -> Result<Option<Step>, SimulationError> {
+        let left = self.whole.end() - self.time;
+        let shortest = SHORTEST * self.whole.dt.max(self.time.abs());
+        if left <= shortest {
+            return Ok(None);
+        }
+        let values: Vec<State> = self.states().collect();
+        let before_kink = self.kink.as_ref().map_or(f64::INFINITY, |kink| kink.next(self.time));
+        self.dt = travel::longest(&self.plain, &values, self.dt.min(left).min(before_kink));
+        let (mut attempt, mut looks) = (0, LOOKS);
+        loop {
+            // A last part that is next to nothing would be lost in rounding.
+            let dt = if self.dt >= left * (1.0 - 1e-6) { left } else { self.dt };
+            // Leaks of the first step are of its first part.
+            let index = if self.parts == 0 { self.whole.index } else { self.whole.index.max(1) };
+            let part = Step { index, start: self.time, dt };
+            let trial = dormand_prince::step(&self.world, &self.states, &self.wrenches, part);
+            let error = self.norm.of(&self.states, &trial);
+            let change = if error.is_nan() { CHANGE[0] } else { SAFETY * error.powf(EXPONENT) };
+            let chosen = dt * change.clamp(CHANGE[0], CHANGE[1]);
+            if error <= 1.0 {
+                self.parts += 1;
+                if self.parts > self.settings.max_parts {
+                    return Err(self.plain.stalled(&values, self.time, dt));
+                }
+                self.time = if dt == left { self.whole.end() } else { self.time + dt };
+                (self.states, self.wrenches) = (trial.states, trial.wrenches);
+                self.dt = match self.kink.take_if(|kink| kink.end <= self.time) {
+                    Some(passed) => passed.resume,
+                    None => chosen,
+                };
+                return Ok(Some(part));
+            }
+            let end: Vec<State> = trial.states.iter().map(State::value).collect();
+            if chosen <= shortest {
+                return Err(match end.iter().all(State::is_finite) {
+                    true => self.plain.stalled(&values, self.time, dt),
+                    false => self.plain.not_finite(&values, &end, self.time),
+                });
+            }
+            if error.is_finite() && (attempt > 0 || error > KINK) {
+                let resume = self.kink.as_ref().map_or(0.5 * dt, |kink| kink.resume);
+                self.kink =
+                    Some(Kink { end: self.time + dt, tolerated: SAFETY * dt / error, resume });
+            }
+            attempt += 1;
+            let onset = (looks > 0 && error.is_finite())
+                .then(|| onset::first(&self.plain, &values, &end, dt, shortest));
+            self.dt = match onset.flatten() {
+                Some(time) => {
+                    looks -= 1;
+                    time + OVERSHOOT * (dt - time) / error
+                }
+                None if attempt > 1 => dt * (SAFETY / error).max(0.5),
+                None => chosen,
+            };
+        }
+    }
+}

@@ -1,0 +1,67 @@
+//! A scene, what it is differentiated by, and what is looked at in the end.
+
+use prehend_autodiff::Scalar;
+use prehend_sim::{Integrator, Simulation, SimulationError, State, TimeSteps, World};
+
+/// A number of the scene.
+#[derive(Clone, Copy)]
+pub(crate) enum Input {
+    /// A coordinate of a body's initial state, in the order of [`State::tangent`].
+    Start(usize, usize),
+    /// A parameter of a contact's law.
+    Law(usize, usize),
+}
+
+/// A number of the last states.
+#[derive(Clone, Copy)]
+pub(crate) enum Output {
+    /// A coordinate of a body's center of mass \[m\].
+    Position(usize, usize),
+    /// A coordinate of its velocity \[m/s\].
+    Velocity(usize, usize),
+}
+
+pub(crate) struct Scene {
+    pub(crate) name: &'static str,
+    pub(crate) world: World,
+    pub(crate) start: Vec<State>,
+    /// How long it takes \[s\].
+    pub(crate) time: f64,
+    pub(crate) input: Input,
+    pub(crate) output: Output,
+    /// A change of the input after which the output is still nearly linear.
+    pub(crate) nudge: f64,
+    /// A step for semi-implicit Euler that is too long \[s\].
+    pub(crate) bad_step: f64,
+}
+
+impl Scene {
+    /// The output by `integrator` in `steps` equal steps, with the input changed by `change`.
+    pub(crate) fn run<S: Scalar>(
+        &self,
+        integrator: &impl Integrator,
+        steps: usize,
+        change: S,
+    ) -> Result<Simulation<S>, SimulationError> {
+        let mut world = self.world.lift::<S>();
+        let mut start: Vec<State<S>> = self.start.iter().map(State::lift).collect();
+        match self.input {
+            Input::Start(body, coordinate) => {
+                let mut tangent = [S::zero(); 12];
+                tangent[coordinate] = change;
+                start[body] = self.start[body].retract(&tangent);
+            }
+            Input::Law(contact, parameter) => {
+                world.contacts[contact].params_mut()[parameter] += change;
+            }
+        }
+        let time_steps = TimeSteps { dt: self.time / steps as f64, steps };
+        let Simulation { states, resolution } =
+            world.simulate_with(integrator, &start, time_steps, |_, _| ())?;
+        let states = match self.output {
+            Output::Position(body, axis) => states[body].pose.translation.vector[axis],
+            Output::Velocity(body, axis) => states[body].linear[axis],
+        };
+        Ok(Simulation { states, resolution })
+    }
+}
