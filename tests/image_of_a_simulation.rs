@@ -4,8 +4,9 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Matrix3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
 use prehend::autodiff::check::finite_difference_gradient;
+use prehend::autodiff::lie::lift;
 use prehend::autodiff::{Scalar, Var, gradient};
 use prehend::geometry::{TriMesh, shapes};
 use prehend::render::{Camera, Light, RenderModel, Renderer, Scene, SceneVars};
@@ -49,11 +50,6 @@ fn end<S: Scalar>(world: &World, tangent: &[S]) -> Isometry3<S> {
     states.unwrap().states[1].pose
 }
 
-fn lifted<S: Scalar>(pose: &Isometry3<f64>) -> Isometry3<S> {
-    let rotation = Unit::new_unchecked(pose.rotation.quaternion().coords.map(S::constant).into());
-    Isometry3::from_parts(Translation3::from(pose.translation.vector.map(S::constant)), rotation)
-}
-
 #[test]
 fn an_image_loss_flows_back_through_a_rollout() {
     let mesh = block();
@@ -76,7 +72,7 @@ fn an_image_loss_flows_back_through_a_rollout() {
     };
     let (value, by) = gradient(
         |x| {
-            let pose = lifted::<Var>(&t_cam_world) * end(&world, x);
+            let pose = lift::<Var>(&t_cam_world) * end(&world, x);
             let vars = SceneVars { poses: vec![(0, pose)], ..SceneVars::default() };
             let image = renderer.record(&scene_at(Isometry3::identity()), &vars).unwrap();
             let color = image.color.as_flattened().iter().zip(target.color.as_flattened());

@@ -15,6 +15,14 @@ pub enum BodyError {
     /// The inertia is not symmetric and positive definite.
     #[error("inertia must be symmetric and positive definite")]
     Inertia,
+    /// No body has such an inertia: a principal moment is larger than the other two together.
+    #[error(
+        "no body has principal moments of inertia {moments:?} kg m²: the largest is at most the sum of the others"
+    )]
+    Moments {
+        /// The principal moments, in ascending order \[kg m²\].
+        moments: [f64; 3],
+    },
     /// The center of mass is not finite.
     #[error("center of mass must be finite")]
     CenterOfMass,
@@ -51,7 +59,7 @@ impl<S: Scalar> RigidBody<S> {
     /// center of mass `com` in its model frame \[m\].
     ///
     /// # Errors
-    /// Unless the mass is positive, the inertia symmetric positive definite and everything finite.
+    /// Unless the mass is positive, the inertia symmetric positive definite and that of a body, and everything finite.
     pub fn new(mass: S, inertia: Matrix3<S>, com: Point3<f64>) -> Result<Self, BodyError> {
         let value = mass.value();
         if !(value > 0.0 && value.is_finite()) {
@@ -65,9 +73,23 @@ impl<S: Scalar> RigidBody<S> {
         if !values.iter().all(|x| x.is_finite()) || asymmetry > 1e-6 * values.norm() {
             return Err(BodyError::Inertia);
         }
+        let mut moments: [f64; 3] = values.symmetric_eigenvalues().into();
+        moments.sort_by(f64::total_cmp);
+        // Nothing is as thin as a sheet: some room for what was measured or written with few digits.
+        if moments[2] > (1.0 + 1e-3) * (moments[0] + moments[1]) && moments[0] > 0.0 {
+            return Err(BodyError::Moments { moments });
+        }
         let inertia = (inertia + inertia.transpose()) * S::constant(0.5);
         let inverse_inertia = inertia.cholesky().ok_or(BodyError::Inertia)?.inverse();
         Ok(Self { mass, inertia, inverse_inertia, com })
+    }
+
+    /// The same body of another density, so that it has `mass` \[kg\]: the inertia is scaled as well.
+    ///
+    /// # Errors
+    /// Unless the mass is positive and finite.
+    pub fn with_mass(&self, mass: S) -> Result<Self, BodyError> {
+        Self::new(mass, self.inertia * (mass / self.mass), self.com)
     }
 
     /// Mass \[kg\].
@@ -171,6 +193,9 @@ mod tests {
         assert!(RigidBody::new(f64::NAN, i, o).is_err());
         assert_eq!(RigidBody::new(1.0, -i, o), Err(BodyError::Inertia));
         assert_eq!(RigidBody::new(1.0, i * f64::NAN, o), Err(BodyError::Inertia));
+        let impossible = Matrix3::from_diagonal(&Vector3::new(1.0, 3.0, 1.0));
+        let moments = [1.0, 1.0, 3.0];
+        assert_eq!(RigidBody::new(1.0, impossible, o), Err(BodyError::Moments { moments }));
         let nowhere = Point3::new(f64::NAN, 0.0, 0.0);
         assert_eq!(RigidBody::new(1.0, i, nowhere), Err(BodyError::CenterOfMass));
     }
@@ -183,6 +208,16 @@ mod tests {
         let at_com = body.com_pose(&pose);
         assert!((at_com.translation.vector - (pose * com).coords).norm() < 1e-15);
         assert!((body.model_pose(&at_com).to_homogeneous() - pose.to_homogeneous()).norm() < 1e-15);
+    }
+
+    #[test]
+    fn a_heavier_body_turns_as_slowly() {
+        let body = RigidBody::new(2.0, Matrix3::identity() * 0.4, Point3::origin()).unwrap();
+        let [mass] = Fwd::<1>::variables([3.0]);
+        let heavier = body.lift().with_mass(mass).unwrap();
+        assert!((heavier.inertia()[(0, 0)].value - 0.6).abs() < 1e-15);
+        assert!((heavier.inertia()[(0, 0)].derivative[0] - 0.2).abs() < 1e-15);
+        assert_eq!(body.with_mass(0.0), Err(BodyError::Mass(0.0)));
     }
 
     #[test]

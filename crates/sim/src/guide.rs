@@ -85,8 +85,8 @@
 //! let (lower, upper) = (world.add(body("lower")), world.add(body("upper")));
 //! let spring = KelvinVoigt { stiffness: 1e7, damping: 1e5 };
 //! let friction = Coulomb { friction: 0.5, slip_scale: 1e-2 };
-//! let law: Arc<dyn DynContactLaw> = Arc::new(Law::new(spring, friction)?);
-//! world.add_symmetric_contact(lower, upper, &law, GapSmoothing::Hard)?;
+//! let law = Law::new(spring, friction)?;
+//! world.add_symmetric_contact(lower, upper, Arc::new(law), GapSmoothing::Hard)?;
 //! let turned = Isometry3::new(Vector3::new(0.0, 0.0, -1e-3), Vector3::x() * std::f64::consts::PI);
 //! let states = [Isometry3::identity(), turned].map(|pose| rigid.at_rest(&pose));
 //! // 1e7 N/m³ · 1 mm · 1 cm², half of it each way.
@@ -268,7 +268,7 @@
 //! # Together with other losses
 //! The states of a rollout over `Var` are numbers on the tape like all others. Their poses go on into a renderer's
 //! operation, a network or a sum of squares, where they come from may be anything as well, and one sweep goes back
-//! through all of it. Wrenches that a controller computes from the states are one more line between two steps:
+//! through all of it. A controller between steps ([`World::simulate_controlled`]) is differentiated with the rest:
 //!
 //! ```
 //! # use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
@@ -278,17 +278,16 @@
 //! # let mut world = World::new(Vector3::zeros());
 //! # let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin())?;
 //! # let ball = world.add(Body::free("ball", rigid));
-//! let integrator = StepCheckpointed::new(SemiImplicitEuler, &world)?;
 //! let recording = Recording::start();
 //! let gain = recording.variable(2.0);
-//! let mut lifted = world.lift::<Var>();
-//! let mut states = vec![rigid.at_rest(&Isometry3::translation(1.0, 0.0, 0.0)).lift()];
+//! let start = [rigid.at_rest(&Isometry3::translation(1.0, 0.0, 0.0)).lift()];
 //! let mut loss = Var::from(0.0);
-//! for index in 0..30 {
-//!     lifted.bodies[ball].external_wrench.x = -gain * states[ball].pose.translation.x;
-//!     states = lifted.step(&integrator, &states, Step::new(index, 1e-2))?;
+//! let control = |_, world: &mut World<Var>, states: &mut [State<Var>]| {
+//!     world.bodies[ball].external_wrench.x = -gain * states[ball].pose.translation.x;
 //!     loss += states[ball].pose.translation.vector.norm_squared();
-//! }
+//! };
+//! let time_steps = TimeSteps { dt: 1e-2, steps: 30 };
+//! world.lift().simulate_controlled(&Adaptive::default(), &start, time_steps, control)?;
 //! // A stiffer spring brings it back sooner.
 //! assert!(recording.gradient(loss).wrt(gain) < 0.0);
 //! # Ok(())

@@ -99,6 +99,53 @@ impl<S: Scalar> World<S> {
         Ok(Simulation { states, resolution })
     }
 
+    /// [`World::simulate_with`] under `control`, which is called before each step: it sees the states and may set external wrenches,
+    /// gravity, parameters of laws, and the states of kinematic bodies, for that step and those after it.
+    ///
+    /// Over a scalar that carries derivatives they pass through the controller too.
+    ///
+    /// ```
+    /// # use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
+    /// # use prehend_autodiff::Fwd;
+    /// # use prehend_sim::*;
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// # let mut world = World::new(Vector3::zeros());
+    /// # let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, Point3::origin())?;
+    /// # let ball = world.add(Body::free("ball", rigid));
+    /// # let start = [rigid.at_rest(&Isometry3::translation(1.0, 0.0, 0.0)).lift()];
+    /// // A spring of 2 N/m pulls the ball back; how far, by its stiffness?
+    /// let stiffness = Fwd::<1>::variable(2.0, 0);
+    /// let time_steps = TimeSteps { dt: 1e-2, steps: 30 };
+    /// let control = |_, world: &mut World<_>, states: &mut [State<_>]| {
+    ///     world.bodies[ball].external_wrench.x = -stiffness * states[ball].pose.translation.x;
+    /// };
+    /// let lifted = world.lift();
+    /// let end = lifted.simulate_controlled(&Adaptive::default(), &start, time_steps, control)?;
+    /// assert!(end[ball].pose.translation.x.derivative[0] < 0.0);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// As [`World::simulate_with`], but for energy, which a controller may bring.
+    pub fn simulate_controlled(
+        &self,
+        integrator: &impl Integrator,
+        initial: &[State<S>],
+        TimeSteps { dt, steps }: TimeSteps,
+        mut control: impl FnMut(Step, &mut Self, &mut [State<S>]),
+    ) -> Result<Vec<State<S>>, SimulationError> {
+        self.check(initial, dt)?;
+        let (mut world, mut states) = (self.clone(), self.started(initial));
+        for index in 0..steps {
+            let step = Step::new(index, dt);
+            control(step, &mut world, &mut states);
+            world.check(&states, dt)?;
+            states = world.advance(integrator, &states, step)?;
+        }
+        Ok(states)
+    }
+
     /// [`World::simulate_with`] without the report; an error of `visit` ends it.
     pub(crate) fn march(
         &self,
@@ -217,7 +264,7 @@ mod tests {
             ("penalty_stribeck", &[5e6, 2e4, 0.6, 0.3, 0.05, 1e-2], 3),
         ] {
             let (mut world, states) = egg_on(bowl(), GapSmoothing::Hard);
-            world.contacts[0].set_law(registry.create(name, values).unwrap().unwrap().into());
+            world.contacts[0].set_law(registry.create(name, values).unwrap().into());
             let (step, good) = (Step::new(0, 1e-3), world.parameters());
             for (k, parameter) in
                 registry.entry(name).unwrap().parameters[2..][..parts].iter().enumerate()
@@ -227,7 +274,7 @@ mod tests {
                 let changed = world.with_parameters(&bad).unwrap();
                 let refused = changed.step(&SemiImplicitEuler, &states, step).unwrap_err();
                 assert!(
-                    matches!(refused, SimulationError::Law(e) if e.name() == Some(parameter.name))
+                    matches!(&refused, SimulationError::Law(e) if e.name() == Some(parameter.name))
                 );
                 let mut lifted = world.lift::<Fwd<1>>();
                 lifted.contacts[0].params_mut()[2 + k] = Fwd::constant(-1.0);

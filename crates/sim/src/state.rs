@@ -1,9 +1,7 @@
 //! Pose and velocity of a body.
 
-use nalgebra::{
-    Isometry3, Quaternion, SMatrix, Translation3, Unit, UnitQuaternion, Vector3, Vector6,
-};
-use prehend_autodiff::lie::{perturb_about, so3_exp};
+use nalgebra::{Isometry3, Quaternion, SMatrix, Translation3, Unit, Vector3, Vector6};
+use prehend_autodiff::lie::{lift, perturb_about, so3_exp};
 use prehend_autodiff::{Fwd, Scalar};
 
 /// Where a body is and how it moves; plain numbers, or numbers that carry derivatives.
@@ -117,11 +115,8 @@ impl State {
 
     /// Constants of another scalar.
     pub fn lift<S: Scalar>(&self) -> State<S> {
-        let rotation: UnitQuaternion<S> =
-            Unit::new_unchecked(Quaternion::from(self.pose.rotation.coords.map(S::constant)));
-        let translation = Translation3::from(self.pose.translation.vector.map(S::constant));
         State {
-            pose: Isometry3::from_parts(translation, rotation),
+            pose: lift(&self.pose),
             linear: self.linear.map(S::constant),
             angular: self.angular.map(S::constant),
         }

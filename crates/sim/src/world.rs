@@ -70,11 +70,11 @@ impl World {
         &mut self,
         a: BodyId,
         b: BodyId,
-        law: &Arc<dyn DynContactLaw>,
+        law: Arc<dyn DynContactLaw>,
         smoothing: GapSmoothing,
     ) -> Result<(), SimulationError> {
         let there = ContactBodies { samples: a, field: b };
-        let pair = |bodies| self.pair(bodies, Arc::clone(law), smoothing);
+        let pair = |bodies| self.pair(bodies, Arc::clone(&law), smoothing);
         let mut both = [pair(there)?, pair(there.swapped())?];
         both.iter_mut().for_each(|pair| pair.weight = 0.5);
         self.contacts.extend(both);
@@ -278,7 +278,7 @@ mod tests {
         let (cup, pebble) = (world.add(cup), world.add(pebble));
         let law: Arc<dyn DynContactLaw> = Arc::new(penalty(5e6, 2e4, 0.6, 2e-2));
         world
-            .add_symmetric_contact(pebble, cup, &law, GapSmoothing::Softplus { width: 3e-4 })
+            .add_symmetric_contact(pebble, cup, law, GapSmoothing::Softplus { width: 3e-4 })
             .unwrap();
         let cup_pose = Isometry3::new(Vector3::new(0.3, 0.2, 0.1), Vector3::new(0.4, -0.7, 1.0));
         let pebble_pose = cup_pose

@@ -13,7 +13,7 @@
 //! | adjoint of the group | the rotation matrix itself | [`se3_adjoint`] |
 //! | adjoint of the algebra | [`cross_matrix`] | [`se3_little_adjoint`] |
 //!
-//! [`twist_row`] is the derivative of a point's coordinate by a left twist about a center, [`perturb_about`] that twist.
+//! [`lift`] makes constants of a pose. [`twist_row`] is the derivative of a point's coordinate by a left twist about a center, [`perturb_about`] that twist.
 //!
 //! A right Jacobian moves the perturbation to the other side: exp(ξ + δ) ≈ exp(ξ) exp(J_r δ). It is the
 //! left one of −ξ.
@@ -22,7 +22,7 @@ mod se3;
 mod so3;
 
 pub use se3::{
-    perturb_about, se3_adjoint, se3_exp, se3_left_jacobian, se3_left_jacobian_inverse,
+    lift, perturb_about, se3_adjoint, se3_exp, se3_left_jacobian, se3_left_jacobian_inverse,
     se3_little_adjoint, se3_log, se3_right_jacobian, se3_right_jacobian_inverse, twist_row,
 };
 pub use so3::{

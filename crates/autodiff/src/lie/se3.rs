@@ -1,6 +1,8 @@
 //! Rigid motions: the group SE(3) and its twists (translation part ρ \[m\], rotation part ω \[rad\]).
 
-use nalgebra::{Isometry3, Matrix3, Matrix6, Translation3, Vector3, Vector6};
+use nalgebra::{
+    Isometry3, Matrix3, Matrix6, Quaternion, Translation3, UnitQuaternion, Vector3, Vector6,
+};
 
 use super::so3::{
     cross_matrix, cross_matrix_squared, inverse_coefficient, so3_exp, so3_left_jacobian_inverse,
@@ -118,6 +120,14 @@ fn jacobian_blocks<S: Scalar>(twist: &Vector6<S>) -> (Matrix3<S>, Matrix3<S>) {
 pub fn twist_row<S: Scalar>(arm: &Vector3<S>, direction: &Vector3<S>) -> Vector6<S> {
     let torque = arm.cross(direction);
     Vector6::new(direction.x, direction.y, direction.z, torque.x, torque.y, torque.z)
+}
+
+/// A pose in constants of another scalar.
+#[inline]
+pub fn lift<S: Scalar>(pose: &Isometry3<f64>) -> Isometry3<S> {
+    let rotation = Quaternion::from(pose.rotation.coords.map(S::constant));
+    let translation = pose.translation.vector.map(S::constant);
+    Isometry3::from_parts(translation.into(), UnitQuaternion::new_unchecked(rotation))
 }
 
 /// Moves `pose` by the left twist `delta` about the point `center`:

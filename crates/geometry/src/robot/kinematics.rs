@@ -2,6 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix6xX, Point3, Quaternion, Translation3, UnitQuaternion};
 use prehend_autodiff::Scalar;
+use prehend_autodiff::lie::lift;
 
 use super::{Drive, Joint, KinematicTree, Motion};
 
@@ -47,7 +48,7 @@ impl KinematicTree {
 }
 
 fn t_parent_child<S: Scalar>(joint: &Joint, joints: &[S]) -> Isometry3<S> {
-    let fixed = constant(&joint.t_parent_joint);
+    let fixed = lift(&joint.t_parent_joint);
     let Drive::Variable { index, multiplier, offset } = joint.drive else { return fixed };
     let position = joints[index] * S::constant(multiplier) + S::constant(offset);
     let axis = joint.axis.into_inner().map(S::constant);
@@ -63,13 +64,6 @@ fn t_parent_child<S: Scalar>(joint: &Joint, joints: &[S]) -> Isometry3<S> {
                 )
         }
     }
-}
-
-fn constant<S: Scalar>(t: &Isometry3<f64>) -> Isometry3<S> {
-    Isometry3::from_parts(
-        Translation3::from(t.translation.vector.map(S::constant)),
-        UnitQuaternion::new_unchecked(Quaternion::from(t.rotation.coords.map(S::constant))),
-    )
 }
 
 #[cfg(test)]

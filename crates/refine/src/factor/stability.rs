@@ -5,8 +5,8 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Matrix6, Point3, Vector3, Vector6};
 use prehend_sim::{
     Body, ContactBodies, Coulomb, GapSmoothing, KelvinVoigt, Law, LeakSteps, Perturbation,
-    RigidBody, StabilityJacobian, StabilityLoss, StabilityWeights, StaticContactTarget, StepError,
-    Surface, TimeSteps, World,
+    RigidBody, SemiImplicitEuler, StabilityJacobian, StabilityLoss, StabilityWeights,
+    StaticContactTarget, StepError, Surface, TimeSteps, World,
 };
 
 use crate::error::RefineError;
@@ -116,6 +116,7 @@ impl StabilityFactor {
             .map_err(|e| fail(e.to_string()))?;
         let steps = settings.steps.0;
         let stability = StabilityLoss {
+            integrator: SemiImplicitEuler,
             world,
             states: vec![prehend_sim::State::at_rest(Isometry3::identity()); 2],
             object: samples,

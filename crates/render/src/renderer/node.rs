@@ -228,7 +228,7 @@ impl<Sh: Shader + Clone + 'static> Renderer<Sh> {
 #[cfg(test)]
 mod tests {
     use nalgebra::Vector6;
-    use prehend_autodiff::lie::perturb_about;
+    use prehend_autodiff::lie::{lift, perturb_about};
     use prehend_autodiff::{Recording, Scalar};
     use prehend_geometry::shapes::cuboid;
 
@@ -250,12 +250,6 @@ mod tests {
             .with(model(&cuboid(Vector3::repeat(0.2))), Isometry3::translation(0.1, 0.0, 0.8))
     }
 
-    fn lifted(pose: &Isometry3<f64>) -> Isometry3<Var> {
-        let coordinates = pose.rotation.quaternion().coords.map(Var::constant);
-        let rotation = Unit::new_unchecked(coordinates.into());
-        Isometry3::from_parts(pose.translation.vector.map(Var::constant).into(), rotation)
-    }
-
     #[test]
     fn the_node_passes_on_the_vector_jacobian_product() {
         let (scene, renderer) = (scene(), Renderer::new(Light::headlight(0.4, 0.6)));
@@ -267,7 +261,7 @@ mod tests {
         let twist: Vec<Var> = recording.variables_of(&[0.0; 6]);
         let center = body.center().coords.map(Var::constant);
         let pose =
-            perturb_about(&lifted(&body.t_cam_model), &center, &Vector6::from_fn(|i, _| twist[i]));
+            perturb_about(&lift(&body.t_cam_model), &center, &Vector6::from_fn(|i, _| twist[i]));
         let positions: Vec<Vector3<Var>> = body
             .model
             .positions()

@@ -3,7 +3,7 @@
 use thiserror::Error;
 
 /// Parameters of a contact law or of a gap smoothing that cannot be.
-#[derive(Clone, Copy, Debug, Error, PartialEq)]
+#[derive(Clone, Debug, Error, PartialEq)]
 pub enum LawError {
     /// A parameter is out of its range.
     #[error("{name} must be {range}, is {value}")]
@@ -29,6 +29,14 @@ pub enum LawError {
         /// How many the law has.
         expected: usize,
     },
+    /// There is no law of that name.
+    #[error("there is no contact law called {name:?}: one of {known}")]
+    Unknown {
+        /// The name.
+        name: String,
+        /// Those that there are, with commas between them.
+        known: String,
+    },
 }
 
 impl LawError {
@@ -36,7 +44,7 @@ impl LawError {
     pub fn name(&self) -> Option<&'static str> {
         match *self {
             Self::Range { name, .. } | Self::Missing { name } => Some(name),
-            Self::Count { .. } => None,
+            Self::Count { .. } | Self::Unknown { .. } => None,
         }
     }
 }

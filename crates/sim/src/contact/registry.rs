@@ -141,13 +141,16 @@ impl LawRegistry {
         self.laws.get(name)
     }
 
-    /// The law called `name` with the given parameters, or `None` where there is none of that name.
-    pub fn create(
-        &self,
-        name: &str,
-        params: &[f64],
-    ) -> Option<Result<Box<dyn DynContactLaw>, LawError>> {
-        self.laws.get(name).map(|entry| (entry.constructor)(params))
+    /// The law called `name` with the given parameters.
+    ///
+    /// # Errors
+    /// If there is none of that name, with those that there are; if a parameter is missing, out of its range or one too many.
+    pub fn create(&self, name: &str, params: &[f64]) -> Result<Box<dyn DynContactLaw>, LawError> {
+        let unknown = || {
+            let known = self.names().collect::<Vec<_>>().join(", ");
+            LawError::Unknown { name: name.to_owned(), known }
+        };
+        (self.laws.get(name).ok_or_else(unknown)?.constructor)(params)
     }
 }
 
@@ -177,7 +180,7 @@ mod tests {
             let values: Vec<f64> = (0..entry.parameters.len())
                 .map(|k| good(entry.parameters[k].name) * (1.0 - 1e-3 * k as f64))
                 .collect();
-            let law = registry.create(name, &values).unwrap().unwrap();
+            let law = registry.create(name, &values).unwrap();
             assert_eq!(law.params(), &values[..law.params().len()], "{name}");
             assert!(!entry.summary.is_empty());
         }
@@ -219,14 +222,15 @@ mod tests {
     #[test]
     fn a_registered_law_answers_like_the_law_itself() {
         let registry = LawRegistry::default();
-        let boxed = registry.create("penalty", &[1e6, 1e3, 0.5, 1e-2]).unwrap().unwrap();
+        let boxed = registry.create("penalty", &[1e6, 1e3, 0.5, 1e-2]).unwrap();
         let law = penalty(1e6, 1e3, 0.5, 1e-2);
         let slip = Vector3::new(0.1, 0.0, 0.0);
         let contact =
             Contact { gap: -1e-3, normal_speed: -0.1, slip, normal: Vector3::z(), area: 1e-4 };
         let [a, b] = [boxed.as_ref(), &law].map(|law| law.response(law.params(), &contact));
         assert_eq!((a.normal, a.tangential), (b.normal, b.tangential));
-        assert!(registry.create("glue", &[]).is_none());
+        let unknown = registry.create("glue", &[]).map(|_| ()).unwrap_err().to_string();
+        assert!(unknown.contains("\"glue\": one of graspd, hertz, hunt_crossley"), "{unknown}");
     }
 
     #[test]
@@ -241,6 +245,6 @@ mod tests {
         });
         assert!(registry.names().any(|name| name == "mine"));
         assert_eq!(registry.entry("mine").unwrap().parameters, []);
-        assert!(registry.create("mine", &[1e6]).unwrap().is_ok());
+        assert!(registry.create("mine", &[1e6]).is_ok());
     }
 }

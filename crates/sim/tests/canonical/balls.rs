@@ -40,7 +40,7 @@ fn two_balls(
         )
     });
     let law: Arc<dyn DynContactLaw> = (law.build)(spec);
-    world.add_symmetric_contact(a, b, &law, smoothing).unwrap();
+    world.add_symmetric_contact(a, b, law, smoothing).unwrap();
     world
 }
 

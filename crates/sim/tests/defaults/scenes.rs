@@ -333,7 +333,7 @@ fn several() -> Vec<Scene> {
     let collision = || {
         let mut world = World::new(Vector3::zeros());
         let (a, b) = (world.add(ball("red")), world.add(ball("white")));
-        world.add_symmetric_contact(a, b, &kelvin_voigt(0.3, 1e-2), SMOOTH).unwrap();
+        world.add_symmetric_contact(a, b, kelvin_voigt(0.3, 1e-2), SMOOTH).unwrap();
         let start = vec![
             state(at(-0.1, 0.005, 0.0), [1.0, 0.0, 0.0], [0.0; 3]),
             State::at_rest(Isometry3::identity()),

@@ -146,7 +146,7 @@ impl Scene {
             states.push(state);
         }
         if let &[a, b] = balls.as_slice() {
-            world.add_symmetric_contact(a, b, &law, smoothing).unwrap();
+            world.add_symmetric_contact(a, b, law, smoothing).unwrap();
         }
         let weights = (0..26).map(|_| dice.roll()).collect();
         Self { world, states, weights }
