@@ -34,6 +34,9 @@ pub enum BodyError {
         /// Number of areas.
         areas: usize,
     },
+    /// The radius of rounded samples is negative or not finite.
+    #[error("radius of surface points must be zero or positive and finite, is {0} m")]
+    Rounding(f64),
     /// There are no surface points, so nothing would ever touch.
     #[error("no surface points")]
     NoSamples,
@@ -76,7 +79,7 @@ impl<S: Scalar> RigidBody<S> {
         let mut moments: [f64; 3] = values.symmetric_eigenvalues().into();
         moments.sort_by(f64::total_cmp);
         // Nothing is as thin as a sheet: some room for what was measured or written with few digits.
-        if moments[2] > (1.0 + 1e-3) * (moments[0] + moments[1]) && moments[0] > 0.0 {
+        if moments[0] > 0.0 && moments[2] > (1.0 + 1e-3) * (moments[0] + moments[1]) {
             return Err(BodyError::Moments { moments });
         }
         let inertia = (inertia + inertia.transpose()) * S::constant(0.5);
@@ -222,14 +225,14 @@ mod tests {
 
     #[test]
     fn inertia_carries_its_derivative_into_its_inverse() {
-        let [a, b] = Fwd::<2>::variables([2.0, 0.3]);
+        let [a, b] = Fwd::<2>::variables([1.5, 0.3]);
         let mut inertia = Matrix3::<Fwd<2>>::identity();
         (inertia[(0, 0)], inertia[(0, 1)], inertia[(1, 0)]) = (a, b, b);
         let body = RigidBody::new(Fwd::constant(1.0), inertia, Point3::origin()).unwrap();
-        // (2·1 − b²)⁻¹ at the corner: ∂/∂a of the inverse's first entry is −(that entry)².
+        // (1.5·1 − b²)⁻¹ at the corner: ∂/∂a of the inverse's first entry is −(that entry)².
         let inverse = body.inverse_world_inertia(&UnitQuaternion::identity());
         let first = inverse[(0, 0)];
-        assert!((first.value - 1.0 / (2.0 - 0.09)).abs() < 1e-14);
+        assert!((first.value - 1.0 / (1.5 - 0.09)).abs() < 1e-14);
         assert!((first.derivative[0] + first.value * first.value).abs() < 1e-14);
     }
 }

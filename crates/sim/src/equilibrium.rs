@@ -103,8 +103,10 @@ impl World {
         let place = |position: &Point3<f64>| t_world_com * (position - body.com().coords);
         let touch = |position: Point3<f64>| {
             let local = t_world_field.inverse_transform_point(&position) + other.com().coords;
-            let sample = field.sample(&local, reach)?;
-            Some((position, t_world_field.rotation * sample.gradient))
+            let outward = field.sample(&local, reach + surface.rounding())?.gradient;
+            let outward = t_world_field.rotation * outward;
+            let touches = outward.try_normalize(0.0)? * surface.rounding();
+            Some((position - touches, outward))
         };
         surface.points().iter().filter_map(|point| touch(place(&point.position))).collect()
     }

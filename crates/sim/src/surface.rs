@@ -22,6 +22,8 @@ pub struct Surface {
     points: Vec<SurfacePoint>,
     blocks: Vec<Block>,
     area: f64,
+    /// Radius of the samples \[m\].
+    rounding: f64,
 }
 
 /// Neighboring samples and the ball they lie in.
@@ -61,7 +63,20 @@ impl Surface {
             samples.map(|(&position, &area)| SurfacePoint { position, area }).collect();
         let mut blocks = Vec::new();
         sort_into_blocks(&mut points, 0, &mut blocks);
-        Ok(Self { blocks, area: areas.iter().sum(), points })
+        Ok(Self { blocks, area: areas.iter().sum(), points, rounding: 0.0 })
+    }
+
+    /// The same samples as balls of `radius` \[m\]: one makes a sphere, eight the corners of a rounded box. They touch where the field
+    /// is nearest, exactly, and roll.
+    ///
+    /// # Errors
+    /// If the radius is negative or not finite.
+    pub fn rounded(mut self, radius: f64) -> Result<Self, BodyError> {
+        if !(radius >= 0.0 && radius.is_finite()) {
+            return Err(BodyError::Rounding(radius));
+        }
+        self.rounding = radius;
+        Ok(self)
     }
 
     /// `points` that share `area` \[m²\] equally, such as uniform samples of a surface.
@@ -82,9 +97,16 @@ impl Surface {
         self.area
     }
 
-    /// No sample is farther from `point` than this \[m\].
+    /// No part of a sample is farther from `point` than this \[m\].
     pub(crate) fn radius_about(&self, point: &Point3<f64>) -> f64 {
-        self.blocks.iter().map(|b| (b.center - point).norm() + b.radius).fold(0.0, f64::max)
+        let radii = self.blocks.iter().map(|b| (b.center - point).norm() + b.radius);
+        radii.fold(0.0, f64::max) + self.rounding
+    }
+
+    /// Radius of the samples \[m\].
+    #[inline]
+    pub(crate) fn rounding(&self) -> f64 {
+        self.rounding
     }
 
     /// The samples that `keep` wants, as one block that is never left out. What is not kept stays part of the area.
@@ -98,7 +120,7 @@ impl Surface {
             blocks.flat_map(|(_, points)| points.iter().filter(|p| keep(p)).copied()).collect();
         let all =
             Block { start: 0, end: points.len(), center: Point3::origin(), radius: f64::INFINITY };
-        Self { blocks: vec![all], points, area: self.area }
+        Self { blocks: vec![all], points, area: self.area, rounding: self.rounding }
     }
 
     /// The blocks with their samples.
@@ -130,7 +152,13 @@ fn sort_into_blocks(points: &mut [SurfacePoint], start: usize, blocks: &mut Vec<
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
+    use nalgebra::{Isometry3, Matrix3, Vector3};
+
     use super::*;
+    use crate::scenes::{floor, on_ground, penalty};
+    use crate::{Body, BodyId, GapSmoothing, RigidBody, State};
 
     #[test]
     fn blocks_hold_every_sample_once_and_in_their_ball() {
@@ -153,6 +181,31 @@ mod tests {
             assert_eq!(surface.points().iter().filter(|s| s.position == *p).count(), 1);
         }
         assert!((surface.area() - 2.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn one_rounded_sample_is_a_ball_that_rolls() {
+        let (mass, radius, speed, friction) = (0.3, 0.05, 1.0, 0.3);
+        let inertia = Matrix3::identity() * (0.4 * mass * radius * radius);
+        let rigid = RigidBody::new(mass, inertia, Point3::origin()).unwrap();
+        let surface = Surface::uniform(&[Point3::origin()], 1e-4).unwrap();
+        let surface = surface.rounded(radius).unwrap();
+        let ball = Body::free("ball", rigid).with_surface(surface);
+        let law = Arc::new(penalty(1e8, 1e6, friction, 1e-3));
+        let smoothing = GapSmoothing::Softplus { width: 1e-6 };
+        let world = on_ground(Vector3::z() * -9.81, floor(), ball, law, smoothing);
+        let sinks = mass * 9.81 / (1e8 * 1e-4);
+        let pose = Isometry3::translation(0.0, 0.0, radius - sinks);
+        let mut start = [State::at_rest(Isometry3::identity()), rigid.at_rest(&pose)];
+        start[1].linear.x = speed;
+        let end = world.simulate(&start, 0.3).unwrap()[1];
+        // It slides until 2v/7μg = 0.097 s and then rolls at 5v/7.
+        assert!((end.linear.x - 5.0 / 7.0 * speed).abs() < 1e-6, "{}", end.linear.x);
+        assert!((end.angular.y - end.linear.x / radius).abs() < 1e-3);
+        let touching = world.equilibrium(BodyId(1), &[start[0], end], friction, 1e-4).unwrap();
+        assert!(touching.is_possible());
+        let refused = Surface::uniform(&[Point3::origin()], 1e-4).unwrap().rounded(-1.0);
+        assert_eq!(refused, Err(BodyError::Rounding(-1.0)));
     }
 
     #[test]

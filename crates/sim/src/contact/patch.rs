@@ -29,7 +29,12 @@ pub struct Patch<'a> {
 
 /// A point in contact: what both the value and its derivative start from.
 pub(super) struct Touch {
+    /// From the center of mass to the sample, and to where it touches.
     pub(super) arm: Vector3<f64>,
+    pub(super) lever: Vector3<f64>,
+    /// Radius of the sample \[m\].
+    pub(super) radius: f64,
+    /// Velocity where it touches.
     pub(super) velocity: Vector3<f64>,
     pub(super) smoothing: SmoothedGap,
     pub(super) normal: Vector3<f64>,
@@ -39,6 +44,12 @@ pub(super) struct Touch {
 }
 
 impl Patch<'_> {
+    /// Distance of a sample's center beyond which there is no force, for a law that reaches to `cutoff`.
+    #[inline]
+    fn reach(&self, cutoff: f64) -> f64 {
+        cutoff + self.smoothing.band() + self.surface.rounding()
+    }
+
     /// Whether a point of `block` may be nearer to the field than `reach`.
     #[inline]
     fn may_touch(&self, block: &Block, reach: f64) -> bool {
@@ -55,14 +66,14 @@ impl Patch<'_> {
 
     /// The samples that may touch, for a law that reaches to `cutoff`, before one of them has moved by `margin` \[m\].
     pub(crate) fn near(&self, cutoff: f64, margin: f64) -> Surface {
-        let reach = cutoff + self.smoothing.band() + self.field.lipschitz_bound() * margin;
+        let reach = self.reach(cutoff) + self.field.lipschitz_bound() * margin;
         let near = |point: &SurfacePoint| self.distance_within(&point.position, reach);
         self.surface.only(near, |block| self.may_touch(block, reach))
     }
 
     /// Whether a sample may touch before one of them has moved by `margin` \[m\], for a law that reaches to `cutoff`.
     pub(crate) fn is_near(&self, cutoff: f64, margin: f64) -> bool {
-        let reach = cutoff + self.smoothing.band() + self.field.lipschitz_bound() * margin;
+        let reach = self.reach(cutoff) + self.field.lipschitz_bound() * margin;
         self.surface.blocks().any(|(block, points)| {
             let near = |point: &SurfacePoint| self.distance_within(&point.position, reach);
             self.may_touch(block, reach) && points.iter().any(near)
@@ -74,8 +85,9 @@ impl Patch<'_> {
         let State { pose, .. } = &self.state;
         for point in self.surface.points() {
             let place = pose.translation.vector + pose.rotation * (point.position - self.com);
-            if let Some(gap) = self.field.distance(&Point3::from(place), reach) {
-                visit(gap, point.area);
+            let radius = self.surface.rounding();
+            if let Some(distance) = self.field.distance(&Point3::from(place), reach + radius) {
+                visit(distance - radius, point.area);
             }
         }
     }
@@ -92,7 +104,7 @@ impl Patch<'_> {
     ) -> bool {
         let State { pose, linear, angular } = &self.state;
         let (translation, rotation) = (pose.translation.vector, pose.rotation.to_rotation_matrix());
-        let reach = cutoff + self.smoothing.band();
+        let (radius, reach) = (self.surface.rounding(), self.reach(cutoff));
         let skips = pressing_only && self.smoothing.leaks();
         for (block, points) in self.surface.blocks() {
             if !self.may_touch(block, reach) {
@@ -102,7 +114,8 @@ impl Patch<'_> {
                 let arm = rotation * (point.position - self.com);
                 let place = Point3::from(translation + arm);
                 // The distance alone is cheap. What is no number is found below.
-                if skips && self.field.distance(&place, reach).is_none_or(|d| d >= cutoff) {
+                if skips && self.field.distance(&place, reach).is_none_or(|d| d - radius >= cutoff)
+                {
                     continue;
                 }
                 let Some(sample) = self.field.sample(&place, reach) else { continue };
@@ -110,14 +123,27 @@ impl Patch<'_> {
                 if distance.is_nan() {
                     return false;
                 }
-                let Some(smoothing) = self.smoothing.at(distance - cutoff) else { continue };
+                let Some(smoothing) = self.smoothing.at(distance - radius - cutoff) else {
+                    continue;
+                };
                 let length = gradient.norm();
                 if length.is_nan() || length < MIN_GRADIENT {
                     continue;
                 }
                 let (normal, area) = (gradient / length, point.area);
-                let velocity = linear + angular.cross(&arm);
-                visit(&Touch { arm, velocity, smoothing, normal, length, area, hessian });
+                let lever = arm - normal * radius;
+                let velocity = linear + angular.cross(&lever);
+                visit(&Touch {
+                    arm,
+                    lever,
+                    radius,
+                    velocity,
+                    smoothing,
+                    normal,
+                    length,
+                    area,
+                    hessian,
+                });
             }
         }
         true
@@ -157,6 +183,13 @@ impl Touch {
             normal,
             area: self.area,
         }
+    }
+
+    /// Derivative of the lever by the sample's position, beside that of the arm: −ρ ∂n/∂x for its radius ρ.
+    #[inline(always)]
+    pub(super) fn lever_slope(&self) -> Matrix3<f64> {
+        let normal = self.lifted_normal();
+        Matrix3::from_fn(|i, j| -self.radius * normal[i].derivative[j])
     }
 
     /// The unit normal with its derivative by position: (I − nnᵀ)·∇²φ/|∇φ|.

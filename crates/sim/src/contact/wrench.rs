@@ -44,7 +44,7 @@ pub(crate) fn wrench<L: ContactLaw>(law: &L, p: &[f64], patch: &Patch<'_>) -> Ve
         let response = law.law(p, &touch.contact(cutoff));
         let f = touch.normal * response.normal + response.tangential;
         force += f;
-        torque += touch.arm.cross(&f);
+        torque += touch.lever.cross(&f);
     });
     // A field that fails must not look like free space.
     if sound { stack(&force, &torque) } else { Vector6::repeat(f64::NAN) }
@@ -73,20 +73,28 @@ pub(crate) fn wrench_jacobian<L: ContactLaw>(
         let force: Vector3<Fwd<6>> =
             Vector3::from_fn(|i, _| contact.normal[i] * response.normal + response.tangential[i]);
         let f = force.map(|x| x.value);
-        let by_position = Matrix3::from_fn(|i, j| force[i].derivative[j]);
+        let mut by_position = Matrix3::from_fn(|i, j| force[i].derivative[j]);
         let by_velocity = Matrix3::from_fn(|i, j| force[i].derivative[3 + j]);
 
-        // Point position: δt + δθ×r; point velocity: δv + δω×r + ω×(δθ×r), for the arm r.
-        let arm = &touch.arm;
+        // Sample position x: δx = δt + δθ×r, for the arm r; velocity where it touches: δv + δω×l + ω×δl, for the lever l, which
+        // turns with the arm and, if the sample is round, with the normal: δl = δθ×r + L δx.
+        let (arm, lever) = (&touch.arm, &touch.lever);
+        if touch.radius > 0.0 {
+            let lever_slope = touch.lever_slope();
+            by_position += times_cross(&by_velocity, &spin) * lever_slope;
+            let moved = -cross_times(&f, &lever_slope);
+            by[1][0] += moved;
+            by[1][1] -= times_cross(&moved, arm);
+        }
         let by_turn = times_cross(&-(by_position + times_cross(&by_velocity, &spin)), arm);
-        let slopes = [by_position, by_turn, by_velocity, times_cross(&-by_velocity, arm)];
+        let slopes = [by_position, by_turn, by_velocity, times_cross(&-by_velocity, lever)];
         for (column, slope) in slopes.iter().enumerate() {
             by[0][column] += slope;
-            by[1][column] += cross_times(arm, slope);
+            by[1][column] += cross_times(lever, slope);
         }
-        // Torque r×f: the arm turns with the body, δ(r×f) = (δθ×r)×f + r×δf.
+        // Torque l×f: δ(l×f) = δl×f + l×δf.
         by[1][1] += cross_times(&f, &cross_matrix(arm));
-        wrench += stack(&f, &touch.arm.cross(&f));
+        wrench += stack(&f, &lever.cross(&f));
         add_param_slopes(law, p, touch, cutoff, &mut param_slopes);
     });
     if !sound {
@@ -129,7 +137,7 @@ fn add_param_slopes<L: ContactLaw>(
         for (lane, slope) in slopes.iter_mut().enumerate() {
             let f = touch.normal * response.normal.derivative[lane]
                 + response.tangential.map(|x| x.derivative[lane]);
-            *slope += stack(&f, &touch.arm.cross(&f));
+            *slope += stack(&f, &touch.lever.cross(&f));
         }
     }
 }
@@ -206,6 +214,34 @@ mod tests {
                     let error = compare_gradients(&exact[row].derivative, reference);
                     assert!(error.relative < 1e-6, "{smoothing:?} row {row}: {error:?}");
                 }
+            }
+        }
+    }
+
+    #[test]
+    fn derivatives_of_rounded_samples_match_differences() {
+        for field in [floor(), bowl()] {
+            let (mut world, mut states) = egg_on(field, GapSmoothing::Softplus { width: 5e-4 });
+            states[1].pose.translation.z += 3e-3;
+            let surface = world.bodies[1].surface.take().unwrap();
+            let rounded = Surface::clone(&surface).rounded(4e-3).unwrap();
+            world.bodies[1].surface = Some(Arc::new(rounded));
+            let wrench = |state: State| world.wrenches(&[states[0], state], 0)[1];
+            let mut lifted: Vec<State<Fwd<12>>> = states.iter().map(State::lift).collect();
+            lifted[1] = states[1].variables();
+            let exact = world.lift().wrenches(&lifted, 0)[1];
+            assert!(wrench(states[1]).z > 0.0);
+            let differences = finite_difference_jacobian(
+                |x| {
+                    let moved = states[1].retract(&std::array::from_fn::<f64, 12, _>(|i| x[i]));
+                    wrench(moved).iter().copied().collect()
+                },
+                &[0.0; 12],
+                1e-7,
+            );
+            for (row, reference) in differences.iter().enumerate() {
+                let error = compare_gradients(&exact[row].derivative, reference);
+                assert!(error.relative < 1e-6, "row {row}: {error:?}");
             }
         }
     }

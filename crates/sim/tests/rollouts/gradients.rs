@@ -105,7 +105,7 @@ impl Scene {
         for ball in 0..1 + usize::from(two) {
             let com = Point3::from(dice.vector() * 2e-3);
             let inertia =
-                Matrix3::from_diagonal(&Vector3::from_fn(|_, _| dice.between(4e-5, 9e-5)));
+                Matrix3::from_diagonal(&Vector3::from_fn(|_, _| dice.between(4.5e-5, 9e-5)));
             let turn = UnitQuaternion::new(dice.vector()).to_rotation_matrix();
             let inertia = turn * inertia * turn.transpose();
             let rigid = RigidBody::new(dice.between(0.1, 0.3), inertia, com).unwrap();
