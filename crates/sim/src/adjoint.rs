@@ -111,6 +111,7 @@ impl<I: Integrator + Send + 'static> Integrator for StepCheckpointed<I> {
         if !has_parts_of(world, &self.scene.world) {
             return Err(SimulationError::AnotherWorld);
         }
+        self.check_differentiable(world)?;
         let Changes { places, values } = self.scene.changes(world);
         let x: Vec<S> = coordinates_of(states).chain(values).collect();
         let function = OneStep { scene: Arc::clone(&self.scene), places, step };
@@ -121,6 +122,10 @@ impl<I: Integrator + Send + 'static> Integrator for StepCheckpointed<I> {
             Motion::Kinematic | Motion::Driven(_) => *state,
         };
         Ok(world.bodies.iter().zip(states).map(next).collect())
+    }
+
+    fn check_differentiable<S: Scalar>(&self, world: &World<S>) -> Result<(), SimulationError> {
+        self.scene.integrator.check_differentiable(world)
     }
 
     fn stability_limit(&self) -> f64 {
@@ -219,6 +224,7 @@ impl World<Var> {
         snapshots: usize,
     ) -> Result<Vec<State<Var>>, SimulationError> {
         self.check(initial, dt)?;
+        integrator.check_differentiable(self)?;
         let scene = Scene::new(integrator, self)?;
         let Changes { places, values } = scene.changes(self);
         let failure = Rc::new(RefCell::new(None));

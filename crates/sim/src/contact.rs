@@ -3,6 +3,7 @@
 pub mod composite;
 pub mod dynamic;
 pub mod error;
+pub(crate) mod force_jump;
 pub mod friction;
 pub mod gap_smoothing;
 pub mod graspd;
@@ -10,7 +11,6 @@ pub mod law;
 #[cfg(test)]
 pub(crate) mod law_checks;
 pub mod normal;
-pub(crate) mod onset;
 pub mod parameters;
 pub mod patch;
 pub mod point;

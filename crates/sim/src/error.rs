@@ -75,7 +75,7 @@ pub enum SimulationError {
     #[error("the integrator was made for a world of other bodies or contacts")]
     AnotherWorld,
     /// The time step is not a positive number.
-    #[error("the time step must be positive and finite, is {0} s")]
+    #[error("a time, or a time step, must be positive and finite, is {0} s")]
     TimeStep(f64),
     /// A body's state is not finite: given so, or blown up.
     #[error(
@@ -106,7 +106,7 @@ pub enum SimulationError {
         /// How much \[J\].
         energy: f64,
     },
-    /// Forces change so fast that no step is short enough, or one too many would be taken.
+    /// Forces change so fast that no step is short enough.
     #[error(
         "body '{body}'{} needs steps shorter than {dt:.3e} s at {time} s: a force that jumps, or contacts far too stiff",
         touching(contact)
@@ -120,6 +120,16 @@ pub enum SimulationError {
         time: f64,
         /// The last step that was tried \[s\].
         dt: f64,
+    },
+    /// A step had to be divided into too many parts.
+    #[error(
+        "a step took more than {max_parts} parts by {time} s: contacts too stiff for so long a time, or `Adaptive::max_parts` too small"
+    )]
+    TooManyParts {
+        /// Parts that are allowed.
+        max_parts: usize,
+        /// Time that they have led to \[s\].
+        time: f64,
     },
     /// A force that jumps at touch has derivatives that no step gets right.
     #[error(

@@ -65,6 +65,14 @@ pub trait Integrator: Sync {
         false
     }
 
+    /// Whether derivatives of its steps in `world` are those of the motion. What takes steps by values first asks here.
+    ///
+    /// # Errors
+    /// If they are not.
+    fn check_differentiable<S: Scalar>(&self, _world: &World<S>) -> Result<(), SimulationError> {
+        Ok(())
+    }
+
     /// Whether the scheme holds its error itself, whatever the step.
     fn controls_error(&self) -> bool {
         false

@@ -59,6 +59,9 @@ impl<S: Scalar> World<S> {
     /// [`World::simulate`] with the steps of `integrator`, each handed to `visit`, and a report on how well they resolve the
     /// motion.
     ///
+    /// Contacts that make energy are an error unless a body is driven or moves as it is told: such a body may bring energy
+    /// with it. Laws that drive things on purpose are for [`World::simulate_controlled`] and [`World::step`], which do not ask.
+    ///
     /// # Errors
     /// Unless there is one finite state for each body and the time step is positive; where a state stops being finite or
     /// contacts make energy, which body, contact and time; if a step's equations were not solved.

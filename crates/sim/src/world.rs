@@ -193,7 +193,11 @@ impl<S: Scalar> World<S> {
     }
 
     /// [`World::seen`] without derivatives: nothing is recorded.
-    pub(crate) fn seen_value(&self, pair: &ContactPair<S>, states: &[State<S>]) -> State {
+    pub(crate) fn seen_value<T: Scalar>(
+        &self,
+        pair: &ContactPair<S>,
+        states: &[State<T>],
+    ) -> State {
         let com = self.bodies[pair.bodies.field].com();
         let frame = states[pair.bodies.field].value().shifted(&-com.coords);
         states[pair.bodies.samples].value().seen_from(&frame)

@@ -132,7 +132,7 @@ fn work_of_pull<S: Scalar>(world: &World<S>, body: BodyId, before: &State, now: 
     force.map(|x| x.value()).dot(&shift)
 }
 
-/// What resting contacts at `states` could give back \[J\]: the work of each sample's normal force from its gap to its reach.
+/// What resting contacts at `states` could give back \[J\]: the work of each sample's normal force from its gap to where there is none.
 fn stored_energy(world: &World, states: &[State]) -> f64 {
     let mut energy = 0.0;
     for pair in &world.contacts {
@@ -140,20 +140,25 @@ fn stored_energy(world: &World, states: &[State]) -> f64 {
         let (Some(surface), Some(field)) = (&body.surface, &other.field) else { continue };
         let (com, state, smoothing) = (body.com(), world.seen_value(pair, states), pair.smoothing);
         let reach = pair.law().reach();
-        Patch { surface, com, state, field: field.as_ref(), smoothing }.for_each_gap(
-            reach,
-            |gap, area| {
-                let depth = reach - gap;
-                let force = |fraction: f64| {
-                    let (slip, normal) = (Vector3::zeros(), Vector3::z());
-                    let gap = reach - fraction * depth;
-                    let contact = Contact { gap, normal_speed: 0.0, slip, normal, area };
-                    pair.law().response(pair.params(), &contact).normal
-                };
-                let mean: f64 = GAUSS.iter().map(|(node, weight)| weight * force(*node)).sum();
-                energy += pair.weight * depth * mean;
-            },
-        );
+        let patch = Patch { surface, com, state, field: field.as_ref(), smoothing };
+        patch.for_each_gap(reach, |gap, area| {
+            let force = |x: f64| {
+                let (slip, normal) = (Vector3::zeros(), Vector3::z());
+                let gap = reach + smoothing.at(x).map_or(0.0, |smoothed| smoothed.gap);
+                let contact = Contact { gap, normal_speed: 0.0, slip, normal, area };
+                pair.law().response(pair.params(), &contact).normal
+            };
+            // The force fades exponentially beyond the reach, if it does.
+            let (from, band) = (gap - reach, smoothing.force_band());
+            let ends = [0.0, 0.1, 0.3, 1.0].map(|fraction| fraction * band);
+            let mut begin = from;
+            for end in ends.into_iter().filter(|end| *end > from) {
+                let nodes = GAUSS.iter();
+                let mean: f64 = nodes.map(|(x, w)| w * force(begin + x * (end - begin))).sum();
+                energy += pair.weight * (end - begin) * mean;
+                begin = end;
+            }
+        });
     }
     energy
 }

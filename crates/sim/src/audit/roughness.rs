@@ -1,6 +1,6 @@
 //! How much forces change from one step to the next.
 
-use nalgebra::{Vector3, Vector6};
+use nalgebra::{Matrix3, Vector3, Vector6};
 use prehend_autodiff::Scalar;
 
 use crate::contact::wrench::stack;
@@ -8,6 +8,9 @@ use crate::state::State;
 use crate::time::Step;
 use crate::world::World;
 use crate::world::body_id::BodyId;
+
+/// Part of a body's speed below which a change of it is rounding, or an integrator's own error.
+const NOISE: f64 = 1e-6;
 
 /// Follows the velocities of free bodies.
 pub(super) struct Roughness {
@@ -22,13 +25,16 @@ pub(super) struct Roughness {
 /// A free body and what is known of its last step.
 struct Followed {
     body: BodyId,
+    mass: f64,
+    inertia: Matrix3<f64>,
     /// Radius of gyration \[m\].
     length: f64,
     /// Acceleration without contacts \[m/s²\].
     pull: Vector3<f64>,
+    torque: Vector3<f64>,
     linear: Vector3<f64>,
-    angular: Vector3<f64>,
-    kick: Vector6<f64>,
+    momentum: Vector3<f64>,
+    kick: Option<Vector6<f64>>,
 }
 
 impl Roughness {
@@ -36,14 +42,18 @@ impl Roughness {
         let follow = |body: BodyId| {
             let (rigid, state) = (world.bodies[body].rigid()?, initial[body].value());
             let mass = rigid.mass().value();
-            let force = world.bodies[body].external_wrench.fixed_rows::<3>(0).map(|x| x.value());
+            let wrench = world.bodies[body].external_wrench.map(|x| x.value());
+            let inertia = rigid.inertia().map(|x| x.value());
             Some(Followed {
                 body,
                 length: rigid.gyration_radius(),
-                pull: world.gravity.map(|x| x.value()) + force / mass,
+                pull: world.gravity.map(|x| x.value()) + wrench.fixed_rows::<3>(0) / mass,
+                torque: wrench.fixed_rows::<3>(3).into_owned(),
                 linear: state.linear,
-                angular: state.angular,
-                kick: Vector6::zeros(),
+                momentum: momentum(&inertia, &state),
+                inertia,
+                mass,
+                kick: None,
             })
         };
         let bodies = world.free_bodies().into_iter().filter_map(follow).collect();
@@ -54,17 +64,24 @@ impl Roughness {
     #[inline]
     pub(super) fn step<S: Scalar>(&mut self, step: Step, states: &[State<S>]) {
         for followed in &mut self.bodies {
-            let state = &states[followed.body];
-            let (linear, angular) = (state.linear.map(S::value), state.angular.map(S::value));
-            let by_contacts = linear - followed.linear - followed.pull * step.dt;
-            let kick = stack(&by_contacts, &((angular - followed.angular) * followed.length));
-            let change = (kick - followed.kick).norm_squared();
+            let state = states[followed.body].value();
+            let momentum = momentum(&followed.inertia, &state);
+            let linear = state.linear - followed.linear - followed.pull * step.dt;
+            let angular = momentum - followed.momentum - followed.torque * step.dt;
+            let mut kick = stack(&linear, &(angular / (followed.mass * followed.length)));
+            let speed = state.linear.norm() + followed.length * state.angular.norm();
+            if kick.norm() < NOISE * speed {
+                kick = Vector6::zeros();
+            }
+            // Nothing is known of what was before the first step.
+            let change = followed.kick.map_or(0.0, |before| (kick - before).norm_squared());
             self.kicks += kick.norm_squared();
             self.changes += change;
             if change > self.largest.0 {
                 self.largest = (change, Some((followed.body, step.start)));
             }
-            (followed.linear, followed.angular, followed.kick) = (linear, angular, kick);
+            (followed.linear, followed.momentum) = (state.linear, momentum);
+            followed.kick = Some(kick);
         }
     }
 
@@ -77,4 +94,10 @@ impl Roughness {
     pub(super) fn roughest(&self) -> Option<(BodyId, f64)> {
         self.largest.1
     }
+}
+
+/// Angular momentum, world frame \[kg m²/s\].
+fn momentum(inertia: &Matrix3<f64>, state: &State) -> Vector3<f64> {
+    let rotation = &state.pose.rotation;
+    rotation * (inertia * (rotation.inverse() * state.angular))
 }

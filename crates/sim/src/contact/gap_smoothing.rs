@@ -89,6 +89,12 @@ impl GapSmoothing {
         }
     }
 
+    /// Beyond this gap there is no force \[m\]: leaks have none.
+    #[inline]
+    pub(crate) fn force_band(&self) -> f64 {
+        if self.leaks() { 0.0 } else { self.band() }
+    }
+
     /// Whether there are contacts with a derivative that exert no force.
     #[inline]
     pub(crate) fn leaks(&self) -> bool {

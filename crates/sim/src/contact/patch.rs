@@ -80,8 +80,9 @@ impl Patch<'_> {
         })
     }
 
-    /// Calls `visit` with gap \[m\] and area \[m²\] of every sample that is nearer than `reach`.
-    pub(crate) fn for_each_gap(&self, reach: f64, mut visit: impl FnMut(f64, f64)) {
+    /// Calls `visit` with gap \[m\] and area \[m²\] of every sample that a law that reaches to `cutoff` may push.
+    pub(crate) fn for_each_gap(&self, cutoff: f64, mut visit: impl FnMut(f64, f64)) {
+        let reach = cutoff + self.smoothing.force_band();
         let State { pose, .. } = &self.state;
         for point in self.surface.points() {
             let place = pose.translation.vector + pose.rotation * (point.position - self.com);
@@ -131,7 +132,7 @@ impl Patch<'_> {
                     continue;
                 }
                 let (normal, area) = (gradient / length, point.area);
-                let lever = arm - normal * radius;
+                let lever = if radius > 0.0 { arm - normal * radius } else { arm };
                 let velocity = linear + angular.cross(&lever);
                 visit(&Touch {
                     arm,

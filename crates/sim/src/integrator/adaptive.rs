@@ -1,9 +1,9 @@
 //! The default integrator: steps as long as their error allows.
 
 mod error_norm;
-mod onset;
 mod planner;
 mod probe;
+mod touch_time;
 mod travel;
 
 use prehend_autodiff::Scalar;
@@ -23,6 +23,9 @@ use planner::Planner;
 /// step. A part that resolves the motion may well be too long for its derivatives, where friction or damping decays within
 /// it; the sensitivity says so. Parts end where samples touch or let go, where derivatives of forces jump, and are never so long that a contact
 /// could be passed over: no sample moves by more than its clearance and a fiftieth of its body's size.
+///
+/// Contacts that leak in the first step of a rollout ([`LeakSteps::First`](crate::LeakSteps::First)) leak in its first part, whose length is not
+/// known beforehand: leaks on every step, or a fixed step, have more of a meaning.
 ///
 /// Parts are chosen by values alone, so that they are the same whatever the scalar. Derivatives are those of the parts that
 /// were taken.
@@ -74,7 +77,7 @@ impl Integrator for Adaptive {
         step: Step,
     ) -> Result<Vec<State<S>>, SimulationError> {
         if S::ORDER > 0 {
-            world.check_onsets()?;
+            self.check_differentiable(world)?;
         }
         let mut planner = Planner::new(self, world, states, step);
         if S::ORDER == 0 {
@@ -84,10 +87,19 @@ impl Integrator for Adaptive {
         let mut states = states.to_vec();
         let mut wrenches = world.wrenches(&states, step.index);
         while let Some(part) = planner.advance()? {
-            let end = dormand_prince::step(world, &states, &wrenches, part);
-            (states, wrenches) = (end.states, end.wrenches);
+            let mut trial = dormand_prince::step(world, &states, &wrenches, part);
+            states = trial.stages.pop().unwrap_or(states);
+            wrenches = match part.index {
+                // Leaks of the first part are not of the next one.
+                0 => world.wrenches(&states, 1),
+                _ => trial.wrenches,
+            };
         }
         Ok(states)
+    }
+
+    fn check_differentiable<S: Scalar>(&self, world: &World<S>) -> Result<(), SimulationError> {
+        world.check_onsets()
     }
 
     fn stability_limit(&self) -> f64 {

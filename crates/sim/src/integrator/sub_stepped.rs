@@ -108,6 +108,10 @@ impl<I: Integrator> Integrator for SubStepped<I> {
         }
     }
 
+    fn check_differentiable<S: Scalar>(&self, world: &World<S>) -> Result<(), SimulationError> {
+        self.integrator.check_differentiable(world)
+    }
+
     fn stability_limit(&self) -> f64 {
         MARGIN * self.integrator.stability_limit() * self.max_substeps.max(1) as f64
     }

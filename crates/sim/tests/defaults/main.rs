@@ -1,9 +1,10 @@
-//! Values and derivatives with default settings in twenty scenes, against those of the same scenes converged.
+//! Values and derivatives with default settings in some twenty scenes, against those of the same scenes converged.
 
 #![allow(clippy::unwrap_used)] // a test may panic; helpers outside test functions count as code to the lint
 
 mod scene;
 mod scenes;
+mod traps;
 
 use prehend_autodiff::Fwd;
 use prehend_sim::{Adaptive, SemiImplicitEuler};

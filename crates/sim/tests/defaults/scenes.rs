@@ -32,34 +32,34 @@ impl ContactLaw for Quadratic {
     }
 }
 
-const SMOOTH: GapSmoothing = GapSmoothing::Softplus { width: 5e-5 };
-const HARD: GapSmoothing = GapSmoothing::Hard;
+pub(crate) const SMOOTH: GapSmoothing = GapSmoothing::Softplus { width: 5e-5 };
+pub(crate) const HARD: GapSmoothing = GapSmoothing::Hard;
 
 /// Hunt and Crossley's law for a body of `mass` \[kg\] on samples of 4 cm² together, 0.5 mm deep, with Coulomb friction.
-fn hunt_crossley(mass: f64, friction: f64, slip_scale: f64) -> Arc<dyn DynContactLaw> {
+pub(crate) fn hunt_crossley(mass: f64, friction: f64, slip_scale: f64) -> Arc<dyn DynContactLaw> {
     let target = StaticContactTarget { mass, gravity: 9.81, penetration: 5e-4, contact_area: 4e-4 };
     let bounce = Bounce { restitution: 0.4, impact_speed: 1.0 };
     let normal = HuntCrossley::from_target(&target, 1.0, bounce).unwrap();
     Arc::new(Law::new(normal, Coulomb { friction, slip_scale }).unwrap())
 }
 
-fn kelvin_voigt(friction: f64, slip_scale: f64) -> Arc<dyn DynContactLaw> {
+pub(crate) fn kelvin_voigt(friction: f64, slip_scale: f64) -> Arc<dyn DynContactLaw> {
     let normal = KelvinVoigt { stiffness: 1e7, damping: 1e5 };
     Arc::new(Law::new(normal, Coulomb { friction, slip_scale }).unwrap())
 }
 
-fn down() -> Vector3<f64> {
+pub(crate) fn down() -> Vector3<f64> {
     Vector3::new(0.0, 0.0, -9.81)
 }
 
 /// A free body of `mass` \[kg\], isotropic `inertia` \[kg m²\] and equal samples of `area` \[m²\] together.
-fn body(name: &str, mass: f64, inertia: f64, points: &[Point3<f64>], area: f64) -> Body {
+pub(crate) fn body(name: &str, mass: f64, inertia: f64, points: &[Point3<f64>], area: f64) -> Body {
     let rigid = RigidBody::new(mass, Matrix3::identity() * inertia, Point3::origin()).unwrap();
     Body::free(name, rigid).with_surface(Surface::uniform(points, area).unwrap())
 }
 
 /// The corners of a box.
-fn corners(half: [f64; 3]) -> Vec<Point3<f64>> {
+pub(crate) fn corners(half: [f64; 3]) -> Vec<Point3<f64>> {
     let sign = |i: usize, axis: usize| if i >> axis & 1 == 0 { -half[axis] } else { half[axis] };
     (0..8).map(|i| Point3::new(sign(i, 0), sign(i, 1), sign(i, 2))).collect()
 }
@@ -81,17 +81,17 @@ fn feet(height: f64) -> Vec<Point3<f64>> {
 }
 
 /// A cube of 10 cm and 0.37 kg.
-fn cube() -> Body {
+pub(crate) fn cube() -> Body {
     body("cube", 0.37, 0.37 * 0.01 / 6.0, &corners([0.05; 3]), 8e-4)
 }
 
 /// Where a body is, and how it moves.
-fn state(pose: Isometry3<f64>, linear: [f64; 3], angular: [f64; 3]) -> State {
+pub(crate) fn state(pose: Isometry3<f64>, linear: [f64; 3], angular: [f64; 3]) -> State {
     State { linear: linear.into(), angular: angular.into(), ..State::at_rest(pose) }
 }
 
 /// `body` on a fixed `field` under `gravity`; the body is number 1.
-fn on(
+pub(crate) fn on(
     field: impl DistanceField + 'static,
     gravity: Vector3<f64>,
     body: Body,
@@ -106,7 +106,7 @@ fn on(
     (world, vec![State::at_rest(Isometry3::identity()), start])
 }
 
-fn at(x: f64, y: f64, z: f64) -> Isometry3<f64> {
+pub(crate) fn at(x: f64, y: f64, z: f64) -> Isometry3<f64> {
     Isometry3::translation(x, y, z)
 }
 

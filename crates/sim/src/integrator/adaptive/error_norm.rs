@@ -28,7 +28,7 @@ struct Scale {
     mass: f64,
     /// Radius of gyration \[m\].
     length: f64,
-    /// Speed of a fall through that radius \[m/s\].
+    /// Speed of a fall through that radius, or in the acceleration by contacts if nothing falls \[m/s\].
     speed: f64,
 }
 
@@ -38,7 +38,7 @@ impl Scale {
     fn largest(&self, change: [f64; 4], speed: f64) -> f64 {
         let [position, velocity, turn, momentum] = change;
         let spin = momentum / (self.mass * self.length * speed);
-        [position / self.length, velocity / speed, turn, spin].into_iter().fold(0.0, larger)
+        [position / self.length, velocity / speed, turn, spin].into_iter().fold(0.0, max_or_nan)
     }
 
     /// The speed at which `state` moves, its rotation with it \[m/s\].
@@ -58,24 +58,21 @@ impl Scale {
 }
 
 /// The larger of two numbers, and what is no number rather than either.
-fn larger(a: f64, b: f64) -> f64 {
+fn max_or_nan(a: f64, b: f64) -> f64 {
     if a > b || a.is_nan() { a } else { b }
 }
 
 impl ErrorNorm {
     /// Of a step that starts at `states`.
     pub(super) fn new(settings: &Adaptive, world: &World, states: &[State]) -> Self {
-        let speeds = states.iter().map(|state| state.linear.norm());
-        let fastest = speeds.fold(0.0, f64::max);
         let scale = |(body, wrench): (usize, &Vector6<f64>)| {
             let rigid = world.bodies[body].rigid()?;
             let length = rigid.gyration_radius();
             let force = |wrench: &Vector6<f64>| wrench.fixed_rows::<3>(0).norm() / rigid.mass();
             let constant = world.gravity.norm() + force(&world.bodies[body].external_wrench);
-            // Without gravity, what is pushed by contacts alone, or soon will be.
+            // Without gravity, what is pushed by contacts alone.
             let acceleration = if constant > 0.0 { constant } else { force(wrench) };
-            let falling = (acceleration * length).sqrt();
-            let speed = falling.max(SLOW * fastest).max(SLOWEST);
+            let speed = (acceleration * length).sqrt().max(SLOWEST);
             Some(Scale { mass: rigid.mass(), length, speed })
         };
         let wrenches = world.wrenches(states, 0);
@@ -104,21 +101,24 @@ impl ErrorNorm {
     }
 
     /// The error of `trial`, a step from `states`: at most one if it is tolerated, not a number if the step is none.
-    pub(super) fn of(&self, states: &[State<Probe>], trial: &Trial<Probe>) -> f64 {
+    pub(super) fn error_of(&self, states: &[State<Probe>], trial: &Trial<Probe>) -> f64 {
         let (mut error, mut slope_error, mut slope) = (0.0, 0.0, 0.0);
+        let speeds = states.iter().chain(trial.end()).map(|s| s.linear.map(|x| x.value).norm());
+        let fastest = speeds.fold(0.0, f64::max);
         for (body, scale) in self.scales.iter().enumerate() {
             let Some(scale) = scale else { continue };
-            let (start, end, change) = (&states[body], &trial.states[body], &trial.error[body]);
-            let speed = scale.speed + larger(scale.speed_of(start), scale.speed_of(end));
+            let (start, end, change) = (&states[body], &trial.end()[body], &trial.error[body]);
+            let own = max_or_nan(scale.speed_of(start), scale.speed_of(end));
+            let speed = scale.speed + own + SLOW * fastest;
             let norms = |part: fn(Probe) -> f64| change.each_ref().map(|v| v.map(part).norm());
-            error = larger(error, scale.largest(norms(|x| x.value), speed));
-            slope_error = larger(slope_error, scale.largest(norms(|x| x.derivative[0]), speed));
+            error = max_or_nan(error, scale.largest(norms(|x| x.value), speed));
+            slope_error = max_or_nan(slope_error, scale.largest(norms(|x| x.derivative[0]), speed));
             for state in [start, end] {
-                slope = larger(slope, scale.sensitivity(state, speed));
+                slope = max_or_nan(slope, scale.sensitivity(state, speed));
             }
         }
         // Where everything is constant there is no error to compare.
         let slope_error = if slope_error == 0.0 { 0.0 } else { slope_error / slope };
-        larger(error / self.tolerance, slope_error / self.sensitivity_tolerance)
+        max_or_nan(error / self.tolerance, slope_error / self.sensitivity_tolerance)
     }
 }

@@ -4,7 +4,7 @@ use nalgebra::Vector6;
 use prehend_autodiff::{Fwd, Scalar};
 
 use super::error_norm::ErrorNorm;
-use super::{Adaptive, onset, probe, travel};
+use super::{Adaptive, probe, touch_time, travel};
 use crate::error::SimulationError;
 use crate::integrator::runge_kutta::dormand_prince;
 use crate::state::State;
@@ -19,11 +19,11 @@ const EXPONENT: f64 = -0.2;
 /// Margin that makes the next step likely to pass.
 const SAFETY: f64 = 0.9;
 /// Change of length from one step to the next, the least and the most.
-const CHANGE: [f64; 2] = [0.2, 5.0];
+const LENGTH_CHANGE: [f64; 2] = [0.2, 5.0];
 /// Error of a part that ends just after a kink.
 const OVERSHOOT: f64 = 0.1;
 /// Times that a part is brought to a kink before it is only made shorter.
-const LOOKS: usize = 2;
+const TOUCH_ATTEMPTS: usize = 2;
 /// Error of a part that can only come from a kink.
 const KINK: f64 = 30.0;
 /// Shortest part, of the whole step or of the time that it starts at.
@@ -111,31 +111,38 @@ impl Planner {
         let values: Vec<State> = self.states().collect();
         let before_kink = self.kink.as_ref().map_or(f64::INFINITY, |kink| kink.next(self.time));
         self.dt = travel::longest(&self.plain, &values, self.dt.min(left).min(before_kink));
-        let (mut attempt, mut looks) = (0, LOOKS);
+        let (mut attempt, mut touches) = (0, TOUCH_ATTEMPTS);
         loop {
             // A last part that is next to nothing would be lost in rounding.
             let dt = if self.dt >= left * (1.0 - 1e-6) { left } else { self.dt };
             // Leaks of the first step are of its first part.
             let index = if self.parts == 0 { self.whole.index } else { self.whole.index.max(1) };
             let part = Step { index, start: self.time, dt };
-            let trial = dormand_prince::step(&self.world, &self.states, &self.wrenches, part);
-            let error = self.norm.of(&self.states, &trial);
-            let change = if error.is_nan() { CHANGE[0] } else { SAFETY * error.powf(EXPONENT) };
-            let chosen = dt * change.clamp(CHANGE[0], CHANGE[1]);
+            let mut trial = dormand_prince::step(&self.world, &self.states, &self.wrenches, part);
+            if travel::passes_over(&self.plain, &values, &trial.stages, dt) {
+                self.dt = 0.5 * dt;
+                continue;
+            }
+            let error = self.norm.error_of(&self.states, &trial);
+            let change =
+                if error.is_nan() { LENGTH_CHANGE[0] } else { SAFETY * error.powf(EXPONENT) };
+            let chosen = dt * change.clamp(LENGTH_CHANGE[0], LENGTH_CHANGE[1]);
             if error <= 1.0 {
                 self.parts += 1;
                 if self.parts > self.settings.max_parts {
-                    return Err(self.plain.stalled(&values, self.time, dt));
+                    let (max_parts, time) = (self.settings.max_parts, self.time);
+                    return Err(SimulationError::TooManyParts { max_parts, time });
                 }
                 self.time = if dt == left { self.whole.end() } else { self.time + dt };
-                (self.states, self.wrenches) = (trial.states, trial.wrenches);
+                self.states = trial.stages.pop().unwrap_or_default();
+                self.wrenches = trial.wrenches;
                 self.dt = match self.kink.take_if(|kink| kink.end <= self.time) {
                     Some(passed) => passed.resume,
                     None => chosen,
                 };
                 return Ok(Some(part));
             }
-            let end: Vec<State> = trial.states.iter().map(State::value).collect();
+            let end: Vec<State> = trial.end().iter().map(State::value).collect();
             if chosen <= shortest {
                 return Err(match end.iter().all(State::is_finite) {
                     true => self.plain.stalled(&values, self.time, dt),
@@ -148,11 +155,11 @@ impl Planner {
                     Some(Kink { end: self.time + dt, tolerated: SAFETY * dt / error, resume });
             }
             attempt += 1;
-            let onset = (looks > 0 && error.is_finite())
-                .then(|| onset::first(&self.plain, &values, &end, dt, shortest));
-            self.dt = match onset.flatten() {
+            let touch = (touches > 0 && error.is_finite())
+                .then(|| touch_time::first(&self.plain, &values, &end, dt, shortest));
+            self.dt = match touch.flatten() {
                 Some(time) => {
-                    looks -= 1;
+                    touches -= 1;
                     time + OVERSHOOT * (dt - time) / error
                 }
                 None if attempt > 1 => dt * (SAFETY / error).max(0.5),

@@ -32,8 +32,8 @@ const ERROR: [f64; 7] = [
 
 /// Where a step leads.
 pub(in crate::integrator) struct Trial<S: Scalar> {
-    /// The states at its end.
-    pub(in crate::integrator) states: Vec<State<S>>,
+    /// The states at its stages, the last of which is its end.
+    pub(in crate::integrator) stages: Vec<Vec<State<S>>>,
     /// The wrenches there: those that the next step starts with.
     pub(in crate::integrator) wrenches: Vec<Vector6<S>>,
     /// By how much the solutions of fifth and fourth order differ.
@@ -48,9 +48,18 @@ pub(in crate::integrator) fn step<S: Scalar>(
     step: Step,
 ) -> Trial<S> {
     let mut stages = Stages::new(world, states, wrenches, step);
-    let mut end = (Vec::new(), Vec::new());
+    let (mut visited, mut wrenches) = (Vec::with_capacity(STAGES.len()), Vec::new());
     for (fraction, weights) in STAGES {
-        end = stages.stage(fraction, weights);
+        let (states, acting) = stages.stage(fraction, weights);
+        visited.push(states);
+        wrenches = acting;
     }
-    Trial { states: end.0, wrenches: end.1, error: stages.combined(&ERROR) }
+    Trial { stages: visited, wrenches, error: stages.combined(&ERROR) }
+}
+
+impl<S: Scalar> Trial<S> {
+    /// The states at its end.
+    pub(in crate::integrator) fn end(&self) -> &[State<S>] {
+        self.stages.last().map_or(&[], Vec::as_slice)
+    }
 }

@@ -1,0 +1,136 @@
+//! What went wrong without a word once.
+
+use std::sync::Arc;
+
+use nalgebra::{Isometry3, Point3, Vector3};
+use prehend_autodiff::Recording;
+use prehend_sim::{
+    Adaptive, Body, ContactBodies, GapSmoothing, HalfSpace, RungeKutta4, SemiImplicitEuler,
+    SimulationError, Sphere, State, StepCheckpointed, TimeSteps, World,
+};
+
+use crate::scenes::{
+    HARD, SMOOTH, at, body, corners, cube, down, hunt_crossley, kelvin_voigt, on, state,
+};
+
+fn pebble() -> Body {
+    body("pebble", 0.1, 1e-5, &[Point3::origin()], 4e-4)
+}
+
+#[test]
+fn a_finger_that_starts_from_rest_does_not_pass_through() {
+    let finger = |duration: f64| {
+        move |time: f64| {
+            // Minimum jerk over 0.6 m.
+            let t = (time / duration).min(1.0);
+            let (place, rate) =
+                (t.powi(3) * (10.0 - 15.0 * t + 6.0 * t * t), 30.0 * t * t * (1.0 - t) * (1.0 - t));
+            let mut state = State::at_rest(Isometry3::translation(0.6 * place - 0.3, 0.0, 0.0));
+            state.linear.x = 0.6 * rate / duration;
+            state
+        }
+    };
+    for duration in [0.2, 0.5, 1.0, 2.0] {
+        let mut world = World::new(Vector3::zeros());
+        let tip = Arc::new(Sphere { center: Point3::origin(), radius: 0.03 });
+        let field = world.add(Body::driven("finger", finger(duration)).with_field(tip));
+        let samples = world.add(pebble());
+        let bodies = ContactBodies { samples, field };
+        world.add_contact(bodies, hunt_crossley(0.1, 0.3, 1e-2), HARD).unwrap();
+        let start = [State::at_rest(Isometry3::identity()); 2];
+        let end = world.simulate(&start, duration).unwrap();
+        assert!(end[samples].linear.x > 1.0 / duration, "{duration}: {}", end[samples].linear.x);
+    }
+}
+
+#[test]
+fn what_is_pushed_does_not_pass_through() {
+    for place in 0..40 {
+        let ball =
+            Sphere { center: Point3::new(0.5 + 0.01 * f64::from(place), 0.0, 0.0), radius: 0.02 };
+        let law = (hunt_crossley(0.1, 0.3, 1e-2), HARD);
+        let (mut world, start) = on(
+            ball,
+            Vector3::zeros(),
+            pebble(),
+            law,
+            state(at(0.0, 1e-3, 0.0), [0.0; 3], [0.0; 3]),
+        );
+        world.bodies[1].external_wrench.x = 1.0;
+        let end = world.simulate(&start, 0.5).unwrap()[1];
+        let reached = end.pose.translation.vector;
+        assert!(reached.x < ball.center.x || reached.y > 0.01, "{place}: {reached:?}");
+    }
+}
+
+#[test]
+fn forces_that_jump_are_refused_before_anything_is_recorded() {
+    let start = state(at(0.0, 0.0, 0.1), [0.0; 3], [0.0; 3]);
+    let (world, start) =
+        on(HalfSpace::floor(), down(), pebble(), (kelvin_voigt(0.3, 1e-2), HARD), start);
+    assert!(world.simulate(&start, 0.2).is_ok());
+    let recording = Recording::start();
+    let mut lifted: Vec<_> = start.iter().map(State::lift).collect();
+    lifted[1].linear.x = recording.variable(0.0);
+    let world = world.lift();
+    let (adaptive, once) = (Adaptive::default(), TimeSteps { dt: 0.2, steps: 1 });
+    let compact = StepCheckpointed::new(adaptive, &world).unwrap();
+    let refused = [
+        world.simulate(&lifted, 0.2).unwrap_err(),
+        world.simulate_with(&compact, &lifted, once, |_, _| ()).unwrap_err(),
+        world.simulate_checkpointed(adaptive, &lifted, once, 2).unwrap_err(),
+    ];
+    assert!(refused.iter().all(|error| matches!(error, SimulationError::ForceJumps { .. })));
+}
+
+#[test]
+fn smooth_contacts_may_give_back_what_they_stored() {
+    for height in [0.0, -1e-5, 1e-4] {
+        for (gravity, width) in [(Vector3::zeros(), 5e-5), (down(), 1e-3)] {
+            let law = (kelvin_voigt(0.0, 1e-2), GapSmoothing::Softplus { width });
+            let start = state(at(0.0, 0.0, height), [0.0; 3], [0.0; 3]);
+            let (world, start) = on(HalfSpace::floor(), gravity, pebble(), law, start);
+            let time_steps = TimeSteps { dt: 1e-5, steps: 3000 };
+            world.simulate_with(&SemiImplicitEuler, &start, time_steps, |_, _| ()).unwrap();
+        }
+    }
+}
+
+#[test]
+fn without_contacts_nothing_is_rough() {
+    let law = || (kelvin_voigt(0.3, 1e-2), SMOOTH);
+    let falling = state(at(0.0, 0.0, 100.0), [0.0; 3], [0.0; 3]);
+    let (world, start) = on(HalfSpace::floor(), down(), cube(), law(), falling);
+    let time_steps = TimeSteps { dt: 1e-3, steps: 1000 };
+    let run = world.simulate_with(&SemiImplicitEuler, &start, time_steps, |_, _| ()).unwrap();
+    assert_eq!((run.resolution.roughness, run.resolution.roughest), (Some(0.0), None));
+    let tumbling = state(at(0.0, 0.0, 100.0), [0.0; 3], [5.0, 1.0, 0.0]);
+    let (world, start) = on(HalfSpace::floor(), down(), cube(), law(), tumbling);
+    let time_steps = TimeSteps { dt: 1e-2, steps: 100 };
+    let run = world.simulate_with(&RungeKutta4, &start, time_steps, |_, _| ()).unwrap();
+    assert_eq!(run.resolution.roughness, Some(0.0));
+}
+
+#[test]
+fn a_short_run_that_begins_in_contact_may_be_fine() {
+    let feet = corners([0.05; 3]);
+    let block = body("block", 0.3, 5e-4, &feet, 8e-4);
+    // Four feet of 1 cm² carry it 0.7 mm deep.
+    let depth = 0.3 * 9.81 / (4e-4 * 1e7);
+    let resting = state(at(0.0, 0.0, 0.05 - depth), [0.0; 3], [0.0; 3]);
+    let (world, start) =
+        on(HalfSpace::floor(), down(), block, (kelvin_voigt(0.3, 1e-2), HARD), resting);
+    let time_steps = TimeSteps { dt: 1e-5, steps: 50 };
+    let run = world.simulate_with(&SemiImplicitEuler, &start, time_steps, |_, _| ()).unwrap();
+    assert!(run.resolution.is_fine(), "{}", run.resolution);
+}
+
+#[test]
+fn too_many_parts_are_told_as_such() {
+    let start = state(at(0.0, 0.0, 0.05), [0.3, 0.0, 0.0], [0.0; 3]);
+    let (world, start) =
+        on(HalfSpace::floor(), down(), cube(), (kelvin_voigt(0.3, 1e-5), SMOOTH), start);
+    let few = Adaptive { max_parts: 50, ..Adaptive::default() };
+    let run = world.simulate_with(&few, &start, TimeSteps { dt: 1.0, steps: 1 }, |_, _| ());
+    assert!(matches!(run, Err(SimulationError::TooManyParts { max_parts: 50, .. })));
+}
