@@ -81,7 +81,8 @@ impl<'a, S: Scalar> Audit<'a, S> {
         self.energy.step(self.world, step, states)
     }
 
-    /// What is to be said of the steps, by an integrator that `controls_error` or not, that have led to `states` at `time` \[s\].
+    /// What is to be said of the steps, by an integrator that `controls_error` or not, that have led to `states` at `time`
+    /// \[s\].
     ///
     /// # Errors
     /// If contacts have made energy.

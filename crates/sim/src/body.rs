@@ -133,6 +133,28 @@ impl<S: Scalar> RigidBody<S> {
         r.matrix() * self.inverse_inertia * r.matrix().transpose()
     }
 
+    /// Angular momentum \[kg m²/s\] of the body that turns with `angular` \[rad/s\], world frame.
+    #[inline]
+    pub(crate) fn momentum(
+        &self,
+        rotation: &UnitQuaternion<S>,
+        angular: &Vector3<S>,
+    ) -> Vector3<S> {
+        let r = rotation.to_rotation_matrix();
+        r * (self.inertia * r.inverse_transform_vector(angular))
+    }
+
+    /// Angular velocity \[rad/s\] of the body with angular `momentum` \[kg m²/s\], world frame.
+    #[inline]
+    pub(crate) fn angular(
+        &self,
+        rotation: &UnitQuaternion<S>,
+        momentum: &Vector3<S>,
+    ) -> Vector3<S> {
+        let r = rotation.to_rotation_matrix();
+        r * (self.inverse_inertia * r.inverse_transform_vector(momentum))
+    }
+
     /// Velocity of the center of mass \[m/s\] and angular momentum \[kg m²/s\] of the body at `state` after `wrench` (about the
     /// center of mass) and `gravity` \[m/s²\] have acted on it for `dt` \[s\], world frame.
     #[inline]

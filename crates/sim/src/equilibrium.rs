@@ -15,8 +15,8 @@ use balance::{Support, WrenchBalance, friction_factor};
 /// Whether a body could rest where it is.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Equilibrium {
-    /// What acts on it in the simulation, by contact laws, the external wrench and gravity: force \[N\], torque about the center
-    /// of mass \[N m\], world frame. Zero at rest.
+    /// What acts on it in the simulation, by contact laws, the external wrench and gravity: force \[N\], torque about the
+    /// center of mass \[N m\], world frame. Zero at rest.
     pub net: Vector6<f64>,
     /// Its points of contact.
     pub supports: Vec<Support>,

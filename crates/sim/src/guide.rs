@@ -1,4 +1,4 @@
-//! From a world in ten lines to gradients of long rollouts.
+//! From a world in twenty lines to gradients of long rollouts.
 //!
 //! # A world
 //! Bodies, what touches what, gravity. Samples of one body's surface touch the distance field of another; a field is a
@@ -15,6 +15,7 @@
 //! };
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! // 200 g; inertia in kg m², center of mass in m.
 //! let com = Point3::new(0.0, 0.0, -5e-3);
 //! let rigid = RigidBody::new(0.2, Matrix3::identity() * 1e-4, com)?;
 //! let feet = [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)];
@@ -22,10 +23,14 @@
 //!
 //! let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
 //! let floor = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
+//! // Four feet of 1 cm² each.
 //! let surface = Surface::uniform(&feet, 4e-4)?;
 //! let stool = world.add(Body::free("stool", rigid).with_surface(surface));
+//! // Pressure per depth [N/m³] and per speed [N s/m³]: the stool sinks in by half a millimeter.
+//! // What sticks creeps below 1 cm/s.
 //! let spring = KelvinVoigt { stiffness: 1e7, damping: 1e5 };
 //! let law = Law::new(spring, Coulomb { friction: 0.5, slip_scale: 1e-2 })?;
+//! // Contact fades in over a tenth of that depth.
 //! let bodies = ContactBodies { samples: stool, field: floor };
 //! world.add_contact(bodies, Arc::new(law), GapSmoothing::Softplus { width: 5e-5 })?;
 //!
@@ -43,12 +48,13 @@
 //! The pose in a state is that of the center of mass: [`RigidBody::at_rest`] makes a state from the pose of the model, and
 //! [`RigidBody::model_pose`] goes back, which is what a renderer needs. For kinematic and driven bodies the two are the same.
 //!
-//! [`World::simulate`] chooses its steps, so that values and derivatives are right whatever the stiffness of the contacts, and an
-//! error says where they cannot be ([`Adaptive`](crate::Adaptive)). [`World::rollout`] gives the states in between too.
+//! [`World::simulate`] chooses its steps by the error of values and derivatives, whatever the stiffness of the contacts,
+//! and is an error where no step is short enough ([`Adaptive`](crate::Adaptive)). [`World::rollout`] gives the states in
+//! between too. Stiffness and damping from what you know of a contact: [`StaticContactTarget`](crate::StaticContactTarget).
 //!
 //! # Bodies on a trajectory
-//! [`Body::driven`] puts a body, such as a robot's link, on a [`Trajectory`](crate::Trajectory). [`World::simulate`] moves it, to
-//! time 0 before the first step too: the state given for it does not matter.
+//! [`Body::driven`] puts a body, such as a robot's link, on a [`Trajectory`](crate::Trajectory). [`World::simulate`] moves
+//! it, to time 0 before the first step too: the state given for it does not matter.
 //!
 //! ```
 //! # use nalgebra::{Isometry3, Vector3};
@@ -96,12 +102,12 @@
 //! ```
 //!
 //! # Steps of your own choice
-//! Where speed counts more than certainty, [`World::simulate_with`] takes the steps of an [`Integrator`](crate::Integrator), and reports how well
-//! they resolved the motion ([`Resolution`](crate::Resolution)). [`SemiImplicitEuler`](crate::SemiImplicitEuler) is the cheapest.
-//! [`BackwardEuler`](crate::BackwardEuler) is stable for every step and damps what is faster than it;
-//! [`SubStepped`](crate::SubStepped) divides the steps of any integrator where contacts, impacts to come among them,
-//! demand it. All have derivatives, which are those of the steps taken: with steps that are too long they are exact and far from those of
-//! the motion, even where the values look right.
+//! Where speed counts more than certainty, [`World::simulate_with`] takes the steps of an
+//! [`Integrator`](crate::Integrator), and reports how well they resolved the motion ([`Resolution`](crate::Resolution)).
+//! [`SemiImplicitEuler`](crate::SemiImplicitEuler) is the cheapest. [`BackwardEuler`](crate::BackwardEuler) is stable for
+//! every step and damps what is faster than it; [`SubStepped`](crate::SubStepped) divides the steps of any integrator where
+//! contacts, impacts to come among them, demand it. All have derivatives, which are those of the steps taken: with steps
+//! that are too long they are exact and far from those of the motion, even where the values look right.
 //!
 //! ```
 //! # use std::sync::Arc;
@@ -217,8 +223,8 @@
 //! The example `custom_contact_law` does this at length, and what follows.
 //!
 //! # Gradients, forward
-//! Write what you want to know once over the scalar: [`World::lift`] makes constants of a world, and any of its numbers may then
-//! be replaced by one that carries derivatives. [`Fwd`](prehend_autodiff::Fwd) is for few inputs. A mass or inertia is
+//! Write what you want to know once over the scalar: [`World::lift`] makes constants of a world, and any of its numbers may
+//! then be replaced by one that carries derivatives. [`Fwd`](prehend_autodiff::Fwd) is for few inputs. A mass or inertia is
 //! replaced together with its body: [`RigidBody::new`]. All of them in a row: [`World::parameters`].
 //!
 //! ```
@@ -261,9 +267,10 @@
 //! # }
 //! ```
 //!
-//! A rollout over [`Var`](prehend_autodiff::Var) records every operation.
-//! [`StepCheckpointed`](crate::StepCheckpointed), around any integrator, keeps a few hundred bytes a step instead. For rollouts too long even
-//! for that, [`World::simulate_checkpointed`] is one node that holds as many states as you allow.
+//! A rollout over [`Var`](prehend_autodiff::Var) records every operation. [`StepCheckpointed`](crate::StepCheckpointed),
+//! around any integrator, keeps a few hundred bytes a step instead; steps of [`Adaptive`](crate::Adaptive) are those of the
+//! rollout, not its parts, so give it many. For rollouts too long even for that, [`World::simulate_checkpointed`] is one
+//! node that holds as many states as you allow.
 //!
 //! # Together with other losses
 //! The states of a rollout over `Var` are numbers on the tape like all others. Their poses go on into a renderer's
@@ -352,11 +359,13 @@
 //! ```
 //!
 //! # What derivatives mean
-//! Those of [`World::simulate`] are the motion's, to a fraction of a percent, as long as forces grow from zero where contact begins:
-//! fields should be C², and damping should fade in, by [`GapSmoothing::Softplus`](crate::GapSmoothing::Softplus) or by the law. What does not is
-//! refused. With steps of your own choice they are those of the steps: under [`GapSmoothing::Hard`](crate::GapSmoothing::Hard) the moment of an
-//! impact jumps from one step to the next, and a step too long for friction makes them meaningless, see [`Resolution`](crate::Resolution).
-//! Derivatives of [`GapSmoothing::Leaky`](crate::GapSmoothing::Leaky) are not those of the forces, on purpose. At rest, at gap zero and
+//! Those of [`World::simulate`] are the motion's, to a fraction of a percent, as long as forces grow from zero where
+//! contact begins: fields should be C², and damping should fade in, by
+//! [`GapSmoothing::Softplus`](crate::GapSmoothing::Softplus) or by the law. A force that jumps at touch is refused; kinks
+//! of a field are not seen. With steps of your own choice they are those of the steps: under
+//! [`GapSmoothing::Hard`](crate::GapSmoothing::Hard) the moment of an impact jumps from one step to the next, and a step
+//! too long for friction makes them meaningless, see [`Resolution`](crate::Resolution). Derivatives of
+//! [`GapSmoothing::Leaky`](crate::GapSmoothing::Leaky) are not those of the forces, on purpose. At rest, at gap zero and
 //! where a field has no gradient they are finite.
 #[cfg(doc)]
 use crate::{Body, RigidBody, World};

@@ -1,10 +1,11 @@
 //! Differentiable penalty-based rigid contact simulation.
 //!
 //! A rigid [`RigidBody`] carries surface samples ([`SurfacePoint`]) that touch a
-//! [`DistanceField`](prehend_geometry::DistanceField). A [`ContactLaw`], written once over a generic scalar, turns gap and slip into
-//! force; a [`GapSmoothing`] says how contact begins. The built-in [`Law`]s are products of a [`NormalLaw`] and a [`FrictionLaw`]. Forces and their derivatives are gathered into one
-//! wrench a step ([`contact::wrench`]), so that a rollout of a [`World`] carries exact derivatives by its initial states
-//! and by every number of the world. [`StabilityLoss`] measures by such rollouts how far an object is from resting.
+//! [`DistanceField`](prehend_geometry::DistanceField). A [`ContactLaw`], written once over a generic scalar, turns gap and
+//! slip into force; a [`GapSmoothing`] says how contact begins. The built-in [`Law`]s are products of a [`NormalLaw`] and a
+//! [`FrictionLaw`]. Forces and their derivatives are gathered into one wrench a step ([`contact::wrench`]), so that a
+//! rollout of a [`World`] carries exact derivatives by its initial states and by every number of the world.
+//! [`StabilityLoss`] measures by such rollouts how far an object is from resting.
 //!
 //! The [`guide`] goes from a world in ten lines to gradients of long rollouts.
 //!

@@ -28,8 +28,8 @@ impl<S: Scalar> World<S> {
     /// what the adjoint needs.
     ///
     /// # Errors
-    /// Unless there is one finite state for each body and the time is positive; where forces jump or grow so that no step is short
-    /// enough, which body, contact and time.
+    /// Unless there is one finite state for each body and the time is positive; where forces jump or grow so that no step
+    /// is short enough, which body, contact and time.
     pub fn simulate(
         &self,
         initial: &[State<S>],
@@ -102,8 +102,8 @@ impl<S: Scalar> World<S> {
         Ok(Simulation { states, resolution })
     }
 
-    /// [`World::simulate_with`] under `control`, which is called before each step: it sees the states and may set external wrenches,
-    /// gravity, parameters of laws, and the states of kinematic bodies, for that step and those after it.
+    /// [`World::simulate_with`] under `control`, which is called before each step: it sees the states and may set external
+    /// wrenches, gravity, parameters of laws, and the states of kinematic bodies, for that step and those after it.
     ///
     /// Over a scalar that carries derivatives they pass through the controller too.
     ///

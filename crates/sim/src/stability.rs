@@ -106,7 +106,8 @@ pub struct StabilityJacobian {
     pub normal: Matrix6<f64>,
 }
 
-/// Fraction of the longest stable step that is used, for semi-implicit Euler 1 of √5 − 1: derivatives of rollouts at the limit grow.
+/// Fraction of the longest stable step that is used, for semi-implicit Euler 1 of √5 − 1: derivatives of rollouts at the
+/// limit grow.
 const SAFETY: f64 = 1.0 / 1.236;
 
 impl<I: Integrator> StabilityLoss<I> {

@@ -66,8 +66,8 @@ impl Surface {
         Ok(Self { blocks, area: areas.iter().sum(), points, rounding: 0.0 })
     }
 
-    /// The same samples as balls of `radius` \[m\]: one makes a sphere, eight the corners of a rounded box. They touch where the field
-    /// is nearest, exactly, and roll.
+    /// The same samples as balls of `radius` \[m\]: one makes a sphere, eight the corners of a rounded box. They touch
+    /// where the field is nearest, exactly, and roll.
     ///
     /// # Errors
     /// If the radius is negative or not finite.

@@ -132,7 +132,8 @@ fn work_of_pull<S: Scalar>(world: &World<S>, body: BodyId, before: &State, now: 
     force.map(|x| x.value()).dot(&shift)
 }
 
-/// What resting contacts at `states` could give back \[J\]: the work of each sample's normal force from its gap to where there is none.
+/// What resting contacts at `states` could give back \[J\]: the work of each sample's normal force from its gap to where
+/// there is none.
 fn stored_energy(world: &World, states: &[State]) -> f64 {
     let mut energy = 0.0;
     for pair in &world.contacts {

@@ -1,8 +1,9 @@
 //! How much forces change from one step to the next.
 
-use nalgebra::{Matrix3, Vector3, Vector6};
+use nalgebra::{Vector3, Vector6};
 use prehend_autodiff::Scalar;
 
+use crate::body::RigidBody;
 use crate::contact::wrench::stack;
 use crate::state::State;
 use crate::time::Step;
@@ -26,7 +27,7 @@ pub(super) struct Roughness {
 struct Followed {
     body: BodyId,
     mass: f64,
-    inertia: Matrix3<f64>,
+    rigid: RigidBody,
     /// Radius of gyration \[m\].
     length: f64,
     /// Acceleration without contacts \[m/s²\].
@@ -40,18 +41,18 @@ struct Followed {
 impl Roughness {
     pub(super) fn new<S: Scalar>(world: &World<S>, initial: &[State<S>]) -> Self {
         let follow = |body: BodyId| {
-            let (rigid, state) = (world.bodies[body].rigid()?, initial[body].value());
+            let rigid = world.bodies[body].rigid()?.map(S::value);
+            let state = initial[body].value();
             let mass = rigid.mass().value();
             let wrench = world.bodies[body].external_wrench.map(|x| x.value());
-            let inertia = rigid.inertia().map(|x| x.value());
             Some(Followed {
                 body,
                 length: rigid.gyration_radius(),
                 pull: world.gravity.map(|x| x.value()) + wrench.fixed_rows::<3>(0) / mass,
                 torque: wrench.fixed_rows::<3>(3).into_owned(),
                 linear: state.linear,
-                momentum: momentum(&inertia, &state),
-                inertia,
+                momentum: rigid.momentum(&state.pose.rotation, &state.angular),
+                rigid,
                 mass,
                 kick: None,
             })
@@ -65,7 +66,7 @@ impl Roughness {
     pub(super) fn step<S: Scalar>(&mut self, step: Step, states: &[State<S>]) {
         for followed in &mut self.bodies {
             let state = states[followed.body].value();
-            let momentum = momentum(&followed.inertia, &state);
+            let momentum = followed.rigid.momentum(&state.pose.rotation, &state.angular);
             let linear = state.linear - followed.linear - followed.pull * step.dt;
             let angular = momentum - followed.momentum - followed.torque * step.dt;
             let mut kick = stack(&linear, &(angular / (followed.mass * followed.length)));
@@ -94,10 +95,4 @@ impl Roughness {
     pub(super) fn roughest(&self) -> Option<(BodyId, f64)> {
         self.largest.1
     }
-}
-
-/// Angular momentum, world frame \[kg m²/s\].
-fn momentum(inertia: &Matrix3<f64>, state: &State) -> Vector3<f64> {
-    let rotation = &state.pose.rotation;
-    rotation * (inertia * (rotation.inverse() * state.angular))
 }

@@ -10,8 +10,8 @@ pub enum GapSmoothing {
     Hard,
     /// −ε ln(1 + exp(−x/ε)): smooth, and a real function, so its derivatives are those of the forces.
     Softplus {
-        /// ε \[m\], positive: a tenth of the depth to which a body sinks in at rest, often 0.05 mm. Contact is felt some five times as far
-        /// away. With fixed steps at least 0.65 |v_n| dt keeps gradients through impacts right.
+        /// ε \[m\], positive: a tenth of the depth to which a body sinks in at rest, often 0.05 mm. Contact is felt some
+        /// five times as far away. With fixed steps at least 0.65 |v_n| dt keeps gradients through impacts right.
         width: f64,
     },
     /// [`GapSmoothing::Hard`] in value; its derivative where inactive is `alpha` instead of zero, so that

@@ -94,8 +94,8 @@ impl Patch<'_> {
     }
 
     /// Calls `visit` with every point in contact, in order; with `pressing_only` without those that exert no force and only
-    /// leak. Points beyond `cutoff` and the band of the smoothing exert no force, so leaving out blocks of them changes nothing.
-    /// Says whether every distance was a number.
+    /// leak. Points beyond `cutoff` and the band of the smoothing exert no force, so leaving out blocks of them changes
+    /// nothing. Says whether every distance was a number.
     #[inline(always)]
     pub(super) fn for_each_touch(
         &self,

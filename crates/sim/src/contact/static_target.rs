@@ -22,8 +22,8 @@ pub struct StaticContactTarget {
     pub gravity: f64,
     /// How deep the body sinks in \[m\], usually 0.2–1 mm.
     pub penetration: f64,
-    /// Area of the samples that touch \[m²\]: what [`Surface`](crate::Surface) says of those that carry the body at rest. Of a ball of
-    /// radius R that sinks in by d it is 2πRd.
+    /// Area of the samples that touch \[m²\]: what [`Surface`](crate::Surface) says of those that carry the body at rest.
+    /// Of a ball of radius R that sinks in by d it is 2πRd.
     pub contact_area: f64,
 }
 

@@ -76,8 +76,8 @@ pub(crate) fn wrench_jacobian<L: ContactLaw>(
         let mut by_position = Matrix3::from_fn(|i, j| force[i].derivative[j]);
         let by_velocity = Matrix3::from_fn(|i, j| force[i].derivative[3 + j]);
 
-        // Sample position x: δx = δt + δθ×r, for the arm r; velocity where it touches: δv + δω×l + ω×δl, for the lever l, which
-        // turns with the arm and, if the sample is round, with the normal: δl = δθ×r + L δx.
+        // Sample position x: δx = δt + δθ×r, for the arm r; velocity where it touches: δv + δω×l + ω×δl, for the lever
+        // l, which turns with the arm and, if the sample is round, with the normal: δl = δθ×r + L δx.
         let (arm, lever) = (&touch.arm, &touch.lever);
         if touch.radius > 0.0 {
             let lever_slope = touch.lever_slope();

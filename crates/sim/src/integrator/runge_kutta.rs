@@ -7,9 +7,11 @@ use nalgebra::{Vector3, Vector6};
 use prehend_autodiff::Scalar;
 use prehend_autodiff::lie::so3_exp;
 
+use crate::body::RigidBody;
 use crate::state::State;
 use crate::time::Step;
 use crate::world::World;
+use crate::world::body_id::BodyId;
 
 /// Of a body: position of the center of mass, its velocity, rotation vector, and angular momentum; or their rates.
 ///
@@ -24,7 +26,17 @@ pub(super) struct Stages<'a, S: Scalar> {
     world: &'a World<S>,
     states: &'a [State<S>],
     step: Step,
+    free: Vec<Free<'a, S>>,
+    /// Of each stage, those of the free bodies.
     slopes: Vec<Vec<Change<S>>>,
+}
+
+/// A body that forces move.
+struct Free<'a, S: Scalar> {
+    id: BodyId,
+    rigid: &'a RigidBody<S>,
+    /// Angular momentum at the start of the step.
+    momentum: Vector3<S>,
 }
 
 impl<'a, S: Scalar> Stages<'a, S> {
@@ -35,76 +47,81 @@ impl<'a, S: Scalar> Stages<'a, S> {
         wrenches: &[Vector6<S>],
         step: Step,
     ) -> Self {
-        let none = vec![[Vector3::zeros(); 4]; states.len()];
-        let slopes = vec![rates(world, states, &none, wrenches)];
-        Self { world, states, step, slopes }
+        let free = |id: BodyId| {
+            let (rigid, state) = (world.bodies[id].rigid()?, &states[id]);
+            let momentum = rigid.momentum(&state.pose.rotation, &state.angular);
+            Some(Free { id, rigid, momentum })
+        };
+        let free: Vec<Free<'_, S>> = world.free_bodies().into_iter().filter_map(free).collect();
+        let mut stages = Self { world, states, step, slopes: Vec::new(), free };
+        let none = vec![[Vector3::zeros(); 4]; stages.free.len()];
+        stages.slopes.push(stages.rates(states, &none, wrenches));
+        stages
     }
 
-    /// The states at `fraction` of the step, which `weights` of the slopes lead to, driven bodies where they are then; and the
-    /// wrenches there, whose slope is that of the next stage.
+    /// The states at `fraction` of the step, which `weights` of the slopes lead to, driven bodies where they are then;
+    /// and the wrenches there, whose slope is that of the next stage.
     pub(super) fn stage(
         &mut self,
         fraction: f64,
         weights: &[f64],
     ) -> (Vec<State<S>>, Vec<Vector6<S>>) {
         let change = self.combined(weights);
-        let mut states = moved(self.world, self.states, &change);
+        let mut states = self.moved(&change);
         self.world.drive(&mut states, self.step.start + fraction * self.step.dt);
         let wrenches = self.world.wrenches(&states, self.step.index);
-        self.slopes.push(rates(self.world, &states, &change, &wrenches));
+        self.slopes.push(self.rates(&states, &change, &wrenches));
         (states, wrenches)
     }
 
     /// The states that `weights` of the slopes lead to.
     pub(super) fn end(&self, weights: &[f64]) -> Vec<State<S>> {
-        moved(self.world, self.states, &self.combined(weights))
+        self.moved(&self.combined(weights))
     }
 
-    /// The step's length times the sum of the slopes with `weights`.
+    /// Of each free body, the step's length times the sum of the slopes with `weights`.
     pub(super) fn combined(&self, weights: &[f64]) -> Vec<Change<S>> {
-        let mut sum = vec![[Vector3::zeros(); 4]; self.states.len()];
+        let mut sum = vec![[Vector3::zeros(); 4]; self.free.len()];
         for (slopes, weight) in self.slopes.iter().zip(weights).filter(|(_, w)| **w != 0.0) {
+            let weight = weight * self.step.dt;
             for (sum, slope) in sum.iter_mut().flatten().zip(slopes.iter().flatten()) {
-                *sum += slope.map(|x| x.times(weight * self.step.dt));
+                *sum += slope.map(|x| x.times(weight));
             }
         }
         sum
     }
-}
 
-/// The rates of change at `states` under `wrenches`, where `change` has led to.
-fn rates<S: Scalar>(
-    world: &World<S>,
-    states: &[State<S>],
-    change: &[Change<S>],
-    wrenches: &[Vector6<S>],
-) -> Vec<Change<S>> {
-    let rate = |body: usize| {
-        let Some(rigid) = world.bodies[body].rigid() else { return [Vector3::zeros(); 4] };
-        let (state, turn, wrench) = (&states[body], &change[body][2], &wrenches[body]);
-        let (force, torque) = (wrench.fixed_rows::<3>(0), wrench.fixed_rows::<3>(3));
-        let once = turn.cross(&state.angular);
-        let twice = turn.cross(&once);
-        let turning =
-            state.angular - once.map(|x| x.times(0.5)) + twice.map(|x| x.times(1.0 / 12.0));
-        [state.linear, world.gravity + force / rigid.mass(), turning, torque.into_owned()]
-    };
-    (0..states.len()).map(rate).collect()
-}
-
-/// `states` after `change`.
-fn moved<S: Scalar>(world: &World<S>, states: &[State<S>], change: &[Change<S>]) -> Vec<State<S>> {
-    let mut moved = states.to_vec();
-    for ((body, state), [position, velocity, turn, momentum]) in
-        world.bodies.iter().zip(&mut moved).zip(change)
-    {
-        let Some(rigid) = body.rigid() else { continue };
-        let momentum = rigid.world_inertia(&state.pose.rotation) * state.angular + momentum;
-        state.pose.translation.vector += position;
-        state.linear += velocity;
-        state.pose.rotation = so3_exp(turn) * state.pose.rotation;
-        state.pose.rotation.renormalize_fast();
-        state.angular = rigid.inverse_world_inertia(&state.pose.rotation) * momentum;
+    /// The states after `change`.
+    fn moved(&self, change: &[Change<S>]) -> Vec<State<S>> {
+        let mut moved = self.states.to_vec();
+        for (free, [position, velocity, turn, momentum]) in self.free.iter().zip(change) {
+            let state = &mut moved[free.id];
+            state.pose.translation.vector += position;
+            state.linear += velocity;
+            state.pose.rotation = so3_exp(turn) * state.pose.rotation;
+            state.pose.rotation.renormalize_fast();
+            state.angular = free.rigid.angular(&state.pose.rotation, &(free.momentum + momentum));
+        }
+        moved
     }
-    moved
+
+    /// The rates of change at `states` under `wrenches`, where `change` has led to.
+    fn rates(
+        &self,
+        states: &[State<S>],
+        change: &[Change<S>],
+        wrenches: &[Vector6<S>],
+    ) -> Vec<Change<S>> {
+        let rate = |(free, change): (&Free<'_, S>, &Change<S>)| {
+            let (state, turn, wrench) = (&states[free.id], &change[2], &wrenches[free.id]);
+            let (force, torque) = (wrench.fixed_rows::<3>(0), wrench.fixed_rows::<3>(3));
+            let once = turn.cross(&state.angular);
+            let twice = turn.cross(&once);
+            let turning =
+                state.angular - once.map(|x| x.times(0.5)) + twice.map(|x| x.times(1.0 / 12.0));
+            let acceleration = self.world.gravity + force * (S::one() / free.rigid.mass());
+            [state.linear, acceleration, turning, torque.into_owned()]
+        };
+        self.free.iter().zip(change).map(rate).collect()
+    }
 }

@@ -126,9 +126,10 @@ pub(crate) fn bounce_gradients(scheme: &Scheme, law: &Law) -> Vec<Row> {
     rows
 }
 
-/// Equal balls exchange velocities, so that the second one's place depends on how the first began: its derivatives by
-/// (x₁, x₂, v₁, v₂) are (1, 0, T, 0), up to the duration of contact; with T = 1 s, (1, 0, 1, 0). Where the scheme itself takes energy, so that
-/// they part at a speed e, they leave with (1 − e)/2 and (1 + e)/2, and those are the derivatives by x₂ and x₁.
+/// Equal balls exchange velocities, so that the second one's place depends on how the first began: its derivatives by (x₁,
+/// x₂, v₁, v₂) are (1, 0, T, 0), up to the duration of contact; with T = 1 s, (1, 0, 1, 0). Where the scheme itself takes
+/// energy, so that they part at a speed e, they leave with (1 − e)/2 and (1 + e)/2, and those are the derivatives by x₂ and
+/// x₁.
 pub(crate) fn exchange(scheme: &Scheme, law: &Law) -> Vec<Row> {
     let (duration, time) = (1e-2, 1.0);
     let dt = duration / 20.0;

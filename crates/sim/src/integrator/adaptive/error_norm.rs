@@ -18,8 +18,8 @@ const SLOWEST: f64 = 1e-9;
 pub(super) struct ErrorNorm {
     tolerance: f64,
     sensitivity_tolerance: f64,
-    /// Of each body, if it is free.
-    scales: Vec<Option<Scale>>,
+    /// Of each free body.
+    scales: Vec<(BodyId, Scale)>,
 }
 
 /// What counts as one for a body.
@@ -65,39 +65,40 @@ fn max_or_nan(a: f64, b: f64) -> f64 {
 impl ErrorNorm {
     /// Of a step that starts at `states`.
     pub(super) fn new(settings: &Adaptive, world: &World, states: &[State]) -> Self {
-        let scale = |(body, wrench): (usize, &Vector6<f64>)| {
+        let wrenches = world.wrenches(states, 0);
+        let scale = |body: BodyId| {
             let rigid = world.bodies[body].rigid()?;
             let length = rigid.gyration_radius();
             let force = |wrench: &Vector6<f64>| wrench.fixed_rows::<3>(0).norm() / rigid.mass();
             let constant = world.gravity.norm() + force(&world.bodies[body].external_wrench);
             // Without gravity, what is pushed by contacts alone.
-            let acceleration = if constant > 0.0 { constant } else { force(wrench) };
+            let acceleration = if constant > 0.0 { constant } else { force(&wrenches[body]) };
             let speed = (acceleration * length).sqrt().max(SLOWEST);
-            Some(Scale { mass: rigid.mass(), length, speed })
+            Some((body, Scale { mass: rigid.mass(), length, speed }))
         };
-        let wrenches = world.wrenches(states, 0);
-        let scales: Vec<Option<Scale>> = wrenches.iter().enumerate().map(scale).collect();
+        let scales = world.free_bodies().into_iter().filter_map(scale).collect();
         let Adaptive { tolerance, sensitivity_tolerance, .. } = *settings;
         Self { tolerance, sensitivity_tolerance, scales }
     }
 
-    /// Units of the twelve coordinates of a body's tangent.
-    pub(super) fn units(&self, body: BodyId) -> [f64; 12] {
-        let Some(Scale { length, speed, .. }) = self.scales[body.index()] else { return [0.0; 12] };
-        let units = [length, 1.0, speed, speed / length];
-        std::array::from_fn(|i| units[i / 3])
+    /// The free bodies and units of the twelve coordinates of their tangents.
+    pub(super) fn units(&self) -> impl Iterator<Item = (BodyId, [f64; 12])> {
+        self.scales.iter().map(|(body, Scale { length, speed, .. })| {
+            let units = [*length, 1.0, *speed, speed / length];
+            (*body, std::array::from_fn(|i| units[i / 3]))
+        })
     }
 
     /// A length to begin with: a tenth of the time in which accelerations change a velocity by as much as it counts.
     pub(super) fn first_step(&self, world: &World, wrenches: &[Vector6<Probe>]) -> f64 {
-        let time = |(scale, wrench): (&Option<Scale>, &Vector6<Probe>)| {
-            let Scale { mass, length, speed } = (*scale)?;
-            let wrench = wrench.map(|w| w.value);
+        let time = |(body, scale): &(BodyId, Scale)| {
+            let (Scale { mass, length, speed }, wrench) =
+                (*scale, wrenches[*body].map(|w| w.value));
             let (force, torque) = (wrench.fixed_rows::<3>(0), wrench.fixed_rows::<3>(3));
             let linear = (world.gravity + force / mass).norm();
-            Some(0.1 * speed / linear.max(torque.norm() / (mass * length)))
+            0.1 * speed / linear.max(torque.norm() / (mass * length))
         };
-        self.scales.iter().zip(wrenches).filter_map(time).fold(f64::INFINITY, f64::min)
+        self.scales.iter().map(time).fold(f64::INFINITY, f64::min)
     }
 
     /// The error of `trial`, a step from `states`: at most one if it is tolerated, not a number if the step is none.
@@ -105,9 +106,8 @@ impl ErrorNorm {
         let (mut error, mut slope_error, mut slope) = (0.0, 0.0, 0.0);
         let speeds = states.iter().chain(trial.end()).map(|s| s.linear.map(|x| x.value).norm());
         let fastest = speeds.fold(0.0, f64::max);
-        for (body, scale) in self.scales.iter().enumerate() {
-            let Some(scale) = scale else { continue };
-            let (start, end, change) = (&states[body], &trial.end()[body], &trial.error[body]);
+        for ((body, scale), change) in self.scales.iter().zip(&trial.error) {
+            let (start, end) = (&states[*body], &trial.end()[*body]);
             let own = max_or_nan(scale.speed_of(start), scale.speed_of(end));
             let speed = scale.speed + own + SLOW * fastest;
             let norms = |part: fn(Probe) -> f64| change.each_ref().map(|v| v.map(part).norm());

@@ -75,7 +75,7 @@ impl Planner {
         let lifted = plain.lift::<Probe>();
         let values: Vec<State> = states.iter().map(State::value).collect();
         let norm = ErrorNorm::new(settings, &plain, &values);
-        let states = probe::seeded(&plain, &values, &norm);
+        let states = probe::seeded(&values, &norm);
         let wrenches = lifted.wrenches(&states, whole.index);
         let dt = norm.first_step(&plain, &wrenches).min(whole.dt);
         Self {

@@ -8,8 +8,8 @@ use crate::state::State;
 use crate::world::World;
 use crate::world::contact_pair::ContactPair;
 
-/// Time into a step of `dt` \[s\] from `start` to `end` at which the first sample enters or leaves the reach of its contact's law
-/// without smoothing, but not before `earliest` \[s\].
+/// Time into a step of `dt` \[s\] from `start` to `end` at which the first sample enters or leaves the reach of its
+/// contact's law without smoothing, but not before `earliest` \[s\].
 pub(super) fn first(
     world: &World,
     start: &[State],

@@ -16,8 +16,8 @@ use crate::world::contact_pair::ContactPair;
 /// Part of a body's size by which its samples may always move.
 const FREE_TRAVEL: f64 = 0.02;
 
-/// The longest of the lengths `dt`, `dt`/2, … \[s\] in which bodies that go on as they move could not pass over a contact: no sample
-/// moves by more than its clearance and a small part of its body's size.
+/// The longest of the lengths `dt`, `dt`/2, … \[s\] in which bodies that go on as they move could not pass over a contact:
+/// no sample moves by more than its clearance and a small part of its body's size.
 pub(super) fn longest(world: &World, states: &[State], mut dt: f64) -> f64 {
     for side in sides(world) {
         // Both may fall, but not away from each other faster than one does.
