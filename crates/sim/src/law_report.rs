@@ -1,0 +1,217 @@
+//! What a contact law does, tried on the simplest problems.
+
+mod curves;
+mod derivatives;
+mod motion;
+mod passivity;
+
+use std::fmt;
+use std::sync::Arc;
+
+use nalgebra::Vector3;
+
+use crate::contact::dynamic::DynContactLaw;
+use crate::contact::force_jump::jumps;
+use crate::contact::gap_smoothing::GapSmoothing;
+use crate::contact::point::{Contact, Response};
+use crate::error::SimulationError;
+use motion::Specimen;
+
+pub use curves::Curve;
+
+/// Depth at which the specimen rests \[m\], and the area it rests on \[m²\].
+const DEPTH: f64 = 5e-4;
+const AREA: f64 = 4e-4;
+/// Gravity \[m/s²\].
+const GRAVITY: f64 = 9.81;
+
+/// What was found of a law, see [`law_report`].
+#[derive(Clone, Debug)]
+pub struct LawReport {
+    /// What was tried, one line each.
+    pub findings: Vec<Finding>,
+    /// Forces and motions, to be drawn.
+    pub curves: Vec<Curve>,
+}
+
+impl LawReport {
+    /// Whether nothing is wrong.
+    pub fn is_sound(&self) -> bool {
+        self.findings.iter().all(|finding| finding.verdict != Verdict::Wrong)
+    }
+}
+
+impl fmt::Display for LawReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for Finding { what, measured, verdict, remark } in &self.findings {
+            writeln!(f, "{:<8} {what:<52} {measured:>12.5e}  {remark}", verdict.name())?;
+        }
+        Ok(())
+    }
+}
+
+/// One thing that was tried.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Finding {
+    /// What was measured, with its unit.
+    pub what: String,
+    /// The figure.
+    pub measured: f64,
+    /// What to think of it.
+    pub verdict: Verdict,
+    /// What was expected, or what it means.
+    pub remark: String,
+}
+
+/// What to think of a finding.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub enum Verdict {
+    /// As it should be.
+    Sound,
+    /// A property of the law, neither good nor bad.
+    Note,
+    /// A law must not do that.
+    Wrong,
+}
+
+impl Verdict {
+    /// A word for it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Sound => "sound",
+            Self::Note => "note",
+            Self::Wrong => "WRONG",
+        }
+    }
+
+    fn when(sound: bool) -> Self {
+        if sound { Self::Sound } else { Self::Wrong }
+    }
+}
+
+/// Tries `law` with its own parameters: how its force begins; rest, bounces and slides of a body of which it carries the
+/// weight half a millimeter deep, on 4 cm², against closed forms; whether it makes energy; its derivatives; stiffness, damping
+/// and the longest stable step.
+///
+/// ```
+/// use std::sync::Arc;
+///
+/// use prehend_sim::{Bounce, Coulomb, HuntCrossley, Law, StaticContactTarget, law_report};
+///
+/// let target =
+///     StaticContactTarget { mass: 0.3, gravity: 9.81, penetration: 5e-4, contact_area: 4e-4 };
+/// let bounce = Bounce { restitution: 0.5, impact_speed: 1.0 };
+/// let normal = HuntCrossley::from_target(&target, 1.5, bounce)?;
+/// let law = Law::new(normal, Coulomb { friction: 0.4, slip_scale: 1e-2 })?;
+/// let report = law_report(&(Arc::new(law) as _))?;
+/// println!("{report}");
+/// assert!(report.is_sound());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// If a parameter is out of its range, or the law cannot be simulated.
+pub fn law_report(law: &Arc<dyn DynContactLaw>) -> Result<LawReport, SimulationError> {
+    law.check(law.params())?;
+    let probe = Probe { law: law.as_ref() };
+    let weight = probe.response(DEPTH, 0.0, Vector3::zeros()).normal;
+    let mut findings = vec![Finding {
+        what: "weight carried 0.5 mm deep on 4 cm² [N]".to_owned(),
+        measured: weight,
+        verdict: Verdict::when(weight > 0.0 && weight.is_finite()),
+        remark: "must push".to_owned(),
+    }];
+    findings.push(onset(&probe));
+    findings.extend(derivatives::findings(&probe));
+    findings.extend(passivity::findings(&probe, weight));
+    let mut curves = curves::of_forces(&probe);
+    if weight > 0.0 && weight.is_finite() {
+        let specimen = Specimen { law, mass: weight / GRAVITY, depth: DEPTH, area: AREA };
+        findings.extend(specimen.findings(&probe)?);
+        curves.push(specimen.bounce_curve()?);
+    }
+    Ok(LawReport { findings, curves })
+}
+
+fn onset(probe: &Probe<'_>) -> Finding {
+    let jump = jumps(probe.law, probe.law.params(), &GapSmoothing::Hard);
+    let force = probe.response(1e-12, -1.0, Vector3::zeros()).normal;
+    Finding {
+        what: "force at first touch, 1 m/s [N]".to_owned(),
+        measured: force,
+        verdict: if jump { Verdict::Note } else { Verdict::Sound },
+        remark: match jump {
+            true => "jumps: derivatives through impacts need GapSmoothing::Softplus".to_owned(),
+            false => "begins at zero".to_owned(),
+        },
+    }
+}
+
+/// A law at one contact.
+struct Probe<'a> {
+    law: &'a dyn DynContactLaw,
+}
+
+impl Probe<'_> {
+    /// The force `depth` \[m\] deep, at a normal speed and a slip \[m/s\].
+    fn response(&self, depth: f64, normal_speed: f64, slip: Vector3<f64>) -> Response<f64> {
+        let (gap, normal) = (self.law.reach() - depth, Vector3::z());
+        let contact = Contact { gap, normal_speed, slip, normal, area: AREA };
+        match depth > 0.0 {
+            true => self.law.response(self.law.params(), &contact),
+            false => Response::zero(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use prehend_autodiff::Scalar;
+
+    use super::*;
+    use crate::ContactLaw;
+    use crate::scenes::penalty;
+
+    /// A belt: friction that drives instead of braking.
+    struct Belt([f64; 2]);
+
+    impl ContactLaw for Belt {
+        fn params(&self) -> &[f64] {
+            &self.0
+        }
+        fn law<S: Scalar>(&self, p: &[S], contact: &Contact<S>) -> Response<S> {
+            let normal = (-p[0] * contact.gap).times(contact.area);
+            Response { normal, tangential: contact.slip * (p[1] * normal) }
+        }
+        fn reach(&self) -> f64 {
+            0.0
+        }
+    }
+
+    #[test]
+    fn a_law_that_drives_is_found_out() {
+        let driving: Arc<dyn DynContactLaw> = Arc::new(Belt([1e7, 0.1]));
+        let report = law_report(&driving).unwrap();
+        let wrong = report.findings.iter().filter(|finding| finding.verdict == Verdict::Wrong);
+        let wrong: Vec<&str> = wrong.map(|finding| finding.what.as_str()).collect();
+        assert_eq!(wrong.len(), 3, "{report}");
+        assert!(wrong.iter().all(|what| what.contains("sliding in circles")));
+        assert!(!report.is_sound() && report.to_string().contains("WRONG"));
+    }
+
+    #[test]
+    fn a_spring_and_damper_bounce_as_their_damping_ratio_says() {
+        let law: Arc<dyn DynContactLaw> = Arc::new(penalty(1e7, 1e4, 0.3, 1e-3));
+        let report = law_report(&law).unwrap();
+        assert!(report.is_sound(), "{report}");
+        let found = |what: &str| {
+            report.findings.iter().find(|f| f.what.starts_with(what)).unwrap().measured
+        };
+        let mass = 1e7 * DEPTH * AREA / GRAVITY;
+        let zeta = 1e4 * AREA / (2.0 * (1e7 * AREA * mass).sqrt());
+        let expected = crate::contact::restitution::restitution(zeta);
+        assert!((found("restitution at 0.5") - expected).abs() < 1e-4, "{report}");
+        assert!((found("friction coefficient") - 0.3).abs() < 1e-6);
+        assert!((found("distance of a slide") - 1.0).abs() < 1e-2);
+    }
+}

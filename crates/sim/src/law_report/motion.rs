@@ -1,0 +1,175 @@
+//! A body on a law: rest, bounces, slides, and how long its steps may be.
+
+use std::sync::Arc;
+
+use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
+
+use super::{Curve, Finding, GRAVITY, Probe, Verdict};
+use crate::body::RigidBody;
+use crate::contact::dynamic::DynContactLaw;
+use crate::contact::gap_smoothing::GapSmoothing;
+use crate::error::SimulationError;
+use crate::fields::HalfSpace;
+use crate::integrator::Integrator;
+use crate::integrator::semi_implicit::SemiImplicitEuler;
+use crate::state::State;
+use crate::surface::Surface;
+use crate::time::TimeSteps;
+use crate::world::World;
+use crate::world::body::Body;
+use crate::world::body_id::BodyId;
+use crate::world::contact_pair::ContactBodies;
+
+/// A body that does not turn, of one sample.
+pub(super) struct Specimen<'a> {
+    pub(super) law: &'a Arc<dyn DynContactLaw>,
+    /// Mass \[kg\], the depth at which it rests \[m\], and the area of its sample \[m²\].
+    pub(super) mass: f64,
+    pub(super) depth: f64,
+    pub(super) area: f64,
+}
+
+/// The body, on a plane at whose distance the law begins.
+const BODY: BodyId = BodyId(1);
+/// Speed of slides \[m/s\].
+const SLIDE: f64 = 0.5;
+
+impl Specimen<'_> {
+    pub(super) fn findings(&self, probe: &Probe<'_>) -> Result<Vec<Finding>, SimulationError> {
+        let mut findings = vec![self.rest()?];
+        for speed in [0.1, 0.5, 1.0] {
+            findings.push(self.restitution(speed)?);
+        }
+        let friction = probe.response(self.depth, 0.0, Vector3::x() * 1e3).tangential.x.abs()
+            / (self.mass * GRAVITY);
+        if friction > 0.0 {
+            findings.push(Finding {
+                what: "friction coefficient at high slip".to_owned(),
+                measured: friction,
+                verdict: Verdict::Note,
+                remark: String::new(),
+            });
+            findings.push(self.stop(friction)?);
+            findings.push(self.creep(friction)?);
+        }
+        findings.extend(self.steps()?);
+        Ok(findings)
+    }
+
+    /// Height over time of a bounce at 0.5 m/s.
+    pub(super) fn bounce_curve(&self) -> Result<Curve, SimulationError> {
+        let (world, start) = self.world(Vector3::zeros(), 0.0, Vector3::z() * -0.5)?;
+        let dt = 2.0 * self.duration() / 200.0;
+        let run = world.rollout(&start, TimeSteps { dt, steps: 200 })?;
+        let heights = run.iter().map(|states| states[BODY].pose.translation.z * 1e3);
+        let points = heights.enumerate().map(|(i, z)| [i as f64 * dt * 1e3, z]).collect();
+        let name = "bounce at 0.5 m/s, without gravity".to_owned();
+        Ok(Curve { name, axes: ["ms", "height [mm]"], points })
+    }
+
+    /// Half a period of the contact that rests \[s\].
+    fn duration(&self) -> f64 {
+        std::f64::consts::PI * (self.depth / GRAVITY).sqrt()
+    }
+
+    /// The body above the surface, or `depth` \[m\] deep, with a velocity.
+    fn world(
+        &self,
+        gravity: Vector3<f64>,
+        depth: f64,
+        velocity: Vector3<f64>,
+    ) -> Result<(World, Vec<State>), SimulationError> {
+        let failed = |error| SimulationError::Body { body: "specimen".to_owned(), error };
+        // Nothing here turns it.
+        let inertia = Matrix3::identity() * self.mass;
+        let rigid = RigidBody::new(self.mass, inertia, Point3::origin()).map_err(failed)?;
+        let surface = Surface::uniform(&[Point3::origin()], self.area).map_err(failed)?;
+        let mut world = World::new(gravity);
+        let plane = HalfSpace { normal: Vector3::z_axis(), height: -self.law.reach() };
+        let field = world.add(Body::kinematic("plane").with_field(Arc::new(plane)));
+        let samples = world.add(Body::free("specimen", rigid).with_surface(surface));
+        let bodies = ContactBodies { samples, field };
+        world.add_contact(bodies, Arc::clone(self.law), GapSmoothing::Hard)?;
+        let mut state = rigid.at_rest(&Isometry3::translation(0.0, 0.0, -depth));
+        state.linear = velocity;
+        Ok((world, vec![State::at_rest(Isometry3::identity()), state]))
+    }
+
+    fn rest(&self) -> Result<Finding, SimulationError> {
+        let (world, start) = self.world(down(), 1.1 * self.depth, Vector3::zeros())?;
+        let end = world.simulate(&start, 40.0 * self.duration())?[BODY];
+        let off = (end.pose.translation.z + self.depth).abs() / self.depth;
+        Ok(Finding {
+            what: "off its rest after 40 half periods, of its depth".to_owned(),
+            measured: off,
+            verdict: match off {
+                _ if off < 1e-3 => Verdict::Sound,
+                _ if off < 0.11 => Verdict::Note,
+                _ => Verdict::Wrong,
+            },
+            remark: "0 if damped; began 0.1 off".to_owned(),
+        })
+    }
+
+    fn restitution(&self, speed: f64) -> Result<Finding, SimulationError> {
+        let (world, start) = self.world(Vector3::zeros(), 0.0, Vector3::z() * -speed)?;
+        let restitution = world.simulate(&start, 20.0 * self.duration())?[BODY].linear.z / speed;
+        Ok(Finding {
+            what: format!("restitution at {speed} m/s"),
+            measured: restitution,
+            verdict: Verdict::when((-1e-6..=1.0 + 1e-3).contains(&restitution)),
+            remark: "0 to 1".to_owned(),
+        })
+    }
+
+    fn stop(&self, friction: f64) -> Result<Finding, SimulationError> {
+        let (world, start) = self.world(down(), self.depth, Vector3::x() * SLIDE)?;
+        let time = 2.0 * SLIDE / (friction * GRAVITY);
+        let end = world.simulate(&start, time)?[BODY].pose.translation.x;
+        let expected = SLIDE * SLIDE / (2.0 * friction * GRAVITY);
+        let ratio = end / expected;
+        Ok(Finding {
+            what: "distance of a slide at 0.5 m/s, of v²/2μg".to_owned(),
+            measured: ratio,
+            verdict: if (ratio - 1.0).abs() < 0.05 { Verdict::Sound } else { Verdict::Note },
+            remark: "1 if friction does not depend on slip".to_owned(),
+        })
+    }
+
+    /// Speed on an incline that takes half of the friction.
+    fn creep(&self, friction: f64) -> Result<Finding, SimulationError> {
+        let angle = (0.5 * friction).atan();
+        let gravity = Vector3::new(angle.sin(), 0.0, -angle.cos()) * GRAVITY;
+        let (world, start) = self.world(gravity, self.depth, Vector3::zeros())?;
+        let speed = world.simulate(&start, 40.0 * self.duration())?[BODY].linear.x;
+        Ok(Finding {
+            what: "creep at half of the friction [m/s]".to_owned(),
+            measured: speed,
+            verdict: if speed.abs() < 1e-6 { Verdict::Sound } else { Verdict::Note },
+            remark: "0 if it sticks".to_owned(),
+        })
+    }
+
+    fn steps(&self) -> Result<[Finding; 2], SimulationError> {
+        let (world, start) = self.world(down(), self.depth, Vector3::zeros())?;
+        let rate = world.contact_frequency(&start);
+        let note = |what: &str, measured: f64, remark: &str| Finding {
+            what: what.to_owned(),
+            measured,
+            verdict: Verdict::Note,
+            remark: remark.to_owned(),
+        };
+        Ok([
+            note("fastest rate at rest: stiffness, damping or friction [1/s]", rate, ""),
+            note(
+                "longest stable step of semi-implicit Euler [s]",
+                SemiImplicitEuler.stability_limit() / rate,
+                "a tenth of it for derivatives",
+            ),
+        ])
+    }
+}
+
+fn down() -> Vector3<f64> {
+    Vector3::z() * -GRAVITY
+}

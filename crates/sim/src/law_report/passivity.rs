@@ -1,0 +1,48 @@
+//! Whether a law makes energy.
+
+use nalgebra::Vector3;
+
+use super::{DEPTH, Finding, Probe, Verdict};
+
+/// Steps of a cycle.
+const STEPS: usize = 4000;
+/// Work that rounding may seem to do, relative to the weight over the depth.
+const ROUNDING: f64 = 1e-6;
+
+/// The work of a law's force over closed cycles: in and out of contact, and in circles across it while pressing harder and less.
+/// `weight` is the force \[N\] at rest.
+pub(super) fn findings(probe: &Probe<'_>, weight: f64) -> Vec<Finding> {
+    let cycle = |what: &str, rate: f64, slip: f64, deep: f64| {
+        let work = work(probe, rate, slip, deep);
+        Finding {
+            what: format!("work over a cycle, {what}, {rate} Hz [J]"),
+            measured: work,
+            verdict: Verdict::when(work <= ROUNDING * weight.abs() * DEPTH),
+            remark: "must not be positive".to_owned(),
+        }
+    };
+    [1.0, 30.0, 300.0]
+        .into_iter()
+        .flat_map(|rate| {
+            [cycle("in and out", rate, 0.0, 1.0), cycle("sliding in circles", rate, DEPTH, 0.2)]
+        })
+        .collect()
+}
+
+/// Work \[J\] of the force on a body that moves at `rate` \[Hz\] in a circle of radius `slip` \[m\] across the normal while its depth
+/// swings by `swing` times half a millimeter about that depth.
+fn work(probe: &Probe<'_>, rate: f64, slip: f64, swing: f64) -> f64 {
+    let turn = std::f64::consts::TAU * rate;
+    let dt = 1.0 / (rate * STEPS as f64);
+    let power = |step: usize| {
+        // By the middle of each step: exact for what is periodic.
+        let (sin, cos) = (turn * dt * (step as f64 + 0.5)).sin_cos();
+        let depth = DEPTH * (1.0 - (1.0 + 1e-3) * swing * cos);
+        // Sinking in is approach: negative.
+        let normal_speed = -DEPTH * (1.0 + 1e-3) * swing * turn * sin;
+        let velocity = Vector3::new(-sin, cos, 0.0) * (slip * turn);
+        let force = probe.response(depth, normal_speed, velocity);
+        force.normal * normal_speed + force.tangential.dot(&velocity)
+    };
+    (0..STEPS).map(power).sum::<f64>() * dt
+}
