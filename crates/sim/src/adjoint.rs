@@ -223,13 +223,13 @@ impl World<Var> {
         TimeSteps { dt, steps }: TimeSteps,
         snapshots: usize,
     ) -> Result<Vec<State<Var>>, SimulationError> {
-        self.check(initial, dt)?;
+        let initial = self.begin(initial, dt)?;
         integrator.check_differentiable(self)?;
         let scene = Scene::new(integrator, self)?;
         let Changes { places, values } = scene.changes(self);
         let failure = Rc::new(RefCell::new(None));
         let step = Steps { scene, places, dt, failure: Rc::clone(&failure) };
-        let initial: Vec<Var> = coordinates_of(&self.started(initial)).collect();
+        let initial: Vec<Var> = coordinates_of(&initial).collect();
         let end = checkpoint::rollout(step, steps, snapshots, &initial, &values);
         match failure.take() {
             Some(error) => Err(error),

@@ -9,7 +9,7 @@ use prehend_autodiff::Scalar;
 
 use crate::error::SimulationError;
 use crate::state::State;
-use crate::time::Step;
+use crate::time::{Step, TimeSteps};
 use crate::world::World;
 use crate::world::body_id::BodyId;
 use energy::EnergyBalance;
@@ -58,7 +58,6 @@ impl fmt::Display for Resolution {
 /// Follows a simulation from step to step.
 pub(crate) struct Audit<'a, S: Scalar> {
     world: &'a World<S>,
-    steps: usize,
     roughness: Roughness,
     energy: EnergyBalance,
 }
@@ -68,7 +67,7 @@ impl<'a, S: Scalar> Audit<'a, S> {
     pub(crate) fn new(world: &'a World<S>, initial: &[State<S>]) -> Self {
         let (roughness, energy) =
             (Roughness::new(world, initial), EnergyBalance::new(world, initial));
-        Self { world, steps: 0, roughness, energy }
+        Self { world, roughness, energy }
     }
 
     /// After `step` has led to `states`.
@@ -76,26 +75,23 @@ impl<'a, S: Scalar> Audit<'a, S> {
     /// # Errors
     /// If contacts have made energy.
     pub(crate) fn step(&mut self, step: Step, states: &[State<S>]) -> Result<(), SimulationError> {
-        self.steps += 1;
         self.roughness.step(step, states);
         self.energy.step(self.world, step, states)
     }
 
-    /// What is to be said of the steps, by an integrator that `controls_error` or not, that have led to `states` at `time`
-    /// \[s\].
+    /// What is to be said of `time_steps`, by an integrator that `controls_error` or not, that have led to `states`.
     ///
     /// # Errors
     /// If contacts have made energy.
     pub(crate) fn finish(
         mut self,
-        time: f64,
+        TimeSteps { dt, steps }: TimeSteps,
         states: &[State<S>],
         controls_error: bool,
     ) -> Result<Resolution, SimulationError> {
-        self.energy.check(self.world, time, states)?;
+        self.energy.check(self.world, dt * steps as f64, states)?;
         let name = |body: BodyId| self.world.bodies[body].name.clone();
         let roughest = self.roughness.roughest().map(|(body, time)| (name(body), time));
-        let steps = self.steps;
         Ok(match controls_error {
             true => Resolution { steps, roughness: None, roughest: None },
             false => Resolution { steps, roughness: Some(self.roughness.mean()), roughest },

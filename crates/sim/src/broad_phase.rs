@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use prehend_autodiff::Scalar;
 
-use crate::contact::patch::Patch;
 use crate::state::State;
 use crate::world::World;
 use crate::world::contact_pair::ContactPair;
@@ -47,7 +46,7 @@ impl<S: Scalar> BroadPhase<S> {
         let (mut moved, mut ahead): (f64, f64) = (0.0, 0.0);
         for (index, (pair, radius)) in full.contacts.iter().zip(&self.radii).enumerate() {
             let now = full.seen_value(pair, states);
-            ahead = ahead.max(now.linear.norm() + now.angular.norm() * radius);
+            ahead = ahead.max(now.speed_within(*radius));
             if let Some(then) = self.made_at.get(index) {
                 let shift = now.pose.translation.vector - then.pose.translation.vector;
                 let turn = now.pose.rotation.angle_to(&then.pose.rotation);
@@ -68,15 +67,11 @@ impl<S: Scalar> BroadPhase<S> {
     fn look(&mut self, full: &World<S>, states: &[State<S>]) {
         let mut near = full.clone();
         self.made_at.clear();
-        for pair in &mut near.contacts {
+        for (pair, near) in full.contacts.iter().zip(&mut near.contacts) {
             let state = full.seen_value(pair, states);
             self.made_at.push(state);
-            let (body, other) =
-                (&full.bodies[pair.bodies.samples], &full.bodies[pair.bodies.field]);
-            if let (Some(surface), Some(field)) = (&body.surface, &other.field) {
-                let (com, smoothing) = (body.com(), pair.smoothing);
-                let patch = Patch { surface, com, state, field: field.as_ref(), smoothing };
-                pair.near = Some(Arc::new(patch.near(pair.law().reach(), self.margin)));
+            if let Some(patch) = full.patch(pair, state) {
+                near.near = Some(Arc::new(patch.near(pair.law().reach(), self.margin)));
             }
         }
         self.world = Some(near);

@@ -126,7 +126,7 @@ pub fn law_report(law: &Arc<dyn DynContactLaw>) -> Result<LawReport, SimulationE
     findings.extend(passivity::findings(&probe, weight));
     let mut curves = curves::of_forces(&probe);
     if weight > 0.0 && weight.is_finite() {
-        let specimen = Specimen { law, mass: weight / GRAVITY, depth: DEPTH, area: AREA };
+        let specimen = Specimen { law, mass: weight / GRAVITY };
         findings.extend(specimen.findings(&probe)?);
         curves.push(specimen.bounce_curve()?);
     }

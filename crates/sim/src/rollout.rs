@@ -35,7 +35,7 @@ impl<S: Scalar> World<S> {
         initial: &[State<S>],
         time: f64,
     ) -> Result<Vec<State<S>>, SimulationError> {
-        let once = TimeSteps { dt: time, steps: 1 };
+        let (once, initial) = (TimeSteps { dt: time, steps: 1 }, self.begin(initial, time)?);
         self.march(&Adaptive::default(), initial, once, |_, _| Ok(()))
     }
 
@@ -48,7 +48,8 @@ impl<S: Scalar> World<S> {
         initial: &[State<S>],
         time_steps: TimeSteps,
     ) -> Result<Vec<Vec<State<S>>>, SimulationError> {
-        let mut states = vec![self.started(initial)];
+        let initial = self.begin(initial, time_steps.dt)?;
+        let mut states = vec![initial.clone()];
         self.march(&Adaptive::default(), initial, time_steps, |_, next| {
             states.push(next.to_vec());
             Ok(())
@@ -70,17 +71,25 @@ impl<S: Scalar> World<S> {
         integrator: &impl Integrator,
         initial: &[State<S>],
         time_steps: TimeSteps,
+        visit: impl FnMut(Step, &[State<S>]),
+    ) -> Result<Simulation<Vec<State<S>>>, SimulationError> {
+        self.audited(integrator, self.begin(initial, time_steps.dt)?, time_steps, visit)
+    }
+
+    /// [`World::simulate_with`] of what has begun.
+    fn audited(
+        &self,
+        integrator: &impl Integrator,
+        initial: Vec<State<S>>,
+        time_steps: TimeSteps,
         mut visit: impl FnMut(Step, &[State<S>]),
     ) -> Result<Simulation<Vec<State<S>>>, SimulationError> {
-        self.check(initial, time_steps.dt)?;
-        let initial = self.started(initial);
         let mut audit = Audit::new(self, &initial);
-        let states = self.march(integrator, &initial, time_steps, |step, states| {
+        let states = self.march(integrator, initial, time_steps, |step, states| {
             visit(step, states);
             audit.step(step, states)
         })?;
-        let end = time_steps.dt * time_steps.steps as f64;
-        let resolution = audit.finish(end, &states, integrator.controls_error())?;
+        let resolution = audit.finish(time_steps, &states, integrator.controls_error())?;
         Ok(Simulation { states, resolution })
     }
 
@@ -94,11 +103,11 @@ impl<S: Scalar> World<S> {
         initial: &[State<S>],
         time_steps: TimeSteps,
     ) -> Result<Simulation<Vec<Vec<State<S>>>>, SimulationError> {
+        let initial = self.begin(initial, time_steps.dt)?;
         let mut states = Vec::with_capacity(time_steps.steps + 1);
-        states.push(self.started(initial));
+        states.push(initial.clone());
         let keep = |_, next: &[State<S>]| states.push(next.to_vec());
-        let Simulation { resolution, .. } =
-            self.simulate_with(integrator, initial, time_steps, keep)?;
+        let Simulation { resolution, .. } = self.audited(integrator, initial, time_steps, keep)?;
         Ok(Simulation { states, resolution })
     }
 
@@ -138,8 +147,7 @@ impl<S: Scalar> World<S> {
         TimeSteps { dt, steps }: TimeSteps,
         mut control: impl FnMut(Step, &mut Self, &mut [State<S>]),
     ) -> Result<Vec<State<S>>, SimulationError> {
-        self.check(initial, dt)?;
-        let (mut world, mut states) = (self.clone(), self.started(initial));
+        let (mut states, mut world) = (self.begin(initial, dt)?, self.clone());
         for index in 0..steps {
             let step = Step::new(index, dt);
             control(step, &mut world, &mut states);
@@ -149,16 +157,14 @@ impl<S: Scalar> World<S> {
         Ok(states)
     }
 
-    /// [`World::simulate_with`] without the report; an error of `visit` ends it.
+    /// [`World::simulate_with`] of what has begun, without the report; an error of `visit` ends it.
     pub(crate) fn march(
         &self,
         integrator: &impl Integrator,
-        initial: &[State<S>],
+        mut states: Vec<State<S>>,
         TimeSteps { dt, steps }: TimeSteps,
         mut visit: impl FnMut(Step, &[State<S>]) -> Result<(), SimulationError>,
     ) -> Result<Vec<State<S>>, SimulationError> {
-        self.check(initial, dt)?;
-        let mut states = self.started(initial);
         let mut near = BroadPhase::new(self);
         for index in 0..steps {
             let step = Step::new(index, dt);
@@ -199,15 +205,23 @@ impl<S: Scalar> World<S> {
         }
     }
 
-    /// The states with driven bodies where their trajectories start.
-    pub(crate) fn started(&self, initial: &[State<S>]) -> Vec<State<S>> {
+    /// The states from which a rollout begins: `initial` with driven bodies where their trajectories start.
+    ///
+    /// # Errors
+    /// See [`World::check`].
+    pub(crate) fn begin(
+        &self,
+        initial: &[State<S>],
+        dt: f64,
+    ) -> Result<Vec<State<S>>, SimulationError> {
+        self.check(initial, dt)?;
         let mut states = initial.to_vec();
         self.drive(&mut states, 0.0);
-        states
+        Ok(states)
     }
 
     /// Whether a rollout may begin.
-    pub(crate) fn check(&self, states: &[State<S>], dt: f64) -> Result<(), SimulationError> {
+    fn check(&self, states: &[State<S>], dt: f64) -> Result<(), SimulationError> {
         if !(dt > 0.0 && dt.is_finite()) {
             return Err(SimulationError::TimeStep(dt));
         }

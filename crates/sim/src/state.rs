@@ -101,6 +101,12 @@ fn less<S: Scalar>(a: &Vector3<S>, value: &Vector3<f64>) -> Vector3<S> {
 }
 
 impl State {
+    /// The largest speed of a point of the body within `radius` \[m\] of its center of mass \[m/s\].
+    #[inline]
+    pub(crate) fn speed_within(&self, radius: f64) -> f64 {
+        self.linear.norm() + radius * self.angular.norm()
+    }
+
     /// The state `tangent` away (the retraction of the manifold of states), in the order of [`State::tangent`].
     pub fn retract<S: Scalar>(&self, tangent: &[S; 12]) -> State<S> {
         let [x, y, z, rx, ry, rz, vx, vy, vz, wx, wy, wz] = *tangent;

@@ -165,18 +165,9 @@ impl<S: Scalar> World<S> {
         states: &[State<S>],
         step: usize,
     ) -> [Vector6<S>; 2] {
-        let surface = pair.near.as_ref().or(self.bodies[pair.bodies.samples].surface.as_ref());
-        let (Some(surface), Some(field)) = (surface, &self.bodies[pair.bodies.field].field) else {
-            return [Vector6::zeros(); 2];
-        };
         let seen = self.seen(pair, states);
-        let patch = Patch {
-            surface,
-            com: self.bodies[pair.bodies.samples].com(),
-            state: seen.value(),
-            field: field.as_ref(),
-            smoothing: pair.smoothing.at_step(step),
-        };
+        let Some(patch) = self.patch(pair, seen.value()) else { return [Vector6::zeros(); 2] };
+        let patch = Patch { smoothing: pair.smoothing.at_step(step), ..patch };
         let [fx, fy, fz, tx, ty, tz] = local_wrench(pair, &seen, &patch);
         let (state, base) = (&states[pair.bodies.samples], &states[pair.bodies.field]);
         let rotation = base.pose.rotation;
@@ -184,6 +175,18 @@ impl<S: Scalar> World<S> {
         let torque = rotation * Vector3::new(tx, ty, tz).map(|x| x.times(pair.weight));
         let offset = state.pose.translation.vector - base.pose.translation.vector;
         [stack(&force, &torque), stack(&-force, &-(torque + offset.cross(&force)))]
+    }
+
+    /// The samples of `pair` beside its field, which sees their body in `state`, if there are both.
+    pub(crate) fn patch<'a>(&'a self, pair: &'a ContactPair<S>, state: State) -> Option<Patch<'a>> {
+        let body = &self.bodies[pair.bodies.samples];
+        Some(Patch {
+            surface: pair.near.as_ref().or(body.surface.as_ref())?,
+            com: body.com(),
+            state,
+            field: self.bodies[pair.bodies.field].field.as_deref()?,
+            smoothing: pair.smoothing,
+        })
     }
 
     /// The body with the samples as the field sees it, in the model frame of the body with the field.

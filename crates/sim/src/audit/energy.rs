@@ -3,7 +3,6 @@
 use nalgebra::Vector3;
 use prehend_autodiff::Scalar;
 
-use crate::contact::patch::Patch;
 use crate::contact::point::Contact;
 use crate::error::SimulationError;
 use crate::state::State;
@@ -33,8 +32,6 @@ pub(super) struct EnergyBalance {
     /// Whether it is such a world: bodies on trajectories bring energy with them.
     closed: bool,
     initial: Vec<State>,
-    /// Steps since the last look.
-    since: usize,
     /// Work of external torques \[J\].
     work: f64,
     /// The largest kinetic energy so far \[J\].
@@ -52,7 +49,7 @@ impl EnergyBalance {
             Motion::Driven(_) => true,
         };
         let closed = !world.bodies.iter().map(|body| &body.motion).zip(&initial).any(moves);
-        Self { closed, initial, since: 0, work: 0.0, kinetic: 0.0 }
+        Self { closed, initial, work: 0.0, kinetic: 0.0 }
     }
 
     /// After `step` has led to `states`.
@@ -69,12 +66,10 @@ impl EnergyBalance {
                 self.work += torque.dot(&state.angular.map(|x| x.value())) * step.dt;
             }
         }
-        self.since += 1;
-        if self.since < EVERY {
-            return Ok(());
+        match (step.index + 1).is_multiple_of(EVERY) {
+            true => self.check(world, step.end(), states),
+            false => Ok(()),
         }
-        self.since = 0;
-        self.check(world, step.end(), states)
     }
 
     /// Compares the energy at `states` with that at the start.
@@ -137,11 +132,8 @@ fn work_of_pull<S: Scalar>(world: &World<S>, body: BodyId, before: &State, now: 
 fn stored_energy(world: &World, states: &[State]) -> f64 {
     let mut energy = 0.0;
     for pair in &world.contacts {
-        let (body, other) = (&world.bodies[pair.bodies.samples], &world.bodies[pair.bodies.field]);
-        let (Some(surface), Some(field)) = (&body.surface, &other.field) else { continue };
-        let (com, state, smoothing) = (body.com(), world.seen_value(pair, states), pair.smoothing);
-        let reach = pair.law().reach();
-        let patch = Patch { surface, com, state, field: field.as_ref(), smoothing };
+        let Some(patch) = world.patch(pair, world.seen_value(pair, states)) else { continue };
+        let (reach, smoothing) = (pair.law().reach(), pair.smoothing);
         patch.for_each_gap(reach, |gap, area| {
             let force = |x: f64| {
                 let (slip, normal) = (Vector3::zeros(), Vector3::z());

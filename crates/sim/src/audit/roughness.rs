@@ -26,7 +26,6 @@ pub(super) struct Roughness {
 /// A free body and what is known of its last step.
 struct Followed {
     body: BodyId,
-    mass: f64,
     rigid: RigidBody,
     /// Radius of gyration \[m\].
     length: f64,
@@ -43,17 +42,15 @@ impl Roughness {
         let follow = |body: BodyId| {
             let rigid = world.bodies[body].rigid()?.map(S::value);
             let state = initial[body].value();
-            let mass = rigid.mass().value();
             let wrench = world.bodies[body].external_wrench.map(|x| x.value());
             Some(Followed {
                 body,
                 length: rigid.gyration_radius(),
-                pull: world.gravity.map(|x| x.value()) + wrench.fixed_rows::<3>(0) / mass,
+                pull: world.gravity.map(|x| x.value()) + wrench.fixed_rows::<3>(0) / rigid.mass(),
                 torque: wrench.fixed_rows::<3>(3).into_owned(),
                 linear: state.linear,
                 momentum: rigid.momentum(&state.pose.rotation, &state.angular),
                 rigid,
-                mass,
                 kick: None,
             })
         };
@@ -69,9 +66,8 @@ impl Roughness {
             let momentum = followed.rigid.momentum(&state.pose.rotation, &state.angular);
             let linear = state.linear - followed.linear - followed.pull * step.dt;
             let angular = momentum - followed.momentum - followed.torque * step.dt;
-            let mut kick = stack(&linear, &(angular / (followed.mass * followed.length)));
-            let speed = state.linear.norm() + followed.length * state.angular.norm();
-            if kick.norm() < NOISE * speed {
+            let mut kick = stack(&linear, &(angular / (followed.rigid.mass() * followed.length)));
+            if kick.norm() < NOISE * state.speed_within(followed.length) {
                 kick = Vector6::zeros();
             }
             // Nothing is known of what was before the first step.

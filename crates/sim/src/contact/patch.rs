@@ -59,9 +59,14 @@ impl Patch<'_> {
 
     #[inline]
     fn distance_within(&self, point: &Point3<f64>, within: f64) -> bool {
+        self.field.distance(&self.place(point), within).is_some()
+    }
+
+    /// Where a point of the body's model frame is.
+    #[inline]
+    fn place(&self, point: &Point3<f64>) -> Point3<f64> {
         let State { pose, .. } = &self.state;
-        let place = pose.translation.vector + pose.rotation * (point - self.com);
-        self.field.distance(&Point3::from(place), within).is_some()
+        Point3::from(pose.translation.vector + pose.rotation * (point - self.com))
     }
 
     /// The samples that may touch, for a law that reaches to `cutoff`, before one of them has moved by `margin` \[m\].
@@ -82,12 +87,10 @@ impl Patch<'_> {
 
     /// Calls `visit` with gap \[m\] and area \[m²\] of every sample that a law that reaches to `cutoff` may push.
     pub(crate) fn for_each_gap(&self, cutoff: f64, mut visit: impl FnMut(f64, f64)) {
-        let reach = cutoff + self.smoothing.force_band();
-        let State { pose, .. } = &self.state;
+        let radius = self.surface.rounding();
+        let within = cutoff + self.smoothing.force_band() + radius;
         for point in self.surface.points() {
-            let place = pose.translation.vector + pose.rotation * (point.position - self.com);
-            let radius = self.surface.rounding();
-            if let Some(distance) = self.field.distance(&Point3::from(place), reach + radius) {
+            if let Some(distance) = self.field.distance(&self.place(&point.position), within) {
                 visit(distance - radius, point.area);
             }
         }
@@ -184,13 +187,6 @@ impl Touch {
             normal,
             area: self.area,
         }
-    }
-
-    /// Derivative of the lever by the sample's position, beside that of the arm: −ρ ∂n/∂x for its radius ρ.
-    #[inline(always)]
-    pub(super) fn lever_slope(&self) -> Matrix3<f64> {
-        let normal = self.lifted_normal();
-        Matrix3::from_fn(|i, j| -self.radius * normal[i].derivative[j])
     }
 
     /// The unit normal with its derivative by position: (I − nnᵀ)·∇²φ/|∇φ|.

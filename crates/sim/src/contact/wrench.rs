@@ -77,10 +77,11 @@ pub(crate) fn wrench_jacobian<L: ContactLaw>(
         let by_velocity = Matrix3::from_fn(|i, j| force[i].derivative[3 + j]);
 
         // Sample position x: δx = δt + δθ×r, for the arm r; velocity where it touches: δv + δω×l + ω×δl, for the lever
-        // l, which turns with the arm and, if the sample is round, with the normal: δl = δθ×r + L δx.
+        // l, which turns with the arm and, if the sample is round, with the normal: δl = δθ×r + L δx, L = −ρ ∂n/∂x.
         let (arm, lever) = (&touch.arm, &touch.lever);
         if touch.radius > 0.0 {
-            let lever_slope = touch.lever_slope();
+            let by_place = |i: usize, j: usize| -touch.radius * contact.normal[i].derivative[j];
+            let lever_slope = Matrix3::from_fn(by_place);
             by_position += times_cross(&by_velocity, &spin) * lever_slope;
             let moved = -cross_times(&f, &lever_slope);
             by[1][0] += moved;
@@ -170,7 +171,9 @@ mod tests {
     use prehend_geometry::{DistanceField, FieldSample};
 
     use crate::scenes::{bowl, egg_on, floor, penalty};
-    use crate::{DynContactLaw, GapSmoothing, LeakSteps, Patch, State, Surface, WrenchJacobian};
+    use crate::{
+        DynContactLaw, GapSmoothing, LeakSteps, Patch, State, Surface, World, WrenchJacobian,
+    };
 
     /// A single sample, with the state of the egg but at `height` above the floor.
     fn sample_at<R>(
@@ -189,31 +192,36 @@ mod tests {
         jacobian.wrench.iter().chain(jacobian.by_state.as_flattened()).all(|x| x.is_finite())
     }
 
+    /// The wrench on body 1 presses it up, the same with derivatives as without, and those match differences.
+    fn assert_derivatives(world: &World, states: &[State], what: &str) {
+        let wrench = |state: State| world.wrenches(&[states[0], state], 0)[1];
+        let mut lifted: Vec<State<Fwd<12>>> = states.iter().map(State::lift).collect();
+        lifted[1] = states[1].variables();
+        let exact = world.lift().wrenches(&lifted, 0)[1];
+        let value = wrench(states[1]);
+        assert!((value - exact.map(|w| w.value)).norm() <= 1e-12 * value.norm());
+        assert!(value.z > 0.0);
+        let differences = finite_difference_jacobian(
+            |x| {
+                let moved = states[1].retract(&std::array::from_fn::<f64, 12, _>(|i| x[i]));
+                wrench(moved).iter().copied().collect()
+            },
+            &[0.0; 12],
+            1e-7,
+        );
+        for (row, reference) in differences.iter().enumerate() {
+            let error = compare_gradients(&exact[row].derivative, reference);
+            assert!(error.relative < 1e-6, "{what} row {row}: {error:?}");
+        }
+    }
+
     #[test]
     fn derivatives_match_differences() {
         for field in [floor(), bowl()] {
             for smoothing in [GapSmoothing::Hard, GapSmoothing::Softplus { width: 5e-4 }] {
                 let (world, mut states) = egg_on(Arc::clone(&field), smoothing);
                 states[1].pose.translation.z -= 1e-3;
-                let wrench = |state: State| world.wrenches(&[states[0], state], 0)[1];
-                let mut lifted: Vec<State<Fwd<12>>> = states.iter().map(State::lift).collect();
-                lifted[1] = states[1].variables();
-                let exact = world.lift().wrenches(&lifted, 0)[1];
-                let value = wrench(states[1]);
-                assert!((value - exact.map(|w| w.value)).norm() <= 1e-12 * value.norm());
-                assert!(value.z > 0.0);
-                let differences = finite_difference_jacobian(
-                    |x| {
-                        let moved = states[1].retract(&std::array::from_fn::<f64, 12, _>(|i| x[i]));
-                        wrench(moved).iter().copied().collect()
-                    },
-                    &[0.0; 12],
-                    1e-7,
-                );
-                for (row, reference) in differences.iter().enumerate() {
-                    let error = compare_gradients(&exact[row].derivative, reference);
-                    assert!(error.relative < 1e-6, "{smoothing:?} row {row}: {error:?}");
-                }
+                assert_derivatives(&world, &states, &format!("{smoothing:?}"));
             }
         }
     }
@@ -226,23 +234,7 @@ mod tests {
             let surface = world.bodies[1].surface.take().unwrap();
             let rounded = Surface::clone(&surface).rounded(4e-3).unwrap();
             world.bodies[1].surface = Some(Arc::new(rounded));
-            let wrench = |state: State| world.wrenches(&[states[0], state], 0)[1];
-            let mut lifted: Vec<State<Fwd<12>>> = states.iter().map(State::lift).collect();
-            lifted[1] = states[1].variables();
-            let exact = world.lift().wrenches(&lifted, 0)[1];
-            assert!(wrench(states[1]).z > 0.0);
-            let differences = finite_difference_jacobian(
-                |x| {
-                    let moved = states[1].retract(&std::array::from_fn::<f64, 12, _>(|i| x[i]));
-                    wrench(moved).iter().copied().collect()
-                },
-                &[0.0; 12],
-                1e-7,
-            );
-            for (row, reference) in differences.iter().enumerate() {
-                let error = compare_gradients(&exact[row].derivative, reference);
-                assert!(error.relative < 1e-6, "row {row}: {error:?}");
-            }
+            assert_derivatives(&world, &states, "rounded");
         }
     }
 

@@ -1,6 +1,7 @@
 //! Derivatives of a law, against differences.
 
 use nalgebra::Vector3;
+use prehend_autodiff::check::finite_difference_jacobian;
 use prehend_autodiff::{Fwd, Scalar};
 use prehend_geometry::SplitMix64;
 
@@ -13,13 +14,17 @@ const CONTACTS: usize = 200;
 const STEPS: [f64; 4] = [1e-9, 1e-6, 1e-6, 1e-6];
 /// Of parameters, relative to their size.
 const PARAMETER_STEP: f64 = 1e-6;
+/// Error that is none, relative to the largest derivative by the same input.
+const TOLERANCE: f64 = 1e-5;
+/// Error of a force by rounding, relative to it.
+const ROUNDING: f64 = 1e-14;
 /// Part of the contacts that may lie at a kink.
 const AT_KINKS: f64 = 0.02;
 
 /// The derivatives by gap, normal speed and slip; then by the parameters.
 pub(super) fn findings(probe: &Probe<'_>) -> Vec<Finding> {
     let mut random = SplitMix64::new(1);
-    let (mut off, mut by_parameters, mut finite) = (Vec::new(), Vec::new(), true);
+    let (mut by_inputs, mut by_parameters, mut finite) = (Vec::new(), Vec::new(), true);
     for _ in 0..CONTACTS {
         let mut spread = || 2.0 * random.uniform() - 1.0;
         let at = [
@@ -29,25 +34,25 @@ pub(super) fn findings(probe: &Probe<'_>) -> Vec<Finding> {
             0.2 * spread(),
         ];
         let p = probe.law.params();
-        let by_inputs = lifted(probe, &at, p, None);
-        off.push(error(&STEPS, |i, h| force(probe, &moved(&at, i, h), p), &by_inputs));
-        for k in 0..p.len() {
-            let change = |_, h: f64| {
+        let exact = lifted(probe, &at, p, None);
+        let moved = |change: &[f64]| force(probe, &std::array::from_fn(|i| at[i] + change[i]), p);
+        by_inputs.push(differs(&exact, moved, &STEPS));
+        finite &= exact.as_flattened().iter().all(|x| x.is_finite());
+        for (k, value) in p.iter().enumerate() {
+            let moved = |change: &[f64]| {
                 let mut changed = p.to_vec();
-                changed[k] += h;
+                changed[k] += change[0];
                 force(probe, &at, &changed)
             };
-            let step = PARAMETER_STEP * p[k].abs().max(1e-3);
-            by_parameters.push(error(&[step], change, &lifted(probe, &at, p, Some(k))));
+            let step = PARAMETER_STEP * value.abs().max(1e-3);
+            by_parameters.push(differs(&lifted(probe, &at, p, Some(k)), moved, &[step]));
         }
-        finite &= by_inputs.as_flattened().iter().all(|x| x.is_finite());
     }
     let rest = [probe.law.reach() - DEPTH, 0.0, 0.0, 0.0];
     let at_rest = lifted(probe, &rest, probe.law.params(), None);
     finite &= at_rest.as_flattened().iter().all(|x| x.is_finite());
-    let finding = |what: &str, errors: Vec<f64>| {
-        let wrong = errors.iter().filter(|e| e.is_nan() || **e > 1e-5).count() as f64;
-        let share = wrong / errors.len().max(1) as f64;
+    let finding = |what: &str, wrong: &[bool]| {
+        let share = wrong.iter().filter(|wrong| **wrong).count() as f64 / wrong.len() as f64;
         Finding {
             what: what.to_owned(),
             measured: share,
@@ -55,9 +60,9 @@ pub(super) fn findings(probe: &Probe<'_>) -> Vec<Finding> {
             remark: "0, or a little for kinks".to_owned(),
         }
     };
-    let mut all = vec![finding("contacts whose derivatives differ from differences", off)];
+    let mut all = vec![finding("contacts whose derivatives differ from differences", &by_inputs)];
     if !by_parameters.is_empty() {
-        all.push(finding("the same, derivatives by parameters", by_parameters));
+        all.push(finding("the same, derivatives by parameters", &by_parameters));
     }
     all.push(Finding {
         what: "derivatives that are finite, at rest too".to_owned(),
@@ -66,12 +71,6 @@ pub(super) fn findings(probe: &Probe<'_>) -> Vec<Finding> {
         remark: "1".to_owned(),
     });
     all
-}
-
-fn moved(at: &[f64; 4], i: usize, h: f64) -> [f64; 4] {
-    let mut moved = *at;
-    moved[i] += h;
-    moved
 }
 
 fn contact<S: Scalar>([gap, normal_speed, x, y]: [S; 4]) -> Contact<S> {
@@ -102,20 +101,21 @@ fn lifted(probe: &Probe<'_>, at: &[f64; 4], p: &[f64], parameter: Option<usize>)
     std::array::from_fn(|i| force.map(|f| f.derivative[i]))
 }
 
-/// The largest error of `exact` against central differences of `at` with `steps`, relative to the largest derivative by the same
-/// input, and to what rounding leaves of it.
-fn error(steps: &[f64], at: impl Fn(usize, f64) -> [f64; 3], exact: &[[f64; 3]; 4]) -> f64 {
-    let of_input = |(i, step): (usize, &f64)| {
-        let (plus, minus) = (at(i, *step), at(i, -step));
-        let largest = |x: &[f64; 3]| x.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
-        let scale = largest(&exact[i]).max(1e-6 * largest(&plus) / step * 1e-3);
-        let off = |k: usize| ((plus[k] - minus[k]) / (2.0 * step) - exact[i][k]).abs();
-        (0..3).map(off).fold(0.0, worst) / scale.max(f64::MIN_POSITIVE)
+/// Whether derivatives by some of the inputs, the first of `exact`, differ from differences of the force at inputs `moved` by
+/// `steps`, by more than rounding of the force may.
+fn differs(exact: &[[f64; 3]; 4], moved: impl Fn(&[f64]) -> [f64; 3], steps: &[f64]) -> bool {
+    let largest = |x: &[f64]| x.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
+    let scaled = |x: &[f64]| {
+        let change: Vec<f64> = x.iter().zip(steps).map(|(x, step)| x * step).collect();
+        moved(&change).to_vec()
     };
-    steps.iter().enumerate().map(of_input).fold(0.0, worst)
-}
-
-/// The larger, and what is no number rather than either.
-fn worst(a: f64, b: f64) -> f64 {
-    if a > b || a.is_nan() { a } else { b }
+    let at = vec![0.0; steps.len()];
+    let rounding = ROUNDING * largest(&scaled(&at));
+    let differences = finite_difference_jacobian(scaled, &at, 1.0);
+    steps.iter().zip(exact).enumerate().any(|(input, (step, exact))| {
+        let exact = exact.map(|x| x * step);
+        let bound = TOLERANCE * largest(&exact) + rounding;
+        let mut errors = exact.iter().zip(&differences).map(|(x, row)| (x - row[input]).abs());
+        errors.any(|error| error.is_nan() || error > bound)
+    })
 }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 
-use super::{Curve, Finding, GRAVITY, Probe, Verdict};
+use super::{AREA, Curve, DEPTH, Finding, GRAVITY, Probe, Verdict};
 use crate::body::RigidBody;
 use crate::contact::dynamic::DynContactLaw;
 use crate::contact::gap_smoothing::GapSmoothing;
@@ -20,13 +20,11 @@ use crate::world::body::Body;
 use crate::world::body_id::BodyId;
 use crate::world::contact_pair::ContactBodies;
 
-/// A body that does not turn, of one sample.
+/// A body that does not turn, of one sample, and rests half a millimeter deep.
 pub(super) struct Specimen<'a> {
     pub(super) law: &'a Arc<dyn DynContactLaw>,
-    /// Mass \[kg\], the depth at which it rests \[m\], and the area of its sample \[m²\].
+    /// Mass \[kg\].
     pub(super) mass: f64,
-    pub(super) depth: f64,
-    pub(super) area: f64,
 }
 
 /// The body, on a plane at whose distance the law begins.
@@ -40,7 +38,7 @@ impl Specimen<'_> {
         for speed in [0.1, 0.5, 1.0] {
             findings.push(self.restitution(speed)?);
         }
-        let friction = probe.response(self.depth, 0.0, Vector3::x() * 1e3).tangential.x.abs()
+        let friction = probe.response(DEPTH, 0.0, Vector3::x() * 1e3).tangential.x.abs()
             / (self.mass * GRAVITY);
         if friction > 0.0 {
             findings.push(Finding {
@@ -59,17 +57,12 @@ impl Specimen<'_> {
     /// Height over time of a bounce at 0.5 m/s.
     pub(super) fn bounce_curve(&self) -> Result<Curve, SimulationError> {
         let (world, start) = self.world(Vector3::zeros(), 0.0, Vector3::z() * -0.5)?;
-        let dt = 2.0 * self.duration() / 200.0;
+        let dt = 2.0 * duration() / 200.0;
         let run = world.rollout(&start, TimeSteps { dt, steps: 200 })?;
         let heights = run.iter().map(|states| states[BODY].pose.translation.z * 1e3);
         let points = heights.enumerate().map(|(i, z)| [i as f64 * dt * 1e3, z]).collect();
         let name = "bounce at 0.5 m/s, without gravity".to_owned();
         Ok(Curve { name, axes: ["ms", "height [mm]"], points })
-    }
-
-    /// Half a period of the contact that rests \[s\].
-    fn duration(&self) -> f64 {
-        std::f64::consts::PI * (self.depth / GRAVITY).sqrt()
     }
 
     /// The body above the surface, or `depth` \[m\] deep, with a velocity.
@@ -83,7 +76,7 @@ impl Specimen<'_> {
         // Nothing here turns it.
         let inertia = Matrix3::identity() * self.mass;
         let rigid = RigidBody::new(self.mass, inertia, Point3::origin()).map_err(failed)?;
-        let surface = Surface::uniform(&[Point3::origin()], self.area).map_err(failed)?;
+        let surface = Surface::uniform(&[Point3::origin()], AREA).map_err(failed)?;
         let mut world = World::new(gravity);
         let plane = HalfSpace { normal: Vector3::z_axis(), height: -self.law.reach() };
         let field = world.add(Body::kinematic("plane").with_field(Arc::new(plane)));
@@ -96,9 +89,9 @@ impl Specimen<'_> {
     }
 
     fn rest(&self) -> Result<Finding, SimulationError> {
-        let (world, start) = self.world(down(), 1.1 * self.depth, Vector3::zeros())?;
-        let end = world.simulate(&start, 40.0 * self.duration())?[BODY];
-        let off = (end.pose.translation.z + self.depth).abs() / self.depth;
+        let (world, start) = self.world(down(), 1.1 * DEPTH, Vector3::zeros())?;
+        let end = world.simulate(&start, 40.0 * duration())?[BODY];
+        let off = (end.pose.translation.z + DEPTH).abs() / DEPTH;
         Ok(Finding {
             what: "off its rest after 40 half periods, of its depth".to_owned(),
             measured: off,
@@ -113,7 +106,7 @@ impl Specimen<'_> {
 
     fn restitution(&self, speed: f64) -> Result<Finding, SimulationError> {
         let (world, start) = self.world(Vector3::zeros(), 0.0, Vector3::z() * -speed)?;
-        let restitution = world.simulate(&start, 20.0 * self.duration())?[BODY].linear.z / speed;
+        let restitution = world.simulate(&start, 20.0 * duration())?[BODY].linear.z / speed;
         Ok(Finding {
             what: format!("restitution at {speed} m/s"),
             measured: restitution,
@@ -123,7 +116,7 @@ impl Specimen<'_> {
     }
 
     fn stop(&self, friction: f64) -> Result<Finding, SimulationError> {
-        let (world, start) = self.world(down(), self.depth, Vector3::x() * SLIDE)?;
+        let (world, start) = self.world(down(), DEPTH, Vector3::x() * SLIDE)?;
         let time = 2.0 * SLIDE / (friction * GRAVITY);
         let end = world.simulate(&start, time)?[BODY].pose.translation.x;
         let expected = SLIDE * SLIDE / (2.0 * friction * GRAVITY);
@@ -140,8 +133,8 @@ impl Specimen<'_> {
     fn creep(&self, friction: f64) -> Result<Finding, SimulationError> {
         let angle = (0.5 * friction).atan();
         let gravity = Vector3::new(angle.sin(), 0.0, -angle.cos()) * GRAVITY;
-        let (world, start) = self.world(gravity, self.depth, Vector3::zeros())?;
-        let speed = world.simulate(&start, 40.0 * self.duration())?[BODY].linear.x;
+        let (world, start) = self.world(gravity, DEPTH, Vector3::zeros())?;
+        let speed = world.simulate(&start, 40.0 * duration())?[BODY].linear.x;
         Ok(Finding {
             what: "creep at half of the friction [m/s]".to_owned(),
             measured: speed,
@@ -151,7 +144,7 @@ impl Specimen<'_> {
     }
 
     fn steps(&self) -> Result<[Finding; 2], SimulationError> {
-        let (world, start) = self.world(down(), self.depth, Vector3::zeros())?;
+        let (world, start) = self.world(down(), DEPTH, Vector3::zeros())?;
         let rate = world.contact_frequency(&start);
         let note = |what: &str, measured: f64, remark: &str| Finding {
             what: what.to_owned(),
@@ -168,6 +161,11 @@ impl Specimen<'_> {
             ),
         ])
     }
+}
+
+/// Half a period of the contact that rests \[s\].
+fn duration() -> f64 {
+    std::f64::consts::PI * (DEPTH / GRAVITY).sqrt()
 }
 
 fn down() -> Vector3<f64> {

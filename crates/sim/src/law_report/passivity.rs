@@ -33,13 +33,15 @@ pub(super) fn findings(probe: &Probe<'_>, weight: f64) -> Vec<Finding> {
 /// swings by `swing` times half a millimeter about that depth.
 fn work(probe: &Probe<'_>, rate: f64, slip: f64, swing: f64) -> f64 {
     let turn = std::f64::consts::TAU * rate;
+    // A little more, so that it leaves the contact.
+    let swing = (1.0 + 1e-3) * swing;
     let dt = 1.0 / (rate * STEPS as f64);
     let power = |step: usize| {
         // By the middle of each step: exact for what is periodic.
         let (sin, cos) = (turn * dt * (step as f64 + 0.5)).sin_cos();
-        let depth = DEPTH * (1.0 - (1.0 + 1e-3) * swing * cos);
+        let depth = DEPTH * (1.0 - swing * cos);
         // Sinking in is approach: negative.
-        let normal_speed = -DEPTH * (1.0 + 1e-3) * swing * turn * sin;
+        let normal_speed = -DEPTH * swing * turn * sin;
         let velocity = Vector3::new(-sin, cos, 0.0) * (slip * turn);
         let force = probe.response(depth, normal_speed, velocity);
         force.normal * normal_speed + force.tangential.dot(&velocity)

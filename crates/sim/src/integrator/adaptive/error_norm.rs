@@ -1,5 +1,7 @@
 //! How large an error is.
 
+use std::cell::LazyCell;
+
 use nalgebra::{Vector3, Vector6};
 
 use super::Adaptive;
@@ -41,12 +43,6 @@ impl Scale {
         [position / self.length, velocity / speed, turn, spin].into_iter().fold(0.0, max_or_nan)
     }
 
-    /// The speed at which `state` moves, its rotation with it \[m/s\].
-    fn speed_of(&self, state: &State<Probe>) -> f64 {
-        let norm = |v: &Vector3<Probe>| v.map(|x| x.value).norm();
-        norm(&state.linear) + self.length * norm(&state.angular)
-    }
-
     /// The largest component of the sensitivity of `state`.
     fn sensitivity(&self, state: &State<Probe>, speed: f64) -> f64 {
         let tangent = state.tangent().map(|x| x.derivative[0]);
@@ -65,7 +61,7 @@ fn max_or_nan(a: f64, b: f64) -> f64 {
 impl ErrorNorm {
     /// Of a step that starts at `states`.
     pub(super) fn new(settings: &Adaptive, world: &World, states: &[State]) -> Self {
-        let wrenches = world.wrenches(states, 0);
+        let wrenches = LazyCell::new(|| world.wrenches(states, 0));
         let scale = |body: BodyId| {
             let rigid = world.bodies[body].rigid()?;
             let length = rigid.gyration_radius();
@@ -108,7 +104,8 @@ impl ErrorNorm {
         let fastest = speeds.fold(0.0, f64::max);
         for ((body, scale), change) in self.scales.iter().zip(&trial.error) {
             let (start, end) = (&states[*body], &trial.end()[*body]);
-            let own = max_or_nan(scale.speed_of(start), scale.speed_of(end));
+            let own = [start, end].map(|state| state.value().speed_within(scale.length));
+            let own = max_or_nan(own[0], own[1]);
             let speed = scale.speed + own + SLOW * fastest;
             let norms = |part: fn(Probe) -> f64| change.each_ref().map(|v| v.map(part).norm());
             error = max_or_nan(error, scale.largest(norms(|x| x.value), speed));

@@ -4,7 +4,8 @@ use nalgebra::Vector6;
 use prehend_autodiff::{Fwd, Scalar};
 
 use super::error_norm::ErrorNorm;
-use super::{Adaptive, probe, touch_time, travel};
+use super::travel::Travel;
+use super::{Adaptive, probe, touch_time};
 use crate::error::SimulationError;
 use crate::integrator::runge_kutta::dormand_prince;
 use crate::state::State;
@@ -54,6 +55,7 @@ pub(super) struct Planner {
     plain: World,
     whole: Step,
     norm: ErrorNorm,
+    travel: Travel,
     states: Vec<State<Probe>>,
     wrenches: Vec<Vector6<Probe>>,
     /// Parts taken, and the time that they have led to \[s\].
@@ -80,6 +82,7 @@ impl Planner {
         let dt = norm.first_step(&plain, &wrenches).min(whole.dt);
         Self {
             settings: *settings,
+            travel: Travel::new(&plain),
             world: lifted,
             plain,
             whole,
@@ -110,7 +113,7 @@ impl Planner {
         }
         let values: Vec<State> = self.states().collect();
         let before_kink = self.kink.as_ref().map_or(f64::INFINITY, |kink| kink.next(self.time));
-        self.dt = travel::longest(&self.plain, &values, self.dt.min(left).min(before_kink));
+        self.dt = self.travel.longest(&self.plain, &values, self.dt.min(left).min(before_kink));
         let (mut attempt, mut touches) = (0, TOUCH_ATTEMPTS);
         loop {
             // A last part that is next to nothing would be lost in rounding.
@@ -119,7 +122,7 @@ impl Planner {
             let index = if self.parts == 0 { self.whole.index } else { self.whole.index.max(1) };
             let part = Step { index, start: self.time, dt };
             let mut trial = dormand_prince::step(&self.world, &self.states, &self.wrenches, part);
-            if travel::passes_over(&self.plain, &values, &trial.stages, dt) {
+            if self.travel.passes_over(&self.plain, &values, &trial.stages, dt) {
                 self.dt = 0.5 * dt;
                 continue;
             }

@@ -5,6 +5,7 @@ use prehend_geometry::FieldSample;
 use crate::contact::gap_smoothing::GapSmoothing;
 use crate::contact::patch::Patch;
 use crate::state::State;
+use crate::surface::SurfacePoint;
 use crate::world::World;
 use crate::world::contact_pair::ContactPair;
 
@@ -30,17 +31,14 @@ fn first_of(
     dt: f64,
     earliest: f64,
 ) -> Option<f64> {
-    let (body, other) = (&world.bodies[pair.bodies.samples], &world.bodies[pair.bodies.field]);
-    let (surface, field) = (body.surface.as_ref()?, other.field.as_ref()?);
-    let com = body.com();
     let seen = ends.map(|states| world.seen_value(pair, states));
-    let moved =
-        seen.each_ref().map(|s| s.linear.norm() + surface.radius_about(&com) * s.angular.norm());
-    let (reach, margin) = (pair.law().reach(), dt * moved[0].max(moved[1]));
-    let smoothing = pair.smoothing;
-    let patch = Patch { surface, com, state: seen[0], field: field.as_ref(), smoothing };
-    let near = patch.near(reach, margin);
-    let time = |point: &crate::surface::SurfacePoint| {
+    let patch = world.patch(pair, seen[0])?;
+    let Patch { surface, com, field, .. } = patch;
+    let radius = surface.radius_about(&com);
+    let [before, after] = seen.each_ref().map(|state| state.speed_within(radius));
+    let reach = pair.law().reach();
+    let near = patch.near(reach, dt * before.max(after));
+    let time = |point: &SurfacePoint| {
         let [from, to] = seen.map(|state| {
             let arm = state.pose.rotation * (point.position - com);
             let place = (state.pose.translation.vector + arm).into();
