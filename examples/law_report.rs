@@ -40,11 +40,8 @@ fn main() -> anyhow::Result<()> {
 /// Parameters of a law by their names, for the target.
 fn usual(registry: &LawRegistry, name: &str) -> Vec<f64> {
     let parameters = registry.entry(name).map(|entry| entry.parameters.as_slice());
-    let exponent = if matches!(name, "hertz" | "hunt_crossley" | "hunt_crossley_stribeck") {
-        1.5
-    } else {
-        1.0
-    };
+    let hertzian = name.starts_with("hertz") || name.starts_with("hunt_crossley");
+    let exponent = if hertzian { 1.5 } else { 1.0 };
     let usual = |parameter: &str, unit: &str| match parameter {
         // Per area, or of the whole contact.
         "stiffness" if unit == "N/m" => TARGET.stiffness(1.0) * TARGET.contact_area,
@@ -56,6 +53,7 @@ fn usual(registry: &LawRegistry, name: &str) -> Vec<f64> {
         "kinetic_friction" => 0.3,
         "stribeck_speed" => 0.05,
         "slip_scale" => 1e-2,
+        "deflection" => 1e-4,
         "gain" => 1e2,
         "direction_x" | "anisotropy" => 1.0,
         _ => 0.0,

@@ -100,11 +100,18 @@ impl<'a> Projected<'a> {
         camera: &Camera,
         margin: f32,
     ) -> Self {
-        let each = faces.par_iter().with_min_len(TASK).enumerate();
-        let (facing, region) = rayon::join(
-            || each.map(|(i, f)| facing(&screen, f, closed(i))).collect(),
-            || region(&screen, camera, margin),
-        );
+        // A plain loop in each task: a closure for each face, which rayon does not inline, is a tenth of the work.
+        let facings = || {
+            let mut facings = vec![0; faces.len()];
+            let tasks = facings.par_chunks_mut(TASK).zip(faces.par_chunks(TASK)).enumerate();
+            tasks.for_each(|(task, (facings, faces))| {
+                for ((index, out), face) in (TASK * task..).zip(facings).zip(faces) {
+                    *out = facing(&screen, face, closed(index));
+                }
+            });
+            facings
+        };
+        let (facing, region) = rayon::join(facings, || region(&screen, camera, margin));
         Self { faces, edges, screen, facing, region }
     }
 
@@ -122,8 +129,9 @@ pub(crate) fn signed_area([a, b, c]: &[[f32; 3]; 3]) -> f32 {
     (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 }
 
-fn facing(screen: &[[f32; 3]], face: &[u32; 3], closed: bool) -> i8 {
-    let corners @ [a, b, c] = face.map(|v| screen[v as usize]);
+#[inline(always)]
+fn facing(screen: &[[f32; 3]], &[a, b, c]: &[u32; 3], closed: bool) -> i8 {
+    let corners @ [a, b, c] = [screen[a as usize], screen[b as usize], screen[c as usize]];
     let drawn = (a[2] != 0.0) & (b[2] != 0.0) & (c[2] != 0.0);
     let area = signed_area(&corners);
     let sign = i8::from(area < 0.0) - i8::from((area > 0.0) & !closed);

@@ -117,11 +117,11 @@ impl<I: Integrator + Send + 'static> Integrator for StepCheckpointed<I> {
         let function = OneStep { scene: Arc::clone(&self.scene), places, step };
         let after = S::recompute(function, &x)?;
         let mut after = states_of(&after);
-        let next = |(body, state): (&Body<S>, &State<S>)| match body.motion {
-            Motion::Free(_) => after.next().unwrap_or(*state),
-            Motion::Kinematic | Motion::Driven(_) => *state,
+        let next = |(index, state): (usize, &State<S>)| match world.moves_by_forces(index) {
+            true => after.next().unwrap_or(*state),
+            false => *state,
         };
-        Ok(world.bodies.iter().zip(states).map(next).collect())
+        Ok(states.iter().enumerate().map(next).collect())
     }
 
     fn check_differentiable<S: Scalar>(&self, world: &World<S>) -> Result<(), SimulationError> {
@@ -137,7 +137,8 @@ impl<I: Integrator + Send + 'static> Integrator for StepCheckpointed<I> {
     }
 }
 
-/// One step as a function of the states' coordinates and of the world's parameters at `places`, to the states of free bodies.
+/// One step as a function of the states' coordinates and of the world's parameters at `places`, to the states of free bodies and of
+/// contacts that stick.
 struct OneStep<I> {
     scene: Arc<Scene<I>>,
     places: Box<[u32]>,
@@ -148,12 +149,12 @@ impl<I: Integrator + Send + 'static> Recompute for OneStep<I> {
     type Error = SimulationError;
 
     fn evaluate<S: Scalar>(&self, x: &[S]) -> Result<Vec<S>, SimulationError> {
-        let (states, values) = x.split_at(STATE * self.scene.world.bodies.len());
+        let (states, values) = x.split_at(STATE * self.scene.world.state_count());
         let world = self.scene.world(&self.places, values)?;
         let states: Vec<State<S>> = states_of(states).collect();
         let next = self.scene.integrator.step(&world, &states, self.step)?;
-        let free = world.bodies.iter().zip(next).filter(|(body, _)| body.rigid().is_some());
-        Ok(free.flat_map(|(_, state)| state.coordinates()).collect())
+        let moved = next.into_iter().enumerate().filter(|(index, _)| world.moves_by_forces(*index));
+        Ok(moved.flat_map(|(_, state)| state.coordinates()).collect())
     }
 }
 

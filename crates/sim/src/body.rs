@@ -34,6 +34,9 @@ pub enum BodyError {
         /// Number of areas.
         areas: usize,
     },
+    /// A length of a box is not positive and finite.
+    #[error("lengths of a box must be positive and finite, one is {0} m")]
+    Length(f64),
     /// The radius of rounded samples is negative or not finite.
     #[error("radius of surface points must be zero or positive and finite, is {0} m")]
     Rounding(f64),

@@ -1,5 +1,7 @@
 //! Penalty contact between surface samples of a body and a signed distance field.
 
+pub(crate) mod bristle_law;
+pub mod bristles;
 pub mod composite;
 pub mod dynamic;
 pub mod error;

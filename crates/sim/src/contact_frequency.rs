@@ -74,8 +74,12 @@ impl World {
         if size == 0 {
             return 0.0;
         }
-        let (stiffness, damping) = (largest(stiffness).sqrt(), largest(damping));
-        if stiffness.is_nan() { stiffness } else { damping.max(stiffness) }
+        let (stiffness, damping) = (largest(stiffness), largest(damping));
+        // Bristles are springs behind the damping of friction.
+        let bristles = self.sticking().map(|(_, bristles)| bristles.fastest()).fold(0.0, f64::max);
+        let fastest = if damping > 0.0 { damping.max(bristles) } else { damping };
+        let frequency = (stiffness + damping * bristles).sqrt();
+        if frequency.is_nan() { frequency } else { fastest.max(frequency) }
     }
 
     /// The root of the inverse mass matrix of a free body.

@@ -16,7 +16,14 @@ impl<S: Scalar> World<S> {
         next: &[State<S>],
         time: f64,
     ) -> SimulationError {
-        let body = BodyId(next.iter().position(|state| !state.is_finite()).unwrap_or_default());
+        let failed = next.iter().position(|state| !state.is_finite()).unwrap_or_default();
+        let body = match failed.checked_sub(self.bodies.len()) {
+            Some(deflection) => {
+                self.sticking().nth(deflection).map(|(pair, _)| pair.bodies.samples)
+            }
+            None => Some(BodyId(failed)),
+        };
+        let body = body.unwrap_or(BodyId(0));
         let (body, contact) = self.names(states, body);
         SimulationError::NotFinite { body, contact, time }
     }
@@ -51,8 +58,12 @@ impl<S: Scalar> World<S> {
 
     /// The force of a contact \[N\], infinite if it is no number.
     fn load(&self, pair: &ContactPair<S>, states: &[State<S>]) -> f64 {
-        let [on_samples, _] = self.contact_wrenches(pair, states, 1);
-        let force = on_samples.fixed_rows::<3>(0).map(|x| x.value()).norm();
+        let force = self
+            .effect(pair, states, None, 1)
+            .on_samples
+            .fixed_rows::<3>(0)
+            .map(|x| x.value())
+            .norm();
         if force.is_nan() { f64::INFINITY } else { force }
     }
 

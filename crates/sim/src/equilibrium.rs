@@ -49,7 +49,7 @@ impl World {
         reach: f64,
     ) -> Result<Equilibrium, SimulationError> {
         let bodies = self.bodies.len();
-        if states.len() != bodies {
+        if states.len() != bodies && states.len() != self.state_count() {
             return Err(SimulationError::States { states: states.len(), bodies });
         }
         let found = self.body(body)?;

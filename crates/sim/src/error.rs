@@ -183,5 +183,5 @@ pub enum SimulationError {
 }
 
 fn touching(contact: &Option<String>) -> String {
-    contact.as_ref().map(|name| format!(", touching '{name}',")).unwrap_or_default()
+    contact.as_ref().map(|name| format!(" (touching '{name}')")).unwrap_or_default()
 }

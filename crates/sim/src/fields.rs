@@ -66,6 +66,37 @@ impl DistanceField for SphereCavity {
     }
 }
 
+/// A box around the origin, along the axes, with round edges. It is C¹ outside and to the depth of its rounding.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cuboid {
+    /// Half of its edges, rounding included \[m\].
+    pub half_extents: Vector3<f64>,
+    /// Radius of its edges \[m\]: more than the depth to which anything presses.
+    pub rounding: f64,
+}
+
+impl DistanceField for Cuboid {
+    fn sample(&self, point: &Point3<f64>, reach: f64) -> Option<FieldSample> {
+        // From the box without its round shell.
+        let beyond = point.coords.abs() - self.half_extents.add_scalar(-self.rounding);
+        let outside = beyond.sup(&Vector3::zeros());
+        let (length, (nearest, depth)) = (outside.norm(), beyond.argmax());
+        let distance = if depth > 0.0 { length } else { depth } - self.rounding;
+        if distance > reach {
+            return None;
+        }
+        let sign = point.coords.map(f64::signum);
+        let (gradient, hessian) = if depth > 0.0 {
+            let gradient = outside.component_mul(&sign) / length;
+            let curved = Matrix3::from_diagonal(&beyond.map(|x| if x > 0.0 { 1.0 } else { 0.0 }));
+            (gradient, (curved - gradient * gradient.transpose()) / length)
+        } else {
+            (Vector3::ith(nearest, sign[nearest]), Matrix3::zeros())
+        };
+        Some(FieldSample { distance, gradient, hessian })
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use prehend_autodiff::check::{compare_gradients, finite_difference_jacobian};
@@ -76,7 +107,13 @@ mod tests {
     fn derivatives_match_differences() {
         let (center, radius) = (Point3::new(0.1, -0.2, 0.3), 0.7);
         let normal = Unit::new_normalize(Vector3::new(1.0, 2.0, -0.5));
-        let fields: [&dyn DistanceField; 3] = [
+        let cuboid = |x, y, z| Cuboid { half_extents: Vector3::new(x, y, z), rounding: 0.1 };
+        let fields: [&dyn DistanceField; 7] = [
+            // Nearest to a corner, an edge, a face, and inside of the shell.
+            &cuboid(0.2, 0.3, 0.2),
+            &cuboid(0.2, 0.7, 0.2),
+            &cuboid(0.7, 0.3, 0.7),
+            &cuboid(0.7, 0.55, 0.7),
             &HalfSpace { normal, height: 0.4 },
             &Sphere { center, radius },
             &SphereCavity { center, radius },

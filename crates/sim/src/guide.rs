@@ -73,6 +73,36 @@
 //! # }
 //! ```
 //!
+//! # Contacts that hold
+//! Friction that knows only the slip of the moment lets everything creep, slowly, at a part of its slip scale. What has to stay
+//! for seconds, such as a stack or an object in a gripper, wants friction with springs ([`Sticking`](crate::Sticking)). Samples
+//! of flat faces should be a lattice ([`Surface::cuboid`](crate::Surface::cuboid)), those of a ball a single round one
+//! ([`Surface::rounded`](crate::Surface::rounded)).
+//!
+//! ```
+//! # use std::sync::Arc;
+//! # use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
+//! # use prehend_sim::*;
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # let mut world = World::new(Vector3::new(2.0, 0.0, -9.6));
+//! # let floor = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
+//! let rigid = RigidBody::new(0.2, Matrix3::identity() * 5e-5, Point3::origin())?;
+//! let surface = Surface::cuboid([0.02; 3], 0.01)?;
+//! let block = world.add(Body::free("block", rigid).with_surface(surface));
+//! let normal = KelvinVoigt { stiffness: 1e7, damping: 1e5 };
+//! let friction = Sticking { friction: Coulomb { friction: 0.5, slip_scale: 1e-2 }, deflection: 1e-4 };
+//! let law = Arc::new(Law::new(normal, friction)?);
+//! let bodies = ContactBodies { samples: block, field: floor };
+//! world.add_contact(bodies, law, GapSmoothing::Softplus { width: 5e-5 })?;
+//! // Downhill, but not beyond friction.
+//! let start = [State::at_rest(Isometry3::identity()), rigid.at_rest(&Isometry3::translation(0.0, 0.0, 0.02))];
+//! let run = world.rollout(&start, TimeSteps { dt: 1.0, steps: 3 })?;
+//! let place = |second: usize| run[second][block].pose.translation.x;
+//! assert!((place(3) - place(1)).abs() < 1e-8);
+//! # Ok(())
+//! # }
+//! ```
+//!
 //! # Symmetric contact
 //! Two bodies that both have samples and fields touch both ways, each with half of the force: corners of either are
 //! felt. Each direction's law sees the axes of its own field's body.

@@ -23,6 +23,9 @@ pub struct Simulation<T> {
 impl<S: Scalar> World<S> {
     /// The states of all bodies after `time` \[s\], from `initial`; driven bodies start where their trajectory does.
     ///
+    /// After them come the deflections of contacts that stick ([`Bristles`](crate::Bristles)), if there are such. What goes on
+    /// from there remembers them; with the states of the bodies alone it starts without deflection.
+    ///
     /// Steps are chosen and checked on the way, see [`Adaptive`]. Over `f64` this simulates; over
     /// [`Fwd`](prehend_autodiff::Fwd) it carries sensitivities to few inputs, over [`Var`](prehend_autodiff::Var) it records
     /// what the adjoint needs.
@@ -186,8 +189,9 @@ impl<S: Scalar> World<S> {
         states: &[State<S>],
         step: Step,
     ) -> Result<Vec<State<S>>, SimulationError> {
-        self.check(states, step.dt)?;
-        self.advance(integrator, states, step)
+        let states = self.with_deflections(states);
+        self.check(&states, step.dt)?;
+        self.advance(integrator, &states, step)
     }
 
     /// [`World::step`] of what has been checked.
@@ -214,8 +218,8 @@ impl<S: Scalar> World<S> {
         initial: &[State<S>],
         dt: f64,
     ) -> Result<Vec<State<S>>, SimulationError> {
-        self.check(initial, dt)?;
-        let mut states = initial.to_vec();
+        let mut states = self.with_deflections(initial);
+        self.check(&states, dt)?;
         self.drive(&mut states, 0.0);
         Ok(states)
     }
@@ -226,7 +230,7 @@ impl<S: Scalar> World<S> {
             return Err(SimulationError::TimeStep(dt));
         }
         let bodies = self.bodies.len();
-        if states.len() != bodies {
+        if states.len() != self.state_count() {
             return Err(SimulationError::States { states: states.len(), bodies });
         }
         for pair in &self.contacts {

@@ -7,7 +7,7 @@ use prehend_geometry::DistanceField;
 
 use crate::{
     Body, ContactBodies, Coulomb, DynContactLaw, GapSmoothing, HalfSpace, KelvinVoigt, Law,
-    RigidBody, SphereCavity, State, Surface, World,
+    RigidBody, SphereCavity, State, Sticking, Surface, World,
 };
 
 /// Kelvin and Voigt's normal law with Coulomb friction, the law of most tests.
@@ -18,6 +18,18 @@ pub(crate) fn penalty(
     slip_scale: f64,
 ) -> Law<KelvinVoigt, Coulomb> {
     Law::new(KelvinVoigt { stiffness, damping }, Coulomb { friction, slip_scale }).unwrap()
+}
+
+/// [`penalty`] with friction that holds.
+pub(crate) fn sticking(
+    stiffness: f64,
+    damping: f64,
+    friction: f64,
+    slip_scale: f64,
+) -> Law<KelvinVoigt, Sticking<Coulomb>> {
+    let friction = Coulomb { friction, slip_scale };
+    let normal = KelvinVoigt { stiffness, damping };
+    Law::new(normal, Sticking { friction, deflection: 1e-3 }).unwrap()
 }
 
 /// The half-space z < 0.

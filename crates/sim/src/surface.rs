@@ -87,6 +87,37 @@ impl Surface {
         Self::new(points, &vec![area / points.len().max(1) as f64; points.len()])
     }
 
+    /// A lattice on the faces of a box around the origin with edges along the axes, `half_extents` \[m\] from it: corners,
+    /// edges, and between them as many equal distances as `spacing` \[m\] allows. Areas are those of the trapezoid rule, so that
+    /// faces are exact in the mean.
+    ///
+    /// # Errors
+    /// If a length is not positive and finite.
+    pub fn cuboid(half_extents: [f64; 3], spacing: f64) -> Result<Self, BodyError> {
+        let lengths = half_extents.iter().chain([&spacing]);
+        if let Some(&length) = lengths.into_iter().find(|x| !(**x > 0.0 && x.is_finite())) {
+            return Err(BodyError::Length(length));
+        }
+        let parts = half_extents.map(|half| (2.0 * half / spacing).ceil() as usize);
+        let step = [0, 1, 2].map(|i| 2.0 * half_extents[i] / parts[i] as f64);
+        let (mut points, mut areas) = (Vec::new(), Vec::new());
+        let [nx, ny, nz] = parts;
+        let plane = |x: usize| (0..=ny).flat_map(move |y| (0..=nz).map(move |z| [x, y, z]));
+        for at in (0..=nx).flat_map(plane) {
+            let on_face = [0, 1, 2].map(|i| at[i] == 0 || at[i] == parts[i]);
+            // A face ends in half a step.
+            let share = |i: usize| if on_face[i] { 0.5 * step[i] } else { step[i] };
+            let faces = (0..3).filter(|i| on_face[*i]);
+            let area: f64 = faces.map(|i| share((i + 1) % 3) * share((i + 2) % 3)).sum();
+            if area > 0.0 {
+                let place = |i: usize| at[i] as f64 * step[i] - half_extents[i];
+                points.push(Point3::new(place(0), place(1), place(2)));
+                areas.push(area);
+            }
+        }
+        Self::new(&points, &areas)
+    }
+
     /// The samples, block after block.
     pub fn points(&self) -> &[SurfacePoint] {
         &self.points
@@ -159,6 +190,23 @@ mod tests {
     use super::*;
     use crate::scenes::{floor, on_ground, penalty};
     use crate::{Body, BodyId, GapSmoothing, RigidBody, State};
+
+    #[test]
+    fn a_lattice_has_the_moments_of_its_box() {
+        let (half, corner) = ([0.03, 0.02, 0.01], Point3::new(0.03, -0.02, 0.01));
+        let surface = Surface::cuboid(half, 0.011).unwrap();
+        let areas = [half[1] * half[2], half[0] * half[2], half[0] * half[1]];
+        assert!((surface.area() - 8.0 * areas.iter().sum::<f64>()).abs() < 1e-15);
+        let at_corner = |p: &&SurfacePoint| (p.position - corner).norm() < 1e-12;
+        assert_eq!(surface.points().iter().filter(at_corner).count(), 1);
+        let mean = |axis: usize| -> f64 {
+            surface.points().iter().map(|p| p.area * p.position[axis]).sum()
+        };
+        assert!((0..3).all(|axis| mean(axis).abs() < 1e-15));
+        // 6 × 4 × 2 cells: all lattice points but those inside.
+        assert_eq!(surface.points().len(), 7 * 5 * 3 - 5 * 3);
+        assert_eq!(Surface::cuboid(half, 0.0).unwrap_err(), BodyError::Length(0.0));
+    }
 
     #[test]
     fn blocks_hold_every_sample_once_and_in_their_ball() {

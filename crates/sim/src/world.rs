@@ -3,13 +3,15 @@
 pub(crate) mod body;
 pub(crate) mod body_id;
 pub(crate) mod contact_pair;
+pub(crate) mod deflection;
 
 use std::fmt;
 use std::sync::Arc;
 
 use nalgebra::{Vector3, Vector6};
-use prehend_autodiff::Scalar;
+use prehend_autodiff::{Fwd, Scalar};
 
+use crate::contact::bristles::{BristleFunction, Bristles, bristle_response};
 use crate::contact::dynamic::DynContactLaw;
 use crate::contact::gap_smoothing::GapSmoothing;
 use crate::contact::patch::Patch;
@@ -32,6 +34,22 @@ pub struct World<S: Scalar = f64> {
     pub contacts: Vec<ContactPair<S>>,
     /// Gravity, world frame \[m/s²\].
     pub gravity: Vector3<S>,
+}
+
+/// What a contact does.
+pub(crate) struct Effect<S: Scalar> {
+    /// Wrench on the body with the samples and on that with the field, each about its own center of mass.
+    pub(crate) on_samples: Vector6<S>,
+    pub(crate) on_field: Vector6<S>,
+    /// Rate of the deflection of a contact that sticks, along the axes of the field \[m/s\], \[rad/s\].
+    pub(crate) rate: Vector6<S>,
+}
+
+impl<S: Scalar> Default for Effect<S> {
+    fn default() -> Self {
+        let zero = Vector6::zeros();
+        Self { on_samples: zero, on_field: zero, rate: zero }
+    }
 }
 
 impl World {
@@ -141,7 +159,8 @@ impl<S: Scalar> World<S> {
     }
 
     /// External and contact wrenches on every body at `states` (force \[N\], torque about the center of mass \[N m\],
-    /// world frame), without gravity. `step` matters to leaks in the first step only.
+    /// world frame), without gravity; then the rate of the deflection (\[m/s\], \[rad/s\]) of every contact that sticks.
+    /// `step` matters to leaks in the first step only.
     ///
     /// Derivatives through contacts are first derivatives.
     ///
@@ -151,30 +170,44 @@ impl<S: Scalar> World<S> {
         let mut wrenches: Vec<Vector6<S>> =
             self.bodies.iter().map(|body| body.external_wrench).collect();
         for pair in &self.contacts {
-            let [on_samples, on_field] = self.contact_wrenches(pair, states, step);
+            let bristles = pair.law().bristles();
+            let deflection = bristles.and_then(|_| states.get(wrenches.len()));
+            let Effect { on_samples, on_field, rate } = self.effect(pair, states, deflection, step);
             wrenches[pair.bodies.samples] += on_samples;
             wrenches[pair.bodies.field] += on_field;
+            if bristles.is_some() {
+                wrenches.push(rate);
+            }
         }
         wrenches
     }
 
-    /// Wrenches of `pair` on the body with the samples and on that with the field, each about its own center of mass.
-    pub fn contact_wrenches(
+    /// What `pair` does with its `deflection`, if it sticks and has one.
+    pub(crate) fn effect(
         &self,
         pair: &ContactPair<S>,
         states: &[State<S>],
+        deflection: Option<&State<S>>,
         step: usize,
-    ) -> [Vector6<S>; 2] {
+    ) -> Effect<S> {
         let seen = self.seen(pair, states);
-        let Some(patch) = self.patch(pair, seen.value()) else { return [Vector6::zeros(); 2] };
+        let Some(patch) = self.patch(pair, seen.value()) else { return Effect::default() };
         let patch = Patch { smoothing: pair.smoothing.at_step(step), ..patch };
-        let [fx, fy, fz, tx, ty, tz] = local_wrench(pair, &seen, &patch);
+        let ([fx, fy, fz, tx, ty, tz], rate) = match pair.law().bristles() {
+            None => (local_wrench(pair, &seen, &patch), Vector6::zeros()),
+            Some(bristles) => {
+                let deflection = deflection.map_or_else(Vector6::zeros, State::deflection);
+                local_bristles(pair, &seen, &patch, bristles, deflection)
+            }
+        };
         let (state, base) = (&states[pair.bodies.samples], &states[pair.bodies.field]);
         let rotation = base.pose.rotation;
         let force = rotation * Vector3::new(fx, fy, fz).map(|x| x.times(pair.weight));
         let torque = rotation * Vector3::new(tx, ty, tz).map(|x| x.times(pair.weight));
         let offset = state.pose.translation.vector - base.pose.translation.vector;
-        [stack(&force, &torque), stack(&-force, &-(torque + offset.cross(&force)))]
+        let (on_samples, on_field) =
+            (stack(&force, &torque), stack(&-force, &-(torque + offset.cross(&force))));
+        Effect { on_samples, on_field, rate }
     }
 
     /// The samples of `pair` beside its field, which sees their body in `state`, if there are both.
@@ -235,6 +268,47 @@ fn local_wrench<S: Scalar>(pair: &ContactPair<S>, seen: &State<S>, patch: &Patch
         }
     }
     wrench
+}
+
+/// [`local_wrench`] of a contact that sticks, and the rate of its deflection.
+fn local_bristles<S: Scalar>(
+    pair: &ContactPair<S>,
+    seen: &State<S>,
+    patch: &Patch<'_>,
+    bristles: Bristles,
+    deflection: Vector6<S>,
+) -> ([S; 6], Vector6<S>) {
+    const { assert!(S::ORDER <= 1, "contacts have first derivatives only: no nested scalars") };
+    let law = pair.law().as_ref();
+    let values: Vec<f64> = pair.params().iter().map(|p| p.value()).collect();
+    let at = deflection.map(|x| x.value());
+    let split = |all: [S; 12]| -> ([S; 6], Vector6<S>) {
+        (std::array::from_fn(|i| all[i]), Vector6::from_fn(|i, _| all[6 + i]))
+    };
+    let function = BristleFunction { law, p: &values, patch, bristles, deflection: at };
+    let tangent = seen.tangent();
+    let change = |i: usize| if i < 12 { tangent[i] } else { deflection[i - 12].plus(-at[i - 12]) };
+    let mut all = S::local(&function, std::array::from_fn(change));
+    // Zeros that carry the parameters' derivatives.
+    let moved: Vec<S> = pair.params().iter().map(|p| p.plus(-p.value())).collect();
+    for (from, moved) in moved.chunks(6).enumerate().map(|(i, moved)| (6 * i, moved)) {
+        if moved.iter().all(|p| p.is_constant_zero()) {
+            continue;
+        }
+        let seeded = |(i, &p): (usize, &f64)| match i.checked_sub(from) {
+            Some(lane) if lane < 6 => Fwd::<6>::variable(p, lane),
+            _ => Fwd::constant(p),
+        };
+        let p: Vec<Fwd<6>> = values.iter().enumerate().map(seeded).collect();
+        let (still, at) = ([Fwd::constant(0.0); 12], at.map(Fwd::constant));
+        let slopes = bristle_response(law, &p, patch, bristles, &still, &at);
+        for (component, slope) in all.iter_mut().zip(slopes) {
+            for (moved, slope) in moved.iter().zip(slope.derivative) {
+                *component += moved.times(slope);
+            }
+        }
+    }
+    split(all)
 }
 
 impl<S: Scalar> fmt::Debug for World<S> {

@@ -1,6 +1,6 @@
 //! The outline of a posed mesh: silhouette edges that separate it from the background.
 
-use crate::model::NONE;
+use crate::model::{Edge, NONE};
 use crate::projected::{Projected, Region};
 
 /// Longest piece of an edge that is judged as a whole \[px\].
@@ -73,12 +73,7 @@ pub(crate) struct Silhouette {
 pub(crate) fn outline(projected: &Projected, region: &Region, margin: f32) -> Silhouette {
     let mut segments = Vec::new();
     let mut candidates = Vec::new();
-    for edge in projected.edges {
-        let own = projected.facing[edge.face as usize];
-        let other = if edge.other == NONE { 0 } else { projected.facing[edge.other as usize] };
-        if own == other {
-            continue;
-        }
+    for (edge, own, other) in silhouette_edges(projected) {
         let screen = edge.vertices.map(|v| projected.screen[v as usize]);
         // A drawn face has all its corners in front of the camera.
         let (a, b) = ([screen[0][0], screen[0][1]], [screen[1][0], screen[1][1]]);
@@ -115,6 +110,18 @@ pub(crate) fn outline(projected: &Projected, region: &Region, margin: f32) -> Si
         }
     }
     silhouette
+}
+
+/// The edges between faces that do not both face the same way, with how the one and the other do: a loop of its own, short enough
+/// to stay in registers.
+fn silhouette_edges<'a>(projected: &Projected<'a>) -> Vec<(&'a Edge, i8, i8)> {
+    let facing = projected.facing.as_slice();
+    let faced = |edge: &'a Edge| {
+        let own = facing[edge.face as usize];
+        let other = if edge.other == NONE { 0 } else { facing[edge.other as usize] };
+        (own != other).then_some((edge, own, other))
+    };
+    projected.edges.iter().filter_map(faced).collect()
 }
 
 /// The share of an edge within `margin` of `region`.

@@ -2,6 +2,7 @@
 
 use prehend_autodiff::Scalar;
 
+use super::bristles::Bristles;
 use super::error::LawError;
 use super::friction::FrictionLaw;
 use super::law::ContactLaw;
@@ -63,6 +64,10 @@ impl<N: NormalLaw, F: FrictionLaw> ContactLaw for Law<N, F> {
     #[inline]
     fn reach(&self) -> f64 {
         self.normal.reach()
+    }
+
+    fn bristles(&self) -> Option<Bristles> {
+        self.friction.bristles()
     }
 
     fn check(&self, p: &[f64]) -> Result<(), LawError> {

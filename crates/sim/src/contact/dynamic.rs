@@ -3,6 +3,7 @@
 use nalgebra::Vector6;
 use prehend_autodiff::Fwd;
 
+use super::bristles::Bristles;
 use super::error::LawError;
 use super::law::ContactLaw;
 use super::patch::Patch;
@@ -22,6 +23,9 @@ pub trait DynContactLaw: Send + Sync + sealed::Sealed {
 
     /// See [`ContactLaw::reach`] \[m\].
     fn reach(&self) -> f64;
+
+    /// See [`ContactLaw::bristles`].
+    fn bristles(&self) -> Option<Bristles>;
 
     /// See [`ContactLaw::check`].
     ///
@@ -52,6 +56,11 @@ impl<L: ContactLaw> DynContactLaw for L {
     #[inline]
     fn reach(&self) -> f64 {
         ContactLaw::reach(self)
+    }
+
+    #[inline]
+    fn bristles(&self) -> Option<Bristles> {
+        ContactLaw::bristles(self)
     }
 
     fn check(&self, p: &[f64]) -> Result<(), LawError> {

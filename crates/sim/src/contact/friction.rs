@@ -2,11 +2,13 @@
 
 pub mod anisotropic;
 pub mod coulomb;
+pub mod sticking;
 pub mod stribeck;
 
 use nalgebra::Vector3;
 use prehend_autodiff::Scalar;
 
+use super::bristles::Bristles;
 use super::parameters::Parameters;
 use super::point::Contact;
 
@@ -19,6 +21,11 @@ pub trait FrictionLaw: Parameters {
         normal_force: S,
         contact: &Contact<S>,
     ) -> Vector3<S>;
+
+    /// See [`ContactLaw::bristles`](super::law::ContactLaw::bristles).
+    fn bristles(&self) -> Option<Bristles> {
+        None
+    }
 }
 
 /// A friction coefficient that may depend on the slip speed, regularized by √(|u|² + v_s²) for slip u and slip scale v_s.

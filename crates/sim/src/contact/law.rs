@@ -2,6 +2,7 @@
 
 use prehend_autodiff::Scalar;
 
+use super::bristles::Bristles;
 use super::error::LawError;
 use super::point::{Contact, Response};
 
@@ -48,6 +49,12 @@ pub trait ContactLaw: Send + Sync {
 
     /// Beyond this gap value and derivative are zero \[m\].
     fn reach(&self) -> f64;
+
+    /// Tangential springs that make contacts hold; none, and friction knows nothing of what was. With them, `slip` is that of
+    /// the contact and of its springs.
+    fn bristles(&self) -> Option<Bristles> {
+        None
+    }
 
     /// Checks that `p`, finite numbers as many as [`params`](Self::params), are in their ranges.
     ///

@@ -8,6 +8,7 @@ use super::error::LawError;
 use super::friction::FrictionLaw;
 use super::friction::anisotropic::AnisotropicFriction;
 use super::friction::coulomb::Coulomb;
+use super::friction::sticking::Sticking;
 use super::friction::stribeck::Stribeck;
 use super::graspd::{GraspD, GraspDParameters};
 use super::normal::NormalLaw;
@@ -97,14 +98,15 @@ pub struct LawRegistry {
 }
 
 impl Default for LawRegistry {
-    /// The laws of this crate: `graspd`, `hertz`, `hunt_crossley`, `hunt_crossley_stribeck`, `penalty`,
-    /// `penalty_approach`, `penalty_grain` and `penalty_stribeck`.
+    /// The laws of this crate: `graspd`, `hertz`, `hunt_crossley`, `hunt_crossley_sticking`, `hunt_crossley_stribeck`,
+    /// `penalty`, `penalty_approach`, `penalty_grain` and `penalty_stribeck`.
     fn default() -> Self {
         let mut registry = Self { laws: BTreeMap::new() };
         let mut add = |name, entry| registry.register_entry(name, entry);
         add("graspd", graspd());
         add("hertz", product::<Hertz, Coulomb>());
         add("hunt_crossley", product::<HuntCrossley, Coulomb>());
+        add("hunt_crossley_sticking", product::<HuntCrossley, Sticking<Coulomb>>());
         add("hunt_crossley_stribeck", product::<HuntCrossley, Stribeck>());
         add("penalty", product::<KelvinVoigt, Coulomb>());
         add("penalty_approach", product::<ApproachDamped, Coulomb>());
@@ -175,7 +177,7 @@ mod tests {
     #[test]
     fn listed_parameters_are_those_of_the_law_and_in_its_order() {
         let registry = LawRegistry::default();
-        assert_eq!(registry.names().count(), 8);
+        assert_eq!(registry.names().count(), 9);
         for (name, entry) in registry.entries() {
             let values: Vec<f64> = (0..entry.parameters.len())
                 .map(|k| good(entry.parameters[k].name) * (1.0 - 1e-3 * k as f64))

@@ -84,7 +84,7 @@ fn carried<S: Scalar>(
         next[body] = arrived(&states[body], &velocity(slot), dt);
     }
     if S::ORDER == 0 {
-        return next;
+        return deflected(world, next, &equations.step);
     }
     let wrenches = world.wrenches(&next, equations.step.index);
     let excess: Vec<[S; 6]> = (free.iter().enumerate())
@@ -106,6 +106,15 @@ fn carried<S: Scalar>(
             }
         }
         next[body] = arrived(&states[body], &velocity, dt);
+    }
+    deflected(world, next, &equations.step)
+}
+
+/// Forces are those of the deflections at the start; these follow the motion at the end.
+fn deflected<S: Scalar>(world: &World<S>, mut next: Vec<State<S>>, step: &Step) -> Vec<State<S>> {
+    if next.len() > world.bodies.len() {
+        let rates = world.wrenches(&next, step.index);
+        world.deflect(&mut next, &rates, S::constant(step.dt));
     }
     next
 }

@@ -8,12 +8,14 @@ use prehend_autodiff::Scalar;
 use prehend_autodiff::lie::so3_exp;
 
 use crate::body::RigidBody;
+use crate::contact::wrench::stack;
 use crate::state::State;
 use crate::time::Step;
 use crate::world::World;
 use crate::world::body_id::BodyId;
 
-/// Of a body: position of the center of mass, its velocity, rotation vector, and angular momentum; or their rates.
+/// Of a body: position of the center of mass, its velocity, rotation vector, and angular momentum; or their rates. Of a contact
+/// that sticks: the two halves of its deflection, and nothing.
 ///
 /// Rotations are R = exp(θ) R₀ with the rotation vector θ from the start of the step, whose rate is
 /// dexp⁻¹(θ) ω = ω − θ×ω/2 + θ×(θ×ω)/12 to the order that counts (H. Munthe-Kaas, "High order Runge–Kutta methods on
@@ -27,7 +29,7 @@ pub(super) struct Stages<'a, S: Scalar> {
     states: &'a [State<S>],
     step: Step,
     free: Vec<Free<'a, S>>,
-    /// Of each stage, those of the free bodies.
+    /// Of each stage, those of the free bodies, then of the contacts that stick.
     slopes: Vec<Vec<Change<S>>>,
 }
 
@@ -54,7 +56,7 @@ impl<'a, S: Scalar> Stages<'a, S> {
         };
         let free: Vec<Free<'_, S>> = world.free_bodies().into_iter().filter_map(free).collect();
         let mut stages = Self { world, states, step, slopes: Vec::new(), free };
-        let none = vec![[Vector3::zeros(); 4]; stages.free.len()];
+        let none = vec![[Vector3::zeros(); 4]; stages.moving()];
         stages.slopes.push(stages.rates(states, &none, wrenches));
         stages
     }
@@ -79,9 +81,9 @@ impl<'a, S: Scalar> Stages<'a, S> {
         self.moved(&self.combined(weights))
     }
 
-    /// Of each free body, the step's length times the sum of the slopes with `weights`.
+    /// Of each free body and contact that sticks, the step's length times the sum of the slopes with `weights`.
     pub(super) fn combined(&self, weights: &[f64]) -> Vec<Change<S>> {
-        let mut sum = vec![[Vector3::zeros(); 4]; self.free.len()];
+        let mut sum = vec![[Vector3::zeros(); 4]; self.moving()];
         for (slopes, weight) in self.slopes.iter().zip(weights).filter(|(_, w)| **w != 0.0) {
             let weight = weight * self.step.dt;
             for (sum, slope) in sum.iter_mut().flatten().zip(slopes.iter().flatten()) {
@@ -102,7 +104,16 @@ impl<'a, S: Scalar> Stages<'a, S> {
             state.pose.rotation.renormalize_fast();
             state.angular = free.rigid.angular(&state.pose.rotation, &(free.momentum + momentum));
         }
+        let deflections = moved.iter_mut().skip(self.world.bodies.len());
+        for (state, [linear, angular, ..]) in deflections.zip(&change[self.free.len()..]) {
+            *state = state.deflected(&stack(linear, angular));
+        }
         moved
+    }
+
+    /// Free bodies and contacts that stick.
+    fn moving(&self) -> usize {
+        self.free.len() + self.states.len() - self.world.bodies.len()
     }
 
     /// The rates of change at `states` under `wrenches`, where `change` has led to.
@@ -122,6 +133,11 @@ impl<'a, S: Scalar> Stages<'a, S> {
             let acceleration = self.world.gravity + force * (S::one() / free.rigid.mass());
             [state.linear, acceleration, turning, torque.into_owned()]
         };
-        self.free.iter().zip(change).map(rate).collect()
+        let rates = self.free.iter().zip(change).map(rate);
+        let deflecting = |rate: &Vector6<S>| {
+            let (linear, angular) = (rate.fixed_rows::<3>(0), rate.fixed_rows::<3>(3));
+            [linear.into_owned(), angular.into_owned(), Vector3::zeros(), Vector3::zeros()]
+        };
+        rates.chain(wrenches[self.world.bodies.len()..].iter().map(deflecting)).collect()
     }
 }

@@ -32,7 +32,10 @@ impl Integrator for SemiImplicitEuler {
             Some(rigid) => advance(rigid, world, state, wrench, S::constant(step.dt)),
             None => *state,
         });
-        Ok(next.collect())
+        let mut next: Vec<State<S>> = next.collect();
+        next.extend_from_slice(&states[next.len()..]);
+        world.deflect(&mut next, &wrenches, S::constant(step.dt));
+        Ok(next)
     }
 
     fn evaluates_forces_once(&self) -> bool {

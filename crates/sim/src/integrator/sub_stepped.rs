@@ -75,7 +75,8 @@ impl<I: Integrator> SubStepped<I> {
             }
             falling.drifted(dt)
         };
-        let then: Vec<State> = plain.bodies.iter().zip(&now).map(drift).collect();
+        let mut then: Vec<State> = plain.bodies.iter().zip(&now).map(drift).collect();
+        then.extend_from_slice(&now[then.len()..]);
         let fastest = plain.contact_frequency(&now).max(plain.contact_frequency(&then));
         (dt * fastest / (MARGIN * limit)).ceil().max(1.0)
     }

@@ -44,8 +44,14 @@ impl Integrator for VelocityVerlet {
                 *state = kicked(rigid, world, state, pose, wrench, dt);
             }
         }
+        world.deflect(&mut next, &before, dt);
         world.drive(&mut next, step.end());
         let after = world.wrenches(&next, step.index);
+        let change = |(before, after)| (after - before) * dt.times(0.5);
+        for (state, pair) in next.iter_mut().zip(before.iter().zip(&after)).skip(world.bodies.len())
+        {
+            *state = state.deflected(&change(pair));
+        }
         let bodies = world.bodies.iter().zip(states).zip(before.iter().zip(&after));
         for (((body, state), (before, after)), next) in bodies.zip(&mut next) {
             if let Some(rigid) = body.rigid() {

@@ -8,7 +8,7 @@ use prehend_geometry::DistanceField;
 use prehend_sim::{
     Body, Bounce, Contact, ContactBodies, ContactLaw, Coulomb, DynContactLaw, GapSmoothing,
     HalfSpace, Hertz, HuntCrossley, KelvinVoigt, Law, Response, RigidBody, Sphere, SphereCavity,
-    State, StaticContactTarget, Stribeck, Surface, World, regularized_coulomb,
+    State, StaticContactTarget, Sticking, Stribeck, Surface, World, regularized_coulomb,
 };
 
 use crate::scene::Input::{self, Law as ByLaw, Start};
@@ -130,7 +130,39 @@ pub(crate) fn all() -> Vec<Scene> {
     let mut all = sliding();
     all.extend(falling());
     all.extend(several());
+    all.extend(holding());
     all
+}
+
+/// Contacts that hold.
+fn holding() -> Vec<Scene> {
+    let law = |mass: f64, friction: f64| {
+        let target =
+            StaticContactTarget { mass, gravity: 9.81, penetration: 2e-4, contact_area: 4e-4 };
+        let bounce = Bounce { restitution: 0.4, impact_speed: 1.0 };
+        let normal = HuntCrossley::from_target(&target, 1.0, bounce).unwrap();
+        let friction = Coulomb { friction, slip_scale: 1e-2 };
+        Arc::new(Law::new(normal, Sticking { friction, deflection: 1e-4 }).unwrap())
+    };
+    let floor = HalfSpace::floor;
+    let stool = body("stool", 0.2, 1e-4, &feet(0.015), 4e-4);
+    let sliding = state(at(0.0, 0.0, 0.0148), [0.3, 0.0, 0.0], [0.0; 3]);
+    let pose = Isometry3::new(Vector3::new(0.0, 0.0, 0.2), Vector3::new(0.3, 0.2, 0.1));
+    let thrown = state(pose, [1.0, 0.0, 0.0], [0.0, 3.0, 0.0]);
+    let rigid = RigidBody::new(0.2, Matrix3::identity() * 5e-5, Point3::origin()).unwrap();
+    let round = Surface::uniform(&[Point3::origin()], 4e-4).unwrap().rounded(0.02).unwrap();
+    let ball = Body::free("ball", rigid).with_surface(round);
+    let spinning = state(at(0.0, 0.0, 0.04), [0.2, 0.0, 0.0], [0.0, -20.0, 5.0]);
+    let stool = on(floor(), down(), stool, (law(0.2, 0.5), HARD), sliding);
+    let cube = on(floor(), down(), cube(), (law(0.37, 0.3), HARD), thrown);
+    let ball = on(floor(), down(), ball, (law(0.2, 0.5), HARD), spinning);
+    let by_speed = (Position(1, 0), Start(1, 6));
+    vec![
+        scene("a stool slides and holds", stool.clone(), 0.2, by_speed, 5e-3),
+        scene("the same by its friction", stool, 0.2, (Position(1, 0), ByLaw(0, 3)), 5e-3),
+        scene("a cube is thrown and holds", cube, 0.5, by_speed, 4e-3),
+        scene("a ball with backspin lands and rolls", ball, 0.3, by_speed, 5e-3),
+    ]
 }
 
 /// Things that slide and stick.

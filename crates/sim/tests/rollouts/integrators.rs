@@ -12,7 +12,7 @@ use prehend_sim::{
     VelocityVerlet, World,
 };
 
-use crate::scenes::{bowl, egg_on, floor, on_ground, penalty};
+use crate::scenes::{bowl, egg_on, floor, on_ground, penalty, sticking};
 
 /// Calls a check that is generic over the integrator with each of them.
 macro_rules! for_every_integrator {
@@ -23,6 +23,14 @@ macro_rules! for_every_integrator {
         $check(&BackwardEuler);
         $check(&SubStepped { integrator: SemiImplicitEuler, max_substeps: 64 });
     }};
+}
+
+/// A world and the same with friction that holds.
+fn sliding_and_sticking(world: World) -> [World; 2] {
+    let mut holds = world.clone();
+    let [stiffness, damping, friction] = [0, 1, 2].map(|i| world.contacts[0].params()[i]);
+    holds.contacts[0].set_law(Arc::new(sticking(stiffness, damping, friction, 2e-2)));
+    [world, holds]
 }
 
 /// An asymmetric body that tumbles freely.
@@ -134,9 +142,11 @@ fn orders_are_as_documented() {
         let (world, states) = top(Vector3::new(0.0, 0.0, -9.81));
         let spinning = orders(&world, &states, integrator, 0.02, 1.0);
         let (world, states) = table(2e4);
-        let touching = orders(&world, &states, integrator, 1e-3, 0.1);
-        for measured in spinning.iter().chain(&touching) {
-            assert!((measured - order).abs() < 0.15, "{order}: {spinning:?} {touching:?}");
+        let [touching, holding] =
+            sliding_and_sticking(world).map(|world| orders(&world, &states, integrator, 5e-4, 0.1));
+        for measured in spinning.iter().chain(&touching).chain(&holding) {
+            let all = [spinning, touching, holding];
+            assert!((measured - order).abs() < 0.15, "{order}: {all:?}");
         }
     }
     check(&SemiImplicitEuler, 1.0);
@@ -191,7 +201,8 @@ fn derivatives_match_differences() {
         states[1].pose.translation.z -= 5e-4;
         // So little damping that contacts, which never pull, are not cut off: that would be a kink.
         world.contacts[0].params_mut()[1] = 2e3;
-        for steps in [1, 30] {
+        let worlds = sliding_and_sticking(world);
+        for (world, steps) in worlds.iter().flat_map(|world| [(world, 1), (world, 30)]) {
             let time_steps = TimeSteps { dt: 1e-3, steps };
             let mut lifted: Vec<State<Fwd<12>>> = states.iter().map(State::lift).collect();
             lifted[1] = states[1].variables();
@@ -250,28 +261,31 @@ fn derivatives_by_parameters_match_differences() {
         states[1].pose.translation.z -= 5e-4;
         world.contacts[0].params_mut()[1] = 2e3;
         let time_steps = TimeSteps { dt: 1e-3, steps: 10 };
-        let lifted: Vec<State<Fwd<7>>> = states.iter().map(State::lift).collect();
-        let changed = with_parameters(&world, &Fwd::<7>::variables([1.0; 7]));
-        let end =
-            changed.simulate_with(integrator, &lifted, time_steps, |_, _| ()).unwrap().states[1];
-        let exact = end.sensitivity();
-        let differences = finite_difference_jacobian(
-            |x| {
-                let changed = with_parameters(&world, x);
-                let run = changed
-                    .simulate_with(integrator, &states, time_steps, |_, _| ())
-                    .unwrap()
-                    .states;
-                coordinates(&run[1], &end.value())
-            },
-            &[1.0; 7],
-            1e-5,
-        );
-        for (row, reference) in differences.iter().enumerate() {
-            let exact: Vec<f64> = exact.row(row).iter().copied().collect();
-            let error = compare_gradients(&exact, reference);
-            assert!(error.relative < 1e-6, "row {row}: {error:?}");
-            assert!(row < 6 || exact.iter().all(|slope| *slope != 0.0));
+        for world in sliding_and_sticking(world) {
+            let lifted: Vec<State<Fwd<7>>> = states.iter().map(State::lift).collect();
+            let changed = with_parameters(&world, &Fwd::<7>::variables([1.0; 7]));
+            let end =
+                changed.simulate_with(integrator, &lifted, time_steps, |_, _| ()).unwrap().states
+                    [1];
+            let exact = end.sensitivity();
+            let differences = finite_difference_jacobian(
+                |x| {
+                    let changed = with_parameters(&world, x);
+                    let run = changed
+                        .simulate_with(integrator, &states, time_steps, |_, _| ())
+                        .unwrap()
+                        .states;
+                    coordinates(&run[1], &end.value())
+                },
+                &[1.0; 7],
+                1e-5,
+            );
+            for (row, reference) in differences.iter().enumerate() {
+                let exact: Vec<f64> = exact.row(row).iter().copied().collect();
+                let error = compare_gradients(&exact, reference);
+                assert!(error.relative < 1e-6, "row {row}: {error:?}");
+                assert!(row < 6 || exact.iter().all(|slope| *slope != 0.0));
+            }
         }
     }
     for_every_integrator!(check);
@@ -286,34 +300,38 @@ fn adjoints_agree_with_forward_mode() {
     fn check(integrator: &impl Integrator) {
         let (world, states) = egg_on(bowl(), GapSmoothing::Softplus { width: 3e-4 });
         let time_steps = TimeSteps { dt: 1e-3, steps: 30 };
-        let friction = world.contacts[0].params()[2];
-        let mut forward_world = world.lift::<Fwd<13>>();
-        let variables = Fwd::<13>::variables([0.0; 13]);
-        forward_world.contacts[0].params_mut()[2] = variables[12].plus(friction);
-        let start = |tangent: &[Fwd<13>]| {
-            vec![
-                states[0].lift(),
-                states[1].retract(&std::array::from_fn::<_, 12, _>(|i| tangent[i])),
-            ]
-        };
-        let run =
-            forward_world.simulate_with(integrator, &start(&variables), time_steps, |_, _| ());
-        let forward = weighted(&run.unwrap().states).derivative;
+        for world in sliding_and_sticking(world) {
+            let friction = world.contacts[0].params()[2];
+            let mut forward_world = world.lift::<Fwd<13>>();
+            let variables = Fwd::<13>::variables([0.0; 13]);
+            forward_world.contacts[0].params_mut()[2] = variables[12].plus(friction);
+            let start = |tangent: &[Fwd<13>]| {
+                vec![
+                    states[0].lift(),
+                    states[1].retract(&std::array::from_fn::<_, 12, _>(|i| tangent[i])),
+                ]
+            };
+            let run =
+                forward_world.simulate_with(integrator, &start(&variables), time_steps, |_, _| ());
+            let forward = weighted(&run.unwrap().states).derivative;
 
-        let recording = Recording::start();
-        let variables: [Var; 13] = recording.variables([0.0; 13]);
-        let mut reverse_world = world.lift::<Var>();
-        reverse_world.contacts[0].params_mut()[2] = variables[12].plus(friction);
-        let start = [
-            states[0].lift(),
-            states[1].retract(&std::array::from_fn::<_, 12, _>(|i| variables[i])),
-        ];
-        let run =
-            reverse_world.simulate_with(integrator, &start, time_steps, |_, _| ()).unwrap().states;
-        let adjoints = recording.gradient(weighted(&run));
-        let reverse: Vec<f64> = variables.iter().map(|x| adjoints.wrt(*x)).collect();
-        let error = compare_gradients(&reverse, &forward);
-        assert!(error.relative < 1e-12 && forward[12] != 0.0, "{error:?}");
+            let recording = Recording::start();
+            let variables: [Var; 13] = recording.variables([0.0; 13]);
+            let mut reverse_world = world.lift::<Var>();
+            reverse_world.contacts[0].params_mut()[2] = variables[12].plus(friction);
+            let start = [
+                states[0].lift(),
+                states[1].retract(&std::array::from_fn::<_, 12, _>(|i| variables[i])),
+            ];
+            let run = reverse_world
+                .simulate_with(integrator, &start, time_steps, |_, _| ())
+                .unwrap()
+                .states;
+            let adjoints = recording.gradient(weighted(&run));
+            let reverse: Vec<f64> = variables.iter().map(|x| adjoints.wrt(*x)).collect();
+            let error = compare_gradients(&reverse, &forward);
+            assert!(error.relative < 1e-12 && forward[12] != 0.0, "{error:?}");
+        }
     }
     for_every_integrator!(check);
 }

@@ -10,5 +10,5 @@ mod scenes;
 // The scenes name these as `crate::…`.
 use prehend_sim::{
     Body, ContactBodies, Coulomb, DynContactLaw, GapSmoothing, HalfSpace, KelvinVoigt, Law,
-    RigidBody, SphereCavity, State, Surface, World,
+    RigidBody, SphereCavity, State, Sticking, Surface, World,
 };

@@ -6,10 +6,12 @@ use nalgebra::{Vector3, Vector6};
 
 use super::Adaptive;
 use super::planner::Probe;
+use crate::contact::bristles::Bristles;
 use crate::integrator::runge_kutta::dormand_prince::Trial;
 use crate::state::State;
 use crate::world::World;
 use crate::world::body_id::BodyId;
+use crate::world::contact_pair::ContactPair;
 
 /// Part of the fastest body's speed that counts for all: what is at rest may be hit by it.
 const SLOW: f64 = 0.1;
@@ -22,6 +24,8 @@ pub(super) struct ErrorNorm {
     sensitivity_tolerance: f64,
     /// Of each free body.
     scales: Vec<(BodyId, Scale)>,
+    /// Of each contact that sticks, the radius of gyration of its smaller body \[m\].
+    deflections: Vec<f64>,
 }
 
 /// What counts as one for a body.
@@ -74,7 +78,13 @@ impl ErrorNorm {
         };
         let scales = world.free_bodies().into_iter().filter_map(scale).collect();
         let Adaptive { tolerance, sensitivity_tolerance, .. } = *settings;
-        Self { tolerance, sensitivity_tolerance, scales }
+        let length = |(pair, _): (&ContactPair, Bristles)| {
+            let bodies = [pair.bodies.samples, pair.bodies.field].map(|body| &world.bodies[body]);
+            let lengths = bodies.iter().filter_map(|body| Some(body.rigid()?.gyration_radius()));
+            lengths.fold(f64::INFINITY, f64::min)
+        };
+        let deflections = world.sticking().map(length).collect();
+        Self { tolerance, sensitivity_tolerance, scales, deflections }
     }
 
     /// The free bodies and units of the twelve coordinates of their tangents.
@@ -113,6 +123,15 @@ impl ErrorNorm {
             for state in [start, end] {
                 slope = max_or_nan(slope, scale.sensitivity(state, speed));
             }
+        }
+        for (length, [linear, angular, ..]) in
+            self.deflections.iter().zip(&trial.error[self.scales.len()..])
+        {
+            let largest = |part: fn(Probe) -> f64| {
+                max_or_nan(linear.map(part).norm() / length, angular.map(part).norm())
+            };
+            error = max_or_nan(error, largest(|x| x.value));
+            slope_error = max_or_nan(slope_error, largest(|x| x.derivative[0]));
         }
         // Where everything is constant there is no error to compare.
         let slope_error = if slope_error == 0.0 { 0.0 } else { slope_error / slope };

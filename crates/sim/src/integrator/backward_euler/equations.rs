@@ -134,6 +134,7 @@ impl Equations for ImplicitStep<'_> {
             self.world.bodies.iter().map(|body| body.external_wrench).collect();
         let mut by_velocity = DMatrix::zeros(x.len(), x.len());
         let mut states: Vec<State<Fwd<12>>> = ends.iter().map(State::lift).collect();
+        let mut deflections = ends[self.world.bodies.len()..].iter().map(State::lift);
         for pair in &self.lifted.contacts {
             // The velocities of the one body in lanes 0..6, of the other in lanes 6..12.
             let bodies = [pair.bodies.samples, pair.bodies.field];
@@ -144,8 +145,9 @@ impl Equations for ImplicitStep<'_> {
                     states[body] = arrived(&self.states[body].lift(), &velocity, dt);
                 }
             }
-            let pair_wrenches = self.lifted.contact_wrenches(pair, &states, self.step.index);
-            for (on, wrench) in bodies.into_iter().zip(pair_wrenches) {
+            let deflection = pair.law().bristles().and_then(|_| deflections.next());
+            let effect = self.lifted.effect(pair, &states, deflection.as_ref(), self.step.index);
+            for (on, wrench) in bodies.into_iter().zip([effect.on_samples, effect.on_field]) {
                 wrenches[on] += wrench.map(|w| w.value);
                 let Some(row) = slots[on] else { continue };
                 for (body, lane) in bodies.into_iter().zip([0, 6]) {

@@ -36,7 +36,7 @@ pub(in crate::integrator) struct Trial<S: Scalar> {
     pub(in crate::integrator) stages: Vec<Vec<State<S>>>,
     /// The wrenches there: those that the next step starts with.
     pub(in crate::integrator) wrenches: Vec<Vector6<S>>,
-    /// Of each free body, by how much the solutions of fifth and fourth order differ.
+    /// Of each free body and contact that sticks, by how much the solutions of fifth and fourth order differ.
     pub(in crate::integrator) error: Vec<Change<S>>,
 }
 

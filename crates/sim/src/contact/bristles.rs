@@ -1,0 +1,233 @@
+//! Tangential springs: what makes a contact hold.
+
+use nalgebra::{Matrix3x6, Matrix6, Vector3, Vector6};
+use prehend_autodiff::{Fwd, LocalFunction, Scalar};
+
+use super::bristle_law::BristleLaw;
+use super::dynamic::DynContactLaw;
+use super::patch::{Patch, Touch};
+use super::point::Contact;
+
+/// Depth over which bristles take hold, in multiples of their deflection.
+const TAKE_HOLD: f64 = 0.1;
+/// Part of what contacts hold that holds every other direction.
+const REGULARIZATION: f64 = 1e-6;
+
+/// Tangential springs of a contact that sticks, as in P. A. Cundall and O. D. L. Strack, "A discrete numerical model for granular
+/// assemblies", Géotechnique 29, 1979, and C. Canudas de Wit et al., "A new model for control of systems with friction", IEEE
+/// Trans. Automatic Control 40, 1995, with one deflection for all samples of a pair.
+///
+/// The deflection is a twist ζ of the body with the samples against the field. It deflects a sample at l from the center of mass
+/// by u = P(ζ_v + ζ_ω×l), across the normal. The law sees the slip s + u v_b/u_b for the deflection u_b and the slip speed v_b of
+/// full friction. Bristles follow the slip and yield as they near full deflection:
+///
+/// u' = v_b/√(s² + v_b²)·s − v_b s²/(s² + v_b²)·(|u|/u_b)⁴ u/u_b,
+///
+/// in the mean over the samples, weighted by their normal forces. Without slip nothing yields: what sticks does not creep. No
+/// rate is faster than 5 v_b/u_b, whatever the slip. Without contact they return to zero in u_b/v_b.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bristles {
+    /// Deflection of full friction u_b \[m\].
+    pub deflection: f64,
+    /// Slip that the full deflection counts as, v_b \[m/s\].
+    pub slip_speed: f64,
+}
+
+impl Bristles {
+    /// The fastest rate at which they yield \[1/s\].
+    pub(crate) fn fastest(&self) -> f64 {
+        5.0 * self.slip_speed / self.deflection
+    }
+}
+
+/// [`bristle_response`] with constant parameters, as a function of the tangent of the body's state and of the change of the
+/// deflection.
+pub(crate) struct BristleFunction<'a> {
+    pub(crate) law: &'a dyn DynContactLaw,
+    pub(crate) p: &'a [f64],
+    pub(crate) patch: &'a Patch<'a>,
+    pub(crate) bristles: Bristles,
+    pub(crate) deflection: Vector6<f64>,
+}
+
+impl LocalFunction<18, 12> for BristleFunction<'_> {
+    fn evaluate<S: Scalar>(&self, change: [S; 18]) -> [S; 12] {
+        let p: Vec<S> = self.p.iter().map(|&p| S::constant(p)).collect();
+        let tangent = std::array::from_fn(|i| change[i]);
+        let deflection = Vector6::from_fn(|i, _| change[12 + i].plus(self.deflection[i]));
+        bristle_response(self.law, &p, self.patch, self.bristles, &tangent, &deflection)
+    }
+}
+
+/// The wrench of all contacts of `patch` about the center of mass and the rate of the deflection, along the axes of the field, to
+/// first order in `tangent`, by which the state is away from that of the patch.
+pub(crate) fn bristle_response<T: Scalar>(
+    law: &dyn DynContactLaw,
+    p: &[T],
+    patch: &Patch<'_>,
+    bristles: Bristles,
+    tangent: &[T; 12],
+    deflection: &Vector6<T>,
+) -> [T; 12] {
+    let cutoff = law.reach();
+    let law = BristleLaw::new(law, p);
+    let moved = Moved::new(patch, tangent);
+    let mut wrench = Vector6::<T>::zeros();
+    let mut brush = Brush::default();
+    let sound = patch.for_each_touch(cutoff, T::ORDER == 0, |touch| {
+        let Lifted { mut contact, lever } = moved.lift(touch, cutoff);
+        let across = across(&contact.normal, &lever);
+        let (slip, bent) = (contact.slip, across * deflection);
+        contact.slip += bent.map(|u| u.times(bristles.slip_speed / bristles.deflection));
+        let response = law.response(&contact);
+        let force = contact.normal * response.normal + response.tangential;
+        let torque = lever.cross(&force);
+        wrench += Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z);
+        // What is not pressed does not hold.
+        if response.normal.value() > 0.0 {
+            let depth = -contact.gap.plus(-cutoff);
+            brush.add(&across, response.normal, depth, bristles.rate(&slip, &bent), bristles);
+        }
+    });
+    let rate = brush.rate(deflection, bristles);
+    let failed = T::constant(f64::NAN);
+    let all = |i: usize| if i < 6 { wrench[i] } else { rate[i - 6] };
+    std::array::from_fn(|i| if sound { all(i) } else { failed })
+}
+
+impl Bristles {
+    /// u' of bristles that are `bent` by u and slip.
+    fn rate<T: Scalar>(&self, slip: &Vector3<T>, bent: &Vector3<T>) -> Vector3<T> {
+        let (s2, u2) = (slip.dot(slip), bent.dot(bent));
+        let squares = s2.plus(self.slip_speed.powi(2));
+        let follow = T::constant(self.slip_speed) / squares.sqrt();
+        let yields = (s2 / squares * u2 * u2).times(self.slip_speed / self.deflection.powi(5));
+        slip * follow - bent * yields
+    }
+}
+
+/// The motion of a sample across the normal by a twist about the center of mass.
+fn across<T: Scalar>(normal: &Vector3<T>, lever: &Vector3<T>) -> Matrix3x6<T> {
+    let basis: [Vector3<T>; 3] = std::array::from_fn(|i| Vector3::ith(i, T::one()));
+    let columns: [Vector3<T>; 6] =
+        std::array::from_fn(|i| if i < 3 { basis[i] } else { basis[i - 3].cross(lever) });
+    Matrix3x6::from_columns(&columns.map(|v| v - normal * normal.dot(&v)))
+}
+
+/// The bristles of all samples: equations for the one deflection that follows them best.
+struct Brush<T: Scalar> {
+    normal: Matrix6<T>,
+    right: Vector6<T>,
+    /// Sums of forces \[N\], and of forces that have taken hold.
+    force: T,
+    held: T,
+}
+
+impl<T: Scalar> Default for Brush<T> {
+    fn default() -> Self {
+        let (normal, right) = (Matrix6::zeros(), Vector6::zeros());
+        Self { normal, right, force: T::zero(), held: T::zero() }
+    }
+}
+
+impl<T: Scalar> Brush<T> {
+    fn add(
+        &mut self,
+        across: &Matrix3x6<T>,
+        force: T,
+        depth: T,
+        rate: Vector3<T>,
+        Bristles { deflection, .. }: Bristles,
+    ) {
+        let weighted = across.transpose() * force;
+        self.normal += weighted * across;
+        self.right += weighted * rate;
+        self.force += force;
+        self.held += force * depth / depth.plus(TAKE_HOLD * deflection);
+    }
+
+    /// ζ'.
+    fn rate(self, deflection: &Vector6<T>, bristles: Bristles) -> Vector6<T> {
+        let returning =
+            |x: &Vector6<T>| x.map(|x| x.times(bristles.slip_speed / bristles.deflection));
+        if self.force.value() <= 0.0 {
+            return -returning(deflection);
+        }
+        // A turn by one counts as the lever of the mean contact, or as a micrometer if that is at the center of mass.
+        let trace = |from: usize| {
+            let diagonal = (from..from + 3).map(|i| self.normal[(i, i)]);
+            diagonal.fold(T::zero(), |sum, x| sum + x)
+        };
+        let (moves, turns) = (trace(0), trace(3));
+        let ground = [moves, turns + moves.times(1e-12)].map(|x| x.times(REGULARIZATION));
+        let ground = Vector6::from_fn(|i, _| ground[i / 3]);
+        let Some(factors) = (self.normal + Matrix6::from_diagonal(&ground)).cholesky() else {
+            return Vector6::repeat(T::constant(f64::NAN));
+        };
+        // What no contact holds returns to zero.
+        let free = |x: &Vector6<T>| factors.solve(&ground.component_mul(x));
+        factors.solve(&self.right) * (self.held / self.force)
+            - returning(&free(&free(&free(&free(deflection)))))
+    }
+}
+
+/// A patch whose body is a little away from where it is.
+struct Moved<'a, T> {
+    patch: &'a Patch<'a>,
+    position: Vector3<T>,
+    turn: Vector3<T>,
+    linear: Vector3<T>,
+    angular: Vector3<T>,
+}
+
+/// A contact, and where it is from the center of mass.
+struct Lifted<T: Scalar> {
+    contact: Contact<T>,
+    lever: Vector3<T>,
+}
+
+impl<'a, T: Scalar> Moved<'a, T> {
+    fn new(patch: &'a Patch<'a>, tangent: &[T; 12]) -> Self {
+        let part = |k: usize| Vector3::from_column_slice(&tangent[3 * k..][..3]);
+        let [position, turn, linear, angular] = std::array::from_fn(part);
+        Self { patch, position, turn, linear, angular }
+    }
+
+    fn lift(&self, touch: &Touch, cutoff: f64) -> Lifted<T> {
+        let constant = |v: &Vector3<f64>| v.map(T::constant);
+        if T::ORDER == 0 {
+            let Contact { gap, normal_speed, slip, normal, area } = touch.contact(cutoff);
+            let contact = Contact {
+                gap: T::constant(gap),
+                normal_speed: T::constant(normal_speed),
+                slip: constant(&slip),
+                normal: constant(&normal),
+                area,
+            };
+            return Lifted { contact, lever: constant(&touch.lever) };
+        }
+        let Contact { gap, normal_speed, slip, normal, area } = touch.lifted(cutoff);
+        let turned = self.turn.cross(&constant(&touch.arm));
+        let place = self.position + turned;
+        let normal_change = normal.map(|n| {
+            let terms = n.derivative[..3].iter().zip(&place);
+            terms.fold(T::zero(), |sum, (slope, x)| sum + x.times(*slope))
+        });
+        let lever_change = turned - normal_change.map(|n| n.times(touch.radius));
+        let spin = constant(&self.patch.state.angular);
+        let velocity =
+            self.linear + self.angular.cross(&constant(&touch.lever)) + spin.cross(&lever_change);
+        let compose = |x: Fwd<6>| {
+            let terms = x.derivative.iter().zip(place.iter().chain(&velocity));
+            terms.fold(T::constant(x.value), |sum, (slope, x)| sum + x.times(*slope))
+        };
+        let contact = Contact {
+            gap: compose(gap),
+            normal_speed: compose(normal_speed),
+            slip: slip.map(compose),
+            normal: normal.map(compose),
+            area,
+        };
+        Lifted { contact, lever: constant(&touch.lever) + lever_change }
+    }
+}

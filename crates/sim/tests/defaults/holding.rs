@@ -1,0 +1,112 @@
+//! Contacts that stick hold.
+
+use std::sync::Arc;
+
+use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
+use prehend_sim::{
+    Body, BodyId, Coulomb, Cuboid, DynContactLaw, KelvinVoigt, Law, RigidBody, State, Sticking,
+    Surface, TimeSteps, World,
+};
+
+use crate::scenes::{SMOOTH, corners, down};
+
+/// Half of an edge of every box, and the radius of its edges \[m\].
+const HALF: f64 = 0.02;
+const ROUNDING: f64 = 2e-3;
+/// That of tables and fingers: no sample is at another's edge.
+const LARGE: f64 = 0.03;
+/// Mass of every box \[kg\].
+const MASS: f64 = 0.2;
+
+/// The law of the guide, ten times as stiff, with friction that holds.
+fn sticking() -> Arc<dyn DynContactLaw> {
+    let normal = KelvinVoigt { stiffness: 1e8, damping: 5e5 };
+    let friction = Coulomb { friction: 0.5, slip_scale: 2e-2 };
+    Arc::new(Law::new(normal, Sticking { friction, deflection: 1e-4 }).unwrap())
+}
+
+/// A cube with round edges and samples at its corners.
+fn cube(body: Body, half: f64) -> Body {
+    let core = [half - ROUNDING; 3];
+    let surface = Surface::cuboid(core, 2.0 * half).unwrap().rounded(ROUNDING).unwrap();
+    let field = Cuboid { half_extents: Vector3::repeat(half), rounding: ROUNDING };
+    body.with_surface(surface).with_field(Arc::new(field))
+}
+
+fn free_cube(name: &str) -> Body {
+    let inertia = Matrix3::identity() * (MASS * HALF * HALF * 2.0 / 3.0);
+    cube(Body::free(name, RigidBody::new(MASS, inertia, Point3::origin()).unwrap()), HALF)
+}
+
+fn at(x: f64, y: f64, z: f64) -> State {
+    State::at_rest(Isometry3::translation(x, y, z))
+}
+
+/// How far the corners of `bodies` move in ten seconds after one \[m\].
+fn creep(world: &World, start: &[State], bodies: &[BodyId]) -> f64 {
+    let run = world.rollout(start, TimeSteps { dt: 0.5, steps: 22 }).unwrap();
+    let moved = |body: BodyId, now: &[State]| {
+        let [from, to] = [&run[2], now].map(|states| states[body].pose);
+        corners([HALF; 3]).iter().map(|p| (to * p - from * p).norm()).fold(0.0, f64::max)
+    };
+    let moved = |now: &Vec<State>| bodies.iter().map(|b| moved(*b, now)).fold(0.0, f64::max);
+    run[2..].iter().map(moved).fold(0.0, f64::max)
+}
+
+#[test]
+fn a_stack_of_three_boxes_stays() {
+    let mut world = World::new(down());
+    // A slope of 6°: what does not hold slides.
+    world.gravity.x = 0.1 * 9.81;
+    let table = world.add(cube(Body::kinematic("table"), LARGE));
+    let mut start = vec![at(0.0, 0.0, -LARGE)];
+    let mut stack = vec![table];
+    for (level, name) in (0_u8..).zip(["lower", "middle", "upper"]) {
+        let body = world.add(free_cube(name));
+        let offset = Vector3::new(-1e-3, 0.0, 2.02 * HALF) * f64::from(level);
+        let turn = Vector3::z() * 0.05 * f64::from(level);
+        start.push(State::at_rest(Isometry3::new(offset + Vector3::z() * 1.01 * HALF, turn)));
+        let below = stack[stack.len() - 1];
+        world.add_symmetric_contact(body, below, sticking(), SMOOTH).unwrap();
+        stack.push(body);
+    }
+    let moved = creep(&world, &start, &stack[1..]);
+    println!("a stack of three boxes creeps by {:.1e} mm in 10 s", 1e3 * moved);
+    assert!(moved < 1e-5);
+}
+
+/// Position and velocity of what goes from 0 to 1 between two times, without jerk at either.
+fn ease(time: f64, from: f64, to: f64) -> [f64; 2] {
+    let s = ((time - from) / (to - from)).clamp(0.0, 1.0);
+    let position = s * s * s * (10.0 - 15.0 * s + 6.0 * s * s);
+    [position, 30.0 * s * s * (1.0 - s) * (1.0 - s) / (to - from)]
+}
+
+#[test]
+fn a_gripper_holds() {
+    let mut world = World::new(down());
+    let finger = |sign: f64| {
+        move |time: f64| {
+            // They close on it, then lift it by 5 cm.
+            let ([closed, closing], [lifted, lifting]) =
+                (ease(time, 0.0, 0.2), ease(time, 0.3, 0.8));
+            let mut state = at(sign * (HALF + LARGE + 1e-3 - 1.1e-3 * closed), 0.0, 0.05 * lifted);
+            state.linear = Vector3::new(-sign * 1.1e-3 * closing, 0.0, 0.05 * lifting);
+            state
+        }
+    };
+    let fingers = [("left", -1.0), ("right", 1.0)]
+        .map(|(name, sign)| world.add(cube(Body::driven(name, finger(sign)), LARGE)));
+    let table = world.add(cube(Body::kinematic("table"), LARGE));
+    let object = world.add(free_cube("object"));
+    for other in fingers.into_iter().chain([table]) {
+        world.add_symmetric_contact(object, other, sticking(), SMOOTH).unwrap();
+    }
+    let start =
+        [at(0.0, 0.0, 0.0), at(0.0, 0.0, 0.0), at(0.0, 0.0, -HALF - LARGE), at(0.0, 0.0, 0.0)];
+    let moved = creep(&world, &start, &[object]);
+    println!("an object in a gripper creeps by {:.1e} mm in 10 s", 1e3 * moved);
+    assert!(moved < 1e-5);
+    let lifted = world.simulate(&start, 1.0).unwrap()[object].pose.translation.z;
+    assert!((lifted - 0.05).abs() < 2e-4, "{lifted}");
+}
