@@ -41,7 +41,8 @@ impl Face {
             return None;
         }
         let base = [a[0].round(), a[1].round()];
-        let edge = EDGES.map(|[i, j]| [0, 1].map(|k| corners[j][k] - corners[i][k]));
+        let edge =
+            EDGES.map(|[i, j]| [corners[j][0] - corners[i][0], corners[j][1] - corners[i][1]]);
         let length = edge.map(|e| e[0] * e[0] + e[1] * e[1]);
         let is_short = length.map(|l| l <= settings.least_edge);
         let share = corners.map(|c| if settings.perspective { 1.0 / c[2] } else { 1.0 });

@@ -1,0 +1,118 @@
+//! Throws a ball so that it bounces once and then hits a target: Levenberg–Marquardt on the simulator's derivatives.
+//!
+//! `cargo run --release --example bounce_onto_target` draws first throw, found throw and target in
+//! `target/bounce_onto_target.svg`.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
+use plotters::prelude::*;
+use prehend::autodiff::optimize::{LevenbergMarquardt, NormalEquations};
+use prehend::autodiff::{Fwd, Scalar};
+use prehend::sim::{
+    Body, Bounce, ContactBodies, Coulomb, GapSmoothing, HalfSpace, HuntCrossley, Law, RigidBody,
+    SimulationError, State, StaticContactTarget, Surface, TimeSteps, World,
+};
+
+const RADIUS: f64 = 0.03;
+/// From the throw to the hit \[s\].
+const TIME: f64 = 0.7;
+/// Where the ball is to be then \[m\].
+const TARGET: [f64; 3] = [1.2, 0.15, 0.3];
+
+/// A rubber ball of 60 g above a floor, and the states of both.
+fn ball_and_floor() -> anyhow::Result<(World, [State; 2])> {
+    let mass = 0.06;
+    let inertia = Matrix3::identity() * (0.4 * mass * RADIUS * RADIUS);
+    let rigid = RigidBody::new(mass, inertia, Point3::origin())?;
+    // One round sample is a ball.
+    let area = 1e-4;
+    let surface = Surface::uniform(&[Point3::origin()], area)?.rounded(RADIUS)?;
+    let target = StaticContactTarget { mass, gravity: 9.81, penetration: 5e-5, contact_area: area };
+    let bounce = Bounce { restitution: 0.8, impact_speed: 3.0 };
+    let normal = HuntCrossley::from_target(&target, 1.5, bounce)?;
+    let law = Law::new(normal, Coulomb { friction: 0.4, slip_scale: 1e-2 })?;
+    let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
+    let field = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
+    let samples = world.add(Body::free("ball", rigid).with_surface(surface));
+    world.add_contact(ContactBodies { samples, field }, Arc::new(law), GapSmoothing::Hard)?;
+    let hand = rigid.at_rest(&Isometry3::translation(0.0, 0.0, 0.5));
+    Ok((world, [State::at_rest(Isometry3::identity()), hand]))
+}
+
+/// Where the ball is at equal times, thrown with a velocity.
+fn thrown<S: Scalar>(
+    world: &World,
+    states: &[State; 2],
+    velocity: &[S],
+    points: usize,
+) -> Result<Vec<Vector3<S>>, SimulationError> {
+    let mut start = states.each_ref().map(State::lift);
+    start[1].linear = Vector3::from_column_slice(velocity);
+    let time_steps = TimeSteps { dt: TIME / points as f64, steps: points };
+    let run = world.lift().rollout(&start, time_steps)?;
+    Ok(run.iter().map(|states| states[1].pose.translation.vector).collect())
+}
+
+fn main() -> anyhow::Result<()> {
+    let (world, states) = ball_and_floor()?;
+    let miss = |velocity: &[Fwd<3>]| match thrown(&world, &states, velocity, 1) {
+        Ok(path) => (0..3).map(|i| path[1][i].plus(-TARGET[i])).collect(),
+        // The solver steps back from what cannot be simulated.
+        Err(_) => vec![Fwd::constant(f64::NAN); 3],
+    };
+    let guess = [1.0, 0.0, -1.0];
+    let found = LevenbergMarquardt::default()
+        .minimize(&guess, |velocity| NormalEquations::forward(miss, velocity))?;
+    let paths =
+        [thrown(&world, &states, &guess, 140)?, thrown(&world, &states, &found.parameters, 140)?];
+    let off = paths.each_ref().map(|path| (path[140] - Vector3::from(TARGET)).norm());
+    let [x, y, z] = [0, 1, 2].map(|i| found.parameters[i]);
+    println!("thrown with (1, 0, -1) m/s it misses by {:.1} cm", 100.0 * off[0]);
+    println!(
+        "thrown with ({x:.4}, {y:.4}, {z:.4}) m/s by {:.1e} cm, {} steps later",
+        100.0 * off[1],
+        found.iterations
+    );
+    let file = Path::new("target/bounce_onto_target.svg");
+    draw(&paths, file)?;
+    println!("drawn in {}", file.display());
+    let low = |path: &[Vector3<f64>]| path.iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
+    anyhow::ensure!(low(&paths[1]) < 1.01 * RADIUS, "it should bounce");
+    anyhow::ensure!(off[1] < 1e-6, "it should hit the target");
+    Ok(())
+}
+
+/// The paths from the side.
+fn draw(paths: &[Vec<Vector3<f64>>; 2], file: &Path) -> anyhow::Result<()> {
+    let root = SVGBackend::new(file, (720, 360)).into_drawing_area();
+    root.fill(&WHITE)?;
+    let mut chart = ChartBuilder::on(&root)
+        .margin(16)
+        .x_label_area_size(36)
+        .y_label_area_size(48)
+        .build_cartesian_2d(-0.05..1.35, 0.0..0.75)?;
+    chart.configure_mesh().light_line_style(WHITE).x_desc("x [m]").y_desc("height [m]").draw()?;
+    let (gray, blue, red) =
+        (RGBColor(140, 140, 140), RGBColor(31, 119, 180), RGBColor(214, 39, 40));
+    for (path, color, name) in [(&paths[0], gray, "first throw"), (&paths[1], blue, "found")] {
+        let line = LineSeries::new(path.iter().map(|p| (p.x, p.z)), color.stroke_width(2));
+        chart
+            .draw_series(line)?
+            .label(name)
+            .legend(move |(x, y)| PathElement::new([(x, y), (x + 14, y)], color));
+    }
+    let target = Circle::new((TARGET[0], TARGET[2]), 6, red.filled());
+    chart
+        .draw_series([target])?
+        .label("target")
+        .legend(move |(x, y)| Circle::new((x + 7, y), 4, red.filled()));
+    chart
+        .configure_series_labels()
+        .position(SeriesLabelPosition::UpperRight)
+        .background_style(WHITE.mix(0.8))
+        .draw()?;
+    root.present()?;
+    Ok(())
+}
