@@ -57,7 +57,7 @@ pub struct RigidBody<S: Scalar = f64> {
     mass: S,
     inertia: Matrix3<S>,
     inverse_inertia: Matrix3<S>,
-    com: Point3<f64>,
+    com: Point3<S>,
 }
 
 impl<S: Scalar> RigidBody<S> {
@@ -66,12 +66,12 @@ impl<S: Scalar> RigidBody<S> {
     ///
     /// # Errors
     /// Unless the mass is positive, the inertia symmetric positive definite and that of a body, and everything finite.
-    pub fn new(mass: S, inertia: Matrix3<S>, com: Point3<f64>) -> Result<Self, BodyError> {
+    pub fn new(mass: S, inertia: Matrix3<S>, com: Point3<S>) -> Result<Self, BodyError> {
         let value = mass.value();
         if !(value > 0.0 && value.is_finite()) {
             return Err(BodyError::Mass(value));
         }
-        if !com.iter().all(|c| c.is_finite()) {
+        if !com.iter().all(|c| c.value().is_finite()) {
             return Err(BodyError::CenterOfMass);
         }
         let values = inertia.map(S::value);
@@ -112,8 +112,15 @@ impl<S: Scalar> RigidBody<S> {
 
     /// Center of mass in the model frame \[m\].
     #[inline]
-    pub fn com(&self) -> &Point3<f64> {
+    pub fn com(&self) -> &Point3<S> {
         &self.com
+    }
+
+    /// A zero that carries the derivatives of the center of mass, in the model frame \[m\]; none if it is a constant.
+    #[inline]
+    pub(crate) fn com_change(&self) -> Option<Vector3<S>> {
+        let change = self.com.coords.map(|x| x.plus(-x.value()));
+        (!change.iter().all(|x| x.is_constant_zero())).then_some(change)
     }
 
     /// Radius of gyration about the center of mass, of all axes together: √(tr I / 2m) \[m\].
@@ -176,13 +183,13 @@ impl<S: Scalar> RigidBody<S> {
     /// `t_world_com` of a body whose model frame is at `t_world_model`.
     #[inline]
     pub fn com_pose(&self, t_world_model: &Isometry3<S>) -> Isometry3<S> {
-        t_world_model * Translation3::from(self.com.coords.map(S::constant))
+        t_world_model * Translation3::from(self.com.coords)
     }
 
     /// `t_world_model` of a body whose center-of-mass frame is at `t_world_com`.
     #[inline]
     pub fn model_pose(&self, t_world_com: &Isometry3<S>) -> Isometry3<S> {
-        t_world_com * Translation3::from(self.com.coords.map(|x| S::constant(-x)))
+        t_world_com * Translation3::from(-self.com.coords)
     }
 
     /// The same body, each number through `f`.
@@ -191,11 +198,11 @@ impl<S: Scalar> RigidBody<S> {
             mass: f(self.mass),
             inertia: self.inertia.map(&f),
             inverse_inertia: self.inverse_inertia.map(&f),
-            com: self.com,
+            com: self.com.map(&f),
         }
     }
 
-    /// The body at rest with its model frame at `t_world_model`.
+    /// The body at rest with its model frame at `t_world_model`. Derivatives by the center of mass are in the state, too.
     pub fn at_rest(&self, t_world_model: &Isometry3<S>) -> State<S> {
         State::at_rest(self.com_pose(t_world_model))
     }

@@ -30,7 +30,9 @@ impl<S: Scalar> BroadPhase<S> {
     pub(crate) fn new(full: &World<S>) -> Self {
         let radius = |pair: &ContactPair<S>| {
             let body = &full.bodies[pair.bodies.samples];
-            body.surface.as_ref().map_or(0.0, |surface| surface.radius_about(&body.com()))
+            body.surface
+                .as_ref()
+                .map_or(0.0, |surface| surface.radius_about(&body.com().map(S::value)))
         };
         let radii = full.contacts.iter().map(radius).collect();
         Self { world: None, radii, made_at: Vec::new(), margin: 0.0 }

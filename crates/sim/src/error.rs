@@ -63,7 +63,7 @@ pub enum SimulationError {
         /// How many it has.
         expected: usize,
     },
-    /// A body has an impossible mass or inertia.
+    /// A body has an impossible mass, inertia or center of mass.
     #[error("body '{body}': {error}")]
     Body {
         /// Its name.

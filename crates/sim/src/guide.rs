@@ -254,8 +254,9 @@
 //!
 //! # Gradients, forward
 //! Write what you want to know once over the scalar: [`World::lift`] makes constants of a world, and any of its numbers may
-//! then be replaced by one that carries derivatives. [`Fwd`](prehend_autodiff::Fwd) is for few inputs. A mass or inertia is
-//! replaced together with its body: [`RigidBody::new`]. All of them in a row: [`World::parameters`].
+//! then be replaced by one that carries derivatives. [`Fwd`](prehend_autodiff::Fwd) is for few inputs. A mass, an
+//! inertia or a center of mass is replaced together with its body: [`RigidBody::new`]. All of them in a row:
+//! [`World::parameters`]. Where the model's pose is given, a center of mass is in the start, too: [`RigidBody::at_rest`].
 //!
 //! ```
 //! # use nalgebra::{Isometry3, Matrix3, Point3, Vector3};

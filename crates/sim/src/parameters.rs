@@ -1,7 +1,7 @@
 //! The parameters of a world and the coordinates of a state in a row, as functions of many numbers want them.
 
 use nalgebra::{
-    Isometry3, Matrix3, Quaternion, Translation3, Unit, UnitQuaternion, Vector3, Vector6,
+    Isometry3, Matrix3, Point3, Quaternion, Translation3, Unit, UnitQuaternion, Vector3, Vector6,
 };
 use prehend_autodiff::Scalar;
 
@@ -49,8 +49,13 @@ pub(crate) fn states_of<S: Scalar>(coordinates: &[S]) -> impl Iterator<Item = St
 impl<S: Scalar> World<S> {
     /// Everything by which a world can be differentiated, in a row.
     ///
-    /// For each body: if it is free, its mass \[kg\] and its inertia xx, yy, zz, xy, xz, yz \[kg m²\]; then its external wrench,
-    /// force \[N\] and torque \[N m\]. Then gravity \[m/s²\]; then the law's parameters of each contact.
+    /// For each body: if it is free, its mass \[kg\], its inertia xx, yy, zz, xy, xz, yz \[kg m²\] and its center of mass in the
+    /// model frame \[m\]; then its external wrench, force \[N\] and torque \[N m\]. Then gravity \[m/s²\]; then the law's parameters
+    /// of each contact.
+    ///
+    /// States are those of centers of mass: with the states as they are, a body whose center of mass moves in its model frame is
+    /// a body whose shape moves the other way. Where the model's pose is given instead, the state follows from
+    /// [`RigidBody::at_rest`] with the center of mass that varies.
     pub fn parameters(&self) -> Vec<S> {
         let mut parameters = Vec::new();
         for body in &self.bodies {
@@ -58,6 +63,7 @@ impl<S: Scalar> World<S> {
                 let i = rigid.inertia();
                 parameters.push(rigid.mass());
                 parameters.extend([i.m11, i.m22, i.m33, i.m12, i.m13, i.m23]);
+                parameters.extend(rigid.com().iter());
             }
             parameters.extend(body.external_wrench.iter());
         }
@@ -69,14 +75,14 @@ impl<S: Scalar> World<S> {
     /// The same bodies and contacts with other `parameters`, in the order of [`World::parameters`].
     ///
     /// # Errors
-    /// If there are too few or too many, or a body of such a mass or inertia is impossible.
+    /// If there are too few or too many, or a body of such a mass, inertia or center of mass is impossible.
     pub fn with_parameters<T: Scalar>(
         &self,
         parameters: &[T],
     ) -> Result<World<T>, SimulationError> {
         let free = self.bodies.iter().filter(|body| body.rigid().is_some()).count();
         let params: usize = self.contacts.iter().map(|pair| pair.params().len()).sum();
-        let expected = 7 * free + 6 * self.bodies.len() + 3 + params;
+        let expected = 10 * free + 6 * self.bodies.len() + 3 + params;
         if parameters.len() != expected {
             return Err(SimulationError::Parameters { given: parameters.len(), expected });
         }
@@ -89,7 +95,8 @@ impl<S: Scalar> World<S> {
                 let mass = next();
                 let [xx, yy, zz, xy, xz, yz] = std::array::from_fn(|_| next());
                 let inertia = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
-                *rigid = RigidBody::new(mass, inertia, *rigid.com())
+                let com = Point3::from(Vector3::from_fn(|_, _| next()));
+                *rigid = RigidBody::new(mass, inertia, com)
                     .map_err(|error| SimulationError::Body { body: body.name.clone(), error })?;
             }
             body.external_wrench = Vector6::from_fn(|_, _| next());
@@ -113,8 +120,8 @@ mod tests {
         let (mut world, states) = egg_on(floor(), GapSmoothing::Hard);
         world.bodies[1].external_wrench = Vector6::new(1.0, 2.0, 3.0, 4.0, 5.0, 6.0);
         let numbers = world.parameters();
-        assert_eq!(numbers.len(), 6 + 7 + 6 + 3 + 3);
-        let variables: [Fwd<25>; 25] = Fwd::variables(std::array::from_fn(|i| numbers[i]));
+        assert_eq!(numbers.len(), 6 + 10 + 6 + 3 + 3);
+        let variables: [Fwd<28>; 28] = Fwd::variables(std::array::from_fn(|i| numbers[i]));
         let lifted = world.with_parameters(&variables).unwrap();
         for (place, number) in lifted.parameters().iter().enumerate() {
             assert_eq!(number.value, numbers[place]);
@@ -136,7 +143,7 @@ mod tests {
         let (world, _) = egg_on(floor(), GapSmoothing::Hard);
         let mut numbers = world.parameters();
         let error = world.with_parameters(&numbers[1..]).unwrap_err();
-        assert_eq!(error, SimulationError::Parameters { given: 24, expected: 25 });
+        assert_eq!(error, SimulationError::Parameters { given: 27, expected: 28 });
         numbers[6] = -1.0;
         let error = BodyError::Mass(-1.0);
         let refused = world.with_parameters(&numbers).unwrap_err();

@@ -69,8 +69,8 @@ impl<S: Scalar> State<S> {
 
     /// The state of a frame fixed to the body at `offset` from its center of mass, in the model's axes \[m\].
     #[inline]
-    pub fn shifted(&self, offset: &Vector3<f64>) -> Self {
-        let arm = self.pose.rotation * offset.map(S::constant);
+    pub fn shifted(&self, offset: &Vector3<S>) -> Self {
+        let arm = self.pose.rotation * offset;
         let mut shifted = *self;
         shifted.pose.translation.vector += arm;
         shifted.linear += self.angular.cross(&arm);

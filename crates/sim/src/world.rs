@@ -4,6 +4,7 @@ pub(crate) mod body;
 pub(crate) mod body_id;
 pub(crate) mod contact_pair;
 pub(crate) mod deflection;
+mod seen;
 
 use std::fmt;
 use std::sync::Arc;
@@ -21,6 +22,7 @@ use crate::state::State;
 use body::{Body, Motion};
 use body_id::BodyId;
 use contact_pair::{ContactBodies, ContactPair};
+use seen::Seen;
 
 /// Bodies, their contacts, and gravity: plain data, over plain numbers or numbers that carry derivatives.
 ///
@@ -191,7 +193,7 @@ impl<S: Scalar> World<S> {
         step: usize,
     ) -> Effect<S> {
         let seen = self.seen(pair, states);
-        let Some(patch) = self.patch(pair, seen.value()) else { return Effect::default() };
+        let Some(patch) = self.patch(pair, seen.state.value()) else { return Effect::default() };
         let patch = Patch { smoothing: pair.smoothing.at_step(step), ..patch };
         let ([fx, fy, fz, tx, ty, tz], rate) = match pair.law().bristles() {
             None => (local_wrench(pair, &seen, &patch), Vector6::zeros()),
@@ -215,28 +217,11 @@ impl<S: Scalar> World<S> {
         let body = &self.bodies[pair.bodies.samples];
         Some(Patch {
             surface: pair.near.as_ref().or(body.surface.as_ref())?,
-            com: body.com(),
+            com: body.com().map(S::value),
             state,
             field: self.bodies[pair.bodies.field].field.as_deref()?,
             smoothing: pair.smoothing,
         })
-    }
-
-    /// The body with the samples as the field sees it, in the model frame of the body with the field.
-    fn seen(&self, pair: &ContactPair<S>, states: &[State<S>]) -> State<S> {
-        let com = self.bodies[pair.bodies.field].com();
-        states[pair.bodies.samples].seen_from(&states[pair.bodies.field].shifted(&-com.coords))
-    }
-
-    /// [`World::seen`] without derivatives: nothing is recorded.
-    pub(crate) fn seen_value<T: Scalar>(
-        &self,
-        pair: &ContactPair<S>,
-        states: &[State<T>],
-    ) -> State {
-        let com = self.bodies[pair.bodies.field].com();
-        let frame = states[pair.bodies.field].value().shifted(&-com.coords);
-        states[pair.bodies.samples].value().seen_from(&frame)
     }
 
     /// Moves the bodies that forces do not move to where they are at `time` \[s\].
@@ -251,7 +236,7 @@ impl<S: Scalar> World<S> {
 
 /// The wrench of `patch`, which is `pair` at the value of `seen`, with the derivatives that `seen` and the parameters
 /// carry.
-fn local_wrench<S: Scalar>(pair: &ContactPair<S>, seen: &State<S>, patch: &Patch<'_>) -> [S; 6] {
+fn local_wrench<S: Scalar>(pair: &ContactPair<S>, seen: &Seen<S>, patch: &Patch<'_>) -> [S; 6] {
     const { assert!(S::ORDER <= 1, "contacts have first derivatives only: no nested scalars") };
     let values: Vec<f64> = pair.params().iter().map(|p| p.value()).collect();
     if S::ORDER == 0 {
@@ -261,19 +246,26 @@ fn local_wrench<S: Scalar>(pair: &ContactPair<S>, seen: &State<S>, patch: &Patch
     let moved: Vec<S> = pair.params().iter().map(|p| p.plus(-p.value())).collect();
     let by_params = moved.iter().any(|p| !p.is_constant_zero());
     let jacobian = pair.law().wrench_jacobian(&values, patch, by_params);
-    let mut wrench = S::local(&jacobian, seen.tangent());
+    let mut wrench = S::local(&jacobian, seen.state.tangent());
     for (by_param, moved) in jacobian.by_params.iter().zip(moved) {
         for (component, slope) in wrench.iter_mut().zip(by_param.iter()) {
             *component += moved.times(*slope);
         }
     }
-    wrench
+    let [fx, fy, fz, tx, ty, tz] = wrench;
+    match &seen.from_com {
+        None => wrench,
+        Some(from_com) => {
+            let torque = Vector3::new(tx, ty, tz) + from_com.cross(&Vector3::new(fx, fy, fz));
+            stack(&Vector3::new(fx, fy, fz), &torque).into()
+        }
+    }
 }
 
 /// [`local_wrench`] of a contact that sticks, and the rate of its deflection.
 fn local_bristles<S: Scalar>(
     pair: &ContactPair<S>,
-    seen: &State<S>,
+    seen: &Seen<S>,
     patch: &Patch<'_>,
     bristles: Bristles,
     deflection: Vector6<S>,
@@ -286,9 +278,15 @@ fn local_bristles<S: Scalar>(
         (std::array::from_fn(|i| all[i]), Vector6::from_fn(|i, _| all[6 + i]))
     };
     let function = BristleFunction { law, p: &values, patch, bristles, deflection: at };
-    let tangent = seen.tangent();
+    let tangent = seen.state.tangent();
     let change = |i: usize| if i < 12 { tangent[i] } else { deflection[i - 12].plus(-at[i - 12]) };
-    let mut all = S::local(&function, std::array::from_fn(change));
+    let mut all = match &seen.from_com {
+        None => S::local(&function, std::array::from_fn::<S, 18, _>(change)),
+        Some(from_com) => {
+            let change = |i: usize| if i < 18 { change(i) } else { from_com[i - 18] };
+            S::local(&function, std::array::from_fn::<S, 21, _>(change))
+        }
+    };
     // Zeros that carry the parameters' derivatives.
     let moved: Vec<S> = pair.params().iter().map(|p| p.plus(-p.value())).collect();
     for (from, moved) in moved.chunks(6).enumerate().map(|(i, moved)| (6 * i, moved)) {
@@ -301,7 +299,7 @@ fn local_bristles<S: Scalar>(
         };
         let p: Vec<Fwd<6>> = values.iter().enumerate().map(seeded).collect();
         let (still, at) = ([Fwd::constant(0.0); 12], at.map(Fwd::constant));
-        let slopes = bristle_response(law, &p, patch, bristles, &still, &at);
+        let slopes = bristle_response(law, &p, patch, bristles, &still, &at, None);
         for (component, slope) in all.iter_mut().zip(slopes) {
             for (moved, slope) in moved.iter().zip(slope.derivative) {
                 *component += moved.times(slope);
@@ -333,7 +331,7 @@ mod tests {
     use prehend_autodiff::check::{compare_gradients, finite_difference_jacobian};
 
     use super::*;
-    use crate::scenes::{egg_on, ellipsoid, floor, penalty};
+    use crate::scenes::{egg_on, ellipsoid, floor, penalty, sticking};
     use crate::{RigidBody, Sphere, SphereCavity, Surface};
 
     /// A pebble in a cup, both free, turned and moving; they touch both ways.
@@ -443,6 +441,45 @@ mod tests {
             for (i, difference) in reference.iter().enumerate() {
                 let slope = exact[row].derivative[i] * at[i];
                 assert!((slope - difference).abs() < 1e-6 * (1.0 + difference.abs()), "{row} {i}");
+            }
+        }
+    }
+
+    /// The wrenches and rates of [`pebble_in_cup`] with the centers of mass moved by `change`.
+    fn with_centers_moved<S: Scalar>(world: &World, states: &[State], change: &[S]) -> Vec<S> {
+        let mut world = world.lift::<S>();
+        for (body, change) in world.bodies.iter_mut().zip(change.as_chunks::<3>().0) {
+            let rigid = *body.rigid().unwrap();
+            let com = rigid.com() + Vector3::from(*change);
+            body.motion =
+                Motion::Free(RigidBody::new(rigid.mass(), *rigid.inertia(), com).unwrap());
+        }
+        let states: Vec<State<S>> = states.iter().map(State::lift).collect();
+        world.wrenches(&states, 0).iter().flat_map(|w| w.iter().copied()).collect()
+    }
+
+    #[test]
+    fn centers_of_mass_have_their_derivatives_in_every_contact() {
+        let (mut world, mut states) = pebble_in_cup();
+        for sticks in [false, true] {
+            if sticks {
+                let law: Arc<dyn DynContactLaw> = Arc::new(sticking(5e6, 2e4, 0.6, 2e-2));
+                world.contacts.iter_mut().for_each(|pair| pair.set_law(Arc::clone(&law)));
+                let deflection = Vector6::new(1e-4, -2e-4, 3e-4, 5e-3, -2e-3, 1e-2);
+                let state = State::at_rest(Isometry3::identity());
+                states.extend([state.deflected(&deflection), state.deflected(&-deflection)]);
+            }
+            let exact = with_centers_moved(&world, &states, &Fwd::<6>::variables([0.0; 6]));
+            // Springs are solved for, and round.
+            let differences = finite_difference_jacobian(
+                |x| with_centers_moved(&world, &states, x),
+                &[0.0; 6],
+                1e-5,
+            );
+            assert_eq!(exact.len(), if sticks { 24 } else { 12 });
+            for (row, reference) in differences.iter().enumerate() {
+                let error = compare_gradients(&exact[row].derivative, reference);
+                assert!(error.relative < 1e-6, "sticks: {sticks}, row {row}: {error:?}");
             }
         }
     }

@@ -50,17 +50,32 @@ pub(crate) struct BristleFunction<'a> {
     pub(crate) deflection: Vector6<f64>,
 }
 
-impl LocalFunction<18, 12> for BristleFunction<'_> {
-    fn evaluate<S: Scalar>(&self, change: [S; 18]) -> [S; 12] {
+impl BristleFunction<'_> {
+    fn response<S: Scalar>(&self, change: &[S], from_com: Option<&Vector3<S>>) -> [S; 12] {
         let p: Vec<S> = self.p.iter().map(|&p| S::constant(p)).collect();
         let tangent = std::array::from_fn(|i| change[i]);
         let deflection = Vector6::from_fn(|i, _| change[12 + i].plus(self.deflection[i]));
-        bristle_response(self.law, &p, self.patch, self.bristles, &tangent, &deflection)
+        bristle_response(self.law, &p, self.patch, self.bristles, &tangent, &deflection, from_com)
+    }
+}
+
+impl LocalFunction<18, 12> for BristleFunction<'_> {
+    fn evaluate<S: Scalar>(&self, change: [S; 18]) -> [S; 12] {
+        self.response(&change, None)
+    }
+}
+
+/// Also of the place of the patch's point from the center of mass, after the rest.
+impl LocalFunction<21, 12> for BristleFunction<'_> {
+    fn evaluate<S: Scalar>(&self, change: [S; 21]) -> [S; 12] {
+        let [.., x, y, z] = change;
+        self.response(&change, Some(&Vector3::new(x, y, z)))
     }
 }
 
 /// The wrench of all contacts of `patch` about the center of mass and the rate of the deflection, along the axes of the field, to
-/// first order in `tangent`, by which the state is away from that of the patch.
+/// first order in `tangent`, by which the state is away from that of the patch, and in `from_com`, from the center of mass
+/// to the point that this is the state of.
 pub(crate) fn bristle_response<T: Scalar>(
     law: &dyn DynContactLaw,
     p: &[T],
@@ -68,6 +83,7 @@ pub(crate) fn bristle_response<T: Scalar>(
     bristles: Bristles,
     tangent: &[T; 12],
     deflection: &Vector6<T>,
+    from_com: Option<&Vector3<T>>,
 ) -> [T; 12] {
     let cutoff = law.reach();
     let law = BristleLaw::new(law, p);
@@ -76,6 +92,7 @@ pub(crate) fn bristle_response<T: Scalar>(
     let mut brush = Brush::default();
     let sound = patch.for_each_touch(cutoff, T::ORDER == 0, |touch| {
         let Lifted { mut contact, lever } = moved.lift(touch, cutoff);
+        let lever = from_com.map_or(lever, |from_com| lever + from_com);
         let across = across(&contact.normal, &lever);
         let (slip, bent) = (contact.slip, across * deflection);
         contact.slip += bent.map(|u| u.times(bristles.slip_speed / bristles.deflection));

@@ -94,7 +94,7 @@ impl<S: Scalar> Body<S> {
 
     /// Center of mass in the model frame \[m\].
     #[inline]
-    pub fn com(&self) -> Point3<f64> {
+    pub fn com(&self) -> Point3<S> {
         self.rigid().map_or_else(Point3::origin, |body| *body.com())
     }
 

@@ -246,7 +246,8 @@ fn with_parameters<S: Scalar>(world: &World, factors: &[S]) -> World<S> {
     }
     let rigid = world.bodies[1].rigid().unwrap();
     let inertia = rigid.inertia().map(|x| factors[4].times(x));
-    let rigid = RigidBody::new(factors[3].times(rigid.mass()), inertia, *rigid.com()).unwrap();
+    let com = rigid.com().map(S::constant);
+    let rigid = RigidBody::new(factors[3].times(rigid.mass()), inertia, com).unwrap();
     changed.bodies[1].motion = Motion::Free(rigid);
     changed.gravity *= factors[5];
     changed.bodies[1].external_wrench =

@@ -1,0 +1,48 @@
+//! A body as the field of another sees it.
+
+use nalgebra::Vector3;
+use prehend_autodiff::Scalar;
+
+use super::World;
+use super::contact_pair::ContactPair;
+use crate::state::State;
+
+/// The body with the samples of a contact, in the model frame of the body with the field.
+///
+/// Samples are plain numbers from the center of mass. Where that carries derivatives, they are about the point of the body
+/// which has its value for coordinates, as if the body were that: it does not move as the center of mass does.
+pub(super) struct Seen<S: Scalar> {
+    /// The state of that point.
+    pub(super) state: State<S>,
+    /// From the center of mass to that point \[m\], a zero that carries derivatives; none if they are the same.
+    pub(super) from_com: Option<Vector3<S>>,
+}
+
+impl<S: Scalar> World<S> {
+    /// How the field of `pair` sees its samples.
+    #[inline]
+    pub(super) fn seen(&self, pair: &ContactPair<S>, states: &[State<S>]) -> Seen<S> {
+        let com = self.bodies[pair.bodies.field].com();
+        let frame = states[pair.bodies.field].shifted(&-com.coords);
+        let state = &states[pair.bodies.samples];
+        let rigid = self.bodies[pair.bodies.samples].rigid();
+        match rigid.and_then(|rigid| rigid.com_change()) {
+            None => Seen { state: state.seen_from(&frame), from_com: None },
+            Some(change) => {
+                let state = state.shifted(&-change).seen_from(&frame);
+                Seen { from_com: Some(-(state.pose.rotation * change)), state }
+            }
+        }
+    }
+
+    /// [`World::seen`] without derivatives: nothing is recorded.
+    pub(crate) fn seen_value<T: Scalar>(
+        &self,
+        pair: &ContactPair<S>,
+        states: &[State<T>],
+    ) -> State {
+        let com = self.bodies[pair.bodies.field].com().coords.map(S::value);
+        let frame = states[pair.bodies.field].value().shifted(&-com);
+        states[pair.bodies.samples].value().seen_from(&frame)
+    }
+}
