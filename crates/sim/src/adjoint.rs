@@ -14,6 +14,7 @@ use crate::time::{Step, TimeSteps};
 use crate::world::World;
 use crate::world::body::{Body, Motion};
 use crate::world::contact_pair::ContactPair;
+use crate::world::trajectory::plain;
 
 /// An integrator each of whose steps [`Var`] records as one node.
 ///
@@ -90,7 +91,7 @@ impl<I: Integrator> StepCheckpointed<I> {
     /// `integrator` for `world` and others that differ from it in parameters only.
     ///
     /// # Errors
-    /// If a body of the world has an impossible mass, inertia or center of mass.
+    /// If a body of the world has an impossible mass, inertia or center of mass, or a trajectory carries derivatives.
     pub fn new<S: Scalar>(integrator: I, world: &World<S>) -> Result<Self, SimulationError> {
         Ok(Self { scene: Scene::new(integrator, world)? })
     }
@@ -98,7 +99,8 @@ impl<I: Integrator> StepCheckpointed<I> {
 
 impl<I: Integrator + Send + 'static> Integrator for StepCheckpointed<I> {
     /// # Errors
-    /// As the integrator within, and if the world differs from the one of [`StepCheckpointed::new`] in more than parameters.
+    /// As the integrator within; if the world differs from the one of [`StepCheckpointed::new`] in more than parameters, or a
+    /// trajectory carries derivatives.
     fn step<S: Scalar>(
         &self,
         world: &World<S>,
@@ -108,6 +110,7 @@ impl<I: Integrator + Send + 'static> Integrator for StepCheckpointed<I> {
         if S::ORDER == 0 {
             return self.scene.integrator.step(world, states, step);
         }
+        world.check_trajectories()?;
         if !has_parts_of(world, &self.scene.world) {
             return Err(SimulationError::AnotherWorld);
         }
@@ -170,7 +173,7 @@ fn has_parts_of<S: Scalar>(a: &World<S>, b: &World) -> bool {
     let body = |(a, b): (&Body<S>, &Body)| {
         let motion = match (&a.motion, &b.motion) {
             (Motion::Free(_), Motion::Free(_)) | (Motion::Kinematic, Motion::Kinematic) => true,
-            (Motion::Driven(a), Motion::Driven(b)) => Arc::ptr_eq(a, b),
+            (Motion::Driven(a), Motion::Driven(b)) => same(plain(a).as_ref(), plain(b).as_ref()),
             _ => false,
         };
         motion
@@ -215,7 +218,7 @@ impl World<Var> {
     /// ```
     ///
     /// # Errors
-    /// See [`World::rollout`].
+    /// See [`World::rollout`]; if a trajectory carries derivatives.
     pub fn simulate_checkpointed(
         &self,
         integrator: impl Integrator + 'static,

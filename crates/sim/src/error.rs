@@ -74,6 +74,15 @@ pub enum SimulationError {
     /// A world that differs in more than parameters from the one its integrator was made for.
     #[error("the integrator was made for a world of other bodies or contacts")]
     AnotherWorld,
+    /// A trajectory that carries derivatives, where only values of it would be kept.
+    #[error(
+        "body '{body}' is driven by a trajectory that carries derivatives: checkpoints and parameters in a row know its values \
+         only, so record the simulation as it is"
+    )]
+    TrajectoryDerivatives {
+        /// Its name.
+        body: String,
+    },
     /// The time step is not a positive number.
     #[error("a time, or a time step, must be positive and finite, is {0} s")]
     TimeStep(f64),

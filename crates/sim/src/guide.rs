@@ -57,7 +57,9 @@
 //! it, to time 0 before the first step too: the state given for it does not matter.
 //!
 //! ```
+//! # use std::sync::Arc;
 //! # use nalgebra::{Isometry3, Vector3};
+//! # use prehend_autodiff::{Fwd, Scalar};
 //! # use prehend_sim::*;
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let mut world = World::new(Vector3::zeros());
@@ -69,6 +71,17 @@
 //! let start = [State::at_rest(Isometry3::identity())];
 //! let end = world.simulate(&start, 0.5)?;
 //! assert!((end[table].pose.translation.x - 0.05).abs() < 1e-12);
+//!
+//! // By its speed: over numbers that carry derivatives, the same for all that it touches.
+//! let speed = Fwd::<1>::variable(0.1, 0);
+//! let mut lifted = world.lift();
+//! lifted.bodies[table].motion = Motion::Driven(Arc::new(move |time: f64| {
+//!     let mut state = State::at_rest(Isometry3::identity());
+//!     (state.pose.translation.x, state.linear.x) = (speed.times(time), speed);
+//!     state
+//! }));
+//! let end = lifted.simulate(&start.map(|state| state.lift()), 0.5)?;
+//! assert!((end[table].pose.translation.x.derivative[0] - 0.5).abs() < 1e-12);
 //! # Ok(())
 //! # }
 //! ```

@@ -86,6 +86,7 @@ pub use state::State;
 pub use surface::{Surface, SurfacePoint};
 pub use time::{Step, TimeSteps};
 pub use world::World;
-pub use world::body::{Body, Motion, Trajectory};
+pub use world::body::{Body, Motion};
 pub use world::body_id::BodyId;
 pub use world::contact_pair::{ContactBodies, ContactPair};
+pub use world::trajectory::Trajectory;

@@ -47,7 +47,7 @@ pub(crate) fn states_of<S: Scalar>(coordinates: &[S]) -> impl Iterator<Item = St
 }
 
 impl<S: Scalar> World<S> {
-    /// Everything by which a world can be differentiated, in a row.
+    /// Everything by which a world can be differentiated, but for trajectories, in a row.
     ///
     /// For each body: if it is free, its mass \[kg\], its inertia xx, yy, zz, xy, xz, yz \[kg m²\] and its center of mass in the
     /// model frame \[m\]; then its external wrench, force \[N\] and torque \[N m\]. Then gravity \[m/s²\]; then the law's parameters
@@ -75,11 +75,13 @@ impl<S: Scalar> World<S> {
     /// The same bodies and contacts with other `parameters`, in the order of [`World::parameters`].
     ///
     /// # Errors
-    /// If there are too few or too many, or a body of such a mass, inertia or center of mass is impossible.
+    /// If there are too few or too many, or a body of such a mass, inertia or center of mass is impossible; if a trajectory of this
+    /// world carries derivatives, which are no parameters.
     pub fn with_parameters<T: Scalar>(
         &self,
         parameters: &[T],
     ) -> Result<World<T>, SimulationError> {
+        self.check_trajectories()?;
         let free = self.bodies.iter().filter(|body| body.rigid().is_some()).count();
         let params: usize = self.contacts.iter().map(|pair| pair.params().len()).sum();
         let expected = 10 * free + 6 * self.bodies.len() + 3 + params;

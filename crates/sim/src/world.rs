@@ -5,6 +5,7 @@ pub(crate) mod body_id;
 pub(crate) mod contact_pair;
 pub(crate) mod deflection;
 mod seen;
+pub(crate) mod trajectory;
 
 use std::fmt;
 use std::sync::Arc;
@@ -140,7 +141,7 @@ impl<S: Scalar> World<S> {
         (0..self.bodies.len()).map(BodyId).filter(free).collect()
     }
 
-    /// The same world, each number through `f`.
+    /// The same world, each number through `f`, but for trajectories, which become those of constants.
     pub(crate) fn map<T: Scalar>(&self, f: impl Fn(S) -> T) -> World<T> {
         World {
             bodies: self.bodies.iter().map(|body| body.map(&f)).collect(),
@@ -228,7 +229,7 @@ impl<S: Scalar> World<S> {
     pub fn drive(&self, states: &mut [State<S>], time: f64) {
         for (body, state) in self.bodies.iter().zip(states) {
             if let Motion::Driven(trajectory) = &body.motion {
-                *state = trajectory.state(time).lift();
+                *state = trajectory.state(time);
             }
         }
     }

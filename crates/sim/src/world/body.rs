@@ -6,8 +6,8 @@ use nalgebra::{Point3, Vector6};
 use prehend_autodiff::Scalar;
 use prehend_geometry::DistanceField;
 
+use super::trajectory::{self, Trajectory};
 use crate::body::RigidBody;
-use crate::state::State;
 use crate::surface::Surface;
 
 /// What a body is and how it touches others.
@@ -32,20 +32,9 @@ pub enum Motion<S: Scalar = f64> {
     Free(RigidBody<S>),
     /// Nothing but whoever sets its state. What touches it feels the state's velocity, a conveyor's for instance.
     Kinematic,
-    /// A trajectory, whatever the forces: a link of a robot whose joints are driven.
-    Driven(Arc<dyn Trajectory>),
-}
-
-/// State of a model frame in the world as a function of time.
-pub trait Trajectory: Send + Sync {
-    /// The state at `time` \[s\].
-    fn state(&self, time: f64) -> State;
-}
-
-impl<F: Fn(f64) -> State + Send + Sync> Trajectory for F {
-    fn state(&self, time: f64) -> State {
-        self(time)
-    }
+    /// A trajectory, whatever the forces: a link of a robot whose joints are driven. In a lifted world one that carries derivatives
+    /// may take its place.
+    Driven(Arc<dyn Trajectory<S>>),
 }
 
 impl<S: Scalar> Body<S> {
@@ -65,7 +54,7 @@ impl<S: Scalar> Body<S> {
     }
 
     /// A body on a trajectory. Its center of mass is the origin of its model frame.
-    pub fn driven(name: &str, trajectory: impl Trajectory + 'static) -> Self {
+    pub fn driven(name: &str, trajectory: impl Trajectory<S>) -> Self {
         Self::new(name, Motion::Driven(Arc::new(trajectory)))
     }
 
@@ -98,14 +87,14 @@ impl<S: Scalar> Body<S> {
         self.rigid().map_or_else(Point3::origin, |body| *body.com())
     }
 
-    /// The same body, each number through `f`.
+    /// The same body, each number through `f`, but for a trajectory, which becomes one of constants.
     pub(super) fn map<T: Scalar>(&self, f: impl Fn(S) -> T) -> Body<T> {
         Body {
             name: self.name.clone(),
             motion: match &self.motion {
                 Motion::Free(rigid) => Motion::Free(rigid.map(&f)),
                 Motion::Kinematic => Motion::Kinematic,
-                Motion::Driven(trajectory) => Motion::Driven(Arc::clone(trajectory)),
+                Motion::Driven(trajectory) => Motion::Driven(trajectory::constant(trajectory)),
             },
             surface: self.surface.clone(),
             field: self.field.clone(),

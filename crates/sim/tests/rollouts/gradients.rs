@@ -51,7 +51,7 @@ struct Scene {
 }
 
 /// Translation, rotation as a quaternion, linear and angular velocity.
-fn coordinates<S: Scalar>(state: &State<S>) -> Vec<S> {
+pub(super) fn coordinates<S: Scalar>(state: &State<S>) -> Vec<S> {
     let State { pose, linear, angular } = state;
     let (translation, rotation) = (pose.translation.vector, pose.rotation.coords);
     let moving = linear.iter().chain(angular.iter());
