@@ -2,6 +2,7 @@
 
 pub(crate) mod balance;
 pub(crate) mod compliant;
+pub(crate) mod pair_friction;
 
 use nalgebra::{Point3, Unit, Vector3, Vector6};
 
@@ -11,6 +12,7 @@ use crate::world::World;
 use crate::world::body_id::BodyId;
 use crate::world::contact_pair::{ContactBodies, ContactPair};
 use balance::{Support, WrenchBalance, friction_factor};
+use pair_friction::PairFriction;
 
 /// Whether a body could rest where it is.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,7 +24,7 @@ pub struct Equilibrium {
     pub supports: Vec<Support>,
     /// Forces at these points that balance the external wrench and gravity, whatever the contact laws say.
     pub balance: WrenchBalance,
-    /// The least factor on the friction coefficient with which they do; see [`friction_factor`].
+    /// The least factor on the friction coefficients with which they do; see [`friction_factor`].
     pub friction_factor: f64,
 }
 
@@ -37,6 +39,8 @@ impl World {
     /// Whether forces at the contacts of `body`, within friction cones of coefficient `friction`, could hold it at
     /// `states` under its external wrench and gravity. Samples no farther than `reach` \[m\] are in contact.
     ///
+    /// Friction is a number, or a function of the other body ([`PairFriction`]).
+    ///
     /// Velocities matter to [`Equilibrium::net`] only.
     ///
     /// # Errors
@@ -45,7 +49,7 @@ impl World {
         &self,
         body: BodyId,
         states: &[State],
-        friction: f64,
+        friction: impl PairFriction,
         reach: f64,
     ) -> Result<Equilibrium, SimulationError> {
         let bodies = self.bodies.len();
@@ -59,7 +63,7 @@ impl World {
         let weight = self.gravity * rigid.mass();
         let weight = Vector6::new(weight.x, weight.y, weight.z, 0.0, 0.0, 0.0);
         let load = found.external_wrench + weight;
-        let supports = self.supports(body, states, friction, reach);
+        let supports = self.supports(body, states, &friction, reach);
         let center = Point3::from(states[body].pose.translation.vector);
         Ok(Equilibrium {
             net: self.wrenches(states, 0)[body] + weight,
@@ -70,14 +74,22 @@ impl World {
     }
 
     /// Where samples of `body` touch others, and theirs touch it.
-    fn supports(&self, body: BodyId, states: &[State], friction: f64, reach: f64) -> Vec<Support> {
+    fn supports(
+        &self,
+        body: BodyId,
+        states: &[State],
+        friction: &impl PairFriction,
+        reach: f64,
+    ) -> Vec<Support> {
         let mut supports = Vec::new();
         for pair in &self.contacts {
-            let sign = match body {
-                _ if pair.bodies.samples == body => 1.0,
-                _ if pair.bodies.field == body => -1.0,
+            let ContactBodies { samples, field } = pair.bodies;
+            let (sign, other) = match body {
+                _ if samples == body => (1.0, field),
+                _ if field == body => (-1.0, samples),
                 _ => continue,
             };
+            let friction = friction.with(other);
             for (position, outward) in self.touching(pair, states, reach) {
                 if let Some(normal) = Unit::try_new(outward * sign, 0.0) {
                     supports.push(Support { position, normal, friction });
@@ -116,11 +128,11 @@ impl World {
 mod tests {
     use std::sync::Arc;
 
-    use nalgebra::{Isometry3, Matrix3};
+    use nalgebra::{Isometry3, Matrix3, UnitQuaternion};
 
     use super::*;
     use crate::scenes::{floor, on_ground, penalty};
-    use crate::{Body, GapSmoothing, RigidBody, Surface};
+    use crate::{Body, DynContactLaw, GapSmoothing, RigidBody, Surface};
 
     /// A box of 0.5 kg, 6 cm wide and 4 cm high, on an incline; the center of mass is in its middle.
     fn incline(angle: f64) -> (World, Vec<State>) {
@@ -172,6 +184,64 @@ mod tests {
         };
         assert!((factor(1.45) - 1.45).abs() < 1e-3);
         assert_eq!(factor(1.55), f64::INFINITY);
+    }
+
+    /// A block between two jaws that taper by `taper` \[rad\] each upwards, out of which it is squeezed downwards.
+    fn between_jaws(taper: f64) -> (World, Vec<State>) {
+        let (sin, cos) = taper.sin_cos();
+        let mut world = World::new(Vector3::z() * -9.81);
+        let jaws = [-1.0, 1.0].map(|side: f64| {
+            // A floor turned up, so that it presses inwards and down.
+            let normal = Vector3::new(-side * cos, 0.0, -sin);
+            let turn = UnitQuaternion::rotation_between(&Vector3::z(), &normal).unwrap();
+            let place = Vector3::new(0.03 * side, 0.0, 0.0);
+            let state = State::at_rest(Isometry3::from_parts(place.into(), turn));
+            (world.add(Body::kinematic("jaw").with_field(floor())), state)
+        });
+        let on_face = |i: u32| {
+            let sign = |bit: u32| if i & bit == 0 { -1.0 } else { 1.0 };
+            let height = 0.02 * sign(1);
+            Point3::new(sign(4) * (0.03 - height * sin / cos), 0.02 * sign(2), height)
+        };
+        let points: Vec<Point3<f64>> = (0..8).map(on_face).collect();
+        let rigid = RigidBody::new(0.5, Matrix3::identity() * 1e-4, Point3::origin()).unwrap();
+        let surface = Surface::uniform(&points, 1e-2).unwrap();
+        let samples = world.add(Body::free("block", rigid).with_surface(surface));
+        let law: Arc<dyn DynContactLaw> = Arc::new(penalty(1e6, 1e3, 0.5, 1e-3));
+        for (field, _) in jaws {
+            let bodies = ContactBodies { samples, field };
+            world.add_contact(bodies, Arc::clone(&law), GapSmoothing::Hard).unwrap();
+        }
+        let block = State::at_rest(Isometry3::identity());
+        (world, jaws.map(|(_, state)| state).into_iter().chain([block]).collect())
+    }
+
+    #[test]
+    fn jaws_of_different_friction_hold_by_the_sum_of_their_friction_angles() {
+        let (taper, left, block) = (0.15_f64, BodyId(0), BodyId(2));
+        let (world, states) = between_jaws(taper);
+        for first in [0.05, 0.15, 0.25] {
+            for (sum, holds) in [(0.98, false), (1.02, true)] {
+                // As angles: both jaws together taper by twice the one.
+                let second = 2.0 * taper * sum - first;
+                let [first, second] = [f64::tan(first), f64::tan(second)];
+                let friction = |other: BodyId| if other == left { first } else { second };
+                let found = world.equilibrium(block, &states, friction, 1e-9).unwrap();
+                assert_eq!(found.supports.len(), 8);
+                let of =
+                    |side: f64| found.supports.iter().filter(move |s| s.position.x * side > 0.0);
+                assert!(of(-1.0).all(|s| s.friction == first));
+                assert!(of(1.0).all(|s| s.friction == second));
+                assert_eq!(found.is_possible(), holds, "{first} {second}: {:?}", found.balance);
+                // The factor with which the angles add up.
+                let angles = |k: f64| (k * first).atan() + (k * second).atan();
+                let factor = found.friction_factor;
+                assert!((angles(factor) / (2.0 * taper) - 1.0).abs() < 1e-3, "{factor}");
+                let swapped = |other: BodyId| if other == left { second } else { first };
+                let mirrored = world.equilibrium(block, &states, swapped, 1e-9).unwrap();
+                assert!((mirrored.friction_factor / factor - 1.0).abs() < 1e-3);
+            }
+        }
     }
 
     #[test]

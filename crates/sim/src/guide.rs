@@ -210,6 +210,9 @@
 //! # let states = [State::at_rest(Isometry3::identity()), stands];
 //! // Friction coefficient 0.5; samples within 0.1 mm are in contact.
 //! assert!(world.equilibrium(stool, &states, 0.5, 1e-4)?.is_possible());
+//! // Or one for each body that it touches.
+//! let friction = |other: BodyId| if other == floor { 0.5 } else { 1.0 };
+//! assert!(world.equilibrium(stool, &states, friction, 1e-4)?.is_possible());
 //! world.bodies[stool].external_wrench.x = 2.0; // More than μ m g.
 //! assert!(!world.equilibrium(stool, &states, 0.5, 1e-4)?.is_possible());
 //! # Ok(())

@@ -68,6 +68,7 @@ pub use contact_frequency::StepError;
 pub use equilibrium::Equilibrium;
 pub use equilibrium::balance::{Support, WrenchBalance, friction_factor};
 pub use equilibrium::compliant::{CompliantBalance, CompliantSupport};
+pub use equilibrium::pair_friction::PairFriction;
 pub use error::SimulationError;
 pub use fields::{Cuboid, HalfSpace, Sphere, SphereCavity};
 pub use integrator::Integrator;
