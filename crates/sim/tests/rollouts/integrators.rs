@@ -238,7 +238,7 @@ fn derivatives_match_differences() {
 }
 
 /// The egg of a world with its parameters, in multiples of their values: stiffness, damping and friction of the contact,
-/// mass, inertia, gravity, and an external wrench.
+/// mass, inertia, gravity, an external wrench, and the center of mass.
 fn with_parameters<S: Scalar>(world: &World, factors: &[S]) -> World<S> {
     let mut changed = world.lift::<S>();
     for (param, factor) in changed.contacts[0].params_mut().iter_mut().zip(factors) {
@@ -246,7 +246,7 @@ fn with_parameters<S: Scalar>(world: &World, factors: &[S]) -> World<S> {
     }
     let rigid = world.bodies[1].rigid().unwrap();
     let inertia = rigid.inertia().map(|x| factors[4].times(x));
-    let com = rigid.com().map(S::constant);
+    let com = rigid.com().map(|x| factors[7].times(x));
     let rigid = RigidBody::new(factors[3].times(rigid.mass()), inertia, com).unwrap();
     changed.bodies[1].motion = Motion::Free(rigid);
     changed.gravity *= factors[5];
@@ -263,8 +263,8 @@ fn derivatives_by_parameters_match_differences() {
         world.contacts[0].params_mut()[1] = 2e3;
         let time_steps = TimeSteps { dt: 1e-3, steps: 10 };
         for world in sliding_and_sticking(world) {
-            let lifted: Vec<State<Fwd<7>>> = states.iter().map(State::lift).collect();
-            let changed = with_parameters(&world, &Fwd::<7>::variables([1.0; 7]));
+            let lifted: Vec<State<Fwd<8>>> = states.iter().map(State::lift).collect();
+            let changed = with_parameters(&world, &Fwd::<8>::variables([1.0; 8]));
             let end =
                 changed.simulate_with(integrator, &lifted, time_steps, |_, _| ()).unwrap().states
                     [1];
@@ -278,7 +278,7 @@ fn derivatives_by_parameters_match_differences() {
                         .states;
                     coordinates(&run[1], &end.value())
                 },
-                &[1.0; 7],
+                &[1.0; 8],
                 1e-5,
             );
             for (row, reference) in differences.iter().enumerate() {
