@@ -1,0 +1,85 @@
+//! How a toss began, from its rows before it first touches the board.
+
+use nalgebra::{DMatrix, Isometry3, Vector3};
+use prehend::autodiff::lie::{lift, so3_exp, so3_log};
+use prehend::autodiff::optimize::{Criteria, LevenbergMarquardt, NormalEquations};
+use prehend::autodiff::{Fwd, Scalar, forward_jacobian};
+use prehend::sim::Adaptive;
+
+use crate::cube::{self, EXACT};
+use crate::recording::{Row, Start, Toss};
+
+/// Half-width that surely holds the cube \[m\], and the least height of its corners in flight \[m\].
+const HALF: f64 = 0.0524;
+const CLEAR: f64 = 2e-3;
+/// Noise of positions \[m\] and attitudes \[rad\].
+const NOISE: [f64; 2] = [3e-5, 1e-3];
+/// Gravity by which the velocity of a first row is put right \[m/s²\].
+const GRAVITY: f64 = 9.8;
+
+/// The rows of the flight of a toss.
+pub(crate) fn rows(toss: &Toss) -> usize {
+    let clear = |row: &&Row| {
+        let Isometry3 { translation, rotation } = row.pose();
+        let up = rotation.inverse() * Vector3::z();
+        translation.z - HALF * up.abs().sum() > CLEAR
+    };
+    toss.rows.iter().take_while(clear).count()
+}
+
+/// The start from which a cube with `values` flies as recorded, by least squares, with its derivatives by them; that of the first
+/// row if the flight is too short.
+pub(crate) fn begin(toss: &Toss, values: &[Fwd<EXACT>; EXACT]) -> Start<Fwd<EXACT>> {
+    let (rows, guess) = (rows(toss), toss.rows[0].start(GRAVITY));
+    if rows < 4 {
+        return guess.lift();
+    }
+    let constants: [Fwd<12>; EXACT] = values.map(|x| Fwd::constant(x.value));
+    let residuals = |x: &[Fwd<12>]| off(toss, rows, &constants, &moved(&guess, x));
+    let criteria = Criteria { iterations: 8, decrease: 1e-6, ..Criteria::default() };
+    let solver = LevenbergMarquardt { damping: 0.0, criteria };
+    let found = solver.minimize(&[0.0; 12], |x| NormalEquations::forward::<12>(residuals, x));
+    let Ok(found) = found else { return guess.lift() };
+    // Where the gradient Jᵀr vanishes, so does its derivative JᵀJ s' + Jᵀr', but for curvature times what little is left of r.
+    let (_, by_start) = forward_jacobian(residuals, &found.parameters);
+    let still: Vec<Fwd<EXACT>> = found.parameters.iter().map(|&x| Fwd::constant(x)).collect();
+    let by_values = off(toss, rows, values, &moved(&guess, &still));
+    let by_values = DMatrix::from_fn(6 * rows, EXACT, |i, j| by_values[i].derivative[j]);
+    let normal = by_start.tr_mul(&by_start).cholesky();
+    let Some(normal) = normal else { return guess.lift() };
+    let slopes = -normal.solve(&by_start.tr_mul(&by_values));
+    let lane = |i: usize| Fwd {
+        value: found.parameters[i],
+        derivative: std::array::from_fn(|j| slopes[(i, j)]),
+    };
+    moved(&guess, &(0..12).map(lane).collect::<Vec<_>>())
+}
+
+/// A start by a little of everything: position \[mm\], attitude \[mrad\], velocity \[cm/s\] and spin \[0.1 rad/s\].
+pub(crate) fn moved<S: Scalar>(start: &Start, x: &[S]) -> Start<S> {
+    let part = |k: usize, unit: f64| Vector3::from_fn(|i, _| x[3 * k + i].times(unit));
+    let mut moved = start.lift();
+    moved.pose.translation.vector += part(0, 1e-3);
+    moved.pose.rotation *= so3_exp(&part(1, 1e-3));
+    moved.velocity += part(2, 1e-2);
+    moved.spin += part(3, 0.1);
+    moved
+}
+
+/// By how much the rows of a flight are off, in multiples of their noise.
+fn off<S: Scalar>(toss: &Toss, rows: usize, values: &[S; EXACT], start: &Start<S>) -> Vec<S> {
+    // Corners do not matter in flight.
+    let Ok(path) = cube::path(&Adaptive::default(), values, 0.0, start, rows) else {
+        return vec![S::constant(f64::NAN); 6 * rows];
+    };
+    let row = |(pose, row): (&Isometry3<S>, &Row)| -> [S; 6] {
+        let seen = lift::<S>(&row.pose());
+        let place = pose.translation.vector - seen.translation.vector;
+        let turn = so3_log(&(pose.rotation * seen.rotation.inverse()));
+        std::array::from_fn(|i| match i {
+            0..3 => place[i].times(1.0 / NOISE[0]),
+            _ => turn[i - 3].times(1.0 / NOISE[1]),
+        })
+    };
+    path.iter().zip(&toss.rows).flat_map(row).collect()
+}

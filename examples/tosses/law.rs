@@ -1,0 +1,42 @@
+//! A contact law made for the cube: every number of it may be identified.
+
+use prehend::autodiff::Scalar;
+use prehend::sim::{Contact, ContactLaw, Response};
+
+/// Hunt and Crossley's normal law, N = k dⁿ (1 − c ḋ) for the depth d, and friction whose coefficient grows with slip u and falls
+/// with load:
+///
+/// μ = (μ₀ + μ₁ u/(u + u₁)) (1 − a x), regularized by the slip scale v₀ + v₁ x, for x = N/(N + N₁).
+///
+/// Parameters: k \[N/mⁿ\], c \[s/m\], n, μ₀, μ₁, u₁ \[m/s\], v₀ \[m/s\], v₁ \[m/s\], a, N₁ \[N\].
+pub(crate) struct CubeLaw(pub(crate) [f64; 10]);
+
+/// Slip below which it has no direction \[m/s\].
+const STILL: f64 = 1e-4;
+
+impl ContactLaw for CubeLaw {
+    fn params(&self) -> &[f64] {
+        &self.0
+    }
+
+    fn law<S: Scalar>(&self, p: &[S], contact: &Contact<S>) -> Response<S> {
+        let depth = -contact.gap;
+        if depth.value() <= 0.0 {
+            return Response::zero();
+        }
+        let damped = (S::one() - p[1] * contact.normal_speed).max(S::zero());
+        let normal = p[0] * depth.powf(p[2]) * damped;
+        let slip2 = contact.slip.dot(&contact.slip);
+        let slip = slip2.plus(STILL * STILL).sqrt();
+        let grown = p[3] + p[4] * slip / (slip + p[5]);
+        let load = normal / (normal + p[9]);
+        let slip_scale = p[6] + p[7] * load;
+        let coefficient = grown * (S::one() - p[8] * load);
+        let scale = -(coefficient * normal) / (slip2 + slip_scale * slip_scale).sqrt();
+        Response { normal, tangential: contact.slip * scale }
+    }
+
+    fn reach(&self) -> f64 {
+        0.0
+    }
+}
