@@ -80,12 +80,7 @@ pub(crate) fn wrench_jacobian<L: ContactLaw>(
         // l, which turns with the arm and, if the sample is round, with the normal: δl = δθ×r + L δx, L = −ρ ∂n/∂x.
         let (arm, lever) = (&touch.arm, &touch.lever);
         if touch.radius > 0.0 {
-            let by_place = |i: usize, j: usize| -touch.radius * contact.normal[i].derivative[j];
-            let lever_slope = Matrix3::from_fn(by_place);
-            by_position += times_cross(&by_velocity, &spin) * lever_slope;
-            let moved = -cross_times(&f, &lever_slope);
-            by[1][0] += moved;
-            by[1][1] -= times_cross(&moved, arm);
+            roll(touch, &contact, &f, &spin, &by_velocity, &mut by_position, &mut by[1]);
         }
         let by_turn = times_cross(&-(by_position + times_cross(&by_velocity, &spin)), arm);
         let slopes = [by_position, by_turn, by_velocity, times_cross(&-by_velocity, lever)];
@@ -105,6 +100,27 @@ pub(crate) fn wrench_jacobian<L: ContactLaw>(
         std::array::from_fn(|column| by[row / 3][column / 3][(row % 3, column % 3)])
     });
     WrenchJacobian { wrench, by_state, by_params: param_slopes }
+}
+
+/// What is added where the lever of a round sample turns with the normal. Never inlined: it is rare, and the rest then fits the
+/// registers.
+#[cold]
+#[inline(never)]
+fn roll(
+    touch: &Touch,
+    contact: &Contact<Fwd<6>>,
+    force: &Vector3<f64>,
+    spin: &Vector3<f64>,
+    by_velocity: &Matrix3<f64>,
+    by_position: &mut Matrix3<f64>,
+    torque_by: &mut [Matrix3<f64>; 4],
+) {
+    let by_place = |i: usize, j: usize| -touch.radius * contact.normal[i].derivative[j];
+    let lever_slope = Matrix3::from_fn(by_place);
+    *by_position += times_cross(by_velocity, spin) * lever_slope;
+    let moved = -cross_times(force, &lever_slope);
+    torque_by[0] += moved;
+    torque_by[1] -= times_cross(&moved, &touch.arm);
 }
 
 /// Adds the derivatives of one contact's wrench by the parameters, six at a time.
