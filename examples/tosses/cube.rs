@@ -59,15 +59,6 @@ pub(crate) const PARAMETERS: [Parameter; COUNT] = [
 ];
 
 impl Parameter {
-    /// The coordinate of `value` in a fit.
-    pub(crate) fn coordinate(&self, value: f64) -> f64 {
-        if self.logarithmic {
-            (value / self.usual).ln() / self.step
-        } else {
-            (value - self.usual) / self.step
-        }
-    }
-
     /// The value of a coordinate.
     pub(crate) fn value<S: Scalar>(&self, coordinate: S) -> S {
         let change = coordinate.times(self.step);
@@ -78,6 +69,11 @@ impl Parameter {
     pub(crate) fn slope(&self, coordinate: f64) -> f64 {
         self.value(Fwd::<1>::variable(coordinate, 0)).derivative[0]
     }
+}
+
+/// The values of the first parameters at coordinates of a fit.
+pub(crate) fn values<S: Scalar, const N: usize>(x: [S; N]) -> [S; N] {
+    std::array::from_fn(|i| PARAMETERS[i].value(x[i]))
 }
 
 /// Mass of the cube \[kg\]: forces are in proportion to it.

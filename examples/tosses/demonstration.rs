@@ -68,6 +68,7 @@ fn toss(id: u32, values: &[f64; COUNT]) -> anyhow::Result<Toss> {
         .collect();
     let (velocity, spin) = (start.velocity, start.spin);
     let rows = seen.iter().enumerate();
-    let rows = rows.map(|(k, pose)| Row::predicted(id, k as f64 / RATE, pose, velocity, spin));
+    let rows =
+        rows.map(|(k, pose)| Row::predicted(id, Some(k as f64 / RATE), pose, velocity, spin));
     Ok(Toss { id, rows: rows.collect() })
 }

@@ -3,7 +3,6 @@
 use std::ops::ControlFlow;
 
 use nalgebra::{DMatrix, DVector, Isometry3, SMatrix, SVector};
-use prehend::autodiff::lie::so3_log;
 use prehend::autodiff::optimize::{Criteria, LevenbergMarquardt, NormalEquations};
 use prehend::autodiff::{Fwd, Scalar};
 use prehend::sim::Adaptive;
@@ -64,41 +63,31 @@ impl Target<'_> {
     fn residuals<S: Scalar>(&self, path: &Path<S>) -> Vec<[S; 6]> {
         let mean = 1.0 / (self.unit * (self.rows as f64).sqrt());
         let row = |((pose, row), weight): ((&Isometry3<S>, &Row), &f64)| {
-            let (seen, scale) = (row.pose(), mean * weight.sqrt());
-            let off = (0..3).map(|i| {
-                let seen = seen.translation.vector[i];
-                pose.translation.vector[i].plus(-seen).times(100.0 / WIDTH * scale)
-            });
-            let inverse = prehend::autodiff::lie::lift::<S>(&seen).rotation.inverse();
-            let turn = so3_log(&(pose.rotation * inverse));
-            let turn = turn.map(|x| x.times(scale * 180.0 / std::f64::consts::PI));
-            let all: Vec<S> = off.chain(turn.iter().copied()).collect();
-            std::array::from_fn(|i| all[i])
+            let (off, scale) = (row.to(pose), mean * weight.sqrt());
+            let units = [100.0 / WIDTH, 180.0 / std::f64::consts::PI];
+            std::array::from_fn(|i| off[i].times(units[i / 3] * scale))
         };
         path.iter().zip(&self.toss.rows).zip(&self.weights).map(row).collect()
     }
 
-    /// The start that explains the flight, and the path from there, with their derivatives by all parameters but the last.
-    fn path(&self, x: &[f64]) -> Option<(Start, Path<Fwd<EXACT>>)> {
-        let variables = Fwd::<EXACT>::variables(std::array::from_fn(|i| x[i]));
-        let values = std::array::from_fn(|i| PARAMETERS[i].value(variables[i]));
-        let radius = PARAMETERS[EXACT].value(x[EXACT]);
+    /// Values of all parameters but the last, and the start that explains the flight, with their derivatives.
+    fn begin(&self, x: &[f64; COUNT]) -> ([Fwd<EXACT>; EXACT], Start<Fwd<EXACT>>) {
+        let [exact @ .., _] = *x;
+        let values = cube::values(Fwd::<EXACT>::variables(exact));
         let start = flight::begin(self.toss, &values);
-        let path = cube::path(&INTEGRATOR, &values, radius, &start, self.rows).ok()?;
-        Some((start.value(), path))
+        (values, start)
     }
 
     /// Weights by how much chance moves the rows: as much as one, and a row counts half.
-    fn weigh(&mut self, x: &[f64]) {
-        self.weights = vec![1.0; self.rows];
-        let Some((start, _)) = self.path(x) else { return };
-        let values: [f64; COUNT] = std::array::from_fn(|i| PARAMETERS[i].value(x[i]));
+    fn weigh(&mut self, x: &[f64; COUNT]) {
+        let (values, start) = self.begin(x);
+        let corner_radius = PARAMETERS[EXACT].value(x[EXACT]);
         let chance = Fwd::<12>::variables([0.0; 12]);
         let chance: Vec<_> =
             chance.iter().enumerate().map(|(i, x)| x.times(CHANCE[i / 3])).collect();
-        let start = flight::moved(&start, &chance);
-        let constants: [Fwd<12>; EXACT] = std::array::from_fn(|i| Fwd::constant(values[i]));
-        let path = cube::path(&INTEGRATOR, &constants, values[EXACT], &start, self.rows);
+        let start = flight::moved(&start.value(), &chance);
+        let constants = values.map(|x| Fwd::constant(x.value));
+        let path = cube::path(&INTEGRATOR, &constants, corner_radius, &start, self.rows);
         let Ok(path) = path else { return };
         let moved = |row: &[Fwd<12>; 6]| -> f64 {
             let all = row.iter().flat_map(|r| r.derivative);
@@ -109,12 +98,14 @@ impl Target<'_> {
     }
 
     /// ½ ln(1 + |r|²) with its derivatives: a toss that tumbles another way counts little.
-    fn part(&self, x: &[f64]) -> Option<Part> {
-        let (start, path) = self.path(x)?;
+    fn part(&self, x: &[f64; COUNT]) -> Option<Part> {
+        let (values, start) = self.begin(x);
+        let [plain @ .., corner_radius] = cube::values(*x);
+        let path = cube::path(&INTEGRATOR, &values, corner_radius, &start, self.rows).ok()?;
+        let start = start.value();
         let nudged = |change: f64| {
-            let values = std::array::from_fn(|i| PARAMETERS[i].value(x[i]));
-            let radius = PARAMETERS[EXACT].value(x[EXACT] + change);
-            let path = cube::path(&INTEGRATOR, &values, radius, &start, self.rows);
+            let corner_radius = PARAMETERS[EXACT].value(x[EXACT] + change);
+            let path = cube::path(&INTEGRATOR, &plain, corner_radius, &start, self.rows);
             Some(self.residuals(&path.ok()?))
         };
         let (more, less) = (nudged(NUDGE)?, nudged(-NUDGE)?);
@@ -140,7 +131,8 @@ impl Target<'_> {
 
 /// The parameters that explain `tosses` best, from their usual values.
 pub(crate) fn fit<'a>(tosses: &[&'a Toss]) -> anyhow::Result<Fit> {
-    let mut x: Vec<f64> = PARAMETERS.iter().map(|p| p.coordinate(p.usual)).collect();
+    // Usual values have zeros for coordinates.
+    let mut x = [0.0; COUNT];
     let mut covariance = SMatrix::zeros();
     for (stage, (horizon, unit, iterations)) in STAGES.into_iter().enumerate() {
         let target = |toss: &&'a Toss| {
@@ -150,18 +142,19 @@ pub(crate) fn fit<'a>(tosses: &[&'a Toss]) -> anyhow::Result<Fit> {
         };
         let mut targets: Vec<Target<'a>> = tosses.par_iter().map(target).collect();
         targets.par_iter_mut().for_each(|target| target.weigh(&x));
-        let parts = |x: &[f64]| -> Vec<Option<Part>> {
+        let parts = |x: &[f64; COUNT]| -> Vec<Option<Part>> {
             targets.par_iter().map(|target| target.part(x)).collect()
         };
         let equations = |x: &[f64]| {
             let expected = 1.0 / (EXPECTED * EXPECTED);
+            let at = std::array::from_fn(|i| x[i]);
             let x = DVector::from_column_slice(x);
             let mut sum = NormalEquations {
                 value: 0.5 * expected * x.norm_squared(),
                 gradient: &x * expected,
                 matrix: DMatrix::identity(COUNT, COUNT) * expected,
             };
-            for part in parts(x.as_slice()) {
+            for part in parts(&at) {
                 let Some(part) = part else {
                     // The solver steps back from what cannot be simulated.
                     sum.value = f64::NAN;
@@ -186,13 +179,12 @@ pub(crate) fn fit<'a>(tosses: &[&'a Toss]) -> anyhow::Result<Fit> {
             ControlFlow::Continue(())
         })?;
         eprintln!();
-        x = outcome.parameters;
+        x = std::array::from_fn(|i| outcome.parameters[i]);
         covariance = sandwich(&parts(&x));
     }
     let slopes: SVector<f64, COUNT> = SVector::from_fn(|i, _| PARAMETERS[i].slope(x[i]));
     let scaled = SMatrix::from_fn(|i, j| slopes[i] * covariance[(i, j)] * slopes[j]);
-    let values = std::array::from_fn(|i| PARAMETERS[i].value(x[i]));
-    Ok(Fit { values, covariance: scaled })
+    Ok(Fit { values: cube::values(x), covariance: scaled })
 }
 
 /// H⁻¹ (Σ g gᵀ) H⁻¹ with the gradients g of the tosses, each of which is one observation whatever its rows have in common

@@ -1,7 +1,7 @@
 //! How a toss began, from its rows before it first touches the board.
 
 use nalgebra::{DMatrix, Isometry3, Vector3};
-use prehend::autodiff::lie::{lift, so3_exp, so3_log};
+use prehend::autodiff::lie::so3_exp;
 use prehend::autodiff::optimize::{Criteria, LevenbergMarquardt, NormalEquations};
 use prehend::autodiff::{Fwd, Scalar, forward_jacobian};
 use prehend::sim::Adaptive;
@@ -73,13 +73,8 @@ fn off<S: Scalar>(toss: &Toss, rows: usize, values: &[S; EXACT], start: &Start<S
         return vec![S::constant(f64::NAN); 6 * rows];
     };
     let row = |(pose, row): (&Isometry3<S>, &Row)| -> [S; 6] {
-        let seen = lift::<S>(&row.pose());
-        let place = pose.translation.vector - seen.translation.vector;
-        let turn = so3_log(&(pose.rotation * seen.rotation.inverse()));
-        std::array::from_fn(|i| match i {
-            0..3 => place[i].times(1.0 / NOISE[0]),
-            _ => turn[i - 3].times(1.0 / NOISE[1]),
-        })
+        let off = row.to(pose);
+        std::array::from_fn(|i| off[i].times(1.0 / NOISE[i / 3]))
     };
     path.iter().zip(&toss.rows).flat_map(row).collect()
 }

@@ -6,7 +6,7 @@ use std::path::Path;
 use anyhow::Context;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use prehend::autodiff::Scalar;
-use prehend::autodiff::lie::lift;
+use prehend::autodiff::lie::{lift, so3_log};
 use prehend::sim::State;
 use serde::{Deserialize, Serialize};
 
@@ -17,26 +17,8 @@ pub(crate) const RATE: f64 = 148.0;
 #[derive(Clone, Copy, Debug, Deserialize, Serialize)]
 pub(crate) struct Row {
     pub(crate) toss_id: u32,
-    pub(crate) t: f64,
-    px: f64,
-    py: f64,
-    pz: f64,
-    qw: f64,
-    qx: f64,
-    qy: f64,
-    qz: f64,
-    vx: f64,
-    vy: f64,
-    vz: f64,
-    wx: f64,
-    wy: f64,
-    wz: f64,
-}
-
-/// A row of a file of starts, which has no times.
-#[derive(Deserialize)]
-struct StartRow {
-    toss_id: u32,
+    /// Starts have none.
+    pub(crate) t: Option<f64>,
     px: f64,
     py: f64,
     pz: f64,
@@ -92,18 +74,32 @@ impl Row {
         Isometry3::from_parts(place, UnitQuaternion::from_quaternion(rotation))
     }
 
-    /// The state of this row, whose velocity is the mean of the interval before under `gravity` \[m/s²\].
-    pub(crate) fn start(&self, gravity: f64) -> Start {
-        let fallen = 0.5 * gravity / RATE;
-        let velocity = Vector3::new(self.vx, self.vy, self.vz - fallen);
+    /// The state of this row.
+    fn state(&self) -> Start {
+        let velocity = Vector3::new(self.vx, self.vy, self.vz);
         let spin = Vector3::new(self.wx, self.wy, self.wz);
         Start { pose: self.pose(), velocity, spin }
+    }
+
+    /// The state of this row, whose velocity is the mean of the interval before under `gravity` \[m/s²\].
+    pub(crate) fn start(&self, gravity: f64) -> Start {
+        let mut start = self.state();
+        start.velocity.z -= 0.5 * gravity / RATE;
+        start
+    }
+
+    /// From this row to `pose`: position \[m\] and rotation vector \[rad\].
+    pub(crate) fn to<S: Scalar>(&self, pose: &Isometry3<S>) -> [S; 6] {
+        let seen = lift::<S>(&self.pose());
+        let place = pose.translation.vector - seen.translation.vector;
+        let turn = so3_log(&(pose.rotation * seen.rotation.inverse()));
+        [place.x, place.y, place.z, turn.x, turn.y, turn.z]
     }
 
     /// A predicted row.
     pub(crate) fn predicted(
         toss_id: u32,
-        t: f64,
+        t: Option<f64>,
         pose: &Isometry3<f64>,
         velocity: Vector3<f64>,
         spin: Vector3<f64>,
@@ -136,7 +132,9 @@ pub(crate) fn read(file: &Path) -> anyhow::Result<Vec<Toss>> {
     let mut tosses: BTreeMap<u32, Vec<Row>> = BTreeMap::new();
     let mut reader = csv::Reader::from_path(file).with_context(|| file.display().to_string())?;
     for (line, row) in reader.deserialize().enumerate() {
-        let row: Row = row.with_context(|| format!("{}, row {}", file.display(), line + 1))?;
+        let place = || format!("{}, row {}", file.display(), line + 1);
+        let row: Row = row.with_context(place)?;
+        row.t.context("no t").with_context(place)?;
         tosses.entry(row.toss_id).or_default().push(row);
     }
     anyhow::ensure!(!tosses.is_empty(), "{}: no rows", file.display());
@@ -146,18 +144,10 @@ pub(crate) fn read(file: &Path) -> anyhow::Result<Vec<Toss>> {
 /// All starts of a file.
 pub(crate) fn read_starts(file: &Path) -> anyhow::Result<BTreeMap<u32, Start>> {
     let mut reader = csv::Reader::from_path(file).with_context(|| file.display().to_string())?;
-    let start = |row: StartRow| {
-        let rotation = Quaternion::new(row.qw, row.qx, row.qy, row.qz);
-        let rotation = UnitQuaternion::from_quaternion(rotation);
-        let place = Translation3::new(row.px, row.py, row.pz);
-        let start = Start {
-            pose: Isometry3::from_parts(place, rotation),
-            velocity: Vector3::new(row.vx, row.vy, row.vz),
-            spin: Vector3::new(row.wx, row.wy, row.wz),
-        };
-        (row.toss_id, start)
-    };
-    let rows = reader.deserialize().map(|row| Ok(start(row?)));
+    let rows = reader.deserialize().map(|row| {
+        let row: Row = row?;
+        Ok((row.toss_id, row.state()))
+    });
     rows.collect::<Result<_, csv::Error>>().with_context(|| file.display().to_string())
 }
 

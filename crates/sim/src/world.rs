@@ -13,7 +13,7 @@ use std::sync::Arc;
 use nalgebra::{Vector3, Vector6};
 use prehend_autodiff::{Fwd, Scalar};
 
-use crate::contact::bristles::{BristleFunction, Bristles, bristle_response};
+use crate::contact::bristles::{BristleFunction, Bristles};
 use crate::contact::dynamic::DynContactLaw;
 use crate::contact::gap_smoothing::GapSmoothing;
 use crate::contact::patch::Patch;
@@ -299,8 +299,7 @@ fn local_bristles<S: Scalar>(
             _ => Fwd::constant(p),
         };
         let p: Vec<Fwd<6>> = values.iter().enumerate().map(seeded).collect();
-        let (still, at) = ([Fwd::constant(0.0); 12], at.map(Fwd::constant));
-        let slopes = bristle_response(law, &p, patch, bristles, &still, &at, None);
+        let slopes = function.response(&p, &[Fwd::constant(0.0); 18], None);
         for (component, slope) in all.iter_mut().zip(slopes) {
             for (moved, slope) in moved.iter().zip(slope.derivative) {
                 *component += moved.times(slope);

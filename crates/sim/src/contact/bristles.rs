@@ -40,8 +40,8 @@ impl Bristles {
     }
 }
 
-/// [`bristle_response`] with constant parameters, as a function of the tangent of the body's state and of the change of the
-/// deflection.
+/// The wrench of all contacts of `patch` about the center of mass and the rate of the deflection, along the axes of the field, as a
+/// function of the tangent of the body's state and of the change of the deflection, to first order.
 pub(crate) struct BristleFunction<'a> {
     pub(crate) law: &'a dyn DynContactLaw,
     pub(crate) p: &'a [f64],
@@ -50,18 +50,9 @@ pub(crate) struct BristleFunction<'a> {
     pub(crate) deflection: Vector6<f64>,
 }
 
-impl BristleFunction<'_> {
-    fn response<S: Scalar>(&self, change: &[S], from_com: Option<&Vector3<S>>) -> [S; 12] {
-        let p: Vec<S> = self.p.iter().map(|&p| S::constant(p)).collect();
-        let tangent = std::array::from_fn(|i| change[i]);
-        let deflection = Vector6::from_fn(|i, _| change[12 + i].plus(self.deflection[i]));
-        bristle_response(self.law, &p, self.patch, self.bristles, &tangent, &deflection, from_com)
-    }
-}
-
 impl LocalFunction<18, 12> for BristleFunction<'_> {
     fn evaluate<S: Scalar>(&self, change: [S; 18]) -> [S; 12] {
-        self.response(&change, None)
+        self.response(&self.constants(), &change, None)
     }
 }
 
@@ -69,47 +60,49 @@ impl LocalFunction<18, 12> for BristleFunction<'_> {
 impl LocalFunction<21, 12> for BristleFunction<'_> {
     fn evaluate<S: Scalar>(&self, change: [S; 21]) -> [S; 12] {
         let [.., x, y, z] = change;
-        self.response(&change, Some(&Vector3::new(x, y, z)))
+        self.response(&self.constants(), &change, Some(&Vector3::new(x, y, z)))
     }
 }
 
-/// The wrench of all contacts of `patch` about the center of mass and the rate of the deflection, along the axes of the field, to
-/// first order in `tangent`, by which the state is away from that of the patch, and in `from_com`, from the center of mass
-/// to the point that this is the state of.
-pub(crate) fn bristle_response<T: Scalar>(
-    law: &dyn DynContactLaw,
-    p: &[T],
-    patch: &Patch<'_>,
-    bristles: Bristles,
-    tangent: &[T; 12],
-    deflection: &Vector6<T>,
-    from_com: Option<&Vector3<T>>,
-) -> [T; 12] {
-    let cutoff = law.reach();
-    let law = BristleLaw::new(law, p);
-    let moved = Moved::new(patch, tangent);
-    let mut wrench = Vector6::<T>::zeros();
-    let mut brush = Brush::default();
-    let sound = patch.for_each_touch(cutoff, T::ORDER == 0, |touch| {
-        let Lifted { mut contact, lever } = moved.lift(touch, cutoff);
-        let lever = from_com.map_or(lever, |from_com| lever + from_com);
-        let across = across(&contact.normal, &lever);
-        let (slip, bent) = (contact.slip, across * deflection);
-        contact.slip += bent.map(|u| u.times(bristles.slip_speed / bristles.deflection));
-        let response = law.response(&contact);
-        let force = contact.normal * response.normal + response.tangential;
-        let torque = lever.cross(&force);
-        wrench += Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z);
-        // What is not pressed does not hold.
-        if response.normal.value() > 0.0 {
-            let depth = -contact.gap.plus(-cutoff);
-            brush.add(&across, response.normal, depth, bristles.rate(&slip, &bent), bristles);
-        }
-    });
-    let rate = brush.rate(deflection, bristles);
-    let failed = T::constant(f64::NAN);
-    let all = |i: usize| if i < 6 { wrench[i] } else { rate[i - 6] };
-    std::array::from_fn(|i| if sound { all(i) } else { failed })
+impl BristleFunction<'_> {
+    fn constants<S: Scalar>(&self) -> Vec<S> {
+        self.p.iter().map(|&p| S::constant(p)).collect()
+    }
+
+    /// The function with parameters `p`, and of `from_com`, from the center of mass to the point that the patch has the state of.
+    pub(crate) fn response<T: Scalar>(
+        &self,
+        p: &[T],
+        change: &[T],
+        from_com: Option<&Vector3<T>>,
+    ) -> [T; 12] {
+        let Self { patch, bristles, .. } = *self;
+        let (cutoff, law) = (self.law.reach(), BristleLaw::new(self.law, p));
+        let moved = Moved::new(patch, change);
+        let deflection = Vector6::from_fn(|i, _| change[12 + i].plus(self.deflection[i]));
+        let mut wrench = Vector6::<T>::zeros();
+        let mut brush = Brush::default();
+        let sound = patch.for_each_touch(cutoff, T::ORDER == 0, |touch| {
+            let Lifted { mut contact, lever } = moved.lift(touch, cutoff);
+            let lever = from_com.map_or(lever, |from_com| lever + from_com);
+            let across = across(&contact.normal, &lever);
+            let (slip, bent) = (contact.slip, across * deflection);
+            contact.slip += bent.map(|u| u.times(bristles.slip_speed / bristles.deflection));
+            let response = law.response(&contact);
+            let force = contact.normal * response.normal + response.tangential;
+            let torque = lever.cross(&force);
+            wrench += Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z);
+            // What is not pressed does not hold.
+            if response.normal.value() > 0.0 {
+                let depth = -contact.gap.plus(-cutoff);
+                brush.add(&across, response.normal, depth, bristles.rate(&slip, &bent), bristles);
+            }
+        });
+        let rate = brush.rate(&deflection, bristles);
+        let failed = T::constant(f64::NAN);
+        let all = |i: usize| if i < 6 { wrench[i] } else { rate[i - 6] };
+        std::array::from_fn(|i| if sound { all(i) } else { failed })
+    }
 }
 
 impl Bristles {
@@ -204,7 +197,7 @@ struct Lifted<T: Scalar> {
 }
 
 impl<'a, T: Scalar> Moved<'a, T> {
-    fn new(patch: &'a Patch<'a>, tangent: &[T; 12]) -> Self {
+    fn new(patch: &'a Patch<'a>, tangent: &[T]) -> Self {
         let part = |k: usize| Vector3::from_column_slice(&tangent[3 * k..][..3]);
         let [position, turn, linear, angular] = std::array::from_fn(part);
         Self { patch, position, turn, linear, angular }
