@@ -2,15 +2,17 @@
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use prehend::geometry::SplitMix64;
-use prehend::sim::Adaptive;
+use prehend::sim::RungeKutta4;
 use rayon::prelude::*;
 
-use crate::cube::{self, COUNT, PARAMETERS};
+use crate::cube::{self, Steps};
 use crate::fit;
+use crate::parameters::{COUNT, PARAMETERS};
 use crate::recording::{RATE, Row, Start, Toss};
 
 const TOSSES: u32 = 24;
 const ROWS: usize = 80;
+const STEPS: Steps<RungeKutta4> = Steps { integrator: RungeKutta4, per_row: 16 };
 /// What is not as usual, and how nearly it has to be found.
 const UNUSUAL: [(&str, f64, f64); 5] = [
     ("half_width", 0.0508, 1e-4),
@@ -56,7 +58,7 @@ fn toss(id: u32, values: &[f64; COUNT]) -> anyhow::Result<Toss> {
         velocity: spread(1.5),
         spin: spread(8.0),
     };
-    let path = cube::predict(&Adaptive::default(), values, &start, ROWS)?;
+    let path = cube::path(&STEPS, values, &start, ROWS)?;
     let seen: Vec<Isometry3<f64>> = path
         .iter()
         .map(|pose| {

@@ -4,18 +4,23 @@ use nalgebra::{DMatrix, Isometry3, Vector3};
 use prehend::autodiff::lie::so3_exp;
 use prehend::autodiff::optimize::{Criteria, LevenbergMarquardt, NormalEquations};
 use prehend::autodiff::{Fwd, Scalar, forward_jacobian};
-use prehend::sim::Adaptive;
+use prehend::sim::RungeKutta4;
 
-use crate::cube::{self, EXACT};
+use crate::cube::{self, Steps};
+use crate::parameters::{COUNT, LANES};
 use crate::recording::{Row, Start, Toss};
 
 /// Half-width that surely holds the cube \[m\], and the least height of its corners in flight \[m\].
 const HALF: f64 = 0.0524;
 const CLEAR: f64 = 2e-3;
 /// Noise of positions \[m\] and attitudes \[rad\].
-const NOISE: [f64; 2] = [3e-5, 1e-3];
+pub(crate) const NOISE: [f64; 2] = [3e-5, 6e-4];
 /// Gravity by which the velocity of a first row is put right \[m/s²\].
-const GRAVITY: f64 = 9.8;
+pub(crate) const GRAVITY: f64 = 9.8;
+/// A flight is smooth.
+const STEPS: Steps<RungeKutta4> = Steps { integrator: RungeKutta4, per_row: 1 };
+/// Rows of a flight that tell its start.
+pub(crate) const SHORTEST: usize = 8;
 
 /// The rows of the flight of a toss.
 pub(crate) fn rows(toss: &Toss) -> usize {
@@ -27,32 +32,29 @@ pub(crate) fn rows(toss: &Toss) -> usize {
     toss.rows.iter().take_while(clear).count()
 }
 
-/// The start from which a cube with `values` flies as recorded, by least squares, with its derivatives by them; that of the first
-/// row if the flight is too short.
-pub(crate) fn begin(toss: &Toss, values: &[Fwd<EXACT>; EXACT]) -> Start<Fwd<EXACT>> {
+/// The start from which a cube with `values` flies as recorded, by least squares, with its derivatives; none if the flight is too
+/// short to tell.
+pub(crate) fn begin(toss: &Toss, values: &[Fwd<LANES>; COUNT]) -> Option<Start<Fwd<LANES>>> {
     let (rows, guess) = (rows(toss), toss.rows[0].start(GRAVITY));
-    if rows < 4 {
-        return guess.lift();
+    if rows < SHORTEST {
+        return None;
     }
-    let constants: [Fwd<12>; EXACT] = values.map(|x| Fwd::constant(x.value));
+    let constants: [Fwd<12>; COUNT] = values.map(|x| Fwd::constant(x.value));
     let residuals = |x: &[Fwd<12>]| off(toss, rows, &constants, &moved(&guess, x));
     let criteria = Criteria { iterations: 8, decrease: 1e-6, ..Criteria::default() };
     let solver = LevenbergMarquardt { damping: 0.0, criteria };
     let found = solver.minimize(&[0.0; 12], |x| NormalEquations::forward::<12>(residuals, x));
-    let Ok(found) = found else { return guess.lift() };
+    let found = found.ok()?.parameters;
     // Where the gradient Jᵀr vanishes, so does its derivative JᵀJ s' + Jᵀr', but for curvature times what little is left of r.
-    let (_, by_start) = forward_jacobian(residuals, &found.parameters);
-    let still: Vec<Fwd<EXACT>> = found.parameters.iter().map(|&x| Fwd::constant(x)).collect();
+    let (_, by_start) = forward_jacobian(residuals, &found);
+    let still: Vec<Fwd<LANES>> = found.iter().map(|&x| Fwd::constant(x)).collect();
     let by_values = off(toss, rows, values, &moved(&guess, &still));
-    let by_values = DMatrix::from_fn(6 * rows, EXACT, |i, j| by_values[i].derivative[j]);
-    let normal = by_start.tr_mul(&by_start).cholesky();
-    let Some(normal) = normal else { return guess.lift() };
+    let by_values = DMatrix::from_fn(6 * rows, LANES, |i, j| by_values[i].derivative[j]);
+    let normal = by_start.tr_mul(&by_start).cholesky()?;
     let slopes = -normal.solve(&by_start.tr_mul(&by_values));
-    let lane = |i: usize| Fwd {
-        value: found.parameters[i],
-        derivative: std::array::from_fn(|j| slopes[(i, j)]),
-    };
-    moved(&guess, &(0..12).map(lane).collect::<Vec<_>>())
+    let lane =
+        |i: usize| Fwd { value: found[i], derivative: std::array::from_fn(|j| slopes[(i, j)]) };
+    Some(moved(&guess, &(0..12).map(lane).collect::<Vec<_>>()))
 }
 
 /// A start by a little of everything: position \[mm\], attitude \[mrad\], velocity \[cm/s\] and spin \[0.1 rad/s\].
@@ -67,9 +69,8 @@ pub(crate) fn moved<S: Scalar>(start: &Start, x: &[S]) -> Start<S> {
 }
 
 /// By how much the rows of a flight are off, in multiples of their noise.
-fn off<S: Scalar>(toss: &Toss, rows: usize, values: &[S; EXACT], start: &Start<S>) -> Vec<S> {
-    // Corners do not matter in flight.
-    let Ok(path) = cube::path(&Adaptive::default(), values, 0.0, start, rows) else {
+fn off<S: Scalar>(toss: &Toss, rows: usize, values: &[S; COUNT], start: &Start<S>) -> Vec<S> {
+    let Ok(path) = cube::path(&STEPS, values, start, rows) else {
         return vec![S::constant(f64::NAN); 6 * rows];
     };
     let row = |(pose, row): (&Isometry3<S>, &Row)| -> [S; 6] {

@@ -3,13 +3,13 @@
 use prehend::autodiff::Scalar;
 use prehend::sim::{Contact, ContactLaw, Response};
 
-/// Hunt and Crossley's normal law, N = k dⁿ (1 − c ḋ) for the depth d, and friction whose coefficient grows with slip u and falls
-/// with load:
+/// A normal force with hysteresis, N = k dⁿ (1 − c ḋ/√(ḋ² + s²)) for the depth d that falls at ḋ, so that restitution is the
+/// same at all speeds above s, and friction whose coefficient changes with slip u and falls with load:
 ///
 /// μ = (μ₀ + μ₁ u/(u + u₁)) (1 − a x), regularized by the slip scale v₀ + v₁ x, for x = N/(N + N₁).
 ///
-/// Parameters: k \[N/mⁿ\], c \[s/m\], n, μ₀, μ₁, u₁ \[m/s\], v₀ \[m/s\], v₁ \[m/s\], a, N₁ \[N\].
-pub(crate) struct CubeLaw(pub(crate) [f64; 10]);
+/// Parameters: k \[N/mⁿ\], n, c, s \[m/s\], μ₀, μ₁, u₁ \[m/s\], v₀ \[m/s\], v₁ \[m/s\], a, N₁ \[N\].
+pub(crate) struct CubeLaw(pub(crate) [f64; 11]);
 
 /// Slip below which it has no direction \[m/s\].
 const STILL: f64 = 1e-4;
@@ -24,14 +24,15 @@ impl ContactLaw for CubeLaw {
         if depth.value() <= 0.0 {
             return Response::zero();
         }
-        let damped = (S::one() - p[1] * contact.normal_speed).max(S::zero());
-        let normal = p[0] * depth.powf(p[2]) * damped;
+        let speed = contact.normal_speed;
+        let damped = S::one() - p[2] * speed / (speed * speed + p[3] * p[3]).sqrt();
+        let normal = p[0] * depth.powf(p[1]) * damped.max(S::zero());
         let slip2 = contact.slip.dot(&contact.slip);
         let slip = slip2.plus(STILL * STILL).sqrt();
-        let grown = p[3] + p[4] * slip / (slip + p[5]);
-        let load = normal / (normal + p[9]);
-        let slip_scale = p[6] + p[7] * load;
-        let coefficient = grown * (S::one() - p[8] * load);
+        let grown = p[4] + p[5] * slip / (slip + p[6]);
+        let load = normal / (normal + p[10]);
+        let slip_scale = p[7] + p[8] * load;
+        let coefficient = grown * (S::one() - p[9] * load);
         let scale = -(coefficient * normal) / (slip2 + slip_scale * slip_scale).sqrt();
         Response { normal, tangential: contact.slip * scale }
     }

@@ -14,7 +14,9 @@ mod demonstration;
 mod fit;
 mod flight;
 mod law;
+mod parameters;
 mod recording;
+mod target;
 
 use std::path::{Path, PathBuf};
 
@@ -23,8 +25,9 @@ use nalgebra::{Isometry3, Vector3};
 use prehend::sim::Adaptive;
 use rayon::prelude::*;
 
-use cube::{COUNT, PARAMETERS};
+use cube::Steps;
 use fit::Fit;
+use parameters::{COUNT, PARAMETERS};
 use recording::{RATE, Row, Start, Toss};
 
 fn main() -> anyhow::Result<()> {
@@ -49,9 +52,10 @@ fn main() -> anyhow::Result<()> {
             let tolerance =
                 option("--tolerance").map_or(Ok(1e-6), |t| t.parse()).context("--tolerance")?;
             let integrator = Adaptive { tolerance, ..Adaptive::default() };
+            let steps = Steps { integrator, per_row: 1 };
             let starts = path("--starts").map(|file| recording::read_starts(&file)).transpose()?;
             let start = |toss: &Toss| match &starts {
-                None => Ok(toss.rows[0].start(values[1])),
+                None => Ok(toss.rows[0].start(values[0])),
                 Some(starts) => {
                     let start = starts.get(&toss.id).copied();
                     start.with_context(|| format!("no start of toss {}", toss.id))
@@ -60,7 +64,7 @@ fn main() -> anyhow::Result<()> {
             let tosses = recording::read(&file)?;
             let predicted: Vec<Vec<Row>> = tosses
                 .par_iter()
-                .map(|toss| predict(&integrator, &values, toss, &start(toss)?))
+                .map(|toss| predict(&steps, &values, toss, &start(toss)?))
                 .collect::<anyhow::Result<_>>()?;
             recording::write(&out()?, &predicted.concat())
         }
@@ -71,14 +75,14 @@ fn main() -> anyhow::Result<()> {
 
 /// The rows of a toss, predicted.
 fn predict(
-    integrator: &Adaptive,
+    steps: &Steps<Adaptive>,
     values: &[f64; COUNT],
     toss: &Toss,
     start: &Start,
 ) -> anyhow::Result<Vec<Row>> {
     let rows = toss.rows.len();
-    let path = cube::predict(integrator, values, start, rows)
-        .with_context(|| format!("toss {}", toss.id))?;
+    let path =
+        cube::path(steps, values, start, rows).with_context(|| format!("toss {}", toss.id))?;
     let row = |k: usize| {
         let (before, now) = (&path[k.saturating_sub(1)], &path[k]);
         let (velocity, spin) = match k {

@@ -1,0 +1,155 @@
+//! The rows of a toss that are to be explained.
+
+use std::ops::Range;
+
+use nalgebra::{DVector, Dyn, Isometry3, OMatrix, SMatrix, SVector, U22};
+use prehend::autodiff::{Fwd, Scalar};
+use prehend::sim::RungeKutta4;
+
+use crate::cube::{self, Path, Steps};
+use crate::flight::{self, NOISE};
+use crate::parameters::{self, COUNT, EXACT, LANES};
+use crate::recording::{Row, Start, Toss};
+
+/// Width of the cube, by which positions are measured \[m\].
+const WIDTH: f64 = 0.1048;
+/// Change of the last coordinate for central differences.
+const NUDGE: f64 = 0.05;
+/// Chance in a toss, most of it in its impacts, as if it were in its start, in the units of [`flight::moved`].
+const CHANCE: [f64; 4] = [0.03, 2.0, 1.0, 5.0];
+
+/// Rows to be explained.
+pub(crate) struct Target<'a> {
+    pub(crate) toss: &'a Toss,
+    pub(crate) start: Start,
+    rows: usize,
+    /// Off by one in position \[m\] and attitude \[rad\].
+    unit: [f64; 2],
+    steps: Steps<RungeKutta4>,
+    /// Square roots of the weights of the rows.
+    weights: Vec<f64>,
+}
+
+impl<'a> Target<'a> {
+    /// The flight of a toss, if it is long enough.
+    pub(crate) fn flight(toss: &'a Toss) -> Option<Self> {
+        let steps = Steps { integrator: RungeKutta4, per_row: 1 };
+        let (rows, start) = (flight::rows(toss), toss.rows[0].start(flight::GRAVITY));
+        let weights = vec![1.0; rows];
+        (rows >= flight::SHORTEST).then_some(Self {
+            toss,
+            start,
+            rows,
+            unit: NOISE,
+            steps,
+            weights,
+        })
+    }
+
+    /// The rows up to some after the first touch, which may be off by percents of the width and degrees.
+    pub(crate) fn contacts(toss: &'a Toss, start: Start, rows: usize, percent: f64) -> Self {
+        let steps = Steps { integrator: RungeKutta4, per_row: 16 };
+        let rows = flight::rows(toss).saturating_add(rows).min(toss.rows.len());
+        let unit = [percent / 100.0 * WIDTH, percent.to_radians()];
+        Self { toss, start, rows, unit, steps, weights: vec![1.0; rows] }
+    }
+
+    /// Weights by how much chance moves the rows: as much as one, and a row counts half.
+    pub(crate) fn weigh(&mut self, x: &[f64; COUNT], part: f64) {
+        let chance = Fwd::<12>::variables([0.0; 12]);
+        let chance: Vec<_> =
+            chance.iter().enumerate().map(|(i, x)| x.times(part * CHANCE[i / 3])).collect();
+        let start = flight::moved(&self.start, &chance);
+        let values = parameters::values(x).map(Fwd::constant);
+        let Ok(path) = cube::path(&self.steps, &values, &start, self.rows) else { return };
+        let residuals = self.residuals(&path);
+        let weight = |row: &[Fwd<12>]| {
+            let all = row.iter().flat_map(|r| r.derivative);
+            let moved = all.map(|x| x * x).sum::<f64>() * self.rows as f64;
+            (1.0 + moved).sqrt().recip()
+        };
+        self.weights = residuals.chunks(6).map(weight).collect();
+    }
+
+    /// Differences in position and attitude, so that the sum of their squares is the mean over the rows.
+    fn residuals<S: Scalar>(&self, path: &Path<S>) -> Vec<S> {
+        let mean = (self.rows as f64).sqrt().recip();
+        let row = |((pose, row), weight): ((&Isometry3<S>, &Row), &f64)| -> [S; 6] {
+            let off = row.to(pose);
+            std::array::from_fn(|i| off[i].times(mean * weight / self.unit[i / 3]))
+        };
+        path.iter().zip(&self.toss.rows).zip(&self.weights).flat_map(row).collect()
+    }
+
+    /// The residuals and their derivatives by the coordinates `free`, from a start that may depend on them.
+    pub(crate) fn linearized(
+        &self,
+        x: &[f64; COUNT],
+        free: &Range<usize>,
+        start: &Start<Fwd<LANES>>,
+    ) -> Option<Linearized> {
+        let path = cube::path(&self.steps, &parameters::seeded(x, free), start, self.rows).ok()?;
+        let exact = self.residuals(&path);
+        let mut slopes = Slopes::zeros(exact.len());
+        for (mut row, residual) in slopes.row_iter_mut().zip(&exact) {
+            for (slope, lane) in
+                row.columns_range_mut(free.clone()).iter_mut().zip(residual.derivative)
+            {
+                *slope = lane;
+            }
+        }
+        if free.contains(&EXACT) {
+            let nudged = |change: f64| {
+                let mut x = *x;
+                x[EXACT] += change;
+                let path =
+                    cube::path(&self.steps, &parameters::values(&x), &start.value(), self.rows);
+                Some(self.residuals(&path.ok()?))
+            };
+            for ((slope, more), less) in
+                slopes.column_mut(EXACT).iter_mut().zip(nudged(NUDGE)?).zip(nudged(-NUDGE)?)
+            {
+                *slope = (more - less) / (2.0 * NUDGE);
+            }
+        }
+        Some(Linearized {
+            residuals: DVector::from_iterator(exact.len(), exact.iter().map(|r| r.value)),
+            slopes,
+        })
+    }
+}
+
+type Slopes = OMatrix<f64, Dyn, U22>;
+
+/// Residuals of a toss and their derivatives.
+pub(crate) struct Linearized {
+    residuals: DVector<f64>,
+    slopes: Slopes,
+}
+
+/// One toss in the normal equations.
+pub(crate) struct Part {
+    pub(crate) value: f64,
+    pub(crate) gradient: SVector<f64, COUNT>,
+    pub(crate) matrix: SMatrix<f64, COUNT, COUNT>,
+}
+
+impl Linearized {
+    pub(crate) fn slopes(&self) -> &Slopes {
+        &self.slopes
+    }
+
+    /// Derivative of ½ ln(1 + |r|²) by ½ |r|²: a toss that tumbles another way counts little.
+    pub(crate) fn weight(&self) -> f64 {
+        (1.0 + self.residuals.norm_squared()).recip()
+    }
+
+    pub(crate) fn part(&self) -> Part {
+        let weight = self.weight();
+        Part {
+            value: 0.5 * self.residuals.norm_squared().ln_1p(),
+            gradient: self.slopes.tr_mul(&self.residuals) * weight,
+            matrix: self.slopes.tr_mul(&self.slopes) * weight,
+        }
+    }
+}
