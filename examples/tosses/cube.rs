@@ -23,11 +23,12 @@ const SLOW: f64 = 1e-3;
 /// Positions of the cube's center and its attitudes, row by row.
 pub(crate) type Path<S> = Vec<Isometry3<S>>;
 
-/// An integrator, and its steps from a row to the next.
+/// An integrator, its steps from a row to the next, and whether the board is there.
 #[derive(Clone, Copy)]
 pub(crate) struct Steps<I> {
     pub(crate) integrator: I,
     pub(crate) per_row: usize,
+    pub(crate) board: bool,
 }
 
 /// The path of a cube with `values` of the parameters, by which the last has no derivative, for some `rows`.
@@ -37,7 +38,7 @@ pub(crate) fn path<S: Scalar>(
     start: &Start<S>,
     rows: usize,
 ) -> Result<Path<S>, SimulationError> {
-    let [g, along, across, cx, cy, cz, ix_to_z, iy_to_z, iz, half, depth, n, c, s, ..] = *values;
+    let [g, along, across, cx, cy, cz, ix_to_z, iy_to_z, half, iz, depth, n, c, s, ..] = *values;
     let [.., mu0, mu1, u1, v0, v1, a, n1, corner_radius] = *values;
     // From meters to units in which the cube has its simulated size.
     let size = S::constant(HALF) / half;
@@ -61,7 +62,10 @@ pub(crate) fn path<S: Scalar>(
     state.angular = pose.rotation * start.spin;
     state.linear = upright(start.velocity) + state.angular.cross(&(pose.rotation * com.coords));
     let states = [State::at_rest(Isometry3::identity()), state];
-    let Steps { integrator, per_row } = steps;
+    let Steps { integrator, per_row, board } = steps;
+    if !board {
+        world.contacts.clear();
+    }
     let time_steps = TimeSteps { dt: 1.0 / (RATE * *per_row as f64), steps: (rows - 1) * per_row };
     let run = world.rollout_with(integrator, &states, time_steps)?.states;
     let recorded = |states: &Vec<State<S>>| {

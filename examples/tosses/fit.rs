@@ -18,16 +18,17 @@ struct Stage {
     rows: usize,
     /// Percent of the width and degrees by which a toss may be off.
     unit: f64,
-    /// Part of [`flight::CHANCE`](crate::target).
+    /// Part of chance in a toss that counts.
     chance: f64,
     iterations: usize,
 }
 
-const STAGES: [Stage; 4] = [
-    Stage { rows: 8, unit: 1.0, chance: 0.0, iterations: 15 },
-    Stage { rows: 20, unit: 2.0, chance: 0.5, iterations: 10 },
-    Stage { rows: usize::MAX, unit: 3.0, chance: 1.0, iterations: 10 },
-    Stage { rows: usize::MAX, unit: 3.0, chance: 1.0, iterations: 10 },
+const STAGES: [Stage; 5] = [
+    Stage { rows: 8, unit: 1.0, chance: 0.0, iterations: 10 },
+    Stage { rows: 20, unit: 2.0, chance: 0.5, iterations: 8 },
+    Stage { rows: usize::MAX, unit: 3.0, chance: 1.0, iterations: 8 },
+    Stage { rows: usize::MAX, unit: 5.0, chance: 0.3, iterations: 8 },
+    Stage { rows: usize::MAX, unit: 8.0, chance: 0.3, iterations: 5 },
 ];
 /// How far parameters are expected from their usual values.
 const EXPECTED: f64 = 25.0;

@@ -1,4 +1,4 @@
-//! How a toss began, from its rows before it first touches the board.
+//! How a toss began, from its rows before it first touches the board, and where it ends.
 
 use nalgebra::{DMatrix, Isometry3, Vector3};
 use prehend::autodiff::lie::so3_exp;
@@ -13,12 +13,16 @@ use crate::recording::{Row, Start, Toss};
 /// Half-width that surely holds the cube \[m\], and the least height of its corners in flight \[m\].
 const HALF: f64 = 0.0524;
 const CLEAR: f64 = 2e-3;
+/// How far a cube that stands may seem tilted \[rad\], and may seem to move \[m\].
+const TILT: f64 = 0.03;
+const STILL: f64 = 2e-4;
 /// Noise of positions \[m\] and attitudes \[rad\].
 pub(crate) const NOISE: [f64; 2] = [3e-5, 6e-4];
 /// Gravity by which the velocity of a first row is put right \[m/s²\].
 pub(crate) const GRAVITY: f64 = 9.8;
 /// A flight is smooth.
-const STEPS: Steps<RungeKutta4> = Steps { integrator: RungeKutta4, per_row: 1 };
+pub(crate) const STEPS: Steps<RungeKutta4> =
+    Steps { integrator: RungeKutta4, per_row: 1, board: false };
 /// Rows of a flight that tell its start.
 pub(crate) const SHORTEST: usize = 8;
 
@@ -30,6 +34,15 @@ pub(crate) fn rows(toss: &Toss) -> usize {
         translation.z - HALF * up.abs().sum() > CLEAR
     };
     toss.rows.iter().take_while(clear).count()
+}
+
+/// Height of the cube's center where a toss ends, if it stands on a face by then \[m\].
+pub(crate) fn rest(toss: &Toss) -> Option<f64> {
+    let [.., before, _, _, _, end] = toss.rows.as_slice() else { return None };
+    let [before, end] = [before, end].map(Row::pose);
+    let upright = (end.rotation.inverse() * Vector3::z()).amax();
+    let moved = (end.translation.z - before.translation.z).abs();
+    (upright > TILT.cos() && moved < STILL).then_some(end.translation.z)
 }
 
 /// The start from which a cube with `values` flies as recorded, by least squares, with its derivatives; none if the flight is too

@@ -52,7 +52,7 @@ fn main() -> anyhow::Result<()> {
             let tolerance =
                 option("--tolerance").map_or(Ok(1e-6), |t| t.parse()).context("--tolerance")?;
             let integrator = Adaptive { tolerance, ..Adaptive::default() };
-            let steps = Steps { integrator, per_row: 1 };
+            let steps = Steps { integrator, per_row: 1, board: true };
             let starts = path("--starts").map(|file| recording::read_starts(&file)).transpose()?;
             let start = |toss: &Toss| match &starts {
                 None => Ok(toss.rows[0].start(values[0])),

@@ -24,9 +24,12 @@ const fn logarithmic(name: &'static str, unit: &'static str, usual: f64, step: f
 
 /// How many there are.
 pub(crate) const COUNT: usize = 22;
-/// Those that a flight tells, and those that contacts tell.
-pub(crate) const FLIGHT: Range<usize> = 0..8;
-pub(crate) const CONTACT: Range<usize> = 8..COUNT;
+/// Those that flight and rest tell, and those that contacts tell.
+pub(crate) const FLIGHT: Range<usize> = 0..9;
+pub(crate) const CONTACT: Range<usize> = 9..COUNT;
+/// Where the half-width is among them, and the depth to which a cube at rest sinks.
+pub(crate) const HALF_WIDTH: usize = 8;
+pub(crate) const DEPTH: usize = 10;
 /// The last one, the radius of the corners, is part of a surface: only the others are differentiated exactly.
 pub(crate) const EXACT: usize = COUNT - 1;
 /// Derivatives that are taken at once.
@@ -43,18 +46,18 @@ pub(crate) const PARAMETERS: [Parameter; COUNT] = [
     linear("center_z", "m", 0.0, 2e-4),
     logarithmic("inertia_x_to_z", "", 1.0, 0.01),
     logarithmic("inertia_y_to_z", "", 1.0, 0.01),
-    logarithmic("inertia_z", "m^2", 2.19e-3, 0.03),
     linear("half_width", "m", 0.0524, 3e-4),
-    logarithmic("depth_at_rest", "m", 1e-4, 0.1),
+    logarithmic("inertia_z", "m^2", 2.4e-3, 0.03),
+    logarithmic("depth_at_rest", "m", 6e-5, 0.1),
     linear("exponent", "", 1.5, 0.05),
     logarithmic("damping", "", 0.9, 0.1),
     logarithmic("damping_speed", "m/s", 0.02, 0.1),
-    linear("friction", "", 0.18, 5e-3),
-    linear("friction_growth", "", 0.0, 5e-3),
-    logarithmic("friction_speed", "m/s", 0.3, 0.1),
-    logarithmic("slip_scale", "m/s", 0.02, 0.1),
-    logarithmic("slip_scale_loaded", "m/s", 0.2, 0.1),
-    linear("friction_drop", "", 0.1, 0.03),
+    linear("friction", "", 0.25, 5e-3),
+    linear("friction_growth", "", -0.05, 5e-3),
+    logarithmic("friction_speed", "m/s", 0.5, 0.1),
+    logarithmic("slip_scale", "m/s", 0.03, 0.1),
+    logarithmic("slip_scale_loaded", "m/s", 0.3, 0.1),
+    linear("friction_drop", "", 0.15, 0.03),
     logarithmic("friction_load", "N", 3.0, 0.1),
     logarithmic("corner_radius", "m", 4e-3, 0.1),
 ];

@@ -8,7 +8,7 @@ use prehend::sim::RungeKutta4;
 
 use crate::cube::{self, Path, Steps};
 use crate::flight::{self, NOISE};
-use crate::parameters::{self, COUNT, EXACT, LANES};
+use crate::parameters::{self, COUNT, DEPTH, EXACT, HALF_WIDTH, LANES};
 use crate::recording::{Row, Start, Toss};
 
 /// Width of the cube, by which positions are measured \[m\].
@@ -18,6 +18,9 @@ const NUDGE: f64 = 0.05;
 /// Chance in a toss, most of it in its impacts, as if it were in its start, in the units of [`flight::moved`].
 const CHANCE: [f64; 4] = [0.03, 2.0, 1.0, 5.0];
 
+/// Noise of the height at rest, where faces are not quite alike \[m\].
+const REST_NOISE: f64 = 3e-4;
+
 /// Rows to be explained.
 pub(crate) struct Target<'a> {
     pub(crate) toss: &'a Toss,
@@ -26,32 +29,35 @@ pub(crate) struct Target<'a> {
     /// Off by one in position \[m\] and attitude \[rad\].
     unit: [f64; 2],
     steps: Steps<RungeKutta4>,
+    /// Height at rest, if it is to be explained \[m\].
+    rest: Option<f64>,
     /// Square roots of the weights of the rows.
     weights: Vec<f64>,
 }
 
 impl<'a> Target<'a> {
-    /// The flight of a toss, if it is long enough.
+    /// The flight of a toss, if it is long enough, and where the toss comes to rest.
     pub(crate) fn flight(toss: &'a Toss) -> Option<Self> {
-        let steps = Steps { integrator: RungeKutta4, per_row: 1 };
         let (rows, start) = (flight::rows(toss), toss.rows[0].start(flight::GRAVITY));
         let weights = vec![1.0; rows];
+        let rest = flight::rest(toss);
         (rows >= flight::SHORTEST).then_some(Self {
             toss,
             start,
             rows,
             unit: NOISE,
-            steps,
+            rest,
+            steps: flight::STEPS,
             weights,
         })
     }
 
     /// The rows up to some after the first touch, which may be off by percents of the width and degrees.
     pub(crate) fn contacts(toss: &'a Toss, start: Start, rows: usize, percent: f64) -> Self {
-        let steps = Steps { integrator: RungeKutta4, per_row: 16 };
+        let steps = Steps { integrator: RungeKutta4, per_row: 16, board: true };
         let rows = flight::rows(toss).saturating_add(rows).min(toss.rows.len());
         let unit = [percent / 100.0 * WIDTH, percent.to_radians()];
-        Self { toss, start, rows, unit, steps, weights: vec![1.0; rows] }
+        Self { toss, start, rows, unit, steps, rest: None, weights: vec![1.0; rows] }
     }
 
     /// Weights by how much chance moves the rows: as much as one, and a row counts half.
@@ -88,8 +94,12 @@ impl<'a> Target<'a> {
         free: &Range<usize>,
         start: &Start<Fwd<LANES>>,
     ) -> Option<Linearized> {
-        let path = cube::path(&self.steps, &parameters::seeded(x, free), start, self.rows).ok()?;
-        let exact = self.residuals(&path);
+        let values = parameters::seeded(x, free);
+        let path = cube::path(&self.steps, &values, start, self.rows).ok()?;
+        let mut exact = self.residuals(&path);
+        // At rest it stands on a face.
+        let stands = values[HALF_WIDTH] - values[DEPTH];
+        exact.extend(self.rest.map(|height| stands.plus(-height).times(1.0 / REST_NOISE)));
         let mut slopes = Slopes::zeros(exact.len());
         for (mut row, residual) in slopes.row_iter_mut().zip(&exact) {
             for (slope, lane) in
