@@ -88,8 +88,11 @@ impl Surface {
     }
 
     /// A lattice on the faces of a box around the origin with edges along the axes, `half_extents` \[m\] from it: corners,
-    /// edges, and between them as many equal distances as `spacing` \[m\] allows. Areas are those of the trapezoid rule, so that
-    /// faces are exact in the mean.
+    /// edges, and between them as many equal distances as `spacing` \[m\] allows.
+    ///
+    /// Areas are those of the trapezoid rule. A sample on an edge or a corner has the mean of its shares of the faces that meet
+    /// there, since one of them touches at a time: where distances come out equal along all axes, every face presses with its own area,
+    /// evenly, and [`Surface::area`] is less than that of the box.
     ///
     /// # Errors
     /// If a length is not positive and finite.
@@ -107,12 +110,12 @@ impl Surface {
             let on_face = [0, 1, 2].map(|i| at[i] == 0 || at[i] == parts[i]);
             // A face ends in half a step.
             let share = |i: usize| if on_face[i] { 0.5 * step[i] } else { step[i] };
-            let faces = (0..3).filter(|i| on_face[*i]);
-            let area: f64 = faces.map(|i| share((i + 1) % 3) * share((i + 2) % 3)).sum();
-            if area > 0.0 {
+            let faces: Vec<usize> = (0..3).filter(|i| on_face[*i]).collect();
+            let shares = faces.iter().map(|i| share((i + 1) % 3) * share((i + 2) % 3));
+            if !faces.is_empty() {
+                areas.push(shares.sum::<f64>() / faces.len() as f64);
                 let place = |i: usize| at[i] as f64 * step[i] - half_extents[i];
                 points.push(Point3::new(place(0), place(1), place(2)));
-                areas.push(area);
             }
         }
         Self::new(&points, &areas)
@@ -192,11 +195,20 @@ mod tests {
     use crate::{Body, BodyId, GapSmoothing, RigidBody, State};
 
     #[test]
-    fn a_lattice_has_the_moments_of_its_box() {
+    fn every_face_of_a_lattice_presses_as_it_is() {
         let (half, corner) = ([0.03, 0.02, 0.01], Point3::new(0.03, -0.02, 0.01));
         let surface = Surface::cuboid(half, 0.011).unwrap();
-        let areas = [half[1] * half[2], half[0] * half[2], half[0] * half[1]];
-        assert!((surface.area() - 8.0 * areas.iter().sum::<f64>()).abs() < 1e-15);
+        for (axis, side) in [(0, 1.0), (1, -1.0), (2, -1.0)] {
+            let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
+            let on_face = |p: &&SurfacePoint| p.position[axis] == side * half[axis];
+            let face: Vec<_> = surface.points().iter().filter(on_face).collect();
+            let sum = |f: fn(&Point3<f64>, usize) -> f64, i: usize| -> f64 {
+                face.iter().map(|p| p.area * f(&p.position, i)).sum()
+            };
+            let area = 4.0 * half[i] * half[j];
+            assert!((sum(|_, _| 1.0, i) / area - 1.0).abs() < 1e-12);
+            assert!(sum(|p, i| p[i], i).abs() + sum(|p, i| p[i], j).abs() < 1e-15);
+        }
         let at_corner = |p: &&SurfacePoint| (p.position - corner).norm() < 1e-12;
         assert_eq!(surface.points().iter().filter(at_corner).count(), 1);
         let mean = |axis: usize| -> f64 {
