@@ -37,6 +37,9 @@ pub enum BodyError {
     /// A length of a box is not positive and finite.
     #[error("lengths of a box must be positive and finite, one is {0} m")]
     Length(f64),
+    /// The edges of a box are not round, or leave nothing of its faces.
+    #[error("edges of a box must be round and leave something of its faces, their radius is {0} m")]
+    Edges(f64),
     /// The radius of rounded samples is negative or not finite.
     #[error("radius of surface points must be zero or positive and finite, is {0} m")]
     Rounding(f64),

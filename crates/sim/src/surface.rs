@@ -94,6 +94,9 @@ impl Surface {
     /// there, since one of them touches at a time: where distances come out equal along all axes, every face presses with its own area,
     /// evenly, and [`Surface::area`] is less than that of the box.
     ///
+    /// Beside the field of a box, whose edges are round, take [`Cuboid::surface`](crate::Cuboid::surface): the samples on
+    /// the edges of this one never touch it.
+    ///
     /// # Errors
     /// If a length is not positive and finite.
     pub fn cuboid(half_extents: [f64; 3], spacing: f64) -> Result<Self, BodyError> {
@@ -116,6 +119,43 @@ impl Surface {
                 areas.push(shares.sum::<f64>() / faces.len() as f64);
                 let place = |i: usize| at[i] as f64 * step[i] - half_extents[i];
                 points.push(Point3::new(place(0), place(1), place(2)));
+            }
+        }
+        Self::new(&points, &areas)
+    }
+
+    /// Lattices on the faces of the same box, each on its own face as far as `inset` \[m\] from the edges and for all of it.
+    pub(crate) fn flat_faces(
+        half_extents: [f64; 3],
+        inset: f64,
+        spacing: f64,
+    ) -> Result<Self, BodyError> {
+        let lengths = half_extents.iter().chain([&spacing]);
+        if let Some(&length) = lengths.into_iter().find(|x| !(**x > 0.0 && x.is_finite())) {
+            return Err(BodyError::Length(length));
+        }
+        let flat = half_extents.map(|half| half - inset);
+        let parts = flat.map(|flat| (2.0 * flat / spacing).ceil() as usize);
+        // Place along an axis, and the width it stands for.
+        let row = |axis: usize, at: usize| {
+            let (half, parts) = (half_extents[axis], parts[axis]);
+            let width = 2.0 * half / parts as f64;
+            let end = at == 0 || at == parts;
+            (
+                flat[axis] * (2.0 * at as f64 / parts as f64 - 1.0),
+                if end { 0.5 * width } else { width },
+            )
+        };
+        let (mut points, mut areas) = (Vec::new(), Vec::new());
+        for axis in 0..3 {
+            let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+            let plane = (0..=parts[u]).flat_map(|i| (0..=parts[v]).map(move |j| (i, j)));
+            for ((i, j), side) in plane.flat_map(|at| [(at, -1.0), (at, 1.0)]) {
+                let mut point = Point3::origin();
+                let ((x, width), (y, height)) = (row(u, i), row(v, j));
+                (point[axis], point[u], point[v]) = (side * half_extents[axis], x, y);
+                points.push(point);
+                areas.push(width * height);
             }
         }
         Self::new(&points, &areas)
