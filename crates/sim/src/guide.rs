@@ -88,29 +88,43 @@
 //!
 //! # Contacts that hold
 //! Friction that knows only the slip of the moment lets everything creep, slowly, at a part of its slip scale. What has to stay
-//! for seconds, such as a stack or an object in a gripper, wants friction with springs ([`Sticking`](crate::Sticking)). Samples
-//! of flat faces should be a lattice ([`Surface::cuboid`](crate::Surface::cuboid)), those of a ball a single round one
-//! ([`Surface::rounded`](crate::Surface::rounded)).
+//! for seconds, such as a stack or an object in a gripper, wants friction with springs ([`Sticking`](crate::Sticking)). It costs
+//! about ten times as much with derivatives: what only slides or bounces is better off with [`Coulomb`](crate::Coulomb) alone, whose
+//! documentation says how to choose a slip scale.
+//!
+//! Samples of flat faces should be a lattice: [`Body::with_cuboid`] gives a box both samples and field, so that boxes touch
+//! each other; one that only stands on others may do with [`Surface::cuboid`](crate::Surface::cuboid). A ball is a single round sample
+//! ([`Surface::ball`](crate::Surface::ball)). Solid, uniform bodies: [`RigidBody::cuboid`], [`RigidBody::ball`].
 //!
 //! ```
 //! # use std::sync::Arc;
-//! # use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
+//! # use nalgebra::{Isometry3, Vector3};
 //! # use prehend_sim::*;
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! # let mut world = World::new(Vector3::new(2.0, 0.0, -9.6));
-//! # let floor = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
-//! let rigid = RigidBody::new(0.2, Matrix3::identity() * 5e-5, Point3::origin())?;
-//! let surface = Surface::cuboid([0.02; 3], 0.01)?;
-//! let block = world.add(Body::free("block", rigid).with_surface(surface));
-//! let normal = KelvinVoigt { stiffness: 1e7, damping: 1e5 };
+//! // A slope of 6°.
+//! let mut world = World::new(Vector3::new(1.0, 0.0, -9.75));
+//! let floor = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
+//! // Two boxes of 4 cm and 200 g with edges of 1 mm; samples 1 cm apart.
+//! let (half, mass) = (0.02, 0.2);
+//! let rigid = RigidBody::cuboid(mass, [half; 3])?;
+//! let shape = Cuboid { half_extents: Vector3::repeat(half), rounding: 1e-3 };
+//! let lower = world.add(Body::free("lower", rigid).with_cuboid(shape, 0.01)?);
+//! let upper = world.add(Body::free("upper", rigid).with_cuboid(shape, 0.01)?);
+//!
+//! // Both weigh on the floor: a face of the lower one sinks in by a tenth of a millimeter.
+//! let contact_area = 4.0 * half * half;
+//! let target = StaticContactTarget { mass: 2.0 * mass, gravity: 9.75, penetration: 1e-4, contact_area };
+//! let normal = KelvinVoigt::from_target(&target, 0.3)?;
 //! let friction = Sticking { friction: Coulomb { friction: 0.5, slip_scale: 1e-2 }, deflection: 1e-4 };
 //! let law = Arc::new(Law::new(normal, friction)?);
-//! let bodies = ContactBodies { samples: block, field: floor };
-//! world.add_contact(bodies, law, GapSmoothing::Softplus { width: 5e-5 })?;
-//! // Downhill, but not beyond friction.
-//! let start = [State::at_rest(Isometry3::identity()), rigid.at_rest(&Isometry3::translation(0.0, 0.0, 0.02))];
+//! let smoothing = GapSmoothing::Softplus { width: 1e-5 };
+//! world.add_contact(ContactBodies { samples: lower, field: floor }, law.clone(), smoothing)?;
+//! world.add_symmetric_contact(upper, lower, law, smoothing)?;
+//!
+//! let at_height = |z| rigid.at_rest(&Isometry3::translation(0.0, 0.0, z));
+//! let start = [State::at_rest(Isometry3::identity()), at_height(half), at_height(3.0 * half)];
 //! let run = world.rollout(&start, TimeSteps { dt: 1.0, steps: 3 })?;
-//! let place = |second: usize| run[second][block].pose.translation.x;
+//! let place = |second: usize| run[second][upper].pose.translation.x;
 //! assert!((place(3) - place(1)).abs() < 1e-8);
 //! # Ok(())
 //! # }

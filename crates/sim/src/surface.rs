@@ -2,7 +2,7 @@
 
 use nalgebra::Point3;
 
-use crate::body::BodyError;
+use crate::body::{BodyError, check_lengths};
 
 /// A sample of a body's surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,6 +79,17 @@ impl Surface {
         Ok(self)
     }
 
+    /// A ball of `radius` \[m\] around the origin: one round sample that stands for the area of its cross-section πR². That is the
+    /// `contact_area` of a [`StaticContactTarget`](crate::StaticContactTarget), however deep the ball sinks in.
+    ///
+    /// # Errors
+    /// Unless the radius is positive and finite.
+    pub fn ball(radius: f64) -> Result<Self, BodyError> {
+        check_lengths(&[radius])?;
+        let area = std::f64::consts::PI * radius * radius;
+        Self::new(&[Point3::origin()], &[area])?.rounded(radius)
+    }
+
     /// `points` that share `area` \[m²\] equally, such as uniform samples of a surface.
     ///
     /// # Errors
@@ -100,10 +111,8 @@ impl Surface {
     /// # Errors
     /// If a length is not positive and finite.
     pub fn cuboid(half_extents: [f64; 3], spacing: f64) -> Result<Self, BodyError> {
-        let lengths = half_extents.iter().chain([&spacing]);
-        if let Some(&length) = lengths.into_iter().find(|x| !(**x > 0.0 && x.is_finite())) {
-            return Err(BodyError::Length(length));
-        }
+        check_lengths(&half_extents)?;
+        check_lengths(&[spacing])?;
         let parts = half_extents.map(|half| (2.0 * half / spacing).ceil() as usize);
         let step = [0, 1, 2].map(|i| 2.0 * half_extents[i] / parts[i] as f64);
         let (mut points, mut areas) = (Vec::new(), Vec::new());
@@ -130,10 +139,8 @@ impl Surface {
         inset: f64,
         spacing: f64,
     ) -> Result<Self, BodyError> {
-        let lengths = half_extents.iter().chain([&spacing]);
-        if let Some(&length) = lengths.into_iter().find(|x| !(**x > 0.0 && x.is_finite())) {
-            return Err(BodyError::Length(length));
-        }
+        check_lengths(&half_extents)?;
+        check_lengths(&[spacing])?;
         let flat = half_extents.map(|half| half - inset);
         let parts = flat.map(|flat| (2.0 * flat / spacing).ceil() as usize);
         // Place along an axis, and the width it stands for.
@@ -228,11 +235,14 @@ fn sort_into_blocks(points: &mut [SurfacePoint], start: usize, blocks: &mut Vec<
 mod tests {
     use std::sync::Arc;
 
-    use nalgebra::{Isometry3, Matrix3, Vector3};
+    use nalgebra::{Isometry3, Vector3};
 
     use super::*;
     use crate::scenes::{floor, on_ground, penalty};
-    use crate::{Body, BodyId, GapSmoothing, RigidBody, State};
+    use crate::{
+        Body, BodyId, Coulomb, GapSmoothing, KelvinVoigt, Law, RigidBody, State,
+        StaticContactTarget,
+    };
 
     #[test]
     fn every_face_of_a_lattice_presses_as_it_is() {
@@ -286,15 +296,13 @@ mod tests {
     #[test]
     fn one_rounded_sample_is_a_ball_that_rolls() {
         let (mass, radius, speed, friction) = (0.3, 0.05, 1.0, 0.3);
-        let inertia = Matrix3::identity() * (0.4 * mass * radius * radius);
-        let rigid = RigidBody::new(mass, inertia, Point3::origin()).unwrap();
-        let surface = Surface::uniform(&[Point3::origin()], 1e-4).unwrap();
-        let surface = surface.rounded(radius).unwrap();
-        let ball = Body::free("ball", rigid).with_surface(surface);
+        let rigid = RigidBody::ball(mass, radius).unwrap();
+        let surface = Surface::ball(radius).unwrap();
+        let ball = Body::free("ball", rigid).with_surface(surface.clone());
         let law = Arc::new(penalty(1e8, 1e6, friction, 1e-3));
         let smoothing = GapSmoothing::Softplus { width: 1e-6 };
         let world = on_ground(Vector3::z() * -9.81, floor(), ball, law, smoothing);
-        let sinks = mass * 9.81 / (1e8 * 1e-4);
+        let sinks = mass * 9.81 / (1e8 * surface.area());
         let pose = Isometry3::translation(0.0, 0.0, radius - sinks);
         let mut start = [State::at_rest(Isometry3::identity()), rigid.at_rest(&pose)];
         start[1].linear.x = speed;
@@ -306,6 +314,32 @@ mod tests {
         assert!(touching.is_possible());
         let refused = Surface::uniform(&[Point3::origin()], 1e-4).unwrap().rounded(-1.0);
         assert_eq!(refused, Err(BodyError::Rounding(-1.0)));
+        assert_eq!(Surface::ball(0.0), Err(BodyError::Length(0.0)));
+    }
+
+    #[test]
+    fn a_ball_rests_and_bounces_as_its_target_says() {
+        let (mass, radius, penetration) = (0.1, 0.03, 5e-4);
+        let (rigid, surface) = (RigidBody::ball(mass, radius), Surface::ball(radius).unwrap());
+        let rigid = rigid.unwrap();
+        let contact_area = surface.area();
+        let target = StaticContactTarget { mass, gravity: 9.81, penetration, contact_area };
+        let normal = KelvinVoigt::from_target(&target, 0.5).unwrap();
+        let law = Law::new(normal, Coulomb { friction: 0.3, slip_scale: 1e-2 }).unwrap();
+        let ball = Body::free("ball", rigid).with_surface(surface);
+        let start = [
+            State::at_rest(Isometry3::identity()),
+            rigid.at_rest(&Isometry3::translation(0.0, 0.0, radius)),
+        ];
+        let smoothing = GapSmoothing::Softplus { width: 1e-6 };
+        let mut world = on_ground(Vector3::zeros(), floor(), ball, Arc::new(law), smoothing);
+        let mut falling = start;
+        falling[1].linear.z = -1.0;
+        let bounced = world.simulate(&falling, 0.1).unwrap()[1].linear.z;
+        assert!((bounced - 0.5).abs() < 2e-3, "{bounced}");
+        world.gravity.z = -9.81;
+        let depth = radius - world.simulate(&start, 1.0).unwrap()[1].pose.translation.z;
+        assert!((depth / penetration - 1.0).abs() < 1e-3, "{depth}");
     }
 
     #[test]

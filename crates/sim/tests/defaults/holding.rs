@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
+use nalgebra::{Isometry3, Vector3};
 use prehend_sim::{
     Body, BodyId, Coulomb, Cuboid, DynContactLaw, KelvinVoigt, Law, RigidBody, State, Sticking,
     TimeSteps, World,
@@ -32,8 +32,7 @@ fn cube(body: Body, half: f64) -> Body {
 }
 
 fn free_cube(name: &str) -> Body {
-    let inertia = Matrix3::identity() * (MASS * HALF * HALF * 2.0 / 3.0);
-    cube(Body::free(name, RigidBody::new(MASS, inertia, Point3::origin()).unwrap()), HALF)
+    cube(Body::free(name, RigidBody::cuboid(MASS, [HALF; 3]).unwrap()), HALF)
 }
 
 fn at(x: f64, y: f64, z: f64) -> State {
