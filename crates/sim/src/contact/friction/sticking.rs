@@ -42,6 +42,10 @@ impl<F: FrictionCoefficient> Parameters for Sticking<F> {
         self.friction.values()
     }
 
+    fn names(&self) -> Vec<&'static str> {
+        self.friction.names()
+    }
+
     fn check(&self, values: &Self::Params<f64>) -> Result<(), LawError> {
         self.friction.check(values)?;
         DEFLECTION.check(self.deflection)
