@@ -83,6 +83,17 @@ pub enum SimulationError {
         /// Its name.
         body: String,
     },
+    /// The velocity of a trajectory is not the rate of its pose.
+    #[error(
+        "body '{body}' is driven by a trajectory whose velocity at {time} s is far from the rate of its pose, which what touches it \
+         should feel: give its state `linear` and `angular`"
+    )]
+    TrajectoryVelocity {
+        /// Its name.
+        body: String,
+        /// Time \[s\].
+        time: f64,
+    },
     /// The time step is not a positive number.
     #[error("a time, or a time step, must be positive and finite, is {0} s")]
     TimeStep(f64),

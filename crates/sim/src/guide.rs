@@ -54,7 +54,8 @@
 //!
 //! # Bodies on a trajectory
 //! [`Body::driven`] puts a body, such as a robot's link, on a [`Trajectory`](crate::Trajectory). [`World::simulate`] moves
-//! it, to time 0 before the first step too: the state given for it does not matter.
+//! it, to time 0 before the first step too: the state given for it does not matter. A trajectory has velocities, too, the rates at
+//! which its pose changes; one that forgets them is refused.
 //!
 //! ```
 //! # use std::sync::Arc;
