@@ -6,7 +6,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
+use nalgebra::{Isometry3, Vector3};
 use plotters::prelude::*;
 use prehend::autodiff::optimize::{LevenbergMarquardt, NormalEquations};
 use prehend::autodiff::{Fwd, Scalar};
@@ -24,12 +24,9 @@ const TARGET: [f64; 3] = [1.2, 0.15, 0.3];
 /// A rubber ball of 60 g above a floor, and the states of both.
 fn ball_and_floor() -> anyhow::Result<(World, [State; 2])> {
     let mass = 0.06;
-    let inertia = Matrix3::identity() * (0.4 * mass * RADIUS * RADIUS);
-    let rigid = RigidBody::new(mass, inertia, Point3::origin())?;
-    // One round sample is a ball.
-    let area = 1e-4;
-    let surface = Surface::uniform(&[Point3::origin()], area)?.rounded(RADIUS)?;
-    let target = StaticContactTarget { mass, gravity: 9.81, penetration: 5e-5, contact_area: area };
+    let (rigid, surface) = (RigidBody::ball(mass, RADIUS)?, Surface::ball(RADIUS)?);
+    let contact_area = surface.area();
+    let target = StaticContactTarget { mass, gravity: 9.81, penetration: 5e-5, contact_area };
     let bounce = Bounce { restitution: 0.8, impact_speed: 3.0 };
     let normal = HuntCrossley::from_target(&target, 1.5, bounce)?;
     let law = Law::new(normal, Coulomb { friction: 0.4, slip_scale: 1e-2 })?;

@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
+use nalgebra::{Isometry3, Point3, Vector3};
 use prehend::autodiff::{Fwd, Recording, Scalar};
 use prehend::geometry::sample::surface_samples;
 use prehend::geometry::shapes;
@@ -38,8 +38,7 @@ fn ball_on_floor(law: Quadratic) -> anyhow::Result<(World, [State; 2])> {
     let (ball, mass) = (shapes::sphere(RADIUS, 64), 0.2);
     let points: Vec<Point3<f64>> =
         surface_samples(&ball, 2000, 0).iter().map(|s| s.point).collect();
-    let inertia = Matrix3::identity() * (0.4 * mass * RADIUS * RADIUS);
-    let rigid = RigidBody::new(mass, inertia, Point3::origin())?;
+    let rigid = RigidBody::ball(mass, RADIUS)?;
     let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
     let field = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
     let surface = Surface::uniform(&points, ball.area())?;

@@ -223,10 +223,11 @@ impl World<Var> {
         &self,
         integrator: impl Integrator + 'static,
         initial: &[State<Var>],
-        TimeSteps { dt, steps }: TimeSteps,
+        time_steps: TimeSteps,
         snapshots: usize,
     ) -> Result<Vec<State<Var>>, SimulationError> {
-        let initial = self.begin(initial, dt)?;
+        let initial = self.begin(initial, time_steps)?;
+        let TimeSteps { dt, steps } = time_steps;
         integrator.check_differentiable(self)?;
         let scene = Scene::new(integrator, self)?;
         let Changes { places, values } = scene.changes(self);

@@ -34,9 +34,12 @@ pub enum BodyError {
         /// Number of areas.
         areas: usize,
     },
-    /// A length of a box is not positive and finite.
-    #[error("lengths of a box must be positive and finite, one is {0} m")]
+    /// A length of a box or the radius of a ball is not positive and finite.
+    #[error("lengths must be positive and finite, one is {0} m")]
     Length(f64),
+    /// The edges of a box are not round, or leave nothing of its faces.
+    #[error("edges of a box must be round and leave something of its faces, their radius is {0} m")]
+    Edges(f64),
     /// The radius of rounded samples is negative or not finite.
     #[error("radius of surface points must be zero or positive and finite, is {0} m")]
     Rounding(f64),
@@ -49,6 +52,14 @@ pub enum BodyError {
         /// Its place.
         index: usize,
     },
+}
+
+/// Whether all `lengths` \[m\] are positive and finite.
+pub(crate) fn check_lengths(lengths: &[f64]) -> Result<(), BodyError> {
+    match lengths.iter().find(|x| !(**x > 0.0 && x.is_finite())) {
+        Some(&length) => Err(BodyError::Length(length)),
+        None => Ok(()),
+    }
 }
 
 /// Mass, inertia and center of mass of a rigid body.
@@ -88,6 +99,28 @@ impl<S: Scalar> RigidBody<S> {
         let inertia = (inertia + inertia.transpose()) * S::constant(0.5);
         let inverse_inertia = inertia.cholesky().ok_or(BodyError::Inertia)?.inverse();
         Ok(Self { mass, inertia, inverse_inertia, com })
+    }
+
+    /// A solid, uniform box of `mass` \[kg\] around the origin of its model frame with edges along the axes, `half_extents` \[m\]
+    /// from it.
+    ///
+    /// # Errors
+    /// Unless the mass and all lengths are positive and finite.
+    pub fn cuboid(mass: S, half_extents: [f64; 3]) -> Result<Self, BodyError> {
+        check_lengths(&half_extents)?;
+        let [x, y, z] = half_extents.map(|half| half * half / 3.0);
+        let moments = Vector3::new(y + z, z + x, x + y).map(|square| mass.times(square));
+        Self::new(mass, Matrix3::from_diagonal(&moments), Point3::origin())
+    }
+
+    /// A solid, uniform ball of `mass` \[kg\] and `radius` \[m\] around the origin of its model frame.
+    ///
+    /// # Errors
+    /// Unless both are positive and finite.
+    pub fn ball(mass: S, radius: f64) -> Result<Self, BodyError> {
+        check_lengths(&[radius])?;
+        let moment = mass.times(0.4 * radius * radius);
+        Self::new(mass, Matrix3::from_diagonal_element(moment), Point3::origin())
     }
 
     /// The same body of another density, so that it has `mass` \[kg\]: the inertia is scaled as well.
@@ -253,6 +286,43 @@ mod tests {
         assert!((heavier.inertia()[(0, 0)].value - 0.6).abs() < 1e-15);
         assert!((heavier.inertia()[(0, 0)].derivative[0] - 0.2).abs() < 1e-15);
         assert_eq!(body.with_mass(0.0), Err(BodyError::Mass(0.0)));
+    }
+
+    #[test]
+    fn solids_have_the_moments_of_their_matter() {
+        let half = [0.03, 0.02, 0.05];
+        let mass = 0.3;
+        let cuboid = RigidBody::cuboid(mass, half).unwrap();
+        let ball = RigidBody::ball(mass, 0.05).unwrap();
+        // Sums over small cells: ∫(r² − x²) dm along each axis.
+        let cells = 40;
+        let place = |i: i32, half: f64| half * (f64::from(2 * i + 1) / f64::from(cells) - 1.0);
+        let moments = |half: [f64; 3], inside: fn(&Vector3<f64>) -> bool| {
+            let grid = (0..cells).flat_map(|i| (0..cells).map(move |j| (i, j)));
+            let points = grid.flat_map(|(i, j)| {
+                let x =
+                    move |k| Vector3::new(place(i, half[0]), place(j, half[1]), place(k, half[2]));
+                (0..cells).map(x)
+            });
+            let points: Vec<_> = points.filter(inside).collect();
+            let sum: Vector3<f64> = points
+                .iter()
+                .map(|p| (p.component_mul(p) * -1.0).add_scalar(p.norm_squared()))
+                .sum();
+            sum * (mass / points.len() as f64)
+        };
+        let close = |body: &RigidBody, expected: Vector3<f64>| {
+            let off = body.inertia() - Matrix3::from_diagonal(&expected);
+            assert!(off.norm() < 3e-3 * expected.norm(), "{off}");
+        };
+        close(&cuboid, moments(half, |_| true));
+        close(&ball, moments([0.05; 3], |p| p.norm() < 0.05));
+        let [mass] = Fwd::<1>::variables([0.3]);
+        let by_mass = RigidBody::cuboid(mass, half).unwrap().inertia()[(2, 2)].derivative[0];
+        assert!((by_mass - cuboid.inertia()[(2, 2)] / 0.3).abs() < 1e-18);
+        assert_eq!(RigidBody::cuboid(1.0, [1.0, 0.0, 1.0]), Err(BodyError::Length(0.0)));
+        assert_eq!(RigidBody::ball(1.0, -1.0), Err(BodyError::Length(-1.0)));
+        assert_eq!(RigidBody::ball(0.0, 1.0), Err(BodyError::Mass(0.0)));
     }
 
     #[test]

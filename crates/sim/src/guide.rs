@@ -48,13 +48,17 @@
 //! The pose in a state is that of the center of mass: [`RigidBody::at_rest`] makes a state from the pose of the model, and
 //! [`RigidBody::model_pose`] goes back, which is what a renderer needs. For kinematic and driven bodies the two are the same.
 //!
+//! Errors say in words what is wrong and where. A `main` that returns `anyhow::Result` prints them so; with
+//! `Box<dyn Error>` it prints the fields alone.
+//!
 //! [`World::simulate`] chooses its steps by the error of values and derivatives, whatever the stiffness of the contacts,
 //! and is an error where no step is short enough ([`Adaptive`](crate::Adaptive)). [`World::rollout`] gives the states in
 //! between too. Stiffness and damping from what you know of a contact: [`StaticContactTarget`](crate::StaticContactTarget).
 //!
 //! # Bodies on a trajectory
 //! [`Body::driven`] puts a body, such as a robot's link, on a [`Trajectory`](crate::Trajectory). [`World::simulate`] moves
-//! it, to time 0 before the first step too: the state given for it does not matter.
+//! it, to time 0 before the first step too: the state given for it does not matter. A trajectory has velocities, too, the rates at
+//! which its pose changes; one that forgets them is refused.
 //!
 //! ```
 //! # use std::sync::Arc;
@@ -88,30 +92,44 @@
 //!
 //! # Contacts that hold
 //! Friction that knows only the slip of the moment lets everything creep, slowly, at a part of its slip scale. What has to stay
-//! for seconds, such as a stack or an object in a gripper, wants friction with springs ([`Sticking`](crate::Sticking)). Samples
-//! of flat faces should be a lattice ([`Surface::cuboid`](crate::Surface::cuboid)), those of a ball a single round one
-//! ([`Surface::rounded`](crate::Surface::rounded)).
+//! for seconds, such as a stack or an object in a gripper, wants friction with springs ([`Sticking`](crate::Sticking)). It costs
+//! five to ten times as much with derivatives: what only slides or bounces is better off with [`Coulomb`](crate::Coulomb) alone, whose
+//! documentation says how to choose a slip scale.
+//!
+//! Samples of flat faces should be a lattice: [`Body::with_cuboid`] gives a box both samples and field, so that boxes touch
+//! each other; one that only stands on others may do with [`Surface::cuboid`](crate::Surface::cuboid). A ball is a single round sample
+//! ([`Surface::ball`](crate::Surface::ball)). Solid, uniform bodies: [`RigidBody::cuboid`], [`RigidBody::ball`].
 //!
 //! ```
 //! # use std::sync::Arc;
-//! # use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
+//! # use nalgebra::{Isometry3, Vector3};
 //! # use prehend_sim::*;
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! # let mut world = World::new(Vector3::new(2.0, 0.0, -9.6));
-//! # let floor = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
-//! let rigid = RigidBody::new(0.2, Matrix3::identity() * 5e-5, Point3::origin())?;
-//! let surface = Surface::cuboid([0.02; 3], 0.01)?;
-//! let block = world.add(Body::free("block", rigid).with_surface(surface));
-//! let normal = KelvinVoigt { stiffness: 1e7, damping: 1e5 };
+//! // A slope of 6°.
+//! let mut world = World::new(Vector3::new(1.0, 0.0, -9.75));
+//! let floor = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
+//! // Two boxes of 4 cm and 200 g with edges of 1 mm; samples 1 cm apart.
+//! let (half, mass) = (0.02, 0.2);
+//! let rigid = RigidBody::cuboid(mass, [half; 3])?;
+//! let shape = Cuboid { half_extents: Vector3::repeat(half), rounding: 1e-3 };
+//! let lower = world.add(Body::free("lower", rigid).with_cuboid(shape, 0.01)?);
+//! let upper = world.add(Body::free("upper", rigid).with_cuboid(shape, 0.01)?);
+//!
+//! // Both weigh on the floor: a face of the lower one sinks in by a tenth of a millimeter.
+//! let contact_area = 4.0 * half * half;
+//! let target = StaticContactTarget { mass: 2.0 * mass, gravity: 9.75, penetration: 1e-4, contact_area };
+//! let normal = KelvinVoigt::from_target(&target, 0.3)?;
 //! let friction = Sticking { friction: Coulomb { friction: 0.5, slip_scale: 1e-2 }, deflection: 1e-4 };
 //! let law = Arc::new(Law::new(normal, friction)?);
-//! let bodies = ContactBodies { samples: block, field: floor };
-//! world.add_contact(bodies, law, GapSmoothing::Softplus { width: 5e-5 })?;
-//! // Downhill, but not beyond friction.
-//! let start = [State::at_rest(Isometry3::identity()), rigid.at_rest(&Isometry3::translation(0.0, 0.0, 0.02))];
+//! let smoothing = GapSmoothing::Softplus { width: 1e-5 };
+//! world.add_contact(ContactBodies { samples: lower, field: floor }, law.clone(), smoothing)?;
+//! world.add_symmetric_contact(upper, lower, law, smoothing)?;
+//!
+//! let at_height = |z| rigid.at_rest(&Isometry3::translation(0.0, 0.0, z));
+//! let start = [State::at_rest(Isometry3::identity()), at_height(half), at_height(3.0 * half)];
 //! let run = world.rollout(&start, TimeSteps { dt: 1.0, steps: 3 })?;
-//! let place = |second: usize| run[second][block].pose.translation.x;
-//! assert!((place(3) - place(1)).abs() < 1e-8);
+//! let place = |second: usize| run[second][upper].pose.translation.x;
+//! assert!((place(3) - place(1)).abs() < 1e-7);
 //! # Ok(())
 //! # }
 //! ```
@@ -146,7 +164,9 @@
 //!
 //! # Steps of your own choice
 //! Where speed counts more than certainty, [`World::simulate_with`] takes the steps of an
-//! [`Integrator`](crate::Integrator), and reports how well they resolved the motion ([`Resolution`](crate::Resolution)).
+//! [`Integrator`](crate::Integrator), and reports how well they resolved the motion ([`Resolution`](crate::Resolution)). Contacts
+//! that make energy are an error, but only while nothing moves except what forces move: one body that is driven, or kinematic with a velocity,
+//! and energy is not asked about.
 //! [`SemiImplicitEuler`](crate::SemiImplicitEuler) is the cheapest. [`BackwardEuler`](crate::BackwardEuler) is stable for
 //! every step and damps what is faster than it; [`SubStepped`](crate::SubStepped) divides the steps of any integrator where
 //! contacts, impacts to come among them, demand it. All have derivatives, which are those of the steps taken: with steps
@@ -319,6 +339,58 @@
 //! rollout, not its parts, so give it many. For rollouts too long even for that, [`World::simulate_checkpointed`] is one
 //! node that holds as many states as you allow.
 //!
+//! # Identification
+//! What a world is made of, from what was seen of it: parameters have names, and least squares take residuals over the scalar as they
+//! are. A trial step may lead to a world that is refused, of negative friction for instance: residuals that are no numbers make it a
+//! bad step, and a shorter one is tried. A step that promises less than the error of what was seen is a waste of rollouts, of which
+//! each takes one ([`Criteria`](prehend_autodiff::optimize::Criteria)).
+//!
+//! ```
+//! # use std::sync::Arc;
+//! # use nalgebra::{Isometry3, Vector3};
+//! use prehend_autodiff::optimize::{Criteria, LevenbergMarquardt, NormalEquations};
+//! use prehend_autodiff::{Fwd, Scalar};
+//! # use prehend_sim::*;
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
+//! # let floor = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
+//! # let rigid = RigidBody::cuboid(0.2, [0.02; 3])?;
+//! # let block = Body::free("block", rigid).with_surface(Surface::cuboid([0.02; 3], 0.02)?);
+//! # let bodies = ContactBodies { samples: world.add(block), field: floor };
+//! # let spring = KelvinVoigt { stiffness: 1e7, damping: 1e5 };
+//! # let law = Law::new(spring, Coulomb { friction: 0.5, slip_scale: 1e-2 })?;
+//! # world.add_contact(bodies, Arc::new(law), GapSmoothing::Softplus { width: 2e-5 })?;
+//! # let stands = rigid.at_rest(&Isometry3::translation(0.0, 0.0, 0.02));
+//! # let start = [State::at_rest(Isometry3::identity()), stands];
+//! // Where a block is every 20 ms, by its friction and its speed at the start.
+//! fn places<S: Scalar>(
+//!     world: &World,
+//!     start: &[State],
+//!     [friction, speed]: [S; 2],
+//! ) -> Result<Vec<S>, SimulationError> {
+//!     let mut world = world.lift::<S>();
+//!     *world.contacts[0].param_mut("friction")? = friction;
+//!     let mut start: Vec<State<S>> = start.iter().map(State::lift).collect();
+//!     start[1].linear.x = speed;
+//!     let run = world.rollout(&start, TimeSteps { dt: 0.02, steps: 10 })?;
+//!     Ok(run.iter().map(|states| states[1].pose.translation.x).collect())
+//! }
+//!
+//! let seen = places(&world, &start, [0.35, 0.6])?;
+//! let residuals = |x: &[Fwd<2>]| match places(&world, &start, [x[0], x[1]]) {
+//!     Ok(places) => places.iter().zip(&seen).map(|(place, seen)| place.plus(-seen)).collect(),
+//!     Err(_) => vec![Fwd::constant(f64::NAN); seen.len()],
+//! };
+//! // Half the sum of squares [m²]: places are known to a micrometer.
+//! let criteria = Criteria { predicted_decrease: 1e-12, ..Criteria::default() };
+//! let solver = LevenbergMarquardt { criteria, ..LevenbergMarquardt::default() };
+//! let found = solver.minimize(&[0.6, 0.4], |x| NormalEquations::forward(residuals, x))?;
+//! assert!((found.parameters[0] - 0.35).abs() < 1e-3 && (found.parameters[1] - 0.6).abs() < 1e-3);
+//! assert!(found.iterations < 20);
+//! # Ok(())
+//! # }
+//! ```
+//!
 //! # Together with other losses
 //! The states of a rollout over `Var` are numbers on the tape like all others. Their poses go on into a renderer's
 //! operation, a network or a sum of squares, where they come from may be anything as well, and one sweep goes back
@@ -408,8 +480,8 @@
 //! # What derivatives mean
 //! Those of [`World::simulate`] are the motion's, to a fraction of a percent, as long as forces grow from zero where
 //! contact begins: fields should be C², and damping should fade in, by
-//! [`GapSmoothing::Softplus`](crate::GapSmoothing::Softplus) or by the law. A force that jumps at touch is refused; kinks
-//! of a field are not seen. With steps of your own choice they are those of the steps: under
+//! [`GapSmoothing::Softplus`](crate::GapSmoothing::Softplus) or by the law. A force that jumps at touch is refused: that
+//! is tried once, at 1 m/s, and jumps elsewhere, in depth or slip, are not looked for; kinks of a field are not seen. With steps of your own choice they are those of the steps: under
 //! [`GapSmoothing::Hard`](crate::GapSmoothing::Hard) the moment of an impact jumps from one step to the next, and a step
 //! too long for friction makes them meaningless, see [`Resolution`](crate::Resolution). Derivatives of
 //! [`GapSmoothing::Leaky`](crate::GapSmoothing::Leaky) are not those of the forces, on purpose. At rest, at gap zero and

@@ -7,7 +7,7 @@
 //! rollout of a [`World`] carries exact derivatives by its initial states and by every number of the world.
 //! [`StabilityLoss`] measures by such rollouts how far an object is from resting.
 //!
-//! The [`guide`] goes from a world in ten lines to gradients of long rollouts.
+//! The [`guide`] goes from a world in twenty lines to gradients of long rollouts.
 //!
 //! World-frame conventions: a pose perturbation is the left twist (translation, rotation) about the
 //! center of mass, velocities are those of the center of mass, in the world frame.

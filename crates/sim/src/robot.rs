@@ -98,7 +98,6 @@ impl World {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::{Matrix3, Point3};
     use prehend_autodiff::lie::so3_log;
 
     use super::*;
@@ -160,8 +159,7 @@ mod tests {
         let (mut world, links) = arm(pushing);
         let tip = links[2].unwrap();
         let (radius, mass) = (0.03, 0.1);
-        let inertia = Matrix3::identity() * (0.4 * mass * radius * radius);
-        let rigid = RigidBody::new(mass, inertia, Point3::origin()).unwrap();
+        let rigid = RigidBody::ball(mass, radius).unwrap();
         let surface = Surface::uniform(&ellipsoid(400, [radius; 3]), 0.0113).unwrap();
         let ball = world.add(Body::free("ball", rigid).with_surface(surface));
         // Critically damped, or nearly: the ball keeps to the finger rather than bounce off.

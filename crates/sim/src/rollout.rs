@@ -31,15 +31,15 @@ impl<S: Scalar> World<S> {
     /// what the adjoint needs.
     ///
     /// # Errors
-    /// Unless there is one finite state for each body and the time is positive; where forces jump or grow so that no step
-    /// is short enough, which body, contact and time.
+    /// Unless there is one finite state for each body and the time is positive; if the velocity of a trajectory is not the rate of
+    /// its pose; where forces jump or grow so that no step is short enough, which body, contact and time.
     pub fn simulate(
         &self,
         initial: &[State<S>],
         time: f64,
     ) -> Result<Vec<State<S>>, SimulationError> {
-        let (once, initial) = (TimeSteps { dt: time, steps: 1 }, self.begin(initial, time)?);
-        self.march(&Adaptive::default(), initial, once, |_, _| Ok(()))
+        let once = TimeSteps { dt: time, steps: 1 };
+        self.march(&Adaptive::default(), self.begin(initial, once)?, once, |_, _| Ok(()))
     }
 
     /// The states of all bodies at 0, dt, …, `steps`·dt, as [`World::simulate`] finds them.
@@ -51,7 +51,7 @@ impl<S: Scalar> World<S> {
         initial: &[State<S>],
         time_steps: TimeSteps,
     ) -> Result<Vec<Vec<State<S>>>, SimulationError> {
-        let initial = self.begin(initial, time_steps.dt)?;
+        let initial = self.begin(initial, time_steps)?;
         let mut states = vec![initial.clone()];
         self.march(&Adaptive::default(), initial, time_steps, |_, next| {
             states.push(next.to_vec());
@@ -67,8 +67,8 @@ impl<S: Scalar> World<S> {
     /// with it. Laws that drive things on purpose are for [`World::simulate_controlled`] and [`World::step`], which do not ask.
     ///
     /// # Errors
-    /// Unless there is one finite state for each body and the time step is positive; where a state stops being finite or
-    /// contacts make energy, which body, contact and time; if a step's equations were not solved.
+    /// Unless there is one finite state for each body and the time step is positive; if the velocity of a trajectory is not the
+    /// rate of its pose; where a state stops being finite or contacts make energy, which body, contact and time; if a step's equations were not solved.
     pub fn simulate_with(
         &self,
         integrator: &impl Integrator,
@@ -76,7 +76,7 @@ impl<S: Scalar> World<S> {
         time_steps: TimeSteps,
         visit: impl FnMut(Step, &[State<S>]),
     ) -> Result<Simulation<Vec<State<S>>>, SimulationError> {
-        self.audited(integrator, self.begin(initial, time_steps.dt)?, time_steps, visit)
+        self.audited(integrator, self.begin(initial, time_steps)?, time_steps, visit)
     }
 
     /// [`World::simulate_with`] of what has begun.
@@ -106,7 +106,7 @@ impl<S: Scalar> World<S> {
         initial: &[State<S>],
         time_steps: TimeSteps,
     ) -> Result<Simulation<Vec<Vec<State<S>>>>, SimulationError> {
-        let initial = self.begin(initial, time_steps.dt)?;
+        let initial = self.begin(initial, time_steps)?;
         let mut states = Vec::with_capacity(time_steps.steps + 1);
         states.push(initial.clone());
         let keep = |_, next: &[State<S>]| states.push(next.to_vec());
@@ -147,10 +147,11 @@ impl<S: Scalar> World<S> {
         &self,
         integrator: &impl Integrator,
         initial: &[State<S>],
-        TimeSteps { dt, steps }: TimeSteps,
+        time_steps: TimeSteps,
         mut control: impl FnMut(Step, &mut Self, &mut [State<S>]),
     ) -> Result<Vec<State<S>>, SimulationError> {
-        let (mut states, mut world) = (self.begin(initial, dt)?, self.clone());
+        let (mut states, mut world) = (self.begin(initial, time_steps)?, self.clone());
+        let TimeSteps { dt, steps } = time_steps;
         for index in 0..steps {
             let step = Step::new(index, dt);
             control(step, &mut world, &mut states);
@@ -212,14 +213,15 @@ impl<S: Scalar> World<S> {
     /// The states from which a rollout begins: `initial` with driven bodies where their trajectories start.
     ///
     /// # Errors
-    /// See [`World::check`].
+    /// See [`World::check`] and [`World::check_velocities`].
     pub(crate) fn begin(
         &self,
         initial: &[State<S>],
-        dt: f64,
+        TimeSteps { dt, steps }: TimeSteps,
     ) -> Result<Vec<State<S>>, SimulationError> {
         let mut states = self.with_deflections(initial);
         self.check(&states, dt)?;
+        self.check_velocities(dt * steps as f64)?;
         self.drive(&mut states, 0.0);
         Ok(states)
     }
@@ -308,7 +310,10 @@ mod tests {
     #[test]
     fn driven_bodies_start_on_their_trajectory() {
         let (mut world, states) = egg_on(bowl(), GapSmoothing::Hard);
-        let rising = |time: f64| State::at_rest(Isometry3::translation(0.0, 0.0, time - 0.3));
+        let rising = |time: f64| State {
+            linear: Vector3::z(),
+            ..State::at_rest(Isometry3::translation(0.0, 0.0, time - 0.3))
+        };
         world.bodies[0].motion = Motion::Driven(Arc::new(rising));
         let run = world
             .rollout_with(&SemiImplicitEuler, &states, TimeSteps { dt: 0.1, steps: 2 })

@@ -230,7 +230,7 @@ impl<I: Integrator> StabilityLoss<I> {
         let residual = |states: &[State<S>]| self.residual(start, &states[self.object]);
         let every = self.weights.averaging == Averaging::Mean;
         let weight = 1.0 / steps.max(1) as f64;
-        let begun = world.begin(initial, self.time_steps.dt)?;
+        let begun = world.begin(initial, self.time_steps)?;
         let last = world.march(&self.integrator, begun, self.time_steps, |_, states| {
             if every {
                 visit(weight, residual(states));

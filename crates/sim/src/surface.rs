@@ -2,7 +2,7 @@
 
 use nalgebra::Point3;
 
-use crate::body::BodyError;
+use crate::body::{BodyError, check_lengths};
 
 /// A sample of a body's surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,6 +79,17 @@ impl Surface {
         Ok(self)
     }
 
+    /// A ball of `radius` \[m\] around the origin: one round sample that stands for the area of its cross-section πR². That is the
+    /// `contact_area` of a [`StaticContactTarget`](crate::StaticContactTarget), however deep the ball sinks in.
+    ///
+    /// # Errors
+    /// Unless the radius is positive and finite.
+    pub fn ball(radius: f64) -> Result<Self, BodyError> {
+        check_lengths(&[radius])?;
+        let area = std::f64::consts::PI * radius * radius;
+        Self::new(&[Point3::origin()], &[area])?.rounded(radius)
+    }
+
     /// `points` that share `area` \[m²\] equally, such as uniform samples of a surface.
     ///
     /// # Errors
@@ -88,16 +99,20 @@ impl Surface {
     }
 
     /// A lattice on the faces of a box around the origin with edges along the axes, `half_extents` \[m\] from it: corners,
-    /// edges, and between them as many equal distances as `spacing` \[m\] allows. Areas are those of the trapezoid rule, so that
-    /// faces are exact in the mean.
+    /// edges, and between them as many equal distances as `spacing` \[m\] allows.
+    ///
+    /// Areas are those of the trapezoid rule. A sample on an edge or a corner has the mean of its shares of the faces that meet
+    /// there, since one of them touches at a time: where distances come out equal along all axes, every face presses with its own area,
+    /// evenly, and [`Surface::area`] is less than that of the box.
+    ///
+    /// Beside the field of a box, whose edges are round, take [`Cuboid::surface`](crate::Cuboid::surface): the samples on
+    /// the edges of this one never touch it.
     ///
     /// # Errors
     /// If a length is not positive and finite.
     pub fn cuboid(half_extents: [f64; 3], spacing: f64) -> Result<Self, BodyError> {
-        let lengths = half_extents.iter().chain([&spacing]);
-        if let Some(&length) = lengths.into_iter().find(|x| !(**x > 0.0 && x.is_finite())) {
-            return Err(BodyError::Length(length));
-        }
+        check_lengths(&half_extents)?;
+        check_lengths(&[spacing])?;
         let parts = half_extents.map(|half| (2.0 * half / spacing).ceil() as usize);
         let step = [0, 1, 2].map(|i| 2.0 * half_extents[i] / parts[i] as f64);
         let (mut points, mut areas) = (Vec::new(), Vec::new());
@@ -107,12 +122,47 @@ impl Surface {
             let on_face = [0, 1, 2].map(|i| at[i] == 0 || at[i] == parts[i]);
             // A face ends in half a step.
             let share = |i: usize| if on_face[i] { 0.5 * step[i] } else { step[i] };
-            let faces = (0..3).filter(|i| on_face[*i]);
-            let area: f64 = faces.map(|i| share((i + 1) % 3) * share((i + 2) % 3)).sum();
-            if area > 0.0 {
+            let faces: Vec<usize> = (0..3).filter(|i| on_face[*i]).collect();
+            let shares = faces.iter().map(|i| share((i + 1) % 3) * share((i + 2) % 3));
+            if !faces.is_empty() {
+                areas.push(shares.sum::<f64>() / faces.len() as f64);
                 let place = |i: usize| at[i] as f64 * step[i] - half_extents[i];
                 points.push(Point3::new(place(0), place(1), place(2)));
-                areas.push(area);
+            }
+        }
+        Self::new(&points, &areas)
+    }
+
+    /// Lattices on the faces of the same box, each on its own face as far as `inset` \[m\] from the edges and for all of it.
+    pub(crate) fn flat_faces(
+        half_extents: [f64; 3],
+        inset: f64,
+        spacing: f64,
+    ) -> Result<Self, BodyError> {
+        check_lengths(&half_extents)?;
+        check_lengths(&[spacing])?;
+        let flat = half_extents.map(|half| half - inset);
+        let parts = flat.map(|flat| (2.0 * flat / spacing).ceil() as usize);
+        // Place along an axis, and the width it stands for.
+        let row = |axis: usize, at: usize| {
+            let (half, parts) = (half_extents[axis], parts[axis]);
+            let width = 2.0 * half / parts as f64;
+            let end = at == 0 || at == parts;
+            (
+                flat[axis] * (2.0 * at as f64 / parts as f64 - 1.0),
+                if end { 0.5 * width } else { width },
+            )
+        };
+        let (mut points, mut areas) = (Vec::new(), Vec::new());
+        for axis in 0..3 {
+            let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+            let plane = (0..=parts[u]).flat_map(|i| (0..=parts[v]).map(move |j| (i, j)));
+            for ((i, j), side) in plane.flat_map(|at| [(at, -1.0), (at, 1.0)]) {
+                let mut point = Point3::origin();
+                let ((x, width), (y, height)) = (row(u, i), row(v, j));
+                (point[axis], point[u], point[v]) = (side * half_extents[axis], x, y);
+                points.push(point);
+                areas.push(width * height);
             }
         }
         Self::new(&points, &areas)
@@ -185,18 +235,30 @@ fn sort_into_blocks(points: &mut [SurfacePoint], start: usize, blocks: &mut Vec<
 mod tests {
     use std::sync::Arc;
 
-    use nalgebra::{Isometry3, Matrix3, Vector3};
+    use nalgebra::{Isometry3, Vector3};
 
     use super::*;
     use crate::scenes::{floor, on_ground, penalty};
-    use crate::{Body, BodyId, GapSmoothing, RigidBody, State};
+    use crate::{
+        Body, BodyId, Coulomb, GapSmoothing, KelvinVoigt, Law, RigidBody, State,
+        StaticContactTarget,
+    };
 
     #[test]
-    fn a_lattice_has_the_moments_of_its_box() {
+    fn every_face_of_a_lattice_presses_as_it_is() {
         let (half, corner) = ([0.03, 0.02, 0.01], Point3::new(0.03, -0.02, 0.01));
         let surface = Surface::cuboid(half, 0.011).unwrap();
-        let areas = [half[1] * half[2], half[0] * half[2], half[0] * half[1]];
-        assert!((surface.area() - 8.0 * areas.iter().sum::<f64>()).abs() < 1e-15);
+        for (axis, side) in [(0, 1.0), (1, -1.0), (2, -1.0)] {
+            let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
+            let on_face = |p: &&SurfacePoint| p.position[axis] == side * half[axis];
+            let face: Vec<_> = surface.points().iter().filter(on_face).collect();
+            let sum = |f: fn(&Point3<f64>, usize) -> f64, i: usize| -> f64 {
+                face.iter().map(|p| p.area * f(&p.position, i)).sum()
+            };
+            let area = 4.0 * half[i] * half[j];
+            assert!((sum(|_, _| 1.0, i) / area - 1.0).abs() < 1e-12);
+            assert!(sum(|p, i| p[i], i).abs() + sum(|p, i| p[i], j).abs() < 1e-15);
+        }
         let at_corner = |p: &&SurfacePoint| (p.position - corner).norm() < 1e-12;
         assert_eq!(surface.points().iter().filter(at_corner).count(), 1);
         let mean = |axis: usize| -> f64 {
@@ -234,15 +296,13 @@ mod tests {
     #[test]
     fn one_rounded_sample_is_a_ball_that_rolls() {
         let (mass, radius, speed, friction) = (0.3, 0.05, 1.0, 0.3);
-        let inertia = Matrix3::identity() * (0.4 * mass * radius * radius);
-        let rigid = RigidBody::new(mass, inertia, Point3::origin()).unwrap();
-        let surface = Surface::uniform(&[Point3::origin()], 1e-4).unwrap();
-        let surface = surface.rounded(radius).unwrap();
-        let ball = Body::free("ball", rigid).with_surface(surface);
+        let rigid = RigidBody::ball(mass, radius).unwrap();
+        let surface = Surface::ball(radius).unwrap();
+        let ball = Body::free("ball", rigid).with_surface(surface.clone());
         let law = Arc::new(penalty(1e8, 1e6, friction, 1e-3));
         let smoothing = GapSmoothing::Softplus { width: 1e-6 };
         let world = on_ground(Vector3::z() * -9.81, floor(), ball, law, smoothing);
-        let sinks = mass * 9.81 / (1e8 * 1e-4);
+        let sinks = mass * 9.81 / (1e8 * surface.area());
         let pose = Isometry3::translation(0.0, 0.0, radius - sinks);
         let mut start = [State::at_rest(Isometry3::identity()), rigid.at_rest(&pose)];
         start[1].linear.x = speed;
@@ -254,6 +314,32 @@ mod tests {
         assert!(touching.is_possible());
         let refused = Surface::uniform(&[Point3::origin()], 1e-4).unwrap().rounded(-1.0);
         assert_eq!(refused, Err(BodyError::Rounding(-1.0)));
+        assert_eq!(Surface::ball(0.0), Err(BodyError::Length(0.0)));
+    }
+
+    #[test]
+    fn a_ball_rests_and_bounces_as_its_target_says() {
+        let (mass, radius, penetration) = (0.1, 0.03, 5e-4);
+        let (rigid, surface) = (RigidBody::ball(mass, radius), Surface::ball(radius).unwrap());
+        let rigid = rigid.unwrap();
+        let contact_area = surface.area();
+        let target = StaticContactTarget { mass, gravity: 9.81, penetration, contact_area };
+        let normal = KelvinVoigt::from_target(&target, 0.5).unwrap();
+        let law = Law::new(normal, Coulomb { friction: 0.3, slip_scale: 1e-2 }).unwrap();
+        let ball = Body::free("ball", rigid).with_surface(surface);
+        let start = [
+            State::at_rest(Isometry3::identity()),
+            rigid.at_rest(&Isometry3::translation(0.0, 0.0, radius)),
+        ];
+        let smoothing = GapSmoothing::Softplus { width: 1e-6 };
+        let mut world = on_ground(Vector3::zeros(), floor(), ball, Arc::new(law), smoothing);
+        let mut falling = start;
+        falling[1].linear.z = -1.0;
+        let bounced = world.simulate(&falling, 0.1).unwrap()[1].linear.z;
+        assert!((bounced - 0.5).abs() < 2e-3, "{bounced}");
+        world.gravity.z = -9.81;
+        let depth = radius - world.simulate(&start, 1.0).unwrap()[1].pose.translation.z;
+        assert!((depth / penetration - 1.0).abs() < 1e-3, "{depth}");
     }
 
     #[test]

@@ -52,6 +52,10 @@ impl<N: NormalLaw, F: FrictionLaw> ContactLaw for Law<N, F> {
         &self.params
     }
 
+    fn param_names(&self) -> Vec<&'static str> {
+        [self.normal.names(), self.friction.names()].concat()
+    }
+
     #[inline]
     fn law<S: Scalar>(&self, p: &[S], contact: &Contact<S>) -> Response<S> {
         let Some(((p_normal, p_friction), [])) = Params::<N, F, S>::split(p) else {

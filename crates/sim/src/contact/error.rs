@@ -29,6 +29,14 @@ pub enum LawError {
         /// How many the law has.
         expected: usize,
     },
+    /// The law has no parameter of that name.
+    #[error("the law has no parameter called {name:?}: one of {known}")]
+    NoParameter {
+        /// The name.
+        name: String,
+        /// Those that it has, with commas between them.
+        known: String,
+    },
     /// There is no law of that name.
     #[error("there is no contact law called {name:?}: one of {known}")]
     Unknown {
@@ -44,7 +52,7 @@ impl LawError {
     pub fn name(&self) -> Option<&'static str> {
         match *self {
             Self::Range { name, .. } | Self::Missing { name } => Some(name),
-            Self::Count { .. } | Self::Unknown { .. } => None,
+            Self::Count { .. } | Self::NoParameter { .. } | Self::Unknown { .. } => None,
         }
     }
 }

@@ -31,12 +31,13 @@ pub(crate) fn jumps(law: &dyn DynContactLaw, p: &[f64], smoothing: &GapSmoothing
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ContactLaw;
 
     #[test]
     fn damping_without_penetration_jumps_unless_it_fades_in() {
         let jump = |smoothing| {
             let law = crate::scenes::penalty(1e7, 1e4, 0.5, 1e-2);
-            jumps(&law, DynContactLaw::params(&law), &smoothing)
+            jumps(&law, law.params(), &smoothing)
         };
         assert!(jump(GapSmoothing::Hard) && jump(GapSmoothing::grasp_d()));
         assert!(!jump(GapSmoothing::Softplus { width: 1e-5 }));

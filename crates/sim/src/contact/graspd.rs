@@ -59,6 +59,10 @@ impl ContactLaw for GraspD {
         &self.params
     }
 
+    fn param_names(&self) -> Vec<&'static str> {
+        self.parameters.names()
+    }
+
     #[inline]
     fn law<S: Scalar>(&self, p: &[S], contact: &Contact<S>) -> Response<S> {
         let &[stiffness, gain, friction] = p else {

@@ -43,9 +43,16 @@ pub trait ContactLaw: Send + Sync {
         &[]
     }
 
+    /// What the parameters are called, in the order of [`params`](Self::params): empty where they have no name.
+    fn param_names(&self) -> Vec<&'static str> {
+        vec![""; self.params().len()]
+    }
+
     /// Force of one contact. `p` are the parameters, as many as [`params`](Self::params), with their derivatives; the laws
     /// of this crate answer NaN to any other number of them.
-    fn law<S: Scalar>(&self, p: &[S], contact: &Contact<S>) -> Response<S>;
+    fn law<S: Scalar>(&self, p: &[S], contact: &Contact<S>) -> Response<S>
+    where
+        Self: Sized;
 
     /// Beyond this gap value and derivative are zero \[m\].
     fn reach(&self) -> f64;

@@ -75,6 +75,11 @@ pub trait Parameters: Send + Sync {
     /// Their values.
     fn values(&self) -> Self::Params<f64>;
 
+    /// What they are called, in their order: empty where they have no name.
+    fn names(&self) -> Vec<&'static str> {
+        vec![""; self.values().to_vec().len()]
+    }
+
     /// Checks that `values` and all other numbers of the law are in their ranges.
     ///
     /// # Errors
@@ -128,6 +133,10 @@ macro_rules! law_part {
 
             fn values(&self) -> Self::Params<f64> {
                 [$(self.$param),*]
+            }
+
+            fn names(&self) -> Vec<&'static str> {
+                vec![$(stringify!($param)),*]
             }
 
             fn check(&self, values: &Self::Params<f64>) -> Result<(), $crate::contact::error::LawError> {

@@ -5,6 +5,11 @@ use super::range::ParameterRange;
 
 /// A body at rest on a contact, from which laws get their stiffness and damping per area.
 ///
+/// The coefficient of restitution that `from_target` of a law takes is that of an impact without gravity
+/// ([`restitution`](crate::contact::restitution)). Under gravity it holds for impacts far faster than √(g δ) for the depth δ at
+/// rest; slower ones bounce less, and at last not at all. Fast ones go deep ([`StaticContactTarget::impact_depth`]): a field
+/// must have that depth to give.
+///
 /// ```
 /// use prehend_sim::{KelvinVoigt, StaticContactTarget};
 ///
@@ -12,6 +17,8 @@ use super::range::ParameterRange;
 /// let target =
 ///     StaticContactTarget { mass: 0.3, gravity: 9.81, penetration: 5e-4, contact_area: 4e-4 };
 /// let law = KelvinVoigt::from_target(&target, 0.45)?;
+/// // At 1 m/s it goes 7 mm deep at most.
+/// assert!((target.impact_depth(1.0, 1.0) - 7.1e-3).abs() < 1e-4);
 /// # Ok::<(), prehend_sim::LawError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,8 +29,10 @@ pub struct StaticContactTarget {
     pub gravity: f64,
     /// How deep the body sinks in \[m\], usually 0.2–1 mm.
     pub penetration: f64,
-    /// Area of the samples that touch \[m²\]: what [`Surface`](crate::Surface) says of those that carry the body at rest.
-    /// Of a ball of radius R that sinks in by d it is 2πRd.
+    /// Area of the samples that touch \[m²\]: what [`Surface`](crate::Surface) says of those that carry the body at rest. A lattice
+    /// on a box has that of the face, a single round sample, such as [`Surface::ball`](crate::Surface::ball), its own. A ball of
+    /// radius R with samples all over it that sinks in by d stands on 2πRd, at half of the depth in the mean: for a law that is linear
+    /// in depth that is πRd.
     pub contact_area: f64,
 }
 
@@ -42,6 +51,15 @@ impl StaticContactTarget {
     /// Stiffness per area K = m g/(A δⁿ) \[N/m^{2+n}\] of a law whose pressure is K dⁿ.
     pub fn stiffness(&self, exponent: f64) -> f64 {
         self.mass * self.gravity / (self.penetration.powf(exponent) * self.contact_area)
+    }
+
+    /// How deep the body goes \[m\] that hits the contact with `speed` \[m/s\] on the same area, if a law whose pressure is K dⁿ
+    /// does not damp it: ((n + 1) v² δⁿ/2g)^{1/(n+1)}, v√(δ/g) where pressure is linear. Gravity adds about δ, damping takes away.
+    pub fn impact_depth(&self, speed: f64, exponent: f64) -> f64 {
+        // m v²/2 = K A dⁿ⁺¹/(n + 1), and K A = m g/δⁿ.
+        let power =
+            0.5 * (exponent + 1.0) * speed * speed * self.penetration.powf(exponent) / self.gravity;
+        power.powf((exponent + 1.0).recip())
     }
 
     /// Stiffness and damping per area of a linear law that bounces with coefficient `restitution`, for which `ratio` is the
@@ -86,6 +104,18 @@ mod tests {
         check(Hertz::from_target(&TARGET));
         let bounce = Bounce { restitution: 0.5, impact_speed: 1.0 };
         check(HuntCrossley::from_target(&TARGET, 2.0, bounce));
+    }
+
+    #[test]
+    fn an_impact_ends_where_its_energy_is_stored() {
+        for (exponent, speed) in [(1.0, 1.0), (1.5, 0.3), (2.2, 2.0)] {
+            let depth = TARGET.impact_depth(speed, exponent);
+            let (stiffness, cells) = (TARGET.stiffness(exponent) * TARGET.contact_area, 10_000);
+            let middle = |i: i32| depth * (f64::from(i) + 0.5) / f64::from(cells);
+            let stored: f64 = (0..cells).map(|i| stiffness * middle(i).powf(exponent)).sum();
+            let stored = stored * depth / f64::from(cells);
+            assert!((stored / (0.5 * TARGET.mass * speed * speed) - 1.0).abs() < 1e-6);
+        }
     }
 
     #[test]

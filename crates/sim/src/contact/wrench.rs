@@ -188,7 +188,8 @@ mod tests {
 
     use crate::scenes::{bowl, egg_on, floor, penalty};
     use crate::{
-        DynContactLaw, GapSmoothing, LeakSteps, Patch, State, Surface, World, WrenchJacobian,
+        ContactLaw, DynContactLaw, GapSmoothing, LeakSteps, Patch, State, Surface, World,
+        WrenchJacobian,
     };
 
     /// A single sample, with the state of the egg but at `height` above the floor.

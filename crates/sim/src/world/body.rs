@@ -7,7 +7,8 @@ use prehend_autodiff::Scalar;
 use prehend_geometry::DistanceField;
 
 use super::trajectory::{self, Trajectory};
-use crate::body::RigidBody;
+use crate::body::{BodyError, RigidBody};
+use crate::fields::Cuboid;
 use crate::surface::Surface;
 
 /// What a body is and how it touches others.
@@ -70,6 +71,14 @@ impl<S: Scalar> Body<S> {
     pub fn with_field(mut self, field: Arc<dyn DistanceField>) -> Self {
         self.field = Some(field);
         self
+    }
+
+    /// The same body as a box around the origin of its model frame: its field, and samples at distances of `spacing` \[m\] at most.
+    ///
+    /// # Errors
+    /// See [`Cuboid::surface`].
+    pub fn with_cuboid(self, cuboid: Cuboid, spacing: f64) -> Result<Self, BodyError> {
+        Ok(self.with_surface(cuboid.surface(spacing)?).with_field(Arc::new(cuboid)))
     }
 
     /// Its mass properties, if forces move it.

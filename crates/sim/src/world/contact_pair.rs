@@ -74,6 +74,41 @@ impl<S: Scalar> ContactPair<S> {
         &mut self.params
     }
 
+    /// The parameter called `name`, such as `"friction"`, to be changed.
+    ///
+    /// ```
+    /// # use std::sync::Arc;
+    /// # use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
+    /// use prehend_autodiff::Fwd;
+    /// # use prehend_sim::*;
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// # let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
+    /// # let floor = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
+    /// # let ball = Body::free("ball", RigidBody::ball(0.1, 0.03)?);
+    /// # let ball = world.add(ball.with_surface(Surface::ball(0.03)?));
+    /// # let spring = HuntCrossley { stiffness: 1e7, damping: 0.1, exponent: 1.0 };
+    /// # let law = Arc::new(Law::new(spring, Coulomb { friction: 0.5, slip_scale: 1e-2 })?);
+    /// # world.add_contact(ContactBodies { samples: ball, field: floor }, law, GapSmoothing::Hard)?;
+    /// let mut lifted = world.lift::<Fwd<1>>();
+    /// *lifted.contacts[0].param_mut("friction")? = Fwd::variable(0.4, 0);
+    /// # assert_eq!(lifted.contacts[0].params()[3].value, 0.4);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// [`LawError::NoParameter`] with the names that there are, if there is none of that name.
+    pub fn param_mut(&mut self, name: &str) -> Result<&mut S, LawError> {
+        let names = self.law.param_names();
+        let named =
+            self.params.iter_mut().zip(&names).find(|(_, own)| !name.is_empty() && **own == name);
+        named.map(|(param, _)| param).ok_or_else(|| {
+            let known: Vec<_> = names.iter().copied().filter(|name| !name.is_empty()).collect();
+            LawError::NoParameter { name: name.to_owned(), known: known.join(", ") }
+        })
+    }
+
     /// Sets all parameters of the law.
     ///
     /// # Errors
@@ -122,4 +157,68 @@ impl<S: Scalar> ContactPair<S> {
 
 fn own_params<S: Scalar>(law: &dyn DynContactLaw) -> Vec<S> {
     law.params().iter().map(|&p| S::constant(p)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::contact::registry::LawRegistry;
+    use crate::scenes::{egg_on, floor};
+    use crate::{
+        AnisotropicFriction, Contact, ContactLaw, Coulomb, Hertz, Law, Response, Sticking,
+    };
+
+    #[test]
+    fn parameters_are_found_by_the_names_of_the_registry() {
+        let (mut world, _) = egg_on(floor(), GapSmoothing::Hard);
+        let pair = &mut world.contacts[0];
+        let registry = LawRegistry::default();
+        for (name, entry) in registry.entries() {
+            let value = |name: &str| match name {
+                "exponent" | "direction_x" => 1.0,
+                "kinetic_friction" => 0.2,
+                _ => 0.5,
+            };
+            let values: Vec<f64> = entry.parameters.iter().map(|p| value(p.name)).collect();
+            pair.set_law(registry.create(name, &values).unwrap().into());
+            for (place, parameter) in entry.parameters.iter().take(pair.params().len()).enumerate()
+            {
+                *pair.param_mut(parameter.name).unwrap() = 7.0;
+                assert_eq!(pair.params().iter().position(|p| *p == 7.0), Some(place), "{name}");
+                pair.params_mut()[place] = 0.5;
+            }
+        }
+        let along = Coulomb { friction: 0.2, slip_scale: 1e-3 };
+        let friction =
+            AnisotropicFriction { along, across_ratio: 2.0, direction: Vector3::x_axis() };
+        pair.set_law(Arc::new(Law::new(Hertz { stiffness: 1e9 }, friction).unwrap()));
+        let error = pair.param_mut("mu").unwrap_err().to_string();
+        let expected =
+            "the law has no parameter called \"mu\": one of stiffness, friction, across_ratio";
+        assert_eq!(error, expected);
+        let held = Sticking { friction: along, deflection: 1e-4 };
+        pair.set_law(Arc::new(Law::new(Hertz { stiffness: 1e9 }, held).unwrap()));
+        assert_eq!(pair.param_mut("friction"), Ok(&mut 0.2));
+    }
+
+    #[test]
+    fn parameters_without_names_are_not_found() {
+        struct Nameless([f64; 1]);
+        impl ContactLaw for Nameless {
+            fn params(&self) -> &[f64] {
+                &self.0
+            }
+            fn law<S: Scalar>(&self, _: &[S], _: &Contact<S>) -> Response<S> {
+                Response::zero()
+            }
+            fn reach(&self) -> f64 {
+                0.0
+            }
+        }
+        let (mut world, _) = egg_on(floor(), GapSmoothing::Hard);
+        world.contacts[0].set_law(Arc::new(Nameless([1.0])));
+        assert!(world.contacts[0].param_mut("").is_err());
+    }
 }

@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
+use nalgebra::{Isometry3, Vector3};
 use prehend_sim::{
     Body, BodyId, Coulomb, Cuboid, DynContactLaw, KelvinVoigt, Law, RigidBody, State, Sticking,
-    Surface, TimeSteps, World,
+    TimeSteps, World,
 };
 
 use crate::scenes::{SMOOTH, corners, down};
@@ -13,7 +13,7 @@ use crate::scenes::{SMOOTH, corners, down};
 /// Half of an edge of every box, and the radius of its edges \[m\].
 const HALF: f64 = 0.02;
 const ROUNDING: f64 = 2e-3;
-/// That of tables and fingers: no sample is at another's edge.
+/// That of tables and fingers.
 const LARGE: f64 = 0.03;
 /// Mass of every box \[kg\].
 const MASS: f64 = 0.2;
@@ -25,17 +25,14 @@ fn sticking() -> Arc<dyn DynContactLaw> {
     Arc::new(Law::new(normal, Sticking { friction, deflection: 1e-4 }).unwrap())
 }
 
-/// A cube with round edges and samples at its corners.
+/// A cube with round edges and four samples on each face.
 fn cube(body: Body, half: f64) -> Body {
-    let core = [half - ROUNDING; 3];
-    let surface = Surface::cuboid(core, 2.0 * half).unwrap().rounded(ROUNDING).unwrap();
-    let field = Cuboid { half_extents: Vector3::repeat(half), rounding: ROUNDING };
-    body.with_surface(surface).with_field(Arc::new(field))
+    let cuboid = Cuboid { half_extents: Vector3::repeat(half), rounding: ROUNDING };
+    body.with_cuboid(cuboid, 2.0 * half).unwrap()
 }
 
 fn free_cube(name: &str) -> Body {
-    let inertia = Matrix3::identity() * (MASS * HALF * HALF * 2.0 / 3.0);
-    cube(Body::free(name, RigidBody::new(MASS, inertia, Point3::origin()).unwrap()), HALF)
+    cube(Body::free(name, RigidBody::cuboid(MASS, [HALF; 3]).unwrap()), HALF)
 }
 
 fn at(x: f64, y: f64, z: f64) -> State {

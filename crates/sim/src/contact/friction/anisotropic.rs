@@ -59,6 +59,10 @@ impl<F: FrictionCoefficient> Parameters for AnisotropicFriction<F> {
         (self.along.values(), [self.across_ratio])
     }
 
+    fn names(&self) -> Vec<&'static str> {
+        [self.along.names(), vec![ACROSS_RATIO.name]].concat()
+    }
+
     fn check(&self, (along, [ratio]): &Self::Params<f64>) -> Result<(), LawError> {
         self.along.check(along)?;
         ACROSS_RATIO.check(*ratio)?;

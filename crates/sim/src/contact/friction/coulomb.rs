@@ -13,7 +13,8 @@ law_part! {
     ///
     /// What should stick creeps at v_s times its share of the friction that it could use, so v_s is the creep that you can
     /// bear: a hundredth of the speeds that matter, often 1 cm/s for impacts and 0.1 mm/s for grasps. Fixed steps must be
-    /// shorter than m v_s/(μ f_n), or derivatives are wrong; [`World::simulate`](crate::World::simulate) sees to it.
+    /// shorter than m v_s/(μ f_n), or derivatives are wrong; [`World::simulate`](crate::World::simulate) sees to it. What has
+    /// to hold for seconds wants [`Sticking`](super::sticking::Sticking) around it.
     pub struct Coulomb: "Coulomb friction" {
         friction [""] NotNegative "friction coefficient";
     }

@@ -9,7 +9,8 @@ use crate::contact::error::LawError;
 use crate::contact::parameters::{LawParameter, Parameters, Tabulated, entry};
 use crate::contact::point::Contact;
 
-/// Friction with tangential springs: what it holds does not creep, see [`Bristles`].
+/// Friction with tangential springs: what it holds does not creep, see [`Bristles`]. What only slides is five to ten times cheaper, with
+/// derivatives, under the friction within alone: [`Coulomb`](super::coulomb::Coulomb) says how to choose its slip scale.
 ///
 /// The deflection should be about the depth to which contacts press, so that they are as stiff across the normal as along it:
 /// often 0.1 mm. The slip scale of the friction within no longer sets a creep, and may be as large as 2 cm/s; the full
@@ -40,6 +41,10 @@ impl<F: FrictionCoefficient> Parameters for Sticking<F> {
 
     fn values(&self) -> Self::Params<f64> {
         self.friction.values()
+    }
+
+    fn names(&self) -> Vec<&'static str> {
+        self.friction.names()
     }
 
     fn check(&self, values: &Self::Params<f64>) -> Result<(), LawError> {

@@ -36,7 +36,8 @@ pub struct Bounce {
 }
 
 impl HuntCrossley {
-    /// The law of this `exponent` with which the body of `target` rests at its depth, and bounces as `bounce` says.
+    /// The law of this `exponent` with which the body of `target` rests at its depth, and bounces as `bounce` says in an impact without
+    /// gravity, see [`StaticContactTarget`].
     ///
     /// # Errors
     /// Names the parameter that is out of its range.

@@ -23,7 +23,7 @@ law_part! {
 
 impl KelvinVoigt {
     /// The law with which the body of `target` rests at its depth, and bounces with coefficient `restitution`, above 0 and at
-    /// most 1.
+    /// most 1: that of an impact without gravity, see [`StaticContactTarget`].
     ///
     /// # Errors
     /// Names the parameter that is out of its range.
