@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Vector3};
 use prehend_sim::{
-    Body, BodyId, Coulomb, Cuboid, DynContactLaw, KelvinVoigt, Law, RigidBody, State, Sticking,
-    TimeSteps, World,
+    Adaptive, Body, BodyId, ContactBodies, Coulomb, Cuboid, DynContactLaw, HalfSpace, KelvinVoigt,
+    Law, RigidBody, State, Sticking, TimeSteps, World,
 };
 
 use crate::scenes::{SMOOTH, corners, down};
@@ -70,6 +70,31 @@ fn a_stack_of_three_boxes_stays() {
     let moved = creep(&world, &start, &stack[1..]);
     println!("a stack of three boxes creeps by {:.1e} mm in 10 s", 1e3 * moved);
     assert!(moved < 1e-5);
+}
+
+#[test]
+fn equal_boxes_on_each_other_take_no_more_steps_than_others() {
+    let mut world = World::new(Vector3::new(0.09 * 9.81, 0.0, -9.81));
+    let mut below = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
+    let mut start = vec![at(0.0, 0.0, 0.0)];
+    let cuboid = Cuboid { half_extents: Vector3::repeat(HALF), rounding: ROUNDING };
+    for (level, name) in (0_u8..).zip(["lower", "middle", "upper"]) {
+        let rigid = RigidBody::cuboid(MASS, [HALF; 3]).unwrap();
+        let body = world.add(Body::free(name, rigid).with_cuboid(cuboid, 0.01).unwrap());
+        let (samples, field) = (body, below);
+        match level {
+            0 => world.add_contact(ContactBodies { samples, field }, sticking(), SMOOTH),
+            _ => world.add_symmetric_contact(body, below, sticking(), SMOOTH),
+        }
+        .unwrap();
+        start.push(at(0.0, 0.0, HALF * f64::from(2 * level + 1)));
+        below = body;
+    }
+    // With samples where the flat part of the other box ends it is more than ten times as many.
+    let few = Adaptive { max_parts: 10_000, ..Adaptive::default() };
+    let second = TimeSteps { dt: 1.0, steps: 1 };
+    let end = world.simulate_with(&few, &start, second, |_, _| ()).unwrap().states;
+    assert!(end[1..4].iter().all(|state| state.linear.norm() < 1e-4), "{end:?}");
 }
 
 /// Position and velocity of what goes from 0 to 1 between two times, without jerk at either.
