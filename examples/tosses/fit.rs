@@ -12,23 +12,19 @@ use crate::parameters::{self, CONTACT, COUNT, FLIGHT, LANES, PARAMETERS};
 use crate::recording::{Start, Toss};
 use crate::target::{Part, Target};
 
-/// A fit to the rows of a toss up to some after its first touch. Rows that chance would move by more than `unit` count little, so
-/// that what tumbles chaotically does not tell.
+/// A fit to the rows of a toss up to some after its first touch: from what hardly depends on chance to whole tosses.
 struct Stage {
     rows: usize,
     /// Percent of the width and degrees by which a toss may be off.
     unit: f64,
-    /// Part of chance in a toss that counts.
-    chance: f64,
     iterations: usize,
 }
 
-const STAGES: [Stage; 5] = [
-    Stage { rows: 8, unit: 1.0, chance: 0.0, iterations: 10 },
-    Stage { rows: 20, unit: 2.0, chance: 0.5, iterations: 8 },
-    Stage { rows: usize::MAX, unit: 3.0, chance: 1.0, iterations: 8 },
-    Stage { rows: usize::MAX, unit: 5.0, chance: 0.3, iterations: 8 },
-    Stage { rows: usize::MAX, unit: 8.0, chance: 0.3, iterations: 5 },
+const STAGES: [Stage; 4] = [
+    Stage { rows: 8, unit: 1.0, iterations: 12 },
+    Stage { rows: 20, unit: 3.0, iterations: 8 },
+    Stage { rows: usize::MAX, unit: 5.0, iterations: 12 },
+    Stage { rows: usize::MAX, unit: 8.0, iterations: 12 },
 ];
 /// How far parameters are expected from their usual values.
 const EXPECTED: f64 = 25.0;
@@ -57,15 +53,11 @@ pub(crate) fn fit<'a>(tosses: &[&'a Toss]) -> anyhow::Result<Fit> {
             Some((target.toss, start.value()))
         })
         .collect();
-    let mut targets = Vec::new();
+    let mut targets: Vec<Target<'a>> = Vec::new();
     for (number, stage) in STAGES.iter().enumerate() {
-        let Stage { rows, unit, chance, iterations } = *stage;
-        let target = |&(toss, start): &(&'a Toss, Start)| {
-            let mut target = Target::contacts(toss, start, rows, unit);
-            target.weigh(&x, chance);
-            target
-        };
-        targets = started.par_iter().map(target).collect();
+        let Stage { rows, unit, iterations } = *stage;
+        let target = |&(toss, start): &(&'a Toss, Start)| Target::contacts(toss, start, rows, unit);
+        targets = started.iter().map(target).collect();
         let name = format!("contacts {} of {}", number + 1, STAGES.len());
         minimize(&name, &targets, &mut x, &CONTACT, iterations, in_contact)?;
     }

@@ -15,8 +15,6 @@ use crate::recording::{Row, Start, Toss};
 const WIDTH: f64 = 0.1048;
 /// Change of the last coordinate for central differences.
 const NUDGE: f64 = 0.05;
-/// Chance in a toss, most of it in its impacts, as if it were in its start, in the units of [`flight::moved`].
-const CHANCE: [f64; 4] = [0.03, 2.0, 1.0, 5.0];
 
 /// Noise of the height at rest, where faces are not quite alike \[m\].
 const REST_NOISE: f64 = 3e-4;
@@ -31,15 +29,12 @@ pub(crate) struct Target<'a> {
     steps: Steps<RungeKutta4>,
     /// Height at rest, if it is to be explained \[m\].
     rest: Option<f64>,
-    /// Square roots of the weights of the rows.
-    weights: Vec<f64>,
 }
 
 impl<'a> Target<'a> {
     /// The flight of a toss, if it is long enough, and where the toss comes to rest.
     pub(crate) fn flight(toss: &'a Toss) -> Option<Self> {
         let (rows, start) = (flight::rows(toss), toss.rows[0].start(flight::GRAVITY));
-        let weights = vec![1.0; rows];
         let rest = flight::rest(toss);
         (rows >= flight::SHORTEST).then_some(Self {
             toss,
@@ -48,7 +43,6 @@ impl<'a> Target<'a> {
             unit: NOISE,
             rest,
             steps: flight::STEPS,
-            weights,
         })
     }
 
@@ -57,34 +51,17 @@ impl<'a> Target<'a> {
         let steps = Steps { integrator: RungeKutta4, per_row: 16, board: true };
         let rows = flight::rows(toss).saturating_add(rows).min(toss.rows.len());
         let unit = [percent / 100.0 * WIDTH, percent.to_radians()];
-        Self { toss, start, rows, unit, steps, rest: None, weights: vec![1.0; rows] }
-    }
-
-    /// Weights by how much chance moves the rows: as much as one, and a row counts half.
-    pub(crate) fn weigh(&mut self, x: &[f64; COUNT], part: f64) {
-        let chance = Fwd::<12>::variables([0.0; 12]);
-        let chance: Vec<_> =
-            chance.iter().enumerate().map(|(i, x)| x.times(part * CHANCE[i / 3])).collect();
-        let start = flight::moved(&self.start, &chance);
-        let values = parameters::values(x).map(Fwd::constant);
-        let Ok(path) = cube::path(&self.steps, &values, &start, self.rows) else { return };
-        let residuals = self.residuals(&path);
-        let weight = |row: &[Fwd<12>]| {
-            let all = row.iter().flat_map(|r| r.derivative);
-            let moved = all.map(|x| x * x).sum::<f64>() * self.rows as f64;
-            (1.0 + moved).sqrt().recip()
-        };
-        self.weights = residuals.chunks(6).map(weight).collect();
+        Self { toss, start, rows, unit, steps, rest: None }
     }
 
     /// Differences in position and attitude, so that the sum of their squares is the mean over the rows.
     fn residuals<S: Scalar>(&self, path: &Path<S>) -> Vec<S> {
         let mean = (self.rows as f64).sqrt().recip();
-        let row = |((pose, row), weight): ((&Isometry3<S>, &Row), &f64)| -> [S; 6] {
+        let row = |(pose, row): (&Isometry3<S>, &Row)| -> [S; 6] {
             let off = row.to(pose);
-            std::array::from_fn(|i| off[i].times(mean * weight / self.unit[i / 3]))
+            std::array::from_fn(|i| off[i].times(mean / self.unit[i / 3]))
         };
-        path.iter().zip(&self.toss.rows).zip(&self.weights).flat_map(row).collect()
+        path.iter().zip(&self.toss.rows).flat_map(row).collect()
     }
 
     /// The residuals and their derivatives by the coordinates `free`, from a start that may depend on them.
