@@ -7,7 +7,7 @@ use nalgebra::{Vector3, Vector6};
 use super::Adaptive;
 use super::planner::Probe;
 use crate::contact::bristles::Bristles;
-use crate::integrator::runge_kutta::dormand_prince::Trial;
+use crate::integrator::runge_kutta::dormand_prince::{Estimate, Trial};
 use crate::state::State;
 use crate::world::World;
 use crate::world::body_id::BodyId;
@@ -107,31 +107,35 @@ impl ErrorNorm {
         self.scales.iter().map(time).fold(f64::INFINITY, f64::min)
     }
 
-    /// The error of `trial`, a step from `states`: at most one if it is tolerated, not a number if the step is none.
-    pub(super) fn error_of(&self, states: &[State<Probe>], trial: &Trial<Probe>) -> f64 {
+    /// The error of `trial`, a step from `states` that is off by `estimate`: at most one if it is tolerated, not a number if the
+    /// step is none.
+    pub(super) fn error_of(
+        &self,
+        states: &[State<Probe>],
+        trial: &Trial<Probe>,
+        estimate: &Estimate<Probe>,
+    ) -> f64 {
+        let (value, derivative) = (|x: Probe| x.value, |x: Probe| x.derivative[0]);
         let (mut error, mut slope_error, mut slope) = (0.0, 0.0, 0.0);
-        let speeds = states.iter().chain(trial.end()).map(|s| s.linear.map(|x| x.value).norm());
+        let speeds = states.iter().chain(trial.end()).map(|s| s.linear.map(value).norm());
         let fastest = speeds.fold(0.0, f64::max);
-        for ((body, scale), change) in self.scales.iter().zip(&trial.error) {
+        for (i, (body, scale)) in self.scales.iter().enumerate() {
             let (start, end) = (&states[*body], &trial.end()[*body]);
             let own = [start, end].map(|state| state.value().speed_within(scale.length));
             let own = max_or_nan(own[0], own[1]);
             let speed = scale.speed + own + SLOW * fastest;
-            let norms = |part: fn(Probe) -> f64| change.each_ref().map(|v| v.map(part).norm());
-            error = max_or_nan(error, scale.largest(norms(|x| x.value), speed));
-            slope_error = max_or_nan(slope_error, scale.largest(norms(|x| x.derivative[0]), speed));
+            error = max_or_nan(error, scale.largest(estimate.across_kinks(i, value), speed));
+            slope_error =
+                max_or_nan(slope_error, scale.largest(estimate.across_kinks(i, derivative), speed));
             for state in [start, end] {
                 slope = max_or_nan(slope, scale.sensitivity(state, speed));
             }
         }
-        for (length, [linear, angular, ..]) in
-            self.deflections.iter().zip(&trial.error[self.scales.len()..])
-        {
-            let largest = |part: fn(Probe) -> f64| {
-                max_or_nan(linear.map(part).norm() / length, angular.map(part).norm())
-            };
-            error = max_or_nan(error, largest(|x| x.value));
-            slope_error = max_or_nan(slope_error, largest(|x| x.derivative[0]));
+        // Its rate jumps as a contact begins, but then it carries nothing: what it does counts with the bodies.
+        for (i, length) in (self.scales.len()..).zip(&self.deflections) {
+            let largest = |[linear, angular, ..]: [f64; 4]| max_or_nan(linear / length, angular);
+            error = max_or_nan(error, largest(estimate.between_orders(i, value)));
+            slope_error = max_or_nan(slope_error, largest(estimate.between_orders(i, derivative)));
         }
         // Where everything is constant there is no error to compare.
         let slope_error = if slope_error == 0.0 { 0.0 } else { slope_error / slope };

@@ -121,12 +121,13 @@ impl Planner {
             // Leaks of the first step are of its first part.
             let index = if self.parts == 0 { self.whole.index } else { self.whole.index.max(1) };
             let part = Step { index, start: self.time, dt };
-            let mut trial = dormand_prince::step(&self.world, &self.states, &self.wrenches, part);
+            let (mut trial, estimate) =
+                dormand_prince::estimated(&self.world, &self.states, &self.wrenches, part);
             if self.travel.passes_over(&self.plain, &values, &trial.stages, dt) {
                 self.dt = 0.5 * dt;
                 continue;
             }
-            let error = self.norm.error_of(&self.states, &trial);
+            let error = self.norm.error_of(&self.states, &trial, &estimate);
             let change =
                 if error.is_nan() { LENGTH_CHANGE[0] } else { SAFETY * error.powf(EXPONENT) };
             let chosen = dt * change.clamp(LENGTH_CHANGE[0], LENGTH_CHANGE[1]);
