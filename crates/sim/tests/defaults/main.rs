@@ -2,7 +2,9 @@
 
 #![allow(clippy::unwrap_used)] // a test may panic; helpers outside test functions count as code to the lint
 
+mod bounces;
 mod holding;
+mod parcel;
 mod scene;
 mod scenes;
 mod traps;
@@ -55,7 +57,9 @@ fn defaults_are_right_and_steps_that_are_too_long_are_told() {
     assert!(scenes.len() >= 20);
     let findings: Vec<Findings> = scenes.par_iter().map(look).collect();
     let mut wrong = Vec::new();
-    println!("| scene | value | off | derivative | off | differences agree to | time | a step too long |");
+    println!(
+        "| scene | value | off | derivative | off | differences agree to | time | a step too long |"
+    );
     println!("|---|--:|--:|--:|--:|--:|--:|---|");
     for (scene, found) in scenes.iter().zip(&findings) {
         let [coarse, fine] = found.differences;
@@ -78,7 +82,7 @@ fn defaults_are_right_and_steps_that_are_too_long_are_told() {
             1e3 * found.time,
             told.as_deref().unwrap_or("PASSES")
         );
-        if !(off < 1e-3 && slope_off < 1e-2) || told.is_none() {
+        if !(off < 1e-3 && slope_off < 2e-3) || told.is_none() {
             wrong.push(scene.name);
         }
     }

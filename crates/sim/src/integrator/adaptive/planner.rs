@@ -113,7 +113,8 @@ impl Planner {
         }
         let values: Vec<State> = self.states().collect();
         let before_kink = self.kink.as_ref().map_or(f64::INFINITY, |kink| kink.next(self.time));
-        self.dt = self.travel.longest(&self.plain, &values, self.dt.min(left).min(before_kink));
+        let dt = self.dt.min(left).min(before_kink);
+        self.dt = self.travel.longest(&self.plain, &values, self.time, dt);
         let (mut attempt, mut touches) = (0, TOUCH_ATTEMPTS);
         loop {
             // A last part that is next to nothing would be lost in rounding.

@@ -134,11 +134,7 @@ fn norms<S: Scalar>(change: &Change<S>, part: fn(S) -> f64) -> [f64; 4] {
 }
 
 /// Roots of sums of squares over `differences` of entry `i`.
-fn together<S: Scalar>(
-    differences: &[Vec<Change<S>>],
-    i: usize,
-    part: fn(S) -> f64,
-) -> [f64; 4] {
+fn together<S: Scalar>(differences: &[Vec<Change<S>>], i: usize, part: fn(S) -> f64) -> [f64; 4] {
     let norms = differences.iter().map(|difference| norms(&difference[i], part));
     norms.fold([0.0; 4], |sum, norms| std::array::from_fn(|k| norms[k].hypot(sum[k])))
 }
