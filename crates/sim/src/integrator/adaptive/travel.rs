@@ -70,19 +70,12 @@ impl Travel {
             }
             let deviations = limit.deviations(world, pair, states, time, dt);
             let passes_over = |dt: f64| {
-                let travel = dt * (speed + dt * fall);
                 // The largest of those within the part, which ascend.
-                let looks = (dt / LOOK) as usize;
-                let deviation = deviations[..looks.min(deviations.len())].last().copied();
-                let deviation = deviation.unwrap_or(0.0);
-                let deviates = deviation > FREE_DEVIATION * limit.free
-                    && limit.is_near(
-                        world,
-                        pair,
-                        state,
-                        (travel + deviation - limit.free).max(0.0),
-                    );
-                deviates || limit.passes_over(world, pair, state, travel + deviation)
+                let looks = deviations.len().min((dt / LOOK) as usize);
+                let deviation = deviations[..looks].last().copied().unwrap_or(0.0);
+                let travel = dt * (speed + dt * fall) + deviation;
+                (travel > limit.free || deviation > FREE_DEVIATION * limit.free)
+                    && limit.is_near(world, pair, state, (travel - limit.free).max(0.0))
             };
             while passes_over(dt) {
                 dt *= 0.5;
@@ -103,17 +96,13 @@ impl Travel {
             let state = world.seen_value(pair, states);
             let speed = |state: State| state.speed_within(limit.radius);
             let speeds = stages.iter().map(|stage| speed(world.seen_value(pair, stage)));
-            limit.passes_over(world, pair, state, dt * speeds.fold(speed(state), f64::max))
+            let travel = dt * speeds.fold(speed(state), f64::max);
+            travel > limit.free && limit.is_near(world, pair, state, travel - limit.free)
         })
     }
 }
 
 impl Limit {
-    /// Whether samples of `pair`, whose field sees their body in `state`, may pass over a contact if they move by `travel` \[m\].
-    fn passes_over(&self, world: &World, pair: &ContactPair, state: State, travel: f64) -> bool {
-        travel > self.free && self.is_near(world, pair, state, travel - self.free)
-    }
-
     /// Whether samples of `pair`, whose field sees their body in `state`, may touch if they move by `travel` \[m\].
     fn is_near(&self, world: &World, pair: &ContactPair, state: State, travel: f64) -> bool {
         let near = |patch: Patch<'_>| patch.is_near(pair.law().reach(), travel);
@@ -130,7 +119,10 @@ impl Limit {
         time: f64,
         dt: f64,
     ) -> Vec<f64> {
-        let looks = if self.driven { (dt / LOOK) as usize } else { 0 };
+        let looks = (dt / LOOK) as usize;
+        if !self.driven || looks == 0 {
+            return Vec::new();
+        }
         let (mut there, mut uniform) = (states.to_vec(), states.to_vec());
         let mut farthest = 0.0_f64;
         let deviation = |look: usize| {
