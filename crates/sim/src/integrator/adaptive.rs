@@ -24,10 +24,10 @@ use planner::Planner;
 /// within it; the sensitivity says so. Both estimates hold across kinks, such as the onset of a contact that is shorter than
 /// the part or a damper that stops pulling, so that parts shrink until what is left of the kink is tolerated.
 ///
-/// Through a bounce of a ball that would rest 0.5 mm, 50 µm or 5 µm deep, derivatives are within 0.1 % of converged ones, in
-/// other scenes nearer than that; `cargo test -p prehend-sim --test defaults -- --nocapture` prints how near. A chain of impacts
-/// multiplies errors as it does all else. For tighter ones set both tolerances: that of the states alone is not one of their
-/// derivatives.
+/// Through a bounce of a ball that would rest 0.5 mm, 50 µm or 5 µm deep, derivatives are within 0.02 % of converged ones;
+/// `cargo test -p prehend-sim --test defaults -- --nocapture` prints how near they are, there and in other scenes. A chain of
+/// impacts multiplies errors as it does all else. For tighter ones set both tolerances: that of the states alone is not one of
+/// their derivatives.
 ///
 /// Parts end where samples touch or let go of a contact without smoothing, and are never so long that a contact could be
 /// passed over: no sample moves by more than its clearance and a fiftieth of its body's size. Trajectories of driven bodies are
@@ -62,7 +62,8 @@ pub struct Adaptive {
     /// Error of a part of a step: of positions in multiples of the body's radius of gyration, of velocities in multiples of the
     /// body's speed and of the speed of a fall through that radius.
     pub tolerance: f64,
-    /// Error of the sensitivity in a part of a step, relative to its largest component, in the same units.
+    /// Error of the sensitivity in a part of a step, in the same units: that of velocities relative to the largest of them, or to a
+    /// tenth of the largest component if that is more, that of positions relative to the largest component.
     pub sensitivity_tolerance: f64,
     /// Parts of a step at most.
     pub max_parts: usize,

@@ -128,11 +128,12 @@ impl Planner {
                 self.dt = 0.5 * dt;
                 continue;
             }
-            let error = self.norm.error_of(&self.states, &trial, &estimate);
+            let errors = self.norm.errors(&self.states, &trial, &estimate);
+            let error = self.norm.intolerable(&errors);
             let change =
                 if error.is_nan() { LENGTH_CHANGE[0] } else { SAFETY * error.powf(EXPONENT) };
             let chosen = dt * change.clamp(LENGTH_CHANGE[0], LENGTH_CHANGE[1]);
-            if error <= 1.0 {
+            if error <= 1.0 || (chosen <= shortest && self.norm.only_kinks(&errors)) {
                 self.parts += 1;
                 if self.parts > self.settings.max_parts {
                     let (max_parts, time) = (self.settings.max_parts, self.time);
