@@ -110,7 +110,7 @@ impl Limit {
     }
 
     /// How far the samples of `pair` have been at most \[m\] from where they would be if what is driven went on as in `states`,
-    /// at each look from `time` on for `dt` \[s\].
+    /// or if it stayed there, whichever is less, as that of a belt is: at each look from `time` on for `dt` \[s\].
     fn deviations(
         &self,
         world: &World,
@@ -132,10 +132,13 @@ impl Limit {
                 there[body] = trajectory.state(time + elapsed);
                 uniform[body] = states[body].uniform(elapsed);
             }
-            let [there, uniform] = [&there, &uniform].map(|s| world.seen_value(pair, s).pose);
-            let moved = there.translation.vector - uniform.translation.vector;
-            let turned = there.rotation.angle_to(&uniform.rotation);
-            farthest = farthest.max(moved.norm() + self.radius * turned);
+            let place = world.seen_value(pair, &there).pose;
+            let from = [&uniform[..], states].map(|states| {
+                let other = world.seen_value(pair, states).pose;
+                let moved = place.translation.vector - other.translation.vector;
+                moved.norm() + self.radius * place.rotation.angle_to(&other.rotation)
+            });
+            farthest = farthest.max(from[0].min(from[1]));
             farthest
         };
         (0..looks).map(deviation).collect()
