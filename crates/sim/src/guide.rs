@@ -58,7 +58,8 @@
 //! # Bodies on a trajectory
 //! [`Body::driven`] puts a body, such as a robot's link, on a [`Trajectory`](crate::Trajectory). [`World::simulate`] moves
 //! it, to time 0 before the first step too: the state given for it does not matter. A trajectory has velocities, too, the rates at
-//! which its pose changes; one that forgets them is refused.
+//! which its pose changes; one that forgets them is refused. It is looked at every millisecond at least, so motions should take
+//! longer than that.
 //!
 //! ```
 //! # use std::sync::Arc;
@@ -478,10 +479,11 @@
 //! ```
 //!
 //! # What derivatives mean
-//! Those of [`World::simulate`] are the motion's, to a fraction of a percent, as long as forces grow from zero where
-//! contact begins: fields should be C², and damping should fade in, by
+//! Those of [`World::simulate`] are the motion's, to a fraction of a percent through an impact, as long as forces grow from zero
+//! where contact begins, however fast: fields should be C², and damping should fade in, by
 //! [`GapSmoothing::Softplus`](crate::GapSmoothing::Softplus) or by the law. A force that jumps at touch is refused: that
-//! is tried once, at 1 m/s, and jumps elsewhere, in depth or slip, are not looked for; kinks of a field are not seen. With steps of your own choice they are those of the steps: under
+//! is tried once, at 1 m/s, and jumps elsewhere, in depth or slip, are not looked for; kinks of a field are not seen. With steps of
+//! your own choice they are those of the steps: under
 //! [`GapSmoothing::Hard`](crate::GapSmoothing::Hard) the moment of an impact jumps from one step to the next, and a step
 //! too long for friction makes them meaningless, see [`Resolution`](crate::Resolution). Derivatives of
 //! [`GapSmoothing::Leaky`](crate::GapSmoothing::Leaky) are not those of the forces, on purpose. At rest, at gap zero and

@@ -21,9 +21,17 @@ use planner::Planner;
 /// Each step of a rollout is divided until the estimated error of every part is within the tolerances. Two errors are held:
 /// that of the states, and that of a *sensitivity*, the derivative of the states along a direction drawn at the start of
 /// the step. A part that resolves the motion may well be too long for its derivatives, where friction or damping decays
-/// within it; the sensitivity says so. Parts end where samples touch or let go, where derivatives of forces jump, and are
-/// never so long that a contact could be passed over: no sample moves by more than its clearance and a fiftieth of its
-/// body's size.
+/// within it; the sensitivity says so. Both estimates hold across kinks, such as the onset of a contact that is shorter than
+/// the part or a damper that stops pulling, so that parts shrink until what is left of the kink is tolerated.
+///
+/// Through a bounce of a ball that would rest 0.5 mm, 50 µm or 5 µm deep, derivatives are within 0.02 % of converged ones;
+/// `cargo test -p prehend-sim --test defaults -- --nocapture` prints how near they are, there and in other scenes. A chain of
+/// impacts multiplies errors as it does all else. For tighter ones set both tolerances: that of the states alone is not one of
+/// their derivatives.
+///
+/// Parts end where samples touch or let go of a contact without smoothing, and are never so long that a contact could be
+/// passed over: no sample moves by more than its clearance and a fiftieth of its body's size. Trajectories of driven bodies are
+/// looked at every millisecond for that; what one does and undoes within a millisecond may be missed.
 ///
 /// Contacts that leak in the first step of a rollout ([`LeakSteps::First`](crate::LeakSteps::First)) leak in its first
 /// part, whose length is not known beforehand: leaks on every step, or a fixed step, have more of a meaning.
@@ -44,8 +52,8 @@ use planner::Planner;
 /// let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
 /// world.add(Body::free("stone", stone));
 /// let start = [stone.at_rest(&Isometry3::identity())];
-/// let integrator = Adaptive { tolerance: 1e-10, ..Adaptive::default() };
-/// let run = world.rollout_with(&integrator, &start, TimeSteps { dt: 0.1, steps: 10 })?.states;
+/// let tight = Adaptive { tolerance: 1e-10, sensitivity_tolerance: 1e-9, ..Adaptive::default() };
+/// let run = world.rollout_with(&tight, &start, TimeSteps { dt: 0.1, steps: 10 })?.states;
 /// assert!((run[10][0].linear.z + 9.81).abs() < 1e-12);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -54,7 +62,8 @@ pub struct Adaptive {
     /// Error of a part of a step: of positions in multiples of the body's radius of gyration, of velocities in multiples of the
     /// body's speed and of the speed of a fall through that radius.
     pub tolerance: f64,
-    /// Error of the sensitivity in a part of a step, relative to its largest component, in the same units.
+    /// Error of the sensitivity in a part of a step, in the same units: that of velocities relative to the largest of them, or to a
+    /// tenth of the largest component if that is more, that of positions relative to the largest component.
     pub sensitivity_tolerance: f64,
     /// Parts of a step at most.
     pub max_parts: usize,

@@ -17,6 +17,9 @@ use crate::state::State;
 /// are far from that is refused ([`SimulationError::TrajectoryVelocity`]). Kinks and jumps are allowed, and a pose that stays where it is
 /// may have any velocity, as a belt has.
 ///
+/// [`World::simulate`] looks at it every millisecond at least: what it does and undoes in less may be missed. Steps of one's own
+/// choice look as often as they evaluate forces.
+///
 /// Over numbers that carry derivatives, those of what drives the body, a speed or a waypoint, go into the simulation.
 /// The velocities must have theirs, too.
 pub trait Trajectory<S: Scalar = f64>: Any + Send + Sync {

@@ -19,6 +19,8 @@ pub(crate) enum Output {
     Position(usize, usize),
     /// A coordinate of its velocity \[m/s\].
     Velocity(usize, usize),
+    /// Turn of a body about z \[rad\], less than half of one.
+    Yaw(usize),
 }
 
 pub(crate) struct Scene {
@@ -61,6 +63,10 @@ impl Scene {
         let states = match self.output {
             Output::Position(body, axis) => states[body].pose.translation.vector[axis],
             Output::Velocity(body, axis) => states[body].linear[axis],
+            Output::Yaw(body) => {
+                let [_, _, k, w] = states[body].pose.rotation.coords.into();
+                k.atan2(w).times(2.0)
+            }
         };
         Ok(Simulation { states, resolution })
     }

@@ -11,8 +11,9 @@ use prehend_sim::{
     State, StaticContactTarget, Sticking, Stribeck, Surface, World, regularized_coulomb,
 };
 
+use crate::parcel;
 use crate::scene::Input::{self, Law as ByLaw, Start};
-use crate::scene::Output::{self, Position, Velocity};
+use crate::scene::Output::{self, Position, Velocity, Yaw};
 use crate::scene::Scene;
 
 /// Force grows with the square of the penetration. Stiffness per area \[N/m⁴\] and friction coefficient.
@@ -399,6 +400,7 @@ fn several() -> Vec<Scene> {
     };
     vec![
         scene("two balls collide", collision(), 0.3, (Position(1, 1), Start(0, 1)), 4e-3),
+        scene("a parcel is tipped", parcel::tipped(), 0.7, (Yaw(1), ByLaw(0, 2)), 5e-3),
         scene(
             "a block is pushed off its center",
             pushed(),

@@ -1,12 +1,13 @@
 //! What went wrong without a word once.
 
+use std::f64::consts::PI;
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use prehend_autodiff::Recording;
 use prehend_sim::{
     Adaptive, Body, ContactBodies, GapSmoothing, HalfSpace, RungeKutta4, SemiImplicitEuler,
-    SimulationError, Sphere, State, StepCheckpointed, TimeSteps, World,
+    SimulationError, Sphere, State, StepCheckpointed, Surface, TimeSteps, World,
 };
 
 use crate::scenes::{
@@ -40,6 +41,48 @@ fn a_finger_that_starts_from_rest_does_not_pass_through() {
         let start = [State::at_rest(Isometry3::identity()); 2];
         let end = world.simulate(&start, duration).unwrap();
         assert!(end[samples].linear.x > 1.0 / duration, "{duration}: {}", end[samples].linear.x);
+    }
+}
+
+/// A state that rests at `z` \[m\] but for a stroke up and back by `stroke` \[m\] within `duration` \[s\] from 0.5 s on.
+fn tapping(stroke: f64, duration: f64) -> impl Fn(f64) -> State {
+    move |time: f64| {
+        let phase = (time - 0.5) / duration;
+        let mut state = State::at_rest(Isometry3::identity());
+        if (0.0..1.0).contains(&phase) {
+            state.pose.translation.z = stroke * (PI * phase).sin().powi(2);
+            state.linear.z = stroke * PI / duration * (2.0 * PI * phase).sin();
+        }
+        state
+    }
+}
+
+#[test]
+fn a_paddle_that_waits_is_not_passed_over() {
+    let radius = 0.03;
+    let ball = || {
+        let surface = Surface::uniform(&[Point3::origin()], 1e-4).unwrap().rounded(radius);
+        body("ball", 0.1, 4e-5, &[Point3::origin()], 1e-4).with_surface(surface.unwrap())
+    };
+    // A ball that floats 2 mm above it; one that rests on it, on which a tenth of a millimeter is enough.
+    for (gravity, height, stroke) in [(0.0, 2e-3, 5e-3), (-9.81, -2.07e-4, 1e-4)] {
+        for duration in [0.2, 0.05, 0.02, 0.005] {
+            let mut world = World::new(Vector3::new(0.0, 0.0, gravity));
+            let paddle = Body::driven("paddle", tapping(stroke, duration));
+            let field = world.add(paddle.with_field(Arc::new(HalfSpace::floor())));
+            let samples = world.add(ball());
+            let bodies = ContactBodies { samples, field };
+            world.add_contact(bodies, hunt_crossley(0.1, 0.3, 1e-2), SMOOTH).unwrap();
+            let above = State::at_rest(at(0.0, 0.0, radius + height));
+            let start = [State::at_rest(Isometry3::identity()), above];
+            let end = world.simulate(&start, 1.0).unwrap()[samples];
+            let run = world.rollout(&start, TimeSteps { dt: 1e-3, steps: 1000 }).unwrap();
+            let fine = run[1000][samples];
+            let speed = run.iter().map(|states| states[samples].linear.z.abs());
+            let speed = speed.fold(0.0, f64::max);
+            let off = (end.linear.z - fine.linear.z).abs();
+            assert!(speed > 1e-4 && off < 1e-3 * speed, "{stroke} {duration}: {off} of {speed}");
+        }
     }
 }
 

@@ -7,7 +7,7 @@ use nalgebra::{Vector3, Vector6};
 use super::Adaptive;
 use super::planner::Probe;
 use crate::contact::bristles::Bristles;
-use crate::integrator::runge_kutta::dormand_prince::Trial;
+use crate::integrator::runge_kutta::dormand_prince::{Estimate, Trial};
 use crate::state::State;
 use crate::world::World;
 use crate::world::body_id::BodyId;
@@ -18,7 +18,18 @@ const SLOW: f64 = 0.1;
 /// Speed of a world in which nothing moves \[m/s\].
 const SLOWEST: f64 = 1e-9;
 
-/// Errors in multiples of what is tolerated.
+/// Part of the largest sensitivity that those of velocities are compared with at least.
+const SMALL: f64 = 0.1;
+/// Error of the sensitivity in a part that cannot be shorter, because of a kink.
+const SHARPEST_KINK: f64 = 1e-6;
+
+/// How far off a part is: its states, and its sensitivity relative to that.
+pub(super) struct Errors {
+    state: f64,
+    sensitivity: f64,
+}
+
+/// How large errors are.
 pub(super) struct ErrorNorm {
     tolerance: f64,
     sensitivity_tolerance: f64,
@@ -39,16 +50,16 @@ struct Scale {
 }
 
 impl Scale {
-    /// The largest of a change of position \[m\], velocity \[m/s\], orientation \[rad\] and angular momentum \[kg m²/s\], with
-    /// velocities in multiples of `speed` \[m/s\].
-    fn largest(&self, change: [f64; 4], speed: f64) -> f64 {
+    /// The larger of a change of position \[m\] and orientation \[rad\], and that of velocity \[m/s\] and angular momentum
+    /// \[kg m²/s\], given in the order of integration; velocities in multiples of `speed` \[m/s\].
+    fn largest(&self, change: [f64; 4], speed: f64) -> [f64; 2] {
         let [position, velocity, turn, momentum] = change;
         let spin = momentum / (self.mass * self.length * speed);
-        [position / self.length, velocity / speed, turn, spin].into_iter().fold(0.0, max_or_nan)
+        [max_or_nan(position / self.length, turn), max_or_nan(velocity / speed, spin)]
     }
 
-    /// The largest component of the sensitivity of `state`.
-    fn sensitivity(&self, state: &State<Probe>, speed: f64) -> f64 {
+    /// The largest components of the sensitivity of `state`.
+    fn sensitivity(&self, state: &State<Probe>, speed: f64) -> [f64; 2] {
         let tangent = state.tangent().map(|x| x.derivative[0]);
         let [position, turn, velocity, spin] =
             std::array::from_fn(|k| Vector3::from_column_slice(&tangent[3 * k..][..3]).norm());
@@ -107,34 +118,58 @@ impl ErrorNorm {
         self.scales.iter().map(time).fold(f64::INFINITY, f64::min)
     }
 
-    /// The error of `trial`, a step from `states`: at most one if it is tolerated, not a number if the step is none.
-    pub(super) fn error_of(&self, states: &[State<Probe>], trial: &Trial<Probe>) -> f64 {
-        let (mut error, mut slope_error, mut slope) = (0.0, 0.0, 0.0);
-        let speeds = states.iter().chain(trial.end()).map(|s| s.linear.map(|x| x.value).norm());
+    /// The errors of `trial`, a step from `states` that is off by `estimate`: no numbers if the step is none.
+    pub(super) fn errors(
+        &self,
+        states: &[State<Probe>],
+        trial: &Trial<Probe>,
+        estimate: &Estimate<Probe>,
+    ) -> Errors {
+        let (value, derivative) = (|x: Probe| x.value, |x: Probe| x.derivative[0]);
+        let (mut error, mut slope_error, mut slope) = (0.0, [0.0; 2], [0.0; 2]);
+        let speeds = states.iter().chain(trial.end()).map(|s| s.linear.map(value).norm());
         let fastest = speeds.fold(0.0, f64::max);
-        for ((body, scale), change) in self.scales.iter().zip(&trial.error) {
+        for (i, (body, scale)) in self.scales.iter().enumerate() {
             let (start, end) = (&states[*body], &trial.end()[*body]);
             let own = [start, end].map(|state| state.value().speed_within(scale.length));
             let own = max_or_nan(own[0], own[1]);
             let speed = scale.speed + own + SLOW * fastest;
-            let norms = |part: fn(Probe) -> f64| change.each_ref().map(|v| v.map(part).norm());
-            error = max_or_nan(error, scale.largest(norms(|x| x.value), speed));
-            slope_error = max_or_nan(slope_error, scale.largest(norms(|x| x.derivative[0]), speed));
+            let largest = |part| scale.largest(estimate.across_kinks(i, part), speed);
+            error = largest(value).into_iter().fold(error, max_or_nan);
+            slope_error = larger(slope_error, largest(derivative));
             for state in [start, end] {
-                slope = max_or_nan(slope, scale.sensitivity(state, speed));
+                slope = larger(slope, scale.sensitivity(state, speed));
             }
         }
-        for (length, [linear, angular, ..]) in
-            self.deflections.iter().zip(&trial.error[self.scales.len()..])
-        {
-            let largest = |part: fn(Probe) -> f64| {
-                max_or_nan(linear.map(part).norm() / length, angular.map(part).norm())
-            };
-            error = max_or_nan(error, largest(|x| x.value));
-            slope_error = max_or_nan(slope_error, largest(|x| x.derivative[0]));
+        // Its rate jumps as a contact begins, but then it carries nothing: what it does counts with the bodies.
+        for (i, length) in (self.scales.len()..).zip(&self.deflections) {
+            let largest = |[linear, angular, ..]: [f64; 4]| max_or_nan(linear / length, angular);
+            error = max_or_nan(error, largest(estimate.between_orders(i, value)));
+            slope_error[0] =
+                max_or_nan(slope_error[0], largest(estimate.between_orders(i, derivative)));
         }
+        // Velocities decide what comes of an impact, even where a long flight has made positions the more sensitive.
+        let whole = max_or_nan(slope[0], slope[1]);
+        let of = [whole, max_or_nan(slope[1], SMALL * whole)];
         // Where everything is constant there is no error to compare.
-        let slope_error = if slope_error == 0.0 { 0.0 } else { slope_error / slope };
-        max_or_nan(error / self.tolerance, slope_error / self.sensitivity_tolerance)
+        let relative = |k: usize| if slope_error[k] == 0.0 { 0.0 } else { slope_error[k] / of[k] };
+        Errors { state: error, sensitivity: max_or_nan(relative(0), relative(1)) }
     }
+
+    /// `errors` in multiples of what is tolerated.
+    pub(super) fn intolerable(&self, errors: &Errors) -> f64 {
+        let Errors { state, sensitivity } = errors;
+        max_or_nan(state / self.tolerance, sensitivity / self.sensitivity_tolerance)
+    }
+
+    /// Whether `errors` of a part that could not be shorter are those of a kink alone: a part that short has no other of its
+    /// sensitivity.
+    pub(super) fn only_kinks(&self, errors: &Errors) -> bool {
+        errors.state <= self.tolerance && errors.sensitivity <= SHARPEST_KINK
+    }
+}
+
+/// The larger of each.
+fn larger(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    [max_or_nan(a[0], b[0]), max_or_nan(a[1], b[1])]
 }

@@ -113,7 +113,8 @@ impl Planner {
         }
         let values: Vec<State> = self.states().collect();
         let before_kink = self.kink.as_ref().map_or(f64::INFINITY, |kink| kink.next(self.time));
-        self.dt = self.travel.longest(&self.plain, &values, self.dt.min(left).min(before_kink));
+        let dt = self.dt.min(left).min(before_kink);
+        self.dt = self.travel.longest(&self.plain, &values, self.time, dt);
         let (mut attempt, mut touches) = (0, TOUCH_ATTEMPTS);
         loop {
             // A last part that is next to nothing would be lost in rounding.
@@ -121,16 +122,18 @@ impl Planner {
             // Leaks of the first step are of its first part.
             let index = if self.parts == 0 { self.whole.index } else { self.whole.index.max(1) };
             let part = Step { index, start: self.time, dt };
-            let mut trial = dormand_prince::step(&self.world, &self.states, &self.wrenches, part);
+            let (mut trial, estimate) =
+                dormand_prince::estimated(&self.world, &self.states, &self.wrenches, part);
             if self.travel.passes_over(&self.plain, &values, &trial.stages, dt) {
                 self.dt = 0.5 * dt;
                 continue;
             }
-            let error = self.norm.error_of(&self.states, &trial);
+            let errors = self.norm.errors(&self.states, &trial, &estimate);
+            let error = self.norm.intolerable(&errors);
             let change =
                 if error.is_nan() { LENGTH_CHANGE[0] } else { SAFETY * error.powf(EXPONENT) };
             let chosen = dt * change.clamp(LENGTH_CHANGE[0], LENGTH_CHANGE[1]);
-            if error <= 1.0 {
+            if error <= 1.0 || (chosen <= shortest && self.norm.only_kinks(&errors)) {
                 self.parts += 1;
                 if self.parts > self.settings.max_parts {
                     let (max_parts, time) = (self.settings.max_parts, self.time);

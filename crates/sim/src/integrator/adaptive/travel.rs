@@ -5,11 +5,17 @@ use crate::body::RigidBody;
 use crate::contact::patch::Patch;
 use crate::state::State;
 use crate::world::World;
-use crate::world::body::Body;
+use crate::world::body::{Body, Motion};
 use crate::world::contact_pair::ContactPair;
 
 /// Part of a body's size by which its samples may always move.
 const FREE_TRAVEL: f64 = 0.02;
+/// Part of that by which a trajectory may always deviate from uniform motion.
+const FREE_DEVIATION: f64 = 0.05;
+/// How often trajectories are looked at \[s\].
+const LOOK: f64 = 1e-3;
+/// Looks ahead at most: no part is longer.
+const LOOKS: usize = 1000;
 
 /// For each contact, what its samples may do, if a force moves one of the bodies.
 pub(super) struct Travel(Vec<Option<Limit>>);
@@ -20,6 +26,8 @@ struct Limit {
     radius: f64,
     /// How far they may always move \[m\].
     free: f64,
+    /// Whether one of the bodies is on a trajectory.
+    driven: bool,
 }
 
 impl Travel {
@@ -32,7 +40,9 @@ impl Travel {
             let radius = body.surface.as_ref()?.radius_about(&body.com());
             let size = |body: &Body| body.rigid().map_or(0.0, RigidBody::gyration_radius);
             let own = radius.max(size(body));
-            Some(Limit { radius, free: FREE_TRAVEL * if own > 0.0 { own } else { size(other) } })
+            let free = FREE_TRAVEL * if own > 0.0 { own } else { size(other) };
+            let driven = [body, other].iter().any(|body| matches!(body.motion, Motion::Driven(_)));
+            Some(Limit { radius, free, driven })
         };
         Self(world.contacts.iter().map(limit).collect())
     }
@@ -45,15 +55,29 @@ impl Travel {
         limited.filter_map(|(pair, limit)| Some((pair, limit.as_ref()?)))
     }
 
-    /// The longest of the lengths `dt`, `dt`/2, … \[s\] in which bodies that go on as they move could not pass over a
-    /// contact: no sample moves by more than its clearance and a small part of its body's size.
-    pub(super) fn longest(&self, world: &World, states: &[State], mut dt: f64) -> f64 {
+    /// The longest of the lengths `dt`, `dt`/2, … \[s\] from `time` on in which bodies that go on as they move, or as their
+    /// trajectories say, could not pass over a contact: no sample moves by more than its clearance and a small part of its
+    /// body's size. Of a trajectory that does not go on as it moves, a yet smaller part counts, for all that it touches may be
+    /// at rest.
+    pub(super) fn longest(&self, world: &World, states: &[State], time: f64, mut dt: f64) -> f64 {
         // Both may fall, but not away from each other faster than one does.
         let fall = 0.5 * world.gravity.norm();
         for (pair, limit) in self.limits(world) {
             let state = world.seen_value(pair, states);
             let speed = state.speed_within(limit.radius);
-            while limit.passes_over(world, pair, state, dt * (speed + dt * fall)) {
+            if limit.driven {
+                dt = dt.min(LOOK * LOOKS as f64);
+            }
+            let deviations = limit.deviations(world, pair, states, time, dt);
+            let passes_over = |dt: f64| {
+                // The largest of those within the part, which ascend.
+                let looks = deviations.len().min((dt / LOOK) as usize);
+                let deviation = deviations[..looks].last().copied().unwrap_or(0.0);
+                let travel = dt * (speed + dt * fall) + deviation;
+                (travel > limit.free || deviation > FREE_DEVIATION * limit.free)
+                    && limit.is_near(world, pair, state, (travel - limit.free).max(0.0))
+            };
+            while passes_over(dt) {
                 dt *= 0.5;
             }
         }
@@ -72,15 +96,51 @@ impl Travel {
             let state = world.seen_value(pair, states);
             let speed = |state: State| state.speed_within(limit.radius);
             let speeds = stages.iter().map(|stage| speed(world.seen_value(pair, stage)));
-            limit.passes_over(world, pair, state, dt * speeds.fold(speed(state), f64::max))
+            let travel = dt * speeds.fold(speed(state), f64::max);
+            travel > limit.free && limit.is_near(world, pair, state, travel - limit.free)
         })
     }
 }
 
 impl Limit {
-    /// Whether samples of `pair`, whose field sees their body in `state`, may pass over a contact if they move by `travel` \[m\].
-    fn passes_over(&self, world: &World, pair: &ContactPair, state: State, travel: f64) -> bool {
-        let near = |patch: Patch<'_>| patch.is_near(pair.law().reach(), travel - self.free);
-        travel > self.free && world.patch(pair, state).is_some_and(near)
+    /// Whether samples of `pair`, whose field sees their body in `state`, may touch if they move by `travel` \[m\].
+    fn is_near(&self, world: &World, pair: &ContactPair, state: State, travel: f64) -> bool {
+        let near = |patch: Patch<'_>| patch.is_near(pair.law().reach(), travel);
+        world.patch(pair, state).is_some_and(near)
+    }
+
+    /// How far the samples of `pair` have been at most \[m\] from where they would be if what is driven went on as in `states`,
+    /// or if it stayed there, whichever is less, as that of a belt is: at each look from `time` on for `dt` \[s\].
+    fn deviations(
+        &self,
+        world: &World,
+        pair: &ContactPair,
+        states: &[State],
+        time: f64,
+        dt: f64,
+    ) -> Vec<f64> {
+        let looks = (dt / LOOK) as usize;
+        if !self.driven || looks == 0 {
+            return Vec::new();
+        }
+        let (mut there, mut uniform) = (states.to_vec(), states.to_vec());
+        let mut farthest = 0.0_f64;
+        let deviation = |look: usize| {
+            let elapsed = LOOK * (look + 1) as f64;
+            for body in [pair.bodies.samples, pair.bodies.field] {
+                let Motion::Driven(trajectory) = &world.bodies[body].motion else { continue };
+                there[body] = trajectory.state(time + elapsed);
+                uniform[body] = states[body].uniform(elapsed);
+            }
+            let place = world.seen_value(pair, &there).pose;
+            let from = [&uniform[..], states].map(|states| {
+                let other = world.seen_value(pair, states).pose;
+                let moved = place.translation.vector - other.translation.vector;
+                moved.norm() + self.radius * place.rotation.angle_to(&other.rotation)
+            });
+            farthest = farthest.max(from[0].min(from[1]));
+            farthest
+        };
+        (0..looks).map(deviation).collect()
     }
 }

@@ -30,14 +30,36 @@ const ERROR: [f64; 7] = [
     -1.0 / 40.0,
 ];
 
+/// Third divided differences of the slopes: of the stages at 0, 3/10, 4/5 and 1, at 3/10, 4/5, 8/9 and 1, and at 0, 3/10, 4/5 and
+/// 8/9. Of a slope that jumps between 3/10 and 4/5 the first and the last are a quarter of the jump, as large as the error may
+/// be; the largest weight of the other is a quarter.
+const THIRD: [[f64; 7]; 3] = [
+    [-7.0 / 36.0, 0.0, 4.0 / 9.0, -7.0 / 12.0, 0.0, 0.0, 1.0 / 3.0],
+    [0.0, 0.0, -4.0 / 567.0, 53.0 / 324.0, -1.0 / 4.0, 0.0, 53.0 / 567.0],
+    [-53.0 / 300.0, 0.0, 32.0 / 75.0, -53.0 / 50.0, 81.0 / 100.0, 0.0, 0.0],
+];
+/// Differences of lower order: the second one of the slopes at 0, 3/10 and 1, and the first one from 0 to 1, so small that
+/// together they are below the third ones wherever the slope jumps.
+const LOWER: [[f64; 7]; 2] = [
+    [7.0 / 45.0, 0.0, -2.0 / 9.0, 0.0, 0.0, 0.0, 1.0 / 15.0],
+    [-1.0 / 20.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0 / 20.0],
+];
+
 /// Where a step leads.
 pub(in crate::integrator) struct Trial<S: Scalar> {
     /// The states at its stages, the last of which is its end.
     pub(in crate::integrator) stages: Vec<Vec<State<S>>>,
     /// The wrenches there: those that the next step starts with.
     pub(in crate::integrator) wrenches: Vec<Vector6<S>>,
+}
+
+/// How far off a step may be.
+pub(in crate::integrator) struct Estimate<S: Scalar> {
     /// Of each free body and contact that sticks, by how much the solutions of fifth and fourth order differ.
-    pub(in crate::integrator) error: Vec<Change<S>>,
+    orders: Vec<Change<S>>,
+    /// Divided differences of its slopes.
+    third: [Vec<Change<S>>; 3],
+    lower: [Vec<Change<S>>; 2],
 }
 
 /// A step from `states` with `wrenches` on them.
@@ -47,14 +69,34 @@ pub(in crate::integrator) fn step<S: Scalar>(
     wrenches: &[Vector6<S>],
     step: Step,
 ) -> Trial<S> {
+    visit(&mut Stages::new(world, states, wrenches, step))
+}
+
+/// [`step`], and how far off it may be.
+pub(in crate::integrator) fn estimated<S: Scalar>(
+    world: &World<S>,
+    states: &[State<S>],
+    wrenches: &[Vector6<S>],
+    step: Step,
+) -> (Trial<S>, Estimate<S>) {
     let mut stages = Stages::new(world, states, wrenches, step);
+    let trial = visit(&mut stages);
+    let estimate = Estimate {
+        orders: stages.combined(&ERROR),
+        third: THIRD.map(|weights| stages.combined(&weights)),
+        lower: LOWER.map(|weights| stages.combined(&weights)),
+    };
+    (trial, estimate)
+}
+
+fn visit<S: Scalar>(stages: &mut Stages<'_, S>) -> Trial<S> {
     let (mut visited, mut wrenches) = (Vec::with_capacity(STAGES.len()), Vec::new());
     for (fraction, weights) in STAGES {
         let (states, acting) = stages.stage(fraction, weights);
         visited.push(states);
         wrenches = acting;
     }
-    Trial { stages: visited, wrenches, error: stages.combined(&ERROR) }
+    Trial { stages: visited, wrenches }
 }
 
 impl<S: Scalar> Trial<S> {
@@ -62,4 +104,37 @@ impl<S: Scalar> Trial<S> {
     pub(in crate::integrator) fn end(&self) -> &[State<S>] {
         self.stages.last().map_or(&[], Vec::as_slice)
     }
+}
+
+impl<S: Scalar> Estimate<S> {
+    /// By how much the two orders differ in `part` of the numbers of free body or contact `i`.
+    pub(in crate::integrator) fn between_orders(&self, i: usize, part: fn(S) -> f64) -> [f64; 4] {
+        norms(&self.orders[i], part)
+    }
+
+    /// How far off `part` of the numbers of free body or contact `i` may be, at kinks too.
+    ///
+    /// The two orders differ as those of a smooth motion do. Their weights nearly cancel on either side of the gap between the
+    /// stages at 3/10 and 4/5: of a slope that jumps in there they see eighty times less than what is wrong. There, divided
+    /// differences of third order are as large as those of lower order; of a smooth slope they are smaller, the more so the
+    /// shorter the step. So they count by that ratio, which makes them of at least fifth order where the motion is smooth, and
+    /// of first order, as the error is, at a kink.
+    pub(in crate::integrator) fn across_kinks(&self, i: usize, part: fn(S) -> f64) -> [f64; 4] {
+        let orders = self.between_orders(i, part);
+        let (third, lower) = (together(&self.third, i, part), together(&self.lower, i, part));
+        std::array::from_fn(|k| {
+            let ratio = if third[k] < lower[k] { third[k] / lower[k] } else { 1.0 };
+            orders[k] + third[k] * ratio
+        })
+    }
+}
+
+fn norms<S: Scalar>(change: &Change<S>, part: fn(S) -> f64) -> [f64; 4] {
+    change.each_ref().map(|vector| vector.map(part).norm())
+}
+
+/// Roots of sums of squares over `differences` of entry `i`.
+fn together<S: Scalar>(differences: &[Vec<Change<S>>], i: usize, part: fn(S) -> f64) -> [f64; 4] {
+    let norms = differences.iter().map(|difference| norms(&difference[i], part));
+    norms.fold([0.0; 4], |sum, norms| std::array::from_fn(|k| norms[k].hypot(sum[k])))
 }
