@@ -27,10 +27,9 @@ use prehend::sim::{
 /// Half of the edges of the parcel \[m\], and how deep it sinks into the table.
 const HALF: [f64; 3] = [0.04, 0.06, 0.03];
 const DEPTH: f64 = 1e-4;
-/// Spring of the plunger \[N/m\], and radius of its tip and area that its sample stands for, \[m\] and \[m²\].
+/// Spring of the plunger \[N/m\], and radius of its tip \[m\].
 const SPRING: f64 = 1500.0;
 const TIP: f64 = 0.03;
-const TIP_AREA: f64 = 1e-4;
 /// Of the camera: its frames, and standard deviations of x and y \[m\] and yaw \[rad\].
 const FRAMES: TimeSteps = TimeSteps { dt: 1.0 / 60.0, steps: 42 };
 const NOISE: [f64; 3] = [1e-4, 1e-4, 1e-3];
@@ -56,7 +55,7 @@ fn plunger(time: f64) -> State {
 /// Table, parcel and plunger. [`slide`] puts in what is to be found.
 fn scene() -> anyhow::Result<World> {
     let mass = GUESS[1];
-    let rigid = RigidBody::new(mass, Matrix3::identity() * 1e-3, Point3::origin())?;
+    let rigid = RigidBody::cuboid(mass, HALF)?;
     // One sample in the middle of each square of 2 cm.
     let middle = |i: i32| 0.01 * f64::from(2 * i + 1);
     let row = |i| (-3..3).map(move |j| Point3::new(middle(i), middle(j), -HALF[2]));
@@ -64,7 +63,8 @@ fn scene() -> anyhow::Result<World> {
     let area = 4.0 * HALF[0] * HALF[1];
     let sides = Cuboid { half_extents: HALF.into(), rounding: 1e-3 };
     let parcel = Body::free("parcel", rigid).with_field(Arc::new(sides));
-    let tip = Surface::uniform(&[Point3::origin()], TIP_AREA)?.rounded(TIP)?;
+    let tip = Surface::ball(TIP)?;
+    let tip_area = tip.area();
     let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
     let table = world.add(Body::kinematic("table").with_field(Arc::new(HalfSpace::floor())));
     let parcel = world.add(parcel.with_surface(Surface::uniform(&bottom, area)?));
@@ -77,7 +77,7 @@ fn scene() -> anyhow::Result<World> {
     let smoothing = GapSmoothing::Softplus { width: 0.1 * DEPTH };
     world.add_contact(ContactBodies { samples: parcel, field: table }, Arc::new(law), smoothing)?;
     // The tip is a roller: no friction.
-    let spring = HuntCrossley { stiffness: SPRING / TIP_AREA, damping: 0.1, exponent: 1.0 };
+    let spring = HuntCrossley { stiffness: SPRING / tip_area, damping: 0.1, exponent: 1.0 };
     let law = Law::new(spring, Coulomb { friction: 0.0, slip_scale: 5e-3 })?;
     let bodies = ContactBodies { samples: plunger, field: parcel };
     world.add_contact(bodies, Arc::new(law), GapSmoothing::Hard)?;
@@ -93,8 +93,7 @@ fn slide<S: Scalar>(scene: &World, values: &[S]) -> anyhow::Result<Vec<[S; 3]>> 
     let rigid = RigidBody::new(mass, Matrix3::from_diagonal(&inertia), Point3::new(x, y, z))?;
     let mut world = scene.lift::<S>();
     world.bodies[1].motion = Motion::Free(rigid);
-    // After stiffness and damping.
-    world.contacts[0].params_mut()[2] = friction;
+    *world.contacts[0].param_mut("friction")? = friction;
     let parcel = rigid.at_rest(&lift(&Isometry3::translation(0.0, 0.0, HALF[2] - DEPTH)));
     let still = State::at_rest(Isometry3::identity()).lift();
     let run = world.rollout(&[still, parcel, still], FRAMES)?;

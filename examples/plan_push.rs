@@ -8,7 +8,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Matrix3, Point2, Point3, Rotation2, Vector2, Vector3};
+use nalgebra::{Isometry3, Point2, Point3, Rotation2, Vector2, Vector3};
 use plotters::prelude::*;
 use prehend::autodiff::optimize::{Criteria, LevenbergMarquardt, NormalEquations};
 use prehend::autodiff::{Fwd, Scalar};
@@ -64,18 +64,15 @@ fn spline<S: Scalar>(points: Vec<Vector2<S>>) -> impl Trajectory<S> {
 /// A box of 500 g on a table, the finger, and where they are at the start.
 fn scene() -> anyhow::Result<(World, [State; 3])> {
     let mass = 0.5;
-    let [a, b, c] = HALF.map(|half| mass * half * half / 3.0);
-    let inertia = Matrix3::from_diagonal(&Vector3::new(b + c, a + c, a + b));
-    let rigid = RigidBody::new(mass, inertia, Point3::origin())?;
+    let rigid = RigidBody::cuboid(mass, HALF)?;
     // One sample in the middle of each square of 2 cm.
     let row = |i| (0..4).map(move |j| Point3::new(0.02 * i, 0.02 * f64::from(j) - 0.03, -HALF[2]));
     let bottom: Vec<_> = (-2..=2).flat_map(|i| row(f64::from(i))).collect();
     let area = 4.0 * HALF[0] * HALF[1];
     let sides = Cuboid { half_extents: HALF.into(), rounding: 2e-3 };
     let pushed = Body::free("box", rigid).with_field(Arc::new(sides));
-    // One round sample is a finger.
-    let (tip, tip_area) = (Point3::origin(), 1e-4);
-    let tip = Surface::uniform(&[tip], tip_area)?.rounded(FINGER)?;
+    let tip = Surface::ball(FINGER)?;
+    let tip_area = tip.area();
     let still = State::at_rest(Isometry3::identity());
     let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
     let table = world.add(Body::kinematic("table").with_field(Arc::new(HalfSpace::floor())));
