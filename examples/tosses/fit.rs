@@ -1,14 +1,13 @@
-//! Fits the parameters to recorded tosses: first what flights tell, then what contacts do.
+//! Fits the parameters to recorded tosses: first what flights and rest tell, then what contacts and slides do.
 
+use std::collections::BTreeMap;
 use std::ops::{ControlFlow, Range};
 
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
-use prehend::autodiff::Fwd;
 use prehend::autodiff::optimize::{Criteria, LevenbergMarquardt, NormalEquations};
 use rayon::prelude::*;
 
-use crate::flight;
-use crate::parameters::{self, CONTACT, COUNT, FLIGHT, LANES, PARAMETERS};
+use crate::parameters::{self, CONTACT, COUNT, FLIGHT, PARAMETERS};
 use crate::recording::{Start, Toss};
 use crate::target::{Part, Target};
 
@@ -41,23 +40,20 @@ pub(crate) fn fit<'a>(tosses: &[&'a Toss]) -> anyhow::Result<Fit> {
     let mut x = [0.0; COUNT];
     let flights: Vec<Target<'a>> = tosses.iter().filter_map(|toss| Target::flight(toss)).collect();
     let in_flight = |target: &Target<'a>, x: &[f64; COUNT]| {
-        let start = flight::begin(target.toss, &parameters::seeded(x, &FLIGHT))?;
-        Some(target.linearized(x, &FLIGHT, &start)?.part())
+        Some(target.linearized(x, &FLIGHT, &target.start_by(x, &FLIGHT)?)?.part())
     };
     minimize("flights", &flights, &mut x, &FLIGHT, 20, in_flight)?;
 
     let started: Vec<(&'a Toss, Start)> = flights
         .iter()
-        .filter_map(|target| {
-            let start = flight::begin(target.toss, &parameters::seeded(&x, &FLIGHT))?;
-            Some((target.toss, start.value()))
-        })
+        .filter_map(|target| Some((target.toss, target.start_by(&x, &FLIGHT)?.value())))
         .collect();
     let mut targets: Vec<Target<'a>> = Vec::new();
     for (number, stage) in STAGES.iter().enumerate() {
         let Stage { rows, unit, iterations } = *stage;
         let target = |&(toss, start): &(&'a Toss, Start)| Target::contacts(toss, start, rows, unit);
         targets = started.iter().map(target).collect();
+        targets.extend(tosses.iter().filter_map(|toss| Target::slide(toss)));
         let name = format!("contacts {} of {}", number + 1, STAGES.len());
         minimize(&name, &targets, &mut x, &CONTACT, iterations, in_contact)?;
     }
@@ -130,27 +126,25 @@ fn covariance<'a>(
     x: &[f64; COUNT],
     in_flight: impl Fn(&Target<'a>, &[f64; COUNT]) -> Option<Part> + Sync,
 ) -> SMatrix<f64, COUNT, COUNT> {
-    type Square = SMatrix<f64, COUNT, COUNT>;
-    let toss =
-        |(flight, contact): (&Target<'a>, &Target<'a>)| -> Option<(SVector<f64, COUNT>, Square)> {
-            let mut all = in_flight(flight, x)?;
-            let start: Start<Fwd<LANES>> =
-                flight::begin(contact.toss, &parameters::seeded(x, &FLIGHT))?;
-            let [by_flight, by_contact] = [
-                contact.linearized(x, &FLIGHT, &start)?,
-                contact.linearized(x, &CONTACT, &contact.start.lift())?,
-            ];
-            all.matrix += by_contact.weight() * by_contact.slopes().tr_mul(by_flight.slopes());
-            let contact = by_contact.part();
-            all.matrix += contact.matrix;
-            Some((all.gradient + contact.gradient, all.matrix))
-        };
-    let parts: Vec<_> = flights.par_iter().zip(contacts).filter_map(toss).collect();
+    let flight = |target: &Target<'a>| Some((target.toss.id, in_flight(target, x)?));
+    let contact = |target: &Target<'a>| {
+        let by_flight = target.linearized(x, &FLIGHT, &target.start_by(x, &FLIGHT)?)?;
+        let by_contact = target.linearized(x, &CONTACT, &target.start.lift())?;
+        let mut part = by_contact.part();
+        part.matrix += by_contact.weight() * by_contact.slopes().tr_mul(by_flight.slopes());
+        Some((target.toss.id, part))
+    };
+    let mut parts: Vec<(u32, Part)> = flights.par_iter().filter_map(flight).collect();
+    parts.par_extend(contacts.par_iter().filter_map(contact));
     // What nothing tells stays as unsure as expected.
-    let prior = Square::identity() / (EXPECTED * EXPECTED);
+    let prior = SMatrix::<f64, COUNT, COUNT>::identity() / (EXPECTED * EXPECTED);
     let (mut matrix, mut scatter) = (prior, prior);
-    for (gradient, part) in parts {
-        matrix += part;
+    let mut gradients: BTreeMap<u32, SVector<f64, COUNT>> = BTreeMap::new();
+    for (toss, part) in parts {
+        matrix += part.matrix;
+        *gradients.entry(toss).or_default() += part.gradient;
+    }
+    for gradient in gradients.values() {
         scatter += gradient * gradient.transpose();
     }
     let inverse = matrix.try_inverse().unwrap_or_default();

@@ -16,6 +16,7 @@ mod flight;
 mod law;
 mod parameters;
 mod recording;
+mod slide;
 mod target;
 
 use std::path::{Path, PathBuf};

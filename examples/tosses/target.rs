@@ -10,12 +10,15 @@ use crate::cube::{self, Path, Steps};
 use crate::flight::{self, NOISE};
 use crate::parameters::{self, COUNT, DEPTH, EXACT, HALF_WIDTH, LANES};
 use crate::recording::{Row, Start, Toss};
+use crate::slide;
 
 /// Width of the cube, by which positions are measured \[m\].
 const WIDTH: f64 = 0.1048;
 /// Change of the last coordinate for central differences.
 const NUDGE: f64 = 0.05;
 
+/// Percent of the width and degrees by which a slide may be off.
+const SLIDE: f64 = 2.0;
 /// Noise of the height at rest, where faces are not quite alike \[m\].
 const REST_NOISE: f64 = 3e-4;
 
@@ -23,6 +26,8 @@ const REST_NOISE: f64 = 3e-4;
 pub(crate) struct Target<'a> {
     pub(crate) toss: &'a Toss,
     pub(crate) start: Start,
+    /// The first row, and how many.
+    first: usize,
     rows: usize,
     /// Off by one in position \[m\] and attitude \[rad\].
     unit: [f64; 2],
@@ -39,6 +44,7 @@ impl<'a> Target<'a> {
         (rows >= flight::SHORTEST).then_some(Self {
             toss,
             start,
+            first: 0,
             rows,
             unit: NOISE,
             rest,
@@ -50,8 +56,16 @@ impl<'a> Target<'a> {
     pub(crate) fn contacts(toss: &'a Toss, start: Start, rows: usize, percent: f64) -> Self {
         let steps = Steps { integrator: RungeKutta4, per_row: 16, board: true };
         let rows = flight::rows(toss).saturating_add(rows).min(toss.rows.len());
-        let unit = [percent / 100.0 * WIDTH, percent.to_radians()];
-        Self { toss, start, rows, unit, steps, rest: None }
+        let unit = off(percent);
+        Self { toss, start, first: 0, rows, unit, steps, rest: None }
+    }
+
+    /// The last slide of a toss, if it is long enough.
+    pub(crate) fn slide(toss: &'a Toss) -> Option<Self> {
+        let steps = Steps { integrator: RungeKutta4, per_row: 8, board: true };
+        let (first, start) = slide::begin(toss)?;
+        let rows = toss.rows.len() - first;
+        Some(Self { toss, start, first, rows, unit: off(SLIDE), steps, rest: None })
     }
 
     /// Differences in position and attitude, so that the sum of their squares is the mean over the rows.
@@ -61,7 +75,19 @@ impl<'a> Target<'a> {
             let off = row.to(pose);
             std::array::from_fn(|i| off[i].times(mean / self.unit[i / 3]))
         };
-        path.iter().zip(&self.toss.rows).flat_map(row).collect()
+        path.iter().zip(&self.toss.rows[self.first..]).flat_map(row).collect()
+    }
+
+    /// The start with its derivatives by the coordinates `free`, if the rows tell it.
+    pub(crate) fn start_by(
+        &self,
+        x: &[f64; COUNT],
+        free: &Range<usize>,
+    ) -> Option<Start<Fwd<LANES>>> {
+        match self.first {
+            0 => flight::begin(self.toss, &parameters::seeded(x, free)),
+            _ => Some(self.start.lift()),
+        }
     }
 
     /// The residuals and their derivatives by the coordinates `free`, from a start that may depend on them.
@@ -72,10 +98,14 @@ impl<'a> Target<'a> {
         start: &Start<Fwd<LANES>>,
     ) -> Option<Linearized> {
         let values = parameters::seeded(x, free);
-        let path = cube::path(&self.steps, &values, start, self.rows).ok()?;
-        let mut exact = self.residuals(&path);
-        // At rest it stands on a face.
+        // On a face.
         let stands = values[HALF_WIDTH] - values[DEPTH];
+        let mut start = *start;
+        if self.first > 0 {
+            start.pose.translation.z = stands;
+        }
+        let path = cube::path(&self.steps, &values, &start, self.rows).ok()?;
+        let mut exact = self.residuals(&path);
         exact.extend(self.rest.map(|height| stands.plus(-height).times(1.0 / REST_NOISE)));
         let mut slopes = Slopes::zeros(exact.len());
         for (mut row, residual) in slopes.row_iter_mut().zip(&exact) {
@@ -104,6 +134,11 @@ impl<'a> Target<'a> {
             slopes,
         })
     }
+}
+
+/// Percent of the width, and as many degrees \[m, rad\].
+fn off(percent: f64) -> [f64; 2] {
+    [percent / 100.0 * WIDTH, percent.to_radians()]
 }
 
 type Slopes = OMatrix<f64, Dyn, U22>;
