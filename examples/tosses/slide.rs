@@ -22,7 +22,8 @@ pub(crate) fn begin(toss: &Toss) -> Option<(usize, Start)> {
     let poses: Vec<Isometry3<f64>> = toss.rows.iter().map(|row| row.pose()).collect();
     let first = poses.iter().rposition(|pose| !slides(pose)).map_or(0, |last| last + 1);
     let slide = &poses[first..];
-    if slide.len() < SHORTEST {
+    // What has not flown is no toss.
+    if first == 0 || slide.len() < SHORTEST {
         return None;
     }
     let pose = slide[0];
