@@ -19,6 +19,7 @@ use plotters::prelude::*;
 use prehend::autodiff::lie::lift;
 use prehend::autodiff::optimize::{Criteria, LevenbergMarquardt, NormalEquations};
 use prehend::autodiff::{Fwd, Scalar};
+use prehend::geometry::SplitMix64;
 use prehend::sim::{
     Body, ContactBodies, Coulomb, Cuboid, GapSmoothing, HalfSpace, HuntCrossley, KelvinVoigt, Law,
     Motion, RigidBody, State, StaticContactTarget, Surface, TimeSteps, World,
@@ -105,21 +106,11 @@ fn slide<S: Scalar>(scene: &World, values: &[S]) -> anyhow::Result<Vec<[S; 3]>> 
     Ok(run.iter().map(seen).collect())
 }
 
-/// Normal noise: sums of twelve numbers of a linear congruential generator.
-fn noise() -> impl FnMut() -> f64 {
-    let mut bits = 1u64;
-    let mut uniform = move || {
-        bits = bits.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (bits >> 11) as f64 / (1u64 << 53) as f64
-    };
-    move || (0..12).map(|_| uniform()).sum::<f64>() - 6.0
-}
-
 fn main() -> anyhow::Result<()> {
     let scene = scene()?;
-    let (mut recording, mut noise) = (slide(&scene, &TRUTH)?, noise());
+    let (mut recording, mut random) = (slide(&scene, &TRUTH)?, SplitMix64::new(1));
     for frame in &mut recording {
-        frame.iter_mut().zip(NOISE).for_each(|(x, sigma)| *x += sigma * noise());
+        frame.iter_mut().zip(NOISE).for_each(|(x, sigma)| *x += sigma * random.normal());
     }
     // In standard deviations.
     let residuals = |x: &[Fwd<COUNT>]| match slide(&scene, x) {

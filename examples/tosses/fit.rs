@@ -48,12 +48,13 @@ pub(crate) fn fit<'a>(tosses: &[&'a Toss]) -> anyhow::Result<Fit> {
         .iter()
         .filter_map(|target| Some((target.toss, target.start_by(&x, &FLIGHT)?.value())))
         .collect();
+    let slides: Vec<Target<'a>> = tosses.iter().filter_map(|toss| Target::slide(toss)).collect();
     let mut targets: Vec<Target<'a>> = Vec::new();
     for (number, stage) in STAGES.iter().enumerate() {
         let Stage { rows, unit, iterations } = *stage;
         let target = |&(toss, start): &(&'a Toss, Start)| Target::contacts(toss, start, rows, unit);
         targets = started.iter().map(target).collect();
-        targets.extend(tosses.iter().filter_map(|toss| Target::slide(toss)));
+        targets.extend(slides.iter().cloned());
         let name = format!("contacts {} of {}", number + 1, STAGES.len());
         minimize(&name, &targets, &mut x, &CONTACT, iterations, in_contact)?;
     }

@@ -1,6 +1,6 @@
 //! How a toss began, from its rows before it first touches the board, and where it ends.
 
-use nalgebra::{DMatrix, Isometry3, Vector3};
+use nalgebra::{DMatrix, Vector3};
 use prehend::autodiff::lie::so3_exp;
 use prehend::autodiff::optimize::{Criteria, LevenbergMarquardt, NormalEquations};
 use prehend::autodiff::{Fwd, Scalar, forward_jacobian};
@@ -28,21 +28,15 @@ pub(crate) const SHORTEST: usize = 8;
 
 /// The rows of the flight of a toss.
 pub(crate) fn rows(toss: &Toss) -> usize {
-    let clear = |row: &&Row| {
-        let Isometry3 { translation, rotation } = row.pose();
-        let up = rotation.inverse() * Vector3::z();
-        translation.z - HALF * up.abs().sum() > CLEAR
-    };
+    let clear = |row: &&Row| row.pose().translation.z - HALF * row.up().abs().sum() > CLEAR;
     toss.rows.iter().take_while(clear).count()
 }
 
 /// Height of the cube's center where a toss ends, if it stands on a face by then \[m\].
 pub(crate) fn rest(toss: &Toss) -> Option<f64> {
     let [.., before, _, _, _, end] = toss.rows.as_slice() else { return None };
-    let [before, end] = [before, end].map(Row::pose);
-    let upright = (end.rotation.inverse() * Vector3::z()).amax();
-    let moved = (end.translation.z - before.translation.z).abs();
-    (upright > TILT.cos() && moved < STILL).then_some(end.translation.z)
+    let [from, to] = [before, end].map(|row| row.pose().translation.z);
+    (end.up().amax() > TILT.cos() && (to - from).abs() < STILL).then_some(to)
 }
 
 /// The start from which a cube with `values` flies as recorded, by least squares, with its derivatives; none if the flight is too
@@ -86,9 +80,6 @@ fn off<S: Scalar>(toss: &Toss, rows: usize, values: &[S; COUNT], start: &Start<S
     let Ok(path) = cube::path(&STEPS, values, start, rows) else {
         return vec![S::constant(f64::NAN); 6 * rows];
     };
-    let row = |(pose, row): (&Isometry3<S>, &Row)| -> [S; 6] {
-        let off = row.to(pose);
-        std::array::from_fn(|i| off[i].times(1.0 / NOISE[i / 3]))
-    };
-    path.iter().zip(&toss.rows).flat_map(row).collect()
+    let scales = NOISE.map(|noise| 1.0 / noise);
+    path.iter().zip(&toss.rows).flat_map(|(pose, row)| row.to(pose, scales)).collect()
 }

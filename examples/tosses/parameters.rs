@@ -35,7 +35,8 @@ pub(crate) const EXACT: usize = COUNT - 1;
 /// Derivatives that are taken at once.
 pub(crate) const LANES: usize = EXACT - CONTACT.start;
 
-/// All of them. Usual values are nominal ones where there are any, guesses elsewhere. Inertia is by mass, since forces are in proportion to it.
+/// All of them. Usual values are nominal ones where there are any, guesses elsewhere. Inertia is by mass, since forces are in
+/// proportion to it.
 pub(crate) const PARAMETERS: [Parameter; COUNT] = [
     linear("gravity", "m/s^2", 9.81, 0.01),
     // Lengths along and across a throw, by height: the recording's vertical is not that of gravity.

@@ -74,6 +74,11 @@ impl Row {
         Isometry3::from_parts(place, UnitQuaternion::from_quaternion(rotation))
     }
 
+    /// The vertical, along the cube's axes.
+    pub(crate) fn up(&self) -> Vector3<f64> {
+        self.pose().rotation.inverse() * Vector3::z()
+    }
+
     /// The state of this row.
     fn state(&self) -> Start {
         let velocity = Vector3::new(self.vx, self.vy, self.vz);
@@ -88,11 +93,12 @@ impl Row {
         start
     }
 
-    /// From this row to `pose`: position \[m\] and rotation vector \[rad\].
-    pub(crate) fn to<S: Scalar>(&self, pose: &Isometry3<S>) -> [S; 6] {
+    /// From this row to `pose`: position and rotation vector, times `scales` \[1/m, 1/rad\].
+    pub(crate) fn to<S: Scalar>(&self, pose: &Isometry3<S>, scales: [f64; 2]) -> [S; 6] {
         let seen = lift::<S>(&self.pose());
         let place = pose.translation.vector - seen.translation.vector;
         let turn = so3_log(&(pose.rotation * seen.rotation.inverse()));
+        let [place, turn] = [place.map(|x| x.times(scales[0])), turn.map(|x| x.times(scales[1]))];
         [place.x, place.y, place.z, turn.x, turn.y, turn.z]
     }
 

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector, Isometry3, UnitQuaternion, Vector3};
 
-use crate::recording::{RATE, Start, Toss};
+use crate::recording::{RATE, Row, Start, Toss};
 
 /// How far a cube that slides on a face may seem tilted \[rad\], and its height may seem to change \[m\].
 const TILT: f64 = 0.023;
@@ -15,20 +15,18 @@ const SLOWEST: f64 = 0.15;
 /// The first row of the last slide, and its start, exactly on a face.
 pub(crate) fn begin(toss: &Toss) -> Option<(usize, Start)> {
     let end = toss.rows.last()?.pose().translation.z;
-    let slides = |pose: &Isometry3<f64>| {
-        let upright = (pose.rotation.inverse() * Vector3::z()).amax();
-        upright > TILT.cos() && (pose.translation.z - end).abs() < LEVEL
-    };
-    let poses: Vec<Isometry3<f64>> = toss.rows.iter().map(|row| row.pose()).collect();
-    let first = poses.iter().rposition(|pose| !slides(pose)).map_or(0, |last| last + 1);
-    let slide = &poses[first..];
+    let slides =
+        |row: &Row| row.up().amax() > TILT.cos() && (row.pose().translation.z - end).abs() < LEVEL;
+    let first = toss.rows.iter().rposition(|row| !slides(row)).map_or(0, |last| last + 1);
+    let slide = &toss.rows[first..];
     // What has not flown is no toss.
     if first == 0 || slide.len() < SHORTEST {
         return None;
     }
-    let pose = slide[0];
-    let moved = |pose: &Isometry3<f64>| {
-        let turned = (pose.rotation * slide[0].rotation.inverse()).scaled_axis();
+    let (rotation, up) = (slide[0].pose().rotation, slide[0].up());
+    let moved = |row: &Row| {
+        let pose = row.pose();
+        let turned = (pose.rotation * rotation.inverse()).scaled_axis();
         Vector3::new(pose.translation.x, pose.translation.y, turned.z)
     };
     let [place, rate] = parabola(slide[..FIRST].iter().map(moved))?;
@@ -36,11 +34,10 @@ pub(crate) fn begin(toss: &Toss) -> Option<(usize, Start)> {
         return None;
     }
     // The axis of the cube that is nearly vertical becomes so.
-    let up = pose.rotation.inverse() * Vector3::z();
     let axis = Vector3::ith(up.iamax(), up[up.iamax()].signum());
-    let upright = UnitQuaternion::rotation_between(&(pose.rotation * axis), &Vector3::z())?;
+    let upright = UnitQuaternion::rotation_between(&(rotation * axis), &Vector3::z())?;
     let turned = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), place.z);
-    let rotation = turned * upright * pose.rotation;
+    let rotation = turned * upright * rotation;
     let start = Start {
         pose: Isometry3::from_parts(Vector3::new(place.x, place.y, end).into(), rotation),
         velocity: Vector3::new(rate.x, rate.y, 0.0),

@@ -2,27 +2,27 @@
 
 use std::ops::Range;
 
-use nalgebra::{DVector, Dyn, Isometry3, OMatrix, SMatrix, SVector, U22};
+use nalgebra::{DVector, Dyn, OMatrix, SMatrix, SVector, U22};
 use prehend::autodiff::{Fwd, Scalar};
 use prehend::sim::RungeKutta4;
 
 use crate::cube::{self, Path, Steps};
 use crate::flight::{self, NOISE};
 use crate::parameters::{self, COUNT, DEPTH, EXACT, HALF_WIDTH, LANES};
-use crate::recording::{Row, Start, Toss};
+use crate::recording::{Start, Toss};
 use crate::slide;
 
 /// Width of the cube, by which positions are measured \[m\].
 const WIDTH: f64 = 0.1048;
 /// Change of the last coordinate for central differences.
 const NUDGE: f64 = 0.05;
-
 /// Percent of the width and degrees by which a slide may be off.
 const SLIDE: f64 = 2.0;
 /// Noise of the height at rest, where faces are not quite alike \[m\].
 const REST_NOISE: f64 = 3e-4;
 
 /// Rows to be explained.
+#[derive(Clone)]
 pub(crate) struct Target<'a> {
     pub(crate) toss: &'a Toss,
     pub(crate) start: Start,
@@ -71,11 +71,9 @@ impl<'a> Target<'a> {
     /// Differences in position and attitude, so that the sum of their squares is the mean over the rows.
     fn residuals<S: Scalar>(&self, path: &Path<S>) -> Vec<S> {
         let mean = (self.rows as f64).sqrt().recip();
-        let row = |(pose, row): (&Isometry3<S>, &Row)| -> [S; 6] {
-            let off = row.to(pose);
-            std::array::from_fn(|i| off[i].times(mean / self.unit[i / 3]))
-        };
-        path.iter().zip(&self.toss.rows[self.first..]).flat_map(row).collect()
+        let scales = self.unit.map(|unit| mean / unit);
+        let rows = &self.toss.rows[self.first..];
+        path.iter().zip(rows).flat_map(|(pose, row)| row.to(pose, scales)).collect()
     }
 
     /// The start with its derivatives by the coordinates `free`, if the rows tell it.
