@@ -73,6 +73,7 @@ fn main() -> anyhow::Result<()> {
         found.iterations
     );
     let file = Path::new("target/bounce_onto_target.svg");
+    std::fs::create_dir_all("target")?;
     draw(&paths, file)?;
     println!("drawn in {}", file.display());
     let low = |path: &[Vector3<f64>]| path.iter().map(|p| p.z).fold(f64::INFINITY, f64::min);

@@ -138,6 +138,7 @@ fn main() -> anyhow::Result<()> {
         println!("{name:<13} {truth:9.5}  {guess:9.5}  {x:9.5} ± {:.5}", sigma[i]);
     }
     let file = Path::new("target/identify_slide.svg");
+    std::fs::create_dir_all("target")?;
     draw(&scene, &recording, &found.parameters, file)?;
     println!("drawn in {}", file.display());
     for (i, x) in found.parameters.iter().enumerate() {

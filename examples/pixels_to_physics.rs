@@ -54,7 +54,7 @@ fn world() -> anyhow::Result<World> {
 fn slide<S: Scalar>(world: &World, x: &[S]) -> Result<Vec<Isometry3<S>>, SimulationError> {
     let [vx, vy, spin, friction] = std::array::from_fn(|i| x[i].times(UNITS[i]));
     let mut world = world.lift::<S>();
-    world.contacts[0].params_mut()[2] = friction;
+    *world.contacts[0].param_mut("friction")? = friction;
     let mut start = State::at_rest(Isometry3::translation(-0.1, -0.04, HALF[2])).lift();
     (start.linear.x, start.linear.y, start.angular.z) = (vx, vy, spin);
     let run = world.rollout(&[State::at_rest(Isometry3::identity()).lift(), start], PICTURES)?;

@@ -147,6 +147,7 @@ fn main() -> anyhow::Result<()> {
     println!("pushed straight ahead it ends {:.1} mm and {:.1}° off", before.0, before.1);
     println!("as planned {:.3} mm and {:.3}°, {} steps later", after.0, after.1, found.iterations);
     let file = Path::new("target/plan_push.svg");
+    std::fs::create_dir_all("target")?;
     draw(&runs, &found.parameters, file)?;
     println!("drawn in {}", file.display());
     let [still, end] = [17, 18].map(|i| Point2::new(runs[1][i][0], runs[1][i][1]));

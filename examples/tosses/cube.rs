@@ -31,7 +31,8 @@ pub(crate) struct Steps<I> {
     pub(crate) board: bool,
 }
 
-/// The path of a cube with `values` of the parameters, by which the last has no derivative, for some `rows`.
+/// The path of a cube with `values` of the parameters for some `rows`. Its round corners are part of its surface, which
+/// carries no derivatives: there are none by their radius, the last parameter, and those by the half-width take them as they are.
 pub(crate) fn path<S: Scalar>(
     steps: &Steps<impl Integrator>,
     values: &[S; COUNT],
@@ -51,7 +52,7 @@ pub(crate) fn path<S: Scalar>(
     world.bodies[1].motion = Motion::Free(rigid);
     // Four corners carry the cube at the depth.
     let stiffness = g.times(0.25 * MASS) * size / (depth * size).powf(n);
-    let law = [stiffness, n, c, s * size, mu0, mu1, u1 * size, v0 * size, v1 * size, a, n1];
+    let law = [stiffness, n, c, s * size, mu0, mu1, u1 * size, v0 * size, v1 * size, a, n1 * size];
     world.contacts[0].set_params(&law)?;
 
     let lean = lean(along, across, &start.velocity);

@@ -42,8 +42,9 @@ fn main() -> anyhow::Result<()> {
     match (path("--fit"), path("--predict")) {
         (Some(file), None) => {
             let (tosses, without) = (recording::read(&file)?, recording::left_out(&file)?);
+            let recorded = tosses.len();
             let tosses: Vec<&Toss> = tosses.iter().filter(|t| !without.contains(&t.id)).collect();
-            println!("{} tosses", tosses.len());
+            println!("{} tosses, {} of the file left out", tosses.len(), recorded - tosses.len());
             let fit = fit::fit(&tosses)?;
             print(&fit);
             save(&fit, &out()?)

@@ -1,6 +1,7 @@
 //! Recorded tosses: reading and writing them.
 
 use std::collections::BTreeMap;
+use std::io::ErrorKind;
 use std::path::Path;
 
 use anyhow::Context;
@@ -12,6 +13,9 @@ use serde::{Deserialize, Serialize};
 
 /// Rows a second.
 pub(crate) const RATE: f64 = 148.0;
+
+/// How far from its time a row may be, in intervals between rows.
+const LATE: f64 = 0.5;
 
 /// A row of a recording: position \[m\], attitude, velocity \[m/s\] and spin along the cube's axes \[rad/s\].
 #[derive(Clone, Copy, Debug, Deserialize, Serialize)]
@@ -144,6 +148,19 @@ pub(crate) fn read(file: &Path) -> anyhow::Result<Vec<Toss>> {
         tosses.entry(row.toss_id).or_default().push(row);
     }
     anyhow::ensure!(!tosses.is_empty(), "{}: no rows", file.display());
+    for (id, rows) in &tosses {
+        let late = |(k, row): &(usize, &Row)| {
+            (row.t.zip(rows[0].t))
+                .is_none_or(|(t, start)| (RATE * (t - start) - *k as f64).abs() > LATE)
+        };
+        if let Some((k, _)) = rows.iter().enumerate().find(late) {
+            anyhow::bail!(
+                "{}: row {} of toss {id} is not {k}/{RATE} s after its first",
+                file.display(),
+                k + 1
+            );
+        }
+    }
     Ok(tosses.into_iter().map(|(id, rows)| Toss { id, rows }).collect())
 }
 
@@ -173,7 +190,10 @@ pub(crate) fn left_out(file: &Path) -> anyhow::Result<Vec<u32>> {
         duplicate_pairs: Vec<[u32; 2]>,
     }
     let subsets = file.with_file_name("subsets.json");
-    let Ok(text) = std::fs::read_to_string(&subsets) else { return Ok(Vec::new()) };
+    let text = match std::fs::read_to_string(&subsets) {
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Vec::new()),
+        text => text.with_context(|| subsets.display().to_string())?,
+    };
     let Subsets { dev100, duplicate_pairs } =
         serde_json::from_str(&text).with_context(|| subsets.display().to_string())?;
     let twins = duplicate_pairs.iter().filter(|pair| pair.iter().any(|id| dev100.contains(id)));

@@ -30,4 +30,10 @@ pub trait DistanceField: Send + Sync {
     fn lipschitz_bound(&self) -> f64 {
         1.25
     }
+
+    /// How thick the solid is about where it is thinnest \[m\], infinite where nothing can pass through it: steps of a
+    /// simulation are short enough not to pass over it.
+    fn thickness(&self) -> f64 {
+        f64::INFINITY
+    }
 }

@@ -21,7 +21,7 @@ const FINE: f64 = 0.1;
 /// How well the steps of a simulation resolved its contacts.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Resolution {
-    /// Steps that were taken.
+    /// Steps that were asked for; an integrator may divide them.
     pub steps: usize,
     /// By how much the accelerations by contacts changed from one step to the next, relative to them, both as root mean squares
     /// over the steps: about dt·ω for the fastest rate ω at which contacts do anything, √2 for an impact within one step.
@@ -58,16 +58,18 @@ impl fmt::Display for Resolution {
 /// Follows a simulation from step to step.
 pub(crate) struct Audit<'a, S: Scalar> {
     world: &'a World<S>,
+    /// Whether the integrator holds its error itself.
+    controls_error: bool,
     roughness: Roughness,
     energy: EnergyBalance,
 }
 
 impl<'a, S: Scalar> Audit<'a, S> {
-    /// Of a simulation from `initial`.
-    pub(crate) fn new(world: &'a World<S>, initial: &[State<S>]) -> Self {
-        let (roughness, energy) =
-            (Roughness::new(world, initial), EnergyBalance::new(world, initial));
-        Self { world, roughness, energy }
+    /// Of a simulation from `initial` by an integrator that `controls_error` or not.
+    pub(crate) fn new(world: &'a World<S>, initial: &[State<S>], controls_error: bool) -> Self {
+        let roughness = Roughness::new(world, initial);
+        let energy = EnergyBalance::new(world, initial, controls_error);
+        Self { world, controls_error, roughness, energy }
     }
 
     /// After `step` has led to `states`.
@@ -79,7 +81,7 @@ impl<'a, S: Scalar> Audit<'a, S> {
         self.energy.step(self.world, step, states)
     }
 
-    /// What is to be said of `time_steps`, by an integrator that `controls_error` or not, that have led to `states`.
+    /// What is to be said of `time_steps` that have led to `states`.
     ///
     /// # Errors
     /// If contacts have made energy.
@@ -87,12 +89,11 @@ impl<'a, S: Scalar> Audit<'a, S> {
         mut self,
         TimeSteps { dt, steps }: TimeSteps,
         states: &[State<S>],
-        controls_error: bool,
     ) -> Result<Resolution, SimulationError> {
         self.energy.check(self.world, dt * steps as f64, states)?;
         let name = |body: BodyId| self.world.bodies[body].name.clone();
         let roughest = self.roughness.roughest().map(|(body, time)| (name(body), time));
-        Ok(match controls_error {
+        Ok(match self.controls_error {
             true => Resolution { steps, roughness: None, roughest: None },
             false => Resolution { steps, roughness: Some(self.roughness.mean()), roughest },
         })

@@ -52,9 +52,8 @@ impl World {
         friction: impl PairFriction,
         reach: f64,
     ) -> Result<Equilibrium, SimulationError> {
-        let bodies = self.bodies.len();
-        if states.len() != bodies && states.len() != self.state_count() {
-            return Err(SimulationError::States { states: states.len(), bodies });
+        if states.len() != self.bodies.len() && states.len() != self.state_count() {
+            return Err(self.wrong_count(states.len()));
         }
         let found = self.body(body)?;
         let Some(rigid) = found.rigid() else {
@@ -276,6 +275,9 @@ mod tests {
         };
         assert_eq!(ask(2, &states), SimulationError::NoBody { body: BodyId(2), bodies: 2 });
         assert_eq!(ask(0, &states), SimulationError::NotFree { body: "ground".to_owned() });
-        assert_eq!(ask(1, &states[..1]), SimulationError::States { states: 1, bodies: 2 });
+        assert_eq!(
+            ask(1, &states[..1]),
+            SimulationError::States { states: 1, bodies: 2, sticking: 0 }
+        );
     }
 }

@@ -29,6 +29,12 @@ pub enum SimulationError {
         /// Its name.
         body: String,
     },
+    /// Two bodies have no contact.
+    #[error("bodies '{}' and '{}' have no contact", .bodies[0], .bodies[1])]
+    NoContact {
+        /// Their names.
+        bodies: [String; 2],
+    },
     /// A body cannot touch itself.
     #[error("body '{body}' cannot touch itself")]
     Itself {
@@ -48,12 +54,24 @@ pub enum SimulationError {
     #[error("no perturbation to measure stability with: rest is one")]
     NoPerturbations,
     /// States and bodies differ in number.
-    #[error("{states} states for {bodies} bodies")]
+    #[error("{states} states for {bodies} bodies and {sticking} contacts that stick")]
     States {
         /// How many states.
         states: usize,
         /// How many bodies.
         bodies: usize,
+        /// How many contacts have a deflection, whose states follow those of the bodies.
+        sticking: usize,
+    },
+    /// A number of an integrator is out of its range.
+    #[error("{setting} must be {range}, is {value}")]
+    Setting {
+        /// Type and field.
+        setting: &'static str,
+        /// What it may be.
+        range: &'static str,
+        /// What it is.
+        value: f64,
     },
     /// Parameters of a world that are too few or too many.
     #[error("{given} parameters for a world of {expected}")]
@@ -141,11 +159,30 @@ pub enum SimulationError {
         /// The last step that was tried \[s\].
         dt: f64,
     },
+    /// A body was pressed past the middle of another, which would push it out on the other side.
+    #[error(
+        "body '{body}' passes through '{contact}' at {time} s: contacts too soft for such an impact or load (see \
+         StaticContactTarget::impact_depth)"
+    )]
+    PassedThrough {
+        /// The body with the samples.
+        body: String,
+        /// The body with the field.
+        contact: String,
+        /// Time \[s\].
+        time: f64,
+    },
     /// A step had to be divided into too many parts.
     #[error(
-        "a step took more than {max_parts} parts by {time} s: contacts too stiff for so long a time, or `Adaptive::max_parts` too small"
+        "a step took more than {max_parts} parts by {time} s, body '{body}' accelerated most{}: contacts too stiff for so long a \
+         time, or `Adaptive::max_parts` too small",
+        touching(contact)
     )]
     TooManyParts {
+        /// The body that is accelerated most.
+        body: String,
+        /// The body that presses hardest on it.
+        contact: Option<String>,
         /// Parts that are allowed.
         max_parts: usize,
         /// Time that they have led to \[s\].
@@ -179,13 +216,19 @@ pub enum SimulationError {
     },
     /// Contacts are too stiff or damped for the parts into which a step may be divided.
     #[error(
-        "the contacts of step {step}, at {time} s, need {needed} parts of it, and {max_substeps} are allowed"
+        "the contacts of step {step}, at {time} s, need {needed} parts of it, and {max_substeps} are allowed; body '{body}'{} is \
+         accelerated most",
+        touching(contact)
     )]
     SubSteps {
         /// Number of the step.
         step: usize,
         /// Time \[s\].
         time: f64,
+        /// The body that is accelerated most.
+        body: String,
+        /// The body that presses hardest on it.
+        contact: Option<String>,
         /// Parts that would be needed.
         needed: f64,
         /// Parts that are allowed.

@@ -48,6 +48,10 @@ impl DistanceField for Sphere {
         let hessian = (Matrix3::identity() - gradient * gradient.transpose()) / length;
         (distance <= reach).then_some(FieldSample { distance, gradient, hessian })
     }
+
+    fn thickness(&self) -> f64 {
+        2.0 * self.radius
+    }
 }
 
 /// Everything outside of a sphere. At its center the gradient is NaN, which is no contact.
@@ -120,6 +124,10 @@ impl DistanceField for Cuboid {
             (Vector3::ith(nearest, sign[nearest]), Matrix3::zeros())
         };
         Some(FieldSample { distance, gradient, hessian })
+    }
+
+    fn thickness(&self) -> f64 {
+        2.0 * self.half_extents.min()
     }
 }
 

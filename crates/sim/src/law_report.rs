@@ -113,29 +113,32 @@ impl Verdict {
 /// If a parameter is out of its range, or the law cannot be simulated.
 pub fn law_report(law: &Arc<dyn DynContactLaw>) -> Result<LawReport, SimulationError> {
     law.check(law.params())?;
-    let probe = Probe { law: law.as_ref() };
-    let weight = probe.response(DEPTH, 0.0, Vector3::zeros()).normal;
+    if let Some(bristles) = law.bristles() {
+        bristles.check()?;
+    }
+    let contact_point = PointContact { law: law.as_ref() };
+    let weight = contact_point.response(DEPTH, 0.0, Vector3::zeros()).normal;
     let mut findings = vec![Finding {
         what: "weight carried 0.5 mm deep on 4 cm² [N]".to_owned(),
         measured: weight,
         verdict: Verdict::when(weight > 0.0 && weight.is_finite()),
         remark: "must push".to_owned(),
     }];
-    findings.push(onset(&probe));
-    findings.extend(derivatives::findings(&probe));
-    findings.extend(passivity::findings(&probe, weight));
-    let mut curves = curves::of_forces(&probe);
+    findings.push(onset(&contact_point));
+    findings.extend(derivatives::findings(&contact_point));
+    findings.extend(passivity::findings(&contact_point, weight));
+    let mut curves = curves::of_forces(&contact_point);
     if weight > 0.0 && weight.is_finite() {
         let specimen = Specimen { law, mass: weight / GRAVITY };
-        findings.extend(specimen.findings(&probe)?);
+        findings.extend(specimen.findings(&contact_point)?);
         curves.push(specimen.bounce_curve()?);
     }
     Ok(LawReport { findings, curves })
 }
 
-fn onset(probe: &Probe<'_>) -> Finding {
-    let jump = jumps(probe.law, probe.law.params(), &GapSmoothing::Hard);
-    let force = probe.response(1e-12, -1.0, Vector3::zeros()).normal;
+fn onset(contact_point: &PointContact<'_>) -> Finding {
+    let jump = jumps(contact_point.law, contact_point.law.params(), &GapSmoothing::Hard);
+    let force = contact_point.response(1e-12, -1.0, Vector3::zeros()).normal;
     Finding {
         what: "force at first touch, 1 m/s [N]".to_owned(),
         measured: force,
@@ -148,11 +151,11 @@ fn onset(probe: &Probe<'_>) -> Finding {
 }
 
 /// A law at one contact.
-struct Probe<'a> {
+struct PointContact<'a> {
     law: &'a dyn DynContactLaw,
 }
 
-impl Probe<'_> {
+impl PointContact<'_> {
     /// The force `depth` \[m\] deep, at a normal speed and a slip \[m/s\].
     fn response(&self, depth: f64, normal_speed: f64, slip: Vector3<f64>) -> Response<f64> {
         let (gap, normal) = (self.law.reach() - depth, Vector3::z());

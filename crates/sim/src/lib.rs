@@ -18,7 +18,7 @@ mod body;
 mod broad_phase;
 pub mod contact;
 mod contact_frequency;
-mod culprit;
+mod diagnosis;
 mod equilibrium;
 mod error;
 pub mod fields;

@@ -32,14 +32,15 @@ impl<S: Scalar> World<S> {
     ///
     /// # Errors
     /// Unless there is one finite state for each body and the time is positive; if the velocity of a trajectory is not the rate of
-    /// its pose; where forces jump or grow so that no step is short enough, which body, contact and time.
+    /// its pose; where forces jump or grow so that no step is short enough, a state stops being finite or contacts make energy
+    /// (see [`World::simulate_with`]), which body, contact and time.
     pub fn simulate(
         &self,
         initial: &[State<S>],
         time: f64,
     ) -> Result<Vec<State<S>>, SimulationError> {
         let once = TimeSteps { dt: time, steps: 1 };
-        self.march(&Adaptive::default(), self.begin(initial, once)?, once, |_, _| Ok(()))
+        Ok(self.simulate_with(&Adaptive::default(), initial, once, |_, _| ())?.states)
     }
 
     /// The states of all bodies at 0, dt, …, `steps`·dt, as [`World::simulate`] finds them.
@@ -51,13 +52,7 @@ impl<S: Scalar> World<S> {
         initial: &[State<S>],
         time_steps: TimeSteps,
     ) -> Result<Vec<Vec<State<S>>>, SimulationError> {
-        let initial = self.begin(initial, time_steps)?;
-        let mut states = vec![initial.clone()];
-        self.march(&Adaptive::default(), initial, time_steps, |_, next| {
-            states.push(next.to_vec());
-            Ok(())
-        })?;
-        Ok(states)
+        Ok(self.rollout_with(&Adaptive::default(), initial, time_steps)?.states)
     }
 
     /// [`World::simulate`] with the steps of `integrator`, each handed to `visit`, and a report on how well they resolve the
@@ -87,12 +82,12 @@ impl<S: Scalar> World<S> {
         time_steps: TimeSteps,
         mut visit: impl FnMut(Step, &[State<S>]),
     ) -> Result<Simulation<Vec<State<S>>>, SimulationError> {
-        let mut audit = Audit::new(self, &initial);
+        let mut audit = Audit::new(self, &initial, integrator.controls_error());
         let states = self.march(integrator, initial, time_steps, |step, states| {
             visit(step, states);
             audit.step(step, states)
         })?;
-        let resolution = audit.finish(time_steps, &states, integrator.controls_error())?;
+        let resolution = audit.finish(time_steps, &states)?;
         Ok(Simulation { states, resolution })
     }
 
@@ -155,7 +150,7 @@ impl<S: Scalar> World<S> {
         for index in 0..steps {
             let step = Step::new(index, dt);
             control(step, &mut world, &mut states);
-            world.check(&states, dt)?;
+            world.check(&states, step)?;
             states = world.advance(integrator, &states, step)?;
         }
         Ok(states)
@@ -191,7 +186,7 @@ impl<S: Scalar> World<S> {
         step: Step,
     ) -> Result<Vec<State<S>>, SimulationError> {
         let states = self.with_deflections(states);
-        self.check(&states, step.dt)?;
+        self.check(&states, step)?;
         self.advance(integrator, &states, step)
     }
 
@@ -220,27 +215,27 @@ impl<S: Scalar> World<S> {
         TimeSteps { dt, steps }: TimeSteps,
     ) -> Result<Vec<State<S>>, SimulationError> {
         let mut states = self.with_deflections(initial);
-        self.check(&states, dt)?;
+        self.check(&states, Step::new(0, dt))?;
         self.check_velocities(dt * steps as f64)?;
         self.drive(&mut states, 0.0);
         Ok(states)
     }
 
     /// Whether a rollout may begin.
-    fn check(&self, states: &[State<S>], dt: f64) -> Result<(), SimulationError> {
+    fn check(&self, states: &[State<S>], step: Step) -> Result<(), SimulationError> {
+        let Step { start, dt, .. } = step;
         if !(dt > 0.0 && dt.is_finite()) {
             return Err(SimulationError::TimeStep(dt));
         }
-        let bodies = self.bodies.len();
         if states.len() != self.state_count() {
-            return Err(SimulationError::States { states: states.len(), bodies });
+            return Err(self.wrong_count(states.len()));
         }
         for pair in &self.contacts {
             pair.check()?;
         }
         match states.iter().all(State::is_finite) {
             true => Ok(()),
-            false => Err(self.not_finite(states, states, 0.0)),
+            false => Err(self.not_finite(states, states, start)),
         }
     }
 }
@@ -264,7 +259,7 @@ mod tests {
         };
         assert_eq!(
             step(&world, &states[..1], 1e-3),
-            SimulationError::States { states: 1, bodies: 2 }
+            SimulationError::States { states: 1, bodies: 2, sticking: 0 }
         );
         assert_eq!(step(&world, &states, -1.0), SimulationError::TimeStep(-1.0));
         for (bad, message) in [
@@ -331,7 +326,7 @@ mod tests {
         };
         assert_eq!(roll(&states, 0.0).unwrap_err(), SimulationError::TimeStep(0.0));
         let error = roll(&states[..1], 1e-3).unwrap_err();
-        assert_eq!(error, SimulationError::States { states: 1, bodies: 2 });
+        assert_eq!(error, SimulationError::States { states: 1, bodies: 2, sticking: 0 });
         let mut lost = states.clone();
         lost[1].linear = Vector3::repeat(f64::NAN);
         let error = roll(&lost, 1e-3).unwrap_err();

@@ -208,9 +208,9 @@ impl<I: Integrator> StabilityLoss<I> {
             return Err(SimulationError::NoPerturbations);
         }
         let body = self.world.body(self.object)?;
-        let (states, bodies) = (self.states.len(), self.world.bodies.len());
-        if states != bodies {
-            return Err(SimulationError::States { states, bodies });
+        let states = self.states.len();
+        if states != self.world.bodies.len() {
+            return Err(self.world.wrong_count(states));
         }
         let rigid =
             body.rigid().ok_or_else(|| SimulationError::NotFree { body: body.name.clone() })?;

@@ -107,14 +107,6 @@ impl State {
         self.linear.norm() + radius * self.angular.norm()
     }
 
-    /// The state after `time` \[s\] at the same velocities.
-    pub(crate) fn uniform(&self, time: f64) -> State {
-        let mut state = *self;
-        state.pose.translation.vector += self.linear * time;
-        state.pose.rotation = so3_exp(&(self.angular * time)) * self.pose.rotation;
-        state
-    }
-
     /// The state `tangent` away (the retraction of the manifold of states), in the order of [`State::tangent`].
     pub fn retract<S: Scalar>(&self, tangent: &[S; 12]) -> State<S> {
         let [x, y, z, rx, ry, rz, vx, vy, vz, wx, wy, wz] = *tangent;

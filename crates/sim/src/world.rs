@@ -83,7 +83,10 @@ impl World {
         Ok(())
     }
 
-    /// Lets two bodies touch both ways, samples on field, each with half of the force.
+    /// Lets two bodies touch both ways, samples on field, each with half of the force: two entries of
+    /// [`contacts`](World::contacts), whose parameters [`set_contact_param`](World::set_contact_param) sets together.
+    ///
+    /// Edges that cross are felt only where samples lie: their distances should be less than half of the smaller body's edges.
     ///
     /// # Errors
     /// See [`World::add_contact`].
@@ -139,6 +142,51 @@ impl<S: Scalar> World<S> {
     pub(crate) fn free_bodies(&self) -> Vec<BodyId> {
         let free = |id: &BodyId| self.bodies[*id].rigid().is_some();
         (0..self.bodies.len()).map(BodyId).filter(free).collect()
+    }
+
+    /// Sets the parameter called `name`, such as `"friction"`, of every contact between two bodies: to differentiate by it, put in a
+    /// variable.
+    ///
+    /// ```
+    /// # use std::sync::Arc;
+    /// # use nalgebra::Vector3;
+    /// use prehend_autodiff::Fwd;
+    /// # use prehend_sim::*;
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// # let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
+    /// # let floor = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
+    /// # let ball = Body::free("ball", RigidBody::ball(0.1, 0.03)?);
+    /// # let ball = world.add(ball.with_surface(Surface::ball(0.03)?));
+    /// # let spring = HuntCrossley { stiffness: 1e7, damping: 0.1, exponent: 1.0 };
+    /// # let law = Arc::new(Law::new(spring, Coulomb { friction: 0.5, slip_scale: 1e-2 })?);
+    /// # world.add_contact(ContactBodies { samples: ball, field: floor }, law, GapSmoothing::Hard)?;
+    /// let mut lifted = world.lift::<Fwd<1>>();
+    /// lifted.set_contact_param(ball, floor, "friction", Fwd::variable(0.4, 0))?;
+    /// # assert_eq!(lifted.contacts[0].params()[3].value, 0.4);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// If the two have no contact, or its law no parameter of that name.
+    pub fn set_contact_param(
+        &mut self,
+        a: BodyId,
+        b: BodyId,
+        name: &str,
+        value: S,
+    ) -> Result<(), SimulationError> {
+        let [first, second] = [self.body(a)?.name.clone(), self.body(b)?.name.clone()];
+        let mut pairs =
+            self.contacts.iter_mut().filter(|pair| pair.joins(a) && pair.joins(b)).peekable();
+        if a == b || pairs.peek().is_none() {
+            return Err(SimulationError::NoContact { bodies: [first, second] });
+        }
+        for pair in pairs {
+            *pair.param_mut(name)? = value;
+        }
+        Ok(())
     }
 
     /// The same world, each number through `f`, but for trajectories, which become those of constants.

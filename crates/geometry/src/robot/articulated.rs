@@ -165,6 +165,10 @@ impl DistanceField for ArticulatedRobot {
     fn sample(&self, point: &Point3<f64>, reach: f64) -> Option<FieldSample> {
         self.posed.sample(point, reach)
     }
+
+    fn thickness(&self) -> f64 {
+        self.posed.thickness()
+    }
 }
 
 #[cfg(test)]

@@ -181,6 +181,11 @@ impl DistanceField for PosedRobot {
     fn distance(&self, point: &Point3<f64>, reach: f64) -> Option<f64> {
         self.nearest(point, reach, SdfGrid::distance, |d| *d).map(|(_, distance)| distance)
     }
+
+    /// That of the thinnest link.
+    fn thickness(&self) -> f64 {
+        self.shape.links().iter().map(|link| link.thickness()).fold(f64::INFINITY, f64::min)
+    }
 }
 
 #[cfg(test)]

@@ -79,6 +79,10 @@ impl DistanceField for LinkShape {
     fn distance(&self, point: &Point3<f64>, reach: f64) -> Option<f64> {
         self.grid()?.distance(point, reach)
     }
+
+    fn thickness(&self) -> f64 {
+        self.grid().map_or(f64::INFINITY, DistanceField::thickness)
+    }
 }
 
 /// Smallest signed distance to any of the bodies.

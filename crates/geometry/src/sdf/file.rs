@@ -101,7 +101,7 @@ impl SdfGrid {
         if !coefficients.iter().all(|c| c.is_finite()) {
             return Err(("coefficients", "not all are finite".into()));
         }
-        Ok(Self { lattice, coefficients, bounds, band })
+        Ok(Self::from_coefficients(lattice, coefficients, bounds, band))
     }
 }
 

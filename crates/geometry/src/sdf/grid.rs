@@ -24,6 +24,8 @@ pub struct SdfGrid {
     pub(super) bounds: (Point3<f64>, Point3<f64>),
     /// Samples are cut off at this distance \[m\]; infinite for none.
     pub(super) band: f64,
+    /// Largest depth of a coefficient, which no point exceeds \[m\].
+    deepest: f64,
 }
 
 impl SdfGrid {
@@ -34,8 +36,17 @@ impl SdfGrid {
         bounds: (Point3<f64>, Point3<f64>),
         band: f64,
     ) -> Self {
-        let coefficients = prefilter(samples, lattice.dims());
-        Self { lattice, coefficients, bounds, band }
+        Self::from_coefficients(lattice, prefilter(samples, lattice.dims()), bounds, band)
+    }
+
+    pub(super) fn from_coefficients(
+        lattice: Lattice,
+        coefficients: Vec<f64>,
+        bounds: (Point3<f64>, Point3<f64>),
+        band: f64,
+    ) -> Self {
+        let deepest = coefficients.iter().fold(0.0, |deepest: f64, c| deepest.max(-c));
+        Self { lattice, coefficients, bounds, band, deepest }
     }
 
     /// Where the samples lie.
@@ -164,6 +175,11 @@ impl DistanceField for SdfGrid {
             return (distance <= reach).then_some(distance);
         }
         None
+    }
+
+    /// Twice the largest depth: right for walls, too much for a shape with parts of many thicknesses.
+    fn thickness(&self) -> f64 {
+        if self.deepest > 0.0 { 2.0 * self.deepest } else { f64::INFINITY }
     }
 }
 

@@ -3,13 +3,16 @@
 use nalgebra::Vector3;
 use prehend_autodiff::Scalar;
 
+use crate::contact::bristles::Bristles;
 use crate::contact::point::Contact;
+use crate::contact::wrench::stack;
 use crate::error::SimulationError;
 use crate::state::State;
 use crate::time::Step;
 use crate::world::World;
-use crate::world::body::Motion;
+use crate::world::body::{Body, Motion};
 use crate::world::body_id::BodyId;
+use crate::world::contact_pair::ContactPair;
 
 /// Part of the largest kinetic energy that contacts may seem to have made: methods of first order are off by as much where they
 /// are still of use.
@@ -29,7 +32,8 @@ const GAUSS: [(f64, f64); 5] = [
 
 /// The energy of a world in which nothing but gravity, constant wrenches and contacts acts.
 pub(super) struct EnergyBalance {
-    /// Whether it is such a world: bodies on trajectories bring energy with them.
+    /// Whether it is such a world, and the work of torques is known: bodies on trajectories bring energy with them, and a body
+    /// may have turned any way within steps of any length.
     closed: bool,
     initial: Vec<State>,
     /// Work of external torques \[J\].
@@ -39,7 +43,12 @@ pub(super) struct EnergyBalance {
 }
 
 impl EnergyBalance {
-    pub(super) fn new<S: Scalar>(world: &World<S>, initial: &[State<S>]) -> Self {
+    /// Of a simulation from `initial` by an integrator that `controls_error`, with steps of any length, or not.
+    pub(super) fn new<S: Scalar>(
+        world: &World<S>,
+        initial: &[State<S>],
+        controls_error: bool,
+    ) -> Self {
         let initial: Vec<State> = initial.iter().map(State::value).collect();
         let moves = |(motion, state): (&Motion<S>, &State)| match motion {
             Motion::Free(_) => false,
@@ -48,7 +57,9 @@ impl EnergyBalance {
             }
             Motion::Driven(_) => true,
         };
-        let closed = !world.bodies.iter().map(|body| &body.motion).zip(&initial).any(moves);
+        let moved = world.bodies.iter().map(|body| &body.motion).zip(&initial).any(moves);
+        let torques = world.bodies.iter().any(|body| torque(body) != Vector3::zeros());
+        let closed = !(moved || controls_error && torques);
         Self { closed, initial, work: 0.0, kinetic: 0.0 }
     }
 
@@ -61,7 +72,7 @@ impl EnergyBalance {
         states: &[State<S>],
     ) -> Result<(), SimulationError> {
         for (body, state) in world.bodies.iter().zip(states) {
-            let torque = body.external_wrench.fixed_rows::<3>(3).map(|x| x.value());
+            let torque = torque(body);
             if torque != Vector3::zeros() {
                 self.work += torque.dot(&state.angular.map(|x| x.value())) * step.dt;
             }
@@ -110,6 +121,11 @@ impl EnergyBalance {
     }
 }
 
+/// The external torque on a body \[N m\].
+fn torque<S: Scalar>(body: &Body<S>) -> Vector3<f64> {
+    body.external_wrench.fixed_rows::<3>(3).map(|x| x.value())
+}
+
 /// Kinetic energy of a free body \[J\].
 fn kinetic_energy<S: Scalar>(world: &World<S>, body: BodyId, state: &State) -> f64 {
     let Some(rigid) = world.bodies[body].rigid() else { return 0.0 };
@@ -128,9 +144,9 @@ fn work_of_pull<S: Scalar>(world: &World<S>, body: BodyId, before: &State, now: 
 }
 
 /// What resting contacts at `states` could give back \[J\]: the work of each sample's normal force from its gap to where
-/// there is none.
+/// there is none, and that of bristles as they return.
 fn stored_energy(world: &World, states: &[State]) -> f64 {
-    let mut energy = 0.0;
+    let mut energy = energy_of_bristles(world, states);
     for pair in &world.contacts {
         let Some(patch) = world.patch(pair, world.seen_value(pair, states)) else { continue };
         let (reach, smoothing) = (pair.law().reach(), pair.smoothing);
@@ -154,4 +170,22 @@ fn stored_energy(world: &World, states: &[State]) -> f64 {
         });
     }
     energy
+}
+
+/// The work of the bristles of all contacts that stick, from their deflections to none, while nothing else moves \[J\].
+fn energy_of_bristles(world: &World, states: &[State]) -> f64 {
+    let resting: Vec<State> = states.iter().map(|state| State::at_rest(state.pose)).collect();
+    let work = |((pair, _), state): ((&ContactPair, Bristles), &State)| {
+        let rotation = states[pair.bodies.field].pose.rotation;
+        let [linear, angular] = [state.linear, state.angular].map(|x| rotation * x);
+        let twist = stack(&linear, &angular);
+        let along = |part: f64| {
+            let deflection = State::at_rest(state.pose).deflected(&(state.deflection() * part));
+            world.effect(pair, &resting, Some(&deflection), 1).on_samples.dot(&twist)
+        };
+        let undeflected = along(0.0);
+        let mean: f64 = GAUSS.iter().map(|(x, weight)| weight * along(*x)).sum();
+        undeflected - mean
+    };
+    world.sticking().zip(&states[world.bodies.len()..]).map(work).sum()
 }

@@ -5,11 +5,15 @@ use prehend_autodiff::{Fwd, LocalFunction, Scalar};
 
 use super::bristle_law::BristleLaw;
 use super::dynamic::DynContactLaw;
+use super::error::LawError;
 use super::patch::{Patch, Touch};
 use super::point::Contact;
+use super::range::ParameterRange;
 
 /// Depth over which bristles take hold, in multiples of their deflection.
 const TAKE_HOLD: f64 = 0.1;
+/// Depth above which they do not let go, in multiples of their deflection.
+const LET_GO: f64 = 1e-3;
 /// Part of what contacts hold that holds every other direction.
 const REGULARIZATION: f64 = 1e-6;
 
@@ -23,8 +27,9 @@ const REGULARIZATION: f64 = 1e-6;
 ///
 /// u' = v_b/√(s² + v_b²)·s − v_b s²/(s² + v_b²)·(|u|/u_b)⁴ u/u_b,
 ///
-/// in the mean over the samples, weighted by their normal forces. Without slip nothing yields: what sticks does not creep. No
-/// rate is faster than 5 v_b/u_b, whatever the slip. Without contact they return to zero in u_b/v_b.
+/// in the mean over the samples, weighted by area and depth. Without slip nothing yields: what sticks does not creep. No
+/// rate is faster than 5 v_b/u_b, whatever the slip. Without contact they return to zero in u_b/v_b, and begin to where the mean
+/// depth is less than u_b/1000: a body has to rest deeper than that to be held.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bristles {
     /// Deflection of full friction u_b \[m\].
@@ -34,6 +39,13 @@ pub struct Bristles {
 }
 
 impl Bristles {
+    /// Whether both numbers are positive.
+    pub(crate) fn check(&self) -> Result<(), LawError> {
+        let range = ParameterRange::Positive;
+        range.check("deflection of bristles", self.deflection)?;
+        range.check("slip speed of bristles", self.slip_speed)
+    }
+
     /// The fastest rate at which they yield \[1/s\].
     pub(crate) fn fastest(&self) -> f64 {
         5.0 * self.slip_speed / self.deflection
@@ -81,24 +93,25 @@ impl BristleFunction<'_> {
         let moved = Moved::new(patch, change);
         let deflection = Vector6::from_fn(|i, _| change[12 + i].plus(self.deflection[i]));
         let mut wrench = Vector6::<T>::zeros();
-        let mut brush = Brush::default();
+        let mut fit = RateFit::default();
         let sound = patch.for_each_touch(cutoff, T::ORDER == 0, |touch| {
             let Lifted { mut contact, lever } = moved.lift(touch, cutoff);
             let lever = from_com.map_or(lever, |from_com| lever + from_com);
             let across = across(&contact.normal, &lever);
-            let (slip, bent) = (contact.slip, across * deflection);
-            contact.slip += bent.map(|u| u.times(bristles.slip_speed / bristles.deflection));
+            let (slip, deflected) = (contact.slip, across * deflection);
+            contact.slip += deflected.map(|u| u.times(bristles.slip_speed / bristles.deflection));
             let response = law.response(&contact);
             let force = contact.normal * response.normal + response.tangential;
             let torque = lever.cross(&force);
             wrench += Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z);
-            // What is not pressed does not hold.
-            if response.normal.value() > 0.0 {
-                let depth = -contact.gap.plus(-cutoff);
-                brush.add(&across, response.normal, depth, bristles.rate(&slip, &bent), bristles);
+            // By depth, which ends smoothly where a contact does; the force of a damper may end before.
+            let depth = -contact.gap.plus(-cutoff);
+            if depth.value() > 0.0 {
+                let weight = depth.times(contact.area);
+                fit.add(&across, weight, depth, bristles.rate(&slip, &deflected));
             }
         });
-        let rate = brush.rate(&deflection, bristles);
+        let rate = fit.rate(&deflection, bristles);
         let failed = T::constant(f64::NAN);
         let all = |i: usize| if i < 6 { wrench[i] } else { rate[i - 6] };
         std::array::from_fn(|i| if sound { all(i) } else { failed })
@@ -106,13 +119,13 @@ impl BristleFunction<'_> {
 }
 
 impl Bristles {
-    /// u' of bristles that are `bent` by u and slip.
-    fn rate<T: Scalar>(&self, slip: &Vector3<T>, bent: &Vector3<T>) -> Vector3<T> {
-        let (s2, u2) = (slip.dot(slip), bent.dot(bent));
+    /// u' of bristles deflected by u and slip.
+    fn rate<T: Scalar>(&self, slip: &Vector3<T>, deflected: &Vector3<T>) -> Vector3<T> {
+        let (s2, u2) = (slip.dot(slip), deflected.dot(deflected));
         let squares = s2.plus(self.slip_speed.powi(2));
         let follow = T::constant(self.slip_speed) / squares.sqrt();
         let yields = (s2 / squares * u2 * u2).times(self.slip_speed / self.deflection.powi(5));
-        slip * follow - bent * yields
+        slip * follow - deflected * yields
     }
 }
 
@@ -124,43 +137,36 @@ fn across<T: Scalar>(normal: &Vector3<T>, lever: &Vector3<T>) -> Matrix3x6<T> {
     Matrix3x6::from_columns(&columns.map(|v| v - normal * normal.dot(&v)))
 }
 
-/// The bristles of all samples: equations for the one deflection that follows them best.
-struct Brush<T: Scalar> {
+/// The least-squares fit of one rate of the deflection to the rates at all samples.
+struct RateFit<T: Scalar> {
     normal: Matrix6<T>,
     right: Vector6<T>,
-    /// Sums of forces \[N\], and of forces that have taken hold.
-    force: T,
-    held: T,
+    /// Sums of weights, and of depths by their weight.
+    weight: T,
+    depth: T,
 }
 
-impl<T: Scalar> Default for Brush<T> {
+impl<T: Scalar> Default for RateFit<T> {
     fn default() -> Self {
-        let (normal, right) = (Matrix6::zeros(), Vector6::zeros());
-        Self { normal, right, force: T::zero(), held: T::zero() }
+        let (normal, right, zero) = (Matrix6::zeros(), Vector6::zeros(), T::zero());
+        Self { normal, right, weight: zero, depth: zero }
     }
 }
 
-impl<T: Scalar> Brush<T> {
-    fn add(
-        &mut self,
-        across: &Matrix3x6<T>,
-        force: T,
-        depth: T,
-        rate: Vector3<T>,
-        Bristles { deflection, .. }: Bristles,
-    ) {
-        let weighted = across.transpose() * force;
+impl<T: Scalar> RateFit<T> {
+    fn add(&mut self, across: &Matrix3x6<T>, weight: T, depth: T, rate: Vector3<T>) {
+        let weighted = across.transpose() * weight;
         self.normal += weighted * across;
         self.right += weighted * rate;
-        self.force += force;
-        self.held += force * depth / depth.plus(TAKE_HOLD * deflection);
+        self.weight += weight;
+        self.depth += weight * depth;
     }
 
     /// ζ'.
     fn rate(self, deflection: &Vector6<T>, bristles: Bristles) -> Vector6<T> {
         let returning =
             |x: &Vector6<T>| x.map(|x| x.times(bristles.slip_speed / bristles.deflection));
-        if self.force.value() <= 0.0 {
+        if self.weight.value() <= 0.0 {
             return -returning(deflection);
         }
         // A turn by one counts as the lever of the mean contact, or as a micrometer if that is at the center of mass.
@@ -174,10 +180,17 @@ impl<T: Scalar> Brush<T> {
         let Some(factors) = (self.normal + Matrix6::from_diagonal(&ground)).cholesky() else {
             return Vector6::repeat(T::constant(f64::NAN));
         };
-        // What no contact holds returns to zero.
+        // What no contact holds returns to zero, and everything where contacts end.
         let free = |x: &Vector6<T>| factors.solve(&ground.component_mul(x));
-        factors.solve(&self.right) * (self.held / self.force)
-            - returning(&free(&free(&free(&free(deflection)))))
+        let free = free(&free(&free(&free(deflection))));
+        let depth = self.depth / self.weight;
+        let held = depth / depth.plus(TAKE_HOLD * bristles.deflection);
+        let part = depth.times(1.0 / (LET_GO * bristles.deflection));
+        let released = match part.value() < 1.0 {
+            true => part.times(2.0).plus(1.0) * part.plus(-1.0) * part.plus(-1.0),
+            false => T::zero(),
+        };
+        factors.solve(&self.right) * held - returning(&(free + (deflection - free) * released))
     }
 }
 

@@ -12,6 +12,9 @@ use crate::surface::{Block, Surface, SurfacePoint};
 /// Below this length a distance gradient has no direction, and the point no contact.
 const MIN_GRADIENT: f64 = 1e-9;
 
+/// Cosine of the angle from which on two normals are those of opposite sides.
+const OPPOSITE: f64 = -0.5;
+
 /// A body's surface beside a distance field, at one moment; everything in the field's frame.
 #[derive(Clone, Copy)]
 pub struct Patch<'a> {
@@ -83,6 +86,23 @@ impl Patch<'_> {
             let near = |point: &SurfacePoint| self.distance_within(&point.position, reach);
             self.may_touch(block, reach) && points.iter().any(near)
         })
+    }
+
+    /// Whether a touching sample has come to another side of the field since its body was in `before`: not out of the solid again
+    /// but through the middle of it.
+    pub(crate) fn has_crossed(&self, before: State) -> bool {
+        let reach = self.surface.rounding();
+        let earlier = Self { state: before, ..*self };
+        let crosses = |point: &SurfacePoint| {
+            let [from, to] = [&earlier, self].map(|patch| {
+                let sample = patch.field.sample(&patch.place(&point.position), reach)?;
+                Some(sample.gradient)
+            });
+            from.zip(to)
+                .is_some_and(|(from, to)| from.dot(&to) < OPPOSITE * from.norm() * to.norm())
+        };
+        let mut touched = self.surface.blocks().filter(|(block, _)| self.may_touch(block, reach));
+        touched.any(|(_, points)| points.iter().any(crosses))
     }
 
     /// Calls `visit` with gap \[m\] and area \[m²\] of every sample that a law that reaches to `cutoff` may push.

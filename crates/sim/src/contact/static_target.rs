@@ -8,7 +8,7 @@ use super::range::ParameterRange;
 /// The coefficient of restitution that `from_target` of a law takes is that of an impact without gravity
 /// ([`restitution`](crate::contact::restitution)). Under gravity it holds for impacts far faster than √(g δ) for the depth δ at
 /// rest; slower ones bounce less, and at last not at all. Fast ones go deep ([`StaticContactTarget::impact_depth`]): a field
-/// must have that depth to give.
+/// must have that depth to give, and a corner, whose area is small, goes several times as deep as all of the area together.
 ///
 /// ```
 /// use prehend_sim::{KelvinVoigt, StaticContactTarget};

@@ -7,6 +7,8 @@ mod touch_time;
 mod travel;
 
 use prehend_autodiff::Scalar;
+#[cfg(doc)]
+use prehend_geometry::DistanceField;
 
 use super::Integrator;
 use super::runge_kutta::dormand_prince;
@@ -24,13 +26,15 @@ use planner::Planner;
 /// within it; the sensitivity says so. Both estimates hold across kinks, such as the onset of a contact that is shorter than
 /// the part or a damper that stops pulling, so that parts shrink until what is left of the kink is tolerated.
 ///
-/// Through a bounce of a ball that would rest 0.5 mm, 50 µm or 5 µm deep, derivatives are within 0.02 % of converged ones;
+/// Through a bounce of a ball that would rest 0.5 mm, 50 µm or 5 µm deep, derivatives are within 0.05 % of converged ones;
 /// `cargo test -p prehend-sim --test defaults -- --nocapture` prints how near they are, there and in other scenes. A chain of
 /// impacts multiplies errors as it does all else. For tighter ones set both tolerances: that of the states alone is not one of
 /// their derivatives.
 ///
-/// Parts end where samples touch or let go of a contact without smoothing, and are never so long that a contact could be
-/// passed over: no sample moves by more than its clearance and a fiftieth of its body's size. Trajectories of driven bodies are
+/// Parts end where samples touch or let go of a contact without smoothing. None is so long that a contact could be passed over: no
+/// sample moves by more than its clearance and either a fiftieth of its body's size or a quarter of the thickness of what it
+/// touches ([`DistanceField::thickness`]), whichever is less. What is pressed past the middle of a
+/// thin body is an error ([`SimulationError::PassedThrough`]). Trajectories of driven bodies are
 /// looked at every millisecond for that; what one does and undoes within a millisecond may be missed.
 ///
 /// Contacts that leak in the first step of a rollout ([`LeakSteps::First`](crate::LeakSteps::First)) leak in its first
@@ -59,14 +63,32 @@ use planner::Planner;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Adaptive {
-    /// Error of a part of a step: of positions in multiples of the body's radius of gyration, of velocities in multiples of the
-    /// body's speed and of the speed of a fall through that radius.
+    /// Error of a part of a step, the largest of δx/r, δφ, δv/u and r δω/u over the bodies, with the errors of position, rotation,
+    /// velocity and angular velocity, the body's radius of gyration r and u = v + √(a r) + v_max/10 for its speed v (that of its
+    /// points within r), its acceleration a without contacts, and the fastest body's speed v_max. Positive.
     pub tolerance: f64,
-    /// Error of the sensitivity in a part of a step, in the same units: that of velocities relative to the largest of them, or to a
-    /// tenth of the largest component if that is more, that of positions relative to the largest component.
+    /// Error of the sensitivity in a part of a step, in the same units: that of positions relative to the sensitivity's largest
+    /// component S, that of velocities relative to the largest of these, or to S/10 if that is more. Positive. A kink that no part is
+    /// too short for may be off by 10⁻³.
     pub sensitivity_tolerance: f64,
     /// Parts of a step at most.
     pub max_parts: usize,
+}
+
+impl Adaptive {
+    fn check(&self) -> Result<(), SimulationError> {
+        let settings = [
+            ("Adaptive::tolerance", self.tolerance),
+            ("Adaptive::sensitivity_tolerance", self.sensitivity_tolerance),
+        ];
+        let positive = |value: f64| value > 0.0 && value.is_finite();
+        match settings.into_iter().find(|(_, value)| !positive(*value)) {
+            Some((setting, value)) => {
+                Err(SimulationError::Setting { setting, range: "positive and finite", value })
+            }
+            None => Ok(()),
+        }
+    }
 }
 
 impl Default for Adaptive {
@@ -78,7 +100,7 @@ impl Default for Adaptive {
 
 impl Integrator for Adaptive {
     /// # Errors
-    /// If a contact's force jumps at touch and derivatives are asked for; where steps would have to be too short or too
+    /// If a tolerance is not positive; if a contact's force jumps at touch and derivatives are asked for; where steps would have to be too short or too
     /// many; where a state stops being finite.
     fn step<S: Scalar>(
         &self,
@@ -86,6 +108,7 @@ impl Integrator for Adaptive {
         states: &[State<S>],
         step: Step,
     ) -> Result<Vec<State<S>>, SimulationError> {
+        self.check()?;
         if S::ORDER > 0 {
             self.check_differentiable(world)?;
         }

@@ -21,6 +21,9 @@ use crate::world::World;
 /// derivative of a step is that of the solution, by the implicit function theorem (D. Baraff, A. Witkin, "Large steps in
 /// cloth simulation", 1998; E. Hairer, G. Wanner, "Solving ordinary differential equations II", IV.8).
 ///
+/// The deflections of contacts that stick ([`Bristles`](crate::Bristles)) follow explicitly: steps should not be longer than u_b/(2
+/// v_b), which is 1 ms for [`Sticking`](crate::Sticking) of 0.1 mm and a slip scale of 1 cm/s.
+///
 /// # Errors
 /// A force that jumps, as that of a damped contact does without smoothing, may leave the equations of an impact without a
 /// solution: [`SimulationError::Unsolved`]. [`SubStepped`](crate::SubStepped) then tries shorter steps; a softplus

@@ -93,7 +93,15 @@ impl<I: Integrator> Integrator for SubStepped<I> {
         let max_substeps = self.max_substeps.max(1);
         if needed.is_nan() || needed > max_substeps as f64 {
             let (step, time) = (step.index, step.start);
-            return Err(SimulationError::SubSteps { step, time, needed, max_substeps });
+            let (body, contact) = world.most_accelerated(states);
+            return Err(SimulationError::SubSteps {
+                step,
+                time,
+                body,
+                contact,
+                needed,
+                max_substeps,
+            });
         }
         let mut parts = needed as usize;
         loop {
@@ -111,6 +119,10 @@ impl<I: Integrator> Integrator for SubStepped<I> {
 
     fn check_differentiable<S: Scalar>(&self, world: &World<S>) -> Result<(), SimulationError> {
         self.integrator.check_differentiable(world)
+    }
+
+    fn controls_error(&self) -> bool {
+        self.integrator.controls_error()
     }
 
     fn stability_limit(&self) -> f64 {
@@ -148,6 +160,8 @@ mod tests {
             SimulationError::SubSteps {
                 step: 2,
                 time: 0.02,
+                body: "egg".to_owned(),
+                contact: Some("ground".to_owned()),
                 needed: impact,
                 max_substeps: impact as usize - 1
             }

@@ -5,7 +5,7 @@ use prehend_autodiff::check::finite_difference_jacobian;
 use prehend_autodiff::{Fwd, Scalar};
 use prehend_geometry::SplitMix64;
 
-use super::{AREA, DEPTH, Finding, Probe, Verdict};
+use super::{AREA, DEPTH, Finding, PointContact, Verdict};
 use crate::contact::point::{Contact, Response};
 
 /// Contacts that are tried.
@@ -22,34 +22,35 @@ const ROUNDING: f64 = 1e-14;
 const AT_KINKS: f64 = 0.02;
 
 /// The derivatives by gap, normal speed and slip; then by the parameters.
-pub(super) fn findings(probe: &Probe<'_>) -> Vec<Finding> {
+pub(super) fn findings(contact_point: &PointContact<'_>) -> Vec<Finding> {
     let mut random = SplitMix64::new(1);
     let (mut by_inputs, mut by_parameters, mut finite) = (Vec::new(), Vec::new(), true);
     for _ in 0..CONTACTS {
         let mut spread = || 2.0 * random.uniform() - 1.0;
         let at = [
-            probe.law.reach() - DEPTH * (1.0 + 0.9 * spread()),
+            contact_point.law.reach() - DEPTH * (1.0 + 0.9 * spread()),
             0.5 * spread(),
             0.2 * spread(),
             0.2 * spread(),
         ];
-        let p = probe.law.params();
-        let exact = lifted(probe, &at, p, None);
-        let moved = |change: &[f64]| force(probe, &std::array::from_fn(|i| at[i] + change[i]), p);
+        let p = contact_point.law.params();
+        let exact = lifted(contact_point, &at, p, None);
+        let moved =
+            |change: &[f64]| force(contact_point, &std::array::from_fn(|i| at[i] + change[i]), p);
         by_inputs.push(differs(&exact, moved, &STEPS));
         finite &= exact.as_flattened().iter().all(|x| x.is_finite());
         for (k, value) in p.iter().enumerate() {
             let moved = |change: &[f64]| {
                 let mut changed = p.to_vec();
                 changed[k] += change[0];
-                force(probe, &at, &changed)
+                force(contact_point, &at, &changed)
             };
             let step = PARAMETER_STEP * value.abs().max(1e-3);
-            by_parameters.push(differs(&lifted(probe, &at, p, Some(k)), moved, &[step]));
+            by_parameters.push(differs(&lifted(contact_point, &at, p, Some(k)), moved, &[step]));
         }
     }
-    let rest = [probe.law.reach() - DEPTH, 0.0, 0.0, 0.0];
-    let at_rest = lifted(probe, &rest, probe.law.params(), None);
+    let rest = [contact_point.law.reach() - DEPTH, 0.0, 0.0, 0.0];
+    let at_rest = lifted(contact_point, &rest, contact_point.law.params(), None);
     finite &= at_rest.as_flattened().iter().all(|x| x.is_finite());
     let finding = |what: &str, wrong: &[bool]| {
         let share = wrong.iter().filter(|wrong| **wrong).count() as f64 / wrong.len() as f64;
@@ -79,13 +80,18 @@ fn contact<S: Scalar>([gap, normal_speed, x, y]: [S; 4]) -> Contact<S> {
     Contact { gap, normal_speed, slip, normal, area: AREA }
 }
 
-fn force(probe: &Probe<'_>, at: &[f64; 4], p: &[f64]) -> [f64; 3] {
-    let Response { normal, tangential } = probe.law.response(p, &contact(*at));
+fn force(contact_point: &PointContact<'_>, at: &[f64; 4], p: &[f64]) -> [f64; 3] {
+    let Response { normal, tangential } = contact_point.law.response(p, &contact(*at));
     [normal, tangential.x, tangential.y]
 }
 
 /// Derivatives of the force by the four inputs, or first by a parameter, in forward mode.
-fn lifted(probe: &Probe<'_>, at: &[f64; 4], p: &[f64], parameter: Option<usize>) -> [[f64; 3]; 4] {
+fn lifted(
+    contact_point: &PointContact<'_>,
+    at: &[f64; 4],
+    p: &[f64],
+    parameter: Option<usize>,
+) -> [[f64; 3]; 4] {
     let seed = |(k, &p): (usize, &f64)| match parameter == Some(k) {
         true => Fwd::<6>::variable(p, 0),
         false => Fwd::constant(p),
@@ -96,7 +102,7 @@ fn lifted(probe: &Probe<'_>, at: &[f64; 4], p: &[f64], parameter: Option<usize>)
         None => Fwd::variable(at[i], i),
     });
     let Response { normal, tangential } =
-        probe.law.response_with_derivative(&params, &contact(inputs));
+        contact_point.law.response_with_derivative(&params, &contact(inputs));
     let force = [normal, tangential.x, tangential.y];
     std::array::from_fn(|i| force.map(|f| f.derivative[i]))
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::{DEPTH, Finding, Probe, Verdict};
+use super::{DEPTH, Finding, PointContact, Verdict};
 
 /// Steps of a cycle.
 const STEPS: usize = 4000;
@@ -11,9 +11,9 @@ const ROUNDING: f64 = 1e-6;
 
 /// The work of a law's force over closed cycles: in and out of contact, and in circles across it while pressing harder and less.
 /// `weight` is the force \[N\] at rest.
-pub(super) fn findings(probe: &Probe<'_>, weight: f64) -> Vec<Finding> {
+pub(super) fn findings(contact_point: &PointContact<'_>, weight: f64) -> Vec<Finding> {
     let cycle = |what: &str, rate: f64, slip: f64, deep: f64| {
-        let work = work(probe, rate, slip, deep);
+        let work = work(contact_point, rate, slip, deep);
         Finding {
             what: format!("work over a cycle, {what}, {rate} Hz [J]"),
             measured: work,
@@ -31,7 +31,7 @@ pub(super) fn findings(probe: &Probe<'_>, weight: f64) -> Vec<Finding> {
 
 /// Work \[J\] of the force on a body that moves at `rate` \[Hz\] in a circle of radius `slip` \[m\] across the normal while its depth
 /// swings by `swing` times half a millimeter about that depth.
-fn work(probe: &Probe<'_>, rate: f64, slip: f64, swing: f64) -> f64 {
+fn work(contact_point: &PointContact<'_>, rate: f64, slip: f64, swing: f64) -> f64 {
     let turn = std::f64::consts::TAU * rate;
     // A little more, so that it leaves the contact.
     let swing = (1.0 + 1e-3) * swing;
@@ -43,7 +43,7 @@ fn work(probe: &Probe<'_>, rate: f64, slip: f64, swing: f64) -> f64 {
         // Sinking in is approach: negative.
         let normal_speed = -DEPTH * swing * turn * sin;
         let velocity = Vector3::new(-sin, cos, 0.0) * (slip * turn);
-        let force = probe.response(depth, normal_speed, velocity);
+        let force = contact_point.response(depth, normal_speed, velocity);
         force.normal * normal_speed + force.tangential.dot(&velocity)
     };
     (0..STEPS).map(power).sum::<f64>() * dt

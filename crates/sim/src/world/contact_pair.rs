@@ -74,28 +74,8 @@ impl<S: Scalar> ContactPair<S> {
         &mut self.params
     }
 
-    /// The parameter called `name`, such as `"friction"`, to be changed.
-    ///
-    /// ```
-    /// # use std::sync::Arc;
-    /// # use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
-    /// use prehend_autodiff::Fwd;
-    /// # use prehend_sim::*;
-    ///
-    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-    /// # let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-    /// # let floor = world.add(Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor())));
-    /// # let ball = Body::free("ball", RigidBody::ball(0.1, 0.03)?);
-    /// # let ball = world.add(ball.with_surface(Surface::ball(0.03)?));
-    /// # let spring = HuntCrossley { stiffness: 1e7, damping: 0.1, exponent: 1.0 };
-    /// # let law = Arc::new(Law::new(spring, Coulomb { friction: 0.5, slip_scale: 1e-2 })?);
-    /// # world.add_contact(ContactBodies { samples: ball, field: floor }, law, GapSmoothing::Hard)?;
-    /// let mut lifted = world.lift::<Fwd<1>>();
-    /// *lifted.contacts[0].param_mut("friction")? = Fwd::variable(0.4, 0);
-    /// # assert_eq!(lifted.contacts[0].params()[3].value, 0.4);
-    /// # Ok(())
-    /// # }
-    /// ```
+    /// The parameter called `name`, such as `"friction"`, to be changed; that of all contacts between two bodies is set by
+    /// [`World::set_contact_param`](crate::World::set_contact_param).
     ///
     /// # Errors
     /// [`LawError::NoParameter`] with the names that there are, if there is none of that name.
@@ -127,6 +107,9 @@ impl<S: Scalar> ContactPair<S> {
         let values: Vec<f64> = self.params.iter().map(|p| p.value()).collect();
         if let Some(&value) = values.iter().find(|value| !value.is_finite()) {
             return Err(LawError::Range { name: "parameter of a contact", range: "finite", value });
+        }
+        if let Some(bristles) = self.law.bristles() {
+            bristles.check()?;
         }
         self.law.check(&values)
     }

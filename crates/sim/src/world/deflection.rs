@@ -10,6 +10,7 @@ use super::World;
 use super::contact_pair::ContactPair;
 use crate::contact::bristles::Bristles;
 use crate::contact::wrench::stack;
+use crate::error::SimulationError;
 use crate::state::State;
 
 impl<S: Scalar> State<S> {
@@ -41,6 +42,12 @@ impl<S: Scalar> World<S> {
     /// How many states there are.
     pub(crate) fn state_count(&self) -> usize {
         self.bodies.len() + self.sticking().count()
+    }
+
+    /// The error of as many `states`.
+    pub(crate) fn wrong_count(&self, states: usize) -> SimulationError {
+        let (bodies, sticking) = (self.bodies.len(), self.sticking().count());
+        SimulationError::States { states, bodies, sticking }
     }
 
     /// `states` with those of contacts that stick, not deflected if they are missing.

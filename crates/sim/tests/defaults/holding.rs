@@ -2,13 +2,16 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::{Isometry3, Point3, Vector3};
+use prehend_autodiff::Fwd;
 use prehend_sim::{
-    Adaptive, Body, BodyId, ContactBodies, Coulomb, Cuboid, DynContactLaw, HalfSpace, KelvinVoigt,
-    Law, RigidBody, State, Sticking, TimeSteps, World,
+    Adaptive, Body, BodyId, Bounce, ContactBodies, Coulomb, Cuboid, DynContactLaw, GapSmoothing,
+    HalfSpace, HuntCrossley, KelvinVoigt, Law, RigidBody, State, StaticContactTarget, Sticking,
+    TimeSteps, World,
 };
 
-use crate::scenes::{SMOOTH, corners, down};
+use crate::CONVERGED;
+use crate::scenes::{SMOOTH, body, corners, down, on, state};
 
 /// Half of an edge of every box, and the radius of its edges \[m\].
 const HALF: f64 = 0.02;
@@ -70,6 +73,48 @@ fn a_stack_of_three_boxes_stays() {
     let moved = creep(&world, &start, &stack[1..]);
     println!("a stack of three boxes creeps by {:.1e} mm in 10 s", 1e3 * moved);
     assert!(moved < 1e-5);
+}
+
+/// A point of 0.2 kg just above the floor, moving along it and down, on which `Sticking` has a deflection of 0.1 mm.
+fn skipping(smoothing: GapSmoothing) -> (World, Vec<State>) {
+    let target =
+        StaticContactTarget { mass: 0.2, gravity: 9.81, penetration: 1e-5, contact_area: 4e-4 };
+    let bounce = Bounce { restitution: 0.8, impact_speed: 0.05 };
+    let normal = HuntCrossley::from_target(&target, 1.5, bounce).unwrap();
+    let friction = Coulomb { friction: 0.5, slip_scale: 1e-2 };
+    let friction = Sticking { friction, deflection: 1e-4 };
+    let point = body("point", 0.2, 1e-5, &[Point3::origin()], 4e-4);
+    let start = state(Isometry3::translation(0.0, 0.0, 1e-4), [0.05, 0.0, -0.05], [0.0; 3]);
+    let law = Arc::new(Law::new(normal, friction).unwrap());
+    on(HalfSpace::floor(), down(), point, (law, smoothing), start)
+}
+
+#[test]
+fn derivatives_hold_where_contacts_that_stick_begin_and_end() {
+    for smoothing in [GapSmoothing::Hard, SMOOTH] {
+        let (world, start) = skipping(smoothing);
+        for time in [0.02, 0.03, 0.05] {
+            let once = TimeSteps { dt: time, steps: 1 };
+            let slides = |speed: f64, integrator: &Adaptive| {
+                let mut start = start.clone();
+                start[1].linear.z = speed;
+                let run = world.simulate_with(integrator, &start, once, |_, _| ()).unwrap();
+                [run.states[1].linear.x, run.states[2].linear.x]
+            };
+            let mut lifted: Vec<State<Fwd<1>>> = start.iter().map(State::lift).collect();
+            lifted[1].linear.z = Fwd::variable(-0.05, 0);
+            let end = world.lift().simulate(&lifted, time).unwrap();
+            let [low, high] = [-1e-6, 1e-6].map(|h| slides(-0.05 + h, &CONVERGED));
+            for (k, found) in [end[1].linear.x, end[2].linear.x].into_iter().enumerate() {
+                let (found, expected) = (found.derivative[0], (high[k] - low[k]) / 2e-6);
+                // Of velocities, and of a deflection after 1 ms of contact.
+                let unit = [1.0, 1e-3][k];
+                let off = (found - expected).abs();
+                println!("{smoothing:?} {time} s: {found:.6} {expected:.6}");
+                assert!(off < 1e-2 * expected.abs().max(1e-2 * unit), "{found} {expected}");
+            }
+        }
+    }
 }
 
 #[test]

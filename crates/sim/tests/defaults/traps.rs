@@ -4,10 +4,11 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Vector3};
-use prehend_autodiff::Recording;
+use prehend_autodiff::{Recording, Scalar};
 use prehend_sim::{
-    Adaptive, Body, ContactBodies, GapSmoothing, HalfSpace, RungeKutta4, SemiImplicitEuler,
-    SimulationError, Sphere, State, StepCheckpointed, Surface, TimeSteps, World,
+    Adaptive, Body, Contact, ContactBodies, ContactLaw, Cuboid, DynContactLaw, GapSmoothing,
+    HalfSpace, Response, RungeKutta4, SemiImplicitEuler, SimulationError, Sphere, State,
+    StepCheckpointed, Surface, TimeSteps, World,
 };
 
 use crate::scenes::{
@@ -104,6 +105,102 @@ fn what_is_pushed_does_not_pass_through() {
         let reached = end.pose.translation.vector;
         assert!(reached.x < ball.center.x || reached.y > 0.01, "{place}: {reached:?}");
     }
+}
+
+#[test]
+fn thin_bodies_are_not_passed_over() {
+    let down_at = |place: f64| state(at(0.0, 0.0, 0.2 + place), [0.0; 3], [0.0; 3]);
+    let stiff = || (hunt_crossley(5e4, 0.3, 1e-2), HARD);
+    let wall = |half: f64| Cuboid { half_extents: Vector3::new(0.5, 0.5, half), rounding: 1e-4 };
+    let plate: Vec<Point3<f64>> = (0..25)
+        .map(|i| Point3::new(0.2 * f64::from(i % 5) - 0.4, 0.2 * f64::from(i / 5) - 0.4, 0.0))
+        .collect();
+    let plate = body("plate", 1.0, 0.1, &plate, 4e-4);
+    let pin = Sphere { center: Point3::origin(), radius: 4e-3 };
+    for place in (0..20).map(|i| 1e-3 * f64::from(i)) {
+        let fallen = |(mut world, mut start): (World, Vec<State>)| {
+            world.gravity = Vector3::zeros();
+            start[1].linear.z = -1.0;
+            world.simulate(&start, 0.5).unwrap()[1].linear.z
+        };
+        for half in [2.5e-4, 1e-3] {
+            let rises = fallen(on(wall(half), down(), cube(), stiff(), down_at(place)));
+            assert!(rises > 0.0, "a wall of {half} m, from {place} m: {rises}");
+        }
+        let rises = fallen(on(pin, down(), plate.clone(), stiff(), down_at(place)));
+        assert!(rises > 0.0, "a pin, from {place} m: {rises}");
+    }
+}
+
+#[test]
+fn what_contacts_cannot_stop_is_told_to_pass_through() {
+    let ball = |radius: f64| {
+        let surface = Surface::uniform(&[Point3::origin()], 1e-4).unwrap().rounded(radius);
+        body("ball", 0.01, 4e-7, &[Point3::origin()], 1e-4).with_surface(surface.unwrap())
+    };
+    let plate = Cuboid { half_extents: Vector3::new(0.1, 0.1, 5e-3), rounding: 1e-3 };
+    for (radius, speed, passes) in
+        [(0.0, 0.3, false), (0.0, 10.0, true), (0.01, 1.0, false), (0.01, 20.0, true)]
+    {
+        let start = state(at(0.0, 0.0, 0.1), [0.0, 0.0, -speed], [0.0; 3]);
+        let (world, start) =
+            on(plate, down(), ball(radius), (kelvin_voigt(0.3, 1e-2), SMOOTH), start);
+        let run = world.simulate(&start, 0.2);
+        match passes {
+            false => assert!(run.unwrap()[1].pose.translation.z > 0.0),
+            true => assert!(
+                matches!(run, Err(SimulationError::PassedThrough { contact, .. }) if contact == "ground")
+            ),
+        }
+    }
+}
+
+/// Friction that drives.
+struct Belt([f64; 2]);
+
+impl ContactLaw for Belt {
+    fn params(&self) -> &[f64] {
+        &self.0
+    }
+    fn law<S: Scalar>(&self, p: &[S], contact: &Contact<S>) -> Response<S> {
+        let normal = (-p[0] * contact.gap).times(contact.area);
+        Response { normal, tangential: contact.slip * (p[1] * normal) }
+    }
+    fn reach(&self) -> f64 {
+        0.0
+    }
+}
+
+#[test]
+fn energy_from_nowhere_is_an_error_by_default() {
+    let start = state(at(0.0, 0.0, -2.5e-4), [0.1, 0.0, 0.0], [0.0; 3]);
+    let law = (Arc::new(Belt([1e7, 0.5])) as Arc<dyn DynContactLaw>, HARD);
+    let (world, start) = on(HalfSpace::floor(), down(), pebble(), law, start);
+    let made = |error| matches!(error, SimulationError::Energy { .. });
+    assert!(made(world.simulate(&start, 1.0).unwrap_err()));
+    assert!(made(world.rollout(&start, TimeSteps { dt: 0.1, steps: 10 }).unwrap_err()));
+}
+
+#[test]
+fn bad_settings_and_bad_states_are_told_as_such() {
+    let start = state(at(0.0, 0.0, 0.1), [0.0; 3], [0.0; 3]);
+    let (world, start) =
+        on(HalfSpace::floor(), down(), pebble(), (hunt_crossley(0.1, 0.3, 1e-2), HARD), start);
+    let once = TimeSteps { dt: 0.1, steps: 1 };
+    for value in [0.0, -1e-6, f64::NAN, f64::INFINITY] {
+        let loose = Adaptive { sensitivity_tolerance: value, ..Adaptive::default() };
+        let refused = world.simulate_with(&loose, &start, once, |_, _| ()).unwrap_err();
+        let refused = refused.to_string();
+        assert!(
+            refused.starts_with("Adaptive::sensitivity_tolerance must be positive"),
+            "{refused}"
+        );
+    }
+    let mut lost = start.clone();
+    lost[1].linear.x = f64::NAN;
+    let step = prehend_sim::Step::new(15, 0.1);
+    let refused = world.step(&Adaptive::default(), &lost, step).unwrap_err();
+    assert!(matches!(refused, SimulationError::NotFinite { time, .. } if time == 1.5));
 }
 
 #[test]

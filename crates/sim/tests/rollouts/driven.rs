@@ -75,7 +75,7 @@ fn check(integrator: &impl Integrator, tight: &impl Integrator, dt: f64, toleran
     let end = pushed(integrator, dt, &Fwd::<4>::variables([0.0; 4]));
     assert!(end[0].value > 5e-3 && end[5].value.abs() > 1e-2, "{end:?}");
     let exact: Vec<[f64; 4]> = end.iter().map(|x| x.derivative).collect();
-    let differences = finite_difference_jacobian(|x| pushed(tight, dt, x), &[0.0; 4], 1e-4);
+    let differences = finite_difference_jacobian(|x| pushed(tight, dt, x), &[0.0; 4], 1e-5);
     let largest = |rows: std::ops::Range<usize>| {
         exact[rows].as_flattened().iter().fold(0.0, |a: f64, x| a.max(x.abs()))
     };

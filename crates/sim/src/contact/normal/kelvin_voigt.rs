@@ -12,7 +12,7 @@ use crate::contact::static_target::StaticContactTarget;
 law_part! {
     /// Spring and damper per area, clamped so that contact never pulls: f_n = A·max(0, −K g − D ġ) for g ≤ 0.
     ///
-    /// Per area, so that forces do not depend on how many samples a surface carries. Contact ends while the body is
+    /// Per area, so that forces of a face do not depend on how many samples it carries. Contact ends while the body is
     /// still inside, which is where the clamped formula of [`restitution`](crate::contact::restitution::restitution)
     /// comes from; [`ApproachDamped`](super::approach_damped::ApproachDamped) bounces more for the same damping.
     pub struct KelvinVoigt: "linear spring and damper that never pull" {

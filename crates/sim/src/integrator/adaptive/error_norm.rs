@@ -20,8 +20,9 @@ const SLOWEST: f64 = 1e-9;
 
 /// Part of the largest sensitivity that those of velocities are compared with at least.
 const SMALL: f64 = 0.1;
-/// Error of the sensitivity in a part that cannot be shorter, because of a kink.
-const SHARPEST_KINK: f64 = 1e-6;
+/// Error of the sensitivity in a part that cannot be shorter, because of a kink: next to nothing beside what follows, where the kink
+/// is the onset of a contact that stiff.
+const SHARPEST_KINK: f64 = 1e-3;
 
 /// How far off a part is: its states, and its sensitivity relative to that.
 pub(super) struct Errors {
@@ -68,7 +69,7 @@ impl Scale {
     }
 }
 
-/// The larger of two numbers, and what is no number rather than either.
+/// The larger of two numbers; NaN if one of them is.
 fn max_or_nan(a: f64, b: f64) -> f64 {
     if a > b || a.is_nan() { a } else { b }
 }
@@ -141,12 +142,11 @@ impl ErrorNorm {
                 slope = larger(slope, scale.sensitivity(state, speed));
             }
         }
-        // Its rate jumps as a contact begins, but then it carries nothing: what it does counts with the bodies.
         for (i, length) in (self.scales.len()..).zip(&self.deflections) {
             let largest = |[linear, angular, ..]: [f64; 4]| max_or_nan(linear / length, angular);
-            error = max_or_nan(error, largest(estimate.between_orders(i, value)));
+            error = max_or_nan(error, largest(estimate.across_kinks(i, value)));
             slope_error[0] =
-                max_or_nan(slope_error[0], largest(estimate.between_orders(i, derivative)));
+                max_or_nan(slope_error[0], largest(estimate.across_kinks(i, derivative)));
         }
         // Velocities decide what comes of an impact, even where a long flight has made positions the more sensitive.
         let whole = max_or_nan(slope[0], slope[1]);
@@ -157,7 +157,7 @@ impl ErrorNorm {
     }
 
     /// `errors` in multiples of what is tolerated.
-    pub(super) fn intolerable(&self, errors: &Errors) -> f64 {
+    pub(super) fn error_ratio(&self, errors: &Errors) -> f64 {
         let Errors { state, sensitivity } = errors;
         max_or_nan(state / self.tolerance, sensitivity / self.sensitivity_tolerance)
     }

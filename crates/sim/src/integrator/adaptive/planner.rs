@@ -129,15 +129,20 @@ impl Planner {
                 continue;
             }
             let errors = self.norm.errors(&self.states, &trial, &estimate);
-            let error = self.norm.intolerable(&errors);
+            let error = self.norm.error_ratio(&errors);
             let change =
                 if error.is_nan() { LENGTH_CHANGE[0] } else { SAFETY * error.powf(EXPONENT) };
             let chosen = dt * change.clamp(LENGTH_CHANGE[0], LENGTH_CHANGE[1]);
+            let end: Vec<State> = trial.end().iter().map(State::value).collect();
             if error <= 1.0 || (chosen <= shortest && self.norm.only_kinks(&errors)) {
                 self.parts += 1;
                 if self.parts > self.settings.max_parts {
                     let (max_parts, time) = (self.settings.max_parts, self.time);
-                    return Err(SimulationError::TooManyParts { max_parts, time });
+                    let (body, contact) = self.plain.most_accelerated(&values);
+                    return Err(SimulationError::TooManyParts { body, contact, max_parts, time });
+                }
+                if let Some(pair) = self.travel.crossed(&self.plain, &values, &end) {
+                    return Err(self.plain.passed_through(pair, self.time));
                 }
                 self.time = if dt == left { self.whole.end() } else { self.time + dt };
                 self.states = trial.stages.pop().unwrap_or_default();
@@ -148,7 +153,6 @@ impl Planner {
                 };
                 return Ok(Some(part));
             }
-            let end: Vec<State> = trial.end().iter().map(State::value).collect();
             if chosen <= shortest {
                 return Err(match end.iter().all(State::is_finite) {
                     true => self.plain.stalled(&values, self.time, dt),

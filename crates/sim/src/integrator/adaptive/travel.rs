@@ -10,6 +10,8 @@ use crate::world::contact_pair::ContactPair;
 
 /// Part of a body's size by which its samples may always move.
 const FREE_TRAVEL: f64 = 0.02;
+/// Part of the thickness of what they may touch by which they may move at most.
+const FREE_THICKNESS: f64 = 0.25;
 /// Part of that by which a trajectory may always deviate from uniform motion.
 const FREE_DEVIATION: f64 = 0.05;
 /// How often trajectories are looked at \[s\].
@@ -26,6 +28,8 @@ struct Limit {
     radius: f64,
     /// How far they may always move \[m\].
     free: f64,
+    /// Whether what they touch has an end.
+    thin: bool,
     /// Whether one of the bodies is on a trajectory.
     driven: bool,
 }
@@ -37,12 +41,15 @@ impl Travel {
                 [pair.bodies.samples, pair.bodies.field].map(|id| &world.bodies[id]);
             // Bodies that no force moves need not feel each other.
             body.rigid().or(other.rigid())?;
-            let radius = body.surface.as_ref()?.radius_about(&body.com());
+            let surface = body.surface.as_ref()?;
+            let radius = surface.radius_about(&body.com());
             let size = |body: &Body| body.rigid().map_or(0.0, RigidBody::gyration_radius);
             let own = radius.max(size(body));
+            let thickness = other.field.as_ref()?.thickness() + 2.0 * surface.rounding();
             let free = FREE_TRAVEL * if own > 0.0 { own } else { size(other) };
+            let free = free.min(FREE_THICKNESS * thickness);
             let driven = [body, other].iter().any(|body| matches!(body.motion, Motion::Driven(_)));
-            Some(Limit { radius, free, driven })
+            Some(Limit { radius, free, thin: thickness.is_finite(), driven })
         };
         Self(world.contacts.iter().map(limit).collect())
     }
@@ -82,6 +89,20 @@ impl Travel {
             }
         }
         dt
+    }
+
+    /// A contact whose samples have gone from `before` to `after` through the middle of what they touch.
+    pub(super) fn crossed<'a>(
+        &'a self,
+        world: &'a World,
+        before: &[State],
+        after: &[State],
+    ) -> Option<&'a ContactPair> {
+        let crossed = |(pair, limit): &(&ContactPair, &Limit)| {
+            let [from, to] = [before, after].map(|states| world.seen_value(pair, states));
+            limit.thin && world.patch(pair, to).is_some_and(|patch| patch.has_crossed(from))
+        };
+        self.limits(world).find(crossed).map(|(pair, _)| pair)
     }
 
     /// Whether a step of `dt` \[s\] from `states` through `stages` may have passed over a contact.
@@ -130,7 +151,7 @@ impl Limit {
             for body in [pair.bodies.samples, pair.bodies.field] {
                 let Motion::Driven(trajectory) = &world.bodies[body].motion else { continue };
                 there[body] = trajectory.state(time + elapsed);
-                uniform[body] = states[body].uniform(elapsed);
+                uniform[body] = states[body].drifted(elapsed);
             }
             let place = world.seen_value(pair, &there).pose;
             let from = [&uniform[..], states].map(|states| {

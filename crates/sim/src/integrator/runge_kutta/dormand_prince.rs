@@ -138,3 +138,46 @@ fn together<S: Scalar>(differences: &[Vec<Change<S>>], i: usize, part: fn(S) -> 
     let norms = differences.iter().map(|difference| norms(&difference[i], part));
     norms.fold([0.0; 4], |sum, norms| std::array::from_fn(|k| norms[k].hypot(sum[k])))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Σ w cᵏ over the stages.
+    fn moment(weights: &[f64], power: i32) -> f64 {
+        let nodes = [0.0].into_iter().chain(STAGES.map(|(fraction, _)| fraction));
+        nodes.zip(weights).map(|(c, w)| w * c.powi(power)).sum()
+    }
+
+    #[test]
+    fn weights_have_their_orders() {
+        for (fraction, weights) in STAGES {
+            assert!((moment(weights, 0) - fraction).abs() < 1e-14);
+        }
+        let (_, fifth) = STAGES[5];
+        for power in 0..5 {
+            assert!((moment(fifth, power) - 1.0 / f64::from(power + 1)).abs() < 1e-15);
+        }
+        for power in 0..4 {
+            assert!(moment(&ERROR, power).abs() < 1e-15);
+        }
+        assert!(moment(&ERROR, 4).abs() > 1e-4);
+        let orders = THIRD.iter().map(|weights| (weights, 3));
+        let orders = orders.chain(LOWER.iter().zip([2, 1]));
+        for (weights, order) in orders {
+            for power in 0..order {
+                assert!(moment(weights, power).abs() < 1e-15);
+            }
+            assert!(moment(weights, order).abs() > 1e-3);
+        }
+    }
+
+    #[test]
+    fn a_jump_between_stages_is_seen() {
+        let step = |weights: &[f64; 7]| weights[3..].iter().sum::<f64>();
+        let size = |all: &[[f64; 7]]| all.iter().map(|w| step(w).powi(2)).sum::<f64>().sqrt();
+        // A slope that is 0 up to 3/10 of the step and 1 from 4/5 on.
+        assert!(step(&ERROR).abs() < 5e-3);
+        assert!(size(&THIRD) > 0.3 && size(&LOWER) < size(&THIRD));
+    }
+}

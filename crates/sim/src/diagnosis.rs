@@ -1,4 +1,4 @@
-//! Who is to blame when a simulation cannot go on.
+//! Names body and contact for the errors of a simulation that cannot go on.
 
 use prehend_autodiff::Scalar;
 
@@ -30,6 +30,12 @@ impl<S: Scalar> World<S> {
 
     /// The error of steps from `states` at `time` \[s\] that even with `dt` \[s\] are too long.
     pub(crate) fn stalled(&self, states: &[State<S>], time: f64, dt: f64) -> SimulationError {
+        let (body, contact) = self.most_accelerated(states);
+        SimulationError::Stalled { body, contact, time, dt }
+    }
+
+    /// The name of the free body that contacts accelerate most, and of what presses hardest on it.
+    pub(crate) fn most_accelerated(&self, states: &[State<S>]) -> (String, Option<String>) {
         let acceleration = |body: &BodyId| {
             let mass =
                 self.bodies[*body].rigid().map_or(f64::INFINITY, |rigid| rigid.mass().value());
@@ -39,8 +45,14 @@ impl<S: Scalar> World<S> {
         let free = self.free_bodies();
         let hardest =
             free.iter().max_by(|a, b| acceleration(a).total_cmp(&acceleration(b))).copied();
-        let (body, contact) = self.names(states, hardest.unwrap_or(BodyId(0)));
-        SimulationError::Stalled { body, contact, time, dt }
+        self.names(states, hardest.unwrap_or(BodyId(0)))
+    }
+
+    /// The error of a contact of which one side has passed through the other at `time` \[s\].
+    pub(crate) fn passed_through(&self, pair: &ContactPair<S>, time: f64) -> SimulationError {
+        let [body, contact] =
+            [pair.bodies.samples, pair.bodies.field].map(|body| self.bodies[body].name.clone());
+        SimulationError::PassedThrough { body, contact, time }
     }
 
     /// The name of a body, and that of the one that presses hardest on it of those that may touch it.
