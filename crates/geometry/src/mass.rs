@@ -1,8 +1,9 @@
 //! Volume, mass, center and inertia of a solid given by its closed surface.
 
-use nalgebra::{Matrix3, Point3, Vector3};
+use nalgebra::{Matrix3, Point3};
 
 use crate::mesh::TriMesh;
+use crate::moments::Moments;
 use crate::topology::edges;
 
 /// Mass properties of a solid of uniform density, in the frame of its mesh.
@@ -47,9 +48,7 @@ pub enum MassError {
 
 /// Mass properties of the solid inside `mesh` at uniform `density` \[kg/m³\].
 ///
-/// Sums over the tetrahedra that the faces span with a reference point: volume det/6, first moment det/24 · s,
-/// second moment det/120 · (s sᵀ + Σ vᵢ vᵢᵀ), s = Σ vᵢ (the divergence theorem over polyhedra: Mirtich,
-/// "Fast and accurate computation of polyhedral mass properties", 1996). Overlapping components count twice.
+/// By [`Moments::enclosed`]. Overlapping components count twice.
 ///
 /// # Errors
 /// [`MassError`] where the mesh is open, encloses no volume or faces inward, or the density is not positive.
@@ -66,7 +65,7 @@ pub(crate) fn mass_of_closed(mesh: &TriMesh, density: f64) -> Result<MassPropert
     if !(density > 0.0 && density.is_finite()) {
         return Err(MassError::BadScale { what: "density", value: density });
     }
-    let (volume, first, second, origin) = moments(mesh);
+    let (Moments { volume, first, second }, origin) = moments(mesh);
     let extent = mesh.bounds().map_or(0.0, |(low, high)| (high - low).norm());
     if volume.is_nan() || volume <= 1e-12 * extent.powi(3) {
         return Err(MassError::NoVolume { volume });
@@ -96,31 +95,23 @@ pub(crate) fn closedness(mesh: &TriMesh) -> usize {
     if edges.is_empty() { 1 } else { edges.iter().filter(|e| !e.is_manifold()).count() }
 }
 
-/// Volume, first and second moments about the returned origin, which lies near the mesh for accuracy.
-fn moments(mesh: &TriMesh) -> (f64, Vector3<f64>, Matrix3<f64>, Point3<f64>) {
+/// The moments about the returned origin, which lies near the mesh for accuracy.
+fn moments(mesh: &TriMesh) -> (Moments, Point3<f64>) {
     let origin =
         mesh.bounds().map_or(Point3::origin(), |(low, high)| nalgebra::center(&low, &high));
-    let (mut volume, mut first, mut second) = (0.0, Vector3::zeros(), Matrix3::zeros());
-    for f in 0..mesh.faces.len() {
-        let corners = mesh.triangle(f).map(|p| p - origin);
-        let [a, b, c] = corners;
-        let det = a.dot(&b.cross(&c));
-        let sum = a + b + c;
-        volume += det / 6.0;
-        first += sum * (det / 24.0);
-        let squares = corners.iter().fold(sum * sum.transpose(), |m, v| m + v * v.transpose());
-        second += squares * (det / 120.0);
-    }
-    (volume, first, second, origin)
+    let corners = |f: usize| mesh.triangle(f).map(|p| Point3::from(p - origin));
+    (Moments::enclosed((0..mesh.faces.len()).map(corners)), origin)
 }
 
 /// Signed volume \[m³\]; meaningful for closed meshes only.
 pub(crate) fn signed_volume(mesh: &TriMesh) -> f64 {
-    moments(mesh).0
+    moments(mesh).0.volume
 }
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Vector3;
+
     use super::*;
     use crate::volume::tests::{cuboid, icosphere};
     use nalgebra::{Isometry3, UnitQuaternion};
