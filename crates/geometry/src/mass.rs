@@ -65,15 +65,14 @@ pub(crate) fn mass_of_closed(mesh: &TriMesh, density: f64) -> Result<MassPropert
     if !(density > 0.0 && density.is_finite()) {
         return Err(MassError::BadScale { what: "density", value: density });
     }
-    let (Moments { volume, first, second }, origin) = moments(mesh);
+    let (moments, origin) = moments(mesh);
+    let volume = moments.volume;
     let extent = mesh.bounds().map_or(0.0, |(low, high)| (high - low).norm());
     if volume.is_nan() || volume <= 1e-12 * extent.powi(3) {
         return Err(MassError::NoVolume { volume });
     }
-    let center = first / volume;
-    let covariance = (second - center * center.transpose() * volume) * density;
-    let inertia = Matrix3::identity() * covariance.trace() - covariance;
-    Ok(MassProperties { volume, mass: density * volume, center_of_mass: origin + center, inertia })
+    let (mass, center, inertia) = moments.of_density(density);
+    Ok(MassProperties { volume, mass, center_of_mass: origin + center.coords, inertia })
 }
 
 impl MassProperties {
@@ -110,11 +109,9 @@ pub(crate) fn signed_volume(mesh: &TriMesh) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::Vector3;
-
     use super::*;
     use crate::volume::tests::{cuboid, icosphere};
-    use nalgebra::{Isometry3, UnitQuaternion};
+    use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
     #[test]
     fn box_moved_and_turned() {

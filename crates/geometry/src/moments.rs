@@ -77,7 +77,7 @@ impl<S: Scalar> Moments<S> {
     /// Mass \[kg\], center of mass \[m\] and inertia about it \[kg m²\] at a uniform `density` \[kg/m³\].
     pub fn of_density(&self, density: S) -> (S, Point3<S>, Matrix3<S>) {
         let center = self.first / self.volume;
-        let central = (self.second - center * self.first.transpose()) * density;
+        let central = (self.second - center * center.transpose() * self.volume) * density;
         let inertia = Matrix3::from_diagonal_element(central.trace()) - central;
         (self.volume * density, center.into(), inertia)
     }

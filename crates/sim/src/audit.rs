@@ -58,18 +58,17 @@ impl fmt::Display for Resolution {
 /// Follows a simulation from step to step.
 pub(crate) struct Audit<'a, S: Scalar> {
     world: &'a World<S>,
-    /// Whether the integrator holds its error itself.
-    controls_error: bool,
-    roughness: Roughness,
+    /// None if the integrator holds its error itself.
+    roughness: Option<Roughness>,
     energy: EnergyBalance,
 }
 
 impl<'a, S: Scalar> Audit<'a, S> {
     /// Of a simulation from `initial` by an integrator that `controls_error` or not.
     pub(crate) fn new(world: &'a World<S>, initial: &[State<S>], controls_error: bool) -> Self {
-        let roughness = Roughness::new(world, initial);
+        let roughness = (!controls_error).then(|| Roughness::new(world, initial));
         let energy = EnergyBalance::new(world, initial, controls_error);
-        Self { world, controls_error, roughness, energy }
+        Self { world, roughness, energy }
     }
 
     /// After `step` has led to `states`.
@@ -77,7 +76,9 @@ impl<'a, S: Scalar> Audit<'a, S> {
     /// # Errors
     /// If contacts have made energy.
     pub(crate) fn step(&mut self, step: Step, states: &[State<S>]) -> Result<(), SimulationError> {
-        self.roughness.step(step, states);
+        if let Some(roughness) = &mut self.roughness {
+            roughness.step(step, states);
+        }
         self.energy.step(self.world, step, states)
     }
 
@@ -92,10 +93,11 @@ impl<'a, S: Scalar> Audit<'a, S> {
     ) -> Result<Resolution, SimulationError> {
         self.energy.check(self.world, dt * steps as f64, states)?;
         let name = |body: BodyId| self.world.bodies[body].name.clone();
-        let roughest = self.roughness.roughest().map(|(body, time)| (name(body), time));
-        Ok(match self.controls_error {
-            true => Resolution { steps, roughness: None, roughest: None },
-            false => Resolution { steps, roughness: Some(self.roughness.mean()), roughest },
+        let roughest = self.roughness.as_ref().and_then(Roughness::roughest);
+        Ok(Resolution {
+            steps,
+            roughness: self.roughness.as_ref().map(Roughness::mean),
+            roughest: roughest.map(|(body, time)| (name(body), time)),
         })
     }
 }

@@ -50,9 +50,13 @@ impl<S: Scalar> World<S> {
 
     /// The error of a contact of which one side has passed through the other at `time` \[s\].
     pub(crate) fn passed_through(&self, pair: &ContactPair<S>, time: f64) -> SimulationError {
-        let [body, contact] =
-            [pair.bodies.samples, pair.bodies.field].map(|body| self.bodies[body].name.clone());
+        let [body, contact] = self.names_of(pair);
         SimulationError::PassedThrough { body, contact, time }
+    }
+
+    /// The names of the bodies with the samples and the field of `pair`.
+    fn names_of(&self, pair: &ContactPair<S>) -> [String; 2] {
+        [pair.bodies.samples, pair.bodies.field].map(|body| self.bodies[body].name.clone())
     }
 
     /// The name of a body, and that of the one that presses hardest on it of those that may touch it.
@@ -84,8 +88,7 @@ impl<S: Scalar> World<S> {
         let jumps = |pair: &&ContactPair<S>| pair.force_jumps();
         match self.contacts.iter().find(jumps) {
             Some(pair) => {
-                let [body, contact] = [pair.bodies.samples, pair.bodies.field]
-                    .map(|body| self.bodies[body].name.clone());
+                let [body, contact] = self.names_of(pair);
                 Err(SimulationError::ForceJumps { body, contact })
             }
             None => Ok(()),

@@ -58,8 +58,8 @@
 //! # Bodies on a trajectory
 //! [`Body::driven`] puts a body, such as a robot's link, on a [`Trajectory`](crate::Trajectory). [`World::simulate`] moves
 //! it, to time 0 before the first step too: the state given for it does not matter. A trajectory has velocities, too, the rates at
-//! which its pose changes; one that forgets them is refused. The derivatives that a trajectory carries are not checked so: a pose by a
-//! variable speed with a constant velocity leads to wrong derivatives of all that it touches. It is looked at every millisecond at least, so motions should take
+//! which its pose changes; one that forgets them is refused. Their derivatives are not checked: a pose by a variable speed with a
+//! constant velocity leads to wrong derivatives of all that it touches. It is looked at every millisecond at least, so motions should take
 //! longer than that.
 //!
 //! ```
@@ -139,8 +139,8 @@
 //! # Symmetric contact
 //! Two bodies that both have samples and fields touch both ways, each with half of the force: corners of either are
 //! felt, and faces where samples lie. Edges that cross are felt only at samples, too: their distances should be less than half of
-//! the smaller body's edges, or boxes that are turned against each other may fall through each other. Each direction is a
-//! contact of its own, whose law sees the axes of its own field's body; [`World::set_contact_param`] sets a parameter of both.
+//! the smaller body's edges, or boxes turned against each other may fall through. Each direction is a contact of its own, whose
+//! law sees the axes of its own field's body; [`World::set_contact_param`] sets a parameter of both.
 //!
 //! ```
 //! # use std::sync::Arc;
@@ -169,11 +169,10 @@
 //! # Steps of your own choice
 //! Where speed counts more than certainty, [`World::simulate_with`] takes the steps of an
 //! [`Integrator`](crate::Integrator), and reports how well they resolved the motion ([`Resolution`](crate::Resolution)). Contacts
-//! that make energy are an error, but only while nothing moves except what forces move: one body that is driven, or kinematic with a velocity,
-//! and energy is not asked about.
+//! that make energy are an error here as by default, but only while nothing is driven, or kinematic with a velocity.
 //! [`SemiImplicitEuler`](crate::SemiImplicitEuler) is the cheapest. [`BackwardEuler`](crate::BackwardEuler) is stable for
-//! every step, but for friction that sticks, and damps what is faster than it: with steps of a millisecond it simulates
-//! a stack at rest two to three times faster than the default; [`SubStepped`](crate::SubStepped) divides the steps of any integrator where
+//! every step, but for friction that sticks, and damps what is faster than it: with steps of a millisecond it simulates a stack at
+//! rest two to three times faster than the default; [`SubStepped`](crate::SubStepped) divides the steps of any integrator where
 //! contacts, impacts to come among them, demand it. All have derivatives, which are those of the steps taken: with steps
 //! that are too long they are exact and far from those of the motion, even where the values look right.
 //!
@@ -348,9 +347,8 @@
 //! What a world is made of, from what was seen of it: parameters have names, and least squares take residuals over the scalar as they
 //! are. A trial step may lead to a world that is refused, of negative friction for instance: residuals that are no numbers make it a
 //! bad step, and a shorter one is tried. A step that promises less than the error of what was seen is a waste of rollouts, of which
-//! each takes one ([`Criteria`](prehend_autodiff::optimize::Criteria)). What the motion does not tell is not found: that of a body
-//! which slides freely depends on neither its mass nor its stiffness. Angles jump by a turn, so compare places of marks on a
-//! body instead; and look at the value that is left, for a wrong minimum is a minimum, too.
+//! each takes one ([`Criteria`](prehend_autodiff::optimize::Criteria)). What slides freely tells nothing of
+//! its mass. Angles jump by a turn: compare marks on a body instead, and look at the value that is left.
 //!
 //! ```
 //! # use std::sync::Arc;

@@ -112,10 +112,7 @@ impl Verdict {
 /// # Errors
 /// If a parameter is out of its range, or the law cannot be simulated.
 pub fn law_report(law: &Arc<dyn DynContactLaw>) -> Result<LawReport, SimulationError> {
-    law.check(law.params())?;
-    if let Some(bristles) = law.bristles() {
-        bristles.check()?;
-    }
+    law.check_all(law.params())?;
     let contact_point = PointContact { law: law.as_ref() };
     let weight = contact_point.response(DEPTH, 0.0, Vector3::zeros()).normal;
     let mut findings = vec![Finding {

@@ -3,6 +3,7 @@
 use nalgebra::Vector6;
 use prehend_autodiff::Fwd;
 
+use super::error::LawError;
 use super::law::ContactLaw;
 use super::patch::Patch;
 use super::point::{Contact, Response};
@@ -28,6 +29,14 @@ pub trait DynContactLaw: ContactLaw + sealed::Sealed {
 
     /// [`DynContactLaw::wrench`] with its derivatives by the state, and by the parameters if `by_params`.
     fn wrench_jacobian(&self, p: &[f64], patch: &Patch<'_>, by_params: bool) -> WrenchJacobian;
+}
+
+impl dyn DynContactLaw {
+    /// Checks parameters `p`, and the bristles if there are any.
+    pub(crate) fn check_all(&self, p: &[f64]) -> Result<(), LawError> {
+        self.bristles().map_or(Ok(()), |bristles| bristles.check())?;
+        self.check(p)
+    }
 }
 
 impl<L: ContactLaw> DynContactLaw for L {

@@ -93,13 +93,15 @@ impl Patch<'_> {
     pub(crate) fn has_crossed(&self, before: State) -> bool {
         let reach = self.surface.rounding();
         let earlier = Self { state: before, ..*self };
+        let gradient = |patch: &Self, point: &SurfacePoint| {
+            Some(patch.field.sample(&patch.place(&point.position), reach)?.gradient)
+        };
         let crosses = |point: &SurfacePoint| {
-            let [from, to] = [&earlier, self].map(|patch| {
-                let sample = patch.field.sample(&patch.place(&point.position), reach)?;
-                Some(sample.gradient)
-            });
-            from.zip(to)
-                .is_some_and(|(from, to)| from.dot(&to) < OPPOSITE * from.norm() * to.norm())
+            gradient(&earlier, point).is_some_and(|from| {
+                let opposite =
+                    |to: Vector3<f64>| from.dot(&to) < OPPOSITE * from.norm() * to.norm();
+                gradient(self, point).is_some_and(opposite)
+            })
         };
         let mut touched = self.surface.blocks().filter(|(block, _)| self.may_touch(block, reach));
         touched.any(|(_, points)| points.iter().any(crosses))

@@ -100,8 +100,8 @@ impl Default for Adaptive {
 
 impl Integrator for Adaptive {
     /// # Errors
-    /// If a tolerance is not positive; if a contact's force jumps at touch and derivatives are asked for; where steps would have to be too short or too
-    /// many; where a state stops being finite.
+    /// If a tolerance is not positive; if a contact's force jumps at touch and derivatives are asked for; where a body passes
+    /// through another; where steps would have to be too short or too many; where a state stops being finite.
     fn step<S: Scalar>(
         &self,
         world: &World<S>,

@@ -108,10 +108,7 @@ impl<S: Scalar> ContactPair<S> {
         if let Some(&value) = values.iter().find(|value| !value.is_finite()) {
             return Err(LawError::Range { name: "parameter of a contact", range: "finite", value });
         }
-        if let Some(bristles) = self.law.bristles() {
-            bristles.check()?;
-        }
-        self.law.check(&values)
+        self.law.check_all(&values)
     }
 
     /// Whether `body` is one of the two.

@@ -133,7 +133,6 @@ impl Planner {
             let change =
                 if error.is_nan() { LENGTH_CHANGE[0] } else { SAFETY * error.powf(EXPONENT) };
             let chosen = dt * change.clamp(LENGTH_CHANGE[0], LENGTH_CHANGE[1]);
-            let end: Vec<State> = trial.end().iter().map(State::value).collect();
             if error <= 1.0 || (chosen <= shortest && self.norm.only_kinks(&errors)) {
                 self.parts += 1;
                 if self.parts > self.settings.max_parts {
@@ -141,7 +140,7 @@ impl Planner {
                     let (body, contact) = self.plain.most_accelerated(&values);
                     return Err(SimulationError::TooManyParts { body, contact, max_parts, time });
                 }
-                if let Some(pair) = self.travel.crossed(&self.plain, &values, &end) {
+                if let Some(pair) = self.travel.crossed(&self.plain, &self.states, trial.end()) {
                     return Err(self.plain.passed_through(pair, self.time));
                 }
                 self.time = if dt == left { self.whole.end() } else { self.time + dt };
@@ -153,6 +152,7 @@ impl Planner {
                 };
                 return Ok(Some(part));
             }
+            let end: Vec<State> = trial.end().iter().map(State::value).collect();
             if chosen <= shortest {
                 return Err(match end.iter().all(State::is_finite) {
                     true => self.plain.stalled(&values, self.time, dt),

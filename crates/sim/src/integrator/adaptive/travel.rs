@@ -95,14 +95,14 @@ impl Travel {
     pub(super) fn crossed<'a>(
         &'a self,
         world: &'a World,
-        before: &[State],
-        after: &[State],
+        before: &[State<Probe>],
+        after: &[State<Probe>],
     ) -> Option<&'a ContactPair> {
-        let crossed = |(pair, limit): &(&ContactPair, &Limit)| {
+        let mut thin = self.limits(world).filter(|(_, limit)| limit.thin).map(|(pair, _)| pair);
+        thin.find(|pair| {
             let [from, to] = [before, after].map(|states| world.seen_value(pair, states));
-            limit.thin && world.patch(pair, to).is_some_and(|patch| patch.has_crossed(from))
-        };
-        self.limits(world).find(crossed).map(|(pair, _)| pair)
+            world.patch(pair, to).is_some_and(|patch| patch.has_crossed(from))
+        })
     }
 
     /// Whether a step of `dt` \[s\] from `states` through `stages` may have passed over a contact.

@@ -107,11 +107,6 @@ impl<S: Scalar> Trial<S> {
 }
 
 impl<S: Scalar> Estimate<S> {
-    /// By how much the two orders differ in `part` of the numbers of free body or contact `i`.
-    pub(in crate::integrator) fn between_orders(&self, i: usize, part: fn(S) -> f64) -> [f64; 4] {
-        norms(&self.orders[i], part)
-    }
-
     /// How far off `part` of the numbers of free body or contact `i` may be, at kinks too.
     ///
     /// The two orders differ as those of a smooth motion do. Their weights nearly cancel on either side of the gap between the
@@ -120,7 +115,7 @@ impl<S: Scalar> Estimate<S> {
     /// shorter the step. So they count by that ratio, which makes them of at least fifth order where the motion is smooth, and
     /// of first order, as the error is, at a kink.
     pub(in crate::integrator) fn across_kinks(&self, i: usize, part: fn(S) -> f64) -> [f64; 4] {
-        let orders = self.between_orders(i, part);
+        let orders = norms(&self.orders[i], part);
         let (third, lower) = (together(&self.third, i, part), together(&self.lower, i, part));
         std::array::from_fn(|k| {
             let ratio = if third[k] < lower[k] { third[k] / lower[k] } else { 1.0 };

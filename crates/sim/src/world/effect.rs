@@ -1,0 +1,171 @@
+//! What contacts do.
+
+use nalgebra::{Vector3, Vector6};
+use prehend_autodiff::{Fwd, Scalar};
+
+use super::World;
+use super::contact_pair::ContactPair;
+use super::seen::Seen;
+use crate::contact::bristles::{BristleFunction, Bristles};
+use crate::contact::patch::Patch;
+use crate::contact::wrench::stack;
+use crate::state::State;
+
+/// What a contact does.
+pub(crate) struct Effect<S: Scalar> {
+    /// Wrench on the body with the samples and on that with the field, each about its own center of mass.
+    pub(crate) on_samples: Vector6<S>,
+    pub(crate) on_field: Vector6<S>,
+    /// Rate of the deflection of a contact that sticks, along the axes of the field \[m/s\], \[rad/s\].
+    pub(crate) rate: Vector6<S>,
+}
+
+impl<S: Scalar> Default for Effect<S> {
+    fn default() -> Self {
+        let zero = Vector6::zeros();
+        Self { on_samples: zero, on_field: zero, rate: zero }
+    }
+}
+
+impl<S: Scalar> World<S> {
+    /// External and contact wrenches on every body at `states` (force \[N\], torque about the center of mass \[N m\],
+    /// world frame), without gravity; then the rate of the deflection (\[m/s\], \[rad/s\]) of every contact that sticks.
+    /// `step` matters to leaks in the first step only.
+    ///
+    /// Derivatives through contacts are first derivatives.
+    ///
+    /// # Panics
+    /// If there are fewer states than bodies.
+    pub fn wrenches(&self, states: &[State<S>], step: usize) -> Vec<Vector6<S>> {
+        let mut wrenches: Vec<Vector6<S>> =
+            self.bodies.iter().map(|body| body.external_wrench).collect();
+        for pair in &self.contacts {
+            let bristles = pair.law().bristles();
+            let deflection = bristles.and_then(|_| states.get(wrenches.len()));
+            let Effect { on_samples, on_field, rate } = self.effect(pair, states, deflection, step);
+            wrenches[pair.bodies.samples] += on_samples;
+            wrenches[pair.bodies.field] += on_field;
+            if bristles.is_some() {
+                wrenches.push(rate);
+            }
+        }
+        wrenches
+    }
+
+    /// What `pair` does with its `deflection`, if it sticks and has one.
+    pub(crate) fn effect(
+        &self,
+        pair: &ContactPair<S>,
+        states: &[State<S>],
+        deflection: Option<&State<S>>,
+        step: usize,
+    ) -> Effect<S> {
+        let seen = self.seen(pair, states);
+        let Some(patch) = self.patch(pair, seen.state.value()) else { return Effect::default() };
+        let patch = Patch { smoothing: pair.smoothing.at_step(step), ..patch };
+        let ([fx, fy, fz, tx, ty, tz], rate) = match pair.law().bristles() {
+            None => (local_wrench(pair, &seen, &patch), Vector6::zeros()),
+            Some(bristles) => {
+                let deflection = deflection.map_or_else(Vector6::zeros, State::deflection);
+                local_bristles(pair, &seen, &patch, bristles, deflection)
+            }
+        };
+        let (state, base) = (&states[pair.bodies.samples], &states[pair.bodies.field]);
+        let rotation = base.pose.rotation;
+        let force = rotation * Vector3::new(fx, fy, fz).map(|x| x.times(pair.weight));
+        let torque = rotation * Vector3::new(tx, ty, tz).map(|x| x.times(pair.weight));
+        let offset = state.pose.translation.vector - base.pose.translation.vector;
+        let (on_samples, on_field) =
+            (stack(&force, &torque), stack(&-force, &-(torque + offset.cross(&force))));
+        Effect { on_samples, on_field, rate }
+    }
+
+    /// The samples of `pair` beside its field, which sees their body in `state`, if there are both.
+    pub(crate) fn patch<'a>(&'a self, pair: &'a ContactPair<S>, state: State) -> Option<Patch<'a>> {
+        let body = &self.bodies[pair.bodies.samples];
+        Some(Patch {
+            surface: pair.near.as_ref().or(body.surface.as_ref())?,
+            com: body.com().map(S::value),
+            state,
+            field: self.bodies[pair.bodies.field].field.as_deref()?,
+            smoothing: pair.smoothing,
+        })
+    }
+}
+
+/// The wrench of `patch`, which is `pair` at the value of `seen`, with the derivatives that `seen` and the parameters
+/// carry.
+fn local_wrench<S: Scalar>(pair: &ContactPair<S>, seen: &Seen<S>, patch: &Patch<'_>) -> [S; 6] {
+    const { assert!(S::ORDER <= 1, "contacts have first derivatives only: no nested scalars") };
+    let values: Vec<f64> = pair.params().iter().map(|p| p.value()).collect();
+    if S::ORDER == 0 {
+        return pair.law().wrench(&values, patch).map(S::constant).into();
+    }
+    let moved = changes(pair.params());
+    let by_params = moved.iter().any(|p| !p.is_constant_zero());
+    let jacobian = pair.law().wrench_jacobian(&values, patch, by_params);
+    let mut wrench = S::local(&jacobian, seen.state.tangent());
+    for (by_param, moved) in jacobian.by_params.iter().zip(moved) {
+        for (component, slope) in wrench.iter_mut().zip(by_param.iter()) {
+            *component += moved.times(*slope);
+        }
+    }
+    let [fx, fy, fz, tx, ty, tz] = wrench;
+    match &seen.from_com {
+        None => wrench,
+        Some(from_com) => {
+            let torque = Vector3::new(tx, ty, tz) + from_com.cross(&Vector3::new(fx, fy, fz));
+            stack(&Vector3::new(fx, fy, fz), &torque).into()
+        }
+    }
+}
+
+/// [`local_wrench`] of a contact that sticks, and the rate of its deflection.
+fn local_bristles<S: Scalar>(
+    pair: &ContactPair<S>,
+    seen: &Seen<S>,
+    patch: &Patch<'_>,
+    bristles: Bristles,
+    deflection: Vector6<S>,
+) -> ([S; 6], Vector6<S>) {
+    const { assert!(S::ORDER <= 1, "contacts have first derivatives only: no nested scalars") };
+    let law = pair.law().as_ref();
+    let values: Vec<f64> = pair.params().iter().map(|p| p.value()).collect();
+    let at = deflection.map(|x| x.value());
+    let split = |all: [S; 12]| -> ([S; 6], Vector6<S>) {
+        (std::array::from_fn(|i| all[i]), Vector6::from_fn(|i, _| all[6 + i]))
+    };
+    let function = BristleFunction { law, p: &values, patch, bristles, deflection: at };
+    let tangent = seen.state.tangent();
+    let change = |i: usize| if i < 12 { tangent[i] } else { deflection[i - 12].plus(-at[i - 12]) };
+    let mut all = match &seen.from_com {
+        None => S::local(&function, std::array::from_fn::<S, 18, _>(change)),
+        Some(from_com) => {
+            let change = |i: usize| if i < 18 { change(i) } else { from_com[i - 18] };
+            S::local(&function, std::array::from_fn::<S, 21, _>(change))
+        }
+    };
+    let moved = changes(pair.params());
+    for (from, moved) in moved.chunks(6).enumerate().map(|(i, moved)| (6 * i, moved)) {
+        if moved.iter().all(|p| p.is_constant_zero()) {
+            continue;
+        }
+        let seeded = |(i, &p): (usize, &f64)| match i.checked_sub(from) {
+            Some(lane) if lane < 6 => Fwd::<6>::variable(p, lane),
+            _ => Fwd::constant(p),
+        };
+        let p: Vec<Fwd<6>> = values.iter().enumerate().map(seeded).collect();
+        let slopes = function.response(&p, &[Fwd::constant(0.0); 18], None);
+        for (component, slope) in all.iter_mut().zip(slopes) {
+            for (moved, slope) in moved.iter().zip(slope.derivative) {
+                *component += moved.times(slope);
+            }
+        }
+    }
+    split(all)
+}
+
+/// Zeros that carry the derivatives of `params`.
+fn changes<S: Scalar>(params: &[S]) -> Vec<S> {
+    params.iter().map(|p| p.plus(-p.value())).collect()
+}
