@@ -36,4 +36,10 @@ pub trait DistanceField: Send + Sync {
     fn thickness(&self) -> f64 {
         f64::INFINITY
     }
+
+    /// Center and radius \[m\] of a ball that holds the solid, none if it has no end or none is known: contacts are looked for
+    /// within it.
+    fn bounding_ball(&self) -> Option<(Point3<f64>, f64)> {
+        None
+    }
 }

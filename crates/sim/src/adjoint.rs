@@ -13,6 +13,7 @@ use crate::state::State;
 use crate::time::{Step, TimeSteps};
 use crate::world::World;
 use crate::world::body::{Body, Motion};
+use crate::world::contact_group::ContactGroup;
 use crate::world::contact_pair::ContactPair;
 use crate::world::trajectory::plain;
 
@@ -108,7 +109,7 @@ impl<I: Integrator + Send + 'static> Integrator for StepCheckpointed<I> {
         step: Step,
     ) -> Result<Vec<State<S>>, SimulationError> {
         if S::ORDER == 0 {
-            return self.scene.integrator.step(world, states, step);
+            return world.stepped(&self.scene.integrator, states, step);
         }
         world.check_trajectories()?;
         if !has_parts_of(world, &self.scene.world) {
@@ -138,6 +139,10 @@ impl<I: Integrator + Send + 'static> Integrator for StepCheckpointed<I> {
     fn controls_error(&self) -> bool {
         self.scene.integrator.controls_error()
     }
+
+    fn finds_contacts(&self) -> bool {
+        true
+    }
 }
 
 /// One step as a function of the states' coordinates and of the world's parameters at `places`, to the states of free bodies and of
@@ -155,7 +160,7 @@ impl<I: Integrator + Send + 'static> Recompute for OneStep<I> {
         let (states, values) = x.split_at(STATE * self.scene.world.state_count());
         let world = self.scene.world(&self.places, values)?;
         let states: Vec<State<S>> = states_of(states).collect();
-        let next = self.scene.integrator.step(&world, &states, self.step)?;
+        let next = world.stepped(&self.scene.integrator, &states, self.step)?;
         let moved = next.into_iter().enumerate().filter(|(index, _)| world.moves_by_forces(*index));
         Ok(moved.flat_map(|(_, state)| state.coordinates()).collect())
     }
@@ -184,8 +189,13 @@ fn has_parts_of<S: Scalar>(a: &World<S>, b: &World) -> bool {
         (a.bodies, a.smoothing, a.weight) == (b.bodies, b.smoothing, b.weight)
             && Arc::ptr_eq(a.law(), b.law())
     };
+    let group = |(a, b): (&ContactGroup<S>, &ContactGroup)| {
+        a.has_bodies_of(b) && pair((&a.contact, &b.contact))
+    };
     a.bodies.len() == b.bodies.len()
         && a.contacts.len() == b.contacts.len()
+        && a.contact_groups.len() == b.contact_groups.len()
+        && a.contact_groups.iter().zip(&b.contact_groups).all(group)
         && a.bodies.iter().zip(&b.bodies).all(body)
         && a.contacts.iter().zip(&b.contacts).all(pair)
 }

@@ -47,7 +47,7 @@ impl World {
         let free = self.free_bodies();
         let size = 6 * free.len();
         let (mut stiffness, mut damping) = (DMatrix::zeros(size, size), DMatrix::zeros(size, size));
-        let lifted = self.plain().lift::<Fwd<12>>();
+        let lifted = self.with_touching(states, 0.0).plain().lift::<Fwd<12>>();
         let constants: Vec<State<Fwd<12>>> = states.iter().map(State::lift).collect();
         let roots: Vec<Matrix6<f64>> =
             free.iter().map(|&body| self.inverse_mass_root(body, &states[body])).collect();

@@ -62,7 +62,8 @@ impl World {
         let weight = self.gravity * rigid.mass();
         let weight = Vector6::new(weight.x, weight.y, weight.z, 0.0, 0.0, 0.0);
         let load = found.external_wrench + weight;
-        let supports = self.supports(body, states, &friction, reach);
+        let near = self.with_touching(states, reach);
+        let supports = near.supports(body, states, &friction, reach);
         let center = Point3::from(states[body].pose.translation.vector);
         Ok(Equilibrium {
             net: self.wrenches(states, 0)[body] + weight,

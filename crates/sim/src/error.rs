@@ -35,6 +35,9 @@ pub enum SimulationError {
         /// Their names.
         bodies: [String; 2],
     },
+    /// Lists of bodies of which no two can move against each other.
+    #[error("no two of these bodies can move against each other")]
+    NoContacts,
     /// A body cannot touch itself.
     #[error("body '{body}' cannot touch itself")]
     Itself {

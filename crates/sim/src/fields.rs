@@ -52,6 +52,10 @@ impl DistanceField for Sphere {
     fn thickness(&self) -> f64 {
         2.0 * self.radius
     }
+
+    fn bounding_ball(&self) -> Option<(Point3<f64>, f64)> {
+        Some((self.center, self.radius))
+    }
 }
 
 /// Everything outside of a sphere. At its center the gradient is NaN, which is no contact.
@@ -128,6 +132,10 @@ impl DistanceField for Cuboid {
 
     fn thickness(&self) -> f64 {
         2.0 * self.half_extents.min()
+    }
+
+    fn bounding_ball(&self) -> Option<(Point3<f64>, f64)> {
+        Some((Point3::origin(), self.half_extents.norm()))
     }
 }
 

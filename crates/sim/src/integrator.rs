@@ -65,6 +65,12 @@ pub trait Integrator: Sync {
         false
     }
 
+    /// Whether it looks for the contacts of [`World::contact_groups`] itself. Others are given a world in which those that may
+    /// touch within the step are [`contacts`](World::contacts).
+    fn finds_contacts(&self) -> bool {
+        false
+    }
+
     /// Whether derivatives of its steps in `world` are those of the motion. What takes steps by values first asks here.
     ///
     /// # Errors

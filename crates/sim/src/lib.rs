@@ -89,5 +89,6 @@ pub use time::{Step, TimeSteps};
 pub use world::World;
 pub use world::body::{Body, Motion};
 pub use world::body_id::BodyId;
+pub use world::contact_group::ContactGroup;
 pub use world::contact_pair::{ContactBodies, ContactPair};
 pub use world::trajectory::Trajectory;

@@ -51,7 +51,7 @@ impl<S: Scalar> World<S> {
     ///
     /// For each body: if it is free, its mass \[kg\], its inertia xx, yy, zz, xy, xz, yz \[kg m²\] and its center of mass in the
     /// model frame \[m\]; then its external wrench, force \[N\] and torque \[N m\]. Then gravity \[m/s²\]; then the law's parameters
-    /// of each contact.
+    /// of each contact, and those of each group of contacts.
     ///
     /// States are those of centers of mass: with the states as they are, a body whose center of mass moves in its model frame is
     /// a body whose shape moves the other way. Where the model's pose is given instead, the state follows from
@@ -68,7 +68,7 @@ impl<S: Scalar> World<S> {
             parameters.extend(body.external_wrench.iter());
         }
         parameters.extend(self.gravity.iter());
-        parameters.extend(self.contacts.iter().flat_map(|pair| pair.params()));
+        parameters.extend(self.contact_params().copied());
         parameters
     }
 
@@ -83,7 +83,7 @@ impl<S: Scalar> World<S> {
     ) -> Result<World<T>, SimulationError> {
         self.check_trajectories()?;
         let free = self.bodies.iter().filter(|body| body.rigid().is_some()).count();
-        let params: usize = self.contacts.iter().map(|pair| pair.params().len()).sum();
+        let params = self.contact_params().count();
         let expected = 10 * free + 6 * self.bodies.len() + 3 + params;
         if parameters.len() != expected {
             return Err(SimulationError::Parameters { given: parameters.len(), expected });
@@ -104,8 +104,16 @@ impl<S: Scalar> World<S> {
             body.external_wrench = Vector6::from_fn(|_, _| next());
         }
         world.gravity = Vector3::from_fn(|_, _| next());
-        world.contacts.iter_mut().flat_map(|pair| pair.params_mut()).for_each(|p| *p = next());
+        let groups = world.contact_groups.iter_mut().map(|group| &mut group.contact);
+        let pairs = world.contacts.iter_mut().chain(groups);
+        pairs.flat_map(|pair| pair.params_mut()).for_each(|p| *p = next());
         Ok(world)
+    }
+
+    /// The parameters of the laws of contacts and groups.
+    fn contact_params(&self) -> impl Iterator<Item = &S> {
+        let groups = self.contact_groups.iter().map(|group| &group.contact);
+        self.contacts.iter().chain(groups).flat_map(|pair| pair.params())
     }
 }
 

@@ -10,6 +10,7 @@ use crate::integrator::adaptive::Adaptive;
 use crate::state::State;
 use crate::time::{Step, TimeSteps};
 use crate::world::World;
+use crate::world::contact_pair::ContactPair;
 
 /// What a simulation with an integrator of one's own choice led to.
 #[derive(Clone, Debug, PartialEq)]
@@ -167,7 +168,7 @@ impl<S: Scalar> World<S> {
         let mut near = BroadPhase::new(self);
         for index in 0..steps {
             let step = Step::new(index, dt);
-            let once = integrator.evaluates_forces_once();
+            let once = integrator.evaluates_forces_once() && self.contact_groups.is_empty();
             let world = if once { near.world(self, &states, dt) } else { self };
             states = world.advance(integrator, &states, step)?;
             visit(step, &states)?;
@@ -197,12 +198,26 @@ impl<S: Scalar> World<S> {
         states: &[State<S>],
         step: Step,
     ) -> Result<Vec<State<S>>, SimulationError> {
-        let mut next = integrator.step(self, states, step)?;
+        let mut next = self.stepped(integrator, states, step)?;
         self.drive(&mut next, step.end());
         match next.iter().all(State::is_finite) {
             true => Ok(next),
             false => Err(self.not_finite(states, &next, step.end())),
         }
+    }
+
+    /// The integrator's step, among the contacts of groups that may touch within it.
+    pub(crate) fn stepped(
+        &self,
+        integrator: &impl Integrator,
+        states: &[State<S>],
+        step: Step,
+    ) -> Result<Vec<State<S>>, SimulationError> {
+        if self.contact_groups.is_empty() || integrator.finds_contacts() {
+            return integrator.step(self, states, step);
+        }
+        let near = self.with_neighbors(states, |search, states| search.travels(states, step));
+        integrator.step(&near, states, step)
     }
 
     /// The states from which a rollout begins: `initial` with driven bodies where their trajectories start.
@@ -230,9 +245,8 @@ impl<S: Scalar> World<S> {
         if states.len() != self.state_count() {
             return Err(self.wrong_count(states.len()));
         }
-        for pair in &self.contacts {
-            pair.check()?;
-        }
+        let groups = self.contact_groups.iter().map(|group| &group.contact);
+        self.contacts.iter().chain(groups).try_for_each(ContactPair::check)?;
         match states.iter().all(State::is_finite) {
             true => Ok(()),
             false => Err(self.not_finite(states, states, start)),

@@ -2,9 +2,11 @@
 
 pub(crate) mod body;
 pub(crate) mod body_id;
+pub(crate) mod contact_group;
 pub(crate) mod contact_pair;
 pub(crate) mod deflection;
 mod effect;
+pub(crate) mod neighbors;
 mod seen;
 pub(crate) mod trajectory;
 
@@ -20,6 +22,7 @@ use crate::error::SimulationError;
 use crate::state::State;
 use body::{Body, Motion};
 use body_id::BodyId;
+use contact_group::ContactGroup;
 use contact_pair::{ContactBodies, ContactPair};
 
 /// Bodies, their contacts, and gravity: plain data, over plain numbers or numbers that carry derivatives.
@@ -32,6 +35,8 @@ pub struct World<S: Scalar = f64> {
     pub bodies: Vec<Body<S>>,
     /// What touches what.
     pub contacts: Vec<ContactPair<S>>,
+    /// Bodies that may touch others of their group, wherever they meet.
+    pub contact_groups: Vec<ContactGroup<S>>,
     /// Gravity, world frame \[m/s²\].
     pub gravity: Vector3<S>,
 }
@@ -39,7 +44,7 @@ pub struct World<S: Scalar = f64> {
 impl World {
     /// A world without bodies under `gravity` \[m/s²\].
     pub fn new(gravity: Vector3<f64>) -> Self {
-        Self { bodies: Vec::new(), contacts: Vec::new(), gravity }
+        Self { bodies: Vec::new(), contacts: Vec::new(), contact_groups: Vec::new(), gravity }
     }
 
     /// Adds a body.
@@ -126,7 +131,7 @@ impl<S: Scalar> World<S> {
     }
 
     /// Sets the parameter called `name`, such as `"friction"`, of every contact between two bodies: to differentiate by it, put in a
-    /// variable.
+    /// variable. That of a group is in [`contact_groups`](World::contact_groups), for all of its contacts.
     ///
     /// ```
     /// # use std::sync::Arc;
@@ -174,6 +179,7 @@ impl<S: Scalar> World<S> {
         World {
             bodies: self.bodies.iter().map(|body| body.map(&f)).collect(),
             contacts: self.contacts.iter().map(|pair| pair.map(&f)).collect(),
+            contact_groups: self.contact_groups.iter().map(|group| group.map(&f)).collect(),
             gravity: self.gravity.map(&f),
         }
     }
@@ -181,7 +187,8 @@ impl<S: Scalar> World<S> {
     /// The same world as values alone: without derivatives, and without leaks, which are for derivatives.
     pub(crate) fn plain(&self) -> World {
         let mut plain = self.map(S::value);
-        for pair in &mut plain.contacts {
+        let groups = plain.contact_groups.iter_mut().map(|group| &mut group.contact);
+        for pair in plain.contacts.iter_mut().chain(groups) {
             if pair.smoothing.leaks() {
                 pair.smoothing = GapSmoothing::Hard;
             }

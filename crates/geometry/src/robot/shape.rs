@@ -83,6 +83,10 @@ impl DistanceField for LinkShape {
     fn thickness(&self) -> f64 {
         self.grid().map_or(f64::INFINITY, DistanceField::thickness)
     }
+
+    fn bounding_ball(&self) -> Option<(Point3<f64>, f64)> {
+        self.grid()?.bounding_ball()
+    }
 }
 
 /// Smallest signed distance to any of the bodies.

@@ -181,6 +181,11 @@ impl DistanceField for SdfGrid {
     fn thickness(&self) -> f64 {
         if self.deepest > 0.0 { 2.0 * self.deepest } else { f64::INFINITY }
     }
+
+    fn bounding_ball(&self) -> Option<(Point3<f64>, f64)> {
+        let (low, high) = &self.bounds;
+        Some((nalgebra::center(low, high), 0.5 * (high - low).norm()))
+    }
 }
 
 #[cfg(test)]

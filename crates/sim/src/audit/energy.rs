@@ -104,11 +104,12 @@ impl EnergyBalance {
             return Ok(());
         }
         // What contacts had stored at the start they may give back.
-        let plain = world.plain();
         let now: Vec<State> = states.iter().map(State::value).collect();
-        let stored = stored_energy(&plain, &self.initial);
-        let energy = gain - stored + stored_energy(&plain, &now);
-        if energy <= TOLERANCE * self.kinetic.max(stored) {
+        let plain = world.plain();
+        let stored = |states: &[State]| stored_energy(&plain.with_touching(states, 0.0), states);
+        let before = stored(&self.initial);
+        let energy = gain - before + stored(&now);
+        if energy <= TOLERANCE * self.kinetic.max(before) {
             return Ok(());
         }
         let fastest = |a: &BodyId, b: &BodyId| {
@@ -116,7 +117,7 @@ impl EnergyBalance {
             energy(*a).total_cmp(&energy(*b))
         };
         let body = world.free_bodies().into_iter().max_by(fastest).unwrap_or(BodyId(0));
-        let (body, contact) = plain.names(&now, body);
+        let (body, contact) = plain.with_touching(&now, 0.0).names(&now, body);
         Err(SimulationError::Energy { body, contact, time, energy })
     }
 }

@@ -1,22 +1,23 @@
 //! The default integrator: steps as long as their error allows.
 
+mod course;
 mod error_norm;
+mod islands;
 mod planner;
 mod probe;
 mod touch_time;
 mod travel;
+mod windows;
 
 use prehend_autodiff::Scalar;
 #[cfg(doc)]
 use prehend_geometry::DistanceField;
 
 use super::Integrator;
-use super::runge_kutta::dormand_prince;
 use crate::error::SimulationError;
 use crate::state::State;
 use crate::time::Step;
 use crate::world::World;
-use planner::Planner;
 
 /// Dormand and Prince's method of fifth order with steps that it chooses: what [`World::simulate`] uses.
 ///
@@ -112,23 +113,11 @@ impl Integrator for Adaptive {
         if S::ORDER > 0 {
             self.check_differentiable(world)?;
         }
-        let mut planner = Planner::new(self, world, states, step);
-        if S::ORDER == 0 {
-            while planner.advance()?.is_some() {}
-            return Ok(planner.states().map(|state| state.lift()).collect());
-        }
-        let mut states = states.to_vec();
-        let mut wrenches = world.wrenches(&states, step.index);
-        while let Some(part) = planner.advance()? {
-            let mut trial = dormand_prince::step(world, &states, &wrenches, part);
-            states = trial.stages.pop().unwrap_or(states);
-            wrenches = match part.index {
-                // Leaks of the first part are not of the next one.
-                0 => world.wrenches(&states, 1),
-                _ => trial.wrenches,
-            };
-        }
-        Ok(states)
+        windows::step(self, world, states, step)
+    }
+
+    fn finds_contacts(&self) -> bool {
+        true
     }
 
     fn check_differentiable<S: Scalar>(&self, world: &World<S>) -> Result<(), SimulationError> {

@@ -37,6 +37,9 @@ impl<S: Scalar> World<S> {
     /// # Panics
     /// If there are fewer states than bodies.
     pub fn wrenches(&self, states: &[State<S>], step: usize) -> Vec<Vector6<S>> {
+        if !self.contact_groups.is_empty() {
+            return self.with_touching(states, 0.0).wrenches(states, step);
+        }
         let mut wrenches: Vec<Vector6<S>> =
             self.bodies.iter().map(|body| body.external_wrench).collect();
         for pair in &self.contacts {

@@ -4,6 +4,7 @@
 
 mod driven;
 mod gradients;
+mod groups;
 mod integrators;
 #[path = "../../src/scenes.rs"]
 mod scenes;

@@ -1,7 +1,7 @@
 //! Chooses the parts of a step.
 
 use nalgebra::Vector6;
-use prehend_autodiff::{Fwd, Scalar};
+use prehend_autodiff::Fwd;
 
 use super::error_norm::ErrorNorm;
 use super::travel::Travel;
@@ -11,6 +11,7 @@ use crate::integrator::runge_kutta::dormand_prince;
 use crate::state::State;
 use crate::time::Step;
 use crate::world::World;
+use crate::world::body_id::BodyId;
 
 /// Numbers that carry the derivative along the probe.
 pub(super) type Probe = Fwd<1>;
@@ -67,19 +68,20 @@ pub(super) struct Planner {
 }
 
 impl Planner {
-    pub(super) fn new<S: Scalar>(
+    /// Of a step from `states` whose first part is about `first` \[s\] long, if that is known.
+    pub(super) fn new(
         settings: &Adaptive,
-        world: &World<S>,
-        states: &[State<S>],
+        plain: World,
+        states: &[State],
         whole: Step,
+        first: Option<f64>,
     ) -> Self {
-        let plain = world.plain();
         let lifted = plain.lift::<Probe>();
-        let values: Vec<State> = states.iter().map(State::value).collect();
-        let norm = ErrorNorm::new(settings, &plain, &values);
-        let states = probe::seeded(&values, &norm);
+        let norm = ErrorNorm::new(settings, &plain, states);
+        let states = probe::seeded(states, &norm);
         let wrenches = lifted.wrenches(&states, whole.index);
-        let dt = norm.first_step(&plain, &wrenches).min(whole.dt);
+        let first = first.unwrap_or_else(|| norm.first_step(&plain, &wrenches));
+        let dt = first.min(whole.dt);
         Self {
             settings: *settings,
             travel: Travel::new(&plain),
@@ -99,6 +101,16 @@ impl Planner {
     /// The states that the parts have led to.
     pub(super) fn states(&self) -> impl Iterator<Item = State> {
         self.states.iter().map(State::value)
+    }
+
+    /// The state of a body that the parts have led to.
+    pub(super) fn state(&self, body: BodyId) -> State {
+        self.states[body].value()
+    }
+
+    /// Length of the part that would come next \[s\].
+    pub(super) fn next_part(&self) -> f64 {
+        self.dt
     }
 
     /// Takes the next part; none when the step is done.

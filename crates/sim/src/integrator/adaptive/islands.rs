@@ -1,0 +1,106 @@
+//! Bodies that can feel each other, apart from all others.
+
+use prehend_autodiff::Scalar;
+
+use crate::state::State;
+use crate::world::World;
+use crate::world::body_id::BodyId;
+use crate::world::contact_pair::{ContactBodies, ContactPair};
+
+/// Free bodies that are linked by contacts, and what they touch that no force moves. What happens to them depends on no others.
+pub(super) struct Island {
+    /// In ascending order.
+    pub(super) bodies: Vec<BodyId>,
+    /// Places among the contacts, in ascending order.
+    contacts: Vec<usize>,
+    /// Places of the deflections of its contacts among the states.
+    deflections: Vec<usize>,
+}
+
+impl Island {
+    /// The islands of the bodies of `world` with these contacts, in the order of their first free bodies.
+    pub(super) fn all(world: &World, contacts: &[ContactPair]) -> Vec<Self> {
+        let mut roots: Vec<usize> = (0..world.bodies.len()).collect();
+        for ContactPair { bodies, .. } in contacts {
+            let ends = [bodies.samples, bodies.field];
+            if ends.iter().all(|id| world.bodies[*id].rigid().is_some()) {
+                let [a, b] = ends.map(|id| root_of(&mut roots, id.index()));
+                roots[a.max(b)] = a.min(b);
+            }
+        }
+        let mut place = vec![None; world.bodies.len()];
+        let mut islands: Vec<Self> = Vec::new();
+        for id in world.free_bodies() {
+            let root = root_of(&mut roots, id.index());
+            let place = *place[root].get_or_insert_with(|| {
+                islands.push(Self {
+                    bodies: Vec::new(),
+                    contacts: Vec::new(),
+                    deflections: Vec::new(),
+                });
+                islands.len() - 1
+            });
+            islands[place].bodies.push(id);
+        }
+        let mut deflection = world.bodies.len();
+        for (index, pair) in contacts.iter().enumerate() {
+            let ends = [pair.bodies.samples, pair.bodies.field];
+            let free = ends.into_iter().find(|id| world.bodies[*id].rigid().is_some());
+            let sticks = pair.law().bristles().is_some();
+            if let Some(place) = free.and_then(|id| place[root_of(&mut roots, id.index())]) {
+                let island = &mut islands[place];
+                island.contacts.push(index);
+                island.deflections.extend(sticks.then_some(deflection));
+                let fixed = ends.into_iter().filter(|id| world.bodies[*id].rigid().is_none());
+                island.bodies.extend(fixed);
+            }
+            deflection += usize::from(sticks);
+        }
+        for island in &mut islands {
+            island.bodies.sort_unstable();
+            island.bodies.dedup();
+        }
+        islands
+    }
+
+    /// Its bodies and contacts as a world, each body at its place among [`bodies`](Self::bodies); `contacts` are those that
+    /// it was found by.
+    pub(super) fn world<S: Scalar>(
+        &self,
+        world: &World<S>,
+        contacts: &[ContactPair<S>],
+    ) -> World<S> {
+        let body = |id: BodyId| BodyId(self.bodies.partition_point(|own| *own < id));
+        let contact = |index: &usize| {
+            let mut pair = contacts[*index].clone();
+            let ContactBodies { samples, field } = pair.bodies;
+            pair.bodies = ContactBodies { samples: body(samples), field: body(field) };
+            pair
+        };
+        World {
+            bodies: self.bodies.iter().map(|id| world.bodies[*id].clone()).collect(),
+            contacts: self.contacts.iter().map(contact).collect(),
+            contact_groups: Vec::new(),
+            gravity: world.gravity,
+        }
+    }
+
+    /// Places of its states, in the order of its world, among those of all.
+    pub(super) fn places(&self) -> impl Iterator<Item = usize> {
+        self.bodies.iter().map(|id| id.index()).chain(self.deflections.iter().copied())
+    }
+
+    /// Its states out of those of all.
+    pub(super) fn states<S: Scalar>(&self, states: &[State<S>]) -> Vec<State<S>> {
+        self.places().map(|place| states[place]).collect()
+    }
+}
+
+/// The first body of those that `index` is linked with.
+fn root_of(roots: &mut [usize], mut index: usize) -> usize {
+    while roots[index] != index {
+        roots[index] = roots[roots[index]];
+        index = roots[index];
+    }
+    index
+}

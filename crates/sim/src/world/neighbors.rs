@@ -1,0 +1,230 @@
+//! Which bodies of a group are near enough to touch.
+
+use std::borrow::Cow;
+
+use nalgebra::Vector3;
+use parry3d_f64::bounding_volume::Aabb;
+use parry3d_f64::math::Vector;
+use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy};
+use prehend_autodiff::Scalar;
+
+use super::World;
+use super::body::{Body, Motion};
+use super::body_id::BodyId;
+use super::contact_group::ContactGroup;
+use super::contact_pair::{ContactBodies, ContactPair};
+use crate::state::State;
+use crate::time::Step;
+
+/// How far a body may be pushed beyond where it would go, in parts of its size.
+const SLACK: f64 = 0.25;
+/// How often trajectories are looked at \[s\], and how many times in a step at most.
+const LOOK: f64 = 1e-3;
+const LOOKS: f64 = 1000.0;
+
+/// A contact of a group.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Neighbors {
+    group: usize,
+    bodies: ContactBodies,
+    weight: f64,
+}
+
+/// Looks for contacts of groups.
+pub(crate) struct NeighborSearch<'a, S: Scalar> {
+    world: &'a World<S>,
+    /// For each body, the radius of a ball about its center of mass that holds its samples and the solid of its field \[m\]; none if
+    /// that has no end.
+    radii: Vec<Option<f64>>,
+    /// Whether a body is in a group.
+    grouped: Vec<bool>,
+}
+
+impl<'a, S: Scalar> NeighborSearch<'a, S> {
+    pub(crate) fn new(world: &'a World<S>) -> Self {
+        let mut grouped = vec![false; world.bodies.len()];
+        let lists = world.contact_groups.iter().flat_map(ContactGroup::bodies);
+        lists.flatten().for_each(|id| grouped[id.index()] = true);
+        let radius =
+            |(body, grouped): (&Body<S>, &bool)| if *grouped { radius(body) } else { None };
+        let radii = world.bodies.iter().zip(&grouped).map(radius).collect();
+        Self { world, radii, grouped }
+    }
+
+    /// The world whose contacts it looks for.
+    pub(crate) fn world(&self) -> &World<S> {
+        self.world
+    }
+
+    /// The bodies of groups that forces move, each with its size \[m\].
+    pub(crate) fn free(&self) -> impl Iterator<Item = (BodyId, f64)> {
+        let free = self.world.free_bodies().into_iter().filter(|id| self.grouped[id.index()]);
+        free.filter_map(|id| {
+            let gyration = self.world.bodies[id].rigid()?.gyration_radius();
+            Some((id, self.radii[id.index()].unwrap_or(0.0).max(gyration)))
+        })
+    }
+
+    /// How far each body's center may come in `step` \[m\], if nothing hits it that is much faster.
+    pub(crate) fn travels(&self, states: &[State], step: Step) -> Vec<f64> {
+        let mut travels = vec![0.0; self.world.bodies.len()];
+        let fall = self.world.gravity.map(S::value).norm() * step.dt;
+        for (id, size) in self.free() {
+            travels[id.index()] = (states[id].linear.norm() + fall) * step.dt + SLACK * size;
+        }
+        let bodies = travels.iter_mut().zip(&self.world.bodies).zip(&self.grouped);
+        for ((travel, body), _) in bodies.filter(|(_, grouped)| **grouped) {
+            if let Motion::Driven(trajectory) = &body.motion {
+                let looks = (step.dt / LOOK).ceil().min(LOOKS);
+                let place = |look: usize| {
+                    let state = trajectory.state(step.start + step.dt * look as f64 / looks);
+                    state.value().pose.translation.vector
+                };
+                *travel = (0..looks as usize).map(|i| (place(i + 1) - place(i)).norm()).sum();
+            }
+        }
+        travels
+    }
+
+    /// The contacts of groups whose samples may touch, from `states` on, before each body's center has moved by its one of
+    /// `travels` \[m\], in an order that depends on nothing but the bodies.
+    pub(crate) fn find(&self, states: &[State], travels: &[f64]) -> Vec<Neighbors> {
+        let reaches: Vec<Reach> = (0..states.len().min(travels.len()))
+            .map(|i| Reach {
+                center: states[i].pose.translation.vector,
+                radius: self.radii[i].map(|radius| radius + travels[i]),
+            })
+            .collect();
+        let mut near = Vec::new();
+        for (index, group) in self.world.contact_groups.iter().enumerate() {
+            for (a, b) in self.pairs(group, &reaches) {
+                let contacts = self.world.sides(a, b).unwrap_or_default().into_iter();
+                let contacts =
+                    contacts.map(|(bodies, weight)| Neighbors { group: index, bodies, weight });
+                near.extend(contacts.filter(|contact| self.may_touch(contact, states, travels)));
+            }
+        }
+        near
+    }
+
+    /// The bodies of a group whose reaches meet.
+    fn pairs(&self, group: &ContactGroup<S>, reaches: &[Reach]) -> Vec<(BodyId, BodyId)> {
+        let margin = reach_of(&group.contact);
+        let [a, b] = group.bodies();
+        let (bounded, endless): (Vec<BodyId>, Vec<BodyId>) =
+            b.iter().partition(|id| reaches[id.index()].radius.is_some());
+        let boxes: Vec<Aabb> = bounded.iter().map(|id| reaches[id.index()].aabb(0.0)).collect();
+        let tree = Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes);
+        let mut pairs = Vec::new();
+        for &id in a {
+            let reach = &reaches[id.index()];
+            let mut others = endless.clone();
+            match reach.radius {
+                Some(_) => {
+                    let own = reach.aabb(margin);
+                    others.extend(tree.intersect_aabb(&own).map(|leaf| bounded[leaf as usize]));
+                }
+                None => others.extend(&bounded),
+            }
+            others.retain(|other| {
+                group.is_wanted(id, *other)
+                    && self.world.moves_against(id, *other)
+                    && reach.meets(&reaches[other.index()], margin)
+            });
+            others.sort_unstable();
+            pairs.extend(others.into_iter().map(|other| (id, other)));
+        }
+        pairs
+    }
+
+    /// Whether samples may touch a field that has no end, or is far from filling its ball.
+    fn may_touch(&self, contact: &Neighbors, states: &[State], travels: &[f64]) -> bool {
+        let ContactBodies { samples, field } = contact.bodies;
+        let (body, base) = (&self.world.bodies[samples], &self.world.bodies[field]);
+        let (Some(surface), Some(distance)) = (&body.surface, &base.field) else { return false };
+        // What turns may come anywhere within its ball.
+        if !matches!(base.motion, Motion::Kinematic) {
+            return true;
+        }
+        let pattern = &self.world.contact_groups[contact.group].contact;
+        let radius = surface.radius_about(&body.com().map(S::value));
+        let within = radius + travels[samples.index()] + reach_of(pattern);
+        let place = states[field].pose.inverse() * states[samples].pose.translation.vector;
+        distance.distance(&place.into(), distance.lipschitz_bound() * within).is_some()
+    }
+}
+
+/// How far from a surface a contact begins \[m\].
+fn reach_of<S: Scalar>(contact: &ContactPair<S>) -> f64 {
+    contact.law().reach() + contact.smoothing.band()
+}
+
+/// Radius of a ball about the center of mass that holds samples and solid \[m\].
+fn radius<S: Scalar>(body: &Body<S>) -> Option<f64> {
+    let com = body.com().map(S::value);
+    let samples = body.surface.as_ref().map_or(0.0, |surface| surface.radius_about(&com));
+    let Some(field) = &body.field else { return Some(samples) };
+    let (center, radius) = field.bounding_ball()?;
+    Some(samples.max((center - com).norm() + radius))
+}
+
+/// Where a body may be felt: within a radius \[m\], or anywhere.
+struct Reach {
+    center: Vector3<f64>,
+    radius: Option<f64>,
+}
+
+impl Reach {
+    /// The box around it that is larger by `margin` \[m\].
+    fn aabb(&self, margin: f64) -> Aabb {
+        let [x, y, z] = self.center.into();
+        let half = self.radius.unwrap_or(f64::INFINITY) + margin;
+        Aabb::from_half_extents(Vector::new(x, y, z), Vector::splat(half))
+    }
+
+    /// Whether it and another one are no farther apart than `margin` \[m\].
+    fn meets(&self, other: &Self, margin: f64) -> bool {
+        match (self.radius, other.radius) {
+            (Some(a), Some(b)) => (self.center - other.center).norm() <= a + b + margin,
+            _ => true,
+        }
+    }
+}
+
+impl<S: Scalar> World<S> {
+    /// The contacts, and those of groups that are among `neighbors`.
+    pub(crate) fn contacts_with(&self, neighbors: &[Neighbors]) -> Vec<ContactPair<S>> {
+        let mut contacts = self.contacts.clone();
+        contacts.extend(neighbors.iter().map(|Neighbors { group, bodies, weight }| {
+            self.contact_groups[*group].pair(*bodies, *weight)
+        }));
+        contacts
+    }
+
+    /// The same world with those contacts of its groups one by one that may touch before each body's center has moved by
+    /// its `travel` \[m\] from `states`, as far as it turns.
+    pub(crate) fn with_neighbors<T: Scalar>(
+        &self,
+        states: &[State<T>],
+        travel: impl FnOnce(&NeighborSearch<'_, S>, &[State]) -> Vec<f64>,
+    ) -> Cow<'_, Self> {
+        if self.contact_groups.is_empty() {
+            return Cow::Borrowed(self);
+        }
+        let values: Vec<State> = states.iter().map(State::value).collect();
+        let search = NeighborSearch::new(self);
+        let neighbors = search.find(&values, &travel(&search, &values));
+        let contacts = self.contacts_with(&neighbors);
+        let (bodies, gravity) = (self.bodies.clone(), self.gravity);
+        Cow::Owned(Self { bodies, contacts, contact_groups: Vec::new(), gravity })
+    }
+
+    /// [`World::with_neighbors`] of those that touch, or are no farther than `reach` \[m\] from it.
+    pub(crate) fn with_touching<T: Scalar>(
+        &self,
+        states: &[State<T>],
+        reach: f64,
+    ) -> Cow<'_, Self> {
+        self.with_neighbors(states, |_, states| vec![reach; states.len()])
+    }
+}
