@@ -8,6 +8,7 @@ use nalgebra::{Point3, Unit, Vector3, Vector6};
 
 use crate::error::SimulationError;
 use crate::state::State;
+use crate::surface::SurfacePoint;
 use crate::world::World;
 use crate::world::body_id::BodyId;
 use crate::world::contact_pair::{ContactBodies, ContactPair};
@@ -113,14 +114,15 @@ impl World {
             return Vec::new();
         };
         let place = |position: &Point3<f64>| t_world_com * (position - body.com().coords);
-        let touch = |position: Point3<f64>| {
+        let touch = |point: &SurfacePoint| {
+            let position = place(&point.position);
             let local = t_world_field.inverse_transform_point(&position) + other.com().coords;
-            let outward = field.sample(&local, reach + surface.rounding())?.gradient;
+            let outward = field.sample(&local, reach + point.radius)?.gradient;
             let outward = t_world_field.rotation * outward;
-            let touches = outward.try_normalize(0.0)? * surface.rounding();
+            let touches = outward.try_normalize(0.0)? * point.radius;
             Some((position - touches, outward))
         };
-        surface.points().iter().filter_map(|point| touch(place(&point.position))).collect()
+        surface.points().iter().filter_map(touch).collect()
     }
 }
 

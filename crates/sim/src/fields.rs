@@ -1,6 +1,7 @@
 //! Analytic distance fields.
 
 use nalgebra::{Matrix3, Point3, Unit, Vector3};
+use prehend_autodiff::Scalar;
 use prehend_geometry::{DistanceField, FieldSample};
 
 use crate::body::BodyError;
@@ -91,7 +92,7 @@ pub struct Cuboid {
 
 /// How far from the edges samples begin, in multiples of the rounding. Where flat turns into round the curvature jumps: samples
 /// of a box that lies just there on an equal one would cross it with every tremor, and take twenty times as many steps.
-const INSET: f64 = 1.25;
+pub(crate) const INSET: f64 = 1.25;
 
 impl Cuboid {
     /// Samples of the box: on each face a lattice with distances of `spacing` \[m\] at most, that begins 5/4 of the rounding from the
@@ -109,24 +110,59 @@ impl Cuboid {
     }
 }
 
+/// How far a point is beyond the faces of a box around the origin.
+pub(crate) struct BeyondBox<T: Scalar> {
+    beyond: Vector3<T>,
+    outside: Vector3<T>,
+    sign: Vector3<T>,
+    length: T,
+    /// The axis of the face that the point is farthest beyond, and how far.
+    nearest: usize,
+    depth: T,
+}
+
+impl<T: Scalar> BeyondBox<T> {
+    #[inline]
+    pub(crate) fn new(half_extents: &Vector3<T>, point: &Point3<T>) -> Self {
+        let sign = point.coords.map(|x| T::constant(x.value().signum()));
+        let beyond = point.coords.component_mul(&sign) - half_extents;
+        let outside = beyond.map(|x| if x.value() > 0.0 { x } else { T::zero() });
+        let nearest = beyond.map(T::value).imax();
+        let (length, depth) = (outside.norm(), beyond[nearest]);
+        Self { beyond, outside, sign, length, nearest, depth }
+    }
+
+    /// From the box, negative inside.
+    #[inline]
+    pub(crate) fn distance(&self) -> T {
+        if self.depth.value() > 0.0 { self.length } else { self.depth }
+    }
+
+    /// Gradient and Hessian of the distance.
+    #[inline]
+    pub(crate) fn derivatives(&self) -> (Vector3<T>, Matrix3<T>) {
+        let Self { beyond, outside, sign, length, nearest, depth } = self;
+        if depth.value() > 0.0 {
+            let gradient = outside.component_mul(sign) / *length;
+            let is_beyond = |x: T| if x.value() > 0.0 { T::one() } else { T::zero() };
+            let curved = Matrix3::from_diagonal(&beyond.map(is_beyond));
+            (gradient, (curved - gradient * gradient.transpose()) / *length)
+        } else {
+            (Vector3::ith(*nearest, sign[*nearest]), Matrix3::zeros())
+        }
+    }
+}
+
 impl DistanceField for Cuboid {
     fn sample(&self, point: &Point3<f64>, reach: f64) -> Option<FieldSample> {
         // From the box without its round shell.
-        let beyond = point.coords.abs() - self.half_extents.add_scalar(-self.rounding);
-        let outside = beyond.sup(&Vector3::zeros());
-        let (length, (nearest, depth)) = (outside.norm(), beyond.argmax());
-        let distance = if depth > 0.0 { length } else { depth } - self.rounding;
+        let core = self.half_extents.add_scalar(-self.rounding);
+        let beyond = BeyondBox::new(&core, point);
+        let distance = beyond.distance() - self.rounding;
         if distance > reach {
             return None;
         }
-        let sign = point.coords.map(f64::signum);
-        let (gradient, hessian) = if depth > 0.0 {
-            let gradient = outside.component_mul(&sign) / length;
-            let curved = Matrix3::from_diagonal(&beyond.map(|x| if x > 0.0 { 1.0 } else { 0.0 }));
-            (gradient, (curved - gradient * gradient.transpose()) / length)
-        } else {
-            (Vector3::ith(nearest, sign[nearest]), Matrix3::zeros())
-        };
+        let (gradient, hessian) = beyond.derivatives();
         Some(FieldSample { distance, gradient, hessian })
     }
 

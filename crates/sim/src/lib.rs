@@ -30,6 +30,7 @@ mod robot;
 mod rollout;
 #[cfg(test)]
 mod scenes;
+mod shape;
 mod smoothing;
 mod stability;
 mod state;
@@ -81,6 +82,9 @@ pub use integrator::velocity_verlet::VelocityVerlet;
 pub use law_report::{Curve, Finding, LawReport, Verdict, law_report};
 pub use robot::JointState;
 pub use rollout::Simulation;
+pub use shape::Shape;
+pub use shape::error::ShapeError;
+pub use shape::options::ShapeOptions;
 pub use smoothing::{SmoothedGradient, Smoothing, SmoothingError};
 pub use stability::{Averaging, Perturbation, StabilityJacobian, StabilityLoss, StabilityWeights};
 pub use state::State;

@@ -11,6 +11,10 @@ pub struct SurfacePoint {
     pub position: Point3<f64>,
     /// Area the sample stands for \[m²\].
     pub area: f64,
+    /// Radius of the sample, which is a ball \[m\]; zero for a point.
+    pub radius: f64,
+    /// Its place among the samples that the surface was made of.
+    pub(crate) index: u32,
 }
 
 /// Samples of a surface, sorted into blocks of neighbors.
@@ -22,7 +26,7 @@ pub struct Surface {
     points: Vec<SurfacePoint>,
     blocks: Vec<Block>,
     area: f64,
-    /// Radius of the samples \[m\].
+    /// Largest radius of a sample \[m\].
     rounding: f64,
 }
 
@@ -52,18 +56,37 @@ impl Surface {
         if points.is_empty() {
             return Err(BodyError::NoSamples);
         }
-        let fine = |(p, a): (&Point3<f64>, &f64)| {
-            p.iter().all(|x| x.is_finite()) && a.is_finite() && *a > 0.0
+        Self::balls(points.iter().zip(areas).map(|(&center, &area)| (center, 0.0, area)))
+    }
+
+    /// Balls as samples: their centers and radii \[m\] and the areas that they stand for \[m²\].
+    ///
+    /// # Errors
+    /// Where there are none, or one is not finite, of no area or a negative radius.
+    pub(crate) fn balls(
+        samples: impl IntoIterator<Item = (Point3<f64>, f64, f64)>,
+    ) -> Result<Self, BodyError> {
+        let sample = |(index, (position, radius, area)): (usize, (Point3<f64>, f64, f64))| {
+            let fine = |x: f64, least: f64| x.is_finite() && x >= least;
+            if position.iter().all(|x| x.is_finite())
+                && fine(area, f64::MIN_POSITIVE)
+                && fine(radius, 0.0)
+            {
+                Ok(SurfacePoint { position, area, radius, index: index as u32 })
+            } else {
+                Err(BodyError::Sample { index })
+            }
         };
-        if let Some(index) = points.iter().zip(areas).position(|sample| !fine(sample)) {
-            return Err(BodyError::Sample { index });
-        }
-        let samples = points.iter().zip(areas);
         let mut points: Vec<SurfacePoint> =
-            samples.map(|(&position, &area)| SurfacePoint { position, area }).collect();
+            samples.into_iter().enumerate().map(sample).collect::<Result<_, _>>()?;
+        if points.is_empty() {
+            return Err(BodyError::NoSamples);
+        }
+        let area = points.iter().map(|p| p.area).sum();
+        let rounding = points.iter().map(|p| p.radius).fold(0.0, f64::max);
         let mut blocks = Vec::new();
         sort_into_blocks(&mut points, 0, &mut blocks);
-        Ok(Self { blocks, area: areas.iter().sum(), points, rounding: 0.0 })
+        Ok(Self { blocks, area, points, rounding })
     }
 
     /// The same samples as balls of `radius` \[m\]: one makes a sphere, eight the corners of a rounded box. They touch
@@ -76,6 +99,7 @@ impl Surface {
             return Err(BodyError::Rounding(radius));
         }
         self.rounding = radius;
+        self.points.iter_mut().for_each(|point| point.radius = radius);
         Ok(self)
     }
 
@@ -184,10 +208,15 @@ impl Surface {
         radii.fold(0.0, f64::max) + self.rounding
     }
 
-    /// Radius of the samples \[m\].
+    /// Largest radius of a sample \[m\].
     #[inline]
     pub(crate) fn rounding(&self) -> f64 {
         self.rounding
+    }
+
+    /// Smallest radius of a sample \[m\].
+    pub(crate) fn smallest(&self) -> f64 {
+        self.points.iter().map(|p| p.radius).fold(self.rounding, f64::min)
     }
 
     /// The samples that `keep` wants, as one block that is never left out. What is not kept stays part of the area.

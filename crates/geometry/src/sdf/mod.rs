@@ -4,9 +4,11 @@ mod build;
 mod cache;
 mod file;
 mod grid;
+mod heights;
 mod lattice;
 mod spline;
 
 pub use cache::GridCache;
 pub use grid::SdfGrid;
+pub use heights::{HeightSample, HeightSpline};
 pub use lattice::{Lattice, MAX_SAMPLES, SdfError};

@@ -115,7 +115,7 @@ fn factors(n: usize) -> Vec<f64> {
 /// given columns.
 ///
 /// Thomas elimination of `c[i-1] + 4 c[i] + c[i+1] = 6 f[i]` with `c = f` at both ends.
-fn solve(rows: &mut [f64], n: usize, width: usize, columns: Range<usize>) {
+pub(super) fn solve(rows: &mut [f64], n: usize, width: usize, columns: Range<usize>) {
     let factor = factors(n);
     for i in 1..n - 1 {
         let (before, from) = rows.split_at_mut((i + 1) * width);

@@ -94,7 +94,7 @@ impl Patch<'_> {
         let reach = self.surface.rounding();
         let earlier = Self { state: before, ..*self };
         let gradient = |patch: &Self, point: &SurfacePoint| {
-            Some(patch.field.sample(&patch.place(&point.position), reach)?.gradient)
+            Some(patch.field.sample(&patch.place(&point.position), point.radius)?.gradient)
         };
         let crosses = |point: &SurfacePoint| {
             gradient(&earlier, point).is_some_and(|from| {
@@ -109,11 +109,11 @@ impl Patch<'_> {
 
     /// Calls `visit` with gap \[m\] and area \[m²\] of every sample that a law that reaches to `cutoff` may push.
     pub(crate) fn for_each_gap(&self, cutoff: f64, mut visit: impl FnMut(f64, f64)) {
-        let radius = self.surface.rounding();
-        let within = cutoff + self.smoothing.force_band() + radius;
+        let within = cutoff + self.smoothing.force_band();
         for point in self.surface.points() {
-            if let Some(distance) = self.field.distance(&self.place(&point.position), within) {
-                visit(distance - radius, point.area);
+            let place = self.place(&point.position);
+            if let Some(distance) = self.field.distance(&place, within + point.radius) {
+                visit(distance - point.radius, point.area);
             }
         }
     }
@@ -130,13 +130,14 @@ impl Patch<'_> {
     ) -> bool {
         let State { pose, linear, angular } = &self.state;
         let (translation, rotation) = (pose.translation.vector, pose.rotation.to_rotation_matrix());
-        let (radius, reach) = (self.surface.rounding(), self.reach(cutoff));
+        let reach = self.reach(cutoff);
         let skips = pressing_only && self.smoothing.leaks();
         for (block, points) in self.surface.blocks() {
             if !self.may_touch(block, reach) {
                 continue;
             }
             for point in points {
+                let radius = point.radius;
                 let arm = rotation * (point.position - self.com);
                 let place = Point3::from(translation + arm);
                 // The distance alone is cheap. What is no number is found below.

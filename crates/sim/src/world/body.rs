@@ -9,6 +9,7 @@ use prehend_geometry::DistanceField;
 use super::trajectory::{self, Trajectory};
 use crate::body::{BodyError, RigidBody};
 use crate::fields::Cuboid;
+use crate::shape::body::Matter;
 use crate::surface::Surface;
 
 /// What a body is and how it touches others.
@@ -24,6 +25,8 @@ pub struct Body<S: Scalar = f64> {
     pub field: Option<Arc<dyn DistanceField>>,
     /// Force \[N\] and torque about the center of mass \[N m\] besides gravity and contacts, world frame.
     pub external_wrench: Vector6<S>,
+    /// What it is made of, where its surface and field come from a shape.
+    pub(crate) matter: Option<Matter<S>>,
 }
 
 /// What moves a body.
@@ -41,7 +44,14 @@ pub enum Motion<S: Scalar = f64> {
 impl<S: Scalar> Body<S> {
     fn new(name: &str, motion: Motion<S>) -> Self {
         let external_wrench = Vector6::zeros();
-        Self { name: name.to_owned(), motion, surface: None, field: None, external_wrench }
+        Self {
+            name: name.to_owned(),
+            motion,
+            surface: None,
+            field: None,
+            external_wrench,
+            matter: None,
+        }
     }
 
     /// A body that forces move.
@@ -108,6 +118,7 @@ impl<S: Scalar> Body<S> {
             surface: self.surface.clone(),
             field: self.field.clone(),
             external_wrench: self.external_wrench.map(&f),
+            matter: self.matter.as_ref().map(|matter| matter.map(&f)),
         }
     }
 }

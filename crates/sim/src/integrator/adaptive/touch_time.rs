@@ -44,7 +44,7 @@ fn first_of(
             let place = (state.pose.translation.vector + arm).into();
             let FieldSample { distance, gradient, .. } = field.sample(&place, f64::INFINITY)?;
             let rate = gradient.dot(&(state.linear + state.angular.cross(&arm)));
-            Some([distance - surface.rounding() - reach, rate])
+            Some([distance - point.radius - reach, rate])
         });
         let time = crossing(from?, to?, dt)?;
         (time > earliest).then_some(time)

@@ -45,7 +45,7 @@ impl Travel {
             let radius = surface.radius_about(&body.com());
             let size = |body: &Body| body.rigid().map_or(0.0, RigidBody::gyration_radius);
             let own = radius.max(size(body));
-            let thickness = other.field.as_ref()?.thickness() + 2.0 * surface.rounding();
+            let thickness = other.field.as_ref()?.thickness() + 2.0 * surface.smallest();
             let free = FREE_TRAVEL * if own > 0.0 { own } else { size(other) };
             let free = free.min(FREE_THICKNESS * thickness);
             let driven = [body, other].iter().any(|body| matches!(body.motion, Motion::Driven(_)));

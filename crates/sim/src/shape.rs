@@ -1,0 +1,186 @@
+//! Shapes of bodies: mass properties, samples and a distance field from one description.
+
+mod ball;
+pub(crate) mod body;
+mod border;
+mod capsule;
+mod compound;
+mod cuboid;
+pub(crate) mod error;
+mod from_parry;
+mod ground;
+mod height_field;
+mod kind;
+mod lattice;
+mod mesh;
+mod nearest;
+pub(crate) mod options;
+mod polyhedron;
+mod polytope;
+mod profile;
+mod revolved;
+mod round;
+mod rows;
+pub(crate) mod solid;
+
+use std::fmt;
+use std::sync::Arc;
+
+use prehend_autodiff::Scalar;
+use prehend_geometry::{DistanceField, Moments};
+
+use crate::surface::Surface;
+use error::ShapeError;
+use kind::Kind;
+use options::ShapeOptions;
+
+/// The shape of a body, over plain numbers or numbers that carry derivatives: its dimensions, and samples of its surface and a
+/// distance field of their values, which bodies of one shape share.
+///
+/// Shapes of [parry](https://parry.rs) are read by [`Shape::from_parry`]. All convex ones with a name are a core with a round border;
+/// the distance is exact outside of the core. What is sharp there gets round edges within its size, by
+/// [`ShapeOptions::rounding`]: faces stay where they are, edges, corners and the tip of a cone are that much blunter. Mass
+/// properties are those of the sharp solid. Shapes with a border have it in their mass, too, unlike parry's.
+///
+/// Samples are balls on faces, edges and corners from within, 5/4 as large as the rounding of the field: they touch whole faces and
+/// edges at once and roll over edges. The areas that they stand for share out each face, see [`Surface::cuboid`].
+///
+/// ```
+/// use parry3d_f64::shape::Cuboid;
+/// use parry3d_f64::math::Vector;
+/// use prehend_autodiff::Fwd;
+/// use prehend_sim::{Body, Shape};
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let shape = Shape::from_parry(&Cuboid::new(Vector::new(0.02, 0.03, 0.05)))?;
+/// let brick = Body::from_shape("brick", &shape, 1e3)?;
+/// assert!((brick.rigid().map_or(0.0, |rigid| rigid.mass()) - 0.24).abs() < 1e-12);
+/// // Mass by half an edge.
+/// let mut lifted = shape.lift::<Fwd<1>>();
+/// lifted.set_dimension("half_extent_x", Fwd::variable(0.02, 0))?;
+/// let volume = lifted.moments().map_or(0.0, |moments| moments.volume.derivative[0]);
+/// assert!((volume - 8.0 * 0.03 * 0.05).abs() < 1e-15);
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone)]
+pub struct Shape<S: Scalar = f64> {
+    built: Arc<Built>,
+    dimensions: Vec<S>,
+}
+
+/// What follows from the values of the dimensions.
+struct Built {
+    kind: Arc<Kind>,
+    values: Vec<f64>,
+    surface: Option<Arc<Surface>>,
+    field: Arc<dyn DistanceField>,
+}
+
+impl Built {
+    fn new(kind: Arc<Kind>, values: Vec<f64>) -> Result<Self, ShapeError> {
+        kind.check(&values)?;
+        let samples = kind.samples(&values);
+        let surface = match samples.is_empty() {
+            true => None,
+            false => Some(Arc::new(Surface::balls(
+                samples.iter().map(|s| (s.center, s.radius, s.area)),
+            )?)),
+        };
+        Ok(Self { surface, field: kind.field(&values), kind, values })
+    }
+}
+
+impl Shape {
+    /// The shape of parry, with lengths that follow from its size where it does not say them.
+    ///
+    /// Balls, boxes, capsules, cylinders, cones and convex polyhedra, sharp or round; half-spaces; height fields, which are C² splines
+    /// through their heights and go on by straight lines beyond the border; meshes, whose distance is a C² grid; and compounds of
+    /// them, whose parts should not overlap.
+    ///
+    /// # Errors
+    /// For other kinds, and for dimensions that are not positive and finite.
+    pub fn from_parry(shape: &dyn parry3d_f64::shape::Shape) -> Result<Self, ShapeError> {
+        Self::from_parry_with(shape, &ShapeOptions::default())
+    }
+
+    /// [`Shape::from_parry`] with lengths of one's own.
+    ///
+    /// # Errors
+    /// See there, and for lengths that are not positive and finite, or that leave nothing of the shape.
+    pub fn from_parry_with(
+        shape: &dyn parry3d_f64::shape::Shape,
+        options: &ShapeOptions,
+    ) -> Result<Self, ShapeError> {
+        let (kind, dimensions) = from_parry::read(shape, options)?;
+        let built = Arc::new(Built::new(Arc::new(kind), dimensions.clone())?);
+        Ok(Self { built, dimensions })
+    }
+
+    /// The same shape in constants of another scalar.
+    pub fn lift<S: Scalar>(&self) -> Shape<S> {
+        self.map(S::constant)
+    }
+}
+
+impl<S: Scalar> Shape<S> {
+    /// Its dimensions with their names \[m\], none of a half-space.
+    pub fn dimensions(&self) -> Vec<(String, S)> {
+        self.built.kind.names().into_iter().zip(self.dimensions.iter().copied()).collect()
+    }
+
+    /// Sets the dimension called `name`, such as `"radius"` \[m\]: to differentiate by it, put in a variable. Samples and the field are
+    /// made anew if its value is another.
+    ///
+    /// # Errors
+    /// If there is no such dimension, or no such shape.
+    pub fn set_dimension(&mut self, name: &str, value: S) -> Result<(), ShapeError> {
+        let names = self.built.kind.names();
+        let Some(place) = names.iter().position(|own| own == name) else {
+            return Err(ShapeError::NoDimension { name: name.to_owned(), known: names.join(", ") });
+        };
+        let mut dimensions = self.dimensions.clone();
+        dimensions[place] = value;
+        *self = self.with_dimensions(dimensions)?;
+        Ok(())
+    }
+
+    /// The same shape with other dimensions, as many.
+    fn with_dimensions(&self, dimensions: Vec<S>) -> Result<Self, ShapeError> {
+        let values: Vec<f64> = dimensions.iter().map(|x| x.value()).collect();
+        let built = match values == self.built.values {
+            true => Arc::clone(&self.built),
+            false => Arc::new(Built::new(Arc::clone(&self.built.kind), values)?),
+        };
+        Ok(Self { built, dimensions })
+    }
+
+    /// Volume \[m³\] and the first two moments about the origin; none of what is a fixed body only.
+    pub fn moments(&self) -> Option<Moments<S>> {
+        self.built.kind.moments(&self.dimensions)
+    }
+
+    /// Samples of its surface; none of what has no mass.
+    pub fn surface(&self) -> Option<&Arc<Surface>> {
+        self.built.surface.as_ref()
+    }
+
+    /// Signed distance to it.
+    pub fn field(&self) -> &Arc<dyn DistanceField> {
+        &self.built.field
+    }
+
+    /// The same shape, each dimension through `f`.
+    pub(crate) fn map<T: Scalar>(&self, f: impl Fn(S) -> T) -> Shape<T> {
+        Shape {
+            built: Arc::clone(&self.built),
+            dimensions: self.dimensions.iter().map(|&x| f(x)).collect(),
+        }
+    }
+}
+
+impl<S: Scalar> fmt::Debug for Shape<S> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_map().entries(self.dimensions()).finish()
+    }
+}

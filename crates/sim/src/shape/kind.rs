@@ -1,0 +1,128 @@
+//! The kinds of shapes.
+
+use std::sync::Arc;
+
+use prehend_autodiff::Scalar;
+use prehend_geometry::{DistanceField, Moments};
+
+use super::ball::Ball;
+use super::border::Border;
+use super::capsule::Capsule;
+use super::compound::Compound;
+use super::cuboid::RoundCuboid;
+use super::error::ShapeError;
+use super::ground::Ground;
+use super::polyhedron::Polyhedron;
+use super::revolved::Revolved;
+use super::solid::{Sample, Solid};
+use crate::fields::INSET;
+
+/// What a shape is, but for the values of its dimensions.
+pub(crate) enum Kind {
+    Ball(Ball),
+    Cuboid(RoundCuboid),
+    Capsule(Capsule),
+    Revolved(Revolved),
+    Polyhedron(Polyhedron),
+    Ground(Ground),
+    Compound(Compound),
+}
+
+/// Calls a method of the convex solid within, or of what else it is.
+macro_rules! each {
+    ($kind:expr, $solid:ident => $call:expr, $ground:ident => $other:expr, $all:ident => $parts:expr) => {
+        match $kind {
+            Kind::Ball($solid) => $call,
+            Kind::Cuboid($solid) => $call,
+            Kind::Capsule($solid) => $call,
+            Kind::Revolved($solid) => $call,
+            Kind::Polyhedron($solid) => $call,
+            Kind::Ground($ground) => $other,
+            Kind::Compound($all) => $parts,
+        }
+    };
+}
+
+impl Kind {
+    /// The names of its dimensions.
+    pub(super) fn names(&self) -> Vec<String> {
+        each!(self, solid => solid.names(), _ground => Vec::new(), all => all.names())
+    }
+
+    /// Why it has no mass, if it has none.
+    pub(super) fn fixed_only(&self) -> Option<&'static str> {
+        each!(self, _solid => None, ground => match ground.moments {
+            Some(_) => None,
+            None => Some(ground.kind),
+        }, all => all.parts.iter().find_map(|part| part.kind.fixed_only()))
+    }
+
+    pub(super) fn moments<T: Scalar>(&self, dimensions: &[T]) -> Option<Moments<T>> {
+        each!(self, solid => Some(solid.moments(dimensions)), ground => {
+            ground.moments.map(|moments| Moments {
+                volume: T::constant(moments.volume),
+                first: moments.first.map(T::constant),
+                second: moments.second.map(T::constant),
+            })
+        }, all => all.moments(dimensions))
+    }
+
+    pub(super) fn samples<T: Scalar>(&self, dimensions: &[T]) -> Vec<Sample<T>> {
+        each!(self, solid => solid.samples(dimensions), ground => {
+            let lift = |s: &Sample<f64>| Sample {
+                center: s.center.map(T::constant),
+                radius: T::constant(s.radius),
+                area: T::constant(s.area),
+            };
+            ground.samples.iter().map(lift).collect()
+        }, all => all.samples(dimensions))
+    }
+
+    pub(super) fn field(&self, dimensions: &[f64]) -> Arc<dyn DistanceField> {
+        each!(self, solid => Arc::new(solid.round(dimensions)), ground => {
+            Arc::clone(&ground.field)
+        }, all => all.field(dimensions))
+    }
+
+    /// Whether there is such a shape.
+    pub(super) fn check(&self, dimensions: &[f64]) -> Result<(), ShapeError> {
+        if let Self::Compound(all) = self {
+            return all.parts(dimensions).try_for_each(|(part, own)| part.kind.check(own));
+        }
+        for (name, &value) in self.names().into_iter().zip(dimensions) {
+            // The segment of a capsule may be a point, a vertex may be anywhere.
+            let least = match self {
+                Self::Capsule(_) if name == "half_height" => 0.0,
+                Self::Polyhedron(_) if name.starts_with("vertex") => f64::MIN,
+                _ => f64::MIN_POSITIVE,
+            };
+            if !(value.is_finite() && value >= least) {
+                return Err(ShapeError::Dimension { name, value });
+            }
+        }
+        let (border, deepest) = match self {
+            Self::Ball(_) | Self::Capsule(_) | Self::Ground(_) | Self::Compound(_) => return Ok(()),
+            Self::Polyhedron(polyhedron) => {
+                (polyhedron.border, polyhedron.deepest(dimensions).ok_or(ShapeError::NotConvex)?)
+            }
+            Self::Cuboid(cuboid) => {
+                (cuboid.border, dimensions[..3].iter().copied().fold(f64::INFINITY, f64::min))
+            }
+            Self::Revolved(revolved) => (
+                revolved.border,
+                Revolved::deepest(revolved.outline, [dimensions[0], dimensions[1]]),
+            ),
+        };
+        check_rounding(border, dimensions, deepest)
+    }
+}
+
+/// Whether samples leave something of a solid that an inset of `deepest` \[m\] makes nothing of.
+fn check_rounding(border: Border, dimensions: &[f64], deepest: f64) -> Result<(), ShapeError> {
+    let rounding = border.rounding(dimensions);
+    let limit = (deepest + rounding.outward()) / INSET;
+    match rounding.border() {
+        radius if radius > 0.0 && rounding.inset() < deepest => Ok(()),
+        radius => Err(ShapeError::Rounding { radius, limit }),
+    }
+}

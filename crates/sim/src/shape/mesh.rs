@@ -1,0 +1,30 @@
+//! Triangle meshes.
+
+use std::sync::Arc;
+
+use prehend_geometry::mass::mass_properties;
+use prehend_geometry::{ClosestPoints, Moments, SdfGrid, TriMesh};
+
+use super::error::ShapeError;
+use super::ground::Ground;
+use super::lattice::{Triangle, lattice};
+use super::options::Lengths;
+use super::solid::Sample;
+
+/// Margin of the grid around the mesh, in cells: there distances are interpolated.
+const MARGIN: f64 = 8.0;
+
+/// A mesh with a C² grid of its distance, whose edges are as round as a cell, and points on its faces, edges and vertices as
+/// samples. Without an inside it has no mass.
+pub(super) fn mesh(mesh: &TriMesh, lengths: &Lengths) -> Result<Ground, ShapeError> {
+    let closest = ClosestPoints::new(mesh)?;
+    let field = SdfGrid::build(&closest, lengths.cell, MARGIN * lengths.cell)?;
+    let all = || (0..mesh.faces.len()).map(|face| mesh.triangle(face));
+    let triangles: Vec<Triangle<f64>> =
+        all().map(|corners| Triangle { corners, stretch: 1.0 }).collect();
+    let sample = |(center, area)| Sample { center, radius: 0.0, area };
+    let samples = lattice(&triangles, lengths.spacing).into_iter().map(sample).collect();
+    // What is open or faces inward has none.
+    let moments = mass_properties(mesh, 1.0).ok().map(|_| Moments::enclosed(all()));
+    Ok(Ground { kind: "mesh that is not closed", field: Arc::new(field), samples, moments })
+}

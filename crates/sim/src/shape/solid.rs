@@ -1,0 +1,30 @@
+//! What a kind of solid knows about itself.
+
+use nalgebra::Point3;
+use prehend_autodiff::Scalar;
+use prehend_geometry::Moments;
+
+use super::round::Round;
+
+/// A ball that touches others where they are nearest: its center and radius \[m\] and the area that it stands for \[m²\].
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Sample<T: Scalar> {
+    pub(crate) center: Point3<T>,
+    pub(crate) radius: T,
+    pub(crate) area: T,
+}
+
+/// A convex solid of a few dimensions, which may carry derivatives. How many samples it has follows from their values.
+pub(crate) trait Solid {
+    /// What its dimensions are called.
+    fn names(&self) -> Vec<String>;
+
+    /// Volume, center and second moments.
+    fn moments<T: Scalar>(&self, dimensions: &[T]) -> Moments<T>;
+
+    /// Signed distance to it.
+    fn round<T: Scalar>(&self, dimensions: &[T]) -> Round<T>;
+
+    /// Samples of its surface.
+    fn samples<T: Scalar>(&self, dimensions: &[T]) -> Vec<Sample<T>>;
+}
