@@ -3,6 +3,7 @@
 pub(crate) mod bristle_law;
 pub mod bristles;
 pub mod composite;
+pub(crate) mod dimensions;
 pub mod dynamic;
 pub mod error;
 pub(crate) mod force_jump;

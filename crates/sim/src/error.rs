@@ -4,6 +4,7 @@ use thiserror::Error;
 
 use crate::body::BodyError;
 use crate::contact::error::LawError;
+use crate::shape::error::ShapeError;
 use crate::world::body_id::BodyId;
 
 /// Why a simulation cannot be set up or cannot go on.
@@ -91,6 +92,14 @@ pub enum SimulationError {
         body: String,
         /// What is wrong.
         error: BodyError,
+    },
+    /// A body has impossible dimensions.
+    #[error("body '{body}': {error}")]
+    Shape {
+        /// Its name.
+        body: String,
+        /// What is wrong.
+        error: ShapeError,
     },
     /// A world that differs in more than parameters from the one its integrator was made for.
     #[error("the integrator was made for a world of other bodies or contacts")]

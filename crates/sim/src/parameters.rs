@@ -50,7 +50,8 @@ impl<S: Scalar> World<S> {
     /// Everything by which a world can be differentiated, but for trajectories, in a row.
     ///
     /// For each body: if it is free, its mass \[kg\], its inertia xx, yy, zz, xy, xz, yz \[kg m²\] and its center of mass in the
-    /// model frame \[m\]; then its external wrench, force \[N\] and torque \[N m\]. Then gravity \[m/s²\]; then the law's parameters
+    /// model frame \[m\]; then its external wrench, force \[N\] and torque \[N m\], and the dimensions of its shape, if it is made of one, which
+    /// change its contacts only \[m\]. Then gravity \[m/s²\]; then the law's parameters
     /// of each contact, and those of each group of contacts.
     ///
     /// States are those of centers of mass: with the states as they are, a body whose center of mass moves in its model frame is
@@ -66,6 +67,7 @@ impl<S: Scalar> World<S> {
                 parameters.extend(rigid.com().iter());
             }
             parameters.extend(body.external_wrench.iter());
+            parameters.extend(body.dimensions());
         }
         parameters.extend(self.gravity.iter());
         parameters.extend(self.contact_params().copied());
@@ -84,7 +86,8 @@ impl<S: Scalar> World<S> {
         self.check_trajectories()?;
         let free = self.bodies.iter().filter(|body| body.rigid().is_some()).count();
         let params = self.contact_params().count();
-        let expected = 10 * free + 6 * self.bodies.len() + 3 + params;
+        let dimensions: usize = self.bodies.iter().map(|body| body.dimensions().len()).sum();
+        let expected = 10 * free + 6 * self.bodies.len() + dimensions + 3 + params;
         if parameters.len() != expected {
             return Err(SimulationError::Parameters { given: parameters.len(), expected });
         }
@@ -102,6 +105,9 @@ impl<S: Scalar> World<S> {
                     .map_err(|error| SimulationError::Body { body: body.name.clone(), error })?;
             }
             body.external_wrench = Vector6::from_fn(|_, _| next());
+            let dimensions = body.dimensions().iter().map(|_| next()).collect();
+            body.set_dimensions(dimensions)
+                .map_err(|error| SimulationError::Shape { body: body.name.clone(), error })?;
         }
         world.gravity = Vector3::from_fn(|_, _| next());
         let groups = world.contact_groups.iter_mut().map(|group| &mut group.contact);

@@ -12,6 +12,7 @@ mod ground;
 mod height_field;
 mod kind;
 mod lattice;
+pub(crate) mod lifted;
 mod mesh;
 mod nearest;
 pub(crate) mod options;

@@ -88,30 +88,50 @@ impl BristleFunction<'_> {
         change: &[T],
         from_com: Option<&Vector3<T>>,
     ) -> [T; 12] {
+        let moved = Moved::new(self.patch, change);
+        let deflection = Vector6::from_fn(|i, _| change[12 + i].plus(self.deflection[i]));
+        self.response_of(p, &deflection, from_com, |touch, cutoff| moved.lift(touch, cutoff))
+    }
+
+    /// The function of dimensions of the shapes, with which `lift` gives a contact.
+    pub(crate) fn response_by_dimensions<T: Scalar>(
+        &self,
+        lift: impl Fn(&Touch, f64) -> Lifted<T>,
+    ) -> [T; 12] {
+        self.response_of(&self.constants(), &self.deflection.map(T::constant), None, lift)
+    }
+
+    fn response_of<T: Scalar>(
+        &self,
+        p: &[T],
+        deflection: &Vector6<T>,
+        from_com: Option<&Vector3<T>>,
+        lift: impl Fn(&Touch, f64) -> Lifted<T>,
+    ) -> [T; 12] {
         let Self { patch, bristles, .. } = *self;
         let (cutoff, law) = (self.law.reach(), BristleLaw::new(self.law, p));
-        let moved = Moved::new(patch, change);
-        let deflection = Vector6::from_fn(|i, _| change[12 + i].plus(self.deflection[i]));
         let mut wrench = Vector6::<T>::zeros();
         let mut fit = RateFit::default();
         let sound = patch.for_each_touch(cutoff, T::ORDER == 0, |touch| {
-            let Lifted { mut contact, lever } = moved.lift(touch, cutoff);
+            let Lifted { mut contact, lever, stretch } = lift(touch, cutoff);
             let lever = from_com.map_or(lever, |from_com| lever + from_com);
             let across = across(&contact.normal, &lever);
             let (slip, deflected) = (contact.slip, across * deflection);
             contact.slip += deflected.map(|u| u.times(bristles.slip_speed / bristles.deflection));
             let response = law.response(&contact);
             let force = contact.normal * response.normal + response.tangential;
+            let force = stretch.map_or(force, |stretch| force * stretch);
             let torque = lever.cross(&force);
             wrench += Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z);
             // By depth, which ends smoothly where a contact does; the force of a damper may end before.
             let depth = -contact.gap.plus(-cutoff);
             if depth.value() > 0.0 {
                 let weight = depth.times(contact.area);
+                let weight = stretch.map_or(weight, |stretch| weight * stretch);
                 fit.add(&across, weight, depth, bristles.rate(&slip, &deflected));
             }
         });
-        let rate = fit.rate(&deflection, bristles);
+        let rate = fit.rate(deflection, bristles);
         let failed = T::constant(f64::NAN);
         let all = |i: usize| if i < 6 { wrench[i] } else { rate[i - 6] };
         std::array::from_fn(|i| if sound { all(i) } else { failed })
@@ -204,9 +224,11 @@ struct Moved<'a, T> {
 }
 
 /// A contact, and where it is from the center of mass.
-struct Lifted<T: Scalar> {
-    contact: Contact<T>,
-    lever: Vector3<T>,
+pub(crate) struct Lifted<T: Scalar> {
+    pub(super) contact: Contact<T>,
+    pub(super) lever: Vector3<T>,
+    /// Its area in multiples of the value of that, if it changes: all forces are proportional to it.
+    pub(super) stretch: Option<T>,
 }
 
 impl<'a, T: Scalar> Moved<'a, T> {
@@ -227,7 +249,7 @@ impl<'a, T: Scalar> Moved<'a, T> {
                 normal: constant(&normal),
                 area,
             };
-            return Lifted { contact, lever: constant(&touch.lever) };
+            return Lifted { contact, lever: constant(&touch.lever), stretch: None };
         }
         let Contact { gap, normal_speed, slip, normal, area } = touch.lifted(cutoff);
         let turned = self.turn.cross(&constant(&touch.arm));
@@ -251,6 +273,6 @@ impl<'a, T: Scalar> Moved<'a, T> {
             normal: normal.map(compose),
             area,
         };
-        Lifted { contact, lever: constant(&touch.lever) + lever_change }
+        Lifted { contact, lever: constant(&touch.lever) + lever_change, stretch: None }
     }
 }

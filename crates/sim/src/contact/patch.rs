@@ -31,7 +31,7 @@ pub struct Patch<'a> {
 }
 
 /// A point in contact: what both the value and its derivative start from.
-pub(super) struct Touch {
+pub(crate) struct Touch {
     /// From the center of mass to the sample, and to where it touches.
     pub(super) arm: Vector3<f64>,
     pub(super) lever: Vector3<f64>,
@@ -44,6 +44,8 @@ pub(super) struct Touch {
     pub(super) length: f64,
     pub(super) area: f64,
     pub(super) hessian: Matrix3<f64>,
+    /// Place of the sample among those that the surface was made of.
+    pub(super) index: u32,
 }
 
 impl Patch<'_> {
@@ -170,6 +172,7 @@ impl Patch<'_> {
                     length,
                     area,
                     hessian,
+                    index: point.index,
                 });
             }
         }

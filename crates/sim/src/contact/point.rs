@@ -17,7 +17,7 @@ pub struct Contact<S: Scalar> {
     pub slip: Vector3<S>,
     /// Unit normal, out of the body with the field.
     pub normal: Vector3<S>,
-    /// Surface area that the sample stands for \[m²\].
+    /// Surface area that the sample stands for \[m²\]. Forces are proportional to it: derivatives by the size of a shape count on that.
     pub area: f64,
 }
 

@@ -8,6 +8,7 @@ use prehend_autodiff::lie::lift;
 use prehend_geometry::{DistanceField, FieldSample, Moments};
 
 use super::kind::Kind;
+use super::lifted::LiftedField;
 use super::solid::Sample;
 
 /// Shapes that move together and do not overlap. The distance is the least of theirs, and has kinks where two are as near.
@@ -58,6 +59,14 @@ impl Compound {
             part.kind.samples(own).into_iter().map(moved).collect::<Vec<_>>()
         };
         self.parts(dimensions).flat_map(samples).collect()
+    }
+
+    pub(super) fn lifted_parts<T: Scalar>(
+        &self,
+        dimensions: &[T],
+    ) -> Vec<(Isometry3<f64>, LiftedField<T>)> {
+        let part = |(part, own): (&Part, &[T])| (part.pose, part.kind.lifted_field(own));
+        self.parts(dimensions).map(part).collect()
     }
 
     pub(super) fn field(&self, dimensions: &[f64]) -> Arc<dyn DistanceField> {

@@ -12,6 +12,7 @@ use super::compound::Compound;
 use super::cuboid::RoundCuboid;
 use super::error::ShapeError;
 use super::ground::Ground;
+use super::lifted::LiftedField;
 use super::polyhedron::Polyhedron;
 use super::revolved::Revolved;
 use super::solid::{Sample, Solid};
@@ -82,6 +83,12 @@ impl Kind {
         each!(self, solid => Arc::new(solid.round(dimensions)), ground => {
             Arc::clone(&ground.field)
         }, all => all.field(dimensions))
+    }
+
+    pub(super) fn lifted_field<T: Scalar>(&self, dimensions: &[T]) -> LiftedField<T> {
+        each!(self, solid => LiftedField::Round(solid.round(dimensions)), ground => {
+            LiftedField::Constant(Arc::clone(&ground.field))
+        }, all => LiftedField::Parts(all.lifted_parts(dimensions)))
     }
 
     /// Whether there is such a shape.

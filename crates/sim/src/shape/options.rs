@@ -16,7 +16,7 @@ pub struct ShapeOptions {
     /// Radius of the edges of sharp shapes: more than the depth to which anything presses. Otherwise 2 % of the smallest
     /// extent. Round shapes have their own.
     pub rounding: Option<f64>,
-    /// Largest distance between samples along edges and on faces. Otherwise a third of the smallest extent, but not less than
+    /// Distance between samples along edges and on faces, about at most. Otherwise a third of the smallest extent, but not less than
     /// 1/24 of the largest: edges of thin plates that cross are felt only where samples lie.
     pub spacing: Option<f64>,
     /// Distance between the samples of a distance grid, which meshes have. Otherwise 1/64 of the largest extent.

@@ -2,13 +2,17 @@
 
 use prehend_autodiff::Scalar;
 
-/// Parts of a length that are `spacing` \[m\] at most. Lengths that are a multiple of it within rounding have that many.
+/// Part of the spacing by which distances may be larger, so that no sample is added as a length that was a multiple of the spacing
+/// changes a little: derivatives are those of as many samples.
+const STRETCH: f64 = 0.05;
+
+/// Parts of a length that are about `spacing` \[m\] at most.
 pub(super) fn parts(length: f64, spacing: f64) -> usize {
-    (length / spacing - 1e-6).ceil().max(1.0) as usize
+    (length / spacing - STRETCH).ceil().max(1.0) as usize
 }
 
 /// Places \[m\] and the widths \[m\] that they stand for, from `from` to `to`. Next to ends that are marked a row is `strip` away from
-/// them, if there is room; between are equal distances of `spacing` \[m\] at most. Widths are those of the trapezoid rule; marked
+/// them, if there is room; between are equal distances of about `spacing` \[m\] at most. Widths are those of the trapezoid rule; marked
 /// ends stand for `beyond` more.
 pub(super) fn rows<T: Scalar>(
     [from, to]: [T; 2],
@@ -19,24 +23,20 @@ pub(super) fn rows<T: Scalar>(
 ) -> Vec<(T, T)> {
     let length = (to - from).value();
     let margins = marked.iter().filter(|m| **m).count() as f64;
-    // Of a face as narrow as a strip, or two, both ends are close enough.
     let inner = length - margins * strip;
     let mut places = vec![from];
-    if inner > -0.5 * strip && length > 1.5 * strip {
+    if inner > 0.25 * strip {
         let start = if marked[0] { from.plus(strip) } else { from };
         let end = if marked[1] { to.plus(-strip) } else { to };
-        if marked[0] {
-            places.push(start);
-        }
-        if inner > 1e-6 * strip {
-            let parts = parts(inner, spacing);
-            let between = |i: usize| start + (end - start).times(i as f64 / parts as f64);
-            places.extend((1..parts).map(between));
-            if marked[1] {
-                places.push(end);
-            }
-        }
+        let parts = parts(inner, spacing);
+        let between = |i: usize| start + (end - start).times(i as f64 / parts as f64);
+        places.extend(marked[0].then_some(start));
+        places.extend((1..parts).map(between));
+        places.extend(marked[1].then_some(end));
+    } else if length > 1.5 * strip {
+        places.push((from + to).times(0.5));
     }
+    // Of a face as narrow as a strip both ends are close enough.
     places.push(to);
     let last = places.len() - 1;
     let width = |i: usize| {

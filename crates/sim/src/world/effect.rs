@@ -1,5 +1,7 @@
 //! What contacts do.
 
+use std::sync::Arc;
+
 use nalgebra::{Vector3, Vector6};
 use prehend_autodiff::{Fwd, Scalar};
 
@@ -7,8 +9,10 @@ use super::World;
 use super::contact_pair::ContactPair;
 use super::seen::Seen;
 use crate::contact::bristles::{BristleFunction, Bristles};
+use crate::contact::dimensions::{LANES, Lane, VariableShapes};
 use crate::contact::patch::Patch;
 use crate::contact::wrench::stack;
+use crate::shape::lifted::LiftedField;
 use crate::state::State;
 
 /// What a contact does.
@@ -66,13 +70,15 @@ impl<S: Scalar> World<S> {
         let seen = self.seen(pair, states);
         let Some(patch) = self.patch(pair, seen.state.value()) else { return Effect::default() };
         let patch = Patch { smoothing: pair.smoothing.at_step(step), ..patch };
-        let ([fx, fy, fz, tx, ty, tz], rate) = match pair.law().bristles() {
+        let deflection = deflection.map_or_else(Vector6::zeros, State::deflection);
+        let (mut wrench, mut rate) = match pair.law().bristles() {
             None => (local_wrench(pair, &seen, &patch), Vector6::zeros()),
-            Some(bristles) => {
-                let deflection = deflection.map_or_else(Vector6::zeros, State::deflection);
-                local_bristles(pair, &seen, &patch, bristles, deflection)
-            }
+            Some(bristles) => local_bristles(pair, &seen, &patch, bristles, deflection),
         };
+        if S::ORDER > 0 {
+            self.add_slopes_by_dimensions(pair, &patch, &deflection, &mut wrench, &mut rate);
+        }
+        let [fx, fy, fz, tx, ty, tz] = wrench;
         let (state, base) = (&states[pair.bodies.samples], &states[pair.bodies.field]);
         let rotation = base.pose.rotation;
         let force = rotation * Vector3::new(fx, fy, fz).map(|x| x.times(pair.weight));
@@ -81,6 +87,61 @@ impl<S: Scalar> World<S> {
         let (on_samples, on_field) =
             (stack(&force, &torque), stack(&-force, &-(torque + offset.cross(&force))));
         Effect { on_samples, on_field, rate }
+    }
+
+    /// Adds to the wrench and rate of `patch`, which is `pair`, the derivatives that the dimensions of its shapes carry.
+    fn add_slopes_by_dimensions(
+        &self,
+        pair: &ContactPair<S>,
+        patch: &Patch<'_>,
+        deflection: &Vector6<S>,
+        wrench: &mut [S; 6],
+        rate: &mut Vector6<S>,
+    ) {
+        let ends = [pair.bodies.samples, pair.bodies.field].map(|id| &self.bodies[id]);
+        let moved = ends.map(|body| changes(body.dimensions()));
+        let variable = |(i, x): (usize, &S)| (!x.is_constant_zero()).then_some(i);
+        let places: Vec<usize> = moved.iter().flatten().enumerate().filter_map(variable).collect();
+        let Some(field) = &ends[1].field else { return };
+        let values: Vec<f64> = pair.params().iter().map(|p| p.value()).collect();
+        let count = moved[0].len();
+        for places in places.chunks(LANES) {
+            let seeded = |end: usize| -> Vec<Lane> {
+                let lane = |i: usize| places.iter().position(|place| *place == i + end * count);
+                let dimensions = ends[end].dimensions().iter().map(|x| x.value()).enumerate();
+                let seed = |(i, value)| match lane(i) {
+                    Some(lane) => Fwd::variable(value, lane),
+                    None => Fwd::constant(value),
+                };
+                dimensions.map(seed).collect()
+            };
+            let field = match ends[1].shape() {
+                Some(shape) => shape.lifted_field(&seeded(1)),
+                None => LiftedField::Constant(Arc::clone(field)),
+            };
+            let samples = ends[0].shape().map(|shape| shape.lifted_samples(&seeded(0)));
+            let shapes = VariableShapes { patch, samples, field };
+            let law = pair.law().as_ref();
+            let mut slopes = [Lane::constant(0.0); 12];
+            match law.bristles() {
+                None => slopes[..6].copy_from_slice(&shapes.wrench(law, &values)),
+                Some(bristles) => {
+                    let deflection = deflection.map(S::value);
+                    let function = BristleFunction { law, p: &values, patch, bristles, deflection };
+                    slopes = shapes.bristles(&function);
+                }
+            }
+            let all = wrench.iter_mut().chain(rate.iter_mut());
+            for (component, slopes) in all.zip(slopes) {
+                for (place, slope) in places.iter().zip(slopes.derivative) {
+                    let moved = match place.checked_sub(count) {
+                        Some(place) => moved[1][place],
+                        None => moved[0][*place],
+                    };
+                    *component += moved.times(slope);
+                }
+            }
+        }
     }
 
     /// The samples of `pair` beside its field, which sees their body in `state`, if there are both.

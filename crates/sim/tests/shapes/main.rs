@@ -4,6 +4,7 @@
 
 mod catalog;
 mod derivatives;
+mod dimensions;
 mod distances;
 mod heights;
 mod joined;
