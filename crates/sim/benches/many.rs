@@ -1,0 +1,107 @@
+//! Times worlds of many bodies, on as many threads as `RAYON_NUM_THREADS` says: `cargo bench -p prehend-sim --bench many`.
+
+use std::hint::black_box;
+use std::sync::Arc;
+use std::time::Instant;
+
+use nalgebra::{Isometry3, Vector3};
+use parry3d_f64::math::Vector;
+use parry3d_f64::shape::{Ball, HeightField};
+use parry3d_f64::utils::Array2;
+use prehend_sim::{
+    Body, BodyId, Bounce, Coulomb, GapSmoothing, HuntCrossley, Law, Shape, State,
+    StaticContactTarget, World,
+};
+
+/// Radius of the balls \[m\].
+const RADIUS: f64 = 0.05;
+/// Distance between balls at the start \[m\].
+const APART: f64 = 0.38;
+/// Nodes of the ground along each side, and the side's length \[m\].
+const NODES: usize = 64;
+const SIDE: f64 = 12.6;
+/// Highest less lowest of the ground \[m\].
+const RELIEF: f64 = 0.2;
+
+/// Hills, about y = 0.
+fn ground() -> anyhow::Result<Shape> {
+    let place = |i: usize| SIDE * (i as f64 / (NODES - 1) as f64 - 0.5);
+    let height = |i: usize, j: usize| {
+        let (x, z) = (place(j), place(i));
+        (2.1 * x + 0.4).sin() * (1.7 * z).cos() + 0.6 * (3.3 * x - 2.9 * z).sin()
+    };
+    let all: Vec<f64> = (0..NODES).flat_map(|i| (0..NODES).map(move |j| height(i, j))).collect();
+    let [low, high] = all
+        .iter()
+        .fold([f64::INFINITY, -f64::INFINITY], |[low, high], &h| [low.min(h), high.max(h)]);
+    let scaled = |i, j| (height(i, j) - low) / (high - low) - 0.5;
+    let heights = Array2::from_fn(NODES, NODES, scaled);
+    Ok(Shape::from_parry(&HeightField::new(heights, Vector::new(SIDE, RELIEF, SIDE)))?)
+}
+
+/// `count` balls at `height` \[m\] over hills, one beside the other.
+fn balls(count: usize, height: f64) -> anyhow::Result<(World, Vec<State>)> {
+    let mut world = World::new(Vector3::y() * -9.81);
+    let shape = Shape::from_parry(&Ball::new(RADIUS))?;
+    let floor = world.add(Body::fixed_from_shape("ground", &ground()?));
+    let mut states = vec![State::at_rest(Isometry3::identity())];
+    let side = (count as f64).sqrt().ceil() as usize;
+    let place = |i: usize| APART * (i as f64 - 0.5 * (side - 1) as f64);
+    let mut ids: Vec<BodyId> = Vec::new();
+    for i in 0..count {
+        let ball = Body::from_shape(&format!("ball {i}"), &shape, 1e3)?;
+        let up = height + 0.02 * (i % 7) as f64;
+        let pose = Isometry3::translation(place(i % side), up, place(i / side));
+        states.extend(ball.rigid().map(|rigid| rigid.at_rest(&pose)));
+        ids.push(world.add(ball));
+    }
+    let mass = 4.0 / 3.0 * std::f64::consts::PI * RADIUS.powi(3) * 1e3;
+    let contact_area = std::f64::consts::PI * RADIUS * RADIUS;
+    let target = StaticContactTarget { mass, gravity: 9.81, penetration: 1e-3, contact_area };
+    let bounce = Bounce { restitution: 0.5, impact_speed: 1.0 };
+    let normal = HuntCrossley::from_target(&target, 1.0, bounce)?;
+    let law = Arc::new(Law::new(normal, Coulomb { friction: 0.4, slip_scale: 1e-2 })?);
+    world.add_contacts_between(&ids, &[floor], law.clone(), GapSmoothing::Hard)?;
+    if count > 1 {
+        world.add_contacts_between(&ids, &ids, law, GapSmoothing::Hard)?;
+    }
+    Ok((world, states))
+}
+
+/// The median time of `runs` runs \[s\].
+fn median<T>(runs: usize, run: impl Fn() -> anyhow::Result<T>) -> anyhow::Result<f64> {
+    let mut times = Vec::new();
+    for _ in 0..runs {
+        let begin = Instant::now();
+        black_box(run()?);
+        times.push(begin.elapsed().as_secs_f64());
+    }
+    times.sort_by(f64::total_cmp);
+    Ok(times[runs / 2])
+}
+
+fn main() -> anyhow::Result<()> {
+    // What does not touch: a millisecond of free fall.
+    let (many, many_states) = balls(1000, 20.0)?;
+    let (one, one_state) = balls(1, 20.0)?;
+    let together = median(21, || Ok(many.simulate(&many_states, 1e-3)?))?;
+    let alone = median(21, || {
+        for _ in 0..1000 {
+            black_box(one.simulate(&one_state, 1e-3)?);
+        }
+        Ok(())
+    })?;
+    println!("| a step of bodies that do not touch | time |");
+    println!("|---|--:|");
+    println!("| 1 000 times one of one | {:.2} ms |", 1e3 * alone);
+    println!("| one of 1 000 | {:.2} ms, {:.2} × |\n", 1e3 * together, together / alone);
+    println!("| balls that fall onto hills, 2 s | time |");
+    println!("|---|--:|");
+    for count in [1, 10, 100, 1000] {
+        let (world, states) = balls(count, 0.5)?;
+        let runs = if count < 100 { 5 } else { 1 };
+        let time = median(runs, || Ok(world.simulate(&states, 2.0)?))?;
+        println!("| {count} | {time:.3} s |");
+    }
+    Ok(())
+}
