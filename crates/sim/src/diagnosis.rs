@@ -86,8 +86,7 @@ impl<S: Scalar> World<S> {
     /// Whether derivatives through the beginning of every contact are right.
     pub(crate) fn check_onsets(&self) -> Result<(), SimulationError> {
         let jumps = |pair: &&ContactPair<S>| pair.force_jumps();
-        let groups = self.contact_groups.iter().map(|group| &group.contact);
-        match self.contacts.iter().chain(groups).find(jumps) {
+        match self.kinds_of_contact().find(jumps) {
             Some(pair) => {
                 let [body, contact] = self.names_of(pair);
                 Err(SimulationError::ForceJumps { body, contact })

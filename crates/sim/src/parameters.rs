@@ -110,16 +110,14 @@ impl<S: Scalar> World<S> {
                 .map_err(|error| SimulationError::Shape { body: body.name.clone(), error })?;
         }
         world.gravity = Vector3::from_fn(|_, _| next());
-        let groups = world.contact_groups.iter_mut().map(|group| &mut group.contact);
-        let pairs = world.contacts.iter_mut().chain(groups);
+        let pairs = world.kinds_of_contact_mut();
         pairs.flat_map(|pair| pair.params_mut()).for_each(|p| *p = next());
         Ok(world)
     }
 
     /// The parameters of the laws of contacts and groups.
     fn contact_params(&self) -> impl Iterator<Item = &S> {
-        let groups = self.contact_groups.iter().map(|group| &group.contact);
-        self.contacts.iter().chain(groups).flat_map(|pair| pair.params())
+        self.kinds_of_contact().flat_map(|pair| pair.params())
     }
 }
 

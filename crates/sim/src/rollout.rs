@@ -245,8 +245,7 @@ impl<S: Scalar> World<S> {
         if states.len() != self.state_count() {
             return Err(self.wrong_count(states.len()));
         }
-        let groups = self.contact_groups.iter().map(|group| &group.contact);
-        self.contacts.iter().chain(groups).try_for_each(ContactPair::check)?;
+        self.kinds_of_contact().try_for_each(ContactPair::check)?;
         match states.iter().all(State::is_finite) {
             true => Ok(()),
             false => Err(self.not_finite(states, states, start)),

@@ -174,6 +174,18 @@ impl<S: Scalar> World<S> {
         Ok(())
     }
 
+    /// The contacts, and what those of each group are like.
+    pub(crate) fn kinds_of_contact(&self) -> impl Iterator<Item = &ContactPair<S>> {
+        let groups = self.contact_groups.iter().map(|group| &group.contact);
+        self.contacts.iter().chain(groups)
+    }
+
+    /// [`World::kinds_of_contact`], to be changed.
+    pub(crate) fn kinds_of_contact_mut(&mut self) -> impl Iterator<Item = &mut ContactPair<S>> {
+        let groups = self.contact_groups.iter_mut().map(|group| &mut group.contact);
+        self.contacts.iter_mut().chain(groups)
+    }
+
     /// The same world, each number through `f`, but for trajectories, which become those of constants.
     pub(crate) fn map<T: Scalar>(&self, f: impl Fn(S) -> T) -> World<T> {
         World {
@@ -187,8 +199,7 @@ impl<S: Scalar> World<S> {
     /// The same world as values alone: without derivatives, and without leaks, which are for derivatives.
     pub(crate) fn plain(&self) -> World {
         let mut plain = self.map(S::value);
-        let groups = plain.contact_groups.iter_mut().map(|group| &mut group.contact);
-        for pair in plain.contacts.iter_mut().chain(groups) {
+        for pair in plain.kinds_of_contact_mut() {
             if pair.smoothing.leaks() {
                 pair.smoothing = GapSmoothing::Hard;
             }

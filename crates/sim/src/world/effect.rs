@@ -102,7 +102,7 @@ impl<S: Scalar> World<S> {
         let moved = ends.map(|body| changes(body.dimensions()));
         let variable = |(i, x): (usize, &S)| (!x.is_constant_zero()).then_some(i);
         let places: Vec<usize> = moved.iter().flatten().enumerate().filter_map(variable).collect();
-        let Some(field) = &ends[1].field else { return };
+        let Some(field) = ends[1].field.as_ref().filter(|_| !places.is_empty()) else { return };
         let values: Vec<f64> = pair.params().iter().map(|p| p.value()).collect();
         let count = moved[0].len();
         for places in places.chunks(LANES) {

@@ -57,9 +57,6 @@ impl Course {
         states: &[State<S>],
         step: Step,
     ) -> Vec<State<S>> {
-        if S::ORDER == 0 {
-            return self.states.iter().map(State::lift).collect();
-        }
         let mut states = states.to_vec();
         let mut wrenches = world.wrenches(&states, step.index);
         for &part in &self.parts {
