@@ -112,7 +112,9 @@ fn binary_not_finite<const N: usize, T: Scalar>(a: [T; N], b: [T; N], da: T, db:
     std::array::from_fn(|i| along(da, a[i]) + along(db, b[i]))
 }
 
-impl_real_field!([const N: usize, T: Scalar] Fwd<N, T> {});
+impl_real_field!([const N: usize, T: Scalar] Fwd<N, T> {
+    const RECORDED: bool = T::RECORDED;
+});
 
 /// The results of `function` and their Jacobian, one row a result: its own, or by forward mode.
 #[inline]

@@ -1,5 +1,7 @@
 //! [`Recompute`] in reverse mode: a node that keeps its inputs and is recorded again in the sweep.
 
+use rayon::prelude::*;
+
 use crate::record::custom;
 use crate::recording::Recording;
 use crate::scalar::Recompute;
@@ -10,19 +12,58 @@ use crate::vjp::CustomVjp;
 pub(crate) fn recompute<F: Recompute>(function: F, x: &[Var]) -> Result<Vec<Var>, F::Error> {
     let values: Box<[f64]> = x.iter().map(|x| x.value()).collect();
     let outputs = function.evaluate(&values)?;
-    let places = || (0..).zip(x).filter(|(_, x)| x.recording != 0);
-    let active: Box<[u32]> = places().map(|(place, _)| place).collect();
+    let active = active_places(x);
     if active.is_empty() {
         return Ok(outputs.into_iter().map(Var::from).collect());
     }
-    let inputs: Vec<Var> = places().map(|(_, &x)| x).collect();
+    let inputs: Vec<Var> = active.iter().map(|&place| x[place as usize]).collect();
     Ok(custom(&inputs, &outputs, Recomputed { function, values, active }))
+}
+
+/// [`Scalar::recompute_each`](crate::Scalar::recompute_each) for [`Var`].
+pub(crate) fn recompute_each<F>(functions: Vec<(F, Vec<Var>)>) -> Vec<Result<Vec<Var>, F::Error>>
+where
+    F: Recompute + Send + Sync,
+    F::Error: Send,
+{
+    let evaluate = |(function, x): (F, Vec<Var>)| {
+        let values: Box<[f64]> = x.iter().map(|x| x.value()).collect();
+        let outputs = function.evaluate(&values)?;
+        let active = active_places(&x);
+        Ok((x, outputs, Recomputed { function, values, active }))
+    };
+    let done: Vec<Result<_, F::Error>> = functions.into_par_iter().map(evaluate).collect();
+    let (mut inputs, mut outputs, mut each) = (Vec::new(), Vec::new(), Vec::new());
+    // Those with derivatives become places in the one node, the others constants.
+    let mut results: Vec<Result<Vec<Var>, F::Error>> = Vec::with_capacity(done.len());
+    let mut members = Vec::new();
+    for (index, result) in done.into_iter().enumerate() {
+        results.push(result.map(|(x, values, recomputed)| {
+            if !recomputed.active.is_empty() {
+                inputs.extend(recomputed.active.iter().map(|&place| x[place as usize]));
+                outputs.extend_from_slice(&values);
+                members.push((index, values.len()));
+                each.push((recomputed, values.len()));
+            }
+            values.into_iter().map(Var::from).collect()
+        }));
+    }
+    let mut recorded = custom(&inputs, &outputs, RecomputedEach(each)).into_iter();
+    for (index, count) in members {
+        results[index] = Ok(recorded.by_ref().take(count).collect());
+    }
+    results
+}
+
+/// Places of the numbers that carry derivatives.
+fn active_places(x: &[Var]) -> Box<[u32]> {
+    (0..).zip(x).filter(|(_, x)| x.recording != 0).map(|(place, _)| place).collect()
 }
 
 struct Recomputed<F> {
     function: F,
     values: Box<[f64]>,
-    /// Places of the numbers that carry derivatives.
+    /// Of [`active_places`].
     active: Box<[u32]>,
 }
 
@@ -46,6 +87,25 @@ impl<F: Recompute> CustomVjp for Recomputed<F> {
         for (adjoint, &variable) in input_adjoints.iter_mut().zip(&variables) {
             *adjoint += adjoints.wrt(variable);
         }
+    }
+}
+
+/// Functions with numbers of their own, each with the number of its outputs.
+struct RecomputedEach<F>(Vec<(Recomputed<F>, usize)>);
+
+impl<F: Recompute + Send + Sync> CustomVjp for RecomputedEach<F> {
+    fn vjp(&self, mut output_adjoints: &[f64], mut input_adjoints: &mut [f64]) {
+        let mut parts = Vec::with_capacity(self.0.len());
+        for (recomputed, outputs) in &self.0 {
+            let own = output_adjoints.split_off(..*outputs).unwrap_or_default();
+            let to = input_adjoints.split_off_mut(..recomputed.active.len()).unwrap_or_default();
+            parts.push((recomputed, own, to));
+        }
+        parts.into_par_iter().for_each(|(recomputed, own, to)| {
+            if own.iter().any(|adjoint| *adjoint != 0.0) {
+                recomputed.vjp(own, to);
+            }
+        });
     }
 }
 
@@ -100,5 +160,65 @@ mod tests {
         let results = Var::recompute(Root, &[x, y, y]).unwrap();
         let adjoints = recording.gradient(results[1] + results[2]);
         assert_eq!((adjoints.wrt(x), adjoints.wrt(y)), (1.0, 3.0));
+    }
+
+    fn each<S: Scalar>(x: &[S]) -> S {
+        // One fails, one has constants only, one does not matter to the sum.
+        let inputs = |i: usize| match i {
+            3 => vec![S::constant(-1.0); 3],
+            5 => vec![S::constant(2.0); 3],
+            _ => vec![x[0].plus(i as f64), x[1], x[1].times(i as f64)],
+        };
+        let all = S::recompute_each((0..9).map(|i| (Root, inputs(i))).collect());
+        assert!(all[3].is_err() && all.iter().filter(|y| y.is_ok()).count() == 8);
+        let parts = all.into_iter().enumerate().filter(|(i, _)| *i != 7).flat_map(|(_, y)| y);
+        parts.fold(S::zero(), |sum, y| sum + y[0] * y[1] + y[2])
+    }
+
+    #[test]
+    fn many_side_by_side_are_the_same_for_any_number_of_threads() {
+        let x = [0.7, 1.3];
+        let (value, plain) = gradient(
+            |x| {
+                let input = |i: usize| [x[0].plus(i as f64), x[1], x[1].times(i as f64)];
+                let one = |i: usize| match i {
+                    5 => Root.evaluate(&[2.0; 3].map(Var::from)).unwrap(),
+                    _ => Root.evaluate(&input(i)).unwrap(),
+                };
+                let parts = [0, 1, 2, 4, 5, 6, 8].map(one);
+                parts.into_iter().fold(Var::from(0.0), |sum, y| sum + y[0] * y[1] + y[2])
+            },
+            &x,
+        );
+        let mut seen: Option<(f64, Vec<f64>)> = None;
+        for threads in [1, 2, 5] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let now = pool.install(|| gradient(each, &x));
+            assert_eq!(now.0, value);
+            plain.iter().zip(&now.1).for_each(|(a, b)| assert!((a - b).abs() < 1e-13 * a.abs()));
+            assert_eq!(seen.get_or_insert(now.clone()), &now);
+            assert_eq!(pool.install(|| each(&x)), value);
+            let forward = pool.install(|| each(&Fwd::<2>::variables(x)));
+            plain
+                .iter()
+                .zip(&forward.derivative)
+                .for_each(|(a, b)| assert!((a - b).abs() < 1e-13 * a.abs()));
+        }
+        // Second derivatives through a recording of one thread.
+        let (_, by) = gradient(
+            |x| {
+                let [a, b] =
+                    [0, 1].map(|i| Fwd::<1, Var> { value: x[i], derivative: [Var::from(1.0)] });
+                each(&[a, b]).derivative[0]
+            },
+            &x,
+        );
+        let slope = |x: [f64; 2]| gradient(each, &x).1.iter().sum::<f64>();
+        for (i, exact) in by.iter().enumerate() {
+            let moved =
+                |h: f64| slope(std::array::from_fn(|k| x[k] + if k == i { h } else { 0.0 }));
+            let difference = (moved(1e-5) - moved(-1e-5)) / 2e-5;
+            assert!((exact - difference).abs() < 1e-7 * difference.abs(), "{exact} {difference}");
+        }
     }
 }

@@ -60,6 +60,8 @@ impl Differentiable for Var {
 }
 
 impl_real_field!([] Var {
+    const RECORDED: bool = true;
+
     #[inline]
     fn local<const N: usize, const M: usize>(
         function: &impl LocalFunction<N, M>,
@@ -79,5 +81,13 @@ impl_real_field!([] Var {
     #[inline]
     fn recompute<F: Recompute>(function: F, x: &[Self]) -> Result<Vec<Self>, F::Error> {
         recomputed::recompute(function, x)
+    }
+
+    fn recompute_each<F>(functions: Vec<(F, Vec<Self>)>) -> Vec<Result<Vec<Self>, F::Error>>
+    where
+        F: Recompute + Send + Sync,
+        F::Error: Send,
+    {
+        recomputed::recompute_each(functions)
     }
 });

@@ -1,6 +1,7 @@
 //! The one scalar trait that simulation code is generic over, and the functions that a scalar may differentiate as a whole.
 
 use nalgebra::RealField;
+use rayon::prelude::*;
 
 use crate::lanes;
 
@@ -24,6 +25,10 @@ pub trait Scalar: RealField + Copy + Default {
     /// An operation that brings its own first derivatives cannot serve numbers of a higher order, and should refuse
     /// them when it is compiled: `const { assert!(S::ORDER <= 1) }`.
     const ORDER: usize;
+
+    /// Whether numbers belong to a recording, and so to one thread.
+    #[doc(hidden)]
+    const RECORDED: bool = false;
 
     /// A constant: carries no derivative.
     fn constant(value: f64) -> Self;
@@ -76,6 +81,46 @@ pub trait Scalar: RealField + Copy + Default {
     #[inline]
     fn recompute<F: Recompute>(function: F, x: &[Self]) -> Result<Vec<Self>, F::Error> {
         function.evaluate(x)
+    }
+
+    /// [`Scalar::recompute`] of each function with numbers of its own, side by side on the threads of `rayon`. Results and
+    /// derivatives are the same, to the last bit, for any number of threads.
+    ///
+    /// Reverse mode records one node for all, and the sweep goes through them side by side as well; one whose results do not
+    /// matter is left out. Forward mode over reverse mode takes one function after the other.
+    ///
+    /// ```
+    /// use std::convert::Infallible;
+    /// use prehend_autodiff::{Recompute, Scalar, gradient};
+    ///
+    /// struct Power(i32);
+    ///
+    /// impl Recompute for Power {
+    ///     type Error = Infallible;
+    ///     fn evaluate<S: Scalar>(&self, x: &[S]) -> Result<Vec<S>, Infallible> {
+    ///         Ok(vec![x[0].powi(self.0)])
+    ///     }
+    /// }
+    ///
+    /// let (sum, slope) = gradient(
+    ///     |x| {
+    ///         let powers = Scalar::recompute_each((1..=3).map(|i| (Power(i), vec![x[0]])).collect());
+    ///         powers.into_iter().flatten().flatten().fold(x[0].times(0.0), |sum, y| sum + y)
+    ///     },
+    ///     &[2.0],
+    /// );
+    /// assert_eq!((sum, slope[0]), (14.0, 17.0));
+    /// ```
+    fn recompute_each<F>(functions: Vec<(F, Vec<Self>)>) -> Vec<Result<Vec<Self>, F::Error>>
+    where
+        F: Recompute + Send + Sync,
+        F::Error: Send,
+    {
+        let apply = |(function, x): (F, Vec<Self>)| Self::recompute(function, &x);
+        match Self::RECORDED {
+            true => functions.into_iter().map(apply).collect(),
+            false => functions.into_par_iter().map(apply).collect(),
+        }
     }
 
     /// Whether this is the constant 0, which moves in no direction.

@@ -49,27 +49,30 @@ pub struct StepCheckpointed<I> {
     scene: Arc<Scene<I>>,
 }
 
-/// What all steps share.
+/// What all steps, or all worlds of a batch, share.
 #[derive(Debug)]
-struct Scene<I> {
-    integrator: I,
+pub(crate) struct Scene<I> {
+    pub(crate) integrator: I,
     world: World,
     parameters: Vec<f64>,
 }
 
 /// Parameters of a world that are not its scene's constants, by their places.
-struct Changes<S> {
-    places: Box<[u32]>,
-    values: Vec<S>,
+pub(crate) struct Changes<S> {
+    pub(crate) places: Box<[u32]>,
+    pub(crate) values: Vec<S>,
 }
 
 impl<I: Integrator> Scene<I> {
-    fn new<S: Scalar>(integrator: I, world: &World<S>) -> Result<Arc<Self>, SimulationError> {
+    pub(crate) fn new<S: Scalar>(
+        integrator: I,
+        world: &World<S>,
+    ) -> Result<Arc<Self>, SimulationError> {
         let parameters: Vec<f64> = world.parameters().into_iter().map(S::value).collect();
         Ok(Arc::new(Self { world: world.with_parameters(&parameters)?, parameters, integrator }))
     }
 
-    fn changes<S: Scalar>(&self, world: &World<S>) -> Changes<S> {
+    pub(crate) fn changes<S: Scalar>(&self, world: &World<S>) -> Changes<S> {
         // A constant less its value is the constant 0.
         let changed = |x: S, own: f64| x.value() != own || !x.plus(-own).is_constant_zero();
         let all = (0..).zip(world.parameters()).zip(&self.parameters);
@@ -78,8 +81,17 @@ impl<I: Integrator> Scene<I> {
         Changes { places: places.into(), values }
     }
 
+    /// Whether `world` differs in parameters only.
+    pub(crate) fn is_of<S: Scalar>(&self, world: &World<S>) -> bool {
+        has_parts_of(world, &self.world)
+    }
+
     /// This scene's world with `values` at `places`.
-    fn world<S: Scalar>(&self, places: &[u32], values: &[S]) -> Result<World<S>, SimulationError> {
+    pub(crate) fn world<S: Scalar>(
+        &self,
+        places: &[u32],
+        values: &[S],
+    ) -> Result<World<S>, SimulationError> {
         let mut all: Vec<S> = self.parameters.iter().map(|&x| S::constant(x)).collect();
         for (&place, &value) in places.iter().zip(values) {
             all[place as usize] = value;
@@ -95,6 +107,11 @@ impl<I: Integrator> StepCheckpointed<I> {
     /// If a body of the world has an impossible mass, inertia or center of mass, or a trajectory carries derivatives.
     pub fn new<S: Scalar>(integrator: I, world: &World<S>) -> Result<Self, SimulationError> {
         Ok(Self { scene: Scene::new(integrator, world)? })
+    }
+
+    /// Of a world of `scene`.
+    pub(crate) fn of(scene: &Arc<Scene<I>>) -> Self {
+        Self { scene: Arc::clone(scene) }
     }
 }
 
@@ -112,7 +129,7 @@ impl<I: Integrator + Send + 'static> Integrator for StepCheckpointed<I> {
             return world.stepped(&self.scene.integrator, states, step);
         }
         world.check_trajectories()?;
-        if !has_parts_of(world, &self.scene.world) {
+        if !self.scene.is_of(world) {
             return Err(SimulationError::AnotherWorld);
         }
         self.check_differentiable(world)?;

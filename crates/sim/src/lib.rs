@@ -14,6 +14,7 @@
 
 mod adjoint;
 mod audit;
+mod batch;
 mod body;
 mod broad_phase;
 pub mod contact;
@@ -40,6 +41,7 @@ mod world;
 
 pub use adjoint::StepCheckpointed;
 pub use audit::Resolution;
+pub use batch::Batch;
 pub use body::{BodyError, RigidBody};
 pub use contact::bristles::Bristles;
 pub use contact::composite::Law;

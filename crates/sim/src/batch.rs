@@ -1,0 +1,160 @@
+//! Many worlds at once.
+
+use std::sync::Arc;
+
+use prehend_autodiff::{Recompute, Scalar};
+
+use crate::adjoint::{Changes, Scene, StepCheckpointed};
+use crate::error::SimulationError;
+use crate::integrator::Integrator;
+use crate::integrator::adaptive::Adaptive;
+use crate::parameters::{STATE, coordinates_of, states_of};
+use crate::state::State;
+use crate::time::TimeSteps;
+use crate::world::World;
+
+/// Simulates worlds that share bodies, shapes and laws and differ in numbers and states, side by side on the threads of `rayon`.
+///
+/// Any scalar goes: plain numbers simulate, [`Fwd`](prehend_autodiff::Fwd) carries sensitivities, and with
+/// [`Var`](prehend_autodiff::Var) all runs are one node, which keeps the numbers that each run began with. The sweep simulates
+/// each again, side by side as well; runs on which the loss does not depend are left out. Results and derivatives are the same, to
+/// the last bit, for any number of threads.
+///
+/// Whatever [`World::parameters`] lists may differ, and may carry derivatives; so may states.
+///
+/// ```
+/// use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
+/// use prehend_autodiff::{Recording, Scalar};
+/// use prehend_sim::{Batch, Body, RigidBody, SimulationError, TimeSteps, World};
+///
+/// let stone = RigidBody::new(1.0, Matrix3::identity(), Point3::origin())?;
+/// let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
+/// let id = world.add(Body::free("stone", stone));
+/// let batch = Batch::new(&world)?;
+///
+/// // By how much does the mean height of 100 throws change with gravity?
+/// let recording = Recording::start();
+/// let gravity = recording.variable(-9.81);
+/// let throws = (0..100).map(|i| {
+///     let mut lifted = world.lift();
+///     lifted.gravity.z = gravity;
+///     let mut start = stone.at_rest(&Isometry3::identity()).lift();
+///     start.linear.z = Scalar::constant(0.1 * f64::from(i));
+///     (lifted, vec![start])
+/// });
+/// let ends = batch.simulate(throws, TimeSteps { dt: 0.5, steps: 1 });
+/// let ends = ends.into_iter().collect::<Result<Vec<_>, SimulationError>>()?;
+/// let heights = ends.iter().map(|states| states[id].pose.translation.z);
+/// let mean = heights.reduce(|sum, height| sum + height).unwrap_or_default().times(0.01);
+/// let slope = recording.gradient(mean).wrt(gravity);
+/// assert!((slope - 0.125).abs() < 1e-9);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct Batch<I = Adaptive> {
+    scene: Arc<Scene<I>>,
+}
+
+impl Batch {
+    /// Of worlds like `world`, with [`Adaptive`] steps.
+    ///
+    /// # Errors
+    /// See [`Batch::with_integrator`].
+    pub fn new<S: Scalar>(world: &World<S>) -> Result<Self, SimulationError> {
+        Self::with_integrator(Adaptive::default(), world)
+    }
+}
+
+impl<I: Integrator + Send + 'static> Batch<I> {
+    /// Of worlds like `world`, with the steps of `integrator`.
+    ///
+    /// # Errors
+    /// If a body of the world has an impossible mass, inertia or center of mass, or a trajectory carries derivatives.
+    pub fn with_integrator<S: Scalar>(
+        integrator: I,
+        world: &World<S>,
+    ) -> Result<Self, SimulationError> {
+        Ok(Self { scene: Scene::new(integrator, world)? })
+    }
+
+    /// Where each of `variants`, a world and the states that it starts from, is after `time_steps`, as
+    /// [`World::simulate_with`] finds it.
+    ///
+    /// Variants are taken one after the other, and only what they change is kept.
+    ///
+    /// # Errors
+    /// Each for itself: those of [`World::simulate_with`]; if the world differs from that of the batch in more than parameters, or a
+    /// trajectory carries derivatives.
+    pub fn simulate<S: Scalar>(
+        &self,
+        variants: impl IntoIterator<Item = (World<S>, Vec<State<S>>)>,
+        time_steps: TimeSteps,
+    ) -> Vec<Result<Vec<State<S>>, SimulationError>> {
+        let mut refused = Vec::new();
+        let mut runs = Vec::new();
+        for (index, (world, states)) in variants.into_iter().enumerate() {
+            match self.run(&world, &states, time_steps) {
+                Ok(run) => runs.push(run),
+                Err(error) => refused.push((index, error)),
+            }
+        }
+        let ends = S::recompute_each(runs).into_iter();
+        let ends = ends.map(|end| end.map(|coordinates| states_of(&coordinates).collect()));
+        let mut ends: Vec<Result<Vec<State<S>>, SimulationError>> = ends.collect();
+        for (index, error) in refused {
+            ends.insert(index, Err(error));
+        }
+        ends
+    }
+
+    /// A run and the numbers that it starts with.
+    fn run<S: Scalar>(
+        &self,
+        world: &World<S>,
+        states: &[State<S>],
+        time_steps: TimeSteps,
+    ) -> Result<(Run<I>, Vec<S>), SimulationError> {
+        world.check_trajectories()?;
+        if !self.scene.is_of(world) {
+            return Err(SimulationError::AnotherWorld);
+        }
+        if S::ORDER > 0 {
+            self.scene.integrator.check_differentiable(world)?;
+        }
+        let Changes { places, values } = self.scene.changes(world);
+        let numbers = coordinates_of(states).chain(values).collect();
+        let run = Run { scene: Arc::clone(&self.scene), places, states: states.len(), time_steps };
+        Ok((run, numbers))
+    }
+}
+
+/// A simulation as a function of the states' coordinates and of the world's parameters at `places`, to the states at its end.
+struct Run<I> {
+    scene: Arc<Scene<I>>,
+    places: Box<[u32]>,
+    /// How many states it starts from.
+    states: usize,
+    time_steps: TimeSteps,
+}
+
+impl<I: Integrator + Send + 'static> Recompute for Run<I> {
+    type Error = SimulationError;
+
+    fn evaluate<S: Scalar>(&self, x: &[S]) -> Result<Vec<S>, SimulationError> {
+        let (states, values) = x.split_at(STATE * self.states);
+        let world = self.scene.world(&self.places, values)?;
+        let states: Vec<State<S>> = states_of(states).collect();
+        // One step is recorded as it is, of many one at a time.
+        let end = match self.time_steps.steps > 1 && S::RECORDED {
+            true => {
+                let steps = StepCheckpointed::of(&self.scene);
+                world.simulate_with(&steps, &states, self.time_steps, |_, _| ())
+            }
+            false => {
+                let integrator = &self.scene.integrator;
+                world.simulate_with(integrator, &states, self.time_steps, |_, _| ())
+            }
+        };
+        Ok(coordinates_of(&end?.states).collect())
+    }
+}
