@@ -204,8 +204,13 @@ impl Surface {
 
     /// No part of a sample is farther from `point` than this \[m\].
     pub(crate) fn radius_about(&self, point: &Point3<f64>) -> f64 {
+        self.spread_about(point) + self.rounding
+    }
+
+    /// Radius of a ball about `point` that holds the centers of the samples \[m\].
+    pub(crate) fn spread_about(&self, point: &Point3<f64>) -> f64 {
         let radii = self.blocks.iter().map(|b| (b.center - point).norm() + b.radius);
-        radii.fold(0.0, f64::max) + self.rounding
+        radii.fold(0.0, f64::max)
     }
 
     /// Largest radius of a sample \[m\].

@@ -33,8 +33,9 @@ use crate::world::World;
 /// their derivatives.
 ///
 /// Parts end where samples touch or let go of a contact without smoothing. None is so long that a contact could be passed over: no
-/// sample moves by more than its clearance and either a fiftieth of its body's size or a quarter of the thickness of what it
-/// touches ([`DistanceField::thickness`]), whichever is less. What is pressed past the middle of a
+/// sample moves by more than its clearance and either a fifth of its body's size or a quarter of the thickness of what it touches
+/// ([`DistanceField::thickness`]), whichever is less; nor does one that moves by more than a fiftieth of its body's size touch in
+/// between, as the cubic of its gap tells. What is pressed past the middle of a
 /// thin body is an error ([`SimulationError::PassedThrough`]). Trajectories of driven bodies are
 /// looked at every millisecond for that; what one does and undoes within a millisecond may be missed.
 ///

@@ -3,7 +3,7 @@
 use prehend_autodiff::Scalar;
 
 use super::Adaptive;
-use super::planner::Planner;
+use super::planner::{Planner, Probe};
 use crate::error::SimulationError;
 use crate::integrator::runge_kutta::dormand_prince;
 use crate::state::State;
@@ -14,8 +14,8 @@ use crate::world::body_id::BodyId;
 /// The parts of a step, found by values alone.
 pub(super) struct Course {
     parts: Vec<Step>,
-    /// The states at its end.
-    pub(super) states: Vec<State>,
+    /// The states at its end, with the sensitivity.
+    pub(super) states: Vec<State<Probe>>,
     /// Length of the part that would come next \[s\].
     pub(super) next_part: f64,
 }
@@ -26,18 +26,19 @@ impl Course {
     pub(super) fn find(
         settings: &Adaptive,
         world: World,
-        states: &[State],
+        states: Vec<State<Probe>>,
         step: Step,
         next_part: Option<f64>,
         limits: &[(BodyId, f64)],
     ) -> Result<Option<Self>, SimulationError> {
         let mut planner = Planner::new(settings, world, states, step, next_part);
+        let speed = |planner: &Planner, id: BodyId| planner.state(id).linear.norm();
         let mut parts = Vec::new();
         let mut moved = vec![0.0; limits.len()];
-        let mut speeds: Vec<f64> = limits.iter().map(|(id, _)| states[*id].linear.norm()).collect();
+        let mut speeds: Vec<f64> = limits.iter().map(|(id, _)| speed(&planner, *id)).collect();
         while let Some(part) = planner.advance()? {
             for (i, (id, limit)) in limits.iter().enumerate() {
-                let speed = planner.state(*id).linear.norm();
+                let speed = speed(&planner, *id);
                 moved[i] += part.dt * speed.max(speeds[i]);
                 speeds[i] = speed;
                 if moved[i] > *limit {
@@ -46,8 +47,8 @@ impl Course {
             }
             parts.push(part);
         }
-        let (states, next_part) = (planner.states().collect(), planner.next_part());
-        Ok(Some(Self { parts, states, next_part }))
+        let next_part = planner.next_part();
+        Ok(Some(Self { parts, states: planner.states(), next_part }))
     }
 
     /// The states to which the same parts lead in `world`, with derivatives, from `states` in which `step` starts.

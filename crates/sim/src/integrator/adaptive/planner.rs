@@ -5,7 +5,7 @@ use prehend_autodiff::Fwd;
 
 use super::error_norm::ErrorNorm;
 use super::travel::Travel;
-use super::{Adaptive, probe, touch_time};
+use super::{Adaptive, touch_time};
 use crate::error::SimulationError;
 use crate::integrator::runge_kutta::dormand_prince;
 use crate::state::State;
@@ -68,17 +68,17 @@ pub(super) struct Planner {
 }
 
 impl Planner {
-    /// Of a step from `states` whose first part is about `first` \[s\] long, if that is known.
+    /// Of a step from `states`, which carry the sensitivity, whose first part is about `first` \[s\] long, if that is known.
     pub(super) fn new(
         settings: &Adaptive,
         plain: World,
-        states: &[State],
+        states: Vec<State<Probe>>,
         whole: Step,
         first: Option<f64>,
     ) -> Self {
         let lifted = plain.lift::<Probe>();
-        let norm = ErrorNorm::new(settings, &plain, states);
-        let states = probe::seeded(states, &norm);
+        let values: Vec<State> = states.iter().map(State::value).collect();
+        let norm = ErrorNorm::new(settings, &plain, &values);
         let wrenches = lifted.wrenches(&states, whole.index);
         let first = first.unwrap_or_else(|| norm.first_step(&plain, &wrenches));
         let dt = first.min(whole.dt);
@@ -98,9 +98,9 @@ impl Planner {
         }
     }
 
-    /// The states that the parts have led to.
-    pub(super) fn states(&self) -> impl Iterator<Item = State> {
-        self.states.iter().map(State::value)
+    /// The states that the parts have led to, with the sensitivity.
+    pub(super) fn states(self) -> Vec<State<Probe>> {
+        self.states
     }
 
     /// The state of a body that the parts have led to.
@@ -123,7 +123,7 @@ impl Planner {
         if left <= shortest {
             return Ok(None);
         }
-        let values: Vec<State> = self.states().collect();
+        let values: Vec<State> = self.states.iter().map(State::value).collect();
         let before_kink = self.kink.as_ref().map_or(f64::INFINITY, |kink| kink.next(self.time));
         let dt = self.dt.min(left).min(before_kink);
         self.dt = self.travel.longest(&self.plain, &values, self.time, dt);

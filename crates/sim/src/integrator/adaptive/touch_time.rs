@@ -5,7 +5,6 @@ use prehend_geometry::FieldSample;
 use crate::contact::gap_smoothing::GapSmoothing;
 use crate::contact::patch::Patch;
 use crate::state::State;
-use crate::surface::SurfacePoint;
 use crate::world::World;
 use crate::world::contact_pair::ContactPair;
 
@@ -31,37 +30,90 @@ fn first_of(
     dt: f64,
     earliest: f64,
 ) -> Option<f64> {
+    let mut first = None;
+    for_each_gap(world, pair, ends, dt, pair.law().reach(), |[from, to]| {
+        let time = crossing(from, to, dt).filter(|time| *time > earliest);
+        first = [first, time].into_iter().flatten().min_by(f64::total_cmp);
+    });
+    first
+}
+
+/// Whether a sample of `pair` is in reach of its law by more than `depth` \[m\] within a step of `dt` \[s\], but at neither end of it.
+pub(super) fn dips(
+    world: &World,
+    pair: &ContactPair,
+    ends: [&[State]; 2],
+    dt: f64,
+    depth: f64,
+) -> bool {
+    let mut dips = false;
+    let reach = pair.law().reach() + pair.smoothing.force_band();
+    for_each_gap(world, pair, ends, dt, reach, |[from, to]| {
+        dips |= from[0] > 0.0 && to[0] > 0.0 && least(from, to, dt) < -depth;
+    });
+    dips
+}
+
+/// Calls `visit` with the gaps beyond `reach` \[m\] of the samples that may touch, and their rates \[m/s\], at both ends of a step of
+/// `dt` \[s\].
+fn for_each_gap(
+    world: &World,
+    pair: &ContactPair,
+    ends: [&[State]; 2],
+    dt: f64,
+    reach: f64,
+    mut visit: impl FnMut([[f64; 2]; 2]),
+) {
     let seen = ends.map(|states| world.seen_value(pair, states));
-    let patch = world.patch(pair, seen[0])?;
+    let Some(patch) = world.patch(pair, seen[0]) else { return };
     let Patch { surface, com, field, .. } = patch;
     let radius = surface.radius_about(&com);
     let [before, after] = seen.each_ref().map(|state| state.speed_within(radius));
-    let reach = pair.law().reach();
     let near = patch.near(reach, dt * before.max(after));
-    let time = |point: &SurfacePoint| {
-        let [from, to] = seen.map(|state| {
+    for point in near.points() {
+        let gaps = seen.each_ref().map(|state| {
             let arm = state.pose.rotation * (point.position - com);
             let place = (state.pose.translation.vector + arm).into();
             let FieldSample { distance, gradient, .. } = field.sample(&place, f64::INFINITY)?;
             let rate = gradient.dot(&(state.linear + state.angular.cross(&arm)));
             Some([distance - point.radius - reach, rate])
         });
-        let time = crossing(from?, to?, dt)?;
-        (time > earliest).then_some(time)
-    };
-    near.points().iter().filter_map(time).min_by(f64::total_cmp)
+        if let [Some(from), Some(to)] = gaps {
+            visit([from, to]);
+        }
+    }
+}
+
+/// The cubic over 0 to 1 with a value and a slope at both ends, where a step is `dt` \[s\] long.
+fn cubic([a, rate_a]: [f64; 2], [b, rate_b]: [f64; 2], dt: f64) -> impl Fn(f64) -> f64 {
+    let (da, db) = (rate_a * dt, rate_b * dt);
+    move |t| {
+        let s = 1.0 - t;
+        s * s * ((1.0 + 2.0 * t) * a + t * da) + t * t * ((1.0 + 2.0 * s) * b - s * db)
+    }
+}
+
+/// The least value of the cubic with a value and a slope at 0 and at `dt`.
+fn least(from: [f64; 2], to: [f64; 2], dt: f64) -> f64 {
+    let value = cubic(from, to, dt);
+    let (da, db) = (from[1] * dt, to[1] * dt);
+    // Slope: da + 2 c t + 3 d t².
+    let d = 2.0 * (from[0] - to[0]) + da + db;
+    let c = 3.0 * (to[0] - from[0]) - 2.0 * da - db;
+    let root = (c * c - 3.0 * d * da).max(0.0).sqrt();
+    // The root at which the slope grows, in the form without cancellation.
+    let t = if c > 0.0 { -da / (c + root) } else { (root - c) / (3.0 * d) };
+    let inside = if t > 0.0 && t < 1.0 { value(t) } else { f64::INFINITY };
+    inside.min(from[0]).min(to[0])
 }
 
 /// Where the cubic with a value and a slope at 0 and at `dt` changes its sign, if the values differ in theirs.
-fn crossing([a, rate_a]: [f64; 2], [b, rate_b]: [f64; 2], dt: f64) -> Option<f64> {
-    if (a > 0.0) == (b > 0.0) {
+fn crossing(from: [f64; 2], to: [f64; 2], dt: f64) -> Option<f64> {
+    let a = from[0];
+    if (a > 0.0) == (to[0] > 0.0) {
         return None;
     }
-    let (da, db) = (rate_a * dt, rate_b * dt);
-    let value = |t: f64| {
-        let s = 1.0 - t;
-        s * s * ((1.0 + 2.0 * t) * a + t * da) + t * t * ((1.0 + 2.0 * s) * b - s * db)
-    };
+    let value = cubic(from, to, dt);
     let (mut low, mut high) = (0.0, 1.0);
     // By halves: as many as a number has digits.
     for _ in 0..52 {
@@ -73,6 +125,8 @@ fn crossing([a, rate_a]: [f64; 2], [b, rate_b]: [f64; 2], dt: f64) -> Option<f64
 
 #[cfg(test)]
 mod tests {
+    use prehend_geometry::SplitMix64;
+
     use super::*;
 
     #[test]
@@ -83,5 +137,22 @@ mod tests {
         let time = crossing([value(0.0), slope(0.0)], [value(2.0), slope(2.0)], 2.0).unwrap();
         assert!(value(time).abs() < 1e-14);
         assert_eq!(crossing([1.0, -1.0], [0.5, 0.0], 1.0), None);
+    }
+
+    #[test]
+    fn the_least_of_a_cubic_is_that_of_many_places() {
+        let mut random = SplitMix64::new(3);
+        for i in 0..1000 {
+            let mut number = || 2.0 * random.uniform() - 1.0;
+            let (mut from, to, dt) = ([number(), number()], [number(), number()], 0.7);
+            if i % 3 == 0 {
+                // A parabola.
+                from[1] = 2.0 * (to[0] - from[0]) / dt - to[1];
+            }
+            let value = cubic(from, to, dt);
+            let all = (0..=10_000).map(|i| value(f64::from(i) * 1e-4));
+            let expected = all.fold(f64::INFINITY, f64::min);
+            assert!((least(from, to, dt) - expected).abs() < 1e-7, "{from:?} {to:?}");
+        }
     }
 }

@@ -1,6 +1,9 @@
 //! How far bodies may move before contacts could be passed over.
 
+use std::cell::LazyCell;
+
 use super::planner::Probe;
+use super::touch_time;
 use crate::body::RigidBody;
 use crate::contact::patch::Patch;
 use crate::state::State;
@@ -9,7 +12,11 @@ use crate::world::body::{Body, Motion};
 use crate::world::contact_pair::ContactPair;
 
 /// Part of a body's size by which its samples may always move.
-const FREE_TRAVEL: f64 = 0.02;
+const FREE_TRAVEL: f64 = 0.2;
+/// Part of a body's size by which samples may move whatever their gaps do meanwhile.
+const SHORT: f64 = 0.02;
+/// Depth of a contact that is as good as none, as part of a body's size.
+const GRAZING: f64 = 1e-6;
 /// Part of the thickness of what they may touch by which they may move at most.
 const FREE_THICKNESS: f64 = 0.25;
 /// Part of that by which a trajectory may always deviate from uniform motion.
@@ -24,10 +31,14 @@ pub(super) struct Travel(Vec<Option<Limit>>);
 
 /// What the samples of a contact may do.
 struct Limit {
-    /// Distance of the farthest one from the center of mass \[m\].
+    /// Distance of the farthest one's center from the center of mass \[m\].
     radius: f64,
+    /// Size of the body \[m\].
+    size: f64,
     /// How far they may always move \[m\].
     free: f64,
+    /// How far they may move whatever their gaps do meanwhile \[m\].
+    short: f64,
     /// Whether what they touch has an end.
     thin: bool,
     /// Whether one of the bodies is on a trajectory.
@@ -46,10 +57,14 @@ impl Travel {
             let size = |body: &Body| body.rigid().map_or(0.0, RigidBody::gyration_radius);
             let own = radius.max(size(body));
             let thickness = other.field.as_ref()?.thickness() + 2.0 * surface.smallest();
-            let free = FREE_TRAVEL * if own > 0.0 { own } else { size(other) };
-            let free = free.min(FREE_THICKNESS * thickness);
+            let size = if own > 0.0 { own } else { size(other) };
+            let thinnest = FREE_THICKNESS * thickness;
+            let [free, short] = [FREE_TRAVEL, SHORT].map(|part| (part * size).min(thinnest));
+            let radius = surface.spread_about(&body.com());
             let driven = [body, other].iter().any(|body| matches!(body.motion, Motion::Driven(_)));
-            Some(Limit { radius, free, thin: thickness.is_finite(), driven })
+            // The ends of a part say nothing of a trajectory in between.
+            let free = if driven { short } else { free };
+            Some(Limit { radius, size, free, short, thin: thickness.is_finite(), driven })
         };
         Self(world.contacts.iter().map(limit).collect())
     }
@@ -81,7 +96,7 @@ impl Travel {
                 let looks = deviations.len().min((dt / LOOK) as usize);
                 let deviation = deviations[..looks].last().copied().unwrap_or(0.0);
                 let travel = dt * (speed + dt * fall) + deviation;
-                (travel > limit.free || deviation > FREE_DEVIATION * limit.free)
+                (travel > limit.free || deviation > FREE_DEVIATION * limit.short)
                     && limit.is_near(world, pair, state, (travel - limit.free).max(0.0))
             };
             while passes_over(dt) {
@@ -113,12 +128,18 @@ impl Travel {
         stages: &[Vec<State<Probe>>],
         dt: f64,
     ) -> bool {
+        let end = LazyCell::new(|| -> Vec<State> {
+            stages.last().into_iter().flatten().map(State::value).collect()
+        });
         self.limits(world).any(|(pair, limit)| {
             let state = world.seen_value(pair, states);
             let speed = |state: State| state.speed_within(limit.radius);
             let speeds = stages.iter().map(|stage| speed(world.seen_value(pair, stage)));
             let travel = dt * speeds.fold(speed(state), f64::max);
-            travel > limit.free && limit.is_near(world, pair, state, travel - limit.free)
+            travel > limit.short
+                && limit.is_near(world, pair, state, travel)
+                && (travel > limit.free && limit.is_near(world, pair, state, travel - limit.free)
+                    || touch_time::dips(world, pair, [states, &end], dt, GRAZING * limit.size))
         })
     }
 }

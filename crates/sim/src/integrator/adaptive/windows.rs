@@ -5,7 +5,10 @@ use rayon::prelude::*;
 
 use super::Adaptive;
 use super::course::Course;
+use super::error_norm::ErrorNorm;
 use super::islands::Island;
+use super::planner::Probe;
+use super::probe;
 use crate::error::SimulationError;
 use crate::state::State;
 use crate::time::Step;
@@ -29,29 +32,31 @@ pub(super) fn step<S: Scalar>(
     whole: Step,
 ) -> Result<Vec<State<S>>, SimulationError> {
     let plain = world.plain();
+    let driving = plain.lift::<Probe>();
     let search = NeighborSearch::new(&plain);
     let mut states = states.to_vec();
-    let mut values: Vec<State> = states.iter().map(State::value).collect();
+    let values: Vec<State> = states.iter().map(State::value).collect();
+    let mut probes = probe::seeded(&values, &ErrorNorm::new(settings, &plain, &values));
     let mut next_parts = vec![None; world.bodies.len()];
     let mut window = whole;
     loop {
         let left = whole.end() - window.start;
-        let length = length(&search, &values);
+        let length = length(&search, &probes);
         window.dt = if length < left { length } else { left };
         let Window { neighbors, islands, dt } =
-            Window::find(settings, &search, &values, window, &next_parts, whole.dt)?;
+            Window::find(settings, &search, &probes, window, &next_parts, whole.dt)?;
         window.dt = dt;
         let contacts = if S::ORDER == 0 { Vec::new() } else { world.contacts_with(&neighbors) };
         for (island, course) in &islands {
             let after = match S::ORDER {
-                0 => course.states.iter().map(State::lift).collect(),
+                0 => course.states.iter().map(|state| state.value().lift()).collect(),
                 _ => {
                     let own = island.world(world, &contacts);
                     course.follow(&own, &island.states(&states), window)
                 }
             };
-            for ((place, after), value) in island.places().zip(after).zip(&course.states) {
-                (states[place], values[place]) = (after, *value);
+            for ((place, after), probe) in island.places().zip(after).zip(&course.states) {
+                (states[place], probes[place]) = (after, *probe);
             }
             island.bodies.iter().for_each(|id| next_parts[id.index()] = Some(course.next_part));
         }
@@ -59,17 +64,17 @@ pub(super) fn step<S: Scalar>(
             return Ok(states);
         }
         let start = window.end();
-        plain.drive(&mut values, start);
+        driving.drive(&mut probes, start);
         world.drive(&mut states, start);
         window = Step { index: window.index.max(1), start, dt: left - dt };
     }
 }
 
 /// In what time the fastest body of a group goes as far as contacts are looked for \[s\], infinite without any.
-fn length(search: &NeighborSearch<'_, f64>, states: &[State]) -> f64 {
+fn length(search: &NeighborSearch<'_, f64>, states: &[State<Probe>]) -> f64 {
     let gravity = search.world().gravity.norm();
     let time = |(id, size): (BodyId, f64)| {
-        TRAVEL * size / (states[id].linear.norm() + (gravity * size).sqrt())
+        TRAVEL * size / (states[id].value().linear.norm() + (gravity * size).sqrt())
     };
     search.free().map(time).fold(f64::INFINITY, f64::min)
 }
@@ -89,16 +94,17 @@ impl Window {
     fn find(
         settings: &Adaptive,
         search: &NeighborSearch<'_, f64>,
-        states: &[State],
+        probes: &[State<Probe>],
         mut step: Step,
         next_parts: &[Option<f64>],
         whole: f64,
     ) -> Result<Self, SimulationError> {
         let world = search.world();
+        let states: Vec<State> = probes.iter().map(State::value).collect();
         let free: Vec<BodyId> = search.free().map(|(id, _)| id).collect();
         loop {
-            let travels = search.travels(states, step);
-            let neighbors = search.find(states, &travels);
+            let travels = search.travels(&states, step);
+            let neighbors = search.find(&states, &travels);
             let contacts = world.contacts_with(&neighbors);
             let islands = Island::all(world, &contacts);
             let find = |island: &Island| {
@@ -110,7 +116,7 @@ impl Window {
                 let first = island.bodies.iter().filter_map(|id| next_parts[id.index()]);
                 let first = first.min_by(f64::total_cmp);
                 let own = island.world(world, &contacts);
-                Course::find(settings, own, &island.states(states), step, first, &limits)
+                Course::find(settings, own, island.states(probes), step, first, &limits)
             };
             // A few are not worth the threads.
             let courses: Vec<_> = match islands.len() {
@@ -123,8 +129,8 @@ impl Window {
                 return Ok(Self { neighbors, islands, dt: step.dt });
             }
             if step.dt < SHORTEST * whole {
-                let near = world.with_touching(states, 0.0);
-                return Err(near.stalled(states, step.start, step.dt));
+                let near = world.with_touching(&states, 0.0);
+                return Err(near.stalled(&states, step.start, step.dt));
             }
             step.dt *= 0.5;
         }
