@@ -114,6 +114,23 @@ fn binary_not_finite<const N: usize, T: Scalar>(a: [T; N], b: [T; N], da: T, db:
 
 impl_real_field!([const N: usize, T: Scalar] Fwd<N, T> {
     const RECORDED: bool = T::RECORDED;
+
+    #[inline]
+    fn local<const K: usize, const M: usize>(
+        function: &impl LocalFunction<K, M>,
+        x: [Self; K],
+    ) -> [Self; M] {
+        if N == 1 && T::ORDER == 0 {
+            let (at, direction) = (x.map(|x| x.value()), x.map(|x| x.derivative[0].value()));
+            if let Some((values, slopes)) = function.derivative_along(at, direction) {
+                return std::array::from_fn(|i| Self {
+                    value: T::constant(values[i]),
+                    derivative: [T::constant(slopes[i]); N],
+                });
+            }
+        }
+        function.evaluate(x)
+    }
 });
 
 /// The results of `function` and their Jacobian, one row a result: its own, or by forward mode.

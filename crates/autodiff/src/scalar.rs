@@ -177,6 +177,13 @@ pub trait LocalFunction<const N: usize, const M: usize> {
     fn linearize(&self, _x: [f64; N]) -> Option<([f64; M], [[f64; N]; M])> {
         None
     }
+
+    /// The results and their derivatives along a `direction` of `x`, where there is a faster way to them than by
+    /// [`evaluate`](Self::evaluate): what [`Fwd<1>`](crate::Fwd) needs.
+    #[inline]
+    fn derivative_along(&self, _x: [f64; N], _direction: [f64; N]) -> Option<([f64; M], [f64; M])> {
+        None
+    }
 }
 
 impl<const N: usize, const M: usize, F: LocalFunction<N, M>> LocalFunction<N, M> for &F {
@@ -188,6 +195,11 @@ impl<const N: usize, const M: usize, F: LocalFunction<N, M>> LocalFunction<N, M>
     #[inline]
     fn linearize(&self, x: [f64; N]) -> Option<([f64; M], [[f64; N]; M])> {
         (**self).linearize(x)
+    }
+
+    #[inline]
+    fn derivative_along(&self, x: [f64; N], direction: [f64; N]) -> Option<([f64; M], [f64; M])> {
+        (**self).derivative_along(x, direction)
     }
 }
 

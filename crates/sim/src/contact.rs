@@ -13,6 +13,7 @@ pub mod graspd;
 pub mod law;
 #[cfg(test)]
 pub(crate) mod law_checks;
+pub(crate) mod moved;
 pub mod normal;
 pub mod parameters;
 pub mod patch;

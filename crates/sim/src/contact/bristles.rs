@@ -1,13 +1,13 @@
 //! Tangential springs: what makes a contact hold.
 
 use nalgebra::{Matrix3x6, Matrix6, Vector3, Vector6};
-use prehend_autodiff::{Fwd, LocalFunction, Scalar};
+use prehend_autodiff::{LocalFunction, Scalar};
 
 use super::bristle_law::BristleLaw;
 use super::dynamic::DynContactLaw;
 use super::error::LawError;
+use super::moved::{LiftedContact, MovedPatch};
 use super::patch::{Patch, Touch};
-use super::point::Contact;
 use super::range::ParameterRange;
 
 /// Depth over which bristles take hold, in multiples of their deflection.
@@ -88,7 +88,7 @@ impl BristleFunction<'_> {
         change: &[T],
         from_com: Option<&Vector3<T>>,
     ) -> [T; 12] {
-        let moved = Moved::new(self.patch, change);
+        let moved = MovedPatch::new(self.patch, change);
         let deflection = Vector6::from_fn(|i, _| change[12 + i].plus(self.deflection[i]));
         self.response_of(p, &deflection, from_com, |touch, cutoff| moved.lift(touch, cutoff))
     }
@@ -96,7 +96,7 @@ impl BristleFunction<'_> {
     /// The function of dimensions of the shapes, with which `lift` gives a contact.
     pub(crate) fn response_by_dimensions<T: Scalar>(
         &self,
-        lift: impl Fn(&Touch, f64) -> Lifted<T>,
+        lift: impl Fn(&Touch, f64) -> LiftedContact<T>,
     ) -> [T; 12] {
         self.response_of(&self.constants(), &self.deflection.map(T::constant), None, lift)
     }
@@ -106,14 +106,14 @@ impl BristleFunction<'_> {
         p: &[T],
         deflection: &Vector6<T>,
         from_com: Option<&Vector3<T>>,
-        lift: impl Fn(&Touch, f64) -> Lifted<T>,
+        lift: impl Fn(&Touch, f64) -> LiftedContact<T>,
     ) -> [T; 12] {
         let Self { patch, bristles, .. } = *self;
         let (cutoff, law) = (self.law.reach(), BristleLaw::new(self.law, p));
         let mut wrench = Vector6::<T>::zeros();
         let mut fit = RateFit::default();
         let sound = patch.for_each_touch(cutoff, T::ORDER == 0, |touch| {
-            let Lifted { mut contact, lever, stretch } = lift(touch, cutoff);
+            let LiftedContact { mut contact, lever, stretch } = lift(touch, cutoff);
             let lever = from_com.map_or(lever, |from_com| lever + from_com);
             let across = across(&contact.normal, &lever);
             let (slip, deflected) = (contact.slip, across * deflection);
@@ -211,68 +211,5 @@ impl<T: Scalar> RateFit<T> {
             false => T::zero(),
         };
         factors.solve(&self.right) * held - returning(&(free + (deflection - free) * released))
-    }
-}
-
-/// A patch whose body is a little away from where it is.
-struct Moved<'a, T> {
-    patch: &'a Patch<'a>,
-    position: Vector3<T>,
-    turn: Vector3<T>,
-    linear: Vector3<T>,
-    angular: Vector3<T>,
-}
-
-/// A contact, and where it is from the center of mass.
-pub(crate) struct Lifted<T: Scalar> {
-    pub(super) contact: Contact<T>,
-    pub(super) lever: Vector3<T>,
-    /// Its area in multiples of the value of that, if it changes: all forces are proportional to it.
-    pub(super) stretch: Option<T>,
-}
-
-impl<'a, T: Scalar> Moved<'a, T> {
-    fn new(patch: &'a Patch<'a>, tangent: &[T]) -> Self {
-        let part = |k: usize| Vector3::from_column_slice(&tangent[3 * k..][..3]);
-        let [position, turn, linear, angular] = std::array::from_fn(part);
-        Self { patch, position, turn, linear, angular }
-    }
-
-    fn lift(&self, touch: &Touch, cutoff: f64) -> Lifted<T> {
-        let constant = |v: &Vector3<f64>| v.map(T::constant);
-        if T::ORDER == 0 {
-            let Contact { gap, normal_speed, slip, normal, area } = touch.contact(cutoff);
-            let contact = Contact {
-                gap: T::constant(gap),
-                normal_speed: T::constant(normal_speed),
-                slip: constant(&slip),
-                normal: constant(&normal),
-                area,
-            };
-            return Lifted { contact, lever: constant(&touch.lever), stretch: None };
-        }
-        let Contact { gap, normal_speed, slip, normal, area } = touch.lifted(cutoff);
-        let turned = self.turn.cross(&constant(&touch.arm));
-        let place = self.position + turned;
-        let normal_change = normal.map(|n| {
-            let terms = n.derivative[..3].iter().zip(&place);
-            terms.fold(T::zero(), |sum, (slope, x)| sum + x.times(*slope))
-        });
-        let lever_change = turned - normal_change.map(|n| n.times(touch.radius));
-        let spin = constant(&self.patch.state.angular);
-        let velocity =
-            self.linear + self.angular.cross(&constant(&touch.lever)) + spin.cross(&lever_change);
-        let compose = |x: Fwd<6>| {
-            let terms = x.derivative.iter().zip(place.iter().chain(&velocity));
-            terms.fold(T::constant(x.value), |sum, (slope, x)| sum + x.times(*slope))
-        };
-        let contact = Contact {
-            gap: compose(gap),
-            normal_speed: compose(normal_speed),
-            slip: slip.map(compose),
-            normal: normal.map(compose),
-            area,
-        };
-        Lifted { contact, lever: constant(&touch.lever) + lever_change, stretch: None }
     }
 }

@@ -3,8 +3,9 @@
 use nalgebra::{Point3, Vector3};
 use prehend_autodiff::{Fwd, Scalar};
 
-use super::bristles::{BristleFunction, Lifted};
+use super::bristles::BristleFunction;
 use super::dynamic::DynContactLaw;
+use super::moved::LiftedContact;
 use super::patch::{Patch, Touch};
 use super::point::Contact;
 use crate::shape::lifted::LiftedField;
@@ -32,7 +33,7 @@ impl VariableShapes<'_> {
         let p: Vec<Lane> = p.iter().map(|&p| Fwd::constant(p)).collect();
         let (mut force, mut torque) = (Vector3::<Lane>::zeros(), Vector3::<Lane>::zeros());
         self.patch.for_each_touch(law.reach(), false, |touch| {
-            let Lifted { contact, lever, stretch } = self.lift(touch, law.reach());
+            let LiftedContact { contact, lever, stretch } = self.lift(touch, law.reach());
             let response = law.response_with_derivative(&p, &contact);
             let own = contact.normal * response.normal + response.tangential;
             let own = stretch.map_or(own, |stretch| own * stretch);
@@ -47,7 +48,7 @@ impl VariableShapes<'_> {
         function.response_by_dimensions(|touch, cutoff| self.lift(touch, cutoff))
     }
 
-    fn lift(&self, touch: &Touch, cutoff: f64) -> Lifted<Lane> {
+    fn lift(&self, touch: &Touch, cutoff: f64) -> LiftedContact<Lane> {
         let constant = |v: &Vector3<f64>| v.map(Fwd::constant);
         let rotation = self.patch.state.pose.rotation.to_rotation_matrix();
         let sample = self.samples.as_ref().and_then(|all| all.get(touch.index as usize));
@@ -78,6 +79,6 @@ impl VariableShapes<'_> {
             normal,
             area: touch.area,
         };
-        Lifted { contact, lever, stretch }
+        LiftedContact { contact, lever, stretch }
     }
 }

@@ -29,6 +29,9 @@ pub trait DynContactLaw: ContactLaw + sealed::Sealed {
 
     /// [`DynContactLaw::wrench`] with its derivatives by the state, and by the parameters if `by_params`.
     fn wrench_jacobian(&self, p: &[f64], patch: &Patch<'_>, by_params: bool) -> WrenchJacobian;
+
+    /// [`DynContactLaw::wrench`] with its derivative along a direction of the state's [`tangent`](crate::State::tangent).
+    fn wrench_along(&self, p: &[f64], patch: &Patch<'_>, tangent: &[f64; 12]) -> [Vector6<f64>; 2];
 }
 
 impl dyn DynContactLaw {
@@ -60,6 +63,10 @@ impl<L: ContactLaw> DynContactLaw for L {
 
     fn wrench_jacobian(&self, p: &[f64], patch: &Patch<'_>, by_params: bool) -> WrenchJacobian {
         wrench::wrench_jacobian(self, p, patch, by_params)
+    }
+
+    fn wrench_along(&self, p: &[f64], patch: &Patch<'_>, tangent: &[f64; 12]) -> [Vector6<f64>; 2] {
+        wrench::wrench_along(self, p, patch, tangent)
     }
 }
 

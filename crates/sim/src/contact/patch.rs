@@ -86,7 +86,7 @@ impl Patch<'_> {
         let reach = self.reach(cutoff) + self.field.lipschitz_bound() * margin;
         self.surface.blocks().any(|(block, points)| {
             let near = |point: &SurfacePoint| self.distance_within(&point.position, reach);
-            self.may_touch(block, reach) && points.iter().any(near)
+            (points.len() == 1 || self.may_touch(block, reach)) && points.iter().any(near)
         })
     }
 
@@ -135,7 +135,8 @@ impl Patch<'_> {
         let reach = self.reach(cutoff);
         let skips = pressing_only && self.smoothing.leaks();
         for (block, points) in self.surface.blocks() {
-            if !self.may_touch(block, reach) {
+            // One is asked for itself below.
+            if points.len() > 1 && !self.may_touch(block, reach) {
                 continue;
             }
             for point in points {

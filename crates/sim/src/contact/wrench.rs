@@ -4,7 +4,9 @@ use nalgebra::{Matrix3, Vector3, Vector6};
 use prehend_autodiff::lie::cross_matrix;
 use prehend_autodiff::{Fwd, LocalFunction, Scalar};
 
+use super::dynamic::DynContactLaw;
 use super::law::ContactLaw;
+use super::moved::{LiftedContact, MovedPatch};
 use super::patch::{Patch, Touch};
 use super::point::Contact;
 
@@ -100,6 +102,55 @@ pub(crate) fn wrench_jacobian<L: ContactLaw>(
         std::array::from_fn(|column| by[row / 3][column / 3][(row % 3, column % 3)])
     });
     WrenchJacobian { wrench, by_state, by_params: param_slopes }
+}
+
+/// [`wrench`] with its derivative along `tangent`.
+pub(crate) fn wrench_along<L: ContactLaw>(
+    law: &L,
+    p: &[f64],
+    patch: &Patch<'_>,
+    tangent: &[f64; 12],
+) -> [Vector6<f64>; 2] {
+    let cutoff = law.reach();
+    let params: Vec<Fwd<1>> = p.iter().map(|&p| Fwd::constant(p)).collect();
+    let moved = MovedPatch::new(patch, &tangent.map(|x| Fwd { value: 0.0, derivative: [x] }));
+    let (mut force, mut torque) = (Vector3::<Fwd<1>>::zeros(), Vector3::<Fwd<1>>::zeros());
+    let sound = patch.for_each_touch(cutoff, false, |touch| {
+        let LiftedContact { contact, lever, .. } = moved.lift(touch, cutoff);
+        let response = law.law(&params, &contact);
+        let f = contact.normal * response.normal + response.tangential;
+        force += f;
+        torque += lever.cross(&f);
+    });
+    let all = stack(&force, &torque);
+    let value = if sound { all.map(|x| x.value) } else { Vector6::repeat(f64::NAN) };
+    [value, all.map(|x| x.derivative[0])]
+}
+
+/// The wrench of `patch` as a function of the tangent of its body's state, to first order.
+pub(crate) struct WrenchFunction<'a> {
+    pub(crate) law: &'a dyn DynContactLaw,
+    pub(crate) p: &'a [f64],
+    pub(crate) patch: &'a Patch<'a>,
+}
+
+impl LocalFunction<12, 6> for WrenchFunction<'_> {
+    #[inline]
+    fn evaluate<S: Scalar>(&self, tangent: [S; 12]) -> [S; 6] {
+        self.law.wrench_jacobian(self.p, self.patch, false).evaluate(tangent)
+    }
+
+    #[inline]
+    fn linearize(&self, _: [f64; 12]) -> Option<([f64; 6], [[f64; 12]; 6])> {
+        let jacobian = self.law.wrench_jacobian(self.p, self.patch, false);
+        Some((jacobian.wrench.into(), jacobian.by_state))
+    }
+
+    #[inline]
+    fn derivative_along(&self, _: [f64; 12], tangent: [f64; 12]) -> Option<([f64; 6], [f64; 6])> {
+        let [wrench, slope] = self.law.wrench_along(self.p, self.patch, &tangent);
+        Some((wrench.into(), slope.into()))
+    }
 }
 
 /// What is added where the lever of a round sample turns with the normal. Never inlined: it is rare, and the rest then fits the

@@ -11,7 +11,7 @@ use super::seen::Seen;
 use crate::contact::bristles::{BristleFunction, Bristles};
 use crate::contact::dimensions::{LANES, Lane, VariableShapes};
 use crate::contact::patch::Patch;
-use crate::contact::wrench::stack;
+use crate::contact::wrench::{WrenchFunction, stack};
 use crate::shape::lifted::LiftedField;
 use crate::state::State;
 
@@ -165,15 +165,20 @@ fn local_wrench<S: Scalar>(pair: &ContactPair<S>, seen: &Seen<S>, patch: &Patch<
     if S::ORDER == 0 {
         return pair.law().wrench(&values, patch).map(S::constant).into();
     }
+    let law = pair.law().as_ref();
     let moved = changes(pair.params());
-    let by_params = moved.iter().any(|p| !p.is_constant_zero());
-    let jacobian = pair.law().wrench_jacobian(&values, patch, by_params);
-    let mut wrench = S::local(&jacobian, seen.state.tangent());
-    for (by_param, moved) in jacobian.by_params.iter().zip(moved) {
-        for (component, slope) in wrench.iter_mut().zip(by_param.iter()) {
-            *component += moved.times(*slope);
+    let wrench = if moved.iter().all(|p| p.is_constant_zero()) {
+        S::local(&WrenchFunction { law, p: &values, patch }, seen.state.tangent())
+    } else {
+        let jacobian = law.wrench_jacobian(&values, patch, true);
+        let mut wrench = S::local(&jacobian, seen.state.tangent());
+        for (by_param, moved) in jacobian.by_params.iter().zip(moved) {
+            for (component, slope) in wrench.iter_mut().zip(by_param.iter()) {
+                *component += moved.times(*slope);
+            }
         }
-    }
+        wrench
+    };
     let [fx, fy, fz, tx, ty, tz] = wrench;
     match &seen.from_com {
         None => wrench,

@@ -1,0 +1,62 @@
+//! Contacts over numbers that carry derivatives.
+
+use nalgebra::Vector3;
+use prehend_autodiff::Scalar;
+
+use super::patch::{Patch, Touch};
+use super::point::Contact;
+
+/// A contact, and where it is from the center of mass.
+pub(crate) struct LiftedContact<T: Scalar> {
+    pub(super) contact: Contact<T>,
+    pub(super) lever: Vector3<T>,
+    /// Its area in multiples of the value of that, if it changes: all forces are proportional to it.
+    pub(super) stretch: Option<T>,
+}
+
+/// A patch whose body is a little away from where it is, in a direction of [`State::tangent`](crate::State::tangent).
+pub(super) struct MovedPatch<T: Scalar> {
+    position: Vector3<T>,
+    turn: Vector3<T>,
+    linear: Vector3<T>,
+    angular: Vector3<T>,
+    spin: Vector3<T>,
+}
+
+impl<T: Scalar> MovedPatch<T> {
+    pub(super) fn new(patch: &Patch<'_>, tangent: &[T]) -> Self {
+        let part = |k: usize| Vector3::from_column_slice(&tangent[3 * k..][..3]);
+        let [position, turn, linear, angular] = std::array::from_fn(part);
+        Self { position, turn, linear, angular, spin: patch.state.angular.map(T::constant) }
+    }
+
+    /// `touch` with derivatives: the normal turns with the sample's place x by (I − nnᵀ)∇²φ δx/|∇φ|.
+    #[inline(always)]
+    pub(super) fn lift(&self, touch: &Touch, cutoff: f64) -> LiftedContact<T> {
+        let constant = |v: &Vector3<f64>| v.map(T::constant);
+        let Touch { arm, lever, radius, velocity, smoothing, normal, length, hessian, .. } = touch;
+        let turned = self.turn.cross(&constant(arm));
+        let place = self.position + turned;
+        let along =
+            |row: &Vector3<f64>| place.x.times(row.x) + place.y.times(row.y) + place.z.times(row.z);
+        let bend = Vector3::from_fn(|i, _| along(&hessian.row(i).transpose()));
+        let across = along(&hessian.tr_mul(normal));
+        let normal_change =
+            Vector3::from_fn(|i, _| (bend[i] - across.times(normal[i])).times(1.0 / length));
+        let lever_change = turned - normal_change.map(|n| n.times(*radius));
+        let moved =
+            self.linear + self.angular.cross(&constant(lever)) + self.spin.cross(&lever_change);
+        let (normal_now, velocity) = (constant(normal) + normal_change, constant(velocity) + moved);
+        let depth = along(normal).times(*length);
+        let smoothed = |value: f64, slope: f64| depth.times(slope).plus(value);
+        let speed = velocity.dot(&normal_now);
+        let contact = Contact {
+            gap: smoothed(cutoff + smoothing.gap, smoothing.slope),
+            normal_speed: smoothed(smoothing.activation, smoothing.activation_slope) * speed,
+            slip: velocity - normal_now * speed,
+            normal: normal_now,
+            area: touch.area,
+        };
+        LiftedContact { contact, lever: constant(lever) + lever_change, stretch: None }
+    }
+}
