@@ -83,14 +83,19 @@ impl<'a, S: Scalar> Stages<'a, S> {
 
     /// Of each free body and contact that sticks, the step's length times the sum of the slopes with `weights`.
     pub(super) fn combined(&self, weights: &[f64]) -> Vec<Change<S>> {
-        let mut sum = vec![[Vector3::zeros(); 4]; self.moving()];
-        for (slopes, weight) in self.slopes.iter().zip(weights).filter(|(_, w)| **w != 0.0) {
-            let weight = weight * self.step.dt;
-            for (sum, slope) in sum.iter_mut().flatten().zip(slopes.iter().flatten()) {
-                *sum += slope.map(|x| x.times(weight));
+        let of = |i: usize| {
+            let mut sum: Change<S> = [Vector3::zeros(); 4];
+            for (slopes, weight) in self.slopes.iter().zip(weights).filter(|(_, w)| **w != 0.0) {
+                let weight = weight * self.step.dt;
+                for (sum, slope) in sum.iter_mut().zip(&slopes[i]) {
+                    sum.x += slope.x.times(weight);
+                    sum.y += slope.y.times(weight);
+                    sum.z += slope.z.times(weight);
+                }
             }
-        }
-        sum
+            sum
+        };
+        (0..self.moving()).map(of).collect()
     }
 
     /// The states after `change`.

@@ -99,6 +99,9 @@ impl<S: Scalar> World<S> {
         rate: &mut Vector6<S>,
     ) {
         let ends = [pair.bodies.samples, pair.bodies.field].map(|id| &self.bodies[id]);
+        if ends.iter().all(|body| body.dimensions().iter().all(is_constant)) {
+            return;
+        }
         let moved = ends.map(|body| changes(body.dimensions()));
         let variable = |(i, x): (usize, &S)| (!x.is_constant_zero()).then_some(i);
         let places: Vec<usize> = moved.iter().flatten().enumerate().filter_map(variable).collect();
@@ -166,10 +169,10 @@ fn local_wrench<S: Scalar>(pair: &ContactPair<S>, seen: &Seen<S>, patch: &Patch<
         return pair.law().wrench(&values, patch).map(S::constant).into();
     }
     let law = pair.law().as_ref();
-    let moved = changes(pair.params());
-    let wrench = if moved.iter().all(|p| p.is_constant_zero()) {
+    let wrench = if pair.params().iter().all(is_constant) {
         S::local(&WrenchFunction { law, p: &values, patch }, seen.state.tangent())
     } else {
+        let moved = changes(pair.params());
         let jacobian = law.wrench_jacobian(&values, patch, true);
         let mut wrench = S::local(&jacobian, seen.state.tangent());
         for (by_param, moved) in jacobian.by_params.iter().zip(moved) {
@@ -232,6 +235,11 @@ fn local_bristles<S: Scalar>(
         }
     }
     split(all)
+}
+
+/// Whether a number carries no derivatives.
+fn is_constant<S: Scalar>(x: &S) -> bool {
+    x.plus(-x.value()).is_constant_zero()
 }
 
 /// Zeros that carry the derivatives of `params`.

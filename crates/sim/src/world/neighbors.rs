@@ -17,7 +17,7 @@ use crate::state::State;
 use crate::time::Step;
 
 /// How far a body may be pushed beyond where it would go, in parts of its size.
-const SLACK: f64 = 0.25;
+const SLACK: f64 = 0.05;
 /// How often trajectories are looked at \[s\], and how many times in a step at most.
 const LOOK: f64 = 1e-3;
 const LOOKS: f64 = 1000.0;

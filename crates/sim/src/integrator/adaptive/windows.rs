@@ -17,7 +17,7 @@ use crate::world::body_id::BodyId;
 use crate::world::neighbors::{NeighborSearch, Neighbors};
 
 /// How far the fastest body goes in a window, in parts of its size.
-const TRAVEL: f64 = 0.5;
+const TRAVEL: f64 = 0.25;
 /// Shortest window, in parts of the step.
 const SHORTEST: f64 = 1e-9;
 
