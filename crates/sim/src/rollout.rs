@@ -216,7 +216,7 @@ impl<S: Scalar> World<S> {
         if self.contact_groups.is_empty() || integrator.finds_contacts() {
             return integrator.step(self, states, step);
         }
-        let near = self.with_neighbors(states, |search, states| search.travels(states, step));
+        let near = self.with_neighbors(states, step);
         integrator.step(&near, states, step)
     }
 

@@ -12,7 +12,7 @@ use crate::contact::gap_smoothing::GapSmoothing;
 use crate::surface::Surface;
 
 /// The two sides of a contact.
-#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+#[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
 pub struct ContactBodies {
     /// The body whose surface samples touch.
     pub samples: BodyId,

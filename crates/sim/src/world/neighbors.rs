@@ -16,7 +16,7 @@ use super::contact_pair::{ContactBodies, ContactPair};
 use crate::state::State;
 use crate::time::Step;
 
-/// How far a body may be pushed beyond where it would go, in parts of its size.
+/// How far a body may be pushed within a step from where it would go, in parts of its size.
 const SLACK: f64 = 0.05;
 /// How often trajectories are looked at \[s\], and how many times in a step at most.
 const LOOK: f64 = 1e-3;
@@ -25,8 +25,8 @@ const LOOKS: f64 = 1000.0;
 /// A contact of a group.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Neighbors {
-    group: usize,
-    bodies: ContactBodies,
+    pub(crate) group: usize,
+    pub(crate) bodies: ContactBodies,
     weight: f64,
 }
 
@@ -65,43 +65,54 @@ impl<'a, S: Scalar> NeighborSearch<'a, S> {
         })
     }
 
-    /// How far each body's center may come in `step` \[m\], if nothing hits it that is much faster.
-    pub(crate) fn travels(&self, states: &[State], step: Step) -> Vec<f64> {
-        let mut travels = vec![0.0; self.world.bodies.len()];
-        let fall = self.world.gravity.map(S::value).norm() * step.dt;
+    /// How far each body's center may come in `step` from where it would be if it went on as it moves \[m\], if nothing pushes it by
+    /// more than `slack` parts of its size.
+    pub(crate) fn deviations(&self, step: Step, slack: f64) -> Vec<f64> {
+        let mut deviations = vec![0.0; self.world.bodies.len()];
+        let fall = 0.5 * self.world.gravity.map(S::value).norm() * step.dt * step.dt;
         for (id, size) in self.free() {
-            travels[id.index()] = (states[id].linear.norm() + fall) * step.dt + SLACK * size;
+            deviations[id.index()] = fall + slack * size;
         }
-        let bodies = travels.iter_mut().zip(&self.world.bodies).zip(&self.grouped);
-        for ((travel, body), _) in bodies.filter(|(_, grouped)| **grouped) {
+        let bodies = deviations.iter_mut().zip(&self.world.bodies).zip(&self.grouped);
+        for ((deviation, body), _) in bodies.filter(|(_, grouped)| **grouped) {
             if let Motion::Driven(trajectory) = &body.motion {
                 let looks = (step.dt / LOOK).ceil().min(LOOKS);
                 let place = |look: usize| {
                     let state = trajectory.state(step.start + step.dt * look as f64 / looks);
                     state.value().pose.translation.vector
                 };
-                *travel = (0..looks as usize).map(|i| (place(i + 1) - place(i)).norm()).sum();
+                *deviation = (0..looks as usize).map(|i| (place(i + 1) - place(i)).norm()).sum();
             }
         }
-        travels
+        deviations
     }
 
-    /// The contacts of groups whose samples may touch, from `states` on, before each body's center has moved by its one of
-    /// `travels` \[m\], in an order that depends on nothing but the bodies.
-    pub(crate) fn find(&self, states: &[State], travels: &[f64]) -> Vec<Neighbors> {
-        let reaches: Vec<Reach> = (0..states.len().min(travels.len()))
-            .map(|i| Reach {
-                center: states[i].pose.translation.vector,
-                radius: self.radii[i].map(|radius| radius + travels[i]),
-            })
-            .collect();
+    /// The contacts of groups whose samples may touch within `dt` \[s\] from `states` on, if no body's center comes farther than its
+    /// one of `deviations` \[m\] from where it would be if what is free went on as it moves and nothing else did, in an order that
+    /// depends on nothing but the bodies.
+    pub(crate) fn find(&self, states: &[State], deviations: &[f64], dt: f64) -> Vec<Neighbors> {
+        let reach = |(id, deviation): (BodyId, &f64)| {
+            let free = self.world.bodies[id].rigid().is_some();
+            Reach {
+                center: states[id].pose.translation.vector,
+                path: if free { states[id].linear * dt } else { Vector3::zeros() },
+                radius: self.radii[id.index()].map(|radius| radius + deviation),
+            }
+        };
+        let reaches: Vec<Reach> =
+            (0..states.len()).map(BodyId).zip(deviations).map(reach).collect();
         let mut near = Vec::new();
         for (index, group) in self.world.contact_groups.iter().enumerate() {
             for (a, b) in self.pairs(group, &reaches) {
                 let contacts = self.world.sides(a, b).unwrap_or_default().into_iter();
                 let contacts =
                     contacts.map(|(bodies, weight)| Neighbors { group: index, bodies, weight });
-                near.extend(contacts.filter(|contact| self.may_touch(contact, states, travels)));
+                let may_touch = |contact: &Neighbors| {
+                    let reach = &reaches[contact.bodies.samples.index()];
+                    let deviation = deviations[contact.bodies.samples.index()];
+                    self.may_touch(contact, states, reach, deviation)
+                };
+                near.extend(contacts.filter(may_touch));
             }
         }
         near
@@ -137,8 +148,14 @@ impl<'a, S: Scalar> NeighborSearch<'a, S> {
         pairs
     }
 
-    /// Whether samples may touch a field that has no end, or is far from filling its ball.
-    fn may_touch(&self, contact: &Neighbors, states: &[State], travels: &[f64]) -> bool {
+    /// Whether samples of a body with this reach may touch a field that has no end, or is far from filling its ball.
+    fn may_touch(
+        &self,
+        contact: &Neighbors,
+        states: &[State],
+        reach: &Reach,
+        deviation: f64,
+    ) -> bool {
         let ContactBodies { samples, field } = contact.bodies;
         let (body, base) = (&self.world.bodies[samples], &self.world.bodies[field]);
         let (Some(surface), Some(distance)) = (&body.surface, &base.field) else { return false };
@@ -148,8 +165,8 @@ impl<'a, S: Scalar> NeighborSearch<'a, S> {
         }
         let pattern = &self.world.contact_groups[contact.group].contact;
         let radius = surface.radius_about(&body.com().map(S::value));
-        let within = radius + travels[samples.index()] + reach_of(pattern);
-        let place = states[field].pose.inverse() * states[samples].pose.translation.vector;
+        let within = radius + 0.5 * reach.path.norm() + deviation + reach_of(pattern);
+        let place = states[field].pose.inverse() * (reach.center + reach.path * 0.5);
         distance.distance(&place.into(), distance.lipschitz_bound() * within).is_some()
     }
 }
@@ -168,26 +185,29 @@ fn radius<S: Scalar>(body: &Body<S>) -> Option<f64> {
     Some(samples.max((center - com).norm() + radius))
 }
 
-/// Where a body may be felt: within a radius \[m\], or anywhere.
+/// Where a body may be felt: within a radius \[m\] about its center that moves along a path \[m\], or anywhere.
 struct Reach {
     center: Vector3<f64>,
+    path: Vector3<f64>,
     radius: Option<f64>,
 }
 
 impl Reach {
     /// The box around it that is larger by `margin` \[m\].
     fn aabb(&self, margin: f64) -> Aabb {
-        let [x, y, z] = self.center.into();
-        let half = self.radius.unwrap_or(f64::INFINITY) + margin;
-        Aabb::from_half_extents(Vector::new(x, y, z), Vector::splat(half))
+        let [x, y, z] = (self.center + self.path * 0.5).into();
+        let half = Vector::new(self.path.x, self.path.y, self.path.z).abs() * 0.5;
+        let radius = self.radius.unwrap_or(f64::INFINITY) + margin;
+        Aabb::from_half_extents(Vector::new(x, y, z), half + Vector::splat(radius))
     }
 
-    /// Whether it and another one are no farther apart than `margin` \[m\].
+    /// Whether it and another one are no farther apart than `margin` \[m\] at a time.
     fn meets(&self, other: &Self, margin: f64) -> bool {
-        match (self.radius, other.radius) {
-            (Some(a), Some(b)) => (self.center - other.center).norm() <= a + b + margin,
-            _ => true,
-        }
+        let (Some(a), Some(b)) = (self.radius, other.radius) else { return true };
+        let (from, path) = (self.center - other.center, self.path - other.path);
+        let length = path.norm_squared();
+        let nearest = if length > 0.0 { (-from.dot(&path) / length).clamp(0.0, 1.0) } else { 0.0 };
+        (from + path * nearest).norm() <= a + b + margin
     }
 }
 
@@ -201,19 +221,29 @@ impl<S: Scalar> World<S> {
         contacts
     }
 
-    /// The same world with those contacts of its groups one by one that may touch before each body's center has moved by
-    /// its `travel` \[m\] from `states`, as far as it turns.
+    /// The same world with those contacts of its groups one by one that may touch in `step` from `states`.
     pub(crate) fn with_neighbors<T: Scalar>(
         &self,
         states: &[State<T>],
-        travel: impl FnOnce(&NeighborSearch<'_, S>, &[State]) -> Vec<f64>,
+        step: Step,
+    ) -> Cow<'_, Self> {
+        self.with_contacts(states, step.dt, |search| search.deviations(step, SLACK))
+    }
+
+    /// The same world with those contacts of its groups one by one that may touch within `dt` \[s\] from `states`, with such
+    /// `deviations` \[m\].
+    fn with_contacts<T: Scalar>(
+        &self,
+        states: &[State<T>],
+        dt: f64,
+        deviations: impl FnOnce(&NeighborSearch<'_, S>) -> Vec<f64>,
     ) -> Cow<'_, Self> {
         if self.contact_groups.is_empty() {
             return Cow::Borrowed(self);
         }
         let values: Vec<State> = states.iter().map(State::value).collect();
         let search = NeighborSearch::new(self);
-        let neighbors = search.find(&values, &travel(&search, &values));
+        let neighbors = search.find(&values, &deviations(&search), dt);
         let contacts = self.contacts_with(&neighbors);
         let (bodies, gravity) = (self.bodies.clone(), self.gravity);
         Cow::Owned(Self { bodies, contacts, contact_groups: Vec::new(), gravity })
@@ -225,6 +255,6 @@ impl<S: Scalar> World<S> {
         states: &[State<T>],
         reach: f64,
     ) -> Cow<'_, Self> {
-        self.with_neighbors(states, |_, states| vec![reach; states.len()])
+        self.with_contacts(states, 0.0, |_| vec![reach; states.len()])
     }
 }

@@ -18,37 +18,34 @@ pub(super) struct Course {
     pub(super) states: Vec<State<Probe>>,
     /// Length of the part that would come next \[s\].
     pub(super) next_part: f64,
+    /// Of each of the bodies that were watched, how far its center came at most from where it would have been if it had gone on
+    /// as it moved at the start \[m\].
+    pub(super) deviations: Vec<f64>,
 }
 
 impl Course {
-    /// The parts of `step` from `states`; none if the center of a body moves by more than its `limits` \[m\]. `next_part` \[s\] is
-    /// that of the step before.
+    /// The parts of `step` from `states`; `next_part` \[s\] is that of the step before.
     pub(super) fn find(
         settings: &Adaptive,
         world: World,
         states: Vec<State<Probe>>,
         step: Step,
         next_part: Option<f64>,
-        limits: &[(BodyId, f64)],
-    ) -> Result<Option<Self>, SimulationError> {
+        watched: &[BodyId],
+    ) -> Result<Self, SimulationError> {
         let mut planner = Planner::new(settings, world, states, step, next_part);
-        let speed = |planner: &Planner, id: BodyId| planner.state(id).linear.norm();
         let mut parts = Vec::new();
-        let mut moved = vec![0.0; limits.len()];
-        let mut speeds: Vec<f64> = limits.iter().map(|(id, _)| speed(&planner, *id)).collect();
+        let mut watched: Vec<Watched> =
+            watched.iter().map(|id| Watched::new(*id, planner.state(*id))).collect();
         while let Some(part) = planner.advance()? {
-            for (i, (id, limit)) in limits.iter().enumerate() {
-                let speed = speed(&planner, *id);
-                moved[i] += part.dt * speed.max(speeds[i]);
-                speeds[i] = speed;
-                if moved[i] > *limit {
-                    return Ok(None);
-                }
+            for body in &mut watched {
+                body.moved(planner.state(body.id), part, step.start);
             }
             parts.push(part);
         }
         let next_part = planner.next_part();
-        Ok(Some(Self { parts, states: planner.states(), next_part }))
+        let deviations = watched.into_iter().map(|body| body.farthest).collect();
+        Ok(Self { parts, states: planner.states(), next_part, deviations })
     }
 
     /// The states to which the same parts lead in `world`, with derivatives, from `states` in which `step` starts.
@@ -70,5 +67,31 @@ impl Course {
             };
         }
         states
+    }
+}
+
+/// A body and its deviation from uniform motion.
+struct Watched {
+    id: BodyId,
+    start: State,
+    /// By how much position \[m\] and velocity \[m/s\] deviate now, and how far it has been off at most \[m\].
+    off: f64,
+    speed: f64,
+    farthest: f64,
+}
+
+impl Watched {
+    fn new(id: BodyId, start: State) -> Self {
+        Self { id, start, off: 0.0, speed: 0.0, farthest: 0.0 }
+    }
+
+    /// After a `part` of a step that started at `time` \[s\] has led to `state`.
+    fn moved(&mut self, state: State, part: Step, time: f64) {
+        let [from, to] = [self.start, state].map(|state| state.pose.translation.vector);
+        let uniform = from + self.start.linear * (part.end() - time);
+        let speed = (state.linear - self.start.linear).norm();
+        self.farthest = self.farthest.max(self.off + part.dt * speed.max(self.speed));
+        self.off = (to - uniform).norm();
+        self.speed = speed;
     }
 }

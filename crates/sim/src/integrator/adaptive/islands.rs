@@ -6,6 +6,7 @@ use crate::state::State;
 use crate::world::World;
 use crate::world::body_id::BodyId;
 use crate::world::contact_pair::{ContactBodies, ContactPair};
+use crate::world::neighbors::Neighbors;
 
 /// Free bodies that are linked by contacts, and what they touch that no force moves. What happens to them depends on no others.
 pub(super) struct Island {
@@ -15,6 +16,13 @@ pub(super) struct Island {
     contacts: Vec<usize>,
     /// Places of the deflections of its contacts among the states.
     deflections: Vec<usize>,
+}
+
+/// What tells one island from another.
+#[derive(Eq, Hash, PartialEq)]
+pub(super) struct Links {
+    bodies: Vec<BodyId>,
+    contacts: Vec<(usize, ContactBodies)>,
 }
 
 impl Island {
@@ -61,6 +69,14 @@ impl Island {
             island.bodies.dedup();
         }
         islands
+    }
+
+    /// What happens to it follows from its bodies and these of its contacts, the group and bodies of those of groups; the others are
+    /// first among all, as many as `single`.
+    pub(super) fn links(&self, single: usize, neighbors: &[Neighbors]) -> Links {
+        let neighbors = self.contacts.iter().filter_map(|i| neighbors.get(i.checked_sub(single)?));
+        let contacts = neighbors.map(|contact| (contact.group, contact.bodies)).collect();
+        Links { bodies: self.bodies.clone(), contacts }
     }
 
     /// Its bodies and contacts as a world, each body at its place among [`bodies`](Self::bodies); `contacts` are those that

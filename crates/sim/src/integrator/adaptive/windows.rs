@@ -1,12 +1,14 @@
 //! Steps of many bodies: those that cannot touch each other for a while move on by themselves.
 
+use std::collections::HashMap;
+
 use prehend_autodiff::Scalar;
 use rayon::prelude::*;
 
 use super::Adaptive;
 use super::course::Course;
 use super::error_norm::ErrorNorm;
-use super::islands::Island;
+use super::islands::{Island, Links};
 use super::planner::Probe;
 use super::probe;
 use crate::error::SimulationError;
@@ -18,13 +20,16 @@ use crate::world::neighbors::{NeighborSearch, Neighbors};
 
 /// How far the fastest body goes in a window, in parts of its size.
 const TRAVEL: f64 = 0.25;
-/// Shortest window, in parts of the step.
-const SHORTEST: f64 = 1e-9;
+/// How far a body is first looked for from where it would be if nothing pushed it, in parts of its size: where that is too little
+/// it is seen, and costs less than an island that is too large.
+const SLACK: f64 = 1e-3;
+/// How much farther than it came a body is looked for.
+const MARGIN: f64 = 1.25;
 
 /// The states after `whole`.
 ///
-/// A step is divided into windows. Within one, no body comes farther than contacts were looked for at its start, so that bodies
-/// which no contact links are islands, each with parts of its own. Without groups of contacts the whole step is one window.
+/// A step is divided into windows. Within one, no body comes farther from uniform motion than contacts were looked for, so that
+/// bodies which no contact links are islands, each with parts of its own. Without groups of contacts the whole step is one window.
 pub(super) fn step<S: Scalar>(
     settings: &Adaptive,
     world: &World<S>,
@@ -43,9 +48,8 @@ pub(super) fn step<S: Scalar>(
         let left = whole.end() - window.start;
         let length = length(&search, &probes);
         window.dt = if length < left { length } else { left };
-        let Window { neighbors, islands, dt } =
-            Window::find(settings, &search, &probes, window, &next_parts, whole.dt)?;
-        window.dt = dt;
+        let Window { neighbors, islands } =
+            Window::find(settings, &search, &probes, window, &next_parts)?;
         let contacts = if S::ORDER == 0 { Vec::new() } else { world.contacts_with(&neighbors) };
         for (island, course) in &islands {
             let after = match S::ORDER {
@@ -60,17 +64,17 @@ pub(super) fn step<S: Scalar>(
             }
             island.bodies.iter().for_each(|id| next_parts[id.index()] = Some(course.next_part));
         }
-        if dt == left {
+        if window.dt == left {
             return Ok(states);
         }
         let start = window.end();
         driving.drive(&mut probes, start);
         world.drive(&mut states, start);
-        window = Step { index: window.index.max(1), start, dt: left - dt };
+        window = Step { index: window.index.max(1), start, dt: left - window.dt };
     }
 }
 
-/// In what time the fastest body of a group goes as far as contacts are looked for \[s\], infinite without any.
+/// In what time the fastest body of a group goes as far as in a window \[s\], infinite without any.
 fn length(search: &NeighborSearch<'_, f64>, states: &[State<Probe>]) -> f64 {
     let gravity = search.world().gravity.norm();
     let time = |(id, size): (BodyId, f64)| {
@@ -84,55 +88,65 @@ struct Window {
     /// The contacts of groups that may touch.
     neighbors: Vec<Neighbors>,
     islands: Vec<(Island, Course)>,
-    /// Its length \[s\].
-    dt: f64,
 }
 
 impl Window {
-    /// The longest of the lengths of `step`, a half of it, … in which no body comes farther than contacts were looked for; an error
-    /// if it would have to be next to nothing of `whole` \[s\].
+    /// Of `step`. Where a body comes farther from uniform motion than contacts were looked for, they are looked for again; courses of
+    /// islands which that leaves alone are kept.
     fn find(
         settings: &Adaptive,
         search: &NeighborSearch<'_, f64>,
         probes: &[State<Probe>],
-        mut step: Step,
+        step: Step,
         next_parts: &[Option<f64>],
-        whole: f64,
     ) -> Result<Self, SimulationError> {
         let world = search.world();
         let states: Vec<State> = probes.iter().map(State::value).collect();
         let free: Vec<BodyId> = search.free().map(|(id, _)| id).collect();
+        let mut deviations = search.deviations(step, SLACK);
+        let mut known: HashMap<Links, Course> = HashMap::new();
         loop {
-            let travels = search.travels(&states, step);
-            let neighbors = search.find(&states, &travels);
+            let neighbors = search.find(&states, &deviations, step.dt);
             let contacts = world.contacts_with(&neighbors);
-            let islands = Island::all(world, &contacts);
-            let find = |island: &Island| {
-                let limit = |(own, id): (usize, &BodyId)| {
-                    let limited = free.binary_search(id).is_ok();
-                    limited.then_some((BodyId(own), travels[id.index()]))
-                };
-                let limits: Vec<_> = island.bodies.iter().enumerate().filter_map(limit).collect();
+            let watched = |island: &Island| {
+                let free = |id: &BodyId| free.binary_search(id).is_ok();
+                let bodies = island.bodies.iter().enumerate().filter(|(_, id)| free(id));
+                bodies.map(|(own, id)| (BodyId(own), *id)).collect::<Vec<_>>()
+            };
+            let find = |(island, known): (&Island, Option<Course>)| {
+                if let Some(course) = known {
+                    return Ok(course);
+                }
                 let first = island.bodies.iter().filter_map(|id| next_parts[id.index()]);
                 let first = first.min_by(f64::total_cmp);
                 let own = island.world(world, &contacts);
-                Course::find(settings, own, island.states(probes), step, first, &limits)
+                let watched: Vec<BodyId> = watched(island).iter().map(|(own, _)| *own).collect();
+                Course::find(settings, own, island.states(probes), step, first, &watched)
             };
+            let islands = Island::all(world, &contacts);
+            let links = |island: &Island| island.links(world.contacts.len(), &neighbors);
+            let known_before: Vec<_> = islands.iter().map(|i| known.remove(&links(i))).collect();
+            let found = islands.iter().zip(known_before);
             // A few are not worth the threads.
             let courses: Vec<_> = match islands.len() {
-                0..4 => islands.iter().map(find).collect(),
-                _ => islands.par_iter().map(find).collect(),
+                0..4 => found.map(find).collect(),
+                _ => found.collect::<Vec<_>>().into_par_iter().map(find).collect(),
             };
-            let courses = courses.into_iter().collect::<Result<Option<Vec<Course>>, _>>()?;
-            if let Some(courses) = courses {
-                let islands = islands.into_iter().zip(courses).collect();
-                return Ok(Self { neighbors, islands, dt: step.dt });
+            let courses = courses.into_iter().collect::<Result<Vec<Course>, _>>()?;
+            let mut complete = true;
+            for (island, course) in islands.iter().zip(&courses) {
+                for ((_, id), deviation) in watched(island).into_iter().zip(&course.deviations) {
+                    let looked_for = &mut deviations[id.index()];
+                    if deviation > looked_for {
+                        (*looked_for, complete) = (MARGIN * deviation, false);
+                    }
+                }
             }
-            if step.dt < SHORTEST * whole {
-                let near = world.with_touching(&states, 0.0);
-                return Err(near.stalled(&states, step.start, step.dt));
+            let islands = islands.into_iter().zip(courses);
+            if complete {
+                return Ok(Self { neighbors, islands: islands.collect() });
             }
-            step.dt *= 0.5;
+            known = islands.map(|(island, course)| (links(&island), course)).collect();
         }
     }
 }
