@@ -121,7 +121,11 @@ impl_real_field!([const N: usize, T: Scalar] Fwd<N, T> {
         x: [Self; K],
     ) -> [Self; M] {
         if N == 1 && T::ORDER == 0 {
-            let (at, direction) = (x.map(|x| x.value()), x.map(|x| x.derivative[0].value()));
+            // A loop: `map` is not inlined for long arrays.
+            let (mut at, mut direction) = ([0.0; K], [0.0; K]);
+            for (i, x) in x.iter().enumerate() {
+                (at[i], direction[i]) = (x.value.value(), x.derivative[0].value());
+            }
             if let Some((values, slopes)) = function.derivative_along(at, direction) {
                 return std::array::from_fn(|i| Self {
                     value: T::constant(values[i]),

@@ -7,6 +7,7 @@ pub(crate) mod contact_pair;
 pub(crate) mod deflection;
 mod effect;
 pub(crate) mod neighbors;
+mod pair_function;
 mod seen;
 pub(crate) mod trajectory;
 

@@ -21,12 +21,17 @@ pub struct WrenchJacobian {
     pub by_params: Vec<Vector6<f64>>,
 }
 
-/// The wrench as a function of the state's tangent, to first order about where it was found.
-impl LocalFunction<12, 6> for WrenchJacobian {
+/// A wrench as a function of the state's tangent, to first order about where it was found.
+pub(crate) struct LinearWrench {
+    pub(crate) value: [f64; 6],
+    pub(crate) by_state: [[f64; 12]; 6],
+}
+
+impl LocalFunction<12, 6> for LinearWrench {
     #[inline]
     fn evaluate<S: Scalar>(&self, tangent: [S; 12]) -> [S; 6] {
         std::array::from_fn(|row| {
-            let sum = S::constant(self.wrench[row]);
+            let sum = S::constant(self.value[row]);
             let terms = tangent.iter().zip(&self.by_state[row]);
             terms.fold(sum, |sum, (direction, slope)| sum + direction.times(*slope))
         })
@@ -34,7 +39,7 @@ impl LocalFunction<12, 6> for WrenchJacobian {
 
     #[inline]
     fn linearize(&self, _: [f64; 12]) -> Option<([f64; 6], [[f64; 12]; 6])> {
-        Some((self.wrench.into(), self.by_state))
+        Some((self.value, self.by_state))
     }
 }
 
@@ -137,7 +142,9 @@ pub(crate) struct WrenchFunction<'a> {
 impl LocalFunction<12, 6> for WrenchFunction<'_> {
     #[inline]
     fn evaluate<S: Scalar>(&self, tangent: [S; 12]) -> [S; 6] {
-        self.law.wrench_jacobian(self.p, self.patch, false).evaluate(tangent)
+        let WrenchJacobian { wrench, by_state, .. } =
+            self.law.wrench_jacobian(self.p, self.patch, false);
+        LinearWrench { value: wrench.into(), by_state }.evaluate(tangent)
     }
 
     #[inline]

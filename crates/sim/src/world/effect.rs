@@ -2,16 +2,17 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Vector3, Vector6};
+use nalgebra::{UnitQuaternion, Vector3, Vector6};
 use prehend_autodiff::{Fwd, Scalar};
 
 use super::World;
 use super::contact_pair::ContactPair;
+use super::pair_function::Relation;
 use super::seen::Seen;
 use crate::contact::bristles::{BristleFunction, Bristles};
 use crate::contact::dimensions::{LANES, Lane, VariableShapes};
 use crate::contact::patch::Patch;
-use crate::contact::wrench::{WrenchFunction, stack};
+use crate::contact::wrench::{LinearWrench, WrenchFunction, WrenchJacobian, stack};
 use crate::shape::lifted::LiftedField;
 use crate::state::State;
 
@@ -67,36 +68,111 @@ impl<S: Scalar> World<S> {
         deflection: Option<&State<S>>,
         step: usize,
     ) -> Effect<S> {
-        let seen = self.seen(pair, states);
-        let Some(patch) = self.patch(pair, seen.state.value()) else { return Effect::default() };
-        let patch = Patch { smoothing: pair.smoothing.at_step(step), ..patch };
-        let deflection = deflection.map_or_else(Vector6::zeros, State::deflection);
-        let (mut wrench, mut rate) = match pair.law().bristles() {
-            None => (local_wrench(pair, &seen, &patch), Vector6::zeros()),
-            Some(bristles) => local_bristles(pair, &seen, &patch, bristles, deflection),
+        const { assert!(S::ORDER <= 1, "contacts have first derivatives only: no nested scalars") };
+        let Some(patch) = self.patch(pair, self.seen_value(pair, states)) else {
+            return Effect::default();
         };
+        let patch = Patch { smoothing: pair.smoothing.at_step(step), ..patch };
+        let Some(bristles) = pair.law().bristles() else {
+            return self.plain_effect(pair, states, &patch);
+        };
+        let deflection = deflection.map_or_else(Vector6::zeros, State::deflection);
+        let seen = self.seen(pair, states);
+        let (wrench, rate) = local_bristles(pair, &seen, &patch, bristles, deflection);
+        let mut slopes = [S::zero(); 12];
         if S::ORDER > 0 {
-            self.add_slopes_by_dimensions(pair, &patch, &deflection, &mut wrench, &mut rate);
+            self.add_slopes_by_dimensions(pair, &patch, &deflection, &mut slopes);
         }
-        let [fx, fy, fz, tx, ty, tz] = wrench;
-        let (state, base) = (&states[pair.bodies.samples], &states[pair.bodies.field]);
-        let rotation = base.pose.rotation;
-        let force = rotation * Vector3::new(fx, fy, fz).map(|x| x.times(pair.weight));
-        let torque = rotation * Vector3::new(tx, ty, tz).map(|x| x.times(pair.weight));
-        let offset = state.pose.translation.vector - base.pose.translation.vector;
-        let (on_samples, on_field) =
-            (stack(&force, &torque), stack(&-force, &-(torque + offset.cross(&force))));
-        Effect { on_samples, on_field, rate }
+        let rate = Vector6::from_fn(|i, _| rate[i] + slopes[6 + i]);
+        let wrench = std::array::from_fn(|i| wrench[i] + slopes[i]);
+        let axes = states[pair.bodies.field].pose.rotation;
+        Effect { rate, ..self.effect_of(pair, states, &axes, wrench) }
     }
 
-    /// Adds to the wrench and rate of `patch`, which is `pair`, the derivatives that the dimensions of its shapes carry.
+    /// What `pair`, which is `patch`, does without a memory.
+    fn plain_effect(
+        &self,
+        pair: &ContactPair<S>,
+        states: &[State<S>],
+        patch: &Patch<'_>,
+    ) -> Effect<S> {
+        let law = pair.law().as_ref();
+        let values: Vec<f64> = pair.params().iter().map(|p| p.value()).collect();
+        if S::ORDER == 0 {
+            let axes = &states[pair.bodies.field].pose.rotation;
+            return self.effect_of(
+                pair,
+                states,
+                axes,
+                law.wrench(&values, patch).map(S::constant).into(),
+            );
+        }
+        let ends = [pair.bodies.samples, pair.bodies.field];
+        let shifted = ends.map(|id| self.shifted(id, states));
+        let [samples, field] =
+            [0, 1].map(|end| shifted[end].as_ref().map_or(&states[ends[end]], |(state, _)| state));
+        let at = Relation { samples: samples.value(), field: field.value(), weight: pair.weight };
+        let mut slopes = [S::zero(); 12];
+        let all = if pair.params().iter().all(is_constant) {
+            at.function(WrenchFunction { law, p: &values, patch }).of(samples, field)
+        } else {
+            let WrenchJacobian { wrench, by_state, by_params } =
+                law.wrench_jacobian(&values, patch, true);
+            for (by_param, moved) in by_params.iter().zip(changes(pair.params())) {
+                for (component, slope) in slopes.iter_mut().zip(by_param.iter()) {
+                    *component += moved.times(*slope);
+                }
+            }
+            at.function(LinearWrench { value: wrench.into(), by_state }).of(samples, field)
+        };
+        self.add_slopes_by_dimensions(pair, patch, &Vector6::zeros(), &mut slopes);
+        let [fx, fy, fz, tx, ty, tz] = all;
+        let (mut force, mut torque) = (Vector3::new(fx, fy, fz), Vector3::new(tx, ty, tz));
+        if !slopes[..6].iter().all(|x| x.is_constant_zero()) {
+            let axes = at.field.pose.rotation.cast();
+            let part = |from: usize| Vector3::from_fn(|i, _| slopes[from + i].times(pair.weight));
+            (force, torque) = (force + axes * part(0), torque + axes * part(3));
+        }
+        if let Some((_, from_com)) = &shifted[0] {
+            torque += from_com.cross(&force);
+        }
+        self.on_both(pair, states, force, torque)
+    }
+
+    /// Of the `wrench` of `pair` along the `axes` of its field.
+    fn effect_of(
+        &self,
+        pair: &ContactPair<S>,
+        states: &[State<S>],
+        axes: &UnitQuaternion<S>,
+        wrench: [S; 6],
+    ) -> Effect<S> {
+        let [fx, fy, fz, tx, ty, tz] = wrench.map(|x| x.times(pair.weight));
+        self.on_both(pair, states, axes * Vector3::new(fx, fy, fz), axes * Vector3::new(tx, ty, tz))
+    }
+
+    /// Of a force and torque on the body with the samples, about its center of mass.
+    #[inline]
+    fn on_both(
+        &self,
+        pair: &ContactPair<S>,
+        states: &[State<S>],
+        force: Vector3<S>,
+        torque: Vector3<S>,
+    ) -> Effect<S> {
+        let (state, base) = (&states[pair.bodies.samples], &states[pair.bodies.field]);
+        let offset = state.pose.translation.vector - base.pose.translation.vector;
+        let on_field = stack(&-force, &-(torque + offset.cross(&force)));
+        Effect { on_samples: stack(&force, &torque), on_field, rate: Vector6::zeros() }
+    }
+
+    /// Adds the derivatives by the dimensions of its shapes to those of the wrench of `patch`, which is `pair`, and of its rate.
     fn add_slopes_by_dimensions(
         &self,
         pair: &ContactPair<S>,
         patch: &Patch<'_>,
         deflection: &Vector6<S>,
-        wrench: &mut [S; 6],
-        rate: &mut Vector6<S>,
+        sums: &mut [S; 12],
     ) {
         let ends = [pair.bodies.samples, pair.bodies.field].map(|id| &self.bodies[id]);
         if ends.iter().all(|body| body.dimensions().iter().all(is_constant)) {
@@ -134,8 +210,7 @@ impl<S: Scalar> World<S> {
                     slopes = shapes.bristles(&function);
                 }
             }
-            let all = wrench.iter_mut().chain(rate.iter_mut());
-            for (component, slopes) in all.zip(slopes) {
+            for (component, slopes) in sums.iter_mut().zip(slopes) {
                 for (place, slope) in places.iter().zip(slopes.derivative) {
                     let moved = match place.checked_sub(count) {
                         Some(place) => moved[1][place],
@@ -160,39 +235,7 @@ impl<S: Scalar> World<S> {
     }
 }
 
-/// The wrench of `patch`, which is `pair` at the value of `seen`, with the derivatives that `seen` and the parameters
-/// carry.
-fn local_wrench<S: Scalar>(pair: &ContactPair<S>, seen: &Seen<S>, patch: &Patch<'_>) -> [S; 6] {
-    const { assert!(S::ORDER <= 1, "contacts have first derivatives only: no nested scalars") };
-    let values: Vec<f64> = pair.params().iter().map(|p| p.value()).collect();
-    if S::ORDER == 0 {
-        return pair.law().wrench(&values, patch).map(S::constant).into();
-    }
-    let law = pair.law().as_ref();
-    let wrench = if pair.params().iter().all(is_constant) {
-        S::local(&WrenchFunction { law, p: &values, patch }, seen.state.tangent())
-    } else {
-        let moved = changes(pair.params());
-        let jacobian = law.wrench_jacobian(&values, patch, true);
-        let mut wrench = S::local(&jacobian, seen.state.tangent());
-        for (by_param, moved) in jacobian.by_params.iter().zip(moved) {
-            for (component, slope) in wrench.iter_mut().zip(by_param.iter()) {
-                *component += moved.times(*slope);
-            }
-        }
-        wrench
-    };
-    let [fx, fy, fz, tx, ty, tz] = wrench;
-    match &seen.from_com {
-        None => wrench,
-        Some(from_com) => {
-            let torque = Vector3::new(tx, ty, tz) + from_com.cross(&Vector3::new(fx, fy, fz));
-            stack(&Vector3::new(fx, fy, fz), &torque).into()
-        }
-    }
-}
-
-/// [`local_wrench`] of a contact that sticks, and the rate of its deflection.
+/// The wrench of a contact that sticks along the axes of its field, and the rate of its deflection.
 fn local_bristles<S: Scalar>(
     pair: &ContactPair<S>,
     seen: &Seen<S>,
@@ -200,7 +243,6 @@ fn local_bristles<S: Scalar>(
     bristles: Bristles,
     deflection: Vector6<S>,
 ) -> ([S; 6], Vector6<S>) {
-    const { assert!(S::ORDER <= 1, "contacts have first derivatives only: no nested scalars") };
     let law = pair.law().as_ref();
     let values: Vec<f64> = pair.params().iter().map(|p| p.value()).collect();
     let at = deflection.map(|x| x.value());
@@ -238,7 +280,7 @@ fn local_bristles<S: Scalar>(
 }
 
 /// Whether a number carries no derivatives.
-fn is_constant<S: Scalar>(x: &S) -> bool {
+pub(super) fn is_constant<S: Scalar>(x: &S) -> bool {
     x.plus(-x.value()).is_constant_zero()
 }
 

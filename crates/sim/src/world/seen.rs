@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 use prehend_autodiff::Scalar;
 
 use super::World;
+use super::body_id::BodyId;
 use super::contact_pair::ContactPair;
 use crate::state::State;
 
@@ -33,6 +34,19 @@ impl<S: Scalar> World<S> {
                 Seen { from_com: Some(-(state.pose.rotation * change)), state }
             }
         }
+    }
+
+    /// Where the center of mass of body `id` carries derivatives, the state of the point that has its value for coordinates, and from
+    /// it to that point \[m\].
+    #[inline]
+    pub(super) fn shifted(
+        &self,
+        id: BodyId,
+        states: &[State<S>],
+    ) -> Option<(State<S>, Vector3<S>)> {
+        let change = self.bodies[id].rigid()?.com_change()?;
+        let state = states[id].shifted(&-change);
+        Some((state, -(state.pose.rotation * change)))
     }
 
     /// [`World::seen`] without derivatives: nothing is recorded.

@@ -1,0 +1,306 @@
+//! What two bodies do to each other, as a function of both their states.
+
+use nalgebra::{Matrix3, Vector3};
+use prehend_autodiff::lie::cross_matrix;
+use prehend_autodiff::{Fwd, LocalFunction, Scalar};
+
+use super::effect::is_constant;
+use crate::contact::wrench::LinearWrench;
+use crate::state::State;
+
+/// Numbers of a state, in the order of [`coordinates`].
+const STATE: usize = 13;
+/// Numbers of two states.
+const TWO: usize = 2 * STATE;
+
+/// The states of two bodies that touch.
+#[derive(Clone, Copy)]
+pub(super) struct Relation {
+    pub(super) samples: State,
+    pub(super) field: State,
+    /// Factor on their wrench.
+    pub(super) weight: f64,
+}
+
+impl Relation {
+    /// The function that is made of the wrench on the body with the samples along the axes of the field, a function of the tangent
+    /// of the state that the field sees.
+    #[inline]
+    pub(super) fn function<W>(self, wrench: W) -> PairFunction<W> {
+        PairFunction { wrench, at: self }
+    }
+}
+
+/// The wrench on the body with the samples, in the world frame about its center of mass, as a function of the coordinates of both
+/// states.
+///
+/// With the offset r = x_s − x_f between the centers of mass and the velocity u = v_s − v_f − ω_f×r, the field sees the
+/// pose Rᵀr, RᵀR_s and the velocities Rᵀu and Rᵀ(ω_s − ω_f) along its axes R. These change by
+///
+/// - Rᵀ(δr + r×θ_f) and the turn Rᵀ(θ_s − θ_f),
+/// - Rᵀ(δv_s − δv_f − ω_f×δr + r×δω_f + u×θ_f) and Rᵀ(δω_s − δω_f + (ω_s − ω_f)×θ_f)
+///
+/// for changes of place, left turns θ, and changes of velocity of the two bodies. What was R f becomes R f + θ_f×R f.
+pub(super) struct PairFunction<W> {
+    wrench: W,
+    at: Relation,
+}
+
+/// Position, the coordinates of the quaternion, linear and angular velocity.
+#[inline]
+fn coordinates<S: Scalar>(state: &State<S>) -> [S; STATE] {
+    let mut x = [S::zero(); STATE];
+    x[..3].copy_from_slice(state.pose.translation.vector.as_slice());
+    x[3..7].copy_from_slice(state.pose.rotation.coords.as_slice());
+    x[7..10].copy_from_slice(state.linear.as_slice());
+    x[10..].copy_from_slice(state.angular.as_slice());
+    x
+}
+
+/// How a state changes.
+struct Change<S: Scalar> {
+    place: Vector3<S>,
+    turn: Vector3<S>,
+    linear: Vector3<S>,
+    angular: Vector3<S>,
+}
+
+impl<S: Scalar> Change<S> {
+    /// Of coordinates `x`, less their values.
+    #[inline(always)]
+    fn new(x: &[S; STATE], state: &State) -> Self {
+        let vector = |from: usize| Vector3::from_fn(|i, _| x[from + i].plus(-x[from + i].value()));
+        // δq q̄ = θ/2, and with q = (u, w): w δu − δw u + u×δu.
+        let (by_vector, by_scalar) = (vector(3), x[6].plus(-x[6].value()));
+        let q = state.pose.rotation.coords;
+        let u = Vector3::new(q.x, q.y, q.z);
+        let turn = by_vector.map(|d| d.times(q.w)) - u.map(|u| by_scalar.times(u));
+        let turn = (turn + cross(&u, &by_vector)).map(|x| x.times(2.0));
+        Self { place: vector(0), turn, linear: vector(7), angular: vector(10) }
+    }
+}
+
+impl<W> PairFunction<W> {
+    /// From the wrench on what the field sees, changed as the coordinates of the samples' body are, and those of the field's body if
+    /// it moves.
+    #[inline(always)]
+    fn wrench<S: Scalar>(
+        &self,
+        samples: &[S; STATE],
+        field: Option<&[S; STATE]>,
+        wrench: impl FnOnce([S; 12]) -> [S; 6],
+    ) -> [S; 6] {
+        let Relative { axes, r, u, spin } = self.relative();
+        let to_field = axes.transpose();
+        let s = Change::new(samples, &self.at.samples);
+        let f = field.map(|x| Change::new(x, &self.at.field));
+        let moved = f.as_ref().map_or(s.place, |f| s.place - f.place);
+        let mut seen = [moved, s.turn, s.linear - cross(&self.at.field.angular, &moved), s.angular];
+        if let Some(f) = &f {
+            seen[0] += cross(&r, &f.turn);
+            seen[1] -= f.turn;
+            seen[2] += cross(&r, &f.angular) + cross(&u, &f.turn) - f.linear;
+            seen[3] += cross(&spin, &f.turn) - f.angular;
+        }
+        let mut tangent = [S::zero(); 12];
+        for (tangent, seen) in tangent.chunks_exact_mut(3).zip(&seen) {
+            tangent.copy_from_slice(times(&to_field, seen).as_slice());
+        }
+        let local = wrench(tangent);
+        let [force, torque] = [0, 3].map(|from| {
+            let part = Vector3::from_fn(|i, _| local[from + i].times(self.at.weight));
+            let part = times(&axes, &part);
+            f.as_ref().map_or(part, |f| part - cross(&part.map(S::value), &f.turn))
+        });
+        std::array::from_fn(|i| if i < 3 { force[i] } else { torque[i - 3] })
+    }
+
+    #[inline]
+    fn relative(&self) -> Relative {
+        let Relation { samples, field, .. } = &self.at;
+        let r = samples.pose.translation.vector - field.pose.translation.vector;
+        Relative {
+            axes: field.pose.rotation.to_rotation_matrix().into_inner(),
+            r,
+            u: samples.linear - field.linear - field.angular.cross(&r),
+            spin: samples.angular - field.angular,
+        }
+    }
+
+    /// The wrench and its derivatives by the coordinates of the samples' body and, if there is room, of the field's.
+    #[inline(always)]
+    fn linearized<const N: usize>(&self, wrench: &LinearWrench) -> ([f64; 6], [[f64; N]; 6]) {
+        let mut by_states = [[0.0; N]; 6];
+        if wrench.value == [0.0; 6] && wrench.by_state == [[0.0; 12]; 6] {
+            return ([0.0; 6], by_states);
+        }
+        let Relative { axes, r, u, spin } = self.relative();
+        let cross_frame = cross_matrix(&self.at.field.angular);
+        let mut values = [0.0; 6];
+        for (part, rows) in by_states.chunks_exact_mut(3).enumerate() {
+            let along = |i: usize| wrench.value[3 * part + i] * self.at.weight;
+            let value = axes * Vector3::from_fn(|i, _| along(i));
+            values[3 * part..3 * part + 3].copy_from_slice(value.as_slice());
+            // By what the field sees, along the axes of the world.
+            let [place, turn, linear, angular] = [0, 3, 6, 9].map(|column| {
+                let slope =
+                    |i: usize, j: usize| wrench.by_state[3 * part + i][column + j] * self.at.weight;
+                axes * Matrix3::from_fn(slope) * axes.transpose()
+            });
+            let by_place = place - linear * cross_frame;
+            set(rows, 0, [&by_place, &turn, &linear, &angular], &self.at.samples);
+            if N == TWO {
+                let [cross_r, cross_u, cross_spin] = [r, u, spin].map(|v| cross_matrix(&v));
+                let by_turn = place * cross_r - turn + linear * cross_u + angular * cross_spin
+                    - cross_matrix(&value);
+                let by_angular = linear * cross_r - angular;
+                set(rows, STATE, [&-by_place, &by_turn, &-linear, &by_angular], &self.at.field);
+            }
+        }
+        (values, by_states)
+    }
+}
+
+/// How the field sees the samples, along the axes of the world.
+struct Relative {
+    axes: Matrix3<f64>,
+    r: Vector3<f64>,
+    u: Vector3<f64>,
+    spin: Vector3<f64>,
+}
+
+/// Writes the derivatives of three rows by place, turn, linear and angular velocity, as derivatives by the coordinates of `state`, which
+/// start at column `first`.
+#[inline(always)]
+fn set<const N: usize>(
+    rows: &mut [[f64; N]],
+    first: usize,
+    [place, turn, linear, angular]: [&Matrix3<f64>; 4],
+    state: &State,
+) {
+    // θ = 2 (w δu − δw u + u×δu) of a quaternion of vector u and scalar w.
+    let q = state.pose.rotation.coords;
+    let u = Vector3::new(q.x, q.y, q.z);
+    let by_scalar = turn * u * -2.0;
+    let by_vector = (turn * q.w + turn * cross_matrix(&u)) * 2.0;
+    for (i, row) in rows.iter_mut().enumerate() {
+        for (from, block) in [(0, place), (3, &by_vector), (7, linear), (10, angular)] {
+            (0..3).for_each(|j| row[first + from + j] = block[(i, j)]);
+        }
+        row[first + 6] = by_scalar[i];
+    }
+}
+
+impl<W: LocalFunction<12, 6>> PairFunction<W> {
+    /// Of the states of both bodies, where that with the field may be one that does not move.
+    #[inline]
+    pub(super) fn of<S: Scalar>(&self, samples: &State<S>, field: &State<S>) -> [S; 6] {
+        let [samples, field] = [samples, field].map(coordinates);
+        if field.iter().all(is_constant) {
+            return S::local(&OneMoves(self), samples);
+        }
+        let mut both = [S::zero(); TWO];
+        both[..STATE].copy_from_slice(&samples);
+        both[STATE..].copy_from_slice(&field);
+        S::local(&BothMove(self), both)
+    }
+
+    #[inline]
+    fn linear(&self) -> Option<LinearWrench> {
+        let (value, by_state) = self.wrench.linearize([0.0; 12])?;
+        Some(LinearWrench { value, by_state })
+    }
+}
+
+/// A function of the state of the body with the samples.
+struct OneMoves<'a, W>(&'a PairFunction<W>);
+
+/// A function of both states.
+struct BothMove<'a, W>(&'a PairFunction<W>);
+
+impl<W: LocalFunction<12, 6>> LocalFunction<STATE, 6> for OneMoves<'_, W> {
+    #[inline]
+    fn evaluate<S: Scalar>(&self, x: [S; STATE]) -> [S; 6] {
+        self.0.wrench(&x, None, |seen| self.0.wrench.evaluate(seen))
+    }
+
+    #[inline]
+    fn linearize(&self, _: [f64; STATE]) -> Option<([f64; 6], [[f64; STATE]; 6])> {
+        Some(self.0.linearized(&self.0.linear()?))
+    }
+
+    #[inline]
+    fn derivative_along(
+        &self,
+        x: [f64; STATE],
+        along: [f64; STATE],
+    ) -> Option<([f64; 6], [f64; 6])> {
+        let x = lifted(x, along);
+        let wrench = |seen: [Fwd<1>; 12]| Scalar::local(&self.0.wrench, seen);
+        Some(parts(self.0.wrench(&x, None, wrench)))
+    }
+}
+
+impl<W: LocalFunction<12, 6>> LocalFunction<TWO, 6> for BothMove<'_, W> {
+    #[inline]
+    fn evaluate<S: Scalar>(&self, x: [S; TWO]) -> [S; 6] {
+        let [samples, field] = halves(x);
+        self.0.wrench(&samples, Some(&field), |seen| self.0.wrench.evaluate(seen))
+    }
+
+    #[inline]
+    fn linearize(&self, _: [f64; TWO]) -> Option<([f64; 6], [[f64; TWO]; 6])> {
+        Some(self.0.linearized(&self.0.linear()?))
+    }
+
+    #[inline]
+    fn derivative_along(&self, x: [f64; TWO], along: [f64; TWO]) -> Option<([f64; 6], [f64; 6])> {
+        let x = lifted(x, along);
+        let [samples, field] = halves(x);
+        let wrench = |seen: [Fwd<1>; 12]| Scalar::local(&self.0.wrench, seen);
+        Some(parts(self.0.wrench(&samples, Some(&field), wrench)))
+    }
+}
+
+// Loops, for the functions of arrays are not inlined where these are long.
+
+#[inline(always)]
+fn lifted<const N: usize>(x: [f64; N], along: [f64; N]) -> [Fwd<1>; N] {
+    let mut lifted = [Fwd::constant(0.0); N];
+    for (lifted, (value, slope)) in lifted.iter_mut().zip(x.into_iter().zip(along)) {
+        *lifted = Fwd { value, derivative: [slope] };
+    }
+    lifted
+}
+
+#[inline(always)]
+fn parts<const N: usize>(all: [Fwd<1>; N]) -> ([f64; N], [f64; N]) {
+    let mut parts = ([0.0; N], [0.0; N]);
+    for (i, x) in all.into_iter().enumerate() {
+        (parts.0[i], parts.1[i]) = (x.value, x.derivative[0]);
+    }
+    parts
+}
+
+#[inline]
+fn halves<S: Scalar>(x: [S; TWO]) -> [[S; STATE]; 2] {
+    let mut halves = [[S::zero(); STATE]; 2];
+    halves[0].copy_from_slice(&x[..STATE]);
+    halves[1].copy_from_slice(&x[STATE..]);
+    halves
+}
+
+/// `a` × `b`.
+#[inline(always)]
+fn cross<S: Scalar>(a: &Vector3<f64>, b: &Vector3<S>) -> Vector3<S> {
+    Vector3::new(
+        b.z.times(a.y) - b.y.times(a.z),
+        b.x.times(a.z) - b.z.times(a.x),
+        b.y.times(a.x) - b.x.times(a.y),
+    )
+}
+
+#[inline(always)]
+fn times<S: Scalar>(m: &Matrix3<f64>, v: &Vector3<S>) -> Vector3<S> {
+    Vector3::from_fn(|i, _| v.x.times(m[(i, 0)]) + v.y.times(m[(i, 1)]) + v.z.times(m[(i, 2)]))
+}
