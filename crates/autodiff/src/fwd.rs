@@ -3,6 +3,7 @@
 use crate::differentiable::Differentiable;
 use crate::real_field::impl_real_field;
 use crate::scalar::{LocalFunction, Scalar};
+use crate::solve::Factored;
 
 /// A number and its partial derivatives with respect to `N` inputs, carried forward.
 ///
@@ -134,6 +135,24 @@ impl_real_field!([const N: usize, T: Scalar] Fwd<N, T> {
             }
         }
         function.evaluate(x)
+    }
+
+    fn solve(matrix: &Factored<f64>, b: &[Self]) -> Vec<Self> {
+        let values: Vec<T> = b.iter().map(|b| b.value).collect();
+        let mut x: Vec<Self> = T::solve(matrix, &values)
+            .into_iter()
+            .map(|value| Self { value, derivative: [T::zero(); N] })
+            .collect();
+        for lane in 0..N {
+            let slopes: Vec<T> = b.iter().map(|b| b.derivative[lane]).collect();
+            if slopes.iter().all(|slope| slope.is_constant_zero()) {
+                continue;
+            }
+            for (x, slope) in x.iter_mut().zip(T::solve(matrix, &slopes)) {
+                x.derivative[lane] = slope;
+            }
+        }
+        x
     }
 });
 

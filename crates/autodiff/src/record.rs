@@ -2,8 +2,12 @@
 
 use std::rc::Rc;
 
+use nalgebra::DMatrix;
+
+use crate::differentiable::Differentiable;
 use crate::fwd::linearize;
 use crate::scalar::LocalFunction;
+use crate::solve::Factored;
 use crate::tape::{push_block, push_custom, with_tape};
 use crate::var::Var;
 use crate::vjp::CustomVjp;
@@ -65,6 +69,27 @@ pub(crate) fn sum_local<const K: usize, F: LocalFunction<K, 1>>(
     let node = push_block(x, 1, &gradient).var(0, sum);
     with_tape(|tape| tape.keep(gradient));
     node
+}
+
+/// [`Scalar::solve`](crate::Scalar::solve) for [`Var`].
+pub(crate) fn solve(matrix: &Factored<f64>, b: &[Var]) -> Vec<Var> {
+    let mut x = DMatrix::from_iterator(b.len(), 1, b.iter().map(|b| b.value()));
+    matrix.solve_in_place(&mut x);
+    if b.iter().all(|b| Differentiable::is_constant(*b)) {
+        return x.iter().map(|x| Var::from(*x)).collect();
+    }
+    custom(b, x.as_slice(), Inverse(matrix.clone()))
+}
+
+/// x = A⁻¹ b.
+struct Inverse(Factored<f64>);
+
+impl CustomVjp for Inverse {
+    fn vjp(&self, output_adjoints: &[f64], input_adjoints: &mut [f64]) {
+        let mut lambda = DMatrix::from_column_slice(output_adjoints.len(), 1, output_adjoints);
+        self.0.solve_transpose_in_place(&mut lambda);
+        input_adjoints.iter_mut().zip(&lambda).for_each(|(sum, lambda)| *sum += lambda);
+    }
 }
 
 #[cfg(test)]
@@ -218,5 +243,33 @@ mod tests {
         let y = custom(&[x], &[1.2], Dot(vec![3.0]))[0];
         assert!(custom(&[x, y], &[], Dot(vec![])).is_empty());
         assert_eq!(recording.gradient(y).wrt(x), 3.0);
+    }
+
+    #[test]
+    fn solutions_have_the_same_derivatives_in_every_mode() {
+        let matrix = nalgebra::Matrix3::new(2.0, 1.0, 0.5, -1.0, 3.0, 0.0, 0.3, 0.2, 4.0);
+        let factors = crate::solve::lu(&matrix).unwrap();
+        fn value<S: Scalar>(factors: &Factored<f64>, p: &[S]) -> S {
+            let b = [p[0] * p[1], p[1].sin(), S::constant(0.7)];
+            S::solve(factors, &b).iter().fold(S::zero(), |sum, x| sum + *x * *x)
+        }
+        let p = [0.4, -1.3];
+        let (reverse, slopes) = gradient(|p| value(&factors, p), &p);
+        let forward = value(&factors, &Fwd::<2>::variables(p));
+        assert!((forward.value - reverse).abs() < 1e-15 && (value(&factors, &p) - reverse) == 0.0);
+        let b = nalgebra::Vector3::new(p[0] * p[1], p[1].sin(), 0.7);
+        let x = matrix.try_inverse().unwrap() * b;
+        assert!((x.norm_squared() - reverse).abs() < 1e-14);
+        for (forward, reverse) in forward.derivative.iter().zip(&slopes) {
+            assert!((forward - reverse).abs() < 1e-14);
+        }
+        // Second derivatives, forward over reverse.
+        let h = 1e-6;
+        let [above, below] = [h, -h].map(|h| gradient(|p| value(&factors, p), &[p[0] + h, p[1]]).1);
+        let recording = Recording::start();
+        let at = [Fwd::variable(recording.variable(p[0]), 0), Fwd::constant(p[1])];
+        let twice: Fwd<1, crate::Var> = value(&factors, &at);
+        let exact = recording.gradient(twice.derivative[0]).wrt(at[0].value);
+        assert!((exact - (above[0] - below[0]) / (2.0 * h)).abs() < 1e-8);
     }
 }

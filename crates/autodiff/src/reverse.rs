@@ -3,6 +3,7 @@
 use crate::differentiable::{Differentiable, chain_active};
 use crate::real_field::impl_real_field;
 use crate::scalar::{LocalFunction, Recompute, Scalar};
+use crate::solve::Factored;
 use crate::tape::{push, refuse_foreign};
 use crate::var::Var;
 use crate::{recomputed, record};
@@ -89,5 +90,9 @@ impl_real_field!([] Var {
         F::Error: Send,
     {
         recomputed::recompute_each(functions)
+    }
+
+    fn solve(matrix: &Factored<f64>, b: &[Self]) -> Vec<Self> {
+        record::solve(matrix, b)
     }
 });

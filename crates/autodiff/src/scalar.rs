@@ -1,9 +1,10 @@
 //! The one scalar trait that simulation code is generic over, and the functions that a scalar may differentiate as a whole.
 
-use nalgebra::RealField;
+use nalgebra::{DMatrix, RealField};
 use rayon::prelude::*;
 
 use crate::lanes;
+use crate::solve::Factored;
 
 /// A real number that may carry derivatives.
 ///
@@ -121,6 +122,27 @@ pub trait Scalar: RealField + Copy + Default {
             true => functions.into_iter().map(apply).collect(),
             false => functions.into_par_iter().map(apply).collect(),
         }
+    }
+
+    /// A⁻¹ b for a matrix A of plain numbers, which has as many rows as `b`: in reverse mode one node for all.
+    ///
+    /// ```
+    /// use nalgebra::Matrix2;
+    /// use prehend_autodiff::solve::{SolveError, lu};
+    /// use prehend_autodiff::{Scalar, gradient};
+    ///
+    /// let matrix = lu(&Matrix2::new(2.0, 1.0, 0.0, 4.0))?;
+    /// let (x, slopes) = gradient(|b| Scalar::solve(&matrix, b)[0], &[5.0, 4.0]);
+    /// assert_eq!((x, slopes), (2.0, vec![0.5, -0.125]));
+    /// # Ok::<(), SolveError>(())
+    /// ```
+    ///
+    /// # Panics
+    /// If `b` has another number of rows.
+    fn solve(matrix: &Factored<f64>, b: &[Self]) -> Vec<Self> {
+        let mut x = DMatrix::from_iterator(b.len(), 1, b.iter().map(|b| b.value()));
+        matrix.solve_in_place(&mut x);
+        x.iter().map(|x| Self::constant(*x)).collect()
     }
 
     /// Whether this is the constant 0, which moves in no direction.

@@ -1,10 +1,10 @@
 //! Newton's method, to find solutions with.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 
 use super::linearization::{check_length, linearize};
 use super::{ImplicitError, Residual};
-use crate::solve::SolveError;
+use crate::solve::{Factored, lu};
 
 const MOST_ITERATIONS: usize = 60;
 
@@ -23,8 +23,11 @@ pub trait Equations {
     /// F(x).
     fn residual(&self, x: &DVector<f64>) -> DVector<f64>;
 
-    /// F(x) and ∂F/∂x.
-    fn linearize(&self, x: &DVector<f64>) -> (DVector<f64>, DMatrix<f64>);
+    /// F(x) and ∂F/∂x, factorized.
+    ///
+    /// # Errors
+    /// If there are not as many equations as unknowns, or the Jacobian is singular or not finite.
+    fn linearize(&self, x: &DVector<f64>) -> Result<(DVector<f64>, Factored<f64>), ImplicitError>;
 
     /// The norm of a residual in a unit that all equations share, if there is one. A step then has to lower it (Armijo's
     /// condition); without one, the length of the next Newton step with the same Jacobian, which does not depend on the
@@ -85,9 +88,10 @@ impl<R: Residual> Equations for At<'_, R> {
         DVector::from_vec(self.equation.residual(x.as_slice(), self.p))
     }
 
-    fn linearize(&self, x: &DVector<f64>) -> (DVector<f64>, DMatrix<f64>) {
+    fn linearize(&self, x: &DVector<f64>) -> Result<(DVector<f64>, Factored<f64>), ImplicitError> {
         let (residual, jacobian) = linearize(self.equation, x.as_slice(), self.p);
-        (DVector::from_vec(residual), jacobian)
+        check_length(x.as_slice(), residual.len())?;
+        Ok((DVector::from_vec(residual), lu(&jacobian)?))
     }
 }
 
@@ -102,22 +106,16 @@ pub fn newton_on(
 ) -> Result<DVector<f64>, ImplicitError> {
     let mut iterations = 0;
     loop {
-        let (residual, jacobian) = equations.linearize(&x);
+        let (residual, jacobian) = equations.linearize(&x)?;
         check_length(x.as_slice(), residual.len())?;
-        if jacobian.shape() != (x.len(), x.len()) {
-            let found = jacobian.nrows().max(jacobian.ncols());
-            return Err(ImplicitError::Jacobian { unknowns: x.len(), found });
+        if jacobian.size() != x.len() {
+            let (unknowns, found) = (x.len(), jacobian.size());
+            return Err(ImplicitError::Jacobian { unknowns, found });
         }
         if x.is_empty() {
             return Ok(x);
         }
-        let factors = jacobian.lu();
-        let Some(step) = factors.solve(&-&residual) else {
-            return Err(SolveError::Singular { condition: f64::INFINITY }.into());
-        };
-        if !step.iter().all(|step| step.is_finite()) {
-            return Err(SolveError::NotFinite("Newton step").into());
-        }
+        let step = -jacobian.solve(&residual)?;
         let error = equations.error(&x, &step);
         if error <= 1.0 {
             return Ok(x + step);
@@ -127,7 +125,7 @@ pub fn newton_on(
             let next = equations.residual(&(&x + &step * fraction));
             let lower = match norm {
                 Some(norm) => equations.norm(&next)? <= (1.0 - 1e-4 * fraction) * norm,
-                None => factors.solve(&next)?.norm() <= (1.0 - 0.5 * fraction) * step.norm(),
+                None => jacobian.solve(&next).ok()?.norm() <= (1.0 - 0.5 * fraction) * step.norm(),
             };
             lower.then_some((fraction, next))
         };
@@ -144,10 +142,10 @@ pub fn newton_on(
         };
         x += step * fraction;
         // The old Jacobian is near enough to tell, and to take, a step shorter still.
-        if let Some(step) = factors.solve(&-next)
+        if let Ok(step) = jacobian.solve(&next)
             && equations.error(&x, &step) <= 1e-2
         {
-            return Ok(x + step);
+            return Ok(x - step);
         }
     }
 }

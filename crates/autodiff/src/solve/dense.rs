@@ -10,6 +10,10 @@ use super::factors::Factors;
 use super::pattern::Pattern;
 use crate::operand::Operand;
 
+/// Rows from which on a sparse factorization is faster, with some twenty entries each.
+#[cfg(feature = "faer")]
+const SPARSE: usize = 120;
+
 /// Factorizes a dense square matrix by Gaussian elimination with partial pivoting.
 ///
 /// # Errors
@@ -40,6 +44,30 @@ pub fn lu<S: Operand, D: Dim>(
         }
         Ok(Arc::new(DenseLu { permutation, lower, upper }))
     })
+}
+
+/// Factorizes a matrix of `size` rows and columns that is zero but for these entries (row, column, value), of which those that share
+/// a place add up: as a sparse one with the cargo feature `faer`, if it has more than a hundred rows, otherwise as a
+/// dense one.
+///
+/// # Errors
+/// If a place lies outside the matrix, a value is not finite, or the matrix is singular to working precision.
+pub fn sparse_lu(
+    size: usize,
+    entries: &[(usize, usize, f64)],
+) -> Result<Factored<f64>, SolveError> {
+    #[cfg(feature = "faer")]
+    if size >= SPARSE {
+        let places: Vec<_> = entries.iter().map(|(row, column, _)| (*row, *column)).collect();
+        let values: Vec<f64> = entries.iter().map(|(.., value)| *value).collect();
+        return super::SparseSolver::lu(size, &places)?.factor(&values);
+    }
+    let mut matrix = DMatrix::zeros(size, size);
+    for &(row, column, value) in entries {
+        let outside = SolveError::OutOfBounds { row, column, size };
+        *matrix.get_mut((row, column)).ok_or(outside)? += value;
+    }
+    lu(&matrix)
 }
 
 /// The factors of P A = L U.

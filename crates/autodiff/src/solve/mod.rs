@@ -25,7 +25,7 @@
 //!
 //! `SparseSolver` does the same for a sparse matrix, whose pattern is analyzed once for all the matrices
 //! that share it. It needs the cargo feature `faer`, which is off by default because faer takes long to
-//! compile.
+//! compile. [`sparse_lu`] uses it if it is there.
 
 mod condition;
 mod dense;
@@ -36,7 +36,7 @@ mod pattern;
 #[cfg(feature = "faer")]
 mod sparse;
 
-pub use dense::lu;
+pub use dense::{lu, sparse_lu};
 pub use error::SolveError;
 pub use factored::Factored;
 #[cfg(feature = "faer")]

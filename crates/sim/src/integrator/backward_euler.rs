@@ -2,10 +2,11 @@
 
 mod equations;
 
-use equations::{ImplicitStep, arrived, excess};
-use nalgebra::{DMatrix, DVector, Matrix6};
+use equations::{ImplicitStep, arrived, excess, velocity_at};
+use nalgebra::DVector;
+use prehend_autodiff::Scalar;
 use prehend_autodiff::implicit::Equations as _;
-use prehend_autodiff::{LocalFunction, Scalar};
+use prehend_autodiff::solve::Factored;
 
 use super::Integrator;
 use crate::error::SimulationError;
@@ -20,6 +21,8 @@ use crate::world::World;
 /// Jacobian of the contacts and steps that are shortened until the residual, in the norm of kinetic energy, falls. The
 /// derivative of a step is that of the solution, by the implicit function theorem (D. Baraff, A. Witkin, "Large steps in
 /// cloth simulation", 1998; E. Hairer, G. Wanner, "Solving ordinary differential equations II", IV.8).
+///
+/// With the cargo feature `faer` the equations of many bodies are solved as sparse ones.
 ///
 /// The deflections of contacts that stick ([`Bristles`](crate::Bristles)) follow explicitly: steps should not be longer than u_b/(2
 /// v_b), which is 1 ms for [`Sticking`](crate::Sticking) of 0.1 mm and a slip scale of 1 cm/s.
@@ -51,7 +54,9 @@ impl Integrator for BackwardEuler {
             ImplicitStep { world: &plain, lifted: &lifted, states: &values, at_end, free, step };
         let solution = equations.solve()?;
         if S::ORDER == 0 {
-            return Ok(carried(world, states, &equations, &solution, &DMatrix::zeros(0, 0)));
+            let velocity = |slot| velocity_at(&solution, slot).map(S::constant);
+            let next = moved(world, states, &equations, velocity);
+            return Ok(deflected(world, next, &equations.step));
         }
         // Leaks are in derivatives only.
         let mut leaky = lifted.clone();
@@ -59,15 +64,30 @@ impl Integrator for BackwardEuler {
             leaky.smoothing = pair.smoothing;
         }
         equations.lifted = &leaky;
-        let inverse = equations.linearize(&solution).1.try_inverse();
-        let inverse =
-            inverse.ok_or_else(|| equations.unsolved(equations.residual(&solution).norm(), 0))?;
-        Ok(carried(world, states, &equations, &solution, &inverse))
+        let (_, jacobian) = equations
+            .linearize(&solution)
+            .map_err(|_| equations.unsolved(equations.residual(&solution).norm(), 0))?;
+        Ok(carried(world, states, &equations, &solution, &jacobian))
     }
 
     fn stability_limit(&self) -> f64 {
         f64::INFINITY
     }
+}
+
+/// The states at the end of a step that free bodies make with these velocities, before contacts that stick are deflected.
+fn moved<S: Scalar>(
+    world: &World<S>,
+    states: &[State<S>],
+    equations: &ImplicitStep<'_>,
+    velocity: impl Fn(usize) -> [S; 6],
+) -> Vec<State<S>> {
+    let mut next = states.to_vec();
+    world.drive(&mut next, equations.step.end());
+    for (slot, &body) in equations.free.iter().enumerate() {
+        next[body] = arrived(&states[body], &velocity(slot), equations.step.dt);
+    }
+    next
 }
 
 /// The states at the end, with the derivatives of the solution: x − J⁻¹F(x), where F carries those by all else.
@@ -76,41 +96,23 @@ fn carried<S: Scalar>(
     states: &[State<S>],
     equations: &ImplicitStep<'_>,
     solution: &DVector<f64>,
-    inverse: &DMatrix<f64>,
+    jacobian: &Factored<f64>,
 ) -> Vec<State<S>> {
-    let (free, dt) = (&equations.free, equations.step.dt);
-    let mut next = states.to_vec();
-    world.drive(&mut next, equations.step.end());
-    let velocity =
-        |slot: usize| -> [S; 6] { std::array::from_fn(|i| S::constant(solution[6 * slot + i])) };
-    for (slot, &body) in free.iter().enumerate() {
-        next[body] = arrived(&states[body], &velocity(slot), dt);
-    }
-    if S::ORDER == 0 {
-        return deflected(world, next, &equations.step);
-    }
+    let velocity = |slot: usize| velocity_at(solution, slot).map(S::constant);
+    let next = moved(world, states, equations, velocity);
     let wrenches = world.wrenches(&next, equations.step.index);
-    let excess: Vec<[S; 6]> = (free.iter().enumerate())
-        .filter_map(|(slot, &body)| {
-            let rigid = world.bodies[body].rigid()?;
-            Some(excess(rigid, world, &states[body], &velocity(slot), &wrenches[body], dt))
-        })
-        .collect();
-    for (row, &body) in free.iter().enumerate() {
-        let mut velocity = velocity(row);
-        for (column, excess) in excess.iter().enumerate() {
-            let block = inverse.fixed_view::<6, 6>(6 * row, 6 * column).into_owned();
-            // Bodies that nothing connects.
-            if block == Matrix6::zeros() {
-                continue;
-            }
-            for (velocity, change) in velocity.iter_mut().zip(S::local(&Product(block), *excess)) {
-                *velocity -= change;
-            }
-        }
-        next[body] = arrived(&states[body], &velocity, dt);
+    let mut excesses = Vec::with_capacity(solution.len());
+    for (slot, &body) in equations.free.iter().enumerate() {
+        let Some(rigid) = world.bodies[body].rigid() else { continue };
+        let (state, wrench, dt) = (&states[body], &wrenches[body], equations.step.dt);
+        excesses.extend(excess(rigid, world, state, &velocity(slot), wrench, dt));
     }
-    deflected(world, next, &equations.step)
+    let changes = S::solve(jacobian, &excesses);
+    let velocity = |slot: usize| {
+        let velocity = velocity(slot);
+        std::array::from_fn(|i| velocity[i] - changes[6 * slot + i])
+    };
+    deflected(world, moved(world, states, equations, velocity), &equations.step)
 }
 
 /// Forces are those of the deflections at the start; these follow the motion at the end.
@@ -120,18 +122,6 @@ fn deflected<S: Scalar>(world: &World<S>, mut next: Vec<State<S>>, step: &Step) 
         world.deflect(&mut next, &rates, S::constant(step.dt));
     }
     next
-}
-
-/// The product with a matrix.
-struct Product(Matrix6<f64>);
-
-impl LocalFunction<6, 6> for Product {
-    fn evaluate<S: Scalar>(&self, x: [S; 6]) -> [S; 6] {
-        std::array::from_fn(|row| {
-            let terms = self.0.row(row).into_owned();
-            terms.iter().zip(x).fold(S::zero(), |sum, (a, x)| sum + x.times(*a))
-        })
-    }
 }
 
 #[cfg(test)]
@@ -231,5 +221,54 @@ mod tests {
         world.bodies[1].motion = Motion::Kinematic;
         let step = Step::new(0, 1e-3);
         assert_eq!(BackwardEuler.step(&world, &states, step).unwrap(), states);
+    }
+
+    /// Enough bodies for sparse equations, where those are compiled.
+    #[test]
+    fn a_pile_is_solved_and_differentiated_together() {
+        const BALLS: usize = 27;
+        let radius = 0.05;
+        let mut world = World::new(Vector3::z() * -9.81);
+        let ground = crate::Body::kinematic("ground").with_field(crate::scenes::floor());
+        let ground = world.add(ground);
+        let mut states = vec![State::at_rest(nalgebra::Isometry3::identity())];
+        let rigid = RigidBody::ball(0.5, radius).unwrap();
+        let surface = std::sync::Arc::new(crate::Surface::ball(radius).unwrap());
+        let field =
+            std::sync::Arc::new(crate::Sphere { center: nalgebra::Point3::origin(), radius });
+        let place = |i: usize| 0.0998 * i as f64;
+        for i in 0..BALLS {
+            let ball = crate::Body::free(&format!("ball {i}"), rigid);
+            world.add(ball.with_surface(surface.clone()).with_field(field.clone()));
+            let (x, y, z) = (place(i % 3), place(i / 3 % 3), 0.0499 + place(i / 9));
+            states.push(rigid.at_rest(&nalgebra::Isometry3::translation(x, y, z)));
+        }
+        let balls: Vec<_> = world.free_bodies();
+        let law = std::sync::Arc::new(crate::scenes::penalty(1e6, 1e4, 0.5, 1e-2));
+        let smoothing = GapSmoothing::Softplus { width: 3e-4 };
+        world.add_contacts_between(&balls, &[ground], law.clone(), smoothing).unwrap();
+        world.add_contacts_between(&balls, &balls, law, smoothing).unwrap();
+        let time_steps = TimeSteps { dt: 2e-3, steps: 2 };
+        let end = |push: [f64; 2]| {
+            let mut states = states.clone();
+            (states[1].linear.x, states[BALLS].angular.y) = (0.1 + push[0], push[1]);
+            let run = world.simulate_with(&BackwardEuler, &states, time_steps, |_, _| ());
+            let states = run.unwrap().states;
+            states.iter().flat_map(|s| [s.linear.x, s.linear.z, s.angular.y]).collect()
+        };
+        let mut lifted: Vec<State<Fwd<2>>> = states.iter().map(State::lift).collect();
+        lifted[1].linear.x = Fwd::variable(0.1, 0);
+        lifted[BALLS].angular.y = Fwd::variable(0.0, 1);
+        let run = world.lift().simulate_with(&BackwardEuler, &lifted, time_steps, |_, _| ());
+        let exact: Vec<Fwd<2>> = (run.unwrap().states.iter())
+            .flat_map(|s| [s.linear.x, s.linear.z, s.angular.y])
+            .collect();
+        let differences = finite_difference_jacobian(|x| end([x[0], x[1]]), &[0.0; 2], 1e-6);
+        let largest = differences.iter().flatten().fold(0.0, |max: f64, x| max.max(x.abs()));
+        for (exact, reference) in exact.iter().zip(&differences) {
+            for (exact, reference) in exact.derivative.iter().zip(reference) {
+                assert!((exact - reference).abs() < 1e-6 * largest, "{exact} {reference}");
+            }
+        }
     }
 }

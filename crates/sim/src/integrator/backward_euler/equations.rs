@@ -1,8 +1,11 @@
 //! The equations of an implicit step.
 
-use nalgebra::{DMatrix, DVector, Matrix6, Vector3, Vector6};
+use std::collections::BTreeMap;
+
+use nalgebra::{DVector, Matrix6, Vector3, Vector6};
 use prehend_autodiff::implicit::{Equations, ImplicitError, newton_on};
 use prehend_autodiff::lie::so3_exp;
+use prehend_autodiff::solve::{Factored, SolveError, sparse_lu};
 use prehend_autodiff::{Fwd, Scalar};
 
 use crate::body::RigidBody;
@@ -48,6 +51,9 @@ pub(super) struct ImplicitStep<'a> {
     pub(super) step: Step,
 }
 
+/// Derivatives of the wrenches on free bodies by their velocities, where there are any.
+type Blocks = BTreeMap<(usize, usize), Matrix6<f64>>;
+
 impl ImplicitStep<'_> {
     /// Newton's method: first from the velocities at the start, then from those of a flight without contacts, in
     /// which what will touch touches already.
@@ -88,14 +94,18 @@ impl ImplicitStep<'_> {
         ends
     }
 
-    /// Derivative of the excesses, with that of the wrenches.
+    /// Derivative of the excesses, with that of the wrenches, by blocks.
     fn jacobian(
         &self,
         x: &DVector<f64>,
         wrenches: &[Vector6<f64>],
-        wrenches_by_velocity: &DMatrix<f64>,
-    ) -> DMatrix<f64> {
-        let mut jacobian = DMatrix::zeros(x.len(), x.len());
+        wrenches_by_velocity: &Blocks,
+    ) -> Result<Factored<f64>, SolveError> {
+        let mut entries = Vec::new();
+        let mut write = |row: usize, column: usize, block: Matrix6<f64>| {
+            let place = |i: usize, j: usize| (6 * row + i, 6 * column + j, block[(i, j)]);
+            entries.extend((0..36).map(|k| place(k % 6, k / 6)));
+        };
         for (slot, &body) in self.free.iter().enumerate() {
             let Some(rigid) = self.lifted.bodies[body].rigid() else { continue };
             // The body's own velocity in lanes 0..6, the wrench on it in lanes 6..12.
@@ -105,12 +115,13 @@ impl ImplicitStep<'_> {
             let state = self.states[body].lift();
             let excess = excess(rigid, self.lifted, &state, &velocity, &wrench, self.step.dt);
             let by = |lane: usize| Matrix6::from_fn(|i, j| excess[i].derivative[lane + j]);
-            let mut rows = jacobian.fixed_rows_mut::<6>(6 * slot);
-            rows.copy_from(&(by(6) * wrenches_by_velocity.fixed_rows::<6>(6 * slot)));
-            let mut own = rows.fixed_columns_mut::<6>(6 * slot);
-            own += by(0);
+            write(slot, slot, by(0));
+            let by_wrench = by(6);
+            for ((_, column), block) in wrenches_by_velocity.range((slot, 0)..(slot + 1, 0)) {
+                write(slot, *column, by_wrench * block);
+            }
         }
-        jacobian
+        sparse_lu(x.len(), &entries)
     }
 
     pub(super) fn unsolved(&self, residual: f64, iterations: usize) -> SimulationError {
@@ -125,14 +136,14 @@ impl Equations for ImplicitStep<'_> {
         self.excesses(x, &wrenches)
     }
 
-    fn linearize(&self, x: &DVector<f64>) -> (DVector<f64>, DMatrix<f64>) {
+    fn linearize(&self, x: &DVector<f64>) -> Result<(DVector<f64>, Factored<f64>), ImplicitError> {
         let dt = self.step.dt;
         let ends = self.ends(x);
         let mut slots = vec![None; ends.len()];
         self.free.iter().enumerate().for_each(|(slot, &body)| slots[body] = Some(slot));
         let mut wrenches: Vec<Vector6<f64>> =
             self.world.bodies.iter().map(|body| body.external_wrench).collect();
-        let mut by_velocity = DMatrix::zeros(x.len(), x.len());
+        let mut by_velocity = Blocks::new();
         let mut states: Vec<State<Fwd<12>>> = ends.iter().map(State::lift).collect();
         let mut deflections = ends[self.world.bodies.len()..].iter().map(State::lift);
         for pair in &self.lifted.contacts {
@@ -152,17 +163,16 @@ impl Equations for ImplicitStep<'_> {
                 let Some(row) = slots[on] else { continue };
                 for (body, lane) in bodies.into_iter().zip([0, 6]) {
                     let Some(column) = slots[body] else { continue };
-                    for (i, component) in wrench.iter().enumerate() {
-                        for j in 0..6 {
-                            by_velocity[(6 * row + i, 6 * column + j)] +=
-                                component.derivative[lane + j];
-                        }
+                    let block = Matrix6::from_fn(|i, j| wrench[i].derivative[lane + j]);
+                    if block != Matrix6::zeros() {
+                        *by_velocity.entry((row, column)).or_default() += block;
                     }
                 }
             }
             bodies.into_iter().for_each(|body| states[body] = ends[body].lift());
         }
-        (self.excesses(x, &wrenches), self.jacobian(x, &wrenches, &by_velocity))
+        let jacobian = self.jacobian(x, &wrenches, &by_velocity)?;
+        Ok((self.excesses(x, &wrenches), jacobian))
     }
 
     /// The velocity of equal kinetic energy of 1 kg \[m/s\].
@@ -183,6 +193,6 @@ impl Equations for ImplicitStep<'_> {
     }
 }
 
-fn velocity_at(x: &DVector<f64>, slot: usize) -> [f64; 6] {
+pub(super) fn velocity_at(x: &DVector<f64>, slot: usize) -> [f64; 6] {
     std::array::from_fn(|i| x[6 * slot + i])
 }
