@@ -143,10 +143,10 @@ fn draw(ways: &[Vec<Vector3<f64>>], moved: usize, file: &Path) -> anyhow::Result
     )?;
     for marble in 0..ways[0].len() {
         let color = if marble == moved { RGBColor(214, 39, 40) } else { RGBColor(31, 119, 180) };
-        let way = ways.iter().map(|places| (places[marble].x, places[marble].z));
+        let mut way = ways.iter().map(|places| (places[marble].x, places[marble].z));
         let width = if marble == moved { 3 } else { 1 };
         chart.draw_series(LineSeries::new(way.clone(), color.stroke_width(width)))?;
-        chart.draw_series(way.last().map(|end| Circle::new(end, 7, color.filled())))?;
+        chart.draw_series(way.next_back().map(|end| Circle::new(end, 7, color.filled())))?;
     }
     root.present()?;
     Ok(())

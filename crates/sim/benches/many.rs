@@ -6,11 +6,12 @@ use std::time::Instant;
 
 use nalgebra::{Isometry3, Vector3};
 use parry3d_f64::math::Vector;
-use parry3d_f64::shape::{Ball, HeightField};
+use parry3d_f64::shape::{Ball, HalfSpace, HeightField};
 use parry3d_f64::utils::Array2;
+use prehend_autodiff::{Recording, Var};
 use prehend_sim::{
-    Body, BodyId, Bounce, Coulomb, GapSmoothing, HuntCrossley, Law, Shape, State,
-    StaticContactTarget, World,
+    BackwardEuler, Body, BodyId, Bounce, Coulomb, GapSmoothing, HuntCrossley, Integrator, Law,
+    RungeKutta4, SemiImplicitEuler, Shape, State, StaticContactTarget, TimeSteps, World,
 };
 
 /// Radius of the balls \[m\].
@@ -68,6 +69,40 @@ fn balls(count: usize, height: f64) -> anyhow::Result<(World, Vec<State>)> {
     Ok((world, states))
 }
 
+/// `count` balls in a pile of five by five, each a little in those beside and below it.
+fn pile(count: usize) -> anyhow::Result<(World, Vec<State>)> {
+    let (mut world, mut states) = balls(count, 0.0)?;
+    let flat = Shape::from_parry(&HalfSpace::new(Vector::Y))?;
+    world.bodies[0] = Body::fixed_from_shape("ground", &flat);
+    let apart = 2.0 * RADIUS - 1e-4;
+    for (i, state) in states[1..].iter_mut().enumerate() {
+        let [x, y, z] = [i % 5, i / 25, i / 5 % 5].map(|k| apart * k as f64);
+        state.pose = Isometry3::translation(x, RADIUS - 1e-4 + y, z);
+    }
+    Ok((world, states))
+}
+
+/// A row of a table: steps of a pile, and with the gradient of where its balls end by all velocities.
+fn steps_of_a_pile<I: Integrator + std::fmt::Debug>(integrator: I) -> anyhow::Result<()> {
+    let (world, states) = pile(100)?;
+    let steps = TimeSteps { dt: 1e-4, steps: 10 };
+    let forward = median(9, || Ok(world.simulate_with(&integrator, &states, steps, |_, _| ())?))?;
+    let reverse = median(9, || {
+        let recording = Recording::start();
+        let mut start: Vec<State<Var>> = states.iter().map(State::lift).collect();
+        for state in &mut start[1..] {
+            state.linear = state.linear.map(|v| recording.variable(v.value()));
+            state.angular = state.angular.map(|v| recording.variable(v.value()));
+        }
+        let end = world.lift().simulate_with(&integrator, &start, steps, |_, _| ())?.states;
+        let sum = end.iter().fold(Var::from(0.0), |sum, state| sum + state.pose.translation.y);
+        Ok(recording.gradient(sum).wrt(start[1].linear.y))
+    })?;
+    let [forward, reverse] = [forward, reverse].map(|time| 1e3 * time / steps.steps as f64);
+    println!("| {integrator:?} | {forward:.3} ms | {reverse:.3} ms | {:.1} |", reverse / forward);
+    Ok(())
+}
+
 /// The median time of `runs` runs \[s\].
 fn median<T>(runs: usize, run: impl Fn() -> anyhow::Result<T>) -> anyhow::Result<f64> {
     let mut times = Vec::new();
@@ -95,7 +130,12 @@ fn main() -> anyhow::Result<()> {
     println!("|---|--:|");
     println!("| 1 000 times one of one | {:.2} ms |", 1e3 * alone);
     println!("| one of 1 000 | {:.2} ms, {:.2} × |\n", 1e3 * together, together / alone);
-    println!("| balls that fall onto hills, 2 s | time |");
+    println!("| a step of a pile of 100 balls | time | with gradient | × |");
+    println!("|---|--:|--:|--:|");
+    steps_of_a_pile(SemiImplicitEuler)?;
+    steps_of_a_pile(RungeKutta4)?;
+    steps_of_a_pile(BackwardEuler)?;
+    println!("\n| balls that fall onto hills, 2 s | time |");
     println!("|---|--:|");
     for count in [1, 10, 100, 1000] {
         let (world, states) = balls(count, 0.5)?;
