@@ -5,11 +5,15 @@ mod boxes;
 pub(crate) mod closed;
 mod extrude;
 mod loft;
+mod mug;
 mod ring;
 mod round;
+mod tube;
 
 pub use boxes::{BoxFace, Panel, RoundedBox, cuboid, rounded_box};
 pub use extrude::{OutlineError, extrude};
 pub use loft::{Section, loft, meridian_lengths, smoothed, subdivided};
+pub use mug::Mug;
 pub use ring::{revolve_ring, torus};
 pub use round::{capsule, cone, cylinder, revolve, sphere, superellipsoid};
+pub use tube::tube;
