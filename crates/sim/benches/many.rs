@@ -41,7 +41,7 @@ fn ground() -> anyhow::Result<Shape> {
 }
 
 /// `count` balls at `height` \[m\] over hills, one beside the other.
-fn balls(count: usize, height: f64) -> anyhow::Result<(World, Vec<State>)> {
+pub fn balls(count: usize, height: f64) -> anyhow::Result<(World, Vec<State>)> {
     let mut world = World::new(Vector3::y() * -9.81);
     let shape = Shape::from_parry(&Ball::new(RADIUS))?;
     let floor = world.add(Body::fixed_from_shape("ground", &ground()?));
@@ -61,7 +61,7 @@ fn balls(count: usize, height: f64) -> anyhow::Result<(World, Vec<State>)> {
     let target = StaticContactTarget { mass, gravity: 9.81, penetration: 1e-3, contact_area };
     let bounce = Bounce { restitution: 0.5, impact_speed: 1.0 };
     let normal = HuntCrossley::from_target(&target, 1.0, bounce)?;
-    let law = Arc::new(Law::new(normal, Coulomb { friction: 0.4, slip_scale: 1e-2 })?);
+    let law = Arc::new(Law::new(normal, Coulomb { friction: 0.4, slip_scale: 3e-2 })?);
     world.add_contacts_between(&ids, &[floor], law.clone(), GapSmoothing::Hard)?;
     if count > 1 {
         world.add_contacts_between(&ids, &ids, law, GapSmoothing::Hard)?;
@@ -70,7 +70,7 @@ fn balls(count: usize, height: f64) -> anyhow::Result<(World, Vec<State>)> {
 }
 
 /// `count` balls in a pile of five by five, each a little in those beside and below it.
-fn pile(count: usize) -> anyhow::Result<(World, Vec<State>)> {
+pub fn pile(count: usize) -> anyhow::Result<(World, Vec<State>)> {
     let (mut world, mut states) = balls(count, 0.0)?;
     let flat = Shape::from_parry(&HalfSpace::new(Vector::Y))?;
     world.bodies[0] = Body::fixed_from_shape("ground", &flat);
@@ -137,7 +137,7 @@ fn main() -> anyhow::Result<()> {
     steps_of_a_pile(BackwardEuler)?;
     println!("\n| balls that fall onto hills, 2 s | time |");
     println!("|---|--:|");
-    for count in [1, 10, 100, 1000] {
+    for count in [1, 10, 100] {
         let (world, states) = balls(count, 0.5)?;
         let runs = if count < 100 { 5 } else { 1 };
         let time = median(runs, || Ok(world.simulate(&states, 2.0)?))?;

@@ -68,8 +68,9 @@ impl<I: Integrator> Scene<I> {
         integrator: I,
         world: &World<S>,
     ) -> Result<Arc<Self>, SimulationError> {
+        world.check_trajectories()?;
         let parameters: Vec<f64> = world.parameters().into_iter().map(S::value).collect();
-        Ok(Arc::new(Self { world: world.with_parameters(&parameters)?, parameters, integrator }))
+        Ok(Arc::new(Self { world: world.map(S::value), parameters, integrator }))
     }
 
     pub(crate) fn changes<S: Scalar>(&self, world: &World<S>) -> Changes<S> {
@@ -92,6 +93,9 @@ impl<I: Integrator> Scene<I> {
         places: &[u32],
         values: &[S],
     ) -> Result<World<S>, SimulationError> {
+        if places.is_empty() {
+            return Ok(self.world.lift());
+        }
         let mut all: Vec<S> = self.parameters.iter().map(|&x| S::constant(x)).collect();
         for (&place, &value) in places.iter().zip(values) {
             all[place as usize] = value;
@@ -133,16 +137,9 @@ impl<I: Integrator + Send + 'static> Integrator for StepCheckpointed<I> {
             return Err(SimulationError::AnotherWorld);
         }
         self.check_differentiable(world)?;
-        let Changes { places, values } = self.scene.changes(world);
-        let x: Vec<S> = coordinates_of(states).chain(values).collect();
-        let function = OneStep { scene: Arc::clone(&self.scene), places, step };
+        let (function, x) = OneStep::new(&self.scene, world, states, step);
         let after = S::recompute(function, &x)?;
-        let mut after = states_of(&after);
-        let next = |(index, state): (usize, &State<S>)| match world.moves_by_forces(index) {
-            true => after.next().unwrap_or(*state),
-            false => *state,
-        };
-        Ok(states.iter().enumerate().map(next).collect())
+        Ok(with_moved(world, states, &after))
     }
 
     fn check_differentiable<S: Scalar>(&self, world: &World<S>) -> Result<(), SimulationError> {
@@ -164,10 +161,38 @@ impl<I: Integrator + Send + 'static> Integrator for StepCheckpointed<I> {
 
 /// One step as a function of the states' coordinates and of the world's parameters at `places`, to the states of free bodies and of
 /// contacts that stick.
-struct OneStep<I> {
+pub(crate) struct OneStep<I> {
     scene: Arc<Scene<I>>,
     places: Box<[u32]>,
     step: Step,
+}
+
+impl<I: Integrator> OneStep<I> {
+    /// `step` from `states` in `world`, one of the worlds of `scene`, and the numbers that it is a function of.
+    pub(crate) fn new<S: Scalar>(
+        scene: &Arc<Scene<I>>,
+        world: &World<S>,
+        states: &[State<S>],
+        step: Step,
+    ) -> (Self, Vec<S>) {
+        let Changes { places, values } = scene.changes(world);
+        let x = coordinates_of(states).chain(values).collect();
+        (Self { scene: Arc::clone(scene), places, step }, x)
+    }
+}
+
+/// `states` after a step of `world` whose function has the results `moved`.
+pub(crate) fn with_moved<S: Scalar>(
+    world: &World<S>,
+    states: &[State<S>],
+    moved: &[S],
+) -> Vec<State<S>> {
+    let mut moved = states_of(moved);
+    let next = |(index, state): (usize, &State<S>)| match world.moves_by_forces(index) {
+        true => moved.next().unwrap_or(*state),
+        false => *state,
+    };
+    states.iter().enumerate().map(next).collect()
 }
 
 impl<I: Integrator + Send + 'static> Recompute for OneStep<I> {

@@ -99,9 +99,18 @@ impl HeightSpline {
         along_u.hypot(along_v)
     }
 
-    #[inline]
-    fn bases(&self, place: [f64; 2]) -> [Basis; 2] {
-        [0, 1].map(|i| Basis::at((place[i] - self.origin[i]) / self.spacing[i], self.dims[i]))
+    // Written out, for the functions of arrays are not inlined.
+    #[inline(always)]
+    fn bases(&self, [u, v]: [f64; 2]) -> [Basis; 2] {
+        [
+            Basis::at((u - self.origin[0]) / self.spacing[0], self.dims[0]),
+            Basis::at((v - self.origin[1]) / self.spacing[1], self.dims[1]),
+        ]
+    }
+
+    /// Distance of heights along u and v \[m\].
+    pub fn spacing(&self) -> [f64; 2] {
+        self.spacing
     }
 
     #[inline]

@@ -20,7 +20,7 @@ pub(super) struct Basis {
 impl Basis {
     /// At grid coordinate `x`, sample `i` being at `x = i`, of `samples` >= 2 along the axis. Outside
     /// 0..=samples - 1 the spline goes on as a straight line.
-    #[inline]
+    #[inline(always)]
     pub(super) fn at(x: f64, samples: usize) -> Self {
         let last = (samples - 1) as f64;
         let inside = x.clamp(0.0, last);
@@ -29,10 +29,10 @@ impl Basis {
         let s = 1.0 - t;
         let (tt, ss) = (t * t, s * s);
         let mut value = [
-            ss * s / 6.0,
-            (4.0 - 3.0 * tt * (1.0 + s)) / 6.0,
-            (4.0 - 3.0 * ss * (1.0 + t)) / 6.0,
-            tt * t / 6.0,
+            ss * s * (1.0 / 6.0),
+            2.0 / 3.0 - 0.5 * tt * (1.0 + s),
+            2.0 / 3.0 - 0.5 * ss * (1.0 + t),
+            tt * t * (1.0 / 6.0),
         ];
         let slope = [-0.5 * ss, 0.5 * (3.0 * tt - 4.0 * t), 0.5 * (4.0 * s - 3.0 * ss), 0.5 * tt];
         let mut curvature = [s, 3.0 * t - 2.0, 3.0 * s - 2.0, t];

@@ -25,8 +25,8 @@ pub(super) struct MovedPatch<T: Scalar> {
 
 impl<T: Scalar> MovedPatch<T> {
     pub(super) fn new(patch: &Patch<'_>, tangent: &[T]) -> Self {
-        let part = |k: usize| Vector3::from_column_slice(&tangent[3 * k..][..3]);
-        let [position, turn, linear, angular] = std::array::from_fn(part);
+        let part = |i: usize| Vector3::new(tangent[i], tangent[i + 1], tangent[i + 2]);
+        let (position, turn, linear, angular) = (part(0), part(3), part(6), part(9));
         Self { position, turn, linear, angular, spin: patch.state.angular.map(T::constant) }
     }
 
@@ -39,10 +39,12 @@ impl<T: Scalar> MovedPatch<T> {
         let place = self.position + turned;
         let along =
             |row: &Vector3<f64>| place.x.times(row.x) + place.y.times(row.y) + place.z.times(row.z);
-        let bend = Vector3::from_fn(|i, _| along(&hessian.row(i).transpose()));
         let across = along(&hessian.tr_mul(normal));
-        let normal_change =
-            Vector3::from_fn(|i, _| (bend[i] - across.times(normal[i])).times(1.0 / length));
+        let turned_by = |i: usize| {
+            let bend = along(&hessian.row(i).transpose());
+            (bend - across.times(normal[i])).times(1.0 / length)
+        };
+        let normal_change = Vector3::new(turned_by(0), turned_by(1), turned_by(2));
         let lever_change = turned - normal_change.map(|n| n.times(*radius));
         let moved =
             self.linear + self.angular.cross(&constant(lever)) + self.spin.cross(&lever_change);

@@ -81,6 +81,27 @@ impl Patch<'_> {
         self.surface.only(near, |block| self.may_touch(block, reach))
     }
 
+    /// Calls `visit` with the samples of [`Patch::near`] and the distances of their centers \[m\].
+    pub(crate) fn for_each_near(
+        &self,
+        cutoff: f64,
+        margin: f64,
+        mut visit: impl FnMut(&SurfacePoint, f64),
+    ) {
+        let reach = self.reach(cutoff) + self.field.lipschitz_bound() * margin;
+        for (block, points) in self.surface.blocks() {
+            // One is asked for itself.
+            if points.len() > 1 && !self.may_touch(block, reach) {
+                continue;
+            }
+            for point in points {
+                if let Some(distance) = self.field.distance(&self.place(&point.position), reach) {
+                    visit(point, distance);
+                }
+            }
+        }
+    }
+
     /// Whether a sample may touch before one of them has moved by `margin` \[m\], for a law that reaches to `cutoff`.
     pub(crate) fn is_near(&self, cutoff: f64, margin: f64) -> bool {
         let reach = self.reach(cutoff) + self.field.lipschitz_bound() * margin;

@@ -94,9 +94,9 @@ impl Adaptive {
 }
 
 impl Default for Adaptive {
-    /// 10⁻⁶ for states, 5·10⁻⁶ for sensitivities, a million parts.
+    /// 5·10⁻⁶ for states, 2·10⁻⁵ for sensitivities, a million parts.
     fn default() -> Self {
-        Self { tolerance: 1e-6, sensitivity_tolerance: 5e-6, max_parts: 1_000_000 }
+        Self { tolerance: 5e-6, sensitivity_tolerance: 2e-5, max_parts: 1_000_000 }
     }
 }
 

@@ -12,6 +12,7 @@ use crate::contact::wrench::stack;
 use crate::state::State;
 use crate::time::Step;
 use crate::world::World;
+use crate::world::body::Body;
 use crate::world::body_id::BodyId;
 
 /// Of a body: position of the center of mass, its velocity, rotation vector, and angular momentum; or their rates. Of a contact
@@ -29,8 +30,12 @@ pub(super) struct Stages<'a, S: Scalar> {
     states: &'a [State<S>],
     step: Step,
     free: Vec<Free<'a, S>>,
+    /// Free bodies and contacts that stick.
+    moving: usize,
     /// Of each stage, those of the free bodies, then of the contacts that stick.
-    slopes: Vec<Vec<Change<S>>>,
+    slopes: Vec<Change<S>>,
+    /// What led to the last stage.
+    change: Vec<Change<S>>,
 }
 
 /// A body that forces move.
@@ -42,22 +47,25 @@ struct Free<'a, S: Scalar> {
 }
 
 impl<'a, S: Scalar> Stages<'a, S> {
-    /// The first stage, of a step that starts with `wrenches` on the bodies.
+    /// The first of `count` stages, of a step that starts with `wrenches` on the bodies.
     pub(super) fn new(
         world: &'a World<S>,
         states: &'a [State<S>],
         wrenches: &[Vector6<S>],
         step: Step,
+        count: usize,
     ) -> Self {
-        let free = |id: BodyId| {
-            let (rigid, state) = (world.bodies[id].rigid()?, &states[id]);
+        let free = |(id, body): (usize, &'a Body<S>)| {
+            let (rigid, state) = (body.rigid()?, &states[id]);
             let momentum = rigid.momentum(&state.pose.rotation, &state.angular);
-            Some(Free { id, rigid, momentum })
+            Some(Free { id: BodyId(id), rigid, momentum })
         };
-        let free: Vec<Free<'_, S>> = world.free_bodies().into_iter().filter_map(free).collect();
-        let mut stages = Self { world, states, step, slopes: Vec::new(), free };
-        let none = vec![[Vector3::zeros(); 4]; stages.moving()];
-        stages.slopes.push(stages.rates(states, &none, wrenches));
+        let free: Vec<Free<'_, S>> = world.bodies.iter().enumerate().filter_map(free).collect();
+        let moving = free.len() + states.len() - world.bodies.len();
+        let change = vec![[Vector3::zeros(); 4]; moving];
+        let slopes = Vec::with_capacity(count * moving);
+        let mut stages = Self { world, states, step, free, moving, slopes, change };
+        stages.add_slopes(states, wrenches);
         stages
     }
 
@@ -68,11 +76,14 @@ impl<'a, S: Scalar> Stages<'a, S> {
         fraction: f64,
         weights: &[f64],
     ) -> (Vec<State<S>>, Vec<Vector6<S>>) {
-        let change = self.combined(weights);
+        let mut change = std::mem::take(&mut self.change);
+        change.fill([Vector3::zeros(); 4]);
+        self.add_combined(weights, &mut change);
         let mut states = self.moved(&change);
+        self.change = change;
         self.world.drive(&mut states, self.step.start + fraction * self.step.dt);
         let wrenches = self.world.wrenches(&states, self.step.index);
-        self.slopes.push(self.rates(&states, &change, &wrenches));
+        self.add_slopes(&states, &wrenches);
         (states, wrenches)
     }
 
@@ -83,19 +94,29 @@ impl<'a, S: Scalar> Stages<'a, S> {
 
     /// Of each free body and contact that sticks, the step's length times the sum of the slopes with `weights`.
     pub(super) fn combined(&self, weights: &[f64]) -> Vec<Change<S>> {
-        let of = |i: usize| {
-            let mut sum: Change<S> = [Vector3::zeros(); 4];
-            for (slopes, weight) in self.slopes.iter().zip(weights).filter(|(_, w)| **w != 0.0) {
-                let weight = weight * self.step.dt;
-                for (sum, slope) in sum.iter_mut().zip(&slopes[i]) {
+        let mut sums = vec![[Vector3::zeros(); 4]; self.moving];
+        self.add_combined(weights, &mut sums);
+        sums
+    }
+
+    #[inline]
+    fn add_combined(&self, weights: &[f64], sums: &mut [Change<S>]) {
+        if self.moving == 0 {
+            return;
+        }
+        for (slopes, weight) in self.slopes.chunks_exact(self.moving).zip(weights) {
+            if *weight == 0.0 {
+                continue;
+            }
+            let weight = weight * self.step.dt;
+            for (sum, slope) in sums.iter_mut().zip(slopes) {
+                for (sum, slope) in sum.iter_mut().zip(slope) {
                     sum.x += slope.x.times(weight);
                     sum.y += slope.y.times(weight);
                     sum.z += slope.z.times(weight);
                 }
             }
-            sum
-        };
-        (0..self.moving()).map(of).collect()
+        }
     }
 
     /// The states after `change`.
@@ -116,19 +137,9 @@ impl<'a, S: Scalar> Stages<'a, S> {
         moved
     }
 
-    /// Free bodies and contacts that stick.
-    fn moving(&self) -> usize {
-        self.free.len() + self.states.len() - self.world.bodies.len()
-    }
-
-    /// The rates of change at `states` under `wrenches`, where `change` has led to.
-    fn rates(
-        &self,
-        states: &[State<S>],
-        change: &[Change<S>],
-        wrenches: &[Vector6<S>],
-    ) -> Vec<Change<S>> {
-        let rate = |(free, change): (&Free<'_, S>, &Change<S>)| {
+    /// The rates of change at `states` under `wrenches`, where the last change has led to.
+    fn add_slopes(&mut self, states: &[State<S>], wrenches: &[Vector6<S>]) {
+        for (free, change) in self.free.iter().zip(&self.change) {
             let (state, turn, wrench) = (&states[free.id], &change[2], &wrenches[free.id]);
             let (force, torque) = (wrench.fixed_rows::<3>(0), wrench.fixed_rows::<3>(3));
             let once = turn.cross(&state.angular);
@@ -136,13 +147,12 @@ impl<'a, S: Scalar> Stages<'a, S> {
             let turning =
                 state.angular - once.map(|x| x.times(0.5)) + twice.map(|x| x.times(1.0 / 12.0));
             let acceleration = self.world.gravity + force * (S::one() / free.rigid.mass());
-            [state.linear, acceleration, turning, torque.into_owned()]
-        };
-        let rates = self.free.iter().zip(change).map(rate);
-        let deflecting = |rate: &Vector6<S>| {
+            self.slopes.push([state.linear, acceleration, turning, torque.into_owned()]);
+        }
+        for rate in &wrenches[self.world.bodies.len()..] {
             let (linear, angular) = (rate.fixed_rows::<3>(0), rate.fixed_rows::<3>(3));
-            [linear.into_owned(), angular.into_owned(), Vector3::zeros(), Vector3::zeros()]
-        };
-        rates.chain(wrenches[self.world.bodies.len()..].iter().map(deflecting)).collect()
+            let none = Vector3::zeros();
+            self.slopes.push([linear.into_owned(), angular.into_owned(), none, none]);
+        }
     }
 }

@@ -6,6 +6,8 @@ use prehend_geometry::{DistanceField, FieldSample};
 
 /// Newton steps at most: three or four do near the ground.
 const STEPS: usize = 12;
+/// Part of the distance between heights within which the ground is its quadratic to rounding.
+const SHORT: f64 = 1e-8;
 
 /// Everything below y = h(x, z), where h is a C² spline through the heights.
 ///
@@ -15,6 +17,8 @@ pub(crate) struct HeightField {
     heights: HeightSpline,
     /// Least part of a height above the ground that the distance is.
     least_part: f64,
+    /// Distance between heights along the axis where it is less \[m\].
+    spacing: f64,
 }
 
 /// The closest point of the ground.
@@ -30,26 +34,24 @@ impl HeightField {
     pub(crate) fn new(heights: HeightSpline) -> Self {
         let steepest = heights.steepest();
         let least_part = 1.0 / (1.0 + steepest * steepest).sqrt();
-        Self { heights, least_part }
+        let [along_u, along_v] = heights.spacing();
+        Self { heights, least_part, spacing: along_u.min(along_v) }
     }
 
-    /// Whether the ground is farther from `point` than `reach`, for certain.
+    /// Where the line from `point` to the ground is normal to it; none if that is farther than `reach`, for certain.
     #[inline]
-    fn is_far(&self, point: &Point3<f64>, reach: f64) -> bool {
-        let above = point.y - self.heights.height(point.x, point.z);
-        // Written so that NaN is far away.
-        let least = above.min(above * self.least_part);
-        above.is_nan() || least > reach
-    }
-
-    /// Where the line from `point` to the ground is normal to it.
-    #[inline]
-    fn foot(&self, point: &Point3<f64>) -> Foot {
+    fn foot(&self, point: &Point3<f64>, reach: f64) -> Option<Foot> {
         let target = Vector2::new(point.x, point.z);
+        let mut ground = self.heights.at(point.x, point.z);
+        let above = point.y - ground.height;
+        // Written so that NaN is far away.
+        let near = above.min(above * self.least_part) <= reach;
+        if !near {
+            return None;
+        }
         let mut place = target;
         let mut step = 0;
         loop {
-            let ground = self.heights.at(place.x, place.y);
             let slopes = Vector2::from(ground.slopes);
             let [uu, uv, vv] = ground.curvatures;
             let above = point.y - ground.height;
@@ -61,11 +63,19 @@ impl HeightField {
             let jacobian = if convex { full } else { steep };
             let change = jacobian.try_inverse().map_or(-residual, |inverse| -(inverse * residual));
             step += 1;
-            let small = change.norm() <= 1e-12 * (above.abs() + change.norm()) + 1e-15;
-            if small || step > STEPS {
-                return Foot { place, ground, jacobian };
+            let length = change.norm();
+            if length <= 1e-12 * (above.abs() + length) + 1e-15 || step > STEPS {
+                return Some(Foot { place, ground, jacobian });
             }
             place += change;
+            if length <= SHORT * self.spacing {
+                let bend =
+                    Vector2::new(uu * change.x + uv * change.y, uv * change.x + vv * change.y);
+                ground.height += change.dot(&(slopes + bend * 0.5));
+                ground.slopes = (slopes + bend).into();
+                return Some(Foot { place, ground, jacobian });
+            }
+            ground = self.heights.at(place.x, place.y);
         }
     }
 }
@@ -89,10 +99,7 @@ impl Foot {
 
 impl DistanceField for HeightField {
     fn sample(&self, point: &Point3<f64>, reach: f64) -> Option<FieldSample> {
-        if self.is_far(point, reach) {
-            return None;
-        }
-        let foot = self.foot(point);
+        let foot = self.foot(point, reach)?;
         let distance = foot.distance(point);
         if distance > reach {
             return None;
@@ -110,10 +117,7 @@ impl DistanceField for HeightField {
     }
 
     fn distance(&self, point: &Point3<f64>, reach: f64) -> Option<f64> {
-        if self.is_far(point, reach) {
-            return None;
-        }
-        let distance = self.foot(point).distance(point);
+        let distance = self.foot(point, reach)?.distance(point);
         (distance <= reach).then_some(distance)
     }
 }

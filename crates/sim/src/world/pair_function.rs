@@ -69,9 +69,10 @@ impl<S: Scalar> Change<S> {
     /// Of coordinates `x`, less their values.
     #[inline(always)]
     fn new(x: &[S; STATE], state: &State) -> Self {
-        let vector = |from: usize| Vector3::from_fn(|i, _| x[from + i].plus(-x[from + i].value()));
+        let less = |i: usize| x[i].plus(-x[i].value());
+        let vector = |from: usize| Vector3::new(less(from), less(from + 1), less(from + 2));
         // δq q̄ = θ/2, and with q = (u, w): w δu − δw u + u×δu.
-        let (by_vector, by_scalar) = (vector(3), x[6].plus(-x[6].value()));
+        let (by_vector, by_scalar) = (vector(3), less(6));
         let q = state.pose.rotation.coords;
         let u = Vector3::new(q.x, q.y, q.z);
         let turn = by_vector.map(|d| d.times(q.w)) - u.map(|u| by_scalar.times(u));
@@ -107,12 +108,13 @@ impl<W> PairFunction<W> {
             tangent.copy_from_slice(times(&to_field, seen).as_slice());
         }
         let local = wrench(tangent);
-        let [force, torque] = [0, 3].map(|from| {
-            let part = Vector3::from_fn(|i, _| local[from + i].times(self.at.weight));
-            let part = times(&axes, &part);
+        let part = |from: usize| {
+            let along = |i: usize| local[from + i].times(self.at.weight);
+            let part = times(&axes, &Vector3::new(along(0), along(1), along(2)));
             f.as_ref().map_or(part, |f| part - cross(&part.map(S::value), &f.turn))
-        });
-        std::array::from_fn(|i| if i < 3 { force[i] } else { torque[i - 3] })
+        };
+        let (force, torque) = (part(0), part(3));
+        [force.x, force.y, force.z, torque.x, torque.y, torque.z]
     }
 
     #[inline]
@@ -195,7 +197,7 @@ impl<W: LocalFunction<12, 6>> PairFunction<W> {
     /// Of the states of both bodies, where that with the field may be one that does not move.
     #[inline]
     pub(super) fn of<S: Scalar>(&self, samples: &State<S>, field: &State<S>) -> [S; 6] {
-        let [samples, field] = [samples, field].map(coordinates);
+        let (samples, field) = (coordinates(samples), coordinates(field));
         if field.iter().all(is_constant) {
             return S::local(&OneMoves(self), samples);
         }
@@ -302,5 +304,6 @@ fn cross<S: Scalar>(a: &Vector3<f64>, b: &Vector3<S>) -> Vector3<S> {
 
 #[inline(always)]
 fn times<S: Scalar>(m: &Matrix3<f64>, v: &Vector3<S>) -> Vector3<S> {
-    Vector3::from_fn(|i, _| v.x.times(m[(i, 0)]) + v.y.times(m[(i, 1)]) + v.z.times(m[(i, 2)]))
+    let row = |i: usize| v.x.times(m[(i, 0)]) + v.y.times(m[(i, 1)]) + v.z.times(m[(i, 2)]);
+    Vector3::new(row(0), row(1), row(2))
 }

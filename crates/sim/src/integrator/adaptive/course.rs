@@ -1,10 +1,13 @@
 //! The parts of a step and where they lead.
 
+use std::sync::Arc;
+
 use prehend_autodiff::Scalar;
 
 use super::Adaptive;
 use super::planner::{Planner, Probe};
 use crate::error::SimulationError;
+use crate::integrator::Integrator;
 use crate::integrator::runge_kutta::dormand_prince;
 use crate::state::State;
 use crate::time::Step;
@@ -13,7 +16,7 @@ use crate::world::body_id::BodyId;
 
 /// The parts of a step, found by values alone.
 pub(super) struct Course {
-    parts: Vec<Step>,
+    pub(super) parts: Parts,
     /// The states at its end, with the sensitivity.
     pub(super) states: Vec<State<Probe>>,
     /// Length of the part that would come next \[s\].
@@ -45,10 +48,16 @@ impl Course {
         }
         let next_part = planner.next_part();
         let deviations = watched.into_iter().map(|body| body.farthest).collect();
-        Ok(Self { parts, states: planner.states(), next_part, deviations })
+        Ok(Self { parts: Parts(parts.into()), states: planner.states(), next_part, deviations })
     }
+}
 
-    /// The states to which the same parts lead in `world`, with derivatives, from `states` in which `step` starts.
+/// The parts of a step.
+#[derive(Clone, Debug)]
+pub(super) struct Parts(Arc<[Step]>);
+
+impl Parts {
+    /// The states to which they lead in `world` from `states` in which `step` starts.
     pub(super) fn follow<S: Scalar>(
         &self,
         world: &World<S>,
@@ -57,7 +66,7 @@ impl Course {
     ) -> Vec<State<S>> {
         let mut states = states.to_vec();
         let mut wrenches = world.wrenches(&states, step.index);
-        for &part in &self.parts {
+        for &part in self.0.iter() {
             let mut trial = dormand_prince::step(world, &states, &wrenches, part);
             states = trial.stages.pop().unwrap_or(states);
             wrenches = match part.index {
@@ -67,6 +76,17 @@ impl Course {
             };
         }
         states
+    }
+}
+
+impl Integrator for Parts {
+    fn step<S: Scalar>(
+        &self,
+        world: &World<S>,
+        states: &[State<S>],
+        step: Step,
+    ) -> Result<Vec<State<S>>, SimulationError> {
+        Ok(self.follow(world, states, step))
     }
 }
 

@@ -22,18 +22,18 @@ const EXPONENT: f64 = -0.2;
 const SAFETY: f64 = 0.9;
 /// Change of length from one step to the next, the least and the most.
 const LENGTH_CHANGE: [f64; 2] = [0.2, 5.0];
-/// Error of a part that ends just after a kink.
-const OVERSHOOT: f64 = 0.1;
-/// Times that a part is brought to a kink before it is only made shorter.
-const TOUCH_ATTEMPTS: usize = 2;
-/// Error of a part that can only come from a kink.
-const KINK: f64 = 30.0;
+/// Times that a part is brought to where a contact begins or ends before it is only made shorter.
+const TOUCH_ATTEMPTS: usize = 3;
+/// Power of the length by which the error of a part falls at least where there is no kink in it.
+const SMOOTH: i32 = 2;
 /// Shortest part, of the whole step or of the time that it starts at.
 const SHORTEST: f64 = 1e-13;
 
-/// A place where derivatives jump, such as a law that stops pulling: the error of a part that it lies in falls with its length,
+/// A place where derivatives jump, such as the onset of a contact: the error of a part that it lies in falls with its length,
 /// not with the fifth power.
 struct Kink {
+    /// When it is, if that is known \[s\].
+    at: Option<f64>,
     /// End of the shortest part so far that it is known to lie in \[s\].
     end: f64,
     /// Length of a part that it may lie in \[s\].
@@ -43,9 +43,10 @@ struct Kink {
 }
 
 impl Kink {
-    /// The next part to try at `time` \[s\]: half of where it may be.
+    /// The next part to try at `time` \[s\]: up to a little before it and then over it, or half of where it may be.
     fn next(&self, time: f64) -> f64 {
-        (0.5 * (self.end - time)).max(self.tolerated)
+        let before = self.at.map_or(0.5 * (self.end - time), |at| at - time - 0.5 * self.tolerated);
+        before.max(self.tolerated)
     }
 }
 
@@ -65,6 +66,8 @@ pub(super) struct Planner {
     /// Length of the next part \[s\].
     dt: f64,
     kink: Option<Kink>,
+    /// Length \[s\] and error of the part before.
+    before: Option<(f64, f64)>,
 }
 
 impl Planner {
@@ -95,6 +98,7 @@ impl Planner {
             time: whole.start,
             dt,
             kink: None,
+            before: None,
         }
     }
 
@@ -127,7 +131,7 @@ impl Planner {
         let before_kink = self.kink.as_ref().map_or(f64::INFINITY, |kink| kink.next(self.time));
         let dt = self.dt.min(left).min(before_kink);
         self.dt = self.travel.longest(&self.plain, &values, self.time, dt);
-        let (mut attempt, mut touches) = (0, TOUCH_ATTEMPTS);
+        let (mut failed, mut touches) = (None, TOUCH_ATTEMPTS);
         loop {
             // A last part that is next to nothing would be lost in rounding.
             let dt = if self.dt >= left * (1.0 - 1e-6) { left } else { self.dt };
@@ -144,6 +148,14 @@ impl Planner {
             let error = self.norm.error_ratio(&errors);
             let change =
                 if error.is_nan() { LENGTH_CHANGE[0] } else { SAFETY * error.powf(EXPONENT) };
+            // Where errors have grown from part to part, they go on to (K. Gustafsson, "Control-theoretic techniques for stepsize selection in
+            // implicit Runge–Kutta methods", ACM Trans. Math. Softw. 20, 1994).
+            let change = match self.before {
+                Some((length, before)) if error <= 1.0 => {
+                    change.min(change * dt / length * (before / error).powf(-EXPONENT))
+                }
+                _ => change,
+            };
             let chosen = dt * change.clamp(LENGTH_CHANGE[0], LENGTH_CHANGE[1]);
             if error <= 1.0 || (chosen <= shortest && self.norm.only_kinks(&errors)) {
                 self.parts += 1;
@@ -155,13 +167,14 @@ impl Planner {
                 if let Some(pair) = self.travel.crossed(&self.plain, &self.states, trial.end()) {
                     return Err(self.plain.passed_through(pair, self.time));
                 }
-                self.time = if dt == left { self.whole.end() } else { self.time + dt };
+                let end = self.time + dt;
+                let passed =
+                    |kink: &mut Kink| kink.end <= end || kink.at.is_some_and(|at| at <= end);
+                self.dt = self.kink.take_if(passed).map_or(chosen, |kink| kink.resume);
+                self.before = Some((dt, error));
+                self.time = if dt == left { self.whole.end() } else { end };
                 self.states = trial.stages.pop().unwrap_or_default();
                 self.wrenches = trial.wrenches;
-                self.dt = match self.kink.take_if(|kink| kink.end <= self.time) {
-                    Some(passed) => passed.resume,
-                    None => chosen,
-                };
                 return Ok(Some(part));
             }
             let end: Vec<State> = trial.end().iter().map(State::value).collect();
@@ -171,22 +184,22 @@ impl Planner {
                     false => self.plain.not_finite(&values, &end, self.time),
                 });
             }
-            if error.is_finite() && (attempt > 0 || error > KINK) {
-                let resume = self.kink.as_ref().map_or(0.5 * dt, |kink| kink.resume);
-                self.kink =
-                    Some(Kink { end: self.time + dt, tolerated: SAFETY * dt / error, resume });
-            }
-            attempt += 1;
             let touch = (touches > 0 && error.is_finite())
-                .then(|| touch_time::first(&self.plain, &values, &end, dt, shortest));
-            self.dt = match touch.flatten() {
-                Some(time) => {
-                    touches -= 1;
-                    time + OVERSHOOT * (dt - time) / error
+                .then(|| touch_time::first(&self.plain, &values, &end, dt, shortest))
+                .flatten();
+            touches -= usize::from(touch.is_some());
+            let smooth = |(longer, worse): (f64, f64)| error < worse * (dt / longer).powi(SMOOTH);
+            let kinked = touch.is_some() || failed.is_some_and(|before| !smooth(before));
+            self.dt = match kinked && error.is_finite() {
+                true => {
+                    let resume = self.kink.as_ref().map_or(0.5 * dt, |kink| kink.resume);
+                    let (at, end) = (touch.map(|touch| self.time + touch), self.time + dt);
+                    let kink = Kink { at, end, tolerated: SAFETY * dt / error, resume };
+                    self.kink.insert(kink).next(self.time).min(SAFETY * dt)
                 }
-                None if attempt > 1 => dt * (SAFETY / error).max(0.5),
-                None => chosen,
+                false => chosen,
             };
+            failed = Some((dt, error));
         }
     }
 }

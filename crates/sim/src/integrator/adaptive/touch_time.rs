@@ -5,6 +5,7 @@ use prehend_geometry::FieldSample;
 use crate::contact::gap_smoothing::GapSmoothing;
 use crate::contact::patch::Patch;
 use crate::state::State;
+use crate::surface::SurfacePoint;
 use crate::world::World;
 use crate::world::contact_pair::ContactPair;
 
@@ -30,8 +31,11 @@ fn first_of(
     dt: f64,
     earliest: f64,
 ) -> Option<f64> {
+    let reach = pair.law().reach();
+    let course = Course::new(world, pair, ends, dt)?;
     let mut first = None;
-    for_each_gap(world, pair, ends, dt, pair.law().reach(), |[from, to]| {
+    course.for_each_near(reach, |point, _| {
+        let [Some(from), Some(to)] = course.gaps(point, reach) else { return };
         let time = crossing(from, to, dt).filter(|time| *time > earliest);
         first = [first, time].into_iter().flatten().min_by(f64::total_cmp);
     });
@@ -46,41 +50,54 @@ pub(super) fn dips(
     dt: f64,
     depth: f64,
 ) -> bool {
-    let mut dips = false;
     let reach = pair.law().reach() + pair.smoothing.force_band();
-    for_each_gap(world, pair, ends, dt, reach, |[from, to]| {
-        dips |= from[0] > 0.0 && to[0] > 0.0 && least(from, to, dt) < -depth;
+    let Some(course) = Course::new(world, pair, ends, dt) else { return false };
+    let mut dips = false;
+    course.for_each_near(reach, |point, distance| {
+        // Most of those that are asked about touch.
+        if dips || distance - point.radius <= reach {
+            return;
+        }
+        let [Some(from), Some(to)] = course.gaps(point, reach) else { return };
+        dips = from[0] > 0.0 && to[0] > 0.0 && least(from, to, dt) < -depth;
     });
     dips
 }
 
-/// Calls `visit` with the gaps beyond `reach` \[m\] of the samples that may touch, and their rates \[m/s\], at both ends of a step of
-/// `dt` \[s\].
-fn for_each_gap(
-    world: &World,
-    pair: &ContactPair,
-    ends: [&[State]; 2],
-    dt: f64,
-    reach: f64,
-    mut visit: impl FnMut([[f64; 2]; 2]),
-) {
-    let seen = ends.map(|states| world.seen_value(pair, states));
-    let Some(patch) = world.patch(pair, seen[0]) else { return };
-    let Patch { surface, com, field, .. } = patch;
-    let radius = surface.radius_about(&com);
-    let [before, after] = seen.each_ref().map(|state| state.speed_within(radius));
-    let near = patch.near(reach, dt * before.max(after));
-    for point in near.points() {
-        let gaps = seen.each_ref().map(|state| {
+/// Samples beside a field at both ends of a step.
+struct Course<'a> {
+    /// At the start.
+    patch: Patch<'a>,
+    ends: [State; 2],
+    /// How far a sample moves at most \[m\].
+    travel: f64,
+}
+
+impl<'a> Course<'a> {
+    /// Of `pair` in a step of `dt` \[s\].
+    fn new(world: &'a World, pair: &'a ContactPair, ends: [&[State]; 2], dt: f64) -> Option<Self> {
+        let ends = ends.map(|states| world.seen_value(pair, states));
+        let patch = world.patch(pair, ends[0])?;
+        let radius = patch.surface.radius_about(&patch.com);
+        let travel = dt * ends[0].speed_within(radius).max(ends[1].speed_within(radius));
+        Some(Self { patch, ends, travel })
+    }
+
+    /// Calls `visit` with the samples that may come within `reach` \[m\], and their centers' distances at the start \[m\].
+    fn for_each_near(&self, reach: f64, visit: impl FnMut(&SurfacePoint, f64)) {
+        self.patch.for_each_near(reach, self.travel, visit);
+    }
+
+    /// The gaps of a sample beyond `reach` \[m\] and their rates \[m/s\], at both ends.
+    fn gaps(&self, point: &SurfacePoint, reach: f64) -> [Option<[f64; 2]>; 2] {
+        let Patch { com, field, .. } = self.patch;
+        self.ends.map(|state| {
             let arm = state.pose.rotation * (point.position - com);
             let place = (state.pose.translation.vector + arm).into();
             let FieldSample { distance, gradient, .. } = field.sample(&place, f64::INFINITY)?;
             let rate = gradient.dot(&(state.linear + state.angular.cross(&arm)));
             Some([distance - point.radius - reach, rate])
-        });
-        if let [Some(from), Some(to)] = gaps {
-            visit([from, to]);
-        }
+        })
     }
 }
 

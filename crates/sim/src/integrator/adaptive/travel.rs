@@ -137,7 +137,6 @@ impl Travel {
             let speeds = stages.iter().map(|stage| speed(world.seen_value(pair, stage)));
             let travel = dt * speeds.fold(speed(state), f64::max);
             travel > limit.short
-                && limit.is_near(world, pair, state, travel)
                 && (travel > limit.free && limit.is_near(world, pair, state, travel - limit.free)
                     || touch_time::dips(world, pair, [states, &end], dt, GRAZING * limit.size))
         })

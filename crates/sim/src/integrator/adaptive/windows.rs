@@ -11,15 +11,17 @@ use super::error_norm::ErrorNorm;
 use super::islands::{Island, Links};
 use super::planner::Probe;
 use super::probe;
+use crate::adjoint::{OneStep, Scene, with_moved};
 use crate::error::SimulationError;
 use crate::state::State;
 use crate::time::Step;
 use crate::world::World;
 use crate::world::body_id::BodyId;
+use crate::world::contact_pair::ContactPair;
 use crate::world::neighbors::{NeighborSearch, Neighbors};
 
 /// How far the fastest body goes in a window, in parts of its size.
-const TRAVEL: f64 = 0.25;
+const TRAVEL: f64 = 0.35;
 /// How far a body is first looked for from where it would be if nothing pushed it, in parts of its size: where that is too little
 /// it is seen, and costs less than an island that is too large.
 const SLACK: f64 = 1e-3;
@@ -50,17 +52,17 @@ pub(super) fn step<S: Scalar>(
         window.dt = if length < left { length } else { left };
         let Window { neighbors, islands } =
             Window::find(settings, &search, &probes, window, &next_parts)?;
-        let contacts = if S::ORDER == 0 { Vec::new() } else { world.contacts_with(&neighbors) };
-        for (island, course) in &islands {
-            let after = match S::ORDER {
-                0 => course.states.iter().map(|state| state.value().lift()).collect(),
-                _ => {
-                    let own = island.world(world, &contacts);
-                    course.follow(&own, &island.states(&states), window)
-                }
-            };
-            for ((place, after), probe) in island.places().zip(after).zip(&course.states) {
-                (states[place], probes[place]) = (after, *probe);
+        let after = match S::ORDER {
+            0 => Vec::new(),
+            _ => followed(world, &world.contacts_with(&neighbors), &states, &islands, window)?,
+        };
+        for (i, (island, course)) in islands.iter().enumerate() {
+            for (k, (place, probe)) in island.places().zip(&course.states).enumerate() {
+                states[place] = match after.get(i) {
+                    Some(after) => after[k],
+                    None => probe.value().lift(),
+                };
+                probes[place] = *probe;
             }
             island.bodies.iter().for_each(|id| next_parts[id.index()] = Some(course.next_part));
         }
@@ -72,6 +74,37 @@ pub(super) fn step<S: Scalar>(
         world.drive(&mut states, start);
         window = Step { index: window.index.max(1), start, dt: left - window.dt };
     }
+}
+
+/// The states of each island after its course, with derivatives; `contacts` are those that they were found by.
+///
+/// What is recorded is one node for all islands, which the sweep goes through side by side: it keeps the states that a window begins
+/// with, and the parts.
+fn followed<S: Scalar>(
+    world: &World<S>,
+    contacts: &[ContactPair<S>],
+    states: &[State<S>],
+    islands: &[(Island, Course)],
+    window: Step,
+) -> Result<Vec<Vec<State<S>>>, SimulationError> {
+    let own = islands
+        .iter()
+        .map(|(island, course)| (island.world(world, contacts), island.states(states), course));
+    // Of a single window the caller knows better what to keep; trajectories with derivatives are no numbers that a node could keep.
+    let whole = world.contact_groups.is_empty() || world.check_trajectories().is_err();
+    if whole || !S::RECORDED {
+        return Ok(own
+            .map(|(own, states, course)| course.parts.follow(&own, &states, window))
+            .collect());
+    }
+    let own: Vec<_> = own.collect();
+    let node = |(own, states, course): &(World<S>, Vec<State<S>>, &Course)| {
+        let scene = Scene::new(course.parts.clone(), own)?;
+        Ok(OneStep::new(&scene, own, states, window))
+    };
+    let nodes = own.iter().map(node).collect::<Result<Vec<_>, SimulationError>>()?;
+    let after = own.iter().zip(S::recompute_each(nodes));
+    after.map(|((own, states, _), moved)| Ok(with_moved(own, states, &moved?))).collect()
 }
 
 /// In what time the fastest body of a group goes as far as in a window \[s\], infinite without any.

@@ -24,7 +24,7 @@ impl Integrator for RungeKutta4 {
         step: Step,
     ) -> Result<Vec<State<S>>, SimulationError> {
         let wrenches = world.wrenches(states, step.index);
-        let mut stages = Stages::new(world, states, &wrenches, step);
+        let mut stages = Stages::new(world, states, &wrenches, step, 4);
         stages.stage(0.5, &[0.5]);
         stages.stage(0.5, &[0.0, 0.5]);
         stages.stage(1.0, &[0.0, 0.0, 1.0]);

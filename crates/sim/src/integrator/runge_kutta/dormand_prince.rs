@@ -69,7 +69,7 @@ pub(in crate::integrator) fn step<S: Scalar>(
     wrenches: &[Vector6<S>],
     step: Step,
 ) -> Trial<S> {
-    visit(&mut Stages::new(world, states, wrenches, step))
+    visit(&mut Stages::new(world, states, wrenches, step, 1 + STAGES.len()))
 }
 
 /// [`step`], and how far off it may be.
@@ -79,7 +79,7 @@ pub(in crate::integrator) fn estimated<S: Scalar>(
     wrenches: &[Vector6<S>],
     step: Step,
 ) -> (Trial<S>, Estimate<S>) {
-    let mut stages = Stages::new(world, states, wrenches, step);
+    let mut stages = Stages::new(world, states, wrenches, step, 1 + STAGES.len());
     let trial = visit(&mut stages);
     let estimate = Estimate {
         orders: stages.combined(&ERROR),
@@ -131,7 +131,9 @@ fn norms<S: Scalar>(change: &Change<S>, part: fn(S) -> f64) -> [f64; 4] {
 /// Roots of sums of squares over `differences` of entry `i`.
 fn together<S: Scalar>(differences: &[Vec<Change<S>>], i: usize, part: fn(S) -> f64) -> [f64; 4] {
     let norms = differences.iter().map(|difference| norms(&difference[i], part));
-    norms.fold([0.0; 4], |sum, norms| std::array::from_fn(|k| norms[k].hypot(sum[k])))
+    norms.fold([0.0; 4], |sum, norms| {
+        std::array::from_fn(|k| (norms[k] * norms[k] + sum[k] * sum[k]).sqrt())
+    })
 }
 
 #[cfg(test)]
