@@ -6,6 +6,7 @@ use crate::scalar::{LocalFunction, Recompute, Scalar};
 use crate::solve::Factored;
 use crate::tape::{push, refuse_foreign};
 use crate::var::Var;
+use crate::vjp::CustomVjp;
 use crate::{recomputed, record};
 
 impl Var {
@@ -90,6 +91,10 @@ impl_real_field!([] Var {
         F::Error: Send,
     {
         recomputed::recompute_each(functions)
+    }
+
+    fn recorded(inputs: &[Self], outputs: &[f64], operation: impl CustomVjp) -> Vec<Self> {
+        record::custom(inputs, outputs, operation)
     }
 
     fn solve(matrix: &Factored<f64>, b: &[Self]) -> Vec<Self> {

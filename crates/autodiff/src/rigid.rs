@@ -38,6 +38,29 @@ pub fn integrate_rotation<S: Scalar>(
     UnitQuaternion::new_unchecked(Quaternion::from_vector(after.into()))
 }
 
+/// exp(`turn`) · `rotation` for a rotation vector `turn` \[rad\], with the quaternion's length brought back to one.
+#[inline]
+pub fn turned<S: Scalar>(rotation: &UnitQuaternion<S>, turn: &Vector3<S>) -> UnitQuaternion<S> {
+    let [i, j, k, w] = rotation.coords.into();
+    let after = S::local(&Turned, [i, j, k, w, turn.x, turn.y, turn.z]);
+    UnitQuaternion::new_unchecked(Quaternion::from_vector(after.into()))
+}
+
+/// R A Rᵀ `vector` for the matrix R of `rotation` and A = `matrix`: angular momentum of an angular velocity with a body's inertia, or
+/// the other way with its inverse.
+///
+/// In reverse mode the derivative by the rotation is that along turns: what would change the length of the quaternion has none.
+#[inline]
+pub fn conjugated<S: Scalar>(
+    rotation: &UnitQuaternion<S>,
+    matrix: &Matrix3<f64>,
+    vector: &Vector3<S>,
+) -> Vector3<S> {
+    let [i, j, k, w] = rotation.coords.into();
+    let conjugated = Conjugated { matrix: *matrix };
+    Vector3::from(S::local(&conjugated, [i, j, k, w, vector.x, vector.y, vector.z]))
+}
+
 /// Angular acceleration \[rad/s²\] of a free body by Euler's equation, α = I⁻¹ (τ − ω × I ω), I = R diag(J) Rᵀ.
 ///
 /// `rotation` maps the body's principal axes into the frame of `velocity` \[rad/s\], `torque` \[N·m\] and the
@@ -143,6 +166,65 @@ impl LocalFunction<7, 4> for IntegrateRotation {
             jacobian[3][4 + c] = da * w - du.dot(&v);
         }
         Some(((step.into_inner() * Quaternion::new(w, i, j, k)).coords.into(), jacobian))
+    }
+}
+
+struct Turned;
+
+impl LocalFunction<7, 4> for Turned {
+    #[inline]
+    fn evaluate<S: Scalar>(&self, x: [S; 7]) -> [S; 4] {
+        let mut after = quaternion(IntegrateRotation { duration: 1.0 }.evaluate(x));
+        after.renormalize_fast();
+        after.into_inner().coords.into()
+    }
+
+    // The quaternion y becomes y (3 − y²)/2.
+    #[inline]
+    fn linearize(&self, x: [f64; 7]) -> Option<([f64; 4], [[f64; 7]; 4])> {
+        let (y, mut jacobian) = IntegrateRotation { duration: 1.0 }.linearize(x)?;
+        let mut after = quaternion(y);
+        after.renormalize_fast();
+        let scale = 1.5 - 0.5 * y.iter().map(|y| y * y).sum::<f64>();
+        for column in 0..7 {
+            let along: f64 = (0..4).map(|row| y[row] * jacobian[row][column]).sum();
+            for row in 0..4 {
+                jacobian[row][column] = scale * jacobian[row][column] - y[row] * along;
+            }
+        }
+        Some((after.into_inner().coords.into(), jacobian))
+    }
+}
+
+struct Conjugated {
+    matrix: Matrix3<f64>,
+}
+
+impl LocalFunction<7, 3> for Conjugated {
+    #[inline]
+    fn evaluate<S: Scalar>(&self, [i, j, k, w, x, y, z]: [S; 7]) -> [S; 3] {
+        let r = quaternion([i, j, k, w]).to_rotation_matrix();
+        let v = r.inverse_transform_vector(&Vector3::new(x, y, z));
+        let m = &self.matrix;
+        let row = |i: usize| v.x.times(m[(i, 0)]) + v.y.times(m[(i, 1)]) + v.z.times(m[(i, 2)]);
+        (r * Vector3::new(row(0), row(1), row(2))).into()
+    }
+
+    // By a small turn θ, R → (1 + [θ]×) R; then from θ to the quaternion's coordinates.
+    #[inline]
+    fn linearize(&self, x: [f64; 7]) -> Option<([f64; 3], [[f64; 7]; 3])> {
+        let value = self.evaluate(x);
+        let q = quaternion([x[0], x[1], x[2], x[3]]);
+        let r = q.to_rotation_matrix().into_inner();
+        let by_vector = r * self.matrix * r.transpose();
+        let vector = Vector3::new(x[4], x[5], x[6]);
+        let by_turn = by_vector * cross_matrix(&vector) - cross_matrix(&value.into());
+        let by_rotation = by_turn * rotation_vector_jacobian(&q);
+        let entry = |row: usize, column: usize| match column {
+            0..4 => by_rotation[(row, column)],
+            _ => by_vector[(row, column - 4)],
+        };
+        Some((value, std::array::from_fn(|row| std::array::from_fn(|column| entry(row, column)))))
     }
 }
 
@@ -257,7 +339,34 @@ mod tests {
             for velocity in VELOCITIES {
                 let [x, y, z] = velocity;
                 check(&IntegrateRotation { duration: 0.5 }, unit([i, j, k, w, x, y, z]));
+                check(&Turned, unit([i, j, k, w, x, y, z]));
                 check(&Cross, [x, y, z, 0.3, w, -1.0]);
+            }
+        }
+    }
+
+    #[test]
+    fn conjugation_matches_forward_mode_along_turns() {
+        let matrix = Matrix3::new(2.0, 0.3, -0.1, 0.3, 1.0, 0.2, 0.1, 0.4, 0.5);
+        let conjugated = Conjugated { matrix };
+        let x = unit([0.3, -0.5, 0.2, 0.7, 3.0, -2.0, 5.0]);
+        let start = quaternion([x[0], x[1], x[2], x[3]]);
+        let s = Fwd::<6>::variables([0.0, 0.0, 0.0, x[4], x[5], x[6]]);
+        let moved = so3_exp(&Vector3::new(s[0], s[1], s[2])) * start.cast::<Fwd<6>>();
+        let [i, j, k, w]: [Fwd<6>; 4] = moved.coords.into();
+        let forward = conjugated.evaluate([i, j, k, w, s[3], s[4], s[5]]);
+        let (values, jacobian) = conjugated.linearize(x).unwrap();
+        for ((value, row), forward) in values.iter().zip(jacobian).zip(forward) {
+            assert_eq!(*value, forward.value);
+            for lane in 0..6 {
+                let by_rotation: f64 = [i, j, k, w]
+                    .iter()
+                    .zip(row)
+                    .map(|(coordinate, slope)| coordinate.derivative[lane] * slope)
+                    .sum();
+                let by_vector = if lane < 3 { 0.0 } else { row[lane + 1] };
+                let error = by_rotation + by_vector - forward.derivative[lane];
+                assert!(error.abs() < 1e-13, "{lane}: {error}");
             }
         }
     }

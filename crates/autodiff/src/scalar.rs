@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use crate::lanes;
 use crate::solve::Factored;
+use crate::vjp::CustomVjp;
 
 /// A real number that may carry derivatives.
 ///
@@ -122,6 +123,13 @@ pub trait Scalar: RealField + Copy + Default {
             true => functions.into_iter().map(apply).collect(),
             false => functions.into_par_iter().map(apply).collect(),
         }
+    }
+
+    /// `outputs` as results of `operation` on `inputs`, on a recording. Other scalars take no part in it: they are told nothing, and
+    /// get constants.
+    #[doc(hidden)]
+    fn recorded(_inputs: &[Self], outputs: &[f64], _operation: impl CustomVjp) -> Vec<Self> {
+        outputs.iter().map(|&value| Self::constant(value)).collect()
     }
 
     /// A⁻¹ b for a matrix A of plain numbers, which has as many rows as `b`: in reverse mode one node for all.

@@ -10,8 +10,9 @@ use parry3d_f64::shape::{Ball, HalfSpace, HeightField};
 use parry3d_f64::utils::Array2;
 use prehend_autodiff::{Recording, Var};
 use prehend_sim::{
-    BackwardEuler, Body, BodyId, Bounce, Coulomb, GapSmoothing, HuntCrossley, Integrator, Law,
-    RungeKutta4, SemiImplicitEuler, Shape, State, StaticContactTarget, TimeSteps, World,
+    BackwardEuler, Body, BodyId, Bounce, ContactBodies, Coulomb, GapSmoothing, HuntCrossley,
+    Integrator, Law, RungeKutta4, SemiImplicitEuler, Shape, State, StaticContactTarget, TimeSteps,
+    World,
 };
 
 /// Radius of the balls \[m\].
@@ -41,7 +42,7 @@ fn ground() -> anyhow::Result<Shape> {
 }
 
 /// `count` balls at `height` \[m\] over hills, one beside the other.
-pub fn balls(count: usize, height: f64) -> anyhow::Result<(World, Vec<State>)> {
+fn balls(count: usize, height: f64) -> anyhow::Result<(World, Vec<State>)> {
     let mut world = World::new(Vector3::y() * -9.81);
     let shape = Shape::from_parry(&Ball::new(RADIUS))?;
     let floor = world.add(Body::fixed_from_shape("ground", &ground()?));
@@ -70,7 +71,7 @@ pub fn balls(count: usize, height: f64) -> anyhow::Result<(World, Vec<State>)> {
 }
 
 /// `count` balls in a pile of five by five, each a little in those beside and below it.
-pub fn pile(count: usize) -> anyhow::Result<(World, Vec<State>)> {
+fn pile(count: usize) -> anyhow::Result<(World, Vec<State>)> {
     let (mut world, mut states) = balls(count, 0.0)?;
     let flat = Shape::from_parry(&HalfSpace::new(Vector::Y))?;
     world.bodies[0] = Body::fixed_from_shape("ground", &flat);
@@ -82,25 +83,58 @@ pub fn pile(count: usize) -> anyhow::Result<(World, Vec<State>)> {
     Ok((world, states))
 }
 
+/// The same world with every contact of its groups by itself.
+fn every_pair(grouped: &World) -> anyhow::Result<World> {
+    let mut world = World { contact_groups: Vec::new(), ..grouped.clone() };
+    for group in &grouped.contact_groups {
+        let [balls, others] = group.bodies();
+        for (&samples, &field) in balls.iter().flat_map(|a| others.iter().map(move |b| (a, b))) {
+            // Of two balls the first touches the second.
+            if others.len() == 1 || samples < field {
+                let bodies = ContactBodies { samples, field };
+                let law = Arc::clone(group.contact.law());
+                world.add_contact(bodies, law, group.contact.smoothing)?;
+            }
+        }
+    }
+    Ok(world)
+}
+
 /// A row of a table: steps of a pile, and with the gradient of where its balls end by all velocities.
-fn steps_of_a_pile<I: Integrator + std::fmt::Debug>(integrator: I) -> anyhow::Result<()> {
-    let (world, states) = pile(100)?;
+fn steps_of_a_pile<I: Integrator + std::fmt::Debug>(
+    integrator: I,
+    (what, world): (&str, &World),
+    states: &[State],
+) -> anyhow::Result<()> {
     let steps = TimeSteps { dt: 1e-4, steps: 10 };
-    let forward = median(9, || Ok(world.simulate_with(&integrator, &states, steps, |_, _| ())?))?;
+    let forward = median(9, || Ok(world.simulate_with(&integrator, states, steps, |_, _| ())?))?;
     let reverse = median(9, || {
         let recording = Recording::start();
-        let mut start: Vec<State<Var>> = states.iter().map(State::lift).collect();
-        for state in &mut start[1..] {
-            state.linear = state.linear.map(|v| recording.variable(v.value()));
-            state.angular = state.angular.map(|v| recording.variable(v.value()));
-        }
+        let start = with_velocities(&recording, states);
         let end = world.lift().simulate_with(&integrator, &start, steps, |_, _| ())?.states;
-        let sum = end.iter().fold(Var::from(0.0), |sum, state| sum + state.pose.translation.y);
-        Ok(recording.gradient(sum).wrt(start[1].linear.y))
+        Ok(recording.gradient(height(&end)).wrt(start[1].linear.y))
     })?;
     let [forward, reverse] = [forward, reverse].map(|time| 1e3 * time / steps.steps as f64);
-    println!("| {integrator:?} | {forward:.3} ms | {reverse:.3} ms | {:.1} |", reverse / forward);
+    println!(
+        "| {integrator:?}, {what} | {forward:.3} ms | {reverse:.3} ms | {:.1} |",
+        reverse / forward
+    );
     Ok(())
+}
+
+/// `states` with all velocities of balls as variables.
+fn with_velocities(recording: &Recording, states: &[State]) -> Vec<State<Var>> {
+    let mut start: Vec<State<Var>> = states.iter().map(State::lift).collect();
+    for state in &mut start[1..] {
+        state.linear = state.linear.map(|v| recording.variable(v.value()));
+        state.angular = state.angular.map(|v| recording.variable(v.value()));
+    }
+    start
+}
+
+/// The sum of the heights of balls \[m\].
+fn height(states: &[State<Var>]) -> Var {
+    states.iter().fold(Var::from(0.0), |sum, state| sum + state.pose.translation.y)
 }
 
 /// The median time of `runs` runs \[s\].
@@ -132,16 +166,26 @@ fn main() -> anyhow::Result<()> {
     println!("| one of 1 000 | {:.2} ms, {:.2} × |\n", 1e3 * together, together / alone);
     println!("| a step of a pile of 100 balls | time | with gradient | × |");
     println!("|---|--:|--:|--:|");
-    steps_of_a_pile(SemiImplicitEuler)?;
-    steps_of_a_pile(RungeKutta4)?;
-    steps_of_a_pile(BackwardEuler)?;
-    println!("\n| balls that fall onto hills, 2 s | time |");
-    println!("|---|--:|");
-    for count in [1, 10, 100] {
+    let (grouped, states) = pile(100)?;
+    let pairs = every_pair(&grouped)?;
+    for world in [("every pair", &pairs), ("a group", &grouped)] {
+        steps_of_a_pile(SemiImplicitEuler, world, &states)?;
+        steps_of_a_pile(RungeKutta4, world, &states)?;
+        steps_of_a_pile(BackwardEuler, world, &states)?;
+    }
+    println!("\n| balls that fall onto hills, 2 s | time | with gradient | × |");
+    println!("|---|--:|--:|--:|");
+    for count in [1, 10, 100, 1000] {
         let (world, states) = balls(count, 0.5)?;
         let runs = if count < 100 { 5 } else { 1 };
-        let time = median(runs, || Ok(world.simulate(&states, 2.0)?))?;
-        println!("| {count} | {time:.3} s |");
+        let forward = median(runs, || Ok(world.simulate(&states, 2.0)?))?;
+        let reverse = median(runs, || {
+            let recording = Recording::start();
+            let start = with_velocities(&recording, &states);
+            let end = world.lift().simulate(&start, 2.0)?;
+            Ok(recording.gradient(height(&end)).wrt(start[1].linear.y))
+        })?;
+        println!("| {count} | {forward:.3} s | {reverse:.3} s | {:.1} |", reverse / forward);
     }
     Ok(())
 }

@@ -2,6 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3, Vector6};
 use prehend_autodiff::Scalar;
+use prehend_autodiff::rigid::conjugated;
 use thiserror::Error;
 
 use crate::state::State;
@@ -183,8 +184,7 @@ impl<S: Scalar> RigidBody<S> {
         rotation: &UnitQuaternion<S>,
         angular: &Vector3<S>,
     ) -> Vector3<S> {
-        let r = rotation.to_rotation_matrix();
-        r * (self.inertia * r.inverse_transform_vector(angular))
+        conjugate(&self.inertia, rotation, angular)
     }
 
     /// Angular velocity \[rad/s\] of the body with angular `momentum` \[kg m²/s\], world frame.
@@ -194,8 +194,7 @@ impl<S: Scalar> RigidBody<S> {
         rotation: &UnitQuaternion<S>,
         momentum: &Vector3<S>,
     ) -> Vector3<S> {
-        let r = rotation.to_rotation_matrix();
-        r * (self.inverse_inertia * r.inverse_transform_vector(momentum))
+        conjugate(&self.inverse_inertia, rotation, momentum)
     }
 
     /// Velocity of the center of mass \[m/s\] and angular momentum \[kg m²/s\] of the body at `state` after `wrench` (about the
@@ -210,7 +209,7 @@ impl<S: Scalar> RigidBody<S> {
     ) -> (Vector3<S>, Vector3<S>) {
         let (force, torque) = (wrench.fixed_rows::<3>(0), wrench.fixed_rows::<3>(3));
         let linear = state.linear + (gravity + force / self.mass) * dt;
-        (linear, self.world_inertia(&state.pose.rotation) * state.angular + torque * dt)
+        (linear, self.momentum(&state.pose.rotation, &state.angular) + torque * dt)
     }
 
     /// `t_world_com` of a body whose model frame is at `t_world_model`.
@@ -246,6 +245,25 @@ impl RigidBody {
     pub fn lift<S: Scalar>(&self) -> RigidBody<S> {
         self.map(S::constant)
     }
+}
+
+/// R A Rᵀ `vector` for A = `matrix`: one node of a tape unless that carries derivatives.
+#[inline]
+fn conjugate<S: Scalar>(
+    matrix: &Matrix3<S>,
+    rotation: &UnitQuaternion<S>,
+    vector: &Vector3<S>,
+) -> Vector3<S> {
+    if S::RECORDED && matrix.iter().all(is_constant) {
+        return conjugated(rotation, &matrix.map(S::value), vector);
+    }
+    let r = rotation.to_rotation_matrix();
+    r * (matrix * r.inverse_transform_vector(vector))
+}
+
+/// Whether a number carries no derivatives.
+pub(crate) fn is_constant<S: Scalar>(x: &S) -> bool {
+    x.plus(-x.value()).is_constant_zero()
 }
 
 #[cfg(test)]

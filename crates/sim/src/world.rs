@@ -6,6 +6,7 @@ pub(crate) mod contact_group;
 pub(crate) mod contact_pair;
 pub(crate) mod deflection;
 mod effect;
+mod linear_contacts;
 pub(crate) mod neighbors;
 mod pair_function;
 mod seen;

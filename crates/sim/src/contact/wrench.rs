@@ -36,11 +36,6 @@ impl LocalFunction<12, 6> for LinearWrench {
             terms.fold(sum, |sum, (direction, slope)| sum + direction.times(*slope))
         })
     }
-
-    #[inline]
-    fn linearize(&self, _: [f64; 12]) -> Option<([f64; 6], [[f64; 12]; 6])> {
-        Some((self.value, self.by_state))
-    }
 }
 
 /// The sum of all contacts of `patch`.
@@ -145,12 +140,6 @@ impl LocalFunction<12, 6> for WrenchFunction<'_> {
         let WrenchJacobian { wrench, by_state, .. } =
             self.law.wrench_jacobian(self.p, self.patch, false);
         LinearWrench { value: wrench.into(), by_state }.evaluate(tangent)
-    }
-
-    #[inline]
-    fn linearize(&self, _: [f64; 12]) -> Option<([f64; 6], [[f64; 12]; 6])> {
-        let jacobian = self.law.wrench_jacobian(self.p, self.patch, false);
-        Some((jacobian.wrench.into(), jacobian.by_state))
     }
 
     #[inline]

@@ -3,9 +3,11 @@
 pub(crate) mod classic;
 pub(super) mod dormand_prince;
 
-use nalgebra::{Vector3, Vector6};
+use nalgebra::{Matrix3, Vector3, Vector6};
+use prehend_autodiff::LocalFunction;
 use prehend_autodiff::Scalar;
-use prehend_autodiff::lie::so3_exp;
+use prehend_autodiff::lie::cross_matrix;
+use prehend_autodiff::rigid::turned;
 
 use crate::body::RigidBody;
 use crate::contact::wrench::stack;
@@ -126,8 +128,7 @@ impl<'a, S: Scalar> Stages<'a, S> {
             let state = &mut moved[free.id];
             state.pose.translation.vector += position;
             state.linear += velocity;
-            state.pose.rotation = so3_exp(turn) * state.pose.rotation;
-            state.pose.rotation.renormalize_fast();
+            state.pose.rotation = turned(&state.pose.rotation, turn);
             state.angular = free.rigid.angular(&state.pose.rotation, &(free.momentum + momentum));
         }
         let deflections = moved.iter_mut().skip(self.world.bodies.len());
@@ -142,10 +143,8 @@ impl<'a, S: Scalar> Stages<'a, S> {
         for (free, change) in self.free.iter().zip(&self.change) {
             let (state, turn, wrench) = (&states[free.id], &change[2], &wrenches[free.id]);
             let (force, torque) = (wrench.fixed_rows::<3>(0), wrench.fixed_rows::<3>(3));
-            let once = turn.cross(&state.angular);
-            let twice = turn.cross(&once);
-            let turning =
-                state.angular - once.map(|x| x.times(0.5)) + twice.map(|x| x.times(1.0 / 12.0));
+            let [(a, b, c), (d, e, f)] = [turn, &state.angular].map(|v| (v.x, v.y, v.z));
+            let turning = Vector3::from(S::local(&TurnRate, [a, b, c, d, e, f]));
             let acceleration = self.world.gravity + force * (S::one() / free.rigid.mass());
             self.slopes.push([state.linear, acceleration, turning, torque.into_owned()]);
         }
@@ -153,6 +152,55 @@ impl<'a, S: Scalar> Stages<'a, S> {
             let (linear, angular) = (rate.fixed_rows::<3>(0), rate.fixed_rows::<3>(3));
             let none = Vector3::zeros();
             self.slopes.push([linear.into_owned(), angular.into_owned(), none, none]);
+        }
+    }
+}
+
+/// The rate of a rotation vector θ whose body turns with ω, of both.
+struct TurnRate;
+
+impl LocalFunction<6, 3> for TurnRate {
+    #[inline]
+    fn evaluate<S: Scalar>(&self, [a, b, c, d, e, f]: [S; 6]) -> [S; 3] {
+        let (turn, angular) = (Vector3::new(a, b, c), Vector3::new(d, e, f));
+        let once = turn.cross(&angular);
+        let twice = turn.cross(&once);
+        (angular - once.map(|x| x.times(0.5)) + twice.map(|x| x.times(1.0 / 12.0))).into()
+    }
+
+    #[inline]
+    fn linearize(&self, x: [f64; 6]) -> Option<([f64; 3], [[f64; 6]; 3])> {
+        let [by_turn, by_angular] = {
+            let (turn, angular) = (Vector3::new(x[0], x[1], x[2]), Vector3::new(x[3], x[4], x[5]));
+            let [turns, spins] = [turn, angular].map(|v| cross_matrix(&v));
+            let twice = cross_matrix(&turn.cross(&angular)) + turns * spins;
+            let identity = Matrix3::identity();
+            [spins * 0.5 - twice / 12.0, identity - turns * 0.5 + turns * turns / 12.0]
+        };
+        let row = |i: usize| {
+            let entry = |j: usize| if j < 3 { by_turn[(i, j)] } else { by_angular[(i, j - 3)] };
+            std::array::from_fn(entry)
+        };
+        Some((self.evaluate(x), std::array::from_fn(row)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use prehend_autodiff::Fwd;
+
+    use super::*;
+
+    #[test]
+    fn the_rate_of_a_rotation_vector_has_its_derivatives() {
+        for x in [[0.3, -0.2, 0.5, 2.0, 1.0, -3.0], [0.0, 0.0, 0.0, 2.0, 1.0, -3.0], [0.0; 6]] {
+            let (values, jacobian) = TurnRate.linearize(x).unwrap();
+            let forward = TurnRate.evaluate(Fwd::<6>::variables(x));
+            for ((value, row), forward) in values.iter().zip(jacobian).zip(forward) {
+                assert_eq!(*value, forward.value);
+                let off = row.iter().zip(forward.derivative).map(|(a, b)| (a - b).abs());
+                assert!(off.fold(0.0, f64::max) < 1e-14);
+            }
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector6;
 use prehend_autodiff::Scalar;
-use prehend_autodiff::lie::so3_exp;
+use prehend_autodiff::rigid::turned;
 
 use super::Integrator;
 use crate::body::RigidBody;
@@ -63,9 +63,8 @@ fn advance<S: Scalar>(
     next.linear = linear;
     next.pose.translation.vector += next.linear * dt;
     let rotation = &state.pose.rotation;
-    let mid_velocity = body.inverse_world_inertia(rotation) * momentum;
-    next.pose.rotation = so3_exp(&(mid_velocity * dt)) * rotation;
-    next.pose.rotation.renormalize_fast();
-    next.angular = body.inverse_world_inertia(&next.pose.rotation) * momentum;
+    let mid_velocity = body.angular(rotation, &momentum);
+    next.pose.rotation = turned(rotation, &(mid_velocity * dt));
+    next.angular = body.angular(&next.pose.rotation, &momentum);
     next
 }

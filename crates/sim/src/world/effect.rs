@@ -7,8 +7,10 @@ use prehend_autodiff::{Fwd, Scalar};
 
 use super::World;
 use super::contact_pair::ContactPair;
+use super::linear_contacts::LinearContacts;
 use super::pair_function::Relation;
 use super::seen::Seen;
+use crate::body::is_constant;
 use crate::contact::bristles::{BristleFunction, Bristles};
 use crate::contact::dimensions::{LANES, Lane, VariableShapes};
 use crate::contact::patch::Patch;
@@ -47,8 +49,13 @@ impl<S: Scalar> World<S> {
         }
         let mut wrenches: Vec<Vector6<S>> =
             self.bodies.iter().map(|body| body.external_wrench).collect();
+        let mut linear = S::RECORDED.then(|| LinearContacts::new(self.bodies.len()));
         for pair in &self.contacts {
             let bristles = pair.law().bristles();
+            if let Some(linear) = linear.as_mut().filter(|_| bristles.is_none()) {
+                linear.add(self, pair, states, step, &mut wrenches);
+                continue;
+            }
             let deflection = bristles.and_then(|_| states.get(wrenches.len()));
             let Effect { on_samples, on_field, rate } = self.effect(pair, states, deflection, step);
             wrenches[pair.bodies.samples] += on_samples;
@@ -56,6 +63,9 @@ impl<S: Scalar> World<S> {
             if bristles.is_some() {
                 wrenches.push(rate);
             }
+        }
+        if let Some(linear) = linear {
+            linear.record(self, states, &mut wrenches);
         }
         wrenches
     }
@@ -112,23 +122,20 @@ impl<S: Scalar> World<S> {
         let [samples, field] =
             [0, 1].map(|end| shifted[end].as_ref().map_or(&states[ends[end]], |(state, _)| state));
         let at = Relation { samples: samples.value(), field: field.value(), weight: pair.weight };
-        let mut slopes = [S::zero(); 12];
-        let all = if pair.params().iter().all(is_constant) {
-            at.function(WrenchFunction { law, p: &values, patch }).of(samples, field)
+        let (all, slopes) = if pair.params().iter().all(is_constant) {
+            let mut slopes = [S::zero(); 12];
+            self.add_slopes_by_dimensions(pair, patch, &Vector6::zeros(), &mut slopes);
+            let function = at.function(WrenchFunction { law, p: &values, patch });
+            let any = !slopes.iter().all(|x| x.is_constant_zero());
+            (function.of(samples, field), any.then_some(slopes))
         } else {
-            let WrenchJacobian { wrench, by_state, by_params } =
-                law.wrench_jacobian(&values, patch, true);
-            for (by_param, moved) in by_params.iter().zip(changes(pair.params())) {
-                for (component, slope) in slopes.iter_mut().zip(by_param.iter()) {
-                    *component += moved.times(*slope);
-                }
-            }
-            at.function(LinearWrench { value: wrench.into(), by_state }).of(samples, field)
+            let (WrenchJacobian { wrench, by_state, .. }, slopes) = self.linearized(pair, patch);
+            let function = at.function(LinearWrench { value: wrench.into(), by_state });
+            (function.of(samples, field), slopes)
         };
-        self.add_slopes_by_dimensions(pair, patch, &Vector6::zeros(), &mut slopes);
         let [fx, fy, fz, tx, ty, tz] = all;
         let (mut force, mut torque) = (Vector3::new(fx, fy, fz), Vector3::new(tx, ty, tz));
-        if !slopes[..6].iter().all(|x| x.is_constant_zero()) {
+        if let Some(slopes) = slopes {
             let axes = at.field.pose.rotation.cast();
             let part = |from: usize| Vector3::from_fn(|i, _| slopes[from + i].times(pair.weight));
             (force, torque) = (force + axes * part(0), torque + axes * part(3));
@@ -222,6 +229,29 @@ impl<S: Scalar> World<S> {
         }
     }
 
+    /// What `pair`, which is `patch`, does without a memory, with derivatives by the state that the field sees; and what it changes with
+    /// parameters and dimensions, if any vary: zeros that carry derivatives, along the axes of the field.
+    pub(super) fn linearized(
+        &self,
+        pair: &ContactPair<S>,
+        patch: &Patch<'_>,
+    ) -> (WrenchJacobian, Option<[S; 12]>) {
+        let values: Vec<f64> = pair.params().iter().map(|p| p.value()).collect();
+        let vary = !pair.params().iter().all(is_constant);
+        let jacobian = pair.law().wrench_jacobian(&values, patch, vary);
+        let mut slopes = [S::zero(); 12];
+        if vary {
+            for (by_param, moved) in jacobian.by_params.iter().zip(changes(pair.params())) {
+                for (component, slope) in slopes.iter_mut().zip(by_param.iter()) {
+                    *component += moved.times(*slope);
+                }
+            }
+        }
+        self.add_slopes_by_dimensions(pair, patch, &Vector6::zeros(), &mut slopes);
+        let any = !slopes.iter().all(|x| x.is_constant_zero());
+        (jacobian, any.then_some(slopes))
+    }
+
     /// The samples of `pair` beside its field, which sees their body in `state`, if there are both.
     pub(crate) fn patch<'a>(&'a self, pair: &'a ContactPair<S>, state: State) -> Option<Patch<'a>> {
         let body = &self.bodies[pair.bodies.samples];
@@ -277,11 +307,6 @@ fn local_bristles<S: Scalar>(
         }
     }
     split(all)
-}
-
-/// Whether a number carries no derivatives.
-pub(super) fn is_constant<S: Scalar>(x: &S) -> bool {
-    x.plus(-x.value()).is_constant_zero()
 }
 
 /// Zeros that carry the derivatives of `params`.

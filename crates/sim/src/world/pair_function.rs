@@ -1,11 +1,9 @@
 //! What two bodies do to each other, as a function of both their states.
 
 use nalgebra::{Matrix3, Vector3};
-use prehend_autodiff::lie::cross_matrix;
 use prehend_autodiff::{Fwd, LocalFunction, Scalar};
 
-use super::effect::is_constant;
-use crate::contact::wrench::LinearWrench;
+use crate::body::is_constant;
 use crate::state::State;
 
 /// Numbers of a state, in the order of [`coordinates`].
@@ -128,39 +126,6 @@ impl<W> PairFunction<W> {
             spin: samples.angular - field.angular,
         }
     }
-
-    /// The wrench and its derivatives by the coordinates of the samples' body and, if there is room, of the field's.
-    #[inline(always)]
-    fn linearized<const N: usize>(&self, wrench: &LinearWrench) -> ([f64; 6], [[f64; N]; 6]) {
-        let mut by_states = [[0.0; N]; 6];
-        if wrench.value == [0.0; 6] && wrench.by_state == [[0.0; 12]; 6] {
-            return ([0.0; 6], by_states);
-        }
-        let Relative { axes, r, u, spin } = self.relative();
-        let cross_frame = cross_matrix(&self.at.field.angular);
-        let mut values = [0.0; 6];
-        for (part, rows) in by_states.chunks_exact_mut(3).enumerate() {
-            let along = |i: usize| wrench.value[3 * part + i] * self.at.weight;
-            let value = axes * Vector3::from_fn(|i, _| along(i));
-            values[3 * part..3 * part + 3].copy_from_slice(value.as_slice());
-            // By what the field sees, along the axes of the world.
-            let [place, turn, linear, angular] = [0, 3, 6, 9].map(|column| {
-                let slope =
-                    |i: usize, j: usize| wrench.by_state[3 * part + i][column + j] * self.at.weight;
-                axes * Matrix3::from_fn(slope) * axes.transpose()
-            });
-            let by_place = place - linear * cross_frame;
-            set(rows, 0, [&by_place, &turn, &linear, &angular], &self.at.samples);
-            if N == TWO {
-                let [cross_r, cross_u, cross_spin] = [r, u, spin].map(|v| cross_matrix(&v));
-                let by_turn = place * cross_r - turn + linear * cross_u + angular * cross_spin
-                    - cross_matrix(&value);
-                let by_angular = linear * cross_r - angular;
-                set(rows, STATE, [&-by_place, &by_turn, &-linear, &by_angular], &self.at.field);
-            }
-        }
-        (values, by_states)
-    }
 }
 
 /// How the field sees the samples, along the axes of the world.
@@ -169,28 +134,6 @@ struct Relative {
     r: Vector3<f64>,
     u: Vector3<f64>,
     spin: Vector3<f64>,
-}
-
-/// Writes the derivatives of three rows by place, turn, linear and angular velocity, as derivatives by the coordinates of `state`, which
-/// start at column `first`.
-#[inline(always)]
-fn set<const N: usize>(
-    rows: &mut [[f64; N]],
-    first: usize,
-    [place, turn, linear, angular]: [&Matrix3<f64>; 4],
-    state: &State,
-) {
-    // θ = 2 (w δu − δw u + u×δu) of a quaternion of vector u and scalar w.
-    let q = state.pose.rotation.coords;
-    let u = Vector3::new(q.x, q.y, q.z);
-    let by_scalar = turn * u * -2.0;
-    let by_vector = (turn * q.w + turn * cross_matrix(&u)) * 2.0;
-    for (i, row) in rows.iter_mut().enumerate() {
-        for (from, block) in [(0, place), (3, &by_vector), (7, linear), (10, angular)] {
-            (0..3).for_each(|j| row[first + from + j] = block[(i, j)]);
-        }
-        row[first + 6] = by_scalar[i];
-    }
 }
 
 impl<W: LocalFunction<12, 6>> PairFunction<W> {
@@ -206,12 +149,6 @@ impl<W: LocalFunction<12, 6>> PairFunction<W> {
         both[STATE..].copy_from_slice(&field);
         S::local(&BothMove(self), both)
     }
-
-    #[inline]
-    fn linear(&self) -> Option<LinearWrench> {
-        let (value, by_state) = self.wrench.linearize([0.0; 12])?;
-        Some(LinearWrench { value, by_state })
-    }
 }
 
 /// A function of the state of the body with the samples.
@@ -224,11 +161,6 @@ impl<W: LocalFunction<12, 6>> LocalFunction<STATE, 6> for OneMoves<'_, W> {
     #[inline]
     fn evaluate<S: Scalar>(&self, x: [S; STATE]) -> [S; 6] {
         self.0.wrench(&x, None, |seen| self.0.wrench.evaluate(seen))
-    }
-
-    #[inline]
-    fn linearize(&self, _: [f64; STATE]) -> Option<([f64; 6], [[f64; STATE]; 6])> {
-        Some(self.0.linearized(&self.0.linear()?))
     }
 
     #[inline]
@@ -248,11 +180,6 @@ impl<W: LocalFunction<12, 6>> LocalFunction<TWO, 6> for BothMove<'_, W> {
     fn evaluate<S: Scalar>(&self, x: [S; TWO]) -> [S; 6] {
         let [samples, field] = halves(x);
         self.0.wrench(&samples, Some(&field), |seen| self.0.wrench.evaluate(seen))
-    }
-
-    #[inline]
-    fn linearize(&self, _: [f64; TWO]) -> Option<([f64; 6], [[f64; TWO]; 6])> {
-        Some(self.0.linearized(&self.0.linear()?))
     }
 
     #[inline]
