@@ -93,8 +93,12 @@ impl_real_field!([] Var {
         recomputed::recompute_each(functions)
     }
 
-    fn recorded(inputs: &[Self], outputs: &[f64], operation: impl CustomVjp) -> Vec<Self> {
-        record::custom(inputs, outputs, operation)
+    fn recorded(
+        inputs: &[Self],
+        outputs: &[f64],
+        operation: impl CustomVjp,
+    ) -> Option<Vec<Self>> {
+        Some(record::custom(inputs, outputs, operation))
     }
 
     fn solve(matrix: &Factored<f64>, b: &[Self]) -> Vec<Self> {

@@ -125,11 +125,14 @@ pub trait Scalar: RealField + Copy + Default {
         }
     }
 
-    /// `outputs` as results of `operation` on `inputs`, on a recording. Other scalars take no part in it: they are told nothing, and
-    /// get constants.
+    /// `outputs` as results of `operation` on `inputs`, on a recording; none of scalars that are not recorded themselves.
     #[doc(hidden)]
-    fn recorded(_inputs: &[Self], outputs: &[f64], _operation: impl CustomVjp) -> Vec<Self> {
-        outputs.iter().map(|&value| Self::constant(value)).collect()
+    fn recorded(
+        _inputs: &[Self],
+        _outputs: &[f64],
+        _operation: impl CustomVjp,
+    ) -> Option<Vec<Self>> {
+        None
     }
 
     /// A⁻¹ b for a matrix A of plain numbers, which has as many rows as `b`: in reverse mode one node for all.

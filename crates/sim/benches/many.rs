@@ -90,7 +90,7 @@ fn every_pair(grouped: &World) -> anyhow::Result<World> {
         let [balls, others] = group.bodies();
         for (&samples, &field) in balls.iter().flat_map(|a| others.iter().map(move |b| (a, b))) {
             // Of two balls the first touches the second.
-            if others.len() == 1 || samples < field {
+            if balls != others || samples < field {
                 let bodies = ContactBodies { samples, field };
                 let law = Arc::clone(group.contact.law());
                 world.add_contact(bodies, law, group.contact.smoothing)?;

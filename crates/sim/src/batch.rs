@@ -128,6 +128,9 @@ impl<I: Integrator + Send + 'static> Batch<I> {
     }
 }
 
+/// Steps of a body that one world records at once at most: some 10 kB each.
+const FEW: usize = 2000;
+
 /// A simulation as a function of the states' coordinates and of the world's parameters at `places`, to the states at its end.
 struct Run<I> {
     scene: Arc<Scene<I>>,
@@ -144,8 +147,11 @@ impl<I: Integrator + Send + 'static> Recompute for Run<I> {
         let (states, values) = x.split_at(STATE * self.states);
         let world = self.scene.world(&self.places, values)?;
         let states: Vec<State<S>> = states_of(states).collect();
-        // One step is recorded as it is, of many one at a time.
-        let end = match self.time_steps.steps > 1 && S::RECORDED {
+        // Few steps are recorded as they are, of many one at a time.
+        let TimeSteps { steps, .. } = self.time_steps;
+        let few = steps == 1
+            || steps.saturating_mul(states.len()) <= FEW && !self.scene.integrator.controls_error();
+        let end = match S::RECORDED && !few {
             true => {
                 let steps = StepCheckpointed::of(&self.scene);
                 world.simulate_with(&steps, &states, self.time_steps, |_, _| ())

@@ -5,6 +5,7 @@ use prehend_autodiff::Scalar;
 use prehend_autodiff::rigid::conjugated;
 use thiserror::Error;
 
+use crate::parameters::is_constant;
 use crate::state::State;
 
 /// Why a body cannot be simulated.
@@ -259,11 +260,6 @@ fn conjugate<S: Scalar>(
     }
     let r = rotation.to_rotation_matrix();
     r * (matrix * r.inverse_transform_vector(vector))
-}
-
-/// Whether a number carries no derivatives.
-pub(crate) fn is_constant<S: Scalar>(x: &S) -> bool {
-    x.plus(-x.value()).is_constant_zero()
 }
 
 #[cfg(test)]

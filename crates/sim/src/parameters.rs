@@ -14,6 +14,11 @@ use crate::world::body::Motion;
 /// Coordinates of a state.
 pub(crate) const STATE: usize = 13;
 
+/// Whether a number carries no derivatives.
+pub(crate) fn is_constant<S: Scalar>(x: &S) -> bool {
+    x.plus(-x.value()).is_constant_zero()
+}
+
 impl<S: Scalar> State<S> {
     /// Translation, rotation as a quaternion x, y, z, w, linear and angular velocity.
     pub(crate) fn coordinates(&self) -> [S; STATE] {

@@ -32,7 +32,7 @@ use crate::world::World;
 /// impacts multiplies errors as it does all else. For tighter ones set both tolerances: that of the states alone is not one of
 /// their derivatives.
 ///
-/// Parts end where samples touch or let go of a contact without smoothing. None is so long that a contact could be passed over: no
+/// Where samples touch or let go of a contact without smoothing, parts end just before, and a tiny one goes over it. None is so long that a contact could be passed over: no
 /// sample moves by more than its clearance and either a fifth of its body's size or a quarter of the thickness of what it touches
 /// ([`DistanceField::thickness`]), whichever is less; nor does one that moves by more than a fiftieth of its body's size touch in
 /// between, as the cubic of its gap tells. What is pressed past the middle of a

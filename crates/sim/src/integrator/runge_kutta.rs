@@ -4,10 +4,10 @@ pub(crate) mod classic;
 pub(super) mod dormand_prince;
 
 use nalgebra::{Matrix3, Vector3, Vector6};
-use prehend_autodiff::LocalFunction;
-use prehend_autodiff::Scalar;
+
 use prehend_autodiff::lie::cross_matrix;
 use prehend_autodiff::rigid::turned;
+use prehend_autodiff::{LocalFunction, Scalar};
 
 use crate::body::RigidBody;
 use crate::contact::wrench::stack;
@@ -148,7 +148,8 @@ impl<'a, S: Scalar> Stages<'a, S> {
             let acceleration = self.world.gravity + force * (S::one() / free.rigid.mass());
             self.slopes.push([state.linear, acceleration, turning, torque.into_owned()]);
         }
-        for rate in &wrenches[self.world.bodies.len()..] {
+        let deflections = self.moving - self.free.len();
+        for rate in wrenches[self.world.bodies.len()..].iter().take(deflections) {
             let (linear, angular) = (rate.fixed_rows::<3>(0), rate.fixed_rows::<3>(3));
             let none = Vector3::zeros();
             self.slopes.push([linear.into_owned(), angular.into_owned(), none, none]);

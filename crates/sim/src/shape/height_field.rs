@@ -6,7 +6,8 @@ use prehend_geometry::{DistanceField, FieldSample};
 
 /// Newton steps at most: three or four do near the ground.
 const STEPS: usize = 12;
-/// Part of the distance between heights within which the ground is its quadratic to rounding.
+/// Part of the distance between heights within which heights and slopes of the ground are those of its quadratic to rounding, and
+/// curvatures change by as little.
 const SHORT: f64 = 1e-8;
 
 /// Everything below y = h(x, z), where h is a C² spline through the heights.

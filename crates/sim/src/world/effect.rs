@@ -10,11 +10,11 @@ use super::contact_pair::ContactPair;
 use super::linear_contacts::LinearContacts;
 use super::pair_function::Relation;
 use super::seen::Seen;
-use crate::body::is_constant;
 use crate::contact::bristles::{BristleFunction, Bristles};
 use crate::contact::dimensions::{LANES, Lane, VariableShapes};
 use crate::contact::patch::Patch;
 use crate::contact::wrench::{LinearWrench, WrenchFunction, WrenchJacobian, stack};
+use crate::parameters::is_constant;
 use crate::shape::lifted::LiftedField;
 use crate::state::State;
 
@@ -52,7 +52,7 @@ impl<S: Scalar> World<S> {
         let mut linear = S::RECORDED.then(|| LinearContacts::new(self.bodies.len()));
         for pair in &self.contacts {
             let bristles = pair.law().bristles();
-            if let Some(linear) = linear.as_mut().filter(|_| bristles.is_none()) {
+            if let (None, Some(linear)) = (&bristles, &mut linear) {
                 linear.add(self, pair, states, step, &mut wrenches);
                 continue;
             }

@@ -6,10 +6,9 @@ use prehend_autodiff::{CustomVjp, Scalar};
 use super::World;
 use super::body_id::BodyId;
 use super::contact_pair::ContactPair;
-use crate::body::is_constant;
 use crate::contact::patch::Patch;
 use crate::contact::wrench::{WrenchJacobian, stack};
-use crate::parameters::STATE;
+use crate::parameters::{STATE, is_constant};
 use crate::state::State;
 
 /// The contacts of a world at one moment as a linear function of its states: one node of the tape, however many they are.
@@ -39,7 +38,7 @@ struct LinearContact {
     torque: Vector3<f64>,
     /// Derivatives of both along the axes of the field, by the tangent of the state that the field sees.
     by_state: [[f64; 12]; 6],
-    /// Factor on those derivatives.
+    /// Factor on those derivatives, which force and torque have already.
     weight: f64,
 }
 
@@ -117,7 +116,8 @@ impl LinearContacts {
         }
         let node = Node { contacts: self.contacts, states: own };
         const { assert!(S::ORDER <= 1, "contacts have first derivatives only: no nested scalars") };
-        let recorded = S::recorded(&inputs, &outputs, node);
+        let recorded = S::recorded(&inputs, &outputs, node)
+            .unwrap_or_else(|| outputs.iter().map(|&x| S::constant(x)).collect());
         let recorded = recorded.chunks_exact(6).map(Vector6::from_column_slice);
         for ((touching, shifted), wrench) in self.bodies.iter().zip(&shifted).zip(recorded) {
             let sum = &mut wrenches[touching.body.index()];
@@ -144,6 +144,11 @@ impl CustomVjp for Node {
                 let from = 6 * contact.ends[end];
                 [0, 3].map(|i| Vector3::from_column_slice(&output_adjoints[from + i..][..3]))
             };
+            // An adjoint of 0 meets no slope, which may be infinite.
+            let unused = |end: &usize| output_adjoints[6 * end..][..6].iter().all(|x| *x == 0.0);
+            if contact.ends.iter().all(unused) {
+                continue;
+            }
             let [samples, field] = contact.ends.map(|end| &self.states[end]);
             let adjoints = contact.vjp([&samples.0, &field.0], of(0), of(1));
             for ((state, first), adjoint) in [samples, field].into_iter().zip(&adjoints) {

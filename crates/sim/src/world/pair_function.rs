@@ -3,11 +3,9 @@
 use nalgebra::{Matrix3, Vector3};
 use prehend_autodiff::{Fwd, LocalFunction, Scalar};
 
-use crate::body::is_constant;
+use crate::parameters::{STATE, is_constant};
 use crate::state::State;
 
-/// Numbers of a state, in the order of [`coordinates`].
-const STATE: usize = 13;
 /// Numbers of two states.
 const TWO: usize = 2 * STATE;
 
@@ -42,17 +40,6 @@ impl Relation {
 pub(super) struct PairFunction<W> {
     wrench: W,
     at: Relation,
-}
-
-/// Position, the coordinates of the quaternion, linear and angular velocity.
-#[inline]
-fn coordinates<S: Scalar>(state: &State<S>) -> [S; STATE] {
-    let mut x = [S::zero(); STATE];
-    x[..3].copy_from_slice(state.pose.translation.vector.as_slice());
-    x[3..7].copy_from_slice(state.pose.rotation.coords.as_slice());
-    x[7..10].copy_from_slice(state.linear.as_slice());
-    x[10..].copy_from_slice(state.angular.as_slice());
-    x
 }
 
 /// How a state changes.
@@ -140,7 +127,7 @@ impl<W: LocalFunction<12, 6>> PairFunction<W> {
     /// Of the states of both bodies, where that with the field may be one that does not move.
     #[inline]
     pub(super) fn of<S: Scalar>(&self, samples: &State<S>, field: &State<S>) -> [S; 6] {
-        let (samples, field) = (coordinates(samples), coordinates(field));
+        let (samples, field) = (samples.coordinates(), field.coordinates());
         if field.iter().all(is_constant) {
             return S::local(&OneMoves(self), samples);
         }

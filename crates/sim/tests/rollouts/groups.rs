@@ -221,3 +221,20 @@ fn bodies_that_cannot_touch_are_refused() {
     world.add_contacts_between(&pebbles, &[wall], law, GapSmoothing::Hard).unwrap();
     assert_eq!((world.contacts.len(), world.contact_groups.len()), (2, 1));
 }
+
+#[test]
+fn what_is_too_fast_to_look_for_is_an_error() {
+    for speed in [1e12, 1e200] {
+        let (world, states) =
+            balls(&[[0.0, 0.0, 1.0]], &[[speed, 0.0, 0.0]], |world, floor, ids| {
+                let law = Arc::new(penalty(2e6, 1e3, 0.4, 2e-2));
+                world.add_contacts_between(ids, &[floor], law, GapSmoothing::Hard).unwrap();
+            });
+        let few = Adaptive { max_parts: 1000, ..Adaptive::default() };
+        let once = TimeSteps { dt: 1.0, steps: 1 };
+        let error = world.rollout_with(&few, &states, once).unwrap_err();
+        let told =
+            matches!(error, SimulationError::TooManyParts { .. } | SimulationError::Stalled { .. });
+        assert!(told, "{error}");
+    }
+}

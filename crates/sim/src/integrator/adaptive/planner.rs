@@ -26,8 +26,10 @@ const LENGTH_CHANGE: [f64; 2] = [0.2, 5.0];
 const TOUCH_ATTEMPTS: usize = 3;
 /// Power of the length by which the error of a part falls at least where there is no kink in it.
 const SMOOTH: i32 = 2;
+/// Error below which that of a part says nothing of how errors grow.
+const SMALL: f64 = 1e-2;
 /// Shortest part, of the whole step or of the time that it starts at.
-const SHORTEST: f64 = 1e-13;
+pub(super) const SHORTEST: f64 = 1e-13;
 
 /// A place where derivatives jump, such as the onset of a contact: the error of a part that it lies in falls with its length,
 /// not with the fifth power.
@@ -45,8 +47,8 @@ struct Kink {
 impl Kink {
     /// The next part to try at `time` \[s\]: up to a little before it and then over it, or half of where it may be.
     fn next(&self, time: f64) -> f64 {
-        let before = self.at.map_or(0.5 * (self.end - time), |at| at - time - 0.5 * self.tolerated);
-        before.max(self.tolerated)
+        let next = self.at.map_or(0.5 * (self.end - time), |at| at - time - 0.5 * self.tolerated);
+        next.max(self.tolerated)
     }
 }
 
@@ -66,8 +68,8 @@ pub(super) struct Planner {
     /// Length of the next part \[s\].
     dt: f64,
     kink: Option<Kink>,
-    /// Length \[s\] and error of the part before.
-    before: Option<(f64, f64)>,
+    /// Length \[s\] and error of the last part.
+    previous: Option<(f64, f64)>,
 }
 
 impl Planner {
@@ -98,7 +100,7 @@ impl Planner {
             time: whole.start,
             dt,
             kink: None,
-            before: None,
+            previous: None,
         }
     }
 
@@ -128,8 +130,9 @@ impl Planner {
             return Ok(None);
         }
         let values: Vec<State> = self.states.iter().map(State::value).collect();
-        let before_kink = self.kink.as_ref().map_or(f64::INFINITY, |kink| kink.next(self.time));
-        let dt = self.dt.min(left).min(before_kink);
+        let wanted = self.dt;
+        let to_kink = self.kink.as_ref().map_or(f64::INFINITY, |kink| kink.next(self.time));
+        let dt = wanted.min(left).min(to_kink);
         self.dt = self.travel.longest(&self.plain, &values, self.time, dt);
         let (mut failed, mut touches) = (None, TOUCH_ATTEMPTS);
         loop {
@@ -150,9 +153,9 @@ impl Planner {
                 if error.is_nan() { LENGTH_CHANGE[0] } else { SAFETY * error.powf(EXPONENT) };
             // Where errors have grown from part to part, they go on to (K. Gustafsson, "Control-theoretic techniques for stepsize selection in
             // implicit Runge–Kutta methods", ACM Trans. Math. Softw. 20, 1994).
-            let change = match self.before {
-                Some((length, before)) if error <= 1.0 => {
-                    change.min(change * dt / length * (before / error).powf(-EXPONENT))
+            let change = match self.previous {
+                Some((length, previous)) if error <= 1.0 => {
+                    change.min(change * dt / length * (previous / error).powf(-EXPONENT))
                 }
                 _ => change,
             };
@@ -170,8 +173,13 @@ impl Planner {
                 let end = self.time + dt;
                 let passed =
                     |kink: &mut Kink| kink.end <= end || kink.at.is_some_and(|at| at <= end);
-                self.dt = self.kink.take_if(passed).map_or(chosen, |kink| kink.resume);
-                self.before = Some((dt, error));
+                self.dt = match self.kink.take_if(passed) {
+                    Some(kink) => kink.resume,
+                    // What was cut short by the end alone says nothing of the next step.
+                    None if dt == left && failed.is_none() => chosen.max(wanted),
+                    None => chosen,
+                };
+                self.previous = Some((dt, error.max(SMALL)));
                 self.time = if dt == left { self.whole.end() } else { end };
                 self.states = trial.stages.pop().unwrap_or_default();
                 self.wrenches = trial.wrenches;
@@ -189,7 +197,7 @@ impl Planner {
                 .flatten();
             touches -= usize::from(touch.is_some());
             let smooth = |(longer, worse): (f64, f64)| error < worse * (dt / longer).powi(SMOOTH);
-            let kinked = touch.is_some() || failed.is_some_and(|before| !smooth(before));
+            let kinked = touch.is_some() || failed.is_some_and(|longer| !smooth(longer));
             self.dt = match kinked && error.is_finite() {
                 true => {
                     let resume = self.kink.as_ref().map_or(0.5 * dt, |kink| kink.resume);
@@ -199,7 +207,7 @@ impl Planner {
                 }
                 false => chosen,
             };
-            failed = Some((dt, error));
+            failed = error.is_finite().then_some((dt, error));
         }
     }
 }

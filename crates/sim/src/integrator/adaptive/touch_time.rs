@@ -32,10 +32,10 @@ fn first_of(
     earliest: f64,
 ) -> Option<f64> {
     let reach = pair.law().reach();
-    let course = Course::new(world, pair, ends, dt)?;
+    let passage = Passage::new(world, pair, ends, dt)?;
     let mut first = None;
-    course.for_each_near(reach, |point, _| {
-        let [Some(from), Some(to)] = course.gaps(point, reach) else { return };
+    passage.for_each_near(reach, |point, _| {
+        let [Some(from), Some(to)] = passage.gaps(point, reach) else { return };
         let time = crossing(from, to, dt).filter(|time| *time > earliest);
         first = [first, time].into_iter().flatten().min_by(f64::total_cmp);
     });
@@ -51,21 +51,21 @@ pub(super) fn dips(
     depth: f64,
 ) -> bool {
     let reach = pair.law().reach() + pair.smoothing.force_band();
-    let Some(course) = Course::new(world, pair, ends, dt) else { return false };
+    let Some(passage) = Passage::new(world, pair, ends, dt) else { return false };
     let mut dips = false;
-    course.for_each_near(reach, |point, distance| {
+    passage.for_each_near(reach, |point, distance| {
         // Most of those that are asked about touch.
         if dips || distance - point.radius <= reach {
             return;
         }
-        let [Some(from), Some(to)] = course.gaps(point, reach) else { return };
+        let [Some(from), Some(to)] = passage.gaps(point, reach) else { return };
         dips = from[0] > 0.0 && to[0] > 0.0 && least(from, to, dt) < -depth;
     });
     dips
 }
 
 /// Samples beside a field at both ends of a step.
-struct Course<'a> {
+struct Passage<'a> {
     /// At the start.
     patch: Patch<'a>,
     ends: [State; 2],
@@ -73,7 +73,7 @@ struct Course<'a> {
     travel: f64,
 }
 
-impl<'a> Course<'a> {
+impl<'a> Passage<'a> {
     /// Of `pair` in a step of `dt` \[s\].
     fn new(world: &'a World, pair: &'a ContactPair, ends: [&[State]; 2], dt: f64) -> Option<Self> {
         let ends = ends.map(|states| world.seen_value(pair, states));

@@ -6,10 +6,10 @@ use prehend_autodiff::Scalar;
 use rayon::prelude::*;
 
 use super::Adaptive;
-use super::course::Course;
+use super::course::{Course, Parts};
 use super::error_norm::ErrorNorm;
 use super::islands::{Island, Links};
-use super::planner::Probe;
+use super::planner::{Probe, SHORTEST};
 use super::probe;
 use crate::adjoint::{OneStep, Scene, with_moved};
 use crate::error::SimulationError;
@@ -46,10 +46,19 @@ pub(super) fn step<S: Scalar>(
     let mut probes = probe::seeded(&values, &ErrorNorm::new(settings, &plain, &values));
     let mut next_parts = vec![None; world.bodies.len()];
     let mut window = whole;
-    loop {
+    for windows in 0.. {
         let left = whole.end() - window.start;
         let length = length(&search, &probes);
         window.dt = if length < left { length } else { left };
+        let values = || probes.iter().map(State::value).collect::<Vec<_>>();
+        if window.dt <= SHORTEST * whole.dt.max(window.start.abs()) && window.dt < left {
+            return Err(plain.stalled(&values(), window.start, window.dt));
+        }
+        if windows > settings.max_parts {
+            let (max_parts, time) = (settings.max_parts, window.start);
+            let (body, contact) = plain.most_accelerated(&values());
+            return Err(SimulationError::TooManyParts { body, contact, max_parts, time });
+        }
         let Window { neighbors, islands } =
             Window::find(settings, &search, &probes, window, &next_parts)?;
         let after = match S::ORDER {
@@ -67,13 +76,14 @@ pub(super) fn step<S: Scalar>(
             island.bodies.iter().for_each(|id| next_parts[id.index()] = Some(course.next_part));
         }
         if window.dt == left {
-            return Ok(states);
+            break;
         }
         let start = window.end();
         driving.drive(&mut probes, start);
         world.drive(&mut states, start);
         window = Step { index: window.index.max(1), start, dt: left - window.dt };
     }
+    Ok(states)
 }
 
 /// The states of each island after its course, with derivatives; `contacts` are those that they were found by.
@@ -87,23 +97,25 @@ fn followed<S: Scalar>(
     islands: &[(Island, Course)],
     window: Step,
 ) -> Result<Vec<Vec<State<S>>>, SimulationError> {
-    let own = islands
-        .iter()
-        .map(|(island, course)| (island.world(world, contacts), island.states(states), course));
-    // Of a single window the caller knows better what to keep; trajectories with derivatives are no numbers that a node could keep.
-    let whole = world.contact_groups.is_empty() || world.check_trajectories().is_err();
-    if whole || !S::RECORDED {
-        return Ok(own
-            .map(|(own, states, course)| course.parts.follow(&own, &states, window))
-            .collect());
+    let island = |(island, course): &(Island, Course)| {
+        (island.world(world, contacts), island.states(states), course.parts.clone())
+    };
+    let worlds: Vec<_> = islands.iter().map(island).collect();
+    let follow =
+        |(own, states, parts): &(World<S>, Vec<State<S>>, Parts)| parts.follow(own, states, window);
+    if !S::RECORDED {
+        return Ok(worlds.par_iter().map(follow).collect());
     }
-    let own: Vec<_> = own.collect();
-    let node = |(own, states, course): &(World<S>, Vec<State<S>>, &Course)| {
-        let scene = Scene::new(course.parts.clone(), own)?;
+    // Of a single window the caller knows better what to keep; trajectories with derivatives are no numbers that a node could keep.
+    if world.contact_groups.is_empty() || world.check_trajectories().is_err() {
+        return Ok(worlds.iter().map(follow).collect());
+    }
+    let node = |(own, states, parts): &(World<S>, Vec<State<S>>, Parts)| {
+        let scene = Scene::new(parts.clone(), own)?;
         Ok(OneStep::new(&scene, own, states, window))
     };
-    let nodes = own.iter().map(node).collect::<Result<Vec<_>, SimulationError>>()?;
-    let after = own.iter().zip(S::recompute_each(nodes));
+    let nodes = worlds.iter().map(node).collect::<Result<Vec<_>, SimulationError>>()?;
+    let after = worlds.iter().zip(S::recompute_each(nodes));
     after.map(|((own, states, _), moved)| Ok(with_moved(own, states, &moved?))).collect()
 }
 
