@@ -123,11 +123,8 @@ impl<S: Scalar> World<S> {
             [0, 1].map(|end| shifted[end].as_ref().map_or(&states[ends[end]], |(state, _)| state));
         let at = Relation { samples: samples.value(), field: field.value(), weight: pair.weight };
         let (all, slopes) = if pair.params().iter().all(is_constant) {
-            let mut slopes = [S::zero(); 12];
-            self.add_slopes_by_dimensions(pair, patch, &Vector6::zeros(), &mut slopes);
             let function = at.function(WrenchFunction { law, p: &values, patch });
-            let any = !slopes.iter().all(|x| x.is_constant_zero());
-            (function.of(samples, field), any.then_some(slopes))
+            (function.of(samples, field), self.slopes(pair, patch, &[]))
         } else {
             let (WrenchJacobian { wrench, by_state, .. }, slopes) = self.linearized(pair, patch);
             let function = at.function(LinearWrench { value: wrench.into(), by_state });
@@ -239,17 +236,27 @@ impl<S: Scalar> World<S> {
         let values: Vec<f64> = pair.params().iter().map(|p| p.value()).collect();
         let vary = !pair.params().iter().all(is_constant);
         let jacobian = pair.law().wrench_jacobian(&values, patch, vary);
+        let slopes = self.slopes(pair, patch, &jacobian.by_params);
+        (jacobian, slopes)
+    }
+
+    /// What the wrench of `pair`, which has these derivatives by its parameters, changes with those and with dimensions, if any vary.
+    fn slopes(
+        &self,
+        pair: &ContactPair<S>,
+        patch: &Patch<'_>,
+        by_params: &[Vector6<f64>],
+    ) -> Option<[S; 12]> {
         let mut slopes = [S::zero(); 12];
-        if vary {
-            for (by_param, moved) in jacobian.by_params.iter().zip(changes(pair.params())) {
-                for (component, slope) in slopes.iter_mut().zip(by_param.iter()) {
-                    *component += moved.times(*slope);
-                }
+        for (by_param, p) in by_params.iter().zip(pair.params()) {
+            let moved = p.plus(-p.value());
+            for (component, slope) in slopes.iter_mut().zip(by_param.iter()) {
+                *component += moved.times(*slope);
             }
         }
         self.add_slopes_by_dimensions(pair, patch, &Vector6::zeros(), &mut slopes);
         let any = !slopes.iter().all(|x| x.is_constant_zero());
-        (jacobian, any.then_some(slopes))
+        any.then_some(slopes)
     }
 
     /// The samples of `pair` beside its field, which sees their body in `state`, if there are both.
