@@ -34,6 +34,17 @@ impl<S: Scalar> World<S> {
         SimulationError::Stalled { body, contact, time, dt }
     }
 
+    /// The error of more than `max_parts` parts from `states` at `time` \[s\].
+    pub(crate) fn too_many_parts(
+        &self,
+        states: &[State<S>],
+        time: f64,
+        max_parts: usize,
+    ) -> SimulationError {
+        let (body, contact) = self.most_accelerated(states);
+        SimulationError::TooManyParts { body, contact, max_parts, time }
+    }
+
     /// The name of the free body that contacts accelerate most, and of what presses hardest on it.
     pub(crate) fn most_accelerated(&self, states: &[State<S>]) -> (String, Option<String>) {
         let acceleration = |body: &BodyId| {

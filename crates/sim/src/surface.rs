@@ -224,15 +224,8 @@ impl Surface {
         self.points.iter().map(|p| p.radius).fold(self.rounding, f64::min)
     }
 
-    /// The samples that `keep` wants, as one block that is never left out. What is not kept stays part of the area.
-    pub(crate) fn only(
-        &self,
-        keep: impl Fn(&SurfacePoint) -> bool,
-        block: impl Fn(&Block) -> bool,
-    ) -> Self {
-        let blocks = self.blocks().filter(|(b, _)| block(b));
-        let points: Vec<SurfacePoint> =
-            blocks.flat_map(|(_, points)| points.iter().filter(|p| keep(p)).copied()).collect();
+    /// Some of its samples, as one block that is never left out. The others stay part of the area.
+    pub(crate) fn only(&self, points: Vec<SurfacePoint>) -> Self {
         let all =
             Block { start: 0, end: points.len(), center: Point3::origin(), radius: f64::INFINITY };
         Self { blocks: vec![all], points, area: self.area, rounding: self.rounding }

@@ -43,7 +43,8 @@ fn hand(p: &Point3<f64>) -> f64 {
 }
 
 impl DistanceField for LinearGrid {
-    #[inline]
+    // The figures shall not hang on what the compiler chooses here.
+    #[inline(always)]
     fn sample(&self, point: &Point3<f64>, reach: f64) -> Option<FieldSample> {
         // A clamp that must keep NaN takes a quarter longer.
         #[allow(clippy::manual_clamp)]

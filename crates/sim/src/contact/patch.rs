@@ -76,38 +76,23 @@ impl Patch<'_> {
 
     /// The samples that may touch, for a law that reaches to `cutoff`, before one of them has moved by `margin` \[m\].
     pub(crate) fn near(&self, cutoff: f64, margin: f64) -> Surface {
-        let reach = self.reach(cutoff) + self.field.lipschitz_bound() * margin;
-        let near = |point: &SurfacePoint| self.distance_within(&point.position, reach);
-        self.surface.only(near, |block| self.may_touch(block, reach))
+        self.surface.only(self.each_near(cutoff, margin).map(|(point, _)| *point).collect())
     }
 
-    /// Calls `visit` with the samples of [`Patch::near`] and the distances of their centers \[m\].
-    pub(crate) fn for_each_near(
+    /// Those samples, each with the distance of its center \[m\].
+    pub(crate) fn each_near(
         &self,
         cutoff: f64,
         margin: f64,
-        mut visit: impl FnMut(&SurfacePoint, f64),
-    ) {
+    ) -> impl Iterator<Item = (&SurfacePoint, f64)> {
         let reach = self.reach(cutoff) + self.field.lipschitz_bound() * margin;
-        for (block, points) in self.surface.blocks() {
-            // One is asked for itself.
-            if points.len() > 1 && !self.may_touch(block, reach) {
-                continue;
-            }
-            for point in points {
-                if let Some(distance) = self.field.distance(&self.place(&point.position), reach) {
-                    visit(point, distance);
-                }
-            }
-        }
-    }
-
-    /// Whether a sample may touch before one of them has moved by `margin` \[m\], for a law that reaches to `cutoff`.
-    pub(crate) fn is_near(&self, cutoff: f64, margin: f64) -> bool {
-        let reach = self.reach(cutoff) + self.field.lipschitz_bound() * margin;
-        self.surface.blocks().any(|(block, points)| {
-            let near = |point: &SurfacePoint| self.distance_within(&point.position, reach);
-            (points.len() == 1 || self.may_touch(block, reach)) && points.iter().any(near)
+        // One is asked for itself.
+        let blocks = self
+            .surface
+            .blocks()
+            .filter(move |(block, points)| points.len() == 1 || self.may_touch(block, reach));
+        blocks.flat_map(|(_, points)| points).filter_map(move |point| {
+            Some((point, self.field.distance(&self.place(&point.position), reach)?))
         })
     }
 

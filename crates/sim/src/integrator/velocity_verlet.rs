@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Vector6};
 use prehend_autodiff::Scalar;
-use prehend_autodiff::lie::so3_exp;
+use prehend_autodiff::rigid::turned;
 
 use super::Integrator;
 use crate::body::RigidBody;
@@ -79,16 +79,14 @@ fn drifted<S: Scalar>(
     let half = dt.times(0.5);
     let mid = kicked(body, world, state, state.pose, wrench, half);
     let rotation = &state.pose.rotation;
-    let momentum = body.world_inertia(rotation) * mid.angular;
+    let momentum = body.momentum(rotation, &mid.angular);
     let mut angular = mid.angular;
     for _ in 0..SUBSTITUTIONS {
-        let halfway = so3_exp(&(angular * half)) * rotation;
-        angular = body.inverse_world_inertia(&halfway) * momentum;
+        angular = body.angular(&turned(rotation, &(angular * half)), &momentum);
     }
     let mut pose = state.pose;
     pose.translation.vector += mid.linear * dt;
-    pose.rotation = so3_exp(&(angular * dt)) * rotation;
-    pose.rotation.renormalize_fast();
+    pose.rotation = turned(rotation, &(angular * dt));
     pose
 }
 
@@ -103,5 +101,5 @@ fn kicked<S: Scalar>(
     dt: S,
 ) -> State<S> {
     let (linear, momentum) = body.kicked(state, wrench, &world.gravity, dt);
-    State { pose, linear, angular: body.inverse_world_inertia(&pose.rotation) * momentum }
+    State { pose, linear, angular: body.angular(&pose.rotation, &momentum) }
 }

@@ -19,6 +19,9 @@ pub(crate) struct Scene {
     pub(crate) name: &'static str,
     pub(crate) world: World,
     pub(crate) start: Vec<State>,
+    /// What the bodies look like.
+    #[allow(dead_code)] // the example mesh_contacts draws them
+    pub(crate) meshes: [TriMesh; 2],
     /// The body that is started.
     pub(crate) moving: BodyId,
     /// A dimension of its shape, if it has any.
@@ -67,7 +70,7 @@ fn law(
 /// A fixed mesh, and a shape of a density \[kg/m³\] that moves.
 struct Pair {
     fixed: (TriMesh, Lengths, Isometry3<f64>),
-    moving: (Shape, Isometry3<f64>),
+    moving: (TriMesh, Shape, Isometry3<f64>),
     dimension: Option<&'static str>,
     density: f64,
     /// Area of a contact \[m²\], how deep it is \[m\], and friction coefficient.
@@ -82,7 +85,8 @@ impl Pair {
         let (mesh, lengths, pose) = self.fixed;
         let other = world.add(Body::fixed_from_shape("fixed", &shape(&mesh, lengths)?));
         let mut start = vec![State::at_rest(pose)];
-        let (shape, pose) = self.moving;
+        let (moving_mesh, shape, pose) = self.moving;
+        let meshes = [mesh, moving_mesh];
         let body = Body::from_shape("moving", &shape, self.density)?;
         let rigid = *body.rigid().ok_or_else(|| anyhow::anyhow!("no mass"))?;
         start.push(rigid.at_rest(&pose));
@@ -92,7 +96,8 @@ impl Pair {
         let smoothing = GapSmoothing::Softplus { width: 0.05 * depth };
         world.add_symmetric_contact(moving, other, law, smoothing)?;
         let mark = self.mark - rigid.com();
-        Ok(Scene { name, world, start, moving, dimension: self.dimension, time: self.time, mark })
+        let Self { dimension, time, .. } = self;
+        Ok(Scene { name, world, start, meshes, moving, dimension, time, mark })
     }
 }
 
@@ -109,6 +114,7 @@ pub(crate) fn mug_on_hook() -> anyhow::Result<Scene> {
     Pair {
         fixed: (hook(), Lengths { spacing: 1.5e-3, cell: 1e-3 }, Isometry3::identity()),
         moving: (
+            mug.mesh(),
             shape(&mug.mesh(), Lengths { spacing: 2e-3, cell: 1.5e-3 })?,
             Isometry3::from_parts(Translation3::from(place.coords), rotation),
         ),
@@ -132,6 +138,7 @@ pub(crate) fn crossed_bars() -> anyhow::Result<Scene> {
     Pair {
         fixed: (cuboid(half), lengths, Isometry3::from_parts(Translation3::identity(), edge_up)),
         moving: (
+            cuboid(half),
             Shape::from_parry_with(
                 &Cuboid::new(Vector::new(half.x, half.y, half.z)),
                 &lengths.options(),
@@ -151,13 +158,11 @@ pub(crate) fn crossed_bars() -> anyhow::Result<Scene> {
 pub(crate) fn nut_on_bolt() -> anyhow::Result<Scene> {
     let thread = Thread { radius: 6e-3, amplitude: 6e-4, pitch: 3e-3, columns: 24, rows: 8 };
     let wide = Thread { radius: thread.radius + 3.5e-4, ..thread };
+    let nut = nut(&wide, [-3e-3, 3e-3], 0.022);
     let lengths = Lengths { spacing: 1e-3, cell: 4e-4 };
     Pair {
         fixed: (bolt(&thread, [-0.012, 0.012]), lengths, Isometry3::identity()),
-        moving: (
-            shape(&nut(&wide, [-3e-3, 3e-3], 0.022), lengths)?,
-            Isometry3::translation(2e-5, -1e-5, -1e-4),
-        ),
+        moving: (nut.clone(), shape(&nut, lengths)?, Isometry3::translation(2e-5, -1e-5, -1e-4)),
         dimension: None,
         density: 7800.0,
         contact: [5e-5, 2e-5, 0.05],
@@ -180,7 +185,7 @@ pub(crate) fn scans(fixed: &TriMesh, moving: &TriMesh) -> anyhow::Result<Scene> 
     place.z = top(fixed) - low(moving) + 1e-3;
     Pair {
         fixed: (fixed.clone(), lengths, Isometry3::identity()),
-        moving: (shape(moving, lengths)?, Isometry3::from(place)),
+        moving: (moving.clone(), shape(moving, lengths)?, Isometry3::from(place)),
         dimension: None,
         density: 500.0,
         contact: [2e-5, 2e-4, 0.3],

@@ -163,9 +163,8 @@ impl Planner {
             if error <= 1.0 || (chosen <= shortest && self.norm.only_kinks(&errors)) {
                 self.parts += 1;
                 if self.parts > self.settings.max_parts {
-                    let (max_parts, time) = (self.settings.max_parts, self.time);
-                    let (body, contact) = self.plain.most_accelerated(&values);
-                    return Err(SimulationError::TooManyParts { body, contact, max_parts, time });
+                    let max_parts = self.settings.max_parts;
+                    return Err(self.plain.too_many_parts(&values, self.time, max_parts));
                 }
                 if let Some(pair) = self.travel.crossed(&self.plain, &self.states, trial.end()) {
                     return Err(self.plain.passed_through(pair, self.time));

@@ -33,13 +33,11 @@ fn first_of(
 ) -> Option<f64> {
     let reach = pair.law().reach();
     let passage = Passage::new(world, pair, ends, dt)?;
-    let mut first = None;
-    passage.for_each_near(reach, |point, _| {
-        let [Some(from), Some(to)] = passage.gaps(point, reach) else { return };
-        let time = crossing(from, to, dt).filter(|time| *time > earliest);
-        first = [first, time].into_iter().flatten().min_by(f64::total_cmp);
+    let times = passage.each_near(reach).filter_map(|(point, _)| {
+        let [from, to] = passage.gaps(point, reach);
+        crossing(from?, to?, dt).filter(|time| *time > earliest)
     });
-    first
+    times.min_by(f64::total_cmp)
 }
 
 /// Whether a sample of `pair` is in reach of its law by more than `depth` \[m\] within a step of `dt` \[s\], but at neither end of it.
@@ -52,16 +50,14 @@ pub(super) fn dips(
 ) -> bool {
     let reach = pair.law().reach() + pair.smoothing.force_band();
     let Some(passage) = Passage::new(world, pair, ends, dt) else { return false };
-    let mut dips = false;
-    passage.for_each_near(reach, |point, distance| {
+    passage.each_near(reach).any(|(point, distance)| {
         // Most of those that are asked about touch.
-        if dips || distance - point.radius <= reach {
-            return;
+        if distance - point.radius <= reach {
+            return false;
         }
-        let [Some(from), Some(to)] = passage.gaps(point, reach) else { return };
-        dips = from[0] > 0.0 && to[0] > 0.0 && least(from, to, dt) < -depth;
-    });
-    dips
+        let [Some(from), Some(to)] = passage.gaps(point, reach) else { return false };
+        from[0] > 0.0 && to[0] > 0.0 && least(from, to, dt) < -depth
+    })
 }
 
 /// Samples beside a field at both ends of a step.
@@ -83,9 +79,9 @@ impl<'a> Passage<'a> {
         Some(Self { patch, ends, travel })
     }
 
-    /// Calls `visit` with the samples that may come within `reach` \[m\], and their centers' distances at the start \[m\].
-    fn for_each_near(&self, reach: f64, visit: impl FnMut(&SurfacePoint, f64)) {
-        self.patch.for_each_near(reach, self.travel, visit);
+    /// The samples that may come within `reach` \[m\], each with its center's distance at the start \[m\].
+    fn each_near(&self, reach: f64) -> impl Iterator<Item = (&SurfacePoint, f64)> {
+        self.patch.each_near(reach, self.travel)
     }
 
     /// The gaps of a sample beyond `reach` \[m\] and their rates \[m/s\], at both ends.

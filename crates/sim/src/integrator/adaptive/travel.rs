@@ -146,7 +146,7 @@ impl Travel {
 impl Limit {
     /// Whether samples of `pair`, whose field sees their body in `state`, may touch if they move by `travel` \[m\].
     fn is_near(&self, world: &World, pair: &ContactPair, state: State, travel: f64) -> bool {
-        let near = |patch: Patch<'_>| patch.is_near(pair.law().reach(), travel);
+        let near = |patch: Patch<'_>| patch.each_near(pair.law().reach(), travel).next().is_some();
         world.patch(pair, state).is_some_and(near)
     }
 

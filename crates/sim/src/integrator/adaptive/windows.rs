@@ -55,9 +55,7 @@ pub(super) fn step<S: Scalar>(
             return Err(plain.stalled(&values(), window.start, window.dt));
         }
         if windows > settings.max_parts {
-            let (max_parts, time) = (settings.max_parts, window.start);
-            let (body, contact) = plain.most_accelerated(&values());
-            return Err(SimulationError::TooManyParts { body, contact, max_parts, time });
+            return Err(plain.too_many_parts(&values(), window.start, settings.max_parts));
         }
         let Window { neighbors, islands } =
             Window::find(settings, &search, &probes, window, &next_parts)?;

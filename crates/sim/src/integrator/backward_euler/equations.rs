@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::{DVector, Matrix6, Vector3, Vector6};
 use prehend_autodiff::implicit::{Equations, ImplicitError, newton_on};
-use prehend_autodiff::lie::so3_exp;
+use prehend_autodiff::rigid::turned;
 use prehend_autodiff::solve::{Factored, SolveError, sparse_lu};
 use prehend_autodiff::{Fwd, Scalar};
 
@@ -33,8 +33,8 @@ pub(super) fn excess<S: Scalar>(
 ) -> [S; 6] {
     let [vx, vy, vz, wx, wy, wz] = *velocity;
     let (linear, momentum) = body.kicked(state, wrench, &world.gravity, S::constant(dt));
-    let turned = so3_exp(&Vector3::new(wx, wy, wz).map(|w| w.times(dt))) * state.pose.rotation;
-    let angular = body.inverse_world_inertia(&turned) * momentum;
+    let rotation = turned(&state.pose.rotation, &Vector3::new(wx, wy, wz).map(|w| w.times(dt)));
+    let angular = body.angular(&rotation, &momentum);
     let expected = [linear.x, linear.y, linear.z, angular.x, angular.y, angular.z];
     let velocity = [vx, vy, vz, wx, wy, wz];
     std::array::from_fn(|i| velocity[i] - expected[i])
@@ -181,8 +181,9 @@ impl Equations for ImplicitStep<'_> {
             let rigid = self.world.bodies[body].rigid()?;
             let at = Vector6::from(velocity_at(velocities, slot));
             let (linear, angular) = (at.fixed_rows::<3>(0), at.fixed_rows::<3>(3));
-            let inertia = rigid.world_inertia(&self.states[body].pose.rotation);
-            Some(rigid.mass() * linear.norm_squared() + angular.dot(&(inertia * angular)))
+            let rotation = &self.states[body].pose.rotation;
+            let momentum = rigid.momentum(rotation, &angular.into_owned());
+            Some(rigid.mass() * linear.norm_squared() + angular.dot(&momentum))
         };
         Some(self.free.iter().enumerate().filter_map(energy).sum::<f64>().sqrt())
     }
