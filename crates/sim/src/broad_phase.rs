@@ -15,12 +15,15 @@ const MARGIN: [f64; 2] = [1e-3, 4e-3];
 /// Steps for which a search for near samples should serve.
 const STEPS: f64 = 2.0;
 
+/// Samples of a contact which cost no more to ask than to look for.
+const FEW: usize = 8;
+
 /// A world that only knows the samples near to a field. The others exert no force, so results are the same to the last bit.
 pub(crate) struct BroadPhase<S: Scalar> {
     world: Option<World<S>>,
-    /// For each contact, how far the samples are from their body's center of mass \[m\].
-    radii: Vec<f64>,
-    /// For each contact, the body with the samples as the field saw it when near ones were looked for.
+    /// The contacts that are looked after, and how far the samples of each are from their body's center of mass \[m\].
+    followed: Vec<(usize, f64)>,
+    /// For each of those, the body with the samples as the field saw it when near ones were looked for.
     made_at: Vec<State>,
     /// How far samples may move until the next search \[m\].
     margin: f64,
@@ -28,14 +31,13 @@ pub(crate) struct BroadPhase<S: Scalar> {
 
 impl<S: Scalar> BroadPhase<S> {
     pub(crate) fn new(full: &World<S>) -> Self {
-        let radius = |pair: &ContactPair<S>| {
+        let followed = |(index, pair): (usize, &ContactPair<S>)| {
             let body = &full.bodies[pair.bodies.samples];
-            body.surface
-                .as_ref()
-                .map_or(0.0, |surface| surface.radius_about(&body.com().map(S::value)))
+            let surface = body.surface.as_ref().filter(|surface| surface.points().len() > FEW)?;
+            Some((index, surface.radius_about(&body.com().map(S::value))))
         };
-        let radii = full.contacts.iter().map(radius).collect();
-        Self { world: None, radii, made_at: Vec::new(), margin: 0.0 }
+        let followed = full.contacts.iter().enumerate().filter_map(followed).collect();
+        Self { world: None, followed, made_at: Vec::new(), margin: 0.0 }
     }
 
     /// A world whose forces at `states` are those of `full`, for a step of `dt` \[s\].
@@ -45,11 +47,14 @@ impl<S: Scalar> BroadPhase<S> {
         states: &[State<S>],
         dt: f64,
     ) -> &'a World<S> {
+        if self.followed.is_empty() {
+            return full;
+        }
         let (mut moved, mut ahead): (f64, f64) = (0.0, 0.0);
-        for (index, (pair, radius)) in full.contacts.iter().zip(&self.radii).enumerate() {
-            let now = full.seen_value(pair, states);
+        for (place, (index, radius)) in self.followed.iter().enumerate() {
+            let now = full.seen_value(&full.contacts[*index], states);
             ahead = ahead.max(now.speed_within(*radius));
-            if let Some(then) = self.made_at.get(index) {
+            if let Some(then) = self.made_at.get(place) {
                 let shift = now.pose.translation.vector - then.pose.translation.vector;
                 let turn = now.pose.rotation.angle_to(&then.pose.rotation);
                 moved = moved.max(shift.norm() + turn * radius);
@@ -69,7 +74,8 @@ impl<S: Scalar> BroadPhase<S> {
     fn look(&mut self, full: &World<S>, states: &[State<S>]) {
         let mut near = full.clone();
         self.made_at.clear();
-        for (pair, near) in full.contacts.iter().zip(&mut near.contacts) {
+        for (index, _) in &self.followed {
+            let (pair, near) = (&full.contacts[*index], &mut near.contacts[*index]);
             let state = full.seen_value(pair, states);
             self.made_at.push(state);
             if let Some(patch) = full.patch(pair, state) {

@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3, Vector6};
 use prehend_autodiff::lie::cross_matrix;
 use prehend_autodiff::{Fwd, LocalFunction, Scalar};
 
-use super::dynamic::DynContactLaw;
+use super::dynamic::{DynContactLaw, ParamValues};
 use super::law::ContactLaw;
 use super::moved::{LiftedContact, MovedPatch};
 use super::patch::{Patch, Touch};
@@ -63,7 +63,7 @@ pub(crate) fn wrench_jacobian<L: ContactLaw>(
     by_params: bool,
 ) -> WrenchJacobian {
     let cutoff = law.reach();
-    let params: Vec<Fwd<6>> = p.iter().map(|&p| Fwd::constant(p)).collect();
+    let params: ParamValues<Fwd<6>> = p.iter().map(|&p| Fwd::constant(p)).collect();
     let spin = patch.state.angular;
     let mut wrench = Vector6::zeros();
     // Force and torque by position, turn, velocity and spin of the body.
@@ -112,7 +112,7 @@ pub(crate) fn wrench_along<L: ContactLaw>(
     tangent: &[f64; 12],
 ) -> [Vector6<f64>; 2] {
     let cutoff = law.reach();
-    let params: Vec<Fwd<1>> = p.iter().map(|&p| Fwd::constant(p)).collect();
+    let params: ParamValues<Fwd<1>> = p.iter().map(|&p| Fwd::constant(p)).collect();
     let moved = MovedPatch::new(patch, &tangent.map(|x| Fwd { value: 0.0, derivative: [x] }));
     let (mut force, mut torque) = (Vector3::<Fwd<1>>::zeros(), Vector3::<Fwd<1>>::zeros());
     let sound = patch.for_each_touch(cutoff, false, |touch| {
@@ -186,7 +186,7 @@ fn add_param_slopes<L: ContactLaw>(
             Some(lane) if lane < 6 => Fwd::variable(p, lane),
             _ => Fwd::constant(p),
         };
-        let params: Vec<Fwd<6>> = p.iter().enumerate().map(seeded).collect();
+        let params: ParamValues<Fwd<6>> = p.iter().enumerate().map(seeded).collect();
         let Contact { gap, normal_speed, slip, normal, area } = touch.contact(cutoff);
         let response = law.law(
             &params,

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use prehend_autodiff::Scalar;
 
 use super::body_id::BodyId;
-use crate::contact::dynamic::DynContactLaw;
+use crate::contact::dynamic::{DynContactLaw, ParamValues};
 use crate::contact::error::LawError;
 use crate::contact::force_jump::jumps;
 use crate::contact::gap_smoothing::GapSmoothing;
@@ -69,7 +69,13 @@ impl<S: Scalar> ContactPair<S> {
         &self.params
     }
 
-    /// The same, to be changed: to differentiate by one, put a variable in its place.
+    /// Their values.
+    #[inline]
+    pub(crate) fn param_values(&self) -> ParamValues<f64> {
+        self.params.iter().map(|p| p.value()).collect()
+    }
+
+    /// The parameters, to be changed: to differentiate by one, put a variable in its place.
     pub fn params_mut(&mut self) -> &mut [S] {
         &mut self.params
     }
@@ -104,7 +110,7 @@ impl<S: Scalar> ContactPair<S> {
 
     /// Whether the law takes these parameters.
     pub(crate) fn check(&self) -> Result<(), LawError> {
-        let values: Vec<f64> = self.params.iter().map(|p| p.value()).collect();
+        let values = self.param_values();
         if let Some(&value) = values.iter().find(|value| !value.is_finite()) {
             return Err(LawError::Range { name: "parameter of a contact", range: "finite", value });
         }
@@ -118,7 +124,7 @@ impl<S: Scalar> ContactPair<S> {
 
     /// Whether the force jumps as a contact begins.
     pub(crate) fn force_jumps(&self) -> bool {
-        let values: Vec<f64> = self.params.iter().map(|p| p.value()).collect();
+        let values = self.param_values();
         jumps(self.law.as_ref(), &values, &self.smoothing)
     }
 

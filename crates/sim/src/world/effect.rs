@@ -107,7 +107,7 @@ impl<S: Scalar> World<S> {
         patch: &Patch<'_>,
     ) -> Effect<S> {
         let law = pair.law().as_ref();
-        let values: Vec<f64> = pair.params().iter().map(|p| p.value()).collect();
+        let values = pair.param_values();
         if S::ORDER == 0 {
             let axes = &states[pair.bodies.field].pose.rotation;
             return self.effect_of(
@@ -186,7 +186,7 @@ impl<S: Scalar> World<S> {
         let variable = |(i, x): (usize, &S)| (!x.is_constant_zero()).then_some(i);
         let places: Vec<usize> = moved.iter().flatten().enumerate().filter_map(variable).collect();
         let Some(field) = ends[1].field.as_ref().filter(|_| !places.is_empty()) else { return };
-        let values: Vec<f64> = pair.params().iter().map(|p| p.value()).collect();
+        let values = pair.param_values();
         let count = moved[0].len();
         for places in places.chunks(LANES) {
             let seeded = |end: usize| -> Vec<Lane> {
@@ -233,7 +233,7 @@ impl<S: Scalar> World<S> {
         pair: &ContactPair<S>,
         patch: &Patch<'_>,
     ) -> (WrenchJacobian, Option<[S; 12]>) {
-        let values: Vec<f64> = pair.params().iter().map(|p| p.value()).collect();
+        let values = pair.param_values();
         let vary = !pair.params().iter().all(is_constant);
         let jacobian = pair.law().wrench_jacobian(&values, patch, vary);
         let slopes = self.slopes(pair, patch, &jacobian.by_params);
@@ -281,7 +281,7 @@ fn local_bristles<S: Scalar>(
     deflection: Vector6<S>,
 ) -> ([S; 6], Vector6<S>) {
     let law = pair.law().as_ref();
-    let values: Vec<f64> = pair.params().iter().map(|p| p.value()).collect();
+    let values = pair.param_values();
     let at = deflection.map(|x| x.value());
     let split = |all: [S; 12]| -> ([S; 6], Vector6<S>) {
         (std::array::from_fn(|i| all[i]), Vector6::from_fn(|i, _| all[6 + i]))

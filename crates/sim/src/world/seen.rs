@@ -56,7 +56,10 @@ impl<S: Scalar> World<S> {
         states: &[State<T>],
     ) -> State {
         let com = self.bodies[pair.bodies.field].com().coords.map(S::value);
-        let frame = states[pair.bodies.field].value().shifted(&-com);
+        let mut frame = states[pair.bodies.field].value();
+        if com != Vector3::zeros() {
+            frame = frame.shifted(&-com);
+        }
         states[pair.bodies.samples].value().seen_from(&frame)
     }
 }
