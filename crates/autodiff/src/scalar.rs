@@ -159,6 +159,12 @@ pub trait Scalar: RealField + Copy + Default {
     /// Whether this is the constant 0, which moves in no direction.
     fn is_constant_zero(self) -> bool;
 
+    /// Whether this carries no derivatives.
+    #[inline]
+    fn is_constant(&self) -> bool {
+        self.plus(-self.value()).is_constant_zero()
+    }
+
     /// `self` times each of `derivative`.
     #[doc(hidden)]
     #[inline(always)]

@@ -8,8 +8,8 @@ use prehend_autodiff::{Recompute, Scalar, Var, checkpoint};
 
 use crate::error::SimulationError;
 use crate::integrator::Integrator;
-use crate::parameters::{STATE, coordinates_of, is_constant, states_of};
 use crate::state::State;
+use crate::state_coordinates::{STATE, coordinates_of, states_of};
 use crate::time::{Step, TimeSteps};
 use crate::world::World;
 use crate::world::body::{Body, Motion};
@@ -74,7 +74,7 @@ impl<I: Integrator> Scene<I> {
     }
 
     pub(crate) fn changes<S: Scalar>(&self, world: &World<S>) -> Changes<S> {
-        let changed = |x: S, own: f64| x.value() != own || !is_constant(&x);
+        let changed = |x: S, own: f64| x.value() != own || !x.is_constant();
         let all = (0..).zip(world.parameters()).zip(&self.parameters);
         let changes = all.filter(|((_, x), own)| changed(*x, **own)).map(|(change, _)| change);
         let (places, values): (Vec<u32>, _) = changes.unzip();

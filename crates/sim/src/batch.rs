@@ -8,8 +8,8 @@ use crate::adjoint::{Changes, Scene, StepCheckpointed};
 use crate::error::SimulationError;
 use crate::integrator::Integrator;
 use crate::integrator::adaptive::Adaptive;
-use crate::parameters::{STATE, coordinates_of, states_of};
 use crate::state::State;
+use crate::state_coordinates::{STATE, coordinates_of, states_of};
 use crate::time::TimeSteps;
 use crate::world::World;
 

@@ -1,5 +1,6 @@
 //! Penalty contact between surface samples of a body and a signed distance field.
 
+pub(crate) mod bristle_function;
 pub(crate) mod bristle_law;
 pub mod bristles;
 pub mod composite;
@@ -23,3 +24,4 @@ pub mod registry;
 pub mod restitution;
 pub mod static_target;
 pub mod wrench;
+pub(crate) mod wrench_function;

@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use crate::body::BodyError;
+use crate::body::error::BodyError;
 use crate::contact::error::LawError;
 use crate::shape::error::ShapeError;
 use crate::world::body_id::BodyId;

@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Point3, Unit, Vector3};
 use prehend_autodiff::Scalar;
 use prehend_geometry::{DistanceField, FieldSample};
 
-use crate::body::BodyError;
+use crate::body::error::BodyError;
 use crate::surface::Surface;
 
 /// A half-space: everything below a plane.

@@ -2,8 +2,10 @@
 
 mod curves;
 mod derivatives;
+mod finding;
 mod motion;
 mod passivity;
+mod point_contact;
 
 use std::fmt;
 use std::sync::Arc;
@@ -13,17 +15,12 @@ use nalgebra::Vector3;
 use crate::contact::dynamic::DynContactLaw;
 use crate::contact::force_jump::jumps;
 use crate::contact::gap_smoothing::GapSmoothing;
-use crate::contact::point::{Contact, Response};
 use crate::error::SimulationError;
 use motion::Specimen;
+use point_contact::{DEPTH, GRAVITY, PointContact};
 
 pub use curves::Curve;
-
-/// Depth at which the specimen rests \[m\], and the area it rests on \[m²\].
-const DEPTH: f64 = 5e-4;
-const AREA: f64 = 4e-4;
-/// Gravity \[m/s²\].
-const GRAVITY: f64 = 9.81;
+pub use finding::{Finding, Verdict};
 
 /// What was found of a law, see [`law_report`].
 #[derive(Clone, Debug)]
@@ -47,45 +44,6 @@ impl fmt::Display for LawReport {
             writeln!(f, "{:<8} {what:<52} {measured:>12.5e}  {remark}", verdict.name())?;
         }
         Ok(())
-    }
-}
-
-/// One thing that was tried.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Finding {
-    /// What was measured, with its unit.
-    pub what: String,
-    /// The figure.
-    pub measured: f64,
-    /// What to think of it.
-    pub verdict: Verdict,
-    /// What was expected, or what it means.
-    pub remark: String,
-}
-
-/// What to think of a finding.
-#[derive(Clone, Copy, Debug, Eq, PartialEq)]
-pub enum Verdict {
-    /// As it should be.
-    Sound,
-    /// A property of the law, neither good nor bad.
-    Note,
-    /// A law must not do that.
-    Wrong,
-}
-
-impl Verdict {
-    /// A word for it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Sound => "sound",
-            Self::Note => "note",
-            Self::Wrong => "WRONG",
-        }
-    }
-
-    fn when(sound: bool) -> Self {
-        if sound { Self::Sound } else { Self::Wrong }
     }
 }
 
@@ -147,30 +105,14 @@ fn onset(contact_point: &PointContact<'_>) -> Finding {
     }
 }
 
-/// A law at one contact.
-struct PointContact<'a> {
-    law: &'a dyn DynContactLaw,
-}
-
-impl PointContact<'_> {
-    /// The force `depth` \[m\] deep, at a normal speed and a slip \[m/s\].
-    fn response(&self, depth: f64, normal_speed: f64, slip: Vector3<f64>) -> Response<f64> {
-        let (gap, normal) = (self.law.reach() - depth, Vector3::z());
-        let contact = Contact { gap, normal_speed, slip, normal, area: AREA };
-        match depth > 0.0 {
-            true => self.law.response(self.law.params(), &contact),
-            false => Response::zero(),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use prehend_autodiff::Scalar;
 
+    use super::point_contact::AREA;
     use super::*;
-    use crate::ContactLaw;
     use crate::scenes::penalty;
+    use crate::{Contact, ContactLaw, Response};
 
     /// A belt: friction that drives instead of braking.
     struct Belt([f64; 2]);

@@ -1,55 +1,12 @@
-//! The parameters of a world and the coordinates of a state in a row, as functions of many numbers want them.
+//! The parameters of a world in a row, as functions of many numbers want them.
 
-use nalgebra::{
-    Isometry3, Matrix3, Point3, Quaternion, Translation3, Unit, UnitQuaternion, Vector3, Vector6,
-};
+use nalgebra::{Matrix3, Point3, Vector3, Vector6};
 use prehend_autodiff::Scalar;
 
 use crate::body::RigidBody;
 use crate::error::SimulationError;
-use crate::state::State;
 use crate::world::World;
 use crate::world::body::Motion;
-
-/// Coordinates of a state.
-pub(crate) const STATE: usize = 13;
-
-/// Whether a number carries no derivatives.
-pub(crate) fn is_constant<S: Scalar>(x: &S) -> bool {
-    x.plus(-x.value()).is_constant_zero()
-}
-
-impl<S: Scalar> State<S> {
-    /// Translation, rotation as a quaternion x, y, z, w, linear and angular velocity.
-    pub(crate) fn coordinates(&self) -> [S; STATE] {
-        let [x, y, z] = self.pose.translation.vector.into();
-        let [qx, qy, qz, qw] = self.pose.rotation.coords.into();
-        let [vx, vy, vz] = self.linear.into();
-        let [wx, wy, wz] = self.angular.into();
-        [x, y, z, qx, qy, qz, qw, vx, vy, vz, wx, wy, wz]
-    }
-
-    /// The state of [`State::coordinates`].
-    pub(crate) fn from_coordinates(coordinates: &[S; STATE]) -> Self {
-        let [x, y, z, qx, qy, qz, qw, vx, vy, vz, wx, wy, wz] = *coordinates;
-        let rotation: UnitQuaternion<S> = Unit::new_unchecked(Quaternion::new(qw, qx, qy, qz));
-        State {
-            pose: Isometry3::from_parts(Translation3::new(x, y, z), rotation),
-            linear: Vector3::new(vx, vy, vz),
-            angular: Vector3::new(wx, wy, wz),
-        }
-    }
-}
-
-/// The coordinates of several states, one state after the other.
-pub(crate) fn coordinates_of<S: Scalar>(states: &[State<S>]) -> impl Iterator<Item = S> {
-    states.iter().flat_map(State::coordinates)
-}
-
-/// The states of [`coordinates_of`].
-pub(crate) fn states_of<S: Scalar>(coordinates: &[S]) -> impl Iterator<Item = State<S>> {
-    coordinates.as_chunks().0.iter().map(State::from_coordinates)
-}
 
 impl<S: Scalar> World<S> {
     /// Everything by which a world can be differentiated, but for trajectories, in a row.
@@ -136,7 +93,7 @@ mod tests {
 
     #[test]
     fn parameters_come_back() {
-        let (mut world, states) = egg_on(floor(), GapSmoothing::Hard);
+        let (mut world, _) = egg_on(floor(), GapSmoothing::Hard);
         world.bodies[1].external_wrench = Vector6::new(1.0, 2.0, 3.0, 4.0, 5.0, 6.0);
         let numbers = world.parameters();
         assert_eq!(numbers.len(), 6 + 10 + 6 + 3 + 3);
@@ -153,8 +110,6 @@ mod tests {
             (world.bodies[1].external_wrench, world.gravity)
         );
         assert_eq!(again.contacts[0].params(), world.contacts[0].params());
-        let numbers: Vec<f64> = coordinates_of(&states).collect();
-        assert!(states_of(&numbers).eq(states));
     }
 
     #[test]

@@ -13,6 +13,7 @@ mod height_field;
 mod kind;
 mod lattice;
 pub(crate) mod lifted;
+pub(crate) mod matter;
 mod mesh;
 mod nearest;
 pub(crate) mod options;
@@ -33,7 +34,9 @@ use prehend_geometry::{DistanceField, Moments};
 use crate::surface::Surface;
 use error::ShapeError;
 use kind::Kind;
+use lifted::LiftedField;
 use options::ShapeOptions;
+use solid::Sample;
 
 /// The shape of a body, over plain numbers or numbers that carry derivatives: its dimensions, and samples of its surface and a
 /// distance field of their values, which bodies of one shape share.
@@ -169,6 +172,16 @@ impl<S: Scalar> Shape<S> {
     /// Signed distance to it.
     pub fn field(&self) -> &Arc<dyn DistanceField> {
         &self.built.field
+    }
+
+    /// Its field with `dimensions` that have its values.
+    pub(crate) fn lifted_field<T: Scalar>(&self, dimensions: &[T]) -> LiftedField<T> {
+        self.built.kind.lifted_field(dimensions)
+    }
+
+    /// Its samples with `dimensions` that have its values, in the order of [`SurfacePoint::index`](crate::SurfacePoint).
+    pub(crate) fn lifted_samples<T: Scalar>(&self, dimensions: &[T]) -> Vec<Sample<T>> {
+        self.built.kind.samples(dimensions)
     }
 
     /// The same shape, each dimension through `f`.

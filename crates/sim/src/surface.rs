@@ -2,7 +2,7 @@
 
 use nalgebra::Point3;
 
-use crate::body::{BodyError, check_lengths};
+use crate::body::error::{BodyError, check_lengths};
 
 /// A sample of a body's surface.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -4,6 +4,7 @@ pub(crate) mod body;
 pub(crate) mod body_id;
 pub(crate) mod contact_group;
 pub(crate) mod contact_pair;
+mod contacts_between;
 pub(crate) mod deflection;
 mod effect;
 mod linear_contacts;
@@ -11,6 +12,7 @@ pub(crate) mod neighbors;
 mod pair_function;
 mod seen;
 pub(crate) mod trajectory;
+mod trajectory_checks;
 
 use std::fmt;
 use std::sync::Arc;

@@ -3,7 +3,7 @@
 use nalgebra::{Point3, Vector3};
 use prehend_autodiff::{Fwd, Scalar};
 
-use super::bristles::BristleFunction;
+use super::bristle_function::BristleFunction;
 use super::dynamic::DynContactLaw;
 use super::moved::LiftedContact;
 use super::patch::{Patch, Touch};

@@ -2,16 +2,12 @@
 
 use nalgebra::Vector6;
 use prehend_autodiff::Fwd;
-use smallvec::SmallVec;
 
 use super::error::LawError;
 use super::law::ContactLaw;
 use super::patch::Patch;
 use super::point::{Contact, Response};
 use super::wrench::{self, WrenchJacobian};
-
-/// The parameters of a law: few have more than these, which take no allocation.
-pub(crate) type ParamValues<T> = SmallVec<[T; 8]>;
 
 mod sealed {
     pub trait Sealed {}

@@ -4,8 +4,7 @@ use nalgebra::{Matrix3, Vector3, Vector6};
 use prehend_autodiff::lie::cross_matrix;
 use prehend_autodiff::{Fwd, LocalFunction, Scalar};
 
-use super::dynamic::{DynContactLaw, ParamValues};
-use super::law::ContactLaw;
+use super::law::{ContactLaw, ParamValues};
 use super::moved::{LiftedContact, MovedPatch};
 use super::patch::{Patch, Touch};
 use super::point::Contact;
@@ -125,28 +124,6 @@ pub(crate) fn wrench_along<L: ContactLaw>(
     let all = stack(&force, &torque);
     let value = if sound { all.map(|x| x.value) } else { Vector6::repeat(f64::NAN) };
     [value, all.map(|x| x.derivative[0])]
-}
-
-/// The wrench of `patch` as a function of the tangent of its body's state, to first order.
-pub(crate) struct WrenchFunction<'a> {
-    pub(crate) law: &'a dyn DynContactLaw,
-    pub(crate) p: &'a [f64],
-    pub(crate) patch: &'a Patch<'a>,
-}
-
-impl LocalFunction<12, 6> for WrenchFunction<'_> {
-    #[inline]
-    fn evaluate<S: Scalar>(&self, tangent: [S; 12]) -> [S; 6] {
-        let WrenchJacobian { wrench, by_state, .. } =
-            self.law.wrench_jacobian(self.p, self.patch, false);
-        LinearWrench { value: wrench.into(), by_state }.evaluate(tangent)
-    }
-
-    #[inline]
-    fn derivative_along(&self, _: [f64; 12], tangent: [f64; 12]) -> Option<([f64; 6], [f64; 6])> {
-        let [wrench, slope] = self.law.wrench_along(self.p, self.patch, &tangent);
-        Some((wrench.into(), slope.into()))
-    }
 }
 
 /// What is added where the lever of a round sample turns with the normal. Never inlined: it is rare, and the rest then fits the

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::{DEPTH, PointContact};
+use super::point_contact::{DEPTH, PointContact};
 
 /// Something to be drawn.
 #[derive(Clone, Debug, PartialEq)]

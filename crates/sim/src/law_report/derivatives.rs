@@ -5,7 +5,8 @@ use prehend_autodiff::check::finite_difference_jacobian;
 use prehend_autodiff::{Fwd, Scalar};
 use prehend_geometry::SplitMix64;
 
-use super::{AREA, DEPTH, Finding, PointContact, Verdict};
+use super::finding::{Finding, Verdict};
+use super::point_contact::{AREA, DEPTH, PointContact};
 use crate::contact::point::{Contact, Response};
 
 /// Contacts that are tried.

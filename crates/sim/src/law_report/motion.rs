@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 
-use super::{AREA, Curve, DEPTH, Finding, GRAVITY, PointContact, Verdict};
+use super::curves::Curve;
+use super::finding::{Finding, Verdict};
+use super::point_contact::{AREA, DEPTH, GRAVITY, PointContact};
 use crate::body::RigidBody;
 use crate::contact::dynamic::DynContactLaw;
 use crate::contact::gap_smoothing::GapSmoothing;

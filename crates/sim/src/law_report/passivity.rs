@@ -2,7 +2,8 @@
 
 use nalgebra::Vector3;
 
-use super::{DEPTH, Finding, PointContact, Verdict};
+use super::finding::{Finding, Verdict};
+use super::point_contact::{DEPTH, PointContact};
 
 /// Steps of a cycle.
 const STEPS: usize = 4000;

@@ -6,23 +6,9 @@ use prehend_autodiff::Scalar;
 
 use super::Shape;
 use super::error::ShapeError;
+use super::matter::Matter;
 use crate::body::RigidBody;
 use crate::world::body::{Body, Motion};
-
-/// What a body is made of.
-#[derive(Clone)]
-pub(crate) struct Matter<S: Scalar> {
-    pub(crate) shape: Shape<S>,
-    /// \[kg/m³\], unless it is fixed.
-    pub(crate) density: Option<S>,
-}
-
-impl<S: Scalar> Matter<S> {
-    /// The same, each number through `f`.
-    pub(crate) fn map<T: Scalar>(&self, f: impl Fn(S) -> T) -> Matter<T> {
-        Matter { shape: self.shape.map(&f), density: self.density.map(f) }
-    }
-}
 
 impl<S: Scalar> Shape<S> {
     /// Mass properties at a uniform `density` \[kg/m³\].

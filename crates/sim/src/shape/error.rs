@@ -4,7 +4,7 @@ use prehend_geometry::closest::ClosestError;
 use prehend_geometry::sdf::SdfError;
 use thiserror::Error;
 
-use crate::body::BodyError;
+use crate::body::error::BodyError;
 
 /// Why there is no such shape, or no such body of it.
 #[derive(Clone, Debug, Error, PartialEq)]

@@ -7,10 +7,8 @@ use prehend_autodiff::Scalar;
 use prehend_autodiff::lie::lift;
 use prehend_geometry::{DistanceField, FieldSample};
 
-use super::Shape;
 use super::nearest::Nearest;
 use super::round::Round;
-use super::solid::Sample;
 
 /// A distance field over numbers that carry derivatives.
 pub(crate) enum LiftedField<T: Scalar> {
@@ -54,17 +52,5 @@ impl<T: Scalar> LiftedField<T> {
                 Some((slope(gradient.into()).plus(distance), gradient_there))
             }
         }
-    }
-}
-
-impl<S: Scalar> Shape<S> {
-    /// Its field with `dimensions` that have its values.
-    pub(crate) fn lifted_field<T: Scalar>(&self, dimensions: &[T]) -> LiftedField<T> {
-        self.built.kind.lifted_field(dimensions)
-    }
-
-    /// Its samples with `dimensions` that have its values, in the order of [`SurfacePoint::index`](crate::SurfacePoint).
-    pub(crate) fn lifted_samples<T: Scalar>(&self, dimensions: &[T]) -> Vec<Sample<T>> {
-        self.built.kind.samples(dimensions)
     }
 }

@@ -7,9 +7,10 @@ use prehend_autodiff::Scalar;
 use prehend_geometry::DistanceField;
 
 use super::trajectory::{self, Trajectory};
-use crate::body::{BodyError, RigidBody};
+use crate::body::RigidBody;
+use crate::body::error::BodyError;
 use crate::fields::Cuboid;
-use crate::shape::body::Matter;
+use crate::shape::matter::Matter;
 use crate::surface::Surface;
 
 /// What a body is and how it touches others.

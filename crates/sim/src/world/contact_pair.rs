@@ -5,10 +5,11 @@ use std::sync::Arc;
 use prehend_autodiff::Scalar;
 
 use super::body_id::BodyId;
-use crate::contact::dynamic::{DynContactLaw, ParamValues};
+use crate::contact::dynamic::DynContactLaw;
 use crate::contact::error::LawError;
 use crate::contact::force_jump::jumps;
 use crate::contact::gap_smoothing::GapSmoothing;
+use crate::contact::law::ParamValues;
 use crate::surface::Surface;
 
 /// The two sides of a contact.

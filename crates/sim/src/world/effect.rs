@@ -10,11 +10,12 @@ use super::contact_pair::ContactPair;
 use super::linear_contacts::LinearContacts;
 use super::pair_function::Relation;
 use super::seen::Seen;
-use crate::contact::bristles::{BristleFunction, Bristles};
+use crate::contact::bristle_function::BristleFunction;
+use crate::contact::bristles::Bristles;
 use crate::contact::dimensions::{LANES, Lane, VariableShapes};
 use crate::contact::patch::Patch;
-use crate::contact::wrench::{LinearWrench, WrenchFunction, WrenchJacobian, stack};
-use crate::parameters::is_constant;
+use crate::contact::wrench::{LinearWrench, WrenchJacobian, stack};
+use crate::contact::wrench_function::WrenchFunction;
 use crate::shape::lifted::LiftedField;
 use crate::state::State;
 
@@ -122,7 +123,7 @@ impl<S: Scalar> World<S> {
         let [samples, field] =
             [0, 1].map(|end| shifted[end].as_ref().map_or(&states[ends[end]], |(state, _)| state));
         let at = Relation { samples: samples.value(), field: field.value(), weight: pair.weight };
-        let (all, slopes) = if pair.params().iter().all(is_constant) {
+        let (all, slopes) = if pair.params().iter().all(Scalar::is_constant) {
             let function = at.function(WrenchFunction { law, p: &values, patch });
             (function.of(samples, field), self.slopes(pair, patch, &[]))
         } else {
@@ -179,7 +180,7 @@ impl<S: Scalar> World<S> {
         sums: &mut [S; 12],
     ) {
         let ends = [pair.bodies.samples, pair.bodies.field].map(|id| &self.bodies[id]);
-        if ends.iter().all(|body| body.dimensions().iter().all(is_constant)) {
+        if ends.iter().all(|body| body.dimensions().iter().all(Scalar::is_constant)) {
             return;
         }
         let moved = ends.map(|body| changes(body.dimensions()));
@@ -234,7 +235,7 @@ impl<S: Scalar> World<S> {
         patch: &Patch<'_>,
     ) -> (WrenchJacobian, Option<[S; 12]>) {
         let values = pair.param_values();
-        let vary = !pair.params().iter().all(is_constant);
+        let vary = !pair.params().iter().all(Scalar::is_constant);
         let jacobian = pair.law().wrench_jacobian(&values, patch, vary);
         let slopes = self.slopes(pair, patch, &jacobian.by_params);
         (jacobian, slopes)

@@ -8,8 +8,8 @@ use super::body_id::BodyId;
 use super::contact_pair::ContactPair;
 use crate::contact::patch::Patch;
 use crate::contact::wrench::{WrenchJacobian, stack};
-use crate::parameters::{STATE, is_constant};
 use crate::state::State;
+use crate::state_coordinates::STATE;
 
 /// The contacts of a world at one moment as a linear function of its states: one node of the tape, however many they are.
 #[derive(Default)]
@@ -107,7 +107,7 @@ impl LinearContacts {
         for (Touching { body, state, wrench }, shifted) in self.bodies.iter().zip(&shifted) {
             let seen = shifted.as_ref().map_or(&states[*body], |(state, _)| state);
             let coordinates = seen.coordinates();
-            let moves = !coordinates.iter().all(is_constant);
+            let moves = !coordinates.iter().all(Scalar::is_constant);
             own.push((*state, moves.then_some(inputs.len())));
             if moves {
                 inputs.extend(coordinates);

@@ -3,8 +3,8 @@
 use nalgebra::{Matrix3, Vector3};
 use prehend_autodiff::{Fwd, LocalFunction, Scalar};
 
-use crate::parameters::{STATE, is_constant};
 use crate::state::State;
+use crate::state_coordinates::STATE;
 
 /// Numbers of two states.
 const TWO: usize = 2 * STATE;
@@ -128,7 +128,7 @@ impl<W: LocalFunction<12, 6>> PairFunction<W> {
     #[inline]
     pub(super) fn of<S: Scalar>(&self, samples: &State<S>, field: &State<S>) -> [S; 6] {
         let (samples, field) = (samples.coordinates(), field.coordinates());
-        if field.iter().all(is_constant) {
+        if field.iter().all(Scalar::is_constant) {
             return S::local(&OneMoves(self), samples);
         }
         let mut both = [S::zero(); TWO];

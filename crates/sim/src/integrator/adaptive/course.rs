@@ -5,7 +5,8 @@ use std::sync::Arc;
 use prehend_autodiff::Scalar;
 
 use super::Adaptive;
-use super::planner::{Planner, Probe};
+use super::planner::Planner;
+use super::probe::Probe;
 use crate::error::SimulationError;
 use crate::integrator::Integrator;
 use crate::integrator::runge_kutta::dormand_prince;

@@ -1,9 +1,9 @@
 //! Chooses the parts of a step.
 
 use nalgebra::Vector6;
-use prehend_autodiff::Fwd;
 
 use super::error_norm::ErrorNorm;
+use super::probe::Probe;
 use super::travel::Travel;
 use super::{Adaptive, touch_time};
 use crate::error::SimulationError;
@@ -12,9 +12,6 @@ use crate::state::State;
 use crate::time::Step;
 use crate::world::World;
 use crate::world::body_id::BodyId;
-
-/// Numbers that carry the derivative along the probe.
-pub(super) type Probe = Fwd<1>;
 
 /// The exponent by which the length of a step follows from its error, for an estimate of fourth order.
 const EXPONENT: f64 = -0.2;

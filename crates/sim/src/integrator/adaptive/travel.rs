@@ -2,7 +2,7 @@
 
 use std::cell::LazyCell;
 
-use super::planner::Probe;
+use super::probe::Probe;
 use super::touch_time;
 use crate::body::RigidBody;
 use crate::contact::patch::Patch;

@@ -1,0 +1,168 @@
+//! Wrench and rate of the deflection of a contact that sticks.
+
+use nalgebra::{Matrix3x6, Matrix6, Vector3, Vector6};
+use prehend_autodiff::{LocalFunction, Scalar};
+
+use super::bristle_law::BristleLaw;
+use super::bristles::Bristles;
+use super::dynamic::DynContactLaw;
+use super::moved::{LiftedContact, MovedPatch};
+use super::patch::{Patch, Touch};
+
+/// Depth over which bristles take hold, in multiples of their deflection.
+const TAKE_HOLD: f64 = 0.1;
+/// Depth above which they do not let go, in multiples of their deflection.
+const LET_GO: f64 = 1e-3;
+/// Part of what contacts hold that holds every other direction.
+const REGULARIZATION: f64 = 1e-6;
+
+/// The wrench of all contacts of `patch` about the center of mass and the rate of the deflection, along the axes of the field, as a
+/// function of the tangent of the body's state and of the change of the deflection, to first order.
+pub(crate) struct BristleFunction<'a> {
+    pub(crate) law: &'a dyn DynContactLaw,
+    pub(crate) p: &'a [f64],
+    pub(crate) patch: &'a Patch<'a>,
+    pub(crate) bristles: Bristles,
+    pub(crate) deflection: Vector6<f64>,
+}
+
+impl LocalFunction<18, 12> for BristleFunction<'_> {
+    fn evaluate<S: Scalar>(&self, change: [S; 18]) -> [S; 12] {
+        self.response(&self.constants(), &change, None)
+    }
+}
+
+/// Also of the place of the patch's point from the center of mass, after the rest.
+impl LocalFunction<21, 12> for BristleFunction<'_> {
+    fn evaluate<S: Scalar>(&self, change: [S; 21]) -> [S; 12] {
+        let [.., x, y, z] = change;
+        self.response(&self.constants(), &change, Some(&Vector3::new(x, y, z)))
+    }
+}
+
+impl BristleFunction<'_> {
+    fn constants<S: Scalar>(&self) -> Vec<S> {
+        self.p.iter().map(|&p| S::constant(p)).collect()
+    }
+
+    /// The function with parameters `p`, and of `from_com`, from the center of mass to the point that the patch has the state of.
+    pub(crate) fn response<T: Scalar>(
+        &self,
+        p: &[T],
+        change: &[T],
+        from_com: Option<&Vector3<T>>,
+    ) -> [T; 12] {
+        let moved = MovedPatch::new(self.patch, change);
+        let deflection = Vector6::from_fn(|i, _| change[12 + i].plus(self.deflection[i]));
+        self.response_of(p, &deflection, from_com, |touch, cutoff| moved.lift(touch, cutoff))
+    }
+
+    /// The function of dimensions of the shapes, with which `lift` gives a contact.
+    pub(crate) fn response_by_dimensions<T: Scalar>(
+        &self,
+        lift: impl Fn(&Touch, f64) -> LiftedContact<T>,
+    ) -> [T; 12] {
+        self.response_of(&self.constants(), &self.deflection.map(T::constant), None, lift)
+    }
+
+    fn response_of<T: Scalar>(
+        &self,
+        p: &[T],
+        deflection: &Vector6<T>,
+        from_com: Option<&Vector3<T>>,
+        lift: impl Fn(&Touch, f64) -> LiftedContact<T>,
+    ) -> [T; 12] {
+        let Self { patch, bristles, .. } = *self;
+        let (cutoff, law) = (self.law.reach(), BristleLaw::new(self.law, p));
+        let mut wrench = Vector6::<T>::zeros();
+        let mut fit = RateFit::default();
+        let sound = patch.for_each_touch(cutoff, T::ORDER == 0, |touch| {
+            let LiftedContact { mut contact, lever, stretch } = lift(touch, cutoff);
+            let lever = from_com.map_or(lever, |from_com| lever + from_com);
+            let across = across(&contact.normal, &lever);
+            let (slip, deflected) = (contact.slip, across * deflection);
+            contact.slip += deflected.map(|u| u.times(bristles.slip_speed / bristles.deflection));
+            let response = law.response(&contact);
+            let force = contact.normal * response.normal + response.tangential;
+            let force = stretch.map_or(force, |stretch| force * stretch);
+            let torque = lever.cross(&force);
+            wrench += Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z);
+            // By depth, which ends smoothly where a contact does; the force of a damper may end before.
+            let depth = -contact.gap.plus(-cutoff);
+            if depth.value() > 0.0 {
+                let weight = depth.times(contact.area);
+                let weight = stretch.map_or(weight, |stretch| weight * stretch);
+                fit.add(&across, weight, depth, bristles.rate(&slip, &deflected));
+            }
+        });
+        let rate = fit.rate(deflection, bristles);
+        let failed = T::constant(f64::NAN);
+        let all = |i: usize| if i < 6 { wrench[i] } else { rate[i - 6] };
+        std::array::from_fn(|i| if sound { all(i) } else { failed })
+    }
+}
+
+/// The motion of a sample across the normal by a twist about the center of mass.
+fn across<T: Scalar>(normal: &Vector3<T>, lever: &Vector3<T>) -> Matrix3x6<T> {
+    let basis: [Vector3<T>; 3] = std::array::from_fn(|i| Vector3::ith(i, T::one()));
+    let columns: [Vector3<T>; 6] =
+        std::array::from_fn(|i| if i < 3 { basis[i] } else { basis[i - 3].cross(lever) });
+    Matrix3x6::from_columns(&columns.map(|v| v - normal * normal.dot(&v)))
+}
+
+/// The least-squares fit of one rate of the deflection to the rates at all samples.
+struct RateFit<T: Scalar> {
+    normal: Matrix6<T>,
+    right: Vector6<T>,
+    /// Sums of weights, and of depths by their weight.
+    weight: T,
+    depth: T,
+}
+
+impl<T: Scalar> Default for RateFit<T> {
+    fn default() -> Self {
+        let (normal, right, zero) = (Matrix6::zeros(), Vector6::zeros(), T::zero());
+        Self { normal, right, weight: zero, depth: zero }
+    }
+}
+
+impl<T: Scalar> RateFit<T> {
+    fn add(&mut self, across: &Matrix3x6<T>, weight: T, depth: T, rate: Vector3<T>) {
+        let weighted = across.transpose() * weight;
+        self.normal += weighted * across;
+        self.right += weighted * rate;
+        self.weight += weight;
+        self.depth += weight * depth;
+    }
+
+    /// ζ'.
+    fn rate(self, deflection: &Vector6<T>, bristles: Bristles) -> Vector6<T> {
+        let returning =
+            |x: &Vector6<T>| x.map(|x| x.times(bristles.slip_speed / bristles.deflection));
+        if self.weight.value() <= 0.0 {
+            return -returning(deflection);
+        }
+        // A turn by one counts as the lever of the mean contact, or as a micrometer if that is at the center of mass.
+        let trace = |from: usize| {
+            let diagonal = (from..from + 3).map(|i| self.normal[(i, i)]);
+            diagonal.fold(T::zero(), |sum, x| sum + x)
+        };
+        let (moves, turns) = (trace(0), trace(3));
+        let ground = [moves, turns + moves.times(1e-12)].map(|x| x.times(REGULARIZATION));
+        let ground = Vector6::from_fn(|i, _| ground[i / 3]);
+        let Some(factors) = (self.normal + Matrix6::from_diagonal(&ground)).cholesky() else {
+            return Vector6::repeat(T::constant(f64::NAN));
+        };
+        // What no contact holds returns to zero, and everything where contacts end.
+        let free = |x: &Vector6<T>| factors.solve(&ground.component_mul(x));
+        let free = free(&free(&free(&free(deflection))));
+        let depth = self.depth / self.weight;
+        let held = depth / depth.plus(TAKE_HOLD * bristles.deflection);
+        let part = depth.times(1.0 / (LET_GO * bristles.deflection));
+        let released = match part.value() < 1.0 {
+            true => part.times(2.0).plus(1.0) * part.plus(-1.0) * part.plus(-1.0),
+            false => T::zero(),
+        };
+        factors.solve(&self.right) * held - returning(&(free + (deflection - free) * released))
+    }
+}

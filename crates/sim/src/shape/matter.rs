@@ -1,0 +1,20 @@
+//! What a body is made of.
+
+use prehend_autodiff::Scalar;
+
+use super::Shape;
+
+/// What a body is made of.
+#[derive(Clone)]
+pub(crate) struct Matter<S: Scalar> {
+    pub(crate) shape: Shape<S>,
+    /// \[kg/m³\], unless it is fixed.
+    pub(crate) density: Option<S>,
+}
+
+impl<S: Scalar> Matter<S> {
+    /// The same, each number through `f`.
+    pub(crate) fn map<T: Scalar>(&self, f: impl Fn(S) -> T) -> Matter<T> {
+        Matter { shape: self.shape.map(&f), density: self.density.map(f) }
+    }
+}
