@@ -29,12 +29,12 @@ pub mod shading;
 #[cfg(test)]
 mod shapes_for_tests;
 mod softras;
+mod view;
 
 #[cfg(feature = "gpu")]
 pub use backend::Gpu;
 pub use backend::{Backend, BackendError, Cpu, Hypothesis, PoseProblem, Session};
 pub use camera::{Camera, CameraError};
-pub use contour::light_samples;
 pub use distortion::{Distortion, DistortionError, Undistortion};
 pub use image::{DepthImage, ImageError, Mask, RgbImage};
 pub use light::{Light, LightError, LightSample};
@@ -43,7 +43,7 @@ pub use model::{ModelError, RenderModel};
 pub use overlay::draw_outline;
 pub use pose_loss::{
     Counts, DepthOptions, Linearized, Loss, LossOptions, OptionError, PoseImage, PoseLoss, Target,
-    TargetError, Tile,
+    TargetError, Tile, light_samples,
 };
 pub use raster::depth_map;
 pub use renderer::{

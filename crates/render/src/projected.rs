@@ -157,3 +157,15 @@ fn region(screen: &[[f32; 3]], camera: &Camera, margin: f32) -> Region {
     };
     if region.x0 < region.x1 && region.y0 < region.y1 { region } else { Region::EMPTY }
 }
+
+/// Perspective-correct barycentric coordinates of pixel (x, y) on a face with these corners (column, row, 1/Z).
+#[inline(always)]
+pub(crate) fn barycentric([a, b, c]: [[f32; 3]; 3], x: f32, y: f32) -> [f32; 3] {
+    let (ax, ay, bx, by, cx, cy) = (a[0] - x, a[1] - y, b[0] - x, b[1] - y, c[0] - x, c[1] - y);
+    let weights =
+        [(bx * cy - by * cx) * a[2], (cx * ay - cy * ax) * b[2], (ax * by - ay * bx) * c[2]];
+    let sum = weights[0] + weights[1] + weights[2];
+    let scale = if sum == 0.0 { 0.0 } else { 1.0 / sum };
+    let (second, third) = (weights[1] * scale, weights[2] * scale);
+    [1.0 - second - third, second, third]
+}

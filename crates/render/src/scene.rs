@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Vector3};
 use rayon::prelude::*;
 
 use crate::camera::Camera;
-use crate::contour::{Lighting, Scene};
+use crate::contour::Scene;
 use crate::image::{DepthImage, RgbImage};
 use crate::light::Light;
 use crate::mode::ContourOptions;
@@ -13,6 +13,7 @@ use crate::posed::Posed;
 use crate::projected::Region;
 use crate::raster::{MISS, rasterize};
 use crate::shading::SurfacePoint;
+use crate::shading::surface::PosedLight;
 
 /// A body of a picture.
 #[derive(Clone, Copy, Debug)]
@@ -140,7 +141,7 @@ impl Nearest {
 fn in_view<'a>(body: &SceneObject<'a>, fine: &Camera, light: &Light) -> Scene<'a> {
     // Mip levels follow the picture's own pixels: finer ones would only be averaged again.
     let posed = Posed::new(body.model, fine, &body.t_cam_model, 0.0);
-    let lighting = Lighting::new(light, &posed.rotation);
+    let lighting = PosedLight::new(light, &posed.rotation);
     let drawing = ContourOptions::default().drawing(1);
     Scene { posed, lighting, drawing, twist_center: Vector3::zeros() }
 }

@@ -1,11 +1,11 @@
 //! Creases: edges in view at which the color of the surface jumps, because normals, texture coordinates or colors do.
 
 use super::outline::{Foot, PIECE, Piece, clip};
-use super::pixel::Scene;
+use super::scene::Scene;
 use crate::model::{Edge, NONE};
-use crate::pose_loss::Pixel;
 use crate::projected::{Projected, Region};
 use crate::raster::{Seen, Visible};
+use crate::view::Pixel;
 
 /// A piece of a visible crease, directed as the one of its two faces runs through it that `outward` points away from.
 #[derive(Clone, Copy, Debug)]

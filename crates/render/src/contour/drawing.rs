@@ -1,6 +1,7 @@
 //! How pixels are drawn, or parts of pixels.
 
-use super::pixel::falling_step;
+use nalgebra::{RealField, convert};
+
 use crate::mode::ContourOptions;
 
 /// How coverage falls across a contour.
@@ -29,6 +30,14 @@ impl Step {
             Self::Square => square_step(s, normal),
         }
     }
+}
+
+/// The smooth step from 1 at −w to 0 at +w, and its derivative.
+#[inline]
+pub(crate) fn falling_step<T: RealField + Copy>(s: T, w: T) -> (T, T) {
+    let (one, two, three): (T, T, T) = (T::one(), convert(2.0), convert(3.0));
+    let x = ((w - s) / (two * w)).clamp(T::zero(), one);
+    (x * x * (three - two * x), -three * x * (one - x) / w)
 }
 
 /// The part of the unit square about the origin in which `normal`·p < −`s`, and its derivative by `s`: the length of the cut.
@@ -115,5 +124,18 @@ mod tests {
         }
         let wide = |half_width| ContourOptions { half_width, ..options }.drawing(2).step;
         assert_eq!(wide(f64::INFINITY), wide(64.0));
+    }
+
+    #[test]
+    fn the_step_falls_smoothly_over_the_band() {
+        let w = 1.3;
+        assert_eq!(falling_step(-w, w), (1.0, 0.0));
+        assert_eq!(falling_step(w, w).0, 0.0);
+        assert_eq!(falling_step(0.0, w).0, 0.5);
+        for s in [-1.1f32, -0.3, 0.0, 0.9] {
+            let d = 1e-2;
+            let difference = (falling_step(s + d, w).0 - falling_step(s - d, w).0) / (2.0 * d);
+            assert!((difference - falling_step(s, w).1).abs() < 1e-3);
+        }
     }
 }

@@ -1,14 +1,16 @@
 //! Slopes of the image over a whole pixel.
 
+use super::contours::ContourView;
 use super::drawing::Step;
-use super::interior::{add_level, barycentric};
+use super::inner::Inner;
+use super::interior::add_level;
 use super::near::{Hit, Place};
 use super::outline::Foot;
-use super::pixel::Scene;
-use super::surface::{Shaded, shade};
-use super::{ContourView, Inner};
-use crate::pose_loss::{Row, scaled_sum};
+use super::scene::Scene;
+use crate::projected::barycentric;
 use crate::raster::Visible;
+use crate::shading::surface::{Shaded, shade};
+use crate::view::{Row, scaled_sum};
 
 /// The faces seen at the pixels to the left, to the right, above and below of the same surface; the face at hand where there
 /// is none of it, and nothing beyond the border of the image.

@@ -1,9 +1,6 @@
 //! Inner contours: where the object hides farther parts of itself.
 
-use super::footprint::Layers;
 use super::outline::Piece;
-use super::pixel::{Scene, falling_step};
-use crate::pose_loss::{Pixel, scaled_sum};
 use crate::projected::Projected;
 use crate::raster::Visible;
 
@@ -52,51 +49,4 @@ pub(crate) fn inner_contours(
         shown.then_some(Inner { piece, behind, split })
     };
     pieces.into_iter().filter_map(select).collect()
-}
-
-impl Scene<'_> {
-    /// Blends the near and the far surface across an inner contour, at pixel (x, y) that shows `own`.
-    ///
-    /// On the far side the near surface has the color of the foot; on the near side the far surface has the
-    /// color of the pixel beyond the contour.
-    pub(crate) fn cross<const DERIVATIVES: bool>(
-        &self,
-        x: f32,
-        y: f32,
-        own: Pixel,
-        inner: &Inner,
-        layers: Option<&Layers>,
-    ) -> Pixel {
-        let foot = inner.piece.foot(x, y);
-        let side = if own.z > inner.split { 1.0 } else { -1.0 };
-        let (near, far) = if side > 0.0 {
-            (self.at_foot::<DERIVATIVES>(&inner.piece, &foot), own)
-        } else {
-            let (u, v, face, inverse_z) = inner.behind;
-            (own, self.interior::<DERIVATIVES>(u, v, face, inverse_z, None))
-        };
-        let distance = foot.distance_squared.sqrt();
-        let step = self.drawing.step;
-        let (alpha, slope) = step.at(side * distance, inner.piece.outward);
-        // Depth counts for nothing at the step itself.
-        let (weight, weight_derivative) = falling_step(step.reach() - 2.0 * distance, step.reach());
-        let mut out = own;
-        for k in 0..3 {
-            out.color[k] = alpha * near.color[k] + (1.0 - alpha) * far.color[k];
-        }
-        out.depth_weight = weight;
-        if DERIVATIVES {
-            let ds = self.distance_row(&inner.piece, &foot, side);
-            for k in 0..3 {
-                let mixed = scaled_sum(alpha, &near.color_rows[k], 1.0 - alpha, &far.color_rows[k]);
-                let step = slope * (near.color[k] - far.color[k]);
-                out.color_rows[k] = scaled_sum(1.0, &mixed, step, &ds);
-            }
-            if let Some(layers) = layers {
-                out.color_rows = self.rows_across([x, y], inner, &foot, side, layers, &ds);
-            }
-            out.depth_weight_row = ds.map(|v| -2.0 * side * weight_derivative * v);
-        }
-        out
-    }
 }

@@ -1,8 +1,8 @@
 //! A pixel inside a face: where it lies on the surface, and how that changes with the pose.
 
-use super::surface::Shaded;
-use super::vec3::{Vec3, cross, dot, mix, scale, sub};
-use crate::pose_loss::Row;
+use crate::shading::surface::Shaded;
+use crate::shading::vec3::{Vec3, cross, dot, mix, scale, sub};
+use crate::view::Row;
 
 /// Surfaces are taken to be inclined to the viewing ray by at least this sine: of what is seen at a grazing angle, a
 /// pixel's center says little, and its derivatives would grow without bound.
@@ -11,18 +11,6 @@ pub(crate) const GRAZING: f32 = 1e-3;
 #[inline(always)]
 pub(crate) fn row(linear: Vec3, angular: Vec3) -> Row {
     [linear[0], linear[1], linear[2], angular[0], angular[1], angular[2]]
-}
-
-/// Perspective-correct barycentric coordinates of pixel (x, y) on a face with these corners (column, row, 1/Z).
-#[inline(always)]
-pub(crate) fn barycentric([a, b, c]: [[f32; 3]; 3], x: f32, y: f32) -> [f32; 3] {
-    let (ax, ay, bx, by, cx, cy) = (a[0] - x, a[1] - y, b[0] - x, b[1] - y, c[0] - x, c[1] - y);
-    let weights =
-        [(bx * cy - by * cx) * a[2], (cx * ay - cy * ax) * b[2], (ax * by - ay * bx) * c[2]];
-    let sum = weights[0] + weights[1] + weights[2];
-    let scale = if sum == 0.0 { 0.0 } else { 1.0 / sum };
-    let (second, third) = (weights[1] * scale, weights[2] * scale);
-    [1.0 - second - third, second, third]
 }
 
 /// How what a fixed pixel shows of a face changes with the pose.

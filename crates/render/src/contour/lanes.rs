@@ -4,12 +4,13 @@
 
 use pulp::{Arch, NullaryFnOnce};
 
-use super::interior::{Motion, add_level, barycentric};
-use super::pixel::Scene;
-use super::surface::{Unlit, coordinates, lit};
-use super::vec3::{Vec3, vec3};
+use super::interior::{Motion, add_level};
+use super::scene::Scene;
 use crate::model::{Albedo, Cell, Mipmap, Texel};
-use crate::pose_loss::{LANES, Lane, LaneSums, Patch, Pixel, Residuals, get, put};
+use crate::projected::barycentric;
+use crate::shading::surface::{Unlit, coordinates, lit};
+use crate::shading::vec3::{Vec3, vec3};
+use crate::view::{LANES, Lane, Patch, Pixel, Sink, get, put};
 
 /// Three vectors, or colors, of each pixel.
 type Nine = [Lane; 9];
@@ -66,12 +67,11 @@ impl Waiting {
         self.patch.count == LANES
     }
 
-    /// Adds the residuals of all that wait; none does afterwards.
+    /// Hands all that wait to `sink`; none does afterwards.
     pub(crate) fn flush<const DERIVATIVES: bool>(
         &mut self,
         scene: &Scene,
-        residuals: &Residuals,
-        sums: &mut LaneSums,
+        sink: &mut impl Sink<DERIVATIVES>,
     ) {
         if self.patch.count == 0 {
             return;
@@ -83,7 +83,7 @@ impl Waiting {
             self.face[l] = self.face[0];
             self.patch.z[l] = self.patch.z[0];
         }
-        self.arch.dispatch(Flush::<DERIVATIVES> { waiting: self, scene, residuals, sums });
+        self.arch.dispatch(Flush::<DERIVATIVES, _> { waiting: self, scene, sink });
         self.patch.count = 0;
     }
 }
@@ -114,45 +114,43 @@ impl Blended {
         self.patch.count == LANES
     }
 
-    /// Adds the residuals of all that wait; none does afterwards.
-    pub(crate) fn flush<const DERIVATIVES: bool>(
-        &mut self,
-        residuals: &Residuals,
-        sums: &mut LaneSums,
-    ) {
+    /// Hands all that wait to `sink`; none does afterwards.
+    pub(crate) fn flush<const DERIVATIVES: bool>(&mut self, sink: &mut impl Sink<DERIVATIVES>) {
         if self.patch.count == 0 {
             return;
         }
         // Lanes without a pixel have no weight.
         let patch = &self.patch;
-        self.arch.dispatch(FlushBlended::<DERIVATIVES> { patch, residuals, sums });
+        self.arch.dispatch(FlushBlended::<DERIVATIVES, _> { patch, sink });
         self.patch.count = 0;
     }
 }
 
-struct FlushBlended<'a, const DERIVATIVES: bool> {
+struct FlushBlended<'a, const DERIVATIVES: bool, S> {
     patch: &'a Patch,
-    residuals: &'a Residuals<'a>,
-    sums: &'a mut LaneSums,
+    sink: &'a mut S,
 }
 
-impl<const DERIVATIVES: bool> NullaryFnOnce for FlushBlended<'_, DERIVATIVES> {
+impl<const DERIVATIVES: bool, S: Sink<DERIVATIVES>> NullaryFnOnce
+    for FlushBlended<'_, DERIVATIVES, S>
+{
     type Output = ();
 
     #[inline(always)]
     fn call(self) {
-        self.residuals.add_colors::<DERIVATIVES>(self.sums, self.patch);
+        self.sink.colors(self.patch);
     }
 }
 
-struct Flush<'a, 'b, const DERIVATIVES: bool> {
+struct Flush<'a, 'b, const DERIVATIVES: bool, S> {
     waiting: &'a mut Waiting,
     scene: &'a Scene<'b>,
-    residuals: &'a Residuals<'a>,
-    sums: &'a mut LaneSums,
+    sink: &'a mut S,
 }
 
-impl<const DERIVATIVES: bool> NullaryFnOnce for Flush<'_, '_, DERIVATIVES> {
+impl<const DERIVATIVES: bool, S: Sink<DERIVATIVES>> NullaryFnOnce
+    for Flush<'_, '_, DERIVATIVES, S>
+{
     type Output = ();
 
     #[inline(always)]
@@ -161,7 +159,7 @@ impl<const DERIVATIVES: bool> NullaryFnOnce for Flush<'_, '_, DERIVATIVES> {
         self.waiting.locate(self.scene);
         self.waiting.color(self.scene);
         self.waiting.shade::<DERIVATIVES>(self.scene);
-        self.residuals.add_patch::<DERIVATIVES>(self.sums, &self.waiting.patch);
+        self.sink.patch(&self.waiting.patch);
     }
 }
 

@@ -7,93 +7,34 @@
 //! the derivative, unless the options ask for them to be softened likewise. Samples within pixels have their slopes between
 //! their sides instead (`footprint.rs`), jumps included.
 
+mod contours;
 mod crease;
+mod cross;
 mod drawing;
 mod footprint;
 mod inner;
 mod interior;
 mod lanes;
-mod light_samples;
 mod near;
 mod outline;
 mod pixel;
-mod sum;
-mod surface;
-mod vec3;
+mod scene;
+mod walk;
 
-use nalgebra::{Isometry3, Point3};
-
-use crate::camera::Camera;
-use crate::light::Light;
-use crate::model::RenderModel;
-use crate::pose_loss::{Residuals, Seen, TileSums, View};
-use crate::posed::Posed;
-use crate::projected::Region;
-use crate::raster::{self, MISS, Visible};
+pub(crate) use contours::ContourView;
 pub(crate) use crease::{Crease, creases};
-pub(crate) use drawing::{Drawing, Step};
-use footprint::Beside;
+pub(crate) use drawing::{Step, falling_step};
 pub(crate) use inner::{Inner, LEAST_STEP, inner_contours};
 pub(crate) use interior::GRAZING;
-pub use light_samples::light_samples;
-pub(crate) use near::Near;
+pub(crate) use outline::{Band, Piece, outline};
+pub(crate) use scene::Scene;
+
+use crate::projected::Region;
+use crate::raster::MISS;
+use crate::view::{Seen, Sink, View};
+use footprint::Beside;
 use near::{Bands, Found, Hit, Place};
-pub(crate) use outline::{Band, Piece, Silhouette, outline};
-pub(crate) use pixel::{Scene, falling_step};
-use sum::BlockSum;
-pub(crate) use surface::{Lighting, Unlit, albedo, posed_normal};
-
-/// A posed model with its contours.
-pub(crate) struct ContourView<'a> {
-    pub(crate) scene: Scene<'a>,
-    /// Columns and rows of the image.
-    size: [usize; 2],
-    region: Region,
-    pub(crate) pieces: Vec<Piece>,
-    inner: Vec<Inner>,
-    creases: Vec<Crease>,
-    pub(crate) visible: Vec<Visible>,
-}
-
-impl<'a> ContourView<'a> {
-    /// Twists turn about `center` (camera frame \[m\]). Besides the pixels that the model may cover, those of `also` are
-    /// visited.
-    pub(crate) fn new(
-        drawing: Drawing,
-        model: &'a RenderModel,
-        pose: &Isometry3<f64>,
-        center: &Point3<f64>,
-        camera: &Camera,
-        light: &Light,
-        also: &Region,
-    ) -> Self {
-        let reach = drawing.step.reach();
-        let posed = Posed::new(model, camera, pose, reach);
-        let lighting = Lighting::new(light, &posed.rotation);
-        let projected = &posed.projected;
-        let region = projected.region.union(also);
-        let (visible, silhouette) = rayon::join(
-            || raster::rasterize(projected, &region),
-            || match projected.region == Region::EMPTY {
-                true => Silhouette::default(),
-                false => outline(projected, &region, reach),
-            },
-        );
-        let least = LEAST_STEP * model.radius() as f32;
-        let inner = inner_contours(projected, &visible, silhouette.covered, |_, _| Some(least));
-        let creases = match drawing.creases && projected.region != Region::EMPTY {
-            false => Vec::new(),
-            true => {
-                let edges = model.creases.iter().map(|i| &model.edges[*i as usize]);
-                creases(projected, &visible, edges, &region, reach, |_| least)
-            }
-        };
-        let twist_center = center.coords.cast();
-        let scene = Scene { posed, lighting, drawing, twist_center };
-        let size = [camera.width, camera.height];
-        Self { scene, size, region, pieces: silhouette.outline, inner, creases, visible }
-    }
-}
+use walk::Walk;
 
 impl ContourView<'_> {
     /// What the pixel at `place` shows, given what was found there.
@@ -162,23 +103,13 @@ impl View for ContourView<'_> {
         }
     }
 
-    fn sum<const DERIVATIVES: bool>(
-        &self,
-        block: usize,
-        residuals: &Residuals,
-        sums: &mut TileSums,
-    ) {
+    fn feed<const DERIVATIVES: bool>(&self, block: usize, sink: &mut impl Sink<DERIVATIVES>) {
         let bands = Bands::new(self, block);
         let clear = bands.clear();
-        let Region { x0, y0, x1, y1 } = bands.visible.region;
-        let tiling = sums.tiling;
-        for rows in tiling.cut(y0..y1) {
-            for columns in tiling.cut(x0..x1) {
-                let window =
-                    Region { x0: columns.start, x1: columns.end, y0: rows.start, y1: rows.end };
-                let sums = sums.at(window.x0, window.y0);
-                BlockSum::<DERIVATIVES>::new(self, &bands, residuals, sums).run(&window, &clear);
-            }
+        for window in sink.windows(&bands.visible.region) {
+            sink.begin(&window);
+            Walk::<DERIVATIVES, _>::new(self, &bands, sink).run(&window, &clear);
+            sink.end();
         }
     }
 }

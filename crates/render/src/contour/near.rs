@@ -1,6 +1,9 @@
 //! What is near each pixel of a block of rows: a face, and the contours and creases within whose bands the pixel lies.
 
-use super::{Band, ContourView, Crease, Inner, Piece};
+use super::contours::ContourView;
+use super::crease::Crease;
+use super::inner::Inner;
+use super::outline::{Band, Piece};
 use crate::model::NONE;
 use crate::projected::Region;
 use crate::raster::{MISS, Visible};

@@ -1,33 +1,18 @@
 //! The blended value of one pixel and its derivatives by the pose.
 
-use nalgebra::{RealField, Vector3, convert};
+use nalgebra::Vector3;
 
-use super::Near;
-use super::drawing::{Drawing, Step};
+use super::drawing::{Step, falling_step};
 use super::footprint::{Around, Beside, Cut};
-use super::interior::{Motion, add_level, barycentric, row};
+use super::interior::{Motion, add_level, row};
+use super::near::Near;
 use super::outline::{Foot, Piece};
-use super::surface::{Lighting, Shaded, albedo, posed_normal, shade};
-use super::vec3::{Vec3, vec3};
-use crate::pose_loss::{Pixel, Row, scaled_sum};
-use crate::posed::Posed;
+use super::scene::Scene;
+use crate::projected::barycentric;
 use crate::shading::SurfacePoint;
-
-/// A posed, lit model, and the point about which twists turn (camera frame).
-pub(crate) struct Scene<'a> {
-    pub(crate) posed: Posed<'a>,
-    pub(crate) lighting: Lighting,
-    pub(crate) drawing: Drawing,
-    pub(crate) twist_center: Vector3<f32>,
-}
-
-/// The smooth step from 1 at −w to 0 at +w, and its derivative.
-#[inline]
-pub(crate) fn falling_step<T: RealField + Copy>(s: T, w: T) -> (T, T) {
-    let (one, two, three): (T, T, T) = (T::one(), convert(2.0), convert(3.0));
-    let x = ((w - s) / (two * w)).clamp(T::zero(), one);
-    (x * x * (three - two * x), -three * x * (one - x) / w)
-}
+use crate::shading::surface::{Shaded, albedo, posed_normal, shade};
+use crate::shading::vec3::{Vec3, vec3};
+use crate::view::{Pixel, Row, scaled_sum};
 
 impl Scene<'_> {
     /// A pixel that `face` covers, with what is near.
@@ -179,12 +164,6 @@ impl Scene<'_> {
         }
     }
 
-    /// The model's center from where twists turn.
-    #[inline(always)]
-    pub(crate) fn level_arm(&self) -> Vec3 {
-        vec3(&(self.posed.center - self.twist_center))
-    }
-
     /// Fades the pixel by its signed distance to the outline (`side` is −1 inside, 1 outside).
     #[inline]
     fn blend<const DERIVATIVES: bool>(
@@ -307,23 +286,5 @@ impl Scene<'_> {
             out[i] = (-along[i] + (turn_b[i] - turn_a[i]) / length) / speed;
         }
         out
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_step_falls_smoothly_over_the_band() {
-        let w = 1.3;
-        assert_eq!(falling_step(-w, w), (1.0, 0.0));
-        assert_eq!(falling_step(w, w).0, 0.0);
-        assert_eq!(falling_step(0.0, w).0, 0.5);
-        for s in [-1.1f32, -0.3, 0.0, 0.9] {
-            let d = 1e-2;
-            let difference = (falling_step(s + d, w).0 - falling_step(s - d, w).0) / (2.0 * d);
-            assert!((difference - falling_step(s, w).1).abs() < 1e-3);
-        }
     }
 }

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::pixel::{Pixel, Row, Seen, View, scaled_sum};
+use crate::view::{Pixel, Row, Seen, View, scaled_sum};
 
 /// A view whose pixels are the means of `samples` by `samples` pixels of a finer one.
 ///

@@ -2,7 +2,7 @@
 
 use prehend_geometry::RobustKernel;
 
-use super::lane::{LANES, Lane};
+use crate::view::{LANES, Lane};
 
 /// [`RobustKernel::loss`] and [`RobustKernel::weight`] at residual `r`.
 ///

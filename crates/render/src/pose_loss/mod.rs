@@ -1,11 +1,13 @@
 //! The loss of a pose: a posed object compared with a segmented image, with derivatives by the pose in closed form.
 
 mod averaged;
+mod block_sums;
 mod check;
+mod counts;
 mod kernel;
-mod lane;
+mod light_samples;
+mod loss;
 mod options;
-mod pixel;
 mod residuals;
 mod sums;
 mod target;
@@ -13,21 +15,21 @@ mod target;
 pub(crate) mod tests;
 mod tiles;
 
-use nalgebra::{Isometry3, Matrix6, Point3, Vector6};
+use nalgebra::{Isometry3, Point3};
 
 use averaged::Averaged;
 pub use check::OptionError;
-pub(crate) use lane::{LANES, Lane, Patch, get, put};
+pub use counts::Counts;
+pub use light_samples::light_samples;
+pub use loss::{Linearized, Loss};
 pub use options::{DepthOptions, LossOptions};
-pub(crate) use pixel::{Pixel, Row, Seen, View, scaled_sum};
-pub(crate) use residuals::Residuals;
-pub use sums::Counts;
+use residuals::Residuals;
+use sums::Sums;
 #[cfg(feature = "gpu")]
 pub(crate) use sums::unpacked;
-pub(crate) use sums::{LaneSums, Sums};
 pub use target::{Target, TargetError};
 pub use tiles::Tile;
-pub(crate) use tiles::{TileSums, Tiling};
+use tiles::Tiling;
 
 use crate::camera::Camera;
 use crate::contour::ContourView;
@@ -37,6 +39,7 @@ use crate::mode::Mode;
 use crate::model::RenderModel;
 use crate::projected::Region;
 use crate::softras::SoftRasView;
+use crate::view::{Seen, View};
 
 /// The largest [`PoseLoss::samples`].
 const MOST_SAMPLES: usize = 16;
@@ -84,42 +87,6 @@ impl Default for PoseLoss {
     fn default() -> Self {
         Self::new(Mode::default(), LossOptions::default())
     }
-}
-
-/// The loss of a pose: (1/N) Σ w ρ(r) with the kernel ρ (½ r² where none is asked for) and N three times the area of the
-/// target's mask \[px\], so that without further channels it is half the mean squared error over the mask's pixels and color
-/// channels.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Loss {
-    /// Sum of the three below.
-    pub total: f64,
-    /// Share of the color.
-    pub color: f64,
-    /// Share of the mask.
-    pub mask: f64,
-    /// Share of the depth.
-    pub depth: f64,
-    /// Numbers of pixels.
-    pub counts: Counts,
-}
-
-impl Loss {
-    /// From the sums of color, mask and depth over all pixels of the target.
-    pub(crate) fn new([color, mask, depth]: [f64; 3], counts: Counts, target: &Target) -> Self {
-        let [color, mask, depth] = [color, mask, depth].map(|sum| sum * target.normalization);
-        Self { total: color + mask + depth, color, mask, depth, counts }
-    }
-}
-
-/// A loss with its derivatives by a left twist of the pose, (translation \[m\], rotation \[rad\]), about a given center.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Linearized {
-    /// The loss.
-    pub loss: Loss,
-    /// Its gradient, Jᵀ W r / N.
-    pub gradient: Vector6<f64>,
-    /// Its Gauss–Newton Hessian, Jᵀ W J / N: the step is −`hessian`⁻¹ `gradient`.
-    pub hessian: Matrix6<f64>,
 }
 
 /// A picture of the object alone, as the mode sees it.

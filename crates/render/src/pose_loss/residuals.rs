@@ -2,57 +2,23 @@
 
 #![allow(clippy::needless_range_loop)] // loops over lanes index several arrays alike
 
-use std::collections::BTreeMap;
 use std::ops::Range;
 
-use rayon::prelude::*;
-
 use super::kernel;
-use super::lane::{LANES, Patch};
 use super::options::{DepthOptions, LossOptions};
-use super::pixel::{Seen, View};
 use super::sums::{LaneSums, Sums};
 use super::target::Target;
-use super::tiles::{TileSums, Tiling};
 use crate::image::DepthImage;
+use crate::view::{LANES, Patch, Seen};
 
 /// What a view is compared with, and how.
 #[derive(Clone, Copy)]
-pub(crate) struct Residuals<'a> {
-    pub(crate) options: &'a LossOptions,
-    pub(crate) target: &'a Target,
+pub(super) struct Residuals<'a> {
+    pub(super) options: &'a LossOptions,
+    pub(super) target: &'a Target,
 }
 
 impl Residuals<'_> {
-    /// Sums the residuals over all pixels of a view.
-    pub(crate) fn total<const DERIVATIVES: bool>(&self, view: &impl View) -> Sums {
-        let tiles = self.by_tiles::<DERIVATIVES>(view, Tiling::WHOLE);
-        let mut total = Sums::new();
-        tiles.into_iter().for_each(|(_, sums)| total.merge(&sums));
-        total
-    }
-
-    /// Sums the residuals over the pixels of a view by tiles, block by block in parallel, added up in a fixed order.
-    pub(crate) fn by_tiles<const DERIVATIVES: bool>(
-        &self,
-        view: &impl View,
-        tiling: Tiling,
-    ) -> BTreeMap<[usize; 2], Sums> {
-        let blocks: Vec<TileSums> = (0..view.blocks())
-            .into_par_iter()
-            .map(|block| {
-                let mut sums = TileSums::new(tiling);
-                view.sum::<DERIVATIVES>(block, self, &mut sums);
-                sums
-            })
-            .collect();
-        let mut total = BTreeMap::new();
-        for (tile, sums) in blocks.into_iter().flatten() {
-            total.entry(tile).or_insert_with(Sums::new).merge(&sums);
-        }
-        total
-    }
-
     /// Adds the cost of a pixel of the mask that shows nothing of the object.
     fn miss(&self, sums: &mut Sums, at: usize) {
         let coverage = self.target.coverage[at];
@@ -65,7 +31,7 @@ impl Residuals<'_> {
 
     /// Whether a known body lies in front of depth `z` \[m\] at pixel `at`; if so, it is counted.
     #[inline]
-    pub(crate) fn hidden(&self, sums: &mut Sums, at: usize, z: f32) -> bool {
+    pub(super) fn hidden(&self, sums: &mut Sums, at: usize, z: f32) -> bool {
         if !self.target.hides(at, z) {
             return false;
         }
@@ -78,7 +44,7 @@ impl Residuals<'_> {
 
     /// Adds the residuals of pixel `at`.
     #[inline]
-    pub(crate) fn add<const DERIVATIVES: bool>(
+    pub(super) fn add<const DERIVATIVES: bool>(
         &self,
         sums: &mut Sums,
         at: usize,
@@ -107,13 +73,13 @@ impl Residuals<'_> {
 
     /// Of each of these pixels, whether it costs something if nothing of the object is seen there.
     #[inline]
-    pub(crate) fn missed_if_empty(&self, at: Range<usize>) -> impl Iterator<Item = bool> {
+    pub(super) fn missed_if_empty(&self, at: Range<usize>) -> impl Iterator<Item = bool> {
         self.target.coverage[at].iter().map(|coverage| *coverage > 0.0)
     }
 
     /// Adds the residuals of pixel `at`, where nothing of the object is seen.
     #[inline]
-    pub(crate) fn add_nothing(&self, sums: &mut Sums, at: usize) {
+    pub(super) fn add_nothing(&self, sums: &mut Sums, at: usize) {
         if self.missed_if_empty(at..at + 1).any(|missed| missed) {
             self.miss(sums, at);
             sums.counts.missed += 1;
@@ -122,7 +88,7 @@ impl Residuals<'_> {
 
     /// Counts pixel `at`, which nothing hides, and adds all of its residuals but those of the color.
     #[inline]
-    pub(crate) fn add_but_color<const DERIVATIVES: bool>(
+    pub(super) fn add_but_color<const DERIVATIVES: bool>(
         &self,
         sums: &mut Sums,
         at: usize,
@@ -162,7 +128,7 @@ impl Residuals<'_> {
 
     /// Adds the residuals of the colors of pixels side by side.
     #[inline(always)]
-    pub(crate) fn add_colors<const DERIVATIVES: bool>(&self, sums: &mut LaneSums, patch: &Patch) {
+    pub(super) fn add_colors<const DERIVATIVES: bool>(&self, sums: &mut LaneSums, patch: &Patch) {
         let options = self.options;
         let mut used = [0.0f32; LANES];
         used[..patch.count].fill(1.0);
@@ -193,7 +159,7 @@ impl Residuals<'_> {
 
     /// Adds the residuals of pixels side by side, none of which is hidden.
     #[inline(always)]
-    pub(crate) fn add_patch<const DERIVATIVES: bool>(&self, sums: &mut LaneSums, patch: &Patch) {
+    pub(super) fn add_patch<const DERIVATIVES: bool>(&self, sums: &mut LaneSums, patch: &Patch) {
         let options = self.options;
         self.add_colors::<DERIVATIVES>(sums, patch);
         if options.mask_weight > 0.0 {
@@ -231,10 +197,12 @@ impl Residuals<'_> {
         }
     }
 
-    /// Whether there is a depth to compare with.
+    /// Counts pixel `at`, whose residuals come in a patch.
     #[inline]
-    pub(crate) fn has_depth(&self, at: usize) -> bool {
-        self.depth().is_some_and(|(_, depth)| depth.pixels()[at] > 0.0)
+    pub(super) fn count_covered(&self, sums: &mut Sums, at: usize) {
+        sums.counts.covered += 1;
+        let compared = self.depth().is_some_and(|(_, depth)| depth.pixels()[at] > 0.0);
+        sums.counts.depth += usize::from(compared);
     }
 
     /// How depth is compared, and with what; a weight of zero leaves it out.

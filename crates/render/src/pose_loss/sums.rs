@@ -4,25 +4,10 @@
 
 use nalgebra::{Matrix6, Vector6};
 
-use super::lane::{LANES, Lane};
-use super::pixel::Row;
+use super::counts::Counts;
+use super::loss::{Linearized, Loss};
 use super::target::Target;
-use super::{Linearized, Loss};
-
-/// Numbers of pixels by what became of them.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Counts {
-    /// The object is seen here.
-    pub covered: usize,
-    /// Within the contour band (inside and outside).
-    pub contour: usize,
-    /// The object or its band lies behind a known body: no residual.
-    pub hidden: usize,
-    /// In the mask but not covered by the object, nor in its band.
-    pub missed: usize,
-    /// Depth was compared.
-    pub depth: usize,
-}
+use crate::view::{LANES, Lane, Row};
 
 /// Σ w r J and the upper triangle of Σ w JᵀJ, row by row.
 pub(crate) const ENTRIES: usize = 27;

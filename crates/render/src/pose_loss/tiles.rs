@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::Linearized;
+use super::loss::Linearized;
 use super::sums::Sums;
 
 /// What the pixels of one square tile of the image bring to a loss.
@@ -18,21 +18,21 @@ pub struct Tile {
 
 /// How an image is cut into square tiles, from its upper left corner on.
 #[derive(Clone, Copy)]
-pub(crate) struct Tiling {
+pub(super) struct Tiling {
     side: usize,
 }
 
 impl Tiling {
     /// One tile for all.
-    pub(crate) const WHOLE: Self = Self { side: usize::MAX };
+    pub(super) const WHOLE: Self = Self { side: usize::MAX };
 
     /// Tiles of `side` pixels, at least one.
-    pub(crate) fn new(side: usize) -> Self {
+    pub(super) fn new(side: usize) -> Self {
         Self { side: side.max(1) }
     }
 
     /// The parts of `range`, of columns or of rows, that lie in one tile each.
-    pub(crate) fn cut(self, range: Range<usize>) -> impl Iterator<Item = Range<usize>> {
+    pub(super) fn cut(self, range: Range<usize>) -> impl Iterator<Item = Range<usize>> {
         let mut from = range.start;
         std::iter::from_fn(move || {
             let to = (from / self.side + 1).saturating_mul(self.side).min(range.end);
@@ -44,30 +44,35 @@ impl Tiling {
 }
 
 /// Sums over the pixels of some tiles.
-pub(crate) struct TileSums {
-    pub(crate) tiling: Tiling,
+pub(super) struct TileSums {
+    pub(super) tiling: Tiling,
     /// Column and row of a tile, and its sums.
     sums: Vec<([usize; 2], Sums)>,
 }
 
 impl TileSums {
-    pub(crate) fn new(tiling: Tiling) -> Self {
+    pub(super) fn new(tiling: Tiling) -> Self {
         Self { tiling, sums: Vec::new() }
     }
 
-    /// The sums of the tile that has pixel (x, y).
-    pub(crate) fn at(&mut self, x: usize, y: usize) -> &mut Sums {
+    /// The place of the sums of the tile that has pixel (x, y).
+    pub(super) fn place(&mut self, x: usize, y: usize) -> usize {
         let tile = [x / self.tiling.side, y / self.tiling.side];
         let known = self.sums.iter().position(|(other, _)| *other == tile);
-        let index = known.unwrap_or_else(|| {
+        known.unwrap_or_else(|| {
             self.sums.push((tile, Sums::new()));
             self.sums.len() - 1
-        });
-        &mut self.sums[index].1
+        })
+    }
+
+    /// The sums at a place.
+    #[inline]
+    pub(super) fn at(&mut self, place: usize) -> &mut Sums {
+        &mut self.sums[place].1
     }
 
     /// To be called after each image row: see [`Sums::end_row`].
-    pub(crate) fn end_row(&mut self) {
+    pub(super) fn end_row(&mut self) {
         self.sums.iter_mut().for_each(|(_, sums)| sums.end_row());
     }
 }

@@ -2,18 +2,10 @@
 
 use nalgebra::Vector3;
 
-use super::pixel::Pixel;
+use super::pixel::{Pixel, PixelAdjoint};
+use super::scene::FaceId;
 use crate::camera::Camera;
 use crate::image::{ImageError, RgbImage};
-
-/// A face of a scene.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct FaceId {
-    /// Place of the object in the scene.
-    pub object: u32,
-    /// Face of its model.
-    pub face: u32,
-}
 
 /// Images of a scene, row-major from the top-left, one entry a pixel.
 #[derive(Clone, Debug, PartialEq)]
@@ -80,15 +72,6 @@ pub struct BufferAdjoints {
     pub normal: Vec<Vector3<f64>>,
 }
 
-/// The adjoints of one pixel.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct PixelAdjoint {
-    pub(super) color: [f64; 3],
-    pub(super) alpha: f64,
-    pub(super) depth: f64,
-    pub(super) normal: Vector3<f64>,
-}
-
 impl BufferAdjoints {
     pub(super) fn fits(&self, pixels: usize) -> bool {
         let lengths = [self.color.len(), self.alpha.len(), self.depth.len(), self.normal.len()];
@@ -104,15 +87,5 @@ impl BufferAdjoints {
             depth: scalar(&self.depth),
             normal: self.normal.get(at).copied().unwrap_or(Vector3::zeros()),
         }
-    }
-}
-
-impl PixelAdjoint {
-    #[inline]
-    pub(super) fn is_zero(&self) -> bool {
-        self.color == [0.0; 3]
-            && self.alpha == 0.0
-            && self.depth == 0.0
-            && self.normal == Vector3::zeros()
     }
 }

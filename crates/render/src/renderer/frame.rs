@@ -4,8 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::buffers::FaceId;
-use super::scene::Scene;
+use super::scene::{FaceId, Scene};
 use crate::camera::Camera;
 use crate::model::{Edge, NONE, RenderModel};
 use crate::posed::{Posed, level};

@@ -24,10 +24,10 @@ mod visibility;
 
 use rayon::prelude::*;
 
-pub use buffers::{BufferAdjoints, Buffers, FaceId};
+pub use buffers::{BufferAdjoints, Buffers};
 pub use gradient::{ObjectGradient, SceneGradient};
 pub use node::{BufferVars, RecordError, SceneVars};
-pub use scene::{PosedModel, Scene};
+pub use scene::{FaceId, PosedModel, Scene};
 
 use crate::mode::Mode;
 use crate::projected::Region;

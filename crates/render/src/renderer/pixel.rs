@@ -2,7 +2,6 @@
 
 use nalgebra::Vector3;
 
-use super::buffers::PixelAdjoint;
 use super::sums::Sums;
 use super::surface::Lit;
 use super::visibility::{BlendAdjoint, Part, PartAdjoint, Visibility};
@@ -16,6 +15,25 @@ pub(super) struct Pixel {
     pub(super) depth: f64,
     pub(super) normal: Vector3<f64>,
     pub(super) face: Option<usize>,
+}
+
+/// The adjoints of one pixel.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PixelAdjoint {
+    pub(super) color: [f64; 3],
+    pub(super) alpha: f64,
+    pub(super) depth: f64,
+    pub(super) normal: Vector3<f64>,
+}
+
+impl PixelAdjoint {
+    #[inline]
+    pub(super) fn is_zero(&self) -> bool {
+        self.color == [0.0; 3]
+            && self.alpha == 0.0
+            && self.depth == 0.0
+            && self.normal == Vector3::zeros()
+    }
 }
 
 /// A pixel of a block: its index, column and row.

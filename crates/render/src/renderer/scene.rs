@@ -46,3 +46,12 @@ impl Scene {
         self
     }
 }
+
+/// A face of a scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FaceId {
+    /// Place of the object in the scene.
+    pub object: u32,
+    /// Face of its model.
+    pub face: u32,
+}

@@ -3,6 +3,8 @@
 mod derivative;
 mod first_order;
 mod lamps;
+pub(crate) mod surface;
+pub(crate) mod vec3;
 
 use nalgebra::Vector3;
 use prehend_autodiff::Scalar;

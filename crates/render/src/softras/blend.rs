@@ -1,20 +1,9 @@
 //! How the fragments of a pixel are blended.
 
+use super::candidate::{Candidate, Part};
 use super::exponential::exp;
 use super::number::Number;
-use super::run::Candidate;
 use super::settings::Settings;
-
-/// A fragment's part in its pixel.
-#[derive(Clone, Copy)]
-pub(crate) struct Part<T> {
-    /// p = sigmoid(−d/σ).
-    pub(crate) presence: T,
-    /// 1 − p, without cancellation.
-    pub(crate) absence: T,
-    /// w = p exp((ζ − ζ_max)/γ).
-    pub(crate) weight: T,
-}
 
 /// The sums of a pixel's blend.
 #[derive(Clone, Copy)]

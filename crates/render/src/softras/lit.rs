@@ -3,9 +3,9 @@
 #![allow(clippy::needless_range_loop)] // closures from elsewhere would be compiled for the plain instructions
 
 use super::number::Number;
-use crate::contour::{Lighting, Unlit, albedo};
 use crate::model::Albedo;
 use crate::posed::Posed;
+use crate::shading::surface::{PosedLight, Unlit, albedo};
 
 /// The most lanes that a texture is sampled for.
 const MOST_LANES: usize = 16;
@@ -82,7 +82,7 @@ fn textured<T: Number>(posed: &Posed, face: usize, b: [T; 3]) -> ([T; 3], [[T; 3
 impl<T: Number> Lit<T> {
     /// At barycentric coordinates `b` of a face.
     #[inline(always)]
-    pub(super) fn new(posed: &Posed, lighting: &Lighting, face: usize, b: [T; 3]) -> Self {
+    pub(super) fn new(posed: &Posed, lighting: &PosedLight, face: usize, b: [T; 3]) -> Self {
         let is = |value: f32| b[0].like(value);
         let zero = is(0.0);
         let corners = &posed.model.normals[face];

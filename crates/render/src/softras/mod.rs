@@ -32,6 +32,7 @@
 
 mod adjoint;
 mod blend;
+mod candidate;
 mod drawn;
 mod exponential;
 mod face;
@@ -54,13 +55,13 @@ use std::sync::OnceLock;
 use nalgebra::{Isometry3, Point3};
 
 use crate::camera::Camera;
-use crate::contour::Lighting;
 use crate::light::Light;
 use crate::mode::SoftRasOptions;
 use crate::model::RenderModel;
-use crate::pose_loss::{Seen, View};
 use crate::posed::Posed;
 use crate::projected::Region;
+use crate::shading::surface::PosedLight;
+use crate::view::{Seen, View};
 pub(crate) use drawn::{Drawn, project};
 pub(crate) use face::Face;
 use number::Number;
@@ -98,7 +99,7 @@ impl<'a> SoftRasView<'a> {
         let settings = Settings::new(options, camera);
         let mut posed = Posed::new(model, camera, pose, settings.reach);
         let region = posed.projected.region.union(also);
-        let lighting = Lighting::new(light, &posed.rotation);
+        let lighting = PosedLight::new(light, &posed.rotation);
         let (mut drawn, mut screen) = (Drawn { faces: Vec::new(), ids: Vec::new() }, Vec::new());
         if posed.projected.region != Region::EMPTY {
             let (rotation, center) = (pose.rotation.to_rotation_matrix(), pose * model.center());

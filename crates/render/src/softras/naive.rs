@@ -3,11 +3,11 @@
 use nalgebra::{Isometry3, Vector2, Vector3};
 
 use crate::camera::Camera;
-use crate::contour::albedo;
 use crate::light::Light;
 use crate::mode::SoftRasOptions;
 use crate::model::{Albedo, RenderModel};
 use crate::posed::Posed;
+use crate::shading::surface::albedo;
 use crate::shading::{Shader, SurfacePoint};
 
 /// What a face looks like from a point of the image.

@@ -14,9 +14,9 @@ use super::number::Number;
 use super::run::{Run, places};
 use super::settings::Settings;
 use crate::camera::Camera;
-use crate::contour::{Lighting, posed_normal};
-use crate::pose_loss::{Pixel, Seen};
 use crate::posed::Posed;
+use crate::shading::surface::{PosedLight, posed_normal};
+use crate::view::{Pixel, Seen};
 
 /// What has a smaller share of the pixel is left out: 64 such fragments are less than 1e-6 of its color.
 pub(crate) const LEAST_SHARE: f32 = 1e-8;
@@ -24,7 +24,7 @@ pub(crate) const LEAST_SHARE: f32 = 1e-8;
 /// A posed, lit model with the faces that are drawn, and the point about which twists turn (camera frame).
 pub(crate) struct Scene<'a> {
     pub(crate) posed: Posed<'a>,
-    pub(crate) lighting: Lighting,
+    pub(crate) lighting: PosedLight,
     pub(crate) settings: Settings,
     pub(crate) camera: Camera,
     /// Column, row \[px\] and Z \[m\] of the vertices.

@@ -1,6 +1,6 @@
 //! The faces that count at the pixels of a short run of them, side by side.
 
-use super::blend::Part;
+use super::candidate::{Candidate, Part};
 use super::face::Face;
 use super::fragment::Fragment;
 use super::number::Number;
@@ -8,18 +8,6 @@ use super::settings::Settings;
 
 /// Pixels whose faces are listed together: at most a vector register's worth is treated at once.
 pub(crate) const RUN: usize = 8;
-
-/// A face that counts at some of the pixels.
-#[derive(Clone, Copy)]
-pub(crate) struct Candidate<T> {
-    pub(crate) face: u32,
-    /// Of plain numbers that come to nothing where the face does not count.
-    pub(crate) fragment: Fragment<T>,
-    /// 1 where the face counts, else 0.
-    pub(crate) counts: T,
-    /// What [`Blend`](super::blend::Blend) finds.
-    pub(crate) part: Part<T>,
-}
 
 /// The faces that count at the pixels of a run, in the order in which they were given: the nearest by depth, of equals
 /// the first.

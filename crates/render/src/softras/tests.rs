@@ -2,9 +2,9 @@
 
 use super::naive::{NaivePixel, naive_picture};
 use super::*;
-use crate::pose_loss::Pixel;
 use crate::pose_loss::tests::lamp;
 use crate::shapes_for_tests::{self, lump, painted, torus};
+use crate::view::Pixel;
 use crate::{LossOptions, Mask, Mode, PoseLoss, Target};
 use nalgebra::{Translation3, UnitQuaternion, Vector3, Vector6};
 use prehend_geometry::TriMesh;

@@ -13,7 +13,8 @@ use crate::image::Mask;
 use crate::light_samples;
 use crate::mode::ContourOptions;
 use crate::shapes_for_tests::{self, lump, painted, torus};
-use nalgebra::{Translation3, UnitQuaternion, Vector3};
+use crate::view::{Pixel, Row};
+use nalgebra::{Matrix6, Translation3, UnitQuaternion, Vector3, Vector6};
 use prehend_geometry::shapes::{cuboid, sphere};
 use prehend_geometry::{RobustKernel, TriMesh};
 

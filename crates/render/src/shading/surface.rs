@@ -9,8 +9,8 @@ use crate::light::Light;
 use crate::model::{Albedo, Texel};
 use crate::posed::Posed;
 
-/// Lighting in f32, in the mesh frame as well.
-pub(crate) struct Lighting {
+/// A light in f32, in the mesh frame as well.
+pub(crate) struct PosedLight {
     pub(crate) ambient: [f32; 3],
     pub(crate) offset: [f32; 3],
     pub(crate) camera: [Vec3; 3],
@@ -19,7 +19,7 @@ pub(crate) struct Lighting {
     pub(crate) rotation: [Vec3; 3],
 }
 
-impl Lighting {
+impl PosedLight {
     pub(crate) fn new(light: &Light, rotation: &Matrix3<f32>) -> Self {
         let camera = light.directional.map(|d| d.cast::<f32>());
         Self {
@@ -115,7 +115,7 @@ pub(crate) fn posed_normal(posed: &Posed, face: usize, b: [f32; 3]) -> Vec3 {
 /// Lit color at barycentric coordinates `b` of a face with normals `corners` at its corners.
 #[inline(always)]
 pub(crate) fn lit<const DERIVATIVES: bool>(
-    lighting: &Lighting,
+    lighting: &PosedLight,
     corners: &[Vec3; 3],
     side: f32,
     b: [f32; 3],
@@ -153,7 +153,7 @@ pub(crate) fn lit<const DERIVATIVES: bool>(
 #[inline]
 pub(crate) fn shade<const DERIVATIVES: bool>(
     posed: &Posed,
-    lighting: &Lighting,
+    lighting: &PosedLight,
     face: usize,
     b: [f32; 3],
 ) -> Shaded {

@@ -2,13 +2,13 @@
 
 use nalgebra::{Isometry3, Vector3};
 
-use super::interior::barycentric;
-use super::surface::{albedo, posed_normal};
+use super::target::Target;
 use crate::light::LightSample;
 use crate::model::RenderModel;
-use crate::pose_loss::Target;
 use crate::posed::Posed;
+use crate::projected::barycentric;
 use crate::raster::{Visible, rasterize};
+use crate::shading::surface::{albedo, posed_normal};
 
 /// What [`Light::fit`](crate::Light::fit) needs: unlit color, normal and observed color where the object is seen inside the
 /// mask, and `margin` pixels to the left, to the right, above and below too; of `most` of these pixels at most, spread evenly over them.

@@ -1,6 +1,6 @@
 //! Vectors of three numbers whose operations always become part of the loop they stand in.
 //!
-//! The loops over lanes are compiled once for each instruction set ([`super::lanes`]); a call left standing in such a
+//! The loops over lanes are compiled once for each instruction set (`contour/lanes.rs`); a call left standing in such a
 //! loop would run with the wrong one and keep the loop from being vectorized.
 
 use nalgebra::Vector3;
