@@ -13,7 +13,7 @@ use prehend_geometry::objects::YcbObject;
 use prehend_geometry::robot::KinematicTree as Tree;
 use prehend_refine::scene::{Hand, Object};
 use prehend_refine::synth::{Grasp, GraspSettings, Grasper};
-use prehend_render::{Camera, Light, RenderModel, SceneObject, render_scene};
+use prehend_render::{Camera, Light, RenderModel, render_scene};
 
 const FRAMES: usize = 100;
 
@@ -91,13 +91,12 @@ fn draw(robot: &Hand, object: &RenderModel, grasp: &Grasp) -> prehend_render::Rg
     for (view, eye) in eyes.into_iter().enumerate() {
         let t_cam_hand = look_at(&Point3::from(eye), &target);
         let t_cam_model = t_cam_hand * grasp.t_hand_object;
-        let mut bodies = vec![SceneObject { model: object, t_cam_model }];
-        for (model, t_cam_model) in robot.render_bodies(&t_cam_hand, &grasp.joints) {
-            bodies.push(SceneObject { model, t_cam_model });
-        }
+        let mut bodies = vec![(object, t_cam_model)];
+        bodies.extend(robot.render_bodies(&t_cam_hand, &grasp.joints));
         let toward = Vector3::new(-0.4, -0.7, -0.6).normalize();
         let light = Light { ambient: [0.45; 3], directional: [toward * 0.55; 3], offset: [0.0; 3] };
-        let image = render_scene(&camera, &bodies, &light, [0.12, 0.13, 0.15], 3);
+        let behind = |_, _| [0.12, 0.13, 0.15];
+        let image = render_scene(&camera, &bodies, 3, |_, point| light.color(point), behind);
         for y in 0..height {
             for x in 0..width {
                 picture.pixels_mut()[y * 3 * width + view * width + x] =

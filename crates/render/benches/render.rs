@@ -18,7 +18,7 @@ use nalgebra::Isometry3;
 use prehend_geometry::shapes::capsule;
 use prehend_render::{
     Backend, Cpu, DepthOptions, Hypothesis, Light, LossOptions, Mode, PoseLoss, PoseProblem,
-    RenderModel, SceneObject, SoftRasOptions, Target, backend, depth_map, render_scene,
+    RenderModel, SoftRasOptions, Target, backend, depth_map, render_scene,
 };
 
 fn main() -> anyhow::Result<()> {
@@ -74,8 +74,7 @@ fn targets(model: &RenderModel, cropped: bool) -> anyhow::Result<(Arc<Target>, A
     let camera = camera(cropped);
     let light = Light::headlight(0.5, 0.4);
     let draw = |model: &RenderModel, light: &Light| {
-        let object = SceneObject { model, t_cam_model: truth() };
-        render_scene(&camera, &[object], light, [0.0; 3], 5)
+        render_scene(&camera, &[(model, truth())], 5, |_, p| light.color(p), |_, _| [0.0; 3])
     };
     let picture = draw(model, &light);
     let white = model.clone().with_uniform_color([1.0; 3]);

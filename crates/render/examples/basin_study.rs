@@ -14,8 +14,8 @@ use nalgebra::{DMatrix, DVector, Isometry3, Vector6};
 use prehend_autodiff::lie::{perturb_about, se3_left_jacobian};
 use prehend_autodiff::optimize::{Criteria, LevenbergMarquardt, NormalEquations};
 use prehend_render::{
-    ContourOptions, DepthImage, Light, LossOptions, Mode, PoseLoss, RenderModel, RgbImage,
-    SceneObject, Target, render_scene,
+    ContourOptions, DepthImage, Light, LossOptions, Mode, PoseLoss, RenderModel, RgbImage, Target,
+    render_scene,
 };
 use rayon::prelude::*;
 
@@ -75,8 +75,8 @@ struct Picture {
 impl Picture {
     fn new(model: &RenderModel) -> Self {
         let draw = |model: &RenderModel| {
-            let object = SceneObject { model, t_cam_model: truth() };
-            render_scene(&camera(false), &[object], &Light::ambient(1.0), [0.0; 3], 9).color
+            let bodies = [(model, truth())];
+            render_scene(&camera(false), &bodies, 9, |_, p| p.albedo, |_, _| [0.0; 3]).color
         };
         let matte = draw(&model.clone().with_uniform_color([1.0; 3]));
         Self { color: draw(model), coverage: matte.pixels().iter().map(|c| c[0]).collect() }

@@ -50,5 +50,5 @@ pub use renderer::{
     BufferAdjoints, BufferVars, Buffers, FaceId, ObjectGradient, PosedModel, RecordError, Renderer,
     Rendering, Scene, SceneGradient, SceneVars,
 };
-pub use scene::{SceneImage, SceneObject, render_scene, render_shaded};
+pub use scene::{SceneImage, render_scene};
 pub use shading::{Lamp, Lighting, Material, Shader, SurfacePoint};

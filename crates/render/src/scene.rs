@@ -1,28 +1,16 @@
 //! Antialiased pictures of several lit bodies.
 
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::Isometry3;
 use rayon::prelude::*;
 
 use crate::camera::Camera;
-use crate::contour::Scene;
 use crate::image::{DepthImage, RgbImage};
-use crate::light::Light;
-use crate::mode::ContourOptions;
 use crate::model::RenderModel;
 use crate::posed::Posed;
-use crate::projected::Region;
+use crate::projected::{Projected, Region, barycentric};
 use crate::raster::{MISS, rasterize};
 use crate::shading::SurfacePoint;
-use crate::shading::surface::PosedLight;
-
-/// A body of a picture.
-#[derive(Clone, Copy, Debug)]
-pub struct SceneObject<'a> {
-    /// Shape and colors.
-    pub model: &'a RenderModel,
-    /// Its pose, mesh to camera frame \[m\].
-    pub t_cam_model: Isometry3<f64>,
-}
+use crate::shading::surface::{albedo, posed_normal};
 
 /// A picture with what is seen where.
 #[derive(Clone, Debug, PartialEq)]
@@ -35,41 +23,26 @@ pub struct SceneImage {
     pub object: Vec<Option<u32>>,
 }
 
-/// Renders `objects` under `light` over a background color, averaging `samples` by `samples` rays a pixel (made
-/// odd, so that one passes through the pixel's center; 3 is good).
+/// Renders `bodies`, each with `t_cam_body`, averaging `samples` by `samples` rays a pixel (made odd, so that one passes through the
+/// pixel's center; 3 is good).
 ///
-/// Bodies behind the camera or with a pose that is not finite are not drawn.
-pub fn render_scene(
-    camera: &Camera,
-    objects: &[SceneObject],
-    light: &Light,
-    background: [f32; 3],
-    samples: usize,
-) -> SceneImage {
-    compose(
-        camera,
-        objects,
-        light,
-        samples,
-        |_, _| background,
-        |_, scene, face, x, y| scene.color(face, x, y),
-    )
-}
-
-/// Like [`render_scene`], with a color of one's own for every visible point and every pixel behind.
-///
-/// `shade` gets the index of the body and the point with its unlit color; `background` the column and row of a pixel.
+/// `shade` gives the color of every visible point, from the index of the body and the point with its unlit color;
+/// `background` that behind all bodies, from column and row of the pixel. Bodies behind the camera or with a pose that is not
+/// finite are not drawn.
 ///
 /// ```
 /// use nalgebra::{Isometry3, Vector3};
-/// use prehend_render::{Camera, RenderModel, SceneObject, render_shaded};
+/// use prehend_render::{Camera, Light, RenderModel, render_scene};
 ///
 /// let cube = prehend_geometry::shapes::cuboid(Vector3::repeat(0.1));
 /// let model = RenderModel::new(&cube)?;
 /// let camera = Camera { fx: 60.0, fy: 60.0, cx: 15.5, cy: 15.5, width: 32, height: 32 };
-/// let body = SceneObject { model: &model, t_cam_model: Isometry3::translation(0.0, 0.0, 0.5) };
+/// let body = (&model, Isometry3::translation(0.0, 0.0, 0.5));
+/// let light = Light::headlight(0.5, 0.4);
+/// let lit = render_scene(&camera, &[body], 3, |_, point| light.color(point), |_, _| [0.1; 3]);
+/// assert_eq!(lit.object[15 * 32 + 15], Some(0));
 /// // Normals as colors, over a picture that darkens downwards.
-/// let picture = render_shaded(
+/// let picture = render_scene(
 ///     &camera,
 ///     &[body],
 ///     3,
@@ -80,84 +53,19 @@ pub fn render_scene(
 /// assert_eq!(picture.color.get(0, 31), Some([0.0; 3]));
 /// # Ok::<(), prehend_render::ModelError>(())
 /// ```
-pub fn render_shaded(
+pub fn render_scene(
     camera: &Camera,
-    objects: &[SceneObject],
+    bodies: &[(&RenderModel, Isometry3<f64>)],
     samples: usize,
     shade: impl Fn(usize, &SurfacePoint<f32>) -> [f32; 3] + Sync,
     background: impl Fn(usize, usize) -> [f32; 3] + Sync,
 ) -> SceneImage {
-    let dark = Light::ambient(0.0);
-    compose(camera, objects, &dark, samples, background, |body, scene, face, x, y| {
-        shade(body, &scene.point(face, x, y))
-    })
-}
-
-/// Nearest face of each sample.
-struct Nearest {
-    /// The samples looked at: whole pixels.
-    region: Region,
-    inverse_z: Vec<f32>,
-    body: Vec<u32>,
-    face: Vec<u32>,
-}
-
-impl Nearest {
-    fn new(scenes: &[Scene], samples: usize) -> Self {
-        let all = scenes.iter().map(|s| s.posed.projected.region);
-        let Region { x0, y0, x1, y1 } = all.fold(Region::EMPTY, |a, b| a.union(&b));
-        let pixels = Region {
-            x0: x0 / samples,
-            y0: y0 / samples,
-            x1: x1.div_ceil(samples),
-            y1: y1.div_ceil(samples),
-        };
-        let region = pixels.scaled(samples);
-        let count = region.width() * (region.y1 - region.y0);
-        let (body, face) = (vec![0; count], vec![MISS; count]);
-        let mut nearest = Self { region, inverse_z: vec![0.0; count], body, face };
-        for (index, scene) in scenes.iter().enumerate() {
-            nearest.draw(index as u32, scene);
-        }
-        nearest
-    }
-
-    fn draw(&mut self, index: u32, scene: &Scene) {
-        let width = self.region.width();
-        for part in rasterize(&scene.posed.projected, &scene.posed.projected.region) {
-            for (i, &face) in part.face.iter().enumerate().filter(|(_, face)| **face != MISS) {
-                let (x, y) = part.position(i);
-                let at = (y - self.region.y0) * width + x - self.region.x0;
-                if part.inverse_z[i] > self.inverse_z[at] {
-                    self.inverse_z[at] = part.inverse_z[i];
-                    self.body[at] = index;
-                    self.face[at] = face;
-                }
-            }
-        }
-    }
-}
-
-fn in_view<'a>(body: &SceneObject<'a>, fine: &Camera, light: &Light) -> Scene<'a> {
-    // Mip levels follow the picture's own pixels: finer ones would only be averaged again.
-    let posed = Posed::new(body.model, fine, &body.t_cam_model, 0.0);
-    let lighting = PosedLight::new(light, &posed.rotation);
-    let drawing = ContourOptions::default().drawing(1);
-    Scene { posed, lighting, drawing, twist_center: Vector3::zeros() }
-}
-
-fn compose(
-    camera: &Camera,
-    objects: &[SceneObject],
-    light: &Light,
-    samples: usize,
-    background: impl Fn(usize, usize) -> [f32; 3] + Sync,
-    color: impl Fn(usize, &Scene, u32, f32, f32) -> [f32; 3] + Sync,
-) -> SceneImage {
     let samples = samples.max(1) | 1;
     let fine = camera.scaled(samples as f64);
-    let scenes: Vec<Scene> = objects.iter().map(|body| in_view(body, &fine, light)).collect();
-    let nearest = Nearest::new(&scenes, samples);
+    // Mip levels follow the picture's own pixels: finer ones would only be averaged again.
+    let posed: Vec<Posed<'_>> =
+        bodies.iter().map(|(model, pose)| Posed::new(model, &fine, pose, 0.0)).collect();
+    let nearest = Nearest::new(&posed, samples);
     let Region { x0, y0, x1, y1 } = nearest.region;
     let (inside_x, inside_y) = (x0 / samples..x1 / samples, y0 / samples..y1 / samples);
     let pixel = |x: usize, y: usize| {
@@ -177,7 +85,7 @@ fn compose(
                     MISS => behind,
                     face => {
                         let body = nearest.body[i] as usize;
-                        color(body, &scenes[body], face, u, v)
+                        shade(body, &point(&posed[body], face, u, v))
                     }
                 };
                 (0..3).for_each(|c| sum[c] += seen[c]);
@@ -208,10 +116,69 @@ fn compose(
     image
 }
 
+/// The visible point of a face at pixel (x, y), with its unlit color.
+fn point(posed: &Posed, face: u32, x: f32, y: f32) -> SurfacePoint<f32> {
+    let b = barycentric(posed.projected.corners(face as usize), x, y);
+    let [p, q, r] = posed.model.faces[face as usize].map(|v| posed.position[v as usize]);
+    SurfacePoint {
+        position: p * b[0] + q * b[1] + r * b[2],
+        normal: posed_normal(posed, face as usize, b).into(),
+        albedo: albedo(posed, face as usize, b).color,
+    }
+}
+
+/// Nearest face of each sample.
+struct Nearest {
+    /// The samples looked at: whole pixels.
+    region: Region,
+    inverse_z: Vec<f32>,
+    body: Vec<u32>,
+    face: Vec<u32>,
+}
+
+impl Nearest {
+    fn new(bodies: &[Posed], samples: usize) -> Self {
+        let all = bodies.iter().map(|body| body.projected.region);
+        let Region { x0, y0, x1, y1 } = all.fold(Region::EMPTY, |a, b| a.union(&b));
+        let pixels = Region {
+            x0: x0 / samples,
+            y0: y0 / samples,
+            x1: x1.div_ceil(samples),
+            y1: y1.div_ceil(samples),
+        };
+        let region = pixels.scaled(samples);
+        let count = region.width() * (region.y1 - region.y0);
+        let (body, face) = (vec![0; count], vec![MISS; count]);
+        let mut nearest = Self { region, inverse_z: vec![0.0; count], body, face };
+        for (index, body) in bodies.iter().enumerate() {
+            nearest.draw(index as u32, &body.projected);
+        }
+        nearest
+    }
+
+    fn draw(&mut self, index: u32, projected: &Projected) {
+        let width = self.region.width();
+        for part in rasterize(projected, &projected.region) {
+            for (i, &face) in part.face.iter().enumerate().filter(|(_, face)| **face != MISS) {
+                let (x, y) = part.position(i);
+                let at = (y - self.region.y0) * width + x - self.region.x0;
+                if part.inverse_z[i] > self.inverse_z[at] {
+                    self.inverse_z[at] = part.inverse_z[i];
+                    self.body[at] = index;
+                    self.face[at] = face;
+                }
+            }
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use nalgebra::Vector3;
     use prehend_geometry::shapes::cuboid;
+
+    use super::*;
+    use crate::light::Light;
 
     #[test]
     fn bodies_hide_each_other_and_edges_are_averaged() {
@@ -222,12 +189,11 @@ mod tests {
         };
         let (near, far) = (body(0.0505, [1.0, 0.0, 0.0]), body(0.2, [0.0, 1.0, 0.0]));
         let at = |x: f64, z: f64| Isometry3::translation(x, 0.0, z);
-        let objects = [
-            SceneObject { model: &far, t_cam_model: at(0.0, 1.2) },
-            SceneObject { model: &near, t_cam_model: at(0.0, 0.5505) },
-            SceneObject { model: &near, t_cam_model: at(0.0, -0.5) },
-        ];
-        let picture = render_scene(&camera, &objects, &Light::ambient(1.0), [0.0, 0.0, 1.0], 3);
+        let objects = [(&far, at(0.0, 1.2)), (&near, at(0.0, 0.5505)), (&near, at(0.0, -0.5))];
+        let draw = |samples| {
+            render_scene(&camera, &objects, samples, |_, p| p.albedo, |_, _| [0.0, 0.0, 1.0])
+        };
+        let picture = draw(3);
         assert_eq!(picture.color.get(31, 23), Some([1.0, 0.0, 0.0]));
         assert_eq!(picture.object[23 * 64 + 31], Some(1));
         assert!((picture.depth.get(31, 23).unwrap() - 0.5).abs() < 1e-6);
@@ -238,7 +204,7 @@ mod tests {
         assert_eq!((picture.object[2], picture.depth.get(2, 0)), (None, Some(0.0)));
         // Its border at 21.4 leaves the first of three samples of column 21, at 20.67, 21 and 21.33.
         assert_eq!(picture.object[23 * 64 + 21], Some(0));
-        let even = render_scene(&camera, &objects, &Light::ambient(1.0), [0.0, 0.0, 1.0], 2);
+        let even = draw(2);
         assert_eq!(even, picture);
     }
 
@@ -246,10 +212,9 @@ mod tests {
     fn the_light_shades_by_the_normal() {
         let camera = Camera { fx: 100.0, fy: 100.0, cx: 15.5, cy: 15.5, width: 32, height: 32 };
         let model = RenderModel::new(&cuboid(Vector3::repeat(0.1))).unwrap();
-        let object =
-            SceneObject { model: &model, t_cam_model: Isometry3::translation(0.0, 0.0, 0.6) };
+        let body = (&model, Isometry3::translation(0.0, 0.0, 0.6));
         let light = Light::headlight(0.25, 0.5);
-        let picture = render_scene(&camera, &[object], &light, [0.0; 3], 1);
+        let picture = render_scene(&camera, &[body], 1, |_, p| light.color(p), |_, _| [0.0; 3]);
         // Mid-gray faces the camera: 0.5 (0.25 + 0.5).
         let color = picture.color.get(15, 15).unwrap();
         color.iter().for_each(|c| assert!((c - 0.375).abs() < 1e-6));

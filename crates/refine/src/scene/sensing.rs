@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Vector3};
 use prehend_geometry::SplitMix64;
 use prehend_geometry::hand::Taxel;
-use prehend_render::{Camera, Light, Mask, SceneObject, render_scene};
+use prehend_render::{Camera, Light, Mask, render_scene};
 
 use super::{Hand, HandMeasurement, Object, Observation};
 
@@ -34,10 +34,8 @@ impl HeldObject<'_> {
         noise: &mut SplitMix64,
     ) -> Observation {
         let Self { camera, object, hand, joints, gravity } = *self;
-        let mut bodies = vec![SceneObject { model: &object.model, t_cam_model: *t_cam_object }];
-        for (model, t_cam_model) in hand.render_bodies(t_cam_hand, joints) {
-            bodies.push(SceneObject { model, t_cam_model });
-        }
+        let mut bodies = vec![(&object.model, *t_cam_object)];
+        bodies.extend(hand.render_bodies(t_cam_hand, joints));
         let toward = Vector3::new(-0.4, -0.7, -0.6).normalize();
         let warm = [0.62, 0.58, 0.52];
         let light = Light {
@@ -45,7 +43,8 @@ impl HeldObject<'_> {
             directional: warm.map(|s| toward * s),
             offset: [0.0; 3],
         };
-        let mut image = render_scene(&camera, &bodies, &light, [0.12, 0.13, 0.15], 3);
+        let behind = |_, _| [0.12, 0.13, 0.15];
+        let mut image = render_scene(&camera, &bodies, 3, |_, point| light.color(point), behind);
         for value in image.color.pixels_mut().iter_mut().flatten() {
             *value = (*value + (COLOR_NOISE * noise.normal()) as f32).clamp(0.0, 1.0);
         }

@@ -11,7 +11,7 @@ use prehend_refine::evaluate::metrics::{oe_deg, pe_cm};
 use prehend_refine::refine;
 use prehend_refine::scene::{Hand, HandMeasurement, Object, Observation};
 use prehend_refine::strategy::{GradientKind, Heuristic};
-use prehend_render::{Camera, Light, Mask, RenderModel, SceneObject, render_scene};
+use prehend_render::{Camera, Light, Mask, RenderModel, render_scene};
 
 const GRIPPER: &str = r#"<robot name="gripper">
   <link name="palm"><collision><origin xyz="0 0 -0.02"/><geometry><box size="0.05 0.12 0.04"/></geometry></collision></link>
@@ -64,16 +64,13 @@ impl Setting {
             self.robot.render_bodies(&self.t_cam_robot, &self.joints);
         let model = RenderModel::new(&self.object.mesh).unwrap();
         bodies.insert(0, (&model, self.truth()));
-        let bodies: Vec<SceneObject> = bodies
-            .into_iter()
-            .map(|(model, t_cam_model)| SceneObject { model, t_cam_model })
-            .collect();
         let light = Light {
             ambient: [0.5; 3],
             directional: [Vector3::new(-0.2, -0.4, -0.3); 3],
             offset: [0.0; 3],
         };
-        let seen = render_scene(&CAMERA, &bodies, &light, [0.1; 3], 3);
+        let seen =
+            render_scene(&CAMERA, &bodies, 3, |_, point| light.color(point), |_, _| [0.1; 3]);
         let mut mask = Mask::filled(CAMERA.width, CAMERA.height, false);
         for (set, body) in mask.pixels_mut().iter_mut().zip(&seen.object) {
             *set = *body == Some(0);

@@ -27,7 +27,6 @@ pub(crate) use drawing::{Step, falling_step};
 pub(crate) use inner::{Inner, LEAST_STEP, inner_contours};
 pub(crate) use interior::GRAZING;
 pub(crate) use outline::{Band, Piece, outline};
-pub(crate) use scene::Scene;
 
 use crate::projected::Region;
 use crate::raster::MISS;

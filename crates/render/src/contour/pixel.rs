@@ -9,8 +9,7 @@ use super::near::Near;
 use super::outline::{Foot, Piece};
 use super::scene::Scene;
 use crate::projected::barycentric;
-use crate::shading::SurfacePoint;
-use crate::shading::surface::{Shaded, albedo, posed_normal, shade};
+use crate::shading::surface::{Shaded, posed_normal, shade};
 use crate::shading::vec3::{Vec3, vec3};
 use crate::view::{Pixel, Row, scaled_sum};
 
@@ -120,25 +119,6 @@ impl Scene<'_> {
             self.foot_rows(piece, &shaded, &slide, &mut pixel);
         }
         pixel
-    }
-
-    /// Color of a face at pixel (x, y), unblended.
-    pub(crate) fn color(&self, face: u32, x: f32, y: f32) -> [f32; 3] {
-        let b = barycentric(self.posed.projected.corners(face as usize), x, y);
-        shade::<false>(&self.posed, &self.lighting, face as usize, b).color
-    }
-
-    /// The visible point of a face at pixel (x, y), with its unlit color.
-    pub(crate) fn point(&self, face: u32, x: f32, y: f32) -> SurfacePoint<f32> {
-        let corners = self.posed.projected.corners(face as usize);
-        let b = barycentric(corners, x, y);
-        let [p, q, r] =
-            self.posed.model.faces[face as usize].map(|v| self.posed.position[v as usize]);
-        SurfacePoint {
-            position: p * b[0] + q * b[1] + r * b[2],
-            normal: posed_normal(&self.posed, face as usize, b).into(),
-            albedo: albedo(&self.posed, face as usize, b).color,
-        }
     }
 
     /// Unit normal of a face at pixel (x, y), camera frame.

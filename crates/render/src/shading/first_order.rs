@@ -6,6 +6,15 @@ use prehend_autodiff::Scalar;
 use super::{Shader, SurfacePoint};
 use crate::light::Light;
 
+impl Light {
+    /// The color of a visible point.
+    #[inline]
+    pub fn color(&self, point: &SurfacePoint<f32>) -> [f32; 3] {
+        let normal = point.normal.cast::<f64>();
+        [0, 1, 2].map(|k| point.albedo[k] * self.factor(k, &normal) as f32 + self.offset[k] as f32)
+    }
+}
+
 impl Shader for Light {
     /// For each channel the ambient factor, the directional vector and the offset.
     fn parameters(&self) -> Vec<f64> {

@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Vector3};
 use prehend_geometry::SplitMix64;
 use prehend_geometry::robot::{Drive, Motion};
 use prehend_render::{
-    Camera, Mask, RenderModel, SceneImage, SceneObject, SurfacePoint, depth_map, render_shaded,
+    Camera, Mask, RenderModel, SceneImage, SurfacePoint, depth_map, render_scene,
 };
 
 use super::calibration::Miscalibration;
@@ -101,14 +101,12 @@ impl<'a> Rig<'a> {
     ) -> SceneImage {
         let lights = self.settings.light.draw(bodies, &-gravity, noise);
         let (wall, behind) = self.settings.background.draw(&self.camera, noise);
-        let drawn: Vec<_> =
-            bodies.iter().map(|(model, pose)| SceneObject { model, t_cam_model: *pose }).collect();
         let shade = |body: usize, point: &SurfacePoint<f32>| {
             let paint = self.paint[[0, 2, 1, 2][body % 4]];
             let albedo = if body == 0 { point.albedo } else { paint };
             lights.shade(point, albedo)
         };
-        let mut picture = render_shaded(&self.camera, &drawn, SAMPLES, shade, |x, y| {
+        let mut picture = render_scene(&self.camera, bodies, SAMPLES, shade, |x, y| {
             wall.pixels()[y * self.camera.width + x]
         });
         for (z, far) in picture.depth.pixels_mut().iter_mut().zip(behind.pixels()) {

@@ -2,7 +2,7 @@
 //! sees, which knows nothing of contours.
 
 use super::*;
-use crate::scene::{SceneObject, render_scene};
+use crate::scene::render_scene;
 use prehend_geometry::objects::YcbObject;
 
 /// Samples a pixel, across and down.
@@ -38,8 +38,8 @@ impl Scene<'_> {
     }
 
     fn picture(&self, window: &Window, pose: &Isometry3<f64>) -> RgbImage {
-        let object = SceneObject { model: self.model, t_cam_model: *pose };
-        render_scene(&window.camera, &[object], &self.light, [0.0; 3], SAMPLES).color
+        let (camera, bodies) = (&window.camera, [(self.model, *pose)]);
+        render_scene(camera, &bodies, SAMPLES, |_, p| self.light.color(p), |_, _| [0.0; 3]).color
     }
 
     /// What a camera sees of the object at `pose`; whatever it touches belongs to the mask.
@@ -210,8 +210,8 @@ fn supersampled_error(
     light: &Light,
     target: &Target,
 ) -> f64 {
-    let object = SceneObject { model, t_cam_model: *pose };
-    let picture = render_scene(target.camera(), &[object], light, [0.0; 3], 9);
+    let bodies = [(model, *pose)];
+    let picture = render_scene(target.camera(), &bodies, 9, |_, p| light.color(p), |_, _| [0.0; 3]);
     let mut sum = 0.0;
     for (ours, theirs) in picture.color.pixels().iter().zip(&target.color) {
         (0..3).for_each(|k| sum += f64::from(ours[k] - theirs[k]).powi(2));
@@ -232,8 +232,9 @@ fn gradients_match_differences_of_supersampled_pictures() {
             let mut noise = Noise(70 + seed);
             let truth = pose(&mut noise);
             let center = truth * model.center();
-            let object = SceneObject { model: &model, t_cam_model: truth };
-            let picture = render_scene(&camera(), &[object], &light, [0.0; 3], 9);
+            let bodies = [(&model, truth)];
+            let picture =
+                render_scene(&camera(), &bodies, 9, |_, p| light.color(p), |_, _| [0.0; 3]);
             let mask = picture.color.pixels().iter().map(|c| *c != [0.0; 3]).collect();
             let mask = Mask::new(160, 120, mask).unwrap();
             let target = Target::new(camera(), &picture.color, &mask).unwrap();
