@@ -109,6 +109,9 @@ fn write(rows: &[Vec<RgbImage>], path: &Path) -> anyhow::Result<()> {
         }
     }
     let whole = RgbImage::new(MOMENTS * width, rows.len() * height, pixels)?;
+    if let Some(folder) = path.parent() {
+        std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+    }
     whole.save(path).with_context(|| path.display().to_string())?;
     Ok(())
 }

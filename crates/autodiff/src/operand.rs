@@ -1,6 +1,5 @@
 //! One way for every scalar through an operation that brings its own derivative.
 
-use crate::differentiable::Differentiable;
 use crate::fwd::Fwd;
 use crate::record::custom;
 use crate::scalar::Scalar;
@@ -20,9 +19,6 @@ pub trait CustomJvp {
 /// Code over `S: Operand` calls [`solve`](crate::solve) and [`implicit`](crate::implicit) with the same
 /// line for every scalar. Derivatives of such operations are of first order.
 pub trait Operand: Scalar {
-    /// Whether no derivative passes through this number.
-    fn is_constant(self) -> bool;
-
     /// The results `outputs` of `operation` on `inputs`, with its derivatives as far as this scalar
     /// carries any. Inputs may be constants; if all are, so are the results.
     ///
@@ -38,11 +34,6 @@ pub trait Operand: Scalar {
 macro_rules! plain_operand {
     ($t:ty) => {
         impl Operand for $t {
-            #[inline]
-            fn is_constant(self) -> bool {
-                true
-            }
-
             fn operation(_: &[Self], outputs: &[f64], _: impl CustomJvp + CustomVjp) -> Vec<Self> {
                 outputs.iter().map(|&value| Self::constant(value)).collect()
             }
@@ -54,11 +45,6 @@ plain_operand!(f32);
 plain_operand!(f64);
 
 impl<const N: usize> Operand for Fwd<N> {
-    #[inline]
-    fn is_constant(self) -> bool {
-        Differentiable::is_constant(self)
-    }
-
     fn operation(
         inputs: &[Self],
         outputs: &[f64],
@@ -83,17 +69,12 @@ impl<const N: usize> Operand for Fwd<N> {
 }
 
 impl Operand for Var {
-    #[inline]
-    fn is_constant(self) -> bool {
-        Differentiable::is_constant(self)
-    }
-
     fn operation(
         inputs: &[Self],
         outputs: &[f64],
         operation: impl CustomJvp + CustomVjp,
     ) -> Vec<Self> {
-        if inputs.iter().all(|input| Operand::is_constant(*input)) {
+        if inputs.iter().all(|input| Scalar::is_constant(*input)) {
             return outputs.iter().map(|&value| Self::constant(value)).collect();
         }
         custom(inputs, outputs, operation)
@@ -148,7 +129,7 @@ mod tests {
         let recording = Recording::start();
         let a = recording.variable(3.0);
         let constants = product_and_sum(Var::from(3.0), Var::from(5.0));
-        assert!(constants.iter().all(|result| Operand::is_constant(*result)));
+        assert!(constants.iter().all(|result| Scalar::is_constant(*result)));
         assert_eq!(recording.statistics().nodes, 1);
         let half = product_and_sum(a, Var::from(5.0));
         assert_eq!(recording.gradient(half[0]).wrt(a), 5.0);

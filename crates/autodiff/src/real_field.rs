@@ -169,12 +169,12 @@ let modulus = num_traits::Signed::abs(&self);
                 // Partials of inactive operands may be NaN (a logarithm of a negative base), so they
                 // are not computed rather than multiplied by zero.
                 let at_zero = x.value() == 0.0;
-                let by_base = if self.is_constant() || (at_zero && e.value() == 0.0) {
+                let by_base = if Differentiable::is_constant(self) || (at_zero && e.value() == 0.0) {
                     Self::inner(0.0)
                 } else {
                     e * x.powf(e - Self::inner(1.0))
                 };
-                let by_exponent = if n.is_constant() || (at_zero && value.value() == 0.0) {
+                let by_exponent = if Differentiable::is_constant(n) || (at_zero && value.value() == 0.0) {
                     Self::inner(0.0)
                 } else {
                     value * x.ln()
@@ -271,7 +271,13 @@ let modulus = num_traits::Signed::abs(&self);
             }
             #[inline]
             fn is_constant_zero(self) -> bool {
-                self.is_constant() && self.primal().is_constant_zero()
+                crate::differentiable::Differentiable::is_constant(self)
+                    && self.primal().is_constant_zero()
+            }
+            #[inline]
+            fn is_constant(self) -> bool {
+                crate::differentiable::Differentiable::is_constant(self)
+                    && self.primal().is_constant()
             }
             $($own)*
         }

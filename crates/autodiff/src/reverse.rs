@@ -48,7 +48,7 @@ impl Differentiable for Var {
 
     #[inline(always)]
     fn binary(self, other: Self, value: f64, [da, db]: [f64; 2]) -> Self {
-        match (self.is_constant(), other.is_constant()) {
+        match (Differentiable::is_constant(self), Differentiable::is_constant(other)) {
             (_, true) => self.unary(value, da),
             (true, false) => other.unary(value, db),
             (false, false) => {

@@ -159,11 +159,8 @@ pub trait Scalar: RealField + Copy + Default {
     /// Whether this is the constant 0, which moves in no direction.
     fn is_constant_zero(self) -> bool;
 
-    /// Whether this carries no derivatives.
-    #[inline]
-    fn is_constant(&self) -> bool {
-        self.plus(-self.value()).is_constant_zero()
-    }
+    /// Whether no derivative passes through this number.
+    fn is_constant(self) -> bool;
 
     /// `self` times each of `derivative`.
     #[doc(hidden)]
@@ -312,6 +309,11 @@ macro_rules! plain_scalar {
             #[inline]
             fn is_constant_zero(self) -> bool {
                 self == 0.0
+            }
+
+            #[inline]
+            fn is_constant(self) -> bool {
+                true
             }
 
             $($own)*

@@ -200,7 +200,7 @@ fn conjugate<S: Scalar>(
     rotation: &UnitQuaternion<S>,
     vector: &Vector3<S>,
 ) -> Vector3<S> {
-    if S::RECORDED && matrix.iter().all(Scalar::is_constant) {
+    if S::RECORDED && matrix.iter().all(|x| x.is_constant()) {
         return conjugated(rotation, &matrix.map(S::value), vector);
     }
     let r = rotation.to_rotation_matrix();

@@ -15,13 +15,13 @@ const MARGIN: [f64; 2] = [1e-3, 4e-3];
 /// Steps for which a search for near samples should serve.
 const STEPS: f64 = 2.0;
 
-/// Samples of a contact which cost no more to ask than to look for.
+/// Up to so many samples cost no more to ask than to look for near ones.
 const FEW: usize = 8;
 
-/// A world that only knows the samples near to a field. The others exert no force, so results are the same to the last bit.
+/// A world in which contacts of more than [`FEW`] samples know only those near to the field. The others exert no force, so results are the same to the last bit.
 pub(crate) struct BroadPhase<S: Scalar> {
     world: Option<World<S>>,
-    /// The contacts that are looked after, and how far the samples of each are from their body's center of mass \[m\].
+    /// The contacts whose near samples are looked for, and how far the samples of each are from their body's center of mass \[m\].
     followed: Vec<(usize, f64)>,
     /// For each of those, the body with the samples as the field saw it when near ones were looked for.
     made_at: Vec<State>,
@@ -88,12 +88,14 @@ impl<S: Scalar> BroadPhase<S> {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::Vector3;
+    use std::sync::Arc;
+
+    use nalgebra::{Isometry3, Vector3};
 
     use crate::scenes::{bowl, egg_on, floor};
     use crate::{
-        BackwardEuler, GapSmoothing, Integrator, RungeKutta4, SemiImplicitEuler, TimeSteps,
-        VelocityVerlet,
+        BackwardEuler, Body, ContactBodies, GapSmoothing, Integrator, RigidBody, RungeKutta4,
+        SemiImplicitEuler, State, Surface, TimeSteps, VelocityVerlet, World,
     };
 
     fn assert_same(integrator: &impl Integrator, gap: f64, dt: f64, steps: usize) {
@@ -101,12 +103,45 @@ mod tests {
             let (world, mut states) = egg_on(field, GapSmoothing::Softplus { width: 1e-5 });
             states[1].pose.translation.z += gap;
             states[1].linear = Vector3::zeros();
-            let mut expected = states.clone();
-            let compare = |step, states: &[_]| {
-                expected = world.step(integrator, &expected, step).unwrap();
-                assert_eq!(expected, states, "{step:?}");
-            };
-            world.simulate_with(integrator, &states, TimeSteps { dt, steps }, compare).unwrap();
+            assert_steps_alike(&world, &states, integrator, dt, steps);
+        }
+    }
+
+    /// A rollout goes where single steps, which look at all samples, go.
+    fn assert_steps_alike(
+        world: &World,
+        states: &[State],
+        integrator: &impl Integrator,
+        dt: f64,
+        steps: usize,
+    ) {
+        let mut expected = states.to_vec();
+        let compare = |step, states: &[_]| {
+            expected = world.step(integrator, &expected, step).unwrap();
+            assert_eq!(expected, states, "{step:?}");
+        };
+        world.simulate_with(integrator, states, TimeSteps { dt, steps }, compare).unwrap();
+    }
+
+    #[test]
+    fn contacts_of_few_samples_come_and_go_beside_others() {
+        let ball = RigidBody::ball(0.5, 0.05).unwrap();
+        let surface = Arc::new(Surface::ball(0.05).unwrap());
+        for egg_too in [false, true] {
+            let (mut world, mut states) = egg_on(floor(), GapSmoothing::Softplus { width: 1e-5 });
+            let law = Arc::clone(world.contacts[0].law());
+            let id = world.add(Body::free("ball", ball).with_surface(Arc::clone(&surface)));
+            let mut contacts = std::mem::take(&mut world.contacts);
+            let field = contacts[0].bodies.field;
+            let bodies = ContactBodies { samples: id, field };
+            world.add_contact(bodies, law, GapSmoothing::Hard).unwrap();
+            if egg_too {
+                world.contacts.append(&mut contacts);
+            }
+            let mut rolling = ball.at_rest(&Isometry3::translation(0.5, 0.0, 0.0495));
+            rolling.linear.x = 0.3;
+            states.push(rolling);
+            assert_steps_alike(&world, &states, &SemiImplicitEuler, 1e-3, 200);
         }
     }
 

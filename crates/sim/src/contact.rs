@@ -16,6 +16,7 @@ pub mod law;
 pub(crate) mod law_checks;
 pub(crate) mod moved;
 pub mod normal;
+pub(crate) mod param_values;
 pub mod parameters;
 pub mod patch;
 pub mod point;

@@ -16,8 +16,8 @@ use crate::contact::dynamic::DynContactLaw;
 use crate::contact::force_jump::jumps;
 use crate::contact::gap_smoothing::GapSmoothing;
 use crate::error::SimulationError;
-use motion::Specimen;
-use point_contact::{DEPTH, GRAVITY, PointContact};
+use motion::{GRAVITY, Specimen};
+use point_contact::{DEPTH, PointContact};
 
 pub use curves::Curve;
 pub use finding::{Finding, Verdict};

@@ -223,7 +223,7 @@ mod tests {
         assert!((exact / differences[0] - 1.0).abs() < 1e-7);
         let constant = p.map(|p| Var::constant(p.value()));
         let solved = solution(chain, &x, &constant).unwrap();
-        assert!(solved.iter().all(|x| Operand::is_constant(*x)));
+        assert!(solved.iter().all(|x| Scalar::is_constant(*x)));
     }
 
     /// x² = p.

@@ -181,3 +181,17 @@ fn what_does_not_move_stops_an_infinite_slope() {
         assert_eq!(slopes, [0.0, 1.0]);
     }
 }
+
+#[test]
+fn constants_are_known_whatever_their_value() {
+    let recording = Recording::start();
+    for x in [0.0, 1.5, f64::NAN, f64::INFINITY] {
+        assert!(x.is_constant());
+        assert!(Fwd::<2>::constant(x).is_constant() && !Fwd::<2>::variable(x, 1).is_constant());
+        let nested = Fwd::<1, Fwd<1>>::constant(x);
+        assert!(nested.is_constant());
+        let inner = Fwd { value: Fwd::<1>::variable(x, 0), ..nested };
+        assert!(!inner.is_constant());
+        assert!(!recording.variable(x).is_constant() && Var::from(x).is_constant());
+    }
+}

@@ -11,7 +11,7 @@ impl Scene<'_> {
     ///
     /// On the far side the near surface has the color of the foot; on the near side the far surface has the
     /// color of the pixel beyond the contour.
-    pub(crate) fn cross<const DERIVATIVES: bool>(
+    pub(super) fn cross<const DERIVATIVES: bool>(
         &self,
         x: f32,
         y: f32,

@@ -14,7 +14,7 @@ use crate::view::{Row, scaled_sum};
 
 /// The faces seen at the pixels to the left, to the right, above and below of the same surface; the face at hand where there
 /// is none of it, and nothing beyond the border of the image.
-pub(crate) type Around = [Option<u32>; 4];
+pub(super) type Around = [Option<u32>; 4];
 
 /// Where these pixels are.
 const STEPS: [[f32; 2]; 4] = [[-1.0, 0.0], [1.0, 0.0], [0.0, -1.0], [0.0, 1.0]];
@@ -64,7 +64,7 @@ impl ContourView<'_> {
 }
 
 /// What a pixel that a face covers has around it.
-pub(crate) enum Beside {
+pub(super) enum Beside {
     /// Of its own surface.
     Surface(Around),
     /// Of both, where an inner contour is near and cuts pixels.
@@ -72,7 +72,7 @@ pub(crate) enum Beside {
 }
 
 /// The two surfaces that an inner contour divides.
-pub(crate) struct Layers {
+pub(super) struct Layers {
     pub(super) near: Layer,
     pub(super) far: Layer,
     /// Depth of the far one at the pixel \[m\].
@@ -80,7 +80,7 @@ pub(crate) struct Layers {
 }
 
 /// One of them.
-pub(crate) struct Layer {
+pub(super) struct Layer {
     pub(super) face: u32,
     pub(super) around: Around,
 }

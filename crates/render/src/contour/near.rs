@@ -32,10 +32,10 @@ pub(super) enum Found<'a> {
 
 /// The contours and the crease within whose bands a pixel lies.
 #[derive(Clone, Copy)]
-pub(crate) struct Near<'a> {
-    pub(crate) edge: Option<&'a Piece>,
-    pub(crate) inner: Option<&'a Inner>,
-    pub(crate) crease: Option<&'a Crease>,
+pub(super) struct Near<'a> {
+    pub(super) edge: Option<&'a Piece>,
+    pub(super) inner: Option<&'a Inner>,
+    pub(super) crease: Option<&'a Crease>,
 }
 
 /// A visible face.

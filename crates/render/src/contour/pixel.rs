@@ -16,7 +16,7 @@ use crate::view::{Pixel, Row, scaled_sum};
 impl Scene<'_> {
     /// A pixel that `face` covers, with what is near.
     #[inline]
-    pub(crate) fn inside<const DERIVATIVES: bool>(
+    pub(super) fn inside<const DERIVATIVES: bool>(
         &self,
         x: f32,
         y: f32,
@@ -51,7 +51,7 @@ impl Scene<'_> {
 
     /// A pixel that no face covers, next to the outline: it shows the color of the nearest outline point.
     #[inline]
-    pub(crate) fn outside<const DERIVATIVES: bool>(
+    pub(super) fn outside<const DERIVATIVES: bool>(
         &self,
         x: f32,
         y: f32,
@@ -68,7 +68,7 @@ impl Scene<'_> {
 
     /// The unblended pixel (x, y) of a face. Its rows are those at its center, or over its area if what is `around` is given.
     #[inline]
-    pub(crate) fn interior<const DERIVATIVES: bool>(
+    pub(super) fn interior<const DERIVATIVES: bool>(
         &self,
         x: f32,
         y: f32,
@@ -104,7 +104,7 @@ impl Scene<'_> {
 
     /// The unblended color of the foot on a contour.
     #[inline]
-    pub(crate) fn at_foot<const DERIVATIVES: bool>(&self, piece: &Piece, foot: &Foot) -> Pixel {
+    pub(super) fn at_foot<const DERIVATIVES: bool>(&self, piece: &Piece, foot: &Foot) -> Pixel {
         let (b, point, ends) = self.on_edge(piece, foot.t);
         let shaded = shade::<DERIVATIVES>(&self.posed, &self.lighting, piece.face as usize, b);
         let mut pixel = Pixel {
@@ -122,7 +122,7 @@ impl Scene<'_> {
     }
 
     /// Unit normal of a face at pixel (x, y), camera frame.
-    pub(crate) fn normal(&self, face: usize, x: f32, y: f32) -> Vec3 {
+    pub(super) fn normal(&self, face: usize, x: f32, y: f32) -> Vec3 {
         let projected = &self.posed.projected;
         let b = barycentric(projected.corners(face), x, y);
         posed_normal(&self.posed, face, b)
@@ -193,7 +193,7 @@ impl Scene<'_> {
 
     /// Row of the signed distance to a contour at its foot (`side` is −1 inside, 1 outside).
     #[inline]
-    pub(crate) fn distance_row(&self, piece: &Piece, foot: &Foot, side: f32) -> Row {
+    pub(super) fn distance_row(&self, piece: &Piece, foot: &Foot, side: f32) -> Row {
         let distance = foot.distance_squared.sqrt();
         let outward =
             if distance > 1e-3 { foot.offset.map(|o| o * side / distance) } else { piece.outward };

@@ -18,7 +18,7 @@ pub(crate) struct Scene<'a> {
 impl Scene<'_> {
     /// The model's center from where twists turn.
     #[inline(always)]
-    pub(crate) fn level_arm(&self) -> Vec3 {
+    pub(super) fn level_arm(&self) -> Vec3 {
         vec3(&(self.posed.center - self.twist_center))
     }
 }

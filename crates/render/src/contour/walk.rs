@@ -46,9 +46,7 @@ impl<'a, const DERIVATIVES: bool, S: Sink<DERIVATIVES>> Walk<'a, DERIVATIVES, S>
             }
             self.add_inside([window.x0, y], row.start, &inside[..inside_count]);
             self.add_others([window.x0, y], &others[..other_count]);
-            if DERIVATIVES {
-                self.sink.end_row();
-            }
+            self.sink.end_row();
         }
         self.waiting.flush(&self.view.scene, self.sink);
         self.blended.flush(self.sink);
@@ -67,7 +65,7 @@ impl<'a, const DERIVATIVES: bool, S: Sink<DERIVATIVES>> Walk<'a, DERIVATIVES, S>
         for column in columns {
             let (i, x) = (first + column, left + column);
             let (z, at) = (1.0 / visible.inverse_z[i], self.in_image(x, y));
-            if self.sink.hides(at, z) {
+            if self.sink.take_hidden(at, z) {
                 continue;
             }
             self.sink.covered(at);
@@ -88,7 +86,7 @@ impl<'a, const DERIVATIVES: bool, S: Sink<DERIVATIVES>> Walk<'a, DERIVATIVES, S>
                 self.sink.nothing(at);
                 continue;
             };
-            if self.sink.hides(at, seen.pixel.z) {
+            if self.sink.take_hidden(at, seen.pixel.z) {
                 continue;
             }
             self.sink.all_but_color(at, &seen);

@@ -9,7 +9,7 @@ use crate::view::{Pixel, Row, Seen, View, scaled_sum};
 /// A camera's pixel averages over its area, and so do the colors, the coverage and the rows of these: creases, fine
 /// texture and folds count for as much of a pixel as they fill. Depth is the mean over the part that shows a face, by the weight
 /// that it has there, so that it does not jump as an outline passes over the samples.
-pub(crate) struct Averaged<V> {
+pub(super) struct Averaged<V> {
     fine: V,
     samples: usize,
 }
@@ -117,7 +117,7 @@ struct Part {
 
 impl<V: View> Averaged<V> {
     /// `fine` is seen by the same camera at `samples` times its resolution.
-    pub(crate) fn new(fine: V, samples: usize) -> Self {
+    pub(super) fn new(fine: V, samples: usize) -> Self {
         Self { fine, samples }
     }
 

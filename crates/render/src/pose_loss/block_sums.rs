@@ -13,7 +13,7 @@ use crate::view::{Patch, Seen, Sink, View};
 
 impl Residuals<'_> {
     /// Sums the residuals over all pixels of a view.
-    pub(crate) fn total<const DERIVATIVES: bool>(&self, view: &impl View) -> Sums {
+    pub(super) fn total<const DERIVATIVES: bool>(&self, view: &impl View) -> Sums {
         let tiles = self.by_tiles::<DERIVATIVES>(view, Tiling::WHOLE);
         let mut total = Sums::new();
         tiles.into_iter().for_each(|(_, sums)| total.merge(&sums));
@@ -21,7 +21,7 @@ impl Residuals<'_> {
     }
 
     /// Sums the residuals over the pixels of a view by tiles, block by block in parallel, added up in a fixed order.
-    pub(crate) fn by_tiles<const DERIVATIVES: bool>(
+    pub(super) fn by_tiles<const DERIVATIVES: bool>(
         &self,
         view: &impl View,
         tiling: Tiling,
@@ -46,14 +46,21 @@ impl Residuals<'_> {
 struct BlockSums<'a> {
     residuals: Residuals<'a>,
     tiles: TileSums,
-    /// Place of the tile of the window at hand, and sums of its pixels side by side.
-    window: usize,
+    /// Place of the tile at hand; whether it is that of a window, and then sums of its pixels side by side.
+    tile: usize,
+    in_window: bool,
     lanes: LaneSums,
 }
 
 impl<'a> BlockSums<'a> {
     fn new(residuals: Residuals<'a>, tiling: Tiling) -> Self {
-        Self { residuals, tiles: TileSums::new(tiling), window: 0, lanes: LaneSums::new() }
+        Self {
+            residuals,
+            tiles: TileSums::new(tiling),
+            tile: 0,
+            in_window: false,
+            lanes: LaneSums::new(),
+        }
     }
 }
 
@@ -61,13 +68,15 @@ impl<const DERIVATIVES: bool> Sink<DERIVATIVES> for BlockSums<'_> {
     #[inline]
     fn pixel(&mut self, x: usize, y: usize, seen: Option<Seen>) {
         let at = y * self.residuals.target.camera.width + x;
-        self.window = self.tiles.place(x, y);
-        self.residuals.add::<DERIVATIVES>(self.tiles.at(self.window), at, seen);
+        self.tile = self.tiles.place(x, y);
+        self.residuals.add::<DERIVATIVES>(self.tiles.at(self.tile), at, seen);
     }
 
     fn end_row(&mut self) {
-        if DERIVATIVES {
-            self.tiles.end_row();
+        match (DERIVATIVES, self.in_window) {
+            (false, _) => {}
+            (true, true) => self.tiles.at(self.tile).end_row(),
+            (true, false) => self.tiles.end_row(),
         }
     }
 
@@ -86,12 +95,13 @@ impl<const DERIVATIVES: bool> Sink<DERIVATIVES> for BlockSums<'_> {
     }
 
     fn begin(&mut self, window: &Region) {
-        self.window = self.tiles.place(window.x0, window.y0);
-        self.lanes = LaneSums::new();
+        self.tile = self.tiles.place(window.x0, window.y0);
+        (self.in_window, self.lanes) = (true, LaneSums::new());
     }
 
     fn end(&mut self) {
-        self.tiles.at(self.window).absorb(&self.lanes);
+        self.tiles.at(self.tile).absorb(&self.lanes);
+        self.in_window = false;
     }
 
     #[inline]
@@ -101,17 +111,17 @@ impl<const DERIVATIVES: bool> Sink<DERIVATIVES> for BlockSums<'_> {
 
     #[inline]
     fn nothing(&mut self, at: usize) {
-        self.residuals.add_nothing(self.tiles.at(self.window), at);
+        self.residuals.add_nothing(self.tiles.at(self.tile), at);
     }
 
     #[inline]
-    fn hides(&mut self, at: usize, z: f32) -> bool {
-        self.residuals.hidden(self.tiles.at(self.window), at, z)
+    fn take_hidden(&mut self, at: usize, z: f32) -> bool {
+        self.residuals.hidden(self.tiles.at(self.tile), at, z)
     }
 
     #[inline]
     fn covered(&mut self, at: usize) {
-        self.residuals.count_covered(self.tiles.at(self.window), at);
+        self.residuals.count_covered(self.tiles.at(self.tile), at);
     }
 
     #[inline(always)]
@@ -121,7 +131,7 @@ impl<const DERIVATIVES: bool> Sink<DERIVATIVES> for BlockSums<'_> {
 
     #[inline]
     fn all_but_color(&mut self, at: usize, seen: &Seen) {
-        self.residuals.add_but_color::<DERIVATIVES>(self.tiles.at(self.window), at, seen);
+        self.residuals.add_but_color::<DERIVATIVES>(self.tiles.at(self.tile), at, seen);
     }
 
     #[inline(always)]

@@ -1,4 +1,4 @@
-// The contour mode: blended value of a pixel and its derivatives. See `contour/pixel.rs` and `contour/inner.rs`.
+// The contour mode: blended value of a pixel and its derivatives. See `contour/pixel.rs` and `contour/cross.rs`.
 
 struct Foot {
     // Share of the edge's screen length.

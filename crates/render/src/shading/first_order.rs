@@ -7,7 +7,8 @@ use super::{Shader, SurfacePoint};
 use crate::light::Light;
 
 impl Light {
-    /// The color of a visible point.
+    /// The color of a visible point, whose normal is in the camera frame: albedo times irradiance, which is zero where the surface faces
+    /// away, and the offset; not clamped.
     #[inline]
     pub fn color(&self, point: &SurfacePoint<f32>) -> [f32; 3] {
         let normal = point.normal.cast::<f64>();
@@ -48,6 +49,12 @@ mod tests {
         for normal in [Vector3::new(0.6, 0.0, -0.8), Vector3::new(0.0, 1.0, 0.0), Vector3::z()] {
             let point = SurfacePoint { position: Vector3::z(), normal, albedo: [0.5, 0.6, 0.7] };
             let color = light.shade(&parameters, &point);
+            let single = light.color(&SurfacePoint {
+                position: point.position.cast(),
+                normal: normal.cast(),
+                albedo: point.albedo.map(|a| a as f32),
+            });
+            assert!(single.iter().zip(color).all(|(a, b)| (f64::from(*a) - b).abs() < 1e-6));
             for (k, value) in color.iter().enumerate() {
                 let expected = point.albedo[k] * light.factor(k, &normal) + light.offset[k];
                 assert!((value - expected).abs() < 1e-15);

@@ -42,8 +42,13 @@ pub(crate) trait View: Sync {
     }
 }
 
-/// What is made of the pixels of a view: pixel by pixel, or window by window, many pixels at once. `at` is the index of a pixel in the
-/// image.
+/// What is made of the pixels of a view.
+///
+/// A view hands over each pixel of a block once: all by [`pixel`](Self::pixel), or window by window in another way. There,
+/// what shows nothing is told by [`nothing`](Self::nothing), if that counts. Of the others the depth comes first; of those that it does not
+/// [take as hidden](Self::take_hidden), either [`covered`](Self::covered) and later a [`patch`](Self::patch) with the pixel, or
+/// [`all_but_color`](Self::all_but_color) and later [`colors`](Self::colors) with it. `at` is the index of a pixel in the image, which is
+/// as large as that of the view's camera.
 pub(crate) trait Sink<const DERIVATIVES: bool> {
     /// A pixel, and what is seen there of the object, if anything.
     fn pixel(&mut self, x: usize, y: usize, seen: Option<Seen>);
@@ -66,8 +71,8 @@ pub(crate) trait Sink<const DERIVATIVES: bool> {
     /// Nothing is seen here.
     fn nothing(&mut self, at: usize);
 
-    /// The surface here has depth `z` \[m\]; says whether something else hides it, so that there is no more to it.
-    fn hides(&mut self, at: usize, z: f32) -> bool;
+    /// The surface here has depth `z` \[m\]. True if something else hides it: then the pixel is done.
+    fn take_hidden(&mut self, at: usize, z: f32) -> bool;
 
     /// The object covers this pixel, whose values come in a patch.
     fn covered(&mut self, at: usize);

@@ -1,14 +1,10 @@
 //! What the author of a contact law writes.
 
 use prehend_autodiff::Scalar;
-use smallvec::SmallVec;
 
 use super::bristles::Bristles;
 use super::error::LawError;
 use super::point::{Contact, Response};
-
-/// The parameters of a law: few have more than these, which take no allocation.
-pub(crate) type ParamValues<T> = SmallVec<[T; 8]>;
 
 /// A contact law: one function, generic over the scalar, from which come forces and derivatives.
 ///

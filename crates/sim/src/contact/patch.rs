@@ -74,23 +74,23 @@ impl Patch<'_> {
         Point3::from(pose.translation.vector + pose.rotation * (point - self.com))
     }
 
-    /// The samples that may touch, for a law that reaches to `cutoff`, before one of them has moved by `margin` \[m\].
+    /// The samples of [`Patch::each_near`].
     pub(crate) fn near(&self, cutoff: f64, margin: f64) -> Surface {
         self.surface.only(self.each_near(cutoff, margin).map(|(point, _)| *point).collect())
     }
 
-    /// Those samples, each with the distance of its center \[m\].
+    /// The samples that may touch, for a law that reaches to `cutoff`, before one of them has moved by `margin` \[m\], each with the
+    /// distance of its center \[m\].
     pub(crate) fn each_near(
         &self,
         cutoff: f64,
         margin: f64,
     ) -> impl Iterator<Item = (&SurfacePoint, f64)> {
         let reach = self.reach(cutoff) + self.field.lipschitz_bound() * margin;
-        // One is asked for itself.
-        let blocks = self
-            .surface
-            .blocks()
-            .filter(move |(block, points)| points.len() == 1 || self.may_touch(block, reach));
+        let blocks = self.surface.blocks().filter(move |(block, points)| {
+            // One is asked for itself.
+            points.len() == 1 || self.may_touch(block, reach)
+        });
         blocks.flat_map(|(_, points)| points).filter_map(move |point| {
             Some((point, self.field.distance(&self.place(&point.position), reach)?))
         })

@@ -4,8 +4,9 @@ use nalgebra::{Matrix3, Vector3, Vector6};
 use prehend_autodiff::lie::cross_matrix;
 use prehend_autodiff::{Fwd, LocalFunction, Scalar};
 
-use super::law::{ContactLaw, ParamValues};
+use super::law::ContactLaw;
 use super::moved::{LiftedContact, MovedPatch};
+use super::param_values::ParamValues;
 use super::patch::{Patch, Touch};
 use super::point::Contact;
 

@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 
 use super::curves::Curve;
 use super::finding::{Finding, Verdict};
-use super::point_contact::{AREA, DEPTH, GRAVITY, PointContact};
+use super::point_contact::{AREA, DEPTH, PointContact};
 use crate::body::RigidBody;
 use crate::contact::dynamic::DynContactLaw;
 use crate::contact::gap_smoothing::GapSmoothing;
@@ -22,6 +22,9 @@ use crate::world::World;
 use crate::world::body::Body;
 use crate::world::body_id::BodyId;
 use crate::world::contact_pair::ContactBodies;
+
+/// Gravity \[m/s²\].
+pub(super) const GRAVITY: f64 = 9.81;
 
 /// A body that does not turn, of one sample, and rests half a millimeter deep.
 pub(super) struct Specimen<'a> {

@@ -5,11 +5,10 @@ use nalgebra::Vector3;
 use crate::contact::dynamic::DynContactLaw;
 use crate::contact::point::{Contact, Response};
 
-/// Depth at which the specimen rests \[m\], and the area it rests on \[m²\].
+/// Depth at which laws are tried \[m\].
 pub(super) const DEPTH: f64 = 5e-4;
+/// Area of the contact at which they are \[m²\].
 pub(super) const AREA: f64 = 4e-4;
-/// Gravity \[m/s²\].
-pub(super) const GRAVITY: f64 = 9.81;
 
 /// A law at one contact.
 pub(super) struct PointContact<'a> {

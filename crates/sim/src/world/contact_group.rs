@@ -13,12 +13,23 @@ use super::contact_pair::{ContactBodies, ContactPair};
 #[derive(Clone)]
 pub struct ContactGroup<S: Scalar = f64> {
     /// The two lists, which may be the same, in ascending order.
-    pub(super) bodies: [Arc<[BodyId]>; 2],
+    bodies: [Arc<[BodyId]>; 2],
     /// What each contact is like: its law, parameters and smoothing. Its bodies are those of one of them.
     pub contact: ContactPair<S>,
 }
 
 impl<S: Scalar> ContactGroup<S> {
+    /// Between the bodies of two lists, in any order, each contact like `contact`.
+    pub(super) fn new(lists: [&[BodyId]; 2], contact: ContactPair<S>) -> Self {
+        let bodies = lists.map(|list| {
+            let mut bodies = list.to_vec();
+            bodies.sort_unstable();
+            bodies.dedup();
+            bodies.into()
+        });
+        Self { bodies, contact }
+    }
+
     /// The two lists of bodies, in ascending order.
     pub fn bodies(&self) -> [&[BodyId]; 2] {
         self.bodies.each_ref().map(|bodies| &**bodies)

@@ -9,7 +9,7 @@ use crate::contact::dynamic::DynContactLaw;
 use crate::contact::error::LawError;
 use crate::contact::force_jump::jumps;
 use crate::contact::gap_smoothing::GapSmoothing;
-use crate::contact::law::ParamValues;
+use crate::contact::param_values::ParamValues;
 use crate::surface::Surface;
 
 /// The two sides of a contact.

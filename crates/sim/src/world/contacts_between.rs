@@ -32,19 +32,10 @@ impl World {
         law: Arc<dyn DynContactLaw>,
         smoothing: GapSmoothing,
     ) -> Result<(), SimulationError> {
-        let sorted = |bodies: &[BodyId]| -> Result<Vec<BodyId>, SimulationError> {
-            let mut sorted = bodies.to_vec();
-            sorted.iter().try_for_each(|body| self.body(*body).map(|_| ()))?;
-            sorted.sort_unstable();
-            sorted.dedup();
-            Ok(sorted)
-        };
-        let lists = [sorted(a)?, sorted(b)?];
+        a.iter().chain(b).try_for_each(|body| self.body(*body).map(|_| ()))?;
         smoothing.check()?;
-        let first = self.first_contact(&lists)?;
-        let bodies = lists.map(Arc::from);
-        let contact = ContactPair::new(first, law, smoothing);
-        let group = ContactGroup { bodies, contact };
+        let first = self.first_contact([a, b])?;
+        let group = ContactGroup::new([a, b], ContactPair::new(first, law, smoothing));
         if group.contact.law().bristles().is_some() {
             let every = self.all_pairs(&group);
             self.contacts.extend(every);
@@ -55,14 +46,14 @@ impl World {
     }
 
     /// One of the contacts between two lists of bodies, if all of them can touch.
-    fn first_contact(&self, lists: &[Vec<BodyId>; 2]) -> Result<ContactBodies, SimulationError> {
+    fn first_contact(&self, lists: [&[BodyId]; 2]) -> Result<ContactBodies, SimulationError> {
         let mut first = None;
         // Bodies that can do the same need be asked once, or twice where they are to touch each other.
         let kind = |id: BodyId| {
             let body = &self.bodies[id];
             (body.surface.is_some(), body.field.is_some(), body.rigid().is_some())
         };
-        let kinds = lists.each_ref().map(|list| {
+        let kinds = lists.map(|list| {
             let mut found: Vec<BodyId> = Vec::new();
             for &id in list {
                 if found.iter().filter(|other| kind(**other) == kind(id)).count() < 2 {

@@ -123,7 +123,7 @@ impl<S: Scalar> World<S> {
         let [samples, field] =
             [0, 1].map(|end| shifted[end].as_ref().map_or(&states[ends[end]], |(state, _)| state));
         let at = Relation { samples: samples.value(), field: field.value(), weight: pair.weight };
-        let (all, slopes) = if pair.params().iter().all(Scalar::is_constant) {
+        let (all, slopes) = if pair.params().iter().all(|x| x.is_constant()) {
             let function = at.function(WrenchFunction { law, p: &values, patch });
             (function.of(samples, field), self.slopes(pair, patch, &[]))
         } else {
@@ -180,7 +180,7 @@ impl<S: Scalar> World<S> {
         sums: &mut [S; 12],
     ) {
         let ends = [pair.bodies.samples, pair.bodies.field].map(|id| &self.bodies[id]);
-        if ends.iter().all(|body| body.dimensions().iter().all(Scalar::is_constant)) {
+        if ends.iter().all(|body| body.dimensions().iter().all(|x| x.is_constant())) {
             return;
         }
         let moved = ends.map(|body| changes(body.dimensions()));
@@ -235,7 +235,7 @@ impl<S: Scalar> World<S> {
         patch: &Patch<'_>,
     ) -> (WrenchJacobian, Option<[S; 12]>) {
         let values = pair.param_values();
-        let vary = !pair.params().iter().all(Scalar::is_constant);
+        let vary = !pair.params().iter().all(|x| x.is_constant());
         let jacobian = pair.law().wrench_jacobian(&values, patch, vary);
         let slopes = self.slopes(pair, patch, &jacobian.by_params);
         (jacobian, slopes)

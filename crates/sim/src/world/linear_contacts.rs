@@ -107,7 +107,7 @@ impl LinearContacts {
         for (Touching { body, state, wrench }, shifted) in self.bodies.iter().zip(&shifted) {
             let seen = shifted.as_ref().map_or(&states[*body], |(state, _)| state);
             let coordinates = seen.coordinates();
-            let moves = !coordinates.iter().all(Scalar::is_constant);
+            let moves = !coordinates.iter().all(|x| x.is_constant());
             own.push((*state, moves.then_some(inputs.len())));
             if moves {
                 inputs.extend(coordinates);

@@ -128,7 +128,7 @@ impl<W: LocalFunction<12, 6>> PairFunction<W> {
     #[inline]
     pub(super) fn of<S: Scalar>(&self, samples: &State<S>, field: &State<S>) -> [S; 6] {
         let (samples, field) = (samples.coordinates(), field.coordinates());
-        if field.iter().all(Scalar::is_constant) {
+        if field.iter().all(|x| x.is_constant()) {
             return S::local(&OneMoves(self), samples);
         }
         let mut both = [S::zero(); TWO];

@@ -55,3 +55,39 @@ pub(super) fn constant<S: Scalar, T: Scalar>(
     };
     Arc::new(Lifted(plain(trajectory).unwrap_or_else(values)))
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Isometry3, Vector3};
+    use prehend_autodiff::Fwd;
+
+    use super::*;
+    use crate::{Body, Motion, World};
+
+    #[test]
+    fn a_lifted_trajectory_is_known_again() {
+        let mut world = World::new(Vector3::zeros());
+        world.add(Body::driven("table", |_: f64| State::at_rest(Isometry3::identity())));
+        let source = |motion: &Motion| match motion {
+            Motion::Driven(trajectory) => plain(trajectory).unwrap(),
+            _ => panic!("not driven"),
+        };
+        let there_and_back = world.lift::<Fwd<1>>().plain().lift::<Fwd<2>>().plain();
+        let [a, b] = [&world, &there_and_back].map(|world| source(&world.bodies[0].motion));
+        assert!(Arc::ptr_eq(&a, &b));
+    }
+
+    #[test]
+    fn values_of_a_trajectory_with_derivatives_are_found() {
+        let mut world = World::new(Vector3::zeros()).lift::<Fwd<1>>();
+        let [speed] = Fwd::<1>::variables([0.2]);
+        world.bodies.push(Body::driven("table", move |time: f64| {
+            let mut state = State::at_rest(Isometry3::identity()).lift();
+            state.pose.translation.x = speed.times(time);
+            state
+        }));
+        let mut state = [State::at_rest(Isometry3::identity())];
+        world.plain().drive(&mut state, 0.5);
+        assert_eq!(state[0].pose.translation.x, 0.1);
+    }
+}

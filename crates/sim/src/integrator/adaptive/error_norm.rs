@@ -3,8 +3,6 @@
 use std::cell::LazyCell;
 
 use nalgebra::{Vector3, Vector6};
-use prehend_autodiff::Fwd;
-use prehend_geometry::SplitMix64;
 
 use super::Adaptive;
 use super::probe::Probe;
@@ -101,21 +99,12 @@ impl ErrorNorm {
         Self { tolerance, sensitivity_tolerance, scales, deflections }
     }
 
-    /// The states with derivatives along a direction in which everything that is free moves: each coordinate by half to all of what
-    /// counts as one.
-    pub(super) fn probe(&self, states: &[State]) -> Vec<State<Probe>> {
-        let mut random = SplitMix64::new(7);
-        let mut probe: Vec<State<Probe>> = states.iter().map(State::lift).collect();
-        for (body, Scale { length, speed, .. }) in &self.scales {
+    /// The free bodies and units of the twelve coordinates of their tangents.
+    pub(super) fn units(&self) -> impl Iterator<Item = (BodyId, [f64; 12])> {
+        self.scales.iter().map(|(body, Scale { length, speed, .. })| {
             let units = [*length, 1.0, *speed, speed / length];
-            let tangent = std::array::from_fn(|i| {
-                let (size, sign) =
-                    (0.5 + 0.5 * random.uniform(), (random.uniform() - 0.5).signum());
-                Fwd { value: 0.0, derivative: [units[i / 3] * size * sign] }
-            });
-            probe[*body] = states[*body].retract(&tangent);
-        }
-        probe
+            (*body, std::array::from_fn(|i| units[i / 3]))
+        })
     }
 
     /// A length to begin with: a tenth of the time in which accelerations change a velocity by as much as it counts.

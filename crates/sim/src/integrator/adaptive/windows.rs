@@ -10,7 +10,7 @@ use super::course::{Course, Parts};
 use super::error_norm::ErrorNorm;
 use super::islands::{Island, Links};
 use super::planner::SHORTEST;
-use super::probe::Probe;
+use super::probe::{self, Probe};
 use crate::adjoint::{OneStep, Scene, with_moved};
 use crate::error::SimulationError;
 use crate::state::State;
@@ -43,7 +43,7 @@ pub(super) fn step<S: Scalar>(
     let search = NeighborSearch::new(&plain);
     let mut states = states.to_vec();
     let values: Vec<State> = states.iter().map(State::value).collect();
-    let mut probes = ErrorNorm::new(settings, &plain, &values).probe(&values);
+    let mut probes = probe::seeded(&values, ErrorNorm::new(settings, &plain, &values).units());
     let mut next_parts = vec![None; world.bodies.len()];
     let mut window = whole;
     for windows in 0.. {
