@@ -5,7 +5,7 @@
 //! thousands of poses at once, on this processor or a graphics device ([`backend::auto`]). [`Renderer`] renders
 //! whole scenes under any [`Shader`] and carries the derivatives of any loss back to poses, vertices, colors, textures,
 //! camera and light, on the tape too. [`render_scene`] makes antialiased pictures, [`depth_map`] the z-buffer of what hides
-//! the object, and [`Undistortion`] pinhole images of those through a lens.
+//! the object, and [`Remap`] pinhole images of those through a lens.
 //!
 //! Cameras follow OpenCV (x right, y down, z forward; pixel centers at integers); lengths are in meters; colors
 //! are in 0..=1 as stored in files.
@@ -35,7 +35,7 @@ mod view;
 pub use backend::Gpu;
 pub use backend::{Backend, BackendError, Cpu, Hypothesis, PoseProblem, Session};
 pub use camera::{Camera, CameraError};
-pub use distortion::{Distortion, DistortionError, Undistortion};
+pub use distortion::{BrownConrady, Distortion, DistortionError, KannalaBrandt, Remap};
 pub use image::{DepthImage, ImageError, Mask, RgbImage};
 pub use light::{Light, LightError, LightSample};
 pub use mode::{ContourOptions, Mode, SoftRasOptions};

@@ -10,10 +10,10 @@ use crate::state::State;
 /// State of a model frame in the world as a function of time: a function from seconds to a [`State`], for instance.
 ///
 /// The velocities are the rates at which the pose changes, world frame: what touches the body feels them. A rollout in which they
-/// are far from that is refused ([`SimulationError::TrajectoryVelocity`]). Kinks and jumps are allowed, and a pose that stays where it is
+/// are far from that is refused ([`SimulationError::TrajectoryVelocity`](crate::SimulationError::TrajectoryVelocity)). Kinks and jumps are allowed, and a pose that stays where it is
 /// may have any velocity, as a belt has.
 ///
-/// [`World::simulate`] looks at it every millisecond at least: what it does and undoes in less may be missed. Steps of one's own
+/// [`World::simulate`](crate::World::simulate) looks at it every millisecond at least: what it does and undoes in less may be missed. Steps of one's own
 /// choice look as often as they evaluate forces.
 ///
 /// Over numbers that carry derivatives, those of what drives the body, a speed or a waypoint, go into the simulation.
