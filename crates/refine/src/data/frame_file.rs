@@ -12,11 +12,11 @@ use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 use prehend_geometry::hand::load_taxels;
 use prehend_geometry::robot::KinematicTree;
 use prehend_geometry::{GridCache, TriMesh};
-use prehend_render::{Camera, DepthImage, Mask, RgbImage};
+use prehend_render::{Camera, DepthImage, Mask, Remap, RgbImage};
 use serde::Deserialize;
 
 use crate::data::assets::FrameInput;
-use crate::data::bop::{DatasetError, Numbers, Positive, read_json, rotation_from_row_major};
+use crate::data::bop::{DatasetError, Lens, Numbers, Positive, read_json, rotation_from_row_major};
 use crate::scene::{Hand, HandMeasurement, Object, Observation, check_gravity};
 
 /// Reads the frame file `file` and everything it names: the frame, and the initial pose (object → camera \[m\]). `seed` decides
@@ -33,10 +33,10 @@ pub fn load_frame_file(
     let field = |name: &str, problem: &dyn Display| DatasetError::field(file, name, problem);
     let layout: Layout = read_json(file)?;
     let folder = file.parent().unwrap_or(Path::new("."));
-    let color = RgbImage::load(&folder.join(&layout.rgb)).map_err(|e| fault(&e))?;
-    let depth = DepthImage::load(&folder.join(&layout.depth), layout.depth_unit_m.0)
+    let mut color = RgbImage::load(&folder.join(&layout.rgb)).map_err(|e| fault(&e))?;
+    let mut depth = DepthImage::load(&folder.join(&layout.depth), layout.depth_unit_m.0)
         .map_err(|e| fault(&e))?;
-    let mask = Mask::load(&folder.join(&layout.mask)).map_err(|e| fault(&e))?;
+    let mut mask = Mask::load(&folder.join(&layout.mask)).map_err(|e| fault(&e))?;
     let (w, h) = (color.width(), color.height());
     let camera = Camera::from_k(layout.k.0, w, h).map_err(|e| field("K", &e))?;
     for (name, width, height) in
@@ -46,6 +46,12 @@ pub fn load_frame_file(
             let problem = format!("the image is {width}x{height} pixels, rgb is {w}x{h}");
             return Err(field(name, &problem));
         }
+    }
+    if let Some(Lens(lens)) = &layout.lens {
+        let remap = Remap::undistort(camera, lens, camera);
+        color = remap.rgb(&color).map_err(|e| fault(&e))?;
+        depth = remap.depth(&depth).map_err(|e| fault(&e))?;
+        mask = remap.mask(&mask).map_err(|e| fault(&e))?;
     }
     let mesh_file = folder.join(&layout.mesh);
     let mesh = TriMesh::load(&mesh_file).map_err(|e| fault(&e))?;
@@ -82,6 +88,9 @@ struct Layout {
     /// Row-major 3×3 intrinsics \[px\].
     #[serde(rename = "K")]
     k: Numbers<9>,
+    /// Through which the images were taken.
+    #[serde(rename = "dist")]
+    lens: Option<Lens>,
     rgb: PathBuf,
     depth: PathBuf,
     /// Meters of one unit of the depth image.

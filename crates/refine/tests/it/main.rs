@@ -13,6 +13,7 @@ mod factors;
 mod fused;
 mod icp;
 mod journal;
+mod lens;
 mod pose_error;
 mod results;
 mod search;

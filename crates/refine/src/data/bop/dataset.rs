@@ -17,6 +17,8 @@ pub struct Dataset {
     split_dir: PathBuf,
     scenes: BTreeMap<u32, Scene>,
     models: Models,
+    /// What all cameras have in common.
+    pub(super) camera: JsonFile,
 }
 
 /// One scene of a split; its files are read when first needed.
@@ -71,6 +73,7 @@ impl Dataset {
             split_dir,
             scenes,
             models: Models::new(root.join("models")),
+            camera: JsonFile::new(root.join("camera.json")),
         })
     }
 

@@ -1,24 +1,30 @@
 //! One image of a scene.
 
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use prehend_render::{Camera, CameraError, DepthImage, Mask, RgbImage};
+use prehend_render::{
+    Camera, CameraError, DepthImage, Distortion, DistortionError, Mask, Remap, RgbImage,
+};
 use serde::Deserialize;
 
 use super::dataset::{Dataset, Scene};
 use super::error::DatasetError;
-use super::json::{JsonFile, Numbers, Positive};
+use super::json::{JsonFile, Lens, Numbers, Positive};
 use super::scene::{SceneBodies, Tactile};
 use crate::scene::Observation;
 
 /// One image: its camera, and access to everything else an estimator may know about it. Each part is
 /// read when asked for and fails on its own.
+///
+/// Where the dataset says that images were taken through a lens (`cam_dist` of `scene_camera.json`, or of `camera.json` for all of them),
+/// they are handed out as a pinhole camera of the same matrix and size sees them.
 #[derive(Clone, Copy, Debug)]
 pub struct Frame<'a> {
     scene: &'a Scene,
     im_id: u32,
     intrinsics: Intrinsics,
+    lens: Option<Distortion>,
     /// Millimeters per stored depth value.
     pub depth_scale: f64,
 }
@@ -28,6 +34,8 @@ struct CameraEntry {
     #[serde(rename = "cam_K")]
     intrinsics: Intrinsics,
     depth_scale: Option<Positive>,
+    #[serde(rename = "cam_dist")]
+    lens: Option<Lens>,
 }
 
 /// What `cam_K` says of a camera of unknown size.
@@ -47,14 +55,19 @@ impl Dataset {
     /// The image `im_id` of the scene `scene_id`.
     ///
     /// # Errors
-    /// Those of [`Dataset::scene`], and when `scene_camera.json` is absent or broken, or does not describe the image.
+    /// Those of [`Dataset::scene`], and when `scene_camera.json` is absent or broken, or does not describe the image; when
+    /// `camera.json` is broken.
     pub fn frame(&self, scene_id: u32, im_id: u32) -> Result<Frame<'_>, DatasetError> {
         let scene = self.scene(scene_id)?;
-        let CameraEntry { intrinsics, depth_scale } = scene.camera.entry(im_id)?;
+        let CameraEntry { intrinsics, depth_scale, mut lens } = scene.camera.entry(im_id)?;
+        if lens.is_none() && self.camera.exists() {
+            lens = self.camera.field("cam_dist")?;
+        }
         Ok(Frame {
             scene,
             im_id,
             intrinsics,
+            lens: lens.map(|lens| lens.0),
             depth_scale: depth_scale.map_or(1.0, |scale| scale.0),
         })
     }
@@ -103,12 +116,21 @@ impl Frame<'_> {
         }
     }
 
+    /// What makes pinhole images of those of `width` by `height` pixels that are stored, if they are not that.
+    fn remap(&self, width: usize, height: usize) -> Option<Remap> {
+        let camera = self.camera(width, height);
+        self.lens.map(|lens| Remap::undistort(camera, &lens, camera))
+    }
+
     /// Reads the color image.
     ///
     /// # Errors
     /// When it is absent or does not decode.
     pub fn rgb(&self) -> Result<RgbImage, DatasetError> {
-        RgbImage::load(&self.rgb_path()?).map_err(DatasetError::from)
+        let file = self.rgb_path()?;
+        let stored = RgbImage::load(&file)?;
+        let remap = self.remap(stored.width(), stored.height());
+        undistorted(&file, stored, remap.as_ref(), Remap::rgb)
     }
 
     /// Reads the depth image.
@@ -117,9 +139,20 @@ impl Frame<'_> {
     /// When it is absent or does not decode, and [`DatasetError::NoDepth`] when it measures nothing.
     pub fn depth(&self) -> Result<DepthImage, DatasetError> {
         let file = self.depth_path();
-        let depth = DepthImage::load(&file, self.depth_scale * 1e-3)?;
+        let stored = DepthImage::load(&file, self.depth_scale * 1e-3)?;
+        let remap = self.remap(stored.width(), stored.height());
+        self.measured(&file, stored, remap.as_ref())
+    }
+
+    fn measured(
+        &self,
+        file: &Path,
+        stored: DepthImage,
+        remap: Option<&Remap>,
+    ) -> Result<DepthImage, DatasetError> {
+        let depth = undistorted(file, stored, remap, Remap::depth)?;
         if depth.pixels().iter().all(|&z| z == 0.0) {
-            Err(DatasetError::NoDepth { file })
+            Err(DatasetError::NoDepth { file: file.to_path_buf() })
         } else {
             Ok(depth)
         }
@@ -137,9 +170,15 @@ impl Frame<'_> {
     /// When it is absent, does not decode, or no pixel is set.
     pub fn mask(&self, instance: usize) -> Result<Mask, DatasetError> {
         let file = self.mask_path(instance)?;
-        let mask = Mask::load(&file)?;
+        let stored = Mask::load(&file)?;
+        let remap = self.remap(stored.width(), stored.height());
+        self.seen(&file, stored, remap.as_ref())
+    }
+
+    fn seen(&self, file: &Path, stored: Mask, remap: Option<&Remap>) -> Result<Mask, DatasetError> {
+        let mask = undistorted(file, stored, remap, Remap::mask)?;
         if mask.count() == 0 {
-            return Err(DatasetError::unusable(&file, "the mask is empty"));
+            return Err(DatasetError::unusable(file, "the mask is empty"));
         }
         Ok(mask)
     }
@@ -150,19 +189,31 @@ impl Frame<'_> {
     /// The first of those of [`Frame::rgb`], [`Frame::depth`] and [`Frame::mask`], and
     /// images that differ in size.
     pub fn observation(&self, instance: usize) -> Result<Observation, DatasetError> {
-        let (rgb, depth, mask) = (self.rgb()?, self.depth()?, self.mask(instance)?);
-        let (width, height) = (rgb.width(), rgb.height());
+        let (rgb_file, depth_file) = (self.rgb_path()?, self.depth_path());
+        let color = RgbImage::load(&rgb_file)?;
+        let (width, height) = (color.width(), color.height());
+        let remap = self.remap(width, height);
+        let depth = DepthImage::load(&depth_file, self.depth_scale * 1e-3)?;
+        let mask_file = self.mask_path(instance)?;
+        let mask = Mask::load(&mask_file)?;
         let sizes = [
-            (self.depth_path(), (depth.width(), depth.height())),
-            (self.mask_path(instance)?, (mask.width(), mask.height())),
+            (&depth_file, (depth.width(), depth.height())),
+            (&mask_file, (mask.width(), mask.height())),
         ];
         if let Some((file, (w, h))) = sizes.into_iter().find(|(_, size)| *size != (width, height)) {
-            let other = self.rgb_path()?;
-            let problem = format!("is {w}x{h} pixels but {} is {width}x{height}", other.display());
-            return Err(DatasetError::unusable(&file, problem));
+            let other = rgb_file.display();
+            let problem = format!("is {w}x{h} pixels but {other} is {width}x{height}");
+            return Err(DatasetError::unusable(file, problem));
         }
-        let camera = self.camera(width, height);
-        Ok(Observation { camera, color: rgb, depth, mask, gravity: None, hand: None })
+        let remap = remap.as_ref();
+        Ok(Observation {
+            camera: self.camera(width, height),
+            color: undistorted(&rgb_file, color, remap, Remap::rgb)?,
+            depth: self.measured(&depth_file, depth, remap)?,
+            mask: self.seen(&mask_file, mask, remap)?,
+            gravity: None,
+            hand: None,
+        })
     }
 
     /// Gravity and the known robots, from `scene_bodies.json`.
@@ -194,4 +245,15 @@ impl Frame<'_> {
     fn fault(&self, file: &JsonFile, field: &str, problem: impl ToString) -> DatasetError {
         DatasetError::field(file.path(), &format!("{}.{field}", self.im_id), problem)
     }
+}
+
+/// `stored` as a pinhole camera sees it.
+fn undistorted<T>(
+    file: &Path,
+    stored: T,
+    remap: Option<&Remap>,
+    apply: impl FnOnce(&Remap, &T) -> Result<T, DistortionError>,
+) -> Result<T, DatasetError> {
+    let made = remap.map(|remap| apply(remap, &stored)).transpose();
+    Ok(made.map_err(|e| DatasetError::unusable(file, e))?.unwrap_or(stored))
 }

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use nalgebra::UnitQuaternion;
+use prehend_render::{Distortion, DistortionError};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
@@ -42,6 +43,15 @@ impl JsonFile {
     /// When the file is absent, cannot be read, is not JSON, or its top level is no object.
     pub(super) fn root(&self) -> Result<&Map<String, Value>, DatasetError> {
         self.root.get_or_init(|| read(&self.path)).as_ref().map_err(Clone::clone)
+    }
+
+    /// A field of the top level, if it is there.
+    ///
+    /// # Errors
+    /// Those of [`JsonFile::root`], and [`DatasetError::Field`] if it is not of its type.
+    pub(super) fn field<T: DeserializeOwned>(&self, name: &str) -> Result<Option<T>, DatasetError> {
+        let value = self.root()?.get(name);
+        value.map(|value| convert(&self.path, name.to_owned(), value)).transpose()
     }
 
     /// The entry of an image or object id.
@@ -186,6 +196,26 @@ impl TryFrom<f64> for Positive {
 
     fn try_from(value: f64) -> Result<Self, &'static str> {
         if value > 0.0 { Ok(Self(value)) } else { Err("must be above zero") }
+    }
+}
+
+/// A lens: the name of its model, and the coefficients in the order of OpenCV.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(try_from = "LensLayout")]
+pub(crate) struct Lens(pub(crate) Distortion);
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct LensLayout {
+    model: String,
+    coefficients: Vec<f64>,
+}
+
+impl TryFrom<LensLayout> for Lens {
+    type Error = DistortionError;
+
+    fn try_from(layout: LensLayout) -> Result<Self, DistortionError> {
+        Distortion::by_name(&layout.model, &layout.coefficients).map(Self)
     }
 }
 

@@ -23,7 +23,7 @@ pub use dataset::{Dataset, Scene};
 pub use error::DatasetError;
 pub use frame::Frame;
 pub use ground_truth::{GroundTruth, TrueObject};
-pub(crate) use json::{Numbers, Positive, read_json};
+pub(crate) use json::{Lens, Numbers, Positive, read_json};
 pub use models::{ModelInfo, Models};
 pub use models_info::write_symmetries;
 pub(crate) use models_info::{diameter, extent_to_bop};
