@@ -13,9 +13,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::Context;
-use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Vector3};
 use prehend::geometry::TriMesh;
-use prehend::render::{Camera, Light, RenderModel, Renderer, RgbImage, Scene as Drawn};
+use prehend::render::{Camera, Light, RenderModel, Renderer, RgbImage, Scene as Drawn, look_at};
 use prehend::sim::TimeSteps;
 use scenes::{Scene, crossed_bars, mug_on_hook, nut_on_bolt, scans};
 
@@ -78,17 +78,13 @@ fn draw(
     let (low, high) = whole.bounds().context("nothing to draw")?;
     let (middle, across) = (nalgebra::center(&low, &high), (high - low).norm());
     let eye = middle + view.normalize() * (1.7 * across);
-    let to_opencv = UnitQuaternion::from_scaled_axis(Vector3::x() * std::f64::consts::PI);
-    let t_cam_world = Isometry3::from_parts(Translation3::identity(), to_opencv)
-        * Isometry3::look_at_rh(&eye, &Point3::from(middle.coords), &Vector3::z());
-    let painted = |mesh: &TriMesh, color: [f32; 3]| -> anyhow::Result<Arc<RenderModel>> {
-        let colors = Some(vec![color; mesh.vertices.len()]);
-        Ok(Arc::new(RenderModel::new(&TriMesh { colors, ..mesh.clone() })?))
-    };
+    let t_cam_world = look_at(&eye, &middle, &Vector3::z(), 0.0);
+    let [fixed_mesh, moving_mesh] = &scene.meshes;
     let models = [
-        painted(&scene.meshes[0], [0.55, 0.55, 0.6])?,
-        painted(&scene.meshes[1], [0.85, 0.45, 0.25])?,
-    ];
+        RenderModel::new(fixed_mesh)?.with_uniform_color([0.55, 0.55, 0.6]),
+        RenderModel::new(moving_mesh)?.with_uniform_color([0.85, 0.45, 0.25]),
+    ]
+    .map(Arc::new);
     let renderer = Renderer::new(Light::headlight(0.4, 0.6));
     let picture = |pose: &Isometry3<f64>| {
         let drawn = Drawn { background: [0.96; 3], ..Drawn::new(camera) }

@@ -17,7 +17,7 @@ use prehend::autodiff::optimize::{Criteria, LevenbergMarquardt, NormalEquations}
 use prehend::autodiff::{Fwd, Scalar};
 use prehend::geometry::TriMesh;
 use prehend::geometry::shapes::{Mug, tube};
-use prehend::render::{Camera, Light, RenderModel, Renderer, RgbImage, Scene};
+use prehend::render::{Camera, Light, RenderModel, Renderer, RgbImage, Scene, look_at};
 use prehend::sim::{
     Body, Bounce, Coulomb, GapSmoothing, HuntCrossley, Law, RigidBody, Shape, ShapeOptions,
     SimulationError, State, StaticContactTarget, TimeSteps, World,
@@ -166,16 +166,10 @@ fn animate(mug: &Mug, ways: &[Vec<Isometry3<f64>>; 2], path: &Path) -> anyhow::R
     let camera = Camera { fx: 350.0, fy: 350.0, cx: 99.5, cy: 82.5, width: 200, height: 200 };
     // From the side and a little above, with z up.
     let (eye, middle) = (Point3::new(0.2, 0.4, 0.12), Point3::new(0.05, 0.0, -0.03));
-    let t_cam_world = Isometry3::look_at_rh(&eye, &middle, &Vector3::z());
-    let to_opencv = UnitQuaternion::from_scaled_axis(Vector3::x() * std::f64::consts::PI);
-    let t_cam_world = Isometry3::from_parts(Translation3::identity(), to_opencv) * t_cam_world;
+    let t_cam_world = look_at(&eye, &middle, &Vector3::z(), 0.0);
     let renderer = Renderer::new(Light::headlight(0.4, 0.6));
-    let painted = |mesh: TriMesh, color: [f32; 3]| -> anyhow::Result<Arc<RenderModel>> {
-        let colors = Some(vec![color; mesh.vertices.len()]);
-        Ok(Arc::new(RenderModel::new(&TriMesh { colors, ..mesh })?))
-    };
-    let hook = painted(hook(), [0.55, 0.55, 0.6])?;
-    let mug = painted(mug.mesh(), [0.85, 0.45, 0.25])?;
+    let hook = Arc::new(RenderModel::new(&hook())?.with_uniform_color([0.55, 0.55, 0.6]));
+    let mug = Arc::new(RenderModel::new(&mug.mesh())?.with_uniform_color([0.85, 0.45, 0.25]));
     let picture = |pose: &Isometry3<f64>| -> anyhow::Result<RgbImage> {
         let scene = Scene { background: [0.96; 3], ..Scene::new(camera) }
             .with(Arc::clone(&hook), t_cam_world)

@@ -7,13 +7,13 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use cpu_time::ProcessTime;
-use nalgebra::{Isometry3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Point3, Vector3};
 use prehend_geometry::hand::{allegro_xela_urdf, taxels};
 use prehend_geometry::objects::YcbObject;
 use prehend_geometry::robot::KinematicTree as Tree;
 use prehend_refine::scene::{Hand, Object};
 use prehend_refine::synth::{Grasp, GraspSettings, Grasper};
-use prehend_render::{Camera, Light, RenderModel, render_scene};
+use prehend_render::{Camera, Light, RenderModel, look_at, render_scene};
 
 const FRAMES: usize = 100;
 
@@ -89,7 +89,7 @@ fn draw(robot: &Hand, object: &RenderModel, grasp: &Grasp) -> prehend_render::Rg
     let target = Point3::new(0.04, 0.0, 0.02);
     let eyes = [[0.45, 0.1, 0.15], [0.12, 0.42, 0.1], [0.15, -0.35, -0.25]];
     for (view, eye) in eyes.into_iter().enumerate() {
-        let t_cam_hand = look_at(&Point3::from(eye), &target);
+        let t_cam_hand = look_at(&Point3::from(eye), &target, &Vector3::z(), 0.0);
         let t_cam_model = t_cam_hand * grasp.t_hand_object;
         let mut bodies = vec![(object, t_cam_model)];
         bodies.extend(robot.render_bodies(&t_cam_hand, &grasp.joints));
@@ -105,15 +105,4 @@ fn draw(robot: &Hand, object: &RenderModel, grasp: &Grasp) -> prehend_render::Rg
         }
     }
     picture
-}
-
-/// Pose base → camera of a camera at `eye` that looks at `target` with the hand's +z up in the image.
-fn look_at(eye: &Point3<f64>, target: &Point3<f64>) -> Isometry3<f64> {
-    let forward = (target - eye).normalize();
-    let right = forward.cross(&Vector3::z()).normalize();
-    let down = forward.cross(&right);
-    let rows =
-        nalgebra::Matrix3::from_rows(&[right.transpose(), down.transpose(), forward.transpose()]);
-    let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rows));
-    Isometry3::from_parts(Translation3::from(-(rotation * eye.coords)), rotation)
 }

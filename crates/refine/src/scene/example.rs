@@ -7,10 +7,10 @@ use prehend_autodiff::lie::perturb_about;
 use prehend_geometry::SplitMix64;
 use prehend_geometry::hand::{JOINT_NAMES, allegro_xela_urdf, default_grasp, taxels};
 use prehend_geometry::robot::KinematicTree;
-use prehend_render::Camera;
+use prehend_render::{Camera, look_at};
 
 use super::sensing::HeldObject;
-use super::{Hand, Object, Observation, look_at};
+use super::{Hand, Object, Observation};
 use crate::error::RefineError;
 
 /// A frame whose truth is known.

@@ -46,21 +46,14 @@ impl Residuals<'_> {
 struct BlockSums<'a> {
     residuals: Residuals<'a>,
     tiles: TileSums,
-    /// Place of the tile at hand; whether it is that of a window, and then sums of its pixels side by side.
+    /// Place of the tile at hand, and sums of its pixels side by side.
     tile: usize,
-    in_window: bool,
     lanes: LaneSums,
 }
 
 impl<'a> BlockSums<'a> {
     fn new(residuals: Residuals<'a>, tiling: Tiling) -> Self {
-        Self {
-            residuals,
-            tiles: TileSums::new(tiling),
-            tile: 0,
-            in_window: false,
-            lanes: LaneSums::new(),
-        }
+        Self { residuals, tiles: TileSums::new(tiling), tile: 0, lanes: LaneSums::new() }
     }
 }
 
@@ -68,15 +61,18 @@ impl<const DERIVATIVES: bool> Sink<DERIVATIVES> for BlockSums<'_> {
     #[inline]
     fn pixel(&mut self, x: usize, y: usize, seen: Option<Seen>) {
         let at = y * self.residuals.target.camera.width + x;
-        self.tile = self.tiles.place(x, y);
+        let tile = self.tiles.place(x, y);
+        if tile != self.tile {
+            // Its part of the row ends here.
+            Sink::<DERIVATIVES>::end_row(self);
+            self.tile = tile;
+        }
         self.residuals.add::<DERIVATIVES>(self.tiles.at(self.tile), at, seen);
     }
 
     fn end_row(&mut self) {
-        match (DERIVATIVES, self.in_window) {
-            (false, _) => {}
-            (true, true) => self.tiles.at(self.tile).end_row(),
-            (true, false) => self.tiles.end_row(),
+        if DERIVATIVES {
+            self.tiles.at(self.tile).end_row();
         }
     }
 
@@ -96,12 +92,11 @@ impl<const DERIVATIVES: bool> Sink<DERIVATIVES> for BlockSums<'_> {
 
     fn begin(&mut self, window: &Region) {
         self.tile = self.tiles.place(window.x0, window.y0);
-        (self.in_window, self.lanes) = (true, LaneSums::new());
+        self.lanes = LaneSums::new();
     }
 
     fn end(&mut self) {
         self.tiles.at(self.tile).absorb(&self.lanes);
-        self.in_window = false;
     }
 
     #[inline]

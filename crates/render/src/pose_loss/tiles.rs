@@ -70,11 +70,6 @@ impl TileSums {
     pub(super) fn at(&mut self, place: usize) -> &mut Sums {
         &mut self.sums[place].1
     }
-
-    /// To be called after each image row: see [`Sums::end_row`].
-    pub(super) fn end_row(&mut self) {
-        self.sums.iter_mut().for_each(|(_, sums)| sums.end_row());
-    }
 }
 
 impl IntoIterator for TileSums {

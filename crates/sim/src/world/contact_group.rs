@@ -19,14 +19,8 @@ pub struct ContactGroup<S: Scalar = f64> {
 }
 
 impl<S: Scalar> ContactGroup<S> {
-    /// Between the bodies of two lists, in any order, each contact like `contact`.
-    pub(super) fn new(lists: [&[BodyId]; 2], contact: ContactPair<S>) -> Self {
-        let bodies = lists.map(|list| {
-            let mut bodies = list.to_vec();
-            bodies.sort_unstable();
-            bodies.dedup();
-            bodies.into()
-        });
+    /// Between the bodies of two [`ascending`] lists, each contact like `contact`.
+    pub(super) fn new(bodies: [Arc<[BodyId]>; 2], contact: ContactPair<S>) -> Self {
         Self { bodies, contact }
     }
 
@@ -57,4 +51,12 @@ impl<S: Scalar> ContactGroup<S> {
     pub(crate) fn has_bodies_of<T: Scalar>(&self, other: &ContactGroup<T>) -> bool {
         self.bodies == other.bodies
     }
+}
+
+/// The bodies of a list, each once, in ascending order.
+pub(super) fn ascending(bodies: &[BodyId]) -> Arc<[BodyId]> {
+    let mut bodies = bodies.to_vec();
+    bodies.sort_unstable();
+    bodies.dedup();
+    bodies.into()
 }

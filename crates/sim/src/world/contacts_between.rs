@@ -7,7 +7,7 @@ use prehend_autodiff::Scalar;
 use super::World;
 use super::body::Body;
 use super::body_id::BodyId;
-use super::contact_group::ContactGroup;
+use super::contact_group::{ContactGroup, ascending};
 use super::contact_pair::{ContactBodies, ContactPair};
 use crate::contact::dynamic::DynContactLaw;
 use crate::contact::gap_smoothing::GapSmoothing;
@@ -34,8 +34,9 @@ impl World {
     ) -> Result<(), SimulationError> {
         a.iter().chain(b).try_for_each(|body| self.body(*body).map(|_| ()))?;
         smoothing.check()?;
-        let first = self.first_contact([a, b])?;
-        let group = ContactGroup::new([a, b], ContactPair::new(first, law, smoothing));
+        let lists = [a, b].map(ascending);
+        let first = self.first_contact(&lists)?;
+        let group = ContactGroup::new(lists, ContactPair::new(first, law, smoothing));
         if group.contact.law().bristles().is_some() {
             let every = self.all_pairs(&group);
             self.contacts.extend(every);
@@ -46,16 +47,16 @@ impl World {
     }
 
     /// One of the contacts between two lists of bodies, if all of them can touch.
-    fn first_contact(&self, lists: [&[BodyId]; 2]) -> Result<ContactBodies, SimulationError> {
+    fn first_contact(&self, lists: &[Arc<[BodyId]>; 2]) -> Result<ContactBodies, SimulationError> {
         let mut first = None;
         // Bodies that can do the same need be asked once, or twice where they are to touch each other.
         let kind = |id: BodyId| {
             let body = &self.bodies[id];
             (body.surface.is_some(), body.field.is_some(), body.rigid().is_some())
         };
-        let kinds = lists.map(|list| {
+        let kinds = lists.each_ref().map(|list| {
             let mut found: Vec<BodyId> = Vec::new();
-            for &id in list {
+            for &id in list.iter() {
                 if found.iter().filter(|other| kind(**other) == kind(id)).count() < 2 {
                     found.push(id);
                 }

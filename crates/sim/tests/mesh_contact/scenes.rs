@@ -104,6 +104,7 @@ impl Pair {
 /// A mug that swings on a hook by its handle.
 pub(crate) fn mug_on_hook() -> anyhow::Result<Scene> {
     let mug = Mug::default();
+    let mesh = mug.mesh();
     // Mug's x (towards the handle) to +z, its z along y.
     let rotation =
         UnitQuaternion::from_basis_unchecked(&[Vector3::z(), Vector3::x(), Vector3::y()]);
@@ -114,8 +115,8 @@ pub(crate) fn mug_on_hook() -> anyhow::Result<Scene> {
     Pair {
         fixed: (hook(), Lengths { spacing: 1.5e-3, cell: 1e-3 }, Isometry3::identity()),
         moving: (
-            mug.mesh(),
-            shape(&mug.mesh(), Lengths { spacing: 2e-3, cell: 1.5e-3 })?,
+            mesh.clone(),
+            shape(&mesh, Lengths { spacing: 2e-3, cell: 1.5e-3 })?,
             Isometry3::from_parts(Translation3::from(place.coords), rotation),
         ),
         dimension: None,

@@ -223,6 +223,23 @@ fn bodies_that_cannot_touch_are_refused() {
 }
 
 #[test]
+fn bodies_may_be_listed_in_any_order_and_more_than_once() {
+    let mut world = World::new(Vector3::zeros());
+    let rigid = RigidBody::ball(0.1, RADIUS).unwrap();
+    let [first, second] = ["first", "second"].map(|name| {
+        let body = Body::free(name, rigid).with_field(Arc::new(HalfSpace::floor()));
+        world.add(body.with_surface(Surface::ball(RADIUS).unwrap()))
+    });
+    let law = Arc::new(penalty(2e6, 1e3, 0.4, 2e-2));
+    let lists = [&[first, first][..], &[first, first, second, first]];
+    world.add_contacts_between(lists[0], lists[1], law.clone(), GapSmoothing::Hard).unwrap();
+    world.add_contacts_between(&[second, first], &[first], law, GapSmoothing::Hard).unwrap();
+    let [a, b] = [0, 1].map(|group| world.contact_groups[group].bodies());
+    assert_eq!(a, [&[first][..], &[first, second]]);
+    assert_eq!(b, [&[first, second][..], &[first]]);
+}
+
+#[test]
 fn what_is_too_fast_to_look_for_is_an_error() {
     for speed in [1e12, 1e200] {
         let (world, states) =

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::error::DatasetError;
 use super::json::JsonFile;
+use super::lens::RemapCache;
 use super::models::Models;
 
 /// One split of a BOP dataset, without anything that tells the true poses: neither `scene_gt*.json`,
@@ -30,6 +31,7 @@ pub struct Scene {
     pub(super) camera: JsonFile,
     pub(super) bodies: JsonFile,
     pub(super) tactile: JsonFile,
+    pub(super) remaps: RemapCache,
 }
 
 impl Dataset {
@@ -116,6 +118,7 @@ impl Scene {
             camera: JsonFile::new(dir.join("scene_camera.json")),
             bodies: JsonFile::new(dir.join("scene_bodies.json")),
             tactile: JsonFile::new(dir.join("scene_tactile.json")),
+            remaps: RemapCache::default(),
             dir,
         }
     }

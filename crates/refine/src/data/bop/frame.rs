@@ -10,7 +10,8 @@ use serde::Deserialize;
 
 use super::dataset::{Dataset, Scene};
 use super::error::DatasetError;
-use super::json::{JsonFile, Lens, Numbers, Positive};
+use super::json::{JsonFile, Numbers, Positive};
+use super::lens::Lens;
 use super::scene::{SceneBodies, Tactile};
 use crate::scene::Observation;
 
@@ -116,12 +117,6 @@ impl Frame<'_> {
         }
     }
 
-    /// What makes pinhole images of those of `width` by `height` pixels that are stored, if they are not that.
-    fn remap(&self, width: usize, height: usize) -> Option<Remap> {
-        let camera = self.camera(width, height);
-        self.lens.map(|lens| Remap::undistort(camera, &lens, camera))
-    }
-
     /// Reads the color image.
     ///
     /// # Errors
@@ -129,8 +124,8 @@ impl Frame<'_> {
     pub fn rgb(&self) -> Result<RgbImage, DatasetError> {
         let file = self.rgb_path()?;
         let stored = RgbImage::load(&file)?;
-        let remap = self.remap(stored.width(), stored.height());
-        undistorted(&file, stored, remap.as_ref(), Remap::rgb)
+        let size = (stored.width(), stored.height());
+        self.undistorted(&file, stored, size, Remap::rgb)
     }
 
     /// Reads the depth image.
@@ -140,19 +135,10 @@ impl Frame<'_> {
     pub fn depth(&self) -> Result<DepthImage, DatasetError> {
         let file = self.depth_path();
         let stored = DepthImage::load(&file, self.depth_scale * 1e-3)?;
-        let remap = self.remap(stored.width(), stored.height());
-        self.measured(&file, stored, remap.as_ref())
-    }
-
-    fn measured(
-        &self,
-        file: &Path,
-        stored: DepthImage,
-        remap: Option<&Remap>,
-    ) -> Result<DepthImage, DatasetError> {
-        let depth = undistorted(file, stored, remap, Remap::depth)?;
+        let size = (stored.width(), stored.height());
+        let depth = self.undistorted(&file, stored, size, Remap::depth)?;
         if depth.pixels().iter().all(|&z| z == 0.0) {
-            Err(DatasetError::NoDepth { file: file.to_path_buf() })
+            Err(DatasetError::NoDepth { file })
         } else {
             Ok(depth)
         }
@@ -171,16 +157,25 @@ impl Frame<'_> {
     pub fn mask(&self, instance: usize) -> Result<Mask, DatasetError> {
         let file = self.mask_path(instance)?;
         let stored = Mask::load(&file)?;
-        let remap = self.remap(stored.width(), stored.height());
-        self.seen(&file, stored, remap.as_ref())
-    }
-
-    fn seen(&self, file: &Path, stored: Mask, remap: Option<&Remap>) -> Result<Mask, DatasetError> {
-        let mask = undistorted(file, stored, remap, Remap::mask)?;
+        let size = (stored.width(), stored.height());
+        let mask = self.undistorted(&file, stored, size, Remap::mask)?;
         if mask.count() == 0 {
-            return Err(DatasetError::unusable(file, "the mask is empty"));
+            return Err(DatasetError::unusable(&file, "the mask is empty"));
         }
         Ok(mask)
+    }
+
+    /// An image that is `stored` with that `size`, as a pinhole camera sees it.
+    fn undistorted<T>(
+        &self,
+        file: &Path,
+        stored: T,
+        (width, height): (usize, usize),
+        apply: impl FnOnce(&Remap, &T) -> Result<T, DistortionError>,
+    ) -> Result<T, DatasetError> {
+        let Some(lens) = self.lens else { return Ok(stored) };
+        let remap = self.scene.remaps.get(self.camera(width, height), lens);
+        apply(&remap, &stored).map_err(|e| DatasetError::unusable(file, e))
     }
 
     /// The image as an [`Observation`] of camera, color, depth and mask; gravity and the hand are left out.
@@ -189,31 +184,19 @@ impl Frame<'_> {
     /// The first of those of [`Frame::rgb`], [`Frame::depth`] and [`Frame::mask`], and
     /// images that differ in size.
     pub fn observation(&self, instance: usize) -> Result<Observation, DatasetError> {
-        let (rgb_file, depth_file) = (self.rgb_path()?, self.depth_path());
-        let color = RgbImage::load(&rgb_file)?;
-        let (width, height) = (color.width(), color.height());
-        let remap = self.remap(width, height);
-        let depth = DepthImage::load(&depth_file, self.depth_scale * 1e-3)?;
-        let mask_file = self.mask_path(instance)?;
-        let mask = Mask::load(&mask_file)?;
+        let (rgb, depth, mask) = (self.rgb()?, self.depth()?, self.mask(instance)?);
+        let (width, height) = (rgb.width(), rgb.height());
         let sizes = [
-            (&depth_file, (depth.width(), depth.height())),
-            (&mask_file, (mask.width(), mask.height())),
+            (self.depth_path(), (depth.width(), depth.height())),
+            (self.mask_path(instance)?, (mask.width(), mask.height())),
         ];
         if let Some((file, (w, h))) = sizes.into_iter().find(|(_, size)| *size != (width, height)) {
-            let other = rgb_file.display();
-            let problem = format!("is {w}x{h} pixels but {other} is {width}x{height}");
-            return Err(DatasetError::unusable(file, problem));
+            let other = self.rgb_path()?;
+            let problem = format!("is {w}x{h} pixels but {} is {width}x{height}", other.display());
+            return Err(DatasetError::unusable(&file, problem));
         }
-        let remap = remap.as_ref();
-        Ok(Observation {
-            camera: self.camera(width, height),
-            color: undistorted(&rgb_file, color, remap, Remap::rgb)?,
-            depth: self.measured(&depth_file, depth, remap)?,
-            mask: self.seen(&mask_file, mask, remap)?,
-            gravity: None,
-            hand: None,
-        })
+        let camera = self.camera(width, height);
+        Ok(Observation { camera, color: rgb, depth, mask, gravity: None, hand: None })
     }
 
     /// Gravity and the known robots, from `scene_bodies.json`.
@@ -245,15 +228,4 @@ impl Frame<'_> {
     fn fault(&self, file: &JsonFile, field: &str, problem: impl ToString) -> DatasetError {
         DatasetError::field(file.path(), &format!("{}.{field}", self.im_id), problem)
     }
-}
-
-/// `stored` as a pinhole camera sees it.
-fn undistorted<T>(
-    file: &Path,
-    stored: T,
-    remap: Option<&Remap>,
-    apply: impl FnOnce(&Remap, &T) -> Result<T, DistortionError>,
-) -> Result<T, DatasetError> {
-    let made = remap.map(|remap| apply(remap, &stored)).transpose();
-    Ok(made.map_err(|e| DatasetError::unusable(file, e))?.unwrap_or(stored))
 }

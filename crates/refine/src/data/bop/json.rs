@@ -8,7 +8,6 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use nalgebra::UnitQuaternion;
-use prehend_render::{Distortion, DistortionError};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
@@ -61,8 +60,8 @@ impl JsonFile {
     /// absent or not of its type.
     pub(super) fn entry<T: DeserializeOwned>(&self, id: u32) -> Result<T, DatasetError> {
         let key = id.to_string();
-        match self.root()?.get(&key) {
-            Some(value) => convert(&self.path, key, value),
+        match self.field(&key)? {
+            Some(entry) => Ok(entry),
             None => Err(DatasetError::NoEntry { file: self.path.clone(), key }),
         }
     }
@@ -196,26 +195,6 @@ impl TryFrom<f64> for Positive {
 
     fn try_from(value: f64) -> Result<Self, &'static str> {
         if value > 0.0 { Ok(Self(value)) } else { Err("must be above zero") }
-    }
-}
-
-/// A lens: the name of its model, and the coefficients in the order of OpenCV.
-#[derive(Clone, Copy, Debug, Deserialize)]
-#[serde(try_from = "LensLayout")]
-pub(crate) struct Lens(pub(crate) Distortion);
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct LensLayout {
-    model: String,
-    coefficients: Vec<f64>,
-}
-
-impl TryFrom<LensLayout> for Lens {
-    type Error = DistortionError;
-
-    fn try_from(layout: LensLayout) -> Result<Self, DistortionError> {
-        Distortion::by_name(&layout.model, &layout.coefficients).map(Self)
     }
 }
 

@@ -2,10 +2,9 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use prehend_geometry::SplitMix64;
-use prehend_render::{Camera, DepthImage, RenderModel, SurfacePoint, depth_map};
+use prehend_render::{Camera, DepthImage, RenderModel, SurfacePoint, depth_map, look_at};
 
 use super::settings::LightSettings;
-use crate::scene::look_at;
 
 impl LightSettings {
     /// Random lamps about `bodies`, which are in camera coordinates.

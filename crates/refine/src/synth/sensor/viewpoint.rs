@@ -2,10 +2,9 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use prehend_geometry::SplitMix64;
-use prehend_render::{Camera, RenderModel, depth_map};
+use prehend_render::{Camera, RenderModel, depth_map, look_at};
 
 use super::settings::ViewpointSettings;
-use crate::scene::look_at;
 
 impl ViewpointSettings {
     /// The true camera of an image of that size.

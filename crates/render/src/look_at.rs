@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaterni
 
 /// Pose base → camera of a camera at `eye` that looks at `target`, with the direction `up` (any length) up in the image
 /// but for a turn by `roll` \[rad\] about the optical axis.
-pub(crate) fn look_at(
+pub fn look_at(
     eye: &Point3<f64>,
     target: &Point3<f64>,
     up: &Vector3<f64>,
