@@ -1,7 +1,7 @@
 //! The best device at hand, with the processor to fall back on.
 
 use super::{Backend, BackendError, Cpu, Hypothesis, PoseProblem, Session};
-use crate::pose_loss::{Linearized, Loss, PoseImage};
+use crate::pose_loss::{Linearized, Loss, PoseImage, Tile};
 
 /// Another backend while it works, and the processor from its first failure on.
 ///
@@ -83,6 +83,14 @@ impl Session for FallbackSession {
         self.run(|session| session.linearize(hypotheses))
     }
 
+    fn linearize_tiles(
+        &mut self,
+        hypotheses: &[Hypothesis],
+        side: usize,
+    ) -> Result<Vec<Vec<Tile>>, BackendError> {
+        self.run(|session| session.linearize_tiles(hypotheses, side))
+    }
+
     fn render(&mut self, hypothesis: &Hypothesis) -> Result<PoseImage, BackendError> {
         self.run(|session| session.render(hypothesis))
     }
@@ -121,6 +129,14 @@ mod tests {
             self.1 += 1;
             assert!(self.1 <= 2, "asked after its failure");
             if self.1 == 1 { self.0.linearize(&h[..0]) } else { Err(lost()) }
+        }
+
+        fn linearize_tiles(
+            &mut self,
+            _: &[Hypothesis],
+            _: usize,
+        ) -> Result<Vec<Vec<Tile>>, BackendError> {
+            panic!("asked after its failure")
         }
 
         fn render(&mut self, _: &Hypothesis) -> Result<PoseImage, BackendError> {

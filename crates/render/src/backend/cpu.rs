@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::{Backend, BackendError, Hypothesis, PoseProblem, Session};
-use crate::pose_loss::{Linearized, Loss, PoseImage};
+use crate::pose_loss::{Linearized, Loss, PoseImage, Tile};
 
 /// All cores of this processor. Never fails.
 #[derive(Clone, Copy, Debug, Default)]
@@ -36,6 +36,19 @@ impl Session for PoseProblem {
         let one = |h: &Hypothesis| {
             let center = h.t_cam_object * self.model.center();
             self.loss.linearize(&self.model, &h.t_cam_object, &center, &h.light, &self.target)
+        };
+        Ok(hypotheses.par_iter().map(one).collect())
+    }
+
+    fn linearize_tiles(
+        &mut self,
+        hypotheses: &[Hypothesis],
+        side: usize,
+    ) -> Result<Vec<Vec<Tile>>, BackendError> {
+        let one = |h: &Hypothesis| {
+            let center = h.t_cam_object * self.model.center();
+            let (pose, light) = (&h.t_cam_object, &h.light);
+            self.loss.linearize_tiles(&self.model, pose, &center, light, &self.target, side)
         };
         Ok(hypotheses.par_iter().map(one).collect())
     }

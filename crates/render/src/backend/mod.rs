@@ -18,7 +18,7 @@ pub use gpu::Gpu;
 
 use crate::light::Light;
 use crate::model::RenderModel;
-use crate::pose_loss::{Linearized, Loss, PoseImage, PoseLoss, Target};
+use crate::pose_loss::{Linearized, Loss, PoseImage, PoseLoss, Target, Tile};
 
 /// What many poses have in common.
 #[derive(Clone, Debug)]
@@ -97,6 +97,18 @@ pub trait Session: Send {
     /// # Errors
     /// When the device fails.
     fn linearize(&mut self, hypotheses: &[Hypothesis]) -> Result<Vec<Linearized>, BackendError>;
+
+    /// As [`linearize`](Self::linearize), by square tiles of the image that are `side` pixels wide:
+    /// [`PoseLoss::linearize_tiles`]. Those to which no pixel is drawn or
+    /// missed may be left out.
+    ///
+    /// # Errors
+    /// When the device fails.
+    fn linearize_tiles(
+        &mut self,
+        hypotheses: &[Hypothesis],
+        side: usize,
+    ) -> Result<Vec<Vec<Tile>>, BackendError>;
 
     /// The picture of one hypothesis.
     ///

@@ -18,7 +18,7 @@ use super::work::{self, BUDGET, Capacity, Work};
 use crate::backend::{BackendError, Hypothesis, PoseProblem, Session};
 use crate::image::{DepthImage, RgbImage};
 use crate::mode::Mode;
-use crate::pose_loss::{Counts, Linearized, Loss, PoseImage, unpacked};
+use crate::pose_loss::{Counts, Linearized, Loss, PoseImage, Tile, unpacked};
 
 /// How long a call back may take once the device is done.
 const PATIENCE: Duration = Duration::from_secs(1);
@@ -274,6 +274,15 @@ impl Session for GpuSession {
     fn linearize(&mut self, hypotheses: &[Hypothesis]) -> Result<Vec<Linearized>, BackendError> {
         let sums = self.sums(hypotheses, Wanted::Derivatives)?;
         Ok(sums.chunks_exact(SUM_COLUMNS).map(|s| self.linearized(s)).collect())
+    }
+
+    fn linearize_tiles(
+        &mut self,
+        _hypotheses: &[Hypothesis],
+        _side: usize,
+    ) -> Result<Vec<Vec<Tile>>, BackendError> {
+        let device = self.device.name.clone();
+        Err(BackendError::Unsupported { device, what: "sums by tiles" })
     }
 
     fn render(&mut self, hypothesis: &Hypothesis) -> Result<PoseImage, BackendError> {
