@@ -14,12 +14,12 @@ use std::time::Instant;
 use bottle::{SIZES, bottle, camera, direction, truth, uniform};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 use prehend_render::{
-    Backend, Cpu, Hypothesis, Light, Mask, PoseLoss, PoseProblem, RenderModel, Target, backend,
+    Backend, Cpu, Device, Hypothesis, Light, Mask, PoseLoss, PoseProblem, RenderModel, Target,
 };
 
 fn main() -> anyhow::Result<()> {
-    let device = backend::auto();
     let software = std::env::var("PREHEND_SOFTWARE_GPU").is_ok_and(|v| v == "1");
+    let device = if software { Device::Gpu.open()? } else { Device::Auto.open()? };
     let (_, sides, rings) = SIZES[0];
     let model = Arc::new(RenderModel::new(&bottle(sides, rings))?);
     println!("{} faces; ms an iteration", model.face_count());

@@ -17,8 +17,8 @@ use bottle::{SIZES, bottle, camera, guess, truth};
 use nalgebra::Isometry3;
 use prehend_geometry::shapes::capsule;
 use prehend_render::{
-    Backend, Cpu, DepthOptions, Hypothesis, Light, LossOptions, Mode, PoseLoss, PoseProblem,
-    RenderModel, SoftRasOptions, Target, backend, depth_map, render_scene,
+    Backend, Cpu, DepthOptions, Device, Hypothesis, Light, LossOptions, Mode, PoseLoss,
+    PoseProblem, RenderModel, SoftRasOptions, Target, depth_map, render_scene,
 };
 
 fn main() -> anyhow::Result<()> {
@@ -36,8 +36,8 @@ fn main() -> anyhow::Result<()> {
         ),
     ];
     let wanted = std::env::args().skip(1).find(|word| !word.starts_with('-')).unwrap_or_default();
-    let mut backends: Vec<Box<dyn Backend>> = vec![Box::new(Cpu)];
-    backends.extend(Some(backend::auto()).filter(|b| b.name() != Cpu.name()));
+    let mut backends: Vec<Arc<dyn Backend>> = vec![Arc::new(Cpu)];
+    backends.extend(Some(Device::Auto.open()?).filter(|b| b.name() != Cpu.name()));
     println!("| device | loss | image | faces | pixels | value, ms | with derivatives, ms |");
     println!("|---|---|---|--:|--:|--:|--:|");
     for backend in &backends {

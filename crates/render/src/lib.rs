@@ -2,7 +2,7 @@
 //!
 //! [`PoseLoss`] compares a posed [`RenderModel`] with a segmented image and returns the loss, its
 //! gradient and the Gauss–Newton matrix by the six degrees of freedom of the pose, in either [`Mode`]; a [`Backend`] does so for
-//! thousands of poses at once, on this processor or a graphics device ([`backend::auto`]). [`Renderer`] renders
+//! thousands of poses at once, on this processor or a graphics device ([`Device`]). [`Renderer`] renders
 //! whole scenes under any [`Shader`] and carries the derivatives of any loss back to poses, vertices, colors, textures,
 //! camera and light, on the tape too. [`render_scene`] makes antialiased pictures, [`depth_map`] the z-buffer of what hides
 //! the object, and [`Remap`] pinhole images of those through a lens.
@@ -10,7 +10,7 @@
 //! Cameras follow OpenCV (x right, y down, z forward; pixel centers at integers); lengths are in meters; colors
 //! are in 0..=1 as stored in files.
 
-pub mod backend;
+mod backend;
 pub mod camera;
 mod contour;
 pub mod distortion;
@@ -34,7 +34,9 @@ mod view;
 
 #[cfg(feature = "gpu")]
 pub use backend::Gpu;
-pub use backend::{Backend, BackendError, Cpu, Hypothesis, PoseProblem, Session};
+pub use backend::{
+    Backend, BackendError, Cpu, Device, Hypothesis, PoseProblem, Session, WithFallback,
+};
 pub use camera::{Camera, CameraError};
 pub use distortion::{BrownConrady, Distortion, DistortionError, KannalaBrandt, Remap};
 pub use image::{DepthImage, ImageError, Mask, RgbImage};

@@ -101,88 +101,154 @@ pub(super) fn iterate<M: Method>(
     };
     let start = start.to_vec();
     let here = evaluate(&start)?;
-    Ok(iterate_on(&Plain, method, criteria, (start, here), evaluate, observe)?.0)
+    iterate_on(&Plain, method, criteria, (start, here), evaluate, observe)
 }
 
 /// Runs `method` on parameters that live in `domain` from `start`, where the objective has been evaluated, until one of the
-/// criteria is met. Returns the evaluation at the last parameters beside the best.
+/// criteria is met.
 ///
 /// # Errors
 /// If the objective is not finite at the start, or cannot be evaluated on the way.
-pub(super) fn iterate_on<P: Clone, M: Method>(
+fn iterate_on<P: Clone, M: Method>(
     domain: &impl Domain<P>,
-    mut method: M,
+    method: M,
     criteria: &Criteria,
-    (mut x, mut here): (P, M::Evaluation),
+    start: (P, M::Evaluation),
     mut evaluate: impl FnMut(&P) -> Result<M::Evaluation, OptimizeError>,
     mut observe: impl FnMut(&Iteration<P>) -> ControlFlow<()>,
-) -> Result<(Outcome<P>, M::Evaluation), OptimizeError> {
-    if !here.is_finite() {
-        return Err(OptimizeError::ObjectiveNotFinite);
-    }
-    let mut best =
-        Outcome { parameters: x.clone(), value: here.value(), iterations: 0, stop: Stop::Gradient };
-    // Reported only if the gradient has not vanished as well, which says more.
-    let mut settled = None;
-    let mut refused = false;
-    best.stop = loop {
-        let gradient = largest(here.gradient());
-        if gradient <= criteria.gradient {
-            break Stop::Gradient;
-        }
-        if let Some(stop) = settled {
-            break stop;
-        }
-        if best.iterations == criteria.iterations {
-            break Stop::Iterations;
-        }
-        let Some(Trial { step, predicted }) = method.propose(&here) else {
-            break Stop::Step;
-        };
-        if predicted.is_some_and(|p| p < criteria.predicted_decrease) {
-            // Small because it is held back, not because there is nothing to gain?
-            break if refused { Stop::Step } else { Stop::Decrease };
-        }
-        best.iterations += 1;
-        let moved = domain.retract(&x, &step);
+) -> Result<Outcome<P>, OptimizeError> {
+    let mut descent = Descent::new(method, start)?;
+    while let Some(moved) = descent.ask(domain, criteria) {
         let there = evaluate(&moved)?;
+        descent.tell(domain, criteria, moved, there, &mut observe);
+    }
+    Ok(descent.end().0)
+}
 
-        let length = norm(&step);
-        let change = here.value() - there.value();
-        let small = criteria.decrease * here.value().abs();
-        if length < criteria.step * (domain.norm(&x) + criteria.step) {
-            settled = Some(Stop::Step);
-        } else if change.abs() < small && predicted.is_none_or(|p| p < small) {
-            settled = Some(Stop::Decrease);
+/// One walk of a method, which says where it wants the objective evaluated, and is told what it is there.
+pub(super) struct Descent<P, M: Method> {
+    method: M,
+    x: P,
+    here: M::Evaluation,
+    best: Outcome<P>,
+    /// Set once it is over.
+    ended: bool,
+    /// Reported only if the gradient has not vanished as well, which says more.
+    settled: Option<Stop>,
+    /// The last step was not taken.
+    refused: bool,
+    trial: Trial,
+}
+
+impl<P: Clone, M: Method> Descent<P, M> {
+    /// From where the objective has been evaluated.
+    ///
+    /// # Errors
+    /// If it is not finite there.
+    pub(super) fn new(method: M, (x, here): (P, M::Evaluation)) -> Result<Self, OptimizeError> {
+        if !here.is_finite() {
+            return Err(OptimizeError::ObjectiveNotFinite);
         }
+        let best = Outcome {
+            parameters: x.clone(),
+            value: here.value(),
+            iterations: 0,
+            stop: Stop::Gradient,
+        };
+        let trial = Trial { step: Vec::new(), predicted: None };
+        Ok(Self { method, x, here, best, ended: false, settled: None, refused: false, trial })
+    }
 
+    /// Where the objective is to be evaluated next; `None` if it is over.
+    pub(super) fn ask(&mut self, domain: &impl Domain<P>, criteria: &Criteria) -> Option<P> {
+        if self.ended {
+            return None;
+        }
+        match self.next_trial(criteria) {
+            Ok(trial) => {
+                self.trial = trial;
+                self.best.iterations += 1;
+                Some(domain.retract(&self.x, &self.trial.step))
+            }
+            Err(stop) => {
+                self.stop(stop);
+                None
+            }
+        }
+    }
+
+    fn next_trial(&mut self, criteria: &Criteria) -> Result<Trial, Stop> {
+        if largest(self.here.gradient()) <= criteria.gradient {
+            return Err(Stop::Gradient);
+        }
+        if let Some(stop) = self.settled {
+            return Err(stop);
+        }
+        if self.best.iterations == criteria.iterations {
+            return Err(Stop::Iterations);
+        }
+        let trial = self.method.propose(&self.here).ok_or(Stop::Step)?;
+        if trial.predicted.is_some_and(|p| p < criteria.predicted_decrease) {
+            // Small because it is held back, not because there is nothing to gain?
+            return Err(if self.refused { Stop::Step } else { Stop::Decrease });
+        }
+        Ok(trial)
+    }
+
+    /// Goes on with what the objective is where it was asked for, or ends if `observe` says so.
+    pub(super) fn tell(
+        &mut self,
+        domain: &impl Domain<P>,
+        criteria: &Criteria,
+        moved: P,
+        there: M::Evaluation,
+        observe: &mut impl FnMut(&Iteration<P>) -> ControlFlow<()>,
+    ) {
+        let predicted = self.trial.predicted;
+        let length = norm(&self.trial.step);
+        let change = self.here.value() - there.value();
+        let small = criteria.decrease * self.here.value().abs();
+        if length < criteria.step * (domain.norm(&self.x) + criteria.step) {
+            self.settled = Some(Stop::Step);
+        } else if change.abs() < small && predicted.is_none_or(|p| p < small) {
+            self.settled = Some(Stop::Decrease);
+        }
         let gain = predicted.map_or(1.0, |p| change / p);
         let taken = there.is_finite() && gain >= SUFFICIENT_GAIN;
-        refused = !taken;
+        self.refused = !taken;
         if taken {
-            method.taken(gain);
-            x = moved;
-            here = there;
-            if here.value() < best.value {
-                best.parameters.clone_from(&x);
-                best.value = here.value();
+            self.method.taken(gain);
+            self.x = moved;
+            self.here = there;
+            if self.here.value() < self.best.value {
+                self.best.parameters.clone_from(&self.x);
+                self.best.value = self.here.value();
             }
         } else {
-            method.refused();
+            self.method.refused();
         }
         let iteration = Iteration {
-            number: best.iterations,
-            parameters: &x,
-            value: here.value(),
-            gradient: largest(here.gradient()),
+            number: self.best.iterations,
+            parameters: &self.x,
+            value: self.here.value(),
+            gradient: largest(self.here.gradient()),
             step: length,
             taken,
         };
         if observe(&iteration).is_break() {
-            break Stop::Observer;
+            self.stop(Stop::Observer);
         }
-    };
-    Ok((best, here))
+    }
+
+    fn stop(&mut self, stop: Stop) {
+        self.best.stop = stop;
+        self.ended = true;
+    }
+
+    /// The best that was found, and the evaluation at the last parameters.
+    pub(super) fn end(self) -> (Outcome<P>, M::Evaluation) {
+        (self.best, self.here)
+    }
 }
 
 /// The observer of those who want none.

@@ -6,7 +6,7 @@ use std::ops::ControlFlow;
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::error::check_setting;
-use super::iterate::{Domain, Evaluation, Method, Trial, iterate, iterate_on, unobserved};
+use super::iterate::{Descent, Domain, Evaluation, Method, Trial, iterate, unobserved};
 use super::problem::{LeastSquares, Linearized, QuadraticModel};
 use super::{Criteria, Iteration, NormalEquations, OptimizeError, Outcome};
 
@@ -136,23 +136,66 @@ impl LevenbergMarquardt {
         problem: &P,
         start: P::Point,
         linearized: P::Linearization,
-        observe: impl FnMut(&Iteration<P::Point>) -> ControlFlow<()>,
-    ) -> Result<(Outcome<P::Point>, P::Linearization), OptimizeError> {
+        mut observe: impl FnMut(&Iteration<P::Point>) -> ControlFlow<()>,
+    ) -> Result<Solved<P>, OptimizeError> {
+        let starts = vec![(start, linearized)];
+        let observe = |_: usize, iteration: &Iteration<P::Point>| observe(iteration);
+        let mut found = self.minimize_all_on(problem, starts, observe)?;
+        found.pop().unwrap_or(Err(OptimizeError::NoParameters))
+    }
+
+    /// As [`minimize_on`](Self::minimize_on) from each of several starts. All walks go step by step side by side, so that
+    /// [`LeastSquares::linearize_all`] can answer them together; none depends on the others. The observer hears the number of the start, too.
+    ///
+    /// # Errors
+    /// If a setting is out of range; for each start, as for one alone.
+    pub fn minimize_all_on<P: LeastSquares>(
+        &self,
+        problem: &P,
+        starts: Vec<(P::Point, P::Linearization)>,
+        mut observe: impl FnMut(usize, &Iteration<P::Point>) -> ControlFlow<()>,
+    ) -> Result<Vec<Result<Solved<P>, OptimizeError>>, OptimizeError> {
         self.check()?;
         self.criteria.check()?;
-        let linearized = Linearized(linearized);
-        let count = linearized.gradient().len();
-        linearized.check_shape(count)?;
-        let evaluate = |x: &P::Point| {
-            let linearized = Linearized(problem.linearize(x));
-            linearized.check_shape(count).map(|()| linearized)
+        let (domain, criteria) = (Manifold(problem), &self.criteria);
+        let begin = |(start, linearized): (P::Point, P::Linearization)| {
+            let linearized = Linearized(linearized);
+            let count = linearized.gradient().len();
+            linearized.check_shape(count)?;
+            Ok((count, Descent::new(self.damped(count), (start, linearized))?))
         };
-        let start = (start, linearized);
-        let method = self.damped(count);
-        let domain = Manifold(problem);
-        let (outcome, last) =
-            iterate_on(&domain, method, &self.criteria, start, evaluate, observe)?;
-        Ok((outcome, last.0))
+        let mut walks: Vec<Result<(usize, Descent<_, Damped<_>>), OptimizeError>> =
+            starts.into_iter().map(begin).collect();
+        loop {
+            let (mut asking, mut points) = (Vec::new(), Vec::new());
+            for (number, walk) in walks.iter_mut().enumerate() {
+                let Ok((_, descent)) = walk else { continue };
+                if let Some(point) = descent.ask(&domain, criteria) {
+                    asking.push(number);
+                    points.push(point);
+                }
+            }
+            if points.is_empty() {
+                let end = |(_, descent): (usize, Descent<_, _>)| {
+                    let (outcome, Linearized(last)) = descent.end();
+                    (outcome, last)
+                };
+                return Ok(walks.into_iter().map(|walk| walk.map(end)).collect());
+            }
+            let linearized = problem.linearize_all(&points);
+            for ((number, point), there) in asking.into_iter().zip(points).zip(linearized) {
+                let Ok((count, descent)) = &mut walks[number] else { continue };
+                let there = Linearized(there);
+                match there.check_shape(*count) {
+                    Ok(()) => {
+                        let mut observe =
+                            |iteration: &Iteration<P::Point>| observe(number, iteration);
+                        descent.tell(&domain, criteria, point, there, &mut observe);
+                    }
+                    Err(error) => walks[number] = Err(error),
+                }
+            }
+        }
     }
 
     fn damped<M>(&self, parameters: usize) -> Damped<M> {
@@ -160,6 +203,9 @@ impl LevenbergMarquardt {
         Damped { damping: self.damping, growth: 2.0, scale, model: PhantomData }
     }
 }
+
+/// What a solve ends with: its outcome, and the linearization there.
+pub type Solved<P> = (Outcome<<P as LeastSquares>::Point>, <P as LeastSquares>::Linearization);
 
 /// Where the parameters of a problem live.
 struct Manifold<'a, P>(&'a P);
@@ -459,6 +505,66 @@ mod tests {
             let found = method.minimize(&[100.0], |x| NormalEquations::forward(line, x)).unwrap();
             assert!((found.parameters[0] - 3.0).abs() < 1e-6, "{found:?}");
             assert!(found.iterations < 20 && found.stop != Stop::Iterations, "{found:?}");
+        }
+    }
+
+    /// Rosenbrock's valley as a problem of plain vectors; not a number beyond x = 5.
+    struct Valley(std::cell::RefCell<Vec<usize>>);
+
+    impl LeastSquares for Valley {
+        type Point = Vec<f64>;
+        type Linearization = NormalEquations;
+
+        fn linearize(&self, at: &Vec<f64>) -> NormalEquations {
+            let mut all = NormalEquations::forward::<2>(rosenbrock, at);
+            all.value = if at[0] > 5.0 { f64::NAN } else { all.value };
+            all
+        }
+
+        fn linearize_all(&self, points: &[Vec<f64>]) -> Vec<NormalEquations> {
+            self.0.borrow_mut().push(points.len());
+            points.iter().map(|at| self.linearize(at)).collect()
+        }
+
+        fn retract(&self, at: &Vec<f64>, step: &[f64]) -> Vec<f64> {
+            at.iter().zip(step).map(|(x, h)| x + h).collect()
+        }
+    }
+
+    #[test]
+    fn walks_side_by_side_go_as_they_go_alone() {
+        let starts = [[-1.2, 1.0], [2.0, -1.0], [6.0, 0.0], [1.0, 1.0], [0.3, 0.3]];
+        let problem = Valley(Vec::new().into());
+        for method in both() {
+            let begin = |start: &[f64; 2]| (start.to_vec(), problem.linearize(&start.to_vec()));
+            let go_on = |_: &Iteration<Vec<f64>>| ControlFlow::Continue(());
+            let alone: Vec<_> = starts
+                .iter()
+                .map(|start| {
+                    let (x, linearized) = begin(start);
+                    method.minimize_on(&problem, x, linearized, go_on).map(|found| found.0)
+                })
+                .collect();
+            problem.0.borrow_mut().clear();
+            let mut heard = [0; 5];
+            let together = method
+                .minimize_all_on(&problem, starts.iter().map(begin).collect(), |number, _| {
+                    heard[number] += 1;
+                    ControlFlow::Continue(())
+                })
+                .unwrap();
+            let together: Vec<_> =
+                together.into_iter().map(|found| found.map(|found| found.0)).collect();
+            assert_eq!(together, alone);
+            assert_eq!(together[2], Err(OptimizeError::ObjectiveNotFinite));
+            let iterations =
+                |found: &Result<Outcome<_>, _>| found.as_ref().map_or(0, |o| o.iterations);
+            assert_eq!(together.iter().map(iterations).collect::<Vec<_>>(), heard);
+            // All that were not over were asked for at once.
+            let asked = problem.0.borrow();
+            assert_eq!(asked.len(), *heard.iter().max().unwrap());
+            assert_eq!(asked[0], 3);
+            assert!(asked.is_sorted_by(|a, b| a >= b));
         }
     }
 

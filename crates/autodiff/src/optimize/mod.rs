@@ -56,7 +56,7 @@ pub use adam::Adam;
 pub use criteria::Criteria;
 pub use error::OptimizeError;
 pub use gradient_descent::GradientDescent;
-pub use least_squares::LevenbergMarquardt;
+pub use least_squares::{LevenbergMarquardt, Solved};
 pub use normal_equations::NormalEquations;
 pub use problem::{LeastSquares, QuadraticModel};
 pub use report::{Iteration, Outcome, Stop};

@@ -15,6 +15,11 @@ pub trait LeastSquares {
     /// The sum about `at`, by the directions of the tangent space there.
     fn linearize(&self, at: &Self::Point) -> Self::Linearization;
 
+    /// The sum about each of several points: together, where that takes less than one after the other.
+    fn linearize_all(&self, points: &[Self::Point]) -> Vec<Self::Linearization> {
+        points.iter().map(|at| self.linearize(at)).collect()
+    }
+
     /// The point that `step` of the tangent space at `at` leads to.
     fn retract(&self, at: &Self::Point, step: &[f64]) -> Self::Point;
 }

@@ -1,12 +1,14 @@
 //! Rendering: the difference between the segmented image and the object rendered at the pose.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use nalgebra::{Isometry3, SMatrix};
 use prehend_geometry::RobustKernel;
 use prehend_render::{
-    ContourOptions, Light, LossOptions, Mode, PoseLoss, Target, Tile, light_samples,
+    Backend, BackendError, ContourOptions, Hypothesis, Light, LossOptions, Mode, PoseLoss,
+    PoseProblem, Session, Target, Tile, light_samples,
 };
+use rayon::prelude::*;
 
 use super::patch_sums::PatchSums;
 use crate::error::RefineError;
@@ -67,6 +69,8 @@ pub struct RenderingFactor {
     object: Arc<Object>,
     target: Arc<Target>,
     loss: PoseLoss,
+    /// The same on a device, if there is one beside the processor.
+    device: Option<Mutex<Box<dyn Session>>>,
     /// Nats per unit of the renderer's loss.
     scale: f64,
     light_ridge: f64,
@@ -93,10 +97,17 @@ impl RenderingFactor {
             ..LossOptions::default()
         };
         let contour = ContourOptions { half_width: HALF_WIDTH, ..ContourOptions::default() };
+        let (object, target) = (Arc::clone(frame.object()), image.target);
+        let loss = PoseLoss::new(Mode::Contour(contour), options);
+        let prepare = |backend: &Arc<dyn Backend>| {
+            let (model, target) = (Arc::clone(&object.model), Arc::clone(&target));
+            backend.prepare(&PoseProblem { model, target, loss }).map(Mutex::new)
+        };
         Ok(Self {
-            object: Arc::clone(frame.object()),
-            target: image.target,
-            loss: PoseLoss::new(Mode::Contour(contour), options),
+            device: frame.backend().map(prepare).transpose()?,
+            object,
+            target,
+            loss,
             scale: settings.effective_pixels / (sigma * sigma),
             light_ridge: settings.light_ridge,
             color: settings.color,
@@ -128,32 +139,73 @@ impl RenderingFactor {
         Lit { factor: self, light: self.light(state) }
     }
 
-    /// The cost under a `light`.
-    fn lit_cost(&self, state: &State, light: &Light) -> f64 {
-        let (model, seen) = (&self.object.model, reprojected(state));
-        self.scale * self.loss.evaluate(model, &seen, light, &self.target).total
+    /// What is to be rendered at each of several states, each under the light that is best there.
+    fn hypotheses(&self, states: &[State]) -> Vec<Hypothesis> {
+        let lit = |state: &State| self.hypothesis(state, self.light(state));
+        states.par_iter().map(lit).collect()
     }
 
-    /// The cost and its derivatives under a `light`.
-    fn lit_linearize(&self, state: &State, light: &Light, equations: &mut NormalEquations) -> f64 {
-        let center = state.center();
-        let (model, seen) = (&self.object.model, reprojected(state));
-        let turning = seen * self.object.center;
+    fn hypothesis(&self, state: &State, light: Light) -> Hypothesis {
+        Hypothesis { t_cam_object: reprojected(state), light }
+    }
+
+    /// What `ask` makes of the device; `None` without one, or if it fails.
+    fn on_device<T>(
+        &self,
+        ask: impl FnOnce(&mut dyn Session) -> Result<T, BackendError>,
+    ) -> Option<T> {
+        let mut session = self.device.as_ref()?.lock().unwrap_or_else(PoisonError::into_inner);
+        ask(session.as_mut()).map_err(|error| log::warn!("{error}; continuing on the CPU")).ok()
+    }
+
+    /// The cost of each hypothesis.
+    fn costs(&self, hypotheses: &[Hypothesis]) -> Vec<f64> {
+        let losses = self.on_device(|session| session.evaluate(hypotheses)).unwrap_or_else(|| {
+            let Self { object, target, loss, .. } = self;
+            let one =
+                |h: &Hypothesis| loss.evaluate(&object.model, &h.t_cam_object, &h.light, target);
+            hypotheses.par_iter().map(one).collect()
+        });
+        losses.into_iter().map(|loss| self.scale * loss.total).collect()
+    }
+
+    /// Each hypothesis by tiles of the image of `side` pixels, turning about the object's center.
+    fn tiles(&self, hypotheses: &[Hypothesis], side: usize) -> Vec<Vec<Tile>> {
+        let tiles = self.on_device(|session| session.linearize_tiles(hypotheses, side));
+        tiles.unwrap_or_else(|| {
+            let Self { object, target, loss, .. } = self;
+            let one = |Hypothesis { t_cam_object, light }: &Hypothesis| {
+                let center = t_cam_object * object.model.center();
+                loss.linearize_tiles(&object.model, t_cam_object, &center, light, target, side)
+            };
+            hypotheses.par_iter().map(one).collect()
+        })
+    }
+
+    /// Patches, if anybody asks for derivatives by them.
+    fn patches_for(&self, equations: &NormalEquations) -> Option<&(Arc<SurfacePatches>, usize)> {
+        self.patches.as_ref().filter(|_| equations.auxiliary() > 0)
+    }
+
+    /// The width of tiles that `equations` need \[px\].
+    fn side_for(&self, equations: &NormalEquations) -> usize {
+        // One tile for all if nobody asks for more.
+        self.patches_for(equations).map_or(usize::MAX, |(_, side)| *side)
+    }
+
+    /// The cost at `state` and its derivatives, from those by the place at which the object is seen.
+    fn add_tiles(&self, state: &State, tiles: &[Tile], equations: &mut NormalEquations) -> f64 {
         // The object is seen shifted, and turned as it is.
         let mut seen_by_state = SMatrix::<f64, 6, 11>::zeros();
-        let place = state.camera.reprojected_jacobian(&center);
+        let place = state.camera.reprojected_jacobian(&state.center());
         seen_by_state.fixed_view_mut::<3, 3>(0, 0).copy_from(&place.fixed_columns::<3>(0));
         seen_by_state.fixed_view_mut::<3, 5>(0, 6).copy_from(&place.fixed_columns::<5>(3));
         seen_by_state.fixed_view_mut::<3, 3>(3, 3).fill_with_identity();
-        let patches = self.patches.as_ref().filter(|_| equations.auxiliary() > 0);
-        let count = patches.map_or(0, |(patches, _)| patches.count());
-        // One tile for all if nobody asks for more.
-        let side = patches.map_or(usize::MAX, |(_, side)| *side);
-        let tiles = self.loss.linearize_tiles(model, &seen, &turning, light, &self.target, side);
-        let mut sums = PatchSums::<11>::new(count);
+        let patches = self.patches_for(equations).map(|(patches, _)| patches);
+        let mut sums = PatchSums::<11>::new(patches.map_or(0, |patches| patches.count()));
         let mut cost = 0.0;
-        for Tile { column, row, at } in tiles {
-            let patch = patches.and_then(|(patches, _)| patches.in_tile(column, row));
+        for &Tile { column, row, at } in tiles {
+            let patch = patches.and_then(|patches| patches.in_tile(column, row));
             let (gradient, hessian) = sums.of(patch);
             *gradient += seen_by_state.tr_mul(&at.gradient) * self.scale;
             *hessian += seen_by_state.tr_mul(&at.hessian) * seen_by_state * self.scale;
@@ -182,6 +234,17 @@ impl Factor for RenderingFactor {
         self.lit_at(state).linearize(state, equations)
     }
 
+    fn cost_all(&self, states: &[State]) -> Vec<f64> {
+        self.costs(&self.hypotheses(states))
+    }
+
+    fn linearize_all(&self, states: &[State], equations: &mut [NormalEquations]) -> Vec<f64> {
+        let Some(first) = equations.first() else { return Vec::new() };
+        let tiles = self.tiles(&self.hypotheses(states), self.side_for(first));
+        let each = states.par_iter().zip(tiles).zip(equations);
+        each.map(|((state, tiles), equations)| self.add_tiles(state, &tiles, equations)).collect()
+    }
+
     fn conditional_at(&self, state: &State) -> Option<Box<dyn Factor + '_>> {
         Some(Box::new(self.lit_at(state)))
     }
@@ -199,11 +262,13 @@ impl Factor for Lit<'_> {
     }
 
     fn cost(&self, state: &State) -> f64 {
-        self.factor.lit_cost(state, &self.light)
+        self.factor.costs(&[self.factor.hypothesis(state, self.light)]).iter().sum()
     }
 
     fn linearize(&self, state: &State, equations: &mut NormalEquations) -> f64 {
-        self.factor.lit_linearize(state, &self.light, equations)
+        let hypothesis = self.factor.hypothesis(state, self.light);
+        let tiles = self.factor.tiles(&[hypothesis], self.factor.side_for(equations));
+        self.factor.add_tiles(state, &tiles.concat(), equations)
     }
 }
 
@@ -251,6 +316,7 @@ mod tests {
         let factor = factor(&frame);
         let truth = State { t_cam_object: scene().truth, ..state.clone() };
         assert!(factor.cost(&truth) < 0.5 * factor.cost(&state));
-        assert!(factor.cost(&truth) < factor.lit_cost(&truth, &Light::ambient(1.0)));
+        let white = Lit { factor: &factor, light: Light::ambient(1.0) };
+        assert!(factor.cost(&truth) < white.cost(&truth));
     }
 }

@@ -3,6 +3,8 @@
 use std::fmt;
 use std::sync::Arc;
 
+use rayon::prelude::*;
+
 use super::{NormalEquations, Rows, State};
 
 /// One kind of evidence: a negative log-likelihood of a [`State`] \[nat\], up to a constant.
@@ -55,6 +57,18 @@ pub trait Factor: Send + Sync {
         rows.cost()
     }
 
+    /// The [`cost`](Self::cost) at each of several states. A factor that has a quicker way than one after the other writes its own.
+    fn cost_all(&self, states: &[State]) -> Vec<f64> {
+        states.par_iter().map(|state| self.cost(state)).collect()
+    }
+
+    /// As [`linearize`](Self::linearize) at each of several states, each with its `equations`. A factor that has a quicker way than one after
+    /// the other writes its own.
+    fn linearize_all(&self, states: &[State], equations: &mut [NormalEquations]) -> Vec<f64> {
+        let each = states.par_iter().zip(equations);
+        each.map(|(state, equations)| self.linearize(state, equations)).collect()
+    }
+
     /// The factor given what it eliminates in closed form (a light), which has the values that are best at `state`; none if it
     /// eliminates nothing. Its gradient is that of its cost, and its cost takes less to compute.
     fn conditional_at(&self, _state: &State) -> Option<Box<dyn Factor + '_>> {
@@ -77,6 +91,14 @@ impl<F: Factor + ?Sized> Factor for Arc<F> {
 
     fn linearize(&self, state: &State, equations: &mut NormalEquations) -> f64 {
         (**self).linearize(state, equations)
+    }
+
+    fn cost_all(&self, states: &[State]) -> Vec<f64> {
+        (**self).cost_all(states)
+    }
+
+    fn linearize_all(&self, states: &[State], equations: &mut [NormalEquations]) -> Vec<f64> {
+        (**self).linearize_all(states, equations)
     }
 
     fn conditional_at(&self, state: &State) -> Option<Box<dyn Factor + '_>> {

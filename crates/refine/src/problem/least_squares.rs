@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 use prehend_autodiff::optimize::{
-    Criteria, LeastSquares, LevenbergMarquardt, QuadraticModel, Stop,
+    Criteria, LeastSquares, LevenbergMarquardt, OptimizeError, QuadraticModel, Solved, Stop,
 };
 use rayon::prelude::*;
 use strum::IntoStaticStr;
@@ -156,6 +156,14 @@ impl Problem {
         self.prior.iter().chain(&self.factors).map(|factor| factor.cost(state)).sum()
     }
 
+    /// The [`cost`](Self::cost) at each of several states.
+    pub(crate) fn cost_all(&self, states: &[State]) -> Vec<f64> {
+        let factors: Vec<_> = self.prior.iter().chain(&self.factors).collect();
+        let costs: Vec<Vec<f64>> =
+            factors.into_par_iter().map(|factor| factor.cost_all(states)).collect();
+        (0..states.len()).map(|i| costs.iter().map(|of_factor| of_factor[i]).sum()).collect()
+    }
+
     /// Lowers the cost from `start` until `solver` is content, or `observe`, which hears after each step whether it lowered the
     /// cost, breaks off.
     pub fn solve(
@@ -164,23 +172,38 @@ impl Problem {
         solver: &Solver,
         mut observe: impl FnMut(bool) -> ControlFlow<()>,
     ) -> Solution {
-        let criteria = Criteria {
-            iterations: solver.iterations,
-            gradient: 0.0,
-            step: 0.0,
-            decrease: 0.0,
-            predicted_decrease: solver.min_decrease,
-        };
-        let method = LevenbergMarquardt { criteria, ..LevenbergMarquardt::default() };
         let mut iterations = 0;
         let state = start.state.clone();
-        let found = method.minimize_on(self, state.clone(), start, |iteration| {
+        let found = solver.method().minimize_on(self, state.clone(), start, |iteration| {
             iterations += usize::from(iteration.taken);
             observe(iteration.taken)
         });
+        self.solution(&state, iterations, found)
+    }
+
+    /// As [`solve`](Self::solve) from each of several states, all side by side.
+    pub(crate) fn solve_all(&self, states: &[State], solver: &Solver) -> Vec<Solution> {
+        let starts = states.iter().cloned().zip(self.linearize_all(states)).collect();
+        let mut iterations = vec![0; states.len()];
+        let found = solver.method().minimize_all_on(self, starts, |number, iteration| {
+            iterations[number] += usize::from(iteration.taken);
+            ControlFlow::Continue(())
+        });
+        let found = found.unwrap_or_else(|error| vec![Err(error); states.len()]);
+        let each = states.iter().zip(iterations).zip(found);
+        each.map(|((state, iterations), found)| self.solution(state, iterations, found)).collect()
+    }
+
+    /// Where a walk from `start` ended.
+    fn solution(
+        &self,
+        start: &State,
+        iterations: usize,
+        found: Result<Solved<Self>, OptimizeError>,
+    ) -> Solution {
         // A start that cannot be linearized is where it ends.
         let Ok((outcome, at)) = found else {
-            let at = self.linearize(&state);
+            let at = self.linearize(start);
             return Solution { at, termination: Termination::Stalled, iterations: 0 };
         };
         let termination = match outcome.stop {
@@ -191,24 +214,21 @@ impl Problem {
         };
         Solution { at, termination, iterations }
     }
-}
 
-impl LeastSquares for Problem {
-    type Point = State;
-    type Linearization = Linearization;
-
-    /// The cost about `state`, factors side by side.
-    fn linearize(&self, state: &State) -> Linearization {
+    /// Nothing yet of the derivatives of a sum.
+    fn no_equations(&self) -> NormalEquations {
         let auxiliary = self.patches.as_ref().map_or(0, |patches| 3 * patches.count());
-        let contribution = |factor: &dyn Factor| {
-            let mut equations = NormalEquations::with_auxiliary(&self.blocks, auxiliary);
-            let cost = factor.linearize(state, &mut equations);
-            Contribution { name: factor.name(), cost, equations }
-        };
-        let of_factors = self.factors.par_iter().map(|factor| contribution(factor.as_ref()));
-        let factors: Vec<Contribution> = of_factors.collect();
-        let prior = self.prior.as_ref().map(|prior| contribution(prior.as_ref()));
-        let mut equations = NormalEquations::with_auxiliary(&self.blocks, auxiliary);
+        NormalEquations::with_auxiliary(&self.blocks, auxiliary)
+    }
+
+    /// The sum of what the factors contribute at `state`.
+    fn sum(
+        &self,
+        state: &State,
+        prior: Option<Contribution>,
+        factors: Vec<Contribution>,
+    ) -> Linearization {
+        let mut equations = self.no_equations();
         let mut cost = 0.0;
         for part in prior.iter().chain(&factors) {
             equations += &part.equations;
@@ -227,6 +247,62 @@ impl LeastSquares for Problem {
             }
         }
         Linearization { state: state.clone(), cost, equations, prior, factors, marginal }
+    }
+}
+
+impl Solver {
+    fn method(&self) -> LevenbergMarquardt {
+        let criteria = Criteria {
+            iterations: self.iterations,
+            gradient: 0.0,
+            step: 0.0,
+            decrease: 0.0,
+            predicted_decrease: self.min_decrease,
+        };
+        LevenbergMarquardt { criteria, ..LevenbergMarquardt::default() }
+    }
+}
+
+impl LeastSquares for Problem {
+    type Point = State;
+    type Linearization = Linearization;
+
+    /// The cost about `state`, factors side by side.
+    fn linearize(&self, state: &State) -> Linearization {
+        let contribution = |factor: &dyn Factor| {
+            let mut equations = self.no_equations();
+            let cost = factor.linearize(state, &mut equations);
+            Contribution { name: factor.name(), cost, equations }
+        };
+        let of_factors = self.factors.par_iter().map(|factor| contribution(factor.as_ref()));
+        let factors = of_factors.collect();
+        let prior = self.prior.as_ref().map(|prior| contribution(prior.as_ref()));
+        self.sum(state, prior, factors)
+    }
+
+    /// The same about several states: factors side by side, each with all states.
+    fn linearize_all(&self, states: &[State]) -> Vec<Linearization> {
+        let contributions = |factor: &dyn Factor| {
+            let mut equations = vec![self.no_equations(); states.len()];
+            let costs = factor.linearize_all(states, &mut equations);
+            let name = factor.name();
+            let each = costs.into_iter().zip(equations);
+            each.map(|(cost, equations)| Contribution { name, cost, equations }).collect::<Vec<_>>()
+        };
+        let of_factors = self.factors.par_iter().map(|factor| contributions(factor.as_ref()));
+        let of_factors: Vec<Vec<Contribution>> = of_factors.collect();
+        let mut by_state: Vec<_> = states.iter().map(|state| (state, None, Vec::new())).collect();
+        for of_factor in of_factors {
+            by_state.iter_mut().zip(of_factor).for_each(|(at, part)| at.2.push(part));
+        }
+        if let Some(prior) = &self.prior {
+            let of_prior = contributions(prior.as_ref());
+            by_state.iter_mut().zip(of_prior).for_each(|(at, part)| at.1 = Some(part));
+        }
+        by_state
+            .into_par_iter()
+            .map(|(state, prior, parts)| self.sum(state, prior, parts))
+            .collect()
     }
 
     fn retract(&self, state: &State, step: &[f64]) -> State {

@@ -5,7 +5,7 @@ use std::collections::btree_map::Entry;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use nalgebra::Point3;
-use prehend_render::{Camera, DepthImage, Target, TargetError, depth_map};
+use prehend_render::{Backend, Camera, Cpu, DepthImage, Target, TargetError, depth_map};
 
 use super::{Hand, HandMeasurement, Object, Observation};
 use crate::error::RefineError;
@@ -20,6 +20,8 @@ pub struct Frame<'a> {
     depth: OnceLock<Arc<DepthImage>>,
     /// Segmented images by what may hide the object and by how many times smaller they are.
     segmented: Mutex<BTreeMap<(Occluders, usize), Segmented>>,
+    /// What renders, if not the processor at hand.
+    backend: Option<Arc<dyn Backend>>,
 }
 
 /// What may hide the object in the image.
@@ -71,7 +73,20 @@ impl<'a> Frame<'a> {
             hand_depth: OnceLock::new(),
             depth: OnceLock::new(),
             segmented: Mutex::default(),
+            backend: None,
         })
+    }
+
+    /// The same, rendered on another device ([`Device::open`](prehend_render::Device::open)): factors of this frame compare their pictures
+    /// there, all hypotheses of a call at once. What it fails to answer, the processor does.
+    pub fn with_backend(self, backend: Arc<dyn Backend>) -> Self {
+        // The processor needs no sessions.
+        Self { backend: Some(backend).filter(|b| b.name() != Cpu.name()), ..self }
+    }
+
+    /// What renders, if not the processor at hand.
+    pub(crate) fn backend(&self) -> Option<&Arc<dyn Backend>> {
+        self.backend.as_ref()
     }
 
     /// What was sensed.

@@ -1,5 +1,7 @@
 //! The object whose pose is sought, prepared for every factor.
 
+use std::sync::Arc;
+
 use nalgebra::{Matrix3, Point3, Vector3};
 use prehend_geometry::closest::ClosestPoints;
 use prehend_geometry::mass::{MassError, MassProperties, mass_properties};
@@ -48,7 +50,7 @@ pub struct Object {
     /// Outward unit normal of each face that `surface` may answer; zero for a face without area.
     pub(crate) normals: Vec<Vector3<f64>>,
     pub(crate) samples: Vec<SurfaceSample>,
-    pub(crate) model: RenderModel,
+    pub(crate) model: Arc<RenderModel>,
 }
 
 impl Object {
@@ -122,7 +124,7 @@ impl Object {
             normals: (0..solid.faces.len()).map(unit).collect(),
             surface: ClosestPoints::new(&solid).map_err(|e| fail(e.to_string()))?,
             samples: surface_samples(&solid, SURFACE_SAMPLES, seed),
-            model: RenderModel::new(&mesh).map_err(|e| fail(e.to_string()))?,
+            model: Arc::new(RenderModel::new(&mesh).map_err(|e| fail(e.to_string()))?),
             center: nalgebra::center(&low, &high),
             radius: 0.5 * (high - low).norm(),
             area: solid.area(),

@@ -34,7 +34,7 @@ impl HeldObject<'_> {
         noise: &mut SplitMix64,
     ) -> Observation {
         let Self { camera, object, hand, joints, gravity } = *self;
-        let mut bodies = vec![(&object.model, *t_cam_object)];
+        let mut bodies = vec![(&*object.model, *t_cam_object)];
         bodies.extend(hand.render_bodies(t_cam_hand, joints));
         let toward = Vector3::new(-0.4, -0.7, -0.6).normalize();
         let warm = [0.62, 0.58, 0.52];

@@ -1,10 +1,6 @@
 //! The sum of three factors, as the judge of hypotheses.
 
-use std::ops::ControlFlow;
 use std::sync::Arc;
-
-use nalgebra::Isometry3;
-use prehend_autodiff::optimize::LeastSquares;
 
 use super::{Scored, SearchSettings};
 use crate::error::RefineError;
@@ -53,17 +49,34 @@ impl<'a> FineScorer<'a> {
         Ok(Self { frame, problem })
     }
 
-    /// The sum of the costs at `pose` \[nat\]; infinite where the pose cannot be seen.
-    pub(super) fn cost(&self, pose: &Isometry3<f64>) -> f64 {
-        State::new(self.frame, pose).map_or(f64::INFINITY, |state| self.problem.cost(&state))
+    /// Each pose with the sum of the costs there \[nat\]; infinite where it cannot be seen.
+    pub(super) fn judge(&self, poses: &[Scored]) -> Vec<Scored> {
+        self.of_visible(poses, |states| {
+            let costs = self.problem.cost_all(states);
+            states.iter().map(|state| state.t_cam_object).zip(costs).collect()
+        })
     }
 
-    /// `pose` after at most `steps` steps down, and the sum of the costs there.
-    pub(super) fn descend(&self, pose: &Isometry3<f64>, steps: usize) -> Scored {
-        let Ok(state) = State::new(self.frame, pose) else { return (*pose, f64::INFINITY) };
+    /// Each pose after at most `steps` steps down, and the sum of the costs there.
+    pub(super) fn descend(&self, poses: &[Scored], steps: usize) -> Vec<Scored> {
         let solver = Solver { iterations: steps, min_decrease: MIN_DECREASE };
-        let start = self.problem.linearize(&state);
-        let found = self.problem.solve(start, &solver, |_| ControlFlow::Continue(())).at;
-        (found.state.t_cam_object, found.cost)
+        self.of_visible(poses, |states| {
+            let found = self.problem.solve_all(states, &solver);
+            found.into_iter().map(|found| (found.at.state.t_cam_object, found.at.cost)).collect()
+        })
+    }
+
+    /// `f` of those poses that can be seen; the others cost infinitely much.
+    fn of_visible(&self, poses: &[Scored], f: impl FnOnce(&[State]) -> Vec<Scored>) -> Vec<Scored> {
+        let states: Vec<Option<State>> =
+            poses.iter().map(|(pose, _)| State::new(self.frame, pose).ok()).collect();
+        let visible: Vec<State> = states.iter().flatten().cloned().collect();
+        let mut found = f(&visible).into_iter();
+        let unseen = |(pose, _): &Scored| (*pose, f64::INFINITY);
+        let each = states.iter().zip(poses);
+        each.map(|(state, pose)| {
+            state.as_ref().and_then(|_| found.next()).unwrap_or_else(|| unseen(pose))
+        })
+        .collect()
     }
 }

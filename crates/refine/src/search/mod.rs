@@ -82,14 +82,12 @@ impl PoseSearch {
         let turned = self.turn(&rough, &placed);
         let judge = |resolution| FineScorer::new(frame, resolution, settings);
         let coarse = judge(settings.coarse_resolution)?;
-        let seen = evaluate(&turned, |pose| (*pose, coarse.cost(pose)));
-        let seen = distinct(seen, settings.seen, 6e-3, 6.0);
+        let seen = distinct(coarse.judge(&turned), settings.seen, 6e-3, 6.0);
         let middle = judge(settings.middle_resolution)?;
-        let moved = evaluate(&seen, |pose| middle.descend(pose, settings.middle_steps));
-        let moved = distinct(moved, settings.last, 3e-3, 3.0);
+        let moved =
+            distinct(middle.descend(&seen, settings.middle_steps), settings.last, 3e-3, 3.0);
         let full = judge(1)?;
-        let last = evaluate(&moved, |pose| full.descend(pose, settings.last_steps));
-        let last = distinct(last, settings.last, 1e-3, 1.0);
+        let last = distinct(full.descend(&moved, settings.last_steps), settings.last, 1e-3, 1.0);
         if last.is_empty() {
             return Err(RefineError::NothingFits);
         }

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Vector3};
 use prehend_geometry::TriMesh;
-use prehend_render::{Camera, DepthImage, Mask};
+use prehend_render::{Camera, DepthImage, Distortion, Mask};
 use serde_json::{Map, Value, json};
 
 use super::hand_files::{TAXELS, URDF};
@@ -14,16 +14,28 @@ pub(super) const DEPTH_SCALE: f64 = 0.1;
 /// Forces are clipped at this many units, as sensors do.
 const FORCE_LIMIT: f64 = 10_000.0;
 
-/// Entry of `scene_camera.json`, with the pose world → camera where there is a world.
-pub(super) fn camera(camera: &Camera, world: Option<&Isometry3<f64>>) -> Value {
+/// Entry of `scene_camera.json`, with its lens if it is no pinhole, and the pose world → camera where there is a world.
+pub(super) fn camera(
+    camera: &Camera,
+    lens: Option<&Distortion>,
+    world: Option<&Isometry3<f64>>,
+) -> Value {
     let mut entry = Map::from_iter([
         ("cam_K".to_owned(), json!(camera.k())),
         ("depth_scale".to_owned(), json!(DEPTH_SCALE)),
     ]);
+    if let Some(distortion) = lens {
+        entry.insert("cam_dist".into(), self::lens(distortion));
+    }
     if let Some(t_cam_world) = world {
         entry.extend(pose("w2c", t_cam_world));
     }
     Value::Object(entry)
+}
+
+/// A lens, as `cam_dist` of a camera has it.
+pub(super) fn lens(lens: &Distortion) -> Value {
+    json!({ "model": lens.name(), "coefficients": lens.coefficients() })
 }
 
 /// Entry of `scene_gt.json`.

@@ -35,6 +35,7 @@ pub fn write_dataset(dir: &Path, scenes: &[Scene]) -> Result<(), AssetError> {
         let seen = &scene.observation;
         let shot = Shot {
             told: seen.clone(),
+            lens: None,
             truth: scene.truth,
             // Nothing else is known of these hands, and where they are is where the world is.
             hand: None,

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use prehend_render::DistortionError;
 use thiserror::Error;
 
 use crate::data::AssetError;
@@ -24,6 +25,9 @@ pub enum SynthError {
     /// There are no objects, two have the same number, or one cannot be used in this hand at all.
     #[error("{0}")]
     Argument(String),
+    /// The lens cannot make an image.
+    #[error(transparent)]
+    Lens(#[from] DistortionError),
     /// A file cannot be read or written, or an object prepared.
     #[error(transparent)]
     Asset(#[from] AssetError),

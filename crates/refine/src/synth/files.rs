@@ -7,7 +7,7 @@ use std::path::Path;
 use nalgebra::Isometry3;
 use prehend_geometry::TriMesh;
 use prehend_geometry::robot::KinematicTree;
-use prehend_render::Mask;
+use prehend_render::{Distortion, Mask};
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 
@@ -45,8 +45,10 @@ pub(super) const FRAME_FOLDERS: [&str; 4] = ["rgb", "depth", "mask", "mask_visib
 
 /// One frame: what is measured, and what is true.
 pub(super) struct Shot {
-    /// The observation as the estimator gets it.
+    /// The observation as the estimator gets it, but for the lens.
     pub(super) told: Observation,
+    /// The lens that the images are seen through, if it is no pinhole.
+    pub(super) lens: Option<Distortion>,
     /// Object → camera.
     pub(super) truth: Isometry3<f64>,
     /// Hand base → camera and joint positions, where the dataset keeps them apart from the measured ones.
@@ -97,7 +99,10 @@ impl Shot {
         let mut add = |name: &str, entry: Value| entries.insert(name.to_owned(), entry);
         add("scene_gt.json", annotation::truth(obj_id, &self.truth));
         add("scene_gt_info.json", annotation::visibility(visible, whole, &told.depth));
-        add("scene_camera.json", annotation::camera(&told.camera, self.world.as_ref()));
+        add(
+            "scene_camera.json",
+            annotation::camera(&told.camera, self.lens.as_ref(), self.world.as_ref()),
+        );
         let gravity = told.gravity.unwrap_or_default();
         let bodies = |t_cam_hand: &Isometry3<f64>, joints: &[f64]| {
             annotation::bodies(&gravity, t_cam_hand, names, joints)

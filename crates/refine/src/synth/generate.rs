@@ -203,17 +203,17 @@ impl Scene<'_> {
         images: &[u32],
         state: &Mutex<(Journal, BTreeMap<usize, Entries>)>,
     ) -> Result<(), SynthError> {
-        let &SynthSettings { width, height, seed, ref sensor, .. } = self.settings;
+        let &SynthSettings { width, height, lens, seed, ref sensor, .. } = self.settings;
         let &Subject { obj_id, ref object } = self.subject;
         let robot = &self.hand.robot;
         let size = (width.get(), height.get());
-        let rig =
-            Rig::new(sensor, object, robot, size, &mut sequence(seed, Use::Rig, obj_id, grasp));
+        let mut noise = sequence(seed, Use::Rig, obj_id, grasp);
+        let rig = Rig::new(sensor, object, robot, size, lens, &mut noise);
         let shares = self.settings.frames_per_grasp.get() as usize;
         images.par_iter().try_for_each(|&im_id| {
             let share = im_id as usize % shares;
             let moment = &moments[(2 * share + 1) * moments.len() / (2 * shares)];
-            let shot = rig.capture(moment, &mut sequence(seed, Use::Frame, obj_id, im_id));
+            let shot = rig.capture(moment, &mut sequence(seed, Use::Frame, obj_id, im_id))?;
             let quality = sensor.color.jpeg_quality;
             let entries = shot.write(&self.dir, im_id, obj_id, &robot.tree, quality)?;
             {

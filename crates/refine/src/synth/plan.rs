@@ -5,8 +5,10 @@ use std::num::{NonZeroU32, NonZeroUsize};
 use std::path::Path;
 
 use prehend_geometry::{SplitMix64, TriMesh};
+use prehend_render::Distortion;
 use serde_json::{Map, Value, json};
 
+use super::annotation;
 use super::error::SynthError;
 use super::files::read_json;
 use super::hand_files::HandFiles;
@@ -34,6 +36,8 @@ pub struct SynthSettings {
     pub width: NonZeroUsize,
     /// Rows of the images.
     pub height: NonZeroUsize,
+    /// The camera's lens, if it is no pinhole.
+    pub lens: Option<Distortion>,
     /// Sensor models.
     pub sensor: SensorSettings,
     /// Seed of all random numbers.
@@ -78,8 +82,9 @@ fn describe(hand: &HandFiles, subjects: &[Subject], settings: &SynthSettings) ->
         });
         (s.obj_id.to_string(), told)
     };
-    let SynthSettings { frames, frames_per_grasp, width, height, sensor, seed, grasp } = settings;
-    json!({
+    let SynthSettings { frames, frames_per_grasp, width, height, lens, sensor, seed, grasp } =
+        settings;
+    let mut plan = json!({
         "program": program(),
         "frames": frames,
         "frames_per_grasp": frames_per_grasp,
@@ -90,7 +95,11 @@ fn describe(hand: &HandFiles, subjects: &[Subject], settings: &SynthSettings) ->
         "grasp": grasp,
         "hand": fingerprint(&hand.content().collect::<Vec<u8>>()),
         "objects": subjects.iter().map(object).collect::<Map<String, Value>>(),
-    })
+    });
+    if let Some(lens) = lens {
+        plan["lens"] = annotation::lens(lens);
+    }
+    plan
 }
 
 /// The first place where two plans differ, and what they say there.

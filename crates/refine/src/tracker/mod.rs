@@ -13,6 +13,7 @@ use std::time::{Duration, Instant};
 
 use nalgebra::Isometry3;
 use prehend_autodiff::optimize::LeastSquares;
+use prehend_render::Backend;
 
 use self::clock::Clock;
 pub use self::clock::Timing;
@@ -60,6 +61,8 @@ pub struct Tracker {
     settings: TrackerSettings,
     /// Factors of all frames besides.
     factors: Vec<Arc<dyn Factor>>,
+    /// What renders, if not the processor at hand.
+    backend: Option<Arc<dyn Backend>>,
     /// Where to begin; the search says where if it is not known.
     initial: Option<Isometry3<f64>>,
     track: Option<TrackState>,
@@ -95,8 +98,21 @@ impl Tracker {
         settings: TrackerSettings,
     ) -> Result<Self, RefineError> {
         settings.check()?;
-        let factors = Vec::new();
-        Ok(Self { object, hand, settings, factors, initial: None, track: None, search: None })
+        Ok(Self {
+            object,
+            hand,
+            settings,
+            factors: Vec::new(),
+            backend: None,
+            initial: None,
+            track: None,
+            search: None,
+        })
+    }
+
+    /// With all frames rendered on another device: [`Frame::with_backend`].
+    pub fn with_backend(self, backend: Arc<dyn Backend>) -> Self {
+        Self { backend: Some(backend), ..self }
     }
 
     /// With a factor of one's own, in every frame.
@@ -125,7 +141,10 @@ impl Tracker {
         let mut clock = Clock::start(self.settings.budget);
         let (object, hand) = (Arc::clone(&self.object), self.hand.clone());
         let frame = match (Frame::new(observation, &object, hand.as_ref()), &self.track) {
-            (Ok(frame), _) => frame,
+            (Ok(frame), _) => match &self.backend {
+                Some(backend) => frame.with_backend(Arc::clone(backend)),
+                None => frame,
+            },
             (Err(RefineError::EmptyMask), Some(track)) => {
                 return Ok(self.predict_unseen(track, observation, time));
             }

@@ -9,6 +9,7 @@ mod bop_dataset;
 mod data_contact;
 mod data_metrics;
 mod data_search;
+mod device;
 mod factors;
 mod fused;
 mod icp;

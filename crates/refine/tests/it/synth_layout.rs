@@ -8,11 +8,13 @@ use image::GenericImageView;
 use nalgebra::{Rotation3, Vector3};
 use prehend_geometry::hand::{JOINT_NAMES, default_grasp};
 use prehend_geometry::objects::YcbObject;
+use prehend_refine::data::bop::Dataset;
 use prehend_refine::scene::{Hand, Object};
 use prehend_refine::synth::{
     DatasetSummary, GraspSnapshot, HandFiles, SensorSettings, Subject, SynthError, SynthSettings,
     generate,
 };
+use prehend_render::Distortion;
 use serde_json::{Value, json};
 
 const BOTTLE: u32 = 5;
@@ -29,6 +31,7 @@ fn settings(sensor: SensorSettings) -> SynthSettings {
         frames_per_grasp: 2.try_into().unwrap(),
         width: 320.try_into().unwrap(),
         height: 240.try_into().unwrap(),
+        lens: None,
         sensor,
         seed: 0,
         grasp: json!("made up"),
@@ -242,6 +245,39 @@ fn realistic_datasets_tell_what_is_not_quite_true() {
     inspect(dir.path(), ".jpg", false);
     let ply = |folder: &str| fs::read(dir.path().join(folder).join("obj_000005.ply")).unwrap();
     assert_ne!(ply("models"), ply("models_eval"));
+}
+
+#[test]
+fn datasets_through_a_lens_are_read_as_those_of_a_pinhole() {
+    let coefficients = [-0.3, 0.1, 2e-3, -1e-3, 0.0, 0.0, 0.0, 0.0];
+    let lens = Distortion::by_name("brown_conrady", &coefficients).unwrap();
+    let dir = tempfile::tempdir().unwrap();
+    let read = |lens: Option<Distortion>, name: &str| {
+        let settings = SynthSettings { lens, ..settings(SensorSettings::clean()) };
+        make(&dir.path().join(name), &settings, &|_| ()).unwrap();
+        let dataset = Dataset::open(&dir.path().join(name)).unwrap();
+        dataset.frame(BOTTLE, 0).unwrap().observation(0).unwrap()
+    };
+    let (pinhole, seen) = (read(None, "pinhole"), read(Some(lens), "lens"));
+    let camera = json(dir.path().join("lens/test/000005/scene_camera.json"));
+    let expected = json!({ "model": "brown_conrady", "coefficients": coefficients });
+    assert_eq!(camera["0"]["cam_dist"], expected);
+    assert_eq!(json(dir.path().join("lens/synth.json"))["lens"], expected);
+    assert_eq!(pinhole.camera, seen.camera);
+    let (mut both, mut either, mut off, mut color) = (0.0, 0.0, Vec::new(), 0.0);
+    for (at, (a, b)) in pinhole.mask.pixels().iter().zip(seen.mask.pixels()).enumerate() {
+        either += f64::from(u8::from(*a || *b));
+        if *a && *b {
+            both += 1.0;
+            off.push((pinhole.depth.pixels()[at] - seen.depth.pixels()[at]).abs());
+            let pair = [&pinhole, &seen].map(|o| o.color.pixels()[at]);
+            color += (0..3).map(|k| f64::from((pair[0][k] - pair[1][k]).abs()) / 3.0).sum::<f64>();
+        }
+    }
+    off.sort_by(f32::total_cmp);
+    let depth = off[off.len() / 2];
+    assert!(both > 0.97 * either && both > 1000.0, "{both} of {either}");
+    assert!(depth < 5e-4 && color / both < 0.02, "{depth} m, {}", color / both);
 }
 
 #[test]

@@ -8,6 +8,11 @@ pub enum BackendError {
     /// There is no device of the kind asked for.
     #[error("no graphics device: {0}")]
     NoDevice(String),
+    /// The program was built without graphics devices.
+    #[error(
+        "this program was built without graphics devices: build it with the cargo feature `gpu`"
+    )]
+    NotBuilt,
     /// A setting of the loss is out of its range.
     #[error(transparent)]
     Option(#[from] OptionError),

@@ -1,8 +1,9 @@
 //! Where poses are compared with an image: this processor, or a graphics device.
 
-mod auto;
 mod cpu;
+mod device;
 mod error;
+mod fallback;
 #[cfg(feature = "gpu")]
 mod gpu;
 
@@ -10,9 +11,10 @@ use std::sync::Arc;
 
 use nalgebra::Isometry3;
 
-pub use auto::{WithFallback, auto};
 pub use cpu::Cpu;
+pub use device::Device;
 pub use error::BackendError;
+pub use fallback::WithFallback;
 #[cfg(feature = "gpu")]
 pub use gpu::Gpu;
 
@@ -48,7 +50,7 @@ pub struct Hypothesis {
 /// use nalgebra::{Isometry3, Vector3};
 /// use prehend_geometry::shapes::cuboid;
 /// use prehend_render::{
-///     Camera, Hypothesis, Light, Mask, PoseLoss, PoseProblem, RenderModel, RgbImage, Target, backend,
+///     Camera, Device, Hypothesis, Light, Mask, PoseLoss, PoseProblem, RenderModel, RgbImage, Target,
 /// };
 ///
 /// let camera = Camera { fx: 60.0, fy: 60.0, cx: 31.5, cy: 23.5, width: 64, height: 48 };
@@ -58,7 +60,7 @@ pub struct Hypothesis {
 ///     target: Arc::new(Target::new(camera, &image, &mask)?),
 ///     loss: PoseLoss::default(),
 /// };
-/// let mut session = backend::auto().prepare(&problem)?;
+/// let mut session = Device::Auto.open()?.prepare(&problem)?;
 /// let hypotheses: Vec<Hypothesis> = (0..100)
 ///     .map(|i| Hypothesis {
 ///         t_cam_object: Isometry3::translation(0.0, 0.0, 0.3 + 0.01 * i as f64),

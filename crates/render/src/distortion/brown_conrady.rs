@@ -45,6 +45,13 @@ impl BrownConrady {
         Ok(Self { radial, tangential: [at(2), at(3)] })
     }
 
+    /// OpenCV's list k1, k2, p1, p2, k3, k4, k5, k6.
+    pub fn to_opencv(&self) -> [f64; 8] {
+        let [k1, k2, k3, k4, k5, k6] = self.radial;
+        let [p1, p2] = self.tangential;
+        [k1, k2, p1, p2, k3, k4, k5, k6]
+    }
+
     /// Where the lens shows an ideal image position; both as X/Z, Y/Z.
     pub fn distort<S: Scalar>(&self, ideal: Vector2<S>) -> Vector2<S> {
         let (x, y) = (ideal.x, ideal.y);

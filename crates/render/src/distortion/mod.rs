@@ -11,6 +11,7 @@ pub use brown_conrady::BrownConrady;
 pub use kannala_brandt::KannalaBrandt;
 pub use remap::Remap;
 
+use crate::camera::Camera;
 use crate::image::ImageError;
 
 /// How a lens shows what a pinhole would show elsewhere. Positions are X/Z, Y/Z.
@@ -43,6 +44,43 @@ impl Distortion {
             "kannala_brandt" => KannalaBrandt::from_opencv(coefficients).map(Self::KannalaBrandt),
             _ => Err(DistortionError::Model { name: name.to_owned() }),
         }
+    }
+
+    /// The name that [`by_name`](Self::by_name) takes.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::BrownConrady(_) => "brown_conrady",
+            Self::KannalaBrandt(_) => "kannala_brandt",
+        }
+    }
+
+    /// The coefficients in the order of OpenCV.
+    pub fn coefficients(&self) -> Vec<f64> {
+        match self {
+            Self::BrownConrady(lens) => lens.to_opencv().to_vec(),
+            Self::KannalaBrandt(lens) => lens.radial.to_vec(),
+        }
+    }
+
+    /// The smallest pinhole camera of the focal lengths of `camera` that sees all of what `camera` sees behind this lens, but no more than
+    /// `widest` times as many columns and rows: nearly a right angle off the axis, a pinhole's image has no end. What
+    /// [`Remap::distort`] makes images from.
+    pub fn pinhole_that_covers(&self, camera: &Camera, widest: f64) -> Camera {
+        let &Camera { fx, fy, cx, cy, width, height } = camera;
+        let reach = |size: usize| 0.5 * (widest - 1.0).max(0.0) * size as f64;
+        let (mut low, mut high) = ([0.0; 2], [width, height].map(|size| size as f64 - 1.0));
+        let most = [width, height].map(|size| (-reach(size), size as f64 - 1.0 + reach(size)));
+        let pixels = (0..width * height).map(|at| [at % width, at / width].map(|v| v as f64));
+        for ideal in pixels.filter_map(|[u, v]| self.undistort(camera.ray(u, v).xy())) {
+            let seen = [fx * ideal.x + cx, fy * ideal.y + cy];
+            for k in 0..2 {
+                let at = seen[k].clamp(most[k].0, most[k].1);
+                (low[k], high[k]) = (at.min(low[k]), at.max(high[k]));
+            }
+        }
+        let size = |k: usize| (high[k].ceil() - low[k].floor()) as usize + 1;
+        let [left, top] = low.map(f64::floor);
+        Camera { cx: cx - left, cy: cy - top, width: size(0), height: size(1), ..*camera }
     }
 
     /// Where the lens shows an ideal image position.
@@ -129,5 +167,46 @@ fn check_finite(coefficients: &[f64]) -> Result<(), DistortionError> {
     match coefficients.iter().enumerate().find(|(_, value)| !value.is_finite()) {
         Some((index, &value)) => Err(DistortionError::NotFinite { index, value }),
         None => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_lens_is_told_by_name_and_coefficients() {
+        let lenses: [(&str, &[f64]); 2] = [
+            ("brown_conrady", &[-0.3, 0.1, 2e-3, -1e-3, -0.02, 0.01, -0.02, 0.03]),
+            ("kannala_brandt", &[0.02, -0.01, 0.002, 1e-4]),
+        ];
+        for (name, coefficients) in lenses {
+            let lens = Distortion::by_name(name, coefficients).unwrap();
+            assert_eq!((lens.name(), lens.coefficients().as_slice()), (name, coefficients));
+        }
+    }
+
+    #[test]
+    fn the_pinhole_covers_what_the_lens_shows() {
+        let camera = Camera { fx: 60.0, fy: 62.0, cx: 39.0, cy: 31.0, width: 80, height: 60 };
+        let barrel = Distortion::by_name("brown_conrady", &[-0.25, 0.05, 2e-3, 0.0]).unwrap();
+        let wide = barrel.pinhole_that_covers(&camera, 4.0);
+        assert!(wide.width > 90 && wide.height > 65, "{wide:?}");
+        let [mut least, mut most] = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
+        for at in 0..80 * 60 {
+            let ray = camera.ray((at % 80) as f64, (at / 80) as f64).xy();
+            let ideal = barrel.undistort(ray).unwrap();
+            let seen = [wide.fx * ideal.x + wide.cx, wide.fy * ideal.y + wide.cy];
+            for k in 0..2 {
+                (least[k], most[k]) = (least[k].min(seen[k]), most[k].max(seen[k]));
+            }
+        }
+        let size = [wide.width, wide.height].map(|size| size as f64 - 1.0);
+        assert!((0..2).all(|k| (0.0..1.0).contains(&least[k])), "{least:?}");
+        assert!((0..2).all(|k| (0.0..1.0).contains(&(size[k] - most[k]))), "{most:?}");
+        // A fisheye may show what no pinhole can.
+        let fisheye = Distortion::by_name("kannala_brandt", &[0.0; 4]).unwrap();
+        let short = Camera { fx: 24.0, fy: 24.0, ..camera };
+        assert_eq!(fisheye.pinhole_that_covers(&short, 3.0).width, 240);
     }
 }

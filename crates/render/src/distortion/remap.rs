@@ -17,6 +17,15 @@ pub struct Remap {
     place: Vec<[f32; 2]>,
 }
 
+/// Depths of pixels side by side on one surface differ by no more than this share, unless it is nearly edge-on.
+const SAME_SURFACE: f32 = 0.01;
+
+/// Indices of four pixels around a position, and how much each counts in a bilinear mean.
+struct Cell {
+    corners: [usize; 4],
+    shares: [f32; 4],
+}
+
 impl Remap {
     /// From images of `source` behind the lens to those of the pinhole camera `target`. Crop and focal lengths of `target` are
     /// free: the source's own are good.
@@ -24,7 +33,9 @@ impl Remap {
         Self::new(source, target, |ideal| lens.shows(ideal).then(|| lens.distort(ideal)))
     }
 
-    /// From images of the pinhole camera `source` to those of `target` behind the lens.
+    /// From images of the pinhole camera `source` to those of `target` behind the lens. Where the lens shows things smaller than the
+    /// pinhole does, colors should be averaged: make an image of `target` [scaled](Camera::scaled) up and
+    /// [downsample](RgbImage::downsampled) it.
     pub fn distort(source: Camera, target: Camera, lens: &Distortion) -> Self {
         Self::new(source, target, |seen| lens.undistort(seen))
     }
@@ -57,36 +68,35 @@ impl Remap {
     /// When the image does not have the size of the source camera.
     pub fn rgb(&self, image: &RgbImage) -> Result<RgbImage, DistortionError> {
         self.check(image.width(), image.height())?;
-        let pixel = |&[x, y]: &[f32; 2]| {
-            let inside = |p: f32, size: usize| (-0.5..=size as f32 - 0.5).contains(&p);
-            if !(inside(x, image.width()) && inside(y, image.height())) {
-                return [0.0; 3];
-            }
-            // The outer half of a border pixel has the color of its center.
-            let cell = |p: f32, size: usize| {
-                let p = p.clamp(0.0, size as f32 - 1.0);
-                let low = p as usize;
-                (p - low as f32, low, (low + 1).min(size - 1))
-            };
-            let (a, x0, x1) = cell(x, image.width());
-            let (b, y0, y1) = cell(y, image.height());
-            let at = |x: usize, y: usize| image.pixels()[y * image.width() + x];
-            let (p, q, r, s) = (at(x0, y0), at(x1, y0), at(x0, y1), at(x1, y1));
-            [0, 1, 2].map(|k| {
-                (1.0 - b) * ((1.0 - a) * p[k] + a * q[k]) + b * ((1.0 - a) * r[k] + a * s[k])
-            })
+        let pixel = |place: &[f32; 2]| {
+            let Some(Cell { corners, shares }) = self.cell(place) else { return [0.0; 3] };
+            let colors = corners.map(|at| image.pixels()[at]);
+            [0, 1, 2].map(|k| colors.iter().zip(shares).map(|(c, share)| share * c[k]).sum())
         };
         let pixels = self.place.iter().map(pixel).collect();
         Ok(RgbImage::new(self.target.width, self.target.height, pixels)?)
     }
 
-    /// Depths (Z, which a lens does not change), each of the nearest pixel: a mean of near and far would lie on
+    /// Depths (Z, which a lens does not change). Where the four pixels around show one surface, 1/Z is interpolated
+    /// bilinearly, as is exact for planes; elsewhere it is the nearest pixel's, for a mean of near and far would lie on
     /// neither. 0 beyond the source's image.
     ///
     /// # Errors
     /// When the image does not have the size of the source camera.
     pub fn depth(&self, image: &DepthImage) -> Result<DepthImage, DistortionError> {
-        let pixels = self.nearest(image.width(), image.height(), image.pixels(), 0.0)?;
+        self.check(image.width(), image.height())?;
+        let pixel = |place: &[f32; 2]| {
+            let nearest = self.nearest_pixel(place).map_or(0.0, |at| image.pixels()[at]);
+            let Some(Cell { corners, shares }) = self.cell(place) else { return nearest };
+            let depths = corners.map(|at| image.pixels()[at]);
+            let (near, far) =
+                depths.iter().fold((f32::INFINITY, 0.0f32), |(a, b), &z| (a.min(z), b.max(z)));
+            if !(near > 0.0 && far < near * (1.0 + SAME_SURFACE)) {
+                return nearest;
+            }
+            1.0 / depths.iter().zip(shares).map(|(z, share)| share / z).sum::<f32>()
+        };
+        let pixels = self.place.iter().map(pixel).collect();
         Ok(DepthImage::new(self.target.width, self.target.height, pixels)?)
     }
 
@@ -107,17 +117,37 @@ impl Remap {
         outside: T,
     ) -> Result<Vec<T>, DistortionError> {
         self.check(width, height)?;
-        let pixel = |&[x, y]: &[f32; 2]| {
-            let index = |p: f32, size: usize| {
-                let p = (p + 0.5).floor();
-                (p >= 0.0 && p < size as f32).then_some(p as usize)
-            };
-            match (index(x, width), index(y, height)) {
-                (Some(x), Some(y)) => pixels[y * width + x],
-                _ => outside,
-            }
-        };
+        let pixel = |place: &[f32; 2]| self.nearest_pixel(place).map_or(outside, |at| pixels[at]);
         Ok(self.place.iter().map(pixel).collect())
+    }
+
+    /// Index of the source pixel that a position lies in.
+    fn nearest_pixel(&self, &[x, y]: &[f32; 2]) -> Option<usize> {
+        let index = |p: f32, size: usize| {
+            let p = (p + 0.5).floor();
+            (p >= 0.0 && p < size as f32).then_some(p as usize)
+        };
+        Some(index(y, self.source.height)? * self.source.width + index(x, self.source.width)?)
+    }
+
+    /// The pixels around a position of the source image.
+    fn cell(&self, &[x, y]: &[f32; 2]) -> Option<Cell> {
+        let along = |p: f32, size: usize| {
+            if !(-0.5..=size as f32 - 0.5).contains(&p) {
+                return None;
+            }
+            // The outer half of a border pixel has the value of its center.
+            let p = p.clamp(0.0, size as f32 - 1.0);
+            let low = p as usize;
+            Some((p - low as f32, low, (low + 1).min(size - 1)))
+        };
+        let (a, x0, x1) = along(x, self.source.width)?;
+        let (b, y0, y1) = along(y, self.source.height)?;
+        let corners = [(x0, y0), (x1, y0), (x0, y1), (x1, y1)];
+        Some(Cell {
+            corners: corners.map(|(x, y)| y * self.source.width + x),
+            shares: [(1.0 - b) * (1.0 - a), (1.0 - b) * a, b * (1.0 - a), b * a],
+        })
     }
 
     fn check(&self, found_width: usize, found_height: usize) -> Result<(), DistortionError> {
@@ -131,8 +161,12 @@ impl Remap {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Isometry3;
+    use prehend_geometry::TriMesh;
+
     use super::*;
-    use crate::BrownConrady;
+    use crate::model::RenderModel;
+    use crate::{BrownConrady, SurfacePoint, render_scene};
 
     const WIDE: [f64; 5] = [-0.31, 0.11, 1.2e-3, -7e-4, -0.02];
 
@@ -172,8 +206,114 @@ mod tests {
                 assert!((color - 0.5 - 0.5 * p.x as f32).abs() < 1e-3, "{x} {y}");
                 if (2.0 * p.x + p.y - 0.1).abs() > 0.03 {
                     assert_eq!(mask.get(x, y), Some(half(p)));
-                    assert_eq!(depth.get(x, y), Some(if half(p) { 0.4 } else { 0.8 }));
+                    let z = if half(p) { 0.4 } else { 0.8 };
+                    assert!((depth.get(x, y).unwrap() - z).abs() < 1e-6);
                 }
+            }
+        }
+    }
+
+    /// How far bars lean, so that the picture's samples see their edges at all distances.
+    const LEAN: f64 = 0.2;
+
+    /// A wall of bright bars along one axis of the image plane at a depth of 1 m, at these positions there and half as wide as `half`.
+    fn bars(places: &[f64], half: f64, axis: usize) -> RenderModel {
+        let mut mesh = TriMesh::new(Vec::new(), Vec::new());
+        for &at in places {
+            let first = mesh.vertices.len() as u32;
+            for [across, along] in [[-half, -2.0], [half, -2.0], [half, 2.0], [-half, 2.0]] {
+                let mut corner = [0.0, 0.0, 1.0];
+                (corner[axis], corner[1 - axis]) = (at + across + LEAN * along, along);
+                mesh.vertices.push(corner.into());
+            }
+            mesh.faces.extend([[0, 2, 1], [0, 3, 2]].map(|f| f.map(|v| v + first)));
+        }
+        RenderModel::new(&mesh).unwrap()
+    }
+
+    /// Largest distance of the bars' edges in the picture from where the lens shows them [px], and how many were looked at.
+    fn worst_bar(camera: &Camera, lens: &Distortion, axis: usize) -> (f64, usize) {
+        let wide = lens.pinhole_that_covers(camera, 4.0);
+        let (places, half) = ((-8..=8).map(|i| 0.08 * f64::from(i)).collect::<Vec<_>>(), 0.012);
+        let bars = bars(&places, half, axis);
+        let white = |_: usize, _: &SurfacePoint<f32>| [1.0; 3];
+        let bodies = [(&bars, Isometry3::identity())];
+        let (fine, finer) = (wide.scaled(5.0), camera.scaled(5.0));
+        let ideal = render_scene(&fine, &bodies, 3, white, |_, _| [0.0; 3]);
+        let seen = Remap::distort(fine, finer, lens).rgb(&ideal.color).unwrap().downsampled(5);
+        let (mut worst, mut count) = (0.0f64, 0);
+        let size = [camera.width, camera.height];
+        let (focal, principal) = ([camera.fx, camera.fy], [camera.cx, camera.cy]);
+        for line in (4..size[1 - axis] - 4).step_by(3) {
+            for &at in &places {
+                // Where the edges of the bar cross this line of pixels.
+                let crossing = |edge: f64| {
+                    let other = (line as f64 - principal[1 - axis]) / focal[1 - axis];
+                    let mut ideal = Vector2::zeros();
+                    ideal[1 - axis] = other;
+                    for _ in 0..50 {
+                        ideal[axis] = edge + LEAN * ideal[1 - axis];
+                        ideal[1 - axis] += other - lens.distort(ideal)[1 - axis];
+                    }
+                    focal[axis] * lens.distort(ideal)[axis] + principal[axis]
+                };
+                let [low, high] = [at - half, at + half].map(crossing);
+                let (from, to) = ((low - 4.0).floor(), (high + 4.0).ceil());
+                if from < 0.0 || to >= size[axis] as f64 {
+                    continue;
+                }
+                // Both edges, by how much of the bar lies on either side of a border between pixels near its middle.
+                let middle = (0.5 * (low + high)).round();
+                let (mut before, mut after) = (0.0, 0.0);
+                for p in from as usize..=to as usize {
+                    let [x, y] = if axis == 0 { [p, line] } else { [line, p] };
+                    let value = f64::from(seen.get(x, y).unwrap()[0]);
+                    *(if (p as f64) < middle { &mut before } else { &mut after }) += value;
+                }
+                let border = middle - 0.5;
+                let errors = [border - before - low, border + after - high];
+                worst = errors.iter().fold(worst, |worst, e| worst.max(e.abs()));
+                count += 1;
+            }
+        }
+        (worst, count)
+    }
+
+    #[test]
+    fn a_rendered_grid_is_where_the_lens_shows_it() {
+        let camera = Camera { fx: 300.0, fy: 302.0, cx: 161.3, cy: 118.2, width: 320, height: 240 };
+        for (name, coefficients) in
+            [("brown_conrady", WIDE.as_slice()), ("kannala_brandt", &[0.02, -0.01, 0.002, 0.0])]
+        {
+            let lens = Distortion::by_name(name, coefficients).unwrap();
+            for axis in 0..2 {
+                let (worst, count) = worst_bar(&camera, &lens, axis);
+                println!("{name}, axis {axis}: {worst:.4} px at most in {count} places");
+                assert!(count > 500 && worst < 0.02, "{name}, axis {axis}: {worst} of {count}");
+            }
+        }
+    }
+
+    #[test]
+    fn planes_keep_their_depth() {
+        let camera = Camera { fx: 80.0, fy: 82.0, cx: 40.2, cy: 29.7, width: 80, height: 60 };
+        let lens = Distortion::by_name("brown_conrady", &WIDE).unwrap();
+        let wide = lens.pinhole_that_covers(&camera, 4.0);
+        let plane = |ray: Vector2<f64>| 0.4 / (1.0 + 0.1 * ray.x - 0.07 * ray.y);
+        let ideal = (0..wide.width * wide.height).map(|at| {
+            plane(wide.ray((at % wide.width) as f64, (at / wide.width) as f64).xy()) as f32
+        });
+        let ideal = DepthImage::new(wide.width, wide.height, ideal.collect()).unwrap();
+        let seen = Remap::distort(wide, camera, &lens).depth(&ideal).unwrap();
+        let back = Remap::undistort(camera, &lens, camera).depth(&seen).unwrap();
+        for (at, z) in back.pixels().iter().enumerate() {
+            let ray = camera.ray((at % 80) as f64, (at / 80) as f64).xy();
+            let place = lens.distort(ray);
+            let [u, v] = [camera.fx * place.x + camera.cx, camera.fy * place.y + camera.cy];
+            // Elsewhere it is that of the border.
+            if (0.0..79.0).contains(&u) && (0.0..59.0).contains(&v) {
+                let error = f64::from(*z) - plane(ray);
+                assert!(error.abs() < 1e-5, "{at}: {error}");
             }
         }
     }

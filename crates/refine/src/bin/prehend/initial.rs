@@ -16,8 +16,9 @@ use prehend_refine::data::bop::{
 };
 use prehend_refine::data::{AssetError, Assets, NoiseLevel, Target};
 use prehend_refine::search::{PoseSearch, SearchSettings};
+use prehend_render::Backend;
 
-use crate::options::{Selection, limit_threads, row, write_poses};
+use crate::options::{Rendering, Selection, limit_threads, row, write_poses};
 use crate::terminal::{cache, exit_code, progress, say};
 
 #[derive(Args)]
@@ -57,6 +58,8 @@ pub(crate) struct Initial {
     /// Worker threads of the search; the poses are the same for any number [default: all cores]
     #[arg(long, value_name = "N")]
     threads: Option<NonZeroUsize>,
+    #[command(flatten)]
+    rendering: Rendering,
 }
 
 /// Rows of a results file, and what failed.
@@ -111,11 +114,12 @@ impl Initial {
     fn found(&self, dataset: &Dataset) -> anyhow::Result<Rows> {
         let targets = self.selection.targets(dataset, self.targets.as_deref())?;
         let mut assets = Assets::new(dataset, 0).with_cache(cache());
+        let backend = self.rendering.open()?;
         let mut searches = BTreeMap::new();
         let (mut rows, mut failures) = (Vec::new(), Vec::new());
         let bar = progress(targets.len(), "searching");
         for target in bar.wrap_iter(targets.iter()) {
-            match search_one(&mut assets, &mut searches, target) {
+            match search_one(&mut assets, &mut searches, target, &backend) {
                 // Of a results file's scores the higher is the better.
                 Ok((pose, cost)) => rows.push(row(target, pose, -cost)),
                 Err(error) => failures.push(format!("{target}: {error}")),
@@ -129,6 +133,7 @@ fn search_one(
     assets: &mut Assets<'_>,
     searches: &mut BTreeMap<u32, PoseSearch>,
     target: &Target,
+    backend: &Arc<dyn Backend>,
 ) -> Result<(Isometry3<f64>, f64), AssetError> {
     let input = assets.load(target, &[])?;
     let search = match searches.entry(target.obj_id) {
@@ -137,7 +142,7 @@ fn search_one(
             unknown.insert(PoseSearch::new(Arc::clone(&input.object), SearchSettings::default())?)
         }
     };
-    let found = search.run(&input.frame()?)?;
+    let found = search.run(&input.frame()?.with_backend(Arc::clone(backend)))?;
     let best = found.first().ok_or(RefineError::NothingFits)?;
     Ok((best.t_cam_object, best.cost))
 }

@@ -85,6 +85,7 @@ fn main() -> ExitCode {
             return ExitCode::from(u8::from(error.use_stderr()));
         }
     };
+    terminal::print_warnings();
     let ended = match prehend.command {
         Command::Refine(refine) => refine.run(),
         Command::Initial(initial) => initial.run(),

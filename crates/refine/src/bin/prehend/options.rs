@@ -2,15 +2,18 @@
 
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use anyhow::bail;
+use anyhow::{anyhow, bail};
 use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use nalgebra::Isometry3;
 use prehend_refine::NamedMethod;
 use prehend_refine::data::bop::{
     Dataset, DatasetError, ReadResults, ResultRow, read_results, share_image_times, write_results,
 };
 use prehend_refine::data::{Target, find_targets};
+use prehend_render::{Backend, Device};
 
 /// A dataset, and which of its images and objects are meant.
 #[derive(Args)]
@@ -40,6 +43,28 @@ pub(crate) struct Input {
     /// Poses on the dataset's images, as a BOP results file
     #[arg(long, value_name = "FILE", help_heading = "Input")]
     pub(crate) poses: PathBuf,
+}
+
+/// Where pictures are rendered.
+#[derive(Args)]
+pub(crate) struct Rendering {
+    /// What renders: cpu; gpu, a graphics device, a software one only if there is no other; or auto, graphics hardware if there is
+    /// any. Poses are the same within 0.05 mm and 0.05° at nearly all frames. A device that fails is replaced by the processor
+    #[arg(
+        long,
+        value_name = "DEVICE",
+        default_value_t = Device::Cpu,
+        value_parser = PossibleValuesParser::new(Device::NAMES).try_map(|name| name.parse::<Device>()),
+        help_heading = "Method"
+    )]
+    pub(crate) device: Device,
+}
+
+impl Rendering {
+    /// The device, ready to render.
+    pub(crate) fn open(&self) -> anyhow::Result<Arc<dyn Backend>> {
+        self.device.open().map_err(|error| anyhow!("--device {}: {error}", self.device))
+    }
 }
 
 /// A row of the results file and the target that it is of.

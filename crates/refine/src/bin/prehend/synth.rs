@@ -13,6 +13,7 @@ use prehend_refine::synth::{
     GraspFailure, GraspSettings, Grasper, HandFiles, SensorSettings, Subject, SynthSettings,
     generate,
 };
+use prehend_render::Distortion;
 use serde_json::json;
 
 use crate::options::limit_threads;
@@ -78,6 +79,10 @@ pub(crate) struct Synth {
     /// Rows of the images
     #[arg(long, value_name = "PX", default_value = "480")]
     height: NonZeroUsize,
+    /// The camera's lens, MODEL:COEFFICIENTS in the order of OpenCV, such as brown_conrady:-0.3,0.1,0.001,0,0 (k1,k2,p1,p2,k3)
+    /// or kannala_brandt:0.02,-0.01,0,0 (k1,k2,k3,k4) [default: a pinhole]
+    #[arg(long, value_name = "LENS", value_parser = lens, allow_hyphen_values = true)]
+    lens: Option<Distortion>,
     /// `clean`, `realistic`, or one setting such as depth.noise=0.001; may be repeated, settings override
     ///
     /// `--sensor list` prints all settings and their values.
@@ -126,6 +131,7 @@ impl Synth {
             frames_per_grasp: self.frames_per_grasp,
             width: self.width,
             height: self.height,
+            lens: self.lens,
             sensor,
             seed: self.seed,
             grasp: json!({ "steps": steps, "tries": tries, "settings": format!("{grasping:?}") }),
@@ -187,6 +193,15 @@ impl Synth {
         };
         chosen.into_iter().map(subject).collect()
     }
+}
+
+/// The lens that a text such as "kannala_brandt:0.02,-0.01,0,0" tells.
+fn lens(text: &str) -> anyhow::Result<Distortion> {
+    let (model, list) = text.split_once(':').context("expected MODEL:COEFFICIENTS")?;
+    let number =
+        |word: &str| word.trim().parse::<f64>().map_err(|error| anyhow!("{word:?}: {error}"));
+    let coefficients: Vec<f64> = list.split(',').map(number).collect::<Result<_, _>>()?;
+    Ok(Distortion::by_name(model, &coefficients)?)
 }
 
 fn built_in(name: &str) -> anyhow::Result<YcbObject> {

@@ -23,6 +23,31 @@ pub(crate) fn complain(text: impl std::fmt::Display) {
     let _ = writeln!(std::io::stderr().lock(), "{text}");
 }
 
+/// Prints what libraries warn of on standard error.
+struct Warnings;
+
+impl log::Log for Warnings {
+    fn enabled(&self, metadata: &log::Metadata<'_>) -> bool {
+        metadata.level() <= log::Level::Warn && metadata.target().starts_with("prehend")
+    }
+
+    fn log(&self, record: &log::Record<'_>) {
+        if self.enabled(record.metadata()) {
+            complain(format!("warning: {}", record.args()));
+        }
+    }
+
+    fn flush(&self) {}
+}
+
+/// From here on warnings of the libraries are printed.
+pub(crate) fn print_warnings() {
+    // Only this sets a logger, and once.
+    if log::set_logger(&Warnings).is_ok() {
+        log::set_max_level(log::LevelFilter::Warn);
+    }
+}
+
 /// Prints a warning about something of this name over the progress bar.
 pub(crate) fn warn(
     bar: &ProgressBar,

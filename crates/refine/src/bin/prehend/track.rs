@@ -10,13 +10,15 @@ use std::time::Duration;
 use anyhow::{anyhow, bail};
 use clap::Args;
 use nalgebra::Isometry3;
+use prehend_refine::RefineError;
 use prehend_refine::data::bop::{Dataset, ResultRow, check_writable};
 use prehend_refine::data::{AssetError, Assets, FrameInput, PlainPose, Target};
+use prehend_refine::scene::{Hand, Object};
 use prehend_refine::strategy::Posterior;
 use prehend_refine::tracker::{Recovery, TrackStatus, Tracked, Tracker, TrackerSettings};
 use serde_json::json;
 
-use crate::options::{Selection, limit_threads, row, write_poses};
+use crate::options::{Rendering, Selection, limit_threads, row, write_poses};
 use crate::terminal::{cache, exit_code, progress, say, warn};
 
 #[derive(Args)]
@@ -68,6 +70,8 @@ pub(crate) struct Track {
     /// Worker threads; the poses are the same for any number [default: all cores]
     #[arg(long, value_name = "N", help_heading = "Method")]
     threads: Option<NonZeroUsize>,
+    #[command(flatten)]
+    rendering: Rendering,
 }
 
 /// Where to begin to follow an object, and its pose there; the search finds it if it is not known.
@@ -92,12 +96,17 @@ impl Track {
             ..TrackerSettings::default()
         };
         limit_threads(self.threads)?;
+        let backend = self.rendering.open()?;
         let dataset = self.selection.open()?;
         let (starts, mut failures) = self.starts(&dataset)?;
         let mut assets = Assets::new(&dataset, 0).with_cache(cache());
         let mut frames = Vec::new();
         for start in &starts {
-            let followed = self.follow(&mut assets, start, &settings, &mut frames, &mut failures);
+            let begin = |object, hand| {
+                let tracker = Tracker::new(object, hand, settings.clone())?;
+                Ok(tracker.with_backend(Arc::clone(&backend)))
+            };
+            let followed = self.follow(&mut assets, start, begin, &mut frames, &mut failures);
             if let Err(error) = followed {
                 let Target { scene_id, obj_id, .. } = start.0;
                 failures.push(format!("scene {scene_id} object {obj_id}: {error}"));
@@ -138,12 +147,12 @@ impl Track {
         Ok((earliest.into_values().collect(), faults))
     }
 
-    /// Follows one object; the frames that are done join `frames`, those at fault `failures`.
+    /// Follows one object by what `begin` makes; the frames that are done join `frames`, those at fault `failures`.
     fn follow(
         &self,
         assets: &mut Assets<'_>,
         start: &Start,
-        settings: &TrackerSettings,
+        begin: impl Fn(Arc<Object>, Option<Arc<Hand>>) -> Result<Tracker, RefineError>,
         frames: &mut Vec<Done>,
         failures: &mut Vec<String>,
     ) -> Result<(), AssetError> {
@@ -166,7 +175,7 @@ impl Track {
                 let tracker = match &mut tracker {
                     Some(tracker) => tracker,
                     none => {
-                        let mut new = Tracker::new(Arc::clone(&object), hand, settings.clone())?;
+                        let mut new = begin(Arc::clone(&object), hand)?;
                         initial.iter().for_each(|pose| new.start_from(pose));
                         none.insert(new)
                     }

@@ -10,8 +10,6 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use nalgebra::Translation3;
-use prehend_autodiff::optimize::LeastSquares;
-use rayon::prelude::*;
 
 use self::factors::depth_noise;
 pub(crate) use self::factors::{problem_of, surface_patches};
@@ -26,7 +24,7 @@ use super::estimate::Recorder;
 use super::{Estimate, Iteration, Observer, Strategy};
 use crate::error::RefineError;
 use crate::factor::GaussianPrior;
-use crate::problem::{Factor, Linearization, Problem, Solution, State, Termination};
+use crate::problem::{Factor, Solution, State, Termination};
 use crate::scene::Frame;
 
 /// Gauss–Newton on all evidence at once, with the quantities that are not known exactly estimated beside the pose.
@@ -154,14 +152,14 @@ impl Walk<'_> {
             .with_prior(self.prior.clone());
         let states = &states[..states.len().min(stage.hypotheses.max(1))];
         let found = if index == 0 {
-            let first = solve_from(&problem, stage, &states[0]);
-            let noise = || depth_noise(frame, &first.at.state, &fused.settings);
-            let others = if settled(&first.at, noise, self.radius()) { 1 } else { states.len() };
-            let mut all = solve_all(&problem, stage, &states[1..others]);
-            all.insert(0, first);
+            let mut all = problem.solve_all(&states[..1], &stage.solver);
+            let noise = || depth_noise(frame, &all[0].at.state, &fused.settings);
+            if !settled(&all[0].at, noise, self.radius()) {
+                all.extend(problem.solve_all(&states[1..], &stage.solver));
+            }
             all
         } else {
-            solve_all(&problem, stage, states)
+            problem.solve_all(states, &stage.solver)
         };
         let mut found = distinct(found, self.radius());
         // Not by the first stage, which sees no colors.
@@ -233,15 +231,6 @@ impl Walk<'_> {
         let own = &self.fused.factors;
         let problem = problem_of(self.frame, initial, last, &settings, None, own)?
             .with_prior(self.prior.clone());
-        Ok(distinct(solve_all(&problem, last, &states), self.radius()))
+        Ok(distinct(problem.solve_all(&states, &last.solver), self.radius()))
     }
-}
-
-fn solve_from(problem: &Problem, stage: &Stage, state: &State) -> Solution {
-    let start: Linearization = problem.linearize(state);
-    problem.solve(start, &stage.solver, |_| ControlFlow::Continue(()))
-}
-
-fn solve_all(problem: &Problem, stage: &Stage, states: &[State]) -> Vec<Solution> {
-    states.par_iter().map(|state| solve_from(problem, stage, state)).collect()
 }

@@ -5,6 +5,7 @@ mod calibration;
 mod color;
 mod deformation;
 mod depth;
+mod lens;
 mod light;
 mod mask;
 mod rig;

@@ -4,11 +4,13 @@ use nalgebra::{Isometry3, Vector3};
 use prehend_geometry::SplitMix64;
 use prehend_geometry::robot::{Drive, Motion};
 use prehend_render::{
-    Camera, Mask, RenderModel, SceneImage, SurfacePoint, depth_map, render_scene,
+    Camera, DepthImage, Distortion, DistortionError, Mask, RenderModel, RgbImage, SurfacePoint,
+    depth_map, render_scene,
 };
 
 use super::calibration::Miscalibration;
 use super::depth::DepthBias;
+use super::lens::Lens;
 use super::settings::SensorSettings;
 use super::touch::TaxelCondition;
 use crate::scene::{Hand, HandMeasurement, Object, Observation};
@@ -21,6 +23,7 @@ pub(in crate::synth) struct Rig<'a> {
     object: &'a Object,
     robot: &'a Hand,
     camera: Camera,
+    lens: Option<Lens>,
     errors: Miscalibration,
     depth: DepthBias,
     taxels: Vec<TaxelCondition>,
@@ -28,16 +31,28 @@ pub(in crate::synth) struct Rig<'a> {
     paint: [[f32; 3]; 3],
 }
 
+/// What there is to be seen, without the sensors' faults.
+pub(super) struct View {
+    pub(super) color: RgbImage,
+    pub(super) depth: DepthImage,
+    /// Where the object is seen, and where the hand.
+    pub(super) visible: Mask,
+    pub(super) hand: Mask,
+    /// Where the object would be seen without the hand.
+    pub(super) whole: Mask,
+}
+
 /// Rays a pixel, along each axis.
 const SAMPLES: usize = 3;
 
 impl<'a> Rig<'a> {
-    /// Sensors of `width` by `height` pixels; `noise` decides their faults.
+    /// Sensors of `width` by `height` pixels, the camera behind a lens if there is one; `noise` decides their faults.
     pub(in crate::synth) fn new(
         settings: &'a SensorSettings,
         object: &'a Object,
         robot: &'a Hand,
         (width, height): (usize, usize),
+        lens: Option<Distortion>,
         noise: &mut SplitMix64,
     ) -> Self {
         let camera = settings.viewpoint.camera(width, height);
@@ -49,12 +64,20 @@ impl<'a> Rig<'a> {
             settings,
             object,
             robot,
+            lens: lens.map(|model| Lens::new(model, &camera)),
             camera,
         }
     }
 
     /// Captures a frame of `moment`, whose joints and taxels are those of the hand.
-    pub(in crate::synth) fn capture(&self, moment: &GraspSnapshot, noise: &mut SplitMix64) -> Shot {
+    ///
+    /// # Errors
+    /// If the lens cannot make an image, which does not happen.
+    pub(in crate::synth) fn capture(
+        &self,
+        moment: &GraspSnapshot,
+        noise: &mut SplitMix64,
+    ) -> Result<Shot, DistortionError> {
         let mut bodies: Vec<(&RenderModel, Isometry3<f64>)> =
             vec![(&self.object.model, moment.t_hand_object)];
         bodies.extend(self.robot.render_bodies(&Isometry3::identity(), &moment.joints));
@@ -62,57 +85,71 @@ impl<'a> Rig<'a> {
         let t_cam_hand = viewpoint.choose(&self.camera, &bodies, &moment.gravity, noise);
         bodies.iter_mut().for_each(|(_, pose)| *pose = t_cam_hand * *pose);
         let gravity = t_cam_hand.rotation * moment.gravity;
-        let picture = self.render_rgbd(&bodies, &gravity, noise);
-        let mask_of = |wanted: fn(u32) -> bool| {
-            let mut mask = Mask::filled(self.camera.width, self.camera.height, false);
-            for (set, body) in mask.pixels_mut().iter_mut().zip(&picture.object) {
-                *set = body.is_some_and(wanted);
-            }
-            mask
-        };
-        let (visible, hand) = (mask_of(|body| body == 0), mask_of(|body| body > 0));
-        let alone = depth_map(&self.camera, &bodies[..1]);
-        let mut whole = visible.clone();
-        for (set, z) in whole.pixels_mut().iter_mut().zip(alone.pixels()) {
-            *set |= *z > 0.0;
+        let mut seen = self.render(&bodies, &gravity, noise);
+        if let Some(lens) = &self.lens {
+            seen = lens.photograph(&seen)?;
         }
         let forces = self.settings.touch.simulate_taxels(&moment.taxel_forces, &self.taxels, noise);
         let (camera, t_cam_hand_told, joints) =
             self.errors.apply(&self.camera, &t_cam_hand, &moment.joints);
         let told = Observation {
             camera,
-            color: self.settings.color.expose(&picture.color, noise),
-            depth: self.settings.depth.measure(&picture.depth, &self.camera, &self.depth, noise),
-            mask: self.settings.mask.segment(&visible, &hand, noise),
+            color: self.settings.color.expose(&seen.color, noise),
+            depth: self.settings.depth.measure(&seen.depth, &self.camera, &self.depth, noise),
+            mask: self.settings.mask.segment(&seen.visible, &seen.hand, noise),
             gravity: Some(gravity),
             hand: Some(HandMeasurement { t_cam_hand: t_cam_hand_told, joints, forces }),
         };
         let truth = t_cam_hand * moment.t_hand_object;
         let hand = Some((t_cam_hand, moment.joints.clone()));
-        Shot { told, truth, hand, world: None, whole, visible }
+        let lens = self.lens.as_ref().map(|lens| lens.model);
+        let View { whole, visible, .. } = seen;
+        Ok(Shot { told, lens, truth, hand, world: None, whole, visible })
     }
 
-    /// Renders color and depth without the camera's faults; the first of `bodies` is the object.
-    fn render_rgbd(
+    /// What is there to be seen by the pinhole camera, or by that of the lens; the first of `bodies` is the object.
+    fn render(
         &self,
         bodies: &[(&RenderModel, Isometry3<f64>)],
         gravity: &Vector3<f64>,
         noise: &mut SplitMix64,
-    ) -> SceneImage {
+    ) -> View {
         let lights = self.settings.light.draw(bodies, &-gravity, noise);
-        let (wall, behind) = self.settings.background.draw(&self.camera, noise);
+        let background = &self.settings.background;
+        // Of the lens's own size, but from as many random numbers: what follows is the same with any lens.
+        let mut same = noise.clone();
+        let (mut wall, mut behind) = background.draw(&self.camera, noise);
+        let (mut camera, mut samples) = (&self.camera, SAMPLES);
+        if let Some(lens) = &self.lens {
+            (wall, behind) = background.draw(&lens.background, &mut same);
+            (camera, samples) = (&lens.pinhole, 1);
+        }
+        let scale = camera.width / wall.width();
         let shade = |body: usize, point: &SurfacePoint<f32>| {
             let paint = self.paint[[0, 2, 1, 2][body % 4]];
             let albedo = if body == 0 { point.albedo } else { paint };
             lights.shade(point, albedo)
         };
-        let mut picture = render_scene(&self.camera, bodies, SAMPLES, shade, |x, y| {
-            wall.pixels()[y * self.camera.width + x]
-        });
-        for (z, far) in picture.depth.pixels_mut().iter_mut().zip(behind.pixels()) {
-            *z = if *z > 0.0 { *z } else { *far };
+        let at = |x: usize, y: usize| y / scale * wall.width() + x / scale;
+        let picture = render_scene(camera, bodies, samples, shade, |x, y| wall.pixels()[at(x, y)]);
+        let mut depth = picture.depth;
+        for (i, z) in depth.pixels_mut().iter_mut().enumerate().filter(|(_, z)| **z <= 0.0) {
+            *z = behind.pixels()[at(i % camera.width, i / camera.width)];
         }
-        picture
+        let mask_of = |wanted: fn(u32) -> bool| {
+            let mut mask = Mask::filled(camera.width, camera.height, false);
+            for (set, body) in mask.pixels_mut().iter_mut().zip(&picture.object) {
+                *set = body.is_some_and(wanted);
+            }
+            mask
+        };
+        let (visible, hand) = (mask_of(|body| body == 0), mask_of(|body| body > 0));
+        let alone = depth_map(camera, &bodies[..1]);
+        let mut whole = visible.clone();
+        for (set, z) in whole.pixels_mut().iter_mut().zip(alone.pixels()) {
+            *set |= *z > 0.0;
+        }
+        View { color: picture.color, depth, visible, hand, whole }
     }
 }
 

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
 use anyhow::bail;
@@ -15,6 +15,7 @@ use prehend_refine::data::{
 use prehend_refine::evaluate::report::{FrameReport, Report};
 use prehend_refine::strategy::{PosteriorSummary, Trace};
 use prehend_refine::{Method, refine};
+use prehend_render::Backend;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
@@ -31,6 +32,8 @@ pub(super) struct DatasetRun<'a> {
     pub(super) options: &'a MethodOptions,
     /// The method that the options make.
     pub(super) method: Method,
+    /// What renders.
+    pub(super) backend: Arc<dyn Backend>,
 }
 
 /// A refined frame as the journal has it.
@@ -141,7 +144,7 @@ impl DatasetRun<'_> {
             "method": self.options.method().name,
             "settings": format!("{:?}", self.method),
             "seed": self.options.seed,
-            "backend": "cpu",
+            "backend": self.backend.name(),
             "history kept": self.keeps_trace(),
         })))
     }
@@ -154,7 +157,8 @@ impl DatasetRun<'_> {
         };
         let initial = &job.row.t_cam_model;
         let start = Instant::now();
-        let found = refine(&input.frame()?, initial, &self.method)?;
+        let frame = input.frame()?.with_backend(Arc::clone(&self.backend));
+        let found = refine(&frame, initial, &self.method)?;
         let seconds = start.elapsed().as_secs_f64();
         let [object_warnings, warnings] = input.warnings(initial);
         let refined = Refined {

@@ -3,11 +3,13 @@
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::process::ExitCode;
+use std::sync::Arc;
 
 use prehend_refine::data::bop::write_atomically;
 use prehend_refine::data::{PlainPose, load_frame_file};
 use prehend_refine::strategy::{PosteriorSummary, Strategy};
 use prehend_refine::{Method, State};
+use prehend_render::Backend;
 use serde_json::json;
 
 use super::options::{MethodOptions, OutputOptions};
@@ -18,6 +20,7 @@ pub(super) fn refine_frame(
     file: &Path,
     output: &OutputOptions,
     method: &MethodOptions,
+    backend: Arc<dyn Backend>,
 ) -> anyhow::Result<ExitCode> {
     let (input, t_cam_object) = load_frame_file(file, method.seed, cache().as_ref())?;
     let mut configured = method.configured()?;
@@ -31,7 +34,7 @@ pub(super) fn refine_frame(
     }
     let warnings = input.warnings(&t_cam_object).concat();
     warnings.iter().for_each(|warning| complain(format!("warning: {warning}")));
-    let frame = input.frame()?;
+    let frame = input.frame()?.with_backend(backend);
     let initial = State::new(&frame, &t_cam_object)?;
     let bar = progress(configured.iterations(), "refining");
     let refined = configured.run(&frame, &initial, &mut |p| {

@@ -14,7 +14,7 @@ use prehend_refine::data::bop::check_writable;
 use self::dataset::DatasetRun;
 use self::frame::refine_frame;
 use self::options::{MethodOptions, OutputOptions};
-use crate::options::{Selection, limit_threads};
+use crate::options::{Rendering, Selection, limit_threads};
 
 #[derive(Args)]
 #[command(next_help_heading = "Input")]
@@ -36,22 +36,26 @@ pub(crate) struct Refine {
     output: OutputOptions,
     #[command(flatten)]
     method: MethodOptions,
+    #[command(flatten)]
+    rendering: Rendering,
 }
 
 impl Refine {
     pub(crate) fn run(self) -> anyhow::Result<ExitCode> {
-        let Self { selection, poses, frame, output, method } = &self;
+        let Self { selection, poses, frame, output, method, rendering } = &self;
         // What cannot be written must be known before the work, not after it.
         if let Some(out) = &output.out {
             check_writable(out)?;
         }
         limit_threads(method.threads)?;
+        let backend = rendering.open()?;
         match (frame, selection, poses, &output.out) {
-            (Some(file), ..) => refine_frame(file, output, method),
+            (Some(file), ..) => refine_frame(file, output, method, backend),
             (None, Some(selection), Some(poses), Some(out)) => {
                 let configured = method.configured()?;
                 let options = method;
-                DatasetRun { selection, poses, out, output, options, method: configured }.run()
+                let method = configured;
+                DatasetRun { selection, poses, out, output, options, method, backend }.run()
             }
             _ => bail!("give --dataset, --poses and --out, or --frame"),
         }

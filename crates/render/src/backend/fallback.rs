@@ -1,6 +1,6 @@
-//! The best device at hand, with the processor to fall back on.
+//! A device with the processor to fall back on.
 
-use super::{Backend, BackendError, Cpu, Hypothesis, PoseProblem, Session};
+use super::{Backend, BackendError, Hypothesis, PoseProblem, Session};
 use crate::pose_loss::{Linearized, Loss, PoseImage, Tile};
 
 /// Another backend while it works, and the processor from its first failure on.
@@ -9,26 +9,6 @@ use crate::pose_loss::{Linearized, Loss, PoseImage, Tile};
 /// warning in the log, and the call at hand is answered by the processor.
 #[derive(Debug)]
 pub struct WithFallback<B>(pub B);
-
-/// The graphics device of this machine with the processor to fall back on, or the processor where there is none.
-///
-/// Opening a device and compiling its shaders takes some tenths of a second: call this once.
-///
-/// Software adapters do not count, since the processor by itself is faster, unless the environment variable
-/// `PREHEND_SOFTWARE_GPU` is `1`.
-pub fn auto() -> Box<dyn Backend> {
-    #[cfg(feature = "gpu")]
-    {
-        let software = std::env::var("PREHEND_SOFTWARE_GPU").is_ok_and(|v| v == "1");
-        let gpu = if software { super::Gpu::with_software() } else { super::Gpu::new() };
-        match gpu {
-            Ok(gpu) => return Box::new(WithFallback(gpu)),
-            Err(BackendError::NoDevice(reason)) => log::debug!("no graphics device: {reason}"),
-            Err(error) => log::warn!("{error}; continuing on the CPU"),
-        }
-    }
-    Box::new(Cpu)
-}
 
 impl<B: Backend> Backend for WithFallback<B> {
     fn name(&self) -> &str {

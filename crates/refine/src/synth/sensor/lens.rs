@@ -1,0 +1,44 @@
+//! Images through a lens.
+
+use prehend_render::{Camera, Distortion, DistortionError, Remap};
+
+use super::rig::View;
+
+/// What a pinhole sees is rendered with this many pixels for one of the lens along each axis, and averaged: a lens may
+/// show things smaller than a pinhole does.
+const FINE: usize = 3;
+/// The pinhole sees at most so much more than the image at its center would.
+const WIDEST: f64 = 3.0;
+
+/// A camera's lens, and the pinhole camera whose images become its own.
+pub(super) struct Lens {
+    pub(super) model: Distortion,
+    /// Sees what the lens shows, `FINE` times finer.
+    pub(super) pinhole: Camera,
+    /// The same at the resolution of the images, for what is behind all.
+    pub(super) background: Camera,
+    color: Remap,
+    centers: Remap,
+}
+
+impl Lens {
+    /// Of `camera`, whose matrix and size are those of the images.
+    pub(super) fn new(model: Distortion, camera: &Camera) -> Self {
+        let background = model.pinhole_that_covers(camera, WIDEST);
+        let pinhole = background.scaled(FINE as f64);
+        let color = Remap::distort(pinhole, camera.scaled(FINE as f64), &model);
+        let centers = Remap::distort(pinhole, *camera, &model);
+        Self { model, pinhole, background, color, centers }
+    }
+
+    /// How the lens shows what its pinhole sees.
+    pub(super) fn photograph(&self, seen: &View) -> Result<View, DistortionError> {
+        Ok(View {
+            color: self.color.rgb(&seen.color)?.downsampled(FINE),
+            depth: self.centers.depth(&seen.depth)?,
+            visible: self.centers.mask(&seen.visible)?,
+            hand: self.centers.mask(&seen.hand)?,
+            whole: self.centers.mask(&seen.whole)?,
+        })
+    }
+}
