@@ -1,4 +1,4 @@
-//! The structs shared with the shaders, field by field as in `shaders/problem.wgsl` and `shaders/work.wgsl`.
+//! The structs shared with the shaders, field by field as in the module that declares each.
 //!
 //! Vectors of three take sixteen bytes there unless a scalar follows.
 

@@ -8,6 +8,7 @@
 
 mod device;
 mod layout;
+mod passes;
 mod session;
 mod shaders;
 #[cfg(test)]

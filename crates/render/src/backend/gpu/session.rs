@@ -4,14 +4,15 @@ use std::sync::Arc;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
-use super::device::{
-    CONTOUR_DERIVATIVES, CONTOUR_PICTURE, CONTOUR_VALUE, COUNT_FACES, Device, FIND_PIECES,
-    FIND_SEGMENTS, NEEDS, PROJECT, Pass, RASTER, SCAN_BINS, SCATTER_FACES, SOFTRAS_DERIVATIVES,
-    SOFTRAS_PICTURE, SOFTRAS_VALUE, TOTAL,
-};
+use super::device::Device;
 use super::layout::{
     PICTURE_COLUMNS, Params, SUM_COLOR, SUM_COLUMNS, SUM_CONTOUR, SUM_COVERED, SUM_DEPTH,
     SUM_GRADIENT, SUM_HESSIAN, SUM_HIDDEN, SUM_MASK, SUM_MISSED, SUM_WITH_DEPTH, Usage,
+};
+use super::passes::{
+    CONTOUR_DERIVATIVES, CONTOUR_PICTURE, CONTOUR_VALUE, COUNT_FACES, FIND_PIECES, FIND_SEGMENTS,
+    NEEDS, PROJECT, Pass, RASTER, SCAN_BINS, SCATTER_FACES, SOFTRAS_DERIVATIVES, SOFTRAS_PICTURE,
+    SOFTRAS_VALUE, TOTAL,
 };
 use super::upload;
 use super::work::{self, BUDGET, Capacity, Work};

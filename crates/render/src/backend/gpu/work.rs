@@ -1,10 +1,11 @@
 //! Buffers that the passes share, sized for a number of hypotheses.
 
-use super::device::{Device, READ_ONLY, READ_WRITE};
+use super::device::Device;
 use super::layout::{
     BIN, ENTRY, Hypothesis, PICTURE_COLUMNS, PIECE, Params, SCREEN, SEGMENT, SUM_COLUMNS, TALLY,
     TILE, Usage, VISIBLE,
 };
+use super::passes::{READ_ONLY, READ_WRITE};
 use crate::backend::BackendError;
 
 /// Memory that a session's work buffers may take together \[bytes\]. More hypotheses are worked off in turns.

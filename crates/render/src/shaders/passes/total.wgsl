@@ -1,5 +1,10 @@
 // Adds up the tiles of each hypothesis in a fixed order, and notes what the work buffers would have needed.
 
+#import prehend::results::{note_needs, results}
+#import prehend::sums::{SUM_COLUMNS, partials}
+#import prehend::tallies::region_of
+#import prehend::tiles::{TILE, tile_index}
+
 // Threads of a column share the tiles.
 const TOTAL_GROUPS: u32 = 7u;
 
@@ -42,16 +47,4 @@ fn total(
     if lane == 0u {
         note_needs(h);
     }
-}
-
-fn note_needs(h: u32) {
-    atomicMax(&results.segments, atomicLoad(&tallies[h].segments));
-    let outline = atomicLoad(&tallies[h].outline);
-    atomicMax(&results.pieces, outline + atomicLoad(&tallies[h].inner));
-}
-
-// For pictures, which are not added up.
-@compute @workgroup_size(1)
-fn needs(@builtin(workgroup_id) group: vec3<u32>) {
-    note_needs(group.z);
 }
