@@ -67,6 +67,11 @@ struct Params {
     least_area: f32,
     faces_per_pixel: u32,
     soft_flags: u32,
+    // Sums are asked for by squares of the image, so wide [px]; so many columns and rows of them; a tile lies in at most so many
+    // across, and as many down. One square for the whole image is wider than any.
+    side: u32,
+    parts: u32,
+    squares: vec2<u32>,
     // Of each level of the texture: first texel, columns, rows.
     level: array<vec4<u32>, 24>,
 }

@@ -8,12 +8,13 @@
 }
 #import prehend::pixel::Pixel
 #import prehend::row::{Row, scaled_sum}
+#import prehend::squares::{first_square, part_index}
 #import prehend::sums::{
     SUM_COLOR, SUM_COLUMNS, SUM_CONTOUR, SUM_COVERED, SUM_DEPTH, SUM_GRADIENT, SUM_HESSIAN,
     SUM_HIDDEN, SUM_MASK, SUM_MISSED, SUM_WITH_DEPTH, partials,
 }
 #import prehend::tallies::region_of
-#import prehend::tiles::{TILE_PIXELS, tile_index, touches_tile}
+#import prehend::tiles::{TILE, TILE_PIXELS, tile_index, touches_tile}
 
 // One row a thread, so that columns add up in a fixed order; an odd length keeps the banks of memory apart.
 var<workgroup> tile_sums: array<f32, 2240>;
@@ -154,10 +155,32 @@ fn store_pixel_sums(lane: u32, pixel: Pixel, goal_pixel: TargetPixel) {
     }
 }
 
+// Adds up the rows of a tile's threads square by square; the tile has pixels of at least one.
+fn store_parts(h: u32, lane: u32, tile: vec2<u32>) {
+    let corner = tile * TILE;
+    let first = first_square(tile);
+    for (var part = 0u; part < params.parts * params.parts; part++) {
+        let square = first + vec2<u32>(part % params.parts, part / params.parts);
+        let low = clamp(square * params.side, corner, corner + TILE) - corner;
+        let high = clamp((square + 1u) * params.side, corner, corner + TILE) - corner;
+        var sum = 0.0;
+        for (var y = low.y; y < high.y; y++) {
+            for (var x = low.x; x < high.x; x++) {
+                sum += tile_sums[(y * TILE + x) * SUM_COLUMNS + lane];
+            }
+        }
+        partials[part_index(h, tile, square) * SUM_COLUMNS + lane] = sum;
+    }
+}
+
 // Adds up the rows of a tile's threads; to be called by a whole workgroup.
 fn store_tile_sums(h: u32, lane: u32, tile: vec2<u32>) {
     workgroupBarrier();
     if lane < SUM_COLUMNS && touches_tile(region_of(h), tile) {
+        if params.parts > 1u {
+            store_parts(h, lane, tile);
+            return;
+        }
         var sum = 0.0;
         for (var i = 0u; i < TILE_PIXELS; i++) {
             sum += tile_sums[i * SUM_COLUMNS + lane];

@@ -15,5 +15,5 @@ const SUM_MISSED: u32 = 33u;
 const SUM_WITH_DEPTH: u32 = 34u;
 const SUM_COLUMNS: u32 = 35u;
 
-// Sums of each tile.
+// Sums of each part of each tile: see `squares.wgsl`.
 @group(0) @binding(15) var<storage, read_write> partials: array<f32>;

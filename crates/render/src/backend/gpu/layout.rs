@@ -28,6 +28,9 @@ pub(super) const SOFT_CULL: u32 = 8;
 /// Pixels along a tile's side.
 pub(super) const TILE: usize = 8;
 
+/// Wider than any image \[px\].
+pub(super) const WHOLE_SIDE: u32 = 1 << 30;
+
 /// Columns of the sums of a hypothesis.
 pub(super) const SUM_COLOR: usize = 0;
 pub(super) const SUM_MASK: usize = 1;
@@ -82,6 +85,9 @@ pub(super) struct Params {
     pub(super) least_area: f32,
     pub(super) faces_per_pixel: u32,
     pub(super) soft_flags: u32,
+    pub(super) side: u32,
+    pub(super) parts: u32,
+    pub(super) squares: [u32; 2],
     pub(super) level: [[u32; 4]; LEVELS],
 }
 

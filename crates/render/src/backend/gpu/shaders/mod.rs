@@ -31,7 +31,7 @@ macro_rules! sources {
 }
 
 /// What passes import, each after all that it imports itself.
-const MODULES: [Source; 26] = sources![
+const MODULES: [Source; 27] = sources![
     "params.wgsl",
     "hypotheses.wgsl",
     "mesh.wgsl",
@@ -39,6 +39,7 @@ const MODULES: [Source; 26] = sources![
     "goal.wgsl",
     "derivatives.wgsl",
     "tiles.wgsl",
+    "squares.wgsl",
     "tallies.wgsl",
     "screen.wgsl",
     "bins.wgsl",

@@ -148,6 +148,9 @@ fn structs_are_laid_out_alike_in_both_languages() {
                 least_area,
                 faces_per_pixel,
                 soft_flags,
+                side,
+                parts,
+                squares,
                 level
             ),
         ),
