@@ -1,4 +1,14 @@
 // For each pixel of a tile, the nearest piece of a list, if within the band.
+#define_import_path prehend::band
+
+#import prehend::contour::{contour_pixel, foot_of}
+#import prehend::mesh::NONE
+#import prehend::params::params
+#import prehend::pieces::pieces
+#import prehend::pixel::Pixel
+#import prehend::tallies::{region_of, tallies}
+#import prehend::tiles::{TILE, TILE_PIXELS, pixel_index, touches_tile}
+#import prehend::z_buffer::visible
 
 struct BandPiece {
     a: vec2<f32>,

@@ -1,4 +1,16 @@
 // The contour mode: blended value of a pixel and its derivatives. See `contour/pixel.rs` and `contour/cross.rs`.
+#define_import_path prehend::contour
+
+#import prehend::derivatives::with_derivatives
+#import prehend::mesh::{NONE, camera_position, faces}
+#import prehend::params::params
+#import prehend::pieces::pieces
+#import prehend::pixel::{Pixel, color_rows}
+#import prehend::row::{
+    Row, image_gradient, image_motion, motion_along, no_row, ray, scaled, scaled_sum,
+}
+#import prehend::screen::{face_screen, facing_of, screen}
+#import prehend::surface::{Shaded, barycentric, shade}
 
 struct Foot {
     // Share of the edge's screen length.
@@ -36,7 +48,7 @@ fn interior(h: u32, p: vec2<f32>, face: u32, inverse_z: f32) -> Pixel {
     pixel.coverage = 1.0;
     pixel.z = z;
     pixel.depth_weight = 1.0;
-    if DERIVATIVES {
+    if with_derivatives() {
         interior_rows(h, face, b, ray(p) * z, shaded, &pixel);
     }
     return pixel;
@@ -111,7 +123,7 @@ fn at_foot(h: u32, piece: u32, foot: Foot) -> Pixel {
     pixel.coverage = 1.0;
     pixel.z = e.point.z;
     pixel.depth_weight = 1.0;
-    if DERIVATIVES {
+    if with_derivatives() {
         // Moving along the edge by dt changes the coordinates of its two corners by -dt and +dt.
         let slid = slide(h, piece, foot, e);
         let sign_1 = select(select(0.0, 1.0, next == 1u), -1.0, corner == 1u);
@@ -162,7 +174,7 @@ fn fade(h: u32, piece: u32, foot: Foot, side: f32, pixel: ptr<function, Pixel>) 
     (*pixel).color = alpha.x * color;
     (*pixel).coverage = alpha.x;
     (*pixel).depth_weight = outer.x * weight;
-    if DERIVATIVES {
+    if with_derivatives() {
         let ds = distance_row(h, piece, foot, side);
         for (var k = 0u; k < 3u; k++) {
             (*pixel).color_rows[k] =
@@ -195,7 +207,7 @@ fn cross_contour(h: u32, p: vec2<f32>, own: Pixel, piece: u32) -> Pixel {
     var out = own;
     out.color = alpha.x * near.color + (1.0 - alpha.x) * far.color;
     out.depth_weight = weight.x;
-    if DERIVATIVES {
+    if with_derivatives() {
         let ds = distance_row(h, piece, foot, side);
         for (var k = 0u; k < 3u; k++) {
             let mixed = scaled_sum(alpha.x, near.color_rows[k], 1.0 - alpha.x, far.color_rows[k]);

@@ -1,22 +1,10 @@
-// What a face looks like from a pixel in the SoftRas mode. See `softras/fragment.rs` and `softras/face.rs`.
+// What a face looks like from a pixel in the SoftRas mode. See `softras/fragment.rs`.
+#define_import_path prehend::fragment
 
-// PyTorch3D's bound for the denominator of the perspective correction.
-const LEAST_SHARE_SUM: f32 = 1e-8;
-
-struct SoftFace {
-    // Corners relative to the hypothesis's base pixel [px].
-    v0: vec2<f32>,
-    v1: vec2<f32>,
-    v2: vec2<f32>,
-    face: u32,
-    // What a corner's edge function is multiplied with for its weight, positive inside.
-    share: vec3<f32>,
-    // The weights' sum is taken to be at least this.
-    least_sum: f32,
-    // Z of the corners [m].
-    z: vec3<f32>,
-    seen_inside: u32,
-}
+#import prehend::mesh::{camera_position, faces}
+#import prehend::params::{SOFT_CLIP, SOFT_PERSPECTIVE, params, soft_flag}
+#import prehend::row::{Row, image_gradient, motion_along, no_row}
+#import prehend::soft_face::SoftFace
 
 struct Fragment {
     // Barycentric coordinates of the surface point, and Σ b_i Z_i [m].
@@ -36,39 +24,6 @@ struct Fragment {
     kept: bool,
 }
 
-fn soft_flag(flag: u32) -> bool {
-    return (params.soft_flags & flag) != 0u;
-}
-
-// Whether a face is drawn at all.
-fn is_soft_face(c: mat3x3<f32>) -> bool {
-    let in_front = c[0].z > 0.0 && c[1].z > 0.0 && c[2].z > 0.0;
-    let area = signed_area(c);
-    return in_front && abs(area) > params.least_area && (area < 0.0 || !soft_flag(SOFT_CULL));
-}
-
-fn soft_face(h: u32, face: u32) -> SoftFace {
-    let ids = faces[face];
-    let at = h * params.vertices;
-    let c = face_screen(h, face);
-    let area = signed_area(c);
-    var out: SoftFace;
-    out.v0 = c[0].xy;
-    out.v1 = c[1].xy;
-    out.v2 = c[2].xy;
-    out.face = face;
-    out.z = vec3<f32>(screen[at + ids.x].w, screen[at + ids.y].w, screen[at + ids.z].w);
-    var share = vec3<f32>(1.0);
-    if soft_flag(SOFT_PERSPECTIVE) {
-        share = vec3<f32>(c[0].z, c[1].z, c[2].z);
-    }
-    out.least_sum = LEAST_SHARE_SUM * share.x * share.y * share.z * abs(area);
-    out.share = select(share, -share, area < 0.0);
-    // A closed surface is lit by its outward normals on both sides: a face that turns over must not jump.
-    out.seen_inside = select(0u, 1u, area > 0.0 && params.closed == 0u);
-    return out;
-}
-
 fn cross_2(a: vec2<f32>, b: vec2<f32>) -> f32 {
     return a.x * b.y - a.y * b.x;
 }
@@ -86,9 +41,9 @@ fn edge_foot(start: vec2<f32>, end: vec2<f32>) -> vec3<f32> {
 
 // The fragment of a face at a pixel, given relative to the base pixel.
 fn fragment_of(f: SoftFace, p: vec2<f32>) -> Fragment {
-    let v0 = f.v0 - p;
-    let v1 = f.v1 - p;
-    let v2 = f.v2 - p;
+    let v0 = f.first - p;
+    let v1 = f.second - p;
+    let v2 = f.third - p;
     let raw = f.share * vec3<f32>(cross_2(v1, v2), cross_2(v2, v0), cross_2(v0, v1));
     let least = select(-3e38, 0.0, soft_flag(SOFT_CLIP));
     let w = max(raw, vec3<f32>(least));
@@ -136,7 +91,7 @@ fn fragment_row(
     by_z: f32,
     by_distance: f32,
 ) -> Row {
-    var v = array<vec2<f32>, 3>(f.v0 - p, f.v1 - p, f.v2 - p);
+    var v = array<vec2<f32>, 3>(f.first - p, f.second - p, f.third - p);
     // Where the sum is free, a depth that is the same everywhere moves with no coordinate; taking it off saves digits.
     let along = by_b + by_z * (f.z - fragment.z * fragment.sum_free);
     let mean = dot(fragment.b, along) * fragment.sum_free;

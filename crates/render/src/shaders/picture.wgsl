@@ -1,4 +1,12 @@
 // The picture of one hypothesis.
+#define_import_path prehend::picture
+
+#import prehend::hypotheses::hypotheses
+#import prehend::params::params
+#import prehend::pixel::Pixel
+#import prehend::results::results
+#import prehend::screen::{face_screen, signed_area}
+#import prehend::surface::{barycentric, normal_at}
 
 // Color, coverage, depth, normal, and the face plus one (0 where there is none).
 const PICTURE_COLUMNS: u32 = 9u;
@@ -22,13 +30,4 @@ fn store_picture(h: u32, pixel: Pixel, at: vec2<u32>) {
     results.values[first + 3u] = pixel.coverage;
     results.values[first + 4u] = select(0.0, pixel.z, pixel.hit);
     results.values[first + 8u] = select(0.0, f32(pixel.face) + 1.0, pixel.hit);
-}
-
-@compute @workgroup_size(8, 8)
-fn contour_picture(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(local_invocation_index) lane: u32,
-    @builtin(global_invocation_id) id: vec3<u32>,
-) {
-    store_picture(group.z, seen_in_contour_mode(group.z, lane, group.xy, id.xy), id.xy);
 }

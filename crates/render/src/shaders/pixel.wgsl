@@ -1,4 +1,9 @@
 // What a pixel shows of the posed object, in either mode.
+#define_import_path prehend::pixel
+
+#import prehend::hypotheses::hypotheses
+#import prehend::row::{Row, scaled_sum}
+#import prehend::surface::Shaded
 
 struct Pixel {
     // What is seen at all, and whether a face covers the pixel's center or it lies within the contour band.
@@ -22,7 +27,7 @@ struct Pixel {
 // Color rows from those of the barycentric coordinates of corners 1 and 2.
 fn color_rows(h: u32, shaded: Shaded, moving_1: Row, moving_2: Row, pixel: ptr<function, Pixel>) {
     for (var k = 0u; k < 3u; k++) {
-        var row = scaled_sum(shaded.along_1[k], moving_1, shaded.along_2[k], moving_2);
+        var row = scaled_sum(shaded.along_second[k], moving_1, shaded.along_third[k], moving_2);
         row.angular += shaded.turning[k];
         // The texture's level follows the depth of the model's center, which a rotation about it leaves alone.
         row.linear.z += shaded.level[k] * hypotheses[h].level_dz;

@@ -1,18 +1,20 @@
 // Residuals of the pixels of a tile against the target, and their sums. See `pose_loss/residuals.rs`.
+#define_import_path prehend::residuals
 
-// Columns of the sums: losses of color, mask and depth, the gradient, the upper triangle of the Hessian row by row, and numbers of
-// pixels covered, near the outline, hidden, missed, and with depth.
-const SUM_COLOR: u32 = 0u;
-const SUM_MASK: u32 = 1u;
-const SUM_DEPTH: u32 = 2u;
-const SUM_GRADIENT: u32 = 3u;
-const SUM_HESSIAN: u32 = 9u;
-const SUM_COVERED: u32 = 30u;
-const SUM_CONTOUR: u32 = 31u;
-const SUM_HIDDEN: u32 = 32u;
-const SUM_MISSED: u32 = 33u;
-const SUM_WITH_DEPTH: u32 = 34u;
-const SUM_COLUMNS: u32 = 35u;
+#import prehend::derivatives::with_derivatives
+#import prehend::goal::TargetPixel
+#import prehend::params::{
+    KERNEL_CAUCHY, KERNEL_GEMAN_MCCLURE, KERNEL_HUBER, KERNEL_SQUARED, KERNEL_TUKEY, params,
+}
+#import prehend::pixel::Pixel
+#import prehend::row::{Row, scaled_sum}
+#import prehend::squares::{first_square, part_index}
+#import prehend::sums::{
+    SUM_COLOR, SUM_COLUMNS, SUM_CONTOUR, SUM_COVERED, SUM_DEPTH, SUM_GRADIENT, SUM_HESSIAN,
+    SUM_HIDDEN, SUM_MASK, SUM_MISSED, SUM_WITH_DEPTH, partials,
+}
+#import prehend::tallies::region_of
+#import prehend::tiles::{TILE, TILE_PIXELS, tile_index, touches_tile}
 
 // One row a thread, so that columns add up in a fixed order; an odd length keeps the banks of memory apart.
 var<workgroup> tile_sums: array<f32, 2240>;
@@ -47,7 +49,7 @@ fn robust_loss(r: f32) -> vec2<f32> {
             let u = min(x, 1.0);
             return vec2<f32>(k * k / 6.0 * u * (3.0 - u * (3.0 - u)), (1.0 - u) * (1.0 - u));
         }
-        default: {
+        case KERNEL_SQUARED, default: {
             return vec2<f32>(0.5 * r * r, 1.0);
         }
     }
@@ -116,7 +118,7 @@ fn store_pixel_sums(lane: u32, pixel: Pixel, goal_pixel: TargetPixel) {
             let r = pixel.color[k] - goal_pixel.color[k];
             let loss = robust_loss(r);
             loss_sum += params.color_weight * loss.x;
-            if DERIVATIVES {
+            if with_derivatives() {
                 add_residual(&equations, pixel.color_rows[k], r, params.color_weight * loss.y);
             }
         }
@@ -125,7 +127,7 @@ fn store_pixel_sums(lane: u32, pixel: Pixel, goal_pixel: TargetPixel) {
     if params.mask_weight > 0.0 {
         let r = pixel.coverage - goal_pixel.coverage;
         tile_sums[row + SUM_MASK] = 0.5 * params.mask_weight * r * r;
-        if DERIVATIVES && pixel.coverage < 1.0 {
+        if with_derivatives() && pixel.coverage < 1.0 {
             add_residual(&equations, pixel.coverage_row, r, params.mask_weight);
         }
     }
@@ -136,14 +138,14 @@ fn store_pixel_sums(lane: u32, pixel: Pixel, goal_pixel: TargetPixel) {
         let r = pixel.depth_weight * bounded * scale;
         tile_sums[row + SUM_DEPTH] = 0.5 * params.depth_weight * r * r;
         tile_sums[row + SUM_WITH_DEPTH] = 1.0;
-        if DERIVATIVES {
+        if with_derivatives() {
             let along = select(0.0, pixel.depth_weight * scale, bounded == difference);
             let depth_row =
                 scaled_sum(along, pixel.z_row, bounded * scale, pixel.depth_weight_row);
             add_residual(&equations, depth_row, r, params.depth_weight);
         }
     }
-    if DERIVATIVES {
+    if with_derivatives() {
         for (var i = 0u; i < 6u; i++) {
             tile_sums[row + SUM_GRADIENT + i] = equations.gradient[i];
         }
@@ -153,33 +155,36 @@ fn store_pixel_sums(lane: u32, pixel: Pixel, goal_pixel: TargetPixel) {
     }
 }
 
+// Adds up the rows of a tile's threads square by square; the tile has pixels of at least one.
+fn store_parts(h: u32, lane: u32, tile: vec2<u32>) {
+    let corner = tile * TILE;
+    let first = first_square(tile);
+    for (var part = 0u; part < params.parts * params.parts; part++) {
+        let square = first + vec2<u32>(part % params.parts, part / params.parts);
+        let low = clamp(square * params.side, corner, corner + TILE) - corner;
+        let high = clamp((square + 1u) * params.side, corner, corner + TILE) - corner;
+        var sum = 0.0;
+        for (var y = low.y; y < high.y; y++) {
+            for (var x = low.x; x < high.x; x++) {
+                sum += tile_sums[(y * TILE + x) * SUM_COLUMNS + lane];
+            }
+        }
+        partials[part_index(h, tile, square) * SUM_COLUMNS + lane] = sum;
+    }
+}
+
 // Adds up the rows of a tile's threads; to be called by a whole workgroup.
 fn store_tile_sums(h: u32, lane: u32, tile: vec2<u32>) {
     workgroupBarrier();
     if lane < SUM_COLUMNS && touches_tile(region_of(h), tile) {
+        if params.parts > 1u {
+            store_parts(h, lane, tile);
+            return;
+        }
         var sum = 0.0;
         for (var i = 0u; i < TILE_PIXELS; i++) {
             sum += tile_sums[i * SUM_COLUMNS + lane];
         }
         partials[tile_index(h, tile) * SUM_COLUMNS + lane] = sum;
     }
-}
-
-fn goal_at(pixel: vec2<u32>) -> TargetPixel {
-    var out: TargetPixel;
-    if all(pixel < params.size) {
-        out = goal[pixel.y * params.size.x + pixel.x];
-    }
-    return out;
-}
-
-@compute @workgroup_size(8, 8)
-fn contour_residuals(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(local_invocation_index) lane: u32,
-    @builtin(global_invocation_id) id: vec3<u32>,
-) {
-    let pixel = seen_in_contour_mode(group.z, lane, group.xy, id.xy);
-    store_pixel_sums(lane, pixel, goal_at(id.xy));
-    store_tile_sums(group.z, lane, group.xy);
 }

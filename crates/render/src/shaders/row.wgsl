@@ -1,4 +1,8 @@
 // Derivatives by a twist (translation, rotation) about the model's center, camera frame.
+#define_import_path prehend::row
+
+#import prehend::hypotheses::hypotheses
+#import prehend::params::params
 
 struct Row {
     linear: vec3<f32>,

@@ -1,10 +1,24 @@
 // The SoftRas mode: the nearest faces of a pixel, blended by depth. See `softras/pixel.rs` and `softras/blend.rs`.
+#define_import_path prehend::softras
+
+#import prehend::bins::{bins, entries, tile_entries}
+#import prehend::derivatives::with_derivatives
+#import prehend::fragment::{Fragment, fragment_of, fragment_row}
+#import prehend::hypotheses::hypotheses
+#import prehend::mesh::NONE
+#import prehend::params::{MOST_FACES, params}
+#import prehend::pixel::Pixel
+#import prehend::row::scaled_sum
+#import prehend::soft_face::{SoftFace, soft_face}
+#import prehend::surface::shade
+#import prehend::tallies::region_of
+#import prehend::tiles::{TILE_PIXELS, tile_index, touches_tile}
 
 // Weight of the background.
 const BACKGROUND: f32 = 1e-10;
+
 // What has a smaller share of the pixel is left out: 64 such fragments are less than 1e-6 of its color.
 const LEAST_SHARE: f32 = 1e-8;
-const MOST_FACES: u32 = 64u;
 
 var<workgroup> soft_batch: array<SoftFace, 64>;
 var<workgroup> soft_count: u32;
@@ -12,8 +26,8 @@ var<workgroup> soft_count: u32;
 // The nearest faces of a pixel in ascending order of depth, of equals the first.
 struct Nearest {
     count: u32,
-    z: array<f32, 64>,
-    face: array<u32, 64>,
+    z: array<f32, MOST_FACES>,
+    face: array<u32, MOST_FACES>,
     // The nearest that contains the pixel's center.
     inside_z: f32,
     inside: u32,
@@ -125,7 +139,7 @@ fn softras_pixel(h: u32, p: vec2<f32>, nearest: ptr<function, Nearest>) -> Pixel
             pixel.color += share * shade(h, f.face, fragment.b, f.seen_inside != 0u).color;
         }
     }
-    if DERIVATIVES {
+    if with_derivatives() {
         softras_rows(h, p, nearest, blend, &pixel);
     }
     pixel.near_outline = true;
@@ -137,7 +151,7 @@ fn softras_pixel(h: u32, p: vec2<f32>, nearest: ptr<function, Nearest>) -> Pixel
         pixel.near_outline = false;
         pixel.z = fragment.z;
         pixel.depth_weight = 1.0;
-        if DERIVATIVES {
+        if with_derivatives() {
             pixel.z_row = fragment_row(h, f, p, fragment, vec3<f32>(0.0), 1.0, 0.0);
         }
     }
@@ -181,7 +195,7 @@ fn softras_rows(
         for (var k = 0u; k < 3u; k++) {
             let contrast = shaded.color[k] - (*pixel).color[k];
             let by_z = relative * (*pixel).color[k] - params.depth_rate * share * contrast;
-            let by_b = share * vec3<f32>(0.0, shaded.along_1[k], shaded.along_2[k]);
+            let by_b = share * vec3<f32>(0.0, shaded.along_second[k], shaded.along_third[k]);
             let by_d = -part.y * params.sharpness * share * contrast;
             var row = fragment_row(h, f, p, fragment, by_b, by_z, by_d);
             row.angular += share * shaded.turning[k];
@@ -189,24 +203,4 @@ fn softras_rows(
             (*pixel).color_rows[k] = scaled_sum(1.0, (*pixel).color_rows[k], 1.0, row);
         }
     }
-}
-
-@compute @workgroup_size(8, 8)
-fn softras_residuals(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(local_invocation_index) lane: u32,
-    @builtin(global_invocation_id) id: vec3<u32>,
-) {
-    let pixel = seen_in_softras_mode(group.z, lane, group.xy, id.xy);
-    store_pixel_sums(lane, pixel, goal_at(id.xy));
-    store_tile_sums(group.z, lane, group.xy);
-}
-
-@compute @workgroup_size(8, 8)
-fn softras_picture(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(local_invocation_index) lane: u32,
-    @builtin(global_invocation_id) id: vec3<u32>,
-) {
-    store_picture(group.z, seen_in_softras_mode(group.z, lane, group.xy, id.xy), id.xy);
 }

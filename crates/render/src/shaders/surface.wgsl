@@ -1,13 +1,17 @@
 // Color of a surface point and its derivatives along the surface and with the normal.
+#define_import_path prehend::surface
 
-// Whether derivatives are wanted; without them the compiler drops their computation.
-override DERIVATIVES: bool = true;
+#import prehend::derivatives::with_derivatives
+#import prehend::hypotheses::hypotheses
+#import prehend::mesh::corners
+#import prehend::params::{ALBEDO_CORNERS, ALBEDO_TEXTURE, ALBEDO_UNIFORM, params}
+#import prehend::texture::sample_texture
 
 struct Shaded {
     color: vec3<f32>,
-    // Derivatives by the barycentric coordinates of corners 1 and 2 (corner 0 taking up the rest).
-    along_1: vec3<f32>,
-    along_2: vec3<f32>,
+    // Derivatives by the barycentric coordinates of the second and the third corner (the first taking up the rest).
+    along_second: vec3<f32>,
+    along_third: vec3<f32>,
     // Derivative of each channel by a rotation of the surface under the fixed light, camera frame.
     turning: mat3x3<f32>,
     // Derivative by the pyramid level of the texture.
@@ -34,25 +38,29 @@ fn barycentric(c: mat3x3<f32>, p: vec2<f32>) -> vec3<f32> {
 // Unlit color and its derivatives by the barycentric coordinates and the level, in the fields of `Shaded`.
 fn albedo(h: u32, face: u32, b: vec3<f32>) -> Shaded {
     var out: Shaded;
-    if params.albedo_kind == ALBEDO_UNIFORM {
-        out.color = params.albedo;
-        return out;
+    let first = corners[3u * face].paint;
+    let second = corners[3u * face + 1u].paint;
+    let third = corners[3u * face + 2u].paint;
+    let mixed = b.x * first + b.y * second + b.z * third;
+    switch params.albedo_kind {
+        case ALBEDO_TEXTURE: {
+            let texel = sample_texture(mixed.xy, hypotheses[h].level);
+            let to_second = second.xy - first.xy;
+            let to_third = third.xy - first.xy;
+            out.color = texel.color;
+            out.along_second = texel.du * to_second.x + texel.dv * to_second.y;
+            out.along_third = texel.du * to_third.x + texel.dv * to_third.y;
+            out.level = texel.dlevel;
+        }
+        case ALBEDO_CORNERS: {
+            out.color = mixed;
+            out.along_second = second - first;
+            out.along_third = third - first;
+        }
+        case ALBEDO_UNIFORM, default: {
+            out.color = params.albedo;
+        }
     }
-    let c0 = corners[3u * face].paint;
-    let c1 = corners[3u * face + 1u].paint;
-    let c2 = corners[3u * face + 2u].paint;
-    let mixed = b.x * c0 + b.y * c1 + b.z * c2;
-    if params.albedo_kind == ALBEDO_CORNERS {
-        out.color = mixed;
-        out.along_1 = c1 - c0;
-        out.along_2 = c2 - c0;
-        return out;
-    }
-    let texel = sample_texture(mixed.xy, hypotheses[h].level);
-    out.color = texel.color;
-    out.along_1 = texel.du * (c1.x - c0.x) + texel.dv * (c1.y - c0.y);
-    out.along_2 = texel.du * (c2.x - c0.x) + texel.dv * (c2.y - c0.y);
-    out.level = texel.dlevel;
     return out;
 }
 
@@ -71,8 +79,8 @@ fn shade(h: u32, face: u32, b: vec3<f32>, seen_inside: bool) -> Shaded {
     if hypotheses[h].flat_light != 0u {
         let factor = max(hypotheses[h].ambient, vec3<f32>(0.0));
         out.color = out.color * factor + hypotheses[h].offset;
-        out.along_1 *= factor;
-        out.along_2 *= factor;
+        out.along_second *= factor;
+        out.along_third *= factor;
         out.level *= factor;
         return out;
     }
@@ -83,19 +91,19 @@ fn shade(h: u32, face: u32, b: vec3<f32>, seen_inside: bool) -> Shaded {
     let factor = max(hypotheses[h].ambient + along_normal, vec3<f32>(0.0));
     let unlit = out.color;
     out.color = unlit * factor;
-    if DERIVATIVES {
+    if with_derivatives() {
         let in_camera = hypotheses[h].rotation * n;
         let d1 = corners[3u * face + 1u].normal - corners[3u * face].normal;
         let d2 = corners[3u * face + 2u].normal - corners[3u * face].normal;
-        out.along_1 *= factor;
-        out.along_2 *= factor;
+        out.along_second *= factor;
+        out.along_third *= factor;
         out.level *= factor;
         for (var k = 0u; k < 3u; k++) {
             if factor[k] > 0.0 {
                 // The normal turns by the part of the corners' difference across it.
                 let across = (light[k] - n * along_normal[k]) * smooth_normal.w;
-                out.along_1[k] += unlit[k] * dot(across, d1);
-                out.along_2[k] += unlit[k] * dot(across, d2);
+                out.along_second[k] += unlit[k] * dot(across, d1);
+                out.along_third[k] += unlit[k] * dot(across, d2);
                 out.turning[k] = cross(in_camera, hypotheses[h].camera_light[k]) * unlit[k];
             }
         }

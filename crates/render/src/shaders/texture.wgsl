@@ -1,4 +1,10 @@
 // Texture lookup: bilinear inside a level, linear between levels of a pyramid.
+#define_import_path prehend::texture
+
+#import prehend::params::params
+
+// 21 bits a channel.
+@group(0) @binding(6) var<storage, read> texels: array<vec2<u32>>;
 
 struct Texel {
     color: vec3<f32>,

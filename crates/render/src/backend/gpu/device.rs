@@ -2,60 +2,11 @@
 
 use std::sync::{Arc, Mutex};
 
+use rayon::prelude::*;
+
+use super::passes::{self, Pass, READ_ONLY, READ_WRITE};
 use super::shaders;
 use crate::backend::BackendError;
-
-/// A compute pass.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Pass {
-    /// Entry point of the shader module.
-    pub(super) entry: &'static str,
-    /// With or without the computation of derivatives.
-    pub(super) derivatives: bool,
-}
-
-const fn pass(entry: &'static str) -> Pass {
-    Pass { entry, derivatives: false }
-}
-
-pub(super) const PROJECT: Pass = pass("project");
-pub(super) const COUNT_FACES: Pass = pass("count_faces");
-pub(super) const SCAN_BINS: Pass = pass("scan_bins");
-pub(super) const SCATTER_FACES: Pass = pass("scatter_faces");
-pub(super) const RASTER: Pass = pass("raster");
-pub(super) const FIND_SEGMENTS: Pass = pass("find_segments");
-pub(super) const FIND_PIECES: Pass = pass("find_pieces");
-pub(super) const CONTOUR_VALUE: Pass = pass("contour_residuals");
-pub(super) const CONTOUR_DERIVATIVES: Pass = Pass { entry: "contour_residuals", derivatives: true };
-pub(super) const CONTOUR_PICTURE: Pass = pass("contour_picture");
-pub(super) const SOFTRAS_VALUE: Pass = pass("softras_residuals");
-pub(super) const SOFTRAS_DERIVATIVES: Pass = Pass { entry: "softras_residuals", derivatives: true };
-pub(super) const SOFTRAS_PICTURE: Pass = pass("softras_picture");
-pub(super) const TOTAL: Pass = pass("total");
-pub(super) const NEEDS: Pass = pass("needs");
-
-/// All of them.
-pub(super) const PASSES: [Pass; 15] = [
-    PROJECT,
-    COUNT_FACES,
-    SCAN_BINS,
-    SCATTER_FACES,
-    RASTER,
-    FIND_SEGMENTS,
-    FIND_PIECES,
-    CONTOUR_VALUE,
-    CONTOUR_DERIVATIVES,
-    CONTOUR_PICTURE,
-    SOFTRAS_VALUE,
-    SOFTRAS_DERIVATIVES,
-    SOFTRAS_PICTURE,
-    TOTAL,
-    NEEDS,
-];
-
-/// Bindings of group 0: the settings, then buffers that are only read, then buffers that are written too.
-pub(super) const READ_ONLY: std::ops::Range<u32> = 1..8;
-pub(super) const READ_WRITE: std::ops::Range<u32> = 8..17;
 
 /// A device, open and ready.
 pub(super) struct Device {
@@ -64,7 +15,7 @@ pub(super) struct Device {
     pub(super) queue: wgpu::Queue,
     pub(super) limits: wgpu::Limits,
     pub(super) layout: wgpu::BindGroupLayout,
-    pipelines: Vec<wgpu::ComputePipeline>,
+    pipelines: Vec<(Pass, wgpu::ComputePipeline)>,
     /// Why the device was lost, if it was.
     lost: Arc<Mutex<Option<String>>>,
 }
@@ -89,8 +40,12 @@ impl Device {
             ..Default::default()
         };
         let failed = |reason: String| BackendError::Device { device: name.clone(), reason };
-        let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
-            .map_err(|e| failed(e.to_string()))?;
+        let (opened, composed) = rayon::join(
+            || pollster::block_on(adapter.request_device(&descriptor)),
+            shaders::compose,
+        );
+        let (device, queue) = opened.map_err(|e| failed(e.to_string()))?;
+        let composed = composed.map_err(&failed)?;
         let lost = Arc::new(Mutex::new(None));
         let note = lost.clone();
         device.set_device_lost_callback(move |reason, message| {
@@ -100,7 +55,13 @@ impl Device {
         });
         // Errors outside of a scope, such as those of another thread's dropped buffers, must not abort the program.
         device.on_uncaptured_error(Arc::new(|error| log::warn!("graphics device: {error}")));
-        let (layout, pipelines) = watched(&device, || compile(&device)).map_err(failed)?;
+        let layout = watched(&device, || passes::layout(&device)).map_err(&failed)?;
+        // Most of the time goes to the driver's compiler, which takes one pipeline a thread. Each thread watches its own errors.
+        let compiled = composed.into_par_iter().map(|one| {
+            watched(&device, || passes::pipelines(&device, &layout, one)).map_err(&failed)
+        });
+        let compiled: Vec<_> = compiled.collect::<Result<_, _>>()?;
+        let pipelines = compiled.into_iter().flatten().collect();
         Ok(Self { name, device, queue, limits, layout, pipelines, lost })
     }
 
@@ -125,8 +86,9 @@ impl Device {
         BackendError::Device { device: self.name.clone(), reason: reason.into() }
     }
 
+    /// The pipeline of a pass; every pass has one.
     pub(super) fn pipeline(&self, pass: Pass) -> Option<&wgpu::ComputePipeline> {
-        PASSES.iter().position(|p| *p == pass).and_then(|i| self.pipelines.get(i))
+        self.pipelines.iter().find(|(other, _)| *other == pass).map(|(_, pipeline)| pipeline)
     }
 }
 
@@ -168,50 +130,4 @@ fn best_adapter(software: bool) -> Result<wgpu::Adapter, BackendError> {
             false => format!("only software adapters found ({})", found.join(", ")),
         })
     })
-}
-
-fn compile(device: &wgpu::Device) -> (wgpu::BindGroupLayout, Vec<wgpu::ComputePipeline>) {
-    let entry = |binding: u32| {
-        let ty = match binding {
-            b if READ_ONLY.contains(&b) => wgpu::BufferBindingType::Storage { read_only: true },
-            b if READ_WRITE.contains(&b) => wgpu::BufferBindingType::Storage { read_only: false },
-            _ => wgpu::BufferBindingType::Uniform,
-        };
-        wgpu::BindGroupLayoutEntry {
-            binding,
-            visibility: wgpu::ShaderStages::COMPUTE,
-            ty: wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None },
-            count: None,
-        }
-    };
-    let entries: Vec<_> = (0..READ_WRITE.end).map(entry).collect();
-    let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-        label: Some("prehend"),
-        entries: &entries,
-    });
-    let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-        label: Some("prehend"),
-        bind_group_layouts: &[Some(&layout)],
-        immediate_size: 0,
-    });
-    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-        label: Some("prehend"),
-        source: wgpu::ShaderSource::Wgsl(shaders::source().into()),
-    });
-    let pipeline = |pass: &Pass| {
-        device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: Some(pass.entry),
-            layout: Some(&pipeline_layout),
-            module: &module,
-            entry_point: Some(pass.entry),
-            compilation_options: wgpu::PipelineCompilationOptions {
-                constants: &[("DERIVATIVES", f64::from(u8::from(pass.derivatives)))],
-                // The shaders write before they read.
-                zero_initialize_workgroup_memory: false,
-            },
-            cache: None,
-        })
-    };
-    let pipelines = PASSES.iter().map(pipeline).collect();
-    (layout, pipelines)
 }

@@ -1,4 +1,4 @@
-//! The structs shared with the shaders, field by field as in `shaders/problem.wgsl` and `shaders/work.wgsl`.
+//! The structs shared with the shaders, field by field as in the module that declares each.
 //!
 //! Vectors of three take sixteen bytes there unless a scalar follows.
 
@@ -27,6 +27,9 @@ pub(super) const SOFT_CULL: u32 = 8;
 
 /// Pixels along a tile's side.
 pub(super) const TILE: usize = 8;
+
+/// Wider than any image \[px\].
+pub(super) const WHOLE_SIDE: u32 = 1 << 30;
 
 /// Columns of the sums of a hypothesis.
 pub(super) const SUM_COLOR: usize = 0;
@@ -82,6 +85,9 @@ pub(super) struct Params {
     pub(super) least_area: f32,
     pub(super) faces_per_pixel: u32,
     pub(super) soft_flags: u32,
+    pub(super) side: u32,
+    pub(super) parts: u32,
+    pub(super) squares: [u32; 2],
     pub(super) level: [[u32; 4]; LEVELS],
 }
 

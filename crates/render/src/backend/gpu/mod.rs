@@ -2,12 +2,15 @@
 //!
 //! All hypotheses of a call go through the same passes at once: project the vertices, sort the faces into tiles of 8 by 8
 //! pixels (count, scan, scatter), fill the z-buffer, find silhouette edges and cut them into visible pieces, and compute the
-//! residuals with one thread a pixel. Each tile's sums are added up in a fixed order, then those of each hypothesis; lists
-//! that atomics fill in any order are only searched for minima with unique keys, so that results repeat to the bit. Only the sums
-//! come back.
+//! residuals with one thread a pixel. Each tile's sums are added up in a fixed order, then those of each hypothesis, or of
+//! each square of the image by which sums are asked for. Lists that atomics fill in any order are only searched for minima
+//! with unique keys, so that results repeat to the bit. Only the sums come back.
 
+mod answer;
 mod device;
 mod layout;
+mod passes;
+mod readback;
 mod session;
 mod shaders;
 #[cfg(test)]

@@ -1,27 +1,21 @@
 //! A problem on a graphics device.
 
 use std::sync::Arc;
-use std::sync::mpsc::{RecvTimeoutError, channel};
-use std::time::{Duration, Instant};
 
-use super::device::{
-    CONTOUR_DERIVATIVES, CONTOUR_PICTURE, CONTOUR_VALUE, COUNT_FACES, Device, FIND_PIECES,
-    FIND_SEGMENTS, NEEDS, PROJECT, Pass, RASTER, SCAN_BINS, SCATTER_FACES, SOFTRAS_DERIVATIVES,
-    SOFTRAS_PICTURE, SOFTRAS_VALUE, TOTAL,
+use super::answer;
+use super::device::Device;
+use super::layout::{PICTURE_COLUMNS, Params, SUM_COLUMNS, Usage};
+use super::passes::{
+    CONTOUR_DERIVATIVES, CONTOUR_PICTURE, CONTOUR_VALUE, COUNT_FACES, FIND_PIECES, FIND_SEGMENTS,
+    NEEDS, PROJECT, Pass, RASTER, SCAN_BINS, SCATTER_FACES, SOFTRAS_DERIVATIVES, SOFTRAS_PICTURE,
+    SOFTRAS_VALUE, TOTAL,
 };
-use super::layout::{
-    PICTURE_COLUMNS, Params, SUM_COLOR, SUM_COLUMNS, SUM_CONTOUR, SUM_COVERED, SUM_DEPTH,
-    SUM_GRADIENT, SUM_HESSIAN, SUM_HIDDEN, SUM_MASK, SUM_MISSED, SUM_WITH_DEPTH, Usage,
-};
+use super::readback::receive;
 use super::upload;
 use super::work::{self, BUDGET, Capacity, Work};
 use crate::backend::{BackendError, Hypothesis, PoseProblem, Session};
-use crate::image::{DepthImage, RgbImage};
 use crate::mode::Mode;
-use crate::pose_loss::{Counts, Linearized, Loss, PoseImage, Tile, unpacked};
-
-/// How long a call back may take once the device is done.
-const PATIENCE: Duration = Duration::from_secs(1);
+use crate::pose_loss::{Linearized, Loss, PoseImage, Tile};
 
 /// What a call wants to know.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -67,7 +61,7 @@ impl GpuSession {
         let capacity = Capacity::guess(&params);
         // Fails early where not even one hypothesis fits.
         work::batch(&device, &params, &capacity, BUDGET, 1)?;
-        check_dispatch(&device, &params)?;
+        work::check_dispatch(&device, &params)?;
         let (positions, faces) = (upload::positions(model), upload::faces(model));
         let (corners, edges) = (upload::corners(model), upload::edges(model));
         let (texels, target) = (upload::texels(model), upload::target(&problem.target));
@@ -110,18 +104,24 @@ impl GpuSession {
         Ok(Self { device, problem, params, settings, model, capacity, budget: BUDGET, work: None })
     }
 
-    /// The sums of each hypothesis.
+    /// Numbers that come back of each hypothesis.
+    fn sum_columns(&self) -> usize {
+        (self.params.squares[0] * self.params.squares[1]) as usize * SUM_COLUMNS
+    }
+
+    /// The sums of each hypothesis, square by square.
     fn sums(
         &mut self,
         hypotheses: &[Hypothesis],
         wanted: Wanted,
     ) -> Result<Vec<f32>, BackendError> {
-        let mut sums = Vec::with_capacity(hypotheses.len() * SUM_COLUMNS);
+        let columns = self.sum_columns();
+        let mut sums = Vec::with_capacity(hypotheses.len() * columns);
         let mut rest = hypotheses;
         while !rest.is_empty() {
             let count = self.prepare(rest.len())?;
             sums.extend(self.attempt(&rest[..count], wanted)?.unwrap_or_default());
-            rest = &hypotheses[sums.len() / SUM_COLUMNS..];
+            rest = &hypotheses[sums.len() / columns..];
         }
         Ok(sums)
     }
@@ -129,8 +129,8 @@ impl GpuSession {
     /// Makes sure that there are buffers, and says for how many of `wanted` hypotheses.
     fn prepare(&mut self, wanted: usize) -> Result<usize, BackendError> {
         let count = work::batch(&self.device, &self.params, &self.capacity, self.budget, wanted)?;
-        let fits = |w: &Work| w.hypotheses >= count && w.capacity == self.capacity;
-        if !self.work.as_ref().is_some_and(fits) {
+        let serves = |work: &Work| work.serves(&self.params, &self.capacity, count);
+        if !self.work.as_ref().is_some_and(serves) {
             // The old buffers go first: the new ones may need their memory.
             self.work = None;
             let (device, model) = (&self.device, &self.model);
@@ -176,7 +176,7 @@ impl GpuSession {
             Wanted::Picture => {
                 (self.params.size[0] * self.params.size[1]) as usize * PICTURE_COLUMNS
             }
-            _ => hypotheses.len() * SUM_COLUMNS,
+            _ => hypotheses.len() * self.sum_columns(),
         };
         let size = (size_of::<Usage>() + values * size_of::<f32>()) as u64;
         let queue = &self.device.queue;
@@ -232,32 +232,11 @@ impl GpuSession {
             run(pixels, across, down);
             match wanted {
                 Wanted::Picture => run(NEEDS, 1, 1),
-                _ => run(TOTAL, 1, 1),
+                _ => run(TOTAL, p.squares[0], p.squares[1]),
             }
         }
         encoder.copy_buffer_to_buffer(&work.results, 0, &work.readback, 0, size);
         encoder.finish()
-    }
-
-    fn loss(&self, sums: &[f32]) -> Loss {
-        let count = |i: usize| sums[i] as usize;
-        let counts = Counts {
-            covered: count(SUM_COVERED),
-            contour: count(SUM_CONTOUR),
-            hidden: count(SUM_HIDDEN),
-            missed: count(SUM_MISSED),
-            depth: count(SUM_WITH_DEPTH),
-        };
-        let shares = [SUM_COLOR, SUM_MASK, SUM_DEPTH].map(|i| f64::from(sums[i]));
-        Loss::new(shares, counts, &self.problem.target)
-    }
-
-    fn linearized(&self, sums: &[f32]) -> Linearized {
-        // In the order of the processor's own sums.
-        const { assert!(SUM_HESSIAN == SUM_GRADIENT + 6) };
-        let entries = std::array::from_fn(|i| f64::from(sums[SUM_GRADIENT + i]));
-        let (gradient, hessian) = unpacked(&entries, self.problem.target.normalization);
-        Linearized { loss: self.loss(sums), gradient, hessian }
     }
 }
 
@@ -268,21 +247,29 @@ impl Session for GpuSession {
 
     fn evaluate(&mut self, hypotheses: &[Hypothesis]) -> Result<Vec<Loss>, BackendError> {
         let sums = self.sums(hypotheses, Wanted::Value)?;
-        Ok(sums.chunks_exact(SUM_COLUMNS).map(|s| self.loss(s)).collect())
+        let target = &self.problem.target;
+        Ok(sums.chunks_exact(SUM_COLUMNS).map(|s| answer::loss(s, target)).collect())
     }
 
     fn linearize(&mut self, hypotheses: &[Hypothesis]) -> Result<Vec<Linearized>, BackendError> {
         let sums = self.sums(hypotheses, Wanted::Derivatives)?;
-        Ok(sums.chunks_exact(SUM_COLUMNS).map(|s| self.linearized(s)).collect())
+        let target = &self.problem.target;
+        Ok(sums.chunks_exact(SUM_COLUMNS).map(|s| answer::linearized(s, target)).collect())
     }
 
     fn linearize_tiles(
         &mut self,
-        _hypotheses: &[Hypothesis],
-        _side: usize,
+        hypotheses: &[Hypothesis],
+        side: usize,
     ) -> Result<Vec<Vec<Tile>>, BackendError> {
-        let device = self.device.name.clone();
-        Err(BackendError::Unsupported { device, what: "sums by tiles" })
+        upload::set_squares(&mut self.params, side);
+        let (squares, columns) = (self.params.squares, self.sum_columns());
+        let sums = work::check_dispatch(&self.device, &self.params)
+            .and_then(|()| self.sums(hypotheses, Wanted::Derivatives));
+        // The other calls ask for one square, even after an error.
+        upload::set_squares(&mut self.params, usize::MAX);
+        let (sums, target) = (sums?, &self.problem.target);
+        Ok(sums.chunks_exact(columns).map(|s| answer::tiles(s, squares, target)).collect())
     }
 
     fn render(&mut self, hypothesis: &Hypothesis) -> Result<PoseImage, BackendError> {
@@ -292,75 +279,6 @@ impl Session for GpuSession {
                 break values;
             }
         };
-        let [width, height] = self.params.size.map(|v| v as usize);
-        let mut picture = PoseImage {
-            color: RgbImage::filled(width, height, [0.0; 3]),
-            coverage: values.iter().skip(3).step_by(PICTURE_COLUMNS).copied().collect(),
-            depth: DepthImage::filled(width, height, 0.0),
-            normal: values.chunks_exact(PICTURE_COLUMNS).map(|v| [v[5], v[6], v[7]]).collect(),
-            face: values.chunks_exact(PICTURE_COLUMNS).map(|v| face(v[8])).collect(),
-        };
-        let pixels = picture.color.pixels_mut().iter_mut().zip(picture.depth.pixels_mut());
-        for ((color, depth), v) in pixels.zip(values.chunks_exact(PICTURE_COLUMNS)) {
-            *color = [v[0], v[1], v[2]];
-            *depth = v[4];
-        }
-        Ok(picture)
+        Ok(answer::picture(self.params.size, &values))
     }
-}
-
-/// The face of a picture's last column.
-fn face(column: f32) -> Option<u32> {
-    (column > 0.0).then(|| column as u32 - 1)
-}
-
-/// The dispatches of a pass must not be larger than the device allows.
-fn check_dispatch(device: &Device, params: &Params) -> Result<(), BackendError> {
-    let groups = [
-        params.vertices.div_ceil(256),
-        params.faces.div_ceil(64),
-        params.edges.div_ceil(64),
-        params.tiles[0],
-        params.tiles[1],
-    ];
-    let limit = device.limits.max_compute_workgroups_per_dimension;
-    match groups.into_iter().max() {
-        Some(most) if most > limit => Err(BackendError::TooLarge {
-            device: device.name.clone(),
-            what: "a dispatch in workgroups",
-            needed: most.into(),
-            limit: limit.into(),
-        }),
-        _ => Ok(()),
-    }
-}
-
-/// Waits for a buffer's bytes.
-fn receive(device: &Device, buffer: &wgpu::Buffer, size: u64) -> Result<Vec<u8>, String> {
-    let (sender, receiver) = channel();
-    buffer.map_async(wgpu::MapMode::Read, ..size, move |result| {
-        // Nobody listens any more if the device failed meanwhile.
-        let _ = sender.send(result);
-    });
-    let poll =
-        || device.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| e.to_string());
-    poll()?;
-    let done = Instant::now();
-    loop {
-        // The call may still be on its way in another thread, which polled for a session of its own.
-        match receiver.recv_timeout(PATIENCE / 100) {
-            Ok(mapped) => break mapped.map_err(|e| e.to_string())?,
-            Err(RecvTimeoutError::Disconnected) => return Err("no answer".into()),
-            // A lost device may never call back.
-            Err(RecvTimeoutError::Timeout) if device.is_lost() || done.elapsed() > PATIENCE => {
-                return Err("no answer".into());
-            }
-            Err(RecvTimeoutError::Timeout) => {
-                poll()?;
-            }
-        }
-    }
-    let bytes = buffer.get_mapped_range(..size).map_err(|e| e.to_string())?.to_vec();
-    buffer.unmap();
-    Ok(bytes)
 }

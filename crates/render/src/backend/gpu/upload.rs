@@ -5,7 +5,7 @@ use prehend_geometry::RobustKernel;
 use super::layout::{
     ALBEDO_CORNERS, ALBEDO_TEXTURE, ALBEDO_UNIFORM, Corner, Edge, Hypothesis, KERNEL_CAUCHY,
     KERNEL_GEMAN_MCCLURE, KERNEL_HUBER, KERNEL_SQUARED, KERNEL_TUKEY, LEVELS, Params, SOFT_CLIP,
-    SOFT_CULL, SOFT_MODE, SOFT_PERSPECTIVE, TILE, TargetPixel,
+    SOFT_CULL, SOFT_MODE, SOFT_PERSPECTIVE, TILE, TargetPixel, WHOLE_SIDE,
 };
 use crate::backend::{self, PoseProblem};
 use crate::camera::Camera;
@@ -102,7 +102,23 @@ pub(super) fn params(problem: &PoseProblem) -> Option<Params> {
     set_albedo(&mut params, model)?;
     set_mode(&mut params, &loss.mode, camera);
     set_loss(&mut params, &loss.options, target.depth.is_some());
+    set_squares(&mut params, usize::MAX);
     Some(params)
+}
+
+/// Asks for sums by squares of `side` pixels, or of the whole image if that is no larger.
+pub(super) fn set_squares(params: &mut Params, side: usize) {
+    let side = side.clamp(1, WHOLE_SIDE as usize) as u32;
+    if params.size.iter().all(|size| *size <= side) {
+        (params.side, params.parts, params.squares) = (WHOLE_SIDE, 1, [1; 2]);
+        return;
+    }
+    let tile = TILE as u32;
+    // Tiles begin at multiples of this within a square: one that ends a square by so much reaches the farthest.
+    let least = tile.min(1 << side.trailing_zeros());
+    params.side = side;
+    params.parts = 1 + (tile - least).div_ceil(side);
+    params.squares = params.size.map(|size| size.div_ceil(side));
 }
 
 pub(super) fn bounds(region: &Region) -> [u32; 4] {

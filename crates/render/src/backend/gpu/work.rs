@@ -1,10 +1,11 @@
 //! Buffers that the passes share, sized for a number of hypotheses.
 
-use super::device::{Device, READ_ONLY, READ_WRITE};
+use super::device::Device;
 use super::layout::{
     BIN, ENTRY, Hypothesis, PICTURE_COLUMNS, PIECE, Params, SCREEN, SEGMENT, SUM_COLUMNS, TALLY,
     TILE, Usage, VISIBLE,
 };
+use super::passes::{READ_ONLY, READ_WRITE};
 use crate::backend::BackendError;
 
 /// Memory that a session's work buffers may take together \[bytes\]. More hypotheses are worked off in turns.
@@ -58,7 +59,10 @@ impl Capacity {
 fn sizes(params: &Params, capacity: &Capacity, hypotheses: usize) -> [u64; 9] {
     let [width, height] = params.size.map(|v| v as usize);
     let tiles = width.div_ceil(TILE) * height.div_ceil(TILE);
-    let values = (hypotheses * SUM_COLUMNS).max(width * height * PICTURE_COLUMNS);
+    let parts = params.parts as usize * params.parts as usize;
+    let [across, down] = params.squares.map(|v| v as usize);
+    let sums = hypotheses * across * down * SUM_COLUMNS;
+    let values = sums.max(width * height * PICTURE_COLUMNS);
     [
         hypotheses * params.vertices as usize * SCREEN,
         hypotheses * TALLY,
@@ -67,7 +71,7 @@ fn sizes(params: &Params, capacity: &Capacity, hypotheses: usize) -> [u64; 9] {
         hypotheses * width * height * VISIBLE,
         hypotheses * capacity.segments * SEGMENT,
         hypotheses * capacity.pieces * PIECE,
-        hypotheses * tiles * SUM_COLUMNS * size_of::<f32>(),
+        hypotheses * tiles * parts * SUM_COLUMNS * size_of::<f32>(),
         size_of::<Usage>() + values * size_of::<f32>(),
     ]
     .map(|size| size.max(16) as u64)
@@ -119,10 +123,38 @@ pub(super) fn batch(
     Ok(wanted.div_ceil(wanted.div_ceil(count.max(1))))
 }
 
+/// The dispatches of a pass must not be larger than the device allows.
+///
+/// # Errors
+/// When one is.
+pub(super) fn check_dispatch(device: &Device, params: &Params) -> Result<(), BackendError> {
+    let groups = [
+        params.vertices.div_ceil(256),
+        params.faces.div_ceil(64),
+        params.edges.div_ceil(64),
+        params.tiles[0],
+        params.tiles[1],
+        params.squares[0],
+        params.squares[1],
+    ];
+    let limit = device.limits.max_compute_workgroups_per_dimension;
+    match groups.into_iter().max() {
+        Some(most) if most > limit => Err(BackendError::TooLarge {
+            device: device.name.clone(),
+            what: "a dispatch in workgroups",
+            needed: most.into(),
+            limit: limit.into(),
+        }),
+        _ => Ok(()),
+    }
+}
+
 /// Buffers for up to `hypotheses` hypotheses, bound together with what the session uploaded.
 pub(super) struct Work {
     pub(super) hypotheses: usize,
     pub(super) capacity: Capacity,
+    /// Of the written buffers \[bytes\].
+    sizes: [u64; 9],
     pub(super) poses: wgpu::Buffer,
     pub(super) tallies: wgpu::Buffer,
     pub(super) bins: wgpu::Buffer,
@@ -177,7 +209,15 @@ impl Work {
             entries: &entries,
         });
         let [tallies, bins, results] = [1, 2, 8].map(|i: usize| written[i].clone());
-        Self { hypotheses, capacity, poses, tallies, bins, results, readback, bind_group }
+        Self { hypotheses, capacity, sizes, poses, tallies, bins, results, readback, bind_group }
+    }
+
+    /// Whether it serves `count` hypotheses with these settings.
+    pub(super) fn serves(&self, params: &Params, capacity: &Capacity, count: usize) -> bool {
+        let needed = sizes(params, capacity, count);
+        self.hypotheses >= count
+            && self.capacity == *capacity
+            && self.sizes.iter().zip(needed).all(|(size, needed)| *size >= needed)
     }
 
     /// Entries of all hypotheses together.

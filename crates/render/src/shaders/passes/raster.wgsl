@@ -1,5 +1,13 @@
 // The hard z-buffer: one workgroup a tile, one thread a pixel.
 
+#import prehend::bins::{bins, entries, tile_entries}
+#import prehend::mesh::{NONE, faces}
+#import prehend::params::params
+#import prehend::screen::{face_screen, signed_area}
+#import prehend::tallies::region_of
+#import prehend::tiles::{TILE_PIXELS, pixel_index, tile_index, touches_tile}
+#import prehend::z_buffer::visible
+
 struct RasterFace {
     // Of each side its first corner and its direction, turned so that the inside is positive.
     sides: mat3x4<f32>,

@@ -1,7 +1,5 @@
-// What a session uploads: the settings, the hypotheses, the model and the target. The structs mirror
-// `backend/gpu/layout.rs`; a test compares sizes and offsets.
-
-const NONE: u32 = 0xffffffffu;
+// The settings of a session and of a call. The struct mirrors `backend/gpu/layout.rs`; a test compares sizes and offsets.
+#define_import_path prehend::params
 
 // How the unlit colors are stored.
 const ALBEDO_UNIFORM: u32 = 0u;
@@ -20,6 +18,9 @@ const SOFT_MODE: u32 = 1u;
 const SOFT_PERSPECTIVE: u32 = 2u;
 const SOFT_CLIP: u32 = 4u;
 const SOFT_CULL: u32 = 8u;
+
+// `Params.faces_per_pixel` is no larger.
+const MOST_FACES: u32 = 64u;
 
 struct Params {
     // Columns and rows of the image, and of the grid of tiles.
@@ -66,60 +67,18 @@ struct Params {
     least_area: f32,
     faces_per_pixel: u32,
     soft_flags: u32,
+    // Sums are asked for by squares of the image, so wide [px]; so many columns and rows of them; a tile lies in at most so many
+    // across, and as many down. One square for the whole image is wider than any.
+    side: u32,
+    parts: u32,
+    squares: vec2<u32>,
     // Of each level of the texture: first texel, columns, rows.
     level: array<vec4<u32>, 24>,
 }
 
-struct Hypothesis {
-    // Rotation from the mesh into the camera frame, by columns.
-    rotation: mat3x3<f32>,
-    // The model's center in the camera frame [m], about which twists turn.
-    center: vec3<f32>,
-    // Whether everything is finite.
-    alive: u32,
-    // Directional light of each channel in the camera frame, and in the mesh frame.
-    camera_light: mat3x3<f32>,
-    object_light: mat3x3<f32>,
-    ambient: vec3<f32>,
-    // No channel depends on the normal.
-    flat_light: u32,
-    offset: vec3<f32>,
-    // Pyramid level of the texture, and its derivative by the center's Z.
-    level: f32,
-    level_dz: f32,
-    // The projected center: its pixel, which screen positions are relative to, and the rest [px]. Zero in the contour mode,
-    // where screen positions are those of the image.
-    image_center: vec4<f32>,
-}
-
-struct Corner {
-    normal: vec3<f32>,
-    // Color, or texture coordinates.
-    paint: vec3<f32>,
-}
-
-struct Edge {
-    vertices: vec2<u32>,
-    face: u32,
-    other: u32,
-    corner: u32,
-    other_corner: u32,
-}
-
-struct TargetPixel {
-    color: vec3<f32>,
-    coverage: f32,
-    // Zero where there is none.
-    depth: f32,
-    occluder: f32,
-}
-
 @group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<storage, read> hypotheses: array<Hypothesis>;
-@group(0) @binding(2) var<storage, read> positions: array<vec4<f32>>;
-@group(0) @binding(3) var<storage, read> faces: array<vec4<u32>>;
-@group(0) @binding(4) var<storage, read> corners: array<Corner>;
-@group(0) @binding(5) var<storage, read> edges: array<Edge>;
-// 21 bits a channel.
-@group(0) @binding(6) var<storage, read> texels: array<vec2<u32>>;
-@group(0) @binding(7) var<storage, read> goal: array<TargetPixel>;
+
+// Whether a flag of the SoftRas mode is set.
+fn soft_flag(flag: u32) -> bool {
+    return (params.soft_flags & flag) != 0u;
+}

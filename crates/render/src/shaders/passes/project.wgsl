@@ -1,5 +1,11 @@
 // Transforms and projects the vertices, and finds the pixels that may be covered.
 
+#import prehend::hypotheses::hypotheses
+#import prehend::mesh::{camera_position, positions}
+#import prehend::params::{SOFT_MODE, params, soft_flag}
+#import prehend::screen::screen
+#import prehend::tallies::{FAR_COLUMN, tallies}
+
 // Geometry nearer to the camera plane than this is not drawn [m].
 const NEAR: f32 = 1e-3;
 
@@ -7,11 +13,6 @@ var<workgroup> box_left: atomic<u32>;
 var<workgroup> box_top: atomic<u32>;
 var<workgroup> box_right: atomic<u32>;
 var<workgroup> box_bottom: atomic<u32>;
-
-// A vertex in the camera frame [m].
-fn camera_position(h: u32, vertex: u32) -> vec3<f32> {
-    return hypotheses[h].rotation * positions[vertex].xyz + hypotheses[h].center;
-}
 
 @compute @workgroup_size(256)
 fn project(
@@ -33,7 +34,7 @@ fn project(
         if hypotheses[h].alive != 0u && p.z > NEAR {
             let w = 1.0 / p.z;
             let center = hypotheses[h].center;
-            if (params.soft_flags & SOFT_MODE) != 0u && center.z > NEAR {
+            if soft_flag(SOFT_MODE) && center.z > NEAR {
                 // Barycentric coordinates of narrow faces magnify rounding, so these are relative to the center.
                 let ratio = center.xy / center.z;
                 let arm = hypotheses[h].rotation * positions[vertex].xyz;
@@ -60,30 +61,4 @@ fn project(
         atomicMax(&tallies[h].right, atomicLoad(&box_right));
         atomicMax(&tallies[h].bottom, atomicLoad(&box_bottom));
     }
-}
-
-fn face_screen(h: u32, face: u32) -> mat3x3<f32> {
-    let at = h * params.vertices;
-    let ids = faces[face];
-    return mat3x3<f32>(screen[at + ids.x].xyz, screen[at + ids.y].xyz, screen[at + ids.z].xyz);
-}
-
-// Twice the signed area of a screen triangle [px²]; negative where its outside is seen.
-fn signed_area(c: mat3x3<f32>) -> f32 {
-    return (c[1].x - c[0].x) * (c[2].y - c[0].y) - (c[1].y - c[0].y) * (c[2].x - c[0].x);
-}
-
-// 1 seen from outside, -1 seen from inside, 0 not drawn.
-fn facing_of(c: mat3x3<f32>) -> i32 {
-    if c[0].z == 0.0 || c[1].z == 0.0 || c[2].z == 0.0 {
-        return 0;
-    }
-    let area = signed_area(c);
-    if area < 0.0 {
-        return 1;
-    }
-    if area > 0.0 && params.closed == 0u {
-        return -1;
-    }
-    return 0;
 }

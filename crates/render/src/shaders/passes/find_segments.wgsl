@@ -1,5 +1,11 @@
 // Finds silhouette edges: exactly one face is drawn, or one is seen from outside and the other from inside.
 
+#import prehend::mesh::{NONE, edges}
+#import prehend::params::params
+#import prehend::screen::{face_screen, facing_of, screen}
+#import prehend::segments::{Segment, segments}
+#import prehend::tallies::tallies
+
 @compute @workgroup_size(64)
 fn find_segments(@builtin(global_invocation_id) id: vec3<u32>) {
     if id.x >= params.edges {
@@ -39,29 +45,4 @@ fn find_segments(@builtin(global_invocation_id) id: vec3<u32>) {
     if slot < params.segment_capacity {
         segments[h * params.segment_capacity + slot] = out;
     }
-}
-
-fn segment_count(h: u32) -> u32 {
-    return min(atomicLoad(&tallies[h].segments), params.segment_capacity);
-}
-
-// The number of surface layers at an image point: the winding number of the silhouette about it.
-fn layers_at(h: u32, p: vec2<f32>) -> f32 {
-    let first = h * params.segment_capacity;
-    let end = first + segment_count(h);
-    var layers = 0.0;
-    for (var i = first; i < end; i++) {
-        let a = segments[i].a;
-        let b = segments[i].b;
-        // Half-open in y, so that a shared vertex counts once.
-        let up = a.y <= p.y;
-        if up == (b.y <= p.y) {
-            continue;
-        }
-        let crossing = a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x);
-        if crossing > p.x {
-            layers += select(-segments[i].layers, segments[i].layers, up);
-        }
-    }
-    return layers;
 }

@@ -1,0 +1,115 @@
+//! The compute passes, and their pipelines.
+
+use std::borrow::Cow;
+
+use super::shaders::{Composed, DERIVATIVES};
+
+/// A compute pass.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Pass {
+    /// Entry point of its shader module.
+    pub(super) entry: &'static str,
+    /// With or without the computation of derivatives.
+    pub(super) derivatives: bool,
+}
+
+const fn pass(entry: &'static str) -> Pass {
+    Pass { entry, derivatives: false }
+}
+
+pub(super) const PROJECT: Pass = pass("project");
+pub(super) const COUNT_FACES: Pass = pass("count_faces");
+pub(super) const SCAN_BINS: Pass = pass("scan_bins");
+pub(super) const SCATTER_FACES: Pass = pass("scatter_faces");
+pub(super) const RASTER: Pass = pass("raster");
+pub(super) const FIND_SEGMENTS: Pass = pass("find_segments");
+pub(super) const FIND_PIECES: Pass = pass("find_pieces");
+pub(super) const CONTOUR_VALUE: Pass = pass("contour_residuals");
+pub(super) const CONTOUR_DERIVATIVES: Pass = Pass { entry: "contour_residuals", derivatives: true };
+pub(super) const CONTOUR_PICTURE: Pass = pass("contour_picture");
+pub(super) const SOFTRAS_VALUE: Pass = pass("softras_residuals");
+pub(super) const SOFTRAS_DERIVATIVES: Pass = Pass { entry: "softras_residuals", derivatives: true };
+pub(super) const SOFTRAS_PICTURE: Pass = pass("softras_picture");
+pub(super) const TOTAL: Pass = pass("total");
+pub(super) const NEEDS: Pass = pass("needs");
+
+/// All of them.
+pub(super) const PASSES: [Pass; 15] = [
+    PROJECT,
+    COUNT_FACES,
+    SCAN_BINS,
+    SCATTER_FACES,
+    RASTER,
+    FIND_SEGMENTS,
+    FIND_PIECES,
+    CONTOUR_VALUE,
+    CONTOUR_DERIVATIVES,
+    CONTOUR_PICTURE,
+    SOFTRAS_VALUE,
+    SOFTRAS_DERIVATIVES,
+    SOFTRAS_PICTURE,
+    TOTAL,
+    NEEDS,
+];
+
+/// Bindings of group 0: the settings, then buffers that are only read, then buffers that are written too.
+pub(super) const READ_ONLY: std::ops::Range<u32> = 1..8;
+pub(super) const READ_WRITE: std::ops::Range<u32> = 8..17;
+
+/// The layout that all passes share, though few of them use every binding.
+pub(super) fn layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
+    let entry = |binding: u32| {
+        let ty = match binding {
+            b if READ_ONLY.contains(&b) => wgpu::BufferBindingType::Storage { read_only: true },
+            b if READ_WRITE.contains(&b) => wgpu::BufferBindingType::Storage { read_only: false },
+            _ => wgpu::BufferBindingType::Uniform,
+        };
+        wgpu::BindGroupLayoutEntry {
+            binding,
+            visibility: wgpu::ShaderStages::COMPUTE,
+            ty: wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None },
+            count: None,
+        }
+    };
+    let entries: Vec<_> = (0..READ_WRITE.end).map(entry).collect();
+    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+        label: Some("prehend"),
+        entries: &entries,
+    })
+}
+
+/// The pipelines of all passes of one entry point, which share its module.
+pub(super) fn pipelines(
+    device: &wgpu::Device,
+    layout: &wgpu::BindGroupLayout,
+    Composed { entry, module }: Composed,
+) -> Vec<(Pass, wgpu::ComputePipeline)> {
+    let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: Some("prehend"),
+        bind_group_layouts: &[Some(layout)],
+        immediate_size: 0,
+    });
+    // A constant that the module lacks would be an error.
+    let constants = module.overrides.len();
+    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+        label: Some(entry),
+        source: wgpu::ShaderSource::Naga(Cow::Owned(module)),
+    });
+    let pipeline = |pass: &Pass| {
+        let derivatives = [(DERIVATIVES, f64::from(u8::from(pass.derivatives)))];
+        let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some(entry),
+            layout: Some(&layout),
+            module: &module,
+            entry_point: Some(entry),
+            compilation_options: wgpu::PipelineCompilationOptions {
+                constants: derivatives.get(..constants).unwrap_or(&derivatives),
+                // The shaders write before they read.
+                zero_initialize_workgroup_memory: false,
+            },
+            cache: None,
+        });
+        (*pass, pipeline)
+    };
+    PASSES.iter().filter(|pass| pass.entry == entry).map(pipeline).collect()
+}

@@ -1,0 +1,9 @@
+// Notes what the work buffers would have needed for a picture, which is not added up.
+
+#import prehend::results::note_needs
+
+// For pictures, which are not added up.
+@compute @workgroup_size(1)
+fn needs(@builtin(workgroup_id) group: vec3<u32>) {
+    note_needs(group.z);
+}
