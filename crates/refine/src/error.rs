@@ -1,7 +1,6 @@
 //! Why a refinement could not be done.
 
 use prehend_geometry::robot::RobotError;
-use prehend_render::BackendError;
 use thiserror::Error;
 
 /// Why a pose could not be refined.
@@ -66,9 +65,6 @@ pub enum RefineError {
         /// What is wrong with it.
         problem: String,
     },
-    /// The device that renders cannot be used.
-    #[error(transparent)]
-    Backend(#[from] BackendError),
     /// Kinematics failed.
     #[error(transparent)]
     Robot(#[from] RobotError),

@@ -69,8 +69,8 @@ pub struct RenderingFactor {
     object: Arc<Object>,
     target: Arc<Target>,
     loss: PoseLoss,
-    /// The same on a device, if there is one beside the processor.
-    device: Option<Mutex<Box<dyn Session>>>,
+    /// The same on a device, if there is one beside the processor; gone after its first failure.
+    device: Mutex<Option<Box<dyn Session>>>,
     /// Nats per unit of the renderer's loss.
     scale: f64,
     light_ridge: f64,
@@ -99,12 +99,12 @@ impl RenderingFactor {
         let contour = ContourOptions { half_width: HALF_WIDTH, ..ContourOptions::default() };
         let (object, target) = (Arc::clone(frame.object()), image.target);
         let loss = PoseLoss::new(Mode::Contour(contour), options);
-        let prepare = |backend: &Arc<dyn Backend>| {
+        let session = |backend: &Arc<dyn Backend>| {
             let (model, target) = (Arc::clone(&object.model), Arc::clone(&target));
-            backend.prepare(&PoseProblem { model, target, loss }).map(Mutex::new)
+            backend.prepare(&PoseProblem { model, target, loss }).map_err(warn).ok()
         };
         Ok(Self {
-            device: frame.backend().map(prepare).transpose()?,
+            device: Mutex::new(frame.backend().and_then(session)),
             object,
             target,
             loss,
@@ -154,8 +154,12 @@ impl RenderingFactor {
         &self,
         ask: impl FnOnce(&mut dyn Session) -> Result<T, BackendError>,
     ) -> Option<T> {
-        let mut session = self.device.as_ref()?.lock().unwrap_or_else(PoisonError::into_inner);
-        ask(session.as_mut()).map_err(|error| log::warn!("{error}; continuing on the CPU")).ok()
+        let mut session = self.device.lock().unwrap_or_else(PoisonError::into_inner);
+        let answer = ask(session.as_mut()?.as_mut()).map_err(warn).ok();
+        if answer.is_none() {
+            *session = None;
+        }
+        answer
     }
 
     /// The cost of each hypothesis.
@@ -214,6 +218,10 @@ impl RenderingFactor {
         sums.add_to(equations);
         cost
     }
+}
+
+fn warn(error: BackendError) {
+    log::warn!("{error}; continuing on the CPU");
 }
 
 /// Where the object is to a camera without calibration errors that sees it as the true one does.

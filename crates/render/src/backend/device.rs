@@ -26,7 +26,7 @@ impl Device {
         Self::NAMES[self as usize]
     }
 
-    /// The device, open and ready. One of graphics falls back on the processor where it fails: [`WithFallback`](super::WithFallback).
+    /// The device, open and ready. [`WithFallback`](super::WithFallback) goes on with the processor where it fails.
     ///
     /// Opening a graphics device and compiling its shaders takes some tenths of a second: call this once.
     ///
@@ -58,7 +58,7 @@ impl std::str::FromStr for Device {
 
 #[cfg(feature = "gpu")]
 fn gpu() -> Result<Arc<dyn Backend>, BackendError> {
-    use super::{Gpu, WithFallback};
+    use super::Gpu;
 
     let gpu = Gpu::new().or_else(|error| match error {
         BackendError::NoDevice(_) => {
@@ -68,7 +68,7 @@ fn gpu() -> Result<Arc<dyn Backend>, BackendError> {
         }
         error => Err(error),
     })?;
-    Ok(Arc::new(WithFallback(gpu)))
+    Ok(Arc::new(gpu))
 }
 
 #[cfg(not(feature = "gpu"))]
@@ -78,10 +78,10 @@ fn gpu() -> Result<Arc<dyn Backend>, BackendError> {
 
 #[cfg(feature = "gpu")]
 fn hardware() -> Option<Arc<dyn Backend>> {
-    use super::{Gpu, WithFallback};
+    use super::Gpu;
 
     match Gpu::new() {
-        Ok(gpu) => return Some(Arc::new(WithFallback(gpu))),
+        Ok(gpu) => return Some(Arc::new(gpu)),
         Err(BackendError::NoDevice(reason)) => log::debug!("no graphics device: {reason}"),
         Err(error) => log::warn!("{error}; continuing on the CPU"),
     }

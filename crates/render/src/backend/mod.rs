@@ -51,6 +51,7 @@ pub struct Hypothesis {
 /// use prehend_geometry::shapes::cuboid;
 /// use prehend_render::{
 ///     Camera, Device, Hypothesis, Light, Mask, PoseLoss, PoseProblem, RenderModel, RgbImage, Target,
+///     WithFallback,
 /// };
 ///
 /// let camera = Camera { fx: 60.0, fy: 60.0, cx: 31.5, cy: 23.5, width: 64, height: 48 };
@@ -60,7 +61,7 @@ pub struct Hypothesis {
 ///     target: Arc::new(Target::new(camera, &image, &mask)?),
 ///     loss: PoseLoss::default(),
 /// };
-/// let mut session = Device::Auto.open()?.prepare(&problem)?;
+/// let mut session = WithFallback(Device::Auto.open()?).prepare(&problem)?;
 /// let hypotheses: Vec<Hypothesis> = (0..100)
 ///     .map(|i| Hypothesis {
 ///         t_cam_object: Isometry3::translation(0.0, 0.0, 0.3 + 0.01 * i as f64),
@@ -79,6 +80,16 @@ pub trait Backend: Send + Sync {
     /// # Errors
     /// When a setting of the loss is out of its range, or the problem does not fit the device.
     fn prepare(&self, problem: &PoseProblem) -> Result<Box<dyn Session>, BackendError>;
+}
+
+impl Backend for Arc<dyn Backend> {
+    fn name(&self) -> &str {
+        (**self).name()
+    }
+
+    fn prepare(&self, problem: &PoseProblem) -> Result<Box<dyn Session>, BackendError> {
+        (**self).prepare(problem)
+    }
 }
 
 /// A problem on its device. Results come in the order of the hypotheses, and a hypothesis has the same result whatever

@@ -72,7 +72,7 @@ impl<'a> Rig<'a> {
     /// Captures a frame of `moment`, whose joints and taxels are those of the hand.
     ///
     /// # Errors
-    /// If the lens cannot make an image, which does not happen.
+    /// If an image has not the size of the lens's camera.
     pub(in crate::synth) fn capture(
         &self,
         moment: &GraspSnapshot,
