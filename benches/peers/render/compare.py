@@ -8,7 +8,8 @@ Ours runs on RAYON_NUM_THREADS threads, two unless said otherwise; all others on
 Prints two tables. Truth: the mean difference of the picture, over the body's pixels, from one of 25 x 25 rays a pixel (of 255);
 cosine and relative error of the gradient of the mean squared error against central differences of such pictures, turns
 scaled by 5 cm; the worse of both sizes, and the median of several runs where samples are random. Time: milliseconds for the
-value, and for value and gradient, all in turns.
+value, and for value and gradient, all in turns. Standard error gets the figures of each scene as they come, and the log of the
+peers is `render_peers.log` in the folder of temporary files.
 """
 
 import argparse
@@ -98,6 +99,13 @@ def number(milliseconds):
     return f"{milliseconds:.2f}" if milliseconds < 10 else f"{milliseconds:.0f}"
 
 
+def progress(title, all_peers, rows):
+    """What is known so far, for a run that is stopped."""
+    print(title, file=sys.stderr)
+    for peer, row in zip(all_peers, rows):
+        print(f"  {peer.name}: " + " ".join(f"{x:.5g}" for x in row), file=sys.stderr, flush=True)
+
+
 def table(columns, rows):
     print("\n| | " + " | ".join(columns) + " |\n|---|" + "--:|" * len(columns))
     for name, cells in rows:
@@ -119,7 +127,7 @@ def main():
             folder = pathlib.Path(tempfile.mkdtemp(dir=WORK.name))
             scenes.write(folder, body, size)
             scene_rows.append(compare(folder, all_peers))
-            print(f"{body}, {size}: {time.time() - begin:.0f} s", file=sys.stderr, flush=True)
+            progress(f"{body}, {size}, after {time.time() - begin:.0f} s", all_peers, scene_rows[-1])
         for i, sizes in enumerate(zip(*scene_rows)):
             off, cosine, error, mean_cosine, mean_error = (
                 worse(row[k] for row in sizes) for k, worse in enumerate((max, min, max, min, max))
