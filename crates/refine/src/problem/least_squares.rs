@@ -194,27 +194,6 @@ impl Problem {
         each.map(|((state, iterations), found)| self.solution(state, iterations, found)).collect()
     }
 
-    /// `solution` after undamped steps to where the gradient vanishes, as long as each promises less than half of what the one before
-    /// it did, and more than `least` \[nat\]: steps that must lower the cost end where rounding decides if they do.
-    pub(crate) fn settle(&self, mut solution: Solution, least: f64) -> Solution {
-        let promise = |at: &Linearization| {
-            let step = at.gauss_newton_step()?;
-            let decrease = -0.5 * at.equations.gradient().dot(&step);
-            (decrease > least).then_some((step, decrease))
-        };
-        let mut wanted = promise(&solution.at);
-        while let Some((step, decrease)) = wanted {
-            let next = self.linearize(&self.retract(&solution.at.state, step.as_slice()));
-            wanted = promise(&next);
-            let shrinks = wanted.as_ref().is_none_or(|(_, later)| *later < 0.5 * decrease);
-            if !(shrinks && next.cost.is_finite()) {
-                break;
-            }
-            solution.at = next;
-        }
-        solution
-    }
-
     /// Where a walk from `start` ended.
     fn solution(
         &self,

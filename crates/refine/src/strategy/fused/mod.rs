@@ -24,7 +24,7 @@ use super::estimate::Recorder;
 use super::{Estimate, Iteration, Observer, Strategy};
 use crate::error::RefineError;
 use crate::factor::GaussianPrior;
-use crate::problem::{Factor, Problem, Solution, State, Termination};
+use crate::problem::{Factor, Solution, State, Termination};
 use crate::scene::Frame;
 
 /// Gauss–Newton on all evidence at once, with the quantities that are not known exactly estimated beside the pose.
@@ -114,16 +114,6 @@ impl Strategy for Fused {
     }
 }
 
-/// The decrease that the last steps of a refinement may still promise \[nat\]: a hundredth of a standard deviation.
-const LEAST_DECREASE: f64 = 5e-5;
-
-/// Lets the best of `found` come to rest.
-fn settle_first(problem: &Problem, found: &mut [Solution]) {
-    if let Some(best) = found.first_mut() {
-        *best = problem.settle(best.clone(), LEAST_DECREASE);
-    }
-}
-
 /// Records the best solution of a stage.
 fn record(recorder: &mut Recorder<'_, '_>, best: &Solution) -> ControlFlow<()> {
     let (index, values) = (recorder.count(), vec![best.at.cost]);
@@ -172,9 +162,6 @@ impl Walk<'_> {
             problem.solve_all(states, &stage.solver)
         };
         let mut found = distinct(found, self.radius());
-        if index + 1 == self.stages().len() {
-            settle_first(&problem, &mut found);
-        }
         // Not by the first stage, which sees no colors.
         if index > 0 {
             let limit = found[0].at.cost + self.settings.prune_margin;
@@ -244,8 +231,6 @@ impl Walk<'_> {
         let own = &self.fused.factors;
         let problem = problem_of(self.frame, initial, last, &settings, None, own)?
             .with_prior(self.prior.clone());
-        let mut found = distinct(problem.solve_all(&states, &last.solver), self.radius());
-        settle_first(&problem, &mut found);
-        Ok(found)
+        Ok(distinct(problem.solve_all(&states, &last.solver), self.radius()))
     }
 }
