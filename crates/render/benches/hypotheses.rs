@@ -6,6 +6,7 @@
 
 #[path = "../examples/bottle/mod.rs"]
 mod bottle;
+mod device;
 
 use std::hint::black_box;
 use std::sync::Arc;
@@ -14,12 +15,12 @@ use std::time::Instant;
 use bottle::{SIZES, bottle, camera, direction, truth, uniform};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 use prehend_render::{
-    Backend, Cpu, Device, Hypothesis, Light, Mask, PoseLoss, PoseProblem, RenderModel, Target,
+    Backend, Cpu, Hypothesis, Light, Mask, PoseLoss, PoseProblem, RenderModel, Target,
 };
 
 fn main() -> anyhow::Result<()> {
     let software = std::env::var("PREHEND_SOFTWARE_GPU").is_ok_and(|v| v == "1");
-    let device = if software { Device::Gpu.open()? } else { Device::Auto.open()? };
+    let device = device::device()?;
     let (_, sides, rings) = SIZES[0];
     let model = Arc::new(RenderModel::new(&bottle(sides, rings))?);
     println!("{} faces; ms an iteration", model.face_count());

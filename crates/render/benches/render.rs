@@ -8,6 +8,7 @@
 
 #[path = "../examples/bottle/mod.rs"]
 mod bottle;
+mod device;
 
 use std::hint::black_box;
 use std::sync::Arc;
@@ -17,8 +18,8 @@ use bottle::{SIZES, bottle, camera, guess, truth};
 use nalgebra::Isometry3;
 use prehend_geometry::shapes::capsule;
 use prehend_render::{
-    Backend, Cpu, DepthOptions, Device, Hypothesis, Light, LossOptions, Mode, PoseLoss,
-    PoseProblem, RenderModel, SoftRasOptions, Target, depth_map, render_scene,
+    Backend, Cpu, DepthOptions, Hypothesis, Light, LossOptions, Mode, PoseLoss, PoseProblem,
+    RenderModel, SoftRasOptions, Target, depth_map, render_scene,
 };
 
 fn main() -> anyhow::Result<()> {
@@ -37,7 +38,7 @@ fn main() -> anyhow::Result<()> {
     ];
     let wanted = std::env::args().skip(1).find(|word| !word.starts_with('-')).unwrap_or_default();
     let mut backends: Vec<Arc<dyn Backend>> = vec![Arc::new(Cpu)];
-    backends.extend(Some(Device::Auto.open()?).filter(|b| b.name() != Cpu.name()));
+    backends.extend(Some(device::device()?).filter(|b| b.name() != Cpu.name()));
     println!("| device | loss | image | faces | pixels | value, ms | with derivatives, ms |");
     println!("|---|---|---|--:|--:|--:|--:|");
     for backend in &backends {

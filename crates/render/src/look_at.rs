@@ -2,8 +2,8 @@
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
-/// Pose base → camera of a camera at `eye` that looks at `target`, with the direction `up` (any length) up in the image
-/// but for a turn by `roll` \[rad\] about the optical axis.
+/// Pose base → camera (OpenCV's axes: x right, y down, z forward) of a camera at `eye` that looks at `target`, both in the base frame \[m\],
+/// with the direction `up` (of any length from 1e-9 on) up in the image but for a turn by `roll` \[rad\] about the optical axis.
 pub fn look_at(
     eye: &Point3<f64>,
     target: &Point3<f64>,

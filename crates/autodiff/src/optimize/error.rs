@@ -35,6 +35,14 @@ pub enum OptimizeError {
         /// Columns of the matrix.
         columns: usize,
     },
+    /// A problem did not answer for each of the points that it was asked about.
+    #[error("{found} linearizations for {expected} points")]
+    Answers {
+        /// Number of points.
+        expected: usize,
+        /// Linearizations given.
+        found: usize,
+    },
     /// A setting is outside its range.
     #[error("`{name}` is {value}, but must be {range}")]
     Setting {

@@ -145,10 +145,11 @@ impl LevenbergMarquardt {
     }
 
     /// As [`minimize_on`](Self::minimize_on) from each of several starts. All walks go step by step side by side, so that
-    /// [`LeastSquares::linearize_all`] can answer them together; none depends on the others. The observer hears the number of the start, too.
+    /// [`LeastSquares::linearize_all`] can answer them together; none depends on the others. The observer hears the number of the start, too;
+    /// what it ends is that walk alone.
     ///
     /// # Errors
-    /// If a setting is out of range; for each start, as for one alone.
+    /// If a setting is out of range or [`LeastSquares::linearize_all`] does not answer for each point; for each start, as for one alone.
     pub fn minimize_all_on<P: LeastSquares>(
         &self,
         problem: &P,
@@ -183,6 +184,10 @@ impl LevenbergMarquardt {
                 return Ok(walks.into_iter().map(|walk| walk.map(end)).collect());
             }
             let linearized = problem.linearize_all(&points);
+            if linearized.len() != points.len() {
+                let (expected, found) = (points.len(), linearized.len());
+                return Err(OptimizeError::Answers { expected, found });
+            }
             for ((number, point), there) in asking.into_iter().zip(points).zip(linearized) {
                 let Ok((count, descent)) = &mut walks[number] else { continue };
                 let there = Linearized(there);
@@ -508,7 +513,7 @@ mod tests {
         }
     }
 
-    /// Rosenbrock's valley as a problem of plain vectors; not a number beyond x = 5.
+    /// Rosenbrock's valley as a problem of plain vectors; not a number beyond x = 5. It forgets answers once it was asked often.
     struct Valley(std::cell::RefCell<Vec<usize>>);
 
     impl LeastSquares for Valley {
@@ -523,12 +528,24 @@ mod tests {
 
         fn linearize_all(&self, points: &[Vec<f64>]) -> Vec<NormalEquations> {
             self.0.borrow_mut().push(points.len());
-            points.iter().map(|at| self.linearize(at)).collect()
+            let answered = if self.0.borrow().len() > 900 { 0 } else { points.len() };
+            points[..answered].iter().map(|at| self.linearize(at)).collect()
         }
 
         fn retract(&self, at: &Vec<f64>, step: &[f64]) -> Vec<f64> {
             at.iter().zip(step).map(|(x, h)| x + h).collect()
         }
+    }
+
+    #[test]
+    fn a_missing_answer_is_an_error() {
+        let problem = Valley(vec![0; 900].into());
+        let start = vec![-1.2, 1.0];
+        let linearized = problem.linearize(&start);
+        let go_on = |_: &Iteration<Vec<f64>>| ControlFlow::Continue(());
+        let found = LevenbergMarquardt::default().minimize_on(&problem, start, linearized, go_on);
+        let error = OptimizeError::Answers { expected: 1, found: 0 };
+        assert_eq!(found.map(|found| found.0), Err(error));
     }
 
     #[test]

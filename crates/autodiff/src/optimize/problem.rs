@@ -15,7 +15,8 @@ pub trait LeastSquares {
     /// The sum about `at`, by the directions of the tangent space there.
     fn linearize(&self, at: &Self::Point) -> Self::Linearization;
 
-    /// The sum about each of several points: together, where that takes less than one after the other.
+    /// The sum about each of several points, one for each and in their order: together, where that takes less than one after the
+    /// other.
     fn linearize_all(&self, points: &[Self::Point]) -> Vec<Self::Linearization> {
         points.iter().map(|at| self.linearize(at)).collect()
     }

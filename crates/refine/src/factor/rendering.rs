@@ -173,7 +173,7 @@ impl RenderingFactor {
         losses.into_iter().map(|loss| self.scale * loss.total).collect()
     }
 
-    /// Each hypothesis by tiles of the image of `side` pixels, turning about the object's center.
+    /// Each hypothesis by tiles of the image of `side` pixels, turning about the center of the object's model.
     fn tiles(&self, hypotheses: &[Hypothesis], side: usize) -> Vec<Vec<Tile>> {
         let tiles = self.on_device(|session| session.linearize_tiles(hypotheses, side));
         tiles.unwrap_or_else(|| {
@@ -197,7 +197,7 @@ impl RenderingFactor {
         self.patches_for(equations).map_or(usize::MAX, |(_, side)| *side)
     }
 
-    /// The cost at `state` and its derivatives, from those by the place at which the object is seen.
+    /// The cost at `state` and its derivatives, from those by the place at which the model's center is seen.
     fn add_tiles(&self, state: &State, tiles: &[Tile], equations: &mut NormalEquations) -> f64 {
         // The object is seen shifted, and turned as it is.
         let mut seen_by_state = SMatrix::<f64, 6, 11>::zeros();
@@ -205,6 +205,9 @@ impl RenderingFactor {
         seen_by_state.fixed_view_mut::<3, 3>(0, 0).copy_from(&place.fixed_columns::<3>(0));
         seen_by_state.fixed_view_mut::<3, 5>(0, 6).copy_from(&place.fixed_columns::<5>(3));
         seen_by_state.fixed_view_mut::<3, 3>(3, 3).fill_with_identity();
+        // States turn about the object's center, which leaves out what does not belong to its surface.
+        let arm = state.t_cam_object.rotation * (self.object.model.center() - self.object.center);
+        seen_by_state.fixed_view_mut::<3, 3>(0, 3).copy_from(&-arm.cross_matrix());
         let patches = self.patches_for(equations).map(|(patches, _)| patches);
         let mut sums = PatchSums::<11>::new(patches.map_or(0, |patches| patches.count()));
         let mut cost = 0.0;
@@ -285,6 +288,8 @@ mod tests {
     use super::super::gradient_check::{
         assert_by_patches, assert_gradient, fixture, patches, scene,
     };
+    use nalgebra::Point3;
+
     use super::*;
     use crate::problem::Block;
 
@@ -303,6 +308,20 @@ mod tests {
             // The camera moves the object as its own pose does, with that gradient's error at this state.
             assert_gradient(&factor.lit_at(&state), &state, Block::Camera, 5e-5, 0.1);
         }
+    }
+
+    #[test]
+    fn turns_are_about_the_center_of_the_object_not_of_all_vertices() {
+        let known = scene();
+        let mut mesh = known.object.mesh.clone();
+        mesh.vertices.push(Point3::new(0.25, 0.15, -0.1));
+        mesh.uvs.iter_mut().for_each(|uvs| uvs.push([0.0; 2]));
+        let object = Arc::new(Object::with_mass("stray", mesh, Some(0.3), 0).unwrap());
+        assert!((object.model.center() - object.center).norm() > 0.03);
+        let frame = Frame::new(&known.observation, &object, Some(&known.hand)).unwrap();
+        let state = State { object_center: object.center, ..fixture(1).1 };
+        let factor = factor(&frame);
+        assert_gradient(&factor.lit_at(&state), &state, Block::ObjectPose, 5e-5, 0.03);
     }
 
     #[test]

@@ -57,12 +57,12 @@ pub trait Factor: Send + Sync {
         rows.cost()
     }
 
-    /// The [`cost`](Self::cost) at each of several states. A factor that has a quicker way than one after the other writes its own.
+    /// The [`cost`](Self::cost) at each of several states, one for each and in their order. A factor that has a quicker way than one after the other writes its own.
     fn cost_all(&self, states: &[State]) -> Vec<f64> {
         states.par_iter().map(|state| self.cost(state)).collect()
     }
 
-    /// As [`linearize`](Self::linearize) at each of several states, each with its `equations`. A factor that has a quicker way than one after
+    /// As [`linearize`](Self::linearize) at each of several states, each with its `equations`; one cost for each. A factor that has a quicker way than one after
     /// the other writes its own.
     fn linearize_all(&self, states: &[State], equations: &mut [NormalEquations]) -> Vec<f64> {
         let each = states.par_iter().zip(equations);

@@ -78,7 +78,9 @@ impl<'a> Frame<'a> {
     }
 
     /// The same, rendered on another device ([`Device::open`](prehend_render::Device::open)): factors of this frame compare their pictures
-    /// there, all hypotheses of a call at once. What it fails to answer, the processor does.
+    /// there, all hypotheses of a call at once. What it fails to answer, the processor does; a device
+    /// [`WithFallback`](prehend_render::WithFallback) is not what is wanted here: it is asked under a lock, in which the tasks of the processor
+    /// must not wait for each other.
     pub fn with_backend(self, backend: Arc<dyn Backend>) -> Self {
         // The processor needs no sessions.
         Self { backend: Some(backend).filter(|b| b.name() != Cpu.name()), ..self }

@@ -16,7 +16,7 @@ use super::files::{
 use super::grasp::GraspSnapshot;
 use super::hand_files::HandFiles;
 use super::plan::{Subject, SynthSettings, Use, check_plan, seed, sequence};
-use super::sensor::Rig;
+use super::sensor::{Lens, Rig};
 use crate::data::bop::{
     Dataset, DatasetError, GroundTruth, ResultRow, create_folder, write_atomically, write_results,
 };
@@ -87,10 +87,13 @@ where
     write_models(&dir.join("models"), subjects.iter().map(|s| models(s, told(s))))?;
     let exact = subjects.iter().map(|s| models(s, s.object.mesh.clone()));
     write_models(&dir.join("models_eval"), exact)?;
+    let size = (settings.width.get(), settings.height.get());
+    let lens = settings.lens.map(|model| Lens::new(model, &settings.sensor, size));
+    let lens = lens.as_ref();
     let mut summary = DatasetSummary::default();
     for subject in subjects {
         let scene_dir = dir.join("test").join(format!("{:06}", subject.obj_id));
-        let scene = Scene { dir: scene_dir, hand, subject, settings, progress };
+        let scene = Scene { dir: scene_dir, hand, subject, settings, lens, progress };
         let failures = scene.complete(|| prepare(subject))?;
         let failed: usize = failures.iter().map(|f| f.images.len()).sum();
         summary.frames += u64::from(settings.frames.get()) - failed as u64;
@@ -129,6 +132,7 @@ struct Scene<'a> {
     hand: &'a HandFiles,
     subject: &'a Subject,
     settings: &'a SynthSettings,
+    lens: Option<&'a Lens>,
     progress: &'a (dyn Fn(u64) + Sync),
 }
 
@@ -203,12 +207,12 @@ impl Scene<'_> {
         images: &[u32],
         state: &Mutex<(Journal, BTreeMap<usize, Entries>)>,
     ) -> Result<(), SynthError> {
-        let &SynthSettings { width, height, lens, seed, ref sensor, .. } = self.settings;
+        let &SynthSettings { width, height, seed, ref sensor, .. } = self.settings;
         let &Subject { obj_id, ref object } = self.subject;
         let robot = &self.hand.robot;
         let size = (width.get(), height.get());
         let mut noise = sequence(seed, Use::Rig, obj_id, grasp);
-        let rig = Rig::new(sensor, object, robot, size, lens, &mut noise);
+        let rig = Rig::new(sensor, object, robot, size, self.lens, &mut noise);
         let shares = self.settings.frames_per_grasp.get() as usize;
         images.par_iter().try_for_each(|&im_id| {
             let share = im_id as usize % shares;

@@ -62,16 +62,18 @@ impl Distortion {
         }
     }
 
-    /// The smallest pinhole camera of the focal lengths of `camera` that sees all of what `camera` sees behind this lens, but no more than
-    /// `widest` times as many columns and rows: nearly a right angle off the axis, a pinhole's image has no end. What
-    /// [`Remap::distort`] makes images from.
+    /// A pinhole camera of the focal lengths of `camera` whose image contains that of `camera`, and all of what this sees behind the lens up to
+    /// the corners of its pixels; but no more than `widest` times as many columns and rows: nearly a right angle off the axis, a pinhole's image
+    /// has no end. What [`Remap::distort`] makes images from.
     pub fn pinhole_that_covers(&self, camera: &Camera, widest: f64) -> Camera {
         let &Camera { fx, fy, cx, cy, width, height } = camera;
         let reach = |size: usize| 0.5 * (widest - 1.0).max(0.0) * size as f64;
         let (mut low, mut high) = ([0.0; 2], [width, height].map(|size| size as f64 - 1.0));
         let most = [width, height].map(|size| (-reach(size), size as f64 - 1.0 + reach(size)));
-        let pixels = (0..width * height).map(|at| [at % width, at / width].map(|v| v as f64));
-        for ideal in pixels.filter_map(|[u, v]| self.undistort(camera.ray(u, v).xy())) {
+        let across = width + 1;
+        let corners =
+            (0..across * (height + 1)).map(|at| [at % across, at / across].map(|v| v as f64 - 0.5));
+        for ideal in corners.filter_map(|[u, v]| self.undistort(camera.ray(u, v).xy())) {
             let seen = [fx * ideal.x + cx, fy * ideal.y + cy];
             for k in 0..2 {
                 let at = seen[k].clamp(most[k].0, most[k].1);
@@ -193,8 +195,8 @@ mod tests {
         let wide = barrel.pinhole_that_covers(&camera, 4.0);
         assert!(wide.width > 90 && wide.height > 65, "{wide:?}");
         let [mut least, mut most] = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
-        for at in 0..80 * 60 {
-            let ray = camera.ray((at % 80) as f64, (at / 80) as f64).xy();
+        for at in 0..81 * 61 {
+            let ray = camera.ray((at % 81) as f64 - 0.5, (at / 81) as f64 - 0.5).xy();
             let ideal = barrel.undistort(ray).unwrap();
             let seen = [wide.fx * ideal.x + wide.cx, wide.fy * ideal.y + wide.cy];
             for k in 0..2 {

@@ -49,7 +49,10 @@ pub(crate) struct Input {
 #[derive(Args)]
 pub(crate) struct Rendering {
     /// What renders: cpu; gpu, a graphics device, a software one only if there is no other; or auto, graphics hardware if there is
-    /// any. Poses are the same within 0.05 mm and 0.05° at nearly all frames. A device that fails is replaced by the processor
+    /// any. A device that fails is replaced by the processor
+    ///
+    /// Pictures are compared with the same results but for rounding. Most poses are the same within 0.05 mm and 0.05°; where that
+    /// decides whether a last step is worth taking, they may differ by a part of their standard deviation.
     #[arg(
         long,
         value_name = "DEVICE",

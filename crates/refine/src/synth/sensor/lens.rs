@@ -3,6 +3,7 @@
 use prehend_render::{Camera, Distortion, DistortionError, Remap};
 
 use super::rig::View;
+use super::settings::SensorSettings;
 
 /// What a pinhole sees is rendered with this many pixels for one of the lens along each axis, and averaged: a lens may
 /// show things smaller than a pinhole does.
@@ -11,7 +12,7 @@ const FINE: usize = 3;
 const WIDEST: f64 = 3.0;
 
 /// A camera's lens, and the pinhole camera whose images become its own.
-pub(super) struct Lens {
+pub(in crate::synth) struct Lens {
     pub(super) model: Distortion,
     /// Sees what the lens shows, `FINE` times finer.
     pub(super) pinhole: Camera,
@@ -22,8 +23,13 @@ pub(super) struct Lens {
 }
 
 impl Lens {
-    /// Of `camera`, whose matrix and size are those of the images.
-    pub(super) fn new(model: Distortion, camera: &Camera) -> Self {
+    /// Of the camera of `settings` with images of `width` by `height` pixels.
+    pub(in crate::synth) fn new(
+        model: Distortion,
+        settings: &SensorSettings,
+        (width, height): (usize, usize),
+    ) -> Self {
+        let camera = &settings.viewpoint.camera(width, height);
         let background = model.pinhole_that_covers(camera, WIDEST);
         let pinhole = background.scaled(FINE as f64);
         let color = Remap::distort(pinhole, camera.scaled(FINE as f64), &model);

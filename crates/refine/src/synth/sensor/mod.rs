@@ -13,5 +13,6 @@ mod settings;
 mod touch;
 mod viewpoint;
 
+pub(super) use lens::Lens;
 pub(super) use rig::Rig;
 pub use settings::{SensorSettings, SettingError};

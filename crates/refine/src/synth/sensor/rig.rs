@@ -4,8 +4,8 @@ use nalgebra::{Isometry3, Vector3};
 use prehend_geometry::SplitMix64;
 use prehend_geometry::robot::{Drive, Motion};
 use prehend_render::{
-    Camera, DepthImage, Distortion, DistortionError, Mask, RenderModel, RgbImage, SurfacePoint,
-    depth_map, render_scene,
+    Camera, DepthImage, DistortionError, Mask, RenderModel, RgbImage, SurfacePoint, depth_map,
+    render_scene,
 };
 
 use super::calibration::Miscalibration;
@@ -23,7 +23,7 @@ pub(in crate::synth) struct Rig<'a> {
     object: &'a Object,
     robot: &'a Hand,
     camera: Camera,
-    lens: Option<Lens>,
+    lens: Option<&'a Lens>,
     errors: Miscalibration,
     depth: DepthBias,
     taxels: Vec<TaxelCondition>,
@@ -52,7 +52,7 @@ impl<'a> Rig<'a> {
         object: &'a Object,
         robot: &'a Hand,
         (width, height): (usize, usize),
-        lens: Option<Distortion>,
+        lens: Option<&'a Lens>,
         noise: &mut SplitMix64,
     ) -> Self {
         let camera = settings.viewpoint.camera(width, height);
@@ -64,7 +64,7 @@ impl<'a> Rig<'a> {
             settings,
             object,
             robot,
-            lens: lens.map(|model| Lens::new(model, &camera)),
+            lens,
             camera,
         }
     }
@@ -86,7 +86,7 @@ impl<'a> Rig<'a> {
         bodies.iter_mut().for_each(|(_, pose)| *pose = t_cam_hand * *pose);
         let gravity = t_cam_hand.rotation * moment.gravity;
         let mut seen = self.render(&bodies, &gravity, noise);
-        if let Some(lens) = &self.lens {
+        if let Some(lens) = self.lens {
             seen = lens.photograph(&seen)?;
         }
         let forces = self.settings.touch.simulate_taxels(&moment.taxel_forces, &self.taxels, noise);
@@ -102,7 +102,7 @@ impl<'a> Rig<'a> {
         };
         let truth = t_cam_hand * moment.t_hand_object;
         let hand = Some((t_cam_hand, moment.joints.clone()));
-        let lens = self.lens.as_ref().map(|lens| lens.model);
+        let lens = self.lens.map(|lens| lens.model);
         let View { whole, visible, .. } = seen;
         Ok(Shot { told, lens, truth, hand, world: None, whole, visible })
     }
@@ -120,7 +120,7 @@ impl<'a> Rig<'a> {
         let mut same = noise.clone();
         let (mut wall, mut behind) = background.draw(&self.camera, noise);
         let (mut camera, mut samples) = (&self.camera, SAMPLES);
-        if let Some(lens) = &self.lens {
+        if let Some(lens) = self.lens {
             (wall, behind) = background.draw(&lens.background, &mut same);
             (camera, samples) = (&lens.pinhole, 1);
         }

@@ -2,7 +2,6 @@
 
 #import prehend::results::note_needs
 
-// For pictures, which are not added up.
 @compute @workgroup_size(1)
 fn needs(@builtin(workgroup_id) group: vec3<u32>) {
     note_needs(group.z);

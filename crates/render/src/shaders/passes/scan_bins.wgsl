@@ -8,7 +8,6 @@
 var<workgroup> scan_sums: array<u32, 256>;
 var<workgroup> scan_base: u32;
 
-// Gives each tile its place in the pool of entries that all hypotheses share.
 @compute @workgroup_size(256)
 fn scan_bins(
     @builtin(workgroup_id) group: vec3<u32>,
