@@ -50,8 +50,8 @@ pub struct Hypothesis {
 /// use nalgebra::{Isometry3, Vector3};
 /// use prehend_geometry::shapes::cuboid;
 /// use prehend_render::{
-///     Camera, Device, Hypothesis, Light, Mask, PoseLoss, PoseProblem, RenderModel, RgbImage, Target,
-///     WithFallback,
+///     Backend, Camera, Device, Hypothesis, Light, Mask, PoseLoss, PoseProblem, RenderModel, RgbImage,
+///     Target, WithFallback,
 /// };
 ///
 /// let camera = Camera { fx: 60.0, fy: 60.0, cx: 31.5, cy: 23.5, width: 64, height: 48 };
