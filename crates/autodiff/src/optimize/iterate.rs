@@ -86,7 +86,7 @@ pub(super) fn iterate<M: Method>(
     criteria: &Criteria,
     start: &[f64],
     mut objective: impl FnMut(&[f64]) -> M::Evaluation,
-    observe: impl FnMut(&Iteration) -> ControlFlow<()>,
+    mut observe: impl FnMut(&Iteration) -> ControlFlow<()>,
 ) -> Result<Outcome, OptimizeError> {
     criteria.check()?;
     if start.is_empty() {
@@ -101,26 +101,10 @@ pub(super) fn iterate<M: Method>(
     };
     let start = start.to_vec();
     let here = evaluate(&start)?;
-    iterate_on(&Plain, method, criteria, (start, here), evaluate, observe)
-}
-
-/// Runs `method` on parameters that live in `domain` from `start`, where the objective has been evaluated, until one of the
-/// criteria is met.
-///
-/// # Errors
-/// If the objective is not finite at the start, or cannot be evaluated on the way.
-fn iterate_on<P: Clone, M: Method>(
-    domain: &impl Domain<P>,
-    method: M,
-    criteria: &Criteria,
-    start: (P, M::Evaluation),
-    mut evaluate: impl FnMut(&P) -> Result<M::Evaluation, OptimizeError>,
-    mut observe: impl FnMut(&Iteration<P>) -> ControlFlow<()>,
-) -> Result<Outcome<P>, OptimizeError> {
-    let mut descent = Descent::new(method, start)?;
-    while let Some(moved) = descent.ask(domain, criteria) {
+    let mut descent = Descent::new(method, (start, here))?;
+    while let Some(moved) = descent.ask(&Plain, criteria) {
         let there = evaluate(&moved)?;
-        descent.tell(domain, criteria, moved, there, &mut observe);
+        descent.tell(&Plain, criteria, moved, there, &mut observe);
     }
     Ok(descent.end().0)
 }

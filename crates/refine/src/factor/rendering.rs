@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, SMatrix};
 use prehend_geometry::RobustKernel;
 use prehend_render::{
     Backend, BackendError, ContourOptions, Hypothesis, Light, LossOptions, Mode, PoseLoss,
-    PoseProblem, Session, Target, Tile, light_samples,
+    PoseProblem, Session, Tile, light_samples,
 };
 use rayon::prelude::*;
 
@@ -67,8 +67,7 @@ impl Default for RenderingSettings {
 /// object as dark as the black outside the mask still has an outline.
 pub struct RenderingFactor {
     object: Arc<Object>,
-    target: Arc<Target>,
-    loss: PoseLoss,
+    problem: PoseProblem,
     /// The same on a device, if there is one beside the processor; gone after its first failure.
     device: Mutex<Option<Box<dyn Session>>>,
     /// Nats per unit of the renderer's loss.
@@ -97,17 +96,17 @@ impl RenderingFactor {
             ..LossOptions::default()
         };
         let contour = ContourOptions { half_width: HALF_WIDTH, ..ContourOptions::default() };
-        let (object, target) = (Arc::clone(frame.object()), image.target);
-        let loss = PoseLoss::new(Mode::Contour(contour), options);
-        let session = |backend: &Arc<dyn Backend>| {
-            let (model, target) = (Arc::clone(&object.model), Arc::clone(&target));
-            backend.prepare(&PoseProblem { model, target, loss }).map_err(warn).ok()
+        let object = Arc::clone(frame.object());
+        let problem = PoseProblem {
+            model: Arc::clone(&object.model),
+            target: image.target,
+            loss: PoseLoss::new(Mode::Contour(contour), options),
         };
+        let session = |backend: &Arc<dyn Backend>| backend.prepare(&problem).map_err(warn).ok();
         Ok(Self {
             device: Mutex::new(frame.backend().and_then(session)),
             object,
-            target,
-            loss,
+            problem,
             scale: settings.effective_pixels / (sigma * sigma),
             light_ridge: settings.light_ridge,
             color: settings.color,
@@ -128,9 +127,9 @@ impl RenderingFactor {
             return Light::ambient(1.0);
         }
         // Four unknowns a channel do not need every pixel.
-        let model = &self.object.model;
+        let PoseProblem { model, target, .. } = &self.problem;
         let seen = reprojected(state);
-        let samples = light_samples(model, &seen, &self.target, LIGHT_MARGIN, LIGHT_SAMPLES);
+        let samples = light_samples(model, &seen, target, LIGHT_MARGIN, LIGHT_SAMPLES);
         Light::fit(&samples, self.light_ridge).unwrap_or_else(|_| Light::ambient(1.0))
     }
 
@@ -164,26 +163,15 @@ impl RenderingFactor {
 
     /// The cost of each hypothesis.
     fn costs(&self, hypotheses: &[Hypothesis]) -> Vec<f64> {
-        let losses = self.on_device(|session| session.evaluate(hypotheses)).unwrap_or_else(|| {
-            let Self { object, target, loss, .. } = self;
-            let one =
-                |h: &Hypothesis| loss.evaluate(&object.model, &h.t_cam_object, &h.light, target);
-            hypotheses.par_iter().map(one).collect()
-        });
+        let losses = self.on_device(|session| session.evaluate(hypotheses));
+        let losses = losses.unwrap_or_else(|| self.problem.losses(hypotheses));
         losses.into_iter().map(|loss| self.scale * loss.total).collect()
     }
 
     /// Each hypothesis by tiles of the image of `side` pixels, turning about the center of the object's model.
     fn tiles(&self, hypotheses: &[Hypothesis], side: usize) -> Vec<Vec<Tile>> {
         let tiles = self.on_device(|session| session.linearize_tiles(hypotheses, side));
-        tiles.unwrap_or_else(|| {
-            let Self { object, target, loss, .. } = self;
-            let one = |Hypothesis { t_cam_object, light }: &Hypothesis| {
-                let center = t_cam_object * object.model.center();
-                loss.linearize_tiles(&object.model, t_cam_object, &center, light, target, side)
-            };
-            hypotheses.par_iter().map(one).collect()
-        })
+        tiles.unwrap_or_else(|| self.problem.tiles(hypotheses, side))
     }
 
     /// Patches, if anybody asks for derivatives by them.
@@ -206,7 +194,7 @@ impl RenderingFactor {
         seen_by_state.fixed_view_mut::<3, 5>(0, 6).copy_from(&place.fixed_columns::<5>(3));
         seen_by_state.fixed_view_mut::<3, 3>(3, 3).fill_with_identity();
         // States turn about the object's center, which leaves out what does not belong to its surface.
-        let arm = state.t_cam_object.rotation * (self.object.model.center() - self.object.center);
+        let arm = state.t_cam_object.rotation * (self.problem.model.center() - self.object.center);
         seen_by_state.fixed_view_mut::<3, 3>(0, 3).copy_from(&-arm.cross_matrix());
         let patches = self.patches_for(equations).map(|(patches, _)| patches);
         let mut sums = PatchSums::<11>::new(patches.map_or(0, |patches| patches.count()));

@@ -49,34 +49,21 @@ impl<'a> FineScorer<'a> {
         Ok(Self { frame, problem })
     }
 
-    /// Each pose with the sum of the costs there \[nat\]; infinite where it cannot be seen.
+    /// The poses that can be seen, each with the sum of the costs there \[nat\].
     pub(super) fn judge(&self, poses: &[Scored]) -> Vec<Scored> {
-        self.of_visible(poses, |states| {
-            let costs = self.problem.cost_all(states);
-            states.iter().map(|state| state.t_cam_object).zip(costs).collect()
-        })
+        let states = self.visible(poses);
+        let costs = self.problem.cost_all(&states);
+        states.iter().map(|state| state.t_cam_object).zip(costs).collect()
     }
 
-    /// Each pose after at most `steps` steps down, and the sum of the costs there.
+    /// The poses that can be seen after at most `steps` steps down, and the sum of the costs there.
     pub(super) fn descend(&self, poses: &[Scored], steps: usize) -> Vec<Scored> {
         let solver = Solver { iterations: steps, min_decrease: MIN_DECREASE };
-        self.of_visible(poses, |states| {
-            let found = self.problem.solve_all(states, &solver);
-            found.into_iter().map(|found| (found.at.state.t_cam_object, found.at.cost)).collect()
-        })
+        let found = self.problem.solve_all(&self.visible(poses), &solver);
+        found.into_iter().map(|found| (found.at.state.t_cam_object, found.at.cost)).collect()
     }
 
-    /// `f` of those poses that can be seen; the others cost infinitely much.
-    fn of_visible(&self, poses: &[Scored], f: impl FnOnce(&[State]) -> Vec<Scored>) -> Vec<Scored> {
-        let states: Vec<Option<State>> =
-            poses.iter().map(|(pose, _)| State::new(self.frame, pose).ok()).collect();
-        let visible: Vec<State> = states.iter().flatten().cloned().collect();
-        let mut found = f(&visible).into_iter();
-        let unseen = |(pose, _): &Scored| (*pose, f64::INFINITY);
-        let each = states.iter().zip(poses);
-        each.map(|(state, pose)| {
-            state.as_ref().and_then(|_| found.next()).unwrap_or_else(|| unseen(pose))
-        })
-        .collect()
+    fn visible(&self, poses: &[Scored]) -> Vec<State> {
+        poses.iter().filter_map(|(pose, _)| State::new(self.frame, pose).ok()).collect()
     }
 }

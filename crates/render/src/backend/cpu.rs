@@ -20,16 +20,34 @@ impl Backend for Cpu {
     }
 }
 
+impl PoseProblem {
+    /// The loss of each hypothesis, on all cores of this processor.
+    pub fn losses(&self, hypotheses: &[Hypothesis]) -> Vec<Loss> {
+        let one = |h: &Hypothesis| {
+            self.loss.evaluate(&self.model, &h.t_cam_object, &h.light, &self.target)
+        };
+        hypotheses.par_iter().map(one).collect()
+    }
+
+    /// The loss of each hypothesis by tiles of `side` pixels with its derivatives by the twist about the model's center, on all cores of
+    /// this processor: [`PoseLoss::linearize_tiles`](crate::PoseLoss::linearize_tiles).
+    pub fn tiles(&self, hypotheses: &[Hypothesis], side: usize) -> Vec<Vec<Tile>> {
+        let one = |h: &Hypothesis| {
+            let center = h.t_cam_object * self.model.center();
+            let (pose, light) = (&h.t_cam_object, &h.light);
+            self.loss.linearize_tiles(&self.model, pose, &center, light, &self.target, side)
+        };
+        hypotheses.par_iter().map(one).collect()
+    }
+}
+
 impl Session for PoseProblem {
     fn name(&self) -> &str {
         Cpu.name()
     }
 
     fn evaluate(&mut self, hypotheses: &[Hypothesis]) -> Result<Vec<Loss>, BackendError> {
-        let one = |h: &Hypothesis| {
-            self.loss.evaluate(&self.model, &h.t_cam_object, &h.light, &self.target)
-        };
-        Ok(hypotheses.par_iter().map(one).collect())
+        Ok(self.losses(hypotheses))
     }
 
     fn linearize(&mut self, hypotheses: &[Hypothesis]) -> Result<Vec<Linearized>, BackendError> {
@@ -45,12 +63,7 @@ impl Session for PoseProblem {
         hypotheses: &[Hypothesis],
         side: usize,
     ) -> Result<Vec<Vec<Tile>>, BackendError> {
-        let one = |h: &Hypothesis| {
-            let center = h.t_cam_object * self.model.center();
-            let (pose, light) = (&h.t_cam_object, &h.light);
-            self.loss.linearize_tiles(&self.model, pose, &center, light, &self.target, side)
-        };
-        Ok(hypotheses.par_iter().map(one).collect())
+        Ok(self.tiles(hypotheses, side))
     }
 
     fn render(&mut self, h: &Hypothesis) -> Result<PoseImage, BackendError> {

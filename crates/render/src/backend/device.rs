@@ -2,10 +2,13 @@
 
 use std::sync::Arc;
 
+use strum::{Display, EnumString, VariantNames};
+
 use super::{Backend, BackendError, Cpu};
 
 /// Which device renders.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Display, EnumString, VariantNames)]
+#[strum(serialize_all = "lowercase", parse_err_ty = String, parse_err_fn = unknown)]
 pub enum Device {
     /// The processor at hand.
     #[default]
@@ -18,14 +21,6 @@ pub enum Device {
 }
 
 impl Device {
-    /// All names, in the order of the variants.
-    pub const NAMES: [&str; 3] = ["cpu", "gpu", "auto"];
-
-    /// The name that [`FromStr`](std::str::FromStr) reads.
-    pub fn name(self) -> &'static str {
-        Self::NAMES[self as usize]
-    }
-
     /// The device, open and ready. [`WithFallback`](super::WithFallback) goes on with the processor where it fails.
     ///
     /// Opening a graphics device and compiling its shaders takes some tenths of a second: call this once.
@@ -41,19 +36,8 @@ impl Device {
     }
 }
 
-impl std::fmt::Display for Device {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.pad(self.name())
-    }
-}
-
-impl std::str::FromStr for Device {
-    type Err = String;
-
-    fn from_str(name: &str) -> Result<Self, String> {
-        let known = [Self::Cpu, Self::Gpu, Self::Auto].into_iter().find(|d| d.name() == name);
-        known.ok_or_else(|| format!("no device {name:?}: one of {}", Self::NAMES.join(", ")))
-    }
+fn unknown(text: &str) -> String {
+    format!("no device {text:?}: one of {}", Device::VARIANTS.join(", "))
 }
 
 #[cfg(feature = "gpu")]
@@ -99,8 +83,8 @@ mod tests {
 
     #[test]
     fn devices_are_told_by_their_names() {
-        for name in Device::NAMES {
-            assert_eq!(name.parse::<Device>().unwrap().to_string(), name);
+        for name in Device::VARIANTS {
+            assert_eq!(name.parse::<Device>().unwrap().to_string(), *name);
         }
         assert_eq!(
             "vulkan".parse::<Device>().unwrap_err(),

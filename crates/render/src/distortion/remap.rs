@@ -86,13 +86,13 @@ impl Remap {
     pub fn depth(&self, image: &DepthImage) -> Result<DepthImage, DistortionError> {
         self.check(image.width(), image.height())?;
         let pixel = |place: &[f32; 2]| {
-            let nearest = self.nearest_pixel(place).map_or(0.0, |at| image.pixels()[at]);
-            let Some(Cell { corners, shares }) = self.cell(place) else { return nearest };
+            let nearest = || self.nearest_pixel(place).map_or(0.0, |at| image.pixels()[at]);
+            let Some(Cell { corners, shares }) = self.cell(place) else { return nearest() };
             let depths = corners.map(|at| image.pixels()[at]);
             let (near, far) =
                 depths.iter().fold((f32::INFINITY, 0.0f32), |(a, b), &z| (a.min(z), b.max(z)));
             if !(near > 0.0 && far < near * (1.0 + SAME_SURFACE)) {
-                return nearest;
+                return nearest();
             }
             1.0 / depths.iter().zip(shares).map(|(z, share)| share / z).sum::<f32>()
         };

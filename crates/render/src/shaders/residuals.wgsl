@@ -14,7 +14,7 @@
     SUM_HIDDEN, SUM_MASK, SUM_MISSED, SUM_WITH_DEPTH, partials,
 }
 #import prehend::tallies::region_of
-#import prehend::tiles::{TILE, TILE_PIXELS, tile_index, touches_tile}
+#import prehend::tiles::{TILE, touches_tile}
 
 // One row a thread, so that columns add up in a fixed order; an odd length keeps the banks of memory apart.
 var<workgroup> tile_sums: array<f32, 2240>;
@@ -177,14 +177,6 @@ fn store_parts(h: u32, lane: u32, tile: vec2<u32>) {
 fn store_tile_sums(h: u32, lane: u32, tile: vec2<u32>) {
     workgroupBarrier();
     if lane < SUM_COLUMNS && touches_tile(region_of(h), tile) {
-        if params.parts > 1u {
-            store_parts(h, lane, tile);
-            return;
-        }
-        var sum = 0.0;
-        for (var i = 0u; i < TILE_PIXELS; i++) {
-            sum += tile_sums[i * SUM_COLUMNS + lane];
-        }
-        partials[tile_index(h, tile) * SUM_COLUMNS + lane] = sum;
+        store_parts(h, lane, tile);
     }
 }

@@ -14,6 +14,7 @@ use prehend_refine::data::bop::{
 };
 use prehend_refine::data::{Target, find_targets};
 use prehend_render::{Backend, Device};
+use strum::VariantNames;
 
 /// A dataset, and which of its images and objects are meant.
 #[derive(Args)]
@@ -57,7 +58,7 @@ pub(crate) struct Rendering {
         long,
         value_name = "DEVICE",
         default_value_t = Device::Cpu,
-        value_parser = PossibleValuesParser::new(Device::NAMES).try_map(|name| name.parse::<Device>()),
+        value_parser = PossibleValuesParser::new(Device::VARIANTS).try_map(|name| name.parse::<Device>()),
         help_heading = "Method"
     )]
     pub(crate) device: Device,
