@@ -22,6 +22,7 @@ pub mod model;
 pub mod overlay;
 mod pose_loss;
 mod posed;
+mod precision;
 mod projected;
 mod raster;
 mod renderer;

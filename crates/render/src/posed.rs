@@ -1,10 +1,12 @@
 //! A model transformed into the camera and projected.
 
-use nalgebra::{Isometry3, Matrix3, Vector3};
+use glam::{DVec2, Mat3, Vec2, Vec3};
+use nalgebra::Isometry3;
 use rayon::prelude::*;
 
 use crate::camera::Camera;
 use crate::model::RenderModel;
+use crate::precision::single;
 use crate::projected::{Projected, TASK};
 
 /// Geometry nearer to the camera plane than this is not drawn \[m\].
@@ -14,14 +16,14 @@ pub(crate) const NEAR: f32 = 1e-3;
 pub(crate) struct Posed<'a> {
     pub(crate) model: &'a RenderModel,
     /// Focal lengths and principal point \[px\].
-    pub(crate) focal: [f32; 2],
-    pub(crate) principal: [f32; 2],
+    pub(crate) focal: Vec2,
+    pub(crate) principal: Vec2,
     /// Rotation from the mesh into the camera frame.
-    pub(crate) rotation: Matrix3<f32>,
+    pub(crate) rotation: Mat3,
     /// The model's center in the camera frame \[m\].
-    pub(crate) center: Vector3<f32>,
+    pub(crate) center: Vec3,
     /// Welded vertices in the camera frame \[m\].
-    pub(crate) position: Vec<Vector3<f32>>,
+    pub(crate) position: Vec<Vec3>,
     pub(crate) projected: Projected<'a>,
     /// Pyramid level of the texture, and its derivative by the center's Z \[1/m\].
     pub(crate) level: f32,
@@ -36,14 +38,14 @@ impl<'a> Posed<'a> {
         t_cam_object: &Isometry3<f64>,
         margin: f32,
     ) -> Self {
-        let rotation: Matrix3<f32> = t_cam_object.rotation.to_rotation_matrix().matrix().cast();
-        let center: Vector3<f32> = (t_cam_object * model.center()).coords.cast();
-        let focal = [camera.fx as f32, camera.fy as f32];
-        let principal = [camera.cx as f32, camera.cy as f32];
+        let rotation = Mat3::from(t_cam_object.rotation.to_rotation_matrix().matrix().cast());
+        let center = single(&(t_cam_object * model.center()).coords);
+        let focal = DVec2::new(camera.fx, camera.fy).as_vec2();
+        let principal = DVec2::new(camera.cx, camera.cy).as_vec2();
         let (mut position, mut screen) = (Vec::new(), Vec::new());
-        let place = |p: &Vector3<f32>| {
-            let p = rotation * p + center;
-            (p, project(focal, principal, [p.x, p.y, p.z]))
+        let place = |p: &Vec3| {
+            let p = rotation * *p + center;
+            (p, project(focal, principal, p))
         };
         let each = model.positions.par_iter().with_min_len(TASK).map(place);
         each.unzip_into_vecs(&mut position, &mut screen);
@@ -56,25 +58,25 @@ impl<'a> Posed<'a> {
 
     /// The viewing ray X/Z through an image position \[px\].
     #[inline(always)]
-    pub(crate) fn ray(&self, u: f32, v: f32) -> [f32; 3] {
-        [(u - self.principal[0]) / self.focal[0], (v - self.principal[1]) / self.focal[1], 1.0]
+    pub(crate) fn ray(&self, at: Vec2) -> Vec3 {
+        ((at - self.principal) / self.focal).extend(1.0)
     }
 
     /// Column, row \[px\] and 1/Z \[1/m\] of a point in the camera frame; zeros where it is not in front of the camera.
     #[inline(always)]
-    pub(crate) fn project(&self, p: [f32; 3]) -> [f32; 3] {
+    pub(crate) fn project(&self, p: Vec3) -> Vec3 {
         project(self.focal, self.principal, p)
     }
 }
 
 #[inline(always)]
-fn project(focal: [f32; 2], principal: [f32; 2], p: [f32; 3]) -> [f32; 3] {
+fn project(focal: Vec2, principal: Vec2, p: Vec3) -> Vec3 {
     // Written so that a NaN is not in front either.
-    if !(p[2] > NEAR && p[2] < f32::INFINITY) {
-        return [0.0; 3];
+    if !(p.z > NEAR && p.z < f32::INFINITY) {
+        return Vec3::ZERO;
     }
-    let w = 1.0 / p[2];
-    [focal[0] * p[0] * w + principal[0], focal[1] * p[1] * w + principal[1], w]
+    let w = 1.0 / p.z;
+    (focal * p.truncate() * w + principal).extend(w)
 }
 
 /// Pyramid level of the texture and its derivative by the center's depth `z`. One level for the whole object, from its

@@ -1,5 +1,6 @@
 //! Projected triangles: all that visibility needs to know.
 
+use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
 use crate::camera::Camera;
@@ -82,7 +83,7 @@ pub(crate) struct Projected<'a> {
     pub(crate) faces: &'a [[u32; 3]],
     pub(crate) edges: &'a [Edge],
     /// Column, row \[px\] and 1/Z \[1/m\] of each vertex; 1/Z is 0 where it is not in front of the camera.
-    pub(crate) screen: Vec<[f32; 3]>,
+    pub(crate) screen: Vec<Vec3>,
     /// Per face: 1 seen from outside, -1 seen from inside, 0 not drawn.
     pub(crate) facing: Vec<i8>,
     /// Pixels that may be covered.
@@ -96,7 +97,7 @@ impl<'a> Projected<'a> {
         faces: &'a [[u32; 3]],
         edges: &'a [Edge],
         closed: impl Fn(usize) -> bool + Sync,
-        screen: Vec<[f32; 3]>,
+        screen: Vec<Vec3>,
         camera: &Camera,
         margin: f32,
     ) -> Self {
@@ -117,7 +118,7 @@ impl<'a> Projected<'a> {
 
     /// Screen positions of a face's corners.
     #[inline(always)]
-    pub(crate) fn corners(&self, face: usize) -> [[f32; 3]; 3] {
+    pub(crate) fn corners(&self, face: usize) -> [Vec3; 3] {
         let [a, b, c] = self.faces[face];
         [self.screen[a as usize], self.screen[b as usize], self.screen[c as usize]]
     }
@@ -125,45 +126,49 @@ impl<'a> Projected<'a> {
 
 /// Twice the signed area of a screen triangle \[px²\]; negative where its outside is seen.
 #[inline(always)]
-pub(crate) fn signed_area([a, b, c]: &[[f32; 3]; 3]) -> f32 {
-    (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+pub(crate) fn signed_area([a, b, c]: [Vec3; 3]) -> f32 {
+    (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x)
 }
 
 #[inline(always)]
-fn facing(screen: &[[f32; 3]], &[a, b, c]: &[u32; 3], closed: bool) -> i8 {
+fn facing(screen: &[Vec3], &[a, b, c]: &[u32; 3], closed: bool) -> i8 {
     let corners @ [a, b, c] = [screen[a as usize], screen[b as usize], screen[c as usize]];
-    let drawn = (a[2] != 0.0) & (b[2] != 0.0) & (c[2] != 0.0);
-    let area = signed_area(&corners);
+    let drawn = (a.z != 0.0) & (b.z != 0.0) & (c.z != 0.0);
+    let area = signed_area(corners);
     let sign = i8::from(area < 0.0) - i8::from((area > 0.0) & !closed);
     if drawn { sign } else { 0 }
 }
 
-fn region(screen: &[[f32; 3]], camera: &Camera, margin: f32) -> Region {
-    let (mut low, mut high) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
-    for p in screen.iter().filter(|p| p[2] > 0.0) {
-        for i in 0..2 {
-            low[i] = low[i].min(p[i]);
-            high[i] = high[i].max(p[i]);
-        }
+fn region(screen: &[Vec3], camera: &Camera, margin: f32) -> Region {
+    let (mut low, mut high) = (Vec2::INFINITY, Vec2::NEG_INFINITY);
+    for p in screen.iter().filter(|p| p.z > 0.0) {
+        low = low.min(p.truncate());
+        high = high.max(p.truncate());
     }
     // Float-to-integer casts saturate, so far-off projections clip to the image.
     let start = |v: f32| (v - margin).ceil().max(0.0) as usize;
     let end = |v: f32, size: usize| ((v + margin).floor() + 1.0).clamp(0.0, size as f32) as usize;
     let region = Region {
-        x0: start(low[0]),
-        y0: start(low[1]),
-        x1: end(high[0], camera.width),
-        y1: end(high[1], camera.height),
+        x0: start(low.x),
+        y0: start(low.y),
+        x1: end(high.x, camera.width),
+        y1: end(high.y, camera.height),
     };
     if region.x0 < region.x1 && region.y0 < region.y1 { region } else { Region::EMPTY }
 }
 
-/// Perspective-correct barycentric coordinates of pixel (x, y) on a face with these corners (column, row, 1/Z).
+/// Twice the signed areas that a point of the image spans with the sides of a screen triangle, opposite each corner.
 #[inline(always)]
-pub(crate) fn barycentric([a, b, c]: [[f32; 3]; 3], x: f32, y: f32) -> [f32; 3] {
-    let (ax, ay, bx, by, cx, cy) = (a[0] - x, a[1] - y, b[0] - x, b[1] - y, c[0] - x, c[1] - y);
-    let weights =
-        [(bx * cy - by * cx) * a[2], (cx * ay - cy * ax) * b[2], (ax * by - ay * bx) * c[2]];
+pub(crate) fn edge_functions(corners: [Vec3; 3], at: Vec2) -> [f32; 3] {
+    let [a, b, c] = corners.map(|corner| corner.truncate() - at);
+    [b.perp_dot(c), c.perp_dot(a), a.perp_dot(b)]
+}
+
+/// Perspective-correct barycentric coordinates of a point of the image on a face with these corners (column, row, 1/Z).
+#[inline(always)]
+pub(crate) fn barycentric(corners: [Vec3; 3], at: Vec2) -> [f32; 3] {
+    let [a, b, c] = edge_functions(corners, at);
+    let weights = [a * corners[0].z, b * corners[1].z, c * corners[2].z];
     let sum = weights[0] + weights[1] + weights[2];
     let scale = if sum == 0.0 { 0.0 } else { 1.0 / sum };
     let (second, third) = (weights[1] * scale, weights[2] * scale);

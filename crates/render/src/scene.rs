@@ -1,5 +1,6 @@
 //! Antialiased pictures of several lit bodies.
 
+use glam::{Vec2, vec2};
 use nalgebra::Isometry3;
 use rayon::prelude::*;
 
@@ -73,25 +74,25 @@ pub fn render_scene(
         if !(inside_x.contains(&x) && inside_y.contains(&y)) {
             return (behind, 0.0, None);
         }
-        let at = |sx: usize, sy: usize| {
+        let index = |sx: usize, sy: usize| {
             (y * samples + sy - y0) * nearest.region.width() + x * samples + sx - x0
         };
         let mut sum = [0.0f32; 3];
         for sy in 0..samples {
             for sx in 0..samples {
-                let i = at(sx, sy);
-                let (u, v) = ((x * samples + sx) as f32, (y * samples + sy) as f32);
+                let i = index(sx, sy);
+                let at = vec2((x * samples + sx) as f32, (y * samples + sy) as f32);
                 let seen = match nearest.face[i] {
                     MISS => behind,
                     face => {
                         let body = nearest.body[i] as usize;
-                        shade(body, &point(&posed[body], face, u, v))
+                        shade(body, &point(&posed[body], face, at))
                     }
                 };
                 (0..3).for_each(|c| sum[c] += seen[c]);
             }
         }
-        let middle = at(samples / 2, samples / 2);
+        let middle = index(samples / 2, samples / 2);
         let hit = nearest.face[middle] != MISS;
         let z = if hit { 1.0 / nearest.inverse_z[middle] } else { 0.0 };
         let mean = sum.map(|s| s / (samples * samples) as f32);
@@ -116,12 +117,12 @@ pub fn render_scene(
     image
 }
 
-/// The visible point of a face at pixel (x, y), with its unlit color.
-fn point(posed: &Posed, face: u32, x: f32, y: f32) -> SurfacePoint<f32> {
-    let b = barycentric(posed.projected.corners(face as usize), x, y);
+/// The visible point of a face at a pixel, with its unlit color.
+fn point(posed: &Posed, face: u32, at: Vec2) -> SurfacePoint<f32> {
+    let b = barycentric(posed.projected.corners(face as usize), at);
     let [p, q, r] = posed.model.faces[face as usize].map(|v| posed.position[v as usize]);
     SurfacePoint {
-        position: p * b[0] + q * b[1] + r * b[2],
+        position: (p * b[0] + q * b[1] + r * b[2]).into(),
         normal: posed_normal(posed, face as usize, b).into(),
         albedo: albedo(posed, face as usize, b).color,
     }

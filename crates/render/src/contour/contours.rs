@@ -11,6 +11,7 @@ use crate::camera::Camera;
 use crate::light::Light;
 use crate::model::RenderModel;
 use crate::posed::Posed;
+use crate::precision::single;
 use crate::projected::Region;
 use crate::raster::{self, Visible};
 use crate::shading::surface::PosedLight;
@@ -41,7 +42,7 @@ impl<'a> ContourView<'a> {
     ) -> Self {
         let reach = drawing.step.reach();
         let posed = Posed::new(model, camera, pose, reach);
-        let lighting = PosedLight::new(light, &posed.rotation);
+        let lighting = PosedLight::new(light, posed.rotation);
         let projected = &posed.projected;
         let region = projected.region.union(also);
         let (visible, silhouette) = rayon::join(
@@ -60,7 +61,7 @@ impl<'a> ContourView<'a> {
                 creases(projected, &visible, edges, &region, reach, |_| least)
             }
         };
-        let twist_center = center.coords.cast();
+        let twist_center = single(&center.coords);
         let scene = Scene { posed, lighting, drawing, twist_center };
         let size = [camera.width, camera.height];
         Self { scene, size, region, pieces: silhouette.outline, inner, creases, visible }

@@ -1,9 +1,11 @@
 //! Creases: edges in view at which the color of the surface jumps, because normals, texture coordinates or colors do.
 
+use glam::Vec2;
+
 use super::outline::{Foot, PIECE, Piece, clip};
 use super::scene::Scene;
 use crate::model::{Edge, NONE};
-use crate::projected::{Projected, Region};
+use crate::projected::{Projected, Region, edge_functions};
 use crate::raster::{Seen, Visible};
 use crate::view::Pixel;
 
@@ -34,8 +36,8 @@ pub(crate) fn creases<'a>(
             continue;
         }
         let [a, b] = edge.vertices.map(|v| projected.screen[v as usize]);
-        let d = [b[0] - a[0], b[1] - a[1]];
-        let length = d[0].hypot(d[1]);
+        let d = (b - a).truncate();
+        let length = d.x.hypot(d.y);
         if !(length > 1e-4 && length.is_finite()) {
             continue;
         }
@@ -43,10 +45,10 @@ pub(crate) fn creases<'a>(
         let whole = Piece {
             face: edge.face,
             corners: [edge.corner, (edge.corner + 1) % 3],
-            a: [a[0], a[1]],
-            b: [b[0], b[1]],
+            a: a.truncate(),
+            b: b.truncate(),
             range: [0.0, 1.0],
-            outward: [-sign * d[1] / length, sign * d[0] / length],
+            outward: sign * d.perp() / length,
         };
         let Some([start, end]) = clip(&whole, region, margin) else { continue };
         let count = ((end - start) * length / PIECE).ceil().max(1.0);
@@ -54,8 +56,8 @@ pub(crate) fn creases<'a>(
             let at = |j: f32| start + (end - start) * j / count;
             let range = [at(i as f32), at(i as f32 + 1.0)];
             let t = 0.5 * (range[0] + range[1]);
-            let z = 1.0 / (a[2] + t * (b[2] - a[2]));
-            let nearest = Visible::seen(visible, a[0] + t * d[0], a[1] + t * d[1]);
+            let z = 1.0 / (a.z + t * (b.z - a.z));
+            let nearest = Visible::seen(visible, whole.at(t));
             if nearest.is_none_or(|Seen { inverse_z, .. }| 1.0 / inverse_z > z - least(edge.face)) {
                 // The other face runs through the edge the other way.
                 let other_corners = [(edge.other_corner + 1) % 3, edge.other_corner];
@@ -79,17 +81,17 @@ impl Crease {
     pub(crate) fn side(
         &self,
         projected: &Projected,
-        [x, y]: [f32; 2],
+        at: Vec2,
         foot: &Foot,
         inverse_z: f32,
     ) -> Option<f32> {
-        let across: f32 = (0..2).map(|k| foot.offset[k] * self.piece.outward[k]).sum();
+        let across = foot.offset.dot(self.piece.outward);
         let (side, face) = if across > 0.0 { (1.0, self.other) } else { (-1.0, self.piece.face) };
         // 1/Z is linear in the image: that of the face's plane, continued to the pixel.
-        let [a, b, c] = projected.corners(face as usize);
-        let (ax, ay, bx, by, cx, cy) = (a[0] - x, a[1] - y, b[0] - x, b[1] - y, c[0] - x, c[1] - y);
-        let e = [bx * cy - by * cx, cx * ay - cy * ax, ax * by - ay * bx];
-        let plane = (e[0] * a[2] + e[1] * b[2] + e[2] * c[2]) / (e[0] + e[1] + e[2]);
+        let corners = projected.corners(face as usize);
+        let e = edge_functions(corners, at);
+        let sum = e[0] * corners[0].z + e[1] * corners[1].z + e[2] * corners[2].z;
+        let plane = sum / (e[0] + e[1] + e[2]);
         ((plane - inverse_z).abs() < SAME * inverse_z).then_some(side)
     }
 }
@@ -98,22 +100,21 @@ impl Crease {
 const SAME: f32 = 0.01;
 
 impl Scene<'_> {
-    /// Blends in what lies beyond a crease, at pixel (x, y) that shows `own` of this
+    /// Blends in what lies beyond a crease, at a pixel that shows `own` of this
     /// inverse depth.
     ///
     /// The color of the surface jumps at the crease by that of the foot, so the pixel gains as much of the jump as its
     /// distance says.
     pub(crate) fn soften<const DERIVATIVES: bool>(
         &self,
-        x: f32,
-        y: f32,
+        at: Vec2,
         inverse_z: f32,
         own: &mut Pixel,
         crease: &Crease,
     ) {
-        let foot = crease.piece.foot(x, y);
+        let foot = crease.piece.foot(at);
         let projected = &self.posed.projected;
-        let Some(side) = crease.side(projected, [x, y], &foot, inverse_z) else { return };
+        let Some(side) = crease.side(projected, at, &foot, inverse_z) else { return };
         let (here, beyond) = (crease.piece, crease.reversed());
         let (here, beyond) = if side < 0.0 { (here, beyond) } else { (beyond, here) };
         let here = self.at_foot::<DERIVATIVES>(&here, &foot);

@@ -1,5 +1,7 @@
 //! Pixels at inner contours, which show two surfaces.
 
+use glam::Vec2;
+
 use super::drawing::falling_step;
 use super::footprint::Layers;
 use super::inner::Inner;
@@ -7,25 +9,24 @@ use super::scene::Scene;
 use crate::view::{Pixel, scaled_sum};
 
 impl Scene<'_> {
-    /// Blends the near and the far surface across an inner contour, at pixel (x, y) that shows `own`.
+    /// Blends the near and the far surface across an inner contour, at a pixel that shows `own`.
     ///
     /// On the far side the near surface has the color of the foot; on the near side the far surface has the
     /// color of the pixel beyond the contour.
     pub(super) fn cross<const DERIVATIVES: bool>(
         &self,
-        x: f32,
-        y: f32,
+        at: Vec2,
         own: Pixel,
         inner: &Inner,
         layers: Option<&Layers>,
     ) -> Pixel {
-        let foot = inner.piece.foot(x, y);
+        let foot = inner.piece.foot(at);
         let side = if own.z > inner.split { 1.0 } else { -1.0 };
         let (near, far) = if side > 0.0 {
             (self.at_foot::<DERIVATIVES>(&inner.piece, &foot), own)
         } else {
-            let (u, v, face, inverse_z) = inner.behind;
-            (own, self.interior::<DERIVATIVES>(u, v, face, inverse_z, None))
+            let (beyond, face, inverse_z) = inner.behind;
+            (own, self.interior::<DERIVATIVES>(beyond, face, inverse_z, None))
         };
         let distance = foot.distance_squared.sqrt();
         let step = self.drawing.step;
@@ -45,7 +46,7 @@ impl Scene<'_> {
                 out.color_rows[k] = scaled_sum(1.0, &mixed, step, &ds);
             }
             if let Some(layers) = layers {
-                out.color_rows = self.rows_across([x, y], inner, &foot, side, layers, &ds);
+                out.color_rows = self.rows_across(at, inner, &foot, side, layers, &ds);
             }
             out.depth_weight_row = ds.map(|v| -2.0 * side * weight_derivative * v);
         }

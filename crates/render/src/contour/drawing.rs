@@ -1,5 +1,6 @@
 //! How pixels are drawn, or parts of pixels.
 
+use glam::Vec2;
 use nalgebra::{RealField, convert};
 
 use crate::mode::ContourOptions;
@@ -24,7 +25,7 @@ impl Step {
 
     /// Coverage at signed distance `s` \[px\], positive outside, from a contour with unit normal `normal`, and its slope.
     #[inline]
-    pub(crate) fn at(self, s: f32, normal: [f32; 2]) -> (f32, f32) {
+    pub(crate) fn at(self, s: f32, normal: Vec2) -> (f32, f32) {
         match self {
             Self::Smooth(half_width) => falling_step(s, half_width),
             Self::Square => square_step(s, normal),
@@ -41,8 +42,8 @@ pub(crate) fn falling_step<T: RealField + Copy>(s: T, w: T) -> (T, T) {
 }
 
 /// The part of the unit square about the origin in which `normal`·p < −`s`, and its derivative by `s`: the length of the cut.
-fn square_step(s: f32, normal: [f32; 2]) -> (f32, f32) {
-    let (p, q) = (normal[0].abs(), normal[1].abs());
+fn square_step(s: f32, normal: Vec2) -> (f32, f32) {
+    let Vec2 { x: p, y: q } = normal.abs();
     let (long, short) = if p > q { (p, q) } else { (q, p) };
     // The square's extent along the normal is a trapezoid: flat to `inner`, zero from `outer` on.
     let (inner, outer) = (0.5 * (long - short), 0.5 * (long + short));
@@ -90,17 +91,19 @@ impl ContourOptions {
 
 #[cfg(test)]
 mod tests {
+    use glam::vec2;
+
     use super::*;
 
     #[test]
     fn the_square_step_is_the_area_of_a_cut_square() {
         for angle in [0.0f32, 0.2, 0.8, 1.1, 1.6, 2.5, -2.0] {
-            let normal = [angle.cos(), angle.sin()];
+            let normal = Vec2::from_angle(angle);
             for s in [-0.8f32, -0.6, -0.3, -0.05, 0.0, 0.11, 0.45, 0.52, 0.69] {
                 let n = 1000;
                 let place = |i: i32| (i as f32 + 0.5) / n as f32 - 0.5;
                 let inside =
-                    (0..n * n).filter(|i| normal[0] * place(i % n) + normal[1] * place(i / n) < -s);
+                    (0..n * n).filter(|i| normal.dot(vec2(place(i % n), place(i / n))) < -s);
                 let area = inside.count() as f32 / (n * n) as f32;
                 let (value, slope) = Step::Square.at(s, normal);
                 assert!((value - area).abs() < 2e-3, "{angle} {s}: {value} {area}");

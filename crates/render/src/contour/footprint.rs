@@ -1,5 +1,7 @@
 //! Slopes of the image over a whole pixel.
 
+use glam::{Vec2, vec2};
+
 use super::contours::ContourView;
 use super::drawing::Step;
 use super::inner::Inner;
@@ -17,13 +19,13 @@ use crate::view::{Row, scaled_sum};
 pub(super) type Around = [Option<u32>; 4];
 
 /// Where these pixels are.
-const STEPS: [[f32; 2]; 4] = [[-1.0, 0.0], [1.0, 0.0], [0.0, -1.0], [0.0, 1.0]];
+const STEPS: [Vec2; 4] = [Vec2::NEG_X, Vec2::X, Vec2::NEG_Y, Vec2::Y];
 
 impl ContourView<'_> {
     /// What is seen around a pixel that shows `face`, of depth `z` and near this inner contour, if any.
     pub(super) fn around(&self, place: &Place, face: u32, z: f32, inner: Option<&Inner>) -> Around {
         STEPS.map(|step| {
-            let (dx, dy) = (step[0] as i64, step[1] as i64);
+            let (dx, dy) = (step.x as i64, step.y as i64);
             let (x, y) = (place.x as i64 + dx, place.y as i64 + dy);
             let [width, height] = self.size;
             if !(0..width as i64).contains(&x) || !(0..height as i64).contains(&y) {
@@ -45,7 +47,7 @@ impl ContourView<'_> {
 
     /// The near and the far surface at an inner contour, where `face` is seen at this depth.
     pub(super) fn layers(&self, place: &Place, face: u32, z: f32, inner: &Inner) -> Layers {
-        let (_, _, behind, inverse_z) = inner.behind;
+        let (_, behind, inverse_z) = inner.behind;
         let beyond = z > inner.split;
         let [near, far] = if beyond { [inner.piece.face, face] } else { [face, behind] };
         let far_z = if beyond { z } else { 1.0 / inverse_z };
@@ -89,23 +91,23 @@ pub(super) struct Layer {
 pub(super) struct Cut {
     /// Signed distance of the pixel from it \[px\], positive outside, and its unit normal.
     pub(super) distance: f32,
-    pub(super) outward: [f32; 2],
+    pub(super) outward: Vec2,
     /// The surface's color at it.
     pub(super) color: [f32; 3],
 }
 
 impl Cut {
     /// The share of a side of the pixel that is on this side of the contour.
-    fn left_of(&self, step: [f32; 2]) -> f32 {
-        let across = self.outward[0] * step[0] + self.outward[1] * step[1];
-        let along = (self.outward[0] * step[1]).abs() + (self.outward[1] * step[0]).abs();
+    fn left_of(&self, step: Vec2) -> f32 {
+        let across = self.outward.dot(step);
+        let along = (self.outward.x * step.y).abs() + (self.outward.y * step.x).abs();
         let distance = self.distance + 0.5 * across;
         (0.5 - distance / along.max(1e-6)).clamp(0.0, 1.0)
     }
 }
 
 impl Scene<'_> {
-    /// Rows of the color of pixel (x, y) of depth `z` that shows `face` as `shaded`, from the differences of the colors seen
+    /// Rows of the color of the pixel `at` of depth `z` that shows `face` as `shaded`, from the differences of the colors seen
     /// at its opposite sides.
     ///
     /// At its center the slope of a print, or of the light on a narrow bevel, says little about a pixel as large as its details,
@@ -116,7 +118,7 @@ impl Scene<'_> {
     /// Of a pixel through which a contour runs only the part inside counts; that the contour moves is left to the caller.
     pub(super) fn rows_over_footprint(
         &self,
-        [x, y]: [f32; 2],
+        at: Vec2,
         z: f32,
         face: u32,
         around: &Around,
@@ -125,15 +127,15 @@ impl Scene<'_> {
     ) -> [Row; 3] {
         let mut sides = [[0.0f32; 3]; 4];
         for (side, (step, &beside)) in sides.iter_mut().zip(STEPS.iter().zip(around)) {
-            let at = [x + 0.5 * step[0], y + 0.5 * step[1]];
-            *side = self.within(face, at);
+            let border = at + 0.5 * step;
+            *side = self.within(face, border);
             if let Some(beside) = beside.filter(|beside| *beside != face) {
-                let other = self.within(beside, at);
+                let other = self.within(beside, border);
                 (0..3).for_each(|k| side[k] = 0.5 * (side[k] + other[k]));
             }
         }
         if around.contains(&None) {
-            self.continue_over_border(face, [x, y], around, &mut sides);
+            self.continue_over_border(face, at, around, &mut sides);
         }
         if let Some(cut) = cut {
             // The sides that are left and the contour itself close a polygon, so that a uniform color has no slope.
@@ -143,12 +145,12 @@ impl Scene<'_> {
             }
         }
         let [left, right, top, bottom] = sides;
-        let point = self.posed.ray(x, y).map(|r| r * z).into();
+        let point = self.posed.ray(at) * z;
         let arm = self.level_arm();
         let area = cut.map_or(1.0, |cut| Step::Square.at(cut.distance, cut.outward).0);
         std::array::from_fn(|k| {
-            let slope = [right[k] - left[k], bottom[k] - top[k]];
-            let mut row = self.image_motion(slope, &point).map(|v| -v);
+            let slope = vec2(right[k] - left[k], bottom[k] - top[k]);
+            let mut row = self.image_motion(slope, point).map(|v| -v);
             (0..3).for_each(|i| row[i + 3] += area * shaded.turning[k][i]);
             add_level(&mut row, area * shaded.level[k] * self.posed.level_dz, arm);
             row
@@ -159,7 +161,7 @@ impl Scene<'_> {
     fn continue_over_border(
         &self,
         face: u32,
-        at: [f32; 2],
+        at: Vec2,
         around: &Around,
         sides: &mut [[f32; 3]; 4],
     ) {
@@ -175,7 +177,7 @@ impl Scene<'_> {
     /// and of the part that shows the far one. The border of both moves with the contour, whose signed distance has row `ds`.
     pub(super) fn rows_across(
         &self,
-        at: [f32; 2],
+        at: Vec2,
         inner: &Inner,
         foot: &Foot,
         side: f32,
@@ -190,10 +192,10 @@ impl Scene<'_> {
         let cut = Cut { distance, outward, color: here };
         let mut rows =
             self.rows_over_footprint(at, point.z, near.face, &near.around, &shaded, Some(&cut));
-        let beyond = self.within(far.face, [at[0] - foot.offset[0], at[1] - foot.offset[1]]);
+        let beyond = self.within(far.face, at - foot.offset);
         let b = self.clamped(far.face, at);
         let shaded = shade::<true>(&self.posed, &self.lighting, far.face as usize, b);
-        let complement = Cut { distance: -distance, outward: outward.map(|v| -v), color: beyond };
+        let complement = Cut { distance: -distance, outward: -outward, color: beyond };
         let cut = Some(&complement);
         let behind = self.rows_over_footprint(at, *far_z, far.face, &far.around, &shaded, cut);
         let (_, slope) = Step::Square.at(distance, outward);
@@ -205,16 +207,16 @@ impl Scene<'_> {
         rows
     }
 
-    /// Barycentric coordinates of the point of a face that is seen at (x, y), or next to it on its border.
-    fn clamped(&self, face: u32, [x, y]: [f32; 2]) -> [f32; 3] {
-        let b = barycentric(self.posed.projected.corners(face as usize), x, y);
+    /// Barycentric coordinates of the point of a face that is seen at a point of the image, or next to it on its border.
+    fn clamped(&self, face: u32, at: Vec2) -> [f32; 3] {
+        let b = barycentric(self.posed.projected.corners(face as usize), at);
         let b = b.map(|v| v.max(0.0));
         let sum = b[0] + b[1] + b[2];
         b.map(|v| v / sum)
     }
 
     /// The color there.
-    fn within(&self, face: u32, at: [f32; 2]) -> [f32; 3] {
+    fn within(&self, face: u32, at: Vec2) -> [f32; 3] {
         let b = self.clamped(face, at);
         shade::<false>(&self.posed, &self.lighting, face as usize, b).color
     }

@@ -1,5 +1,7 @@
 //! Inner contours: where the object hides farther parts of itself.
 
+use glam::Vec2;
+
 use super::outline::Piece;
 use crate::projected::Projected;
 use crate::raster::Visible;
@@ -12,7 +14,7 @@ pub(crate) const LEAST_STEP: f32 = 0.02;
 pub(crate) struct Inner {
     pub(crate) piece: Piece,
     /// The pixel next to it on the far side, the face seen there and its 1/Z \[1/m\].
-    pub(crate) behind: (f32, f32, u32, f32),
+    pub(crate) behind: (Vec2, u32, f32),
     /// Half-way between the near and the far surface \[m\].
     pub(crate) split: f32,
 }
@@ -31,13 +33,9 @@ pub(crate) fn inner_contours(
     let select = |piece: Piece| {
         let t = 0.5 * (piece.range[0] + piece.range[1]);
         let face = projected.faces[piece.face as usize];
-        let [wa, wb] = piece.corners.map(|c| projected.screen[face[c as usize] as usize][2]);
+        let [wa, wb] = piece.corners.map(|c| projected.screen[face[c as usize] as usize].z);
         let z = 1.0 / (wa + t * (wb - wa));
-        let beside = |distance: f32| {
-            let at =
-                |k: usize| piece.a[k] + t * (piece.b[k] - piece.a[k]) + distance * piece.outward[k];
-            Visible::seen(visible, at(0), at(1))
-        };
+        let beside = |distance: f32| Visible::seen(visible, piece.at(t) + distance * piece.outward);
         let (behind, front) = (beside(1.0)?, beside(-1.0)?);
         let step = 1.0 / behind.inverse_z - z;
         let split = z + 0.5 * step;
@@ -45,7 +43,7 @@ pub(crate) fn inner_contours(
             Some(least) => step > least && 1.0 / front.inverse_z < split,
             None => least(piece.face, front.face).is_some(),
         };
-        let behind = (behind.x, behind.y, behind.face, behind.inverse_z);
+        let behind = (behind.at, behind.face, behind.inverse_z);
         shown.then_some(Inner { piece, behind, split })
     };
     pieces.into_iter().filter_map(select).collect()

@@ -1,7 +1,8 @@
 //! A pixel inside a face: where it lies on the surface, and how that changes with the pose.
 
+use glam::Vec3;
+
 use crate::shading::surface::Shaded;
-use crate::shading::vec3::{Vec3, cross, dot, mix, scale, sub};
 use crate::view::Row;
 
 /// Surfaces are taken to be inclined to the viewing ray by at least this sine: of what is seen at a grazing angle, a
@@ -10,7 +11,7 @@ pub(crate) const GRAZING: f32 = 1e-3;
 
 #[inline(always)]
 pub(crate) fn row(linear: Vec3, angular: Vec3) -> Row {
-    [linear[0], linear[1], linear[2], angular[0], angular[1], angular[2]]
+    [linear.x, linear.y, linear.z, angular.x, angular.y, angular.z]
 }
 
 /// How what a fixed pixel shows of a face changes with the pose.
@@ -31,28 +32,26 @@ impl Motion {
     /// 2 likewise with c₂ = p₀ × e₁), so it changes by −h·v, h = (c₁ − f n) / n·X, and the depth by n·v / n·ray.
     #[inline(always)]
     pub(crate) fn new(p: &[Vec3; 3], b: [f32; 3], ray: Vec3, z: f32, twist_center: Vec3) -> Self {
-        let point = scale(ray, z);
-        let (e1, e2) = (sub(p[1], p[0]), sub(p[2], p[0]));
-        let n = cross(e1, e2);
+        let (e1, e2) = (p[1] - p[0], p[2] - p[0]);
+        let n = e1.cross(e2);
         // Of the corner, where rounding disturbs the plane's offset least.
-        let facing = dot(n, p[0]);
-        let least = GRAZING * (dot(n, n) * dot(p[0], p[0])).sqrt().max(1e-30);
+        let facing = n.dot(p[0]);
+        let least = GRAZING * (n.dot(n) * p[0].dot(p[0])).sqrt().max(1e-30);
         let facing = if facing < 0.0 { facing.min(-least) } else { facing.max(least) };
         let inverse = 1.0 / facing;
-        let first = mix(inverse, cross(e2, p[0]), -b[1] * inverse, n);
-        let second = mix(inverse, cross(p[0], e1), -b[2] * inverse, n);
-        let arm = sub(point, twist_center);
-        let along = scale(n, z * inverse);
-        Self { gradients: [first, second], arm, z_row: row(along, cross(arm, along)) }
+        let first = inverse * e2.cross(p[0]) - b[1] * inverse * n;
+        let second = inverse * p[0].cross(e1) - b[2] * inverse * n;
+        let arm = ray * z - twist_center;
+        let along = n * (z * inverse);
+        Self { gradients: [first, second], arm, z_row: row(along, arm.cross(along)) }
     }
 
     /// Derivative of color channel `k`.
     #[inline(always)]
     pub(crate) fn color_row(&self, shaded: &Shaded, k: usize) -> Row {
         let [first, second] = self.gradients;
-        let h = mix(shaded.along[0][k], first, shaded.along[1][k], second);
-        let turn = cross(self.arm, h);
-        row(scale(h, -1.0), sub(shaded.turning[k], turn))
+        let h = shaded.along[0][k] * first + shaded.along[1][k] * second;
+        row(-h, shaded.turning[k] - self.arm.cross(h))
     }
 }
 
@@ -61,6 +60,6 @@ impl Motion {
 #[inline(always)]
 pub(crate) fn add_level(row: &mut Row, level: f32, arm: Vec3) {
     row[2] += level;
-    row[3] += level * arm[1];
-    row[4] -= level * arm[0];
+    row[3] += level * arm.y;
+    row[4] -= level * arm.x;
 }

@@ -2,6 +2,7 @@
 
 #![allow(clippy::needless_range_loop)] // loops over lanes index several arrays alike
 
+use glam::{Vec3, vec2, vec3};
 use pulp::{Arch, NullaryFnOnce};
 
 use super::interior::{Motion, add_level};
@@ -9,7 +10,6 @@ use super::scene::Scene;
 use crate::model::{Albedo, Cell, Mipmap, Texel};
 use crate::projected::barycentric;
 use crate::shading::surface::{Unlit, coordinates, lit};
-use crate::shading::vec3::{Vec3, vec3};
 use crate::view::{LANES, Lane, Patch, Pixel, Sink, get, put};
 
 /// Three vectors, or colors, of each pixel.
@@ -165,12 +165,12 @@ impl<const DERIVATIVES: bool, S: Sink<DERIVATIVES>> NullaryFnOnce
 
 #[inline(always)]
 fn triple(v: [f32; 9]) -> [Vec3; 3] {
-    [[v[0], v[1], v[2]], [v[3], v[4], v[5]], [v[6], v[7], v[8]]]
+    [vec3(v[0], v[1], v[2]), vec3(v[3], v[4], v[5]), vec3(v[6], v[7], v[8])]
 }
 
 #[inline(always)]
 fn flat([a, b, c]: [Vec3; 3]) -> [f32; 9] {
-    [a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2]]
+    [a.x, a.y, a.z, b.x, b.y, b.z, c.x, c.y, c.z]
 }
 
 impl Waiting {
@@ -179,10 +179,9 @@ impl Waiting {
         let (posed, model) = (&scene.posed, scene.posed.model);
         for l in 0..LANES {
             let face = self.face[l] as usize;
-            let [a, b, c] = model.faces[face].map(|v| vec3(&posed.position[v as usize]));
-            put(&mut self.corners, l, flat([a, b, c]));
-            let [a, b, c] = &model.normals[face];
-            put(&mut self.normals, l, flat([vec3(a), vec3(b), vec3(c)]));
+            let corners = model.faces[face].map(|v| posed.position[v as usize]);
+            put(&mut self.corners, l, flat(corners));
+            put(&mut self.normals, l, flat(model.normals[face]));
             self.side[l] = if posed.projected.facing[face] < 0 { -1.0 } else { 1.0 };
         }
     }
@@ -194,7 +193,7 @@ impl Waiting {
         for l in 0..LANES {
             let [a, b, c] = triple(get(&self.corners, l));
             let corners = [posed.project(a), posed.project(b), posed.project(c)];
-            put(&mut self.b, l, barycentric(corners, self.x[l], self.y[l]));
+            put(&mut self.b, l, barycentric(corners, vec2(self.x[l], self.y[l])));
         }
     }
 
@@ -208,10 +207,10 @@ impl Waiting {
             Albedo::Corners(corners) => {
                 let mut colors: Nine = [[0.0; LANES]; 9];
                 for l in 0..LANES {
-                    put(&mut colors, l, flat(corners[self.face[l] as usize]));
+                    put(&mut colors, l, flat(corners[self.face[l] as usize].map(Vec3::from)));
                 }
                 for l in 0..LANES {
-                    let unlit = Unlit::between(&triple(get(&colors, l)), get(&self.b, l));
+                    let unlit = Unlit::between(triple(get(&colors, l)).map(Vec3::into), get(&self.b, l));
                     self.unlit.put(l, &unlit);
                 }
             }
@@ -244,7 +243,7 @@ impl Waiting {
     #[inline(always)]
     fn shade<const DERIVATIVES: bool>(&mut self, scene: &Scene) {
         let posed = &scene.posed;
-        let (twist_center, arm) = (vec3(&scene.twist_center), scene.level_arm());
+        let (twist_center, arm) = (scene.twist_center, scene.level_arm());
         for l in 0..LANES {
             let b = get(&self.b, l);
             let normals = triple(get(&self.normals, l));
@@ -253,7 +252,7 @@ impl Waiting {
             put(&mut self.patch.color, l, shaded.color);
             if DERIVATIVES {
                 let corners = triple(get(&self.corners, l));
-                let ray = posed.ray(self.x[l], self.y[l]);
+                let ray = posed.ray(vec2(self.x[l], self.y[l]));
                 let motion = Motion::new(&corners, b, ray, self.patch.z[l], twist_center);
                 for k in 0..3 {
                     let mut row = motion.color_row(&shaded, k);

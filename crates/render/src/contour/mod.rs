@@ -28,6 +28,8 @@ pub(crate) use inner::{Inner, LEAST_STEP, inner_contours};
 pub(crate) use interior::GRAZING;
 pub(crate) use outline::{Band, Piece, outline};
 
+use glam::{Vec3, vec2};
+
 use crate::projected::Region;
 use crate::raster::MISS;
 use crate::view::{Seen, Sink, View};
@@ -40,7 +42,7 @@ impl ContourView<'_> {
     #[inline]
     fn seen<const DERIVATIVES: bool>(&self, place: Place, found: Found) -> Option<Seen> {
         let scene = &self.scene;
-        let (u, v) = (place.x as f32, place.y as f32);
+        let at = vec2(place.x as f32, place.y as f32);
         let footprint = DERIVATIVES && scene.drawing.footprint;
         let around =
             |face: u32, z: f32, inner| footprint.then(|| self.around(&place, face, z, inner));
@@ -48,12 +50,12 @@ impl ContourView<'_> {
             Found::Nothing => return None,
             Found::Outside(piece) => {
                 let around = around(piece.face, 0.0, None);
-                (scene.outside::<DERIVATIVES>(u, v, piece, around.as_ref()), false, true)
+                (scene.outside::<DERIVATIVES>(at, piece, around.as_ref()), false, true)
             }
             Found::Face(hit) => {
                 let Hit { face, inverse_z } = hit;
                 let around = around(face, 1.0 / inverse_z, None);
-                (scene.interior::<DERIVATIVES>(u, v, face, inverse_z, around.as_ref()), true, false)
+                (scene.interior::<DERIVATIVES>(at, face, inverse_z, around.as_ref()), true, false)
             }
             Found::Border(hit, near) => {
                 let Hit { face, inverse_z } = hit;
@@ -64,7 +66,7 @@ impl ContourView<'_> {
                     None => around(face, z, near.inner).map(Beside::Surface),
                 };
                 let beside = beside.as_ref();
-                let pixel = scene.inside::<DERIVATIVES>(u, v, face, inverse_z, near, beside);
+                let pixel = scene.inside::<DERIVATIVES>(at, face, inverse_z, near, beside);
                 (pixel, true, near.edge.is_some())
             }
         };
@@ -94,11 +96,11 @@ impl View for ContourView<'_> {
         }
     }
 
-    fn faces(&self, block: usize, mut each: impl FnMut(usize, usize, u32, [f32; 3])) {
+    fn faces(&self, block: usize, mut each: impl FnMut(usize, usize, u32, Vec3)) {
         let visible = &self.visible[block];
         for (i, &face) in visible.face.iter().enumerate().filter(|(_, face)| **face != MISS) {
             let (x, y) = visible.position(i);
-            each(x, y, face, self.scene.normal(face as usize, x as f32, y as f32));
+            each(x, y, face, self.scene.normal(face as usize, vec2(x as f32, y as f32)));
         }
     }
 

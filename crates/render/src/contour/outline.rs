@@ -1,5 +1,7 @@
 //! The outline of a posed mesh: silhouette edges that separate it from the background.
 
+use glam::{Vec2, vec2};
+
 use crate::model::{Edge, NONE};
 use crate::projected::{Projected, Region};
 
@@ -16,12 +18,12 @@ pub(crate) struct Piece {
     pub(crate) face: u32,
     pub(crate) corners: [u8; 2],
     /// Screen positions of the whole edge's ends \[px\].
-    pub(crate) a: [f32; 2],
-    pub(crate) b: [f32; 2],
+    pub(crate) a: Vec2,
+    pub(crate) b: Vec2,
     /// The part of the edge (share of its screen length) that belongs to the outline.
     pub(crate) range: [f32; 2],
     /// Unit normal in the image, away from the object.
-    pub(crate) outward: [f32; 2],
+    pub(crate) outward: Vec2,
 }
 
 /// The point of a piece next to a pixel.
@@ -30,28 +32,31 @@ pub(crate) struct Foot {
     /// Share of the edge's screen length.
     pub(crate) t: f32,
     /// From the foot to the pixel \[px\].
-    pub(crate) offset: [f32; 2],
+    pub(crate) offset: Vec2,
     pub(crate) distance_squared: f32,
 }
 
 impl Piece {
     #[inline]
-    pub(crate) fn foot(&self, x: f32, y: f32) -> Foot {
-        let d = [self.b[0] - self.a[0], self.b[1] - self.a[1]];
-        let r = [x - self.a[0], y - self.a[1]];
-        let t = ((r[0] * d[0] + r[1] * d[1]) / (d[0] * d[0] + d[1] * d[1]))
-            .max(self.range[0])
-            .min(self.range[1]);
-        let offset = [r[0] - t * d[0], r[1] - t * d[1]];
-        Foot { t, offset, distance_squared: offset[0] * offset[0] + offset[1] * offset[1] }
+    pub(crate) fn foot(&self, at: Vec2) -> Foot {
+        let (d, r) = (self.b - self.a, at - self.a);
+        let t = (r.dot(d) / d.dot(d)).max(self.range[0]).min(self.range[1]);
+        let offset = r - t * d;
+        Foot { t, offset, distance_squared: offset.dot(offset) }
+    }
+
+    /// The point at a share of the edge's screen length.
+    #[inline]
+    pub(crate) fn at(&self, t: f32) -> Vec2 {
+        self.a + t * (self.b - self.a)
     }
 }
 
 /// A silhouette edge: where the number of surface layers changes.
 #[derive(Clone, Copy, Default)]
 struct Segment {
-    a: [f32; 2],
-    b: [f32; 2],
+    a: Vec2,
+    b: Vec2,
     /// Layers gained by crossing from the side where a→b runs up the rows.
     layers: f32,
 }
@@ -74,9 +79,8 @@ pub(crate) fn outline(projected: &Projected, region: &Region, margin: f32) -> Si
     let mut segments = Vec::new();
     let mut candidates = Vec::new();
     for (edge, own, other) in silhouette_edges(projected) {
-        let screen = edge.vertices.map(|v| projected.screen[v as usize]);
         // A drawn face has all its corners in front of the camera.
-        let (a, b) = ([screen[0][0], screen[0][1]], [screen[1][0], screen[1][1]]);
+        let [a, b] = edge.vertices.map(|v| projected.screen[v as usize].truncate());
         let layers = f32::from(other) - f32::from(own);
         segments.push(Segment { a, b, layers });
         let use_own = own == 1 || other == 0;
@@ -85,11 +89,11 @@ pub(crate) fn outline(projected: &Projected, region: &Region, margin: f32) -> Si
         let (a, b) = if use_own { (a, b) } else { (b, a) };
         let sign = f32::from(projected.facing[face as usize]);
         let corners = [corner, (corner + 1) % 3];
-        let d = [b[0] - a[0], b[1] - a[1]];
-        let length = d[0].hypot(d[1]);
+        let d = b - a;
+        let length = d.x.hypot(d.y);
         // Shorter edges are spanned by their neighbors' ends.
         if length > 1e-4 && length.is_finite() {
-            let outward = [-sign * d[1] / length, sign * d[0] / length];
+            let outward = sign * d.perp() / length;
             candidates.push((Piece { face, corners, a, b, range: [0.0, 1.0], outward }, length));
         }
     }
@@ -101,10 +105,8 @@ pub(crate) fn outline(projected: &Projected, region: &Region, margin: f32) -> Si
         for i in 0..count as usize {
             let at = |j: f32| start + (end - start) * j / count;
             let range = [at(i as f32), at(i as f32 + 1.0)];
-            let middle = 0.5 * (range[0] + range[1]);
-            let probe =
-                |k: usize| edge.a[k] + middle * (edge.b[k] - edge.a[k]) + PROBE * edge.outward[k];
-            let free = layers.at(probe(0), probe(1)) < 0.5;
+            let middle = edge.at(0.5 * (range[0] + range[1]));
+            let free = layers.at(middle + PROBE * edge.outward) < 0.5;
             let list = if free { &mut silhouette.outline } else { &mut silhouette.covered };
             list.push(Piece { range, ..edge });
         }
@@ -162,7 +164,7 @@ impl Layers {
         let count = (rows * STRIPS) as usize + 1;
         let strips = |s: &Segment| {
             let strip = |y: f32| ((y - first_row) * STRIPS).floor();
-            let (low, high) = (strip(s.a[1].min(s.b[1])), strip(s.a[1].max(s.b[1])));
+            let (low, high) = (strip(s.a.y.min(s.b.y)), strip(s.a.y.max(s.b.y)));
             if high < 0.0 || low >= count as f32 {
                 return 0..0;
             }
@@ -186,7 +188,7 @@ impl Layers {
         Self { first_row, starts, segments: sorted }
     }
 
-    fn at(&self, x: f32, y: f32) -> f32 {
+    fn at(&self, Vec2 { x, y }: Vec2) -> f32 {
         let strip = ((y - self.first_row) * STRIPS).floor();
         if strip < 0.0 || strip >= (self.starts.len() - 1) as f32 {
             return 0.0;
@@ -195,11 +197,11 @@ impl Layers {
         let mut layers = 0.0;
         for s in &self.segments[self.starts[strip] as usize..self.starts[strip + 1] as usize] {
             // Half-open in y, so that a shared vertex counts once.
-            let up = s.a[1] <= y;
-            if up == (s.b[1] <= y) {
+            let up = s.a.y <= y;
+            if up == (s.b.y <= y) {
                 continue;
             }
-            let crossing = s.a[0] + (y - s.a[1]) / (s.b[1] - s.a[1]) * (s.b[0] - s.a[0]);
+            let crossing = s.a.x + (y - s.a.y) / (s.b.y - s.a.y) * (s.b.x - s.a.x);
             if crossing > x {
                 layers += if up { s.layers } else { -s.layers };
             }
@@ -225,19 +227,18 @@ impl Band {
         let limit = half_width * half_width;
         let mut band = Self { distance_squared: vec![limit; count], piece: vec![NONE; count] };
         for (index, piece) in pieces.enumerate() {
-            let end = |t: f32, k: usize| piece.a[k] + t * (piece.b[k] - piece.a[k]);
-            let span = |k: usize, first: usize, last: usize| {
-                let (p, q) = (end(piece.range[0], k), end(piece.range[1], k));
+            let ends = piece.range.map(|t| piece.at(t));
+            let span = |[p, q]: [f32; 2], first: usize, last: usize| {
                 let low = (p.min(q) - half_width).ceil().max(first as f32);
                 let high = (p.max(q) + half_width).floor().min(last as f32 - 1.0);
                 (low <= high).then(|| low as usize..high as usize + 1)
             };
-            let Some(ys) = span(1, rows.y0, rows.y1) else { continue };
-            let Some(xs) = span(0, rows.x0, rows.x1) else { continue };
+            let Some(ys) = span(ends.map(|end| end.y), rows.y0, rows.y1) else { continue };
+            let Some(xs) = span(ends.map(|end| end.x), rows.x0, rows.x1) else { continue };
             for y in ys {
                 let row = (y - rows.y0) * width;
                 for x in xs.clone() {
-                    let d = piece.foot(x as f32, y as f32).distance_squared;
+                    let d = piece.foot(vec2(x as f32, y as f32)).distance_squared;
                     let at = row + x - rows.x0;
                     if d < band.distance_squared[at] {
                         band.distance_squared[at] = d;

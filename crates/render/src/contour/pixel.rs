@@ -1,6 +1,6 @@
 //! The blended value of one pixel and its derivatives by the pose.
 
-use nalgebra::Vector3;
+use glam::{Vec2, Vec3};
 
 use super::drawing::{Step, falling_step};
 use super::footprint::{Around, Beside, Cut};
@@ -10,16 +10,14 @@ use super::outline::{Foot, Piece};
 use super::scene::Scene;
 use crate::projected::barycentric;
 use crate::shading::surface::{Shaded, posed_normal, shade};
-use crate::shading::vec3::{Vec3, vec3};
 use crate::view::{Pixel, Row, scaled_sum};
 
 impl Scene<'_> {
-    /// A pixel that `face` covers, with what is near.
+    /// The pixel `at` that `face` covers, with what is near.
     #[inline]
     pub(super) fn inside<const DERIVATIVES: bool>(
         &self,
-        x: f32,
-        y: f32,
+        at: Vec2,
         face: u32,
         inverse_z: f32,
         Near { edge, inner, crease }: Near,
@@ -34,59 +32,56 @@ impl Scene<'_> {
         let cut = around.filter(|_| inner.is_none() && edge.is_some());
         let cut = cut.filter(|_| self.drawing.step == Step::Square);
         let whole = around.filter(|_| cut.is_none());
-        let mut pixel = self.interior::<DERIVATIVES>(x, y, face, inverse_z, whole);
+        let mut pixel = self.interior::<DERIVATIVES>(at, face, inverse_z, whole);
         if let Some(crease) = crease {
-            self.soften::<DERIVATIVES>(x, y, inverse_z, &mut pixel, crease);
+            self.soften::<DERIVATIVES>(at, inverse_z, &mut pixel, crease);
         }
         if let Some(inner) = inner {
-            pixel = self.cross::<DERIVATIVES>(x, y, pixel, inner, layers);
+            pixel = self.cross::<DERIVATIVES>(at, pixel, inner, layers);
         }
         if let Some(piece) = edge {
-            let foot = piece.foot(x, y);
+            let foot = piece.foot(at);
             let cut = cut.map(|around| (face, around));
-            self.blend::<DERIVATIVES>([x, y], piece, &foot, -1.0, cut, &mut pixel);
+            self.blend::<DERIVATIVES>(at, piece, &foot, -1.0, cut, &mut pixel);
         }
         pixel
     }
 
-    /// A pixel that no face covers, next to the outline: it shows the color of the nearest outline point.
+    /// The pixel `at` that no face covers, next to the outline: it shows the color of the nearest outline point.
     #[inline]
     pub(super) fn outside<const DERIVATIVES: bool>(
         &self,
-        x: f32,
-        y: f32,
+        at: Vec2,
         piece: &Piece,
         around: Option<&Around>,
     ) -> Pixel {
-        let foot = piece.foot(x, y);
+        let foot = piece.foot(at);
         let mut pixel = self.at_foot::<DERIVATIVES>(piece, &foot);
         let cut = around.filter(|_| self.drawing.step == Step::Square);
         let cut = cut.map(|around| (piece.face, around));
-        self.blend::<DERIVATIVES>([x, y], piece, &foot, 1.0, cut, &mut pixel);
+        self.blend::<DERIVATIVES>(at, piece, &foot, 1.0, cut, &mut pixel);
         pixel
     }
 
-    /// The unblended pixel (x, y) of a face. Its rows are those at its center, or over its area if what is `around` is given.
+    /// The unblended pixel `at` of a face. Its rows are those at its center, or over its area if what is `around` is given.
     #[inline]
     pub(super) fn interior<const DERIVATIVES: bool>(
         &self,
-        x: f32,
-        y: f32,
+        at: Vec2,
         face: u32,
         inverse_z: f32,
         around: Option<&Around>,
     ) -> Pixel {
         let (index, face) = (face, face as usize);
-        let b = barycentric(self.posed.projected.corners(face), x, y);
+        let b = barycentric(self.posed.projected.corners(face), at);
         let shaded = shade::<DERIVATIVES>(&self.posed, &self.lighting, face, b);
         let z = 1.0 / inverse_z;
         let mut pixel =
             Pixel { color: shaded.color, coverage: 1.0, z, depth_weight: 1.0, ..Pixel::default() };
         if DERIVATIVES {
-            let corners =
-                self.posed.model.faces[face].map(|v| vec3(&self.posed.position[v as usize]));
-            let ray = self.posed.ray(x, y);
-            let motion = Motion::new(&corners, b, ray, z, vec3(&self.twist_center));
+            let corners = self.posed.model.faces[face].map(|v| self.posed.position[v as usize]);
+            let ray = self.posed.ray(at);
+            let motion = Motion::new(&corners, b, ray, z, self.twist_center);
             let arm = self.level_arm();
             for k in 0..3 {
                 pixel.color_rows[k] = motion.color_row(&shaded, k);
@@ -95,8 +90,7 @@ impl Scene<'_> {
             }
             pixel.z_row = motion.z_row;
             if let Some(around) = around {
-                pixel.color_rows =
-                    self.rows_over_footprint([x, y], z, index, around, &shaded, None);
+                pixel.color_rows = self.rows_over_footprint(at, z, index, around, &shaded, None);
             }
         }
         pixel
@@ -115,16 +109,16 @@ impl Scene<'_> {
             ..Pixel::default()
         };
         if DERIVATIVES {
-            let slide = self.slide(piece, foot, &point, &ends);
+            let slide = self.slide(piece, foot, point, ends);
             self.foot_rows(piece, &shaded, &slide, &mut pixel);
         }
         pixel
     }
 
-    /// Unit normal of a face at pixel (x, y), camera frame.
-    pub(super) fn normal(&self, face: usize, x: f32, y: f32) -> Vec3 {
+    /// Unit normal of a face at a pixel, camera frame.
+    pub(super) fn normal(&self, face: usize, at: Vec2) -> Vec3 {
         let projected = &self.posed.projected;
-        let b = barycentric(projected.corners(face), x, y);
+        let b = barycentric(projected.corners(face), at);
         posed_normal(&self.posed, face, b)
     }
 
@@ -148,7 +142,7 @@ impl Scene<'_> {
     #[inline]
     fn blend<const DERIVATIVES: bool>(
         &self,
-        at: [f32; 2],
+        at: Vec2,
         piece: &Piece,
         foot: &Foot,
         side: f32,
@@ -196,25 +190,21 @@ impl Scene<'_> {
     pub(super) fn distance_row(&self, piece: &Piece, foot: &Foot, side: f32) -> Row {
         let distance = foot.distance_squared.sqrt();
         let outward =
-            if distance > 1e-3 { foot.offset.map(|o| o * side / distance) } else { piece.outward };
+            if distance > 1e-3 { foot.offset * side / distance } else { piece.outward };
         let (_, point, _) = self.on_edge(piece, foot.t);
         // The foot moves by J v along the outward normal, and the signed distance shrinks by as much.
-        self.image_motion(outward, &point).map(|v| -v)
+        self.image_motion(outward, point).map(|v| -v)
     }
 
     /// Barycentric coordinates and camera-frame position at screen share `t` of an edge, and its ends.
     #[inline]
-    pub(super) fn on_edge(
-        &self,
-        piece: &Piece,
-        t: f32,
-    ) -> ([f32; 3], Vector3<f32>, [Vector3<f32>; 2]) {
+    pub(super) fn on_edge(&self, piece: &Piece, t: f32) -> ([f32; 3], Vec3, [Vec3; 2]) {
         let face = self.posed.model.faces[piece.face as usize];
         let ids = piece.corners.map(|c| face[c as usize] as usize);
         let ends = ids.map(|v| self.posed.position[v]);
         let (wa, wb) = (
-            (1.0 - t) * self.posed.projected.screen[ids[0]][2],
-            t * self.posed.projected.screen[ids[1]][2],
+            (1.0 - t) * self.posed.projected.screen[ids[0]].z,
+            t * self.posed.projected.screen[ids[1]].z,
         );
         let share = wb / (wa + wb);
         let mut b = [0.0; 3];
@@ -225,17 +215,16 @@ impl Scene<'_> {
 
     /// Motion of the image of `point` along the image direction `direction` \[px\] by the twist.
     #[inline]
-    pub(super) fn image_motion(&self, direction: [f32; 2], point: &Vector3<f32>) -> Row {
+    pub(super) fn image_motion(&self, direction: Vec2, point: Vec3) -> Row {
         let a = self.image_gradient(direction, point);
-        row(vec3(&a), vec3(&(point - self.twist_center).cross(&a)))
+        row(a, (point - self.twist_center).cross(a))
     }
 
     /// Gradient by the point of its image position along `direction`.
     #[inline]
-    fn image_gradient(&self, direction: [f32; 2], point: &Vector3<f32>) -> Vector3<f32> {
-        let x = self.posed.focal[0] * direction[0];
-        let y = self.posed.focal[1] * direction[1];
-        Vector3::new(x, y, -(x * point.x + y * point.y) / point.z) / point.z
+    fn image_gradient(&self, direction: Vec2, point: Vec3) -> Vec3 {
+        let by = self.posed.focal * direction;
+        by.extend(-by.dot(point.truncate()) / point.z) / point.z
     }
 
     /// How far the material point under the foot slides along its edge (share of the edge in space).
@@ -243,24 +232,18 @@ impl Scene<'_> {
     /// The foot stays where (π(E) − p)·τ = 0 with the edge's image direction τ; differentiating this gives
     /// dt = (−τ·dπ(E) + s n·(dπ(B) − dπ(A))/ℓ) / (τ·J(B − A)), and zero at an end of the edge.
     #[inline]
-    fn slide(
-        &self,
-        piece: &Piece,
-        foot: &Foot,
-        point: &Vector3<f32>,
-        ends: &[Vector3<f32>; 2],
-    ) -> Row {
+    fn slide(&self, piece: &Piece, foot: &Foot, point: Vec3, ends: [Vec3; 2]) -> Row {
         if foot.t <= piece.range[0] || foot.t >= piece.range[1] {
             return [0.0; 6];
         }
-        let d = [piece.b[0] - piece.a[0], piece.b[1] - piece.a[1]];
-        let length = d[0].hypot(d[1]);
-        let tau = d.map(|v| v / length);
-        let speed = self.image_gradient(tau, point).dot(&(ends[1] - ends[0]));
+        let d = piece.b - piece.a;
+        let length = d.x.hypot(d.y);
+        let tau = d / length;
+        let speed = self.image_gradient(tau, point).dot(ends[1] - ends[0]);
         let along = self.image_motion(tau, point);
         // The offset from foot to pixel is s n, and perpendicular to τ.
-        let turn_a = self.image_motion(foot.offset, &ends[0]);
-        let turn_b = self.image_motion(foot.offset, &ends[1]);
+        let turn_a = self.image_motion(foot.offset, ends[0]);
+        let turn_b = self.image_motion(foot.offset, ends[1]);
         let mut out = [0.0; 6];
         for i in 0..6 {
             out[i] = (-along[i] + (turn_b[i] - turn_a[i]) / length) / speed;

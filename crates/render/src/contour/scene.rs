@@ -1,24 +1,23 @@
 //! What the contour mode draws.
 
-use nalgebra::Vector3;
+use glam::Vec3;
 
 use super::drawing::Drawing;
 use crate::posed::Posed;
 use crate::shading::surface::PosedLight;
-use crate::shading::vec3::{Vec3, vec3};
 
 /// A posed, lit model, and the point about which twists turn (camera frame).
 pub(crate) struct Scene<'a> {
     pub(crate) posed: Posed<'a>,
     pub(crate) lighting: PosedLight,
     pub(crate) drawing: Drawing,
-    pub(crate) twist_center: Vector3<f32>,
+    pub(crate) twist_center: Vec3,
 }
 
 impl Scene<'_> {
     /// The model's center from where twists turn.
     #[inline(always)]
     pub(super) fn level_arm(&self) -> Vec3 {
-        vec3(&(self.posed.center - self.twist_center))
+        self.posed.center - self.twist_center
     }
 }

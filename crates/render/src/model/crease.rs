@@ -19,7 +19,7 @@ impl RenderModel {
         let (first, second) = (edge.corner as usize, edge.other_corner as usize);
         // The other face runs through the edge the other way.
         [(first, (second + 1) % 3), ((first + 1) % 3, second)].into_iter().any(|(i, j)| {
-            let turned = self.normals[own][i].dot(&self.normals[other][j]) < 1.0 - LEAST_TURN;
+            let turned = self.normals[own][i].dot(self.normals[other][j]) < 1.0 - LEAST_TURN;
             turned
                 || match &self.albedo {
                     Albedo::Uniform(_) => false,

@@ -3,11 +3,12 @@
 use nalgebra::{Point3, Vector3};
 
 use super::{Albedo, CREASE, Mipmap, ModelError, RenderModel, topology};
+use crate::precision::{double, single};
 
 impl RenderModel {
     /// Welded vertices, mesh frame \[m\].
     pub fn positions(&self) -> Vec<Point3<f64>> {
-        self.positions.iter().map(|p| self.center + p.cast::<f64>()).collect()
+        self.positions.iter().map(|p| self.center + double(p)).collect()
     }
 
     /// The faces drawn, as indices into [`Self::positions`].
@@ -53,14 +54,14 @@ impl RenderModel {
         if let Some(vertex) = positions.iter().position(|p| !finite(p)) {
             return Err(ModelError::NotFinite { vertex });
         }
-        self.positions = positions.iter().map(|p| (p - self.center).cast()).collect();
+        self.positions = positions.iter().map(|p| single(&(p - self.center))).collect();
         let face_normal = |f: &[u32; 3]| {
             let [a, b, c] = f.map(|v| positions[v as usize]);
             (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or(Vector3::zeros())
         };
         let face_normals: Vec<Vector3<f64>> = self.faces.iter().map(face_normal).collect();
         let normals = topology::corner_normals(positions, &self.faces, &face_normals, CREASE);
-        self.normals = normals.iter().map(|n| n.map(|v| v.cast())).collect();
+        self.normals = normals.iter().map(|n| n.each_ref().map(single)).collect();
         self.find_creases();
         Ok(self)
     }
@@ -115,7 +116,7 @@ mod tests {
         let same = model.clone().with_positions(&model.positions()).unwrap();
         assert_eq!(same.positions, model.positions);
         for (a, b) in same.normals.iter().flatten().zip(model.normals.iter().flatten()) {
-            assert!((a - b).norm() < 1e-5);
+            assert!(a.distance(*b) < 1e-5);
         }
         let colors = model.vertex_colors().unwrap();
         let same = model.clone().with_colors(&colors).unwrap();

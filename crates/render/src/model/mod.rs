@@ -7,12 +7,15 @@ mod normal_adjoint;
 mod texels;
 mod topology;
 
+use glam::Vec3;
 use nalgebra::{Matrix3, Point3, Vector3};
 use prehend_geometry::TriMesh;
 use prehend_geometry::topology::is_collapsed;
 
 pub(crate) use mipmap::{Cell, Mipmap, Texel};
 pub(crate) use topology::{Edge, NONE};
+
+use crate::precision::single;
 
 /// Faces that meet at less than this angle share a smooth normal \[rad\] (37.5 degrees).
 const CREASE: f64 = 0.6545;
@@ -94,11 +97,11 @@ pub(crate) enum Albedo {
 #[derive(Clone, Debug)]
 pub struct RenderModel {
     /// Welded positions, mesh frame, relative to `center` \[m\].
-    pub(crate) positions: Vec<Vector3<f32>>,
+    pub(crate) positions: Vec<Vec3>,
     /// Welded vertex indices of each face.
     pub(crate) faces: Vec<[u32; 3]>,
     /// Unit normals of each face's corners, mesh frame.
-    pub(crate) normals: Vec<[Vector3<f32>; 3]>,
+    pub(crate) normals: Vec<[Vec3; 3]>,
     pub(crate) edges: Vec<Edge>,
     /// Edges at which normals, texture coordinates or colors jump.
     pub(crate) creases: Vec<u32>,
@@ -144,9 +147,9 @@ impl RenderModel {
         let (albedo, texel_density) = albedo(mesh, &kept)?;
         let radius = mesh.vertices.iter().map(|v| (v - center).norm()).fold(0.0, f64::max);
         let mut model = Self {
-            positions: positions.iter().map(|p| (p - center).cast()).collect(),
+            positions: positions.iter().map(|p| single(&(p - center))).collect(),
             faces,
-            normals: normals.iter().map(|n| n.map(|v| v.cast())).collect(),
+            normals: normals.iter().map(|n| n.each_ref().map(single)).collect(),
             closed: edges.iter().all(|e| e.other != NONE),
             edges,
             creases: Vec::new(),

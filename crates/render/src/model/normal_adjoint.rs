@@ -3,6 +3,7 @@
 use nalgebra::{Point3, Vector3};
 
 use super::{CREASE, RenderModel, topology};
+use crate::precision::double;
 
 impl RenderModel {
     /// Carries adjoints of the corner normals (one entry a face) back to the vertices and adds them to `positions`.
@@ -14,7 +15,7 @@ impl RenderModel {
         normals: &[[Vector3<f64>; 3]],
         positions: &mut [Vector3<f64>],
     ) {
-        let place: Vec<Point3<f64>> = self.positions.iter().map(|p| p.cast().into()).collect();
+        let place: Vec<Point3<f64>> = self.positions.iter().map(|p| double(p).into()).collect();
         let corners = |f: usize| self.faces[f].map(|v| place[v as usize]);
         let area = |f: usize| {
             let [a, b, c] = corners(f);
@@ -113,7 +114,7 @@ mod tests {
         model.add_normal_adjoint(&weights, &mut gradient);
         let value = |model: &RenderModel| -> f64 {
             let normals = model.normals.iter().flatten();
-            normals.zip(weights.iter().flatten()).map(|(n, w)| n.cast::<f64>().dot(w)).sum()
+            normals.zip(weights.iter().flatten()).map(|(n, w)| double(n).dot(w)).sum()
         };
         for vertex in [60, 107, 223, 340] {
             for axis in 0..3 {

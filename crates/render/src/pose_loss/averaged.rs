@@ -1,5 +1,6 @@
 //! Pixels that are means of finer ones.
 
+use glam::Vec3;
 use rayon::prelude::*;
 
 use crate::view::{Pixel, Row, Seen, View, scaled_sum};
@@ -188,7 +189,7 @@ impl<V: View> View for Averaged<V> {
         }
     }
 
-    fn faces(&self, _block: usize, mut each: impl FnMut(usize, usize, u32, [f32; 3])) {
+    fn faces(&self, _block: usize, mut each: impl FnMut(usize, usize, u32, Vec3)) {
         let (samples, middle) = (self.samples, self.samples / 2);
         for block in 0..self.fine.blocks() {
             self.fine.faces(block, |x, y, face, normal| {

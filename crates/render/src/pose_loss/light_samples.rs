@@ -1,6 +1,7 @@
 //! What the estimation of light needs from a posed model and an image.
 
-use nalgebra::{Isometry3, Vector3};
+use glam::vec2;
+use nalgebra::Isometry3;
 
 use super::target::Target;
 use crate::light::LightSample;
@@ -24,10 +25,10 @@ pub fn light_samples(
     let pixels = inner_pixels(&visible, target, margin);
     let step = pixels.len().div_ceil(most.max(1)).max(1);
     let sample = |&(face, x, y): &(usize, usize, usize)| {
-        let b = barycentric(posed.projected.corners(face), x as f32, y as f32);
+        let b = barycentric(posed.projected.corners(face), vec2(x as f32, y as f32));
         LightSample {
             albedo: albedo(&posed, face, b).color,
-            normal: Vector3::from(posed_normal(&posed, face, b)),
+            normal: posed_normal(&posed, face, b).into(),
             observed: target.color[y * target.camera.width + x],
         }
     };

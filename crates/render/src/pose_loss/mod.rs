@@ -291,7 +291,7 @@ fn picture(view: &impl View, camera: &Camera) -> PoseImage {
         });
         view.faces(block, |x, y, face, normal| {
             let at = y * camera.width + x;
-            image.normal[at] = normal;
+            image.normal[at] = normal.into();
             image.face[at] = Some(face);
         });
     }

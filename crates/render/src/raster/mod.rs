@@ -2,6 +2,7 @@
 
 mod small;
 
+use glam::Vec2;
 use nalgebra::Isometry3;
 use rayon::prelude::*;
 
@@ -55,8 +56,7 @@ pub(crate) struct Visible {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Seen {
     /// The pixel.
-    pub(crate) x: f32,
-    pub(crate) y: f32,
+    pub(crate) at: Vec2,
     /// The face, and its 1/Z \[1/m\].
     pub(crate) face: u32,
     pub(crate) inverse_z: f32,
@@ -68,14 +68,14 @@ impl Visible {
         Self { region, face: vec![MISS; count], inverse_z: vec![0.0; count] }
     }
 
-    /// What the blocks show at the pixel nearest to (x, y), if anything.
-    pub(crate) fn seen(blocks: &[Self], x: f32, y: f32) -> Option<Seen> {
-        let (x, y) = (x.round(), y.round());
-        if x < 0.0 || y < 0.0 {
+    /// What the blocks show at the pixel nearest to a point of the image, if anything.
+    pub(crate) fn seen(blocks: &[Self], at: Vec2) -> Option<Seen> {
+        let at = at.round();
+        if at.x < 0.0 || at.y < 0.0 {
             return None;
         }
-        let (face, inverse_z) = Self::at(blocks, x as usize, y as usize)?;
-        Some(Seen { x, y, face, inverse_z })
+        let (face, inverse_z) = Self::at(blocks, at.x as usize, at.y as usize)?;
+        Some(Seen { at, face, inverse_z })
     }
 
     /// The face that the blocks, [`BAND`] rows each, show at pixel (x, y), and its 1/Z \[1/m\]; `None` where there is none.
@@ -102,18 +102,18 @@ impl Visible {
     pub(crate) fn draw(&mut self, projected: &Projected, face: u32) {
         let [a, b, c] = projected.corners(face as usize);
         let region = self.region;
-        let Some((y0, y1)) = centers(span(a[1], b[1], c[1]), region.y0, region.y1) else { return };
-        let Some((x0, x1)) = centers(span(a[0], b[0], c[0]), region.x0, region.x1) else { return };
-        let area = signed_area(&[a, b, c]);
+        let Some((y0, y1)) = centers(span(a.y, b.y, c.y), region.y0, region.y1) else { return };
+        let Some((x0, x1)) = centers(span(a.x, b.x, c.x), region.x0, region.x1) else { return };
+        let area = signed_area([a, b, c]);
         let scale = 1.0 / area;
         let width = region.width();
         for y in y0..=y1 {
             let py = y as f32;
-            let (ay, by, cy) = (a[1] - py, b[1] - py, c[1] - py);
+            let (ay, by, cy) = (a.y - py, b.y - py, c.y - py);
             let row = (y - region.y0) * width;
             for x in x0..=x1 {
                 let px = x as f32;
-                let (ax, bx, cx) = (a[0] - px, b[0] - px, c[0] - px);
+                let (ax, bx, cx) = (a.x - px, b.x - px, c.x - px);
                 // The other face of an edge has exactly the opposite number, so that none of its pixels is lost.
                 let e = [
                     (bx * cy - by * cx) * scale,
@@ -123,7 +123,7 @@ impl Visible {
                 if (e[0] < 0.0) | (e[1] < 0.0) | (e[2] < 0.0) {
                     continue;
                 }
-                let inverse_z = e[0] * a[2] + e[1] * b[2] + e[2] * c[2];
+                let inverse_z = e[0] * a.z + e[1] * b.z + e[2] * c.z;
                 let at = row + x - region.x0;
                 if inverse_z > self.inverse_z[at] {
                     self.inverse_z[at] = inverse_z;
@@ -142,7 +142,7 @@ pub(crate) fn bin(projected: &Projected, region: &Region) -> Vec<Vec<u32>> {
     let mut bins: Vec<Vec<u32>> = (0..count).map(|_| Vec::with_capacity(expected)).collect();
     for (f, _) in projected.facing.iter().enumerate().filter(|(_, facing)| **facing != 0) {
         let [a, b, c] = projected.corners(f);
-        let Some((top, bottom)) = centers(span(a[1], b[1], c[1]), region.y0, region.y1) else {
+        let Some((top, bottom)) = centers(span(a.y, b.y, c.y), region.y0, region.y1) else {
             continue;
         };
         for bin in &mut bins[(top - region.y0) / BAND..=(bottom - region.y0) / BAND] {

@@ -1,5 +1,6 @@
 //! Drawing many faces: those of a fine mesh cover hardly a pixel each, so they are treated side by side, without branches.
 
+use glam::vec3;
 use pulp::{Arch, NullaryFnOnce};
 
 use super::{Visible, span};
@@ -72,11 +73,8 @@ impl SideBySide {
     fn gather(&mut self, projected: &Projected, faces: &[u32]) {
         for (l, &face) in faces.iter().enumerate() {
             let [a, b, c] = projected.corners(face as usize);
-            for i in 0..3 {
-                self.corners[i][l] = a[i];
-                self.corners[3 + i][l] = b[i];
-                self.corners[6 + i][l] = c[i];
-            }
+            let corners = [a.x, a.y, a.z, b.x, b.y, b.z, c.x, c.y, c.z];
+            self.corners.iter_mut().zip(corners).for_each(|(lanes, value)| lanes[l] = value);
         }
     }
 
@@ -89,27 +87,27 @@ impl SideBySide {
         let width = region.width() as i32;
         for l in 0..LANES {
             let corner = |k: usize| {
-                [self.corners[3 * k][l], self.corners[3 * k + 1][l], self.corners[3 * k + 2][l]]
+                vec3(self.corners[3 * k][l], self.corners[3 * k + 1][l], self.corners[3 * k + 2][l])
             };
             let (a, b, c) = (corner(0), corner(1), corner(2));
-            let [x_low, x_high] = span(a[0], b[0], c[0]);
-            let [y_low, y_high] = span(a[1], b[1], c[1]);
+            let [x_low, x_high] = span(a.x, b.x, c.x);
+            let [y_low, y_high] = span(a.y, b.y, c.y);
             let (x_low, y_low) = (x_low.max(left).min(right), y_low.max(top).min(bottom));
             let x0 = whole_above(x_low);
             let y0 = whole_above(y_low);
             let reach = ACROSS as f32;
             self.large[l] = (x_high >= x0 + reach) | (y_high >= y0 + reach);
-            let scale = 1.0 / signed_area(&[a, b, c]);
+            let scale = 1.0 / signed_area([a, b, c]);
             let mut all = 0;
             for i in 0..ACROSS {
                 for j in 0..ACROSS {
                     let (px, py) = (x0 + j as f32, y0 + i as f32);
-                    let (ax, bx, cx) = (a[0] - px, b[0] - px, c[0] - px);
-                    let (ay, by, cy) = (a[1] - py, b[1] - py, c[1] - py);
+                    let (ax, bx, cx) = (a.x - px, b.x - px, c.x - px);
+                    let (ay, by, cy) = (a.y - py, b.y - py, c.y - py);
                     let e0 = (bx * cy - by * cx) * scale;
                     let e1 = (cx * ay - cy * ax) * scale;
                     let e2 = (ax * by - ay * bx) * scale;
-                    let inverse_z = e0 * a[2] + e1 * b[2] + e2 * c[2];
+                    let inverse_z = e0 * a.z + e1 * b.z + e2 * c.z;
                     let covered =
                         (e0 >= 0.0) & (e1 >= 0.0) & (e2 >= 0.0) & (px <= right) & (py <= bottom);
                     self.inverse_z[i * ACROSS + j][l] = inverse_z;

@@ -1,6 +1,7 @@
 //! The contour mode: a hard z-buffer inside, a smooth step across outlines and inner contours, with the same equations as
 //! the loss of a pose.
 
+use glam::vec2;
 use nalgebra::Vector3;
 use prehend_autodiff::{Fwd, LocalFunction};
 use rayon::prelude::*;
@@ -156,9 +157,9 @@ impl Contours {
                     return 0.0;
                 };
                 let (x, y) = visible.position(i);
-                let (x, y) = (x as f32, y as f32);
-                let foot = fold.piece.foot(x, y);
-                fold.side(&projected, [x, y], &foot, visible.inverse_z[i]).unwrap_or(0.0)
+                let at = vec2(x as f32, y as f32);
+                let foot = fold.piece.foot(at);
+                fold.side(&projected, at, &foot, visible.inverse_z[i]).unwrap_or(0.0)
             };
             let side = crease.iter().enumerate().map(side).collect();
             Block { visible, edge, inner, crease, side }
@@ -186,7 +187,7 @@ impl Contours {
     #[inline]
     fn step(&self, frame: &Frame, piece: &Piece, pixel: [f64; 2], side: f64) -> Step {
         let range = piece.range.map(f64::from);
-        let foot = Foot { pixel, range, outward: piece.outward.map(f64::from), side };
+        let foot = Foot { pixel, range, outward: piece.outward.to_array().map(f64::from), side };
         let [share, distance] = foot.evaluate(foot_inputs(frame, piece));
         let (alpha, slope) = falling_step(distance, self.half_width);
         Step { piece: *piece, foot, share, alpha, slope }
@@ -327,8 +328,8 @@ impl Visibility for Contours {
             let side = if own_is_near { -1.0 } else { 1.0 };
             let step = self.step(frame, &inner.piece, at, side);
             let (part, other) = if own_is_near {
-                let (u, v, face, _) = inner.behind;
-                let behind = [f64::from(u), f64::from(v)];
+                let (behind, face, _) = inner.behind;
+                let behind = behind.to_array().map(f64::from);
                 let (part, hit) = at_pixel(frame, face as usize, behind, 0.0);
                 (part, Site::Ray(behind, hit))
             } else {

@@ -2,12 +2,14 @@
 
 use std::sync::Arc;
 
+use glam::Vec3;
 use nalgebra::{Matrix3, Vector3};
 
 use super::scene::{FaceId, Scene};
 use crate::camera::Camera;
 use crate::model::{Edge, NONE, RenderModel};
 use crate::posed::{Posed, level};
+use crate::precision::double;
 use crate::projected::{Projected, Region};
 
 /// One object in the camera frame.
@@ -42,7 +44,7 @@ pub(super) struct Flat {
     /// Those at which normals or colors of an object jump.
     pub(super) creases: Vec<Edge>,
     /// Column, row \[px\] and 1/Z \[1/m\]; 1/Z is 0 where it is not in front of the camera.
-    pub(super) screen: Vec<[f32; 3]>,
+    pub(super) screen: Vec<Vec3>,
     pub(super) region: Region,
 }
 
@@ -69,8 +71,7 @@ impl Frame {
             let rotation = *object.t_cam_model.rotation.to_rotation_matrix().matrix();
             let center = object.center().coords;
             let (level, level_dz) = level(model, &camera, center.z);
-            let place = |p: &Vector3<f32>| rotation * p.cast::<f64>() + center;
-            frame.position.extend(model.positions.iter().map(place));
+            frame.position.extend(model.positions.iter().map(|p| rotation * double(p) + center));
             let shift = |ids: &[u32; 3]| ids.map(|v| v + first_vertex as u32);
             frame.faces.extend(model.faces.iter().map(shift));
             let projected = Posed::new(model, &camera, &object.t_cam_model, margin).projected;

@@ -6,6 +6,7 @@ use prehend_autodiff::Fwd;
 use super::frame::Frame;
 use super::sums::{Sums, TexelUse};
 use crate::model::Albedo;
+use crate::precision::double;
 use crate::shading::{Chunks, Shader, SurfacePoint, by_parameters, by_point};
 
 /// A scene with its shader.
@@ -39,7 +40,7 @@ impl<Sh: Shader> Lit<'_, Sh> {
         let body = &self.frame.bodies[body_index];
         let own = face - body.first_face;
         let corners = self.frame.corners(face);
-        let normals = body.model.normals[own].map(|n| n.cast::<f64>());
+        let normals = body.model.normals[own].each_ref().map(double);
         let normal_sum = body.rotation * mix(&normals, b);
         let length = normal_sum.norm();
         let normal = match length > LEAST_NORMAL {
@@ -89,7 +90,7 @@ impl<Sh: Shader> Lit<'_, Sh> {
             let in_model = body.rotation.tr_mul(&by_sum);
             let face = sums.face(sample.face);
             for (k, normal) in body.model.normals[own].iter().enumerate() {
-                by_b[k] += normal.cast::<f64>().dot(&in_model);
+                by_b[k] += double(normal).dot(&in_model);
                 face.normal[k] += in_model * sample.b[k];
             }
         }

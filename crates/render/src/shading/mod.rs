@@ -4,7 +4,6 @@ mod derivative;
 mod first_order;
 mod lamps;
 pub(crate) mod surface;
-pub(crate) mod vec3;
 
 use nalgebra::Vector3;
 use prehend_autodiff::Scalar;

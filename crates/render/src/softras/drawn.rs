@@ -1,5 +1,6 @@
 //! Which faces of a mesh the mode draws.
 
+use glam::Vec3;
 use nalgebra::Point3;
 
 use super::face::Face;
@@ -48,10 +49,10 @@ impl Drawn {
 pub(crate) fn project(
     camera: &Camera,
     vertices: impl Iterator<Item = Point3<f64>>,
-    flat: &[[f32; 3]],
+    flat: &[Vec3],
 ) -> Vec<[f64; 3]> {
-    let place = |(p, flat): (Point3<f64>, &[f32; 3])| {
-        let seen = if flat[2] == 0.0 { None } else { camera.project(&p) };
+    let place = |(p, flat): (Point3<f64>, &Vec3)| {
+        let seen = if flat.z == 0.0 { None } else { camera.project(&p) };
         seen.map_or([0.0; 3], |uv| [uv.x, uv.y, p.z])
     };
     vertices.zip(flat).map(place).collect()

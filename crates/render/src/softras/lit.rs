@@ -102,7 +102,7 @@ impl<T: Number> Lit<T> {
         let mut out = Self { color: unlit, normal, turning: unlit, along: unlit_along, level };
         for k in 0..3 {
             let light = lighting.object[k];
-            let light = [is(light[0]), is(light[1]), is(light[2])];
+            let light = [is(light.x), is(light.y), is(light.z)];
             let along_normal = light[0] * normal[0] + light[1] * normal[1] + light[2] * normal[2];
             let factor = is(lighting.ambient[k]) + along_normal;
             // Surfaces facing away are black, whatever the pose.

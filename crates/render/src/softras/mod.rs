@@ -52,6 +52,7 @@ mod tests;
 
 use std::sync::OnceLock;
 
+use glam::Vec3;
 use nalgebra::{Isometry3, Point3};
 
 use crate::camera::Camera;
@@ -59,6 +60,7 @@ use crate::light::Light;
 use crate::mode::SoftRasOptions;
 use crate::model::RenderModel;
 use crate::posed::Posed;
+use crate::precision::double;
 use crate::projected::Region;
 use crate::shading::surface::PosedLight;
 use crate::view::{Seen, View};
@@ -99,11 +101,11 @@ impl<'a> SoftRasView<'a> {
         let settings = Settings::new(options, camera);
         let mut posed = Posed::new(model, camera, pose, settings.reach);
         let region = posed.projected.region.union(also);
-        let lighting = PosedLight::new(light, &posed.rotation);
+        let lighting = PosedLight::new(light, posed.rotation);
         let (mut drawn, mut screen) = (Drawn { faces: Vec::new(), ids: Vec::new() }, Vec::new());
         if posed.projected.region != Region::EMPTY {
             let (rotation, center) = (pose.rotation.to_rotation_matrix(), pose * model.center());
-            let vertices = model.positions.iter().map(|p| center + rotation * p.cast::<f64>());
+            let vertices = model.positions.iter().map(|p| center + rotation * double(p));
             screen = project(camera, vertices, &posed.projected.screen);
             let facing = &mut posed.projected.facing;
             drawn = Drawn::new(&model.faces, &screen, |_| model.closed, facing, &settings);
@@ -207,7 +209,7 @@ impl View for SoftRasView<'_> {
         self.arch.dispatch(Walk { view: self, block, each_run: Shown::<DERIVATIVES, _>(each) });
     }
 
-    fn faces(&self, block: usize, each: impl FnMut(usize, usize, u32, [f32; 3])) {
+    fn faces(&self, block: usize, each: impl FnMut(usize, usize, u32, Vec3)) {
         self.arch.dispatch(Walk { view: self, block, each_run: Centers(each) });
     }
 }
@@ -244,7 +246,7 @@ where
 /// The faces at the pixels' centers.
 struct Centers<F>(F);
 
-impl<F: FnMut(usize, usize, u32, [f32; 3])> EachRun for Centers<F> {
+impl<F: FnMut(usize, usize, u32, Vec3)> EachRun for Centers<F> {
     #[inline(always)]
     fn run<T: Number>(
         &mut self,

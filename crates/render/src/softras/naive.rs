@@ -1,5 +1,6 @@
 //! The equations of the mode once more, for tests: in f64 and normalized device coordinates, every face at every pixel.
 
+use glam::Vec3;
 use nalgebra::{Isometry3, Vector2, Vector3};
 
 use crate::camera::Camera;
@@ -7,6 +8,7 @@ use crate::light::Light;
 use crate::mode::SoftRasOptions;
 use crate::model::{Albedo, RenderModel};
 use crate::posed::Posed;
+use crate::precision::double;
 use crate::shading::surface::albedo;
 use crate::shading::{Shader, SurfacePoint};
 
@@ -82,8 +84,8 @@ pub(super) fn naive_areas(model: &RenderModel, pose: &Isometry3<f64>, camera: &C
 /// The corners of all faces: x and y in normalized device coordinates, and Z.
 fn naive_faces(model: &RenderModel, pose: &Isometry3<f64>, camera: &Camera) -> Vec<[[f64; 3]; 3]> {
     let scale = 2.0 / camera.width.min(camera.height) as f64;
-    let place = |p: &Vector3<f32>| {
-        let p = pose.rotation * p.cast::<f64>() + (pose * model.center()).coords;
+    let place = |p: &Vec3| {
+        let p = pose.rotation * double(p) + (pose * model.center()).coords;
         [
             (camera.fx * p.x / p.z + camera.cx) * scale,
             (camera.fy * p.y / p.z + camera.cy) * scale,
@@ -126,7 +128,7 @@ pub(super) fn naive_picture(
     let parameters = light.parameters();
     let shaded = |fragment: &NaiveFragment| {
         let NaiveFragment { face, b, .. } = *fragment;
-        let corners = model.normals[face].map(|n| n.cast::<f64>());
+        let corners = model.normals[face].each_ref().map(double);
         let normal = corners[0] * b[0] + corners[1] * b[1] + corners[2] * b[2];
         let side = f64::from(posed.projected.facing[face]);
         let normal = pose.rotation * normal.normalize() * side;

@@ -4,7 +4,8 @@
 
 use std::sync::OnceLock;
 
-use nalgebra::{Point3, Vector3};
+use glam::Vec3;
+use nalgebra::Point3;
 
 use super::blend::Blend;
 use super::face::Face;
@@ -15,6 +16,7 @@ use super::run::{Run, places};
 use super::settings::Settings;
 use crate::camera::Camera;
 use crate::posed::Posed;
+use crate::precision::single;
 use crate::shading::surface::{PosedLight, posed_normal};
 use crate::view::{Pixel, Seen};
 
@@ -125,7 +127,7 @@ impl Scene<'_> {
     }
 
     /// The unit normal (camera frame) of a face at barycentric coordinates, and the model's index of the face.
-    pub(crate) fn normal(&self, face: u32, b: [f32; 3]) -> (u32, [f32; 3]) {
+    pub(crate) fn normal(&self, face: u32, b: [f32; 3]) -> (u32, Vec3) {
         let id = self.ids[face as usize];
         (id, posed_normal(&self.posed, id as usize, b))
     }
@@ -158,7 +160,7 @@ impl Scene<'_> {
         let settings = &self.settings;
         let (focal, principal) = (self.posed.focal, self.posed.principal);
         let focal = [is(focal[0]), is(focal[1])];
-        let center: Vector3<f32> = self.twist_center.coords.cast();
+        let center = single(&self.twist_center.coords);
         let ray = Ray {
             direction: [
                 (column - is(principal[0])) / focal[0],
@@ -239,12 +241,12 @@ impl Scene<'_> {
             let normals = turning[k];
             let mut in_camera = [zero; 3];
             for n in 0..3 {
-                let axis = self.lighting.rotation[n];
+                let axis = self.lighting.rotation.row(n);
                 in_camera[n] =
-                    normals[0] * is(axis[0]) + normals[1] * is(axis[1]) + normals[2] * is(axis[2]);
+                    normals[0] * is(axis.x) + normals[1] * is(axis.y) + normals[2] * is(axis.z);
             }
             let light = self.lighting.camera[k];
-            let turn = cross(in_camera, [is(light[0]), is(light[1]), is(light[2])]);
+            let turn = cross(in_camera, [is(light.x), is(light.y), is(light.z)]);
             let mut out = color_sums[k].row(&ray);
             for n in 0..3 {
                 out[n + 3] = out[n + 3] + turn[n];

@@ -11,7 +11,7 @@ pub(super) fn decision(frame: &Frame, contours: &Contours, place: Place) -> Opti
     let Decision { face, edge, inner, crease } = contours.decision(place.block, place.i);
     let (x, y) = (place.x as f32, place.y as f32);
     let ends_here = |piece: &Piece| {
-        let t = piece.foot(x, y).t;
+        let t = piece.foot(glam::vec2(x, y)).t;
         let [low, high] = piece.range;
         (low > 0.0 && t <= low) || (high < 1.0 && t >= high)
     };
@@ -24,7 +24,7 @@ pub(super) fn decision(frame: &Frame, contours: &Contours, place: Place) -> Opti
     let pieces = [edge, inner.map(|inner| &inner.piece), fold].into_iter().flatten();
     let own = face.map(|face| face as u32);
     let behind = inner.map(|inner| inner.behind);
-    if pieces.clone().any(ends_here) || own.into_iter().chain(behind.map(|b| b.2)).any(grazes) {
+    if pieces.clone().any(ends_here) || own.into_iter().chain(behind.map(|b| b.1)).any(grazes) {
         return None;
     }
     let ids = |piece: &Piece| [piece.face, u32::from(piece.corners[0])];
@@ -32,7 +32,7 @@ pub(super) fn decision(frame: &Frame, contours: &Contours, place: Place) -> Opti
     out.extend(crease.map(|(_, side)| u32::from(side > 0.0)));
     out.extend(own);
     out.extend(pieces.flat_map(ids));
-    out.extend(behind.map(|(u, v, face, _)| [u as u32, v as u32, face]).into_iter().flatten());
+    out.extend(behind.map(|(at, face, _)| [at.x as u32, at.y as u32, face]).into_iter().flatten());
     Some(out)
 }
 

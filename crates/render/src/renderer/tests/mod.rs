@@ -365,7 +365,7 @@ fn singular_points_have_finite_derivatives() {
         let (_, gradient) = finite(&model, at(0.0, 0.0, -1.0));
         assert_eq!(gradient.objects[0].twist, Vector6::zeros());
         let mut model = model.clone();
-        model.normals.fill([Vector3::zeros(); 3]);
+        model.normals.fill([glam::Vec3::ZERO; 3]);
         finite(&model, pose);
     }
 }
