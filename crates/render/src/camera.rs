@@ -85,6 +85,9 @@ impl Camera {
     /// When a number is not finite, a focal length is not positive or the image is empty.
     pub fn check(&self) -> Result<(), CameraError> {
         let Self { width, height, .. } = *self;
+        if width == 0 || height == 0 {
+            return Err(CameraError::Empty { width, height });
+        }
         let k = self.k();
         if let Some((index, &value)) = k.iter().enumerate().find(|(_, v)| !v.is_finite()) {
             return Err(CameraError::NotFinite { index, value });
@@ -93,9 +96,6 @@ impl Camera {
             if value <= 0.0 {
                 return Err(CameraError::FocalLength { name, value });
             }
-        }
-        if width == 0 || height == 0 {
-            return Err(CameraError::Empty { width, height });
         }
         Ok(())
     }

@@ -8,12 +8,13 @@
 //! the object, and [`Remap`] pinhole images of those through a lens.
 //!
 //! Cameras follow OpenCV (x right, y down, z forward; pixel centers at integers); lengths are in meters; colors
-//! are in 0..=1 as stored in files.
+//! are in 0..=1 as stored in files. Poses and cameras of graphics engines, in glam's types, are converted by [`graphics`].
 
 mod backend;
 pub mod camera;
 mod contour;
 pub mod distortion;
+pub mod graphics;
 pub mod image;
 pub mod light;
 mod look_at;
@@ -40,6 +41,7 @@ pub use backend::{
 };
 pub use camera::{Camera, CameraError};
 pub use distortion::{BrownConrady, Distortion, DistortionError, KannalaBrandt, Remap};
+pub use graphics::{MatrixError, ModelView};
 pub use image::{DepthImage, ImageError, Mask, RgbImage};
 pub use light::{Light, LightError, LightSample};
 pub use look_at::look_at;

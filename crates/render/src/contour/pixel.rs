@@ -189,8 +189,7 @@ impl Scene<'_> {
     #[inline]
     pub(super) fn distance_row(&self, piece: &Piece, foot: &Foot, side: f32) -> Row {
         let distance = foot.distance_squared.sqrt();
-        let outward =
-            if distance > 1e-3 { foot.offset * side / distance } else { piece.outward };
+        let outward = if distance > 1e-3 { foot.offset * side / distance } else { piece.outward };
         let (_, point, _) = self.on_edge(piece, foot.t);
         // The foot moves by J v along the outward normal, and the signed distance shrinks by as much.
         self.image_motion(outward, point).map(|v| -v)

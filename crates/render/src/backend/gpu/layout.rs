@@ -1,8 +1,9 @@
 //! The structs shared with the shaders, field by field as in the module that declares each.
 //!
-//! Vectors of three take sixteen bytes there unless a scalar follows.
+//! Vectors of three take sixteen bytes there unless a scalar follows. What bytemuck takes as plain data has no gaps in it.
 
 use bytemuck::{Pod, Zeroable};
+use glam::{Vec2, Vec3, Vec4};
 
 /// Most levels of a texture's pyramid: enough for 8 million texels a side.
 pub(super) const LEVELS: usize = 24;
@@ -52,8 +53,8 @@ pub(super) const PICTURE_COLUMNS: usize = 9;
 pub(super) struct Params {
     pub(super) size: [u32; 2],
     pub(super) tiles: [u32; 2],
-    pub(super) focal: [f32; 2],
-    pub(super) principal: [f32; 2],
+    pub(super) focal: Vec2,
+    pub(super) principal: Vec2,
     pub(super) bounds: [u32; 4],
     pub(super) vertices: u32,
     pub(super) faces: u32,
@@ -67,7 +68,7 @@ pub(super) struct Params {
     pub(super) levels: u32,
     pub(super) margin: f32,
     pub(super) half_width: f32,
-    pub(super) albedo: [f32; 3],
+    pub(super) albedo: Vec3,
     pub(super) least_step: f32,
     pub(super) color_weight: f32,
     pub(super) mask_weight: f32,
@@ -95,26 +96,26 @@ pub(super) struct Params {
 #[derive(Clone, Copy, Pod, Zeroable)]
 pub(super) struct Hypothesis {
     /// Columns, the fourth entries unused; likewise below.
-    pub(super) rotation: [[f32; 4]; 3],
-    pub(super) center: [f32; 3],
+    pub(super) rotation: [Vec4; 3],
+    pub(super) center: Vec3,
     pub(super) alive: u32,
-    pub(super) camera_light: [[f32; 4]; 3],
-    pub(super) object_light: [[f32; 4]; 3],
-    pub(super) ambient: [f32; 3],
+    pub(super) camera_light: [Vec4; 3],
+    pub(super) object_light: [Vec4; 3],
+    pub(super) ambient: Vec3,
     pub(super) flat_light: u32,
-    pub(super) offset: [f32; 3],
+    pub(super) offset: Vec3,
     pub(super) level: f32,
     pub(super) level_dz: f32,
     pub(super) pad: [u32; 3],
-    pub(super) image_center: [f32; 4],
+    pub(super) image_center: Vec4,
 }
 
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 pub(super) struct Corner {
-    pub(super) normal: [f32; 3],
+    pub(super) normal: Vec3,
     pub(super) pad: u32,
-    pub(super) paint: [f32; 3],
+    pub(super) paint: Vec3,
     pub(super) pad_2: u32,
 }
 
@@ -131,7 +132,7 @@ pub(super) struct Edge {
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 pub(super) struct TargetPixel {
-    pub(super) color: [f32; 3],
+    pub(super) color: Vec3,
     pub(super) coverage: f32,
     pub(super) depth: f32,
     pub(super) occluder: f32,

@@ -1,5 +1,6 @@
 //! Models, targets, settings and hypotheses in the form that the shaders read.
 
+use glam::{DVec2, DVec3, DVec4, Mat3, Vec2, Vec3, Vec4};
 use prehend_geometry::RobustKernel;
 
 use super::layout::{
@@ -14,12 +15,13 @@ use crate::mode::{Mode, SoftRasOptions};
 use crate::model::{Albedo, RenderModel};
 use crate::pose_loss::{LossOptions, Target};
 use crate::posed;
+use crate::precision::single;
 use crate::projected::Region;
 use crate::softras::Settings;
 
 /// Positions, mesh frame [m].
-pub(super) fn positions(model: &RenderModel) -> Vec<[f32; 4]> {
-    model.positions.iter().map(|p| [p.x, p.y, p.z, 0.0]).collect()
+pub(super) fn positions(model: &RenderModel) -> Vec<Vec4> {
+    model.positions.iter().map(|p| p.extend(0.0)).collect()
 }
 
 /// Vertices of each face.
@@ -30,12 +32,12 @@ pub(super) fn faces(model: &RenderModel) -> Vec<[u32; 4]> {
 /// Normal and color or texture coordinates of each corner, three a face.
 pub(super) fn corners(model: &RenderModel) -> Vec<Corner> {
     let paint = |face: usize, k: usize| match &model.albedo {
-        Albedo::Uniform(_) => [0.0; 3],
-        Albedo::Corners(colors) => colors[face][k],
-        Albedo::Texture(_, uvs) => [uvs[face][k][0], uvs[face][k][1], 0.0],
+        Albedo::Uniform(_) => Vec3::ZERO,
+        Albedo::Corners(colors) => colors[face][k].into(),
+        Albedo::Texture(_, uvs) => Vec2::from(uvs[face][k]).extend(0.0),
     };
     let corner = |face: usize, k: usize| Corner {
-        normal: model.normals[face][k].into(),
+        normal: model.normals[face][k],
         pad: 0,
         paint: paint(face, k),
         pad_2: 0,
@@ -75,7 +77,7 @@ pub(super) fn texels(model: &RenderModel) -> Vec<[u32; 2]> {
 /// The target, pixel by pixel.
 pub(super) fn target(target: &Target) -> Vec<TargetPixel> {
     let pixel = |(at, (&color, &coverage)): (usize, (&[f32; 3], &f32))| TargetPixel {
-        color,
+        color: color.into(),
         coverage,
         depth: target.depth.as_ref().map_or(0.0, |d| d.pixels()[at]),
         occluder: target.occluder.as_ref().map_or(0.0, |o| o.pixels()[at]),
@@ -91,8 +93,8 @@ pub(super) fn params(problem: &PoseProblem) -> Option<Params> {
     let mut params: Params = bytemuck::Zeroable::zeroed();
     params.size = [camera.width, camera.height].map(|v| v as u32);
     params.tiles = [camera.width, camera.height].map(|v| v.div_ceil(TILE) as u32);
-    params.focal = [camera.fx, camera.fy].map(|v| v as f32);
-    params.principal = [camera.cx, camera.cy].map(|v| v as f32);
+    params.focal = DVec2::new(camera.fx, camera.fy).as_vec2();
+    params.principal = DVec2::new(camera.cx, camera.cy).as_vec2();
     params.bounds = bounds(&target.bounds);
     params.vertices = model.positions.len() as u32;
     params.faces = model.faces.len() as u32;
@@ -129,7 +131,7 @@ fn set_albedo(params: &mut Params, model: &RenderModel) -> Option<()> {
     match &model.albedo {
         Albedo::Uniform(color) => {
             params.albedo_kind = ALBEDO_UNIFORM;
-            params.albedo = *color;
+            params.albedo = Vec3::from(*color);
         }
         Albedo::Corners(_) => params.albedo_kind = ALBEDO_CORNERS,
         Albedo::Texture(map, _) => {
@@ -198,33 +200,32 @@ fn set_loss(params: &mut Params, options: &LossOptions, has_depth: bool) {
 /// A hypothesis; one that is not finite is marked so that nothing of it is computed with.
 pub(super) fn hypothesis(problem: &PoseProblem, h: &backend::Hypothesis) -> Hypothesis {
     let model = &problem.model;
-    let rotation = h.t_cam_object.rotation.to_rotation_matrix().matrix().cast::<f32>();
-    let center = (h.t_cam_object * model.center()).coords.cast::<f32>();
+    let rotation = Mat3::from(h.t_cam_object.rotation.to_rotation_matrix().matrix().cast());
+    let center = single(&(h.t_cam_object * model.center()).coords);
     // Beyond this, squares overflow.
-    let alive = rotation.iter().chain(center.iter()).all(|v| v.abs() < 1e18);
+    let alive = center.abs().cmplt(Vec3::splat(1e18)).all() && rotation.is_finite();
     let mut out: Hypothesis = bytemuck::Zeroable::zeroed();
     if !alive {
         return out;
     }
     let (level, level_dz) = posed::level(model, &problem.target.camera, center.z as f64);
     let (level, level_dz) = (level as f32, level_dz as f32);
-    let column = |v: nalgebra::Vector3<f32>| [v.x, v.y, v.z, 0.0];
-    let light = h.light.directional.map(|d| d.cast::<f32>());
-    out.rotation = [0, 1, 2].map(|k| column(rotation.column(k).into_owned()));
-    out.center = center.into();
+    let light = h.light.directional.each_ref().map(single);
+    out.rotation = [0, 1, 2].map(|k| rotation.col(k).extend(0.0));
+    out.center = center;
     out.alive = 1;
-    out.camera_light = light.map(column);
-    out.object_light = light.map(|d| column(rotation.tr_mul(&d)));
-    out.ambient = h.light.ambient.map(|a| a as f32);
-    out.offset = h.light.offset.map(|a| a as f32);
-    out.flat_light = light.iter().all(|d| *d == nalgebra::Vector3::zeros()).into();
+    out.camera_light = light.map(|d| d.extend(0.0));
+    out.object_light = light.map(|d| (rotation.transpose() * d).extend(0.0));
+    out.ambient = DVec3::from(h.light.ambient).as_vec3();
+    out.offset = DVec3::from(h.light.offset).as_vec3();
+    out.flat_light = (light == [Vec3::ZERO; 3]).into();
     (out.level, out.level_dz) = (level, level_dz);
     if let (Mode::SoftRas(_), true) = (&problem.loss.mode, center.z > posed::NEAR) {
         let camera = &problem.target.camera;
         let p = h.t_cam_object * model.center();
-        let at = [camera.fx * p.x / p.z + camera.cx, camera.fy * p.y / p.z + camera.cy];
-        let [x, y] = at.map(f64::round);
-        out.image_center = [x, y, at[0] - x, at[1] - y].map(|v| v as f32);
+        let (x, y) = (camera.fx * p.x / p.z + camera.cx, camera.fy * p.y / p.z + camera.cy);
+        let center = DVec4::new(x.round(), y.round(), x - x.round(), y - y.round());
+        out.image_center = center.as_vec4();
     }
     out
 }
