@@ -49,6 +49,8 @@ pub struct Object {
     pub(crate) surface: ClosestPoints,
     /// Outward unit normal of each face that `surface` may answer; zero for a face without area.
     pub(crate) normals: Vec<Vector3<f64>>,
+    /// Unit normals at the corners of these faces, smooth over the surface.
+    pub(crate) corner_normals: Vec<[Vector3<f64>; 3]>,
     pub(crate) samples: Vec<SurfaceSample>,
     pub(crate) model: Arc<RenderModel>,
 }
@@ -118,10 +120,12 @@ impl Object {
         if !(inertial.mass.is_finite() && inertial.mass > 0.0) {
             return Err(fail(format!("the mass {} kg is not positive", inertial.mass)));
         }
+        let smooth = solid.vertex_normals();
         let unit = |f| solid.area_vector(f).try_normalize(0.0).unwrap_or_else(Vector3::zeros);
         Ok(Self {
             name: name.to_owned(),
             normals: (0..solid.faces.len()).map(unit).collect(),
+            corner_normals: solid.faces.iter().map(|f| f.map(|v| smooth[v as usize])).collect(),
             surface: ClosestPoints::new(&solid).map_err(|e| fail(e.to_string()))?,
             samples: surface_samples(&solid, SURFACE_SAMPLES, seed),
             model: Arc::new(RenderModel::new(&mesh).map_err(|e| fail(e.to_string()))?),

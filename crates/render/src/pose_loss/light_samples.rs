@@ -12,7 +12,10 @@ use crate::raster::{Visible, rasterize};
 use crate::shading::surface::{albedo, posed_normal};
 
 /// What [`Light::fit`](crate::Light::fit) needs: unlit color, normal and observed color where the object is seen inside the
-/// mask, and `margin` pixels to the left, to the right, above and below too; of `most` of these pixels at most, spread evenly over them.
+/// mask, and `margin` pixels to the left, to the right, above and below too; of about `most` of these pixels at most.
+///
+/// Which pixels are asked depends on the mask alone, so that those that a moving object covers come and go one by one, and the
+/// light does not jump.
 pub fn light_samples(
     model: &RenderModel,
     t_cam_object: &Isometry3<f64>,
@@ -22,8 +25,9 @@ pub fn light_samples(
 ) -> Vec<LightSample> {
     let posed = Posed::new(model, &target.camera, t_cam_object, 0.0);
     let visible = rasterize(&posed.projected, &posed.projected.region);
-    let pixels = inner_pixels(&visible, target, margin);
-    let step = pixels.len().div_ceil(most.max(1)).max(1);
+    let masked = target.coverage.iter().filter(|coverage| **coverage >= 1.0).count();
+    let lattice = Lattice::new(masked.div_ceil(most.max(1)));
+    let pixels = inner_pixels(&visible, target, margin, &lattice);
     let sample = |&(face, x, y): &(usize, usize, usize)| {
         let b = barycentric(posed.projected.corners(face), vec2(x as f32, y as f32));
         LightSample {
@@ -32,11 +36,34 @@ pub fn light_samples(
             observed: target.color[y * target.camera.width + x],
         }
     };
-    pixels.iter().skip(step - 1).step_by(step).map(sample).collect()
+    pixels.iter().map(sample).collect()
 }
 
-/// Faces, columns and rows of the pixels that show the object alone.
-fn inner_pixels(visible: &[Visible], target: &Target, margin: usize) -> Vec<(usize, usize, usize)> {
+/// One pixel of so many, spread evenly: a lattice of rank one.
+struct Lattice {
+    step: usize,
+    /// Columns by which a row is shifted from the one above: by the golden section of a step.
+    shift: usize,
+}
+
+impl Lattice {
+    fn new(step: usize) -> Self {
+        let step = step.max(1);
+        Self { step, shift: (0.618 * step as f64).round() as usize }
+    }
+
+    fn has(&self, x: usize, y: usize) -> bool {
+        (x + y * self.shift).is_multiple_of(self.step)
+    }
+}
+
+/// Faces, columns and rows of the pixels of a lattice that show the object alone.
+fn inner_pixels(
+    visible: &[Visible],
+    target: &Target,
+    margin: usize,
+    lattice: &Lattice,
+) -> Vec<(usize, usize, usize)> {
     let seen = |x: usize, y: usize| Visible::at(visible, x, y);
     let inside = |x: usize, y: usize| {
         let shift = |center: usize, by: usize| (center + by).checked_sub(margin);
@@ -49,7 +76,7 @@ fn inner_pixels(visible: &[Visible], target: &Target, margin: usize) -> Vec<(usi
     let mut pixels = Vec::new();
     for block in visible {
         for y in block.region.y0..block.region.y1 {
-            for x in block.region.x0..block.region.x1 {
+            for x in (block.region.x0..block.region.x1).filter(|x| lattice.has(*x, y)) {
                 let at = y * target.camera.width + x;
                 let Some((face, inverse_z)) = seen(x, y).filter(|_| target.coverage[at] >= 1.0)
                 else {

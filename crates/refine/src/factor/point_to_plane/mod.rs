@@ -8,6 +8,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use nalgebra::{SVector, Vector2, Vector3};
 use prehend_autodiff::lie::twist_row;
+use prehend_geometry::closest::Closest;
 use prehend_render::Mask;
 use rayon::prelude::*;
 
@@ -50,7 +51,7 @@ impl Default for PointToPlaneSettings {
 /// Distances from the masked depth points to the planes that touch the surface where it is nearest to them (Chen and
 /// Medioni, 1992), where the points are as the state corrects the camera ([`CameraCalibrationError`](crate::scene::CameraCalibrationError)).
 ///
-/// A depth point is not of a face that looks away from the camera: such a match counts as it is far, and pulls nothing. What
+/// A depth point is not of a surface that looks away from the camera: such a match counts as it is far, and pulls nothing. What
 /// the points' errors have in common, a smooth field, is eliminated.
 pub struct PointToPlaneFactor {
     object: Arc<Object>,
@@ -80,8 +81,8 @@ const N: usize = 11;
 struct Residual {
     /// Signed distance from the surface \[m\].
     distance: f64,
-    /// Whether the point can be of the face that is nearest.
-    faces_camera: bool,
+    /// Whether the point can be of the surface that is nearest: from 0, which looks away from the camera, to 1.
+    facing: f64,
     /// Nearest place of the surface \[m\], and the outward direction from there to the point (camera frame).
     surface: Vector3<f64>,
     away: Vector3<f64>,
@@ -89,6 +90,9 @@ struct Residual {
 
 /// How far in front of the hand a point must be to be of something else \[m\].
 const IN_FRONT: f64 = 6e-3;
+
+/// Surface that is inclined to the line of sight by less than this sine counts less, down to nothing where it looks away.
+const FACING: f64 = 0.2;
 
 /// The share of points that must be left without those near the border.
 const LEAST_SHARE: f64 = 0.25;
@@ -148,11 +152,24 @@ impl PointToPlaneFactor {
             let surface = (state.t_cam_object * closest.point).coords;
             let offset = place.coords - surface;
             let distance = offset.norm().copysign(normal.dot(&offset));
-            let faces_camera = normal.dot(&surface) < 0.0;
+            let facing = self.facing(&closest, state, &surface);
             let away = if distance.abs() > 1e-9 { offset / distance } else { normal };
-            Some(Residual { distance, faces_camera, surface, away })
+            Some(Residual { distance, facing, surface, away })
         };
         self.points.par_iter().with_min_len(TASK).map(residual).collect()
+    }
+
+    /// How much the surface looks at the camera at a place of it (camera frame).
+    ///
+    /// By normals that are smooth over the surface, and in a smooth step: the cost must not jump as points pass from face to face.
+    fn facing(&self, closest: &Closest, state: &State, place: &Vector3<f64>) -> f64 {
+        let corners = &self.object.corner_normals[closest.face as usize];
+        let normal: Vector3<f64> =
+            corners.iter().zip(closest.barycentric).map(|(normal, b)| normal * b).sum();
+        let cosine = -(state.t_cam_object * normal).dot(place) / (normal.norm() * place.norm());
+        // Nothing where there is no normal, either.
+        let x = if cosine > 0.0 { (cosine / FACING).min(1.0) } else { 0.0 };
+        x * x * (3.0 - 2.0 * x)
     }
 
     /// The field that the distances are best seen with, and what it leaves of them.
@@ -160,21 +177,20 @@ impl PointToPlaneFactor {
         let distance = |r: &Option<Residual>| r.as_ref().map_or(0.0, |r| r.distance);
         let distances: Vec<f64> = residuals.iter().map(distance).collect();
         let weighting = self.weighting();
-        let usable = |i: usize| residuals[i].as_ref().is_some_and(|r| r.faces_camera);
-        let weight = |i: usize, left: f64| if usable(i) { weighting.weight(left) } else { 0.0 };
+        let facing = |i: usize| residuals[i].as_ref().map_or(0.0, |r| r.facing);
+        let weight = |i: usize, left: f64| facing(i) * weighting.weight(left);
         let fitted = self.field.as_ref().and_then(|field| field.fit(&distances, weight));
-        let mut fit = fitted.unwrap_or_else(|| Fit::without_field(&distances, weight));
-        // What is not of the surface says nothing of the field either.
-        for i in (0..distances.len()).filter(|i| !usable(*i)) {
-            fit.left[i] = distances[i];
-        }
-        fit
+        fitted.unwrap_or_else(|| Fit::without_field(&distances, weight))
     }
 
     /// Nats at the fitted field.
-    fn cost_of(&self, fit: &Fit) -> f64 {
+    fn cost_of(&self, residuals: &[Option<Residual>], fit: &Fit) -> f64 {
         let weighting = self.weighting();
-        fit.left.iter().map(|left| weighting.cost(*left)).sum::<f64>() + fit.cost
+        let cost = |(left, residual): (&f64, &Option<Residual>)| {
+            let Some(Residual { distance, facing, .. }) = residual else { return 0.0 };
+            facing * weighting.cost(*left) + (1.0 - facing) * weighting.cost(*distance)
+        };
+        fit.left.iter().zip(residuals).map(cost).sum::<f64>() + fit.cost
     }
 
     fn weighting(&self) -> Weighting {
@@ -198,7 +214,8 @@ impl Factor for PointToPlaneFactor {
     }
 
     fn cost(&self, state: &State) -> f64 {
-        self.cost_of(&self.fit(&self.residuals(state)))
+        let residuals = self.residuals(state);
+        self.cost_of(&residuals, &self.fit(&residuals))
     }
 
     fn linearize(&self, state: &State, equations: &mut NormalEquations) -> f64 {
@@ -238,7 +255,7 @@ impl Factor for PointToPlaneFactor {
             hessian -= field.lost(&fit, hessian.nrows(), derivatives);
         }
         add_to(equations, &gradient, &hessian);
-        self.cost_of(&fit)
+        self.cost_of(&residuals, &fit)
     }
 }
 
@@ -283,6 +300,20 @@ mod tests {
             let factor = factor(&frame, gp_sigma).with_patches(Arc::clone(&patches));
             assert_by_patches(&factor, &state, &patches, 1e-9);
         }
+    }
+
+    #[test]
+    fn the_cost_does_not_jump_as_points_pass_from_face_to_face() {
+        let (frame, state) = fixture(0);
+        let factor = factor(&frame, 1e-3);
+        let near = State { t_cam_object: scene().truth, ..state };
+        let turned = |i: i32| {
+            let twist = [8e-3, 3e-3, 0.0, 0.0, 1e-5 * f64::from(i), 0.0];
+            factor.cost(&near.retract(&[Block::ObjectPose], &twist))
+        };
+        let costs: Vec<f64> = (0..400).map(turned).collect();
+        let jump = costs.windows(2).map(|w| (w[1] - w[0]).abs()).fold(0.0, f64::max);
+        assert!(jump < 0.02, "{jump} nat");
     }
 
     #[test]

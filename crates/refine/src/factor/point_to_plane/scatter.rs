@@ -21,13 +21,13 @@ pub(crate) struct NoiseEstimate {
 const PATCHES: f64 = 36.0;
 
 /// Points and patches by which scatter can be judged.
-const LEAST_POINTS: usize = 3;
+const LEAST_POINTS: f64 = 3.0;
 const LEAST_PATCHES: usize = 6;
 
 /// Number, sum and sum of squares of the residuals in a patch.
 #[derive(Clone, Copy, Default)]
 struct Patch {
-    count: usize,
+    count: f64,
     sum: f64,
     squares: f64,
 }
@@ -48,17 +48,17 @@ impl PointToPlaneFactor {
         let mut patches = vec![Patch::default(); across * (patch(top, bottom) + 1)];
         let limit = self.settings.noise.kernel.scale().unwrap_or(f64::INFINITY);
         for (point, residual) in self.points.iter().zip(self.residuals(state)) {
-            let Some(Residual { distance, faces_camera: true, .. }) = residual else { continue };
+            let Some(Residual { distance, facing, .. }) = residual else { continue };
             let residual = distance.clamp(-limit, limit);
             let (x, y) = point.pixel;
             let patch = &mut patches[patch(top, y) * across + patch(left, x)];
-            patch.count += 1;
-            patch.sum += residual;
-            patch.squares += residual * residual;
+            patch.count += facing;
+            patch.sum += facing * residual;
+            patch.squares += facing * residual * residual;
         }
         patches.retain(|patch| patch.count >= LEAST_POINTS);
-        let total = patches.iter().map(|patch| patch.count).sum::<usize>() as f64;
-        let of_means = patches.iter().map(|p| p.sum * p.sum / p.count as f64).sum::<f64>() / total;
+        let total = patches.iter().map(|patch| patch.count).sum::<f64>();
+        let of_means = patches.iter().map(|p| p.sum * p.sum / p.count).sum::<f64>() / total;
         let of_points = patches.iter().map(|patch| patch.squares).sum::<f64>() / total;
         if !(of_means > 0.0 && patches.len() >= LEAST_PATCHES) {
             return None;
