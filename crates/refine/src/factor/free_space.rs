@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Point3, Vector2, Vector3};
 use prehend_render::{Camera, DepthImage};
 
+use super::facing::facing;
 use crate::problem::{Block, Factor, NoiseModel, Rows, State};
 use crate::scene::{Frame, Object};
 
@@ -25,7 +26,8 @@ impl Default for FreeSpaceSettings {
     }
 }
 
-/// How far samples of the object's surface lie in front of what the depth image measured on their pixels.
+/// How far samples of the object's surface lie in front of what the depth image measured on the four pixels about them, each with its bilinear
+/// weight, so that the cost does not jump as a sample passes from pixel to pixel.
 ///
 /// The mask is not asked, so that what it misses counts too: background seen beside the hand says that no object is in
 /// front of it.
@@ -36,13 +38,13 @@ pub struct FreeSpaceFactor {
     settings: FreeSpaceSettings,
 }
 
-/// A sample in front of what was measured.
+/// A sample in front of what was measured on a pixel.
 struct InFront {
-    /// The sample, in the camera frame.
-    point: Point3<f64>,
-    /// Depth on its pixel as measured \[m\].
+    /// The share of the sample that is on this pixel and looks at the camera.
+    share: f64,
+    /// Depth there as measured \[m\].
     measured: f64,
-    /// How far it is in front of that, beyond the margin \[m\].
+    /// How far the sample is in front of that, beyond the margin \[m\].
     beyond: f64,
 }
 
@@ -57,30 +59,31 @@ impl FreeSpaceFactor {
         }
     }
 
-    /// The sample at `point` with its `normal` (object frame), if it is in front of measured depth.
+    /// Where the sample at `place` (camera frame), of which so much looks at the camera and which is seen at `pixel`, is in front of
+    /// measured depth.
     fn in_front(
         &self,
         state: &State,
-        reprojected: &nalgebra::Isometry3<f64>,
-        (point, normal): (&Point3<f64>, &Vector3<f64>),
-    ) -> Option<InFront> {
-        let place = state.t_cam_object * point;
-        if (state.t_cam_object * normal).dot(&place.coords) >= 0.0 {
-            return None;
-        }
-        let pixel = self.camera.project(&(reprojected * point))?;
-        let (u, v) = (pixel.x.round(), pixel.y.round());
-        if u < 0.0 || v < 0.0 {
-            return None;
-        }
-        let measured = self.depth.get(u as usize, v as usize)?;
-        if !measured.is_finite() || measured <= 0.0 {
-            return None;
-        }
-        let measured = f64::from(measured);
-        let depth = state.camera.depth_scale * measured + state.camera.depth_bias;
-        let beyond = depth - place.z - self.settings.margin;
-        (beyond > 0.0).then_some(InFront { point: place, measured, beyond })
+        place: Point3<f64>,
+        facing: f64,
+        pixel: Vector2<f64>,
+    ) -> impl Iterator<Item = InFront> {
+        let (first, part) = (pixel.map(f64::floor), pixel - pixel.map(f64::floor));
+        [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)].into_iter().filter_map(move |(i, j)| {
+            let (u, v) = (first.x + i, first.y + j);
+            if u < 0.0 || v < 0.0 {
+                return None;
+            }
+            let measured = self.depth.get(u as usize, v as usize)?;
+            if !measured.is_finite() || measured <= 0.0 {
+                return None;
+            }
+            let measured = f64::from(measured);
+            let depth = state.camera.depth_scale * measured + state.camera.depth_bias;
+            let beyond = depth - place.z - self.settings.margin;
+            let share = facing * (1.0 - (i - part.x).abs()) * (1.0 - (j - part.y).abs());
+            (beyond > 0.0 && share > 0.0).then_some(InFront { share, measured, beyond })
+        })
     }
 
     /// One of so many samples is taken.
@@ -99,13 +102,17 @@ impl Factor for FreeSpaceFactor {
         let samples = self.object.samples.iter().step_by(self.stride());
         let weighting = self.settings.noise.weighting(samples.len());
         for sample in samples {
-            let surface = (&sample.point, &sample.normal);
-            let Some(sample) = self.in_front(state, &reprojected, surface) else { continue };
-            rows.add(sample.beyond, &weighting, |row| {
-                // Which pixel a sample falls on is taken as it is: depth's steps have no derivative.
-                row.object_point(state, &sample.point, &-Vector3::z());
-                row.block(Block::Camera, &[sample.measured, 1.0, 0.0, 0.0, 0.0]);
-            });
+            let place = state.t_cam_object * sample.point;
+            let facing = facing(&(state.t_cam_object * sample.normal), &place.coords);
+            let pixel = self.camera.project(&(reprojected * sample.point));
+            let Some(pixel) = pixel.filter(|_| facing > 0.0) else { continue };
+            for InFront { share, measured, beyond } in self.in_front(state, place, facing, pixel) {
+                rows.add(beyond, &weighting.shared(share), |row| {
+                    // Which pixels a sample falls on is taken as it is: depth's steps have no derivative.
+                    row.object_point(state, &place, &-Vector3::z());
+                    row.block(Block::Camera, &[measured, 1.0, 0.0, 0.0, 0.0]);
+                });
+            }
         }
     }
 }

@@ -1,6 +1,7 @@
 //! The evidence, one kind a file: each factor is a negative log-likelihood of the state, up to a constant.
 
 mod chamfer_depth;
+mod facing;
 mod free_space;
 mod hand_depth;
 mod patch_sums;

@@ -61,6 +61,11 @@ impl Weighting {
     pub fn weight(&self, r: f64) -> f64 {
         self.information * self.kernel.weight(r * r)
     }
+
+    /// What a residual counts that is worth `share` of one.
+    pub(crate) fn shared(&self, share: f64) -> Self {
+        Self { information: share * self.information, ..*self }
+    }
 }
 
 #[cfg(test)]

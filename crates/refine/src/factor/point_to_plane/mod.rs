@@ -8,12 +8,12 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use nalgebra::{SVector, Vector2, Vector3};
 use prehend_autodiff::lie::twist_row;
-use prehend_geometry::closest::Closest;
 use prehend_render::Mask;
 use rayon::prelude::*;
 
 pub(crate) use self::scatter::NoiseEstimate;
 use self::smooth_field::{Fit, SmoothField};
+use super::facing::facing;
 use super::patch_sums::{PatchSums, add_to};
 use crate::error::RefineError;
 use crate::problem::{Factor, NoiseModel, NormalEquations, State, SurfacePatches, Weighting};
@@ -91,9 +91,6 @@ struct Residual {
 /// How far in front of the hand a point must be to be of something else \[m\].
 const IN_FRONT: f64 = 6e-3;
 
-/// Surface that is inclined to the line of sight by less than this sine counts less, down to nothing where it looks away.
-const FACING: f64 = 0.2;
-
 /// The share of points that must be left without those near the border.
 const LEAST_SHARE: f64 = 0.25;
 
@@ -152,24 +149,15 @@ impl PointToPlaneFactor {
             let surface = (state.t_cam_object * closest.point).coords;
             let offset = place.coords - surface;
             let distance = offset.norm().copysign(normal.dot(&offset));
-            let facing = self.facing(&closest, state, &surface);
+            // By normals that are smooth over the surface: the cost must not jump as points pass from face to face.
+            let corners = &self.object.corner_normals[closest.face as usize];
+            let smooth: Vector3<f64> =
+                corners.iter().zip(closest.barycentric).map(|(normal, b)| normal * b).sum();
+            let facing = facing(&(state.t_cam_object * smooth), &surface);
             let away = if distance.abs() > 1e-9 { offset / distance } else { normal };
             Some(Residual { distance, facing, surface, away })
         };
         self.points.par_iter().with_min_len(TASK).map(residual).collect()
-    }
-
-    /// How much the surface looks at the camera at a place of it (camera frame).
-    ///
-    /// By normals that are smooth over the surface, and in a smooth step: the cost must not jump as points pass from face to face.
-    fn facing(&self, closest: &Closest, state: &State, place: &Vector3<f64>) -> f64 {
-        let corners = &self.object.corner_normals[closest.face as usize];
-        let normal: Vector3<f64> =
-            corners.iter().zip(closest.barycentric).map(|(normal, b)| normal * b).sum();
-        let cosine = -(state.t_cam_object * normal).dot(place) / (normal.norm() * place.norm());
-        // Nothing where there is no normal, either.
-        let x = if cosine > 0.0 { (cosine / FACING).min(1.0) } else { 0.0 };
-        x * x * (3.0 - 2.0 * x)
     }
 
     /// The field that the distances are best seen with, and what it leaves of them.
