@@ -24,7 +24,7 @@ use super::estimate::Recorder;
 use super::{Estimate, Iteration, Observer, Strategy};
 use crate::error::RefineError;
 use crate::factor::GaussianPrior;
-use crate::problem::{Factor, Solution, State, Termination};
+use crate::problem::{Factor, Solution, Solver, State, Termination};
 use crate::scene::Frame;
 
 /// Gauss–Newton on all evidence at once, with the quantities that are not known exactly estimated beside the pose.
@@ -70,6 +70,9 @@ const COARSEST: f64 = 3e-3;
 /// Solutions of geometry alone that are taken up: where they differ, starts spread about them say more than they do.
 const KEPT: usize = 4;
 
+/// The last stage's tolerance times this is that of a solve with exact calibrations, which has nothing else to wait for.
+const EXACT: f64 = 0.01;
+
 impl Strategy for Fused {
     /// Every stage is an iteration.
     fn run(
@@ -100,7 +103,10 @@ impl Strategy for Fused {
             && self.settings.calibration_test
             && calibration_test::is_exact(&found[0].at);
         if exact {
-            found = walk.with_exact_calibrations(&found)?;
+            // Twice, as the noise is measured where the solution of less exact ones is at first.
+            for _ in 0..2 {
+                found = walk.with_exact_calibrations(&found)?;
+            }
             _ = record(&mut recorder, &found[0]);
         }
         let (radius, inflation) = (frame.object().radius, self.settings.inflation);
@@ -231,6 +237,7 @@ impl Walk<'_> {
         let own = &self.fused.factors;
         let problem = problem_of(self.frame, initial, last, &settings, None, own)?
             .with_prior(self.prior.clone());
-        Ok(distinct(problem.solve_all(&states, &last.solver), self.radius()))
+        let solver = Solver { min_decrease: EXACT * last.solver.min_decrease, ..last.solver };
+        Ok(distinct(problem.solve_all(&states, &solver), self.radius()))
     }
 }
