@@ -52,7 +52,7 @@ fn main() -> anyhow::Result<()> {
     let camera = Camera::from_perspective(&view.projection, width, height)?;
     let light = Light::headlight(0.4, 0.6);
 
-    let truth = Affine3A::from_rotation_translation(Quat::from_rotation_x(-1.4), Vec3::Y * -0.04);
+    let truth = Affine3A::from_rotation_translation(Quat::from_rotation_x(0.17), Vec3::Y * -0.04);
     let seen = ModelView::try_from(view.t_view_world * truth)?.t_cam_model;
     let picture = PoseLoss::default().render(&model, &seen, &camera, &light);
     let target = Target::from_matte(camera, &picture.color, picture.coverage)?;

@@ -1,7 +1,7 @@
 //! Draws a glTF file, and paints it by how much each vertex, if moved, would change the area that the object covers in the image.
 //!
 //! `cargo run --release --example gltf_gradients [file.gltf or file.glb]` writes `drawn.png` and `gradient.png` to
-//! `target/gltf_gradients`; side by side they are `docs/images/gltf_gradients.png`.
+//! `target/gltf_gradients`; side by side and smaller they are `docs/images/gltf_gradients.png`. glTF has y up.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -15,8 +15,8 @@ fn main() -> anyhow::Result<()> {
     let mesh = TriMesh::load(&std::env::args().nth(1).map_or(mug, PathBuf::from))?;
     let model = RenderModel::new(&mesh)?;
     let camera = Camera { fx: 700.0, fy: 700.0, cx: 255.5, cy: 255.5, width: 512, height: 512 };
-    let eye = model.center() + Vector3::new(0.5, -1.0, 0.7) * (2.2 * model.radius());
-    let pose = look_at(&eye, &model.center(), &Vector3::z(), 0.0);
+    let eye = model.center() + Vector3::new(0.5, 0.7, 1.0) * (2.2 * model.radius());
+    let pose = look_at(&eye, &model.center(), &Vector3::y(), 0.0);
     let draw = |model: RenderModel, light: Light| {
         Renderer::new(light).render(&Scene::new(camera).with(Arc::new(model), pose))
     };

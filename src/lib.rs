@@ -16,6 +16,7 @@ pub use prehend_geometry as geometry;
 #[cfg(feature = "refine")]
 pub use prehend_refine as refine;
 pub use prehend_render as render;
+pub use prehend_render::glam;
 pub use prehend_sim as sim;
 
 /// The README's Rust code, compiled as a test.

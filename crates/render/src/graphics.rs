@@ -1,8 +1,9 @@
 //! Poses and cameras as graphics engines have them: glam's types, and cameras that look along −z with y up.
 //!
-//! wgpu, Bevy and rend3 keep transforms in glam's [`Mat4`], [`Affine3A`], [`Quat`] and [`Vec3`], and project with a matrix of
-//! the frustum. [`ModelView`] converts poses, [`Camera::to_perspective`] and [`Camera::from_perspective`] cameras. (Vectors,
-//! rotations and matrices by themselves convert between glam and nalgebra with `From`, in the same axes.)
+//! Bevy, rend3 and most programs on wgpu keep transforms in glam's [`Mat4`], [`Affine3A`], [`Quat`] and [`Vec3`], and project with a
+//! matrix of the frustum. [`ModelView`] converts poses, [`Camera::to_perspective`] and [`Camera::from_perspective`] cameras. (Vectors,
+//! rotations and matrices by themselves convert between glam and nalgebra with `From`, in the same axes. Types of another version of glam
+//! than 0.33, which is re-exported as `prehend_render::glam`, go through their arrays, such as `to_cols_array`.)
 //!
 //! ```
 //! use glam::camera::rh::{proj::directx::perspective, view::look_at_affine3a};
@@ -27,7 +28,7 @@ use nalgebra::{Isometry3, Quaternion, UnitQuaternion};
 
 use crate::camera::{Camera, CameraError};
 
-/// A matrix is taken as rigid if its columns are orthonormal to this: some hundred roundings of single precision.
+/// A matrix is taken as rigid if its columns are orthonormal to this: a thousand roundings of single precision.
 const RIGID: f64 = 1e-4;
 
 /// A model's pose in the view space of a graphics engine (x right, y up, z back): what its model-view matrix says.
@@ -65,6 +66,14 @@ pub enum MatrixError {
         found: [f32; 4],
         /// As it should be.
         expected: [f32; 4],
+    },
+    /// The projection also shifts what it projects: it holds (a part of) a view matrix, or is one eye's of a pair.
+    #[error("projection shifts points by ({x}, {y}) before it projects them; expected no shift")]
+    Shifted {
+        /// Along the image's rows, in clip space.
+        x: f32,
+        /// Along its columns.
+        y: f32,
     },
     /// The projection is skewed, or its camera is none of this crate.
     #[error(transparent)]
@@ -116,7 +125,7 @@ impl TryFrom<Affine3A> for ModelView {
     }
 }
 
-/// A translation, and a rotation, which is normalized.
+/// A translation, and a rotation, which is normalized; one of length zero, or not finite, gives a pose that is not finite.
 impl From<(Vec3, Quat)> for ModelView {
     fn from((translation, rotation): (Vec3, Quat)) -> Self {
         Self::in_view((translation.as_dvec3(), rotation.as_dquat()).into())
@@ -144,7 +153,7 @@ impl From<ModelView> for (Vec3, Quat) {
 
 impl Camera {
     /// The projection into clip space as wgpu and Direct3D have it (right-handed view space, depth 0 at `near` and 1
-    /// at `far` \[m\], which may be infinite).
+    /// at `far` \[m\]: 0 < `near` < `far`, which may be infinite).
     pub fn to_perspective(&self, near: f64, far: f64) -> Mat4 {
         let (width, height) = (self.width as f64, self.height as f64);
         let ratio = if far.is_finite() { far / (near - far) } else { -1.0 };
@@ -166,7 +175,7 @@ impl Camera {
     /// The camera of `width` by `height` pixels with this projection, whatever it makes of depth (reversed or infinite too).
     ///
     /// # Errors
-    /// When the matrix is not finite, no perspective (right-handed, as [`Self::to_perspective`] makes them), or skewed, or the
+    /// When the matrix is not finite, no perspective (right-handed, as [`Self::to_perspective`] makes them), skewed or shifted, or the
     /// image is empty.
     pub fn from_perspective(
         projection: &Mat4,
@@ -174,6 +183,10 @@ impl Camera {
         height: usize,
     ) -> Result<Self, MatrixError> {
         check(projection, [0.0, 0.0, -1.0, 0.0])?;
+        let (x, y) = (projection.w_axis.x, projection.w_axis.y);
+        if x.abs().max(y.abs()) > RIGID as f32 {
+            return Err(MatrixError::Shifted { x, y });
+        }
         let matrix = projection.as_dmat4();
         let (half_width, half_height) = (0.5 * width as f64, 0.5 * height as f64);
         let k = [

@@ -34,6 +34,8 @@ mod shapes_for_tests;
 mod softras;
 mod view;
 
+pub use glam;
+
 #[cfg(feature = "gpu")]
 pub use backend::Gpu;
 pub use backend::{

@@ -107,6 +107,8 @@ fn what_is_no_pose_or_no_camera_is_said() {
     assert!(matches!(camera(&flat, 640), Err(MatrixError::LastRow { .. })));
     let empty = CameraError::Empty { width: 0, height: 480 };
     assert_eq!(camera(&projection, 0).unwrap_err(), MatrixError::Camera(empty));
+    let shifted = projection * Mat4::from_translation(Vec3::X * 0.03);
+    assert!(matches!(camera(&shifted, 640), Err(MatrixError::Shifted { x, .. }) if x > 0.05));
     let mut skewed = projection;
     skewed.y_axis.x = 0.1;
     let error = camera(&skewed, 640).unwrap_err();

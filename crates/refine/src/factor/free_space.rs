@@ -40,7 +40,7 @@ pub struct FreeSpaceFactor {
 
 /// A sample in front of what was measured on a pixel.
 struct InFront {
-    /// The share of the sample that is on this pixel and looks at the camera.
+    /// The pixel's bilinear weight, times how much the sample faces the camera.
     share: f64,
     /// Depth there as measured \[m\].
     measured: f64,
@@ -68,7 +68,8 @@ impl FreeSpaceFactor {
         facing: f64,
         pixel: Vector2<f64>,
     ) -> impl Iterator<Item = InFront> {
-        let (first, part) = (pixel.map(f64::floor), pixel - pixel.map(f64::floor));
+        let first = pixel.map(f64::floor);
+        let part = pixel - first;
         [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)].into_iter().filter_map(move |(i, j)| {
             let (u, v) = (first.x + i, first.y + j);
             if u < 0.0 || v < 0.0 {
@@ -108,7 +109,7 @@ impl Factor for FreeSpaceFactor {
             let Some(pixel) = pixel.filter(|_| facing > 0.0) else { continue };
             for InFront { share, measured, beyond } in self.in_front(state, place, facing, pixel) {
                 rows.add(beyond, &weighting.shared(share), |row| {
-                    // Which pixels a sample falls on is taken as it is: depth's steps have no derivative.
+                    // Shares are taken as they are: at depth's steps their derivative would pull samples sideways.
                     row.object_point(state, &place, &-Vector3::z());
                     row.block(Block::Camera, &[measured, 1.0, 0.0, 0.0, 0.0]);
                 });
@@ -137,6 +138,20 @@ mod tests {
                 assert_gradient(&factor, &state, block, 1e-8, 1e-3);
             }
         }
+    }
+
+    #[test]
+    fn the_cost_does_not_jump_as_samples_pass_from_pixel_to_pixel() {
+        let (frame, state) = fixture(0);
+        let factor = FreeSpaceFactor::new(&frame, &FreeSpaceSettings::default());
+        // Beside what the depth image shows, so that samples pass its edges.
+        let moved = |i: i32| {
+            let twist = [8e-3 + 1e-6 * f64::from(i), 3e-3, 0.0, 0.0, 0.0, 0.0];
+            factor.cost(&state.retract(&[Block::ObjectPose], &twist))
+        };
+        let costs: Vec<f64> = (0..400).map(moved).collect();
+        let jump = costs.windows(2).map(|w| (w[1] - w[0]).abs()).fold(0.0, f64::max);
+        assert!(costs[0] > 0.5 && jump < 0.02, "{jump} of {} nat", costs[0]);
     }
 
     #[test]

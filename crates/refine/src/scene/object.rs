@@ -28,6 +28,9 @@ pub struct Inertial {
     pub inertia: Matrix3<f64>,
 }
 
+/// Normals are smoothed over edges of faces up to this long \[m\].
+const SMOOTHED: f64 = 10e-3;
+
 /// An object model: geometry, appearance, mass, and what the factors precompute from them.
 pub struct Object {
     /// Name for messages.
@@ -49,7 +52,7 @@ pub struct Object {
     pub(crate) surface: ClosestPoints,
     /// Outward unit normal of each face that `surface` may answer; zero for a face without area.
     pub(crate) normals: Vec<Vector3<f64>>,
-    /// Unit normals at the corners of these faces, smooth over the surface.
+    /// Normals at the corners of these faces, smooth over the surface, of about unit length.
     pub(crate) corner_normals: Vec<[Vector3<f64>; 3]>,
     pub(crate) samples: Vec<SurfaceSample>,
     pub(crate) model: Arc<RenderModel>,
@@ -120,12 +123,11 @@ impl Object {
         if !(inertial.mass.is_finite() && inertial.mass > 0.0) {
             return Err(fail(format!("the mass {} kg is not positive", inertial.mass)));
         }
-        let smooth = solid.vertex_normals();
         let unit = |f| solid.area_vector(f).try_normalize(0.0).unwrap_or_else(Vector3::zeros);
         Ok(Self {
             name: name.to_owned(),
             normals: (0..solid.faces.len()).map(unit).collect(),
-            corner_normals: solid.faces.iter().map(|f| f.map(|v| smooth[v as usize])).collect(),
+            corner_normals: corner_normals(&solid),
             surface: ClosestPoints::new(&solid).map_err(|e| fail(e.to_string()))?,
             samples: surface_samples(&solid, SURFACE_SAMPLES, seed),
             model: Arc::new(RenderModel::new(&mesh).map_err(|e| fail(e.to_string()))?),
@@ -140,6 +142,20 @@ impl Object {
     }
 }
 
+/// Normals at the corners of each face that are smooth over the surface, sharp edges included, where faces are no longer than
+/// [`SMOOTHED`]; the longer a face is, the nearer they are to its own, so that large flat faces stay flat.
+fn corner_normals(mesh: &TriMesh) -> Vec<[Vector3<f64>; 3]> {
+    let smooth = mesh.vertex_normals();
+    let of_face = |f: usize| {
+        let [a, b, c] = mesh.triangle(f);
+        let longest = (b - a).norm().max((c - b).norm()).max((a - c).norm());
+        let share = (SMOOTHED / longest).min(1.0);
+        let own = mesh.area_vector(f).try_normalize(0.0).unwrap_or_default();
+        mesh.faces[f].map(|v| own.lerp(&smooth[v as usize], share))
+    };
+    (0..mesh.faces.len()).map(of_face).collect()
+}
+
 impl From<MassProperties> for Inertial {
     fn from(m: MassProperties) -> Self {
         Self { mass: m.mass, center_of_mass: m.center_of_mass, inertia: m.inertia }
@@ -148,7 +164,21 @@ impl From<MassProperties> for Inertial {
 
 #[cfg(test)]
 mod tests {
+    use prehend_geometry::shapes::cuboid;
+
     use super::*;
+
+    #[test]
+    fn large_faces_keep_their_normals_and_small_ones_share_them() {
+        let tilt = |side: f64| {
+            let mesh = cuboid(Vector3::repeat(side)).welded();
+            let own = mesh.area_vector(0).normalize();
+            let corners = corner_normals(&mesh)[0];
+            corners.map(|normal| normal.angle(&own)).into_iter().fold(0.0, f64::max)
+        };
+        assert!(tilt(0.2) < 0.05, "{}", tilt(0.2));
+        assert!(tilt(0.005) > 0.9);
+    }
 
     #[test]
     fn a_face_beyond_the_vertices_is_an_error() {

@@ -12,10 +12,10 @@ use crate::raster::{Visible, rasterize};
 use crate::shading::surface::{albedo, posed_normal};
 
 /// What [`Light::fit`](crate::Light::fit) needs: unlit color, normal and observed color where the object is seen inside the
-/// mask, and `margin` pixels to the left, to the right, above and below too; of about `most` of these pixels at most.
+/// mask, and `margin` pixels to the left, to the right, above and below too; of `most` of these pixels at most, about.
 ///
-/// Which pixels are asked depends on the mask alone, so that those that a moving object covers come and go one by one, and the
-/// light does not jump.
+/// They are those of a lattice in the image, so that pixels that a moving object covers or leaves come and go one by one, and the
+/// light hardly changes. The lattice is twice as wide where there would be too many.
 pub fn light_samples(
     model: &RenderModel,
     t_cam_object: &Isometry3<f64>,
@@ -25,9 +25,8 @@ pub fn light_samples(
 ) -> Vec<LightSample> {
     let posed = Posed::new(model, &target.camera, t_cam_object, 0.0);
     let visible = rasterize(&posed.projected, &posed.projected.region);
-    let masked = target.coverage.iter().filter(|coverage| **coverage >= 1.0).count();
-    let lattice = Lattice::new(masked.div_ceil(most.max(1)));
-    let pixels = inner_pixels(&visible, target, margin, &lattice);
+    let pixels = inner_pixels(&visible, target, margin);
+    let step = pixels.len().div_ceil(most.max(1)).next_power_of_two();
     let sample = |&(face, x, y): &(usize, usize, usize)| {
         let b = barycentric(posed.projected.corners(face), vec2(x as f32, y as f32));
         LightSample {
@@ -36,34 +35,17 @@ pub fn light_samples(
             observed: target.color[y * target.camera.width + x],
         }
     };
-    pixels.iter().map(sample).collect()
+    pixels.iter().filter(|(_, x, y)| on_lattice(*x, *y, step)).map(sample).collect()
 }
 
-/// One pixel of so many, spread evenly: a lattice of rank one.
-struct Lattice {
-    step: usize,
-    /// Columns by which a row is shifted from the one above: by the golden section of a step.
-    shift: usize,
+/// One pixel of `step`, spread evenly: a lattice of rank one, with an odd shift from row to row.
+fn on_lattice(x: usize, y: usize, step: usize) -> bool {
+    let golden = (0.618 * step as f64) as usize | 1;
+    (x + y * golden).is_multiple_of(step)
 }
 
-impl Lattice {
-    fn new(step: usize) -> Self {
-        let step = step.max(1);
-        Self { step, shift: (0.618 * step as f64).round() as usize }
-    }
-
-    fn has(&self, x: usize, y: usize) -> bool {
-        (x + y * self.shift).is_multiple_of(self.step)
-    }
-}
-
-/// Faces, columns and rows of the pixels of a lattice that show the object alone.
-fn inner_pixels(
-    visible: &[Visible],
-    target: &Target,
-    margin: usize,
-    lattice: &Lattice,
-) -> Vec<(usize, usize, usize)> {
+/// Faces, columns and rows of the pixels that show the object alone.
+fn inner_pixels(visible: &[Visible], target: &Target, margin: usize) -> Vec<(usize, usize, usize)> {
     let seen = |x: usize, y: usize| Visible::at(visible, x, y);
     let inside = |x: usize, y: usize| {
         let shift = |center: usize, by: usize| (center + by).checked_sub(margin);
@@ -76,7 +58,7 @@ fn inner_pixels(
     let mut pixels = Vec::new();
     for block in visible {
         for y in block.region.y0..block.region.y1 {
-            for x in (block.region.x0..block.region.x1).filter(|x| lattice.has(*x, y)) {
+            for x in block.region.x0..block.region.x1 {
                 let at = y * target.camera.width + x;
                 let Some((face, inverse_z)) = seen(x, y).filter(|_| target.coverage[at] >= 1.0)
                 else {
@@ -89,4 +71,23 @@ fn inner_pixels(
         }
     }
     pixels
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lattices_have_one_pixel_of_so_many_in_every_part() {
+        for step in [1, 2, 4, 8, 64, 512] {
+            let count = |x0: usize, y0: usize, side: usize| {
+                let all = (y0..y0 + side).flat_map(|y| (x0..x0 + side).map(move |x| (x, y)));
+                all.filter(|(x, y)| on_lattice(*x, *y, step)).count() as f64
+            };
+            for (x0, y0) in [(0, 0), (37, 91), (200, 3)] {
+                let expected = 128.0 * 128.0 / step as f64;
+                assert!((count(x0, y0, 128) / expected - 1.0).abs() < 0.1, "{step}");
+            }
+        }
+    }
 }

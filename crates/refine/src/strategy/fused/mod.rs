@@ -70,7 +70,7 @@ const COARSEST: f64 = 3e-3;
 /// Solutions of geometry alone that are taken up: where they differ, starts spread about them say more than they do.
 const KEPT: usize = 4;
 
-/// The last stage's tolerance times this is that of a solve with exact calibrations, which has nothing else to wait for.
+/// The last stage's tolerance times this is that of a solve with exact calibrations: its steps are cheap, and its errors small.
 const EXACT: f64 = 0.01;
 
 impl Strategy for Fused {
@@ -103,7 +103,7 @@ impl Strategy for Fused {
             && self.settings.calibration_test
             && calibration_test::is_exact(&found[0].at);
         if exact {
-            // Twice, as the noise is measured where the solution of less exact ones is at first.
+            // Depth's noise is measured at the solution with free calibrations first, then at that with exact ones.
             for _ in 0..2 {
                 found = walk.with_exact_calibrations(&found)?;
             }
