@@ -7,11 +7,11 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use glam::camera::rh::proj::directx::perspective;
-use glam::camera::rh::view::look_at_affine3a;
-use glam::{Affine3A, Mat4, Quat, Vec3, vec3};
 use prehend::autodiff::lie::perturb_about;
 use prehend::geometry::TriMesh;
+use prehend::glam::camera::rh::proj::directx::perspective;
+use prehend::glam::camera::rh::view::look_at_affine3a;
+use prehend::glam::{Affine3A, Mat4, Quat, Vec3, vec3};
 use prehend::render::{Camera, Light, ModelView, PoseLoss, RenderModel, Target, draw_outline};
 
 /// A camera as a graphics engine has it.

@@ -105,8 +105,10 @@ impl Factor for FreeSpaceFactor {
         for sample in samples {
             let place = state.t_cam_object * sample.point;
             let facing = facing(&(state.t_cam_object * sample.normal), &place.coords);
-            let pixel = self.camera.project(&(reprojected * sample.point));
-            let Some(pixel) = pixel.filter(|_| facing > 0.0) else { continue };
+            if facing == 0.0 {
+                continue;
+            }
+            let Some(pixel) = self.camera.project(&(reprojected * sample.point)) else { continue };
             for InFront { share, measured, beyond } in self.in_front(state, place, facing, pixel) {
                 rows.add(beyond, &weighting.shared(share), |row| {
                     // Shares are taken as they are: at depth's steps their derivative would pull samples sideways.

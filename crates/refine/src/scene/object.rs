@@ -124,10 +124,11 @@ impl Object {
             return Err(fail(format!("the mass {} kg is not positive", inertial.mass)));
         }
         let unit = |f| solid.area_vector(f).try_normalize(0.0).unwrap_or_else(Vector3::zeros);
+        let normals: Vec<_> = (0..solid.faces.len()).map(unit).collect();
         Ok(Self {
             name: name.to_owned(),
-            normals: (0..solid.faces.len()).map(unit).collect(),
-            corner_normals: corner_normals(&solid),
+            corner_normals: corner_normals(&solid, &normals),
+            normals,
             surface: ClosestPoints::new(&solid).map_err(|e| fail(e.to_string()))?,
             samples: surface_samples(&solid, SURFACE_SAMPLES, seed),
             model: Arc::new(RenderModel::new(&mesh).map_err(|e| fail(e.to_string()))?),
@@ -143,17 +144,16 @@ impl Object {
 }
 
 /// Normals at the corners of each face that are smooth over the surface, sharp edges included, where faces are no longer than
-/// [`SMOOTHED`]; the longer a face is, the nearer they are to its own, so that large flat faces stay flat.
-fn corner_normals(mesh: &TriMesh) -> Vec<[Vector3<f64>; 3]> {
+/// [`SMOOTHED`]; the longer a face is, the nearer they are to its own of `normals`, so that large flat faces stay flat.
+fn corner_normals(mesh: &TriMesh, normals: &[Vector3<f64>]) -> Vec<[Vector3<f64>; 3]> {
     let smooth = mesh.vertex_normals();
-    let of_face = |f: usize| {
+    let of_face = |(f, own): (usize, &Vector3<f64>)| {
         let [a, b, c] = mesh.triangle(f);
         let longest = (b - a).norm().max((c - b).norm()).max((a - c).norm());
         let share = (SMOOTHED / longest).min(1.0);
-        let own = mesh.area_vector(f).try_normalize(0.0).unwrap_or_default();
         mesh.faces[f].map(|v| own.lerp(&smooth[v as usize], share))
     };
-    (0..mesh.faces.len()).map(of_face).collect()
+    normals.iter().enumerate().map(of_face).collect()
 }
 
 impl From<MassProperties> for Inertial {
@@ -173,7 +173,7 @@ mod tests {
         let tilt = |side: f64| {
             let mesh = cuboid(Vector3::repeat(side)).welded();
             let own = mesh.area_vector(0).normalize();
-            let corners = corner_normals(&mesh)[0];
+            let corners = corner_normals(&mesh, &[own])[0];
             corners.map(|normal| normal.angle(&own)).into_iter().fold(0.0, f64::max)
         };
         assert!(tilt(0.2) < 0.05, "{}", tilt(0.2));

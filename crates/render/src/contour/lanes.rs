@@ -213,8 +213,7 @@ impl Waiting {
                     put(&mut colors, l, flat(corners[self.face[l] as usize].map(Vec3::from)));
                 }
                 for l in 0..LANES {
-                    let unlit =
-                        Unlit::between(triple(get(&colors, l)).map(Vec3::into), get(&self.b, l));
+                    let unlit = Unlit::between(triple(get(&colors, l)), get(&self.b, l));
                     self.unlit.put(l, &unlit);
                 }
             }

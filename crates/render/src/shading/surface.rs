@@ -56,8 +56,7 @@ pub(crate) struct Shaded {
 impl Unlit {
     /// Between the colors of three corners.
     #[inline(always)]
-    pub(crate) fn between(corners: [[f32; 3]; 3], b: [f32; 3]) -> Self {
-        let [first, second, third] = corners.map(Vec3::from);
+    pub(crate) fn between([first, second, third]: [Vec3; 3], b: [f32; 3]) -> Self {
         Self {
             color: (b[0] * first + b[1] * second + b[2] * third).into(),
             along: [(second - first).into(), (third - first).into()],
@@ -89,7 +88,7 @@ pub(crate) fn coordinates(uv: &[[f32; 2]; 3], b: [f32; 3]) -> [f32; 2] {
 pub(crate) fn albedo(posed: &Posed, face: usize, b: [f32; 3]) -> Unlit {
     match &posed.model.albedo {
         Albedo::Uniform(color) => Unlit { color: *color, ..Unlit::default() },
-        Albedo::Corners(corners) => Unlit::between(corners[face], b),
+        Albedo::Corners(corners) => Unlit::between(corners[face].map(Vec3::from), b),
         Albedo::Texture(map, corners) => {
             let uv = &corners[face];
             let [u, v] = coordinates(uv, b);

@@ -203,7 +203,8 @@ pub(super) fn hypothesis(problem: &PoseProblem, h: &backend::Hypothesis) -> Hypo
     let rotation = Mat3::from(h.t_cam_object.rotation.to_rotation_matrix().matrix().cast());
     let center = single(&(h.t_cam_object * model.center()).coords);
     // Beyond this, squares overflow.
-    let alive = center.abs().cmplt(Vec3::splat(1e18)).all() && rotation.is_finite();
+    let mut entries = rotation.to_cols_array().into_iter().chain(center.to_array());
+    let alive = entries.all(|v| v.abs() < 1e18);
     let mut out: Hypothesis = bytemuck::Zeroable::zeroed();
     if !alive {
         return out;
