@@ -39,7 +39,7 @@ pub(crate) struct Initial {
         long,
         value_name = "LEVEL",
         required_unless_present = "search",
-        conflicts_with = "search"
+        conflicts_with_all = ["search", "device"]
     )]
     noise: Option<NoiseLevel>,
     /// Seed of the errors
