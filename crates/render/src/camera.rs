@@ -1,6 +1,6 @@
 //! The pinhole camera.
 
-use nalgebra::{Matrix2x3, Point3, Vector2, Vector3};
+use nalgebra::{Point3, Vector2, Vector3};
 
 /// A pinhole camera without distortion, in the OpenCV frame (x right, y down, z forward).
 ///
@@ -116,12 +116,6 @@ impl Camera {
         })
     }
 
-    /// Derivatives of [`project`](Self::project) by the point \[px/m\].
-    pub fn project_jacobian(&self, point: &Point3<f64>) -> Matrix2x3<f64> {
-        let (x, y) = (self.fx / point.z, self.fy / point.z);
-        Matrix2x3::new(x, 0.0, -x * point.x / point.z, 0.0, y, -y * point.y / point.z)
-    }
-
     /// The point in the camera frame \[m\] at image position (`u`, `v`) \[px\] and depth `z` (its Z) \[m\].
     pub fn unproject(&self, u: f64, v: f64, z: f64) -> Point3<f64> {
         Point3::from(self.ray(u, v) * z)
@@ -156,8 +150,6 @@ impl Camera {
 
 #[cfg(test)]
 mod tests {
-    use prehend_autodiff::check::{compare_gradients, finite_difference_gradient};
-
     use super::*;
 
     const K: [f64; 9] = [600.0, 0.0, 319.5, 0.0, 590.0, 239.5, 0.0, 0.0, 1.0];
@@ -170,19 +162,6 @@ mod tests {
         assert!((camera.unproject(uv.x, uv.y, point.z) - point).norm() < 1e-15);
         assert!(camera.project(&Point3::new(0.0, 0.0, -1.0)).is_none());
         assert_eq!(camera.k(), K);
-    }
-
-    #[test]
-    fn derivatives_of_projecting_match_differences() {
-        let camera = Camera::from_k(K, 640, 480).unwrap();
-        let point = Point3::new(0.07, -0.04, 0.55);
-        let jacobian = camera.project_jacobian(&point);
-        for row in 0..2 {
-            let image = |p: &[f64]| camera.project(&Point3::from_slice(p)).unwrap()[row];
-            let reference = finite_difference_gradient(image, point.coords.as_slice(), 1e-6);
-            let found: Vec<f64> = jacobian.row(row).iter().copied().collect();
-            assert!(compare_gradients(&found, &reference).relative < 1e-8);
-        }
     }
 
     #[test]

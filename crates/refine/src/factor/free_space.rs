@@ -2,12 +2,11 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Vector2, Vector3};
-use prehend_autodiff::lie::twist_row;
+use nalgebra::{Point3, Vector2, Vector3};
 use prehend_render::{Camera, DepthImage};
 
-use super::facing::Facing;
-use crate::problem::{Block, Factor, NoiseModel, Row, Rows, State};
+use super::facing::facing;
+use crate::problem::{Block, Factor, NoiseModel, Rows, State};
 use crate::scene::{Frame, Object};
 
 /// Settings of [`FreeSpaceFactor`].
@@ -39,11 +38,10 @@ pub struct FreeSpaceFactor {
     settings: FreeSpaceSettings,
 }
 
-/// A pixel near a sample that is in front of what was measured there.
+/// A sample in front of what was measured on a pixel.
 struct InFront {
-    /// The pixel's bilinear weight, and its derivative by the place in the image \[1/px\].
-    weight: f64,
-    slope: Vector2<f64>,
+    /// The pixel's bilinear weight, times how much the sample faces the camera.
+    share: f64,
     /// Depth there as measured \[m\].
     measured: f64,
     /// How far the sample is in front of that, beyond the margin \[m\].
@@ -61,11 +59,13 @@ impl FreeSpaceFactor {
         }
     }
 
-    /// The pixels where a sample of depth `z` \[m\], seen at `pixel`, is in front of measured depth.
+    /// Where the sample at `place` (camera frame), of which so much looks at the camera and which is seen at `pixel`, is in front of
+    /// measured depth.
     fn in_front(
         &self,
         state: &State,
-        z: f64,
+        place: Point3<f64>,
+        facing: f64,
         pixel: Vector2<f64>,
     ) -> impl Iterator<Item = InFront> {
         let first = pixel.map(f64::floor);
@@ -81,10 +81,9 @@ impl FreeSpaceFactor {
             }
             let measured = f64::from(measured);
             let depth = state.camera.depth_scale * measured + state.camera.depth_bias;
-            let beyond = depth - z - self.settings.margin;
-            let (x, y) = (1.0 - (i - part.x).abs(), 1.0 - (j - part.y).abs());
-            let slope = Vector2::new((2.0 * i - 1.0) * y, (2.0 * j - 1.0) * x);
-            (beyond > 0.0).then_some(InFront { weight: x * y, slope, measured, beyond })
+            let beyond = depth - place.z - self.settings.margin;
+            let share = facing * (1.0 - (i - part.x).abs()) * (1.0 - (j - part.y).abs());
+            (beyond > 0.0 && share > 0.0).then_some(InFront { share, measured, beyond })
         })
     }
 
@@ -100,39 +99,22 @@ impl Factor for FreeSpaceFactor {
     }
 
     fn rows(&self, state: &State, rows: &mut Rows<'_>) {
-        let center = state.center();
-        let reprojected = state.camera.reprojected(&state.t_cam_object, &center);
-        let by_shift = state.camera.reprojected_jacobian(&center);
+        let reprojected = state.camera.reprojected(&state.t_cam_object, &state.center());
         let samples = self.object.samples.iter().step_by(self.stride());
         let weighting = self.settings.noise.weighting(samples.len());
         for sample in samples {
             let place = state.t_cam_object * sample.point;
-            let facing = Facing::new(&(state.t_cam_object * sample.normal), &place.coords);
-            if facing.share == 0.0 {
+            let facing = facing(&(state.t_cam_object * sample.normal), &place.coords);
+            if facing == 0.0 {
                 continue;
             }
-            let seen = reprojected * sample.point;
-            let Some(pixel) = self.camera.project(&seen) else { continue };
-            for InFront { weight, slope, measured, beyond } in self.in_front(state, place.z, pixel)
-            {
-                let by_beyond = |row: &mut Row<'_>| {
+            let Some(pixel) = self.camera.project(&(reprojected * sample.point)) else { continue };
+            for InFront { share, measured, beyond } in self.in_front(state, place, facing, pixel) {
+                rows.add(beyond, &weighting.shared(share), |row| {
+                    // Shares are taken as they are: at depth's steps their derivative would pull samples sideways.
                     row.object_point(state, &place, &-Vector3::z());
                     row.block(Block::Camera, &[measured, 1.0, 0.0, 0.0, 0.0]);
-                };
-                let by_share = |row: &mut Row<'_>| {
-                    let by_seen =
-                        self.camera.project_jacobian(&seen).tr_mul(&(slope * facing.share));
-                    let by_shift = by_shift.tr_mul(&by_seen);
-                    let arm = place.coords - center;
-                    let mut twist = twist_row(&arm, &(facing.by_place * weight));
-                    let mut place = twist.fixed_rows_mut::<3>(0);
-                    place += by_shift.fixed_rows::<3>(0);
-                    let mut rotation = twist.fixed_rows_mut::<3>(3);
-                    rotation += arm.cross(&by_seen) + facing.by_rotation * weight;
-                    row.block(Block::ObjectPose, twist.as_slice());
-                    row.block(Block::Camera, &by_shift.as_slice()[3..]);
-                };
-                rows.add_share(weight * facing.share, beyond, &weighting, by_beyond, by_share);
+                });
             }
         }
     }
@@ -147,8 +129,11 @@ mod tests {
     fn gradients_match_differences() {
         for seed in 0..3 {
             let (frame, state) = fixture(seed);
-            // Towards the camera, where there is something to say.
+            // Towards the camera, where there is something to say; the truth's own depth varies from pixel to pixel.
             let state = state.retract(&[Block::ObjectPose], &[0.0, 0.0, -6e-3, 0.0, 0.0, 0.0]);
+            let mut observation = frame.observation().clone();
+            observation.depth.pixels_mut().fill(state.center().z as f32 - 0.02);
+            let frame = Frame::new(&observation, frame.object(), None).unwrap();
             let factor = FreeSpaceFactor::new(&frame, &FreeSpaceSettings::default());
             assert!(factor.cost(&state) > 0.0);
             for block in [Block::ObjectPose, Block::Camera] {

@@ -174,12 +174,6 @@ impl NormalEquations {
         }
     }
 
-    /// Adds `scale` times the row begun last to the gradient alone.
-    #[inline]
-    pub(super) fn finish_gradient(&mut self, scale: f64) {
-        self.entries.iter().for_each(|&(i, d)| self.gradient[i] += scale * d);
-    }
-
     /// Adds the gradient and Hessian of a factor whose parameters are those of `blocks`, concatenated.
     ///
     /// Parts that belong to blocks nobody requested are dropped.

@@ -43,25 +43,6 @@ impl<'a> Rows<'a> {
         }
     }
 
-    /// Adds `share` of the cost of a residual, where the share changes with the state, too: `share_jacobian` writes its derivatives.
-    /// They are part of the gradient, not of the Gauss–Newton Hessian, to which they would give eigenvalues of either sign.
-    #[inline]
-    pub fn add_share(
-        &mut self,
-        share: f64,
-        residual: f64,
-        weighting: &Weighting,
-        jacobian: impl FnOnce(&mut Row<'_>),
-        share_jacobian: impl FnOnce(&mut Row<'_>),
-    ) {
-        self.add(residual, &weighting.shared(share), jacobian);
-        if let Some(equations) = self.equations.as_deref_mut() {
-            let mut row = equations.begin_row();
-            share_jacobian(&mut row);
-            equations.finish_gradient(weighting.cost(residual));
-        }
-    }
-
     /// Adds a constant to the cost, of residuals that no state changes \[nat\].
     pub fn add_constant(&mut self, cost: f64) {
         self.cost += cost;

@@ -55,8 +55,9 @@ fn every_factor_changes_as_its_gradient_says() {
         let cost = factor.linearize(&off, &mut equations);
         let name = factor.name();
         assert!((cost - factor.cost(&off)).abs() <= 1e-9 * cost.abs(), "{name}: {cost}");
-        // Stability has the derivatives of smoothed contacts.
-        if name == "stability" {
+        // Stability has the derivatives of smoothed contacts; free space those at fixed shares of pixels, which change at depth's
+        // steps. Its own test has depth without steps.
+        if ["stability", "free-space"].contains(&name) {
             continue;
         }
         let conditional = factor.conditional_at(&off);

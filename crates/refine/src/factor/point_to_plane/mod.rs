@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 pub(crate) use self::scatter::NoiseEstimate;
 use self::smooth_field::{Fit, SmoothField};
-use super::facing::Facing;
+use super::facing::facing;
 use super::patch_sums::{PatchSums, add_to};
 use crate::error::RefineError;
 use crate::problem::{Factor, NoiseModel, NormalEquations, State, SurfacePatches, Weighting};
@@ -153,7 +153,7 @@ impl PointToPlaneFactor {
             let corners = &self.object.corner_normals[closest.face as usize];
             let smooth: Vector3<f64> =
                 corners.iter().zip(closest.barycentric).map(|(normal, b)| normal * b).sum();
-            let facing = Facing::new(&(state.t_cam_object * smooth), &surface).share;
+            let facing = facing(&(state.t_cam_object * smooth), &surface);
             let away = if distance.abs() > 1e-9 { offset / distance } else { normal };
             Some(Residual { distance, facing, surface, away })
         };
