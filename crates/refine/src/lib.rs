@@ -34,6 +34,7 @@ pub mod factor;
 mod method;
 pub mod problem;
 mod refine;
+pub mod rig;
 pub mod scene;
 pub mod search;
 pub mod strategy;

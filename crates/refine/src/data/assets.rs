@@ -13,6 +13,7 @@ use crate::data::bop::{Dataset, DatasetError, Frame, Models, Tactile};
 use crate::data::targets::Target;
 use crate::error::RefineError;
 use crate::method::Method;
+use crate::rig::Rig;
 use crate::scene::{self, Hand, HandMeasurement, Inertial, Object, Observation, check_gravity};
 use crate::strategy::GradientKind;
 
@@ -75,6 +76,8 @@ pub struct FrameInput {
     pub object: Arc<Object>,
     /// The hand, where it is known.
     pub hand: Option<Arc<Hand>>,
+    /// The rig, by which all this is corrected, where it is known.
+    pub rig: Option<Arc<Rig>>,
 }
 
 impl FrameInput {
@@ -83,12 +86,16 @@ impl FrameInput {
     /// # Errors
     /// Those of [`scene::Frame::new`].
     pub fn frame(&self) -> Result<scene::Frame<'_>, RefineError> {
-        scene::Frame::new(&self.observation, &self.object, self.hand.as_ref())
+        let frame = scene::Frame::new(&self.observation, &self.object, self.hand.as_ref())?;
+        Ok(match &self.rig {
+            Some(rig) => frame.with_rig(rig),
+            None => frame,
+        })
     }
 
     /// Warnings about the object, then about its pose `t_cam_object`: units, frames, and what was assumed.
     pub fn warnings(&self, t_cam_object: &Isometry3<f64>) -> [Vec<String>; 2] {
-        let Self { observation, object, hand } = self;
+        let Self { observation, object, hand, .. } = self;
         [
             scene::inspect_object(object),
             scene::inspect_pose(observation, object, hand.as_deref(), t_cam_object),
@@ -114,17 +121,30 @@ pub struct Assets<'a> {
     objects: HashMap<u32, Arc<Object>>,
     hands: HashMap<(PathBuf, Option<PathBuf>), Arc<Hand>>,
     cache: Option<GridCache>,
+    rig: Option<Arc<Rig>>,
 }
 
 impl<'a> Assets<'a> {
     /// Nothing loaded yet; `seed` decides where objects' surfaces are sampled.
     pub fn new(dataset: &'a Dataset, seed: u64) -> Self {
-        Self { dataset, seed, objects: HashMap::new(), hands: HashMap::new(), cache: None }
+        Self {
+            dataset,
+            seed,
+            objects: HashMap::new(),
+            hands: HashMap::new(),
+            cache: None,
+            rig: None,
+        }
     }
 
     /// With the distance grids of hands kept between runs in `cache`, if there is one.
     pub fn with_cache(self, cache: Option<GridCache>) -> Self {
         Self { cache, ..self }
+    }
+
+    /// Corrected by `rig`, if it is known.
+    pub fn with_rig(self, rig: Option<Arc<Rig>>) -> Self {
+        Self { rig, ..self }
     }
 
     /// The dataset.
@@ -140,7 +160,11 @@ impl<'a> Assets<'a> {
         if let Some(object) = self.objects.get(&id) {
             return Ok(Arc::clone(object));
         }
-        let object = Arc::new(load_object(self.dataset.models(), id, self.seed)?);
+        let mut object = load_object(self.dataset.models(), id, self.seed)?;
+        if let Some(deviation) = self.rig.as_ref().and_then(|rig| rig.objects.get(&id)) {
+            object = deviation.corrected(&object)?;
+        }
+        let object = Arc::new(object);
         self.objects.insert(id, Arc::clone(&object));
         Ok(object)
     }
@@ -153,7 +177,7 @@ impl<'a> Assets<'a> {
         let object = self.object(target.obj_id)?;
         let frame = self.dataset.frame(target.scene_id, target.im_id)?;
         let (observation, hand) = self.observation(&frame, target.instance, required)?;
-        Ok(FrameInput { observation, object, hand })
+        Ok(FrameInput { observation, object, hand, rig: self.rig.clone() })
     }
 
     /// The frame with every sensor that it brings, and the hand if the frame says where it is. A sensor whose file or
@@ -162,6 +186,18 @@ impl<'a> Assets<'a> {
     /// # Errors
     /// If a file that is there is broken, or a required one is missing.
     pub fn observation(
+        &mut self,
+        frame: &Frame<'_>,
+        instance: usize,
+        required: &[Sensor],
+    ) -> Result<(Observation, Option<Arc<Hand>>), AssetError> {
+        let (observation, hand) = self.said(frame, instance, required)?;
+        let corrected = self.rig.as_ref().map(|rig| rig.corrected(&observation)).transpose()?;
+        Ok((corrected.unwrap_or(observation), hand))
+    }
+
+    /// The same as it is said to be.
+    fn said(
         &mut self,
         frame: &Frame<'_>,
         instance: usize,

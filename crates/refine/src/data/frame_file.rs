@@ -78,7 +78,7 @@ pub fn load_frame_file(
     let gravity = layout.gravity.map(|g| Vector3::from(g.0));
     gravity.iter().try_for_each(check_gravity).map_err(|e| field("gravity", &e))?;
     let observation = Observation { camera, color, depth, mask, gravity, hand: measured };
-    Ok((FrameInput { observation, object: Arc::new(object), hand }, layout.pose.0))
+    Ok((FrameInput { observation, object: Arc::new(object), hand, rig: None }, layout.pose.0))
 }
 
 /// The file's layout.

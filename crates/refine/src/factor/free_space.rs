@@ -113,7 +113,7 @@ impl Factor for FreeSpaceFactor {
                 rows.add(beyond, &weighting.shared(share), |row| {
                     // Shares are taken as they are: at depth's steps their derivative would pull samples sideways.
                     row.object_point(state, &place, &-Vector3::z());
-                    row.block(Block::Camera, &[measured, 1.0, 0.0, 0.0, 0.0]);
+                    row.block(Block::Camera, &[measured, 1.0, 0.0, 0.0, 0.0, 0.0]);
                 });
             }
         }

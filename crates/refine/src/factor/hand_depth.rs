@@ -34,9 +34,18 @@ impl Default for HandDepthSettings {
 /// needs to know, whatever depth's common errors are.
 pub struct HandDepthFactor {
     hand: Arc<Hand>,
-    /// Directions (x/z, y/z) and depths \[m\].
-    points: Vec<(Vector2<f64>, f64)>,
+    points: Vec<Point>,
     settings: HandDepthSettings,
+}
+
+/// A depth point.
+struct Point {
+    /// Its column and row \[px\].
+    pixel: Vector2<f64>,
+    /// Its direction, (x/z, y/z).
+    ray: Vector2<f64>,
+    /// Its depth as measured \[m\].
+    depth: f64,
 }
 
 /// Pixels around the object's mask that are not taken for the hand.
@@ -73,7 +82,11 @@ impl HandDepthFactor {
         let step = of_hand.len().div_ceil(settings.points.max(1)).max(1);
         let point = |&pixel: &usize| {
             let (x, y) = ((pixel % width) as f64, (pixel / width) as f64);
-            (camera.unproject(x, y, 1.0).coords.xy(), f64::from(depth.pixels()[pixel]))
+            Point {
+                pixel: Vector2::new(x, y),
+                ray: camera.unproject(x, y, 1.0).coords.xy(),
+                depth: f64::from(depth.pixels()[pixel]),
+            }
         };
         let points = of_hand.iter().step_by(step).map(point).collect();
         Ok(Self { hand: Arc::clone(robot), points, settings: settings.clone() })
@@ -85,7 +98,7 @@ impl HandDepthFactor {
             return Vec::new();
         };
         let reach = 2.0 * self.settings.reach;
-        let sample = |(ray, depth): &(Vector2<f64>, f64)| {
+        let sample = |Point { ray, depth, .. }: &Point| {
             let point = state.camera.point(ray, *depth);
             Some((point, hand.distance_with_gradient(&point, reach)?))
         };
@@ -100,7 +113,7 @@ impl Factor for HandDepthFactor {
 
     fn rows(&self, state: &State, rows: &mut Rows<'_>) {
         let weighting = self.settings.noise.weighting(self.points.len());
-        for (sample, (ray, depth)) in self.samples(state).iter().zip(&self.points) {
+        for (sample, Point { pixel, ray, depth }) in self.samples(state).iter().zip(&self.points) {
             let Some((point, sample)) = sample else {
                 // Points out of reach are as bad as those at its end.
                 rows.add_constant(weighting.cost(2.0 * self.settings.reach));
@@ -113,6 +126,8 @@ impl Factor for HandDepthFactor {
                 row.block(Block::Joints(state.joints.len()), sample.joints.as_slice());
                 let camera = state.camera.point_jacobian(ray, *depth).tr_mul(normal);
                 row.block(Block::Camera, camera.as_slice());
+                // As the bias of depth, there.
+                row.depth(pixel.x, pixel.y, camera[1]);
             });
         }
     }

@@ -70,7 +70,7 @@ mod gradient_check {
             // Radians move the surface by a tenth of what meters do.
             Block::ObjectPose | Block::HandPose => vec![1.0, 1.0, 1.0, 10.0, 10.0, 10.0],
             Block::Joints(count) => vec![10.0; count],
-            Block::Camera => vec![2.0, 1.0, 2.0, 2.0, 10.0],
+            Block::Camera => vec![2.0, 1.0, 2.0, 2.0, 10.0, 10.0],
         }
     }
 
@@ -126,12 +126,12 @@ mod gradient_check {
         let (value, same) =
             (factor.linearize(state, &mut alone), factor.linearize(state, &mut all));
         assert!((value / same - 1.0).abs() < 1e-5, "{value} {same}");
-        let gradient = all.gradient().rows(0, 11) - alone.gradient();
+        let gradient = all.gradient().rows(0, 12) - alone.gradient();
         assert!(gradient.norm() < 1e-4 * alone.gradient().norm());
-        let hessian = all.hessian().view((0, 0), (11, 11)) - alone.hessian();
+        let hessian = all.hessian().view((0, 0), (12, 12)) - alone.hessian();
         assert!(hessian.norm() < 1e-4 * alone.hessian().norm());
         let place = alone.gradient().fixed_rows::<3>(0).into_owned();
-        let by_patch = (0..patches.count()).map(|k| all.gradient().fixed_rows::<3>(11 + 3 * k));
+        let by_patch = (0..patches.count()).map(|k| all.gradient().fixed_rows::<3>(12 + 3 * k));
         let sum = by_patch.fold(-place, |sum, by_patch| sum + by_patch);
         assert!(sum.norm() <= elsewhere * place.norm(), "{sum:?} of {place:?}");
         let eigenvalues = all.hessian().clone().symmetric_eigenvalues();

@@ -29,6 +29,8 @@ pub struct PriorSettings {
     pub principal_point: f64,
     /// The size of images, as a part of it: errors of the focal length and of the model's size.
     pub focal_scale: f64,
+    /// Half of what the two focal lengths differ by, as a part of them.
+    pub aspect: f64,
 }
 
 impl PriorSettings {
@@ -44,6 +46,7 @@ impl PriorSettings {
                 self.principal_point,
                 self.principal_point,
                 self.focal_scale,
+                self.aspect,
             ],
         }
     }
@@ -67,6 +70,7 @@ impl Default for PriorSettings {
             depth_bias: 1e-3,
             principal_point: 1.7e-3,
             focal_scale: 4e-3,
+            aspect: 2e-3,
         }
     }
 }
@@ -258,6 +262,7 @@ mod tests {
             depth_bias: 1e-3,
             principal_point: 2e-3,
             focal_scale: 4e-3,
+            aspect: 2e-3,
         }
     }
 

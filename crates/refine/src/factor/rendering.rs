@@ -188,16 +188,16 @@ impl RenderingFactor {
     /// The cost at `state` and its derivatives, from those by the place at which the model's center is seen.
     fn add_tiles(&self, state: &State, tiles: &[Tile], equations: &mut NormalEquations) -> f64 {
         // The object is seen shifted, and turned as it is.
-        let mut seen_by_state = SMatrix::<f64, 6, 11>::zeros();
+        let mut seen_by_state = SMatrix::<f64, 6, 12>::zeros();
         let place = state.camera.reprojected_jacobian(&state.center());
         seen_by_state.fixed_view_mut::<3, 3>(0, 0).copy_from(&place.fixed_columns::<3>(0));
-        seen_by_state.fixed_view_mut::<3, 5>(0, 6).copy_from(&place.fixed_columns::<5>(3));
+        seen_by_state.fixed_view_mut::<3, 6>(0, 6).copy_from(&place.fixed_columns::<6>(3));
         seen_by_state.fixed_view_mut::<3, 3>(3, 3).fill_with_identity();
         // States turn about the object's center, which leaves out what does not belong to its surface.
         let arm = state.t_cam_object.rotation * (self.problem.model.center() - self.object.center);
         seen_by_state.fixed_view_mut::<3, 3>(0, 3).copy_from(&-arm.cross_matrix());
         let patches = self.patches_for(equations).map(|(patches, _)| patches);
-        let mut sums = PatchSums::<11>::new(patches.map_or(0, |patches| patches.count()));
+        let mut sums = PatchSums::<12>::new(patches.map_or(0, |patches| patches.count()));
         let mut cost = 0.0;
         for &Tile { column, row, at } in tiles {
             let patch = patches.and_then(|patches| patches.in_tile(column, row));

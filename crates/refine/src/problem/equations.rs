@@ -1,8 +1,10 @@
 //! The normal equations that factors add to.
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, DMatrixView, DVector, DVectorView, SMatrix, SVector};
 
-use super::{Block, Row};
+use super::{Block, DepthField, Row};
 
 /// Gradient Jᵀr and Gauss–Newton Hessian JᵀJ of ½‖r‖², a sum of factors, by the parameters of some blocks.
 #[derive(Clone, Debug)]
@@ -13,6 +15,8 @@ pub struct NormalEquations {
     /// Number of parameters that no state holds and that are eliminated: displacements of surface patches. They come last, and
     /// have room once something depends on them.
     auxiliary: usize,
+    /// By which depth may be off: its coefficients come after the patches' displacements, and no state holds them either.
+    depth_field: Option<Arc<DepthField>>,
     gradient: DVector<f64>,
     hessian: DMatrix<f64>,
     /// Place and derivative of each parameter of the row begun last.
@@ -42,10 +46,28 @@ impl NormalEquations {
             blocks: blocks.to_vec(),
             dimension: n,
             auxiliary,
+            depth_field: None,
             gradient: DVector::zeros(n),
             hessian: DMatrix::zeros(n, n),
             entries: Vec::new(),
         }
+    }
+
+    /// The same over the coefficients of a field by which depth may be off, too.
+    pub(crate) fn with_depth_field(mut self, field: Arc<DepthField>) -> Self {
+        self.depth_field = Some(field);
+        self.grow();
+        self
+    }
+
+    /// The field by which depth may be off, and where its coefficients begin.
+    pub(crate) fn depth_field(&self) -> Option<(&Arc<DepthField>, usize)> {
+        self.depth_field.as_ref().map(|field| (field, self.dimension + self.auxiliary))
+    }
+
+    /// Number of the blocks' parameters.
+    pub(crate) fn dimension(&self) -> usize {
+        self.dimension
     }
 
     /// Number of auxiliary parameters that may be added to.
@@ -60,7 +82,8 @@ impl NormalEquations {
 
     /// Makes room for the auxiliary parameters.
     fn grow(&mut self) {
-        let n = self.dimension + self.auxiliary;
+        let field = self.depth_field.as_ref().map_or(0, |field| field.len());
+        let n = self.dimension + self.auxiliary + field;
         if self.gradient.len() < n {
             let old = std::mem::replace(&mut self.gradient, DVector::zeros(n));
             self.gradient.rows_mut(0, old.len()).copy_from(&old);
@@ -104,6 +127,7 @@ impl NormalEquations {
             blocks: self.blocks.clone(),
             dimension: n,
             auxiliary: 0,
+            depth_field: None,
             gradient: self.gradient.rows(0, n) - coupling.tr_mul(&pull),
             hessian: self.hessian.view((0, 0), (n, n)) - coupling.tr_mul(&coupling),
             entries: Vec::new(),
@@ -117,6 +141,7 @@ impl NormalEquations {
         let n = self.dimension;
         Self {
             auxiliary: 0,
+            depth_field: None,
             gradient: self.gradient.rows(0, n).clone_owned(),
             hessian: self.hessian.view((0, 0), (n, n)).clone_owned(),
             ..self
@@ -160,6 +185,15 @@ impl NormalEquations {
         if let Some(offset) = self.offset(block) {
             self.entries.push((offset + index, derivative));
         }
+    }
+
+    /// The derivative by what depth is off by at the pixel (x, y); dropped if nobody asks for it.
+    #[inline]
+    pub(super) fn push_depth(&mut self, x: f64, y: f64, derivative: f64) {
+        let Some(field) = &self.depth_field else { return };
+        let first = self.dimension + self.auxiliary;
+        let weights = field.weights(x, y);
+        self.entries.extend(weights.map(|(k, weight)| (first + k, weight * derivative)));
     }
 
     /// Adds ½ `weight` r² of the residual r whose derivatives are the row begun last.
@@ -207,7 +241,9 @@ impl NormalEquations {
         hessian: &DMatrix<f64>,
     ) {
         self.grow();
-        self.add_views(blocks, self.auxiliary, &gradient.as_view(), &hessian.as_view());
+        // That of a depth field too, where it is given.
+        let auxiliary = gradient.len() - blocks.iter().map(|b| b.dimension()).sum::<usize>();
+        self.add_views(blocks, auxiliary, &gradient.as_view(), &hessian.as_view());
     }
 
     fn add_views(

@@ -11,7 +11,8 @@ use rayon::prelude::*;
 use strum::IntoStaticStr;
 
 use super::{
-    Block, Factor, NormalEquations, RIDGE, ScaledCholesky, SchurComplement, State, SurfacePatches,
+    Block, DepthField, Factor, NormalEquations, RIDGE, ScaledCholesky, SchurComplement, State,
+    SurfacePatches,
 };
 
 /// Factors, and the blocks of the state that are solved for.
@@ -213,6 +214,20 @@ impl Problem {
             Stop::Observer => Termination::Aborted,
         };
         Solution { at, termination, iterations }
+    }
+
+    /// Derivatives of all factors but the prior at `state`, those by displacements of patches and by a field that depth is off by included.
+    pub(crate) fn evidence(&self, state: &State, field: &Arc<DepthField>) -> NormalEquations {
+        let nothing = || self.no_equations().with_depth_field(Arc::clone(field));
+        let of_factor = |factor: &Arc<dyn Factor>| {
+            let mut equations = nothing();
+            factor.linearize(state, &mut equations);
+            equations
+        };
+        let parts: Vec<NormalEquations> = self.factors.par_iter().map(of_factor).collect();
+        let mut sum = nothing();
+        parts.iter().for_each(|part| sum += part);
+        sum
     }
 
     /// Nothing yet of the derivatives of a sum.

@@ -1,6 +1,7 @@
 //! The least-squares problem: [`Factor`]s over a [`State`] in [`Block`]s of parameters, the [`NormalEquations`] that they
 //! add to, and the solver.
 
+mod depth_field;
 mod equations;
 mod factor;
 mod least_squares;
@@ -10,6 +11,7 @@ mod rows;
 mod scaled_cholesky;
 mod state;
 
+pub(crate) use depth_field::DepthField;
 pub use equations::NormalEquations;
 pub(crate) use equations::SchurComplement;
 pub use factor::Factor;

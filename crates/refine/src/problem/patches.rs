@@ -1,6 +1,6 @@
 //! Patches of the object's surface that may each be off by themselves.
 
-use nalgebra::{DMatrix, Vector3};
+use nalgebra::{DMatrix, Point3, Vector3};
 
 use crate::scene::Observation;
 
@@ -46,6 +46,8 @@ pub(crate) struct SurfacePatches {
     columns: usize,
     /// Number of the patch in each tile, row-major.
     numbers: Vec<Option<usize>>,
+    /// Where each patch is, in the middle of what is seen of it (camera frame) \[m\].
+    places: Vec<Point3<f64>>,
     /// Inverse of the covariance of the patches' displacements in one direction \[1/m²\].
     precision: DMatrix<f64>,
     /// Logarithm of the determinant of that of all displacements.
@@ -98,7 +100,7 @@ impl SurfacePatches {
         let mut places = Vec::new();
         let number = |(sum, count): &(Vector3<f64>, f64)| {
             (*count > 0.0).then(|| {
-                places.push(sum / *count);
+                places.push(Point3::from(sum / *count));
                 places.len() - 1
             })
         };
@@ -111,7 +113,20 @@ impl SurfacePatches {
         let factor = covariance.cholesky()?;
         let log_determinant = -3.0 * factor.ln_determinant();
         let precision = factor.inverse();
-        Some(Self { side, first: [left, top], columns, numbers, precision, log_determinant })
+        Some(Self {
+            side,
+            first: [left, top],
+            columns,
+            numbers,
+            places,
+            precision,
+            log_determinant,
+        })
+    }
+
+    /// Where each patch is (camera frame) \[m\].
+    pub(crate) fn places(&self) -> &[Point3<f64>] {
+        &self.places
     }
 
     /// How many there are.

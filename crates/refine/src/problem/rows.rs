@@ -70,6 +70,12 @@ impl Row<'_> {
         self.equations.push_entry(block, index, derivative);
     }
 
+    /// Writes the derivative by depth \[1/m of measured depth, corrected\] as it is measured at the pixel (x, y).
+    #[inline]
+    pub fn depth(&mut self, x: f64, y: f64, derivative: f64) {
+        self.equations.push_depth(x, y, derivative);
+    }
+
     /// Derivatives by the object's pose of a residual that changes by `direction`·v while a point of the object, now at
     /// `point`, moves by v (camera frame).
     #[inline]

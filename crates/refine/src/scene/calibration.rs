@@ -1,6 +1,6 @@
 //! How a camera differs from its calibration.
 
-use nalgebra::{Isometry3, Matrix3x5, Point3, SMatrix, Translation3, Vector2, Vector3};
+use nalgebra::{Isometry3, Matrix3x6, Point3, SMatrix, Translation3, Vector2, Vector3};
 
 /// Errors of a depth camera, as small changes that bring what it measures to where things are.
 ///
@@ -15,6 +15,8 @@ pub struct CameraCalibrationError {
     pub principal_point: Vector2<f64>,
     /// How much larger the images of things are than focal length and models say, as a part of their size.
     pub focal_scale: f64,
+    /// How much wider they are besides, and less high, as a part of their size: half of what the two focal lengths differ by.
+    pub aspect: f64,
 }
 
 impl Default for CameraCalibrationError {
@@ -24,24 +26,25 @@ impl Default for CameraCalibrationError {
             depth_bias: 0.0,
             principal_point: Vector2::zeros(),
             focal_scale: 0.0,
+            aspect: 0.0,
         }
     }
 }
 
 impl CameraCalibrationError {
     /// Number of parameters.
-    pub(crate) const DIMENSION: usize = 5;
+    pub(crate) const DIMENSION: usize = 6;
 
     /// The parameters, zero where nothing is corrected.
     pub fn parameters(&self) -> [f64; Self::DIMENSION] {
         let [x, y] = self.principal_point.into();
-        [self.depth_scale - 1.0, self.depth_bias, x, y, self.focal_scale]
+        [self.depth_scale - 1.0, self.depth_bias, x, y, self.focal_scale, self.aspect]
     }
 
     /// With `change` added to the parameters.
     ///
     /// # Panics
-    /// If there are not five changes.
+    /// If there is not one change a parameter.
     pub fn changed(&self, change: &[f64]) -> Self {
         assert_eq!(change.len(), Self::DIMENSION, "one change a parameter");
         Self {
@@ -49,53 +52,70 @@ impl CameraCalibrationError {
             depth_bias: self.depth_bias + change[1],
             principal_point: self.principal_point + Vector2::new(change[2], change[3]),
             focal_scale: self.focal_scale + change[4],
+            aspect: self.aspect + change[5],
         }
     }
 
     /// Where a point is \[m\] that the camera, as it is said to be, sees along `ray` (x/z, y/z) at `depth` \[m\].
     pub fn point(&self, ray: &Vector2<f64>, depth: f64) -> Point3<f64> {
         let z = self.depth_scale * depth + self.depth_bias;
-        let true_ray = (ray - self.principal_point) / (1.0 + self.focal_scale);
+        let true_ray = (ray - self.principal_point).component_div(&self.sizes());
         Point3::new(true_ray.x * z, true_ray.y * z, z)
     }
 
     /// Derivatives of [`point`](Self::point) by the parameters.
-    pub fn point_jacobian(&self, ray: &Vector2<f64>, depth: f64) -> Matrix3x5<f64> {
+    pub fn point_jacobian(&self, ray: &Vector2<f64>, depth: f64) -> Matrix3x6<f64> {
         let z = self.depth_scale * depth + self.depth_bias;
-        let larger = 1.0 + self.focal_scale;
-        let true_ray = (ray - self.principal_point) / larger;
+        let sizes = self.sizes();
+        let true_ray = (ray - self.principal_point).component_div(&sizes);
         let along = true_ray.push(1.0);
-        Matrix3x5::from_columns(&[
+        let by_size = true_ray.component_div(&sizes) * -z;
+        Matrix3x6::from_columns(&[
             along * depth,
             along,
-            Vector3::new(-z / larger, 0.0, 0.0),
-            Vector3::new(0.0, -z / larger, 0.0),
-            Vector3::new(-true_ray.x * z, -true_ray.y * z, 0.0) / larger,
+            Vector3::new(-z / sizes.x, 0.0, 0.0),
+            Vector3::new(0.0, -z / sizes.y, 0.0),
+            Vector3::new(by_size.x, by_size.y, 0.0),
+            Vector3::new(by_size.x, -by_size.y, 0.0),
         ])
     }
 
+    /// Width and height of images over what focal lengths and models say.
+    fn sizes(&self) -> Vector2<f64> {
+        let larger = 1.0 + self.focal_scale;
+        Vector2::new(larger + self.aspect, larger - self.aspect)
+    }
+
     /// The pose at which the camera, as it is said to be, would see a thing of center `center` (camera frame) as it does
-    /// see it at `pose`: nearer where images are larger, and shifted. To first order in the thing's size over its distance.
+    /// see it at `pose`: nearer where images are larger, and shifted. To first order in the thing's size over its distance, and but for
+    /// its being wider than high.
     pub(crate) fn reprojected(
         &self,
         pose: &Isometry3<f64>,
         center: &Vector3<f64>,
     ) -> Isometry3<f64> {
-        let z = center.z / (1.0 + self.focal_scale);
+        let larger = 1.0 + self.focal_scale;
+        let z = center.z / larger;
+        let wider = self.aspect / larger;
         let [right, below] = (self.principal_point * z).into();
-        Translation3::new(right, below, z - center.z) * pose
+        Translation3::new(right + wider * center.x, below - wider * center.y, z - center.z) * pose
     }
 
     /// Derivatives of the place of [`reprojected`](Self::reprojected): by the place of the pose, then by the parameters.
-    pub(crate) fn reprojected_jacobian(&self, center: &Vector3<f64>) -> SMatrix<f64, 3, 8> {
+    pub(crate) fn reprojected_jacobian(&self, center: &Vector3<f64>) -> SMatrix<f64, 3, 9> {
         let larger = 1.0 + self.focal_scale;
         let z = center.z / larger;
+        let wider = self.aspect / larger;
         let along = self.principal_point.push(1.0);
-        let mut jacobian = SMatrix::<f64, 3, 8>::identity();
+        let across = Vector3::new(center.x, -center.y, 0.0);
+        let mut jacobian = SMatrix::<f64, 3, 9>::identity();
+        jacobian[(0, 0)] += wider;
+        jacobian[(1, 1)] -= wider;
         jacobian.set_column(2, &(along / larger));
         jacobian[(0, 5)] = z;
         jacobian[(1, 6)] = z;
-        jacobian.set_column(7, &(along * (-z / larger)));
+        jacobian.set_column(7, &((along * z + across * wider) / -larger));
+        jacobian.set_column(8, &(across / larger));
         jacobian
     }
 }
@@ -107,7 +127,7 @@ mod tests {
     use super::*;
 
     fn some() -> CameraCalibrationError {
-        CameraCalibrationError::default().changed(&[0.01, 2e-3, 3e-3, -1e-3, 4e-3])
+        CameraCalibrationError::default().changed(&[0.01, 2e-3, 3e-3, -1e-3, 4e-3, 2e-3])
     }
 
     /// Compares a Jacobian with finite differences of `f` at zero.
@@ -124,7 +144,7 @@ mod tests {
         let (ray, depth) = (Vector2::new(0.1, -0.2), 0.5);
         let plain = CameraCalibrationError::default();
         assert_eq!(plain.point(&ray, depth), Point3::new(0.05, -0.1, 0.5));
-        assert_eq!(plain.parameters(), [0.0; 5]);
+        assert_eq!(plain.parameters(), [0.0; 6]);
         let pose = Isometry3::translation(0.03, -0.02, 0.4);
         let center = pose.translation.vector;
         for correction in [plain, some()] {

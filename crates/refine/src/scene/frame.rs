@@ -9,6 +9,7 @@ use prehend_render::{Backend, Camera, Cpu, DepthImage, Target, TargetError, dept
 
 use super::{Hand, HandMeasurement, Object, Observation};
 use crate::error::RefineError;
+use crate::rig::Rig;
 
 /// An observation of an object in a hand, checked, with what factors derive from it: each thing is made when it is first asked
 /// for, and once.
@@ -22,6 +23,7 @@ pub struct Frame<'a> {
     segmented: Mutex<BTreeMap<(Occluders, usize), Segmented>>,
     /// What renders, if not the processor at hand.
     backend: Option<Arc<dyn Backend>>,
+    rig: Option<&'a Rig>,
 }
 
 /// What may hide the object in the image.
@@ -74,7 +76,18 @@ impl<'a> Frame<'a> {
             depth: OnceLock::new(),
             segmented: Mutex::default(),
             backend: None,
+            rig: None,
         })
+    }
+
+    /// The same of a rig that is known as well as `rig` says: what was observed, and the object, are corrected by it already.
+    pub fn with_rig(self, rig: &'a Rig) -> Self {
+        Self { rig: Some(rig), ..self }
+    }
+
+    /// The rig, where it is known.
+    pub(crate) fn rig(&self) -> Option<&'a Rig> {
+        self.rig
     }
 
     /// The same, rendered on another device ([`Device::open`](prehend_render::Device::open)): factors of this frame compare their pictures

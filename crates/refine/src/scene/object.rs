@@ -49,6 +49,10 @@ pub struct Object {
     pub radius: f64,
     /// Surface area \[m²\].
     pub area: f64,
+    /// How far the surface is from where the mesh has it, where that is known \[m\]: standard deviation in each direction.
+    pub surface_sigma: Option<f64>,
+    /// What decided where the surface is sampled.
+    pub(crate) seed: u64,
     pub(crate) surface: ClosestPoints,
     /// Outward unit normal of each face that `surface` may answer; zero for a face without area.
     pub(crate) normals: Vec<Vector3<f64>>,
@@ -134,6 +138,8 @@ impl Object {
             model: Arc::new(RenderModel::new(&mesh).map_err(|e| fail(e.to_string()))?),
             center: nalgebra::center(&low, &high),
             radius: 0.5 * (high - low).norm(),
+            surface_sigma: None,
+            seed,
             area: solid.area(),
             mesh,
             report,

@@ -9,6 +9,7 @@ mod step;
 mod trace;
 
 pub use estimate::{Estimate, Observer, Progress, Strategy};
+pub(crate) use fused::Evidence;
 pub use fused::{
     CovarianceInflation, Fused, FusedSettings, Hypothesis, Inconsistency, Modality, Nuisance,
     Posterior, PosteriorSummary, Stage, UnobservableDirection,

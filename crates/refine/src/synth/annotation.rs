@@ -96,6 +96,30 @@ pub(super) fn model(mesh: &TriMesh, inertial: &Inertial) -> Value {
     Value::Object(fields)
 }
 
+/// What is wrong with a rig, as changes that bring what is said and measured to what is true: factors of focal lengths, shift of the
+/// principal point, factor of depth, what is to be added then on a grid of the image, the hand's pose in the frame of where it is said to be,
+/// joint positions to be added, and the taxels' gains.
+pub(super) fn rig(
+    focal: [f64; 2],
+    principal_px: [f64; 2],
+    depth_scale: f64,
+    depth_offsets: &[Vec<f64>],
+    hand: &Isometry3<f64>,
+    joints: &Map<String, Value>,
+    taxel_gains: &[f64],
+) -> Value {
+    json!({
+        "focal_scale": focal,
+        "principal_point_px": principal_px,
+        "depth_scale": depth_scale,
+        "depth_offset_mm": depth_offsets,
+        "hand_R": rotation_to_row_major(&hand.rotation),
+        "hand_t": translation_to_mm(&hand.translation),
+        "joints": joints,
+        "taxel_gains": taxel_gains,
+    })
+}
+
 /// `cam_R_…` and `cam_t_…` of a pose into the camera frame.
 fn pose(suffix: &str, pose: &Isometry3<f64>) -> Map<String, Value> {
     Map::from_iter([

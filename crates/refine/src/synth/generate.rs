@@ -58,7 +58,7 @@ const FAILURES: &str = "synth_failures.json";
 ///
 /// `models/` and `scene_bodies.json` hold what the estimator is told, `models_eval/`, `mask/`, `scene_gt.json`,
 /// `scene_gt_info.json` and `scene_bodies_gt.json` the truth; `init_low.csv` and `init_high.csv` are initial poses
-/// ([`NoiseLevel`]); `synth.json` keeps the settings.
+/// ([`NoiseLevel`]); `synth.json` keeps the settings, and `rig_gt.json` what is wrong with the rig where that is the same in all frames.
 ///
 /// # Errors
 /// If the folder holds something else or a dataset of other settings, a file cannot be written, or an object cannot be
@@ -90,6 +90,12 @@ where
     let size = (settings.width.get(), settings.height.get());
     let lens = settings.lens.map(|model| Lens::new(model, &settings.sensor, size));
     let lens = lens.as_ref();
+    if settings.sensor.calibration.shared > 0 {
+        let mut noise = sequence(settings.seed, Use::Rig, 0, 0);
+        let rig =
+            Rig::new(&settings.sensor, &subjects[0].object, &hand.robot, size, lens, &mut noise);
+        write_atomically(&dir.join("rig_gt.json"), format!("{}\n", rig.faults()).as_bytes())?;
+    }
     let mut summary = DatasetSummary::default();
     for subject in subjects {
         let scene_dir = dir.join("test").join(format!("{:06}", subject.obj_id));
@@ -211,7 +217,8 @@ impl Scene<'_> {
         let &Subject { obj_id, ref object } = self.subject;
         let robot = &self.hand.robot;
         let size = (width.get(), height.get());
-        let mut noise = sequence(seed, Use::Rig, obj_id, grasp);
+        let lasting = if sensor.calibration.shared > 0 { (0, 0) } else { (obj_id, grasp) };
+        let mut noise = sequence(seed, Use::Rig, lasting.0, lasting.1);
         let rig = Rig::new(sensor, object, robot, size, self.lens, &mut noise);
         let shares = self.settings.frames_per_grasp.get() as usize;
         images.par_iter().try_for_each(|&im_id| {

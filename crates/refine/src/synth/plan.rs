@@ -134,7 +134,7 @@ pub(super) enum Use {
     Model = 1,
     /// The grasp and its trajectory, by object and grasp.
     Grasp,
-    /// Sensor faults that last through a grasp, by object and grasp.
+    /// Sensor faults that last, by object and grasp, or of all.
     Rig,
     /// What differs from frame to frame, by object and frame.
     Frame,

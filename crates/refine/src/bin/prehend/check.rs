@@ -50,7 +50,7 @@ impl Check {
 
 fn check(assets: &mut Assets<'_>, job: &Job) -> Result<(RgbImage, Vec<String>), AssetError> {
     let input = assets.load(&job.target, &[])?;
-    let FrameInput { observation, object, hand } = &input;
+    let FrameInput { observation, object, hand, .. } = &input;
     let t_cam_model = &job.row.t_cam_model;
     let mut warnings = Vec::new();
     let touches = observation.hand.as_ref().is_some_and(|hand| !hand.forces.is_empty());

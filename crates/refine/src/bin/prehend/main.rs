@@ -1,5 +1,6 @@
 //! The `prehend` command.
 
+mod calibrate;
 mod check;
 mod eval;
 mod initial;
@@ -63,6 +64,8 @@ enum Command {
     Eval(eval::Eval),
     /// Regenerate the paper's tables on a dataset, ours beside the published rows, or measure the fused estimator
     Study(Box<study::Study>),
+    /// Learn a rig from its own frames: what is wrong with camera, hand and models in the same way in all of them
+    Calibrate(Box<calibrate::Calibrate>),
     /// Draw poses over their images, and warn about units and frames of the object, before refining anything
     Check(check::Check),
     /// Find the symmetries of models, and write them into models_info.json
@@ -92,6 +95,7 @@ fn main() -> ExitCode {
         Command::Track(track) => track.run(),
         Command::Eval(eval) => eval.run(),
         Command::Study(study) => study.run(),
+        Command::Calibrate(calibrate) => calibrate.run(),
         Command::Check(check) => check.run(),
         Command::Symmetry(symmetry) => symmetry.run(),
         Command::Synth(synth) => synth.run(),

@@ -83,7 +83,7 @@ pub(crate) struct Synth {
     /// or kannala_brandt:0.02,-0.01,0,0 (k1,k2,k3,k4) [default: a pinhole]
     #[arg(long, value_name = "LENS", value_parser = lens, allow_hyphen_values = true)]
     lens: Option<Distortion>,
-    /// `clean`, `realistic`, or one setting such as depth.noise=0.001; may be repeated, settings override
+    /// `clean`, `realistic`, `rig` (realistic faults, the same in all frames), or one setting such as depth.noise=0.001; may be repeated, settings override
     ///
     /// `--sensor list` prints all settings and their values.
     #[arg(long, value_name = "PRESET|KEY=VALUE")]
@@ -163,8 +163,9 @@ impl Synth {
             match word.as_str() {
                 "clean" => settings = SensorSettings::clean(),
                 "realistic" => settings = SensorSettings::realistic(),
+                "rig" => settings = SensorSettings::rig(),
                 "list" => {}
-                _ => bail!("--sensor {word}: neither clean, realistic, list nor KEY=VALUE"),
+                _ => bail!("--sensor {word}: neither clean, realistic, rig, list nor KEY=VALUE"),
             }
         }
         for (key, value) in given.iter().filter_map(|word| word.split_once('=')) {

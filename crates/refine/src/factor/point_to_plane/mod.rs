@@ -6,7 +6,7 @@ mod smooth_field;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use nalgebra::{SVector, Vector2, Vector3};
+use nalgebra::{DMatrix, DVector, SVector, Vector2, Vector3};
 use prehend_autodiff::lie::twist_row;
 use prehend_render::Mask;
 use rayon::prelude::*;
@@ -75,7 +75,10 @@ struct Point {
 }
 
 /// Parameters of the object's pose and the camera together.
-const N: usize = 11;
+const N: usize = 12;
+
+/// Which of them is added to depth.
+const BIAS: usize = 7;
 
 /// A point seen from the surface.
 struct Residual {
@@ -226,20 +229,38 @@ impl Factor for PointToPlaneFactor {
             let (column, row) = self.points[i].pixel;
             patches.and_then(|patches| patches.at(column, row))
         };
-        let mut sums = PatchSums::<N>::new(count);
-        for (i, ((row, weight), left)) in rows.iter().zip(&fit.weights).zip(&fit.left).enumerate() {
-            let row = SVector::from(*row);
-            let (gradient, hessian) = sums.of(patch(i));
-            gradient.axpy(weight * left, &row, 1.0);
-            hessian.ger(*weight, &row, &row, 1.0);
-        }
-        let (gradient, mut hessian) = sums.equations();
+        let depth_field = equations.depth_field().map(|(field, _)| Arc::clone(field));
+        let derivatives = |i: usize| {
+            let at = patch(i).map(PatchSums::<N>::place);
+            let displaced = at.into_iter().flat_map(|at| at..at + 3).zip(rows[i]);
+            let (x, y) = self.points[i].pixel;
+            let off = depth_field.iter().flat_map(move |field| field.weights(x as f64, y as f64));
+            let (first, by_bias) = (PatchSums::<N>::place(count), rows[i][BIAS]);
+            let off = off.map(move |(k, weight)| (first + k, weight * by_bias));
+            rows[i].into_iter().enumerate().chain(displaced).chain(off)
+        };
+        let weighted = || fit.weights.iter().zip(&fit.left).enumerate();
+        let (gradient, mut hessian) = if let Some(field) = &depth_field {
+            let size = PatchSums::<N>::place(count) + field.len();
+            let (mut gradient, mut hessian) = (DVector::zeros(size), DMatrix::zeros(size, size));
+            for (i, (weight, left)) in weighted() {
+                for (r, by_row) in derivatives(i) {
+                    gradient[r] += weight * left * by_row;
+                    derivatives(i).for_each(|(c, d)| hessian[(r, c)] += weight * by_row * d);
+                }
+            }
+            (gradient, hessian)
+        } else {
+            let mut sums = PatchSums::<N>::new(count);
+            for (i, (weight, left)) in weighted() {
+                let row = SVector::from(rows[i]);
+                let (gradient, hessian) = sums.of(patch(i));
+                gradient.axpy(weight * left, &row, 1.0);
+                hessian.ger(*weight, &row, &row, 1.0);
+            }
+            sums.equations()
+        };
         if let Some(field) = &self.field {
-            let derivatives = |i: usize| {
-                let at = patch(i).map(PatchSums::<N>::place);
-                let displaced = at.into_iter().flat_map(move |at| at..at + 3).zip(rows[i]);
-                rows[i].into_iter().enumerate().chain(displaced)
-            };
             hessian -= field.lost(&fit, hessian.nrows(), derivatives);
         }
         add_to(equations, &gradient, &hessian);

@@ -23,8 +23,11 @@ pub use self::summary::PosteriorSummary;
 use super::estimate::Recorder;
 use super::{Estimate, Iteration, Observer, Strategy};
 use crate::error::RefineError;
-use crate::factor::GaussianPrior;
-use crate::problem::{Factor, Solution, Solver, State, Termination};
+use crate::factor::{GaussianPrior, Layout};
+use crate::problem::{
+    Block, DepthField, Factor, NormalEquations, Solution, Solver, State, SurfacePatches,
+    Termination,
+};
 use crate::scene::Frame;
 
 /// Gauss–Newton on all evidence at once, with the quantities that are not known exactly estimated beside the pose.
@@ -56,10 +59,68 @@ impl Fused {
         Self { settings, factors: Vec::new() }
     }
 
+    /// The settings, with what is known of how good the frame's model is.
+    fn settings_for(&self, frame: &Frame<'_>) -> FusedSettings {
+        let mut settings = self.settings.clone();
+        if let Some(sigma) = frame.object().surface_sigma {
+            settings.model.gp_sigma = settings.model.gp_sigma.min(sigma);
+        }
+        settings
+    }
+
+    /// What is known beforehand: about `initial`, and of calibrations what the frame's rig says, or the settings.
+    fn prior(&self, frame: &Frame<'_>, initial: &State) -> Result<GaussianPrior, RefineError> {
+        let settings = &self.settings.prior;
+        let Some(rig) = frame.rig() else {
+            return GaussianPrior::independent(initial.clone(), settings);
+        };
+        let object = settings.sigmas(Block::ObjectPose);
+        let covariance = rig.frame_covariance(initial, &frame.observation().camera, &object);
+        let layout = Layout::new(initial.joints.len());
+        GaussianPrior::correlated(initial.clone(), layout, &covariance).ok_or_else(|| {
+            let problem = "the covariance is not positive definite".into();
+            RefineError::Setting { name: "rig", problem }
+        })
+    }
+
     /// With a factor of one's own; its noise model is believed as it is stated.
     pub fn with(mut self, factor: impl Factor + 'static) -> Self {
         self.factors.push(Arc::new(factor));
         self
+    }
+}
+
+/// What a frame says of its state and of the object's surface, beside what is known beforehand.
+pub(crate) struct Evidence {
+    /// Where it was asked.
+    pub(crate) state: State,
+    /// Derivatives by the object's pose, by all calibrations, by displacements of the patches and by the field that depth is off by.
+    pub(crate) equations: NormalEquations,
+    /// Where the object may be off from its model.
+    pub(crate) patches: Option<Arc<SurfacePatches>>,
+}
+
+impl Fused {
+    /// What all factors of the last stage say at `state`, from where noise is measured. `None` if there are none.
+    ///
+    /// # Errors
+    /// Those of a run.
+    pub(crate) fn evidence(
+        &self,
+        frame: &Frame<'_>,
+        state: &State,
+        field: &Arc<DepthField>,
+    ) -> Result<Option<Evidence>, RefineError> {
+        let prior = Arc::new(GaussianPrior::independent(state.clone(), &self.settings.prior)?);
+        let settings = self.settings_for(frame);
+        let mut walk = Walk { fused: self, frame, initial: state, prior, settings };
+        let Some(stage) = self.settings.stages.last() else { return Ok(None) };
+        let patches = surface_patches(frame, state, stage, &walk.settings);
+        walk.measure_noise(state, patches.is_some());
+        let (settings, own) = (&walk.settings, &self.factors);
+        let problem = problem_of(frame, state, stage, settings, patches.clone(), own)?;
+        let equations = problem.evidence(state, field);
+        Ok(Some(Evidence { state: state.clone(), equations, patches }))
     }
 }
 
@@ -86,8 +147,9 @@ impl Strategy for Fused {
         }
         let names = std::iter::once("posterior");
         let mut recorder = Recorder::new(names, initial, self.iterations(), None, observe);
-        let prior = Arc::new(GaussianPrior::independent(initial.clone(), &self.settings.prior)?);
-        let mut walk = Walk { fused: self, frame, initial, prior, settings: self.settings.clone() };
+        let prior = Arc::new(self.prior(frame, initial)?);
+        let settings = self.settings_for(frame);
+        let mut walk = Walk { fused: self, frame, initial, prior, settings };
         let mut states = restarts(initial, self.settings.restart_angle);
         let mut found = Vec::new();
         let mut go_on = ControlFlow::Continue(());
@@ -101,6 +163,7 @@ impl Strategy for Fused {
         }
         let exact = go_on.is_continue()
             && self.settings.calibration_test
+            && frame.rig().is_none()
             && calibration_test::is_exact(&found[0].at);
         if exact {
             // Depth's noise is measured at the solution with free calibrations first, then at that with exact ones.

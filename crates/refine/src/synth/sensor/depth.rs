@@ -131,9 +131,9 @@ impl DepthSettings {
 
 /// What stays the same through a grasp.
 pub(super) struct DepthBias {
-    scale: f32,
+    pub(super) scale: f32,
     /// Added to each pixel \[m\].
-    warp: Vec<f32>,
+    pub(super) warp: Vec<f32>,
 }
 
 /// Neighbors that differ by more lie on different surfaces \[m\].

@@ -8,12 +8,15 @@ use prehend_render::{
     render_scene,
 };
 
+use serde_json::{Value, json};
+
 use super::calibration::Miscalibration;
 use super::depth::DepthBias;
 use super::lens::Lens;
 use super::settings::SensorSettings;
 use super::touch::TaxelCondition;
 use crate::scene::{Hand, HandMeasurement, Object, Observation};
+use crate::synth::annotation;
 use crate::synth::files::Shot;
 use crate::synth::grasp::GraspSnapshot;
 
@@ -42,6 +45,9 @@ pub(super) struct View {
     pub(super) whole: Mask,
 }
 
+/// Distance of the places where `rig_gt.json` tells depth's warp \[px\].
+const GRID: usize = 20;
+
 /// Rays a pixel, along each axis.
 const SAMPLES: usize = 3;
 
@@ -69,6 +75,29 @@ impl<'a> Rig<'a> {
         }
     }
 
+    /// What is wrong with it: the content of `rig_gt.json`.
+    pub(in crate::synth) fn faults(&self) -> Value {
+        let Miscalibration { focal, principal, hand } = &self.errors;
+        let (camera, scale) = (&self.camera, f64::from(self.depth.scale));
+        let offset =
+            |x: usize, y: usize| -1e3 * f64::from(self.depth.warp[y * camera.width + x]) / scale;
+        let across = (0..camera.width).step_by(GRID);
+        let row = |y: usize| across.clone().map(|x| offset(x, y)).collect();
+        let offsets: Vec<Vec<f64>> = (0..camera.height).step_by(GRID).map(row).collect();
+        let names = self.robot.tree.joint_names().iter().cloned();
+        let joints = names.zip(hand.joints.iter().map(|error| json!(-error))).collect();
+        let gains: Vec<f64> = self.taxels.iter().map(|taxel| taxel.gain).collect();
+        annotation::rig(
+            focal.map(|scale| 1.0 / scale),
+            principal.map(|shift| -shift * camera.width as f64),
+            1.0 / scale,
+            &offsets,
+            &hand.pose.inverse(),
+            &joints,
+            &gains,
+        )
+    }
+
     /// Captures a frame of `moment`, whose joints and taxels are those of the hand.
     ///
     /// # Errors
@@ -90,10 +119,12 @@ impl<'a> Rig<'a> {
             seen = lens.photograph(&seen)?;
         }
         let forces = self.settings.touch.simulate_taxels(&moment.taxel_forces, &self.taxels, noise);
-        let (camera, t_cam_hand_told, joints) =
-            self.errors.apply(&self.camera, &t_cam_hand, &moment.joints);
+        let (mut t_cam_hand_told, mut joints) = self.errors.hand.apply(&t_cam_hand, &moment.joints);
+        if let Some(play) = self.settings.play.draw(&slides(self.robot), noise) {
+            (t_cam_hand_told, joints) = play.apply(&t_cam_hand_told, &joints);
+        }
         let told = Observation {
-            camera,
+            camera: self.errors.camera(&self.camera),
             color: self.settings.color.expose(&seen.color, noise),
             depth: self.settings.depth.measure(&seen.depth, &self.camera, &self.depth, noise),
             mask: self.settings.mask.segment(&seen.visible, &seen.hand, noise),

@@ -1,4 +1,4 @@
-//! All settings of all sensors, by name, with their values in both presets.
+//! All settings of all sensors, by name, with their values in all presets.
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -7,7 +7,7 @@ use thiserror::Error;
 /// Makes a structure of each group of settings, and [`SensorSettings`] of the groups.
 macro_rules! sensor_settings {
     ($($(#[$about:meta])* $group:ident: $Group:ident {
-        $($(#[$what:meta])* $name:ident: $number:ty { clean: $clean:expr, realistic: $real:expr },)*
+        $($(#[$what:meta])* $name:ident: $number:ty { clean: $clean:expr, realistic: $real:expr $(, rig: $rig:expr)? },)*
     })*) => {
         $(
             $(#[$about])*
@@ -45,6 +45,13 @@ macro_rules! sensor_settings {
             /// A stereo camera and tactile sensors with realistic faults.
             pub fn realistic() -> Self {
                 Self { $($group: $Group { $($name: $real),* }),* }
+            }
+
+            /// The same of one rig: what is wrong with cameras, hand and skin is so in every frame.
+            pub fn rig() -> Self {
+                let mut settings = Self::realistic();
+                $($($(settings.$group.$name = $rig;)?)*)*
+                settings
             }
         }
     };
@@ -108,7 +115,7 @@ sensor_settings! {
     /// Faults of the depth images. Zero takes any of them away.
     depth: DepthSettings {
         /// Standard deviation of the scale error, the same through a grasp.
-        scale: f64 { clean: 0.0, realistic: 4e-3 },
+        scale: f64 { clean: 0.0, realistic: 4e-3, rig: 6e-3 },
         /// Standard deviation of a smooth warp that changes over a third of the image, the same through a grasp \[m\].
         warp: f64 { clean: 0.0, realistic: 1.5e-3 },
         /// Standard deviation of noise of single pixels, at half a meter; it grows with the square of the depth \[m\].
@@ -163,16 +170,27 @@ sensor_settings! {
     }
     /// Standard deviations of the calibration's errors, which stay the same through a grasp.
     calibration: CalibrationSettings {
+        /// 1 if all that stays the same through a grasp does so through the whole dataset, else 0.
+        shared: u32 { clean: 0, realistic: 0, rig: 1 },
         /// Focal lengths, relative.
-        focal: f64 { clean: 0.0, realistic: 3e-3 },
+        focal: f64 { clean: 0.0, realistic: 3e-3, rig: 2e-3 },
         /// Principal point, each coordinate \[px\] of an image 640 px wide.
-        principal_px: f64 { clean: 0.0, realistic: 1.0 },
+        principal_px: f64 { clean: 0.0, realistic: 1.0, rig: 1.5 },
         /// Place of the hand in the camera frame, each axis \[m\].
-        hand_translation: f64 { clean: 0.0, realistic: 2e-3 },
+        hand_translation: f64 { clean: 0.0, realistic: 2e-3, rig: 3e-3 },
         /// Turn of the hand in the camera frame, each axis \[deg\].
-        hand_rotation_deg: f64 { clean: 0.0, realistic: 0.4 },
+        hand_rotation_deg: f64 { clean: 0.0, realistic: 0.4, rig: 0.6 },
         /// Joint positions \[deg\], of prismatic joints in thousandths of `joint_deg` meters.
         joint_deg: f64 { clean: 0.0, realistic: 0.8 },
+    }
+    /// Standard deviations of what changes from frame to frame, beside the calibration's errors.
+    play: PlaySettings {
+        /// Place of the hand, each axis \[m\].
+        hand_translation: f64 { clean: 0.0, realistic: 0.0, rig: 2e-4 },
+        /// Turn of the hand, each axis \[deg\].
+        hand_rotation_deg: f64 { clean: 0.0, realistic: 0.0, rig: 0.05 },
+        /// Joint positions, as in `calibration`.
+        joint_deg: f64 { clean: 0.0, realistic: 0.0, rig: 0.15 },
     }
     /// How the model that the estimator is given differs from the object.
     model: ModelSettings {

@@ -56,7 +56,7 @@ impl TouchSettings {
 #[derive(Clone, Debug)]
 pub(super) struct TaxelCondition {
     /// Zero for a dead one.
-    gain: f64,
+    pub(super) gain: f64,
     /// Felt without cause \[units\].
     phantom: Vector3<f64>,
 }

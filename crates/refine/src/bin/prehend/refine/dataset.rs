@@ -13,6 +13,7 @@ use prehend_refine::data::{
     Assets, FrameInput, Identity, Journal, PlainPose, Sensor, Times, Workers,
 };
 use prehend_refine::evaluate::report::{FrameReport, Report};
+use prehend_refine::rig::Rig;
 use prehend_refine::strategy::{PosteriorSummary, Trace};
 use prehend_refine::{Method, refine};
 use prehend_render::Backend;
@@ -34,6 +35,8 @@ pub(super) struct DatasetRun<'a> {
     pub(super) method: Method,
     /// What renders.
     pub(super) backend: Arc<dyn Backend>,
+    /// The rig's file.
+    pub(super) rig: Option<&'a Path>,
 }
 
 /// A refined frame as the journal has it.
@@ -56,7 +59,9 @@ impl DatasetRun<'_> {
         let json = self.output.json;
         let dataset = self.selection.open()?;
         let (jobs, mut failures) = self.selection.jobs(self.poses)?;
-        let assets = Mutex::new(Assets::new(&dataset, self.options.seed).with_cache(cache()));
+        let rig = self.rig.map(Rig::load).transpose()?.map(Arc::new);
+        let assets = Assets::new(&dataset, self.options.seed).with_cache(cache()).with_rig(rig);
+        let assets = Mutex::new(assets);
         let report = self.output.report.as_deref().map(Report::create).transpose()?;
         let journal = beside(self.out, "journal");
         let (mut journal, mut refined): (_, BTreeMap<usize, Refined>) =
@@ -140,6 +145,7 @@ impl DatasetRun<'_> {
             "dataset": canonical(dataset.split_dir()),
             "annotations": dataset_fingerprint(dataset, &SENSED)?,
             "poses": file_fingerprint(self.poses)?,
+            "rig": self.rig.map(file_fingerprint).transpose()?,
             "filters": self.selection.filters(),
             "method": self.options.method().name,
             "settings": format!("{:?}", self.method),

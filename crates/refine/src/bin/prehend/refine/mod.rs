@@ -32,6 +32,9 @@ pub(crate) struct Refine {
     /// Instead of a dataset, one frame described by a JSON file (see docs/FRAME.md)
     #[arg(long, value_name = "FILE", conflicts_with_all = ["Selection", "poses", "report"])]
     frame: Option<PathBuf>,
+    /// The rig that the dataset was recorded with, as `prehend calibrate` has found it: frames and models are corrected by it
+    #[arg(long, value_name = "FILE", conflicts_with = "frame")]
+    rig: Option<PathBuf>,
     #[command(flatten)]
     output: OutputOptions,
     #[command(flatten)]
@@ -42,7 +45,7 @@ pub(crate) struct Refine {
 
 impl Refine {
     pub(crate) fn run(self) -> anyhow::Result<ExitCode> {
-        let Self { selection, poses, frame, output, method, rendering } = &self;
+        let Self { selection, poses, frame, rig, output, method, rendering } = &self;
         // What cannot be written must be known before the work, not after it.
         if let Some(out) = &output.out {
             check_writable(out)?;
@@ -54,8 +57,8 @@ impl Refine {
             (None, Some(selection), Some(poses), Some(out)) => {
                 let configured = method.configured()?;
                 let options = method;
-                let method = configured;
-                DatasetRun { selection, poses, out, output, options, method, backend }.run()
+                let (method, rig) = (configured, rig.as_deref());
+                DatasetRun { selection, poses, out, output, options, method, backend, rig }.run()
             }
             _ => bail!("give --dataset, --poses and --out, or --frame"),
         }

@@ -1,0 +1,145 @@
+//! By what the surface of an object differs from its model.
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3xX, Point3, Vector3};
+use prehend_geometry::TriMesh;
+
+use crate::error::RefineError;
+use crate::problem::ModelErrorSettings;
+use crate::scene::Object;
+
+/// Distance between the places that describe the deviation, as a share of its length scale.
+const SPACING: f64 = 0.8;
+
+/// Those places, at most.
+const MOST_NODES: usize = 150;
+
+/// What patches are off by themselves, as a share of the deviation: what too few places do not describe, and what looks off in one view.
+const OWN: f64 = 0.3;
+
+/// A smooth field of displacements over the surface of a model, in its coordinates: a Gaussian process through a few places that
+/// describe all others (Quiñonero-Candela and Rasmussen, 2005).
+#[derive(Clone, Debug)]
+pub struct SurfaceDeviation {
+    /// What was expected beforehand.
+    pub(super) settings: ModelErrorSettings,
+    pub(super) nodes: Vec<Point3<f64>>,
+    /// Factor of the correlations among the nodes.
+    factor: Cholesky<f64, Dyn>,
+    /// A column for each node: independent, and of unit variance beforehand.
+    pub(super) coefficients: Matrix3xX<f64>,
+    /// Standard deviation of what it leaves, in each direction \[m\].
+    pub(super) left: f64,
+}
+
+impl SurfaceDeviation {
+    /// None yet, of `object`; `None` if models are exact.
+    pub(super) fn new(object: &Object, settings: &ModelErrorSettings) -> Option<Self> {
+        let places: Vec<Point3<f64>> = object.samples.iter().map(|sample| sample.point).collect();
+        let nodes = far_apart(&places, SPACING * settings.length_scale);
+        let coefficients = Matrix3xX::zeros(nodes.len());
+        Self::from_parts(settings.clone(), nodes, coefficients, settings.gp_sigma)
+    }
+
+    /// Of its `nodes` and their coefficients, of which there are as many; `None` if that makes no field.
+    pub(super) fn from_parts(
+        settings: ModelErrorSettings,
+        nodes: Vec<Point3<f64>>,
+        coefficients: Matrix3xX<f64>,
+        left: f64,
+    ) -> Option<Self> {
+        let ModelErrorSettings { gp_sigma, length_scale } = settings;
+        if !(gp_sigma > 0.0 && length_scale > 0.0) || nodes.len() != coefficients.ncols() {
+            return None;
+        }
+        let among = DMatrix::from_fn(nodes.len(), nodes.len(), |i, j| {
+            // What makes it certainly positive definite.
+            correlation(&nodes[i], &nodes[j], length_scale) + if i == j { 1e-6 } else { 0.0 }
+        });
+        Some(Self { settings, nodes, factor: Cholesky::new(among)?, coefficients, left })
+    }
+
+    /// How many coefficients a direction has.
+    pub(super) fn count(&self) -> usize {
+        self.nodes.len()
+    }
+
+    /// Variance of what patches of the surface are off by themselves \[m²\].
+    pub(super) fn own_variance(&self) -> f64 {
+        (OWN * self.settings.gp_sigma).powi(2)
+    }
+
+    /// What the coefficients are multiplied by for the displacement at `place` (model coordinates).
+    pub(super) fn features(&self, place: &Point3<f64>) -> DVector<f64> {
+        let ModelErrorSettings { gp_sigma, length_scale } = self.settings;
+        let to = self.nodes.iter().map(|node| gp_sigma * correlation(node, place, length_scale));
+        let mut features = DVector::from_iterator(self.count(), to);
+        self.factor.l_dirty().solve_lower_triangular_mut(&mut features);
+        features
+    }
+
+    /// The displacement at `place` of the model \[m\].
+    pub fn at(&self, place: &Point3<f64>) -> Vector3<f64> {
+        &self.coefficients * self.features(place)
+    }
+
+    /// Changes the coefficients, of each node three, which have this covariance then.
+    pub(super) fn change(&mut self, change: &DVector<f64>, covariance: &DMatrix<f64>) {
+        self.coefficients.iter_mut().zip(change).for_each(|(value, change)| *value += change);
+        let variance = |node: &Point3<f64>| {
+            let features = self.features(node);
+            let all = |axis: usize| {
+                let count = self.count();
+                let of_axis =
+                    DMatrix::from_fn(count, count, |r, c| covariance[(3 * r + axis, 3 * c + axis)]);
+                features.dot(&(of_axis * &features))
+            };
+            (0..3).map(all).sum::<f64>() / 3.0
+        };
+        let sum: f64 = self.nodes.iter().map(variance).sum();
+        self.left = (sum / self.count().max(1) as f64 + self.own_variance()).sqrt();
+    }
+
+    /// `mesh` with every vertex displaced.
+    pub fn applied(&self, mesh: &TriMesh) -> TriMesh {
+        let mut mesh = mesh.clone();
+        mesh.vertices.iter_mut().for_each(|vertex| *vertex += self.at(vertex));
+        // Readers compute their own.
+        mesh.normals = None;
+        mesh
+    }
+
+    /// The object with its surface displaced, its mass as it was.
+    ///
+    /// # Errors
+    /// If its mesh cannot be used any more.
+    pub fn corrected(&self, object: &Object) -> Result<Object, RefineError> {
+        let (mesh, inertial) = (self.applied(&object.mesh), object.inertial.clone());
+        let corrected = Object::new(&object.name, mesh, Some(inertial), object.seed)?;
+        Ok(Object {
+            inertial_assumed: object.inertial_assumed,
+            surface_sigma: Some(self.left),
+            ..corrected
+        })
+    }
+}
+
+fn correlation(a: &Point3<f64>, b: &Point3<f64>, length_scale: f64) -> f64 {
+    (-0.5 * (a - b).norm_squared() / length_scale.powi(2)).exp()
+}
+
+/// The first of `places`, and others, each farther than `distance` from all before it and the farthest of those left.
+fn far_apart(places: &[Point3<f64>], distance: f64) -> Vec<Point3<f64>> {
+    let mut chosen: Vec<Point3<f64>> = places.first().copied().into_iter().collect();
+    let mut nearest = vec![f64::INFINITY; places.len()];
+    while let Some(last) = chosen.last().filter(|_| chosen.len() < MOST_NODES) {
+        for (nearest, place) in nearest.iter_mut().zip(places) {
+            *nearest = nearest.min((place - last).norm());
+        }
+        let farthest = nearest.iter().zip(places).max_by(|a, b| a.0.total_cmp(b.0));
+        match farthest.filter(|(nearest, _)| **nearest > distance) {
+            Some((_, place)) => chosen.push(*place),
+            None => break,
+        }
+    }
+    chosen
+}

@@ -1,0 +1,210 @@
+//! Rigs in JSON: `docs/RIG.md` describes the layout.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use nalgebra::{DMatrix, Isometry3, Matrix3xX, Point3, UnitQuaternion, Vector2, Vector3};
+use serde::{Deserialize, Serialize};
+
+use super::deviation::SurfaceDeviation;
+use super::parameters::{Play, Rig};
+use crate::data::bop::{DatasetError, read_json, write_atomically};
+use crate::problem::{DepthField, ModelErrorSettings};
+use crate::scene::CameraCalibrationError;
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Layout {
+    image_size: [usize; 2],
+    camera: CameraLayout,
+    hand: HandLayout,
+    play: PlayLayout,
+    /// A row each.
+    covariance: Vec<Vec<f64>>,
+    objects: BTreeMap<u32, ObjectLayout>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CameraLayout {
+    depth_scale: f64,
+    depth_bias_m: f64,
+    principal_point_focal: [f64; 2],
+    focal_scale: f64,
+    aspect: f64,
+    depth_cells: usize,
+    depth_offsets_m: Vec<f64>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct HandLayout {
+    in_hand: PoseLayout,
+    in_camera: PoseLayout,
+    joints: Vec<f64>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PoseLayout {
+    translation_m: [f64; 3],
+    rotation_vector_rad: [f64; 3],
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PlayLayout {
+    hand_translation_m: f64,
+    hand_rotation_rad: f64,
+    joints: f64,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ObjectLayout {
+    sigma_m: f64,
+    length_scale_m: f64,
+    left_sigma_m: f64,
+    nodes_m: Vec<[f64; 3]>,
+    coefficients: Vec<[f64; 3]>,
+}
+
+impl Rig {
+    /// Reads a rig.
+    ///
+    /// # Errors
+    /// If the file is missing or broken, naming the field.
+    pub fn load(file: &Path) -> Result<Self, DatasetError> {
+        let layout: Layout = read_json(file)?;
+        let field = |name: &str, problem: &dyn std::fmt::Display| {
+            Err(DatasetError::field(file, name, problem))
+        };
+        let Layout { image_size: [width, height], camera, hand, play, covariance, objects } =
+            layout;
+        if width == 0 || height == 0 || !(1..=MOST_CELLS).contains(&camera.depth_cells) {
+            return field("image_size", &"no image is of that size, or has so many cells");
+        }
+        let depth_field = DepthField::new(width, height, camera.depth_cells);
+        let (found, expected) = (camera.depth_offsets_m.len(), depth_field.len());
+        if found != expected {
+            let problem = format!("expected {expected} coefficients, found {found}");
+            return field("camera.depth_offsets_m", &problem);
+        }
+        let mut rig = Self {
+            camera: CameraCalibrationError {
+                depth_scale: camera.depth_scale,
+                depth_bias: camera.depth_bias_m,
+                principal_point: Vector2::from(camera.principal_point_focal),
+                focal_scale: camera.focal_scale,
+                aspect: camera.aspect,
+            },
+            depth_field: depth_field.into(),
+            depth_offsets: camera.depth_offsets_m,
+            in_hand: (&hand.in_hand).into(),
+            in_camera: (&hand.in_camera).into(),
+            joints: hand.joints,
+            play: Play {
+                hand_translation: play.hand_translation_m,
+                hand_rotation: play.hand_rotation_rad,
+                joints: play.joints,
+            },
+            covariance: DMatrix::zeros(0, 0),
+            objects: BTreeMap::new(),
+        };
+        let n = rig.len();
+        if covariance.len() != n || covariance.iter().any(|row| row.len() != n) {
+            return field("covariance", &format!("expected {n} rows of {n} numbers"));
+        }
+        rig.covariance = DMatrix::from_fn(n, n, |r, c| covariance[r][c]);
+        if rig.covariance.clone().cholesky().is_none() {
+            return field("covariance", &"is not symmetric and positive definite");
+        }
+        for (id, object) in objects {
+            let ObjectLayout { sigma_m, length_scale_m, left_sigma_m, nodes_m, coefficients } =
+                object;
+            let settings = ModelErrorSettings { gp_sigma: sigma_m, length_scale: length_scale_m };
+            let nodes = nodes_m.into_iter().map(Point3::from).collect();
+            let columns: Vec<Vector3<f64>> = coefficients.into_iter().map(Vector3::from).collect();
+            let coefficients = match columns.as_slice() {
+                [] => Matrix3xX::zeros(0),
+                columns => Matrix3xX::from_columns(columns),
+            };
+            let Some(deviation) =
+                SurfaceDeviation::from_parts(settings, nodes, coefficients, left_sigma_m)
+            else {
+                let problem = "expected one coefficient for each node, and positive deviations";
+                return field(&format!("objects.{id}"), &problem);
+            };
+            rig.objects.insert(id, deviation);
+        }
+        Ok(rig)
+    }
+
+    /// Writes the rig; the file appears whole or not at all.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn save(&self, file: &Path) -> Result<(), DatasetError> {
+        let object = |(id, deviation): (&u32, &SurfaceDeviation)| {
+            let layout = ObjectLayout {
+                sigma_m: deviation.settings.gp_sigma,
+                length_scale_m: deviation.settings.length_scale,
+                left_sigma_m: deviation.left,
+                nodes_m: deviation.nodes.iter().map(|node| node.coords.into()).collect(),
+                coefficients: deviation
+                    .coefficients
+                    .column_iter()
+                    .map(|c| [c[0], c[1], c[2]])
+                    .collect(),
+            };
+            (*id, layout)
+        };
+        let camera = &self.camera;
+        let layout = Layout {
+            image_size: self.depth_field.size(),
+            camera: CameraLayout {
+                depth_scale: camera.depth_scale,
+                depth_bias_m: camera.depth_bias,
+                principal_point_focal: camera.principal_point.into(),
+                focal_scale: camera.focal_scale,
+                aspect: camera.aspect,
+                depth_cells: self.depth_field.cells(),
+                depth_offsets_m: self.depth_offsets.clone(),
+            },
+            hand: HandLayout {
+                in_hand: (&self.in_hand).into(),
+                in_camera: (&self.in_camera).into(),
+                joints: self.joints.clone(),
+            },
+            play: PlayLayout {
+                hand_translation_m: self.play.hand_translation,
+                hand_rotation_rad: self.play.hand_rotation,
+                joints: self.play.joints,
+            },
+            covariance: self.covariance.row_iter().map(|r| r.iter().copied().collect()).collect(),
+            objects: self.objects.iter().map(object).collect(),
+        };
+        // Numbers under names: nothing that JSON lacks, but for those that are not finite.
+        let text = serde_json::to_string(&layout).map_err(|e| DatasetError::unusable(file, e))?;
+        write_atomically(file, format!("{text}\n").as_bytes())
+    }
+}
+
+/// Cells of depth's field along the width of images, at most.
+const MOST_CELLS: usize = 64;
+
+impl From<&PoseLayout> for Isometry3<f64> {
+    fn from(pose: &PoseLayout) -> Self {
+        let rotation = UnitQuaternion::from_scaled_axis(Vector3::from(pose.rotation_vector_rad));
+        Self::from_parts(Vector3::from(pose.translation_m).into(), rotation)
+    }
+}
+
+impl From<&Isometry3<f64>> for PoseLayout {
+    fn from(pose: &Isometry3<f64>) -> Self {
+        Self {
+            translation_m: pose.translation.vector.into(),
+            rotation_vector_rad: pose.rotation.scaled_axis().into(),
+        }
+    }
+}

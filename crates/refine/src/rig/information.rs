@@ -1,0 +1,105 @@
+//! What one frame says of a rig.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::deviation::SurfaceDeviation;
+use super::parameters::{Rig, deviation};
+use crate::problem::{Block, RIDGE, ScaledCholesky, State};
+use crate::strategy::Evidence;
+
+/// Normal equations of the rig's parameters and then of the object's coefficients (three of each node), with all that is the frame's own
+/// eliminated: the object's pose, play, and what patches of the surface are off by themselves.
+pub(super) struct FrameInformation {
+    pub(super) hessian: DMatrix<f64>,
+    pub(super) gradient: DVector<f64>,
+    pub(super) play: FramePlay,
+}
+
+/// The play of a frame's hand pose and joints.
+pub(super) struct FramePlay {
+    /// If the parameters do not change, and its derivatives by them.
+    at_rest: DVector<f64>,
+    by_parameters: DMatrix<f64>,
+    variances: DVector<f64>,
+}
+
+impl FrameInformation {
+    /// Of `evidence`, in a frame that says `said` of its calibrations when corrected by `rig`, of an object whose surface has a `field` of
+    /// deviations; `sigmas` are the standard deviations of the object's pose. `None` if the evidence lacks a block.
+    pub(super) fn new(
+        evidence: &Evidence,
+        said: &State,
+        rig: &Rig,
+        field: Option<&SurfaceDeviation>,
+        sigmas: &[f64],
+    ) -> Option<Self> {
+        let Evidence { state, equations, patches } = evidence;
+        let joints = Block::Joints(state.joints.len());
+        let mut calibrations = Vec::new();
+        for block in [Block::HandPose, joints, Block::Camera] {
+            let at = equations.offset(block)?;
+            calibrations.extend(at..at + block.dimension());
+        }
+        let pose = equations.offset(Block::ObjectPose)?;
+        let (_, first_offset) = equations.depth_field()?;
+        let (n, first_patch) = (equations.gradient().len(), equations.dimension());
+        // What the evidence is about, by the rig's parameters and the object's coefficients.
+        let coefficients = field.map_or(0, |field| 3 * field.count());
+        let mut by_shared = DMatrix::zeros(n, rig.len() + coefficients);
+        for (row, at) in rig.jacobian(said).row_iter().zip(&calibrations) {
+            by_shared.view_mut((*at, 0), row.shape()).copy_from(&row);
+        }
+        for k in 0..n - first_offset {
+            by_shared[(first_offset + k, rig.first_offset() + k)] = 1.0;
+        }
+        if let (Some(patches), Some(field)) = (patches, field) {
+            let turn = state.t_cam_object.rotation.to_rotation_matrix();
+            for (p, place) in patches.places().iter().enumerate() {
+                let features = field.features(&state.t_cam_object.inverse_transform_point(place));
+                for (m, feature) in features.iter().enumerate() {
+                    let at = (first_patch + 3 * p, rig.len() + 3 * m);
+                    let axes = turn.matrix() * *feature;
+                    by_shared.fixed_view_mut::<3, 3>(at.0, at.1).copy_from(&axes);
+                }
+            }
+        }
+        let in_play = calibrations.len() - Block::Camera.dimension();
+        let own: Vec<usize> = (pose..pose + 6)
+            .chain(calibrations[..in_play].iter().copied())
+            .chain(first_patch..first_offset)
+            .collect();
+        let mut variances: Vec<f64> = sigmas.iter().map(|sigma| sigma * sigma).collect();
+        variances.extend(rig.play_variances());
+        variances.resize(own.len(), field.map_or(1.0, SurfaceDeviation::own_variance));
+        // The evidence is linear about its state, not about what the frame says.
+        let mut offset = DVector::zeros(n);
+        calibrations.iter().zip(&deviation(said, state)).for_each(|(at, off)| offset[*at] = *off);
+        let hessian = equations.hessian();
+        let gradient = equations.gradient() - hessian * offset;
+        let by_all = hessian * &by_shared;
+        let mut of_own = hessian.select_rows(&own).select_columns(&own);
+        variances.iter().enumerate().for_each(|(k, variance)| of_own[(k, k)] += variance.recip());
+        let inverse = ScaledCholesky::new(&of_own, RIDGE)?.inverse();
+        let coupling = by_all.select_rows(&own);
+        let through = &inverse * &coupling;
+        let at_rest = -(&inverse * gradient.select_rows(&own));
+        let of_play = sigmas.len();
+        Some(Self {
+            hessian: by_shared.tr_mul(&by_all) - coupling.tr_mul(&through),
+            gradient: by_shared.tr_mul(&gradient) + coupling.tr_mul(&at_rest),
+            play: FramePlay {
+                at_rest: at_rest.rows(of_play, in_play).into_owned(),
+                by_parameters: -through.rows(of_play, in_play),
+                variances: inverse.diagonal().rows(of_play, in_play).into_owned(),
+            },
+        })
+    }
+}
+
+impl FramePlay {
+    /// The squares that are expected of hand pose and joints if the parameters change so.
+    pub(super) fn expected_squares(&self, change: &DVector<f64>) -> DVector<f64> {
+        let play = &self.at_rest + &self.by_parameters * change;
+        play.component_mul(&play) + &self.variances
+    }
+}

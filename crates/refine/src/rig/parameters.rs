@@ -1,0 +1,234 @@
+//! What is wrong with a rig.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Point3, UnitQuaternion, Vector3};
+use prehend_autodiff::lie::{cross_matrix, so3_log};
+use prehend_render::Camera;
+
+use super::deviation::SurfaceDeviation;
+use crate::error::RefineError;
+use crate::factor::Layout;
+use crate::problem::{Block, DepthField, State};
+use crate::scene::{CameraCalibrationError, Observation};
+
+/// Standard deviations of what changes from frame to frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Play {
+    /// Place of the hand in each direction \[m\].
+    pub hand_translation: f64,
+    /// Turn of the hand about each axis \[rad\].
+    pub hand_rotation: f64,
+    /// Each joint \[rad or m\].
+    pub joints: f64,
+}
+
+/// Changes that bring what is said and measured in the frames of a rig to what is true, the same in all of them.
+#[derive(Clone, Debug)]
+pub struct Rig {
+    /// Of the camera and its depth.
+    pub camera: CameraCalibrationError,
+    /// By what depth is off after that: a smooth field over the image, whose coefficients are to be added \[m\].
+    pub(crate) depth_field: Arc<DepthField>,
+    pub(super) depth_offsets: Vec<f64>,
+    /// The hand's pose in the frame of where it is said to be, as if it were mounted so.
+    pub in_hand: Isometry3<f64>,
+    /// Its displacement and its rotation about its own origin in the axes of the camera, as if that were mounted so.
+    pub in_camera: Isometry3<f64>,
+    /// To be added to joint positions \[rad or m\].
+    pub joints: Vec<f64>,
+    /// What changes from frame to frame.
+    pub play: Play,
+    /// Covariance of the parameters: displacement and rotation vector of `in_hand` and of `in_camera` \[m, rad\], joints, camera, coefficients
+    /// of depth's field.
+    pub covariance: DMatrix<f64>,
+    /// By what the surface of each object differs from its model, by the object's number.
+    pub objects: BTreeMap<u32, SurfaceDeviation>,
+}
+
+/// Displacements and rotations of the hand in its own axes and in those of the camera.
+const POSES: usize = 12;
+
+impl Rig {
+    /// With everything as it is said to be, of a hand of so many joints and a field of depth; `sigmas` are the parameters' standard deviations.
+    pub(super) fn nominal(
+        joints: usize,
+        depth_field: DepthField,
+        sigmas: &DVector<f64>,
+        play: Play,
+    ) -> Self {
+        Self {
+            camera: CameraCalibrationError::default(),
+            depth_offsets: vec![0.0; depth_field.len()],
+            depth_field: Arc::new(depth_field),
+            in_hand: Isometry3::identity(),
+            in_camera: Isometry3::identity(),
+            joints: vec![0.0; joints],
+            play,
+            covariance: DMatrix::from_diagonal(&sigmas.map(|sigma| sigma * sigma)),
+            objects: BTreeMap::new(),
+        }
+    }
+
+    /// Number of its parameters, but for the objects'.
+    pub(super) fn len(&self) -> usize {
+        self.first_offset() + self.depth_offsets.len()
+    }
+
+    /// Where the coefficients of depth's field begin among them.
+    pub(super) fn first_offset(&self) -> usize {
+        POSES + self.joints.len() + CameraCalibrationError::DIMENSION
+    }
+
+    /// The parameters, zero where nothing is corrected.
+    pub(super) fn values(&self) -> DVector<f64> {
+        let poses = [&self.in_hand, &self.in_camera];
+        let poses = poses.map(|pose| (pose.translation.vector, so3_log(&pose.rotation)));
+        let poses = poses.iter().flat_map(|(place, turn)| place.iter().chain(turn)).copied();
+        let numbers = self.joints.iter().copied().chain(self.camera.parameters());
+        let offsets = self.depth_offsets.iter().copied();
+        DVector::from_iterator(self.len(), poses.chain(numbers).chain(offsets))
+    }
+
+    /// Names and values of the parameters, in the order of [`covariance`](Self::covariance), without the coefficients of depth's field
+    /// \[m, rad; focal lengths\].
+    pub fn parameters(&self) -> Vec<(String, f64)> {
+        let mut names = Vec::new();
+        for axes in ["hand", "camera"] {
+            for kind in ["translation", "rotation"] {
+                names.extend(["x", "y", "z"].map(|axis| format!("{kind} {axis}, {axes} axes")));
+            }
+        }
+        names.extend((0..self.joints.len()).map(|joint| format!("joint {joint}")));
+        names.extend(
+            ["depth scale", "depth bias", "principal point x", "principal point y"]
+                .into_iter()
+                .chain(["focal scale", "aspect"])
+                .map(str::to_owned),
+        );
+        names.into_iter().zip(self.values().iter().copied()).collect()
+    }
+
+    /// With `change` on top of what it corrects.
+    pub(super) fn changed(&self, change: &[f64]) -> Self {
+        let vector = |from: usize| Vector3::from_column_slice(&change[from..from + 3]);
+        let rotation = |from: usize| UnitQuaternion::from_scaled_axis(vector(from));
+        let (joints, rest) = change[POSES..].split_at(self.joints.len());
+        let (camera, offsets) = rest.split_at(CameraCalibrationError::DIMENSION);
+        let sum = |values: &[f64], change: &[f64]| {
+            values.iter().zip(change).map(|(value, change)| value + change).collect()
+        };
+        Self {
+            in_hand: self.in_hand * Isometry3::from_parts(vector(0).into(), rotation(3)),
+            in_camera: Isometry3::from_parts(
+                (self.in_camera.translation.vector + vector(6)).into(),
+                rotation(9) * self.in_camera.rotation,
+            ),
+            joints: sum(&self.joints, joints),
+            camera: self.camera.changed(camera),
+            depth_offsets: sum(&self.depth_offsets, offsets),
+            ..self.clone()
+        }
+    }
+
+    /// What a frame of this rig would have shown and said without its errors.
+    ///
+    /// # Errors
+    /// If images are of another size, or the hand has another number of joints.
+    pub fn corrected(&self, observation: &Observation) -> Result<Observation, RefineError> {
+        let mut corrected = observation.clone();
+        let (camera, error) = (&mut corrected.camera, &self.camera);
+        let fault = |problem: String| RefineError::Setting { name: "rig", problem };
+        let (size, expected) = ([camera.width, camera.height], self.depth_field.size());
+        if size != expected {
+            return Err(fault(format!("is of images of {expected:?} pixels, not of {size:?}")));
+        }
+        camera.cx += error.principal_point.x * camera.fx;
+        camera.cy += error.principal_point.y * camera.fy;
+        camera.fx *= 1.0 + error.focal_scale + error.aspect;
+        camera.fy *= 1.0 + error.focal_scale - error.aspect;
+        for (i, z) in corrected.depth.pixels_mut().iter_mut().enumerate() {
+            if *z > 0.0 {
+                let (x, y) = ((i % size[0]) as f64, (i / size[0]) as f64);
+                let offset = error.depth_bias + self.depth_field.at(&self.depth_offsets, x, y);
+                *z = (error.depth_scale * f64::from(*z) + offset) as f32;
+            }
+        }
+        if let Some(hand) = &mut corrected.hand {
+            let (given, expected) = (hand.joints.len(), self.joints.len());
+            if given != expected {
+                return Err(fault(format!("is of a hand of {expected} joints, not of {given}")));
+            }
+            let mounted = hand.t_cam_hand * self.in_hand;
+            hand.t_cam_hand = Isometry3::from_parts(
+                (mounted.translation.vector + self.in_camera.translation.vector).into(),
+                self.in_camera.rotation * mounted.rotation,
+            );
+            hand.joints.iter_mut().zip(&self.joints).for_each(|(q, error)| *q += error);
+        }
+        Ok(corrected)
+    }
+
+    /// Derivatives of what a frame says of its calibrations, a row each of hand pose (a left twist about the object's center), joints
+    /// and camera, by the rig's parameters; `said` is what the frame says when corrected.
+    pub(super) fn jacobian(&self, said: &State) -> DMatrix<f64> {
+        let rest = self.joints.len() + CameraCalibrationError::DIMENSION;
+        let mut jacobian = DMatrix::zeros(6 + rest, self.len());
+        let turn = said.t_cam_hand.rotation.to_rotation_matrix();
+        let arm = cross_matrix(&(said.center() - said.t_cam_hand.translation.vector));
+        for (column, axes) in [(0, *turn.matrix()), (6, Matrix3::identity())] {
+            jacobian.fixed_view_mut::<3, 3>(0, column).copy_from(&axes);
+            jacobian.fixed_view_mut::<3, 3>(0, column + 3).copy_from(&(-arm * axes));
+            jacobian.fixed_view_mut::<3, 3>(3, column + 3).copy_from(&axes);
+        }
+        jacobian.view_mut((6, POSES), (rest, rest)).fill_with_identity();
+        jacobian
+    }
+
+    /// Covariance of a frame's calibrations, in the order of [`Layout`], about what it says when corrected; `object` are the standard
+    /// deviations of the object's pose.
+    pub(crate) fn frame_covariance(
+        &self,
+        said: &State,
+        camera: &Camera,
+        object: &[f64],
+    ) -> DMatrix<f64> {
+        let layout = Layout::new(self.joints.len());
+        let (object_rows, bias) = (object.len(), layout.offset(Block::Camera) + 1);
+        let mut jacobian = self.jacobian(said);
+        // Where the object is, depth's field is a bias.
+        if let Some(pixel) = camera.project(&said.center().into()) {
+            for (k, weight) in self.depth_field.weights(pixel.x, pixel.y) {
+                jacobian[(bias - object_rows, self.first_offset() + k)] += weight;
+            }
+        }
+        let known = &jacobian * &self.covariance * jacobian.transpose();
+        let mut covariance = DMatrix::zeros(layout.len(), layout.len());
+        covariance.view_mut((object_rows, object_rows), known.shape()).copy_from(&known);
+        let own = object.iter().map(|sigma| sigma * sigma).chain(self.play_variances());
+        own.enumerate().for_each(|(k, variance)| covariance[(k, k)] += variance);
+        covariance
+    }
+
+    /// Variances of hand pose and joints from frame to frame.
+    pub(super) fn play_variances(&self) -> impl Iterator<Item = f64> + use<> {
+        let Play { hand_translation, hand_rotation, joints } = self.play;
+        let hand = [hand_translation; 3].into_iter().chain([hand_rotation; 3]);
+        hand.chain(std::iter::repeat_n(joints, self.joints.len())).map(|sigma| sigma * sigma)
+    }
+}
+
+/// How far the calibrations of `state` are from what is `said`, by displacement of the point at the object's center and rotation vector of
+/// the hand, joints and camera.
+pub(super) fn deviation(said: &State, state: &State) -> DVector<f64> {
+    let center = said.center();
+    let motion = state.t_cam_hand * said.t_cam_hand.inverse();
+    let off = (motion * Point3::from(center)).coords - center;
+    let turn = so3_log(&motion.rotation);
+    let joints = state.joints.iter().zip(&said.joints).map(|(q, said)| q - said);
+    let camera = state.camera.parameters().into_iter().zip(said.camera.parameters());
+    let hand = off.iter().chain(&turn).copied();
+    let all: Vec<f64> = hand.chain(joints).chain(camera.map(|(is, said)| is - said)).collect();
+    DVector::from_vec(all)
+}
