@@ -142,7 +142,7 @@ mod tests {
     fn gradients_match_differences() {
         for seed in 0..3 {
             let (frame, mut state) = fixture(seed);
-            state.camera = state.camera.changed(&[2e-3, 1e-3, 1e-3, -1e-3, 2e-3]);
+            state.camera = state.camera.changed(&[2e-3, 1e-3, 1e-3, -1e-3, 2e-3, 1e-3]);
             state.joints.iter_mut().enumerate().for_each(|(i, q)| *q += 0.01 * (i as f64).sin());
             let factor = HandDepthFactor::new(&frame, &HandDepthSettings::default()).unwrap();
             assert!(factor.points.len() > 100);

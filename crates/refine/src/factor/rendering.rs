@@ -292,7 +292,7 @@ mod tests {
             let factor = factor(&frame);
             // Pixels are in single precision and texture has kinks: a step of some hundredths of a pixel.
             assert_gradient(&factor.lit_at(&state), &state, Block::ObjectPose, 5e-5, 0.03);
-            state.camera = state.camera.changed(&[0.0, 0.0, 1e-3, -1e-3, 3e-3]);
+            state.camera = state.camera.changed(&[0.0, 0.0, 1e-3, -1e-3, 3e-3, 1e-3]);
             // The camera moves the object as its own pose does, with that gradient's error at this state.
             assert_gradient(&factor.lit_at(&state), &state, Block::Camera, 5e-5, 0.1);
         }

@@ -10,6 +10,7 @@ use super::deviation::SurfaceDeviation;
 use super::information::{FrameInformation, FramePlay};
 use super::parameters::{Play, Rig};
 use crate::error::RefineError;
+use crate::factor::PriorSettings;
 use crate::problem::{Block, DepthField, ScaledCholesky, State};
 use crate::refine;
 use crate::scene::{Frame, Hand, Object, Observation};
@@ -18,12 +19,10 @@ use crate::strategy::Fused;
 /// Settings of a [`Calibrator`]: how frames are refined, and standard deviations of what is wrong with a rig.
 #[derive(Clone, Debug)]
 pub struct CalibratorSettings {
-    /// How frames are refined; what is known of joints, camera and models beforehand is stated there, too.
+    /// How frames are refined, and how good models are.
     pub fused: Fused,
-    /// The hand's place \[m\], in its own axes and in those of the camera.
-    pub hand_translation: f64,
-    /// Its rotation \[rad\], in both.
-    pub hand_rotation: f64,
+    /// Hand, joints and camera. The hand's are of its place and rotation both in its own axes and in those of the camera.
+    pub prior: PriorSettings,
     /// The coefficients of the smooth field that depth is off by \[m\].
     pub depth_offset: f64,
     /// Play, as it is expected until frames say how much there is.
@@ -35,12 +34,19 @@ pub struct CalibratorSettings {
 }
 
 impl Default for CalibratorSettings {
-    /// A robot and a depth camera of common accuracy.
+    /// A robot and a depth camera of common accuracy. What calibrations beforehand leave of intrinsics is a part of what they leave
+    /// in a single frame, where the size of the model counts as well.
     fn default() -> Self {
         Self {
             fused: Fused::default(),
-            hand_translation: 3e-3,
-            hand_rotation: 10e-3,
+            prior: PriorSettings {
+                hand_translation: 3e-3,
+                hand_rotation: 10e-3,
+                depth_scale: 6e-3,
+                principal_point: 2.6e-3,
+                focal_scale: 2e-3,
+                ..PriorSettings::default()
+            },
             depth_offset: 3e-3,
             play: Play { hand_translation: 4e-4, hand_rotation: 1.5e-3, joints: 4e-3 },
             play_weight: 5.0,
@@ -52,19 +58,10 @@ impl Default for CalibratorSettings {
 impl CalibratorSettings {
     /// Standard deviations of the parameters of a rig.
     fn sigmas(&self, joints: usize, offsets: usize) -> DVector<f64> {
-        let prior = &self.fused.settings.prior;
-        let pose = [[self.hand_translation; 3], [self.hand_rotation; 3]].concat();
-        DVector::from_vec(
-            [
-                &pose,
-                &pose,
-                &prior.sigmas(Block::Joints(joints)),
-                &prior.sigmas(Block::Camera),
-                &vec![self.depth_offset; offsets],
-            ]
-            .map(Vec::as_slice)
-            .concat(),
-        )
+        let blocks = [Block::HandPose, Block::HandPose, Block::Joints(joints), Block::Camera];
+        let mut sigmas = blocks.map(|block| self.prior.sigmas(block)).concat();
+        sigmas.resize(sigmas.len() + offsets, self.depth_offset);
+        DVector::from_vec(sigmas)
     }
 }
 

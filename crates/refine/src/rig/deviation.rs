@@ -143,3 +143,33 @@ fn far_apart(places: &[Point3<f64>], distance: f64) -> Vec<Point3<f64>> {
     }
     chosen
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::default_scene;
+
+    #[test]
+    fn a_field_has_the_expected_deviation_and_moves_the_surface() {
+        let object = default_scene(1).unwrap().object;
+        let settings = ModelErrorSettings::default();
+        let mut field = SurfaceDeviation::new(&object, &settings).unwrap();
+        assert!((20..=MOST_NODES).contains(&field.count()), "{}", field.count());
+        // All but a little of the variance is described at places between the nodes, too.
+        for sample in object.samples.iter().step_by(97) {
+            let part = field.features(&sample.point).norm() / settings.gp_sigma;
+            assert!((0.9..1.0001).contains(&part), "{part}");
+        }
+        assert_eq!(field.at(&object.center), Vector3::zeros());
+        let size = 3 * field.count();
+        let change = DVector::from_fn(size, |k, _| (k as f64).sin());
+        field.change(&change, &(DMatrix::identity(size, size) * 0.01));
+        let expected = settings.gp_sigma * (0.01 + OWN * OWN).sqrt();
+        assert!((field.left / expected - 1.0).abs() < 0.05, "{}", field.left);
+        let corrected = field.corrected(&object).unwrap();
+        assert_eq!(corrected.surface_sigma, Some(field.left));
+        let vertex = object.mesh.vertices[10];
+        let moved = corrected.mesh.vertices[10] - vertex;
+        assert!(moved.norm() > 1e-5 && (moved - field.at(&vertex)).norm() < 1e-15);
+    }
+}

@@ -103,3 +103,61 @@ impl FramePlay {
         play.component_mul(&play) + &self.variances
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::factor::{
+        HandDepthFactor, HandDepthSettings, PointToPlaneFactor, PointToPlaneSettings,
+    };
+    use crate::problem::{DepthField, Factor, NormalEquations};
+    use crate::rig::{Calibrator, CalibratorSettings};
+    use crate::scene::{Frame, Observation, default_scene};
+
+    /// Depth that is off by a smooth field is what a rig corrects, so its derivatives are those of a factor's cost by that correction.
+    #[test]
+    fn derivatives_by_depths_field_match_differences() {
+        let scene = default_scene(1).unwrap();
+        let settings = CalibratorSettings::default();
+        let calibrator = Calibrator::new(16, (640, 480), BTreeMap::new(), settings);
+        let field = Arc::new(DepthField::new(640, 480, 4));
+        let factors_of = |observation: &Observation| {
+            let frame = Frame::new(observation, &scene.object, Some(&scene.hand)).unwrap();
+            let mut state = State::new(&frame, &scene.truth).unwrap();
+            // Off, so that costs have slopes.
+            state.t_cam_object.translation.z += 1e-3;
+            state.t_cam_hand.translation.z += 1e-3;
+            let depth = PointToPlaneFactor::new(&frame, &PointToPlaneSettings::default()).unwrap();
+            let hand = HandDepthFactor::new(&frame, &HandDepthSettings::default()).unwrap();
+            (state, [Box::new(depth) as Box<dyn Factor>, Box::new(hand)])
+        };
+        let (state, factors) = factors_of(&scene.observation);
+        for (f, factor) in factors.iter().enumerate() {
+            let blocks = [Block::ObjectPose, Block::Camera];
+            let mut equations = NormalEquations::new(&blocks).with_depth_field(Arc::clone(&field));
+            factor.linearize(&state, &mut equations);
+            let (_, first) = equations.depth_field().unwrap();
+            let step = 2e-6;
+            for k in [16, 17, 23, 24, 25] {
+                let cost = |sign: f64| {
+                    let mut rig = calibrator.rig().clone();
+                    rig.depth_offsets[k] = sign * step;
+                    let observation = rig.corrected(&scene.observation).unwrap();
+                    let (state, factors) = factors_of(&observation);
+                    factors[f].cost(&state)
+                };
+                let difference = (cost(1.0) - cost(-1.0)) / (2.0 * step);
+                let found = equations.gradient()[first + k];
+                let error = (found - difference).abs() / difference.abs().max(500.0);
+                assert!(error < 0.03, "{} {k}: {found} {difference}", factor.name());
+            }
+            // A field that is the same everywhere is the bias of the camera.
+            let sum: f64 = equations.gradient().rows(first, field.len()).sum();
+            let bias = equations.gradient()[equations.offset(Block::Camera).unwrap() + 1];
+            assert!((sum - bias).abs() < 1e-9 * bias.abs(), "{sum} {bias}");
+        }
+    }
+}

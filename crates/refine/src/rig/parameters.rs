@@ -175,10 +175,13 @@ impl Rig {
     pub(super) fn jacobian(&self, said: &State) -> DMatrix<f64> {
         let rest = self.joints.len() + CameraCalibrationError::DIMENSION;
         let mut jacobian = DMatrix::zeros(6 + rest, self.len());
-        let turn = said.t_cam_hand.rotation.to_rotation_matrix();
+        let turn = said.t_cam_hand.rotation.to_rotation_matrix().into_inner();
+        let mounted = self.in_camera.rotation.inverse() * said.t_cam_hand.rotation;
+        let mounted = mounted.to_rotation_matrix().into_inner();
+        let camera = Matrix3::identity();
         let arm = cross_matrix(&(said.center() - said.t_cam_hand.translation.vector));
-        for (column, axes) in [(0, *turn.matrix()), (6, Matrix3::identity())] {
-            jacobian.fixed_view_mut::<3, 3>(0, column).copy_from(&axes);
+        for (column, directions, axes) in [(0, mounted, turn), (6, camera, camera)] {
+            jacobian.fixed_view_mut::<3, 3>(0, column).copy_from(&directions);
             jacobian.fixed_view_mut::<3, 3>(0, column + 3).copy_from(&(-arm * axes));
             jacobian.fixed_view_mut::<3, 3>(3, column + 3).copy_from(&axes);
         }
@@ -231,4 +234,58 @@ pub(super) fn deviation(said: &State, state: &State) -> DVector<f64> {
     let hand = off.iter().chain(&turn).copied();
     let all: Vec<f64> = hand.chain(joints).chain(camera.map(|(is, said)| is - said)).collect();
     DVector::from_vec(all)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Frame, default_scene};
+
+    fn nominal() -> Rig {
+        let field = DepthField::new(640, 480, 4);
+        let sigmas = DVector::repeat(POSES + 16 + 6 + field.len(), 1e-3);
+        let play = Play { hand_translation: 1e-3, hand_rotation: 1e-3, joints: 1e-3 };
+        Rig::nominal(16, field, &sigmas, play)
+    }
+
+    #[test]
+    fn derivatives_of_what_a_frame_says_match_differences() {
+        let scene = default_scene(1).unwrap();
+        let change: Vec<f64> = (0..nominal().len()).map(|k| 5e-3 * (k as f64).sin()).collect();
+        let rig = nominal().changed(&change);
+        assert!((rig.values() - DVector::from_vec(change)).amax() < 1e-12);
+        let said = |rig: &Rig| {
+            let observation = rig.corrected(&scene.observation).unwrap();
+            let frame = Frame::new(&observation, &scene.object, Some(&scene.hand)).unwrap();
+            State::new(&frame, &scene.truth).unwrap()
+        };
+        let (at, step) = (said(&rig), 1e-6);
+        let jacobian = rig.jacobian(&at);
+        // What is said of a camera is in the observation, not in a state.
+        for parameter in 0..POSES + 16 {
+            let moved = |sign: f64| {
+                let mut change = vec![0.0; rig.len()];
+                change[parameter] = sign * step;
+                deviation(&at, &said(&rig.changed(&change)))
+            };
+            let difference = (moved(1.0) - moved(-1.0)) / (2.0 * step);
+            let error = (difference - jacobian.column(parameter)).amax();
+            assert!(error < 1e-6, "parameter {parameter}: {error}");
+        }
+    }
+
+    #[test]
+    fn a_corrected_camera_sees_what_its_error_says() {
+        let mut rig = nominal();
+        rig.camera = rig.camera.changed(&[0.01, 2e-3, 3e-3, -1e-3, 4e-3, 2e-3]);
+        let scene = default_scene(1).unwrap();
+        let (said, corrected) = (&scene.observation, rig.corrected(&scene.observation).unwrap());
+        for (x, y) in [(320, 240), (300, 260)] {
+            let depth = f64::from(said.depth.get(x, y).unwrap());
+            let ray = said.camera.ray(x as f64, y as f64).xy();
+            let z = f64::from(corrected.depth.get(x, y).unwrap());
+            let place = corrected.camera.unproject(x as f64, y as f64, z);
+            assert!(depth > 0.0 && (rig.camera.point(&ray, depth) - place).norm() < 1e-7);
+        }
+    }
 }

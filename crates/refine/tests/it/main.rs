@@ -17,6 +17,7 @@ mod journal;
 mod lens;
 mod pose_error;
 mod results;
+mod rig;
 mod search;
 mod symmetry;
 mod synth_layout;

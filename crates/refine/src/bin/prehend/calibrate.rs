@@ -103,7 +103,7 @@ impl Calibrate {
                     mesh.save_ply(&folder.join(format!("obj_{id:06}.ply")))?;
                 }
             }
-            say(format!("{}", summary(&calibrator)))?;
+            say(summary(&calibrator))?;
             say(format!("rig of {count} frames written to {}", self.out.display()))?;
         }
         Ok(exit_code(count, &failures))

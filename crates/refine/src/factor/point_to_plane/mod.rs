@@ -286,7 +286,7 @@ mod tests {
     fn gradients_match_differences() {
         for seed in 0..3 {
             let (frame, mut state) = fixture(seed);
-            state.camera = state.camera.changed(&[2e-3, 1e-3, 1e-3, -1e-3, 2e-3]);
+            state.camera = state.camera.changed(&[2e-3, 1e-3, 1e-3, -1e-3, 2e-3, 1e-3]);
             let check = |state: &State, gp_sigma: f64| {
                 for block in [Block::ObjectPose, Block::Camera] {
                     // What the few points pull that were matched with faces that look away is left out.

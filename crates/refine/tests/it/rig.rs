@@ -1,0 +1,126 @@
+//! A rig is found from frames that are all wrong in the same way, and corrects them.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use nalgebra::Vector3;
+use prehend_refine::refine;
+use prehend_refine::rig::{CalibrationFrame, Calibrator, CalibratorSettings, Pass, Rig};
+use prehend_refine::scene::{Frame, Observation, default_sequence};
+use prehend_refine::strategy::Fused;
+
+const SHIFT_PX: f64 = 2.0;
+const DEPTH_SCALE: f64 = 1.006;
+const JOINT: f64 = 0.012;
+const HAND: Vector3<f64> = Vector3::new(2e-3, -1e-3, 1.5e-3);
+
+/// What a rig that is wrong says of a frame.
+fn said(truth: &Observation) -> Observation {
+    let mut said = truth.clone();
+    said.camera.cx -= SHIFT_PX;
+    for z in said.depth.pixels_mut() {
+        *z = (f64::from(*z) / DEPTH_SCALE) as f32;
+    }
+    let hand = said.hand.as_mut().unwrap();
+    hand.t_cam_hand.translation.vector -= HAND;
+    hand.joints.iter_mut().for_each(|q| *q -= JOINT);
+    said
+}
+
+#[test]
+fn what_is_wrong_in_all_frames_is_found_and_corrected() {
+    let sequence = default_sequence(1, 61).unwrap();
+    let frames: Vec<_> = sequence.frames.iter().step_by(6).collect();
+    let objects = BTreeMap::from([(7, Arc::clone(&sequence.object))]);
+    let size = (640, 480);
+    let mut calibrator = Calibrator::new(16, size, objects, CalibratorSettings::default());
+    let mut poses: Vec<_> = frames.iter().map(|frame| frame.truth).collect();
+    for _ in 0..3 {
+        let mut pass = Pass::default();
+        for (frame, pose) in frames.iter().zip(&mut poses) {
+            let hand = Arc::clone(&sequence.hand);
+            let observation = said(&frame.observation);
+            let frame = CalibrationFrame { observation, obj_id: 7, hand, initial: *pose };
+            let visit = calibrator.visit(&frame).unwrap();
+            *pose = visit.t_cam_object;
+            pass.add(visit);
+        }
+        calibrator.solve(pass).unwrap();
+    }
+    // Within four of its own deviations. The camera hardly moves towards the hand here, so that much of it stays unknown.
+    let rig = calibrator.rig();
+    let sigmas = rig.covariance.diagonal().map(f64::sqrt);
+    let names = rig.parameters();
+    let focal = frames[0].observation.camera.fx;
+    for (k, (name, found)) in names.iter().enumerate() {
+        let expected = match name.as_str() {
+            "depth scale" => DEPTH_SCALE - 1.0,
+            "principal point x" => SHIFT_PX / focal,
+            "translation x, camera axes" => HAND.x,
+            "translation y, camera axes" => HAND.y,
+            "translation z, camera axes" => HAND.z,
+            joint if joint.starts_with("joint") => JOINT,
+            _ => 0.0,
+        };
+        let (sigma, before) = (sigmas[k], calibrator.prior_sigmas()[k]);
+        println!("{name}: {found} ± {sigma} (± {before}), is {expected}");
+        assert!((found - expected).abs() < 4.0 * sigma, "{name}: {found} ± {sigma}");
+        assert!(sigma <= 1.001 * before);
+    }
+    let joint = names.iter().position(|(name, _)| name == "joint 4").unwrap();
+    assert!(sigmas[joint] < 0.4 * calibrator.prior_sigmas()[joint], "{}", sigmas[joint]);
+
+    // A frame that it has not seen, without the rig and with it, read from a file.
+    let file = tempfile::tempdir().unwrap();
+    let path = file.path().join("rig.json");
+    rig.save(&path).unwrap();
+    let rig = Rig::load(&path).unwrap();
+    let new = &sequence.frames[39];
+    let told = said(&new.observation);
+    let error = |observation: &Observation, object, rig: Option<&Rig>| {
+        let frame = Frame::new(observation, object, Some(&sequence.hand)).unwrap();
+        let frame = match rig {
+            Some(rig) => frame.with_rig(rig),
+            None => frame,
+        };
+        let found = refine(&frame, &sequence.frames[36].truth, &Fused::default()).unwrap();
+        let center = sequence.object.center;
+        let off = (found.t_cam_object() * center - new.truth * center).norm();
+        (off, found.posterior.unwrap().covariance().trace())
+    };
+    let (alone, unsure) = error(&told, &sequence.object, None);
+    let object = Arc::new(rig.objects[&7].corrected(&sequence.object).unwrap());
+    let (with, sure) = error(&rig.corrected(&told).unwrap(), &object, Some(&rig));
+    println!("{alone} ± {unsure} → {with} ± {sure}");
+    assert!(sure < unsure && with < alone, "{alone} ± {unsure} → {with} ± {sure}");
+    let wrong = |observation: &Observation| -> f64 {
+        let joints = |o: &Observation| o.hand.as_ref().unwrap().joints.clone();
+        let pairs = joints(observation).into_iter().zip(joints(&new.observation));
+        pairs.map(|(said, is)| (said - is).abs()).sum::<f64>() / 16.0
+    };
+    let (before, after) = (wrong(&told), wrong(&rig.corrected(&told).unwrap()));
+    println!("joints {before} → {after} rad");
+    assert!(after < 0.4 * before, "{after} of {before}");
+}
+
+#[test]
+fn faults_of_a_file_are_named() {
+    let calibrator = Calibrator::new(2, (64, 48), BTreeMap::new(), CalibratorSettings::default());
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("rig.json");
+    calibrator.rig().save(&path).unwrap();
+    let text = std::fs::read_to_string(&path).unwrap();
+    assert_eq!(Rig::load(&path).unwrap().parameters(), calibrator.rig().parameters());
+    for (from, to, expected) in [
+        ("\"depth_cells\":4", "\"depth_cells\":0", "image_size"),
+        ("\"depth_cells\":4", "\"depth_cells\":5", "camera.depth_offsets_m"),
+        ("\"joints\":[0.0,0.0]", "\"joints\":[0.0]", "covariance"),
+        ("\"covariance\":[[", "\"covariance\":[[-", "covariance"),
+        ("\"aspect\"", "\"aspekt\"", "camera"),
+    ] {
+        assert!(text.contains(from), "{from}");
+        std::fs::write(&path, text.replacen(from, to, 1)).unwrap();
+        let error = Rig::load(&path).unwrap_err().to_string();
+        assert!(error.contains("rig.json") && error.contains(expected), "{error}");
+    }
+}
