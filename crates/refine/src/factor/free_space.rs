@@ -42,6 +42,8 @@ pub struct FreeSpaceFactor {
 struct InFront {
     /// The pixel's bilinear weight, times how much the sample faces the camera.
     share: f64,
+    /// The pixel's column and row.
+    pixel: Vector2<f64>,
     /// Depth there as measured \[m\].
     measured: f64,
     /// How far the sample is in front of that, beyond the margin \[m\].
@@ -83,7 +85,12 @@ impl FreeSpaceFactor {
             let depth = state.camera.depth_scale * measured + state.camera.depth_bias;
             let beyond = depth - place.z - self.settings.margin;
             let share = facing * (1.0 - (i - part.x).abs()) * (1.0 - (j - part.y).abs());
-            (beyond > 0.0 && share > 0.0).then_some(InFront { share, measured, beyond })
+            (beyond > 0.0 && share > 0.0).then_some(InFront {
+                share,
+                pixel: Vector2::new(u, v),
+                measured,
+                beyond,
+            })
         })
     }
 
@@ -109,11 +116,14 @@ impl Factor for FreeSpaceFactor {
                 continue;
             }
             let Some(pixel) = self.camera.project(&(reprojected * sample.point)) else { continue };
-            for InFront { share, measured, beyond } in self.in_front(state, place, facing, pixel) {
+            for InFront { share, pixel, measured, beyond } in
+                self.in_front(state, place, facing, pixel)
+            {
                 rows.add(beyond, &weighting.shared(share), |row| {
                     // Shares are taken as they are: at depth's steps their derivative would pull samples sideways.
                     row.object_point(state, &place, &-Vector3::z());
                     row.block(Block::Camera, &[measured, 1.0, 0.0, 0.0, 0.0, 0.0]);
+                    row.depth(pixel.x, pixel.y, 1.0);
                 });
             }
         }

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector, Isometry3};
 
 use super::deviation::SurfaceDeviation;
-use super::information::{FrameInformation, FramePlay};
+use super::information::{Eliminated, FrameInformation, FramePlay};
 use super::parameters::{Play, Rig};
 use crate::error::RefineError;
 use crate::factor::PriorSettings;
@@ -34,8 +34,8 @@ pub struct CalibratorSettings {
 }
 
 impl Default for CalibratorSettings {
-    /// A robot and a depth camera of common accuracy. What calibrations beforehand leave of intrinsics is a part of what they leave
-    /// in a single frame, where the size of the model counts as well.
+    /// A robot and a depth camera of common accuracy: as the sensor settings of `prehend synth --sensor rig`, but for wider intrinsics. The
+    /// focal length is known better than in a single frame, where the size of the model counts as well.
     fn default() -> Self {
         Self {
             fused: Fused::default(),
@@ -80,7 +80,7 @@ pub struct CalibrationFrame {
 /// What a visit has found of a frame.
 pub struct Visit {
     obj_id: u32,
-    information: Option<FrameInformation>,
+    information: FrameInformation,
     /// Object → camera \[m\].
     pub t_cam_object: Isometry3<f64>,
 }
@@ -89,7 +89,8 @@ pub struct Visit {
 /// after the last of a pass the rig is [solved](Self::solve) for.
 ///
 /// All frames' poses and the rig are one nonlinear least-squares problem. A visit refines a frame and eliminates all that is the
-/// frame's own (Schur's complement), so that memory is needed for the rig and its objects alone.
+/// frame's own (Schur's complement), so that memory is needed for the rig and its objects, and some 100 kB for a frame's play. A visit belongs
+/// to the calibrator that made it.
 pub struct Calibrator {
     settings: CalibratorSettings,
     rig: Rig,
@@ -116,8 +117,7 @@ pub struct Pass {
 impl Pass {
     /// Adds what a frame has said.
     pub fn add(&mut self, visit: Visit) {
-        let Visit { obj_id, information: Some(information), .. } = visit else { return };
-        let FrameInformation { hessian, gradient, play } = information;
+        let Visit { obj_id, information: FrameInformation { hessian, gradient, play }, .. } = visit;
         match self.sums.entry(obj_id) {
             Entry::Vacant(none) => drop(none.insert((hessian, gradient))),
             Entry::Occupied(mut sum) => {
@@ -130,23 +130,25 @@ impl Pass {
     }
 }
 
-/// The coefficients of an object, by the change of the rig's parameters.
-struct Eliminated {
-    at_rest: DVector<f64>,
-    by_parameters: DMatrix<f64>,
-    covariance: DMatrix<f64>,
-}
-
 impl Calibrator {
     /// Of a rig with a hand of so many joints and images of so many columns and rows, which sees `objects`, by their numbers.
+    ///
+    /// # Errors
+    /// If a standard deviation is not a positive number.
     pub fn new(
         joints: usize,
         (width, height): (usize, usize),
         objects: BTreeMap<u32, Arc<Object>>,
         settings: CalibratorSettings,
-    ) -> Self {
-        let field = DepthField::new(width, height, settings.depth_cells);
+    ) -> Result<Self, RefineError> {
+        let field = DepthField::new(width, height, settings.depth_cells.max(1));
         let sigmas = settings.sigmas(joints, field.len());
+        let Play { hand_translation, hand_rotation, joints: of_joints } = settings.play;
+        let all = sigmas.iter().chain([&hand_translation, &hand_rotation, &of_joints]);
+        if let Some(wrong) = all.copied().find(|sigma| !(sigma.is_finite() && *sigma > 0.0)) {
+            let problem = format!("a standard deviation of {wrong} is not positive");
+            return Err(RefineError::Setting { name: "prior", problem });
+        }
         let mut rig = Rig::nominal(joints, field, &sigmas, settings.play);
         let mut models = BTreeMap::new();
         for (id, given) in objects {
@@ -155,7 +157,7 @@ impl Calibrator {
             models.insert(id, Model { corrected: Arc::clone(&given), given });
         }
         let prior = sigmas.map(|sigma| sigma.powi(-2));
-        Self { settings, rig, prior, models }
+        Ok(Self { settings, rig, prior, models })
     }
 
     /// The rig as it is known so far.
@@ -190,6 +192,10 @@ impl Calibrator {
         let information = evidence.and_then(|evidence| {
             FrameInformation::new(&evidence, &said, &self.rig, field, &sigmas)
         });
+        let Some(information) = information else {
+            let problem = "a rig needs all of them estimated, in at least one stage".into();
+            return Err(RefineError::Setting { name: "nuisances", problem });
+        };
         Ok(Visit { obj_id: *obj_id, information, t_cam_object })
     }
 
@@ -197,7 +203,7 @@ impl Calibrator {
     /// most has done so.
     ///
     /// # Errors
-    /// If a corrected model cannot be used.
+    /// If a corrected model cannot be used, or what was said is not finite.
     pub fn solve(&mut self, pass: Pass) -> Result<f64, RefineError> {
         let n = self.rig.len();
         let mut hessian = DMatrix::from_diagonal(&self.prior);
@@ -212,36 +218,35 @@ impl Calibrator {
                 let own = of_object.view((n, n), (m, m)) + DMatrix::identity(m, m);
                 let coefficients = DVector::from_column_slice(field.coefficients.as_slice());
                 let coupling = of_object.view((n, 0), (m, n));
-                if let Some(factor) = own.cholesky() {
-                    let at_rest = -factor.solve(&(pull.rows(n, m) + coefficients));
-                    let by_parameters = -factor.solve(&coupling);
-                    hessian += coupling.tr_mul(&by_parameters);
-                    gradient += coupling.tr_mul(&at_rest);
-                    let covariance = factor.inverse();
-                    eliminated.insert(*id, Eliminated { at_rest, by_parameters, covariance });
-                }
+                let factor = own.cholesky().ok_or_else(not_finite)?;
+                let at_rest = -factor.solve(&(pull.rows(n, m) + coefficients));
+                let by_parameters = -factor.solve(&coupling);
+                hessian += coupling.tr_mul(&by_parameters);
+                gradient += coupling.tr_mul(&at_rest);
+                let covariance = factor.inverse();
+                eliminated.insert(*id, Eliminated { at_rest, by_parameters, covariance });
             }
         }
-        let Some(factor) = ScaledCholesky::new(&hessian, 0.0) else { return Ok(0.0) };
-        self.rig.covariance = factor.inverse();
-        let change = -(&self.rig.covariance * gradient);
-        let of_object = |e: &Eliminated| &e.at_rest + &e.by_parameters * &change;
-        self.expect_play(pass.play.iter().map(|(id, play)| {
-            let coefficients = eliminated.get(id).map(of_object);
-            let all: Vec<f64> =
-                change.iter().chain(coefficients.iter().flatten()).copied().collect();
-            play.expected_squares(&DVector::from_vec(all))
-        }));
-        for (id, of_this) in &eliminated {
+        let factor = ScaledCholesky::new(&hessian, 0.0).ok_or_else(not_finite)?;
+        let covariance = factor.inverse();
+        let change = -(&covariance * gradient);
+        self.expect_play(
+            pass.play
+                .iter()
+                .map(|(id, play)| play.expected_squares(&change, &covariance, eliminated.get(id))),
+        );
+        for (id, Eliminated { at_rest, by_parameters, covariance: of_object }) in &eliminated {
             if let (Some(field), Some(model)) =
                 (self.rig.objects.get_mut(id), self.models.get_mut(id))
             {
-                field.change(&of_object(of_this), &of_this.covariance);
+                let all = of_object + by_parameters * &covariance * by_parameters.transpose();
+                field.change(&(at_rest + by_parameters * &change), &all);
                 model.corrected = Arc::new(field.corrected(&model.given)?);
             }
         }
+        let deviations = covariance.diagonal().map(f64::sqrt);
         self.rig = self.rig.changed(change.as_slice());
-        let deviations = self.rig.covariance.diagonal().map(f64::sqrt);
+        self.rig.covariance = covariance;
         Ok(change.component_div(&deviations).amax())
     }
 
@@ -261,4 +266,9 @@ impl Calibrator {
         let [hand_translation, hand_rotation, joints] = sums.map(|sum| (sum / count).sqrt());
         self.rig.play = Play { hand_translation, hand_rotation, joints };
     }
+}
+
+fn not_finite() -> RefineError {
+    let problem = "the evidence of a pass is not finite".into();
+    RefineError::Setting { name: "rig", problem }
 }

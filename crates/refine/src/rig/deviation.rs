@@ -85,18 +85,17 @@ impl SurfaceDeviation {
     /// Changes the coefficients, of each node three, which have this covariance then.
     pub(super) fn change(&mut self, change: &DVector<f64>, covariance: &DMatrix<f64>) {
         self.coefficients.iter_mut().zip(change).for_each(|(value, change)| *value += change);
+        let count = self.count();
+        let of_axis = |axis: usize| {
+            DMatrix::from_fn(count, count, |r, c| covariance[(3 * r + axis, 3 * c + axis)])
+        };
+        let mean = (of_axis(0) + of_axis(1) + of_axis(2)) / 3.0;
         let variance = |node: &Point3<f64>| {
             let features = self.features(node);
-            let all = |axis: usize| {
-                let count = self.count();
-                let of_axis =
-                    DMatrix::from_fn(count, count, |r, c| covariance[(3 * r + axis, 3 * c + axis)]);
-                features.dot(&(of_axis * &features))
-            };
-            (0..3).map(all).sum::<f64>() / 3.0
+            features.dot(&(&mean * &features))
         };
         let sum: f64 = self.nodes.iter().map(variance).sum();
-        self.left = (sum / self.count().max(1) as f64 + self.own_variance()).sqrt();
+        self.left = (sum / count.max(1) as f64 + self.own_variance()).sqrt();
     }
 
     /// `mesh` with every vertex displaced.

@@ -81,8 +81,15 @@ impl Rig {
         };
         let Layout { image_size: [width, height], camera, hand, play, covariance, objects } =
             layout;
-        if width == 0 || height == 0 || !(1..=MOST_CELLS).contains(&camera.depth_cells) {
-            return field("image_size", &"no image is of that size, or has so many cells");
+        if !(1..=MOST_PIXELS).contains(&width) || !(1..=MOST_PIXELS).contains(&height) {
+            return field("image_size", &"no image is of that size");
+        }
+        if !(1..=MOST_CELLS).contains(&camera.depth_cells) {
+            return field("camera.depth_cells", &format!("expected 1 to {MOST_CELLS}"));
+        }
+        let sizes = [camera.focal_scale + camera.aspect, camera.focal_scale - camera.aspect];
+        if camera.depth_scale <= 0.0 || sizes.iter().any(|size| *size <= -1.0) {
+            return field("camera", &"no depth or focal length is negative");
         }
         let depth_field = DepthField::new(width, height, camera.depth_cells);
         let (found, expected) = (camera.depth_offsets_m.len(), depth_field.len());
@@ -116,12 +123,18 @@ impl Rig {
             return field("covariance", &format!("expected {n} rows of {n} numbers"));
         }
         rig.covariance = DMatrix::from_fn(n, n, |r, c| covariance[r][c]);
-        if rig.covariance.clone().cholesky().is_none() {
+        let symmetric =
+            (&rig.covariance - rig.covariance.transpose()).amax() <= 1e-9 * rig.covariance.amax();
+        if !symmetric || rig.covariance.clone().cholesky().is_none() {
             return field("covariance", &"is not symmetric and positive definite");
         }
         for (id, object) in objects {
             let ObjectLayout { sigma_m, length_scale_m, left_sigma_m, nodes_m, coefficients } =
                 object;
+            if nodes_m.len() > MOST_NODES || left_sigma_m <= 0.0 {
+                let problem = format!("expected up to {MOST_NODES} nodes, and positive deviations");
+                return field(&format!("objects.{id}"), &problem);
+            }
             let settings = ModelErrorSettings { gp_sigma: sigma_m, length_scale: length_scale_m };
             let nodes = nodes_m.into_iter().map(Point3::from).collect();
             let columns: Vec<Vector3<f64>> = coefficients.into_iter().map(Vector3::from).collect();
@@ -143,8 +156,13 @@ impl Rig {
     /// Writes the rig; the file appears whole or not at all.
     ///
     /// # Errors
-    /// If it cannot be written.
+    /// If it cannot be written, or is not finite.
     pub fn save(&self, file: &Path) -> Result<(), DatasetError> {
+        let coefficients = self.objects.values().flat_map(|object| object.coefficients.iter());
+        if !self.values().iter().chain(&self.covariance).chain(coefficients).all(|v| v.is_finite())
+        {
+            return Err(DatasetError::unusable(file, "the rig is not finite, and was not written"));
+        }
         let object = |(id, deviation): (&u32, &SurfaceDeviation)| {
             let layout = ObjectLayout {
                 sigma_m: deviation.settings.gp_sigma,
@@ -184,11 +202,14 @@ impl Rig {
             covariance: self.covariance.row_iter().map(|r| r.iter().copied().collect()).collect(),
             objects: self.objects.iter().map(object).collect(),
         };
-        // Numbers under names: nothing that JSON lacks, but for those that are not finite.
         let text = serde_json::to_string(&layout).map_err(|e| DatasetError::unusable(file, e))?;
         write_atomically(file, format!("{text}\n").as_bytes())
     }
 }
+
+/// Columns or rows of an image, and nodes of an object's surface, at most.
+const MOST_PIXELS: usize = 1 << 16;
+const MOST_NODES: usize = 2000;
 
 /// Cells of depth's field along the width of images, at most.
 const MOST_CELLS: usize = 64;

@@ -69,7 +69,8 @@ impl FrameInformation {
             .chain(first_patch..first_offset)
             .collect();
         let mut variances: Vec<f64> = sigmas.iter().map(|sigma| sigma * sigma).collect();
-        variances.extend(rig.play_variances());
+        variances.extend(rig.play.variances(state.joints.len()));
+        // Patches there are where there is a field.
         variances.resize(own.len(), field.map_or(1.0, SurfaceDeviation::own_variance));
         // The evidence is linear about its state, not about what the frame says.
         let mut offset = DVector::zeros(n);
@@ -97,11 +98,37 @@ impl FrameInformation {
 }
 
 impl FramePlay {
-    /// The squares that are expected of hand pose and joints if the parameters change so.
-    pub(super) fn expected_squares(&self, change: &DVector<f64>) -> DVector<f64> {
-        let play = &self.at_rest + &self.by_parameters * change;
-        play.component_mul(&play) + &self.variances
+    /// The squares that are expected of hand pose and joints if the parameters change so, and have that covariance then; of those of the object,
+    /// if it has any, `object` says how they depend on the others.
+    pub(super) fn expected_squares(
+        &self,
+        change: &DVector<f64>,
+        covariance: &DMatrix<f64>,
+        object: Option<&Eliminated>,
+    ) -> DVector<f64> {
+        let n = change.len();
+        let mut by_parameters = self.by_parameters.columns(0, n).into_owned();
+        let mut play = self.at_rest.clone();
+        let mut variances = self.variances.clone();
+        if let Some(object) = object {
+            let by_object = self.by_parameters.columns(n, object.at_rest.len());
+            by_parameters += by_object * &object.by_parameters;
+            play += by_object * &object.at_rest;
+            variances += (by_object * &object.covariance).component_mul(&by_object).column_sum();
+        }
+        play += &by_parameters * change;
+        variances += (&by_parameters * covariance).component_mul(&by_parameters).column_sum();
+        play.component_mul(&play) + variances
     }
+}
+
+/// The coefficients of an object, given the rig's parameters.
+pub(super) struct Eliminated {
+    /// Their change if the parameters do not, and its derivatives by them.
+    pub(super) at_rest: DVector<f64>,
+    pub(super) by_parameters: DMatrix<f64>,
+    /// Their covariance if the parameters are known.
+    pub(super) covariance: DMatrix<f64>,
 }
 
 #[cfg(test)]
@@ -111,7 +138,8 @@ mod tests {
 
     use super::*;
     use crate::factor::{
-        HandDepthFactor, HandDepthSettings, PointToPlaneFactor, PointToPlaneSettings,
+        FreeSpaceFactor, FreeSpaceSettings, HandDepthFactor, HandDepthSettings, PointToPlaneFactor,
+        PointToPlaneSettings,
     };
     use crate::problem::{DepthField, Factor, NormalEquations};
     use crate::rig::{Calibrator, CalibratorSettings};
@@ -122,7 +150,7 @@ mod tests {
     fn derivatives_by_depths_field_match_differences() {
         let scene = default_scene(1).unwrap();
         let settings = CalibratorSettings::default();
-        let calibrator = Calibrator::new(16, (640, 480), BTreeMap::new(), settings);
+        let calibrator = Calibrator::new(16, (640, 480), BTreeMap::new(), settings).unwrap();
         let field = Arc::new(DepthField::new(640, 480, 4));
         let factors_of = |observation: &Observation| {
             let frame = Frame::new(observation, &scene.object, Some(&scene.hand)).unwrap();
@@ -132,7 +160,8 @@ mod tests {
             state.t_cam_hand.translation.z += 1e-3;
             let depth = PointToPlaneFactor::new(&frame, &PointToPlaneSettings::default()).unwrap();
             let hand = HandDepthFactor::new(&frame, &HandDepthSettings::default()).unwrap();
-            (state, [Box::new(depth) as Box<dyn Factor>, Box::new(hand)])
+            let free = FreeSpaceFactor::new(&frame, &FreeSpaceSettings::default());
+            (state, [Box::new(depth) as Box<dyn Factor>, Box::new(hand), Box::new(free)])
         };
         let (state, factors) = factors_of(&scene.observation);
         for (f, factor) in factors.iter().enumerate() {

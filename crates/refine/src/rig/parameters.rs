@@ -139,10 +139,10 @@ impl Rig {
     pub fn corrected(&self, observation: &Observation) -> Result<Observation, RefineError> {
         let mut corrected = observation.clone();
         let (camera, error) = (&mut corrected.camera, &self.camera);
-        let fault = |problem: String| RefineError::Setting { name: "rig", problem };
         let (size, expected) = ([camera.width, camera.height], self.depth_field.size());
         if size != expected {
-            return Err(fault(format!("is of images of {expected:?} pixels, not of {size:?}")));
+            let problem = format!("is of images of {expected:?} pixels, not of {size:?}");
+            return Err(RefineError::Setting { name: "rig", problem });
         }
         camera.cx += error.principal_point.x * camera.fx;
         camera.cy += error.principal_point.y * camera.fy;
@@ -158,7 +158,7 @@ impl Rig {
         if let Some(hand) = &mut corrected.hand {
             let (given, expected) = (hand.joints.len(), self.joints.len());
             if given != expected {
-                return Err(fault(format!("is of a hand of {expected} joints, not of {given}")));
+                return Err(of_other_joints(given, expected));
             }
             let mounted = hand.t_cam_hand * self.in_hand;
             hand.t_cam_hand = Isometry3::from_parts(
@@ -171,9 +171,9 @@ impl Rig {
     }
 
     /// Derivatives of what a frame says of its calibrations, a row each of hand pose (a left twist about the object's center), joints
-    /// and camera, by the rig's parameters; `said` is what the frame says when corrected.
+    /// and camera, by the rig's parameters; `said` is what the frame says when corrected, of all joints or, where no hand is known, of none.
     pub(super) fn jacobian(&self, said: &State) -> DMatrix<f64> {
-        let rest = self.joints.len() + CameraCalibrationError::DIMENSION;
+        let rest = said.joints.len() + CameraCalibrationError::DIMENSION;
         let mut jacobian = DMatrix::zeros(6 + rest, self.len());
         let turn = said.t_cam_hand.rotation.to_rotation_matrix().into_inner();
         let mounted = self.in_camera.rotation.inverse() * said.t_cam_hand.rotation;
@@ -185,19 +185,27 @@ impl Rig {
             jacobian.fixed_view_mut::<3, 3>(0, column + 3).copy_from(&(-arm * axes));
             jacobian.fixed_view_mut::<3, 3>(3, column + 3).copy_from(&axes);
         }
-        jacobian.view_mut((6, POSES), (rest, rest)).fill_with_identity();
+        let from = self.first_offset() - rest;
+        jacobian.view_mut((6, from), (rest, rest)).fill_with_identity();
         jacobian
     }
 
     /// Covariance of a frame's calibrations, in the order of [`Layout`], about what it says when corrected; `object` are the standard
     /// deviations of the object's pose.
+    ///
+    /// # Errors
+    /// If the frame's hand has another number of joints.
     pub(crate) fn frame_covariance(
         &self,
         said: &State,
         camera: &Camera,
         object: &[f64],
-    ) -> DMatrix<f64> {
-        let layout = Layout::new(self.joints.len());
+    ) -> Result<DMatrix<f64>, RefineError> {
+        let (given, expected) = (said.joints.len(), self.joints.len());
+        if given != expected && given != 0 {
+            return Err(of_other_joints(given, expected));
+        }
+        let layout = Layout::new(given);
         let (object_rows, bias) = (object.len(), layout.offset(Block::Camera) + 1);
         let mut jacobian = self.jacobian(said);
         // Where the object is, depth's field is a bias.
@@ -209,17 +217,24 @@ impl Rig {
         let known = &jacobian * &self.covariance * jacobian.transpose();
         let mut covariance = DMatrix::zeros(layout.len(), layout.len());
         covariance.view_mut((object_rows, object_rows), known.shape()).copy_from(&known);
-        let own = object.iter().map(|sigma| sigma * sigma).chain(self.play_variances());
+        let own = object.iter().map(|sigma| sigma * sigma).chain(self.play.variances(given));
         own.enumerate().for_each(|(k, variance)| covariance[(k, k)] += variance);
-        covariance
+        Ok(covariance)
     }
+}
 
-    /// Variances of hand pose and joints from frame to frame.
-    pub(super) fn play_variances(&self) -> impl Iterator<Item = f64> + use<> {
-        let Play { hand_translation, hand_rotation, joints } = self.play;
+impl Play {
+    /// Variances of a hand's pose and of so many joints.
+    pub(super) fn variances(&self, count: usize) -> impl Iterator<Item = f64> + use<> {
+        let Self { hand_translation, hand_rotation, joints } = *self;
         let hand = [hand_translation; 3].into_iter().chain([hand_rotation; 3]);
-        hand.chain(std::iter::repeat_n(joints, self.joints.len())).map(|sigma| sigma * sigma)
+        hand.chain(std::iter::repeat_n(joints, count)).map(|sigma| sigma * sigma)
     }
+}
+
+fn of_other_joints(given: usize, expected: usize) -> RefineError {
+    let problem = format!("is of a hand of {expected} joints, not of {given}");
+    RefineError::Setting { name: "rig", problem }
 }
 
 /// How far the calibrations of `state` are from what is `said`, by displacement of the point at the object's center and rotation vector of

@@ -80,7 +80,8 @@ impl<'a> Frame<'a> {
         })
     }
 
-    /// The same of a rig that is known as well as `rig` says: what was observed, and the object, are corrected by it already.
+    /// The same of a rig that is known as well as `rig` says: what was observed, and the object, are corrected by it already. The fused
+    /// estimator takes that for what is known beforehand; others do not ask.
     pub fn with_rig(self, rig: &'a Rig) -> Self {
         Self { rig: Some(rig), ..self }
     }

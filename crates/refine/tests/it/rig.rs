@@ -33,7 +33,7 @@ fn what_is_wrong_in_all_frames_is_found_and_corrected() {
     let frames: Vec<_> = sequence.frames.iter().step_by(6).collect();
     let objects = BTreeMap::from([(7, Arc::clone(&sequence.object))]);
     let size = (640, 480);
-    let mut calibrator = Calibrator::new(16, size, objects, CalibratorSettings::default());
+    let mut calibrator = Calibrator::new(16, size, objects, CalibratorSettings::default()).unwrap();
     let mut poses: Vec<_> = frames.iter().map(|frame| frame.truth).collect();
     for _ in 0..3 {
         let mut pass = Pass::default();
@@ -98,6 +98,11 @@ fn what_is_wrong_in_all_frames_is_found_and_corrected() {
         let pairs = joints(observation).into_iter().zip(joints(&new.observation));
         pairs.map(|(said, is)| (said - is).abs()).sum::<f64>() / 16.0
     };
+    // Without a hand, what is known of the camera still counts.
+    let corrected = rig.corrected(&told).unwrap();
+    let frame = Frame::new(&corrected, &object, None).unwrap().with_rig(&rig);
+    let found = refine(&frame, &sequence.frames[36].truth, &Fused::default()).unwrap();
+    assert!(found.posterior.is_some());
     let (before, after) = (wrong(&told), wrong(&rig.corrected(&told).unwrap()));
     println!("joints {before} → {after} rad");
     assert!(after < 0.4 * before, "{after} of {before}");
@@ -105,15 +110,18 @@ fn what_is_wrong_in_all_frames_is_found_and_corrected() {
 
 #[test]
 fn faults_of_a_file_are_named() {
-    let calibrator = Calibrator::new(2, (64, 48), BTreeMap::new(), CalibratorSettings::default());
+    let calibrator =
+        Calibrator::new(2, (64, 48), BTreeMap::new(), CalibratorSettings::default()).unwrap();
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("rig.json");
     calibrator.rig().save(&path).unwrap();
     let text = std::fs::read_to_string(&path).unwrap();
     assert_eq!(Rig::load(&path).unwrap().parameters(), calibrator.rig().parameters());
     for (from, to, expected) in [
-        ("\"depth_cells\":4", "\"depth_cells\":0", "image_size"),
+        ("\"depth_cells\":4", "\"depth_cells\":0", "camera.depth_cells"),
         ("\"depth_cells\":4", "\"depth_cells\":5", "camera.depth_offsets_m"),
+        ("\"depth_scale\":1.0", "\"depth_scale\":-1.0", "camera"),
+        ("\"image_size\":[64", "\"image_size\":[99999999", "image_size"),
         ("\"joints\":[0.0,0.0]", "\"joints\":[0.0]", "covariance"),
         ("\"covariance\":[[", "\"covariance\":[[-", "covariance"),
         ("\"aspect\"", "\"aspekt\"", "camera"),

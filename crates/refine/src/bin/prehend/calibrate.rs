@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::{Mutex, PoisonError};
 
-use anyhow::{Context, bail};
+use anyhow::Context;
 use clap::Args;
 use nalgebra::Isometry3;
 use prehend_refine::data::bop::check_writable;
@@ -38,18 +38,24 @@ impl Calibrate {
     pub(crate) fn run(self) -> anyhow::Result<ExitCode> {
         check_writable(&self.out)?;
         limit_threads(self.threads)?;
+        if let Some(folder) = &self.models {
+            std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+        }
         let dataset = self.input.selection.open()?;
         let (jobs, mut failures) = self.input.selection.jobs(&self.input.poses)?;
         let mut assets = Assets::new(&dataset, 0).with_cache(cache());
         let ids: BTreeSet<u32> = jobs.iter().map(|job| job.target.obj_id).collect();
         let objects: BTreeMap<_, _> =
             ids.iter().map(|id| Ok((*id, assets.object(*id)?))).collect::<anyhow::Result<_>>()?;
-        let Some(Job { target, .. }) = jobs.first() else { bail!("there are no frames") };
-        let FrameInput { observation, hand, .. } = assets.load(target, &[Sensor::Hand])?;
-        let joints = hand.with_context(|| format!("{target}: {NO_HAND}"))?.tree.joint_names().len();
-        let size = (observation.camera.width, observation.camera.height);
+        let first = jobs.iter().find_map(|job| {
+            let FrameInput { observation, hand, .. } =
+                assets.load(&job.target, &[Sensor::Hand]).ok()?;
+            let size = (observation.camera.width, observation.camera.height);
+            Some((hand?.tree.joint_names().len(), size))
+        });
+        let (joints, size) = first.context(NO_HAND)?;
         let settings = CalibratorSettings::default();
-        let mut calibrator = Calibrator::new(joints, size, objects.clone(), settings);
+        let mut calibrator = Calibrator::new(joints, size, objects.clone(), settings)?;
         let assets = Mutex::new(assets);
         let mut poses: Vec<_> = jobs.iter().map(|job| job.row.t_cam_model).collect();
         let passes = self.passes.get();
@@ -61,6 +67,7 @@ impl Calibrate {
             let mut found = BTreeMap::new();
             count = 0;
             let mut next = 0;
+            let mut missed = Vec::new();
             let before = poses.clone();
             Workers::new(jobs.len(), rayon::current_num_threads())?.run(
                 &indices,
@@ -76,16 +83,16 @@ impl Calibrate {
                                 pass.add(visit);
                                 count += 1;
                             }
-                            Err(error) if number == 0 => {
-                                failures.push(format!("{}: {error}", jobs[next].target));
-                            }
-                            Err(_) => {}
+                            Err(error) => missed.push(format!("{}: {error}", jobs[next].target)),
                         }
                         next += 1;
                     }
                     Ok(())
                 },
             )?;
+            if count == 0 || number + 1 == passes {
+                failures.append(&mut missed);
+            }
             if count == 0 {
                 break;
             }
@@ -97,7 +104,6 @@ impl Calibrate {
             let rig = calibrator.rig();
             rig.save(&self.out)?;
             if let Some(folder) = &self.models {
-                std::fs::create_dir_all(folder).with_context(|| format!("{}", folder.display()))?;
                 for (id, deviation) in &rig.objects {
                     let mesh = deviation.applied(&objects[id].mesh).scaled(1e3);
                     mesh.save_ply(&folder.join(format!("obj_{id:06}.ply")))?;
@@ -110,7 +116,7 @@ impl Calibrate {
     }
 }
 
-const NO_HAND: &str = "nothing is known of the hand, which is part of the rig";
+const NO_HAND: &str = "nothing is known of a hand, which is part of the rig";
 
 /// What a frame says of the rig.
 fn visit(

@@ -244,9 +244,10 @@ impl Factor for PointToPlaneFactor {
             let size = PatchSums::<N>::place(count) + field.len();
             let (mut gradient, mut hessian) = (DVector::zeros(size), DMatrix::zeros(size, size));
             for (i, (weight, left)) in weighted() {
-                for (r, by_row) in derivatives(i) {
-                    gradient[r] += weight * left * by_row;
-                    derivatives(i).for_each(|(c, d)| hessian[(r, c)] += weight * by_row * d);
+                let row: Vec<(usize, f64)> = derivatives(i).collect();
+                for (r, by_row) in &row {
+                    gradient[*r] += weight * left * by_row;
+                    row.iter().for_each(|(c, d)| hessian[(*r, *c)] += weight * by_row * d);
                 }
             }
             (gradient, hessian)

@@ -75,7 +75,7 @@ impl Fused {
             return GaussianPrior::independent(initial.clone(), settings);
         };
         let object = settings.sigmas(Block::ObjectPose);
-        let covariance = rig.frame_covariance(initial, &frame.observation().camera, &object);
+        let covariance = rig.frame_covariance(initial, &frame.observation().camera, &object)?;
         let layout = Layout::new(initial.joints.len());
         GaussianPrior::correlated(initial.clone(), layout, &covariance).ok_or_else(|| {
             let problem = "the covariance is not positive definite".into();
@@ -116,7 +116,9 @@ impl Fused {
         let mut walk = Walk { fused: self, frame, initial: state, prior, settings };
         let Some(stage) = self.settings.stages.last() else { return Ok(None) };
         let patches = surface_patches(frame, state, stage, &walk.settings);
-        walk.measure_noise(state, patches.is_some());
+        if stage.measured_noise {
+            walk.measure_noise(state, patches.is_some());
+        }
         let (settings, own) = (&walk.settings, &self.factors);
         let problem = problem_of(frame, state, stage, settings, patches.clone(), own)?;
         let equations = problem.evidence(state, field);
