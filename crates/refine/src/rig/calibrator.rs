@@ -34,17 +34,13 @@ pub struct CalibratorSettings {
 }
 
 impl Default for CalibratorSettings {
-    /// A robot and a depth camera of common accuracy: as the sensor settings of `prehend synth --sensor rig`, but for wider intrinsics. The
-    /// focal length is known better than in a single frame, where the size of the model counts as well.
+    /// A robot and a depth camera of common accuracy, as in a single frame; a hand that may be off in both ways.
     fn default() -> Self {
         Self {
             fused: Fused::default(),
             prior: PriorSettings {
                 hand_translation: 3e-3,
                 hand_rotation: 10e-3,
-                depth_scale: 6e-3,
-                principal_point: 2.6e-3,
-                focal_scale: 2e-3,
                 ..PriorSettings::default()
             },
             depth_offset: 3e-3,

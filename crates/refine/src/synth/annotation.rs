@@ -98,7 +98,7 @@ pub(super) fn model(mesh: &TriMesh, inertial: &Inertial) -> Value {
 
 /// What is wrong with a rig, as changes that bring what is said and measured to what is true: factors of focal lengths, shift of the
 /// principal point, factor of depth, what is to be added then on a grid of the image, the hand's pose in the frame of where it is said to be,
-/// joint positions to be added, and the taxels' gains.
+/// joint positions to be added; and what taxels' readings have been multiplied by.
 pub(super) fn rig(
     focal: [f64; 2],
     principal_px: [f64; 2],
