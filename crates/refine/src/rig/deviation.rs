@@ -4,7 +4,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3xX, Point3, Vector3};
 use prehend_geometry::TriMesh;
 
 use crate::error::RefineError;
-use crate::problem::ModelErrorSettings;
+use crate::problem::{ModelErrorSettings, far_apart};
 use crate::scene::Object;
 
 /// Distance between the places that describe the deviation, as a share of its length scale.
@@ -34,8 +34,9 @@ pub struct SurfaceDeviation {
 impl SurfaceDeviation {
     /// None yet, of `object`; `None` if models are exact.
     pub(super) fn new(object: &Object, settings: &ModelErrorSettings) -> Option<Self> {
-        let places: Vec<Point3<f64>> = object.samples.iter().map(|sample| sample.point).collect();
-        let nodes = far_apart(&places, SPACING * settings.length_scale);
+        let places: Vec<_> = object.samples.iter().map(|sample| sample.point.coords).collect();
+        let nodes = far_apart(&places, SPACING * settings.length_scale, MOST_NODES);
+        let nodes: Vec<_> = nodes.into_iter().map(Point3::from).collect();
         let coefficients = Matrix3xX::zeros(nodes.len());
         Self::from_parts(settings.clone(), nodes, coefficients, settings.gp_sigma)
     }
@@ -124,23 +125,6 @@ impl SurfaceDeviation {
 
 fn correlation(a: &Point3<f64>, b: &Point3<f64>, length_scale: f64) -> f64 {
     (-0.5 * (a - b).norm_squared() / length_scale.powi(2)).exp()
-}
-
-/// The first of `places`, and others, each farther than `distance` from all before it and the farthest of those left.
-fn far_apart(places: &[Point3<f64>], distance: f64) -> Vec<Point3<f64>> {
-    let mut chosen: Vec<Point3<f64>> = places.first().copied().into_iter().collect();
-    let mut nearest = vec![f64::INFINITY; places.len()];
-    while let Some(last) = chosen.last().filter(|_| chosen.len() < MOST_NODES) {
-        for (nearest, place) in nearest.iter_mut().zip(places) {
-            *nearest = nearest.min((place - last).norm());
-        }
-        let farthest = nearest.iter().zip(places).max_by(|a, b| a.0.total_cmp(b.0));
-        match farthest.filter(|(nearest, _)| **nearest > distance) {
-            Some((_, place)) => chosen.push(*place),
-            None => break,
-        }
-    }
-    chosen
 }
 
 #[cfg(test)]

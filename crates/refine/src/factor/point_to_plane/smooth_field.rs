@@ -2,6 +2,8 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector3};
 
+use crate::problem::far_apart;
+
 /// Coefficients that the field is described by, at most.
 const MOST_COEFFICIENTS: usize = 24;
 
@@ -50,7 +52,7 @@ impl SmoothField {
         let kernel = |a: &Vector3<f64>, b: &Vector3<f64>| {
             (-0.5 * (a - b).norm_squared() / smoothness.powi(2)).exp()
         };
-        let chosen = far_apart(places, SPACING * smoothness);
+        let chosen = far_apart(places, SPACING * smoothness, MOST_COEFFICIENTS);
         let among = DMatrix::from_fn(chosen.len(), chosen.len(), |i, j| {
             // What makes it certainly positive definite.
             kernel(&chosen[i], &chosen[j]) + if i == j { 1e-6 } else { 0.0 }
@@ -107,23 +109,6 @@ impl SmoothField {
         }
         shared.tr_mul(&information.solve(&shared))
     }
-}
-
-/// The first of `places`, and others, each farther than `distance` from all before it and the farthest of those left.
-fn far_apart(places: &[Vector3<f64>], distance: f64) -> Vec<Vector3<f64>> {
-    let mut chosen: Vec<Vector3<f64>> = places.first().copied().into_iter().collect();
-    let mut nearest = vec![f64::INFINITY; places.len()];
-    while let Some(last) = chosen.last().filter(|_| chosen.len() < MOST_COEFFICIENTS) {
-        for (nearest, place) in nearest.iter_mut().zip(places) {
-            *nearest = nearest.min((place - last).norm());
-        }
-        let farthest = nearest.iter().zip(places).max_by(|a, b| a.0.total_cmp(b.0));
-        match farthest.filter(|(nearest, _)| **nearest > distance) {
-            Some((_, place)) => chosen.push(*place),
-            None => break,
-        }
-    }
-    chosen
 }
 
 #[cfg(test)]

@@ -23,7 +23,7 @@ pub use self::summary::PosteriorSummary;
 use super::estimate::Recorder;
 use super::{Estimate, Iteration, Observer, Strategy};
 use crate::error::RefineError;
-use crate::factor::{GaussianPrior, Layout};
+use crate::factor::{GaussianPrior, Layout, NoiseEstimate};
 use crate::problem::{
     Block, DepthField, Factor, NormalEquations, Solution, Solver, State, SurfacePatches,
     Termination,
@@ -111,16 +111,15 @@ impl Fused {
         state: &State,
         field: &Arc<DepthField>,
     ) -> Result<Option<Evidence>, RefineError> {
-        let prior = Arc::new(GaussianPrior::independent(state.clone(), &self.settings.prior)?);
-        let settings = self.settings_for(frame);
-        let mut walk = Walk { fused: self, frame, initial: state, prior, settings };
         let Some(stage) = self.settings.stages.last() else { return Ok(None) };
-        let patches = surface_patches(frame, state, stage, &walk.settings);
+        let mut settings = self.settings_for(frame);
+        let patches = surface_patches(frame, state, stage, &settings);
         if stage.measured_noise {
-            walk.measure_noise(state, patches.is_some());
+            let measured = depth_noise(frame, state, &self.settings);
+            take_noise(&mut settings, measured, patches.is_some());
         }
-        let (settings, own) = (&walk.settings, &self.factors);
-        let problem = problem_of(frame, state, stage, settings, patches.clone(), own)?;
+        let own = &self.factors;
+        let problem = problem_of(frame, state, stage, &settings, patches.clone(), own)?;
         let equations = problem.evidence(state, field);
         Ok(Some(Evidence { state: state.clone(), equations, patches }))
     }
@@ -185,6 +184,17 @@ impl Strategy for Fused {
     }
 }
 
+/// Takes the noise of depth as it was `measured`, if it was.
+fn take_noise(settings: &mut FusedSettings, measured: Option<NoiseEstimate>, with_patches: bool) {
+    let Some(noise) = measured else { return };
+    settings.depth.noise.sigma = noise.independent.clamp(FINEST, COARSEST);
+    // The model's part of it is what patches are off by.
+    let model = if with_patches { settings.model.gp_sigma } else { 0.0 };
+    let correlated = (noise.correlated.powi(2) - model.powi(2)).max(0.0).sqrt();
+    settings.depth.gp_sigma = correlated.min(COARSEST);
+    settings.depth.noise.effective_samples = settings.max_effective_samples;
+}
+
 /// Records the best solution of a stage.
 fn record(recorder: &mut Recorder<'_, '_>, best: &Solution) -> ControlFlow<()> {
     let (index, values) = (recorder.count(), vec![best.at.cost]);
@@ -217,7 +227,8 @@ impl Walk<'_> {
         let stage = &fused.settings.stages[index];
         let patches = surface_patches(frame, initial, stage, &self.settings);
         if stage.measured_noise {
-            self.measure_noise(&states[0], patches.is_some());
+            let measured = depth_noise(frame, &states[0], &fused.settings);
+            take_noise(&mut self.settings, measured, patches.is_some());
         }
         let problem = problem_of(frame, initial, stage, &self.settings, patches, &fused.factors)?
             .with_prior(self.prior.clone());
@@ -246,18 +257,6 @@ impl Walk<'_> {
             });
         }
         Ok(found)
-    }
-
-    /// Takes the noise of depth from the residuals at `state`.
-    fn measure_noise(&mut self, state: &State, with_patches: bool) {
-        let Some(noise) = depth_noise(self.frame, state, &self.fused.settings) else { return };
-        let settings = &mut self.settings;
-        settings.depth.noise.sigma = noise.independent.clamp(FINEST, COARSEST);
-        // The model's part of it is what patches are off by.
-        let model = if with_patches { settings.model.gp_sigma } else { 0.0 };
-        let correlated = (noise.correlated.powi(2) - model.powi(2)).max(0.0).sqrt();
-        settings.depth.gp_sigma = correlated.min(COARSEST);
-        settings.depth.noise.effective_samples = settings.max_effective_samples;
     }
 
     /// Where the stage after `index` starts, which found these solutions.
