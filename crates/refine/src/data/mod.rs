@@ -24,6 +24,7 @@ pub use noise::NoiseLevel;
 pub use pose::PlainPose;
 pub(crate) use smooth_field::smooth_field;
 pub use symmetry::{ContinuousSymmetry, Symmetries};
+pub(crate) use targets::listed_targets;
 pub use targets::{Target, find_targets};
 pub use times::{Times, join_times};
 pub use workers::Workers;

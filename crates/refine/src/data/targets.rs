@@ -47,13 +47,12 @@ struct Listed {
 /// # Errors
 /// If a file is missing or broken, or there is no list and not just one object.
 pub fn find_targets(dataset: &Dataset, file: Option<&Path>) -> Result<Vec<Target>, DatasetError> {
-    let own = dataset.root().join(LIST);
-    if let Some(file) = file.or_else(|| own.is_file().then_some(own.as_path())) {
-        return read(file);
+    if let Some(listed) = listed_targets(dataset, file)? {
+        return Ok(listed);
     }
     let [obj_id] = dataset.models().object_ids()?[..] else {
         let problem = "no list of targets (--targets names one), and there is not just one object";
-        return Err(DatasetError::unusable(&own, problem));
+        return Err(DatasetError::unusable(&dataset.root().join(LIST), problem));
     };
     let mut targets = Vec::new();
     for scene in dataset.scenes() {
@@ -61,6 +60,18 @@ pub fn find_targets(dataset: &Dataset, file: Option<&Path>) -> Result<Vec<Target
         targets.extend(scene.images()?.into_iter().map(of_image));
     }
     Ok(targets)
+}
+
+/// The targets that `file` lists or, without `file`, the dataset's own list; `None` if it has none.
+///
+/// # Errors
+/// If a file is missing or broken.
+pub(crate) fn listed_targets(
+    dataset: &Dataset,
+    file: Option<&Path>,
+) -> Result<Option<Vec<Target>>, DatasetError> {
+    let own = dataset.root().join(LIST);
+    file.or_else(|| own.is_file().then_some(own.as_path())).map(read).transpose()
 }
 
 fn read(file: &Path) -> Result<Vec<Target>, DatasetError> {

@@ -1,6 +1,8 @@
-//! How good poses are: metrics, symmetries, scores of whole files, reports and studies.
+//! How good poses are: metrics, symmetries, scores of whole files, BOP's average recall, reports and studies.
 
+pub mod localization;
 pub mod metrics;
+mod model;
 pub mod report;
 mod scoring;
 #[cfg(feature = "cli")]

@@ -6,19 +6,17 @@ use std::path::{Path, PathBuf};
 use nalgebra::Isometry3;
 use prehend_geometry::robot::KinematicTree;
 use prehend_geometry::{ClosestPoints, SolidUnion, TriMesh};
-use prehend_render::{DepthImage, RenderModel, depth_map};
+use prehend_render::DepthImage;
 
-use crate::data::bop::{Dataset, DatasetError, GroundTruth, ResultRow, diameter};
+use super::model::EvaluationModel;
+use crate::data::bop::{Dataset, DatasetError, GroundTruth, ResultRow};
 use crate::data::{AssetError, ContactModel, load_mesh};
-use crate::error::RefineError;
-use crate::evaluate::metrics::{Contact, ScoredModel, ScoredRow, vsd};
+use crate::evaluate::metrics::{Contact, ScoredRow};
 
-/// An evaluation model, prepared once.
+/// What scoring needs of an object, prepared once.
 struct Model {
-    scored: ScoredModel,
+    evaluation: EvaluationModel,
     contact: ContactModel,
-    drawn: RenderModel,
-    diameter: f64,
 }
 
 /// What scoring needs of one image.
@@ -85,12 +83,11 @@ impl<'a> Scorer<'a> {
         let (width, height) =
             depth.as_ref().map_or((0, 0), |depth| (depth.width(), depth.height()));
         let camera = self.dataset.frame(scene_id, im_id)?.camera(width, height);
-        let mut score = model.scored.score(&row.t_cam_model, &truth, &camera);
+        let evaluation = &model.evaluation;
+        let mut score = evaluation.points.score(&row.t_cam_model, &truth, &camera);
         if let Some(sensed) = depth {
-            let draw = |pose: &Isometry3<f64>| depth_map(&camera, &[(&model.drawn, *pose)]);
-            let errors =
-                vsd(&camera, sensed, &draw(&row.t_cam_model), &draw(&truth), model.diameter);
-            score = score.with_visible_surface(&errors, model.diameter, camera.width);
+            let errors = evaluation.vsd(&row.t_cam_model, &truth, &camera, sensed);
+            score = score.with_visible_surface(&errors, evaluation.diameter, camera.width);
         }
         if let Some(hand) = hand {
             let estimate = hand.contact(&model.contact, &row.t_cam_model)?;
@@ -105,19 +102,9 @@ impl<'a> Scorer<'a> {
             return Ok(());
         }
         let mesh = load_mesh(self.truth.models(), id)?;
-        let (symmetries, diameter) = match self.truth.models().info(id) {
-            Ok(info) => (info.symmetries, info.diameter),
-            Err(DatasetError::Missing { .. } | DatasetError::UnknownObject { .. }) => {
-                (Default::default(), diameter(&mesh.vertices))
-            }
-            // Without its symmetries, a symmetric object would be scored wrongly.
-            Err(broken) => return Err(broken.into()),
-        };
         let contact = ContactModel::new(&mesh);
-        let drawn = RenderModel::new(&mesh)
-            .map_err(|e| RefineError::Object { object: format!("{id}"), reason: e.to_string() })?;
-        let scored = ScoredModel::new(mesh.vertices, symmetries);
-        self.models.insert(id, Model { scored, contact, drawn, diameter });
+        let evaluation = EvaluationModel::new(self.truth.models(), id, mesh)?;
+        self.models.insert(id, Model { evaluation, contact });
         Ok(())
     }
 

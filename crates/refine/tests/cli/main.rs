@@ -4,6 +4,7 @@
 
 mod bad_input;
 mod command;
+mod eval_bop;
 mod fixture;
 mod fused;
 mod initial;

@@ -7,6 +7,7 @@
 mod any_robot;
 mod bop_dataset;
 mod data_contact;
+mod data_localization;
 mod data_metrics;
 mod data_search;
 mod device;
@@ -15,6 +16,7 @@ mod fused;
 mod icp;
 mod journal;
 mod lens;
+mod localization;
 mod pose_error;
 mod results;
 mod rig;

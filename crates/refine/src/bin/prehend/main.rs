@@ -60,6 +60,7 @@ enum Command {
     /// Prints means and medians, overall and by object, of PE and OE (position and rotation error), of
     /// ADD, ADI, MSSD, MSPD and VSD, of AR (BOP's average recall, over the poses given), and of CA and IV
     /// (contact area and intersection volume with the hand).
+    /// With --bop, it prints BOP's average recall over all targets of the dataset instead.
     /// Where the dataset has models_eval/ or scene_bodies_gt.json, those count as the truth.
     Eval(eval::Eval),
     /// Regenerate the paper's tables on a dataset, ours beside the published rows, or measure the fused estimator

@@ -12,7 +12,8 @@ use super::models::Models;
 use super::pose::translation_from_mm;
 use super::scene::SceneBodies;
 
-/// What scorers may read and estimators must not: `scene_gt.json`, `scene_bodies_gt.json` and `models_eval/`.
+/// What scorers may read and estimators must not: `scene_gt.json`, `scene_gt_info.json`, `scene_bodies_gt.json` and
+/// `models_eval/`.
 #[derive(Debug)]
 pub struct GroundTruth<'a> {
     dataset: &'a Dataset,
@@ -20,9 +21,11 @@ pub struct GroundTruth<'a> {
     models: Models,
 }
 
+/// The files of one scene.
 #[derive(Debug)]
-struct TrueScene {
-    objects: JsonFile,
+pub(super) struct TrueScene {
+    pub(super) objects: JsonFile,
+    pub(super) visibility: JsonFile,
     bodies: JsonFile,
 }
 
@@ -49,6 +52,7 @@ impl<'a> GroundTruth<'a> {
     pub fn new(dataset: &'a Dataset) -> Self {
         let scene = |dir: &std::path::Path| TrueScene {
             objects: JsonFile::new(dir.join("scene_gt.json")),
+            visibility: JsonFile::new(dir.join("scene_gt_info.json")),
             bodies: JsonFile::new(dir.join("scene_bodies_gt.json")),
         };
         let eval = dataset.root().join("models_eval");
@@ -124,7 +128,7 @@ impl<'a> GroundTruth<'a> {
         Ok(if own.exists() { own } else { &self.dataset.scene(scene_id)?.bodies })
     }
 
-    fn scene(&self, scene_id: u32) -> Result<&TrueScene, DatasetError> {
+    pub(super) fn scene(&self, scene_id: u32) -> Result<&TrueScene, DatasetError> {
         self.dataset.scene(scene_id).map(|scene| &self.scenes[&scene.id()])
     }
 }

@@ -18,6 +18,7 @@ mod models_info;
 mod pose;
 mod results;
 mod scene;
+mod visibility;
 
 pub use atomic::{check_writable, create_folder, write_atomically};
 pub use dataset::{Dataset, Scene};

@@ -5,6 +5,7 @@
 //! challenge (Hodaň et al., ECCVW 2020).
 
 mod pose_error;
+mod recall;
 mod score;
 mod scored_model;
 mod summary;
@@ -12,6 +13,7 @@ mod table;
 mod vsd;
 
 pub use pose_error::{oe_deg, oe_symmetric_deg, pe_cm};
+pub(crate) use recall::{NormalizedErrors, Recall, THRESHOLDS};
 #[cfg(feature = "cli")]
 pub(crate) use score::COLUMNS;
 pub(crate) use score::Contact;
@@ -19,6 +21,6 @@ pub use score::PoseScore;
 pub use scored_model::ScoredModel;
 pub use summary::{ScoredRow, Statistic, Summary, summarize};
 pub use table::Table;
-pub(crate) use vsd::vsd;
+pub(crate) use vsd::{VSD_TOLERANCES, vsd};
 
 pub use crate::data::{CONTACT_SAMPLES, ContactModel};

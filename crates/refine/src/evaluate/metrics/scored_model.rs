@@ -68,14 +68,19 @@ impl ScoredModel {
 
     /// MSSD: the least over the symmetries (see [`Symmetries::transforms`]) of the largest distance between corresponding
     /// points \[m\].
-    fn mssd(&self, estimate: &Isometry3<f64>, truth: &Isometry3<f64>) -> f64 {
+    pub(crate) fn mssd(&self, estimate: &Isometry3<f64>, truth: &Isometry3<f64>) -> f64 {
         let estimated: Vec<_> = self.points.iter().map(|p| estimate * p).collect();
         self.least_maximum(truth, |k, p| (p - estimated[k]).norm_squared())
     }
 
     /// MSPD: the same for the projections of the points into the image \[px\]; infinite when a point lies
     /// behind the camera in the estimated pose or in every symmetric true pose.
-    fn mspd(&self, estimate: &Isometry3<f64>, truth: &Isometry3<f64>, camera: &Camera) -> f64 {
+    pub(crate) fn mspd(
+        &self,
+        estimate: &Isometry3<f64>,
+        truth: &Isometry3<f64>,
+        camera: &Camera,
+    ) -> f64 {
         let estimated: Vec<_> =
             self.points.iter().map(|p| camera.project(&(estimate * p))).collect();
         self.least_maximum(truth, |k, p| match (camera.project(&p), &estimated[k]) {

@@ -7,7 +7,7 @@ use prehend_render::{Camera, DepthImage};
 pub(super) const VISIBILITY_TOLERANCE: f64 = 15e-3;
 
 /// Tolerances of the misalignment, as fractions of the object's diameter.
-pub(super) const VSD_TOLERANCES: [f64; 10] =
+pub(crate) const VSD_TOLERANCES: [f64; 10] =
     [0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5];
 
 /// The share of the visible surface that is out of place, in 0..=1, for each of [`VSD_TOLERANCES`].

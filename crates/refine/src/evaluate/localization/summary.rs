@@ -1,0 +1,122 @@
+//! Average recalls over targets.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::target::TargetScore;
+use crate::evaluate::metrics::{Recall, THRESHOLDS, Table, VSD_TOLERANCES};
+
+/// BOP's average recalls over some targets (0..=1).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct AverageRecall {
+    /// Number of instances to be found.
+    pub targets: usize,
+    /// Number of estimates that count, at most one an instance.
+    pub estimates: usize,
+    /// Of the visible surface discrepancy, over tolerances and thresholds.
+    pub ar_vsd: f64,
+    /// Of the maximum symmetry-aware surface distance, over thresholds.
+    pub ar_mssd: f64,
+    /// Of the maximum symmetry-aware projection distance, over thresholds.
+    pub ar_mspd: f64,
+    /// The mean of the three.
+    pub ar: f64,
+}
+
+/// Average recalls over all targets and over those of each object.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LocalizationSummary {
+    /// Over all targets.
+    pub overall: AverageRecall,
+    /// Over the targets of each object id.
+    pub per_object: BTreeMap<u32, AverageRecall>,
+}
+
+impl AverageRecall {
+    /// Zero without targets.
+    fn of<'a>(scores: impl Iterator<Item = &'a TargetScore>) -> Self {
+        let (mut targets, mut estimates, mut found) = (0, 0, [0; 3]);
+        for score in scores {
+            targets += score.target.instances;
+            estimates += score.estimates;
+            let of_target = [score.found.vsd, score.found.mssd, score.found.mspd];
+            found.iter_mut().zip(of_target).for_each(|(sum, of_target)| *sum += of_target);
+        }
+        let recall = |found: usize, settings: usize| match targets {
+            0 => 0.0,
+            _ => found as f64 / (targets * settings) as f64,
+        };
+        let recall = Recall {
+            vsd: recall(found[0], VSD_TOLERANCES.len() * THRESHOLDS.len()),
+            mssd: recall(found[1], THRESHOLDS.len()),
+            mspd: recall(found[2], THRESHOLDS.len()),
+        };
+        let (ar_vsd, ar_mssd, ar_mspd) = (recall.vsd, recall.mssd, recall.mspd);
+        Self { targets, estimates, ar_vsd, ar_mssd, ar_mspd, ar: recall.average() }
+    }
+}
+
+/// Summarizes targets; their order does not matter.
+pub fn summarize_localization(scores: &[TargetScore]) -> LocalizationSummary {
+    let mut of_object: BTreeMap<u32, Vec<&TargetScore>> = BTreeMap::new();
+    for score in scores {
+        of_object.entry(score.target.obj_id).or_default().push(score);
+    }
+    let average =
+        |(id, scores): (u32, Vec<&TargetScore>)| (id, AverageRecall::of(scores.into_iter()));
+    LocalizationSummary {
+        overall: AverageRecall::of(scores.iter()),
+        per_object: of_object.into_iter().map(average).collect(),
+    }
+}
+
+impl LocalizationSummary {
+    /// A table with a line an object and one over all; `name` gives the label of an object id.
+    pub fn table(&self, name: impl Fn(u32) -> String) -> Table {
+        let header =
+            ["average recall", "targets", "estimates", "AR_VSD", "AR_MSSD", "AR_MSPD", "AR"];
+        let mut table = Table::new(header);
+        let objects = self.per_object.iter().map(|(&id, average)| (name(id), average));
+        for (label, average) in objects.chain([("all".into(), &self.overall)]) {
+            let AverageRecall { targets, estimates, ar_vsd, ar_mssd, ar_mspd, ar } = average;
+            let recalls = [ar_vsd, ar_mssd, ar_mspd, ar].map(|recall| format!("{recall:.4}"));
+            let counts = [targets, estimates].map(usize::to_string);
+            table.push([label].into_iter().chain(counts).chain(recalls).collect());
+        }
+        table
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::matching::Found;
+    use super::super::target::LocalizationTarget;
+    use super::*;
+
+    fn score(obj_id: u32, instances: usize, estimates: usize, found: [usize; 3]) -> TargetScore {
+        let target = LocalizationTarget { scene_id: 1, im_id: 0, obj_id, instances };
+        let [vsd, mssd, mspd] = found;
+        TargetScore { target, estimates, found: Found { vsd, mssd, mspd } }
+    }
+
+    #[test]
+    fn recall_is_over_instances_and_those_without_an_estimate_are_missed() {
+        let scores =
+            [score(7, 1, 1, [100, 10, 10]), score(7, 2, 1, [50, 4, 2]), score(3, 1, 0, [0; 3])];
+        let summary = summarize_localization(&scores);
+        let all = summary.overall;
+        assert_eq!((all.targets, all.estimates), (4, 2));
+        assert_eq!((all.ar_vsd, all.ar_mssd, all.ar_mspd), (150.0 / 400.0, 14.0 / 40.0, 0.3));
+        assert!((all.ar - (0.375 + 0.35 + 0.3) / 3.0).abs() < 1e-15);
+        assert_eq!(summary.per_object[&7].ar_mssd, 14.0 / 30.0);
+        assert_eq!(summary.per_object[&3].ar, 0.0);
+        assert_eq!(summarize_localization(&[]).overall.ar, 0.0);
+
+        let text = summary.table(|id| format!("object {id}")).to_string();
+        let last: Vec<&str> = text.lines().last().unwrap().split_whitespace().collect();
+        assert_eq!(last, ["all", "4", "2", "0.3750", "0.3500", "0.3000", "0.3417"]);
+        let json = serde_json::to_value(&summary).unwrap();
+        assert_eq!(json["per_object"]["7"]["targets"], 3);
+    }
+}

@@ -1,0 +1,73 @@
+//! Evaluation models: what metrics need of an object, prepared once for many poses.
+
+use nalgebra::Isometry3;
+use prehend_geometry::TriMesh;
+use prehend_render::{Camera, DepthImage, ModelError, RenderModel, depth_map};
+
+use crate::data::AssetError;
+use crate::data::bop::{DatasetError, Models, diameter};
+use crate::error::RefineError;
+use crate::evaluate::metrics::{NormalizedErrors, ScoredModel, VSD_TOLERANCES, vsd};
+
+/// An object to score poses of.
+pub(super) struct EvaluationModel {
+    /// Its vertices and symmetries.
+    pub(super) points: ScoredModel,
+    /// Its diameter \[m\].
+    pub(super) diameter: f64,
+    drawn: RenderModel,
+}
+
+impl EvaluationModel {
+    /// The object `obj_id` of `models`, whose mesh \[m\] is `mesh`. Without an entry of `models_info.json` it has no
+    /// symmetries, and the diameter of its vertices.
+    ///
+    /// # Errors
+    /// If `models_info.json` is broken or the mesh cannot be rendered.
+    pub(super) fn new(models: &Models, obj_id: u32, mesh: TriMesh) -> Result<Self, AssetError> {
+        let (symmetries, diameter) = match models.info(obj_id) {
+            Ok(info) => (info.symmetries, info.diameter),
+            Err(DatasetError::Missing { .. } | DatasetError::UnknownObject { .. }) => {
+                (Default::default(), diameter(&mesh.vertices))
+            }
+            // Without its symmetries, a symmetric object would be scored wrongly.
+            Err(broken) => return Err(broken.into()),
+        };
+        let unusable = |e: ModelError| RefineError::Object {
+            object: format!("{obj_id}"),
+            reason: e.to_string(),
+        };
+        let drawn = RenderModel::new(&mesh).map_err(unusable)?;
+        Ok(Self { points: ScoredModel::new(mesh.vertices, symmetries), diameter, drawn })
+    }
+
+    /// The visible surface discrepancy (0..=1) for each of BOP's tolerances. `sensed` is the depth image of the scene \[m\],
+    /// of `camera`'s size.
+    pub(super) fn vsd(
+        &self,
+        estimate: &Isometry3<f64>,
+        truth: &Isometry3<f64>,
+        camera: &Camera,
+        sensed: &DepthImage,
+    ) -> [f64; VSD_TOLERANCES.len()] {
+        let draw = |pose: &Isometry3<f64>| depth_map(camera, &[(&self.drawn, *pose)]);
+        vsd(camera, sensed, &draw(estimate), &draw(truth), self.diameter)
+    }
+
+    /// The errors that BOP thresholds, `sensed` as for [`EvaluationModel::vsd`].
+    pub(super) fn errors(
+        &self,
+        estimate: &Isometry3<f64>,
+        truth: &Isometry3<f64>,
+        camera: &Camera,
+        sensed: &DepthImage,
+    ) -> NormalizedErrors {
+        NormalizedErrors::new(
+            &self.vsd(estimate, truth, camera, sensed),
+            self.points.mssd(estimate, truth),
+            self.diameter,
+            self.points.mspd(estimate, truth, camera),
+            camera.width,
+        )
+    }
+}
