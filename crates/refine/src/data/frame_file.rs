@@ -17,17 +17,20 @@ use serde::Deserialize;
 
 use crate::data::assets::FrameInput;
 use crate::data::bop::{DatasetError, Lens, Numbers, Positive, read_json, rotation_from_row_major};
+use crate::rig::Rig;
 use crate::scene::{Hand, HandMeasurement, Object, Observation, check_gravity};
 
 /// Reads the frame file `file` and everything it names: the frame, and the initial pose (object → camera \[m\]). `seed` decides
-/// where the object's surface is sampled; distance grids of the hand are kept in `cache`.
+/// where the object's surface is sampled; distance grids of the hand are kept in `cache`. With a `rig` the frame is corrected by it, and the
+/// object, too, if the file says which of the rig's it is.
 ///
 /// # Errors
-/// If the file or one that it names is missing or broken, naming the file and the field.
+/// If the file or one that it names is missing or broken, or does not fit the rig, naming the file and the field.
 pub fn load_frame_file(
     file: &Path,
     seed: u64,
     cache: Option<&GridCache>,
+    rig: Option<Arc<Rig>>,
 ) -> Result<(FrameInput, Isometry3<f64>), DatasetError> {
     let fault = |problem: &dyn Display| DatasetError::unusable(file, problem);
     let field = |name: &str, problem: &dyn Display| DatasetError::field(file, name, problem);
@@ -57,7 +60,13 @@ pub fn load_frame_file(
     let mesh = TriMesh::load(&mesh_file).map_err(|e| fault(&e))?;
     let mesh = mesh.scaled(layout.mesh_unit.meters());
     let name = mesh_file.display().to_string();
-    let object = Object::with_mass(&name, mesh, layout.mass_kg, seed).map_err(|e| fault(&e))?;
+    let mut object = Object::with_mass(&name, mesh, layout.mass_kg, seed).map_err(|e| fault(&e))?;
+    if let (Some(rig), Some(id)) = (&rig, layout.obj_id) {
+        let Some(deviation) = rig.objects.get(&id) else {
+            return Err(field("obj_id", &format!("the rig has no object {id}")));
+        };
+        object = deviation.corrected(&object).map_err(|e| fault(&e))?;
+    }
     let (mut hand, mut measured) = (None, None);
     if let Some(r) = &layout.robot {
         let tree = KinematicTree::from_urdf_file(folder.join(&r.urdf)).map_err(|e| fault(&e))?;
@@ -77,8 +86,11 @@ pub fn load_frame_file(
     }
     let gravity = layout.gravity.map(|g| Vector3::from(g.0));
     gravity.iter().try_for_each(check_gravity).map_err(|e| field("gravity", &e))?;
-    let observation = Observation { camera, color, depth, mask, gravity, hand: measured };
-    Ok((FrameInput { observation, object: Arc::new(object), hand, rig: None }, layout.pose.0))
+    let mut observation = Observation { camera, color, depth, mask, gravity, hand: measured };
+    if let Some(rig) = &rig {
+        observation = rig.corrected(&observation).map_err(|e| fault(&e))?;
+    }
+    Ok((FrameInput { observation, object: Arc::new(object), hand, rig }, layout.pose.0))
 }
 
 /// The file's layout.
@@ -99,6 +111,8 @@ struct Layout {
     mesh: PathBuf,
     mesh_unit: Unit,
     mass_kg: Option<f64>,
+    /// The object's number in a rig.
+    obj_id: Option<u32>,
     pose: Pose,
     gravity: Option<Numbers<3>>,
     robot: Option<RobotLayout>,

@@ -9,7 +9,7 @@ use prehend_render::Camera;
 
 use super::deviation::SurfaceDeviation;
 use crate::error::RefineError;
-use crate::factor::Layout;
+use crate::factor::{Layout, PriorSettings};
 use crate::problem::{Block, DepthField, State};
 use crate::scene::{CameraCalibrationError, Observation};
 
@@ -220,6 +220,37 @@ impl Rig {
         let own = object.iter().map(|sigma| sigma * sigma).chain(self.play.variances(given));
         own.enumerate().for_each(|(k, variance)| covariance[(k, k)] += variance);
         Ok(covariance)
+    }
+
+    /// `prior`, with calibrations as accurate as [`frame_covariance`](Self::frame_covariance) has them, each by itself.
+    ///
+    /// # Errors
+    /// If the frame's hand has another number of joints.
+    pub(crate) fn marginal_prior(
+        &self,
+        said: &State,
+        camera: &Camera,
+        prior: &PriorSettings,
+    ) -> Result<PriorSettings, RefineError> {
+        let object = prior.sigmas(Block::ObjectPose);
+        let variances = self.frame_covariance(said, camera, &object)?.diagonal();
+        let layout = Layout::new(said.joints.len());
+        let sigma = |from: usize, count: usize| variances.rows(from, count).mean().sqrt();
+        let (hand, camera) = (layout.offset(Block::HandPose), layout.offset(Block::Camera));
+        Ok(PriorSettings {
+            hand_translation: sigma(hand, 3),
+            hand_rotation: sigma(hand + 3, 3),
+            joints: match said.joints.len() {
+                0 => prior.joints,
+                count => sigma(layout.offset(Block::Joints(count)), count),
+            },
+            depth_scale: sigma(camera, 1),
+            depth_bias: sigma(camera + 1, 1),
+            principal_point: sigma(camera + 2, 2),
+            focal_scale: sigma(camera + 4, 1),
+            aspect: sigma(camera + 5, 1),
+            ..prior.clone()
+        })
     }
 }
 

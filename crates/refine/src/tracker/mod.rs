@@ -23,6 +23,7 @@ pub use self::tracked::{Rejection, TrackStatus, Tracked};
 use crate::error::RefineError;
 use crate::factor::GaussianPrior;
 use crate::problem::{Factor, Problem, Solution, State, Termination};
+use crate::rig::Rig;
 use crate::scene::{CameraCalibrationError, Frame, Hand, Object, Observation};
 use crate::search::PoseSearch;
 use crate::strategy::{
@@ -63,6 +64,7 @@ pub struct Tracker {
     factors: Vec<Arc<dyn Factor>>,
     /// What renders, if not the processor at hand.
     backend: Option<Arc<dyn Backend>>,
+    rig: Option<Arc<Rig>>,
     /// Where to begin; the search says where if it is not known.
     initial: Option<Isometry3<f64>>,
     track: Option<TrackState>,
@@ -104,6 +106,7 @@ impl Tracker {
             settings,
             factors: Vec::new(),
             backend: None,
+            rig: None,
             initial: None,
             track: None,
             search: None,
@@ -113,6 +116,11 @@ impl Tracker {
     /// With all frames rendered on another device: [`Frame::with_backend`].
     pub fn with_backend(self, backend: Arc<dyn Backend>) -> Self {
         Self { backend: Some(backend), ..self }
+    }
+
+    /// Of frames that are corrected by `rig` already, as the object is: calibrations are as accurate as the rig is known.
+    pub fn with_rig(self, rig: Arc<Rig>) -> Self {
+        Self { rig: Some(rig), ..self }
     }
 
     /// With a factor of one's own, in every frame.
@@ -139,12 +147,17 @@ impl Tracker {
         time: Duration,
     ) -> Result<Tracked, RefineError> {
         let mut clock = Clock::start(self.settings.budget);
-        let (object, hand) = (Arc::clone(&self.object), self.hand.clone());
+        let (object, hand, rig) = (Arc::clone(&self.object), self.hand.clone(), self.rig.clone());
         let frame = match (Frame::new(observation, &object, hand.as_ref()), &self.track) {
-            (Ok(frame), _) => match &self.backend {
-                Some(backend) => frame.with_backend(Arc::clone(backend)),
-                None => frame,
-            },
+            (Ok(mut frame), _) => {
+                if let Some(backend) = &self.backend {
+                    frame = frame.with_backend(Arc::clone(backend));
+                }
+                match &rig {
+                    Some(rig) => frame.with_rig(rig),
+                    None => frame,
+                }
+            }
             (Err(RefineError::EmptyMask), Some(track)) => {
                 return Ok(self.predict_unseen(track, observation, time));
             }
@@ -234,6 +247,10 @@ impl Tracker {
             None => self.search(frame)?,
         };
         let nominal = State::new(frame, &initial)?;
+        if let Some(rig) = frame.rig() {
+            let prior = &mut self.settings.fused.prior;
+            *prior = rig.marginal_prior(&nominal, &frame.observation().camera, prior)?;
+        }
         let (solved, posterior) = self.estimate(frame, &nominal)?;
         let (in_hand, level) = (frame.hand().is_some(), solved.cost());
         self.track = Some(self.remember(time, &solved, &nominal, in_hand, level));

@@ -146,7 +146,7 @@ fn frame_file(dir: &Path, lens: &Value) -> std::path::PathBuf {
 fn a_frame_file_behind_a_lens_is_seen_by_a_pinhole() {
     for lens in lenses() {
         let dir = dataset(&lens_of(&lens), None, None);
-        let (input, _) = load_frame_file(&frame_file(dir.path(), &lens), 1, None).unwrap();
+        let (input, _) = load_frame_file(&frame_file(dir.path(), &lens), 1, None, None).unwrap();
         let seen = input.observation;
         assert_pinhole(&seen.color, &seen.depth, &seen.mask);
     }
@@ -160,7 +160,7 @@ fn lenses_that_are_none_name_their_field() {
     let dir = dataset(&lens, Some(&wrong), None);
     let error = Dataset::open(dir.path()).unwrap().frame(1, 0).unwrap_err().to_string();
     assert!(error.ends_with(&format!("scene_camera.json: 0.cam_dist: {problem}")), "{error}");
-    let refused = load_frame_file(&frame_file(dir.path(), &wrong), 1, None).err().unwrap();
+    let refused = load_frame_file(&frame_file(dir.path(), &wrong), 1, None, None).err().unwrap();
     let error = refused.to_string();
     assert!(error.ends_with(&format!("frame.json: dist: {problem}")), "{error}");
     let few = json!({ "model": "kannala_brandt", "coefficients": [0.1] });

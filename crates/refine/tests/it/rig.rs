@@ -8,6 +8,7 @@ use prehend_refine::refine;
 use prehend_refine::rig::{CalibrationFrame, Calibrator, CalibratorSettings, Pass, Rig};
 use prehend_refine::scene::{Frame, Observation, default_sequence};
 use prehend_refine::strategy::Fused;
+use prehend_refine::tracker::{Tracker, TrackerSettings};
 
 const SHIFT_PX: f64 = 2.0;
 const DEPTH_SCALE: f64 = 1.006;
@@ -106,6 +107,29 @@ fn what_is_wrong_in_all_frames_is_found_and_corrected() {
     let (before, after) = (wrong(&told), wrong(&rig.corrected(&told).unwrap()));
     println!("joints {before} → {after} rad");
     assert!(after < 0.4 * before, "{after} of {before}");
+    // A tracker is surer, too, and no farther off.
+    let track = |object: &Arc<_>, rig: Option<&Arc<Rig>>| {
+        let (object, hand) = (Arc::clone(object), Some(Arc::clone(&sequence.hand)));
+        let mut tracker = Tracker::new(object, hand, TrackerSettings::default()).unwrap();
+        tracker.start_from(&sequence.initial);
+        if let Some(rig) = rig {
+            tracker = tracker.with_rig(Arc::clone(rig));
+        }
+        let (mut off, mut unsure) = (0.0, 0.0);
+        for frame in &sequence.frames[..6] {
+            let told = said(&frame.observation);
+            let told = rig.map_or_else(|| told.clone(), |rig| rig.corrected(&told).unwrap());
+            let tracked = tracker.track(&told, frame.time).unwrap();
+            let center = sequence.object.center;
+            off += (tracked.t_cam_object * center - frame.truth * center).norm() / 6.0;
+            unsure += tracked.posterior.unwrap().covariance().trace() / 6.0;
+        }
+        (off, unsure)
+    };
+    let (alone, unsure) = track(&sequence.object, None);
+    let (with, sure) = track(&object, Some(&Arc::new(rig)));
+    println!("tracked {alone} ± {unsure} → {with} ± {sure}");
+    assert!(sure < 0.99 * unsure && with < 1.1 * alone, "{alone} ± {unsure} → {with} ± {sure}");
 }
 
 #[test]

@@ -14,6 +14,7 @@ use prehend_refine::RefineError;
 use prehend_refine::data::bop::{Dataset, ResultRow, check_writable};
 use prehend_refine::data::{AssetError, Assets, FrameInput, PlainPose, Target};
 use prehend_refine::scene::{Hand, Object};
+use prehend_refine::rig::Rig;
 use prehend_refine::strategy::Posterior;
 use prehend_refine::tracker::{Recovery, TrackStatus, Tracked, Tracker, TrackerSettings};
 use serde_json::json;
@@ -45,6 +46,9 @@ pub(crate) struct Track {
     /// [default: that file of the dataset, or the only object in every image]
     #[arg(long, value_name = "FILE", requires = "search")]
     targets: Option<PathBuf>,
+    /// The rig that recorded the frames, as `prehend calibrate` has found it: frames and the model are corrected by it
+    #[arg(long, value_name = "FILE")]
+    rig: Option<PathBuf>,
     /// Images a second: those of a scene, in order of their ids, are the frames; ids that are missing count
     #[arg(long, value_name = "HZ", default_value_t = 30.0)]
     rate: f64,
@@ -99,12 +103,17 @@ impl Track {
         let backend = self.rendering.open()?;
         let dataset = self.selection.open()?;
         let (starts, mut failures) = self.starts(&dataset)?;
-        let mut assets = Assets::new(&dataset, 0).with_cache(cache());
+        let rig = self.rig.as_deref().map(Rig::load).transpose()?.map(Arc::new);
+        let mut assets = Assets::new(&dataset, 0).with_cache(cache()).with_rig(rig.clone());
         let mut frames = Vec::new();
         for start in &starts {
             let begin = |object, hand| {
                 let tracker = Tracker::new(object, hand, settings.clone())?;
-                Ok(tracker.with_backend(Arc::clone(&backend)))
+                let tracker = tracker.with_backend(Arc::clone(&backend));
+                Ok(match &rig {
+                    Some(rig) => tracker.with_rig(Arc::clone(rig)),
+                    None => tracker,
+                })
             };
             let followed = self.follow(&mut assets, start, begin, &mut frames, &mut failures);
             if let Err(error) = followed {

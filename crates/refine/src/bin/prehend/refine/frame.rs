@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use prehend_refine::data::bop::write_atomically;
 use prehend_refine::data::{PlainPose, load_frame_file};
+use prehend_refine::rig::Rig;
 use prehend_refine::strategy::{PosteriorSummary, Strategy};
 use prehend_refine::{Method, State};
 use prehend_render::Backend;
@@ -21,8 +22,10 @@ pub(super) fn refine_frame(
     output: &OutputOptions,
     method: &MethodOptions,
     backend: Arc<dyn Backend>,
+    rig: Option<&Path>,
 ) -> anyhow::Result<ExitCode> {
-    let (input, t_cam_object) = load_frame_file(file, method.seed, cache().as_ref())?;
+    let rig = rig.map(Rig::load).transpose()?.map(Arc::new);
+    let (input, t_cam_object) = load_frame_file(file, method.seed, cache().as_ref(), rig)?;
     let mut configured = method.configured()?;
     let mut terms = Vec::new();
     if let Method::Heuristic(heuristic) = &mut configured {

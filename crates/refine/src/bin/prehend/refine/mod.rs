@@ -32,8 +32,8 @@ pub(crate) struct Refine {
     /// Instead of a dataset, one frame described by a JSON file (see docs/FRAME.md)
     #[arg(long, value_name = "FILE", conflicts_with_all = ["Selection", "poses", "report"])]
     frame: Option<PathBuf>,
-    /// The rig that the dataset was recorded with, as `prehend calibrate` has found it: frames and models are corrected by it
-    #[arg(long, value_name = "FILE", conflicts_with = "frame")]
+    /// The rig that recorded the frames, as `prehend calibrate` has found it: frames and models are corrected by it
+    #[arg(long, value_name = "FILE")]
     rig: Option<PathBuf>,
     #[command(flatten)]
     output: OutputOptions,
@@ -53,7 +53,7 @@ impl Refine {
         limit_threads(method.threads)?;
         let backend = rendering.open()?;
         match (frame, selection, poses, &output.out) {
-            (Some(file), ..) => refine_frame(file, output, method, backend),
+            (Some(file), ..) => refine_frame(file, output, method, backend, rig.as_deref()),
             (None, Some(selection), Some(poses), Some(out)) => {
                 let configured = method.configured()?;
                 let options = method;
