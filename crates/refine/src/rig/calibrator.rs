@@ -77,6 +77,10 @@ pub struct CalibrationFrame {
 pub struct Visit {
     obj_id: u32,
     information: FrameInformation,
+    disagreement: f64,
+    /// By how many times more than is usual the frame disagrees with the rig, if that is so much that it is left out: its pose is wrong, or the
+    /// rig was another then.
+    pub left_out: Option<f64>,
     /// Object → camera \[m\].
     pub t_cam_object: Isometry3<f64>,
 }
@@ -94,7 +98,12 @@ pub struct Calibrator {
     prior: DVector<f64>,
     /// Models as they were given, and as they are corrected.
     models: BTreeMap<u32, Model>,
+    /// How much frames disagree with the rig, half of them less; unknown as long as it is nominal.
+    usual_disagreement: Option<f64>,
 }
+
+/// A frame that disagrees so many times more than is usual is left out.
+const LEFT_OUT: f64 = 3.5;
 
 struct Model {
     given: Arc<Object>,
@@ -108,12 +117,19 @@ pub struct Pass {
     sums: BTreeMap<u32, (DMatrix<f64>, DVector<f64>)>,
     /// By frame, with its object's number.
     play: Vec<(u32, FramePlay)>,
+    /// By frame, those left out among them.
+    disagreements: Vec<f64>,
 }
 
 impl Pass {
-    /// Adds what a frame has said.
+    /// Adds what a frame has said, unless it is left out.
     pub fn add(&mut self, visit: Visit) {
-        let Visit { obj_id, information: FrameInformation { hessian, gradient, play }, .. } = visit;
+        let Visit { obj_id, information, disagreement, left_out, .. } = visit;
+        self.disagreements.push(disagreement);
+        if left_out.is_some() {
+            return;
+        }
+        let FrameInformation { hessian, gradient, play } = information;
         match self.sums.entry(obj_id) {
             Entry::Vacant(none) => drop(none.insert((hessian, gradient))),
             Entry::Occupied(mut sum) => {
@@ -153,7 +169,7 @@ impl Calibrator {
             models.insert(id, Model { corrected: Arc::clone(&given), given });
         }
         let prior = sigmas.map(|sigma| sigma.powi(-2));
-        Ok(Self { settings, rig, prior, models })
+        Ok(Self { settings, rig, prior, models, usual_disagreement: None })
     }
 
     /// The rig as it is known so far.
@@ -192,7 +208,10 @@ impl Calibrator {
             let problem = "a rig needs all of them estimated, in at least one stage".into();
             return Err(RefineError::Setting { name: "nuisances", problem });
         };
-        Ok(Visit { obj_id: *obj_id, information, t_cam_object })
+        let disagreement = information.disagreement(&self.prior).ok_or_else(not_finite)?;
+        let times = self.usual_disagreement.map(|usual| disagreement / usual);
+        let left_out = times.filter(|times| *times > LEFT_OUT);
+        Ok(Visit { obj_id: *obj_id, information, disagreement, left_out, t_cam_object })
     }
 
     /// Solves for the rig by what the frames of a pass have said. Returns by how many of its deviations the parameter that has changed
@@ -200,8 +219,12 @@ impl Calibrator {
     ///
     /// # Errors
     /// If a corrected model cannot be used, or what was said is not finite.
-    pub fn solve(&mut self, pass: Pass) -> Result<f64, RefineError> {
+    pub fn solve(&mut self, mut pass: Pass) -> Result<f64, RefineError> {
         let n = self.rig.len();
+        // What frames say of a rig that nothing is known of is no disagreement yet.
+        pass.disagreements.sort_by(f64::total_cmp);
+        let middle = pass.disagreements.get(pass.disagreements.len() / 2);
+        self.usual_disagreement = middle.copied().filter(|_| self.rig.is_known(&self.prior));
         let mut hessian = DMatrix::from_diagonal(&self.prior);
         let mut gradient = self.prior.component_mul(&self.rig.values());
         // Objects have to do with the rig alone: each is eliminated by itself.

@@ -97,6 +97,19 @@ impl FrameInformation {
     }
 }
 
+impl FrameInformation {
+    /// How much lower the frame's cost would be with parameters of its own, `prior` being their inverse variances about those that the rig has:
+    /// over what that would be by noise alone if the rig's were true.
+    pub(super) fn disagreement(&self, prior: &DVector<f64>) -> Option<f64> {
+        let n = prior.len();
+        let hessian = self.hessian.view((0, 0), (n, n)).into_owned();
+        let gradient = self.gradient.rows(0, n).into_owned();
+        let factor = (&hessian + DMatrix::from_diagonal(prior)).cholesky()?;
+        let degrees = factor.solve(&hessian).trace();
+        Some(gradient.dot(&factor.solve(&gradient)) / degrees).filter(|ratio| ratio.is_finite())
+    }
+}
+
 impl FramePlay {
     /// The squares that are expected of hand pose and joints if the parameters change so, and have that covariance then; of those of the object,
     /// if it has any, `object` says how they depend on the others.

@@ -71,6 +71,11 @@ impl Rig {
         }
     }
 
+    /// Whether frames have said anything of it, the inverse variances of its parameters being `prior` beforehand.
+    pub(super) fn is_known(&self, prior: &DVector<f64>) -> bool {
+        self.covariance.diagonal().iter().zip(prior).any(|(now, prior)| now * prior < 0.999)
+    }
+
     /// Number of its parameters, but for the objects'.
     pub(super) fn len(&self) -> usize {
         self.first_offset() + self.depth_offsets.len()
@@ -144,10 +149,7 @@ impl Rig {
             let problem = format!("is of images of {expected:?} pixels, not of {size:?}");
             return Err(RefineError::Setting { name: "rig", problem });
         }
-        camera.cx += error.principal_point.x * camera.fx;
-        camera.cy += error.principal_point.y * camera.fy;
-        camera.fx *= 1.0 + error.focal_scale + error.aspect;
-        camera.fy *= 1.0 + error.focal_scale - error.aspect;
+        *camera = error.corrected(camera);
         for (i, z) in corrected.depth.pixels_mut().iter_mut().enumerate() {
             if *z > 0.0 {
                 let (x, y) = ((i % size[0]) as f64, (i / size[0]) as f64);

@@ -1,6 +1,7 @@
 //! How a camera differs from its calibration.
 
 use nalgebra::{Isometry3, Matrix3x6, Point3, SMatrix, Translation3, Vector2, Vector3};
+use prehend_render::Camera;
 
 /// Errors of a depth camera, as small changes that bring what it measures to where things are.
 ///
@@ -53,6 +54,17 @@ impl CameraCalibrationError {
             principal_point: self.principal_point + Vector2::new(change[2], change[3]),
             focal_scale: self.focal_scale + change[4],
             aspect: self.aspect + change[5],
+        }
+    }
+
+    /// `camera` without its error.
+    pub fn corrected(&self, camera: &Camera) -> Camera {
+        Camera {
+            cx: camera.cx + self.principal_point.x * camera.fx,
+            cy: camera.cy + self.principal_point.y * camera.fy,
+            fx: camera.fx * (1.0 + self.focal_scale + self.aspect),
+            fy: camera.fy * (1.0 + self.focal_scale - self.aspect),
+            ..*camera
         }
     }
 

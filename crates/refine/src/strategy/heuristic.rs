@@ -9,7 +9,7 @@ use strum::{Display, EnumString, IntoStaticStr, VariantNames};
 
 use super::estimate::Recorder;
 use super::step::damped_step;
-use super::{Estimate, Iteration, Observer, Strategy};
+use super::{Estimate, Fused, Iteration, Observer, Strategy};
 use crate::error::RefineError;
 use crate::factor::{
     ChamferDepthFactor, ChamferDepthSettings, RenderingFactor, RenderingSettings, StabilityFactor,
@@ -207,7 +207,11 @@ impl Strategy for Heuristic {
         let names = gradients.chain(self.factors.iter().map(|factor| factor.name()));
         let mut recorder = Recorder::new(names, initial, self.iterations, judge, observe);
         self.walk(&factors, initial.clone(), frame.object().radius, &mut recorder);
-        Ok(recorder.estimate(None))
+        let mut estimate = recorder.estimate(None);
+        // Of all evidence that there is. A frame that lacks what the fused estimator needs has none.
+        let posterior = Fused::default().posterior_at(frame, initial, &estimate.state);
+        estimate.posterior = posterior.ok().flatten();
+        Ok(estimate)
     }
 
     fn iterations(&self) -> usize {

@@ -11,8 +11,8 @@ mod trace;
 pub use estimate::{Estimate, Observer, Progress, Strategy};
 pub(crate) use fused::Evidence;
 pub use fused::{
-    CovarianceInflation, Fused, FusedSettings, Hypothesis, Inconsistency, Modality, Nuisance,
-    Posterior, PosteriorSummary, Stage, UnobservableDirection,
+    CovarianceInflation, Fit, FitReference, FitStatistics, Fused, FusedSettings, Hypothesis,
+    Inconsistency, Modality, Nuisance, Posterior, PosteriorSummary, Stage, UnobservableDirection,
 };
 pub(crate) use fused::{chi_square_z, problem_of, surface_patches};
 pub use heuristic::{GradientKind, Heuristic};

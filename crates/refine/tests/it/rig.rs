@@ -36,14 +36,22 @@ fn what_is_wrong_in_all_frames_is_found_and_corrected() {
     let size = (640, 480);
     let mut calibrator = Calibrator::new(16, size, objects, CalibratorSettings::default()).unwrap();
     let mut poses: Vec<_> = frames.iter().map(|frame| frame.truth).collect();
-    for _ in 0..3 {
+    // The hand was elsewhere in one frame.
+    let bumped = 4;
+    for pass in 0..6 {
+        let last = pass == 5;
         let mut pass = Pass::default();
-        for (frame, pose) in frames.iter().zip(&mut poses) {
+        for (index, (frame, pose)) in frames.iter().zip(&mut poses).enumerate() {
             let hand = Arc::clone(&sequence.hand);
-            let observation = said(&frame.observation);
+            let mut observation = said(&frame.observation);
+            if index == bumped {
+                let hand = observation.hand.as_mut().unwrap();
+                hand.t_cam_hand.translation.vector += Vector3::new(0.02, -0.01, 0.01);
+            }
             let frame = CalibrationFrame { observation, obj_id: 7, hand, initial: *pose };
             let visit = calibrator.visit(&frame).unwrap();
             *pose = visit.t_cam_object;
+            assert!(!last || visit.left_out.is_some() == (index == bumped), "frame {index}");
             pass.add(visit);
         }
         calibrator.solve(pass).unwrap();

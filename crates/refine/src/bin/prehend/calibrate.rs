@@ -14,7 +14,7 @@ use prehend_refine::data::{Assets, FrameInput, Sensor, Workers};
 use prehend_refine::rig::{CalibrationFrame, Calibrator, CalibratorSettings, Pass, Visit};
 
 use crate::options::{Input, Job, limit_threads};
-use crate::terminal::{cache, exit_code, progress, say};
+use crate::terminal::{cache, complain, exit_code, progress, say};
 
 #[derive(Args)]
 pub(crate) struct Calibrate {
@@ -62,12 +62,14 @@ impl Calibrate {
         let bar = progress(passes * jobs.len(), "calibrating");
         let indices: Vec<usize> = (0..jobs.len()).collect();
         let mut count = 0;
+        let mut left_out = Vec::new();
         for number in 0..passes {
             let mut pass = Pass::default();
             let mut found = BTreeMap::new();
             count = 0;
             let mut next = 0;
             let mut missed = Vec::new();
+            left_out.clear();
             let before = poses.clone();
             Workers::new(jobs.len(), rayon::current_num_threads())?.run(
                 &indices,
@@ -80,6 +82,13 @@ impl Calibrate {
                         match outcome {
                             Ok(visit) => {
                                 poses[next] = visit.t_cam_object;
+                                let target = jobs[next].target;
+                                left_out.extend(visit.left_out.map(|times| {
+                                    format!(
+                                        "{target}: left out, disagrees {times:.1} times more than is \
+                                         usual: its pose is wrong, or the rig was another"
+                                    )
+                                }));
                                 pass.add(visit);
                                 count += 1;
                             }
@@ -100,6 +109,7 @@ impl Calibrate {
             log::info!("pass {}: parameters changed by up to {change:.2} deviations", number + 1);
         }
         bar.finish_and_clear();
+        left_out.iter().for_each(|frame| complain(format!("warning: {frame}")));
         if count > 0 {
             let rig = calibrator.rig();
             rig.save(&self.out)?;

@@ -2,6 +2,7 @@
 
 mod calibration_test;
 mod factors;
+mod fit;
 mod hypotheses;
 mod posterior;
 mod settings;
@@ -10,9 +11,11 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use nalgebra::Translation3;
+use prehend_autodiff::optimize::LeastSquares;
 
 use self::factors::depth_noise;
 pub(crate) use self::factors::{problem_of, surface_patches};
+pub use self::fit::{Fit, FitReference, FitStatistics};
 use self::hypotheses::{distinct, restarts, settled, spread};
 pub(crate) use self::posterior::chi_square_z;
 pub use self::posterior::{
@@ -25,8 +28,8 @@ use super::{Estimate, Iteration, Observer, Strategy};
 use crate::error::RefineError;
 use crate::factor::{GaussianPrior, Layout, NoiseEstimate};
 use crate::problem::{
-    Block, DepthField, Factor, NormalEquations, Solution, Solver, State, SurfacePatches,
-    Termination,
+    Block, DepthField, Factor, Linearization, NormalEquations, Problem, Solution, Solver, State,
+    SurfacePatches, Termination,
 };
 use crate::scene::Frame;
 
@@ -90,6 +93,12 @@ impl Fused {
     }
 }
 
+/// The problem of the last stage, and where the object may be off from its model.
+struct LastProblem {
+    problem: Problem,
+    patches: Option<Arc<SurfacePatches>>,
+}
+
 /// What a frame says of its state and of the object's surface, beside what is known beforehand.
 pub(crate) struct Evidence {
     /// Where it was asked.
@@ -111,6 +120,40 @@ impl Fused {
         state: &State,
         field: &Arc<DepthField>,
     ) -> Result<Option<Evidence>, RefineError> {
+        let Some(LastProblem { problem, patches }) = self.last_problem(frame, state)? else {
+            return Ok(None);
+        };
+        let equations = problem.evidence(state, field);
+        Ok(Some(Evidence { state: state.clone(), equations, patches }))
+    }
+
+    /// The posterior about `state`, wherever that came from, of a refinement that began at `initial`: nothing is searched, and what the state
+    /// is short of the best one widens it. `None` without stages.
+    ///
+    /// # Errors
+    /// Those of a run.
+    pub(crate) fn posterior_at(
+        &self,
+        frame: &Frame<'_>,
+        initial: &State,
+        state: &State,
+    ) -> Result<Option<Posterior>, RefineError> {
+        let Some(last) = self.last_problem(frame, state)? else { return Ok(None) };
+        let at = last.problem.with_prior(Arc::new(self.prior(frame, initial)?)).linearize(state);
+        let solution = Solution { at, termination: Termination::Iterations, iterations: 0 };
+        let (radius, inflation) = (frame.object().radius, self.settings.inflation);
+        let found = [solution];
+        let mut posterior = Posterior::new(&found, inflation, radius, false, None);
+        posterior.fit = Some(self.fit(frame, initial, &found[0].at)?);
+        Ok(Some(posterior))
+    }
+
+    /// The problem of the last stage about `state`, from where noise is measured, without a prior; `None` without stages.
+    fn last_problem(
+        &self,
+        frame: &Frame<'_>,
+        state: &State,
+    ) -> Result<Option<LastProblem>, RefineError> {
         let Some(stage) = self.settings.stages.last() else { return Ok(None) };
         let mut settings = self.settings_for(frame);
         let patches = surface_patches(frame, state, stage, &settings);
@@ -120,8 +163,7 @@ impl Fused {
         }
         let own = &self.factors;
         let problem = problem_of(frame, state, stage, &settings, patches.clone(), own)?;
-        let equations = problem.evidence(state, field);
-        Ok(Some(Evidence { state: state.clone(), equations, patches }))
+        Ok(Some(LastProblem { problem, patches }))
     }
 }
 
@@ -174,13 +216,33 @@ impl Strategy for Fused {
             _ = record(&mut recorder, &found[0]);
         }
         let (radius, inflation) = (frame.object().radius, self.settings.inflation);
-        let posterior = Posterior::new(&found, inflation, radius, exact, None);
+        let mut posterior = Posterior::new(&found, inflation, radius, exact, None);
+        posterior.fit = Some(self.fit(frame, initial, &found[0].at)?);
         Ok(recorder.estimate(Some(posterior)))
     }
 
     /// Stages, and one more where calibrations turn out to be exact.
     fn iterations(&self) -> usize {
         self.settings.stages.len() + usize::from(self.settings.calibration_test)
+    }
+}
+
+impl Fused {
+    /// How well `point` explains what `frame` shows, which says `said` of calibrations.
+    fn fit(
+        &self,
+        frame: &Frame<'_>,
+        said: &State,
+        point: &Linearization,
+    ) -> Result<Fit, RefineError> {
+        let prior = &self.settings.prior;
+        let by_rig = frame.rig().map(|rig| {
+            let camera = &frame.observation().camera;
+            rig.marginal_prior(said, camera, prior)
+        });
+        let by_rig = by_rig.transpose()?;
+        let noise = depth_noise(frame, &point.state, &self.settings);
+        Ok(Fit::new(frame, said, point, by_rig.as_ref().unwrap_or(prior), noise.as_ref()))
     }
 }
 

@@ -4,6 +4,7 @@ use nalgebra::{Isometry3, Matrix6, Point3, Vector3, Vector6};
 use prehend_autodiff::lie::{perturb_about, so3_log};
 use prehend_geometry::SplitMix64;
 
+use super::fit::Fit;
 use crate::problem::{
     Block, Contribution, Linearization, NormalEquations, RIDGE, ScaledCholesky, Solution,
     Termination,
@@ -50,6 +51,8 @@ pub struct Posterior {
     pub unobservable: Vec<UnobservableDirection>,
     /// Senses that disagree with the pose.
     pub inconsistencies: Vec<Inconsistency>,
+    /// Whether the best pose fits as right ones do, where that was asked.
+    pub fit: Option<Fit>,
     /// Why the search ended.
     pub termination: Termination,
     /// Whether all calibrations were found to be exact, and believed to be so.
@@ -132,6 +135,7 @@ impl Posterior {
         Self {
             unobservable: unobservable(&hypotheses[0].covariance, radius),
             inconsistencies,
+            fit: None,
             hypotheses,
             termination: best.termination,
             exact,
@@ -150,13 +154,14 @@ impl Posterior {
         directions(&self.covariance(), radius)[0].1
     }
 
-    /// Probability that the pose is right: within 5 mm and 5° of the true one.
+    /// Probability that model, data and pose are right, the last within 5 mm and 5° of the true one.
     pub fn probability(&self) -> f64 {
-        self.probability_within(5e-3, 5f64.to_radians())
+        let fit = self.fit.as_ref().map_or(1.0, |fit| fit.probability);
+        fit * self.probability_within(5e-3, 5f64.to_radians())
     }
 
-    /// Probability that the true pose is within `distance` \[m\] and `angle` \[rad\] of the best one, all hypotheses
-    /// considered. By sampling; always the same for the same posterior.
+    /// Probability that the true pose is within `distance` \[m\] and `angle` \[rad\] of the best one, if model and data are right; all
+    /// hypotheses considered. By sampling; always the same for the same posterior.
     pub fn probability_within(&self, distance: f64, angle: f64) -> f64 {
         let place = self.hypotheses[0].t_cam_object.inverse() * Point3::from(self.center);
         let mut random = SplitMix64::new(0);

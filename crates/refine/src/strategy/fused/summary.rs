@@ -8,8 +8,12 @@ use super::Posterior;
 /// What reports and files say of a [`Posterior`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PosteriorSummary {
-    /// Probability that the pose is within 5 mm and 5° of the true one.
+    /// Probability that model, data and pose are right, the last within 5 mm and 5° of the true one.
     pub probability: f64,
+    /// Probability that model and data are right, where that was asked.
+    pub fit: Option<f64>,
+    /// What fits worse than it does for right poses, and by how many standard deviations.
+    pub misfits: Vec<(String, f64)>,
     /// Standard deviations of the place of the object's center in the camera frame \[mm\].
     pub deviation_mm: [f64; 3],
     /// Standard deviations of the rotation about the axes of the camera frame \[°\].
@@ -32,8 +36,12 @@ impl From<&Posterior> for PosteriorSummary {
         let deviation =
             |first: usize| Vector3::from_fn(|k, _| covariance[(first + k, first + k)].sqrt());
         let inconsistencies = posterior.inconsistencies.iter();
+        let fit = posterior.fit.as_ref();
+        let misfits = fit.iter().flat_map(|fit| &fit.misfits);
         Self {
             probability: posterior.probability(),
+            fit: fit.map(|fit| fit.probability),
+            misfits: misfits.map(|(what, z)| ((*what).to_owned(), *z)).collect(),
             deviation_mm: (deviation(0) * 1e3).into(),
             deviation_deg: deviation(3).map(f64::to_degrees).into(),
             unobserved_mm: posterior.unobservable.iter().map(|u| u.deviation * 1e3).collect(),

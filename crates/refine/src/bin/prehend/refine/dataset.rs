@@ -104,8 +104,8 @@ impl DatasetRun<'_> {
         let seconds = |index: usize| times.of(index, name);
         let row = |(&index, refined): (&usize, &Refined)| ResultRow {
             t_cam_model: (&refined.pose).into(),
-            // BOP leaves open what a score is; here it is the probability of being right.
-            score: refined.confidence.as_ref().map_or(jobs[index].row.score, |c| c.probability),
+            // BOP leaves open what a score is; here it is the probability of being right, where the method knows it.
+            score: refined.confidence.as_ref().map_or(-1.0, |c| c.probability),
             time: seconds(index).filter(|_| self.output.time).unwrap_or(-1.0),
             ..jobs[index].row.clone()
         };

@@ -1,0 +1,173 @@
+//! In how many ways a pose fits what was observed, and how well in each.
+
+use std::collections::BTreeMap;
+
+use super::pixels::Pixels;
+use crate::factor::{NoiseEstimate, PriorSettings};
+use crate::problem::{Block, Linearization, State};
+use crate::scene::Frame;
+
+/// What is most likely wrong where something does not fit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Suspect {
+    /// The surface lies elsewhere than depth was measured.
+    Depth,
+    DepthScale,
+    Hand,
+    Touch,
+    Color,
+    Mask,
+}
+
+/// A way in which a pose may not fit.
+pub(super) struct Statistic {
+    pub(super) name: &'static str,
+    /// What does not matter: about so much is added before logarithms are taken.
+    negligible: f64,
+    pub(super) suspect: Suspect,
+}
+
+const fn statistic(name: &'static str, negligible: f64, suspect: Suspect) -> Statistic {
+    Statistic { name, negligible, suspect }
+}
+
+/// Their number.
+pub(super) const COUNT: usize = 17;
+
+/// All of them, in the order of [`FitStatistics`].
+pub(super) const STATISTICS: [Statistic; COUNT] = [
+    // Medians and root mean squares, over the noise of single pixels.
+    statistic("depth residual", 0.2, Suspect::Depth),
+    statistic("depth offset", 0.3, Suspect::Depth),
+    statistic("depth residual of patches", 0.2, Suspect::Depth),
+    statistic("hand depth offset", 0.1, Suspect::DepthScale),
+    statistic("hand depth residual", 0.2, Suspect::Hand),
+    // Standard deviation [m].
+    statistic("correlated depth noise", 2e-4, Suspect::Depth),
+    // Standard deviations.
+    statistic("depth bias", 0.5, Suspect::DepthScale),
+    statistic("depth scale", 1.0, Suspect::DepthScale),
+    statistic("focal length", 0.5, Suspect::DepthScale),
+    statistic("hand position", 1.0, Suspect::Hand),
+    statistic("joint position", 1.0, Suspect::Hand),
+    // Costs [nat].
+    statistic("prior", 2.0, Suspect::Hand),
+    statistic("tactile", 1.0, Suspect::Touch),
+    statistic("penetration", 0.5, Suspect::Touch),
+    statistic("rendering", 5.0, Suspect::Color),
+    // Shares of the object's pixels.
+    statistic("mask too small", 3e-3, Suspect::Mask),
+    statistic("mask too large", 3e-3, Suspect::Mask),
+];
+
+impl Statistic {
+    /// Whether it speaks against a pose: a mask may be wrong, and a pose still right.
+    pub(super) fn counts(&self) -> bool {
+        self.suspect != Suspect::Mask
+    }
+}
+
+/// How well a pose fits in each of the ways, as logarithms; `None` where there is no such evidence.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FitStatistics(pub(super) [Option<f64>; COUNT]);
+
+/// Fewest pixels that say something.
+const FEWEST: usize = 30;
+
+/// Added to the noise of single pixels that residuals are compared with \[m\].
+const FINEST: f64 = 2e-4;
+
+/// That noise where it cannot be measured \[m\].
+const TYPICAL: f64 = 7e-4;
+
+/// Width of patches of depth \[px\], and how many of its pixels a patch must have.
+const PATCH: usize = 12;
+const FULL: usize = 70;
+
+/// How far a pixel of a patch counts at most \[m\].
+const FAR: f64 = 15e-3;
+
+impl FitStatistics {
+    /// Of `point`, in a frame that says `said` of calibrations, as accurate as `prior` has it; `noise` is that of depth.
+    pub(super) fn new(
+        frame: &Frame<'_>,
+        said: &State,
+        point: &Linearization,
+        prior: &PriorSettings,
+        noise: Option<&NoiseEstimate>,
+    ) -> Self {
+        let mut found = BTreeMap::new();
+        let pixels = Pixels::new(frame, &point.state);
+        // Where noise cannot be measured, depth is not where the object is: that must show.
+        let unit = noise.map_or(TYPICAL, |noise| noise.independent) + FINEST;
+        let on_object = pixels.on_object(FEWEST);
+        if on_object.len() >= FEWEST {
+            let [size, offset] = medians(&on_object);
+            found.extend([("depth residual", size / unit), ("depth offset", offset / unit)]);
+            let of_patches = of_patches(&on_object).map(|rms| rms / unit);
+            found.extend(of_patches.map(|rms| ("depth residual of patches", rms)));
+        }
+        let on_hand = pixels.on_hand();
+        if on_hand.len() >= FEWEST {
+            let [size, offset] = medians(&on_hand);
+            found.insert("hand depth residual", size / unit);
+            found.insert("hand depth offset", offset / unit);
+        }
+        found.extend(noise.map(|noise| ("correlated depth noise", noise.correlated)));
+        let [lacks, exceeds] = pixels.mask_misfit();
+        found.extend([("mask too small", lacks), ("mask too large", exceeds)]);
+        found.extend(of_calibrations(said, &point.state, prior));
+        found.extend(point.prior.as_ref().map(|prior| ("prior", prior.cost)));
+        found.extend(point.factors.iter().map(|factor| (factor.name, factor.cost)));
+        Self(STATISTICS.each_ref().map(|Statistic { name, negligible, .. }| {
+            let value = found.get(name).filter(|value| value.is_finite());
+            value.map(|value| (value.max(0.0) + negligible).ln())
+        }))
+    }
+}
+
+/// By how many of their standard deviations the calibrations of `state` differ from those `said`.
+fn of_calibrations(
+    said: &State,
+    state: &State,
+    prior: &PriorSettings,
+) -> impl Iterator<Item = (&'static str, f64)> + use<> {
+    let mut found = Vec::new();
+    let [scale, bias, _, _, focal, _] = state.camera.parameters();
+    found.push(("depth scale", scale.abs() / prior.depth_scale));
+    found.push(("depth bias", bias.abs() / prior.depth_bias));
+    found.push(("focal length", focal.abs() / prior.focal_scale));
+    if !said.joints.is_empty() {
+        let motion = state.t_cam_hand * said.t_cam_hand.inverse();
+        let off = motion * nalgebra::Point3::from(said.center()) - said.center();
+        found.push(("hand position", off.coords.norm() / prior.hand_translation));
+        let sigmas = prior.sigmas(Block::Joints(said.joints.len()));
+        let off = state.joints.iter().zip(&said.joints).zip(sigmas);
+        let off = off.map(|((is, said), sigma)| (is - said).abs() / sigma);
+        found.push(("joint position", off.fold(0.0, f64::max)));
+    }
+    found.into_iter()
+}
+
+/// Root mean square of the mean residuals of patches; `None` if no patch is full.
+fn of_patches(residuals: &[([usize; 2], f64)]) -> Option<f64> {
+    let mut patches: BTreeMap<[usize; 2], (f64, usize)> = BTreeMap::new();
+    for (place, residual) in residuals {
+        let (sum, count) = patches.entry(place.map(|at| at / PATCH)).or_default();
+        *sum += residual.clamp(-FAR, FAR);
+        *count += 1;
+    }
+    let full = patches.values().filter(|(_, count)| *count > FULL);
+    let squares: Vec<f64> = full.map(|(sum, count)| (sum / *count as f64).powi(2)).collect();
+    (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
+}
+
+/// Medians of the sizes of residuals, and the size of their median.
+fn medians(residuals: &[([usize; 2], f64)]) -> [f64; 2] {
+    let median = |of: fn(f64) -> f64| {
+        let mut values: Vec<f64> = residuals.iter().map(|(_, r)| of(*r)).collect();
+        let middle = values.len() / 2;
+        *values.select_nth_unstable_by(middle, f64::total_cmp).1
+    };
+    [median(f64::abs), median(|r| r).abs()]
+}
