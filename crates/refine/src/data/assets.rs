@@ -14,7 +14,9 @@ use crate::data::targets::Target;
 use crate::error::RefineError;
 use crate::method::Method;
 use crate::rig::Rig;
-use crate::scene::{self, Hand, HandMeasurement, Inertial, Object, Observation, check_gravity};
+use crate::scene::{
+    self, Hand, HandMeasurement, Inertial, Object, Observation, StatedSize, Warning, check_gravity,
+};
 use crate::strategy::GradientKind;
 
 /// BOP models are in millimeters \[m\].
@@ -93,8 +95,9 @@ impl FrameInput {
         })
     }
 
-    /// Warnings about the object, then about its pose `t_cam_object`: units, frames, and what was assumed.
-    pub fn warnings(&self, t_cam_object: &Isometry3<f64>) -> [Vec<String>; 2] {
+    /// What looks wrong with the object's model, then with the frame and the object's pose in it, `t_cam_object`: units, frames,
+    /// sensors, and what was assumed.
+    pub fn warnings(&self, t_cam_object: &Isometry3<f64>) -> [Vec<Warning>; 2] {
         let Self { observation, object, hand, .. } = self;
         [
             scene::inspect_object(object),
@@ -271,18 +274,22 @@ fn present<T>(read: Result<T, DatasetError>, required: bool) -> Result<Option<T>
 fn load_object(models: &Models, id: u32, seed: u64) -> Result<Object, AssetError> {
     let mesh = load_mesh(models, id)?;
     let name = models.mesh_path(id)?.display().to_string();
-    let (mass, place) = match models.info(id) {
-        Ok(info) => (info.mass, info.center_of_mass.zip(info.inertia)),
+    let info = match models.info(id) {
+        Ok(info) => Some(info),
         // BOP does not require the list of an estimator's models.
-        Err(DatasetError::Missing { .. } | DatasetError::UnknownObject { .. }) => (None, None),
+        Err(DatasetError::Missing { .. } | DatasetError::UnknownObject { .. }) => None,
         Err(broken) => return Err(broken.into()),
     };
-    Ok(match mass.zip(place) {
+    let mass = info.as_ref().and_then(|info| info.mass);
+    let place = info.as_ref().and_then(|info| info.center_of_mass.zip(info.inertia));
+    let object = match mass.zip(place) {
         Some((mass, (center_of_mass, inertia))) => {
             Object::new(&name, mesh, Some(Inertial { mass, center_of_mass, inertia }), seed)?
         }
         None => Object::with_mass(&name, mesh, mass, seed)?,
-    })
+    };
+    let stated_size = info.map(|info| StatedSize { diameter: info.diameter, bounds: info.bounds });
+    Ok(Object { stated_size, ..object })
 }
 
 /// The surface of object `id` of `models`, in meters.

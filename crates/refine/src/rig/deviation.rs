@@ -118,6 +118,7 @@ impl SurfaceDeviation {
         Ok(Object {
             inertial_assumed: object.inertial_assumed,
             surface_sigma: Some(self.left),
+            stated_size: object.stated_size.clone(),
             ..corrected
         })
     }

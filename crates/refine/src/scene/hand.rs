@@ -139,7 +139,7 @@ mod tests {
         let posed = scene.hand.posed(&Isometry3::identity(), &[0.0; 17]);
         assert!(matches!(posed, Err(RobotError::JointCount { given: 17, expected: 16 })));
         let warnings = inspect_pose(&observation, &scene.object, Some(&scene.hand), &scene.initial);
-        assert!(warnings.iter().any(|w| w.contains("15 joint positions")), "{warnings:?}");
+        assert!(warnings.iter().any(|w| w.finding.contains("15 joint positions")), "{warnings:?}");
     }
 
     #[test]

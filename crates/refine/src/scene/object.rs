@@ -28,6 +28,15 @@ pub struct Inertial {
     pub inertia: Matrix3<f64>,
 }
 
+/// How large whoever made a model says that it is, in object coordinates.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StatedSize {
+    /// Largest distance between two vertices \[m\].
+    pub diameter: f64,
+    /// Lowest and highest coordinates of vertices \[m\], where they are stated.
+    pub bounds: Option<(Point3<f64>, Point3<f64>)>,
+}
+
 /// Normals are smoothed over edges of faces up to this long \[m\].
 const SMOOTHED: f64 = 10e-3;
 
@@ -43,6 +52,8 @@ pub struct Object {
     pub inertial: Inertial,
     /// Whether `inertial` was assumed (uniform 500 kg/m³) rather than given.
     pub inertial_assumed: bool,
+    /// How large the mesh should be, where that is stated; it is checked and has no other effect.
+    pub stated_size: Option<StatedSize>,
     /// Center of the bounding box, in object coordinates \[m\].
     pub center: Point3<f64>,
     /// Half the diagonal of the bounding box \[m\]: turns radians into meters of surface motion.
@@ -139,6 +150,7 @@ impl Object {
             center: nalgebra::center(&low, &high),
             radius: 0.5 * (high - low).norm(),
             surface_sigma: None,
+            stated_size: None,
             seed,
             area: solid.area(),
             mesh,

@@ -142,6 +142,47 @@ fn check_draws_every_pose_and_warns() {
     assert!(place.read("look/index.html").contains("check depth_scale and units"));
 }
 
+/// A fault in the files of one image is named for that image, and for no other.
+#[test]
+fn check_names_what_is_wrong_with_hand_forces_and_models() {
+    let place = Workplace::new();
+    let scene = "ds/test/000001";
+    let check = || {
+        let said = place.prehend("check --dataset ds --poses ds/init.csv --report look");
+        assert_eq!(said.code, 0, "{}", said.err);
+        said.err
+    };
+    let edited = |file: &str, edit: &dyn Fn(&mut Value)| {
+        let before = place.read(file);
+        place.edit_json(file, edit);
+        let told = check();
+        place.write(file, &before);
+        told
+    };
+    let bodies = format!("{scene}/scene_bodies.json");
+    let told = edited(&bodies, &|all| {
+        let joints = all["0"]["bodies"][0]["joints"].as_object_mut().unwrap();
+        joints.values_mut().for_each(|q| *q = json!(q.as_f64().unwrap().to_degrees()));
+    });
+    assert!(told.contains("image 0 object 5: joint ") && told.contains("in degrees?"), "{told}");
+    assert_eq!(told.lines().count(), 1, "{told}");
+    let told = edited(&bodies, &|all| all["1"]["bodies"][0]["cam_t_b2c"][0] = json!(80));
+    assert!(told.contains("image 1 object 5: where the hand should be seen"), "{told}");
+    assert_eq!(told.lines().count(), 1, "{told}");
+    let told = edited(&format!("{scene}/scene_tactile.json"), &|all| {
+        let forces = all["1"]["force"].as_array_mut().unwrap();
+        let numbers = forces.iter_mut().flat_map(|force| force.as_array_mut().unwrap());
+        numbers.for_each(|f| *f = json!(1e3 * f.as_f64().unwrap()));
+    });
+    assert!(told.contains("image 1 object 5: the largest taxel force is "), "{told}");
+    assert_eq!(told.lines().count(), 1, "{told}");
+    let told = edited("ds/models/models_info.json", &|all| {
+        all["5"]["diameter"] = json!(0.9 * all["5"]["diameter"].as_f64().unwrap());
+    });
+    assert_eq!(told.matches("1.1111 times").count(), 2, "{told}");
+    assert_eq!(check(), "");
+}
+
 #[test]
 fn a_plain_bop_dataset_can_be_checked_and_refined() {
     let place = Workplace::new();
@@ -242,6 +283,12 @@ fn a_frame_file_is_as_good_as_a_dataset() {
             "forces": forces,
         },
     });
+    place.write("ds/frame.json", &frame.to_string());
+    let told = place.succeed("check --frame ds/frame.json --report look");
+    assert!(told.contains("1 picture; open look/index.html"), "{told}");
+    place.replace("ds/frame.json", "\"depth_unit_m\":0.0001", "\"depth_unit_m\":0.001");
+    let said = place.prehend("check --frame ds/frame.json --report look");
+    assert!(said.err.starts_with("warning: sensor depth is 10."), "{}", said.err);
     place.write("ds/frame.json", &frame.to_string());
     let printed = place.succeed("refine --frame ds/frame.json --method combined --iterations 10");
     let told: Value = serde_json::from_str(&printed).unwrap();

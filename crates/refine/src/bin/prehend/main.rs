@@ -67,7 +67,11 @@ enum Command {
     Study(Box<study::Study>),
     /// Learn a rig from its own frames: what is wrong with camera, hand and models in the same way in all of them
     Calibrate(Box<calibrate::Calibrate>),
-    /// Draw poses over their images, and warn about units and frames of the object, before refining anything
+    /// Draw poses over their images, and say what looks wrong with object, hand and sensors, before refining anything
+    ///
+    /// Each warning has a figure and a likely cause. Judged are the mesh (its unit, and its size against models_info.json), the pose,
+    /// the mask (against the object's outline, the hand and depth), depth (on the object and on the hand), the hand (its joints
+    /// against their limits, and its pose), and forces (their size and sign, and whether the object is where they are felt).
     Check(check::Check),
     /// Find the symmetries of models, and write them into models_info.json
     ///

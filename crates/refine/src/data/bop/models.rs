@@ -23,6 +23,8 @@ pub struct Models {
 pub struct ModelInfo {
     /// Largest distance between two vertices \[m\].
     pub diameter: f64,
+    /// Lowest and highest coordinates of vertices \[m\] (of `min_x`, …, `size_z`), if known.
+    pub bounds: Option<(Point3<f64>, Point3<f64>)>,
     /// Motions that map the object onto itself.
     pub symmetries: Symmetries,
     /// Mass \[kg\] (`mass_kg`, not part of BOP), if known.
@@ -84,6 +86,12 @@ impl Models {
 #[derive(Deserialize)]
 struct InfoEntry {
     diameter: Positive,
+    min_x: Option<f64>,
+    min_y: Option<f64>,
+    min_z: Option<f64>,
+    size_x: Option<f64>,
+    size_y: Option<f64>,
+    size_z: Option<f64>,
     mass_kg: Option<Positive>,
     com_mm: Option<Numbers<3>>,
     inertia_kg_m2: Option<Inertia>,
@@ -99,9 +107,14 @@ impl From<InfoEntry> for ModelInfo {
             axis: entry.axis.0,
             point: entry.offset.map_or_else(Point3::origin, point),
         };
+        let coordinates = |[x, y, z]: [Option<f64>; 3]| Some(Vector3::new(x?, y?, z?) / 1000.0);
+        let low = coordinates([entry.min_x, entry.min_y, entry.min_z]).map(Point3::from);
+        let size = coordinates([entry.size_x, entry.size_y, entry.size_z]);
+        let bounds = low.zip(size).map(|(low, size)| (low, low + size));
         let continuous = entry.symmetries_continuous.into_iter().flatten().map(axis);
         Self {
             diameter: entry.diameter.0 / 1000.0,
+            bounds,
             symmetries: Symmetries {
                 discrete: discrete.collect(),
                 continuous: continuous.collect(),
@@ -182,7 +195,8 @@ mod tests {
     #[test]
     fn reads_units_symmetries_and_optional_fields() {
         let (_dir, models) = models(
-            r#"{"12": {"diameter": 120.5, "mass_kg": 0.5, "com_mm": [1, 2, 3],
+            r#"{"12": {"diameter": 120.5, "min_x": -10, "min_y": -20, "min_z": -30, "size_x": 40,
+                "size_y": 50, "size_z": 60, "mass_kg": 0.5, "com_mm": [1, 2, 3],
                 "inertia_kg_m2": [[2e-3, 1e-5, 0], [1e-5, 3e-3, 0], [0, 0, 4e-3]],
                 "symmetries_discrete": [[-1, 0, 0, 7, 0, -1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]],
                 "symmetries_continuous": [{"axis": [0, 0, 2], "offset": [5, 0, 0]}]},
@@ -190,6 +204,9 @@ mod tests {
         );
         let info = models.info(12).unwrap();
         assert!((info.diameter - 0.1205).abs() < 1e-16);
+        let (low, high) = info.bounds.unwrap();
+        assert_eq!(low, Point3::new(-0.01, -0.02, -0.03));
+        assert!((high - Point3::new(0.03, 0.03, 0.03)).amax() < 1e-16);
         assert_eq!(
             (info.mass, info.center_of_mass),
             (Some(0.5), Some(Point3::new(0.001, 0.002, 0.003)))
@@ -199,6 +216,7 @@ mod tests {
         assert_eq!(info.symmetries.continuous[0].axis.into_inner(), Vector3::z());
         assert_eq!(info.symmetries.continuous[0].point, Point3::new(0.005, 0.0, 0.0));
         let plain = models.info(3).unwrap();
+        assert_eq!(plain.bounds, None);
         assert_eq!((plain.mass, plain.center_of_mass, plain.inertia), (None, None, None));
         assert_eq!(plain.symmetries, Symmetries::default());
         assert_eq!(models.object_ids().unwrap(), [12]);

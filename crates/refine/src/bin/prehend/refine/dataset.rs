@@ -14,6 +14,7 @@ use prehend_refine::data::{
 };
 use prehend_refine::evaluate::report::{FrameReport, Report};
 use prehend_refine::rig::Rig;
+use prehend_refine::scene::Warning;
 use prehend_refine::strategy::{PosteriorSummary, Trace};
 use prehend_refine::{Method, refine};
 use prehend_render::Backend;
@@ -166,7 +167,9 @@ impl DatasetRun<'_> {
         let frame = input.frame()?.with_backend(Arc::clone(&self.backend));
         let found = refine(&frame, initial, &self.method)?;
         let seconds = start.elapsed().as_secs_f64();
-        let [object_warnings, warnings] = input.warnings(initial);
+        let [object_warnings, warnings] = input
+            .warnings(initial)
+            .map(|warnings| warnings.iter().map(Warning::to_string).collect());
         let refined = Refined {
             pose: PlainPose::from(found.t_cam_object()),
             iteration: found.iteration,

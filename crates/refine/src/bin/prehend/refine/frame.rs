@@ -8,6 +8,7 @@ use std::sync::Arc;
 use prehend_refine::data::bop::write_atomically;
 use prehend_refine::data::{PlainPose, load_frame_file};
 use prehend_refine::rig::Rig;
+use prehend_refine::scene::Warning;
 use prehend_refine::strategy::{PosteriorSummary, Strategy};
 use prehend_refine::{Method, State};
 use prehend_render::Backend;
@@ -36,6 +37,7 @@ pub(super) fn refine_frame(
         terms = heuristic.gradients.iter().map(|g| g.name()).collect();
     }
     let warnings = input.warnings(&t_cam_object).concat();
+    let warnings: Vec<String> = warnings.iter().map(Warning::to_string).collect();
     warnings.iter().for_each(|warning| complain(format!("warning: {warning}")));
     let frame = input.frame()?.with_backend(backend);
     let initial = State::new(&frame, &t_cam_object)?;

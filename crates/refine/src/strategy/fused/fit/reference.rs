@@ -58,16 +58,8 @@ impl FitReference {
 
     /// Of poses that are right, all of frames with every sensor; `None` if they are too few.
     pub fn learn(right: &[FitStatistics]) -> Option<Self> {
-        let all: Vec<[f64; COUNT]> = right
-            .iter()
-            .filter_map(|statistics| {
-                statistics
-                    .0
-                    .iter()
-                    .all(Option::is_some)
-                    .then(|| statistics.0.map(Option::unwrap_or_default))
-            })
-            .collect();
+        let whole = right.iter().filter(|statistics| statistics.0.iter().all(Option::is_some));
+        let all: Vec<[f64; COUNT]> = whole.map(|s| s.0.map(Option::unwrap_or_default)).collect();
         let count = all.len() as f64;
         if all.len() < 2 * COUNT {
             return None;

@@ -1,0 +1,118 @@
+//! The object's mesh: its unit, what the dataset says of its size, and what was assumed.
+
+use nalgebra::{Point3, Vector3};
+
+use super::warning::{Subject, Warning};
+use crate::scene::{Object, StatedSize};
+
+/// Sizes between which an object's extent is believed to be in meters \[m\].
+const PLAUSIBLE_EXTENT: std::ops::Range<f64> = 5e-3..5.0;
+
+/// What a size may differ by from what is stated, as a share of the diameter.
+const SIZE_TOLERANCE: f64 = 0.02;
+
+/// Ratios nearer than this to a power of ten are those of units.
+const UNIT_TOLERANCE: f64 = 0.1;
+
+/// What looks wrong with the model of `object`.
+pub(super) fn inspect(object: &Object) -> Vec<Warning> {
+    let mut warnings = Vec::new();
+    let stated = object.stated_size.as_ref();
+    warnings.extend(stated.and_then(|stated| size(&object.mesh.vertices, stated)));
+    if warnings.is_empty() && !is_plausible(object) {
+        let extent = 2.0 * object.radius;
+        warnings.push(
+            Warning::new(Subject::Model, extent, "m")
+                .found(format!("the mesh is {extent:.4} m across"))
+                .hint("is it in meters, or in millimeters as BOP has it?"),
+        );
+    }
+    if object.inertial_assumed {
+        let mass = object.inertial.mass;
+        let finding =
+            format!("the object's mass is unknown: {mass:.3} kg was assumed from 500 kg/m³");
+        warnings.push(Warning::new(Subject::Model, mass, "kg").found(finding));
+    }
+    if !object.report.watertight {
+        let edges = object.report.open_edges;
+        let finding =
+            format!("the mesh is not closed ({edges} open edges): what is inside it is a guess");
+        warnings.push(Warning::new(Subject::Model, edges as f64, "edges").found(finding));
+    }
+    warnings
+}
+
+/// Whether the mesh of `object` can be in meters.
+pub(super) fn is_plausible(object: &Object) -> bool {
+    PLAUSIBLE_EXTENT.contains(&(2.0 * object.radius))
+}
+
+/// How a mesh of these `vertices` \[m\] differs from what is `stated`: first in scale, then in its box, then in its origin.
+fn size(vertices: &[Point3<f64>], stated: &StatedSize) -> Option<Warning> {
+    let first = vertices.first()?;
+    let found = diameter(vertices);
+    let ratio = found / stated.diameter;
+    if (ratio - 1.0).abs() > SIZE_TOLERANCE {
+        let [found, said] = [found, stated.diameter].map(|d| d * 1e3);
+        let finding = format!(
+            "the mesh is {found:.4} mm across, {ratio:.4} times the {said:.4} mm that models_info.json says"
+        );
+        let decades = ratio.log10();
+        let is_unit = decades.round() != 0.0
+            && (ratio / 10_f64.powf(decades.round()) - 1.0).abs() < UNIT_TOLERANCE;
+        let hint = if is_unit {
+            "are both in millimeters?"
+        } else {
+            "is it the model that the file describes, at that scale?"
+        };
+        return Some(Warning::new(Subject::Model, ratio, "").found(finding).hint(hint));
+    }
+    let (said_low, said_high) = stated.bounds?;
+    let low = vertices.iter().fold(*first, |low, v| low.inf(v));
+    let high = vertices.iter().fold(*first, |high, v| high.sup(v));
+    let off = |found: Vector3<f64>, said: Vector3<f64>, what: &str, hint| {
+        let by = (found - said).amax();
+        let [found, said] = [found, said]
+            .map(|v| format!("({:.1}, {:.1}, {:.1})", v.x * 1e3, v.y * 1e3, v.z * 1e3));
+        (by > SIZE_TOLERANCE * stated.diameter).then(|| {
+            Warning::new(Subject::Model, by * 1e3, "mm")
+                .found(format!("{what} {found} mm, but {said} mm in models_info.json"))
+                .hint(hint)
+        })
+    };
+    off(
+        high - low,
+        said_high - said_low,
+        "the mesh's bounding box is",
+        "is it the model that the file describes, with the same axes?",
+    )
+    .or_else(|| {
+        off(
+            low.coords,
+            said_low.coords,
+            "the mesh's bounding box begins at",
+            "is its origin that of the dataset's poses?",
+        )
+    })
+}
+
+/// Largest distance between two of `points`, or up to a hundredth less: between those that lie farthest in many directions.
+fn diameter(points: &[Point3<f64>]) -> f64 {
+    let steps = || -3..=3_i32;
+    let directions = steps().flat_map(|x| steps().map(move |y| (x, y)));
+    // Of a direction and its opposite, one will do.
+    let directions = directions.flat_map(|(x, y)| (0..=3).map(move |z| [z, y, x]));
+    let mut extremes: Vec<&Point3<f64>> = Vec::new();
+    for direction in directions.filter(|d| *d > [0; 3]) {
+        let direction = Vector3::from(direction.map(f64::from));
+        let along = points.iter().map(|p| (p.coords.dot(&direction), p));
+        let ends = along.map(|end| [end, end]).reduce(|[low, high], [end, _]| {
+            [if end.0 < low.0 { end } else { low }, if end.0 > high.0 { end } else { high }]
+        });
+        extremes.extend(ends.into_iter().flatten().map(|(_, point)| point));
+    }
+    let from = |a: &Point3<f64>| {
+        extremes.iter().map(|b| nalgebra::distance_squared(a, b)).fold(0.0, f64::max)
+    };
+    extremes.iter().map(|a| from(a)).fold(0.0, f64::max).sqrt()
+}
