@@ -43,6 +43,7 @@ pub(crate) fn apply(
     match kind {
         "another model" => {
             let others: Vec<_> = objects.values().filter(|o| o.name != object.name).collect();
+            anyhow::ensure!(!others.is_empty(), "the dataset has no other model");
             let index = between(0.0, others.len() as f64) as usize;
             object.clone_from(others[index.min(others.len() - 1)]);
         }

@@ -38,6 +38,9 @@ fn main() -> anyhow::Result<()> {
     };
     let all: Vec<String> = fault::KINDS.map(str::to_owned).to_vec();
     let kinds = if kinds.is_empty() { &all } else { kinds };
+    if let Some(unknown) = kinds.iter().find(|kind| !all.contains(kind)) {
+        bail!("there is no fault {unknown:?}: one of {}", all.join(", "));
+    }
     let dataset = Dataset::open(Path::new(dataset))?;
     let (truth, rows) = (GroundTruth::new(&dataset), read_results(Path::new(poses))?.rows);
     let pose_of = |r: &ResultRow| truth.pose(r.scene_id, r.im_id, r.obj_id, &r.t_cam_model);

@@ -62,10 +62,11 @@ pub fn load_frame_file(
     let name = mesh_file.display().to_string();
     let mut object = Object::with_mass(&name, mesh, layout.mass_kg, seed).map_err(|e| fault(&e))?;
     if let (Some(rig), Some(id)) = (&rig, layout.obj_id) {
-        let Some(deviation) = rig.objects.get(&id) else {
-            return Err(field("obj_id", &format!("the rig has no object {id}")));
-        };
-        object = deviation.corrected(&object).map_err(|e| fault(&e))?;
+        match rig.objects.get(&id) {
+            Some(deviation) => object = deviation.corrected(&object).map_err(|e| fault(&e))?,
+            // As of a dataset: other objects are seen by the same rig.
+            None => log::info!("the rig does not know object {id}"),
+        }
     }
     let (mut hand, mut measured) = (None, None);
     if let Some(r) = &layout.robot {

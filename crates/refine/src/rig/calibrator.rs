@@ -218,13 +218,18 @@ impl Calibrator {
     /// most has done so.
     ///
     /// # Errors
-    /// If a corrected model cannot be used, or what was said is not finite.
+    /// If nothing or nothing finite was said, or a corrected model cannot be used.
     pub fn solve(&mut self, mut pass: Pass) -> Result<f64, RefineError> {
         let n = self.rig.len();
+        if pass.sums.is_empty() {
+            let problem = "no frame of a pass says anything of it".into();
+            return Err(RefineError::Setting { name: "rig", problem });
+        }
         // What frames say of a rig that nothing is known of is no disagreement yet.
         pass.disagreements.sort_by(f64::total_cmp);
         let middle = pass.disagreements.get(pass.disagreements.len() / 2);
-        self.usual_disagreement = middle.copied().filter(|_| self.rig.is_known(&self.prior));
+        let usual = middle.copied().filter(|usual| *usual > 0.0);
+        self.usual_disagreement = usual.filter(|_| self.rig.is_known(&self.prior));
         let mut hessian = DMatrix::from_diagonal(&self.prior);
         let mut gradient = self.prior.component_mul(&self.rig.values());
         // Objects have to do with the rig alone: each is eliminated by itself.

@@ -95,9 +95,7 @@ impl FrameInformation {
             },
         })
     }
-}
 
-impl FrameInformation {
     /// How much lower the frame's cost would be with parameters of its own, `prior` being their inverse variances about those that the rig has:
     /// over what that would be by noise alone if the rig's were true.
     pub(super) fn disagreement(&self, prior: &DVector<f64>) -> Option<f64> {
@@ -106,7 +104,9 @@ impl FrameInformation {
         let gradient = self.gradient.rows(0, n).into_owned();
         let factor = (&hessian + DMatrix::from_diagonal(prior)).cholesky()?;
         let degrees = factor.solve(&hessian).trace();
-        Some(gradient.dot(&factor.solve(&gradient)) / degrees).filter(|ratio| ratio.is_finite())
+        let squared = gradient.dot(&factor.solve(&gradient));
+        // Of a frame that says nothing, both are zero.
+        Some(squared / degrees.max(1e-9)).filter(|ratio| ratio.is_finite())
     }
 }
 

@@ -239,19 +239,19 @@ impl Rig {
         let layout = Layout::new(said.joints.len());
         let sigma = |from: usize, count: usize| variances.rows(from, count).mean().sqrt();
         let (hand, camera) = (layout.offset(Block::HandPose), layout.offset(Block::Camera));
+        let mut prior = prior.clone();
+        if let count @ 1.. = said.joints.len() {
+            prior.hand_translation = sigma(hand, 3);
+            prior.hand_rotation = sigma(hand + 3, 3);
+            prior.joints = sigma(layout.offset(Block::Joints(count)), count);
+        }
         Ok(PriorSettings {
-            hand_translation: sigma(hand, 3),
-            hand_rotation: sigma(hand + 3, 3),
-            joints: match said.joints.len() {
-                0 => prior.joints,
-                count => sigma(layout.offset(Block::Joints(count)), count),
-            },
             depth_scale: sigma(camera, 1),
             depth_bias: sigma(camera + 1, 1),
             principal_point: sigma(camera + 2, 2),
             focal_scale: sigma(camera + 4, 1),
             aspect: sigma(camera + 5, 1),
-            ..prior.clone()
+            ..prior
         })
     }
 }

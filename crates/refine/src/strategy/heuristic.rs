@@ -209,8 +209,12 @@ impl Strategy for Heuristic {
         self.walk(&factors, initial.clone(), frame.object().radius, &mut recorder);
         let mut estimate = recorder.estimate(None);
         // Of all evidence that there is. A frame that lacks what the fused estimator needs has none.
-        let posterior = Fused::default().posterior_at(frame, initial, &estimate.state);
-        estimate.posterior = posterior.ok().flatten();
+        let fused = self.factors.iter().cloned().fold(Fused::default(), Fused::with);
+        let posterior = fused.posterior_at(frame, initial, &estimate.state);
+        estimate.posterior = posterior.unwrap_or_else(|error| {
+            log::info!("no posterior: {error}");
+            None
+        });
         Ok(estimate)
     }
 

@@ -21,7 +21,7 @@ use self::memory::{Prediction, TrackState};
 pub use self::settings::{GatingSettings, ProcessNoise, Recovery, TrackerSettings};
 pub use self::tracked::{Rejection, TrackStatus, Tracked};
 use crate::error::RefineError;
-use crate::factor::GaussianPrior;
+use crate::factor::{GaussianPrior, PriorSettings};
 use crate::problem::{Factor, Problem, Solution, State, Termination};
 use crate::rig::Rig;
 use crate::scene::{CameraCalibrationError, Frame, Hand, Object, Observation};
@@ -65,6 +65,8 @@ pub struct Tracker {
     /// What renders, if not the processor at hand.
     backend: Option<Arc<dyn Backend>>,
     rig: Option<Arc<Rig>>,
+    /// How accurate calibrations are without one.
+    stated: PriorSettings,
     /// Where to begin; the search says where if it is not known.
     initial: Option<Isometry3<f64>>,
     track: Option<TrackState>,
@@ -103,10 +105,11 @@ impl Tracker {
         Ok(Self {
             object,
             hand,
-            settings,
             factors: Vec::new(),
             backend: None,
             rig: None,
+            stated: settings.fused.prior.clone(),
+            settings,
             initial: None,
             track: None,
             search: None,
@@ -248,8 +251,8 @@ impl Tracker {
         };
         let nominal = State::new(frame, &initial)?;
         if let Some(rig) = frame.rig() {
-            let prior = &mut self.settings.fused.prior;
-            *prior = rig.marginal_prior(&nominal, &frame.observation().camera, prior)?;
+            let (camera, stated) = (&frame.observation().camera, &self.stated);
+            self.settings.fused.prior = rig.marginal_prior(&nominal, camera, stated)?;
         }
         let (solved, posterior) = self.estimate(frame, &nominal)?;
         let (in_hand, level) = (frame.hand().is_some(), solved.cost());
@@ -280,9 +283,9 @@ impl Tracker {
         initial: &State,
         prior: Arc<GaussianPrior>,
     ) -> Result<Problem, RefineError> {
-        let (stage, settings) = (&self.settings.stage, &self.settings.fused);
-        let patches = surface_patches(frame, initial, stage, settings);
-        let problem = problem_of(frame, initial, stage, settings, patches, &self.factors)?;
+        let (stage, settings) = (&self.settings.stage, self.settings.fused.for_frame(frame));
+        let patches = surface_patches(frame, initial, stage, &settings);
+        let problem = problem_of(frame, initial, stage, &settings, patches, &self.factors)?;
         Ok(problem.with_prior(prior))
     }
 
@@ -320,7 +323,9 @@ impl Tracker {
         let estimate = fused.run(frame, initial, &mut |_| ControlFlow::Continue(()))?;
         let prior = GaussianPrior::independent(initial.clone(), &self.settings.fused.prior)?;
         let problem = self.stage_problem(frame, initial, Arc::new(prior))?;
-        let posterior = estimate.posterior.ok_or(RefineError::NothingFits)?;
+        let mut posterior = estimate.posterior.ok_or(RefineError::NothingFits)?;
+        // Frames that are followed are not tested: gates judge them.
+        posterior.fit = None;
         let (at, termination) = (problem.linearize(&estimate.state), posterior.termination);
         let solution = Solution { at, termination, iterations: estimate.iteration };
         Ok((Solved { solution, tried: true }, posterior))

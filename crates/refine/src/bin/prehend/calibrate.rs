@@ -120,7 +120,8 @@ impl Calibrate {
                 }
             }
             say(summary(&calibrator))?;
-            say(format!("rig of {count} frames written to {}", self.out.display()))?;
+            let frames = count - left_out.len();
+            say(format!("rig of {frames} frames written to {}", self.out.display()))?;
         }
         Ok(exit_code(count, &failures))
     }

@@ -15,6 +15,7 @@ use prehend_autodiff::optimize::LeastSquares;
 
 use self::factors::depth_noise;
 pub(crate) use self::factors::{problem_of, surface_patches};
+use self::fit::Known;
 pub use self::fit::{Fit, FitReference, FitStatistics};
 use self::hypotheses::{distinct, restarts, settled, spread};
 pub(crate) use self::posterior::chi_square_z;
@@ -60,15 +61,6 @@ impl Fused {
     /// With these settings.
     pub fn new(settings: FusedSettings) -> Self {
         Self { settings, factors: Vec::new() }
-    }
-
-    /// The settings, with what is known of how good the frame's model is.
-    fn settings_for(&self, frame: &Frame<'_>) -> FusedSettings {
-        let mut settings = self.settings.clone();
-        if let Some(sigma) = frame.object().surface_sigma {
-            settings.model.gp_sigma = settings.model.gp_sigma.min(sigma);
-        }
-        settings
     }
 
     /// What is known beforehand: about `initial`, and of calibrations what the frame's rig says, or the settings.
@@ -142,10 +134,7 @@ impl Fused {
         let at = last.problem.with_prior(Arc::new(self.prior(frame, initial)?)).linearize(state);
         let solution = Solution { at, termination: Termination::Iterations, iterations: 0 };
         let (radius, inflation) = (frame.object().radius, self.settings.inflation);
-        let found = [solution];
-        let mut posterior = Posterior::new(&found, inflation, radius, false, None);
-        posterior.fit = Some(self.fit(frame, initial, &found[0].at)?);
-        Ok(Some(posterior))
+        Ok(Some(Posterior::new(&[solution], inflation, radius, false, None)))
     }
 
     /// The problem of the last stage about `state`, from where noise is measured, without a prior; `None` without stages.
@@ -155,7 +144,7 @@ impl Fused {
         state: &State,
     ) -> Result<Option<LastProblem>, RefineError> {
         let Some(stage) = self.settings.stages.last() else { return Ok(None) };
-        let mut settings = self.settings_for(frame);
+        let mut settings = self.settings.for_frame(frame);
         let patches = surface_patches(frame, state, stage, &settings);
         if stage.measured_noise {
             let measured = depth_noise(frame, state, &self.settings);
@@ -191,7 +180,7 @@ impl Strategy for Fused {
         let names = std::iter::once("posterior");
         let mut recorder = Recorder::new(names, initial, self.iterations(), None, observe);
         let prior = Arc::new(self.prior(frame, initial)?);
-        let settings = self.settings_for(frame);
+        let settings = self.settings.for_frame(frame);
         let mut walk = Walk { fused: self, frame, initial, prior, settings };
         let mut states = restarts(initial, self.settings.restart_angle);
         let mut found = Vec::new();
@@ -217,7 +206,10 @@ impl Strategy for Fused {
         }
         let (radius, inflation) = (frame.object().radius, self.settings.inflation);
         let mut posterior = Posterior::new(&found, inflation, radius, exact, None);
-        posterior.fit = Some(self.fit(frame, initial, &found[0].at)?);
+        // What right poses are like is known of the last stage.
+        if go_on.is_continue() {
+            posterior.fit = Some(self.fit(frame, initial, &found[0].at)?);
+        }
         Ok(recorder.estimate(Some(posterior)))
     }
 
@@ -241,8 +233,15 @@ impl Fused {
             rig.marginal_prior(said, camera, prior)
         });
         let by_rig = by_rig.transpose()?;
-        let noise = depth_noise(frame, &point.state, &self.settings);
-        Ok(Fit::new(frame, said, point, by_rig.as_ref().unwrap_or(prior), noise.as_ref()))
+        // Where the pose was said to be has nothing to do with it.
+        let calibrations = State { t_cam_object: said.t_cam_object, ..point.state.clone() };
+        let known = Known {
+            said,
+            cost: self.prior(frame, said)?.cost(&calibrations),
+            sigmas: by_rig.as_ref().unwrap_or(prior),
+            noise: depth_noise(frame, &point.state, &self.settings),
+        };
+        Ok(Fit::new(frame, point, &known))
     }
 }
 

@@ -9,7 +9,7 @@ use crate::factor::{
     TouchModel,
 };
 use crate::problem::{Block, ModelErrorSettings, NoiseModel, Solver, State};
-use crate::scene::Occluders;
+use crate::scene::{Frame, Occluders};
 
 /// A sensor modality, or a constraint, that the fused estimator weighs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, IntoStaticStr)]
@@ -156,6 +156,15 @@ pub struct FusedSettings {
 }
 
 impl FusedSettings {
+    /// The same, with what is known of how good the model of `frame` is.
+    pub(crate) fn for_frame(&self, frame: &Frame<'_>) -> Self {
+        let mut settings = self.clone();
+        if let Some(sigma) = frame.object().surface_sigma {
+            settings.model.gp_sigma = settings.model.gp_sigma.min(sigma);
+        }
+        settings
+    }
+
     /// What is solved for from `state` that it holds; of a hand that is not `known`, nothing.
     pub(super) fn blocks(&self, known: bool, state: &State) -> Vec<Block> {
         let nuisances = self.nuisances.iter().filter(|n| known || **n == Nuisance::Camera);

@@ -10,9 +10,9 @@ mod statistics;
 
 pub use self::reference::FitReference;
 pub use self::statistics::FitStatistics;
+pub(super) use self::statistics::Known;
 use self::statistics::{STATISTICS, Suspect};
-use crate::factor::{NoiseEstimate, PriorSettings};
-use crate::problem::{Linearization, State};
+use crate::problem::Linearization;
 use crate::scene::Frame;
 
 /// How well a pose explains what was observed, beside right ones.
@@ -31,15 +31,9 @@ pub struct Fit {
 const MISFIT: f64 = 4.0;
 
 impl Fit {
-    /// Of `point`, in a frame that says `said` of calibrations, as accurate as `prior` has it; `noise` is that of depth.
-    pub(super) fn new(
-        frame: &Frame<'_>,
-        said: &State,
-        point: &Linearization,
-        prior: &PriorSettings,
-        noise: Option<&NoiseEstimate>,
-    ) -> Self {
-        let statistics = FitStatistics::new(frame, said, point, prior, noise);
+    /// Of `point` in `frame`, of which this is `known`.
+    pub(super) fn new(frame: &Frame<'_>, point: &Linearization, known: &Known<'_>) -> Self {
+        let statistics = FitStatistics::new(frame, point, known);
         let reference = FitReference::builtin();
         let misfits = misfits(&reference.scores(&statistics));
         Self { probability: reference.probability(&statistics), misfits, statistics }

@@ -56,7 +56,7 @@ impl FitReference {
         &REFERENCE
     }
 
-    /// Of poses that are right, all of frames with every sensor; `None` if they are too few.
+    /// Of poses that are right, those of frames with every sensor; `None` if they are too few.
     pub fn learn(right: &[FitStatistics]) -> Option<Self> {
         let whole = right.iter().filter(|statistics| statistics.0.iter().all(Option::is_some));
         let all: Vec<[f64; COUNT]> = whole.map(|s| s.0.map(Option::unwrap_or_default)).collect();
@@ -72,7 +72,8 @@ impl FitReference {
             (0..COUNT).map(|k| variance(k).sqrt().max(LEAST_DEVIATION)).collect();
         let names = STATISTICS.iter().map(|statistic| statistic.name.to_owned()).collect();
         let mut reference = Self { names, means, deviations, moments: Vec::new(), limit: 0.0 };
-        let scores: Vec<_> = right.iter().map(|s| reference.scores(s)).collect();
+        let all: Vec<FitStatistics> = all.iter().map(|s| FitStatistics(s.map(Some))).collect();
+        let scores: Vec<_> = all.iter().map(|s| reference.scores(s)).collect();
         let moment = |i: usize, j: usize| {
             let products = scores.iter().map(|z| z[i].unwrap_or(0.0) * z[j].unwrap_or(0.0));
             let moment = products.sum::<f64>() / scores.len() as f64;
@@ -80,7 +81,7 @@ impl FitReference {
         };
         reference.moments =
             (0..COUNT).map(|i| (0..COUNT).map(|j| moment(i, j)).collect()).collect();
-        let mut distances: Vec<f64> = right
+        let mut distances: Vec<f64> = all
             .iter()
             .filter_map(|s| reference.distance(s))
             .map(|(squared, k)| chi_square_z(squared, k))
@@ -102,8 +103,8 @@ impl FitReference {
     }
 
     fn is_sound(&self) -> bool {
-        let sizes = [self.means.len(), self.deviations.len(), self.moments.len()];
-        sizes == [COUNT; 3]
+        let Self { names, means, deviations, moments, .. } = self;
+        [names.len(), means.len(), deviations.len(), moments.len()] == [COUNT; 4]
             && self.moments.iter().all(|row| row.len() == COUNT)
             && self.names.iter().zip(&STATISTICS).all(|(name, statistic)| name == statistic.name)
     }

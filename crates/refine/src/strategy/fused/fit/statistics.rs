@@ -71,6 +71,18 @@ impl Statistic {
 #[derive(Clone, Debug, PartialEq)]
 pub struct FitStatistics(pub(super) [Option<f64>; COUNT]);
 
+/// What is known of a frame besides.
+pub(in super::super) struct Known<'a> {
+    /// What it says of calibrations.
+    pub(in super::super) said: &'a State,
+    /// How much it costs that calibrations differ from that \[nat\].
+    pub(in super::super) cost: f64,
+    /// How accurate they are, each by itself.
+    pub(in super::super) sigmas: &'a PriorSettings,
+    /// Noise of depth, where it can be measured.
+    pub(in super::super) noise: Option<NoiseEstimate>,
+}
+
 /// Fewest pixels that say something.
 const FEWEST: usize = 30;
 
@@ -80,6 +92,9 @@ const FINEST: f64 = 2e-4;
 /// That noise where it cannot be measured \[m\].
 const TYPICAL: f64 = 7e-4;
 
+/// Statistics are at most so large.
+const WORST: f64 = 1e12;
+
 /// Width of patches of depth \[px\], and how many of its pixels a patch must have.
 const PATCH: usize = 12;
 const FULL: usize = 70;
@@ -88,18 +103,14 @@ const FULL: usize = 70;
 const FAR: f64 = 15e-3;
 
 impl FitStatistics {
-    /// Of `point`, in a frame that says `said` of calibrations, as accurate as `prior` has it; `noise` is that of depth.
-    pub(super) fn new(
-        frame: &Frame<'_>,
-        said: &State,
-        point: &Linearization,
-        prior: &PriorSettings,
-        noise: Option<&NoiseEstimate>,
-    ) -> Self {
-        let mut found = BTreeMap::new();
+    /// Of `point` in `frame`, of which this is `known`.
+    pub(super) fn new(frame: &Frame<'_>, point: &Linearization, known: &Known<'_>) -> Self {
+        let Known { said, cost, sigmas, noise } = known;
+        let costs = point.factors.iter().map(|factor| (factor.name, factor.cost));
+        let mut found: BTreeMap<&str, f64> = costs.collect();
         let pixels = Pixels::new(frame, &point.state);
         // Where noise cannot be measured, depth is not where the object is: that must show.
-        let unit = noise.map_or(TYPICAL, |noise| noise.independent) + FINEST;
+        let unit = noise.as_ref().map_or(TYPICAL, |noise| noise.independent) + FINEST;
         let on_object = pixels.on_object(FEWEST);
         if on_object.len() >= FEWEST {
             let [size, offset] = medians(&on_object);
@@ -113,38 +124,43 @@ impl FitStatistics {
             found.insert("hand depth residual", size / unit);
             found.insert("hand depth offset", offset / unit);
         }
-        found.extend(noise.map(|noise| ("correlated depth noise", noise.correlated)));
+        found.extend(noise.as_ref().map(|noise| ("correlated depth noise", noise.correlated)));
         let [lacks, exceeds] = pixels.mask_misfit();
         found.extend([("mask too small", lacks), ("mask too large", exceeds)]);
-        found.extend(of_calibrations(said, &point.state, prior));
-        found.extend(point.prior.as_ref().map(|prior| ("prior", prior.cost)));
-        found.extend(point.factors.iter().map(|factor| (factor.name, factor.cost)));
+        found.extend(of_calibrations(frame.hand().is_some(), said, &point.state, sigmas));
+        found.insert("prior", *cost);
         Self(STATISTICS.each_ref().map(|Statistic { name, negligible, .. }| {
-            let value = found.get(name).filter(|value| value.is_finite());
-            value.map(|value| (value.max(0.0) + negligible).ln())
+            let value = found.get(name)?;
+            // What is not a number fits as badly as can be.
+            let value = if value.is_nan() { WORST } else { value.clamp(0.0, WORST) };
+            Some((value + negligible).ln())
         }))
     }
 }
 
 /// By how many of their standard deviations the calibrations of `state` differ from those `said`.
 fn of_calibrations(
+    in_hand: bool,
     said: &State,
     state: &State,
     prior: &PriorSettings,
 ) -> impl Iterator<Item = (&'static str, f64)> + use<> {
     let mut found = Vec::new();
-    let [scale, bias, _, _, focal, _] = state.camera.parameters();
+    let (is, was) = (state.camera.parameters(), said.camera.parameters());
+    let [scale, bias, _, _, focal, _] = std::array::from_fn(|k| is[k] - was[k]);
     found.push(("depth scale", scale.abs() / prior.depth_scale));
     found.push(("depth bias", bias.abs() / prior.depth_bias));
     found.push(("focal length", focal.abs() / prior.focal_scale));
-    if !said.joints.is_empty() {
+    if in_hand {
         let motion = state.t_cam_hand * said.t_cam_hand.inverse();
         let off = motion * nalgebra::Point3::from(said.center()) - said.center();
         found.push(("hand position", off.coords.norm() / prior.hand_translation));
         let sigmas = prior.sigmas(Block::Joints(said.joints.len()));
         let off = state.joints.iter().zip(&said.joints).zip(sigmas);
         let off = off.map(|((is, said), sigma)| (is - said).abs() / sigma);
-        found.push(("joint position", off.fold(0.0, f64::max)));
+        if !said.joints.is_empty() {
+            found.push(("joint position", off.fold(0.0, f64::max)));
+        }
     }
     found.into_iter()
 }
