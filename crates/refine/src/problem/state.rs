@@ -1,7 +1,7 @@
 //! What a solve may move: named blocks of parameters.
 
-use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3, Vector6};
-use prehend_autodiff::lie::perturb_about;
+use nalgebra::{DVector, Isometry3, Point3, UnitQuaternion, Vector3, Vector6};
+use prehend_autodiff::lie::{perturb_about, so3_log};
 
 use crate::error::RefineError;
 
@@ -79,6 +79,20 @@ impl State {
     /// The object's center in the camera frame \[m\]: the point that twists turn about.
     pub fn center(&self) -> Vector3<f64> {
         (self.t_cam_object * self.object_center).coords
+    }
+
+    /// How far the calibrations are from those `said`: displacement of the point that is said to be at the object's center and rotation
+    /// vector of the hand \[m; rad\], joints, camera.
+    pub(crate) fn calibration_deviation(&self, said: &Self) -> DVector<f64> {
+        let center = said.center();
+        let motion = self.t_cam_hand * said.t_cam_hand.inverse();
+        let off = (motion * Point3::from(center)).coords - center;
+        let turn = so3_log(&motion.rotation);
+        let joints = self.joints.iter().zip(&said.joints).map(|(q, said)| q - said);
+        let camera = self.camera.parameters().into_iter().zip(said.camera.parameters());
+        let hand = off.iter().chain(&turn).copied();
+        let all: Vec<f64> = hand.chain(joints).chain(camera.map(|(is, said)| is - said)).collect();
+        DVector::from_vec(all)
     }
 
     /// The state after a step of the tangent space of `blocks`, their parts of `delta` one after the other; twists are about

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::deviation::SurfaceDeviation;
-use super::parameters::{Rig, deviation};
+use super::parameters::Rig;
 use crate::problem::{Block, RIDGE, ScaledCholesky, State};
 use crate::strategy::Evidence;
 
@@ -74,7 +74,8 @@ impl FrameInformation {
         variances.resize(own.len(), field.map_or(1.0, SurfaceDeviation::own_variance));
         // The evidence is linear about its state, not about what the frame says.
         let mut offset = DVector::zeros(n);
-        calibrations.iter().zip(&deviation(said, state)).for_each(|(at, off)| offset[*at] = *off);
+        let deviation = state.calibration_deviation(said);
+        calibrations.iter().zip(&deviation).for_each(|(at, off)| offset[*at] = *off);
         let hessian = equations.hessian();
         let gradient = equations.gradient() - hessian * offset;
         let by_all = hessian * &by_shared;

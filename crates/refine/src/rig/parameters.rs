@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Point3, UnitQuaternion, Vector3};
+use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, UnitQuaternion, Vector3};
 use prehend_autodiff::lie::{cross_matrix, so3_log};
 use prehend_render::Camera;
 
@@ -270,20 +270,6 @@ fn of_other_joints(given: usize, expected: usize) -> RefineError {
     RefineError::Setting { name: "rig", problem }
 }
 
-/// How far the calibrations of `state` are from what is `said`, by displacement of the point at the object's center and rotation vector of
-/// the hand, joints and camera.
-pub(super) fn deviation(said: &State, state: &State) -> DVector<f64> {
-    let center = said.center();
-    let motion = state.t_cam_hand * said.t_cam_hand.inverse();
-    let off = (motion * Point3::from(center)).coords - center;
-    let turn = so3_log(&motion.rotation);
-    let joints = state.joints.iter().zip(&said.joints).map(|(q, said)| q - said);
-    let camera = state.camera.parameters().into_iter().zip(said.camera.parameters());
-    let hand = off.iter().chain(&turn).copied();
-    let all: Vec<f64> = hand.chain(joints).chain(camera.map(|(is, said)| is - said)).collect();
-    DVector::from_vec(all)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -314,7 +300,7 @@ mod tests {
             let moved = |sign: f64| {
                 let mut change = vec![0.0; rig.len()];
                 change[parameter] = sign * step;
-                deviation(&at, &said(&rig.changed(&change)))
+                said(&rig.changed(&change)).calibration_deviation(&at)
             };
             let difference = (moved(1.0) - moved(-1.0)) / (2.0 * step);
             let error = (difference - jacobian.column(parameter)).amax();

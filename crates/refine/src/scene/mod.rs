@@ -9,6 +9,7 @@ mod object;
 mod observation;
 mod sensing;
 mod sequence;
+mod view;
 
 pub use calibration::CameraCalibrationError;
 pub use example::{Scene, default_scene};
@@ -20,3 +21,4 @@ pub use object::{Inertial, Object, StatedSize};
 pub(crate) use observation::check_gravity;
 pub use observation::{HandMeasurement, Observation};
 pub use sequence::{Sequence, SequenceFrame, default_sequence};
+pub(crate) use view::{Pixel, View, median};

@@ -13,6 +13,7 @@ use prehend_refine::data::bop::{
     Dataset, DatasetError, ReadResults, ResultRow, read_results, share_image_times, write_results,
 };
 use prehend_refine::data::{Target, find_targets};
+use prehend_refine::rig::Rig;
 use prehend_render::{Backend, Device};
 use strum::VariantNames;
 
@@ -164,6 +165,11 @@ pub(crate) fn limit_threads(threads: Option<NonZeroUsize>) -> anyhow::Result<()>
         rayon::ThreadPoolBuilder::new().num_threads(threads.get()).build_global()?;
     }
     Ok(())
+}
+
+/// The rig of `file`, if one is named.
+pub(crate) fn open_rig(file: Option<&Path>) -> Result<Option<Arc<Rig>>, DatasetError> {
+    file.map(Rig::load).transpose().map(|rig| rig.map(Arc::new))
 }
 
 /// The method called `name`.

@@ -13,13 +13,12 @@ use nalgebra::Isometry3;
 use prehend_refine::RefineError;
 use prehend_refine::data::bop::{Dataset, ResultRow, check_writable};
 use prehend_refine::data::{AssetError, Assets, FrameInput, PlainPose, Target};
-use prehend_refine::rig::Rig;
 use prehend_refine::scene::{Hand, Object};
 use prehend_refine::strategy::Posterior;
 use prehend_refine::tracker::{Recovery, TrackStatus, Tracked, Tracker, TrackerSettings};
 use serde_json::json;
 
-use crate::options::{Rendering, Selection, limit_threads, row, write_poses};
+use crate::options::{Rendering, Selection, limit_threads, open_rig, row, write_poses};
 use crate::terminal::{cache, exit_code, progress, say, warn};
 
 #[derive(Args)]
@@ -103,7 +102,7 @@ impl Track {
         let backend = self.rendering.open()?;
         let dataset = self.selection.open()?;
         let (starts, mut failures) = self.starts(&dataset)?;
-        let rig = self.rig.as_deref().map(Rig::load).transpose()?.map(Arc::new);
+        let rig = open_rig(self.rig.as_deref())?;
         let mut assets = Assets::new(&dataset, 0).with_cache(cache()).with_rig(rig.clone());
         let mut frames = Vec::new();
         for start in &starts {

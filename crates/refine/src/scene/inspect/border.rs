@@ -1,6 +1,6 @@
 //! The mask's border against depth: where it runs, one thing ends before another.
 
-use super::view::View;
+use crate::scene::view::View;
 
 /// How far from the border depth is read on both sides: cameras blur depth at edges \[px\].
 const STEP: usize = 5;

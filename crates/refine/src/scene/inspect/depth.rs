@@ -1,8 +1,8 @@
 //! Depth against that of the object at the pose, and of the hand, which is known better.
 
-use super::view::{Pixel, View, median};
 use super::warning::{Subject, Warning};
 use crate::scene::Object;
+use crate::scene::view::{Pixel, View, median};
 
 /// Ratios of depths that are no question of units.
 const PLAUSIBLE_RATIO: std::ops::Range<f64> = 0.5..2.0;

@@ -1,8 +1,8 @@
 //! Forces on the hand's taxels by themselves: their unit and sign, and the layout of the taxels.
 
 use super::touch::TOUCHED;
-use super::view::median;
 use super::warning::{Subject, Warning};
+use crate::scene::view::median;
 use crate::scene::{Hand, HandMeasurement};
 
 /// Largest force of a taxel, and of all together \[N\].

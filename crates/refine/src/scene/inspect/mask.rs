@@ -1,11 +1,9 @@
 //! The mask against the object at the pose, and against what depth shows under it.
 
-use nalgebra::Vector2;
-
 use super::border::cut_share;
-use super::view::{View, median};
 use super::warning::{Subject, Warning};
 use crate::scene::Object;
+use crate::scene::view::{View, median};
 
 /// Least intersection over union of the mask and the object at a pose to start from.
 const LEAST_OVERLAP: f64 = 0.25;
@@ -34,21 +32,10 @@ pub(super) fn at_pose(
     mask_fits: bool,
     hand_wrong: bool,
 ) -> Option<Warning> {
-    let (mut mask, mut model, mut overlap) = (0.0, 0.0, 0.0);
-    let (mut of_mask, mut of_model) = (Vector2::zeros(), Vector2::zeros());
-    for ([x, y], pixel) in view.pixels() {
-        let at = Vector2::new(x as f64, y as f64);
-        let visible = pixel.shows_object();
-        if pixel.masked {
-            mask += 1.0;
-            of_mask += at;
-        }
-        if visible {
-            model += 1.0;
-            of_model += at;
-        }
-        overlap += f64::from(u8::from(visible && pixel.masked));
-    }
+    let [of_mask, of_model] = view.sums();
+    let (mask, model) = (of_mask.z, of_model.z);
+    let both = view.pixels().filter(|(_, pixel)| pixel.masked && pixel.shows_object());
+    let overlap = both.count() as f64;
     // An inverted mask has the border of a right one.
     let mask_fits = mask_fits && PLAUSIBLE_AREA.contains(&(mask / model));
     let subject = if mask_fits { Subject::Pose } else { Subject::Mask };
@@ -61,7 +48,7 @@ pub(super) fn at_pose(
         return None;
     }
     let share = overlap / (mask + model - overlap);
-    let (pixels, area) = ((of_mask / mask - of_model / model).norm(), mask / model);
+    let (pixels, area) = ((of_mask.xy() / mask - of_model.xy() / model).norm(), mask / model);
     let shift = pixels * z / view.observation.camera.fx;
     let (value, unit) = if !PLAUSIBLE_AREA.contains(&area) {
         (area, "")

@@ -13,13 +13,12 @@ mod model;
 #[cfg(test)]
 mod tests;
 mod touch;
-mod view;
 mod warning;
 
 use nalgebra::{Isometry3, Translation3};
 
-use self::view::View;
 pub use self::warning::{Subject, Warning};
+use super::view::View;
 use super::{Hand, Object, Observation};
 
 /// What looks wrong with an object's model; empty if all looks well.
@@ -63,7 +62,7 @@ pub(crate) fn inspect_pose(
         return warnings;
     }
     let hand_drawn = drawn.is_some();
-    let view = View::new(observation, object, drawn, t_cam_object);
+    let view = View::new(observation, &observation.camera, object, drawn, t_cam_object);
     let of_depth = depth::inspect(&view, object);
     let blamed = |subject| of_depth.iter().any(|warning| warning.subject == subject);
     let hand_fits = hand_drawn && of_depth.is_empty();

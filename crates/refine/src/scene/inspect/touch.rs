@@ -2,8 +2,8 @@
 
 use nalgebra::{Isometry3, Point3};
 
-use super::view::median;
 use super::warning::{Subject, Warning};
+use crate::scene::view::median;
 use crate::scene::{Hand, HandMeasurement, Object};
 
 /// A taxel that feels more is touched \[N\].

@@ -85,8 +85,8 @@ impl Fused {
     }
 }
 
-/// The problem of the last stage, and where the object may be off from its model.
-struct LastProblem {
+/// The problem of a stage, without a prior, and where the object may be off from its model.
+struct StageProblem {
     problem: Problem,
     patches: Option<Arc<SurfacePatches>>,
 }
@@ -112,7 +112,7 @@ impl Fused {
         state: &State,
         field: &Arc<DepthField>,
     ) -> Result<Option<Evidence>, RefineError> {
-        let Some(LastProblem { problem, patches }) = self.last_problem(frame, state)? else {
+        let Some(StageProblem { problem, patches }) = self.last_problem(frame, state)? else {
             return Ok(None);
         };
         let equations = problem.evidence(state, field);
@@ -137,22 +137,34 @@ impl Fused {
         Ok(Some(Posterior::new(&[solution], inflation, radius, false, None)))
     }
 
-    /// The problem of the last stage about `state`, from where noise is measured, without a prior; `None` without stages.
+    /// The problem of the last stage about `state`, from where noise is measured; `None` without stages.
     fn last_problem(
         &self,
         frame: &Frame<'_>,
         state: &State,
-    ) -> Result<Option<LastProblem>, RefineError> {
+    ) -> Result<Option<StageProblem>, RefineError> {
         let Some(stage) = self.settings.stages.last() else { return Ok(None) };
         let mut settings = self.settings.for_frame(frame);
-        let patches = surface_patches(frame, state, stage, &settings);
+        self.stage_problem(frame, state, state, stage, &mut settings).map(Some)
+    }
+
+    /// The problem of `stage` about `initial`, with the noise that is measured at `seen`, which `settings` take.
+    fn stage_problem(
+        &self,
+        frame: &Frame<'_>,
+        initial: &State,
+        seen: &State,
+        stage: &Stage,
+        settings: &mut FusedSettings,
+    ) -> Result<StageProblem, RefineError> {
+        let patches = surface_patches(frame, initial, stage, settings);
         if stage.measured_noise {
-            let measured = depth_noise(frame, state, &self.settings);
-            take_noise(&mut settings, measured, patches.is_some());
+            let measured = depth_noise(frame, seen, &self.settings);
+            take_noise(settings, measured, patches.is_some());
         }
         let own = &self.factors;
-        let problem = problem_of(frame, state, stage, &settings, patches.clone(), own)?;
-        Ok(Some(LastProblem { problem, patches }))
+        let problem = problem_of(frame, initial, stage, settings, patches.clone(), own)?;
+        Ok(StageProblem { problem, patches })
     }
 }
 
@@ -208,7 +220,7 @@ impl Strategy for Fused {
         let mut posterior = Posterior::new(&found, inflation, radius, exact, None);
         // What right poses are like is known of the last stage.
         if go_on.is_continue() {
-            posterior.fit = Some(self.fit(frame, initial, &found[0].at)?);
+            posterior.fit = Some(walk.fit(&found[0].at)?);
         }
         Ok(recorder.estimate(Some(posterior)))
     }
@@ -216,32 +228,6 @@ impl Strategy for Fused {
     /// Stages, and one more where calibrations turn out to be exact.
     fn iterations(&self) -> usize {
         self.settings.stages.len() + usize::from(self.settings.calibration_test)
-    }
-}
-
-impl Fused {
-    /// How well `point` explains what `frame` shows, which says `said` of calibrations.
-    fn fit(
-        &self,
-        frame: &Frame<'_>,
-        said: &State,
-        point: &Linearization,
-    ) -> Result<Fit, RefineError> {
-        let prior = &self.settings.prior;
-        let by_rig = frame.rig().map(|rig| {
-            let camera = &frame.observation().camera;
-            rig.marginal_prior(said, camera, prior)
-        });
-        let by_rig = by_rig.transpose()?;
-        // Where the pose was said to be has nothing to do with it.
-        let calibrations = State { t_cam_object: said.t_cam_object, ..point.state.clone() };
-        let known = Known {
-            said,
-            cost: self.prior(frame, said)?.cost(&calibrations),
-            sigmas: by_rig.as_ref().unwrap_or(prior),
-            noise: depth_noise(frame, &point.state, &self.settings),
-        };
-        Ok(Fit::new(frame, point, &known))
     }
 }
 
@@ -286,13 +272,9 @@ impl Walk<'_> {
     fn stage(&mut self, index: usize, states: &[State]) -> Result<Vec<Solution>, RefineError> {
         let (fused, frame, initial) = (self.fused, self.frame, self.initial);
         let stage = &fused.settings.stages[index];
-        let patches = surface_patches(frame, initial, stage, &self.settings);
-        if stage.measured_noise {
-            let measured = depth_noise(frame, &states[0], &fused.settings);
-            take_noise(&mut self.settings, measured, patches.is_some());
-        }
-        let problem = problem_of(frame, initial, stage, &self.settings, patches, &fused.factors)?
-            .with_prior(self.prior.clone());
+        let settings = &mut self.settings;
+        let of_stage = fused.stage_problem(frame, initial, &states[0], stage, settings)?;
+        let problem = of_stage.problem.with_prior(self.prior.clone());
         let states = &states[..states.len().min(stage.hypotheses.max(1))];
         let found = if index == 0 {
             let mut all = problem.solve_all(&states[..1], &stage.solver);
@@ -364,5 +346,22 @@ impl Walk<'_> {
             .with_prior(self.prior.clone());
         let solver = Solver { min_decrease: EXACT * last.solver.min_decrease, ..last.solver };
         Ok(distinct(problem.solve_all(&states, &solver), self.radius()))
+    }
+
+    /// How well `point` explains what the frame shows.
+    fn fit(&self, point: &Linearization) -> Result<Fit, RefineError> {
+        let (fused, frame, said) = (self.fused, self.frame, self.initial);
+        let stated = &fused.settings.prior;
+        let camera = &frame.observation().camera;
+        let by_rig = frame.rig().map(|rig| rig.marginal_prior(said, camera, stated)).transpose()?;
+        // Where the pose was said to be has nothing to do with it.
+        let calibrations = State { t_cam_object: said.t_cam_object, ..point.state.clone() };
+        let known = Known {
+            said,
+            cost: self.prior.cost(&calibrations),
+            sigmas: by_rig.as_ref().unwrap_or(stated),
+            noise: depth_noise(frame, &point.state, &fused.settings),
+        };
+        Ok(Fit::new(frame, point, &known))
     }
 }

@@ -13,7 +13,6 @@ use prehend_refine::data::{
     Assets, FrameInput, Identity, Journal, PlainPose, Sensor, Times, Workers,
 };
 use prehend_refine::evaluate::report::{FrameReport, Report};
-use prehend_refine::rig::Rig;
 use prehend_refine::scene::Warning;
 use prehend_refine::strategy::{PosteriorSummary, Trace};
 use prehend_refine::{Method, refine};
@@ -22,7 +21,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use super::options::{MethodOptions, OutputOptions};
-use crate::options::{Job, Selection, beside, write_poses};
+use crate::options::{Job, Selection, beside, open_rig, write_poses};
 use crate::terminal::{cache, exit_code, progress, say, warn};
 
 /// A refinement of a dataset's frames.
@@ -60,7 +59,7 @@ impl DatasetRun<'_> {
         let json = self.output.json;
         let dataset = self.selection.open()?;
         let (jobs, mut failures) = self.selection.jobs(self.poses)?;
-        let rig = self.rig.map(Rig::load).transpose()?.map(Arc::new);
+        let rig = open_rig(self.rig)?;
         let assets = Assets::new(&dataset, self.options.seed).with_cache(cache()).with_rig(rig);
         let assets = Mutex::new(assets);
         let report = self.output.report.as_deref().map(Report::create).transpose()?;

@@ -7,7 +7,6 @@ use std::sync::Arc;
 
 use prehend_refine::data::bop::write_atomically;
 use prehend_refine::data::{PlainPose, load_frame_file};
-use prehend_refine::rig::Rig;
 use prehend_refine::scene::Warning;
 use prehend_refine::strategy::{PosteriorSummary, Strategy};
 use prehend_refine::{Method, State};
@@ -15,6 +14,7 @@ use prehend_render::Backend;
 use serde_json::json;
 
 use super::options::{MethodOptions, OutputOptions};
+use crate::options::open_rig;
 use crate::terminal::{cache, complain, progress, say};
 
 /// Refines the frame of `file`; the pose goes to the output file, and to standard output without one or with `--json`.
@@ -25,8 +25,8 @@ pub(super) fn refine_frame(
     backend: Arc<dyn Backend>,
     rig: Option<&Path>,
 ) -> anyhow::Result<ExitCode> {
-    let rig = rig.map(Rig::load).transpose()?.map(Arc::new);
-    let (input, t_cam_object) = load_frame_file(file, method.seed, cache().as_ref(), rig)?;
+    let (rig, cache) = (open_rig(rig)?, cache());
+    let (input, t_cam_object) = load_frame_file(file, method.seed, cache.as_ref(), rig)?;
     let mut configured = method.configured()?;
     let mut terms = Vec::new();
     if let Method::Heuristic(heuristic) = &mut configured {

@@ -59,20 +59,20 @@ impl FitReference {
     /// Of poses that are right, those of frames with every sensor; `None` if they are too few.
     pub fn learn(right: &[FitStatistics]) -> Option<Self> {
         let whole = right.iter().filter(|statistics| statistics.0.iter().all(Option::is_some));
-        let all: Vec<[f64; COUNT]> = whole.map(|s| s.0.map(Option::unwrap_or_default)).collect();
+        let all: Vec<&FitStatistics> = whole.collect();
         let count = all.len() as f64;
         if all.len() < 2 * COUNT {
             return None;
         }
-        let mean = |k: usize| all.iter().map(|s| s[k]).sum::<f64>() / count;
+        let values = |k: usize| all.iter().filter_map(move |statistics| statistics.0[k]);
+        let mean = |k: usize| values(k).sum::<f64>() / count;
         let means: Vec<f64> = (0..COUNT).map(mean).collect();
         let variance =
-            |k: usize| all.iter().map(|s| (s[k] - means[k]).powi(2)).sum::<f64>() / count;
+            |k: usize| values(k).map(|value| (value - means[k]).powi(2)).sum::<f64>() / count;
         let deviations: Vec<f64> =
             (0..COUNT).map(|k| variance(k).sqrt().max(LEAST_DEVIATION)).collect();
         let names = STATISTICS.iter().map(|statistic| statistic.name.to_owned()).collect();
         let mut reference = Self { names, means, deviations, moments: Vec::new(), limit: 0.0 };
-        let all: Vec<FitStatistics> = all.iter().map(|s| FitStatistics(s.map(Some))).collect();
         let scores: Vec<_> = all.iter().map(|s| reference.scores(s)).collect();
         let moment = |i: usize, j: usize| {
             let products = scores.iter().map(|z| z[i].unwrap_or(0.0) * z[j].unwrap_or(0.0));

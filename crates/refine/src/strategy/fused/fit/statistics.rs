@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use super::pixels::Pixels;
 use crate::factor::{NoiseEstimate, PriorSettings};
-use crate::problem::{Block, Linearization, State};
-use crate::scene::Frame;
+use crate::problem::{Linearization, State};
+use crate::scene::{Frame, median};
 
 /// What is most likely wrong where something does not fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -113,16 +113,15 @@ impl FitStatistics {
         let unit = noise.as_ref().map_or(TYPICAL, |noise| noise.independent) + FINEST;
         let on_object = pixels.on_object(FEWEST);
         if on_object.len() >= FEWEST {
-            let [size, offset] = medians(&on_object);
-            found.extend([("depth residual", size / unit), ("depth offset", offset / unit)]);
+            found.extend(size(&on_object).map(|size| ("depth residual", size / unit)));
+            found.extend(offset(&on_object).map(|offset| ("depth offset", offset / unit)));
             let of_patches = of_patches(&on_object).map(|rms| rms / unit);
             found.extend(of_patches.map(|rms| ("depth residual of patches", rms)));
         }
         let on_hand = pixels.on_hand();
         if on_hand.len() >= FEWEST {
-            let [size, offset] = medians(&on_hand);
-            found.insert("hand depth residual", size / unit);
-            found.insert("hand depth offset", offset / unit);
+            found.extend(size(&on_hand).map(|size| ("hand depth residual", size / unit)));
+            found.extend(offset(&on_hand).map(|offset| ("hand depth offset", offset / unit)));
         }
         found.extend(noise.as_ref().map(|noise| ("correlated depth noise", noise.correlated)));
         let [lacks, exceeds] = pixels.mask_misfit();
@@ -145,21 +144,18 @@ fn of_calibrations(
     state: &State,
     prior: &PriorSettings,
 ) -> impl Iterator<Item = (&'static str, f64)> + use<> {
-    let mut found = Vec::new();
-    let (is, was) = (state.camera.parameters(), said.camera.parameters());
-    let [scale, bias, _, _, focal, _] = std::array::from_fn(|k| is[k] - was[k]);
-    found.push(("depth scale", scale.abs() / prior.depth_scale));
-    found.push(("depth bias", bias.abs() / prior.depth_bias));
-    found.push(("focal length", focal.abs() / prior.focal_scale));
+    let off = state.calibration_deviation(said);
+    let joints = said.joints.len();
+    let [scale, bias, _, _, focal, _] = std::array::from_fn(|k| off[6 + joints + k].abs());
+    let mut found = vec![
+        ("depth scale", scale / prior.depth_scale),
+        ("depth bias", bias / prior.depth_bias),
+        ("focal length", focal / prior.focal_scale),
+    ];
     if in_hand {
-        let motion = state.t_cam_hand * said.t_cam_hand.inverse();
-        let off = motion * nalgebra::Point3::from(said.center()) - said.center();
-        found.push(("hand position", off.coords.norm() / prior.hand_translation));
-        let sigmas = prior.sigmas(Block::Joints(said.joints.len()));
-        let off = state.joints.iter().zip(&said.joints).zip(sigmas);
-        let off = off.map(|((is, said), sigma)| (is - said).abs() / sigma);
-        if !said.joints.is_empty() {
-            found.push(("joint position", off.fold(0.0, f64::max)));
+        found.push(("hand position", off.rows(0, 3).norm() / prior.hand_translation));
+        if joints > 0 {
+            found.push(("joint position", off.rows(6, joints).amax() / prior.joints));
         }
     }
     found.into_iter()
@@ -178,12 +174,12 @@ fn of_patches(residuals: &[([usize; 2], f64)]) -> Option<f64> {
     (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
 }
 
-/// Medians of the sizes of residuals, and the size of their median.
-fn medians(residuals: &[([usize; 2], f64)]) -> [f64; 2] {
-    let median = |of: fn(f64) -> f64| {
-        let mut values: Vec<f64> = residuals.iter().map(|(_, r)| of(*r)).collect();
-        let middle = values.len() / 2;
-        *values.select_nth_unstable_by(middle, f64::total_cmp).1
-    };
-    [median(f64::abs), median(|r| r).abs()]
+/// Median size of residuals.
+fn size(residuals: &[([usize; 2], f64)]) -> Option<f64> {
+    median(residuals.iter().map(|(_, residual)| residual.abs()))
+}
+
+/// Size of the median residual.
+fn offset(residuals: &[([usize; 2], f64)]) -> Option<f64> {
+    median(residuals.iter().map(|(_, residual)| *residual)).map(f64::abs)
 }

@@ -1,14 +1,14 @@
 //! The object at a pose and the hand, drawn beside what was sensed.
 
 use nalgebra::{Isometry3, Vector3};
-use prehend_render::{DepthImage, depth_map};
+use prehend_render::{Camera, DepthImage, depth_map};
 
-use crate::scene::frame::hand_depth;
-use crate::scene::{Object, Observation};
+use super::frame::hand_depth;
+use super::{Object, Observation};
 
 /// What should be seen, and what is.
-pub(super) struct View<'a> {
-    pub(super) observation: &'a Observation,
+pub(crate) struct View<'a> {
+    pub(crate) observation: &'a Observation,
     /// Depth of the whole object at the pose \[m\], 0 where it is not.
     object: DepthImage,
     /// Depth of the hand \[m\], 0 where it is not or not known.
@@ -19,23 +19,23 @@ pub(super) struct View<'a> {
 
 /// One pixel of it. Depths are in meters, 0 for none.
 #[derive(Clone, Copy)]
-pub(super) struct Pixel {
-    pub(super) object: f32,
-    pub(super) hand: f32,
-    pub(super) sensor: f32,
-    pub(super) masked: bool,
+pub(crate) struct Pixel {
+    pub(crate) object: f32,
+    pub(crate) hand: f32,
+    pub(crate) sensor: f32,
+    pub(crate) masked: bool,
 }
 
 impl<'a> View<'a> {
-    /// With the object at `t_cam_object`, and the depth image of the hand \[m\] where it is known. All images must have the camera's
-    /// size.
-    pub(super) fn new(
+    /// With the object at `t_cam_object` before `camera`, that of the observation or a better one of its size, and the depth image of
+    /// the hand \[m\] where it is known. All images must have the camera's size.
+    pub(crate) fn new(
         observation: &'a Observation,
+        camera: &Camera,
         object: &Object,
         hand: Option<DepthImage>,
         t_cam_object: &Isometry3<f64>,
     ) -> Self {
-        let camera = &observation.camera;
         let hand = hand.unwrap_or_else(|| hand_depth(camera, None));
         let object = depth_map(camera, &[(&object.model, *t_cam_object)]);
         let mut view = Self { observation, object, hand, covered: Vec::new() };
@@ -46,18 +46,18 @@ impl<'a> View<'a> {
     }
 
     /// Width and height \[px\].
-    pub(super) fn size(&self) -> (usize, usize) {
+    pub(crate) fn size(&self) -> (usize, usize) {
         (self.hand.width(), self.hand.height())
     }
 
     /// All pixels that object, hand or mask cover, row by row, each with its column and row.
-    pub(super) fn pixels(&self) -> impl Iterator<Item = ([usize; 2], Pixel)> {
+    pub(crate) fn pixels(&self) -> impl Iterator<Item = ([usize; 2], Pixel)> {
         let width = self.size().0;
         self.covered.iter().map(move |&i| ([i % width, i / width], self.pixel(i)))
     }
 
     /// The same of those that are farther than `margin` \[px\] from the image's border, each with its index, row by row.
-    pub(super) fn inner_pixels(&self, margin: usize) -> impl Iterator<Item = (usize, Pixel)> {
+    pub(crate) fn inner_pixels(&self, margin: usize) -> impl Iterator<Item = (usize, Pixel)> {
         let (width, height) = self.size();
         let inside = move |at: usize, size: usize| at >= margin && at + margin < size;
         let pixels =
@@ -67,7 +67,7 @@ impl<'a> View<'a> {
 
     /// The pixel of that index, row by row.
     #[inline]
-    pub(super) fn pixel(&self, index: usize) -> Pixel {
+    pub(crate) fn pixel(&self, index: usize) -> Pixel {
         Pixel {
             object: self.object.pixels()[index],
             hand: self.hand.pixels()[index],
@@ -76,15 +76,21 @@ impl<'a> View<'a> {
         }
     }
 
-    /// What moves the object, its center at depth `z`, to where mask and depth have it (camera frame) \[m\]; none if mask and
-    /// object do not meet.
-    pub(super) fn toward_seen(&self, z: f64) -> Option<Vector3<f64>> {
+    /// Sums over the pixels of the mask, and over those that should show the object: column, row and number.
+    pub(crate) fn sums(&self) -> [Vector3<f64>; 2] {
         let (mut mask, mut model) = (Vector3::zeros(), Vector3::zeros());
         for ([x, y], pixel) in self.pixels() {
             let at = Vector3::new(x as f64, y as f64, 1.0);
             mask += at * f64::from(u8::from(pixel.masked));
             model += at * f64::from(u8::from(pixel.shows_object()));
         }
+        [mask, model]
+    }
+
+    /// What moves the object, its center at depth `z`, to where mask and depth have it (camera frame) \[m\]; none if mask and
+    /// object do not meet.
+    pub(crate) fn toward_seen(&self, z: f64) -> Option<Vector3<f64>> {
+        let [mask, model] = self.sums();
         let forward = median(self.depths_on_object().map(|(sensor, object)| sensor - object))?;
         let camera = &self.observation.camera;
         let place = |sum: Vector3<f64>, z| camera.unproject(sum.x / sum.z, sum.y / sum.z, z);
@@ -92,7 +98,7 @@ impl<'a> View<'a> {
     }
 
     /// Sensor's and object's depth \[m\] where the mask shows the object.
-    pub(super) fn depths_on_object(&self) -> impl Iterator<Item = (f64, f64)> {
+    pub(crate) fn depths_on_object(&self) -> impl Iterator<Item = (f64, f64)> {
         self.pixels()
             .filter(|(_, p)| p.shows_object() && p.masked && p.sensor > 0.0)
             .map(|(_, p)| (f64::from(p.sensor), f64::from(p.object)))
@@ -101,18 +107,18 @@ impl<'a> View<'a> {
 
 impl Pixel {
     /// Whether the object should be seen there, with nothing of the hand before it.
-    pub(super) fn shows_object(&self) -> bool {
+    pub(crate) fn shows_object(&self) -> bool {
         self.object > 0.0 && (self.hand == 0.0 || self.object < self.hand)
     }
 
     /// Whether depth is within `reach` \[m\] of the hand's.
-    pub(super) fn is_on_hand(&self, reach: f64) -> bool {
+    pub(crate) fn is_on_hand(&self, reach: f64) -> bool {
         self.hand > 0.0 && self.sensor > 0.0 && f64::from((self.sensor - self.hand).abs()) < reach
     }
 }
 
 /// The middle one of `values`; none of none.
-pub(super) fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
+pub(crate) fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
     let mut values: Vec<f64> = values.collect();
     let middle = values.len() / 2;
     (middle < values.len()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
