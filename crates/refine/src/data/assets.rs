@@ -125,6 +125,7 @@ pub struct Assets<'a> {
     hands: HashMap<(PathBuf, Option<PathBuf>), Arc<Hand>>,
     cache: Option<GridCache>,
     rig: Option<Arc<Rig>>,
+    masks_optional: bool,
 }
 
 impl<'a> Assets<'a> {
@@ -137,7 +138,13 @@ impl<'a> Assets<'a> {
             hands: HashMap::new(),
             cache: None,
             rig: None,
+            masks_optional: false,
         }
+    }
+
+    /// With an empty mask where there is no file of one, which otherwise is an error.
+    pub fn with_optional_masks(self) -> Self {
+        Self { masks_optional: true, ..self }
     }
 
     /// With the distance grids of hands kept between runs in `cache`, if there is one.
@@ -206,7 +213,10 @@ impl<'a> Assets<'a> {
         instance: usize,
         required: &[Sensor],
     ) -> Result<(Observation, Option<Arc<Hand>>), AssetError> {
-        let mut observation = frame.observation(instance)?;
+        let mut observation = match frame.observation(instance) {
+            Err(DatasetError::Missing { .. }) if self.masks_optional => frame.unsegmented()?,
+            read => read?,
+        };
         let Some(bodies) = present(frame.bodies(), !required.is_empty())? else {
             return Ok((observation, None));
         };

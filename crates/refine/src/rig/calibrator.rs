@@ -1,69 +1,28 @@
 //! The way from frames to their rig.
 
 use std::collections::BTreeMap;
-use std::collections::btree_map::Entry;
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector, Isometry3};
 
 use super::deviation::SurfaceDeviation;
-use super::information::{Eliminated, FrameInformation, FramePlay};
+use super::information::{Eliminated, FrameInformation};
+use super::observability::{HandMotion, UnobservedDirection, unobserved_directions};
 use super::parameters::{Play, Rig};
+use super::pass::{Pass, PlaySquares, Sums, Visit};
+use super::residuals::FrameResiduals;
+use super::settings::CalibratorSettings;
 use crate::error::RefineError;
-use crate::factor::PriorSettings;
 use crate::problem::{Block, DepthField, ScaledCholesky, State};
 use crate::refine;
-use crate::scene::{Frame, Hand, Object, Observation};
-use crate::strategy::Fused;
-
-/// Settings of a [`Calibrator`]: how frames are refined, and standard deviations of what is wrong with a rig.
-#[derive(Clone, Debug)]
-pub struct CalibratorSettings {
-    /// How frames are refined, and how good models are.
-    pub fused: Fused,
-    /// Hand, joints and camera. The hand's are of its place and rotation both in its own axes and in those of the camera.
-    pub prior: PriorSettings,
-    /// The coefficients of the smooth field that depth is off by \[m\].
-    pub depth_offset: f64,
-    /// Play, as it is expected until frames say how much there is.
-    pub play: Play,
-    /// So many frames would outweigh that.
-    pub play_weight: f64,
-    /// Cells of the field that depth is off by, along the width of images.
-    pub depth_cells: usize,
-}
-
-impl Default for CalibratorSettings {
-    /// A robot and a depth camera of common accuracy, as in a single frame; a hand that may be off in both ways.
-    fn default() -> Self {
-        Self {
-            fused: Fused::default(),
-            prior: PriorSettings {
-                hand_translation: 3e-3,
-                hand_rotation: 10e-3,
-                ..PriorSettings::default()
-            },
-            depth_offset: 3e-3,
-            play: Play { hand_translation: 4e-4, hand_rotation: 1.5e-3, joints: 4e-3 },
-            play_weight: 5.0,
-            depth_cells: 4,
-        }
-    }
-}
-
-impl CalibratorSettings {
-    /// Standard deviations of the parameters of a rig.
-    fn sigmas(&self, joints: usize, offsets: usize) -> DVector<f64> {
-        let blocks = [Block::HandPose, Block::HandPose, Block::Joints(joints), Block::Camera];
-        let mut sigmas = blocks.map(|block| self.prior.sigmas(block)).concat();
-        sigmas.resize(sigmas.len() + offsets, self.depth_offset);
-        DVector::from_vec(sigmas)
-    }
-}
+use crate::scene::{Frame, Hand, Object, Observation, View};
+use crate::strategy::{Fused, Modality};
 
 /// A frame of a rig, and where its object is thought to be.
+#[derive(Clone)]
 pub struct CalibrationFrame {
-    /// What was observed, as it was.
+    /// What was observed, as it was. Without a mask, the object is looked for where it should be, which needs a good pose: its outline then
+    /// says nothing.
     pub observation: Observation,
     /// The object's number.
     pub obj_id: u32,
@@ -71,26 +30,17 @@ pub struct CalibrationFrame {
     pub hand: Arc<Hand>,
     /// Object → camera \[m\].
     pub initial: Isometry3<f64>,
-}
-
-/// What a visit has found of a frame.
-pub struct Visit {
-    obj_id: u32,
-    information: FrameInformation,
-    disagreement: f64,
-    /// By how many times more than is usual the frame disagrees with the rig, if that is so much that it is left out: its pose is wrong, or the
-    /// rig was another then.
-    pub left_out: Option<f64>,
-    /// Object → camera \[m\].
-    pub t_cam_object: Isometry3<f64>,
+    /// Whether that is what a visit has found with much the same rig: the next one then only refines it further.
+    pub is_refined: bool,
 }
 
 /// A rig in the making, pass by pass over its frames: each is [visited](Self::visit), what it says is [summed up](Pass::add), and
-/// after the last of a pass the rig is [solved](Self::solve) for.
+/// after the last of a pass the rig is [solved](Self::solve) for. What frames have said is [kept](Self::keep) when others follow.
 ///
 /// All frames' poses and the rig are one nonlinear least-squares problem. A visit refines a frame and eliminates all that is the
-/// frame's own (Schur's complement), so that memory is needed for the rig and its objects, and some 100 kB for a frame's play. A visit belongs
-/// to the calibrator that made it.
+/// frame's own (Schur's complement), so that memory is needed for the rig and its objects, and for the play of the frames of a pass, some
+/// 100 kB each. A visit belongs to the calibrator that made it.
+#[derive(Clone)]
 pub struct Calibrator {
     settings: CalibratorSettings,
     rig: Rig,
@@ -100,46 +50,23 @@ pub struct Calibrator {
     models: BTreeMap<u32, Model>,
     /// How much frames disagree with the rig, half of them less; unknown as long as it is nominal.
     usual_disagreement: Option<f64>,
+    /// What frames have said that are not visited any more, about the parameters that there are now.
+    kept: Sums,
+    kept_play: PlaySquares,
+    /// Solutions since then that the rig is the mean of; none while it is still on its way.
+    averaged: usize,
 }
+
+/// A rig is on its way while a parameter changes by so many of its deviations.
+const ON_ITS_WAY: f64 = 2.0;
 
 /// A frame that disagrees so many times more than is usual is left out.
 const LEFT_OUT: f64 = 3.5;
 
+#[derive(Clone)]
 struct Model {
     given: Arc<Object>,
     corrected: Arc<Object>,
-}
-
-/// What the frames of a pass have said. Sums are the same for the same order of frames.
-#[derive(Default)]
-pub struct Pass {
-    /// By object: normal equations of the rig's parameters, and then of the object's coefficients.
-    sums: BTreeMap<u32, (DMatrix<f64>, DVector<f64>)>,
-    /// By frame, with its object's number.
-    play: Vec<(u32, FramePlay)>,
-    /// By frame, those left out among them.
-    disagreements: Vec<f64>,
-}
-
-impl Pass {
-    /// Adds what a frame has said, unless it is left out.
-    pub fn add(&mut self, visit: Visit) {
-        let Visit { obj_id, information, disagreement, left_out, .. } = visit;
-        self.disagreements.push(disagreement);
-        if left_out.is_some() {
-            return;
-        }
-        let FrameInformation { hessian, gradient, play } = information;
-        match self.sums.entry(obj_id) {
-            Entry::Vacant(none) => drop(none.insert((hessian, gradient))),
-            Entry::Occupied(mut sum) => {
-                let (of_hessian, of_gradient) = sum.get_mut();
-                *of_hessian += hessian;
-                *of_gradient += gradient;
-            }
-        }
-        self.play.push((obj_id, play));
-    }
 }
 
 impl Calibrator {
@@ -169,7 +96,16 @@ impl Calibrator {
             models.insert(id, Model { corrected: Arc::clone(&given), given });
         }
         let prior = sigmas.map(|sigma| sigma.powi(-2));
-        Ok(Self { settings, rig, prior, models, usual_disagreement: None })
+        Ok(Self {
+            settings,
+            rig,
+            prior,
+            models,
+            usual_disagreement: None,
+            kept: Sums::default(),
+            kept_play: PlaySquares::default(),
+            averaged: 0,
+        })
     }
 
     /// The rig as it is known so far.
@@ -187,54 +123,148 @@ impl Calibrator {
     /// # Errors
     /// If the frame cannot be refined, does not fit the rig, or is of another object than there are.
     pub fn visit(&self, frame: &CalibrationFrame) -> Result<Visit, RefineError> {
-        let CalibrationFrame { observation, obj_id, hand, initial } = frame;
-        let Some(model) = self.models.get(obj_id) else {
-            let problem = format!("is calibrated without object {obj_id}");
-            return Err(RefineError::Setting { name: "rig", problem });
-        };
-        let observation = self.rig.corrected(observation)?;
-        let frame = Frame::new(&observation, &model.corrected, Some(hand))?.with_rig(&self.rig);
-        let fused = &self.settings.fused;
-        let found = refine(&frame, initial, fused)?;
+        let CalibrationFrame { obj_id, hand, initial, is_refined, .. } = frame;
+        let (observation, mut fused) = self.corrected(frame)?;
+        if *is_refined {
+            let stages = &mut fused.settings.stages;
+            stages.drain(..stages.len().saturating_sub(1));
+            fused.settings.restart_angle = 0.0;
+        }
+        let frame =
+            Frame::new(&observation, self.object(*obj_id)?, Some(hand))?.with_rig(&self.rig);
+        let found = refine(&frame, initial, &fused)?;
         let t_cam_object = *found.t_cam_object();
-        let said = State::new(&frame, &t_cam_object)?;
-        let sigmas = fused.settings.prior.sigmas(Block::ObjectPose);
-        let field = self.rig.objects.get(obj_id);
-        let evidence = fused.evidence(&frame, &found.state, &self.rig.depth_field)?;
-        let information = evidence.and_then(|evidence| {
-            FrameInformation::new(&evidence, &said, &self.rig, field, &sigmas)
-        });
-        let Some(information) = information else {
-            let problem = "a rig needs all of them estimated, in at least one stage".into();
-            return Err(RefineError::Setting { name: "nuisances", problem });
-        };
+        let information = self.information(&frame, &fused, *obj_id, &found.state)?;
         let disagreement = information.disagreement(&self.prior).ok_or_else(not_finite)?;
         let times = self.usual_disagreement.map(|usual| disagreement / usual);
         let left_out = times.filter(|times| *times > LEFT_OUT);
         Ok(Visit { obj_id: *obj_id, information, disagreement, left_out, t_cam_object })
     }
 
-    /// Solves for the rig by what the frames of a pass have said. Returns by how many of its deviations the parameter that has changed
-    /// most has done so.
+    /// How well a frame, as the rig corrects it, fits what is said of it: [`CalibrationFrame::initial`] should be the pose that a visit has
+    /// found.
+    ///
+    /// # Errors
+    /// If the frame does not fit the rig, or is of another object than there are.
+    pub fn residuals(&self, frame: &CalibrationFrame) -> Result<FrameResiduals, RefineError> {
+        let has_mask = frame.observation.mask.count() > 0;
+        let (observation, fused) = self.corrected(frame)?;
+        let object = self.object(frame.obj_id)?;
+        let corrected = Frame::new(&observation, object, Some(&frame.hand))?;
+        FrameResiduals::new(&corrected, &frame.initial, &fused.settings.tactile, has_mask)
+    }
+
+    /// The rig's directions that frames have hardly told yet, the least known first, and for each which motion of the hand of `frame` would
+    /// tell most; [`CalibrationFrame::initial`] should be the pose that a visit has found.
+    ///
+    /// # Errors
+    /// Those of a visit.
+    pub fn unobserved(
+        &self,
+        frame: &CalibrationFrame,
+    ) -> Result<Vec<UnobservedDirection>, RefineError> {
+        let CalibrationFrame { obj_id, hand, initial, .. } = frame;
+        let (observation, fused) = self.corrected(frame)?;
+        let object = self.object(*obj_id)?;
+        let seen = Frame::new(&observation, object, Some(hand))?;
+        let mut fused = fused.with_noise_of(&seen, &State::new(&seen, initial)?);
+        // Nobody knows what colors would be.
+        fused.settings.modalities.retain(|modality| *modality != Modality::Color);
+        let mut motions = Vec::new();
+        for motion in HandMotion::all(&(initial * object.center)) {
+            let Some((predicted, pose)) = motion.predict(&observation, object, hand, initial)
+            else {
+                continue;
+            };
+            let frame = Frame::new(&predicted, object, Some(hand))?.with_rig(&self.rig);
+            let state = State::new(&frame, &pose)?;
+            let FrameInformation { hessian, .. } =
+                self.information(&frame, &fused, *obj_id, &state)?;
+            motions.push((motion, self.of_rig(&hessian).ok_or_else(not_finite)?));
+        }
+        unobserved_directions(&self.rig, &self.prior, &motions).ok_or_else(not_finite)
+    }
+
+    /// The part of a frame's information that is of the rig's parameters, its object's coefficients eliminated.
+    fn of_rig(&self, hessian: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+        let n = self.rig.len();
+        let m = hessian.nrows() - n;
+        let own = hessian.view((n, n), (m, m)) + DMatrix::identity(m, m);
+        let coupling = hessian.view((n, 0), (m, n));
+        let through = own.cholesky()?.solve(&coupling.into_owned());
+        Some(hessian.view((0, 0), (n, n)) - coupling.tr_mul(&through))
+    }
+
+    /// What a frame shows when the rig is corrected, and how it is refined.
+    fn corrected(&self, frame: &CalibrationFrame) -> Result<(Observation, Fused), RefineError> {
+        let CalibrationFrame { observation, obj_id, hand, initial, .. } = frame;
+        let (object, mut fused) = (self.object(*obj_id)?, self.settings.fused.clone());
+        let mut observation = self.rig.corrected(observation)?;
+        if observation.mask.count() == 0 {
+            observation.mask =
+                View::of_observation(&observation, object, hand, initial)?.likely_mask();
+            fused.settings.modalities.retain(|modality| *modality != Modality::Silhouette);
+        }
+        Ok((observation, fused))
+    }
+
+    /// The corrected model of an object.
+    ///
+    /// # Errors
+    /// If there is none of that number.
+    pub fn object(&self, obj_id: u32) -> Result<&Arc<Object>, RefineError> {
+        let Some(model) = self.models.get(&obj_id) else {
+            let problem = format!("is calibrated without object {obj_id}");
+            return Err(RefineError::Setting { name: "rig", problem });
+        };
+        Ok(&model.corrected)
+    }
+
+    /// What `frame`, corrected, says of the rig if its state is `state`.
+    fn information(
+        &self,
+        frame: &Frame<'_>,
+        fused: &Fused,
+        obj_id: u32,
+        state: &State,
+    ) -> Result<FrameInformation, RefineError> {
+        let said = State::new(frame, &state.t_cam_object)?;
+        let sigmas = fused.settings.prior.sigmas(Block::ObjectPose);
+        let field = self.rig.objects.get(&obj_id);
+        let evidence = fused.evidence(frame, state, &self.rig.depth_field)?;
+        let information = evidence.and_then(|evidence| {
+            FrameInformation::new(&evidence, &said, &self.rig, field, &sigmas)
+        });
+        information.ok_or_else(|| {
+            let problem = "a rig needs all of them estimated, in at least one stage".into();
+            RefineError::Setting { name: "nuisances", problem }
+        })
+    }
+
+    /// Solves for the rig by what the frames of a pass have said, and those [kept](Self::keep). Returns by how many of its deviations the
+    /// parameter that has changed most has done so.
+    ///
+    /// From pass to pass solutions scatter by some tenths of their deviations, because each visit chooses anew which pixels it looks at. So
+    /// from the first that is within two deviations of the one before, the rig is the mean of solutions (Polyak and Juditsky, 1992).
     ///
     /// # Errors
     /// If nothing or nothing finite was said, or a corrected model cannot be used.
-    pub fn solve(&mut self, mut pass: Pass) -> Result<f64, RefineError> {
+    pub fn solve(&mut self, pass: &mut Pass) -> Result<f64, RefineError> {
         let n = self.rig.len();
-        if pass.sums.is_empty() {
+        if pass.sums.0.is_empty() {
             let problem = "no frame of a pass says anything of it".into();
             return Err(RefineError::Setting { name: "rig", problem });
         }
         // What frames say of a rig that nothing is known of is no disagreement yet.
-        pass.disagreements.sort_by(f64::total_cmp);
-        let middle = pass.disagreements.get(pass.disagreements.len() / 2);
-        let usual = middle.copied().filter(|usual| *usual > 0.0);
+        let usual = pass.usual_disagreement();
         self.usual_disagreement = usual.filter(|_| self.rig.is_known(&self.prior));
+        let mut sums = self.kept.clone();
+        sums.merge(pass.sums.clone());
         let mut hessian = DMatrix::from_diagonal(&self.prior);
         let mut gradient = self.prior.component_mul(&self.rig.values());
         // Objects have to do with the rig alone: each is eliminated by itself.
         let mut eliminated = BTreeMap::new();
-        for (id, (of_object, pull)) in &pass.sums {
+        for (id, (of_object, pull)) in &sums.0 {
             let m = pull.len() - n;
             hessian += of_object.view((0, 0), (n, n));
             gradient += pull.rows(0, n);
@@ -254,40 +284,50 @@ impl Calibrator {
         let factor = ScaledCholesky::new(&hessian, 0.0).ok_or_else(not_finite)?;
         let covariance = factor.inverse();
         let change = -(&covariance * gradient);
-        self.expect_play(
-            pass.play
-                .iter()
-                .map(|(id, play)| play.expected_squares(&change, &covariance, eliminated.get(id))),
-        );
+        pass.expect_play(&change, &covariance, &eliminated);
+        self.take_play(pass.squares);
+        let deviations = covariance.diagonal().map(f64::sqrt);
+        if self.averaged > 0 || change.component_div(&deviations).amax() < ON_ITS_WAY {
+            self.averaged += 1;
+        }
+        let share = 1.0 / self.averaged.max(1) as f64;
+        let mut of_objects = BTreeMap::new();
         for (id, Eliminated { at_rest, by_parameters, covariance: of_object }) in &eliminated {
             if let (Some(field), Some(model)) =
                 (self.rig.objects.get_mut(id), self.models.get_mut(id))
             {
                 let all = of_object + by_parameters * &covariance * by_parameters.transpose();
-                field.change(&(at_rest + by_parameters * &change), &all);
+                let of_field = (at_rest + by_parameters * &change) * share;
+                field.change(&of_field, &all);
                 model.corrected = Arc::new(field.corrected(&model.given)?);
+                of_objects.insert(*id, of_field);
             }
         }
-        let deviations = covariance.diagonal().map(f64::sqrt);
+        let change = change * share;
         self.rig = self.rig.changed(change.as_slice());
         self.rig.covariance = covariance;
+        self.kept.shift(&change, &of_objects);
+        pass.sums.shift(&change, &of_objects);
         Ok(change.component_div(&deviations).amax())
     }
 
-    /// Takes the play from the squares that it is expected to have in each frame (expectation and maximization).
-    fn expect_play(&mut self, squares: impl Iterator<Item = DVector<f64>>) {
-        let expected = self.settings.play;
-        let mut sums = [expected.hand_translation, expected.hand_rotation, expected.joints]
-            .map(|sigma| self.settings.play_weight * sigma * sigma);
-        let mut count = self.settings.play_weight;
-        for squares in squares {
-            sums[0] += squares.rows(0, 3).mean();
-            sums[1] += squares.rows(3, 3).mean();
-            let joints = squares.rows(6, squares.len() - 6);
-            sums[2] += if joints.is_empty() { 0.0 } else { joints.mean() };
-            count += 1.0;
-        }
-        let [hand_translation, hand_rotation, joints] = sums.map(|sum| (sum / count).sqrt());
+    /// Keeps what the frames of a pass that was [solved](Self::solve) for have said; they need no visits any more. What a frame says is
+    /// linear in the rig from then on, and its memory is free.
+    pub fn keep(&mut self, pass: Pass) {
+        self.kept.merge(pass.sums);
+        self.kept_play.merge(&pass.squares);
+        self.averaged = 0;
+    }
+
+    /// Takes the play from the squares that it is expected to have in the frames of a pass and those kept (expectation and
+    /// maximization).
+    fn take_play(&mut self, mut squares: PlaySquares) {
+        let (expected, weight) = (self.settings.play, self.settings.play_weight);
+        let sigmas = [expected.hand_translation, expected.hand_rotation, expected.joints];
+        squares.merge(&self.kept_play);
+        squares.merge(&PlaySquares { sums: sigmas.map(|s| weight * s * s), frames: weight });
+        let deviation = |sum: f64| (sum / squares.frames).sqrt();
+        let [hand_translation, hand_rotation, joints] = squares.sums.map(deviation);
         self.rig.play = Play { hand_translation, hand_rotation, joints };
     }
 }

@@ -7,8 +7,16 @@ mod calibrator;
 mod deviation;
 mod file;
 mod information;
+mod observability;
 mod parameters;
+mod pass;
+mod residuals;
+mod settings;
 
-pub use self::calibrator::{CalibrationFrame, Calibrator, CalibratorSettings, Pass, Visit};
+pub use self::calibrator::{CalibrationFrame, Calibrator};
 pub use self::deviation::SurfaceDeviation;
+pub use self::observability::{HandMotion, UnobservedDirection};
 pub use self::parameters::{Play, Rig};
+pub use self::pass::{Pass, Visit};
+pub use self::residuals::{FrameResiduals, Residuals};
+pub use self::settings::CalibratorSettings;

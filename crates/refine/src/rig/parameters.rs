@@ -86,6 +86,11 @@ impl Rig {
         POSES + self.joints.len() + CameraCalibrationError::DIMENSION
     }
 
+    /// Where depth's bias is among them.
+    pub(super) fn depth_bias(&self) -> usize {
+        POSES + self.joints.len() + 1
+    }
+
     /// The parameters, zero where nothing is corrected.
     pub(super) fn values(&self) -> DVector<f64> {
         let poses = [&self.in_hand, &self.in_camera];

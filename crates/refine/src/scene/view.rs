@@ -1,10 +1,11 @@
 //! The object at a pose and the hand, drawn beside what was sensed.
 
 use nalgebra::{Isometry3, Vector3};
-use prehend_render::{Camera, DepthImage, depth_map};
+use prehend_render::{Camera, DepthImage, Mask, depth_map};
 
 use super::frame::hand_depth;
-use super::{Object, Observation};
+use super::{Hand, Object, Observation};
+use crate::error::RefineError;
 
 /// What should be seen, and what is.
 pub(crate) struct View<'a> {
@@ -16,6 +17,9 @@ pub(crate) struct View<'a> {
     /// Pixels that object, hand or mask cover, row by row.
     covered: Vec<usize>,
 }
+
+/// Depth that differs by so much from the object's is of something else \[m\].
+const ELSEWHERE: f64 = 15e-3;
 
 /// One pixel of it. Depths are in meters, 0 for none.
 #[derive(Clone, Copy)]
@@ -43,6 +47,52 @@ impl<'a> View<'a> {
         let (width, height) = view.size();
         view.covered = (0..width * height).filter(|&i| covers(view.pixel(i))).collect();
         view
+    }
+
+    /// With the object at `t_cam_object` before the camera, and the hand where it is measured.
+    ///
+    /// # Errors
+    /// If an image has not the camera's size, or there is not one joint position a joint.
+    pub(crate) fn of_observation(
+        observation: &'a Observation,
+        object: &Object,
+        hand: &Hand,
+        t_cam_object: &Isometry3<f64>,
+    ) -> Result<Self, RefineError> {
+        observation.check_sizes().map_err(|(image, problem)| {
+            RefineError::Images(format!("the {image} has {problem}"))
+        })?;
+        let camera = &observation.camera;
+        let hand = observation.hand.as_ref().map(|measured| {
+            hand.check_joints(&measured.joints)?;
+            Ok::<_, RefineError>(hand_depth(camera, Some((hand, measured))))
+        });
+        Ok(Self::new(observation, camera, object, hand.transpose()?, t_cam_object))
+    }
+
+    /// Where the object should be seen, and nothing else was measured.
+    pub(crate) fn likely_mask(&self) -> Mask {
+        let (width, height) = self.size();
+        let mut mask = Mask::filled(width, height, false);
+        for ([x, y], pixel) in self.pixels() {
+            mask.pixels_mut()[y * width + x] =
+                pixel.shows_object() && !pixel.is_off_object(ELSEWHERE);
+        }
+        mask
+    }
+
+    /// Depth images of object and hand together, and the mask that the object would have \[m\].
+    pub(crate) fn expected(&self) -> (DepthImage, Mask) {
+        let (width, height) = self.size();
+        let mut depth = DepthImage::filled(width, height, 0.0);
+        let mut mask = Mask::filled(width, height, false);
+        for ([x, y], pixel) in self.pixels() {
+            let shows_object = pixel.shows_object();
+            depth.pixels_mut()[y * width + x] =
+                if shows_object { pixel.object } else { pixel.hand };
+            mask.pixels_mut()[y * width + x] = shows_object;
+        }
+        (depth, mask)
     }
 
     /// Width and height \[px\].
@@ -109,6 +159,11 @@ impl Pixel {
     /// Whether the object should be seen there, with nothing of the hand before it.
     pub(crate) fn shows_object(&self) -> bool {
         self.object > 0.0 && (self.hand == 0.0 || self.object < self.hand)
+    }
+
+    /// Whether depth was measured, but not within `reach` \[m\] of the object's.
+    fn is_off_object(&self, reach: f64) -> bool {
+        self.sensor > 0.0 && f64::from((self.sensor - self.object).abs()) > reach
     }
 
     /// Whether depth is within `reach` \[m\] of the hand's.

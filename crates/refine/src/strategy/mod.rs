@@ -14,7 +14,7 @@ pub use fused::{
     CovarianceInflation, Fit, FitReference, FitStatistics, Fused, FusedSettings, Hypothesis,
     Inconsistency, Modality, Nuisance, Posterior, PosteriorSummary, Stage, UnobservableDirection,
 };
-pub(crate) use fused::{chi_square_z, problem_of, surface_patches};
+pub(crate) use fused::{Pixels, chi_square_z, problem_of, surface_patches};
 pub use heuristic::{GradientKind, Heuristic};
 pub use icp::Icp;
 pub use robust_icp::RobustIcp;

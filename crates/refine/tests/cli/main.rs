@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used)] // a test may panic; helpers outside test functions count as code to the lint
 
 mod bad_input;
+mod calibrate;
 mod command;
 mod eval_bop;
 mod fixture;

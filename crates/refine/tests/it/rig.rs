@@ -5,10 +5,11 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 use prehend_refine::refine;
-use prehend_refine::rig::{CalibrationFrame, Calibrator, CalibratorSettings, Pass, Rig};
-use prehend_refine::scene::{Frame, Observation, default_sequence};
+use prehend_refine::rig::{CalibrationFrame, Calibrator, CalibratorSettings, Pass, Residuals, Rig};
+use prehend_refine::scene::{Frame, Observation, Sequence, SequenceFrame, default_sequence};
 use prehend_refine::strategy::Fused;
 use prehend_refine::tracker::{Tracker, TrackerSettings};
+use prehend_render::Mask;
 
 const SHIFT_PX: f64 = 2.0;
 const DEPTH_SCALE: f64 = 1.006;
@@ -28,39 +29,66 @@ fn said(truth: &Observation) -> Observation {
     said
 }
 
+/// Frames of `sequence` as a wrong rig says them, the object where it is.
+fn frames(sequence: &Sequence) -> Vec<CalibrationFrame> {
+    let chosen = sequence.frames.iter().step_by(6);
+    let frame = |frame: &SequenceFrame| CalibrationFrame {
+        observation: said(&frame.observation),
+        obj_id: 7,
+        hand: Arc::clone(&sequence.hand),
+        initial: frame.truth,
+        is_refined: false,
+    };
+    chosen.map(frame).collect()
+}
+
+fn calibrator(sequence: &Sequence) -> Calibrator {
+    let objects = BTreeMap::from([(7, Arc::clone(&sequence.object))]);
+    Calibrator::new(16, (640, 480), objects, CalibratorSettings::default()).unwrap()
+}
+
+/// Visits `frames`, whose poses change, in so many passes; keeps what they say.
+fn learn(calibrator: &mut Calibrator, frames: &mut [CalibrationFrame], passes: usize) {
+    for number in 0..passes {
+        let mut pass = Pass::default();
+        for frame in frames.iter_mut() {
+            frame.is_refined = number > 1;
+            let visit = calibrator.visit(frame).unwrap();
+            frame.initial = visit.t_cam_object;
+            pass.add(visit);
+        }
+        calibrator.solve(&mut pass).unwrap();
+        if number + 1 == passes {
+            calibrator.keep(pass);
+        }
+    }
+}
+
 #[test]
 fn what_is_wrong_in_all_frames_is_found_and_corrected() {
     let sequence = default_sequence(1, 61).unwrap();
-    let frames: Vec<_> = sequence.frames.iter().step_by(6).collect();
-    let objects = BTreeMap::from([(7, Arc::clone(&sequence.object))]);
-    let size = (640, 480);
-    let mut calibrator = Calibrator::new(16, size, objects, CalibratorSettings::default()).unwrap();
-    let mut poses: Vec<_> = frames.iter().map(|frame| frame.truth).collect();
+    let (mut frames, mut calibrator) = (frames(&sequence), calibrator(&sequence));
     // The hand was elsewhere in one frame.
     let bumped = 4;
-    for pass in 0..6 {
-        let last = pass == 5;
+    let hand = frames[bumped].observation.hand.as_mut().unwrap();
+    hand.t_cam_hand.translation.vector += Vector3::new(0.02, -0.01, 0.01);
+    for number in 0..6 {
         let mut pass = Pass::default();
-        for (index, (frame, pose)) in frames.iter().zip(&mut poses).enumerate() {
-            let hand = Arc::clone(&sequence.hand);
-            let mut observation = said(&frame.observation);
-            if index == bumped {
-                let hand = observation.hand.as_mut().unwrap();
-                hand.t_cam_hand.translation.vector += Vector3::new(0.02, -0.01, 0.01);
-            }
-            let frame = CalibrationFrame { observation, obj_id: 7, hand, initial: *pose };
-            let visit = calibrator.visit(&frame).unwrap();
-            *pose = visit.t_cam_object;
-            assert!(!last || visit.left_out.is_some() == (index == bumped), "frame {index}");
+        for (index, frame) in frames.iter_mut().enumerate() {
+            frame.is_refined = number > 1;
+            let visit = calibrator.visit(frame).unwrap();
+            frame.initial = visit.t_cam_object;
+            let left_out = visit.left_out.is_some();
+            assert!(number < 5 || left_out == (index == bumped), "frame {index}");
             pass.add(visit);
         }
-        calibrator.solve(pass).unwrap();
+        calibrator.solve(&mut pass).unwrap();
     }
     // Within four of its own deviations. The camera hardly moves towards the hand here, so that much of it stays unknown.
     let rig = calibrator.rig();
     let sigmas = rig.covariance.diagonal().map(f64::sqrt);
     let names = rig.parameters();
-    let focal = frames[0].observation.camera.fx;
+    let focal = sequence.frames[0].observation.camera.fx;
     for (k, (name, found)) in names.iter().enumerate() {
         let expected = match name.as_str() {
             "depth scale" => DEPTH_SCALE - 1.0,
@@ -138,6 +166,66 @@ fn what_is_wrong_in_all_frames_is_found_and_corrected() {
     let (with, sure) = track(&object, Some(&Arc::new(rig)));
     println!("tracked {alone} ± {unsure} → {with} ± {sure}");
     assert!(sure < 0.99 * unsure && with < 1.1 * alone, "{alone} ± {unsure} → {with} ± {sure}");
+}
+
+#[test]
+fn what_frames_have_said_is_kept_and_masks_may_be_missing() {
+    let sequence = default_sequence(1, 61).unwrap();
+    let mut at_once = calibrator(&sequence);
+    learn(&mut at_once, &mut frames(&sequence), 4);
+    // Two windows, one after the other; in the second without masks.
+    let mut in_windows = calibrator(&sequence);
+    let mut frames = frames(&sequence);
+    let half = frames.len() / 2;
+    learn(&mut in_windows, &mut frames[..half], 4);
+    let of_half = in_windows.rig().covariance.trace();
+    for frame in &mut frames[half..] {
+        frame.observation.mask = Mask::filled(640, 480, false);
+    }
+    learn(&mut in_windows, &mut frames[half..], 4);
+    let (a, b) = (at_once.rig(), in_windows.rig());
+    assert!(b.covariance.trace() < 0.999 * of_half);
+    let sigmas = a.covariance.diagonal().map(f64::sqrt);
+    for ((name, value), (k, (_, other))) in
+        a.parameters().iter().zip(b.parameters().iter().enumerate())
+    {
+        let off = (value - other).abs() / sigmas[k];
+        let wider = (b.covariance[(k, k)] / a.covariance[(k, k)]).sqrt();
+        println!("{name}: {off} deviations apart, {wider} times as wide");
+        assert!(off < 1.5 && (0.6..1.6).contains(&wider), "{name}: {off}, {wider}");
+    }
+    // Poses without masks are no worse than a little.
+    for (frame, told) in frames[half..].iter().zip(sequence.frames.iter().step_by(6).skip(half)) {
+        let center = sequence.object.center;
+        let off = (frame.initial * center - told.truth * center).norm();
+        assert!(off < 3e-3, "{off}");
+    }
+    // What the rig explains is left no more.
+    let residuals = |calibrator: &Calibrator| {
+        let mut residuals = Residuals::new((640, 480));
+        let all = frames[..half].iter().map(|frame| calibrator.residuals(frame).unwrap());
+        all.for_each(|frame| residuals.add(&frame));
+        residuals
+    };
+    let (before, after) = (residuals(&calibrator(&sequence)), residuals(&in_windows));
+    for ((name, _, offset, size), (_, _, new_offset, new_size)) in
+        before.rows().into_iter().zip(after.rows())
+    {
+        println!("{name}: {size} ({offset:?}) → {new_size} ({new_offset:?})");
+        assert!(new_size < 1.1 * size, "{name}: {size} → {new_size}");
+    }
+    let names: Vec<_> = before.rows().iter().map(|row| (row.0, row.2.is_some())).collect();
+    let expected = [("depth on the hand", true), ("depth on the object", true)];
+    assert_eq!(names, [&expected[..], &[("outline", false), ("touched skin", true)]].concat());
+    // The hand's motion in this sequence does not change its distance: which motion would tell is said.
+    let unobserved = in_windows.unobserved(&frames[0]).unwrap();
+    assert!(!unobserved.is_empty());
+    for direction in &unobserved {
+        println!("{direction:?}");
+        assert!((0.5..1.001).contains(&direction.deviation));
+        assert!(direction.motion.is_none_or(|(_, left)| left < direction.deviation));
+    }
+    assert!(unobserved.iter().any(|direction| direction.motion.is_some()));
 }
 
 #[test]

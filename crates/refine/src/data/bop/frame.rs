@@ -184,19 +184,40 @@ impl Frame<'_> {
     /// The first of those of [`Frame::rgb`], [`Frame::depth`] and [`Frame::mask`], and
     /// images that differ in size.
     pub fn observation(&self, instance: usize) -> Result<Observation, DatasetError> {
-        let (rgb, depth, mask) = (self.rgb()?, self.depth()?, self.mask(instance)?);
-        let (width, height) = (rgb.width(), rgb.height());
-        let sizes = [
-            (self.depth_path(), (depth.width(), depth.height())),
-            (self.mask_path(instance)?, (mask.width(), mask.height())),
-        ];
-        if let Some((file, (w, h))) = sizes.into_iter().find(|(_, size)| *size != (width, height)) {
-            let other = self.rgb_path()?;
-            let problem = format!("is {w}x{h} pixels but {} is {width}x{height}", other.display());
-            return Err(DatasetError::unusable(&file, problem));
+        let unsegmented = self.unsegmented()?;
+        let mask = self.mask(instance)?;
+        self.check_size(&self.mask_path(instance)?, (mask.width(), mask.height()), &unsegmented)?;
+        Ok(Observation { mask, ..unsegmented })
+    }
+
+    /// The same with an empty mask.
+    ///
+    /// # Errors
+    /// Those of [`Frame::rgb`] and [`Frame::depth`], and if the images differ in size.
+    pub fn unsegmented(&self) -> Result<Observation, DatasetError> {
+        let (color, depth) = (self.rgb()?, self.depth()?);
+        let (width, height) = (color.width(), color.height());
+        let (camera, mask) = (self.camera(width, height), Mask::filled(width, height, false));
+        let depth_size = (depth.width(), depth.height());
+        let observation = Observation { camera, color, depth, mask, gravity: None, hand: None };
+        self.check_size(&self.depth_path(), depth_size, &observation)?;
+        Ok(observation)
+    }
+
+    /// Refuses an image in `file` of another size than the color image.
+    fn check_size(
+        &self,
+        file: &Path,
+        (w, h): (usize, usize),
+        Observation { color, .. }: &Observation,
+    ) -> Result<(), DatasetError> {
+        let (width, height) = (color.width(), color.height());
+        if (w, h) == (width, height) {
+            return Ok(());
         }
-        let camera = self.camera(width, height);
-        Ok(Observation { camera, color: rgb, depth, mask, gravity: None, hand: None })
+        let other = self.rgb_path()?;
+        let problem = format!("is {w}x{h} pixels but {} is {width}x{height}", other.display());
+        Err(DatasetError::unusable(file, problem))
     }
 
     /// Gravity and the known robots, from `scene_bodies.json`.

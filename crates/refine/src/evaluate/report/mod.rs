@@ -8,4 +8,4 @@ mod picture;
 
 #[cfg(feature = "cli")]
 pub use page::{FrameReport, Report};
-pub use picture::{before_and_after, outline_picture};
+pub use picture::{before_and_after, depth_residual_picture, outline_picture, rig_picture};

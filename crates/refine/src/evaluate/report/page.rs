@@ -97,6 +97,19 @@ impl Report {
         Ok(())
     }
 
+    /// Adds a table: a heading a column, and rows of as many cells.
+    pub fn add_table(&mut self, title: &str, headings: &[&str], rows: &[Vec<String>]) {
+        let cells = |tag: &str, cells: &mut dyn Iterator<Item = &str>| -> String {
+            cells.map(|cell| format!("<{tag}>{}</{tag}>", escape(cell))).collect()
+        };
+        let head = cells("th", &mut headings.iter().copied());
+        let row = |row: &Vec<String>| {
+            format!("<tr>{}</tr>", cells("td", &mut row.iter().map(String::as_str)))
+        };
+        let rows: String = rows.iter().map(row).collect();
+        self.section(title, &format!("<table><tr>{head}</tr>{rows}</table>"));
+    }
+
     fn section(&mut self, title: &str, content: &str) {
         self.body += &format!("<section><h2>{}</h2>{content}</section>\n", escape(title));
     }
@@ -125,7 +138,8 @@ const HEAD: &str = "<!doctype html><html lang=en><meta charset=utf-8><title>Preh
     body{font:15px/1.4 system-ui,sans-serif;margin:2em auto;max-width:1400px;color:#222}\
     section{border-top:1px solid #ddd;padding:.5em 0}section>div{display:flex;flex-wrap:wrap;gap:1em}\
     h2{font-size:1.1em;margin:.5em 0}figure{margin:0}img{max-width:100%}\
-    .before{color:#d33}.after{color:#2a4}li{color:#a40}</style><body><h1>Prehend</h1>\n";
+    table{border-collapse:collapse}td,th{padding:.1em .8em;text-align:right}\
+    td:first-child,th:first-child{text-align:left}.before{color:#d33}.after{color:#2a4}li{color:#a40}</style><body><h1>Prehend</h1>\n";
 
 fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")

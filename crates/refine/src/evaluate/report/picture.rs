@@ -1,8 +1,9 @@
 //! Overlays: the object's outline at a pose over the image.
 
 use nalgebra::Isometry3;
-use prehend_render::{RgbImage, draw_outline};
+use prehend_render::{Mask, RgbImage, draw_outline};
 
+use crate::rig::Residuals;
 use crate::scene::{Hand, Object, Observation};
 
 /// Outline of the initial pose.
@@ -22,14 +23,48 @@ pub fn before_and_after(
     before: &Isometry3<f64>,
     after: &Isometry3<f64>,
 ) -> RgbImage {
-    let mut left = brightened(observation);
-    let mut right = left.clone();
-    draw_outline(&mut left, &observation.camera, &object.model, before, BEFORE, 1.5);
-    draw_outline(&mut right, &observation.camera, &object.model, after, AFTER, 1.5);
-    let window @ [.., width, height] = window(observation);
+    let outlined = |pose, color| outlined(observation, object, None, pose, color);
+    side_by_side([outlined(before, BEFORE), outlined(after, AFTER)], window(&observation.mask))
+}
+
+/// The image around the object twice, with outlines of object and hand: as an observation, a model and a pose (object → camera \[m\]) have
+/// them before, and after a calibration.
+pub fn rig_picture(
+    before: (&Observation, &Object, &Isometry3<f64>),
+    after: (&Observation, &Object, &Isometry3<f64>),
+    hand: &Hand,
+) -> RgbImage {
+    let draw = |(observation, object, pose): (&Observation, &Object, &Isometry3<f64>), color| {
+        outlined(observation, object, Some(hand), pose, color)
+    };
+    side_by_side([draw(before, BEFORE), draw(after, AFTER)], window(&before.0.mask))
+}
+
+/// Mean residuals of depth over the image before and after a calibration: red where depth is measured too far away, blue where too near, by
+/// `brightest` \[m\] where colors are full; gray where none was seen.
+pub fn depth_residual_picture(before: &Residuals, after: &Residuals, brightest: f64) -> RgbImage {
+    let draw = |residuals: &Residuals| {
+        let (width, height) = residuals.size();
+        let mut image = RgbImage::filled(width, height, [0.6; 3]);
+        for (i, pixel) in image.pixels_mut().iter_mut().enumerate() {
+            if let Some(residual) = residuals.depth_at(i % width.max(1), i / width.max(1)) {
+                let part = (residual / brightest).clamp(-1.0, 1.0) as f32;
+                let rest = 1.0 - part.abs();
+                *pixel = if part > 0.0 { [1.0, rest, rest] } else { [rest, rest, 1.0] };
+            }
+        }
+        image
+    };
+    let (width, height) = before.size();
+    side_by_side([draw(before), draw(after)], [0, 0, width, height])
+}
+
+/// Left, top, width and height of two images, beside each other.
+fn side_by_side(images: [RgbImage; 2], window @ [.., width, height]: [usize; 4]) -> RgbImage {
     let mut pair = RgbImage::filled(2 * width + GAP, height, [1.0; 3]);
-    copy(&left, window, &mut pair, 0);
-    copy(&right, window, &mut pair, width + GAP);
+    for (k, image) in images.iter().enumerate() {
+        copy(image, window, &mut pair, k * (width + GAP));
+    }
     pair
 }
 
@@ -40,13 +75,24 @@ pub fn outline_picture(
     robot: Option<&Hand>,
     t_cam_object: &Isometry3<f64>,
 ) -> RgbImage {
+    outlined(observation, object, robot, t_cam_object, BEFORE)
+}
+
+/// The same in this color.
+fn outlined(
+    observation: &Observation,
+    object: &Object,
+    robot: Option<&Hand>,
+    t_cam_object: &Isometry3<f64>,
+    color: [f32; 3],
+) -> RgbImage {
     let mut image = brightened(observation);
     if let (Some(robot), Some(hand)) = (robot, &observation.hand) {
         for (model, pose) in robot.render_bodies(&hand.t_cam_hand, &hand.joints) {
             draw_outline(&mut image, &observation.camera, model, &pose, HAND, 1.0);
         }
     }
-    draw_outline(&mut image, &observation.camera, &object.model, t_cam_object, BEFORE, 1.5);
+    draw_outline(&mut image, &observation.camera, &object.model, t_cam_object, color, 1.5);
     image
 }
 
@@ -63,8 +109,7 @@ fn brightened(observation: &Observation) -> RgbImage {
 }
 
 /// Left, top, width and height of the mask's surroundings \[px\].
-fn window(observation: &Observation) -> [usize; 4] {
-    let mask = &observation.mask;
+fn window(mask: &Mask) -> [usize; 4] {
     let (width, height) = (mask.width(), mask.height());
     let Some([left, top, columns, rows]) = mask.bounds() else { return [0, 0, width, height] };
     // Square and half as large again, so that the hand and a misplaced outline are in view.

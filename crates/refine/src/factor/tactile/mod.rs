@@ -105,6 +105,16 @@ impl TactileFactor {
         Ok(Self { object: Arc::clone(frame.object()), hand: Arc::clone(hand), probes })
     }
 
+    /// Distances of what is touched from the object's surface, positive outside \[m\]; of none for a hand that cannot be posed.
+    pub(crate) fn touched_distances(&self, state: &State) -> Vec<f64> {
+        let Ok(hand) = self.hand.articulated(&state.t_cam_hand, &state.joints) else {
+            return Vec::new();
+        };
+        let touched = self.probes.iter().filter(|probe| probe.touched);
+        let measured = touched.filter_map(|probe| self.measure(state, &hand, probe));
+        measured.map(|measured| measured.distance).collect()
+    }
+
     /// Where `probe` is, if that costs anything.
     fn measure(&self, state: &State, hand: &ArticulatedRobot, probe: &Probe) -> Option<Measured> {
         let point = hand.posed().t_world_links()[probe.link] * probe.position;

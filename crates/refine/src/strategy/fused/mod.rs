@@ -16,6 +16,7 @@ use prehend_autodiff::optimize::LeastSquares;
 use self::factors::depth_noise;
 pub(crate) use self::factors::{problem_of, surface_patches};
 use self::fit::Known;
+pub(crate) use self::fit::Pixels;
 pub use self::fit::{Fit, FitReference, FitStatistics};
 use self::hypotheses::{distinct, restarts, settled, spread};
 pub(crate) use self::posterior::chi_square_z;
@@ -135,6 +136,18 @@ impl Fused {
         let solution = Solution { at, termination: Termination::Iterations, iterations: 0 };
         let (radius, inflation) = (frame.object().radius, self.settings.inflation);
         Ok(Some(Posterior::new(&[solution], inflation, radius, false, None)))
+    }
+
+    /// The same, with depth's noise in the last stage as it is in `frame` about `state`, whatever a frame shows.
+    pub(crate) fn with_noise_of(&self, frame: &Frame<'_>, state: &State) -> Self {
+        let mut fused = self.clone();
+        let settings = &mut fused.settings;
+        if let Some(stage) = settings.stages.last_mut().filter(|stage| stage.measured_noise) {
+            stage.measured_noise = false;
+            let with_patches = stage.model_error && settings.nuisances.contains(&Nuisance::Model);
+            take_noise(settings, depth_noise(frame, state, &self.settings), with_patches);
+        }
+        fused
     }
 
     /// The problem of the last stage about `state`, from where noise is measured; `None` without stages.

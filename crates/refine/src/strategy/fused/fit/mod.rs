@@ -8,6 +8,7 @@ mod pixels;
 mod reference;
 mod statistics;
 
+pub(crate) use self::pixels::Pixels;
 pub use self::reference::FitReference;
 pub use self::statistics::FitStatistics;
 pub(super) use self::statistics::Known;

@@ -6,13 +6,13 @@ use crate::problem::State;
 use crate::scene::{CameraCalibrationError, Frame, Pixel, View};
 
 /// The object and the hand of a state in the image of a frame, with what is wrong with the camera corrected.
-pub(super) struct Pixels<'a> {
+pub(crate) struct Pixels<'a> {
     view: View<'a>,
     camera_error: CameraCalibrationError,
 }
 
 impl<'a> Pixels<'a> {
-    pub(super) fn new(frame: &Frame<'a>, state: &State) -> Self {
+    pub(crate) fn new(frame: &Frame<'a>, state: &State) -> Self {
         let observation = frame.observation();
         let camera = state.camera.corrected(&observation.camera);
         let hand = frame.hand().map(|(hand, _)| {
@@ -36,7 +36,7 @@ impl<'a> Pixels<'a> {
 
     /// How far behind the object's surface the measured one is \[m\], with the column and row, where the mask agrees that it is the object and
     /// not near its edges; wherever the object should be seen, if that is fewer than `fewest` pixels.
-    pub(super) fn on_object(&self, fewest: usize) -> Vec<([usize; 2], f64)> {
+    pub(crate) fn on_object(&self, fewest: usize) -> Vec<([usize; 2], f64)> {
         let agreed = self.residuals(|p| p.object, |p| p.shows_object() && p.masked);
         if agreed.len() >= fewest {
             return agreed;
@@ -45,7 +45,7 @@ impl<'a> Pixels<'a> {
     }
 
     /// The same of the hand's surface beside the mask.
-    pub(super) fn on_hand(&self) -> Vec<([usize; 2], f64)> {
+    pub(crate) fn on_hand(&self) -> Vec<([usize; 2], f64)> {
         self.residuals(|p| p.hand, |p| p.hand > 0.0 && !p.shows_object() && !p.masked)
     }
 
@@ -62,6 +62,26 @@ impl<'a> Pixels<'a> {
             let patches = eroded(width, &differs, EDGE_MARGIN);
             patches.iter().filter(|inside| **inside).count() as f64 / seen.z.max(1.0)
         })
+    }
+
+    /// How far the outlines of mask and object are apart, away from the hand \[px\]: the area between them by the length of the object's.
+    /// `None` without an outline there.
+    pub(crate) fn outline_distance(&self) -> Option<f64> {
+        let (width, height) = self.view.size();
+        let away = eroded(width, &self.marked(true, |_, p| p.hand == 0.0), HAND_MARGIN);
+        let seen = self.marked(false, |_, p| p.shows_object());
+        let is_edge = |i: usize| {
+            let (x, y) = (i % width, i / width);
+            let inner = x > 0 && y > 0 && x + 1 < width && y + 1 < height;
+            inner && [i - 1, i + 1, i - width, i + width].iter().any(|near| !seen[*near])
+        };
+        let (mut length, mut between) = (0, 0);
+        for ([x, y], pixel) in self.view.pixels() {
+            let i = y * width + x;
+            length += usize::from(away[i] && seen[i] && is_edge(i));
+            between += usize::from(away[i] && seen[i] != pixel.masked);
+        }
+        (length > 0).then(|| between as f64 / length as f64)
     }
 
     /// How far behind the surface of which a pixel has the depth the measured one is \[m\], with the column and row, where and around where

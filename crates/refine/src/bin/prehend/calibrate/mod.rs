@@ -1,0 +1,171 @@
+//! `prehend calibrate`.
+
+mod passes;
+mod report;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use anyhow::Context;
+use clap::Args;
+use nalgebra::Isometry3;
+use prehend_refine::data::bop::{ResultRow, check_writable};
+use prehend_refine::data::{Assets, FrameInput, Sensor};
+use prehend_refine::evaluate::report::Report;
+use prehend_refine::rig::{CalibrationFrame, Calibrator, CalibratorSettings};
+use prehend_refine::scene::Object;
+
+use self::passes::Passes;
+use crate::options::{Input, Job, limit_threads, write_poses};
+use crate::terminal::{cache, complain, exit_code, say};
+
+#[derive(Args)]
+pub(crate) struct Calibrate {
+    #[command(flatten)]
+    input: Input,
+    /// Write the rig here, as JSON (see docs/RIG.md); an existing one is replaced
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    out: PathBuf,
+    /// Write the corrected models to this folder, as obj_ID.ply in millimeters [default: rig.models beside rig.json]
+    #[arg(long, value_name = "DIR", help_heading = "Output")]
+    models: Option<PathBuf>,
+    /// Write the poses as they are with the rig here, as a BOP results file without scores
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    refined: Option<PathBuf>,
+    /// Write residuals before and after, by sensor, with pictures to this folder; begin with its index.html
+    #[arg(long, value_name = "DIR", help_heading = "Output")]
+    report: Option<PathBuf>,
+    /// Passes over all frames, at most
+    #[arg(long, value_name = "N", default_value = "6")]
+    passes: NonZeroUsize,
+    /// Take so many frames at a time, in the order of the poses, and keep what they say: then memory does not grow with their
+    /// number [default: all]
+    #[arg(long, value_name = "N")]
+    window: Option<NonZeroUsize>,
+    /// Worker threads; the rig is the same for any number [default: all cores]
+    #[arg(long, value_name = "N")]
+    threads: Option<NonZeroUsize>,
+}
+
+/// The frames of a dataset, and their files.
+struct Frames<'a> {
+    jobs: Vec<Job>,
+    assets: Mutex<Assets<'a>>,
+}
+
+impl Calibrate {
+    pub(crate) fn run(self) -> anyhow::Result<ExitCode> {
+        let models = self.models.clone().unwrap_or_else(|| self.out.with_extension("models"));
+        check_writable(&self.out)?;
+        self.refined.as_deref().map(check_writable).transpose()?;
+        limit_threads(self.threads)?;
+        std::fs::create_dir_all(&models).with_context(|| models.display().to_string())?;
+        let report = self.report.as_deref().map(Report::create).transpose()?;
+        let dataset = self.input.selection.open()?;
+        let (jobs, mut failures) = self.input.selection.jobs(&self.input.poses)?;
+        let mut assets = Assets::new(&dataset, 0).with_cache(cache()).with_optional_masks();
+        let ids: BTreeSet<u32> = jobs.iter().map(|job| job.target.obj_id).collect();
+        let objects: BTreeMap<_, _> =
+            ids.iter().map(|id| Ok((*id, assets.object(*id)?))).collect::<anyhow::Result<_>>()?;
+        let frames = Frames { jobs, assets: Mutex::new(assets) };
+        let (joints, size) = frames.layout().context(NO_HAND)?;
+        let settings = CalibratorSettings::default();
+        let nominal = Calibrator::new(joints, size, objects.clone(), settings)?;
+        let done = Passes::new(&frames, self.passes, self.window).run(nominal.clone())?;
+        failures.extend(done.failed.iter().map(|(frame, error)| format!("{frame}: {error}")));
+        let count = done.poses.len();
+        if count == 0 {
+            return Ok(exit_code(count, &failures));
+        }
+        done.left_out.values().for_each(|frame| complain(format!("warning: {frame}")));
+        let calibrator = &done.calibrator;
+        calibrator.rig().save(&self.out)?;
+        save_models(calibrator, &objects, &models)?;
+        if let Some(out) = &self.refined {
+            write_poses(out, frames.rows(&done.poses), &mut failures)?;
+        }
+        say(parameters(calibrator))?;
+        // Of a frame in the middle, as an example of where the hand is.
+        let example = done.poses.iter().nth(count / 2);
+        let unobserved = example.map(|(&index, pose)| {
+            Ok::<_, anyhow::Error>(calibrator.unobserved(&frames.load(index, pose)?)?)
+        });
+        let unobserved = unobserved.transpose()?.unwrap_or_default();
+        if !unobserved.is_empty() {
+            say("\nhardly told by these frames:")?;
+        }
+        for direction in &unobserved {
+            say(report::told(direction))?;
+        }
+        let (used, out) = (count - done.left_out.len(), self.out.display());
+        say(format!("\nrig of {used} frames written to {out}, models to {}", models.display()))?;
+        if let Some(report) = report {
+            let page = report::write(report, &frames, &nominal, &done, &unobserved, &mut failures)?;
+            say(format!("report: open {}", page.display()))?;
+        }
+        Ok(exit_code(count, &failures))
+    }
+}
+
+const NO_HAND: &str = "nothing is known of a hand, which is part of the rig";
+
+impl Frames<'_> {
+    /// Joints of the hand and size of images of the first frame that can be read.
+    fn layout(&self) -> Option<(usize, (usize, usize))> {
+        let mut assets = self.assets.lock().unwrap_or_else(PoisonError::into_inner);
+        self.jobs.iter().find_map(|job| {
+            let FrameInput { observation, hand, .. } =
+                assets.load(&job.target, &[Sensor::Hand]).ok()?;
+            let size = (observation.camera.width, observation.camera.height);
+            Some((hand?.tree.joint_names().len(), size))
+        })
+    }
+
+    /// The frame of that index, with its object at `pose`.
+    fn load(&self, index: usize, pose: &Isometry3<f64>) -> anyhow::Result<CalibrationFrame> {
+        let target = &self.jobs[index].target;
+        let input = {
+            let mut assets = self.assets.lock().unwrap_or_else(PoisonError::into_inner);
+            assets.load(target, &[Sensor::Hand])?
+        };
+        let FrameInput { observation, hand, .. } = input;
+        let (obj_id, hand) = (target.obj_id, hand.context(NO_HAND)?);
+        Ok(CalibrationFrame { observation, obj_id, hand, initial: *pose, is_refined: false })
+    }
+
+    /// Rows of a results file with these poses, by the frames' indices.
+    fn rows(&self, poses: &BTreeMap<usize, Isometry3<f64>>) -> Vec<ResultRow> {
+        let row = |(&index, pose): (&usize, &Isometry3<f64>)| ResultRow {
+            t_cam_model: *pose,
+            score: -1.0,
+            time: -1.0,
+            ..self.jobs[index].row.clone()
+        };
+        poses.iter().map(row).collect()
+    }
+}
+
+/// Writes `objects` as the rig corrects them.
+fn save_models(
+    calibrator: &Calibrator,
+    objects: &BTreeMap<u32, Arc<Object>>,
+    folder: &Path,
+) -> anyhow::Result<()> {
+    for (id, deviation) in &calibrator.rig().objects {
+        let mesh = deviation.applied(&objects[id].mesh).scaled(1e3);
+        mesh.save_ply(&folder.join(format!("obj_{id:06}.ply")))?;
+    }
+    Ok(())
+}
+
+/// A table of the parameters, but for the coefficients of depth's field.
+fn parameters(calibrator: &Calibrator) -> String {
+    let mut text = format!("{:28} {:>10} {:>10} {:>10}", "parameter", "value", "sigma", "before");
+    for [name, value, sigma, before] in report::parameter_rows(calibrator) {
+        text += &format!("\n{name:28} {value:>10} {sigma:>10} {before:>10}");
+    }
+    text
+}

@@ -1,0 +1,172 @@
+//! What a calibration has changed, for people.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use nalgebra::Isometry3;
+use prehend_refine::data::Workers;
+use prehend_refine::evaluate::report::{Report, depth_residual_picture, rig_picture};
+use prehend_refine::rig::{
+    CalibrationFrame, Calibrator, FrameResiduals, Residuals, UnobservedDirection,
+};
+
+use super::Frames;
+use super::passes::Done;
+use crate::terminal::progress;
+
+/// Frames that are drawn.
+const DRAWN: usize = 6;
+
+/// Residuals \[m\] of the brightest colors.
+const BRIGHTEST: f64 = 3e-3;
+
+/// A frame with the nominal rig and the pose that it has by itself, and with the rig that was found.
+struct Compared {
+    before: FrameResiduals,
+    after: FrameResiduals,
+    alone: Isometry3<f64>,
+}
+
+/// Name, value, standard deviation and that beforehand of each parameter, but for the coefficients of depth's field.
+pub(super) fn parameter_rows(calibrator: &Calibrator) -> Vec<[String; 4]> {
+    let rig = calibrator.rig();
+    let sigmas = rig.covariance.diagonal().map(f64::sqrt);
+    let rows = rig.parameters().into_iter().zip(sigmas.iter().zip(calibrator.prior_sigmas()));
+    let number = |value: f64| format!("{value:.5}");
+    rows.map(|((name, value), (sigma, before))| {
+        [name, number(value), number(*sigma), number(before)]
+    })
+    .collect()
+}
+
+/// A direction in a line.
+pub(super) fn told(direction: &UnobservedDirection) -> String {
+    let shares = direction.shares.iter().map(|(name, share)| format!("{share:+.2} {name}"));
+    let shares: Vec<String> = shares.collect();
+    let motion = match &direction.motion {
+        Some((motion, left)) => {
+            let (frames, left) = (UnobservedDirection::FRAMES, 1e2 * left);
+            format!("{frames} frames with the hand {motion} would leave {left:.0} %")
+        }
+        None => "no motion of the hand that was tried tells it".to_owned(),
+    };
+    let left = 1e2 * direction.deviation;
+    format!("  {}: {left:.0} % of its deviation beforehand is left; {motion}", shares.join(", "))
+}
+
+/// Writes the report of `done`, which began with the `nominal` rig, and returns its page; of frames that cannot be shown `failures` hears.
+pub(super) fn write(
+    mut report: Report,
+    frames: &Frames<'_>,
+    nominal: &Calibrator,
+    done: &Done,
+    unobserved: &[UnobservedDirection],
+    failures: &mut Vec<String>,
+) -> anyhow::Result<PathBuf> {
+    let indices: Vec<usize> = done.poses.keys().copied().collect();
+    let compared = compare(frames, nominal, done, &indices, failures)?;
+    let (_, size) = frames.layout().unwrap_or_default();
+    let [mut before, mut after] = [Residuals::new(size), Residuals::new(size)];
+    for frame in compared.values() {
+        before.add(&frame.before);
+        after.add(&frame.after);
+    }
+    let mut rows = Vec::new();
+    for ((name, unit, offset, size), (_, _, new_offset, new_size)) in
+        before.rows().into_iter().zip(after.rows())
+    {
+        let number = |value: Option<f64>| value.map_or("–".into(), |value| format!("{value:.2}"));
+        let cells = [Some(size), Some(new_size), offset, new_offset].map(number);
+        rows.push([[format!("{name} [{unit}]")].as_slice(), &cells].concat());
+    }
+    report.add_table(
+        "Residuals by sensor, where all calibrations are believed: medians over frames of the frames' medians",
+        &["sensor", "size before", "size after", "offset before", "offset after"],
+        &rows,
+    );
+    let picture = depth_residual_picture(&before, &after, BRIGHTEST);
+    let what = format!(
+        "Mean residual of depth over the image, of hand and object, before (left) and after: red is measured too far away, blue too near, by \
+         {:.0} mm where colors are full",
+        BRIGHTEST * 1e3
+    );
+    report.add_picture(&what, &picture, &[])?;
+    let parameters: Vec<Vec<String>> =
+        parameter_rows(&done.calibrator).into_iter().map(Vec::from).collect();
+    report.add_table(
+        "Parameters: lengths in meters, angles in radians",
+        &["parameter", "value", "standard deviation", "beforehand"],
+        &parameters,
+    );
+    let open: Vec<Vec<String>> = unobserved.iter().map(|direction| vec![told(direction)]).collect();
+    if !open.is_empty() {
+        report.add_table("Hardly told by these frames", &["direction"], &open);
+    }
+    let left_out: Vec<Vec<String>> =
+        done.left_out.values().map(|frame| vec![frame.clone()]).collect();
+    if !left_out.is_empty() {
+        report.add_table("Left out", &["frame"], &left_out);
+    }
+    let step = indices.len().div_ceil(DRAWN).max(1);
+    for &index in indices.iter().step_by(step) {
+        let Some(frame) = compared.get(&index) else { continue };
+        let target = frames.jobs[index].target;
+        let what = format!("{target}: outlines of object and hand (blue) before (left) and after");
+        match drawn(frames, nominal, done, index, &frame.alone) {
+            Ok(picture) => report.add_picture(&what, &picture, &[])?,
+            Err(error) => failures.push(format!("{target}: report: {error}")),
+        }
+    }
+    Ok(report.finish()?)
+}
+
+/// All frames of `indices` before and after.
+fn compare(
+    frames: &Frames<'_>,
+    nominal: &Calibrator,
+    done: &Done,
+    indices: &[usize],
+    failures: &mut Vec<String>,
+) -> anyhow::Result<BTreeMap<usize, Compared>> {
+    let bar = progress(indices.len(), "comparing");
+    let mut compared = BTreeMap::new();
+    let compare = |&index: &usize| -> anyhow::Result<Compared> {
+        let frame = frames.load(index, &done.poses[&index])?;
+        let alone = nominal.visit(&frame)?.t_cam_object;
+        let before = nominal.residuals(&CalibrationFrame { initial: alone, ..frame.clone() })?;
+        let after = done.calibrator.residuals(&frame)?;
+        Ok(Compared { before, after, alone })
+    };
+    Workers::new(indices.len(), rayon::current_num_threads())?.run(
+        indices,
+        || compare,
+        |&index, outcome| -> anyhow::Result<()> {
+            bar.inc(1);
+            match outcome {
+                Ok(frame) => drop(compared.insert(index, frame)),
+                Err(error) => {
+                    failures.push(format!("{}: report: {error}", frames.jobs[index].target))
+                }
+            }
+            Ok(())
+        },
+    )?;
+    bar.finish_and_clear();
+    Ok(compared)
+}
+
+/// The frame of that index with the nominal rig and the pose that it has by itself, and with the rig that was found.
+fn drawn(
+    frames: &Frames<'_>,
+    nominal: &Calibrator,
+    done: &Done,
+    index: usize,
+    alone: &Isometry3<f64>,
+) -> anyhow::Result<prehend_render::RgbImage> {
+    let frame = frames.load(index, &done.poses[&index])?;
+    let after = done.calibrator.rig().corrected(&frame.observation)?;
+    let [object, corrected] =
+        [nominal.object(frame.obj_id)?, done.calibrator.object(frame.obj_id)?];
+    let before = (&frame.observation, &**object, alone);
+    Ok(rig_picture(before, (&after, corrected, &frame.initial), &frame.hand))
+}

@@ -1,0 +1,121 @@
+//! What frames have said of their rig.
+
+use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
+
+use nalgebra::{DMatrix, DVector, Isometry3};
+
+use super::information::{Eliminated, FrameInformation, FramePlay};
+
+/// What a visit has found of a frame.
+pub struct Visit {
+    pub(super) obj_id: u32,
+    pub(super) information: FrameInformation,
+    pub(super) disagreement: f64,
+    /// By how many times more than is usual the frame disagrees with the rig, if that is so much that it is left out: its pose is wrong, or the
+    /// rig was another then.
+    pub left_out: Option<f64>,
+    /// Object → camera \[m\].
+    pub t_cam_object: Isometry3<f64>,
+}
+
+/// What the frames of a pass have said. Sums are the same for the same order of frames.
+#[derive(Default)]
+pub struct Pass {
+    pub(super) sums: Sums,
+    /// By frame, with its object's number.
+    play: Vec<(u32, FramePlay)>,
+    /// By frame, those left out among them.
+    disagreements: Vec<f64>,
+    pub(super) squares: PlaySquares,
+}
+
+/// By object: normal equations of the rig's parameters, and then of the object's coefficients.
+#[derive(Clone, Default)]
+pub(super) struct Sums(pub(super) BTreeMap<u32, (DMatrix<f64>, DVector<f64>)>);
+
+impl Sums {
+    fn add(&mut self, obj_id: u32, hessian: DMatrix<f64>, gradient: DVector<f64>) {
+        match self.0.entry(obj_id) {
+            Entry::Vacant(none) => drop(none.insert((hessian, gradient))),
+            Entry::Occupied(mut sum) => {
+                let (of_hessian, of_gradient) = sum.get_mut();
+                *of_hessian += hessian;
+                *of_gradient += gradient;
+            }
+        }
+    }
+
+    pub(super) fn merge(&mut self, other: Self) {
+        other.0.into_iter().for_each(|(id, (hessian, gradient))| self.add(id, hessian, gradient));
+    }
+
+    /// Says the same of parameters that have changed so, as have the coefficients of objects.
+    pub(super) fn shift(
+        &mut self,
+        change: &DVector<f64>,
+        of_objects: &BTreeMap<u32, DVector<f64>>,
+    ) {
+        for (id, (hessian, gradient)) in &mut self.0 {
+            let mut all = DVector::zeros(gradient.len());
+            all.rows_mut(0, change.len()).copy_from(change);
+            if let Some(of_object) = of_objects.get(id) {
+                all.rows_mut(change.len(), of_object.len()).copy_from(of_object);
+            }
+            *gradient += &*hessian * all;
+        }
+    }
+}
+
+/// Squares that play is expected to have: mean square of each kind, summed over frames.
+#[derive(Clone, Copy, Default)]
+pub(super) struct PlaySquares {
+    /// Translations \[m²\], rotations \[rad²\] and joints \[rad² or m²\].
+    pub(super) sums: [f64; 3],
+    pub(super) frames: f64,
+}
+
+impl PlaySquares {
+    pub(super) fn merge(&mut self, other: &Self) {
+        self.sums.iter_mut().zip(other.sums).for_each(|(sum, other)| *sum += other);
+        self.frames += other.frames;
+    }
+}
+
+impl Pass {
+    /// Adds what a frame has said, unless it is left out.
+    pub fn add(&mut self, visit: Visit) {
+        let Visit { obj_id, information, disagreement, left_out, .. } = visit;
+        self.disagreements.push(disagreement);
+        if left_out.is_some() {
+            return;
+        }
+        let FrameInformation { hessian, gradient, play } = information;
+        self.sums.add(obj_id, hessian, gradient);
+        self.play.push((obj_id, play));
+    }
+
+    /// How much frames disagree with the rig, half of them less; `None` if they do not.
+    pub(super) fn usual_disagreement(&mut self) -> Option<f64> {
+        self.disagreements.sort_by(f64::total_cmp);
+        let middle = self.disagreements.get(self.disagreements.len() / 2);
+        middle.copied().filter(|usual| *usual > 0.0)
+    }
+
+    /// Finds the squares of the frames' play if the parameters change so, and have that covariance then.
+    pub(super) fn expect_play(
+        &mut self,
+        change: &DVector<f64>,
+        covariance: &DMatrix<f64>,
+        objects: &BTreeMap<u32, Eliminated>,
+    ) {
+        self.squares = PlaySquares::default();
+        for (id, play) in &self.play {
+            let squares = play.expected_squares(change, covariance, objects.get(id));
+            let joints = squares.rows(6, squares.len() - 6);
+            let of_joints = if joints.is_empty() { 0.0 } else { joints.mean() };
+            let sums = [squares.rows(0, 3).mean(), squares.rows(3, 3).mean(), of_joints];
+            self.squares.merge(&PlaySquares { sums, frames: 1.0 });
+        }
+    }
+}

@@ -1,0 +1,47 @@
+//! `prehend calibrate`.
+
+use prehend_refine::evaluate::metrics::pe_cm;
+use prehend_refine::scene::default_scene;
+
+use crate::fixture::Workplace;
+
+const CALIBRATE: &str = "calibrate --dataset ds --poses ds/init.csv --passes 2";
+
+#[test]
+fn a_rig_its_models_its_poses_and_a_report_are_written() {
+    let place = Workplace::new();
+    // Of a track, an image may have no mask.
+    place.remove("ds/test/000001/mask_visib/000001_000000.png");
+    let told = place.succeed(&format!("{CALIBRATE} --out rig.json --report r --refined p.csv"));
+    assert!(told.contains("depth scale") && told.contains("hardly told"), "{told}");
+    assert!(told.contains("rig of 2 frames written to rig.json, models to rig.models"), "{told}");
+    assert!(told.contains("report: open r/index.html"), "{told}");
+    assert!(place.path("rig.models/obj_000005.ply").is_file());
+    let page = place.read("r/index.html");
+    for what in ["Residuals by sensor", "depth on the hand [mm]", "touched skin", "outlines of"] {
+        assert!(page.contains(what), "{what}");
+    }
+    assert!(place.path("r/0002.png").is_file());
+    let truth = default_scene(1).unwrap().truth;
+    let rows = place.poses("p.csv");
+    assert_eq!(rows.len(), 2);
+    for row in &rows {
+        let pe = pe_cm(&row.t_cam_model, &truth);
+        assert!(pe < 0.4 && row.score == -1.0, "{pe} cm");
+    }
+    // The file is all that a refinement needs; frame by frame, the same is learnt in the end.
+    let refine = "refine --dataset ds --poses ds/init.csv --image 0 --rig rig.json --out f.csv";
+    place.succeed(refine);
+    let told = place.succeed(&format!("{CALIBRATE} --window 1 --threads 1 --out w.json"));
+    assert!(told.contains("rig of 2 frames"), "{told}");
+}
+
+#[test]
+fn a_frame_without_a_hand_is_named() {
+    let place = Workplace::new();
+    place.remove("ds/test/000001/scene_bodies.json");
+    let said = place.prehend(&format!("{CALIBRATE} --out rig.json"));
+    assert_eq!(said.code, 1);
+    assert!(said.err.contains("nothing is known of a hand"), "{}", said.err);
+    assert!(!place.path("rig.json").exists());
+}
