@@ -28,6 +28,8 @@ pub struct PoseCandidate {
     pub t_cam_object: Isometry3<f64>,
     /// The sum of the costs there \[nat\]; the lower the better.
     pub cost: f64,
+    /// Its share among the poses that the search ended with, which sum to one: in proportion to exp(−cost).
+    pub weight: f64,
 }
 
 /// Visuo-tactile global search: finds an object without any initial pose, training or randomness.
@@ -91,10 +93,7 @@ impl PoseSearch {
         if last.is_empty() {
             return Err(RefineError::NothingFits);
         }
-        Ok(last
-            .into_iter()
-            .map(|(t_cam_object, cost)| PoseCandidate { t_cam_object, cost })
-            .collect())
+        Ok(weighted(&last))
     }
 
     /// Stage 1.
@@ -136,6 +135,17 @@ impl PoseSearch {
         });
         distinct(turned, settings.turned, 6e-3, 6.0)
     }
+}
+
+/// `poses`, of which there are some, best first, with their shares.
+fn weighted(poses: &[Scored]) -> Vec<PoseCandidate> {
+    let share = |cost: f64| (poses[0].1 - cost).exp();
+    let total: f64 = poses.iter().map(|(_, cost)| share(*cost)).sum();
+    let candidate = |&(t_cam_object, cost): &Scored| {
+        let weight = share(cost) / total;
+        PoseCandidate { t_cam_object, cost, weight }
+    };
+    poses.iter().map(candidate).collect()
 }
 
 /// `f` of every pose, in the same order.

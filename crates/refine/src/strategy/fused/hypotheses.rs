@@ -1,5 +1,6 @@
 //! Where solves start, and which of their ends are the same.
 
+use nalgebra::Isometry3;
 use prehend_autodiff::lie::so3_log;
 
 use super::posterior::principal_directions;
@@ -19,6 +20,43 @@ pub(super) fn restarts(initial: &State, angle: f64) -> Vec<State> {
         }
     }
     starts
+}
+
+/// The initial state, and the same with the object at each of the poses `others` \[m\] that differ from it and are in front of the camera.
+pub(super) fn rivals(initial: &State, others: &[Isometry3<f64>]) -> Vec<State> {
+    let at = |pose: &Isometry3<f64>| State { t_cam_object: *pose, ..initial.clone() };
+    let seen = others.iter().map(at).filter(|state| state.center().z > 0.0);
+    let differs = |state: &State| state.t_cam_object != initial.t_cam_object;
+    std::iter::once(initial.clone()).chain(seen.filter(differs)).collect()
+}
+
+/// The rotation between poses that are alternatives to each other \[rad\].
+const ALTERNATIVE: f64 = 0.2;
+
+/// What `motions` in object coordinates make of `states`, without what is turned hardly otherwise than one of them, or than another.
+pub(super) fn alternatives(states: &[State], motions: &[Isometry3<f64>]) -> Vec<State> {
+    let mut known: Vec<State> = states.to_vec();
+    for state in states {
+        for motion in motions {
+            let moved =
+                State { t_cam_object: state.t_cam_object * motion, ..state.clone() };
+            let near = |other: &State| {
+                let (other, own) = (&other.t_cam_object.rotation, &moved.t_cam_object.rotation);
+                other.angle_to(own) < ALTERNATIVE
+            };
+            if !known.iter().any(near) {
+                known.push(moved);
+            }
+        }
+    }
+    known.split_off(states.len())
+}
+
+/// The `count` of `states` with the lowest `costs`, in order of cost.
+pub(super) fn lowest(states: &[State], costs: &[f64], count: usize) -> Vec<State> {
+    let mut order: Vec<usize> = (0..states.len()).collect();
+    order.sort_by(|&a, &b| costs[a].total_cmp(&costs[b]));
+    order.into_iter().take(count).map(|k| states[k].clone()).collect()
 }
 
 /// How wide the posterior may be in any direction \[m of surface motion\], and how far depth points may be from the surface \[m\],

@@ -7,6 +7,7 @@ mod hypotheses;
 mod posterior;
 mod settings;
 mod summary;
+use std::f64::consts::PI;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
@@ -17,7 +18,7 @@ use self::factors::depth_noise;
 pub(crate) use self::factors::{problem_of, surface_patches};
 use self::fit::Known;
 pub use self::fit::{Fit, FitReference, FitStatistics};
-use self::hypotheses::{distinct, restarts, settled, spread};
+use self::hypotheses::{alternatives, distinct, lowest, restarts, rivals, settled, spread};
 pub(crate) use self::posterior::chi_square_z;
 pub use self::posterior::{
     CovarianceInflation, Hypothesis, Inconsistency, Posterior, UnobservableDirection,
@@ -63,11 +64,15 @@ impl Fused {
         Self { settings, factors: Vec::new() }
     }
 
-    /// What is known beforehand: about `initial`, and of calibrations what the frame's rig says, or the settings.
+    /// What is known beforehand: about `initial`, and of calibrations what the frame's rig says, or the settings. Of the rotation that a search
+    /// has found, nothing is known that is not in the frame.
     fn prior(&self, frame: &Frame<'_>, initial: &State) -> Result<GaussianPrior, RefineError> {
-        let settings = &self.settings.prior;
+        let mut settings = self.settings.prior.clone();
+        if frame.rivals().is_some() {
+            settings.object_rotation = [PI; 3];
+        }
         let Some(rig) = frame.rig() else {
-            return GaussianPrior::independent(initial.clone(), settings);
+            return GaussianPrior::independent(initial.clone(), &settings);
         };
         let object = settings.sigmas(Block::ObjectPose);
         let covariance = rig.frame_covariance(initial, &frame.observation().camera, &object)?;
@@ -175,6 +180,9 @@ const COARSEST: f64 = 3e-3;
 /// Solutions of geometry alone that are taken up: where they differ, starts spread about them say more than they do.
 const KEPT: usize = 4;
 
+/// Stages take up so many times as many hypotheses where initial poses come from a search.
+const WITH_RIVALS: usize = 2;
+
 /// The last stage's tolerance times this is that of a solve with exact calibrations: its steps are cheap, and its errors small.
 const EXACT: f64 = 0.01;
 
@@ -194,12 +202,22 @@ impl Strategy for Fused {
         let prior = Arc::new(self.prior(frame, initial)?);
         let settings = self.settings.for_frame(frame);
         let mut walk = Walk { fused: self, frame, initial, prior, settings };
-        let mut states = restarts(initial, self.settings.restart_angle);
+        let mut states = match frame.rivals() {
+            Some(others) => rivals(initial, others),
+            None => restarts(initial, self.settings.restart_angle),
+        };
         let mut found = Vec::new();
         let mut go_on = ControlFlow::Continue(());
         for index in 0..self.settings.stages.len() {
             found = walk.stage(index, &states)?;
             states = walk.next_starts(index, &found);
+            if std::env::var_os("PD").is_some() {
+                eprintln!("DBG stage {index} {}", found.iter().map(|s| {
+                    let q = s.at.state.t_cam_object.rotation.quaternion();
+                    format!("{:.1}:{:.4},{:.4},{:.4},{:.4}:{}", s.at.cost, q.w, q.i, q.j, q.k,
+                        s.at.factors.iter().map(|f| format!("{}={:.1}", f.name, f.cost)).collect::<Vec<_>>().join("/"))
+                }).collect::<Vec<_>>().join(" "));
+            }
             go_on = record(&mut recorder, &found[0]);
             if go_on.is_break() {
                 break;
@@ -218,6 +236,9 @@ impl Strategy for Fused {
         }
         let (radius, inflation) = (frame.object().radius, self.settings.inflation);
         let mut posterior = Posterior::new(&found, inflation, radius, exact, None);
+        if std::env::var_os("PD").is_some() {
+            eprintln!("DBG weights {} {:?}", posterior.probability_within(5e-3, 5f64.to_radians()), posterior.hypotheses.iter().map(|h| h.weight).collect::<Vec<_>>());
+        }
         // What right poses are like is known of the last stage.
         if go_on.is_continue() {
             posterior.fit = Some(walk.fit(&found[0].at)?);
@@ -275,8 +296,16 @@ impl Walk<'_> {
         let settings = &mut self.settings;
         let of_stage = fused.stage_problem(frame, initial, &states[0], stage, settings)?;
         let problem = of_stage.problem.with_prior(self.prior.clone());
-        let states = &states[..states.len().min(stage.hypotheses.max(1))];
-        let found = if index == 0 {
+        let searched = frame.rivals().is_some();
+        let limit = stage.hypotheses.max(1) * if searched { WITH_RIVALS } else { 1 };
+        let judged: Vec<State>;
+        let states = if searched && states.len() > limit {
+            judged = lowest(states, &problem.cost_all(states), limit);
+            &judged
+        } else {
+            &states[..states.len().min(limit)]
+        };
+        let found = if index == 0 && !searched {
             let mut all = problem.solve_all(&states[..1], &stage.solver);
             let noise = || depth_noise(frame, &all[0].at.state, &fused.settings);
             if !settled(&all[0].at, noise, self.radius()) {
@@ -309,6 +338,10 @@ impl Walk<'_> {
         // Where it is, geometry finds well; how it is turned, colors may say better from where they were told. And
         // what little is seen of the object may have led astray.
         let initial = self.initial;
+        if self.frame.rivals().is_some() {
+            states.extend(alternatives(&states, self.frame.object().near_symmetries()));
+            return states;
+        }
         let mut turned_back = states[0].clone();
         let moved = states[0].center() - initial.center();
         states.truncate(KEPT.min(next.hypotheses.saturating_sub(2).max(1)));
