@@ -28,7 +28,8 @@ pub struct PoseCandidate {
     pub t_cam_object: Isometry3<f64>,
     /// The sum of the costs there \[nat\]; the lower the better.
     pub cost: f64,
-    /// Its share among the poses that the search ended with, which sum to one: in proportion to exp(−cost).
+    /// Its share among the poses that the search ended with, in proportion to exp(−cost / 10 nat); they sum to one. The search holds calibrations
+    /// and models for exact, so that costs differ by far more than they should.
     pub weight: f64,
 }
 
@@ -137,9 +138,13 @@ impl PoseSearch {
     }
 }
 
-/// `poses`, of which there are some, best first, with their shares.
+/// Differences of costs over this are logarithms of ratios of probabilities \[nat\].
+const TEMPERATURE: f64 = 10.0;
+
+/// `poses`, best first, with their shares.
 fn weighted(poses: &[Scored]) -> Vec<PoseCandidate> {
-    let share = |cost: f64| (poses[0].1 - cost).exp();
+    let least = poses.first().map_or(0.0, |(_, cost)| *cost);
+    let share = |cost: f64| ((least - cost) / TEMPERATURE).exp();
     let total: f64 = poses.iter().map(|(_, cost)| share(*cost)).sum();
     let candidate = |&(t_cam_object, cost): &Scored| {
         let weight = share(cost) / total;
@@ -173,4 +178,19 @@ fn distinct(mut poses: Vec<Scored>, limit: usize, distance: f64, angle: f64) -> 
         }
     }
     kept
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shares_sum_to_one_and_the_best_has_the_largest() {
+        let pose = Isometry3::identity();
+        let found = weighted(&[(pose, 700.0), (pose, 710.0), (pose, 1e5)]);
+        let weights: Vec<f64> = found.iter().map(|c| c.weight).collect();
+        assert!((weights.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+        assert!((weights[0] / weights[1] - 1f64.exp()).abs() < 1e-9, "{weights:?}");
+        assert_eq!(weights[2], 0.0);
+    }
 }

@@ -18,7 +18,7 @@ use prehend_geometry::sample::spread_rotations;
 use rayon::prelude::*;
 
 pub use self::deviation::SymmetrySettings;
-pub(crate) use self::near::near_symmetries;
+pub(crate) use self::near::{alternatives, near_symmetries};
 pub use self::symmetries::{ContinuousSymmetry, Symmetries};
 
 use self::deviation::Shape;

@@ -18,8 +18,9 @@ use self::factors::depth_noise;
 pub(crate) use self::factors::{problem_of, surface_patches};
 use self::fit::Known;
 pub use self::fit::{Fit, FitReference, FitStatistics};
-use self::hypotheses::{alternatives, distinct, lowest, restarts, rivals, settled, spread};
+use self::hypotheses::{distinct, lowest, restarts, rivals, settled, spread, turned};
 pub(crate) use self::posterior::chi_square_z;
+use self::posterior::log_mass;
 pub use self::posterior::{
     CovarianceInflation, Hypothesis, Inconsistency, Posterior, UnobservableDirection,
 };
@@ -69,7 +70,7 @@ impl Fused {
     fn prior(&self, frame: &Frame<'_>, initial: &State) -> Result<GaussianPrior, RefineError> {
         let mut settings = self.settings.prior.clone();
         if frame.rivals().is_some() {
-            settings.object_rotation = [PI; 3];
+            settings.object_rotation = [UNKNOWN_ROTATION; 3];
         }
         let Some(rig) = frame.rig() else {
             return GaussianPrior::independent(initial.clone(), &settings);
@@ -180,7 +181,12 @@ const COARSEST: f64 = 3e-3;
 /// Solutions of geometry alone that are taken up: where they differ, starts spread about them say more than they do.
 const KEPT: usize = 4;
 
-/// Stages take up so many times as many hypotheses where initial poses come from a search.
+/// Standard deviation about each axis of a rotation that nothing is known of \[rad\]: half a turn costs half a nat.
+const UNKNOWN_ROTATION: f64 = PI;
+
+/// Where initial poses come from a search, the first stage, and the first that sees colors, take up so many hypotheses at most, …
+const MOST_ALTERNATIVES: usize = 64;
+/// … and later ones so many times as many as else.
 const WITH_RIVALS: usize = 2;
 
 /// The last stage's tolerance times this is that of a solve with exact calibrations: its steps are cheap, and its errors small.
@@ -211,13 +217,6 @@ impl Strategy for Fused {
         for index in 0..self.settings.stages.len() {
             found = walk.stage(index, &states)?;
             states = walk.next_starts(index, &found);
-            if std::env::var_os("PD").is_some() {
-                eprintln!("DBG stage {index} {}", found.iter().map(|s| {
-                    let q = s.at.state.t_cam_object.rotation.quaternion();
-                    format!("{:.1}:{:.4},{:.4},{:.4},{:.4}:{}", s.at.cost, q.w, q.i, q.j, q.k,
-                        s.at.factors.iter().map(|f| format!("{}={:.1}", f.name, f.cost)).collect::<Vec<_>>().join("/"))
-                }).collect::<Vec<_>>().join(" "));
-            }
             go_on = record(&mut recorder, &found[0]);
             if go_on.is_break() {
                 break;
@@ -236,9 +235,6 @@ impl Strategy for Fused {
         }
         let (radius, inflation) = (frame.object().radius, self.settings.inflation);
         let mut posterior = Posterior::new(&found, inflation, radius, exact, None);
-        if std::env::var_os("PD").is_some() {
-            eprintln!("DBG weights {} {:?}", posterior.probability_within(5e-3, 5f64.to_radians()), posterior.hypotheses.iter().map(|h| h.weight).collect::<Vec<_>>());
-        }
         // What right poses are like is known of the last stage.
         if go_on.is_continue() {
             posterior.fit = Some(walk.fit(&found[0].at)?);
@@ -285,6 +281,11 @@ impl Walk<'_> {
         &self.fused.settings.stages
     }
 
+    /// Whether the initial pose comes from a search.
+    fn searched(&self) -> bool {
+        self.frame.rivals().is_some()
+    }
+
     fn radius(&self) -> f64 {
         self.frame.object().radius
     }
@@ -296,16 +297,8 @@ impl Walk<'_> {
         let settings = &mut self.settings;
         let of_stage = fused.stage_problem(frame, initial, &states[0], stage, settings)?;
         let problem = of_stage.problem.with_prior(self.prior.clone());
-        let searched = frame.rivals().is_some();
-        let limit = stage.hypotheses.max(1) * if searched { WITH_RIVALS } else { 1 };
-        let judged: Vec<State>;
-        let states = if searched && states.len() > limit {
-            judged = lowest(states, &problem.cost_all(states), limit);
-            &judged
-        } else {
-            &states[..states.len().min(limit)]
-        };
-        let found = if index == 0 && !searched {
+        let states = &self.taken_up(index, states, &problem);
+        let found = if index == 0 && !self.searched() {
             let mut all = problem.solve_all(&states[..1], &stage.solver);
             let noise = || depth_noise(frame, &all[0].at.state, &fused.settings);
             if !settled(&all[0].at, noise, self.radius()) {
@@ -328,7 +321,30 @@ impl Walk<'_> {
                 kept
             });
         }
+        if index + 1 == self.stages().len() {
+            self.rank(&mut found);
+        }
         Ok(found)
+    }
+
+    /// Those of `states` that stage `index`, which solves `problem`, takes up.
+    fn taken_up(&self, index: usize, states: &[State], problem: &Problem) -> Vec<State> {
+        let usual = self.stages()[index].hypotheses.max(1);
+        if !self.searched() {
+            return states[..states.len().min(usual)].to_vec();
+        }
+        let limit = if index < 2 { MOST_ALTERNATIVES } else { WITH_RIVALS * usual };
+        if states.len() <= limit {
+            return states.to_vec();
+        }
+        lowest(states, &problem.cost_all(states), limit)
+    }
+
+    /// Puts the best of the last solutions first: modes far apart, as those of a search are, compare by their mass rather than their height.
+    fn rank(&self, found: &mut [Solution]) {
+        if self.searched() {
+            found.sort_by(|a, b| log_mass(&b.at).total_cmp(&log_mass(&a.at)));
+        }
     }
 
     /// Where the stage after `index` starts, which found these solutions.
@@ -338,8 +354,9 @@ impl Walk<'_> {
         // Where it is, geometry finds well; how it is turned, colors may say better from where they were told. And
         // what little is seen of the object may have led astray.
         let initial = self.initial;
-        if self.frame.rivals().is_some() {
-            states.extend(alternatives(&states, self.frame.object().near_symmetries()));
+        if self.searched() {
+            // Which of them it is, colors say, that were not considered yet.
+            states.extend(turned(&states, self.frame.object().near_symmetries()));
             return states;
         }
         let mut turned_back = states[0].clone();
@@ -378,7 +395,9 @@ impl Walk<'_> {
         let problem = problem_of(self.frame, initial, last, &settings, None, own)?
             .with_prior(self.prior.clone());
         let solver = Solver { min_decrease: EXACT * last.solver.min_decrease, ..last.solver };
-        Ok(distinct(problem.solve_all(&states, &solver), self.radius()))
+        let mut found = distinct(problem.solve_all(&states, &solver), self.radius());
+        self.rank(&mut found);
+        Ok(found)
     }
 
     /// How well `point` explains what the frame shows.
