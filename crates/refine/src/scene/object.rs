@@ -108,7 +108,12 @@ impl Object {
     /// Motions in object coordinates after which the object looks much the same by shape, the identity left out; found when they are first
     /// asked for, which takes about a second. None where the mesh is so broken that they cannot be found.
     pub(crate) fn near_symmetries(&self) -> &[Isometry3<f64>] {
-        self.near_symmetries.get_or_init(|| near_symmetries(&self.mesh).unwrap_or_default())
+        if let Some(known) = self.near_symmetries.get() {
+            return known;
+        }
+        // Not within the lock: this is work for all threads, and one that waits for it may take up another frame of the object.
+        let found = near_symmetries(&self.mesh).unwrap_or_default();
+        self.near_symmetries.get_or_init(|| found)
     }
 
     fn build(

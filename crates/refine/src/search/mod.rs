@@ -50,6 +50,9 @@ pub struct PoseCandidate {
 /// here takes a pose of the object. A hand that is not known hides what its depth says it hides in stages 1 and 2, and
 /// nothing in the factors: without it, small and much hidden objects are often found turned.
 ///
+/// How a pose is turned is often wrong where an object looks much the same from both sides: what begins at the best one should try the others, too
+/// ([`Frame::with_rivals`]).
+///
 /// The result does not depend on the number of threads. Poses that look and feel alike (a symmetry) are
 /// equally good; one of them comes first.
 pub struct PoseSearch {

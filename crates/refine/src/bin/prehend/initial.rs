@@ -76,6 +76,10 @@ struct Found {
 impl Initial {
     pub(crate) fn run(self) -> anyhow::Result<ExitCode> {
         check_writable(&self.out)?;
+        let beside = beside(&self.out, RIVALS);
+        if self.search {
+            check_writable(&beside)?;
+        }
         limit_threads(self.threads)?;
         let dataset = self.selection.open()?;
         let Found { rows, rivals, mut failures } = match self.noise {
@@ -86,14 +90,11 @@ impl Initial {
             bail!("nothing is of the scenes, images and objects asked for");
         }
         let count = rows.len();
-        let beside = beside(&self.out, RIVALS);
-        match rivals.is_empty() {
-            false => write_results(&beside, &rivals)?,
+        if !rivals.is_empty() {
+            write_results(&beside, &rivals)?;
+        } else if count > 0 && beside.exists() {
             // Those of a search before would pass for rivals of these.
-            true if count > 0 && beside.exists() => {
-                fs::remove_file(&beside).with_context(|| beside.display().to_string())?;
-            }
-            true => {}
+            fs::remove_file(&beside).with_context(|| beside.display().to_string())?;
         }
         write_poses(&self.out, rows, &mut failures)?;
         if count > 0 {
