@@ -17,6 +17,7 @@
 //!
 //! | module | what it holds |
 //! |---|---|
+//! | [`symmetry`] | motions that map an object onto itself, all but its print too
 //! | [`scene`] | what there is: observation, object, hand |
 //! | [`problem`] | state, factors, noise models, normal equations, solver |
 //! | [`factor`] | one kind of evidence a file |
@@ -24,7 +25,7 @@
 //! | [`search`] | poses to start from, by sensors alone |
 //! | [`tracker`] | an object followed through frames |
 //! | [`data`] | BOP datasets and other files |
-//! | [`evaluate`] | metrics, symmetries, reports, studies |
+//! | [`evaluate`] | metrics, reports, studies |
 //! | [`synth`] | made-up datasets whose truth is known |
 
 pub mod data;
@@ -38,6 +39,7 @@ pub mod rig;
 pub mod scene;
 pub mod search;
 pub mod strategy;
+pub mod symmetry;
 pub mod synth;
 pub mod tracker;
 

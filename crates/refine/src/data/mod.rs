@@ -1,5 +1,5 @@
 //! Files: BOP datasets, single frames, what a dataset's objects and hands are loaded into, and what a long run keeps; and
-//! what scores and made-up datasets share: symmetries, contact, noise.
+//! what scores and made-up datasets share: contact, noise.
 
 mod assets;
 pub mod bop;
@@ -10,7 +10,6 @@ mod journal;
 mod noise;
 mod pose;
 mod smooth_field;
-mod symmetry;
 mod targets;
 mod times;
 mod workers;
@@ -23,7 +22,6 @@ pub use journal::Journal;
 pub use noise::NoiseLevel;
 pub use pose::PlainPose;
 pub(crate) use smooth_field::smooth_field;
-pub use symmetry::{ContinuousSymmetry, Symmetries};
 pub(crate) use targets::listed_targets;
 pub use targets::{Target, find_targets};
 pub use times::{Times, join_times};

@@ -1,4 +1,4 @@
-//! How good poses are: metrics, symmetries, scores of whole files, BOP's average recall, reports and studies.
+//! How good poses are: metrics, scores of whole files, BOP's average recall, reports and studies.
 
 pub mod localization;
 pub mod metrics;
@@ -7,6 +7,5 @@ pub mod report;
 mod scoring;
 #[cfg(feature = "cli")]
 pub mod study;
-pub mod symmetry;
 
 pub use scoring::Scorer;

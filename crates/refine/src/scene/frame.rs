@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use nalgebra::Point3;
+use nalgebra::{Isometry3, Point3};
 use prehend_render::{Backend, Camera, Cpu, DepthImage, Target, TargetError, depth_map};
 
 use super::{Hand, HandMeasurement, Object, Observation};
@@ -24,6 +24,7 @@ pub struct Frame<'a> {
     /// What renders, if not the processor at hand.
     backend: Option<Arc<dyn Backend>>,
     rig: Option<&'a Rig>,
+    rivals: Option<Vec<Isometry3<f64>>>,
 }
 
 /// What may hide the object in the image.
@@ -77,6 +78,7 @@ impl<'a> Frame<'a> {
             segmented: Mutex::default(),
             backend: None,
             rig: None,
+            rivals: None,
         })
     }
 
@@ -84,6 +86,17 @@ impl<'a> Frame<'a> {
     /// estimator takes that for what is known beforehand; others do not ask.
     pub fn with_rig(self, rig: &'a Rig) -> Self {
         Self { rig: Some(rig), ..self }
+    }
+
+    /// The same where initial poses come from a search, which ended at `rivals` (object → camera \[m\]), too, or at that pose alone. The fused
+    /// estimator then trusts no rotation: it tries all of them, and what looks alike by shape. Others do not ask.
+    pub fn with_rivals(self, rivals: Vec<Isometry3<f64>>) -> Self {
+        Self { rivals: Some(rivals), ..self }
+    }
+
+    /// The rivals of initial poses, where these come from a search.
+    pub(crate) fn rivals(&self) -> Option<&[Isometry3<f64>]> {
+        self.rivals.as_deref()
     }
 
     /// The rig, where it is known.

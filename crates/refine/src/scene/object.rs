@@ -1,8 +1,8 @@
 //! The object whose pose is sought, prepared for every factor.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
-use nalgebra::{Matrix3, Point3, Vector3};
+use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 use prehend_geometry::closest::ClosestPoints;
 use prehend_geometry::mass::{MassError, MassProperties, mass_properties};
 use prehend_geometry::sample::{SurfaceSample, surface_samples};
@@ -10,6 +10,7 @@ use prehend_geometry::{MeshReport, TriMesh};
 use prehend_render::RenderModel;
 
 use crate::error::RefineError;
+use crate::symmetry::near_symmetries;
 
 /// Assumed where an object's mass is unknown \[kg/m³\].
 const DEFAULT_DENSITY: f64 = 500.0;
@@ -71,6 +72,8 @@ pub struct Object {
     pub(crate) corner_normals: Vec<[Vector3<f64>; 3]>,
     pub(crate) samples: Vec<SurfaceSample>,
     pub(crate) model: Arc<RenderModel>,
+    /// See [`near_symmetries`](Self::near_symmetries).
+    pub(crate) near_symmetries: OnceLock<Vec<Isometry3<f64>>>,
 }
 
 impl Object {
@@ -100,6 +103,17 @@ impl Object {
         seed: u64,
     ) -> Result<Self, RefineError> {
         Self::build(name, mesh, None, mass, seed)
+    }
+
+    /// Motions in object coordinates after which the object looks much the same by shape, the identity left out; found when they are first
+    /// asked for, which takes about a second. None where the mesh is so broken that they cannot be found.
+    pub(crate) fn near_symmetries(&self) -> &[Isometry3<f64>] {
+        if let Some(known) = self.near_symmetries.get() {
+            return known;
+        }
+        // Not within the lock: this is work for all threads, and one that waits for it may take up another frame of the object.
+        let found = near_symmetries(&self.mesh).unwrap_or_default();
+        self.near_symmetries.get_or_init(|| found)
     }
 
     fn build(
@@ -153,6 +167,7 @@ impl Object {
             stated_size: None,
             seed,
             area: solid.area(),
+            near_symmetries: OnceLock::new(),
             mesh,
             report,
             inertial,

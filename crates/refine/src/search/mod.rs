@@ -28,6 +28,9 @@ pub struct PoseCandidate {
     pub t_cam_object: Isometry3<f64>,
     /// The sum of the costs there \[nat\]; the lower the better.
     pub cost: f64,
+    /// Its share among the poses that the search ended with, in proportion to exp(−cost / 10 nat); they sum to one. The search holds calibrations
+    /// and models for exact, so that costs differ by far more than they should.
+    pub weight: f64,
 }
 
 /// Visuo-tactile global search: finds an object without any initial pose, training or randomness.
@@ -46,6 +49,9 @@ pub struct PoseCandidate {
 /// The factors are depth, color and, where there is a skin, touch. Only what an estimator may know is read: nothing
 /// here takes a pose of the object. A hand that is not known hides what its depth says it hides in stages 1 and 2, and
 /// nothing in the factors: without it, small and much hidden objects are often found turned.
+///
+/// How a pose is turned is often wrong where an object looks much the same from both sides: what begins at the best one should try the others, too
+/// ([`Frame::with_rivals`]).
 ///
 /// The result does not depend on the number of threads. Poses that look and feel alike (a symmetry) are
 /// equally good; one of them comes first.
@@ -91,10 +97,7 @@ impl PoseSearch {
         if last.is_empty() {
             return Err(RefineError::NothingFits);
         }
-        Ok(last
-            .into_iter()
-            .map(|(t_cam_object, cost)| PoseCandidate { t_cam_object, cost })
-            .collect())
+        Ok(weighted(&last))
     }
 
     /// Stage 1.
@@ -138,6 +141,21 @@ impl PoseSearch {
     }
 }
 
+/// Differences of costs over this are logarithms of ratios of probabilities \[nat\].
+const TEMPERATURE: f64 = 10.0;
+
+/// `poses`, best first, with their shares.
+fn weighted(poses: &[Scored]) -> Vec<PoseCandidate> {
+    let least = poses.first().map_or(0.0, |(_, cost)| *cost);
+    let share = |cost: f64| ((least - cost) / TEMPERATURE).exp();
+    let total: f64 = poses.iter().map(|(_, cost)| share(*cost)).sum();
+    let candidate = |&(t_cam_object, cost): &Scored| {
+        let weight = share(cost) / total;
+        PoseCandidate { t_cam_object, cost, weight }
+    };
+    poses.iter().map(candidate).collect()
+}
+
 /// `f` of every pose, in the same order.
 fn evaluate(poses: &[Scored], f: impl Fn(&Isometry3<f64>) -> Scored + Sync) -> Vec<Scored> {
     poses.par_iter().with_max_len(1).map(|(pose, _)| f(pose)).collect()
@@ -163,4 +181,19 @@ fn distinct(mut poses: Vec<Scored>, limit: usize, distance: f64, angle: f64) -> 
         }
     }
     kept
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shares_sum_to_one_and_the_best_has_the_largest() {
+        let pose = Isometry3::identity();
+        let found = weighted(&[(pose, 700.0), (pose, 710.0), (pose, 1e5)]);
+        let weights: Vec<f64> = found.iter().map(|c| c.weight).collect();
+        assert!((weights.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+        assert!((weights[0] / weights[1] - 1f64.exp()).abs() < 1e-9, "{weights:?}");
+        assert_eq!(weights[2], 0.0);
+    }
 }

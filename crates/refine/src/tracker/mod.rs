@@ -166,7 +166,7 @@ impl Tracker {
             }
             (Err(error), _) => return Err(error),
         };
-        let Some(track) = self.track.clone() else { return self.begin(&frame, time, &mut clock) };
+        let Some(track) = self.track.clone() else { return self.begin(frame, time, &mut clock) };
         let in_hand = frame.hand().is_some();
         let nominal = State::new(&frame, &track.state.t_cam_object)?;
         let prediction = track.predict(time, &nominal, in_hand, &self.settings);
@@ -202,7 +202,7 @@ impl Tracker {
         } else {
             Rejection::Unseen
         };
-        let again = self.recover(&frame, &predicted, &track)?;
+        let again = self.recover(frame, &predicted, &track)?;
         timing.recovery = clock.lap();
         if let Some((solved, posterior)) = again {
             // The level of a pose found is not taken over at once: it may be a wrong one, and would then pass for right ever after.
@@ -241,14 +241,19 @@ impl Tracker {
     /// The first frame.
     fn begin(
         &mut self,
-        frame: &Frame<'_>,
+        mut frame: Frame<'_>,
         time: Duration,
         clock: &mut Clock,
     ) -> Result<Tracked, RefineError> {
         let initial = match self.initial {
             Some(pose) => pose,
-            None => self.search(frame)?,
+            None => {
+                let (best, rivals) = self.search(&frame)?;
+                frame = frame.with_rivals(rivals);
+                best
+            }
         };
+        let frame = &frame;
         let nominal = State::new(frame, &initial)?;
         if let Some(rig) = frame.rig() {
             let (camera, stated) = (&frame.observation().camera, &self.stated);
@@ -331,7 +336,11 @@ impl Tracker {
         Ok((Solved { solution, tried: true }, posterior))
     }
 
-    fn search(&mut self, frame: &Frame<'_>) -> Result<Isometry3<f64>, RefineError> {
+    /// The best pose that a search finds, and the others \[m\].
+    fn search(
+        &mut self,
+        frame: &Frame<'_>,
+    ) -> Result<(Isometry3<f64>, Vec<Isometry3<f64>>), RefineError> {
         let search = match &mut self.search {
             Some(search) => search,
             none => {
@@ -339,14 +348,15 @@ impl Tracker {
                 none.insert(PoseSearch::new(object, settings)?)
             }
         };
-        let found = search.run(frame)?;
-        found.first().map(|f| f.t_cam_object).ok_or(RefineError::NothingFits)
+        let mut found = search.run(frame)?.into_iter().map(|found| found.t_cam_object);
+        let best = found.next().ok_or(RefineError::NothingFits)?;
+        Ok((best, found.collect()))
     }
 
     /// A pose that is believed, looked for from near to far. One from anywhere must fit as if nothing had changed.
     fn recover(
         &mut self,
-        frame: &Frame<'_>,
+        mut frame: Frame<'_>,
         predicted: &State,
         track: &TrackState,
     ) -> Result<Option<(Solved, Posterior)>, RefineError> {
@@ -358,8 +368,11 @@ impl Tracker {
             }
             let mut start = predicted.clone();
             if reach == Recovery::Anywhere {
-                match self.search(frame) {
-                    Ok(pose) => start.t_cam_object = pose,
+                match self.search(&frame) {
+                    Ok((best, rivals)) => {
+                        start.t_cam_object = best;
+                        frame = frame.with_rivals(rivals);
+                    }
                     Err(RefineError::NothingFits | RefineError::NoDepth) => break,
                     Err(error) => return Err(error),
                 }
@@ -367,7 +380,7 @@ impl Tracker {
             if start.center().z <= 0.0 {
                 continue;
             }
-            let (solved, posterior) = self.estimate(frame, &start)?;
+            let (solved, posterior) = self.estimate(&frame, &start)?;
             if self.gate(&solved, &posterior, None, level).is_none() {
                 return Ok(Some((solved, posterior)));
             }

@@ -1,5 +1,7 @@
 //! `prehend refine` with its default method, the fused estimator.
 
+use nalgebra::{Isometry3, Vector3};
+use prehend_refine::data::bop::{ResultRow, write_results};
 use prehend_refine::evaluate::metrics::{oe_deg, pe_cm};
 use prehend_refine::scene::default_scene;
 use serde_json::Value;
@@ -41,4 +43,31 @@ fn files_of_absent_senses_may_be_absent() {
     place.remove("ds/test/000001/scene_bodies.json");
     place.succeed(&format!("{REFINE} --restart"));
     assert_right(&place, 0.5, 4.0);
+}
+
+/// A bottle that a search has found turned by half about its long axis, in both images, and true rivals of it.
+#[test]
+fn a_rival_that_fits_better_is_returned() {
+    let place = Workplace::new();
+    let half = Isometry3::rotation(Vector3::z() * std::f64::consts::PI);
+    let rows = place.poses("ds/init.csv");
+    let turned: Vec<ResultRow> = rows
+        .iter()
+        .map(|row| ResultRow { t_cam_model: row.t_cam_model * half, ..row.clone() })
+        .collect();
+    write_results(&place.path("poses.csv"), &turned).unwrap();
+    let both = turned.iter().zip(&rows).flat_map(|(turned, row)| {
+        [(turned, 0.9), (row, 0.1)].map(|(row, score)| ResultRow { score, ..row.clone() })
+    });
+    write_results(&place.path("rivals.csv"), &both.collect::<Vec<_>>()).unwrap();
+    let refine = "refine --dataset ds --poses poses.csv --out f.csv";
+    place.succeed(&format!("{refine} --rivals rivals.csv"));
+    assert_right(&place, 0.1, 1.0);
+    // Without them, a start is trusted as far as its turn goes; beside the poses, they are found.
+    place.succeed(refine);
+    let truth = default_scene(1).unwrap().truth;
+    assert!(place.poses("f.csv").iter().all(|row| oe_deg(&row.t_cam_model, &truth) > 170.0));
+    place.copy("rivals.csv", "poses.csv.rivals.csv");
+    place.succeed(refine);
+    assert_right(&place, 0.1, 1.0);
 }

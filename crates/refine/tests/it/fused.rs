@@ -45,6 +45,55 @@ fn errors(pose: &Isometry3<f64>) -> (f64, f64) {
     (pe_cm(pose, &SCENE.truth), oe_deg(pose, &SCENE.truth))
 }
 
+/// The pose and the posterior of a refinement that begins turned by half about the bottle's long axis, which looks much the same by shape.
+fn from_the_back(rivals: Option<Vec<Isometry3<f64>>>) -> (Isometry3<f64>, Posterior) {
+    let axis = SCENE.truth.rotation * Vector3::z() * std::f64::consts::PI;
+    let back = turned(&[2e-3, -1e-3, 2e-3, axis.x, axis.y, axis.z]);
+    let frame = Frame::new(&SCENE.observation, &SCENE.object, Some(&SCENE.hand)).unwrap();
+    let frame = match rivals {
+        Some(rivals) => frame.with_rivals(rivals),
+        None => frame,
+    };
+    let found = refine(&frame, &back, &Fused::default()).unwrap();
+    (found.state.t_cam_object, found.posterior.unwrap())
+}
+
+#[test]
+fn a_trusted_start_is_not_turned_by_half_and_that_of_a_search_is() {
+    let (pose, _) = from_the_back(None);
+    assert!(errors(&pose).1 > 170.0, "{:?}", errors(&pose));
+    // The rival is the right one; without it, the model's near symmetry is.
+    for rivals in [vec![turned(&OFF)], vec![]] {
+        let (pose, posterior) = from_the_back(Some(rivals));
+        let (pe, oe) = errors(&pose);
+        assert!(pe < 0.05 && oe < 0.5, "{pe} cm, {oe}°");
+        assert_eq!(pose, posterior.hypotheses[0].t_cam_object);
+        let weights: Vec<f64> = posterior.hypotheses.iter().map(|h| h.weight).collect();
+        assert!((weights.iter().sum::<f64>() - 1.0).abs() < 1e-9, "{weights:?}");
+        assert!(weights.windows(2).all(|pair| pair[0] >= pair[1]), "{weights:?}");
+        assert!(posterior.probability() > 0.9);
+    }
+}
+
+#[test]
+fn where_colors_do_not_tell_the_posterior_covers_both_sides() {
+    let mut observation = SCENE.observation.clone();
+    observation.hand = None;
+    let frame = Frame::new(&observation, &SCENE.object, None).unwrap().with_rivals(vec![]);
+    let found = refine(&frame, &turned(&OFF), &Fused::new(without(Modality::Color))).unwrap();
+    let posterior = found.posterior.unwrap();
+    let best = posterior.hypotheses[0].t_cam_object;
+    let share: f64 = posterior
+        .hypotheses
+        .iter()
+        .filter(|h| oe_deg(&h.t_cam_object, &best) > 170.0)
+        .map(|h| h.weight)
+        .sum();
+    assert!(share > 0.01, "{share}");
+    let within = posterior.probability_within(5e-3, 5f64.to_radians());
+    assert!((within - (1.0 - share)).abs() < 0.05, "{within} {share}");
+}
+
 #[test]
 fn exact_calibrations_are_recognized_and_errors_are_as_large_as_promised() {
     let (pose, posterior) =

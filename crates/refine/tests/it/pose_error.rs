@@ -1,8 +1,8 @@
 //! Errors of poses.
 
 use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
-use prehend_refine::data::{ContinuousSymmetry, Symmetries};
 use prehend_refine::evaluate::metrics::{oe_deg, oe_symmetric_deg, pe_cm};
+use prehend_refine::symmetry::{ContinuousSymmetry, Symmetries};
 
 fn pose(x: f64, axis_angle: [f64; 3]) -> Isometry3<f64> {
     let rotation = UnitQuaternion::from_scaled_axis(Vector3::from(axis_angle));

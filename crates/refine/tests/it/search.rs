@@ -20,7 +20,8 @@ fn the_bottle_is_found_from_sensors_alone() {
     let best = &found[0].t_cam_object;
     let (pe, oe) = (pe_cm(best, &SCENE.truth), oe_deg(best, &SCENE.truth));
     assert!(pe < 0.3 && oe < 3.0, "{pe} cm, {oe}°");
-    assert!(found.windows(2).all(|f| f[0].cost <= f[1].cost));
+    assert!(found.windows(2).all(|f| f[0].cost <= f[1].cost && f[0].weight >= f[1].weight));
+    assert!((found.iter().map(|f| f.weight).sum::<f64>() - 1.0).abs() < 1e-9);
 }
 
 #[test]

@@ -4,8 +4,7 @@ use nalgebra::{Isometry3, Vector3};
 use prehend_geometry::TriMesh;
 use prehend_geometry::objects::YcbObject;
 use prehend_geometry::shapes::{cone, cuboid, cylinder, sphere};
-use prehend_refine::data::Symmetries;
-use prehend_refine::evaluate::symmetry::{SymmetrySettings, find_symmetries};
+use prehend_refine::symmetry::{Symmetries, SymmetrySettings, find_symmetries};
 
 fn found(mesh: &TriMesh) -> Symmetries {
     find_symmetries(mesh, &SymmetrySettings::default()).unwrap()

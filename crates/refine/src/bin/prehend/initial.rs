@@ -2,23 +2,22 @@
 
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
+use std::fs;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 
-use anyhow::bail;
+use anyhow::{Context, bail};
 use clap::Args;
-use nalgebra::Isometry3;
-use prehend_refine::RefineError;
 use prehend_refine::data::bop::{
-    Dataset, DatasetError, GroundTruth, ResultRow, TrueObject, check_writable,
+    Dataset, DatasetError, GroundTruth, ResultRow, TrueObject, check_writable, write_results,
 };
 use prehend_refine::data::{AssetError, Assets, NoiseLevel, Target};
-use prehend_refine::search::{PoseSearch, SearchSettings};
+use prehend_refine::search::{PoseCandidate, PoseSearch, SearchSettings};
 use prehend_render::Backend;
 
-use crate::options::{Rendering, Selection, limit_threads, row, write_poses};
+use crate::options::{RIVALS, Rendering, Selection, beside, limit_threads, row, write_poses};
 use crate::terminal::{cache, exit_code, progress, say};
 
 #[derive(Args)]
@@ -46,6 +45,9 @@ pub(crate) struct Initial {
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
     /// Find the objects from depth, mask, color and touch alone; where a scene says nothing of its hand, without touch
+    ///
+    /// All poses that the search of an object ends with, the best one first and with their shares as scores, are written to FILE.rivals.csv beside
+    /// the best ones, where `prehend refine` finds them.
     #[arg(long)]
     search: bool,
     /// What to search for, as BOP's test_targets_bop19.json has it
@@ -62,15 +64,25 @@ pub(crate) struct Initial {
     rendering: Rendering,
 }
 
-/// Rows of a results file, and what failed.
-type Rows = (Vec<ResultRow>, Vec<String>);
+/// What there is to be written, and what failed.
+#[derive(Default)]
+struct Found {
+    rows: Vec<ResultRow>,
+    /// All poses that searches ended with.
+    rivals: Vec<ResultRow>,
+    failures: Vec<String>,
+}
 
 impl Initial {
     pub(crate) fn run(self) -> anyhow::Result<ExitCode> {
         check_writable(&self.out)?;
+        let beside = beside(&self.out, RIVALS);
+        if self.search {
+            check_writable(&beside)?;
+        }
         limit_threads(self.threads)?;
         let dataset = self.selection.open()?;
-        let (rows, mut failures) = match self.noise {
+        let Found { rows, rivals, mut failures } = match self.noise {
             Some(level) => self.perturbed(&dataset, level)?,
             None => self.found(&dataset)?,
         };
@@ -78,6 +90,12 @@ impl Initial {
             bail!("nothing is of the scenes, images and objects asked for");
         }
         let count = rows.len();
+        if !rivals.is_empty() {
+            write_results(&beside, &rivals)?;
+        } else if count > 0 && beside.exists() {
+            // Those of a search before would pass for rivals of these.
+            fs::remove_file(&beside).with_context(|| beside.display().to_string())?;
+        }
         write_poses(&self.out, rows, &mut failures)?;
         if count > 0 {
             say(format!("{count} poses written to {}", self.out.display()))?;
@@ -86,46 +104,49 @@ impl Initial {
     }
 
     /// The true poses with errors of `level`.
-    fn perturbed(&self, dataset: &Dataset, level: NoiseLevel) -> Result<Rows, DatasetError> {
+    fn perturbed(&self, dataset: &Dataset, level: NoiseLevel) -> Result<Found, DatasetError> {
         let truth = GroundTruth::new(dataset);
-        let (mut rows, mut failures) = (Vec::new(), Vec::new());
+        let mut found = Found::default();
         for scene in dataset.scenes() {
             let scene_id = scene.id();
             let mut images = scene.images()?;
             images.retain(|id| self.selection.admits_image(scene_id, *id));
             for im_id in images {
                 let objects = truth.objects(scene_id, im_id).unwrap_or_else(|error| {
-                    failures.push(format!("scene {scene_id} image {im_id}: {error}"));
+                    found.failures.push(format!("scene {scene_id} image {im_id}: {error}"));
                     Vec::new()
                 });
                 for (instance, TrueObject { obj_id, t_cam_model }) in objects.iter().enumerate() {
                     let target = Target { scene_id, im_id, obj_id: *obj_id, instance };
                     if self.selection.admits(scene_id, im_id, *obj_id) {
                         let pose = level.perturb_target(t_cam_model, self.seed, &target);
-                        rows.push(row(&target, pose, 1.0));
+                        found.rows.push(row(&target, pose, 1.0));
                     }
                 }
             }
         }
-        Ok((rows, failures))
+        Ok(found)
     }
 
     /// The poses that the search finds.
-    fn found(&self, dataset: &Dataset) -> anyhow::Result<Rows> {
+    fn found(&self, dataset: &Dataset) -> anyhow::Result<Found> {
         let targets = self.selection.targets(dataset, self.targets.as_deref())?;
         let mut assets = Assets::new(dataset, 0).with_cache(cache());
         let backend = self.rendering.open()?;
         let mut searches = BTreeMap::new();
-        let (mut rows, mut failures) = (Vec::new(), Vec::new());
+        let mut all = Found::default();
         let bar = progress(targets.len(), "searching");
         for target in bar.wrap_iter(targets.iter()) {
             match search_one(&mut assets, &mut searches, target, &backend) {
-                // Of a results file's scores the higher is the better.
-                Ok((pose, cost)) => rows.push(row(target, pose, -cost)),
-                Err(error) => failures.push(format!("{target}: {error}")),
+                Ok(found) => {
+                    // Of a results file's scores the higher is the better.
+                    all.rows.extend(found.first().map(|c| row(target, c.t_cam_object, -c.cost)));
+                    all.rivals.extend(found.iter().map(|c| row(target, c.t_cam_object, c.weight)));
+                }
+                Err(error) => all.failures.push(format!("{target}: {error}")),
             }
         }
-        Ok((rows, failures))
+        Ok(all)
     }
 }
 
@@ -134,7 +155,7 @@ fn search_one(
     searches: &mut BTreeMap<u32, PoseSearch>,
     target: &Target,
     backend: &Arc<dyn Backend>,
-) -> Result<(Isometry3<f64>, f64), AssetError> {
+) -> Result<Vec<PoseCandidate>, AssetError> {
     let input = assets.load(target, &[])?;
     let search = match searches.entry(target.obj_id) {
         Entry::Occupied(known) => known.into_mut(),
@@ -142,7 +163,5 @@ fn search_one(
             unknown.insert(PoseSearch::new(Arc::clone(&input.object), SearchSettings::default())?)
         }
     };
-    let found = search.run(&input.frame()?.with_backend(Arc::clone(backend)))?;
-    let best = found.first().ok_or(RefineError::NothingFits)?;
-    Ok((best.t_cam_object, best.cost))
+    Ok(search.run(&input.frame()?.with_backend(Arc::clone(backend)))?)
 }

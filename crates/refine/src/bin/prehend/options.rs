@@ -10,7 +10,8 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use nalgebra::Isometry3;
 use prehend_refine::NamedMethod;
 use prehend_refine::data::bop::{
-    Dataset, DatasetError, ReadResults, ResultRow, read_results, share_image_times, write_results,
+    Dataset, DatasetError, ReadResults, ResultRow, read_results, read_rivals, share_image_times,
+    write_results,
 };
 use prehend_refine::data::{Target, find_targets};
 use prehend_refine::rig::Rig;
@@ -76,6 +77,8 @@ impl Rendering {
 pub(crate) struct Job {
     pub(crate) target: Target,
     pub(crate) row: ResultRow,
+    /// The other poses that a search ended with, if the row's comes from one.
+    pub(crate) rivals: Option<Vec<Isometry3<f64>>>,
 }
 
 impl Selection {
@@ -116,16 +119,29 @@ impl Selection {
 
     /// The rows of the results file `poses` that are meant, and what is wrong with the others.
     pub(crate) fn jobs(&self, poses: &Path) -> anyhow::Result<(Vec<Job>, Vec<String>)> {
-        let ReadResults { rows, instances, errors } = read_results(poses)?;
+        self.jobs_with_rivals(poses, None)
+    }
+
+    /// As [`jobs`](Self::jobs), with the rivals that the file `rivals` has.
+    pub(crate) fn jobs_with_rivals(
+        &self,
+        poses: &Path,
+        rivals: Option<&Path>,
+    ) -> anyhow::Result<(Vec<Job>, Vec<String>)> {
+        let ReadResults { rows, instances, errors, .. } = read_results(poses)?;
         let file = poses.display();
         if rows.is_empty() && errors.is_empty() {
             bail!("{file}: no poses: there is nothing but a header");
         }
-        let job = |(row, instance): (ResultRow, usize)| {
+        let mut found = vec![None; rows.len()];
+        if let Some(rivals) = rivals {
+            found = read_rivals(rivals, &rows)?;
+        }
+        let job = |((row, instance), rivals): ((ResultRow, usize), _)| {
             let ResultRow { scene_id, im_id, obj_id, .. } = row;
-            Job { target: Target { scene_id, im_id, obj_id, instance }, row }
+            Job { target: Target { scene_id, im_id, obj_id, instance }, row, rivals }
         };
-        let mut jobs: Vec<Job> = rows.into_iter().zip(instances).map(job).collect();
+        let mut jobs: Vec<Job> = rows.into_iter().zip(instances).zip(found).map(job).collect();
         jobs.retain(|Job { row, .. }| self.admits(row.scene_id, row.im_id, row.obj_id));
         if jobs.is_empty() && errors.is_empty() {
             bail!("{file}: no pose is of the scenes, images and objects asked for");
@@ -179,6 +195,9 @@ pub(crate) fn named(name: &str) -> Result<&'static NamedMethod, String> {
         format!("unknown method: one of {}", names.join(", "))
     })
 }
+
+/// The extension of the file of rivals beside a results file.
+pub(crate) const RIVALS: &str = "rivals.csv";
 
 /// The file `extension` that accompanies the output `out`: out.csv.journal beside out.csv.
 pub(crate) fn beside(out: &Path, extension: &str) -> PathBuf {

@@ -6,8 +6,8 @@ use std::process::ExitCode;
 use anyhow::bail;
 use clap::Args;
 use prehend_refine::data::bop::{Models, write_symmetries};
-use prehend_refine::data::{Symmetries, load_mesh};
-use prehend_refine::evaluate::symmetry::{SymmetrySettings, find_symmetries};
+use prehend_refine::data::load_mesh;
+use prehend_refine::symmetry::{Symmetries, SymmetrySettings, find_symmetries};
 
 use crate::terminal::{exit_code, progress, say};
 

@@ -17,6 +17,7 @@ mod models;
 mod models_info;
 mod pose;
 mod results;
+mod rivals;
 mod scene;
 mod visibility;
 
@@ -32,4 +33,5 @@ pub use models_info::write_symmetries;
 pub(crate) use models_info::{diameter, extent_to_bop};
 pub(crate) use pose::{rotation_from_row_major, rotation_to_row_major, translation_to_mm};
 pub use results::{ReadResults, ResultRow, read_results, share_image_times, write_results};
+pub use rivals::read_rivals;
 pub use scene::{Body, SceneBodies, Tactile, UNITS_PER_NEWTON};

@@ -9,7 +9,7 @@ use serde::Deserialize;
 use super::error::DatasetError;
 use super::json::{JsonFile, Numbers, Positive};
 use super::pose::pose_from_bop;
-use crate::data::symmetry::{ContinuousSymmetry, Symmetries};
+use crate::symmetry::{ContinuousSymmetry, Symmetries};
 
 /// A folder with `obj_000001.ply`, … (millimeters) and `models_info.json`.
 #[derive(Debug)]

@@ -9,7 +9,7 @@ use super::atomic::write_atomically;
 use super::error::DatasetError;
 use super::models::Models;
 use super::pose::{rotation_to_row_major, translation_to_mm};
-use crate::data::symmetry::{ContinuousSymmetry, Symmetries};
+use crate::symmetry::{ContinuousSymmetry, Symmetries};
 
 /// Largest distance between two of `points`; 0 without two.
 pub(crate) fn diameter(points: &[Point3<f64>]) -> f64 {

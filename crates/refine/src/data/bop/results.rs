@@ -37,6 +37,8 @@ pub struct ReadResults {
     /// For each of `rows`, its index from 0 among all the file's rows of the same image, malformed
     /// ones included: the instance that [`super::Frame::mask`] asks for.
     pub instances: Vec<usize>,
+    /// The line of each of `rows`, from 1, the header included.
+    pub lines: Vec<u64>,
     /// What is wrong with each malformed row, in file order, such as `line 3: R: "x" is not a number`: the line number is
     /// from 1, the header included, and the column is `row` where the columns themselves are wrong in number.
     pub errors: Vec<String>,
@@ -73,13 +75,14 @@ pub fn read_results(file: &Path) -> Result<ReadResults, DatasetError> {
             *count += 1;
             *count - 1
         });
+        let line = record.position().map_or(0, csv::Position::line);
         match parse_row(&fields) {
             Ok(row) => {
                 results.rows.push(row);
                 results.instances.push(instance);
+                results.lines.push(line);
             }
             Err((column, problem)) => {
-                let line = record.position().map_or(0, csv::Position::line);
                 results.errors.push(format!("line {line}: {column}: {problem}"));
             }
         }

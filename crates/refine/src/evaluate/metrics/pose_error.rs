@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, UnitQuaternion};
 
-use crate::data::Symmetries;
+use crate::symmetry::Symmetries;
 
 /// Position error: the distance of the two model origins \[cm\].
 pub fn pe_cm(estimate: &Isometry3<f64>, truth: &Isometry3<f64>) -> f64 {

@@ -111,7 +111,7 @@ pub(crate) struct Contact {
 mod tests {
     use super::super::ScoredModel;
     use super::*;
-    use crate::data::Symmetries;
+    use crate::symmetry::Symmetries;
     use nalgebra::{Isometry3, Point3, Vector3};
     use prehend_render::Camera;
 

@@ -8,7 +8,7 @@ use prehend_render::Camera;
 
 use super::pose_error::{oe_deg, oe_symmetric_deg, pe_cm};
 use super::score::PoseScore;
-use crate::data::Symmetries;
+use crate::symmetry::Symmetries;
 
 /// What scoring needs to know of an object, prepared once for many poses.
 #[derive(Debug)]
@@ -114,7 +114,7 @@ impl ScoredModel {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::data::ContinuousSymmetry;
+    use crate::symmetry::ContinuousSymmetry;
     use nalgebra::Vector3;
 
     const CAMERA: Camera =

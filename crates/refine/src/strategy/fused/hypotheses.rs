@@ -1,10 +1,12 @@
 //! Where solves start, and which of their ends are the same.
 
+use nalgebra::Isometry3;
 use prehend_autodiff::lie::so3_log;
 
 use super::posterior::principal_directions;
 use crate::factor::NoiseEstimate;
 use crate::problem::{Block, Linearization, Solution, State};
+use crate::symmetry::alternatives;
 
 /// The initial state, and those turned by `angle` \[rad\] about each axis of the camera frame, both ways; that alone if it is zero.
 pub(super) fn restarts(initial: &State, angle: f64) -> Vec<State> {
@@ -19,6 +21,28 @@ pub(super) fn restarts(initial: &State, angle: f64) -> Vec<State> {
         }
     }
     starts
+}
+
+/// The initial state, and the same with the object at each of the poses `others` \[m\] that differ from it and are in front of the camera.
+pub(super) fn rivals(initial: &State, others: &[Isometry3<f64>]) -> Vec<State> {
+    let at = |pose: &Isometry3<f64>| State { t_cam_object: *pose, ..initial.clone() };
+    let seen = others.iter().map(at).filter(|state| state.center().z > 0.0);
+    let differs = |state: &State| state.t_cam_object != initial.t_cam_object;
+    std::iter::once(initial.clone()).chain(seen.filter(differs)).collect()
+}
+
+/// What `motions` in object coordinates make of `states`, where it is turned otherwise than these and each other.
+pub(super) fn turned(states: &[State], motions: &[Isometry3<f64>]) -> Vec<State> {
+    let poses: Vec<_> = states.iter().map(|state| state.t_cam_object).collect();
+    let of = |(from, t_cam_object): (usize, _)| State { t_cam_object, ..states[from].clone() };
+    alternatives(&poses, motions).into_iter().map(of).collect()
+}
+
+/// The `count` of `states` with the lowest `costs`, in order of cost.
+pub(super) fn lowest(states: &[State], costs: &[f64], count: usize) -> Vec<State> {
+    let mut order: Vec<usize> = (0..states.len()).collect();
+    order.sort_by(|&a, &b| costs[a].total_cmp(&costs[b]));
+    order.into_iter().take(count).map(|k| states[k].clone()).collect()
 }
 
 /// How wide the posterior may be in any direction \[m of surface motion\], and how far depth points may be from the surface \[m\],
@@ -91,4 +115,31 @@ pub(super) fn spread(
     }
     states.truncate(count);
     states
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::scene::{Frame, default_scene};
+
+    #[test]
+    fn rivals_are_in_front_of_the_camera_and_the_cheapest_come_first() {
+        let scene = default_scene(1).unwrap();
+        let frame = Frame::new(&scene.observation, &scene.object, None).unwrap();
+        let initial = State::new(&frame, &scene.initial).unwrap();
+        let behind = Isometry3::translation(0.0, 0.0, -1.0);
+        let states = rivals(&initial, &[scene.initial, behind, scene.truth]);
+        assert_eq!(states.len(), 2);
+        assert_eq!(states[1].t_cam_object, scene.truth);
+        let half = Isometry3::rotation(Vector3::z() * std::f64::consts::PI);
+        let turned = turned(&states, &[half]);
+        // The initial pose and the truth are no alternatives to each other.
+        assert_eq!(turned.len(), 1);
+        assert_eq!(turned[0].t_cam_object, scene.initial * half);
+        let first = lowest(&[states, turned].concat(), &[3.0, 1.0, 2.0], 2);
+        let poses: Vec<_> = first.iter().map(|state| state.t_cam_object).collect();
+        assert_eq!(poses, [scene.truth, scene.initial * half]);
+    }
 }

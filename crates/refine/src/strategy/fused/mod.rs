@@ -7,6 +7,7 @@ mod hypotheses;
 mod posterior;
 mod settings;
 mod summary;
+use std::f64::consts::PI;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
@@ -18,8 +19,9 @@ pub(crate) use self::factors::{problem_of, surface_patches};
 use self::fit::Known;
 pub(crate) use self::fit::Pixels;
 pub use self::fit::{Fit, FitReference, FitStatistics};
-use self::hypotheses::{distinct, restarts, settled, spread};
+use self::hypotheses::{distinct, lowest, restarts, rivals, settled, spread, turned};
 pub(crate) use self::posterior::chi_square_z;
+use self::posterior::log_mass;
 pub use self::posterior::{
     CovarianceInflation, Hypothesis, Inconsistency, Posterior, UnobservableDirection,
 };
@@ -64,11 +66,15 @@ impl Fused {
         Self { settings, factors: Vec::new() }
     }
 
-    /// What is known beforehand: about `initial`, and of calibrations what the frame's rig says, or the settings.
+    /// What is known beforehand: about `initial`, and of calibrations what the frame's rig says, or the settings. Of the rotation that a search
+    /// has found, nothing is known that is not in the frame.
     fn prior(&self, frame: &Frame<'_>, initial: &State) -> Result<GaussianPrior, RefineError> {
-        let settings = &self.settings.prior;
+        let mut settings = self.settings.prior.clone();
+        if frame.rivals().is_some() {
+            settings.object_rotation = [UNKNOWN_ROTATION; 3];
+        }
         let Some(rig) = frame.rig() else {
-            return GaussianPrior::independent(initial.clone(), settings);
+            return GaussianPrior::independent(initial.clone(), &settings);
         };
         let object = settings.sigmas(Block::ObjectPose);
         let covariance = rig.frame_covariance(initial, &frame.observation().camera, &object)?;
@@ -188,6 +194,14 @@ const COARSEST: f64 = 3e-3;
 /// Solutions of geometry alone that are taken up: where they differ, starts spread about them say more than they do.
 const KEPT: usize = 4;
 
+/// Standard deviation about each axis of a rotation that nothing is known of \[rad\]: half a turn costs half a nat.
+const UNKNOWN_ROTATION: f64 = PI;
+
+/// Where initial poses come from a search, the first stage, and the first that sees colors, take up so many hypotheses at most, …
+const MOST_ALTERNATIVES: usize = 64;
+/// … and later ones so many times as many as else.
+const WITH_RIVALS: usize = 2;
+
 /// The last stage's tolerance times this is that of a solve with exact calibrations: its steps are cheap, and its errors small.
 const EXACT: f64 = 0.01;
 
@@ -207,7 +221,10 @@ impl Strategy for Fused {
         let prior = Arc::new(self.prior(frame, initial)?);
         let settings = self.settings.for_frame(frame);
         let mut walk = Walk { fused: self, frame, initial, prior, settings };
-        let mut states = restarts(initial, self.settings.restart_angle);
+        let mut states = match frame.rivals() {
+            Some(others) => rivals(initial, others),
+            None => restarts(initial, self.settings.restart_angle),
+        };
         let mut found = Vec::new();
         let mut go_on = ControlFlow::Continue(());
         for index in 0..self.settings.stages.len() {
@@ -277,6 +294,11 @@ impl Walk<'_> {
         &self.fused.settings.stages
     }
 
+    /// Whether the initial pose comes from a search.
+    fn searched(&self) -> bool {
+        self.frame.rivals().is_some()
+    }
+
     fn radius(&self) -> f64 {
         self.frame.object().radius
     }
@@ -288,8 +310,8 @@ impl Walk<'_> {
         let settings = &mut self.settings;
         let of_stage = fused.stage_problem(frame, initial, &states[0], stage, settings)?;
         let problem = of_stage.problem.with_prior(self.prior.clone());
-        let states = &states[..states.len().min(stage.hypotheses.max(1))];
-        let found = if index == 0 {
+        let states = &self.taken_up(index, states, &problem);
+        let found = if index == 0 && !self.searched() {
             let mut all = problem.solve_all(&states[..1], &stage.solver);
             let noise = || depth_noise(frame, &all[0].at.state, &fused.settings);
             if !settled(&all[0].at, noise, self.radius()) {
@@ -312,7 +334,30 @@ impl Walk<'_> {
                 kept
             });
         }
+        if index + 1 == self.stages().len() {
+            self.rank(&mut found);
+        }
         Ok(found)
+    }
+
+    /// Those of `states` that stage `index`, which solves `problem`, takes up.
+    fn taken_up(&self, index: usize, states: &[State], problem: &Problem) -> Vec<State> {
+        let usual = self.stages()[index].hypotheses.max(1);
+        if !self.searched() {
+            return states[..states.len().min(usual)].to_vec();
+        }
+        let limit = if index < 2 { MOST_ALTERNATIVES } else { WITH_RIVALS * usual };
+        if states.len() <= limit {
+            return states.to_vec();
+        }
+        lowest(states, &problem.cost_all(states), limit)
+    }
+
+    /// Puts the best of the last solutions first: modes far apart, as those of a search are, compare by their mass rather than their height.
+    fn rank(&self, found: &mut [Solution]) {
+        if self.searched() {
+            found.sort_by(|a, b| log_mass(&b.at).total_cmp(&log_mass(&a.at)));
+        }
     }
 
     /// Where the stage after `index` starts, which found these solutions.
@@ -322,6 +367,11 @@ impl Walk<'_> {
         // Where it is, geometry finds well; how it is turned, colors may say better from where they were told. And
         // what little is seen of the object may have led astray.
         let initial = self.initial;
+        if self.searched() {
+            // Which of them it is, colors say, that were not considered yet.
+            states.extend(turned(&states, self.frame.object().near_symmetries()));
+            return states;
+        }
         let mut turned_back = states[0].clone();
         let moved = states[0].center() - initial.center();
         states.truncate(KEPT.min(next.hypotheses.saturating_sub(2).max(1)));
@@ -358,7 +408,9 @@ impl Walk<'_> {
         let problem = problem_of(self.frame, initial, last, &settings, None, own)?
             .with_prior(self.prior.clone());
         let solver = Solver { min_decrease: EXACT * last.solver.min_decrease, ..last.solver };
-        Ok(distinct(problem.solve_all(&states, &solver), self.radius()))
+        let mut found = distinct(problem.solve_all(&states, &solver), self.radius());
+        self.rank(&mut found);
+        Ok(found)
     }
 
     /// How well `point` explains what the frame shows.

@@ -45,7 +45,7 @@ pub struct Inconsistency {
 /// What is known of how good a pose is.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Posterior {
-    /// The poses found, that of the lowest value first.
+    /// The poses found, that of the lowest value first; where the initial pose comes from a search, that of the largest weight.
     pub hypotheses: Vec<Hypothesis>,
     /// Directions that are hardly observed.
     pub unobservable: Vec<UnobservableDirection>,
@@ -209,6 +209,11 @@ fn laplace(point: &Linearization) -> (Matrix6<f64>, f64) {
     let covariance = Matrix6::from_fn(|r, c| all[(at + r, at + c)]);
     let eliminated = point.marginal.as_ref().map_or(0.0, |marginal| marginal.log_determinant);
     (covariance, -factor.log_determinant() - eliminated)
+}
+
+/// Logarithm of the mass of the mode at `point`, up to a constant.
+pub(super) fn log_mass(point: &Linearization) -> f64 {
+    0.5 * laplace(point).1 - point.cost
 }
 
 /// The object's part of the step to where the quadratic model about `point` is least: a left twist about its center \[m, rad\].

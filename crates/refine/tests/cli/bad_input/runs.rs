@@ -6,7 +6,7 @@ use super::*;
 #[test]
 fn hopeless_runs() {
     type Case = (&'static str, fn(&Workplace), &'static str, &'static str);
-    let cases: [Case; 12] = [
+    let cases: [Case; 15] = [
         ("no poses", |p| p.remove("init.csv"), REFINE, "error: init.csv: no such file"),
         ("empty poses", |p| p.write("init.csv", ""), REFINE, "error: init.csv: the file is empty"),
         (
@@ -16,6 +16,24 @@ fn hopeless_runs() {
             "error: init.csv: no poses",
         ),
         ("nothing but faults", |p| p.write("init.csv", "1,0\n1,1\n"), REFINE, "0 done, 3 failed"),
+        (
+            "no rivals",
+            |_| (),
+            "refine --dataset ds --poses init.csv --rivals none.csv --out refined.csv",
+            "error: none.csv: no such file",
+        ),
+        (
+            "a broken row of rivals",
+            |p| p.write("init.csv.rivals.csv", "1,0,5,1,1 0 0 0 1 0 0 0,0 0 500,-1\n"),
+            REFINE,
+            "error: init.csv.rivals.csv: line 1: R: ",
+        ),
+        (
+            "rivals of other poses",
+            |p| p.write("init.csv.rivals.csv", "1,9,5,1,1 0 0 0 1 0 0 0 1,0 0 500,-1\n"),
+            REFINE,
+            "error: init.csv.rivals.csv: line 1: pose: scene 1 image 9 object 5: neither",
+        ),
         ("no dataset", |p| p.remove("ds"), REFINE, "error: ds: no such file or folder"),
         ("no scenes", |p| p.remove("ds/test"), REFINE, "error: ds: no scene folders"),
         (

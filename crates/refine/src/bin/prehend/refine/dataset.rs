@@ -28,6 +28,8 @@ use crate::terminal::{cache, exit_code, progress, say, warn};
 pub(super) struct DatasetRun<'a> {
     pub(super) selection: &'a Selection,
     pub(super) poses: &'a Path,
+    /// Rivals of the poses, where these come from a search.
+    pub(super) rivals: Option<&'a Path>,
     pub(super) out: &'a Path,
     pub(super) output: &'a OutputOptions,
     pub(super) options: &'a MethodOptions,
@@ -58,7 +60,7 @@ impl DatasetRun<'_> {
         let name = self.options.method().name;
         let json = self.output.json;
         let dataset = self.selection.open()?;
-        let (jobs, mut failures) = self.selection.jobs(self.poses)?;
+        let (jobs, mut failures) = self.selection.jobs_with_rivals(self.poses, self.rivals)?;
         let rig = open_rig(self.rig)?;
         let assets = Assets::new(&dataset, self.options.seed).with_cache(cache()).with_rig(rig);
         let assets = Mutex::new(assets);
@@ -145,6 +147,7 @@ impl DatasetRun<'_> {
             "dataset": canonical(dataset.split_dir()),
             "annotations": dataset_fingerprint(dataset, &SENSED)?,
             "poses": file_fingerprint(self.poses)?,
+            "rivals": self.rivals.map(file_fingerprint).transpose()?,
             "rig": self.rig.map(file_fingerprint).transpose()?,
             "filters": self.selection.filters(),
             "method": self.options.method().name,
@@ -163,7 +166,10 @@ impl DatasetRun<'_> {
         };
         let initial = &job.row.t_cam_model;
         let start = Instant::now();
-        let frame = input.frame()?.with_backend(Arc::clone(&self.backend));
+        let mut frame = input.frame()?.with_backend(Arc::clone(&self.backend));
+        if let Some(rivals) = &job.rivals {
+            frame = frame.with_rivals(rivals.clone());
+        }
         let found = refine(&frame, initial, &self.method)?;
         let seconds = start.elapsed().as_secs_f64();
         let [object_warnings, warnings] = input

@@ -14,7 +14,7 @@ use prehend_refine::data::bop::check_writable;
 use self::dataset::DatasetRun;
 use self::frame::refine_frame;
 use self::options::{MethodOptions, OutputOptions};
-use crate::options::{Rendering, Selection, limit_threads};
+use crate::options::{RIVALS, Rendering, Selection, beside, limit_threads};
 
 #[derive(Args)]
 #[command(next_help_heading = "Input")]
@@ -29,8 +29,12 @@ pub(crate) struct Refine {
     /// Poses on the dataset's images, as a BOP results file
     #[arg(long, value_name = "FILE", required_unless_present = "frame")]
     poses: Option<PathBuf>,
+    /// The other poses that a search ended with, as `prehend initial --search` writes them beside the best ones: the fused method then trusts no
+    /// rotation, and starts from all of them and from what looks alike by shape [default: the poses' file with .rivals.csv added, if there is one]
+    #[arg(long, value_name = "FILE", requires = "poses")]
+    rivals: Option<PathBuf>,
     /// Instead of a dataset, one frame described by a JSON file (see docs/FRAME.md)
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["Selection", "poses", "report"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["Selection", "poses", "rivals", "report"])]
     frame: Option<PathBuf>,
     /// The rig that recorded the frames, as `prehend calibrate` has found it: frames and models are corrected by it
     #[arg(long, value_name = "FILE")]
@@ -45,7 +49,7 @@ pub(crate) struct Refine {
 
 impl Refine {
     pub(crate) fn run(self) -> anyhow::Result<ExitCode> {
-        let Self { selection, poses, frame, rig, output, method, rendering } = &self;
+        let Self { selection, poses, rivals, frame, rig, output, method, rendering } = &self;
         // What cannot be written must be known before the work, not after it.
         if let Some(out) = &output.out {
             check_writable(out)?;
@@ -58,7 +62,11 @@ impl Refine {
                 let configured = method.configured()?;
                 let options = method;
                 let (method, rig) = (configured, rig.as_deref());
-                DatasetRun { selection, poses, out, output, options, method, backend, rig }.run()
+                let beside = Some(beside(poses, RIVALS)).filter(|file| file.exists());
+                let rivals = rivals.clone().or(beside);
+                let rivals = rivals.as_deref();
+                DatasetRun { selection, poses, rivals, out, output, options, method, backend, rig }
+                    .run()
             }
             _ => bail!("give --dataset, --poses and --out, or --frame"),
         }

@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
 
 /// Rotations that stand for a continuous symmetry: ⌈π/0.01⌉, so that no surface point moves by more than 1 %
 /// of the diameter from one to the next (BOP).
-pub(super) const CONTINUOUS_STEPS: usize = 315;
+const CONTINUOUS_STEPS: usize = 315;
 
 /// The symmetries of an object in its model frame.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -26,6 +26,15 @@ pub struct ContinuousSymmetry {
     pub point: Point3<f64>,
 }
 
+impl ContinuousSymmetry {
+    /// The turn by `angle` \[rad\] about the axis, as a motion.
+    pub(crate) fn turn(&self, angle: f64) -> Isometry3<f64> {
+        let rotation = UnitQuaternion::from_axis_angle(&self.axis, angle);
+        let shift = self.point.coords - rotation * self.point.coords;
+        Isometry3::from_parts(Translation3::from(shift), rotation)
+    }
+}
+
 impl Symmetries {
     /// The identity followed by the discrete symmetries.
     pub(crate) fn discrete_with_identity(&self) -> impl Iterator<Item = Isometry3<f64>> {
@@ -37,15 +46,9 @@ impl Symmetries {
     /// each axis. Axes are not combined with one another, as in BOP.
     pub fn transforms(&self) -> Vec<Isometry3<f64>> {
         let mut spins: Vec<Isometry3<f64>> = Vec::new();
-        for ContinuousSymmetry { axis, point } in &self.continuous {
-            spins.extend((0..CONTINUOUS_STEPS).map(|i| {
-                let rotation =
-                    UnitQuaternion::from_axis_angle(axis, TAU * i as f64 / CONTINUOUS_STEPS as f64);
-                Isometry3::from_parts(
-                    Translation3::from(point.coords - rotation * point.coords),
-                    rotation,
-                )
-            }));
+        for symmetry in &self.continuous {
+            let turn = |i| symmetry.turn(TAU * i as f64 / CONTINUOUS_STEPS as f64);
+            spins.extend((0..CONTINUOUS_STEPS).map(turn));
         }
         if spins.is_empty() {
             return self.discrete_with_identity().collect();

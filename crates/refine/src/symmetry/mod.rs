@@ -1,4 +1,4 @@
-//! Finds the symmetries of a mesh, in the form that BOP's `models_info.json` has them.
+//! Symmetries: motions that map an object onto itself, in the form that BOP's `models_info.json` has them, and how they are found.
 //!
 //! A symmetry is a rotation about the centroid of the surface that brings the surface back onto itself. Rotations
 //! spread over all of SO(3) are drawn to their nearest such rotation; what arrives within the tolerance is one. An axis
@@ -7,7 +7,9 @@
 mod axes;
 mod deviation;
 mod discrete;
+mod near;
 mod paint;
+mod symmetries;
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion};
 use prehend_geometry::TriMesh;
@@ -16,9 +18,10 @@ use prehend_geometry::sample::spread_rotations;
 use rayon::prelude::*;
 
 pub use self::deviation::SymmetrySettings;
+pub(crate) use self::near::{alternatives, near_symmetries};
+pub use self::symmetries::{ContinuousSymmetry, Symmetries};
 
 use self::deviation::Shape;
-use crate::data::{ContinuousSymmetry, Symmetries};
 
 /// Rotations that the search begins with: about 15° apart.
 const STARTS: usize = 3000;
