@@ -143,7 +143,7 @@ fn what_is_wrong_in_all_frames_is_found_and_corrected() {
     let (before, after) = (wrong(&told), wrong(&rig.corrected(&told).unwrap()));
     println!("joints {before} → {after} rad");
     assert!(after < 0.4 * before, "{after} of {before}");
-    // A tracker is surer, too, and no farther off.
+    // A tracker is surer, too, and no farther off than the rig is uncertain by.
     let track = |object: &Arc<_>, rig: Option<&Arc<Rig>>| {
         let (object, hand) = (Arc::clone(object), Some(Arc::clone(&sequence.hand)));
         let mut tracker = Tracker::new(object, hand, TrackerSettings::default()).unwrap();
@@ -165,7 +165,7 @@ fn what_is_wrong_in_all_frames_is_found_and_corrected() {
     let (alone, unsure) = track(&sequence.object, None);
     let (with, sure) = track(&object, Some(&Arc::new(rig)));
     println!("tracked {alone} ± {unsure} → {with} ± {sure}");
-    assert!(sure < 0.99 * unsure && with < 1.1 * alone, "{alone} ± {unsure} → {with} ± {sure}");
+    assert!(sure < 0.99 * unsure && with < alone + 3e-4, "{alone} ± {unsure} → {with} ± {sure}");
 }
 
 #[test]
