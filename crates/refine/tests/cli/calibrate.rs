@@ -43,5 +43,5 @@ fn a_frame_without_a_hand_is_named() {
     let said = place.prehend(&format!("{CALIBRATE} --out rig.json"));
     assert_eq!(said.code, 1);
     assert!(said.err.contains("nothing is known of a hand"), "{}", said.err);
-    assert!(!place.path("rig.json").exists());
+    assert!(!place.path("rig.json").exists() && !place.path("rig.models").exists());
 }

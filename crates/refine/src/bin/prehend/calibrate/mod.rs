@@ -62,7 +62,6 @@ impl Calibrate {
         check_writable(&self.out)?;
         self.refined.as_deref().map(check_writable).transpose()?;
         limit_threads(self.threads)?;
-        std::fs::create_dir_all(&models).with_context(|| models.display().to_string())?;
         let report = self.report.as_deref().map(Report::create).transpose()?;
         let dataset = self.input.selection.open()?;
         let (jobs, mut failures) = self.input.selection.jobs(&self.input.poses)?;
@@ -154,6 +153,7 @@ fn save_models(
     objects: &BTreeMap<u32, Arc<Object>>,
     folder: &Path,
 ) -> anyhow::Result<()> {
+    std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
     for (id, deviation) in &calibrator.rig().objects {
         let mesh = deviation.applied(&objects[id].mesh).scaled(1e3);
         mesh.save_ply(&folder.join(format!("obj_{id:06}.ply")))?;
