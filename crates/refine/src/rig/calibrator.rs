@@ -15,7 +15,7 @@ use super::settings::CalibratorSettings;
 use crate::error::RefineError;
 use crate::problem::{Block, DepthField, ScaledCholesky, State};
 use crate::refine;
-use crate::scene::{Frame, Hand, Object, Observation, View};
+use crate::scene::{Frame, Hand, Object, Observation, View, median};
 use crate::strategy::{Fused, Modality};
 
 /// A frame of a rig, and where its object is thought to be.
@@ -30,7 +30,8 @@ pub struct CalibrationFrame {
     pub hand: Arc<Hand>,
     /// Object → camera \[m\].
     pub initial: Isometry3<f64>,
-    /// Whether that is what a visit has found with much the same rig: the next one then only refines it further.
+    /// Whether that is where a visit has found the object, with a rig that has hardly changed since: the next visit then refines it
+    /// from there, and looks nowhere else.
     pub is_refined: bool,
 }
 
@@ -53,6 +54,9 @@ pub struct Calibrator {
     /// What frames have said that are not visited any more, about the parameters that there are now.
     kept: Sums,
     kept_play: PlaySquares,
+    kept_disagreements: Vec<f64>,
+    /// Passes that were solved for since then.
+    solved: usize,
     /// Solutions since then that the rig is the mean of; none while it is still on its way.
     averaged: usize,
 }
@@ -104,6 +108,8 @@ impl Calibrator {
             usual_disagreement: None,
             kept: Sums::default(),
             kept_play: PlaySquares::default(),
+            kept_disagreements: Vec::new(),
+            solved: 0,
             averaged: 0,
         })
     }
@@ -124,6 +130,7 @@ impl Calibrator {
     /// If the frame cannot be refined, does not fit the rig, or is of another object than there are.
     pub fn visit(&self, frame: &CalibrationFrame) -> Result<Visit, RefineError> {
         let CalibrationFrame { obj_id, hand, initial, is_refined, .. } = frame;
+        let has_mask = frame.observation.mask.count() > 0;
         let (observation, mut fused) = self.corrected(frame)?;
         if *is_refined {
             let stages = &mut fused.settings.stages;
@@ -135,10 +142,12 @@ impl Calibrator {
         let found = refine(&frame, initial, &fused)?;
         let t_cam_object = *found.t_cam_object();
         let information = self.information(&frame, &fused, *obj_id, &found.state)?;
-        let disagreement = information.disagreement(&self.prior).ok_or_else(not_finite)?;
+        // In the first pass of a window, its frames have no part in the rig yet.
+        let errors = (self.solved == 0).then_some(&self.rig.covariance);
+        let disagreement = information.disagreement(&self.prior, errors).ok_or_else(not_finite)?;
         let times = self.usual_disagreement.map(|usual| disagreement / usual);
         let left_out = times.filter(|times| *times > LEFT_OUT);
-        Ok(Visit { obj_id: *obj_id, information, disagreement, left_out, t_cam_object })
+        Ok(Visit { obj_id: *obj_id, information, disagreement, left_out, has_mask, t_cam_object })
     }
 
     /// How well a frame, as the rig corrects it, fits what is said of it: [`CalibrationFrame::initial`] should be the pose that a visit has
@@ -154,7 +163,7 @@ impl Calibrator {
         FrameResiduals::new(&corrected, &frame.initial, &fused.settings.tactile, has_mask)
     }
 
-    /// The rig's directions that frames have hardly told yet, the least known first, and for each which motion of the hand of `frame` would
+    /// The rig's directions that frames have hardly determined yet, the least known first, and for each which motion of the hand of `frame` would
     /// tell most; [`CalibrationFrame::initial`] should be the pose that a visit has found.
     ///
     /// # Errors
@@ -178,21 +187,11 @@ impl Calibrator {
             };
             let frame = Frame::new(&predicted, object, Some(hand))?.with_rig(&self.rig);
             let state = State::new(&frame, &pose)?;
-            let FrameInformation { hessian, .. } =
-                self.information(&frame, &fused, *obj_id, &state)?;
-            motions.push((motion, self.of_rig(&hessian).ok_or_else(not_finite)?));
+            let information = self.information(&frame, &fused, *obj_id, &state)?;
+            let (hessian, _) = information.of_rig(self.rig.len()).ok_or_else(not_finite)?;
+            motions.push((motion, hessian));
         }
         unobserved_directions(&self.rig, &self.prior, &motions).ok_or_else(not_finite)
-    }
-
-    /// The part of a frame's information that is of the rig's parameters, its object's coefficients eliminated.
-    fn of_rig(&self, hessian: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-        let n = self.rig.len();
-        let m = hessian.nrows() - n;
-        let own = hessian.view((n, n), (m, m)) + DMatrix::identity(m, m);
-        let coupling = hessian.view((n, 0), (m, n));
-        let through = own.cholesky()?.solve(&coupling.into_owned());
-        Some(hessian.view((0, 0), (n, n)) - coupling.tr_mul(&through))
     }
 
     /// What a frame shows when the rig is corrected, and how it is refined.
@@ -251,13 +250,15 @@ impl Calibrator {
     /// If nothing or nothing finite was said, or a corrected model cannot be used.
     pub fn solve(&mut self, pass: &mut Pass) -> Result<f64, RefineError> {
         let n = self.rig.len();
-        if pass.sums.0.is_empty() {
-            let problem = "no frame of a pass says anything of it".into();
+        if pass.sums.0.is_empty() && self.kept.0.is_empty() {
+            let problem = "no frame says anything of it".into();
             return Err(RefineError::Setting { name: "rig", problem });
         }
         // What frames say of a rig that nothing is known of is no disagreement yet.
-        let usual = pass.usual_disagreement();
+        let all = self.kept_disagreements.iter().chain(&pass.disagreements).copied();
+        let usual = median(all).filter(|usual| *usual > 0.0);
         self.usual_disagreement = usual.filter(|_| self.rig.is_known(&self.prior));
+        self.solved += 1;
         let mut sums = self.kept.clone();
         sums.merge(pass.sums.clone());
         let mut hessian = DMatrix::from_diagonal(&self.prior);
@@ -316,7 +317,8 @@ impl Calibrator {
     pub fn keep(&mut self, pass: Pass) {
         self.kept.merge(pass.sums);
         self.kept_play.merge(&pass.squares);
-        self.averaged = 0;
+        self.kept_disagreements.extend(pass.disagreements);
+        (self.solved, self.averaged) = (0, 0);
     }
 
     /// Takes the play from the squares that it is expected to have in the frames of a pass and those kept (expectation and

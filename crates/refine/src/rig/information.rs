@@ -98,16 +98,33 @@ impl FrameInformation {
     }
 
     /// How much lower the frame's cost would be with parameters of its own, `prior` being their inverse variances about those that the rig has:
-    /// over what that would be by noise alone if the rig's were true.
-    pub(super) fn disagreement(&self, prior: &DVector<f64>) -> Option<f64> {
-        let n = prior.len();
-        let hessian = self.hessian.view((0, 0), (n, n)).into_owned();
-        let gradient = self.gradient.rows(0, n).into_owned();
+    /// over what that would be by noise alone. The rig's are true, or have the errors of `covariance` if the frame has no part in them.
+    pub(super) fn disagreement(
+        &self,
+        prior: &DVector<f64>,
+        covariance: Option<&DMatrix<f64>>,
+    ) -> Option<f64> {
+        let (hessian, gradient) = self.of_rig(prior.len())?;
         let factor = (&hessian + DMatrix::from_diagonal(prior)).cholesky()?;
-        let degrees = factor.solve(&hessian).trace();
+        let mut noise = hessian.clone();
+        if let Some(covariance) = covariance {
+            noise += &hessian * covariance * &hessian;
+        }
+        let degrees = factor.solve(&noise).trace();
         let squared = gradient.dot(&factor.solve(&gradient));
         // Of a frame that says nothing, both are zero.
         Some(squared / degrees.max(1e-9)).filter(|ratio| ratio.is_finite())
+    }
+
+    /// Hessian and gradient by the `n` parameters of the rig alone, the object's coefficients being what they may be beforehand.
+    pub(super) fn of_rig(&self, n: usize) -> Option<(DMatrix<f64>, DVector<f64>)> {
+        let m = self.gradient.len() - n;
+        let own = self.hessian.view((n, n), (m, m)) + DMatrix::identity(m, m);
+        let coupling = self.hessian.view((n, 0), (m, n)).into_owned();
+        let factor = own.cholesky()?;
+        let hessian = self.hessian.view((0, 0), (n, n)) - coupling.tr_mul(&factor.solve(&coupling));
+        let at_rest = factor.solve(&self.gradient.rows(n, m).into_owned());
+        Some((hessian, self.gradient.rows(0, n) - coupling.tr_mul(&at_rest)))
     }
 }
 

@@ -18,5 +18,5 @@ pub use self::deviation::SurfaceDeviation;
 pub use self::observability::{HandMotion, UnobservedDirection};
 pub use self::parameters::{Play, Rig};
 pub use self::pass::{Pass, Visit};
-pub use self::residuals::{FrameResiduals, Residuals};
+pub use self::residuals::{FrameResiduals, Residuals, SensorResidual};
 pub use self::settings::CalibratorSettings;

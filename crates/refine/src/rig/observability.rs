@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector, Isometry3, Point3, Translation3, UnitQuaternion
 use super::parameters::Rig;
 use crate::scene::{Hand, Object, Observation, View};
 
-/// A combination of a rig's parameters that frames have hardly told.
+/// A combination of a rig's parameters that frames have hardly determined.
 #[derive(Clone, Debug)]
 pub struct UnobservedDirection {
     /// Parameters and their shares, the largest first: a unit vector where each parameter counts by its standard deviation beforehand. The depth
@@ -40,7 +40,7 @@ const SHIFT: f64 = 0.25;
 /// Turns that are tried \[rad\].
 const TURN: f64 = std::f64::consts::FRAC_PI_4;
 
-/// What counts as hardly told: so much of the deviation beforehand is left.
+/// What counts as hardly determined: so much of the deviation beforehand is left.
 const OPEN: f64 = 0.5;
 
 /// A motion tells if it leaves at most so much of a deviation.
@@ -116,7 +116,7 @@ impl fmt::Display for HandMotion {
     }
 }
 
-/// The directions of `rig`, the inverse variances of its parameters being `prior` beforehand, that are hardly told, the least known first, and
+/// The directions of `rig`, the inverse variances of its parameters being `prior` beforehand, that are hardly determined, the least known first, and
 /// what `motions` would tell: of each the information that a frame after it has of the parameters. `None` if that is not finite.
 pub(super) fn unobserved_directions(
     rig: &Rig,
@@ -142,8 +142,9 @@ pub(super) fn unobserved_directions(
             let deviation = eigen.eigenvalues[k].sqrt();
             let best = after.iter().map(|(motion, covariance)| (*motion, left(covariance)));
             let best = best.min_by(|a, b| a.1.total_cmp(&b.1));
+            let least = SMALL.min(direction.amax());
             let shares =
-                names.iter().zip(direction.iter()).filter(|(_, share)| share.abs() > SMALL);
+                names.iter().zip(direction.iter()).filter(|(_, share)| share.abs() >= least);
             let mut shares: Vec<_> =
                 shares.map(|((name, _), share)| (name.clone(), *share)).collect();
             shares.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));

@@ -15,6 +15,8 @@ pub struct Visit {
     /// By how many times more than is usual the frame disagrees with the rig, if that is so much that it is left out: its pose is wrong, or the
     /// rig was another then.
     pub left_out: Option<f64>,
+    /// Whether the frame has a mask; else it was taken for where the object should be.
+    pub has_mask: bool,
     /// Object → camera \[m\].
     pub t_cam_object: Isometry3<f64>,
 }
@@ -26,7 +28,7 @@ pub struct Pass {
     /// By frame, with its object's number.
     play: Vec<(u32, FramePlay)>,
     /// By frame, those left out among them.
-    disagreements: Vec<f64>,
+    pub(super) disagreements: Vec<f64>,
     pub(super) squares: PlaySquares,
 }
 
@@ -95,13 +97,6 @@ impl Pass {
         self.play.push((obj_id, play));
     }
 
-    /// How much frames disagree with the rig, half of them less; `None` if they do not.
-    pub(super) fn usual_disagreement(&mut self) -> Option<f64> {
-        self.disagreements.sort_by(f64::total_cmp);
-        let middle = self.disagreements.get(self.disagreements.len() / 2);
-        middle.copied().filter(|usual| *usual > 0.0)
-    }
-
     /// Finds the squares of the frames' play if the parameters change so, and have that covariance then.
     pub(super) fn expect_play(
         &mut self,
@@ -117,5 +112,26 @@ impl Pass {
             let sums = [squares.rows(0, 3).mean(), squares.rows(3, 3).mean(), of_joints];
             self.squares.merge(&PlaySquares { sums, frames: 1.0 });
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sums_say_the_same_of_parameters_that_have_changed() {
+        // Of two parameters, and two coefficients of an object.
+        let root = DMatrix::from_fn(4, 4, |r, c| ((3 * r + c * c) as f64).sin());
+        let hessian = &root * root.transpose();
+        let gradient = DVector::from_vec(vec![1.0, -2.0, 0.5, 3.0]);
+        let mut sums = Sums::default();
+        sums.add(7, hessian.clone(), gradient.clone());
+        let (change, of_object) =
+            (DVector::from_vec(vec![0.1, 0.2]), DVector::from_vec(vec![-0.3, 0.4]));
+        sums.shift(&change, &BTreeMap::from([(7, of_object)]));
+        let all = DVector::from_vec(vec![0.1, 0.2, -0.3, 0.4]);
+        // The gradient of g x + x H x / 2 there.
+        assert!((&sums.0[&7].1 - (gradient + hessian * all)).amax() < 1e-12);
     }
 }

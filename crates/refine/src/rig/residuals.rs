@@ -44,6 +44,19 @@ impl FrameResiduals {
     }
 }
 
+/// Residuals of a sensor over frames: medians of the frames' medians.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SensorResidual {
+    /// What is measured.
+    pub sensor: &'static str,
+    /// The unit.
+    pub unit: &'static str,
+    /// How large residuals are.
+    pub size: f64,
+    /// Of those with a sign, what they have in common: depth is positive behind a surface, skin outside of it.
+    pub offset: Option<f64>,
+}
+
 /// Residuals of many frames, by sensor.
 #[derive(Clone, Debug)]
 pub struct Residuals {
@@ -100,16 +113,15 @@ impl Residuals {
         }
     }
 
-    /// By sensor: its name, its unit, and the medians over frames of the frames' medians and median sizes. Depth is positive behind a surface,
-    /// skin outside of it; an outline has a size alone.
-    pub fn rows(&self) -> Vec<(&'static str, &'static str, Option<f64>, f64)> {
+    /// Of each sensor that any frame has.
+    pub fn sensors(&self) -> Vec<SensorResidual> {
         let over_frames =
             |frames: &[[f64; 2]], k: usize| median(frames.iter().map(|frame| frame[k]));
-        let rows = self.frames.iter().filter_map(|((name, unit), frames)| {
-            let offset = over_frames(frames, 0).filter(|_| *unit != PIXELS);
-            Some((*name, *unit, offset, over_frames(frames, 1)?))
-        });
-        rows.collect()
+        let of = |(&(sensor, unit), frames): (&(&'static str, &'static str), &Vec<[f64; 2]>)| {
+            let offset = over_frames(frames, 0).filter(|_| unit != PIXELS);
+            Some(SensorResidual { sensor, unit, size: over_frames(frames, 1)?, offset })
+        };
+        self.frames.iter().filter_map(of).collect()
     }
 
     /// The mean residual of depth \[m\] at the pixel (x, y) and around it, of object and hand; `None` where hardly any were seen.

@@ -44,7 +44,8 @@ pub fn read_rivals(
         let Some(others) = of_current.and_then(|at| rivals[at].as_mut()) else {
             let (scene, image, object) = ids(row);
             let problem = format!(
-                "scene {scene} image {image} object {object}: neither that of a pose to be refined nor after such a one"
+                "scene {scene} image {image} object {object}: neither that of a pose to be refined nor after such a one; rivals of other \
+                 poses have to be removed, or others named with --rivals"
             );
             return Err(DatasetError::field(file, &field("pose"), problem));
         };

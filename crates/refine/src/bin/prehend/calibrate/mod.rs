@@ -9,16 +9,17 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use anyhow::Context;
+use anyhow::{Context, anyhow, bail};
 use clap::Args;
 use nalgebra::Isometry3;
 use prehend_refine::data::bop::{ResultRow, check_writable};
+use prehend_refine::data::identity::canonical;
 use prehend_refine::data::{Assets, FrameInput, Sensor};
 use prehend_refine::evaluate::report::Report;
-use prehend_refine::rig::{CalibrationFrame, Calibrator, CalibratorSettings};
-use prehend_refine::scene::Object;
+use prehend_refine::rig::{CalibrationFrame, Calibrator, CalibratorSettings, UnobservedDirection};
+use prehend_refine::scene::{Object, Observation};
 
-use self::passes::Passes;
+use self::passes::{Done, Passes};
 use crate::options::{Input, Job, limit_threads, write_poses};
 use crate::terminal::{cache, complain, exit_code, say};
 
@@ -32,7 +33,7 @@ pub(crate) struct Calibrate {
     /// Write the corrected models to this folder, as obj_ID.ply in millimeters [default: rig.models beside rig.json]
     #[arg(long, value_name = "DIR", help_heading = "Output")]
     models: Option<PathBuf>,
-    /// Write the poses as they are with the rig here, as a BOP results file without scores
+    /// Write the frames' poses here, as a BOP results file without scores; with --window, as they were with the rig until then
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     refined: Option<PathBuf>,
     /// Write residuals before and after, by sensor, with pictures to this folder; begin with its index.html
@@ -60,67 +61,110 @@ impl Calibrate {
     pub(crate) fn run(self) -> anyhow::Result<ExitCode> {
         let models = self.models.clone().unwrap_or_else(|| self.out.with_extension("models"));
         check_writable(&self.out)?;
+        if models == self.out || models.is_file() {
+            bail!("--models {}: is no folder", models.display());
+        }
         self.refined.as_deref().map(check_writable).transpose()?;
         limit_threads(self.threads)?;
         let report = self.report.as_deref().map(Report::create).transpose()?;
         let dataset = self.input.selection.open()?;
+        if canonical(&models) == canonical(dataset.models().dir()) {
+            bail!("--models {}: has the models that are to be corrected", models.display());
+        }
         let (jobs, mut failures) = self.input.selection.jobs(&self.input.poses)?;
         let mut assets = Assets::new(&dataset, 0).with_cache(cache()).with_optional_masks();
         let ids: BTreeSet<u32> = jobs.iter().map(|job| job.target.obj_id).collect();
         let objects: BTreeMap<_, _> =
             ids.iter().map(|id| Ok((*id, assets.object(*id)?))).collect::<anyhow::Result<_>>()?;
         let frames = Frames { jobs, assets: Mutex::new(assets) };
-        let (joints, size) = frames.layout().context(NO_HAND)?;
+        let (joints, size) = frames.layout()?;
         let settings = CalibratorSettings::default();
         let nominal = Calibrator::new(joints, size, objects.clone(), settings)?;
         let done = Passes::new(&frames, self.passes, self.window).run(nominal.clone())?;
-        failures.extend(done.failed.iter().map(|(frame, error)| format!("{frame}: {error}")));
+        let target = |index: &usize| frames.jobs[*index].target;
+        failures.extend(done.failed.iter().map(|(index, e)| format!("{}: {e}", target(index))));
         let count = done.poses.len();
         if count == 0 {
             return Ok(exit_code(count, &failures));
         }
         done.left_out.values().for_each(|frame| complain(format!("warning: {frame}")));
+        if done.without_mask > 0 {
+            let count = done.without_mask;
+            complain(format!(
+                "warning: {count} frames have no mask: their poses are taken to be good"
+            ));
+        }
         let calibrator = &done.calibrator;
         calibrator.rig().save(&self.out)?;
-        save_models(calibrator, &objects, &models)?;
         if let Some(out) = &self.refined {
             write_poses(out, frames.rows(&done.poses), &mut failures)?;
         }
         say(parameters(calibrator))?;
-        // Of a frame in the middle, as an example of where the hand is.
-        let example = done.poses.iter().nth(count / 2);
-        let unobserved = example.map(|(&index, pose)| {
-            Ok::<_, anyhow::Error>(calibrator.unobserved(&frames.load(index, pose)?)?)
+        let unobserved = frames.unobserved(&done).unwrap_or_else(|error| {
+            failures.push(format!("what is unobserved: {error}"));
+            Vec::new()
         });
-        let unobserved = unobserved.transpose()?.unwrap_or_default();
         if !unobserved.is_empty() {
-            say("\nhardly told by these frames:")?;
+            say("\nhardly determined by these frames:")?;
         }
-        for direction in &unobserved {
+        for direction in unobserved.iter().take(LINES) {
             say(report::told(direction))?;
         }
+        if unobserved.len() > LINES {
+            say(format!("  and {} more", unobserved.len() - LINES))?;
+        }
+        save_models(calibrator, &objects, &models)?;
         let (used, out) = (count - done.left_out.len(), self.out.display());
         say(format!("\nrig of {used} frames written to {out}, models to {}", models.display()))?;
         if let Some(report) = report {
-            let page = report::write(report, &frames, &nominal, &done, &unobserved, &mut failures)?;
+            let page = report::write(
+                report,
+                &frames,
+                (&nominal, size),
+                &done,
+                &unobserved,
+                &mut failures,
+            )?;
             say(format!("report: open {}", page.display()))?;
         }
         Ok(exit_code(count, &failures))
     }
 }
 
+/// Directions that are printed at most.
+const LINES: usize = 6;
+
 const NO_HAND: &str = "nothing is known of a hand, which is part of the rig";
 
 impl Frames<'_> {
     /// Joints of the hand and size of images of the first frame that can be read.
-    fn layout(&self) -> Option<(usize, (usize, usize))> {
+    fn layout(&self) -> anyhow::Result<(usize, (usize, usize))> {
         let mut assets = self.assets.lock().unwrap_or_else(PoisonError::into_inner);
-        self.jobs.iter().find_map(|job| {
-            let FrameInput { observation, hand, .. } =
-                assets.load(&job.target, &[Sensor::Hand]).ok()?;
-            let size = (observation.camera.width, observation.camera.height);
-            Some((hand?.tree.joint_names().len(), size))
-        })
+        let mut fault = None;
+        for job in &self.jobs {
+            match assets.load(&job.target, &[Sensor::Hand]) {
+                Ok(FrameInput {
+                    observation: Observation { camera, .. },
+                    hand: Some(hand),
+                    ..
+                }) => {
+                    return Ok((hand.tree.joint_names().len(), (camera.width, camera.height)));
+                }
+                Ok(_) => {}
+                Err(error) => {
+                    fault.get_or_insert_with(|| anyhow!("{}: {error}", job.target));
+                }
+            }
+        }
+        Err(fault.unwrap_or_else(|| anyhow!(NO_HAND)))
+    }
+
+    /// What `done` leaves open, seen from a frame in the middle, as an example of where the hand is.
+    fn unobserved(&self, done: &Done) -> anyhow::Result<Vec<UnobservedDirection>> {
+        let used = done.poses.iter().filter(|(index, _)| !done.left_out.contains_key(index));
+        let used: Vec<_> = used.collect();
+        let Some((index, pose)) = used.get(used.len() / 2) else { return Ok(Vec::new()) };
+        Ok(done.calibrator.unobserved(&self.load(**index, pose)?)?)
     }
 
     /// The frame of that index, with its object at `pose`.

@@ -6,7 +6,7 @@ use std::ops::Range;
 
 use indicatif::ProgressBar;
 use nalgebra::Isometry3;
-use prehend_refine::data::{Target, Workers};
+use prehend_refine::data::Workers;
 use prehend_refine::rig::{Calibrator, Pass, Visit};
 
 use super::Frames;
@@ -33,7 +33,9 @@ pub(super) struct Done {
     pub(super) poses: BTreeMap<usize, Isometry3<f64>>,
     /// What is to be said of frames that disagree with the rig, by their indices.
     pub(super) left_out: BTreeMap<usize, String>,
-    pub(super) failed: Vec<(Target, anyhow::Error)>,
+    pub(super) failed: BTreeMap<usize, anyhow::Error>,
+    /// Frames that have no mask.
+    pub(super) without_mask: usize,
 }
 
 impl<'a> Passes<'a> {
@@ -49,7 +51,8 @@ impl<'a> Passes<'a> {
 
     pub(super) fn run(&self, calibrator: Calibrator) -> anyhow::Result<Done> {
         let (poses, left_out) = (BTreeMap::new(), BTreeMap::new());
-        let mut done = Done { calibrator, poses, left_out, failed: Vec::new() };
+        let failed = BTreeMap::new();
+        let mut done = Done { calibrator, poses, left_out, failed, without_mask: 0 };
         let count = self.frames.jobs.len();
         for start in (0..count).step_by(self.window.max(1)) {
             self.learn(start..(start + self.window).min(count), &mut done)?;
@@ -63,7 +66,7 @@ impl<'a> Passes<'a> {
         for number in 1..=self.most {
             let mut pass = Pass::default();
             let (mut poses, mut left_out) = (BTreeMap::new(), BTreeMap::new());
-            let mut failed = Vec::new();
+            let (mut failed, mut without_mask) = (BTreeMap::new(), 0);
             let is_refined = number > ROUGH_PASSES;
             self.visit_all(window.clone(), done, is_refined, |index, outcome| {
                 let target = self.frames.jobs[index].target;
@@ -77,9 +80,10 @@ impl<'a> Passes<'a> {
                             (index, what)
                         }));
                         poses.insert(index, visit.t_cam_object);
+                        without_mask += usize::from(!visit.has_mask);
                         pass.add(visit);
                     }
-                    Err(error) => failed.push((target, error)),
+                    Err(error) => drop(failed.insert(index, error)),
                 }
             })?;
             let nothing = poses.is_empty();
@@ -90,6 +94,8 @@ impl<'a> Passes<'a> {
                 let passes = (self.most - number) as u64;
                 self.bar.inc(passes * window.len() as u64);
                 done.calibrator.keep(pass);
+                done.poses.retain(|index, _| !failed.contains_key(index));
+                done.without_mask += without_mask;
                 done.failed.append(&mut failed);
                 done.left_out.append(&mut left_out);
                 break;
@@ -110,25 +116,40 @@ impl<'a> Passes<'a> {
         let indices: Vec<usize> = window.collect();
         let starts: Vec<_> = indices.iter().map(|index| known.poses.get(index).copied()).collect();
         let first = indices.first().copied().unwrap_or(0);
-        let (mut waiting, mut next) = (BTreeMap::new(), first);
-        let visit = |&index: &usize| {
+        let visit = |index: usize| {
             let told = self.frames.jobs[index].row.t_cam_model;
             let mut frame = self.frames.load(index, &starts[index - first].unwrap_or(told))?;
             frame.is_refined = is_refined && starts[index - first].is_some();
             Ok(known.calibrator.visit(&frame)?)
         };
-        Workers::new(indices.len(), rayon::current_num_threads())?.run(
-            &indices,
-            || visit,
-            |&index, outcome| -> anyhow::Result<()> {
-                self.bar.inc(1);
-                waiting.insert(index, outcome);
-                while let Some(outcome) = waiting.remove(&next) {
-                    each(next, outcome);
-                    next += 1;
-                }
-                Ok(())
-            },
-        )
+        in_order(&indices, visit, |index, outcome| {
+            self.bar.inc(1);
+            each(index, outcome);
+        })
     }
+}
+
+/// Does the `work` of all indices in parallel; `each` hears of them in their order, so that sums are the same for any number of threads.
+pub(super) fn in_order<T: Send>(
+    indices: &[usize],
+    work: impl Fn(usize) -> T + Sync,
+    mut each: impl FnMut(usize, T),
+) -> anyhow::Result<()> {
+    let mut waiting = BTreeMap::new();
+    let mut next = indices.iter();
+    let mut expected = next.next();
+    Workers::new(indices.len(), rayon::current_num_threads())?.run(
+        indices,
+        || |&index: &usize| work(index),
+        |&index, outcome| -> anyhow::Result<()> {
+            waiting.insert(index, outcome);
+            while let Some((index, outcome)) =
+                expected.and_then(|index| waiting.remove_entry(index))
+            {
+                each(index, outcome);
+                expected = next.next();
+            }
+            Ok(())
+        },
+    )
 }

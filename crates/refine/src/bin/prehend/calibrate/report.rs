@@ -4,14 +4,13 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use nalgebra::Isometry3;
-use prehend_refine::data::Workers;
 use prehend_refine::evaluate::report::{Report, depth_residual_picture, rig_picture};
 use prehend_refine::rig::{
-    CalibrationFrame, Calibrator, FrameResiduals, Residuals, UnobservedDirection,
+    CalibrationFrame, Calibrator, FrameResiduals, Residuals, SensorResidual, UnobservedDirection,
 };
 
 use super::Frames;
-use super::passes::Done;
+use super::passes::{Done, in_order};
 use crate::terminal::progress;
 
 /// Frames that are drawn.
@@ -54,31 +53,48 @@ pub(super) fn told(direction: &UnobservedDirection) -> String {
     format!("  {}: {left:.0} % of its deviation beforehand is left; {motion}", shares.join(", "))
 }
 
-/// Writes the report of `done`, which began with the `nominal` rig, and returns its page; of frames that cannot be shown `failures` hears.
+/// Writes the report of `done`, which began with the `nominal` rig, of images of this size, and returns its page; of frames that cannot be shown `failures` hears.
 pub(super) fn write(
     mut report: Report,
     frames: &Frames<'_>,
-    nominal: &Calibrator,
+    (nominal, size): (&Calibrator, (usize, usize)),
     done: &Done,
     unobserved: &[UnobservedDirection],
     failures: &mut Vec<String>,
 ) -> anyhow::Result<PathBuf> {
-    let indices: Vec<usize> = done.poses.keys().copied().collect();
-    let compared = compare(frames, nominal, done, &indices, failures)?;
-    let (_, size) = frames.layout().unwrap_or_default();
+    let used = |index: &&usize| !done.left_out.contains_key(index);
+    let indices: Vec<usize> = done.poses.keys().filter(used).copied().collect();
+    let step = indices.len().div_ceil(DRAWN).max(1);
+    let mut drawn: BTreeMap<usize, Isometry3<f64>> =
+        indices.iter().step_by(step).map(|index| (*index, Isometry3::identity())).collect();
     let [mut before, mut after] = [Residuals::new(size), Residuals::new(size)];
-    for frame in compared.values() {
-        before.add(&frame.before);
-        after.add(&frame.after);
-    }
-    let mut rows = Vec::new();
-    for ((name, unit, offset, size), (_, _, new_offset, new_size)) in
-        before.rows().into_iter().zip(after.rows())
-    {
-        let number = |value: Option<f64>| value.map_or("–".into(), |value| format!("{value:.2}"));
-        let cells = [Some(size), Some(new_size), offset, new_offset].map(number);
-        rows.push([[format!("{name} [{unit}]")].as_slice(), &cells].concat());
-    }
+    let bar = progress(indices.len(), "comparing");
+    let compare = |index: usize| compare(frames, nominal, done, index);
+    in_order(&indices, compare, |index, outcome| {
+        bar.inc(1);
+        match outcome {
+            Ok(frame) => {
+                before.add(&frame.before);
+                after.add(&frame.after);
+                drawn.entry(index).and_modify(|pose| *pose = frame.alone);
+            }
+            Err(error) => {
+                failures.push(format!("{}: report: {error}", frames.jobs[index].target));
+                drawn.remove(&index);
+            }
+        }
+    })?;
+    bar.finish_and_clear();
+    let (old, new) = (before.sensors(), after.sensors());
+    let number = |value: Option<f64>| value.map_or("–".into(), |value| format!("{value:.2}"));
+    let row = |old: &SensorResidual| {
+        let new = new.iter().find(|new| new.sensor == old.sensor);
+        let values =
+            [Some(old.size), new.map(|new| new.size), old.offset, new.and_then(|new| new.offset)];
+        let name = format!("{} [{}]", old.sensor, old.unit);
+        std::iter::once(name).chain(values.map(number)).collect()
+    };
+    let rows: Vec<Vec<String>> = old.iter().map(row).collect();
     report.add_table(
         "Residuals by sensor, where all calibrations are believed: medians over frames of the frames' medians",
         &["sensor", "size before", "size after", "offset before", "offset after"],
@@ -94,25 +110,23 @@ pub(super) fn write(
     let parameters: Vec<Vec<String>> =
         parameter_rows(&done.calibrator).into_iter().map(Vec::from).collect();
     report.add_table(
-        "Parameters: lengths in meters, angles in radians",
+        "Parameters: lengths in meters, angles in radians, the principal point in focal lengths",
         &["parameter", "value", "standard deviation", "beforehand"],
         &parameters,
     );
     let open: Vec<Vec<String>> = unobserved.iter().map(|direction| vec![told(direction)]).collect();
     if !open.is_empty() {
-        report.add_table("Hardly told by these frames", &["direction"], &open);
+        report.add_table("Hardly determined by these frames", &["direction"], &open);
     }
     let left_out: Vec<Vec<String>> =
         done.left_out.values().map(|frame| vec![frame.clone()]).collect();
     if !left_out.is_empty() {
         report.add_table("Left out", &["frame"], &left_out);
     }
-    let step = indices.len().div_ceil(DRAWN).max(1);
-    for &index in indices.iter().step_by(step) {
-        let Some(frame) = compared.get(&index) else { continue };
+    for (&index, alone) in &drawn {
         let target = frames.jobs[index].target;
         let what = format!("{target}: outlines of object and hand (blue) before (left) and after");
-        match drawn(frames, nominal, done, index, &frame.alone) {
+        match draw(frames, nominal, done, index, alone) {
             Ok(picture) => report.add_picture(&what, &picture, &[])?,
             Err(error) => failures.push(format!("{target}: report: {error}")),
         }
@@ -120,43 +134,22 @@ pub(super) fn write(
     Ok(report.finish()?)
 }
 
-/// All frames of `indices` before and after.
+/// The frame of that index before and after.
 fn compare(
     frames: &Frames<'_>,
     nominal: &Calibrator,
     done: &Done,
-    indices: &[usize],
-    failures: &mut Vec<String>,
-) -> anyhow::Result<BTreeMap<usize, Compared>> {
-    let bar = progress(indices.len(), "comparing");
-    let mut compared = BTreeMap::new();
-    let compare = |&index: &usize| -> anyhow::Result<Compared> {
-        let frame = frames.load(index, &done.poses[&index])?;
-        let alone = nominal.visit(&frame)?.t_cam_object;
-        let before = nominal.residuals(&CalibrationFrame { initial: alone, ..frame.clone() })?;
-        let after = done.calibrator.residuals(&frame)?;
-        Ok(Compared { before, after, alone })
-    };
-    Workers::new(indices.len(), rayon::current_num_threads())?.run(
-        indices,
-        || compare,
-        |&index, outcome| -> anyhow::Result<()> {
-            bar.inc(1);
-            match outcome {
-                Ok(frame) => drop(compared.insert(index, frame)),
-                Err(error) => {
-                    failures.push(format!("{}: report: {error}", frames.jobs[index].target))
-                }
-            }
-            Ok(())
-        },
-    )?;
-    bar.finish_and_clear();
-    Ok(compared)
+    index: usize,
+) -> anyhow::Result<Compared> {
+    let frame = frames.load(index, &done.poses[&index])?;
+    let alone = nominal.visit(&frame)?.t_cam_object;
+    let before = nominal.residuals(&CalibrationFrame { initial: alone, ..frame.clone() })?;
+    let after = done.calibrator.residuals(&frame)?;
+    Ok(Compared { before, after, alone })
 }
 
 /// The frame of that index with the nominal rig and the pose that it has by itself, and with the rig that was found.
-fn drawn(
+fn draw(
     frames: &Frames<'_>,
     nominal: &Calibrator,
     done: &Done,
