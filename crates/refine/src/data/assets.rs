@@ -213,10 +213,11 @@ impl<'a> Assets<'a> {
         instance: usize,
         required: &[Sensor],
     ) -> Result<(Observation, Option<Arc<Hand>>), AssetError> {
-        let mut observation = match frame.observation(instance) {
-            Err(DatasetError::Missing { .. }) if self.masks_optional => frame.unsegmented()?,
+        let mut observation = frame.unsegmented()?;
+        match frame.segment(&mut observation, instance) {
+            Err(DatasetError::Missing { .. }) if self.masks_optional => {}
             read => read?,
-        };
+        }
         let Some(bodies) = present(frame.bodies(), !required.is_empty())? else {
             return Ok((observation, None));
         };

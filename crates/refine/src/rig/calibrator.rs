@@ -6,7 +6,7 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector, Isometry3};
 
 use super::deviation::SurfaceDeviation;
-use super::information::{Eliminated, FrameInformation};
+use super::information::{Eliminated, Elimination, FrameInformation};
 use super::observability::{HandMotion, UnobservedDirection, unobserved_directions};
 use super::parameters::{Play, Rig};
 use super::pass::{Pass, PlaySquares, Sums, Visit};
@@ -179,10 +179,11 @@ impl Calibrator {
         let mut fused = fused.with_noise_of(&seen, &State::new(&seen, initial)?);
         // Nobody knows what colors would be.
         fused.settings.modalities.retain(|modality| *modality != Modality::Color);
+        let [_, visible] = View::of_observation(&observation, object, hand, initial)?.sums();
         let mut motions = Vec::new();
         for motion in HandMotion::all(&(initial * object.center)) {
-            let Some((predicted, pose)) = motion.predict(&observation, object, hand, initial)
-            else {
+            let predicted = motion.predict(&observation, object, hand, initial, visible.z);
+            let Some((predicted, pose)) = predicted else {
                 continue;
             };
             let frame = Frame::new(&predicted, object, Some(hand))?.with_rig(&self.rig);
@@ -266,20 +267,15 @@ impl Calibrator {
         // Objects have to do with the rig alone: each is eliminated by itself.
         let mut eliminated = BTreeMap::new();
         for (id, (of_object, pull)) in &sums.0 {
-            let m = pull.len() - n;
             hessian += of_object.view((0, 0), (n, n));
             gradient += pull.rows(0, n);
             if let Some(field) = self.rig.objects.get(id) {
-                let own = of_object.view((n, n), (m, m)) + DMatrix::identity(m, m);
-                let coefficients = DVector::from_column_slice(field.coefficients.as_slice());
-                let coupling = of_object.view((n, 0), (m, n));
-                let factor = own.cholesky().ok_or_else(not_finite)?;
-                let at_rest = -factor.solve(&(pull.rows(n, m) + coefficients));
-                let by_parameters = -factor.solve(&coupling);
-                hessian += coupling.tr_mul(&by_parameters);
-                gradient += coupling.tr_mul(&at_rest);
-                let covariance = factor.inverse();
-                eliminated.insert(*id, Eliminated { at_rest, by_parameters, covariance });
+                let coefficients = field.coefficients.as_slice();
+                let object =
+                    Elimination::new(of_object, pull, coefficients).ok_or_else(not_finite)?;
+                hessian += &object.hessian;
+                gradient += &object.gradient;
+                eliminated.insert(*id, object.coefficients());
             }
         }
         let factor = ScaledCholesky::new(&hessian, 0.0).ok_or_else(not_finite)?;

@@ -1,6 +1,6 @@
 //! What one frame says of a rig.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::deviation::SurfaceDeviation;
 use super::parameters::Rig;
@@ -118,13 +118,10 @@ impl FrameInformation {
 
     /// Hessian and gradient by the `n` parameters of the rig alone, the object's coefficients being what they may be beforehand.
     pub(super) fn of_rig(&self, n: usize) -> Option<(DMatrix<f64>, DVector<f64>)> {
-        let m = self.gradient.len() - n;
-        let own = self.hessian.view((n, n), (m, m)) + DMatrix::identity(m, m);
-        let coupling = self.hessian.view((n, 0), (m, n)).into_owned();
-        let factor = own.cholesky()?;
-        let hessian = self.hessian.view((0, 0), (n, n)) - coupling.tr_mul(&factor.solve(&coupling));
-        let at_rest = factor.solve(&self.gradient.rows(n, m).into_owned());
-        Some((hessian, self.gradient.rows(0, n) - coupling.tr_mul(&at_rest)))
+        let (hessian, gradient) = (&self.hessian, &self.gradient);
+        let object = Elimination::new(hessian, gradient, &vec![0.0; gradient.len() - n])?;
+        let of_rig = hessian.view((0, 0), (n, n)) + object.hessian;
+        Some((of_rig, gradient.rows(0, n) + object.gradient))
     }
 }
 
@@ -150,6 +147,46 @@ impl FramePlay {
         play += &by_parameters * change;
         variances += (&by_parameters * covariance).component_mul(&by_parameters).column_sum();
         play.component_mul(&play) + variances
+    }
+}
+
+/// An object's coefficients, eliminated from normal equations.
+pub(super) struct Elimination {
+    /// What that adds to the part of the rig's parameters.
+    pub(super) hessian: DMatrix<f64>,
+    pub(super) gradient: DVector<f64>,
+    factor: Cholesky<f64, Dyn>,
+    at_rest: DVector<f64>,
+    by_parameters: DMatrix<f64>,
+}
+
+impl Elimination {
+    /// Of normal equations of the rig's parameters and then of `coefficients`, which are independent and of unit variance about zero beforehand.
+    pub(super) fn new(
+        hessian: &DMatrix<f64>,
+        gradient: &DVector<f64>,
+        coefficients: &[f64],
+    ) -> Option<Self> {
+        let m = coefficients.len();
+        let n = gradient.len() - m;
+        let own = hessian.view((n, n), (m, m)) + DMatrix::identity(m, m);
+        let coupling = hessian.view((n, 0), (m, n));
+        let factor = own.cholesky()?;
+        let pull = gradient.rows(n, m) + DVector::from_column_slice(coefficients);
+        let (at_rest, by_parameters) = (-factor.solve(&pull), -factor.solve(&coupling));
+        Some(Self {
+            hessian: coupling.tr_mul(&by_parameters),
+            gradient: coupling.tr_mul(&at_rest),
+            factor,
+            at_rest,
+            by_parameters,
+        })
+    }
+
+    /// The coefficients, given the rig's parameters.
+    pub(super) fn coefficients(self) -> Eliminated {
+        let Self { factor, at_rest, by_parameters, .. } = self;
+        Eliminated { covariance: factor.inverse(), at_rest, by_parameters }
     }
 }
 

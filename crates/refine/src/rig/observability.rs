@@ -64,20 +64,16 @@ impl HandMotion {
         shifts.chain(turns).collect()
     }
 
-    /// What `observation` would show of `object`, which is at `pose`, and of `hand` after the motion, without noise and colors, and the pose
-    /// then; `None` if too little would be seen of the object.
+    /// What `observation` would show of `object`, which is at `pose` and of which so many pixels are `visible`, and of `hand` after the motion,
+    /// without noise and colors, and the pose then; `None` if too little would be seen of the object.
     pub(super) fn predict(
         &self,
         observation: &Observation,
         object: &Object,
         hand: &Hand,
         pose: &Isometry3<f64>,
+        visible: f64,
     ) -> Option<(Observation, Isometry3<f64>)> {
-        let seen = |observation: &Observation, pose: &Isometry3<f64>| {
-            let view = View::of_observation(observation, object, hand, pose).ok()?;
-            Some(view.expected())
-        };
-        let (_, before) = seen(observation, pose)?;
         let center = (pose * object.center).coords;
         let motion = Translation3::from(center + self.translation)
             * UnitQuaternion::from_scaled_axis(self.rotation)
@@ -87,10 +83,10 @@ impl HandMotion {
             hand.t_cam_hand = motion * hand.t_cam_hand;
         }
         let pose = motion * pose;
-        let (depth, mask) = seen(&moved, &pose)?;
+        let (depth, mask) = View::of_observation(&moved, object, hand, &pose).ok()?.expected();
         // The object's image is larger when it is nearer.
         let scale = (center.z / (center.z + self.translation.z)).powi(2);
-        let least = SEEN * scale * before.count() as f64;
+        let least = SEEN * scale * visible;
         (mask.count() as f64 > least && mask.count() > 0)
             .then_some((Observation { depth, mask, ..moved }, pose))
     }

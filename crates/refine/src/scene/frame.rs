@@ -59,9 +59,7 @@ impl<'a> Frame<'a> {
         object: &'a Arc<Object>,
         hand: Option<&'a Arc<Hand>>,
     ) -> Result<Self, RefineError> {
-        observation.check_sizes().map_err(|(image, problem)| {
-            RefineError::Images(format!("the {image} has {problem}"))
-        })?;
+        observation.require_sizes()?;
         if observation.mask.count() == 0 {
             return Err(RefineError::EmptyMask);
         }

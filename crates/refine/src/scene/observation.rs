@@ -3,6 +3,8 @@
 use nalgebra::{Isometry3, Vector3};
 use prehend_render::{Camera, DepthImage, Mask, RgbImage};
 
+use crate::error::RefineError;
+
 /// Where the hand is said to be, and what it feels.
 #[derive(Clone, Debug)]
 pub struct HandMeasurement {
@@ -47,6 +49,15 @@ impl Observation {
             }
         }
         Ok(())
+    }
+
+    /// The same as an error of a refinement.
+    ///
+    /// # Errors
+    /// [`RefineError::Images`].
+    pub(super) fn require_sizes(&self) -> Result<(), RefineError> {
+        self.check_sizes()
+            .map_err(|(image, problem)| RefineError::Images(format!("the {image} has {problem}")))
     }
 
     /// Whether the picture shows anything under the mask: one color everywhere is what a camera gives that failed.

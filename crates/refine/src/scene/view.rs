@@ -59,9 +59,7 @@ impl<'a> View<'a> {
         hand: &Hand,
         t_cam_object: &Isometry3<f64>,
     ) -> Result<Self, RefineError> {
-        observation.check_sizes().map_err(|(image, problem)| {
-            RefineError::Images(format!("the {image} has {problem}"))
-        })?;
+        observation.require_sizes()?;
         let camera = &observation.camera;
         let hand = observation.hand.as_ref().map(|measured| {
             hand.check_joints(&measured.joints)?;

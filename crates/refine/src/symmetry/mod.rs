@@ -38,20 +38,24 @@ pub fn find_symmetries(
     mesh: &TriMesh,
     settings: &SymmetrySettings,
 ) -> Result<Symmetries, ClosestError> {
-    let shape = Shape::new(mesh, settings)?;
-    let found = symmetric_rotations(&shape);
-    let axes = axes::axes_of_revolution(&shape, &found);
+    Ok(symmetries_of(&Shape::new(mesh, settings)?))
+}
+
+/// The symmetries of `shape`, the identity left out.
+fn symmetries_of(shape: &Shape) -> Symmetries {
+    let found = symmetric_rotations(shape);
+    let axes = axes::axes_of_revolution(shape, &found);
     let discrete = match axes.as_slice() {
-        [] => discrete::finite(&shape, found),
-        [axis] => discrete::flip(&shape, axis).into_iter().collect(),
+        [] => discrete::finite(shape, found),
+        [axis] => discrete::flip(shape, axis).into_iter().collect(),
         _ => Vec::new(),
     };
     let center = shape.center();
     let continuous = axes.into_iter().map(|axis| ContinuousSymmetry { axis, point: center });
-    Ok(Symmetries {
+    Symmetries {
         continuous: continuous.collect(),
         discrete: discrete.into_iter().map(|r| about(&center, &r)).collect(),
-    })
+    }
 }
 
 /// The symmetries that the search arrives at, the identity left out; where they form a continuum, many of it.

@@ -8,7 +8,7 @@ use prehend_geometry::closest::ClosestError;
 
 use super::axes::turn;
 use super::deviation::Shape;
-use super::{ContinuousSymmetry, Symmetries, SymmetrySettings, about, find_symmetries};
+use super::{ContinuousSymmetry, Symmetries, SymmetrySettings, about, symmetries_of};
 
 /// The fraction of the surface that may be off by more than the tolerance: handles and spouts, which a hand may hide.
 const EXEMPT: f64 = 0.05;
@@ -26,7 +26,7 @@ const APART: f64 = 0.2;
 pub(crate) fn near_symmetries(mesh: &TriMesh) -> Result<Vec<Isometry3<f64>>, ClosestError> {
     let settings = SymmetrySettings { exempt: EXEMPT, ..SymmetrySettings::default() };
     let shape = Shape::new(mesh, &settings)?;
-    let mut symmetries = find_symmetries(mesh, &settings)?;
+    let mut symmetries = symmetries_of(&shape);
     let axes = shape.principal_axes();
     let half = |k: usize| turn(&Unit::new_normalize(axes.column(k).into_owned()), 0.5);
     symmetries.discrete.extend((0..3).map(|k| about(&shape.center(), &half(k))));

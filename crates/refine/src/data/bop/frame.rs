@@ -184,17 +184,31 @@ impl Frame<'_> {
     /// The first of those of [`Frame::rgb`], [`Frame::depth`] and [`Frame::mask`], and
     /// images that differ in size.
     pub fn observation(&self, instance: usize) -> Result<Observation, DatasetError> {
-        let unsegmented = self.unsegmented()?;
+        let mut observation = self.unsegmented()?;
+        self.segment(&mut observation, instance)?;
+        Ok(observation)
+    }
+
+    /// Gives `observation`, which is of this image, the mask of an object's visible part.
+    ///
+    /// # Errors
+    /// Those of [`Frame::mask`], and if it has another size.
+    pub(crate) fn segment(
+        &self,
+        observation: &mut Observation,
+        instance: usize,
+    ) -> Result<(), DatasetError> {
         let mask = self.mask(instance)?;
-        self.check_size(&self.mask_path(instance)?, (mask.width(), mask.height()), &unsegmented)?;
-        Ok(Observation { mask, ..unsegmented })
+        self.check_size(&self.mask_path(instance)?, (mask.width(), mask.height()), observation)?;
+        observation.mask = mask;
+        Ok(())
     }
 
     /// The same with an empty mask.
     ///
     /// # Errors
     /// Those of [`Frame::rgb`] and [`Frame::depth`], and if the images differ in size.
-    pub fn unsegmented(&self) -> Result<Observation, DatasetError> {
+    pub(crate) fn unsegmented(&self) -> Result<Observation, DatasetError> {
         let (color, depth) = (self.rgb()?, self.depth()?);
         let (width, height) = (color.width(), color.height());
         let (camera, mask) = (self.camera(width, height), Mask::filled(width, height, false));

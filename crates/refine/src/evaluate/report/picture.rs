@@ -1,7 +1,7 @@
 //! Overlays: the object's outline at a pose over the image.
 
 use nalgebra::Isometry3;
-use prehend_render::{Mask, RgbImage, draw_outline};
+use prehend_render::{RgbImage, draw_outline};
 
 use crate::rig::Residuals;
 use crate::scene::{Hand, Object, Observation};
@@ -23,8 +23,9 @@ pub fn before_and_after(
     before: &Isometry3<f64>,
     after: &Isometry3<f64>,
 ) -> RgbImage {
-    let outlined = |pose, color| outlined(observation, object, None, pose, color);
-    side_by_side([outlined(before, BEFORE), outlined(after, AFTER)], window(&observation.mask))
+    let image = brightened(observation);
+    let outlined = |pose, color| outlined(image.clone(), observation, object, None, pose, color);
+    side_by_side([outlined(before, BEFORE), outlined(after, AFTER)], window(observation))
 }
 
 /// The image around the object twice, with outlines of object and hand: as an observation, a model and a pose (object → camera \[m\]) have
@@ -34,10 +35,12 @@ pub fn rig_picture(
     after: (&Observation, &Object, &Isometry3<f64>),
     hand: &Hand,
 ) -> RgbImage {
+    // A calibration changes no colors.
+    let image = brightened(before.0);
     let draw = |(observation, object, pose): (&Observation, &Object, &Isometry3<f64>), color| {
-        outlined(observation, object, Some(hand), pose, color)
+        outlined(image.clone(), observation, object, Some(hand), pose, color)
     };
-    side_by_side([draw(before, BEFORE), draw(after, AFTER)], window(&before.0.mask))
+    side_by_side([draw(before, BEFORE), draw(after, AFTER)], window(before.0))
 }
 
 /// Mean residuals of depth over the image before and after a calibration: red where depth is measured too far away, blue where too near, by
@@ -75,18 +78,18 @@ pub fn outline_picture(
     robot: Option<&Hand>,
     t_cam_object: &Isometry3<f64>,
 ) -> RgbImage {
-    outlined(observation, object, robot, t_cam_object, BEFORE)
+    outlined(brightened(observation), observation, object, robot, t_cam_object, BEFORE)
 }
 
-/// The same in this color.
+/// `image` with these outlines, the object's in this color.
 fn outlined(
+    mut image: RgbImage,
     observation: &Observation,
     object: &Object,
     robot: Option<&Hand>,
     t_cam_object: &Isometry3<f64>,
     color: [f32; 3],
 ) -> RgbImage {
-    let mut image = brightened(observation);
     if let (Some(robot), Some(hand)) = (robot, &observation.hand) {
         for (model, pose) in robot.render_bodies(&hand.t_cam_hand, &hand.joints) {
             draw_outline(&mut image, &observation.camera, model, &pose, HAND, 1.0);
@@ -109,7 +112,8 @@ fn brightened(observation: &Observation) -> RgbImage {
 }
 
 /// Left, top, width and height of the mask's surroundings \[px\].
-fn window(mask: &Mask) -> [usize; 4] {
+fn window(observation: &Observation) -> [usize; 4] {
+    let mask = &observation.mask;
     let (width, height) = (mask.width(), mask.height());
     let Some([left, top, columns, rows]) = mask.bounds() else { return [0, 0, width, height] };
     // Square and half as large again, so that the hand and a misplaced outline are in view.

@@ -354,9 +354,12 @@ impl Walk<'_> {
     }
 
     /// Puts the best of the last solutions first: modes far apart, as those of a search are, compare by their mass rather than their height.
-    fn rank(&self, found: &mut [Solution]) {
+    fn rank(&self, found: &mut Vec<Solution>) {
         if self.searched() {
-            found.sort_by(|a, b| log_mass(&b.at).total_cmp(&log_mass(&a.at)));
+            let ranked = found.drain(..).map(|solution| (log_mass(&solution.at), solution));
+            let mut ranked: Vec<_> = ranked.collect();
+            ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
+            found.extend(ranked.into_iter().map(|(_, solution)| solution));
         }
     }
 

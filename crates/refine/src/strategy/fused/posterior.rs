@@ -117,11 +117,9 @@ impl Posterior {
             };
             bounds[k].0 * scale + more + left * left.transpose()
         };
-        // Laplace: the mass of a mode is its height times its volume.
-        let logarithm = |k: usize| 0.5 * bounds[k].1 - found[k].at.cost;
-        let first = (0..found.len()).map(logarithm).fold(f64::NEG_INFINITY, f64::max);
+        let first = bounds.iter().map(|bound| bound.1).fold(f64::NEG_INFINITY, f64::max);
         // A mode whose width is not known counts only where none is.
-        let mass = |k: usize| if first.is_finite() { (logarithm(k) - first).exp() } else { 1.0 };
+        let mass = |k: usize| if first.is_finite() { (bounds[k].1 - first).exp() } else { 1.0 };
         let masses: Vec<f64> = (0..found.len()).map(mass).collect();
         let total: f64 = masses.iter().sum();
         let hypotheses: Vec<Hypothesis> = (0..found.len())
@@ -198,7 +196,8 @@ impl Posterior {
     }
 }
 
-/// Covariance of the object's pose with all else integrated out, and the logarithm of the determinant of that of everything.
+/// Laplace's approximation of the mode at `point`: covariance of the object's pose with all else integrated out, and the logarithm of its mass, which
+/// is its height times its volume, up to a constant.
 fn laplace(point: &Linearization) -> (Matrix6<f64>, f64) {
     // What nothing is known of, not even beforehand, must not be infinite.
     let Some(factor) = ScaledCholesky::new(point.equations.hessian(), RIDGE) else {
@@ -208,12 +207,13 @@ fn laplace(point: &Linearization) -> (Matrix6<f64>, f64) {
     let at = point.equations.offset(Block::ObjectPose).unwrap_or(0);
     let covariance = Matrix6::from_fn(|r, c| all[(at + r, at + c)]);
     let eliminated = point.marginal.as_ref().map_or(0.0, |marginal| marginal.log_determinant);
-    (covariance, -factor.log_determinant() - eliminated)
+    let log_determinant = -factor.log_determinant() - eliminated;
+    (covariance, 0.5 * log_determinant - point.cost)
 }
 
 /// Logarithm of the mass of the mode at `point`, up to a constant.
 pub(super) fn log_mass(point: &Linearization) -> f64 {
-    0.5 * laplace(point).1 - point.cost
+    laplace(point).1
 }
 
 /// The object's part of the step to where the quadratic model about `point` is least: a left twist about its center \[m, rad\].

@@ -142,9 +142,9 @@ fn compare(
     index: usize,
 ) -> anyhow::Result<Compared> {
     let frame = frames.load(index, &done.poses[&index])?;
-    let alone = nominal.visit(&frame)?.t_cam_object;
-    let before = nominal.residuals(&CalibrationFrame { initial: alone, ..frame.clone() })?;
     let after = done.calibrator.residuals(&frame)?;
+    let alone = nominal.visit(&frame)?.t_cam_object;
+    let before = nominal.residuals(&CalibrationFrame { initial: alone, ..frame })?;
     Ok(Compared { before, after, alone })
 }
 

@@ -49,11 +49,16 @@ impl<'a> Pixels<'a> {
         self.residuals(|p| p.hand, |p| p.hand > 0.0 && !p.shows_object() && !p.masked)
     }
 
+    /// Whether each pixel, row by row, is away from the hand.
+    fn away_from_hand(&self) -> Vec<bool> {
+        eroded(self.view.size().0, &self.marked(true, |_, p| p.hand == 0.0), HAND_MARGIN)
+    }
+
     /// Shares of the object's pixels that are in the middle of a patch that the mask lacks, and of one that it has too much, both away from
     /// the hand.
     pub(super) fn mask_misfit(&self) -> [f64; 2] {
         let width = self.view.size().0;
-        let away = eroded(width, &self.marked(true, |_, p| p.hand == 0.0), HAND_MARGIN);
+        let away = self.away_from_hand();
         let [_, seen] = self.view.sums();
         [true, false].map(|lacking| {
             let differs = self.marked(false, |i, p| {
@@ -68,7 +73,7 @@ impl<'a> Pixels<'a> {
     /// `None` without an outline there.
     pub(crate) fn outline_distance(&self) -> Option<f64> {
         let (width, height) = self.view.size();
-        let away = eroded(width, &self.marked(true, |_, p| p.hand == 0.0), HAND_MARGIN);
+        let away = self.away_from_hand();
         let seen = self.marked(false, |_, p| p.shows_object());
         let is_edge = |i: usize| {
             let (x, y) = (i % width, i / width);
