@@ -6,7 +6,7 @@ use nalgebra::{Point3, Vector2, Vector3};
 use prehend_render::{Camera, DepthImage};
 
 use super::facing::facing;
-use crate::problem::{Block, Factor, NoiseModel, Rows, State};
+use crate::problem::{Factor, NoiseModel, Rows, State};
 use crate::scene::{Frame, Object};
 
 /// Settings of [`FreeSpaceFactor`].
@@ -122,8 +122,8 @@ impl Factor for FreeSpaceFactor {
                 rows.add(beyond, &weighting.shared(share), |row| {
                     // Shares are taken as they are: at depth's steps their derivative would pull samples sideways.
                     row.object_point(state, &place, &-Vector3::z());
-                    row.block(Block::Camera, &[measured, 1.0, 0.0, 0.0, 0.0, 0.0]);
-                    row.depth(pixel.x, pixel.y, 1.0);
+                    let ray = self.camera.ray(pixel.x, pixel.y).xy();
+                    row.camera(&pixel, &ray, &[measured, 1.0, 0.0, 0.0, 0.0, 0.0]);
                 });
             }
         }
@@ -134,6 +134,7 @@ impl Factor for FreeSpaceFactor {
 mod tests {
     use super::super::gradient_check::{assert_gradient, fixture, scene};
     use super::*;
+    use crate::problem::Block;
 
     #[test]
     fn gradients_match_differences() {

@@ -125,9 +125,7 @@ impl Factor for HandDepthFactor {
                 row.block(Block::HandPose, hand.as_slice());
                 row.block(Block::Joints(state.joints.len()), sample.joints.as_slice());
                 let camera = state.camera.point_jacobian(ray, *depth).tr_mul(normal);
-                row.block(Block::Camera, camera.as_slice());
-                // As the bias of depth, there.
-                row.depth(pixel.x, pixel.y, camera[1]);
+                row.camera(pixel, ray, camera.as_slice());
             });
         }
     }

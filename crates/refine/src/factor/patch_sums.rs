@@ -1,8 +1,8 @@
-//! NormalEquations equations by patch.
+//! Normal equations by patch.
 
-use nalgebra::{DMatrix, DVector, SMatrix, SVector};
+use nalgebra::{DMatrix, DVector, SMatrix, SVector, Vector2};
 
-use crate::problem::{Block, NormalEquations};
+use crate::problem::{Block, NormalEquations, radial_as_camera};
 
 /// Gradient and Gauss–Newton Hessian by `N` parameters of what each patch shows, the first three of which are the object's place.
 ///
@@ -33,9 +33,20 @@ impl<const N: usize> PatchSums<N> {
         N + 3 * patch
     }
 
-    /// Adds all to `equations`: by object pose and camera, and by the displacements of all patches, if there are any.
-    pub(super) fn add_to(&self, equations: &mut NormalEquations) {
-        let (gradient, hessian) = self.equations();
+    /// Adds all to `equations`: by object pose and camera, by the displacements of all patches, if there are any, and by what the image is off by,
+    /// if somebody asks for that; `center` is the ray (x/z, y/z) to the object.
+    pub(super) fn add_to(&self, center: &Vector2<f64>, equations: &mut NormalEquations) {
+        let (mut gradient, mut hessian) = self.equations();
+        if let Some((warp, _)) = equations.image_warp() {
+            // Around the object's center, distortion is as a change of the camera; of depth images say nothing.
+            let (known, camera) = (gradient.len(), N - Block::Camera.dimension());
+            let (first, radial) = (N + equations.auxiliary(), radial_as_camera(center));
+            let mut by_all = DMatrix::zeros(known, first + warp.len());
+            by_all.fill_with_identity();
+            by_all.view_mut((camera, first), radial.shape()).copy_from(&radial);
+            gradient = by_all.tr_mul(&gradient);
+            hessian = by_all.tr_mul(&(hessian * &by_all));
+        }
         add_to(equations, &gradient, &hessian);
     }
 

@@ -206,7 +206,8 @@ impl RenderingFactor {
             *hessian += seen_by_state.tr_mul(&at.hessian) * seen_by_state * self.scale;
             cost += self.scale * at.loss.total;
         }
-        sums.add_to(equations);
+        let center = state.center();
+        sums.add_to(&(center.xy() / center.z), equations);
         cost
     }
 }

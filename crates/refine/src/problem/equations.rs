@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, DMatrixView, DVector, DVectorView, SMatrix, SVector};
+use nalgebra::{DMatrix, DMatrixView, DVector, DVectorView, SMatrix, SVector, Vector2};
 
-use super::{Block, DepthField, Row};
+use super::{Block, ImageWarp, Row};
 
 /// Gradient Jᵀr and Gauss–Newton Hessian JᵀJ of ½‖r‖², a sum of factors, by the parameters of some blocks.
 #[derive(Clone, Debug)]
@@ -15,8 +15,8 @@ pub struct NormalEquations {
     /// Number of parameters that no state holds and that are eliminated: displacements of surface patches. They come last, and
     /// have room once something depends on them.
     auxiliary: usize,
-    /// By which depth may be off: its coefficients come after the patches' displacements, and no state holds them either.
-    depth_field: Option<Arc<DepthField>>,
+    /// By which the image may be off: its coefficients come after the patches' displacements, and no state holds them either.
+    image_warp: Option<Arc<ImageWarp>>,
     gradient: DVector<f64>,
     hessian: DMatrix<f64>,
     /// Place and derivative of each parameter of the row begun last.
@@ -46,23 +46,23 @@ impl NormalEquations {
             blocks: blocks.to_vec(),
             dimension: n,
             auxiliary,
-            depth_field: None,
+            image_warp: None,
             gradient: DVector::zeros(n),
             hessian: DMatrix::zeros(n, n),
             entries: Vec::new(),
         }
     }
 
-    /// The same over the coefficients of a field by which depth may be off, too.
-    pub(crate) fn with_depth_field(mut self, field: Arc<DepthField>) -> Self {
-        self.depth_field = Some(field);
+    /// The same over the coefficients by which the image may be off, too.
+    pub(crate) fn with_image_warp(mut self, warp: Arc<ImageWarp>) -> Self {
+        self.image_warp = Some(warp);
         self.grow();
         self
     }
 
-    /// The field by which depth may be off, and where its coefficients begin.
-    pub(crate) fn depth_field(&self) -> Option<(&Arc<DepthField>, usize)> {
-        self.depth_field.as_ref().map(|field| (field, self.dimension + self.auxiliary))
+    /// By which the image may be off, and where its coefficients begin.
+    pub(crate) fn image_warp(&self) -> Option<(&Arc<ImageWarp>, usize)> {
+        self.image_warp.as_ref().map(|warp| (warp, self.dimension + self.auxiliary))
     }
 
     /// Number of the blocks' parameters.
@@ -82,8 +82,8 @@ impl NormalEquations {
 
     /// Makes room for the auxiliary parameters.
     fn grow(&mut self) {
-        let field = self.depth_field.as_ref().map_or(0, |field| field.len());
-        let n = self.dimension + self.auxiliary + field;
+        let warp = self.image_warp.as_ref().map_or(0, |warp| warp.len());
+        let n = self.dimension + self.auxiliary + warp;
         if self.gradient.len() < n {
             let old = std::mem::replace(&mut self.gradient, DVector::zeros(n));
             self.gradient.rows_mut(0, old.len()).copy_from(&old);
@@ -127,7 +127,7 @@ impl NormalEquations {
             blocks: self.blocks.clone(),
             dimension: n,
             auxiliary: 0,
-            depth_field: None,
+            image_warp: None,
             gradient: self.gradient.rows(0, n) - coupling.tr_mul(&pull),
             hessian: self.hessian.view((0, 0), (n, n)) - coupling.tr_mul(&coupling),
             entries: Vec::new(),
@@ -141,7 +141,7 @@ impl NormalEquations {
         let n = self.dimension;
         Self {
             auxiliary: 0,
-            depth_field: None,
+            image_warp: None,
             gradient: self.gradient.rows(0, n).clone_owned(),
             hessian: self.hessian.view((0, 0), (n, n)).clone_owned(),
             ..self
@@ -187,13 +187,18 @@ impl NormalEquations {
         }
     }
 
-    /// The derivative by what depth is off by at the pixel (x, y); dropped if nobody asks for it.
+    /// The derivatives by what the image is off by at `pixel`, seen along `ray`; dropped if nobody asks for them.
     #[inline]
-    pub(super) fn push_depth(&mut self, x: f64, y: f64, derivative: f64) {
-        let Some(field) = &self.depth_field else { return };
+    pub(super) fn push_warp(
+        &mut self,
+        pixel: &Vector2<f64>,
+        ray: &Vector2<f64>,
+        by_camera: &[f64],
+    ) {
+        let Some(warp) = &self.image_warp else { return };
         let first = self.dimension + self.auxiliary;
-        let weights = field.weights(x, y);
-        self.entries.extend(weights.map(|(k, weight)| (first + k, weight * derivative)));
+        let derivatives = warp.derivatives(pixel, ray, by_camera);
+        self.entries.extend(derivatives.map(|(k, derivative)| (first + k, derivative)));
     }
 
     /// Adds ½ `weight` r² of the residual r whose derivatives are the row begun last.
@@ -241,7 +246,7 @@ impl NormalEquations {
         hessian: &DMatrix<f64>,
     ) {
         self.grow();
-        // That of a depth field too, where it is given.
+        // Those of an image's warp too, where they are given.
         let auxiliary = gradient.len() - blocks.iter().map(|b| b.dimension()).sum::<usize>();
         self.add_views(blocks, auxiliary, &gradient.as_view(), &hessian.as_view());
     }

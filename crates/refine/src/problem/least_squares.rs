@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use strum::IntoStaticStr;
 
 use super::{
-    Block, DepthField, Factor, NormalEquations, RIDGE, ScaledCholesky, SchurComplement, State,
+    Block, Factor, ImageWarp, NormalEquations, RIDGE, ScaledCholesky, SchurComplement, State,
     SurfacePatches,
 };
 
@@ -216,9 +216,9 @@ impl Problem {
         Solution { at, termination, iterations }
     }
 
-    /// Derivatives of all factors but the prior at `state`, those by displacements of patches and by a field that depth is off by included.
-    pub(crate) fn evidence(&self, state: &State, field: &Arc<DepthField>) -> NormalEquations {
-        let nothing = || self.no_equations().with_depth_field(Arc::clone(field));
+    /// Derivatives of all factors but the prior at `state`, those by displacements of patches and by what the image is off by included.
+    pub(crate) fn evidence(&self, state: &State, warp: &Arc<ImageWarp>) -> NormalEquations {
+        let nothing = || self.no_equations().with_image_warp(Arc::clone(warp));
         let of_factor = |factor: &Arc<dyn Factor>| {
             let mut equations = nothing();
             factor.linearize(state, &mut equations);

@@ -4,6 +4,7 @@
 mod depth_field;
 mod equations;
 mod factor;
+mod image_warp;
 mod inducing_points;
 mod least_squares;
 mod noise;
@@ -16,6 +17,7 @@ pub(crate) use depth_field::DepthField;
 pub use equations::NormalEquations;
 pub(crate) use equations::SchurComplement;
 pub use factor::Factor;
+pub(crate) use image_warp::{ImageWarp, RADIAL, radial_as_camera};
 pub(crate) use inducing_points::far_apart;
 pub use least_squares::{Contribution, Linearization, Problem, Solution, Solver, Termination};
 pub use noise::{NoiseModel, Weighting};

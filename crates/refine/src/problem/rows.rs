@@ -1,6 +1,6 @@
 //! The residuals of a factor, and their derivatives by blocks.
 
-use nalgebra::{Point3, Vector3, Vector6};
+use nalgebra::{Point3, Vector2, Vector3, Vector6};
 use prehend_autodiff::lie::twist_row;
 
 use super::{Block, NormalEquations, State, Weighting};
@@ -70,10 +70,11 @@ impl Row<'_> {
         self.equations.push_entry(block, index, derivative);
     }
 
-    /// Writes the derivative by depth \[1/m of measured depth, corrected\] as it is measured at the pixel (x, y).
+    /// Writes the derivatives by the camera, of a residual about what is seen at `pixel` along `ray` (x/z, y/z).
     #[inline]
-    pub fn depth(&mut self, x: f64, y: f64, derivative: f64) {
-        self.equations.push_depth(x, y, derivative);
+    pub fn camera(&mut self, pixel: &Vector2<f64>, ray: &Vector2<f64>, derivatives: &[f64]) {
+        self.block(Block::Camera, derivatives);
+        self.equations.push_warp(pixel, ray, derivatives);
     }
 
     /// Derivatives by the object's pose of a residual that changes by `direction`·v while a point of the object, now at

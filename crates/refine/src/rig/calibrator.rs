@@ -13,7 +13,7 @@ use super::pass::{Pass, PlaySquares, Sums, Visit};
 use super::residuals::FrameResiduals;
 use super::settings::CalibratorSettings;
 use crate::error::RefineError;
-use crate::problem::{Block, DepthField, ScaledCholesky, State};
+use crate::problem::{Block, DepthField, ImageWarp, ScaledCholesky, State};
 use crate::refine;
 use crate::scene::{Frame, Hand, Object, Observation, View, median};
 use crate::strategy::{Fused, Modality};
@@ -84,15 +84,15 @@ impl Calibrator {
         objects: BTreeMap<u32, Arc<Object>>,
         settings: CalibratorSettings,
     ) -> Result<Self, RefineError> {
-        let field = DepthField::new(width, height, settings.depth_cells.max(1));
-        let sigmas = settings.sigmas(joints, field.len());
+        let warp = ImageWarp { depth: DepthField::new(width, height, settings.depth_cells.max(1)) };
+        let sigmas = settings.sigmas(joints, &warp);
         let Play { hand_translation, hand_rotation, joints: of_joints } = settings.play;
         let all = sigmas.iter().chain([&hand_translation, &hand_rotation, &of_joints]);
         if let Some(wrong) = all.copied().find(|sigma| !(sigma.is_finite() && *sigma > 0.0)) {
             let problem = format!("a standard deviation of {wrong} is not positive");
             return Err(RefineError::Setting { name: "prior", problem });
         }
-        let mut rig = Rig::nominal(joints, field, &sigmas, settings.play);
+        let mut rig = Rig::nominal(joints, warp, &sigmas, settings.play);
         let mut models = BTreeMap::new();
         for (id, given) in objects {
             let deviation = SurfaceDeviation::new(&given, &settings.fused.settings.model);
@@ -231,7 +231,7 @@ impl Calibrator {
         let said = State::new(frame, &state.t_cam_object)?;
         let sigmas = fused.settings.prior.sigmas(Block::ObjectPose);
         let field = self.rig.objects.get(&obj_id);
-        let evidence = fused.evidence(frame, state, &self.rig.depth_field)?;
+        let evidence = fused.evidence(frame, state, &self.rig.warp)?;
         let information = evidence.and_then(|evidence| {
             FrameInformation::new(&evidence, &said, &self.rig, field, &sigmas)
         });

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::deviation::SurfaceDeviation;
 use super::parameters::{Play, Rig};
 use crate::data::bop::{DatasetError, read_json, write_atomically};
-use crate::problem::{DepthField, ModelErrorSettings};
+use crate::problem::{DepthField, ImageWarp, ModelErrorSettings, RADIAL};
 use crate::scene::CameraCalibrationError;
 
 #[derive(Serialize, Deserialize)]
@@ -32,6 +32,7 @@ struct CameraLayout {
     principal_point_focal: [f64; 2],
     focal_scale: f64,
     aspect: f64,
+    distortion: [f64; RADIAL],
     depth_cells: usize,
     depth_offsets_m: Vec<f64>,
 }
@@ -91,8 +92,8 @@ impl Rig {
         if camera.depth_scale <= 0.0 || sizes.iter().any(|size| *size <= -1.0) {
             return field("camera", &"no depth or focal length is negative");
         }
-        let depth_field = DepthField::new(width, height, camera.depth_cells);
-        let (found, expected) = (camera.depth_offsets_m.len(), depth_field.len());
+        let warp = ImageWarp { depth: DepthField::new(width, height, camera.depth_cells) };
+        let (found, expected) = (camera.depth_offsets_m.len(), warp.depth.len());
         if found != expected {
             let problem = format!("expected {expected} coefficients, found {found}");
             return field("camera.depth_offsets_m", &problem);
@@ -105,7 +106,8 @@ impl Rig {
                 focal_scale: camera.focal_scale,
                 aspect: camera.aspect,
             },
-            depth_field: depth_field.into(),
+            distortion: camera.distortion,
+            warp: warp.into(),
             depth_offsets: camera.depth_offsets_m,
             in_hand: (&hand.in_hand).into(),
             in_camera: (&hand.in_camera).into(),
@@ -179,14 +181,15 @@ impl Rig {
         };
         let camera = &self.camera;
         let layout = Layout {
-            image_size: self.depth_field.size(),
+            image_size: self.warp.depth.size(),
             camera: CameraLayout {
                 depth_scale: camera.depth_scale,
                 depth_bias_m: camera.depth_bias,
                 principal_point_focal: camera.principal_point.into(),
                 focal_scale: camera.focal_scale,
                 aspect: camera.aspect,
-                depth_cells: self.depth_field.cells(),
+                distortion: self.distortion,
+                depth_cells: self.warp.depth.cells(),
                 depth_offsets_m: self.depth_offsets.clone(),
             },
             hand: HandLayout {

@@ -41,7 +41,7 @@ impl FrameInformation {
             calibrations.extend(at..at + block.dimension());
         }
         let pose = equations.offset(Block::ObjectPose)?;
-        let (_, first_offset) = equations.depth_field()?;
+        let (_, first_warp) = equations.image_warp()?;
         let (n, first_patch) = (equations.gradient().len(), equations.dimension());
         // What the evidence is about, by the rig's parameters and the object's coefficients.
         let coefficients = field.map_or(0, |field| 3 * field.count());
@@ -49,8 +49,8 @@ impl FrameInformation {
         for (row, at) in rig.jacobian(said).row_iter().zip(&calibrations) {
             by_shared.view_mut((*at, 0), row.shape()).copy_from(&row);
         }
-        for k in 0..n - first_offset {
-            by_shared[(first_offset + k, rig.first_offset() + k)] = 1.0;
+        for k in 0..n - first_warp {
+            by_shared[(first_warp + k, rig.first_warp() + k)] = 1.0;
         }
         if let (Some(patches), Some(field)) = (patches, field) {
             let turn = state.t_cam_object.rotation.to_rotation_matrix();
@@ -66,7 +66,7 @@ impl FrameInformation {
         let in_play = calibrations.len() - Block::Camera.dimension();
         let own: Vec<usize> = (pose..pose + 6)
             .chain(calibrations[..in_play].iter().copied())
-            .chain(first_patch..first_offset)
+            .chain(first_patch..first_warp)
             .collect();
         let mut variances: Vec<f64> = sigmas.iter().map(|sigma| sigma * sigma).collect();
         variances.extend(rig.play.variances(state.joints.len()));
@@ -209,7 +209,7 @@ mod tests {
         FreeSpaceFactor, FreeSpaceSettings, HandDepthFactor, HandDepthSettings, PointToPlaneFactor,
         PointToPlaneSettings,
     };
-    use crate::problem::{DepthField, Factor, NormalEquations};
+    use crate::problem::{DepthField, Factor, ImageWarp, NormalEquations, RADIAL};
     use crate::rig::{Calibrator, CalibratorSettings};
     use crate::scene::{Frame, Observation, default_scene};
 
@@ -219,7 +219,7 @@ mod tests {
         let scene = default_scene(1).unwrap();
         let settings = CalibratorSettings::default();
         let calibrator = Calibrator::new(16, (640, 480), BTreeMap::new(), settings).unwrap();
-        let field = Arc::new(DepthField::new(640, 480, 4));
+        let warp = Arc::new(ImageWarp { depth: DepthField::new(640, 480, 4) });
         let factors_of = |observation: &Observation| {
             let frame = Frame::new(observation, &scene.object, Some(&scene.hand)).unwrap();
             let mut state = State::new(&frame, &scene.truth).unwrap();
@@ -234,9 +234,9 @@ mod tests {
         let (state, factors) = factors_of(&scene.observation);
         for (f, factor) in factors.iter().enumerate() {
             let blocks = [Block::ObjectPose, Block::Camera];
-            let mut equations = NormalEquations::new(&blocks).with_depth_field(Arc::clone(&field));
+            let mut equations = NormalEquations::new(&blocks).with_image_warp(Arc::clone(&warp));
             factor.linearize(&state, &mut equations);
-            let (_, first) = equations.depth_field().unwrap();
+            let first = equations.image_warp().unwrap().1 + RADIAL;
             let step = 2e-6;
             for k in [16, 17, 23, 24, 25] {
                 let cost = |sign: f64| {
@@ -252,9 +252,73 @@ mod tests {
                 assert!(error < 0.03, "{} {k}: {found} {difference}", factor.name());
             }
             // A field that is the same everywhere is the bias of the camera.
-            let sum: f64 = equations.gradient().rows(first, field.len()).sum();
+            let sum: f64 = equations.gradient().rows(first, warp.depth.len()).sum();
             let bias = equations.gradient()[equations.offset(Block::Camera).unwrap() + 1];
             assert!((sum - bias).abs() < 1e-9 * bias.abs(), "{sum} {bias}");
+        }
+    }
+
+    /// What is seen in a small window is shifted by radial distortion as by a principal point that is off.
+    #[test]
+    fn derivatives_by_distortion_are_those_of_a_shift_there() {
+        let scene = default_scene(1).unwrap();
+        let warp = Arc::new(ImageWarp { depth: DepthField::new(640, 480, 4) });
+        let mut observation = scene.observation.clone();
+        // Off the image's center, where distortion is something.
+        observation.camera.cx -= 0.3 * observation.camera.fx;
+        let aside = 0.3 * scene.truth.translation.z;
+        observation.hand.as_mut().unwrap().t_cam_hand.translation.x += aside;
+        let mut state = {
+            let frame = Frame::new(&observation, &scene.object, Some(&scene.hand)).unwrap();
+            State::new(&frame, &scene.truth).unwrap()
+        };
+        state.t_cam_object.translation.x += aside;
+        let links = scene.hand.posed(&state.t_cam_hand, &state.joints).unwrap();
+        for factor in ["point-to-plane", "hand-depth"] {
+            let on_object = factor == "point-to-plane";
+            let is_there = |at: &usize| {
+                let ray = observation.camera.ray((at % 640) as f64, (at / 640) as f64);
+                let depth = f64::from(observation.depth.pixels()[*at]);
+                let near = || links.signed_distance(&(ray.xy() * depth).push(depth).into(), 1.0);
+                let masked = observation.mask.pixels()[*at];
+                if on_object { masked } else { !masked && near().is_some_and(|d| d < 3e-3) }
+            };
+            let all: Vec<usize> = (0..640 * 480).filter(is_there).collect();
+            let center = all[all.len() / 2];
+            let mut window = observation.clone();
+            for (at, z) in window.depth.pixels_mut().iter_mut().enumerate() {
+                let apart = [at % 640, at / 640].map(|v| v as f64);
+                let [x, y] = [apart[0] - (center % 640) as f64, apart[1] - (center / 640) as f64];
+                if x.abs().max(y.abs()) > 8.0 {
+                    *z = 0.0;
+                }
+            }
+            let frame = Frame::new(&window, &scene.object, Some(&scene.hand)).unwrap();
+            let factor: Box<dyn Factor> = if on_object {
+                Box::new(PointToPlaneFactor::new(&frame, &PointToPlaneSettings::default()).unwrap())
+            } else {
+                Box::new(HandDepthFactor::new(&frame, &HandDepthSettings::default()).unwrap())
+            };
+            let blocks = [Block::ObjectPose, Block::Camera];
+            let mut equations = NormalEquations::new(&blocks).with_image_warp(Arc::clone(&warp));
+            factor.linearize(&state, &mut equations);
+            let (camera, first) =
+                (equations.offset(Block::Camera).unwrap(), equations.image_warp().unwrap().1);
+            let ray = window.camera.ray((center % 640) as f64, (center / 640) as f64).xy();
+            let hessian = equations.hessian();
+            let by_shift = |row: usize| {
+                ray.x * hessian[(row, camera + 2)] + ray.y * hessian[(row, camera + 3)]
+            };
+            let along = ray.x * by_shift(camera + 2) + ray.y * by_shift(camera + 3);
+            for k in 0..RADIAL {
+                let size = ray.norm_squared().powi(k as i32 + 1);
+                let pairs = [(first + k, size * along), (camera + 2, by_shift(camera + 2))];
+                for (row, by_row) in pairs {
+                    let (found, expected) = (hessian[(row, first + k)], size * by_row);
+                    let off = (found / expected - 1.0).abs();
+                    assert!(off < 0.25, "{} {k}: {found}, not {expected}", factor.name());
+                }
+            }
         }
     }
 }

@@ -5,6 +5,7 @@ use std::fmt;
 use nalgebra::{DMatrix, DVector, Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use super::parameters::Rig;
+use crate::problem::RADIAL;
 use crate::scene::{Hand, Object, Observation, View};
 
 /// A combination of a rig's parameters that frames have hardly determined.
@@ -155,12 +156,13 @@ pub(super) fn unobserved_directions(
 /// What brings changes of all parameters to those of the named ones in their deviations beforehand, with the field of depth in the middle of the
 /// image counted to the bias: of the two, frames can only tell the sum.
 fn whitening(rig: &Rig, prior: &DVector<f64>) -> DMatrix<f64> {
-    let mut named = DMatrix::zeros(rig.first_offset(), rig.len());
+    let first_offset = rig.first_warp() + RADIAL;
+    let mut named = DMatrix::zeros(first_offset, rig.len());
     named.fill_with_identity();
-    let [width, height] = rig.depth_field.size();
+    let [width, height] = rig.warp.depth.size();
     let bias = rig.depth_bias();
-    for (k, weight) in rig.depth_field.weights(width as f64 / 2.0, height as f64 / 2.0) {
-        named[(bias, rig.first_offset() + k)] += weight;
+    for (k, weight) in rig.warp.depth.weights(width as f64 / 2.0, height as f64 / 2.0) {
+        named[(bias, first_offset + k)] += weight;
     }
     for mut row in named.row_iter_mut() {
         let variance: f64 = row.iter().zip(prior).map(|(part, prior)| part * part / prior).sum();
@@ -172,16 +174,16 @@ fn whitening(rig: &Rig, prior: &DVector<f64>) -> DMatrix<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::problem::DepthField;
+    use crate::problem::{DepthField, ImageWarp};
     use crate::rig::Play;
 
     /// A rig of which one sum of two parameters is known, and a motion that tells their difference.
     #[test]
     fn what_is_open_is_found_and_what_would_tell_it() {
-        let field = DepthField::new(640, 480, 4);
+        let warp = ImageWarp { depth: DepthField::new(640, 480, 4) };
         let play = Play { hand_translation: 1e-3, hand_rotation: 1e-3, joints: 1e-3 };
-        let sigmas = DVector::repeat(12 + 6 + field.len(), 2e-3);
-        let mut rig = Rig::nominal(0, field, &sigmas, play);
+        let sigmas = DVector::repeat(12 + 6 + warp.len(), 2e-3);
+        let mut rig = Rig::nominal(0, warp, &sigmas, play);
         let prior = sigmas.map(|sigma| sigma.powi(-2));
         let n = rig.len();
         let told = |parts: &[(usize, f64)], weight: f64| {

@@ -5,12 +5,12 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, UnitQuaternion, Vector3};
 use prehend_autodiff::lie::{cross_matrix, so3_log};
-use prehend_render::Camera;
+use prehend_render::{BrownConrady, Camera, Distortion, DistortionError, Remap};
 
 use super::deviation::SurfaceDeviation;
 use crate::error::RefineError;
 use crate::factor::{Layout, PriorSettings};
-use crate::problem::{Block, DepthField, State};
+use crate::problem::{Block, ImageWarp, RADIAL, State, radial_as_camera};
 use crate::scene::{CameraCalibrationError, Observation};
 
 /// Standard deviations of what changes from frame to frame.
@@ -29,8 +29,10 @@ pub struct Play {
 pub struct Rig {
     /// Of the camera and its depth.
     pub camera: CameraCalibrationError,
-    /// By what depth is off after that: a smooth field over the image, whose coefficients are to be added \[m\].
-    pub(crate) depth_field: Arc<DepthField>,
+    /// k1 and k2 of the radial distortion (Brown and Conrady) that the corrected camera has beside that which is said of its lens.
+    pub distortion: [f64; RADIAL],
+    pub(super) warp: Arc<ImageWarp>,
+    /// By what depth is off beside scale and bias: coefficients of a smooth field over the image, to be added \[m\].
     pub(super) depth_offsets: Vec<f64>,
     /// The hand's pose in the frame of where it is said to be, as if it were mounted so.
     pub in_hand: Isometry3<f64>,
@@ -40,8 +42,8 @@ pub struct Rig {
     pub joints: Vec<f64>,
     /// What changes from frame to frame.
     pub play: Play,
-    /// Covariance of the parameters: displacement and rotation vector of `in_hand` and of `in_camera` \[m, rad\], joints, camera, coefficients
-    /// of depth's field.
+    /// Covariance of the parameters: displacement and rotation vector of `in_hand` and of `in_camera` \[m, rad\], joints, camera,
+    /// distortion, coefficients of depth's field.
     pub covariance: DMatrix<f64>,
     /// By what the surface of each object differs from its model, by the object's number.
     pub objects: BTreeMap<u32, SurfaceDeviation>,
@@ -50,18 +52,22 @@ pub struct Rig {
 /// Displacements and rotations of the hand in its own axes and in those of the camera.
 const POSES: usize = 12;
 
+/// Images of a lens that moves no corner by more are taken as they are \[px\].
+const STRAIGHT: f64 = 0.05;
+
 impl Rig {
     /// With everything as it is said to be, of a hand of so many joints and a field of depth; `sigmas` are the parameters' standard deviations.
     pub(super) fn nominal(
         joints: usize,
-        depth_field: DepthField,
+        warp: ImageWarp,
         sigmas: &DVector<f64>,
         play: Play,
     ) -> Self {
         Self {
             camera: CameraCalibrationError::default(),
-            depth_offsets: vec![0.0; depth_field.len()],
-            depth_field: Arc::new(depth_field),
+            distortion: [0.0; RADIAL],
+            depth_offsets: vec![0.0; warp.depth.len()],
+            warp: Arc::new(warp),
             in_hand: Isometry3::identity(),
             in_camera: Isometry3::identity(),
             joints: vec![0.0; joints],
@@ -78,11 +84,11 @@ impl Rig {
 
     /// Number of its parameters, but for the objects'.
     pub(super) fn len(&self) -> usize {
-        self.first_offset() + self.depth_offsets.len()
+        self.first_warp() + self.warp.len()
     }
 
-    /// Where the coefficients of depth's field begin among them.
-    pub(super) fn first_offset(&self) -> usize {
+    /// Where what the image is off by begins among them: distortion, then coefficients of depth's field.
+    pub(super) fn first_warp(&self) -> usize {
         POSES + self.joints.len() + CameraCalibrationError::DIMENSION
     }
 
@@ -97,8 +103,8 @@ impl Rig {
         let poses = poses.map(|pose| (pose.translation.vector, so3_log(&pose.rotation)));
         let poses = poses.iter().flat_map(|(place, turn)| place.iter().chain(turn)).copied();
         let numbers = self.joints.iter().copied().chain(self.camera.parameters());
-        let offsets = self.depth_offsets.iter().copied();
-        DVector::from_iterator(self.len(), poses.chain(numbers).chain(offsets))
+        let warp = self.distortion.iter().chain(&self.depth_offsets).copied();
+        DVector::from_iterator(self.len(), poses.chain(numbers).chain(warp))
     }
 
     /// Names and values of the parameters, in the order of [`covariance`](Self::covariance), without the coefficients of depth's field
@@ -114,7 +120,7 @@ impl Rig {
         names.extend(
             ["depth scale", "depth bias", "principal point x", "principal point y"]
                 .into_iter()
-                .chain(["focal scale", "aspect"])
+                .chain(["focal scale", "aspect", "distortion k1", "distortion k2"])
                 .map(str::to_owned),
         );
         names.into_iter().zip(self.values().iter().copied()).collect()
@@ -125,7 +131,8 @@ impl Rig {
         let vector = |from: usize| Vector3::from_column_slice(&change[from..from + 3]);
         let rotation = |from: usize| UnitQuaternion::from_scaled_axis(vector(from));
         let (joints, rest) = change[POSES..].split_at(self.joints.len());
-        let (camera, offsets) = rest.split_at(CameraCalibrationError::DIMENSION);
+        let (camera, warp) = rest.split_at(CameraCalibrationError::DIMENSION);
+        let (distortion, offsets) = warp.split_at(RADIAL);
         let sum = |values: &[f64], change: &[f64]| {
             values.iter().zip(change).map(|(value, change)| value + change).collect()
         };
@@ -137,6 +144,7 @@ impl Rig {
             ),
             joints: sum(&self.joints, joints),
             camera: self.camera.changed(camera),
+            distortion: std::array::from_fn(|k| self.distortion[k] + distortion[k]),
             depth_offsets: sum(&self.depth_offsets, offsets),
             ..self.clone()
         }
@@ -149,7 +157,7 @@ impl Rig {
     pub fn corrected(&self, observation: &Observation) -> Result<Observation, RefineError> {
         let mut corrected = observation.clone();
         let (camera, error) = (&mut corrected.camera, &self.camera);
-        let (size, expected) = ([camera.width, camera.height], self.depth_field.size());
+        let (size, expected) = ([camera.width, camera.height], self.warp.depth.size());
         if size != expected {
             let problem = format!("is of images of {expected:?} pixels, not of {size:?}");
             return Err(RefineError::Setting { name: "rig", problem });
@@ -158,10 +166,11 @@ impl Rig {
         for (i, z) in corrected.depth.pixels_mut().iter_mut().enumerate() {
             if *z > 0.0 {
                 let (x, y) = ((i % size[0]) as f64, (i / size[0]) as f64);
-                let offset = error.depth_bias + self.depth_field.at(&self.depth_offsets, x, y);
+                let offset = error.depth_bias + self.warp.depth.at(&self.depth_offsets, x, y);
                 *z = (error.depth_scale * f64::from(*z) + offset) as f32;
             }
         }
+        self.undistort(&mut corrected)?;
         if let Some(hand) = &mut corrected.hand {
             let (given, expected) = (hand.joints.len(), self.joints.len());
             if given != expected {
@@ -175,6 +184,32 @@ impl Rig {
             hand.joints.iter_mut().zip(&self.joints).for_each(|(q, error)| *q += error);
         }
         Ok(corrected)
+    }
+
+    /// Makes the images of a camera, corrected, those of a pinhole.
+    fn undistort(&self, observation: &mut Observation) -> Result<(), RefineError> {
+        let lens = BrownConrady {
+            radial: [self.distortion[0], self.distortion[1], 0.0, 0.0, 0.0, 0.0],
+            tangential: [0.0; 2],
+        };
+        let Observation { camera, color, depth, mask, .. } = observation;
+        let (right, below) = ((camera.width - 1) as f64, (camera.height - 1) as f64);
+        let moved = [(0.0, 0.0), (right, 0.0), (0.0, below), (right, below)].map(|(x, y)| {
+            let ray = camera.ray(x, y).xy();
+            (lens.distort(ray) - ray).norm() * camera.fx
+        });
+        if moved.into_iter().fold(0.0, f64::max) < STRAIGHT {
+            return Ok(());
+        }
+        let remap = Remap::undistort(*camera, &Distortion::BrownConrady(lens), *camera);
+        let failed = |error: DistortionError| RefineError::Setting {
+            name: "rig",
+            problem: format!("distortion: {error}"),
+        };
+        *color = remap.rgb(color).map_err(failed)?;
+        *depth = remap.depth(depth).map_err(failed)?;
+        *mask = remap.mask(mask).map_err(failed)?;
+        Ok(())
     }
 
     /// Derivatives of what a frame says of its calibrations, a row each of hand pose (a left twist about the object's center), joints
@@ -192,7 +227,7 @@ impl Rig {
             jacobian.fixed_view_mut::<3, 3>(0, column + 3).copy_from(&(-arm * axes));
             jacobian.fixed_view_mut::<3, 3>(3, column + 3).copy_from(&axes);
         }
-        let from = self.first_offset() - rest;
+        let from = self.first_warp() - rest;
         jacobian.view_mut((6, from), (rest, rest)).fill_with_identity();
         jacobian
     }
@@ -213,13 +248,16 @@ impl Rig {
             return Err(of_other_joints(given, expected));
         }
         let layout = Layout::new(given);
-        let (object_rows, bias) = (object.len(), layout.offset(Block::Camera) + 1);
+        let object_rows = object.len();
         let mut jacobian = self.jacobian(said);
-        // Where the object is, depth's field is a bias.
+        // Where the object is, depth's field is a bias, and distortion a shift and another size.
         if let Some(pixel) = camera.project(&said.center().into()) {
-            for (k, weight) in self.depth_field.weights(pixel.x, pixel.y) {
-                jacobian[(bias - object_rows, self.first_offset() + k)] += weight;
+            let (at, first) = (layout.offset(Block::Camera) - object_rows, self.first_warp());
+            for (k, weight) in self.warp.depth.weights(pixel.x, pixel.y) {
+                jacobian[(at + 1, first + RADIAL + k)] += weight;
             }
+            let radial = radial_as_camera(&camera.ray(pixel.x, pixel.y).xy());
+            jacobian.view_mut((at, first), radial.shape()).copy_from(&radial);
         }
         let known = &jacobian * &self.covariance * jacobian.transpose();
         let mut covariance = DMatrix::zeros(layout.len(), layout.len());
@@ -278,13 +316,14 @@ fn of_other_joints(given: usize, expected: usize) -> RefineError {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::problem::DepthField;
     use crate::scene::{Frame, default_scene};
 
     fn nominal() -> Rig {
-        let field = DepthField::new(640, 480, 4);
-        let sigmas = DVector::repeat(POSES + 16 + 6 + field.len(), 1e-3);
+        let warp = ImageWarp { depth: DepthField::new(640, 480, 4) };
+        let sigmas = DVector::repeat(POSES + 16 + 6 + warp.len(), 1e-3);
         let play = Play { hand_translation: 1e-3, hand_rotation: 1e-3, joints: 1e-3 };
-        Rig::nominal(16, field, &sigmas, play)
+        Rig::nominal(16, warp, &sigmas, play)
     }
 
     #[test]

@@ -4,7 +4,7 @@ use nalgebra::DVector;
 
 use super::parameters::Play;
 use crate::factor::PriorSettings;
-use crate::problem::Block;
+use crate::problem::{Block, ImageWarp, RADIAL};
 use crate::strategy::Fused;
 
 /// Settings of a [`Calibrator`](super::Calibrator): how frames are refined, and standard deviations of what is wrong with a rig.
@@ -14,6 +14,8 @@ pub struct CalibratorSettings {
     pub fused: Fused,
     /// Hand, joints and camera. The hand's are of its place and rotation both in its own axes and in those of the camera.
     pub prior: PriorSettings,
+    /// Coefficients k1 and k2 of radial distortion, beside what is said of the lens.
+    pub distortion: f64,
     /// The coefficients of the smooth field that depth is off by \[m\].
     pub depth_offset: f64,
     /// Play, as it is expected until frames say how much there is.
@@ -34,6 +36,7 @@ impl Default for CalibratorSettings {
                 hand_rotation: 10e-3,
                 ..PriorSettings::default()
             },
+            distortion: 0.02,
             depth_offset: 3e-3,
             play: Play { hand_translation: 4e-4, hand_rotation: 1.5e-3, joints: 4e-3 },
             play_weight: 5.0,
@@ -44,10 +47,11 @@ impl Default for CalibratorSettings {
 
 impl CalibratorSettings {
     /// Standard deviations of the parameters of a rig.
-    pub(super) fn sigmas(&self, joints: usize, offsets: usize) -> DVector<f64> {
+    pub(super) fn sigmas(&self, joints: usize, warp: &ImageWarp) -> DVector<f64> {
         let blocks = [Block::HandPose, Block::HandPose, Block::Joints(joints), Block::Camera];
         let mut sigmas = blocks.map(|block| self.prior.sigmas(block)).concat();
-        sigmas.resize(sigmas.len() + offsets, self.depth_offset);
+        sigmas.resize(sigmas.len() + RADIAL, self.distortion);
+        sigmas.resize(sigmas.len() + warp.depth.len(), self.depth_offset);
         DVector::from_vec(sigmas)
     }
 }

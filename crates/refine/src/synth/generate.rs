@@ -88,7 +88,9 @@ where
     let exact = subjects.iter().map(|s| models(s, s.object.mesh.clone()));
     write_models(&dir.join("models_eval"), exact)?;
     let size = (settings.width.get(), settings.height.get());
-    let lens = settings.lens.map(|model| Lens::new(model, &settings.sensor, size));
+    let lens = settings
+        .lens
+        .map(|model| Lens::new(model, !settings.undeclared_lens, &settings.sensor, size));
     let lens = lens.as_ref();
     if settings.sensor.calibration.shared > 0 {
         let mut noise = sequence(settings.seed, Use::Rig, 0, 0);

@@ -38,6 +38,8 @@ pub struct SynthSettings {
     pub height: NonZeroUsize,
     /// The camera's lens, if it is no pinhole.
     pub lens: Option<Distortion>,
+    /// Whether the dataset keeps silent about that lens, as about other faults of a rig.
+    pub undeclared_lens: bool,
     /// Sensor models.
     pub sensor: SensorSettings,
     /// Seed of all random numbers.
@@ -82,8 +84,9 @@ fn describe(hand: &HandFiles, subjects: &[Subject], settings: &SynthSettings) ->
         });
         (s.obj_id.to_string(), told)
     };
-    let SynthSettings { frames, frames_per_grasp, width, height, lens, sensor, seed, grasp } =
-        settings;
+    let SynthSettings {
+        frames, frames_per_grasp, width, height, lens, sensor, seed, grasp, ..
+    } = settings;
     let mut plan = json!({
         "program": program(),
         "frames": frames,
@@ -98,6 +101,9 @@ fn describe(hand: &HandFiles, subjects: &[Subject], settings: &SynthSettings) ->
     });
     if let Some(lens) = lens {
         plan["lens"] = annotation::lens(lens);
+        if settings.undeclared_lens {
+            plan["undeclared_lens"] = true.into();
+        }
     }
     plan
 }

@@ -32,6 +32,7 @@ fn settings(sensor: SensorSettings) -> SynthSettings {
         width: 320.try_into().unwrap(),
         height: 240.try_into().unwrap(),
         lens: None,
+        undeclared_lens: false,
         sensor,
         seed: 0,
         grasp: json!("made up"),

@@ -77,9 +77,6 @@ struct Point {
 /// Parameters of the object's pose and the camera together.
 const N: usize = 12;
 
-/// Which of them is added to depth.
-const BIAS: usize = 7;
-
 /// A point seen from the surface.
 struct Residual {
     /// Signed distance from the surface \[m\].
@@ -229,19 +226,21 @@ impl Factor for PointToPlaneFactor {
             let (column, row) = self.points[i].pixel;
             patches.and_then(|patches| patches.at(column, row))
         };
-        let depth_field = equations.depth_field().map(|(field, _)| Arc::clone(field));
+        let image_warp = equations.image_warp().map(|(warp, _)| Arc::clone(warp));
         let derivatives = |i: usize| {
             let at = patch(i).map(PatchSums::<N>::place);
             let displaced = at.into_iter().flat_map(|at| at..at + 3).zip(rows[i]);
             let (x, y) = self.points[i].pixel;
-            let off = depth_field.iter().flat_map(move |field| field.weights(x as f64, y as f64));
-            let (first, by_bias) = (PatchSums::<N>::place(count), rows[i][BIAS]);
-            let off = off.map(move |(k, weight)| (first + k, weight * by_bias));
+            let (pixel, ray) = (Vector2::new(x as f64, y as f64), self.points[i].ray);
+            let by_camera = &rows[i][6..];
+            let off = image_warp.iter().flat_map(move |w| w.derivatives(&pixel, &ray, by_camera));
+            let first = PatchSums::<N>::place(count);
+            let off = off.map(move |(k, derivative)| (first + k, derivative));
             rows[i].into_iter().enumerate().chain(displaced).chain(off)
         };
         let weighted = || fit.weights.iter().zip(&fit.left).enumerate();
-        let (gradient, mut hessian) = if let Some(field) = &depth_field {
-            let size = PatchSums::<N>::place(count) + field.len();
+        let (gradient, mut hessian) = if let Some(warp) = &image_warp {
+            let size = PatchSums::<N>::place(count) + warp.len();
             let (mut gradient, mut hessian) = (DVector::zeros(size), DMatrix::zeros(size, size));
             for (i, (weight, left)) in weighted() {
                 let row: Vec<(usize, f64)> = derivatives(i).collect();

@@ -32,7 +32,7 @@ use super::{Estimate, Iteration, Observer, Strategy};
 use crate::error::RefineError;
 use crate::factor::{GaussianPrior, Layout, NoiseEstimate};
 use crate::problem::{
-    Block, DepthField, Factor, Linearization, NormalEquations, Problem, Solution, Solver, State,
+    Block, Factor, ImageWarp, Linearization, NormalEquations, Problem, Solution, Solver, State,
     SurfacePatches, Termination,
 };
 use crate::scene::Frame;
@@ -102,7 +102,7 @@ struct StageProblem {
 pub(crate) struct Evidence {
     /// Where it was asked.
     pub(crate) state: State,
-    /// Derivatives by the object's pose, by all calibrations, by displacements of the patches and by the field that depth is off by.
+    /// Derivatives by the object's pose, by all calibrations, by displacements of the patches and by what the image is off by.
     pub(crate) equations: NormalEquations,
     /// Where the object may be off from its model.
     pub(crate) patches: Option<Arc<SurfacePatches>>,
@@ -117,12 +117,12 @@ impl Fused {
         &self,
         frame: &Frame<'_>,
         state: &State,
-        field: &Arc<DepthField>,
+        warp: &Arc<ImageWarp>,
     ) -> Result<Option<Evidence>, RefineError> {
         let Some(StageProblem { problem, patches }) = self.last_problem(frame, state)? else {
             return Ok(None);
         };
-        let equations = problem.evidence(state, field);
+        let equations = problem.evidence(state, warp);
         Ok(Some(Evidence { state: state.clone(), equations, patches }))
     }
 

@@ -13,7 +13,8 @@ const WIDEST: f64 = 3.0;
 
 /// A camera's lens, and the pinhole camera whose images become its own.
 pub(in crate::synth) struct Lens {
-    pub(super) model: Distortion,
+    model: Distortion,
+    is_declared: bool,
     /// Sees what the lens shows, `FINE` times finer.
     pub(super) pinhole: Camera,
     /// The same at the resolution of the images, for what is behind all.
@@ -23,9 +24,10 @@ pub(in crate::synth) struct Lens {
 }
 
 impl Lens {
-    /// Of the camera of `settings` with images of `width` by `height` pixels.
+    /// Of the camera of `settings` with images of `width` by `height` pixels; datasets tell of it if it `is_declared`.
     pub(in crate::synth) fn new(
         model: Distortion,
+        is_declared: bool,
         settings: &SensorSettings,
         (width, height): (usize, usize),
     ) -> Self {
@@ -34,7 +36,17 @@ impl Lens {
         let pinhole = background.scaled(FINE as f64);
         let color = Remap::distort(pinhole, camera.scaled(FINE as f64), &model);
         let centers = Remap::distort(pinhole, *camera, &model);
-        Self { model, pinhole, background, color, centers }
+        Self { model, is_declared, pinhole, background, color, centers }
+    }
+
+    /// What is said of it.
+    pub(super) fn declared(&self) -> Option<Distortion> {
+        self.is_declared.then_some(self.model)
+    }
+
+    /// What is not said of it.
+    pub(super) fn undeclared(&self) -> Option<Distortion> {
+        (!self.is_declared).then_some(self.model)
     }
 
     /// How the lens shows what its pinhole sees.

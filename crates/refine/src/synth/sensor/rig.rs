@@ -87,7 +87,7 @@ impl<'a> Rig<'a> {
         let names = self.robot.tree.joint_names().iter().cloned();
         let joints = names.zip(hand.joints.iter().map(|error| json!(-error))).collect();
         let gains: Vec<f64> = self.taxels.iter().map(|taxel| taxel.gain).collect();
-        annotation::rig(
+        let mut faults = annotation::rig(
             focal.map(|scale| 1.0 / scale),
             principal.map(|shift| -shift * camera.width as f64),
             1.0 / scale,
@@ -95,7 +95,11 @@ impl<'a> Rig<'a> {
             &hand.pose.inverse(),
             &joints,
             &gains,
-        )
+        );
+        if let Some(lens) = self.lens.and_then(Lens::undeclared) {
+            faults["cam_dist"] = annotation::lens(&lens);
+        }
+        faults
     }
 
     /// Captures a frame of `moment`, whose joints and taxels are those of the hand.
@@ -133,7 +137,7 @@ impl<'a> Rig<'a> {
         };
         let truth = t_cam_hand * moment.t_hand_object;
         let hand = Some((t_cam_hand, moment.joints.clone()));
-        let lens = self.lens.map(|lens| lens.model);
+        let lens = self.lens.and_then(Lens::declared);
         let View { whole, visible, .. } = seen;
         Ok(Shot { told, lens, truth, hand, world: None, whole, visible })
     }
