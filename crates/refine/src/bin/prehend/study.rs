@@ -9,7 +9,9 @@ use std::sync::Mutex;
 use anyhow::bail;
 use clap::{Args, Subcommand};
 use prehend_refine::data::bop::{Dataset, create_folder};
-use prehend_refine::data::identity::{SENSED, TRUTH, canonical, dataset_fingerprint};
+use prehend_refine::data::identity::{
+    SENSED, TRUTH, canonical, dataset_fingerprint, file_fingerprint,
+};
 use prehend_refine::data::{Assets, Identity, Journal, Times, Workers, join_times};
 use prehend_refine::evaluate::study::{
     Design, Failure, Frame, FrameRecord, FrameResult, Kind, Level, MethodSettings, RECORDS, Runner,
@@ -17,7 +19,7 @@ use prehend_refine::evaluate::study::{
 };
 use prehend_refine::{Method, NamedMethod};
 
-use crate::options::{Selection, limit_threads, named};
+use crate::options::{Selection, limit_threads, named, open_rig};
 use crate::terminal::{cache, exit_code, progress, say};
 
 #[derive(Args)]
@@ -58,6 +60,9 @@ struct Run {
     /// [default: init_low.csv and init_high.csv of the dataset]
     #[arg(long, value_name = "[LEVEL=]FILE", help_heading = "Input")]
     poses: Vec<String>,
+    /// The rig that recorded the frames, as `prehend calibrate` has found it: frames and models are corrected by it
+    #[arg(long, value_name = "FILE", help_heading = "Input")]
+    rig: Option<PathBuf>,
     /// Write everything here
     #[arg(long, value_name = "DIR", help_heading = "Output")]
     out: PathBuf,
@@ -138,7 +143,8 @@ impl Run {
         frames.retain(|f| design.shard.holds(f.index));
         let open: Vec<&Frame> = frames.iter().filter(|f| !records.contains_key(&f.index)).collect();
 
-        let assets = Mutex::new(Assets::new(&dataset, self.seed).with_cache(cache()));
+        let rig = open_rig(self.rig.as_deref())?;
+        let assets = Mutex::new(Assets::new(&dataset, self.seed).with_cache(cache()).with_rig(rig));
         let bar = progress(frames.len(), kind.name());
         bar.set_position(records.len() as u64);
         bar.reset_eta();
@@ -235,6 +241,7 @@ impl Run {
             methods: methods.iter().map(settings).collect(),
             steps: methods.first().map_or_else(Vec::new, |(_, c)| Design::steps(kind, c)),
             sweeps: sweeps.to_vec(),
+            rig: self.rig.as_deref().map(file_fingerprint).transpose()?,
             seed: self.seed,
             backend: "cpu".into(),
             shard: self.shard,

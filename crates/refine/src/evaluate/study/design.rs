@@ -33,6 +33,9 @@ pub struct Design {
     /// Faults of the observation; empty except in the robustness study.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sweeps: Vec<Sweep>,
+    /// Fingerprint of the rig that frames and models are corrected by, if there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rig: Option<String>,
     /// Seed of the points on objects' surfaces.
     pub seed: u64,
     /// What renders.

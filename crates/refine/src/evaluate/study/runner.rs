@@ -13,11 +13,11 @@ use super::posterior::PredictedPosterior;
 use super::record::{FrameRecord, RowOutcome};
 use super::sweep::Sweep;
 use crate::data::bop::ResultRow;
-use crate::data::{AssetError, Assets, PlainPose, Sensor};
+use crate::data::{AssetError, Assets, PlainPose, Sensor, Target};
 use crate::evaluate::scoring::Scorer;
 use crate::method::Method;
 use crate::problem::State;
-use crate::scene::{self, Object};
+use crate::scene::Object;
 use crate::strategy::{Posterior, Strategy};
 
 /// Runs the methods of a study frame by frame; several runners may share the assets.
@@ -139,21 +139,19 @@ impl<'a> Runner<'a> {
         fault: Option<(Sweep, f64)>,
     ) -> Result<Refined, AssetError> {
         let row = &frame.row;
-        let (object, mut observation, hand) = {
+        let ResultRow { scene_id, im_id, obj_id, .. } = *row;
+        let target = Target { scene_id, im_id, obj_id, instance: frame.instance };
+        let mut input = {
             let mut assets = self.assets.lock().unwrap_or_else(PoisonError::into_inner);
-            let object = assets.object(row.obj_id)?;
-            let image = assets.dataset().frame(row.scene_id, row.im_id)?;
-            let required = Sensor::required_by(method);
-            let (observation, hand) = assets.observation(&image, frame.instance, &required)?;
-            (object, observation, hand)
+            assets.load(&target, &Sensor::required_by(method))?
         };
         if let Some((sweep, amount)) = fault {
-            sweep.perturb(&mut observation, amount, sweep.seed(row));
+            sweep.perturb(&mut input.observation, amount, sweep.seed(row));
         }
         let steps = &self.design.steps;
         let mut poses: Vec<Pose> = Vec::new();
         let start = Instant::now();
-        let frame = scene::Frame::new(&observation, &object, hand.as_ref())?;
+        let frame = input.frame()?;
         let initial = State::new(&frame, &row.t_cam_model)?;
         let refined = method.run(&frame, &initial, &mut |p| {
             // A run of fewer iterations would have come just as far: nothing in it looks ahead.
@@ -167,7 +165,7 @@ impl<'a> Runner<'a> {
         poses.resize(steps.len().max(1), (*refined.t_cam_object(), refined.iteration));
         let posterior = refined.posterior;
         drop(frame);
-        Ok(Refined { poses, seconds, object, posterior })
+        Ok(Refined { poses, seconds, object: input.object, posterior })
     }
 
     /// The outcome of a row whose pose is `pose`.

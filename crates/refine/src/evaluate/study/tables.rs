@@ -265,6 +265,7 @@ pub(super) mod tests {
             steps: Vec::new(),
             sweeps: Vec::new(),
             seed: 0,
+            rig: None,
             backend: "cpu".into(),
             shard: Shard::WHOLE,
         };
