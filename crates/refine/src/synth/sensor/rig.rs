@@ -15,6 +15,7 @@ use super::depth::DepthBias;
 use super::lens::Lens;
 use super::settings::SensorSettings;
 use super::touch::TaxelCondition;
+use crate::data::bop::UNITS_PER_NEWTON;
 use crate::scene::{Hand, HandMeasurement, Object, Observation};
 use crate::synth::annotation;
 use crate::synth::files::Shot;
@@ -87,6 +88,8 @@ impl<'a> Rig<'a> {
         let names = self.robot.tree.joint_names().iter().cloned();
         let joints = names.zip(hand.joints.iter().map(|error| json!(-error))).collect();
         let gains: Vec<f64> = self.taxels.iter().map(|taxel| taxel.gain).collect();
+        let offset = |taxel: &TaxelCondition| (taxel.phantom / UNITS_PER_NEWTON).into();
+        let taxel_offsets: Vec<[f64; 3]> = self.taxels.iter().map(offset).collect();
         annotation::rig(
             focal.map(|scale| 1.0 / scale),
             principal.map(|shift| -shift * camera.width as f64),
@@ -95,6 +98,7 @@ impl<'a> Rig<'a> {
             &hand.pose.inverse(),
             &joints,
             &gains,
+            &taxel_offsets,
         )
     }
 
