@@ -106,8 +106,7 @@ pub(super) fn rig(
     depth_offsets: &[Vec<f64>],
     hand: &Isometry3<f64>,
     joints: &Map<String, Value>,
-    taxel_gains: &[f64],
-    taxel_offsets: &[[f64; 3]],
+    (taxel_gains, taxel_offsets): (&[f64], &[[f64; 3]]),
 ) -> Value {
     json!({
         "focal_scale": focal,

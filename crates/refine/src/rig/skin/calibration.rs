@@ -100,6 +100,17 @@ mod tests {
     use crate::scene::default_scene;
 
     #[test]
+    fn a_mass_that_touch_tells_scales_inertia() {
+        let given = default_scene(1).unwrap().object.inertial.clone();
+        let told = ObjectMass { mass: 2.0 * given.mass, sigma: 0.1 };
+        let skin = SkinCalibration { masses: BTreeMap::from([(5, told)]), ..Default::default() };
+        assert_eq!(skin.inertial(6, &given), given);
+        let Inertial { mass, center_of_mass, inertia } = skin.inertial(5, &given);
+        assert_eq!((mass, center_of_mass), (told.mass, given.center_of_mass));
+        assert!((inertia - given.inertia * 2.0).norm() < 1e-12 * inertia.norm());
+    }
+
+    #[test]
     fn forces_are_corrected_and_the_silence_of_dead_taxels_is_no_silence() {
         let mut hand = default_scene(1).unwrap().observation.hand.unwrap();
         let alive =

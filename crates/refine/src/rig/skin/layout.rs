@@ -104,7 +104,8 @@ mod tests {
         let written = || SkinLayout::from(&skin);
         assert_eq!(written().read(), Ok(skin.clone()));
         assert_eq!(SkinLayout::default().read(), Ok(SkinCalibration::default()));
-        let wrong: [(&str, fn(&mut SkinLayout)); 6] = [
+        type Change = fn(&mut SkinLayout);
+        let wrong: [(&str, Change); 6] = [
             ("skin.gains", |skin| skin.gains[1] = -1.0),
             ("skin.gain_sigmas", |skin| skin.gain_sigmas[0] = f64::INFINITY),
             ("skin.offsets_n", |skin| skin.offsets_n[2][1] = f64::NAN),

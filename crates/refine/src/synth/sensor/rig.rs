@@ -88,8 +88,8 @@ impl<'a> Rig<'a> {
         let names = self.robot.tree.joint_names().iter().cloned();
         let joints = names.zip(hand.joints.iter().map(|error| json!(-error))).collect();
         let gains: Vec<f64> = self.taxels.iter().map(|taxel| taxel.gain).collect();
-        let offset = |taxel: &TaxelCondition| (taxel.phantom / UNITS_PER_NEWTON).into();
-        let taxel_offsets: Vec<[f64; 3]> = self.taxels.iter().map(offset).collect();
+        let felt = |taxel: &TaxelCondition| (taxel.phantom / UNITS_PER_NEWTON).into();
+        let added: Vec<[f64; 3]> = self.taxels.iter().map(felt).collect();
         annotation::rig(
             focal.map(|scale| 1.0 / scale),
             principal.map(|shift| -shift * camera.width as f64),
@@ -97,8 +97,7 @@ impl<'a> Rig<'a> {
             &offsets,
             &hand.pose.inverse(),
             &joints,
-            &gains,
-            &taxel_offsets,
+            (&gains, &added),
         )
     }
 

@@ -6,13 +6,20 @@ use super::super::reading::tests::reading;
 use super::*;
 use crate::scene::default_scene;
 
+/// Gains as they are, gains and deviations as they are found, and masses.
+struct Solved {
+    truth: Vec<f64>,
+    gains: Vec<(f64, f64)>,
+    masses: BTreeMap<u32, ObjectMass>,
+}
+
 /// Forces at a dozen taxels that hold the object, read with gains of which the first `seen` are known to the skin.
-fn solved(seen: usize) -> (Vec<f64>, Vec<(f64, f64)>, BTreeMap<u32, ObjectMass>) {
+fn solved(seen: usize) -> Solved {
     let scene = default_scene(1).unwrap();
     let mut reading = reading(&scene, Vector3::zeros());
     let mut noise = SplitMix64::new(4);
     let taxels: Vec<usize> = (0..12).map(|k| 30 * k).collect();
-    let true_gains: Vec<f64> = taxels.iter().map(|_| 0.75 + 0.5 * noise.uniform()).collect();
+    let truth: Vec<f64> = taxels.iter().map(|_| 0.75 + 0.5 * noise.uniform()).collect();
     let mut sums = BalanceSums::default();
     let inertial = reading.object.inertial.clone();
     for _ in 0..60 {
@@ -39,18 +46,18 @@ fn solved(seen: usize) -> (Vec<f64>, Vec<(f64, f64)>, BTreeMap<u32, ObjectMass>)
         for (k, taxel) in taxels.iter().enumerate().take(seen) {
             let force = Vector3::new(all[3 * k], all[3 * k + 1], all[3 * k + 2]);
             let turn = reading.t_object_links[*taxel].rotation.inverse();
-            forces[*taxel] = turn * force * true_gains[k];
+            forces[*taxel] = turn * force * truth[k];
         }
         sums.add(&reading, &forces, 1.0);
     }
     let (gains, masses) = sums.solve(368);
-    let of_taxels = taxels.iter().map(|taxel| gains[*taxel]).collect();
-    (true_gains, of_taxels, masses)
+    let gains = taxels.iter().map(|taxel| gains[*taxel]).collect();
+    Solved { truth, gains, masses }
 }
 
 #[test]
 fn where_all_contacts_are_felt_their_balance_tells_gains() {
-    let (truth, found, _) = solved(12);
+    let Solved { truth, gains: found, .. } = solved(12);
     let rms = |errors: Vec<f64>| (errors.iter().map(|e| e * e).sum::<f64>() / 12.0).sqrt();
     let before = rms(truth.iter().map(|gain| gain - 1.0).collect());
     let after = rms(truth.iter().zip(&found).map(|(gain, (f, _))| f - gain).collect());
@@ -63,7 +70,7 @@ fn where_all_contacts_are_felt_their_balance_tells_gains() {
 
 #[test]
 fn where_contacts_are_unseen_nothing_is_claimed() {
-    let (_, found, masses) = solved(6);
+    let Solved { gains: found, masses, .. } = solved(6);
     for (gain, sigma) in &found {
         assert!((gain - 1.0).abs() < 0.1 && *sigma > 0.8 * GAIN_SIGMA, "{gain} {sigma}");
     }
