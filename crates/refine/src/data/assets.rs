@@ -171,8 +171,8 @@ impl<'a> Assets<'a> {
             return Ok(Arc::clone(object));
         }
         let mut object = load_object(self.dataset.models(), id, self.seed)?;
-        if let Some(deviation) = self.rig.as_ref().and_then(|rig| rig.objects.get(&id)) {
-            object = deviation.corrected(&object)?;
+        if let Some(rig) = &self.rig {
+            object = rig.corrected_object(id, &object)?.unwrap_or(object);
         }
         let object = Arc::new(object);
         self.objects.insert(id, Arc::clone(&object));

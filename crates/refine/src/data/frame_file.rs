@@ -62,8 +62,8 @@ pub fn load_frame_file(
     let name = mesh_file.display().to_string();
     let mut object = Object::with_mass(&name, mesh, layout.mass_kg, seed).map_err(|e| fault(&e))?;
     if let (Some(rig), Some(id)) = (&rig, layout.obj_id) {
-        match rig.objects.get(&id) {
-            Some(deviation) => object = deviation.corrected(&object).map_err(|e| fault(&e))?,
+        match rig.corrected_object(id, &object).map_err(|e| fault(&e))? {
+            Some(corrected) => object = corrected,
             // As of a dataset: other objects are seen by the same rig.
             None => log::info!("the rig does not know object {id}"),
         }

@@ -12,6 +12,7 @@ use super::parameters::{Play, Rig};
 use super::pass::{Pass, PlaySquares, Sums, Visit};
 use super::residuals::FrameResiduals;
 use super::settings::CalibratorSettings;
+use super::skin::{SkinEvidence, SkinReading};
 use crate::error::RefineError;
 use crate::problem::{Block, DepthField, ImageWarp, ScaledCholesky, State};
 use crate::refine;
@@ -55,6 +56,7 @@ pub struct Calibrator {
     kept: Sums,
     kept_play: PlaySquares,
     kept_disagreements: Vec<f64>,
+    kept_skin: SkinEvidence,
     /// Passes that were solved for since then.
     solved: usize,
     /// Solutions since then that the rig is the mean of; none while it is still on its way.
@@ -109,6 +111,7 @@ impl Calibrator {
             kept: Sums::default(),
             kept_play: PlaySquares::default(),
             kept_disagreements: Vec::new(),
+            kept_skin: SkinEvidence::default(),
             solved: 0,
             averaged: 0,
         })
@@ -131,6 +134,7 @@ impl Calibrator {
     pub fn visit(&self, frame: &CalibrationFrame) -> Result<Visit, RefineError> {
         let CalibrationFrame { obj_id, hand, initial, is_refined, .. } = frame;
         let has_mask = frame.observation.mask.count() > 0;
+        let read = frame.observation.hand.as_ref().map_or(&[][..], |hand| &hand.forces);
         let (observation, mut fused) = self.corrected(frame)?;
         if *is_refined {
             let stages = &mut fused.settings.stages;
@@ -147,7 +151,10 @@ impl Calibrator {
         let disagreement = information.disagreement(&self.prior, errors).ok_or_else(not_finite)?;
         let times = self.usual_disagreement.map(|usual| disagreement / usual);
         let left_out = times.filter(|times| *times > LEFT_OUT);
-        Ok(Visit { obj_id: *obj_id, information, disagreement, left_out, has_mask, t_cam_object })
+        let object = (*obj_id, &self.model(*obj_id)?.given);
+        let skin = SkinReading::new(&frame, &found.state, object, read);
+        let obj_id = *obj_id;
+        Ok(Visit { obj_id, information, disagreement, skin, left_out, has_mask, t_cam_object })
     }
 
     /// How well a frame, as the rig corrects it, fits what is said of it: [`CalibrationFrame::initial`] should be the pose that a visit has
@@ -199,7 +206,12 @@ impl Calibrator {
     fn corrected(&self, frame: &CalibrationFrame) -> Result<(Observation, Fused), RefineError> {
         let CalibrationFrame { observation, obj_id, hand, initial, .. } = frame;
         let (object, mut fused) = (self.object(*obj_id)?, self.settings.fused.clone());
+        let read = observation.hand.as_ref().map(|hand| &hand.forces);
         let mut observation = self.rig.corrected(observation)?;
+        // The skin is judged by the poses that visits find, which therefore do not depend on that judgment.
+        if let (Some(hand), Some(read)) = (&mut observation.hand, read) {
+            hand.forces.clone_from(read);
+        }
         if observation.mask.count() == 0 {
             observation.mask =
                 View::of_observation(&observation, object, hand, initial)?.likely_mask();
@@ -213,11 +225,13 @@ impl Calibrator {
     /// # Errors
     /// If there is none of that number.
     pub fn object(&self, obj_id: u32) -> Result<&Arc<Object>, RefineError> {
-        let Some(model) = self.models.get(&obj_id) else {
-            let problem = format!("is calibrated without object {obj_id}");
-            return Err(RefineError::Setting { name: "rig", problem });
-        };
-        Ok(&model.corrected)
+        Ok(&self.model(obj_id)?.corrected)
+    }
+
+    fn model(&self, obj_id: u32) -> Result<&Model, RefineError> {
+        let problem = || format!("is calibrated without object {obj_id}");
+        let model = self.models.get(&obj_id);
+        model.ok_or_else(|| RefineError::Setting { name: "rig", problem: problem() })
     }
 
     /// What `frame`, corrected, says of the rig if its state is `state`.
@@ -290,19 +304,23 @@ impl Calibrator {
         let share = 1.0 / self.averaged.max(1) as f64;
         let mut of_objects = BTreeMap::new();
         for (id, Eliminated { at_rest, by_parameters, covariance: of_object }) in &eliminated {
-            if let (Some(field), Some(model)) =
-                (self.rig.objects.get_mut(id), self.models.get_mut(id))
-            {
+            if let Some(field) = self.rig.objects.get_mut(id) {
                 let all = of_object + by_parameters * &covariance * by_parameters.transpose();
                 let of_field = (at_rest + by_parameters * &change) * share;
                 field.change(&of_field, &all);
-                model.corrected = Arc::new(field.corrected(&model.given)?);
                 of_objects.insert(*id, of_field);
             }
         }
         let change = change * share;
         self.rig = self.rig.changed(change.as_slice());
         self.rig.covariance = covariance;
+        let mut skin = self.kept_skin.clone();
+        skin.add(&pass.skin);
+        self.rig.skin = skin.solve();
+        for (id, model) in &mut self.models {
+            let corrected = self.rig.corrected_object(*id, &model.given)?;
+            model.corrected = corrected.map_or_else(|| Arc::clone(&model.given), Arc::new);
+        }
         self.kept.shift(&change, &of_objects);
         pass.sums.shift(&change, &of_objects);
         Ok(change.component_div(&deviations).amax())
@@ -312,6 +330,7 @@ impl Calibrator {
     /// linear in the rig from then on, and its memory is free.
     pub fn keep(&mut self, pass: Pass) {
         self.kept.merge(pass.sums);
+        self.kept_skin.add(&pass.skin);
         self.kept_play.merge(&pass.squares);
         self.kept_disagreements.extend(pass.disagreements);
         (self.solved, self.averaged) = (0, 0);

@@ -113,14 +113,7 @@ impl SurfaceDeviation {
     /// # Errors
     /// If its mesh cannot be used any more.
     pub fn corrected(&self, object: &Object) -> Result<Object, RefineError> {
-        let (mesh, inertial) = (self.applied(&object.mesh), object.inertial.clone());
-        let corrected = Object::new(&object.name, mesh, Some(inertial), object.seed)?;
-        Ok(Object {
-            inertial_assumed: object.inertial_assumed,
-            surface_sigma: Some(self.left),
-            stated_size: object.stated_size.clone(),
-            ..corrected
-        })
+        object.with_surface(self.applied(&object.mesh), Some(self.left))
     }
 }
 

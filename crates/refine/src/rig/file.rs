@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::deviation::SurfaceDeviation;
 use super::parameters::{Play, Rig};
+use super::skin::{SkinCalibration, SkinLayout};
 use crate::data::bop::{DatasetError, read_json, write_atomically};
 use crate::problem::{DepthField, ImageWarp, ModelErrorSettings, RADIAL};
 use crate::scene::CameraCalibrationError;
@@ -22,6 +23,9 @@ struct Layout {
     /// A row each.
     covariance: Vec<Vec<f64>>,
     objects: BTreeMap<u32, ObjectLayout>,
+    /// Older files have none.
+    #[serde(default)]
+    skin: SkinLayout,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -80,7 +84,7 @@ impl Rig {
         let field = |name: &str, problem: &dyn std::fmt::Display| {
             Err(DatasetError::field(file, name, problem))
         };
-        let Layout { image_size: [width, height], camera, hand, play, covariance, objects } =
+        let Layout { image_size: [width, height], camera, hand, play, covariance, objects, skin } =
             layout;
         if !(1..=MOST_PIXELS).contains(&width) || !(1..=MOST_PIXELS).contains(&height) {
             return field("image_size", &"no image is of that size");
@@ -119,6 +123,7 @@ impl Rig {
             },
             covariance: DMatrix::zeros(0, 0),
             objects: BTreeMap::new(),
+            skin: SkinCalibration::default(),
         };
         let n = rig.len();
         if covariance.len() != n || covariance.iter().any(|row| row.len() != n) {
@@ -151,6 +156,10 @@ impl Rig {
                 return field(&format!("objects.{id}"), &problem);
             };
             rig.objects.insert(id, deviation);
+        }
+        match skin.read() {
+            Ok(skin) => rig.skin = skin,
+            Err((name, problem)) => return field(&name, &problem),
         }
         Ok(rig)
     }
@@ -204,6 +213,7 @@ impl Rig {
             },
             covariance: self.covariance.row_iter().map(|r| r.iter().copied().collect()).collect(),
             objects: self.objects.iter().map(object).collect(),
+            skin: (&self.skin).into(),
         };
         let text = serde_json::to_string(&layout).map_err(|e| DatasetError::unusable(file, e))?;
         write_atomically(file, format!("{text}\n").as_bytes())

@@ -12,6 +12,7 @@ mod parameters;
 mod pass;
 mod residuals;
 mod settings;
+mod skin;
 
 pub use self::calibrator::{CalibrationFrame, Calibrator};
 pub use self::deviation::SurfaceDeviation;
@@ -20,3 +21,4 @@ pub use self::parameters::{Play, Rig};
 pub use self::pass::{Pass, Visit};
 pub use self::residuals::{FrameResiduals, Residuals, SensorResidual};
 pub use self::settings::CalibratorSettings;
+pub use self::skin::{ObjectMass, SkinCalibration, TaxelCalibration};

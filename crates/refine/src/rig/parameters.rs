@@ -8,10 +8,11 @@ use prehend_autodiff::lie::{cross_matrix, so3_log};
 use prehend_render::{BrownConrady, Camera, Distortion, DistortionError, Remap};
 
 use super::deviation::SurfaceDeviation;
+use super::skin::SkinCalibration;
 use crate::error::RefineError;
 use crate::factor::{Layout, PriorSettings};
 use crate::problem::{Block, ImageWarp, RADIAL, State, radial_as_camera};
-use crate::scene::{CameraCalibrationError, Observation};
+use crate::scene::{CameraCalibrationError, Object, Observation};
 
 /// Standard deviations of what changes from frame to frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,6 +48,8 @@ pub struct Rig {
     pub covariance: DMatrix<f64>,
     /// By what the surface of each object differs from its model, by the object's number.
     pub objects: BTreeMap<u32, SurfaceDeviation>,
+    /// What is wrong with the skin, and the masses that it tells.
+    pub skin: SkinCalibration,
 }
 
 /// Displacements and rotations of the hand in its own axes and in those of the camera.
@@ -74,6 +77,7 @@ impl Rig {
             play,
             covariance: DMatrix::from_diagonal(&sigmas.map(|sigma| sigma * sigma)),
             objects: BTreeMap::new(),
+            skin: SkinCalibration::default(),
         }
     }
 
@@ -182,6 +186,7 @@ impl Rig {
                 self.in_camera.rotation * mounted.rotation,
             );
             hand.joints.iter_mut().zip(&self.joints).for_each(|(q, error)| *q += error);
+            self.skin.correct(hand)?;
         }
         Ok(corrected)
     }
@@ -210,6 +215,22 @@ impl Rig {
         *depth = remap.depth(depth).map_err(failed)?;
         *mask = remap.mask(mask).map_err(failed)?;
         Ok(())
+    }
+
+    /// Object `id` with its surface displaced and its mass corrected; `None` if the rig knows nothing of it.
+    ///
+    /// # Errors
+    /// If its mesh cannot be used any more.
+    pub fn corrected_object(&self, id: u32, given: &Object) -> Result<Option<Object>, RefineError> {
+        let corrected = match self.objects.get(&id) {
+            Some(deviation) => deviation.corrected(given)?,
+            None if self.skin.masses.contains_key(&id) => {
+                given.with_surface(given.mesh.clone(), given.surface_sigma)?
+            }
+            None => return Ok(None),
+        };
+        let inertial = self.skin.inertial(id, &given.inertial);
+        Ok(Some(Object { inertial, ..corrected }))
     }
 
     /// Derivatives of what a frame says of its calibrations, a row each of hand pose (a left twist about the object's center), joints

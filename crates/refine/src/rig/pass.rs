@@ -6,12 +6,14 @@ use std::collections::btree_map::Entry;
 use nalgebra::{DMatrix, DVector, Isometry3};
 
 use super::information::{Eliminated, FrameInformation, FramePlay};
+use super::skin::SkinReading;
 
 /// What a visit has found of a frame.
 pub struct Visit {
     pub(super) obj_id: u32,
     pub(super) information: FrameInformation,
     pub(super) disagreement: f64,
+    pub(super) skin: Option<SkinReading>,
     /// By how many times more than is usual the frame disagrees with the rig, if that is so much that it is left out: its pose is wrong, or the
     /// rig was another then.
     pub left_out: Option<f64>,
@@ -30,6 +32,7 @@ pub struct Pass {
     /// By frame, those left out among them.
     pub(super) disagreements: Vec<f64>,
     pub(super) squares: PlaySquares,
+    pub(super) skin: Vec<SkinReading>,
 }
 
 /// By object: normal equations of the rig's parameters, and then of the object's coefficients.
@@ -87,7 +90,7 @@ impl PlaySquares {
 impl Pass {
     /// Adds what a frame has said, unless it is left out.
     pub fn add(&mut self, visit: Visit) {
-        let Visit { obj_id, information, disagreement, left_out, .. } = visit;
+        let Visit { obj_id, information, disagreement, left_out, skin, .. } = visit;
         self.disagreements.push(disagreement);
         if left_out.is_some() {
             return;
@@ -95,6 +98,7 @@ impl Pass {
         let FrameInformation { hessian, gradient, play } = information;
         self.sums.add(obj_id, hessian, gradient);
         self.play.push((obj_id, play));
+        self.skin.extend(skin);
     }
 
     /// Finds the squares of the frames' play if the parameters change so, and have that covariance then.

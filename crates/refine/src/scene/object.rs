@@ -105,6 +105,24 @@ impl Object {
         Self::build(name, mesh, None, mass, seed)
     }
 
+    /// The object with another surface, which is as far from `mesh` as `surface_sigma` says; its mass as it was.
+    ///
+    /// # Errors
+    /// If the mesh cannot be used.
+    pub(crate) fn with_surface(
+        &self,
+        mesh: TriMesh,
+        surface_sigma: Option<f64>,
+    ) -> Result<Self, RefineError> {
+        let object = Self::new(&self.name, mesh, Some(self.inertial.clone()), self.seed)?;
+        Ok(Self {
+            inertial_assumed: self.inertial_assumed,
+            surface_sigma,
+            stated_size: self.stated_size.clone(),
+            ..object
+        })
+    }
+
     /// Motions in object coordinates after which the object looks much the same by shape, the identity left out; found when they are first
     /// asked for, which takes about a second. None where the mesh is so broken that they cannot be found.
     pub(crate) fn near_symmetries(&self) -> &[Isometry3<f64>] {

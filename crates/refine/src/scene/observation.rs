@@ -12,8 +12,18 @@ pub struct HandMeasurement {
     pub t_cam_hand: Isometry3<f64>,
     /// Joint positions in the order of the robot's joints \[rad\].
     pub joints: Vec<f64>,
-    /// Force of the object on each taxel, in the taxel's link frame \[N\]; empty without a skin.
+    /// Force of the object on each taxel, in the taxel's link frame \[N\], or [`UNKNOWN_FORCE`](Self::UNKNOWN_FORCE); empty without a skin.
     pub forces: Vec<Vector3<f64>>,
+}
+
+impl HandMeasurement {
+    /// The force on a taxel of which nothing is known, as on a dead one: it is no evidence of anything.
+    pub const UNKNOWN_FORCE: Vector3<f64> = Vector3::new(f64::NAN, f64::NAN, f64::NAN);
+
+    /// Whether nothing is known of the force on a taxel. A force that is a number in some axes only is broken.
+    pub(crate) fn is_unknown(force: &Vector3<f64>) -> bool {
+        force.iter().all(|f| f.is_nan())
+    }
 }
 
 /// One segmented RGB-D frame, with the hand's state where it is known. All in the camera frame.

@@ -7,7 +7,7 @@ use prehend_geometry::sample::surface_samples;
 use prehend_render::{Camera, DepthImage};
 
 use crate::error::RefineError;
-use crate::scene::{Frame, Observation};
+use crate::scene::{Frame, HandMeasurement, Observation};
 
 /// Depth points that normals are estimated from, at most.
 const POINTS: usize = 2500;
@@ -49,6 +49,9 @@ impl Evidence {
             outside.extend(surface.iter().map(|s| s.point));
             for (taxel, force) in robot.taxels.iter().zip(&reading.forces) {
                 let link = posed.t_world_links()[robot.link_of(taxel)?];
+                if HandMeasurement::is_unknown(force) {
+                    continue;
+                }
                 let list =
                     if force.norm() > contact_threshold { &mut touched } else { &mut outside };
                 list.push(link * taxel.position);
@@ -207,6 +210,14 @@ mod tests {
         };
         let wrong = evidence.outside.iter().filter(|p| inside(p)).count();
         assert!(wrong * 20 < evidence.outside.len(), "{wrong}");
+        // A taxel of whose force nothing is known is in neither list.
+        let mut observation = scene.observation.clone();
+        observation.hand.as_mut().unwrap().forces.fill(HandMeasurement::UNKNOWN_FORCE);
+        let frame = Frame::new(&observation, &scene.object, Some(&scene.hand)).unwrap();
+        let unfelt = Evidence::new(&frame, 0.1).unwrap();
+        let taxels = scene.hand.taxels.len();
+        let all = evidence.outside.len() + evidence.touched.len();
+        assert_eq!((unfelt.outside.len(), unfelt.touched.len()), (all - taxels, 0));
     }
 
     #[test]

@@ -98,7 +98,7 @@ pub(super) fn model(mesh: &TriMesh, inertial: &Inertial) -> Value {
 
 /// What is wrong with a rig, as changes that bring what is said and measured to what is true: factors of focal lengths, shift of the
 /// principal point, factor of depth, what is to be added then on a grid of the image, the hand's pose in the frame of where it is said to be,
-/// joint positions to be added; and what taxels' readings have been multiplied by.
+/// joint positions to be added; what taxels' readings have been multiplied by, and what was added to them then \[N\].
 pub(super) fn rig(
     focal: [f64; 2],
     principal_px: [f64; 2],
@@ -106,7 +106,7 @@ pub(super) fn rig(
     depth_offsets: &[Vec<f64>],
     hand: &Isometry3<f64>,
     joints: &Map<String, Value>,
-    taxel_gains: &[f64],
+    (taxel_gains, taxel_offsets): (&[f64], &[[f64; 3]]),
 ) -> Value {
     json!({
         "focal_scale": focal,
@@ -117,6 +117,7 @@ pub(super) fn rig(
         "hand_t": translation_to_mm(&hand.translation),
         "joints": joints,
         "taxel_gains": taxel_gains,
+        "taxel_offsets_n": taxel_offsets,
     })
 }
 

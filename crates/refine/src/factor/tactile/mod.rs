@@ -197,6 +197,7 @@ impl Factor for TactileFactor {
 mod tests {
     use super::super::gradient_check::{assert_gradient, fixture, scene};
     use super::*;
+    use crate::scene::{HandMeasurement, Observation};
 
     #[test]
     fn gradients_match_differences() {
@@ -212,6 +213,27 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn forces_of_which_nothing_is_known_say_nothing() {
+        let scene = scene();
+        let mut observation = scene.observation.clone();
+        let taxels = TactileSettings::default();
+        let touch = TouchModel::Contacts(ContactSettings::default());
+        let contacts = TactileSettings { touch, ..taxels.clone() };
+        let probes = |observation: &Observation, settings: &TactileSettings| {
+            let frame = Frame::new(observation, &scene.object, Some(&scene.hand)).unwrap();
+            TactileFactor::new(&frame, settings).unwrap().probes.len()
+        };
+        let all = probes(&observation, &taxels);
+        fn forces(observation: &mut Observation) -> &mut [Vector3<f64>] {
+            &mut observation.hand.as_mut().unwrap().forces
+        }
+        forces(&mut observation)[7] = HandMeasurement::UNKNOWN_FORCE;
+        assert_eq!(probes(&observation, &taxels), all - 1);
+        forces(&mut observation).fill(HandMeasurement::UNKNOWN_FORCE);
+        assert_eq!([&taxels, &contacts].map(|settings| probes(&observation, settings)), [0, 0]);
     }
 
     #[test]

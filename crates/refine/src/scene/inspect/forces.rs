@@ -1,5 +1,7 @@
 //! Forces on the hand's taxels by themselves: their unit and sign, and the layout of the taxels.
 
+use nalgebra::Vector3;
+
 use super::touch::TOUCHED;
 use super::warning::{Subject, Warning};
 use crate::scene::view::median;
@@ -30,7 +32,8 @@ pub(super) fn inspect(hand: &Hand, measured: &HandMeasurement) -> (Vec<Warning>,
         return (vec![Warning::new(Subject::Touch, count, "").found(error.to_string())], false);
     }
     let mut warnings = Vec::new();
-    let broken = forces.iter().filter(|f| !f.norm().is_finite()).count();
+    let is_broken = |f: &&Vector3<f64>| !f.norm().is_finite() && !HandMeasurement::is_unknown(f);
+    let broken = forces.iter().filter(is_broken).count();
     if broken > 0 {
         let finding = format!("{broken} of {} taxel forces are no numbers", forces.len());
         warnings.push(Warning::new(Subject::Touch, broken as f64, "").found(finding));

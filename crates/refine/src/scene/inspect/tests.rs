@@ -192,6 +192,13 @@ fn forces_in_another_unit_and_of_another_sign() {
 }
 
 #[test]
+fn forces_of_which_nothing_is_known_are_no_fault() {
+    let mut scene = default_scene(1).unwrap();
+    hand(&mut scene).forces[..40].fill(HandMeasurement::UNKNOWN_FORCE);
+    assert_eq!(found(&scene, &scene.truth), []);
+}
+
+#[test]
 fn models_that_are_not_of_their_size() {
     let changed = |change: &dyn Fn(&mut StatedSize)| {
         let scene = default_scene(1).unwrap();

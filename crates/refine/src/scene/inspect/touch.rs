@@ -40,7 +40,7 @@ pub(super) fn inspect(
     let far = touched.iter().filter(|(distance, _)| *distance > CLEAR).count();
     let warning = |subject, value: f64| Warning::new(subject, value * 1e2, "cm");
     if 2 * count > hand.taxels.len() && 4 * far > count {
-        let middle = median(measured.forces.iter().map(|f| f.norm()))?;
+        let middle = median(measured.forces.iter().map(|f| f.norm()).filter(|f| f.is_finite()))?;
         return Some(
             Warning::new(Subject::Touch, middle, "N")
                 .found(format!(

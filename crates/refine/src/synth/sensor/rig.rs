@@ -15,6 +15,7 @@ use super::depth::DepthBias;
 use super::lens::Lens;
 use super::settings::SensorSettings;
 use super::touch::TaxelCondition;
+use crate::data::bop::UNITS_PER_NEWTON;
 use crate::scene::{Hand, HandMeasurement, Object, Observation};
 use crate::synth::annotation;
 use crate::synth::files::Shot;
@@ -87,6 +88,8 @@ impl<'a> Rig<'a> {
         let names = self.robot.tree.joint_names().iter().cloned();
         let joints = names.zip(hand.joints.iter().map(|error| json!(-error))).collect();
         let gains: Vec<f64> = self.taxels.iter().map(|taxel| taxel.gain).collect();
+        let felt = |taxel: &TaxelCondition| (taxel.phantom / UNITS_PER_NEWTON).into();
+        let added: Vec<[f64; 3]> = self.taxels.iter().map(felt).collect();
         let mut faults = annotation::rig(
             focal.map(|scale| 1.0 / scale),
             principal.map(|shift| -shift * camera.width as f64),
@@ -94,7 +97,7 @@ impl<'a> Rig<'a> {
             &offsets,
             &hand.pose.inverse(),
             &joints,
-            &gains,
+            (&gains, &added),
         );
         if let Some(lens) = self.lens.and_then(Lens::undeclared) {
             faults["cam_dist"] = annotation::lens(&lens);

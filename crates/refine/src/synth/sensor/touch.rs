@@ -58,7 +58,7 @@ pub(super) struct TaxelCondition {
     /// Zero for a dead one.
     pub(super) gain: f64,
     /// Felt without cause \[units\].
-    phantom: Vector3<f64>,
+    pub(super) phantom: Vector3<f64>,
 }
 
 #[cfg(test)]

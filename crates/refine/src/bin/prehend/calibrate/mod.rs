@@ -100,6 +100,9 @@ impl Calibrate {
             write_poses(out, frames.rows(&done.poses), &mut failures)?;
         }
         say(parameters(calibrator))?;
+        for [name, found] in report::skin_rows(calibrator) {
+            say(format!("{name:31} {found}"))?;
+        }
         let unobserved = frames.unobserved(&done).unwrap_or_else(|error| {
             failures.push(format!("what is unobserved: {error}"));
             Vec::new()

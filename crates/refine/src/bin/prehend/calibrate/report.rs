@@ -6,7 +6,8 @@ use std::path::PathBuf;
 use nalgebra::Isometry3;
 use prehend_refine::evaluate::report::{Report, depth_residual_picture, rig_picture};
 use prehend_refine::rig::{
-    CalibrationFrame, Calibrator, FrameResiduals, Residuals, SensorResidual, UnobservedDirection,
+    CalibrationFrame, Calibrator, FrameResiduals, ObjectMass, Residuals, SensorResidual,
+    SkinCalibration, TaxelCalibration, UnobservedDirection,
 };
 
 use super::Frames;
@@ -36,6 +37,28 @@ pub(super) fn parameter_rows(calibrator: &Calibrator) -> Vec<[String; 4]> {
         [name, number(value), number(*sigma), number(before)]
     })
     .collect()
+}
+
+/// What touch has told of the skin, name and finding each; nothing where there is none.
+pub(super) fn skin_rows(calibrator: &Calibrator) -> Vec<[String; 2]> {
+    let SkinCalibration { taxels, masses } = &calibrator.rig().skin;
+    if taxels.is_empty() {
+        return Vec::new();
+    }
+    let count = |is: fn(&TaxelCalibration) -> bool| taxels.iter().filter(|t| is(t)).count();
+    let of = |count: usize| format!("{count} of {}", taxels.len());
+    let mut rows = vec![
+        ["taxels probably dead".to_owned(), of(count(TaxelCalibration::is_dead))],
+        ["taxels that ring false".to_owned(), of(count(TaxelCalibration::rings_false))],
+        ["gains known better than before".to_owned(), of(count(TaxelCalibration::has_known_gain))],
+    ];
+    rows.extend(masses.iter().map(|(id, ObjectMass { mass, sigma })| {
+        [format!("mass of object {id}"), format!("{mass:.3} kg, deviation {sigma:.3} kg")]
+    }));
+    if masses.is_empty() {
+        rows.push(["masses told by touch".to_owned(), "none".to_owned()]);
+    }
+    rows
 }
 
 /// A direction in a line.
@@ -114,6 +137,10 @@ pub(super) fn write(
         &["parameter", "value", "standard deviation", "beforehand"],
         &parameters,
     );
+    let skin: Vec<Vec<String>> = skin_rows(&done.calibrator).into_iter().map(Vec::from).collect();
+    if !skin.is_empty() {
+        report.add_table("Skin", &["what", "found"], &skin);
+    }
     let open: Vec<Vec<String>> = unobserved.iter().map(|direction| vec![told(direction)]).collect();
     if !open.is_empty() {
         report.add_table("Hardly determined by these frames", &["direction"], &open);
