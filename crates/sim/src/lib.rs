@@ -13,6 +13,7 @@
 //! center of mass, velocities are those of the center of mass, in the world frame.
 
 mod adjoint;
+pub mod articulated;
 mod audit;
 mod batch;
 mod body;

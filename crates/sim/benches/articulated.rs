@@ -1,0 +1,78 @@
+//! Times the dynamics of an arm and of a floating base with thirty joints, one thread: `cargo bench -p prehend-sim --bench articulated`.
+//! `benches/peers/sim/articulated_pinocchio.cpp` times Pinocchio on the same trees.
+
+use std::hint::black_box;
+use std::time::Instant;
+
+use nalgebra::{DVector, Isometry3, Matrix3, Point3, Vector3};
+use prehend_sim::articulated::{Articulation, Joint, Link};
+
+/// Evaluations in a row, and how often; the fastest counts.
+const EVALUATIONS: u32 = 2000;
+const ROUNDS: usize = 15;
+
+/// Links of 1 kg, one after the other, turning about x, y and z in turn; the first may float, and then chains of six hang on it.
+fn tree(joints: usize, floats: bool) -> anyhow::Result<Articulation> {
+    let mut links = Vec::new();
+    let mut push = |joint: Joint, parent: Option<usize>| {
+        links.push(Link {
+            name: links.len().to_string(),
+            parent,
+            t_parent_joint: Isometry3::translation(0.1, 0.05, 0.2),
+            joint,
+            mass: 1.0,
+            com: Point3::new(0.02, -0.01, 0.1),
+            inertia: Matrix3::from_diagonal(&Vector3::new(0.01, 0.012, 0.008)),
+            armature: 0.0,
+        });
+        links.len() - 1
+    };
+    let axes = [Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis()];
+    let root = floats.then(|| push(Joint::Floating, None));
+    let mut parent = root;
+    for joint in 0..joints {
+        if joint % 6 == 0 && floats {
+            parent = root;
+        }
+        parent = Some(push(Joint::Revolute(axes[joint % 3]), parent));
+    }
+    Ok(Articulation::new(links, Vector3::new(0.0, 0.0, -9.81))?)
+}
+
+fn time(name: &str, mut evaluate: impl FnMut()) {
+    let mut best = f64::INFINITY;
+    for _ in 0..ROUNDS {
+        let start = Instant::now();
+        (0..EVALUATIONS).for_each(|_| evaluate());
+        best = best.min(start.elapsed().as_secs_f64() / f64::from(EVALUATIONS));
+    }
+    println!("{name:40} {:8.2} µs", best * 1e6);
+}
+
+fn main() -> anyhow::Result<()> {
+    for (name, tree) in [("7", tree(7, false)?), ("36", tree(30, true)?)] {
+        let n = tree.freedoms();
+        let vector =
+            |phase: f64| (0..n).map(|k| (k as f64 + phase).sin()).collect::<Vec<f64>>();
+        let (q, v, tau) = (tree.moved(&tree.neutral(), &vector(0.3)), vector(0.7), vector(1.1));
+        let of = |what: &str| format!("{what}, {name} degrees of freedom");
+        time(&of("inverse dynamics"), || {
+            black_box(tree.kinematics(black_box(&q), &v).inverse_dynamics(&tau));
+        });
+        time(&of("forward dynamics"), || {
+            black_box(tree.kinematics(black_box(&q), &v).forward_dynamics(&tau));
+        });
+        time(&of("mass matrix"), || {
+            black_box(tree.kinematics(black_box(&q), &v).mass_matrix());
+        });
+        time(&of("derivatives of inverse dynamics"), || {
+            black_box(tree.kinematics(black_box(&q), &v).inverse_dynamics_derivatives(&tau));
+        });
+        time(&of("derivatives of forward dynamics"), || {
+            let at = tree.kinematics(black_box(&q), &v);
+            let accelerations: DVector<f64> = at.forward_dynamics(&tau);
+            black_box(at.forward_dynamics_derivatives(&accelerations));
+        });
+    }
+    Ok(())
+}

@@ -1,0 +1,157 @@
+//! Derivatives of the dynamics, in closed form.
+
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, Vector3, Vector6};
+
+use super::kinematics::Kinematics;
+use super::spatial::{SpatialInertia, angular, cross_force, cross_motion, linear};
+
+/// Derivatives of efforts τ: by displacements along unit velocities, and by velocities.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DynamicsDerivatives {
+    /// By positions: column k is the change of τ while coordinates [move](super::Articulation::moved) with the unit velocity k.
+    pub by_position: DMatrix<f64>,
+    /// By velocities.
+    pub by_velocity: DMatrix<f64>,
+}
+
+/// Derivatives of accelerations v̇.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ForwardDerivatives {
+    /// By positions, as in [`DynamicsDerivatives`].
+    pub by_position: DMatrix<f64>,
+    /// By velocities.
+    pub by_velocity: DMatrix<f64>,
+    /// By efforts: the inverse of the mass matrix.
+    pub by_effort: DMatrix<f64>,
+}
+
+impl Kinematics<'_> {
+    /// Derivatives of [inverse dynamics](Self::inverse_dynamics) at accelerations v̇; by these themselves they are the
+    /// [mass matrix](Self::mass_matrix).
+    ///
+    /// Singh, Russell and Wensing, Efficient Analytical Derivatives of Rigid-Body Dynamics using Spatial Vector Algebra, 2022.
+    ///
+    /// # Panics
+    /// If there is not one acceleration for each degree of freedom.
+    pub fn inverse_dynamics_derivatives(&self, accelerations: &[f64]) -> DynamicsDerivatives {
+        let effort = self.effort(accelerations);
+        let (n, links) = (self.axes.len(), self.tree.links());
+        // How axes change: with their parent's motion, and with their own link's.
+        let mut with_parent = Vec::with_capacity(n);
+        let mut twice = Vec::with_capacity(n);
+        let mut with_both = Vec::with_capacity(n);
+        for (freedom, axis) in self.axes.iter().enumerate() {
+            let link = self.tree.link_of(freedom);
+            let (velocity, acceleration) = match links[link].parent {
+                Some(parent) => (self.velocities[parent], effort.accelerations[parent]),
+                None => (Vector6::zeros(), self.rest()),
+            };
+            let change = cross_motion(&velocity, axis);
+            with_parent.push(change);
+            twice.push(cross_motion(&acceleration, axis) + cross_motion(&velocity, &change));
+            with_both.push(change + cross_motion(&self.velocities[link], axis));
+        }
+        let composites = self.composites();
+        let own = self.velocities.iter().zip(&self.inertias);
+        let mut rates: Vec<Matrix6<f64>> = own.map(|(v, inertia)| rate(v, inertia)).collect();
+        let mut by_position = DMatrix::zeros(n, n);
+        let mut by_velocity = DMatrix::zeros(n, n);
+        for (index, link) in links.iter().enumerate().rev() {
+            let (composite, rate) = (&composites[index], rates[index]);
+            let [_, freedoms] = self.tree.range(index);
+            for freedom in freedoms {
+                let axis = &self.axes[freedom];
+                let moved = rate * with_parent[freedom]
+                    + composite.times(&twice[freedom])
+                    + cross_force(axis, &effort.forces[index]);
+                let pushed = rate * axis + composite.times(&with_both[freedom]);
+                let (by_rate, by_inertia) = (rate.tr_mul(axis), composite.times(axis));
+                let mut ancestor = Some(index);
+                while let Some(of) = ancestor {
+                    let [_, others] = self.tree.range(of);
+                    for other in others {
+                        by_position[(freedom, other)] =
+                            by_rate.dot(&with_parent[other]) + by_inertia.dot(&twice[other]);
+                        by_velocity[(freedom, other)] =
+                            by_rate.dot(&self.axes[other]) + by_inertia.dot(&with_both[other]);
+                        if of != index {
+                            by_position[(other, freedom)] = self.axes[other].dot(&moved);
+                            by_velocity[(other, freedom)] = self.axes[other].dot(&pushed);
+                        }
+                    }
+                    ancestor = links[of].parent;
+                }
+            }
+            if let Some(parent) = link.parent {
+                rates[parent] += rate;
+            }
+        }
+        DynamicsDerivatives { by_position, by_velocity }
+    }
+
+    /// Derivatives of [forward dynamics](Self::forward_dynamics), whose result is `accelerations`: those of inverse dynamics there,
+    /// by the inverse of the mass matrix. `None` if that is singular.
+    ///
+    /// # Panics
+    /// If there is not one acceleration for each degree of freedom.
+    pub fn forward_dynamics_derivatives(
+        &self,
+        accelerations: &DVector<f64>,
+    ) -> Option<ForwardDerivatives> {
+        let DynamicsDerivatives { by_position, by_velocity } =
+            self.inverse_dynamics_derivatives(accelerations.as_slice());
+        let by_effort = self.mass_matrix().cholesky()?.inverse();
+        Some(ForwardDerivatives {
+            by_position: -(&by_effort * by_position),
+            by_velocity: -(&by_effort * by_velocity),
+            by_effort,
+        })
+    }
+}
+
+/// The matrix B of m ↦ v ×* (I m) − I (v × m) + m ×* (I v): how a body of inertia I that moves with v resists to a change of motion.
+fn rate(v: &Vector6<f64>, inertia: &SpatialInertia<f64>) -> Matrix6<f64> {
+    let momentum = inertia.times(v);
+    let (force, torque) = (linear(&momentum), angular(&momentum));
+    let spin = angular(v);
+    // The inertia's own rate is that of a body about a moving point.
+    let moment = inertia.moment;
+    let moment_rate = linear(v) * inertia.mass + spin.cross(&moment);
+    let turned = cross(&spin) * inertia.inertia;
+    // −(v c̄ + c̄ v), c̄ the first moment.
+    let velocity = linear(v);
+    let carried = cross(&velocity) * cross(&moment);
+    let inertia_rate = turned + turned.transpose() - carried - carried.transpose();
+    let mut matrix = Matrix6::zeros();
+    let change = cross(&moment_rate);
+    let pull = cross(&force);
+    matrix.fixed_view_mut::<3, 3>(0, 3).copy_from(&(-change - pull));
+    matrix.fixed_view_mut::<3, 3>(3, 0).copy_from(&(change - pull));
+    matrix.fixed_view_mut::<3, 3>(3, 3).copy_from(&(inertia_rate - cross(&torque)));
+    matrix
+}
+
+fn cross(v: &Vector3<f64>) -> Matrix3<f64> {
+    v.cross_matrix()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_rate_is_that_of_its_definition() {
+        let com = Vector3::new(0.1, -0.2, 0.3);
+        let at_com = Matrix3::new(2.0, 0.1, 0.2, 0.1, 3.0, -0.1, 0.2, -0.1, 4.0);
+        let inertia = SpatialInertia::new(1.5, &com, &at_com);
+        let v = Vector6::new(1.0, 2.0, -1.0, 0.5, -0.4, 0.3);
+        let matrix = rate(&v, &inertia);
+        for k in 0..6 {
+            let m = Vector6::ith(k, 1.0);
+            let expected = cross_force(&v, &inertia.times(&m))
+                - inertia.times(&cross_motion(&v, &m))
+                + cross_force(&m, &inertia.times(&v));
+            assert!((matrix * m - expected).amax() < 1e-13, "{k}");
+        }
+    }
+}

@@ -1,0 +1,69 @@
+//! Recursive Newton–Euler.
+
+use nalgebra::{DVector, Vector3, Vector6};
+use prehend_autodiff::Scalar;
+
+use super::kinematics::Kinematics;
+use super::spatial::{cross_force, cross_motion, spatial};
+
+/// Motion and force of all links at some accelerations.
+pub(super) struct Effort<S: Scalar> {
+    /// Spatial acceleration of each link, less that of free fall.
+    pub(super) accelerations: Vec<Vector6<S>>,
+    /// What moves each link and all that hangs on it.
+    pub(super) forces: Vec<Vector6<S>>,
+}
+
+impl<S: Scalar> Kinematics<'_, S> {
+    /// Efforts τ \[N m or N\] of the joints at accelerations v̇.
+    ///
+    /// # Panics
+    /// If there is not one for each degree of freedom.
+    pub fn inverse_dynamics(&self, accelerations: &[S]) -> DVector<S> {
+        let effort = self.effort(accelerations);
+        let tau = |freedom: usize| {
+            let link = self.tree.link_of(freedom);
+            let armature = self.tree.links()[link].armature;
+            self.axes[freedom].dot(&effort.forces[link]) + armature * accelerations[freedom]
+        };
+        DVector::from_fn(self.axes.len(), |freedom, _| tau(freedom))
+    }
+
+    pub(super) fn effort(&self, accelerations: &[S]) -> Effort<S> {
+        assert_eq!(accelerations.len(), self.axes.len(), "one number a degree of freedom");
+        let links = self.tree.links();
+        let mut effort = Effort {
+            accelerations: Vec::with_capacity(links.len()),
+            forces: Vec::with_capacity(links.len()),
+        };
+        for (index, link) in links.iter().enumerate() {
+            let velocity = &self.velocities[index];
+            let mut acceleration = match link.parent {
+                Some(parent) => effort.accelerations[parent],
+                None => self.rest(),
+            };
+            acceleration += cross_motion(velocity, &self.joint_velocities[index]);
+            let [_, freedoms] = self.tree.range(index);
+            for freedom in freedoms {
+                acceleration += self.axes[freedom] * accelerations[freedom];
+            }
+            let inertia = &self.inertias[index];
+            let force =
+                inertia.times(&acceleration) + cross_force(velocity, &inertia.times(velocity));
+            effort.accelerations.push(acceleration);
+            effort.forces.push(force);
+        }
+        for (index, link) in links.iter().enumerate().rev() {
+            if let Some(parent) = link.parent {
+                let force = effort.forces[index];
+                effort.forces[parent] += force;
+            }
+        }
+        effort
+    }
+
+    /// Acceleration of the world, less that of free fall.
+    pub(super) fn rest(&self) -> Vector6<S> {
+        spatial(&self.tree.gravity().map(|g| S::constant(-g)), &Vector3::zeros())
+    }
+}

@@ -1,0 +1,144 @@
+//! How a link may move with respect to its parent.
+
+use nalgebra::{Matrix3, Quaternion, Unit, UnitQuaternion, Vector3, Vector6};
+use prehend_autodiff::Scalar;
+
+use super::spatial::spatial;
+
+/// A joint of a link, in the joint's frame: where the link is, by coordinates q, and how it moves, by velocities v.
+///
+/// | | q | v |
+/// |---|---|---|
+/// | fixed | none | none |
+/// | revolute | angle \[rad\] | \[rad/s\] |
+/// | prismatic | displacement \[m\] | \[m/s\] |
+/// | spherical | quaternion (i, j, k, w) | angular velocity, link's axes \[rad/s\] |
+/// | floating | position \[m\], quaternion (i, j, k, w) | velocity of the link's origin \[m/s\] and angular velocity \[rad/s\], link's axes |
+///
+/// Quaternions are normalized where they are read.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Joint {
+    /// Not at all.
+    Fixed,
+    /// Turning about an axis.
+    Revolute(Unit<Vector3<f64>>),
+    /// Sliding along an axis.
+    Prismatic(Unit<Vector3<f64>>),
+    /// Turning about a point.
+    Spherical,
+    /// Moving freely.
+    Floating,
+}
+
+impl Joint {
+    /// Number of coordinates.
+    pub fn coordinates(&self) -> usize {
+        match self {
+            Self::Fixed => 0,
+            Self::Revolute(_) | Self::Prismatic(_) => 1,
+            Self::Spherical => 4,
+            Self::Floating => 7,
+        }
+    }
+
+    /// Number of degrees of freedom.
+    pub fn freedoms(&self) -> usize {
+        match self {
+            Self::Fixed => 0,
+            Self::Revolute(_) | Self::Prismatic(_) => 1,
+            Self::Spherical => 3,
+            Self::Floating => 6,
+        }
+    }
+
+    /// The coordinates at which link and joint frame coincide.
+    pub fn neutral(&self) -> &'static [f64] {
+        match self {
+            Self::Fixed => &[],
+            Self::Revolute(_) | Self::Prismatic(_) => &[0.0],
+            Self::Spherical => &[0.0, 0.0, 0.0, 1.0],
+            Self::Floating => &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
+        }
+    }
+
+    /// Rotation and place of the link in the joint's frame.
+    #[inline]
+    pub(super) fn placement<S: Scalar>(&self, q: &[S]) -> (Option<Matrix3<S>>, Option<Vector3<S>>) {
+        match self {
+            Self::Fixed => (None, None),
+            Self::Revolute(axis) => (Some(turn(axis, q[0])), None),
+            Self::Prismatic(axis) => (None, Some(axis.map(|a| q[0].times(a)))),
+            Self::Spherical => (Some(rotation(q)), None),
+            Self::Floating => (Some(rotation(&q[3..])), Some(Vector3::new(q[0], q[1], q[2]))),
+        }
+    }
+
+    /// The motions of unit velocities, in the frame of the link, at its origin: constant.
+    #[inline]
+    pub(super) fn axis(&self, freedom: usize) -> Vector6<f64> {
+        match self {
+            Self::Fixed => Vector6::zeros(),
+            Self::Revolute(axis) => spatial(&Vector3::zeros(), axis),
+            Self::Prismatic(axis) => spatial(axis, &Vector3::zeros()),
+            Self::Spherical => Vector6::ith(3 + freedom, 1.0),
+            Self::Floating => Vector6::ith(freedom, 1.0),
+        }
+    }
+
+    /// Coordinates after moving on by `step`, velocities times a time.
+    pub(super) fn moved<S: Scalar>(&self, q: &[S], step: &[S], after: &mut Vec<S>) {
+        match self {
+            Self::Fixed => {}
+            Self::Revolute(_) | Self::Prismatic(_) => after.push(q[0] + step[0]),
+            Self::Spherical => push(&(quaternion(q) * exponential(step)), after),
+            Self::Floating => {
+                let turned = quaternion(&q[3..]);
+                let twist = nalgebra::Vector6::from_column_slice(step);
+                let moved = prehend_autodiff::lie::se3_exp(&twist);
+                let place = Vector3::new(q[0], q[1], q[2]) + turned * moved.translation.vector;
+                after.extend(place.iter());
+                push(&(turned * moved.rotation), after);
+            }
+        }
+    }
+}
+
+fn exponential<S: Scalar>(step: &[S]) -> UnitQuaternion<S> {
+    prehend_autodiff::lie::so3_exp(&Vector3::new(step[0], step[1], step[2]))
+}
+
+fn push<S: Scalar>(rotation: &UnitQuaternion<S>, coordinates: &mut Vec<S>) {
+    coordinates.extend(rotation.coords.iter());
+}
+
+/// Of the first four of `q`.
+#[inline]
+fn quaternion<S: Scalar>(q: &[S]) -> UnitQuaternion<S> {
+    Unit::new_normalize(Quaternion::new(q[3], q[0], q[1], q[2]))
+}
+
+#[inline]
+fn rotation<S: Scalar>(q: &[S]) -> Matrix3<S> {
+    quaternion(q).to_rotation_matrix().into_inner()
+}
+
+/// The rotation by `angle` about `axis` (Rodrigues).
+#[inline]
+fn turn<S: Scalar>(axis: &Vector3<f64>, angle: S) -> Matrix3<S> {
+    let (sin, cos) = angle.sin_cos();
+    let versine = S::one() - cos;
+    let [x, y, z] = [axis.x, axis.y, axis.z];
+    let entry = |i: f64, j: f64, k: f64| versine.times(i * j) + sin.times(k);
+    let diagonal = |i: f64| versine.times(i * i) + cos;
+    Matrix3::new(
+        diagonal(x),
+        entry(x, y, -z),
+        entry(x, z, y),
+        entry(x, y, z),
+        diagonal(y),
+        entry(y, z, -x),
+        entry(x, z, -y),
+        entry(y, z, x),
+        diagonal(z),
+    )
+}

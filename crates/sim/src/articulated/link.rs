@@ -1,0 +1,191 @@
+//! A tree of links.
+
+use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
+use prehend_autodiff::Scalar;
+use prehend_autodiff::lie::lift;
+
+use super::joint::Joint;
+use super::kinematics::Kinematics;
+use crate::body::RigidBody;
+
+/// A link and the joint that it hangs on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Link<S: Scalar = f64> {
+    /// What it is called.
+    pub name: String,
+    /// The link that it hangs on; none is the world.
+    pub parent: Option<usize>,
+    /// Joint frame → parent link's frame.
+    pub t_parent_joint: Isometry3<S>,
+    /// How the link moves in the joint's frame.
+    pub joint: Joint,
+    /// Mass \[kg\].
+    pub mass: S,
+    /// Center of mass, in the link's frame \[m\].
+    pub com: Point3<S>,
+    /// Inertia about the center of mass, along the link's axes \[kg m²\].
+    pub inertia: Matrix3<S>,
+    /// Inertia of what turns with the joint behind gears, for each degree of freedom \[kg m² or kg\].
+    pub armature: S,
+}
+
+impl<S: Scalar> Link<S> {
+    /// Without armature, of `body` in the link's frame.
+    pub fn new(
+        name: impl Into<String>,
+        parent: Option<usize>,
+        t_parent_joint: Isometry3<S>,
+        joint: Joint,
+        body: &RigidBody<S>,
+    ) -> Self {
+        let (mass, com, inertia) = (body.mass(), *body.com(), *body.inertia());
+        let name = name.into();
+        Self { name, parent, t_parent_joint, joint, mass, com, inertia, armature: S::zero() }
+    }
+
+    /// With `armature` \[kg m² or kg\].
+    pub fn with_armature(self, armature: S) -> Self {
+        Self { armature, ..self }
+    }
+}
+
+/// Links and joints that form trees, rooted in the world.
+#[derive(Clone, Debug)]
+pub struct Articulation<S: Scalar = f64> {
+    links: Vec<Link<S>>,
+    /// Of each link: the first coordinate and the first degree of freedom of its joint, and last how many there are.
+    first: Vec<[usize; 2]>,
+    /// Of each degree of freedom: the link that it moves.
+    link_of: Vec<usize>,
+    /// Acceleration of free fall \[m/s²\].
+    gravity: Vector3<f64>,
+}
+
+/// Why links make no tree.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ArticulationError {
+    /// A parent that comes later.
+    #[error("link {link}: its parent is no link before it")]
+    Parent {
+        /// The link.
+        link: String,
+    },
+    /// A link that could be accelerated without effort.
+    #[error("link {link}: {problem}")]
+    Mass {
+        /// The link.
+        link: String,
+        /// What is wrong.
+        problem: &'static str,
+    },
+}
+
+impl<S: Scalar> Articulation<S> {
+    /// Of `links`, each after its parent, that fall with `gravity` \[m/s²\].
+    ///
+    /// # Errors
+    /// If a parent does not come before its link, or a number is not finite or a mass negative.
+    pub fn new(links: Vec<Link<S>>, gravity: Vector3<f64>) -> Result<Self, ArticulationError> {
+        let (mut first, mut link_of) = (Vec::with_capacity(links.len() + 1), Vec::new());
+        let mut next = [0, 0];
+        for (index, link) in links.iter().enumerate() {
+            if link.parent.is_some_and(|parent| parent >= index) {
+                return Err(ArticulationError::Parent { link: link.name.clone() });
+            }
+            let mass = link.mass.value();
+            let wrong = |problem| ArticulationError::Mass { link: link.name.clone(), problem };
+            if !(mass >= 0.0 && link.armature.value() >= 0.0) {
+                return Err(wrong("mass and armature may not be negative"));
+            }
+            let numbers = link.inertia.iter().chain(link.com.iter()).map(|x| x.value());
+            if !numbers.chain([mass, link.armature.value()]).all(f64::is_finite) {
+                return Err(wrong("mass, center of mass or inertia is not finite"));
+            }
+            first.push(next);
+            next = [next[0] + link.joint.coordinates(), next[1] + link.joint.freedoms()];
+            link_of.resize(next[1], index);
+        }
+        first.push(next);
+        Ok(Self { links, first, link_of, gravity })
+    }
+
+    /// The links, each after its parent.
+    pub fn links(&self) -> &[Link<S>] {
+        &self.links
+    }
+
+    /// Acceleration of free fall \[m/s²\].
+    pub fn gravity(&self) -> &Vector3<f64> {
+        &self.gravity
+    }
+
+    /// Number of coordinates q.
+    pub fn coordinates(&self) -> usize {
+        self.first[self.links.len()][0]
+    }
+
+    /// Number of degrees of freedom, and so of velocities v and efforts τ.
+    pub fn freedoms(&self) -> usize {
+        self.link_of.len()
+    }
+
+    /// Where the coordinates and the degrees of freedom of the joint of `link` are.
+    pub fn range(&self, link: usize) -> [std::ops::Range<usize>; 2] {
+        [0, 1].map(|k| self.first[link][k]..self.first[link + 1][k])
+    }
+
+    /// The link that a degree of freedom moves.
+    pub(super) fn link_of(&self, freedom: usize) -> usize {
+        self.link_of[freedom]
+    }
+
+    /// The coordinates at which all links are in their joints' frames.
+    pub fn neutral(&self) -> Vec<f64> {
+        self.links.iter().flat_map(|link| link.joint.neutral()).copied().collect()
+    }
+
+    /// `q` after moving on by `step`: velocities times a time.
+    ///
+    /// # Panics
+    /// If there are not as many coordinates and velocities as there should be.
+    pub fn moved(&self, q: &[S], step: &[S]) -> Vec<S> {
+        self.check(q, step);
+        let mut after = Vec::with_capacity(q.len());
+        for (link, ranges) in self.links.iter().zip(self.first.windows(2)) {
+            let [from, to] = [ranges[0], ranges[1]];
+            link.joint.moved(&q[from[0]..to[0]], &step[from[1]..to[1]], &mut after);
+        }
+        after
+    }
+
+    /// Where the links are at coordinates `q`, and how they move with velocities `v`.
+    ///
+    /// # Panics
+    /// If there are not as many as there should be.
+    pub fn kinematics(&self, q: &[S], v: &[S]) -> Kinematics<'_, S> {
+        Kinematics::new(self, q, v)
+    }
+
+    pub(super) fn check(&self, q: &[S], v: &[S]) {
+        assert_eq!(q.len(), self.coordinates(), "one number a coordinate");
+        assert_eq!(v.len(), self.freedoms(), "one number a degree of freedom");
+    }
+}
+
+impl Articulation {
+    /// The same in numbers that may carry derivatives.
+    pub fn lift<S: Scalar>(&self) -> Articulation<S> {
+        let links = self.links.iter().map(|link| Link {
+            name: link.name.clone(),
+            parent: link.parent,
+            t_parent_joint: lift(&link.t_parent_joint),
+            joint: link.joint,
+            mass: S::constant(link.mass),
+            com: link.com.map(S::constant),
+            inertia: link.inertia.map(S::constant),
+            armature: S::constant(link.armature),
+        });
+        let (first, link_of) = (self.first.clone(), self.link_of.clone());
+        Articulation { links: links.collect(), first, link_of, gravity: self.gravity }
+    }
+}
