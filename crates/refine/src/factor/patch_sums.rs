@@ -90,7 +90,10 @@ pub(super) fn add_to(
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use super::*;
+    use crate::problem::{DepthField, ImageWarp, RADIAL};
 
     #[test]
     fn a_patch_moves_what_it_shows_as_the_object_does() {
@@ -121,5 +124,33 @@ mod tests {
         let (gradient, hessian) = sums.equations();
         assert!((gradient - pull).amax() < 1e-12);
         assert!((hessian - expected).amax() < 1e-12);
+    }
+
+    /// Derivatives by distortion come after all patches of the equations, whether or not the factor knows of them.
+    #[test]
+    fn distortion_comes_after_the_patches() {
+        let row = SVector::<f64, 12>::from_fn(|k, _| (k as f64 + 1.0).sin());
+        let center = Vector2::new(0.2, -0.1);
+        let warp = Arc::new(ImageWarp { depth: DepthField::new(640, 480, 4) });
+        for patches in [0, 2] {
+            let mut sums = PatchSums::<12>::new(patches);
+            let (gradient, hessian) = sums.of((patches > 0).then_some(1));
+            *gradient += row;
+            *hessian += row * row.transpose();
+            let blocks = [Block::ObjectPose, Block::Camera];
+            let mut equations =
+                NormalEquations::with_auxiliary(&blocks, 6).with_image_warp(Arc::clone(&warp));
+            sums.add_to(&center, &mut equations);
+            let mut expected = DVector::zeros(12 + 6 + warp.len());
+            expected.rows_mut(0, 12).copy_from(&row);
+            if patches > 0 {
+                expected.rows_mut(15, 3).copy_from(&row.fixed_rows::<3>(0));
+            }
+            let radial = radial_as_camera(&center).tr_mul(&row.fixed_rows::<6>(6));
+            expected.rows_mut(18, RADIAL).copy_from(&radial);
+            assert!((equations.gradient() - &expected).amax() < 1e-12, "{patches}");
+            let of_all = &expected * expected.transpose();
+            assert!((equations.hessian() - of_all).amax() < 1e-12, "{patches}");
+        }
     }
 }

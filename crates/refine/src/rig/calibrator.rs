@@ -140,6 +140,7 @@ impl Calibrator {
             let stages = &mut fused.settings.stages;
             stages.drain(..stages.len().saturating_sub(1));
             fused.settings.restart_angle = 0.0;
+            fused.settings.search_unfit = false;
         }
         let frame =
             Frame::new(&observation, self.object(*obj_id)?, Some(hand))?.with_rig(&self.rig);
@@ -157,7 +158,7 @@ impl Calibrator {
         Ok(Visit { obj_id, information, disagreement, skin, left_out, has_mask, t_cam_object })
     }
 
-    /// How well a frame, as the rig corrects it, fits what is said of it: [`CalibrationFrame::initial`] should be the pose that a visit has
+    /// How well a frame, as the rig corrects all but what its skin feels, fits what is said of it: [`CalibrationFrame::initial`] should be the pose that a visit has
     /// found.
     ///
     /// # Errors
@@ -206,12 +207,8 @@ impl Calibrator {
     fn corrected(&self, frame: &CalibrationFrame) -> Result<(Observation, Fused), RefineError> {
         let CalibrationFrame { observation, obj_id, hand, initial, .. } = frame;
         let (object, mut fused) = (self.object(*obj_id)?, self.settings.fused.clone());
-        let read = observation.hand.as_ref().map(|hand| &hand.forces);
-        let mut observation = self.rig.corrected(observation)?;
         // The skin is judged by the poses that visits find, which therefore do not depend on that judgment.
-        if let (Some(hand), Some(read)) = (&mut observation.hand, read) {
-            hand.forces.clone_from(read);
-        }
+        let mut observation = self.rig.corrected_geometry(observation)?;
         if observation.mask.count() == 0 {
             observation.mask =
                 View::of_observation(&observation, object, hand, initial)?.likely_mask();
@@ -304,10 +301,13 @@ impl Calibrator {
         let share = 1.0 / self.averaged.max(1) as f64;
         let mut of_objects = BTreeMap::new();
         for (id, Eliminated { at_rest, by_parameters, covariance: of_object }) in &eliminated {
-            if let Some(field) = self.rig.objects.get_mut(id) {
+            if let (Some(field), Some(model)) =
+                (self.rig.objects.get_mut(id), self.models.get_mut(id))
+            {
                 let all = of_object + by_parameters * &covariance * by_parameters.transpose();
                 let of_field = (at_rest + by_parameters * &change) * share;
                 field.change(&of_field, &all);
+                model.corrected = Arc::new(field.corrected(&model.given)?);
                 of_objects.insert(*id, of_field);
             }
         }
@@ -317,10 +317,6 @@ impl Calibrator {
         let mut skin = self.kept_skin.clone();
         skin.add(&pass.skin);
         self.rig.skin = skin.solve();
-        for (id, model) in &mut self.models {
-            let corrected = self.rig.corrected_object(*id, &model.given)?;
-            model.corrected = corrected.map_or_else(|| Arc::clone(&model.given), Arc::new);
-        }
         self.kept.shift(&change, &of_objects);
         pass.sums.shift(&change, &of_objects);
         Ok(change.component_div(&deviations).amax())

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::Arc;
 
 use nalgebra::{DMatrix, Isometry3, Matrix3xX, Point3, UnitQuaternion, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
@@ -23,8 +24,6 @@ struct Layout {
     /// A row each.
     covariance: Vec<Vec<f64>>,
     objects: BTreeMap<u32, ObjectLayout>,
-    /// Older files have none.
-    #[serde(default)]
     skin: SkinLayout,
 }
 
@@ -112,6 +111,7 @@ impl Rig {
             },
             distortion: camera.distortion,
             warp: warp.into(),
+            remaps: Arc::default(),
             depth_offsets: camera.depth_offsets_m,
             in_hand: (&hand.in_hand).into(),
             in_camera: (&hand.in_camera).into(),
@@ -170,8 +170,14 @@ impl Rig {
     /// If it cannot be written, or is not finite.
     pub fn save(&self, file: &Path) -> Result<(), DatasetError> {
         let coefficients = self.objects.values().flat_map(|object| object.coefficients.iter());
-        if !self.values().iter().chain(&self.covariance).chain(coefficients).all(|v| v.is_finite())
-        {
+        let numbers = self
+            .values()
+            .iter()
+            .chain(&self.covariance)
+            .chain(coefficients)
+            .copied()
+            .collect::<Vec<_>>();
+        if !numbers.into_iter().chain(self.skin.numbers()).all(f64::is_finite) {
             return Err(DatasetError::unusable(file, "the rig is not finite, and was not written"));
         }
         let object = |(id, deviation): (&u32, &SurfaceDeviation)| {

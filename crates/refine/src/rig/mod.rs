@@ -4,6 +4,7 @@
 //! by it, and says how well they are known then ([`Frame::with_rig`](crate::Frame::with_rig)).
 
 mod calibrator;
+mod correction;
 mod deviation;
 mod file;
 mod information;

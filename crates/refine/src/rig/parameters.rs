@@ -5,14 +5,15 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, UnitQuaternion, Vector3};
 use prehend_autodiff::lie::{cross_matrix, so3_log};
-use prehend_render::{BrownConrady, Camera, Distortion, DistortionError, Remap};
+use prehend_render::Camera;
 
 use super::deviation::SurfaceDeviation;
 use super::skin::SkinCalibration;
+use crate::data::bop::RemapCache;
 use crate::error::RefineError;
 use crate::factor::{Layout, PriorSettings};
 use crate::problem::{Block, ImageWarp, RADIAL, State, radial_as_camera};
-use crate::scene::{CameraCalibrationError, Object, Observation};
+use crate::scene::CameraCalibrationError;
 
 /// Standard deviations of what changes from frame to frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,6 +34,8 @@ pub struct Rig {
     /// k1 and k2 of the radial distortion (Brown and Conrady) that the corrected camera has beside that which is said of its lens.
     pub distortion: [f64; RADIAL],
     pub(super) warp: Arc<ImageWarp>,
+    /// What undistorts images, kept for the last camera.
+    pub(super) remaps: Arc<RemapCache>,
     /// By what depth is off beside scale and bias: coefficients of a smooth field over the image, to be added \[m\].
     pub(super) depth_offsets: Vec<f64>,
     /// The hand's pose in the frame of where it is said to be, as if it were mounted so.
@@ -55,9 +58,6 @@ pub struct Rig {
 /// Displacements and rotations of the hand in its own axes and in those of the camera.
 const POSES: usize = 12;
 
-/// Images of a lens that moves no corner by more are taken as they are \[px\].
-const STRAIGHT: f64 = 0.05;
-
 impl Rig {
     /// With everything as it is said to be, of a hand of so many joints and a field of depth; `sigmas` are the parameters' standard deviations.
     pub(super) fn nominal(
@@ -71,6 +71,7 @@ impl Rig {
             distortion: [0.0; RADIAL],
             depth_offsets: vec![0.0; warp.depth.len()],
             warp: Arc::new(warp),
+            remaps: Arc::default(),
             in_hand: Isometry3::identity(),
             in_camera: Isometry3::identity(),
             joints: vec![0.0; joints],
@@ -152,85 +153,6 @@ impl Rig {
             depth_offsets: sum(&self.depth_offsets, offsets),
             ..self.clone()
         }
-    }
-
-    /// What a frame of this rig would have shown and said without its errors.
-    ///
-    /// # Errors
-    /// If images are of another size, or the hand has another number of joints.
-    pub fn corrected(&self, observation: &Observation) -> Result<Observation, RefineError> {
-        let mut corrected = observation.clone();
-        let (camera, error) = (&mut corrected.camera, &self.camera);
-        let (size, expected) = ([camera.width, camera.height], self.warp.depth.size());
-        if size != expected {
-            let problem = format!("is of images of {expected:?} pixels, not of {size:?}");
-            return Err(RefineError::Setting { name: "rig", problem });
-        }
-        *camera = error.corrected(camera);
-        for (i, z) in corrected.depth.pixels_mut().iter_mut().enumerate() {
-            if *z > 0.0 {
-                let (x, y) = ((i % size[0]) as f64, (i / size[0]) as f64);
-                let offset = error.depth_bias + self.warp.depth.at(&self.depth_offsets, x, y);
-                *z = (error.depth_scale * f64::from(*z) + offset) as f32;
-            }
-        }
-        self.undistort(&mut corrected)?;
-        if let Some(hand) = &mut corrected.hand {
-            let (given, expected) = (hand.joints.len(), self.joints.len());
-            if given != expected {
-                return Err(of_other_joints(given, expected));
-            }
-            let mounted = hand.t_cam_hand * self.in_hand;
-            hand.t_cam_hand = Isometry3::from_parts(
-                (mounted.translation.vector + self.in_camera.translation.vector).into(),
-                self.in_camera.rotation * mounted.rotation,
-            );
-            hand.joints.iter_mut().zip(&self.joints).for_each(|(q, error)| *q += error);
-            self.skin.correct(hand)?;
-        }
-        Ok(corrected)
-    }
-
-    /// Makes the images of a camera, corrected, those of a pinhole.
-    fn undistort(&self, observation: &mut Observation) -> Result<(), RefineError> {
-        let lens = BrownConrady {
-            radial: [self.distortion[0], self.distortion[1], 0.0, 0.0, 0.0, 0.0],
-            tangential: [0.0; 2],
-        };
-        let Observation { camera, color, depth, mask, .. } = observation;
-        let (right, below) = ((camera.width - 1) as f64, (camera.height - 1) as f64);
-        let moved = [(0.0, 0.0), (right, 0.0), (0.0, below), (right, below)].map(|(x, y)| {
-            let ray = camera.ray(x, y).xy();
-            (lens.distort(ray) - ray).norm() * camera.fx
-        });
-        if moved.into_iter().fold(0.0, f64::max) < STRAIGHT {
-            return Ok(());
-        }
-        let remap = Remap::undistort(*camera, &Distortion::BrownConrady(lens), *camera);
-        let failed = |error: DistortionError| RefineError::Setting {
-            name: "rig",
-            problem: format!("distortion: {error}"),
-        };
-        *color = remap.rgb(color).map_err(failed)?;
-        *depth = remap.depth(depth).map_err(failed)?;
-        *mask = remap.mask(mask).map_err(failed)?;
-        Ok(())
-    }
-
-    /// Object `id` with its surface displaced and its mass corrected; `None` if the rig knows nothing of it.
-    ///
-    /// # Errors
-    /// If its mesh cannot be used any more.
-    pub fn corrected_object(&self, id: u32, given: &Object) -> Result<Option<Object>, RefineError> {
-        let corrected = match self.objects.get(&id) {
-            Some(deviation) => deviation.corrected(given)?,
-            None if self.skin.masses.contains_key(&id) => {
-                given.with_surface(given.mesh.clone(), given.surface_sigma)?
-            }
-            None => return Ok(None),
-        };
-        let inertial = self.skin.inertial(id, &given.inertial);
-        Ok(Some(Object { inertial, ..corrected }))
     }
 
     /// Derivatives of what a frame says of its calibrations, a row each of hand pose (a left twist about the object's center), joints
@@ -329,7 +251,7 @@ impl Play {
     }
 }
 
-fn of_other_joints(given: usize, expected: usize) -> RefineError {
+pub(super) fn of_other_joints(given: usize, expected: usize) -> RefineError {
     let problem = format!("is of a hand of {expected} joints, not of {given}");
     RefineError::Setting { name: "rig", problem }
 }

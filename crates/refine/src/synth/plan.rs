@@ -85,7 +85,15 @@ fn describe(hand: &HandFiles, subjects: &[Subject], settings: &SynthSettings) ->
         (s.obj_id.to_string(), told)
     };
     let SynthSettings {
-        frames, frames_per_grasp, width, height, lens, sensor, seed, grasp, ..
+        frames,
+        frames_per_grasp,
+        width,
+        height,
+        lens,
+        undeclared_lens,
+        sensor,
+        seed,
+        grasp,
     } = settings;
     let mut plan = json!({
         "program": program(),
@@ -101,7 +109,7 @@ fn describe(hand: &HandFiles, subjects: &[Subject], settings: &SynthSettings) ->
     });
     if let Some(lens) = lens {
         plan["lens"] = annotation::lens(lens);
-        if settings.undeclared_lens {
+        if *undeclared_lens {
             plan["undeclared_lens"] = true.into();
         }
     }

@@ -1,11 +1,13 @@
 //! The fused estimator on the built-in scene.
 
+use std::collections::BTreeMap;
 use std::sync::{Arc, LazyLock};
 
 use nalgebra::{Isometry3, Point3, Translation3, Vector3};
 
 use prehend_refine::evaluate::metrics::{oe_deg, pe_cm};
 use prehend_refine::problem::{Block, NoiseModel, Rows};
+use prehend_refine::rig::{Calibrator, CalibratorSettings};
 use prehend_refine::scene::{Scene, default_scene};
 use prehend_refine::strategy::{Fused, FusedSettings, Modality, Nuisance, Posterior};
 use prehend_refine::{Factor, Frame, Hand, Observation, State, refine};
@@ -56,6 +58,25 @@ fn from_the_back(rivals: Option<Vec<Isometry3<f64>>>) -> (Isometry3<f64>, Poster
     };
     let found = refine(&frame, &back, &Fused::default()).unwrap();
     (found.state.t_cam_object, found.posterior.unwrap())
+}
+
+#[test]
+fn where_the_rig_is_known_a_frame_that_nothing_fits_is_searched() {
+    let axis = SCENE.truth.rotation * Vector3::x() * std::f64::consts::PI;
+    let upside_down = turned(&[2e-3, -1e-3, 2e-3, axis.x, axis.y, axis.z]);
+    // As it is said to be, and known as well as that.
+    let nominal =
+        Calibrator::new(16, (640, 480), BTreeMap::new(), CalibratorSettings::default()).unwrap();
+    let frame = Frame::new(&SCENE.observation, &SCENE.object, Some(&SCENE.hand)).unwrap();
+    let frame = frame.with_rig(nominal.rig());
+    for search_unfit in [false, true] {
+        let settings = FusedSettings { search_unfit, ..FusedSettings::default() };
+        let found = refine(&frame, &upside_down, &Fused::new(settings)).unwrap();
+        let (oe, posterior) = (errors(found.t_cam_object()).1, found.posterior.unwrap());
+        let is_right = oe < 1.0 && posterior.probability() > 0.9;
+        assert!(is_right == search_unfit, "{oe}°, {}", posterior.probability());
+        assert!(is_right || posterior.probability() < 0.05, "{}", posterior.probability());
+    }
 }
 
 #[test]

@@ -282,6 +282,22 @@ fn datasets_through_a_lens_are_read_as_those_of_a_pinhole() {
 }
 
 #[test]
+fn an_undeclared_lens_is_a_fault_of_the_rig() {
+    let coefficients = [0.04, -0.03, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+    let lens = Distortion::by_name("brown_conrady", &coefficients).unwrap();
+    let dir = tempfile::tempdir().unwrap();
+    let mut sensor = SensorSettings::clean();
+    sensor.set("calibration.shared", "1").unwrap();
+    let settings = SynthSettings { lens: Some(lens), undeclared_lens: true, ..settings(sensor) };
+    make(dir.path(), &settings, &|_| ()).unwrap();
+    let camera = json(dir.path().join("test/000005/scene_camera.json"));
+    assert!(camera["0"]["cam_dist"].is_null());
+    let expected = json!({ "model": "brown_conrady", "coefficients": coefficients });
+    assert_eq!(json(dir.path().join("rig_gt.json"))["cam_dist"], expected);
+    assert_eq!(json(dir.path().join("synth.json"))["undeclared_lens"], true);
+}
+
+#[test]
 fn interrupted_datasets_end_as_others_do() {
     let (whole, broken) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let settings = settings(SensorSettings::realistic());

@@ -134,6 +134,7 @@ impl Run {
         let dataset = self.selection.open()?;
         let methods = self.methods(kind)?;
         let (design, mut frames) = self.design(kind, &dataset, &methods, sweeps)?;
+        let rig = open_rig(self.rig.as_deref())?;
         create_folder(&self.out)?;
         let (mut journal, mut records): (_, BTreeMap<usize, FrameRecord>) =
             Journal::open(&self.out.join(RECORDS), &Identity::of(&design), self.restart)?;
@@ -143,7 +144,6 @@ impl Run {
         frames.retain(|f| design.shard.holds(f.index));
         let open: Vec<&Frame> = frames.iter().filter(|f| !records.contains_key(&f.index)).collect();
 
-        let rig = open_rig(self.rig.as_deref())?;
         let assets = Mutex::new(Assets::new(&dataset, self.seed).with_cache(cache()).with_rig(rig));
         let bar = progress(frames.len(), kind.name());
         bar.set_position(records.len() as u64);

@@ -83,7 +83,7 @@ pub(crate) struct Synth {
     /// or kannala_brandt:0.02,-0.01,0,0 (k1,k2,k3,k4) [default: a pinhole]
     #[arg(long, value_name = "LENS", value_parser = lens, allow_hyphen_values = true)]
     lens: Option<Distortion>,
-    /// Say nothing of the lens in the dataset: a fault that `prehend calibrate` has to find
+    /// Say nothing of the lens in scene_camera.json: a fault that `prehend calibrate` has to find
     #[arg(long, requires = "lens")]
     undeclared_lens: bool,
     /// `clean`, `realistic`, `rig` (realistic faults, the same in all frames), or one setting such as depth.noise=0.001; may be repeated, settings override

@@ -27,11 +27,11 @@ impl TryFrom<LensLayout> for Lens {
 
 /// What makes pinhole images of those through a lens, kept for the last camera: most images of a scene have the same one.
 #[derive(Debug, Default)]
-pub(super) struct RemapCache(Mutex<Option<(Camera, Distortion, Arc<Remap>)>>);
+pub(crate) struct RemapCache(Mutex<Option<(Camera, Distortion, Arc<Remap>)>>);
 
 impl RemapCache {
     /// Of images of `camera` behind `lens`, for a pinhole of the same matrix and size.
-    pub(super) fn get(&self, camera: Camera, lens: Distortion) -> Arc<Remap> {
+    pub(crate) fn get(&self, camera: Camera, lens: Distortion) -> Arc<Remap> {
         let last = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((known, its, remap)) = &*last()
             && (*known, *its) == (camera, lens)

@@ -27,7 +27,7 @@ pub use error::DatasetError;
 pub use frame::Frame;
 pub use ground_truth::{GroundTruth, TrueObject};
 pub(crate) use json::{Numbers, Positive, read_json};
-pub(crate) use lens::Lens;
+pub(crate) use lens::{Lens, RemapCache};
 pub use models::{ModelInfo, Models};
 pub use models_info::write_symmetries;
 pub(crate) use models_info::{diameter, extent_to_bop};

@@ -227,6 +227,8 @@ impl Factor for PointToPlaneFactor {
             patches.and_then(|patches| patches.at(column, row))
         };
         let image_warp = equations.image_warp().map(|(warp, _)| Arc::clone(warp));
+        // After all patches of the equations, whether or not this factor knows of them.
+        let first = N + equations.auxiliary();
         let derivatives = |i: usize| {
             let at = patch(i).map(PatchSums::<N>::place);
             let displaced = at.into_iter().flat_map(|at| at..at + 3).zip(rows[i]);
@@ -234,13 +236,12 @@ impl Factor for PointToPlaneFactor {
             let (pixel, ray) = (Vector2::new(x as f64, y as f64), self.points[i].ray);
             let by_camera = &rows[i][6..];
             let off = image_warp.iter().flat_map(move |w| w.derivatives(&pixel, &ray, by_camera));
-            let first = PatchSums::<N>::place(count);
             let off = off.map(move |(k, derivative)| (first + k, derivative));
             rows[i].into_iter().enumerate().chain(displaced).chain(off)
         };
         let weighted = || fit.weights.iter().zip(&fit.left).enumerate();
         let (gradient, mut hessian) = if let Some(warp) = &image_warp {
-            let size = PatchSums::<N>::place(count) + warp.len();
+            let size = first + warp.len();
             let (mut gradient, mut hessian) = (DVector::zeros(size), DMatrix::zeros(size, size));
             for (i, (weight, left)) in weighted() {
                 let row: Vec<(usize, f64)> = derivatives(i).collect();

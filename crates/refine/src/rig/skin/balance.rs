@@ -40,8 +40,9 @@ impl BalanceSums {
     pub(super) fn add(&mut self, reading: &SkinReading, forces: &[Vector3<f64>], weight: f64) {
         let Some(gravity) = reading.gravity else { return };
         let inertial = &reading.object.inertial;
-        let felt = forces.iter().enumerate().filter(|(_, force)| force.norm() > FELT);
-        let felt: Vec<_> = felt.filter(|(_, force)| force.norm().is_finite()).collect();
+        let is_felt = |force: &Vector3<f64>| force.norm() > FELT && force.norm().is_finite();
+        let felt = forces.iter().enumerate().filter(|(_, force)| is_felt(force));
+        let felt: Vec<_> = felt.collect();
         if felt.is_empty() {
             return;
         }

@@ -70,7 +70,20 @@ impl TaxelCalibration {
 }
 
 impl SkinCalibration {
+    /// All numbers of it.
+    pub(in crate::rig) fn numbers(&self) -> impl Iterator<Item = f64> {
+        let taxel = |t: &TaxelCalibration| {
+            let [x, y, z] = t.offset.into();
+            [t.gain, t.gain_sigma, t.dead, x, y, z]
+        };
+        let masses = self.masses.values().flat_map(|told| [told.mass, told.sigma]);
+        self.taxels.iter().flat_map(taxel).chain(masses)
+    }
+
     /// Corrects the forces of a hand, if it has a skin.
+    ///
+    /// # Errors
+    /// If that has another number of taxels.
     pub(in crate::rig) fn correct(&self, hand: &mut HandMeasurement) -> Result<(), RefineError> {
         let (given, expected) = (hand.forces.len(), self.taxels.len());
         if given == 0 || expected == 0 {

@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 
+use super::calibration::FELT;
 use super::reading::SkinReading;
 
 /// A taxel so far from the object is not touched by it, whatever the pose is off by \[m\].
@@ -15,6 +16,9 @@ const FALSE_SHARE: f64 = 0.03;
 
 /// How often a taxel away from the object reads a force if it rings false, and if it does not.
 const RINGS: (f64, f64) = (0.9, 0.02);
+
+/// Odds from which that is told: those of two grasps, since in one a taxel may touch anything.
+const CERTAIN: f64 = 9.0;
 
 /// What rings false varies by no more than such a share of itself, and so much \[N\].
 const VARIES: (f64, f64) = (0.3, 0.03);
@@ -64,7 +68,7 @@ impl OffsetSums {
 }
 
 impl Away {
-    /// What it rings with, if that is more likely than not.
+    /// What it rings with, if that is likely enough and no noise.
     fn offset(&self) -> Option<Vector3<f64>> {
         let (if_false, if_not) = RINGS;
         let log_odds = (FALSE_SHARE / (1.0 - FALSE_SHARE)).ln()
@@ -73,7 +77,8 @@ impl Away {
         let mean = self.sum / self.ringing;
         let varies = (self.squares / self.ringing - mean.norm_squared()).max(0.0).sqrt();
         let (share, least) = VARIES;
-        (log_odds > 0.0 && varies < share * mean.norm() + least).then_some(mean)
+        let is_constant = varies < share * mean.norm() + least;
+        (log_odds > CERTAIN.ln() && mean.norm() > FELT && is_constant).then_some(mean)
     }
 }
 

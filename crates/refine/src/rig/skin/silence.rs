@@ -73,8 +73,6 @@ impl SilenceSums {
                 }
             }
         }
-        // Before the first frame there are none.
-        dead.resize(offsets.len(), DEAD_SHARE);
         dead
     }
 }

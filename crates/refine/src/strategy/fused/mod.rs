@@ -5,13 +5,14 @@ mod factors;
 mod fit;
 mod hypotheses;
 mod posterior;
+mod search_again;
 mod settings;
 mod summary;
 use std::f64::consts::PI;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-use nalgebra::Translation3;
+use nalgebra::{Isometry3, Translation3};
 use prehend_autodiff::optimize::LeastSquares;
 
 use self::factors::depth_noise;
@@ -68,9 +69,14 @@ impl Fused {
 
     /// What is known beforehand: about `initial`, and of calibrations what the frame's rig says, or the settings. Of the rotation that a search
     /// has found, nothing is known that is not in the frame.
-    fn prior(&self, frame: &Frame<'_>, initial: &State) -> Result<GaussianPrior, RefineError> {
+    fn prior(
+        &self,
+        frame: &Frame<'_>,
+        initial: &State,
+        is_searched: bool,
+    ) -> Result<GaussianPrior, RefineError> {
         let mut settings = self.settings.prior.clone();
-        if frame.rivals().is_some() {
+        if is_searched {
             settings.object_rotation = [UNKNOWN_ROTATION; 3];
         }
         let Some(rig) = frame.rig() else {
@@ -138,7 +144,8 @@ impl Fused {
         state: &State,
     ) -> Result<Option<Posterior>, RefineError> {
         let Some(last) = self.last_problem(frame, state)? else { return Ok(None) };
-        let at = last.problem.with_prior(Arc::new(self.prior(frame, initial)?)).linearize(state);
+        let prior = self.prior(frame, initial, frame.rivals().is_some())?;
+        let at = last.problem.with_prior(Arc::new(prior)).linearize(state);
         let solution = Solution { at, termination: Termination::Iterations, iterations: 0 };
         let (radius, inflation) = (frame.object().radius, self.settings.inflation);
         Ok(Some(Posterior::new(&[solution], inflation, radius, false, None)))
@@ -216,12 +223,41 @@ impl Strategy for Fused {
         if self.settings.stages.is_empty() {
             return Err(RefineError::Setting { name: "stages", problem: "are missing".into() });
         }
+        let found = self.run_from(frame, initial, frame.rivals(), observe)?;
+        let again = self.settings.search_unfit && frame.rivals().is_none();
+        if !(again && search_again::is_unfit(frame, &found)) {
+            return Ok(found);
+        }
+        let Some((start, rivals)) = search_again::searched(frame, initial) else {
+            return Ok(found);
+        };
+        let other = self.run_from(frame, &start, Some(&rivals), observe)?;
+        let probability = |found: &Estimate| found.posterior.as_ref().map(Posterior::probability);
+        Ok(if probability(&other) > probability(&found) { other } else { found })
+    }
+
+    /// Stages, and one more where calibrations turn out to be exact.
+    fn iterations(&self) -> usize {
+        self.settings.stages.len() + usize::from(self.settings.calibration_test)
+    }
+}
+
+impl Fused {
+    /// A run from `initial`; `others` are its rivals, if it comes from a search.
+    fn run_from(
+        &self,
+        frame: &Frame<'_>,
+        initial: &State,
+        others: Option<&[Isometry3<f64>]>,
+        observe: &mut Observer<'_>,
+    ) -> Result<Estimate, RefineError> {
         let names = std::iter::once("posterior");
         let mut recorder = Recorder::new(names, initial, self.iterations(), None, observe);
-        let prior = Arc::new(self.prior(frame, initial)?);
+        let prior = Arc::new(self.prior(frame, initial, others.is_some())?);
         let settings = self.settings.for_frame(frame);
-        let mut walk = Walk { fused: self, frame, initial, prior, settings };
-        let mut states = match frame.rivals() {
+        let searched = others.is_some();
+        let mut walk = Walk { fused: self, frame, initial, searched, prior, settings };
+        let mut states = match others {
             Some(others) => rivals(initial, others),
             None => restarts(initial, self.settings.restart_angle),
         };
@@ -254,11 +290,6 @@ impl Strategy for Fused {
         }
         Ok(recorder.estimate(Some(posterior)))
     }
-
-    /// Stages, and one more where calibrations turn out to be exact.
-    fn iterations(&self) -> usize {
-        self.settings.stages.len() + usize::from(self.settings.calibration_test)
-    }
 }
 
 /// Takes the noise of depth as it was `measured`, if it was.
@@ -284,6 +315,8 @@ struct Walk<'a> {
     fused: &'a Fused,
     frame: &'a Frame<'a>,
     initial: &'a State,
+    /// Whether that comes from a search.
+    searched: bool,
     prior: Arc<GaussianPrior>,
     /// With what was measured of depth's noise.
     settings: FusedSettings,
@@ -292,11 +325,6 @@ struct Walk<'a> {
 impl Walk<'_> {
     fn stages(&self) -> &[Stage] {
         &self.fused.settings.stages
-    }
-
-    /// Whether the initial pose comes from a search.
-    fn searched(&self) -> bool {
-        self.frame.rivals().is_some()
     }
 
     fn radius(&self) -> f64 {
@@ -311,7 +339,7 @@ impl Walk<'_> {
         let of_stage = fused.stage_problem(frame, initial, &states[0], stage, settings)?;
         let problem = of_stage.problem.with_prior(self.prior.clone());
         let states = &self.taken_up(index, states, &problem);
-        let found = if index == 0 && !self.searched() {
+        let found = if index == 0 && !self.searched {
             let mut all = problem.solve_all(&states[..1], &stage.solver);
             let noise = || depth_noise(frame, &all[0].at.state, &fused.settings);
             if !settled(&all[0].at, noise, self.radius()) {
@@ -343,7 +371,7 @@ impl Walk<'_> {
     /// Those of `states` that stage `index`, which solves `problem`, takes up.
     fn taken_up(&self, index: usize, states: &[State], problem: &Problem) -> Vec<State> {
         let usual = self.stages()[index].hypotheses.max(1);
-        if !self.searched() {
+        if !self.searched {
             return states[..states.len().min(usual)].to_vec();
         }
         let limit = if index < 2 { MOST_ALTERNATIVES } else { WITH_RIVALS * usual };
@@ -355,7 +383,7 @@ impl Walk<'_> {
 
     /// Puts the best of the last solutions first: modes far apart, as those of a search are, compare by their mass rather than their height.
     fn rank(&self, found: &mut Vec<Solution>) {
-        if self.searched() {
+        if self.searched {
             let ranked = found.drain(..).map(|solution| (log_mass(&solution.at), solution));
             let mut ranked: Vec<_> = ranked.collect();
             ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -370,7 +398,7 @@ impl Walk<'_> {
         // Where it is, geometry finds well; how it is turned, colors may say better from where they were told. And
         // what little is seen of the object may have led astray.
         let initial = self.initial;
-        if self.searched() {
+        if self.searched {
             // Which of them it is, colors say, that were not considered yet.
             states.extend(turned(&states, self.frame.object().near_symmetries()));
             return states;

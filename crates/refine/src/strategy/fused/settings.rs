@@ -130,6 +130,8 @@ pub struct FusedSettings {
     pub restart_spacing: f64,
     /// Whether to ask the evidence if calibrations are exact.
     pub calibration_test: bool,
+    /// Where the rig is known and nothing fits, search the frame from nothing and refine what that finds, too.
+    pub search_unfit: bool,
     /// Independent measurements that depth points amount to beside the errors that neighbors share, where both were measured.
     pub max_effective_samples: f64,
     /// Hypotheses that are so much behind the best one after a stage, colors considered, are given up \[nat\].
@@ -229,6 +231,7 @@ impl Default for FusedSettings {
             restart_angle: 20f64.to_radians(),
             restart_spacing: 10e-3,
             calibration_test: true,
+            search_unfit: true,
             max_effective_samples: 50.0,
             prune_margin: 15.0,
             inflation: CovarianceInflation::default(),

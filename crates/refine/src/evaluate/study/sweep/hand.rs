@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use prehend_geometry::SplitMix64;
 
-use crate::scene::Observation;
+use crate::scene::{HandMeasurement, Observation};
 
 /// Shifts the hand by `distance` \[m\].
 pub(super) fn shift(observation: &mut Observation, distance: f64, random: &mut SplitMix64) {
@@ -32,7 +32,7 @@ pub(super) fn bend(observation: &mut Observation, angle: f64, random: &mut Split
 /// A share of the taxels feels nothing.
 pub(super) fn silence(observation: &mut Observation, share: f64, random: &mut SplitMix64) {
     for force in observation.hand.iter_mut().flat_map(|hand| &mut hand.forces) {
-        if random.uniform() < share {
+        if random.uniform() < share && !HandMeasurement::is_unknown(force) {
             *force = Vector3::zeros();
         }
     }
