@@ -48,10 +48,11 @@ fn farthest_taxel(sequence: &Sequence) -> usize {
 
 /// Frames of `sequence` as a wrong rig says them, the object where it is.
 fn frames(sequence: &Sequence) -> Vec<CalibrationFrame> {
-    let chosen = sequence.frames.iter().step_by(6);
-    let frame = |frame: &SequenceFrame| CalibrationFrame {
+    let chosen = sequence.frames.iter().step_by(6).enumerate();
+    let frame = |(index, frame): (usize, &SequenceFrame)| CalibrationFrame {
         observation: said(&frame.observation),
-        obj_id: 7,
+        // As if two objects were held: of one grasp alone a taxel may touch anything.
+        obj_id: 7 + index as u32 % 2,
         hand: Arc::clone(&sequence.hand),
         initial: frame.truth,
         is_refined: false,
@@ -60,8 +61,8 @@ fn frames(sequence: &Sequence) -> Vec<CalibrationFrame> {
 }
 
 fn calibrator(sequence: &Sequence) -> Calibrator {
-    let objects = BTreeMap::from([(7, Arc::clone(&sequence.object))]);
-    Calibrator::new(16, (640, 480), objects, CalibratorSettings::default()).unwrap()
+    let objects = [7, 8].map(|id| (id, Arc::clone(&sequence.object)));
+    Calibrator::new(16, (640, 480), objects.into(), CalibratorSettings::default()).unwrap()
 }
 
 /// Visits `frames`, whose poses change, in so many passes; keeps what they say.
