@@ -110,18 +110,23 @@ impl SurfacePatches {
             let own = if i == j { OWN } else { 0.0 };
             gp_sigma.powi(2) * ((-0.5 * squared / length_scale.powi(2)).exp() + own)
         });
-        let factor = covariance.cholesky()?;
-        let log_determinant = -3.0 * factor.ln_determinant();
-        let precision = factor.inverse();
-        Some(Self {
+        let patches = Self {
             side,
             first: [left, top],
             columns,
             numbers,
             places,
-            precision,
-            log_determinant,
-        })
+            precision: DMatrix::zeros(0, 0),
+            log_determinant: 0.0,
+        };
+        patches.with_covariance(covariance)
+    }
+
+    /// The same, displaced with this covariance in each direction \[m²\]; `None` if it is singular.
+    pub(crate) fn with_covariance(self, covariance: DMatrix<f64>) -> Option<Self> {
+        let factor = covariance.cholesky()?;
+        let log_determinant = -3.0 * factor.ln_determinant();
+        Some(Self { precision: factor.inverse(), log_determinant, ..self })
     }
 
     /// Where each patch is (camera frame) \[m\].

@@ -91,7 +91,7 @@ impl Rig {
         let corrected = match self.objects.get(&id) {
             Some(deviation) => deviation.corrected(given)?,
             None if self.skin.masses.contains_key(&id) => {
-                given.with_surface(given.mesh.clone(), given.surface_sigma)?
+                given.with_surface(given.mesh.clone(), given.deviation.clone())?
             }
             None => return Ok(None),
         };

@@ -1,5 +1,7 @@
 //! By what the surface of an object differs from its model.
 
+use std::sync::Arc;
+
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3xX, Point3, Vector3};
 use prehend_geometry::TriMesh;
 
@@ -27,8 +29,8 @@ pub struct SurfaceDeviation {
     factor: Cholesky<f64, Dyn>,
     /// A column for each node: independent, and of unit variance beforehand.
     pub(super) coefficients: Matrix3xX<f64>,
-    /// Standard deviation of what it leaves, in each direction \[m\].
-    pub(super) left: f64,
+    /// Covariance of the coefficients in one direction: what is still not known of them.
+    pub(super) covariance: DMatrix<f64>,
 }
 
 impl SurfaceDeviation {
@@ -38,25 +40,27 @@ impl SurfaceDeviation {
         let nodes = far_apart(&places, SPACING * settings.length_scale, MOST_NODES);
         let nodes: Vec<_> = nodes.into_iter().map(Point3::from).collect();
         let coefficients = Matrix3xX::zeros(nodes.len());
-        Self::from_parts(settings.clone(), nodes, coefficients, settings.gp_sigma)
+        let covariance = DMatrix::identity(nodes.len(), nodes.len());
+        Self::from_parts(settings.clone(), nodes, coefficients, covariance)
     }
 
-    /// Of its `nodes` and their coefficients, of which there are as many; `None` if that makes no field.
+    /// Of its `nodes` and their coefficients, of which there are as many, with their covariance; `None` if that makes no field.
     pub(super) fn from_parts(
         settings: ModelErrorSettings,
         nodes: Vec<Point3<f64>>,
         coefficients: Matrix3xX<f64>,
-        left: f64,
+        covariance: DMatrix<f64>,
     ) -> Option<Self> {
         let ModelErrorSettings { gp_sigma, length_scale } = settings;
-        if !(gp_sigma > 0.0 && length_scale > 0.0) || nodes.len() != coefficients.ncols() {
+        let sizes = [coefficients.ncols(), covariance.nrows(), covariance.ncols()];
+        if !(gp_sigma > 0.0 && length_scale > 0.0) || sizes != [nodes.len(); 3] {
             return None;
         }
         let among = DMatrix::from_fn(nodes.len(), nodes.len(), |i, j| {
             // What makes it certainly positive definite.
             correlation(&nodes[i], &nodes[j], length_scale) + if i == j { 1e-6 } else { 0.0 }
         });
-        Some(Self { settings, nodes, factor: Cholesky::new(among)?, coefficients, left })
+        Some(Self { settings, nodes, factor: Cholesky::new(among)?, coefficients, covariance })
     }
 
     /// How many coefficients a direction has.
@@ -90,13 +94,26 @@ impl SurfaceDeviation {
         let of_axis = |axis: usize| {
             DMatrix::from_fn(count, count, |r, c| covariance[(3 * r + axis, 3 * c + axis)])
         };
-        let mean = (of_axis(0) + of_axis(1) + of_axis(2)) / 3.0;
-        let variance = |node: &Point3<f64>| {
-            let features = self.features(node);
-            features.dot(&(&mean * &features))
+        self.covariance = (of_axis(0) + of_axis(1) + of_axis(2)) / 3.0;
+    }
+
+    /// Covariance of what it leaves at `places` of the model, in each direction \[m²\]: what is not known of the coefficients, and what places are
+    /// off by themselves.
+    pub(crate) fn left_covariance(&self, places: &[Point3<f64>]) -> DMatrix<f64> {
+        let columns: Vec<_> = places.iter().map(|place| self.features(place)).collect();
+        let features = match columns.as_slice() {
+            [] => return DMatrix::zeros(0, 0),
+            columns => DMatrix::from_columns(columns),
         };
-        let sum: f64 = self.nodes.iter().map(variance).sum();
-        self.left = (sum / count.max(1) as f64 + self.own_variance()).sqrt();
+        let mut covariance = features.tr_mul(&(&self.covariance * &features));
+        (0..places.len()).for_each(|k| covariance[(k, k)] += self.own_variance());
+        covariance
+    }
+
+    /// Standard deviation of what it leaves, in each direction \[m\].
+    pub(crate) fn left(&self) -> f64 {
+        let trace = self.left_covariance(&self.nodes).trace();
+        (trace / self.count().max(1) as f64).sqrt()
     }
 
     /// `mesh` with every vertex displaced.
@@ -113,7 +130,7 @@ impl SurfaceDeviation {
     /// # Errors
     /// If its mesh cannot be used any more.
     pub fn corrected(&self, object: &Object) -> Result<Object, RefineError> {
-        object.with_surface(self.applied(&object.mesh), Some(self.left))
+        object.with_surface(self.applied(&object.mesh), Some(Arc::new(self.clone())))
     }
 }
 
@@ -142,9 +159,15 @@ mod tests {
         let change = DVector::from_fn(size, |k, _| (k as f64).sin());
         field.change(&change, &(DMatrix::identity(size, size) * 0.01));
         let expected = settings.gp_sigma * (0.01 + OWN * OWN).sqrt();
-        assert!((field.left / expected - 1.0).abs() < 0.05, "{}", field.left);
+        assert!((field.left() / expected - 1.0).abs() < 0.05, "{}", field.left());
+        // Places near each other are off alike, and far ones are not.
+        let near = field.nodes[0] + Vector3::new(2e-3, 0.0, 0.0);
+        let places = [field.nodes[0], near, object.center + Vector3::x()];
+        let left = field.left_covariance(&places);
+        assert!(left[(0, 1)] > 0.9 * (left[(0, 0)] - field.own_variance()), "{left}");
+        assert!(left[(0, 2)] < 1e-12 && left[(2, 2)] >= field.own_variance());
         let corrected = field.corrected(&object).unwrap();
-        assert_eq!(corrected.surface_sigma, Some(field.left));
+        assert_eq!(corrected.deviation.as_ref().unwrap().left(), field.left());
         let vertex = object.mesh.vertices[10];
         let moved = corrected.mesh.vertices[10] - vertex;
         assert!(moved.norm() > 1e-5 && (moved - field.at(&vertex)).norm() < 1e-15);

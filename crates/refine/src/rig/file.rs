@@ -68,7 +68,8 @@ struct PlayLayout {
 struct ObjectLayout {
     sigma_m: f64,
     length_scale_m: f64,
-    left_sigma_m: f64,
+    /// A row each.
+    covariance: Vec<Vec<f64>>,
     nodes_m: Vec<[f64; 3]>,
     coefficients: Vec<[f64; 3]>,
 }
@@ -130,17 +131,25 @@ impl Rig {
             return field("covariance", &format!("expected {n} rows of {n} numbers"));
         }
         rig.covariance = DMatrix::from_fn(n, n, |r, c| covariance[r][c]);
-        let symmetric =
-            (&rig.covariance - rig.covariance.transpose()).amax() <= 1e-9 * rig.covariance.amax();
-        if !symmetric || rig.covariance.clone().cholesky().is_none() {
+        if !is_covariance(&rig.covariance) {
             return field("covariance", &"is not symmetric and positive definite");
         }
         for (id, object) in objects {
-            let ObjectLayout { sigma_m, length_scale_m, left_sigma_m, nodes_m, coefficients } =
+            let ObjectLayout { sigma_m, length_scale_m, covariance, nodes_m, coefficients } =
                 object;
-            if nodes_m.len() > MOST_NODES || left_sigma_m <= 0.0 {
-                let problem = format!("expected up to {MOST_NODES} nodes, and positive deviations");
+            let count = nodes_m.len();
+            if count > MOST_NODES {
+                let problem = format!("expected up to {MOST_NODES} nodes");
                 return field(&format!("objects.{id}"), &problem);
+            }
+            if covariance.len() != count || covariance.iter().any(|row| row.len() != count) {
+                let problem = format!("expected {count} rows of {count} numbers");
+                return field(&format!("objects.{id}.covariance"), &problem);
+            }
+            let covariance = DMatrix::from_fn(count, count, |r, c| covariance[r][c]);
+            if !is_covariance(&covariance) {
+                let problem = "is not symmetric and positive definite";
+                return field(&format!("objects.{id}.covariance"), &problem);
             }
             let settings = ModelErrorSettings { gp_sigma: sigma_m, length_scale: length_scale_m };
             let nodes = nodes_m.into_iter().map(Point3::from).collect();
@@ -150,7 +159,7 @@ impl Rig {
                 columns => Matrix3xX::from_columns(columns),
             };
             let Some(deviation) =
-                SurfaceDeviation::from_parts(settings, nodes, coefficients, left_sigma_m)
+                SurfaceDeviation::from_parts(settings, nodes, coefficients, covariance)
             else {
                 let problem = "expected one coefficient for each node, and positive deviations";
                 return field(&format!("objects.{id}"), &problem);
@@ -169,7 +178,10 @@ impl Rig {
     /// # Errors
     /// If it cannot be written, or is not finite.
     pub fn save(&self, file: &Path) -> Result<(), DatasetError> {
-        let coefficients = self.objects.values().flat_map(|object| object.coefficients.iter());
+        let coefficients = self
+            .objects
+            .values()
+            .flat_map(|object| object.coefficients.iter().chain(&object.covariance));
         let numbers = self
             .values()
             .iter()
@@ -184,7 +196,7 @@ impl Rig {
             let layout = ObjectLayout {
                 sigma_m: deviation.settings.gp_sigma,
                 length_scale_m: deviation.settings.length_scale,
-                left_sigma_m: deviation.left,
+                covariance: rows(&deviation.covariance),
                 nodes_m: deviation.nodes.iter().map(|node| node.coords.into()).collect(),
                 coefficients: deviation
                     .coefficients
@@ -217,13 +229,22 @@ impl Rig {
                 hand_rotation_rad: self.play.hand_rotation,
                 joints: self.play.joints,
             },
-            covariance: self.covariance.row_iter().map(|r| r.iter().copied().collect()).collect(),
+            covariance: rows(&self.covariance),
             objects: self.objects.iter().map(object).collect(),
             skin: (&self.skin).into(),
         };
         let text = serde_json::to_string(&layout).map_err(|e| DatasetError::unusable(file, e))?;
         write_atomically(file, format!("{text}\n").as_bytes())
     }
+}
+
+fn rows(matrix: &DMatrix<f64>) -> Vec<Vec<f64>> {
+    matrix.row_iter().map(|row| row.iter().copied().collect()).collect()
+}
+
+fn is_covariance(matrix: &DMatrix<f64>) -> bool {
+    let symmetric = (matrix - matrix.transpose()).amax() <= 1e-9 * matrix.amax();
+    symmetric && matrix.clone().cholesky().is_some()
 }
 
 /// Columns or rows of an image, and nodes of an object's surface, at most.

@@ -10,6 +10,7 @@ use prehend_geometry::{MeshReport, TriMesh};
 use prehend_render::RenderModel;
 
 use crate::error::RefineError;
+use crate::rig::SurfaceDeviation;
 use crate::symmetry::near_symmetries;
 
 /// Assumed where an object's mass is unknown \[kg/m³\].
@@ -61,8 +62,8 @@ pub struct Object {
     pub radius: f64,
     /// Surface area \[m²\].
     pub area: f64,
-    /// How far the surface is from where the mesh has it, where that is known \[m\]: standard deviation in each direction.
-    pub surface_sigma: Option<f64>,
+    /// By what the surface was corrected, where it was: how far it may still be from where the mesh has it.
+    pub deviation: Option<Arc<SurfaceDeviation>>,
     /// What decided where the surface is sampled.
     pub(crate) seed: u64,
     pub(crate) surface: ClosestPoints,
@@ -105,19 +106,19 @@ impl Object {
         Self::build(name, mesh, None, mass, seed)
     }
 
-    /// The object with another surface, which is as far from `mesh` as `surface_sigma` says; its mass as it was.
+    /// The object with another surface, which is as far from `mesh` as `deviation` leaves open; its mass as it was.
     ///
     /// # Errors
     /// If the mesh cannot be used.
     pub(crate) fn with_surface(
         &self,
         mesh: TriMesh,
-        surface_sigma: Option<f64>,
+        deviation: Option<Arc<SurfaceDeviation>>,
     ) -> Result<Self, RefineError> {
         let object = Self::new(&self.name, mesh, Some(self.inertial.clone()), self.seed)?;
         Ok(Self {
             inertial_assumed: self.inertial_assumed,
-            surface_sigma,
+            deviation,
             stated_size: self.stated_size.clone(),
             ..object
         })
@@ -181,7 +182,7 @@ impl Object {
             model: Arc::new(RenderModel::new(&mesh).map_err(|e| fail(e.to_string()))?),
             center: nalgebra::center(&low, &high),
             radius: 0.5 * (high - low).norm(),
-            surface_sigma: None,
+            deviation: None,
             stated_size: None,
             seed,
             area: solid.area(),

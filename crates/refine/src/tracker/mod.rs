@@ -289,7 +289,7 @@ impl Tracker {
         prior: Arc<GaussianPrior>,
     ) -> Result<Problem, RefineError> {
         let (stage, settings) = (&self.settings.stage, self.settings.fused.for_frame(frame));
-        let patches = surface_patches(frame, initial, stage, &settings);
+        let patches = surface_patches(frame, initial, initial, stage, &settings);
         let problem = problem_of(frame, initial, stage, &settings, patches, &self.factors)?;
         Ok(problem.with_prior(prior))
     }

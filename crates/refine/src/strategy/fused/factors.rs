@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use nalgebra::Point3;
+
 use super::settings::{FusedSettings, Modality, Nuisance, Stage};
 use crate::error::RefineError;
 use crate::factor::{
@@ -27,10 +29,11 @@ pub(super) fn depth_noise(
     PointToPlaneFactor::new(frame, &depth).ok()?.noise_estimate(state)
 }
 
-/// Where the object may be off from its model in `stage`, if it may; it is about as far away as at `initial`.
+/// Where the object may be off from its model in `stage`, if it may; it is about as far away as at `initial`, and turned as at `seen`.
 pub(crate) fn surface_patches(
     frame: &Frame<'_>,
     initial: &State,
+    seen: &State,
     stage: &Stage,
     settings: &FusedSettings,
 ) -> Option<Arc<SurfacePatches>> {
@@ -39,7 +42,11 @@ pub(crate) fn surface_patches(
     }
     let distance = initial.center().z;
     let unit = settings.rendering.downsample * stage.downsample;
-    SurfacePatches::new(frame.observation(), distance, &settings.model, unit).map(Arc::new)
+    let patches = SurfacePatches::new(frame.observation(), distance, &settings.model, unit)?;
+    let Some(deviation) = &frame.object().deviation else { return Some(Arc::new(patches)) };
+    let on_model = |place: &Point3<f64>| seen.t_cam_object.inverse_transform_point(place);
+    let places: Vec<_> = patches.places().iter().map(on_model).collect();
+    patches.with_covariance(deviation.left_covariance(&places)).map(Arc::new)
 }
 
 /// What `stage` solves but for the prior: all factors, the `own` ones among them, by the pose and all nuisances of `initial`.

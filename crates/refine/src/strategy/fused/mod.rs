@@ -183,7 +183,7 @@ impl Fused {
         stage: &Stage,
         settings: &mut FusedSettings,
     ) -> Result<StageProblem, RefineError> {
-        let patches = surface_patches(frame, initial, stage, settings);
+        let patches = surface_patches(frame, initial, seen, stage, settings);
         if stage.measured_noise {
             let measured = depth_noise(frame, seen, &self.settings);
             take_noise(settings, measured, patches.is_some());

@@ -161,8 +161,8 @@ impl FusedSettings {
     /// The same, with what is known of how good the model of `frame` is.
     pub(crate) fn for_frame(&self, frame: &Frame<'_>) -> Self {
         let mut settings = self.clone();
-        if let Some(sigma) = frame.object().surface_sigma {
-            settings.model.gp_sigma = settings.model.gp_sigma.min(sigma);
+        if let Some(deviation) = &frame.object().deviation {
+            settings.model.gp_sigma = settings.model.gp_sigma.min(deviation.left());
         }
         settings
     }
