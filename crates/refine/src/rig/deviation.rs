@@ -18,6 +18,10 @@ const MOST_NODES: usize = 150;
 /// What patches are off by themselves, as a share of the deviation: what too few places do not describe, and what looks off in one view.
 const OWN: f64 = 0.3;
 
+/// What all of a surface is off by together, as a share of the deviation: a model of a wrong size, or with a wrong origin. Frames cannot tell that from
+/// the object's place.
+const TOGETHER: f64 = 0.5;
+
 /// A smooth field of displacements over the surface of a model, in its coordinates: a Gaussian process through a few places that
 /// describe all others (Quiñonero-Candela and Rasmussen, 2005).
 #[derive(Clone, Debug)]
@@ -98,7 +102,7 @@ impl SurfaceDeviation {
     }
 
     /// Covariance of what it leaves at `places` of the model, in each direction \[m²\]: what is not known of the coefficients, and what places are
-    /// off by themselves.
+    /// off by themselves, and all together.
     pub(crate) fn left_covariance(&self, places: &[Point3<f64>]) -> DMatrix<f64> {
         let columns: Vec<_> = places.iter().map(|place| self.features(place)).collect();
         let features = match columns.as_slice() {
@@ -107,6 +111,7 @@ impl SurfaceDeviation {
         };
         let mut covariance = features.tr_mul(&(&self.covariance * &features));
         (0..places.len()).for_each(|k| covariance[(k, k)] += self.own_variance());
+        covariance.add_scalar_mut((TOGETHER * self.settings.gp_sigma).powi(2));
         covariance
     }
 
@@ -158,14 +163,16 @@ mod tests {
         let size = 3 * field.count();
         let change = DVector::from_fn(size, |k, _| (k as f64).sin());
         field.change(&change, &(DMatrix::identity(size, size) * 0.01));
-        let expected = settings.gp_sigma * (0.01 + OWN * OWN).sqrt();
+        let expected = settings.gp_sigma * (0.01 + OWN * OWN + TOGETHER * TOGETHER).sqrt();
         assert!((field.left() / expected - 1.0).abs() < 0.05, "{}", field.left());
         // Places near each other are off alike, and far ones are not.
         let near = field.nodes[0] + Vector3::new(2e-3, 0.0, 0.0);
         let places = [field.nodes[0], near, object.center + Vector3::x()];
         let left = field.left_covariance(&places);
-        assert!(left[(0, 1)] > 0.9 * (left[(0, 0)] - field.own_variance()), "{left}");
-        assert!(left[(0, 2)] < 1e-12 && left[(2, 2)] >= field.own_variance());
+        let together = (TOGETHER * settings.gp_sigma).powi(2);
+        let alike = |k: usize| left[(0, k)] - together;
+        assert!(alike(1) > 0.9 * (alike(0) - field.own_variance()), "{left}");
+        assert!(alike(2).abs() < 1e-12 && left[(2, 2)] >= field.own_variance() + together);
         let corrected = field.corrected(&object).unwrap();
         assert_eq!(corrected.deviation.as_ref().unwrap().left(), field.left());
         let vertex = object.mesh.vertices[10];
