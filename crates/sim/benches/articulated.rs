@@ -52,8 +52,7 @@ fn time(name: &str, mut evaluate: impl FnMut()) {
 fn main() -> anyhow::Result<()> {
     for (name, tree) in [("7", tree(7, false)?), ("36", tree(30, true)?)] {
         let n = tree.freedoms();
-        let vector =
-            |phase: f64| (0..n).map(|k| (k as f64 + phase).sin()).collect::<Vec<f64>>();
+        let vector = |phase: f64| (0..n).map(|k| (k as f64 + phase).sin()).collect::<Vec<f64>>();
         let (q, v, tau) = (tree.moved(&tree.neutral(), &vector(0.3)), vector(0.7), vector(1.1));
         let of = |what: &str| format!("{what}, {name} degrees of freedom");
         time(&of("inverse dynamics"), || {
