@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, Vector3, Vector6};
 
 use super::kinematics::Kinematics;
 use super::spatial::{SpatialInertia, angular, cross_force, cross_motion, linear};
+use super::tree_factor::TreeFactor;
 
 /// Derivatives of efforts τ: by displacements along unit velocities, and by velocities.
 #[derive(Clone, Debug, PartialEq)]
@@ -12,6 +13,8 @@ pub struct DynamicsDerivatives {
     pub by_position: DMatrix<f64>,
     /// By velocities.
     pub by_velocity: DMatrix<f64>,
+    /// By accelerations: the [mass matrix](Kinematics::mass_matrix).
+    pub by_acceleration: DMatrix<f64>,
 }
 
 /// Derivatives of accelerations v̇.
@@ -26,8 +29,7 @@ pub struct ForwardDerivatives {
 }
 
 impl Kinematics<'_> {
-    /// Derivatives of [inverse dynamics](Self::inverse_dynamics) at accelerations v̇; by these themselves they are the
-    /// [mass matrix](Self::mass_matrix).
+    /// Derivatives of [inverse dynamics](Self::inverse_dynamics) at accelerations v̇.
     ///
     /// Singh, Russell and Wensing, Efficient Analytical Derivatives of Rigid-Body Dynamics using Spatial Vector Algebra, 2022.
     ///
@@ -54,8 +56,8 @@ impl Kinematics<'_> {
         let composites = self.composites();
         let own = self.velocities.iter().zip(&self.inertias);
         let mut rates: Vec<Matrix6<f64>> = own.map(|(v, inertia)| rate(v, inertia)).collect();
-        let mut by_position = DMatrix::zeros(n, n);
-        let mut by_velocity = DMatrix::zeros(n, n);
+        let [mut by_position, mut by_velocity, mut by_acceleration] =
+            [(); 3].map(|()| DMatrix::zeros(n, n));
         for (index, link) in links.iter().enumerate().rev() {
             let (composite, rate) = (&composites[index], rates[index]);
             let [_, freedoms] = self.tree.range(index);
@@ -74,6 +76,9 @@ impl Kinematics<'_> {
                             by_rate.dot(&with_parent[other]) + by_inertia.dot(&twice[other]);
                         by_velocity[(freedom, other)] =
                             by_rate.dot(&self.axes[other]) + by_inertia.dot(&with_both[other]);
+                        let mass = by_inertia.dot(&self.axes[other]);
+                        by_acceleration[(freedom, other)] = mass;
+                        by_acceleration[(other, freedom)] = mass;
                         if of != index {
                             by_position[(other, freedom)] = self.axes[other].dot(&moved);
                             by_velocity[(other, freedom)] = self.axes[other].dot(&pushed);
@@ -81,12 +86,13 @@ impl Kinematics<'_> {
                     }
                     ancestor = links[of].parent;
                 }
+                by_acceleration[(freedom, freedom)] += link.armature;
             }
             if let Some(parent) = link.parent {
                 rates[parent] += rate;
             }
         }
-        DynamicsDerivatives { by_position, by_velocity }
+        DynamicsDerivatives { by_position, by_velocity, by_acceleration }
     }
 
     /// Derivatives of [forward dynamics](Self::forward_dynamics), whose result is `accelerations`: those of inverse dynamics there,
@@ -98,14 +104,22 @@ impl Kinematics<'_> {
         &self,
         accelerations: &DVector<f64>,
     ) -> Option<ForwardDerivatives> {
-        let DynamicsDerivatives { by_position, by_velocity } =
+        let DynamicsDerivatives { by_position, by_velocity, by_acceleration } =
             self.inverse_dynamics_derivatives(accelerations.as_slice());
-        let by_effort = self.mass_matrix().cholesky()?.inverse();
-        Some(ForwardDerivatives {
-            by_position: -(&by_effort * by_position),
-            by_velocity: -(&by_effort * by_velocity),
-            by_effort,
-        })
+        let factor = TreeFactor::new(&by_acceleration, self.tree.carriers())?;
+        let n = self.axes.len();
+        // Row by row: by positions, velocities and efforts.
+        let mut all = DMatrix::zeros(3 * n, n);
+        for (row, mut column) in all.column_iter_mut().enumerate() {
+            for k in 0..n {
+                column[k] = -by_position[(row, k)];
+                column[n + k] = -by_velocity[(row, k)];
+            }
+            column[2 * n + row] = 1.0;
+        }
+        factor.solve_transposed(&mut all);
+        let part = |k: usize| all.rows(k * n, n).transpose();
+        Some(ForwardDerivatives { by_position: part(0), by_velocity: part(1), by_effort: part(2) })
     }
 }
 

@@ -57,6 +57,8 @@ pub struct Articulation<S: Scalar = f64> {
     first: Vec<[usize; 2]>,
     /// Of each degree of freedom: the link that it moves.
     link_of: Vec<usize>,
+    /// Of each degree of freedom: the one that carries it, the last of those before it on the way to the world.
+    carriers: Vec<Option<usize>>,
     /// Acceleration of free fall \[m/s²\].
     gravity: Vector3<f64>,
 }
@@ -87,6 +89,9 @@ impl<S: Scalar> Articulation<S> {
     /// If a parent does not come before its link, or a number is not finite or a mass negative.
     pub fn new(links: Vec<Link<S>>, gravity: Vector3<f64>) -> Result<Self, ArticulationError> {
         let (mut first, mut link_of) = (Vec::with_capacity(links.len() + 1), Vec::new());
+        let mut carriers = Vec::new();
+        // Of each link: the last degree of freedom that moves it.
+        let mut last: Vec<Option<usize>> = Vec::with_capacity(links.len());
         let mut next = [0, 0];
         for (index, link) in links.iter().enumerate() {
             if link.parent.is_some_and(|parent| parent >= index) {
@@ -104,9 +109,15 @@ impl<S: Scalar> Articulation<S> {
             first.push(next);
             next = [next[0] + link.joint.coordinates(), next[1] + link.joint.freedoms()];
             link_of.resize(next[1], index);
+            let mut carrier = link.parent.and_then(|parent| last[parent]);
+            for freedom in carriers.len()..next[1] {
+                carriers.push(carrier);
+                carrier = Some(freedom);
+            }
+            last.push(carrier);
         }
         first.push(next);
-        Ok(Self { links, first, link_of, gravity })
+        Ok(Self { links, first, link_of, carriers, gravity })
     }
 
     /// The links, each after its parent.
@@ -137,6 +148,11 @@ impl<S: Scalar> Articulation<S> {
     /// The link that a degree of freedom moves.
     pub(super) fn link_of(&self, freedom: usize) -> usize {
         self.link_of[freedom]
+    }
+
+    /// Of each degree of freedom the one that carries it.
+    pub(super) fn carriers(&self) -> &[Option<usize>] {
+        &self.carriers
     }
 
     /// The coordinates at which all links are in their joints' frames.
@@ -186,6 +202,7 @@ impl Articulation {
             armature: S::constant(link.armature),
         });
         let (first, link_of) = (self.first.clone(), self.link_of.clone());
-        Articulation { links: links.collect(), first, link_of, gravity: self.gravity }
+        let (carriers, gravity) = (self.carriers.clone(), self.gravity);
+        Articulation { links: links.collect(), first, link_of, carriers, gravity }
     }
 }

@@ -24,6 +24,7 @@ mod mass_matrix;
 mod spatial;
 #[cfg(test)]
 mod tests;
+mod tree_factor;
 
 pub use self::derivatives::{DynamicsDerivatives, ForwardDerivatives};
 pub use self::joint::Joint;
