@@ -1,5 +1,7 @@
 //! Articulated bodies against Pinocchio: `benches/peers/sim/articulated_golden.py` has made the values.
 
+#![allow(clippy::unwrap_used)] // a test may panic; helpers outside test functions count as code to the lint
+
 use nalgebra::{DVector, Isometry3, Matrix3, Point3, Quaternion, Unit, UnitQuaternion, Vector3};
 use prehend_sim::articulated::{Articulation, Joint, Link};
 use serde_json::Value;
