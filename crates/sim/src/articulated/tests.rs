@@ -17,11 +17,11 @@ pub(super) fn random_tree(seed: u64, count: usize) -> Articulation {
         let root = Matrix3::from_columns(&[vector(0.1), vector(0.1), vector(0.1)]);
         let choice = vector(1.0);
         let joint = match (choice.x.abs() * 1e6) as usize % 8 {
-            _ if index == 0 && seed % 2 == 0 => Joint::Floating,
+            _ if index == 0 && seed.is_multiple_of(2) => Joint::Floating,
             0 => Joint::Spherical,
             1 => Joint::Fixed,
             2 => Joint::Prismatic(axis),
-            3 if seed % 3 == 0 => Joint::Floating,
+            3 if seed.is_multiple_of(3) => Joint::Floating,
             _ => Joint::Revolute(axis),
         };
         let back = 1 + (choice.y.abs() * 1e6) as usize % 2;
