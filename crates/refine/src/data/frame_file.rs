@@ -36,10 +36,10 @@ pub fn load_frame_file(
     let field = |name: &str, problem: &dyn Display| DatasetError::field(file, name, problem);
     let layout: Layout = read_json(file)?;
     let folder = file.parent().unwrap_or(Path::new("."));
-    let mut color = RgbImage::load(&folder.join(&layout.rgb)).map_err(|e| fault(&e))?;
-    let mut depth = DepthImage::load(&folder.join(&layout.depth), layout.depth_unit_m.0)
+    let color = RgbImage::load(&folder.join(&layout.rgb)).map_err(|e| fault(&e))?;
+    let depth = DepthImage::load(&folder.join(&layout.depth), layout.depth_unit_m.0)
         .map_err(|e| fault(&e))?;
-    let mut mask = Mask::load(&folder.join(&layout.mask)).map_err(|e| fault(&e))?;
+    let mask = Mask::load(&folder.join(&layout.mask)).map_err(|e| fault(&e))?;
     let (w, h) = (color.width(), color.height());
     let camera = Camera::from_k(layout.k.0, w, h).map_err(|e| field("K", &e))?;
     for (name, width, height) in
@@ -49,12 +49,6 @@ pub fn load_frame_file(
             let problem = format!("the image is {width}x{height} pixels, rgb is {w}x{h}");
             return Err(field(name, &problem));
         }
-    }
-    if let Some(Lens(lens)) = &layout.lens {
-        let remap = Remap::undistort(camera, lens, camera);
-        color = remap.rgb(&color).map_err(|e| fault(&e))?;
-        depth = remap.depth(&depth).map_err(|e| fault(&e))?;
-        mask = remap.mask(&mask).map_err(|e| fault(&e))?;
     }
     let mesh_file = folder.join(&layout.mesh);
     let mesh = TriMesh::load(&mesh_file).map_err(|e| fault(&e))?;
@@ -88,6 +82,10 @@ pub fn load_frame_file(
     let gravity = layout.gravity.map(|g| Vector3::from(g.0));
     gravity.iter().try_for_each(check_gravity).map_err(|e| field("gravity", &e))?;
     let mut observation = Observation { camera, color, depth, mask, gravity, hand: measured };
+    if let Some(Lens(lens)) = &layout.lens {
+        let remap = Remap::undistort(camera, lens, camera);
+        observation.undistort(&remap).map_err(|e| fault(&e))?;
+    }
     if let Some(rig) = &rig {
         observation = rig.corrected(&observation).map_err(|e| fault(&e))?;
     }

@@ -15,15 +15,6 @@ pub(crate) struct ImageWarp {
 /// Number of coefficients of radial distortion.
 pub(crate) const RADIAL: usize = 2;
 
-/// Number of parameters of [`Block::Camera`](super::Block::Camera).
-const CAMERA: usize = CameraCalibrationError::DIMENSION;
-
-/// Places of parameters among those.
-const DEPTH_BIAS: usize = 1;
-const PRINCIPAL_POINT: usize = 2;
-const FOCAL_SCALE: usize = 4;
-const ASPECT: usize = 5;
-
 impl ImageWarp {
     /// Number of coefficients.
     pub(crate) fn len(&self) -> usize {
@@ -38,11 +29,12 @@ impl ImageWarp {
         ray: &Vector2<f64>,
         by_camera: &[f64],
     ) -> impl Iterator<Item = (usize, f64)> + use<> {
-        let along = ray.x * by_camera[PRINCIPAL_POINT] + ray.y * by_camera[PRINCIPAL_POINT + 1];
+        let along = ray.x * by_camera[CameraCalibrationError::PRINCIPAL_POINT]
+            + ray.y * by_camera[CameraCalibrationError::PRINCIPAL_POINT + 1];
         let squared = ray.norm_squared();
         // At one pixel distortion is a shift, and depth's field a bias.
         let radial = [squared * along, squared * squared * along];
-        let by_bias = by_camera[DEPTH_BIAS];
+        let by_bias = by_camera[CameraCalibrationError::DEPTH_BIAS];
         let depth = self.depth.weights(pixel.x, pixel.y);
         let depth = depth.map(move |(k, weight)| (RADIAL + k, weight * by_bias));
         radial.into_iter().enumerate().chain(depth)
@@ -51,8 +43,10 @@ impl ImageWarp {
 
 /// The changes of a camera's parameters, a column for each coefficient, that are to the image around `ray` (x/z, y/z) what radial distortion is: to
 /// first order in the size of that image, and but for its shear.
-pub(crate) fn radial_as_camera(ray: &Vector2<f64>) -> SMatrix<f64, CAMERA, RADIAL> {
-    let mut changes = SMatrix::<f64, CAMERA, RADIAL>::zeros();
+pub(crate) fn radial_as_camera(
+    ray: &Vector2<f64>,
+) -> SMatrix<f64, { CameraCalibrationError::DIMENSION }, RADIAL> {
+    let mut changes = SMatrix::<f64, { CameraCalibrationError::DIMENSION }, RADIAL>::zeros();
     let squared = ray.norm_squared();
     for power in 1..=RADIAL {
         // Displacements r²ⁿ x, and half the sum and half the difference of their derivatives along the image's axes.
@@ -62,10 +56,10 @@ pub(crate) fn radial_as_camera(ray: &Vector2<f64>) -> SMatrix<f64, CAMERA, RADIA
         let larger = (1.0 + n) * lower * squared;
         let wider = n * lower * (ray.x * ray.x - ray.y * ray.y);
         let mut change = changes.column_mut(power - 1);
-        change[PRINCIPAL_POINT] = shift.x - (larger + wider) * ray.x;
-        change[PRINCIPAL_POINT + 1] = shift.y - (larger - wider) * ray.y;
-        change[FOCAL_SCALE] = larger;
-        change[ASPECT] = wider;
+        change[CameraCalibrationError::PRINCIPAL_POINT] = shift.x - (larger + wider) * ray.x;
+        change[CameraCalibrationError::PRINCIPAL_POINT + 1] = shift.y - (larger - wider) * ray.y;
+        change[CameraCalibrationError::FOCAL_SCALE] = larger;
+        change[CameraCalibrationError::ASPECT] = wider;
     }
     changes
 }

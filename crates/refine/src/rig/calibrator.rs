@@ -134,7 +134,6 @@ impl Calibrator {
     pub fn visit(&self, frame: &CalibrationFrame) -> Result<Visit, RefineError> {
         let CalibrationFrame { obj_id, hand, initial, is_refined, .. } = frame;
         let has_mask = frame.observation.mask.count() > 0;
-        let read = frame.observation.hand.as_ref().map_or(&[][..], |hand| &hand.forces);
         let (observation, mut fused) = self.corrected(frame)?;
         if *is_refined {
             let stages = &mut fused.settings.stages;
@@ -153,7 +152,7 @@ impl Calibrator {
         let times = self.usual_disagreement.map(|usual| disagreement / usual);
         let left_out = times.filter(|times| *times > LEFT_OUT);
         let object = (*obj_id, &self.model(*obj_id)?.given);
-        let skin = SkinReading::new(&frame, &found.state, object, read);
+        let skin = SkinReading::new(&frame, &found.state, object);
         let obj_id = *obj_id;
         Ok(Visit { obj_id, information, disagreement, skin, left_out, has_mask, t_cam_object })
     }

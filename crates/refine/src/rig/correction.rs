@@ -1,7 +1,7 @@
 //! What a rig corrects.
 
 use nalgebra::Isometry3;
-use prehend_render::{BrownConrady, Distortion, DistortionError};
+use prehend_render::{BrownConrady, Distortion};
 
 use super::parameters::{Rig, of_other_joints};
 use crate::error::RefineError;
@@ -61,7 +61,7 @@ impl Rig {
 
     /// Makes the images of a camera, corrected, those of a pinhole.
     fn undistort(&self, observation: &mut Observation) -> Result<(), RefineError> {
-        let Observation { camera, color, depth, mask, .. } = observation;
+        let camera = observation.camera;
         // Coefficients of opposite signs may cancel at the corners and not inside; without signs they bound both.
         let bound = lens(self.distortion.map(f64::abs));
         let (right, below) = ((camera.width - 1) as f64, (camera.height - 1) as f64);
@@ -72,15 +72,11 @@ impl Rig {
         if moved.into_iter().fold(0.0, f64::max) < STRAIGHT {
             return Ok(());
         }
-        let remap = self.remaps.get(*camera, Distortion::BrownConrady(lens(self.distortion)));
-        let failed = |error: DistortionError| RefineError::Setting {
+        let remap = self.remaps.get(camera, Distortion::BrownConrady(lens(self.distortion)));
+        observation.undistort(&remap).map_err(|error| RefineError::Setting {
             name: "rig",
             problem: format!("distortion: {error}"),
-        };
-        *color = remap.rgb(color).map_err(failed)?;
-        *depth = remap.depth(depth).map_err(failed)?;
-        *mask = remap.mask(mask).map_err(failed)?;
-        Ok(())
+        })
     }
 
     /// Object `id` with its surface displaced and its mass corrected; `None` if the rig knows nothing of it.

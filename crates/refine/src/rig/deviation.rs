@@ -35,6 +35,8 @@ pub struct SurfaceDeviation {
     pub(super) coefficients: Matrix3xX<f64>,
     /// Covariance of the coefficients in one direction: what is still not known of them.
     pub(super) covariance: DMatrix<f64>,
+    /// Standard deviation of what it leaves, in each direction \[m\].
+    left: f64,
 }
 
 impl SurfaceDeviation {
@@ -64,7 +66,10 @@ impl SurfaceDeviation {
             // What makes it certainly positive definite.
             correlation(&nodes[i], &nodes[j], length_scale) + if i == j { 1e-6 } else { 0.0 }
         });
-        Some(Self { settings, nodes, factor: Cholesky::new(among)?, coefficients, covariance })
+        let factor = Cholesky::new(among)?;
+        let mut field = Self { settings, nodes, factor, coefficients, covariance, left: 0.0 };
+        field.left = field.mean_left();
+        Some(field)
     }
 
     /// How many coefficients a direction has.
@@ -99,6 +104,7 @@ impl SurfaceDeviation {
             DMatrix::from_fn(count, count, |r, c| covariance[(3 * r + axis, 3 * c + axis)])
         };
         self.covariance = (of_axis(0) + of_axis(1) + of_axis(2)) / 3.0;
+        self.left = self.mean_left();
     }
 
     /// Covariance of what it leaves at `places` of the model, in each direction \[m²\]: what is not known of the coefficients, and what places are
@@ -117,6 +123,11 @@ impl SurfaceDeviation {
 
     /// Standard deviation of what it leaves, in each direction \[m\].
     pub(crate) fn left(&self) -> f64 {
+        self.left
+    }
+
+    /// That, at the nodes.
+    fn mean_left(&self) -> f64 {
         let trace = self.left_covariance(&self.nodes).trace();
         (trace / self.count().max(1) as f64).sqrt()
     }

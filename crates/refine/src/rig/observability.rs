@@ -5,7 +5,6 @@ use std::fmt;
 use nalgebra::{DMatrix, DVector, Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use super::parameters::Rig;
-use crate::problem::RADIAL;
 use crate::scene::{Hand, Object, Observation, View};
 
 /// A combination of a rig's parameters that frames have hardly determined.
@@ -156,13 +155,12 @@ pub(super) fn unobserved_directions(
 /// What brings changes of all parameters to those of the named ones in their deviations beforehand, with the field of depth in the middle of the
 /// image counted to the bias: of the two, frames can only tell the sum.
 fn whitening(rig: &Rig, prior: &DVector<f64>) -> DMatrix<f64> {
-    let first_offset = rig.first_warp() + RADIAL;
-    let mut named = DMatrix::zeros(first_offset, rig.len());
+    let mut named = DMatrix::zeros(rig.first_offset(), rig.len());
     named.fill_with_identity();
     let [width, height] = rig.warp.depth.size();
     let bias = rig.depth_bias();
     for (k, weight) in rig.warp.depth.weights(width as f64 / 2.0, height as f64 / 2.0) {
-        named[(bias, first_offset + k)] += weight;
+        named[(bias, rig.first_offset() + k)] += weight;
     }
     for mut row in named.row_iter_mut() {
         let variance: f64 = row.iter().zip(prior).map(|(part, prior)| part * part / prior).sum();

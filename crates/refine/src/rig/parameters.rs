@@ -97,9 +97,14 @@ impl Rig {
         POSES + self.joints.len() + CameraCalibrationError::DIMENSION
     }
 
+    /// Where the coefficients of depth's field begin.
+    pub(super) fn first_offset(&self) -> usize {
+        self.first_warp() + RADIAL
+    }
+
     /// Where depth's bias is among them.
     pub(super) fn depth_bias(&self) -> usize {
-        POSES + self.joints.len() + 1
+        POSES + self.joints.len() + CameraCalibrationError::DEPTH_BIAS
     }
 
     /// The parameters, zero where nothing is corrected.
@@ -197,7 +202,8 @@ impl Rig {
         if let Some(pixel) = camera.project(&said.center().into()) {
             let (at, first) = (layout.offset(Block::Camera) - object_rows, self.first_warp());
             for (k, weight) in self.warp.depth.weights(pixel.x, pixel.y) {
-                jacobian[(at + 1, first + RADIAL + k)] += weight;
+                jacobian[(at + CameraCalibrationError::DEPTH_BIAS, self.first_offset() + k)] +=
+                    weight;
             }
             let radial = radial_as_camera(&camera.ray(pixel.x, pixel.y).xy());
             jacobian.view_mut((at, first), radial.shape()).copy_from(&radial);

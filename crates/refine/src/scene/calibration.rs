@@ -36,6 +36,12 @@ impl CameraCalibrationError {
     /// Number of parameters.
     pub(crate) const DIMENSION: usize = 6;
 
+    /// Where they are, in the order of [`parameters`](Self::parameters).
+    pub(crate) const DEPTH_BIAS: usize = 1;
+    pub(crate) const PRINCIPAL_POINT: usize = 2;
+    pub(crate) const FOCAL_SCALE: usize = 4;
+    pub(crate) const ASPECT: usize = 5;
+
     /// The parameters, zero where nothing is corrected.
     pub fn parameters(&self) -> [f64; Self::DIMENSION] {
         let [x, y] = self.principal_point.into();

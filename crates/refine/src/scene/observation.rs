@@ -1,7 +1,7 @@
 //! What was sensed in one frame.
 
 use nalgebra::{Isometry3, Vector3};
-use prehend_render::{Camera, DepthImage, Mask, RgbImage};
+use prehend_render::{Camera, DepthImage, DistortionError, Mask, Remap, RgbImage};
 
 use crate::error::RefineError;
 
@@ -44,6 +44,17 @@ pub struct Observation {
 }
 
 impl Observation {
+    /// Makes images behind a lens those of a pinhole.
+    ///
+    /// # Errors
+    /// If one has another size than `remap` is for.
+    pub(crate) fn undistort(&mut self, remap: &Remap) -> Result<(), DistortionError> {
+        self.color = remap.rgb(&self.color)?;
+        self.depth = remap.depth(&self.depth)?;
+        self.mask = remap.mask(&self.mask)?;
+        Ok(())
+    }
+
     /// Refuses images that have not the camera's size: the first of color, depth and mask, and what is wrong.
     pub(crate) fn check_sizes(&self) -> Result<(), (&'static str, String)> {
         let expected = (self.camera.width, self.camera.height);

@@ -1,6 +1,8 @@
 //! Derivatives of the dynamics, in closed form.
 
-use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, Vector3, Vector6};
+use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
+
+use prehend_autodiff::lie::cross_matrix;
 
 use super::kinematics::Kinematics;
 use super::spatial::{SpatialInertia, angular, cross_force, cross_motion, linear};
@@ -68,23 +70,18 @@ impl Kinematics<'_> {
                     + cross_force(axis, &effort.forces[index]);
                 let pushed = rate * axis + composite.times(&with_both[freedom]);
                 let (by_rate, by_inertia) = (rate.tr_mul(axis), composite.times(axis));
-                let mut ancestor = Some(index);
-                while let Some(of) = ancestor {
-                    let [_, others] = self.tree.range(of);
-                    for other in others {
-                        by_position[(freedom, other)] =
-                            by_rate.dot(&with_parent[other]) + by_inertia.dot(&twice[other]);
-                        by_velocity[(freedom, other)] =
-                            by_rate.dot(&self.axes[other]) + by_inertia.dot(&with_both[other]);
-                        let mass = by_inertia.dot(&self.axes[other]);
-                        by_acceleration[(freedom, other)] = mass;
-                        by_acceleration[(other, freedom)] = mass;
-                        if of != index {
-                            by_position[(other, freedom)] = self.axes[other].dot(&moved);
-                            by_velocity[(other, freedom)] = self.axes[other].dot(&pushed);
-                        }
+                for other in self.tree.freedoms_of(index) {
+                    by_position[(freedom, other)] =
+                        by_rate.dot(&with_parent[other]) + by_inertia.dot(&twice[other]);
+                    by_velocity[(freedom, other)] =
+                        by_rate.dot(&self.axes[other]) + by_inertia.dot(&with_both[other]);
+                    let mass = by_inertia.dot(&self.axes[other]);
+                    by_acceleration[(freedom, other)] = mass;
+                    by_acceleration[(other, freedom)] = mass;
+                    if self.tree.link_of(other) != index {
+                        by_position[(other, freedom)] = self.axes[other].dot(&moved);
+                        by_velocity[(other, freedom)] = self.axes[other].dot(&pushed);
                     }
-                    ancestor = links[of].parent;
                 }
                 by_acceleration[(freedom, freedom)] += link.armature;
             }
@@ -131,26 +128,24 @@ fn rate(v: &Vector6<f64>, inertia: &SpatialInertia<f64>) -> Matrix6<f64> {
     // The inertia's own rate is that of a body about a moving point.
     let moment = inertia.moment;
     let moment_rate = linear(v) * inertia.mass + spin.cross(&moment);
-    let turned = cross(&spin) * inertia.inertia;
+    let turned = cross_matrix(&spin) * inertia.inertia;
     // −(v c̄ + c̄ v), c̄ the first moment.
     let velocity = linear(v);
-    let carried = cross(&velocity) * cross(&moment);
+    let carried = cross_matrix(&velocity) * cross_matrix(&moment);
     let inertia_rate = turned + turned.transpose() - carried - carried.transpose();
     let mut matrix = Matrix6::zeros();
-    let change = cross(&moment_rate);
-    let pull = cross(&force);
+    let change = cross_matrix(&moment_rate);
+    let pull = cross_matrix(&force);
     matrix.fixed_view_mut::<3, 3>(0, 3).copy_from(&(-change - pull));
     matrix.fixed_view_mut::<3, 3>(3, 0).copy_from(&(change - pull));
-    matrix.fixed_view_mut::<3, 3>(3, 3).copy_from(&(inertia_rate - cross(&torque)));
+    matrix.fixed_view_mut::<3, 3>(3, 3).copy_from(&(inertia_rate - cross_matrix(&torque)));
     matrix
-}
-
-fn cross(v: &Vector3<f64>) -> Matrix3<f64> {
-    v.cross_matrix()
 }
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::{Matrix3, Vector3};
+
     use super::*;
 
     #[test]

@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix3, Quaternion, Unit, UnitQuaternion, Vector3, Vector6};
 use prehend_autodiff::Scalar;
+use prehend_autodiff::lie::{se3_exp, so3_exp};
 
 use super::spatial::spatial;
 
@@ -93,8 +94,7 @@ impl Joint {
             Self::Spherical => push(&(quaternion(q) * exponential(step)), after),
             Self::Floating => {
                 let turned = quaternion(&q[3..]);
-                let twist = nalgebra::Vector6::from_column_slice(step);
-                let moved = prehend_autodiff::lie::se3_exp(&twist);
+                let moved = se3_exp(&Vector6::from_column_slice(step));
                 let place = Vector3::new(q[0], q[1], q[2]) + turned * moved.translation.vector;
                 after.extend(place.iter());
                 push(&(turned * moved.rotation), after);
@@ -104,7 +104,7 @@ impl Joint {
 }
 
 fn exponential<S: Scalar>(step: &[S]) -> UnitQuaternion<S> {
-    prehend_autodiff::lie::so3_exp(&Vector3::new(step[0], step[1], step[2]))
+    so3_exp(&Vector3::new(step[0], step[1], step[2]))
 }
 
 fn push<S: Scalar>(rotation: &UnitQuaternion<S>, coordinates: &mut Vec<S>) {
@@ -122,7 +122,7 @@ fn rotation<S: Scalar>(q: &[S]) -> Matrix3<S> {
     quaternion(q).to_rotation_matrix().into_inner()
 }
 
-/// The rotation by `angle` about `axis` (Rodrigues).
+/// The rotation by `angle` about `axis` (Rodrigues): nalgebra's own branches at zero, and has no derivative there.
 #[inline]
 fn turn<S: Scalar>(axis: &Vector3<f64>, angle: S) -> Matrix3<S> {
     let (sin, cos) = angle.sin_cos();

@@ -121,15 +121,9 @@ impl<'a, S: Scalar> Kinematics<'a, S> {
     pub fn jacobian(&self, link: usize, point: &Point3<S>) -> Matrix6xX<S> {
         let arm = self.places[link] + self.rotations[link] * point.coords;
         let mut jacobian = Matrix6xX::zeros(self.axes.len());
-        let mut next = Some(link);
-        while let Some(index) = next {
-            let [_, freedoms] = self.tree.range(index);
-            for freedom in freedoms {
-                let (velocity, spin) = (linear(&self.axes[freedom]), angular(&self.axes[freedom]));
-                let column = spatial(&(velocity + spin.cross(&arm)), &spin);
-                jacobian.set_column(freedom, &column);
-            }
-            next = self.tree.links()[index].parent;
+        for freedom in self.tree.freedoms_of(link) {
+            let (velocity, spin) = (linear(&self.axes[freedom]), angular(&self.axes[freedom]));
+            jacobian.set_column(freedom, &spatial(&(velocity + spin.cross(&arm)), &spin));
         }
         jacobian
     }

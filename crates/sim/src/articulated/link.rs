@@ -59,6 +59,8 @@ pub struct Articulation<S: Scalar = f64> {
     link_of: Vec<usize>,
     /// Of each degree of freedom: the one that carries it, the last of those before it on the way to the world.
     carriers: Vec<Option<usize>>,
+    /// Of each link: the last degree of freedom that moves it.
+    last: Vec<Option<usize>>,
     /// Acceleration of free fall \[m/s²\].
     gravity: Vector3<f64>,
 }
@@ -90,7 +92,6 @@ impl<S: Scalar> Articulation<S> {
     pub fn new(links: Vec<Link<S>>, gravity: Vector3<f64>) -> Result<Self, ArticulationError> {
         let (mut first, mut link_of) = (Vec::with_capacity(links.len() + 1), Vec::new());
         let mut carriers = Vec::new();
-        // Of each link: the last degree of freedom that moves it.
         let mut last: Vec<Option<usize>> = Vec::with_capacity(links.len());
         let mut next = [0, 0];
         for (index, link) in links.iter().enumerate() {
@@ -117,7 +118,7 @@ impl<S: Scalar> Articulation<S> {
             last.push(carrier);
         }
         first.push(next);
-        Ok(Self { links, first, link_of, carriers, gravity })
+        Ok(Self { links, first, link_of, carriers, last, gravity })
     }
 
     /// The links, each after its parent.
@@ -148,6 +149,11 @@ impl<S: Scalar> Articulation<S> {
     /// The link that a degree of freedom moves.
     pub(super) fn link_of(&self, freedom: usize) -> usize {
         self.link_of[freedom]
+    }
+
+    /// The degrees of freedom that move a link, the nearest first.
+    pub(super) fn freedoms_of(&self, link: usize) -> impl Iterator<Item = usize> {
+        std::iter::successors(self.last[link], |k| self.carriers[*k])
     }
 
     /// Of each degree of freedom the one that carries it.
@@ -202,7 +208,7 @@ impl Articulation {
             armature: S::constant(link.armature),
         });
         let (first, link_of) = (self.first.clone(), self.link_of.clone());
-        let (carriers, gravity) = (self.carriers.clone(), self.gravity);
-        Articulation { links: links.collect(), first, link_of, carriers, gravity }
+        let (carriers, last, gravity) = (self.carriers.clone(), self.last.clone(), self.gravity);
+        Articulation { links: links.collect(), first, link_of, carriers, last, gravity }
     }
 }

@@ -15,15 +15,10 @@ impl<S: Scalar> Kinematics<'_, S> {
             let [_, freedoms] = self.tree.range(index);
             for freedom in freedoms {
                 let force = composites[index].times(&self.axes[freedom]);
-                let mut ancestor = Some(index);
-                while let Some(of) = ancestor {
-                    let [_, others] = self.tree.range(of);
-                    for other in others {
-                        let entry = self.axes[other].dot(&force);
-                        matrix[(other, freedom)] = entry;
-                        matrix[(freedom, other)] = entry;
-                    }
-                    ancestor = self.tree.links()[of].parent;
+                for other in self.tree.freedoms_of(index) {
+                    let entry = self.axes[other].dot(&force);
+                    matrix[(other, freedom)] = entry;
+                    matrix[(freedom, other)] = entry;
                 }
                 matrix[(freedom, freedom)] += link.armature;
             }

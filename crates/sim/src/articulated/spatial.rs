@@ -5,6 +5,7 @@
 
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 use prehend_autodiff::Scalar;
+use prehend_autodiff::lie::cross_matrix;
 
 /// (linear, angular).
 #[inline]
@@ -75,8 +76,7 @@ impl<S: Scalar> SpatialInertia<S> {
     #[inline]
     pub(crate) fn matrix(&self) -> Matrix6<S> {
         let mut matrix = Matrix6::zeros();
-        let [x, y, z] = self.moment.into();
-        let cross = Matrix3::new(S::zero(), -z, y, z, S::zero(), -x, -y, x, S::zero());
+        let cross = cross_matrix(&self.moment);
         for k in 0..3 {
             matrix[(k, k)] = self.mass;
         }

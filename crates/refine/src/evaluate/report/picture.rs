@@ -35,10 +35,9 @@ pub fn rig_picture(
     after: (&Observation, &Object, &Isometry3<f64>),
     hand: &Hand,
 ) -> RgbImage {
-    // A calibration changes no colors.
-    let image = brightened(before.0);
     let draw = |(observation, object, pose): (&Observation, &Object, &Isometry3<f64>), color| {
-        outlined(image.clone(), observation, object, Some(hand), pose, color)
+        // Undistorted images are others than those before.
+        outlined(brightened(observation), observation, object, Some(hand), pose, color)
     };
     side_by_side([draw(before, BEFORE), draw(after, AFTER)], window(before.0))
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use crate::problem::State;
-use crate::scene::{Frame, Hand, Object};
+use crate::scene::{Frame, Hand, HandMeasurement, Object};
 
 /// The skin in a frame, in coordinates of the object where a visit has found it.
 #[derive(Clone)]
@@ -31,14 +31,13 @@ const SAME_GRASP: (f64, f64) = (10e-3, 0.1);
 const REACH: f64 = 8e-3;
 
 impl SkinReading {
-    /// Of a frame at `state`, of `object` as it is given, whose taxels read `forces`; `None` without a skin, or if it cannot be posed.
+    /// Of a frame at `state`, whose forces are as they were read, of `object` as it is given; `None` without a skin, or if it cannot be posed.
     pub(in crate::rig) fn new(
         frame: &Frame<'_>,
         state: &State,
         (obj_id, object): (u32, &Arc<Object>),
-        forces: &[Vector3<f64>],
     ) -> Option<Self> {
-        let (hand, _) = frame.hand()?;
+        let (hand, HandMeasurement { forces, .. }) = frame.hand()?;
         if forces.is_empty() || forces.len() != hand.taxels.len() {
             return None;
         }
@@ -52,7 +51,7 @@ impl SkinReading {
             hand: Arc::clone(hand),
             t_object_hand: t_object_cam * state.t_cam_hand,
             t_object_links,
-            forces: forces.to_vec(),
+            forces: forces.clone(),
             distances: Vec::new(),
             gravity: frame.observation().gravity.map(|gravity| t_object_cam * gravity),
         };
@@ -117,11 +116,10 @@ pub(super) mod tests {
 
     /// Of a scene as it truly is, with a hand displaced on the object.
     pub(in super::super) fn reading(scene: &Scene, displaced: Vector3<f64>) -> SkinReading {
-        let hand = scene.observation.hand.as_ref().unwrap();
         let frame = Frame::new(&scene.observation, &scene.object, Some(&scene.hand)).unwrap();
         let mut state = State::new(&frame, &scene.truth).unwrap();
         state.t_cam_object.translation.vector += displaced;
-        SkinReading::new(&frame, &state, (5, &scene.object), &hand.forces).unwrap()
+        SkinReading::new(&frame, &state, (5, &scene.object)).unwrap()
     }
 
     #[test]
