@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 
 use prehend_autodiff::lie::cross_matrix;
+use prehend_autodiff::{Fwd, Scalar};
 
 use super::kinematics::Kinematics;
 use super::spatial::{SpatialInertia, angular, cross_force, cross_motion, linear};
@@ -38,6 +39,9 @@ impl Kinematics<'_> {
     /// # Panics
     /// If there is not one acceleration for each degree of freedom.
     pub fn inverse_dynamics_derivatives(&self, accelerations: &[f64]) -> DynamicsDerivatives {
+        if let Some([q, v]) = &self.custom {
+            return self.by_forward_mode(q, v, accelerations);
+        }
         let effort = self.effort(accelerations);
         let (n, links) = (self.axes.len(), self.tree.links());
         // How axes change: with their parent's motion, and with their own link's.
@@ -90,6 +94,27 @@ impl Kinematics<'_> {
             }
         }
         DynamicsDerivatives { by_position, by_velocity, by_acceleration }
+    }
+
+    /// [`inverse_dynamics_derivatives`](Self::inverse_dynamics_derivatives) at coordinates `q` and velocities `v`, direction by direction.
+    fn by_forward_mode(&self, q: &[f64], v: &[f64], accelerations: &[f64]) -> DynamicsDerivatives {
+        let n = v.len();
+        let lifted = self.tree.lift::<Fwd<1>>();
+        let constants = |x: &[f64]| x.iter().map(|x| Fwd::constant(*x)).collect::<Vec<Fwd<1>>>();
+        let [q, v, accelerations] = [q, v, accelerations].map(constants);
+        let effort = |q: &[Fwd<1>], v: &[Fwd<1>]| {
+            let at = lifted.kinematics(q, v).under(self.gravity.map(Fwd::constant));
+            at.inverse_dynamics(&accelerations).map(|x| x.derivative[0])
+        };
+        let [mut by_position, mut by_velocity] = [(); 2].map(|()| DMatrix::zeros(n, n));
+        for k in 0..n {
+            let mut step = vec![Fwd::constant(0.0); n];
+            step[k] = Fwd::variable(0.0, 0);
+            by_position.set_column(k, &effort(&lifted.moved(&q, &step), &v));
+            let pushed: Vec<Fwd<1>> = v.iter().zip(&step).map(|(v, step)| *v + *step).collect();
+            by_velocity.set_column(k, &effort(&q, &pushed));
+        }
+        DynamicsDerivatives { by_position, by_velocity, by_acceleration: self.mass_matrix() }
     }
 
     /// Derivatives of [forward dynamics](Self::forward_dynamics), whose result is `accelerations`: those of inverse dynamics there,

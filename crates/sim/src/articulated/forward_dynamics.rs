@@ -4,7 +4,15 @@ use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 use prehend_autodiff::Scalar;
 
 use super::kinematics::Kinematics;
-use super::spatial::{cross_force, cross_motion};
+use super::spatial::cross_force;
+
+/// What is left of the algorithm when accelerations are known: the factor of the mass matrix.
+pub(super) struct ArticulatedInertia<S: Scalar> {
+    /// Of each degree of freedom, the force of its acceleration on what hangs on it.
+    pulls: Vec<Vector6<S>>,
+    /// Of each link, the inverse of the efforts that accelerations of its joint take.
+    inverses: Vec<DMatrix<S>>,
+}
 
 impl<S: Scalar> Kinematics<'_, S> {
     /// Accelerations v̇ by efforts τ \[N m or N\]; not finite where a degree of freedom moves no mass.
@@ -12,6 +20,24 @@ impl<S: Scalar> Kinematics<'_, S> {
     /// # Panics
     /// If there is not one for each degree of freedom.
     pub fn forward_dynamics(&self, efforts: &[S]) -> DVector<S> {
+        self.articulated(efforts, None).0
+    }
+
+    /// [`forward_dynamics`](Self::forward_dynamics) with `wrenches` on the links: forces \[N\] and torques about the links' origins
+    /// \[N m\], along the world's axes.
+    ///
+    /// # Panics
+    /// If there is not one effort for each degree of freedom and one wrench for each link.
+    pub fn forward_dynamics_under(&self, efforts: &[S], wrenches: &[Vector6<S>]) -> DVector<S> {
+        self.articulated(efforts, Some(wrenches)).0
+    }
+
+    /// Accelerations, and the inertias that they follow from.
+    pub(super) fn articulated(
+        &self,
+        efforts: &[S],
+        wrenches: Option<&[Vector6<S>]>,
+    ) -> (DVector<S>, ArticulatedInertia<S>) {
         let n = self.axes.len();
         assert_eq!(efforts.len(), n, "one number a degree of freedom");
         let links = self.tree.links();
@@ -20,9 +46,12 @@ impl<S: Scalar> Kinematics<'_, S> {
         for (velocity, inertia) in self.velocities.iter().zip(&self.inertias) {
             biases.push(cross_force(velocity, &inertia.times(velocity)));
         }
-        let drift =
-            |index: usize| cross_motion(&self.velocities[index], &self.joint_velocities[index]);
-        // Of each degree of freedom: the force of its acceleration, and of a joint the inverse of what efforts it takes.
+        if let Some(wrenches) = wrenches {
+            assert_eq!(wrenches.len(), links.len(), "one wrench a link");
+            for (index, (bias, wrench)) in biases.iter_mut().zip(wrenches).enumerate() {
+                *bias -= self.about_origin(index, wrench);
+            }
+        }
         let mut pulls = vec![Vector6::zeros(); n];
         let mut rest = vec![S::zero(); n];
         let mut inverses: Vec<DMatrix<S>> = vec![DMatrix::zeros(0, 0); links.len()];
@@ -60,24 +89,75 @@ impl<S: Scalar> Kinematics<'_, S> {
                 inverses[index] = inverse;
             }
             if let Some(parent) = link.parent {
-                biases[parent] += pull + left * drift(index);
+                biases[parent] += pull + left * self.drifts[index];
                 inertias[parent] += left;
             }
         }
+        let factor = ArticulatedInertia { pulls, inverses };
+        let result = self.outward(&factor, &rest, self.rest(), |index| self.drifts[index]);
+        (result, factor)
+    }
+
+    /// M⁻¹ `efforts`, as accelerations from rest without gravity.
+    pub(super) fn accelerated(
+        &self,
+        factor: &ArticulatedInertia<S>,
+        efforts: &[S],
+    ) -> DVector<S> {
+        let mut rest = efforts.to_vec();
+        let mut forces = vec![Vector6::zeros(); self.tree.links().len()];
+        for (index, link) in self.tree.links().iter().enumerate().rev() {
+            let [_, freedoms] = self.tree.range(index);
+            let mut force: Vector6<S> = forces[index];
+            for freedom in freedoms.clone() {
+                rest[freedom] -= self.axes[freedom].dot(&forces[index]);
+            }
+            let Some(parent) = link.parent else { continue };
+            for r in freedoms.clone() {
+                let inverse = factor.inverses[index].row(r - freedoms.start);
+                let pushed = inverse.iter().zip(&rest[freedoms.clone()]);
+                let value = pushed.fold(S::zero(), |sum, (i, rest)| sum + *i * *rest);
+                force += factor.pulls[r] * value;
+            }
+            forces[parent] += force;
+        }
+        self.outward(factor, &rest, Vector6::zeros(), |_| Vector6::zeros())
+    }
+
+    /// Accelerations of the joints, from the root outward, by what `rest`s of the efforts.
+    fn outward(
+        &self,
+        factor: &ArticulatedInertia<S>,
+        rest: &[S],
+        root: Vector6<S>,
+        drift: impl Fn(usize) -> Vector6<S>,
+    ) -> DVector<S> {
+        let links = self.tree.links();
         let mut accelerations: Vec<Vector6<S>> = Vec::with_capacity(links.len());
-        let mut result = DVector::zeros(n);
+        let mut result = DVector::zeros(rest.len());
         for (index, link) in links.iter().enumerate() {
-            let of_parent = link.parent.map_or_else(|| self.rest(), |p| accelerations[p]);
+            let of_parent = link.parent.map_or(root, |p| accelerations[p]);
             let mut acceleration = of_parent + drift(index);
             let [_, freedoms] = self.tree.range(index);
             let first = freedoms.start;
-            let left: Vec<S> =
-                freedoms.clone().map(|f| rest[f] - pulls[f].dot(&acceleration)).collect();
-            for freedom in freedoms {
-                let inverse = inverses[index].row(freedom - first);
-                let value = inverse.iter().zip(&left).fold(S::zero(), |sum, (i, l)| sum + *i * *l);
-                acceleration += self.axes[freedom] * value;
-                result[freedom] = value;
+            let inverse = &factor.inverses[index];
+            if freedoms.len() == 1 {
+                let value =
+                    inverse[0] * (rest[first] - factor.pulls[first].dot(&acceleration));
+                acceleration += self.axes[first] * value;
+                result[first] = value;
+            } else {
+                let left: Vec<S> = freedoms
+                    .clone()
+                    .map(|f| rest[f] - factor.pulls[f].dot(&acceleration))
+                    .collect();
+                for freedom in freedoms {
+                    let inverse = inverse.row(freedom - first);
+                    let terms = inverse.iter().zip(&left);
+                    let value = terms.fold(S::zero(), |sum, (i, l)| sum + *i * *l);
+                    acceleration += self.axes[freedom] * value;
+                    result[freedom] = value;
+                }
             }
             accelerations.push(acceleration);
         }

@@ -4,7 +4,7 @@ use nalgebra::{DVector, Vector3, Vector6};
 use prehend_autodiff::Scalar;
 
 use super::kinematics::Kinematics;
-use super::spatial::{cross_force, cross_motion, spatial};
+use super::spatial::{cross_force, spatial};
 
 /// Motion and force of all links at some accelerations.
 pub(super) struct Effort<S: Scalar> {
@@ -42,7 +42,7 @@ impl<S: Scalar> Kinematics<'_, S> {
                 Some(parent) => effort.accelerations[parent],
                 None => self.rest(),
             };
-            acceleration += cross_motion(velocity, &self.joint_velocities[index]);
+            acceleration += self.drifts[index];
             let [_, freedoms] = self.tree.range(index);
             for freedom in freedoms {
                 acceleration += self.axes[freedom] * accelerations[freedom];
@@ -64,6 +64,6 @@ impl<S: Scalar> Kinematics<'_, S> {
 
     /// Acceleration of the world, less that of free fall.
     pub(super) fn rest(&self) -> Vector6<S> {
-        spatial(&self.tree.gravity().map(|g| S::constant(-g)), &Vector3::zeros())
+        spatial(&-self.gravity, &Vector3::zeros())
     }
 }

@@ -1,9 +1,12 @@
 //! How a link may move with respect to its parent.
 
+use std::sync::Arc;
+
 use nalgebra::{Matrix3, Quaternion, Unit, UnitQuaternion, Vector3, Vector6};
 use prehend_autodiff::Scalar;
 use prehend_autodiff::lie::{se3_exp, so3_exp};
 
+use super::joint_model::{DynJointModel, JointModel, MOST};
 use super::spatial::spatial;
 
 /// A joint of a link, in the joint's frame: where the link is, by coordinates q, and how it moves, by velocities v.
@@ -14,10 +17,11 @@ use super::spatial::spatial;
 /// | revolute | angle \[rad\] | \[rad/s\] |
 /// | prismatic | displacement \[m\] | \[m/s\] |
 /// | spherical | quaternion (i, j, k, w) | angular velocity, link's axes \[rad/s\] |
+/// | one's own | 1 to 3 numbers | their rates |
 /// | floating | position \[m\], quaternion (i, j, k, w) | velocity of the link's origin \[m/s\] and angular velocity \[rad/s\], link's axes |
 ///
-/// Quaternions are normalized where they are read.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// Quaternions are normalized where they are read. A joint that turns on and on is a revolute one: none has limits of its own.
+#[derive(Clone, Debug, PartialEq)]
 pub enum Joint {
     /// Not at all.
     Fixed,
@@ -29,9 +33,27 @@ pub enum Joint {
     Spherical,
     /// Moving freely.
     Floating,
+    /// As a [`JointModel`] says.
+    Custom(CustomJoint),
+}
+
+/// A [`JointModel`], see [`Joint::custom`].
+#[derive(Clone, Debug)]
+pub struct CustomJoint(pub(super) Arc<dyn DynJointModel>);
+
+impl PartialEq for CustomJoint {
+    /// Whether they are the same one.
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+    }
 }
 
 impl Joint {
+    /// A joint type of one's own.
+    pub fn custom(model: impl JointModel) -> Self {
+        Self::Custom(CustomJoint(Arc::new(model)))
+    }
+
     /// Number of coordinates.
     pub fn coordinates(&self) -> usize {
         match self {
@@ -39,6 +61,7 @@ impl Joint {
             Self::Revolute(_) | Self::Prismatic(_) => 1,
             Self::Spherical => 4,
             Self::Floating => 7,
+            Self::Custom(CustomJoint(model)) => model.freedoms(),
         }
     }
 
@@ -49,24 +72,26 @@ impl Joint {
             Self::Revolute(_) | Self::Prismatic(_) => 1,
             Self::Spherical => 3,
             Self::Floating => 6,
+            Self::Custom(CustomJoint(model)) => model.freedoms(),
         }
     }
 
-    /// The coordinates at which link and joint frame coincide.
+    /// The coordinates from which others are counted: link and joint frame coincide there, but for joint types of one's own.
     pub fn neutral(&self) -> &'static [f64] {
         match self {
             Self::Fixed => &[],
             Self::Revolute(_) | Self::Prismatic(_) => &[0.0],
             Self::Spherical => &[0.0, 0.0, 0.0, 1.0],
             Self::Floating => &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
+            Self::Custom(CustomJoint(model)) => &[0.0; MOST][..model.freedoms()],
         }
     }
 
-    /// Rotation and place of the link in the joint's frame.
+    /// Rotation and place of the link in the joint's frame; not of a joint type of one's own.
     #[inline]
     pub(super) fn placement<S: Scalar>(&self, q: &[S]) -> (Option<Matrix3<S>>, Option<Vector3<S>>) {
         match self {
-            Self::Fixed => (None, None),
+            Self::Fixed | Self::Custom(_) => (None, None),
             Self::Revolute(axis) => (Some(turn(axis, q[0])), None),
             Self::Prismatic(axis) => (None, Some(axis.map(|a| q[0].times(a)))),
             Self::Spherical => (Some(rotation(q)), None),
@@ -74,11 +99,11 @@ impl Joint {
         }
     }
 
-    /// The motions of unit velocities, in the frame of the link, at its origin: constant.
+    /// The motions of unit velocities, in the frame of the link, at its origin: constant; not of a joint type of one's own.
     #[inline]
     pub(super) fn axis(&self, freedom: usize) -> Vector6<f64> {
         match self {
-            Self::Fixed => Vector6::zeros(),
+            Self::Fixed | Self::Custom(_) => Vector6::zeros(),
             Self::Revolute(axis) => spatial(&Vector3::zeros(), axis),
             Self::Prismatic(axis) => spatial(axis, &Vector3::zeros()),
             Self::Spherical => Vector6::ith(3 + freedom, 1.0),
@@ -90,7 +115,9 @@ impl Joint {
     pub(super) fn moved<S: Scalar>(&self, q: &[S], step: &[S], after: &mut Vec<S>) {
         match self {
             Self::Fixed => {}
-            Self::Revolute(_) | Self::Prismatic(_) => after.push(q[0] + step[0]),
+            Self::Revolute(_) | Self::Prismatic(_) | Self::Custom(_) => {
+                after.extend(q.iter().zip(step).map(|(q, step)| *q + *step));
+            }
             Self::Spherical => push(&(quaternion(q) * exponential(step)), after),
             Self::Floating => {
                 let turned = quaternion(&q[3..]);

@@ -5,8 +5,10 @@ use nalgebra::{
 };
 use prehend_autodiff::Scalar;
 
+use super::joint::{CustomJoint, Joint};
+use super::joint_model::Course;
 use super::link::Articulation;
-use super::spatial::{SpatialInertia, angular, linear, spatial};
+use super::spatial::{SpatialInertia, angular, cross_motion, linear, spatial};
 
 /// Positions, velocities and inertias of the links at some coordinates and velocities.
 ///
@@ -15,7 +17,7 @@ use super::spatial::{SpatialInertia, angular, linear, spatial};
 pub struct Kinematics<'a, S: Scalar = f64> {
     pub(super) tree: &'a Articulation<S>,
     /// That origin, in the world \[m\].
-    origin: Vector3<f64>,
+    pub(super) origin: Vector3<f64>,
     /// Link → world, about the origin.
     pub(super) rotations: Vec<Matrix3<S>>,
     pub(super) places: Vec<Vector3<S>>,
@@ -24,7 +26,13 @@ pub struct Kinematics<'a, S: Scalar = f64> {
     /// Of each link, that of its joint alone, and with its parent's.
     pub(super) joint_velocities: Vec<Vector6<S>>,
     pub(super) velocities: Vec<Vector6<S>>,
+    /// Acceleration of each link at constant velocities of the joints.
+    pub(super) drifts: Vec<Vector6<S>>,
     pub(super) inertias: Vec<SpatialInertia<S>>,
+    /// Acceleration of free fall \[m/s²\].
+    pub(super) gravity: Vector3<S>,
+    /// Coordinates and velocities, where there are joint types of one's own.
+    pub(super) custom: Option<[Vec<S>; 2]>,
 }
 
 /// Energies \[J\].
@@ -48,11 +56,23 @@ impl<'a, S: Scalar> Kinematics<'a, S> {
             axes: Vec::with_capacity(v.len()),
             joint_velocities: Vec::with_capacity(count),
             velocities: Vec::with_capacity(count),
+            drifts: Vec::with_capacity(count),
             inertias: Vec::with_capacity(count),
+            gravity: *tree.gravity(),
+            custom: None,
         };
         for (index, link) in tree.links().iter().enumerate() {
             let [coordinates, freedoms] = tree.range(index);
-            let (turned, moved) = link.joint.placement(&q[coordinates]);
+            let own = match &link.joint {
+                Joint::Custom(CustomJoint(model)) => {
+                    Some(Course::new(model, &q[coordinates.clone()], &v[freedoms.clone()]))
+                }
+                _ => None,
+            };
+            let (turned, moved) = match &own {
+                Some(course) => (Some(course.rotation), Some(course.place)),
+                None => link.joint.placement(&q[coordinates]),
+            };
             let joint_rotation = link.t_parent_joint.rotation.to_rotation_matrix().into_inner();
             let joint_place = link.t_parent_joint.translation.vector;
             let (mut rotation, mut place) = match link.parent {
@@ -75,10 +95,15 @@ impl<'a, S: Scalar> Kinematics<'a, S> {
                 place -= at.origin.map(S::constant);
             }
             let mut joint_velocity = Vector6::zeros();
+            let along_world = |axis: &Vector6<S>| {
+                let turn = rotation * angular(axis);
+                spatial(&(rotation * linear(axis) + place.cross(&turn)), &turn)
+            };
             for (k, freedom) in freedoms.enumerate() {
-                let axis = link.joint.axis(k).map(S::constant);
-                let turn = rotation * angular(&axis);
-                let axis = spatial(&(rotation * linear(&axis) + place.cross(&turn)), &turn);
+                let axis = match &own {
+                    Some(course) => along_world(&course.axes[k]),
+                    None => along_world(&link.joint.axis(k).map(S::constant)),
+                };
                 joint_velocity += axis * v[freedom];
                 at.axes.push(axis);
             }
@@ -88,10 +113,23 @@ impl<'a, S: Scalar> Kinematics<'a, S> {
             at.inertias.push(SpatialInertia::new(link.mass, &com, &inertia));
             at.rotations.push(rotation);
             at.places.push(place);
+            let velocity = of_parent + joint_velocity;
+            let mut drift = cross_motion(&velocity, &joint_velocity);
+            if let Some(course) = &own {
+                drift += along_world(&course.drift);
+                at.custom.get_or_insert_with(|| [q.to_vec(), v.to_vec()]);
+            }
             at.joint_velocities.push(joint_velocity);
-            at.velocities.push(of_parent + joint_velocity);
+            at.velocities.push(velocity);
+            at.drifts.push(drift);
         }
         at
+    }
+
+    /// The same under another acceleration of free fall \[m/s²\].
+    #[must_use]
+    pub fn under(self, gravity: Vector3<S>) -> Self {
+        Self { gravity, ..self }
     }
 
     /// Link → world.
@@ -128,9 +166,15 @@ impl<'a, S: Scalar> Kinematics<'a, S> {
         jacobian
     }
 
+    /// A force and torque about a link's origin, about the origin of all.
+    #[inline]
+    pub(super) fn about_origin(&self, link: usize, wrench: &Vector6<S>) -> Vector6<S> {
+        let force = linear(wrench);
+        spatial(&force, &(angular(wrench) + self.places[link].cross(&force)))
+    }
+
     /// Kinetic and potential energy.
     pub fn energy(&self, v: &[S]) -> Energy<S> {
-        let gravity = self.tree.gravity().map(S::constant);
         let (mut kinetic, mut potential) = (S::zero(), S::zero());
         for (index, link) in self.tree.links().iter().enumerate() {
             let (velocity, inertia) = (&self.velocities[index], &self.inertias[index]);
@@ -138,7 +182,7 @@ impl<'a, S: Scalar> Kinematics<'a, S> {
             let [_, freedoms] = self.tree.range(index);
             v[freedoms].iter().for_each(|v| kinetic += link.armature * *v * *v);
             let moment = inertia.moment + self.origin.map(S::constant) * link.mass;
-            potential -= gravity.dot(&moment);
+            potential -= self.gravity.dot(&moment);
         }
         Energy { kinetic: kinetic.times(0.5), potential }
     }

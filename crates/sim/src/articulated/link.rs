@@ -1,8 +1,7 @@
 //! A tree of links.
 
-use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
+use nalgebra::{Isometry3, Matrix3, Point3, Quaternion, Unit, Vector3};
 use prehend_autodiff::Scalar;
-use prehend_autodiff::lie::lift;
 
 use super::joint::Joint;
 use super::kinematics::Kinematics;
@@ -47,6 +46,22 @@ impl<S: Scalar> Link<S> {
     pub fn with_armature(self, armature: S) -> Self {
         Self { armature, ..self }
     }
+
+    /// The same link, each number through `f`.
+    fn map<T: Scalar>(&self, f: impl Fn(S) -> T) -> Link<T> {
+        let Isometry3 { translation, rotation } = self.t_parent_joint;
+        let rotation = Unit::new_unchecked(Quaternion::from(rotation.coords.map(&f)));
+        Link {
+            name: self.name.clone(),
+            parent: self.parent,
+            t_parent_joint: Isometry3::from_parts(translation.vector.map(&f).into(), rotation),
+            joint: self.joint.clone(),
+            mass: f(self.mass),
+            com: self.com.map(&f),
+            inertia: self.inertia.map(&f),
+            armature: f(self.armature),
+        }
+    }
 }
 
 /// Links and joints that form trees, rooted in the world.
@@ -62,7 +77,7 @@ pub struct Articulation<S: Scalar = f64> {
     /// Of each link: the last degree of freedom that moves it.
     last: Vec<Option<usize>>,
     /// Acceleration of free fall \[m/s²\].
-    gravity: Vector3<f64>,
+    gravity: Vector3<S>,
 }
 
 /// Why links make no tree.
@@ -89,7 +104,7 @@ impl<S: Scalar> Articulation<S> {
     ///
     /// # Errors
     /// If a parent does not come before its link, or a number is not finite or a mass negative.
-    pub fn new(links: Vec<Link<S>>, gravity: Vector3<f64>) -> Result<Self, ArticulationError> {
+    pub fn new(links: Vec<Link<S>>, gravity: Vector3<S>) -> Result<Self, ArticulationError> {
         let (mut first, mut link_of) = (Vec::with_capacity(links.len() + 1), Vec::new());
         let mut carriers = Vec::new();
         let mut last: Vec<Option<usize>> = Vec::with_capacity(links.len());
@@ -127,7 +142,7 @@ impl<S: Scalar> Articulation<S> {
     }
 
     /// Acceleration of free fall \[m/s²\].
-    pub fn gravity(&self) -> &Vector3<f64> {
+    pub fn gravity(&self) -> &Vector3<S> {
         &self.gravity
     }
 
@@ -195,20 +210,19 @@ impl<S: Scalar> Articulation<S> {
 }
 
 impl Articulation {
-    /// The same in numbers that may carry derivatives.
+    /// The same in constants of another scalar.
     pub fn lift<S: Scalar>(&self) -> Articulation<S> {
-        let links = self.links.iter().map(|link| Link {
-            name: link.name.clone(),
-            parent: link.parent,
-            t_parent_joint: lift(&link.t_parent_joint),
-            joint: link.joint,
-            mass: S::constant(link.mass),
-            com: link.com.map(S::constant),
-            inertia: link.inertia.map(S::constant),
-            armature: S::constant(link.armature),
-        });
+        self.map(S::constant)
+    }
+}
+
+impl<S: Scalar> Articulation<S> {
+    /// The same trees, each number through `f`.
+    pub(crate) fn map<T: Scalar>(&self, f: impl Fn(S) -> T) -> Articulation<T> {
         let (first, link_of) = (self.first.clone(), self.link_of.clone());
-        let (carriers, last, gravity) = (self.carriers.clone(), self.last.clone(), self.gravity);
-        Articulation { links: links.collect(), first, link_of, carriers, last, gravity }
+        let (carriers, last) = (self.carriers.clone(), self.last.clone());
+        let links = self.links.iter().map(|link| link.map(&f)).collect();
+        let gravity = self.gravity.map(f);
+        Articulation { links, first, link_of, carriers, last, gravity }
     }
 }

@@ -14,10 +14,12 @@
 //! All but derivatives are generic over the scalar. Algorithms are those of Featherstone, Rigid Body Dynamics Algorithms, 2008, in one frame for all
 //! links, whose axes are the world's: nothing has to be brought from link to link.
 
+pub(crate) mod adjoint;
 mod derivatives;
 mod forward_dynamics;
 mod inverse_dynamics;
 mod joint;
+mod joint_model;
 mod kinematics;
 mod link;
 mod mass_matrix;
@@ -27,6 +29,7 @@ mod tests;
 mod tree_factor;
 
 pub use self::derivatives::{DynamicsDerivatives, ForwardDerivatives};
-pub use self::joint::Joint;
+pub use self::joint::{CustomJoint, Joint};
+pub use self::joint_model::JointModel;
 pub use self::kinematics::{Energy, Kinematics};
 pub use self::link::{Articulation, ArticulationError, Link};

@@ -6,6 +6,38 @@ use prehend_geometry::SplitMix64;
 
 use super::*;
 
+/// A nut on a thread, about x and along a line that is askew.
+#[derive(Debug)]
+struct Thread;
+
+impl JointModel for Thread {
+    fn freedoms(&self) -> usize {
+        1
+    }
+    fn placement<S: Scalar>(&self, q: &[S]) -> Isometry3<S> {
+        let rise = Vector3::new(q[0].times(0.2), q[0].sin().times(0.1), S::zero());
+        let turn = Vector3::new(q[0], S::zero(), S::zero());
+        Isometry3::from_parts(rise.into(), prehend_autodiff::lie::so3_exp(&turn))
+    }
+}
+
+/// Two axes that cross, with an arm between them.
+#[derive(Debug)]
+struct Universal;
+
+impl JointModel for Universal {
+    fn freedoms(&self) -> usize {
+        2
+    }
+    fn placement<S: Scalar>(&self, q: &[S]) -> Isometry3<S> {
+        let zero = S::zero();
+        let about = |x, y, z| prehend_autodiff::lie::so3_exp(&Vector3::new(x, y, z));
+        let first = about(q[0], zero, zero);
+        let arm = first * Vector3::new(zero, S::constant(0.1), zero);
+        Isometry3::from_parts(arm.into(), first * about(zero, q[1], zero))
+    }
+}
+
 /// A tree of `count` links with all kinds of joints, each under one of those before it.
 pub(super) fn random_tree(seed: u64, count: usize) -> Articulation {
     let mut random = SplitMix64::new(seed);
@@ -22,6 +54,8 @@ pub(super) fn random_tree(seed: u64, count: usize) -> Articulation {
             1 => Joint::Fixed,
             2 => Joint::Prismatic(axis),
             3 if seed.is_multiple_of(3) => Joint::Floating,
+            4 if seed % 3 != 1 => Joint::custom(Thread),
+            5 if seed % 3 == 2 => Joint::custom(Universal),
             _ => Joint::Revolute(axis),
         };
         let back = 1 + (choice.y.abs() * 1e6) as usize % 2;

@@ -1,0 +1,164 @@
+//! Which numbers a node is a function of, and their adjoints in a row.
+
+use nalgebra::{Matrix3, Quaternion, Vector3, Vector6};
+use prehend_autodiff::Scalar;
+
+use crate::articulated::joint::{CustomJoint, Joint};
+use crate::articulated::kinematics::Kinematics;
+use crate::articulated::link::{Articulation, Link};
+use crate::articulated::spatial::{angular, linear};
+
+/// Adjoints of what a link is made of.
+#[derive(Clone, Copy)]
+pub(super) struct LinkAdjoint {
+    /// Along a displacement of the joint's frame and all that hangs on it: a force about the origin.
+    pub(super) displacement: Vector6<f64>,
+    pub(super) mass: f64,
+    pub(super) com: Vector3<f64>,
+    pub(super) inertia: Matrix3<f64>,
+    pub(super) armature: f64,
+}
+
+/// Numbers of a link that may vary: place and rotation of its joint, mass, center of mass, inertia and armature.
+const LINK: usize = 3 + 4 + 1 + 3 + 9 + 1;
+
+fn numbers<S: Scalar>(link: &Link<S>) -> impl Iterator<Item = S> {
+    let pose = &link.t_parent_joint;
+    let place = pose.translation.vector.iter().chain(pose.rotation.coords.iter());
+    let body = std::iter::once(&link.mass).chain(link.com.iter()).chain(link.inertia.iter());
+    place.chain(body).chain(std::iter::once(&link.armature)).copied()
+}
+
+/// What of a node's inputs varies, so that constants are not recorded.
+pub(super) struct Inputs<S> {
+    /// The numbers that vary.
+    pub(super) varying: Vec<S>,
+    /// Of all numbers in their order, whether they do.
+    varies: Vec<bool>,
+    /// Whether numbers of links are among them.
+    pub(super) links: bool,
+}
+
+impl<S: Scalar> Inputs<S> {
+    /// Of `first` and, if one of them varies, the numbers of all links.
+    pub(super) fn new(first: impl Iterator<Item = S>, tree: &Articulation<S>) -> Self {
+        let links = tree.links().iter().any(|link| numbers(link).any(|x| !x.is_constant()));
+        let mut inputs = Self { varying: Vec::new(), varies: Vec::new(), links };
+        first.for_each(|x| inputs.push(x));
+        if links {
+            tree.links().iter().flat_map(numbers).for_each(|x| inputs.push(x));
+        }
+        inputs
+    }
+
+    fn push(&mut self, x: S) {
+        let varies = !x.is_constant();
+        self.varies.push(varies);
+        if varies {
+            self.varying.push(x);
+        }
+    }
+
+    pub(super) fn into_varies(self) -> Vec<bool> {
+        self.varies
+    }
+}
+
+/// Adds those of `adjoints`, in the order of the inputs, that vary.
+pub(super) fn add_varying(
+    varies: &[bool],
+    adjoints: impl Iterator<Item = f64>,
+    into: &mut [f64],
+) {
+    let varying = varies.iter().zip(adjoints).filter(|(varies, _)| **varies);
+    into.iter_mut().zip(varying).for_each(|(sum, (_, x))| *sum += x);
+}
+
+impl Kinematics<'_> {
+    /// The adjoints of all numbers of the links, in their order.
+    pub(super) fn link_adjoints(&self, adjoints: &[LinkAdjoint]) -> Vec<f64> {
+        let mut all = Vec::with_capacity(LINK * adjoints.len());
+        for (link, adjoint) in self.tree.links().iter().zip(adjoints) {
+            let (rotation, place) = match link.parent {
+                Some(parent) => (self.rotations[parent], self.places[parent]),
+                None => (Matrix3::identity(), -self.origin),
+            };
+            let joint = place + rotation * link.t_parent_joint.translation.vector;
+            let (push, moment) = (linear(&adjoint.displacement), angular(&adjoint.displacement));
+            let turn = rotation.tr_mul(&(moment - joint.cross(&push)));
+            all.extend((rotation.tr_mul(&push)).iter());
+            let turned = Quaternion::from_imag(turn) * link.t_parent_joint.rotation.into_inner();
+            all.extend(turned.coords.iter().map(|x| 2.0 * x));
+            all.push(adjoint.mass);
+            all.extend(adjoint.com.iter());
+            all.extend(adjoint.inertia.iter());
+            all.push(adjoint.armature);
+        }
+        all
+    }
+
+    /// Adds to the adjoints of the coordinates `q` of a link's joint those of displacements of the link along the joint's axes:
+    /// `displacement` is a force about the origin.
+    pub(super) fn coordinate_adjoint(
+        &self,
+        link: usize,
+        q: &[f64],
+        displacement: &Vector6<f64>,
+        adjoints: &mut [f64],
+    ) {
+        let [_, freedoms] = self.tree.range(link);
+        let along: Vec<f64> = freedoms.map(|k| self.axes[k].dot(displacement)).collect();
+        let quaternion = |q: &[f64], turn: &[f64], adjoints: &mut [f64]| {
+            let rotation = Quaternion::new(q[3], q[0], q[1], q[2]);
+            let square = rotation.norm_squared();
+            let turned = rotation * Quaternion::from_imag(Vector3::from_column_slice(turn));
+            adjoints.iter_mut().zip(turned.coords.iter()).for_each(|(a, x)| *a += 2.0 * x / square);
+        };
+        match &self.tree.links()[link].joint {
+            Joint::Spherical => quaternion(q, &along, adjoints),
+            Joint::Floating => {
+                let rotation = Quaternion::new(q[6], q[3], q[4], q[5]);
+                let turned = nalgebra::Unit::new_normalize(rotation);
+                let place = turned * Vector3::from_column_slice(&along[..3]);
+                adjoints.iter_mut().zip(&place).for_each(|(a, x)| *a += x);
+                quaternion(&q[3..], &along[3..], &mut adjoints[3..]);
+            }
+            Joint::Fixed | Joint::Revolute(_) | Joint::Prismatic(_) | Joint::Custom(_) => {
+                adjoints.iter_mut().zip(along).for_each(|(a, x)| *a += x);
+            }
+        }
+    }
+
+    /// Adds to the adjoints of coordinates and velocities of a joint of one's own those of changes of its axes and of its drift, in
+    /// the link's frame: forces about the origin.
+    pub(super) fn course_adjoint(
+        &self,
+        link: usize,
+        [q, v]: [&[f64]; 2],
+        by_axes: &[Vector6<f64>],
+        by_drift: Option<&Vector6<f64>>,
+        [q_adjoint, v_adjoint]: [&mut [f64]; 2],
+    ) {
+        let Joint::Custom(CustomJoint(model)) = &self.tree.links()[link].joint else { return };
+        let most = super::super::joint_model::MOST;
+        let part = |all: &[f64], i: usize| all.get(i).copied().unwrap_or(0.0);
+        let x = std::array::from_fn(|i| if i < most { part(q, i) } else { part(v, i - most) });
+        let (_, jacobian) = model.linearized(x);
+        let local = |force: &Vector6<f64>| {
+            let (push, moment) = (linear(force), angular(force));
+            let moment = moment - self.places[link].cross(&push);
+            let rotation = &self.rotations[link];
+            crate::contact::wrench::stack(&rotation.tr_mul(&push), &rotation.tr_mul(&moment))
+        };
+        let mut add = |first: usize, force: Vector6<f64>| {
+            for (row, force) in jacobian[first..].iter().zip(&force) {
+                q_adjoint.iter_mut().zip(row).for_each(|(a, slope)| *a += slope * force);
+                v_adjoint.iter_mut().zip(&row[most..]).for_each(|(a, slope)| *a += slope * force);
+            }
+        };
+        by_axes.iter().enumerate().for_each(|(k, force)| add(12 + 6 * k, local(force)));
+        if let Some(force) = by_drift {
+            add(12 + 6 * most, local(force));
+        }
+    }
+}

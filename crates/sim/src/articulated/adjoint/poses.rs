@@ -1,0 +1,104 @@
+//! States of links.
+
+use nalgebra::{Matrix3, Point3, Quaternion, Vector3, Vector6};
+use prehend_autodiff::{CustomVjp, Scalar};
+
+use super::inputs::{Inputs, LinkAdjoint, add_varying};
+use crate::articulated::kinematics::Kinematics;
+use crate::articulated::link::Articulation;
+use crate::articulated::spatial::{angular, cross_force, spatial};
+use crate::state::State;
+use crate::state_coordinates::{STATE, coordinates_of, states_of};
+
+/// The states of all links, at the origins of their frames, at coordinates `q` with velocities `v`: in reverse mode one node.
+pub(crate) fn link_states<S: Scalar>(tree: &Articulation<S>, q: &[S], v: &[S]) -> Vec<State<S>> {
+    if !(S::RECORDED && S::ORDER == 1) {
+        return states(&tree.kinematics(q, v));
+    }
+    let [plain_q, plain_v] = [q, v].map(|all| all.iter().map(|x| x.value()).collect::<Vec<f64>>());
+    let plain = tree.map(S::value);
+    let result = states(&plain.kinematics(&plain_q, &plain_v));
+    let inputs = Inputs::new(q.iter().chain(v).copied(), tree);
+    let (links, varying) = (inputs.links, inputs.varying.clone());
+    let outputs: Vec<f64> = coordinates_of(&result).collect();
+    let varies = inputs.into_varies();
+    let node = Node { tree: plain, q: plain_q, v: plain_v, links, varies };
+    match S::recorded(&varying, &outputs, node) {
+        Some(recorded) => states_of(&recorded).collect(),
+        None => result.iter().map(State::lift).collect(),
+    }
+}
+
+fn states<S: Scalar>(at: &Kinematics<'_, S>) -> Vec<State<S>> {
+    let state = |link: usize| {
+        let [linear, angular] = at.velocity(link, &Point3::origin());
+        State { pose: at.pose(link), linear, angular }
+    };
+    (0..at.tree.links().len()).map(state).collect()
+}
+
+struct Node {
+    tree: Articulation,
+    q: Vec<f64>,
+    v: Vec<f64>,
+    links: bool,
+    varies: Vec<bool>,
+}
+
+impl CustomVjp for Node {
+    fn vjp(&self, output_adjoints: &[f64], input_adjoints: &mut [f64]) {
+        let at = self.tree.kinematics(&self.q, &self.v);
+        let count = self.tree.links().len();
+        let (mut q, mut v) = (vec![0.0; self.q.len()], vec![0.0; self.v.len()]);
+        let nothing = LinkAdjoint {
+            displacement: Vector6::zeros(),
+            mass: 0.0,
+            com: Vector3::zeros(),
+            inertia: Matrix3::zeros(),
+            armature: 0.0,
+        };
+        let mut links = vec![nothing; count];
+        // Adjoints of each link's place and of its velocity, with all that hangs on it.
+        let mut placed = vec![Vector6::zeros(); count];
+        let mut moving = vec![Vector6::zeros(); count];
+        for (index, link) in self.tree.links().iter().enumerate().rev() {
+            let adjoint = &output_adjoints[STATE * index..][..STATE];
+            let part = |from: usize| Vector3::from_column_slice(&adjoint[from..from + 3]);
+            let (by_place, by_velocity, by_spin) = (part(0), part(7), part(10));
+            let (place, spin) = (at.places[index], angular(&at.velocities[index]));
+            // A turn θ moves a quaternion by ½ (θ, 0) q.
+            let turned = at.pose(index).rotation;
+            let by_rotation = Quaternion::new(adjoint[6], adjoint[3], adjoint[4], adjoint[5]);
+            let by_turn = (by_rotation * turned.conjugate().into_inner()).imag() * 0.5;
+            let push = by_place + by_velocity.cross(&spin);
+            let velocity = spatial(&by_velocity, &(by_spin + place.cross(&by_velocity)));
+            moving[index] += velocity;
+            placed[index] += spatial(&push, &(by_turn + place.cross(&push)))
+                + cross_force(&at.velocities[index], &velocity);
+            let of_parent = link.parent.map_or_else(Vector6::zeros, |p| at.velocities[p]);
+            let (placed_here, moving_here) = (placed[index], moving[index]);
+            let displacement = placed_here - cross_force(&of_parent, &moving_here);
+            let [coordinates, freedoms] = self.tree.range(index);
+            let own = &self.q[coordinates.clone()];
+            at.coordinate_adjoint(index, own, &displacement, &mut q[coordinates.clone()]);
+            freedoms.clone().for_each(|k| v[k] += at.axes[k].dot(&moving_here));
+            let by_axes: Vec<Vector6<f64>> =
+                freedoms.clone().map(|k| moving_here * self.v[k]).collect();
+            at.course_adjoint(
+                index,
+                [own, &self.v[freedoms.clone()]],
+                &by_axes,
+                None,
+                [&mut q[coordinates], &mut v[freedoms]],
+            );
+            links[index].displacement = displacement;
+            if let Some(parent) = link.parent {
+                placed[parent] += placed_here;
+                moving[parent] += moving_here;
+            }
+        }
+        let links = if self.links { at.link_adjoints(&links) } else { Vec::new() };
+        let first = q.into_iter().chain(v);
+        add_varying(&self.varies, first.chain(links), input_adjoints);
+    }
+}
