@@ -6,15 +6,18 @@ use std::sync::Arc;
 
 use prehend_autodiff::{Recompute, Scalar, Var, checkpoint};
 
+use crate::articulated::Link;
 use crate::error::SimulationError;
 use crate::integrator::Integrator;
 use crate::state::State;
 use crate::state_coordinates::{STATE, coordinates_of, states_of};
 use crate::time::{Step, TimeSteps};
 use crate::world::World;
+use crate::world::articulated_body::ArticulatedBody;
 use crate::world::body::{Body, Motion};
 use crate::world::contact_group::ContactGroup;
 use crate::world::contact_pair::ContactPair;
+use crate::world::joint_force::JointForce;
 use crate::world::trajectory::plain;
 
 /// An integrator each of whose steps [`Var`] records as one node.
@@ -218,7 +221,9 @@ fn has_parts_of<S: Scalar>(a: &World<S>, b: &World) -> bool {
     }
     let body = |(a, b): (&Body<S>, &Body)| {
         let motion = match (&a.motion, &b.motion) {
-            (Motion::Free(_), Motion::Free(_)) | (Motion::Kinematic, Motion::Kinematic) => true,
+            (Motion::Free(_), Motion::Free(_))
+            | (Motion::Kinematic, Motion::Kinematic)
+            | (Motion::Link, Motion::Link) => true,
             (Motion::Driven(a), Motion::Driven(b)) => same(plain(a).as_ref(), plain(b).as_ref()),
             _ => false,
         };
@@ -233,7 +238,19 @@ fn has_parts_of<S: Scalar>(a: &World<S>, b: &World) -> bool {
     let group = |(a, b): (&ContactGroup<S>, &ContactGroup)| {
         a.has_bodies_of(b) && pair((&a.contact, &b.contact))
     };
+    let articulation = |(a, b): (&ArticulatedBody<S>, &ArticulatedBody)| {
+        let link = |(a, b): (&Link<S>, &Link)| (a.parent, &a.joint) == (b.parent, &b.joint);
+        a.bodies() == b.bodies() && a.tree.links().iter().zip(b.tree.links()).all(link)
+    };
+    let force =
+        |(a, b): (&JointForce<S>, &JointForce)| a.axes == b.axes && Arc::ptr_eq(a.law(), b.law());
     a.bodies.len() == b.bodies.len()
+        && a.articulations.len() == b.articulations.len()
+        && a.joint_forces.len() == b.joint_forces.len()
+        && a.articulations.iter().zip(&b.articulations).all(articulation)
+        && a.joint_forces.iter().zip(&b.joint_forces).all(force)
+        && a.welds.len() == b.welds.len()
+        && a.welds.iter().zip(&b.welds).all(|(a, b)| (a.bodies, a.frames) == (b.bodies, b.frames))
         && a.contacts.len() == b.contacts.len()
         && a.contact_groups.len() == b.contact_groups.len()
         && a.contact_groups.iter().zip(&b.contact_groups).all(group)

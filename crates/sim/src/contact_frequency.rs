@@ -1,6 +1,6 @@
 //! Whether a time step is short enough for the stiffness and damping of the contacts.
 
-use nalgebra::{DMatrix, Matrix3, Matrix6};
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, Matrix6xX, Point3};
 use prehend_autodiff::Fwd;
 use thiserror::Error;
 
@@ -8,6 +8,7 @@ use crate::integrator::Integrator;
 use crate::state::State;
 use crate::world::World;
 use crate::world::body_id::BodyId;
+use crate::world::joint_force::JointForce;
 
 /// A time step too long for the stiffness or damping of the contacts.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
@@ -38,30 +39,38 @@ impl World {
         if dt > 0.0 && dt <= limit { Ok(()) } else { Err(StepError { dt, limit }) }
     }
 
-    /// The largest of the contacts' natural frequency ω_max and damping rate \[1/s\] at `states`: of M⁻¹K and M⁻¹D, with
-    /// the symmetric parts of the contacts' stiffness K and damping D; NaN for states that are.
+    /// The largest of natural frequency ω_max and damping rate \[1/s\] of contacts and forces along joints at `states`: of M⁻¹K and
+    /// M⁻¹D, with the symmetric parts of their stiffness K and damping D; NaN for states that are.
     ///
     /// # Panics
-    /// If there are fewer states than bodies.
+    /// If there are fewer states than bodies and joints.
     pub fn contact_frequency(&self, states: &[State]) -> f64 {
-        let free = self.free_bodies();
-        let size = 6 * free.len();
-        let (mut stiffness, mut damping) = (DMatrix::zeros(size, size), DMatrix::zeros(size, size));
         let lifted = self.with_touching(states, 0.0).plain().lift::<Fwd<12>>();
         let constants: Vec<State<Fwd<12>>> = states.iter().map(State::lift).collect();
-        let roots: Vec<Matrix6<f64>> =
-            free.iter().map(|&body| self.inverse_mass_root(body, &states[body])).collect();
-        for (column, &body) in free.iter().enumerate() {
+        let (motions, size) = self.unit_motions(states);
+        let (mut stiffness, mut damping) = (DMatrix::zeros(size, size), DMatrix::zeros(size, size));
+        for Motions { body, first, by } in &motions {
             let mut states = constants.clone();
-            states[body] = states[body].value().variables();
-            let wrenches = lifted.wrenches(&states, 0);
-            for (row, &other) in free.iter().enumerate() {
-                let block = |from: usize| {
-                    let slopes = Matrix6::from_fn(|i, j| wrenches[other][i].derivative[from + j]);
-                    -(roots[row] * slopes * roots[column])
+            states[*body] = states[*body].value().variables();
+            let wrenches = lifted.contact_wrenches(&states, 0);
+            for other in &motions {
+                let add = |matrix: &mut DMatrix<f64>, from: usize| {
+                    let wrench = &wrenches[other.body];
+                    let slopes = Matrix6::from_fn(|i, j| wrench[i].derivative[from + j]);
+                    let block = other.by.tr_mul(&(slopes * by));
+                    let (rows, columns) = block.shape();
+                    let mut view = matrix.view_mut((other.first, *first), (rows, columns));
+                    view -= block;
                 };
-                stiffness.view_mut((6 * row, 6 * column), (6, 6)).copy_from(&block(0));
-                damping.view_mut((6 * row, 6 * column), (6, 6)).copy_from(&block(6));
+                add(&mut stiffness, 0);
+                add(&mut damping, 6);
+            }
+        }
+        for (first, direction, slopes) in self.slopes_along_joints(states) {
+            let outer = &direction * direction.transpose();
+            for (matrix, slope) in [&mut stiffness, &mut damping].into_iter().zip(slopes) {
+                let mut view = matrix.view_mut((first, first), outer.shape());
+                view -= &outer * slope;
             }
         }
         let largest = |m: DMatrix<f64>| {
@@ -82,6 +91,48 @@ impl World {
         if frequency.is_nan() { frequency } else { fastest.max(frequency) }
     }
 
+    /// Of each body that forces move, its motions of unit kinetic energy (½); and how many there are of all.
+    fn unit_motions(&self, states: &[State]) -> (Vec<Motions>, usize) {
+        let (mut motions, mut first) = (Vec::new(), 0);
+        for body in self.free_bodies() {
+            let root = self.inverse_mass_root(body, &states[body]);
+            let by = Matrix6xX::from_columns(&root.column_iter().collect::<Vec<_>>());
+            motions.push(Motions { body, first, by });
+            first += 6;
+        }
+        for (own, joints) in self.articulated(states) {
+            let [q, v] = own.coordinates(joints);
+            let at = own.tree.kinematics(&q, &v);
+            let root = at.inverse_mass_root();
+            for (link, body) in own.bodies().iter().enumerate() {
+                let by = at.jacobian(link, &Point3::origin()) * &root;
+                motions.push(Motions { body: *body, first, by });
+            }
+            first += v.len();
+        }
+        (motions, first)
+    }
+
+    /// Of each force along joints: the first of its articulation's motions of unit energy, what they are along it, and the slopes of its effort.
+    fn slopes_along_joints(&self, states: &[State]) -> Vec<(usize, DVector<f64>, [f64; 2])> {
+        let mut first = 6 * self.free_bodies().len();
+        let mut roots = Vec::with_capacity(self.articulations.len());
+        for (own, joints) in self.articulated(states) {
+            let [q, v] = own.coordinates(joints);
+            roots.push((first, own.tree.kinematics(&q, &v).inverse_mass_root()));
+            first += v.len();
+        }
+        let slopes = |force: &JointForce| {
+            let (places, [position, velocity]) = self.along(force, states)?;
+            let (first, root) = &roots[places.first()?.0];
+            let mut along = DVector::zeros(root.nrows());
+            places.iter().for_each(|(_, freedom, factor)| along[*freedom] += factor);
+            let effort = force.law().effort_by_motion(force.params(), position, velocity);
+            Some((*first, root.tr_mul(&along), effort.derivative))
+        };
+        self.joint_forces.iter().filter_map(slopes).collect()
+    }
+
     /// The root of the inverse mass matrix of a free body.
     fn inverse_mass_root(&self, body: BodyId, state: &State) -> Matrix6<f64> {
         let Some(rigid) = self.bodies[body].rigid() else { return Matrix6::zeros() };
@@ -95,11 +146,19 @@ impl World {
     }
 }
 
+/// Motions of a body: its velocity and angular velocity by each of them.
+struct Motions {
+    body: BodyId,
+    /// The first of them among those of all.
+    first: usize,
+    by: Matrix6xX<f64>,
+}
+
 #[cfg(test)]
 mod tests {
     use std::sync::Arc;
 
-    use nalgebra::{Isometry3, Point3, Vector3};
+    use nalgebra::{Isometry3, Vector3};
 
     use super::*;
     use crate::scenes::{floor, on_ground, penalty};

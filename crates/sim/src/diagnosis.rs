@@ -17,11 +17,14 @@ impl<S: Scalar> World<S> {
         time: f64,
     ) -> SimulationError {
         let failed = next.iter().position(|state| !state.is_finite()).unwrap_or_default();
-        let body = match failed.checked_sub(self.bodies.len()) {
+        let links = self.articulations.iter().flat_map(|own| own.bodies()).copied();
+        let joint =
+            failed.checked_sub(self.bodies.len()).and_then(|joint| links.clone().nth(joint));
+        let body = match failed.checked_sub(self.joint_places().end) {
             Some(deflection) => {
                 self.sticking().nth(deflection).map(|(pair, _)| pair.bodies.samples)
             }
-            None => Some(BodyId(failed)),
+            None => joint.or(Some(BodyId(failed))),
         };
         let body = body.unwrap_or(BodyId(0));
         let (body, contact) = self.names(states, body);
@@ -48,12 +51,11 @@ impl<S: Scalar> World<S> {
     /// The name of the free body that contacts accelerate most, and of what presses hardest on it.
     pub(crate) fn most_accelerated(&self, states: &[State<S>]) -> (String, Option<String>) {
         let acceleration = |body: &BodyId| {
-            let mass =
-                self.bodies[*body].rigid().map_or(f64::INFINITY, |rigid| rigid.mass().value());
+            let mass = self.mass(*body);
             let pairs = self.contacts.iter().filter(|pair| pair.joins(*body));
             pairs.map(|pair| self.load(pair, states)).fold(0.0, f64::max) / mass
         };
-        let free = self.free_bodies();
+        let free: Vec<BodyId> = self.moved_bodies().collect();
         let hardest =
             free.iter().max_by(|a, b| acceleration(a).total_cmp(&acceleration(b))).copied();
         self.names(states, hardest.unwrap_or(BodyId(0)))

@@ -280,7 +280,7 @@ mod tests {
         assert_eq!(ask(0, &states), SimulationError::NotFree { body: "ground".to_owned() });
         assert_eq!(
             ask(1, &states[..1]),
-            SimulationError::States { states: 1, bodies: 2, sticking: 0 }
+            SimulationError::States { states: 1, bodies: 2, joints: 0, sticking: 0 }
         );
     }
 }

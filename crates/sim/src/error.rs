@@ -54,17 +54,55 @@ pub enum SimulationError {
         /// Its name.
         body: String,
     },
+    /// A body that is no link has no joint.
+    #[error("body '{body}' is no link of an articulation")]
+    NotALink {
+        /// Its name.
+        body: String,
+    },
+    /// A joint has no such axis, or is of another articulation than the others.
+    #[error("the joint of link '{link}' has no such axis, or is of another articulation")]
+    NoAxis {
+        /// Its name.
+        link: String,
+    },
+    /// A force along no joint.
+    #[error("a force along joints needs an axis to act along")]
+    NoAxes,
+    /// Coordinates and velocities of a joint that are too few or too many.
+    #[error(
+        "{} coordinates and {} velocities for the joint of link '{link}', which has {} and {}", .given[0], .given[1], .expected[0],
+        .expected[1]
+    )]
+    JointNumbers {
+        /// Its name.
+        link: String,
+        /// How many coordinates and velocities were given.
+        given: [usize; 2],
+        /// How many it has.
+        expected: [usize; 2],
+    },
+    /// An integrator that knows no joints.
+    #[error("{integrator} does not move articulations")]
+    Joints {
+        /// Its name.
+        integrator: &'static str,
+    },
     /// A stability loss without a start to measure from.
     #[error("no perturbation to measure stability with: rest is one")]
     NoPerturbations,
     /// States and bodies differ in number.
-    #[error("{states} states for {bodies} bodies and {sticking} contacts that stick")]
+    #[error(
+        "{states} states for {bodies} bodies, {joints} joints and {sticking} contacts that stick"
+    )]
     States {
         /// How many states.
         states: usize,
         /// How many bodies.
         bodies: usize,
-        /// How many contacts have a deflection, whose states follow those of the bodies.
+        /// How many joints of articulations, whose states follow those of the bodies.
+        joints: usize,
+        /// How many contacts have a deflection, whose states come last.
         sticking: usize,
     },
     /// A number of an integrator is out of its range.

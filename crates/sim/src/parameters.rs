@@ -3,18 +3,21 @@
 use nalgebra::{Matrix3, Point3, Vector3, Vector6};
 use prehend_autodiff::Scalar;
 
+use crate::articulated::link::NUMBERS;
 use crate::body::RigidBody;
 use crate::error::SimulationError;
 use crate::world::World;
 use crate::world::body::Motion;
+use crate::world::weld::WeldStiffness;
 
 impl<S: Scalar> World<S> {
     /// Everything by which a world can be differentiated, but for trajectories, in a row.
     ///
     /// For each body: if it is free, its mass \[kg\], its inertia xx, yy, zz, xy, xz, yz \[kg m²\] and its center of mass in the
     /// model frame \[m\]; then its external wrench, force \[N\] and torque \[N m\], and the dimensions of its shape, if it is made of one, which
-    /// change its contacts only \[m\]. Then gravity \[m/s²\]; then the law's parameters
-    /// of each contact, and those of each group of contacts.
+    /// change its contacts only \[m\]. For each link of an articulation, where its joint is in the frame of its parent, place \[m\] and
+    /// quaternion (i, j, k, w), its mass, center of mass, inertia in the same order, and armature. Then gravity \[m/s²\]; then the law's parameters
+    /// of each contact, those of each group of contacts, those of each force along joints, and stiffness and damping of each weld.
     ///
     /// States are those of centers of mass: with the states as they are, a body whose center of mass moves in its model frame is
     /// a body whose shape moves the other way. Where the model's pose is given instead, the state follows from
@@ -31,8 +34,13 @@ impl<S: Scalar> World<S> {
             parameters.extend(body.external_wrench.iter());
             parameters.extend(body.dimensions());
         }
+        for link in self.articulations.iter().flat_map(|own| own.tree.links()) {
+            parameters.extend(link.numbers());
+        }
         parameters.extend(self.gravity.iter());
         parameters.extend(self.contact_params().copied());
+        parameters.extend(self.joint_forces.iter().flat_map(|force| force.params()));
+        parameters.extend(self.welds.iter().flat_map(|weld| weld.stiffness.numbers()));
         parameters
     }
 
@@ -47,9 +55,12 @@ impl<S: Scalar> World<S> {
     ) -> Result<World<T>, SimulationError> {
         self.check_trajectories()?;
         let free = self.bodies.iter().filter(|body| body.rigid().is_some()).count();
-        let params = self.contact_params().count();
+        let params = self.contact_params().count()
+            + self.joint_forces.iter().map(|force| force.params().len()).sum::<usize>()
+            + 4 * self.welds.len();
+        let links = NUMBERS * self.joint_count();
         let dimensions: usize = self.bodies.iter().map(|body| body.dimensions().len()).sum();
-        let expected = 10 * free + 6 * self.bodies.len() + dimensions + 3 + params;
+        let expected = 10 * free + 6 * self.bodies.len() + dimensions + links + 3 + params;
         if parameters.len() != expected {
             return Err(SimulationError::Parameters { given: parameters.len(), expected });
         }
@@ -71,9 +82,17 @@ impl<S: Scalar> World<S> {
             body.set_dimensions(dimensions)
                 .map_err(|error| SimulationError::Shape { body: body.name.clone(), error })?;
         }
+        for link in world.articulations.iter_mut().flat_map(|own| own.tree.links_mut()) {
+            link.set_numbers(&std::array::from_fn(|_| next()));
+        }
         world.gravity = Vector3::from_fn(|_, _| next());
         let pairs = world.kinds_of_contact_mut();
         pairs.flat_map(|pair| pair.params_mut()).for_each(|p| *p = next());
+        let forces = world.joint_forces.iter_mut();
+        forces.flat_map(|force| force.params_mut()).for_each(|p| *p = next());
+        for weld in &mut world.welds {
+            weld.stiffness = WeldStiffness::of(std::array::from_fn(|_| next()));
+        }
         Ok(world)
     }
 

@@ -12,13 +12,13 @@ use crate::world::World;
 use crate::world::body::Body;
 use crate::world::body_id::BodyId;
 
-/// Positions and velocities of a robot's joints, in the order of [`KinematicTree::joint_names`].
+/// Positions and velocities: of a robot's joints, in the order of [`KinematicTree::joint_names`], or of one joint.
 #[derive(Clone, Debug, PartialEq)]
-pub struct JointState {
+pub struct JointState<S = f64> {
     /// Positions \[rad or m\].
-    pub position: Vec<f64>,
+    pub position: Vec<S>,
     /// Velocities \[rad/s or m/s\].
-    pub velocity: Vec<f64>,
+    pub velocity: Vec<S>,
 }
 
 /// A robot whose joints follow a trajectory.

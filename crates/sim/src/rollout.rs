@@ -11,6 +11,7 @@ use crate::state::State;
 use crate::time::{Step, TimeSteps};
 use crate::world::World;
 use crate::world::contact_pair::ContactPair;
+use crate::world::joint_force::JointForce;
 
 /// What a simulation with an integrator of one's own choice led to.
 #[derive(Clone, Debug, PartialEq)]
@@ -246,6 +247,7 @@ impl<S: Scalar> World<S> {
             return Err(self.wrong_count(states.len()));
         }
         self.kinds_of_contact().try_for_each(ContactPair::check)?;
+        self.joint_forces.iter().try_for_each(JointForce::check)?;
         match states.iter().all(State::is_finite) {
             true => Ok(()),
             false => Err(self.not_finite(states, states, start)),
@@ -272,7 +274,7 @@ mod tests {
         };
         assert_eq!(
             step(&world, &states[..1], 1e-3),
-            SimulationError::States { states: 1, bodies: 2, sticking: 0 }
+            SimulationError::States { states: 1, bodies: 2, joints: 0, sticking: 0 }
         );
         assert_eq!(step(&world, &states, -1.0), SimulationError::TimeStep(-1.0));
         for (bad, message) in [
@@ -339,7 +341,7 @@ mod tests {
         };
         assert_eq!(roll(&states, 0.0).unwrap_err(), SimulationError::TimeStep(0.0));
         let error = roll(&states[..1], 1e-3).unwrap_err();
-        assert_eq!(error, SimulationError::States { states: 1, bodies: 2, sticking: 0 });
+        assert_eq!(error, SimulationError::States { states: 1, bodies: 2, joints: 0, sticking: 0 });
         let mut lost = states.clone();
         lost[1].linear = Vector3::repeat(f64::NAN);
         let error = roll(&lost, 1e-3).unwrap_err();

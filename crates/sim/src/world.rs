@@ -1,5 +1,6 @@
 //! Bodies, what acts on them and what touches what.
 
+pub(crate) mod articulated_body;
 pub(crate) mod body;
 pub(crate) mod body_id;
 pub(crate) mod contact_group;
@@ -7,12 +8,15 @@ pub(crate) mod contact_pair;
 mod contacts_between;
 pub(crate) mod deflection;
 mod effect;
+pub(crate) mod joint_force;
 mod linear_contacts;
 pub(crate) mod neighbors;
 mod pair_function;
 mod seen;
+mod sensors;
 pub(crate) mod trajectory;
 mod trajectory_checks;
+pub(crate) mod weld;
 
 use std::fmt;
 use std::sync::Arc;
@@ -24,15 +28,18 @@ use crate::contact::dynamic::DynContactLaw;
 use crate::contact::gap_smoothing::GapSmoothing;
 use crate::error::SimulationError;
 use crate::state::State;
+use articulated_body::ArticulatedBody;
 use body::{Body, Motion};
 use body_id::BodyId;
 use contact_group::ContactGroup;
 use contact_pair::{ContactBodies, ContactPair};
+use joint_force::JointForce;
+use weld::Weld;
 
 /// Bodies, their contacts, and gravity: plain data, over plain numbers or numbers that carry derivatives.
 ///
 /// To differentiate by a mass, a friction coefficient or gravity, [`lift`](World::lift) the world to the scalar and put
-/// the variable in its place. States come in the order of the bodies.
+/// the variable in its place. States come in the order of the bodies; then those of the joints of [articulations](World::add_articulation).
 #[derive(Clone)]
 pub struct World<S: Scalar = f64> {
     /// The bodies.
@@ -41,6 +48,12 @@ pub struct World<S: Scalar = f64> {
     pub contacts: Vec<ContactPair<S>>,
     /// Bodies that may touch others of their group, wherever they meet.
     pub contact_groups: Vec<ContactGroup<S>>,
+    /// Which bodies are links that joints hold together.
+    pub articulations: Vec<ArticulatedBody<S>>,
+    /// What acts along joints.
+    pub joint_forces: Vec<JointForce<S>>,
+    /// Which frames springs hold together.
+    pub welds: Vec<Weld<S>>,
     /// Gravity, world frame \[m/s²\].
     pub gravity: Vector3<S>,
 }
@@ -48,7 +61,15 @@ pub struct World<S: Scalar = f64> {
 impl World {
     /// A world without bodies under `gravity` \[m/s²\].
     pub fn new(gravity: Vector3<f64>) -> Self {
-        Self { bodies: Vec::new(), contacts: Vec::new(), contact_groups: Vec::new(), gravity }
+        Self {
+            bodies: Vec::new(),
+            contacts: Vec::new(),
+            contact_groups: Vec::new(),
+            articulations: Vec::new(),
+            joint_forces: Vec::new(),
+            welds: Vec::new(),
+            gravity,
+        }
     }
 
     /// Adds a body.
@@ -128,7 +149,13 @@ impl<S: Scalar> World<S> {
         self.bodies.get(id.index()).ok_or(no_body)
     }
 
-    /// The bodies that forces move.
+    /// The bodies that forces move, links among them.
+    pub(crate) fn moved_bodies(&self) -> impl Iterator<Item = BodyId> {
+        let moved = self.bodies.iter().enumerate().filter(|(_, body)| body.feels_forces());
+        moved.map(|(index, _)| BodyId(index))
+    }
+
+    /// The bodies that forces move by themselves: no links.
     pub(crate) fn free_bodies(&self) -> Vec<BodyId> {
         let free = |id: &BodyId| self.bodies[*id].rigid().is_some();
         (0..self.bodies.len()).map(BodyId).filter(free).collect()
@@ -196,6 +223,9 @@ impl<S: Scalar> World<S> {
             bodies: self.bodies.iter().map(|body| body.map(&f)).collect(),
             contacts: self.contacts.iter().map(|pair| pair.map(&f)).collect(),
             contact_groups: self.contact_groups.iter().map(|group| group.map(&f)).collect(),
+            articulations: self.articulations.iter().map(|own| own.map(&f)).collect(),
+            joint_forces: self.joint_forces.iter().map(|force| force.map(&f)).collect(),
+            welds: self.welds.iter().map(|weld| weld.map(&f)).collect(),
             gravity: self.gravity.map(&f),
         }
     }
@@ -211,13 +241,14 @@ impl<S: Scalar> World<S> {
         plain
     }
 
-    /// Moves the bodies that forces do not move to where they are at `time` \[s\].
+    /// Moves the bodies that forces do not move to where they are at `time` \[s\], and links to where their joints put them.
     pub fn drive(&self, states: &mut [State<S>], time: f64) {
-        for (body, state) in self.bodies.iter().zip(states) {
+        for (body, state) in self.bodies.iter().zip(states.iter_mut()) {
             if let Motion::Driven(trajectory) = &body.motion {
                 *state = trajectory.state(time);
             }
         }
+        self.place_links(states);
     }
 }
 

@@ -99,11 +99,7 @@ impl<S: Scalar> Kinematics<'_, S> {
     }
 
     /// M⁻¹ `efforts`, as accelerations from rest without gravity.
-    pub(super) fn accelerated(
-        &self,
-        factor: &ArticulatedInertia<S>,
-        efforts: &[S],
-    ) -> DVector<S> {
+    pub(super) fn accelerated(&self, factor: &ArticulatedInertia<S>, efforts: &[S]) -> DVector<S> {
         let mut rest = efforts.to_vec();
         let mut forces = vec![Vector6::zeros(); self.tree.links().len()];
         for (index, link) in self.tree.links().iter().enumerate().rev() {
@@ -142,8 +138,7 @@ impl<S: Scalar> Kinematics<'_, S> {
             let first = freedoms.start;
             let inverse = &factor.inverses[index];
             if freedoms.len() == 1 {
-                let value =
-                    inverse[0] * (rest[first] - factor.pulls[first].dot(&acceleration));
+                let value = inverse[0] * (rest[first] - factor.pulls[first].dot(&acceleration));
                 acceleration += self.axes[first] * value;
                 result[first] = value;
             } else {

@@ -1,10 +1,10 @@
 //! Recursive Newton–Euler.
 
-use nalgebra::{DVector, Vector3, Vector6};
+use nalgebra::{DVector, Point3, Vector3, Vector6};
 use prehend_autodiff::Scalar;
 
 use super::kinematics::Kinematics;
-use super::spatial::{cross_force, spatial};
+use super::spatial::{angular, cross_force, linear, spatial};
 
 /// Motion and force of all links at some accelerations.
 pub(super) struct Effort<S: Scalar> {
@@ -27,6 +27,19 @@ impl<S: Scalar> Kinematics<'_, S> {
             self.axes[freedom].dot(&effort.forces[link]) + armature * accelerations[freedom]
         };
         DVector::from_fn(self.axes.len(), |freedom, _| tau(freedom))
+    }
+
+    /// Acceleration of a link's origin \[m/s²\], less that of free fall, and its angular acceleration \[rad/s²\], along the world's axes, at
+    /// accelerations v̇.
+    ///
+    /// # Panics
+    /// If there is not one for each degree of freedom, or no such link.
+    pub fn acceleration(&self, link: usize, accelerations: &[S]) -> Vector6<S> {
+        let at = self.effort(accelerations).accelerations[link];
+        let [velocity, spin] = self.velocity(link, &Point3::origin());
+        let turning = angular(&at);
+        let origin = linear(&at) + turning.cross(&self.places[link]) + spin.cross(&velocity);
+        spatial(&origin, &turning)
     }
 
     pub(super) fn effort(&self, accelerations: &[S]) -> Effort<S> {

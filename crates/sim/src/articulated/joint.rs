@@ -76,6 +76,11 @@ impl Joint {
         }
     }
 
+    /// Whether a rotation is among its coordinates.
+    pub(crate) fn turns(&self) -> bool {
+        matches!(self, Self::Spherical | Self::Floating)
+    }
+
     /// The coordinates from which others are counted: link and joint frame coincide there, but for joint types of one's own.
     pub fn neutral(&self) -> &'static [f64] {
         match self {

@@ -129,10 +129,7 @@ impl LocalFunction<{ 2 * MOST }, COURSE> for Linear {
         })
     }
 
-    fn linearize(
-        &self,
-        _: [f64; 2 * MOST],
-    ) -> Option<([f64; COURSE], [[f64; 2 * MOST]; COURSE])> {
+    fn linearize(&self, _: [f64; 2 * MOST]) -> Option<([f64; COURSE], [[f64; 2 * MOST]; COURSE])> {
         Some((self.value, self.jacobian))
     }
 }

@@ -1,6 +1,6 @@
 //! A tree of links.
 
-use nalgebra::{Isometry3, Matrix3, Point3, Quaternion, Unit, Vector3};
+use nalgebra::{Isometry3, Matrix3, Point3, Quaternion, Translation3, Unit, Vector3};
 use prehend_autodiff::Scalar;
 
 use super::joint::Joint;
@@ -28,6 +28,9 @@ pub struct Link<S: Scalar = f64> {
     pub armature: S,
 }
 
+/// How many numbers a link is made of.
+pub(crate) const NUMBERS: usize = 3 + 4 + 1 + 3 + 6 + 1;
+
 impl<S: Scalar> Link<S> {
     /// Without armature, of `body` in the link's frame.
     pub fn new(
@@ -45,6 +48,26 @@ impl<S: Scalar> Link<S> {
     /// With `armature` \[kg m² or kg\].
     pub fn with_armature(self, armature: S) -> Self {
         Self { armature, ..self }
+    }
+
+    /// Place and rotation (i, j, k, w) of its joint, mass, center of mass, inertia xx, yy, zz, xy, xz, yz, and armature.
+    pub(crate) fn numbers(&self) -> impl Iterator<Item = S> {
+        let pose = &self.t_parent_joint;
+        let i = &self.inertia;
+        let place = pose.translation.vector.iter().chain(pose.rotation.coords.iter()).copied();
+        let body = std::iter::once(self.mass).chain(self.com.iter().copied());
+        let inertia = [i.m11, i.m22, i.m33, i.m12, i.m13, i.m23, self.armature];
+        place.chain(body).chain(inertia)
+    }
+
+    /// Sets what [`numbers`](Self::numbers) gives.
+    pub(crate) fn set_numbers(&mut self, numbers: &[S; NUMBERS]) {
+        let [x, y, z, qx, qy, qz, qw, mass, cx, cy, cz, xx, yy, zz, xy, xz, yz, armature] =
+            *numbers;
+        let rotation = Unit::new_normalize(Quaternion::new(qw, qx, qy, qz));
+        self.t_parent_joint = Isometry3::from_parts(Translation3::new(x, y, z), rotation);
+        (self.mass, self.com, self.armature) = (mass, Point3::new(cx, cy, cz), armature);
+        self.inertia = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
     }
 
     /// The same link, each number through `f`.
@@ -139,6 +162,12 @@ impl<S: Scalar> Articulation<S> {
     /// The links, each after its parent.
     pub fn links(&self) -> &[Link<S>] {
         &self.links
+    }
+
+    /// The links, to be changed: to differentiate by a mass, a length or an armature, put a variable in its place. Their joints and parents are
+    /// to stay as they are.
+    pub(crate) fn links_mut(&mut self) -> &mut [Link<S>] {
+        &mut self.links
     }
 
     /// Acceleration of free fall \[m/s²\].

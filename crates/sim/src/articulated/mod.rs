@@ -21,9 +21,9 @@ mod inverse_dynamics;
 mod joint;
 mod joint_model;
 mod kinematics;
-mod link;
+pub(crate) mod link;
 mod mass_matrix;
-mod spatial;
+pub(crate) mod spatial;
 #[cfg(test)]
 mod tests;
 mod tree_factor;

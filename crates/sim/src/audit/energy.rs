@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 use prehend_autodiff::Scalar;
 
+use crate::articulated::Energy;
 use crate::contact::bristles::Bristles;
 use crate::contact::point::Contact;
 use crate::contact::wrench::stack;
@@ -13,6 +14,7 @@ use crate::world::World;
 use crate::world::body::{Body, Motion};
 use crate::world::body_id::BodyId;
 use crate::world::contact_pair::ContactPair;
+use crate::world::joint_force::JointForce;
 
 /// Part of the largest kinetic energy that contacts may seem to have made: methods of first order are off by as much where they
 /// are still of use.
@@ -51,7 +53,7 @@ impl EnergyBalance {
     ) -> Self {
         let initial: Vec<State> = initial.iter().map(State::value).collect();
         let moves = |(motion, state): (&Motion<S>, &State)| match motion {
-            Motion::Free(_) => false,
+            Motion::Free(_) | Motion::Link => false,
             Motion::Kinematic => {
                 state.linear != Vector3::zeros() || state.angular != Vector3::zeros()
             }
@@ -59,7 +61,10 @@ impl EnergyBalance {
         };
         let moved = world.bodies.iter().map(|body| &body.motion).zip(&initial).any(moves);
         let torques = world.bodies.iter().any(|body| torque(body) != Vector3::zeros());
-        let closed = !(moved || controls_error && torques);
+        let pushed = world.joint_forces.iter().any(|force| !force.law().is_passive());
+        let links = world.bodies.iter().filter(|body| matches!(body.motion, Motion::Link));
+        let pulled = links.into_iter().any(|body| body.external_wrench.norm().value() > 0.0);
+        let closed = !(moved || pushed || pulled || controls_error && torques);
         Self { closed, initial, work: 0.0, kinetic: 0.0 }
     }
 
@@ -99,6 +104,14 @@ impl EnergyBalance {
                 - kinetic_energy(world, body, before)
                 - work_of_pull(world, body, before, &now);
         }
+        let articulated =
+            [self.initial.as_slice(), &states.iter().map(State::value).collect::<Vec<_>>()]
+                .map(|states| articulated_energy(world, states));
+        kinetic += articulated[1].kinetic;
+        gain += articulated[1].kinetic + articulated[1].potential
+            - articulated[0].kinetic
+            - articulated[0].potential
+            - work_along_joints(world, &self.initial, states);
         self.kinetic = self.kinetic.max(kinetic);
         if !self.closed || gain <= TOLERANCE * self.kinetic {
             return Ok(());
@@ -135,6 +148,32 @@ fn kinetic_energy<S: Scalar>(world: &World<S>, body: BodyId, state: &State) -> f
     0.5 * (rigid.mass().value() * state.linear.norm_squared() + spin.dot(&(inertia * spin)))
 }
 
+/// Energy of all links \[J\].
+fn articulated_energy<S: Scalar>(world: &World<S>, states: &[State]) -> Energy {
+    let gravity = world.gravity.map(|x| x.value());
+    let mut sum = Energy { kinetic: 0.0, potential: 0.0 };
+    for (own, joints) in world.articulated(states) {
+        let [q, v] = own.coordinates(joints);
+        let energy = own.tree.map(S::value).kinematics(&q, &v).under(gravity).energy(&v);
+        sum.kinetic += energy.kinetic;
+        sum.potential += energy.potential;
+    }
+    sum
+}
+
+/// What springs along joints, and all else that acts there, have done while nothing moved fast \[J\].
+fn work_along_joints<S: Scalar>(world: &World<S>, before: &[State], now: &[State<S>]) -> f64 {
+    let work = |force: &JointForce<S>| {
+        let lifted: Vec<State<S>> = before.iter().map(State::lift).collect();
+        let position = |states: &[State<S>]| Some(world.along(force, states)?.1[0].value());
+        let (Some(from), Some(to)) = (position(&lifted), position(now)) else { return 0.0 };
+        let p: Vec<f64> = force.params().iter().map(|p| p.value()).collect();
+        let effort = |x: f64| force.law().effort(&p, from + x * (to - from), 0.0);
+        (to - from) * GAUSS.iter().map(|(x, weight)| weight * effort(*x)).sum::<f64>()
+    };
+    world.joint_forces.iter().map(work).sum()
+}
+
 /// Work of gravity and the external force on a free body that has moved from `before` to `now` \[J\].
 fn work_of_pull<S: Scalar>(world: &World<S>, body: BodyId, before: &State, now: &State) -> f64 {
     let Some(rigid) = world.bodies[body].rigid() else { return 0.0 };
@@ -145,9 +184,9 @@ fn work_of_pull<S: Scalar>(world: &World<S>, body: BodyId, before: &State, now: 
 }
 
 /// What resting contacts at `states` could give back \[J\]: the work of each sample's normal force from its gap to where
-/// there is none, and that of bristles as they return.
+/// there is none, and that of bristles and welds as they return.
 fn stored_energy(world: &World, states: &[State]) -> f64 {
-    let mut energy = energy_of_bristles(world, states);
+    let mut energy = energy_of_bristles(world, states) + world.energy_of_welds(states);
     for pair in &world.contacts {
         let Some(patch) = world.patch(pair, world.seen_value(pair, states)) else { continue };
         let (reach, smoothing) = (pair.law().reach(), pair.smoothing);
@@ -188,5 +227,5 @@ fn energy_of_bristles(world: &World, states: &[State]) -> f64 {
         let mean: f64 = GAUSS.iter().map(|(x, weight)| weight * along(*x)).sum();
         undeflected - mean
     };
-    world.sticking().zip(&states[world.bodies.len()..]).map(work).sum()
+    world.sticking().zip(&states[world.joint_places().end..]).map(work).sum()
 }

@@ -13,14 +13,38 @@ use crate::world::body_id::BodyId;
 /// Part of a body's speed below which a change of it is rounding, or an integrator's own error.
 const NOISE: f64 = 1e-6;
 
-/// Follows the velocities of free bodies.
+/// Follows the velocities of free bodies and joints.
 pub(super) struct Roughness {
     bodies: Vec<Followed>,
-    /// Sums of the squared changes of velocity by contacts, and of the squared changes of these.
+    joints: Vec<Joint>,
+    sums: Sums,
+}
+
+/// Sums of the squared changes of velocity by contacts, and of the squared changes of these.
+#[derive(Default)]
+struct Sums {
     kicks: f64,
     changes: f64,
     /// The largest of the latter, whose it is, and when \[s\].
     largest: (f64, Option<(BodyId, f64)>),
+}
+
+impl Sums {
+    fn add(&mut self, body: BodyId, step: Step, before: Option<Vector6<f64>>, kick: Vector6<f64>) {
+        // Nothing is known of what was before the first step.
+        let change = before.map_or(0.0, |before| (kick - before).norm_squared());
+        self.kicks += kick.norm_squared();
+        self.changes += change;
+        if change > self.largest.0 {
+            self.largest = (change, Some((body, step.start)));
+        }
+    }
+}
+
+/// The velocities of a joint's state.
+fn velocity<S: Scalar>(state: &State<S>) -> Vector6<f64> {
+    let state = state.value();
+    stack(&state.linear, &state.angular)
 }
 
 /// A free body and what is known of its last step.
@@ -34,6 +58,14 @@ struct Followed {
     torque: Vector3<f64>,
     linear: Vector3<f64>,
     momentum: Vector3<f64>,
+    kick: Option<Vector6<f64>>,
+}
+
+/// A joint and what is known of its last step.
+struct Joint {
+    place: usize,
+    link: BodyId,
+    velocity: Vector6<f64>,
     kick: Option<Vector6<f64>>,
 }
 
@@ -55,7 +87,13 @@ impl Roughness {
             })
         };
         let bodies = world.free_bodies().into_iter().filter_map(follow).collect();
-        Self { bodies, kicks: 0.0, changes: 0.0, largest: (0.0, None) }
+        let links = world.articulations.iter().flat_map(|own| own.bodies());
+        let joints = world.joint_places().zip(links).map(|(place, link)| {
+            let velocity = initial.get(place).map_or_else(Vector6::zeros, velocity);
+            Joint { place, link: *link, velocity, kick: None }
+        });
+        let joints = joints.collect();
+        Self { bodies, joints, sums: Sums::default() }
     }
 
     /// After `step` has led to `states`.
@@ -70,25 +108,27 @@ impl Roughness {
             if kick.norm() < NOISE * state.speed_within(followed.length) {
                 kick = Vector6::zeros();
             }
-            // Nothing is known of what was before the first step.
-            let change = followed.kick.map_or(0.0, |before| (kick - before).norm_squared());
-            self.kicks += kick.norm_squared();
-            self.changes += change;
-            if change > self.largest.0 {
-                self.largest = (change, Some((followed.body, step.start)));
-            }
             (followed.linear, followed.momentum) = (state.linear, momentum);
-            followed.kick = Some(kick);
+            let before = followed.kick.replace(kick);
+            self.sums.add(followed.body, step, before, kick);
+        }
+        for joint in &mut self.joints {
+            let now = velocity(&states[joint.place]);
+            let kick = now - joint.velocity;
+            joint.velocity = now;
+            let before = joint.kick.replace(kick);
+            self.sums.add(joint.link, step, before, kick);
         }
     }
 
     /// The ratio of both root mean squares.
     pub(super) fn mean(&self) -> f64 {
-        if self.kicks > 0.0 { (self.changes / self.kicks).sqrt() } else { 0.0 }
+        let Sums { kicks, changes, .. } = self.sums;
+        if kicks > 0.0 { (changes / kicks).sqrt() } else { 0.0 }
     }
 
     /// The body with the largest change, and when \[s\].
     pub(super) fn roughest(&self) -> Option<(BodyId, f64)> {
-        self.largest.1
+        self.sums.largest.1
     }
 }

@@ -41,6 +41,7 @@ impl Integrator for BackwardEuler {
         states: &[State<S>],
         step: Step,
     ) -> Result<Vec<State<S>>, SimulationError> {
+        world.refuse_joints("BackwardEuler")?;
         let free = world.free_bodies();
         if free.is_empty() {
             return Ok(states.to_vec());

@@ -17,8 +17,8 @@ use crate::world::World;
 use crate::world::body::Body;
 use crate::world::body_id::BodyId;
 
-/// Of a body: position of the center of mass, its velocity, rotation vector, and angular momentum; or their rates. Of a contact
-/// that sticks: the two halves of its deflection, and nothing.
+/// Of a body: position of the center of mass, its velocity, rotation vector, and angular momentum; or their rates. Of a joint the same
+/// of its state, with its angular velocity. Of a contact that sticks: the two halves of its deflection, and nothing.
 ///
 /// Rotations are R = exp(θ) R₀ with the rotation vector θ from the start of the step, whose rate is
 /// dexp⁻¹(θ) ω = ω − θ×ω/2 + θ×(θ×ω)/12 to the order that counts (H. Munthe-Kaas, "High order Runge–Kutta methods on
@@ -32,9 +32,9 @@ pub(super) struct Stages<'a, S: Scalar> {
     states: &'a [State<S>],
     step: Step,
     free: Vec<Free<'a, S>>,
-    /// Free bodies and contacts that stick.
+    /// Free bodies, joints and contacts that stick.
     moving: usize,
-    /// Of each stage, those of the free bodies, then of the contacts that stick.
+    /// Of each stage, those of the free bodies, then of the joints and of the contacts that stick.
     slopes: Vec<Change<S>>,
     /// What led to the last stage.
     change: Vec<Change<S>>,
@@ -94,7 +94,7 @@ impl<'a, S: Scalar> Stages<'a, S> {
         self.moved(&self.combined(weights))
     }
 
-    /// Of each free body and contact that sticks, the step's length times the sum of the slopes with `weights`.
+    /// Of each free body, joint and contact that sticks, the step's length times the sum of the slopes with `weights`.
     pub(super) fn combined(&self, weights: &[f64]) -> Vec<Change<S>> {
         let mut sums = vec![[Vector3::zeros(); 4]; self.moving];
         self.add_combined(weights, &mut sums);
@@ -131,8 +131,16 @@ impl<'a, S: Scalar> Stages<'a, S> {
             state.pose.rotation = turned(&state.pose.rotation, turn);
             state.angular = free.rigid.angular(&state.pose.rotation, &(free.momentum + momentum));
         }
-        let deflections = moved.iter_mut().skip(self.world.bodies.len());
-        for (state, [linear, angular, ..]) in deflections.zip(&change[self.free.len()..]) {
+        let (joints, deflections) = change[self.free.len()..].split_at(self.world.joint_count());
+        for (place, [position, velocity, turn, spin]) in self.world.joint_places().zip(joints) {
+            let state = &mut moved[place];
+            state.pose.translation.vector += position;
+            state.linear += velocity;
+            state.pose.rotation = turned(&state.pose.rotation, turn);
+            state.angular += spin;
+        }
+        let states = moved.iter_mut().skip(self.world.joint_places().end);
+        for (state, [linear, angular, ..]) in states.zip(deflections) {
             *state = state.deflected(&stack(linear, angular));
         }
         moved
@@ -143,18 +151,32 @@ impl<'a, S: Scalar> Stages<'a, S> {
         for (free, change) in self.free.iter().zip(&self.change) {
             let (state, turn, wrench) = (&states[free.id], &change[2], &wrenches[free.id]);
             let (force, torque) = (wrench.fixed_rows::<3>(0), wrench.fixed_rows::<3>(3));
-            let [(a, b, c), (d, e, f)] = [turn, &state.angular].map(|v| (v.x, v.y, v.z));
-            let turning = Vector3::from(S::local(&TurnRate, [a, b, c, d, e, f]));
+            let turning = turn_rate(turn, &state.angular);
             let acceleration = self.world.gravity + force * (S::one() / free.rigid.mass());
             self.slopes.push([state.linear, acceleration, turning, torque.into_owned()]);
         }
-        let deflections = self.moving - self.free.len();
-        for rate in wrenches[self.world.bodies.len()..].iter().take(deflections) {
+        let joints = self.world.joint_places();
+        let deflections = self.moving - self.free.len() - joints.len();
+        let changes = &self.change[self.free.len()..];
+        for ((place, joint), change) in joints.clone().zip(self.world.joints()).zip(changes) {
+            let (state, turn, rate) = (&states[place], &change[2], &wrenches[place]);
+            let [position, angular] = joint.rate_of_pose(state);
+            let turning = if joint.turns() { turn_rate(turn, &angular) } else { Vector3::zeros() };
+            let (linear, spin) = (rate.fixed_rows::<3>(0), rate.fixed_rows::<3>(3));
+            self.slopes.push([position, linear.into_owned(), turning, spin.into_owned()]);
+        }
+        for rate in wrenches[joints.end..].iter().take(deflections) {
             let (linear, angular) = (rate.fixed_rows::<3>(0), rate.fixed_rows::<3>(3));
             let none = Vector3::zeros();
             self.slopes.push([linear.into_owned(), angular.into_owned(), none, none]);
         }
     }
+}
+
+/// The rate of the rotation vector `turn` whose body turns with `angular`.
+fn turn_rate<S: Scalar>(turn: &Vector3<S>, angular: &Vector3<S>) -> Vector3<S> {
+    let [(a, b, c), (d, e, f)] = [turn, angular].map(|v| (v.x, v.y, v.z));
+    S::local(&TurnRate, [a, b, c, d, e, f]).into()
 }
 
 /// The rate of a rotation vector θ whose body turns with ω, of both.

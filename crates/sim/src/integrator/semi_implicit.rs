@@ -15,7 +15,7 @@ use crate::world::World;
 ///
 /// The rotational part is kept in momentum form, L = I(R)ω: L' = L + dt τ, R' = exp(dt I(R)⁻¹L') R,
 /// ω' = I(R')⁻¹L'. The gyroscopic term thus comes from the turning inertia, and angular momentum is conserved to
-/// rounding.
+/// rounding. Joints follow v' = v + dt v̇, q' = q + dt v'.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SemiImplicitEuler;
 
@@ -34,6 +34,7 @@ impl Integrator for SemiImplicitEuler {
         });
         let mut next: Vec<State<S>> = next.collect();
         next.extend_from_slice(&states[next.len()..]);
+        world.swing(&mut next, &wrenches, S::constant(step.dt));
         world.deflect(&mut next, &wrenches, S::constant(step.dt));
         Ok(next)
     }

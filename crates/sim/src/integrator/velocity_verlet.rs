@@ -35,6 +35,7 @@ impl Integrator for VelocityVerlet {
         states: &[State<S>],
         step: Step,
     ) -> Result<Vec<State<S>>, SimulationError> {
+        world.refuse_joints("VelocityVerlet")?;
         let dt = S::constant(step.dt);
         let before = world.wrenches(states, step.index);
         let mut next = states.to_vec();

@@ -24,7 +24,8 @@ pub struct Body<S: Scalar = f64> {
     pub surface: Option<Arc<Surface>>,
     /// Signed distance to it, in its model frame: what the samples of others touch.
     pub field: Option<Arc<dyn DistanceField>>,
-    /// Force \[N\] and torque about the center of mass \[N m\] besides gravity and contacts, world frame.
+    /// Force \[N\] and torque about the center of mass \[N m\] besides gravity and contacts, world frame; of a link about the origin of its
+    /// frame.
     pub external_wrench: Vector6<S>,
     /// What it is made of, where its surface and field come from a shape.
     pub(crate) matter: Option<Matter<S>>,
@@ -40,6 +41,8 @@ pub enum Motion<S: Scalar = f64> {
     /// A trajectory, whatever the forces: a link of a robot whose joints are driven. In a lifted world one that carries derivatives
     /// may take its place.
     Driven(Arc<dyn Trajectory<S>>),
+    /// The joint that it hangs on, as a link of one of the world's [articulations](crate::World::add_articulation). Its model frame is the link's.
+    Link,
 }
 
 impl<S: Scalar> Body<S> {
@@ -70,6 +73,16 @@ impl<S: Scalar> Body<S> {
         Self::new(name, Motion::Driven(Arc::new(trajectory)))
     }
 
+    /// A link.
+    pub(super) fn link(name: &str) -> Self {
+        Self::new(name, Motion::Link)
+    }
+
+    /// Whether forces move it, alone or as a link.
+    pub(crate) fn feels_forces(&self) -> bool {
+        matches!(self.motion, Motion::Free(_) | Motion::Link)
+    }
+
     /// The same body with samples of its surface.
     #[must_use]
     pub fn with_surface(mut self, surface: impl Into<Arc<Surface>>) -> Self {
@@ -97,7 +110,7 @@ impl<S: Scalar> Body<S> {
     pub fn rigid(&self) -> Option<&RigidBody<S>> {
         match &self.motion {
             Motion::Free(body) => Some(body),
-            Motion::Kinematic | Motion::Driven(_) => None,
+            Motion::Kinematic | Motion::Driven(_) | Motion::Link => None,
         }
     }
 
@@ -114,6 +127,7 @@ impl<S: Scalar> Body<S> {
             motion: match &self.motion {
                 Motion::Free(rigid) => Motion::Free(rigid.map(&f)),
                 Motion::Kinematic => Motion::Kinematic,
+                Motion::Link => Motion::Link,
                 Motion::Driven(trajectory) => Motion::Driven(trajectory::constant(trajectory)),
             },
             surface: self.surface.clone(),

@@ -52,7 +52,7 @@ impl World {
         // Bodies that can do the same need be asked once, or twice where they are to touch each other.
         let kind = |id: BodyId| {
             let body = &self.bodies[id];
-            (body.surface.is_some(), body.field.is_some(), body.rigid().is_some())
+            (body.surface.is_some(), body.field.is_some(), body.feels_forces())
         };
         let kinds = lists.each_ref().map(|list| {
             let mut found: Vec<BodyId> = Vec::new();
@@ -87,7 +87,7 @@ impl World {
 impl<S: Scalar> World<S> {
     /// Whether a force may move one of two bodies.
     pub(crate) fn moves_against(&self, a: BodyId, b: BodyId) -> bool {
-        self.bodies[a].rigid().or(self.bodies[b].rigid()).is_some()
+        self.bodies[a].feels_forces() || self.bodies[b].feels_forces()
     }
 
     /// Which of two bodies brings the samples and which the field, with the weight of each contact.

@@ -37,7 +37,8 @@ impl<S: Scalar> Default for Effect<S> {
 
 impl<S: Scalar> World<S> {
     /// External and contact wrenches on every body at `states` (force \[N\], torque about the center of mass \[N m\],
-    /// world frame), without gravity; then the rate of the deflection (\[m/s\], \[rad/s\]) of every contact that sticks.
+    /// world frame), without gravity; then the accelerations of every joint, in the order of its state's velocities, and the rate of the
+    /// deflection (\[m/s\], \[rad/s\]) of every contact that sticks.
     /// `step` matters to leaks in the first step only.
     ///
     /// Derivatives through contacts are first derivatives.
@@ -48,8 +49,17 @@ impl<S: Scalar> World<S> {
         if !self.contact_groups.is_empty() {
             return self.with_touching(states, 0.0).wrenches(states, step);
         }
+        let mut wrenches = self.contact_wrenches(states, step);
+        let accelerations = self.joint_accelerations(states, &wrenches);
+        wrenches[self.joint_places()].copy_from_slice(&accelerations);
+        wrenches
+    }
+
+    /// [`World::wrenches`] without groups of contacts, and without the accelerations of joints.
+    pub(crate) fn contact_wrenches(&self, states: &[State<S>], step: usize) -> Vec<Vector6<S>> {
         let mut wrenches: Vec<Vector6<S>> =
             self.bodies.iter().map(|body| body.external_wrench).collect();
+        wrenches.resize(self.joint_places().end, Vector6::zeros());
         let mut linear = S::RECORDED.then(|| LinearContacts::new(self.bodies.len()));
         for pair in &self.contacts {
             let bristles = pair.law().bristles();
@@ -68,6 +78,7 @@ impl<S: Scalar> World<S> {
         if let Some(linear) = linear {
             linear.record(self, states, &mut wrenches);
         }
+        self.add_welds(states, &mut wrenches);
         wrenches
     }
 

@@ -58,10 +58,10 @@ impl<'a, S: Scalar> NeighborSearch<'a, S> {
 
     /// The bodies of groups that forces move, each with its size \[m\].
     pub(crate) fn free(&self) -> impl Iterator<Item = (BodyId, f64)> {
-        let free = self.world.free_bodies().into_iter().filter(|id| self.grouped[id.index()]);
-        free.filter_map(|id| {
-            let gyration = self.world.bodies[id].rigid()?.gyration_radius();
-            Some((id, self.radii[id.index()].unwrap_or(0.0).max(gyration)))
+        let free = self.world.moved_bodies().filter(|id| self.grouped[id.index()]);
+        free.map(|id| {
+            let gyration = self.world.gyration_radius(id);
+            (id, self.radii[id.index()].unwrap_or(0.0).max(gyration))
         })
     }
 
@@ -92,7 +92,7 @@ impl<'a, S: Scalar> NeighborSearch<'a, S> {
     /// depends on nothing but the bodies.
     pub(crate) fn find(&self, states: &[State], deviations: &[f64], dt: f64) -> Vec<Neighbors> {
         let reach = |(id, deviation): (BodyId, &f64)| {
-            let free = self.world.bodies[id].rigid().is_some();
+            let free = self.world.bodies[id].feels_forces();
             Reach {
                 center: states[id].pose.translation.vector,
                 path: if free { states[id].linear * dt } else { Vector3::zeros() },
@@ -100,7 +100,7 @@ impl<'a, S: Scalar> NeighborSearch<'a, S> {
             }
         };
         let reaches: Vec<Reach> =
-            (0..states.len()).map(BodyId).zip(deviations).map(reach).collect();
+            (0..self.world.bodies.len()).map(BodyId).zip(deviations).map(reach).collect();
         let mut near = Vec::new();
         for (index, group) in self.world.contact_groups.iter().enumerate() {
             for (a, b) in self.pairs(group, &reaches) {
@@ -245,8 +245,15 @@ impl<S: Scalar> World<S> {
         let search = NeighborSearch::new(self);
         let neighbors = search.find(&values, &deviations(&search), dt);
         let contacts = self.contacts_with(&neighbors);
-        let (bodies, gravity) = (self.bodies.clone(), self.gravity);
-        Cow::Owned(Self { bodies, contacts, contact_groups: Vec::new(), gravity })
+        Cow::Owned(Self {
+            bodies: self.bodies.clone(),
+            contacts,
+            contact_groups: Vec::new(),
+            articulations: self.articulations.clone(),
+            joint_forces: self.joint_forces.clone(),
+            welds: self.welds.clone(),
+            gravity: self.gravity,
+        })
     }
 
     /// [`World::with_neighbors`] of those that touch, or are no farther than `reach` \[m\] from it.

@@ -5,7 +5,7 @@ use prehend_autodiff::Scalar;
 
 use crate::articulated::joint::{CustomJoint, Joint};
 use crate::articulated::kinematics::Kinematics;
-use crate::articulated::link::{Articulation, Link};
+use crate::articulated::link::{Articulation, Link, NUMBERS};
 use crate::articulated::spatial::{angular, linear};
 
 /// Adjoints of what a link is made of.
@@ -17,16 +17,6 @@ pub(super) struct LinkAdjoint {
     pub(super) com: Vector3<f64>,
     pub(super) inertia: Matrix3<f64>,
     pub(super) armature: f64,
-}
-
-/// Numbers of a link that may vary: place and rotation of its joint, mass, center of mass, inertia and armature.
-const LINK: usize = 3 + 4 + 1 + 3 + 9 + 1;
-
-fn numbers<S: Scalar>(link: &Link<S>) -> impl Iterator<Item = S> {
-    let pose = &link.t_parent_joint;
-    let place = pose.translation.vector.iter().chain(pose.rotation.coords.iter());
-    let body = std::iter::once(&link.mass).chain(link.com.iter()).chain(link.inertia.iter());
-    place.chain(body).chain(std::iter::once(&link.armature)).copied()
 }
 
 /// What of a node's inputs varies, so that constants are not recorded.
@@ -42,11 +32,11 @@ pub(super) struct Inputs<S> {
 impl<S: Scalar> Inputs<S> {
     /// Of `first` and, if one of them varies, the numbers of all links.
     pub(super) fn new(first: impl Iterator<Item = S>, tree: &Articulation<S>) -> Self {
-        let links = tree.links().iter().any(|link| numbers(link).any(|x| !x.is_constant()));
+        let links = tree.links().iter().any(|link| link.numbers().any(|x| !x.is_constant()));
         let mut inputs = Self { varying: Vec::new(), varies: Vec::new(), links };
         first.for_each(|x| inputs.push(x));
         if links {
-            tree.links().iter().flat_map(numbers).for_each(|x| inputs.push(x));
+            tree.links().iter().flat_map(Link::numbers).for_each(|x| inputs.push(x));
         }
         inputs
     }
@@ -65,11 +55,7 @@ impl<S: Scalar> Inputs<S> {
 }
 
 /// Adds those of `adjoints`, in the order of the inputs, that vary.
-pub(super) fn add_varying(
-    varies: &[bool],
-    adjoints: impl Iterator<Item = f64>,
-    into: &mut [f64],
-) {
+pub(super) fn add_varying(varies: &[bool], adjoints: impl Iterator<Item = f64>, into: &mut [f64]) {
     let varying = varies.iter().zip(adjoints).filter(|(varies, _)| **varies);
     into.iter_mut().zip(varying).for_each(|(sum, (_, x))| *sum += x);
 }
@@ -77,7 +63,7 @@ pub(super) fn add_varying(
 impl Kinematics<'_> {
     /// The adjoints of all numbers of the links, in their order.
     pub(super) fn link_adjoints(&self, adjoints: &[LinkAdjoint]) -> Vec<f64> {
-        let mut all = Vec::with_capacity(LINK * adjoints.len());
+        let mut all = Vec::with_capacity(NUMBERS * adjoints.len());
         for (link, adjoint) in self.tree.links().iter().zip(adjoints) {
             let (rotation, place) = match link.parent {
                 Some(parent) => (self.rotations[parent], self.places[parent]),
@@ -91,7 +77,9 @@ impl Kinematics<'_> {
             all.extend(turned.coords.iter().map(|x| 2.0 * x));
             all.push(adjoint.mass);
             all.extend(adjoint.com.iter());
-            all.extend(adjoint.inertia.iter());
+            let i = &adjoint.inertia;
+            all.extend([i.m11, i.m22, i.m33]);
+            all.extend([i.m12 + i.m21, i.m13 + i.m31, i.m23 + i.m32]);
             all.push(adjoint.armature);
         }
         all

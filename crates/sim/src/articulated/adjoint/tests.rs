@@ -42,13 +42,8 @@ fn weighed<S: Scalar>(tree: &Articulation, start: &[f64], x: &[S]) -> S {
         let _ = next();
     }
     let tree = Articulation::new(links, gravity).unwrap();
-    let on = Acting {
-        gravity,
-        coordinates: &q,
-        velocities: &v,
-        efforts: &efforts,
-        wrenches: &wrenches,
-    };
+    let on =
+        Acting { gravity, coordinates: &q, velocities: &v, efforts: &efforts, wrenches: &wrenches };
     let weights = (1..).map(|k| f64::from(k).sin());
     let accelerations = accelerations(&tree, &on);
     let states = link_states(&tree, &q, &v);

@@ -6,6 +6,7 @@ use nalgebra::{Vector3, Vector6};
 
 use super::Adaptive;
 use super::probe::Probe;
+use crate::articulated::Joint;
 use crate::contact::bristles::Bristles;
 use crate::integrator::runge_kutta::dormand_prince::{Estimate, Trial};
 use crate::state::State;
@@ -34,20 +35,27 @@ pub(super) struct Errors {
 pub(super) struct ErrorNorm {
     tolerance: f64,
     sensitivity_tolerance: f64,
-    /// Of each free body.
-    scales: Vec<(BodyId, Scale)>,
+    /// How many bodies there are, whose states come first.
+    bodies: usize,
+    /// Of each free body, then of each joint, with the place of its state.
+    scales: Vec<(usize, Scale)>,
     /// Of each contact that sticks, the radius of gyration of its smaller body \[m\].
     deflections: Vec<f64>,
 }
 
-/// What counts as one for a body.
+/// What counts as one for a body or joint.
 #[derive(Clone, Copy)]
 struct Scale {
+    /// By which angular momenta are those of angular velocities times the squared length; so 1/length² where they are such velocities.
     mass: f64,
-    /// Radius of gyration \[m\].
+    /// Radius of gyration \[m\]; 1 rad of a coordinate that is an angle.
     length: f64,
-    /// Speed of a fall through that radius, or in the acceleration by contacts if nothing falls \[m/s\].
+    /// Speed of a fall through that radius, or in the acceleration by contacts if nothing falls \[m/s\]; or that of the angle.
     speed: f64,
+    /// Speed of a coordinate by that of the bodies: 1, or 1/radius \[1/m\] of an angle.
+    per_meter: f64,
+    /// Which of its coordinates there are: places, rotations.
+    has: [bool; 2],
 }
 
 impl Scale {
@@ -86,33 +94,41 @@ impl ErrorNorm {
             // Without gravity, what is pushed by contacts alone.
             let acceleration = if constant > 0.0 { constant } else { force(&wrenches[body]) };
             let speed = (acceleration * length).sqrt().max(SLOWEST);
-            Some((body, Scale { mass: rigid.mass(), length, speed }))
+            let (mass, per_meter, has) = (rigid.mass(), 1.0, [true; 2]);
+            Some((body.index(), Scale { mass, length, speed, per_meter, has }))
         };
-        let scales = world.free_bodies().into_iter().filter_map(scale).collect();
+        let mut scales: Vec<(usize, Scale)> =
+            world.free_bodies().into_iter().filter_map(scale).collect();
+        scales.extend(world.joint_places().zip(joint_scales(world, states, &wrenches)));
         let Adaptive { tolerance, sensitivity_tolerance, .. } = *settings;
         let length = |(pair, _): (&ContactPair, Bristles)| {
-            let bodies = [pair.bodies.samples, pair.bodies.field].map(|body| &world.bodies[body]);
-            let lengths = bodies.iter().filter_map(|body| Some(body.rigid()?.gyration_radius()));
-            lengths.fold(f64::INFINITY, f64::min)
+            let bodies = [pair.bodies.samples, pair.bodies.field];
+            let lengths = bodies.map(|body| world.gyration_radius(body)).into_iter();
+            lengths.filter(|length| *length > 0.0).fold(f64::INFINITY, f64::min)
         };
         let deflections = world.sticking().map(length).collect();
-        Self { tolerance, sensitivity_tolerance, scales, deflections }
+        let bodies = world.bodies.len();
+        Self { tolerance, sensitivity_tolerance, bodies, scales, deflections }
     }
 
-    /// The free bodies and units of the twelve coordinates of their tangents.
-    pub(super) fn units(&self) -> impl Iterator<Item = (BodyId, [f64; 12])> {
-        self.scales.iter().map(|(body, Scale { length, speed, .. })| {
+    /// The places of the states of free bodies and joints, and units of the twelve coordinates of their tangents.
+    pub(super) fn units(&self) -> impl Iterator<Item = (usize, [f64; 12])> {
+        self.scales.iter().map(|(place, Scale { length, speed, has: [moves, turns], .. })| {
             let units = [*length, 1.0, *speed, speed / length];
-            (*body, std::array::from_fn(|i| units[i / 3]))
+            let has = [moves, turns, moves, turns];
+            (*place, std::array::from_fn(|i| if *has[i / 3] { units[i / 3] } else { 0.0 }))
         })
     }
 
     /// A length to begin with: a tenth of the time in which accelerations change a velocity by as much as it counts.
     pub(super) fn first_step(&self, world: &World, wrenches: &[Vector6<Probe>]) -> f64 {
-        let time = |(body, scale): &(BodyId, Scale)| {
-            let (Scale { mass, length, speed }, wrench) =
-                (*scale, wrenches[*body].map(|w| w.value));
+        let time = |(place, scale): &(usize, Scale)| {
+            let (Scale { mass, length, speed, .. }, wrench) =
+                (*scale, wrenches[*place].map(|w| w.value));
             let (force, torque) = (wrench.fixed_rows::<3>(0), wrench.fixed_rows::<3>(3));
+            if *place >= world.bodies.len() {
+                return 0.1 * speed / force.norm().max(torque.norm() * length);
+            }
             let linear = (world.gravity + force / mass).norm();
             0.1 * speed / linear.max(torque.norm() / (mass * length))
         };
@@ -128,13 +144,15 @@ impl ErrorNorm {
     ) -> Errors {
         let (value, derivative) = (|x: Probe| x.value, |x: Probe| x.derivative[0]);
         let (mut error, mut slope_error, mut slope) = (0.0, [0.0; 2], [0.0; 2]);
-        let speeds = states.iter().chain(trial.end()).map(|s| s.linear.map(value).norm());
+        let bodies = |states| <[State<Probe>]>::iter(states).take(self.bodies);
+        let speeds = bodies(states).chain(bodies(trial.end()));
+        let speeds = speeds.map(|s| s.linear.map(value).norm());
         let fastest = speeds.fold(0.0, f64::max);
-        for (i, (body, scale)) in self.scales.iter().enumerate() {
-            let (start, end) = (&states[*body], &trial.end()[*body]);
+        for (i, (place, scale)) in self.scales.iter().enumerate() {
+            let (start, end) = (&states[*place], &trial.end()[*place]);
             let own = [start, end].map(|state| state.value().speed_within(scale.length));
             let own = max_or_nan(own[0], own[1]);
-            let speed = scale.speed + own + SLOW * fastest;
+            let speed = scale.speed + own + SLOW * fastest * scale.per_meter;
             let largest = |part| scale.largest(estimate.across_kinks(i, part), speed);
             error = largest(value).into_iter().fold(error, max_or_nan);
             slope_error = larger(slope_error, largest(derivative));
@@ -167,6 +185,32 @@ impl ErrorNorm {
     pub(super) fn only_kinks(&self, errors: &Errors) -> bool {
         errors.state <= self.tolerance && errors.sensitivity <= SHARPEST_KINK
     }
+}
+
+/// Of each joint: the radius of what it moves, its fall through that, and angles in radians. Where nothing falls, accelerations are those of
+/// the joint itself.
+fn joint_scales<'a>(
+    world: &'a World,
+    states: &'a [State],
+    wrenches: &'a LazyCell<Vec<Vector6<f64>>, impl FnOnce() -> Vec<Vector6<f64>>>,
+) -> impl Iterator<Item = Scale> + 'a {
+    let all = world.articulated(states).flat_map(|(own, joints)| {
+        let [q, v] = own.coordinates(joints);
+        let radii = own.tree.kinematics(&q, &v).radii();
+        own.tree.links().iter().map(|link| &link.joint).zip(radii).collect::<Vec<_>>()
+    });
+    all.zip(world.joint_places()).map(move |((joint, radius), place)| {
+        let radius = if radius > 0.0 { radius } else { 1.0 };
+        let angle = !matches!(joint, Joint::Prismatic(_) | Joint::Floating);
+        let (length, per_meter) = if angle { (1.0, 1.0 / radius) } else { (radius, 1.0) };
+        let acceleration = match world.gravity.norm() {
+            0.0 => wrenches[place].norm() / per_meter,
+            gravity => gravity,
+        };
+        let speed = (acceleration * radius).sqrt().max(SLOWEST) * per_meter;
+        let has = [joint.freedoms() > 0 && !matches!(joint, Joint::Spherical), joint.turns()];
+        Scale { mass: 1.0 / (length * length), length, speed, per_meter, has }
+    })
 }
 
 /// The larger of each.

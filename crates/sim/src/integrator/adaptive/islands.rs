@@ -8,12 +8,16 @@ use crate::world::body_id::BodyId;
 use crate::world::contact_pair::{ContactBodies, ContactPair};
 use crate::world::neighbors::Neighbors;
 
-/// Free bodies that are linked by contacts, and what they touch that no force moves. What happens to them depends on no others.
+/// Bodies that are linked by contacts or joints, and what they touch that no force moves. What happens to them depends on no others.
+#[derive(Default)]
 pub(super) struct Island {
     /// In ascending order.
     pub(super) bodies: Vec<BodyId>,
     /// Places among the contacts, in ascending order.
     contacts: Vec<usize>,
+    /// Its articulations, and the places of their joints among the states.
+    articulations: Vec<usize>,
+    joints: Vec<usize>,
     /// Places of the deflections of its contacts among the states.
     deflections: Vec<usize>,
 }
@@ -31,38 +35,59 @@ impl Island {
         let mut roots: Vec<usize> = (0..world.bodies.len()).collect();
         for ContactPair { bodies, .. } in contacts {
             let ends = [bodies.samples, bodies.field];
-            if ends.iter().all(|id| world.bodies[*id].rigid().is_some()) {
-                let [a, b] = ends.map(|id| root_of(&mut roots, id.index()));
-                roots[a.max(b)] = a.min(b);
+            if ends.iter().all(|id| world.bodies[*id].feels_forces()) {
+                join(&mut roots, ends);
+            }
+        }
+        for articulation in &world.articulations {
+            articulation.bodies().windows(2).for_each(|pair| join(&mut roots, [pair[0], pair[1]]));
+        }
+        for weld in &world.welds {
+            if weld.bodies.iter().all(|id| world.bodies[*id].feels_forces()) {
+                join(&mut roots, weld.bodies);
             }
         }
         let mut place = vec![None; world.bodies.len()];
         let mut islands: Vec<Self> = Vec::new();
-        for id in world.free_bodies() {
+        for id in world.moved_bodies() {
             let root = root_of(&mut roots, id.index());
             let place = *place[root].get_or_insert_with(|| {
-                islands.push(Self {
-                    bodies: Vec::new(),
-                    contacts: Vec::new(),
-                    deflections: Vec::new(),
-                });
+                islands.push(Self::default());
                 islands.len() - 1
             });
             islands[place].bodies.push(id);
         }
-        let mut deflection = world.bodies.len();
+        let mut joint = world.bodies.len();
+        for (index, articulation) in world.articulations.iter().enumerate() {
+            let (first, count) = (joint, articulation.bodies().len());
+            joint += count;
+            let body = articulation.bodies().first();
+            if let Some(place) = body.and_then(|id| place[root_of(&mut roots, id.index())]) {
+                islands[place].articulations.push(index);
+                islands[place].joints.extend(first..first + count);
+            }
+        }
+        let mut deflection = world.joint_places().end;
         for (index, pair) in contacts.iter().enumerate() {
             let ends = [pair.bodies.samples, pair.bodies.field];
-            let free = ends.into_iter().find(|id| world.bodies[*id].rigid().is_some());
+            let free = ends.into_iter().find(|id| world.bodies[*id].feels_forces());
             let sticks = pair.law().bristles().is_some();
             if let Some(place) = free.and_then(|id| place[root_of(&mut roots, id.index())]) {
                 let island = &mut islands[place];
                 island.contacts.push(index);
                 island.deflections.extend(sticks.then_some(deflection));
-                let fixed = ends.into_iter().filter(|id| world.bodies[*id].rigid().is_none());
+                let fixed = ends.into_iter().filter(|id| !world.bodies[*id].feels_forces());
                 island.bodies.extend(fixed);
             }
             deflection += usize::from(sticks);
+        }
+        for weld in &world.welds {
+            let (moved, fixed): (Vec<BodyId>, Vec<BodyId>) =
+                weld.bodies.iter().partition(|id| world.bodies[**id].feels_forces());
+            let root = moved.first().map(|id| root_of(&mut roots, id.index()));
+            if let Some(place) = root.and_then(|root| place[root]) {
+                islands[place].bodies.extend(fixed);
+            }
         }
         for island in &mut islands {
             island.bodies.sort_unstable();
@@ -97,19 +122,48 @@ impl Island {
             bodies: self.bodies.iter().map(|id| world.bodies[*id].clone()).collect(),
             contacts: self.contacts.iter().map(contact).collect(),
             contact_groups: Vec::new(),
+            articulations: self
+                .articulations
+                .iter()
+                .map(|index| world.articulations[*index].with_bodies(body))
+                .collect(),
+            joint_forces: world
+                .joint_forces
+                .iter()
+                .filter(|force| force.axes.iter().all(|(axis, _)| self.has(axis.link)))
+                .map(|force| force.with_bodies(body))
+                .collect(),
+            welds: world
+                .welds
+                .iter()
+                .filter(|weld| weld.bodies.iter().all(|id| self.has(*id)))
+                .filter(|weld| weld.bodies.iter().any(|id| world.bodies[*id].feels_forces()))
+                .map(|weld| weld.with_bodies(body))
+                .collect(),
             gravity: world.gravity,
         }
     }
 
     /// Places of its states, in the order of its world, among those of all.
     pub(super) fn places(&self) -> impl Iterator<Item = usize> {
-        self.bodies.iter().map(|id| id.index()).chain(self.deflections.iter().copied())
+        let bodies = self.bodies.iter().map(|id| id.index());
+        bodies.chain(self.joints.iter().copied()).chain(self.deflections.iter().copied())
+    }
+
+    fn has(&self, body: BodyId) -> bool {
+        self.bodies.binary_search(&body).is_ok()
     }
 
     /// Its states out of those of all.
     pub(super) fn states<S: Scalar>(&self, states: &[State<S>]) -> Vec<State<S>> {
         self.places().map(|place| states[place]).collect()
     }
+}
+
+/// Makes one island of two.
+fn join(roots: &mut [usize], ends: [BodyId; 2]) {
+    let [a, b] = ends.map(|id| root_of(roots, id.index()));
+    roots[a.max(b)] = a.min(b);
 }
 
 /// The first body of those that `index` is linked with.

@@ -4,25 +4,24 @@ use prehend_autodiff::Fwd;
 use prehend_geometry::SplitMix64;
 
 use crate::state::State;
-use crate::world::body_id::BodyId;
 
 /// Numbers that carry the derivative along the probe.
 pub(super) type Probe = Fwd<1>;
 
-/// The states with derivatives along a direction in which everything that is free moves: each coordinate of the bodies by half to all of its
+/// The states with derivatives along a direction in which everything that is free moves: each coordinate of the bodies and joints by half to all of its
 /// unit.
 pub(super) fn seeded(
     states: &[State],
-    units: impl Iterator<Item = (BodyId, [f64; 12])>,
+    units: impl Iterator<Item = (usize, [f64; 12])>,
 ) -> Vec<State<Probe>> {
     let mut random = SplitMix64::new(7);
     let mut seeded: Vec<State<Probe>> = states.iter().map(State::lift).collect();
-    for (body, units) in units {
+    for (place, units) in units {
         let tangent = units.map(|unit| {
             let (size, sign) = (0.5 + 0.5 * random.uniform(), (random.uniform() - 0.5).signum());
             Fwd { value: 0.0, derivative: [unit * size * sign] }
         });
-        seeded[body] = states[body].retract(&tangent);
+        seeded[place] = states[place].retract(&tangent);
     }
     seeded
 }

@@ -4,11 +4,10 @@ use std::cell::LazyCell;
 
 use super::probe::Probe;
 use super::touch_time;
-use crate::body::RigidBody;
 use crate::contact::patch::Patch;
 use crate::state::State;
 use crate::world::World;
-use crate::world::body::{Body, Motion};
+use crate::world::body::Motion;
 use crate::world::contact_pair::ContactPair;
 
 /// Part of a body's size by which its samples may always move.
@@ -48,16 +47,16 @@ struct Limit {
 impl Travel {
     pub(super) fn new(world: &World) -> Self {
         let limit = |pair: &ContactPair| {
-            let [body, other] =
-                [pair.bodies.samples, pair.bodies.field].map(|id| &world.bodies[id]);
+            let ends = [pair.bodies.samples, pair.bodies.field];
+            let [body, other] = ends.map(|id| &world.bodies[id]);
+            let [gyration, other_gyration] = ends.map(|id| world.gyration_radius(id));
             // Bodies that no force moves need not feel each other.
-            body.rigid().or(other.rigid())?;
+            (body.feels_forces() || other.feels_forces()).then_some(())?;
             let surface = body.surface.as_ref()?;
             let radius = surface.radius_about(&body.com());
-            let size = |body: &Body| body.rigid().map_or(0.0, RigidBody::gyration_radius);
-            let own = radius.max(size(body));
+            let own = radius.max(gyration);
             let thickness = other.field.as_ref()?.thickness() + 2.0 * surface.smallest();
-            let size = if own > 0.0 { own } else { size(other) };
+            let size = if own > 0.0 { own } else { other_gyration };
             let thinnest = FREE_THICKNESS * thickness;
             let [free, short] = [FREE_TRAVEL, SHORT].map(|part| (part * size).min(thinnest));
             let radius = surface.spread_about(&body.com());

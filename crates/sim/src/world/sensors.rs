@@ -1,0 +1,99 @@
+//! What sensors on a body feel. Over numbers that carry derivatives, so do they.
+
+use nalgebra::{Point3, Vector3, Vector6};
+use prehend_autodiff::Scalar;
+
+use super::World;
+use super::body_id::BodyId;
+use crate::articulated::spatial::{angular, linear};
+use crate::error::SimulationError;
+use crate::state::State;
+
+impl<S: Scalar> World<S> {
+    /// What contacts and welds do to a body: force \[N\] and torque \[N m\] about its center of mass, of a link about the origin of its frame; world
+    /// frame.
+    ///
+    /// # Errors
+    /// If there is no such body, or states are too few or too many.
+    pub fn contact_wrench(
+        &self,
+        body: BodyId,
+        states: &[State<S>],
+    ) -> Result<Vector6<S>, SimulationError> {
+        let external = self.body(body)?.external_wrench;
+        let states = self.sensed(states)?;
+        // Leaks of the first step are no forces.
+        let world = self.with_touching(&states, 0.0);
+        Ok(world.contact_wrenches(&states, 1)[body] - external)
+    }
+
+    /// What an accelerometer at `point` of a body, given in its model frame \[m\], shows: acceleration less that of free fall, along the axes of the
+    /// body \[m/s²\].
+    ///
+    /// # Errors
+    /// If there is no such body or no force moves it, or states are too few or too many.
+    pub fn accelerometer(
+        &self,
+        body: BodyId,
+        point: &Point3<f64>,
+        states: &[State<S>],
+    ) -> Result<Vector3<S>, SimulationError> {
+        let states = self.sensed(states)?;
+        let wrenches = self.wrenches(&states, 1);
+        let state = &states[body];
+        let (acceleration, turning, arm) = match self.body(body)?.rigid() {
+            Some(rigid) => {
+                let (force, torque) =
+                    (wrenches[body].fixed_rows::<3>(0), wrenches[body].fixed_rows::<3>(3));
+                let momentum = rigid.momentum(&state.pose.rotation, &state.angular);
+                let left = torque - state.angular.cross(&momentum);
+                let turning = rigid.inverse_world_inertia(&state.pose.rotation) * left;
+                let arm = point.coords.map(S::constant) - rigid.com().coords;
+                (force * (S::one() / rigid.mass()), turning, arm)
+            }
+            None => {
+                let (articulation, link) = self.link_of(body)?;
+                let (acceleration, turning) =
+                    self.link_acceleration(articulation, link, &states, &wrenches);
+                (acceleration, turning, point.coords.map(S::constant))
+            }
+        };
+        let arm = state.pose.rotation * arm;
+        let spin = &state.angular;
+        let felt = acceleration + turning.cross(&arm) + spin.cross(&spin.cross(&arm));
+        Ok(state.pose.rotation.inverse() * felt)
+    }
+
+    /// Acceleration of a link's origin, less that of free fall, and its angular acceleration, world frame.
+    fn link_acceleration(
+        &self,
+        articulation: usize,
+        link: usize,
+        states: &[State<S>],
+        wrenches: &[Vector6<S>],
+    ) -> (Vector3<S>, Vector3<S>) {
+        let mut first = self.joint_places().start;
+        for own in &self.articulations[..articulation] {
+            first += own.bodies().len();
+        }
+        let own = &self.articulations[articulation];
+        let places = first..first + own.bodies().len();
+        let [q, v] = own.coordinates(&states[places.clone()]);
+        let rates = wrenches[places].iter().zip(own.tree.links());
+        let accelerations: Vec<S> =
+            rates.flat_map(|(rate, link)| link.joint.accelerations(rate)).collect();
+        let at = own.tree.kinematics(&q, &v).under(self.gravity);
+        let of_link = at.acceleration(link, &accelerations);
+        (linear(&of_link), angular(&of_link))
+    }
+
+    /// The states, with links where their joints put them.
+    fn sensed(&self, states: &[State<S>]) -> Result<Vec<State<S>>, SimulationError> {
+        let mut states = self.with_deflections(states);
+        if states.len() != self.state_count() {
+            return Err(self.wrong_count(states.len()));
+        }
+        self.place_links(&mut states);
+        Ok(states)
+    }
+}

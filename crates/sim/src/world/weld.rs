@@ -1,0 +1,176 @@
+//! Springs that hold two frames together, and so close loops.
+
+use nalgebra::{Isometry3, Translation3, Vector3, Vector6};
+use prehend_autodiff::lie::{lift, so3_log};
+use prehend_autodiff::{LocalFunction, Scalar};
+
+use super::World;
+use super::body_id::BodyId;
+use crate::contact::wrench::stack;
+use crate::error::SimulationError;
+use crate::state::State;
+use crate::state_coordinates::STATE;
+
+/// A soft weld of two bodies, or a soft ball joint: springs and dampers between a frame of one and a frame of the other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Weld<S: Scalar = f64> {
+    /// The bodies.
+    pub bodies: [BodyId; 2],
+    /// Their frames, each in its body's model frame \[m\].
+    pub frames: [Isometry3<f64>; 2],
+    /// How stiff it is.
+    pub stiffness: WeldStiffness<S>,
+}
+
+/// Stiffness and damping of a [`Weld`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WeldStiffness<S: Scalar = f64> {
+    /// Force by distance of the frames' origins \[N/m\].
+    pub linear: S,
+    /// Force by the rate of that \[N s/m\].
+    pub linear_damping: S,
+    /// Torque by the angle between the frames \[N m/rad\]; with this and the next 0 they turn freely, as in a ball joint.
+    pub angular: S,
+    /// Torque by the rate of that \[N m s/rad\].
+    pub angular_damping: S,
+}
+
+impl WeldStiffness {
+    /// Critically damped, so that a displacement of what weighs `mass` \[kg\] and has `inertia` \[kg m²\] decays in `time` \[s\]. With an inertia of 0
+    /// the frames turn freely.
+    pub fn critical(mass: f64, inertia: f64, time: f64) -> Self {
+        let [linear, angular] = [mass, inertia].map(|m| m / (time * time));
+        let [linear_damping, angular_damping] = [mass, inertia].map(|m| 2.0 * m / time);
+        Self { linear, linear_damping, angular, angular_damping }
+    }
+}
+
+impl<S: Scalar> WeldStiffness<S> {
+    pub(crate) fn numbers(&self) -> [S; 4] {
+        [self.linear, self.linear_damping, self.angular, self.angular_damping]
+    }
+
+    pub(crate) fn of([linear, linear_damping, angular, angular_damping]: [S; 4]) -> Self {
+        Self { linear, linear_damping, angular, angular_damping }
+    }
+}
+
+impl<S: Scalar> Weld<S> {
+    pub(super) fn map<T: Scalar>(&self, f: impl Fn(S) -> T) -> Weld<T> {
+        let stiffness = WeldStiffness::of(self.stiffness.numbers().map(f));
+        Weld { bodies: self.bodies, frames: self.frames, stiffness }
+    }
+
+    /// The same weld of other bodies.
+    pub(crate) fn with_bodies(self, body: impl Fn(BodyId) -> BodyId) -> Self {
+        Self { bodies: self.bodies.map(body), ..self }
+    }
+}
+
+impl World {
+    /// Adds a weld.
+    ///
+    /// # Errors
+    /// If there is no such body, or both are the same; if a stiffness or damping is negative or not finite.
+    pub fn add_weld(&mut self, weld: Weld) -> Result<(), SimulationError> {
+        for body in weld.bodies {
+            self.body(body)?;
+        }
+        if weld.bodies[0] == weld.bodies[1] {
+            return Err(SimulationError::Itself { body: self.bodies[weld.bodies[0]].name.clone() });
+        }
+        for value in weld.stiffness.numbers() {
+            let (setting, range) = ("WeldStiffness", "zero or positive, and finite");
+            if !(value >= 0.0 && value.is_finite()) {
+                return Err(SimulationError::Setting { setting, range, value });
+            }
+        }
+        self.welds.push(weld);
+        Ok(())
+    }
+}
+
+impl<S: Scalar> World<S> {
+    /// Adds what welds do to the wrenches on the bodies.
+    pub(super) fn add_welds(&self, states: &[State<S>], wrenches: &mut [Vector6<S>]) {
+        for weld in &self.welds {
+            let [a, b] = weld.bodies;
+            let pull = Pull { frames: self.frames_from_com(weld) };
+            let mut x = [S::zero(); INPUTS];
+            x[..STATE].copy_from_slice(&states[a].coordinates());
+            x[STATE..2 * STATE].copy_from_slice(&states[b].coordinates());
+            x[2 * STATE..].copy_from_slice(&weld.stiffness.numbers());
+            let both = S::local(&pull, x);
+            wrenches[a] += Vector6::from_column_slice(&both[..6]);
+            wrenches[b] += Vector6::from_column_slice(&both[6..]);
+        }
+    }
+
+    /// The frames of a weld, from the centers of mass.
+    fn frames_from_com(&self, weld: &Weld<S>) -> [Isometry3<f64>; 2] {
+        std::array::from_fn(|end| {
+            let com = self.bodies[weld.bodies[end]].com().coords.map(S::value);
+            Translation3::from(-com) * weld.frames[end]
+        })
+    }
+
+    /// What the springs of welds have stored at `states` \[J\].
+    pub(crate) fn energy_of_welds(&self, states: &[State]) -> f64 {
+        let energy = |weld: &Weld<S>| {
+            let [a, b] = weld.bodies.map(|body| states[body]);
+            let Gap { apart, turn, .. } = Gap::new(&self.frames_from_com(weld), &a, &b);
+            let [linear, _, angular, _] = weld.stiffness.numbers().map(S::value);
+            0.5 * (linear * apart.norm_squared() + angular * turn.norm_squared())
+        };
+        self.welds.iter().map(energy).sum()
+    }
+}
+
+/// Two states and four numbers.
+const INPUTS: usize = 2 * STATE + 4;
+
+/// How far two frames are apart.
+struct Gap<S: Scalar> {
+    /// From the centers of mass to the origin of the first frame \[m\].
+    arms: [Vector3<S>; 2],
+    /// From the first to the second origin \[m\].
+    apart: Vector3<S>,
+    /// The turn from the first to the second \[rad\].
+    turn: Vector3<S>,
+}
+
+impl<S: Scalar> Gap<S> {
+    fn new(frames: &[Isometry3<f64>; 2], a: &State<S>, b: &State<S>) -> Self {
+        let [first, second] = [(a, frames[0]), (b, frames[1])].map(|(s, f)| s.pose * lift(&f));
+        let [from, to] = [first, second].map(|frame| frame.translation.vector);
+        Self {
+            arms: [a, b].map(|state| from - state.pose.translation.vector),
+            apart: to - from,
+            turn: so3_log(&(second.rotation * first.rotation.inverse())),
+        }
+    }
+}
+
+/// The wrenches on both bodies. Rates are as the second sees them, and both forces act at the first frame's origin, so that nothing is pushed or
+/// turned by itself.
+struct Pull {
+    frames: [Isometry3<f64>; 2],
+}
+
+impl LocalFunction<INPUTS, 12> for Pull {
+    fn evaluate<S: Scalar>(&self, x: [S; INPUTS]) -> [S; 12] {
+        let state = |from: usize| State::from_coordinates(&std::array::from_fn(|i| x[from + i]));
+        let (a, b): (State<S>, State<S>) = (state(0), state(STATE));
+        let [linear, linear_damping, angular, angular_damping] =
+            std::array::from_fn(|i| x[2 * STATE + i]);
+        let Gap { arms, apart, turn } = Gap::new(&self.frames, &a, &b);
+        // The first origin's velocity and that of the second body there.
+        let [velocity, other] = [(&a, arms[0]), (&b, arms[1])]
+            .map(|(state, arm)| state.linear + state.angular.cross(&arm));
+        let force = apart * linear + (other - velocity) * linear_damping;
+        let torque = turn * angular + (b.angular - a.angular) * angular_damping;
+        let on_first = stack(&force, &(torque + arms[0].cross(&force)));
+        let on_second = stack(&-force, &-(torque + arms[1].cross(&force)));
+        std::array::from_fn(|i| if i < 6 { on_first[i] } else { on_second[i - 6] })
+    }
+}

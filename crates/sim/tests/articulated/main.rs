@@ -1,0 +1,8 @@
+//! Articulations as parts of a world.
+#![allow(clippy::unwrap_used)]
+
+mod free_body;
+mod gradients;
+mod loops;
+mod pendulum;
+mod sensors;
