@@ -8,7 +8,7 @@ use crate::integrator::Integrator;
 use crate::state::State;
 use crate::world::World;
 use crate::world::body_id::BodyId;
-use crate::world::joint_force::JointForce;
+use crate::world::joint_force::{Along, JointForce};
 
 /// A time step too long for the stiffness or damping of the contacts.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
@@ -123,10 +123,10 @@ impl World {
             first += v.len();
         }
         let slopes = |force: &JointForce| {
-            let (places, [position, velocity]) = self.along(force, states)?;
-            let (first, root) = &roots[places.first()?.0];
+            let Along { articulation, freedoms, position, velocity } = self.along(force, states)?;
+            let (first, root) = &roots[articulation];
             let mut along = DVector::zeros(root.nrows());
-            places.iter().for_each(|(_, freedom, factor)| along[*freedom] += factor);
+            freedoms.iter().for_each(|(freedom, factor)| along[*freedom] += factor);
             let effort = force.law().effort_by_motion(force.params(), position, velocity);
             Some((*first, root.tr_mul(&along), effort.derivative))
         };

@@ -10,6 +10,7 @@ pub(crate) mod deflection;
 mod effect;
 pub(crate) mod joint_force;
 mod linear_contacts;
+mod matter;
 pub(crate) mod neighbors;
 mod pair_function;
 mod seen;

@@ -20,6 +20,7 @@ mod forward_dynamics;
 mod inverse_dynamics;
 mod joint;
 mod joint_model;
+mod joint_state;
 mod kinematics;
 pub(crate) mod link;
 mod mass_matrix;

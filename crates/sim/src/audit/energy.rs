@@ -165,7 +165,7 @@ fn articulated_energy<S: Scalar>(world: &World<S>, states: &[State]) -> Energy {
 fn work_along_joints<S: Scalar>(world: &World<S>, before: &[State], now: &[State<S>]) -> f64 {
     let work = |force: &JointForce<S>| {
         let lifted: Vec<State<S>> = before.iter().map(State::lift).collect();
-        let position = |states: &[State<S>]| Some(world.along(force, states)?.1[0].value());
+        let position = |states: &[State<S>]| Some(world.along(force, states)?.position.value());
         let (Some(from), Some(to)) = (position(&lifted), position(now)) else { return 0.0 };
         let p: Vec<f64> = force.params().iter().map(|p| p.value()).collect();
         let effort = |x: f64| force.law().effort(&p, from + x * (to - from), 0.0);

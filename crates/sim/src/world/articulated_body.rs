@@ -5,19 +5,16 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Quaternion, Unit, Vector3, Vector6};
+use nalgebra::{Isometry3, Vector6};
 use prehend_autodiff::Scalar;
-use prehend_autodiff::lie::so3_log;
 use prehend_autodiff::rigid::turned;
 
 use super::World;
 use super::body::Body;
 use super::body_id::BodyId;
-use super::joint_force::{JointAxis, JointForce, JointForceId};
 use crate::articulated::adjoint::{Acting, accelerations, link_states};
 use crate::articulated::{Articulation, Joint};
 use crate::error::SimulationError;
-use crate::joint_law::dynamic::DynJointLaw;
 use crate::robot::JointState;
 use crate::state::State;
 
@@ -65,45 +62,6 @@ impl World {
             links.map(|link| Body::link(&link.name)).map(|b| self.add(b)).collect();
         self.articulations.push(ArticulatedBody { tree, bodies: bodies.as_slice().into() });
         bodies
-    }
-
-    /// Lets `law` act along the joint of a link, which has one axis or whose axis is given.
-    ///
-    /// # Errors
-    /// If it is no link, or its joint has no such axis; a floating one has none.
-    pub fn add_joint_force(
-        &mut self,
-        axis: impl Into<JointAxis>,
-        law: impl crate::joint_law::JointLaw,
-    ) -> Result<JointForceId, SimulationError> {
-        self.add_coupled_force(&[(axis.into(), 1.0)], Arc::new(law))
-    }
-
-    /// Lets `law` act along a weighted sum of the joints of one articulation: its position is the sum of theirs times their factors, and each has
-    /// its factor of the effort. So does a tendon, or a spring that couples joints.
-    ///
-    /// # Errors
-    /// If there is none, one is no link or has no such axis, or they are not of one articulation.
-    pub fn add_coupled_force(
-        &mut self,
-        axes: &[(JointAxis, f64)],
-        law: Arc<dyn DynJointLaw>,
-    ) -> Result<JointForceId, SimulationError> {
-        let mut articulation = None;
-        for (axis, _) in axes {
-            let (own, link) = self.link_of(axis.link)?;
-            let joint = &self.articulations[own].tree.links()[link].joint;
-            let has = axis.index < joint.freedoms() && !matches!(joint, Joint::Floating);
-            if !has || articulation.is_some_and(|other| other != own) {
-                return Err(SimulationError::NoAxis { link: self.bodies[axis.link].name.clone() });
-            }
-            articulation = Some(own);
-        }
-        if axes.is_empty() {
-            return Err(SimulationError::NoAxes);
-        }
-        self.joint_forces.push(JointForce::new(axes.to_vec(), law));
-        Ok(JointForceId(self.joint_forces.len() - 1))
     }
 }
 
@@ -155,14 +113,6 @@ impl<S: Scalar> World<S> {
         Ok(JointState { position, velocity })
     }
 
-    /// The force along joints called `id`, to be changed.
-    ///
-    /// # Panics
-    /// If it is of another world.
-    pub fn joint_force_mut(&mut self, id: JointForceId) -> &mut JointForce<S> {
-        &mut self.joint_forces[id.0]
-    }
-
     /// The articulation and the link in it that a body is.
     pub(crate) fn link_of(&self, body: BodyId) -> Result<(usize, usize), SimulationError> {
         let name = &self.body(body)?.name;
@@ -170,26 +120,6 @@ impl<S: Scalar> World<S> {
             Some((index, own.bodies.iter().position(|link| *link == body)?))
         });
         found.ok_or_else(|| SimulationError::NotALink { body: name.clone() })
-    }
-
-    /// Radius of gyration about its own center of mass of a body that forces move, 0 of others \[m\].
-    pub(crate) fn gyration_radius(&self, body: BodyId) -> f64 {
-        if let Some(rigid) = self.bodies[body].rigid() {
-            return rigid.gyration_radius();
-        }
-        let Ok((articulation, link)) = self.link_of(body) else { return 0.0 };
-        let link = &self.articulations[articulation].tree.links()[link];
-        let square = link.inertia.trace().value() / (2.0 * link.mass.value());
-        if square.is_finite() { square.sqrt() } else { 0.0 }
-    }
-
-    /// Mass of a body that forces move, without end of others \[kg\].
-    pub(crate) fn mass(&self, body: BodyId) -> f64 {
-        if let Some(rigid) = self.bodies[body].rigid() {
-            return rigid.mass().value();
-        }
-        let Ok((articulation, link)) = self.link_of(body) else { return f64::INFINITY };
-        self.articulations[articulation].tree.links()[link].mass.value()
     }
 
     /// # Errors
@@ -213,7 +143,7 @@ impl<S: Scalar> World<S> {
         }
     }
 
-    fn joint_place(
+    pub(super) fn joint_place(
         &self,
         states: &[State<S>],
         body: BodyId,
@@ -291,120 +221,5 @@ impl<S: Scalar> World<S> {
             }
         }
         all
-    }
-
-    /// The efforts of all joint forces, one for each degree of freedom of each articulation \[N m or N\].
-    pub(crate) fn joint_efforts(&self, states: &[State<S>]) -> Vec<Vec<S>> {
-        let mut efforts: Vec<Vec<S>> =
-            self.articulations.iter().map(|own| vec![S::zero(); own.tree.freedoms()]).collect();
-        for force in &self.joint_forces {
-            let Some((places, [position, velocity])) = self.along(force, states) else { continue };
-            let effort = force.law().lifted(force.params(), position, velocity);
-            for (articulation, freedom, factor) in places {
-                efforts[articulation][freedom] += effort.times(factor);
-            }
-        }
-        efforts
-    }
-
-    /// Which degrees of freedom a force acts along, with their factors; its position and velocity.
-    pub(crate) fn along(
-        &self,
-        force: &JointForce<S>,
-        states: &[State<S>],
-    ) -> Option<(Vec<(usize, usize, f64)>, [S; 2])> {
-        let (mut position, mut velocity) = (S::zero(), S::zero());
-        let mut places = Vec::with_capacity(force.axes.len());
-        for (JointAxis { link, index }, factor) in &force.axes {
-            let (articulation, own) = self.link_of(*link).ok()?;
-            let (place, joint) = self.joint_place(states, *link).ok()?;
-            let [_, freedoms] = self.articulations[articulation].tree.range(own);
-            let [at, speed] = joint.along(&states[place], *index);
-            position += at.times(*factor);
-            velocity += speed.times(*factor);
-            places.push((articulation, freedoms.start + index, *factor));
-        }
-        Some((places, [position, velocity]))
-    }
-}
-
-impl Joint {
-    /// Appends the coordinates and velocities that `state` is.
-    pub(crate) fn read<S: Scalar>(&self, state: &State<S>, q: &mut Vec<S>, v: &mut Vec<S>) {
-        let (place, turn) = (&state.pose.translation.vector, &state.pose.rotation.coords);
-        match self {
-            Self::Spherical => {
-                q.extend(turn.iter());
-                v.extend(state.angular.iter());
-            }
-            Self::Floating => {
-                q.extend(place.iter().chain(turn.iter()));
-                v.extend(state.linear.iter().chain(state.angular.iter()));
-            }
-            Self::Fixed | Self::Revolute(_) | Self::Prismatic(_) | Self::Custom(_) => {
-                q.extend(place.iter().take(self.coordinates()));
-                v.extend(state.linear.iter().take(self.freedoms()));
-            }
-        }
-    }
-
-    /// The state that coordinates and velocities are.
-    pub(crate) fn write<S: Scalar>(&self, q: &[S], v: &[S]) -> State<S> {
-        let mut state = State::at_rest(Isometry3::identity());
-        let rotation = |q: &[S]| {
-            let [x, y, z, w] = [q[0], q[1], q[2], q[3]];
-            Unit::new_normalize(Quaternion::new(w, x, y, z))
-        };
-        let copy = |to: &mut [S], from: &[S]| to[..from.len()].copy_from_slice(from);
-        match self {
-            Self::Spherical => {
-                state.pose.rotation = rotation(q);
-                copy(state.angular.as_mut_slice(), v);
-            }
-            Self::Floating => {
-                copy(state.pose.translation.vector.as_mut_slice(), &q[..3]);
-                state.pose.rotation = rotation(&q[3..]);
-                copy(state.linear.as_mut_slice(), &v[..3]);
-                copy(state.angular.as_mut_slice(), &v[3..]);
-            }
-            Self::Fixed | Self::Revolute(_) | Self::Prismatic(_) | Self::Custom(_) => {
-                copy(state.pose.translation.vector.as_mut_slice(), q);
-                copy(state.linear.as_mut_slice(), v);
-            }
-        }
-        state
-    }
-
-    /// The rate of its state's velocities.
-    fn rate_of_velocities<S: Scalar>(&self, accelerations: &[S]) -> Vector6<S> {
-        let mut rate = Vector6::zeros();
-        let first = if matches!(self, Self::Spherical) { 3 } else { 0 };
-        rate.as_mut_slice()[first..first + accelerations.len()].copy_from_slice(accelerations);
-        rate
-    }
-
-    /// The accelerations that a rate of its state's velocities is.
-    pub(super) fn accelerations<S: Scalar>(&self, rate: &Vector6<S>) -> Vec<S> {
-        let first = if matches!(self, Self::Spherical) { 3 } else { 0 };
-        rate.as_slice()[first..first + self.freedoms()].to_vec()
-    }
-
-    /// The rate of its state's place, and the angular velocity of its rotation as one of the joint's frame.
-    pub(crate) fn rate_of_pose<S: Scalar>(&self, state: &State<S>) -> [Vector3<S>; 2] {
-        match self {
-            Self::Spherical => [state.linear, state.pose.rotation * state.angular],
-            Self::Floating => [state.linear, state.angular].map(|v| state.pose.rotation * v),
-            Self::Fixed | Self::Revolute(_) | Self::Prismatic(_) | Self::Custom(_) => {
-                [state.linear, state.angular]
-            }
-        }
-    }
-
-    /// Position and velocity along an axis: of a spherical joint, components of its rotation vector.
-    fn along<S: Scalar>(&self, state: &State<S>, axis: usize) -> [S; 2] {
-        match self {
-            Self::Spherical => [so3_log(&state.pose.rotation)[axis], state.angular[axis]],
-            _ => [state.pose.translation.vector[axis], state.linear[axis]],
-        }
     }
 }

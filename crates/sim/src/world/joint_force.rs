@@ -4,9 +4,14 @@ use std::sync::Arc;
 
 use prehend_autodiff::Scalar;
 
+use super::World;
 use super::body_id::BodyId;
+use crate::articulated::Joint;
 use crate::contact::error::LawError;
+use crate::error::SimulationError;
+use crate::joint_law::JointLaw;
 use crate::joint_law::dynamic::DynJointLaw;
+use crate::state::State;
 
 /// One of the axes of a link's joint: the first of a revolute or prismatic one.
 #[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
@@ -103,5 +108,105 @@ impl<S: Scalar> JointForce<S> {
         let mut force = self.clone();
         force.axes.iter_mut().for_each(|(axis, _)| axis.link = body(axis.link));
         force
+    }
+}
+
+/// Where a force along joints acts.
+pub(crate) struct Along<S> {
+    pub(crate) articulation: usize,
+    /// Degrees of freedom of the articulation, with the force's factors.
+    pub(crate) freedoms: Vec<(usize, f64)>,
+    pub(crate) position: S,
+    pub(crate) velocity: S,
+}
+
+impl World {
+    /// Lets `law` act along the joint of a link, which has one axis or whose axis is given.
+    ///
+    /// # Errors
+    /// If it is no link, or its joint has no such axis; a floating one has none.
+    pub fn add_joint_force(
+        &mut self,
+        axis: impl Into<JointAxis>,
+        law: impl JointLaw,
+    ) -> Result<JointForceId, SimulationError> {
+        self.add_coupled_force(&[(axis.into(), 1.0)], Arc::new(law))
+    }
+
+    /// Lets `law` act along a weighted sum of the joints of one articulation: its position is the sum of theirs times their factors, and each has
+    /// its factor of the effort. So does a tendon, or a spring that couples joints.
+    ///
+    /// # Errors
+    /// If there is none, one is no link or has no such axis, or they are not of one articulation.
+    pub fn add_coupled_force(
+        &mut self,
+        axes: &[(JointAxis, f64)],
+        law: Arc<dyn DynJointLaw>,
+    ) -> Result<JointForceId, SimulationError> {
+        let mut articulation = None;
+        for (axis, _) in axes {
+            let (own, link) = self.link_of(axis.link)?;
+            let joint = &self.articulations[own].tree.links()[link].joint;
+            let has = axis.index < joint.freedoms() && !matches!(joint, Joint::Floating);
+            if !has || articulation.is_some_and(|other| other != own) {
+                return Err(SimulationError::NoAxis { link: self.bodies[axis.link].name.clone() });
+            }
+            articulation = Some(own);
+        }
+        if axes.is_empty() {
+            return Err(SimulationError::NoAxes);
+        }
+        self.joint_forces.push(JointForce::new(axes.to_vec(), law));
+        Ok(JointForceId(self.joint_forces.len() - 1))
+    }
+}
+
+impl<S: Scalar> World<S> {
+    /// The force along joints called `id`, to be changed.
+    ///
+    /// # Panics
+    /// If it is of another world.
+    pub fn joint_force_mut(&mut self, id: JointForceId) -> &mut JointForce<S> {
+        &mut self.joint_forces[id.0]
+    }
+
+    /// The efforts of all joint forces, one for each degree of freedom of each articulation \[N m or N\].
+    pub(crate) fn joint_efforts(&self, states: &[State<S>]) -> Vec<Vec<S>> {
+        let mut efforts: Vec<Vec<S>> =
+            self.articulations.iter().map(|own| vec![S::zero(); own.tree.freedoms()]).collect();
+        for force in &self.joint_forces {
+            let Some(Along { articulation, freedoms, position, velocity }) =
+                self.along(force, states)
+            else {
+                continue;
+            };
+            let effort = force.law().lifted(force.params(), position, velocity);
+            for (freedom, factor) in freedoms {
+                efforts[articulation][freedom] += effort.times(factor);
+            }
+        }
+        efforts
+    }
+
+    /// Where a force acts.
+    pub(crate) fn along(&self, force: &JointForce<S>, states: &[State<S>]) -> Option<Along<S>> {
+        let (first, _) = force.axes.first()?;
+        let (articulation, _) = self.link_of(first.link).ok()?;
+        let mut along = Along {
+            articulation,
+            freedoms: Vec::with_capacity(force.axes.len()),
+            position: S::zero(),
+            velocity: S::zero(),
+        };
+        for (JointAxis { link, index }, factor) in &force.axes {
+            let (_, own) = self.link_of(*link).ok()?;
+            let (place, joint) = self.joint_place(states, *link).ok()?;
+            let [_, freedoms] = self.articulations[articulation].tree.range(own);
+            let [position, velocity] = joint.along(&states[place], *index);
+            along.position += position.times(*factor);
+            along.velocity += velocity.times(*factor);
+            along.freedoms.push((freedoms.start + index, *factor));
+        }
+        Some(along)
     }
 }

@@ -26,7 +26,7 @@ fn worlds() -> [(World, Vec<State>); 2] {
         } else {
             world.add(Body::free("brick", rigid))
         };
-        let surface = Surface::cuboid([0.02, 0.03, 0.01].into(), 0.01).unwrap();
+        let surface = Surface::cuboid([0.02, 0.03, 0.01], 0.01).unwrap();
         world.bodies[brick].surface = Some(Arc::new(surface));
         let spring = HuntCrossley { stiffness: 1e8, damping: 0.5, exponent: 1.0 };
         let friction = Coulomb { friction: 0.4, slip_scale: 2e-2 };

@@ -123,7 +123,7 @@ fn scene(seed: u64) -> (World, Vec<State>) {
             Isometry3::new(Vector3::new(0.0, 0.1, 0.05), Vector3::new(0.3, -0.2, 0.5)),
         ];
         let (others, last) = ([free, floor], bodies[count - 1]);
-        let inertia = if seed % 2 == 0 { 1e-3 } else { 0.0 };
+        let inertia = if seed.is_multiple_of(2) { 1e-3 } else { 0.0 };
         let stiffness = WeldStiffness::critical(0.03, inertia, 0.05);
         let bodies = [last, others[seed as usize % 5]];
         world.add_weld(Weld { bodies, frames, stiffness }).unwrap();

@@ -1,0 +1,91 @@
+//! The state of a joint in a world: its coordinates are the pose of a [`State`], its velocities the velocities.
+//!
+//! Numbers come first in place and velocity; a rotation and its angular velocity, along the link's axes, are those of the state.
+
+use nalgebra::{Isometry3, Quaternion, Unit, Vector3, Vector6};
+use prehend_autodiff::Scalar;
+use prehend_autodiff::lie::so3_log;
+
+use super::joint::Joint;
+use crate::state::State;
+
+impl Joint {
+    /// Appends the coordinates and velocities that `state` is.
+    pub(crate) fn read<S: Scalar>(&self, state: &State<S>, q: &mut Vec<S>, v: &mut Vec<S>) {
+        let (place, turn) = (&state.pose.translation.vector, &state.pose.rotation.coords);
+        match self {
+            Self::Spherical => {
+                q.extend(turn.iter());
+                v.extend(state.angular.iter());
+            }
+            Self::Floating => {
+                q.extend(place.iter().chain(turn.iter()));
+                v.extend(state.linear.iter().chain(state.angular.iter()));
+            }
+            Self::Fixed | Self::Revolute(_) | Self::Prismatic(_) | Self::Custom(_) => {
+                q.extend(place.iter().take(self.coordinates()));
+                v.extend(state.linear.iter().take(self.freedoms()));
+            }
+        }
+    }
+
+    /// The state that coordinates and velocities are.
+    pub(crate) fn write<S: Scalar>(&self, q: &[S], v: &[S]) -> State<S> {
+        let mut state = State::at_rest(Isometry3::identity());
+        let rotation = |q: &[S]| {
+            let [x, y, z, w] = [q[0], q[1], q[2], q[3]];
+            Unit::new_normalize(Quaternion::new(w, x, y, z))
+        };
+        let copy = |to: &mut [S], from: &[S]| to[..from.len()].copy_from_slice(from);
+        match self {
+            Self::Spherical => {
+                state.pose.rotation = rotation(q);
+                copy(state.angular.as_mut_slice(), v);
+            }
+            Self::Floating => {
+                copy(state.pose.translation.vector.as_mut_slice(), &q[..3]);
+                state.pose.rotation = rotation(&q[3..]);
+                copy(state.linear.as_mut_slice(), &v[..3]);
+                copy(state.angular.as_mut_slice(), &v[3..]);
+            }
+            Self::Fixed | Self::Revolute(_) | Self::Prismatic(_) | Self::Custom(_) => {
+                copy(state.pose.translation.vector.as_mut_slice(), q);
+                copy(state.linear.as_mut_slice(), v);
+            }
+        }
+        state
+    }
+
+    /// The rate of its state's velocities.
+    pub(crate) fn rate_of_velocities<S: Scalar>(&self, accelerations: &[S]) -> Vector6<S> {
+        let mut rate = Vector6::zeros();
+        let first = if matches!(self, Self::Spherical) { 3 } else { 0 };
+        rate.as_mut_slice()[first..first + accelerations.len()].copy_from_slice(accelerations);
+        rate
+    }
+
+    /// The accelerations that a rate of its state's velocities is.
+    pub(crate) fn accelerations<S: Scalar>(&self, rate: &Vector6<S>) -> Vec<S> {
+        let first = if matches!(self, Self::Spherical) { 3 } else { 0 };
+        rate.as_slice()[first..first + self.freedoms()].to_vec()
+    }
+
+    /// The rate of its state's place, and the angular velocity of its rotation as one of the joint's frame.
+    pub(crate) fn rate_of_pose<S: Scalar>(&self, state: &State<S>) -> [Vector3<S>; 2] {
+        match self {
+            Self::Spherical => [state.linear, state.pose.rotation * state.angular],
+            Self::Floating => [state.linear, state.angular].map(|v| state.pose.rotation * v),
+            Self::Fixed | Self::Revolute(_) | Self::Prismatic(_) | Self::Custom(_) => {
+                [state.linear, state.angular]
+            }
+        }
+    }
+
+    /// Position and velocity along an axis: of a spherical joint, components of its rotation vector.
+    pub(crate) fn along<S: Scalar>(&self, state: &State<S>, axis: usize) -> [S; 2] {
+        match self {
+            Self::Spherical => [so3_log(&state.pose.rotation)[axis], state.angular[axis]],
+            _ => [state.pose.translation.vector[axis], state.linear[axis]],
+        }
+    }
+}
