@@ -187,8 +187,9 @@ impl<S: Scalar> World<S> {
         states: &[State<S>],
         step: Step,
     ) -> Result<Vec<State<S>>, SimulationError> {
-        let states = self.with_deflections(states);
+        let mut states = self.with_deflections(states);
         self.check(&states, step)?;
+        self.place_links(&mut states);
         self.advance(integrator, &states, step)
     }
 
@@ -238,7 +239,7 @@ impl<S: Scalar> World<S> {
     }
 
     /// Whether a rollout may begin.
-    fn check(&self, states: &[State<S>], step: Step) -> Result<(), SimulationError> {
+    pub(crate) fn check(&self, states: &[State<S>], step: Step) -> Result<(), SimulationError> {
         let Step { start, dt, .. } = step;
         if !(dt > 0.0 && dt.is_finite()) {
             return Err(SimulationError::TimeStep(dt));

@@ -117,7 +117,7 @@ impl Joint {
     }
 
     /// Coordinates after moving on by `step`, velocities times a time.
-    pub(super) fn moved<S: Scalar>(&self, q: &[S], step: &[S], after: &mut Vec<S>) {
+    pub(crate) fn moved<S: Scalar>(&self, q: &[S], step: &[S], after: &mut Vec<S>) {
         match self {
             Self::Fixed => {}
             Self::Revolute(_) | Self::Prismatic(_) | Self::Custom(_) => {

@@ -4,7 +4,7 @@
 
 use nalgebra::{Isometry3, Quaternion, Unit, Vector3, Vector6};
 use prehend_autodiff::Scalar;
-use prehend_autodiff::lie::so3_log;
+use prehend_autodiff::lie::{so3_log, so3_right_jacobian_inverse};
 
 use super::joint::Joint;
 use crate::state::State;
@@ -78,6 +78,17 @@ impl Joint {
             Self::Fixed | Self::Revolute(_) | Self::Prismatic(_) | Self::Custom(_) => {
                 [state.linear, state.angular]
             }
+        }
+    }
+
+    /// Derivatives of the position along an axis by displacements along all.
+    pub(crate) fn position_slopes<S: Scalar>(&self, state: &State<S>, axis: usize) -> [f64; 3] {
+        match self {
+            Self::Spherical => {
+                let turn = so3_log(&state.value().pose.rotation);
+                so3_right_jacobian_inverse(&turn).row(axis).transpose().into()
+            }
+            _ => std::array::from_fn(|k| if k == axis { 1.0 } else { 0.0 }),
         }
     }
 

@@ -15,24 +15,24 @@ use super::spatial::{SpatialInertia, angular, cross_motion, linear, spatial};
 /// Spatial vectors are about an origin at rest near the first link, along the world's axes.
 #[derive(Clone, Debug)]
 pub struct Kinematics<'a, S: Scalar = f64> {
-    pub(super) tree: &'a Articulation<S>,
+    pub(crate) tree: &'a Articulation<S>,
     /// That origin, in the world \[m\].
-    pub(super) origin: Vector3<f64>,
+    pub(crate) origin: Vector3<f64>,
     /// Link → world, about the origin.
-    pub(super) rotations: Vec<Matrix3<S>>,
-    pub(super) places: Vec<Vector3<S>>,
+    pub(crate) rotations: Vec<Matrix3<S>>,
+    pub(crate) places: Vec<Vector3<S>>,
     /// Motion of each degree of freedom.
-    pub(super) axes: Vec<Vector6<S>>,
+    pub(crate) axes: Vec<Vector6<S>>,
     /// Of each link, that of its joint alone, and with its parent's.
-    pub(super) joint_velocities: Vec<Vector6<S>>,
-    pub(super) velocities: Vec<Vector6<S>>,
+    pub(crate) joint_velocities: Vec<Vector6<S>>,
+    pub(crate) velocities: Vec<Vector6<S>>,
     /// Acceleration of each link at constant velocities of the joints.
-    pub(super) drifts: Vec<Vector6<S>>,
-    pub(super) inertias: Vec<SpatialInertia<S>>,
+    pub(crate) drifts: Vec<Vector6<S>>,
+    pub(crate) inertias: Vec<SpatialInertia<S>>,
     /// Acceleration of free fall \[m/s²\].
-    pub(super) gravity: Vector3<S>,
+    pub(crate) gravity: Vector3<S>,
     /// Coordinates and velocities, where there are joint types of one's own.
-    pub(super) custom: Option<[Vec<S>; 2]>,
+    pub(crate) custom: Option<[Vec<S>; 2]>,
 }
 
 /// Energies \[J\].
@@ -45,7 +45,7 @@ pub struct Energy<S: Scalar = f64> {
 }
 
 impl<'a, S: Scalar> Kinematics<'a, S> {
-    pub(super) fn new(tree: &'a Articulation<S>, q: &[S], v: &[S]) -> Self {
+    pub(crate) fn new(tree: &'a Articulation<S>, q: &[S], v: &[S]) -> Self {
         tree.check(q, v);
         let count = tree.links().len();
         let mut at = Self {
@@ -168,7 +168,7 @@ impl<'a, S: Scalar> Kinematics<'a, S> {
 
     /// A force and torque about a link's origin, about the origin of all.
     #[inline]
-    pub(super) fn about_origin(&self, link: usize, wrench: &Vector6<S>) -> Vector6<S> {
+    pub(crate) fn about_origin(&self, link: usize, wrench: &Vector6<S>) -> Vector6<S> {
         let force = linear(wrench);
         spatial(&force, &(angular(wrench) + self.places[link].cross(&force)))
     }

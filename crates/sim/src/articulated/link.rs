@@ -191,17 +191,17 @@ impl<S: Scalar> Articulation<S> {
     }
 
     /// The link that a degree of freedom moves.
-    pub(super) fn link_of(&self, freedom: usize) -> usize {
+    pub(crate) fn link_of(&self, freedom: usize) -> usize {
         self.link_of[freedom]
     }
 
     /// The degrees of freedom that move a link, the nearest first.
-    pub(super) fn freedoms_of(&self, link: usize) -> impl Iterator<Item = usize> {
+    pub(crate) fn freedoms_of(&self, link: usize) -> impl Iterator<Item = usize> {
         std::iter::successors(self.last[link], |k| self.carriers[*k])
     }
 
     /// Of each degree of freedom the one that carries it.
-    pub(super) fn carriers(&self) -> &[Option<usize>] {
+    pub(crate) fn carriers(&self) -> &[Option<usize>] {
         &self.carriers
     }
 
@@ -232,7 +232,7 @@ impl<S: Scalar> Articulation<S> {
         Kinematics::new(self, q, v)
     }
 
-    pub(super) fn check(&self, q: &[S], v: &[S]) {
+    pub(crate) fn check(&self, q: &[S], v: &[S]) {
         assert_eq!(q.len(), self.coordinates(), "one number a coordinate");
         assert_eq!(v.len(), self.freedoms(), "one number a degree of freedom");
     }

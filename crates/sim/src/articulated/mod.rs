@@ -27,7 +27,7 @@ mod mass_matrix;
 pub(crate) mod spatial;
 #[cfg(test)]
 mod tests;
-mod tree_factor;
+pub(crate) mod tree_factor;
 
 pub use self::derivatives::{DynamicsDerivatives, ForwardDerivatives};
 pub use self::joint::{CustomJoint, Joint};

@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 /// L of M = Lᵀ L, lower triangular: entries are zero where neither degree of freedom moves the other (Featherstone, section 6.5).
-pub(super) struct TreeFactor<'a> {
+pub(crate) struct TreeFactor<'a> {
     lower: DMatrix<f64>,
     /// Of each degree of freedom: the one that carries it.
     parents: &'a [Option<usize>],
@@ -11,7 +11,7 @@ pub(super) struct TreeFactor<'a> {
 
 impl<'a> TreeFactor<'a> {
     /// Of a mass matrix; `None` if it is not positive definite.
-    pub(super) fn new(mass: &DMatrix<f64>, parents: &'a [Option<usize>]) -> Option<Self> {
+    pub(crate) fn new(mass: &DMatrix<f64>, parents: &'a [Option<usize>]) -> Option<Self> {
         let mut lower = mass.clone();
         for k in (0..parents.len()).rev() {
             let pivot = lower[(k, k)];
@@ -35,7 +35,7 @@ impl<'a> TreeFactor<'a> {
     }
 
     /// M⁻¹ B in place of B, where column i of `transposed` is row i of B: whole rows are added to each other.
-    pub(super) fn solve_transposed(&self, transposed: &mut DMatrix<f64>) {
+    pub(crate) fn solve_transposed(&self, transposed: &mut DMatrix<f64>) {
         let n = self.parents.len();
         for i in (0..n).rev() {
             transposed.column_mut(i).unscale_mut(self.lower[(i, i)]);

@@ -1,6 +1,6 @@
 //! Semi-implicit (symplectic) Euler: momenta first, then positions with the new velocities.
 
-use nalgebra::Vector6;
+use nalgebra::{Vector3, Vector6};
 use prehend_autodiff::Scalar;
 use prehend_autodiff::rigid::turned;
 
@@ -29,7 +29,7 @@ impl Integrator for SemiImplicitEuler {
         let wrenches = world.wrenches(states, step.index);
         let bodies = world.bodies.iter().zip(states).zip(&wrenches);
         let next = bodies.map(|((body, state), wrench)| match body.rigid() {
-            Some(rigid) => advance(rigid, world, state, wrench, S::constant(step.dt)),
+            Some(rigid) => advance(rigid, &world.gravity, state, wrench, S::constant(step.dt)),
             None => *state,
         });
         let mut next: Vec<State<S>> = next.collect();
@@ -51,16 +51,17 @@ impl Integrator for SemiImplicitEuler {
     }
 }
 
+/// A body's state after `dt` \[s\].
 #[inline]
-fn advance<S: Scalar>(
+pub(crate) fn advance<S: Scalar>(
     body: &RigidBody<S>,
-    world: &World<S>,
+    gravity: &Vector3<S>,
     state: &State<S>,
     wrench: &Vector6<S>,
     dt: S,
 ) -> State<S> {
     let mut next = *state;
-    let (linear, momentum) = body.kicked(state, wrench, &world.gravity, dt);
+    let (linear, momentum) = body.kicked(state, wrench, gravity, dt);
     next.linear = linear;
     next.pose.translation.vector += next.linear * dt;
     let rotation = &state.pose.rotation;

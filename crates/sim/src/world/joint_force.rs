@@ -188,6 +188,24 @@ impl<S: Scalar> World<S> {
         efforts
     }
 
+    /// Derivatives of the position of a force by displacements along degrees of freedom of its articulation.
+    pub(crate) fn position_slopes(
+        &self,
+        force: &JointForce<S>,
+        states: &[State<S>],
+    ) -> Vec<(usize, f64)> {
+        let mut slopes = Vec::with_capacity(force.axes.len());
+        for (JointAxis { link, index }, factor) in &force.axes {
+            let Ok((articulation, own)) = self.link_of(*link) else { continue };
+            let Ok((place, joint)) = self.joint_place(states, *link) else { continue };
+            let [_, freedoms] = self.articulations[articulation].tree.range(own);
+            let of_axis = joint.position_slopes(&states[place], *index);
+            let own = freedoms.zip(of_axis).map(|(freedom, slope)| (freedom, slope * factor));
+            slopes.extend(own.filter(|(_, slope)| *slope != 0.0));
+        }
+        slopes
+    }
+
     /// Where a force acts.
     pub(crate) fn along(&self, force: &JointForce<S>, states: &[State<S>]) -> Option<Along<S>> {
         let (first, _) = force.axes.first()?;

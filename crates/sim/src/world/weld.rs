@@ -94,16 +94,26 @@ impl<S: Scalar> World<S> {
     /// Adds what welds do to the wrenches on the bodies.
     pub(super) fn add_welds(&self, states: &[State<S>], wrenches: &mut [Vector6<S>]) {
         for weld in &self.welds {
-            let [a, b] = weld.bodies;
-            let pull = Pull { frames: self.frames_from_com(weld) };
-            let mut x = [S::zero(); INPUTS];
-            x[..STATE].copy_from_slice(&states[a].coordinates());
-            x[STATE..2 * STATE].copy_from_slice(&states[b].coordinates());
-            x[2 * STATE..].copy_from_slice(&weld.stiffness.numbers());
-            let both = S::local(&pull, x);
-            wrenches[a] += Vector6::from_column_slice(&both[..6]);
-            wrenches[b] += Vector6::from_column_slice(&both[6..]);
+            let ends = weld.bodies.map(|body| &states[body]);
+            let both = self.pull(weld, ends, weld.stiffness.numbers());
+            weld.bodies.into_iter().zip(both).for_each(|(body, wrench)| wrenches[body] += wrench);
         }
+    }
+
+    /// What a weld of this stiffness does to both bodies in these states.
+    pub(crate) fn pull<T: Scalar>(
+        &self,
+        weld: &Weld<S>,
+        states: [&State<T>; 2],
+        stiffness: [T; 4],
+    ) -> [Vector6<T>; 2] {
+        let pull = Pull { frames: self.frames_from_com(weld) };
+        let mut x = [T::zero(); INPUTS];
+        x[..STATE].copy_from_slice(&states[0].coordinates());
+        x[STATE..2 * STATE].copy_from_slice(&states[1].coordinates());
+        x[2 * STATE..].copy_from_slice(&stiffness);
+        let both = T::local(&pull, x);
+        [0, 6].map(|from| Vector6::from_column_slice(&both[from..from + 6]))
     }
 
     /// The frames of a weld, from the centers of mass.

@@ -3,6 +3,8 @@
 
 mod free_body;
 mod gradients;
+mod linear_step;
 mod loops;
 mod pendulum;
+mod scenes;
 mod sensors;

@@ -1,0 +1,266 @@
+//! Forces along all coordinates, their derivatives, and the accelerations of joints that follow.
+
+use nalgebra::{DMatrix, SMatrix, Vector6};
+use prehend_autodiff::Fwd;
+
+use super::motions::{Motion, of_free_body, of_link};
+use super::pair::Between;
+use crate::articulated::Kinematics;
+use crate::articulated::spatial::{angular, cross_motion, linear};
+use crate::articulated::tree_factor::TreeFactor;
+use crate::state::State;
+use crate::world::World;
+use crate::world::articulated_body::ArticulatedBody;
+use crate::world::joint_force::Along;
+
+/// Forces on free bodies and accelerations of joints, with derivatives by all coordinates.
+pub(super) struct Generalized {
+    /// How many coordinates there are, and the first of those of joints.
+    pub(super) count: usize,
+    pub(super) joints: usize,
+    /// As [`World::wrenches`] has them.
+    pub(super) wrenches: Vec<Vector6<f64>>,
+    /// Of wrenches on free bodies and of accelerations of joints: by displacements and by velocities.
+    pub(super) by_position: DMatrix<f64>,
+    pub(super) by_velocity: DMatrix<f64>,
+    /// Of accelerations of joints, by efforts.
+    pub(super) by_effort: DMatrix<f64>,
+}
+
+impl Generalized {
+    pub(super) fn new(world: &World, states: &[State], step: usize) -> Self {
+        let trees = trees(world, states);
+        let mut all = Self::empty(world, &trees);
+        all.add_forces(world, states, &trees, step);
+        let efforts = all.add_joint_forces(world, states, &trees);
+        for (tree, efforts) in trees.iter().zip(&efforts) {
+            let accelerations = all.accelerate(tree, efforts);
+            for (index, link) in tree.own.tree.links().iter().enumerate() {
+                let [_, freedoms] = tree.own.tree.range(index);
+                all.wrenches.push(link.joint.rate_of_velocities(&accelerations[freedoms]));
+            }
+        }
+        all
+    }
+
+    /// Without any but by efforts.
+    pub(super) fn without_forces(world: &World, states: &[State]) -> Self {
+        let trees = trees(world, states);
+        let mut all = Self::empty(world, &trees);
+        for Tree { at, first, .. } in &trees {
+            let root = at.inverse_mass_root();
+            let (from, n) = (first - all.joints, root.nrows());
+            let inverse = &root * root.transpose();
+            all.by_effort.view_mut((from, from), (n, n)).copy_from(&inverse);
+        }
+        all
+    }
+
+    fn empty(world: &World, trees: &[Tree<'_>]) -> Self {
+        let joints = 6 * world.free_bodies().len();
+        let count = joints + trees.iter().map(|tree| tree.freedoms).sum::<usize>();
+        let [by_position, by_velocity] = [(); 2].map(|()| DMatrix::zeros(count, count));
+        let by_effort = DMatrix::zeros(count - joints, count - joints);
+        let wrenches = world.bodies.iter().map(|body| body.external_wrench).collect();
+        Self { count, joints, wrenches, by_position, by_velocity, by_effort }
+    }
+
+    /// Adds contacts and welds: their wrenches on bodies, and what follows along the coordinates.
+    fn add_forces(&mut self, world: &World, states: &[State], trees: &[Tree<'_>], step: usize) {
+        let contacts = world.contacts.iter();
+        let contacts = contacts.filter_map(|pair| Between::contact(world, pair, states, step));
+        let welds = world.welds.iter().map(|weld| Between::weld(world, weld, states));
+        let mut motions: Vec<Option<Vec<Motion>>> = Vec::new();
+        motions.resize_with(world.bodies.len(), || None);
+        let mut own = Vec::new();
+        if !(world.contacts.is_empty() && world.welds.is_empty()) {
+            own = places(world, trees);
+        }
+        for between in contacts.chain(welds) {
+            for body in between.bodies {
+                motions[body].get_or_insert_with(|| match own[body.index()] {
+                    Place::Free(first) => of_free_body(first),
+                    Place::Link(tree, link) => of_link(&trees[tree].at, link, trees[tree].first),
+                    Place::Fixed => Vec::new(),
+                });
+            }
+            let ends = between.bodies.map(|body| motions[body].as_deref().unwrap_or(&[]));
+            for end in 0..2 {
+                let wrench = &between.on[end];
+                self.wrenches[between.bodies[end]] += wrench;
+                for (by, moving) in ends.iter().enumerate() {
+                    self.add_slopes(&between.by[end][by], ends[end], moving);
+                }
+                if matches!(own[between.bodies[end].index()], Place::Link(..)) {
+                    self.add_turns(wrench, ends[end]);
+                }
+            }
+        }
+    }
+
+    /// Adds, along the motions of one body, the change of a wrench with those of another.
+    fn add_slopes(&mut self, by: &SMatrix<f64, 6, 12>, of: &[Motion], moving: &[Motion]) {
+        for Motion { freedom: column, displaced, unit } in moving {
+            let by_displacement = by * displaced;
+            let by_velocity = by.fixed_columns::<6>(6) * unit;
+            for Motion { freedom: row, unit, .. } in of {
+                self.by_position[(*row, *column)] += unit.dot(&by_displacement);
+                self.by_velocity[(*row, *column)] += unit.dot(&by_velocity);
+            }
+        }
+    }
+
+    /// Adds the change of the coordinates' share in a wrench on a link as its point moves; that by the turn of axes follows for the sum.
+    fn add_turns(&mut self, wrench: &Vector6<f64>, motions: &[Motion]) {
+        let force = linear(wrench);
+        for Motion { freedom: column, unit: moved, .. } in motions {
+            let change = linear(moved).cross(&force);
+            for Motion { freedom: row, unit, .. } in motions {
+                self.by_position[(*row, *column)] += angular(unit).dot(&change);
+            }
+        }
+    }
+
+    /// Adds the slopes of forces along joints, and returns the efforts of each tree.
+    fn add_joint_forces(
+        &mut self,
+        world: &World,
+        states: &[State],
+        trees: &[Tree<'_>],
+    ) -> Vec<Vec<f64>> {
+        let mut efforts: Vec<Vec<f64>> =
+            trees.iter().map(|tree| vec![0.0; tree.freedoms]).collect();
+        for force in &world.joint_forces {
+            let Some(Along { articulation, freedoms, position, velocity }) =
+                world.along(force, states)
+            else {
+                continue;
+            };
+            let Fwd { value, derivative: [by_position, by_velocity] } =
+                force.law().effort_by_motion(force.params(), position, velocity);
+            let first = trees[articulation].first;
+            for (row, share) in &freedoms {
+                efforts[articulation][*row] += value * share;
+                for (column, factor) in &freedoms {
+                    self.by_velocity[(first + row, first + column)] += by_velocity * share * factor;
+                }
+                for (column, slope) in world.position_slopes(force, states) {
+                    self.by_position[(first + row, first + column)] += by_position * share * slope;
+                }
+            }
+        }
+        efforts
+    }
+
+    /// Makes accelerations of the efforts of a tree, and of their derivatives.
+    fn accelerate(&mut self, tree: &Tree<'_>, efforts: &[f64]) -> Vec<f64> {
+        let Tree { own, at, first, .. } = tree;
+        let (first, n) = (*first, efforts.len());
+        let wrenches: Vec<Vector6<f64>> =
+            own.bodies().iter().map(|body| self.wrenches[*body]).collect();
+        let accelerations = at.forward_dynamics_under(efforts, &wrenches);
+        self.add_axes_turns(tree, &wrenches);
+        let bias = at.inverse_dynamics_derivatives(accelerations.as_slice());
+        let Some(factor) = TreeFactor::new(&bias.by_acceleration, own.tree.carriers()) else {
+            self.by_position.rows_mut(first, n).fill(f64::NAN);
+            return accelerations.as_slice().to_vec();
+        };
+        let mut view = self.by_position.view_mut((first, first), (n, n));
+        view -= &bias.by_position;
+        let mut view = self.by_velocity.view_mut((first, first), (n, n));
+        view -= &bias.by_velocity;
+        let columns = self.count;
+        let mut all = DMatrix::zeros(2 * columns + n, n);
+        for row in 0..n {
+            for k in 0..columns {
+                all[(k, row)] = self.by_position[(first + row, k)];
+                all[(columns + k, row)] = self.by_velocity[(first + row, k)];
+            }
+            all[(2 * columns + row, row)] = 1.0;
+        }
+        factor.solve_transposed(&mut all);
+        for row in 0..n {
+            for k in 0..columns {
+                self.by_position[(first + row, k)] = all[(k, row)];
+                self.by_velocity[(first + row, k)] = all[(columns + k, row)];
+            }
+            for k in 0..n {
+                let at = (first - self.joints + row, first - self.joints + k);
+                self.by_effort[at] = all[(2 * columns + k, row)];
+            }
+        }
+        accelerations.as_slice().to_vec()
+    }
+
+    /// Adds the change of the coordinates' share in all wrenches on links as axes turn with those that carry them.
+    fn add_axes_turns(&mut self, tree: &Tree<'_>, wrenches: &[Vector6<f64>]) {
+        let Tree { own, at, first, .. } = tree;
+        let links = own.tree.links();
+        let mut sums: Vec<Vector6<f64>> = Vec::with_capacity(links.len());
+        sums.extend(wrenches.iter().enumerate().map(|(link, w)| at.about_origin(link, w)));
+        for (index, link) in links.iter().enumerate().rev() {
+            let sum = sums[index];
+            if sum == Vector6::zeros() {
+                continue;
+            }
+            let [_, freedoms] = own.tree.range(index);
+            for row in freedoms {
+                for column in own.tree.freedoms_of(index) {
+                    let turned = cross_motion(&at.axes[column], &at.axes[row]);
+                    self.by_position[(first + row, first + column)] += turned.dot(&sum);
+                }
+            }
+            if let Some(parent) = link.parent {
+                sums[parent] += sum;
+            }
+        }
+    }
+}
+
+/// An articulation where it is.
+struct Tree<'a> {
+    own: &'a ArticulatedBody,
+    at: Kinematics<'a>,
+    /// The first of its coordinates.
+    first: usize,
+    /// How many there are.
+    freedoms: usize,
+}
+
+fn trees<'a>(world: &'a World, states: &[State]) -> Vec<Tree<'a>> {
+    let mut first = 6 * world.free_bodies().len();
+    let mut trees = Vec::with_capacity(world.articulations.len());
+    let mut joint = world.bodies.len();
+    for own in &world.articulations {
+        let (from, freedoms) = (joint, own.tree.freedoms());
+        joint += own.bodies().len();
+        let [q, v] = own.coordinates(&states[from..joint]);
+        let at = own.tree.kinematics(&q, &v).under(world.gravity);
+        trees.push(Tree { own, at, first, freedoms });
+        first += freedoms;
+    }
+    trees
+}
+
+/// What moves a body.
+#[derive(Clone, Copy)]
+enum Place {
+    Fixed,
+    /// Its own coordinates, from here on.
+    Free(usize),
+    /// The tree and the link in it.
+    Link(usize, usize),
+}
+
+fn places(world: &World, trees: &[Tree<'_>]) -> Vec<Place> {
+    let mut places = vec![Place::Fixed; world.bodies.len()];
+    for (slot, body) in world.free_bodies().into_iter().enumerate() {
+        places[body] = Place::Free(6 * slot);
+    }
+    for (index, tree) in trees.iter().enumerate() {
+        for (link, body) in tree.own.bodies().iter().enumerate() {
+            places[*body] = Place::Link(index, link);
+        }
+    }
+    places
+}

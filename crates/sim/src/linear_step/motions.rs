@@ -1,0 +1,50 @@
+//! How the state of a body changes with the coordinates that move it.
+
+use nalgebra::{SVector, Vector6};
+
+use crate::articulated::Kinematics;
+use crate::articulated::spatial::{angular, cross_motion, linear, spatial};
+use crate::contact::wrench::stack;
+
+/// Changes of a body's state, in the order of [`State::tangent`](crate::State::tangent), by one coordinate.
+pub(super) struct Motion {
+    /// Which coordinate.
+    pub(super) freedom: usize,
+    /// By its displacement.
+    pub(super) displaced: SVector<f64, 12>,
+    /// By its velocity: velocity and angular velocity, and by the displacement place and turn.
+    pub(super) unit: Vector6<f64>,
+}
+
+/// Of a free body whose first coordinate is `first`.
+pub(super) fn of_free_body(first: usize) -> Vec<Motion> {
+    let motion = |k: usize| Motion {
+        freedom: first + k,
+        displaced: SVector::ith(k, 1.0),
+        unit: Vector6::ith(k, 1.0),
+    };
+    (0..6).map(motion).collect()
+}
+
+/// Of a link of a tree whose first coordinate is `first`.
+pub(super) fn of_link(at: &Kinematics<'_>, link: usize, first: usize) -> Vec<Motion> {
+    let place = at.places[link];
+    let spin = angular(&at.velocities[link]);
+    let mut motions = Vec::with_capacity(at.axes.len());
+    for freedom in at.tree.freedoms_of(link) {
+        let axis = &at.axes[freedom];
+        let carrier = at.tree.links()[at.tree.link_of(freedom)].parent;
+        let relative = match carrier {
+            Some(parent) => at.velocities[link] - at.velocities[parent],
+            None => at.velocities[link],
+        };
+        let change = cross_motion(axis, &relative);
+        let (moved, turned) = (linear(axis) + angular(axis).cross(&place), angular(axis));
+        let velocity = linear(&change) + angular(&change).cross(&place) + spin.cross(&moved);
+        let mut displaced = SVector::<f64, 12>::zeros();
+        displaced.fixed_rows_mut::<6>(0).copy_from(&stack(&moved, &turned));
+        displaced.fixed_rows_mut::<6>(6).copy_from(&spatial(&velocity, &angular(&change)));
+        motions.push(Motion { freedom: first + freedom, displaced, unit: stack(&moved, &turned) });
+    }
+    motions
+}
