@@ -1,4 +1,4 @@
-//! Meshes, closest points, signed distance grids, kinematics and exact volumes.
+//! Meshes, closest points, signed distance grids, kinematics, descriptions of robots and exact volumes.
 
 mod box_tree;
 mod clean;
@@ -9,9 +9,11 @@ mod expansion;
 mod field;
 pub mod hand;
 pub mod icp;
+mod inertial;
 mod io;
 pub mod mass;
 mod mesh;
+pub mod mjcf;
 mod moments;
 mod normals;
 pub mod objects;
@@ -33,6 +35,7 @@ pub use closest::ClosestPoints;
 pub use cloud::{KdTree, PointCloud};
 pub use contact_area::contact_area;
 pub use field::{DistanceField, FieldSample};
+pub use inertial::Inertial;
 pub use io::{MeshError, limits, write_atomic};
 pub use mass::{MassError, MassProperties};
 pub use mesh::{Texture, TriMesh};

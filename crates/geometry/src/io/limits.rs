@@ -21,3 +21,12 @@ pub const MAX_URDF_BYTES: usize = 1 << 26;
 
 /// Deepest nesting of tags in a robot description, whose readers descend by recursion.
 pub const MAX_URDF_DEPTH: usize = 64;
+
+/// Largest MJCF model with all files that it includes \[bytes\].
+pub const MAX_MJCF_BYTES: usize = 1 << 26;
+
+/// Most elements of an MJCF model.
+pub const MAX_MJCF_ELEMENTS: usize = 1 << 20;
+
+/// Deepest nesting of tags in an MJCF model, which is read by recursion: bodies lie in the bodies that carry them.
+pub const MAX_MJCF_DEPTH: usize = 256;

@@ -59,6 +59,17 @@ impl TriMesh {
     }
 }
 
+/// As [`TriMesh::load`], positions and faces alone: what an OBJ file says of materials is not looked at.
+///
+/// Descriptions of robots often come without the materials that their meshes name.
+pub(crate) fn load_shape(path: &Path) -> Result<TriMesh, MeshError> {
+    let mesh = match extension(path).as_str() {
+        "obj" => checked(obj::parse_shape(&read(path)?, path)?, path)?,
+        _ => TriMesh::load(path)?,
+    };
+    Ok(TriMesh::new(mesh.vertices, mesh.faces))
+}
+
 /// The extension of `path` in lower case, empty without one.
 fn extension(path: &Path) -> String {
     path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase()

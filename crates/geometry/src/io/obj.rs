@@ -5,7 +5,7 @@ use std::io::Cursor;
 use std::path::Path;
 
 use nalgebra::{Point3, Vector3};
-use tobj::{LoadError, LoadOptions, Material, Mesh};
+use tobj::{LoadError, LoadOptions, Material, Mesh, Model};
 
 use super::images::Images;
 use super::parts::{Part, join};
@@ -52,6 +52,23 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshError> {
     // A group of nothing but points or lines leaves a part without faces.
     parts.retain(|p| !p.mesh.faces.is_empty());
     join(parts, path)
+}
+
+/// Positions and faces alone.
+pub(super) fn parse_shape(bytes: &[u8], path: &Path) -> Result<TriMesh, MeshError> {
+    // Corners share their position whatever their normals are.
+    let options = LoadOptions { single_index: false, ..OPTIONS };
+    let no_materials = |_: &Path| Err(LoadError::GenericFailure);
+    let (models, _) = tobj::load_obj_buf(&mut Cursor::new(bytes), &options, no_materials)
+        .map_err(|e| MeshError::malformed(path, line_at_fault(bytes), e))?;
+    let mut whole = TriMesh::default();
+    for Model { mesh, .. } in models {
+        let vertices = mesh.positions.chunks_exact(3);
+        let vertices = vertices.map(|p| Point3::new(p[0], p[1], p[2]).cast()).collect();
+        let faces = mesh.indices.chunks_exact(3).map(|f| [f[0], f[1], f[2]]).collect();
+        whole.append(&TriMesh::new(vertices, faces));
+    }
+    Ok(whole)
 }
 
 /// The line, from 1, without which the lines before it can be read: `tobj` does not say where it stopped. Where faces

@@ -3,6 +3,7 @@
 mod articulated;
 mod closest;
 mod collision;
+mod dynamics;
 mod error;
 mod kinematics;
 mod limits;
@@ -24,6 +25,7 @@ pub use posed::PosedRobot;
 pub use screw::Screw;
 pub use shape::{LinkShape, RobotShape};
 
+use crate::inertial::Inertial;
 use crate::mesh::TriMesh;
 
 /// A rigid body of a robot.
@@ -33,6 +35,8 @@ pub struct Link {
     pub name: String,
     /// Collision bodies in the link frame \[m\], one a collision tag; they may overlap each other.
     pub parts: Vec<TriMesh>,
+    /// Mass and inertia in the link frame, where the description has them.
+    pub inertial: Option<Inertial>,
 }
 
 /// How a joint lets its child link move.
@@ -81,6 +85,14 @@ pub struct Joint {
     pub limits: Option<(f64, f64)>,
     /// Where its position comes from.
     pub drive: Drive,
+    /// Viscous damping \[N m s/rad or N s/m\], where the description tells it.
+    pub damping: Option<f64>,
+    /// Dry friction \[N m or N\], where the description tells it.
+    pub friction: Option<f64>,
+    /// Largest speed \[rad/s or m/s\], where the joint has such a limit.
+    pub velocity_limit: Option<f64>,
+    /// Largest torque or force of its motor \[N m or N\], where the joint has such a limit.
+    pub effort_limit: Option<f64>,
 }
 
 /// A tree of links and joints with one root, the base.

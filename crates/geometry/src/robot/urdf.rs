@@ -8,7 +8,9 @@ use nalgebra::{Unit, Vector3};
 use urdf_rs::JointType;
 
 use super::origin::{finite, isometry};
-use super::{Drive, Joint, KinematicTree, Link, Motion, RobotError, collision, limits, tree};
+use super::{
+    Drive, Joint, KinematicTree, Link, Motion, RobotError, collision, dynamics, limits, tree,
+};
 use crate::io::folder::read_limited;
 use crate::limits::{MAX_URDF_BYTES, MAX_URDF_DEPTH};
 
@@ -51,7 +53,10 @@ impl KinematicTree {
         let links = urdf
             .links
             .iter()
-            .map(|l| Ok(Link { name: l.name.clone(), parts: collision::parts(l, asset_dir)? }))
+            .map(|l| {
+                let (parts, inertial) = (collision::parts(l, asset_dir)?, dynamics::inertial(l)?);
+                Ok(Link { name: l.name.clone(), parts, inertial })
+            })
             .collect::<Result<Vec<_>, RobotError>>()?;
         let variables: Vec<String> = urdf
             .joints
@@ -101,6 +106,7 @@ impl KinematicTree {
                     }
                     _ => None,
                 };
+                let dynamics = dynamics::damping_and_friction(j)?;
                 Ok(Joint {
                     name: j.name.clone(),
                     motion,
@@ -110,6 +116,10 @@ impl KinematicTree {
                     axis,
                     limits,
                     drive: drive(j, &by_name, &variables)?,
+                    damping: dynamics.map(|(damping, _)| damping),
+                    friction: dynamics.map(|(_, friction)| friction),
+                    velocity_limit: dynamics::limit(j, "limit velocity", j.limit.velocity)?,
+                    effort_limit: dynamics::limit(j, "limit effort", j.limit.effort)?,
                 })
             })
             .collect::<Result<Vec<_>, RobotError>>()?;

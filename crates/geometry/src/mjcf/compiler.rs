@@ -1,0 +1,137 @@
+//! The `compiler` element: how the rest of a model is to be understood.
+
+use super::element::Element;
+use super::error::MjcfError;
+use super::value::Limited;
+
+/// Whose inertia a body has.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum InertiaFrom {
+    /// That of its `inertial` element or else of its geoms.
+    Either,
+    /// That of its geoms, even where it has an `inertial` element.
+    Geoms,
+    /// That of its `inertial` element, or none.
+    Element,
+}
+
+/// Settings of all `compiler` elements together; what comes later counts.
+#[derive(Clone, Debug)]
+pub(super) struct Compiler {
+    pub(super) degrees: bool,
+    pub(super) auto_limits: bool,
+    /// Axes of Euler angles: 0 to 2, and whether they stay while the body turns.
+    pub(super) euler: [(usize, bool); 3],
+    pub(super) mesh_folder: String,
+    pub(super) strip_path: bool,
+    pub(super) inertia_from: InertiaFrom,
+    /// First and last group of geoms whose mass counts.
+    pub(super) inertia_groups: [f64; 2],
+    /// Least mass \[kg\] and least principal inertia \[kg m²\] of a body.
+    pub(super) least: [f64; 2],
+    /// Whether inertias that no body can have are made those of a ball.
+    pub(super) balance: bool,
+    /// Mass that all bodies are scaled to \[kg\].
+    pub(super) total_mass: Option<f64>,
+    /// Whether meshes are stood in for by the box around them, not by that of their inertia.
+    pub(super) fit_bounds: bool,
+}
+
+impl Compiler {
+    /// What the `compiler` elements in `root` say.
+    pub(super) fn read(root: &Element) -> Result<Self, MjcfError> {
+        let mut all = Self {
+            degrees: true,
+            auto_limits: true,
+            euler: [(0, false), (1, false), (2, false)],
+            mesh_folder: String::new(),
+            strip_path: false,
+            inertia_from: InertiaFrom::Either,
+            inertia_groups: [0.0, 5.0],
+            least: [0.0; 2],
+            balance: false,
+            total_mass: None,
+            fit_bounds: false,
+        };
+        root.sections("compiler").try_for_each(|e| all.add(e))?;
+        Ok(all)
+    }
+
+    fn add(&mut self, e: &Element) -> Result<(), MjcfError> {
+        if let Some(degrees) = e.keyword("angle", &[("degree", true), ("radian", false)])? {
+            self.degrees = degrees;
+        }
+        e.keyword("coordinate", &[("local", ())])?;
+        if let Some(axes) = e.text("eulerseq") {
+            self.euler = euler(axes).ok_or_else(|| {
+                e.invalid("eulerseq", format!("is '{axes}', not three of xyz and XYZ"))
+            })?;
+        }
+        let inertia = [
+            ("auto", InertiaFrom::Either),
+            ("true", InertiaFrom::Geoms),
+            ("false", InertiaFrom::Element),
+        ];
+        self.inertia_from = e.keyword("inertiafromgeom", &inertia)?.unwrap_or(self.inertia_from);
+        self.inertia_groups = e.numbers("inertiagrouprange")?.unwrap_or(self.inertia_groups);
+        for folder in ["assetdir", "meshdir"] {
+            if let Some(name) = e.text(folder) {
+                self.mesh_folder = name.to_owned();
+            }
+        }
+        let switches = [
+            ("autolimits", &mut self.auto_limits),
+            ("strippath", &mut self.strip_path),
+            ("balanceinertia", &mut self.balance),
+            ("fitaabb", &mut self.fit_bounds),
+        ];
+        for (name, value) in switches {
+            *value = e.switch(name)?.unwrap_or(*value);
+        }
+        self.least[0] = e.magnitude("boundmass")?.unwrap_or(self.least[0]);
+        self.least[1] = e.magnitude("boundinertia")?.unwrap_or(self.least[1]);
+        if let Some(mass) = e.number("settotalmass")? {
+            self.total_mass = (mass > 0.0).then_some(mass);
+        }
+        Ok(())
+    }
+
+    /// An angle of the file in radians.
+    pub(super) fn angle(&self, value: f64) -> f64 {
+        if self.degrees { value.to_radians() } else { value }
+    }
+
+    /// The range that counts, from the attributes `limited_field` and `field` of `e` or its classes.
+    pub(super) fn range(
+        &self,
+        e: &Element,
+        [limited_field, field]: [&'static str; 2],
+        limited: Limited,
+        [low, high]: [f64; 2],
+    ) -> Result<Option<(f64, f64)>, MjcfError> {
+        let given = low != 0.0 || high != 0.0;
+        let is_limited = match limited {
+            Limited::Yes => true,
+            Limited::No => false,
+            Limited::Auto if !self.auto_limits && given => {
+                let reason = "must be told with a range, since autolimits is false";
+                return Err(e.invalid(limited_field, reason));
+            }
+            Limited::Auto => given,
+        };
+        match is_limited {
+            false => Ok(None),
+            true if low < high => Ok(Some((low, high))),
+            true => Err(e.invalid(field, format!("is from {low} to {high}, which is no range"))),
+        }
+    }
+}
+
+fn euler(text: &str) -> Option<[(usize, bool); 3]> {
+    let axis = |letter: char| {
+        let axis = "xyz".find(letter.to_ascii_lowercase())?;
+        Some((axis, letter.is_ascii_uppercase()))
+    };
+    let axes: Option<Vec<_>> = text.trim().chars().map(axis).collect();
+    axes?.try_into().ok()
+}

@@ -1,0 +1,19 @@
+//! Pairs of bodies that do not collide.
+
+use super::element::Element;
+use super::error::MjcfError;
+use super::names::Names;
+
+/// The pairs of the `exclude` elements in `root`; `None` is the world.
+pub(super) fn exclusions(
+    root: &Element,
+    names: &Names,
+) -> Result<Vec<[Option<usize>; 2]>, MjcfError> {
+    let mut all = Vec::new();
+    for e in root.in_sections("contact").filter(|e| e.tag == "exclude") {
+        e.take();
+        e.text("name");
+        all.push([names.body(e, "body1")?, names.body(e, "body2")?]);
+    }
+    Ok(all)
+}

@@ -1,0 +1,154 @@
+//! The elements of a model's files, joined to one tree by their `include` elements.
+//!
+//! They keep book of what has been asked for, so that the rest can be named in warnings.
+
+use std::cell::Cell;
+use std::path::Path;
+use std::sync::Arc;
+
+use super::error::{MjcfError, Place};
+
+/// What has become of an element or an attribute.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Use {
+    /// Nothing has asked for it.
+    None,
+    /// It has been read.
+    Read,
+    /// It has been looked at and left out, wholly or in part, for this reason.
+    Refused(&'static str),
+}
+
+#[derive(Debug)]
+struct Attribute {
+    name: String,
+    value: String,
+    used: Cell<Use>,
+}
+
+/// An element with what is below it.
+#[derive(Debug)]
+pub(super) struct Element {
+    /// Its tag.
+    pub(super) tag: String,
+    attributes: Vec<Attribute>,
+    /// The elements in it.
+    pub(super) children: Vec<Element>,
+    /// The file that it comes from.
+    pub(super) file: Option<Arc<Path>>,
+    line: u32,
+    used: Cell<Use>,
+}
+
+impl Element {
+    /// The element `node` itself, without its children.
+    pub(super) fn new(node: roxmltree::Node<'_, '_>, file: Option<Arc<Path>>, line: u32) -> Self {
+        let attribute = |a: roxmltree::Attribute<'_, '_>| Attribute {
+            name: a.name().to_owned(),
+            value: a.value().to_owned(),
+            used: Cell::new(Use::None),
+        };
+        Self {
+            tag: node.tag_name().name().to_owned(),
+            attributes: node.attributes().map(attribute).collect(),
+            children: Vec::new(),
+            file,
+            line,
+            used: Cell::new(Use::None),
+        }
+    }
+
+    /// Where it is.
+    pub(super) fn place(&self) -> Place {
+        let name = self.attributes.iter().find(|a| a.name == "name");
+        Place {
+            file: self.file.as_deref().map(Path::to_path_buf),
+            line: self.line,
+            element: self.tag.clone(),
+            name: name.map(|a| a.value.clone()).unwrap_or_default(),
+        }
+    }
+
+    /// Marks it as read.
+    pub(super) fn take(&self) {
+        self.used.set(Use::Read);
+    }
+
+    /// Marks it as left out.
+    pub(super) fn refuse(&self, reason: &'static str) {
+        self.used.set(Use::Refused(reason));
+    }
+
+    /// Marks an attribute as left out, at least in part.
+    pub(super) fn refuse_attribute(&self, name: &str, reason: &'static str) {
+        let named = self.attributes.iter().filter(|a| a.name == name);
+        named.for_each(|a| a.used.set(Use::Refused(reason)));
+    }
+
+    pub(super) fn used(&self) -> Use {
+        self.used.get()
+    }
+
+    /// Names of the attributes and what has become of them.
+    pub(super) fn attributes(&self) -> impl Iterator<Item = (&str, Use)> {
+        self.attributes.iter().map(|a| (a.name.as_str(), a.used.get()))
+    }
+
+    /// Whether it has the attribute, which does not count as reading it.
+    pub(super) fn has(&self, name: &str) -> bool {
+        self.attributes.iter().any(|a| a.name == name)
+    }
+
+    /// The text of an attribute.
+    pub(super) fn text(&self, name: &str) -> Option<&str> {
+        let attribute = self.attributes.iter().find(|a| a.name == name)?;
+        attribute.used.set(Use::Read);
+        Some(attribute.value.as_str())
+    }
+
+    /// The `name` attribute, empty without one.
+    pub(super) fn name(&self) -> String {
+        self.text("name").unwrap_or_default().to_owned()
+    }
+
+    /// The children of all children called `section`, which are marked as read; what is in them is not.
+    pub(super) fn in_sections<'a>(&'a self, section: &'a str) -> impl Iterator<Item = &'a Element> {
+        self.sections(section).flat_map(|s| &s.children)
+    }
+
+    /// The children called `section`, which are marked as read.
+    pub(super) fn sections<'a>(&'a self, section: &'a str) -> impl Iterator<Item = &'a Element> {
+        self.children.iter().filter(move |c| c.tag == section).inspect(|c| c.take())
+    }
+
+    /// [`MjcfError::Value`] of an attribute.
+    pub(super) fn invalid(&self, field: &'static str, reason: impl Into<String>) -> MjcfError {
+        MjcfError::Value { place: Box::new(self.place()), field, reason: reason.into() }
+    }
+
+    /// [`MjcfError::Missing`] of an attribute.
+    pub(super) fn missing(&self, field: &'static str) -> MjcfError {
+        MjcfError::Missing { place: Box::new(self.place()), field }
+    }
+
+    /// [`MjcfError::Unknown`] of an attribute.
+    pub(super) fn unknown(&self, field: &'static str, name: impl Into<String>) -> MjcfError {
+        MjcfError::Unknown { place: Box::new(self.place()), field, name: name.into() }
+    }
+
+    /// [`MjcfError::Duplicate`] of the element.
+    pub(super) fn duplicate(&self, kind: &'static str) -> MjcfError {
+        MjcfError::Duplicate { place: Box::new(self.place()), kind }
+    }
+
+    /// [`MjcfError::Structure`] of the element.
+    pub(super) fn misplaced(&self, reason: impl Into<String>) -> MjcfError {
+        MjcfError::Structure { place: Box::new(self.place()), reason: reason.into() }
+    }
+
+    /// [`MjcfError::File`] of a file that the element names.
+    pub(super) fn unusable(&self, file: &str, reason: impl Into<String>) -> MjcfError {
+        let file = file.to_owned();
+        MjcfError::File { place: Box::new(self.place()), file, reason: reason.into() }
+    }
+}

@@ -1,0 +1,183 @@
+//! Constraints that hold bodies or joints together.
+
+use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
+
+use super::class::{Classes, MAIN};
+use super::element::Element;
+use super::error::MjcfError;
+use super::names::Names;
+use super::orientation::quaternion_wxyz;
+use super::solver::SolverParameters;
+use super::{JointIndex, Model};
+
+/// A constraint between two bodies or joints.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Equality {
+    /// Its name, empty where it has none.
+    pub name: String,
+    /// What it holds together.
+    pub kind: EqualityKind,
+    /// Whether it acts from the beginning.
+    pub active: bool,
+    /// How softly it holds.
+    pub solver: SolverParameters,
+}
+
+/// What a constraint holds together. Of bodies, `None` is the world.
+#[derive(Clone, Debug, PartialEq)]
+pub enum EqualityKind {
+    /// A point of one body is at a point of the other.
+    Connect {
+        /// The bodies.
+        bodies: [Option<usize>; 2],
+        /// The point, in the frame of each body \[m\].
+        anchors: [Point3<f64>; 2],
+    },
+    /// One body keeps its pose in the other.
+    Weld {
+        /// The bodies.
+        bodies: [Option<usize>; 2],
+        /// A point that stays together, in the frame of each body \[m\].
+        anchors: [Point3<f64>; 2],
+        /// Axes of the second body → axes of the first.
+        rotation: UnitQuaternion<f64>,
+        /// Length by which the error of the rotation is multiplied \[m/rad\].
+        torque_scale: f64,
+    },
+    /// The first joint follows the second, or stays where it is.
+    Joint {
+        /// The first joint, and the second where there is one: hinges or slides.
+        joints: (JointIndex, Option<JointIndex>),
+        /// Coefficients c of q₁ − r₁ = c₀ + c₁x + … + c₄x⁴ with x = q₂ − r₂, both from their references r \[rad or m\]; x is
+        /// zero without a second joint.
+        polynomial: [f64; 5],
+    },
+}
+
+/// What is known of a constraint before it is complete.
+#[derive(Clone)]
+pub(super) struct Spec {
+    active: bool,
+    solver: SolverParameters,
+}
+
+impl Default for Spec {
+    fn default() -> Self {
+        Self { active: true, solver: SolverParameters::default() }
+    }
+}
+
+impl Spec {
+    pub(super) fn read(&mut self, e: &Element) -> Result<(), MjcfError> {
+        self.active = e.switch("active")?.unwrap_or(self.active);
+        self.solver.read(e, ["solref", "solimp"])
+    }
+}
+
+/// The constraints of `root`.
+pub(super) fn read(
+    root: &Element,
+    classes: &Classes,
+    model: &Model,
+    names: &Names,
+) -> Result<Vec<Equality>, MjcfError> {
+    let reader = Reader { names, model, t_world_bodies: model.reference_poses() };
+    let mut all = Vec::new();
+    for e in root.in_sections("equality") {
+        e.take();
+        let mut spec = classes.of(e, MAIN)?.equality.clone();
+        let kind = match e.tag.as_str() {
+            "connect" => reader.connect(e)?,
+            "weld" => reader.weld(e)?,
+            "joint" => reader.joint(e)?,
+            _ => {
+                e.refuse("left out: only connect, weld and joint are read");
+                continue;
+            }
+        };
+        spec.read(e)?;
+        all.push(Equality { name: e.name(), kind, active: spec.active, solver: spec.solver });
+    }
+    Ok(all)
+}
+
+type Sites = ([Option<usize>; 2], [Isometry3<f64>; 2]);
+
+struct Reader<'a> {
+    names: &'a Names,
+    model: &'a Model,
+    t_world_bodies: Vec<Isometry3<f64>>,
+}
+
+impl Reader<'_> {
+    fn bodies(&self, e: &Element) -> Result<[Option<usize>; 2], MjcfError> {
+        let first = self.names.body(e, "body1")?;
+        let second = if e.has("body2") { self.names.body(e, "body2")? } else { None };
+        Ok([first, second])
+    }
+
+    /// Pose of the second body in the first, with all joints at their references.
+    fn t_first_second(&self, bodies: [Option<usize>; 2]) -> Isometry3<f64> {
+        let [first, second] =
+            bodies.map(|b| b.map_or(Isometry3::identity(), |b| self.t_world_bodies[b]));
+        first.inv_mul(&second)
+    }
+
+    /// The bodies of the two sites, and their poses there.
+    fn sites(&self, e: &Element) -> Result<Sites, MjcfError> {
+        if let Some(field) = ["body1", "body2", "anchor", "relpose"].iter().find(|f| e.has(f)) {
+            return Err(e.invalid(field, "is given beside site1 and site2"));
+        }
+        let (first, second) = (self.names.site(e, "site1")?, self.names.site(e, "site2")?);
+        Ok(([first.0, second.0], [first.1, second.1]))
+    }
+
+    fn connect(&self, e: &Element) -> Result<EqualityKind, MjcfError> {
+        if e.has("site1") || e.has("site2") {
+            let (bodies, poses) = self.sites(e)?;
+            let anchors = poses.map(|t| t.translation.vector.into());
+            return Ok(EqualityKind::Connect { bodies, anchors });
+        }
+        let bodies = self.bodies(e)?;
+        let anchor = e.numbers::<3>("anchor")?.ok_or_else(|| e.missing("anchor"))?;
+        let first = Point3::from(anchor);
+        let anchors = [first, self.t_first_second(bodies).inverse_transform_point(&first)];
+        Ok(EqualityKind::Connect { bodies, anchors })
+    }
+
+    fn weld(&self, e: &Element) -> Result<EqualityKind, MjcfError> {
+        let torque_scale = e.number("torquescale")?.unwrap_or(1.0);
+        if e.has("site1") || e.has("site2") {
+            let (bodies, poses) = self.sites(e)?;
+            let anchors = poses.map(|t| t.translation.vector.into());
+            let rotation = poses[0].rotation * poses[1].rotation.inverse();
+            return Ok(EqualityKind::Weld { bodies, anchors, rotation, torque_scale });
+        }
+        let bodies = self.bodies(e)?;
+        let second = Point3::from(e.numbers::<3>("anchor")?.unwrap_or_default());
+        let written = e.numbers::<7>("relpose")?;
+        let pose = written.and_then(|[x, y, z, q0, q1, q2, q3]| {
+            Some((Vector3::new(x, y, z), quaternion_wxyz([q0, q1, q2, q3])?))
+        });
+        // A quaternion of zeros asks for the pose as it is. A pose that is written is that of the first body's anchor.
+        let (first, rotation) = match pose {
+            Some((first, rotation)) => (first.into(), rotation),
+            None => {
+                let t = self.t_first_second(bodies);
+                (t * second, t.rotation)
+            }
+        };
+        Ok(EqualityKind::Weld { bodies, anchors: [first, second], rotation, torque_scale })
+    }
+
+    fn joint(&self, e: &Element) -> Result<EqualityKind, MjcfError> {
+        let first = self.names.single_joint(e, "joint1", self.model)?;
+        let second = match e.has("joint2") {
+            true => Some(self.names.single_joint(e, "joint2", self.model)?),
+            false => None,
+        };
+        let mut polynomial = [0.0, 1.0, 0.0, 0.0, 0.0];
+        e.leading("polycoef", &mut polynomial)?;
+        Ok(EqualityKind::Joint { joints: (first, second), polynomial })
+    }
+}

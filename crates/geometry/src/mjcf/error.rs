@@ -1,0 +1,112 @@
+//! What can be wrong with an MJCF model, and where.
+
+use std::fmt;
+use std::path::PathBuf;
+
+/// An element of a model's files.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Place {
+    /// The file; none where the model was given as text.
+    pub file: Option<PathBuf>,
+    /// The line of its start tag, from 1.
+    pub line: u32,
+    /// The tag.
+    pub element: String,
+    /// Its `name` attribute, empty where it has none.
+    pub name: String,
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.file {
+            Some(file) => write!(f, "{}:{}: {}", file.display(), self.line, self.element)?,
+            None => write!(f, "line {}: {}", self.line, self.element)?,
+        }
+        if self.name.is_empty() { Ok(()) } else { write!(f, " '{}'", self.name) }
+    }
+}
+
+/// Why a model could not be read.
+#[derive(Debug, thiserror::Error)]
+pub enum MjcfError {
+    /// A file of the model cannot be read.
+    #[error("cannot read MJCF file {path}: {source}")]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// The error of the operating system.
+        source: std::io::Error,
+    },
+    /// A file is not well-formed XML, or its outermost element is not `mujoco`.
+    #[error("{}invalid MJCF: {message}", .file.as_ref().map(|f| format!("{}: ", f.display())).unwrap_or_default())]
+    Xml {
+        /// The file; none where the model was given as text.
+        file: Option<PathBuf>,
+        /// What is wrong, with line and column where the parser tells them.
+        message: String,
+    },
+    /// A model too large or nested too deeply.
+    #[error("the model is too large: {count} {what}, at most {limit} are read")]
+    TooLarge {
+        /// Bytes, elements, or levels of tags.
+        what: &'static str,
+        /// How many.
+        count: usize,
+        /// How many are read.
+        limit: usize,
+    },
+    /// A file that the model names cannot be used.
+    #[error("{place}: file '{file}': {reason}")]
+    File {
+        /// The element that names it.
+        place: Box<Place>,
+        /// The file as the model names it.
+        file: String,
+        /// Why not.
+        reason: String,
+    },
+    /// An attribute whose value does not fit.
+    #[error("{place}: {field} {reason}")]
+    Value {
+        /// The element.
+        place: Box<Place>,
+        /// The attribute.
+        field: &'static str,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// An attribute that must be there and is not.
+    #[error("{place}: {field} is missing")]
+    Missing {
+        /// The element.
+        place: Box<Place>,
+        /// The attribute.
+        field: &'static str,
+    },
+    /// A reference to something that does not exist.
+    #[error("{place}: {field} names '{name}', which does not exist")]
+    Unknown {
+        /// The element.
+        place: Box<Place>,
+        /// The attribute.
+        field: &'static str,
+        /// The name that nothing has.
+        name: String,
+    },
+    /// Two things of one kind that share a name.
+    #[error("{place}: another {kind} has this name")]
+    Duplicate {
+        /// The later one.
+        place: Box<Place>,
+        /// Body, joint, mesh or the like.
+        kind: &'static str,
+    },
+    /// An element that must not be where it is.
+    #[error("{place}: {reason}")]
+    Structure {
+        /// The element.
+        place: Box<Place>,
+        /// What is wrong with it.
+        reason: String,
+    },
+}

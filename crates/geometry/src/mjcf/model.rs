@@ -1,0 +1,190 @@
+//! A whole model, and how it is read.
+
+use std::path::Path;
+
+use nalgebra::{Isometry3, Vector3};
+
+use super::actuator::{self, Actuator};
+use super::body::{self, Body};
+use super::class::Classes;
+use super::compiler::Compiler;
+use super::contact;
+use super::element::Element;
+use super::equality::{self, Equality};
+use super::error::MjcfError;
+use super::geom::{Assets, Geom};
+use super::joint::{Joint, JointKind};
+use super::keyframe::{self, Keyframe};
+use super::mesh::Meshes;
+use super::names::Names;
+use super::site::Site;
+use super::tendon::{self, Tendon};
+use super::warning::{self, Warning};
+use super::{material, source};
+
+/// A joint of a model.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct JointIndex {
+    /// Index of the body that it moves.
+    pub body: usize,
+    /// Index among that body's joints.
+    pub joint: usize,
+}
+
+/// A model in SI units and radians.
+#[derive(Clone, Debug)]
+pub struct Model {
+    /// Its name.
+    pub name: String,
+    /// Acceleration of free fall \[m/s²\].
+    pub gravity: Vector3<f64>,
+    /// The time step that its author meant \[s\].
+    pub time_step: f64,
+    /// The bodies, each after the one that carries it, depth first: MuJoCo's order without the world.
+    pub bodies: Vec<Body>,
+    /// Shapes fixed to the world.
+    pub world_geoms: Vec<Geom>,
+    /// Marked places of the world.
+    pub world_sites: Vec<Site>,
+    /// What drives it.
+    pub actuators: Vec<Actuator>,
+    /// Its tendons.
+    pub tendons: Vec<Tendon>,
+    /// Constraints between its bodies and joints.
+    pub equalities: Vec<Equality>,
+    /// Pairs of bodies that do not collide, beside those that a joint connects; `None` is the world.
+    pub exclusions: Vec<[Option<usize>; 2]>,
+    /// States that it comes with.
+    pub keyframes: Vec<Keyframe>,
+    /// What has not been read.
+    pub warnings: Vec<Warning>,
+}
+
+impl Model {
+    /// Reads an MJCF file. Meshes and included files are looked for in its folder or below, and nowhere else.
+    ///
+    /// # Errors
+    /// [`MjcfError`], naming file, element and attribute.
+    pub fn from_file(path: impl AsRef<Path>) -> Result<Self, MjcfError> {
+        let path = path.as_ref();
+        let folder = match path.parent() {
+            Some(p) if !p.as_os_str().is_empty() => p,
+            _ => Path::new("."),
+        };
+        Self::from_tree(
+            &source::parse(&source::read(path)?, Some(path), Some(folder))?,
+            Some(folder),
+        )
+    }
+
+    /// Reads MJCF text. Meshes and included files are looked for in `asset_dir` and never outside of it.
+    ///
+    /// # Errors
+    /// [`MjcfError`], naming element and attribute.
+    pub fn from_str(xml: &str, asset_dir: Option<&Path>) -> Result<Self, MjcfError> {
+        Self::from_tree(&source::parse(xml, None, asset_dir)?, asset_dir)
+    }
+
+    fn from_tree(root: &Element, folder: Option<&Path>) -> Result<Self, MjcfError> {
+        let compiler = Compiler::read(root)?;
+        let classes = Classes::read(root, &compiler)?;
+        let assets = Assets {
+            meshes: Meshes::new(root, &classes, folder)?,
+            materials: material::read(root, &classes)?,
+        };
+        let tree = body::read(root, &compiler, &classes, &assets)?;
+        let mut model = Self {
+            name: root.text("model").unwrap_or("MuJoCo Model").to_owned(),
+            gravity: Vector3::new(0.0, 0.0, -9.81),
+            time_step: 0.002,
+            bodies: tree.bodies,
+            world_geoms: tree.geoms,
+            world_sites: tree.sites,
+            actuators: Vec::new(),
+            tendons: Vec::new(),
+            equalities: Vec::new(),
+            exclusions: Vec::new(),
+            keyframes: Vec::new(),
+            warnings: Vec::new(),
+        };
+        for e in root.sections("option") {
+            model.gravity = e.numbers("gravity")?.map_or(model.gravity, Vector3::from);
+            model.time_step = e.number("timestep")?.unwrap_or(model.time_step);
+        }
+        model.scale_masses(&compiler);
+        let names = Names::new(&model);
+        model.exclusions = contact::exclusions(root, &names)?;
+        model.equalities = equality::read(root, &classes, &model, &names)?;
+        model.tendons = tendon::read(root, &compiler, &classes, &model, &names)?;
+        let (actuators, written) = actuator::read(root, &compiler, &classes, &model, &names)?;
+        model.actuators = actuators;
+        model.keyframes = keyframe::read(root, &model, &written)?;
+        model.warnings = warning::warnings(root);
+        Ok(model)
+    }
+
+    fn scale_masses(&mut self, compiler: &Compiler) {
+        let inertials = || self.bodies.iter().filter_map(|b| b.inertial);
+        let sum: f64 = inertials().map(|i| i.mass).sum();
+        let Some(total) = compiler.total_mass.filter(|_| sum > 0.0) else { return };
+        for inertial in self.bodies.iter_mut().filter_map(|b| b.inertial.as_mut()) {
+            inertial.mass *= total / sum;
+            inertial.inertia *= total / sum;
+        }
+    }
+
+    /// Index of the body of that name; `None` for the world as for a name that no body has.
+    pub fn body_index(&self, name: &str) -> Option<usize> {
+        self.bodies.iter().position(|b| b.name == name)
+    }
+
+    /// Index of the joint of that name.
+    pub fn joint_index(&self, name: &str) -> Option<JointIndex> {
+        self.joint_indices().find(|&index| self.joint(index).name == name)
+    }
+
+    /// Indices of all joints in the order of [`Keyframe::positions`].
+    pub fn joint_indices(&self) -> impl Iterator<Item = JointIndex> {
+        let of = |(body, b): (usize, &Body)| {
+            (0..b.joints.len()).map(move |joint| JointIndex { body, joint })
+        };
+        self.bodies.iter().enumerate().flat_map(of)
+    }
+
+    /// The joint of that index.
+    ///
+    /// # Panics
+    /// If there is none.
+    pub fn joint(&self, index: JointIndex) -> &Joint {
+        &self.bodies[index.body].joints[index.joint]
+    }
+
+    /// Body frames → world, with all joints at their references.
+    pub fn reference_poses(&self) -> Vec<Isometry3<f64>> {
+        let mut poses: Vec<Isometry3<f64>> = Vec::with_capacity(self.bodies.len());
+        for body in &self.bodies {
+            let t_world_parent = body.parent.map_or(Isometry3::identity(), |p| poses[p]);
+            poses.push(t_world_parent * body.t_parent_body);
+        }
+        poses
+    }
+
+    /// Positions of all joints at their references, laid out as in [`Keyframe::positions`].
+    pub fn reference_positions(&self) -> Vec<f64> {
+        let mut positions = Vec::new();
+        for body in &self.bodies {
+            for joint in &body.joints {
+                let q = body.t_parent_body.rotation;
+                match joint.kind {
+                    JointKind::Hinge | JointKind::Slide => positions.push(joint.reference),
+                    JointKind::Ball => positions.extend([1.0, 0.0, 0.0, 0.0]),
+                    JointKind::Free => {
+                        positions.extend(body.t_parent_body.translation.vector.iter());
+                        positions.extend([q.w, q.i, q.j, q.k]);
+                    }
+                }
+            }
+        }
+        positions
+    }
+}

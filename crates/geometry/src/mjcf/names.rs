@@ -1,0 +1,92 @@
+//! What the names in a model refer to.
+
+use std::collections::BTreeMap;
+
+use nalgebra::Isometry3;
+
+use super::element::Element;
+use super::error::MjcfError;
+use super::joint::JointKind;
+use super::{JointIndex, Model};
+
+/// Bodies, joints and sites by name.
+pub(super) struct Names {
+    /// `None` is the world.
+    bodies: BTreeMap<String, Option<usize>>,
+    joints: BTreeMap<String, JointIndex>,
+    /// The body that each is on, and its pose there.
+    sites: BTreeMap<String, (Option<usize>, Isometry3<f64>)>,
+}
+
+impl Names {
+    pub(super) fn new(model: &Model) -> Self {
+        let mut names = Self {
+            bodies: BTreeMap::from([("world".to_owned(), None)]),
+            joints: BTreeMap::new(),
+            sites: BTreeMap::new(),
+        };
+        for site in &model.world_sites {
+            names.sites.insert(site.name.clone(), (None, site.t_body_site));
+        }
+        for (b, body) in model.bodies.iter().enumerate() {
+            names.bodies.insert(body.name.clone(), Some(b));
+            for (j, joint) in body.joints.iter().enumerate() {
+                names.joints.insert(joint.name.clone(), JointIndex { body: b, joint: j });
+            }
+            for site in &body.sites {
+                names.sites.insert(site.name.clone(), (Some(b), site.t_body_site));
+            }
+        }
+        // What has no name cannot be named.
+        names.bodies.remove("");
+        names.joints.remove("");
+        names.sites.remove("");
+        names
+    }
+
+    /// The body that the attribute `field` of `e` names; `None` is the world.
+    pub(super) fn body(
+        &self,
+        e: &Element,
+        field: &'static str,
+    ) -> Result<Option<usize>, MjcfError> {
+        find(&self.bodies, e, field)
+    }
+
+    /// The joint that the attribute `field` of `e` names.
+    pub(super) fn joint(&self, e: &Element, field: &'static str) -> Result<JointIndex, MjcfError> {
+        find(&self.joints, e, field)
+    }
+
+    /// The hinge or slide that the attribute `field` of `e` names.
+    pub(super) fn single_joint(
+        &self,
+        e: &Element,
+        field: &'static str,
+        model: &Model,
+    ) -> Result<JointIndex, MjcfError> {
+        let joint = self.joint(e, field)?;
+        match model.joint(joint).kind {
+            JointKind::Hinge | JointKind::Slide => Ok(joint),
+            _ => Err(e.invalid(field, "names neither a hinge nor a slide")),
+        }
+    }
+
+    /// The site that the attribute `field` of `e` names: its body (`None` is the world) and its pose there.
+    pub(super) fn site(
+        &self,
+        e: &Element,
+        field: &'static str,
+    ) -> Result<(Option<usize>, Isometry3<f64>), MjcfError> {
+        find(&self.sites, e, field)
+    }
+}
+
+fn find<T: Copy>(
+    all: &BTreeMap<String, T>,
+    e: &Element,
+    field: &'static str,
+) -> Result<T, MjcfError> {
+    let name = e.text(field).ok_or_else(|| e.missing(field))?;
+    all.get(name).copied().ok_or_else(|| e.unknown(field, name))
+}

@@ -1,0 +1,112 @@
+//! What a URDF says of masses, damping and the strength of joints.
+
+use nalgebra::{Matrix3, Point3};
+
+use super::RobotError;
+use super::origin::{finite, isometry};
+use crate::inertial::Inertial;
+
+/// Mass and inertia of `link` in its frame; `None` without an `inertial` tag, and where it is at the origin and all zeros, which
+/// reads the same.
+pub(super) fn inertial(link: &urdf_rs::Link) -> Result<Option<Inertial>, RobotError> {
+    let owner = || format!("link '{}'", link.name);
+    let urdf_rs::Inertial { origin, mass, inertia } = &link.inertial;
+    let urdf_rs::Inertia { ixx, ixy, ixz, iyy, iyz, izz } = *inertia;
+    let moments = [ixx, ixy, ixz, iyy, iyz, izz];
+    finite(&owner, "inertial mass", &[mass.value])?;
+    finite(&owner, "inertia", &moments)?;
+    if mass.value < 0.0 {
+        let (field, requirement) = ("inertial mass", "must not be negative");
+        return Err(RobotError::Number { owner: owner(), field, requirement });
+    }
+    let t_link_inertial = isometry(&owner, origin)?;
+    if mass.value == 0.0 && moments == [0.0; 6] && origin.xyz.0 == [0.0; 3] {
+        return Ok(None);
+    }
+    let inertia = Matrix3::new(ixx, ixy, ixz, ixy, iyy, iyz, ixz, iyz, izz);
+    let inertial = Inertial { mass: mass.value, com: Point3::origin(), inertia };
+    Ok(Some(inertial.moved(&t_link_inertial)))
+}
+
+/// Damping and dry friction of `joint`; `None` without a `dynamics` tag.
+pub(super) fn damping_and_friction(
+    joint: &urdf_rs::Joint,
+) -> Result<Option<(f64, f64)>, RobotError> {
+    let Some(dynamics) = &joint.dynamics else { return Ok(None) };
+    let owner = || format!("joint '{}'", joint.name);
+    finite(&owner, "damping", &[dynamics.damping])?;
+    finite(&owner, "friction", &[dynamics.friction])?;
+    Ok(Some((dynamics.damping, dynamics.friction)))
+}
+
+/// A limit of speed or effort. Zero is what stands where the tag or the attribute is missing, and a joint of no strength or
+/// speed is none; since URDF 1.2 it is infinity.
+pub(super) fn limit(
+    joint: &urdf_rs::Joint,
+    field: &'static str,
+    value: f64,
+) -> Result<Option<f64>, RobotError> {
+    if value.is_nan() {
+        let owner = format!("joint '{}'", joint.name);
+        return Err(RobotError::Number { owner, field, requirement: "must be a number" });
+    }
+    Ok((value > 0.0 && value.is_finite()).then_some(value))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::KinematicTree;
+    use super::*;
+    use nalgebra::Vector3;
+
+    fn read(link: &str, joint: &str) -> Result<KinematicTree, String> {
+        let xml = format!(
+            "<robot name=\"r\"><link name=\"a\">{link}</link><link name=\"b\"/><joint name=\"j\" type=\"revolute\">\
+            <parent link=\"a\"/><child link=\"b\"/>{joint}</joint></robot>"
+        );
+        KinematicTree::from_urdf_str(&xml, None).map_err(|e| e.to_string())
+    }
+
+    const INERTIA: &str =
+        "<inertia ixx=\"0.1\" ixy=\"0\" ixz=\"0\" iyy=\"0.2\" iyz=\"0\" izz=\"0.25\"/>";
+
+    #[test]
+    fn inertia_is_turned_into_the_axes_of_the_link() {
+        let quarter = std::f64::consts::FRAC_PI_2;
+        let tag = format!(
+            "<inertial><origin xyz=\"0.1 0.2 0.3\" rpy=\"0 0 {quarter}\"/><mass value=\"2\"/>{INERTIA}</inertial>"
+        );
+        let robot = read(&tag, "").unwrap();
+        let inertial = robot.links()[0].inertial.unwrap();
+        let expected = Matrix3::from_diagonal(&Vector3::new(0.2, 0.1, 0.25));
+        assert!((inertial.inertia - expected).norm() < 1e-15);
+        assert_eq!((inertial.mass, inertial.com), (2.0, Point3::new(0.1, 0.2, 0.3)));
+        assert_eq!(robot.links()[1].inertial, None);
+    }
+
+    #[test]
+    fn what_a_joint_says_of_its_motion_is_kept() {
+        let of = |tags: &str| {
+            let robot = read("", tags).unwrap();
+            let j = &robot.joints()[0];
+            [j.damping, j.friction, j.velocity_limit, j.effort_limit]
+        };
+        let limit = "<limit lower=\"-1\" upper=\"1\" effort=\"30\" velocity=\"2\"/>";
+        assert_eq!(of(""), [None; 4]);
+        assert_eq!(of(limit), [None, None, Some(2.0), Some(30.0)]);
+        assert_eq!(of("<dynamics friction=\"0.1\"/>"), [Some(0.0), Some(0.1), None, None]);
+        assert_eq!(
+            of("<limit lower=\"-1\" upper=\"1\" velocity=\"2\"/>"),
+            [None, None, Some(2.0), None]
+        );
+    }
+
+    #[test]
+    fn what_is_no_mass_is_named() {
+        let tag = |mass: &str| format!("<inertial><mass value=\"{mass}\"/>{INERTIA}</inertial>");
+        assert!(read(&tag("-1"), "").unwrap_err().contains("link 'a': inertial mass"));
+        assert!(read(&tag("NaN"), "").unwrap_err().contains("must be finite"));
+        let bad = read("", "<dynamics damping=\"inf\"/>").unwrap_err();
+        assert!(bad.contains("joint 'j': damping"), "{bad}");
+    }
+}
