@@ -2,10 +2,15 @@
 //! `benches/peers/sim/articulated_pinocchio.cpp` times Pinocchio on the same trees.
 
 use std::hint::black_box;
+use std::sync::Arc;
 use std::time::Instant;
 
 use nalgebra::{DVector, Isometry3, Matrix3, Point3, Vector3};
 use prehend_sim::articulated::{Articulation, Joint, Link};
+use prehend_sim::{
+    Body, ContactBodies, Coulomb, DynContactLaw, GapSmoothing, HalfSpace, KelvinVoigt, Law,
+    SemiImplicitEuler, State, Step, Surface, World,
+};
 
 /// Evaluations in a row, and how often; the fastest counts.
 const EVALUATIONS: u32 = 2000;
@@ -39,6 +44,36 @@ fn tree(joints: usize, floats: bool) -> anyhow::Result<Articulation> {
     Ok(Articulation::new(links, Vector3::new(0.0, 0.0, -9.81))?)
 }
 
+/// The tree over a floor that its last link, or the last of each chain of six, touches with a ball.
+fn touching(tree: Articulation, q: &[f64], v: &[f64]) -> anyhow::Result<(World, Vec<State>)> {
+    let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
+    let ends: Vec<usize> = (0..tree.links().len())
+        .filter(|link| tree.links().iter().all(|other| other.parent != Some(*link)))
+        .collect();
+    let ranges: Vec<_> = (0..tree.links().len()).map(|link| tree.range(link)).collect();
+    let bodies = world.add_articulation(tree);
+    let mut states = world.neutral_states();
+    for (body, [coordinates, freedoms]) in bodies.iter().zip(ranges) {
+        world.set_joint(&mut states, *body, &q[coordinates], &v[freedoms])?;
+    }
+    let spring = KelvinVoigt { stiffness: 1e7, damping: 1e5 };
+    let law = Law::new(spring, Coulomb { friction: 0.5, slip_scale: 1e-2 })?;
+    let law: Arc<dyn DynContactLaw> = Arc::new(law);
+    for end in ends {
+        world.bodies[bodies[end]].surface = Some(Arc::new(Surface::ball(0.03)?));
+        let height = states[bodies[end]].pose.translation.z - 0.029;
+        let field = HalfSpace { height, ..HalfSpace::floor() };
+        let floor = world.add(Body::kinematic("floor").with_field(Arc::new(field)));
+        let bodies = ContactBodies { samples: bodies[end], field: floor };
+        world.add_contact(bodies, law.clone(), GapSmoothing::Softplus { width: 1e-4 })?;
+    }
+    // Floors were added since.
+    let joints = states.split_off(world.articulations[0].bodies().len());
+    states.resize(world.bodies.len(), State::at_rest(Isometry3::identity()));
+    states.extend(joints);
+    Ok((world, states))
+}
+
 fn time(name: &str, mut evaluate: impl FnMut()) {
     let mut best = f64::INFINITY;
     for _ in 0..ROUNDS {
@@ -46,7 +81,7 @@ fn time(name: &str, mut evaluate: impl FnMut()) {
         (0..EVALUATIONS).for_each(|_| evaluate());
         best = best.min(start.elapsed().as_secs_f64() / f64::from(EVALUATIONS));
     }
-    println!("{name:40} {:8.2} µs", best * 1e6);
+    println!("{name:55} {:8.2} µs", best * 1e6);
 }
 
 fn main() -> anyhow::Result<()> {
@@ -71,6 +106,14 @@ fn main() -> anyhow::Result<()> {
             let at = tree.kinematics(black_box(&q), &v);
             let accelerations: DVector<f64> = at.forward_dynamics(&tau);
             black_box(at.forward_dynamics_derivatives(&accelerations));
+        });
+        let (world, states) = touching(tree.clone(), &q, &v)?;
+        let step = Step::new(0, 1e-4);
+        time(&of("step with contacts"), || {
+            black_box(world.step(&SemiImplicitEuler, black_box(&states), step).is_ok());
+        });
+        time(&of("step with contacts and its Jacobian"), || {
+            black_box(world.linear_step(black_box(&states), step).is_ok());
         });
     }
     Ok(())

@@ -42,13 +42,16 @@ impl World {
     pub fn linear_step(&self, states: &[State], step: Step) -> Result<LinearStep, SimulationError> {
         let mut states = self.with_deflections(states);
         self.check(&states, step)?;
-        self.place_links(&mut states);
+        if !self.contact_groups.is_empty() {
+            self.place_links(&mut states);
+        }
         let near = self.with_neighbors(&states, step);
         if near.sticking().next().is_some() || near.joints().any(|j| matches!(j, Joint::Custom(_)))
         {
+            let near = near.into_owned();
             return near.linear_step_by_forward_mode(&states, step);
         }
-        let forces = Generalized::new(&near, &states, step.index);
+        let forces = Generalized::new(&near, &mut states, step.index);
         let next = near.finished(&states, &forces, step)?;
         let n = forces.count;
         let [mut by_state, mut by_force] = [2 * n, n].map(|columns| DMatrix::zeros(2 * n, columns));

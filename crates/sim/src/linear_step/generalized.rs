@@ -28,8 +28,13 @@ pub(super) struct Generalized {
 }
 
 impl Generalized {
-    pub(super) fn new(world: &World, states: &[State], step: usize) -> Self {
+    /// At `states`, whose links are moved to where their joints put them.
+    pub(super) fn new(world: &World, states: &mut [State], step: usize) -> Self {
         let trees = trees(world, states);
+        for Tree { own, at, .. } in &trees {
+            let bodies = own.bodies().iter();
+            bodies.zip(at.link_states()).for_each(|(body, state)| states[*body] = state);
+        }
         let mut all = Self::empty(world, &trees);
         all.add_forces(world, states, &trees, step);
         let efforts = all.add_joint_forces(world, states, &trees);

@@ -13,11 +13,11 @@ use crate::state_coordinates::{STATE, coordinates_of, states_of};
 /// The states of all links, at the origins of their frames, at coordinates `q` with velocities `v`: in reverse mode one node.
 pub(crate) fn link_states<S: Scalar>(tree: &Articulation<S>, q: &[S], v: &[S]) -> Vec<State<S>> {
     if !(S::RECORDED && S::ORDER == 1) {
-        return states(&tree.kinematics(q, v));
+        return tree.kinematics(q, v).link_states().collect();
     }
     let [plain_q, plain_v] = [q, v].map(|all| all.iter().map(|x| x.value()).collect::<Vec<f64>>());
     let plain = tree.map(S::value);
-    let result = states(&plain.kinematics(&plain_q, &plain_v));
+    let result: Vec<State> = plain.kinematics(&plain_q, &plain_v).link_states().collect();
     let inputs = Inputs::new(q.iter().chain(v).copied(), tree);
     let (links, varying) = (inputs.links, inputs.varying.clone());
     let outputs: Vec<f64> = coordinates_of(&result).collect();
@@ -29,12 +29,14 @@ pub(crate) fn link_states<S: Scalar>(tree: &Articulation<S>, q: &[S], v: &[S]) -
     }
 }
 
-fn states<S: Scalar>(at: &Kinematics<'_, S>) -> Vec<State<S>> {
-    let state = |link: usize| {
-        let [linear, angular] = at.velocity(link, &Point3::origin());
-        State { pose: at.pose(link), linear, angular }
-    };
-    (0..at.tree.links().len()).map(state).collect()
+impl<S: Scalar> Kinematics<'_, S> {
+    /// The states of all links, at the origins of their frames.
+    pub(crate) fn link_states(&self) -> impl Iterator<Item = State<S>> {
+        (0..self.tree.links().len()).map(|link| {
+            let [linear, angular] = self.velocity(link, &Point3::origin());
+            State { pose: self.pose(link), linear, angular }
+        })
+    }
 }
 
 struct Node {
