@@ -3,7 +3,7 @@
 //! This package re-exports the five crates of the workspace:
 //!
 //! - [`autodiff`]: one scalar trait over nalgebra's `RealField`, forward and reverse mode, Lie groups;
-//! - [`geometry`]: meshes, closest points, distance grids, robots from URDF, exact volumes;
+//! - [`geometry`]: meshes, closest points, distance grids, robots from URDF and MJCF, exact volumes;
 //! - [`sim`]: rigid bodies under penalty contact, differentiable;
 //! - [`render`]: a rasterizer with closed-form pose derivatives;
 //! - `refine` (feature of that name, a default): refining the 6-DoF pose of an object held in a robot hand.

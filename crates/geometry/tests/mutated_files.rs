@@ -4,6 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use nalgebra::{Point3, Vector3};
+use prehend_geometry::mjcf::{JointKind, Model};
 use prehend_geometry::{KinematicTree, SplitMix64, Texture, TriMesh};
 
 fn tetrahedron() -> TriMesh {
@@ -156,6 +157,46 @@ fn robot_descriptions() {
         Ok(robot) => {
             let joints = robot.clamp_joints(&vec![0.3; robot.joint_names().len()]).unwrap();
             assert_eq!(robot.forward_kinematics(&joints).len(), robot.links().len());
+            accepted += 1;
+        }
+        Err(error) => {
+            assert!(!error.to_string().is_empty());
+            refused += 1;
+        }
+    });
+    assert!(accepted > 50 && refused > 50, "{accepted} {refused}");
+}
+
+#[test]
+fn mjcf() {
+    let folder = tempfile::tempdir().unwrap();
+    tetrahedron().save_obj(&folder.path().join("m.obj")).unwrap();
+    let text = r#"<mujoco model="m"><compiler angle="radian" eulerseq="xYz"/><default><joint damping="1"/><default class="c">
+        <geom type="capsule" size="0.1" fromto="0 0 0 0 0 1"/><position kp="3" dampratio="1"/></default></default>
+        <asset><mesh file="m.obj" scale="1 -1 1"/><mesh name="n" vertex="0 0 0 1 0 0 0 1 0 0 0 1" face="0 2 1 0 1 3 1 2 3 0 3 2"/></asset>
+        <worldbody><body name="a"><freejoint/><geom type="mesh" mesh="m"/><frame euler="0 1 0"><body name="b" childclass="c"><joint name="q"
+        range="-1 1"/><geom/><geom type="box" mesh="n" class="main"/><site name="s" zaxis="0 1 1"/></body></frame></body></worldbody>
+        <contact><exclude body1="a" body2="b"/></contact><tendon><fixed name="t"><joint joint="q" coef="2"/></fixed></tendon>
+        <equality><weld body1="a" body2="b"/><joint joint1="q" polycoef="0 1"/></equality>
+        <actuator><position joint="q" class="c" inheritrange="1"/><general tendon="t" biastype="affine" biasprm="1 2 3"/></actuator>
+        <keyframe><key qpos="0 0 0 1 0 0 0 1" ctrl="1 2"/></keyframe></mujoco>"#;
+    let read = |text: &str| Model::from_str(text, Some(folder.path()));
+    assert_eq!(read(text).unwrap().warnings, []);
+    let (mut accepted, mut refused) = (0, 0);
+    mutations(text.as_bytes(), 3000, |bytes| match read(&String::from_utf8_lossy(&bytes)) {
+        Ok(model) => {
+            let numbers = |count: fn(JointKind) -> usize| -> usize {
+                model.joint_indices().map(|j| count(model.joint(j).kind)).sum()
+            };
+            assert_eq!(model.reference_positions().len(), numbers(JointKind::positions));
+            for frame in &model.keyframes {
+                assert_eq!(frame.velocities.len(), numbers(JointKind::velocities));
+                assert_eq!(frame.controls.len(), model.actuators.len());
+            }
+            for (b, body) in model.bodies.iter().enumerate() {
+                assert!(body.parent.is_none_or(|p| p < b));
+                assert!(body.inertial.is_none_or(|i| i.mass >= 0.0));
+            }
             accepted += 1;
         }
         Err(error) => {

@@ -26,7 +26,10 @@ pub const MAX_URDF_DEPTH: usize = 64;
 pub const MAX_MJCF_BYTES: usize = 1 << 26;
 
 /// Most elements of an MJCF model.
-pub const MAX_MJCF_ELEMENTS: usize = 1 << 20;
+pub const MAX_MJCF_ELEMENTS: usize = 1 << 18;
+
+/// Most default classes of an MJCF model.
+pub const MAX_MJCF_CLASSES: usize = 1 << 12;
 
 /// Deepest nesting of tags in an MJCF model, which is read by recursion: bodies lie in the bodies that carry them.
 pub const MAX_MJCF_DEPTH: usize = 256;

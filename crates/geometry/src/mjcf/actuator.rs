@@ -7,7 +7,7 @@ use super::compiler::Compiler;
 use super::drive::{Drive, DriveKind, Drives};
 use super::element::Element;
 use super::error::MjcfError;
-use super::names::Names;
+use super::names::{Names, Taken};
 use super::reflected::Reflected;
 use super::value::Limited;
 use super::{JointIndex, Model};
@@ -106,15 +106,13 @@ pub(super) fn read(
 ) -> Result<(Vec<Actuator>, Vec<Option<usize>>), MjcfError> {
     // Known when the first damping ratio asks for it.
     let reflected = OnceCell::new();
-    let mut all: Vec<Actuator> = Vec::new();
+    let (mut all, mut taken) = (Vec::new(), Taken::default());
     let mut written = Vec::new();
     for e in root.in_sections("actuator") {
         let built = build(e, compiler, classes, (model, names), &reflected)?;
         written.push(built.is_some().then_some(all.len()));
         let Some(actuator) = built else { continue };
-        if !actuator.name.is_empty() && all.iter().any(|a| a.name == actuator.name) {
-            return Err(e.duplicate("actuator"));
-        }
+        taken.add(e, "actuator")?;
         all.push(actuator);
     }
     Ok((all, written))
@@ -135,11 +133,10 @@ fn build(
     e.take();
     let mut spec = classes.of(e, MAIN)?.actuator.clone();
     let drive = spec.read(e, kind)?;
-    let Some((gain, bias, dynamics)) = drive.resolved() else {
+    let Some((mut gain, mut bias, dynamics)) = drive.resolved() else {
         e.refuse("left out: gains, biases or dynamics of its kind are not read");
         return Ok(None);
     };
-    let (mut gain, mut bias) = (gain, bias);
     let gear = spec.gear[0];
     if drive.has_damping_ratio() {
         let reflected = reflected.get_or_init(|| Reflected::new(model)).as_ref();
@@ -189,8 +186,8 @@ fn transmission(
     model: &Model,
     names: &Names,
 ) -> Result<Option<Transmission>, MjcfError> {
-    if let Some(name) = e.text("tendon") {
-        let found = model.tendons.iter().position(|t| t.name == name);
+    if e.has("tendon") {
+        let found = names.tendon(e, "tendon")?;
         if found.is_none() {
             e.refuse("left out: the tendon that it pulls at is not read");
         }

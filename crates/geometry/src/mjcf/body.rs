@@ -4,11 +4,12 @@ use nalgebra::Isometry3;
 
 use super::class::{Classes, MAIN};
 use super::compiler::{Compiler, InertiaFrom};
-use super::element::Element;
+use super::element::{Element, Use};
 use super::error::MjcfError;
 use super::geom::{Assets, Geom};
 use super::inertial;
 use super::joint::{self, Joint, JointKind};
+use super::names::Taken;
 use super::orientation;
 use super::site::Site;
 use crate::inertial::Inertial;
@@ -60,8 +61,17 @@ pub(super) fn read(
     classes: &Classes,
     assets: &Assets<'_>,
 ) -> Result<Tree, MjcfError> {
-    let mut reader =
-        Reader { compiler, classes, assets, tree: Tree::default(), weights: Vec::new() };
+    let mut reader = Reader {
+        compiler,
+        classes,
+        assets,
+        tree: Tree::default(),
+        weights: Vec::new(),
+        body_names: Taken::default(),
+        joint_names: Taken::default(),
+        geom_names: Taken::default(),
+        site_names: Taken::default(),
+    };
     for e in root.sections("worldbody") {
         let class = classes.index(e, "childclass", MAIN)?;
         reader.content(e, Spot { body: None, t_body_frame: Isometry3::identity(), class })?;
@@ -74,8 +84,12 @@ struct Reader<'a> {
     classes: &'a Classes,
     assets: &'a Assets<'a>,
     tree: Tree,
-    /// What the geoms of each body weigh.
-    weights: Vec<Vec<Inertial>>,
+    /// What the geoms of each body weigh, where its inertia is theirs.
+    weights: Vec<Option<Vec<Inertial>>>,
+    body_names: Taken,
+    joint_names: Taken,
+    geom_names: Taken,
+    site_names: Taken,
 }
 
 impl Reader<'_> {
@@ -93,11 +107,10 @@ impl Reader<'_> {
                 "joint" | "freejoint" => self.joint(child, spot)?,
                 "geom" => self.geom(child, spot)?,
                 "site" => self.site(child, spot)?,
-                // Read with its body.
-                "inertial" if spot.body.is_some() => continue,
+                // Inertials are read with their bodies.
                 _ => continue,
             }
-            if child.used() == super::element::Use::None {
+            if child.used() == Use::None {
                 child.take();
             }
         }
@@ -106,11 +119,12 @@ impl Reader<'_> {
 
     fn body(&mut self, e: &Element, spot: Spot) -> Result<(), MjcfError> {
         let t_parent_body = spot.t_body_frame * orientation::pose(e, self.compiler)?;
+        self.body_names.add(e, "body")?;
         let name = e.name();
-        if name == "world" || (!name.is_empty() && self.tree.bodies.iter().any(|b| b.name == name))
-        {
+        if name == "world" {
             return Err(e.duplicate("body"));
         }
+        let written = inertial::written(e, self.compiler)?;
         let index = self.tree.bodies.len();
         self.tree.bodies.push(Body {
             name,
@@ -122,16 +136,19 @@ impl Reader<'_> {
             sites: Vec::new(),
             gravity_compensation: e.number("gravcomp")?.unwrap_or(0.0),
         });
-        self.weights.push(Vec::new());
+        // Whose inertia is written need not have shapes that could weigh.
+        let infers = match self.compiler.inertia_from {
+            InertiaFrom::Geoms => true,
+            InertiaFrom::Either => written.is_none(),
+            InertiaFrom::Element => false,
+        };
+        self.weights.push(infers.then(Vec::new));
         let class = self.classes.index(e, "childclass", spot.class)?;
         let inside = Spot { body: Some(index), t_body_frame: Isometry3::identity(), class };
         self.content(e, inside)?;
-        let written = inertial::written(e, self.compiler)?;
-        let inferred = || Inertial::joined(&self.weights[index]);
-        let inertial = match self.compiler.inertia_from {
-            InertiaFrom::Geoms => inferred(),
-            InertiaFrom::Either => written.or_else(inferred),
-            InertiaFrom::Element => written,
+        let inertial = match &self.weights[index] {
+            Some(parts) => Inertial::joined(parts),
+            None => written,
         };
         self.tree.bodies[index].inertial = inertial::bounded(inertial, self.compiler);
         Ok(())
@@ -155,10 +172,7 @@ impl Reader<'_> {
         if body.joints.iter().any(|j| j.kind == JointKind::Free) {
             return Err(e.misplaced("a free body has no other joint"));
         }
-        let mut all = self.tree.bodies.iter().flat_map(|b| &b.joints);
-        if !joint.name.is_empty() && all.any(|j| j.name == joint.name) {
-            return Err(e.duplicate("joint"));
-        }
+        self.joint_names.add(e, "joint")?;
         self.tree.bodies[index].joints.push(joint);
         Ok(())
     }
@@ -166,13 +180,15 @@ impl Reader<'_> {
     fn geom(&mut self, e: &Element, spot: Spot) -> Result<(), MjcfError> {
         let mut spec = self.classes.of(e, spot.class)?.geom.clone();
         spec.read(e, self.compiler)?;
-        let built = spec.build(e, self.compiler, self.assets, &spot.t_body_frame)?;
+        let weighs = spot.body.is_some_and(|b| self.weights[b].is_some());
+        let built = spec.build(e, self.compiler, self.assets, &spot.t_body_frame, weighs)?;
         let Some((geom, weight)) = built else { return Ok(()) };
+        self.geom_names.add(e, "geom")?;
         match spot.body {
             None => self.tree.geoms.push(geom),
             Some(index) => {
                 self.tree.bodies[index].geoms.push(geom);
-                self.weights[index].extend(weight);
+                self.weights[index].iter_mut().for_each(|all| all.extend(weight));
             }
         }
         Ok(())
@@ -181,11 +197,127 @@ impl Reader<'_> {
     fn site(&mut self, e: &Element, spot: Spot) -> Result<(), MjcfError> {
         let mut spec = self.classes.of(e, spot.class)?.site.clone();
         spec.read(e, self.compiler)?;
+        self.site_names.add(e, "site")?;
         let site = spec.build(e, &spot.t_body_frame)?;
         match spot.body {
             None => self.tree.sites.push(site),
             Some(index) => self.tree.bodies[index].sites.push(site),
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Model;
+    use nalgebra::{Point3, UnitQuaternion, Vector3};
+
+    fn read(worldbody: &str) -> Result<Model, String> {
+        let xml = format!("<mujoco><worldbody>{worldbody}</worldbody></mujoco>");
+        Model::from_str(&xml, None).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn frames_move_what_is_in_them() {
+        let model = read(
+            "<frame pos=\"1 2 3\" euler=\"0 0 90\"><body name=\"b\" pos=\"1 0 0\"><geom size=\"1\"/>\
+            <frame pos=\"0 0 1\"><frame euler=\"0 90 0\"><site name=\"s\" pos=\"0 0 1\"/>\
+            <joint axis=\"0 0 1\" pos=\"0.5 0 0\"/></frame></frame></body><geom size=\"1\"/></frame>",
+        )
+        .unwrap();
+        let body = &model.bodies[0];
+        let turn = UnitQuaternion::new(Vector3::z() * std::f64::consts::FRAC_PI_2);
+        assert!(
+            (body.t_parent_body.translation.vector - Vector3::new(1.0, 3.0, 3.0)).norm() < 1e-15
+        );
+        assert!(body.t_parent_body.rotation.angle_to(&turn) < 1e-15);
+        let site = body.sites[0].t_body_site * Point3::origin();
+        assert!((site - Point3::new(1.0, 0.0, 1.0)).norm() < 1e-15);
+        let joint = &body.joints[0];
+        assert!((*joint.axis - Vector3::x()).norm() < 1e-15);
+        assert!((joint.anchor - Point3::new(0.0, 0.0, 0.5)).norm() < 1e-15);
+        assert_eq!(
+            model.world_geoms[0].t_body_geom.translation.vector,
+            Vector3::new(1.0, 2.0, 3.0)
+        );
+    }
+
+    #[test]
+    fn bodies_come_depth_first_each_after_its_parent() {
+        let model = read(
+            "<body name=\"a\"><frame><body name=\"b\"/></frame><body name=\"c\"><body name=\"d\"/></body></body>\
+            <body name=\"e\"/>",
+        )
+        .unwrap();
+        let tree: Vec<_> = model.bodies.iter().map(|b| (b.name.as_str(), b.parent)).collect();
+        let parents = [("a", None), ("b", Some(0)), ("c", Some(0)), ("d", Some(2)), ("e", None)];
+        assert_eq!(tree, parents);
+        assert_eq!(model.body_index("d"), Some(3));
+        assert!(model.bodies.iter().all(|b| b.inertial.is_none()));
+    }
+
+    #[test]
+    fn inertia_is_written_or_that_of_the_geoms_that_count() {
+        let mass = |compiler: &str, content: &str| {
+            let xml = format!(
+                "<mujoco><compiler {compiler}/><worldbody><body>{content}</body></worldbody></mujoco>"
+            );
+            Model::from_str(&xml, None).unwrap().bodies[0].inertial.map(|i| i.mass)
+        };
+        let geoms = "<geom size=\"1\" mass=\"2\"/><geom size=\"1\" mass=\"3\" group=\"4\"/><geom size=\"1\" mass=\"0\"/>";
+        let both = format!("{geoms}<inertial pos=\"0 0 0\" mass=\"7\" diaginertia=\"1 1 1\"/>");
+        assert_eq!(mass("", geoms), Some(5.0));
+        assert_eq!(mass("inertiagrouprange=\"0 3\"", geoms), Some(2.0));
+        assert_eq!(mass("", &both), Some(7.0));
+        assert_eq!(mass("inertiafromgeom=\"true\"", &both), Some(5.0));
+        assert_eq!(mass("inertiafromgeom=\"false\"", geoms), None);
+        let density = mass("", "<geom type=\"box\" size=\"0.5 0.5 0.5\" density=\"3\"/>");
+        assert_eq!(density, Some(3.0));
+    }
+
+    #[test]
+    fn what_cannot_be_is_named_with_its_place() {
+        for (worldbody, part) in [
+            ("<joint/>", "line 1: joint: the world has no joints"),
+            (
+                "<body><geom size=\"1\"/><body><freejoint name=\"f\"/></body></body>",
+                "freejoint 'f'",
+            ),
+            ("<body><joint/><freejoint/></body>", "must be the only one"),
+            ("<body><freejoint/><joint/></body>", "no other joint"),
+            ("<body name=\"a\"/><body name=\"a\"/>", "body 'a': another body has this name"),
+            ("<body name=\"world\"/>", "another body"),
+            ("<body><joint name=\"j\"/><joint name=\"j\"/></body>", "another joint"),
+            ("<body pos=\"1 2\"/>", "body: pos must have 3 numbers, not 2"),
+            ("<geom name=\"g\"/>", "geom 'g': size must be positive"),
+            ("<geom size=\"1 2 3 4\"/>", "size has more than 3 numbers"),
+            ("<geom size=\"1\" type=\"ball\"/>", "type is 'ball', none of: plane, sphere"),
+            ("<geom size=\"1\" contype=\"1.5\"/>", "contype is '1.5', no whole number"),
+            ("<geom size=\"1\" mass=\"-1\"/>", "mass must not be negative"),
+            ("<geom size=\"1\" material=\"m\"/>", "material names 'm'"),
+            ("<geom type=\"mesh\"/>", "mesh is missing"),
+            ("<geom type=\"mesh\" mesh=\"m\"/>", "mesh names 'm'"),
+            ("<geom type=\"capsule\" size=\"1\" fromto=\"0 0 0 0 0 0\"/>", "fromto has no length"),
+            ("<geom size=\"1\" fromto=\"0 0 0 0 0 1\"/>", "fromto is for capsules"),
+            ("<geom type=\"box\" size=\"1\" pos=\"0 0 0\" fromto=\"0 0 0 0 0 1\"/>", "beside pos"),
+            ("<body><joint axis=\"0 0 0\"/></body>", "axis must not be zero"),
+            ("<body><joint damping=\"-1\"/></body>", "damping must not be negative"),
+            ("<body><inertial mass=\"1\"/></body>", "inertial: pos is missing"),
+            ("<body><inertial pos=\"0 0 0\"/></body>", "inertial: mass is missing"),
+        ] {
+            let error = read(worldbody).unwrap_err();
+            assert!(error.contains(part), "{error}");
+        }
+        let inertial = |more: &str| {
+            let e = read(&format!("<body><inertial pos=\"0 0 0\" mass=\"1\" {more}/></body>"));
+            e.map(|model| model.warnings.len())
+        };
+        assert!(
+            inertial("diaginertia=\"-1 1 1\"").unwrap_err().contains("diaginertia must not be")
+        );
+        let turned = inertial("fullinertia=\"1 1 1 0 0 0\" euler=\"0 0 1\"");
+        assert!(turned.unwrap_err().contains("beside an orientation"));
+        assert_eq!(inertial("diaginertia=\"1 1 3\""), Ok(1));
+        assert_eq!(inertial("diaginertia=\"1 1 2\""), Ok(0));
     }
 }

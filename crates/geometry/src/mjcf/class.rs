@@ -1,9 +1,12 @@
 //! Default classes: what elements are before their own attributes are read.
 
+use std::collections::BTreeMap;
+
 use super::compiler::Compiler;
 use super::element::Element;
 use super::error::MjcfError;
 use super::{actuator, equality, geom, joint, material, mesh, site, tendon};
+use crate::limits::MAX_MJCF_CLASSES;
 
 /// The outermost class, of elements without any.
 pub(super) const MAIN: usize = 0;
@@ -11,7 +14,6 @@ pub(super) const MAIN: usize = 0;
 /// The state in which elements of a class begin.
 #[derive(Clone, Default)]
 pub(super) struct Class {
-    name: String,
     pub(super) joint: joint::Spec,
     pub(super) geom: geom::Spec,
     pub(super) site: site::Spec,
@@ -23,15 +25,19 @@ pub(super) struct Class {
 }
 
 /// All classes of a model.
-pub(super) struct Classes(Vec<Class>);
+pub(super) struct Classes {
+    all: Vec<Class>,
+    names: BTreeMap<String, usize>,
+}
 
 impl Classes {
     pub(super) fn read(root: &Element, compiler: &Compiler) -> Result<Self, MjcfError> {
-        let mut all = Self(vec![Class { name: "main".into(), ..Class::default() }]);
+        let names = BTreeMap::from([("main".to_owned(), MAIN)]);
+        let mut all = Self { all: vec![Class::default()], names };
         for e in root.sections("default") {
             // Some files name the outermost class otherwise.
             if let Some(name) = e.text("class") {
-                all.0[MAIN].name = name.to_owned();
+                all.names.insert(name.to_owned(), MAIN);
             }
             all.fill(MAIN, e, compiler)?;
         }
@@ -40,7 +46,7 @@ impl Classes {
 
     /// Reads what is in `e` into the class `index`, then the classes within, which begin as it ended.
     fn fill(&mut self, index: usize, e: &Element, compiler: &Compiler) -> Result<(), MjcfError> {
-        let class = &mut self.0[index];
+        let class = &mut self.all[index];
         for child in e.children.iter().filter(|c| c.tag != "default") {
             let is_known = match child.tag.as_str() {
                 "joint" => class.joint.read(child, compiler).map(|()| true),
@@ -58,11 +64,16 @@ impl Classes {
         }
         for child in e.sections("default") {
             let name = child.text("class").ok_or_else(|| child.missing("class"))?.to_owned();
-            if self.0.iter().any(|c| c.name == name) {
-                return Err(child.invalid("class", format!("'{name}' is the name of another")));
+            let next = self.all.len();
+            if next == MAX_MJCF_CLASSES {
+                let (what, count) = ("default classes", next + 1);
+                return Err(MjcfError::TooLarge { what, count, limit: MAX_MJCF_CLASSES });
             }
-            self.0.push(Class { name, ..self.0[index].clone() });
-            self.fill(self.0.len() - 1, child, compiler)?;
+            if self.names.insert(name, next).is_some() {
+                return Err(child.invalid("class", "is the name of another"));
+            }
+            self.all.push(self.all[index].clone());
+            self.fill(next, child, compiler)?;
         }
         Ok(())
     }
@@ -75,11 +86,80 @@ impl Classes {
         inherited: usize,
     ) -> Result<usize, MjcfError> {
         let Some(name) = e.text(field) else { return Ok(inherited) };
-        self.0.iter().position(|c| c.name == name).ok_or_else(|| e.unknown(field, name))
+        self.names.get(name).copied().ok_or_else(|| e.unknown(field, name))
     }
 
     /// The class of `e`: its own, or `inherited`.
     pub(super) fn of(&self, e: &Element, inherited: usize) -> Result<&Class, MjcfError> {
-        Ok(&self.0[self.index(e, "class", inherited)?])
+        Ok(&self.all[self.index(e, "class", inherited)?])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Model;
+
+    fn model(defaults: &str, body: &str) -> Result<Model, String> {
+        let xml = format!(
+            "<mujoco>{defaults}<worldbody><body name=\"b\" childclass=\"a\">{body}</body></worldbody></mujoco>"
+        );
+        Model::from_str(&xml, None).map_err(|e| e.to_string())
+    }
+
+    const CLASSES: &str = r#"<default><geom size="1 2 3" friction="0.5 0.1"/><joint damping="1" armature="2"/>
+        <default class="c"><joint damping="9"/></default>
+        <default class="a"><joint damping="3"/>
+          <default class="b"><joint armature="4"/><geom type="box" friction="0.7"/></default>
+          <joint frictionloss="5"/></default></default>"#;
+
+    #[test]
+    fn classes_begin_as_their_outer_class_ended() {
+        let body = "<joint name=\"plain\"/><joint name=\"inner\" class=\"b\"/>\
+            <joint name=\"main\" class=\"main\" axis=\"1 0 0\"/><geom/><geom class=\"b\" size=\"0.5\"/>";
+        let model = model(CLASSES, body).unwrap();
+        let of = |name: &str| {
+            let joint = model.joint(model.joint_index(name).unwrap());
+            [joint.damping, joint.armature, joint.friction_loss]
+        };
+        assert_eq!(of("plain"), [3.0, 2.0, 5.0]);
+        // What follows the inner class in the file is in it, too.
+        assert_eq!(of("inner"), [3.0, 4.0, 5.0]);
+        assert_eq!(of("main"), [1.0, 2.0, 0.0]);
+        let geoms = &model.bodies[0].geoms;
+        assert_eq!(geoms[0].friction, [0.5, 0.1, 0.0001]);
+        // The first number is its own, the rest is its class's.
+        assert_eq!(geoms[1].friction, [0.7, 0.1, 0.0001]);
+        let super::super::Shape::Box { half_extents } = geoms[1].shape else { panic!() };
+        assert_eq!(half_extents.as_slice(), [0.5, 2.0, 3.0]);
+    }
+
+    #[test]
+    fn the_nearest_childclass_counts() {
+        let body = "<frame childclass=\"c\"><geom/><body><joint name=\"framed\"/><geom/></body></frame>\
+            <body><joint name=\"inherited\"/><geom/></body><body childclass=\"b\"><joint name=\"own\"/><geom/></body>";
+        let model = model(CLASSES, body).unwrap();
+        let damping = |name: &str| model.joint(model.joint_index(name).unwrap()).damping;
+        assert_eq!(["framed", "inherited", "own"].map(damping), [9.0, 3.0, 3.0]);
+    }
+
+    #[test]
+    fn classes_are_named_once_and_exist() {
+        let error = |defaults: &str, body: &str| model(defaults, body).unwrap_err();
+        assert!(error(CLASSES, "<geom class=\"x\"/>").contains("class names 'x', which does not"));
+        assert!(error("", "").contains("body 'b': childclass names 'a'"));
+        let twice = "<default><default class=\"a\"/><default class=\"a\"/></default>";
+        assert!(error(twice, "").contains("default: class is the name of another"));
+        assert!(error("<default><default/></default>", "").contains("class is missing"));
+        let many: String = (0..5000).map(|k| format!("<default class=\"{k}\"/>")).collect();
+        assert!(error(&format!("<default>{many}</default>"), "").contains("default classes"));
+    }
+
+    #[test]
+    fn an_orientation_of_another_form_replaces_that_of_the_class() {
+        let defaults =
+            "<default><default class=\"a\"><geom euler=\"0 0 90\" size=\"1\"/></default></default>";
+        let model = model(defaults, "<geom/><geom quat=\"0 1 0 0\"/>").unwrap();
+        let k = |g: usize| model.bodies[0].geoms[g].t_body_geom.rotation.quaternion().coords;
+        assert!((k(0).z - 0.5_f64.sqrt()).abs() < 1e-15 && (k(1).x - 1.0).abs() < 1e-15);
     }
 }

@@ -135,3 +135,74 @@ fn euler(text: &str) -> Option<[(usize, bool); 3]> {
     let axes: Option<Vec<_>> = text.trim().chars().map(axis).collect();
     axes?.try_into().ok()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::{MjcfError, Model};
+
+    fn range(compiler: &str, joint: &str) -> Result<Option<(f64, f64)>, MjcfError> {
+        let xml = format!(
+            "<mujoco><compiler angle=\"radian\" {compiler}/><worldbody><body><joint name=\"q\" {joint}/>\
+            <geom size=\"1\"/></body></worldbody></mujoco>"
+        );
+        Ok(Model::from_str(&xml, None)?.bodies[0].joints[0].range)
+    }
+
+    #[test]
+    fn a_range_limits_unless_told_otherwise() {
+        let told = Some((-1.0, 2.0));
+        for (joint, expected) in [
+            ("", None),
+            ("range=\"0 0\"", None),
+            ("range=\"-1 2\"", told),
+            ("range=\"-1 2\" limited=\"auto\"", told),
+            ("range=\"-1 2\" limited=\"true\"", told),
+            ("range=\"-1 2\" limited=\"false\"", None),
+        ] {
+            assert_eq!(range("", joint).unwrap(), expected, "{joint}");
+        }
+        let off = "autolimits=\"false\"";
+        assert_eq!(range(off, "").unwrap(), None);
+        assert_eq!(range(off, "range=\"-1 2\" limited=\"true\"").unwrap(), told);
+        let error = range(off, "range=\"-1 2\"").unwrap_err().to_string();
+        assert!(error.contains("joint 'q': limited must be told"), "{error}");
+        for joint in ["range=\"2 -1\"", "limited=\"true\""] {
+            let error = range("", joint).unwrap_err().to_string();
+            assert!(error.contains("which is no range"), "{error}");
+        }
+    }
+
+    #[test]
+    fn sections_add_up_and_degrees_are_the_default() {
+        let read = |compilers: &str| {
+            let xml = format!(
+                "<mujoco>{compilers}<worldbody><body><joint range=\"0 90\"/><joint type=\"slide\" range=\"0 90\"/>\
+                <geom size=\"1\"/></body></worldbody></mujoco>"
+            );
+            let body = Model::from_str(&xml, None).unwrap().bodies.remove(0);
+            [0, 1].map(|k| body.joints[k].range.unwrap().1)
+        };
+        assert_eq!(read(""), [std::f64::consts::FRAC_PI_2, 90.0]);
+        assert_eq!(read("<compiler angle=\"degree\"/><compiler angle=\"radian\"/>"), [90.0; 2]);
+        assert_eq!(read("<compiler angle=\"radian\"/><compiler autolimits=\"true\"/>"), [90.0; 2]);
+    }
+
+    #[test]
+    fn masses_can_be_bounded_balanced_and_scaled() {
+        // As MuJoCo has them, too.
+        for (compiler, diagonal, mass, expected) in [
+            ("boundmass=\"0.5\" boundinertia=\"0.2\"", "0.1 0.3 0.3", 0.5, [0.2, 0.3, 0.3]),
+            ("balanceinertia=\"true\"", "0.1 0.1 0.3", 0.1, [0.5 / 3.0; 3]),
+            ("settotalmass=\"2\"", "0.2 0.2 0.3", 2.0, [4.0, 4.0, 6.0]),
+        ] {
+            let xml = format!(
+                "<mujoco><compiler {compiler}/><worldbody><body><joint/>\
+                <inertial mass=\"0.1\" pos=\"0 0 0\" diaginertia=\"{diagonal}\"/></body></worldbody></mujoco>"
+            );
+            let inertial = Model::from_str(&xml, None).unwrap().bodies[0].inertial.unwrap();
+            assert!((inertial.mass - mass).abs() < 1e-12, "{compiler}");
+            let off = inertial.inertia.diagonal() - nalgebra::Vector3::from(expected);
+            assert!(off.norm() < 1e-12, "{compiler}: {}", inertial.inertia);
+        }
+    }
+}

@@ -95,7 +95,7 @@ impl Drive {
     /// Whether the last bias is the damping ratio of a servo of positions.
     pub(super) fn has_damping_ratio(&self) -> bool {
         let is_servo = self.gain_form == Form::Fixed && self.bias_form == Form::Affine;
-        is_servo && self.bias[2] > 0.0 && self.gain[0] == -self.bias[1]
+        is_servo && self.bias[2] > 0.0 && self.gain[0] >= 0.0 && self.gain[0] == -self.bias[1]
     }
 
     fn read_general(&mut self, e: &Element) -> Result<(), MjcfError> {
@@ -139,6 +139,9 @@ impl Drive {
         let ratio = e.magnitude("dampratio")?;
         if damping.is_some() && ratio.is_some() {
             return Err(e.invalid("dampratio", "is given beside kv"));
+        }
+        if ratio.is_some() && stiffness < 0.0 {
+            return Err(e.invalid("kp", "must not be negative beside a damping ratio"));
         }
         let last = damping.or(ratio).unwrap_or(self.bias[2]);
         (self.gain_form, self.gain) = (Form::Fixed, [stiffness, 0.0, 0.0]);
@@ -204,5 +207,75 @@ impl Drives {
             self.0[DriveKind::General as usize] = drive;
         }
         Ok(drive)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Actuator, Dynamics, Model};
+
+    fn actuators(defaults: &str, elements: &str) -> Result<Vec<Actuator>, String> {
+        let xml = format!(
+            "<mujoco><default>{defaults}</default><worldbody><body><joint name=\"y\" type=\"slide\" range=\"-1 3\"/>\
+            <geom size=\"0.2\" mass=\"2\"/></body></worldbody><actuator>{elements}</actuator></mujoco>"
+        );
+        Model::from_str(&xml, None).map(|m| m.actuators).map_err(|e| e.to_string())
+    }
+
+    fn check(defaults: &str, element: &str, gain: [f64; 3], bias: [f64; 3]) {
+        let found = actuators(defaults, &format!("<{element}/>")).unwrap();
+        assert_eq!((found[0].gain, found[0].bias), (gain, bias), "{element} in {defaults}");
+    }
+
+    #[test]
+    fn shorthands_are_gains_and_biases() {
+        check("", "motor joint=\"y\"", [1.0, 0.0, 0.0], [0.0; 3]);
+        check("", "position joint=\"y\" kp=\"5\" kv=\"2\"", [5.0, 0.0, 0.0], [0.0, -5.0, -2.0]);
+        check("", "velocity joint=\"y\" kv=\"3\"", [3.0, 0.0, 0.0], [0.0, 0.0, -3.0]);
+        check("", "damper joint=\"y\" kv=\"3\" ctrlrange=\"0 1\"", [0.0, 0.0, -3.0], [0.0; 3]);
+        let bias = "biasprm=\"1 2 3\"";
+        check(
+            "",
+            &format!("general joint=\"y\" gainprm=\"3 1\" {bias}"),
+            [3.0, 0.0, 0.0],
+            [0.0; 3],
+        );
+        let affine = format!("general joint=\"y\" biastype=\"affine\" {bias}");
+        check("", &affine, [1.0, 0.0, 0.0], [1.0, 2.0, 3.0]);
+    }
+
+    /// All found with MuJoCo.
+    #[test]
+    fn classes_keep_a_drive_for_each_shorthand() {
+        let (main, class) = ("joint=\"y\"", "joint=\"y\" class=\"r\"");
+        let nested =
+            "<position kp=\"5\" kv=\"2\"/><default class=\"r\"><velocity kv=\"3\"/></default>";
+        check(nested, &format!("general {main}"), [5.0, 0.0, 0.0], [0.0, -5.0, -2.0]);
+        check(nested, &format!("general {class}"), [3.0, 0.0, 0.0], [0.0, 0.0, -3.0]);
+        check(nested, &format!("position {class}"), [5.0, 0.0, 0.0], [0.0, -5.0, -2.0]);
+        check(nested, &format!("velocity {main}"), [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]);
+        check(nested, &format!("intvelocity {class}"), [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]);
+        check(nested, &format!("motor {class}"), [1.0, 0.0, 0.0], [0.0; 3]);
+        let nested =
+            "<velocity kv=\"7\"/><default class=\"r\"><general gainprm=\"2 1\"/></default>";
+        check(nested, &format!("general {class}"), [2.0, 0.0, 0.0], [0.0, 0.0, -7.0]);
+        check(nested, &format!("position {class}"), [2.0, 0.0, 0.0], [0.0, -2.0, -7.0]);
+        check(nested, &format!("position {main}"), [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]);
+    }
+
+    #[test]
+    fn damping_ratios_and_ranges_come_from_the_joint() {
+        let servo = |more: &str| {
+            actuators("", &format!("<position joint=\"y\" kp=\"8\" {more}/>")).unwrap()
+        };
+        // Twice the ratio times the root of stiffness and mass.
+        assert!((servo("dampratio=\"0.5\"")[0].bias[2] + 4.0).abs() < 1e-12);
+        assert!((servo("dampratio=\"1\" gear=\"2\"")[0].bias[2] + 4.0).abs() < 1e-12);
+        assert_eq!(servo("inheritrange=\"0.5\"")[0].control_range, Some((0.0, 2.0)));
+        assert_eq!(servo("timeconst=\"0.1\"")[0].dynamics, Dynamics::Filter(0.1));
+        let both = actuators("", "<position joint=\"y\" kv=\"1\" dampratio=\"1\"/>").unwrap_err();
+        assert!(both.contains("position: dampratio is given beside kv"), "{both}");
+        let none = actuators("", "<position joint=\"x\"/>").unwrap_err();
+        assert!(none.contains("joint names 'x'"), "{none}");
     }
 }

@@ -181,3 +181,54 @@ impl Reader<'_> {
         Ok(EqualityKind::Joint { joints: (first, second), polynomial })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(element: &str) -> Result<Equality, String> {
+        let xml = format!(
+            "<mujoco><worldbody><body name=\"a\" pos=\"0 0 1\"><joint name=\"x\"/><geom size=\"1\"/><site name=\"s\" pos=\"0 1 0\"/>\
+            </body><body name=\"b\" pos=\"0 1 1\" euler=\"0 0 90\"><joint type=\"ball\" name=\"y\"/><geom size=\"1\"/></body>\
+            </worldbody><equality><{element}/></equality></mujoco>"
+        );
+        let mut model = Model::from_str(&xml, None).map_err(|e| e.to_string())?;
+        Ok(model.equalities.remove(0))
+    }
+
+    #[test]
+    fn points_and_poses_are_those_of_the_references() {
+        let near = |a: Point3<f64>, b: [f64; 3]| (a - Point3::from(b)).norm() < 1e-15;
+        let EqualityKind::Connect { bodies, anchors } =
+            read("connect body1=\"a\" body2=\"b\" anchor=\"0 0 0.3\"").unwrap().kind
+        else {
+            panic!()
+        };
+        assert_eq!(bodies, [Some(0), Some(1)]);
+        assert!(near(anchors[0], [0.0, 0.0, 0.3]) && near(anchors[1], [-1.0, 0.0, 0.3]));
+        let EqualityKind::Weld { bodies, anchors, rotation, .. } =
+            read("weld body1=\"b\" anchor=\"1 0 0\"").unwrap().kind
+        else {
+            panic!()
+        };
+        assert_eq!(bodies, [Some(1), None]);
+        // The world's (1, 0, 0), seen by the turned body at (0, 1, 1).
+        assert!(near(anchors[0], [-1.0, -1.0, -1.0]) && near(anchors[1], [1.0, 0.0, 0.0]));
+        assert!((rotation.angle() - std::f64::consts::FRAC_PI_2).abs() < 1e-15);
+    }
+
+    #[test]
+    fn what_is_held_together_must_exist() {
+        for (element, part) in [
+            ("connect body1=\"a\"", "connect: anchor is missing"),
+            ("connect body1=\"c\" anchor=\"0 0 0\"", "body1 names 'c'"),
+            ("weld body2=\"a\"", "weld: body1 is missing"),
+            ("weld site1=\"s\" body2=\"a\"", "body2 is given beside site1 and site2"),
+            ("connect site1=\"s\"", "site2 is missing"),
+            ("joint joint1=\"x\" joint2=\"y\"", "joint2 names neither a hinge nor a slide"),
+        ] {
+            let error = read(element).unwrap_err();
+            assert!(error.contains(part), "{error}");
+        }
+    }
+}

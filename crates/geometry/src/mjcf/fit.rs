@@ -40,7 +40,7 @@ pub(super) fn shape(
 
 /// The box of uniform density with the mass and the inertia of the mesh.
 fn inertia_box(mesh: &Mesh) -> Option<(Isometry3<f64>, Vector3<f64>)> {
-    let solid = mesh.of_unit_density()?;
+    let solid = mesh.of_unit_density().filter(|s| s.inertia.iter().all(|x| x.is_finite()))?;
     let eigen = solid.inertia.symmetric_eigen();
     let mut order = [0, 1, 2];
     order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));

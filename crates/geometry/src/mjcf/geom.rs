@@ -128,14 +128,15 @@ impl Spec {
         Ok(())
     }
 
-    /// The geom of `e`, which lies in a frame of its body's, and what it weighs, in the body's frame; `None` where
-    /// shapes of its kind are not read.
+    /// The geom of `e`, which lies in a frame of its body's, and, where it `weighs`, its part of the body in the body's
+    /// frame; `None` where shapes of its kind are not read.
     pub(super) fn build(
         self,
         e: &Element,
         compiler: &Compiler,
         assets: &Assets<'_>,
         t_body_frame: &Isometry3<f64>,
+        weighs: bool,
     ) -> Result<Option<(Geom, Option<Inertial>)>, MjcfError> {
         if self.kind == Kind::Other {
             e.refuse("left out: height fields and distance fields are not read");
@@ -143,27 +144,28 @@ impl Spec {
         }
         let (t_frame_geom, size) = self.placed(e)?;
         let mut t_body_geom = t_body_frame * t_frame_geom;
-        let (shape, mut inertial) = if let Some(name) = &self.mesh {
+        let shape = if let Some(name) = &self.mesh {
             let mesh = assets.meshes.get(e, name, compiler)?;
             if self.kind == Kind::Mesh {
-                (Shape::Mesh(mesh.mesh.clone()), None)
+                Shape::Mesh(mesh.mesh.clone())
             } else {
                 let fitted = fit::shape(self.kind, &mesh, self.fit_scale, compiler.fit_bounds);
                 let (shape, t_mesh_shape) = fitted.ok_or_else(|| {
                     e.invalid("mesh", format!("'{name}' holds no volume to fit a shape to"))
                 })?;
                 t_body_geom *= t_mesh_shape;
-                (shape, None)
+                shape
             }
         } else if self.kind == Kind::Mesh {
             return Err(e.missing("mesh"));
         } else {
             let shape = self.kind.of_size(size);
-            (shape.ok_or_else(|| e.invalid("size", "must be positive"))?, None)
+            shape.ok_or_else(|| e.invalid("size", "must be positive"))?
         };
-        if self.weighs(compiler) {
-            inertial = self.inertial(e, compiler, assets, &shape)?;
-        }
+        let inertial = match weighs && self.counts(compiler) {
+            true => self.inertial(e, compiler, assets, &shape)?,
+            false => None,
+        };
         let own = self.material.as_ref().map(|name| {
             let color = assets.materials.get(name);
             color.copied().ok_or_else(|| e.unknown("material", name))
@@ -185,7 +187,8 @@ impl Spec {
         Ok(Some((geom, inertial.map(|i| i.moved(&t_body_geom)))))
     }
 
-    fn weighs(&self, compiler: &Compiler) -> bool {
+    /// Whether its mass is part of its body's.
+    fn counts(&self, compiler: &Compiler) -> bool {
         let [first, last] = compiler.inertia_groups;
         (first..=last).contains(&f64::from(self.group))
             && self.mass != Some(0.0)
@@ -214,7 +217,11 @@ impl Spec {
         };
         let density = self.mass.map_or(self.density, |mass| mass / unit.mass);
         let mass = self.mass.unwrap_or(self.density * unit.mass);
-        Ok((mass > 1e-15).then(|| Inertial { mass, inertia: unit.inertia * density, ..unit }))
+        let all = Inertial { mass, inertia: unit.inertia * density, ..unit };
+        if !(mass.is_finite() && all.inertia.iter().chain(all.com.iter()).all(|x| x.is_finite())) {
+            return Err(e.invalid("mass", "or size is beyond all bounds"));
+        }
+        Ok((mass > 1e-15).then_some(all))
     }
 
     /// Where the geom is in its frame, and its size.

@@ -72,3 +72,37 @@ fn filled(e: &Element, field: &'static str, default: Vec<f64>) -> Result<Vec<f64
     }
     Ok(list)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::Model;
+
+    fn read(key: &str) -> Result<Model, String> {
+        let xml = format!(
+            "<mujoco><worldbody><body pos=\"0 0 1\"><freejoint/><geom size=\"1\"/></body><body><joint name=\"q\" ref=\"180\"/>\
+            <geom size=\"1\"/></body></worldbody><actuator><muscle joint=\"q\"/><motor joint=\"q\"/></actuator>\
+            <keyframe><key {key}/></keyframe></mujoco>"
+        );
+        Model::from_str(&xml, None).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn what_is_not_told_is_at_its_reference() {
+        let frame = read("name=\"k\" ctrl=\"3 4\"").unwrap().keyframes.remove(0);
+        let pi = std::f64::consts::PI;
+        assert_eq!(frame.positions, [0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, pi]);
+        assert_eq!(frame.velocities, [0.0; 7]);
+        // The first actuator has not been read.
+        assert_eq!(frame.controls, [4.0]);
+        let frame = read("qpos=\"1 2 3 0 0 2 0 4\" time=\"5\"").unwrap().keyframes.remove(0);
+        assert_eq!(frame.positions, [1.0, 2.0, 3.0, 0.0, 0.0, 1.0, 0.0, 4.0]);
+        assert_eq!((frame.time, frame.controls.as_slice()), (5.0, &[0.0][..]));
+    }
+
+    #[test]
+    fn lists_must_fit_the_model() {
+        let error = read("name=\"k\" qvel=\"1\"").unwrap_err();
+        assert!(error.contains("key 'k': qvel has 1 numbers, and the model 7"), "{error}");
+        assert!(read("qpos=\"1 2 3 0 0 0 0 4\"").unwrap_err().contains("quaternion of zeros"));
+    }
+}

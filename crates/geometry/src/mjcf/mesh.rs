@@ -1,8 +1,9 @@
 //! Mesh assets: read once, when the first geom asks for them.
 
-use std::cell::RefCell;
+use std::cell::{OnceCell, RefCell};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
@@ -68,16 +69,17 @@ impl Spec {
 }
 
 /// A mesh that has been read.
-#[derive(Clone)]
 pub(super) struct Mesh {
     pub(super) mesh: Arc<TriMesh>,
     inertia: MeshInertia,
+    /// Found when the first geom asks for it.
+    unit: OnceCell<Option<Inertial>>,
 }
 
 impl Mesh {
     /// The mesh at 1 kg/m³, or at 1 kg/m² where it is a shell; `None` where it holds no volume.
     pub(super) fn of_unit_density(&self) -> Option<Inertial> {
-        mesh_mass::of_unit_density(&self.mesh, self.inertia)
+        *self.unit.get_or_init(|| mesh_mass::of_unit_density(&self.mesh, self.inertia))
     }
 }
 
@@ -90,7 +92,7 @@ struct Asset<'a> {
 pub(super) struct Meshes<'a> {
     assets: BTreeMap<String, Asset<'a>>,
     folder: Option<&'a Path>,
-    read: RefCell<BTreeMap<String, Mesh>>,
+    read: RefCell<BTreeMap<String, Rc<Mesh>>>,
 }
 
 impl<'a> Meshes<'a> {
@@ -128,7 +130,7 @@ impl<'a> Meshes<'a> {
         geom: &Element,
         name: &str,
         compiler: &Compiler,
-    ) -> Result<Mesh, MjcfError> {
+    ) -> Result<Rc<Mesh>, MjcfError> {
         if let Some(mesh) = self.read.borrow().get(name) {
             return Ok(mesh.clone());
         }
@@ -138,7 +140,8 @@ impl<'a> Meshes<'a> {
             None => written(asset.element)?,
         };
         let spec = &asset.spec;
-        let mesh = Mesh { mesh: Arc::new(spec.apply(raw)), inertia: spec.inertia };
+        let (mesh, inertia) = (Arc::new(spec.apply(raw)), spec.inertia);
+        let mesh = Rc::new(Mesh { mesh, inertia, unit: OnceCell::new() });
         self.read.borrow_mut().insert(name.to_owned(), mesh.clone());
         Ok(mesh)
     }
@@ -188,4 +191,74 @@ fn written(e: &Element) -> Result<TriMesh, MjcfError> {
     let vertices = vertices.chunks_exact(3).map(Point3::from_slice).collect();
     let faces = faces.chunks_exact(3).map(|f| [f[0] as u32, f[1] as u32, f[2] as u32]).collect();
     Ok(TriMesh::new(vertices, faces))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Model, Shape};
+    use super::*;
+
+    const TETRAHEDRON: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0 0\nmtllib gone.mtl\nusemtl x\n\
+        f 1/1 3/1 2/1\nf 1/1 2/1 4/1\nf 2/1 3/1 4/1\nf 1/1 4/1 3/1\n";
+
+    fn read(mesh: &str, folder: Option<&Path>) -> Result<Model, String> {
+        let xml = format!(
+            "<mujoco><compiler meshdir=\"m\"/><asset><mesh {mesh}/></asset><worldbody><body>\
+            <geom type=\"mesh\" mesh=\"a\"/><geom type=\"mesh\" mesh=\"a\" pos=\"1 0 0\"/></body></worldbody></mujoco>"
+        );
+        Model::from_str(&xml, folder).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn meshes_are_moved_then_scaled_and_shared() {
+        let root = tempfile::tempdir().unwrap();
+        std::fs::create_dir(root.path().join("m")).unwrap();
+        // Materials that were never shipped do not matter.
+        std::fs::write(root.path().join("m/a.obj"), TETRAHEDRON).unwrap();
+        std::fs::write(root.path().join("b.obj"), TETRAHEDRON).unwrap();
+        let attributes = "file=\"a.obj\" scale=\"2 -3 4\" refpos=\"0 0 1\" refquat=\"1 0 0 1\"";
+        let model = read(attributes, Some(root.path())).unwrap();
+        let [Shape::Mesh(a), Shape::Mesh(b)] = [0, 1].map(|g| &model.bodies[0].geoms[g].shape)
+        else {
+            panic!()
+        };
+        assert!(Arc::ptr_eq(a, b));
+        // (1, 0, 0) - (0, 0, 1), turned by -90° about z: (0, -1, -1).
+        let moved = Point3::new(0.0, 3.0, -4.0);
+        assert!(a.vertices.iter().any(|v| (v - moved).norm() < 1e-12));
+        let inertial = model.bodies[0].inertial.unwrap();
+        assert!((inertial.mass - 2.0 * 4000.0).abs() < 1e-8, "{}", inertial.mass);
+        for (mesh, part) in [
+            ("name=\"a\" file=\"../b.obj\"", "leaves the folder"),
+            ("name=\"a\" file=\"/etc/passwd\"", "leaves the folder"),
+            ("name=\"a\" file=\"c.obj\"", "mesh 'a': file 'c.obj': no such file"),
+            ("name=\"a\"", "mesh 'a': file is missing"),
+            ("name=\"b\" file=\"a.obj\"", "geom: mesh names 'a'"),
+            ("scale=\"1 1 1\"", "mesh: name is missing"),
+        ] {
+            let error = read(mesh, Some(root.path())).unwrap_err();
+            assert!(error.contains(part), "{error}");
+        }
+        assert!(read("file=\"a.obj\"", None).unwrap_err().contains("need a folder"));
+        std::fs::write(root.path().join("m/a.obj"), "v 0 0\n").unwrap();
+        assert!(read("file=\"a.obj\"", Some(root.path())).unwrap_err().contains("a.obj: line 1"));
+    }
+
+    #[test]
+    fn meshes_in_the_model_are_checked() {
+        let vertices = "name=\"a\" vertex=\"0 0 0 1 0 0 0 1 0 0 0 1\"";
+        let with = |faces: &str| read(&format!("{vertices} face=\"{faces}\""), None);
+        assert!(with("0 2 1 0 1 3 1 2 3 0 3 2").is_ok());
+        for (faces, part) in [
+            ("0 1 4", "face refers to vertex 4 of 4"),
+            ("0 1 -1", "face refers to vertex -1"),
+            ("0 1", "not three each"),
+            ("", "face must not be empty"),
+            ("0 1 2", "holds no volume"),
+        ] {
+            let error = with(faces).unwrap_err();
+            assert!(error.contains(part), "{error}");
+        }
+        assert!(read(vertices, None).unwrap_err().contains("face is missing"));
+    }
 }

@@ -112,10 +112,11 @@ impl Model {
             model.time_step = e.number("timestep")?.unwrap_or(model.time_step);
         }
         model.scale_masses(&compiler);
-        let names = Names::new(&model);
+        let mut names = Names::new(&model);
         model.exclusions = contact::exclusions(root, &names)?;
         model.equalities = equality::read(root, &classes, &model, &names)?;
         model.tendons = tendon::read(root, &compiler, &classes, &model, &names)?;
+        names.add_tendons(root, &model.tendons);
         let (actuators, written) = actuator::read(root, &compiler, &classes, &model, &names)?;
         model.actuators = actuators;
         model.keyframes = keyframe::read(root, &model, &written)?;

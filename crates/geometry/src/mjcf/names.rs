@@ -1,19 +1,34 @@
 //! What the names in a model refer to.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::Isometry3;
 
 use super::element::Element;
 use super::error::MjcfError;
 use super::joint::JointKind;
+use super::tendon::Tendon;
 use super::{JointIndex, Model};
+
+/// The names that things of one kind have.
+#[derive(Default)]
+pub(super) struct Taken(BTreeSet<String>);
+
+impl Taken {
+    /// Adds the name of `e`, which no other of this `kind` may have; many may have none.
+    pub(super) fn add(&mut self, e: &Element, kind: &'static str) -> Result<(), MjcfError> {
+        let name = e.name();
+        if name.is_empty() || self.0.insert(name) { Ok(()) } else { Err(e.duplicate(kind)) }
+    }
+}
 
 /// Bodies, joints and sites by name.
 pub(super) struct Names {
     /// `None` is the world.
     bodies: BTreeMap<String, Option<usize>>,
     joints: BTreeMap<String, JointIndex>,
+    /// `None` are those that are not read.
+    tendons: BTreeMap<String, Option<usize>>,
     /// The body that each is on, and its pose there.
     sites: BTreeMap<String, (Option<usize>, Isometry3<f64>)>,
 }
@@ -23,6 +38,7 @@ impl Names {
         let mut names = Self {
             bodies: BTreeMap::from([("world".to_owned(), None)]),
             joints: BTreeMap::new(),
+            tendons: BTreeMap::new(),
             sites: BTreeMap::new(),
         };
         for site in &model.world_sites {
@@ -42,6 +58,23 @@ impl Names {
         names.joints.remove("");
         names.sites.remove("");
         names
+    }
+
+    /// Adds the tendons of `root`, of which these have been read since.
+    pub(super) fn add_tendons(&mut self, root: &Element, read: &[Tendon]) {
+        let written = root.in_sections("tendon").map(|e| (e.name(), None));
+        let read = read.iter().enumerate().map(|(t, tendon)| (tendon.name.clone(), Some(t)));
+        self.tendons.extend(written.chain(read));
+        self.tendons.remove("");
+    }
+
+    /// The tendon that the attribute `field` of `e` names; `None` where it is not read.
+    pub(super) fn tendon(
+        &self,
+        e: &Element,
+        field: &'static str,
+    ) -> Result<Option<usize>, MjcfError> {
+        find(&self.tendons, e, field)
     }
 
     /// The body that the attribute `field` of `e` names; `None` is the world.

@@ -149,7 +149,7 @@ mod tests {
             ("axisangle=\"0 0 0 1\"", "axisangle must not be zero"),
             ("xyaxes=\"1 0 0 2 0 0\"", "xyaxes must not be parallel"),
             ("zaxis=\"0 0 0\"", "zaxis must not be zero"),
-            ("euler=\"0 nan 0\"", "euler has 'nan', which is no finite number"),
+            ("euler=\"0 nan 0\"", "euler has 'nan', which is no number"),
             ("euler=\"0 0 0 1\"", "euler has more than 3 numbers"),
             ("quat=\"1 0 0 0\" zaxis=\"0 0 1\"", "zaxis is given beside quat"),
         ] {

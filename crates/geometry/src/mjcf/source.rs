@@ -150,3 +150,95 @@ impl Lines {
         self.0.partition_point(|&start| start <= at) as u32
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::Model;
+    use super::*;
+
+    #[test]
+    fn included_files_stand_in_place_of_their_element() {
+        let root = tempfile::tempdir().unwrap();
+        let folder = root.path().join("robot");
+        std::fs::create_dir_all(folder.join("sub")).unwrap();
+        let write = |name: &str, text: &str| std::fs::write(folder.join(name), text).unwrap();
+        write("sub/a.xml", "<mujoco><body name=\"a\"/>\n<include file=\"b.xml\"/></mujoco>");
+        write("sub/b.xml", "<any><body name=\"b\"/></any>");
+        std::fs::write(root.path().join("c.xml"), "<mujoco/>").unwrap();
+        let read = |includes: &str| {
+            let xml =
+                format!("<mujoco><worldbody>{includes}<body name=\"z\"/></worldbody></mujoco>");
+            write("model.xml", &xml);
+            let model = Model::from_file(folder.join("model.xml")).map_err(|e| e.to_string())?;
+            Ok(model.bodies.into_iter().map(|b| b.name).collect::<Vec<_>>())
+        };
+        let include = |file: &str| format!("<include file=\"{file}\"/>");
+        assert_eq!(read(&include("sub/a.xml")).unwrap(), ["a", "b", "z"]);
+        let fails = |includes: String, part: &str| {
+            let error: String = read(&includes).unwrap_err();
+            assert!(
+                error.contains(part) && error.contains("model.xml:1: include: file"),
+                "{error}"
+            );
+        };
+        fails(include("sub/b.xml").repeat(2), "is included already");
+        fails(include("../c.xml"), "leaves the folder");
+        fails(include("none.xml"), "no such file");
+        write("loop.xml", &format!("<mujoco>{}</mujoco>", include("loop.xml")));
+        assert!(read(&include("loop.xml")).unwrap_err().contains("is included already"));
+        // Errors in an included file name it.
+        write("sub/b.xml", "<any>\n<body name=\"b\" pos=\"x\"/></any>");
+        let error = read(&include("sub/a.xml")).unwrap_err();
+        assert!(error.contains("b.xml:2: body 'b': pos has 'x'"), "{error}");
+        let xml = "<mujoco><include file=\"a.xml\"/></mujoco>";
+        assert!(matches!(Model::from_str(xml, None), Err(MjcfError::File { .. })));
+    }
+
+    #[test]
+    fn what_is_no_model_is_refused() {
+        for xml in ["", "<mujoco>", "<robot/>", "<mujoco><a></b></mujoco>", "text"] {
+            assert!(matches!(Model::from_str(xml, None), Err(MjcfError::Xml { .. })), "{xml}");
+        }
+        // Entities could unfold without end.
+        let entity = "<!DOCTYPE a [<!ENTITY b \"c\">]><mujoco model=\"&b;\"/>";
+        assert!(matches!(Model::from_str(entity, None), Err(MjcfError::Xml { .. })));
+        assert!(matches!(Model::from_file("/nowhere/x.xml"), Err(MjcfError::Read { .. })));
+        assert_eq!(Model::from_str("<mujoco model=\"m\"/>", None).unwrap().name, "m");
+    }
+
+    #[test]
+    fn numbers_beyond_bounds_are_refused() {
+        let mesh = |scale: &str, kind: &str| {
+            let xml = format!(
+                "<mujoco><asset><mesh name=\"t\" vertex=\"0 0 0 1 0 0 0 1 0 0 0 1\" face=\"0 2 1 0 1 3 1 2 3 0 3 2\" \
+                scale=\"{scale}\"/></asset><worldbody><body><geom type=\"{kind}\" mesh=\"t\" pos=\"1e30 0 0\"/></body>\
+                </worldbody></mujoco>"
+            );
+            Model::from_str(&xml, None)
+        };
+        assert!(mesh("1 1 1", "mesh").is_ok());
+        assert!(mesh("1e30 1e30 1e30", "box").is_ok());
+        for (scale, kind) in [("1e31 1 1", "mesh"), ("inf 1 1", "box"), ("1e-200 1e-200 1", "box")]
+        {
+            assert!(matches!(mesh(scale, kind), Err(MjcfError::Value { .. })), "{scale} {kind}");
+        }
+    }
+
+    #[test]
+    fn deep_nests_are_read_and_deeper_ones_refused() {
+        let nest = |tag: &str, depth: usize| {
+            let inside = format!("<{tag}>").repeat(depth) + &format!("</{tag}>").repeat(depth);
+            Model::from_str(&format!("<mujoco><worldbody>{inside}</worldbody></mujoco>"), None)
+        };
+        let deepest = MAX_MJCF_DEPTH - 1;
+        assert_eq!(nest("body", deepest).unwrap().bodies.len(), deepest);
+        assert!(nest("frame", deepest).is_ok());
+        for depth in [deepest + 1, 100_000] {
+            let error = nest("body", depth).unwrap_err();
+            assert!(matches!(error, MjcfError::TooLarge { what: "levels of tags", .. }), "{error}");
+        }
+        let many = "<a/>".repeat(MAX_MJCF_ELEMENTS);
+        let error = Model::from_str(&format!("<mujoco>{many}</mujoco>"), None).unwrap_err();
+        assert!(matches!(error, MjcfError::TooLarge { what: "elements", .. }), "{error}");
+    }
+}

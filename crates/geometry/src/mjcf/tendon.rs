@@ -4,7 +4,7 @@ use super::class::{Class, Classes, MAIN};
 use super::compiler::Compiler;
 use super::element::Element;
 use super::error::MjcfError;
-use super::names::Names;
+use super::names::{Names, Taken};
 use super::solver::SolverParameters;
 use super::value::Limited;
 use super::{JointIndex, Model};
@@ -141,7 +141,7 @@ pub(super) fn read(
     model: &Model,
     names: &Names,
 ) -> Result<Vec<Tendon>, MjcfError> {
-    let mut all: Vec<Tendon> = Vec::new();
+    let (mut all, mut taken) = (Vec::new(), Taken::default());
     for e in root.in_sections("tendon") {
         if e.tag != "fixed" {
             e.refuse("left out: only tendons that are sums of joints are read");
@@ -151,11 +151,41 @@ pub(super) fn read(
         let class: &Class = classes.of(e, MAIN)?;
         let mut spec = class.tendon.clone();
         spec.read(e)?;
-        let tendon = spec.build(e, compiler, model, names)?;
-        if !tendon.name.is_empty() && all.iter().any(|t| t.name == tendon.name) {
-            return Err(e.duplicate("tendon"));
-        }
-        all.push(tendon);
+        taken.add(e, "tendon")?;
+        all.push(spec.build(e, compiler, model, names)?);
     }
     Ok(all)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(tendon: &str) -> Result<Tendon, String> {
+        let xml = format!(
+            "<mujoco><worldbody><body><joint name=\"x\" type=\"slide\" springref=\"0.2\"/><joint name=\"y\" type=\"slide\" \
+            springref=\"0.3\"/><geom size=\"1\"/></body></worldbody><tendon>{tendon}</tendon></mujoco>"
+        );
+        let mut model = Model::from_str(&xml, None).map_err(|e| e.to_string())?;
+        Ok(model.tendons.remove(0))
+    }
+
+    #[test]
+    fn springs_are_slack_where_those_of_the_joints_are() {
+        let fixed = |attributes: &str| {
+            read(&format!(
+                "<fixed name=\"t\" {attributes}><joint joint=\"x\" coef=\"2\"/><joint joint=\"y\" coef=\"-1\"/></fixed>"
+            ))
+        };
+        let (low, high) = fixed("").unwrap().spring_range;
+        assert!((low - 0.1).abs() < 1e-15 && low == high);
+        assert_eq!(fixed("springlength=\"0.5\"").unwrap().spring_range, (0.5, 0.5));
+        assert_eq!(fixed("springlength=\"0.5 1\"").unwrap().spring_range, (0.5, 1.0));
+        assert!(fixed("springlength=\"\"").unwrap_err().contains("springlength must have"));
+        assert!(read("<fixed/>").unwrap_err().contains("fixed: a tendon needs a joint"));
+        let error = read("<fixed><joint joint=\"z\" coef=\"1\"/></fixed>").unwrap_err();
+        assert!(error.contains("joint names 'z'"), "{error}");
+        let error = read("<fixed><joint joint=\"x\"/></fixed>").unwrap_err();
+        assert!(error.contains("coef is missing"), "{error}");
+    }
 }

@@ -14,6 +14,9 @@ pub(super) enum Limited {
     Auto,
 }
 
+/// Larger numbers are mistakes, and products of some of them without end.
+const LARGEST: f64 = 1e30;
+
 impl Element {
     /// A finite number.
     pub(super) fn number(&self, field: &'static str) -> Result<Option<f64>, MjcfError> {
@@ -55,9 +58,10 @@ impl Element {
         let Some(text) = self.text(field) else { return Ok(None) };
         let mut numbers = Vec::new();
         for word in text.split_whitespace() {
-            let number = word.parse::<f64>().ok().filter(|x| x.is_finite());
+            let number = word.parse::<f64>().ok().filter(|x| x.abs() <= LARGEST);
             let Some(number) = number else {
-                return Err(self.invalid(field, format!("has '{word}', which is no finite number")));
+                let reason = format!("has '{word}', which is no number up to {LARGEST:e}");
+                return Err(self.invalid(field, reason));
             };
             if numbers.len() == most {
                 return Err(self.invalid(field, format!("has more than {most} numbers")));

@@ -91,3 +91,34 @@ pub(super) fn warnings(root: &Element) -> Vec<Warning> {
     }
     found
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::Model;
+
+    #[test]
+    fn what_is_not_read_is_named_once() {
+        let xml = "<mujoco><option cone=\"elliptic\"/>\n<worldbody><light/><light/><geom size=\"1\" rgba=\"1 0 0 1\" gap=\"0\"/>\n\
+            <body><geom size=\"1\" gap=\"1\"/><replicate count=\"2\"><geom size=\"1\"/></replicate></body></worldbody>\n\
+            <actuator><muscle name=\"m\" tendon=\"t\"/></actuator><sensor><gyro/></sensor></mujoco>";
+        let model = Model::from_str(xml, None).unwrap();
+        let found: Vec<String> = model.warnings.iter().map(ToString::to_string).collect();
+        let expected = [
+            "line 1: option: cone: not read",
+            "line 2: light: not read (2 times)",
+            "line 2: geom: gap: not read (2 times)",
+            "line 3: replicate: not read",
+            "line 4: muscle 'm': left out: actuators of this kind are not read",
+            "line 4: sensor: not read",
+        ];
+        assert_eq!(found, expected);
+    }
+
+    #[test]
+    fn looks_and_what_is_read_give_no_warnings() {
+        let xml = "<mujoco><asset><material name=\"m\" shininess=\"1\"/></asset><worldbody><body><joint name=\"q\" range=\"0 1\"/>\
+            <geom size=\"1\" material=\"m\" user=\"1\"/><site size=\"1\" type=\"box\" group=\"4\"/></body></worldbody>\
+            <actuator><position joint=\"q\" kp=\"1\" group=\"1\"/></actuator></mujoco>";
+        assert_eq!(Model::from_str(xml, None).unwrap().warnings, []);
+    }
+}
