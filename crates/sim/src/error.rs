@@ -2,6 +2,7 @@
 
 use thiserror::Error;
 
+use crate::articulated::ArticulationError;
 use crate::body::error::BodyError;
 use crate::contact::error::LawError;
 use crate::shape::error::ShapeError;
@@ -54,6 +55,9 @@ pub enum SimulationError {
         /// Its name.
         body: String,
     },
+    /// Links are no articulation.
+    #[error(transparent)]
+    Articulation(#[from] ArticulationError),
     /// A body that is no link has no joint.
     #[error("body '{body}' is no link of an articulation")]
     NotALink {

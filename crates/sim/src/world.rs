@@ -150,6 +150,11 @@ impl<S: Scalar> World<S> {
         self.bodies.get(id.index()).ok_or(no_body)
     }
 
+    /// The first body of that name.
+    pub fn body_named(&self, name: &str) -> Option<BodyId> {
+        self.bodies.iter().position(|body| body.name == name).map(BodyId)
+    }
+
     /// The bodies that forces move, links among them.
     pub(crate) fn moved_bodies(&self) -> impl Iterator<Item = BodyId> {
         let moved = self.bodies.iter().enumerate().filter(|(_, body)| body.feels_forces());

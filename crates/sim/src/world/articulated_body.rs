@@ -15,7 +15,7 @@ use super::body_id::BodyId;
 use crate::articulated::adjoint::{Acting, accelerations, link_states};
 use crate::articulated::{Articulation, Joint};
 use crate::error::SimulationError;
-use crate::robot::JointState;
+use crate::robot::driven::JointState;
 use crate::state::State;
 
 /// A tree of links, each a body of its world.

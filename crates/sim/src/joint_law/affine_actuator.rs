@@ -1,0 +1,64 @@
+//! The actuator of MJCF.
+
+use prehend_autodiff::Scalar;
+
+use super::JointLaw;
+use crate::contact::error::LawError;
+use crate::contact::parameters::Parameters;
+
+/// An actuator whose force is affine in length l and rate v of what it pulls at, as MuJoCo's are: (g·(1, l, v)) u + b·(1, l, v) for its
+/// control u. Motors and servos of position and velocity are such actuators. The control is a parameter, `"control"`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AffineActuator {
+    /// The control u.
+    pub control: f64,
+    /// g: force by control, constant, by length and by its rate.
+    pub gain: [f64; 3],
+    /// b: force without control, constant, by length and by its rate.
+    pub bias: [f64; 3],
+    /// Smallest and largest control; infinite without limits.
+    pub control_range: [f64; 2],
+    /// Smallest and largest force \[N m or N\]; infinite without limits.
+    pub force_range: [f64; 2],
+}
+
+impl Parameters for AffineActuator {
+    type Params<T: Copy> = [T; 1];
+
+    fn values(&self) -> [f64; 1] {
+        [self.control]
+    }
+
+    fn names(&self) -> Vec<&'static str> {
+        vec!["control"]
+    }
+
+    fn check(&self, _: &[f64; 1]) -> Result<(), LawError> {
+        let ranges = [("control_range", self.control_range), ("force_range", self.force_range)];
+        match ranges.into_iter().find(|(_, [low, high])| !(low <= high)) {
+            Some((name, [_, value])) => {
+                Err(LawError::Range { name, range: "in ascending order", value })
+            }
+            None => Ok(()),
+        }
+    }
+}
+
+impl JointLaw for AffineActuator {
+    fn effort<S: Scalar>(&self, [control]: [S; 1], position: S, velocity: S) -> S {
+        let affine = |[constant, by_length, by_rate]: [f64; 3]| {
+            position.times(by_length) + velocity.times(by_rate) + S::constant(constant)
+        };
+        let force = affine(self.gain) * within(control, self.control_range) + affine(self.bias);
+        within(force, self.force_range)
+    }
+}
+
+/// `x`, but no less and no more than the ends of `range`.
+fn within<S: Scalar>(x: S, [low, high]: [f64; 2]) -> S {
+    match x.value() {
+        value if value < low => S::constant(low),
+        value if value > high => S::constant(high),
+        _ => x,
+    }
+}

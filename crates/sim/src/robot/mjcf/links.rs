@@ -1,0 +1,103 @@
+//! The links that bodies with their joints are.
+
+use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion};
+use prehend_geometry::mjcf::{Body, Joint as MjcfJoint, JointKind, Model};
+
+use crate::articulated::{Joint, Link};
+
+/// The links of a model: one for each joint, one more where a body's frame is not that of its last joint.
+#[derive(Default)]
+pub(super) struct Chain {
+    pub(super) links: Vec<Link>,
+    /// The link that each body is.
+    pub(super) bodies: Vec<usize>,
+    /// In the order of the model.
+    pub(super) joints: Vec<ChainJoint>,
+}
+
+/// A joint and the link that it moves.
+pub(super) struct ChainJoint {
+    pub(super) name: String,
+    pub(super) kind: JointKind,
+    pub(super) link: usize,
+}
+
+impl Chain {
+    pub(super) fn new(model: &Model, t_world_model: &Isometry3<f64>) -> Self {
+        let mut chain = Self::default();
+        for body in &model.bodies {
+            chain.add(body, t_world_model);
+        }
+        chain
+    }
+
+    fn add(&mut self, body: &Body, t_world_model: &Isometry3<f64>) {
+        let mut parent = body.parent.map(|parent| self.bodies[parent]);
+        // From what the next link hangs on to where it is while its joint is at its reference.
+        let mut place = match parent {
+            Some(_) => body.t_parent_body,
+            None => t_world_model * body.t_parent_body,
+        };
+        for joint in &body.joints {
+            let anchor = Translation3::from(joint.anchor.coords);
+            let (moves, t_body_joint) = match joint.kind {
+                JointKind::Hinge => {
+                    let back = UnitQuaternion::from_axis_angle(&joint.axis, -joint.reference);
+                    (Joint::Revolute(joint.axis), anchor * back)
+                }
+                JointKind::Slide => {
+                    let back = Translation3::from(joint.axis.into_inner() * -joint.reference);
+                    (Joint::Prismatic(joint.axis), Isometry3::from(back))
+                }
+                JointKind::Ball => (Joint::Spherical, Isometry3::from(anchor)),
+                // Its position is one in the world.
+                JointKind::Free => {
+                    place = *t_world_model;
+                    (Joint::Floating, Isometry3::identity())
+                }
+            };
+            let shifted = matches!(joint.kind, JointKind::Hinge | JointKind::Ball)
+                && joint.anchor != Point3::origin();
+            let link = self.push(&body.name, parent, place * t_body_joint, moves);
+            self.links[link].armature = joint.armature;
+            self.joints.push(ChainJoint { name: name_of(joint, body), kind: joint.kind, link });
+            parent = Some(link);
+            place = if shifted { anchor.inverse().into() } else { Isometry3::identity() };
+        }
+        let link =
+            match parent.filter(|_| !body.joints.is_empty() && place == Isometry3::identity()) {
+                Some(link) => link,
+                None => self.push(&body.name, parent, place, Joint::Fixed),
+            };
+        if let Some(inertial) = &body.inertial {
+            let own = &mut self.links[link];
+            (own.mass, own.com, own.inertia) = (inertial.mass, inertial.com, inertial.inertia);
+        }
+        self.bodies.push(link);
+    }
+
+    fn push(
+        &mut self,
+        name: &str,
+        parent: Option<usize>,
+        t_parent_joint: Isometry3<f64>,
+        joint: Joint,
+    ) -> usize {
+        self.links.push(Link {
+            name: name.to_owned(),
+            parent,
+            t_parent_joint,
+            joint,
+            mass: 0.0,
+            com: Point3::origin(),
+            inertia: Matrix3::zeros(),
+            armature: 0.0,
+        });
+        self.links.len() - 1
+    }
+}
+
+/// A joint's name, or its body's if it has none.
+fn name_of(joint: &MjcfJoint, body: &Body) -> String {
+    if joint.name.is_empty() { body.name.clone() } else { joint.name.clone() }
+}

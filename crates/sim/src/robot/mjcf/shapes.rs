@@ -1,0 +1,123 @@
+//! Shapes of a model's geoms.
+
+use nalgebra::Isometry3;
+use parry3d_f64::math::{Pose, Vector};
+use parry3d_f64::shape::{
+    Ball, Capsule, Compound, ConvexPolyhedron, Cuboid, Cylinder, HalfSpace, SharedShape,
+};
+use prehend_geometry::mjcf::{Geom, Model, Shape as MjcfShape};
+
+use super::{MjcfError, MjcfOptions, MjcfRobot};
+use crate::shape::Shape;
+use crate::shape::error::ShapeError;
+use crate::shape::options::ShapeOptions;
+use crate::world::World;
+use crate::world::body::Body;
+
+/// Corners of an ellipsoid's hull along each angle.
+const ELLIPSOID: usize = 12;
+
+impl World {
+    /// Gives the robot's bodies the shapes of their geoms that collide, and adds the fixed ones of the model's world.
+    pub(super) fn add_shapes(
+        &mut self,
+        model: &Model,
+        robot: &MjcfRobot,
+        options: &MjcfOptions,
+    ) -> Result<(), MjcfError> {
+        for (body, id) in model.bodies.iter().zip(&robot.bodies) {
+            let wrong = |error| MjcfError::Shape { body: body.name.clone(), error };
+            if let Some(shape) = shape(&body.geoms, &options.shape_options).map_err(wrong)? {
+                let own = &mut self.bodies[*id];
+                own.surface = shape.surface().cloned();
+                own.field = Some(shape.field().clone());
+            }
+        }
+        for geom in model.world_geoms.iter().filter(|geom| geom.collides()) {
+            let wrong = |error| MjcfError::Shape { body: geom.name.clone(), error };
+            let shape = match geom.shape {
+                MjcfShape::Plane { .. } => {
+                    let turned = options.t_world_model.rotation * geom.t_body_geom.rotation;
+                    let normal = turned * nalgebra::Vector3::z();
+                    let place = options.t_world_model * geom.t_body_geom.translation.vector;
+                    let field = crate::fields::HalfSpace {
+                        normal: nalgebra::Unit::new_normalize(normal),
+                        height: normal.dot(&place),
+                    };
+                    let body = Body::kinematic(&geom.name);
+                    self.add(body.with_field(std::sync::Arc::new(field)));
+                    continue;
+                }
+                _ => shape(std::slice::from_ref(geom), &options.shape_options).map_err(wrong)?,
+            };
+            if let Some(shape) = shape {
+                self.add(Body::fixed_from_shape(&geom.name, &shape));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Of all geoms of a body that collide; none if there are none.
+fn shape(geoms: &[Geom], options: &ShapeOptions) -> Result<Option<Shape>, ShapeError> {
+    let mut parts = Vec::new();
+    for geom in geoms.iter().filter(|geom| geom.collides()) {
+        let (shape, t_geom_shape) = part(&geom.shape)?;
+        parts.push((pose(&(geom.t_body_geom * t_geom_shape)), shape));
+    }
+    if parts.is_empty() {
+        return Ok(None);
+    }
+    Ok(Some(Shape::from_parry_with(&Compound::new(parts), options)?))
+}
+
+/// The shape of parry, whose round ones are about y, and where it is in the geom's frame.
+fn part(shape: &MjcfShape) -> Result<(SharedShape, Isometry3<f64>), ShapeError> {
+    let upright = Isometry3::rotation(nalgebra::Vector3::x() * std::f64::consts::FRAC_PI_2);
+    let vector = |v: &nalgebra::Vector3<f64>| Vector::new(v.x, v.y, v.z);
+    let hull =
+        |points: &[Vector]| ConvexPolyhedron::from_convex_hull(points).ok_or(ShapeError::NotConvex);
+    let own = Isometry3::identity();
+    Ok(match shape {
+        MjcfShape::Plane { .. } => {
+            (SharedShape::new(HalfSpace::new(Vector::new(0.0, 0.0, 1.0))), own)
+        }
+        MjcfShape::Sphere { radius } => (SharedShape::new(Ball::new(*radius)), own),
+        MjcfShape::Capsule { radius, half_length } => {
+            (SharedShape::new(Capsule::new_y(*half_length, *radius)), upright)
+        }
+        MjcfShape::Cylinder { radius, half_length } => {
+            (SharedShape::new(Cylinder::new(*half_length, *radius)), upright)
+        }
+        MjcfShape::Ellipsoid { radii } => (SharedShape::new(hull(&ellipsoid(radii))?), own),
+        MjcfShape::Box { half_extents } => {
+            (SharedShape::new(Cuboid::new(vector(half_extents))), own)
+        }
+        MjcfShape::Mesh(mesh) => {
+            let points: Vec<Vector> = mesh.vertices.iter().map(|p| vector(&p.coords)).collect();
+            (SharedShape::new(hull(&points)?), own)
+        }
+    })
+}
+
+fn ellipsoid(radii: &nalgebra::Vector3<f64>) -> Vec<Vector> {
+    let mut points = Vec::new();
+    for i in 0..=ELLIPSOID {
+        let polar = std::f64::consts::PI * i as f64 / ELLIPSOID as f64;
+        for j in 0..2 * ELLIPSOID {
+            let around = std::f64::consts::PI * j as f64 / ELLIPSOID as f64;
+            let (ring, height) = polar.sin_cos();
+            let (y, x) = around.sin_cos();
+            points.push(Vector::new(radii.x * ring * x, radii.y * ring * y, radii.z * height));
+        }
+    }
+    points
+}
+
+fn pose(pose: &Isometry3<f64>) -> Pose {
+    let (t, r) = (pose.translation.vector, pose.rotation);
+    Pose::from_parts(
+        Vector::new(t.x, t.y, t.z),
+        parry3d_f64::math::Rotation::from_xyzw(r.i, r.j, r.k, r.w),
+    )
+}

@@ -1,0 +1,152 @@
+//! Robots in URDF that forces move.
+
+use std::sync::Arc;
+
+use nalgebra::{Isometry3, Matrix3, Point3};
+use prehend_geometry::robot::{Drive, KinematicTree, Motion, RobotShape};
+
+use crate::articulated::{Articulation, Joint, Link};
+use crate::error::SimulationError;
+use crate::joint_law::damper::JointDamper;
+use crate::joint_law::friction::JointFriction;
+use crate::joint_law::limits::JointLimits;
+use crate::joint_law::spring::JointSpring;
+use crate::world::World;
+use crate::world::body_id::BodyId;
+use crate::world::joint_force::JointAxis;
+
+/// Speed at which dry friction has 1/√2 of its bound \[rad/s or m/s\].
+const FRICTION_SCALE: f64 = 0.01;
+/// Share of a limit's effort per speed against it \[s/rad or s/m\].
+const LIMIT_DAMPING: f64 = 1.0;
+
+/// How a robot in URDF that forces move becomes part of a world.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UrdfOptions {
+    /// Base → world.
+    pub t_world_base: Isometry3<f64>,
+    /// Whether the base floats; else it is fixed.
+    pub floating: bool,
+    /// Time constant of limits and of joints that mimic others \[s\].
+    pub time_constant: f64,
+}
+
+impl Default for UrdfOptions {
+    /// A base fixed at the world's origin, limits that give way for 5 ms.
+    fn default() -> Self {
+        Self { t_world_base: Isometry3::identity(), floating: false, time_constant: 5e-3 }
+    }
+}
+
+impl World {
+    /// Adds the links of `robot` as those of an articulation that forces move, with the damping, friction and limits of its joints, and returns each
+    /// link's body, in the order of [`KinematicTree::links`]. With a shape, links have its distance fields; samples are the caller's to give.
+    ///
+    /// Joints that mimic others follow them by springs. A robot whose joints go where they are told is added by [`World::add_robot`].
+    ///
+    /// # Errors
+    /// If `shape` is not the robot's, or a link weighs nothing and yet should move.
+    pub fn add_articulated_robot(
+        &mut self,
+        robot: &KinematicTree,
+        shape: Option<&RobotShape>,
+        options: &UrdfOptions,
+    ) -> Result<Vec<BodyId>, SimulationError> {
+        let (found, expected) = (shape.map(|shape| shape.links().len()), robot.links().len());
+        if let Some(found) = found.filter(|found| *found != expected) {
+            return Err(SimulationError::Robot { what: "links of the shape", found, expected });
+        }
+        let (links, order) = links(robot, options);
+        let added = self.add_articulation(Articulation::new(links, self.gravity)?);
+        let mut bodies = vec![BodyId(0); expected];
+        order.iter().zip(&added).for_each(|(link, body)| bodies[*link] = *body);
+        if let Some(shape) = shape {
+            for (body, shape) in bodies.iter().zip(shape.links()) {
+                if shape.grid().is_some() {
+                    self.bodies[*body].field = Some(shape.clone());
+                }
+            }
+        }
+        self.add_joint_properties(robot, &bodies, options)?;
+        Ok(bodies)
+    }
+
+    fn add_joint_properties(
+        &mut self,
+        robot: &KinematicTree,
+        bodies: &[BodyId],
+        options: &UrdfOptions,
+    ) -> Result<(), SimulationError> {
+        let inverse = self.inverse_mass();
+        for joint in robot.joints().iter().filter(|joint| joint.motion != Motion::Fixed) {
+            let axis = JointAxis::from(bodies[joint.child]);
+            if let Some(damping) = joint.damping.filter(|damping| *damping > 0.0) {
+                self.add_joint_force(axis, JointDamper { damping })?;
+            }
+            if let Some(friction) = joint.friction.filter(|friction| *friction > 0.0) {
+                let velocity_scale = FRICTION_SCALE;
+                self.add_joint_force(axis, JointFriction { friction, velocity_scale })?;
+            }
+            if let Some((lower, upper)) = joint.limits {
+                let inertia = self.inertia_along(&inverse, &[(axis, 1.0)]);
+                let stiffness = inertia / options.time_constant.powi(2);
+                let limits = JointLimits { lower, upper, stiffness, damping: LIMIT_DAMPING };
+                self.add_joint_force(axis, limits)?;
+            }
+            let Drive::Variable { index, multiplier, offset } = joint.drive else { continue };
+            let leader = robot.joints().iter().find(|other| {
+                let own = Drive::Variable { index, multiplier: 1.0, offset: 0.0 };
+                other.drive == own && other.name == robot.joint_names()[index]
+            });
+            if let Some(leader) = leader.filter(|leader| leader.name != joint.name) {
+                let axes = [(axis, 1.0), (bodies[leader.child].into(), -multiplier)];
+                let inertia = self.inertia_along(&inverse, &axes);
+                let stiffness = inertia / options.time_constant.powi(2);
+                let damping = 2.0 * inertia / options.time_constant;
+                let spring = JointSpring { stiffness, rest: offset };
+                self.add_coupled_force(&axes, Arc::new(spring))?;
+                self.add_coupled_force(&axes, Arc::new(JointDamper { damping }))?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The links, each after its parent, and which of the robot's each of them is.
+fn links(robot: &KinematicTree, options: &UrdfOptions) -> (Vec<Link>, Vec<usize>) {
+    let (mut links, mut order) = (Vec::new(), vec![robot.root()]);
+    let base = if options.floating { Joint::Floating } else { Joint::Fixed };
+    let (mut parents, mut at) = (vec![None], vec![options.t_world_base]);
+    let mut kinds = vec![base];
+    let mut next = 0;
+    while next < order.len() {
+        let index = order[next];
+        let own = &robot.links()[index];
+        let mut link = Link {
+            name: own.name.clone(),
+            parent: parents[next],
+            t_parent_joint: at[next],
+            joint: kinds[next].clone(),
+            mass: 0.0,
+            com: Point3::origin(),
+            inertia: Matrix3::zeros(),
+            armature: 0.0,
+        };
+        if let Some(inertial) = &own.inertial {
+            (link.mass, link.com, link.inertia) = (inertial.mass, inertial.com, inertial.inertia);
+        }
+        links.push(link);
+        for joint in robot.joints().iter().filter(|joint| joint.parent == index) {
+            order.push(joint.child);
+            parents.push(Some(next));
+            at.push(joint.t_parent_joint);
+            kinds.push(match joint.motion {
+                Motion::Fixed => Joint::Fixed,
+                Motion::Revolute => Joint::Revolute(joint.axis),
+                Motion::Prismatic => Joint::Prismatic(joint.axis),
+            });
+        }
+        next += 1;
+    }
+    (links, order)
+}
