@@ -35,7 +35,10 @@ impl Parameters for AffineActuator {
 
     fn check(&self, _: &[f64; 1]) -> Result<(), LawError> {
         let ranges = [("control_range", self.control_range), ("force_range", self.force_range)];
-        match ranges.into_iter().find(|(_, [low, high])| !(low <= high)) {
+        match ranges
+            .into_iter()
+            .find(|(_, [low, high])| low.is_nan() || high.is_nan() || low > high)
+        {
             Some((name, [_, value])) => {
                 Err(LawError::Range { name, range: "in ascending order", value })
             }

@@ -17,8 +17,8 @@ use crate::world::joint_force::JointAxis;
 
 /// Speed at which dry friction has 1/√2 of its bound \[rad/s or m/s\].
 const FRICTION_SCALE: f64 = 0.01;
-/// Share of a limit's effort per speed against it \[s/rad or s/m\].
-const LIMIT_DAMPING: f64 = 1.0;
+/// Share of a limit's effort per speed against it \[s/rad or s/m\]: nothing bounces off faster than its inverse.
+const LIMIT_DAMPING: f64 = 100.0;
 
 /// How a robot in URDF that forces move becomes part of a world.
 #[derive(Clone, Copy, Debug, PartialEq)]

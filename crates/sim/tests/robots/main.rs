@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used)] // a test may panic; helpers outside test functions count as code to the lint
 
 mod golden;
+mod gripper;
 
 use std::path::PathBuf;
 

@@ -20,8 +20,8 @@ use crate::world::joint_force::{JointAxis, JointForceId};
 
 /// Speed at which dry friction has 1/√2 of its bound \[rad/s or m/s\].
 const FRICTION_SCALE: f64 = 0.01;
-/// Share of a limit's effort per speed against it \[s/rad or s/m\].
-const LIMIT_DAMPING: f64 = 1.0;
+/// Share of a limit's effort per speed against it \[s/rad or s/m\]: nothing bounces off faster than its inverse.
+const LIMIT_DAMPING: f64 = 100.0;
 
 /// Adds forces along joints.
 pub(super) struct Forces<'a> {
@@ -31,7 +31,6 @@ pub(super) struct Forces<'a> {
     axes: Vec<JointAxis>,
     /// Inverse of the mass matrix with all joints at their neutral coordinates, and where each joint is in it.
     inverse: DMatrix<f64>,
-    softness: f64,
     warnings: &'a mut Vec<String>,
     pub(super) actuators: Vec<(String, JointForceId)>,
 }
@@ -41,11 +40,10 @@ impl<'a> Forces<'a> {
         world: &'a mut World,
         model: &'a Model,
         axes: Vec<JointAxis>,
-        softness: f64,
         warnings: &'a mut Vec<String>,
     ) -> Self {
         let inverse = world.inverse_mass();
-        Self { world, model, axes, inverse, softness, warnings, actuators: Vec::new() }
+        Self { world, model, axes, inverse, warnings, actuators: Vec::new() }
     }
 
     pub(super) fn add_all(&mut self) -> Result<(), MjcfError> {
@@ -109,7 +107,7 @@ impl<'a> Forces<'a> {
         (lower, upper): (f64, f64),
         solver: &SolverParameters,
     ) -> Result<(), MjcfError> {
-        let [stiffness, _] = stiffness(solver, self.inertia(axes), self.softness);
+        let [stiffness, _] = stiffness(solver, self.inertia(axes), 1.0);
         self.add(axes, JointLimits { lower, upper, stiffness, damping: LIMIT_DAMPING })?;
         Ok(())
     }

@@ -15,6 +15,9 @@ use crate::world::body_id::BodyId;
 use crate::world::joint_force::JointAxis;
 use crate::world::weld::{Weld, WeldStiffness};
 
+/// Mobility that counts, as part of that of the most mobile direction.
+const LEAST_MOBILITY: f64 = 1e-2;
+
 impl World {
     /// Adds the equality constraints of a model that act from the beginning.
     pub(super) fn add_loops(
@@ -97,7 +100,7 @@ impl World {
         Ok(self.add_weld(Weld { bodies, frames, stiffness })?)
     }
 
-    /// What a force between points of two bodies of the last articulation has to accelerate \[kg\], on average over its directions.
+    /// What a force between points of two bodies of the last articulation has to accelerate at most \[kg\].
     fn mass_between(&self, bodies: [BodyId; 2], points: [Point3<f64>; 2]) -> f64 {
         let tree = &self.articulations[self.articulations.len() - 1].tree;
         let rest = vec![0.0; tree.freedoms()];
@@ -109,11 +112,9 @@ impl World {
             }
         }
         let mobility = &relative * self.inverse_mass() * relative.transpose();
-        // Directions in which nothing moves do not count.
+        // By the least mobile direction: others are damped the more. One in which next to nothing moves does not count.
         let eigenvalues = mobility.symmetric_eigenvalues();
-        let largest = eigenvalues.max();
-        let moving: Vec<f64> =
-            eigenvalues.iter().copied().filter(|value| *value > 1e-6 * largest).collect();
-        moving.len() as f64 / moving.iter().sum::<f64>()
+        let least = LEAST_MOBILITY * eigenvalues.max();
+        1.0 / eigenvalues.iter().copied().filter(|x| *x > least).fold(f64::INFINITY, f64::min)
     }
 }

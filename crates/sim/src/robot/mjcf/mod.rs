@@ -27,13 +27,13 @@ pub struct MjcfOptions {
     pub shapes: bool,
     /// Lengths of those shapes.
     pub shape_options: ShapeOptions,
-    /// Time constants of loops, couplings and limits as a part of those in the file. MuJoCo pushes within its constraints against what would
-    /// violate them; springs alone have to be stiffer to give way no more.
+    /// Time constants of loops and couplings as a part of those in the file. MuJoCo pushes within its constraints against what would violate them;
+    /// springs alone have to be stiffer to give way no more. Limits have those of the file.
     pub softness: f64,
 }
 
 impl Default for MjcfOptions {
-    /// At the world's origin, with shapes, time constants of a fifth.
+    /// At the world's origin, with shapes, time constants of loops a fifth of the file's.
     fn default() -> Self {
         let (t_world_model, shape_options) = (Isometry3::identity(), ShapeOptions::default());
         Self { t_world_model, shapes: true, shape_options, softness: 0.2 }
@@ -162,7 +162,7 @@ impl World {
         }
         let axes: Vec<JointAxis> =
             chain.joints.iter().map(|joint| links[joint.link].into()).collect();
-        let mut forces = forces::Forces::new(self, model, axes, options.softness, &mut warnings);
+        let mut forces = forces::Forces::new(self, model, axes, &mut warnings);
         forces.add_all()?;
         let actuators = forces.actuators;
         self.add_loops(model, &robot, options, &mut warnings)?;
