@@ -5,7 +5,7 @@
 
 use nalgebra::{Isometry3, Vector3};
 use prehend::autodiff::{Recording, Scalar};
-use prehend::sim::articulated::{Articulation, Joint, JointModel, Link};
+use prehend::sim::articulated::{Joint, JointModel, Link};
 use prehend::sim::{BodyId, RigidBody, SimulationError, State, World};
 
 /// Radius of the circle that rolls the cycloid off \[m\], and free fall \[m/s²\].
@@ -42,14 +42,14 @@ fn slide<S: Scalar>(
     let mut states: Vec<State<S>> = world.neutral_states();
     world.set_joint(&mut states, *bead, &[q], &[S::zero()])?;
     let end = world.simulate(&states, time)?;
-    Ok(along(world.joint(&end, *bead)?.position[0]))
+    Ok(along(world.joint_motion(&end, *bead)?[0]))
 }
 
 fn main() -> anyhow::Result<()> {
     let mut world = World::new(Vector3::z() * -GRAVITY);
     let body = RigidBody::ball(0.02, 5e-3)?;
-    let wire = Link::new("bead", None, Isometry3::identity(), Joint::custom(Cycloid), &body);
-    let bead = world.add_articulation(Articulation::new(vec![wire], Vector3::zeros())?)[0];
+    let bead = Link::new("bead", Joint::custom(Cycloid), &body);
+    let bead = world.add_articulation(vec![bead])?[0];
     let scene = (world, bead);
 
     let rate = (GRAVITY / (4.0 * RADIUS)).sqrt();

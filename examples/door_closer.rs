@@ -9,14 +9,14 @@ use std::path::Path;
 use std::sync::Arc;
 
 use anyhow::Context;
-use nalgebra::{Isometry3, Matrix3, Vector3};
+use nalgebra::{Isometry3, Vector3};
 use plotters::prelude::*;
 use prehend::autodiff::optimize::{Adam, Criteria};
 use prehend::autodiff::{Scalar, forward_jacobian};
-use prehend::sim::articulated::{Articulation, Joint, Link};
+use prehend::sim::articulated::{Joint, Link};
 use prehend::sim::{
     Body, BodyId, Bounce, ContactBodies, Coulomb, Cuboid, GapSmoothing, HuntCrossley, JointForceId,
-    JointLaw, JointLimits, JointSpring, Law, Parameters, RigidBody, SimulationError, State,
+    JointLaw, JointLimits, JointSpring, Law, Parameters, Placed, RigidBody, SimulationError, State,
     StaticContactTarget, Surface, TimeSteps, World,
 };
 
@@ -66,7 +66,7 @@ impl JointLaw for Valves {
 /// A door, and a ball that flies towards it.
 struct Doorway {
     world: World,
-    hinges: BodyId,
+    leaf: BodyId,
     valves: JointForceId,
     start: Vec<State>,
 }
@@ -78,18 +78,13 @@ impl Doorway {
         let rigid = RigidBody::ball(BALL, RADIUS)?;
         let ball = world.add(Body::free("ball", rigid).with_surface(Surface::ball(RADIUS)?));
 
-        // A link's frame is where its joint is: the leaf, whose frame is in its middle, is fixed to the hinges.
-        let leaf = RigidBody::cuboid(25.0, HALF)?;
-        let (turning, place) = (Joint::Revolute(Vector3::z_axis()), Isometry3::identity());
-        let mut pins = Link::new("hinges", None, place, turning, &leaf);
-        (pins.mass, pins.inertia) = (0.0, Matrix3::zeros());
-        let t_hinges_leaf = Isometry3::translation(HALF[0], HALF[1], HALF[2]);
-        let leaf = Link::new("leaf", Some(0), t_hinges_leaf, Joint::Fixed, &leaf);
-        let tree = Articulation::new(vec![pins, leaf], Vector3::zeros())?;
-        let [hinges, leaf]: [BodyId; 2] =
-            world.add_articulation(tree).try_into().ok().context("two links")?;
-        let shape = Cuboid { half_extents: HALF.into(), rounding: 5e-3 };
-        world.bodies[leaf].field = Some(Arc::new(shape));
+        // The frame of a link is where its joint is, that of a box in its middle.
+        let pose = Isometry3::translation(HALF[0], HALF[1], HALF[2]);
+        let slab = RigidBody::cuboid(25.0, HALF)?.moved(&pose);
+        let hinges = Joint::Revolute(Vector3::z_axis());
+        let leaf = world.add_articulation(vec![Link::new("leaf", hinges, &slab)])?[0];
+        let field = Cuboid { half_extents: HALF.into(), rounding: 5e-3 };
+        world.bodies[leaf].field = Some(Arc::new(Placed { field, pose }));
 
         let contact_area = Surface::ball(RADIUS)?.area();
         let target =
@@ -100,15 +95,15 @@ impl Doorway {
         let bodies = ContactBodies { samples: ball, field: leaf };
         world.add_contact(bodies, law, GapSmoothing::Hard)?;
         // Shut, it is still pressed to the stop.
-        world.add_joint_force(hinges, JointSpring { stiffness: 10.0, rest: -0.6 })?;
+        world.add_joint_force(leaf, JointSpring { stiffness: 10.0, rest: -0.6 })?;
         let stop = JointLimits { lower: 0.0, upper: 3.0, stiffness: 5e3, damping: 1.0 };
-        world.add_joint_force(hinges, stop)?;
-        let valves = world.add_joint_force(hinges, Valves { sweep: 0.0, latch: 0.0 })?;
+        world.add_joint_force(leaf, stop)?;
+        let valves = world.add_joint_force(leaf, Valves { sweep: 0.0, latch: 0.0 })?;
 
         let mut start = world.neutral_states();
         start[ball] = rigid.at_rest(&Isometry3::translation(0.65, -0.5, 1.0));
         start[ball].linear.y = SPEED;
-        Ok(Self { world, hinges, valves, start })
+        Ok(Self { world, leaf, valves, start })
     }
 
     /// Angle \[rad\] and speed \[rad/s\] of the door every [`DT`], with these dampings.
@@ -117,11 +112,7 @@ impl Doorway {
         world.joint_force_mut(self.valves).params_mut().copy_from_slice(dampings);
         let start: Vec<State<S>> = self.start.iter().map(State::lift).collect();
         let run = world.rollout(&start, TimeSteps { dt: DT, steps: (TIME / DT) as usize })?;
-        let seen = |states: &Vec<State<S>>| {
-            let joint = world.joint(states, self.hinges)?;
-            Ok([joint.position[0], joint.velocity[0]])
-        };
-        run.iter().map(seen).collect()
+        run.iter().map(|states| world.joint_motion(states, self.leaf)).collect()
     }
 
     /// How long the door takes \[s\], with barriers that keep it from being too fast, by the logarithms of both dampings.

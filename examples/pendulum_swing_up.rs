@@ -9,12 +9,12 @@ use std::f64::consts::PI;
 use std::ops::ControlFlow;
 use std::path::Path;
 
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Isometry3, Vector3};
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use prehend::autodiff::optimize::{Adam, Criteria};
 use prehend::autodiff::{Scalar, Var, gradient};
-use prehend::sim::articulated::{Articulation, Joint, Link};
+use prehend::sim::articulated::{Joint, Link};
 use prehend::sim::{
     Adaptive, BodyId, Integrator, JointForceId, Motor, RigidBody, RungeKutta4, SimulationError,
     State, Step, StepCheckpointed, TimeSteps, World,
@@ -40,12 +40,11 @@ struct Pendulum {
 impl Pendulum {
     fn new() -> anyhow::Result<Self> {
         let ball = RigidBody::ball(MASS, 0.05)?;
-        let ball = RigidBody::new(MASS, *ball.inertia(), Point3::new(0.0, 0.0, -LENGTH))?;
+        let ball = ball.moved(&Isometry3::translation(0.0, 0.0, -LENGTH));
         // About this axis a positive angle is one towards x.
         let hinge = Joint::Revolute(-Vector3::y_axis());
-        let link = Link::new("rod", None, Isometry3::identity(), hinge, &ball);
         let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
-        let rod = world.add_articulation(Articulation::new(vec![link], Vector3::zeros())?)[0];
+        let rod = world.add_articulation(vec![Link::new("rod", hinge, &ball)])?[0];
         let motor = world.add_joint_force(rod, Motor { effort: 0.0 })?;
         Ok(Self { world, rod, motor })
     }
@@ -59,19 +58,12 @@ impl Pendulum {
     ) -> Result<Vec<[S; 2]>, SimulationError> {
         let world = self.world.lift::<S>();
         let start = world.neutral_states();
-        let mut run = Vec::with_capacity(parts * efforts.len() + 1);
-        let control = |step: Step, world: &mut World<S>, states: &mut [State<S>]| {
-            world.joint_force_mut(self.motor).params_mut()[0] = efforts[step.index / parts];
-            run.push(states.to_vec());
+        let control = |step: Step, world: &mut World<S>, _: &mut [State<S>]| {
+            world.joint_force_mut(self.motor).set_param("effort", efforts[step.index / parts])
         };
         let time_steps = TimeSteps { dt: HOLD / parts as f64, steps: parts * efforts.len() };
-        let end = world.simulate_controlled(integrator, &start, time_steps, control)?;
-        run.push(end);
-        let seen = |states: &Vec<State<S>>| {
-            let joint = world.joint(states, self.rod)?;
-            Ok([joint.position[0], joint.velocity[0]])
-        };
-        run.iter().map(seen).collect()
+        let run = world.rollout_controlled(integrator, &start, time_steps, control)?;
+        run.iter().map(|states| world.joint_motion(states, self.rod)).collect()
     }
 
     /// How far the rod ends from upright and at rest.

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Vector3};
-use prehend::sim::articulated::{Articulation, Joint, Link};
+use prehend::sim::articulated::{Joint, Link};
 use prehend::sim::{
     Body, BodyId, Bounce, ContactBodies, Coulomb, Cuboid, GapSmoothing, HalfSpace, HuntCrossley,
     JointForceId, Law, PositionServo, RigidBody, State, StaticContactTarget, Surface, World,
@@ -47,22 +47,18 @@ impl Scene {
         let pushed = Body::free("box", rigid).with_field(Arc::new(sides));
         let pushed = world.add(pushed.with_surface(Surface::uniform(&bottom, area)?));
 
-        let mut parent = None;
-        let mut links = Vec::new();
-        let mut place = Isometry3::translation(0.0, 0.0, HEIGHT);
-        for (name, length) in ["upper arm", "forearm"].into_iter().zip(LINKS) {
+        let rod = |name, length: f64| -> anyhow::Result<Link> {
             let rod = RigidBody::cuboid(2.0 * length, [0.5 * length, 0.02, 0.015])?;
-            let com = Point3::new(0.5 * length, 0.0, 0.0);
-            let rod = RigidBody::new(rod.mass(), *rod.inertia(), com)?;
-            let joint = Joint::Revolute(Vector3::z_axis());
-            links.push(Link::new(name, parent, place, joint, &rod).with_armature(0.01));
-            parent = Some(links.len() - 1);
-            place = Isometry3::translation(length, 0.0, 0.0);
-        }
-        let links = world.add_articulation(Articulation::new(links, Vector3::zeros())?);
+            let rod = rod.moved(&Isometry3::translation(0.5 * length, 0.0, 0.0));
+            Ok(Link::new(name, Joint::Revolute(Vector3::z_axis()), &rod).with_armature(0.01))
+        };
+        let links = world.add_articulation(vec![
+            rod("upper arm", LINKS[0])?.at(Isometry3::translation(0.0, 0.0, HEIGHT)),
+            rod("forearm", LINKS[1])?.on(0, Isometry3::translation(LINKS[0], 0.0, 0.0)),
+        ])?;
         let arm = [links[0], links[1]];
-        let tip = Point3::new(LINKS[1], 0.0, HALF[2] - HEIGHT);
-        let peg = Surface::uniform(&[tip], std::f64::consts::PI * PEG * PEG)?.rounded(PEG)?;
+        let tip = Isometry3::translation(LINKS[1], 0.0, HALF[2] - HEIGHT);
+        let peg = Surface::ball(PEG)?.moved(&tip);
         let peg_area = peg.area();
         world.bodies[arm[1]].surface = Some(Arc::new(peg));
         let servo = PositionServo { target: 0.0, stiffness: 60.0, damping: 5.0, max_effort: 10.0 };

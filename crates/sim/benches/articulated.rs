@@ -51,7 +51,7 @@ fn touching(tree: Articulation, q: &[f64], v: &[f64]) -> anyhow::Result<(World, 
         .filter(|link| tree.links().iter().all(|other| other.parent != Some(*link)))
         .collect();
     let ranges: Vec<_> = (0..tree.links().len()).map(|link| tree.range(link)).collect();
-    let bodies = world.add_articulation(tree);
+    let bodies = world.add_articulation(tree.links().to_vec())?;
     let mut states = world.neutral_states();
     for (body, [coordinates, freedoms]) in bodies.iter().zip(ranges) {
         world.set_joint(&mut states, *body, &q[coordinates], &v[freedoms])?;

@@ -70,6 +70,20 @@ impl<S: Scalar> RigidBody<S> {
         Self::new(mass, Matrix3::from_diagonal_element(moment), Point3::origin())
     }
 
+    /// The same body moved in its model frame: what was at the origin is at `motion`.
+    #[must_use]
+    pub fn moved(&self, motion: &Isometry3<f64>) -> Self {
+        let rotation = motion.rotation.to_rotation_matrix().into_inner().map(S::constant);
+        let about = |matrix: &Matrix3<S>| rotation * matrix * rotation.transpose();
+        let place = motion.translation.vector.map(S::constant);
+        Self {
+            mass: self.mass,
+            inertia: about(&self.inertia),
+            inverse_inertia: about(&self.inverse_inertia),
+            com: (place + rotation * self.com.coords).into(),
+        }
+    }
+
     /// The same body of another density, so that it has `mass` \[kg\]: the inertia is scaled as well.
     ///
     /// # Errors

@@ -64,11 +64,29 @@ pub enum SimulationError {
         /// Its name.
         body: String,
     },
-    /// A joint has no such axis, or is of another articulation than the others.
-    #[error("the joint of link '{link}' has no such axis, or is of another articulation")]
+    /// A joint has no such axis.
+    #[error(
+        "the joint of link '{link}' has no axis {axis} to act along: a fixed or a floating one has none"
+    )]
     NoAxis {
         /// Its name.
         link: String,
+        /// Which axis, from 0.
+        axis: usize,
+    },
+    /// A force along joints of several articulations.
+    #[error("links '{}' and '{}' are of different articulations", .links[0], .links[1])]
+    Apart {
+        /// Their names.
+        links: [String; 2],
+    },
+    /// A law along a joint does not take its parameters.
+    #[error("the law along the joint of link '{link}': {error}")]
+    JointLaw {
+        /// Its name.
+        link: String,
+        /// What is wrong.
+        error: LawError,
     },
     /// A force along no joint.
     #[error("a force along joints needs an axis to act along")]

@@ -1,11 +1,46 @@
 //! Analytic distance fields.
 
-use nalgebra::{Matrix3, Point3, Unit, Vector3};
+use nalgebra::{Isometry3, Matrix3, Point3, Unit, Vector3};
 use prehend_autodiff::Scalar;
 use prehend_geometry::{DistanceField, FieldSample};
 
 use crate::body::error::BodyError;
 use crate::surface::Surface;
+
+/// A field that is moved in the model frame: what was at the origin is at `pose`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Placed<F> {
+    /// The field.
+    pub field: F,
+    /// Where it is \[m\].
+    pub pose: Isometry3<f64>,
+}
+
+impl<F: DistanceField> DistanceField for Placed<F> {
+    fn sample(&self, point: &Point3<f64>, reach: f64) -> Option<FieldSample> {
+        let local = self.pose.inverse_transform_point(point);
+        let FieldSample { distance, gradient, hessian } = self.field.sample(&local, reach)?;
+        let rotation = self.pose.rotation.to_rotation_matrix().into_inner();
+        let hessian = rotation * hessian * rotation.transpose();
+        Some(FieldSample { distance, gradient: rotation * gradient, hessian })
+    }
+
+    fn distance(&self, point: &Point3<f64>, reach: f64) -> Option<f64> {
+        self.field.distance(&self.pose.inverse_transform_point(point), reach)
+    }
+
+    fn lipschitz_bound(&self) -> f64 {
+        self.field.lipschitz_bound()
+    }
+
+    fn thickness(&self) -> f64 {
+        self.field.thickness()
+    }
+
+    fn bounding_ball(&self) -> Option<(Point3<f64>, f64)> {
+        self.field.bounding_ball().map(|(center, radius)| (self.pose * center, radius))
+    }
+}
 
 /// A half-space: everything below a plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -217,7 +252,9 @@ mod tests {
         let (center, radius) = (Point3::new(0.1, -0.2, 0.3), 0.7);
         let normal = Unit::new_normalize(Vector3::new(1.0, 2.0, -0.5));
         let cuboid = |x, y, z| Cuboid { half_extents: Vector3::new(x, y, z), rounding: 0.1 };
-        let fields: [&dyn DistanceField; 7] = [
+        let pose = Isometry3::new(Vector3::new(0.1, 0.2, -0.1), Vector3::new(0.3, -0.5, 0.2));
+        let fields: [&dyn DistanceField; 8] = [
+            &Placed { field: Sphere { center, radius }, pose },
             // Nearest to a corner, an edge, a face, and inside of the shell.
             &cuboid(0.2, 0.3, 0.2),
             &cuboid(0.2, 0.7, 0.2),

@@ -11,7 +11,6 @@ use crate::state::State;
 use crate::time::{Step, TimeSteps};
 use crate::world::World;
 use crate::world::contact_pair::ContactPair;
-use crate::world::joint_force::JointForce;
 
 /// What a simulation with an integrator of one's own choice led to.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,6 +19,27 @@ pub struct Simulation<T> {
     pub states: T,
     /// Whether the steps were short enough.
     pub resolution: Resolution,
+}
+
+/// What a controller may return: nothing, or a result whose error ends the simulation.
+pub trait ControlResult {
+    /// As a result.
+    ///
+    /// # Errors
+    /// If the controller failed.
+    fn into_result(self) -> Result<(), SimulationError>;
+}
+
+impl ControlResult for () {
+    fn into_result(self) -> Result<(), SimulationError> {
+        Ok(())
+    }
+}
+
+impl<E: Into<SimulationError>> ControlResult for Result<(), E> {
+    fn into_result(self) -> Result<(), SimulationError> {
+        self.map_err(Into::into)
+    }
 }
 
 impl<S: Scalar> World<S> {
@@ -112,7 +132,8 @@ impl<S: Scalar> World<S> {
     }
 
     /// [`World::simulate_with`] under `control`, which is called before each step: it sees the states and may set external
-    /// wrenches, gravity, parameters of laws, and the states of kinematic bodies, for that step and those after it.
+    /// wrenches, gravity, parameters of laws, of contacts and [along joints](World::joint_force_mut), and the states of kinematic bodies, for
+    /// that step and those after it. It may return nothing, or a result, whose error ends the simulation.
     ///
     /// Over a scalar that carries derivatives they pass through the controller too.
     ///
@@ -140,18 +161,48 @@ impl<S: Scalar> World<S> {
     ///
     /// # Errors
     /// As [`World::simulate_with`], but for energy, which a controller may bring.
-    pub fn simulate_controlled(
+    pub fn simulate_controlled<R: ControlResult>(
         &self,
         integrator: &impl Integrator,
         initial: &[State<S>],
         time_steps: TimeSteps,
-        mut control: impl FnMut(Step, &mut Self, &mut [State<S>]),
+        control: impl FnMut(Step, &mut Self, &mut [State<S>]) -> R,
+    ) -> Result<Vec<State<S>>, SimulationError> {
+        self.controlled(integrator, initial, time_steps, control, |_| ())
+    }
+
+    /// The states of [`World::simulate_controlled`] at 0, dt, …, `steps`·dt.
+    ///
+    /// # Errors
+    /// See there.
+    pub fn rollout_controlled<R: ControlResult>(
+        &self,
+        integrator: &impl Integrator,
+        initial: &[State<S>],
+        time_steps: TimeSteps,
+        control: impl FnMut(Step, &mut Self, &mut [State<S>]) -> R,
+    ) -> Result<Vec<Vec<State<S>>>, SimulationError> {
+        let mut run = Vec::with_capacity(time_steps.steps + 1);
+        let keep = |states: &[State<S>]| run.push(states.to_vec());
+        let end = self.controlled(integrator, initial, time_steps, control, keep)?;
+        run.push(end);
+        Ok(run)
+    }
+
+    fn controlled<R: ControlResult>(
+        &self,
+        integrator: &impl Integrator,
+        initial: &[State<S>],
+        time_steps: TimeSteps,
+        mut control: impl FnMut(Step, &mut Self, &mut [State<S>]) -> R,
+        mut visit: impl FnMut(&[State<S>]),
     ) -> Result<Vec<State<S>>, SimulationError> {
         let (mut states, mut world) = (self.begin(initial, time_steps)?, self.clone());
         let TimeSteps { dt, steps } = time_steps;
         for index in 0..steps {
             let step = Step::new(index, dt);
-            control(step, &mut world, &mut states);
+            control(step, &mut world, &mut states).into_result()?;
+            visit(&states);
             world.check(&states, step)?;
             states = world.advance(integrator, &states, step)?;
         }
@@ -248,7 +299,7 @@ impl<S: Scalar> World<S> {
             return Err(self.wrong_count(states.len()));
         }
         self.kinds_of_contact().try_for_each(ContactPair::check)?;
-        self.joint_forces.iter().try_for_each(JointForce::check)?;
+        self.joint_forces.iter().try_for_each(|force| self.check_joint_force(force))?;
         match states.iter().all(State::is_finite) {
             true => Ok(()),
             false => Err(self.not_finite(states, states, start)),

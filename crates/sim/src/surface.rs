@@ -1,6 +1,6 @@
 //! Samples of a body's surface, in blocks that are left out together where nothing is near.
 
-use nalgebra::Point3;
+use nalgebra::{Isometry3, Point3};
 
 use crate::body::error::{BodyError, check_lengths};
 
@@ -101,6 +101,15 @@ impl Surface {
         self.rounding = radius;
         self.points.iter_mut().for_each(|point| point.radius = radius);
         Ok(self)
+    }
+
+    /// The same samples moved in the model frame: what was at the origin is at `motion`.
+    #[must_use]
+    pub fn moved(&self, motion: &Isometry3<f64>) -> Self {
+        let mut moved = self.clone();
+        moved.points.iter_mut().for_each(|point| point.position = motion * point.position);
+        moved.blocks.iter_mut().for_each(|block| block.center = motion * block.center);
+        moved
     }
 
     /// A ball of `radius` \[m\] around the origin: one round sample that stands for the area of its cross-section πR². That is the

@@ -59,7 +59,7 @@ pub(super) trait DynJointModel: fmt::Debug + Send + Sync {
 
 impl<J: JointModel> DynJointModel for J {
     fn freedoms(&self) -> usize {
-        JointModel::freedoms(self).min(MOST)
+        JointModel::freedoms(self)
     }
 
     fn course(&self, x: [f64; 2 * MOST]) -> [f64; COURSE] {

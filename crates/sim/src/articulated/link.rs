@@ -3,7 +3,8 @@
 use nalgebra::{Isometry3, Matrix3, Point3, Quaternion, Translation3, Unit, Vector3};
 use prehend_autodiff::Scalar;
 
-use super::joint::Joint;
+use super::joint::{CustomJoint, Joint};
+use super::joint_model::MOST;
 use super::kinematics::Kinematics;
 use crate::body::RigidBody;
 
@@ -32,20 +33,40 @@ pub struct Link<S: Scalar = f64> {
 pub(crate) const NUMBERS: usize = 3 + 4 + 1 + 3 + 6 + 1;
 
 impl<S: Scalar> Link<S> {
-    /// Without armature, of `body` in the link's frame.
-    pub fn new(
-        name: impl Into<String>,
-        parent: Option<usize>,
-        t_parent_joint: Isometry3<S>,
-        joint: Joint,
-        body: &RigidBody<S>,
-    ) -> Self {
+    /// Of `body` in the link's frame, hanging on the world by `joint` at its origin.
+    pub fn new(name: impl Into<String>, joint: Joint, body: &RigidBody<S>) -> Self {
         let (mass, com, inertia) = (body.mass(), *body.com(), *body.inertia());
-        let name = name.into();
-        Self { name, parent, t_parent_joint, joint, mass, com, inertia, armature: S::zero() }
+        Self { mass, com, inertia, ..Self::massless(name, joint) }
+    }
+
+    /// Without mass: what hangs on it has to have some.
+    pub fn massless(name: impl Into<String>, joint: Joint) -> Self {
+        Self {
+            name: name.into(),
+            parent: None,
+            t_parent_joint: Isometry3::identity(),
+            joint,
+            mass: S::zero(),
+            com: Point3::origin(),
+            inertia: Matrix3::zeros(),
+            armature: S::zero(),
+        }
+    }
+
+    /// Hanging on the link number `parent` of those before it, where that has its joint \[m\].
+    #[must_use]
+    pub fn on(self, parent: usize, t_parent_joint: Isometry3<S>) -> Self {
+        Self { parent: Some(parent), t_parent_joint, ..self }
+    }
+
+    /// Hanging on the world, where that has its joint \[m\].
+    #[must_use]
+    pub fn at(self, t_world_joint: Isometry3<S>) -> Self {
+        Self { parent: None, t_parent_joint: t_world_joint, ..self }
     }
 
     /// With `armature` \[kg m² or kg\].
+    #[must_use]
     pub fn with_armature(self, armature: S) -> Self {
         Self { armature, ..self }
     }
@@ -112,6 +133,14 @@ pub enum ArticulationError {
         /// The link.
         link: String,
     },
+    /// A joint type of one's own with too few or too many coordinates.
+    #[error("link {link}: a joint has 1 to 3 coordinates, not {freedoms}")]
+    Freedoms {
+        /// The link.
+        link: String,
+        /// How many its joint has.
+        freedoms: usize,
+    },
     /// A link that could be accelerated without effort.
     #[error("link {link}: {problem}")]
     Mass {
@@ -122,11 +151,29 @@ pub enum ArticulationError {
     },
 }
 
+/// Whether every joint moves some mass, or has armature.
+fn check_moved<S: Scalar>(links: &[Link<S>]) -> Result<(), ArticulationError> {
+    let mut weighs: Vec<bool> = links
+        .iter()
+        .map(|link| link.mass.value() > 0.0 || link.inertia.iter().any(|x| x.value() != 0.0))
+        .collect();
+    for (index, link) in links.iter().enumerate().rev() {
+        if !weighs[index] && link.joint.freedoms() > 0 && link.armature.value() == 0.0 {
+            let problem = "its joint moves no mass: neither the link nor what hangs on it has any";
+            return Err(ArticulationError::Mass { link: link.name.clone(), problem });
+        }
+        if let Some(parent) = link.parent {
+            weighs[parent] |= weighs[index];
+        }
+    }
+    Ok(())
+}
+
 impl<S: Scalar> Articulation<S> {
     /// Of `links`, each after its parent, that fall with `gravity` \[m/s²\].
     ///
     /// # Errors
-    /// If a parent does not come before its link, or a number is not finite or a mass negative.
+    /// If a parent does not come before its link, a number is not finite or a mass negative, or a joint moves no mass.
     pub fn new(links: Vec<Link<S>>, gravity: Vector3<S>) -> Result<Self, ArticulationError> {
         let (mut first, mut link_of) = (Vec::with_capacity(links.len() + 1), Vec::new());
         let mut carriers = Vec::new();
@@ -145,6 +192,12 @@ impl<S: Scalar> Articulation<S> {
             if !numbers.chain([mass, link.armature.value()]).all(f64::is_finite) {
                 return Err(wrong("mass, center of mass or inertia is not finite"));
             }
+            if let Joint::Custom(CustomJoint(model)) = &link.joint
+                && !(1..=MOST).contains(&model.freedoms())
+            {
+                let (link, freedoms) = (link.name.clone(), model.freedoms());
+                return Err(ArticulationError::Freedoms { link, freedoms });
+            }
             first.push(next);
             next = [next[0] + link.joint.coordinates(), next[1] + link.joint.freedoms()];
             link_of.resize(next[1], index);
@@ -156,6 +209,7 @@ impl<S: Scalar> Articulation<S> {
             last.push(carrier);
         }
         first.push(next);
+        check_moved(&links)?;
         Ok(Self { links, first, link_of, carriers, last, gravity })
     }
 

@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Matrix3, Point3};
+use nalgebra::Isometry3;
 use prehend_geometry::robot::{Drive, KinematicTree, Motion, RobotShape};
 
-use crate::articulated::{Articulation, Joint, Link};
+use crate::articulated::{Joint, Link};
 use crate::error::SimulationError;
 use crate::joint_law::damper::JointDamper;
 use crate::joint_law::friction::JointFriction;
@@ -21,12 +21,12 @@ const FRICTION_SCALE: f64 = 0.01;
 const LIMIT_DAMPING: f64 = 100.0;
 
 /// How a robot in URDF that forces move becomes part of a world.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct UrdfOptions {
     /// Base → world.
     pub t_world_base: Isometry3<f64>,
-    /// Whether the base floats; else it is fixed.
-    pub floating: bool,
+    /// How the base hangs on the world.
+    pub base: Joint,
     /// Time constant of limits and of joints that mimic others \[s\].
     pub time_constant: f64,
 }
@@ -34,7 +34,7 @@ pub struct UrdfOptions {
 impl Default for UrdfOptions {
     /// A base fixed at the world's origin, limits that give way for 5 ms.
     fn default() -> Self {
-        Self { t_world_base: Isometry3::identity(), floating: false, time_constant: 5e-3 }
+        Self { t_world_base: Isometry3::identity(), base: Joint::Fixed, time_constant: 5e-3 }
     }
 }
 
@@ -57,7 +57,7 @@ impl World {
             return Err(SimulationError::Robot { what: "links of the shape", found, expected });
         }
         let (links, order) = links(robot, options);
-        let added = self.add_articulation(Articulation::new(links, self.gravity)?);
+        let added = self.add_articulation(links)?;
         let mut bodies = vec![BodyId(0); expected];
         order.iter().zip(&added).for_each(|(link, body)| bodies[*link] = *body);
         if let Some(shape) = shape {
@@ -115,23 +115,15 @@ impl World {
 /// The links, each after its parent, and which of the robot's each of them is.
 fn links(robot: &KinematicTree, options: &UrdfOptions) -> (Vec<Link>, Vec<usize>) {
     let (mut links, mut order) = (Vec::new(), vec![robot.root()]);
-    let base = if options.floating { Joint::Floating } else { Joint::Fixed };
     let (mut parents, mut at) = (vec![None], vec![options.t_world_base]);
-    let mut kinds = vec![base];
+    let mut kinds = vec![options.base.clone()];
     let mut next = 0;
     while next < order.len() {
         let index = order[next];
         let own = &robot.links()[index];
-        let mut link = Link {
-            name: own.name.clone(),
-            parent: parents[next],
-            t_parent_joint: at[next],
-            joint: kinds[next].clone(),
-            mass: 0.0,
-            com: Point3::origin(),
-            inertia: Matrix3::zeros(),
-            armature: 0.0,
-        };
+        let (parent, t_parent_joint) = (parents[next], at[next]);
+        let massless = Link::massless(&own.name, kinds[next].clone());
+        let mut link = Link { parent, t_parent_joint, ..massless };
         if let Some(inertial) = &own.inertial {
             (link.mass, link.com, link.inertia) = (inertial.mass, inertial.com, inertial.inertia);
         }

@@ -12,8 +12,9 @@ use prehend_autodiff::rigid::turned;
 use super::World;
 use super::body::Body;
 use super::body_id::BodyId;
+use super::joint_force::JointAxis;
 use crate::articulated::adjoint::{Acting, accelerations, link_states};
-use crate::articulated::{Articulation, Joint};
+use crate::articulated::{Articulation, Joint, Link};
 use crate::error::SimulationError;
 use crate::robot::driven::JointState;
 use crate::state::State;
@@ -54,14 +55,45 @@ impl<S: Scalar> ArticulatedBody<S> {
 }
 
 impl World {
-    /// Adds the links of `tree` as bodies, named after them, and returns which. Give them samples and fields as other bodies. The state of a
-    /// link is that of its frame; its joint is set by [`World::set_joint`].
-    pub fn add_articulation(&mut self, tree: Articulation) -> Vec<BodyId> {
+    /// Adds links, each after its parent, as bodies named after them, and returns which, in the same order. Give them samples and fields as
+    /// other bodies.
+    ///
+    /// What is free to move are the joints, whose states follow those of the bodies: start from [`World::neutral_states`] and set them by
+    /// [`World::set_joint`]. The state of a link, that of its frame, follows from its joints; what is written there is overwritten.
+    ///
+    /// ```
+    /// use nalgebra::{Isometry3, Point3, Vector3};
+    /// use prehend_sim::articulated::{Joint, Link};
+    /// use prehend_sim::{RigidBody, World};
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// // Two rods of 1 m and 1 kg that hang on each other, and the first on a hinge 2 m above the ground.
+    /// let rod = RigidBody::cuboid(1.0, [0.01, 0.01, 0.5])?.moved(&Isometry3::translation(0.0, 0.0, -0.5));
+    /// let hinge = Joint::Revolute(Vector3::y_axis());
+    /// let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
+    /// let links = world.add_articulation(vec![
+    ///     Link::new("upper", hinge.clone(), &rod).at(Isometry3::translation(0.0, 0.0, 2.0)),
+    ///     Link::new("lower", hinge, &rod).on(0, Isometry3::translation(0.0, 0.0, -1.0)),
+    /// ])?;
+    /// let mut start = world.neutral_states();
+    /// world.set_joint(&mut start, links[0], &[0.5], &[0.0])?;
+    /// let end = world.simulate(&start, 1.0)?;
+    /// let [angle, velocity] = world.joint_motion(&end, links[1])?;
+    /// let tip = end[links[1]].pose * Point3::new(0.0, 0.0, -1.0);
+    /// # assert!(angle.abs() > 0.1 && velocity.is_finite() && tip.z > -1e-9);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// If the links are no tree, or a joint moves no mass.
+    pub fn add_articulation(&mut self, links: Vec<Link>) -> Result<Vec<BodyId>, SimulationError> {
+        let tree = Articulation::new(links, self.gravity)?;
         let links = tree.links().iter();
         let bodies: Vec<BodyId> =
             links.map(|link| Body::link(&link.name)).map(|b| self.add(b)).collect();
         self.articulations.push(ArticulatedBody { tree, bodies: bodies.as_slice().into() });
-        bodies
+        Ok(bodies)
     }
 }
 
@@ -111,6 +143,21 @@ impl<S: Scalar> World<S> {
         let (mut position, mut velocity) = (Vec::new(), Vec::new());
         joint.read(&states[place], &mut position, &mut velocity);
         Ok(JointState { position, velocity })
+    }
+
+    /// Position and velocity along an axis of the joint of a link, the first if a link is given \[rad, rad/s or m, m/s\].
+    ///
+    /// # Errors
+    /// If it is no link, its joint has no such axis, or the states are not those of this world.
+    pub fn joint_motion(
+        &self,
+        states: &[State<S>],
+        axis: impl Into<JointAxis>,
+    ) -> Result<[S; 2], SimulationError> {
+        let JointAxis { link, index } = axis.into();
+        self.check_axis(link, index)?;
+        let (place, joint) = self.joint_place(states, link)?;
+        Ok(joint.along(&states[place], index))
     }
 
     /// The articulation and the link in it that a body is.

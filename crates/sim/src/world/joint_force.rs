@@ -124,7 +124,7 @@ impl World {
     /// Lets `law` act along the joint of a link, which has one axis or whose axis is given.
     ///
     /// # Errors
-    /// If it is no link, or its joint has no such axis; a floating one has none.
+    /// If it is no link, its joint has no such axis (a floating or a fixed one has none), or a parameter of the law is out of its range.
     pub fn add_joint_force(
         &mut self,
         axis: impl Into<JointAxis>,
@@ -137,31 +137,48 @@ impl World {
     /// its factor of the effort. So does a tendon, or a spring that couples joints.
     ///
     /// # Errors
-    /// If there is none, one is no link or has no such axis, or they are not of one articulation.
+    /// If there is none, one is no link or has no such axis, they are not of one articulation, or a parameter of the law is out of its range.
     pub fn add_coupled_force(
         &mut self,
         axes: &[(JointAxis, f64)],
         law: Arc<dyn DynJointLaw>,
     ) -> Result<JointForceId, SimulationError> {
-        let mut articulation = None;
+        let Some((first, _)) = axes.first() else { return Err(SimulationError::NoAxes) };
         for (axis, _) in axes {
-            let (own, link) = self.link_of(axis.link)?;
-            let joint = &self.articulations[own].tree.links()[link].joint;
-            let has = axis.index < joint.freedoms() && !matches!(joint, Joint::Floating);
-            if !has || articulation.is_some_and(|other| other != own) {
-                return Err(SimulationError::NoAxis { link: self.bodies[axis.link].name.clone() });
+            self.check_axis(axis.link, axis.index)?;
+            if self.link_of(axis.link)?.0 != self.link_of(first.link)?.0 {
+                let links = [axis.link, first.link].map(|link| self.bodies[link].name.clone());
+                return Err(SimulationError::Apart { links });
             }
-            articulation = Some(own);
         }
-        if axes.is_empty() {
-            return Err(SimulationError::NoAxes);
-        }
-        self.joint_forces.push(JointForce::new(axes.to_vec(), law));
+        let force = JointForce::new(axes.to_vec(), law);
+        self.check_joint_force(&force)?;
+        self.joint_forces.push(force);
         Ok(JointForceId(self.joint_forces.len() - 1))
     }
 }
 
 impl<S: Scalar> World<S> {
+    /// Whether the joint of a link has such an axis.
+    pub(super) fn check_axis(&self, link: BodyId, axis: usize) -> Result<(), SimulationError> {
+        let (articulation, own) = self.link_of(link)?;
+        let joint = &self.articulations[articulation].tree.links()[own].joint;
+        match axis < joint.freedoms() && !matches!(joint, Joint::Floating) {
+            true => Ok(()),
+            false => Err(SimulationError::NoAxis { link: self.bodies[link].name.clone(), axis }),
+        }
+    }
+
+    /// Whether a law takes its parameters.
+    pub(crate) fn check_joint_force(&self, force: &JointForce<S>) -> Result<(), SimulationError> {
+        let link = |(axis, _): &(JointAxis, f64)| self.bodies[axis.link].name.clone();
+        let wrong = |error| {
+            let link = force.axes.first().map(link).unwrap_or_default();
+            SimulationError::JointLaw { link, error }
+        };
+        force.check().map_err(wrong)
+    }
+
     /// The force along joints called `id`, to be changed.
     ///
     /// # Panics

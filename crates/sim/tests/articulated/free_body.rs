@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
-use prehend_sim::articulated::{Articulation, Joint, Link};
+use prehend_sim::articulated::{Joint, Link};
 use prehend_sim::{
     Body, ContactBodies, Coulomb, GapSmoothing, HalfSpace, HuntCrossley, Law, RigidBody, State,
     Surface, World,
@@ -21,8 +21,8 @@ fn worlds() -> [(World, Vec<State>); 2] {
         let floor = Body::kinematic("floor").with_field(Arc::new(HalfSpace::floor()));
         let floor = world.add(floor);
         let brick = if linked {
-            let link = Link::new("brick", None, Isometry3::identity(), Joint::Floating, &rigid);
-            world.add_articulation(Articulation::new(vec![link], Vector3::zeros()).unwrap())[0]
+            let link = Link::new("brick", Joint::Floating, &rigid);
+            world.add_articulation(vec![link]).unwrap()[0]
         } else {
             world.add(Body::free("brick", rigid))
         };

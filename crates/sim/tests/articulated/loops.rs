@@ -1,7 +1,7 @@
 //! Welds and the loops that they close.
 
 use nalgebra::{Isometry3, Point3, Vector3};
-use prehend_sim::articulated::{Articulation, Joint, Link};
+use prehend_sim::articulated::{Joint, Link};
 use prehend_sim::{Body, BodyId, RigidBody, State, TimeSteps, Weld, WeldStiffness, World};
 
 #[test]
@@ -30,17 +30,14 @@ fn parallelogram() -> (World, [BodyId; 2]) {
     let rod = RigidBody::cuboid(1.0, [0.02, 0.02, 0.5]).unwrap();
     let down = RigidBody::new(1.0, *rod.inertia(), Point3::new(0.0, 0.0, -0.5)).unwrap();
     let across = RigidBody::cuboid(1.0, [0.5, 0.02, 0.02]).unwrap();
-    let hinge = |name, parent, place: [f64; 3], body: &RigidBody| {
-        let at = Isometry3::translation(place[0], place[1], place[2]);
-        Link::new(name, parent, at, Joint::Revolute(Vector3::y_axis()), body)
-    };
+    let hinge = |name, body: &RigidBody| Link::new(name, Joint::Revolute(Vector3::y_axis()), body);
     let across = RigidBody::new(1.0, *across.inertia(), Point3::new(0.5, 0.0, 0.0)).unwrap();
     let links = vec![
-        hinge("left", None, [0.0; 3], &down),
-        hinge("right", None, [1.0, 0.0, 0.0], &down),
-        hinge("coupler", Some(0), [0.0, 0.0, -1.0], &across),
+        hinge("left", &down),
+        hinge("right", &down).at(Isometry3::translation(1.0, 0.0, 0.0)),
+        hinge("coupler", &across).on(0, Isometry3::translation(0.0, 0.0, -1.0)),
     ];
-    let bodies = world.add_articulation(Articulation::new(links, Vector3::zeros()).unwrap());
+    let bodies = world.add_articulation(links).unwrap();
     let frames = [Isometry3::translation(1.0, 0.0, 0.0), Isometry3::translation(0.0, 0.0, -1.0)];
     let stiffness = WeldStiffness::critical(1.0, 0.0, 2e-3);
     world.add_weld(Weld { bodies: [bodies[2], bodies[1]], frames, stiffness }).unwrap();

@@ -1,7 +1,7 @@
 //! Against closed forms.
 
 use nalgebra::{Isometry3, Vector3};
-use prehend_sim::articulated::{Articulation, Joint, Link};
+use prehend_sim::articulated::{Joint, Link};
 use prehend_sim::{
     Adaptive, BodyId, Integrator, JointDamper, JointLimits, JointSpring, RigidBody, RungeKutta4,
     SemiImplicitEuler, State, TimeSteps, World,
@@ -16,9 +16,8 @@ fn pendulum() -> (World, BodyId, f64) {
     let (inertia, com) = (*ball.inertia(), nalgebra::Point3::new(0.0, 0.0, -1.0));
     let ball = RigidBody::new(1.0, inertia, com).unwrap();
     let hinge = Joint::Revolute(Vector3::y_axis());
-    let link = Link::new("rod", None, Isometry3::translation(0.0, 0.0, 2.0), hinge, &ball);
-    let tree = Articulation::new(vec![link], Vector3::zeros()).unwrap();
-    let rod = world.add_articulation(tree)[0];
+    let link = Link::new("rod", hinge, &ball).at(Isometry3::translation(0.0, 0.0, 2.0));
+    let rod = world.add_articulation(vec![link]).unwrap()[0];
     (world, rod, 1.0 + inertia.m11)
 }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
 use prehend_autodiff::Scalar;
 use prehend_geometry::SplitMix64;
-use prehend_sim::articulated::{Articulation, Joint, JointModel, Link};
+use prehend_sim::articulated::{Joint, JointModel, Link};
 use prehend_sim::{
     Body, ContactBodies, Coulomb, GapSmoothing, HalfSpace, JointDamper, JointFriction, JointLimits,
     JointSpring, KelvinVoigt, Law, PositionServo, RigidBody, Sphere, State, Sticking, Surface,
@@ -60,7 +60,7 @@ pub(super) fn random_scene(seed: u64) -> (World, Vec<State>) {
     let mut random = SplitMix64::new(seed);
     let count = 1 + seed as usize % 6;
     let links = (0..count).map(|index| random_link(&mut random, index, seed.is_multiple_of(3)));
-    let tree = Articulation::new(links.collect(), Vector3::zeros()).unwrap();
+    let links: Vec<Link> = links.collect();
     let mut world = World::new(Vector3::new(0.1, -0.2, -9.81));
     let floor = Body::kinematic("floor")
         .with_field(Arc::new(HalfSpace { height: -0.02, ..HalfSpace::floor() }));
@@ -72,7 +72,7 @@ pub(super) fn random_scene(seed: u64) -> (World, Vec<State>) {
     };
     let free = world.add(Body::free("ball", RigidBody::ball(0.3, 0.06).unwrap()));
     ball(&mut world, free, 0.06);
-    let bodies = world.add_articulation(tree);
+    let bodies = world.add_articulation(links).unwrap();
     bodies.iter().for_each(|body| ball(&mut world, *body, 0.08));
     let coulomb = Coulomb { friction: 0.5, slip_scale: 5e-2 };
     let spring = KelvinVoigt { stiffness: 3e5, damping: 1e3 };

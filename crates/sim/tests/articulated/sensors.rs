@@ -1,7 +1,7 @@
 //! Sensors against differences of the motion.
 
 use nalgebra::{Isometry3, Point3, Vector3};
-use prehend_sim::articulated::{Articulation, Joint, Link};
+use prehend_sim::articulated::{Joint, Link};
 use prehend_sim::{Body, RigidBody, State, World};
 
 #[test]
@@ -10,11 +10,11 @@ fn an_accelerometer_shows_the_motion_less_free_fall() {
     let rigid = RigidBody::cuboid(1.0, [0.1, 0.05, 0.2]).unwrap();
     let place = |x: f64| Isometry3::new(Vector3::new(x, 0.1, 0.3), Vector3::new(0.2, x, -0.3));
     let links = vec![
-        Link::new("base", None, place(0.0), Joint::Floating, &rigid),
-        Link::new("arm", Some(0), place(0.2), Joint::Spherical, &rigid),
-        Link::new("hand", Some(1), place(-0.3), Joint::Revolute(Vector3::x_axis()), &rigid),
+        Link::new("base", Joint::Floating, &rigid).at(place(0.0)),
+        Link::new("arm", Joint::Spherical, &rigid).on(0, place(0.2)),
+        Link::new("hand", Joint::Revolute(Vector3::x_axis()), &rigid).on(1, place(-0.3)),
     ];
-    let bodies = world.add_articulation(Articulation::new(links, Vector3::zeros()).unwrap());
+    let bodies = world.add_articulation(links).unwrap();
     let stone = world.add(Body::free("stone", rigid));
     world.bodies[stone].external_wrench.x = 2.0;
     world.bodies[bodies[2]].external_wrench.y = 3.0;

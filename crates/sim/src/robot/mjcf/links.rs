@@ -1,8 +1,9 @@
 //! The links that bodies with their joints are.
 
-use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion};
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion};
 use prehend_geometry::mjcf::{Body, Joint as MjcfJoint, JointKind, Model};
 
+use super::MjcfOptions;
 use crate::articulated::{Joint, Link};
 
 /// The links of a model: one for each joint, one more where a body's frame is not that of its last joint.
@@ -23,15 +24,15 @@ pub(super) struct ChainJoint {
 }
 
 impl Chain {
-    pub(super) fn new(model: &Model, t_world_model: &Isometry3<f64>) -> Self {
+    pub(super) fn new(model: &Model, options: &MjcfOptions) -> Self {
         let mut chain = Self::default();
         for body in &model.bodies {
-            chain.add(body, t_world_model);
+            chain.add(body, options);
         }
         chain
     }
 
-    fn add(&mut self, body: &Body, t_world_model: &Isometry3<f64>) {
+    fn add(&mut self, body: &Body, MjcfOptions { t_world_model, base, .. }: &MjcfOptions) {
         let mut parent = body.parent.map(|parent| self.bodies[parent]);
         // From what the next link hangs on to where it is while its joint is at its reference.
         let mut place = match parent {
@@ -67,6 +68,7 @@ impl Chain {
         let link =
             match parent.filter(|_| !body.joints.is_empty() && place == Isometry3::identity()) {
                 Some(link) => link,
+                None if parent.is_none() => self.push(&body.name, None, place, base.clone()),
                 None => self.push(&body.name, parent, place, Joint::Fixed),
             };
         if let Some(inertial) = &body.inertial {
@@ -83,16 +85,8 @@ impl Chain {
         t_parent_joint: Isometry3<f64>,
         joint: Joint,
     ) -> usize {
-        self.links.push(Link {
-            name: name.to_owned(),
-            parent,
-            t_parent_joint,
-            joint,
-            mass: 0.0,
-            com: Point3::origin(),
-            inertia: Matrix3::zeros(),
-            armature: 0.0,
-        });
+        let link = Link { parent, t_parent_joint, ..Link::massless(name, joint) };
+        self.links.push(link);
         self.links.len() - 1
     }
 }

@@ -9,7 +9,7 @@ use nalgebra::{Isometry3, Quaternion, Unit};
 use prehend_geometry::mjcf::{JointKind, Model};
 use thiserror::Error;
 
-use crate::articulated::{Articulation, ArticulationError};
+use crate::articulated::Joint;
 use crate::error::SimulationError;
 use crate::shape::error::ShapeError;
 use crate::shape::options::ShapeOptions;
@@ -23,6 +23,8 @@ use crate::world::joint_force::{JointAxis, JointForceId};
 pub struct MjcfOptions {
     /// Model's world → world.
     pub t_world_model: Isometry3<f64>,
+    /// How bodies that would be fixed to the model's world hang on it instead: on a slide that lifts a gripper, for instance.
+    pub base: Joint,
     /// Whether bodies get the shapes that collide, as samples and fields; contacts are up to the caller. Meshes are their convex hulls, as in MuJoCo.
     pub shapes: bool,
     /// Lengths of those shapes.
@@ -36,7 +38,7 @@ impl Default for MjcfOptions {
     /// At the world's origin, with shapes, time constants of loops a fifth of the file's.
     fn default() -> Self {
         let (t_world_model, shape_options) = (Isometry3::identity(), ShapeOptions::default());
-        Self { t_world_model, shapes: true, shape_options, softness: 0.2 }
+        Self { t_world_model, base: Joint::Fixed, shapes: true, shape_options, softness: 0.2 }
     }
 }
 
@@ -108,9 +110,6 @@ impl MjcfRobot {
 /// Why a robot in MJCF cannot become part of a world.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum MjcfError {
-    /// Its bodies are no articulation.
-    #[error(transparent)]
-    Articulation(#[from] ArticulationError),
     /// A shape cannot be.
     #[error("body '{body}': {error}")]
     Shape {
@@ -119,7 +118,7 @@ pub enum MjcfError {
         /// What is wrong.
         error: ShapeError,
     },
-    /// A force or state does not fit.
+    /// Its bodies are no articulation, or a force or state does not fit.
     #[error(transparent)]
     World(#[from] SimulationError),
     /// Positions that are too few or too many.
@@ -146,9 +145,8 @@ impl World {
         options: &MjcfOptions,
     ) -> Result<MjcfRobot, MjcfError> {
         let mut warnings: Vec<String> = model.warnings.iter().map(ToString::to_string).collect();
-        let chain = links::Chain::new(model, &options.t_world_model);
-        let tree = Articulation::new(chain.links, self.gravity)?;
-        let links = self.add_articulation(tree);
+        let chain = links::Chain::new(model, options);
+        let links = self.add_articulation(chain.links)?;
         let robot = MjcfRobot {
             bodies: chain.bodies.iter().map(|link| links[*link]).collect(),
             joints: named(&chain.joints, |link| links[link]),

@@ -1,0 +1,135 @@
+//! The gripper, of MJCF where that is at hand, of URDF otherwise.
+
+use std::path::Path;
+
+use anyhow::Context;
+use nalgebra::{Isometry3, Point3, Vector3};
+use prehend::geometry::mjcf::Model;
+use prehend::geometry::robot::{KinematicTree, RobotShape};
+use prehend::sim::articulated::Joint;
+use prehend::sim::{
+    BodyId, JointForceId, LawError, MjcfOptions, PositionServo, UrdfOptions, World,
+};
+
+/// Two fingers that slide towards each other under a plate.
+const URDF: &str = r#"<robot name="slides">
+  <link name="plate">
+    <inertial><origin xyz="0 0 0"/><mass value="0.5"/><inertia ixx="1e-3" ixy="0" ixz="0" iyy="1e-3" iyz="0" izz="1e-3"/></inertial>
+    <collision><geometry><box size="0.04 0.13 0.02"/></geometry></collision>
+  </link>
+  <link name="left">
+    <inertial><origin xyz="0 0 0.05"/><mass value="0.1"/><inertia ixx="1e-4" ixy="0" ixz="0" iyy="1e-4" iyz="0" izz="1e-5"/></inertial>
+    <collision><origin xyz="0 0 0.05"/><geometry><box size="0.024 0.01 0.1"/></geometry></collision>
+  </link>
+  <link name="right">
+    <inertial><origin xyz="0 0 0.05"/><mass value="0.1"/><inertia ixx="1e-4" ixy="0" ixz="0" iyy="1e-4" iyz="0" izz="1e-5"/></inertial>
+    <collision><origin xyz="0 0 0.05"/><geometry><box size="0.024 0.01 0.1"/></geometry></collision>
+  </link>
+  <joint name="left" type="prismatic"><parent link="plate"/><child link="left"/><origin xyz="0 0.05 0"/><axis xyz="0 -1 0"/>
+    <limit lower="0" upper="0.05" effort="20" velocity="1"/><dynamics damping="5"/></joint>
+  <joint name="right" type="prismatic"><parent link="plate"/><child link="right"/><origin xyz="0 -0.05 0"/><axis xyz="0 1 0"/>
+    <limit lower="0" upper="0.05" effort="20" velocity="1"/><dynamics damping="5"/></joint>
+</robot>"#;
+
+/// A gripper that hangs on a lift, over the origin.
+pub(crate) struct Gripper {
+    pub(crate) name: String,
+    /// What the lift moves.
+    pub(crate) base: BodyId,
+    /// What presses.
+    pub(crate) pads: [BodyId; 2],
+    /// Corners of each body that is drawn.
+    pub(crate) corners: Vec<(BodyId, Vec<Point3<f64>>)>,
+    lift: JointForceId,
+    /// What closes it, with the parameter to set and its value when closed.
+    closers: Vec<(JointForceId, &'static str, f64)>,
+}
+
+impl Gripper {
+    pub(crate) fn add(world: &mut World) -> anyhow::Result<Self> {
+        let data = std::env::var_os("PREHEND_DATA").unwrap_or_else(|| "../shared/data".into());
+        let file = Path::new(&data).join("robots/robotiq_2f85/2f85.xml");
+        if file.is_file() { Self::from_mjcf(world, &file) } else { Self::from_urdf(world) }
+    }
+
+    /// The gripper of the file, upside down: 0.16 m from its base to where it pinches.
+    fn from_mjcf(world: &mut World, file: &Path) -> anyhow::Result<Self> {
+        let model = Model::from_file(file)?;
+        // Up is the model's −z.
+        let base = Joint::Prismatic(-Vector3::z_axis());
+        let t_world_model = over(0.19);
+        let options = MjcfOptions { t_world_model, base, ..MjcfOptions::default() };
+        let robot = world.add_mjcf(&model, &options)?;
+        for warning in &robot.warnings {
+            println!("not read: {warning}");
+        }
+        let body = |name: &str| robot.body(name).with_context(|| format!("no body {name}"));
+        let base = body("base_mount")?;
+        let closer = robot.actuator("fingers_actuator").context("no actuator")?;
+        let corners = robot.bodies.iter().filter_map(|&body| {
+            let surface = world.bodies[body].surface.as_ref()?;
+            Some((body, surface.points().iter().map(|point| point.position).collect()))
+        });
+        Ok(Self {
+            name: model.name.clone(),
+            base,
+            pads: [body("left_pad")?, body("right_pad")?],
+            corners: corners.collect(),
+            lift: lift(world, base)?,
+            closers: vec![(closer, "control", 255.0)],
+        })
+    }
+
+    fn from_urdf(world: &mut World) -> anyhow::Result<Self> {
+        let robot = KinematicTree::from_urdf_str(URDF, None)?;
+        let shape = RobotShape::new(&robot, 2e-3, 8e-3)?;
+        let base = Joint::Prismatic(-Vector3::z_axis());
+        let options = UrdfOptions { t_world_base: over(0.12), base, ..UrdfOptions::default() };
+        let links = world.add_articulated_robot(&robot, Some(&shape), &options)?;
+        let link = |name: &str| {
+            Ok::<_, anyhow::Error>(links[robot.link_index(name).context("no such link")?])
+        };
+        let pads = [link("left")?, link("right")?];
+        let servo = PositionServo { target: 0.0, stiffness: 1e3, damping: 30.0, max_effort: 10.0 };
+        let closers = pads.map(|pad| world.add_joint_force(pad, servo)).into_iter();
+        let closers = closers.map(|id| Ok((id?, "target", 0.05)));
+        let parts = robot.links().iter().zip(&links);
+        let corners = parts.map(|(link, body)| {
+            (*body, link.parts.iter().flat_map(|part| part.vertices.clone()).collect())
+        });
+        let base = link("plate")?;
+        Ok(Self {
+            name: robot.name().to_owned(),
+            base,
+            pads,
+            corners: corners.collect(),
+            closers: closers.collect::<anyhow::Result<_>>()?,
+            lift: lift(world, base)?,
+        })
+    }
+
+    /// Closes by a part of all it can, and goes to a height \[m\] over that at the start.
+    pub(crate) fn command(
+        &self,
+        world: &mut World,
+        closed: f64,
+        height: f64,
+    ) -> Result<(), LawError> {
+        for (id, param, most) in &self.closers {
+            world.joint_force_mut(*id).set_param(param, closed * most)?;
+        }
+        world.joint_force_mut(self.lift).set_param("target", height)
+    }
+}
+
+/// Upside down at this height \[m\].
+fn over(height: f64) -> Isometry3<f64> {
+    Isometry3::new(Vector3::new(0.0, 0.0, height), Vector3::x() * std::f64::consts::PI)
+}
+
+/// A stiff servo that carries the gripper.
+fn lift(world: &mut World, base: BodyId) -> anyhow::Result<JointForceId> {
+    let servo =
+        PositionServo { target: 0.0, stiffness: 2e4, damping: 4e2, max_effort: f64::INFINITY };
+    Ok(world.add_joint_force(base, servo)?)
+}
