@@ -5,6 +5,7 @@
 
 mod drawing;
 mod gripper;
+mod hull;
 
 use std::sync::Arc;
 

@@ -109,6 +109,11 @@ fn main() -> anyhow::Result<()> {
         });
         let (world, states) = touching(tree.clone(), &q, &v)?;
         let step = Step::new(0, 1e-4);
+        let mut alone = world.clone();
+        alone.contacts.clear();
+        time(&of("step"), || {
+            black_box(alone.step(&SemiImplicitEuler, black_box(&states), step).is_ok());
+        });
         time(&of("step with contacts"), || {
             black_box(world.step(&SemiImplicitEuler, black_box(&states), step).is_ok());
         });
