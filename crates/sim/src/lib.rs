@@ -7,6 +7,9 @@
 //! rollout of a [`World`] carries exact derivatives by its initial states and by every number of the world.
 //! [`StabilityLoss`] measures by such rollouts how far an object is from resting.
 //!
+//! Links that joints hold together are [`articulated`]: they are bodies of a world like others, with laws along their joints
+//! ([`JointLaw`]), contacts, loops ([`Weld`]) and sensors, from code, URDF or MJCF.
+//!
 //! The [`guide`] goes from a world in twenty lines to gradients of long rollouts.
 //!
 //! World-frame conventions: a pose perturbation is the left twist (translation, rotation) about the

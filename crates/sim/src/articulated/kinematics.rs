@@ -35,6 +35,14 @@ pub struct Kinematics<'a, S: Scalar = f64> {
     pub(crate) custom: Option<[Vec<S>; 2]>,
 }
 
+/// Whether inertias are needed.
+#[derive(Clone, Copy, PartialEq)]
+pub(crate) enum Moves {
+    WithMass,
+    /// Positions and velocities alone.
+    Only,
+}
+
 /// Energies \[J\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Energy<S: Scalar = f64> {
@@ -45,7 +53,7 @@ pub struct Energy<S: Scalar = f64> {
 }
 
 impl<'a, S: Scalar> Kinematics<'a, S> {
-    pub(crate) fn new(tree: &'a Articulation<S>, q: &[S], v: &[S]) -> Self {
+    pub(crate) fn new(tree: &'a Articulation<S>, q: &[S], v: &[S], moves: Moves) -> Self {
         tree.check(q, v);
         let count = tree.links().len();
         let mut at = Self {
@@ -108,9 +116,11 @@ impl<'a, S: Scalar> Kinematics<'a, S> {
                 at.axes.push(axis);
             }
             let of_parent = link.parent.map_or_else(Vector6::zeros, |p| at.velocities[p]);
-            let com = place + rotation * link.com.coords;
-            let inertia = rotation * link.inertia * rotation.transpose();
-            at.inertias.push(SpatialInertia::new(link.mass, &com, &inertia));
+            if moves == Moves::WithMass {
+                let com = place + rotation * link.com.coords;
+                let inertia = rotation * link.inertia * rotation.transpose();
+                at.inertias.push(SpatialInertia::new(link.mass, &com, &inertia));
+            }
             at.rotations.push(rotation);
             at.places.push(place);
             let velocity = of_parent + joint_velocity;

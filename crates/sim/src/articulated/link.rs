@@ -5,7 +5,7 @@ use prehend_autodiff::Scalar;
 
 use super::joint::{CustomJoint, Joint};
 use super::joint_model::MOST;
-use super::kinematics::Kinematics;
+use super::kinematics::{Kinematics, Moves};
 use crate::body::RigidBody;
 
 /// A link and the joint that it hangs on.
@@ -283,7 +283,12 @@ impl<S: Scalar> Articulation<S> {
     /// # Panics
     /// If there are not as many as there should be.
     pub fn kinematics(&self, q: &[S], v: &[S]) -> Kinematics<'_, S> {
-        Kinematics::new(self, q, v)
+        Kinematics::new(self, q, v, Moves::WithMass)
+    }
+
+    /// [`kinematics`](Self::kinematics) without inertias: where links are and how they move.
+    pub(crate) fn motion(&self, q: &[S], v: &[S]) -> Kinematics<'_, S> {
+        Kinematics::new(self, q, v, Moves::Only)
     }
 
     pub(crate) fn check(&self, q: &[S], v: &[S]) {

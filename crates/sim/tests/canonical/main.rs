@@ -1,4 +1,4 @@
-//! Canonical contact problems with closed forms, for every integrator and every contact law they apply to.
+//! Canonical problems of contact and joints with closed forms, for every integrator and every contact law they apply to.
 //!
 //! `cargo test -p prehend-sim --release --test canonical -- --nocapture` prints the table. An integrator is added by
 //! one entry in [`integrators::SCHEMES`], a law by one in [`laws::LAWS`], a problem by one in [`PROBLEMS`].
@@ -10,6 +10,7 @@ mod compliant_balance;
 mod flight;
 mod friction;
 mod integrators;
+mod joints;
 mod laws;
 mod painleve;
 mod rest;
@@ -29,6 +30,9 @@ const PROBLEMS: &[Problem] = &[
     Problem { name: "free fall", over: Over::Integrators(flight::free_fall) },
     Problem { name: "torque-free precession", over: Over::Integrators(flight::precession) },
     Problem { name: "intermediate-axis flip", over: Over::Integrators(flight::flip) },
+    Problem { name: "pendulum", over: Over::Integrators(joints::pendulum_period) },
+    Problem { name: "torsion spring", over: Over::Integrators(joints::torsion_spring) },
+    Problem { name: "accelerometer", over: Over::Integrators(joints::accelerometer) },
     Problem { name: "momentum of two bodies", over: Over::Pairs(balls::momentum) },
     Problem { name: "rest", over: Over::Pairs(rest::rest) },
     Problem { name: "restitution", over: Over::Pairs(rest::restitution) },

@@ -13,11 +13,11 @@ use crate::state_coordinates::{STATE, coordinates_of, states_of};
 /// The states of all links, at the origins of their frames, at coordinates `q` with velocities `v`: in reverse mode one node.
 pub(crate) fn link_states<S: Scalar>(tree: &Articulation<S>, q: &[S], v: &[S]) -> Vec<State<S>> {
     if !(S::RECORDED && S::ORDER == 1) {
-        return tree.kinematics(q, v).link_states().collect();
+        return tree.motion(q, v).link_states().collect();
     }
     let [plain_q, plain_v] = [q, v].map(|all| all.iter().map(|x| x.value()).collect::<Vec<f64>>());
     let plain = tree.map(S::value);
-    let result: Vec<State> = plain.kinematics(&plain_q, &plain_v).link_states().collect();
+    let result: Vec<State> = plain.motion(&plain_q, &plain_v).link_states().collect();
     let inputs = Inputs::new(q.iter().chain(v).copied(), tree);
     let (links, varying) = (inputs.links, inputs.varying.clone());
     let outputs: Vec<f64> = coordinates_of(&result).collect();
@@ -49,7 +49,7 @@ struct Node {
 
 impl CustomVjp for Node {
     fn vjp(&self, output_adjoints: &[f64], input_adjoints: &mut [f64]) {
-        let at = self.tree.kinematics(&self.q, &self.v);
+        let at = self.tree.motion(&self.q, &self.v);
         let count = self.tree.links().len();
         let (mut q, mut v) = (vec![0.0; self.q.len()], vec![0.0; self.v.len()]);
         let nothing = LinkAdjoint {
