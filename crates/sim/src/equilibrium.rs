@@ -53,7 +53,7 @@ impl World {
         friction: impl PairFriction,
         reach: f64,
     ) -> Result<Equilibrium, SimulationError> {
-        if states.len() != self.bodies.len() && states.len() != self.state_count() {
+        if states.len() != self.joint_places().end && states.len() != self.state_count() {
             return Err(self.wrong_count(states.len()));
         }
         let found = self.body(body)?;

@@ -9,6 +9,8 @@ pub(crate) mod motor;
 pub(crate) mod position_servo;
 pub(crate) mod slack_spring;
 pub(crate) mod spring;
+#[cfg(test)]
+mod tests;
 pub(crate) mod velocity_servo;
 
 use prehend_autodiff::Scalar;

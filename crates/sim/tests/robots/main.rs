@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used)] // a test may panic; helpers outside test functions count as code to the lint
 
+mod authored;
 mod golden;
 mod gripper;
 

@@ -145,6 +145,9 @@ impl World {
         options: &MjcfOptions,
     ) -> Result<MjcfRobot, MjcfError> {
         let mut warnings: Vec<String> = model.warnings.iter().map(ToString::to_string).collect();
+        for body in model.bodies.iter().filter(|body| body.gravity_compensation != 0.0) {
+            warnings.push(format!("body '{}': its weight is not carried for it", body.name));
+        }
         let chain = links::Chain::new(model, options);
         let links = self.add_articulation(chain.links)?;
         let robot = MjcfRobot {

@@ -1,0 +1,123 @@
+//! Every law against differences, and what is refused.
+
+use nalgebra::{Isometry3, Vector3};
+use prehend_autodiff::{Fwd, Scalar};
+
+use crate::articulated::{ArticulationError, Joint, JointModel, Link};
+use crate::*;
+
+fn laws() -> Vec<Box<dyn DynJointLaw>> {
+    let servo = PositionServo { target: 0.7, stiffness: 3.0, damping: 0.2, max_effort: 1e3 };
+    let limits = JointLimits { lower: -0.1, upper: 0.1, stiffness: 40.0, damping: 0.3 };
+    let everything = [f64::NEG_INFINITY, f64::INFINITY];
+    let actuator = AffineActuator {
+        control: 0.4,
+        gain: [2.0, 0.3, -0.1],
+        bias: [0.1, -1.0, -0.2],
+        control_range: [-1.0, 1.0],
+        force_range: everything,
+    };
+    vec![
+        Box::new(JointSpring { stiffness: 2.0, rest: 0.3 }),
+        Box::new(SlackSpring { stiffness: 2.0, lower: -0.2, upper: 0.2 }),
+        Box::new(JointDamper { damping: 0.5 }),
+        Box::new(JointFriction { friction: 0.4, velocity_scale: 0.1 }),
+        Box::new(limits),
+        Box::new(Motor { effort: 0.7 }),
+        Box::new(servo),
+        Box::new(VelocityServo { target: 0.5, damping: 2.0, max_effort: 1e3 }),
+        Box::new(actuator),
+    ]
+}
+
+#[test]
+fn efforts_have_their_derivatives_and_passive_laws_take_energy() {
+    for (index, law) in laws().iter().enumerate() {
+        let p = law.param_values();
+        assert_eq!(p.len(), law.param_names().len());
+        law.check(&p).unwrap();
+        for (q, v) in [(0.5, 0.3), (-0.4, -0.2), (0.05, 0.0), (0.3, -0.7)] {
+            let step = 1e-6;
+            let difference = |f: &dyn Fn(f64) -> f64| (f(step) - f(-step)) / (2.0 * step);
+            let found = law.effort_by_motion(&p, q, v);
+            assert_eq!(found.value, law.effort(&p, q, v));
+            let by_position = difference(&|x| law.effort(&p, q + x, v));
+            let by_velocity = difference(&|x| law.effort(&p, q, v + x));
+            for (slope, expected) in found.derivative.into_iter().zip([by_position, by_velocity]) {
+                assert!((slope - expected).abs() < 1e-7, "{index}: {slope} {expected}");
+            }
+            for k in 0..p.len() {
+                let mut along: Vec<Fwd<1>> = p.iter().map(|p| Fwd::constant(*p)).collect();
+                along[k] = Fwd::variable(p[k], 0);
+                let [slope] = law.effort_along(&along, q, v).derivative;
+                let expected = difference(&|x| {
+                    let mut moved = p.clone();
+                    moved[k] += x;
+                    law.effort(&moved, q, v)
+                });
+                assert!((slope - expected).abs() < 1e-7, "{index} {k}: {slope} {expected}");
+            }
+            if law.is_passive() {
+                let damped = law.effort(&p, q, v) - law.effort(&p, q, 0.0);
+                assert!(damped * v <= 1e-12, "{index} brings energy");
+            }
+        }
+        assert!(law.effort(&[], 0.0, 0.0).is_nan());
+        assert!(matches!(law.check(&[]), Err(LawError::Count { .. })));
+    }
+}
+
+#[test]
+fn what_cannot_be_is_refused_where_it_is_added() {
+    let mut world = World::new(Vector3::zeros());
+    let rod = RigidBody::cuboid(1.0, [0.1; 3]).unwrap();
+    let hinge = Joint::Revolute(Vector3::x_axis());
+    let stone = world.add(Body::free("stone", rod));
+    let links = vec![Link::new("rod", hinge.clone(), &rod), Link::new("plate", Joint::Fixed, &rod)];
+    let links = world.add_articulation(links).unwrap();
+    let other = world.add_articulation(vec![Link::new("other", hinge.clone(), &rod)]).unwrap()[0];
+    let damper = |damping| JointDamper { damping };
+    let refused = |error: SimulationError| error.to_string();
+    for (error, message) in [
+        (
+            refused(world.add_joint_force(links[0], damper(-1.0)).unwrap_err()),
+            "the law along the joint of link 'rod': damping must be zero or positive, is -1",
+        ),
+        (
+            refused(world.add_joint_force(links[1], damper(1.0)).unwrap_err()),
+            "the joint of link 'plate' has no axis 0 to act along: a fixed or a floating one has none",
+        ),
+        (
+            refused(world.add_joint_force(stone, damper(1.0)).unwrap_err()),
+            "body 'stone' is no link of an articulation",
+        ),
+    ] {
+        assert_eq!(error, message);
+    }
+    let both = [(links[0].into(), 1.0), (other.into(), -1.0)];
+    let apart = world.add_coupled_force(&both, std::sync::Arc::new(damper(1.0))).unwrap_err();
+    assert!(matches!(apart, SimulationError::Apart { .. }));
+    let id = world.add_joint_force(links[0], damper(1.0)).unwrap();
+    assert!(world.joint_force_mut(id).set_param("friction", 1.0).is_err());
+    world.joint_force_mut(id).set_param("damping", f64::NAN).unwrap();
+    let states = world.neutral_states();
+    assert!(matches!(world.simulate(&states, 0.1), Err(SimulationError::JointLaw { .. })));
+
+    #[derive(Debug)]
+    struct Many;
+    impl JointModel for Many {
+        fn freedoms(&self) -> usize {
+            4
+        }
+        fn placement<S: Scalar>(&self, _: &[S]) -> Isometry3<S> {
+            Isometry3::identity()
+        }
+    }
+    let many = world.add_articulation(vec![Link::new("many", Joint::custom(Many), &rod)]);
+    let expected = ArticulationError::Freedoms { link: "many".to_owned(), freedoms: 4 };
+    assert_eq!(many, Err(SimulationError::Articulation(expected)));
+    let light = world.add_articulation(vec![Link::massless("feather", hinge.clone())]);
+    assert!(matches!(light, Err(SimulationError::Articulation(ArticulationError::Mass { .. }))));
+    let carried = Link::new("stone", Joint::Fixed, &rod).on(0, Isometry3::identity());
+    assert!(world.add_articulation(vec![Link::massless("feather", hinge), carried]).is_ok());
+}

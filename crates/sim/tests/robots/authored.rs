@@ -1,0 +1,100 @@
+//! A model with joints of every kind, several on a body, anchors and references. Poses and efforts against gravity are MuJoCo's.
+
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
+use prehend_geometry::mjcf::Model;
+use prehend_sim::{BodyId, MjcfError, MjcfOptions, TimeSteps, World};
+
+const MODEL: &str = r#"<mujoco model="authored"><compiler angle="radian"/><worldbody>
+    <geom name="ground" type="plane" size="1 1 .1"/>
+    <body name="base" pos="0.1 0.2 0.3" euler="0.1 0.2 0.3">
+        <geom type="box" size="0.1 0.1 0.05" mass="2"/>
+        <body name="elbow" pos="0.2 0 0.1" euler="0 0.4 0">
+            <joint name="yaw" type="hinge" axis="0 0 1" pos="0.01 0.02 0" ref="0.2" armature="0.01"/>
+            <joint name="slide" type="slide" axis="1 0 0" ref="0.05"/>
+            <joint name="pitch" type="hinge" axis="0 1 0" pos="0 0 0.03"/>
+            <inertial mass="0.5" pos="0.05 0 0" diaginertia="1e-3 2e-3 2.5e-3"/>
+            <geom type="capsule" fromto="0 0 0 0.1 0 0" size="0.02"/>
+            <body name="hand" pos="0.15 0 0"><joint name="ball" type="ball" pos="0 0.01 0"/>
+                <inertial mass="0.2" pos="0 0 0.02" diaginertia="1e-4 2e-4 2.5e-4"/></body>
+        </body>
+    </body>
+    <body name="free" pos="0 0 1"><freejoint name="flight"/><geom type="sphere" size="0.05" mass="0.3"/></body>
+    </worldbody></mujoco>"#;
+
+/// `qpos` of MuJoCo; quaternions are normalized.
+const POSITIONS: [f64; 14] =
+    [0.5, 0.12, -0.3, 0.8, 0.1, 0.5, 0.3, 0.4, -0.2, 0.7, 0.9, 0.1, 0.2, -0.3];
+
+/// Places and quaternions (w, x, y, z).
+const POSES: [(&str, [f64; 3], [f64; 4]); 4] = [
+    (
+        "base",
+        [0.1, 0.2, 0.3],
+        [0.9818561728660808, 0.06407134770607116, 0.09115754934299071, 0.15343930202422257],
+    ),
+    (
+        "elbow",
+        [0.36584245108274166, 0.2995921294162346, 0.3270191325985656],
+        [0.940290217836259, 0.11879887109641568, 0.13741095419702984, 0.28785302523044526],
+    ),
+    (
+        "hand",
+        [0.4858313200709744, 0.39019106762408257, 0.2940582025987243],
+        [0.588239489931368, 0.08679998267695734, 0.5761072874817098, 0.5608390667589325],
+    ),
+    (
+        "free",
+        [0.4, -0.2, 0.7],
+        [0.9233805168766387, 0.10259783520851541, 0.20519567041703082, -0.3077935056255462],
+    ),
+];
+
+/// Efforts that hold it, of yaw, slide, pitch and ball.
+const EFFORTS: [f64; 6] = [
+    0.25168540602488265,
+    -3.142003159893175,
+    -0.5054787213099026,
+    -0.035664900824404655,
+    -0.022775542334184662,
+    -0.011387771167092373,
+];
+
+#[test]
+fn joints_of_every_kind_are_where_mujoco_has_them() {
+    let model = Model::from_str(MODEL, None).unwrap();
+    let mut world = World::new(model.gravity);
+    let robot = world.add_mjcf(&model, &MjcfOptions::default()).unwrap();
+    let mut states = world.neutral_states();
+    robot.set_positions(&world, &mut states, &POSITIONS).unwrap();
+    for (name, place, [w, i, j, k]) in POSES {
+        let turn = UnitQuaternion::from_quaternion(Quaternion::new(w, i, j, k));
+        let expected = Isometry3::from_parts(Translation3::from(place), turn);
+        let found = states[robot.body(name).unwrap()].pose;
+        let off = (found.to_homogeneous() - expected.to_homogeneous()).amax();
+        assert!(off < 1e-12, "{name}: {off}");
+    }
+    let own = &world.articulations[0];
+    let [mut q, mut v] = [Vec::new(), Vec::new()];
+    for link in own.bodies() {
+        let joint = world.joint(&states, *link).unwrap();
+        q.extend(joint.position);
+        v.extend(joint.velocity);
+    }
+    let at = own.tree.kinematics(&q, &v).under(world.gravity);
+    let effort = at.inverse_dynamics(&vec![0.0; v.len()]);
+    for (found, expected) in effort.iter().zip(EFFORTS) {
+        assert!((found - expected).abs() < 1e-12, "{found} {expected}");
+    }
+    // The ground is there, and shapes touch it.
+    let ground: BodyId = world.body_named("ground").unwrap();
+    assert!(world.bodies[ground].field.is_some());
+    assert!(world.bodies[robot.body("free").unwrap()].surface.is_some());
+    // The free ball falls.
+    let time_steps = TimeSteps { dt: 0.1, steps: 1 };
+    let end = &world.rollout(&states, time_steps).unwrap()[1];
+    let fallen = 0.7 - end[robot.body("free").unwrap()].pose.translation.z;
+    assert!((fallen - 0.5 * 9.81 * 0.01).abs() < 1e-6, "{fallen}");
+
+    let refused = robot.set_positions(&world, &mut states, &POSITIONS[1..]);
+    assert_eq!(refused, Err(MjcfError::Positions { given: 13, expected: 14 }));
+}
