@@ -213,12 +213,12 @@ impl Adjoints {
     /// as a node because it joins two active numbers; 0 for a constant.
     ///
     /// A fused result (see [`Var`]) has no adjoint of its own. Where it moves one to one with its operand's
-    /// node (`x + 3`), that node's adjoint is returned, which also counts the other uses of the operand;
+    /// node (`x.plus(3.0)`), that node's adjoint is returned, which also counts the other uses of the operand;
     /// any other fused result is refused.
     ///
     /// # Panics
     /// If `input` belongs to another recording, or is a fused result whose derivative with respect to its
-    /// node is not exactly 1 (such as `x * 3`).
+    /// node is not exactly 1 (such as `x.times(3.0)`).
     pub fn wrt(&self, input: Var) -> f64 {
         let Some(node) = input.own_node(self.recording) else { return 0.0 };
         // Recorded after the sweep: nothing depends on it.

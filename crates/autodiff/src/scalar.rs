@@ -12,7 +12,8 @@ use crate::vjp::CustomVjp;
 /// Code written over `S: Scalar` runs unchanged with `f32`, `f64`, forward-mode [`Fwd`](crate::Fwd)
 /// and reverse-mode [`Var`](crate::Var), inside every nalgebra type.
 ///
-/// Plain numbers enter through `S::constant`: write `x * S::constant(2.0)` or `x.times(2.0)`, not `2.0 * x`.
+/// Plain numbers enter through `S::constant`: write `x.times(2.0)` and `x.plus(1.0)`, or `x * S::constant(2.0)`, neither `2.0 * x` nor `x * 2.0`. Functions
+/// such as `cos` of a `Var` or `Fwd` outside of generic code want `use nalgebra::ComplexField`.
 ///
 /// Branches: compare values (`<`, `>` and `==` look at nothing else) and choose with nalgebra's
 /// `if_true.select(condition, if_false)`. Unlike multiplying by 0 or 1, the branch not taken then

@@ -25,7 +25,7 @@ pub struct Resolution {
     pub steps: usize,
     /// By how much the accelerations by contacts changed from one step to the next, relative to them, both as root mean squares
     /// over the steps: about dt·ω for the fastest rate ω at which contacts do anything, √2 for an impact within one step.
-    /// Derivatives of a method of first order are off by about as much. None if the integrator holds its error itself.
+    /// Derivatives of a method of first order are off by about as much. Joints count with all of their accelerations. None if the integrator holds its error itself.
     pub roughness: Option<f64>,
     /// The body with the largest such change, and when \[s\]; none if nothing touched.
     pub roughest: Option<(String, f64)>,

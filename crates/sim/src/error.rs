@@ -110,6 +110,12 @@ pub enum SimulationError {
         /// Its name.
         integrator: &'static str,
     },
+    /// An integrator that knows no welds.
+    #[error("{integrator} knows nothing of welds")]
+    Welds {
+        /// Its name.
+        integrator: &'static str,
+    },
     /// A stability loss without a start to measure from.
     #[error("no perturbation to measure stability with: rest is one")]
     NoPerturbations,

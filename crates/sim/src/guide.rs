@@ -46,7 +46,8 @@
 //! ```
 //!
 //! The pose in a state is that of the center of mass: [`RigidBody::at_rest`] makes a state from the pose of the model, and
-//! [`RigidBody::model_pose`] goes back, which is what a renderer needs. For kinematic and driven bodies the two are the same.
+//! [`RigidBody::model_pose`] goes back, which is what a renderer needs. For kinematic and driven bodies the two are the same; of a link it is
+//! the pose of its frame, wherever its center of mass is.
 //!
 //! Errors say in words what is wrong and where. A `main` that returns `anyhow::Result` prints them so; with
 //! `Box<dyn Error>` it prints the fields alone.
@@ -139,11 +140,12 @@
 //! # Joints and robots
 //! Links that hang on each other by joints are bodies, too: they carry samples and fields and touch what others touch.
 //! [`World::add_articulation`] adds them; what is free to move are the joints. Their states follow those of the bodies, so begin with
-//! [`World::neutral_states`], set joints by [`World::set_joint`], and read them by [`World::joint_motion`]. States of links follow from them.
+//! [`World::neutral_states`], set joints by [`World::set_joint`], and read them by [`World::joint_motion`]. States of links follow from them: what is written there is overwritten. Samples and
+//! fields go to a link once it is there: `world.bodies[finger] = world.bodies[finger].clone().with_cuboid(shape, 0.005)?`.
 //!
 //! What acts along a joint is a [`JointLaw`](crate::JointLaw): springs, dampers, dry friction, limits (no joint has any by itself), motors and servos. A
-//! controller sets their parameters by name, step by step; over numbers that carry derivatives, these pass through it. A servo whose effort is at its bound has
-//! no derivative by its target.
+//! controller sets their parameters by name; they keep these values for the whole step, however it is divided, so that smooth targets want short steps. Over
+//! numbers that carry derivatives, these pass through it. A servo whose effort is at its bound has a derivative of 0 by its target.
 //!
 //! ```
 //! # use nalgebra::{Isometry3, Vector3};
@@ -178,13 +180,17 @@
 //! ```
 //!
 //! Trees have no loops: [`World::add_weld`] closes them by springs. Robots of MJCF come by [`World::add_mjcf`], with joints, actuators, tendons and loops; those of
-//! URDF by [`World::add_articulated_robot`], or by [`World::add_robot`] if their joints simply go where they are told. Sensors:
+//! URDF ([`KinematicTree::from_urdf_file`](prehend_geometry::robot::KinematicTree::from_urdf_file)) by [`World::add_articulated_robot`], which names joints by the
+//! links that they move, or by [`World::add_robot`] if their joints simply go where they are told. Sensors:
 //! [`World::contact_wrench`], [`World::accelerometer`]. A joint type of your own is a function from coordinates to a pose
 //! ([`JointModel`](crate::articulated::JointModel)). [`World::linear_step`] gives a step with its Jacobian in closed form.
 //!
 //! Reverse mode keeps kinematics and dynamics of an articulation as one node each, whose adjoint is in closed form.
-//! [`VelocityVerlet`](crate::VelocityVerlet) and [`BackwardEuler`](crate::BackwardEuler) move no joints. What presses should hold with
-//! [`Sticking`](crate::Sticking), as below: under [`Coulomb`](crate::Coulomb) a gripped object creeps.
+//! [`VelocityVerlet`](crate::VelocityVerlet) and [`BackwardEuler`](crate::BackwardEuler) move no joints;
+//! [`SemiImplicitEuler`](crate::SemiImplicitEuler) does, and simulates a grasp with steps of 0.1 ms some ten times faster than the default. But
+//! [`World::simulate_controlled`] says nothing of steps that are too long: ask [`World::check_time_step`]. What presses should hold with
+//! [`Sticking`](crate::Sticking), as [above](#contacts-that-hold): under [`Coulomb`](crate::Coulomb) and a slip scale of 1 cm/s a gripped box slides by 5 mm in two
+//! seconds.
 //!
 //! # Symmetric contact
 //! Two bodies that both have samples and fields touch both ways, each with half of the force: corners of either are

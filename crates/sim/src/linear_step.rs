@@ -34,8 +34,8 @@ pub struct LinearStep {
 impl World {
     /// A step of [`SemiImplicitEuler`] with its Jacobian.
     ///
-    /// Contacts that stick are as they are given, their deflections are no rows. Where there are such contacts or joint types of
-    /// one's own, derivatives are those of forward mode, direction by direction; else in closed form, much faster.
+    /// Contacts that stick are as they are given, their deflections are no rows. Where there are such contacts, spherical joints or joint types
+    /// of one's own, derivatives are those of forward mode, direction by direction; else in closed form, much faster.
     ///
     /// # Errors
     /// As [`World::step`].
@@ -46,8 +46,7 @@ impl World {
             self.place_links(&mut states);
         }
         let near = self.with_neighbors(&states, step);
-        if near.sticking().next().is_some() || near.joints().any(|j| matches!(j, Joint::Custom(_)))
-        {
+        if near.sticking().next().is_some() || near.joints().any(has_curved_axes) {
             let near = near.into_owned();
             return near.linear_step_by_forward_mode(&states, step);
         }
@@ -251,6 +250,11 @@ impl World {
         displacements.extend(velocities);
         displacements
     }
+}
+
+/// Whether laws along a joint, or its axes, change with its position in a way that the closed form leaves out.
+fn has_curved_axes(joint: &Joint) -> bool {
+    matches!(joint, Joint::Custom(_) | Joint::Spherical)
 }
 
 /// How a joint's displacement after a step follows from that before it and from its velocity after it.

@@ -85,6 +85,9 @@ impl<S: Scalar> World<S> {
         for link in world.articulations.iter_mut().flat_map(|own| own.tree.links_mut()) {
             link.set_numbers(&std::array::from_fn(|_| next()));
         }
+        for own in &world.articulations {
+            own.tree.check_numbers()?;
+        }
         world.gravity = Vector3::from_fn(|_, _| next());
         let pairs = world.kinds_of_contact_mut();
         pairs.flat_map(|pair| pair.params_mut()).for_each(|p| *p = next());

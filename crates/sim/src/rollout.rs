@@ -45,7 +45,8 @@ impl<E: Into<SimulationError>> ControlResult for Result<(), E> {
 impl<S: Scalar> World<S> {
     /// The states of all bodies after `time` \[s\], from `initial`; driven bodies start where their trajectory does.
     ///
-    /// After them come the deflections of contacts that stick ([`Bristles`](crate::Bristles)), if there are such. What goes on
+    /// After them come the states of joints, if there are [articulations](World::add_articulation), and the deflections of contacts that stick
+    /// ([`Bristles`](crate::Bristles)), if there are such. What goes on
     /// from there remembers them; with the states of the bodies alone it starts without deflection.
     ///
     /// Steps are chosen and checked on the way, see [`Adaptive`]. Over `f64` this simulates; over
@@ -134,6 +135,8 @@ impl<S: Scalar> World<S> {
     /// [`World::simulate_with`] under `control`, which is called before each step: it sees the states and may set external
     /// wrenches, gravity, parameters of laws, of contacts and [along joints](World::joint_force_mut), and the states of kinematic bodies, for
     /// that step and those after it. It may return nothing, or a result, whose error ends the simulation.
+    ///
+    /// Nothing is said of how well the steps resolve the motion, as [`World::simulate_with`] does: see [`World::check_time_step`].
     ///
     /// Over a scalar that carries derivatives they pass through the controller too.
     ///
@@ -300,6 +303,7 @@ impl<S: Scalar> World<S> {
         }
         self.kinds_of_contact().try_for_each(ContactPair::check)?;
         self.joint_forces.iter().try_for_each(|force| self.check_joint_force(force))?;
+        self.check_welds()?;
         match states.iter().all(State::is_finite) {
             true => Ok(()),
             false => Err(self.not_finite(states, states, start)),

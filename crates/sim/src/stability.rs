@@ -209,7 +209,7 @@ impl<I: Integrator> StabilityLoss<I> {
         }
         let body = self.world.body(self.object)?;
         let states = self.states.len();
-        if states != self.world.bodies.len() {
+        if states != self.world.joint_places().end {
             return Err(self.world.wrong_count(states));
         }
         let rigid =

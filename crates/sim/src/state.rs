@@ -7,7 +7,7 @@ use prehend_autodiff::{Fwd, Scalar};
 /// Where a body is and how it moves; plain numbers, or numbers that carry derivatives.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct State<S: Scalar = f64> {
-    /// `t_world_com`: origin at the center of mass \[m\], axes of the model.
+    /// `t_world_com`: origin at the center of mass \[m\], axes of the model. Of a link it is that of its frame.
     pub pose: Isometry3<S>,
     /// Velocity of the center of mass, world frame \[m/s\].
     pub linear: Vector3<S>,

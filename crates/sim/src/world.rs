@@ -248,6 +248,9 @@ impl<S: Scalar> World<S> {
     }
 
     /// Moves the bodies that forces do not move to where they are at `time` \[s\], and links to where their joints put them.
+    ///
+    /// # Panics
+    /// If there are fewer states than bodies and joints, where there are joints.
     pub fn drive(&self, states: &mut [State<S>], time: f64) {
         for (body, state) in self.bodies.iter().zip(states.iter_mut()) {
             if let Motion::Driven(trajectory) = &body.motion {

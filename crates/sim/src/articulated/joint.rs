@@ -88,7 +88,7 @@ impl Joint {
             Self::Revolute(_) | Self::Prismatic(_) => &[0.0],
             Self::Spherical => &[0.0, 0.0, 0.0, 1.0],
             Self::Floating => &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
-            Self::Custom(CustomJoint(model)) => &[0.0; MOST][..model.freedoms()],
+            Self::Custom(CustomJoint(model)) => &[0.0; MOST][..model.freedoms().min(MOST)],
         }
     }
 

@@ -82,20 +82,23 @@ impl Joint {
     }
 
     /// Derivatives of the position along an axis by displacements along all.
-    pub(crate) fn position_slopes<S: Scalar>(&self, state: &State<S>, axis: usize) -> [f64; 3] {
+    pub(crate) fn position_slopes<S: Scalar>(&self, state: &State<S>, axis: usize) -> [S; 3] {
         match self {
             Self::Spherical => {
-                let turn = so3_log(&state.value().pose.rotation);
+                let turn = so3_log(&state.pose.rotation);
                 so3_right_jacobian_inverse(&turn).row(axis).transpose().into()
             }
-            _ => std::array::from_fn(|k| if k == axis { 1.0 } else { 0.0 }),
+            _ => std::array::from_fn(|k| if k == axis { S::one() } else { S::zero() }),
         }
     }
 
-    /// Position and velocity along an axis: of a spherical joint, components of its rotation vector.
+    /// Position and velocity along an axis: of a spherical joint, a component of its rotation vector and its rate.
     pub(crate) fn along<S: Scalar>(&self, state: &State<S>, axis: usize) -> [S; 2] {
         match self {
-            Self::Spherical => [so3_log(&state.pose.rotation)[axis], state.angular[axis]],
+            Self::Spherical => {
+                let slopes = Vector3::from(self.position_slopes(state, axis));
+                [so3_log(&state.pose.rotation)[axis], slopes.dot(&state.angular)]
+            }
             _ => [state.pose.translation.vector[axis], state.linear[axis]],
         }
     }

@@ -71,6 +71,18 @@ impl<S: Scalar> Link<S> {
         Self { armature, ..self }
     }
 
+    /// Whether its numbers are those of a link.
+    fn check_numbers(&self) -> Result<(), ArticulationError> {
+        let wrong = |problem| ArticulationError::Mass { link: self.name.clone(), problem };
+        if !(self.mass.value() >= 0.0 && self.armature.value() >= 0.0) {
+            return Err(wrong("mass and armature may not be negative"));
+        }
+        match self.numbers().all(|x| x.value().is_finite()) {
+            true => Ok(()),
+            false => Err(wrong("place, mass, center of mass, inertia or armature is not finite")),
+        }
+    }
+
     /// Place and rotation (i, j, k, w) of its joint, mass, center of mass, inertia xx, yy, zz, xy, xz, yz, and armature.
     pub(crate) fn numbers(&self) -> impl Iterator<Item = S> {
         let pose = &self.t_parent_joint;
@@ -183,15 +195,7 @@ impl<S: Scalar> Articulation<S> {
             if link.parent.is_some_and(|parent| parent >= index) {
                 return Err(ArticulationError::Parent { link: link.name.clone() });
             }
-            let mass = link.mass.value();
-            let wrong = |problem| ArticulationError::Mass { link: link.name.clone(), problem };
-            if !(mass >= 0.0 && link.armature.value() >= 0.0) {
-                return Err(wrong("mass and armature may not be negative"));
-            }
-            let numbers = link.inertia.iter().chain(link.com.iter()).map(|x| x.value());
-            if !numbers.chain([mass, link.armature.value()]).all(f64::is_finite) {
-                return Err(wrong("mass, center of mass or inertia is not finite"));
-            }
+            link.check_numbers()?;
             if let Joint::Custom(CustomJoint(model)) = &link.joint
                 && !(1..=MOST).contains(&model.freedoms())
             {
@@ -218,9 +222,14 @@ impl<S: Scalar> Articulation<S> {
         &self.links
     }
 
+    /// Whether the numbers of all links are such.
+    pub(crate) fn check_numbers(&self) -> Result<(), ArticulationError> {
+        self.links.iter().try_for_each(Link::check_numbers)
+    }
+
     /// The links, to be changed: to differentiate by a mass, a length or an armature, put a variable in its place. Their joints and parents are
     /// to stay as they are.
-    pub(crate) fn links_mut(&mut self) -> &mut [Link<S>] {
+    pub fn links_mut(&mut self) -> &mut [Link<S>] {
         &mut self.links
     }
 

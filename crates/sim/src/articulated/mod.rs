@@ -11,7 +11,7 @@
 //! | kinetic and potential energy | [`Kinematics::energy`] | |
 //! | ∂ of a link's velocity by v | [`Kinematics::jacobian`] | |
 //!
-//! All but derivatives are generic over the scalar. Algorithms are those of Featherstone, Rigid Body Dynamics Algorithms, 2008, in one frame for all
+//! All but derivatives are generic over the scalar, to first derivatives. Algorithms are those of Featherstone, Rigid Body Dynamics Algorithms, 2008, in one frame for all
 //! links, whose axes are the world's: nothing has to be brought from link to link.
 
 pub(crate) mod adjoint;

@@ -42,6 +42,7 @@ impl Integrator for BackwardEuler {
         step: Step,
     ) -> Result<Vec<State<S>>, SimulationError> {
         world.refuse_joints("BackwardEuler")?;
+        world.refuse_welds("BackwardEuler")?;
         let free = world.free_bodies();
         if free.is_empty() {
             return Ok(states.to_vec());

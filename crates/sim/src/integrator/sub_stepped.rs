@@ -1,5 +1,6 @@
 //! Steps that are divided where contacts are too stiff for them.
 
+use nalgebra::Vector6;
 use prehend_autodiff::Scalar;
 
 use super::Integrator;
@@ -77,6 +78,8 @@ impl<I: Integrator> SubStepped<I> {
         };
         let mut then: Vec<State> = plain.bodies.iter().zip(&now).map(drift).collect();
         then.extend_from_slice(&now[then.len()..]);
+        plain.swing(&mut then, &vec![Vector6::zeros(); now.len()], dt);
+        plain.place_links(&mut then);
         let fastest = plain.contact_frequency(&now).max(plain.contact_frequency(&then));
         (dt * fastest / (MARGIN * limit)).ceil().max(1.0)
     }

@@ -147,10 +147,9 @@ impl Generalized {
             for (row, share) in &freedoms {
                 efforts[articulation][*row] += value * share;
                 for (column, factor) in &freedoms {
-                    self.by_velocity[(first + row, first + column)] += by_velocity * share * factor;
-                }
-                for (column, slope) in world.position_slopes(force, states) {
-                    self.by_position[(first + row, first + column)] += by_position * share * slope;
+                    let at = (first + row, first + column);
+                    self.by_velocity[at] += by_velocity * share * factor;
+                    self.by_position[at] += by_position * share * factor;
                 }
             }
         }

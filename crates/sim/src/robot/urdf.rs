@@ -39,10 +39,10 @@ impl Default for UrdfOptions {
 }
 
 impl World {
-    /// Adds the links of `robot` as those of an articulation that forces move, with the damping, friction and limits of its joints, and returns each
+    /// Adds the links of `robot` as those of an articulation that forces move, with the damping, friction and limits of position of its joints, and returns each
     /// link's body, in the order of [`KinematicTree::links`]. With a shape, links have its distance fields; samples are the caller's to give.
     ///
-    /// Joints that mimic others follow them by springs. A robot whose joints go where they are told is added by [`World::add_robot`].
+    /// Limits of effort and speed are not used, and there are no motors: add them by [`World::add_joint_force`]. Joints that mimic others follow them by springs. A robot whose joints go where they are told is added by [`World::add_robot`].
     ///
     /// # Errors
     /// If `shape` is not the robot's, or a link weighs nothing and yet should move.

@@ -160,6 +160,15 @@ impl<S: Scalar> World<S> {
         Ok(joint.along(&states[place], index))
     }
 
+    /// Whether one body hangs on the other by a joint.
+    pub(crate) fn share_joint(&self, a: BodyId, b: BodyId) -> bool {
+        let (Ok((own, first)), Ok((other, second))) = (self.link_of(a), self.link_of(b)) else {
+            return false;
+        };
+        let links = self.articulations[own].tree.links();
+        own == other && (links[first].parent == Some(second) || links[second].parent == Some(first))
+    }
+
     /// The articulation and the link in it that a body is.
     pub(crate) fn link_of(&self, body: BodyId) -> Result<(usize, usize), SimulationError> {
         let name = &self.body(body)?.name;

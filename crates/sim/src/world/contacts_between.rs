@@ -85,9 +85,9 @@ impl World {
 }
 
 impl<S: Scalar> World<S> {
-    /// Whether a force may move one of two bodies.
+    /// Whether a force may move one of two bodies against the other; links that share a joint overlap there and do not count.
     pub(crate) fn moves_against(&self, a: BodyId, b: BodyId) -> bool {
-        self.bodies[a].feels_forces() || self.bodies[b].feels_forces()
+        (self.bodies[a].feels_forces() || self.bodies[b].feels_forces()) && !self.share_joint(a, b)
     }
 
     /// Which of two bodies brings the samples and which the field, with the weight of each contact.

@@ -44,7 +44,7 @@ impl<S: Scalar> World<S> {
     /// Derivatives through contacts are first derivatives.
     ///
     /// # Panics
-    /// If there are fewer states than bodies.
+    /// If there are fewer states than bodies and joints.
     pub fn wrenches(&self, states: &[State<S>], step: usize) -> Vec<Vector6<S>> {
         if !self.contact_groups.is_empty() {
             return self.with_touching(states, 0.0).wrenches(states, step);

@@ -114,8 +114,8 @@ impl<S: Scalar> JointForce<S> {
 /// Where a force along joints acts.
 pub(crate) struct Along<S> {
     pub(crate) articulation: usize,
-    /// Degrees of freedom of the articulation, with the force's factors.
-    pub(crate) freedoms: Vec<(usize, f64)>,
+    /// Degrees of freedom of the articulation, with the derivatives of the position by them.
+    pub(crate) freedoms: Vec<(usize, S)>,
     pub(crate) position: S,
     pub(crate) velocity: S,
 }
@@ -199,28 +199,10 @@ impl<S: Scalar> World<S> {
             };
             let effort = force.law().lifted(force.params(), position, velocity);
             for (freedom, factor) in freedoms {
-                efforts[articulation][freedom] += effort.times(factor);
+                efforts[articulation][freedom] += effort * factor;
             }
         }
         efforts
-    }
-
-    /// Derivatives of the position of a force by displacements along degrees of freedom of its articulation.
-    pub(crate) fn position_slopes(
-        &self,
-        force: &JointForce<S>,
-        states: &[State<S>],
-    ) -> Vec<(usize, f64)> {
-        let mut slopes = Vec::with_capacity(force.axes.len());
-        for (JointAxis { link, index }, factor) in &force.axes {
-            let Ok((articulation, own)) = self.link_of(*link) else { continue };
-            let Ok((place, joint)) = self.joint_place(states, *link) else { continue };
-            let [_, freedoms] = self.articulations[articulation].tree.range(own);
-            let of_axis = joint.position_slopes(&states[place], *index);
-            let own = freedoms.zip(of_axis).map(|(freedom, slope)| (freedom, slope * factor));
-            slopes.extend(own.filter(|(_, slope)| *slope != 0.0));
-        }
-        slopes
     }
 
     /// Where a force acts.
@@ -240,7 +222,11 @@ impl<S: Scalar> World<S> {
             let [position, velocity] = joint.along(&states[place], *index);
             along.position += position.times(*factor);
             along.velocity += velocity.times(*factor);
-            along.freedoms.push((freedoms.start + index, *factor));
+            // A virtual displacement moves the position by its slopes, and so the effort acts along them.
+            let slopes = joint.position_slopes(&states[place], *index);
+            let slopes =
+                freedoms.zip(slopes).map(|(freedom, slope)| (freedom, slope.times(*factor)));
+            along.freedoms.extend(slopes.filter(|(_, slope)| !slope.is_constant_zero()));
         }
         Some(along)
     }

@@ -38,10 +38,11 @@ impl<S: Scalar> World<S> {
         point: &Point3<f64>,
         states: &[State<S>],
     ) -> Result<Vector3<S>, SimulationError> {
+        let rigid = self.body(body)?.rigid();
         let states = self.sensed(states)?;
         let wrenches = self.wrenches(&states, 1);
         let state = &states[body];
-        let (acceleration, turning, arm) = match self.body(body)?.rigid() {
+        let (acceleration, turning, arm) = match rigid {
             Some(rigid) => {
                 let (force, torque) =
                     (wrenches[body].fixed_rows::<3>(0), wrenches[body].fixed_rows::<3>(3));

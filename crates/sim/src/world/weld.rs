@@ -79,24 +79,55 @@ impl World {
         if weld.bodies[0] == weld.bodies[1] {
             return Err(SimulationError::Itself { body: self.bodies[weld.bodies[0]].name.clone() });
         }
-        for value in weld.stiffness.numbers() {
-            let (setting, range) = ("WeldStiffness", "zero or positive, and finite");
-            if !(value >= 0.0 && value.is_finite()) {
-                return Err(SimulationError::Setting { setting, range, value });
-            }
-        }
         self.welds.push(weld);
-        Ok(())
+        let checked = self.check_welds();
+        if checked.is_err() {
+            self.welds.pop();
+        }
+        checked
     }
 }
 
 impl<S: Scalar> World<S> {
+    /// # Errors
+    /// If there are welds, of which `integrator` knows nothing.
+    pub(crate) fn refuse_welds(&self, integrator: &'static str) -> Result<(), SimulationError> {
+        match self.welds.is_empty() {
+            true => Ok(()),
+            false => Err(SimulationError::Welds { integrator }),
+        }
+    }
+
+    /// Whether the stiffness of every weld is one.
+    pub(crate) fn check_welds(&self) -> Result<(), SimulationError> {
+        let numbers = self.welds.iter().flat_map(|weld| weld.stiffness.numbers());
+        let mut values = numbers.map(|x| x.value());
+        match values.find(|value| !(value.is_finite() && *value >= 0.0)) {
+            Some(value) => {
+                let (setting, range) = ("WeldStiffness", "zero or positive, and finite");
+                Err(SimulationError::Setting { setting, range, value })
+            }
+            None => Ok(()),
+        }
+    }
+
     /// Adds what welds do to the wrenches on the bodies.
     pub(super) fn add_welds(&self, states: &[State<S>], wrenches: &mut [Vector6<S>]) {
         for weld in &self.welds {
-            let ends = weld.bodies.map(|body| &states[body]);
+            // Where a center of mass varies, of the point that has its value for coordinates.
+            let shifted = weld.bodies.map(|body| self.shifted(body, states));
+            let ends = [0, 1].map(|end| match &shifted[end] {
+                Some((state, _)) => state,
+                None => &states[weld.bodies[end]],
+            });
             let both = self.pull(weld, ends, weld.stiffness.numbers());
-            weld.bodies.into_iter().zip(both).for_each(|(body, wrench)| wrenches[body] += wrench);
+            for ((body, wrench), shifted) in weld.bodies.into_iter().zip(both).zip(&shifted) {
+                wrenches[body] += wrench;
+                if let Some((_, from_com)) = shifted {
+                    let force = wrench.fixed_rows::<3>(0).into_owned();
+                    wrenches[body] += stack(&Vector3::zeros(), &from_com.cross(&force));
+                }
+            }
         }
     }
 

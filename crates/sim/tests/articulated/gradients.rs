@@ -61,6 +61,8 @@ fn inputs((world, _): &(World, Vec<State>)) -> usize {
 fn direction(scene: &(World, Vec<State>), random: &mut SplitMix64) -> Vec<f64> {
     let mut size = scene.0.parameters();
     size.iter_mut().for_each(|x| *x = 0.1 * x.abs());
+    // The center of mass of the free ball, after the floor's wrench and its own mass and inertia.
+    size[13..16].fill(1e-2);
     size.resize(inputs(scene), 0.1);
     size.iter().map(|size| size * random.normal()).collect()
 }

@@ -51,8 +51,11 @@ fn the_closed_form_is_forward_mode() {
     let (mut closed, mut forward) = (0, 0);
     for seed in 0..200 {
         let (world, states) = random_scene(seed);
-        let custom =
-            world.articulations[0].tree.links().iter().any(|l| matches!(l.joint, Joint::Custom(_)));
+        let custom = world.articulations[0]
+            .tree
+            .links()
+            .iter()
+            .any(|link| matches!(link.joint, Joint::Custom(_) | Joint::Spherical));
         let sticks = world.contacts.iter().any(|pair| pair.law().bristles().is_some());
         let step = Step::new(0, 1e-3);
         let found = world.linear_step(&states, step).unwrap();
@@ -79,5 +82,5 @@ fn the_closed_form_is_forward_mode() {
             assert!(off < 1e-10, "{seed}, by {name}: {off}");
         }
     }
-    assert!(closed > 50 && forward > 50, "{closed} {forward}");
+    assert!(closed > 30 && forward > 60, "{closed} {forward}");
 }

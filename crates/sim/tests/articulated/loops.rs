@@ -2,7 +2,10 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use prehend_sim::articulated::{Joint, Link};
-use prehend_sim::{Body, BodyId, RigidBody, State, TimeSteps, Weld, WeldStiffness, World};
+use prehend_sim::{
+    BackwardEuler, Body, BodyId, JointLimits, JointSpring, Motion, RigidBody, SimulationError,
+    State, Step, TimeSteps, Weld, WeldStiffness, World,
+};
 
 #[test]
 fn a_welded_ball_is_an_oscillator() {
@@ -42,6 +45,76 @@ fn parallelogram() -> (World, [BodyId; 2]) {
     let stiffness = WeldStiffness::critical(1.0, 0.0, 2e-3);
     world.add_weld(Weld { bodies: [bodies[2], bodies[1]], frames, stiffness }).unwrap();
     (world, [bodies[0], bodies[1]])
+}
+
+#[test]
+fn a_weld_feels_the_center_of_mass_and_what_knows_no_welds_refuses() {
+    use prehend_autodiff::Fwd;
+    let mut world = World::new(Vector3::zeros());
+    let rigid = RigidBody::ball(0.5, 0.1).unwrap().moved(&Isometry3::translation(0.05, 0.0, 0.0));
+    let (post, ball) = (world.add(Body::kinematic("post")), world.add(Body::free("ball", rigid)));
+    let stiffness = WeldStiffness { angular: 3.0, ..WeldStiffness::critical(1.0, 0.1, 0.1) };
+    let frames = [Isometry3::translation(0.1, 0.2, 0.0), Isometry3::identity()];
+    world.add_weld(Weld { bodies: [ball, post], frames, stiffness }).unwrap();
+    let turned = Isometry3::new(Vector3::new(0.1, 0.0, 0.2), Vector3::new(0.3, 0.1, -0.5));
+    let wrench = |x: f64| {
+        let moved = rigid.moved(&Isometry3::translation(0.0, x, 0.0));
+        let mut world = world.clone();
+        world.bodies[ball].motion = Motion::Free(moved);
+        let mut states = world.neutral_states();
+        states[ball] = State { angular: Vector3::x(), ..State::at_rest(turned) };
+        world.wrenches(&states, 0)[ball]
+    };
+    let difference = (wrench(1e-6) - wrench(-1e-6)) / 2e-6;
+    let mut lifted = world.lift::<Fwd<1>>();
+    let mut parameters = lifted.parameters();
+    // Of the free body: mass, inertia, and of its center of mass x, then y.
+    parameters[6 + 1 + 6 + 1].derivative[0] = 1.0;
+    lifted = world.with_parameters(&parameters).unwrap();
+    let mut states = lifted.neutral_states();
+    states[ball] = State { angular: Vector3::x(), ..State::at_rest(turned) }.lift();
+    let slopes = lifted.wrenches(&states, 0)[ball].map(|x| x.derivative[0]);
+    assert!(difference.norm() > 1.0 && (slopes - difference).norm() < 1e-6, "{slopes}{difference}");
+    let states = world.neutral_states();
+    let refused = world.step(&BackwardEuler, &states, Step::new(0, 1e-3));
+    assert!(matches!(refused, Err(SimulationError::Welds { .. })));
+}
+
+/// A spring along one axis of a ball joint, where axes are not those of the rotation vector, keeps energy.
+#[test]
+fn a_spring_on_one_axis_of_a_ball_joint_keeps_energy() {
+    let mut world = World::new(Vector3::zeros());
+    let rigid = RigidBody::cuboid(1.0, [0.1, 0.2, 0.3]).unwrap();
+    let link =
+        world.add_articulation(vec![Link::new("ball", Joint::Spherical, &rigid)]).unwrap()[0];
+    let stiffness = 1.0;
+    world.add_joint_force(link, JointSpring { stiffness, rest: 0.0 }).unwrap();
+    let mut states = world.neutral_states();
+    let q = nalgebra::UnitQuaternion::from_scaled_axis(Vector3::new(0.5, 1.5, 0.0));
+    let q: Vec<f64> = q.coords.iter().copied().collect();
+    world.set_joint(&mut states, link, &q, &[0.0, 0.3, 2.0]).unwrap();
+    let energy = |states: &[State]| {
+        let at = world.joint(states, link).unwrap();
+        let kinetic = world.articulations[0].tree.kinematics(&at.position, &at.velocity);
+        let [angle, _] = world.joint_motion(states, link).unwrap();
+        kinetic.energy(&at.velocity).kinetic + 0.5 * stiffness * angle * angle
+    };
+    let end = world.simulate(&states, 0.6).unwrap();
+    assert!((energy(&end) - energy(&states)).abs() < 1e-4 * energy(&states));
+}
+
+#[test]
+fn a_joint_let_go_beyond_its_limit_makes_no_energy() {
+    let mut world = World::new(Vector3::zeros());
+    let rigid = RigidBody::cuboid(1.0, [0.1; 3]).unwrap();
+    let hinge = Joint::Revolute(Vector3::x_axis());
+    let link = world.add_articulation(vec![Link::new("rod", hinge, &rigid)]).unwrap()[0];
+    let limits = JointLimits { lower: -1.0, upper: 1.0, stiffness: 1e3, damping: 0.0 };
+    world.add_joint_force(link, limits).unwrap();
+    let mut states = world.neutral_states();
+    world.set_joint(&mut states, link, &[1.01], &[0.0]).unwrap();
+    let end = world.simulate(&states, 0.4).unwrap();
+    assert!(world.joint_motion(&end, link).unwrap()[0] < 0.0);
 }
 
 #[test]

@@ -95,6 +95,20 @@ fn joints_of_every_kind_are_where_mujoco_has_them() {
     let fallen = 0.7 - end[robot.body("free").unwrap()].pose.translation.z;
     assert!((fallen - 0.5 * 9.81 * 0.01).abs() < 1e-6, "{fallen}");
 
+    // A model that is placed takes its world with it.
+    let options = MjcfOptions {
+        t_world_model: Isometry3::translation(5.0, 0.0, 2.0),
+        ..MjcfOptions::default()
+    };
+    let mut moved = World::new(model.gravity);
+    let robot_there = moved.add_mjcf(&model, &options).unwrap();
+    let mut there = moved.neutral_states();
+    robot_there.set_positions(&moved, &mut there, &POSITIONS).unwrap();
+    for (here, other) in robot.bodies.iter().zip(&robot_there.bodies) {
+        let by = there[*other].pose.translation.vector - states[*here].pose.translation.vector;
+        assert!((by - nalgebra::Vector3::new(5.0, 0.0, 2.0)).norm() < 1e-12);
+    }
+
     let refused = robot.set_positions(&world, &mut states, &POSITIONS[1..]);
     assert_eq!(refused, Err(MjcfError::Positions { given: 13, expected: 14 }));
 }

@@ -115,7 +115,7 @@ fn compare(name: &str, golden: &Value, Robot { world, joints, bodies }: &Robot) 
 
 #[test]
 #[ignore = "reads PREHEND_DATA"]
-fn robots_of_the_data_are_as_mujoco_and_pinocchio_have_them() {
+fn data_robots_are_as_mujoco_and_pinocchio_have_them() {
     let golden: Value = serde_json::from_str(include_str!("../golden/robots.json")).unwrap();
     for (name, golden) in golden.as_object().unwrap() {
         let robot = if golden["file"].as_str().unwrap().ends_with(".urdf") {

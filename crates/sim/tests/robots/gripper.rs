@@ -12,7 +12,7 @@ fn numbers(value: &Value) -> Vec<f64> {
 
 #[test]
 #[ignore = "reads PREHEND_DATA"]
-fn the_loops_of_a_gripper_move_as_in_mujoco() {
+fn data_loops_of_a_gripper_move_as_in_mujoco() {
     let golden: Value = serde_json::from_str(include_str!("../golden/gripper.json")).unwrap();
     let model = Model::from_file(data_folder().join("robots/robotiq_2f85/2f85.xml")).unwrap();
     let mut world = World::new(model.gravity);

@@ -44,6 +44,7 @@ pub(super) fn step<S: Scalar>(
     let mut states = states.to_vec();
     let values: Vec<State> = states.iter().map(State::value).collect();
     let mut probes = probe::seeded(&values, ErrorNorm::new(settings, &plain, &values).units());
+    driving.place_links(&mut probes);
     let mut next_parts = vec![None; world.bodies.len()];
     let mut window = whole;
     for windows in 0.. {

@@ -175,7 +175,8 @@ impl<'a> Forces<'a> {
 pub(super) fn stiffness(solver: &SolverParameters, inertia: f64, softness: f64) -> [f64; 2] {
     let ([time, ratio], most) = (solver.reference, solver.impedance[1]);
     if time < 0.0 && ratio < 0.0 {
-        return [-time * inertia, -ratio * inertia];
+        let (stiffness, damping) = (-time / (most * most), -ratio / most);
+        return [stiffness * inertia / (softness * softness), damping * inertia / softness];
     }
     let time = time * softness;
     let stiffness = inertia / (most * time * ratio).powi(2);

@@ -18,6 +18,18 @@ use crate::world::weld::{Weld, WeldStiffness};
 /// Mobility that counts, as part of that of the most mobile direction.
 const LEAST_MOBILITY: f64 = 1e-2;
 
+/// Frames at anchors, of the model's world where that is what holds.
+fn placed(
+    anchors: &[Point3<f64>; 2],
+    fixed: [bool; 2],
+    t_world_model: &Isometry3<f64>,
+) -> [Isometry3<f64>; 2] {
+    std::array::from_fn(|end| {
+        let frame = Isometry3::from(anchors[end].coords);
+        if fixed[end] { t_world_model * frame } else { frame }
+    })
+}
+
 impl World {
     /// Adds the equality constraints of a model that act from the beginning.
     pub(super) fn add_loops(
@@ -37,15 +49,17 @@ impl World {
             };
             match &equality.kind {
                 EqualityKind::Connect { bodies, anchors } => {
+                    let fixed = bodies.map(|body| body.is_none());
                     let bodies = ends(self, bodies);
-                    let frames = anchors.map(|anchor| Isometry3::from(anchor.coords));
+                    let frames = placed(anchors, fixed, &options.t_world_model);
                     self.add_stiff_weld(bodies, frames, &equality.solver, options.softness, 0.0)?;
                 }
                 EqualityKind::Weld { bodies, anchors, rotation, torque_scale } => {
+                    let fixed = bodies.map(|body| body.is_none());
                     let bodies = ends(self, bodies);
-                    let mut frames = anchors.map(|anchor| Isometry3::from(anchor.coords));
+                    let mut frames = placed(anchors, fixed, &options.t_world_model);
                     // Axes of the second body as the first has them.
-                    frames[0].rotation = *rotation;
+                    frames[0].rotation *= *rotation;
                     let softness = options.softness;
                     self.add_stiff_weld(bodies, frames, &equality.solver, softness, *torque_scale)?;
                 }
@@ -113,6 +127,9 @@ impl World {
         }
         let mobility = &relative * self.inverse_mass() * relative.transpose();
         // By the least mobile direction: others are damped the more. One in which next to nothing moves does not count.
+        if mobility.iter().any(|x| !x.is_finite()) {
+            return f64::NAN;
+        }
         let eigenvalues = mobility.symmetric_eigenvalues();
         let least = LEAST_MOBILITY * eigenvalues.max();
         1.0 / eigenvalues.iter().copied().filter(|x| *x > least).fold(f64::INFINITY, f64::min)

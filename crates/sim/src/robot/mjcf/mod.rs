@@ -132,8 +132,9 @@ pub enum MjcfError {
 }
 
 impl World {
-    /// Adds the bodies of a model as links of one articulation, with its joints, springs, dampers, limits, tendons, actuators and loops. Fields of
-    /// planes that are fixed to the model's world become fixed bodies, last of all.
+    /// Adds the bodies of a model as links of one articulation, with its joints, springs, dampers, limits, tendons, actuators and loops. Geoms
+    /// of the model's world become fixed bodies. Everything starts at neutral coordinates: [`MjcfRobot::set_positions`] with
+    /// [`Model::reference_positions`] puts it where the file has it.
     ///
     /// Contacts are the caller's to add, with [`World::add_contacts_between`].
     ///
@@ -145,9 +146,7 @@ impl World {
         options: &MjcfOptions,
     ) -> Result<MjcfRobot, MjcfError> {
         let mut warnings: Vec<String> = model.warnings.iter().map(ToString::to_string).collect();
-        for body in model.bodies.iter().filter(|body| body.gravity_compensation != 0.0) {
-            warnings.push(format!("body '{}': its weight is not carried for it", body.name));
-        }
+        warnings.extend(left_out(model));
         let chain = links::Chain::new(model, options);
         let links = self.add_articulation(chain.links)?;
         let robot = MjcfRobot {
@@ -169,6 +168,31 @@ impl World {
         self.add_loops(model, &robot, options, &mut warnings)?;
         Ok(MjcfRobot { actuators, warnings, ..robot })
     }
+}
+
+/// What of the model has no counterpart.
+fn left_out(model: &Model) -> impl Iterator<Item = String> {
+    let bodies = model.bodies.iter().filter(|body| body.gravity_compensation != 0.0);
+    let bodies =
+        bodies.map(|body| format!("body '{}': its weight is not carried for it", body.name));
+    let joints = model.joint_indices().map(|index| model.joint(index));
+    let joints = joints.flat_map(|joint| {
+        let free = joint.kind == JointKind::Free;
+        let acts = joint.damping > 0.0 || joint.stiffness > 0.0 || joint.friction_loss > 0.0;
+        let left = [
+            (joint.actuator_force_range.is_some(), "its bound on actuators' forces"),
+            (joint.limit_margin != 0.0, "the margin of its limits"),
+            (free && acts, "what acts along a free joint"),
+        ];
+        let name = joint.name.clone();
+        left.into_iter()
+            .filter(|(is, _)| *is)
+            .map(move |(_, what)| format!("joint '{name}': {what}"))
+    });
+    let tendons = model.tendons.iter().filter(|tendon| tendon.actuator_force_range.is_some());
+    let tendons =
+        tendons.map(|tendon| format!("tendon '{}': its bound on actuators' forces", tendon.name));
+    bodies.chain(joints).chain(tendons)
 }
 
 fn named(joints: &[links::ChainJoint], body: impl Fn(usize) -> BodyId) -> Vec<(String, JointAxis)> {

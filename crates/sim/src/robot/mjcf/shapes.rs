@@ -48,7 +48,11 @@ impl World {
                     self.add(body.with_field(std::sync::Arc::new(field)));
                     continue;
                 }
-                _ => shape(std::slice::from_ref(geom), &options.shape_options).map_err(wrong)?,
+                _ => {
+                    let t_body_geom = options.t_world_model * geom.t_body_geom;
+                    let placed = Geom { t_body_geom, ..geom.clone() };
+                    shape(std::slice::from_ref(&placed), &options.shape_options).map_err(wrong)?
+                }
             };
             if let Some(shape) = shape {
                 self.add(Body::fixed_from_shape(&geom.name, &shape));
