@@ -50,6 +50,22 @@ def derivatives(model, q, v, a, tau):
     }
 
 
+def record(path, model, motion, values):
+    (q, v, a), (tau, mass, poses, acceleration) = motion, values
+    return {
+        "file": path,
+        "joints": list(model.names)[1:],
+        "q": q.tolist(),
+        "v": v.tolist(),
+        "a": a.tolist(),
+        "poses": poses,
+        "mass": mass.ravel().tolist(),
+        "effort": tau.tolist(),
+        "acceleration": acceleration.tolist(),
+        **derivatives(model, q, v, a, tau),
+    }
+
+
 def state(rng, n):
     return rng.uniform(-0.7, 0.7, n), rng.normal(0, 2, n), rng.normal(0, 5, n)
 
@@ -115,43 +131,19 @@ def mjcf(folder, path, rng):
     tau = mass @ a + data.qfrc_bias
     poses = {model.body(i).name: pose(data.xpos[i], data.xquat[i]) for i in range(1, model.nbody)}
     acceleration = np.linalg.solve(mass, tau - data.qfrc_bias)
-    names = [model.joint(i).name for i in range(model.njnt)]
     twin = twin_of(model)
     twin.armature[:] = model.dof_armature
     own_tau, own_mass, _, own_acceleration = from_pinocchio(twin, q, v, a)
     check(f"{path}: mass matrix", mass, own_mass)
     check(f"{path}: inverse dynamics", tau, own_tau)
     check(f"{path}: forward dynamics", acceleration, own_acceleration)
-    return {
-        "file": path,
-        "joints": names,
-        "q": q.tolist(),
-        "v": v.tolist(),
-        "a": a.tolist(),
-        "poses": poses,
-        "mass": mass.ravel().tolist(),
-        "effort": tau.tolist(),
-        "acceleration": acceleration.tolist(),
-        **derivatives(twin, q, v, a, tau),
-    }
+    return record(path, twin, (q, v, a), (tau, mass, poses, acceleration))
 
 
 def urdf(folder, path, rng):
     model = pin.buildModelFromUrdf(os.path.join(folder, path))
     q, v, a = state(rng, model.nv)
-    tau, mass, poses, acceleration = from_pinocchio(model, q, v, a)
-    return {
-        "file": path,
-        "joints": list(model.names)[1:],
-        "q": q.tolist(),
-        "v": v.tolist(),
-        "a": a.tolist(),
-        "poses": poses,
-        "mass": mass.ravel().tolist(),
-        "effort": tau.tolist(),
-        "acceleration": acceleration.tolist(),
-        **derivatives(model, q, v, a, tau),
-    }
+    return record(path, model, (q, v, a), from_pinocchio(model, q, v, a))
 
 
 def main():

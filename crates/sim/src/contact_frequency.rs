@@ -47,7 +47,7 @@ impl World {
     pub fn contact_frequency(&self, states: &[State]) -> f64 {
         let lifted = self.with_touching(states, 0.0).plain().lift::<Fwd<12>>();
         let constants: Vec<State<Fwd<12>>> = states.iter().map(State::lift).collect();
-        let (motions, size) = self.unit_motions(states);
+        let UnitMotions { motions, roots, size } = self.unit_motions(states);
         let (mut stiffness, mut damping) = (DMatrix::zeros(size, size), DMatrix::zeros(size, size));
         for Motions { body, first, by } in &motions {
             let mut states = constants.clone();
@@ -66,7 +66,7 @@ impl World {
                 add(&mut damping, 6);
             }
         }
-        for (first, direction, slopes) in self.slopes_along_joints(states) {
+        for (first, direction, slopes) in self.slopes_along_joints(states, &roots) {
             let outer = &direction * direction.transpose();
             for (matrix, slope) in [&mut stiffness, &mut damping].into_iter().zip(slopes) {
                 let mut view = matrix.view_mut((first, first), outer.shape());
@@ -91,9 +91,9 @@ impl World {
         if frequency.is_nan() { frequency } else { fastest.max(frequency) }
     }
 
-    /// Of each body that forces move, its motions of unit kinetic energy (½); and how many there are of all.
-    fn unit_motions(&self, states: &[State]) -> (Vec<Motions>, usize) {
-        let (mut motions, mut first) = (Vec::new(), 0);
+    /// The motions of all bodies that forces move.
+    fn unit_motions(&self, states: &[State]) -> UnitMotions {
+        let (mut motions, mut roots, mut first) = (Vec::new(), Vec::new(), 0);
         for body in self.free_bodies() {
             let root = self.inverse_mass_root(body, &states[body]);
             let by = Matrix6xX::from_columns(&root.column_iter().collect::<Vec<_>>());
@@ -108,20 +108,18 @@ impl World {
                 let by = at.jacobian(link, &Point3::origin()) * &root;
                 motions.push(Motions { body: *body, first, by });
             }
+            roots.push((first, root));
             first += v.len();
         }
-        (motions, first)
+        UnitMotions { motions, roots, size: first }
     }
 
     /// Of each force along joints: the first of its articulation's motions of unit energy, what they are along it, and the slopes of its effort.
-    fn slopes_along_joints(&self, states: &[State]) -> Vec<(usize, DVector<f64>, [f64; 2])> {
-        let mut first = 6 * self.free_bodies().len();
-        let mut roots = Vec::with_capacity(self.articulations.len());
-        for (own, joints) in self.articulated(states) {
-            let [q, v] = own.coordinates(joints);
-            roots.push((first, own.tree.kinematics(&q, &v).inverse_mass_root()));
-            first += v.len();
-        }
+    fn slopes_along_joints(
+        &self,
+        states: &[State],
+        roots: &[(usize, DMatrix<f64>)],
+    ) -> Vec<(usize, DVector<f64>, [f64; 2])> {
         let slopes = |force: &JointForce| {
             let Along { articulation, freedoms, position, velocity } = self.along(force, states)?;
             let (first, root) = &roots[articulation];
@@ -144,6 +142,16 @@ impl World {
         root.fixed_view_mut::<3, 3>(3, 3).copy_from(&turn);
         root
     }
+}
+
+/// Motions of unit kinetic energy (½).
+struct UnitMotions {
+    /// Of each body that forces move.
+    motions: Vec<Motions>,
+    /// Of each articulation, the first of them, and the joints' velocities that they are.
+    roots: Vec<(usize, DMatrix<f64>)>,
+    /// How many there are of all.
+    size: usize,
 }
 
 /// Motions of a body: its velocity and angular velocity by each of them.

@@ -15,6 +15,7 @@ pub(crate) mod velocity_servo;
 
 use prehend_autodiff::Scalar;
 
+use crate::contact::error::LawError;
 use crate::contact::parameters::Parameters;
 
 /// The effort along a joint, or along a weighted sum of joints, by its position and velocity: \[N m\] by \[rad\], or \[N\] by \[m\]. One
@@ -58,6 +59,12 @@ pub trait JointLaw: Parameters + 'static {
     fn is_passive(&self) -> bool {
         false
     }
+}
+
+/// Whether the ends of a range, the parameters `lower` and `upper`, are in order.
+fn in_order(lower: f64, upper: f64) -> Result<(), LawError> {
+    let (name, range) = ("upper", "no less than lower");
+    if lower <= upper { Ok(()) } else { Err(LawError::Range { name, range, value: upper }) }
 }
 
 /// `effort`, but no more than `most` either way.

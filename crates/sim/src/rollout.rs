@@ -254,11 +254,24 @@ impl<S: Scalar> World<S> {
         states: &[State<S>],
         step: Step,
     ) -> Result<Vec<State<S>>, SimulationError> {
-        let mut next = self.stepped(integrator, states, step)?;
-        self.drive(&mut next, step.end());
+        let next = self.stepped(integrator, states, step)?;
+        self.arrived(states, next, step.end())
+    }
+
+    /// `next` at `time` \[s\], with driven bodies and links where they are then, after a step from `states`.
+    ///
+    /// # Errors
+    /// If one is not finite.
+    pub(crate) fn arrived(
+        &self,
+        states: &[State<S>],
+        mut next: Vec<State<S>>,
+        time: f64,
+    ) -> Result<Vec<State<S>>, SimulationError> {
+        self.drive(&mut next, time);
         match next.iter().all(State::is_finite) {
             true => Ok(next),
-            false => Err(self.not_finite(states, &next, step.end())),
+            false => Err(self.not_finite(states, &next, time)),
         }
     }
 

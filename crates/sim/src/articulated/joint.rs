@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, Quaternion, Unit, UnitQuaternion, Vector3, Vector6};
 use prehend_autodiff::Scalar;
 use prehend_autodiff::lie::{se3_exp, so3_exp};
 
-use super::joint_model::{DynJointModel, JointModel, MOST};
+use super::joint_model::{DynJointModel, JointModel, MOST_FREEDOMS};
 use super::spatial::spatial;
 
 /// A joint of a link, in the joint's frame: where the link is, by coordinates q, and how it moves, by velocities v.
@@ -88,7 +88,9 @@ impl Joint {
             Self::Revolute(_) | Self::Prismatic(_) => &[0.0],
             Self::Spherical => &[0.0, 0.0, 0.0, 1.0],
             Self::Floating => &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
-            Self::Custom(CustomJoint(model)) => &[0.0; MOST][..model.freedoms().min(MOST)],
+            Self::Custom(CustomJoint(model)) => {
+                &[0.0; MOST_FREEDOMS][..model.freedoms().min(MOST_FREEDOMS)]
+            }
         }
     }
 
@@ -145,7 +147,7 @@ fn push<S: Scalar>(rotation: &UnitQuaternion<S>, coordinates: &mut Vec<S>) {
 
 /// Of the first four of `q`.
 #[inline]
-fn quaternion<S: Scalar>(q: &[S]) -> UnitQuaternion<S> {
+pub(super) fn quaternion<S: Scalar>(q: &[S]) -> UnitQuaternion<S> {
     Unit::new_normalize(Quaternion::new(q[3], q[0], q[1], q[2]))
 }
 

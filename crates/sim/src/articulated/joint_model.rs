@@ -9,7 +9,7 @@ use prehend_autodiff::{Fwd, LocalFunction, Scalar};
 use super::spatial::spatial;
 
 /// Coordinates of a joint type of one's own at most.
-pub(super) const MOST: usize = 3;
+pub(super) const MOST_FREEDOMS: usize = 3;
 
 /// A joint type of one's own, up to three coordinates whose rates are its velocities: where it puts the link. Everything else follows, derivatives
 /// too.
@@ -52,9 +52,12 @@ pub trait JointModel: fmt::Debug + Send + Sync + 'static {
 /// A [`JointModel`] behind a pointer.
 pub(super) trait DynJointModel: fmt::Debug + Send + Sync {
     fn freedoms(&self) -> usize;
-    /// What [`Course`] makes of coordinates and velocities, and its Jacobian.
-    fn course(&self, x: [f64; 2 * MOST]) -> [f64; COURSE];
-    fn linearized(&self, x: [f64; 2 * MOST]) -> ([f64; COURSE], [[f64; 2 * MOST]; COURSE]);
+    /// What [`CustomMotion`] makes of coordinates and velocities, and its Jacobian.
+    fn motion(&self, x: [f64; 2 * MOST_FREEDOMS]) -> [f64; MOTION];
+    fn linearized(
+        &self,
+        x: [f64; 2 * MOST_FREEDOMS],
+    ) -> ([f64; MOTION], [[f64; 2 * MOST_FREEDOMS]; MOTION]);
 }
 
 impl<J: JointModel> DynJointModel for J {
@@ -62,38 +65,48 @@ impl<J: JointModel> DynJointModel for J {
         JointModel::freedoms(self)
     }
 
-    fn course(&self, x: [f64; 2 * MOST]) -> [f64; COURSE] {
-        course(self, x)
+    fn motion(&self, x: [f64; 2 * MOST_FREEDOMS]) -> [f64; MOTION] {
+        motion(self, x)
     }
 
-    fn linearized(&self, x: [f64; 2 * MOST]) -> ([f64; COURSE], [[f64; 2 * MOST]; COURSE]) {
-        let all = course(self, Fwd::<{ 2 * MOST }>::variables(x));
+    fn linearized(
+        &self,
+        x: [f64; 2 * MOST_FREEDOMS],
+    ) -> ([f64; MOTION], [[f64; 2 * MOST_FREEDOMS]; MOTION]) {
+        let all = motion(self, Fwd::<{ 2 * MOST_FREEDOMS }>::variables(x));
         (all.map(|x| x.value), all.map(|x| x.derivative))
     }
 }
 
-/// Numbers of a [`Course`].
-pub(super) const COURSE: usize = 12 + 6 * MOST + 6;
+/// Coordinates, then velocities, zero where there are fewer.
+pub(super) fn inputs<S: Scalar>(q: &[S], v: &[S]) -> [S; 2 * MOST_FREEDOMS] {
+    let part = |all: &[S], i: usize| all.get(i).copied().unwrap_or_else(S::zero);
+    std::array::from_fn(|i| match i.checked_sub(MOST_FREEDOMS) {
+        None => part(q, i),
+        Some(i) => part(v, i),
+    })
+}
+
+/// Numbers of a [`CustomMotion`].
+pub(super) const MOTION: usize = 12 + 6 * MOST_FREEDOMS + 6;
 
 /// Where a link is in its joint's frame, and how it moves along its own axes.
-pub(super) struct Course<S: Scalar> {
+pub(super) struct CustomMotion<S: Scalar> {
     pub(super) rotation: Matrix3<S>,
     pub(super) place: Vector3<S>,
     /// Motion by each unit velocity, at the link's origin.
-    pub(super) axes: [Vector6<S>; MOST],
+    pub(super) axes: [Vector6<S>; MOST_FREEDOMS],
     /// Acceleration at constant velocities, less that of axes that turn with the link.
     pub(super) drift: Vector6<S>,
 }
 
-impl<S: Scalar> Course<S> {
+impl<S: Scalar> CustomMotion<S> {
     /// Of `model` at coordinates `q` with velocities `v`.
     pub(super) fn new(model: &Arc<dyn DynJointModel>, q: &[S], v: &[S]) -> Self {
-        let part = |all: &[S], i: usize| all.get(i).copied().unwrap_or_else(S::zero);
-        let x: [S; 2 * MOST] =
-            std::array::from_fn(|i| if i < MOST { part(q, i) } else { part(v, i - MOST) });
+        let x = inputs(q, v);
         let values = x.map(S::value);
         if S::ORDER == 0 {
-            return Self::of(&model.course(values).map(S::constant));
+            return Self::of(&model.motion(values).map(S::constant));
         }
         const { assert!(S::ORDER <= 1, "joints of one's own have first derivatives only") };
         let (value, jacobian) = model.linearized(values);
@@ -101,26 +114,26 @@ impl<S: Scalar> Course<S> {
     }
 
     /// Of numbers in their order.
-    pub(super) fn of(numbers: &[S; COURSE]) -> Self {
+    pub(super) fn of(numbers: &[S; MOTION]) -> Self {
         let twist = |from: usize| Vector6::from_column_slice(&numbers[from..from + 6]);
         Self {
             rotation: Matrix3::from_column_slice(&numbers[..9]),
             place: Vector3::from_column_slice(&numbers[9..12]),
             axes: std::array::from_fn(|k| twist(12 + 6 * k)),
-            drift: twist(12 + 6 * MOST),
+            drift: twist(12 + 6 * MOST_FREEDOMS),
         }
     }
 }
 
-/// A course about where it was linearized.
+/// A motion about where it was linearized.
 struct Linear {
-    at: [f64; 2 * MOST],
-    value: [f64; COURSE],
-    jacobian: [[f64; 2 * MOST]; COURSE],
+    at: [f64; 2 * MOST_FREEDOMS],
+    value: [f64; MOTION],
+    jacobian: [[f64; 2 * MOST_FREEDOMS]; MOTION],
 }
 
-impl LocalFunction<{ 2 * MOST }, COURSE> for Linear {
-    fn evaluate<S: Scalar>(&self, x: [S; 2 * MOST]) -> [S; COURSE] {
+impl LocalFunction<{ 2 * MOST_FREEDOMS }, MOTION> for Linear {
+    fn evaluate<S: Scalar>(&self, x: [S; 2 * MOST_FREEDOMS]) -> [S; MOTION] {
         std::array::from_fn(|row| {
             let slopes = self.jacobian[row].iter().zip(&x).zip(&self.at);
             slopes.fold(S::constant(self.value[row]), |sum, ((slope, x), at)| {
@@ -129,32 +142,35 @@ impl LocalFunction<{ 2 * MOST }, COURSE> for Linear {
         })
     }
 
-    fn linearize(&self, _: [f64; 2 * MOST]) -> Option<([f64; COURSE], [[f64; 2 * MOST]; COURSE])> {
+    fn linearize(
+        &self,
+        _: [f64; 2 * MOST_FREEDOMS],
+    ) -> Option<([f64; MOTION], [[f64; 2 * MOST_FREEDOMS]; MOTION])> {
         Some((self.value, self.jacobian))
     }
 }
 
 /// Rotation, place, axes and drift: coordinates carry their derivatives, and those the rates at which they change with time.
-fn course<J: JointModel, S: Scalar>(model: &J, x: [S; 2 * MOST]) -> [S; COURSE] {
+fn motion<J: JointModel, S: Scalar>(model: &J, x: [S; 2 * MOST_FREEDOMS]) -> [S; MOTION] {
     let count = DynJointModel::freedoms(model);
-    let q: Vec<Fwd<MOST, Fwd<1, S>>> = (0..count)
-        .map(|k| Fwd::variable(Fwd { value: x[k], derivative: [x[MOST + k]] }, k))
+    let q: Vec<Fwd<MOST_FREEDOMS, Fwd<1, S>>> = (0..count)
+        .map(|k| Fwd::variable(Fwd { value: x[k], derivative: [x[MOST_FREEDOMS + k]] }, k))
         .collect();
     let Isometry3 { translation, rotation } = model.placement(&q);
     let turned = rotation.to_rotation_matrix().into_inner();
     let back = turned.map(|x| x.value).transpose();
-    let mut course = [S::zero(); COURSE];
+    let mut motion = [S::zero(); MOTION];
     let (mut place, mut drift) = (12, Vector6::zeros());
-    course[..9].copy_from_slice(turned.map(|x| x.value.value).as_slice());
-    course[9..12].copy_from_slice(translation.vector.map(|x| x.value.value).as_slice());
+    motion[..9].copy_from_slice(turned.map(|x| x.value.value).as_slice());
+    motion[9..12].copy_from_slice(translation.vector.map(|x| x.value.value).as_slice());
     for k in 0..count {
         let spin = back * turned.map(|x| x.derivative[k]);
         let spin = Vector3::new(spin.m32, spin.m13, spin.m21);
         let axis = spatial(&(back * translation.vector.map(|x| x.derivative[k])), &spin);
-        course[place..place + 6].copy_from_slice(axis.map(|x| x.value).as_slice());
-        drift += axis.map(|x| x.derivative[0]) * x[MOST + k];
+        motion[place..place + 6].copy_from_slice(axis.map(|x| x.value).as_slice());
+        drift += axis.map(|x| x.derivative[0]) * x[MOST_FREEDOMS + k];
         place += 6;
     }
-    course[12 + 6 * MOST..].copy_from_slice(drift.as_slice());
-    course
+    motion[12 + 6 * MOST_FREEDOMS..].copy_from_slice(drift.as_slice());
+    motion
 }

@@ -2,11 +2,11 @@
 //!
 //! Numbers come first in place and velocity; a rotation and its angular velocity, along the link's axes, are those of the state.
 
-use nalgebra::{Isometry3, Quaternion, Unit, Vector3, Vector6};
+use nalgebra::{Isometry3, Vector3, Vector6};
 use prehend_autodiff::Scalar;
 use prehend_autodiff::lie::{so3_log, so3_right_jacobian_inverse};
 
-use super::joint::Joint;
+use super::joint::{Joint, quaternion};
 use crate::state::State;
 
 impl Joint {
@@ -32,19 +32,15 @@ impl Joint {
     /// The state that coordinates and velocities are.
     pub(crate) fn write<S: Scalar>(&self, q: &[S], v: &[S]) -> State<S> {
         let mut state = State::at_rest(Isometry3::identity());
-        let rotation = |q: &[S]| {
-            let [x, y, z, w] = [q[0], q[1], q[2], q[3]];
-            Unit::new_normalize(Quaternion::new(w, x, y, z))
-        };
         let copy = |to: &mut [S], from: &[S]| to[..from.len()].copy_from_slice(from);
         match self {
             Self::Spherical => {
-                state.pose.rotation = rotation(q);
+                state.pose.rotation = quaternion(q);
                 copy(state.angular.as_mut_slice(), v);
             }
             Self::Floating => {
                 copy(state.pose.translation.vector.as_mut_slice(), &q[..3]);
-                state.pose.rotation = rotation(&q[3..]);
+                state.pose.rotation = quaternion(&q[3..]);
                 copy(state.linear.as_mut_slice(), &v[..3]);
                 copy(state.angular.as_mut_slice(), &v[3..]);
             }
@@ -59,15 +55,19 @@ impl Joint {
     /// The rate of its state's velocities.
     pub(crate) fn rate_of_velocities<S: Scalar>(&self, accelerations: &[S]) -> Vector6<S> {
         let mut rate = Vector6::zeros();
-        let first = if matches!(self, Self::Spherical) { 3 } else { 0 };
-        rate.as_mut_slice()[first..first + accelerations.len()].copy_from_slice(accelerations);
+        rate.as_mut_slice()[self.velocities()].copy_from_slice(accelerations);
         rate
     }
 
     /// The accelerations that a rate of its state's velocities is.
     pub(crate) fn accelerations<S: Scalar>(&self, rate: &Vector6<S>) -> Vec<S> {
+        rate.as_slice()[self.velocities()].to_vec()
+    }
+
+    /// Which of a state's velocities, linear and angular, are its own.
+    fn velocities(&self) -> std::ops::Range<usize> {
         let first = if matches!(self, Self::Spherical) { 3 } else { 0 };
-        rate.as_slice()[first..first + self.freedoms()].to_vec()
+        first..first + self.freedoms()
     }
 
     /// The rate of its state's place, and the angular velocity of its rotation as one of the joint's frame.

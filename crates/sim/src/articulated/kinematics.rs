@@ -6,7 +6,7 @@ use nalgebra::{
 use prehend_autodiff::Scalar;
 
 use super::joint::{CustomJoint, Joint};
-use super::joint_model::Course;
+use super::joint_model::CustomMotion;
 use super::link::Articulation;
 use super::spatial::{SpatialInertia, angular, cross_motion, linear, spatial};
 
@@ -73,12 +73,12 @@ impl<'a, S: Scalar> Kinematics<'a, S> {
             let [coordinates, freedoms] = tree.range(index);
             let own = match &link.joint {
                 Joint::Custom(CustomJoint(model)) => {
-                    Some(Course::new(model, &q[coordinates.clone()], &v[freedoms.clone()]))
+                    Some(CustomMotion::new(model, &q[coordinates.clone()], &v[freedoms.clone()]))
                 }
                 _ => None,
             };
             let (turned, moved) = match &own {
-                Some(course) => (Some(course.rotation), Some(course.place)),
+                Some(motion) => (Some(motion.rotation), Some(motion.place)),
                 None => link.joint.placement(&q[coordinates]),
             };
             let joint_rotation = link.t_parent_joint.rotation.to_rotation_matrix().into_inner();
@@ -109,7 +109,7 @@ impl<'a, S: Scalar> Kinematics<'a, S> {
             };
             for (k, freedom) in freedoms.enumerate() {
                 let axis = match &own {
-                    Some(course) => along_world(&course.axes[k]),
+                    Some(motion) => along_world(&motion.axes[k]),
                     None => along_world(&link.joint.axis(k).map(S::constant)),
                 };
                 joint_velocity += axis * v[freedom];
@@ -125,8 +125,8 @@ impl<'a, S: Scalar> Kinematics<'a, S> {
             at.places.push(place);
             let velocity = of_parent + joint_velocity;
             let mut drift = cross_motion(&velocity, &joint_velocity);
-            if let Some(course) = &own {
-                drift += along_world(&course.drift);
+            if let Some(motion) = &own {
+                drift += along_world(&motion.drift);
                 at.custom.get_or_insert_with(|| [q.to_vec(), v.to_vec()]);
             }
             at.joint_velocities.push(joint_velocity);

@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Matrix3, Point3, Quaternion, Translation3, Unit, Vecto
 use prehend_autodiff::Scalar;
 
 use super::joint::{CustomJoint, Joint};
-use super::joint_model::MOST;
+use super::joint_model::MOST_FREEDOMS;
 use super::kinematics::{Kinematics, Moves};
 use crate::body::RigidBody;
 
@@ -197,7 +197,7 @@ impl<S: Scalar> Articulation<S> {
             }
             link.check_numbers()?;
             if let Joint::Custom(CustomJoint(model)) = &link.joint
-                && !(1..=MOST).contains(&model.freedoms())
+                && !(1..=MOST_FREEDOMS).contains(&model.freedoms())
             {
                 let (link, freedoms) = (link.name.clone(), model.freedoms());
                 return Err(ArticulationError::Freedoms { link, freedoms });

@@ -34,6 +34,12 @@ impl<S: Scalar> Kinematics<'_, S> {
         factor.map_or(DMatrix::from_element(n, n, f64::NAN), |inverse| inverse.transpose())
     }
 
+    /// M⁻¹, by values; no numbers if M is not positive definite.
+    pub(crate) fn inverse_mass_matrix(&self) -> DMatrix<f64> {
+        let root = self.inverse_mass_root();
+        &root * root.transpose()
+    }
+
     /// Of each link the radius of gyration, about the link's origin, of it and all that hangs on it \[m\]: no number where that has no mass.
     pub(crate) fn radii(&self) -> Vec<f64> {
         let radius = |(composite, place): (SpatialInertia<S>, &Vector3<S>)| {

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use prehend_autodiff::Scalar;
 
-use crate::articulated::Energy;
+use crate::articulated::{Articulation, Energy};
 use crate::contact::bristles::Bristles;
 use crate::contact::point::Contact;
 use crate::contact::wrench::stack;
@@ -23,6 +23,9 @@ const TOLERANCE: f64 = 0.25;
 /// Steps from one look at the energy to the next.
 const EVERY: usize = 16;
 
+/// The energy of no links.
+const NOTHING: Energy = Energy { kinetic: 0.0, potential: 0.0 };
+
 /// Parts of a joint's way over which the work of what acts along it is summed.
 const PARTS: usize = 200;
 
@@ -41,6 +44,9 @@ pub(super) struct EnergyBalance {
     /// may have turned any way within steps of any length.
     closed: bool,
     initial: Vec<State>,
+    /// Articulations as values, and their energy at the start.
+    trees: Vec<Articulation>,
+    articulated: Energy,
     /// Work of external torques \[J\].
     work: f64,
     /// The largest kinetic energy so far \[J\].
@@ -65,10 +71,16 @@ impl EnergyBalance {
         let moved = world.bodies.iter().map(|body| &body.motion).zip(&initial).any(moves);
         let torques = world.bodies.iter().any(|body| torque(body) != Vector3::zeros());
         let pushed = world.joint_forces.iter().any(|force| !force.law().is_passive());
-        let links = world.bodies.iter().filter(|body| matches!(body.motion, Motion::Link));
-        let pulled = links.into_iter().any(|body| body.external_wrench.norm().value() > 0.0);
+        let is_pulled = |body: &Body<S>| {
+            matches!(body.motion, Motion::Link) && body.external_wrench.norm().value() > 0.0
+        };
+        let pulled = world.bodies.iter().any(is_pulled);
         let closed = !(moved || pushed || pulled || controls_error && torques);
-        Self { closed, initial, work: 0.0, kinetic: 0.0 }
+        let trees = world.articulations.iter().map(|own| own.tree.map(S::value)).collect();
+        let mut balance =
+            Self { closed, initial, trees, articulated: NOTHING, work: 0.0, kinetic: 0.0 };
+        balance.articulated = balance.articulated_energy(world, &balance.initial);
+        balance
     }
 
     /// After `step` has led to `states`.
@@ -91,6 +103,25 @@ impl EnergyBalance {
         }
     }
 
+    /// Energy of all links \[J\].
+    fn articulated_energy<S: Scalar, T: Scalar>(
+        &self,
+        world: &World<S>,
+        states: &[State<T>],
+    ) -> Energy {
+        let gravity = world.gravity.map(|x| x.value());
+        let mut sum = NOTHING;
+        for (tree, (own, joints)) in self.trees.iter().zip(world.articulated(states)) {
+            let [q, v] = own
+                .coordinates(joints)
+                .map(|all| all.into_iter().map(|x| x.value()).collect::<Vec<f64>>());
+            let energy = tree.kinematics(&q, &v).under(gravity).energy(&v);
+            sum.kinetic += energy.kinetic;
+            sum.potential += energy.potential;
+        }
+        sum
+    }
+
     /// Compares the energy at `states` with that at the start.
     pub(super) fn check<S: Scalar>(
         &mut self,
@@ -107,13 +138,11 @@ impl EnergyBalance {
                 - kinetic_energy(world, body, before)
                 - work_of_pull(world, body, before, &now);
         }
-        let articulated =
-            [self.initial.as_slice(), &states.iter().map(State::value).collect::<Vec<_>>()]
-                .map(|states| articulated_energy(world, states));
-        kinetic += articulated[1].kinetic;
-        gain += articulated[1].kinetic + articulated[1].potential
-            - articulated[0].kinetic
-            - articulated[0].potential;
+        let articulated = self.articulated_energy(world, states);
+        kinetic += articulated.kinetic;
+        gain += articulated.kinetic + articulated.potential
+            - self.articulated.kinetic
+            - self.articulated.potential;
         self.kinetic = self.kinetic.max(kinetic);
         if !self.closed || gain <= TOLERANCE * self.kinetic {
             return Ok(());
@@ -154,23 +183,10 @@ fn kinetic_energy<S: Scalar>(world: &World<S>, body: BodyId, state: &State) -> f
     0.5 * (rigid.mass().value() * state.linear.norm_squared() + spin.dot(&(inertia * spin)))
 }
 
-/// Energy of all links \[J\].
-fn articulated_energy<S: Scalar>(world: &World<S>, states: &[State]) -> Energy {
-    let gravity = world.gravity.map(|x| x.value());
-    let mut sum = Energy { kinetic: 0.0, potential: 0.0 };
-    for (own, joints) in world.articulated(states) {
-        let [q, v] = own.coordinates(joints);
-        let energy = own.tree.map(S::value).kinematics(&q, &v).under(gravity).energy(&v);
-        sum.kinetic += energy.kinetic;
-        sum.potential += energy.potential;
-    }
-    sum
-}
-
 /// What springs along joints, and all else that acts there, have done while nothing moved fast \[J\].
 fn work_along_joints<S: Scalar>(world: &World<S>, before: &[State], now: &[State<S>]) -> f64 {
+    let lifted: Vec<State<S>> = before.iter().map(State::lift).collect();
     let work = |force: &JointForce<S>| {
-        let lifted: Vec<State<S>> = before.iter().map(State::lift).collect();
         let position = |states: &[State<S>]| Some(world.along(force, states)?.position.value());
         let (Some(from), Some(to)) = (position(&lifted), position(now)) else { return 0.0 };
         let p: Vec<f64> = force.params().iter().map(|p| p.value()).collect();

@@ -16,7 +16,7 @@ const NOISE: f64 = 1e-6;
 /// Follows the velocities of free bodies and joints.
 pub(super) struct Roughness {
     bodies: Vec<Followed>,
-    joints: Vec<Joint>,
+    joints: Vec<FollowedJoint>,
     sums: Sums,
 }
 
@@ -62,7 +62,7 @@ struct Followed {
 }
 
 /// A joint and what is known of its last step.
-struct Joint {
+struct FollowedJoint {
     place: usize,
     link: BodyId,
     velocity: Vector6<f64>,
@@ -90,7 +90,7 @@ impl Roughness {
         let links = world.articulations.iter().flat_map(|own| own.bodies());
         let joints = world.joint_places().zip(links).map(|(place, link)| {
             let velocity = initial.get(place).map_or_else(Vector6::zeros, velocity);
-            Joint { place, link: *link, velocity, kick: None }
+            FollowedJoint { place, link: *link, velocity, kick: None }
         });
         let joints = joints.collect();
         Self { bodies, joints, sums: Sums::default() }

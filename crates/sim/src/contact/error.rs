@@ -48,6 +48,18 @@ pub enum LawError {
 }
 
 impl LawError {
+    /// The place of the parameter called `name` among those with these names, empty where they have none.
+    ///
+    /// # Errors
+    /// [`LawError::NoParameter`] if there is none of that name.
+    pub(crate) fn place_of(name: &str, names: &[&str]) -> Result<usize, Self> {
+        let found = names.iter().position(|own| !name.is_empty() && *own == name);
+        found.ok_or_else(|| {
+            let known: Vec<&str> = names.iter().copied().filter(|name| !name.is_empty()).collect();
+            Self::NoParameter { name: name.to_owned(), known: known.join(", ") }
+        })
+    }
+
     /// Name of the parameter that is missing or out of its range.
     pub fn name(&self) -> Option<&'static str> {
         match *self {

@@ -26,16 +26,9 @@ impl Integrator for SemiImplicitEuler {
         states: &[State<S>],
         step: Step,
     ) -> Result<Vec<State<S>>, SimulationError> {
-        let wrenches = world.wrenches(states, step.index);
-        let bodies = world.bodies.iter().zip(states).zip(&wrenches);
-        let next = bodies.map(|((body, state), wrench)| match body.rigid() {
-            Some(rigid) => advance(rigid, &world.gravity, state, wrench, S::constant(step.dt)),
-            None => *state,
-        });
-        let mut next: Vec<State<S>> = next.collect();
-        next.extend_from_slice(&states[next.len()..]);
-        world.swing(&mut next, &wrenches, S::constant(step.dt));
-        world.deflect(&mut next, &wrenches, S::constant(step.dt));
+        let (wrenches, dt) = (world.wrenches(states, step.index), S::constant(step.dt));
+        let mut next = moved(world, states, &wrenches, dt);
+        world.deflect(&mut next, &wrenches, dt);
         Ok(next)
     }
 
@@ -49,6 +42,24 @@ impl Integrator for SemiImplicitEuler {
     fn stability_limit(&self) -> f64 {
         1.236
     }
+}
+
+/// The states after `dt` \[s\] with these wrenches on bodies and accelerations of joints, before contacts that stick are deflected.
+pub(crate) fn moved<S: Scalar>(
+    world: &World<S>,
+    states: &[State<S>],
+    wrenches: &[Vector6<S>],
+    dt: S,
+) -> Vec<State<S>> {
+    let bodies = world.bodies.iter().zip(states).zip(wrenches);
+    let next = bodies.map(|((body, state), wrench)| match body.rigid() {
+        Some(rigid) => advance(rigid, &world.gravity, state, wrench, dt),
+        None => *state,
+    });
+    let mut next: Vec<State<S>> = next.collect();
+    next.extend_from_slice(&states[next.len()..]);
+    world.swing(&mut next, wrenches, dt);
+    next
 }
 
 /// A body's state after `dt` \[s\].

@@ -20,8 +20,7 @@ law_part! {
 }
 
 fn in_order(&[lower, upper, ..]: &[f64; 4]) -> Result<(), LawError> {
-    let (name, range) = ("upper", "no less than lower");
-    if lower <= upper { Ok(()) } else { Err(LawError::Range { name, range, value: upper }) }
+    super::in_order(lower, upper)
 }
 
 impl JointLaw for JointLimits {

@@ -53,9 +53,8 @@ impl Generalized {
         let trees = trees(world, states);
         let mut all = Self::empty(world, &trees);
         for Tree { at, first, .. } in &trees {
-            let root = at.inverse_mass_root();
-            let (from, n) = (first - all.joints, root.nrows());
-            let inverse = &root * root.transpose();
+            let inverse = at.inverse_mass_matrix();
+            let (from, n) = (first - all.joints, inverse.nrows());
             all.by_effort.view_mut((from, from), (n, n)).copy_from(&inverse);
         }
         all
@@ -234,11 +233,9 @@ struct Tree<'a> {
 fn trees<'a>(world: &'a World, states: &[State]) -> Vec<Tree<'a>> {
     let mut first = 6 * world.free_bodies().len();
     let mut trees = Vec::with_capacity(world.articulations.len());
-    let mut joint = world.bodies.len();
-    for own in &world.articulations {
-        let (from, freedoms) = (joint, own.tree.freedoms());
-        joint += own.bodies().len();
-        let [q, v] = own.coordinates(&states[from..joint]);
+    for (index, own) in world.articulations.iter().enumerate() {
+        let freedoms = own.tree.freedoms();
+        let [q, v] = own.coordinates(&states[world.joint_range(index)]);
         let at = own.tree.kinematics(&q, &v).under(world.gravity);
         trees.push(Tree { own, at, first, freedoms });
         first += freedoms;

@@ -1,6 +1,6 @@
 //! Robots of descriptions as bodies of a world.
 
+mod constraints;
 pub(crate) mod driven;
-mod inertia;
 pub(crate) mod mjcf;
 pub(crate) mod urdf;

@@ -1,24 +1,13 @@
 //! Robots in URDF that forces move.
 
-use std::sync::Arc;
-
 use nalgebra::Isometry3;
 use prehend_geometry::robot::{Drive, KinematicTree, Motion, RobotShape};
 
 use crate::articulated::{Joint, Link};
 use crate::error::SimulationError;
-use crate::joint_law::damper::JointDamper;
-use crate::joint_law::friction::JointFriction;
-use crate::joint_law::limits::JointLimits;
-use crate::joint_law::spring::JointSpring;
 use crate::world::World;
 use crate::world::body_id::BodyId;
 use crate::world::joint_force::JointAxis;
-
-/// Speed at which dry friction has 1/√2 of its bound \[rad/s or m/s\].
-const FRICTION_SCALE: f64 = 0.01;
-/// Share of a limit's effort per speed against it \[s/rad or s/m\]: nothing bounces off faster than its inverse.
-const LIMIT_DAMPING: f64 = 100.0;
 
 /// How a robot in URDF that forces move becomes part of a world.
 #[derive(Clone, Debug, PartialEq)]
@@ -39,10 +28,12 @@ impl Default for UrdfOptions {
 }
 
 impl World {
-    /// Adds the links of `robot` as those of an articulation that forces move, with the damping, friction and limits of position of its joints, and returns each
-    /// link's body, in the order of [`KinematicTree::links`]. With a shape, links have its distance fields; samples are the caller's to give.
+    /// Adds the links of `robot` as those of an articulation that forces move, with the damping, friction and limits of position of its joints,
+    /// and returns each link's body, in the order of [`KinematicTree::links`]. With a shape, links have its distance fields; samples are the
+    /// caller's to give.
     ///
-    /// Limits of effort and speed are not used, and there are no motors: add them by [`World::add_joint_force`]. Joints that mimic others follow them by springs. A robot whose joints go where they are told is added by [`World::add_robot`].
+    /// Limits of effort and speed are not used, and there are no motors: add them by [`World::add_joint_force`]. Joints that mimic others follow
+    /// them by springs. A robot whose joints go where they are told is added by [`World::add_robot`].
     ///
     /// # Errors
     /// If `shape` is not the robot's, or a link weighs nothing and yet should move.
@@ -80,18 +71,13 @@ impl World {
         let inverse = self.inverse_mass();
         for joint in robot.joints().iter().filter(|joint| joint.motion != Motion::Fixed) {
             let axis = JointAxis::from(bodies[joint.child]);
-            if let Some(damping) = joint.damping.filter(|damping| *damping > 0.0) {
-                self.add_joint_force(axis, JointDamper { damping })?;
-            }
-            if let Some(friction) = joint.friction.filter(|friction| *friction > 0.0) {
-                let velocity_scale = FRICTION_SCALE;
-                self.add_joint_force(axis, JointFriction { friction, velocity_scale })?;
-            }
-            if let Some((lower, upper)) = joint.limits {
-                let inertia = self.inertia_along(&inverse, &[(axis, 1.0)]);
-                let stiffness = inertia / options.time_constant.powi(2);
-                let limits = JointLimits { lower, upper, stiffness, damping: LIMIT_DAMPING };
-                self.add_joint_force(axis, limits)?;
+            let own = [(axis, 1.0)];
+            let [damping, friction] =
+                [joint.damping, joint.friction].map(Option::unwrap_or_default);
+            self.add_losses(&own, damping, friction)?;
+            if let Some(range) = joint.limits {
+                let inertia = self.inertia_along(&inverse, &own);
+                self.add_limits(&own, range, inertia / options.time_constant.powi(2))?;
             }
             let Drive::Variable { index, multiplier, offset } = joint.drive else { continue };
             let leader = robot.joints().iter().find(|other| {
@@ -103,9 +89,7 @@ impl World {
                 let inertia = self.inertia_along(&inverse, &axes);
                 let stiffness = inertia / options.time_constant.powi(2);
                 let damping = 2.0 * inertia / options.time_constant;
-                let spring = JointSpring { stiffness, rest: offset };
-                self.add_coupled_force(&axes, Arc::new(spring))?;
-                self.add_coupled_force(&axes, Arc::new(JointDamper { damping }))?;
+                self.add_coupling(&axes, offset, [stiffness, damping])?;
             }
         }
         Ok(())

@@ -3,6 +3,7 @@
 //! The states of their joints follow those of the bodies, one for each link: coordinates in the pose, velocities in the velocities. Those of
 //! the links follow from them.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Vector6};
@@ -117,6 +118,19 @@ impl<S: Scalar> World<S> {
         position: &[S],
         velocity: &[S],
     ) -> Result<(), SimulationError> {
+        self.write_joint(states, link, position, velocity)?;
+        self.place_links(states);
+        Ok(())
+    }
+
+    /// [`World::set_joint`] without moving the links.
+    pub(crate) fn write_joint(
+        &self,
+        states: &mut [State<S>],
+        link: BodyId,
+        position: &[S],
+        velocity: &[S],
+    ) -> Result<(), SimulationError> {
         let (place, joint) = self.joint_place(states, link)?;
         if position.len() != joint.coordinates() || velocity.len() != joint.freedoms() {
             return Err(SimulationError::JointNumbers {
@@ -126,7 +140,6 @@ impl<S: Scalar> World<S> {
             });
         }
         states[place] = joint.write(position, velocity);
-        self.place_links(states);
         Ok(())
     }
 
@@ -205,12 +218,24 @@ impl<S: Scalar> World<S> {
         body: BodyId,
     ) -> Result<(usize, &Joint), SimulationError> {
         let (articulation, link) = self.link_of(body)?;
-        let before = self.articulations[..articulation].iter().map(|a| a.bodies.len());
-        let place = self.bodies.len() + before.sum::<usize>() + link;
-        if states.len() < self.bodies.len() + self.joint_count() {
+        if states.len() < self.joint_places().end {
             return Err(self.wrong_count(states.len()));
         }
+        let place = self.joint_range(articulation).start + link;
         Ok((place, &self.articulations[articulation].tree.links()[link].joint))
+    }
+
+    /// Where the states of an articulation's joints are.
+    pub(crate) fn joint_range(&self, articulation: usize) -> Range<usize> {
+        let before = self.articulations[..articulation].iter().map(|own| own.bodies.len());
+        let first = self.bodies.len() + before.sum::<usize>();
+        first..first + self.articulations[articulation].bodies.len()
+    }
+
+    /// The link that a body is.
+    pub(crate) fn link(&self, body: BodyId) -> Result<&Link<S>, SimulationError> {
+        let (articulation, link) = self.link_of(body)?;
+        Ok(&self.articulations[articulation].tree.links()[link])
     }
 
     /// How many states joints have: one for each link.
@@ -219,7 +244,7 @@ impl<S: Scalar> World<S> {
     }
 
     /// Where the states of joints are.
-    pub(crate) fn joint_places(&self) -> std::ops::Range<usize> {
+    pub(crate) fn joint_places(&self) -> Range<usize> {
         self.bodies.len()..self.bodies.len() + self.joint_count()
     }
 
@@ -233,12 +258,8 @@ impl<S: Scalar> World<S> {
         &'a self,
         states: &'a [State<T>],
     ) -> impl Iterator<Item = (&'a ArticulatedBody<S>, &'a [State<T>])> {
-        let mut next = self.bodies.len();
-        self.articulations.iter().map(move |own| {
-            let first = next;
-            next += own.bodies.len();
-            (own, &states[first..next])
-        })
+        let all = self.articulations.iter().enumerate();
+        all.map(|(index, own)| (own, &states[self.joint_range(index)]))
     }
 
     /// Moves the links to where their joints put them.

@@ -10,6 +10,7 @@ use crate::contact::error::LawError;
 use crate::contact::force_jump::jumps;
 use crate::contact::gap_smoothing::GapSmoothing;
 use crate::contact::param_values::ParamValues;
+use crate::contact::range::ParameterRange;
 use crate::surface::Surface;
 
 /// The two sides of a contact.
@@ -87,13 +88,10 @@ impl<S: Scalar> ContactPair<S> {
     /// # Errors
     /// [`LawError::NoParameter`] with the names that there are, if there is none of that name.
     pub fn param_mut(&mut self, name: &str) -> Result<&mut S, LawError> {
-        let names = self.law.param_names();
-        let named =
-            self.params.iter_mut().zip(&names).find(|(_, own)| !name.is_empty() && **own == name);
-        named.map(|(param, _)| param).ok_or_else(|| {
-            let known: Vec<_> = names.iter().copied().filter(|name| !name.is_empty()).collect();
-            LawError::NoParameter { name: name.to_owned(), known: known.join(", ") }
-        })
+        let mut names = self.law.param_names();
+        names.truncate(self.params.len());
+        let place = LawError::place_of(name, &names)?;
+        Ok(&mut self.params[place])
     }
 
     /// Sets all parameters of the law.
@@ -112,9 +110,8 @@ impl<S: Scalar> ContactPair<S> {
     /// Whether the law takes these parameters.
     pub(crate) fn check(&self) -> Result<(), LawError> {
         let values = self.param_values();
-        if let Some(&value) = values.iter().find(|value| !value.is_finite()) {
-            return Err(LawError::Range { name: "parameter of a contact", range: "finite", value });
-        }
+        let finite = |value: &f64| ParameterRange::Finite.check("parameter of a contact", *value);
+        values.iter().try_for_each(finite)?;
         self.law.check_all(&values)
     }
 

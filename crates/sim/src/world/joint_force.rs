@@ -8,6 +8,7 @@ use super::World;
 use super::body_id::BodyId;
 use crate::articulated::Joint;
 use crate::contact::error::LawError;
+use crate::contact::range::ParameterRange;
 use crate::error::SimulationError;
 use crate::joint_law::JointLaw;
 use crate::joint_law::dynamic::DynJointLaw;
@@ -68,30 +69,17 @@ impl<S: Scalar> JointForce<S> {
     /// # Errors
     /// [`LawError::NoParameter`] with the names that there are, if there is none of that name.
     pub fn set_param(&mut self, name: &str, value: S) -> Result<(), LawError> {
-        let names = self.law.param_names();
-        match names.iter().position(|own| !name.is_empty() && *own == name) {
-            Some(place) => {
-                self.params[place] = value;
-                Ok(())
-            }
-            None => {
-                let known = names.into_iter().filter(|name| !name.is_empty());
-                let known = known.collect::<Vec<_>>().join(", ");
-                Err(LawError::NoParameter { name: name.to_owned(), known })
-            }
-        }
+        self.params[LawError::place_of(name, &self.law.param_names())?] = value;
+        Ok(())
     }
 
     /// Whether the law takes these parameters.
     pub(crate) fn check(&self) -> Result<(), LawError> {
         let values: Vec<f64> = self.params.iter().map(|p| p.value()).collect();
-        match values.iter().find(|value| !value.is_finite()) {
-            Some(&value) => {
-                let (name, range) = ("parameter of a joint's law", "finite");
-                Err(LawError::Range { name, range, value })
-            }
-            None => self.law.check(&values),
-        }
+        let finite =
+            |value: &f64| ParameterRange::Finite.check("parameter of a joint's law", *value);
+        values.iter().try_for_each(finite)?;
+        self.law.check(&values)
     }
 
     /// The same force, each number through `f`.
@@ -161,8 +149,7 @@ impl World {
 impl<S: Scalar> World<S> {
     /// Whether the joint of a link has such an axis.
     pub(super) fn check_axis(&self, link: BodyId, axis: usize) -> Result<(), SimulationError> {
-        let (articulation, own) = self.link_of(link)?;
-        let joint = &self.articulations[articulation].tree.links()[own].joint;
+        let joint = &self.link(link)?.joint;
         match axis < joint.freedoms() && !matches!(joint, Joint::Floating) {
             true => Ok(()),
             false => Err(SimulationError::NoAxis { link: self.bodies[link].name.clone(), axis }),
@@ -209,6 +196,7 @@ impl<S: Scalar> World<S> {
     pub(crate) fn along(&self, force: &JointForce<S>, states: &[State<S>]) -> Option<Along<S>> {
         let (first, _) = force.axes.first()?;
         let (articulation, _) = self.link_of(first.link).ok()?;
+        let (own, joints) = (&self.articulations[articulation], self.joint_range(articulation));
         let mut along = Along {
             articulation,
             freedoms: Vec::with_capacity(force.axes.len()),
@@ -216,14 +204,14 @@ impl<S: Scalar> World<S> {
             velocity: S::zero(),
         };
         for (JointAxis { link, index }, factor) in &force.axes {
-            let (_, own) = self.link_of(*link).ok()?;
-            let (place, joint) = self.joint_place(states, *link).ok()?;
-            let [_, freedoms] = self.articulations[articulation].tree.range(own);
-            let [position, velocity] = joint.along(&states[place], *index);
+            let link = own.bodies().iter().position(|body| body == link)?;
+            let (joint, state) = (&own.tree.links()[link].joint, states.get(joints.start + link)?);
+            let [_, freedoms] = own.tree.range(link);
+            let [position, velocity] = joint.along(state, *index);
             along.position += position.times(*factor);
             along.velocity += velocity.times(*factor);
             // A virtual displacement moves the position by its slopes, and so the effort acts along them.
-            let slopes = joint.position_slopes(&states[place], *index);
+            let slopes = joint.position_slopes(state, *index);
             let slopes =
                 freedoms.zip(slopes).map(|(freedom, slope)| (freedom, slope.times(*factor)));
             along.freedoms.extend(slopes.filter(|(_, slope)| !slope.is_constant_zero()));

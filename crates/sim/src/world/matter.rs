@@ -11,8 +11,7 @@ impl<S: Scalar> World<S> {
         if let Some(rigid) = self.bodies[body].rigid() {
             return rigid.gyration_radius();
         }
-        let Ok((articulation, link)) = self.link_of(body) else { return 0.0 };
-        let link = &self.articulations[articulation].tree.links()[link];
+        let Ok(link) = self.link(body) else { return 0.0 };
         let square = link.inertia.trace().value() / (2.0 * link.mass.value());
         if square.is_finite() { square.sqrt() } else { 0.0 }
     }
@@ -22,7 +21,6 @@ impl<S: Scalar> World<S> {
         if let Some(rigid) = self.bodies[body].rigid() {
             return rigid.mass().value();
         }
-        let Ok((articulation, link)) = self.link_of(body) else { return f64::INFINITY };
-        self.articulations[articulation].tree.links()[link].mass.value()
+        self.link(body).map_or(f64::INFINITY, |link| link.mass.value())
     }
 }

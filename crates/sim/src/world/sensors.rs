@@ -73,12 +73,7 @@ impl<S: Scalar> World<S> {
         states: &[State<S>],
         wrenches: &[Vector6<S>],
     ) -> (Vector3<S>, Vector3<S>) {
-        let mut first = self.joint_places().start;
-        for own in &self.articulations[..articulation] {
-            first += own.bodies().len();
-        }
-        let own = &self.articulations[articulation];
-        let places = first..first + own.bodies().len();
+        let (own, places) = (&self.articulations[articulation], self.joint_range(articulation));
         let [q, v] = own.coordinates(&states[places.clone()]);
         let rates = wrenches[places].iter().zip(own.tree.links());
         let accelerations: Vec<S> =

@@ -50,12 +50,15 @@ fn by_velocities(world: &World, states: &[State], step: Step) -> DMatrix<f64> {
 fn the_closed_form_is_forward_mode() {
     let (mut closed, mut forward) = (0, 0);
     for seed in 0..200 {
-        let (world, states) = random_scene(seed);
-        let custom = world.articulations[0]
-            .tree
-            .links()
-            .iter()
-            .any(|link| matches!(link.joint, Joint::Custom(_) | Joint::Spherical));
+        let (mut world, states) = random_scene(seed);
+        let has = |kind: fn(&Joint) -> bool| {
+            world.articulations[0].tree.links().iter().any(|link| kind(&link.joint))
+        };
+        let custom = has(|joint| matches!(joint, Joint::Custom(_)));
+        // Laws along their axes have no closed form.
+        if has(|joint| matches!(joint, Joint::Spherical)) {
+            world.joint_forces.clear();
+        }
         let sticks = world.contacts.iter().any(|pair| pair.law().bristles().is_some());
         let step = Step::new(0, 1e-3);
         let found = world.linear_step(&states, step).unwrap();
@@ -82,5 +85,5 @@ fn the_closed_form_is_forward_mode() {
             assert!(off < 1e-10, "{seed}, by {name}: {off}");
         }
     }
-    assert!(closed > 30 && forward > 60, "{closed} {forward}");
+    assert!(closed > 50 && forward > 50, "{closed} {forward}");
 }

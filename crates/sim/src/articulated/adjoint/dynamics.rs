@@ -37,10 +37,8 @@ pub(crate) fn accelerations<S: Scalar>(tree: &Articulation<S>, on: &Acting<'_, S
     };
     let first = on.gravity.iter().chain(on.coordinates).chain(on.velocities).chain(on.efforts);
     let first = first.chain(on.wrenches.iter().flat_map(|wrench| wrench.iter())).copied();
-    let inputs = Inputs::new(first, tree);
-    let (links, varying) = (inputs.links, inputs.varying.clone());
+    let Inputs { varying, varies, links } = Inputs::new(first, tree);
     let accelerations = result.clone();
-    let varies = inputs.into_varies();
     let node = Node { tree: plain, gravity, q, v, wrenches, accelerations, links, varies };
     match S::recorded(&varying, result.as_slice(), node) {
         Some(recorded) => DVector::from_vec(recorded),
@@ -94,19 +92,12 @@ impl Sweep {
             tree.range(index)[1].clone().for_each(|k| motion += at.axes[k] * multipliers[k]);
             virtual_motions.push(motion);
         }
-        let nothing = LinkAdjoint {
-            displacement: Vector6::zeros(),
-            mass: 0.0,
-            com: Vector3::zeros(),
-            inertia: nalgebra::Matrix3::zeros(),
-            armature: 0.0,
-        };
         let mut sweep = Self {
             gravity: Vector3::zeros(),
             q: vec![0.0; node.q.len()],
             v: vec![0.0; node.v.len()],
             wrenches: Vec::with_capacity(count),
-            links: vec![nothing; count],
+            links: vec![LinkAdjoint::default(); count],
         };
         // Adjoints of each link's velocity, acceleration and virtual motion, and of the forces' turn with it.
         let mut by = vec![Force::default(); count];
@@ -156,7 +147,7 @@ impl Sweep {
                     + own.motion * multipliers[k])
             };
             let by_axes: Vec<Vector6<f64>> = freedoms.clone().map(by_axis).collect();
-            at.course_adjoint(
+            at.custom_adjoint(
                 index,
                 [&node.q[coordinates.clone()], &node.v[freedoms.clone()]],
                 &by_axes,

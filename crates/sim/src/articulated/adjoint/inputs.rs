@@ -3,13 +3,14 @@
 use nalgebra::{Matrix3, Quaternion, Vector3, Vector6};
 use prehend_autodiff::Scalar;
 
-use crate::articulated::joint::{CustomJoint, Joint};
+use crate::articulated::joint::{CustomJoint, Joint, quaternion};
+use crate::articulated::joint_model::{MOST_FREEDOMS, inputs};
 use crate::articulated::kinematics::Kinematics;
 use crate::articulated::link::{Articulation, Link, NUMBERS};
-use crate::articulated::spatial::{angular, linear};
+use crate::articulated::spatial::{angular, linear, spatial};
 
 /// Adjoints of what a link is made of.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 pub(super) struct LinkAdjoint {
     /// Along a displacement of the joint's frame and all that hangs on it: a force about the origin.
     pub(super) displacement: Vector6<f64>,
@@ -24,7 +25,7 @@ pub(super) struct Inputs<S> {
     /// The numbers that vary.
     pub(super) varying: Vec<S>,
     /// Of all numbers in their order, whether they do.
-    varies: Vec<bool>,
+    pub(super) varies: Vec<bool>,
     /// Whether numbers of links are among them.
     pub(super) links: bool,
 }
@@ -47,10 +48,6 @@ impl<S: Scalar> Inputs<S> {
         if varies {
             self.varying.push(x);
         }
-    }
-
-    pub(super) fn into_varies(self) -> Vec<bool> {
-        self.varies
     }
 }
 
@@ -96,20 +93,18 @@ impl Kinematics<'_> {
     ) {
         let [_, freedoms] = self.tree.range(link);
         let along: Vec<f64> = freedoms.map(|k| self.axes[k].dot(displacement)).collect();
-        let quaternion = |q: &[f64], turn: &[f64], adjoints: &mut [f64]| {
+        let by_turn = |q: &[f64], turn: &[f64], adjoints: &mut [f64]| {
             let rotation = Quaternion::new(q[3], q[0], q[1], q[2]);
             let square = rotation.norm_squared();
             let turned = rotation * Quaternion::from_imag(Vector3::from_column_slice(turn));
             adjoints.iter_mut().zip(turned.coords.iter()).for_each(|(a, x)| *a += 2.0 * x / square);
         };
         match &self.tree.links()[link].joint {
-            Joint::Spherical => quaternion(q, &along, adjoints),
+            Joint::Spherical => by_turn(q, &along, adjoints),
             Joint::Floating => {
-                let rotation = Quaternion::new(q[6], q[3], q[4], q[5]);
-                let turned = nalgebra::Unit::new_normalize(rotation);
-                let place = turned * Vector3::from_column_slice(&along[..3]);
+                let place = quaternion(&q[3..]) * Vector3::from_column_slice(&along[..3]);
                 adjoints.iter_mut().zip(&place).for_each(|(a, x)| *a += x);
-                quaternion(&q[3..], &along[3..], &mut adjoints[3..]);
+                by_turn(&q[3..], &along[3..], &mut adjoints[3..]);
             }
             Joint::Fixed | Joint::Revolute(_) | Joint::Prismatic(_) | Joint::Custom(_) => {
                 adjoints.iter_mut().zip(along).for_each(|(a, x)| *a += x);
@@ -119,7 +114,7 @@ impl Kinematics<'_> {
 
     /// Adds to the adjoints of coordinates and velocities of a joint of one's own those of changes of its axes and of its drift, in
     /// the link's frame: forces about the origin.
-    pub(super) fn course_adjoint(
+    pub(super) fn custom_adjoint(
         &self,
         link: usize,
         [q, v]: [&[f64]; 2],
@@ -128,25 +123,25 @@ impl Kinematics<'_> {
         [q_adjoint, v_adjoint]: [&mut [f64]; 2],
     ) {
         let Joint::Custom(CustomJoint(model)) = &self.tree.links()[link].joint else { return };
-        let most = super::super::joint_model::MOST;
-        let part = |all: &[f64], i: usize| all.get(i).copied().unwrap_or(0.0);
-        let x = std::array::from_fn(|i| if i < most { part(q, i) } else { part(v, i - most) });
-        let (_, jacobian) = model.linearized(x);
+        let (_, jacobian) = model.linearized(inputs(q, v));
         let local = |force: &Vector6<f64>| {
             let (push, moment) = (linear(force), angular(force));
             let moment = moment - self.places[link].cross(&push);
             let rotation = &self.rotations[link];
-            crate::contact::wrench::stack(&rotation.tr_mul(&push), &rotation.tr_mul(&moment))
+            spatial(&rotation.tr_mul(&push), &rotation.tr_mul(&moment))
         };
         let mut add = |first: usize, force: Vector6<f64>| {
             for (row, force) in jacobian[first..].iter().zip(&force) {
                 q_adjoint.iter_mut().zip(row).for_each(|(a, slope)| *a += slope * force);
-                v_adjoint.iter_mut().zip(&row[most..]).for_each(|(a, slope)| *a += slope * force);
+                v_adjoint
+                    .iter_mut()
+                    .zip(&row[MOST_FREEDOMS..])
+                    .for_each(|(a, slope)| *a += slope * force);
             }
         };
         by_axes.iter().enumerate().for_each(|(k, force)| add(12 + 6 * k, local(force)));
         if let Some(force) = by_drift {
-            add(12 + 6 * most, local(force));
+            add(12 + 6 * MOST_FREEDOMS, local(force));
         }
     }
 }

@@ -1,6 +1,6 @@
 //! States of links.
 
-use nalgebra::{Matrix3, Point3, Quaternion, Vector3, Vector6};
+use nalgebra::{Point3, Quaternion, Vector3, Vector6};
 use prehend_autodiff::{CustomVjp, Scalar};
 
 use super::inputs::{Inputs, LinkAdjoint, add_varying};
@@ -18,10 +18,8 @@ pub(crate) fn link_states<S: Scalar>(tree: &Articulation<S>, q: &[S], v: &[S]) -
     let [plain_q, plain_v] = [q, v].map(|all| all.iter().map(|x| x.value()).collect::<Vec<f64>>());
     let plain = tree.map(S::value);
     let result: Vec<State> = plain.motion(&plain_q, &plain_v).link_states().collect();
-    let inputs = Inputs::new(q.iter().chain(v).copied(), tree);
-    let (links, varying) = (inputs.links, inputs.varying.clone());
+    let Inputs { varying, varies, links } = Inputs::new(q.iter().chain(v).copied(), tree);
     let outputs: Vec<f64> = coordinates_of(&result).collect();
-    let varies = inputs.into_varies();
     let node = Node { tree: plain, q: plain_q, v: plain_v, links, varies };
     match S::recorded(&varying, &outputs, node) {
         Some(recorded) => states_of(&recorded).collect(),
@@ -52,14 +50,7 @@ impl CustomVjp for Node {
         let at = self.tree.motion(&self.q, &self.v);
         let count = self.tree.links().len();
         let (mut q, mut v) = (vec![0.0; self.q.len()], vec![0.0; self.v.len()]);
-        let nothing = LinkAdjoint {
-            displacement: Vector6::zeros(),
-            mass: 0.0,
-            com: Vector3::zeros(),
-            inertia: Matrix3::zeros(),
-            armature: 0.0,
-        };
-        let mut links = vec![nothing; count];
+        let mut links = vec![LinkAdjoint::default(); count];
         // Adjoints of each link's place and of its velocity, with all that hangs on it.
         let mut placed = vec![Vector6::zeros(); count];
         let mut moving = vec![Vector6::zeros(); count];
@@ -86,7 +77,7 @@ impl CustomVjp for Node {
             freedoms.clone().for_each(|k| v[k] += at.axes[k].dot(&moving_here));
             let by_axes: Vec<Vector6<f64>> =
                 freedoms.clone().map(|k| moving_here * self.v[k]).collect();
-            at.course_adjoint(
+            at.custom_adjoint(
                 index,
                 [own, &self.v[freedoms.clone()]],
                 &by_axes,

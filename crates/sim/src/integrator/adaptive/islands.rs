@@ -57,14 +57,11 @@ impl Island {
             });
             islands[place].bodies.push(id);
         }
-        let mut joint = world.bodies.len();
         for (index, articulation) in world.articulations.iter().enumerate() {
-            let (first, count) = (joint, articulation.bodies().len());
-            joint += count;
             let body = articulation.bodies().first();
             if let Some(place) = body.and_then(|id| place[root_of(&mut roots, id.index())]) {
                 islands[place].articulations.push(index);
-                islands[place].joints.extend(first..first + count);
+                islands[place].joints.extend(world.joint_range(index));
             }
         }
         let mut deflection = world.joint_places().end;

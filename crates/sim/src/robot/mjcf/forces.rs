@@ -8,20 +8,12 @@ use prehend_geometry::mjcf::{
 };
 
 use super::MjcfError;
+use crate::joint_law::JointLaw;
 use crate::joint_law::affine_actuator::AffineActuator;
-use crate::joint_law::damper::JointDamper;
-use crate::joint_law::dynamic::DynJointLaw;
-use crate::joint_law::friction::JointFriction;
-use crate::joint_law::limits::JointLimits;
 use crate::joint_law::slack_spring::SlackSpring;
 use crate::joint_law::spring::JointSpring;
 use crate::world::World;
 use crate::world::joint_force::{JointAxis, JointForceId};
-
-/// Speed at which dry friction has 1/√2 of its bound \[rad/s or m/s\].
-const FRICTION_SCALE: f64 = 0.01;
-/// Share of a limit's effort per speed against it \[s/rad or s/m\]: nothing bounces off faster than its inverse.
-const LIMIT_DAMPING: f64 = 100.0;
 
 /// Adds forces along joints.
 pub(super) struct Forces<'a> {
@@ -29,8 +21,8 @@ pub(super) struct Forces<'a> {
     model: &'a Model,
     /// Of each joint of the model.
     axes: Vec<JointAxis>,
-    /// Inverse of the mass matrix with all joints at their neutral coordinates, and where each joint is in it.
-    inverse: DMatrix<f64>,
+    /// Inverse of the mass matrix with all joints at their neutral coordinates.
+    inverse: &'a DMatrix<f64>,
     warnings: &'a mut Vec<String>,
     pub(super) actuators: Vec<(String, JointForceId)>,
 }
@@ -40,9 +32,9 @@ impl<'a> Forces<'a> {
         world: &'a mut World,
         model: &'a Model,
         axes: Vec<JointAxis>,
+        inverse: &'a DMatrix<f64>,
         warnings: &'a mut Vec<String>,
     ) -> Self {
-        let inverse = world.inverse_mass();
         Self { world, model, axes, inverse, warnings, actuators: Vec::new() }
     }
 
@@ -65,10 +57,9 @@ impl<'a> Forces<'a> {
     fn add(
         &mut self,
         axes: &[(JointAxis, f64)],
-        law: impl crate::joint_law::JointLaw,
+        law: impl JointLaw,
     ) -> Result<JointForceId, MjcfError> {
-        let law: Arc<dyn DynJointLaw> = Arc::new(law);
-        Ok(self.world.add_coupled_force(axes, law)?)
+        Ok(self.world.add_coupled_force(axes, Arc::new(law))?)
     }
 
     fn add_joint(&mut self, index: JointIndex, joint: &Joint) -> Result<(), MjcfError> {
@@ -79,13 +70,7 @@ impl<'a> Forces<'a> {
         };
         for k in 0..count {
             let axis = [(JointAxis { index: k, ..first }, 1.0)];
-            if joint.damping > 0.0 {
-                self.add(&axis, JointDamper { damping: joint.damping })?;
-            }
-            if joint.friction_loss > 0.0 {
-                let (friction, velocity_scale) = (joint.friction_loss, FRICTION_SCALE);
-                self.add(&axis, JointFriction { friction, velocity_scale })?;
-            }
+            self.world.add_losses(&axis, joint.damping, joint.friction_loss)?;
             if joint.stiffness > 0.0 {
                 let rest = if joint.kind == JointKind::Ball { 0.0 } else { joint.spring_reference };
                 self.add(&axis, JointSpring { stiffness: joint.stiffness, rest })?;
@@ -104,23 +89,17 @@ impl<'a> Forces<'a> {
     fn add_limits(
         &mut self,
         axes: &[(JointAxis, f64)],
-        (lower, upper): (f64, f64),
+        range: (f64, f64),
         solver: &SolverParameters,
     ) -> Result<(), MjcfError> {
-        let [stiffness, _] = stiffness(solver, self.inertia(axes), 1.0);
-        self.add(axes, JointLimits { lower, upper, stiffness, damping: LIMIT_DAMPING })?;
-        Ok(())
+        let inertia = self.world.inertia_along(self.inverse, axes);
+        let [stiffness, _] = stiffness(solver, inertia, 1.0);
+        Ok(self.world.add_limits(axes, range, stiffness)?)
     }
 
     fn add_tendon(&mut self, tendon: &Tendon) -> Result<(), MjcfError> {
         let axes = self.along(tendon, 1.0);
-        if tendon.damping > 0.0 {
-            self.add(&axes, JointDamper { damping: tendon.damping })?;
-        }
-        if tendon.friction_loss > 0.0 {
-            let (friction, velocity_scale) = (tendon.friction_loss, FRICTION_SCALE);
-            self.add(&axes, JointFriction { friction, velocity_scale })?;
-        }
+        self.world.add_losses(&axes, tendon.damping, tendon.friction_loss)?;
         if tendon.stiffness > 0.0 {
             let (stiffness, (lower, upper)) = (tendon.stiffness, tendon.spring_range);
             self.add(&axes, SlackSpring { stiffness, lower, upper })?;
@@ -163,11 +142,6 @@ impl<'a> Forces<'a> {
             self.actuators.push((actuator.name.clone(), id));
         }
         Ok(())
-    }
-
-    /// What an effort along a sum of joints has to accelerate \[kg m² or kg\].
-    fn inertia(&self, axes: &[(JointAxis, f64)]) -> f64 {
-        self.world.inertia_along(&self.inverse, axes)
     }
 }
 

@@ -1,14 +1,10 @@
 //! Loops and couplings of a model.
 
-use std::sync::Arc;
-
-use nalgebra::{Isometry3, Point3};
+use nalgebra::{DMatrix, Isometry3, Matrix3xX, Point3};
 use prehend_geometry::mjcf::{EqualityKind, Model, SolverParameters};
 
 use super::forces::stiffness;
 use super::{MjcfError, MjcfOptions, MjcfRobot};
-use crate::joint_law::damper::JointDamper;
-use crate::joint_law::spring::JointSpring;
 use crate::world::World;
 use crate::world::body::Body;
 use crate::world::body_id::BodyId;
@@ -37,6 +33,7 @@ impl World {
         model: &Model,
         robot: &MjcfRobot,
         options: &MjcfOptions,
+        inverse: &DMatrix<f64>,
         warnings: &mut Vec<String>,
     ) -> Result<(), MjcfError> {
         let ground = std::cell::OnceCell::new();
@@ -52,7 +49,9 @@ impl World {
                     let fixed = bodies.map(|body| body.is_none());
                     let bodies = ends(self, bodies);
                     let frames = placed(anchors, fixed, &options.t_world_model);
-                    self.add_stiff_weld(bodies, frames, &equality.solver, options.softness, 0.0)?;
+                    let held =
+                        self.held(bodies, &frames, inverse, &equality.solver, options.softness);
+                    self.add_weld(Weld { bodies, frames, stiffness: weld(held, 0.0) })?;
                 }
                 EqualityKind::Weld { bodies, anchors, rotation, torque_scale } => {
                     let fixed = bodies.map(|body| body.is_none());
@@ -60,8 +59,10 @@ impl World {
                     let mut frames = placed(anchors, fixed, &options.t_world_model);
                     // Axes of the second body as the first has them.
                     frames[0].rotation *= *rotation;
-                    let softness = options.softness;
-                    self.add_stiff_weld(bodies, frames, &equality.solver, softness, *torque_scale)?;
+                    let held =
+                        self.held(bodies, &frames, inverse, &equality.solver, options.softness);
+                    let stiffness = weld(held, *torque_scale);
+                    self.add_weld(Weld { bodies, frames, stiffness })?;
                 }
                 EqualityKind::Joint { joints: (first, second), polynomial } => {
                     let [constant, slope, rest @ ..] = *polynomial;
@@ -81,51 +82,45 @@ impl World {
                         axes.extend(axis(*second).map(|axis| (axis, -slope)));
                         target -= slope * model.joint(*second).reference;
                     }
-                    let inertia = self.inertia_along(&self.inverse_mass(), &axes);
-                    let [stiffness, damping] =
-                        stiffness(&equality.solver, inertia, options.softness);
-                    let spring = JointSpring { stiffness, rest: target };
-                    self.add_coupled_force(&axes, Arc::new(spring))?;
-                    self.add_coupled_force(&axes, Arc::new(JointDamper { damping }))?;
+                    let inertia = self.inertia_along(inverse, &axes);
+                    let held = stiffness(&equality.solver, inertia, options.softness);
+                    self.add_coupling(&axes, target, held)?;
                 }
             }
         }
         Ok(())
     }
 
-    fn add_stiff_weld(
-        &mut self,
+    /// Stiffness and damping of what holds frames of two bodies together.
+    fn held(
+        &self,
         bodies: [BodyId; 2],
-        frames: [Isometry3<f64>; 2],
+        frames: &[Isometry3<f64>; 2],
+        inverse: &DMatrix<f64>,
         solver: &SolverParameters,
         softness: f64,
-        torque_scale: f64,
-    ) -> Result<(), MjcfError> {
-        let mass = self.mass_between(bodies, frames.map(|frame| frame.translation.vector.into()));
-        let [linear, linear_damping] = stiffness(solver, mass, softness);
-        // Angles count as lengths of this size.
-        let square = torque_scale * torque_scale;
-        let stiffness = WeldStiffness {
-            linear,
-            linear_damping,
-            angular: linear * square,
-            angular_damping: linear_damping * square,
-        };
-        Ok(self.add_weld(Weld { bodies, frames, stiffness })?)
+    ) -> [f64; 2] {
+        let points = frames.map(|frame| frame.translation.vector.into());
+        stiffness(solver, self.mass_between(bodies, points, inverse), softness)
     }
 
     /// What a force between points of two bodies of the last articulation has to accelerate at most \[kg\].
-    fn mass_between(&self, bodies: [BodyId; 2], points: [Point3<f64>; 2]) -> f64 {
+    fn mass_between(
+        &self,
+        bodies: [BodyId; 2],
+        points: [Point3<f64>; 2],
+        inverse: &DMatrix<f64>,
+    ) -> f64 {
         let tree = &self.articulations[self.articulations.len() - 1].tree;
         let rest = vec![0.0; tree.freedoms()];
         let at = tree.kinematics(&tree.neutral(), &rest);
-        let mut relative = nalgebra::Matrix3xX::zeros(tree.freedoms());
+        let mut relative = Matrix3xX::zeros(tree.freedoms());
         for ((body, point), sign) in bodies.into_iter().zip(points).zip([1.0, -1.0]) {
             if let Ok((_, link)) = self.link_of(body) {
                 relative += at.jacobian(link, &point).rows(0, 3) * sign;
             }
         }
-        let mobility = &relative * self.inverse_mass() * relative.transpose();
+        let mobility = &relative * inverse * relative.transpose();
         // By the least mobile direction: others are damped the more. One in which next to nothing moves does not count.
         if mobility.iter().any(|x| !x.is_finite()) {
             return f64::NAN;
@@ -134,4 +129,11 @@ impl World {
         let least = LEAST_MOBILITY * eigenvalues.max();
         1.0 / eigenvalues.iter().copied().filter(|x| *x > least).fold(f64::INFINITY, f64::min)
     }
+}
+
+/// A weld of this stiffness and damping, whose angles count as lengths by `torque_scale` \[m/rad\].
+fn weld([linear, linear_damping]: [f64; 2], torque_scale: f64) -> WeldStiffness {
+    let square = torque_scale * torque_scale;
+    let (angular, angular_damping) = (linear * square, linear_damping * square);
+    WeldStiffness { linear, linear_damping, angular, angular_damping }
 }

@@ -101,8 +101,9 @@ impl MjcfRobot {
                 JointKind::Ball => turned(own).to_vec(),
                 JointKind::Free => own[..3].iter().copied().chain(turned(&own[3..])).collect(),
             };
-            world.set_joint(states, *link, &position, &vec![0.0; kind.velocities()])?;
+            world.write_joint(states, *link, &position, &vec![0.0; kind.velocities()])?;
         }
+        world.place_links(states);
         Ok(())
     }
 }
@@ -162,10 +163,11 @@ impl World {
         }
         let axes: Vec<JointAxis> =
             chain.joints.iter().map(|joint| links[joint.link].into()).collect();
-        let mut forces = forces::Forces::new(self, model, axes, &mut warnings);
+        let inverse = self.inverse_mass();
+        let mut forces = forces::Forces::new(self, model, axes, &inverse, &mut warnings);
         forces.add_all()?;
         let actuators = forces.actuators;
-        self.add_loops(model, &robot, options, &mut warnings)?;
+        self.add_loops(model, &robot, options, &inverse, &mut warnings)?;
         Ok(MjcfRobot { actuators, warnings, ..robot })
     }
 }
