@@ -76,6 +76,10 @@ impl<I: Integrator> Scene<I> {
         Ok(Arc::new(Self { world: world.map(S::value), parameters, integrator }))
     }
 
+    pub(crate) fn plain_world(&self) -> &World {
+        &self.world
+    }
+
     pub(crate) fn changes<S: Scalar>(&self, world: &World<S>) -> Changes<S> {
         let changed = |x: S, own: f64| x.value() != own || !x.is_constant();
         let all = (0..).zip(world.parameters()).zip(&self.parameters);

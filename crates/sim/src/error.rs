@@ -151,6 +151,22 @@ pub enum SimulationError {
         /// How many it has.
         expected: usize,
     },
+    /// A world has no parameter of that name, or it was named before.
+    #[error("the world has no parameter called '{name}', or it was named twice: see its names")]
+    NoParameter {
+        /// The name.
+        name: String,
+    },
+    /// Inputs of a function of numbers that are too few or too many.
+    #[error("{given} {what}: {expected} are expected")]
+    Inputs {
+        /// What was given.
+        what: &'static str,
+        /// How many were given.
+        given: usize,
+        /// How many it takes.
+        expected: usize,
+    },
     /// A body has an impossible mass, inertia or center of mass.
     #[error("body '{body}': {error}")]
     Body {

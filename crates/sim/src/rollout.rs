@@ -1,5 +1,7 @@
 //! Simulating for many steps.
 
+use std::ops::ControlFlow;
+
 use prehend_autodiff::Scalar;
 
 use crate::audit::{Audit, Resolution};
@@ -21,24 +23,30 @@ pub struct Simulation<T> {
     pub resolution: Resolution,
 }
 
-/// What a controller may return: nothing, or a result whose error ends the simulation.
+/// What a controller may return: nothing, whether to go on, or a result of either, whose error ends the simulation.
 pub trait ControlResult {
-    /// As a result.
+    /// Whether the simulation goes on.
     ///
     /// # Errors
     /// If the controller failed.
-    fn into_result(self) -> Result<(), SimulationError>;
+    fn into_flow(self) -> Result<ControlFlow<()>, SimulationError>;
 }
 
 impl ControlResult for () {
-    fn into_result(self) -> Result<(), SimulationError> {
-        Ok(())
+    fn into_flow(self) -> Result<ControlFlow<()>, SimulationError> {
+        Ok(ControlFlow::Continue(()))
     }
 }
 
-impl<E: Into<SimulationError>> ControlResult for Result<(), E> {
-    fn into_result(self) -> Result<(), SimulationError> {
-        self.map_err(Into::into)
+impl ControlResult for ControlFlow<()> {
+    fn into_flow(self) -> Result<ControlFlow<()>, SimulationError> {
+        Ok(self)
+    }
+}
+
+impl<C: ControlResult, E: Into<SimulationError>> ControlResult for Result<C, E> {
+    fn into_flow(self) -> Result<ControlFlow<()>, SimulationError> {
+        self.map_err(Into::into)?.into_flow()
     }
 }
 
@@ -134,7 +142,8 @@ impl<S: Scalar> World<S> {
 
     /// [`World::simulate_with`] under `control`, which is called before each step: it sees the states and may set external
     /// wrenches, gravity, parameters of laws, of contacts and [along joints](World::joint_force_mut), and the states of kinematic bodies, for
-    /// that step and those after it. It may return nothing, or a result, whose error ends the simulation.
+    /// that step and those after it. It may return nothing; [`ControlFlow`], which ends the simulation before that step; or a result of
+    /// either, whose error ends it, too.
     ///
     /// Nothing is said of how well the steps resolve the motion, as [`World::simulate_with`] does: see [`World::check_time_step`].
     ///
@@ -174,7 +183,7 @@ impl<S: Scalar> World<S> {
         self.controlled(integrator, initial, time_steps, control, |_| ())
     }
 
-    /// The states of [`World::simulate_controlled`] at 0, dt, …, `steps`·dt.
+    /// The states of [`World::simulate_controlled`] at 0, dt, …, `steps`·dt, or until `control` ends it.
     ///
     /// # Errors
     /// See there.
@@ -204,7 +213,9 @@ impl<S: Scalar> World<S> {
         let TimeSteps { dt, steps } = time_steps;
         for index in 0..steps {
             let step = Step::new(index, dt);
-            control(step, &mut world, &mut states).into_result()?;
+            if control(step, &mut world, &mut states).into_flow()?.is_break() {
+                break;
+            }
             visit(&states);
             world.check(&states, step)?;
             states = world.advance(integrator, &states, step)?;
@@ -400,6 +411,30 @@ mod tests {
             .states;
         let heights = [0, 1, 2].map(|i: usize| run[i][0].pose.translation.z);
         assert!((heights[0] + 0.3).abs() < 1e-15 && (heights[2] + 0.1).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_controller_ends_a_simulation() {
+        let (world, states) = egg_on(bowl(), GapSmoothing::Hard);
+        let time_steps = TimeSteps { dt: 1e-3, steps: 100 };
+        let control = |step: Step, _: &mut World, states: &mut [State]| {
+            states[1].linear.x = 0.1;
+            match step.index {
+                7 => ControlFlow::Break(()),
+                _ => ControlFlow::Continue(()),
+            }
+        };
+        let run = world.rollout_controlled(&SemiImplicitEuler, &states, time_steps, control);
+        let run = run.unwrap();
+        assert_eq!(run.len(), 8);
+        let end = world.simulate_controlled(&SemiImplicitEuler, &states, time_steps, control);
+        assert_eq!(&end.unwrap(), run.last().unwrap());
+        let fails = |step: Step, _: &mut World, _: &mut [State]| match step.index {
+            3 => Err(SimulationError::TimeStep(0.0)),
+            _ => Ok(ControlFlow::Continue(())),
+        };
+        let failed = world.simulate_controlled(&SemiImplicitEuler, &states, time_steps, fails);
+        assert_eq!(failed, Err(SimulationError::TimeStep(0.0)));
     }
 
     #[test]

@@ -32,6 +32,28 @@ pub struct Link<S: Scalar = f64> {
 /// How many numbers a link is made of.
 pub(crate) const NUMBERS: usize = 3 + 4 + 1 + 3 + 6 + 1;
 
+/// What they are called.
+pub(crate) const NUMBER_NAMES: [&str; NUMBERS] = [
+    "joint_x",
+    "joint_y",
+    "joint_z",
+    "joint_qx",
+    "joint_qy",
+    "joint_qz",
+    "joint_qw",
+    "mass",
+    "com_x",
+    "com_y",
+    "com_z",
+    "inertia_xx",
+    "inertia_yy",
+    "inertia_zz",
+    "inertia_xy",
+    "inertia_xz",
+    "inertia_yz",
+    "armature",
+];
+
 impl<S: Scalar> Link<S> {
     /// Of `body` in the link's frame, hanging on the world by `joint` at its origin.
     pub fn new(name: impl Into<String>, joint: Joint, body: &RigidBody<S>) -> Self {

@@ -7,7 +7,8 @@
 //!
 //! What acts along a joint is a [`JointLaw`](crate::JointLaw): springs, dampers, dry friction, limits (no joint has any by itself), motors and servos. A
 //! controller sets their parameters by name; they keep these values for the whole step, however it is divided, so that smooth targets want short steps. Over
-//! numbers that carry derivatives, these pass through it. A servo whose effort is at its bound has a derivative of 0 by its target.
+//! numbers that carry derivatives, these pass through it; to end a run early it returns [`ControlFlow::Break`](std::ops::ControlFlow). A servo whose effort
+//! is at its bound has a derivative of 0 by its target.
 //!
 //! ```
 //! # use nalgebra::{Isometry3, Vector3};
@@ -46,6 +47,9 @@
 //! links that they move, or by [`World::add_robot`] if their joints simply go where they are told. Sensors:
 //! [`World::contact_wrench`], [`World::accelerometer`]. A joint type of your own is a function from coordinates to a pose
 //! ([`JointModel`](crate::articulated::JointModel)). [`World::linear_step`] gives a step with its Jacobian in closed form.
+//!
+//! For many inputs, such as a push per step, write the same over [`Var`](prehend_autodiff::Var): [`gradient`](prehend_autodiff::gradient) of a function of
+//! them hands value and gradient to [`optimize`](prehend_autodiff::optimize) (`examples/pendulum_swing_up.rs`).
 //!
 //! Reverse mode keeps kinematics and dynamics of an articulation as one node each, whose adjoint is in closed form.
 //! [`VelocityVerlet`](crate::VelocityVerlet) and [`BackwardEuler`](crate::BackwardEuler) move no joints;

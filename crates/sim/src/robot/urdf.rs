@@ -36,7 +36,7 @@ impl World {
     /// them by springs. A robot whose joints go where they are told is added by [`World::add_robot`].
     ///
     /// # Errors
-    /// If `shape` is not the robot's, or a link weighs nothing and yet should move.
+    /// If `shape` is not the robot's, or a link weighs nothing and yet should move. The world is then as it was.
     pub fn add_articulated_robot(
         &mut self,
         robot: &KinematicTree,
@@ -47,9 +47,22 @@ impl World {
         if let Some(found) = found.filter(|found| *found != expected) {
             return Err(SimulationError::Robot { what: "links of the shape", found, expected });
         }
+        let mut grown = self.clone();
+        let bodies = grown.insert_robot(robot, shape, options)?;
+        *self = grown;
+        Ok(bodies)
+    }
+
+    /// [`World::add_articulated_robot`], which on an error leaves a part behind.
+    fn insert_robot(
+        &mut self,
+        robot: &KinematicTree,
+        shape: Option<&RobotShape>,
+        options: &UrdfOptions,
+    ) -> Result<Vec<BodyId>, SimulationError> {
         let (links, order) = links(robot, options);
         let added = self.add_articulation(links)?;
-        let mut bodies = vec![BodyId(0); expected];
+        let mut bodies = vec![BodyId(0); robot.links().len()];
         order.iter().zip(&added).for_each(|(link, body)| bodies[*link] = *body);
         if let Some(shape) = shape {
             for (body, shape) in bodies.iter().zip(shape.links()) {

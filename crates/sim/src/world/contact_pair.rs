@@ -88,10 +88,15 @@ impl<S: Scalar> ContactPair<S> {
     /// # Errors
     /// [`LawError::NoParameter`] with the names that there are, if there is none of that name.
     pub fn param_mut(&mut self, name: &str) -> Result<&mut S, LawError> {
-        let mut names = self.law.param_names();
-        names.truncate(self.params.len());
-        let place = LawError::place_of(name, &names)?;
+        let place = LawError::place_of(name, &self.param_names())?;
         Ok(&mut self.params[place])
+    }
+
+    /// Names of the parameters, empty where the law has none.
+    pub(crate) fn param_names(&self) -> Vec<&'static str> {
+        let mut names = self.law.param_names();
+        names.resize(self.params.len(), "");
+        names
     }
 
     /// Sets all parameters of the law.

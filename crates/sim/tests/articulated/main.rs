@@ -8,3 +8,4 @@ mod loops;
 mod pendulum;
 mod scenes;
 mod sensors;
+mod trees;

@@ -7,9 +7,9 @@ use prehend_autodiff::Scalar;
 use prehend_geometry::SplitMix64;
 use prehend_sim::articulated::{Joint, JointModel, Link};
 use prehend_sim::{
-    Body, ContactBodies, Coulomb, GapSmoothing, HalfSpace, JointDamper, JointFriction, JointLimits,
-    JointSpring, KelvinVoigt, Law, PositionServo, RigidBody, Sphere, State, Sticking, Surface,
-    VelocityServo, Weld, WeldStiffness, World,
+    Body, ContactBodies, Coulomb, DynContactLaw, GapSmoothing, HalfSpace, JointDamper,
+    JointFriction, JointLimits, JointSpring, KelvinVoigt, Law, PositionServo, RigidBody, Sphere,
+    State, Sticking, Surface, VelocityServo, Weld, WeldStiffness, World,
 };
 
 /// A nut on a thread.
@@ -27,7 +27,7 @@ impl JointModel for Thread {
     }
 }
 
-fn random_link(random: &mut SplitMix64, index: usize, floats: bool) -> Link {
+pub(super) fn random_link(random: &mut SplitMix64, index: usize, floats: bool) -> Link {
     let mut vector = |scale: f64| Vector3::from_fn(|_, _| scale * random.normal());
     let place = Translation3::from(vector(0.1));
     let turn = UnitQuaternion::from_scaled_axis(vector(1.0));
@@ -55,6 +55,14 @@ fn random_link(random: &mut SplitMix64, index: usize, floats: bool) -> Link {
     }
 }
 
+const FRICTION: Coulomb = Coulomb { friction: 0.5, slip_scale: 5e-2 };
+const SPRING: KelvinVoigt = KelvinVoigt { stiffness: 3e5, damping: 1e3 };
+
+pub(super) fn coulomb_law() -> (Arc<dyn DynContactLaw>, GapSmoothing) {
+    let law = Law::new(SPRING, FRICTION).unwrap();
+    (Arc::new(law), GapSmoothing::Softplus { width: 2e-3 })
+}
+
 /// A tree whose links are balls, low over a floor, beside a free ball; everything is pressed together and moves.
 pub(super) fn random_scene(seed: u64) -> (World, Vec<State>) {
     let mut random = SplitMix64::new(seed);
@@ -74,16 +82,12 @@ pub(super) fn random_scene(seed: u64) -> (World, Vec<State>) {
     ball(&mut world, free, 0.06);
     let bodies = world.add_articulation(links).unwrap();
     bodies.iter().for_each(|body| ball(&mut world, *body, 0.08));
-    let coulomb = Coulomb { friction: 0.5, slip_scale: 5e-2 };
-    let spring = KelvinVoigt { stiffness: 3e5, damping: 1e3 };
-    let slides = Arc::new(Law::new(spring, coulomb).unwrap());
-    let holds = Sticking { friction: coulomb, deflection: 1e-3 };
-    let holds = Arc::new(Law::new(spring, holds).unwrap());
-    let smoothing = GapSmoothing::Softplus { width: 2e-3 };
+    let (slides, smoothing) = coulomb_law();
+    let holds = Sticking { friction: FRICTION, deflection: 1e-3 };
+    let holds: Arc<dyn DynContactLaw> = Arc::new(Law::new(SPRING, holds).unwrap());
     for (index, &samples) in bodies.iter().enumerate() {
         let field = if index % 2 == 0 { floor } else { free };
-        let law: Arc<dyn prehend_sim::DynContactLaw> =
-            if index % 3 == 2 { holds.clone() } else { slides.clone() };
+        let law = if index % 3 == 2 { holds.clone() } else { slides.clone() };
         world.add_contact(ContactBodies { samples, field }, law, smoothing).unwrap();
         let moves = world.articulations[0].tree.links()[index].joint.freedoms();
         if moves == 0 || matches!(world.articulations[0].tree.links()[index].joint, Joint::Floating)

@@ -2,7 +2,8 @@
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use prehend_geometry::mjcf::Model;
-use prehend_sim::{BodyId, MjcfError, MjcfOptions, TimeSteps, World};
+use prehend_sim::articulated::Joint;
+use prehend_sim::{BodyId, JointAxis, MjcfError, MjcfOptions, TimeSteps, World};
 
 const MODEL: &str = r#"<mujoco model="authored"><compiler angle="radian"/><worldbody>
     <geom name="ground" type="plane" size="1 1 .1"/>
@@ -111,4 +112,47 @@ fn joints_of_every_kind_are_where_mujoco_has_them() {
 
     let refused = robot.set_positions(&world, &mut states, &POSITIONS[1..]);
     assert_eq!(refused, Err(MjcfError::Positions { given: 13, expected: 14 }));
+}
+
+#[test]
+fn a_model_hangs_on_the_joint_that_is_asked_for_and_has_shapes_if_wanted() {
+    let model = Model::from_str(MODEL, None).unwrap();
+    let mut world = World::new(model.gravity);
+    let options = MjcfOptions {
+        base: Joint::Prismatic(nalgebra::Vector3::x_axis()),
+        shapes: false,
+        ..MjcfOptions::default()
+    };
+    let robot = world.add_mjcf(&model, &options).unwrap();
+    assert!(world.body_named("ground").is_none());
+    assert!(world.bodies.iter().all(|body| body.surface.is_none() && body.field.is_none()));
+    let mut states = world.neutral_states();
+    let base = robot.body("base").unwrap();
+    let before = states[base].pose;
+    world.set_joint(&mut states, base, &[0.25], &[0.0]).unwrap();
+    let by = states[base].pose.translation.vector - before.translation.vector;
+    // Along the axis of the base's own frame, which the file turns.
+    let along = before.rotation * nalgebra::Vector3::x() * 0.25;
+    assert!((by - along).norm() < 1e-12, "{by}");
+    // Positions of the file do not name that slide.
+    robot.set_positions(&world, &mut states, &POSITIONS).unwrap();
+    let slide: JointAxis = base.into();
+    let [position, _] = world.joint_motion(&states, slide).unwrap();
+    assert_eq!(position, 0.25);
+    // What flies does not hang on it.
+    let free = states[robot.body("free").unwrap()].pose.translation.vector;
+    assert!((free - nalgebra::Vector3::new(0.4, -0.2, 0.7)).norm() < 1e-12);
+}
+
+#[test]
+fn a_model_that_cannot_be_leaves_the_world_as_it_was() {
+    let flawed = r#"<mujoco><worldbody><body name="light"><joint name="hinge" type="hinge"/>
+        <inertial mass="1" pos="0 0 0" diaginertia="1 1 1"/>
+        <geom type="box" size="0.1 0.1 1e-9"/></body></worldbody></mujoco>"#;
+    let model = Model::from_str(flawed, None).unwrap();
+    let mut world = World::new(model.gravity);
+    let error = world.add_mjcf(&model, &MjcfOptions::default()).unwrap_err();
+    assert!(matches!(&error, MjcfError::Shape { body, .. } if body == "light"), "{error}");
+    assert!(world.bodies.is_empty() && world.articulations.is_empty());
+    assert!(world.joint_forces.is_empty());
 }

@@ -4,6 +4,7 @@
 
 mod batch;
 mod driven;
+mod functions;
 mod gradients;
 mod groups;
 mod integrators;

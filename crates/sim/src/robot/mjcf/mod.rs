@@ -140,8 +140,20 @@ impl World {
     /// Contacts are the caller's to add, with [`World::add_contacts_between`].
     ///
     /// # Errors
-    /// If a body weighs nothing and yet should move by itself, or a shape cannot be.
+    /// If a body weighs nothing and yet should move by itself, or a shape cannot be. The world is then as it was.
     pub fn add_mjcf(
+        &mut self,
+        model: &Model,
+        options: &MjcfOptions,
+    ) -> Result<MjcfRobot, MjcfError> {
+        let mut grown = self.clone();
+        let robot = grown.insert_mjcf(model, options)?;
+        *self = grown;
+        Ok(robot)
+    }
+
+    /// [`World::add_mjcf`], which on an error leaves a part behind.
+    fn insert_mjcf(
         &mut self,
         model: &Model,
         options: &MjcfOptions,

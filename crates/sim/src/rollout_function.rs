@@ -1,0 +1,329 @@
+//! A rollout as a function of rows of numbers, with its derivatives: what other languages and optimizers call.
+
+use std::sync::Arc;
+
+use prehend_autodiff::{Fwd, Recording, Scalar, Var};
+
+use crate::adjoint::Scene;
+use crate::error::SimulationError;
+use crate::integrator::Integrator;
+use crate::integrator::adaptive::Adaptive;
+use crate::state::State;
+use crate::state_coordinates::{STATE, coordinates_of, states_of};
+use crate::time::{Step, TimeSteps};
+use crate::world::World;
+
+/// The states of a world at 0, dt, …, `steps`·dt as a function of the initial states, of some of its
+/// [parameters](World::parameters), and of others that a controller sets before each step.
+///
+/// A state is a row of 13 numbers: position x, y, z \[m\], quaternion i, j, k, w, velocity \[m/s\] and angular velocity \[rad/s\] of the center of
+/// mass, world frame. Bodies come first, then joints and contacts that stick, as in [`World::neutral_states`].
+///
+/// Derivatives by quaternions mean something along the sphere of unit quaternions alone.
+///
+/// ```
+/// use nalgebra::{Isometry3, Vector3};
+/// use prehend_sim::{Body, RigidBody, RolloutFunction, RolloutInputs, TimeSteps, World};
+///
+/// let mut world = World::new(Vector3::new(0.0, 0.0, -9.81));
+/// world.add(Body::free("stone", RigidBody::ball(1.0, 0.05)?));
+/// let time_steps = TimeSteps { dt: 0.1, steps: 5 };
+/// // By gravity, and by a push that changes from step to step.
+/// let throw = RolloutFunction::new(&world, time_steps, &["gravity.z"], &["stone.force_x"])?;
+/// let states = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 3.0, 0.0, 0.0, 0.0];
+/// let inputs = RolloutInputs { states: &states, parameters: &[-9.81], controls: &[1.0; 5] };
+/// let run = throw.evaluate(inputs)?;
+/// let height = run[5 * 13 + 2];
+///
+/// let mut adjoints = vec![0.0; run.len()];
+/// adjoints[5 * 13 + 2] = 1.0;
+/// let gradient = throw.vjp(inputs, &run, &adjoints)?;
+/// assert!((height - (3.0 * 0.5 - 0.125 * 9.81)).abs() < 1e-9);
+/// assert!((gradient.parameters[0] - 0.125).abs() < 1e-9 && (gradient.states[9] - 0.5).abs() < 1e-9);
+/// assert_eq!(gradient.controls, [0.0; 5]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct RolloutFunction<I = Adaptive> {
+    scene: Arc<Scene<I>>,
+    time_steps: TimeSteps,
+    /// Places of the parameters among all, then of the controls.
+    places: Box<[u32]>,
+    parameters: usize,
+}
+
+/// What a [`RolloutFunction`] is a function of.
+#[derive(Clone, Copy, Debug)]
+pub struct RolloutInputs<'a, S: Scalar = f64> {
+    /// The initial states, those of bodies or all, 13 numbers each.
+    pub states: &'a [S],
+    /// The parameters that it was asked to vary.
+    pub parameters: &'a [S],
+    /// The parameters that change from step to step, those of a step after those of the step before.
+    pub controls: &'a [S],
+}
+
+/// Derivatives by all [`RolloutInputs`], as many of each as were given.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RolloutGradient {
+    /// By the initial states.
+    pub states: Vec<f64>,
+    /// By the parameters.
+    pub parameters: Vec<f64>,
+    /// By the controls.
+    pub controls: Vec<f64>,
+}
+
+impl RolloutFunction {
+    /// Of `world`, with [`Adaptive`] steps.
+    ///
+    /// # Errors
+    /// See [`RolloutFunction::with_integrator`].
+    pub fn new(
+        world: &World,
+        time_steps: TimeSteps,
+        parameters: &[&str],
+        controls: &[&str],
+    ) -> Result<Self, SimulationError> {
+        Self::with_integrator(Adaptive::default(), world, time_steps, parameters, controls)
+    }
+}
+
+impl<I: Integrator> RolloutFunction<I> {
+    /// Of `world` with the steps of `integrator`, by the parameters of these [names](World::parameter_names). Those that are no inputs keep their values.
+    ///
+    /// # Errors
+    /// If there is no such parameter or one is named twice, there is no step or its time is not positive.
+    pub fn with_integrator(
+        integrator: I,
+        world: &World,
+        time_steps: TimeSteps,
+        parameters: &[&str],
+        controls: &[&str],
+    ) -> Result<Self, SimulationError> {
+        let names = world.parameter_names();
+        let mut places = Vec::with_capacity(parameters.len() + controls.len());
+        for name in parameters.iter().chain(controls) {
+            let place = names.iter().position(|own| own == name);
+            let place = place.filter(|place| !places.contains(&(*place as u32)));
+            let place =
+                place.ok_or_else(|| SimulationError::NoParameter { name: (*name).to_owned() })?;
+            places.push(place as u32);
+        }
+        if !(time_steps.dt > 0.0 && time_steps.dt.is_finite()) {
+            return Err(SimulationError::TimeStep(time_steps.dt));
+        }
+        if time_steps.steps == 0 {
+            return Err(SimulationError::Inputs { what: "steps", given: 0, expected: 1 });
+        }
+        let scene = Scene::new(integrator, world)?;
+        Ok(Self { scene, time_steps, places: places.into(), parameters: parameters.len() })
+    }
+
+    /// The world as it was given.
+    pub fn world(&self) -> &World {
+        self.scene.plain_world()
+    }
+
+    /// The steps.
+    pub fn time_steps(&self) -> TimeSteps {
+        self.time_steps
+    }
+
+    /// How many parameters it takes, and how many controls a step.
+    pub fn inputs(&self) -> [usize; 2] {
+        [self.parameters, self.places.len() - self.parameters]
+    }
+
+    /// How many numbers all states are at one time: 13 for each body, joint and contact that sticks.
+    pub fn width(&self) -> usize {
+        STATE * self.world().state_count()
+    }
+
+    /// The states at 0, dt, …, `steps`·dt, one after the other.
+    ///
+    /// # Errors
+    /// As [`World::simulate_with`]; with controls as [`World::simulate_controlled`].
+    pub fn evaluate<S: Scalar>(
+        &self,
+        inputs: RolloutInputs<'_, S>,
+    ) -> Result<Vec<S>, SimulationError> {
+        let mut run = Vec::with_capacity((self.time_steps.steps + 1) * self.width());
+        let end = self.march(inputs, |states| run.extend(coordinates_of(states)))?;
+        run.extend(coordinates_of(&end));
+        Ok(run)
+    }
+
+    /// The states at the end alone.
+    ///
+    /// # Errors
+    /// See [`RolloutFunction::evaluate`].
+    pub fn end<S: Scalar>(&self, inputs: RolloutInputs<'_, S>) -> Result<Vec<S>, SimulationError> {
+        Ok(coordinates_of(&self.march(inputs, |_| ())?).collect())
+    }
+
+    /// The states at the end; those before each step go to `visit`.
+    fn march<S: Scalar>(
+        &self,
+        inputs: RolloutInputs<'_, S>,
+        mut visit: impl FnMut(&[State<S>]),
+    ) -> Result<Vec<State<S>>, SimulationError> {
+        self.check(&inputs)?;
+        let integrator = &self.scene.integrator;
+        let initial: Vec<State<S>> = states_of(inputs.states).collect();
+        let [_, controls] = self.inputs();
+        if controls == 0 {
+            let world = self.scene.world(&self.places, inputs.parameters)?;
+            // What is seen after a step is what comes before the next.
+            let mut last = world.begin(&initial, self.time_steps)?;
+            let follow = |_, states: &[State<S>]| {
+                visit(&last);
+                last.copy_from_slice(states);
+            };
+            return Ok(world.simulate_with(integrator, &initial, self.time_steps, follow)?.states);
+        }
+        let mut states = Vec::new();
+        for step in self.steps() {
+            let world = self.scene.world(&self.places, &self.values_at(&inputs, step.index))?;
+            if step.index == 0 {
+                states = world.begin(&initial, self.time_steps)?;
+            }
+            visit(&states);
+            world.check(&states, step)?;
+            states = world.advance(integrator, &states, step)?;
+        }
+        Ok(states)
+    }
+
+    fn steps(&self) -> impl DoubleEndedIterator<Item = Step> + use<I> {
+        let TimeSteps { dt, steps } = self.time_steps;
+        (0..steps).map(move |index| Step::new(index, dt))
+    }
+
+    /// Parameters and controls of a step.
+    fn values_at<S: Scalar>(&self, inputs: &RolloutInputs<'_, S>, step: usize) -> Vec<S> {
+        let [_, count] = self.inputs();
+        let controls = &inputs.controls[step * count..][..count];
+        inputs.parameters.iter().chain(controls).copied().collect()
+    }
+
+    /// Whether there are as many as it takes.
+    fn check<S: Scalar>(&self, inputs: &RolloutInputs<'_, S>) -> Result<(), SimulationError> {
+        let [parameters, controls] = self.inputs();
+        let expected = [
+            ("parameters", inputs.parameters.len(), parameters),
+            ("controls", inputs.controls.len(), controls * self.time_steps.steps),
+        ];
+        for (what, given, expected) in expected {
+            if given != expected {
+                return Err(SimulationError::Inputs { what, given, expected });
+            }
+        }
+        match inputs.states.len().is_multiple_of(STATE) {
+            true => Ok(()),
+            false => {
+                let (given, expected) = (inputs.states.len(), self.width());
+                Err(SimulationError::Inputs { what: "numbers of states", given, expected })
+            }
+        }
+    }
+
+    /// The product of `adjoints`, one for each number of [`RolloutFunction::evaluate`], and its Jacobian, by one sweep back through the `run` that
+    /// it gave: each step is recorded again, and no more than one is held at once.
+    ///
+    /// The derivatives are those of [`StepCheckpointed`](crate::StepCheckpointed).
+    ///
+    /// # Errors
+    /// See [`RolloutFunction::evaluate`]; if `run` or `adjoints` are too short or too long, or the integrator's steps have no derivatives in this world.
+    pub fn vjp(
+        &self,
+        inputs: RolloutInputs<'_>,
+        run: &[f64],
+        adjoints: &[f64],
+    ) -> Result<RolloutGradient, SimulationError> {
+        self.check(&inputs)?;
+        self.scene.integrator.check_differentiable(self.world())?;
+        let (width, steps) = (self.width(), self.time_steps.steps);
+        let expected = width * (steps + 1);
+        for (what, given) in [("numbers of a run", run.len()), ("adjoints", adjoints.len())] {
+            if given != expected {
+                return Err(SimulationError::Inputs { what, given, expected });
+            }
+        }
+        let (mut by_parameters, mut by_controls) =
+            (vec![0.0; inputs.parameters.len()], vec![0.0; inputs.controls.len()]);
+        let [_, count] = self.inputs();
+        let mut add = |step: usize, by_values: &[f64]| {
+            let to = by_parameters.iter_mut().chain(&mut by_controls[step * count..][..count]);
+            to.zip(by_values).for_each(|(to, by)| *to += by);
+        };
+        let mut by_states = adjoints[steps * width..].to_vec();
+        for step in self.steps().rev() {
+            let before = step.index * width..(step.index + 1) * width;
+            let states = &run[before.clone()];
+            let [by_before, by_values] =
+                self.pull_back(&inputs, step.index, states, &by_states, |world, states| {
+                    world.advance(&self.scene.integrator, states, step)
+                })?;
+            add(step.index, &by_values);
+            by_states = by_before;
+            by_states.iter_mut().zip(&adjoints[before]).for_each(|(by, own)| *by += own);
+        }
+        let begin =
+            |world: &World<Var>, states: &[State<Var>]| world.begin(states, self.time_steps);
+        let [states, by_values] = self.pull_back(&inputs, 0, inputs.states, &by_states, begin)?;
+        add(0, &by_values);
+        Ok(RolloutGradient { states, parameters: by_parameters, controls: by_controls })
+    }
+
+    /// Derivatives, by the numbers of the states `before` a step and by the parameters and controls of the step, of what `change` makes of them times
+    /// `adjoints`.
+    fn pull_back(
+        &self,
+        inputs: &RolloutInputs<'_>,
+        step: usize,
+        before: &[f64],
+        adjoints: &[f64],
+        change: impl FnOnce(&World<Var>, &[State<Var>]) -> Result<Vec<State<Var>>, SimulationError>,
+    ) -> Result<[Vec<f64>; 2], SimulationError> {
+        let values = self.values_at(inputs, step);
+        if adjoints.iter().all(|adjoint| *adjoint == 0.0) {
+            return Ok([vec![0.0; before.len()], vec![0.0; values.len()]]);
+        }
+        let recording = Recording::start();
+        let states = recording.variables_of(before);
+        let values = recording.variables_of(&values);
+        let world = self.scene.world(&self.places, &values)?;
+        let after = change(&world, &states_of(&states).collect::<Vec<_>>())?;
+        let seeds = coordinates_of(&after).zip(adjoints.iter().copied());
+        let seeds: Vec<(Var, f64)> = seeds.filter(|(_, adjoint)| *adjoint != 0.0).collect();
+        let adjoints = recording.vjp(&seeds);
+        let by = |vars: &[Var]| vars.iter().map(|&var| adjoints.wrt(var)).collect();
+        Ok([by(&states), by(&values)])
+    }
+
+    /// The states of [`RolloutFunction::evaluate`] and their derivatives along `tangents` of all inputs, by forward mode.
+    ///
+    /// # Errors
+    /// See [`RolloutFunction::evaluate`]; if tangents are too few or too many.
+    pub fn jvp(
+        &self,
+        inputs: RolloutInputs<'_>,
+        tangents: RolloutInputs<'_>,
+    ) -> Result<[Vec<f64>; 2], SimulationError> {
+        let lift = |what: &'static str, values: &[f64], along: &[f64]| {
+            let (given, expected) = (along.len(), values.len());
+            if given != expected {
+                return Err(SimulationError::Inputs { what, given, expected });
+            }
+            let pairs = values.iter().zip(along);
+            Ok(pairs.map(|(&value, &along)| Fwd { value, derivative: [along] }).collect::<Vec<_>>())
+        };
+        let states = lift("tangents of states", inputs.states, tangents.states)?;
+        let parameters = lift("tangents of parameters", inputs.parameters, tangents.parameters)?;
+        let controls = lift("tangents of controls", inputs.controls, tangents.controls)?;
+        let (states, parameters, controls) = (&*states, &*parameters, &*controls);
+        let run: Vec<Fwd<1>> = self.evaluate(RolloutInputs { states, parameters, controls })?;
+        Ok([run.iter().map(|x| x.value).collect(), run.iter().map(|x| x.derivative[0]).collect()])
+    }
+}
