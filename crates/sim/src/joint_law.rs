@@ -7,6 +7,7 @@ pub(crate) mod friction;
 pub(crate) mod limits;
 pub(crate) mod motor;
 pub(crate) mod position_servo;
+pub(crate) mod registry;
 pub(crate) mod slack_spring;
 pub(crate) mod spring;
 #[cfg(test)]

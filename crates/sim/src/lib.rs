@@ -99,6 +99,7 @@ pub use joint_law::friction::JointFriction;
 pub use joint_law::limits::JointLimits;
 pub use joint_law::motor::Motor;
 pub use joint_law::position_servo::PositionServo;
+pub use joint_law::registry::{JointLawEntry, joint_laws};
 pub use joint_law::slack_spring::SlackSpring;
 pub use joint_law::spring::JointSpring;
 pub use joint_law::velocity_servo::VelocityServo;

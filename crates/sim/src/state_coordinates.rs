@@ -9,8 +9,8 @@ use crate::state::State;
 pub(crate) const STATE: usize = 13;
 
 impl<S: Scalar> State<S> {
-    /// Translation, rotation as a quaternion x, y, z, w, linear and angular velocity.
-    pub(crate) fn coordinates(&self) -> [S; STATE] {
+    /// The state as a row of numbers: translation \[m\], rotation as a quaternion i, j, k, w, linear \[m/s\] and angular \[rad/s\] velocity.
+    pub fn coordinates(&self) -> [S; STATE] {
         let [x, y, z] = self.pose.translation.vector.into();
         let [qx, qy, qz, qw] = self.pose.rotation.coords.into();
         let [vx, vy, vz] = self.linear.into();
@@ -18,8 +18,8 @@ impl<S: Scalar> State<S> {
         [x, y, z, qx, qy, qz, qw, vx, vy, vz, wx, wy, wz]
     }
 
-    /// The state of [`State::coordinates`].
-    pub(crate) fn from_coordinates(coordinates: &[S; STATE]) -> Self {
+    /// The state of [`State::coordinates`]. The quaternion is taken as it is.
+    pub fn from_coordinates(coordinates: &[S; STATE]) -> Self {
         let [x, y, z, qx, qy, qz, qw, vx, vy, vz, wx, wy, wz] = *coordinates;
         let rotation: UnitQuaternion<S> = Unit::new_unchecked(Quaternion::new(qw, qx, qy, qz));
         State {

@@ -155,6 +155,11 @@ impl<S: Scalar> World<S> {
         self.bodies.iter().position(|body| body.name == name).map(BodyId)
     }
 
+    /// All bodies, in their order.
+    pub fn body_ids(&self) -> impl Iterator<Item = BodyId> + use<S> {
+        (0..self.bodies.len()).map(BodyId)
+    }
+
     /// The bodies that forces move, links among them.
     pub(crate) fn moved_bodies(&self) -> impl Iterator<Item = BodyId> {
         let moved = self.bodies.iter().enumerate().filter(|(_, body)| body.feels_forces());
@@ -164,7 +169,7 @@ impl<S: Scalar> World<S> {
     /// The bodies that forces move by themselves: no links.
     pub(crate) fn free_bodies(&self) -> Vec<BodyId> {
         let free = |id: &BodyId| self.bodies[*id].rigid().is_some();
-        (0..self.bodies.len()).map(BodyId).filter(free).collect()
+        self.body_ids().filter(free).collect()
     }
 
     /// Sets the parameter called `name`, such as `"friction"`, of every contact between two bodies: to differentiate by it, put in a

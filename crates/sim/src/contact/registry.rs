@@ -70,7 +70,10 @@ fn graspd() -> LawEntry {
 }
 
 /// `values`, if they are as many as the table has entries.
-fn exactly<P: ParameterArray<f64>>(values: &[f64], table: &[LawParameter]) -> Result<P, LawError> {
+pub(crate) fn exactly<P: ParameterArray<f64>>(
+    values: &[f64],
+    table: &[LawParameter],
+) -> Result<P, LawError> {
     if let Some(missing) = table.get(values.len()) {
         return Err(LawError::Missing { name: missing.name });
     }

@@ -1,0 +1,33 @@
+//! Python's module `prehend._prehend`: what NumPy arrays and names become, and what errors become.
+#![cfg(feature = "extension")]
+
+mod arrays;
+mod error;
+mod integrator;
+mod link;
+mod python_law;
+mod robot;
+mod rollout;
+mod shape;
+mod world;
+
+use pyo3::prelude::*;
+
+/// Differentiable simulation, rendering and pose refinement.
+#[pymodule]
+mod _prehend {
+    #[pymodule_export]
+    use super::error::Error;
+    #[pymodule_export]
+    use super::link::Link;
+    #[pymodule_export]
+    use super::robot::Robot;
+    #[pymodule_export]
+    use super::rollout::Rollout;
+    #[pymodule_export]
+    use super::shape::Shape;
+    #[pymodule_export]
+    use super::world::World;
+    #[pymodule_export]
+    use super::world::laws::{contact_laws, joint_laws};
+}

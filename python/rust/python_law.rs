@@ -1,0 +1,104 @@
+//! Contact laws written in Python: slow, and for trying them out.
+
+use nalgebra::Vector3;
+use prehend_autodiff::Scalar;
+use prehend_sim::{Contact, ContactLaw, Response};
+use pyo3::prelude::*;
+use pyo3::types::PyTuple;
+
+use crate::error::wrong;
+use crate::world::laws::Values;
+
+/// Gap, its rate, slip and normal.
+const MOTION: usize = 8;
+
+/// A law whose forces, and their derivatives, Python computes at each contact point.
+pub(crate) struct PythonLaw {
+    /// `prehend.laws._respond(law, numbers, area, differentiate)`.
+    respond: Py<PyAny>,
+    law: Py<PyAny>,
+    names: Vec<&'static str>,
+    values: Vec<f64>,
+    reach: f64,
+}
+
+impl PythonLaw {
+    /// Of an object with a method `law(p, contact)`, and the values of its parameters in the order of `parameters`, its list of names.
+    pub(crate) fn new(law: &Bound<'_, PyAny>, mut given: Values) -> PyResult<Self> {
+        let names: Vec<String> = match law.getattr_opt("parameters")? {
+            Some(names) => names.extract()?,
+            None => Vec::new(),
+        };
+        if !law.hasattr("law")? {
+            return Err(wrong(
+                "a contact law is a name, or an object with a method law(p, contact)",
+            ));
+        }
+        let value = |name: &String| {
+            given
+                .remove(name)
+                .ok_or_else(|| wrong(format!("the law's parameter '{name}' is missing")))
+        };
+        let values = names.iter().map(value).collect::<PyResult<Vec<f64>>>()?;
+        if let Some(name) = given.keys().next() {
+            return Err(wrong(format!("the law has no parameter '{name}'")));
+        }
+        let reach = law.getattr_opt("reach")?.map_or(Ok(0.0), |reach| reach.extract())?;
+        let respond = law.py().import("prehend.laws")?.getattr("_respond")?.unbind();
+        // Names of parameters live as long as the program; there are a few in each.
+        let names = names.into_iter().map(|name| &*Box::leak(name.into_boxed_str())).collect();
+        Ok(Self { respond, law: law.clone().unbind(), names, values, reach })
+    }
+
+    /// The four numbers of a response, each with its derivatives by motion and parameters if asked for.
+    fn respond(
+        &self,
+        numbers: &[f64],
+        area: f64,
+        differentiate: bool,
+    ) -> PyResult<Vec<(f64, Vec<f64>)>> {
+        Python::attach(|py| {
+            let numbers = PyTuple::new(py, numbers)?;
+            self.respond.call1(py, (&self.law, numbers, area, differentiate))?.extract(py)
+        })
+    }
+}
+
+impl ContactLaw for PythonLaw {
+    fn params(&self) -> &[f64] {
+        &self.values
+    }
+
+    fn param_names(&self) -> Vec<&'static str> {
+        self.names.clone()
+    }
+
+    fn law<S: Scalar>(&self, p: &[S], contact: &Contact<S>) -> Response<S> {
+        let mut inputs: Vec<S> = Vec::with_capacity(MOTION + p.len());
+        inputs.extend([contact.gap, contact.normal_speed]);
+        inputs.extend(contact.slip.iter().chain(contact.normal.iter()));
+        inputs.extend_from_slice(p);
+        let numbers: Vec<f64> = inputs.iter().map(|x| x.value()).collect();
+        let outputs = match self.respond(&numbers, contact.area, S::ORDER > 0) {
+            Ok(outputs) if outputs.len() == 4 => outputs,
+            Ok(_) => return Response::nan(),
+            Err(error) => {
+                // A law has no way to fail: the simulation ends where forces are no numbers, and this says why.
+                Python::attach(|py| error.print(py));
+                return Response::nan();
+            }
+        };
+        let [normal, x, y, z] = std::array::from_fn(|k| {
+            let (value, slopes) = &outputs[k];
+            let moved = inputs.iter().zip(slopes).filter(|(_, slope)| **slope != 0.0);
+            moved.fold(S::constant(*value), |sum, (input, slope)| {
+                sum + (*input - S::constant(input.value())).times(*slope)
+            })
+        });
+        Response { normal, tangential: Vector3::new(x, y, z) }
+    }
+
+    fn reach(&self) -> f64 {
+        self.reach
+    }
+}

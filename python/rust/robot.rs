@@ -1,0 +1,110 @@
+//! Robots in a world.
+
+use std::collections::BTreeMap;
+
+use numpy::PyArray2;
+use prehend_geometry::mjcf::Model;
+use prehend_geometry::robot::{KinematicTree, Motion};
+use prehend_sim::{BodyId, MjcfRobot};
+use pyo3::prelude::*;
+
+use crate::arrays::{Numbers, in_order};
+use crate::error::{Raise, wrong};
+use crate::world::World;
+
+/// A robot that was added to a world.
+#[pyclass(frozen, module = "prehend")]
+pub(crate) struct Robot {
+    /// The row of each body by its name.
+    #[pyo3(get)]
+    bodies: BTreeMap<String, usize>,
+    /// The row of the link that each joint moves, and which axis of its joint.
+    #[pyo3(get)]
+    joints: BTreeMap<String, (usize, usize)>,
+    /// The parameter that each actuator is driven by.
+    #[pyo3(get)]
+    actuators: BTreeMap<String, String>,
+    /// What of the file has no counterpart.
+    #[pyo3(get)]
+    warnings: Vec<String>,
+    /// Positions that the file has, in MuJoCo's order.
+    reference: Vec<f64>,
+    mjcf: Option<MjcfRobot>,
+}
+
+impl Robot {
+    /// `before` are the names of the parameters before it was added to `world`.
+    pub(crate) fn of_mjcf(
+        model: &Model,
+        robot: MjcfRobot,
+        world: &prehend_sim::World,
+        before: &[String],
+    ) -> Self {
+        let before: std::collections::HashSet<&String> = before.iter().collect();
+        let names = world.parameter_names();
+        // Those of actuators, in their order: nothing else is called so.
+        let controls = names.iter().filter(|name| !before.contains(name));
+        let controls = controls
+            .filter(|name| name.rsplit('.').next().is_some_and(|own| own.starts_with("control")));
+        let actuators = robot.actuators.iter().map(|(name, _)| name.clone());
+        let bodies = model.bodies.iter().zip(&robot.bodies);
+        Self {
+            bodies: bodies.map(|(body, id)| (body.name.clone(), id.index())).collect(),
+            joints: robot
+                .joints
+                .iter()
+                .map(|(name, axis)| (name.clone(), (axis.link.index(), axis.index)))
+                .collect(),
+            actuators: actuators.zip(controls.cloned()).collect(),
+            warnings: robot.warnings.clone(),
+            reference: model.reference_positions(),
+            mjcf: Some(robot),
+        }
+    }
+
+    pub(crate) fn of_urdf(tree: &KinematicTree, bodies: &[BodyId]) -> Self {
+        let links = tree.links().iter().zip(bodies);
+        let moving = tree.joints().iter().filter(|joint| joint.motion != Motion::Fixed);
+        Self {
+            bodies: links.map(|(link, id)| (link.name.clone(), id.index())).collect(),
+            joints: moving
+                .map(|joint| (joint.name.clone(), (bodies[joint.child].index(), 0)))
+                .collect(),
+            actuators: BTreeMap::new(),
+            warnings: Vec::new(),
+            reference: Vec::new(),
+            mjcf: None,
+        }
+    }
+}
+
+#[pymethods]
+impl Robot {
+    /// Puts the joints of a robot in MJCF to `positions` in MuJoCo's order, its `qpos`, or where the file has them, at rest.
+    #[pyo3(signature = (world, states, positions=None))]
+    fn set_positions(
+        &self,
+        world: &World,
+        states: &Bound<'_, PyArray2<f64>>,
+        positions: Option<Numbers<'_>>,
+    ) -> PyResult<()> {
+        let robot = self
+            .mjcf
+            .as_ref()
+            .ok_or_else(|| wrong("a robot of URDF has no positions in MuJoCo's order"))?;
+        let positions =
+            positions.map_or_else(|| self.reference.clone(), |p| in_order(&p).into_owned());
+        crate::world::states::change(states, |all| {
+            robot.set_positions(&world.world, all, &positions).raise()
+        })
+    }
+
+    fn __repr__(&self) -> String {
+        format!(
+            "Robot(bodies={}, joints={:?}, actuators={:?})",
+            self.bodies.len(),
+            self.joints.keys(),
+            self.actuators.keys()
+        )
+    }
+}

@@ -1,0 +1,204 @@
+//! Worlds.
+
+mod contacts;
+mod joints;
+pub(crate) mod laws;
+mod sensors;
+pub(crate) mod states;
+
+use std::collections::BTreeMap;
+
+use nalgebra::Vector3;
+use prehend_sim::{Body, BodyId, RigidBody, RolloutFunction, TimeSteps};
+use pyo3::prelude::*;
+
+use crate::arrays::{Numbers, vector_or};
+use crate::error::{Raise, wrong};
+use crate::integrator::AnyIntegrator;
+use crate::link::Matter;
+use crate::rollout::Rollout;
+use crate::shape::Shape;
+
+/// Bodies, their contacts, and gravity [m/s²].
+///
+/// Bodies are told by their row in states, as an int, or by their name. `world["ball.mass"]` reads and writes a parameter.
+#[pyclass(module = "prehend")]
+#[derive(Clone)]
+pub(crate) struct World {
+    pub(crate) world: prehend_sim::World,
+}
+
+/// A body: its row or its name.
+#[derive(FromPyObject)]
+pub(crate) enum BodyKey {
+    Row(usize),
+    Name(String),
+}
+
+impl World {
+    /// The body that Python means.
+    pub(crate) fn id(&self, key: &BodyKey) -> PyResult<BodyId> {
+        let found = match key {
+            BodyKey::Row(row) => self.world.body_ids().nth(*row),
+            BodyKey::Name(name) => self.world.body_named(name),
+        };
+        let bodies = self.world.bodies.len();
+        found.ok_or_else(|| match key {
+            BodyKey::Row(row) => wrong(format!("there is no body {row}: the world has {bodies}")),
+            BodyKey::Name(name) => wrong(format!("there is no body '{name}'")),
+        })
+    }
+
+    /// What `change` makes of the world, with the parameters that are new since, each by its last name. If it fails, nothing has changed.
+    pub(crate) fn naming(
+        &mut self,
+        change: impl FnOnce(&mut prehend_sim::World) -> PyResult<()>,
+    ) -> PyResult<BTreeMap<String, String>> {
+        let before: std::collections::HashSet<String> =
+            self.world.parameter_names().into_iter().collect();
+        let mut grown = self.world.clone();
+        change(&mut grown)?;
+        self.world = grown;
+        let names = self.world.parameter_names().into_iter().filter(|name| !before.contains(name));
+        let mut named = BTreeMap::new();
+        for name in names {
+            let last = name.rsplit('.').next().unwrap_or_default();
+            let short = last.split('#').next().unwrap_or_default().to_owned();
+            named.entry(short).or_insert(name);
+        }
+        Ok(named)
+    }
+
+    fn place(&self, name: &str) -> PyResult<usize> {
+        let found = self.world.parameter_names().iter().position(|own| own == name);
+        found.ok_or_else(|| pyo3::exceptions::PyKeyError::new_err(name.to_owned()))
+    }
+}
+
+#[pymethods]
+impl World {
+    #[new]
+    #[pyo3(signature = (gravity=None))]
+    fn new(gravity: Option<Numbers<'_>>) -> PyResult<Self> {
+        let gravity: Vector3<f64> = vector_or(gravity.as_ref(), [0.0, 0.0, -9.81], "gravity")?;
+        Ok(Self { world: prehend_sim::World::new(gravity) })
+    }
+
+    /// Adds a body and returns its row in states.
+    ///
+    /// With `fixed` it stays where its state says and moves at that state's velocity, whatever touches it. Otherwise forces move it: mass properties
+    /// follow from `shape` and `density` [kg/m³] (1000 if nothing is given) or `mass` [kg], or are given as `mass`, `com` [m] and `inertia` [kg m²].
+    #[pyo3(signature = (name, shape=None, *, fixed=false, mass=None, density=None, com=None, inertia=None))]
+    #[allow(clippy::too_many_arguments)] // as many as Python names
+    fn add_body(
+        &mut self,
+        name: &str,
+        shape: Option<&Shape>,
+        fixed: bool,
+        mass: Option<f64>,
+        density: Option<f64>,
+        com: Option<Numbers<'_>>,
+        inertia: Option<Numbers<'_>>,
+    ) -> PyResult<usize> {
+        let shape = shape.map(|shape| &shape.shape);
+        let matter = Matter::of(mass, com.as_ref(), inertia.as_ref(), shape, density)?;
+        let body = match (fixed, shape) {
+            (true, _) if matter.is_some() => {
+                return Err(wrong(format!("body '{name}': it is fixed, and has a mass")));
+            }
+            (true, Some(shape)) => Body::fixed_from_shape(name, shape),
+            (true, None) => Body::kinematic(name),
+            (false, Some(shape)) if inertia.is_none() => {
+                let density = match (density, mass, shape.moments()) {
+                    (Some(density), _, _) => density,
+                    (None, Some(mass), Some(moments)) => mass / moments.volume,
+                    _ => 1000.0,
+                };
+                Body::from_shape(name, shape, density).raise()?
+            }
+            (false, shape) => {
+                let no_mass = || {
+                    wrong(format!("body '{name}': it has no mass; fixed=True keeps it in place"))
+                };
+                let Matter { mass, com, inertia } = matter.ok_or_else(no_mass)?;
+                let mut body = Body::free(name, RigidBody::new(mass, inertia, com).raise()?);
+                if let Some(shape) = shape {
+                    body.surface = shape.surface().cloned();
+                    body.field = Some(shape.field().clone());
+                }
+                body
+            }
+        };
+        Ok(self.world.add(body).index())
+    }
+
+    /// The row of the body of that name.
+    fn body(&self, name: String) -> PyResult<usize> {
+        Ok(self.id(&BodyKey::Name(name))?.index())
+    }
+
+    /// The names of the bodies, in the order of their rows.
+    #[getter]
+    fn bodies(&self) -> Vec<String> {
+        self.world.bodies.iter().map(|body| body.name.clone()).collect()
+    }
+
+    /// The names of all parameters by which the world can be differentiated: `ball.mass`, `gravity.z`, `ball/floor.friction`, …
+    #[getter]
+    fn parameters(&self) -> Vec<String> {
+        self.world.parameter_names()
+    }
+
+    fn __getitem__(&self, name: &str) -> PyResult<f64> {
+        Ok(self.world.parameters()[self.place(name)?])
+    }
+
+    fn __setitem__(&mut self, name: &str, value: f64) -> PyResult<()> {
+        let (place, mut parameters) = (self.place(name)?, self.world.parameters());
+        parameters[place] = value;
+        self.world = self.world.with_parameters(&parameters).raise()?;
+        Ok(())
+    }
+
+    fn __contains__(&self, name: &str) -> bool {
+        self.place(name).is_ok()
+    }
+
+    /// A copy, which changes apart from this one.
+    fn copy(&self) -> Self {
+        self.clone()
+    }
+
+    /// The simulation of `steps` steps of `dt` [s] as a function of arrays, with derivatives by the initial states, by the parameters of these names,
+    /// and by controls: parameters that are set anew before each step.
+    ///
+    /// `integrator` is "adaptive", which chooses steps within `dt` to hold an error (`tolerance`, 5e-6 of the motion), or one of fixed steps:
+    /// "semi_implicit_euler", "runge_kutta_4", "backward_euler". Later changes of the world are not seen by the rollout.
+    #[pyo3(signature = (dt, steps, *, parameters=Vec::new(), controls=Vec::new(), integrator="adaptive", tolerance=None))]
+    fn rollout(
+        &self,
+        dt: f64,
+        steps: usize,
+        parameters: Vec<String>,
+        controls: Vec<String>,
+        integrator: &str,
+        tolerance: Option<f64>,
+    ) -> PyResult<Rollout> {
+        let integrator = AnyIntegrator::of(integrator, tolerance)?;
+        let own: Vec<&str> = parameters.iter().map(String::as_str).collect();
+        let each_step: Vec<&str> = controls.iter().map(String::as_str).collect();
+        let time_steps = TimeSteps { dt, steps };
+        let function =
+            RolloutFunction::with_integrator(integrator, &self.world, time_steps, &own, &each_step)
+                .raise()?;
+        let values =
+            parameters.iter().map(|name| self.__getitem__(name)).collect::<PyResult<_>>()?;
+        Ok(Rollout::new(function, parameters, controls, values))
+    }
+
+    fn __repr__(&self) -> String {
+        let (bodies, contacts) = (self.world.bodies.len(), self.world.contacts.len());
+        let groups = self.world.contact_groups.len();
+        format!("World({bodies} bodies, {contacts} contacts, {groups} groups of contacts)")
+    }
+}

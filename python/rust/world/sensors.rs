@@ -1,0 +1,51 @@
+//! What sensors feel, and how short steps have to be.
+
+use numpy::PyArray;
+use numpy::ndarray::IxDyn;
+use prehend_sim::Integrator;
+use pyo3::prelude::*;
+
+use super::states::states;
+use super::{BodyKey, World};
+use crate::arrays::{Numbers, array, vector};
+use crate::error::Raise;
+use crate::integrator::AnyIntegrator;
+
+type Array<'py> = Bound<'py, PyArray<f64, IxDyn>>;
+
+#[pymethods]
+impl World {
+    /// What contacts and welds do to a body: force [N] and torque [N m] about its center of mass, of a link about the origin of its frame; world frame.
+    fn contact_wrench<'py>(
+        &self,
+        py: Python<'py>,
+        states: Numbers<'py>,
+        body: BodyKey,
+    ) -> PyResult<Array<'py>> {
+        let (id, states) = (self.id(&body)?, self::states(&states)?);
+        let wrench = self.world.contact_wrench(id, &states).raise()?;
+        array(py, wrench.as_slice().to_vec(), &[6])
+    }
+
+    /// What an accelerometer at a point of a body shows [m/s²], both in the body's frame: acceleration less that of free fall.
+    fn accelerometer<'py>(
+        &self,
+        py: Python<'py>,
+        states: Numbers<'py>,
+        body: BodyKey,
+        point: Numbers<'py>,
+    ) -> PyResult<Array<'py>> {
+        let (id, states) = (self.id(&body)?, self::states(&states)?);
+        let felt =
+            self.world.accelerometer(id, &vector(&point, "point")?.into(), &states).raise()?;
+        array(py, felt.as_slice().to_vec(), &[3])
+    }
+
+    /// The longest step [s] with which an integrator of fixed steps is stable for the contacts at `states`; those to come are not among them.
+    #[pyo3(signature = (states, integrator="semi_implicit_euler"))]
+    fn longest_step(&self, states: Numbers<'_>, integrator: &str) -> PyResult<f64> {
+        let states = self::states(&states)?;
+        let integrator = AnyIntegrator::of(integrator, None)?;
+        Ok(integrator.stability_limit() / self.world.contact_frequency(&states))
+    }
+}

@@ -1,0 +1,125 @@
+//! Rows of states.
+
+use numpy::ndarray::{ArrayView1, IxDyn};
+use numpy::{PyArray2, PyArrayMethods, PyUntypedArrayMethods};
+use prehend_sim::State;
+use pyo3::prelude::*;
+
+use super::{BodyKey, World};
+use crate::arrays::{Numbers, array, in_order, matrix, pose, vector_or};
+use crate::error::{Raise, wrong};
+use crate::rollout::STATE;
+
+/// The states in the rows of an array.
+pub(crate) fn states(rows: &Numbers<'_>) -> PyResult<Vec<State>> {
+    match rows.shape() {
+        [_, STATE] => {
+            Ok(in_order(rows).as_chunks().0.iter().map(State::from_coordinates).collect())
+        }
+        shape => Err(wrong(format!("states: an array of n × 13 is expected, not {shape:?}"))),
+    }
+}
+
+/// Lets `edit` change the states in the rows of an array, which stays as it was if that fails.
+pub(crate) fn change(
+    rows: &Bound<'_, PyArray2<f64>>,
+    edit: impl FnOnce(&mut [State]) -> PyResult<()>,
+) -> PyResult<()> {
+    let mut rows = rows.try_readwrite().raise()?;
+    let mut array = rows.as_array_mut();
+    if array.ncols() != STATE {
+        return Err(wrong(format!(
+            "states: an array of n × 13 is expected, not {:?}",
+            array.shape()
+        )));
+    }
+    let row = |row: ArrayView1<'_, f64>| State::from_coordinates(&std::array::from_fn(|k| row[k]));
+    let mut states: Vec<State> = array.rows().into_iter().map(row).collect();
+    edit(&mut states)?;
+    for (mut row, state) in array.rows_mut().into_iter().zip(&states) {
+        row.iter_mut().zip(state.coordinates()).for_each(|(to, x)| *to = x);
+    }
+    Ok(())
+}
+
+#[pymethods]
+impl World {
+    /// States in which everything is at rest, bodies with their center of mass at the origin and joints at their neutral coordinates: rows × 13.
+    fn neutral_states<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<Bound<'py, numpy::PyArray<f64, IxDyn>>> {
+        let states = self.world.neutral_states();
+        let rows = states.len();
+        array(py, states.iter().flat_map(State::coordinates).collect(), &[rows, STATE])
+    }
+
+    /// Writes the row of a body in `states`: the pose of its frame (4 × 4 or a translation), velocity of its center of mass [m/s] and angular
+    /// velocity [rad/s].
+    #[pyo3(signature = (states, body, pose, *, velocity=None, angular_velocity=None))]
+    fn set_pose(
+        &self,
+        states: &Bound<'_, PyArray2<f64>>,
+        body: BodyKey,
+        pose: Numbers<'_>,
+        velocity: Option<Numbers<'_>>,
+        angular_velocity: Option<Numbers<'_>>,
+    ) -> PyResult<()> {
+        let id = self.id(&body)?;
+        let pose = self::pose(Some(&pose), "pose")?;
+        let mut state = match self.world.bodies[id].rigid() {
+            Some(rigid) => rigid.at_rest(&pose),
+            None => State::at_rest(pose),
+        };
+        state.linear = vector_or(velocity.as_ref(), [0.0; 3], "velocity")?;
+        state.angular = vector_or(angular_velocity.as_ref(), [0.0; 3], "angular_velocity")?;
+        let place = id.index();
+        change(states, |all| {
+            *all.get_mut(place)
+                .ok_or_else(|| wrong(format!("states: there is no row {place}")))? = state;
+            Ok(())
+        })
+    }
+
+    /// The pose of a body's frame in a row of states, 4 × 4.
+    fn pose<'py>(
+        &self,
+        py: Python<'py>,
+        states: Numbers<'py>,
+        body: BodyKey,
+    ) -> PyResult<Bound<'py, numpy::PyArray<f64, IxDyn>>> {
+        let (id, states) = (self.id(&body)?, self::states(&states)?);
+        let place = id.index();
+        let state =
+            states.get(place).ok_or_else(|| wrong(format!("states: there is no row {place}")))?;
+        let pose = match self.world.bodies[id].rigid() {
+            Some(rigid) => rigid.model_pose(&state.pose),
+            None => state.pose,
+        };
+        matrix(py, &pose)
+    }
+
+    /// Writes coordinates [m, rad] and velocities of the joint of a link into `states`, and where the links are then. A spherical joint has a
+    /// quaternion (x, y, z, w), a floating one a place before it.
+    #[pyo3(signature = (states, link, position, velocity=None))]
+    fn set_joint(
+        &self,
+        states: &Bound<'_, PyArray2<f64>>,
+        link: BodyKey,
+        position: Numbers<'_>,
+        velocity: Option<Numbers<'_>>,
+    ) -> PyResult<()> {
+        let id = self.id(&link)?;
+        change(states, |all| {
+            let still = vec![0.0; self.world.joint(all, id).raise()?.velocity.len()];
+            let velocity = velocity.as_ref().map_or(still, |v| in_order(v).into_owned());
+            self.world.set_joint(all, id, &in_order(&position), &velocity).raise()
+        })
+    }
+
+    /// Coordinates [m, rad] and velocities of the joint of a link.
+    fn joint(&self, states: Numbers<'_>, link: BodyKey) -> PyResult<(Vec<f64>, Vec<f64>)> {
+        let joint = self.world.joint(&self::states(&states)?, self.id(&link)?).raise()?;
+        Ok((joint.position, joint.velocity))
+    }
+}

@@ -1,0 +1,112 @@
+"""Rollouts as functions of JAX, with derivatives, under ``jit`` and ``vmap``.
+
+Turn on double precision first, ``jax.config.update("jax_enable_x64", True)``: otherwise states and derivatives are rounded to single.
+
+>>> import jax, prehend, prehend.jax
+>>> jax.config.update("jax_enable_x64", True)
+>>> world = prehend.World()
+>>> ball = world.add_body("ball", prehend.Shape.ball(0.1))
+>>> throw = prehend.jax.rollout(world.rollout(0.1, 5, parameters=["gravity.z"]), end=True)
+>>> start = world.neutral_states()
+>>> height = jax.jit(lambda gravity: throw(start, gravity)[ball, 2])
+>>> round(float(jax.grad(height)(jax.numpy.array([-9.81]))[0]), 6)
+0.125
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import NDArray
+
+from ._prehend import Rollout
+
+Array = Any
+"""An array of JAX, or what becomes one."""
+
+RolloutOfJax = Callable[..., Array]
+
+STATE = 13
+"""Numbers of a row of states."""
+
+
+def rollout(function: Rollout, *, end: bool = False) -> RolloutOfJax:
+    """The function (states, parameters, controls) → states at 0, dt, …, steps·dt, of shape (steps + 1, rows, 13), or at the end alone, (rows, 13).
+
+    Parameters and controls that are left out are those of the world and none. For batches use ``jax.vmap``, whose worlds are simulated side by side.
+    """
+
+    @jax.custom_vjp
+    def run(states: Array, parameters: Array, controls: Array) -> Array:
+        return _call(function, end, states, parameters, controls)
+
+    def forward(states: Array, parameters: Array, controls: Array) -> tuple[Array, Any]:
+        whole = _call(function, False, states, parameters, controls)
+        return whole[-1] if end else whole, (whole, states, parameters, controls)
+
+    def backward(kept: Any, adjoints: Array) -> tuple[Array, ...]:
+        whole, *inputs = kept
+        shapes = [jax.ShapeDtypeStruct(x.shape, x.dtype) for x in inputs]
+        gradients = jax.pure_callback(
+            lambda *arrays: _pull_back(function, arrays, shapes),
+            shapes,
+            whole,
+            adjoints,
+            *inputs,
+            vmap_method="broadcast_all",
+        )
+        return tuple(gradients)
+
+    run.defvjp(forward, backward)
+
+    def with_defaults(states: Array, parameters: Array = None, controls: Array = None) -> Array:
+        if parameters is None:
+            parameters = function.values
+        if controls is None:
+            controls = np.zeros((function.steps, len(function.controls)))
+            if controls.size:
+                raise ValueError(f"controls are missing: {', '.join(function.controls)}")
+        return run(jnp.asarray(states), jnp.asarray(parameters), jnp.asarray(controls))
+
+    return with_defaults
+
+
+def _call(function: Rollout, end: bool, states: Array, parameters: Array, controls: Array) -> Array:
+    own = (function.rows, STATE)
+    shape = own if end else (function.steps + 1, *own)
+
+    def compute(*arrays: Array) -> NDArray[Any]:
+        batch, inputs = _flat(arrays, (2, 1, 2))
+        result = function(*inputs, end=end)
+        return result.reshape(*batch, *shape).astype(states.dtype)
+
+    result = jax.ShapeDtypeStruct(shape, states.dtype)
+    arrays = (states, parameters, controls)
+    return jax.pure_callback(compute, result, *arrays, vmap_method="broadcast_all")
+
+
+def _pull_back(function: Rollout, arrays: Any, shapes: Any) -> list[NDArray[Any]]:
+    whole, adjoints = arrays[:2]
+    own = adjoints.ndim - (whole.ndim - 3)
+    batch, (run, flat, *inputs) = _flat(arrays, (3, own, 2, 1, 2))
+    gradients = function.pullback(run, flat, *inputs)
+    return [
+        gradient.reshape(*batch, *shape.shape).astype(shape.dtype)
+        for gradient, shape in zip(gradients, shapes, strict=True)
+    ]
+
+
+def _flat(arrays: Any, dimensions: tuple[int, ...]) -> tuple[tuple[int, ...], list[NDArray[np.float64]]]:
+    """The shape of the batch, and arrays in double precision with one dimension for it, if there is one."""
+    plain = [np.asarray(array, dtype=np.float64) for array in arrays]
+    batch = plain[0].shape[: plain[0].ndim - dimensions[0]]
+    if not batch:
+        return batch, plain
+    return batch, [
+        array.reshape(-1, *array.shape[array.ndim - own :])
+        for array, own in zip(plain, dimensions, strict=True)
+    ]
