@@ -1,0 +1,75 @@
+"""Rollouts in JAX."""
+
+import numpy as np
+import prehend
+import pytest
+
+from scenes import batch, bounce
+
+jax = pytest.importorskip("jax")
+jax.config.update("jax_enable_x64", True)
+import jax.numpy as jnp  # noqa: E402
+import prehend.jax  # noqa: E402
+
+WEIGHTS = np.cos(np.arange(26.0)).reshape(2, 13)
+
+
+def loss_of(rollout, end):
+    function = prehend.jax.rollout(rollout, end=end)
+
+    def loss(states, parameters, controls):
+        run = function(states, parameters, controls)
+        return (WEIGHTS * (run if end else run[-1])).sum()
+
+    return loss
+
+
+@pytest.mark.parametrize("end", [False, True])
+def test_gradients_are_those_of_numpy_to_the_bit(end):
+    rollout, inputs = bounce()
+    run, pullback = prehend.vjp(rollout, *inputs)
+    expected = pullback(WEIGHTS)
+    loss = loss_of(rollout, end)
+    for gradient in (jax.grad(loss, (0, 1, 2)), jax.jit(jax.grad(loss, (0, 1, 2)))):
+        for found, own in zip(gradient(*inputs), expected, strict=True):
+            np.testing.assert_array_equal(found, own)
+    np.testing.assert_array_equal(jax.jit(prehend.jax.rollout(rollout))(*inputs), run)
+
+
+@pytest.mark.parametrize("end", [False, True])
+def test_vmap_is_a_batch(end):
+    rollout, inputs = bounce()
+    many = batch(inputs)
+    _, pullback = prehend.vjp(rollout, *many)
+    expected = pullback(np.repeat(WEIGHTS[None], 4, 0))
+    gradient = jax.vmap(jax.grad(loss_of(rollout, end), (0, 1, 2)))
+    for compiled in (gradient, jax.jit(gradient)):
+        for found, own in zip(compiled(*many), expected, strict=True):
+            np.testing.assert_array_equal(found, own)
+
+
+def test_what_is_not_mapped_is_summed():
+    rollout, (states, parameters, controls) = bounce()
+    many = batch((states, parameters, controls))[0]
+    loss = loss_of(rollout, True)
+
+    def total(parameters):
+        return jax.vmap(loss, (0, None, None))(many, parameters, controls).sum()
+
+    _, pullback = prehend.vjp(rollout, many, parameters, controls)
+    expected = pullback(np.repeat(WEIGHTS[None], 4, 0)).parameters
+    np.testing.assert_allclose(jax.grad(total)(jnp.asarray(parameters)), expected, rtol=1e-12)
+
+
+def test_nested_vmap_and_defaults():
+    rollout, (states, parameters, controls) = bounce()
+    function = prehend.jax.rollout(rollout, end=True)
+    nested = jax.vmap(jax.vmap(function, (0, None, None)), (None, 0, None))
+    states = np.repeat(states[None], 3, 0)
+    parameters = np.stack([parameters, 1.1 * parameters])
+    result = nested(states, parameters, controls)
+    assert result.shape == (2, 3, 2, 13)
+    np.testing.assert_array_equal(result[1, 2], rollout(states[2], parameters[1], controls, end=True))
+    with pytest.raises(ValueError, match="controls are missing: ball.force_y"):
+        function(states[0])
+    np.testing.assert_array_equal(function(states[0], controls=controls), result[0, 0])

@@ -1,0 +1,140 @@
+"""Articulations and robots."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import prehend
+import pytest
+
+DATA = os.environ.get("PREHEND_DATA")
+needs_data = pytest.mark.skipif(DATA is None, reason="PREHEND_DATA is not set")
+
+
+def pendulum():
+    world = prehend.World()
+    rod = prehend.Link("rod", "revolute", axis=[0, 1, 0], mass=1.0, com=[0, 0, -1], inertia=3 * [4e-3])
+    [rod] = world.add_articulation([rod])
+    return world, rod
+
+
+def test_a_pendulum_has_its_period():
+    world, rod = pendulum()
+    states = world.neutral_states()
+    angle = 0.3
+    world.set_joint(states, rod, [angle])
+    # 4 K(sin(θ/2)) √(I / m g l) by the arithmetic-geometric mean.
+    a, b = 1.0, np.cos(0.5 * angle)
+    for _ in range(20):
+        a, b = 0.5 * (a + b), np.sqrt(a * b)
+    period = 2 * np.pi / a * np.sqrt(1.004 / 9.81)
+    end = world.rollout(period, 1)(states, end=True)
+    assert world.joint(end, rod)[0][0] == pytest.approx(angle, abs=1e-4)
+    assert end[world.joint_row(rod), 0] == world.joint(end, rod)[0][0]
+
+
+def test_a_motor_is_a_control_with_its_derivative():
+    world, rod = pendulum()
+    motor = world.add_joint_force(rod, "motor", effort=0.0)
+    world.add_joint_force("rod", "damper", damping=0.1)
+    assert motor == {"effort": "rod.joint.effort"}
+    rollout = world.rollout(0.02, 50, controls=[motor["effort"]])
+    controls = np.sin(np.arange(50.0))[:, None]
+    run, pullback = prehend.vjp(rollout, world.neutral_states(), None, controls)
+    row = world.joint_row(rod)
+    weights = np.zeros_like(run[-1])
+    weights[row, 0] = 1.0
+    slopes = pullback(weights).controls
+    step = 1e-4
+    for k in [0, 20, 49]:
+        ends = [
+            rollout(world.neutral_states(), None, controls + sign * step * np.eye(50)[:, [k]], end=True)
+            for sign in (1, -1)
+        ]
+        difference = (ends[0][row, 0] - ends[1][row, 0]) / (2 * step)
+        assert slopes[k, 0] == pytest.approx(difference, rel=1e-4, abs=1e-8)
+
+
+def test_a_servo_holds_a_two_link_arm():
+    world = prehend.World()
+    bar = prehend.Shape.capsule(0.1, 0.02)
+    links = [
+        prehend.Link("upper", axis=[0, 0, 1], at=[0, 0, 1], shape=bar, mass=0.5),
+        prehend.Link("lower", axis=[0, 0, 1], parent=0, at=[0, 0.25, 0], shape=bar, mass=0.5),
+    ]
+    upper, lower = world.add_articulation(links)
+    for link, target in [(upper, 0.5), (lower, -0.8)]:
+        world.add_joint_force(
+            link, "position_servo", target=target, stiffness=20.0, damping=1.0, max_effort=50.0
+        )
+    end = world.rollout(1.0, 5)(world.neutral_states(), end=True)
+    assert world.joint(end, upper)[0][0] == pytest.approx(0.5, abs=1e-2)
+    assert world.joint(end, lower)[0][0] == pytest.approx(-0.8, abs=1e-2)
+    # The pose of a link is where its joints put it.
+    turn = world.pose(end, lower)[:2, 0]
+    assert np.arctan2(turn[1], turn[0]) == pytest.approx(-0.3, abs=1e-2)
+
+
+def test_tendons_couple_joints_and_welds_close_loops():
+    world = prehend.World(gravity=[0, 0, 0])
+    inertia = 3 * [1e-2]
+    links = [
+        prehend.Link(name, axis=[0, 0, 1], at=[x, 0, 0], mass=1.0, com=[0.1, 0, 0], inertia=inertia)
+        for name, x in [("left", 0.0), ("right", 1.0)]
+    ]
+    left, right = world.add_articulation(links)
+    # They are of one articulation, and a spring holds the sum of their angles.
+    world.add_joint_force([(left, 1.0), ((right, 0), 1.0)], "spring", stiffness=50.0, rest=0.4)
+    for link in (left, right):
+        world.add_joint_force(link, "damper", damping=1.0)
+    end = world.rollout(2.0, 1)(world.neutral_states(), end=True)
+    angles = [world.joint(end, link)[0][0] for link in (left, right)]
+    assert sum(angles) == pytest.approx(0.4, abs=1e-3) and angles[0] == pytest.approx(angles[1], abs=1e-6)
+    names = world.add_weld(left, right, mass=0.1, frame_a=[0.5, 0, 0], frame_b=[-0.5, 0, 0])
+    assert names["linear_stiffness"] == "left-right.linear_stiffness"
+
+
+def test_mjcf_and_urdf_become_robots(tmp_path):
+    mjcf = tmp_path / "arm.xml"
+    mjcf.write_text(
+        """<mujoco><worldbody><body name="arm"><joint name="hinge" axis="0 1 0" damping="0.1"/>
+        <geom type="capsule" fromto="0 0 0 0 0 -0.3" size="0.02" mass="0.4"/></body></worldbody>
+        <actuator><motor name="drive" joint="hinge"/></actuator></mujoco>"""
+    )
+    world = prehend.World()
+    robot = world.add_mjcf(mjcf)
+    assert list(robot.bodies) == ["arm"] and list(robot.joints) == ["hinge"]
+    states = world.neutral_states()
+    robot.set_positions(world, states, [0.4])
+    assert world.joint(states, "arm")[0] == [0.4]
+    rollout = world.rollout(0.1, 2, controls=[robot.actuators["drive"]])
+    pushed, free = (rollout(states, None, np.full((2, 1), push), end=True) for push in (0.1, 0.0))
+    row = world.joint_row("arm")
+    assert pushed[row, 0] > free[row, 0]
+
+    urdf = tmp_path / "arm.urdf"
+    inertial = """<inertial><origin xyz="0 0 -0.1"/><mass value="0.4"/>
+        <inertia ixx="1e-3" ixy="0" ixz="0" iyy="1e-3" iyz="0" izz="1e-4"/></inertial>"""
+    urdf.write_text(
+        f"""<robot name="arm"><link name="base"/><link name="arm">{inertial}</link>
+        <joint name="hinge" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 1 0"/>
+        <limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
+    )
+    robot = world.add_urdf(urdf, pose=[1, 0, 0], shapes=False)
+    assert set(robot.bodies) == {"base", "arm"} and list(robot.joints) == ["hinge"]
+    with pytest.raises(prehend.Error, match="missing.xml"):
+        world.add_mjcf(tmp_path / "missing.xml")
+
+
+@needs_data
+def test_a_gripper_of_the_data_closes():
+    path = next(Path(DATA, "robots").rglob("2f85.xml"))
+    world = prehend.World()
+    robot = world.add_mjcf(path)
+    states = world.neutral_states()
+    robot.set_positions(world, states)
+    [control] = robot.actuators.values()
+    rollout = world.rollout(1e-3, 300, controls=[control], integrator="semi_implicit_euler")
+    end = rollout(states, None, np.full((300, 1), 200.0), end=True)
+    driver = robot.joints["right_driver_joint"][0]
+    assert world.joint(end, driver)[0][0] > 0.1

@@ -1,0 +1,134 @@
+"""Worlds: bodies, shapes, contacts, parameters by name, and what is refused."""
+
+import numpy as np
+import prehend
+import pytest
+from prehend import POSITION, VELOCITY
+
+from scenes import thrown_ball
+
+
+def test_a_ball_falls_and_comes_to_rest():
+    world = prehend.World()
+    floor = world.add_body("floor", prehend.Shape.half_space(), fixed=True)
+    ball = world.add_body("ball", prehend.Shape.ball(0.03), density=1000.0)
+    world.add_contact(
+        ball, floor, "hunt_crossley", smoothing=1e-5,
+        stiffness=1e9, damping=1.0, exponent=1.5, friction=0.5, slip_scale=1e-2,
+    )
+    assert world.bodies == ["floor", "ball"] and world.body("ball") == ball == 1
+    states = world.neutral_states()
+    world.set_pose(states, "ball", [0.0, 0.0, 0.1])
+    free = world.rollout(0.05, 1)(states, end=True)
+    assert free[ball, 2] == pytest.approx(0.1 - 0.5 * 9.81 * 0.05**2, abs=1e-8)
+    end = world.rollout(2.0, 1)(states, end=True)
+    assert end[ball, 2] == pytest.approx(0.03, abs=3e-3)
+    assert np.abs(end[ball, VELOCITY]).max() < 1e-2
+    weight = world["ball.mass"] * 9.81
+    assert world.contact_wrench(end, ball)[2] == pytest.approx(weight, rel=2e-2)
+    # At rest an accelerometer shows what holds the body up.
+    assert world.accelerometer(end, ball, [0, 0, 0])[2] == pytest.approx(9.81, rel=2e-2)
+
+
+@pytest.mark.parametrize(
+    ("shape", "volume"),
+    [
+        (prehend.Shape.ball(0.1), 4 / 3 * np.pi * 1e-3),
+        (prehend.Shape.cuboid([0.1, 0.2, 0.3]), 0.048),
+        (prehend.Shape.cylinder(0.2, 0.1), np.pi * 0.01 * 0.4),
+        (prehend.Shape.cone(0.2, 0.1), np.pi * 0.01 * 0.4 / 3),
+        (prehend.Shape.capsule(0.2, 0.1), np.pi * 0.01 * 0.4 + 4 / 3 * np.pi * 1e-3),
+        (prehend.Shape.convex_hull(np.array(np.meshgrid(*3 * [[-0.1, 0.1]])).reshape(3, -1).T), 0.008),
+        (
+            prehend.Shape.compound(
+                [(prehend.Shape.ball(0.1), [0, 0, 0]), (prehend.Shape.ball(0.1), [0.3, 0, 0])]
+            ),
+            8 / 3 * np.pi * 1e-3,
+        ),
+    ],
+)
+def test_shapes_have_their_volume(shape, volume):
+    assert shape.volume == pytest.approx(volume, rel=1e-9)
+    world = prehend.World()
+    world.add_body("body", shape, density=500.0)
+    assert world["body.mass"] == pytest.approx(500 * volume, rel=1e-9)
+
+
+def test_a_mesh_is_a_shape():
+    corners = np.array(np.meshgrid(*3 * [[-0.1, 0.1]], indexing="ij")).reshape(3, -1).T
+    faces = [
+        [0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1],
+        [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3],
+    ]
+    assert prehend.Shape.mesh(corners, faces).volume == pytest.approx(0.008, rel=1e-9)
+    with pytest.raises(prehend.Error, match="no vertex 8"):
+        prehend.Shape.mesh(corners, [[0, 1, 8]])
+
+
+def test_poses_are_those_of_a_bodys_frame():
+    world = prehend.World()
+    inertia = np.diag([1e-3, 2e-3, 2.5e-3])
+    stone = world.add_body("stone", mass=0.2, com=[0.01, 0.02, 0.03], inertia=inertia)
+    pose = np.array([[0.0, -1, 0, 0.5], [1, 0, 0, 0.6], [0, 0, 1, 0.7], [0, 0, 0, 1]])
+    states = world.neutral_states()
+    world.set_pose(states, stone, pose)
+    np.testing.assert_allclose(states[stone, POSITION], pose[:3, :3] @ [0.01, 0.02, 0.03] + pose[:3, 3])
+    np.testing.assert_allclose(world.pose(states, stone), pose, atol=1e-15)
+
+
+def test_parameters_are_read_and_written_by_name():
+    world, _, _, contact = thrown_ball()
+    assert contact["friction"] == "ball/floor.friction" and contact["friction"] in world
+    other = world.copy()
+    other["ball/floor.friction"] = 0.7
+    assert (world["ball/floor.friction"], other["ball/floor.friction"]) == (0.4, 0.7)
+    assert other["gravity.z"] == -9.81
+    with pytest.raises(KeyError):
+        world["ball.color"]
+    with pytest.raises(prehend.Error, match="mass"):
+        world["ball.mass"] = -1.0
+
+
+def test_laws_are_described():
+    summary, parameters = prehend.contact_laws()["penalty"]
+    assert summary and ("stiffness", "N/m^3") in [(name, unit) for name, unit, _ in parameters]
+    assert "position_servo" in prehend.joint_laws()
+
+
+def test_what_cannot_be_is_refused():
+    world, states, ball, _ = thrown_ball()
+    rollout = world.rollout(1e-3, 5)
+    for text, call in {
+        "no contact law called": lambda: world.add_contact("ball", "floor", "glue"),
+        "stiffness is missing": lambda: world.add_contact("ball", "floor", "penalty"),
+        "no parameter 'color'": lambda: world.add_contact(
+            "ball", "floor", "penalty", stiffness=1.0, damping=1.0, friction=0.0, slip_scale=1.0, color=2.0
+        ),
+        "there is no body 'wall'": lambda: world.add_contact("ball", "wall", "penalty"),
+        "no mass": lambda: world.add_body("ghost"),
+        "no parameter called 'ball.color'": lambda: world.rollout(1e-3, 5, parameters=["ball.color"]),
+        "no integrator called 'euler'": lambda: world.rollout(1e-3, 5, integrator="euler"),
+        "an array of n × 13": lambda: rollout(states[:, :12]),
+        "for a world of 2 bodies": lambda: rollout(states[:1]),
+        "no rotation": lambda: world.set_pose(states, ball, np.diag([1.0, 1.0, -1.0, 1.0])),
+        "time step": lambda: world.rollout(-1.0, 5),
+    }.items():
+        with pytest.raises(prehend.Error, match=text):
+            call()
+    # A refused contact leaves nothing behind.
+    assert [name for name in world.parameters if "/" in name][4:] == []
+
+
+def test_many_balls_touch_by_groups():
+    world = prehend.World()
+    floor = world.add_body("floor", prehend.Shape.half_space(), fixed=True)
+    balls = [world.add_body(f"ball {k}", prehend.Shape.ball(0.05), mass=0.1) for k in range(3)]
+    names = world.add_contacts_between(
+        [floor, *balls], balls, "penalty", smoothing=1e-5,
+        stiffness=2e6, damping=1e4, friction=0.4, slip_scale=2e-2,
+    )
+    states = world.neutral_states()
+    for k, ball in enumerate(balls):
+        world.set_pose(states, ball, [0.0, 0.0, 0.05 + 0.1001 * k])
+    end = world.rollout(0.1, 2, parameters=[names["stiffness"]])(states, end=True)
+    assert end[balls, 2] == pytest.approx([0.05, 0.15, 0.25], abs=2e-3)
