@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
-use prehend_geometry::hand::load_taxels;
+use prehend_geometry::hand::{Taxel, load_taxels};
 use prehend_geometry::robot::KinematicTree;
 use prehend_geometry::{GridCache, TriMesh};
 use prehend_render::{Camera, DepthImage, Mask, Remap, RgbImage};
@@ -33,26 +33,7 @@ pub fn load_frame_file(
     rig: Option<Arc<Rig>>,
 ) -> Result<(FrameInput, Isometry3<f64>), DatasetError> {
     let fault = |problem: &dyn Display| DatasetError::unusable(file, problem);
-    let field = |name: &str, problem: &dyn Display| DatasetError::field(file, name, problem);
-    let layout: Layout = read_json(file)?;
-    let folder = file.parent().unwrap_or(Path::new("."));
-    let color = RgbImage::load(&folder.join(&layout.rgb)).map_err(|e| fault(&e))?;
-    let depth = DepthImage::load(&folder.join(&layout.depth), layout.depth_unit_m.0)
-        .map_err(|e| fault(&e))?;
-    let mask = Mask::load(&folder.join(&layout.mask)).map_err(|e| fault(&e))?;
-    let (w, h) = (color.width(), color.height());
-    let camera = Camera::from_k(layout.k.0, w, h).map_err(|e| field("K", &e))?;
-    for (name, width, height) in
-        [("depth", depth.width(), depth.height()), ("mask", mask.width(), mask.height())]
-    {
-        if (width, height) != (w, h) {
-            let problem = format!("the image is {width}x{height} pixels, rgb is {w}x{h}");
-            return Err(field(name, &problem));
-        }
-    }
-    let mesh_file = folder.join(&layout.mesh);
-    let mesh = TriMesh::load(&mesh_file).map_err(|e| fault(&e))?;
-    let mesh = mesh.scaled(layout.mesh_unit.meters());
+    let FrameParts { mut observation, mesh, mesh_file, robot, layout } = FrameParts::read(file)?;
     let name = mesh_file.display().to_string();
     let mut object = Object::with_mass(&name, mesh, layout.mass_kg, seed).map_err(|e| fault(&e))?;
     if let (Some(rig), Some(id)) = (&rig, layout.obj_id) {
@@ -62,27 +43,10 @@ pub fn load_frame_file(
             None => log::info!("the rig does not know object {id}"),
         }
     }
-    let (mut hand, mut measured) = (None, None);
-    if let Some(r) = &layout.robot {
-        let tree = KinematicTree::from_urdf_file(folder.join(&r.urdf)).map_err(|e| fault(&e))?;
-        let joints = tree.joint_vector(&r.joints).map_err(|e| field("robot.joints", &e))?;
-        let skin = r.taxels.as_ref().map(|csv| load_taxels(&folder.join(csv))).transpose();
-        let skin = skin.map_err(|e| fault(&e))?.unwrap_or_default();
-        let forces = r.forces.as_deref().unwrap_or_default();
-        if !forces.is_empty() && forces.len() != skin.len() {
-            let (expected, found) = (skin.len(), forces.len());
-            let problem =
-                format!("expected one force for each of {expected} taxels, found {found}");
-            return Err(field("robot.forces", &problem));
-        }
-        let forces = forces.iter().map(|f| Vector3::from(f.0)).collect();
-        measured = Some(HandMeasurement { t_cam_hand: r.base_pose.0, joints, forces });
-        hand = Some(Arc::new(Hand::cached(tree, skin, cache).map_err(|e| fault(&e))?));
-    }
-    let gravity = layout.gravity.map(|g| Vector3::from(g.0));
-    gravity.iter().try_for_each(check_gravity).map_err(|e| field("gravity", &e))?;
-    let mut observation = Observation { camera, color, depth, mask, gravity, hand: measured };
+    let hand = robot.map(|(tree, skin)| Hand::cached(tree, skin, cache)).transpose();
+    let hand = hand.map_err(|e| fault(&e))?.map(Arc::new);
     if let Some(Lens(lens)) = &layout.lens {
+        let camera = observation.camera;
         let remap = Remap::undistort(camera, lens, camera);
         observation.undistort(&remap).map_err(|e| fault(&e))?;
     }
@@ -90,6 +54,85 @@ pub fn load_frame_file(
         observation = rig.corrected(&observation).map_err(|e| fault(&e))?;
     }
     Ok((FrameInput { observation, object: Arc::new(object), hand, rig }, layout.pose.0))
+}
+
+/// What a frame file names, as it is there: nothing is derived from it yet.
+pub(crate) struct FrameParts {
+    /// Images as they were taken, and what is measured of the hand.
+    pub(crate) observation: Observation,
+    /// The object's mesh \[m\].
+    pub(crate) mesh: TriMesh,
+    pub(crate) mesh_file: PathBuf,
+    /// The hand and its taxels.
+    pub(crate) robot: Option<(KinematicTree, Vec<Taxel>)>,
+    layout: Layout,
+}
+
+impl FrameParts {
+    /// Reads the frame file `file` and everything it names.
+    ///
+    /// # Errors
+    /// If the file or one that it names is missing or broken, naming the file and the field.
+    pub(crate) fn read(file: &Path) -> Result<Self, DatasetError> {
+        let fault = |problem: &dyn Display| DatasetError::unusable(file, problem);
+        let field = |name: &str, problem: &dyn Display| DatasetError::field(file, name, problem);
+        let layout: Layout = read_json(file)?;
+        let folder = file.parent().unwrap_or(Path::new("."));
+        let color = RgbImage::load(&folder.join(&layout.rgb)).map_err(|e| fault(&e))?;
+        let depth = DepthImage::load(&folder.join(&layout.depth), layout.depth_unit_m.0)
+            .map_err(|e| fault(&e))?;
+        let mask = Mask::load(&folder.join(&layout.mask)).map_err(|e| fault(&e))?;
+        let (w, h) = (color.width(), color.height());
+        let camera = Camera::from_k(layout.k.0, w, h).map_err(|e| field("K", &e))?;
+        for (name, width, height) in
+            [("depth", depth.width(), depth.height()), ("mask", mask.width(), mask.height())]
+        {
+            if (width, height) != (w, h) {
+                let problem = format!("the image is {width}x{height} pixels, rgb is {w}x{h}");
+                return Err(field(name, &problem));
+            }
+        }
+        let mesh_file = folder.join(&layout.mesh);
+        let mesh = TriMesh::load(&mesh_file).map_err(|e| fault(&e))?;
+        let mesh = mesh.scaled(layout.mesh_unit.meters());
+        let (mut robot, mut measured) = (None, None);
+        if let Some(r) = &layout.robot {
+            let tree =
+                KinematicTree::from_urdf_file(folder.join(&r.urdf)).map_err(|e| fault(&e))?;
+            let joints = tree.joint_vector(&r.joints).map_err(|e| field("robot.joints", &e))?;
+            let skin = r.taxels.as_ref().map(|csv| load_taxels(&folder.join(csv))).transpose();
+            let skin = skin.map_err(|e| fault(&e))?.unwrap_or_default();
+            let forces = r.forces.as_deref().unwrap_or_default();
+            if !forces.is_empty() && forces.len() != skin.len() {
+                let (expected, found) = (skin.len(), forces.len());
+                let problem =
+                    format!("expected one force for each of {expected} taxels, found {found}");
+                return Err(field("robot.forces", &problem));
+            }
+            let forces = forces.iter().map(|f| Vector3::from(f.0)).collect();
+            measured = Some(HandMeasurement { t_cam_hand: r.base_pose.0, joints, forces });
+            robot = Some((tree, skin));
+        }
+        let gravity = layout.gravity.as_ref().map(|g| Vector3::from(g.0));
+        gravity.iter().try_for_each(check_gravity).map_err(|e| field("gravity", &e))?;
+        let observation = Observation { camera, color, depth, mask, gravity, hand: measured };
+        Ok(Self { observation, mesh, mesh_file, robot, layout })
+    }
+
+    /// The initial pose, object → camera \[m\].
+    pub(crate) fn t_cam_object(&self) -> &Isometry3<f64> {
+        &self.layout.pose.0
+    }
+
+    /// Mass of the object \[kg\], where the file says it.
+    pub(crate) fn mass(&self) -> Option<f64> {
+        self.layout.mass_kg
+    }
+
+    /// Whether the images were taken through a lens.
+    pub(crate) fn has_lens(&self) -> bool {
+        self.layout.lens.is_some()
+    }
 }
 
 /// The file's layout.

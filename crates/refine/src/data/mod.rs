@@ -16,6 +16,7 @@ mod workers;
 
 pub use assets::{AssetError, Assets, FrameInput, Sensor, load_mesh};
 pub use contact::{CONTACT_SAMPLES, ContactModel};
+pub(crate) use frame_file::FrameParts;
 pub use frame_file::load_frame_file;
 pub use identity::Identity;
 pub use journal::Journal;

@@ -1,6 +1,6 @@
 //! Run times by frame and method, in a file of their own: they differ between runs, results do not.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, OpenOptions};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -39,6 +39,15 @@ impl Times {
         let entry = |(index, _, method, seconds): (_, String, _, _)| ((index, method), seconds);
         times.seconds = rows.flatten().map(entry).collect();
         Ok(times)
+    }
+
+    /// The methods that the file at `path` has times of; none where there is no such file.
+    pub fn methods(path: &Path) -> Vec<String> {
+        let text = fs::read_to_string(path).unwrap_or_default();
+        let Some(rows) = text.strip_prefix(HEADER) else { return Vec::new() };
+        let method = |row: &str| row.split(',').nth(2).map(str::to_owned);
+        let methods: BTreeSet<String> = rows.lines().filter_map(method).collect();
+        methods.into_iter().collect()
     }
 
     /// Adds the time of a frame; `frame` and `method` are without commas.
@@ -105,6 +114,8 @@ mod tests {
         times.add(1, "scene 1 image 1 object 5", "depth", 2.0).unwrap();
         times.add(1, "scene 1 image 1 object 5", "physics", 7.0).unwrap();
         assert_eq!(times.means()["depth"], (1.5, 2));
+        assert_eq!(Times::methods(&path), ["depth", "physics"]);
+        assert!(Times::methods(&dir.path().join("none.csv")).is_empty());
         drop(times);
         let text = fs::read_to_string(&path).unwrap();
         fs::write(&path, &text[..text.len() - 3]).unwrap();

@@ -87,6 +87,11 @@ impl Rig {
         self.covariance.diagonal().iter().zip(prior).any(|(now, prior)| now * prior < 0.999)
     }
 
+    /// Columns and rows of its images.
+    pub fn image_size(&self) -> [usize; 2] {
+        self.warp.depth.size()
+    }
+
     /// Number of its parameters, but for the objects'.
     pub(super) fn len(&self) -> usize {
         self.first_warp() + self.warp.len()

@@ -345,9 +345,11 @@ fn no_help_text_names_a_default_twice() {
     let place = Workplace::empty();
     let study =
         ["main", "gradients", "noise", "steps", "evidence", "confidence", "robustness", "merge"];
-    let commands = ["refine", "initial", "track", "eval", "check", "symmetry", "synth"]
-        .map(str::to_owned)
+    let single = ["refine", "initial", "track", "eval", "calibrate", "check", "info"];
+    let commands = single
         .into_iter()
+        .chain(["symmetry", "synth", "completions", "man"])
+        .map(str::to_owned)
         .chain(study.map(|name| format!("study {name}")));
     for command in commands {
         for length in ["-h", "--help"] {

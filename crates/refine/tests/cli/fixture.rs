@@ -109,7 +109,7 @@ impl Workplace {
     pub(crate) fn command(&self, arguments: &str) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_prehend"));
         command.args(arguments.split_whitespace()).current_dir(self.dir.path());
-        command.env("PREHEND_CACHE", "");
+        command.env("PREHEND_CACHE", "").env_remove("PREHEND_LOG").env_remove("CLICOLOR_FORCE");
         command
     }
 

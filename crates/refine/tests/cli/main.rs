@@ -5,10 +5,14 @@
 mod bad_input;
 mod calibrate;
 mod command;
+mod config;
 mod eval_bop;
 mod fixture;
 mod fused;
+mod info;
 mod initial;
+mod messages;
+mod pages;
 mod resume;
 mod study;
 mod track;

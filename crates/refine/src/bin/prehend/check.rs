@@ -12,7 +12,7 @@ use prehend_refine::scene::Warning;
 use prehend_render::RgbImage;
 
 use crate::options::{Job, Selection};
-use crate::terminal::{cache, complain, exit_code, progress, say, warn};
+use crate::terminal::{cache, exit_code, progress, say, warn};
 
 #[derive(Args)]
 #[command(next_help_heading = "Input")]
@@ -47,7 +47,7 @@ impl Check {
         let (input, t_cam_object) = load_frame_file(file, 0, cache().as_ref(), None)?;
         let mut report = Report::create(&self.report)?;
         let (picture, warnings) = drawn(&input, &t_cam_object);
-        warnings.iter().for_each(|warning| complain(format!("warning: {warning}")));
+        warnings.iter().for_each(|warning| log::warn!("{warning}"));
         report.add_picture(&file.display().to_string(), &picture, &warnings)?;
         say(format!("1 picture; open {}", report.finish()?.display()))?;
         Ok(ExitCode::SUCCESS)

@@ -2,9 +2,14 @@
 
 mod calibrate;
 mod check;
+mod config;
 mod eval;
+mod global;
+mod info;
 mod initial;
+mod logging;
 mod options;
+mod pages;
 mod refine;
 mod study;
 mod symmetry;
@@ -12,9 +17,13 @@ mod synth;
 mod terminal;
 mod track;
 
+use std::env;
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use anyhow::anyhow;
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+
+use self::config::{Asked, ReadError};
 
 /// Refine the poses of objects held in a robot hand, from RGB-D, touch and physics
 ///
@@ -41,6 +50,8 @@ use clap::{Parser, Subcommand};
 #[derive(Parser)]
 #[command(name = "prehend", version, verbatim_doc_comment)]
 struct Prehend {
+    #[command(flatten)]
+    global: global::Global,
     #[command(subcommand)]
     command: Command,
 }
@@ -73,6 +84,8 @@ enum Command {
     /// the mask (against the object's outline, the hand and depth), depth (on the object and on the hand), the hand (its joints
     /// against their limits, and its pose), and forces (their size and sign, and whether the object is where they are felt).
     Check(check::Check),
+    /// Say what a file or a folder is, what it holds and what is wrong with it
+    Info(info::Info),
     /// Find the symmetries of models, and write them into models_info.json
     ///
     /// Scores that are free of symmetries (MSSD, MSPD, the symmetric OE) take them from there.
@@ -82,19 +95,33 @@ enum Command {
     /// Interrupted at any moment and run again with the same options, it goes on with what is missing; the files are
     /// the same in the end.
     Synth(Box<synth::Synth>),
+    /// Print what completes the words of this command in a shell: `source <(prehend completions bash)`
+    Completions(pages::Completions),
+    /// Print the manual page of this command
+    Man(pages::Man),
 }
 
 fn main() -> ExitCode {
-    let prehend = match Prehend::try_parse() {
-        Ok(prehend) => prehend,
-        Err(error) => {
-            // A closed pipe is no reason to complain.
-            let _ = error.print();
-            return ExitCode::from(u8::from(error.use_stderr()));
-        }
+    logging::start();
+    let command = Prehend::command();
+    let ended = match config::read(&command, env::args_os().collect()) {
+        Ok(Asked::Run(matches)) => run(&matches, command),
+        Ok(Asked::Print(text)) => terminal::say(text.trim_end()).map(|()| ExitCode::SUCCESS),
+        Err(ReadError::Line(error)) => return refuse(&error),
+        Err(ReadError::Config(error)) => Err(error.into()),
     };
-    terminal::print_warnings();
-    let ended = match prehend.command {
+    ended.unwrap_or_else(|error| {
+        // The messages of our errors contain those of their causes.
+        log::error!("{error}");
+        ExitCode::from(1)
+    })
+}
+
+/// Runs the command asked for.
+fn run(matches: &clap::ArgMatches, command: clap::Command) -> anyhow::Result<ExitCode> {
+    let prehend = Prehend::from_arg_matches(matches).map_err(|error| anyhow!("{error}"))?;
+    prehend.global.apply()?;
+    match prehend.command {
         Command::Refine(refine) => refine.run(),
         Command::Initial(initial) => initial.run(),
         Command::Track(track) => track.run(),
@@ -102,12 +129,17 @@ fn main() -> ExitCode {
         Command::Study(study) => study.run(),
         Command::Calibrate(calibrate) => calibrate.run(),
         Command::Check(check) => check.run(),
+        Command::Info(info) => info.run(),
         Command::Symmetry(symmetry) => symmetry.run(),
         Command::Synth(synth) => synth.run(),
-    };
-    ended.unwrap_or_else(|error| {
-        // The messages of our errors contain those of their causes.
-        terminal::complain(format!("error: {error}"));
-        ExitCode::from(1)
-    })
+        Command::Completions(completions) => completions.run(command),
+        Command::Man(man) => man.run(command),
+    }
+}
+
+/// Prints what is wrong with the command line, or the help that it asks for.
+fn refuse(error: &clap::Error) -> ExitCode {
+    // A closed pipe is no reason to complain.
+    let _ = error.print();
+    ExitCode::from(u8::from(error.use_stderr()))
 }

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::{anyhow, bail};
-use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::{Args, ValueEnum};
 use nalgebra::Isometry3;
 use prehend_refine::NamedMethod;
 use prehend_refine::data::bop::{
@@ -70,6 +70,22 @@ impl Rendering {
     /// The device, ready to render.
     pub(crate) fn open(&self) -> anyhow::Result<Arc<dyn Backend>> {
         self.device.open().map_err(|error| anyhow!("--device {}: {error}", self.device))
+    }
+}
+
+/// Unit of the lengths of a mesh file.
+#[derive(Clone, Copy, ValueEnum)]
+pub(crate) enum Unit {
+    M,
+    Mm,
+}
+
+impl Unit {
+    pub(crate) fn meters(self) -> f64 {
+        match self {
+            Self::M => 1.0,
+            Self::Mm => 1e-3,
+        }
     }
 }
 

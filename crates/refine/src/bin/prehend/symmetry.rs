@@ -25,7 +25,7 @@ pub(crate) struct Symmetry {
     tolerance: f64,
     /// Compare colors too: how much they may differ, root mean square, of 0 to 1 (0.05 is good) [default: shape alone]
     #[arg(long, value_name = "DIFFERENCE")]
-    color: Option<f64>,
+    color_tolerance: Option<f64>,
     /// Write them into models_info.json, in place of those that were there
     #[arg(long, help_heading = "Output")]
     write: bool,
@@ -33,15 +33,15 @@ pub(crate) struct Symmetry {
 
 impl Symmetry {
     pub(crate) fn run(self) -> anyhow::Result<ExitCode> {
-        let Self { tolerance, color, .. } = self;
+        let Self { tolerance, color_tolerance, .. } = self;
         if !(tolerance > 0.0 && tolerance < 0.5) {
             bail!("--tolerance {tolerance}: must be above 0 and below 0.5");
         }
-        if color.is_some_and(|c| !(0.0..=1.0).contains(&c)) {
-            bail!("--color: must be from 0 to 1");
+        if color_tolerance.is_some_and(|c| !(0.0..=1.0).contains(&c)) {
+            bail!("--color-tolerance: must be from 0 to 1");
         }
         let settings =
-            SymmetrySettings { tolerance, color_tolerance: color, ..SymmetrySettings::default() };
+            SymmetrySettings { tolerance, color_tolerance, ..SymmetrySettings::default() };
         let models = Models::new(self.models);
         let search = |id: u32| -> anyhow::Result<Symmetries> {
             let mesh = load_mesh(&models, id)?;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context, anyhow, bail};
-use clap::{Args, ValueEnum};
+use clap::Args;
 use prehend_geometry::TriMesh;
 use prehend_geometry::objects::YcbObject;
 use prehend_refine::scene::Object;
@@ -16,7 +16,7 @@ use prehend_refine::synth::{
 use prehend_render::Distortion;
 use serde_json::json;
 
-use crate::options::limit_threads;
+use crate::options::{Unit, limit_threads};
 use crate::terminal::{exit_code, progress, say};
 
 #[derive(Args)]
@@ -97,12 +97,6 @@ pub(crate) struct Synth {
     /// Worker threads; the dataset is the same for any number [default: all cores]
     #[arg(long, value_name = "N")]
     threads: Option<NonZeroUsize>,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum Unit {
-    M,
-    Mm,
 }
 
 impl Synth {
@@ -217,11 +211,7 @@ fn built_in(name: &str) -> anyhow::Result<YcbObject> {
 }
 
 fn own(obj_id: u32, file: &Path, unit: Unit, mass: Option<f64>) -> anyhow::Result<Subject> {
-    let mesh = TriMesh::load(file)?;
-    let mesh = match unit {
-        Unit::M => mesh,
-        Unit::Mm => mesh.scaled(1e-3),
-    };
+    let mesh = TriMesh::load(file)?.scaled(unit.meters());
     let name = file.file_stem().unwrap_or_default().to_string_lossy();
     let object =
         Object::with_mass(&name, mesh, mass, 0).map_err(|e| anyhow!("{}: {e}", file.display()))?;

@@ -9,6 +9,8 @@ use etcetera::BaseStrategy;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use prehend_geometry::GridCache;
 
+use crate::logging;
+
 /// Prints `text` and a line break. That the reader has gone away (`prehend … | head`) is no error.
 pub(crate) fn say(text: impl std::fmt::Display) -> anyhow::Result<()> {
     let mut out = std::io::stdout().lock();
@@ -23,45 +25,25 @@ pub(crate) fn complain(text: impl std::fmt::Display) {
     let _ = writeln!(std::io::stderr().lock(), "{text}");
 }
 
-/// Prints what libraries warn of on standard error.
-struct Warnings;
-
-impl log::Log for Warnings {
-    fn enabled(&self, metadata: &log::Metadata<'_>) -> bool {
-        metadata.level() <= log::Level::Warn && metadata.target().starts_with("prehend")
-    }
-
-    fn log(&self, record: &log::Record<'_>) {
-        if self.enabled(record.metadata()) {
-            complain(format!("warning: {}", record.args()));
-        }
-    }
-
-    fn flush(&self) {}
-}
-
-/// From here on warnings of the libraries are printed.
-pub(crate) fn print_warnings() {
-    // Only this sets a logger, and once.
-    if log::set_logger(&Warnings).is_ok() {
-        log::set_max_level(log::LevelFilter::Warn);
-    }
-}
-
 /// Prints a warning about something of this name over the progress bar.
 pub(crate) fn warn(
     bar: &ProgressBar,
     name: impl std::fmt::Display,
     warning: impl std::fmt::Display,
 ) {
-    bar.suspend(|| complain(format!("warning: {name}: {warning}")));
+    bar.suspend(|| log::warn!("{name}: {warning}"));
 }
 
 /// A progress bar over `length` steps of `what` with rate and remaining time, on standard error; hidden where that is no
-/// terminal, and gone when it is dropped.
+/// terminal or only errors are to be seen, and gone when it is dropped.
 pub(crate) fn progress(length: usize, what: &'static str) -> ProgressBar {
     // indicatif hides a bar by itself where standard error is no terminal.
-    let bar = ProgressBar::with_draw_target(Some(length as u64), ProgressDrawTarget::stderr());
+    let target = if logging::is_quiet() {
+        ProgressDrawTarget::hidden()
+    } else {
+        ProgressDrawTarget::stderr()
+    };
+    let bar = ProgressBar::with_draw_target(Some(length as u64), target);
     let template = "{msg} [{bar:30}] {pos}/{len} {per_sec}, {eta} left";
     if let Ok(style) = ProgressStyle::with_template(template) {
         bar.set_style(style.progress_chars("=> "));
@@ -88,5 +70,6 @@ pub(crate) fn cache() -> Option<GridCache> {
         Some(folder) => PathBuf::from(folder),
         None => etcetera::choose_base_strategy().ok()?.cache_dir().join("prehend"),
     };
+    log::debug!("cache folder: {folder:?}");
     (!folder.as_os_str().is_empty()).then(|| GridCache::new(folder))
 }

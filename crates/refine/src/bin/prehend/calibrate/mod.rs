@@ -21,7 +21,7 @@ use prehend_refine::scene::{Object, Observation};
 
 use self::passes::{Done, Passes};
 use crate::options::{Input, Job, limit_threads, write_poses};
-use crate::terminal::{cache, complain, exit_code, say};
+use crate::terminal::{cache, exit_code, say};
 
 #[derive(Args)]
 pub(crate) struct Calibrate {
@@ -87,12 +87,10 @@ impl Calibrate {
         if count == 0 {
             return Ok(exit_code(count, &failures));
         }
-        done.left_out.values().for_each(|frame| complain(format!("warning: {frame}")));
+        done.left_out.values().for_each(|frame| log::warn!("{frame}"));
         if done.without_mask > 0 {
             let count = done.without_mask;
-            complain(format!(
-                "warning: {count} frames have no mask: their poses are taken to be good"
-            ));
+            log::warn!("{count} frames have no mask: their poses are taken to be good");
         }
         let calibrator = &done.calibrator;
         calibrator.rig().save(&self.out)?;

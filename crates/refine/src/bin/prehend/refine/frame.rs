@@ -15,7 +15,7 @@ use serde_json::json;
 
 use super::options::{MethodOptions, OutputOptions};
 use crate::options::open_rig;
-use crate::terminal::{cache, complain, progress, say};
+use crate::terminal::{cache, progress, say};
 
 /// Refines the frame of `file`; the pose goes to the output file, and to standard output without one or with `--json`.
 pub(super) fn refine_frame(
@@ -38,7 +38,7 @@ pub(super) fn refine_frame(
     }
     let warnings = input.warnings(&t_cam_object).concat();
     let warnings: Vec<String> = warnings.iter().map(Warning::to_string).collect();
-    warnings.iter().for_each(|warning| complain(format!("warning: {warning}")));
+    warnings.iter().for_each(|warning| log::warn!("{warning}"));
     let frame = input.frame()?.with_backend(backend);
     let initial = State::new(&frame, &t_cam_object)?;
     let bar = progress(configured.iterations(), "refining");
