@@ -43,6 +43,8 @@ use self::config::{Asked, ReadError};
 ///   prehend refine  --dataset DIR --poses init.csv --out refined.csv --report out
 ///   prehend eval    --dataset DIR --poses refined.csv
 ///
+/// Options may come from a file: `prehend refine --print-config` shows one, --config FILE takes it.
+///
 /// What a hand needs is prepared once and kept in PREHEND_CACHE (default: prehend in the user's cache folder); set it empty to
 /// keep nothing.
 ///

@@ -56,7 +56,7 @@ pub(crate) struct Synth {
         long,
         value_names = ["MIN", "MAX"],
         value_delimiter = ',',
-        num_args = 2,
+        num_args = 1..=2,
         default_values_t = [20.0, 60.0],
         help_heading = "Objects and hand"
     )]

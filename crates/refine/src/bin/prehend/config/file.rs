@@ -7,10 +7,11 @@ use std::path::PathBuf;
 
 use clap::error::{ContextKind, ContextValue};
 use clap::parser::ValueSource;
-use clap::{Arg, ArgAction, ArgMatches, Command};
+use clap::{Arg, ArgMatches, Command};
 use toml::{Table, Value};
 
-use super::{ConfigError, ReadError, join, options, takes_list};
+use super::words::spelled;
+use super::{ConfigError, ReadError, join, options};
 
 /// The options of a file that count for a command line.
 pub(super) struct ConfigFile {
@@ -102,40 +103,6 @@ impl ConfigFile {
         let message = error.to_string();
         let problem = message.split("\n\n").next().unwrap_or_default();
         self.fault(field, problem.trim_start_matches("error: ")).into()
-    }
-}
-
-/// The words of a command line that give `value` to the option `name`.
-fn spelled(arg: &Arg, name: &str, value: &Value) -> Result<Vec<String>, &'static str> {
-    match (arg.get_action(), value) {
-        (ArgAction::SetTrue, Value::Boolean(set)) => Ok(vec![format!("--{name}"); (*set).into()]),
-        (ArgAction::SetTrue, _) => Err("must be true or false"),
-        (ArgAction::Count, Value::Integer(times @ 0..=255)) => {
-            Ok(vec![format!("--{name}"); *times as usize])
-        }
-        (ArgAction::Count, _) => Err("must be a count"),
-        (_, Value::Array(list)) if takes_list(arg) => {
-            let texts = list.iter().map(text).collect::<Result<Vec<_>, _>>()?;
-            match (arg.get_num_args(), arg.get_value_delimiter()) {
-                _ if texts.is_empty() => Ok(texts),
-                // clap counts the values of `--name=1,2` as one.
-                (Some(count), Some(between)) if count.max_values() > 1 => {
-                    Ok(vec![format!("--{name}"), texts.join(&between.to_string())])
-                }
-                _ => Ok(texts.into_iter().map(|text| format!("--{name}={text}")).collect()),
-            }
-        }
-        (_, Value::Array(_)) => Err("takes one value, not a list"),
-        _ => Ok(vec![format!("--{name}={}", text(value)?)]),
-    }
-}
-
-fn text(value: &Value) -> Result<String, &'static str> {
-    match value {
-        Value::String(text) => Ok(text.clone()),
-        Value::Integer(number) => Ok(number.to_string()),
-        Value::Float(number) => Ok(number.to_string()),
-        _ => Err("must be text or a number"),
     }
 }
 

@@ -3,6 +3,7 @@
 mod error;
 mod file;
 mod print;
+mod words;
 
 use std::ffi::{OsStr, OsString};
 use std::path::PathBuf;
