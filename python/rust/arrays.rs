@@ -19,9 +19,10 @@ pub(crate) type Indices<'py> = PyArrayLikeDyn<'py, i64, AllowTypeChange>;
 pub(crate) fn in_order<'a, T: numpy::Element + Copy>(
     array: &'a PyArrayLikeDyn<'_, T, AllowTypeChange>,
 ) -> Cow<'a, [T]> {
+    // A slice may be in the order of Fortran, too.
     match array.as_slice() {
-        Ok(slice) => Cow::Borrowed(slice),
-        Err(_) => Cow::Owned(array.as_array().iter().copied().collect()),
+        Ok(slice) if array.is_c_contiguous() => Cow::Borrowed(slice),
+        _ => Cow::Owned(array.as_array().iter().copied().collect()),
     }
 }
 

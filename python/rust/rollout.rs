@@ -25,8 +25,10 @@ pub(crate) struct Rollout {
     function: RolloutFunction<AnyIntegrator>,
     /// Values of the parameters, where none are given.
     values: Vec<f64>,
+    /// Names of the parameters.
     #[pyo3(get)]
     parameters: Vec<String>,
+    /// Names of the controls.
     #[pyo3(get)]
     controls: Vec<String>,
 }

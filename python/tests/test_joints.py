@@ -134,7 +134,7 @@ def test_a_gripper_of_the_data_closes():
     states = world.neutral_states()
     robot.set_positions(world, states)
     [control] = robot.actuators.values()
-    rollout = world.rollout(1e-3, 300, controls=[control], integrator="semi_implicit_euler")
-    end = rollout(states, None, np.full((300, 1), 200.0), end=True)
+    rollout = world.rollout(1e-4, 2000, controls=[control], integrator="semi_implicit_euler")
+    end = rollout(states, None, np.full((2000, 1), 200.0), end=True)
     driver = robot.joints["right_driver_joint"][0]
     assert world.joint(end, driver)[0][0] > 0.1

@@ -27,10 +27,11 @@ def test_gradients_are_those_of_differences(integrator):
             moved = [x + step * along if k == part else x for k, x in enumerate(inputs)]
             return (weights * rollout(*moved, end=True)).sum()
 
-        h = 1e-4
+        # Steps that are chosen are others where inputs are, to their tolerance.
+        h = 1e-4 if integrator == "adaptive" else 1e-7
         difference = (8 * (at(h) - at(-h)) - (at(2 * h) - at(-2 * h))) / (12 * h)
         found = (slope * along).sum()
-        assert found == pytest.approx(difference, rel=1e-4, abs=1e-6)
+        assert found == pytest.approx(difference, rel=1e-4, abs=1e-5)
     tangents = tuple(random.normal(size=x.shape) for x in inputs)
     tangents[0][:, 3:7] = 0.0
     _, along_run = rollout.jvp(inputs, tangents)

@@ -104,12 +104,12 @@ def test_what_cannot_be_is_refused():
         "no parameter 'color'": lambda: world.add_contact(
             "ball", "floor", "penalty", stiffness=1.0, damping=1.0, friction=0.0, slip_scale=1.0, color=2.0
         ),
-        "there is no body 'wall'": lambda: world.add_contact("ball", "wall", "penalty"),
+        "there is no body 'wall'": lambda: world.pose(states, "wall"),
         "no mass": lambda: world.add_body("ghost"),
         "no parameter called 'ball.color'": lambda: world.rollout(1e-3, 5, parameters=["ball.color"]),
         "no integrator called 'euler'": lambda: world.rollout(1e-3, 5, integrator="euler"),
         "an array of n × 13": lambda: rollout(states[:, :12]),
-        "for a world of 2 bodies": lambda: rollout(states[:1]),
+        "1 states for 2 bodies": lambda: rollout(states[:1]),
         "no rotation": lambda: world.set_pose(states, ball, np.diag([1.0, 1.0, -1.0, 1.0])),
         "time step": lambda: world.rollout(-1.0, 5),
     }.items():

@@ -7,11 +7,14 @@ use prehend_sim::{
     DynContactLaw, DynJointLaw, GapSmoothing, LawParameter, LawRegistry, LeakSteps,
     joint_laws as sim_joint_laws,
 };
+use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::error::{Raise, wrong};
 use crate::python_law::PythonLaw;
+
+const SLOW: &std::ffi::CStr = c"a contact law in Python is slow: it is called at each contact point in each step, and one at a time; write it in Rust once it does what it should";
 
 /// Parameters by name, from keyword arguments.
 pub(crate) type Values = BTreeMap<String, f64>;
@@ -67,7 +70,10 @@ pub(crate) fn contact_law(
     values: Values,
 ) -> PyResult<Arc<dyn DynContactLaw>> {
     let Ok(name) = law.extract::<String>() else {
-        return Ok(Arc::new(PythonLaw::new(law, values)?));
+        let own = PythonLaw::new(law, values)?;
+        let category = law.py().get_type::<PyUserWarning>();
+        PyErr::warn(law.py(), &category, SLOW, 1)?;
+        return Ok(Arc::new(own));
     };
     let registry = LawRegistry::default();
     let table = registry.entry(&name).map_or(&[][..], |entry| &entry.parameters);

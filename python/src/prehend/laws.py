@@ -18,8 +18,7 @@ long as a law in Rust: :func:`prehend.World.add_contact` warns of it.
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -34,7 +33,6 @@ class Dual:
     """A number with its derivatives by the inputs of a law."""
 
     __slots__ = ("slopes", "value")
-    __array_ufunc__ = None
 
     def __init__(self, value: float, slopes: NDArray[np.float64]) -> None:
         self.value = float(value)
@@ -196,5 +194,3 @@ def _respond(
     return [
         (x.value, x.slopes.tolist()) if isinstance(x, Dual) else (float(x), []) for x in response
     ]
-
-

@@ -1,0 +1,54 @@
+"""Learns the friction of a floor from slides that were seen, by Gauss–Newton steps: NumPy alone.
+
+    python learn_friction.py
+"""
+
+import numpy as np
+import prehend
+from numpy.typing import NDArray
+from prehend import POSITION, VELOCITY
+
+TRUTH = 0.3
+
+
+def scene() -> tuple[prehend.World, int, str]:
+    """A box over a floor: its row in states, and the name of their friction."""
+    world = prehend.World()
+    floor = world.add_body("floor", prehend.Shape.half_space(), fixed=True)
+    box = world.add_body("box", prehend.Shape.cuboid([0.05, 0.04, 0.03], spacing=0.02), density=500.0)
+    contact = world.add_contact(
+        box, floor, "hunt_crossley", smoothing=5e-5,
+        stiffness=1e8, damping=1.0, exponent=1.0, friction=TRUTH, slip_scale=1e-2,
+    )
+    return world, box, contact["friction"]
+
+
+def main() -> None:
+    world, box, friction = scene()
+    random = np.random.default_rng(1)
+    starts = np.repeat(world.neutral_states()[None], 8, 0)
+    starts[:, box, POSITION] = [0.0, 0.0, 0.035]
+    starts[:, box, VELOCITY] = random.normal(size=(8, 3)) * [0.5, 0.5, 0.0]
+    rollout = world.rollout(0.02, 10, parameters=[friction])
+    seen = rollout(starts)[:, 1:, box, POSITION]
+    seen += 1e-4 * random.normal(size=seen.shape)
+
+    def linearized(value: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """What is off, and its derivative by the friction."""
+        run, along = rollout.jvp((starts, [value], None), (None, [1.0], None))
+        return (run[:, 1:, box, POSITION] - seen).ravel(), along[:, 1:, box, POSITION].ravel()
+
+    value, steps = 0.5, 0
+    for steps in range(1, 20):
+        off, slope = linearized(value)
+        step = float(slope @ off) / float(slope @ slope)
+        value = max(value - step, 0.0)
+        if abs(step) < 1e-6:
+            break
+    deviation = 1e-4 / float(np.linalg.norm(slope))
+    print(f"friction {value:.5f} ± {deviation:.5f} in {steps} steps, truth {TRUTH}")
+    assert abs(value - TRUTH) < 4 * deviation
+
+
+if __name__ == "__main__":
+    main()
