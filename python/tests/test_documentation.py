@@ -46,3 +46,9 @@ def test_mypy_in_strict_mode(tmp_path):
     example = Path(__file__).parents[1] / "examples" / "learn_friction.py"
     out, err, code = api.run(["--strict", "--cache-dir", str(tmp_path), str(example)])
     assert code == 0, out + err
+
+
+def test_the_readme_runs(capsys):
+    text = (Path(__file__).parents[1] / "README.md").read_text()
+    exec(text.split("```python")[1].split("```")[0], {})
+    assert capsys.readouterr().out

@@ -73,3 +73,13 @@ def test_nested_vmap_and_defaults():
     with pytest.raises(ValueError, match="controls are missing: ball.force_y"):
         function(states[0])
     np.testing.assert_array_equal(function(states[0], controls=controls), result[0, 0])
+
+
+def test_arrays_of_numpy_are_constants_under_jit_and_vmap():
+    rollout, inputs = bounce()
+    many = batch(inputs)
+    function = jax.vmap(prehend.jax.rollout(rollout, end=True), (0, None, None))
+    gradient = jax.jit(jax.grad(lambda parameters: function(many[0], parameters, inputs[2]).sum()))
+    _, pullback = prehend.vjp(rollout, many[0], *inputs[1:])
+    expected = pullback(np.ones((4, 2, 13))).parameters
+    np.testing.assert_allclose(gradient(inputs[1]), expected, rtol=1e-12)

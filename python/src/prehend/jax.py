@@ -15,6 +15,7 @@ Turn on double precision first, ``jax.config.update("jax_enable_x64", True)``: o
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -70,7 +71,8 @@ def rollout(function: Rollout, *, end: bool = False) -> RolloutOfJax:
             controls = np.zeros((function.steps, len(function.controls)))
             if controls.size:
                 raise ValueError(f"controls are missing: {', '.join(function.controls)}")
-        return run(jnp.asarray(states), jnp.asarray(parameters), jnp.asarray(controls))
+        # As copies: under vmap, arrays of NumPy are no constants that JAX takes.
+        return run(jnp.array(states), jnp.array(parameters), jnp.array(controls))
 
     return with_defaults
 
@@ -106,7 +108,8 @@ def _flat(arrays: Any, dimensions: tuple[int, ...]) -> tuple[tuple[int, ...], li
     batch = plain[0].shape[: plain[0].ndim - dimensions[0]]
     if not batch:
         return batch, plain
+    worlds = math.prod(batch)
     return batch, [
-        array.reshape(-1, *array.shape[array.ndim - own :])
+        array.reshape(worlds, *array.shape[array.ndim - own :])
         for array, own in zip(plain, dimensions, strict=True)
     ]
