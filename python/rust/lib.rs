@@ -6,6 +6,7 @@ mod error;
 mod integrator;
 mod link;
 mod python_law;
+mod refine;
 mod robot;
 mod rollout;
 mod shape;
@@ -20,6 +21,11 @@ mod _prehend {
     use super::error::Error;
     #[pymodule_export]
     use super::link::Link;
+    #[pymodule_export]
+    use super::refine::{
+        _calibrate, _score, Dataset, Frame, Hand, Mesh, Object, Rig, Tracker, example_frame,
+        example_sequence, methods, refine_batch,
+    };
     #[pymodule_export]
     use super::robot::Robot;
     #[pymodule_export]

@@ -51,6 +51,9 @@ pub enum RefineError {
     /// The initial pose is not finite.
     #[error("the initial pose is not finite")]
     NotFinite,
+    /// The pose that was found is unusable.
+    #[error("the refined pose is not finite")]
+    Diverged,
     /// No factor was asked for.
     #[error("no factor to refine by")]
     NoFactors,

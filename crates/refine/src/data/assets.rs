@@ -1,6 +1,7 @@
 //! Objects and hands of a dataset, each loaded once and shared by all frames.
 
 use std::collections::HashMap;
+use std::ops::Deref;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -46,6 +47,17 @@ pub enum AssetError {
     /// The refinement itself.
     #[error(transparent)]
     Refine(#[from] RefineError),
+    /// A rig is of a camera and a hand.
+    #[error("nothing is known of a hand, which is part of the rig")]
+    NoHand,
+    /// A frame is at fault.
+    #[error("{target}: {error}")]
+    Frame {
+        /// Which.
+        target: Target,
+        /// What is wrong with it.
+        error: Box<AssetError>,
+    },
 }
 
 /// What a frame may bring beside color, depth and mask, each in a file of its own.
@@ -117,9 +129,27 @@ impl FrameInput {
     }
 }
 
+/// A dataset of one's own, or somebody else's.
+#[derive(Clone)]
+enum Shared<'a> {
+    Borrowed(&'a Dataset),
+    Owned(Arc<Dataset>),
+}
+
+impl Deref for Shared<'_> {
+    type Target = Dataset;
+
+    fn deref(&self) -> &Dataset {
+        match self {
+            Self::Borrowed(dataset) => dataset,
+            Self::Owned(dataset) => dataset,
+        }
+    }
+}
+
 /// The objects and hands of a dataset.
 pub struct Assets<'a> {
-    dataset: &'a Dataset,
+    dataset: Shared<'a>,
     seed: u64,
     objects: HashMap<u32, Arc<Object>>,
     hands: HashMap<(PathBuf, Option<PathBuf>), Arc<Hand>>,
@@ -131,6 +161,15 @@ pub struct Assets<'a> {
 impl<'a> Assets<'a> {
     /// Nothing loaded yet; `seed` decides where objects' surfaces are sampled.
     pub fn new(dataset: &'a Dataset, seed: u64) -> Self {
+        Self::of(Shared::Borrowed(dataset), seed)
+    }
+
+    /// As [`Self::new`] has it, of a dataset that is kept as long as this is.
+    pub fn owning(dataset: Arc<Dataset>, seed: u64) -> Assets<'static> {
+        Assets::of(Shared::Owned(dataset), seed)
+    }
+
+    fn of(dataset: Shared<'a>, seed: u64) -> Self {
         Self {
             dataset,
             seed,
@@ -158,8 +197,8 @@ impl<'a> Assets<'a> {
     }
 
     /// The dataset.
-    pub fn dataset(&self) -> &'a Dataset {
-        self.dataset
+    pub fn dataset(&self) -> &Dataset {
+        &self.dataset
     }
 
     /// The model of object `id`, in meters.
@@ -185,7 +224,8 @@ impl<'a> Assets<'a> {
     /// Those of [`Assets::object`] and [`Assets::observation`], and if there is no such image.
     pub fn load(&mut self, target: &Target, required: &[Sensor]) -> Result<FrameInput, AssetError> {
         let object = self.object(target.obj_id)?;
-        let frame = self.dataset.frame(target.scene_id, target.im_id)?;
+        let dataset = self.dataset.clone();
+        let frame = dataset.frame(target.scene_id, target.im_id)?;
         let (observation, hand) = self.observation(&frame, target.instance, required)?;
         Ok(FrameInput { observation, object, hand, rig: self.rig.clone() })
     }

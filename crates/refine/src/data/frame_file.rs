@@ -16,7 +16,8 @@ use prehend_render::{Camera, DepthImage, Mask, Remap, RgbImage};
 use serde::Deserialize;
 
 use crate::data::assets::FrameInput;
-use crate::data::bop::{DatasetError, Lens, Numbers, Positive, read_json, rotation_from_row_major};
+use crate::data::bop::{DatasetError, Lens, Numbers, Positive, read_json};
+use crate::data::pose::pose_from_matrix;
 use crate::rig::Rig;
 use crate::scene::{Hand, HandMeasurement, Object, Observation, check_gravity};
 
@@ -220,11 +221,8 @@ impl TryFrom<PoseLayout> for Pose {
         let (rotation, translation) =
             match (layout.matrix, layout.quaternion_wxyz, layout.quaternion_xyzw) {
                 (Some(m), None, None) => {
-                    if m.0[12..] != [0.0, 0.0, 0.0, 1.0] {
-                        return Err("the matrix's last row must be 0 0 0 1".into());
-                    }
-                    let row_major = std::array::from_fn(|i| m.0[4 * (i / 3) + i % 3]);
-                    (rotation_from_row_major(&row_major)?, [m.0[3], m.0[7], m.0[11]])
+                    let pose = pose_from_matrix(&m.0)?;
+                    (pose.rotation, pose.translation.vector.into())
                 }
                 (None, Some(wxyz), None) => from_quaternion(wxyz.0)?,
                 (None, None, Some(Numbers([x, y, z, w]))) => from_quaternion([w, x, y, z])?,

@@ -3,6 +3,8 @@
 
 mod assets;
 pub mod bop;
+#[cfg(feature = "cli")]
+mod cache;
 mod contact;
 mod frame_file;
 pub mod identity;
@@ -15,13 +17,15 @@ mod times;
 mod workers;
 
 pub use assets::{AssetError, Assets, FrameInput, Sensor, load_mesh};
+#[cfg(feature = "cli")]
+pub use cache::user_cache;
 pub use contact::{CONTACT_SAMPLES, ContactModel};
 pub(crate) use frame_file::FrameParts;
 pub use frame_file::load_frame_file;
 pub use identity::Identity;
 pub use journal::Journal;
 pub use noise::NoiseLevel;
-pub use pose::PlainPose;
+pub use pose::{PlainPose, pose_from_matrix};
 pub(crate) use smooth_field::smooth_field;
 pub(crate) use targets::listed_targets;
 pub use targets::{Target, find_targets};

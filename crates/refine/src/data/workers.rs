@@ -1,9 +1,13 @@
 //! Frames in parallel.
 
+use std::collections::BTreeMap;
+use std::convert::Infallible;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc;
 
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
+
+use crate::error::RefineError;
 
 /// Main threads have as much; Rayon's own default is a quarter of it.
 const STACK_BYTES: usize = 8 << 20;
@@ -21,15 +25,20 @@ impl Workers {
     /// Workers for `frames` frames with `threads` threads in total.
     ///
     /// # Errors
-    /// If the system gives no threads.
-    pub fn new(frames: usize, threads: usize) -> Result<Self, ThreadPoolBuildError> {
+    /// [`RefineError::Setting`] if the system gives no threads.
+    pub fn new(frames: usize, threads: usize) -> Result<Self, RefineError> {
         let threads = threads.max(1);
         let workers = threads.min(frames).max(1);
         let pool = |worker: usize| {
             let own = threads / workers + usize::from(worker < threads % workers);
             ThreadPoolBuilder::new().num_threads(own).stack_size(STACK_BYTES).build()
         };
-        Ok(Self { pools: (0..workers).map(pool).collect::<Result<_, _>>()? })
+        let refused = |error: ThreadPoolBuildError| RefineError::Setting {
+            name: "threads",
+            problem: format!("cannot be had: {error}"),
+        };
+        let pools = (0..workers).map(pool).collect::<Result<_, _>>().map_err(refused)?;
+        Ok(Self { pools })
     }
 
     /// Does all `jobs`, each by one of the workers that `worker` makes, and hands results to `done` on this thread as they
@@ -80,6 +89,34 @@ impl Workers {
     }
 }
 
+impl Workers {
+    /// Does the `work` of all `indices` side by side; `each` hears of them in their order, so that sums are the same for any number of threads.
+    pub fn run_in_order<T: Send>(
+        &self,
+        indices: &[usize],
+        work: impl Fn(usize) -> T + Sync,
+        mut each: impl FnMut(usize, T),
+    ) {
+        let mut waiting = BTreeMap::new();
+        let mut next = indices.iter();
+        let mut expected = next.next();
+        let Ok(()) = self.run(
+            indices,
+            || |&index: &usize| work(index),
+            |&index, outcome| -> Result<(), Infallible> {
+                waiting.insert(index, outcome);
+                while let Some((index, outcome)) =
+                    expected.and_then(|index| waiting.remove_entry(index))
+                {
+                    each(index, outcome);
+                    expected = next.next();
+                }
+                Ok(())
+            },
+        );
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -102,6 +139,15 @@ mod tests {
             workers.run(&jobs, || |&job: &usize| job * job, done).unwrap();
             assert_eq!(sum, vec![1; frames]);
         }
+    }
+
+    #[test]
+    fn results_come_in_order() {
+        let indices: Vec<usize> = (3..40).collect();
+        let mut heard = Vec::new();
+        let workers = Workers::new(indices.len(), 3).unwrap();
+        workers.run_in_order(&indices, |k| k * k, |k, square| heard.push((k, square)));
+        assert_eq!(heard, indices.iter().map(|k| (*k, k * k)).collect::<Vec<_>>());
     }
 
     #[test]

@@ -18,7 +18,6 @@ pub use hand::Hand;
 pub use inspect::{Subject, Warning};
 pub(crate) use inspect::{inspect_object, inspect_pose};
 pub use object::{Inertial, Object, StatedSize};
-pub(crate) use observation::check_gravity;
-pub use observation::{HandMeasurement, Observation};
+pub use observation::{HandMeasurement, Observation, check_gravity};
 pub use sequence::{Sequence, SequenceFrame, default_sequence};
 pub(crate) use view::{Pixel, View, median};

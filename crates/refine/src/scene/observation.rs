@@ -94,7 +94,10 @@ impl Observation {
 const PLAUSIBLE_GRAVITY: std::ops::Range<f64> = 1e-2..1e3;
 
 /// Refuses a gravity that cannot be in m/s² or that presses nothing into the hand.
-pub(crate) fn check_gravity(gravity: &Vector3<f64>) -> Result<(), String> {
+///
+/// # Errors
+/// What is wrong with it.
+pub fn check_gravity(gravity: &Vector3<f64>) -> Result<(), String> {
     let norm = gravity.norm();
     if PLAUSIBLE_GRAVITY.contains(&norm) {
         return Ok(());

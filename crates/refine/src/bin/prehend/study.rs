@@ -151,7 +151,7 @@ impl Run {
         Workers::new(open.len(), rayon::current_num_threads())?.run(
             &open,
             || {
-                let mut runner = Runner::new(&design, &methods, &assets);
+                let mut runner = Runner::new(&design, &methods, &dataset, &assets);
                 move |frame: &&Frame| runner.run(frame)
             },
             |frame, FrameResult { record, seconds }| -> anyhow::Result<()> {

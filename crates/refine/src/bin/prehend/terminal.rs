@@ -1,13 +1,10 @@
 //! Standard output, standard error, progress and exit codes; and where preparations are kept between runs.
 
-use std::env;
 use std::io::{ErrorKind, Write};
-use std::path::PathBuf;
 use std::process::ExitCode;
 
-use etcetera::BaseStrategy;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use prehend_geometry::GridCache;
+pub(crate) use prehend_refine::data::user_cache as cache;
 
 use crate::logging;
 
@@ -61,15 +58,4 @@ pub(crate) fn exit_code(done: usize, failures: &[String]) -> ExitCode {
     complain(format!("\n{done} done, {} failed:", failures.len()));
     failures.iter().for_each(|failure| complain(format!("  {failure}")));
     ExitCode::from(if done > 0 { 2 } else { 1 })
-}
-
-/// The cache in the folder that `PREHEND_CACHE` names, none if that is empty, and by default in `prehend` in the user's cache
-/// folder.
-pub(crate) fn cache() -> Option<GridCache> {
-    let folder = match env::var_os("PREHEND_CACHE") {
-        Some(folder) => PathBuf::from(folder),
-        None => etcetera::choose_base_strategy().ok()?.cache_dir().join("prehend"),
-    };
-    log::debug!("cache folder: {folder:?}");
-    (!folder.as_os_str().is_empty()).then(|| GridCache::new(folder))
 }

@@ -12,7 +12,7 @@ use super::kind::{INITIAL, Kind, TRUTH};
 use super::posterior::PredictedPosterior;
 use super::record::{FrameRecord, RowOutcome};
 use super::sweep::Sweep;
-use crate::data::bop::ResultRow;
+use crate::data::bop::{Dataset, ResultRow};
 use crate::data::{AssetError, Assets, PlainPose, Sensor, Target};
 use crate::evaluate::scoring::Scorer;
 use crate::method::Method;
@@ -49,13 +49,13 @@ struct Refined {
 }
 
 impl<'a> Runner<'a> {
-    /// A runner of `methods`, those of the design, with their settings.
+    /// A runner of `methods`, those of the design, with their settings, on the dataset that `assets` are of.
     pub fn new(
         design: &'a Design,
         methods: &'a [(String, Method)],
+        dataset: &'a Dataset,
         assets: &'a Mutex<Assets<'a>>,
     ) -> Self {
-        let dataset = assets.lock().unwrap_or_else(PoisonError::into_inner).dataset();
         Self { design, methods, assets, scorer: Scorer::new(dataset) }
     }
 

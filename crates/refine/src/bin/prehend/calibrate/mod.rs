@@ -1,27 +1,27 @@
 //! `prehend calibrate`.
 
-mod passes;
 mod report;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
-use anyhow::{Context, anyhow, bail};
+use anyhow::{Context, bail};
 use clap::Args;
 use nalgebra::Isometry3;
+use prehend_refine::data::Assets;
 use prehend_refine::data::bop::{ResultRow, check_writable};
 use prehend_refine::data::identity::canonical;
-use prehend_refine::data::{Assets, FrameInput, Sensor};
 use prehend_refine::evaluate::report::Report;
-use prehend_refine::rig::{CalibrationFrame, Calibrator, CalibratorSettings, UnobservedDirection};
-use prehend_refine::scene::{Object, Observation};
+use prehend_refine::rig::{
+    Calibrated, CalibrationFrames, Calibrator, CalibratorSettings, Passes, UnobservedDirection,
+};
+use prehend_refine::scene::Object;
 
-use self::passes::{Done, Passes};
 use crate::options::{Input, Job, limit_threads, write_poses};
-use crate::terminal::{cache, exit_code, say};
+use crate::terminal::{cache, exit_code, progress, say};
 
 #[derive(Args)]
 pub(crate) struct Calibrate {
@@ -51,12 +51,6 @@ pub(crate) struct Calibrate {
     threads: Option<NonZeroUsize>,
 }
 
-/// The frames of a dataset, and their files.
-struct Frames<'a> {
-    jobs: Vec<Job>,
-    assets: Mutex<Assets<'a>>,
-}
-
 impl Calibrate {
     pub(crate) fn run(self) -> anyhow::Result<ExitCode> {
         let models = self.models.clone().unwrap_or_else(|| self.out.with_extension("models"));
@@ -76,12 +70,16 @@ impl Calibrate {
         let ids: BTreeSet<u32> = jobs.iter().map(|job| job.target.obj_id).collect();
         let objects: BTreeMap<_, _> =
             ids.iter().map(|id| Ok((*id, assets.object(*id)?))).collect::<anyhow::Result<_>>()?;
-        let frames = Frames { jobs, assets: Mutex::new(assets) };
+        let told = jobs.iter().map(|job| (job.target, job.row.t_cam_model)).collect();
+        let frames = CalibrationFrames::new(assets, told);
         let (joints, size) = frames.layout()?;
         let settings = CalibratorSettings::default();
         let nominal = Calibrator::new(joints, size, objects.clone(), settings)?;
-        let done = Passes::new(&frames, self.passes, self.window).run(nominal.clone())?;
-        let target = |index: &usize| frames.jobs[*index].target;
+        let bar = progress(self.passes.get() * jobs.len(), "calibrating");
+        let passes = Passes::new(&frames, self.passes, self.window);
+        let done = passes.run(nominal.clone(), &mut |visits| bar.inc(visits as u64))?;
+        bar.finish_and_clear();
+        let target = |index: &usize| frames.poses[*index].0;
         failures.extend(done.failed.iter().map(|(index, e)| format!("{}: {e}", target(index))));
         let count = done.poses.len();
         if count == 0 {
@@ -95,13 +93,13 @@ impl Calibrate {
         let calibrator = &done.calibrator;
         calibrator.rig().save(&self.out)?;
         if let Some(out) = &self.refined {
-            write_poses(out, frames.rows(&done.poses), &mut failures)?;
+            write_poses(out, rows(&jobs, &done.poses), &mut failures)?;
         }
         say(parameters(calibrator))?;
         for [name, found] in report::skin_rows(calibrator) {
             say(format!("{name:31} {found}"))?;
         }
-        let unobserved = frames.unobserved(&done).unwrap_or_else(|error| {
+        let unobserved = unobserved(&frames, &done).unwrap_or_else(|error| {
             failures.push(format!("what is unobserved: {error}"));
             Vec::new()
         });
@@ -135,61 +133,26 @@ impl Calibrate {
 /// Directions that are printed at most.
 const LINES: usize = 6;
 
-const NO_HAND: &str = "nothing is known of a hand, which is part of the rig";
+/// What `done` leaves open, seen from a frame in the middle, as an example of where the hand is.
+fn unobserved(
+    frames: &CalibrationFrames<'_>,
+    done: &Calibrated,
+) -> anyhow::Result<Vec<UnobservedDirection>> {
+    let used = done.poses.iter().filter(|(index, _)| !done.left_out.contains_key(index));
+    let used: Vec<_> = used.collect();
+    let Some((index, pose)) = used.get(used.len() / 2) else { return Ok(Vec::new()) };
+    Ok(done.calibrator.unobserved(&frames.load(**index, pose)?)?)
+}
 
-impl Frames<'_> {
-    /// Joints of the hand and size of images of the first frame that can be read.
-    fn layout(&self) -> anyhow::Result<(usize, (usize, usize))> {
-        let mut assets = self.assets.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut fault = None;
-        for job in &self.jobs {
-            match assets.load(&job.target, &[Sensor::Hand]) {
-                Ok(FrameInput {
-                    observation: Observation { camera, .. },
-                    hand: Some(hand),
-                    ..
-                }) => {
-                    return Ok((hand.tree.joint_names().len(), (camera.width, camera.height)));
-                }
-                Ok(_) => {}
-                Err(error) => {
-                    fault.get_or_insert_with(|| anyhow!("{}: {error}", job.target));
-                }
-            }
-        }
-        Err(fault.unwrap_or_else(|| anyhow!(NO_HAND)))
-    }
-
-    /// What `done` leaves open, seen from a frame in the middle, as an example of where the hand is.
-    fn unobserved(&self, done: &Done) -> anyhow::Result<Vec<UnobservedDirection>> {
-        let used = done.poses.iter().filter(|(index, _)| !done.left_out.contains_key(index));
-        let used: Vec<_> = used.collect();
-        let Some((index, pose)) = used.get(used.len() / 2) else { return Ok(Vec::new()) };
-        Ok(done.calibrator.unobserved(&self.load(**index, pose)?)?)
-    }
-
-    /// The frame of that index, with its object at `pose`.
-    fn load(&self, index: usize, pose: &Isometry3<f64>) -> anyhow::Result<CalibrationFrame> {
-        let target = &self.jobs[index].target;
-        let input = {
-            let mut assets = self.assets.lock().unwrap_or_else(PoisonError::into_inner);
-            assets.load(target, &[Sensor::Hand])?
-        };
-        let FrameInput { observation, hand, .. } = input;
-        let (obj_id, hand) = (target.obj_id, hand.context(NO_HAND)?);
-        Ok(CalibrationFrame { observation, obj_id, hand, initial: *pose, is_refined: false })
-    }
-
-    /// Rows of a results file with these poses, by the frames' indices.
-    fn rows(&self, poses: &BTreeMap<usize, Isometry3<f64>>) -> Vec<ResultRow> {
-        let row = |(&index, pose): (&usize, &Isometry3<f64>)| ResultRow {
-            t_cam_model: *pose,
-            score: -1.0,
-            time: -1.0,
-            ..self.jobs[index].row.clone()
-        };
-        poses.iter().map(row).collect()
-    }
+/// Rows of a results file with these poses, by the frames' indices.
+fn rows(jobs: &[Job], poses: &BTreeMap<usize, Isometry3<f64>>) -> Vec<ResultRow> {
+    let row = |(&index, pose): (&usize, &Isometry3<f64>)| ResultRow {
+        t_cam_model: *pose,
+        score: -1.0,
+        time: -1.0,
+        ..jobs[index].row.clone()
+    };
+    poses.iter().map(row).collect()
 }
 
 /// Writes `objects` as the rig corrects them.

@@ -4,14 +4,13 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use nalgebra::Isometry3;
+use prehend_refine::data::Workers;
 use prehend_refine::evaluate::report::{Report, depth_residual_picture, rig_picture};
 use prehend_refine::rig::{
-    CalibrationFrame, Calibrator, FrameResiduals, ObjectMass, Residuals, SensorResidual,
-    SkinCalibration, TaxelCalibration, UnobservedDirection,
+    Calibrated, CalibrationFrame, CalibrationFrames, Calibrator, FrameResiduals, ObjectMass,
+    Residuals, SensorResidual, SkinCalibration, TaxelCalibration, UnobservedDirection,
 };
 
-use super::Frames;
-use super::passes::{Done, in_order};
 use crate::terminal::progress;
 
 /// Frames that are drawn.
@@ -79,9 +78,9 @@ pub(super) fn told(direction: &UnobservedDirection) -> String {
 /// Writes the report of `done`, which began with the `nominal` rig, of images of this size, and returns its page; of frames that cannot be shown `failures` hears.
 pub(super) fn write(
     mut report: Report,
-    frames: &Frames<'_>,
+    frames: &CalibrationFrames<'_>,
     (nominal, size): (&Calibrator, (usize, usize)),
-    done: &Done,
+    done: &Calibrated,
     unobserved: &[UnobservedDirection],
     failures: &mut Vec<String>,
 ) -> anyhow::Result<PathBuf> {
@@ -93,7 +92,8 @@ pub(super) fn write(
     let [mut before, mut after] = [Residuals::new(size), Residuals::new(size)];
     let bar = progress(indices.len(), "comparing");
     let compare = |index: usize| compare(frames, nominal, done, index);
-    in_order(&indices, compare, |index, outcome| {
+    let workers = Workers::new(indices.len(), rayon::current_num_threads())?;
+    workers.run_in_order(&indices, compare, |index, outcome| {
         bar.inc(1);
         match outcome {
             Ok(frame) => {
@@ -102,11 +102,11 @@ pub(super) fn write(
                 drawn.entry(index).and_modify(|pose| *pose = frame.alone);
             }
             Err(error) => {
-                failures.push(format!("{}: report: {error}", frames.jobs[index].target));
+                failures.push(format!("{}: report: {error}", frames.poses[index].0));
                 drawn.remove(&index);
             }
         }
-    })?;
+    });
     bar.finish_and_clear();
     let (old, new) = (before.sensors(), after.sensors());
     let number = |value: Option<f64>| value.map_or("–".into(), |value| format!("{value:.2}"));
@@ -151,7 +151,7 @@ pub(super) fn write(
         report.add_table("Left out", &["frame"], &left_out);
     }
     for (&index, alone) in &drawn {
-        let target = frames.jobs[index].target;
+        let target = frames.poses[index].0;
         let what = format!("{target}: outlines of object and hand (blue) before (left) and after");
         match draw(frames, nominal, done, index, alone) {
             Ok(picture) => report.add_picture(&what, &picture, &[])?,
@@ -163,9 +163,9 @@ pub(super) fn write(
 
 /// The frame of that index before and after.
 fn compare(
-    frames: &Frames<'_>,
+    frames: &CalibrationFrames<'_>,
     nominal: &Calibrator,
-    done: &Done,
+    done: &Calibrated,
     index: usize,
 ) -> anyhow::Result<Compared> {
     let frame = frames.load(index, &done.poses[&index])?;
@@ -177,9 +177,9 @@ fn compare(
 
 /// The frame of that index with the nominal rig and the pose that it has by itself, and with the rig that was found.
 fn draw(
-    frames: &Frames<'_>,
+    frames: &CalibrationFrames<'_>,
     nominal: &Calibrator,
-    done: &Done,
+    done: &Calibrated,
     index: usize,
     alone: &Isometry3<f64>,
 ) -> anyhow::Result<prehend_render::RgbImage> {

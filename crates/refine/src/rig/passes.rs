@@ -4,13 +4,12 @@ use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
 use std::ops::Range;
 
-use indicatif::ProgressBar;
 use nalgebra::Isometry3;
-use prehend_refine::data::Workers;
-use prehend_refine::rig::{Calibrator, Pass, Visit};
 
-use super::Frames;
-use crate::terminal::progress;
+use super::calibrator::Calibrator;
+use super::frames::CalibrationFrames;
+use super::pass::{Pass, Visit};
+use crate::data::{AssetError, Workers};
 
 /// Parameters that change by fewer of their deviations are found.
 const SETTLED: f64 = 0.05;
@@ -18,58 +17,75 @@ const SETTLED: f64 = 0.05;
 /// Passes that find poses as if nothing were known of them; the rig is much the same in later ones.
 const ROUGH_PASSES: usize = 2;
 
-/// All frames, window by window, each in several passes.
-pub(super) struct Passes<'a> {
-    frames: &'a Frames<'a>,
+/// Passes over all frames of a dataset, window by window, until the rig is settled.
+pub struct Passes<'a> {
+    frames: &'a CalibrationFrames<'a>,
     most: usize,
     window: usize,
-    bar: ProgressBar,
 }
 
 /// What they have found.
-pub(super) struct Done {
-    pub(super) calibrator: Calibrator,
+pub struct Calibrated {
+    /// The calibrator, which has the rig.
+    pub calibrator: Calibrator,
     /// Object → camera \[m\], by the frames' indices.
-    pub(super) poses: BTreeMap<usize, Isometry3<f64>>,
+    pub poses: BTreeMap<usize, Isometry3<f64>>,
     /// What is to be said of frames that disagree with the rig, by their indices.
-    pub(super) left_out: BTreeMap<usize, String>,
-    pub(super) failed: BTreeMap<usize, anyhow::Error>,
+    pub left_out: BTreeMap<usize, String>,
+    /// What is wrong with the frames that could not be visited, by their indices.
+    pub failed: BTreeMap<usize, AssetError>,
     /// Frames that have no mask.
-    pub(super) without_mask: usize,
+    pub without_mask: usize,
 }
 
+/// Hears how many of the visits that there are at most have been made, or will not have to be.
+type Progress<'a> = dyn FnMut(usize) + 'a;
+
 impl<'a> Passes<'a> {
-    pub(super) fn new(
-        frames: &'a Frames<'a>,
+    /// At most so many passes over each window of so many frames, or over all at once.
+    pub fn new(
+        frames: &'a CalibrationFrames<'a>,
         most: NonZeroUsize,
         window: Option<NonZeroUsize>,
     ) -> Self {
-        let (count, most) = (frames.jobs.len(), most.get());
-        let window = window.map_or(count, NonZeroUsize::get);
-        Self { frames, most, window, bar: progress(most * count, "calibrating") }
+        let window = window.map_or(frames.poses.len(), NonZeroUsize::get);
+        Self { frames, most: most.get(), window }
     }
 
-    pub(super) fn run(&self, calibrator: Calibrator) -> anyhow::Result<Done> {
+    /// Learns from all frames; `progress` hears of visits, of which there are at most as many as passes times frames.
+    ///
+    /// # Errors
+    /// If a rig cannot be solved for, or the system gives no threads.
+    pub fn run(
+        &self,
+        calibrator: Calibrator,
+        progress: &mut Progress<'_>,
+    ) -> Result<Calibrated, AssetError> {
         let (poses, left_out) = (BTreeMap::new(), BTreeMap::new());
         let failed = BTreeMap::new();
-        let mut done = Done { calibrator, poses, left_out, failed, without_mask: 0 };
-        let count = self.frames.jobs.len();
+        let mut done = Calibrated { calibrator, poses, left_out, failed, without_mask: 0 };
+        let count = self.frames.poses.len();
         for start in (0..count).step_by(self.window.max(1)) {
-            self.learn(start..(start + self.window).min(count), &mut done)?;
+            self.learn(start..(start + self.window).min(count), &mut done, progress)?;
         }
-        self.bar.finish_and_clear();
         Ok(done)
     }
 
     /// Learns from the frames of a window until the rig is settled, and keeps what they say.
-    fn learn(&self, window: Range<usize>, done: &mut Done) -> anyhow::Result<()> {
+    fn learn(
+        &self,
+        window: Range<usize>,
+        done: &mut Calibrated,
+        progress: &mut Progress<'_>,
+    ) -> Result<(), AssetError> {
         for number in 1..=self.most {
             let mut pass = Pass::default();
             let (mut poses, mut left_out) = (BTreeMap::new(), BTreeMap::new());
             let (mut failed, mut without_mask) = (BTreeMap::new(), 0);
             let is_refined = number > ROUGH_PASSES;
             self.visit_all(window.clone(), done, is_refined, |index, outcome| {
-                let target = self.frames.jobs[index].target;
+                progress(1);
+                let target = self.frames.poses[index].0;
                 match outcome {
                     Ok(visit) => {
                         left_out.extend(visit.left_out.map(|times| {
@@ -91,8 +107,8 @@ impl<'a> Passes<'a> {
             let change = if nothing { 0.0 } else { done.calibrator.solve(&mut pass)? };
             log::info!("pass {number}: parameters changed by up to {change:.2} deviations");
             if change < SETTLED || number == self.most {
-                let passes = (self.most - number) as u64;
-                self.bar.inc(passes * window.len() as u64);
+                let passes = self.most - number;
+                progress(passes * window.len());
                 done.calibrator.keep(pass);
                 done.poses.retain(|index, _| !failed.contains_key(index));
                 done.without_mask += without_mask;
@@ -109,47 +125,21 @@ impl<'a> Passes<'a> {
     fn visit_all(
         &self,
         window: Range<usize>,
-        known: &Done,
+        known: &Calibrated,
         is_refined: bool,
-        mut each: impl FnMut(usize, anyhow::Result<Visit>),
-    ) -> anyhow::Result<()> {
+        each: impl FnMut(usize, Result<Visit, AssetError>),
+    ) -> Result<(), AssetError> {
         let indices: Vec<usize> = window.collect();
         let starts: Vec<_> = indices.iter().map(|index| known.poses.get(index).copied()).collect();
         let first = indices.first().copied().unwrap_or(0);
         let visit = |index: usize| {
-            let told = self.frames.jobs[index].row.t_cam_model;
+            let told = self.frames.poses[index].1;
             let mut frame = self.frames.load(index, &starts[index - first].unwrap_or(told))?;
             frame.is_refined = is_refined && starts[index - first].is_some();
             Ok(known.calibrator.visit(&frame)?)
         };
-        in_order(&indices, visit, |index, outcome| {
-            self.bar.inc(1);
-            each(index, outcome);
-        })
+        Workers::new(indices.len(), rayon::current_num_threads())?
+            .run_in_order(&indices, visit, each);
+        Ok(())
     }
-}
-
-/// Does the `work` of all indices in parallel; `each` hears of them in their order, so that sums are the same for any number of threads.
-pub(super) fn in_order<T: Send>(
-    indices: &[usize],
-    work: impl Fn(usize) -> T + Sync,
-    mut each: impl FnMut(usize, T),
-) -> anyhow::Result<()> {
-    let mut waiting = BTreeMap::new();
-    let mut next = indices.iter();
-    let mut expected = next.next();
-    Workers::new(indices.len(), rayon::current_num_threads())?.run(
-        indices,
-        || |&index: &usize| work(index),
-        |&index, outcome| -> anyhow::Result<()> {
-            waiting.insert(index, outcome);
-            while let Some((index, outcome)) =
-                expected.and_then(|index| waiting.remove_entry(index))
-            {
-                each(index, outcome);
-                expected = next.next();
-            }
-            Ok(())
-        },
-    )
 }

@@ -1,0 +1,78 @@
+//! Many frames at once.
+
+use std::num::NonZeroUsize;
+
+use nalgebra::Isometry3;
+
+use crate::data::{FrameInput, Workers};
+use crate::error::RefineError;
+use crate::method::Method;
+use crate::refine::refine;
+use crate::scene::Warning;
+use crate::strategy::Estimate;
+
+/// A frame, and where to begin.
+pub struct RefineJob<'a> {
+    /// The frame.
+    pub input: &'a FrameInput,
+    /// Object → camera \[m\].
+    pub initial: Isometry3<f64>,
+    /// The other poses that a search ended with, if `initial` comes from one: [`Frame::with_rivals`](crate::Frame::with_rivals).
+    pub rivals: Option<Vec<Isometry3<f64>>>,
+}
+
+/// What becomes of a [`RefineJob`].
+pub struct Refined {
+    /// The pose, and how sure it is.
+    pub estimate: Estimate,
+    /// What looks wrong with object, frame and initial pose.
+    pub warnings: Vec<Warning>,
+}
+
+impl RefineJob<'_> {
+    /// Refines the frame. Gradients of the heuristic for which the frame brings no evidence drop out.
+    ///
+    /// # Errors
+    /// Those of [`refine`], and if the pose that is found is not finite.
+    pub fn run(&self, method: &Method) -> Result<Refined, RefineError> {
+        let mut method = method.clone();
+        if let Method::Heuristic(heuristic) = &mut method {
+            heuristic.gradients.retain(|&gradient| self.input.offers(gradient));
+        }
+        let mut frame = self.input.frame()?;
+        if let Some(rivals) = &self.rivals {
+            frame = frame.with_rivals(rivals.clone());
+        }
+        let estimate = refine(&frame, &self.initial, &method)?;
+        let pose = estimate.t_cam_object();
+        let mut numbers = pose.rotation.coords.iter().chain(pose.translation.vector.iter());
+        if !numbers.all(|v| v.is_finite()) {
+            return Err(RefineError::Diverged);
+        }
+        Ok(Refined { estimate, warnings: self.input.warnings(&self.initial).concat() })
+    }
+}
+
+/// Refines frames side by side, with so many threads in all, or as many as there are cores. What becomes of a frame depends neither on the others
+/// nor on the number of threads.
+///
+/// # Errors
+/// If the system gives no threads; what is wrong with a frame is in its place.
+pub fn refine_all(
+    jobs: &[RefineJob<'_>],
+    method: &Method,
+    threads: Option<NonZeroUsize>,
+) -> Result<Vec<Result<Refined, RefineError>>, RefineError> {
+    let threads = threads.map_or_else(rayon::current_num_threads, NonZeroUsize::get);
+    let workers = Workers::new(jobs.len(), threads)?;
+    let indices: Vec<usize> = (0..jobs.len()).collect();
+    let mut done: Vec<Option<Result<Refined, RefineError>>> = Vec::new();
+    done.resize_with(jobs.len(), || None);
+    let keep = |&index: &usize, outcome| -> Result<(), RefineError> {
+        done[index] = Some(outcome);
+        Ok(())
+    };
+    workers.run(&indices, || |&index: &usize| jobs[index].run(method), keep)?;
+    // None is missing: a panic of a worker comes through.
+    Ok(done.into_iter().flatten().collect())
+}

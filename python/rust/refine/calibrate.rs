@@ -1,0 +1,64 @@
+//! Rigs learnt from frames of a dataset.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::num::NonZeroUsize;
+use std::sync::Arc;
+
+use prehend_refine::data::{AssetError, Assets, Target, user_cache};
+use prehend_refine::rig::{Calibrated, CalibrationFrames, Calibrator, CalibratorSettings, Passes};
+use pyo3::prelude::*;
+
+use super::dataset::Dataset;
+use super::frame::poses;
+use super::rig::Rig;
+use crate::arrays::Numbers;
+use crate::error::{Raise, wrong};
+
+/// Passes over all frames, at most, if nothing is said.
+const PASSES: usize = 6;
+
+/// `prehend.calibrate` is made of it: the rig, what is to be said of frames that were left out, and what is wrong with others. `ids` are the numbers of
+/// scene, image, object and mask of each pose.
+#[pyfunction]
+#[pyo3(signature = (dataset, ids, poses, passes=None, window=None))]
+#[allow(clippy::type_complexity)] // as Python has it
+pub(crate) fn _calibrate(
+    py: Python<'_>,
+    dataset: &Dataset,
+    ids: Vec<(u32, u32, u32, usize)>,
+    poses: Numbers<'_>,
+    passes: Option<NonZeroUsize>,
+    window: Option<NonZeroUsize>,
+) -> PyResult<(Rig, Vec<String>, Vec<String>)> {
+    let poses = self::poses(&poses, "poses")?;
+    if poses.len() != ids.len() {
+        return Err(wrong(format!("{} poses of {} objects in images", poses.len(), ids.len())));
+    }
+    let target =
+        |&(scene_id, im_id, obj_id, instance)| Target { scene_id, im_id, obj_id, instance };
+    let told: Vec<_> = ids.iter().map(target).zip(poses).collect();
+    let targets: Vec<Target> = told.iter().map(|(target, _)| *target).collect();
+    let passes = passes.or(NonZeroUsize::new(PASSES)).unwrap_or(NonZeroUsize::MIN);
+    let source = Arc::clone(&dataset.dataset);
+    let learn = move || -> Result<Calibrated, AssetError> {
+        // Frames as they are, whatever rig the dataset is read with.
+        let mut assets = Assets::owning(source, 0).with_cache(user_cache()).with_optional_masks();
+        let numbers: BTreeSet<u32> = told.iter().map(|(target, _)| target.obj_id).collect();
+        let objects: BTreeMap<_, _> = numbers
+            .into_iter()
+            .map(|id| Ok((id, assets.object(id)?)))
+            .collect::<Result<_, AssetError>>()?;
+        let frames = CalibrationFrames::new(assets, told);
+        let (joints, size) = frames.layout()?;
+        let nominal = Calibrator::new(joints, size, objects, CalibratorSettings::default())?;
+        Passes::new(&frames, passes, window).run(nominal, &mut |_| ())
+    };
+    let done = py.detach(learn).raise()?;
+    let failed = done.failed.iter().map(|(index, error)| format!("{}: {error}", targets[*index]));
+    let failed: Vec<String> = failed.collect();
+    if done.poses.is_empty() {
+        return Err(wrong(format!("no frame could be used: {}", failed.join("; "))));
+    }
+    let rig = Rig { rig: Arc::new(done.calibrator.rig().clone()) };
+    Ok((rig, done.left_out.into_values().collect(), failed))
+}

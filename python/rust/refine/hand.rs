@@ -1,0 +1,50 @@
+//! Robot hands, prepared once.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use prehend_geometry::hand::load_taxels;
+use prehend_geometry::robot::KinematicTree;
+use prehend_refine::data::user_cache;
+use pyo3::prelude::*;
+
+use crate::error::Raise;
+
+/// A robot hand, prepared once for any number of frames: collision geometry of a URDF file, and taxels of a CSV file with the columns idx, patch,
+/// link, x_m, y_m, z_m, nx, ny, nz (position [m] and outward normal in the frame of the link).
+///
+/// What takes long to prepare is kept in the user's cache folder, or in the one that PREHEND_CACHE names (empty: nowhere).
+#[pyclass(frozen, module = "prehend")]
+pub(crate) struct Hand {
+    pub(super) hand: Arc<prehend_refine::Hand>,
+}
+
+#[pymethods]
+impl Hand {
+    #[new]
+    #[pyo3(signature = (urdf, taxels=None))]
+    fn new(py: Python<'_>, urdf: PathBuf, taxels: Option<PathBuf>) -> PyResult<Self> {
+        let tree = KinematicTree::from_urdf_file(urdf).raise()?;
+        let taxels = taxels.map(|file| load_taxels(&file)).transpose().raise()?;
+        let taxels = taxels.unwrap_or_default();
+        let hand = py.detach(|| prehend_refine::Hand::cached(tree, taxels, user_cache().as_ref()));
+        Ok(Self { hand: Arc::new(hand.raise()?) })
+    }
+
+    /// The names of its joints, in the order in which an array has their positions.
+    #[getter]
+    fn joints(&self) -> Vec<String> {
+        self.hand.tree.joint_names().to_vec()
+    }
+
+    /// The links that carry its taxels, in the order in which an array has their forces.
+    #[getter]
+    fn taxels(&self) -> Vec<String> {
+        self.hand.taxels.iter().map(|taxel| taxel.link.clone()).collect()
+    }
+
+    fn __repr__(&self) -> String {
+        let (joints, taxels) = (self.hand.tree.joint_names().len(), self.hand.taxels.len());
+        format!("Hand('{}', {joints} joints, {taxels} taxels)", self.hand.tree.name())
+    }
+}

@@ -1,0 +1,67 @@
+//! Methods by name, and many frames at once.
+
+use std::num::NonZeroUsize;
+
+use prehend_refine::{Method, NamedMethod, RefineJob, refine_all};
+use pyo3::prelude::*;
+use pyo3::types::PyList;
+
+use super::estimate;
+use super::frame::{Frame, poses};
+use crate::arrays::Numbers;
+use crate::error::{Error, Raise, wrong};
+
+/// The method of that name.
+pub(super) fn method(name: &str, iterations: Option<NonZeroUsize>) -> PyResult<Method> {
+    let unknown = || {
+        let names: Vec<_> = NamedMethod::all().iter().map(|method| method.name).collect();
+        wrong(format!("method: '{name}' is unknown: one of {}", names.join(", ")))
+    };
+    let mut method = Method::named(name).ok_or_else(unknown)?;
+    if let Some(iterations) = iterations {
+        method.set_iterations(iterations.get());
+    }
+    Ok(method)
+}
+
+/// The names of all methods, and what each is.
+#[pyfunction]
+pub(crate) fn methods() -> std::collections::BTreeMap<&'static str, &'static str> {
+    NamedMethod::all().iter().map(|method| (method.name, method.summary)).collect()
+}
+
+/// Refines many frames side by side, each from its pose (n × 4 × 4, camera ← object [m]): a list of one `Estimate` a frame, in their order. In place
+/// of a frame that failed is the `Error` that says why, so that none is lost for another; raise it, or look at the others.
+///
+/// `threads` is how many threads work, all cores if it is not given; poses are the same for any number.
+#[pyfunction]
+#[pyo3(signature = (frames, poses, *, method="fused", iterations=None, threads=None))]
+pub(crate) fn refine_batch<'py>(
+    py: Python<'py>,
+    frames: Vec<Py<Frame>>,
+    poses: Numbers<'py>,
+    method: &str,
+    iterations: Option<NonZeroUsize>,
+    threads: Option<NonZeroUsize>,
+) -> PyResult<Bound<'py, PyList>> {
+    let method = self::method(method, iterations)?;
+    let poses = self::poses(&poses, "poses")?;
+    let (count, given) = (frames.len(), poses.len());
+    if given != count {
+        return Err(wrong(format!("poses: {count} are expected, one a frame, not {given}")));
+    }
+    let frames = frames.iter().map(|frame| &frame.get().input);
+    let jobs: Vec<RefineJob<'_>> = frames
+        .zip(poses)
+        .map(|(input, initial)| RefineJob { input, initial, rivals: None })
+        .collect();
+    let done = py.detach(|| refine_all(&jobs, &method, threads)).raise()?;
+    let results = PyList::empty(py);
+    for outcome in &done {
+        match outcome {
+            Ok(refined) => results.append(estimate::estimate(py, refined)?)?,
+            Err(error) => results.append(Error::new_err(error.to_string()).into_value(py))?,
+        }
+    }
+    Ok(results)
+}

@@ -1,0 +1,77 @@
+//! Objects followed from frame to frame.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use prehend_refine::tracker::{Recovery, TrackerSettings};
+use pyo3::prelude::*;
+
+use super::estimate;
+use super::frame::{Frame, pose};
+use super::hand::Hand;
+use super::object::Object;
+use super::rig::Rig;
+use crate::arrays::Numbers;
+use crate::error::{Raise, wrong};
+
+/// Follows one object through the frames of a camera.
+///
+/// `pose` (4 × 4, camera ← object [m]) is where to begin; without it the first frame is searched. `budget` [s] is what following may take in a frame.
+/// `recovery` is what is done about an object that is lost: "off", "near" (look about where it should be) or "anywhere". Of a `rig`, frames
+/// and the object are corrected already.
+#[pyclass(module = "prehend")]
+pub(crate) struct Tracker {
+    tracker: prehend_refine::tracker::Tracker,
+}
+
+/// A span of time, with what it is called.
+fn seconds(seconds: f64, what: &str) -> PyResult<Duration> {
+    Duration::try_from_secs_f64(seconds).map_err(|e| wrong(format!("{what}: {e}")))
+}
+
+#[pymethods]
+impl Tracker {
+    #[new]
+    #[pyo3(signature = (object, hand=None, *, pose=None, rig=None, budget=None, recovery="anywhere"))]
+    fn new(
+        object: &Object,
+        hand: Option<&Hand>,
+        pose: Option<Numbers<'_>>,
+        rig: Option<&Rig>,
+        budget: Option<f64>,
+        recovery: &str,
+    ) -> PyResult<Self> {
+        let recovery: Recovery = recovery.parse().raise()?;
+        let budget = budget.map(|budget| seconds(budget, "budget")).transpose()?;
+        let settings = TrackerSettings { budget, recovery, ..TrackerSettings::default() };
+        let hand = hand.map(|hand| Arc::clone(&hand.hand));
+        let object = Arc::clone(&object.object);
+        let mut tracker = prehend_refine::tracker::Tracker::new(object, hand, settings).raise()?;
+        if let Some(rig) = rig {
+            tracker = tracker.with_rig(Arc::clone(&rig.rig));
+        }
+        if let Some(pose) = pose {
+            tracker.start_from(&self::pose(&pose, "pose")?);
+        }
+        Ok(Self { tracker })
+    }
+
+    /// The pose in the next frame, taken at `time` [s] from any moment: a `Tracked`. A frame without a mask, or with an empty one, shows nothing of
+    /// the object, which is then where it should be. The tracker is as it was before, if this fails.
+    fn push<'py>(
+        &mut self,
+        py: Python<'py>,
+        frame: &Frame,
+        time: f64,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let time = seconds(time, "time")?;
+        let tracked = py.detach(|| self.tracker.track(&frame.input.observation, time)).raise()?;
+        estimate::tracked(py, &tracked)
+    }
+
+    /// Forgets all, and begins anew at a pose (4 × 4, camera ← object [m]) in the next frame.
+    fn start_from(&mut self, pose: Numbers<'_>) -> PyResult<()> {
+        self.tracker.start_from(&self::pose(&pose, "pose")?);
+        Ok(())
+    }
+}

@@ -1,0 +1,119 @@
+"""Refinement of the pose of an object held in a robot hand, from RGB-D, touch and physics.
+
+Poses are matrices of 4 × 4 that map coordinates of the object, or of the hand's base, into those of the camera [m]: x right, y down, z forward, as OpenCV
+has it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ._prehend import Frame, Hand, Mesh, Object, Rig
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """A refined pose, and what is known of how good it is. Only the fused methods know more than the pose."""
+
+    pose: NDArray[np.float64]
+    """4 × 4, camera ← object [m]."""
+    covariance: NDArray[np.float64] | None = None
+    """6 × 6, of the pose's error as a small motion in the axes of the camera: first the displacement of the object's center (`Object.center`) along x, y, z
+    [m], then the rotation about x, y, z through that center [rad]. The true pose is the motion applied after `pose`."""
+    probability: float | None = None
+    """That model, data and pose are right, the last within 5 mm and 5° of the true one."""
+    hypotheses: list[tuple[NDArray[np.float64], float]] = field(default_factory=list)
+    """The poses that the search came upon (4 × 4), each with its share of the posterior; the first is `pose`."""
+    warnings: list[str] = field(default_factory=list)
+    """What looks wrong with object, frame and initial pose."""
+    fit: float | None = None
+    """Probability that model and data are right, where that was asked."""
+    misfits: list[tuple[str, float]] = field(default_factory=list)
+    """What fits worse than it does for right poses, and by how many standard deviations."""
+    disagreements: list[tuple[str, float]] = field(default_factory=list)
+    """Evidence that would rather have the pose elsewhere, and by how many standard deviations beyond chance."""
+    unobserved: list[float] = field(default_factory=list)
+    """Standard deviations of surface motion along directions that the evidence says hardly anything of [m]."""
+    exact: bool = False
+    """Whether all calibrations were found to be exact, and believed to be so."""
+    ending: str = ""
+    """Why the search ended."""
+    iterations: int = 0
+    """Iterations done."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tracked:
+    """What became of a frame of a `Tracker`."""
+
+    pose: NDArray[np.float64]
+    """4 × 4, camera ← object [m]."""
+    status: str
+    """"followed" (from the frame before), "found" (anew), "predicted" (no time to look), or "lost"; of the last two the pose is where the object should be."""
+    covariance: NDArray[np.float64] | None = None
+    """As of `Estimate`, unless the pose was only predicted."""
+    probability: float | None = None
+    """That the pose is within 5 mm and 5° of the true one, unless it was only predicted."""
+    hypotheses: list[tuple[NDArray[np.float64], float]] = field(default_factory=list)
+    """As of `Estimate`."""
+    doubt: str | None = None
+    """Why the object was not followed, if that was tried."""
+    iterations: int = 0
+    """Steps that lowered the cost."""
+    seconds: float = 0.0
+    """Time that it took [s]."""
+
+
+def refine(
+    rgb: ArrayLike,
+    depth: ArrayLike,
+    K: ArrayLike,
+    mesh: Mesh | Object,
+    pose: ArrayLike,
+    *,
+    mask: ArrayLike | None = None,
+    hand: Hand | None = None,
+    hand_pose: ArrayLike | None = None,
+    joints: Mapping[str, float] | ArrayLike | None = None,
+    touch: ArrayLike | None = None,
+    gravity: ArrayLike | None = None,
+    depth_scale: float | None = None,
+    lens: tuple[str, Sequence[float]] | None = None,
+    rig: Rig | None = None,
+    method: str = "fused",
+    iterations: int | None = None,
+    rivals: ArrayLike | None = None,
+) -> Estimate:
+    """Refines the pose of an object in one frame: `Frame(...)` and its `refine`, whose documentation says what arguments are.
+
+    A mesh is prepared anew in each call, with a mass that is assumed; make an `Object` of it to do so once.
+
+    >>> import prehend
+    >>> frame, initial, truth = prehend.example_frame(1)
+    >>> estimate = prehend.refine(
+    ...     frame.rgb, frame.depth, frame.K, frame.object, initial, mask=frame.mask, hand=frame.hand,
+    ...     hand_pose=frame.hand_pose, joints=frame.joints, touch=frame.touch, gravity=frame.gravity)
+    >>> bool(np.linalg.norm(estimate.pose[:3, 3] - truth[:3, 3]) < 1e-3)
+    True
+    """
+    frame = Frame(
+        rgb,
+        depth,
+        K,
+        mesh,
+        mask=mask,
+        hand=hand,
+        hand_pose=hand_pose,
+        joints=joints,
+        touch=touch,
+        gravity=gravity,
+        depth_scale=depth_scale,
+        lens=lens,
+        rig=rig,
+    )
+    estimate: Estimate = frame.refine(pose, method=method, iterations=iterations, rivals=rivals)
+    return estimate

@@ -1,0 +1,354 @@
+"""Refinement: of made-up frames, and of those of the data folder that PREHEND_DATA names, where there is one."""
+
+import json
+import os
+import pickle
+import shutil
+import subprocess
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import prehend
+from prehend.datasets import Bop, Result, read_results, write_results
+
+DATA = Path(os.environ.get("PREHEND_DATA", "")) / "mujoco"
+needs_data = pytest.mark.skipif(
+    not os.environ.get("PREHEND_DATA") or not DATA.is_dir(), reason="PREHEND_DATA names no data"
+)
+SCENE, IMAGE, OBJECT = 4, 0, 4
+
+
+@pytest.fixture(scope="module")
+def example():
+    return prehend.example_frame(1)
+
+
+@pytest.fixture(scope="module")
+def refined(example):
+    frame, initial, _ = example
+    return frame.refine(initial)
+
+
+def inputs(frame, **changed):
+    """The arguments of a frame, some of them changed."""
+    names = ["rgb", "depth", "K", "object", "mask", "hand", "hand_pose", "joints", "touch", "gravity"]
+    return {name: getattr(frame, name) for name in names} | changed
+
+
+def error(pose, truth, center):
+    """Displacement of a point of the object, and rotation vector, from a pose to the true one."""
+    place = np.append(center, 1.0)
+    turn = truth[:3, :3] @ pose[:3, :3].T
+    angle = np.arccos(np.clip((np.trace(turn) - 1) / 2, -1, 1))
+    axis = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
+    return np.concatenate([((truth - pose) @ place)[:3], axis * (0.5 * angle / np.sin(angle))])
+
+
+def test_a_made_up_frame_is_refined(example, refined):
+    frame, initial, truth = example
+    before = np.linalg.norm(initial[:3, 3] - truth[:3, 3])
+    after = np.linalg.norm(refined.pose[:3, 3] - truth[:3, 3])
+    assert before > 5e-3 and after < 1e-3
+    assert refined.pose.shape == (4, 4) and refined.pose.dtype == np.float64
+    assert 0.9 < refined.probability <= 1.0
+    assert refined.ending and refined.iterations > 0
+    best, share = refined.hypotheses[0]
+    assert (best == refined.pose).all() and 0.5 < share <= 1.0
+    assert sum(share for _, share in refined.hypotheses) == pytest.approx(1.0)
+
+
+def test_the_covariance_is_in_the_order_and_frame_that_are_documented(example, refined):
+    frame, _, truth = example
+    covariance = refined.covariance
+    assert covariance.shape == (6, 6) and np.allclose(covariance, covariance.T)
+    assert (np.linalg.eigvalsh(covariance) > 0).all()
+    off = error(refined.pose, truth, frame.object.center)
+    assert off @ np.linalg.solve(covariance, off) < 5.0**2
+    # Millimeters and degrees: in another order they would not be.
+    assert (np.sqrt(np.diag(covariance)[:3]) < 5e-3).all()
+
+
+def test_arrays_and_a_frame_are_the_same(example, refined):
+    frame, initial, _ = example
+    # The pose of the hand is read from a matrix, so the last digits may differ.
+    given = inputs(frame)
+    mesh = given.pop("object")
+    estimate = prehend.refine(**given, mesh=mesh, pose=initial)
+    assert np.abs(estimate.pose - refined.pose).max() < 1e-6
+    ordered = prehend.Frame(**inputs(frame, joints=list(frame.joints.values())))
+    assert ordered.joints == frame.joints
+    strided = prehend.Frame(
+        **inputs(
+            frame,
+            rgb=np.asfortranarray(frame.rgb),
+            depth=np.repeat(frame.depth, 2, axis=1)[:, ::2].astype(np.float64),
+            mask=255 * frame.mask.astype(np.uint8),
+        )
+    )
+    for name in ["rgb", "depth", "mask"]:
+        assert (getattr(strided, name) == getattr(frame, name)).all(), name
+
+
+def test_whole_numbers_of_depth_have_a_scale(example):
+    frame, _, _ = example
+    units = np.round(frame.depth / 1e-4).astype(np.uint16)
+    read = prehend.Frame(**inputs(frame, depth=units, depth_scale=1e-4)).depth
+    assert (read == (units.astype(np.float64) * 1e-4).astype(np.float32)).all()
+    holes = frame.depth.copy()
+    holes[:10], holes[10:20] = np.nan, -1.0
+    assert not prehend.Frame(**inputs(frame, depth=holes)).depth[:20].any()
+
+
+def test_less_may_be_known(example):
+    frame, initial, truth = example
+    only = prehend.Frame(frame.rgb, frame.depth, frame.K, frame.object.mesh, mask=frame.mask)
+    assert (only.hand, only.joints, only.touch, only.gravity, only.ids) == (None,) * 5
+    estimate = only.refine(initial, method="robust-icp")
+    assert estimate.covariance is None and estimate.probability is None and estimate.hypotheses == []
+    assert np.linalg.norm(estimate.pose[:3, 3] - truth[:3, 3]) < 5e-3
+    assert "robust-icp" in prehend.methods()
+    # Gradients without evidence drop out of the paper's method.
+    few = only.refine(initial, method="combined", iterations=3)
+    assert few.iterations == 3
+
+
+@pytest.mark.parametrize(
+    "changed, text",
+    [
+        ({"rgb": np.zeros((4, 4), np.uint8)}, "rgb: an array of H × W × 3 of uint8"),
+        ({"rgb": np.zeros((480, 640, 3))}, "rgb: .* of float64"),
+        ({"depth": np.zeros((4, 4, 1))}, "depth: an array of H × W is expected"),
+        ({"depth": np.zeros((4, 4))}, "the depth image has 4x4 pixels, the camera has 640x480"),
+        ({"depth": np.zeros((480, 640), np.uint16)}, "whole numbers need depth_scale"),
+        ({"depth": np.zeros((480, 640), np.uint16), "depth_scale": -1}, "depth_scale: -1"),
+        ({"depth": np.zeros((480, 640), complex)}, "depth: numbers are expected, not complex128"),
+        ({"mask": np.zeros((480, 640))}, "mask: booleans or whole numbers"),
+        ({"mask": np.zeros((4, 4), bool)}, "the mask has 4x4 pixels"),
+        ({"K": np.eye(4)}, "K: a matrix of 3 × 3"),
+        ({"K": np.zeros((3, 3))}, "K: "),
+        ({"hand": None}, "hand, hand_pose and joints: each needs the others"),
+        ({"hand_pose": 2 * np.eye(4)}, "hand_pose: the matrix's last row"),
+        ({"hand_pose": np.diag([2.0, 1, 1, 1])}, "hand_pose: not orthonormal"),
+        ({"joints": [0.0]}, "joint"),
+        ({"joints": {"elbow": 0.0}}, "elbow"),
+        ({"touch": np.zeros((2, 3))}, "2 taxel forces were given for"),
+        ({"touch": np.zeros(3)}, "touch: an array of n × 3"),
+        ({"gravity": [0, 0, 9810.0]}, "gravity: .* is no gravity"),
+        ({"lens": ("pinhole", [])}, "pinhole"),
+    ],
+)
+def test_what_cannot_be_is_named(example, changed, text):
+    with pytest.raises(prehend.Error, match=text):
+        prehend.Frame(**inputs(example[0], **changed))
+
+
+def test_a_frame_that_cannot_be_refined_says_why(example):
+    frame, initial, _ = example
+    with pytest.raises(prehend.Error, match="method: 'guess' is unknown: one of combined|fused"):
+        frame.refine(initial, method="guess")
+    with pytest.raises(prehend.Error, match="pose: a matrix of 4 × 4"):
+        frame.refine(initial[:3])
+    with pytest.raises(prehend.Error, match="pose: value 0 is not finite"):
+        frame.refine(np.where(initial == initial[0, 0], np.nan, initial))
+    behind = initial.copy()
+    behind[2, 3] = -1.0
+    with pytest.raises(prehend.Error, match="behind the camera"):
+        frame.refine(behind)
+    with pytest.raises(prehend.Error, match="mask is empty"):
+        prehend.Frame(**inputs(frame, mask=None)).refine(initial)
+    assert any("behind the camera" in text for text in frame.warnings(behind))
+
+
+def test_objects_and_meshes(tmp_path):
+    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
+    faces = [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4]]
+    faces += [[1, 5, 7], [1, 7, 3]]
+    box = prehend.Mesh(0.1 * corners, faces, colors=corners)
+    assert (box.faces == faces).all() and (box.vertices == 0.1 * corners).all()
+    assert repr(box) == "Mesh(8 vertices, 12 faces, colors)"
+    assert prehend.Object(box, density=1000).mass == pytest.approx(1.0)
+    assert prehend.Object(box, mass=0.3).mass == pytest.approx(0.3)
+    assert "assumed" in repr(prehend.Object(box, name="box"))
+    whole = prehend.Object(box, mass=0.3, com=[0.05] * 3, inertia=[1e-3] * 3)
+    assert np.allclose(whole.center, 0.05) and repr(whole) == "Object('object', 0.300 kg)"
+    off = tmp_path / "box.obj"
+    lines = [f"v {x} {y} {z}" for x, y, z in 100 * corners]
+    off.write_text("\n".join(lines + [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in faces]))
+    assert np.allclose(prehend.Mesh.load(off, scale=1e-3).vertices.max(0), 0.1)
+    with pytest.raises(prehend.Error, match="not closed"):
+        prehend.Object(prehend.Mesh(corners, faces[:5]))
+    with pytest.raises(prehend.Error, match="give one of mass, density"):
+        prehend.Object(box, mass=1.0, density=1.0)
+    with pytest.raises(prehend.Error, match="there is no vertex 9"):
+        prehend.Mesh(corners, [[0, 1, 9]])
+    with pytest.raises(prehend.Error, match="colors: they are not all between"):
+        prehend.Mesh(corners, faces, colors=255 * corners)
+    with pytest.raises(prehend.Error, match="missing.ply"):
+        prehend.Mesh.load(tmp_path / "missing.ply")
+    with pytest.raises(prehend.Error, match="missing.urdf"):
+        prehend.Hand(tmp_path / "missing.urdf")
+
+
+def test_other_threads_run_while_a_frame_is_refined(example, refined):
+    frame, initial, _ = example
+    found = []
+    worker = threading.Thread(target=lambda: found.append(frame.refine(initial)))
+    ticks = 0
+    worker.start()
+    while worker.is_alive():
+        time.sleep(1e-3)
+        ticks += 1
+    worker.join()
+    # With Python's lock held it would be one or two.
+    assert ticks > 10
+    both = [threading.Thread(target=lambda: found.append(frame.refine(initial))) for _ in range(2)]
+    [thread.start() for thread in both]
+    [thread.join() for thread in both]
+    assert len(found) == 3
+    assert all((estimate.pose == refined.pose).all() for estimate in found)
+
+
+def test_a_bad_frame_loses_no_other(example, refined):
+    frame, initial, _ = example
+    blind = prehend.Frame(**inputs(frame, mask=None))
+    for threads in (None, 1, 2):
+        first, second, third = prehend.refine_batch([frame, blind, frame], [initial] * 3, threads=threads)
+        assert isinstance(second, prehend.Error) and "mask is empty" in str(second)
+        for estimate in (first, third):
+            assert (estimate.pose == refined.pose).all()
+            assert (estimate.covariance == refined.covariance).all()
+            assert estimate.probability == refined.probability
+            assert estimate.warnings == refined.warnings
+    assert prehend.refine_batch([], []) == []
+    with pytest.raises(prehend.Error, match="poses: 2 are expected, one a frame, not 1"):
+        prehend.refine_batch([frame, frame], [initial])
+    with pytest.raises(prehend.Error, match=r"poses\[1\]: not orthonormal"):
+        prehend.refine_batch([frame, frame], [initial, np.diag([2.0, 1, 1, 1])])
+
+
+def test_estimates_can_be_sent_to_other_processes(refined):
+    again = pickle.loads(pickle.dumps(refined))
+    assert (again.pose == refined.pose).all() and again.probability == refined.probability
+
+
+def test_an_object_is_followed():
+    initial, frames = prehend.example_sequence(1, 4)
+    first = frames[0][0]
+    tracker = prehend.Tracker(first.object, first.hand, pose=initial)
+    followed = [tracker.push(frame, at) for frame, at, _ in frames]
+    assert [tracked.status for tracked in followed] == ["found"] + ["followed"] * 3
+    for tracked, (_, _, truth) in zip(followed, frames, strict=True):
+        assert np.linalg.norm(tracked.pose[:3, 3] - truth[:3, 3]) < 3e-3
+        assert tracked.covariance.shape == (6, 6) and tracked.probability > 0.5
+        assert tracked.seconds > 0
+    blind = prehend.Frame(**inputs(frames[-1][0], mask=None))
+    lost = tracker.push(blind, 0.2)
+    assert (lost.status, lost.covariance, lost.doubt) == ("lost", None, "nothing of the object is seen")
+    tracker.start_from(frames[0][2])
+    assert tracker.push(first, 0.0).status == "found"
+    with pytest.raises(prehend.Error, match="recovery"):
+        prehend.Tracker(first.object, recovery="far")
+    with pytest.raises(prehend.Error, match="budget"):
+        prehend.Tracker(first.object, budget=-1.0)
+    with pytest.raises(prehend.Error, match="time"):
+        tracker.push(first, float("nan"))
+    with pytest.raises(prehend.Error, match="mask is empty"):
+        prehend.Tracker(first.object, first.hand, pose=initial).push(blind, 0.0)
+
+
+def test_results_files(tmp_path):
+    file = tmp_path / "poses.csv"
+    pose = np.eye(4)
+    pose[:3, 3] = [0.1, -1 / 3, 0.7]
+    write_results(file, [Result(1, 2, 3, pose, 0.5), Result(1, 2, 4, pose, 0.25, 0.1)])
+    first, second = read_results(file)
+    assert first.ids == (1, 2, 3, 0) and second.ids == (1, 2, 4, 1)
+    assert (first.score, first.time, second.time) == (0.5, -1.0, 0.1)
+    assert np.abs(first.pose - pose).max() < 1e-15
+    file.write_text("1,2,3,0.5,1 0 0 0 1 0 0 0,0 0 500,-1\n")
+    with pytest.raises(prehend.Error, match="poses.csv: line 1"):
+        read_results(file)
+    with pytest.raises(prehend.Error, match="no finite matrix"):
+        write_results(file, [Result(1, 2, 3, np.full((4, 4), np.nan))])
+    with pytest.raises(prehend.Error, match="no-dataset"):
+        Bop(tmp_path / "no-dataset")
+
+
+@pytest.fixture(scope="module")
+def dataset():
+    return Bop(DATA)
+
+
+@pytest.fixture(scope="module")
+def command_line(tmp_path_factory):
+    """What the command makes of one frame: rotation, and translation [mm]."""
+    target = Path(os.environ.get("CARGO_TARGET_DIR", Path(__file__).parents[2] / "target"))
+    candidates = [
+        os.environ.get("PREHEND_COMMAND"),
+        target / "release" / "prehend",
+        target / "debug" / "prehend",
+        shutil.which("prehend"),
+    ]
+    found = [str(path) for path in candidates if path and os.access(path, os.X_OK)]
+    if not found:
+        pytest.skip("the command prehend is not built")
+    out = tmp_path_factory.mktemp("command") / "refined.csv"
+    selected = ["--scene", str(SCENE), "--image", str(IMAGE), "--object", str(OBJECT)]
+    command = [found[0], "refine", "--dataset", str(DATA), "--poses", str(DATA / "init_low.csv")]
+    subprocess.run([*command, "--out", str(out), *selected], check=True, capture_output=True)
+    cells = out.read_text().splitlines()[1].split(",")
+    rotation, place = ([float(x) for x in cells[k].split()] for k in (4, 5))
+    return np.reshape(rotation, (3, 3)), np.array(place), float(cells[3])
+
+
+@needs_data
+def test_a_frame_of_a_dataset_is_refined_as_by_the_command(dataset, command_line):
+    initial = read_results(DATA / "init_low.csv")[0]
+    assert initial.ids == (SCENE, IMAGE, OBJECT, 0)
+    frame = dataset.frame(*initial.ids)
+    assert frame.ids == (SCENE, IMAGE, OBJECT)
+    estimate = frame.refine(initial.pose)
+    rotation, place, score = command_line
+    assert (estimate.pose[:3, :3] == rotation).all()
+    assert (estimate.pose[:3, 3] * 1000.0 == place).all()
+    assert estimate.probability == score
+    truth = dataset.true_pose(frame)
+    assert np.linalg.norm(estimate.pose[:3, 3] - truth[:3, 3]) < 1e-3
+
+
+@needs_data
+def test_arrays_of_a_dataset_are_refined_as_by_the_command(dataset, command_line):
+    initial = read_results(DATA / "init_low.csv")[0]
+    frame = dataset.frame(*initial.ids)
+    # From the file: a matrix of the frame's would be rounded once more.
+    scene = next((DATA / "test").glob(f"*{SCENE:04}"))
+    body = json.loads((scene / "scene_bodies.json").read_text())[str(IMAGE)]["bodies"][0]
+    hand_pose = np.eye(4)
+    hand_pose[:3, :3] = np.reshape(body["cam_R_b2c"], (3, 3))
+    hand_pose[:3, 3] = np.array(body["cam_t_b2c"]) / 1000.0
+    hand = prehend.Hand(DATA / body["urdf"], DATA / "hand" / "taxels.csv")
+    given = inputs(frame, hand=hand, hand_pose=hand_pose, joints=body["joints"])
+    mesh = given.pop("object")
+    estimate = prehend.refine(**given, mesh=mesh, pose=initial.pose)
+    rotation, place, _ = command_line
+    assert (estimate.pose[:3, :3] == rotation).all()
+    assert (estimate.pose[:3, 3] * 1000.0 == place).all()
+
+
+@needs_data
+def test_a_dataset_is_iterated(dataset):
+    targets = dataset.targets()
+    assert len(dataset) == len(targets) == 36
+    assert targets[0][:3] == (SCENE, IMAGE, OBJECT)
+    frame = next(iter(dataset))
+    assert frame.ids == targets[0][:3]
+    assert frame.rgb.shape == (*frame.depth.shape, 3) and frame.mask.any()
+    assert frame.touch.shape == (len(frame.hand.taxels), 3)
+    assert frame.object.mass == dataset.object(OBJECT).mass
+    assert OBJECT in dataset.objects and SCENE in dataset.scenes
+    with pytest.raises(prehend.Error, match="no scene 999"):
+        dataset.frame(999, 0, OBJECT)
