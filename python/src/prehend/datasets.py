@@ -41,9 +41,10 @@ class Bop(Dataset):
         in all images, or else all that `scene_gt.json` says is there.
         """
         try:
-            return self._listed()
+            listed: list[tuple[int, int, int, int]] = self._listed()
+            return listed
         except Error as error:
-            found = []
+            found: list[tuple[int, int, int, int]] = []
             for scene in self.scenes:
                 for image in self.images(scene):
                     try:
@@ -58,7 +59,8 @@ class Bop(Dataset):
         if frame.ids is None:
             raise Error("the frame is of no dataset")
         scene, image, wanted = frame.ids
-        poses = [pose for number, pose in self.truth(scene, image) if number == wanted]
+        truth: list[tuple[int, NDArray[np.float64]]] = self.truth(scene, image)
+        poses = [pose for number, pose in truth if number == wanted]
         if not poses:
             raise Error(f"scene {scene} image {image}: there is no object {wanted}")
         return poses[0]

@@ -58,8 +58,9 @@ def evaluate(dataset: Bop, poses: Poses) -> Scores:
     rows, stacked = _rows(poses)
     ids = [row.ids[:3] for row in rows]
     columns, values, mean, median, failures = _score(dataset, ids, stacked)
-    named = [dict(zip(columns, numbers.tolist(), strict=True)) for numbers in (mean, median)]
-    return Scores(columns, values, *named, rows=rows, failures=dict(failures))
+    means = dict(zip(columns, mean.tolist(), strict=True))
+    medians = dict(zip(columns, median.tolist(), strict=True))
+    return Scores(columns, values, means, medians, rows, dict(failures))
 
 
 def calibrate(
