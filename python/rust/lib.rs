@@ -7,6 +7,7 @@ mod integrator;
 mod link;
 mod python_law;
 mod refine;
+mod render;
 mod robot;
 mod rollout;
 mod shape;
@@ -26,6 +27,16 @@ mod _prehend {
         _calibrate, _score, Dataset, Frame, Hand, Mesh, Object, Rig, Tracker, example_frame,
         example_sequence, methods, refine_batch,
     };
+    #[pymodule_export]
+    use super::render::light::{ambient_light, headlight};
+    #[pymodule_export]
+    use super::render::pose::perturb;
+    #[pymodule_export]
+    use super::render::pose_loss::PoseLoss;
+    #[pymodule_export]
+    use super::render::pullback::RenderPullback;
+    #[pymodule_export]
+    use super::render::renderer::Renderer;
     #[pymodule_export]
     use super::robot::Robot;
     #[pymodule_export]

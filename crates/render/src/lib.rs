@@ -57,7 +57,7 @@ pub use pose_loss::{
 pub use raster::depth_map;
 pub use renderer::{
     BufferAdjoints, BufferVars, Buffers, FaceId, ObjectGradient, PosedModel, RecordError, Renderer,
-    Rendering, Scene, SceneGradient, SceneVars,
+    Rendering, Scene, SceneGradient, SceneVars, render_each, vjp_each,
 };
 pub use scene::{SceneImage, render_scene};
 pub use shading::{Lamp, Lighting, Material, Shader, SurfacePoint};

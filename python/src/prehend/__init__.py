@@ -4,24 +4,38 @@ Lengths are in m, angles in rad, times in s, masses in kg; arrays are NumPy's, i
 """
 
 from . import datasets
-from ._prehend import Error, Link, Robot, Rollout, Shape, World, contact_laws, joint_laws
 from ._prehend import (
+    Error,
     Frame,
     Hand,
+    Link,
     Mesh,
     Object,
+    PoseLoss,
+    Renderer,
+    RenderPullback,
     Rig,
+    Robot,
+    Rollout,
+    Shape,
     Tracker,
+    World,
+    ambient_light,
+    contact_laws,
     example_frame,
     example_sequence,
+    headlight,
+    joint_laws,
     methods,
+    perturb,
     refine_batch,
 )
 from ._version import __version__
 from .columns import ANGULAR_VELOCITY, POSITION, QUATERNION, VELOCITY
 from .evaluation import Scores, calibrate, evaluate
-from .pullback import Pullback, vjp
+from .pullback import Gradient, Pullback, vjp
 from .refinement import Estimate, Tracked, refine
+from .render import Image, LinearizedLoss, RenderGradient
 
 __all__ = [
     "ANGULAR_VELOCITY",
@@ -31,11 +45,18 @@ __all__ = [
     "Error",
     "Estimate",
     "Frame",
+    "Gradient",
     "Hand",
+    "Image",
+    "LinearizedLoss",
     "Link",
     "Mesh",
     "Object",
+    "PoseLoss",
     "Pullback",
+    "RenderGradient",
+    "RenderPullback",
+    "Renderer",
     "Rig",
     "Robot",
     "Rollout",
@@ -45,14 +66,17 @@ __all__ = [
     "Tracker",
     "World",
     "__version__",
+    "ambient_light",
     "calibrate",
     "contact_laws",
     "datasets",
     "evaluate",
     "example_frame",
     "example_sequence",
+    "headlight",
     "joint_laws",
     "methods",
+    "perturb",
     "refine",
     "refine_batch",
     "vjp",

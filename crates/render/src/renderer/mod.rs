@@ -8,6 +8,7 @@
 
 mod buffers;
 mod contour;
+mod each;
 mod fragment;
 mod frame;
 mod geometry;
@@ -25,6 +26,7 @@ mod visibility;
 use rayon::prelude::*;
 
 pub use buffers::{BufferAdjoints, Buffers};
+pub use each::{render_each, vjp_each};
 pub use gradient::{ObjectGradient, SceneGradient};
 pub use node::{BufferVars, RecordError, SceneVars};
 pub use scene::{FaceId, PosedModel, Scene};

@@ -1,0 +1,287 @@
+//! The renderer: pictures of a mesh as functions of arrays.
+
+use std::sync::Arc;
+
+use nalgebra::Point3;
+use numpy::ndarray::IxDyn;
+use numpy::{PyArray, PyArrayMethods};
+use prehend_render::{Camera, Light, Mode, RenderModel, Rendering, Scene, render_each};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use super::camera::{camera, with_intrinsics};
+use super::inputs::{Input, batch_of};
+use super::light::{light, to_array};
+use super::mesh::{Look, model, single};
+use super::mode::mode;
+use super::pose::pose;
+use super::pullback::{RenderPullback, picture};
+use crate::arrays::{Numbers, array, vector_or};
+use crate::error::{Raise, wrong};
+
+type Array<'py> = Bound<'py, PyArray<f64, IxDyn>>;
+
+/// Pictures of a mesh, with derivatives by its pose and by all that makes them.
+///
+/// `mesh` is the path of a file (OBJ, PLY, STL, glTF), or vertices (n × 3, m) and faces (m × 3, counter-clockwise seen from outside). `K` is the
+/// camera matrix (3 × 3, px; pixel centers at whole numbers), `size` the rows and columns (H, W) of the pictures. Colors of vertices
+/// (`colors`, n × 3), or a `texture` (H × W × 3, bytes or 0..1; `uvs`, n × 2, v upwards), take the place of the mesh's own; without any it is gray.
+/// `light` is an array of 3 × 5 (`ambient_light`, the default, and `headlight` make some), `background` a color.
+///
+/// `mode` is "contour", sharp and exact (settings `half_width` of the band across outlines, px, and `creases`), or "softras", the
+/// soft rasterizer in the form of PyTorch3D (`sigma`, `gamma`, `blur_radius`, `faces_per_pixel`, `z_near`, `z_far`, `perspective_correct`,
+/// `clip_barycentric`, `cull_backfaces`).
+///
+/// Vertices of the mesh at one place are one: `vertices` and `faces` are those that the renderer has. Shapes and colors are kept in single precision, all else is
+/// computed in double.
+#[pyclass(frozen, module = "prehend")]
+pub(crate) struct Renderer {
+    model: Arc<RenderModel>,
+    camera: Camera,
+    mode: Mode,
+    light: Light,
+    background: [f64; 3],
+}
+
+/// What pictures can be made with, each once for all, or a batch.
+struct Inputs<'a> {
+    pose: Input<'a>,
+    /// In the order of [`NAMES`].
+    others: [Option<Input<'a>>; 6],
+    batch: Option<usize>,
+}
+
+/// Inputs after the pose.
+const NAMES: [&str; 6] = ["vertices", "colors", "texels", "light", "background", "intrinsics"];
+
+impl Renderer {
+    fn inputs<'a>(
+        &self,
+        pose: &'a Numbers<'_>,
+        others: [&'a Option<Numbers<'_>>; 6],
+    ) -> PyResult<Inputs<'a>> {
+        let vertices = self.model.positions().len();
+        let texels = match self.model.texture() {
+            Some((width, height, _)) => vec![height, width, 3],
+            None if others[2].is_some() => return Err(wrong("texels: the mesh has no texture")),
+            None => Vec::new(),
+        };
+        let shapes: [&[usize]; 6] = [&[vertices, 3], &[vertices, 3], &texels, &[3, 5], &[3], &[4]];
+        let pose = Input::new(pose, &super::pose::SHAPE, "pose")?;
+        let mut batches = vec![("pose", pose.batch())];
+        let mut inputs = [const { None }; 6];
+        for (k, given) in others.into_iter().enumerate() {
+            if let Some(given) = given {
+                let input = Input::new(given, shapes[k], NAMES[k])?;
+                batches.push((NAMES[k], input.batch()));
+                inputs[k] = Some(input);
+            }
+        }
+        let batch = batch_of(&batches)?;
+        Ok(Inputs { pose, others: inputs, batch })
+    }
+
+    /// The model of a picture.
+    fn shaped(&self, inputs: &Inputs<'_>, picture: usize) -> PyResult<Arc<RenderModel>> {
+        let [vertices, colors, texels, ..] = &inputs.others;
+        let mut model = (*self.model).clone();
+        if let Some(vertices) = vertices {
+            let points = vertices.of(picture).as_chunks().0;
+            let points: Vec<Point3<f64>> = points.iter().map(|p: &[f64; 3]| (*p).into()).collect();
+            model = model.with_positions(&points).raise()?;
+        }
+        if let Some(colors) = colors {
+            model = model.with_colors(&single(colors.of(picture))).raise()?;
+        }
+        if let Some(texels) = texels {
+            model = model.with_texels(single(texels.of(picture))).raise()?;
+        }
+        Ok(Arc::new(model))
+    }
+
+    fn scenes(&self, inputs: &Inputs<'_>) -> PyResult<Vec<(Scene, Light)>> {
+        let [vertices, colors, texels, lights, backgrounds, intrinsics] = &inputs.others;
+        let shapes = [vertices, colors, texels].map(Option::as_ref);
+        let varied = shapes.into_iter().flatten().any(|input| input.batch().is_some());
+        let mut model = self.model.clone();
+        let mut scenes = Vec::new();
+        for picture in 0..inputs.batch.unwrap_or(1) {
+            if varied || (picture == 0 && shapes.iter().any(Option::is_some)) {
+                model = self.shaped(inputs, picture)?;
+            }
+            let mut camera = self.camera;
+            if let Some(own) = intrinsics {
+                camera = with_intrinsics(&camera, own.of(picture))?;
+            }
+            let mut scene = Scene::new(camera);
+            scene.background = match backgrounds.as_ref().map(|own| own.of(picture)) {
+                Some([r, g, b]) => [*r, *g, *b],
+                _ => self.background,
+            };
+            let pose = pose(inputs.pose.of(picture), "pose")?;
+            let light = lights.as_ref().map_or(self.light, |own| light(own.of(picture)));
+            scenes.push((scene.with(model.clone(), pose), light));
+        }
+        Ok(scenes)
+    }
+
+    /// The pictures, and what carries derivatives back.
+    fn rendered(
+        &self,
+        py: Python<'_>,
+        pose: &Numbers<'_>,
+        others: [&Option<Numbers<'_>>; 6],
+    ) -> PyResult<(Vec<Rendering<Light>>, RenderPullback)> {
+        let inputs = self.inputs(pose, others)?;
+        let scenes = self.scenes(&inputs)?;
+        let renderings = py.detach(|| render_each(self.mode, &scenes));
+        let mut batched = vec![Some(inputs.pose.batch().is_some())];
+        let of = |input: &Option<Input<'_>>| input.as_ref().map(|own| own.batch().is_some());
+        batched.extend(inputs.others.iter().map(of));
+        let scenes = scenes.into_iter().map(|(scene, _)| scene).collect();
+        let pullback = RenderPullback::new(scenes, batched, inputs.batch.is_some());
+        Ok((renderings, pullback))
+    }
+}
+
+#[pymethods]
+impl Renderer {
+    #[new]
+    #[pyo3(signature = (mesh, K, size, *, colors=None, uvs=None, texture=None, light=None, background=None, mode="contour", **settings))]
+    #[expect(non_snake_case, clippy::too_many_arguments)] // Python's own
+    fn new(
+        mesh: &Bound<'_, PyAny>,
+        K: Numbers<'_>,
+        size: (usize, usize),
+        colors: Option<Numbers<'_>>,
+        uvs: Option<Numbers<'_>>,
+        texture: Option<Bound<'_, PyAny>>,
+        light: Option<Numbers<'_>>,
+        background: Option<Numbers<'_>>,
+        mode: &str,
+        settings: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Self> {
+        Ok(Self {
+            model: model(mesh, &Look { colors, uvs, texture })?,
+            camera: camera(&K, size)?,
+            mode: self::mode(mode, settings)?,
+            light: super::light::given(light.as_ref())?,
+            background: vector_or(background.as_ref(), [0.0; 3], "background")?.into(),
+        })
+    }
+
+    /// The picture of the mesh at `pose`, mesh to camera frame (4 × 4; x right, y down, z forward, m): its color (H, W, 3), coverage (H, W; 0..1), depth
+    /// (H, W; m, 0 where there is nothing) and normal (H, W, 3; camera frame, zero where there is nothing).
+    ///
+    /// `vertices` (n × 3, m), `colors` (n × 3), `texels` (H × W × 3), `light` (3 × 5), `background` (3) and `intrinsics` (fx, fy, cx, cy; px) take
+    /// the place of the renderer's own. With one more dimension in front, inputs are a batch; those without are the same for all its
+    /// pictures, which are rendered side by side on all cores. What the matrix's upper left block lacks of a rotation, 1e-4 at most, is taken out: the
+    /// nearest rotation counts.
+    #[pyo3(signature = (pose, *, vertices=None, colors=None, texels=None, light=None, background=None, intrinsics=None))]
+    #[expect(clippy::too_many_arguments)] // Python's own
+    fn render<'py>(
+        &self,
+        py: Python<'py>,
+        pose: Numbers<'py>,
+        vertices: Option<Numbers<'py>>,
+        colors: Option<Numbers<'py>>,
+        texels: Option<Numbers<'py>>,
+        light: Option<Numbers<'py>>,
+        background: Option<Numbers<'py>>,
+        intrinsics: Option<Numbers<'py>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let others = [&vertices, &colors, &texels, &light, &background, &intrinsics];
+        let (renderings, pullback) = self.rendered(py, &pose, others)?;
+        picture(py, &renderings, pullback.is_batch())
+    }
+
+    /// The picture as of `render`, and its pullback, which carries derivatives of a number by the picture back to the inputs.
+    #[pyo3(signature = (pose, *, vertices=None, colors=None, texels=None, light=None, background=None, intrinsics=None))]
+    #[expect(clippy::too_many_arguments)] // Python's own
+    fn vjp<'py>(
+        &self,
+        py: Python<'py>,
+        pose: Numbers<'py>,
+        vertices: Option<Numbers<'py>>,
+        colors: Option<Numbers<'py>>,
+        texels: Option<Numbers<'py>>,
+        light: Option<Numbers<'py>>,
+        background: Option<Numbers<'py>>,
+        intrinsics: Option<Numbers<'py>>,
+    ) -> PyResult<(Bound<'py, PyAny>, RenderPullback)> {
+        let others = [&vertices, &colors, &texels, &light, &background, &intrinsics];
+        let (renderings, pullback) = self.rendered(py, &pose, others)?;
+        Ok((picture(py, &renderings, pullback.is_batch())?, pullback.of(renderings)))
+    }
+
+    /// Vertices, mesh frame (n × 3, m): those of the mesh in their order, each place once.
+    #[getter]
+    fn vertices<'py>(&self, py: Python<'py>) -> PyResult<Array<'py>> {
+        let all = self.model.positions();
+        let shape = [all.len(), 3];
+        array(py, all.iter().flat_map(|p| [p.x, p.y, p.z]).collect(), &shape)
+    }
+
+    /// The faces drawn (m × 3), as indices of `vertices`.
+    #[getter]
+    fn faces<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray<i64, IxDyn>>> {
+        let all = self.model.faces();
+        let shape = [all.len(), 3];
+        PyArray::from_vec(py, all.iter().flatten().map(|v| i64::from(*v)).collect())
+            .reshape(IxDyn(&shape))
+    }
+
+    /// Colors of `vertices` (n × 3), if the mesh is colored by vertices.
+    #[getter]
+    fn colors<'py>(&self, py: Python<'py>) -> PyResult<Option<Array<'py>>> {
+        let Some(all) = self.model.vertex_colors() else { return Ok(None) };
+        double(py, &all, &[all.len(), 3]).map(Some)
+    }
+
+    /// The texture (H × W × 3), if the mesh has one.
+    #[getter]
+    fn texels<'py>(&self, py: Python<'py>) -> PyResult<Option<Array<'py>>> {
+        let Some((width, height, all)) = self.model.texture() else { return Ok(None) };
+        double(py, all, &[height, width, 3]).map(Some)
+    }
+
+    /// The light (3 × 5).
+    #[getter]
+    fn light<'py>(&self, py: Python<'py>) -> PyResult<Array<'py>> {
+        to_array(py, &self.light)
+    }
+
+    /// The color before which the mesh is.
+    #[getter]
+    fn background<'py>(&self, py: Python<'py>) -> PyResult<Array<'py>> {
+        array(py, self.background.to_vec(), &[3])
+    }
+
+    /// fx, fy, cx and cy \[px\].
+    #[getter]
+    fn intrinsics<'py>(&self, py: Python<'py>) -> PyResult<Array<'py>> {
+        let Camera { fx, fy, cx, cy, .. } = self.camera;
+        array(py, vec![fx, fy, cx, cy], &[4])
+    }
+
+    /// Center of the mesh's bounding box, mesh frame \[m\]: twists turn about where the pose puts it.
+    #[getter]
+    fn center<'py>(&self, py: Python<'py>) -> PyResult<Array<'py>> {
+        array(py, self.model.center().iter().copied().collect(), &[3])
+    }
+
+    /// Rows and columns of the pictures.
+    #[getter]
+    fn size(&self) -> (usize, usize) {
+        (self.camera.height, self.camera.width)
+    }
+
+    fn __repr__(&self) -> String {
+        let Camera { width, height, .. } = self.camera;
+        format!("Renderer({} faces, size=({height}, {width}))", self.model.face_count())
+    }
+}
+
+fn double<'py>(py: Python<'py>, rows: &[[f32; 3]], shape: &[usize]) -> PyResult<Array<'py>> {
+    array(py, rows.as_flattened().iter().map(|v| f64::from(*v)).collect(), shape)
+}
