@@ -33,7 +33,8 @@ COLORS = RNG.uniform(0.2, 0.9, VERTICES.shape)
 LIGHT = prehend.headlight(0.4, 0.6)
 
 
-def pose(x: float = 0.01, turn: float = 0.4) -> np.ndarray:
+def pose(x: float = 0.012, turn: float = 0.37) -> np.ndarray:
+    """A pose at which no edge runs within the steps of differences by a pixel's center, where colors jump."""
     start = np.eye(4)
     start[:3, 3] = [x, -0.005, 0.4]
     return prehend.perturb(start, [0, 0, 0, turn, -0.3, 0.2], start[:3, 3])
@@ -121,7 +122,7 @@ def test_derivatives_by_the_pose_match_differences(mode: str) -> None:
 
 @pytest.mark.parametrize(
     ("name", "step"),
-    [("vertices", 1e-4), ("colors", 1e-2), ("light", 1e-4), ("background", 1e-4), ("intrinsics", 1e-5)],
+    [("vertices", 1e-5), ("colors", 1e-2), ("light", 1e-4), ("background", 1e-4), ("intrinsics", 1e-5)],
 )
 def test_derivatives_by_all_else_match_differences(name: str, step: float) -> None:
     own, at = renderer(), pose()
@@ -129,8 +130,7 @@ def test_derivatives_by_all_else_match_differences(name: str, step: float) -> No
     gradient = getattr(own.vjp(at, **{name: given})[1](*adjoints()), name)
     # Shapes and colors are kept in single precision: steps are long.
     expected = difference(lambda x: weighted(own.render(at, **{name: x})), given, step)
-    scale = np.abs(expected).max()
-    np.testing.assert_allclose(gradient, expected, rtol=0, atol=2e-3 * scale)
+    np.testing.assert_allclose(gradient, expected, rtol=0, atol=2e-4 * np.abs(expected).max())
 
 
 def test_derivatives_by_texels_match_differences() -> None:
@@ -214,7 +214,7 @@ def test_the_loss_is_least_at_the_truth() -> None:
     assert 0 <= loss(pose()) < 1e-8
     assert loss(pose(0.015)) > 1e-4
     at = pose(0.015)
-    for _ in range(8):
+    for _ in range(6):
         step = loss.linearize(at)
         at = prehend.perturb(at, -np.linalg.solve(step.hessian, step.gradient), step.center)
     np.testing.assert_allclose(at, pose(), atol=1e-5)
@@ -222,12 +222,12 @@ def test_the_loss_is_least_at_the_truth() -> None:
 
 def test_derivatives_of_the_loss_match_differences() -> None:
     loss = observed()
-    at = pose(0.013, 0.37)
+    at = pose(0.0132, 0.37)
     own = loss.linearize(at)
     assert own.value == loss(at)
     np.testing.assert_allclose(own.center, at[:3, 3], atol=1e-9)
-    by_twist = difference(lambda t: loss(prehend.perturb(at, t, own.center)), np.zeros(6), 1e-4)
-    np.testing.assert_allclose(own.gradient, by_twist, rtol=0, atol=3e-2 * np.abs(by_twist).max())
+    by_twist = difference(lambda t: loss(prehend.perturb(at, t, own.center)), np.zeros(6), 3e-5)
+    np.testing.assert_allclose(own.gradient, by_twist, rtol=0, atol=1e-3 * np.abs(by_twist).max())
     np.testing.assert_array_equal(own.hessian, own.hessian.T)
     tangent = (prehend.perturb(at, 1e-6 * np.eye(6)[4], own.center) - at) / 1e-6
     assert (tangent * own.pose).sum() == pytest.approx(own.gradient[4], rel=1e-4)
@@ -246,7 +246,8 @@ def test_a_batch_of_losses_is_each() -> None:
 
 def test_the_light_is_found() -> None:
     image = renderer().render(pose())
-    loss = prehend.PoseLoss((VERTICES, FACES), K, image.color, image.coverage > 0.5, colors=COLORS)
+    loss = prehend.PoseLoss((VERTICES, FACES), K, image.color, image.coverage, colors=COLORS)
+    # Three faces leave the light open; they do not leave open how they look.
     fitted = loss.fit_light(pose())
     assert loss(pose(), light=fitted) < 0.1 * loss(pose())
     assert loss.light.shape == (3, 5)
@@ -340,7 +341,7 @@ def test_torch_has_the_loss() -> None:
     from prehend import torch_render
 
     loss = observed()
-    poses = np.stack([pose(0.013), pose(-0.02, 0.1)])
+    poses = np.stack([pose(0.0132), pose(-0.02, 0.1)])
     at = torch.tensor(poses, requires_grad=True)
     values = torch_render.pose_loss(loss, at)
     np.testing.assert_array_equal(values.detach().numpy(), loss(poses))
@@ -416,7 +417,7 @@ def test_jax_has_the_loss() -> None:
     jax, jax_render = jax_and_render()
     loss = observed()
     function = jax_render.pose_loss(loss)
-    poses = np.stack([pose(0.013), pose(-0.02, 0.1)])
+    poses = np.stack([pose(0.0132), pose(-0.02, 0.1)])
     at = loss.linearize(poses)
     np.testing.assert_array_equal(jax.jit(function)(poses[0]), at.value[0])
     values, by = jax.jit(jax.vmap(jax.value_and_grad(function)))(poses)
