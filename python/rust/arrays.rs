@@ -12,9 +12,6 @@ use crate::error::wrong;
 /// An array of numbers, or a list of them.
 pub(crate) type Numbers<'py> = PyArrayLikeDyn<'py, f64, AllowTypeChange>;
 
-/// An array of whole numbers.
-pub(crate) type Indices<'py> = PyArrayLikeDyn<'py, i64, AllowTypeChange>;
-
 /// Its numbers in the order of C, not copied if that is how they are.
 pub(crate) fn in_order<'a, T: numpy::Element + Copy>(
     array: &'a PyArrayLikeDyn<'_, T, AllowTypeChange>,
@@ -55,12 +52,34 @@ pub(crate) fn vector_or(
     array.map_or(Ok(Vector3::from(otherwise)), |array| vector(array, what))
 }
 
-/// A symmetric matrix of 3 × 3, or its diagonal.
+/// A symmetric matrix of 3 × 3 without negative eigenvalues, or its diagonal.
 pub(crate) fn inertia(array: &Numbers<'_>) -> PyResult<Matrix3<f64>> {
     let values = in_order(array);
-    match values.len() {
-        3 => Ok(Matrix3::from_diagonal(&Vector3::from(exactly(&values, "inertia")?))),
-        _ => exactly::<9>(&values, "inertia").map(|rows| Matrix3::from_row_slice(&rows)),
+    let matrix = match values.len() {
+        3 => Matrix3::from_diagonal(&Vector3::from(exactly(&values, "inertia")?)),
+        _ => Matrix3::from_row_slice(&exactly::<9>(&values, "inertia")?),
+    };
+    let size = matrix.amax();
+    let symmetric = (matrix - matrix.transpose()).amax() <= 1e-9 * size;
+    match symmetric && matrix.symmetric_eigenvalues().min() >= -1e-9 * size {
+        true => Ok(0.5 * (matrix + matrix.transpose())),
+        false => Err(wrong("inertia: a symmetric matrix without negative eigenvalues is expected")),
+    }
+}
+
+/// Triples of places among `count`, the faces of a mesh.
+pub(crate) fn faces(array: &Numbers<'_>, count: usize) -> PyResult<Vec<[u32; 3]>> {
+    let [_, 3] = array.shape() else {
+        let shape = array.shape();
+        return Err(wrong(format!("faces: an array of m × 3 is expected, not {shape:?}")));
+    };
+    let numbers = in_order(array);
+    let place = |x: &f64| x.fract() == 0.0 && (0.0..count as f64).contains(x);
+    match numbers.iter().find(|x| !place(x)) {
+        Some(wild) => Err(wrong(format!("faces: there is no vertex {wild}"))),
+        None => {
+            Ok(numbers.as_chunks().0.iter().map(|face: &[f64; 3]| face.map(|x| x as u32)).collect())
+        }
     }
 }
 

@@ -11,6 +11,7 @@ mod render;
 mod robot;
 mod rollout;
 mod shape;
+mod threads;
 mod world;
 
 use pyo3::prelude::*;

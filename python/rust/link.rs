@@ -70,6 +70,9 @@ impl Link {
     }
 }
 
+/// Density of what none is given of, that of water [kg/m³].
+const DENSITY: f64 = 1000.0;
+
 /// Mass properties.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Matter {
@@ -101,15 +104,23 @@ impl Matter {
             let com = vector_or(com, [0.0; 3], "com")?;
             return Ok(Some(Self { mass, com: com.into(), inertia: self::inertia(moments)? }));
         }
-        if com.is_some() {
-            return Err(wrong("a com is given, but no inertia"));
-        }
         let Some(shape) = shape else {
             return match (mass, density) {
-                (None, None) => Ok(None),
-                _ => Err(wrong("a mass or density is given, but neither inertia nor shape")),
+                (None, None) if com.is_none() => Ok(None),
+                // A point: links may be such.
+                (Some(mass), None) => {
+                    let com = vector_or(com, [0.0; 3], "com")?.into();
+                    Ok(Some(Self { mass, com, inertia: Matrix3::zeros() }))
+                }
+                (None, None) => Err(wrong("a com is given, but no mass")),
+                _ => Err(wrong("a density is given, but no shape")),
             };
         };
+        if com.is_some() {
+            return Err(wrong(
+                "a com is given, but no inertia: that of the shape is about another",
+            ));
+        }
         let moments = shape.moments().ok_or_else(|| wrong("the shape has no mass"));
         let density = match (mass, density) {
             (Some(_), Some(_)) => return Err(wrong("mass and density are given: one of them")),

@@ -1,5 +1,7 @@
 //! Contact laws written in Python: slow, and for trying them out.
 
+use std::sync::{Mutex, PoisonError};
+
 use nalgebra::Vector3;
 use prehend_autodiff::Scalar;
 use prehend_sim::{Contact, ContactLaw, Response};
@@ -11,6 +13,28 @@ use crate::world::laws::Values;
 
 /// Gap, its rate, slip and normal.
 const MOTION: usize = 8;
+
+/// What a law has raised. Laws have no way to fail: they answer what is no number, which ends the simulation, and this says why.
+static RAISED: Mutex<Option<PyErr>> = Mutex::new(None);
+
+/// Sees to it that what a law raises from now on is raised in the end.
+pub(crate) struct LawFailure;
+
+impl LawFailure {
+    pub(crate) fn watch() -> Self {
+        drop(Self.taken());
+        Self
+    }
+
+    /// The first exception since.
+    pub(crate) fn taken(self) -> Option<PyErr> {
+        RAISED.lock().unwrap_or_else(PoisonError::into_inner).take()
+    }
+
+    fn keep(error: PyErr) {
+        RAISED.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
+    }
+}
 
 /// A law whose forces, and their derivatives, Python computes at each contact point.
 pub(crate) struct PythonLaw {
@@ -81,10 +105,14 @@ impl ContactLaw for PythonLaw {
         let numbers: Vec<f64> = inputs.iter().map(|x| x.value()).collect();
         let outputs = match self.respond(&numbers, contact.area, S::ORDER > 0) {
             Ok(outputs) if outputs.len() == 4 => outputs,
-            Ok(_) => return Response::nan(),
+            Ok(_) => {
+                LawFailure::keep(wrong(
+                    "a contact law returns the force along the normal, and three components of that across it",
+                ));
+                return Response::nan();
+            }
             Err(error) => {
-                // A law has no way to fail: the simulation ends where forces are no numbers, and this says why.
-                Python::attach(|py| error.print(py));
+                LawFailure::keep(error);
                 return Response::nan();
             }
         };

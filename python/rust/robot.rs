@@ -46,10 +46,13 @@ impl Robot {
         let controls = names.iter().filter(|name| !before.contains(name));
         let controls = controls
             .filter(|name| name.rsplit('.').next().is_some_and(|own| own.starts_with("control")));
-        let actuators = robot.actuators.iter().map(|(name, _)| name.clone());
+        let actuators = robot.actuators.iter().enumerate().map(|(k, (name, _))| named(name, k));
         let bodies = model.bodies.iter().zip(&robot.bodies);
         Self {
-            bodies: bodies.map(|(body, id)| (body.name.clone(), id.index())).collect(),
+            bodies: bodies
+                .enumerate()
+                .map(|(k, (body, id))| (named(&body.name, k), id.index()))
+                .collect(),
             joints: robot
                 .joints
                 .iter()
@@ -76,6 +79,11 @@ impl Robot {
             mjcf: None,
         }
     }
+}
+
+/// The name, or the number of what has none.
+fn named(name: &str, number: usize) -> String {
+    if name.is_empty() { number.to_string() } else { name.to_owned() }
 }
 
 #[pymethods]

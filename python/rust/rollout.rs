@@ -9,6 +9,8 @@ use rayon::prelude::*;
 use crate::arrays::{Numbers, array, in_order};
 use crate::error::wrong;
 use crate::integrator::AnyIntegrator;
+use crate::python_law::LawFailure;
+use crate::threads;
 
 type Array<'py> = Bound<'py, PyArray<f64, IxDyn>>;
 
@@ -17,9 +19,13 @@ pub(crate) const STATE: usize = 13;
 
 /// A rollout of a world as a function of its initial states, of some parameters, and of controls. Made by `World.rollout`.
 ///
-/// A row of states is position [m], quaternion (x, y, z, w), velocity [m/s] and angular velocity [rad/s] of the center of mass, world frame; rows
-/// are bodies, then joints and contacts that stick. With one more dimension in front, inputs are a batch: those without are the same for all, and
-/// worlds are simulated side by side on all cores.
+/// `rollout(states, parameters=None, controls=None, *, end=False)` gives the states at 0, dt, …, steps·dt, of shape (steps + 1, rows, 13), or those at the
+/// end alone, (rows, 13). `parameters` are as many as their names, those of the world if left out; `controls` are (steps, names).
+///
+/// A row of states is position [m], unit quaternion (x, y, z, w), velocity [m/s] and angular velocity [rad/s] of the center of mass, world frame; of a link or
+/// a fixed body, of the origin of its frame. Rows are bodies, then joints and contacts that stick; those of links follow from their joints, whose columns
+/// `World.joint_row` tells. With one more dimension in front, inputs are a batch: those without are the same for all, and worlds are simulated side by
+/// side on all cores.
 #[pyclass(frozen, module = "prehend")]
 pub(crate) struct Rollout {
     function: RolloutFunction<AnyIntegrator>,
@@ -188,11 +194,16 @@ impl Rollout {
                 None => wrong(error.to_string()),
             })
         };
+        let failure = LawFailure::watch();
         let results: Vec<Result<T, SimulationError>> = py.detach(|| match inputs.worlds() {
-            1 => vec![compute(0)],
-            worlds => (0..worlds).into_par_iter().map(&compute).collect(),
-        });
-        results.into_iter().enumerate().map(named).collect()
+            1 => Ok(vec![compute(0)]),
+            worlds => threads::run(|| (0..worlds).into_par_iter().map(&compute).collect()),
+        })?;
+        let results: PyResult<Vec<T>> = results.into_iter().enumerate().map(named).collect();
+        match (results, failure.taken()) {
+            (_, Some(of_law)) => Err(of_law),
+            (results, None) => results,
+        }
     }
 }
 

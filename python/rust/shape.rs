@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 
 use prehend_sim::ShapeOptions;
 
-use crate::arrays::{Indices, Numbers, in_order, points, pose, vector, vector_or};
+use crate::arrays::{Numbers, faces, in_order, points, pose, vector, vector_or};
 use crate::error::{Raise, wrong};
 
 /// The shape of a body: mass properties, samples of its surface and its distance field. Lengths in m; cylinders, capsules and cones lie along y.
@@ -31,8 +31,17 @@ impl Shape {
         cell: Option<f64>,
     ) -> PyResult<Self> {
         let options = ShapeOptions { rounding, spacing, cell };
-        let shape = prehend_sim::Shape::from_parry_with(&*parry, &options).raise()?;
+        let make = || prehend_sim::Shape::from_parry_with(&*parry, &options);
+        let shape = Python::attach(|py| py.detach(make)).raise()?;
         Ok(Self { parry, shape })
+    }
+}
+
+/// Refuses sizes of which parry makes others, or none.
+fn sizes(named: &[(&str, f64)]) -> PyResult<()> {
+    match named.iter().find(|(_, size)| !(*size >= 0.0 && size.is_finite())) {
+        Some((name, size)) => Err(wrong(format!("{name} must be positive and finite, is {size}"))),
+        None => Ok(()),
     }
 }
 
@@ -60,6 +69,7 @@ impl Shape {
     #[staticmethod]
     #[pyo3(signature = (half_height, radius, *, spacing=None))]
     fn capsule(half_height: f64, radius: f64, spacing: Option<f64>) -> PyResult<Self> {
+        sizes(&[("half_height", half_height), ("radius", radius)])?;
         Self::new(SharedShape::capsule_y(half_height, radius), None, spacing, None)
     }
 
@@ -72,6 +82,7 @@ impl Shape {
         rounding: Option<f64>,
         spacing: Option<f64>,
     ) -> PyResult<Self> {
+        sizes(&[("half_height", half_height), ("radius", radius)])?;
         Self::new(SharedShape::cylinder(half_height, radius), rounding, spacing, None)
     }
 
@@ -84,6 +95,7 @@ impl Shape {
         rounding: Option<f64>,
         spacing: Option<f64>,
     ) -> PyResult<Self> {
+        sizes(&[("half_height", half_height), ("radius", radius)])?;
         Self::new(SharedShape::cone(half_height, radius), rounding, spacing, None)
     }
 
@@ -106,24 +118,12 @@ impl Shape {
     #[pyo3(signature = (vertices, faces, *, spacing=None, cell=None))]
     fn mesh(
         vertices: Numbers<'_>,
-        faces: Indices<'_>,
+        faces: Numbers<'_>,
         spacing: Option<f64>,
         cell: Option<f64>,
     ) -> PyResult<Self> {
         let vertices = vectors(&vertices, "vertices")?;
-        let [_, 3] = faces.shape() else {
-            return Err(wrong(format!(
-                "faces: an array of m × 3 is expected, not {:?}",
-                faces.shape()
-            )));
-        };
-        let count = vertices.len() as i64;
-        let faces = in_order(&faces);
-        if let Some(wild) = faces.iter().find(|index| !(0..count).contains(*index)) {
-            return Err(wrong(format!("faces: there is no vertex {wild}")));
-        }
-        let faces: Vec<[u32; 3]> =
-            faces.as_chunks::<3>().0.iter().map(|face| face.map(|index| index as u32)).collect();
+        let faces = self::faces(&faces, vertices.len())?;
         let mesh = TriMesh::new(vertices, faces).raise()?;
         Self::new(SharedShape::new(mesh), None, spacing, cell)
     }
@@ -154,9 +154,15 @@ impl Shape {
     /// Heights over a rectangle in the plane x, z, as rows along z; `scale` is the size along x, the factor of heights, and the size along z.
     #[staticmethod]
     fn height_field(heights: Numbers<'_>, scale: Numbers<'_>) -> PyResult<Self> {
-        let [rows, columns] = *heights.shape() else {
-            return Err(wrong(format!("heights: a matrix is expected, not {:?}", heights.shape())));
+        let &[rows, columns] = heights.shape() else {
+            let shape = heights.shape();
+            return Err(wrong(format!(
+                "heights: a matrix of 2 × 2 at least is expected, not {shape:?}"
+            )));
         };
+        if rows.min(columns) < 2 {
+            return Err(wrong("heights: a matrix of 2 × 2 at least is expected"));
+        }
         let scale = vector(&scale, "scale")?;
         let values = in_order(&heights);
         let by_columns = (0..columns)
@@ -179,6 +185,9 @@ impl Shape {
     ) -> PyResult<Self> {
         let placed = parts.iter().map(|(part, at)| {
             let at = pose(Some(at), "parts")?;
+            if part.get().parry.as_compound().is_some() {
+                return Err(wrong("parts: a compound is among them; give its parts"));
+            }
             let (t, r) = (at.translation.vector, at.rotation.coords);
             let rotation = Rotation::from_xyzw(r.x, r.y, r.z, r.w);
             let at = Pose::from_parts(Vector::new(t.x, t.y, t.z), rotation);
@@ -191,13 +200,13 @@ impl Shape {
         Self::new(SharedShape::compound(placed), rounding, spacing, cell)
     }
 
-    /// Its dimensions by name, those by which a world can be differentiated \[m\].
+    /// Its dimensions by name, those by which a world can be differentiated [m].
     #[getter]
     fn dimensions(&self) -> std::collections::BTreeMap<String, f64> {
         self.shape.dimensions().into_iter().collect()
     }
 
-    /// Its volume \[m³\]; None for what has none.
+    /// Its volume [m³]; None for what has none.
     #[getter]
     fn volume(&self) -> Option<f64> {
         self.shape.moments().map(|moments| moments.volume)

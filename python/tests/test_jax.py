@@ -83,3 +83,10 @@ def test_arrays_of_numpy_are_constants_under_jit_and_vmap():
     _, pullback = prehend.vjp(rollout, many[0], *inputs[1:])
     expected = pullback(np.ones((4, 2, 13))).parameters
     np.testing.assert_allclose(gradient(inputs[1]), expected, rtol=1e-12)
+
+
+def test_whole_numbers_are_states_too():
+    world = prehend.World()
+    world.add_body("stone", prehend.Shape.ball(0.1))
+    function = prehend.jax.rollout(world.rollout(0.1, 2), end=True)
+    assert function([[0] * 6 + [1] + [0] * 6])[0, 9] == pytest.approx(-1.962)

@@ -1,5 +1,6 @@
 """Rollouts as functions: derivatives, batches, threads and arrays of other kinds."""
 
+import multiprocessing
 import threading
 import time
 
@@ -131,6 +132,35 @@ def test_the_world_that_fails_is_named():
     parameters[2, 0] = -1.0
     with pytest.raises(prehend.Error, match="world 2: .*friction"):
         rollout(states, parameters, controls)
+
+
+def test_changes_in_place_change_no_derivative():
+    rollout, (states, parameters, controls) = bounce()
+    weights = np.ones((2, 13))
+    expected = prehend.vjp(rollout, states, parameters, controls)[1](weights)
+    run, pullback = prehend.vjp(rollout, states, parameters, controls)
+    run[:] = 0.0
+    states[1, 7], parameters[0], controls[:] = 9.0, 0.1, 7.0
+    for found, own in zip(pullback(weights), expected, strict=True):
+        np.testing.assert_array_equal(found, own)
+
+
+def forked(rollout, states, parameters, controls, queue):
+    queue.put(rollout(states, parameters, controls, end=True))
+
+
+@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning", "ignore:.*fork:RuntimeWarning")
+def test_a_forked_process_has_threads_of_its_own():
+    rollout, inputs = bounce()
+    many = batch(inputs)
+    expected = rollout(*many, end=True)
+    fork = multiprocessing.get_context("fork")
+    queue = fork.Queue()
+    process = fork.Process(target=forked, args=(rollout, *many, queue))
+    process.start()
+    np.testing.assert_array_equal(queue.get(timeout=60), expected)
+    process.join(60)
+    assert process.exitcode == 0
 
 
 def test_other_threads_run_meanwhile():

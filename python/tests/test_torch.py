@@ -85,3 +85,30 @@ def test_adam_finds_the_friction_of_a_throw():
         loss.backward()
         adam.step()
     assert friction.item() == pytest.approx(0.25, abs=1e-3)
+
+
+def test_what_is_changed_before_going_back_is_noticed():
+    rollout, inputs = bounce()
+    states, parameters, controls = tensors(inputs)
+    parameters.requires_grad_()
+    end = prehend.torch.rollout(rollout, states, parameters, controls, end=True)
+    with torch.no_grad():
+        parameters.mul_(2.0)
+    with pytest.raises(RuntimeError, match="modified by an inplace operation"):
+        end.sum().backward()
+    # Of the result nothing is needed.
+    parameters = tensors(inputs, requires_grad=True)[1]
+    run = prehend.torch.rollout(rollout, states, parameters, controls)
+    expected = prehend.vjp(rollout, *inputs)[1](np.ones((2, 13))).parameters
+    run[:, 1, 2] += 0.02
+    run[-1].sum().backward()
+    np.testing.assert_array_equal(parameters.grad.numpy(), expected)
+
+
+def test_whole_numbers_are_states_too():
+    world = prehend.World()
+    world.add_body("stone", prehend.Shape.ball(0.1))
+    rollout = world.rollout(0.1, 2)
+    row = torch.tensor([[0] * 6 + [1] + [0] * 6])
+    assert prehend.torch.rollout(rollout, row)[-1, 0, 9].item() == pytest.approx(-1.962)
+    assert prehend.torch.rollout(rollout, world.neutral_states(), end=True).dtype == torch.float64

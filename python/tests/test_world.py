@@ -1,5 +1,7 @@
 """Worlds: bodies, shapes, contacts, parameters by name, and what is refused."""
 
+import copy
+
 import numpy as np
 import prehend
 import pytest
@@ -116,7 +118,65 @@ def test_what_cannot_be_is_refused():
         with pytest.raises(prehend.Error, match=text):
             call()
     # A refused contact leaves nothing behind.
-    assert [name for name in world.parameters if "/" in name][4:] == []
+    assert [name for name in world if "/" in name] == [f"ball/floor.{p}" for p in ("stiffness", "damping", "friction")]
+
+
+@pytest.mark.parametrize(
+    ("text", "make"),
+    {
+        "radius must be positive": lambda: prehend.Shape.cylinder(0.1, -1.0),
+        "half_height must be positive": lambda: prehend.Shape.capsule(-1.0, 0.1),
+        "2 × 2 at least": lambda: prehend.Shape.height_field(np.zeros((1, 5)), [1, 1, 1]),
+        "a compound is among them": lambda: prehend.Shape.compound(
+            [(prehend.Shape.compound([(prehend.Shape.ball(0.1), [0, 0, 0])]), [0, 0, 0])]
+        ),
+        "no vertex 0.6": lambda: prehend.Shape.mesh(np.eye(3), [[0.6, 1.2, 2.9]]),
+        "symmetric": lambda: prehend.Link("rod", mass=1.0, com=[0, 0, 0], inertia=[-0.1, 1, 1]),
+    }.items(),
+)
+def test_shapes_and_links_that_cannot_be_are_refused(text, make):
+    with pytest.raises(prehend.Error, match=text):
+        make()
+
+
+def test_states_that_cannot_be_are_refused():
+    world, states, ball, _ = thrown_ball()
+    with pytest.raises(prehend.Error, match="state 0: its quaternion has the length 0"):
+        world.rollout(1e-3, 1)(np.zeros_like(states))
+    with pytest.raises(prehend.Error, match="2 rows are expected"):
+        world.longest_step(states[:1])
+    with pytest.raises(prehend.Error, match="no memory"):
+        world.rollout(1e-3, 2**62)(states)
+    rod = world.add_articulation([prehend.Link("rod", mass=1.0, com=[0, 0, -1])])[0]
+    with pytest.raises(prehend.Error, match="'rod' is a link"):
+        world.set_pose(world.neutral_states(), rod, [0, 0, 1])
+
+
+def test_poses_may_be_views_of_the_states():
+    world, states, ball, _ = thrown_ball()
+    expected = states.copy()
+    world.set_pose(states, ball, states[ball, :3], velocity=states[ball, 7:10])
+    np.testing.assert_array_equal(states, expected)
+
+
+def test_contacts_both_ways_have_one_set_of_parameters():
+    world = prehend.World(gravity=[0, 0, 0])
+    a, b = (world.add_body(name, prehend.Shape.cuboid([0.05] * 3), mass=1.0) for name in "ab")
+    names = world.add_contact(
+        a, b, "penalty", both_ways=True, stiffness=1e8, damping=0.0, friction=0.0, slip_scale=0.1
+    )
+    assert len([name for name in world if name.endswith("stiffness")]) == 1
+    states = world.neutral_states()
+    world.set_pose(states, b, [0, 0, 0.0999])
+    rollout = world.rollout(1e-4, 1, parameters=[names["stiffness"]], integrator="semi_implicit_euler")
+    once, twice = (rollout(states, [k], end=True)[b, 9] for k in (1e8, 2e8))
+    assert twice == pytest.approx(2 * once, rel=1e-9) and once > 0
+
+
+def test_a_world_is_a_mapping_that_can_be_copied():
+    world, _, _, _ = thrown_ball()
+    assert list(world) == world.parameters and len(world) == len(world.parameters)
+    assert copy.deepcopy(world).parameters == world.parameters
 
 
 def test_many_balls_touch_by_groups():

@@ -157,6 +157,20 @@ pub enum SimulationError {
         /// The name.
         name: String,
     },
+    /// A state whose rotation is no unit quaternion.
+    #[error("state {row}: its quaternion has the length {norm}, not 1")]
+    Quaternion {
+        /// The number of the state.
+        row: usize,
+        /// The length of its quaternion.
+        norm: f64,
+    },
+    /// A rollout too long to keep.
+    #[error("there is no memory for the states of {steps} steps")]
+    Memory {
+        /// The number of its steps.
+        steps: usize,
+    },
     /// Inputs of a function of numbers that are too few or too many.
     #[error("{given} {what}: {expected} are expected")]
     Inputs {

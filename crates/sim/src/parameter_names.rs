@@ -18,7 +18,7 @@ impl<S: Scalar> World<S> {
     ///
     /// | parameter | name |
     /// |---|---|
-    /// | of a body | `ball.mass`, `ball.inertia_xy`, `ball.com_x`, `ball.force_x`, `ball.torque_z`, and dimensions as `ball.radius` |
+    /// | of a body | `ball.mass`, `ball.inertia_xy`, `ball.com_x`; external force and torque in the world frame about the center of mass, of a link about the origin of its frame: `ball.force_x`, `ball.torque_z`; dimensions as `ball.radius` |
     /// | of a link and its joint | `elbow.joint_x`, `elbow.joint_qw`, `elbow.mass`, `elbow.com_x`, `elbow.inertia_xy`, `elbow.armature` |
     /// | gravity | `gravity.x` |
     /// | of a contact | samples and field, as `ball/floor.friction` |

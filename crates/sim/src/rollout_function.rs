@@ -1,5 +1,6 @@
 //! A rollout as a function of rows of numbers, with its derivatives: what other languages and optimizers call.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 
 use prehend_autodiff::{Fwd, Recording, Scalar, Var};
@@ -16,8 +17,9 @@ use crate::world::World;
 /// The states of a world at 0, dt, …, `steps`·dt as a function of the initial states, of some of its
 /// [parameters](World::parameters), and of others that a controller sets before each step.
 ///
-/// A state is a row of 13 numbers: position x, y, z \[m\], quaternion i, j, k, w, velocity \[m/s\] and angular velocity \[rad/s\] of the center of
-/// mass, world frame. Bodies come first, then joints and contacts that stick, as in [`World::neutral_states`].
+/// A state is a row of 13 numbers: position x, y, z \[m\], unit quaternion i, j, k, w, velocity \[m/s\] and angular velocity \[rad/s\] of the center of
+/// mass, world frame; of a link or a fixed body, of the origin of its frame. Bodies come first, then joints and contacts that stick, as in
+/// [`World::neutral_states`]. The rows of links follow from those of joints.
 ///
 /// Derivatives by quaternions mean something along the sphere of unit quaternions alone.
 ///
@@ -51,6 +53,9 @@ pub struct RolloutFunction<I = Adaptive> {
     places: Box<[u32]>,
     parameters: usize,
 }
+
+/// How far the length of a quaternion may be from 1: differences are taken about unit ones.
+const UNIT: f64 = 1e-3;
 
 /// What a [`RolloutFunction`] is a function of.
 #[derive(Clone, Copy, Debug)]
@@ -102,13 +107,11 @@ impl<I: Integrator> RolloutFunction<I> {
         controls: &[&str],
     ) -> Result<Self, SimulationError> {
         let names = world.parameter_names();
+        let mut left: HashMap<&str, u32> = names.iter().map(String::as_str).zip(0..).collect();
         let mut places = Vec::with_capacity(parameters.len() + controls.len());
-        for name in parameters.iter().chain(controls) {
-            let place = names.iter().position(|own| own == name);
-            let place = place.filter(|place| !places.contains(&(*place as u32)));
-            let place =
-                place.ok_or_else(|| SimulationError::NoParameter { name: (*name).to_owned() })?;
-            places.push(place as u32);
+        for &name in parameters.iter().chain(controls) {
+            let unknown = || SimulationError::NoParameter { name: name.to_owned() };
+            places.push(left.remove(name).ok_or_else(unknown)?);
         }
         if !(time_steps.dt > 0.0 && time_steps.dt.is_finite()) {
             return Err(SimulationError::TimeStep(time_steps.dt));
@@ -143,12 +146,19 @@ impl<I: Integrator> RolloutFunction<I> {
     /// The states at 0, dt, …, `steps`·dt, one after the other.
     ///
     /// # Errors
-    /// As [`World::simulate_with`]; with controls as [`World::simulate_controlled`].
+    /// As [`World::simulate_with`], with controls as [`World::simulate_controlled`]; if inputs are too few or too many, a quaternion has not the length 1, or there
+    /// is no memory for so many steps.
     pub fn evaluate<S: Scalar>(
         &self,
         inputs: RolloutInputs<'_, S>,
     ) -> Result<Vec<S>, SimulationError> {
-        let mut run = Vec::with_capacity((self.time_steps.steps + 1) * self.width());
+        let mut run = Vec::new();
+        let numbers =
+            self.time_steps.steps.checked_add(1).and_then(|n| n.checked_mul(self.width()));
+        let reserved = numbers.is_some_and(|numbers| run.try_reserve_exact(numbers).is_ok());
+        if !reserved {
+            return Err(SimulationError::Memory { steps: self.time_steps.steps });
+        }
         let end = self.march(inputs, |states| run.extend(coordinates_of(states)))?;
         run.extend(coordinates_of(&end));
         Ok(run)
@@ -219,12 +229,17 @@ impl<I: Integrator> RolloutFunction<I> {
                 return Err(SimulationError::Inputs { what, given, expected });
             }
         }
-        match inputs.states.len().is_multiple_of(STATE) {
-            true => Ok(()),
-            false => {
-                let (given, expected) = (inputs.states.len(), self.width());
-                Err(SimulationError::Inputs { what: "numbers of states", given, expected })
-            }
+        if !inputs.states.len().is_multiple_of(STATE) {
+            let (given, expected) = (inputs.states.len(), self.width());
+            return Err(SimulationError::Inputs { what: "numbers of states", given, expected });
+        }
+        // Others would scale what they turn.
+        let norm =
+            |row: &[S; STATE]| row[3..7].iter().map(|x| x.value().powi(2)).sum::<f64>().sqrt();
+        let norms = inputs.states.as_chunks().0.iter().map(norm).enumerate();
+        match norms.into_iter().find(|(_, norm)| (norm - 1.0).abs() > UNIT) {
+            Some((row, norm)) => Err(SimulationError::Quaternion { row, norm }),
+            None => Ok(()),
         }
     }
 

@@ -9,7 +9,7 @@ use prehend_geometry::{Texture, TriMesh};
 use pyo3::prelude::*;
 
 use super::images;
-use crate::arrays::{Indices, Numbers, array, in_order, points};
+use crate::arrays::{Numbers, array, faces, in_order, points};
 use crate::error::{Raise, wrong};
 
 /// A triangle mesh in meters, with colors or a texture where it has them.
@@ -18,7 +18,7 @@ use crate::error::{Raise, wrong};
 /// of texture, H × W × 3 of uint8.
 #[pyclass(frozen, module = "prehend")]
 pub(crate) struct Mesh {
-    pub(super) mesh: TriMesh,
+    pub(crate) mesh: TriMesh,
 }
 
 #[pymethods]
@@ -27,24 +27,14 @@ impl Mesh {
     #[pyo3(signature = (vertices, faces, *, colors=None, uvs=None, texture=None))]
     fn new(
         vertices: Numbers<'_>,
-        faces: Indices<'_>,
+        faces: Numbers<'_>,
         colors: Option<Numbers<'_>>,
         uvs: Option<Numbers<'_>>,
         texture: Option<Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let vertices = points(&vertices, "vertices")?;
         let count = vertices.len();
-        let [_, 3] = faces.shape() else {
-            return Err(wrong(format!(
-                "faces: an array of m × 3 is expected, not {:?}",
-                faces.shape()
-            )));
-        };
-        let faces = in_order(&faces);
-        if let Some(wild) = faces.iter().find(|index| !(0..count as i64).contains(*index)) {
-            return Err(wrong(format!("faces: there is no vertex {wild}")));
-        }
-        let corners = faces.as_chunks::<3>().0.iter().map(|face| face.map(|v| v as u32)).collect();
+        let corners = self::faces(&faces, count)?;
         let mut mesh = TriMesh::new(vertices, corners);
         if let Some(colors) = colors {
             mesh.colors = Some(of_vertices::<3>(&colors, count, "colors")?);

@@ -9,7 +9,7 @@ use prehend_render::RenderModel;
 use pyo3::prelude::*;
 
 use super::image::picture;
-use crate::arrays::{Indices, Numbers, in_order, points};
+use crate::arrays::{Numbers, faces, in_order, points};
 use crate::error::{Raise, wrong};
 
 /// Colors of a mesh, in the place of its own.
@@ -43,21 +43,18 @@ pub(super) fn model(mesh: &Bound<'_, PyAny>, look: &Look<'_>) -> PyResult<Arc<Re
 }
 
 fn read(mesh: &Bound<'_, PyAny>) -> PyResult<TriMesh> {
-    if let Ok((vertices, faces)) = mesh.extract::<(Numbers<'_>, Indices<'_>)>() {
-        let [_, 3] = faces.shape() else {
-            let shape = faces.shape();
-            return Err(wrong(format!("faces: an array of m × 3 is expected, not {shape:?}")));
-        };
+    if let Ok((vertices, faces)) = mesh.extract::<(Numbers<'_>, Numbers<'_>)>() {
         let vertices = points(&vertices, "vertices")?;
-        let all = in_order(&faces);
-        if let Some(wild) = all.iter().find(|index| !(0..vertices.len() as i64).contains(*index)) {
-            return Err(wrong(format!("faces: there is no vertex {wild}")));
-        }
-        let faces = all.as_chunks().0.iter().map(|face: &[i64; 3]| face.map(|i| i as u32));
-        return Ok(TriMesh::new(vertices, faces.collect()));
+        let faces = self::faces(&faces, vertices.len())?;
+        return Ok(TriMesh::new(vertices, faces));
+    }
+    if let Ok(mesh) = mesh.cast::<crate::refine::Mesh>() {
+        return Ok(mesh.get().mesh.clone());
     }
     let Ok(path) = mesh.extract::<PathBuf>() else {
-        return Err(wrong("mesh: a path is expected, or vertices (n × 3) and faces (m × 3)"));
+        return Err(wrong(
+            "mesh: a Mesh is expected, a path, or vertices (n × 3) and faces (m × 3)",
+        ));
     };
     TriMesh::load(&path).raise()
 }

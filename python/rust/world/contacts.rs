@@ -17,7 +17,7 @@ impl World {
     /// Python (`prehend.laws`). Returns the names of its parameters.
     ///
     /// `smoothing` is how contact begins: the width of a softplus [m], None for a hard beginning, or "leaky". With `both_ways` the field of the first
-    /// is touched, too, each with half of the force.
+    /// is touched, too, each with half of the force. Contacts that stick have a set of parameters for each way then, of which the first is returned.
     #[pyo3(signature = (samples, field, law, *, smoothing=None, both_ways=false, **parameters))]
     fn add_contact(
         &mut self,
@@ -32,7 +32,8 @@ impl World {
         let (samples, field) = (self.id(&samples)?, self.id(&field)?);
         let smoothing = Begins::smoothing(smoothing)?;
         self.naming(|world| match both_ways {
-            true => world.add_symmetric_contact(samples, field, law, smoothing).raise(),
+            // As a group, which has one set of parameters.
+            true => world.add_contacts_between(&[samples], &[field], law, smoothing).raise(),
             false => world.add_contact(ContactBodies { samples, field }, law, smoothing).raise(),
         })
     }

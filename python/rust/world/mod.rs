@@ -6,7 +6,7 @@ pub(crate) mod laws;
 mod sensors;
 pub(crate) mod states;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 
 use nalgebra::Vector3;
 use prehend_sim::{Body, BodyId, RigidBody, RolloutFunction, TimeSteps};
@@ -101,20 +101,21 @@ impl World {
         inertia: Option<Numbers<'_>>,
     ) -> PyResult<usize> {
         let shape = shape.map(|shape| &shape.shape);
-        let matter = Matter::of(mass, com.as_ref(), inertia.as_ref(), shape, density)?;
+        let given = mass.or(density).is_some() || inertia.is_some();
+        let matter = match fixed {
+            true => None,
+            false => Matter::of(mass, com.as_ref(), inertia.as_ref(), shape, density)?,
+        };
         let body = match (fixed, shape) {
-            (true, _) if matter.is_some() => {
+            (true, _) if given => {
                 return Err(wrong(format!("body '{name}': it is fixed, and has a mass")));
             }
             (true, Some(shape)) => Body::fixed_from_shape(name, shape),
             (true, None) => Body::kinematic(name),
             (false, Some(shape)) if inertia.is_none() => {
-                let density = match (density, mass, shape.moments()) {
-                    (Some(density), _, _) => density,
-                    (None, Some(mass), Some(moments)) => mass / moments.volume,
-                    _ => 1000.0,
-                };
-                Body::from_shape(name, shape, density).raise()?
+                let volume = shape.moments().map_or(f64::NAN, |moments| moments.volume);
+                let mass = matter.map_or(f64::NAN, |matter| matter.mass);
+                Body::from_shape(name, shape, mass / volume).raise()?
             }
             (false, shape) => {
                 let no_mass = || {
@@ -164,8 +165,25 @@ impl World {
         self.place(name).is_ok()
     }
 
+    fn __iter__(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        let names = self.world.parameter_names().into_pyobject(py)?;
+        Ok(names.call_method0("__iter__")?.unbind())
+    }
+
+    fn __len__(&self) -> usize {
+        self.world.parameters().len()
+    }
+
     /// A copy, which changes apart from this one.
     fn copy(&self) -> Self {
+        self.clone()
+    }
+
+    fn __copy__(&self) -> Self {
+        self.clone()
+    }
+
+    fn __deepcopy__(&self, _memo: &Bound<'_, PyAny>) -> Self {
         self.clone()
     }
 
@@ -174,7 +192,10 @@ impl World {
     ///
     /// `integrator` is "adaptive", which chooses steps within `dt` to hold an error (`tolerance`, 5e-6 of the motion), or one of fixed steps:
     /// "semi_implicit_euler", "runge_kutta_4", "backward_euler". Later changes of the world are not seen by the rollout.
-    #[pyo3(signature = (dt, steps, *, parameters=Vec::new(), controls=Vec::new(), integrator="adaptive", tolerance=None))]
+    #[pyo3(
+        signature = (dt, steps, *, parameters=Vec::new(), controls=Vec::new(), integrator="adaptive", tolerance=None),
+        text_signature = "($self, dt, steps, *, parameters=(), controls=(), integrator='adaptive', tolerance=None)"
+    )]
     fn rollout(
         &self,
         dt: f64,
@@ -191,8 +212,9 @@ impl World {
         let function =
             RolloutFunction::with_integrator(integrator, &self.world, time_steps, &own, &each_step)
                 .raise()?;
-        let values =
-            parameters.iter().map(|name| self.__getitem__(name)).collect::<PyResult<_>>()?;
+        let (names, all) = (self.world.parameter_names(), self.world.parameters());
+        let known: HashMap<&String, f64> = names.iter().zip(all).collect();
+        let values = parameters.iter().filter_map(|name| known.get(name).copied()).collect();
         Ok(Rollout::new(function, parameters, controls, values))
     }
 

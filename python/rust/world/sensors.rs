@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use super::states::states;
 use super::{BodyKey, World};
 use crate::arrays::{Numbers, array, vector};
-use crate::error::Raise;
+use crate::error::{Raise, wrong};
 use crate::integrator::AnyIntegrator;
 
 type Array<'py> = Bound<'py, PyArray<f64, IxDyn>>;
@@ -45,6 +45,10 @@ impl World {
     #[pyo3(signature = (states, integrator="semi_implicit_euler"))]
     fn longest_step(&self, states: Numbers<'_>, integrator: &str) -> PyResult<f64> {
         let states = self::states(&states)?;
+        let rows = self.world.neutral_states().len();
+        if states.len() < rows {
+            return Err(wrong(format!("states: {rows} rows are expected, not {}", states.len())));
+        }
         let integrator = AnyIntegrator::of(integrator, None)?;
         Ok(integrator.stability_limit() / self.world.contact_frequency(&states))
     }

@@ -2,7 +2,7 @@
 
 use numpy::ndarray::{ArrayView1, IxDyn};
 use numpy::{PyArray2, PyArrayMethods, PyUntypedArrayMethods};
-use prehend_sim::State;
+use prehend_sim::{Motion, State};
 use pyo3::prelude::*;
 
 use super::{BodyKey, World};
@@ -44,7 +44,8 @@ pub(crate) fn change(
 
 #[pymethods]
 impl World {
-    /// States in which everything is at rest, bodies with their center of mass at the origin and joints at their neutral coordinates: rows × 13.
+    /// States in which everything is at rest, bodies with their center of mass at the origin and joints at their neutral coordinates: a row of 13 for
+    /// each body, then for each joint. Contacts that stick begin without a deflection, and have rows in what a rollout returns.
     fn neutral_states<'py>(
         &self,
         py: Python<'py>,
@@ -54,8 +55,8 @@ impl World {
         array(py, states.iter().flat_map(State::coordinates).collect(), &[rows, STATE])
     }
 
-    /// Writes the row of a body in `states`: the pose of its frame (4 × 4 or a translation), velocity of its center of mass [m/s] and angular
-    /// velocity [rad/s].
+    /// Writes the row of a body in `states`: the pose of its frame (4 × 4 or a translation), velocity of its center of mass (of a fixed body of its
+    /// frame's origin) [m/s] and angular velocity [rad/s]. Links are put by `set_joint`.
     #[pyo3(signature = (states, body, pose, *, velocity=None, angular_velocity=None))]
     fn set_pose(
         &self,
@@ -66,13 +67,21 @@ impl World {
         angular_velocity: Option<Numbers<'_>>,
     ) -> PyResult<()> {
         let id = self.id(&body)?;
-        let pose = self::pose(Some(&pose), "pose")?;
+        if matches!(self.world.bodies[id].motion, Motion::Link) {
+            let name = &self.world.bodies[id].name;
+            return Err(wrong(format!(
+                "body '{name}' is a link, which its joints put where it is: use set_joint"
+            )));
+        }
+        let at = self::pose(Some(&pose), "pose")?;
         let mut state = match self.world.bodies[id].rigid() {
-            Some(rigid) => rigid.at_rest(&pose),
-            None => State::at_rest(pose),
+            Some(rigid) => rigid.at_rest(&at),
+            None => State::at_rest(at),
         };
         state.linear = vector_or(velocity.as_ref(), [0.0; 3], "velocity")?;
         state.angular = vector_or(angular_velocity.as_ref(), [0.0; 3], "angular_velocity")?;
+        // They may be views of the states.
+        drop((pose, velocity, angular_velocity));
         let place = id.index();
         change(states, |all| {
             *all.get_mut(place)
@@ -109,11 +118,15 @@ impl World {
         position: Numbers<'_>,
         velocity: Option<Numbers<'_>>,
     ) -> PyResult<()> {
+        let (position_like, velocity_like) = (position, velocity);
         let id = self.id(&link)?;
+        let position = in_order(&position_like).into_owned();
+        let velocity = velocity_like.as_ref().map(|v| in_order(v).into_owned());
+        // They may be views of the states.
+        drop((position_like, velocity_like));
         change(states, |all| {
             let still = vec![0.0; self.world.joint(all, id).raise()?.velocity.len()];
-            let velocity = velocity.as_ref().map_or(still, |v| in_order(v).into_owned());
-            self.world.set_joint(all, id, &in_order(&position), &velocity).raise()
+            self.world.set_joint(all, id, &position, &velocity.unwrap_or(still)).raise()
         })
     }
 

@@ -39,6 +39,7 @@ def rollout(function: Rollout, *, end: bool = False) -> RolloutOfJax:
     """The function (states, parameters, controls) → states at 0, dt, …, steps·dt, of shape (steps + 1, rows, 13), or at the end alone, (rows, 13).
 
     Parameters and controls that are left out are those of the world and none. For batches use ``jax.vmap``, whose worlds are simulated side by side.
+    Derivatives are first ones, in reverse mode: ``jax.grad``, ``vjp`` and ``jacrev``, not ``jacfwd`` or ``hessian``.
     """
 
     @jax.custom_vjp
@@ -72,7 +73,7 @@ def rollout(function: Rollout, *, end: bool = False) -> RolloutOfJax:
             if controls.size:
                 raise ValueError(f"controls are missing: {', '.join(function.controls)}")
         # As copies: under vmap, arrays of NumPy are no constants that JAX takes.
-        return run(jnp.array(states), jnp.array(parameters), jnp.array(controls))
+        return run(*(jnp.array(x, jnp.result_type(float, x)) for x in (states, parameters, controls)))
 
     return with_defaults
 

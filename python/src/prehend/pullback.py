@@ -19,7 +19,7 @@ class Gradient(NamedTuple):
     controls: NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Pullback:
     """A run of a rollout, which carries derivatives by its states back to its inputs. Call it as often as wanted."""
 
@@ -55,5 +55,9 @@ def vjp(
     >>> round(float(pullback(by_height).parameters[0]), 6)
     0.125
     """
-    run = rollout(states, parameters, controls)
-    return run, Pullback(rollout, run, states, parameters, controls)
+    inputs = [None if x is None else np.array(x, dtype=np.float64) for x in (states, parameters, controls)]
+    own, *others = inputs
+    assert own is not None
+    run = rollout(own, *others)
+    # Copies: whoever changes inputs or the run in place changes no derivative.
+    return run, Pullback(rollout, run.copy(), own, *others)

@@ -37,13 +37,20 @@ def rollout(
 
     Computed in double precision on the processor, whatever the inputs are; the result is of their type and device. Derivatives are first ones.
     """
-    return _Rollout.apply(function, end, states, parameters, controls)  # type: ignore[no-any-return, no-untyped-call]
+    given = [None if x is None else torch.as_tensor(x) for x in (states, parameters, controls)]
+    return _Rollout.apply(function, end, *given)  # type: ignore[no-any-return, no-untyped-call]
 
 
 def _array(tensor: torch.Tensor | None) -> Array | None:
     if tensor is None:
         return None
     return tensor.detach().to("cpu", torch.float64).numpy()
+
+
+def _like(array: Array, like: torch.Tensor) -> torch.Tensor:
+    """As of the type and device of another tensor, in double precision if that has no fractions."""
+    dtype = like.dtype if like.is_floating_point() else torch.float64
+    return torch.from_numpy(array).to(like.device, dtype)
 
 
 class _Rollout(torch.autograd.Function):
@@ -56,26 +63,30 @@ class _Rollout(torch.autograd.Function):
         parameters: torch.Tensor | None,
         controls: torch.Tensor | None,
     ) -> torch.Tensor:
-        inputs = [_array(states), _array(parameters), _array(controls)]
         needed = any(ctx.needs_input_grad)
-        run = function(*inputs, end=end and not needed)
-        ctx.function, ctx.inputs = function, inputs
-        ctx.tensors = [(x.dtype, x.device) if x is not None else None for x in (states, parameters, controls)]
-        if needed:
-            ctx.run = run
-            if end:
-                # A copy: a view would keep the whole run.
-                run = run[..., -1, :, :].copy()
-        return torch.from_numpy(run).to(states.device, states.dtype)
+        run = function(
+            states.detach().to("cpu", torch.float64).numpy(),
+            _array(parameters),
+            _array(controls),
+            end=end and not needed,
+        )
+        if not needed:
+            return _like(run, states)
+        ctx.function = function
+        # Autograd watches for changes of what is saved; the run is a copy that nobody else has.
+        ctx.save_for_backward(states, parameters, controls, torch.from_numpy(run))
+        return _like((run[..., -1, :, :] if end else run).copy(), states)
 
     @staticmethod
     @torch.autograd.function.once_differentiable
     def backward(ctx: Any, adjoints: torch.Tensor) -> tuple[torch.Tensor | None, ...]:  # type: ignore[override]
+        *inputs, run = ctx.saved_tensors
         own = adjoints.detach().to("cpu", torch.float64).contiguous().numpy()
-        gradients = ctx.function.pullback(ctx.run, own, *ctx.inputs)
-        wanted = zip(ctx.needs_input_grad[2:], ctx.tensors, gradients, strict=True)
+        gradients = ctx.function.pullback(run.numpy(), own, *map(_array, inputs))
         by_inputs = [
-            torch.from_numpy(gradient).to(own[1], own[0]) if needed and own is not None else None
-            for needed, own, gradient in wanted
+            _like(gradient, like) if needed else None
+            for needed, like, gradient in zip(
+                ctx.needs_input_grad[2:], inputs, gradients, strict=True
+            )
         ]
         return (None, None, *by_inputs)

@@ -155,6 +155,15 @@ fn what_is_no_input_is_refused() {
         let inputs = RolloutInputs { states: &start[..count], parameters: mass, controls: force };
         assert!(matches!(function.evaluate(inputs), Err(SimulationError::Inputs { .. })));
     }
+    let mut stretched = start.clone();
+    stretched[13 + 6] = 1.1;
+    let inputs = RolloutInputs { states: &stretched, parameters: &[0.2], controls: &[0.0; 2] };
+    let refused = function.evaluate(inputs).unwrap_err();
+    assert!(matches!(refused, SimulationError::Quaternion { row: 1, .. }), "{refused}");
+    let long =
+        RolloutFunction::new(&world, TimeSteps { dt: 1e-3, steps: 1 << 60 }, &[], &[]).unwrap();
+    let inputs = RolloutInputs { states: &start, parameters: &[], controls: &[] };
+    assert_eq!(long.evaluate(inputs), Err(SimulationError::Memory { steps: 1 << 60 }));
     let inputs = RolloutInputs { states: &start, parameters: &[0.2], controls: &[0.0; 2] };
     let run = function.evaluate(inputs).unwrap();
     assert!(function.vjp(inputs, &run, &run[1..]).is_err());
