@@ -148,7 +148,7 @@ def test_what_cannot_be_is_named(example, changed, text):
 
 def test_a_frame_that_cannot_be_refined_says_why(example):
     frame, initial, _ = example
-    with pytest.raises(prehend.Error, match="method: 'guess' is unknown: one of combined|fused"):
+    with pytest.raises(prehend.Error, match="method: 'guess' is unknown: one of fused, combined"):
         frame.refine(initial, method="guess")
     with pytest.raises(prehend.Error, match="pose: a matrix of 4 × 4"):
         frame.refine(initial[:3])
@@ -366,6 +366,21 @@ def test_a_dataset_is_iterated(dataset):
     assert OBJECT in dataset.objects and SCENE in dataset.scenes
     with pytest.raises(prehend.Error, match="no scene 999"):
         dataset.frame(999, 0, OBJECT)
+
+
+@needs_data
+def test_an_object_is_followed_as_by_the_command(dataset, command, tmp_path):
+    out = tmp_path / "tracked.csv"
+    command("track", "--out", out)
+    told = [line.split(",") for line in out.read_text().splitlines()[1:]]
+    start = next(row for row in read_results(DATA / "init_low.csv") if row.scene == SCENE)
+    tracker = prehend.Tracker(dataset.object(OBJECT), dataset.frame(*start.ids).hand, pose=start.pose)
+    assert len(told) == len(dataset.images(SCENE)) > 1
+    for image, cells in zip(dataset.images(SCENE), told, strict=True):
+        tracked = tracker.push(dataset.frame(SCENE, image, OBJECT), image / 30.0)
+        assert tracked.pose[:3, :3].ravel().tolist() == [float(x) for x in cells[4].split()]
+        assert (tracked.pose[:3, 3] * 1000.0).tolist() == [float(x) for x in cells[5].split()]
+        assert (tracked.probability or 0.0) == float(cells[3])
 
 
 @needs_data

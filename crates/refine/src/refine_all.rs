@@ -76,3 +76,36 @@ pub fn refine_all(
     // None is missing: a panic of a worker comes through.
     Ok(done.into_iter().flatten().collect())
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::scene::{Scene, default_scene};
+
+    #[test]
+    fn what_becomes_of_a_frame_depends_on_no_other() {
+        let Scene { observation, object, hand, initial, .. } = default_scene(1).unwrap();
+        let input = |mask: bool| {
+            let mut observation = observation.clone();
+            observation.mask.pixels_mut().iter_mut().for_each(|set| *set &= mask);
+            let (object, hand) = (Arc::clone(&object), Some(Arc::clone(&hand)));
+            FrameInput { observation, object, hand, rig: None }
+        };
+        let inputs = [input(true), input(false), input(true)];
+        let job = |input| RefineJob { input, initial, rivals: None };
+        let jobs: Vec<_> = inputs.iter().map(job).collect();
+        let alone = jobs[0].run(&Method::default()).unwrap().estimate;
+        for threads in [None, NonZeroUsize::new(1), NonZeroUsize::new(2)] {
+            let done = refine_all(&jobs, &Method::default(), threads).unwrap();
+            assert!(matches!(done[1], Err(RefineError::EmptyMask)));
+            for outcome in [&done[0], &done[2]] {
+                let estimate = &outcome.as_ref().ok().unwrap().estimate;
+                assert_eq!(estimate.t_cam_object(), alone.t_cam_object());
+                assert_eq!(estimate.posterior, alone.posterior);
+            }
+        }
+        assert!(refine_all(&[], &Method::default(), None).unwrap().is_empty());
+    }
+}

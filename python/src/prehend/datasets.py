@@ -26,8 +26,8 @@ __all__ = ["Bop", "Result", "read_results", "write_results"]
 class Bop(Dataset):
     """A split of a BOP dataset, `test` or the only one if none is named: its images, and beside them hand, touch and truth where it has them.
 
-    Iterating yields a `Frame` for each of `targets`. Objects and hands are prepared once, and corrected by `rig`, if one is given. Files are read when they
-    are needed.
+    Iterating yields a `Frame` for each of `targets`, with its mask empty where there is no file of one. Objects and hands are prepared once, and corrected
+    by `rig`, if one is given. Files are read when they are needed.
     """
 
     def __iter__(self) -> Iterator[Frame]:
@@ -91,7 +91,8 @@ COLUMNS = ["scene_id", "im_id", "obj_id", "score", "R", "t", "time"]
 
 
 def read_results(path: str | os.PathLike[str]) -> list[Result]:
-    """The rows of a results file (scene_id,im_id,obj_id,score,R,t,time; R row-major, t in mm; with a header or without)."""
+    """The rows of a results file (scene_id,im_id,obj_id,score,R,t,time; R row-major, t in mm; with a header or without). A row that
+    cannot be read is an error that names its line."""
     results: list[Result] = []
     seen: dict[tuple[int, int], int] = {}
     with open(path, newline="", encoding="utf-8-sig") as file:

@@ -88,9 +88,30 @@ def refine(
     iterations: int | None = None,
     rivals: ArrayLike | None = None,
 ) -> Estimate:
-    """Refines the pose of an object in one frame: `Frame(...)` and its `refine`, whose documentation says what arguments are.
+    """Refines the pose of an object in one frame: the same as `Frame(rgb, depth, K, mesh, …).refine(pose, …)`.
 
-    A mesh is prepared anew in each call, with a mass that is assumed; make an `Object` of it to do so once.
+    Camera frame: OpenCV's, x right, y down, z forward; pixel centers at integers. Python's other threads run on meanwhile.
+
+    Args:
+        rgb: H × W × 3 of uint8.
+        depth: H × W, registered to rgb; in meters, or whole numbers in units of `depth_scale` meters; 0 or not finite where missing.
+        K: 3 × 3 [px].
+        mesh: The object. A mesh is prepared anew in each call, with a mass that is assumed; make an `Object` of it to do so once.
+        pose: Where to begin: 4 × 4, camera ← object [m].
+        mask: H × W, not zero on the visible part of the object. All methods need it.
+        hand: The hand that holds the object; it needs `hand_pose` and `joints`.
+        hand_pose: 4 × 4, camera ← base of the hand [m].
+        joints: Positions by name, or in the order of `hand.joints` [rad; m of prismatic ones].
+        touch: taxels × 3, the force of the object on each in the frame of its link [N]; NaN where nothing is known.
+        gravity: In the camera frame [m/s²].
+        lens: "brown_conrady" or "kannala_brandt" and coefficients in OpenCV's order: through which the images were taken.
+        rig: What corrects the frame. The object is corrected by `rig.corrected`.
+        method: One of `methods()`.
+        iterations: At most so many in each stage.
+        rivals: n × 4 × 4, the other poses that a search ended with, if `pose` comes from one.
+
+    Raises:
+        Error: What is wrong with the input, or why nothing was found.
 
     >>> import prehend
     >>> frame, initial, truth = prehend.example_frame(1)
