@@ -172,6 +172,8 @@ def test_errors_say_what_is_wrong() -> None:
         own.render([0, 0, 1])
     with pytest.raises(prehend.Error, match="light: a batch of 3, but others are of 2"):
         own.render(np.stack([pose()] * 2), light=np.stack([LIGHT] * 3))
+    with pytest.raises(prehend.Error, match="pose: the batch is empty"):
+        own.render(np.zeros((0, 4, 4)))
     with pytest.raises(prehend.Error, match="the mesh has no texture"):
         own.render(pose(), texels=np.zeros((2, 2, 3)))
     with pytest.raises(prehend.Error, match="focal length fx is -1 px"):

@@ -46,7 +46,7 @@ impl<'a> Input<'a> {
     }
 }
 
-/// The length of a batch of which all inputs are, None if there is no batch.
+/// The length of the batch of all inputs, at least one; None if there is no batch.
 pub(super) fn batch_of(inputs: &[(&str, Option<usize>)]) -> PyResult<Option<usize>> {
     let mut all = None;
     for (what, own) in inputs {
@@ -54,6 +54,7 @@ pub(super) fn batch_of(inputs: &[(&str, Option<usize>)]) -> PyResult<Option<usiz
             (Some(all), Some(own)) if all != own => {
                 return Err(wrong(format!("{what}: a batch of {own}, but others are of {all}")));
             }
+            (_, Some(0)) => return Err(wrong(format!("{what}: the batch is empty"))),
             (_, Some(own)) => all = Some(own),
             _ => {}
         }

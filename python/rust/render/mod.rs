@@ -10,6 +10,7 @@ pub(crate) mod pose;
 pub(crate) mod pose_loss;
 pub(crate) mod pullback;
 pub(crate) mod renderer;
+mod scenes;
 
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;

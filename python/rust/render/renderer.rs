@@ -2,22 +2,18 @@
 
 use std::sync::Arc;
 
-use nalgebra::Point3;
 use numpy::ndarray::IxDyn;
 use numpy::{PyArray, PyArrayMethods};
-use prehend_render::{Camera, Light, Mode, RenderModel, Rendering, Scene, render_each};
+use prehend_render::{Camera, Light, Mode, RenderModel, Rendering, render_each};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use super::camera::{camera, with_intrinsics};
-use super::inputs::{Input, batch_of};
-use super::light::{light, to_array};
-use super::mesh::{Look, model, single};
+use super::camera::camera;
+use super::light::to_array;
+use super::mesh::{Look, model};
 use super::mode::mode;
-use super::pose::pose;
 use super::pullback::{RenderPullback, picture};
 use crate::arrays::{Numbers, array, vector_or};
-use crate::error::{Raise, wrong};
 
 type Array<'py> = Bound<'py, PyArray<f64, IxDyn>>;
 
@@ -36,95 +32,14 @@ type Array<'py> = Bound<'py, PyArray<f64, IxDyn>>;
 /// computed in double.
 #[pyclass(frozen, module = "prehend")]
 pub(crate) struct Renderer {
-    model: Arc<RenderModel>,
-    camera: Camera,
-    mode: Mode,
-    light: Light,
-    background: [f64; 3],
+    pub(super) model: Arc<RenderModel>,
+    pub(super) camera: Camera,
+    pub(super) mode: Mode,
+    pub(super) light: Light,
+    pub(super) background: [f64; 3],
 }
-
-/// What pictures can be made with, each once for all, or a batch.
-struct Inputs<'a> {
-    pose: Input<'a>,
-    /// In the order of [`NAMES`].
-    others: [Option<Input<'a>>; 6],
-    batch: Option<usize>,
-}
-
-/// Inputs after the pose.
-const NAMES: [&str; 6] = ["vertices", "colors", "texels", "light", "background", "intrinsics"];
 
 impl Renderer {
-    fn inputs<'a>(
-        &self,
-        pose: &'a Numbers<'_>,
-        others: [&'a Option<Numbers<'_>>; 6],
-    ) -> PyResult<Inputs<'a>> {
-        let vertices = self.model.positions().len();
-        let texels = match self.model.texture() {
-            Some((width, height, _)) => vec![height, width, 3],
-            None if others[2].is_some() => return Err(wrong("texels: the mesh has no texture")),
-            None => Vec::new(),
-        };
-        let shapes: [&[usize]; 6] = [&[vertices, 3], &[vertices, 3], &texels, &[3, 5], &[3], &[4]];
-        let pose = Input::new(pose, &super::pose::SHAPE, "pose")?;
-        let mut batches = vec![("pose", pose.batch())];
-        let mut inputs = [const { None }; 6];
-        for (k, given) in others.into_iter().enumerate() {
-            if let Some(given) = given {
-                let input = Input::new(given, shapes[k], NAMES[k])?;
-                batches.push((NAMES[k], input.batch()));
-                inputs[k] = Some(input);
-            }
-        }
-        let batch = batch_of(&batches)?;
-        Ok(Inputs { pose, others: inputs, batch })
-    }
-
-    /// The model of a picture.
-    fn shaped(&self, inputs: &Inputs<'_>, picture: usize) -> PyResult<Arc<RenderModel>> {
-        let [vertices, colors, texels, ..] = &inputs.others;
-        let mut model = (*self.model).clone();
-        if let Some(vertices) = vertices {
-            let points = vertices.of(picture).as_chunks().0;
-            let points: Vec<Point3<f64>> = points.iter().map(|p: &[f64; 3]| (*p).into()).collect();
-            model = model.with_positions(&points).raise()?;
-        }
-        if let Some(colors) = colors {
-            model = model.with_colors(&single(colors.of(picture))).raise()?;
-        }
-        if let Some(texels) = texels {
-            model = model.with_texels(single(texels.of(picture))).raise()?;
-        }
-        Ok(Arc::new(model))
-    }
-
-    fn scenes(&self, inputs: &Inputs<'_>) -> PyResult<Vec<(Scene, Light)>> {
-        let [vertices, colors, texels, lights, backgrounds, intrinsics] = &inputs.others;
-        let shapes = [vertices, colors, texels].map(Option::as_ref);
-        let varied = shapes.into_iter().flatten().any(|input| input.batch().is_some());
-        let mut model = self.model.clone();
-        let mut scenes = Vec::new();
-        for picture in 0..inputs.batch.unwrap_or(1) {
-            if varied || (picture == 0 && shapes.iter().any(Option::is_some)) {
-                model = self.shaped(inputs, picture)?;
-            }
-            let mut camera = self.camera;
-            if let Some(own) = intrinsics {
-                camera = with_intrinsics(&camera, own.of(picture))?;
-            }
-            let mut scene = Scene::new(camera);
-            scene.background = match backgrounds.as_ref().map(|own| own.of(picture)) {
-                Some([r, g, b]) => [*r, *g, *b],
-                _ => self.background,
-            };
-            let pose = pose(inputs.pose.of(picture), "pose")?;
-            let light = lights.as_ref().map_or(self.light, |own| light(own.of(picture)));
-            scenes.push((scene.with(model.clone(), pose), light));
-        }
-        Ok(scenes)
-    }
-
     /// The pictures, and what carries derivatives back.
     fn rendered(
         &self,
@@ -135,11 +50,8 @@ impl Renderer {
         let inputs = self.inputs(pose, others)?;
         let scenes = self.scenes(&inputs)?;
         let renderings = py.detach(|| render_each(self.mode, &scenes));
-        let mut batched = vec![Some(inputs.pose.batch().is_some())];
-        let of = |input: &Option<Input<'_>>| input.as_ref().map(|own| own.batch().is_some());
-        batched.extend(inputs.others.iter().map(of));
         let scenes = scenes.into_iter().map(|(scene, _)| scene).collect();
-        let pullback = RenderPullback::new(scenes, batched, inputs.batch.is_some());
+        let pullback = RenderPullback::new(scenes, inputs.batched(), inputs.batch.is_some());
         Ok((renderings, pullback))
     }
 }
