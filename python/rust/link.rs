@@ -124,7 +124,7 @@ impl Matter {
         let moments = shape.moments().ok_or_else(|| wrong("the shape has no mass"));
         let density = match (mass, density) {
             (Some(_), Some(_)) => return Err(wrong("mass and density are given: one of them")),
-            (None, None) => return Ok(None),
+            (None, None) => DENSITY,
             (Some(mass), None) => {
                 mass / moments.as_ref().map_or(f64::NAN, |moments| moments.volume)
             }
