@@ -331,6 +331,8 @@ def test_torch_is_numpy() -> None:
     np.testing.assert_array_equal(vertices.grad.numpy(), gradient.vertices)
     single = torch_render.render(own, torch.tensor(poses[0], dtype=torch.float32))
     assert single.color.dtype == torch.float32 and not single.color.requires_grad
+    whole = torch_render.render(own, np.eye(4, dtype=int), light=LIGHT)
+    assert whole.color.dtype == torch.float64
     np.testing.assert_allclose(
         torch_render.perturb(at[0], torch.full((6,), 0.1, dtype=torch.float64), at[0, :3, 3]).detach().numpy(),
         prehend.perturb(poses[0], np.full(6, 0.1), poses[0, :3, 3]),

@@ -140,14 +140,14 @@ def perturb(pose: Array, twist: Array, center: Array = None) -> Array:
     generators = jnp.asarray(twist_generators(), twist.dtype)
     motion = jax.scipy.linalg.expm(jnp.einsum("k,kij->ij", twist, generators))
     if center is not None:
-        center = jnp.asarray(center)
+        center = jnp.array(center)
         motion = motion.at[:3, 3].add(center - motion[:3, :3] @ center)
-    return motion @ jnp.asarray(pose)
+    return motion @ jnp.array(pose)
 
 
 def _floating(x: Array) -> Array:
-    x = jnp.asarray(x)
-    return x if jnp.issubdtype(x.dtype, jnp.floating) else x.astype(float)
+    """As a copy: under vmap, arrays of NumPy are no constants that JAX takes."""
+    return jnp.array(x, jnp.result_type(float, x))
 
 
 def _flat(arrays: list[tuple[Array, int]]) -> tuple[tuple[int, ...], list[NDArray[np.float64]]]:

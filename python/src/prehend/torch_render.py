@@ -47,7 +47,8 @@ def render(
     is of the pose's type and device. Of the pose's upper left block the nearest rotation counts, and derivatives by it are along rotations. Derivatives are first ones.
     """
     given = (pose, vertices, colors, texels, light, background, intrinsics)
-    return Image(*_Render.apply(renderer, *given))  # type: ignore[no-untyped-call]
+    tensors = [None if x is None else torch.as_tensor(x) for x in given]
+    return Image(*_Render.apply(renderer, *tensors))  # type: ignore[no-untyped-call]
 
 
 def pose_loss(loss: PoseLoss, pose: Tensor, *, light: ArrayLike | None = None) -> Tensor:
@@ -55,7 +56,7 @@ def pose_loss(loss: PoseLoss, pose: Tensor, *, light: ArrayLike | None = None) -
 
     The light is an array (3, 5), without derivatives. Pixels are computed in single precision.
     """
-    return _PoseLoss.apply(loss, light, pose)  # type: ignore[no-any-return, no-untyped-call]
+    return _PoseLoss.apply(loss, light, torch.as_tensor(pose))  # type: ignore[no-any-return, no-untyped-call]
 
 
 def perturb(pose: Tensor, twist: Tensor, center: Tensor | None = None) -> Tensor:
@@ -74,10 +75,14 @@ def perturb(pose: Tensor, twist: Tensor, center: Tensor | None = None) -> Tensor
     return about @ pose
 
 
-def _array(tensor: Tensor | None) -> NDArray[np.float64] | None:
-    if tensor is None:
-        return None
+def _array(tensor: Tensor) -> NDArray[np.float64]:
     return tensor.detach().to("cpu", torch.float64).numpy()
+
+
+def _like(array: ArrayLike, like: Tensor) -> Tensor:
+    """As of the type and device of another tensor, in double precision if that has no fractions."""
+    dtype = like.dtype if like.is_floating_point() else torch.float64
+    return torch.as_tensor(array).to(like.device, dtype)
 
 
 class _Render(torch.autograd.Function):
@@ -85,19 +90,19 @@ class _Render(torch.autograd.Function):
     def forward(ctx: Any, renderer: Renderer, *tensors: Tensor | None) -> tuple[Tensor, ...]:  # type: ignore[override]
         pose = tensors[0]
         assert pose is not None
-        given = {name: _array(x) for name, x in zip(INPUTS, tensors, strict=True) if x is not None}
+        given: dict[str, Any] = {name: _array(x) for name, x in zip(INPUTS, tensors, strict=True) if x is not None}
         if any(ctx.needs_input_grad):
             image, ctx.pullback = renderer.vjp(**given)
         else:
             image = renderer.render(**given)
         ctx.set_materialize_grads(False)
         ctx.like = [(x.dtype, x.device) if x is not None else None for x in tensors]
-        return tuple(torch.from_numpy(x).to(pose.device, pose.dtype) for x in image)
+        return tuple(_like(x, pose) for x in image)
 
     @staticmethod
     @torch.autograd.function.once_differentiable
     def backward(ctx: Any, *adjoints: Tensor | None) -> tuple[Tensor | None, ...]:  # type: ignore[override]
-        gradient = ctx.pullback(*(_array(x) for x in adjoints))
+        gradient = ctx.pullback(*(None if x is None else _array(x) for x in adjoints))
         by_inputs: list[Tensor | None] = []
         for name, needed, like in zip(INPUTS, ctx.needs_input_grad[1:], ctx.like, strict=True):
             own = getattr(gradient, name) if needed else None
@@ -110,11 +115,11 @@ class _PoseLoss(torch.autograd.Function):
     def forward(ctx: Any, loss: PoseLoss, light: ArrayLike | None, pose: Tensor) -> Tensor:  # type: ignore[override]
         if ctx.needs_input_grad[2]:
             at = loss.linearize(_array(pose), light=light)
-            ctx.by_pose = torch.from_numpy(at.pose).to(pose.device, pose.dtype)
+            ctx.by_pose = _like(at.pose, pose)
             value = at.value
         else:
             value = loss(_array(pose), light=light)
-        return torch.as_tensor(value).to(pose.device, pose.dtype)
+        return _like(value, pose)
 
     @staticmethod
     @torch.autograd.function.once_differentiable
