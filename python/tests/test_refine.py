@@ -3,7 +3,6 @@
 import json
 import os
 import pickle
-import shutil
 import subprocess
 import threading
 import time
@@ -286,20 +285,13 @@ def dataset():
 @pytest.fixture(scope="module")
 def command():
     """Runs the command `prehend` on the frames of one scene, and returns what it prints."""
-    target = Path(os.environ.get("CARGO_TARGET_DIR", Path(__file__).parents[2] / "target"))
-    candidates = [
-        os.environ.get("PREHEND_COMMAND"),
-        target / "release" / "prehend",
-        target / "debug" / "prehend",
-        shutil.which("prehend"),
-    ]
-    found = [str(path) for path in candidates if path and os.access(path, os.X_OK)]
-    if not found:
-        pytest.skip("the command prehend is not built")
+    own = os.environ.get("PREHEND_COMMAND")
+    if own is None:
+        pytest.skip("PREHEND_COMMAND, the command prehend of the same build, is not set")
 
     def run(name, *options):
         given = ["--dataset", DATA, "--poses", DATA / "init_low.csv", "--scene", SCENE, *options]
-        command = [found[0], name, *map(str, given)]
+        command = [own, name, *map(str, given)]
         return subprocess.run(command, check=True, capture_output=True, text=True).stdout
 
     return run

@@ -184,7 +184,7 @@ def test_errors_say_what_is_wrong() -> None:
         own.vjp(pose())[1](np.zeros((2, 2, 3)))
     with pytest.raises(prehend.Error, match="there is no vertex 9"):
         prehend.Renderer((VERTICES, [[0, 1, 9]]), K, SIZE)
-    with pytest.raises(prehend.Error, match="a path is expected"):
+    with pytest.raises(prehend.Error, match="a Mesh is expected, a path"):
         prehend.Renderer(3.0, K, SIZE)
     with pytest.raises(prehend.Error, match="absent.obj"):
         prehend.Renderer("absent.obj", K, SIZE)

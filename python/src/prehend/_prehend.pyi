@@ -1,9 +1,12 @@
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from os import PathLike
-from typing import Any, Self
+from typing import Any, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from .refinement import Estimate, Tracked
+from .render import Image, LinearizedLoss, RenderGradient
 
 _Array = NDArray[np.float64]
 _Body = int | str
@@ -159,6 +162,10 @@ class World:
     def __getitem__(self, name: str) -> float: ...
     def __setitem__(self, name: str, value: float) -> None: ...
     def __contains__(self, name: str) -> bool: ...
+    def __iter__(self) -> Iterator[str]: ...
+    def __len__(self) -> int: ...
+    def __copy__(self) -> World: ...
+    def __deepcopy__(self, memo: Any) -> World: ...
     def copy(self) -> World: ...
     def add_contact(
         self,
@@ -243,3 +250,278 @@ class World:
         integrator: str = "adaptive",
         tolerance: float | None = None,
     ) -> Rollout: ...
+
+class Mesh:
+    def __new__(
+        cls,
+        vertices: ArrayLike,
+        faces: ArrayLike,
+        *,
+        colors: ArrayLike | None = None,
+        uvs: ArrayLike | None = None,
+        texture: ArrayLike | None = None,
+    ) -> Mesh: ...
+    @staticmethod
+    def load(path: str | PathLike[str], scale: float = 1.0) -> Mesh: ...
+    @property
+    def vertices(self) -> NDArray[np.float64]: ...
+    @property
+    def faces(self) -> NDArray[np.int64]: ...
+
+class Object:
+    def __new__(
+        cls,
+        mesh: Mesh,
+        *,
+        mass: float | None = None,
+        density: float | None = None,
+        com: ArrayLike | None = None,
+        inertia: ArrayLike | None = None,
+        name: str = "object",
+        seed: int = 0,
+    ) -> Object: ...
+    @property
+    def mass(self) -> float: ...
+    @property
+    def mesh(self) -> Mesh: ...
+    @property
+    def center(self) -> list[float]: ...
+
+class Hand:
+    def __new__(
+        cls, urdf: str | PathLike[str], taxels: str | PathLike[str] | None = None
+    ) -> Hand: ...
+    @property
+    def joints(self) -> list[str]: ...
+    @property
+    def taxels(self) -> list[str]: ...
+
+class Frame:
+    def __new__(
+        cls,
+        rgb: ArrayLike,
+        depth: ArrayLike,
+        K: ArrayLike,
+        object: Object | Mesh,
+        *,
+        mask: ArrayLike | None = None,
+        hand: Hand | None = None,
+        hand_pose: ArrayLike | None = None,
+        joints: Mapping[str, float] | ArrayLike | None = None,
+        touch: ArrayLike | None = None,
+        gravity: ArrayLike | None = None,
+        depth_scale: float | None = None,
+        lens: tuple[str, Sequence[float]] | None = None,
+        rig: Rig | None = None,
+    ) -> Frame: ...
+    def refine(
+        self,
+        pose: ArrayLike,
+        *,
+        method: str = "fused",
+        iterations: int | None = None,
+        rivals: ArrayLike | None = None,
+    ) -> Estimate: ...
+    def warnings(self, pose: ArrayLike) -> list[str]: ...
+    @property
+    def rgb(self) -> NDArray[np.uint8]: ...
+    @property
+    def depth(self) -> NDArray[np.float32]: ...
+    @property
+    def mask(self) -> NDArray[np.bool_]: ...
+    @property
+    def K(self) -> NDArray[np.float64]: ...
+    @property
+    def object(self) -> Object: ...
+    @property
+    def hand(self) -> Hand | None: ...
+    @property
+    def hand_pose(self) -> NDArray[np.float64] | None: ...
+    @property
+    def joints(self) -> dict[str, float] | None: ...
+    @property
+    def touch(self) -> NDArray[np.float64] | None: ...
+    @property
+    def gravity(self) -> NDArray[np.float64] | None: ...
+    @property
+    def ids(self) -> tuple[int, int, int] | None: ...
+
+class Rig:
+    @staticmethod
+    def load(path: str | PathLike[str]) -> Rig: ...
+    def save(self, path: str | PathLike[str]) -> None: ...
+    def corrected(self, object: Object, object_id: int) -> Object: ...
+    @property
+    def parameters(self) -> dict[str, float]: ...
+    @property
+    def covariance(self) -> NDArray[np.float64]: ...
+    @property
+    def objects(self) -> list[int]: ...
+
+class Tracker:
+    def __new__(
+        cls,
+        object: Object,
+        hand: Hand | None = None,
+        *,
+        pose: ArrayLike | None = None,
+        rig: Rig | None = None,
+        budget: float | None = None,
+        recovery: Literal["off", "near", "anywhere"] = "anywhere",
+    ) -> Tracker: ...
+    def push(self, frame: Frame, time: float) -> Tracked: ...
+    def start_from(self, pose: ArrayLike) -> None: ...
+
+class Dataset:
+    def __new__(
+        cls,
+        path: str | PathLike[str],
+        split: str | None = None,
+        *,
+        rig: Rig | None = None,
+        seed: int = 0,
+    ) -> Self: ...
+    @property
+    def scenes(self) -> list[int]: ...
+    def images(self, scene: int) -> list[int]: ...
+    @property
+    def objects(self) -> list[int]: ...
+    def object(self, object: int) -> Object: ...
+    def _listed(self) -> list[tuple[int, int, int, int]]: ...
+    def frame(self, scene: int, image: int, object: int, instance: int = 0) -> Frame: ...
+    def truth(self, scene: int, image: int) -> list[tuple[int, NDArray[np.float64]]]: ...
+
+def methods() -> dict[str, str]: ...
+def refine_batch(
+    frames: Sequence[Frame],
+    poses: ArrayLike | Sequence[ArrayLike],
+    *,
+    method: str = "fused",
+    iterations: int | None = None,
+    threads: int | None = None,
+) -> list[Estimate | Error]: ...
+def example_frame(seed: int = 0) -> tuple[Frame, NDArray[np.float64], NDArray[np.float64]]: ...
+def example_sequence(
+    seed: int = 0, count: int = 10
+) -> tuple[NDArray[np.float64], list[tuple[Frame, float, NDArray[np.float64]]]]: ...
+def _score(
+    dataset: Dataset, ids: Sequence[tuple[int, int, int]], poses: ArrayLike
+) -> tuple[
+    list[str], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], list[tuple[int, str]]
+]: ...
+def _calibrate(
+    dataset: Dataset,
+    ids: Sequence[tuple[int, int, int, int]],
+    poses: ArrayLike,
+    passes: int | None = None,
+    window: int | None = None,
+) -> tuple[Rig, list[str], list[str]]: ...
+
+_Mesh = Mesh | str | PathLike[str] | tuple[ArrayLike, ArrayLike]
+
+def ambient_light(strength: float = 1.0) -> _Array: ...
+def headlight(ambient: float = 0.5, head: float = 0.5) -> _Array: ...
+def perturb(pose: ArrayLike, twist: ArrayLike, center: ArrayLike | None = None) -> _Array: ...
+
+class RenderPullback:
+    def __call__(
+        self,
+        color: ArrayLike | None = None,
+        coverage: ArrayLike | None = None,
+        depth: ArrayLike | None = None,
+        normal: ArrayLike | None = None,
+        *,
+        each: bool = False,
+    ) -> RenderGradient: ...
+
+class Renderer:
+    def __init__(
+        self,
+        mesh: _Mesh,
+        K: ArrayLike,
+        size: tuple[int, int],
+        *,
+        colors: ArrayLike | None = None,
+        uvs: ArrayLike | None = None,
+        texture: ArrayLike | None = None,
+        light: ArrayLike | None = None,
+        background: ArrayLike | None = None,
+        mode: str = "contour",
+        **settings: float,
+    ) -> None: ...
+    def render(
+        self,
+        pose: ArrayLike,
+        *,
+        vertices: ArrayLike | None = None,
+        colors: ArrayLike | None = None,
+        texels: ArrayLike | None = None,
+        light: ArrayLike | None = None,
+        background: ArrayLike | None = None,
+        intrinsics: ArrayLike | None = None,
+    ) -> Image: ...
+    def vjp(
+        self,
+        pose: ArrayLike,
+        *,
+        vertices: ArrayLike | None = None,
+        colors: ArrayLike | None = None,
+        texels: ArrayLike | None = None,
+        light: ArrayLike | None = None,
+        background: ArrayLike | None = None,
+        intrinsics: ArrayLike | None = None,
+    ) -> tuple[Image, RenderPullback]: ...
+    @property
+    def vertices(self) -> _Array: ...
+    @property
+    def faces(self) -> NDArray[np.int64]: ...
+    @property
+    def colors(self) -> _Array | None: ...
+    @property
+    def texels(self) -> _Array | None: ...
+    @property
+    def light(self) -> _Array: ...
+    @property
+    def background(self) -> _Array: ...
+    @property
+    def intrinsics(self) -> _Array: ...
+    @property
+    def center(self) -> _Array: ...
+    @property
+    def size(self) -> tuple[int, int]: ...
+
+class PoseLoss:
+    def __init__(
+        self,
+        mesh: _Mesh,
+        K: ArrayLike,
+        image: ArrayLike,
+        mask: ArrayLike,
+        *,
+        depth: ArrayLike | None = None,
+        occluder: ArrayLike | None = None,
+        colors: ArrayLike | None = None,
+        uvs: ArrayLike | None = None,
+        texture: ArrayLike | None = None,
+        light: ArrayLike | None = None,
+        color_weight: float = 1.0,
+        mask_weight: float = 0.0,
+        depth_weight: float = 1.0,
+        depth_scale: float = 0.02,
+        depth_truncation: float = ...,
+        kernel: str = "squared",
+        kernel_scale: float = 0.1,
+        penalize_occluded: bool = False,
+        samples: int = 1,
+        mode: str = "contour",
+        **settings: float,
+    ) -> None: ...
+    def __call__(self, pose: ArrayLike, *, light: ArrayLike | None = None) -> Any: ...
+    def linearize(self, pose: ArrayLike, *, light: ArrayLike | None = None) -> LinearizedLoss: ...
+    def fit_light(self, pose: ArrayLike, *, margin: int = 1, most: int = 4096) -> _Array: ...
+    @property
+    def light(self) -> _Array: ...
+    @property
+    def center(self) -> _Array: ...
+    @property
+    def size(self) -> tuple[int, int]: ...

@@ -25,6 +25,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._prehend import Rollout
+from .jax_render import perturb, pose_loss, render
+
+__all__ = ["perturb", "pose_loss", "render", "rollout"]
 
 Array = Any
 """An array of JAX, or what becomes one."""
@@ -73,7 +76,8 @@ def rollout(function: Rollout, *, end: bool = False) -> RolloutOfJax:
             if controls.size:
                 raise ValueError(f"controls are missing: {', '.join(function.controls)}")
         # As copies: under vmap, arrays of NumPy are no constants that JAX takes.
-        return run(*(jnp.array(x, jnp.result_type(float, x)) for x in (states, parameters, controls)))
+        given = [jnp.array(x) for x in (states, parameters, controls)]
+        return run(*(x.astype(jnp.result_type(float, x)) for x in given))
 
     return with_defaults
 

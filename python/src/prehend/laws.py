@@ -55,10 +55,10 @@ class Dual:
         return self
 
     def __sub__(self, other: Number) -> Dual:
-        return self + (-other)
+        return self.__add__(-other)
 
     def __rsub__(self, other: Number) -> Dual:
-        return (-self) + other
+        return (-self).__add__(other)
 
     def __mul__(self, other: Number) -> Dual:
         if isinstance(other, Dual):

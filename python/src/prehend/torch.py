@@ -21,6 +21,9 @@ import torch
 from numpy.typing import NDArray
 
 from ._prehend import Rollout
+from .torch_render import perturb, pose_loss, render
+
+__all__ = ["perturb", "pose_loss", "render", "rollout"]
 
 Array = NDArray[np.float64]
 

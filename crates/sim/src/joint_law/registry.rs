@@ -16,6 +16,9 @@ use crate::contact::error::LawError;
 use crate::contact::parameters::{LawParameter, ParameterArray, Tabulated};
 use crate::contact::registry::exactly;
 
+/// Makes a law from its parameters, in order.
+type Constructor = fn(&[f64]) -> Result<Arc<dyn DynJointLaw>, LawError>;
+
 /// A law along joints, by name.
 #[derive(Clone, Debug)]
 pub struct JointLawEntry {
@@ -25,7 +28,7 @@ pub struct JointLawEntry {
     pub summary: &'static str,
     /// What it is made of, in order.
     pub parameters: Vec<LawParameter>,
-    constructor: fn(&[f64]) -> Result<Arc<dyn DynJointLaw>, LawError>,
+    constructor: Constructor,
 }
 
 impl JointLawEntry {
