@@ -9,7 +9,7 @@ use prehend_refine::rig::{Calibrated, CalibrationFrames, Calibrator, CalibratorS
 use pyo3::prelude::*;
 
 use super::dataset::Dataset;
-use super::frame::poses;
+use super::poses::poses;
 use super::rig::Rig;
 use crate::arrays::Numbers;
 use crate::error::{Raise, wrong};

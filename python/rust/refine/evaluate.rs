@@ -8,7 +8,7 @@ use prehend_refine::evaluate::metrics::{ScoredRow, Statistic, summarize};
 use pyo3::prelude::*;
 
 use super::dataset::Dataset;
-use super::frame::poses;
+use super::poses::poses;
 use crate::arrays::{Numbers, array};
 use crate::error::wrong;
 

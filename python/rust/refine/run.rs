@@ -7,7 +7,8 @@ use pyo3::prelude::*;
 use pyo3::types::PyList;
 
 use super::estimate;
-use super::frame::{Frame, poses};
+use super::frame::Frame;
+use super::poses::poses;
 use crate::arrays::Numbers;
 use crate::error::{Error, Raise, wrong};
 

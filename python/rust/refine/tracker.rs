@@ -7,9 +7,10 @@ use prehend_refine::tracker::{Recovery, TrackerSettings};
 use pyo3::prelude::*;
 
 use super::estimate;
-use super::frame::{Frame, pose};
+use super::frame::Frame;
 use super::hand::Hand;
 use super::object::Object;
+use super::poses::pose;
 use super::rig::Rig;
 use crate::arrays::Numbers;
 use crate::error::{Raise, wrong};

@@ -1,0 +1,106 @@
+//! What a frame holds, as arrays.
+
+use std::sync::Arc;
+
+use nalgebra::Vector3;
+use numpy::PyArray;
+use numpy::ndarray::IxDyn;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use super::frame::Frame;
+use super::hand::Hand;
+use super::images;
+use super::object::Object;
+use crate::arrays::{array, matrix};
+
+type Array<'py, T> = Bound<'py, PyArray<T, IxDyn>>;
+
+#[pymethods]
+impl Frame {
+    /// H × W × 3 of uint8.
+    #[getter]
+    fn rgb<'py>(&self, py: Python<'py>) -> PyResult<Array<'py, u8>> {
+        let image = &self.input.observation.color;
+        let byte = |v: &f32| (255.0 * v.clamp(0.0, 1.0)).round() as u8;
+        let pixels = image.pixels().iter().flatten().map(byte).collect();
+        images::image(py, pixels, &[image.height(), image.width(), 3])
+    }
+
+    /// H × W [m], 0 where missing.
+    #[getter]
+    fn depth<'py>(&self, py: Python<'py>) -> PyResult<Array<'py, f32>> {
+        let image = &self.input.observation.depth;
+        images::image(py, image.pixels().to_vec(), &[image.height(), image.width()])
+    }
+
+    /// H × W.
+    #[getter]
+    fn mask<'py>(&self, py: Python<'py>) -> PyResult<Array<'py, bool>> {
+        let image = &self.input.observation.mask;
+        images::image(py, image.pixels().to_vec(), &[image.height(), image.width()])
+    }
+
+    /// 3 × 3 [px].
+    #[getter]
+    #[pyo3(name = "K")]
+    fn k<'py>(&self, py: Python<'py>) -> PyResult<Array<'py, f64>> {
+        array(py, self.input.observation.camera.k().to_vec(), &[3, 3])
+    }
+
+    /// The object.
+    #[getter]
+    fn object(&self) -> Object {
+        Object { object: Arc::clone(&self.input.object) }
+    }
+
+    /// The hand, where it is known.
+    #[getter]
+    fn hand(&self) -> Option<Hand> {
+        self.input.hand.as_ref().map(|hand| Hand { hand: Arc::clone(hand) })
+    }
+
+    /// 4 × 4, camera ← base of the hand [m], where it is known.
+    #[getter]
+    fn hand_pose<'py>(&self, py: Python<'py>) -> PyResult<Option<Array<'py, f64>>> {
+        let hand = self.input.observation.hand.as_ref();
+        hand.map(|hand| matrix(py, &hand.t_cam_hand)).transpose()
+    }
+
+    /// Positions of the hand's joints by name [rad or m], where they are known.
+    #[getter]
+    fn joints<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        let (Some(hand), Some(measured)) = (&self.input.hand, &self.input.observation.hand) else {
+            return Ok(None);
+        };
+        let joints = PyDict::new(py);
+        for (name, position) in hand.tree.joint_names().iter().zip(&measured.joints) {
+            joints.set_item(name, position)?;
+        }
+        Ok(Some(joints))
+    }
+
+    /// taxels × 3 [N], where they are known.
+    #[getter]
+    fn touch<'py>(&self, py: Python<'py>) -> PyResult<Option<Array<'py, f64>>> {
+        let hand = self.input.observation.hand.as_ref();
+        let forces = hand.map(|hand| &hand.forces).filter(|forces| !forces.is_empty());
+        let numbers = |forces: &Vec<Vector3<f64>>| {
+            forces.iter().flat_map(|force| [force.x, force.y, force.z]).collect()
+        };
+        forces.map(|forces| array(py, numbers(forces), &[forces.len(), 3])).transpose()
+    }
+
+    /// In the camera frame [m/s²], where it is known.
+    #[getter]
+    fn gravity<'py>(&self, py: Python<'py>) -> PyResult<Option<Array<'py, f64>>> {
+        let gravity = self.input.observation.gravity;
+        gravity.map(|gravity| array(py, gravity.as_slice().to_vec(), &[3])).transpose()
+    }
+
+    /// Of a frame of a dataset: the numbers of scene, image and object.
+    #[getter]
+    fn ids(&self) -> Option<(u32, u32, u32)> {
+        self.target.map(|target| (target.scene_id, target.im_id, target.obj_id))
+    }
+}
