@@ -59,5 +59,8 @@ def test_mypy_in_strict_mode(tmp_path):
 
 def test_the_readme_runs(capsys):
     text = (Path(__file__).parents[1] / "README.md").read_text()
-    exec(text.split("```python")[1].split("```")[0], {})
-    assert capsys.readouterr().out
+    blocks = [block.split("```")[0] for block in text.split("```python")[1:]]
+    assert len(blocks) == 2
+    for block in blocks:
+        exec(block, {})
+        assert capsys.readouterr().out

@@ -9,7 +9,9 @@ NEEDS = {
     "arm": ["matplotlib"],
     "gymnasium_environment": ["matplotlib", "gymnasium", "torch"],
     "learn_friction_with_jax": ["matplotlib", "jax", "optax"],
+    "refine_a_frame": ["matplotlib"],
     "throw_through_a_bounce": ["matplotlib", "torch"],
+    "track_a_film": ["matplotlib"],
 }
 FOLDER = Path(__file__).parents[1] / "notebooks"
 
