@@ -3,7 +3,7 @@
 Lengths are in m, angles in rad, times in s, masses in kg; arrays are NumPy's, in double precision.
 """
 
-from . import datasets
+from . import datasets, laws
 from ._prehend import (
     Error,
     Frame,
@@ -75,6 +75,7 @@ __all__ = [
     "example_sequence",
     "headlight",
     "joint_laws",
+    "laws",
     "methods",
     "perturb",
     "refine",

@@ -6,6 +6,7 @@ has it.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -90,7 +91,8 @@ def refine(
 ) -> Estimate:
     """Refines the pose of an object in one frame: the same as `Frame(rgb, depth, K, mesh, …).refine(pose, …)`.
 
-    Camera frame: OpenCV's, x right, y down, z forward; pixel centers at integers. Python's other threads run on meanwhile.
+    Camera frame: OpenCV's, x right, y down, z forward; pixel centers at integers. Python's other threads run on meanwhile. What looks wrong with the input,
+    such as degrees or millimeters, is a Python warning, and in `Estimate.warnings`; the probability knows nothing of it.
 
     Args:
         rgb: H × W × 3 of uint8.
@@ -137,4 +139,6 @@ def refine(
         rig=rig,
     )
     estimate: Estimate = frame.refine(pose, method=method, iterations=iterations, rivals=rivals)
+    for text in estimate.warnings:
+        warnings.warn(text, stacklevel=2)
     return estimate
