@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use numpy::PyArray2;
 use prehend_geometry::mjcf::Model;
 use prehend_geometry::robot::{KinematicTree, Motion};
 use prehend_sim::{BodyId, MjcfRobot};
@@ -93,7 +92,7 @@ impl Robot {
     fn set_positions(
         &self,
         world: &World,
-        states: &Bound<'_, PyArray2<f64>>,
+        states: &Bound<'_, PyAny>,
         positions: Option<Numbers<'_>>,
     ) -> PyResult<()> {
         let robot = self

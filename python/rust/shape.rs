@@ -128,11 +128,19 @@ impl Shape {
         Self::new(SharedShape::new(mesh), None, spacing, cell)
     }
 
-    /// The mesh of a file: OBJ, PLY, STL or glTF.
+    /// The mesh of a file: OBJ, PLY, STL or glTF; `scale` is how many meters one of its units is (1e-3 for millimeters).
     #[staticmethod]
-    #[pyo3(signature = (path, *, spacing=None, cell=None))]
-    fn mesh_file(path: PathBuf, spacing: Option<f64>, cell: Option<f64>) -> PyResult<Self> {
-        let mesh = prehend_geometry::TriMesh::load(&path).raise()?;
+    #[pyo3(signature = (path, *, scale=1.0, spacing=None, cell=None))]
+    fn mesh_file(
+        path: PathBuf,
+        scale: f64,
+        spacing: Option<f64>,
+        cell: Option<f64>,
+    ) -> PyResult<Self> {
+        if !(scale.is_finite() && scale > 0.0) {
+            return Err(wrong(format!("scale: {scale} is no length")));
+        }
+        let mesh = prehend_geometry::TriMesh::load(&path).raise()?.scaled(scale);
         let vertices = mesh.vertices.iter().map(|v| Vector::new(v.x, v.y, v.z)).collect();
         let mesh = TriMesh::new(vertices, mesh.faces.clone()).raise()?;
         Self::new(SharedShape::new(mesh), None, spacing, cell)

@@ -85,8 +85,8 @@ def test_parameters_are_read_and_written_by_name():
     other["ball/floor.friction"] = 0.7
     assert (world["ball/floor.friction"], other["ball/floor.friction"]) == (0.4, 0.7)
     assert other["gravity.z"] == -9.81
-    with pytest.raises(KeyError):
-        world["ball.color"]
+    with pytest.raises(KeyError, match="do you mean 'ball.mass'"):
+        world["ball.masss"]
     with pytest.raises(prehend.Error, match="mass"):
         world["ball.mass"] = -1.0
 
@@ -103,12 +103,15 @@ def test_what_cannot_be_is_refused():
     for text, call in {
         "no contact law called": lambda: world.add_contact("ball", "floor", "glue"),
         "stiffness is missing": lambda: world.add_contact("ball", "floor", "penalty"),
-        "no parameter 'color'": lambda: world.add_contact(
+        "no parameter 'color', of stiffness": lambda: world.add_contact(
             "ball", "floor", "penalty", stiffness=1.0, damping=1.0, friction=0.0, slip_scale=1.0, color=2.0
         ),
         "there is no body 'wall'": lambda: world.pose(states, "wall"),
         "no mass": lambda: world.add_body("ghost"),
-        "no parameter called 'ball.color'": lambda: world.rollout(1e-3, 5, parameters=["ball.color"]),
+        "called 'ball.mas': do you mean 'ball.mass'": lambda: world.rollout(1e-3, 5, parameters=["ball.mas"]),
+        "'ball.mass' is named twice": lambda: world.rollout(1e-3, 5, parameters=2 * ["ball.mass"]),
+        "there is a body 'ball' already": lambda: world.add_body("ball", prehend.Shape.ball(0.1)),
+        "in double precision": lambda: world.set_pose(states.astype(np.float32), ball, [0, 0, 0]),
         "no integrator called 'euler'": lambda: world.rollout(1e-3, 5, integrator="euler"),
         "an array of n × 13": lambda: rollout(states[:, :12]),
         "1 states for 2 bodies": lambda: rollout(states[:1]),

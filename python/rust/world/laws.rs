@@ -52,16 +52,15 @@ pub(crate) fn values_of(keywords: Option<&Bound<'_, PyDict>>) -> PyResult<Values
 
 /// The values in the order of a table.
 fn ordered(law: &str, table: &[LawParameter], mut values: Values) -> PyResult<Vec<f64>> {
+    let known = || table.iter().map(|p| p.name).collect::<Vec<_>>().join(", ");
+    if let Some(name) = values.keys().find(|name| table.iter().all(|p| p.name != **name)) {
+        return Err(wrong(format!("{law}: there is no parameter '{name}', of {}", known())));
+    }
     let take = |p: &LawParameter| {
-        let known = || table.iter().map(|p| p.name).collect::<Vec<_>>().join(", ");
         let value = values.remove(p.name);
         value.ok_or_else(|| wrong(format!("{law}: {} is missing, of {}", p.name, known())))
     };
-    let ordered = table.iter().map(take).collect::<PyResult<Vec<f64>>>()?;
-    match values.keys().next() {
-        Some(name) => Err(wrong(format!("{law}: there is no parameter '{name}'"))),
-        None => Ok(ordered),
-    }
+    table.iter().map(take).collect()
 }
 
 /// A contact law: of a name with parameters, or an object with a method `law`.

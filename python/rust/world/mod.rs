@@ -6,10 +6,11 @@ pub(crate) mod laws;
 mod sensors;
 pub(crate) mod states;
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 use nalgebra::Vector3;
 use prehend_sim::{Body, BodyId, RigidBody, RolloutFunction, TimeSteps};
+use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
 
 use crate::arrays::{Numbers, vector_or};
@@ -54,8 +55,7 @@ impl World {
         &mut self,
         change: impl FnOnce(&mut prehend_sim::World) -> PyResult<()>,
     ) -> PyResult<BTreeMap<String, String>> {
-        let before: std::collections::HashSet<String> =
-            self.world.parameter_names().into_iter().collect();
+        let before: HashSet<String> = self.world.parameter_names().into_iter().collect();
         let mut grown = self.world.clone();
         change(&mut grown)?;
         self.world = grown;
@@ -70,9 +70,17 @@ impl World {
     }
 
     fn place(&self, name: &str) -> PyResult<usize> {
-        let found = self.world.parameter_names().iter().position(|own| own == name);
-        found.ok_or_else(|| pyo3::exceptions::PyKeyError::new_err(name.to_owned()))
+        let names = self.world.parameter_names();
+        let found = names.iter().position(|own| own == name);
+        found.ok_or_else(|| PyKeyError::new_err(unknown(name, &names)))
     }
+}
+
+/// What is said of a parameter that there is not.
+fn unknown(name: &str, names: &[String]) -> String {
+    let near = names.iter().max_by(|a, b| strsim::jaro(a, name).total_cmp(&strsim::jaro(b, name)));
+    let near = near.map_or_else(String::new, |near| format!(": do you mean '{near}'?"));
+    format!("the world has no parameter called '{name}'{near}")
 }
 
 #[pymethods]
@@ -100,6 +108,9 @@ impl World {
         com: Option<Numbers<'_>>,
         inertia: Option<Numbers<'_>>,
     ) -> PyResult<usize> {
+        if self.world.body_named(name).is_some() {
+            return Err(wrong(format!("there is a body '{name}' already")));
+        }
         let shape = shape.map(|shape| &shape.shape);
         let given = mass.or(density).is_some() || inertia.is_some();
         let matter = match fixed {
@@ -206,14 +217,23 @@ impl World {
         tolerance: Option<f64>,
     ) -> PyResult<Rollout> {
         let integrator = AnyIntegrator::of(integrator, tolerance)?;
+        let (names, all) = (self.world.parameter_names(), self.world.parameters());
+        let known: HashMap<&String, f64> = names.iter().zip(all).collect();
+        let mut seen = HashSet::new();
+        for name in parameters.iter().chain(&controls) {
+            if !known.contains_key(name) {
+                return Err(wrong(unknown(name, &names)));
+            }
+            if !seen.insert(name) {
+                return Err(wrong(format!("the parameter '{name}' is named twice")));
+            }
+        }
         let own: Vec<&str> = parameters.iter().map(String::as_str).collect();
         let each_step: Vec<&str> = controls.iter().map(String::as_str).collect();
         let time_steps = TimeSteps { dt, steps };
         let function =
             RolloutFunction::with_integrator(integrator, &self.world, time_steps, &own, &each_step)
                 .raise()?;
-        let (names, all) = (self.world.parameter_names(), self.world.parameters());
-        let known: HashMap<&String, f64> = names.iter().zip(all).collect();
         let values = parameters.iter().filter_map(|name| known.get(name).copied()).collect();
         Ok(Rollout::new(function, parameters, controls, values))
     }

@@ -22,9 +22,12 @@ pub(crate) fn states(rows: &Numbers<'_>) -> PyResult<Vec<State>> {
 
 /// Lets `edit` change the states in the rows of an array, which stays as it was if that fails.
 pub(crate) fn change(
-    rows: &Bound<'_, PyArray2<f64>>,
+    rows: &Bound<'_, PyAny>,
     edit: impl FnOnce(&mut [State]) -> PyResult<()>,
 ) -> PyResult<()> {
+    let rows = rows.cast::<PyArray2<f64>>().map_err(|_| {
+        wrong("states: an array of n × 13 in double precision is expected, which is written to")
+    })?;
     let mut rows = rows.try_readwrite().raise()?;
     let mut array = rows.as_array_mut();
     if array.ncols() != STATE {
@@ -60,7 +63,7 @@ impl World {
     #[pyo3(signature = (states, body, pose, *, velocity=None, angular_velocity=None))]
     fn set_pose(
         &self,
-        states: &Bound<'_, PyArray2<f64>>,
+        states: &Bound<'_, PyAny>,
         body: BodyKey,
         pose: Numbers<'_>,
         velocity: Option<Numbers<'_>>,
@@ -113,7 +116,7 @@ impl World {
     #[pyo3(signature = (states, link, position, velocity=None))]
     fn set_joint(
         &self,
-        states: &Bound<'_, PyArray2<f64>>,
+        states: &Bound<'_, PyAny>,
         link: BodyKey,
         position: Numbers<'_>,
         velocity: Option<Numbers<'_>>,

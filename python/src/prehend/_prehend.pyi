@@ -57,7 +57,11 @@ class Shape:
     ) -> Shape: ...
     @staticmethod
     def mesh_file(
-        path: str | PathLike[str], *, spacing: float | None = None, cell: float | None = None
+        path: str | PathLike[str],
+        *,
+        scale: float = 1.0,
+        spacing: float | None = None,
+        cell: float | None = None,
     ) -> Shape: ...
     @staticmethod
     def half_space(normal: ArrayLike | None = None) -> Shape: ...
