@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use prehend_geometry::mjcf::Model;
 use prehend_sim::articulated::Joint;
-use prehend_sim::{BodyId, JointAxis, MjcfError, MjcfOptions, TimeSteps, World};
+use prehend_sim::{BodyId, JointAxis, MjcfError, MjcfOptions, ShapeOptions, TimeSteps, World};
 
 const MODEL: &str = r#"<mujoco model="authored"><compiler angle="radian"/><worldbody>
     <geom name="ground" type="plane" size="1 1 .1"/>
@@ -148,10 +148,13 @@ fn a_model_hangs_on_the_joint_that_is_asked_for_and_has_shapes_if_wanted() {
 fn a_model_that_cannot_be_leaves_the_world_as_it_was() {
     let flawed = r#"<mujoco><worldbody><body name="light"><joint name="hinge" type="hinge"/>
         <inertial mass="1" pos="0 0 0" diaginertia="1 1 1"/>
-        <geom type="box" size="0.1 0.1 1e-9"/></body></worldbody></mujoco>"#;
+        <geom type="box" size="0.1 0.1 0.1"/></body></worldbody></mujoco>"#;
     let model = Model::from_str(flawed, None).unwrap();
     let mut world = World::new(model.gravity);
-    let error = world.add_mjcf(&model, &MjcfOptions::default()).unwrap_err();
+    // Edges rounder than the box is wide.
+    let shape_options = ShapeOptions { rounding: Some(1.0), ..ShapeOptions::default() };
+    let options = MjcfOptions { shape_options, ..MjcfOptions::default() };
+    let error = world.add_mjcf(&model, &options).unwrap_err();
     assert!(matches!(&error, MjcfError::Shape { body, .. } if body == "light"), "{error}");
     assert!(world.bodies.is_empty() && world.articulations.is_empty());
     assert!(world.joint_forces.is_empty());
