@@ -106,7 +106,7 @@ impl<S: Scalar> World<S> {
     }
 
     /// [`World::simulate_with`] of what has begun.
-    fn audited(
+    pub(crate) fn audited(
         &self,
         integrator: &impl Integrator,
         initial: Vec<State<S>>,

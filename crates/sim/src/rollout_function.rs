@@ -159,8 +159,7 @@ impl<I: Integrator> RolloutFunction<I> {
         if !reserved {
             return Err(SimulationError::Memory { steps: self.time_steps.steps });
         }
-        let end = self.march(inputs, |states| run.extend(coordinates_of(states)))?;
-        run.extend(coordinates_of(&end));
+        self.march(inputs, |states| run.extend(coordinates_of(states)))?;
         Ok(run)
     }
 
@@ -172,35 +171,28 @@ impl<I: Integrator> RolloutFunction<I> {
         Ok(coordinates_of(&self.march(inputs, |_| ())?).collect())
     }
 
-    /// The states at the end; those before each step go to `visit`.
+    /// The states at the end; those at the start and after each step go to `visit`.
     fn march<S: Scalar>(
         &self,
         inputs: RolloutInputs<'_, S>,
         mut visit: impl FnMut(&[State<S>]),
     ) -> Result<Vec<State<S>>, SimulationError> {
         self.check(&inputs)?;
-        let integrator = &self.scene.integrator;
+        let (integrator, time_steps) = (&self.scene.integrator, self.time_steps);
         let initial: Vec<State<S>> = states_of(inputs.states).collect();
+        let world = self.scene.world(&self.places, &self.values_at(&inputs, 0))?;
+        let mut states = world.begin(&initial, time_steps)?;
+        visit(&states);
         let [_, controls] = self.inputs();
         if controls == 0 {
-            let world = self.scene.world(&self.places, inputs.parameters)?;
-            // What is seen after a step is what comes before the next.
-            let mut last = world.begin(&initial, self.time_steps)?;
-            let follow = |_, states: &[State<S>]| {
-                visit(&last);
-                last.copy_from_slice(states);
-            };
-            return Ok(world.simulate_with(integrator, &initial, self.time_steps, follow)?.states);
+            let follow = |_, states: &[State<S>]| visit(states);
+            return Ok(world.audited(integrator, states, time_steps, follow)?.states);
         }
-        let mut states = Vec::new();
         for step in self.steps() {
             let world = self.scene.world(&self.places, &self.values_at(&inputs, step.index))?;
-            if step.index == 0 {
-                states = world.begin(&initial, self.time_steps)?;
-            }
-            visit(&states);
             world.check(&states, step)?;
             states = world.advance(integrator, &states, step)?;
+            visit(&states);
         }
         Ok(states)
     }

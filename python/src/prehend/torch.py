@@ -21,7 +21,7 @@ import torch
 from numpy.typing import NDArray
 
 from ._prehend import Rollout
-from .torch_render import perturb, pose_loss, render
+from .torch_render import _array, perturb, pose_loss, render
 
 __all__ = ["perturb", "pose_loss", "render", "rollout"]
 
@@ -44,10 +44,8 @@ def rollout(
     return _Rollout.apply(function, end, *given)  # type: ignore[no-any-return, no-untyped-call]
 
 
-def _array(tensor: torch.Tensor | None) -> Array | None:
-    if tensor is None:
-        return None
-    return tensor.detach().to("cpu", torch.float64).numpy()
+def _given(tensor: torch.Tensor | None) -> Array | None:
+    return None if tensor is None else _array(tensor)
 
 
 def _like(array: Array, like: torch.Tensor) -> torch.Tensor:
@@ -67,12 +65,8 @@ class _Rollout(torch.autograd.Function):
         controls: torch.Tensor | None,
     ) -> torch.Tensor:
         needed = any(ctx.needs_input_grad)
-        run = function(
-            states.detach().to("cpu", torch.float64).numpy(),
-            _array(parameters),
-            _array(controls),
-            end=end and not needed,
-        )
+        others = map(_given, (parameters, controls))
+        run = function(_array(states), *others, end=end and not needed)
         if not needed:
             return _like(run, states)
         ctx.function = function
@@ -84,8 +78,7 @@ class _Rollout(torch.autograd.Function):
     @torch.autograd.function.once_differentiable
     def backward(ctx: Any, adjoints: torch.Tensor) -> tuple[torch.Tensor | None, ...]:  # type: ignore[override]
         *inputs, run = ctx.saved_tensors
-        own = adjoints.detach().to("cpu", torch.float64).contiguous().numpy()
-        gradients = ctx.function.pullback(run.numpy(), own, *map(_array, inputs))
+        gradients = ctx.function.pullback(run.numpy(), _array(adjoints), *map(_given, inputs))
         by_inputs = [
             _like(gradient, like) if needed else None
             for needed, like, gradient in zip(
