@@ -121,12 +121,12 @@ def test_less_may_be_known(example):
         ({"rgb": np.zeros((4, 4), np.uint8)}, "rgb: an array of H × W × 3 of uint8"),
         ({"rgb": np.zeros((480, 640, 3))}, "rgb: .* of float64"),
         ({"depth": np.zeros((4, 4, 1))}, "depth: an array of H × W is expected"),
-        ({"depth": np.zeros((4, 4))}, "the depth image has 4x4 pixels, the camera has 640x480"),
+        ({"depth": np.zeros((4, 4))}, r"depth: \[4, 4\], but rgb is \[480, 640\]"),
         ({"depth": np.zeros((480, 640), np.uint16)}, "whole numbers need depth_scale"),
         ({"depth": np.zeros((480, 640), np.uint16), "depth_scale": -1}, "depth_scale: -1"),
         ({"depth": np.zeros((480, 640), complex)}, "depth: numbers are expected, not complex128"),
         ({"mask": np.zeros((480, 640))}, "mask: booleans or whole numbers"),
-        ({"mask": np.zeros((4, 4), bool)}, "the mask has 4x4 pixels"),
+        ({"mask": np.zeros((4, 4), bool)}, r"mask: \[4, 4\], but rgb is \[480, 640\]"),
         ({"K": np.eye(4)}, "K: a matrix of 3 × 3"),
         ({"K": np.zeros((3, 3))}, "K: "),
         ({"hand": None}, "hand, hand_pose and joints: each needs the others"),
@@ -135,6 +135,7 @@ def test_less_may_be_known(example):
         ({"joints": [0.0]}, "joint"),
         ({"joints": {"elbow": 0.0}}, "elbow"),
         ({"touch": np.zeros((2, 3))}, "2 taxel forces were given for"),
+        ({"hand": None, "hand_pose": None, "joints": None}, "touch: it needs hand, hand_pose and joints"),
         ({"touch": np.zeros(3)}, "touch: an array of n × 3"),
         ({"gravity": [0, 0, 9810.0]}, "gravity: .* is no gravity"),
         ({"lens": ("pinhole", [])}, "pinhole"),
@@ -153,11 +154,13 @@ def test_a_frame_that_cannot_be_refined_says_why(example):
         frame.refine(initial[:3])
     with pytest.raises(prehend.Error, match="pose: value 0 is not finite"):
         frame.refine(np.where(initial == initial[0, 0], np.nan, initial))
+    with pytest.raises(prehend.Error, match="iterations: at least 1"):
+        frame.refine(initial, iterations=0)
     behind = initial.copy()
     behind[2, 3] = -1.0
     with pytest.raises(prehend.Error, match="behind the camera"):
         frame.refine(behind)
-    with pytest.raises(prehend.Error, match="mask is empty"):
+    with pytest.raises(prehend.Error, match="mask is empty or missing"):
         prehend.Frame(**inputs(frame, mask=None)).refine(initial)
     assert any("behind the camera" in text for text in frame.warnings(behind))
 
@@ -178,6 +181,8 @@ def test_objects_and_meshes(tmp_path):
     lines = [f"v {x} {y} {z}" for x, y, z in 100 * corners]
     off.write_text("\n".join(lines + [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in faces]))
     assert np.allclose(prehend.Mesh.load(off, scale=1e-3).vertices.max(0), 0.1)
+    with pytest.raises(TypeError, match=r"an Object or a Mesh is expected, not str; Mesh.load\(path\)"):
+        prehend.Tracker("box.obj")
     with pytest.raises(prehend.Error, match="not closed"):
         prehend.Object(prehend.Mesh(corners, faces[:5]))
     with pytest.raises(prehend.Error, match="give one of mass, density"):
@@ -255,7 +260,7 @@ def test_an_object_is_followed():
         prehend.Tracker(first.object, budget=-1.0)
     with pytest.raises(prehend.Error, match="time"):
         tracker.push(first, float("nan"))
-    with pytest.raises(prehend.Error, match="mask is empty"):
+    with pytest.raises(prehend.Error, match="mask is empty or missing"):
         prehend.Tracker(first.object, first.hand, pose=initial).push(blind, 0.0)
 
 

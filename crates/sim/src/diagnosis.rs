@@ -87,12 +87,7 @@ impl<S: Scalar> World<S> {
 
     /// The force of a contact \[N\], infinite if it is no number.
     fn load(&self, pair: &ContactPair<S>, states: &[State<S>]) -> f64 {
-        let force = self
-            .effect(pair, states, None, 1)
-            .on_samples
-            .fixed_rows::<3>(0)
-            .map(|x| x.value())
-            .norm();
+        let force = self.force(pair, states);
         if force.is_nan() { f64::INFINITY } else { force }
     }
 

@@ -27,6 +27,7 @@ mod diagnosis;
 mod equilibrium;
 mod error;
 pub mod fields;
+mod first_order;
 pub mod guide;
 mod integrator;
 mod joint_law;

@@ -1,7 +1,6 @@
 //! Rigs learnt from frames of a dataset.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::num::NonZeroUsize;
 use std::sync::Arc;
 
 use prehend_refine::data::{AssetError, Assets, Target, user_cache};
@@ -11,24 +10,22 @@ use pyo3::prelude::*;
 use super::dataset::Dataset;
 use super::poses::poses;
 use super::rig::Rig;
+use super::run::at_least_one;
 use crate::arrays::Numbers;
 use crate::error::{Raise, wrong};
-
-/// Passes over all frames, at most, if nothing is said.
-const PASSES: usize = 6;
 
 /// `prehend.calibrate` is made of it: the rig, what is to be said of frames that were left out, and what is wrong with others. `ids` are the numbers of
 /// scene, image, object and mask of each pose.
 #[pyfunction]
-#[pyo3(signature = (dataset, ids, poses, passes=None, window=None))]
+#[pyo3(signature = (dataset, ids, poses, passes=6, window=None))]
 #[allow(clippy::type_complexity)] // as Python has it
 pub(crate) fn _calibrate(
     py: Python<'_>,
     dataset: &Dataset,
     ids: Vec<(u32, u32, u32, usize)>,
     poses: Numbers<'_>,
-    passes: Option<NonZeroUsize>,
-    window: Option<NonZeroUsize>,
+    passes: usize,
+    window: Option<usize>,
 ) -> PyResult<(Rig, Vec<String>, Vec<String>)> {
     let poses = self::poses(&poses, "poses")?;
     if poses.len() != ids.len() {
@@ -38,7 +35,8 @@ pub(crate) fn _calibrate(
         |&(scene_id, im_id, obj_id, instance)| Target { scene_id, im_id, obj_id, instance };
     let told: Vec<_> = ids.iter().map(target).zip(poses).collect();
     let targets: Vec<Target> = told.iter().map(|(target, _)| *target).collect();
-    let passes = passes.or(NonZeroUsize::new(PASSES)).unwrap_or(NonZeroUsize::MIN);
+    let passes = at_least_one(passes, "passes")?;
+    let window = window.map(|window| at_least_one(window, "window")).transpose()?;
     let source = Arc::clone(&dataset.dataset);
     let learn = move || -> Result<Calibrated, AssetError> {
         // Frames as they are, whatever rig the dataset is read with.

@@ -1,6 +1,5 @@
 //! Frames: all that is known of one moment.
 
-use std::num::NonZeroUsize;
 use std::sync::Arc;
 
 use numpy::PyUntypedArrayMethods;
@@ -12,7 +11,7 @@ use pyo3::prelude::*;
 
 use super::hand::Hand;
 use super::measured::{Joints, measured};
-use super::object::AnyObject;
+use super::object::prepared;
 use super::poses::{pose, poses};
 use super::rig::Rig;
 use super::{estimate, images, run};
@@ -41,11 +40,10 @@ impl Frame {
                         lens=None, rig=None))]
     #[allow(clippy::too_many_arguments, non_snake_case)] // as many as Python names, and as everybody calls it
     fn new(
-        py: Python<'_>,
         rgb: Bound<'_, PyAny>,
         depth: Bound<'_, PyAny>,
         K: Numbers<'_>,
-        object: AnyObject<'_>,
+        object: Bound<'_, PyAny>,
         mask: Option<Bound<'_, PyAny>>,
         hand: Option<&Hand>,
         hand_pose: Option<Numbers<'_>>,
@@ -61,9 +59,18 @@ impl Frame {
         let k: [f64; 9] = <[f64; 9]>::try_from(&*in_order(&K))
             .map_err(|_| wrong(format!("K: a matrix of 3 × 3 is expected, not {:?}", K.shape())))?;
         let camera = Camera::from_k(k, width, height).map_err(|e| wrong(format!("K: {e}")))?;
+        let sized = |what: &str, size: [usize; 2]| match size == [height, width] {
+            true => Ok(()),
+            false => Err(wrong(format!("{what}: {size:?}, but rgb is {:?}", [height, width]))),
+        };
         let depth = images::depth(&depth, depth_scale)?;
+        sized("depth", [depth.height(), depth.width()])?;
         let mask = match &mask {
-            Some(mask) => images::mask(mask)?,
+            Some(mask) => {
+                let mask = images::mask(mask)?;
+                sized("mask", [mask.height(), mask.width()])?;
+                mask
+            }
             None => Mask::filled(width, height, false),
         };
         let gravity = gravity.map(|gravity| vector(&gravity, "gravity")).transpose()?;
@@ -75,9 +82,10 @@ impl Frame {
                 Some(measured(&hand.hand, pose, joints, touch.as_ref())?)
             }
             (None, None, None) if touch.is_none() => None,
+            (None, None, None) => return Err(wrong("touch: it needs hand, hand_pose and joints")),
             _ => return Err(wrong("hand, hand_pose and joints: each needs the others")),
         };
-        let object = object.prepared(py)?;
+        let object = prepared(&object)?;
         let mut observation = Observation { camera, color, depth, mask, gravity, hand: measured };
         let hand = hand.map(|hand| Arc::clone(&hand.hand));
         let check = |observation: &Observation| {
@@ -111,7 +119,7 @@ impl Frame {
         py: Python<'py>,
         pose: Numbers<'py>,
         method: &str,
-        iterations: Option<NonZeroUsize>,
+        iterations: Option<usize>,
         rivals: Option<Numbers<'py>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let method = run::method(method, iterations)?;

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use nalgebra::Point3;
 use prehend_geometry::mass::mass_properties;
 use prehend_refine::scene::Inertial;
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 
 use super::mesh::Mesh;
@@ -20,27 +21,23 @@ pub(crate) struct Object {
     pub(super) object: Arc<prehend_refine::Object>,
 }
 
-/// An object, or a mesh that becomes one.
-#[derive(FromPyObject)]
-pub(super) enum AnyObject<'py> {
-    Object(Bound<'py, Object>),
-    Mesh(Bound<'py, Mesh>),
-}
-
-impl AnyObject<'_> {
-    /// The object; a mesh is prepared, with a mass that is assumed.
-    pub(super) fn prepared(&self, py: Python<'_>) -> PyResult<Arc<prehend_refine::Object>> {
-        match self {
-            Self::Object(object) => Ok(Arc::clone(&object.get().object)),
-            Self::Mesh(mesh) => {
-                let mesh = mesh.get().mesh.clone();
-                let object = py
-                    .detach(|| prehend_refine::Object::with_mass("object", mesh, None, 0))
-                    .raise()?;
-                Ok(Arc::new(object))
-            }
-        }
+/// The object that Python gave; a mesh is prepared, with a mass that is assumed.
+pub(super) fn prepared(given: &Bound<'_, PyAny>) -> PyResult<Arc<prehend_refine::Object>> {
+    if let Ok(object) = given.cast::<Object>() {
+        return Ok(Arc::clone(&object.get().object));
     }
+    let Ok(mesh) = given.cast::<Mesh>() else {
+        let kind = given.get_type();
+        let text = format!(
+            "an Object or a Mesh is expected, not {}; Mesh.load(path) reads one from a file",
+            kind.name()?
+        );
+        return Err(PyTypeError::new_err(text));
+    };
+    let mesh = mesh.get().mesh.clone();
+    let object =
+        given.py().detach(|| prehend_refine::Object::with_mass("object", mesh, None, 0)).raise()?;
+    Ok(Arc::new(object))
 }
 
 #[pymethods]

@@ -12,15 +12,20 @@ use super::poses::poses;
 use crate::arrays::Numbers;
 use crate::error::{Error, Raise, wrong};
 
+/// A number that may not be 0.
+pub(super) fn at_least_one(number: usize, what: &str) -> PyResult<NonZeroUsize> {
+    NonZeroUsize::new(number).ok_or_else(|| wrong(format!("{what}: at least 1 is expected")))
+}
+
 /// The method of that name.
-pub(super) fn method(name: &str, iterations: Option<NonZeroUsize>) -> PyResult<Method> {
+pub(super) fn method(name: &str, iterations: Option<usize>) -> PyResult<Method> {
     let unknown = || {
         let names: Vec<_> = NamedMethod::all().iter().map(|method| method.name).collect();
         wrong(format!("method: '{name}' is unknown: one of {}", names.join(", ")))
     };
     let mut method = Method::named(name).ok_or_else(unknown)?;
     if let Some(iterations) = iterations {
-        method.set_iterations(iterations.get());
+        method.set_iterations(at_least_one(iterations, "iterations")?.get());
     }
     Ok(method)
 }
@@ -42,10 +47,11 @@ pub(crate) fn refine_batch<'py>(
     frames: Vec<Py<Frame>>,
     poses: Numbers<'py>,
     method: &str,
-    iterations: Option<NonZeroUsize>,
-    threads: Option<NonZeroUsize>,
+    iterations: Option<usize>,
+    threads: Option<usize>,
 ) -> PyResult<Bound<'py, PyList>> {
     let method = self::method(method, iterations)?;
+    let threads = threads.map(|threads| at_least_one(threads, "threads")).transpose()?;
     let poses = self::poses(&poses, "poses")?;
     let (count, given) = (frames.len(), poses.len());
     if given != count {

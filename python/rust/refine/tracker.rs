@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use super::estimate;
 use super::frame::Frame;
 use super::hand::Hand;
-use super::object::Object;
+use super::object::prepared;
 use super::poses::pose;
 use super::rig::Rig;
 use crate::arrays::Numbers;
@@ -35,7 +35,7 @@ impl Tracker {
     #[new]
     #[pyo3(signature = (object, hand=None, *, pose=None, rig=None, budget=None, recovery="anywhere"))]
     fn new(
-        object: &Object,
+        object: Bound<'_, PyAny>,
         hand: Option<&Hand>,
         pose: Option<Numbers<'_>>,
         rig: Option<&Rig>,
@@ -46,7 +46,7 @@ impl Tracker {
         let budget = budget.map(|budget| seconds(budget, "budget")).transpose()?;
         let settings = TrackerSettings { budget, recovery, ..TrackerSettings::default() };
         let hand = hand.map(|hand| Arc::clone(&hand.hand));
-        let object = Arc::clone(&object.object);
+        let object = prepared(&object)?;
         let mut tracker = prehend_refine::tracker::Tracker::new(object, hand, settings).raise()?;
         if let Some(rig) = rig {
             tracker = tracker.with_rig(Arc::clone(&rig.rig));

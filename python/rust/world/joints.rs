@@ -87,17 +87,18 @@ impl World {
     #[pyo3(signature = (path, *, pose=None, floating=false, shapes=true))]
     fn add_mjcf(
         &mut self,
+        py: Python<'_>,
         path: PathBuf,
         pose: Option<Numbers<'_>>,
         floating: bool,
         shapes: bool,
     ) -> PyResult<Robot> {
-        let model = Model::from_file(&path).raise()?;
         let t_world_model = self::pose(pose.as_ref(), "pose")?;
         let options =
             MjcfOptions { t_world_model, base: base(floating), shapes, ..MjcfOptions::default() };
         let before = self.world.parameter_names();
-        let robot = self.world.add_mjcf(&model, &options).raise()?;
+        let model = Model::from_file(&path).raise()?;
+        let robot = py.detach(|| self.world.add_mjcf(&model, &options)).raise()?;
         Ok(Robot::of_mjcf(&model, robot, &self.world, &before))
     }
 
@@ -106,6 +107,7 @@ impl World {
     #[pyo3(signature = (path, *, pose=None, floating=false, shapes=true))]
     fn add_urdf(
         &mut self,
+        py: Python<'_>,
         path: PathBuf,
         pose: Option<Numbers<'_>>,
         floating: bool,
@@ -113,7 +115,8 @@ impl World {
     ) -> PyResult<Robot> {
         let robot = KinematicTree::from_urdf_file(&path).raise()?;
         let [spacing, margin] = LINK_GRID;
-        let shape = shapes.then(|| RobotShape::new(&robot, spacing, margin)).transpose().raise()?;
+        let shape = || shapes.then(|| RobotShape::new(&robot, spacing, margin)).transpose();
+        let shape = py.detach(shape).raise()?;
         let t_world_base = self::pose(pose.as_ref(), "pose")?;
         let options = UrdfOptions { t_world_base, base: base(floating), ..UrdfOptions::default() };
         let bodies = self.world.add_articulated_robot(&robot, shape.as_ref(), &options).raise()?;

@@ -365,7 +365,7 @@ class Rig:
 class Tracker:
     def __new__(
         cls,
-        object: Object,
+        object: Object | Mesh,
         hand: Hand | None = None,
         *,
         pose: ArrayLike | None = None,
@@ -417,7 +417,7 @@ def _calibrate(
     dataset: Dataset,
     ids: Sequence[tuple[int, int, int, int]],
     poses: ArrayLike,
-    passes: int | None = None,
+    passes: int = 6,
     window: int | None = None,
 ) -> tuple[Rig, list[str], list[str]]: ...
 

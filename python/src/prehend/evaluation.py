@@ -64,7 +64,7 @@ def evaluate(dataset: Bop, poses: Poses) -> Scores:
 
 
 def calibrate(
-    dataset: Bop, poses: Poses, *, passes: int | None = None, window: int | None = None
+    dataset: Bop, poses: Poses, *, passes: int = 6, window: int | None = None
 ) -> Rig:
     """Learns a rig from frames of a dataset in which the poses of objects are roughly known: what camera, hand and models get wrong in all of them. As
     `prehend calibrate` has it, with up to 6 `passes` over all frames, or over each `window` of so many.

@@ -1,13 +1,14 @@
 //! Wrench and rate of the deflection of a contact that sticks.
 
 use nalgebra::{Matrix3x6, Matrix6, Vector3, Vector6};
-use prehend_autodiff::{LocalFunction, Scalar};
+use prehend_autodiff::{Fwd, LocalFunction, Scalar};
 
 use super::bristle_law::BristleLaw;
 use super::bristles::Bristles;
 use super::dynamic::DynContactLaw;
 use super::moved::{LiftedContact, MovedPatch};
 use super::patch::{Patch, Touch};
+use crate::first_order::{Linearized, first_order, linearized};
 
 /// Depth over which bristles take hold, in multiples of their deflection.
 const TAKE_HOLD: f64 = 0.1;
@@ -27,17 +28,86 @@ pub(crate) struct BristleFunction<'a> {
 }
 
 impl LocalFunction<18, 12> for BristleFunction<'_> {
+    #[inline]
     fn evaluate<S: Scalar>(&self, change: [S; 18]) -> [S; 12] {
-        self.response(&self.constants(), &change, None)
+        match S::ORDER {
+            0 => self.value(&change.map(S::value)).map(S::constant),
+            _ => first_order(&self.derivatives(change.map(S::value)), &change),
+        }
+    }
+
+    fn linearize(&self, change: [f64; 18]) -> Option<Linearized<18, 12>> {
+        Some(self.derivatives(change))
+    }
+
+    fn derivative_along(&self, x: [f64; 18], along: [f64; 18]) -> Option<([f64; 12], [f64; 12])> {
+        Some(self.directional(&x, &along))
     }
 }
 
 /// Also of the place of the patch's point from the center of mass, after the rest.
 impl LocalFunction<21, 12> for BristleFunction<'_> {
+    #[inline]
     fn evaluate<S: Scalar>(&self, change: [S; 21]) -> [S; 12] {
-        let [.., x, y, z] = change;
-        self.response(&self.constants(), &change, Some(&Vector3::new(x, y, z)))
+        match S::ORDER {
+            0 => self.value(&change.map(S::value)).map(S::constant),
+            _ => first_order(&self.derivatives_about(change.map(S::value)), &change),
+        }
     }
+
+    fn linearize(&self, change: [f64; 21]) -> Option<Linearized<21, 12>> {
+        Some(self.derivatives_about(change))
+    }
+
+    fn derivative_along(&self, x: [f64; 21], along: [f64; 21]) -> Option<([f64; 12], [f64; 12])> {
+        Some(self.directional(&x, &along))
+    }
+}
+
+// Not generic: compiled here.
+impl BristleFunction<'_> {
+    fn value(&self, change: &[f64]) -> [f64; 12] {
+        self.response(self.p, change, about(change).as_ref())
+    }
+
+    fn derivatives(&self, change: [f64; 18]) -> Linearized<18, 12> {
+        linearized(self.response(&self.constants(), &Fwd::variables(change), None))
+    }
+
+    fn derivatives_about(&self, change: [f64; 21]) -> Linearized<21, 12> {
+        let change = Fwd::variables(change);
+        linearized(self.response(&self.constants(), &change, about(&change).as_ref()))
+    }
+
+    fn directional(&self, x: &[f64], along: &[f64]) -> ([f64; 12], [f64; 12]) {
+        let pairs = x.iter().zip(along);
+        let change: Vec<Fwd<1>> =
+            pairs.map(|(&value, &slope)| Fwd { value, derivative: [slope] }).collect();
+        let results = self.response(&self.constants(), &change, about(&change).as_ref());
+        (results.map(|y| y.value), results.map(|y| y.derivative[0]))
+    }
+
+    /// The derivatives by each parameter.
+    pub(crate) fn by_parameters(&self) -> Vec<[f64; 12]> {
+        const LANES: usize = 6;
+        let mut columns = Vec::with_capacity(self.p.len());
+        for from in (0..self.p.len()).step_by(LANES) {
+            let seeded = |(i, &p): (usize, &f64)| match i.checked_sub(from) {
+                Some(lane) if lane < LANES => Fwd::<LANES>::variable(p, lane),
+                _ => Fwd::constant(p),
+            };
+            let p: Vec<_> = self.p.iter().enumerate().map(seeded).collect();
+            let results = self.response(&p, &[Fwd::constant(0.0); 18], None);
+            let lanes = LANES.min(self.p.len() - from);
+            columns.extend((0..lanes).map(|lane| results.map(|y| y.derivative[lane])));
+        }
+        columns
+    }
+}
+
+/// The place of the patch's point from the center of mass, if it is among what changes.
+fn about<T: Scalar>(change: &[T]) -> Option<Vector3<T>> {
+    change.get(18..21).map(Vector3::from_column_slice)
 }
 
 impl BristleFunction<'_> {
@@ -46,12 +116,7 @@ impl BristleFunction<'_> {
     }
 
     /// The function with parameters `p`, and of `from_com`, from the center of mass to the point that the patch has the state of.
-    pub(crate) fn response<T: Scalar>(
-        &self,
-        p: &[T],
-        change: &[T],
-        from_com: Option<&Vector3<T>>,
-    ) -> [T; 12] {
+    fn response<T: Scalar>(&self, p: &[T], change: &[T], from_com: Option<&Vector3<T>>) -> [T; 12] {
         let moved = MovedPatch::new(self.patch, change);
         let deflection = Vector6::from_fn(|i, _| change[12 + i].plus(self.deflection[i]));
         self.response_of(p, &deflection, from_com, |touch, cutoff| moved.lift(touch, cutoff))

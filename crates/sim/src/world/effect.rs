@@ -57,25 +57,28 @@ impl<S: Scalar> World<S> {
 
     /// [`World::wrenches`] without groups of contacts, and without the accelerations of joints.
     pub(crate) fn contact_wrenches(&self, states: &[State<S>], step: usize) -> Vec<Vector6<S>> {
+        const { assert!(S::ORDER <= 1, "contacts have first derivatives only: no nested scalars") };
         let mut wrenches: Vec<Vector6<S>> =
             self.bodies.iter().map(|body| body.external_wrench).collect();
         wrenches.resize(self.joint_places().end, Vector6::zeros());
-        let mut linear = S::RECORDED.then(|| LinearContacts::new(self.bodies.len()));
+        let mut linear = LinearContacts::new(if S::RECORDED { self.bodies.len() } else { 0 });
         for pair in &self.contacts {
-            let bristles = pair.law().bristles();
-            if let (None, Some(linear)) = (&bristles, &mut linear) {
+            let Effect { on_samples, on_field, .. } = if let Some(bristles) = pair.law().bristles()
+            {
+                let deflection = states.get(wrenches.len());
+                let effect = self.sticking_effect(pair, states, bristles, deflection, step);
+                wrenches.push(effect.rate);
+                effect
+            } else if S::RECORDED {
                 linear.add(self, pair, states, step, &mut wrenches);
                 continue;
-            }
-            let deflection = bristles.and_then(|_| states.get(wrenches.len()));
-            let Effect { on_samples, on_field, rate } = self.effect(pair, states, deflection, step);
+            } else {
+                self.plain_effect(pair, states, step)
+            };
             wrenches[pair.bodies.samples] += on_samples;
             wrenches[pair.bodies.field] += on_field;
-            if bristles.is_some() {
-                wrenches.push(rate);
-            }
         }
-        if let Some(linear) = linear {
+        if S::RECORDED {
             linear.record(self, states, &mut wrenches);
         }
         self.add_welds(states, &mut wrenches);
@@ -90,14 +93,48 @@ impl<S: Scalar> World<S> {
         deflection: Option<&State<S>>,
         step: usize,
     ) -> Effect<S> {
-        const { assert!(S::ORDER <= 1, "contacts have first derivatives only: no nested scalars") };
-        let Some(patch) = self.patch(pair, self.seen_value(pair, states)) else {
-            return Effect::default();
+        match pair.law().bristles() {
+            Some(bristles) => self.sticking_effect(pair, states, bristles, deflection, step),
+            None => self.plain_effect(pair, states, step),
+        }
+    }
+
+    /// How large the force of `pair` is without a memory \[N\].
+    pub(crate) fn force(&self, pair: &ContactPair<S>, states: &[State<S>]) -> f64 {
+        let Some(patch) = &self.patch_at(pair, states, 1) else { return 0.0 };
+        let (law, p) = (pair.law().as_ref(), &pair.param_values());
+        let wrench = match law.bristles() {
+            None => law.wrench(p, patch),
+            Some(bristles) => {
+                let deflection = Vector6::zeros();
+                let function = BristleFunction { law, p, patch, bristles, deflection };
+                Vector6::from_column_slice(&f64::local(&function, [0.0; 18])[..6])
+            }
         };
-        let patch = Patch { smoothing: pair.smoothing.at_step(step), ..patch };
-        let Some(bristles) = pair.law().bristles() else {
-            return self.plain_effect(pair, states, &patch);
-        };
+        pair.weight * wrench.fixed_rows::<3>(0).norm()
+    }
+
+    /// The samples of `pair` beside its field in a step, if there are both.
+    fn patch_at<'a>(
+        &'a self,
+        pair: &'a ContactPair<S>,
+        states: &[State<S>],
+        step: usize,
+    ) -> Option<Patch<'a>> {
+        let patch = self.patch(pair, self.seen_value(pair, states))?;
+        Some(Patch { smoothing: pair.smoothing.at_step(step), ..patch })
+    }
+
+    /// What `pair`, which sticks, does with its `deflection`.
+    fn sticking_effect(
+        &self,
+        pair: &ContactPair<S>,
+        states: &[State<S>],
+        bristles: Bristles,
+        deflection: Option<&State<S>>,
+        step: usize,
+    ) -> Effect<S> {
+        let Some(patch) = self.patch_at(pair, states, step) else { return Effect::default() };
         let deflection = deflection.map_or_else(Vector6::zeros, State::deflection);
         let seen = self.seen(pair, states);
         let (wrench, rate) = local_bristles(pair, &seen, &patch, bristles, deflection);
@@ -111,13 +148,9 @@ impl<S: Scalar> World<S> {
         Effect { rate, ..self.effect_of(pair, states, &axes, wrench) }
     }
 
-    /// What `pair`, which is `patch`, does without a memory.
-    fn plain_effect(
-        &self,
-        pair: &ContactPair<S>,
-        states: &[State<S>],
-        patch: &Patch<'_>,
-    ) -> Effect<S> {
+    /// What `pair` does without a memory.
+    fn plain_effect(&self, pair: &ContactPair<S>, states: &[State<S>], step: usize) -> Effect<S> {
+        let Some(patch) = &self.patch_at(pair, states, step) else { return Effect::default() };
         let law = pair.law().as_ref();
         let values = pair.param_values();
         if S::ORDER == 0 {
@@ -309,18 +342,9 @@ fn local_bristles<S: Scalar>(
         }
     };
     let moved = changes(pair.params());
-    for (from, moved) in moved.chunks(6).enumerate().map(|(i, moved)| (6 * i, moved)) {
-        if moved.iter().all(|p| p.is_constant_zero()) {
-            continue;
-        }
-        let seeded = |(i, &p): (usize, &f64)| match i.checked_sub(from) {
-            Some(lane) if lane < 6 => Fwd::<6>::variable(p, lane),
-            _ => Fwd::constant(p),
-        };
-        let p: Vec<Fwd<6>> = values.iter().enumerate().map(seeded).collect();
-        let slopes = function.response(&p, &[Fwd::constant(0.0); 18], None);
-        for (component, slope) in all.iter_mut().zip(slopes) {
-            for (moved, slope) in moved.iter().zip(slope.derivative) {
+    if !moved.iter().all(|p| p.is_constant_zero()) {
+        for (moved, column) in moved.iter().zip(function.by_parameters()) {
+            for (component, slope) in all.iter_mut().zip(column) {
                 *component += moved.times(slope);
             }
         }

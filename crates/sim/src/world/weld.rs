@@ -2,12 +2,13 @@
 
 use nalgebra::{Isometry3, Translation3, Vector3, Vector6};
 use prehend_autodiff::lie::{lift, so3_log};
-use prehend_autodiff::{LocalFunction, Scalar};
+use prehend_autodiff::{Fwd, LocalFunction, Scalar};
 
 use super::World;
 use super::body_id::BodyId;
 use crate::contact::wrench::stack;
 use crate::error::SimulationError;
+use crate::first_order::{Linearized, first_order, linearized};
 use crate::state::State;
 use crate::state_coordinates::STATE;
 
@@ -199,7 +200,35 @@ struct Pull {
 }
 
 impl LocalFunction<INPUTS, 12> for Pull {
+    #[inline]
     fn evaluate<S: Scalar>(&self, x: [S; INPUTS]) -> [S; 12] {
+        match S::ORDER {
+            0 => self.wrenches(&x.map(S::value)).map(S::constant),
+            _ => first_order(&self.derivatives(x.map(S::value)), &x),
+        }
+    }
+
+    fn linearize(&self, x: [f64; INPUTS]) -> Option<Linearized<INPUTS, 12>> {
+        Some(self.derivatives(x))
+    }
+
+    fn derivative_along(
+        &self,
+        x: [f64; INPUTS],
+        along: [f64; INPUTS],
+    ) -> Option<([f64; 12], [f64; 12])> {
+        let x = std::array::from_fn(|i| Fwd { value: x[i], derivative: [along[i]] });
+        let results = self.wrenches::<Fwd<1>>(&x);
+        Some((results.map(|y| y.value), results.map(|y| y.derivative[0])))
+    }
+}
+
+impl Pull {
+    fn derivatives(&self, x: [f64; INPUTS]) -> Linearized<INPUTS, 12> {
+        linearized(self.wrenches(&Fwd::variables(x)))
+    }
+
+    fn wrenches<S: Scalar>(&self, x: &[S; INPUTS]) -> [S; 12] {
         let state = |from: usize| State::from_coordinates(&std::array::from_fn(|i| x[from + i]));
         let (a, b): (State<S>, State<S>) = (state(0), state(STATE));
         let [linear, linear_damping, angular, angular_damping] =
