@@ -222,11 +222,17 @@ impl Scene<'_> {
         let lasting = if sensor.calibration.shared > 0 { (0, 0) } else { (obj_id, grasp) };
         let mut noise = sequence(seed, Use::Rig, lasting.0, lasting.1);
         let rig = Rig::new(sensor, object, robot, size, self.lens, &mut noise);
+        let film = self
+            .settings
+            .film
+            .as_ref()
+            .map(|film| rig.film(film, moments, &mut sequence(seed, Use::Film, obj_id, grasp)));
         let shares = self.settings.frames_per_grasp.get() as usize;
         images.par_iter().try_for_each(|&im_id| {
             let share = im_id as usize % shares;
             let moment = &moments[(2 * share + 1) * moments.len() / (2 * shares)];
-            let shot = rig.capture(moment, &mut sequence(seed, Use::Frame, obj_id, im_id))?;
+            let film = film.as_ref().map(|film| (film, share));
+            let shot = rig.capture(moment, film, &mut sequence(seed, Use::Frame, obj_id, im_id))?;
             let quality = sensor.color.jpeg_quality;
             let entries = shot.write(&self.dir, im_id, obj_id, &robot.tree, quality)?;
             {

@@ -19,4 +19,4 @@ pub use generate::{DatasetSummary, GraspFailure, generate};
 pub use grasp::{Grasp, GraspError, GraspFault, GraspSettings, GraspSnapshot, Grasper, Preshape};
 pub use hand_files::HandFiles;
 pub use plan::{Subject, SynthSettings};
-pub use sensor::{SensorSettings, SettingError};
+pub use sensor::{FilmSettings, SensorSettings, SettingError};

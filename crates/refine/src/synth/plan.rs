@@ -12,7 +12,7 @@ use super::annotation;
 use super::error::SynthError;
 use super::files::read_json;
 use super::hand_files::HandFiles;
-use super::sensor::SensorSettings;
+use super::sensor::{FilmSettings, SensorSettings};
 use crate::data::bop::{DatasetError, write_atomically};
 use crate::data::identity::{fingerprint, program};
 use crate::scene::Object;
@@ -40,6 +40,8 @@ pub struct SynthSettings {
     pub lens: Option<Distortion>,
     /// Whether the dataset keeps silent about that lens, as about other faults of a rig.
     pub undeclared_lens: bool,
+    /// Whether the frames of each grasp are a film: the camera stands still, and the frames follow each other in time.
+    pub film: Option<FilmSettings>,
     /// Sensor models.
     pub sensor: SensorSettings,
     /// Seed of all random numbers.
@@ -91,6 +93,7 @@ fn describe(hand: &HandFiles, subjects: &[Subject], settings: &SynthSettings) ->
         height,
         lens,
         undeclared_lens,
+        film,
         sensor,
         seed,
         grasp,
@@ -107,6 +110,9 @@ fn describe(hand: &HandFiles, subjects: &[Subject], settings: &SynthSettings) ->
         "hand": fingerprint(&hand.content().collect::<Vec<u8>>()),
         "objects": subjects.iter().map(object).collect::<Map<String, Value>>(),
     });
+    if let Some(FilmSettings { rate, occluders }) = film {
+        plan["film"] = json!({ "rate": rate, "occluders": occluders });
+    }
     if let Some(lens) = lens {
         plan["lens"] = annotation::lens(lens);
         if *undeclared_lens {
@@ -156,6 +162,8 @@ pub(super) enum Use {
     InitialLow,
     /// Initial poses of the higher level, by object and frame.
     InitialHigh,
+    /// Where the camera of a film stands and what passes in front of it, by object and grasp.
+    Film,
 }
 
 /// A seed for one `purpose`, one object and one number.

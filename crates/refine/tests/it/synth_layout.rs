@@ -33,6 +33,7 @@ fn settings(sensor: SensorSettings) -> SynthSettings {
         height: 240.try_into().unwrap(),
         lens: None,
         undeclared_lens: false,
+        film: None,
         sensor,
         seed: 0,
         grasp: json!("made up"),
@@ -53,6 +54,7 @@ fn moments(hand: &Hand) -> Vec<GraspSnapshot> {
         t_hand_object: grasp.t_base_object,
         joints: joints.clone(),
         gravity: Rotation3::new(Vector3::new(0.2, 0.1, 0.3) * i as f64) * Vector3::z() * -9.81,
+        turn: UnitQuaternion::from_scaled_axis(Vector3::new(0.2, 0.1, 0.3) * i as f64).inverse(),
         taxel_forces: taxel_forces.clone(),
     };
     (0..5).map(moment).collect()

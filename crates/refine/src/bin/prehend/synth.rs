@@ -10,8 +10,8 @@ use prehend_geometry::TriMesh;
 use prehend_geometry::objects::YcbObject;
 use prehend_refine::scene::Object;
 use prehend_refine::synth::{
-    GraspFailure, GraspSettings, Grasper, HandFiles, SensorSettings, Subject, SynthSettings,
-    generate,
+    FilmSettings, GraspFailure, GraspSettings, Grasper, HandFiles, SensorSettings, Subject,
+    SynthSettings, generate,
 };
 use prehend_render::Distortion;
 use serde_json::json;
@@ -73,6 +73,27 @@ pub(crate) struct Synth {
     /// Grasps tried until one holds through its trajectory
     #[arg(long, value_name = "N", default_value = "60")]
     tries: NonZeroU32,
+    /// Make a film of each object instead: one camera that stands still, a hand that moves by up to 1.5 rad/s, frames that follow each other
+    #[arg(long, conflicts_with_all = ["frames_per_grasp", "steps"], help_heading = "Films")]
+    film: bool,
+    /// Frames a second
+    #[arg(
+        long,
+        value_name = "HZ",
+        default_value_t = 30.0,
+        requires = "film",
+        help_heading = "Films"
+    )]
+    rate: f64,
+    /// How often the object slips in the hand, by 4 to 15 mm or until it holds again
+    #[arg(long, value_name = "N", default_value_t = 0, requires = "film", help_heading = "Films")]
+    slips: u32,
+    /// Things that nobody knows of and that pass in front of the object, each once
+    #[arg(long, value_name = "N", default_value_t = 0, requires = "film", help_heading = "Films")]
+    occluders: u32,
+    /// Let the hand drop the object, and hold it in another way later on
+    #[arg(long, requires = "film", help_heading = "Films")]
+    drop: bool,
     /// Columns of the images
     #[arg(long, value_name = "PX", default_value = "640")]
     width: NonZeroUsize,
@@ -99,6 +120,9 @@ pub(crate) struct Synth {
     threads: Option<NonZeroUsize>,
 }
 
+/// How fast the hand of a film turns, root mean square \[rad/s\]: at most 2.5 times as fast.
+const FILM_TURN_RATE: f64 = 0.6;
+
 impl Synth {
     pub(crate) fn run(self) -> anyhow::Result<ExitCode> {
         let sensor = self.sensors()?;
@@ -114,32 +138,49 @@ impl Synth {
             Some(urdf) => HandFiles::load(urdf, self.taxels.as_deref())?,
             None => HandFiles::built_in()?,
         };
-        let (steps, tries) = (self.steps.get(), u64::from(self.tries.get()));
+        let film = self.film()?;
+        let (mut steps, tries) = (self.steps.get(), u64::from(self.tries.get()));
+        let mut frames_per_grasp = self.frames_per_grasp;
         let &[least, most] = self.contact_area.as_slice() else {
             bail!("--contact-area: expected two numbers, such as 20,60");
         };
-        let grasping = GraspSettings {
+        let mut grasping = GraspSettings {
             links: self.links.get(),
             contact_area: (least, most),
+            slips: self.slips,
             ..GraspSettings::default()
         };
+        if let Some(film) = &film {
+            frames_per_grasp = self.frames;
+            steps = self.frames.get() as usize;
+            grasping.frame_time = film.rate.recip();
+            grasping.turn_rate = FILM_TURN_RATE;
+        }
         let settings = SynthSettings {
             frames: self.frames,
-            frames_per_grasp: self.frames_per_grasp,
+            frames_per_grasp,
             width: self.width,
             height: self.height,
             lens: self.lens,
             undeclared_lens: self.undeclared_lens,
+            film,
             sensor,
             seed: self.seed,
-            grasp: json!({ "steps": steps, "tries": tries, "settings": format!("{grasping:?}") }),
+            grasp: json!({ "steps": steps, "tries": tries, "drop": self.drop, "settings": format!("{grasping:?}") }),
         };
         let total = settings.frames.get() as usize * subjects.len();
         let bar = progress(total, "frames");
         let prepare = |subject: &'_ Subject| -> Result<_, String> {
             let grasper = Grasper::new(&hand.robot, &subject.object, &grasping);
             let grasper = grasper.map_err(|e| e.to_string())?;
-            Ok(move |seed| grasper.sequence(seed, tries, steps).map_err(|e| e.to_string()))
+            let drops = self.drop;
+            Ok(move |seed| {
+                let moments = match drops {
+                    true => grasper.dropping(seed, tries, steps),
+                    false => grasper.sequence(seed, tries, steps),
+                };
+                moments.map_err(|e| e.to_string())
+            })
         };
         let summary =
             generate(&self.out, &hand, &subjects, &settings, prepare, &|done| bar.inc(done))?;
@@ -151,6 +192,14 @@ impl Synth {
         };
         let failures: Vec<String> = summary.failures.iter().map(told).collect();
         Ok(exit_code(summary.frames as usize, &failures))
+    }
+
+    /// The film's settings, if it is to be one.
+    fn film(&self) -> anyhow::Result<Option<FilmSettings>> {
+        if !(self.rate.is_finite() && self.rate > 0.0) {
+            bail!("--rate: {} is no number of images a second", self.rate);
+        }
+        Ok(self.film.then_some(FilmSettings { rate: self.rate, occluders: self.occluders }))
     }
 
     /// The last preset named, with all single settings over it.

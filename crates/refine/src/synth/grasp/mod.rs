@@ -6,6 +6,7 @@
 
 mod drive;
 mod fault;
+mod film;
 mod grasper;
 mod placement;
 mod preshape;
@@ -22,3 +23,4 @@ pub use grasper::{Grasp, Grasper};
 pub use preshape::Preshape;
 pub use settings::GraspSettings;
 pub use trajectory::GraspSnapshot;
+pub(super) use trajectory::Waves;

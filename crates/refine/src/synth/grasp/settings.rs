@@ -90,6 +90,8 @@ grasp_settings! {
     turn_rate: f64 = 1.5, NOT_NEGATIVE;
     /// By how much of itself the grip grows along a trajectory, at most.
     squeeze: f64 = 0.3, NOT_NEGATIVE;
+    /// How often the hand loosens its grip along a trajectory for a moment, so that the object slips by 4 to 15 mm, or less if it holds.
+    slips: u32 = 0;
     /// A contact is felt by taxels within this distance \[m\].
     taxel_reach: f64 = 8e-3, POSITIVE;
 }

@@ -17,6 +17,8 @@ pub struct GraspSnapshot {
     pub joints: Vec<f64>,
     /// Gravity in hand base coordinates \[m/s²\].
     pub gravity: Vector3<f64>,
+    /// How the hand is turned: hand base axes → axes that stand still.
+    pub turn: UnitQuaternion<f64>,
     /// Force of the object on each taxel, in the frame of the taxel's link \[N\].
     pub taxel_forces: Vec<Vector3<f64>>,
 }
@@ -27,6 +29,11 @@ const WAVES: usize = 3;
 const FREQUENCIES: (f64, f64) = (0.1, 0.6);
 /// Time given to a grasp to settle under gravity before the first moment \[s\].
 const SETTLING: f64 = 0.25;
+/// What is left of the grip while the object slips.
+const LOOSE: f64 = 0.1;
+/// How far it slips, least and most \[m\], unless the hand is loose for so long \[s\] before.
+const SLIP: (f64, f64) = (4e-3, 15e-3);
+const LOOSE_TIME: f64 = 0.3;
 
 impl Grasper<'_> {
     /// `steps` moments of the hand turning smoothly and at random while it holds the object, which is simulated.
@@ -44,16 +51,29 @@ impl Grasper<'_> {
         steps: usize,
     ) -> Result<Vec<GraspSnapshot>, GraspFault> {
         let mut random = SplitMix64::new(seed);
+        let down = random_direction(&mut random) * self.settings.gravity;
+        self.moments(grasp, &mut random, steps, &UnitQuaternion::identity(), &down)
+    }
+
+    /// The same, where the hand begins turned by `turn` under the gravity `down`, both in axes that stand still.
+    pub(super) fn moments(
+        &self,
+        grasp: &Grasp,
+        random: &mut SplitMix64,
+        steps: usize,
+        turn: &UnitQuaternion<f64>,
+        down: &Vector3<f64>,
+    ) -> Result<Vec<GraspSnapshot>, GraspFault> {
         let settings = &self.settings;
-        let down = random_direction(&mut random) * settings.gravity;
-        let turning: [Waves; 3] = std::array::from_fn(|_| Waves::new(&mut random));
-        let squeezing = Waves::new(&mut random);
+        let turning: [Waves; 3] = std::array::from_fn(|_| Waves::new(random));
+        let squeezing = Waves::new(random);
         let mut simulation = Simulation::new(&self.setup, &grasp.joints, &grasp.t_hand_object)?;
         let pace = vec![1.0; grasp.joints.len()];
         let dt = settings.time_step;
         let inner = (settings.frame_time / dt).round().max(1.0) as usize;
         let settling = (SETTLING / dt).ceil() as usize;
-        let mut turn = UnitQuaternion::identity();
+        let mut slips = Slips::new(settings.slips, steps, random);
+        let mut turn = *turn;
         let mut moments = Vec::with_capacity(steps);
         let mut start: Option<Isometry3<f64>> = None;
         let per_axis = settings.turn_rate / 3f64.sqrt();
@@ -61,19 +81,28 @@ impl Grasper<'_> {
             let time = step.saturating_sub(settling) as f64 * dt;
             let gravity = turn.inverse() * down;
             let wave = squeezing.at(time) / Waves::LARGEST;
+            let slipping =
+                step >= settling && slips.at(moments.len(), &simulation, settings.time_step);
             let grip = grasp.grip * (1.0 + settings.squeeze * wave.max(0.0));
+            let grip = if slipping { LOOSE * grip } else { grip };
             let change = self.drive.change(&simulation, &Effort { pace: pace.clone(), grip });
             simulation.advance(&change, Medium::Gravity(gravity))?;
             if step < settling {
                 continue;
             }
             let t_hand_object = simulation.t_hand_object();
-            self.moved(start.get_or_insert(t_hand_object), &t_hand_object)?;
+            if slipping {
+                // It is to stay where it is then.
+                start = None;
+            } else {
+                self.moved(start.get_or_insert(t_hand_object), &t_hand_object)?;
+            }
             if (step - settling).is_multiple_of(inner) && moments.len() < steps {
                 moments.push(GraspSnapshot {
                     t_hand_object,
                     joints: simulation.joints().to_vec(),
                     gravity,
+                    turn,
                     taxel_forces: self.skin.forces(&simulation.touches(), simulation.poses()),
                 });
             }
@@ -84,15 +113,52 @@ impl Grasper<'_> {
     }
 }
 
+/// When the hand loosens its grip, and by how much the object slips then.
+struct Slips {
+    /// The next moments, the last first, each with a distance \[m\].
+    left: Vec<(usize, f64)>,
+    /// Of the one that goes on: where the object was, how far it goes, and the time left \[s\].
+    now: Option<(Isometry3<f64>, f64, f64)>,
+}
+
+impl Slips {
+    /// So many in `steps` moments.
+    fn new(count: u32, steps: usize, random: &mut SplitMix64) -> Self {
+        let mut slip = |k: u32| {
+            let share = (f64::from(k) + 0.3 + 0.4 * random.uniform()) / f64::from(count);
+            let (least, most) = SLIP;
+            ((share * steps as f64) as usize, least + (most - least) * random.uniform())
+        };
+        let mut left: Vec<_> = (0..count).map(&mut slip).collect();
+        left.reverse();
+        Self { left, now: None }
+    }
+
+    /// Whether the grip is loose at a moment.
+    fn at(&mut self, moment: usize, simulation: &Simulation<'_>, dt: f64) -> bool {
+        let pose = simulation.t_hand_object();
+        if let Some((_, distance)) = self.left.pop_if(|(next, _)| moment >= *next) {
+            self.now = Some((pose, distance, LOOSE_TIME));
+        }
+        let Some((from, distance, time)) = &mut self.now else { return false };
+        *time -= dt;
+        let slipped = (pose.translation.vector - from.translation.vector).norm() >= *distance;
+        if slipped || *time <= 0.0 {
+            self.now = None;
+        }
+        self.now.is_some()
+    }
+}
+
 /// A smooth random function of time of mean square 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Waves([(f64, f64); WAVES]);
+pub(in crate::synth) struct Waves([(f64, f64); WAVES]);
 
 impl Waves {
     /// No value is larger.
     const LARGEST: f64 = 2.4495;
 
-    fn new(random: &mut SplitMix64) -> Self {
+    pub(in crate::synth) fn new(random: &mut SplitMix64) -> Self {
         let (low, high) = FREQUENCIES;
         Self(std::array::from_fn(|_| {
             let rate = std::f64::consts::TAU * (low + (high - low) * random.uniform());
@@ -100,7 +166,7 @@ impl Waves {
         }))
     }
 
-    fn at(&self, time: f64) -> f64 {
+    pub(in crate::synth) fn at(&self, time: f64) -> f64 {
         let sum: f64 = self.0.iter().map(|(rate, phase)| (rate * time + phase).sin()).sum();
         sum * (2.0 / WAVES as f64).sqrt()
     }

@@ -5,6 +5,7 @@ mod calibration;
 mod color;
 mod deformation;
 mod depth;
+mod film;
 mod lens;
 mod light;
 mod mask;
@@ -13,6 +14,7 @@ mod settings;
 mod touch;
 mod viewpoint;
 
+pub use film::FilmSettings;
 pub(super) use lens::Lens;
 pub(super) use rig::Rig;
 pub use settings::{SensorSettings, SettingError};

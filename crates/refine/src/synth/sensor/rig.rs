@@ -12,6 +12,7 @@ use serde_json::{Value, json};
 
 use super::calibration::Miscalibration;
 use super::depth::DepthBias;
+use super::film::{Film, FilmSettings};
 use super::lens::Lens;
 use super::settings::SensorSettings;
 use super::touch::TaxelCondition;
@@ -105,23 +106,62 @@ impl<'a> Rig<'a> {
         faults
     }
 
-    /// Captures a frame of `moment`, whose joints and taxels are those of the hand.
+    /// A film of `moments`.
+    pub(in crate::synth) fn film(
+        &self,
+        settings: &FilmSettings,
+        moments: &[GraspSnapshot],
+        noise: &mut SplitMix64,
+    ) -> Film {
+        let first = |moment| self.viewpoint(&self.bodies(moment), moment, noise);
+        let t_cam_hand = moments.first().map_or_else(Isometry3::identity, first);
+        Film::new(settings, moments, &t_cam_hand, &self.object.center, noise)
+    }
+
+    /// Object and hand in hand base coordinates.
+    fn bodies(&self, moment: &GraspSnapshot) -> Vec<(&RenderModel, Isometry3<f64>)> {
+        let mut bodies: Vec<(&RenderModel, _)> = vec![(&self.object.model, moment.t_hand_object)];
+        bodies.extend(self.robot.render_bodies(&Isometry3::identity(), &moment.joints));
+        bodies
+    }
+
+    fn viewpoint(
+        &self,
+        bodies: &[(&RenderModel, Isometry3<f64>)],
+        moment: &GraspSnapshot,
+        noise: &mut SplitMix64,
+    ) -> Isometry3<f64> {
+        self.settings.viewpoint.choose(&self.camera, bodies, &moment.gravity, noise)
+    }
+
+    /// Captures a frame of `moment`, whose joints and taxels are those of the hand, from anywhere or as a frame of that number in a film.
     ///
     /// # Errors
     /// If an image has not the size of the lens's camera.
     pub(in crate::synth) fn capture(
         &self,
         moment: &GraspSnapshot,
+        film: Option<(&Film, usize)>,
         noise: &mut SplitMix64,
     ) -> Result<Shot, DistortionError> {
-        let mut bodies: Vec<(&RenderModel, Isometry3<f64>)> =
-            vec![(&self.object.model, moment.t_hand_object)];
-        bodies.extend(self.robot.render_bodies(&Isometry3::identity(), &moment.joints));
-        let viewpoint = &self.settings.viewpoint;
-        let t_cam_hand = viewpoint.choose(&self.camera, &bodies, &moment.gravity, noise);
+        let mut bodies = self.bodies(moment);
+        let t_cam_hand = match film {
+            Some((film, frame)) => film.t_cam_hand(frame, moment),
+            None => self.viewpoint(&bodies, moment, noise),
+        };
         bodies.iter_mut().for_each(|(_, pose)| *pose = t_cam_hand * *pose);
         let gravity = t_cam_hand.rotation * moment.gravity;
-        let mut seen = self.render(&bodies, &gravity, noise);
+        let mut seen = match film {
+            Some((film, frame)) => {
+                let mut paints = Vec::new();
+                for (model, pose, paint) in film.passing(frame) {
+                    bodies.push((model, pose));
+                    paints.push(paint);
+                }
+                self.render(&bodies, &paints, &gravity, &mut film.surroundings.clone())
+            }
+            None => self.render(&bodies, &[], &gravity, noise),
+        };
         if let Some(lens) = self.lens {
             seen = lens.photograph(&seen)?;
         }
@@ -145,10 +185,12 @@ impl<'a> Rig<'a> {
         Ok(Shot { told, lens, truth, hand, world: None, whole, visible })
     }
 
-    /// What is there to be seen by the pinhole camera, or by that of the lens; the first of `bodies` is the object.
+    /// What is there to be seen by the pinhole camera, or by that of the lens; the first of `bodies` is the object, and the last ones have `paints`
+    /// of their own.
     fn render(
         &self,
         bodies: &[(&RenderModel, Isometry3<f64>)],
+        paints: &[[f32; 3]],
         gravity: &Vector3<f64>,
         noise: &mut SplitMix64,
     ) -> View {
@@ -164,7 +206,8 @@ impl<'a> Rig<'a> {
         }
         let scale = camera.width / wall.width();
         let shade = |body: usize, point: &SurfacePoint<f32>| {
-            let paint = self.paint[[0, 2, 1, 2][body % 4]];
+            let own = body.checked_sub(bodies.len() - paints.len());
+            let paint = own.map_or(self.paint[[0, 2, 1, 2][body % 4]], |own| paints[own]);
             let albedo = if body == 0 { point.albedo } else { paint };
             lights.shade(point, albedo)
         };
