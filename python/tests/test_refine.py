@@ -249,8 +249,10 @@ def test_an_object_is_followed():
         assert np.linalg.norm(tracked.pose[:3, 3] - truth[:3, 3]) < 3e-3
         assert tracked.covariance.shape == (6, 6) and tracked.probability > 0.5
         assert tracked.seconds > 0
-    blind = prehend.Frame(**inputs(frames[-1][0], mask=None))
-    lost = tracker.push(blind, 0.2)
+    bare = prehend.Frame(**inputs(frames[-1][0], mask=None))
+    assert tracker.push(bare, 0.1).status == "followed"
+    hidden = inputs(frames[-1][0], mask=None, depth=np.full((480, 640), 0.3), rgb=np.full((480, 640, 3), 128, np.uint8))
+    lost = tracker.push(prehend.Frame(**hidden), 0.2)
     assert (lost.status, lost.covariance, lost.doubt) == ("lost", None, "nothing of the object is seen")
     tracker.start_from(frames[0][2])
     assert tracker.push(first, 0.0).status == "found"
@@ -260,8 +262,7 @@ def test_an_object_is_followed():
         prehend.Tracker(first.object, budget=-1.0)
     with pytest.raises(prehend.Error, match="time"):
         tracker.push(first, float("nan"))
-    with pytest.raises(prehend.Error, match="mask is empty or missing"):
-        prehend.Tracker(first.object, first.hand, pose=initial).push(blind, 0.0)
+    assert prehend.Tracker(first.object, first.hand, pose=initial).push(bare, 0.0).status == "found"
 
 
 def test_results_files(tmp_path):

@@ -15,7 +15,7 @@ pub enum RefineError {
         reason: String,
     },
     /// The mask selects nothing.
-    #[error("the object's mask is empty")]
+    #[error("the object's mask is empty or missing")]
     EmptyMask,
     /// No depth where the object is.
     #[error("no pixel of the object's mask has a depth")]

@@ -57,8 +57,8 @@ impl Tracker {
         Ok(Self { tracker })
     }
 
-    /// The pose in the next frame, taken at `time` [s] from any moment: a `Tracked`. A frame without a mask, or with an empty one, shows nothing of
-    /// the object, which is then where it should be. The tracker is as it was before, if this fails.
+    /// The pose in the next frame, taken at `time` [s] from any moment: a `Tracked`. No mask is needed, and one that does not fit what is seen is not
+    /// believed. The tracker is as it was before, if this fails.
     fn push<'py>(
         &mut self,
         py: Python<'py>,

@@ -181,7 +181,7 @@ impl<'a> Assets<'a> {
         }
     }
 
-    /// With an empty mask where there is no file of one, which otherwise is an error.
+    /// With an empty mask where there is no file of one, or one in which nothing is set, which otherwise are errors.
     pub fn with_optional_masks(self) -> Self {
         Self { masks_optional: true, ..self }
     }
@@ -255,7 +255,8 @@ impl<'a> Assets<'a> {
     ) -> Result<(Observation, Option<Arc<Hand>>), AssetError> {
         let mut observation = frame.unsegmented()?;
         match frame.segment(&mut observation, instance) {
-            Err(DatasetError::Missing { .. }) if self.masks_optional => {}
+            Err(DatasetError::Missing { .. } | DatasetError::EmptyMask { .. })
+                if self.masks_optional => {}
             read => read?,
         }
         let Some(bodies) = present(frame.bodies(), !required.is_empty())? else {

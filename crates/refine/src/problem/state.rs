@@ -5,7 +5,7 @@ use prehend_autodiff::lie::{perturb_about, so3_log};
 
 use crate::error::RefineError;
 
-use crate::scene::{CameraCalibrationError, Frame};
+use crate::scene::{CameraCalibrationError, Frame, Object, Observation};
 
 /// A named block of a [`State`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -54,17 +54,29 @@ impl State {
     /// # Errors
     /// If the pose is not finite, or behind the camera.
     pub fn new(frame: &Frame<'_>, initial: &Isometry3<f64>) -> Result<Self, RefineError> {
+        Self::measured(frame.observation(), frame.object(), initial)
+    }
+
+    /// The same of an object in `observation`.
+    ///
+    /// # Errors
+    /// See [`new`](Self::new).
+    pub(crate) fn measured(
+        observation: &Observation,
+        object: &Object,
+        initial: &Isometry3<f64>,
+    ) -> Result<Self, RefineError> {
         let rotation = initial.rotation.coords.iter();
         if !rotation.chain(initial.translation.vector.iter()).all(|v| v.is_finite()) {
             return Err(RefineError::NotFinite);
         }
-        let hand = frame.observation().hand.as_ref();
+        let hand = observation.hand.as_ref();
         let state = Self {
             t_cam_object: Isometry3::from_parts(
                 initial.translation,
                 UnitQuaternion::new_normalize(*initial.rotation.quaternion()),
             ),
-            object_center: frame.object().center,
+            object_center: object.center,
             t_cam_hand: hand.map_or_else(Isometry3::identity, |h| h.t_cam_hand),
             joints: hand.map_or_else(Vec::new, |h| h.joints.clone()),
             camera: CameraCalibrationError::default(),

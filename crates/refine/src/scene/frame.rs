@@ -116,6 +116,11 @@ impl<'a> Frame<'a> {
         self.backend.as_ref()
     }
 
+    /// The same with the depth image of the hand, which is known already \[m\].
+    pub(crate) fn with_hand_depth(self, depth: &Arc<DepthImage>) -> Self {
+        Self { hand_depth: OnceLock::from(Arc::clone(depth)), ..self }
+    }
+
     /// What was sensed.
     pub fn observation(&self) -> &'a Observation {
         self.observation
@@ -244,7 +249,7 @@ fn brightness(observation: &Observation) -> f64 {
 }
 
 /// Depth image of a hand, whose joints must have been checked \[m\]; 0 where it is not.
-pub(super) fn hand_depth(camera: &Camera, hand: Option<(&Hand, &HandMeasurement)>) -> DepthImage {
+pub(crate) fn hand_depth(camera: &Camera, hand: Option<(&Hand, &HandMeasurement)>) -> DepthImage {
     match hand {
         Some((hand, measured)) => {
             depth_map(camera, &hand.render_bodies(&measured.t_cam_hand, &measured.joints))

@@ -76,7 +76,7 @@ impl Observation {
     ///
     /// # Errors
     /// [`RefineError::Images`].
-    pub(super) fn require_sizes(&self) -> Result<(), RefineError> {
+    pub(crate) fn require_sizes(&self) -> Result<(), RefineError> {
         self.check_sizes()
             .map_err(|(image, problem)| RefineError::Images(format!("the {image} has {problem}")))
     }

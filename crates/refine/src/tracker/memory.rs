@@ -16,6 +16,12 @@ const COASTING: f64 = 0.25;
 /// By how much of itself the level grows with every frame that the object is lost. Slowly, or what is wrong for a moment would soon pass for right.
 const GROWTH: f64 = 0.02;
 
+/// Frames between two times that a lost object is looked for.
+const LOOK_EVERY: u32 = 8;
+
+/// Frames after which an object may be held in another way than before.
+const LONG: u32 = 5;
+
 /// The last pose that was believed, and what was learnt with it.
 #[derive(Clone, Debug)]
 pub(super) struct TrackState {
@@ -39,6 +45,8 @@ pub(super) struct TrackState {
     pub(super) level: f64,
     /// Frames in which something was seen, but not believed, less those in which it was believed again; not below zero.
     pub(super) lost: u32,
+    /// Frames since.
+    misses: u32,
 }
 
 /// What is expected of a frame before it is looked at.
@@ -75,7 +83,25 @@ impl TrackState {
             layout,
             level,
             lost: 0,
+            misses: 0,
         }
+    }
+
+    /// A frame in which the object was not followed, though something was `seen` where it should be.
+    pub(super) fn missed(&mut self, seen: bool) {
+        self.misses = self.misses.saturating_add(1);
+        self.lost = self.lost.saturating_add(u32::from(seen));
+    }
+
+    /// Whether it was lost for so long that much may have happened to it.
+    pub(super) fn is_long_lost(&self) -> bool {
+        self.misses >= LONG
+    }
+
+    /// Whether it is time to look for an object that is lost: often at first, and then every so many frames, because that takes long.
+    pub(super) fn is_due(&self) -> bool {
+        self.misses.is_multiple_of(LOOK_EVERY)
+            || self.misses.is_power_of_two() && self.misses < LOOK_EVERY
     }
 
     /// The level that misfits are judged by: it grows while the object is lost, because circumstances may have changed for good.

@@ -2,6 +2,7 @@
 
 mod clock;
 mod memory;
+mod segmentation;
 mod settings;
 #[cfg(test)]
 mod tests;
@@ -13,18 +14,19 @@ use std::time::{Duration, Instant};
 
 use nalgebra::Isometry3;
 use prehend_autodiff::optimize::LeastSquares;
-use prehend_render::Backend;
+use prehend_render::{Backend, DepthImage};
 
 use self::clock::Clock;
 pub use self::clock::Timing;
 use self::memory::{Prediction, TrackState};
+use self::segmentation::Segmenter;
 pub use self::settings::{GatingSettings, ProcessNoise, Recovery, TrackerSettings};
 pub use self::tracked::{Rejection, TrackStatus, Tracked};
 use crate::error::RefineError;
 use crate::factor::{GaussianPrior, PriorSettings};
 use crate::problem::{Factor, Problem, Solution, State, Termination};
 use crate::rig::Rig;
-use crate::scene::{CameraCalibrationError, Frame, Hand, Object, Observation};
+use crate::scene::{Frame, Hand, Object, Observation, hand_depth};
 use crate::search::PoseSearch;
 use crate::strategy::{
     Fused, Inconsistency, Posterior, Strategy, chi_square_z, problem_of, surface_patches,
@@ -72,6 +74,7 @@ pub struct Tracker {
     track: Option<TrackState>,
     /// Made when it is first needed.
     search: Option<PoseSearch>,
+    segmenter: Segmenter,
 }
 
 /// A pose that was solved for.
@@ -87,6 +90,24 @@ impl Solved {
         self.solution.at.cost_of_factors()
     }
 }
+
+/// A frame with its hand, and what shows the object in it as far as that is known.
+struct Sight {
+    observation: Observation,
+    hand_depth: Arc<DepthImage>,
+}
+
+impl Sight {
+    /// Of a hand whose joints were checked.
+    fn new(observation: Observation, hand: Option<&Arc<Hand>>) -> Self {
+        let hand = hand.map(|hand| &**hand).zip(observation.hand.as_ref());
+        let hand_depth = Arc::new(hand_depth(&observation.camera, hand));
+        Self { observation, hand_depth }
+    }
+}
+
+/// What share of the pixels that should show an object that was found again must do so.
+const LEAST_SHOWN: f64 = 0.5;
 
 /// Part of the way that the running mean of costs goes to the next one.
 const LEVEL_GAIN: f64 = 0.1;
@@ -113,6 +134,7 @@ impl Tracker {
             initial: None,
             track: None,
             search: None,
+            segmenter: Segmenter::default(),
         })
     }
 
@@ -136,73 +158,84 @@ impl Tracker {
     pub fn start_from(&mut self, t_cam_object: &Isometry3<f64>) {
         self.initial = Some(*t_cam_object);
         self.track = None;
+        self.segmenter = Segmenter::default();
     }
 
-    /// The pose in the next frame, which was taken at `time`, counted from any moment; if it is before that of the
-    /// last frame, no time has passed.
+    /// [`push`](Self::push) of a copy.
     ///
     /// # Errors
-    /// If the images do not fit each other, the hand's joints or forces do not fit the hand, or nothing is found to begin with.
-    /// The tracker is then as it was before.
+    /// See there.
     pub fn track(
         &mut self,
         observation: &Observation,
         time: Duration,
     ) -> Result<Tracked, RefineError> {
+        self.push(observation.clone(), time)
+    }
+
+    /// The pose in the next frame, which was taken at `time`, counted from any moment; if it is before that of the
+    /// last frame, no time has passed.
+    ///
+    /// Its mask may be empty, or wrong: what shows the object is told by where it should be, by depth and colors, and by a mask as far as it
+    /// agrees with these. In the first frame the pose or a search tells where it is.
+    ///
+    /// # Errors
+    /// If the images do not fit each other, the hand's joints or forces do not fit the hand, or nothing is found to begin with.
+    /// The tracker is then as it was before.
+    pub fn push(
+        &mut self,
+        observation: Observation,
+        time: Duration,
+    ) -> Result<Tracked, RefineError> {
         let mut clock = Clock::start(self.settings.budget);
-        let (object, hand, rig) = (Arc::clone(&self.object), self.hand.clone(), self.rig.clone());
-        let frame = match (Frame::new(observation, &object, hand.as_ref()), &self.track) {
-            (Ok(mut frame), _) => {
-                if let Some(backend) = &self.backend {
-                    frame = frame.with_backend(Arc::clone(backend));
-                }
-                match &rig {
-                    Some(rig) => frame.with_rig(rig),
-                    None => frame,
-                }
-            }
-            (Err(RefineError::EmptyMask), Some(track)) => {
-                return Ok(self.predict_unseen(track, observation, time));
-            }
-            (Err(error), _) => return Err(error),
-        };
-        let Some(track) = self.track.clone() else { return self.begin(frame, time, &mut clock) };
-        let in_hand = frame.hand().is_some();
-        let nominal = State::new(&frame, &track.state.t_cam_object)?;
-        let prediction = track.predict(time, &nominal, in_hand, &self.settings);
-        let predicted = prediction.state.clone();
-        if !clock.has(Duration::ZERO) {
-            return Ok(Tracked::predicted(predicted, Timing::default()));
+        observation.require_sizes()?;
+        let hand = self.hand.as_deref().zip(observation.hand.as_ref());
+        if let Some((hand, measured)) = hand {
+            hand.check_joints(&measured.joints)?;
         }
-        let mut timing = Timing::default();
-        let rejection = if predicted.center().z > 0.0 {
-            let (problem, prior) = self.prepare(&frame, &prediction)?;
-            timing.preparation = clock.lap();
-            if !clock.has(Duration::ZERO) {
-                return Ok(Tracked::predicted(predicted, timing));
-            }
-            let solved = self.solve(&problem, &predicted, &clock);
-            timing.steps = clock.lap();
-            if solved.solution.termination == Termination::Aborted && !solved.tried {
-                return Ok(Tracked::predicted(predicted, timing));
-            }
-            let posterior = self.posterior(&solved, &nominal)?;
-            let rejection = self.gate(&solved, &posterior, Some(&prior), track.allowance());
-            timing.validation = clock.lap();
-            let Some(rejection) = rejection else {
-                let motion = self.settings.motion(in_hand);
-                let level = track.level + LEVEL_GAIN * (solved.cost() - track.level);
-                let next = self.remember(time, &solved, &nominal, in_hand, level);
-                let mut next = TrackState::followed(next, &prediction, motion);
-                next.lost = track.lost.saturating_sub(1);
-                self.track = Some(next);
-                return Ok(Tracked::solved(solved, posterior, TrackStatus::Tracked, None, timing));
-            };
-            rejection
-        } else {
-            Rejection::Unseen
+        let in_hand = hand.is_some();
+        let Some(track) = self.track.clone() else {
+            let sight = Sight::new(observation, self.hand.as_ref());
+            return self.begin(sight, time, &mut clock);
         };
-        let again = self.recover(frame, &predicted, &track)?;
+        let nominal = State::measured(&observation, &self.object, &track.state.t_cam_object)?;
+        let prediction = track.predict(time, &nominal, in_hand, &self.settings);
+        if !clock.has(Duration::ZERO) {
+            return Ok(Tracked::predicted(prediction.state, Timing::default()));
+        }
+        let mut sight = Sight::new(observation, self.hand.as_ref());
+        let seen = self.segmenter.segment(
+            &sight.observation,
+            &sight.hand_depth,
+            &self.object,
+            &prediction.state.t_cam_object,
+        );
+        let mut timing = Timing::default();
+        let seen = seen.map(|mask| sight.observation.mask = mask).is_some();
+        // What was away for long may be held in another way: it is looked for everywhere then.
+        let long_lost = track.is_long_lost() && self.settings.recovery == Recovery::Anywhere;
+        let mut rejection = Rejection::Unseen;
+        if seen && long_lost {
+            rejection = Rejection::LongLost;
+        } else if seen {
+            match self.follow(
+                &sight,
+                &track,
+                &prediction,
+                &nominal,
+                time,
+                &mut clock,
+                &mut timing,
+            )? {
+                Ok(tracked) => return Ok(tracked),
+                Err(own) => rejection = own,
+            }
+        }
+        let predicted = &prediction.state;
+        let again = match track.is_due() {
+            true => self.recover(&mut sight, predicted, &track, seen && !long_lost)?,
+            false => None,
+        };
         timing.recovery = clock.lap();
         if let Some((solved, posterior)) = again {
             // The level of a pose found is not taken over at once: it may be a wrong one, and would then pass for right ever after.
@@ -214,37 +247,95 @@ impl Tracker {
             return Ok(Tracked::solved(solved, posterior, status, Some(rejection), timing));
         }
         if let Some(track) = &mut self.track {
-            track.lost = track.lost.saturating_add(1);
+            track.missed(seen);
         }
-        Ok(Tracked::lost(predicted, rejection, timing))
+        Ok(Tracked::lost(prediction.state, rejection, timing))
     }
 
-    /// Where the object should be in a frame that shows nothing of it. Where the hand is measured to be needs no mask.
-    fn predict_unseen(
-        &self,
+    /// Follows the object from where it should be: the frame's outcome, or why it is not believed.
+    #[allow(clippy::too_many_arguments)] // all that a frame has
+    fn follow(
+        &mut self,
+        sight: &Sight,
         track: &TrackState,
-        observation: &Observation,
+        prediction: &Prediction,
+        nominal: &State,
         time: Duration,
-    ) -> Tracked {
-        let hand = observation.hand.as_ref();
-        let nominal = State {
-            t_cam_hand: hand.map_or(track.state.t_cam_hand, |h| h.t_cam_hand),
-            joints: hand.map_or_else(Vec::new, |h| h.joints.clone()),
-            camera: CameraCalibrationError::default(),
-            ..track.state.clone()
-        };
-        let in_hand = self.hand.is_some() && hand.is_some();
-        let state = track.predict(time, &nominal, in_hand, &self.settings).state;
-        Tracked::lost(state, Rejection::Unseen, Timing::default())
+        clock: &mut Clock,
+        timing: &mut Timing,
+    ) -> Result<Result<Tracked, Rejection>, RefineError> {
+        let (object, hand, rig) = (Arc::clone(&self.object), self.hand.clone(), self.rig.clone());
+        let frame = self.frame(sight, &object, hand.as_ref(), rig.as_deref())?;
+        let in_hand = frame.hand().is_some();
+        let predicted = &prediction.state;
+        let (problem, prior) = self.prepare(&frame, prediction)?;
+        timing.preparation = clock.lap();
+        if !clock.has(Duration::ZERO) {
+            return Ok(Ok(Tracked::predicted(predicted.clone(), *timing)));
+        }
+        let solved = self.solve(&problem, predicted, clock);
+        timing.steps = clock.lap();
+        if solved.solution.termination == Termination::Aborted && !solved.tried {
+            return Ok(Ok(Tracked::predicted(predicted.clone(), *timing)));
+        }
+        let posterior = self.posterior(&solved, nominal)?;
+        if let Some(rejection) = self.gate(&solved, &posterior, Some(&prior), track.allowance()) {
+            timing.validation = clock.lap();
+            return Ok(Err(rejection));
+        }
+        let motion = self.settings.motion(in_hand);
+        let level = track.level + LEVEL_GAIN * (solved.cost() - track.level);
+        let next = self.remember(time, &solved, nominal, in_hand, level);
+        let mut next = TrackState::followed(next, prediction, motion);
+        next.lost = track.lost.saturating_sub(1);
+        self.learn(sight, &solved);
+        timing.validation = clock.lap();
+        self.track = Some(next);
+        Ok(Ok(Tracked::solved(solved, posterior, TrackStatus::Tracked, None, *timing)))
+    }
+
+    /// The frame of a sight.
+    fn frame<'a>(
+        &self,
+        sight: &'a Sight,
+        object: &'a Arc<Object>,
+        hand: Option<&'a Arc<Hand>>,
+        rig: Option<&'a Rig>,
+    ) -> Result<Frame<'a>, RefineError> {
+        let mut frame =
+            Frame::new(&sight.observation, object, hand)?.with_hand_depth(&sight.hand_depth);
+        if let Some(backend) = &self.backend {
+            frame = frame.with_backend(Arc::clone(backend));
+        }
+        Ok(match rig {
+            Some(rig) => frame.with_rig(rig),
+            None => frame,
+        })
+    }
+
+    /// Learns colors where a pose was believed.
+    fn learn(&mut self, sight: &Sight, solved: &Solved) {
+        let pose = &solved.solution.at.state.t_cam_object;
+        self.segmenter.learn(&sight.observation, &sight.hand_depth, &self.object, pose);
     }
 
     /// The first frame.
     fn begin(
         &mut self,
-        mut frame: Frame<'_>,
+        mut sight: Sight,
         time: Duration,
         clock: &mut Clock,
     ) -> Result<Tracked, RefineError> {
+        let (object, hand, rig) = (Arc::clone(&self.object), self.hand.clone(), self.rig.clone());
+        if sight.observation.mask.count() == 0 {
+            let (observation, depth) = (&sight.observation, &sight.hand_depth);
+            let mask = match &self.initial {
+                Some(pose) => self.segmenter.segment(observation, depth, &object, pose),
+                None => self.segmenter.anywhere(observation, depth),
+            };
+            sight.observation.mask = mask.ok_or(RefineError::EmptyMask)?;
+        }
+        let mut frame = self.frame(&sight, &object, hand.as_ref(), rig.as_deref())?;
         let initial = match self.initial {
             Some(pose) => pose,
             None => {
@@ -262,6 +353,7 @@ impl Tracker {
         let (solved, posterior) = self.estimate(frame, &nominal)?;
         let (in_hand, level) = (frame.hand().is_some(), solved.cost());
         self.track = Some(self.remember(time, &solved, &nominal, in_hand, level));
+        self.learn(&sight, &solved);
         let timing = Timing { recovery: clock.lap(), ..Timing::default() };
         Ok(Tracked::solved(solved, posterior, TrackStatus::Relocalized, None, timing))
     }
@@ -353,13 +445,16 @@ impl Tracker {
         Ok((best, found.collect()))
     }
 
-    /// A pose that is believed, looked for from near to far. One from anywhere must fit as if nothing had changed.
+    /// A pose that is believed, looked for from near to far: from where it should be if it is `seen` there. One from anywhere must fit as if
+    /// nothing had changed.
     fn recover(
         &mut self,
-        mut frame: Frame<'_>,
+        sight: &mut Sight,
         predicted: &State,
         track: &TrackState,
+        seen: bool,
     ) -> Result<Option<(Solved, Posterior)>, RefineError> {
+        let (object, hand, rig) = (Arc::clone(&self.object), self.hand.clone(), self.rig.clone());
         let recovery = self.settings.recovery;
         let levels = [(Recovery::Near, track.allowance()), (Recovery::Anywhere, track.level)];
         for (reach, level) in levels {
@@ -367,21 +462,40 @@ impl Tracker {
                 break;
             }
             let mut start = predicted.clone();
+            let mut rivals = None;
             if reach == Recovery::Anywhere {
+                let mask = self.segmenter.anywhere(&sight.observation, &sight.hand_depth);
+                let Some(mask) = mask else { break };
+                sight.observation.mask = mask;
+                let frame = self.frame(sight, &object, hand.as_ref(), rig.as_deref())?;
                 match self.search(&frame) {
-                    Ok((best, rivals)) => {
+                    Ok((best, others)) => {
                         start.t_cam_object = best;
-                        frame = frame.with_rivals(rivals);
+                        rivals = Some(others);
                     }
                     Err(RefineError::NothingFits | RefineError::NoDepth) => break,
                     Err(error) => return Err(error),
                 }
+                // Its own outline, now that it is known where that should be.
+                let (observation, depth) = (&sight.observation, &sight.hand_depth);
+                let mask = self.segmenter.segment(observation, depth, &object, &start.t_cam_object);
+                let Some(mask) = mask else { break };
+                sight.observation.mask = mask;
+            } else if !seen {
+                continue;
             }
             if start.center().z <= 0.0 {
                 continue;
             }
+            let mut frame = self.frame(sight, &object, hand.as_ref(), rig.as_deref())?;
+            if let Some(rivals) = rivals {
+                frame = frame.with_rivals(rivals);
+            }
             let (solved, posterior) = self.estimate(&frame, &start)?;
-            if self.gate(&solved, &posterior, None, level).is_none() {
+            let pose = &solved.solution.at.state.t_cam_object;
+            let shown = self.segmenter.shown(&sight.observation, &sight.hand_depth, &object, pose);
+            if shown >= LEAST_SHOWN && self.gate(&solved, &posterior, None, level).is_none() {
+                self.learn(sight, &solved);
                 return Ok(Some((solved, posterior)));
             }
         }

@@ -35,8 +35,10 @@ impl TrackStatus {
 /// Why a pose was not believed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Rejection {
-    /// The mask is empty, or the object would be behind the camera.
+    /// Nothing of it is seen where it should be, or it would be behind the camera.
     Unseen,
+    /// It was lost for so long that it is not followed from where it should be, but looked for.
+    LongLost,
     /// The cost is so high \[nat\], its running mean being the other number.
     Cost(f64, f64),
     /// The object would be so many standard deviations of the prediction away from it.
@@ -49,6 +51,7 @@ impl fmt::Display for Rejection {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Unseen => write!(f, "nothing of the object is seen"),
+            Self::LongLost => write!(f, "it was lost for long"),
             Self::Cost(cost, mean) => {
                 write!(f, "a cost of {cost:.0} nats where {mean:.0} are usual")
             }

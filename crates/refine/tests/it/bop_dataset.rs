@@ -325,8 +325,7 @@ fn images_that_cannot_serve() {
     let dataset = fixture.open();
     let frame = dataset.frame(4, 0).unwrap();
     assert_eq!(frame.depth(), Err(DatasetError::NoDepth { file: depth.clone() }));
-    let problem = "the mask is empty".to_owned();
-    assert_eq!(frame.mask(0), Err(DatasetError::Unusable { file: mask, problem }));
+    assert_eq!(frame.mask(0), Err(DatasetError::EmptyMask { file: mask }));
     assert_eq!(frame.observation(0).unwrap_err(), DatasetError::NoDepth { file: depth });
     let error = dataset.frame(4, 3).unwrap().observation(0).unwrap_err().to_string();
     assert!(error.starts_with(&format!("{}: is 3x4 pixels but ", odd.display())), "{error}");

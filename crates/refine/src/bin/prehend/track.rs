@@ -103,7 +103,8 @@ impl Track {
         let dataset = self.selection.open()?;
         let (starts, mut failures) = self.starts(&dataset)?;
         let rig = open_rig(self.rig.as_deref())?;
-        let mut assets = Assets::new(&dataset, 0).with_cache(cache()).with_rig(rig.clone());
+        let mut assets = Assets::new(&dataset, 0);
+        assets = assets.with_cache(cache()).with_rig(rig.clone()).with_optional_masks();
         let mut frames = Vec::new();
         for start in &starts {
             let begin = |object, hand| {
@@ -188,7 +189,7 @@ impl Track {
                         none.insert(new)
                     }
                 };
-                Ok(tracker.track(&observation, time)?)
+                Ok(tracker.push(observation, time)?)
             };
             match frame() {
                 Ok(tracked) => {

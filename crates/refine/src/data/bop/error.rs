@@ -14,7 +14,7 @@ pub enum DatasetError {
         /// The path looked for.
         file: PathBuf,
     },
-    /// It is not what it has to be: broken JSON, a truncated image, an empty mask, a dataset without scenes, a journal of
+    /// It is not what it has to be: broken JSON, a truncated image, a dataset without scenes, a journal of
     /// another run.
     #[error("{}: {problem}", file.display())]
     Unusable {
@@ -22,6 +22,12 @@ pub enum DatasetError {
         file: PathBuf,
         /// What is wrong, and where the decoder knows it.
         problem: String,
+    },
+    /// A mask in which nothing is set.
+    #[error("{}: the mask is empty", file.display())]
+    EmptyMask {
+        /// The file.
+        file: PathBuf,
     },
     /// A file that lists things by key lacks this one.
     #[error("{}: no entry {key:?}", file.display())]

@@ -160,7 +160,7 @@ impl Frame<'_> {
         let size = (stored.width(), stored.height());
         let mask = self.undistorted(&file, stored, size, Remap::mask)?;
         if mask.count() == 0 {
-            return Err(DatasetError::unusable(&file, "the mask is empty"));
+            return Err(DatasetError::EmptyMask { file });
         }
         Ok(mask)
     }

@@ -29,7 +29,8 @@ impl Grasper<'_> {
     ) -> Result<Vec<GraspSnapshot>, GraspFault> {
         let down = random_direction(&mut SplitMix64::new(first_seed)) * self.settings.gravity;
         let before = (BEFORE * steps as f64) as usize;
-        let between = (((OPENING + EMPTY) / self.settings.frame_time) as usize).min(steps - before);
+        let between = ((OPENING + EMPTY) / self.settings.frame_time) as usize;
+        let between = between.min((steps - before).saturating_sub(1));
         let held = |seed: u64, count: usize, turn: UnitQuaternion<f64>| {
             let mut last = GraspFault::NoContact(0);
             for k in 0..tries {

@@ -30,7 +30,7 @@ const FREQUENCIES: (f64, f64) = (0.1, 0.6);
 /// Time given to a grasp to settle under gravity before the first moment \[s\].
 const SETTLING: f64 = 0.25;
 /// What is left of the grip while the object slips.
-const LOOSE: f64 = 0.1;
+const LOOSE: f64 = 0.02;
 /// How far it slips, least and most \[m\], unless the hand is loose for so long \[s\] before.
 const SLIP: (f64, f64) = (4e-3, 15e-3);
 const LOOSE_TIME: f64 = 0.3;

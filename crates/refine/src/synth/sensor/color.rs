@@ -6,11 +6,20 @@ use prehend_render::RgbImage;
 use super::settings::ColorSettings;
 
 impl ColorSettings {
-    /// The picture that the camera takes.
-    pub(super) fn expose(&self, truth: &RgbImage, noise: &mut SplitMix64) -> RgbImage {
+    /// Exposure and white balance: what colors are multiplied by.
+    pub(super) fn gains(&self, noise: &mut SplitMix64) -> [f32; 3] {
         let exposure = (self.exposure * noise.normal()).exp2();
-        let gain = [0; 3]
-            .map(|_| (exposure * (1.0 + self.white_balance * noise.normal()).max(0.1)) as f32);
+        let gain = |_| (exposure * (1.0 + self.white_balance * noise.normal()).max(0.1)) as f32;
+        [0; 3].map(gain)
+    }
+
+    /// The picture that the camera takes.
+    pub(super) fn expose(
+        &self,
+        truth: &RgbImage,
+        gain: [f32; 3],
+        noise: &mut SplitMix64,
+    ) -> RgbImage {
         let mut picture = blurred(truth, self.blur * (0.4 + 0.6 * noise.uniform()));
         let (dark, shot) = ((self.noise * self.noise) as f32, self.shot_noise as f32);
         let noisy = dark > 0.0 || shot > 0.0;
@@ -95,7 +104,11 @@ mod tests {
     fn noise_and_gains_are_as_strong_as_asked_for() {
         let flat = RgbImage::filled(100, 100, [0.4; 3]);
         let mut noise = SplitMix64::new(6);
-        let clean = SensorSettings::clean().color.expose(&flat, &mut noise);
+        let expose = |settings: &ColorSettings, noise: &mut SplitMix64| {
+            let gains = settings.gains(noise);
+            settings.expose(&flat, gains, noise)
+        };
+        let clean = expose(&SensorSettings::clean().color, &mut noise);
         let spread = |image: &RgbImage| {
             let mean = image.pixels().iter().map(|p| p[0]).sum::<f32>() / 1e4;
             let square = image.pixels().iter().map(|p| (p[0] - mean).powi(2)).sum::<f32>() / 1e4;
@@ -104,8 +117,7 @@ mod tests {
         let (mean, sigma) = spread(&clean);
         assert!((mean - 0.4).abs() < 1e-3 && (sigma - 0.01).abs() < 5e-4, "{mean} {sigma}");
         let settings = SensorSettings::realistic().color;
-        let means: Vec<f32> =
-            (0..40).map(|_| spread(&settings.expose(&flat, &mut noise)).0).collect();
+        let means: Vec<f32> = (0..40).map(|_| spread(&expose(&settings, &mut noise)).0).collect();
         let stops: f32 = means.iter().map(|m| (m / 0.4).log2().powi(2)).sum::<f32>() / 40.0;
         assert!((0.2..0.5).contains(&stops.sqrt()), "{}", stops.sqrt());
     }

@@ -170,9 +170,13 @@ impl<'a> Rig<'a> {
         if let Some(play) = self.settings.play.draw(&slides(self.robot), noise) {
             (t_cam_hand_told, joints) = play.apply(&t_cam_hand_told, &joints);
         }
+        let gains = match film {
+            Some((film, _)) => self.settings.color.gains(&mut film.surroundings.clone()),
+            None => self.settings.color.gains(noise),
+        };
         let told = Observation {
             camera: self.errors.camera(&self.camera),
-            color: self.settings.color.expose(&seen.color, noise),
+            color: self.settings.color.expose(&seen.color, gains, noise),
             depth: self.settings.depth.measure(&seen.depth, &self.camera, &self.depth, noise),
             mask: self.settings.mask.segment(&seen.visible, &seen.hand, noise),
             gravity: Some(gravity),

@@ -1,0 +1,50 @@
+//! How often colors occur.
+
+/// Levels of a channel.
+const LEVELS: f32 = 16.0;
+const COLORS: usize = 16 * 16 * 16;
+/// What a color that was never seen counts for, as a share of all that were.
+const UNSEEN: f32 = 1e-4;
+
+/// Shares of the colors of a part of pictures.
+#[derive(Clone, Debug)]
+pub(super) struct ColorHistogram {
+    shares: Vec<f32>,
+    /// Whether anything was learnt.
+    known: bool,
+}
+
+impl Default for ColorHistogram {
+    fn default() -> Self {
+        Self { shares: vec![0.0; COLORS], known: false }
+    }
+}
+
+/// The number of a color.
+pub(super) fn color_index(color: &[f32; 3]) -> u16 {
+    let level = |channel: f32| (channel * LEVELS).clamp(0.0, LEVELS - 1.0) as u16;
+    let [r, g, b] = color.map(level);
+    (r << 8) | (g << 4) | b
+}
+
+impl ColorHistogram {
+    /// Goes a part `gain` of the way to what `colors` show, and all of it at first.
+    pub(super) fn learn(&mut self, colors: impl Iterator<Item = u16> + Clone, gain: f32) {
+        let count = colors.clone().count();
+        if count == 0 {
+            return;
+        }
+        let gain = if self.known { gain } else { 1.0 };
+        self.known = true;
+        self.shares.iter_mut().for_each(|share| *share *= 1.0 - gain);
+        let each = gain / count as f32;
+        for color in colors {
+            self.shares[usize::from(color)] += each;
+        }
+    }
+
+    /// How often a color occurs.
+    pub(super) fn density(&self, color: u16) -> f32 {
+        self.shares[usize::from(color)] + UNSEEN
+    }
+}

@@ -1,0 +1,217 @@
+//! What of a picture shows the object, told by where it should be, depth, colors, and a mask if there is one.
+
+mod colors;
+mod parts;
+mod window;
+
+use nalgebra::Isometry3;
+use prehend_render::{DepthImage, Mask};
+
+use self::colors::ColorHistogram;
+use self::parts::large_parts;
+use self::window::{Label, Pixel, Window};
+use crate::scene::{Object, Observation};
+
+/// Pixels of which each colors, depth and masks are asked: every so many of rows and columns.
+const STRIDE: usize = 2;
+/// How far from where it should be the object is looked for \[m\].
+const REACH: f64 = 0.04;
+/// How much a frame that was believed counts for the colors beside those before.
+const COLOR_GAIN: f32 = 0.1;
+/// Colors of neighbors are alike: what part of their evidence counts, and how much at most \[nat\].
+const COLOR_WEIGHT: f32 = 0.6;
+const COLOR_LIMIT: f32 = 3.0;
+/// Pixels that are needed to judge a mask.
+const ENOUGH: f32 = 30.0;
+/// How often a mask errs at least.
+const MASK_ERROR: f32 = 0.02;
+/// How many of the pixels that should show the object must do so.
+const LEAST_SHARE: f32 = 0.05;
+
+/// How many pixels an object must have that was lost, beside the last frame in which it was seen.
+const LEAST_FOUND: f32 = 0.3;
+/// What colors tell of an object in a hand before any are known \[nat\].
+const UNKNOWN_COLORS: f32 = 1.0;
+
+/// Tells the object from everything else by its colors and those around it, which are learnt from frames in which its pose was
+/// believed.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Segmenter {
+    object: ColorHistogram,
+    others: ColorHistogram,
+    /// How often masks say so of pixels that show the object, and of others.
+    hits: f32,
+    false_alarms: f32,
+    /// How many pixels should have shown the object in the last frame that was learnt from.
+    last_seen: f32,
+}
+
+impl Segmenter {
+    /// The pixels of `observation` that show `object`, which should be at `t_cam_object`; `hand` is the depth image of the hand there \[m\]. None if
+    /// hardly any of those do that should.
+    ///
+    /// The mask of the observation is evidence as far as it agrees with pixels that are sure: one of no use tells nothing.
+    pub(super) fn segment(
+        &mut self,
+        observation: &Observation,
+        hand: &DepthImage,
+        object: &Object,
+        t_cam_object: &Isometry3<f64>,
+    ) -> Option<Mask> {
+        let window = Window::new(observation, hand, object, t_cam_object, REACH)?;
+        self.judge_masks(&window);
+        let [set, unset] = self.mask_evidence();
+        let (width, height) = (observation.camera.width, observation.camera.height);
+        let mut mask = Mask::filled(width, height, false);
+        let (mut seen, mut expected) = (0.0, 0.0);
+        for pixel in window.pixels() {
+            expected += pixel.share;
+            let color = COLOR_WEIGHT * self.colors_evidence(pixel.color);
+            let told = if pixel.masked { set } else { unset };
+            if pixel.prior() + pixel.depth_evidence() + color + told <= 0.0 {
+                continue;
+            }
+            seen += 1.0;
+            fill(&mut mask, pixel.at);
+        }
+        (seen >= LEAST_SHARE * expected && seen > 0.0).then_some(mask)
+    }
+
+    /// The pixels of `observation` that may show an object of which nothing is known: of its colors, in the mask as far as that has been right, and, of
+    /// an object in a hand, near what of the hand is seen, but not on it. None if they are far fewer than in the last frame that was believed.
+    pub(super) fn anywhere(&self, observation: &Observation, hand: &DepthImage) -> Option<Mask> {
+        let window = Window::whole(observation, hand);
+        let [set, unset] = self.mask_evidence();
+        let center = window.hand_center();
+        let may_show = |pixel: &Pixel| {
+            let color = match self.last_seen > 0.0 {
+                true => COLOR_WEIGHT * self.colors_evidence(pixel.color),
+                false => UNKNOWN_COLORS,
+            };
+            let told = if pixel.masked { set } else { unset };
+            pixel.near_hand(center) + color + told > 0.0
+        };
+        let may_show: Vec<bool> = window.pixels().map(may_show).collect();
+        let columns = observation.camera.width.div_ceil(STRIDE);
+        let parts = large_parts(&may_show, columns);
+        let count = parts.iter().filter(|part| **part).count() as f32;
+        let (width, height) = (observation.camera.width, observation.camera.height);
+        let mut mask = Mask::filled(width, height, false);
+        let shown = window.pixels().zip(&parts).filter(|(_, part)| **part);
+        shown.for_each(|(pixel, _)| fill(&mut mask, pixel.at));
+        (count >= ENOUGH.max(LEAST_FOUND * self.last_seen)).then_some(mask)
+    }
+
+    /// The share of the pixels which should show an object at `t_cam_object` that do so.
+    pub(super) fn shown(
+        &self,
+        observation: &Observation,
+        hand: &DepthImage,
+        object: &Object,
+        t_cam_object: &Isometry3<f64>,
+    ) -> f64 {
+        let Some(window) = Window::new(observation, hand, object, t_cam_object, 0.0) else {
+            return 0.0;
+        };
+        let (mut seen, mut expected) = (0.0, 0.0);
+        for pixel in window.pixels() {
+            let color = COLOR_WEIGHT * self.colors_evidence(pixel.color);
+            expected += pixel.share;
+            seen += pixel.share * f32::from(u8::from(pixel.depth_evidence() + color > 0.0));
+        }
+        f64::from(seen / expected)
+    }
+
+    /// Learns colors from a frame with the object at `t_cam_object`.
+    pub(super) fn learn(
+        &mut self,
+        observation: &Observation,
+        hand: &DepthImage,
+        object: &Object,
+        t_cam_object: &Isometry3<f64>,
+    ) {
+        let Some(window) = Window::new(observation, hand, object, t_cam_object, REACH) else {
+            return;
+        };
+        self.last_seen = window.pixels().map(|pixel| pixel.share).sum();
+        for (label, colors) in [(Label::Object, &mut self.object), (Label::Other, &mut self.others)]
+        {
+            let pixels = window.pixels().filter(|pixel| pixel.label() == Some(label));
+            colors.learn(pixels.map(|pixel| pixel.color), COLOR_GAIN);
+        }
+    }
+
+    /// Whether a color is rather the object's than another's \[nat\].
+    fn colors_evidence(&self, color: u16) -> f32 {
+        let [own, other] = [&self.object, &self.others].map(|colors| colors.density(color));
+        (own / other).ln().clamp(-COLOR_LIMIT, COLOR_LIMIT)
+    }
+
+    /// Finds how often the mask is right, unless too few pixels are sure.
+    fn judge_masks(&mut self, window: &Window) {
+        let share = |label: Label| {
+            let mut counts = [0.0_f32; 2];
+            for pixel in window.pixels().filter(|pixel| pixel.label() == Some(label)) {
+                counts[usize::from(pixel.masked)] += 1.0;
+            }
+            let all = counts[0] + counts[1];
+            (all >= ENOUGH).then(|| counts[1] / all)
+        };
+        if let (Some(hits), Some(false_alarms)) = (share(Label::Object), share(Label::Other)) {
+            (self.hits, self.false_alarms) = (hits, false_alarms);
+        }
+    }
+
+    /// What it tells that a pixel is in the mask, and that it is not \[nat\].
+    fn mask_evidence(&self) -> [f32; 2] {
+        let rate = |share: f32| share.clamp(MASK_ERROR, 1.0 - MASK_ERROR);
+        let (hits, false_alarms) = (rate(self.hits), rate(self.false_alarms));
+        [(hits / false_alarms).ln(), ((1.0 - hits) / (1.0 - false_alarms)).ln()]
+    }
+}
+
+/// Sets the pixels that the one at a column and row stands for.
+fn fill(mask: &mut Mask, [x, y]: [usize; 2]) {
+    let (width, height) = (mask.width(), mask.height());
+    for row in y..(y + STRIDE).min(height) {
+        let end = (x + STRIDE).min(width);
+        mask.pixels_mut()[row * width + x..row * width + end].fill(true);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Frame, default_scene};
+
+    /// Overlap of two masks over what either has.
+    fn overlap(a: &Mask, b: &Mask) -> f64 {
+        let pairs = || a.pixels().iter().zip(b.pixels());
+        let both = pairs().filter(|(a, b)| **a && **b).count() as f64;
+        both / pairs().filter(|(a, b)| **a || **b).count() as f64
+    }
+
+    #[test]
+    fn the_object_is_told_from_the_rest_also_by_useless_masks() {
+        let scene = default_scene(1).unwrap();
+        let truth = scene.observation.mask.clone();
+        let hand = Frame::new(&scene.observation, &scene.object, Some(&scene.hand))
+            .map(|frame| frame.hand_depth().clone())
+            .unwrap();
+        let mut segmenter = Segmenter::default();
+        segmenter.learn(&scene.observation, &hand, &scene.object, &scene.truth);
+        // As far off as an object that slips between two frames.
+        let off = Isometry3::translation(6e-3, -4e-3, 3e-3) * scene.truth;
+        for fill in [None, Some(false), Some(true)] {
+            let mut observation = scene.observation.clone();
+            if let Some(fill) = fill {
+                observation.mask.pixels_mut().fill(fill);
+            }
+            let found = segmenter.segment(&observation, &hand, &scene.object, &off).unwrap();
+            let overlap = overlap(&found, &truth);
+            assert!(overlap > 0.9, "{fill:?}: {overlap}");
+        }
+        let away = Isometry3::translation(0.3, 0.0, 0.0) * scene.truth;
+        assert!(segmenter.segment(&scene.observation, &hand, &scene.object, &away).is_none());
+    }
+}

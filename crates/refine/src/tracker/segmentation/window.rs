@@ -1,0 +1,240 @@
+//! The part of a picture in which the object may be, with what is expected there.
+
+use nalgebra::{Isometry3, Vector3};
+use prehend_render::{Camera, DepthImage, depth_map};
+
+use super::STRIDE;
+use super::colors::color_index;
+use crate::scene::{Object, Observation};
+
+/// Outlines are expected within so many pixels of the window to either side.
+const BAND: usize = 4;
+/// Depth of the surface is carried on over so many pixels of the window beyond its outline.
+const BEYOND: usize = 16;
+/// How sure it is that the object is where it should be.
+const SURE: f32 = 0.95;
+/// Standard deviation of depth about where the object should be, and at the hand \[m\].
+const OBJECT_SIGMA: f32 = 5e-3;
+const HAND_SIGMA: f32 = 5e-3;
+/// Density of depths of what is not known \[1/m\], and how often the object's depth is so, too.
+const ANYWHERE: f32 = 3.0;
+const OUTLIERS: f32 = 0.03;
+/// Depth that is so near the object's surface is the object's, and so far from it not \[m\].
+const ON_OBJECT: f32 = 5e-3;
+const OFF_OBJECT: f32 = 15e-3;
+
+/// How far from the middle of a hand it holds something \[m\].
+const HELD: f32 = 0.2;
+
+/// What a pixel surely shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Label {
+    Object,
+    Other,
+}
+
+/// One pixel of a window.
+#[derive(Clone, Copy)]
+pub(super) struct Pixel {
+    /// Column and row in the picture.
+    pub(super) at: [usize; 2],
+    /// The share of its neighbors that should show the object.
+    pub(super) share: f32,
+    pub(super) color: u16,
+    pub(super) masked: bool,
+    /// Depth of the object, carried on beyond its outline, of the hand, and as measured \[m\]; 0 where there is none.
+    object: f32,
+    hand: f32,
+    sensor: f32,
+    /// Where that is, camera frame \[m\]; known of whole pictures only.
+    place: Vector3<f32>,
+}
+
+/// Part of a picture at every so many pixels.
+pub(super) struct Window {
+    pixels: Vec<Pixel>,
+}
+
+impl Window {
+    /// About an object at `t_cam_object`, and `reach` \[m\] to all sides; none if that is out of the picture.
+    pub(super) fn new(
+        observation: &Observation,
+        hand: &DepthImage,
+        object: &Object,
+        t_cam_object: &Isometry3<f64>,
+        reach: f64,
+    ) -> Option<Self> {
+        let full = &observation.camera;
+        let center = t_cam_object * object.center;
+        let nearest = center.z - object.radius;
+        if nearest <= 0.0 {
+            return None;
+        }
+        let at = full.project(&center)?;
+        let extent = (object.radius + reach) * full.fx.max(full.fy) / nearest;
+        let range = |middle: f64, size: usize| {
+            let from = ((middle - extent).max(0.0) as usize) / STRIDE;
+            let to = ((middle + extent).clamp(0.0, size as f64) as usize) / STRIDE;
+            (from, to.saturating_sub(from))
+        };
+        let ((left, columns), (top, rows)) = (range(at.x, full.width), range(at.y, full.height));
+        if columns == 0 || rows == 0 {
+            return None;
+        }
+        let coarse = full.scaled(1.0 / STRIDE as f64);
+        let camera: Camera = coarse.cropped(left, top, columns, rows);
+        let drawn = depth_map(&camera, &[(&object.model, *t_cam_object)]);
+        let picture = |column: usize, row: usize| [(left + column) * STRIDE, (top + row) * STRIDE];
+        let mut pixels: Vec<Pixel> = Vec::with_capacity(columns * rows);
+        for row in 0..rows {
+            for column in 0..columns {
+                let [x, y] = picture(column, row);
+                let index = y * full.width + x;
+                let front = hand.pixels()[index];
+                let own = drawn.pixels()[row * columns + column];
+                let hidden = front > 0.0 && front < own;
+                pixels.push(Pixel {
+                    at: [x, y],
+                    share: if own > 0.0 && !hidden { 1.0 } else { 0.0 },
+                    color: color_index(&observation.color.pixels()[index]),
+                    masked: observation.mask.pixels()[index],
+                    object: own,
+                    hand: front,
+                    sensor: observation.depth.pixels()[index],
+                    place: Vector3::zeros(),
+                });
+            }
+        }
+        if pixels.iter().all(|pixel| pixel.share == 0.0) {
+            return None;
+        }
+        let size = (columns, rows);
+        let depths = pixels.iter().map(|pixel| pixel.object).collect::<Vec<_>>();
+        let drawn = depths.iter().map(|z| f32::from(u8::from(*z > 0.0))).collect::<Vec<_>>();
+        let shares = means(&pixels.iter().map(|p| p.share).collect::<Vec<_>>(), size, BAND);
+        let (near, count) = (means(&depths, size, BEYOND), means(&drawn, size, BEYOND));
+        let middle = center.z as f32;
+        for (i, pixel) in pixels.iter_mut().enumerate() {
+            pixel.share = shares[i];
+            if pixel.object == 0.0 {
+                pixel.object = if count[i] > 0.0 { near[i] / count[i] } else { middle };
+            }
+        }
+        Some(Self { pixels })
+    }
+
+    /// Of a whole picture, in which nothing is known of the object.
+    pub(super) fn whole(observation: &Observation, hand: &DepthImage) -> Self {
+        let full = &observation.camera;
+        let (columns, rows) = (full.width.div_ceil(STRIDE), full.height.div_ceil(STRIDE));
+        let pixel = |k: usize| {
+            let (x, y) = (k % columns * STRIDE, k / columns * STRIDE);
+            let index = y * full.width + x;
+            let sensor = observation.depth.pixels()[index];
+            Pixel {
+                at: [x, y],
+                share: 0.0,
+                color: color_index(&observation.color.pixels()[index]),
+                masked: observation.mask.pixels()[index],
+                object: 0.0,
+                hand: hand.pixels()[index],
+                sensor,
+                place: full.unproject(x as f64, y as f64, f64::from(sensor)).coords.cast(),
+            }
+        };
+        Self { pixels: (0..columns * rows).map(pixel).collect() }
+    }
+
+    /// The middle of what of the hand is seen, camera frame \[m\]; none without one.
+    pub(super) fn hand_center(&self) -> Option<Vector3<f32>> {
+        let on_hand = self.pixels.iter().filter(|pixel| pixel.is_on_hand());
+        let (sum, count) = on_hand
+            .fold((Vector3::zeros(), 0.0), |(sum, count), pixel| (sum + pixel.place, count + 1.0));
+        (count > 0.0).then(|| sum / count)
+    }
+
+    pub(super) fn pixels(&self) -> impl Iterator<Item = &Pixel> + Clone {
+        self.pixels.iter()
+    }
+}
+
+/// Means over squares that reach `reach` pixels to all sides, without what is outside.
+fn means(values: &[f32], (columns, rows): (usize, usize), reach: usize) -> Vec<f32> {
+    let mut across = vec![0.0; values.len()];
+    for (line, sums) in values.chunks(columns).zip(across.chunks_mut(columns)) {
+        running_means(columns, reach, |i| line[i], |i, mean| sums[i] = mean);
+    }
+    let mut all = vec![0.0; values.len()];
+    for column in 0..columns {
+        let at = |row: usize| row * columns + column;
+        running_means(rows, reach, |i| across[at(i)], |i, mean| all[at(i)] = mean);
+    }
+    all
+}
+
+fn running_means(
+    count: usize,
+    reach: usize,
+    value: impl Fn(usize) -> f32,
+    mut set: impl FnMut(usize, f32),
+) {
+    let mut sum: f32 = (0..reach.min(count)).map(&value).sum();
+    let mut number = reach.min(count) as f32;
+    for i in 0..count {
+        if i + reach < count {
+            (sum, number) = (sum + value(i + reach), number + 1.0);
+        }
+        set(i, (sum / number).max(0.0));
+        if i >= reach {
+            (sum, number) = (sum - value(i - reach), number - 1.0);
+        }
+    }
+}
+
+impl Pixel {
+    /// Whether the object should be seen here \[nat\].
+    pub(super) fn prior(&self) -> f32 {
+        let sure = (1.0 - SURE) + (2.0 * SURE - 1.0) * self.share;
+        (sure / (1.0 - sure)).ln()
+    }
+
+    /// Whether depth is rather the object's than that of the hand or of something else \[nat\].
+    pub(super) fn depth_evidence(&self) -> f32 {
+        if self.sensor <= 0.0 {
+            return 0.0;
+        }
+        let bell = |off: f32, sigma: f32| 0.399 / sigma * (-0.5 * (off / sigma).powi(2)).exp();
+        let own = bell(self.sensor - self.object, OBJECT_SIGMA);
+        let own = (1.0 - OUTLIERS) * own + OUTLIERS * ANYWHERE;
+        let other = match self.hand > 0.0 {
+            true => 0.5 * (bell(self.sensor - self.hand, HAND_SIGMA) + ANYWHERE),
+            false => ANYWHERE,
+        };
+        (own / other).ln()
+    }
+
+    /// Whether depth is the hand's.
+    fn is_on_hand(&self) -> bool {
+        self.hand > 0.0 && self.sensor > 0.0 && (self.sensor - self.hand).abs() < 2.0 * HAND_SIGMA
+    }
+
+    /// Whether what is seen here may be held by a hand about that place \[nat\].
+    pub(super) fn near_hand(&self, center: Option<Vector3<f32>>) -> f32 {
+        let Some(center) = center else { return 0.0 };
+        match self.sensor > 0.0 && !self.is_on_hand() && (self.place - center).norm() < HELD {
+            true => 0.0,
+            false => -3.0,
+        }
+    }
+
+    /// What it surely shows, where that is known.
+    pub(super) fn label(&self) -> Option<Label> {
+        let off = (self.sensor - self.object).abs();
+        let measured = self.sensor > 0.0;
+        if self.share > 0.999 && measured && off < ON_OBJECT {
+            return Some(Label::Object);
+        }
+        let elsewhere = self.share == 0.0 || measured && off > OFF_OBJECT;
+        elsewhere.then_some(Label::Other)
+    }
+}
