@@ -66,7 +66,8 @@ enum Command {
     Initial(initial::Initial),
     /// Follow objects through the images of scenes, taken for the frames of a camera
     ///
-    /// An image's pose comes from the one before it; an object that is lost is looked for.
+    /// An image's pose comes from the one before it; an object that is lost is looked for. Masks are needed in the first image alone, and with
+    /// --search not even there where the object is in a hand; others are believed as far as they fit depth and colors.
     Track(Box<track::Track>),
     /// Score poses against a dataset's ground truth
     ///
