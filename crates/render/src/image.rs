@@ -236,8 +236,8 @@ impl DepthImage {
             if valid.is_empty() || valid.len() * 2 < block.len() {
                 return 0.0;
             }
-            valid.sort_by(f32::total_cmp);
-            valid[(valid.len() - 1) / 2]
+            let middle = (valid.len() - 1) / 2;
+            *valid.select_nth_unstable_by(middle, f32::total_cmp).1
         })
     }
 }

@@ -19,6 +19,9 @@ const GROWTH: f64 = 0.02;
 /// Frames between two times that a lost object is looked for.
 const LOOK_EVERY: u32 = 8;
 
+/// Frames between two that colors are learnt from.
+const LEARN_EVERY: u32 = 4;
+
 /// Frames after which an object may be held in another way than before.
 const LONG: u32 = 5;
 
@@ -47,6 +50,8 @@ pub(super) struct TrackState {
     pub(super) lost: u32,
     /// Frames since.
     misses: u32,
+    /// Frames in which it was followed.
+    followed: u32,
 }
 
 /// What is expected of a frame before it is looked at.
@@ -84,6 +89,7 @@ impl TrackState {
             level,
             lost: 0,
             misses: 0,
+            followed: 0,
         }
     }
 
@@ -91,6 +97,11 @@ impl TrackState {
     pub(super) fn missed(&mut self, seen: bool) {
         self.misses = self.misses.saturating_add(1);
         self.lost = self.lost.saturating_add(u32::from(seen));
+    }
+
+    /// Whether colors are to be learnt from this frame: they change slowly.
+    pub(super) fn is_time_to_learn(&self) -> bool {
+        self.followed.is_multiple_of(LEARN_EVERY)
     }
 
     /// Whether it was lost for so long that much may have happened to it.
@@ -110,7 +121,13 @@ impl TrackState {
     }
 
     /// The next of this memory: as [`new`](Self::new), and with the velocity between `prediction` and there.
-    pub(super) fn followed(mut next: Self, prediction: &Prediction, motion: &ProcessNoise) -> Self {
+    pub(super) fn followed(
+        &self,
+        mut next: Self,
+        prediction: &Prediction,
+        motion: &ProcessNoise,
+    ) -> Self {
+        next.followed = self.followed.wrapping_add(1);
         next.velocity = prediction.velocity;
         if prediction.seconds > 0.0 {
             let moved = next.state.t_cam_object * prediction.zero_velocity_pose.inverse();

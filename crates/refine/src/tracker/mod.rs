@@ -286,9 +286,11 @@ impl Tracker {
         let motion = self.settings.motion(in_hand);
         let level = track.level + LEVEL_GAIN * (solved.cost() - track.level);
         let next = self.remember(time, &solved, nominal, in_hand, level);
-        let mut next = TrackState::followed(next, prediction, motion);
+        let mut next = track.followed(next, prediction, motion);
         next.lost = track.lost.saturating_sub(1);
-        self.learn(sight, &solved);
+        if next.is_time_to_learn() {
+            self.learn(sight, &solved);
+        }
         timing.validation = clock.lap();
         self.track = Some(next);
         Ok(Ok(Tracked::solved(solved, posterior, TrackStatus::Tracked, None, *timing)))

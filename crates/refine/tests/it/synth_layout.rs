@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use image::GenericImageView;
-use nalgebra::{Rotation3, Vector3};
+use nalgebra::{Rotation3, UnitQuaternion, Vector3};
 use prehend_geometry::hand::{JOINT_NAMES, default_grasp};
 use prehend_geometry::objects::YcbObject;
 use prehend_refine::data::bop::Dataset;

@@ -71,24 +71,51 @@ fn factors_of(
     settings: &FusedSettings,
     patches: Option<&Arc<SurfacePatches>>,
 ) -> Result<Vec<Arc<dyn Factor>>, RefineError> {
+    // Drawn by all threads, before two of them ask for it.
+    frame.hand_depth();
+    let (picture, others) = rayon::join(
+        || picture_factor(frame, stage, settings, patches),
+        || other_factors(frame, stage, settings, patches),
+    );
+    Ok(picture?.into_iter().chain(others?).collect())
+}
+
+/// What compares pictures, if anything does.
+fn picture_factor(
+    frame: &Frame<'_>,
+    stage: &Stage,
+    settings: &FusedSettings,
+    patches: Option<&Arc<SurfacePatches>>,
+) -> Result<Option<Arc<dyn Factor>>, RefineError> {
     let wanted = |modality| settings.modalities.contains(&modality);
-    let mut factors: Vec<Arc<dyn Factor>> = Vec::new();
     let color = stage.color && wanted(Modality::Color) && frame.observation().has_colors();
     let silhouette = wanted(Modality::Silhouette);
-    if color || silhouette {
-        let mut rendering = settings.rendering.clone();
-        rendering.downsample *= stage.downsample;
-        rendering.kernel_width *= stage.kernel_scale;
-        rendering.color = color;
-        if !silhouette {
-            rendering.mask_sigma = f64::INFINITY;
-        }
-        let mut factor = RenderingFactor::new(frame, &rendering)?;
-        if let Some(patches) = patches {
-            factor = factor.with_patches(Arc::clone(patches), rendering.downsample);
-        }
-        factors.push(Arc::new(factor));
+    if !(color || silhouette) {
+        return Ok(None);
     }
+    let mut rendering = settings.rendering.clone();
+    rendering.downsample *= stage.downsample;
+    rendering.kernel_width *= stage.kernel_scale;
+    rendering.color = color;
+    if !silhouette {
+        rendering.mask_sigma = f64::INFINITY;
+    }
+    let mut factor = RenderingFactor::new(frame, &rendering)?;
+    if let Some(patches) = patches {
+        factor = factor.with_patches(Arc::clone(patches), rendering.downsample);
+    }
+    Ok(Some(Arc::new(factor)))
+}
+
+/// All others.
+fn other_factors(
+    frame: &Frame<'_>,
+    stage: &Stage,
+    settings: &FusedSettings,
+    patches: Option<&Arc<SurfacePatches>>,
+) -> Result<Vec<Arc<dyn Factor>>, RefineError> {
+    let wanted = |modality| settings.modalities.contains(&modality);
+    let mut factors: Vec<Arc<dyn Factor>> = Vec::new();
     if wanted(Modality::Depth) {
         let depth = PointToPlaneSettings {
             points: stage.points,

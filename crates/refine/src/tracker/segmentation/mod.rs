@@ -17,7 +17,7 @@ const STRIDE: usize = 2;
 /// How far from where it should be the object is looked for \[m\].
 const REACH: f64 = 0.04;
 /// How much a frame that was believed counts for the colors beside those before.
-const COLOR_GAIN: f32 = 0.1;
+const COLOR_GAIN: f32 = 0.3;
 /// Colors of neighbors are alike: what part of their evidence counts, and how much at most \[nat\].
 const COLOR_WEIGHT: f32 = 0.6;
 const COLOR_LIMIT: f32 = 3.0;
