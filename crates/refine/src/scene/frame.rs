@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
+use std::ops::Range;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use nalgebra::{Isometry3, Point3};
@@ -25,6 +26,8 @@ pub struct Frame<'a> {
     backend: Option<Arc<dyn Backend>>,
     rig: Option<&'a Rig>,
     rivals: Option<Vec<Isometry3<f64>>>,
+    /// Columns and rows beyond which nothing is looked for that may hide the object; all if it is not known.
+    focus: Option<[Range<usize>; 2]>,
 }
 
 /// What may hide the object in the image.
@@ -77,6 +80,7 @@ impl<'a> Frame<'a> {
             backend: None,
             rig: None,
             rivals: None,
+            focus: None,
         })
     }
 
@@ -119,6 +123,11 @@ impl<'a> Frame<'a> {
     /// The same with the depth image of the hand, which is known already \[m\].
     pub(crate) fn with_hand_depth(self, depth: &Arc<DepthImage>) -> Self {
         Self { hand_depth: OnceLock::from(Arc::clone(depth)), ..self }
+    }
+
+    /// The same of an object that is nowhere but in these columns and rows.
+    pub(crate) fn with_focus(self, focus: [Range<usize>; 2]) -> Self {
+        Self { focus: Some(focus), ..self }
     }
 
     /// What was sensed.
@@ -224,14 +233,23 @@ impl<'a> Frame<'a> {
 
     /// Depth of the hand and of what was measured beside the mask, whichever is nearer.
     fn measured_occluder(&self) -> DepthImage {
-        let mut occluder = (**self.hand_depth()).clone();
         let Observation { depth, mask, .. } = self.observation;
-        let seen = depth.pixels().iter().zip(mask.pixels());
-        for (nearest, (depth, masked)) in occluder.pixels_mut().iter_mut().zip(seen) {
-            let front = depth + IN_FRONT;
-            let nearer = *nearest <= 0.0 || front < *nearest;
-            if !masked && depth.is_finite() && *depth > 0.0 && nearer {
-                *nearest = front;
+        let (width, height) = (depth.width(), depth.height());
+        let [columns, rows] = self.focus.clone().unwrap_or([0..width, 0..height]);
+        let hand = self.hand_depth().pixels();
+        let mut occluder = DepthImage::filled(width, height, 0.0);
+        for row in rows.start..rows.end.min(height) {
+            let line = row * width + columns.start..row * width + columns.end.min(width);
+            let seen = depth.pixels()[line.clone()].iter().zip(&mask.pixels()[line.clone()]);
+            let known = hand[line.clone()].iter().zip(seen);
+            let targets = occluder.pixels_mut()[line].iter_mut();
+            for (nearest, (hand, (depth, masked))) in targets.zip(known) {
+                *nearest = *hand;
+                let front = depth + IN_FRONT;
+                let nearer = *nearest <= 0.0 || front < *nearest;
+                if !masked && depth.is_finite() && *depth > 0.0 && nearer {
+                    *nearest = front;
+                }
             }
         }
         occluder

@@ -8,7 +8,7 @@ mod settings;
 mod tests;
 mod tracked;
 
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Range};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -19,7 +19,7 @@ use prehend_render::{Backend, DepthImage};
 use self::clock::Clock;
 pub use self::clock::Timing;
 use self::memory::{Prediction, TrackState};
-use self::segmentation::Segmenter;
+use self::segmentation::{Segmentation, Segmenter};
 pub use self::settings::{GatingSettings, ProcessNoise, Recovery, TrackerSettings};
 pub use self::tracked::{Rejection, TrackStatus, Tracked};
 use crate::error::RefineError;
@@ -95,6 +95,8 @@ impl Solved {
 struct Sight {
     observation: Observation,
     hand_depth: Arc<DepthImage>,
+    /// Columns and rows in which the object is, where that is known.
+    focus: Option<[Range<usize>; 2]>,
 }
 
 impl Sight {
@@ -102,7 +104,12 @@ impl Sight {
     fn new(observation: Observation, hand: Option<&Arc<Hand>>) -> Self {
         let hand = hand.map(|hand| &**hand).zip(observation.hand.as_ref());
         let hand_depth = Arc::new(hand_depth(&observation.camera, hand));
-        Self { observation, hand_depth }
+        Self { observation, hand_depth, focus: None }
+    }
+
+    /// Takes what shows the object for its mask.
+    fn show(&mut self, Segmentation { mask, around }: Segmentation) {
+        (self.observation.mask, self.focus) = (mask, Some(around));
     }
 }
 
@@ -211,7 +218,7 @@ impl Tracker {
             &prediction.state.t_cam_object,
         );
         let mut timing = Timing::default();
-        let seen = seen.map(|mask| sight.observation.mask = mask).is_some();
+        let seen = seen.map(|seen| sight.show(seen)).is_some();
         // What was away for long may be held in another way: it is looked for everywhere then.
         let long_lost = track.is_long_lost() && self.settings.recovery == Recovery::Anywhere;
         let mut rejection = Rejection::Unseen;
@@ -306,6 +313,9 @@ impl Tracker {
     ) -> Result<Frame<'a>, RefineError> {
         let mut frame =
             Frame::new(&sight.observation, object, hand)?.with_hand_depth(&sight.hand_depth);
+        if let Some(focus) = &sight.focus {
+            frame = frame.with_focus(focus.clone());
+        }
         if let Some(backend) = &self.backend {
             frame = frame.with_backend(Arc::clone(backend));
         }
@@ -332,7 +342,9 @@ impl Tracker {
         if sight.observation.mask.count() == 0 {
             let (observation, depth) = (&sight.observation, &sight.hand_depth);
             let mask = match &self.initial {
-                Some(pose) => self.segmenter.segment(observation, depth, &object, pose),
+                Some(pose) => {
+                    self.segmenter.segment(observation, depth, &object, pose).map(|seen| seen.mask)
+                }
                 None => self.segmenter.anywhere(observation, depth),
             };
             sight.observation.mask = mask.ok_or(RefineError::EmptyMask)?;
@@ -468,7 +480,7 @@ impl Tracker {
             if reach == Recovery::Anywhere {
                 let mask = self.segmenter.anywhere(&sight.observation, &sight.hand_depth);
                 let Some(mask) = mask else { break };
-                sight.observation.mask = mask;
+                (sight.observation.mask, sight.focus) = (mask, None);
                 let frame = self.frame(sight, &object, hand.as_ref(), rig.as_deref())?;
                 match self.search(&frame) {
                     Ok((best, others)) => {
@@ -480,9 +492,9 @@ impl Tracker {
                 }
                 // Its own outline, now that it is known where that should be.
                 let (observation, depth) = (&sight.observation, &sight.hand_depth);
-                let mask = self.segmenter.segment(observation, depth, &object, &start.t_cam_object);
-                let Some(mask) = mask else { break };
-                sight.observation.mask = mask;
+                let seen = self.segmenter.segment(observation, depth, &object, &start.t_cam_object);
+                let Some(seen) = seen else { break };
+                sight.show(seen);
             } else if !seen {
                 continue;
             }

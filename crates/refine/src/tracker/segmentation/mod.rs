@@ -4,6 +4,8 @@ mod colors;
 mod parts;
 mod window;
 
+use std::ops::Range;
+
 use nalgebra::Isometry3;
 use prehend_render::{DepthImage, Mask};
 
@@ -46,6 +48,13 @@ pub(super) struct Segmenter {
     last_seen: f32,
 }
 
+/// What shows the object.
+pub(super) struct Segmentation {
+    pub(super) mask: Mask,
+    /// Columns and rows in which that was looked for.
+    pub(super) around: [Range<usize>; 2],
+}
+
 impl Segmenter {
     /// The pixels of `observation` that show `object`, which should be at `t_cam_object`; `hand` is the depth image of the hand there \[m\]. None if
     /// hardly any of those do that should.
@@ -57,7 +66,7 @@ impl Segmenter {
         hand: &DepthImage,
         object: &Object,
         t_cam_object: &Isometry3<f64>,
-    ) -> Option<Mask> {
+    ) -> Option<Segmentation> {
         let window = Window::new(observation, hand, object, t_cam_object, REACH)?;
         self.judge_masks(&window);
         let [set, unset] = self.mask_evidence();
@@ -74,7 +83,8 @@ impl Segmenter {
             seen += 1.0;
             fill(&mut mask, pixel.at);
         }
-        (seen >= LEAST_SHARE * expected && seen > 0.0).then_some(mask)
+        let around = window.range();
+        (seen >= LEAST_SHARE * expected && seen > 0.0).then_some(Segmentation { mask, around })
     }
 
     /// The pixels of `observation` that may show an object of which nothing is known: of its colors, in the mask as far as that has been right, and, of
@@ -208,7 +218,7 @@ mod tests {
                 observation.mask.pixels_mut().fill(fill);
             }
             let found = segmenter.segment(&observation, &hand, &scene.object, &off).unwrap();
-            let overlap = overlap(&found, &truth);
+            let overlap = overlap(&found.mask, &truth);
             assert!(overlap > 0.9, "{fill:?}: {overlap}");
         }
         let away = Isometry3::translation(0.3, 0.0, 0.0) * scene.truth;

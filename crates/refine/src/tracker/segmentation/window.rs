@@ -1,5 +1,7 @@
 //! The part of a picture in which the object may be, with what is expected there.
 
+use std::ops::Range;
+
 use nalgebra::{Isometry3, Vector3};
 use prehend_render::{Camera, DepthImage, depth_map};
 
@@ -53,6 +55,7 @@ pub(super) struct Pixel {
 /// Part of a picture at every so many pixels.
 pub(super) struct Window {
     pixels: Vec<Pixel>,
+    range: [Range<usize>; 2],
 }
 
 impl Window {
@@ -120,7 +123,8 @@ impl Window {
                 pixel.object = if count[i] > 0.0 { near[i] / count[i] } else { middle };
             }
         }
-        Some(Self { pixels })
+        let ends = picture(columns, rows);
+        Some(Self { pixels, range: [left * STRIDE..ends[0], top * STRIDE..ends[1]] })
     }
 
     /// Of a whole picture, in which nothing is known of the object.
@@ -142,7 +146,8 @@ impl Window {
                 place: full.unproject(x as f64, y as f64, f64::from(sensor)).coords.cast(),
             }
         };
-        Self { pixels: (0..columns * rows).map(pixel).collect() }
+        let range = [0..full.width, 0..full.height];
+        Self { pixels: (0..columns * rows).map(pixel).collect(), range }
     }
 
     /// The middle of what of the hand is seen, camera frame \[m\]; none without one.
@@ -151,6 +156,11 @@ impl Window {
         let (sum, count) = on_hand
             .fold((Vector3::zeros(), 0.0), |(sum, count), pixel| (sum + pixel.place, count + 1.0));
         (count > 0.0).then(|| sum / count)
+    }
+
+    /// Its columns and rows in the picture.
+    pub(super) fn range(&self) -> [Range<usize>; 2] {
+        self.range.clone()
     }
 
     pub(super) fn pixels(&self) -> impl Iterator<Item = &Pixel> + Clone {
