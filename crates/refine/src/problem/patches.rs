@@ -70,8 +70,9 @@ impl SurfacePatches {
         }
         let (mask, camera) = (&observation.mask, &observation.camera);
         let width = camera.width;
-        let masked = mask.pixels().iter().enumerate().filter(|(_, m)| **m);
-        let seen: Vec<[usize; 2]> = masked.map(|(i, _)| [i % width, i / width]).collect();
+        let [left, top, columns, rows] = mask.bounds()?;
+        let within = (top..top + rows).flat_map(|y| (left..left + columns).map(move |x| [x, y]));
+        let seen: Vec<[usize; 2]> = within.filter(|[x, y]| mask.pixels()[y * width + x]).collect();
         let largest = width.max(camera.height);
         let least = LEAST_SIDE * length_scale * camera.fx / distance;
         let wanted = (seen.len() as f64 / FULL_PATCHES).sqrt().max(least);

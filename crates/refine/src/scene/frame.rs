@@ -258,7 +258,11 @@ impl<'a> Frame<'a> {
 
 /// Root mean square of the colors under the mask; never zero.
 fn brightness(observation: &Observation) -> f64 {
-    let pixels = observation.color.pixels().iter().zip(observation.mask.pixels());
+    let Observation { color, mask, .. } = observation;
+    let [left, top, width, height] = mask.bounds().unwrap_or_default();
+    let line = |row: usize| row * mask.width() + left..row * mask.width() + left + width;
+    let pixels = (top..top + height)
+        .flat_map(|row| color.pixels()[line(row)].iter().zip(&mask.pixels()[line(row)]));
     let (sum, count) = pixels
         .filter(|(_, m)| **m)
         .flat_map(|(c, _)| c)

@@ -43,8 +43,8 @@ impl ColorHistogram {
         }
     }
 
-    /// How often a color occurs.
-    pub(super) fn density(&self, color: u16) -> f32 {
-        self.shares[usize::from(color)] + UNSEEN
+    /// How often each color occurs.
+    pub(super) fn densities(&self) -> impl Iterator<Item = f32> {
+        self.shares.iter().map(|share| share + UNSEEN)
     }
 }

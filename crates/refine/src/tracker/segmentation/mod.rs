@@ -44,6 +44,8 @@ pub(super) struct Segmenter {
     /// How often masks say so of pixels that show the object, and of others.
     hits: f32,
     false_alarms: f32,
+    /// What each color tells \[nat\]; empty before any is known.
+    color_evidence: Vec<f32>,
     /// How many pixels should have shown the object in the last frame that was learnt from.
     last_seen: f32,
 }
@@ -75,7 +77,11 @@ impl Segmenter {
         let (mut seen, mut expected) = (0.0, 0.0);
         for pixel in window.pixels() {
             expected += pixel.share;
-            let color = COLOR_WEIGHT * self.colors_evidence(pixel.color);
+            // Most pixels.
+            if pixel.is_elsewhere() {
+                continue;
+            }
+            let color = self.color_evidence(pixel.color);
             let told = if pixel.masked { set } else { unset };
             if pixel.prior() + pixel.depth_evidence() + color + told <= 0.0 {
                 continue;
@@ -95,7 +101,7 @@ impl Segmenter {
         let center = window.hand_center();
         let may_show = |pixel: &Pixel| {
             let color = match self.last_seen > 0.0 {
-                true => COLOR_WEIGHT * self.colors_evidence(pixel.color),
+                true => self.color_evidence(pixel.color),
                 false => UNKNOWN_COLORS,
             };
             let told = if pixel.masked { set } else { unset };
@@ -125,8 +131,8 @@ impl Segmenter {
         };
         let (mut seen, mut expected) = (0.0, 0.0);
         for pixel in window.pixels() {
-            let color = COLOR_WEIGHT * self.colors_evidence(pixel.color);
             expected += pixel.share;
+            let color = self.color_evidence(pixel.color);
             seen += pixel.share * f32::from(u8::from(pixel.depth_evidence() + color > 0.0));
         }
         f64::from(seen / expected)
@@ -149,12 +155,17 @@ impl Segmenter {
             let pixels = window.pixels().filter(|pixel| pixel.label() == Some(label));
             colors.learn(pixels.map(|pixel| pixel.color), COLOR_GAIN);
         }
+        let pairs = self.object.densities().zip(self.others.densities());
+        let evidence = |(own, other): (f32, f32)| {
+            COLOR_WEIGHT * (own / other).ln().clamp(-COLOR_LIMIT, COLOR_LIMIT)
+        };
+        self.color_evidence.clear();
+        self.color_evidence.extend(pairs.map(evidence));
     }
 
     /// Whether a color is rather the object's than another's \[nat\].
-    fn colors_evidence(&self, color: u16) -> f32 {
-        let [own, other] = [&self.object, &self.others].map(|colors| colors.density(color));
-        (own / other).ln().clamp(-COLOR_LIMIT, COLOR_LIMIT)
+    fn color_evidence(&self, color: u16) -> f32 {
+        self.color_evidence.get(usize::from(color)).copied().unwrap_or_default()
     }
 
     /// Finds how often the mask is right, unless too few pixels are sure.

@@ -202,6 +202,12 @@ fn running_means(
 }
 
 impl Pixel {
+    /// Whether no color and no mask could make this pixel the object's: beyond its outline, and far from it in depth.
+    pub(super) fn is_elsewhere(&self) -> bool {
+        let off = (self.sensor - self.object).abs();
+        self.share == 0.0 && self.sensor > 0.0 && off > 5.0 * OBJECT_SIGMA
+    }
+
     /// Whether the object should be seen here \[nat\].
     pub(super) fn prior(&self) -> f32 {
         let sure = (1.0 - SURE) + (2.0 * SURE - 1.0) * self.share;
