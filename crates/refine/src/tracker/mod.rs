@@ -4,29 +4,32 @@ mod clock;
 mod memory;
 mod segmentation;
 mod settings;
+mod sight;
 #[cfg(test)]
 mod tests;
 mod tracked;
 
-use std::ops::{ControlFlow, Range};
+use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use log::debug;
 use nalgebra::Isometry3;
 use prehend_autodiff::optimize::LeastSquares;
-use prehend_render::{Backend, DepthImage};
+use prehend_render::Backend;
 
 use self::clock::Clock;
 pub use self::clock::Timing;
 use self::memory::{Prediction, TrackState};
-use self::segmentation::{Segmentation, Segmenter};
+use self::segmentation::Segmenter;
 pub use self::settings::{GatingSettings, ProcessNoise, Recovery, TrackerSettings};
+use self::sight::Sight;
 pub use self::tracked::{Rejection, TrackStatus, Tracked};
 use crate::error::RefineError;
 use crate::factor::{GaussianPrior, PriorSettings};
 use crate::problem::{Factor, Problem, Solution, State, Termination};
 use crate::rig::Rig;
-use crate::scene::{Frame, Hand, Object, Observation, hand_depth};
+use crate::scene::{Frame, Hand, Object, Observation};
 use crate::search::PoseSearch;
 use crate::strategy::{
     Fused, Inconsistency, Posterior, Strategy, chi_square_z, problem_of, surface_patches,
@@ -88,28 +91,6 @@ impl Solved {
     /// Cost without what was known before, of the model as it is \[nat\].
     fn cost(&self) -> f64 {
         self.solution.at.cost_of_factors()
-    }
-}
-
-/// A frame with its hand, and what shows the object in it as far as that is known.
-struct Sight {
-    observation: Observation,
-    hand_depth: Arc<DepthImage>,
-    /// Columns and rows in which the object is, where that is known.
-    focus: Option<[Range<usize>; 2]>,
-}
-
-impl Sight {
-    /// Of a hand whose joints were checked.
-    fn new(observation: Observation, hand: Option<&Arc<Hand>>) -> Self {
-        let hand = hand.map(|hand| &**hand).zip(observation.hand.as_ref());
-        let hand_depth = Arc::new(hand_depth(&observation.camera, hand));
-        Self { observation, hand_depth, focus: None }
-    }
-
-    /// Takes what shows the object for its mask.
-    fn show(&mut self, Segmentation { mask, around }: Segmentation) {
-        (self.observation.mask, self.focus) = (mask, Some(around));
     }
 }
 
@@ -211,12 +192,8 @@ impl Tracker {
             return Ok(Tracked::predicted(prediction.state, Timing::default()));
         }
         let mut sight = Sight::new(observation, self.hand.as_ref());
-        let seen = self.segmenter.segment(
-            &sight.observation,
-            &sight.hand_depth,
-            &self.object,
-            &prediction.state.t_cam_object,
-        );
+        let expected = &prediction.state.t_cam_object;
+        let seen = self.segmenter.segment(&sight, &self.object, expected);
         let mut timing = Timing::default();
         let seen = seen.map(|seen| sight.show(seen)).is_some();
         // What was away for long may be held in another way: it is looked for everywhere then.
@@ -328,7 +305,7 @@ impl Tracker {
     /// Learns colors where a pose was believed.
     fn learn(&mut self, sight: &Sight, solved: &Solved) {
         let pose = &solved.solution.at.state.t_cam_object;
-        self.segmenter.learn(&sight.observation, &sight.hand_depth, &self.object, pose);
+        self.segmenter.learn(sight, &self.object, pose);
     }
 
     /// The first frame.
@@ -340,12 +317,9 @@ impl Tracker {
     ) -> Result<Tracked, RefineError> {
         let (object, hand, rig) = (Arc::clone(&self.object), self.hand.clone(), self.rig.clone());
         if sight.observation.mask.count() == 0 {
-            let (observation, depth) = (&sight.observation, &sight.hand_depth);
             let mask = match &self.initial {
-                Some(pose) => {
-                    self.segmenter.segment(observation, depth, &object, pose).map(|seen| seen.mask)
-                }
-                None => self.segmenter.anywhere(observation, depth),
+                Some(pose) => self.segmenter.segment(&sight, &object, pose).map(|seen| seen.mask),
+                None => self.segmenter.anywhere(&sight),
             };
             sight.observation.mask = mask.ok_or(RefineError::EmptyMask)?;
         }
@@ -478,8 +452,11 @@ impl Tracker {
             let mut start = predicted.clone();
             let mut rivals = None;
             if reach == Recovery::Anywhere {
-                let mask = self.segmenter.anywhere(&sight.observation, &sight.hand_depth);
-                let Some(mask) = mask else { break };
+                let mask = self.segmenter.anywhere(sight);
+                let Some(mask) = mask else {
+                    debug!("nothing like the object is seen anywhere");
+                    break;
+                };
                 (sight.observation.mask, sight.focus) = (mask, None);
                 let frame = self.frame(sight, &object, hand.as_ref(), rig.as_deref())?;
                 match self.search(&frame) {
@@ -491,8 +468,7 @@ impl Tracker {
                     Err(error) => return Err(error),
                 }
                 // Its own outline, now that it is known where that should be.
-                let (observation, depth) = (&sight.observation, &sight.hand_depth);
-                let seen = self.segmenter.segment(observation, depth, &object, &start.t_cam_object);
+                let seen = self.segmenter.segment(sight, &object, &start.t_cam_object);
                 let Some(seen) = seen else { break };
                 sight.show(seen);
             } else if !seen {
@@ -507,11 +483,14 @@ impl Tracker {
             }
             let (solved, posterior) = self.estimate(&frame, &start)?;
             let pose = &solved.solution.at.state.t_cam_object;
-            let shown = self.segmenter.shown(&sight.observation, &sight.hand_depth, &object, pose);
-            if shown >= LEAST_SHOWN && self.gate(&solved, &posterior, None, level).is_none() {
+            let shown = self.segmenter.shown(sight, &object, pose);
+            let doubt = self.gate(&solved, &posterior, None, level);
+            if shown >= LEAST_SHOWN && doubt.is_none() {
                 self.learn(sight, &solved);
                 return Ok(Some((solved, posterior)));
             }
+            let doubt = doubt.map_or_else(String::new, |doubt| format!(", {doubt}"));
+            debug!("not found {reach:?}: {:.0} % of it are seen{doubt}", 100.0 * shown);
         }
         Ok(None)
     }

@@ -7,12 +7,13 @@ mod window;
 use std::ops::Range;
 
 use nalgebra::Isometry3;
-use prehend_render::{DepthImage, Mask};
+use prehend_render::Mask;
 
 use self::colors::ColorHistogram;
 use self::parts::large_parts;
 use self::window::{Label, Pixel, Window};
-use crate::scene::{Object, Observation};
+use super::sight::Sight;
+use crate::scene::Object;
 
 /// Pixels of which each colors, depth and masks are asked: every so many of rows and columns.
 const STRIDE: usize = 2;
@@ -23,15 +24,17 @@ const COLOR_GAIN: f32 = 0.3;
 /// Colors of neighbors are alike: what part of their evidence counts, and how much at most \[nat\].
 const COLOR_WEIGHT: f32 = 0.6;
 const COLOR_LIMIT: f32 = 3.0;
-/// Pixels that are needed to judge a mask.
+/// Pixels that are needed to judge a mask, and what share of those that should show the object must be sure to.
 const ENOUGH: f32 = 30.0;
+const SURE_SHARE: f32 = 0.2;
 /// How often a mask errs at least.
 const MASK_ERROR: f32 = 0.02;
 /// How many of the pixels that should show the object must do so.
 const LEAST_SHARE: f32 = 0.05;
 
-/// How many pixels an object must have that was lost, beside the last frame in which it was seen.
-const LEAST_FOUND: f32 = 0.3;
+/// How much of an object that was lost must be seen, beside what was seen of it, of which a frame counts so much.
+const LEAST_FOUND: f32 = 0.25;
+const AREA_GAIN: f32 = 0.1;
 /// What colors tell of an object in a hand before any are known \[nat\].
 const UNKNOWN_COLORS: f32 = 1.0;
 
@@ -46,8 +49,8 @@ pub(super) struct Segmenter {
     false_alarms: f32,
     /// What each color tells \[nat\]; empty before any is known.
     color_evidence: Vec<f32>,
-    /// How many pixels should have shown the object in the last frame that was learnt from.
-    last_seen: f32,
+    /// How much of the object is seen, in squares of depth by pixels.
+    seen_area: f32,
 }
 
 /// What shows the object.
@@ -58,21 +61,19 @@ pub(super) struct Segmentation {
 }
 
 impl Segmenter {
-    /// The pixels of `observation` that show `object`, which should be at `t_cam_object`; `hand` is the depth image of the hand there \[m\]. None if
-    /// hardly any of those do that should.
+    /// The pixels of `sight` that show `object`, which should be at `t_cam_object`. None if hardly any of those do that should.
     ///
-    /// The mask of the observation is evidence as far as it agrees with pixels that are sure: one of no use tells nothing.
+    /// The mask that came with it is evidence as far as it agrees with pixels that are sure: one of no use tells nothing.
     pub(super) fn segment(
         &mut self,
-        observation: &Observation,
-        hand: &DepthImage,
+        sight: &Sight,
         object: &Object,
         t_cam_object: &Isometry3<f64>,
     ) -> Option<Segmentation> {
-        let window = Window::new(observation, hand, object, t_cam_object, REACH)?;
+        let window = Window::new(sight, object, t_cam_object, REACH)?;
         self.judge_masks(&window);
         let [set, unset] = self.mask_evidence();
-        let (width, height) = (observation.camera.width, observation.camera.height);
+        let (width, height) = (sight.observation.camera.width, sight.observation.camera.height);
         let mut mask = Mask::filled(width, height, false);
         let (mut seen, mut expected) = (0.0, 0.0);
         for pixel in window.pixels() {
@@ -93,14 +94,14 @@ impl Segmenter {
         (seen >= LEAST_SHARE * expected && seen > 0.0).then_some(Segmentation { mask, around })
     }
 
-    /// The pixels of `observation` that may show an object of which nothing is known: of its colors, in the mask as far as that has been right, and, of
-    /// an object in a hand, near what of the hand is seen, but not on it. None if they are far fewer than in the last frame that was believed.
-    pub(super) fn anywhere(&self, observation: &Observation, hand: &DepthImage) -> Option<Mask> {
-        let window = Window::whole(observation, hand);
+    /// The pixels of `sight` that may show an object of which nothing is known: of its colors, in the mask as far as that has been right, and, of
+    /// an object in a hand, near what of the hand is seen, but not on it. None if they are far less than was seen of it before.
+    pub(super) fn anywhere(&self, sight: &Sight) -> Option<Mask> {
+        let window = Window::whole(sight);
         let [set, unset] = self.mask_evidence();
         let center = window.hand_center();
         let may_show = |pixel: &Pixel| {
-            let color = match self.last_seen > 0.0 {
+            let color = match self.seen_area > 0.0 {
                 true => self.color_evidence(pixel.color),
                 false => UNKNOWN_COLORS,
             };
@@ -108,25 +109,26 @@ impl Segmenter {
             pixel.near_hand(center) + color + told > 0.0
         };
         let may_show: Vec<bool> = window.pixels().map(may_show).collect();
-        let columns = observation.camera.width.div_ceil(STRIDE);
+        let columns = sight.observation.camera.width.div_ceil(STRIDE);
         let parts = large_parts(&may_show, columns);
-        let count = parts.iter().filter(|part| **part).count() as f32;
-        let (width, height) = (observation.camera.width, observation.camera.height);
+        let shown =
+            || window.pixels().zip(&parts).filter(|(_, part)| **part).map(|(pixel, _)| pixel);
+        let area: f32 = shown().map(Pixel::seen_area).sum();
+        let (width, height) = (sight.observation.camera.width, sight.observation.camera.height);
         let mut mask = Mask::filled(width, height, false);
-        let shown = window.pixels().zip(&parts).filter(|(_, part)| **part);
-        shown.for_each(|(pixel, _)| fill(&mut mask, pixel.at));
-        (count >= ENOUGH.max(LEAST_FOUND * self.last_seen)).then_some(mask)
+        shown().for_each(|pixel| fill(&mut mask, pixel.at));
+        let enough = shown().count() as f32 >= ENOUGH && area >= LEAST_FOUND * self.seen_area;
+        enough.then_some(mask)
     }
 
     /// The share of the pixels which should show an object at `t_cam_object` that do so.
     pub(super) fn shown(
         &self,
-        observation: &Observation,
-        hand: &DepthImage,
+        sight: &Sight,
         object: &Object,
         t_cam_object: &Isometry3<f64>,
     ) -> f64 {
-        let Some(window) = Window::new(observation, hand, object, t_cam_object, 0.0) else {
+        let Some(window) = Window::new(sight, object, t_cam_object, 0.0) else {
             return 0.0;
         };
         let (mut seen, mut expected) = (0.0, 0.0);
@@ -139,17 +141,13 @@ impl Segmenter {
     }
 
     /// Learns colors from a frame with the object at `t_cam_object`.
-    pub(super) fn learn(
-        &mut self,
-        observation: &Observation,
-        hand: &DepthImage,
-        object: &Object,
-        t_cam_object: &Isometry3<f64>,
-    ) {
-        let Some(window) = Window::new(observation, hand, object, t_cam_object, REACH) else {
+    pub(super) fn learn(&mut self, sight: &Sight, object: &Object, t_cam_object: &Isometry3<f64>) {
+        let Some(window) = Window::new(sight, object, t_cam_object, REACH) else {
             return;
         };
-        self.last_seen = window.pixels().map(|pixel| pixel.share).sum();
+        let area: f32 = window.pixels().map(Pixel::expected_area).sum();
+        let gain = if self.seen_area > 0.0 { AREA_GAIN } else { 1.0 };
+        self.seen_area += gain * (area - self.seen_area);
         for (label, colors) in [(Label::Object, &mut self.object), (Label::Other, &mut self.others)]
         {
             let pixels = window.pixels().filter(|pixel| pixel.label() == Some(label));
@@ -168,17 +166,19 @@ impl Segmenter {
         self.color_evidence.get(usize::from(color)).copied().unwrap_or_default()
     }
 
-    /// Finds how often the mask is right, unless too few pixels are sure.
+    /// Finds how often the mask is right, unless too few pixels are sure: what is not where it should be says nothing of masks.
     fn judge_masks(&mut self, window: &Window) {
-        let share = |label: Label| {
+        let expected: f32 = window.pixels().map(|pixel| pixel.share).sum();
+        let share = |label: Label, least: f32| {
             let mut counts = [0.0_f32; 2];
             for pixel in window.pixels().filter(|pixel| pixel.label() == Some(label)) {
                 counts[usize::from(pixel.masked)] += 1.0;
             }
             let all = counts[0] + counts[1];
-            (all >= ENOUGH).then(|| counts[1] / all)
+            (all >= ENOUGH.max(least)).then(|| counts[1] / all)
         };
-        if let (Some(hits), Some(false_alarms)) = (share(Label::Object), share(Label::Other)) {
+        let shares = (share(Label::Object, SURE_SHARE * expected), share(Label::Other, 0.0));
+        if let (Some(hits), Some(false_alarms)) = shares {
             (self.hits, self.false_alarms) = (hits, false_alarms);
         }
     }
@@ -187,7 +187,8 @@ impl Segmenter {
     fn mask_evidence(&self) -> [f32; 2] {
         let rate = |share: f32| share.clamp(MASK_ERROR, 1.0 - MASK_ERROR);
         let (hits, false_alarms) = (rate(self.hits), rate(self.false_alarms));
-        [(hits / false_alarms).ln(), ((1.0 - hits) / (1.0 - false_alarms)).ln()]
+        // One that is wrong more often than right is of something else, and does not tell where the object is not.
+        [(hits / false_alarms).ln().max(0.0), ((1.0 - hits) / (1.0 - false_alarms)).ln().min(0.0)]
     }
 }
 
@@ -203,7 +204,7 @@ fn fill(mask: &mut Mask, [x, y]: [usize; 2]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Frame, default_scene};
+    use crate::scene::default_scene;
 
     /// Overlap of two masks over what either has.
     fn overlap(a: &Mask, b: &Mask) -> f64 {
@@ -215,24 +216,27 @@ mod tests {
     #[test]
     fn the_object_is_told_from_the_rest_also_by_useless_masks() {
         let scene = default_scene(1).unwrap();
-        let truth = scene.observation.mask.clone();
-        let hand = Frame::new(&scene.observation, &scene.object, Some(&scene.hand))
-            .map(|frame| frame.hand_depth().clone())
-            .unwrap();
+        let sight = |fill: Option<bool>| {
+            let mut observation = scene.observation.clone();
+            fill.iter().for_each(|fill| observation.mask.pixels_mut().fill(*fill));
+            Sight::new(observation, Some(&scene.hand))
+        };
         let mut segmenter = Segmenter::default();
-        segmenter.learn(&scene.observation, &hand, &scene.object, &scene.truth);
+        segmenter.learn(&sight(None), &scene.object, &scene.truth);
         // As far off as an object that slips between two frames.
         let off = Isometry3::translation(6e-3, -4e-3, 3e-3) * scene.truth;
         for fill in [None, Some(false), Some(true)] {
-            let mut observation = scene.observation.clone();
-            if let Some(fill) = fill {
-                observation.mask.pixels_mut().fill(fill);
-            }
-            let found = segmenter.segment(&observation, &hand, &scene.object, &off).unwrap();
-            let overlap = overlap(&found.mask, &truth);
+            let found = segmenter.segment(&sight(fill), &scene.object, &off).unwrap();
+            let overlap = overlap(&found.mask, &scene.observation.mask);
             assert!(overlap > 0.9, "{fill:?}: {overlap}");
+            // From nothing, too.
+            let found = segmenter.anywhere(&sight(fill)).unwrap();
+            let anywhere = self::overlap(&found, &scene.observation.mask);
+            assert!(anywhere > 0.6, "{fill:?}: {anywhere}");
         }
         let away = Isometry3::translation(0.3, 0.0, 0.0) * scene.truth;
-        assert!(segmenter.segment(&scene.observation, &hand, &scene.object, &away).is_none());
+        assert!(segmenter.segment(&sight(None), &scene.object, &away).is_none());
+        let shown = |pose: &Isometry3<f64>| segmenter.shown(&sight(None), &scene.object, pose);
+        assert!(shown(&scene.truth) > 0.9 && shown(&away) < 0.1);
     }
 }

@@ -3,11 +3,12 @@
 use std::ops::Range;
 
 use nalgebra::{Isometry3, Vector3};
-use prehend_render::{Camera, DepthImage, depth_map};
+use prehend_render::{Camera, depth_map};
 
 use super::STRIDE;
 use super::colors::color_index;
-use crate::scene::{Object, Observation};
+use crate::scene::Object;
+use crate::tracker::sight::Sight;
 
 /// Outlines are expected within so many pixels of the window to either side.
 const BAND: usize = 4;
@@ -61,12 +62,12 @@ pub(super) struct Window {
 impl Window {
     /// About an object at `t_cam_object`, and `reach` \[m\] to all sides; none if that is out of the picture.
     pub(super) fn new(
-        observation: &Observation,
-        hand: &DepthImage,
+        sight: &Sight,
         object: &Object,
         t_cam_object: &Isometry3<f64>,
         reach: f64,
     ) -> Option<Self> {
+        let Sight { observation, given, hand_depth: hand, .. } = sight;
         let full = &observation.camera;
         let center = t_cam_object * object.center;
         let nearest = center.z - object.radius;
@@ -100,7 +101,7 @@ impl Window {
                     at: [x, y],
                     share: if own > 0.0 && !hidden { 1.0 } else { 0.0 },
                     color: color_index(&observation.color.pixels()[index]),
-                    masked: observation.mask.pixels()[index],
+                    masked: given.pixels()[index],
                     object: own,
                     hand: front,
                     sensor: observation.depth.pixels()[index],
@@ -128,7 +129,8 @@ impl Window {
     }
 
     /// Of a whole picture, in which nothing is known of the object.
-    pub(super) fn whole(observation: &Observation, hand: &DepthImage) -> Self {
+    pub(super) fn whole(sight: &Sight) -> Self {
+        let Sight { observation, given, hand_depth: hand, .. } = sight;
         let full = &observation.camera;
         let (columns, rows) = (full.width.div_ceil(STRIDE), full.height.div_ceil(STRIDE));
         let pixel = |k: usize| {
@@ -139,7 +141,7 @@ impl Window {
                 at: [x, y],
                 share: 0.0,
                 color: color_index(&observation.color.pixels()[index]),
-                masked: observation.mask.pixels()[index],
+                masked: given.pixels()[index],
                 object: 0.0,
                 hand: hand.pixels()[index],
                 sensor,
@@ -206,6 +208,16 @@ impl Pixel {
     pub(super) fn is_elsewhere(&self) -> bool {
         let off = (self.sensor - self.object).abs();
         self.share == 0.0 && self.sensor > 0.0 && off > 5.0 * OBJECT_SIGMA
+    }
+
+    /// The area of what is seen here, and of what should show the object, in squares of depth.
+    pub(super) fn seen_area(&self) -> f32 {
+        self.sensor * self.sensor
+    }
+
+    /// See [`seen_area`](Self::seen_area).
+    pub(super) fn expected_area(&self) -> f32 {
+        self.share * self.object * self.object
     }
 
     /// Whether the object should be seen here \[nat\].
