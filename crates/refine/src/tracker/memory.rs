@@ -48,8 +48,9 @@ pub(super) struct TrackState {
     pub(super) level: f64,
     /// Frames in which something was seen, but not believed, less those in which it was believed again; not below zero.
     pub(super) lost: u32,
-    /// Frames since.
+    /// Frames since, and whether nothing was seen of it in the last one.
     misses: u32,
+    unseen: bool,
     /// Frames in which it was followed.
     followed: u32,
 }
@@ -89,12 +90,14 @@ impl TrackState {
             level,
             lost: 0,
             misses: 0,
+            unseen: false,
             followed: 0,
         }
     }
 
     /// A frame in which the object was not followed, though something was `seen` where it should be.
     pub(super) fn missed(&mut self, seen: bool) {
+        self.unseen = !seen;
         self.misses = self.misses.saturating_add(1);
         self.lost = self.lost.saturating_add(u32::from(seen));
     }
@@ -109,8 +112,12 @@ impl TrackState {
         self.misses >= LONG
     }
 
-    /// Whether it is time to look for an object that is lost: often at first, and then every so many frames, because that takes long.
-    pub(super) fn is_due(&self) -> bool {
+    /// Whether it is time to look for an object that is lost, and `seen` where it should be or not: often at first, where it comes into sight, and
+    /// else every so many frames, because that takes long.
+    pub(super) fn is_due(&self, seen: bool) -> bool {
+        if seen && self.unseen {
+            return true;
+        }
         self.misses.is_multiple_of(LOOK_EVERY)
             || self.misses.is_power_of_two() && self.misses < LOOK_EVERY
     }

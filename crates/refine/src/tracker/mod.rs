@@ -94,6 +94,9 @@ impl Solved {
     }
 }
 
+/// Where to begin, and the other poses that a search ended with, if it comes from one.
+type Candidates = (Isometry3<f64>, Option<Vec<Isometry3<f64>>>);
+
 /// What share of the pixels that should show an object that was found again must do so.
 const LEAST_SHOWN: f64 = 0.5;
 
@@ -216,8 +219,8 @@ impl Tracker {
             }
         }
         let predicted = &prediction.state;
-        let again = match track.is_due() {
-            true => self.recover(&mut sight, predicted, &track, seen && !long_lost)?,
+        let again = match track.is_due(seen) {
+            true => self.recover(&mut sight, predicted, &track, long_lost)?,
             false => None,
         };
         timing.recovery = clock.lap();
@@ -433,50 +436,36 @@ impl Tracker {
         Ok((best, found.collect()))
     }
 
-    /// A pose that is believed, looked for from near to far: from where it should be if it is `seen` there. One from anywhere must fit as if
-    /// nothing had changed.
+    /// A pose that is believed, looked for where it should be and then everywhere, or the other way round if it was `long_lost`. One from anywhere must
+    /// fit as if nothing had changed.
     fn recover(
         &mut self,
         sight: &mut Sight,
         predicted: &State,
         track: &TrackState,
-        seen: bool,
+        long_lost: bool,
     ) -> Result<Option<(Solved, Posterior)>, RefineError> {
-        let (object, hand, rig) = (Arc::clone(&self.object), self.hand.clone(), self.rig.clone());
+        let mut ways = [(Recovery::Near, track.allowance()), (Recovery::Anywhere, track.level)];
+        if long_lost {
+            ways.reverse();
+        }
         let recovery = self.settings.recovery;
-        let levels = [(Recovery::Near, track.allowance()), (Recovery::Anywhere, track.level)];
-        for (reach, level) in levels {
-            if reach > recovery {
-                break;
-            }
-            let mut start = predicted.clone();
-            let mut rivals = None;
-            if reach == Recovery::Anywhere {
-                let mask = self.segmenter.anywhere(sight);
-                let Some(mask) = mask else {
-                    debug!("nothing like the object is seen anywhere");
-                    break;
-                };
-                (sight.observation.mask, sight.focus) = (mask, None);
-                let frame = self.frame(sight, &object, hand.as_ref(), rig.as_deref())?;
-                match self.search(&frame) {
-                    Ok((best, others)) => {
-                        start.t_cam_object = best;
-                        rivals = Some(others);
-                    }
-                    Err(RefineError::NothingFits | RefineError::NoDepth) => break,
-                    Err(error) => return Err(error),
-                }
-                // Its own outline, now that it is known where that should be.
-                let seen = self.segmenter.segment(sight, &object, &start.t_cam_object);
-                let Some(seen) = seen else { break };
-                sight.show(seen);
-            } else if !seen {
-                continue;
-            }
+        for (reach, level) in ways.into_iter().filter(|(reach, _)| *reach <= recovery) {
+            let found = match reach {
+                Recovery::Anywhere => self.search_anywhere(sight)?,
+                _ => Some((predicted.t_cam_object, None)),
+            };
+            let Some((t_cam_object, rivals)) = found else { continue };
+            let start = State { t_cam_object, ..predicted.clone() };
             if start.center().z <= 0.0 {
                 continue;
             }
+            let Some(seen) = self.segmenter.segment(sight, &self.object, &t_cam_object) else {
+                continue;
+            };
+            sight.show(seen);
+            let (object, hand, rig) =
+                (Arc::clone(&self.object), self.hand.clone(), self.rig.clone());
             let mut frame = self.frame(sight, &object, hand.as_ref(), rig.as_deref())?;
             if let Some(rivals) = rivals {
                 frame = frame.with_rivals(rivals);
@@ -486,13 +475,28 @@ impl Tracker {
             let shown = self.segmenter.shown(sight, &object, pose);
             let doubt = self.gate(&solved, &posterior, None, level);
             if shown >= LEAST_SHOWN && doubt.is_none() {
-                self.learn(sight, &solved);
                 return Ok(Some((solved, posterior)));
             }
             let doubt = doubt.map_or_else(String::new, |doubt| format!(", {doubt}"));
             debug!("not found {reach:?}: {:.0} % of it are seen{doubt}", 100.0 * shown);
         }
         Ok(None)
+    }
+
+    /// The best pose that a search finds wherever something like the object is seen, and the others \[m\]; none if nothing fits.
+    fn search_anywhere(&mut self, sight: &mut Sight) -> Result<Option<Candidates>, RefineError> {
+        let Some(mask) = self.segmenter.anywhere(sight) else {
+            debug!("nothing like the object is seen anywhere");
+            return Ok(None);
+        };
+        (sight.observation.mask, sight.focus) = (mask, None);
+        let (object, hand, rig) = (Arc::clone(&self.object), self.hand.clone(), self.rig.clone());
+        let frame = self.frame(sight, &object, hand.as_ref(), rig.as_deref())?;
+        match self.search(&frame) {
+            Ok((best, rivals)) => Ok(Some((best, Some(rivals)))),
+            Err(RefineError::NothingFits | RefineError::NoDepth) => Ok(None),
+            Err(error) => Err(error),
+        }
     }
 
     /// Why `solved` should not be believed, if so.

@@ -14,6 +14,8 @@ pub(super) struct Sight {
     pub(super) observation: Observation,
     /// The mask that came with it.
     pub(super) given: Mask,
+    /// Whether that is of something, and not of everything.
+    pub(super) tells: bool,
     /// Depth image of the hand \[m\], 0 where it is not.
     pub(super) hand_depth: Arc<DepthImage>,
     /// Columns and rows in which the object is, where that is known.
@@ -25,7 +27,9 @@ impl Sight {
     pub(super) fn new(observation: Observation, hand: Option<&Arc<Hand>>) -> Self {
         let hand = hand.map(|hand| &**hand).zip(observation.hand.as_ref());
         let hand_depth = Arc::new(hand_depth(&observation.camera, hand));
-        Self { given: observation.mask.clone(), observation, hand_depth, focus: None }
+        let given = observation.mask.clone();
+        let tells = (1..given.pixels().len()).contains(&given.count());
+        Self { given, tells, observation, hand_depth, focus: None }
     }
 
     /// Takes what shows the object for its mask.

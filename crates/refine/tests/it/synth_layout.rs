@@ -11,8 +11,8 @@ use prehend_geometry::objects::YcbObject;
 use prehend_refine::data::bop::Dataset;
 use prehend_refine::scene::{Hand, Object};
 use prehend_refine::synth::{
-    DatasetSummary, GraspSnapshot, HandFiles, SensorSettings, Subject, SynthError, SynthSettings,
-    generate,
+    DatasetSummary, FilmSettings, GraspSnapshot, HandFiles, SensorSettings, Subject, SynthError,
+    SynthSettings, generate,
 };
 use prehend_render::Distortion;
 use serde_json::{Value, json};
@@ -68,6 +68,34 @@ fn make(
     let (hand, subjects) = (HandFiles::built_in().unwrap(), [subject()]);
     let prepare = |_: &Subject| Ok(|_| Ok(moments(&hand.robot)));
     generate(dir, &hand, &subjects, settings, prepare, progress)
+}
+
+#[test]
+fn the_camera_of_a_film_stands_still() {
+    let film = FilmSettings { rate: 30.0, occluders: 1 };
+    let settings = SynthSettings {
+        film: Some(film),
+        frames: 5.try_into().unwrap(),
+        frames_per_grasp: 5.try_into().unwrap(),
+        ..settings(SensorSettings::clean())
+    };
+    let folder = tempfile::tempdir().unwrap();
+    assert_eq!(make(folder.path(), &settings, &|_| ()).unwrap().frames, 5);
+    let scene = folder.path().join("test/000006");
+    let (bodies, truth) =
+        (json(scene.join("scene_bodies.json")), json(scene.join("scene_gt.json")));
+    let gravity = |k: usize| numbers(&bodies[k.to_string()]["gravity"]);
+    let place = |k: usize| numbers(&truth[k.to_string()][0]["cam_t_m2c"]);
+    for k in 1..5 {
+        // The hand turns, and what pulls down does so in the same direction of the picture.
+        assert!(gravity(k).iter().zip(gravity(0)).all(|(a, b)| (a - b).abs() < 1e-9));
+        assert_ne!(
+            bodies[k.to_string()]["bodies"][0]["cam_R_b2c"],
+            bodies["0"]["bodies"][0]["cam_R_b2c"]
+        );
+        let off: f64 = place(k).iter().zip(place(k - 1)).map(|(a, b)| (a - b).powi(2)).sum();
+        assert!(off.sqrt() < 15.0, "{off}");
+    }
 }
 
 fn json(path: PathBuf) -> Value {

@@ -85,7 +85,7 @@ pub(crate) struct Synth {
         help_heading = "Films"
     )]
     rate: f64,
-    /// How often the object slips in the hand, by 4 to 15 mm or until it holds again
+    /// How often the object slips in each grasp of the film, by 4 to 15 mm or until it holds again
     #[arg(long, value_name = "N", default_value_t = 0, requires = "film", help_heading = "Films")]
     slips: u32,
     /// Things that nobody knows of and that pass in front of the object, each once
@@ -154,6 +154,9 @@ impl Synth {
             frames_per_grasp = self.frames;
             steps = self.frames.get() as usize;
             grasping.frame_time = film.rate.recip();
+            // Frames take whole numbers of steps.
+            grasping.time_step =
+                grasping.frame_time / (grasping.frame_time / grasping.time_step).ceil();
             grasping.turn_rate = FILM_TURN_RATE;
         }
         let settings = SynthSettings {

@@ -16,8 +16,8 @@ const EMPTY: f64 = 0.7;
 const OPEN: f64 = 0.3;
 
 impl Grasper<'_> {
-    /// `steps` moments of a hand that drops the object on its way, and then holds it in another grasp; each grasp is the first of the seeds from
-    /// `first_seed` on that holds.
+    /// `steps` moments of a hand that drops the object on its way, and then holds it in another grasp; each grasp is the first that holds
+    /// of the seeds from `first_seed` on, and from its complement.
     ///
     /// # Errors
     /// [`GraspFault::Exhausted`] if none of `tries` seeds leads to one.

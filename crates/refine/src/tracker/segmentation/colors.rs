@@ -43,6 +43,11 @@ impl ColorHistogram {
         }
     }
 
+    /// Whether anything was learnt.
+    pub(super) fn is_known(&self) -> bool {
+        self.known
+    }
+
     /// How often each color occurs.
     pub(super) fn densities(&self) -> impl Iterator<Item = f32> {
         self.shares.iter().map(|share| share + UNSEEN)

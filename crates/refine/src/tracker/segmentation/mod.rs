@@ -27,6 +27,8 @@ const COLOR_LIMIT: f32 = 3.0;
 /// Pixels that are needed to judge a mask, and what share of those that should show the object must be sure to.
 const ENOUGH: f32 = 30.0;
 const SURE_SHARE: f32 = 0.2;
+/// What is kept of how often masks have been right, in a frame in which that is not known.
+const FORGET: f32 = 0.9;
 /// How often a mask errs at least.
 const MASK_ERROR: f32 = 0.02;
 /// How many of the pixels that should show the object must do so.
@@ -72,7 +74,7 @@ impl Segmenter {
     ) -> Option<Segmentation> {
         let window = Window::new(sight, object, t_cam_object, REACH)?;
         self.judge_masks(&window);
-        let [set, unset] = self.mask_evidence();
+        let [set, unset] = self.mask_evidence(sight);
         let (width, height) = (sight.observation.camera.width, sight.observation.camera.height);
         let mut mask = Mask::filled(width, height, false);
         let (mut seen, mut expected) = (0.0, 0.0);
@@ -98,12 +100,16 @@ impl Segmenter {
     /// an object in a hand, near what of the hand is seen, but not on it. None if they are far less than was seen of it before.
     pub(super) fn anywhere(&self, sight: &Sight) -> Option<Mask> {
         let window = Window::whole(sight);
-        let [set, unset] = self.mask_evidence();
+        let [set, unset] = self.mask_evidence(sight);
         let center = window.hand_center();
+        // Nothing is known at all.
+        if center.is_none() && self.color_evidence.is_empty() && set == 0.0 {
+            return None;
+        }
         let may_show = |pixel: &Pixel| {
-            let color = match self.seen_area > 0.0 {
-                true => self.color_evidence(pixel.color),
-                false => UNKNOWN_COLORS,
+            let color = match self.color_evidence.is_empty() {
+                true => UNKNOWN_COLORS,
+                false => self.color_evidence(pixel.color),
             };
             let told = if pixel.masked { set } else { unset };
             pixel.near_hand(center) + color + told > 0.0
@@ -121,7 +127,7 @@ impl Segmenter {
         enough.then_some(mask)
     }
 
-    /// The share of the pixels which should show an object at `t_cam_object` that do so.
+    /// The share of the pixels which should show an object at `t_cam_object` that do so, of those with depth or a color that tells.
     pub(super) fn shown(
         &self,
         sight: &Sight,
@@ -133,11 +139,13 @@ impl Segmenter {
         };
         let (mut seen, mut expected) = (0.0, 0.0);
         for pixel in window.pixels() {
-            expected += pixel.share;
-            let color = self.color_evidence(pixel.color);
-            seen += pixel.share * f32::from(u8::from(pixel.depth_evidence() + color > 0.0));
+            let told = pixel.depth_evidence() + self.color_evidence(pixel.color);
+            if told != 0.0 {
+                expected += pixel.share;
+                seen += pixel.share * f32::from(u8::from(told > 0.0));
+            }
         }
-        f64::from(seen / expected)
+        if expected > 0.0 { f64::from(seen / expected) } else { 0.0 }
     }
 
     /// Learns colors from a frame with the object at `t_cam_object`.
@@ -153,11 +161,14 @@ impl Segmenter {
             let pixels = window.pixels().filter(|pixel| pixel.label() == Some(label));
             colors.learn(pixels.map(|pixel| pixel.color), COLOR_GAIN);
         }
+        self.color_evidence.clear();
+        if !(self.object.is_known() && self.others.is_known()) {
+            return;
+        }
         let pairs = self.object.densities().zip(self.others.densities());
         let evidence = |(own, other): (f32, f32)| {
             COLOR_WEIGHT * (own / other).ln().clamp(-COLOR_LIMIT, COLOR_LIMIT)
         };
-        self.color_evidence.clear();
         self.color_evidence.extend(pairs.map(evidence));
     }
 
@@ -178,13 +189,18 @@ impl Segmenter {
             (all >= ENOUGH.max(least)).then(|| counts[1] / all)
         };
         let shares = (share(Label::Object, SURE_SHARE * expected), share(Label::Other, 0.0));
-        if let (Some(hits), Some(false_alarms)) = shares {
-            (self.hits, self.false_alarms) = (hits, false_alarms);
-        }
+        (self.hits, self.false_alarms) = match shares {
+            (Some(hits), Some(false_alarms)) => (hits, false_alarms),
+            // What they were worth is forgotten while they cannot be judged.
+            _ => (FORGET * self.hits, FORGET * self.false_alarms),
+        };
     }
 
-    /// What it tells that a pixel is in the mask, and that it is not \[nat\].
-    fn mask_evidence(&self) -> [f32; 2] {
+    /// What it tells that a pixel is in the mask of `sight`, and that it is not \[nat\].
+    fn mask_evidence(&self, sight: &Sight) -> [f32; 2] {
+        if !sight.tells {
+            return [0.0; 2];
+        }
         let rate = |share: f32| share.clamp(MASK_ERROR, 1.0 - MASK_ERROR);
         let (hits, false_alarms) = (rate(self.hits), rate(self.false_alarms));
         // One that is wrong more often than right is of something else, and does not tell where the object is not.

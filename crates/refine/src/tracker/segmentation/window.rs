@@ -70,10 +70,11 @@ impl Window {
         let Sight { observation, given, hand_depth: hand, .. } = sight;
         let full = &observation.camera;
         let center = t_cam_object * object.center;
-        let nearest = center.z - object.radius;
-        if nearest <= 0.0 {
+        if center.z <= 0.0 {
             return None;
         }
+        // The whole picture, if it is as near as that.
+        let nearest = (center.z - object.radius).max(0.05 * center.z);
         let at = full.project(&center)?;
         let extent = (object.radius + reach) * full.fx.max(full.fy) / nearest;
         let range = |middle: f64, size: usize| {
@@ -113,13 +114,14 @@ impl Window {
             return None;
         }
         let size = (columns, rows);
-        let depths = pixels.iter().map(|pixel| pixel.object).collect::<Vec<_>>();
-        let drawn = depths.iter().map(|z| f32::from(u8::from(*z > 0.0))).collect::<Vec<_>>();
-        let shares = means(&pixels.iter().map(|p| p.share).collect::<Vec<_>>(), size, BAND);
-        let (near, count) = (means(&depths, size, BEYOND), means(&drawn, size, BEYOND));
+        let depths: Vec<f32> = pixels.iter().map(|pixel| pixel.object).collect();
+        let drawn: Vec<f32> = depths.iter().map(|z| f32::from(u8::from(*z > 0.0))).collect();
+        let shown: Vec<f32> = pixels.iter().map(|pixel| pixel.share).collect();
+        let (shown, all) = (sums(&shown, size, BAND), sums(&vec![1.0; shown.len()], size, BAND));
+        let (near, count) = (sums(&depths, size, BEYOND), sums(&drawn, size, BEYOND));
         let middle = center.z as f32;
         for (i, pixel) in pixels.iter_mut().enumerate() {
-            pixel.share = shares[i];
+            pixel.share = shown[i] / all[i];
             if pixel.object == 0.0 {
                 pixel.object = if count[i] > 0.0 { near[i] / count[i] } else { middle };
             }
@@ -170,35 +172,34 @@ impl Window {
     }
 }
 
-/// Means over squares that reach `reach` pixels to all sides, without what is outside.
-fn means(values: &[f32], (columns, rows): (usize, usize), reach: usize) -> Vec<f32> {
+/// Sums over squares that reach `reach` pixels to all sides; of whole numbers they are exact.
+fn sums(values: &[f32], (columns, rows): (usize, usize), reach: usize) -> Vec<f32> {
     let mut across = vec![0.0; values.len()];
     for (line, sums) in values.chunks(columns).zip(across.chunks_mut(columns)) {
-        running_means(columns, reach, |i| line[i], |i, mean| sums[i] = mean);
+        running_sums(columns, reach, |i| line[i], |i, sum| sums[i] = sum);
     }
     let mut all = vec![0.0; values.len()];
     for column in 0..columns {
         let at = |row: usize| row * columns + column;
-        running_means(rows, reach, |i| across[at(i)], |i, mean| all[at(i)] = mean);
+        running_sums(rows, reach, |i| across[at(i)], |i, sum| all[at(i)] = sum);
     }
     all
 }
 
-fn running_means(
+fn running_sums(
     count: usize,
     reach: usize,
     value: impl Fn(usize) -> f32,
     mut set: impl FnMut(usize, f32),
 ) {
     let mut sum: f32 = (0..reach.min(count)).map(&value).sum();
-    let mut number = reach.min(count) as f32;
     for i in 0..count {
         if i + reach < count {
-            (sum, number) = (sum + value(i + reach), number + 1.0);
+            sum += value(i + reach);
         }
-        set(i, (sum / number).max(0.0));
+        set(i, sum);
         if i >= reach {
-            (sum, number) = (sum - value(i - reach), number - 1.0);
+            sum -= value(i - reach);
         }
     }
 }
@@ -228,7 +229,7 @@ impl Pixel {
 
     /// Whether depth is rather the object's than that of the hand or of something else \[nat\].
     pub(super) fn depth_evidence(&self) -> f32 {
-        if self.sensor <= 0.0 {
+        if !(self.sensor > 0.0 && self.sensor.is_finite()) {
             return 0.0;
         }
         let bell = |off: f32, sigma: f32| 0.399 / sigma * (-0.5 * (off / sigma).powi(2)).exp();
@@ -264,5 +265,26 @@ impl Pixel {
         }
         let elsewhere = self.share == 0.0 || measured && off > OFF_OBJECT;
         elsewhere.then_some(Label::Other)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sums_of_whole_numbers_are_exact() {
+        let (columns, rows) = (13, 9);
+        let value = |k: usize| f32::from(u8::from((k * 7) % 5 == 0));
+        let values: Vec<f32> = (0..columns * rows).map(value).collect();
+        let found = sums(&values, (columns, rows), 2);
+        for (k, found) in found.iter().enumerate() {
+            let (x, y) = (k % columns, k / columns);
+            let near = |i: &usize| (i % columns).abs_diff(x) <= 2 && (i / columns).abs_diff(y) <= 2;
+            let expected: f32 = (0..values.len()).filter(near).map(|i| values[i]).sum();
+            assert_eq!(*found, expected);
+        }
+        // Windows that are smaller than what they are summed over.
+        assert_eq!(sums(&[1.0, 2.0], (2, 1), 5), [3.0, 3.0]);
     }
 }
