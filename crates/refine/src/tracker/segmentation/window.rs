@@ -275,7 +275,7 @@ mod tests {
     #[test]
     fn sums_of_whole_numbers_are_exact() {
         let (columns, rows) = (13, 9);
-        let value = |k: usize| f32::from(u8::from((k * 7) % 5 == 0));
+        let value = |k: usize| f32::from(u8::from((k * 7).is_multiple_of(5)));
         let values: Vec<f32> = (0..columns * rows).map(value).collect();
         let found = sums(&values, (columns, rows), 2);
         for (k, found) in found.iter().enumerate() {
