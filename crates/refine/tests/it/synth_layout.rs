@@ -81,7 +81,7 @@ fn the_camera_of_a_film_stands_still() {
     };
     let folder = tempfile::tempdir().unwrap();
     assert_eq!(make(folder.path(), &settings, &|_| ()).unwrap().frames, 5);
-    let scene = folder.path().join("test/000006");
+    let scene = folder.path().join(format!("test/{BOTTLE:06}"));
     let (bodies, truth) =
         (json(scene.join("scene_bodies.json")), json(scene.join("scene_gt.json")));
     let gravity = |k: usize| numbers(&bodies[k.to_string()]["gravity"]);

@@ -15,13 +15,14 @@ const BAND: usize = 4;
 /// Depth of the surface is carried on over so many pixels of the window beyond its outline.
 const BEYOND: usize = 16;
 /// How sure it is that the object is where it should be.
-const SURE: f32 = 0.95;
+const SURE: f32 = 0.85;
 /// Standard deviation of depth about where the object should be, and at the hand \[m\].
 const OBJECT_SIGMA: f32 = 5e-3;
 const HAND_SIGMA: f32 = 5e-3;
-/// Density of depths of what is not known \[1/m\], and how often the object's depth is so, too.
+/// Density of depths of what is not known \[1/m\], and how often the object's depth is so, too: behind it, and in front of it.
 const ANYWHERE: f32 = 3.0;
 const OUTLIERS: f32 = 0.03;
+const OUTLIERS_IN_FRONT: f32 = 1e-3;
 /// Depth that is so near the object's surface is the object's, and so far from it not \[m\].
 const ON_OBJECT: f32 = 5e-3;
 const OFF_OBJECT: f32 = 15e-3;
@@ -234,7 +235,8 @@ impl Pixel {
         }
         let bell = |off: f32, sigma: f32| 0.399 / sigma * (-0.5 * (off / sigma).powi(2)).exp();
         let own = bell(self.sensor - self.object, OBJECT_SIGMA);
-        let own = (1.0 - OUTLIERS) * own + OUTLIERS * ANYWHERE;
+        let outliers = if self.sensor < self.object { OUTLIERS_IN_FRONT } else { OUTLIERS };
+        let own = (1.0 - outliers) * own + outliers * ANYWHERE;
         let other = match self.hand > 0.0 {
             true => 0.5 * (bell(self.sensor - self.hand, HAND_SIGMA) + ANYWHERE),
             false => ANYWHERE,
