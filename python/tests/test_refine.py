@@ -252,6 +252,8 @@ def test_an_object_is_followed():
     bare = prehend.Frame(**inputs(frames[-1][0], mask=None))
     assert tracker.push(bare, 0.1).status == "followed"
     hidden = inputs(frames[-1][0], mask=None, depth=np.full((480, 640), 0.3), rgb=np.full((480, 640, 3), 128, np.uint8))
+    tracker = prehend.Tracker(first.object, first.hand, pose=initial, recovery="off")
+    tracker.push(first, 0.0)
     lost = tracker.push(prehend.Frame(**hidden), 0.2)
     assert (lost.status, lost.covariance, lost.doubt) == ("lost", None, "nothing of the object is seen")
     tracker.start_from(frames[0][2])
