@@ -1,6 +1,7 @@
 //! An object followed from frame to frame.
 
 mod clock;
+mod find;
 mod memory;
 mod segmentation;
 mod settings;
@@ -13,7 +14,6 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use log::debug;
 use nalgebra::Isometry3;
 use prehend_autodiff::optimize::LeastSquares;
 use prehend_render::Backend;
@@ -31,13 +31,11 @@ use crate::problem::{Factor, Problem, Solution, State, Termination};
 use crate::rig::Rig;
 use crate::scene::{Frame, Hand, Object, Observation};
 use crate::search::PoseSearch;
-use crate::strategy::{
-    Fused, Inconsistency, Posterior, Strategy, chi_square_z, problem_of, surface_patches,
-};
+use crate::strategy::{Inconsistency, Posterior, chi_square_z, problem_of, surface_patches};
 
 /// Follows one object through the frames of a camera.
 ///
-/// A frame is one least-squares problem, that of [`Fused`] at one resolution and from one start: where the object would be
+/// A frame is one least-squares problem, that of [`Fused`](crate::strategy::Fused) at one resolution and from one start: where the object would be
 /// if it went on as it did, relative to the hand where that is known, because the hand moves the object. What was learnt
 /// before comes in as a Gaussian about that prediction, with all its correlations: poses, calibration of the hand, errors of
 /// the joints' positions and corrections of the camera. It is a Kalman filter whose update is iterated, with calibrations
@@ -93,12 +91,6 @@ impl Solved {
         self.solution.at.cost_of_factors()
     }
 }
-
-/// Where to begin, and the other poses that a search ended with, if it comes from one.
-type Candidates = (Isometry3<f64>, Option<Vec<Isometry3<f64>>>);
-
-/// What share of the pixels that should show an object that was found again must do so.
-const LEAST_SHOWN: f64 = 0.5;
 
 /// Part of the way that the running mean of costs goes to the next one.
 const LEVEL_GAIN: f64 = 0.1;
@@ -311,44 +303,6 @@ impl Tracker {
         self.segmenter.learn(sight, &self.object, pose);
     }
 
-    /// The first frame.
-    fn begin(
-        &mut self,
-        mut sight: Sight,
-        time: Duration,
-        clock: &mut Clock,
-    ) -> Result<Tracked, RefineError> {
-        let (object, hand, rig) = (Arc::clone(&self.object), self.hand.clone(), self.rig.clone());
-        if sight.observation.mask.count() == 0 {
-            let mask = match &self.initial {
-                Some(pose) => self.segmenter.segment(&sight, &object, pose).map(|seen| seen.mask),
-                None => self.segmenter.anywhere(&sight),
-            };
-            sight.observation.mask = mask.ok_or(RefineError::EmptyMask)?;
-        }
-        let mut frame = self.frame(&sight, &object, hand.as_ref(), rig.as_deref())?;
-        let initial = match self.initial {
-            Some(pose) => pose,
-            None => {
-                let (best, rivals) = self.search(&frame)?;
-                frame = frame.with_rivals(rivals);
-                best
-            }
-        };
-        let frame = &frame;
-        let nominal = State::new(frame, &initial)?;
-        if let Some(rig) = frame.rig() {
-            let (camera, stated) = (&frame.observation().camera, &self.stated);
-            self.settings.fused.prior = rig.marginal_prior(&nominal, camera, stated)?;
-        }
-        let (solved, posterior) = self.estimate(frame, &nominal)?;
-        let (in_hand, level) = (frame.hand().is_some(), solved.cost());
-        self.track = Some(self.remember(time, &solved, &nominal, in_hand, level));
-        self.learn(&sight, &solved);
-        let timing = Timing { recovery: clock.lap(), ..Timing::default() };
-        Ok(Tracked::solved(solved, posterior, TrackStatus::Relocalized, None, timing))
-    }
-
     /// The problem of a frame, and its prior, which is the prediction.
     fn prepare(
         &self,
@@ -397,106 +351,6 @@ impl Tracker {
             go_on()
         });
         Solved { solution, tried }
-    }
-
-    /// The whole fused estimator from `initial`, with nothing carried over but what `initial` has; linearized as frames that are
-    /// tracked are, so that costs compare.
-    fn estimate(
-        &self,
-        frame: &Frame<'_>,
-        initial: &State,
-    ) -> Result<(Solved, Posterior), RefineError> {
-        let fused = Fused::new(self.settings.fused.clone());
-        let fused = self.factors.iter().cloned().fold(fused, Fused::with);
-        let estimate = fused.run(frame, initial, &mut |_| ControlFlow::Continue(()))?;
-        let prior = GaussianPrior::independent(initial.clone(), &self.settings.fused.prior)?;
-        let problem = self.stage_problem(frame, initial, Arc::new(prior))?;
-        let mut posterior = estimate.posterior.ok_or(RefineError::NothingFits)?;
-        // Frames that are followed are not tested: gates judge them.
-        posterior.fit = None;
-        let (at, termination) = (problem.linearize(&estimate.state), posterior.termination);
-        let solution = Solution { at, termination, iterations: estimate.iteration };
-        Ok((Solved { solution, tried: true }, posterior))
-    }
-
-    /// The best pose that a search finds, and the others \[m\].
-    fn search(
-        &mut self,
-        frame: &Frame<'_>,
-    ) -> Result<(Isometry3<f64>, Vec<Isometry3<f64>>), RefineError> {
-        let search = match &mut self.search {
-            Some(search) => search,
-            none => {
-                let (object, settings) = (Arc::clone(&self.object), self.settings.search.clone());
-                none.insert(PoseSearch::new(object, settings)?)
-            }
-        };
-        let mut found = search.run(frame)?.into_iter().map(|found| found.t_cam_object);
-        let best = found.next().ok_or(RefineError::NothingFits)?;
-        Ok((best, found.collect()))
-    }
-
-    /// A pose that is believed, looked for where it should be and then everywhere, or the other way round if it was `long_lost`. One from anywhere must
-    /// fit as if nothing had changed.
-    fn recover(
-        &mut self,
-        sight: &mut Sight,
-        predicted: &State,
-        track: &TrackState,
-        long_lost: bool,
-    ) -> Result<Option<(Solved, Posterior)>, RefineError> {
-        let mut ways = [(Recovery::Near, track.allowance()), (Recovery::Anywhere, track.level)];
-        if long_lost {
-            ways.reverse();
-        }
-        let recovery = self.settings.recovery;
-        for (reach, level) in ways.into_iter().filter(|(reach, _)| *reach <= recovery) {
-            let found = match reach {
-                Recovery::Anywhere => self.search_anywhere(sight)?,
-                _ => Some((predicted.t_cam_object, None)),
-            };
-            let Some((t_cam_object, rivals)) = found else { continue };
-            let start = State { t_cam_object, ..predicted.clone() };
-            if start.center().z <= 0.0 {
-                continue;
-            }
-            let Some(seen) = self.segmenter.segment(sight, &self.object, &t_cam_object) else {
-                continue;
-            };
-            sight.show(seen);
-            let (object, hand, rig) =
-                (Arc::clone(&self.object), self.hand.clone(), self.rig.clone());
-            let mut frame = self.frame(sight, &object, hand.as_ref(), rig.as_deref())?;
-            if let Some(rivals) = rivals {
-                frame = frame.with_rivals(rivals);
-            }
-            let (solved, posterior) = self.estimate(&frame, &start)?;
-            let pose = &solved.solution.at.state.t_cam_object;
-            let shown = self.segmenter.shown(sight, &object, pose);
-            let doubt = self.gate(&solved, &posterior, None, level);
-            if shown >= LEAST_SHOWN && doubt.is_none() {
-                return Ok(Some((solved, posterior)));
-            }
-            let doubt = doubt.map_or_else(String::new, |doubt| format!(", {doubt}"));
-            debug!("not found {reach:?}: {:.0} % of it are seen{doubt}", 100.0 * shown);
-        }
-        Ok(None)
-    }
-
-    /// The best pose that a search finds wherever something like the object is seen, and the others \[m\]; none if nothing fits.
-    fn search_anywhere(&mut self, sight: &mut Sight) -> Result<Option<Candidates>, RefineError> {
-        let Some(mask) = self.segmenter.anywhere(sight) else {
-            debug!("nothing like the object is seen anywhere");
-            return Ok(None);
-        };
-        (sight.observation.mask, sight.focus) = (mask, None);
-        let (object, hand, rig) = (Arc::clone(&self.object), self.hand.clone(), self.rig.clone());
-        let frame = self.frame(sight, &object, hand.as_ref(), rig.as_deref())?;
-        match self.search(&frame) {
-            Ok((best, rivals)) => Ok(Some((best, Some(rivals)))),
-            Err(RefineError::NothingFits | RefineError::NoDepth) => Ok(None),
-            Err(error) => Err(error),
-        }
     }
 
     /// Why `solved` should not be believed, if so.

@@ -31,18 +31,10 @@ impl Grasper<'_> {
         let before = (BEFORE * steps as f64) as usize;
         let between = ((OPENING + EMPTY) / self.settings.frame_time) as usize;
         let between = between.min((steps - before).saturating_sub(1));
-        let held = |seed: u64, count: usize, turn: UnitQuaternion<f64>| {
-            let mut last = GraspFault::NoContact(0);
-            for k in 0..tries {
-                let seed = seed.wrapping_add(k);
-                let moments =
-                    |grasp| self.moments(&grasp, &mut SplitMix64::new(seed), count, &turn, &down);
-                match self.grasp(seed).and_then(moments) {
-                    Ok(moments) => return Ok(moments),
-                    Err(fault) => last = fault,
-                }
-            }
-            Err(GraspFault::Exhausted(tries, Box::new(last)))
+        let held = |first_seed: u64, count: usize, turn: UnitQuaternion<f64>| {
+            self.first_that_holds(first_seed, tries, |grasp, seed| {
+                self.moments(grasp, &mut SplitMix64::new(seed), count, &turn, &down)
+            })
         };
         let mut moments = held(first_seed, before.max(1), UnitQuaternion::identity())?;
         let Some(dropped) = moments.last().cloned() else { return Ok(moments) };

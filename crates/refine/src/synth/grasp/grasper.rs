@@ -149,10 +149,20 @@ impl<'a> Grasper<'a> {
         tries: u64,
         steps: usize,
     ) -> Result<Vec<GraspSnapshot>, GraspFault> {
+        self.first_that_holds(first_seed, tries, |grasp, seed| self.trajectory(grasp, seed, steps))
+    }
+
+    /// What `moments` makes of the first grasp of the seeds from `first_seed` on of which it makes anything.
+    pub(super) fn first_that_holds(
+        &self,
+        first_seed: u64,
+        tries: u64,
+        moments: impl Fn(&Grasp, u64) -> Result<Vec<GraspSnapshot>, GraspFault>,
+    ) -> Result<Vec<GraspSnapshot>, GraspFault> {
         let mut last = GraspFault::NoContact(0);
         for k in 0..tries {
             let seed = first_seed.wrapping_add(k);
-            match self.grasp(seed).and_then(|grasp| self.trajectory(&grasp, seed, steps)) {
+            match self.grasp(seed).and_then(|grasp| moments(&grasp, seed)) {
                 Ok(moments) => return Ok(moments),
                 Err(fault) => last = fault,
             }

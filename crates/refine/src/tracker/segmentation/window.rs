@@ -68,8 +68,7 @@ impl Window {
         t_cam_object: &Isometry3<f64>,
         reach: f64,
     ) -> Option<Self> {
-        let Sight { observation, given, hand_depth: hand, .. } = sight;
-        let full = &observation.camera;
+        let full = &sight.observation.camera;
         let center = t_cam_object * object.center;
         if center.z <= 0.0 {
             return None;
@@ -94,21 +93,12 @@ impl Window {
         let mut pixels: Vec<Pixel> = Vec::with_capacity(columns * rows);
         for row in 0..rows {
             for column in 0..columns {
-                let [x, y] = picture(column, row);
-                let index = y * full.width + x;
-                let front = hand.pixels()[index];
+                let at = picture(column, row);
                 let own = drawn.pixels()[row * columns + column];
-                let hidden = front > 0.0 && front < own;
-                pixels.push(Pixel {
-                    at: [x, y],
-                    share: if own > 0.0 && !hidden { 1.0 } else { 0.0 },
-                    color: color_index(&observation.color.pixels()[index]),
-                    masked: given.pixels()[index],
-                    object: own,
-                    hand: front,
-                    sensor: observation.depth.pixels()[index],
-                    place: Vector3::zeros(),
-                });
+                let pixel = Pixel::sensed(sight, at);
+                let hidden = pixel.hand > 0.0 && pixel.hand < own;
+                let share = if own > 0.0 && !hidden { 1.0 } else { 0.0 };
+                pixels.push(Pixel { share, object: own, ..pixel });
             }
         }
         if pixels.iter().all(|pixel| pixel.share == 0.0) {
@@ -133,23 +123,13 @@ impl Window {
 
     /// Of a whole picture, in which nothing is known of the object.
     pub(super) fn whole(sight: &Sight) -> Self {
-        let Sight { observation, given, hand_depth: hand, .. } = sight;
-        let full = &observation.camera;
+        let full = &sight.observation.camera;
         let (columns, rows) = (full.width.div_ceil(STRIDE), full.height.div_ceil(STRIDE));
         let pixel = |k: usize| {
-            let (x, y) = (k % columns * STRIDE, k / columns * STRIDE);
-            let index = y * full.width + x;
-            let sensor = observation.depth.pixels()[index];
-            Pixel {
-                at: [x, y],
-                share: 0.0,
-                color: color_index(&observation.color.pixels()[index]),
-                masked: given.pixels()[index],
-                object: 0.0,
-                hand: hand.pixels()[index],
-                sensor,
-                place: full.unproject(x as f64, y as f64, f64::from(sensor)).coords.cast(),
-            }
+            let pixel = Pixel::sensed(sight, [k % columns * STRIDE, k / columns * STRIDE]);
+            let [x, y] = pixel.at.map(|x| x as f64);
+            let place = full.unproject(x, y, f64::from(pixel.sensor));
+            Pixel { place: place.coords.cast(), ..pixel }
         };
         let range = [0..full.width, 0..full.height];
         Self { pixels: (0..columns * rows).map(pixel).collect(), range }
@@ -206,6 +186,22 @@ fn running_sums(
 }
 
 impl Pixel {
+    /// What was sensed at a column and row, of which nothing is expected.
+    fn sensed(sight: &Sight, at: [usize; 2]) -> Self {
+        let Sight { observation, given, hand_depth, .. } = sight;
+        let index = at[1] * observation.camera.width + at[0];
+        Self {
+            at,
+            share: 0.0,
+            color: color_index(&observation.color.pixels()[index]),
+            masked: given.pixels()[index],
+            object: 0.0,
+            hand: hand_depth.pixels()[index],
+            sensor: observation.depth.pixels()[index],
+            place: Vector3::zeros(),
+        }
+    }
+
     /// Whether no color and no mask could make this pixel the object's: beyond its outline, and far from it in depth.
     pub(super) fn is_elsewhere(&self) -> bool {
         let off = (self.sensor - self.object).abs();

@@ -1,0 +1,168 @@
+//! How an object is found: in the first frame, and where it was lost.
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+use std::time::Duration;
+
+use log::debug;
+use nalgebra::Isometry3;
+use prehend_autodiff::optimize::LeastSquares;
+
+use super::clock::{Clock, Timing};
+use super::memory::TrackState;
+use super::settings::Recovery;
+use super::sight::Sight;
+use super::tracked::{TrackStatus, Tracked};
+use super::{Solved, Tracker};
+use crate::error::RefineError;
+use crate::factor::GaussianPrior;
+use crate::problem::{Solution, State};
+use crate::scene::Frame;
+use crate::search::PoseSearch;
+use crate::strategy::{Fused, Posterior, Strategy};
+
+/// Where to begin, and the other poses that a search ended with, if it comes from one.
+type Candidates = (Isometry3<f64>, Option<Vec<Isometry3<f64>>>);
+
+/// What share of the pixels that should show an object that was found again must do so.
+const LEAST_SHOWN: f64 = 0.5;
+
+impl Tracker {
+    /// The first frame.
+    pub(super) fn begin(
+        &mut self,
+        mut sight: Sight,
+        time: Duration,
+        clock: &mut Clock,
+    ) -> Result<Tracked, RefineError> {
+        let (object, hand, rig) = (Arc::clone(&self.object), self.hand.clone(), self.rig.clone());
+        if sight.observation.mask.count() == 0 {
+            let mask = match &self.initial {
+                Some(pose) => self.segmenter.segment(&sight, &object, pose).map(|seen| seen.mask),
+                None => self.segmenter.anywhere(&sight),
+            };
+            sight.observation.mask = mask.ok_or(RefineError::EmptyMask)?;
+        }
+        let mut frame = self.frame(&sight, &object, hand.as_ref(), rig.as_deref())?;
+        let initial = match self.initial {
+            Some(pose) => pose,
+            None => {
+                let (best, rivals) = self.search(&frame)?;
+                frame = frame.with_rivals(rivals);
+                best
+            }
+        };
+        let frame = &frame;
+        let nominal = State::new(frame, &initial)?;
+        if let Some(rig) = frame.rig() {
+            let (camera, stated) = (&frame.observation().camera, &self.stated);
+            self.settings.fused.prior = rig.marginal_prior(&nominal, camera, stated)?;
+        }
+        let (solved, posterior) = self.estimate(frame, &nominal)?;
+        let (in_hand, level) = (frame.hand().is_some(), solved.cost());
+        self.track = Some(self.remember(time, &solved, &nominal, in_hand, level));
+        self.learn(&sight, &solved);
+        let timing = Timing { recovery: clock.lap(), ..Timing::default() };
+        Ok(Tracked::solved(solved, posterior, TrackStatus::Relocalized, None, timing))
+    }
+
+    /// The whole fused estimator from `initial`, with nothing carried over but what `initial` has; linearized as frames that are
+    /// tracked are, so that costs compare.
+    fn estimate(
+        &self,
+        frame: &Frame<'_>,
+        initial: &State,
+    ) -> Result<(Solved, Posterior), RefineError> {
+        let fused = Fused::new(self.settings.fused.clone());
+        let fused = self.factors.iter().cloned().fold(fused, Fused::with);
+        let estimate = fused.run(frame, initial, &mut |_| ControlFlow::Continue(()))?;
+        let prior = GaussianPrior::independent(initial.clone(), &self.settings.fused.prior)?;
+        let problem = self.stage_problem(frame, initial, Arc::new(prior))?;
+        let mut posterior = estimate.posterior.ok_or(RefineError::NothingFits)?;
+        // Frames that are followed are not tested: gates judge them.
+        posterior.fit = None;
+        let (at, termination) = (problem.linearize(&estimate.state), posterior.termination);
+        let solution = Solution { at, termination, iterations: estimate.iteration };
+        Ok((Solved { solution, tried: true }, posterior))
+    }
+
+    /// The best pose that a search finds, and the others \[m\].
+    fn search(
+        &mut self,
+        frame: &Frame<'_>,
+    ) -> Result<(Isometry3<f64>, Vec<Isometry3<f64>>), RefineError> {
+        let search = match &mut self.search {
+            Some(search) => search,
+            none => {
+                let (object, settings) = (Arc::clone(&self.object), self.settings.search.clone());
+                none.insert(PoseSearch::new(object, settings)?)
+            }
+        };
+        let mut found = search.run(frame)?.into_iter().map(|found| found.t_cam_object);
+        let best = found.next().ok_or(RefineError::NothingFits)?;
+        Ok((best, found.collect()))
+    }
+
+    /// A pose that is believed, looked for where it should be and then everywhere, or the other way round if it was `long_lost`. One from anywhere must
+    /// fit as if nothing had changed.
+    pub(super) fn recover(
+        &mut self,
+        sight: &mut Sight,
+        predicted: &State,
+        track: &TrackState,
+        long_lost: bool,
+    ) -> Result<Option<(Solved, Posterior)>, RefineError> {
+        let mut ways = [(Recovery::Near, track.allowance()), (Recovery::Anywhere, track.level)];
+        if long_lost {
+            ways.reverse();
+        }
+        let recovery = self.settings.recovery;
+        for (reach, level) in ways.into_iter().filter(|(reach, _)| *reach <= recovery) {
+            let found = match reach {
+                Recovery::Anywhere => self.search_anywhere(sight)?,
+                _ => Some((predicted.t_cam_object, None)),
+            };
+            let Some((t_cam_object, rivals)) = found else { continue };
+            let start = State { t_cam_object, ..predicted.clone() };
+            if start.center().z <= 0.0 {
+                continue;
+            }
+            let Some(seen) = self.segmenter.segment(sight, &self.object, &t_cam_object) else {
+                continue;
+            };
+            sight.show(seen);
+            let (object, hand, rig) =
+                (Arc::clone(&self.object), self.hand.clone(), self.rig.clone());
+            let mut frame = self.frame(sight, &object, hand.as_ref(), rig.as_deref())?;
+            if let Some(rivals) = rivals {
+                frame = frame.with_rivals(rivals);
+            }
+            let (solved, posterior) = self.estimate(&frame, &start)?;
+            let pose = &solved.solution.at.state.t_cam_object;
+            let shown = self.segmenter.shown(sight, &object, pose);
+            let doubt = self.gate(&solved, &posterior, None, level);
+            if shown >= LEAST_SHOWN && doubt.is_none() {
+                return Ok(Some((solved, posterior)));
+            }
+            let doubt = doubt.map_or_else(String::new, |doubt| format!(", {doubt}"));
+            debug!("not found {reach:?}: {:.0} % of it are seen{doubt}", 100.0 * shown);
+        }
+        Ok(None)
+    }
+
+    /// The best pose that a search finds wherever something like the object is seen, and the others \[m\]; none if nothing fits.
+    fn search_anywhere(&mut self, sight: &mut Sight) -> Result<Option<Candidates>, RefineError> {
+        let Some(mask) = self.segmenter.anywhere(sight) else {
+            debug!("nothing like the object is seen anywhere");
+            return Ok(None);
+        };
+        (sight.observation.mask, sight.focus) = (mask, None);
+        let (object, hand, rig) = (Arc::clone(&self.object), self.hand.clone(), self.rig.clone());
+        let frame = self.frame(sight, &object, hand.as_ref(), rig.as_deref())?;
+        match self.search(&frame) {
+            Ok((best, rivals)) => Ok(Some((best, Some(rivals)))),
+            Err(RefineError::NothingFits | RefineError::NoDepth) => Ok(None),
+            Err(error) => Err(error),
+        }
+    }
+}
