@@ -26,6 +26,7 @@ mod posed;
 mod precision;
 mod projected;
 mod raster;
+mod registration;
 mod renderer;
 pub mod scene;
 pub mod shading;
@@ -55,6 +56,7 @@ pub use pose_loss::{
     TargetError, Tile, light_samples,
 };
 pub use raster::depth_map;
+pub use registration::register_depth;
 pub use renderer::{
     BufferAdjoints, BufferVars, Buffers, FaceId, ObjectGradient, PosedModel, RecordError, Renderer,
     Rendering, Scene, SceneGradient, SceneVars, render_each, vjp_each,

@@ -86,7 +86,8 @@ impl Frame {
             _ => return Err(wrong("hand, hand_pose and joints: each needs the others")),
         };
         let object = prepared(&object)?;
-        let mut observation = Observation { camera, color, depth, mask, gravity, hand: measured };
+        let seen = Observation::new(camera, color, depth, mask);
+        let mut observation = Observation { gravity, hand: measured, ..seen };
         let hand = hand.map(|hand| Arc::clone(&hand.hand));
         let check = |observation: &Observation| {
             // Only what looks at the object needs a mask.

@@ -48,5 +48,5 @@ pub(super) fn measured(
         return Err(RefineError::TaxelCount { forces: given, taxels }).raise();
     }
     let joints = hand.tree.joint_vector(&named).raise()?;
-    Ok(HandMeasurement { t_cam_hand: pose(hand_pose, "hand_pose")?, joints, forces })
+    Ok(HandMeasurement::new(pose(hand_pose, "hand_pose")?, joints).with_forces(forces))
 }

@@ -1,6 +1,7 @@
 //! Robots: kinematic trees with collision shapes, read from URDF.
 
 mod articulated;
+mod assembly;
 mod closest;
 mod collision;
 mod dynamics;
@@ -108,6 +109,8 @@ pub struct KinematicTree {
     variables: Vec<String>,
     /// Limits of those entries.
     ranges: Vec<limits::Range>,
+    /// The first link of each body that floats beside the base.
+    floating: Vec<usize>,
 }
 
 impl KinematicTree {
@@ -135,6 +138,12 @@ impl KinematicTree {
     /// Index of the base: the link that no joint moves.
     pub fn root(&self) -> usize {
         self.root
+    }
+
+    /// The first link of each body that floats beside the base ([`with_floating`](Self::with_floating)), ascending: the links from there to the next
+    /// are its own.
+    pub fn floating_bodies(&self) -> &[usize] {
+        &self.floating
     }
 
     /// Index of the link of that name.

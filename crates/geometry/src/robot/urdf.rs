@@ -125,7 +125,8 @@ impl KinematicTree {
             .collect::<Result<Vec<_>, RobotError>>()?;
         let (order, root) = tree::order(&links, &joints)?;
         let ranges = limits::ranges(&joints, &variables)?;
-        Ok(Self { name: urdf.name, links, joints, order, root, variables, ranges })
+        let floating = Vec::new();
+        Ok(Self { name: urdf.name, links, joints, order, root, variables, ranges, floating })
     }
 }
 

@@ -2,22 +2,18 @@
 
 use std::collections::HashMap;
 use std::ops::Deref;
-use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use nalgebra::Isometry3;
-use prehend_geometry::hand::load_taxels;
-use prehend_geometry::robot::KinematicTree;
 use prehend_geometry::{GridCache, TriMesh};
 
-use crate::data::bop::{Dataset, DatasetError, Frame, Models, Tactile};
+use crate::data::bop::{BodyKind, Dataset, DatasetError, Frame, Models, SceneBodies};
+use crate::data::robots::Robots;
 use crate::data::targets::Target;
 use crate::error::RefineError;
 use crate::method::Method;
 use crate::rig::Rig;
-use crate::scene::{
-    self, Hand, HandMeasurement, Inertial, Object, Observation, StatedSize, Warning, check_gravity,
-};
+use crate::scene::{self, Hand, Inertial, Object, Observation, StatedSize, Warning, check_gravity};
 use crate::strategy::GradientKind;
 
 /// BOP models are in millimeters \[m\].
@@ -152,8 +148,7 @@ pub struct Assets<'a> {
     dataset: Shared<'a>,
     seed: u64,
     objects: HashMap<u32, Arc<Object>>,
-    hands: HashMap<(PathBuf, Option<PathBuf>), Arc<Hand>>,
-    cache: Option<GridCache>,
+    robots: Robots,
     rig: Option<Arc<Rig>>,
     masks_optional: bool,
 }
@@ -174,8 +169,7 @@ impl<'a> Assets<'a> {
             dataset,
             seed,
             objects: HashMap::new(),
-            hands: HashMap::new(),
-            cache: None,
+            robots: Robots::default(),
             rig: None,
             masks_optional: false,
         }
@@ -188,7 +182,7 @@ impl<'a> Assets<'a> {
 
     /// With the distance grids of hands kept between runs in `cache`, if there is one.
     pub fn with_cache(self, cache: Option<GridCache>) -> Self {
-        Self { cache, ..self }
+        Self { robots: Robots::cached(cache), ..self }
     }
 
     /// Corrected by `rig`, if it is known.
@@ -259,52 +253,32 @@ impl<'a> Assets<'a> {
                 if self.masks_optional => {}
             read => read?,
         }
-        let Some(bodies) = present(frame.bodies(), !required.is_empty())? else {
+        for (view, t_cam_view) in frame.taken_together(&self.dataset.clone(), instance)? {
+            observation = observation.with_view(view, t_cam_view);
+        }
+        let Some(SceneBodies { gravity, bodies }) = present(frame.bodies(), !required.is_empty())?
+        else {
             return Ok((observation, None));
         };
         let tactile = present(frame.tactile(), required.contains(&Sensor::Touch))?;
-        let [body] = bodies.bodies.as_slice() else {
-            let problem = format!("expected one hand, found {}", bodies.bodies.len());
-            return Err(frame.bodies_fault("bodies", problem).into());
+        check_gravity(&gravity).map_err(|e| frame.bodies_fault("gravity", e))?;
+        observation.gravity = Some(gravity);
+        for body in &bodies {
+            if let BodyKind::Object { obj_id } = body.kind {
+                self.object(obj_id)?;
+            }
+        }
+        let tactile = tactile.unwrap_or_default();
+        let robot = self.robots.of(frame, &bodies, &tactile, &self.objects)?;
+        let Some((hand, measured)) = robot else {
+            return match required.is_empty() {
+                true => Ok((observation, None)),
+                false => Err(frame.bodies_fault("bodies", "expected one hand, found 0").into()),
+            };
         };
-        check_gravity(&bodies.gravity).map_err(|e| frame.bodies_fault("gravity", e))?;
-        if let Some(Tactile { body: named, .. }) = &tactile
-            && *named != body.name
-        {
-            let problem = format!("names {named:?}, but the hand is {:?}", body.name);
-            return Err(frame.tactile_fault("body", problem).into());
-        }
-        let hand = self.hand(&body.urdf, tactile.as_ref().map(|t| t.taxels.as_path()))?;
-        let taxels = hand.taxels.len();
-        if let Some(Tactile { taxels: file, force, .. }) = &tactile
-            && force.len() != taxels
-        {
-            let (file, found) = (file.display(), force.len());
-            let problem = format!("expected {taxels} forces, one a taxel of {file}, found {found}");
-            return Err(frame.tactile_fault("force", problem).into());
-        }
-        let joints = hand.tree.joint_vector(&body.joints);
-        let joints = joints.map_err(|e| frame.bodies_fault("bodies[0].joints", e))?;
-        observation.gravity = Some(bodies.gravity);
-        observation.hand = Some(HandMeasurement {
-            t_cam_hand: body.t_cam_base,
-            joints,
-            forces: tactile.map_or_else(Vec::new, |t| t.force),
-        });
+        observation.hand = Some(measured);
+        observation.place_views();
         Ok((observation, Some(hand)))
-    }
-
-    /// The hand of `urdf` with the taxels of a table.
-    fn hand(&mut self, urdf: &Path, taxels: Option<&Path>) -> Result<Arc<Hand>, AssetError> {
-        let key = (urdf.to_owned(), taxels.map(Path::to_owned));
-        if let Some(hand) = self.hands.get(&key) {
-            return Ok(Arc::clone(hand));
-        }
-        let tree = KinematicTree::from_urdf_file(urdf)?;
-        let skin = taxels.map(load_taxels).transpose()?.unwrap_or_default();
-        let hand = Arc::new(Hand::cached(tree, skin, self.cache.as_ref())?);
-        self.hands.insert(key, Arc::clone(&hand));
-        Ok(hand)
     }
 }
 

@@ -2,15 +2,18 @@
 //! what scores and made-up datasets share: contact, noise.
 
 mod assets;
+mod bodies;
 pub mod bop;
 #[cfg(feature = "cli")]
 mod cache;
 mod contact;
+mod depth_camera;
 mod frame_file;
 pub mod identity;
 mod journal;
 mod noise;
 mod pose;
+mod robots;
 mod smooth_field;
 mod targets;
 mod times;

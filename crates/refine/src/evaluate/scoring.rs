@@ -123,9 +123,12 @@ impl<'a> Scorer<'a> {
             return Ok(None);
         }
         let bodies = self.truth.bodies(scene, image)?;
-        let [body] = bodies.bodies.as_slice() else { return Ok(None) };
-        let tree = self.tree(&body.urdf)?;
-        let poses = tree.forward_kinematics(&tree.joint_vector(&body.joints)?);
+        let mut hands = bodies.bodies.iter().filter_map(|body| Some((body, body.as_hand()?)));
+        let (Some((body, (urdf, joints))), None) = (hands.next(), hands.next()) else {
+            return Ok(None);
+        };
+        let tree = self.tree(urdf)?;
+        let poses = tree.forward_kinematics(&tree.joint_vector(joints)?);
         let parts: Vec<TriMesh> = tree
             .links()
             .iter()

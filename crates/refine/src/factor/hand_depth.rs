@@ -48,6 +48,9 @@ struct Point {
     depth: f64,
 }
 
+/// Of robots of several bodies, so many times as many points are looked at as are used of each.
+const CANDIDATES: usize = 8;
+
 /// Pixels around the object's mask that are not taken for the hand.
 const MARGIN: usize = 3;
 
@@ -57,7 +60,7 @@ impl HandDepthFactor {
     /// # Errors
     /// If the hand is unknown.
     pub fn new(frame: &Frame<'_>, settings: &HandDepthSettings) -> Result<Self, RefineError> {
-        let (robot, _) = frame.require_hand("hand-depth")?;
+        let (robot, measured) = frame.require_hand("hand-depth")?;
         let (observation, hand) = (frame.observation(), frame.hand_depth());
         let (depth, camera) = (&observation.depth, &observation.camera);
         let mask = observation.mask.pixels();
@@ -79,7 +82,6 @@ impl HandDepthFactor {
             })
         };
         let of_hand: Vec<usize> = on_hand.into_iter().filter(|p| !of_object(*p)).collect();
-        let step = of_hand.len().div_ceil(settings.points.max(1)).max(1);
         let point = |&pixel: &usize| {
             let (x, y) = ((pixel % width) as f64, (pixel / width) as f64);
             Point {
@@ -88,7 +90,33 @@ impl HandDepthFactor {
                 depth: f64::from(depth.pixels()[pixel]),
             }
         };
-        let points = of_hand.iter().step_by(step).map(point).collect();
+        let points = |limit: usize| {
+            let step = of_hand.len().div_ceil(limit.max(1)).max(1);
+            of_hand.iter().step_by(step).map(point).collect::<Vec<_>>()
+        };
+        let first = robot.tree.floating_bodies();
+        let points = if first.is_empty() {
+            points(settings.points)
+        } else {
+            // A table may fill the image, and would leave hardly a point to the hand.
+            let posed = robot.posed(&measured.t_cam_hand, &measured.joints)?;
+            let body = |Point { ray, depth, .. }: &Point| {
+                let (link, _) =
+                    posed.sample_link(&(ray.push(1.0) * *depth).into(), settings.reach)?;
+                Some(first.partition_point(|first| *first <= link))
+            };
+            let mut of_bodies: Vec<Vec<Point>> = (0..=first.len()).map(|_| Vec::new()).collect();
+            for point in points(CANDIDATES * settings.points) {
+                if let Some(body) = body(&point) {
+                    of_bodies[body].push(point);
+                }
+            }
+            let evenly = |points: Vec<Point>| {
+                let step = points.len().div_ceil(settings.points.max(1)).max(1);
+                points.into_iter().step_by(step)
+            };
+            of_bodies.into_iter().flat_map(evenly).collect()
+        };
         Ok(Self { hand: Arc::clone(robot), points, settings: settings.clone() })
     }
 

@@ -12,6 +12,7 @@ mod rendering;
 mod stability;
 mod support;
 mod tactile;
+mod view;
 
 pub use chamfer_depth::{ChamferDepthFactor, ChamferDepthSettings};
 pub use free_space::{FreeSpaceFactor, FreeSpaceSettings};
@@ -24,7 +25,12 @@ pub use prior::{GaussianPrior, PriorSettings};
 pub use rendering::{RenderingFactor, RenderingSettings};
 pub use stability::{StabilityFactor, StabilitySettings};
 pub use support::{SupportFactor, SupportSettings};
-pub use tactile::{ContactSettings, TactileFactor, TactileSettings, TouchModel};
+pub use tactile::{
+    BinaryTouchFactor, BinaryTouchSettings, ContactPatchFactor, ContactPatchSettings,
+    ContactSettings, ProximityFactor, ProximitySettings, TactileFactor, TactileSettings,
+    TouchModel,
+};
+pub use view::ViewFactor;
 
 #[cfg(test)]
 mod gradient_check {
@@ -71,6 +77,7 @@ mod gradient_check {
             Block::ObjectPose | Block::HandPose => vec![1.0, 1.0, 1.0, 10.0, 10.0, 10.0],
             Block::Joints(count) => vec![10.0; count],
             Block::Camera => vec![2.0, 1.0, 2.0, 2.0, 10.0, 10.0],
+            Block::View(_) => [vec![1.0; 3], vec![10.0; 3], scales(Block::Camera)].concat(),
         }
     }
 

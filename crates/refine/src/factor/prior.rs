@@ -5,7 +5,7 @@ use prehend_autodiff::lie::{cross_matrix, so3_left_jacobian_inverse, so3_log};
 
 use crate::error::RefineError;
 use crate::problem::{Block, Factor, NoiseModel, RIDGE, Rows, ScaledCholesky, State};
-use crate::scene::CameraCalibrationError;
+use crate::scene::{CameraCalibrationError, HandMeasurement, ViewCalibrationError};
 
 /// Stated accuracies: standard deviations of what a [`State`] holds from what it begins with. All are positive; what is known exactly has a
 /// tiny one.
@@ -21,6 +21,8 @@ pub struct PriorSettings {
     pub hand_rotation: f64,
     /// Each joint \[rad or m\].
     pub joints: f64,
+    /// Joints of which that is known, in the order of the joints: beyond the end of the list and where there is none, as all others.
+    pub known_joints: Vec<Option<f64>>,
     /// Depth, as a part of it.
     pub depth_scale: f64,
     /// Depth \[m\].
@@ -31,6 +33,10 @@ pub struct PriorSettings {
     pub focal_scale: f64,
     /// Half of what the two focal lengths differ by, as a part of them.
     pub aspect: f64,
+    /// Where another camera is beside the first, at the object's place, in each direction \[m\].
+    pub view_translation: f64,
+    /// Its rotation about each axis \[rad\].
+    pub view_rotation: f64,
 }
 
 impl PriorSettings {
@@ -39,7 +45,9 @@ impl PriorSettings {
         match block {
             Block::ObjectPose => [self.object_translation, self.object_rotation].concat(),
             Block::HandPose => [[self.hand_translation; 3], [self.hand_rotation; 3]].concat(),
-            Block::Joints(count) => vec![self.joints; count],
+            Block::Joints(count) => (0..count)
+                .map(|k| self.known_joints.get(k).copied().flatten().unwrap_or(self.joints))
+                .collect(),
             Block::Camera => vec![
                 self.depth_scale,
                 self.depth_bias,
@@ -48,12 +56,29 @@ impl PriorSettings {
                 self.focal_scale,
                 self.aspect,
             ],
+            Block::View(_) => {
+                let pose = [[self.view_translation; 3], [self.view_rotation; 3]].concat();
+                [pose, self.sigmas(Block::Camera)].concat()
+            }
         }
+    }
+
+    /// The same with what is known of the pose and the joints of `hand`.
+    pub(crate) fn of_hand(&self, hand: Option<&HandMeasurement>) -> Self {
+        let mut prior = self.clone();
+        let Some(hand) = hand else { return prior };
+        if let Some([translation, rotation]) = hand.pose_sigmas {
+            (prior.hand_translation, prior.hand_rotation) = (translation, rotation);
+        }
+        if !hand.joint_sigmas.is_empty() {
+            prior.known_joints.clone_from(&hand.joint_sigmas);
+        }
+        prior
     }
 
     /// The same of all that a state with `layout` holds.
     pub(crate) fn all_sigmas(&self, layout: Layout) -> DVector<f64> {
-        DVector::from_vec(layout.blocks().map(|block| self.sigmas(block)).concat())
+        DVector::from_vec(layout.blocks().iter().flat_map(|block| self.sigmas(*block)).collect())
     }
 }
 
@@ -66,36 +91,46 @@ impl Default for PriorSettings {
             hand_translation: 2.1e-3,
             hand_rotation: 7e-3,
             joints: 0.014,
+            known_joints: Vec::new(),
             depth_scale: 4e-3,
             depth_bias: 1e-3,
             principal_point: 1.7e-3,
             focal_scale: 4e-3,
             aspect: 2e-3,
+            view_translation: 2e-3,
+            view_rotation: 4e-3,
         }
     }
 }
 
-/// Where the parts of a vector of all that a state holds begin: object, hand, joints, camera.
+/// Where the parts of a vector of all that a state holds begin: object, hand, joints, camera, other cameras.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Layout {
     joints: usize,
+    views: usize,
 }
 
 /// Twists of the object, then of the hand.
 const POSES: usize = 12;
 
 impl Layout {
-    pub(crate) fn new(joints: usize) -> Self {
-        Self { joints }
+    pub(crate) fn new(joints: usize, views: usize) -> Self {
+        Self { joints, views }
+    }
+
+    /// Of `state`.
+    pub(crate) fn of(state: &State) -> Self {
+        Self::new(state.joints.len(), state.views.len())
     }
 
     pub(crate) fn len(self) -> usize {
-        POSES + self.joints + CameraCalibrationError::DIMENSION
+        self.offset(Block::View(self.views))
     }
 
     /// Its blocks, in order.
-    pub(crate) fn blocks(self) -> [Block; 4] {
-        [Block::ObjectPose, Block::HandPose, Block::Joints(self.joints), Block::Camera]
+    pub(crate) fn blocks(self) -> Vec<Block> {
+        let first = [Block::ObjectPose, Block::HandPose, Block::Joints(self.joints), Block::Camera];
+        first.into_iter().chain((0..self.views).map(Block::View)).collect()
     }
 
     /// Where `block` begins.
@@ -105,6 +140,10 @@ impl Layout {
             Block::HandPose => 6,
             Block::Joints(_) => POSES,
             Block::Camera => POSES + self.joints,
+            Block::View(k) => {
+                let first = POSES + self.joints + CameraCalibrationError::DIMENSION;
+                first + k * ViewCalibrationError::DIMENSION
+            }
         }
     }
 }
@@ -134,7 +173,7 @@ impl GaussianPrior {
     /// # Errors
     /// If a standard deviation is not a positive number.
     pub fn independent(mean: State, settings: &PriorSettings) -> Result<Self, RefineError> {
-        let layout = Layout::new(mean.joints.len());
+        let layout = Layout::of(&mean);
         let sigmas = settings.all_sigmas(layout);
         if let Some(wrong) = sigmas.iter().find(|v| v.is_nan() || **v <= 0.0) {
             let problem = format!("a standard deviation of {wrong} is not positive");
@@ -201,7 +240,11 @@ impl Factor for GaussianPrior {
         let (hand, by_hand) = self.deviation(&state.t_cam_hand, &self.mean.t_cam_hand, state);
         let joints = state.joints.iter().zip(&self.mean.joints).take(self.layout.joints);
         let camera = state.camera.parameters().into_iter().zip(self.mean.camera.parameters());
-        let numbers = joints.map(|(now, then)| now - then).chain(camera.map(|(a, b)| a - b));
+        let views = state.views.iter().zip(&self.mean.views).take(self.layout.views);
+        let views =
+            views.flat_map(|(now, then)| now.parameters().into_iter().zip(then.parameters()));
+        let cameras = camera.chain(views).map(|(now, then)| now - then);
+        let numbers = joints.map(|(now, then)| now - then).chain(cameras);
         let all = object.iter().chain(&hand).copied().chain(numbers);
         let deviations = DVector::from_iterator(self.layout.len(), all);
         let unit = NoiseModel::gaussian(1.0).weighting(1);
@@ -218,15 +261,16 @@ impl Factor for GaussianPrior {
                             Block::HandPose => {
                                 row.block(block, (by_hand.row(at).transpose() * root).as_slice());
                             }
-                            Block::Joints(_) | Block::Camera => row.parameter(block, at, root),
+                            Block::Joints(_) | Block::Camera | Block::View(_) => {
+                                row.parameter(block, at, root);
+                            }
                         });
                     }
                 }
             }
             Whitener::Full(whitener) => {
                 let residuals = whitener * deviations;
-                let joints = Block::Joints(self.layout.joints);
-                let (from, to) = (self.layout.offset(joints), self.layout.offset(Block::Camera));
+                let blocks = self.layout.blocks();
                 for (k, residual) in residuals.iter().enumerate() {
                     rows.add(*residual, &unit, |row| {
                         let all: Vec<f64> = whitener.row(k).iter().copied().collect();
@@ -234,8 +278,10 @@ impl Factor for GaussianPrior {
                         let hand = by_hand.tr_mul(&Vector6::from_column_slice(&all[6..POSES]));
                         row.block(Block::ObjectPose, object.as_slice());
                         row.block(Block::HandPose, hand.as_slice());
-                        row.block(joints, &all[from..to]);
-                        row.block(Block::Camera, &all[to..]);
+                        for &block in &blocks[2..] {
+                            let from = self.layout.offset(block);
+                            row.block(block, &all[from..from + block.dimension()]);
+                        }
                     });
                 }
             }
@@ -263,6 +309,7 @@ mod tests {
             principal_point: 2e-3,
             focal_scale: 4e-3,
             aspect: 2e-3,
+            ..PriorSettings::default()
         }
     }
 
@@ -294,7 +341,7 @@ mod tests {
     #[test]
     fn independent_deviations_are_those_of_a_diagonal_covariance() {
         let (_, start) = fixture(0);
-        let layout = Layout::new(16);
+        let layout = Layout::new(16, 0);
         let variances = settings().all_sigmas(layout).map(|sigma| sigma.powi(2));
         let covariance = DMatrix::from_diagonal(&variances);
         let full = GaussianPrior::correlated(start.clone(), layout, &covariance).unwrap();
@@ -315,7 +362,7 @@ mod tests {
     #[test]
     fn correlated_deviations_have_their_covariance_and_derivatives() {
         let (_, start) = fixture(0);
-        let layout = Layout::new(16);
+        let layout = Layout::new(16, 0);
         let n = layout.len();
         let mixed = DMatrix::from_fn(n, n, |r, c| ((r * 7 + c * 3) as f64).sin());
         let covariance = (&mixed * mixed.transpose() + DMatrix::identity(n, n)) * 1e-4;

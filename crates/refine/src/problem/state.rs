@@ -5,7 +5,7 @@ use prehend_autodiff::lie::{perturb_about, so3_log};
 
 use crate::error::RefineError;
 
-use crate::scene::{CameraCalibrationError, Frame, Object, Observation};
+use crate::scene::{CameraCalibrationError, Frame, Object, Observation, ViewCalibrationError};
 
 /// A named block of a [`State`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -20,6 +20,8 @@ pub enum Block {
     Joints(usize),
     /// How the camera differs from what is said of it: see [`CameraCalibrationError`].
     Camera,
+    /// How another camera, so many after the first, differs from what is said of it: see [`ViewCalibrationError`].
+    View(usize),
 }
 
 impl Block {
@@ -29,6 +31,7 @@ impl Block {
             Self::ObjectPose | Self::HandPose => 6,
             Self::Joints(count) => count,
             Self::Camera => CameraCalibrationError::DIMENSION,
+            Self::View(_) => ViewCalibrationError::DIMENSION,
         }
     }
 }
@@ -46,6 +49,8 @@ pub struct State {
     pub joints: Vec<f64>,
     /// How the camera differs from what is said of it.
     pub camera: CameraCalibrationError,
+    /// The same of the other cameras that see the object.
+    pub views: Vec<ViewCalibrationError>,
 }
 
 impl State {
@@ -80,6 +85,7 @@ impl State {
             t_cam_hand: hand.map_or_else(Isometry3::identity, |h| h.t_cam_hand),
             joints: hand.map_or_else(Vec::new, |h| h.joints.clone()),
             camera: CameraCalibrationError::default(),
+            views: vec![ViewCalibrationError::default(); observation.seeing_views().count()],
         };
         let depth = state.center().z;
         if depth <= 0.0 {
@@ -94,7 +100,7 @@ impl State {
     }
 
     /// How far the calibrations are from those `said`: displacement of the point that is said to be at the object's center and rotation
-    /// vector of the hand \[m; rad\], joints, camera.
+    /// vector of the hand \[m; rad\], joints, camera, other cameras.
     pub(crate) fn calibration_deviation(&self, said: &Self) -> DVector<f64> {
         let center = said.center();
         let motion = self.t_cam_hand * said.t_cam_hand.inverse();
@@ -103,7 +109,10 @@ impl State {
         let joints = self.joints.iter().zip(&said.joints).map(|(q, said)| q - said);
         let camera = self.camera.parameters().into_iter().zip(said.camera.parameters());
         let hand = off.iter().chain(&turn).copied();
-        let all: Vec<f64> = hand.chain(joints).chain(camera.map(|(is, said)| is - said)).collect();
+        let views = self.views.iter().zip(&said.views);
+        let views = views.flat_map(|(is, said)| is.parameters().into_iter().zip(said.parameters()));
+        let cameras = camera.chain(views).map(|(is, said)| is - said);
+        let all: Vec<f64> = hand.chain(joints).chain(cameras).collect();
         DVector::from_vec(all)
     }
 
@@ -128,6 +137,10 @@ impl State {
                 }
                 Block::Camera => {
                     state.camera = state.camera.changed(part);
+                    continue;
+                }
+                Block::View(k) => {
+                    state.views[k] = state.views[k].changed(part);
                     continue;
                 }
             };

@@ -56,6 +56,7 @@ impl Rig {
             );
             hand.joints.iter_mut().zip(&self.joints).for_each(|(q, error)| *q += error);
         }
+        corrected.place_views();
         Ok(corrected)
     }
 

@@ -200,7 +200,7 @@ impl Rig {
         if given != expected && given != 0 {
             return Err(of_other_joints(given, expected));
         }
-        let layout = Layout::new(given);
+        let layout = Layout::new(given, 0);
         let object_rows = object.len();
         let mut jacobian = self.jacobian(said);
         // Where the object is, depth's field is a bias, and distortion a shift and another size.
@@ -233,7 +233,7 @@ impl Rig {
     ) -> Result<PriorSettings, RefineError> {
         let object = prior.sigmas(Block::ObjectPose);
         let variances = self.frame_covariance(said, camera, &object)?.diagonal();
-        let layout = Layout::new(said.joints.len());
+        let layout = Layout::new(said.joints.len(), 0);
         let sigma = |from: usize, count: usize| variances.rows(from, count).mean().sqrt();
         let (hand, camera) = (layout.offset(Block::HandPose), layout.offset(Block::Camera));
         let mut prior = prior.clone();

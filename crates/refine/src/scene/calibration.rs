@@ -20,6 +20,44 @@ pub struct CameraCalibrationError {
     pub aspect: f64,
 }
 
+/// How another camera differs from what is said of it and of its place. The default changes nothing.
+///
+/// The parameters of [`Block::View`](crate::problem::Block::View) are translation, rotation vector, and those of the camera.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ViewCalibrationError {
+    /// How far from where it is said to be the object's center is seen, in the camera's frame \[m\].
+    pub translation: Vector3<f64>,
+    /// How things are turned about that, as a rotation vector \[rad\].
+    pub rotation: Vector3<f64>,
+    /// Of the camera itself.
+    pub camera: CameraCalibrationError,
+}
+
+impl ViewCalibrationError {
+    /// Number of parameters.
+    pub(crate) const DIMENSION: usize = 6 + CameraCalibrationError::DIMENSION;
+
+    /// The parameters, zero where nothing is corrected.
+    pub fn parameters(&self) -> [f64; Self::DIMENSION] {
+        let pose = self.translation.iter().chain(&self.rotation).copied();
+        let mut all = pose.chain(self.camera.parameters());
+        std::array::from_fn(|_| all.next().unwrap_or_default())
+    }
+
+    /// With `change` added to the parameters.
+    ///
+    /// # Panics
+    /// If there is not one change a parameter.
+    pub fn changed(&self, change: &[f64]) -> Self {
+        assert_eq!(change.len(), Self::DIMENSION, "one change a parameter");
+        Self {
+            translation: self.translation + Vector3::from_column_slice(&change[..3]),
+            rotation: self.rotation + Vector3::from_column_slice(&change[3..6]),
+            camera: self.camera.changed(&change[6..]),
+        }
+    }
+}
+
 impl Default for CameraCalibrationError {
     fn default() -> Self {
         Self {

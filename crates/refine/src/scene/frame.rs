@@ -28,6 +28,8 @@ pub struct Frame<'a> {
     rivals: Option<Vec<Isometry3<f64>>>,
     /// Columns and rows beyond which nothing is looked for that may hide the object; all if it is not known.
     focus: Option<[Range<usize>; 2]>,
+    /// What other cameras saw of the object, each with the first camera's coordinates → its own \[m\].
+    views: Vec<(Isometry3<f64>, Frame<'a>)>,
 }
 
 /// What may hide the object in the image.
@@ -70,7 +72,12 @@ impl<'a> Frame<'a> {
         if let Some((hand, measured)) = hand {
             hand.check_joints(&measured.joints)?;
         }
+        let views = observation.seeing_views().map(|view| {
+            let hand = hand.map(|(hand, _)| hand);
+            Ok((view.t_view_cam(), Self::new(view.observation(), object, hand)?))
+        });
         Ok(Self {
+            views: views.collect::<Result<_, RefineError>>()?,
             observation,
             object,
             hand,
@@ -128,6 +135,11 @@ impl<'a> Frame<'a> {
     /// The same of an object that is nowhere but in these columns and rows.
     pub(crate) fn with_focus(self, focus: [Range<usize>; 2]) -> Self {
         Self { focus: Some(focus), ..self }
+    }
+
+    /// What other cameras saw of the object: for each the first camera's coordinates → its own \[m\], and its frame.
+    pub fn views(&self) -> &[(Isometry3<f64>, Frame<'a>)] {
+        &self.views
     }
 
     /// What was sensed.

@@ -3,6 +3,7 @@
 use nalgebra::{Isometry3, Vector3};
 use prehend_render::{Camera, DepthImage, DistortionError, Mask, Remap, RgbImage};
 
+use super::TouchReading;
 use crate::error::RefineError;
 
 /// Where the hand is said to be, and what it feels.
@@ -14,9 +15,32 @@ pub struct HandMeasurement {
     pub joints: Vec<f64>,
     /// Force of the object on each taxel, in the taxel's link frame \[N\], or [`UNKNOWN_FORCE`](Self::UNKNOWN_FORCE); empty without a skin.
     pub forces: Vec<Vector3<f64>>,
+    /// What sensors say that measure no forces.
+    pub touch: Vec<TouchReading>,
+    /// Standard deviations of `t_cam_hand` at the object's place in each direction, and about each axis \[m, rad\], where they are known.
+    pub pose_sigmas: Option<[f64; 2]>,
+    /// Standard deviations of joint positions where they are known \[rad or m\], in the order of the joints; an empty list for none. The others are as
+    /// accurate as the estimator's settings state.
+    pub joint_sigmas: Vec<Option<f64>>,
 }
 
 impl HandMeasurement {
+    /// A hand that feels nothing, with its base at `t_cam_hand` \[m\] and its joints at `joints` \[rad\].
+    pub fn new(t_cam_hand: Isometry3<f64>, joints: Vec<f64>) -> Self {
+        let (forces, touch, joint_sigmas) = (Vec::new(), Vec::new(), Vec::new());
+        Self { t_cam_hand, joints, forces, touch, pose_sigmas: None, joint_sigmas }
+    }
+
+    /// The same with the force of the object on each taxel, in its link's frame \[N\].
+    pub fn with_forces(self, forces: Vec<Vector3<f64>>) -> Self {
+        Self { forces, ..self }
+    }
+
+    /// The same with what sensors say that measure no forces.
+    pub fn with_touch(self, touch: Vec<TouchReading>) -> Self {
+        Self { touch, ..self }
+    }
+
     /// The force on a taxel of which nothing is known, as on a dead one: it is no evidence of anything.
     pub const UNKNOWN_FORCE: Vector3<f64> = Vector3::new(f64::NAN, f64::NAN, f64::NAN);
 
@@ -41,9 +65,66 @@ pub struct Observation {
     pub gravity: Option<Vector3<f64>>,
     /// The hand, where known.
     pub hand: Option<HandMeasurement>,
+    /// What other cameras saw at the same moment.
+    pub views: Vec<AdditionalView>,
+}
+
+/// What another camera saw.
+#[derive(Clone, Debug)]
+pub struct AdditionalView {
+    /// Its coordinates → those of the first camera \[m\].
+    t_cam_view: Isometry3<f64>,
+    /// In its own frame, with the hand there, and nothing of what that feels.
+    observation: Observation,
+}
+
+impl AdditionalView {
+    /// The first camera's coordinates → its own \[m\].
+    pub fn t_view_cam(&self) -> Isometry3<f64> {
+        self.t_cam_view.inverse()
+    }
+
+    /// What it saw, in its own frame.
+    pub fn observation(&self) -> &Observation {
+        &self.observation
+    }
+
+    /// Takes over where the hand is.
+    fn place(&mut self, hand: Option<&HandMeasurement>) {
+        let t_view_cam = self.t_view_cam();
+        self.observation.hand = hand.map(|hand| HandMeasurement {
+            pose_sigmas: hand.pose_sigmas,
+            joint_sigmas: hand.joint_sigmas.clone(),
+            ..HandMeasurement::new(t_view_cam * hand.t_cam_hand, hand.joints.clone())
+        });
+    }
 }
 
 impl Observation {
+    /// What `camera` shows: `color`, `depth` \[m\], and `mask` on the visible part of the object.
+    pub fn new(camera: Camera, color: RgbImage, depth: DepthImage, mask: Mask) -> Self {
+        Self { camera, color, depth, mask, gravity: None, hand: None, views: Vec::new() }
+    }
+
+    /// With what another camera saw at the same moment, whose coordinates `t_cam_view` takes to those of this one \[m\]. Hand and gravity are this one's.
+    pub fn with_view(mut self, view: Self, t_cam_view: Isometry3<f64>) -> Self {
+        let observation = Self { gravity: None, views: Vec::new(), ..view };
+        self.views.push(AdditionalView { t_cam_view, observation });
+        self.place_views();
+        self
+    }
+
+    /// The other cameras that see the object: those with a mask of it.
+    pub(crate) fn seeing_views(&self) -> impl Iterator<Item = &AdditionalView> {
+        self.views.iter().filter(|view| view.observation.mask.count() > 0)
+    }
+
+    /// Tells the other cameras where the hand is. To be called when [`hand`](Self::hand) has changed.
+    pub fn place_views(&mut self) {
+        let Self { hand, views, .. } = self;
+        views.iter_mut().for_each(|view| view.place(hand.as_ref()));
+    }
+
     /// Makes images behind a lens those of a pinhole.
     ///
     /// # Errors

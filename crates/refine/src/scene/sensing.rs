@@ -56,15 +56,9 @@ impl HeldObject<'_> {
             *m = *body == Some(0);
         }
         let forces = feel(object, hand, t_cam_object, t_cam_hand, joints);
-        let measured = HandMeasurement { t_cam_hand: *t_cam_hand, joints: joints.to_vec(), forces };
-        Observation {
-            camera,
-            color: image.color,
-            depth: image.depth,
-            mask,
-            gravity,
-            hand: Some(measured),
-        }
+        let measured = HandMeasurement::new(*t_cam_hand, joints.to_vec()).with_forces(forces);
+        let seen = Observation::new(camera, image.color, image.depth, mask);
+        Observation { gravity, hand: Some(measured), ..seen }
     }
 }
 

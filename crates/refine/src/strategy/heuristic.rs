@@ -298,6 +298,7 @@ mod tests {
             t_cam_hand: Isometry3::identity(),
             joints: Vec::new(),
             camera: CameraCalibrationError::default(),
+            views: Vec::new(),
         };
         let names = factors.iter().map(|factor| factor.name());
         let mut observe = |_: &_| ControlFlow::Continue(());

@@ -19,7 +19,7 @@ use crate::factor::GaussianPrior;
 use crate::problem::{Solution, State};
 use crate::scene::Frame;
 use crate::search::PoseSearch;
-use crate::strategy::{Fused, Posterior, Strategy};
+use crate::strategy::{Fused, FusedSettings, Posterior, Strategy};
 
 /// Where to begin, and the other poses that a search ended with, if it comes from one.
 type Candidates = (Isometry3<f64>, Option<Vec<Isometry3<f64>>>);
@@ -54,10 +54,11 @@ impl Tracker {
         };
         let frame = &frame;
         let nominal = State::new(frame, &initial)?;
-        if let Some(rig) = frame.rig() {
-            let (camera, stated) = (&frame.observation().camera, &self.stated);
-            self.settings.fused.prior = rig.marginal_prior(&nominal, camera, stated)?;
-        }
+        let stated = self.stated.of_hand(frame.observation().hand.as_ref());
+        self.settings.fused.prior = match frame.rig() {
+            Some(rig) => rig.marginal_prior(&nominal, &frame.observation().camera, &stated)?,
+            None => stated,
+        };
         let (solved, posterior) = self.estimate(frame, &nominal)?;
         let (in_hand, level) = (frame.hand().is_some(), solved.cost());
         self.track = Some(self.remember(time, &solved, &nominal, in_hand, level));
@@ -73,7 +74,9 @@ impl Tracker {
         frame: &Frame<'_>,
         initial: &State,
     ) -> Result<(Solved, Posterior), RefineError> {
-        let fused = Fused::new(self.settings.fused.clone());
+        // Costs must compare with those of frames that are followed: all evidence counts in these.
+        let fused = FusedSettings { let_off: false, ..self.settings.fused.clone() };
+        let fused = Fused::new(fused);
         let fused = self.factors.iter().cloned().fold(fused, Fused::with);
         let estimate = fused.run(frame, initial, &mut |_| ControlFlow::Continue(()))?;
         let prior = GaussianPrior::independent(initial.clone(), &self.settings.fused.prior)?;

@@ -76,7 +76,7 @@ impl TrackState {
         prior: &PriorSettings,
         level: f64,
     ) -> Self {
-        let layout = Layout::new(if in_hand { nominal.joints.len() } else { 0 });
+        let layout = layout_of(nominal, in_hand);
         let joints = at.state.joints.iter().zip(&nominal.joints);
         Self {
             time,
@@ -158,7 +158,7 @@ impl TrackState {
     ) -> Prediction {
         let seconds = time.saturating_sub(self.time).as_secs_f64();
         let motion = settings.motion(in_hand);
-        let layout = Layout::new(if in_hand { nominal.joints.len() } else { 0 });
+        let layout = layout_of(nominal, in_hand);
         let kept = (-seconds / settings.calibration_time_constant).exp();
         let (with_hand, velocity) = if in_hand == self.in_hand {
             let moved = match in_hand {
@@ -182,6 +182,11 @@ impl TrackState {
         }
         let camera = self.state.camera.parameters().map(|p| kept * p);
         state.camera = CameraCalibrationError::default().changed(&camera);
+        if state.views.len() == self.state.views.len() {
+            for (view, before) in state.views.iter_mut().zip(&self.state.views) {
+                *view = view.changed(&before.parameters().map(|p| kept * p));
+            }
+        }
         let stated = variances(&settings.fused.prior, layout);
         let covariance = if layout == self.layout {
             let transition = transition(&with_hand.rotation, kept, layout);
@@ -225,6 +230,11 @@ fn transition(turn: &UnitQuaternion<f64>, kept: f64, layout: Layout) -> DMatrix<
         transition.fixed_view_mut::<3, 3>(3 * k, 3 * k).copy_from(&(turn * factor));
     }
     transition
+}
+
+/// What is known of frames like that of `nominal`; of the hand only if that is known.
+fn layout_of(nominal: &State, in_hand: bool) -> Layout {
+    Layout::new(if in_hand { nominal.joints.len() } else { 0 }, nominal.views.len())
 }
 
 /// Stated variances.

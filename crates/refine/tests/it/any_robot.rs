@@ -76,16 +76,9 @@ impl Setting {
             *set = *body == Some(0);
         }
         Observation {
-            camera: CAMERA,
-            color: seen.color,
-            depth: seen.depth,
-            mask,
             gravity: Some(self.t_cam_robot.rotation * Vector3::new(0.0, 0.0, -9.81)),
-            hand: Some(HandMeasurement {
-                t_cam_hand: self.t_cam_robot,
-                joints: self.joints.clone(),
-                forces: Vec::new(),
-            }),
+            hand: Some(HandMeasurement::new(self.t_cam_robot, self.joints.clone())),
+            ..Observation::new(CAMERA, seen.color, seen.depth, mask)
         }
     }
 

@@ -6,7 +6,9 @@ use std::fs;
 use std::path::Path;
 
 use prehend_geometry::TriMesh;
-use prehend_refine::data::bop::{Dataset, GroundTruth, read_results, write_results};
+use prehend_refine::data::bop::{
+    Dataset, GroundTruth, TactileReading, read_results, write_results,
+};
 use prehend_refine::evaluate::Scorer;
 use prehend_refine::evaluate::metrics::{PoseScore, ScoredModel, ScoredRow, summarize};
 
@@ -102,13 +104,15 @@ fn every_frame_of_both_grasp_sets_reads() {
                 let bodies = frame.bodies().unwrap();
                 assert!((bodies.gravity.norm() - 9.81).abs() < 0.02);
                 let hand = bodies.body("hand").unwrap();
-                assert!(hand.urdf.is_file() && hand.joints.len() == 16);
+                let (urdf, joints) = hand.as_hand().unwrap();
+                assert!(urdf.is_file() && joints.len() == 16);
                 let tactile = frame.tactile().unwrap();
-                assert_eq!(tactile.force.len(), 368);
-                assert_eq!(tactile.force.len(), 368);
+                let TactileReading::Force { force, .. } = &tactile[0].reading else {
+                    panic!("no forces")
+                };
+                assert_eq!(force.len(), 368);
                 assert!(
-                    tactile.force.iter().any(|f| f.norm() > 0.1)
-                        && tactile.force.iter().all(|f| f.amax() <= 10.0)
+                    force.iter().any(|f| f.norm() > 0.1) && force.iter().all(|f| f.amax() <= 10.0)
                 );
                 let info = dataset.models().info(row.obj_id).unwrap();
                 assert!(

@@ -21,6 +21,7 @@ mod pose_error;
 mod results;
 mod rig;
 mod search;
+mod sensors;
 mod symmetry;
 mod synth_layout;
 mod tracker;

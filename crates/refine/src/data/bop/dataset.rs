@@ -3,6 +3,9 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+use serde::Deserialize;
 
 use super::error::DatasetError;
 use super::json::JsonFile;
@@ -32,6 +35,23 @@ pub struct Scene {
     pub(super) bodies: JsonFile,
     pub(super) tactile: JsonFile,
     pub(super) remaps: RemapCache,
+    pub(super) depth_remaps: RemapCache,
+    /// Images by the name of the rig that took them together.
+    pub(super) rigs: OnceLock<Result<BTreeMap<RigName, Vec<u32>>, DatasetError>>,
+}
+
+/// The name of a rig, which may be a number.
+#[derive(Clone, Debug, Deserialize, PartialEq, Eq, PartialOrd, Ord)]
+#[serde(untagged, expecting = "is neither a string nor an integer")]
+pub(super) enum RigName {
+    Number(i64),
+    Text(String),
+}
+
+/// Of what rig an image is.
+#[derive(Deserialize)]
+pub(super) struct RigEntry {
+    pub(super) rig: Option<RigName>,
 }
 
 impl Dataset {
@@ -119,6 +139,8 @@ impl Scene {
             bodies: JsonFile::new(dir.join("scene_bodies.json")),
             tactile: JsonFile::new(dir.join("scene_tactile.json")),
             remaps: RemapCache::default(),
+            depth_remaps: RemapCache::default(),
+            rigs: OnceLock::new(),
             dir,
         }
     }
@@ -136,6 +158,24 @@ impl Scene {
     /// The dataset's folder, which paths inside the scene's files are relative to.
     pub(super) fn root(&self) -> &Path {
         &self.root
+    }
+
+    /// The images that cameras of a rig took together with one that has `name` for its rig, ascending; itself among them.
+    ///
+    /// # Errors
+    /// Those of [`images`](Self::images), and if an entry of `scene_camera.json` is broken.
+    pub(super) fn taken_together(&self, name: &RigName) -> Result<&[u32], DatasetError> {
+        let by_rig = || {
+            let mut by_rig: BTreeMap<RigName, Vec<u32>> = BTreeMap::new();
+            for image in self.images()? {
+                if let RigEntry { rig: Some(name) } = self.camera.entry(image)? {
+                    by_rig.entry(name).or_default().push(image);
+                }
+            }
+            Ok(by_rig)
+        };
+        let rigs = self.rigs.get_or_init(by_rig).as_ref().map_err(Clone::clone)?;
+        Ok(rigs.get(name).map_or(&[], Vec::as_slice))
     }
 
     /// The images that `scene_camera.json` lists, ascending.

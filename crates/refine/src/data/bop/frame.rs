@@ -3,29 +3,34 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use nalgebra::Isometry3;
 use prehend_render::{
     Camera, CameraError, DepthImage, Distortion, DistortionError, Mask, Remap, RgbImage,
 };
 use serde::Deserialize;
 
-use super::dataset::{Dataset, Scene};
+use super::bodies::{SceneBodies, missing};
+use super::dataset::{Dataset, RigEntry, Scene};
 use super::error::DatasetError;
-use super::json::{JsonFile, Numbers, Positive};
+use super::json::{JsonFile, Numbers, Positive, Rotation};
 use super::lens::Lens;
-use super::scene::{SceneBodies, Tactile};
+use super::pose::translation_from_mm;
+use super::touch::Tactile;
+use crate::data::depth_camera::DepthCamera;
 use crate::scene::Observation;
 
 /// One image: its camera, and access to everything else an estimator may know about it. Each part is
 /// read when asked for and fails on its own.
 ///
 /// Where the dataset says that images were taken through a lens (`cam_dist` of `scene_camera.json`, or of `camera.json` for all of them),
-/// they are handed out as a pinhole camera of the same matrix and size sees them.
+/// they are handed out as a pinhole camera of the same matrix and size sees them. Depth of a camera of its own is registered to the color camera.
 #[derive(Clone, Copy, Debug)]
 pub struct Frame<'a> {
     scene: &'a Scene,
     im_id: u32,
     intrinsics: Intrinsics,
     lens: Option<Distortion>,
+    depth_camera: Option<DepthCamera>,
     /// Millimeters per stored depth value.
     pub depth_scale: f64,
 }
@@ -37,6 +42,23 @@ struct CameraEntry {
     depth_scale: Option<Positive>,
     #[serde(rename = "cam_dist")]
     lens: Option<Lens>,
+    #[serde(rename = "depth_K")]
+    depth_intrinsics: Option<Intrinsics>,
+    #[serde(rename = "depth_dist")]
+    depth_lens: Option<Lens>,
+    #[serde(rename = "cam_R_d2c")]
+    depth_rotation: Option<Rotation>,
+    #[serde(rename = "cam_t_d2c")]
+    depth_translation: Option<Numbers<3>>,
+}
+
+/// What places the camera of an image beside others that took theirs at the same moment. Of other images it is never read.
+#[derive(Deserialize)]
+struct PlaceEntry {
+    #[serde(rename = "cam_R_w2c")]
+    rotation: Option<Rotation>,
+    #[serde(rename = "cam_t_w2c")]
+    translation: Option<Numbers<3>>,
 }
 
 /// What `cam_K` says of a camera of unknown size.
@@ -60,14 +82,23 @@ impl Dataset {
     /// `camera.json` is broken.
     pub fn frame(&self, scene_id: u32, im_id: u32) -> Result<Frame<'_>, DatasetError> {
         let scene = self.scene(scene_id)?;
-        let CameraEntry { intrinsics, depth_scale, mut lens } = scene.camera.entry(im_id)?;
+        let entry: CameraEntry = scene.camera.entry(im_id)?;
+        let CameraEntry { intrinsics, depth_scale, mut lens, .. } = entry;
         if lens.is_none() && self.camera.exists() {
             lens = self.camera.field("cam_dist")?;
         }
+        let depth_camera = DepthCamera::new(
+            entry.depth_intrinsics.map(|k| k.0),
+            entry.depth_lens.map(|lens| lens.0),
+            (entry.depth_rotation.map(|r| r.0), entry.depth_translation.map(|t| t.0)),
+        );
+        let depth_camera =
+            depth_camera.map_err(|name| scene.camera.fault(&im_id.to_string(), &missing(name)))?;
         Ok(Frame {
             scene,
             im_id,
             intrinsics,
+            depth_camera,
             lens: lens.map(|lens| lens.0),
             depth_scale: depth_scale.map_or(1.0, |scale| scale.0),
         })
@@ -128,15 +159,35 @@ impl Frame<'_> {
         self.undistorted(&file, stored, size, Remap::rgb)
     }
 
-    /// Reads the depth image.
+    /// Reads the depth image, registered to the color image.
     ///
     /// # Errors
     /// When it is absent or does not decode, and [`DatasetError::NoDepth`] when it measures nothing.
     pub fn depth(&self) -> Result<DepthImage, DatasetError> {
+        let color = match self.depth_camera {
+            Some(_) if self.has_color() => {
+                let color = self.rgb()?;
+                Some((color.width(), color.height()))
+            }
+            _ => None,
+        };
+        self.depth_of(color)
+    }
+
+    /// The same, registered to a color image of that size; of the depth image's without one.
+    fn depth_of(&self, color: Option<(usize, usize)>) -> Result<DepthImage, DatasetError> {
         let file = self.depth_path();
         let stored = DepthImage::load(&file, self.depth_scale * 1e-3)?;
         let size = (stored.width(), stored.height());
-        let depth = self.undistorted(&file, stored, size, Remap::depth)?;
+        let depth = match &self.depth_camera {
+            None => self.undistorted(&file, stored, size, Remap::depth)?,
+            Some(own) => {
+                let (width, height) = color.unwrap_or(size);
+                let registered =
+                    own.register(stored, &self.camera(width, height), &self.scene.depth_remaps);
+                registered.map_err(|e| DatasetError::unusable(&file, e))?
+            }
+        };
         if depth.pixels().iter().all(|&z| z == 0.0) {
             Err(DatasetError::NoDepth { file })
         } else {
@@ -204,18 +255,77 @@ impl Frame<'_> {
         Ok(())
     }
 
-    /// The same with an empty mask.
+    /// Whether the scene has color, and whether it has depth.
+    fn has_color(&self) -> bool {
+        self.scene.dir().join("rgb").is_dir()
+    }
+
+    /// See [`has_color`](Self::has_color).
+    fn has_depth(&self) -> bool {
+        self.scene.dir().join("depth").is_dir()
+    }
+
+    /// The same with an empty mask. A scene without color has black pictures, one without depth measures nothing.
     ///
     /// # Errors
     /// Those of [`Frame::rgb`] and [`Frame::depth`], and if the images differ in size.
     pub(crate) fn unsegmented(&self) -> Result<Observation, DatasetError> {
-        let (color, depth) = (self.rgb()?, self.depth()?);
-        let (width, height) = (color.width(), color.height());
-        let (camera, mask) = (self.camera(width, height), Mask::filled(width, height, false));
+        let color = match self.has_color() || !self.has_depth() {
+            true => Some(self.rgb()?),
+            false => None,
+        };
+        let size = color.as_ref().map(|color| (color.width(), color.height()));
+        let depth = if self.has_depth() || color.is_none() {
+            self.depth_of(size)?
+        } else {
+            let (width, height) = size.unwrap_or_default();
+            DepthImage::filled(width, height, 0.0)
+        };
         let depth_size = (depth.width(), depth.height());
-        let observation = Observation { camera, color, depth, mask, gravity: None, hand: None };
+        let (width, height) = size.unwrap_or(depth_size);
+        let color = color.unwrap_or_else(|| RgbImage::filled(width, height, [0.0; 3]));
+        let (camera, mask) = (self.camera(width, height), Mask::filled(width, height, false));
+        let observation = Observation::new(camera, color, depth, mask);
         self.check_size(&self.depth_path(), depth_size, &observation)?;
         Ok(observation)
+    }
+
+    /// What other cameras of the image's rig saw at the same moment, and their coordinates → those of this image's camera \[m\]; of those with
+    /// a mask of the object. Nothing for an image without a rig.
+    ///
+    /// # Errors
+    /// Those of [`Frame::observation`] of each, and if one lacks its place.
+    pub(crate) fn taken_together(
+        &self,
+        dataset: &Dataset,
+        instance: usize,
+    ) -> Result<Vec<(Observation, Isometry3<f64>)>, DatasetError> {
+        let RigEntry { rig: Some(name) } = self.scene.camera.entry(self.im_id)? else {
+            return Ok(Vec::new());
+        };
+        let t_cam_world = self.place()?;
+        let mut seen = Vec::new();
+        for &image in self.scene.taken_together(&name)? {
+            if image == self.im_id {
+                continue;
+            }
+            let other = dataset.frame(self.scene.id(), image)?;
+            let mask = other.mask(instance);
+            if let Err(DatasetError::Missing { .. } | DatasetError::EmptyMask { .. }) = mask {
+                continue;
+            }
+            seen.push((other.observation(instance)?, t_cam_world * other.place()?.inverse()));
+        }
+        Ok(seen)
+    }
+
+    /// World → camera \[m\].
+    fn place(&self) -> Result<Isometry3<f64>, DatasetError> {
+        let PlaceEntry { rotation, translation } = self.scene.camera.entry(self.im_id)?;
+        let lacks = |name| self.scene.camera.fault(&self.im_id.to_string(), &missing(name));
+        let rotation = rotation.ok_or_else(|| lacks("cam_R_w2c"))?;
+        let translation = translation.ok_or_else(|| lacks("cam_t_w2c"))?;
+        Ok(Isometry3::from_parts(translation_from_mm(&translation.0), rotation.0))
     }
 
     /// Refuses an image in `file` of another size than the color image.
@@ -229,12 +339,12 @@ impl Frame<'_> {
         if (w, h) == (width, height) {
             return Ok(());
         }
-        let other = self.rgb_path()?;
+        let other = if self.has_color() { self.rgb_path()? } else { self.depth_path() };
         let problem = format!("is {w}x{h} pixels but {} is {width}x{height}", other.display());
         Err(DatasetError::unusable(file, problem))
     }
 
-    /// Gravity and the known robots, from `scene_bodies.json`.
+    /// Gravity, the known robots and other bodies, from `scene_bodies.json`.
     ///
     /// # Errors
     /// When the file is absent or broken, or lacks the image or one of its fields.
@@ -242,11 +352,11 @@ impl Frame<'_> {
         SceneBodies::read(&self.scene.bodies, self.im_id, self.scene.root())
     }
 
-    /// Taxel forces, from `scene_tactile.json`.
+    /// What is felt, from `scene_tactile.json`.
     ///
     /// # Errors
     /// When the file is absent or broken, or lacks the image or one of its fields.
-    pub fn tactile(&self) -> Result<Tactile, DatasetError> {
+    pub fn tactile(&self) -> Result<Vec<Tactile>, DatasetError> {
         Tactile::read(&self.scene.tactile, self.im_id, self.scene.root())
     }
 
@@ -261,6 +371,7 @@ impl Frame<'_> {
     }
 
     fn fault(&self, file: &JsonFile, field: &str, problem: impl ToString) -> DatasetError {
-        DatasetError::field(file.path(), &format!("{}.{field}", self.im_id), problem)
+        let dot = if field.is_empty() { "" } else { "." };
+        DatasetError::field(file.path(), &format!("{}{dot}{field}", self.im_id), problem)
     }
 }

@@ -5,12 +5,12 @@ use std::collections::BTreeMap;
 use nalgebra::Isometry3;
 use serde::Deserialize;
 
+use super::bodies::SceneBodies;
 use super::dataset::Dataset;
 use super::error::DatasetError;
 use super::json::{JsonFile, Numbers, Rotation};
 use super::models::Models;
 use super::pose::translation_from_mm;
-use super::scene::SceneBodies;
 
 /// What scorers may read and estimators must not: `scene_gt.json`, `scene_gt_info.json`, `scene_bodies_gt.json` and
 /// `models_eval/`.

@@ -67,6 +67,35 @@ impl JsonFile {
     }
 }
 
+impl JsonFile {
+    /// The entries of an image that has one or a list of them, each with what it is called.
+    ///
+    /// # Errors
+    /// Those of [`JsonFile::entry`].
+    pub(super) fn entries<T: DeserializeOwned>(
+        &self,
+        id: u32,
+    ) -> Result<Vec<(String, T)>, DatasetError> {
+        let key = id.to_string();
+        let one = |name: String, value| Ok((name.clone(), convert(&self.path, name, value)?));
+        match self.root()?.get(&key) {
+            None => Err(DatasetError::NoEntry { file: self.path.clone(), key }),
+            Some(Value::Array(all)) => {
+                let named = all.iter().enumerate();
+                named.map(|(k, value)| one(format!("{key}[{k}]"), value)).collect()
+            }
+            Some(value) => Ok(vec![one(key, value)?]),
+        }
+    }
+
+    /// An error about a field, where `problem` may be that a part of it is missing.
+    pub(super) fn fault(&self, field: &str, problem: &str) -> DatasetError {
+        let (absent, problem) = plain(problem);
+        let absent = absent.map(|name| format!(".{name}")).unwrap_or_default();
+        DatasetError::field(&self.path, &format!("{field}{absent}"), problem)
+    }
+}
+
 /// What a file of one layout says.
 ///
 /// # Errors
@@ -162,7 +191,7 @@ fn false_for_non_finite(bytes: &[u8]) -> Vec<u8> {
 }
 
 /// `N` numbers; a matrix may also be a list of rows.
-#[derive(Deserialize)]
+#[derive(Clone, Copy, Deserialize)]
 #[serde(try_from = "Vec<NumberOrRow>")]
 pub(crate) struct Numbers<const N: usize>(pub(crate) [f64; N]);
 
@@ -201,7 +230,7 @@ impl TryFrom<f64> for Positive {
 /// A rotation of nine row-major entries.
 #[derive(Deserialize)]
 #[serde(try_from = "Numbers<9>")]
-pub(super) struct Rotation(pub(super) UnitQuaternion<f64>);
+pub(crate) struct Rotation(pub(crate) UnitQuaternion<f64>);
 
 impl TryFrom<Numbers<9>> for Rotation {
     type Error = String;

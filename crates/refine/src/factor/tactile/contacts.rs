@@ -5,7 +5,7 @@ use prehend_geometry::hand::Taxel;
 use prehend_geometry::robot::RobotShape;
 use prehend_geometry::{DistanceField, RobustKernel};
 
-use super::Probe;
+use super::probes::{Distance, Probe};
 use crate::problem::Weighting;
 use crate::scene::Hand;
 
@@ -66,7 +66,7 @@ pub(super) fn contacts(
             Probe {
                 link: group[0].link,
                 position: on_skin(robot, group[0].link, center),
-                touched: true,
+                distance: Distance::Is(0.0),
                 weighting: Weighting {
                     information: trust / settings.sigma.powi(2),
                     kernel: RobustKernel::Cauchy { scale: settings.kernel_width },

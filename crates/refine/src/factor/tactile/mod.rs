@@ -1,18 +1,25 @@
-//! Touch: taxels that feel force touch the object, inactive taxels are not inside it.
+//! Touch: what feels the object is on its surface, what does not is outside.
 
+mod binary;
 mod contacts;
+mod patch;
+mod probes;
+mod proximity;
 
 use std::sync::Arc;
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
 use prehend_geometry::hand::Taxel;
-use prehend_geometry::robot::ArticulatedRobot;
 
+pub use self::binary::{BinaryTouchFactor, BinaryTouchSettings};
 pub use self::contacts::ContactSettings;
 use self::contacts::contacts;
+pub use self::patch::{ContactPatchFactor, ContactPatchSettings};
+use self::probes::{Distance, Probe, Probes};
+pub use self::proximity::{ProximityFactor, ProximitySettings};
 use crate::error::RefineError;
-use crate::problem::{Block, Factor, NoiseModel, Rows, State, Weighting};
-use crate::scene::{Frame, Hand, Object};
+use crate::problem::{Factor, NoiseModel, Rows, State};
+use crate::scene::{Frame, Hand};
 
 /// What taxels that feel force say.
 #[derive(Clone, Debug, PartialEq)]
@@ -60,36 +67,12 @@ impl TactileSettings {
     }
 }
 
-/// A point of a link whose distance from the object is known.
-struct Probe {
-    link: usize,
-    /// In link coordinates \[m\].
-    position: Point3<f64>,
-    /// Whether it is on the surface; else it is not inside.
-    touched: bool,
-    weighting: Weighting,
-}
-
 /// The paper's distance between the mesh and the taxels in contact, or that of whole contacts ([`TouchModel`]), and the evidence of the
 /// other taxels.
 ///
 /// What is touched is drawn to the surface from either side; inactive taxels are pushed out of it, which the
 /// paper leaves unused. Both have Cauchy's kernel, because some taxels are dead and some report false forces.
-pub struct TactileFactor {
-    object: Arc<Object>,
-    hand: Arc<Hand>,
-    probes: Vec<Probe>,
-}
-
-/// Where a probe is.
-struct Measured {
-    /// From the surface, positive outside \[m\].
-    distance: f64,
-    /// Outward direction (camera frame).
-    outward: Vector3<f64>,
-    /// The probe (camera frame).
-    point: Point3<f64>,
-}
+pub struct TactileFactor(Probes);
 
 impl TactileFactor {
     /// Of the taxels of `frame`.
@@ -102,35 +85,16 @@ impl TactileFactor {
         let links = hand.taxels.iter().map(|taxel| hand.link_of(taxel));
         let links = links.collect::<Result<Vec<usize>, _>>()?;
         let probes = probes(hand, &links, &measured.forces, settings);
-        Ok(Self { object: Arc::clone(frame.object()), hand: Arc::clone(hand), probes })
+        let (object, hand) = (Arc::clone(frame.object()), Arc::clone(hand));
+        Ok(Self(Probes { object, hand, probes }))
     }
 
     /// Distances of what is touched from the object's surface, positive outside \[m\]; of none for a hand that cannot be posed.
     pub(crate) fn touched_distances(&self, state: &State) -> Vec<f64> {
-        let Ok(hand) = self.hand.articulated(&state.t_cam_hand, &state.joints) else {
-            return Vec::new();
-        };
-        let touched = self.probes.iter().filter(|probe| probe.touched);
-        let measured = touched.filter_map(|probe| self.measure(state, &hand, probe));
+        let Some(hand) = self.0.posed(state) else { return Vec::new() };
+        let touched = self.0.probes.iter().filter(|probe| probe.distance != Distance::Outside);
+        let measured = touched.filter_map(|probe| self.0.measure(state, &hand, probe));
         measured.map(|measured| measured.distance).collect()
-    }
-
-    /// Where `probe` is, if that costs anything.
-    fn measure(&self, state: &State, hand: &ArticulatedRobot, probe: &Probe) -> Option<Measured> {
-        let point = hand.posed().t_world_links()[probe.link] * probe.position;
-        let local = state.t_cam_object.inverse_transform_point(&point);
-        // Far outside everything an inactive taxel costs nothing, and no exact distance is needed.
-        if !probe.touched && (local - self.object.center).norm() > self.object.radius {
-            return None;
-        }
-        let (distance, closest) = self.object.surface.signed_distance(&local);
-        if !probe.touched && distance >= 0.0 {
-            return None;
-        }
-        let along = (local - closest.point) * distance.signum();
-        let outward =
-            along.try_normalize(1e-12).map_or_else(Vector3::zeros, |n| state.t_cam_object * n);
-        Some(Measured { distance, outward, point })
     }
 }
 
@@ -145,10 +109,10 @@ fn probes(
     // A force that is not a number is no silence.
     let is_inactive = |force: &Vector3<f64>| force.norm() <= settings.contact_threshold;
     let all = || hand.taxels.iter().zip(links).zip(forces);
-    let probe = |(taxel, link): (&Taxel, &usize), touched, weighting| Probe {
+    let probe = |(taxel, link): (&Taxel, &usize), distance, weighting| Probe {
         link: *link,
         position: taxel.position,
-        touched,
+        distance,
         weighting,
     };
     let mut probes: Vec<Probe> = match &settings.touch {
@@ -156,7 +120,7 @@ fn probes(
         TouchModel::Taxels(noise) => {
             let touched = all().filter(|(_, force)| is_touched(force));
             let weighting = noise.weighting(touched.clone().count());
-            touched.map(|(taxel, _)| probe(taxel, true, weighting)).collect()
+            touched.map(|(taxel, _)| probe(taxel, Distance::Is(0.0), weighting)).collect()
         }
         TouchModel::Contacts(contact) => {
             contacts(hand, links, forces, settings.contact_threshold, contact)
@@ -164,7 +128,7 @@ fn probes(
     };
     let inactive = all().filter(|(_, force)| is_inactive(force));
     let weighting = settings.no_contact.weighting(inactive.clone().count());
-    probes.extend(inactive.map(|(taxel, _)| probe(taxel, false, weighting)));
+    probes.extend(inactive.map(|(taxel, _)| probe(taxel, Distance::Outside, weighting)));
     probes
 }
 
@@ -173,23 +137,8 @@ impl Factor for TactileFactor {
         "tactile"
     }
 
-    /// A hand that cannot be posed costs nothing.
     fn rows(&self, state: &State, rows: &mut Rows<'_>) {
-        let Ok(hand) = self.hand.articulated(&state.t_cam_hand, &state.joints) else { return };
-        let mut joints = vec![0.0; state.joints.len()];
-        for probe in &self.probes {
-            let Some(measured) = self.measure(state, &hand, probe) else { continue };
-            let Measured { distance, outward, point } = measured;
-            rows.add(distance, &probe.weighting, |row| {
-                // The taxel moves with the hand.
-                row.relative_point(state, &point, &-outward);
-                joints.fill(0.0);
-                for (joint, velocity) in hand.point_jacobian(probe.link, &point) {
-                    joints[joint] += outward.dot(&velocity);
-                }
-                row.block(Block::Joints(joints.len()), &joints);
-            });
-        }
+        self.0.rows(state, rows);
     }
 }
 
@@ -197,6 +146,7 @@ impl Factor for TactileFactor {
 mod tests {
     use super::super::gradient_check::{assert_gradient, fixture, scene};
     use super::*;
+    use crate::problem::Block;
     use crate::scene::{HandMeasurement, Observation};
 
     #[test]
@@ -224,7 +174,7 @@ mod tests {
         let contacts = TactileSettings { touch, ..taxels.clone() };
         let probes = |observation: &Observation, settings: &TactileSettings| {
             let frame = Frame::new(observation, &scene.object, Some(&scene.hand)).unwrap();
-            TactileFactor::new(&frame, settings).unwrap().probes.len()
+            TactileFactor::new(&frame, settings).unwrap().0.probes.len()
         };
         let all = probes(&observation, &taxels);
         fn forces(observation: &mut Observation) -> &mut [Vector3<f64>] {

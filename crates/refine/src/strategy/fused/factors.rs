@@ -2,16 +2,26 @@
 
 use std::sync::Arc;
 
-use nalgebra::Point3;
+use nalgebra::{Isometry3, Point3};
 
 use super::settings::{FusedSettings, Modality, Nuisance, Stage};
 use crate::error::RefineError;
 use crate::factor::{
-    FreeSpaceFactor, HandDepthFactor, NoiseEstimate, PenetrationFactor, PointToPlaneFactor,
-    PointToPlaneSettings, RenderingFactor, SupportFactor, TactileFactor, TouchModel,
+    BinaryTouchFactor, ContactPatchFactor, FreeSpaceFactor, HandDepthFactor, NoiseEstimate,
+    PenetrationFactor, PointToPlaneFactor, PointToPlaneSettings, ProximityFactor, RenderingFactor,
+    SupportFactor, TactileFactor, TouchModel, ViewFactor,
 };
 use crate::problem::{Factor, NoiseModel, Problem, State, SurfacePatches};
-use crate::scene::Frame;
+use crate::scene::{Frame, TouchReading};
+
+/// What of a frame is seen.
+const SEEN: [Modality; 5] = [
+    Modality::Color,
+    Modality::Silhouette,
+    Modality::Depth,
+    Modality::HandDepth,
+    Modality::FreeSpace,
+];
 
 /// Depth points that their noise is estimated from.
 const NOISE_POINTS: usize = 1200;
@@ -73,11 +83,35 @@ fn factors_of(
 ) -> Result<Vec<Arc<dyn Factor>>, RefineError> {
     // Drawn by all threads, before two of them ask for it.
     frame.hand_depth();
+    let views = view_factors(frame, stage, settings, patches.is_some())?;
     let (picture, others) = rayon::join(
         || picture_factor(frame, stage, settings, patches),
         || other_factors(frame, stage, settings, patches),
     );
-    Ok(picture?.into_iter().chain(others?).collect())
+    Ok(picture?.into_iter().chain(others?).chain(views).collect())
+}
+
+/// What other cameras see, one factor each. Where the object may be off from its model in patches of the first camera's image, what that does to
+/// another camera's depth is as large.
+fn view_factors(
+    frame: &Frame<'_>,
+    stage: &Stage,
+    settings: &FusedSettings,
+    with_patches: bool,
+) -> Result<Vec<Arc<dyn Factor>>, RefineError> {
+    if frame.views().is_empty() {
+        return Ok(Vec::new());
+    }
+    let mut settings = settings.clone();
+    settings.modalities.retain(|modality| SEEN.contains(modality));
+    if with_patches {
+        settings.depth.gp_sigma = settings.depth.gp_sigma.hypot(settings.model.gp_sigma);
+    }
+    let view = |(k, (t_view_cam, seen)): (usize, &(Isometry3<f64>, Frame<'_>))| {
+        let factors = factors_of(seen, stage, &settings, None)?;
+        Ok(Arc::new(ViewFactor::new(k, factors, *t_view_cam)) as Arc<dyn Factor>)
+    };
+    frame.views().iter().enumerate().map(view).collect()
 }
 
 /// What compares pictures, if anything does.
@@ -154,6 +188,19 @@ fn other_factors(
             tactile.no_contact = NoiseModel { sigma: f64::INFINITY, ..tactile.no_contact };
         }
         factors.push(Arc::new(TactileFactor::new(frame, &tactile)?));
+    }
+    let has = |kind: fn(&TouchReading) -> bool| hand.touch.iter().any(kind);
+    if (touch || inactive) && has(|reading| matches!(reading, TouchReading::Binary(_))) {
+        let binary = settings.binary_touch.clone().widened(stage.kernel_scale);
+        factors.push(Arc::new(BinaryTouchFactor::new(frame, &binary, [touch, inactive])?));
+    }
+    if touch && has(|reading| matches!(reading, TouchReading::Proximity(_))) {
+        let proximity = settings.proximity.clone().widened(stage.kernel_scale);
+        factors.push(Arc::new(ProximityFactor::new(frame, &proximity)?));
+    }
+    if touch && has(|reading| matches!(reading, TouchReading::Patch(_))) {
+        let patch = settings.contact_patch.clone().widened(stage.kernel_scale);
+        factors.push(Arc::new(ContactPatchFactor::new(frame, &patch)?));
     }
     if stage.contact && wanted(Modality::Penetration) {
         factors.push(Arc::new(PenetrationFactor::new(frame, &settings.penetration)?));

@@ -4,6 +4,7 @@ mod calibration_test;
 mod factors;
 mod fit;
 mod hypotheses;
+mod let_off;
 mod posterior;
 mod search_again;
 mod settings;
@@ -12,7 +13,7 @@ use std::f64::consts::PI;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Translation3};
+use nalgebra::{DMatrix, Isometry3, Translation3};
 use prehend_autodiff::optimize::LeastSquares;
 
 use self::factors::depth_noise;
@@ -75,7 +76,7 @@ impl Fused {
         initial: &State,
         is_searched: bool,
     ) -> Result<GaussianPrior, RefineError> {
-        let mut settings = self.settings.prior.clone();
+        let mut settings = self.settings.prior.of_hand(frame.observation().hand.as_ref());
         if is_searched {
             settings.object_rotation = [UNKNOWN_ROTATION; 3];
         }
@@ -83,8 +84,12 @@ impl Fused {
             return GaussianPrior::independent(initial.clone(), &settings);
         };
         let object = settings.sigmas(Block::ObjectPose);
-        let covariance = rig.frame_covariance(initial, &frame.observation().camera, &object)?;
-        let layout = Layout::new(initial.joints.len());
+        let by_rig = rig.frame_covariance(initial, &frame.observation().camera, &object)?;
+        let layout = Layout::of(initial);
+        // A rig is of one camera; of others that is known which is said.
+        let variances = settings.all_sigmas(layout).map(|sigma| sigma * sigma);
+        let mut covariance = DMatrix::from_diagonal(&variances);
+        covariance.view_mut((0, 0), by_rig.shape()).copy_from(&by_rig);
         GaussianPrior::correlated(initial.clone(), layout, &covariance).ok_or_else(|| {
             let problem = "the covariance is not positive definite".into();
             RefineError::Setting { name: "rig", problem }
@@ -224,6 +229,10 @@ impl Strategy for Fused {
             return Err(RefineError::Setting { name: "stages", problem: "are missing".into() });
         }
         let found = self.run_from(frame, initial, frame.rivals(), observe)?;
+        let found = match self.settings.let_off {
+            true => self.without_misfits(frame, initial, found, observe)?,
+            false => found,
+        };
         let again = self.settings.search_unfit && frame.rivals().is_none();
         if !(again && search_again::is_unfit(frame, &found)) {
             return Ok(found);
@@ -424,6 +433,7 @@ impl Walk<'_> {
             t_cam_hand: initial.t_cam_hand,
             joints: initial.joints.clone(),
             camera: initial.camera,
+            views: initial.views.clone(),
             ..solution.at.state.clone()
         };
         let states: Vec<State> = found.iter().map(nominal).collect();
@@ -447,7 +457,7 @@ impl Walk<'_> {
     /// How well `point` explains what the frame shows.
     fn fit(&self, point: &Linearization) -> Result<Fit, RefineError> {
         let (fused, frame, said) = (self.fused, self.frame, self.initial);
-        let stated = &fused.settings.prior;
+        let stated = &fused.settings.prior.of_hand(frame.observation().hand.as_ref());
         let camera = &frame.observation().camera;
         let by_rig = frame.rig().map(|rig| rig.marginal_prior(said, camera, stated)).transpose()?;
         // Where the pose was said to be has nothing to do with it.
@@ -457,6 +467,7 @@ impl Walk<'_> {
             cost: self.prior.cost(&calibrations),
             sigmas: by_rig.as_ref().unwrap_or(stated),
             noise: depth_noise(frame, &point.state, &fused.settings),
+            with_depth: fused.settings.modalities.contains(&Modality::Depth),
         };
         Ok(Fit::new(frame, point, &known))
     }

@@ -4,6 +4,7 @@ use nalgebra::{Isometry3, Matrix6, Point3, Vector3, Vector6};
 use prehend_autodiff::lie::{perturb_about, so3_log};
 use prehend_geometry::SplitMix64;
 
+use super::Modality;
 use super::fit::Fit;
 use crate::problem::{
     Block, Contribution, Linearization, NormalEquations, RIDGE, ScaledCholesky, Solution,
@@ -51,6 +52,8 @@ pub struct Posterior {
     pub unobservable: Vec<UnobservableDirection>,
     /// Senses that disagree with the pose.
     pub inconsistencies: Vec<Inconsistency>,
+    /// Evidence that did not fit and was let off: the pose is found without it.
+    pub let_off: Vec<Modality>,
     /// Whether the best pose fits as right ones do, where that was asked.
     pub fit: Option<Fit>,
     /// Why the search ended.
@@ -133,6 +136,7 @@ impl Posterior {
         Self {
             unobservable: unobservable(&hypotheses[0].covariance, radius),
             inconsistencies,
+            let_off: Vec::new(),
             fit: None,
             hypotheses,
             termination: best.termination,

@@ -4,9 +4,9 @@ use strum::IntoStaticStr;
 
 use super::posterior::CovarianceInflation;
 use crate::factor::{
-    ContactSettings, FreeSpaceSettings, HandDepthSettings, PenetrationSettings,
-    PointToPlaneSettings, PriorSettings, RenderingSettings, SupportSettings, TactileSettings,
-    TouchModel,
+    BinaryTouchSettings, ContactPatchSettings, ContactSettings, FreeSpaceSettings,
+    HandDepthSettings, PenetrationSettings, PointToPlaneSettings, PriorSettings, ProximitySettings,
+    RenderingSettings, SupportSettings, TactileSettings, TouchModel,
 };
 use crate::problem::{Block, ModelErrorSettings, NoiseModel, Solver, State};
 use crate::scene::{Frame, Occluders};
@@ -25,9 +25,9 @@ pub enum Modality {
     HandDepth,
     /// Depth behind where the object is not.
     FreeSpace,
-    /// Taxels that feel a force.
+    /// What is felt: taxels with a force, contact, proximity and patches of the surface.
     Touch,
-    /// Taxels that feel none.
+    /// Taxels that feel nothing.
     Quiet,
     /// Hand and object are not in the same place.
     Penetration,
@@ -63,7 +63,7 @@ pub enum Nuisance {
     HandPose,
     /// The hand's joint positions.
     Joints,
-    /// Depth scale and bias, center of projection and size of images.
+    /// Depth scale and bias, center of projection and size of images; of other cameras, their places, too.
     Camera,
     /// How the object differs from its model.
     Model,
@@ -132,6 +132,8 @@ pub struct FusedSettings {
     pub calibration_test: bool,
     /// Where the rig is known and nothing fits, search the frame from nothing and refine what that finds, too.
     pub search_unfit: bool,
+    /// Where something does not fit, try without colors, without depth and without touch, and let that off which was to blame.
+    pub let_off: bool,
     /// Independent measurements that depth points amount to beside the errors that neighbors share, where both were measured.
     pub max_effective_samples: f64,
     /// Hypotheses that are so much behind the best one after a stage, colors considered, are given up \[nat\].
@@ -149,8 +151,14 @@ pub struct FusedSettings {
     pub hand_depth: HandDepthSettings,
     /// Free space.
     pub free_space: FreeSpaceSettings,
-    /// Taxels.
+    /// Taxels that feel forces.
     pub tactile: TactileSettings,
+    /// Sensors that feel contact alone.
+    pub binary_touch: BinaryTouchSettings,
+    /// Proximity.
+    pub proximity: ProximitySettings,
+    /// Contact patches.
+    pub contact_patch: ContactPatchSettings,
     /// Non-penetration.
     pub penetration: PenetrationSettings,
     /// Feasibility of contact forces.
@@ -164,6 +172,7 @@ impl FusedSettings {
         if let Some(deviation) = &frame.object().deviation {
             settings.model.gp_sigma = settings.model.gp_sigma.min(deviation.left());
         }
+        settings.prior = settings.prior.of_hand(frame.observation().hand.as_ref());
         settings
     }
 
@@ -171,7 +180,9 @@ impl FusedSettings {
     pub(super) fn blocks(&self, known: bool, state: &State) -> Vec<Block> {
         let nuisances = self.nuisances.iter().filter(|n| known || **n == Nuisance::Camera);
         let blocks = nuisances.filter_map(|nuisance| nuisance.block(state.joints.len()));
-        std::iter::once(Block::ObjectPose).chain(blocks).collect()
+        let views = if self.nuisances.contains(&Nuisance::Camera) { state.views.len() } else { 0 };
+        let views = (0..views).map(Block::View);
+        std::iter::once(Block::ObjectPose).chain(blocks).chain(views).collect()
     }
 }
 
@@ -232,6 +243,7 @@ impl Default for FusedSettings {
             restart_spacing: 10e-3,
             calibration_test: true,
             search_unfit: true,
+            let_off: true,
             max_effective_samples: 50.0,
             prune_margin: 15.0,
             inflation: CovarianceInflation::default(),
@@ -256,6 +268,9 @@ impl Default for FusedSettings {
                 touch: TouchModel::Contacts(ContactSettings::default()),
                 ..TactileSettings::default()
             },
+            binary_touch: BinaryTouchSettings::default(),
+            proximity: ProximitySettings::default(),
+            contact_patch: ContactPatchSettings::default(),
             penetration: PenetrationSettings::default(),
             support: SupportSettings::default(),
         }

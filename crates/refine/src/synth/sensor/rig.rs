@@ -180,7 +180,8 @@ impl<'a> Rig<'a> {
             depth: self.settings.depth.measure(&seen.depth, &self.camera, &self.depth, noise),
             mask: self.settings.mask.segment(&seen.visible, &seen.hand, noise),
             gravity: Some(gravity),
-            hand: Some(HandMeasurement { t_cam_hand: t_cam_hand_told, joints, forces }),
+            hand: Some(HandMeasurement::new(t_cam_hand_told, joints).with_forces(forces)),
+            views: Vec::new(),
         };
         let truth = t_cam_hand * moment.t_hand_object;
         let hand = Some((t_cam_hand, moment.joints.clone()));

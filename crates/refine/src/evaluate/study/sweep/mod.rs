@@ -160,11 +160,11 @@ pub(super) mod tests {
             depth: DepthImage::new(width, height, depth).unwrap(),
             mask: Mask::new(width, height, (0..count).map(inside).collect()).unwrap(),
             gravity: None,
-            hand: Some(HandMeasurement {
-                t_cam_hand: Isometry3::translation(0.0, 0.1, 0.5),
-                joints: vec![0.2; 16],
-                forces: (0..100).map(|k| Vector3::z() * f64::from(k % 2)).collect(),
-            }),
+            hand: Some(
+                HandMeasurement::new(Isometry3::translation(0.0, 0.1, 0.5), vec![0.2; 16])
+                    .with_forces((0..100).map(|k| Vector3::z() * f64::from(k % 2)).collect()),
+            ),
+            views: Vec::new(),
         }
     }
 

@@ -81,6 +81,8 @@ pub(in super::super) struct Known<'a> {
     pub(in super::super) sigmas: &'a PriorSettings,
     /// Noise of depth, where it can be measured.
     pub(in super::super) noise: Option<NoiseEstimate>,
+    /// Whether depth on the object is evidence.
+    pub(in super::super) with_depth: bool,
 }
 
 /// Fewest pixels that say something.
@@ -105,14 +107,14 @@ const FAR: f64 = 15e-3;
 impl FitStatistics {
     /// Of `point` in `frame`, of which this is `known`.
     pub(super) fn new(frame: &Frame<'_>, point: &Linearization, known: &Known<'_>) -> Self {
-        let Known { said, cost, sigmas, noise } = known;
+        let Known { said, cost, sigmas, noise, with_depth } = known;
         let costs = point.factors.iter().map(|factor| (factor.name, factor.cost));
         let mut found: BTreeMap<&str, f64> = costs.collect();
         let pixels = Pixels::new(frame, &point.state);
         // Where noise cannot be measured, depth is not where the object is: that must show.
         let unit = noise.as_ref().map_or(TYPICAL, |noise| noise.independent) + FINEST;
         let on_object = pixels.on_object(FEWEST);
-        if on_object.len() >= FEWEST {
+        if *with_depth && on_object.len() >= FEWEST {
             found.extend(size(&on_object).map(|size| ("depth residual", size / unit)));
             found.extend(offset(&on_object).map(|offset| ("depth offset", offset / unit)));
             let of_patches = of_patches(&on_object).map(|rms| rms / unit);
@@ -123,7 +125,8 @@ impl FitStatistics {
             found.extend(size(&on_hand).map(|size| ("hand depth residual", size / unit)));
             found.extend(offset(&on_hand).map(|offset| ("hand depth offset", offset / unit)));
         }
-        found.extend(noise.as_ref().map(|noise| ("correlated depth noise", noise.correlated)));
+        let correlated = noise.as_ref().filter(|_| *with_depth).map(|noise| noise.correlated);
+        found.extend(correlated.map(|correlated| ("correlated depth noise", correlated)));
         let [lacks, exceeds] = pixels.mask_misfit();
         found.extend([("mask too small", lacks), ("mask too large", exceeds)]);
         found.extend(of_calibrations(frame.hand().is_some(), said, &point.state, sigmas));

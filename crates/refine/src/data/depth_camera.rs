@@ -1,0 +1,77 @@
+//! A depth camera beside the color camera.
+
+use nalgebra::{Isometry3, UnitQuaternion};
+use prehend_render::{Camera, DepthImage, Distortion, DistortionError, register_depth};
+
+use crate::data::bop::{RemapCache, translation_from_mm};
+
+/// A camera of its own, that measured depth.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct DepthCamera {
+    /// Of unknown size.
+    camera: Camera,
+    lens: Option<Distortion>,
+    /// Its coordinates → those of the color camera \[m\].
+    t_color_depth: Isometry3<f64>,
+}
+
+impl DepthCamera {
+    /// Of what is said of it: intrinsics, lens, and rotation and translation \[mm\] to the color camera; none if nothing is.
+    ///
+    /// # Errors
+    /// The name of what is missing beside what is there.
+    pub(crate) fn new(
+        camera: Option<Camera>,
+        lens: Option<Distortion>,
+        place: (Option<UnitQuaternion<f64>>, Option<[f64; 3]>),
+    ) -> Result<Option<Self>, &'static str> {
+        let t_color_depth = match place {
+            (None, None) => None,
+            (Some(turn), Some(mm)) => Some(Isometry3::from_parts(translation_from_mm(&mm), turn)),
+            (None, Some(_)) => return Err("cam_R_d2c"),
+            (Some(_), None) => return Err("cam_t_d2c"),
+        };
+        let Some(camera) = camera else {
+            let nothing = lens.is_none() && t_color_depth.is_none();
+            return if nothing { Ok(None) } else { Err("depth_K") };
+        };
+        let t_color_depth = t_color_depth.unwrap_or_else(Isometry3::identity);
+        Ok(Some(Self { camera, lens, t_color_depth }))
+    }
+
+    /// `depth`, which it measured \[m\], as the pinhole camera `camera` would have.
+    ///
+    /// # Errors
+    /// Those of a lens.
+    pub(crate) fn register(
+        &self,
+        mut depth: DepthImage,
+        camera: &Camera,
+        remaps: &RemapCache,
+    ) -> Result<DepthImage, DistortionError> {
+        let (width, height) = (depth.width(), depth.height());
+        let own = Camera { width, height, ..self.camera };
+        if let Some(lens) = self.lens {
+            depth = remaps.get(own, lens).depth(&depth)?;
+        }
+        Ok(register_depth(&depth, &own, &self.t_color_depth, camera))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_missing_is_named() {
+        let camera = Camera::from_k([400.0, 0.0, 20.0, 0.0, 400.0, 15.0, 0.0, 0.0, 1.0], 1, 1).ok();
+        let place = (Some(UnitQuaternion::identity()), Some([10.0, 0.0, 0.0]));
+        let missing = |camera, place| DepthCamera::new(camera, None, place).err();
+        assert_eq!(missing(camera, (None, place.1)), Some("cam_R_d2c"));
+        assert_eq!(missing(camera, (place.0, None)), Some("cam_t_d2c"));
+        assert_eq!(missing(None, place), Some("depth_K"));
+        assert!(DepthCamera::new(None, None, (None, None)).unwrap().is_none());
+        let known = DepthCamera::new(camera, None, place).unwrap().unwrap();
+        assert_eq!(known.t_color_depth.translation.x, 0.01);
+    }
+}

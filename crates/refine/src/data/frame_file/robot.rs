@@ -1,0 +1,131 @@
+//! The robot and the bodies besides.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use nalgebra::Vector3;
+use prehend_geometry::TriMesh;
+use prehend_geometry::hand::{Taxel, load_taxels};
+use prehend_geometry::robot::KinematicTree;
+
+use super::layout::{BodyLayout, Layout, RobotLayout};
+use crate::data::bodies::{Bodies, PlacedBody, in_view, plate};
+use crate::data::bop::{DatasetError, KindName, TactileReading, body_sigmas};
+use crate::scene::HandMeasurement;
+
+/// What the robot of a frame file is called beside other bodies.
+const ROBOT: &str = "robot";
+
+impl Layout {
+    /// The robot and all other bodies as one, its taxels, and what is measured of it; nothing without any.
+    ///
+    /// # Errors
+    /// If a file that is named is missing or broken, or a field does not fit it.
+    pub(super) fn robot(
+        &self,
+        file: &Path,
+    ) -> Result<Option<(KinematicTree, Vec<Taxel>, HandMeasurement)>, DatasetError> {
+        let folder = file.parent().unwrap_or(Path::new("."));
+        let mut placed = Vec::new();
+        if let Some(robot) = &self.robot {
+            placed.push(robot.placed(file, folder)?);
+        }
+        for (k, body) in self.bodies.iter().enumerate() {
+            let body = body.placed(file, folder, &format!("bodies[{k}]"))?;
+            if placed.iter().any(|other: &PlacedBody| other.name == body.name) {
+                let problem = format!("there are two bodies called {:?}", body.name);
+                return Err(DatasetError::field(file, &format!("bodies[{k}].name"), problem));
+            }
+            placed.push(body);
+        }
+        let Some(all) = Bodies::new(placed) else { return Ok(None) };
+        let mut measured = all.measured();
+        let tree = all.tree().map_err(|e| DatasetError::unusable(file, e))?;
+        let Some(robot) = &self.robot else { return Ok(Some((tree, Vec::new(), measured))) };
+        let layout = |csv: &Path| {
+            load_taxels(&folder.join(csv)).map_err(|e| DatasetError::unusable(file, e))
+        };
+        let skin = robot.taxels.as_deref().map(layout).transpose()?.unwrap_or_default();
+        let forces = robot.forces.as_deref().unwrap_or_default();
+        if !forces.is_empty() && forces.len() != skin.len() {
+            let (expected, found) = (skin.len(), forces.len());
+            let problem =
+                format!("expected one force for each of {expected} taxels, found {found}");
+            return Err(DatasetError::field(file, "robot.forces", problem));
+        }
+        measured.forces = forces.iter().map(|f| Vector3::from(f.0)).collect();
+        for (k, entry) in robot.touch.iter().enumerate() {
+            let name = format!("robot.touch[{k}]");
+            let fault = |problem: String| DatasetError::field(file, &name, problem);
+            let mut sensor = entry.clone().read(folder).map_err(fault)?;
+            ROBOT.clone_into(&mut sensor.body);
+            let layout = match &sensor.reading {
+                TactileReading::Force { .. } => {
+                    return Err(fault("forces are robot.forces".to_owned()));
+                }
+                TactileReading::Binary { taxels, .. }
+                | TactileReading::Proximity { taxels, .. } => layout(taxels)?,
+                TactileReading::Patch { .. } => Vec::new(),
+            };
+            measured.touch.extend(all.reading(&tree, &sensor, &layout).map_err(fault)?);
+        }
+        Ok(Some((tree, skin, measured)))
+    }
+}
+
+impl RobotLayout {
+    fn placed(&self, file: &Path, folder: &Path) -> Result<PlacedBody, DatasetError> {
+        let tree = KinematicTree::from_urdf_file(folder.join(&self.urdf))
+            .map_err(|e| DatasetError::unusable(file, e))?;
+        let joints = tree.joint_vector(&self.joints);
+        Ok(PlacedBody {
+            name: ROBOT.to_owned(),
+            joints: joints.map_err(|e| DatasetError::field(file, "robot.joints", e))?,
+            tree: Arc::new(tree),
+            is_hand: true,
+            t_cam_body: self.base_pose.0,
+            sigmas: None,
+        })
+    }
+}
+
+impl BodyLayout {
+    fn placed(&self, file: &Path, folder: &Path, name: &str) -> Result<PlacedBody, DatasetError> {
+        let field = |part: &str, problem: String| {
+            DatasetError::field(file, &format!("{name}.{part}"), problem)
+        };
+        let needed = |part: &'static str| move || field(part, "is missing".to_owned());
+        let broken = |error: String| DatasetError::unusable(file, error);
+        let (mut joints, mut t_cam_body) = (Vec::new(), self.pose.0);
+        let tree = match self.kind {
+            KindName::Hand => {
+                let urdf = self.urdf.as_ref().ok_or_else(needed("urdf"))?;
+                let tree = KinematicTree::from_urdf_file(folder.join(urdf))
+                    .map_err(|e| broken(e.to_string()))?;
+                let said = self.joints.as_ref().ok_or_else(needed("joints"))?;
+                joints = tree.joint_vector(said).map_err(|e| field("joints", e.to_string()))?;
+                tree
+            }
+            KindName::Plane => {
+                t_cam_body = in_view(&t_cam_body);
+                KinematicTree::rigid("plane", vec![plate()])
+            }
+            KindName::Object => {
+                let mesh = self.mesh.as_ref().ok_or_else(needed("mesh"))?;
+                let unit = self.mesh_unit.ok_or_else(needed("mesh_unit"))?;
+                let mesh = TriMesh::load(&folder.join(mesh)).map_err(|e| broken(e.to_string()))?;
+                let mesh = mesh.scaled(unit.meters()).cleaned().0;
+                KinematicTree::rigid("object", vec![mesh])
+            }
+        };
+        let sigmas = body_sigmas(self.sigma_mm, self.sigma_deg);
+        Ok(PlacedBody {
+            name: self.name.clone(),
+            tree: Arc::new(tree),
+            joints,
+            is_hand: self.kind == KindName::Hand,
+            t_cam_body,
+            sigmas: sigmas.map_err(|problem| DatasetError::field(file, name, problem))?,
+        })
+    }
+}

@@ -1,0 +1,181 @@
+//! Hands and other bodies of a dataset, and what is felt, each prepared once.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use prehend_geometry::GridCache;
+use prehend_geometry::hand::{Taxel, load_taxels};
+use prehend_geometry::robot::KinematicTree;
+
+use crate::data::assets::AssetError;
+use crate::data::bodies::{Bodies, PlacedBody, in_view, plate};
+use crate::data::bop::{Body, BodyKind, Frame, Tactile, TactileReading};
+use crate::error::RefineError;
+use crate::scene::{Hand, HandMeasurement, Object};
+
+/// Of what shape a body is.
+#[derive(Clone, PartialEq, Eq, Hash)]
+enum BodyShape {
+    Robot(PathBuf),
+    Plate,
+    Object(u32),
+}
+
+/// Names and shapes of bodies, and the body and the layout of the sensor of forces.
+type HandKey = (Vec<(String, BodyShape)>, Option<(String, PathBuf)>);
+
+/// What is shared by frames.
+#[derive(Default)]
+pub(super) struct Robots {
+    /// Robots and other bodies, each alone.
+    trees: HashMap<BodyShape, Arc<KinematicTree>>,
+    /// All bodies of frames together.
+    hands: HashMap<HandKey, Arc<Hand>>,
+    /// Layouts of taxels.
+    layouts: HashMap<PathBuf, Vec<Taxel>>,
+    cache: Option<GridCache>,
+}
+
+impl Robots {
+    /// None yet; distance grids are kept between runs in `cache`, if there is one.
+    pub(super) fn cached(cache: Option<GridCache>) -> Self {
+        Self { cache, ..Self::default() }
+    }
+
+    /// All `bodies` of `frame` as one robot, and what that measures; `None` of none. Objects among them are some of `objects`.
+    ///
+    /// # Errors
+    /// If a file that is named is missing or broken, or what is said does not fit it.
+    pub(super) fn of(
+        &mut self,
+        frame: &Frame<'_>,
+        bodies: &[Body],
+        tactile: &[Tactile],
+        objects: &HashMap<u32, Arc<Object>>,
+    ) -> Result<Option<(Arc<Hand>, HandMeasurement)>, AssetError> {
+        let mut placed = Vec::with_capacity(bodies.len());
+        for (k, body) in bodies.iter().enumerate() {
+            placed.push(self.placed(frame, k, body, objects)?);
+        }
+        let Some(all) = Bodies::new(placed) else { return Ok(None) };
+        let shapes = bodies.iter().map(|body| (body.name.clone(), BodyShape::of(body))).collect();
+        self.felt(frame, &all, shapes, tactile).map(Some)
+    }
+
+    /// Body `k` of `frame` with its shape.
+    fn placed(
+        &mut self,
+        frame: &Frame<'_>,
+        k: usize,
+        body: &Body,
+        objects: &HashMap<u32, Arc<Object>>,
+    ) -> Result<PlacedBody, AssetError> {
+        let shape = BodyShape::of(body);
+        let tree = match self.trees.get(&shape) {
+            Some(tree) => Arc::clone(tree),
+            None => {
+                let tree = Arc::new(match &body.kind {
+                    BodyKind::Hand { urdf, .. } => KinematicTree::from_urdf_file(urdf)?,
+                    BodyKind::Plane => KinematicTree::rigid("plane", vec![plate()]),
+                    BodyKind::Object { obj_id } => {
+                        let parts = objects.get(obj_id).map(|object| object.mesh.cleaned().0);
+                        KinematicTree::rigid("object", parts.into_iter().collect())
+                    }
+                });
+                self.trees.insert(shape, Arc::clone(&tree));
+                tree
+            }
+        };
+        let joints = match body.as_hand() {
+            None => Vec::new(),
+            Some((_, joints)) => {
+                let field = format!("bodies[{k}].joints");
+                tree.joint_vector(joints).map_err(|e| frame.bodies_fault(&field, e))?
+            }
+        };
+        Ok(PlacedBody {
+            name: body.name.clone(),
+            joints,
+            is_hand: body.as_hand().is_some(),
+            t_cam_body: match body.kind {
+                BodyKind::Plane => in_view(&body.t_cam_base),
+                BodyKind::Hand { .. } | BodyKind::Object { .. } => body.t_cam_base,
+            },
+            sigmas: body.sigmas,
+            tree,
+        })
+    }
+
+    /// All bodies as one robot with its skin, and what that measures.
+    fn felt(
+        &mut self,
+        frame: &Frame<'_>,
+        all: &Bodies,
+        shapes: Vec<(String, BodyShape)>,
+        tactile: &[Tactile],
+    ) -> Result<(Arc<Hand>, HandMeasurement), AssetError> {
+        if let Some(Tactile { body, .. }) = tactile.iter().find(|sensor| !all.has(&sensor.body)) {
+            let problem = format!("names {body:?}, but the hand is {:?}", all.first_name());
+            return Err(frame.tactile_fault("body", problem).into());
+        }
+        let mut measured = all.measured();
+        let mut skin = None;
+        for sensor in tactile {
+            if let TactileReading::Force { taxels, force } = &sensor.reading {
+                let layout = all.skin(&sensor.body, self.layout(taxels)?);
+                let layout = layout.map_err(|link| RefineError::TaxelLink { link })?;
+                if force.len() != layout.len() {
+                    let (expected, found) = (layout.len(), force.len());
+                    let file = taxels.display();
+                    let problem =
+                        format!("expected {expected} forces, one a taxel of {file}, found {found}");
+                    return Err(frame.tactile_fault("force", problem).into());
+                }
+                measured.forces.clone_from(force);
+                skin = Some((sensor.body.clone(), taxels.clone(), layout));
+            }
+        }
+        let layout = skin.as_ref().map(|(body, file, _)| (body.clone(), file.clone()));
+        let key = (shapes, layout);
+        let hand = match self.hands.get(&key) {
+            Some(hand) => Arc::clone(hand),
+            None => {
+                let taxels = skin.map(|(.., taxels)| taxels).unwrap_or_default();
+                let hand = Arc::new(Hand::cached(all.tree()?, taxels, self.cache.as_ref())?);
+                self.hands.insert(key, Arc::clone(&hand));
+                hand
+            }
+        };
+        for sensor in tactile {
+            let layout = match &sensor.reading {
+                TactileReading::Binary { taxels, .. }
+                | TactileReading::Proximity { taxels, .. } => self.layout(taxels)?,
+                TactileReading::Force { .. } | TactileReading::Patch { .. } => Vec::new(),
+            };
+            let reading = all.reading(&hand.tree, sensor, &layout);
+            measured.touch.extend(reading.map_err(|e| frame.tactile_fault("", e))?);
+        }
+        Ok((hand, measured))
+    }
+
+    /// A layout of taxels.
+    fn layout(&mut self, file: &Path) -> Result<Vec<Taxel>, AssetError> {
+        if let Some(known) = self.layouts.get(file) {
+            return Ok(known.clone());
+        }
+        let layout = load_taxels(file)?;
+        self.layouts.insert(file.to_owned(), layout.clone());
+        Ok(layout)
+    }
+}
+
+impl BodyShape {
+    fn of(body: &Body) -> Self {
+        match &body.kind {
+            BodyKind::Hand { urdf, .. } => Self::Robot(urdf.clone()),
+            BodyKind::Plane => Self::Plate,
+            BodyKind::Object { obj_id } => Self::Object(*obj_id),
+        }
+    }
+}

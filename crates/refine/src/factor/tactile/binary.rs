@@ -1,0 +1,80 @@
+//! Touch without forces: places of the skin that are touched, and others that are not.
+
+use std::sync::Arc;
+
+use super::probes::{Distance, Probe, Probes};
+use crate::error::RefineError;
+use crate::problem::{Factor, NoiseModel, Rows, State};
+use crate::scene::{BinaryContact, Frame, TouchReading};
+
+/// Settings of [`BinaryTouchFactor`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct BinaryTouchSettings {
+    /// Distances of touched places from the surface \[m\]: coarser than of forces, which tell where between taxels a contact is.
+    pub contact: NoiseModel,
+    /// Depths of other places inside the object \[m\].
+    pub no_contact: NoiseModel,
+}
+
+impl Default for BinaryTouchSettings {
+    fn default() -> Self {
+        Self {
+            contact: NoiseModel::cauchy(2.5e-3, 5e-3, 8.0),
+            no_contact: NoiseModel::cauchy(1e-3, 10e-3, f64::INFINITY),
+        }
+    }
+}
+
+impl BinaryTouchSettings {
+    /// With kernels `factor` times as wide.
+    pub(crate) fn widened(self, factor: f64) -> Self {
+        let [contact, no_contact] = [self.contact, self.no_contact].map(|n| n.widened(factor));
+        Self { contact, no_contact }
+    }
+}
+
+/// Places that are touched are on the surface, others are not inside ([`TouchReading::Binary`]).
+pub struct BinaryTouchFactor(Probes);
+
+impl BinaryTouchFactor {
+    /// Of all sensors of `frame` that tell contact alone: touched places with `touched`, others with `untouched`.
+    ///
+    /// # Errors
+    /// If the hand is unknown.
+    pub fn new(
+        frame: &Frame<'_>,
+        settings: &BinaryTouchSettings,
+        [touched, untouched]: [bool; 2],
+    ) -> Result<Self, RefineError> {
+        let (hand, measured) = frame.require_hand("binary-touch")?;
+        let readings = measured.touch.iter().filter_map(|reading| match reading {
+            TouchReading::Binary(contacts) => Some(contacts),
+            _ => None,
+        });
+        let contacts: Vec<BinaryContact> = readings.flatten().copied().collect();
+        let count = |touched: bool| contacts.iter().filter(|c| c.touched == touched).count();
+        let contact = settings.contact.weighting(count(true));
+        let no_contact = settings.no_contact.weighting(count(false));
+        let used = contacts.iter().filter(|c| if c.touched { touched } else { untouched });
+        let probe = |&BinaryContact { link, position, touched }: &BinaryContact| {
+            let (distance, weighting) = match touched {
+                true => (Distance::Is(0.0), contact),
+                false => (Distance::Outside, no_contact),
+            };
+            Probe { link, position, distance, weighting }
+        };
+        let probes = used.map(probe).collect();
+        let (object, hand) = (Arc::clone(frame.object()), Arc::clone(hand));
+        Ok(Self(Probes { object, hand, probes }))
+    }
+}
+
+impl Factor for BinaryTouchFactor {
+    fn name(&self) -> &'static str {
+        "binary-touch"
+    }
+
+    fn rows(&self, state: &State, rows: &mut Rows<'_>) {
+        self.0.rows(state, rows);
+    }
+}

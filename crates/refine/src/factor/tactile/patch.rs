@@ -1,0 +1,132 @@
+//! Contact patches: the shape of a contact as a soft skin takes it.
+
+use std::sync::Arc;
+
+use nalgebra::{Point3, Vector3};
+use prehend_geometry::robot::ArticulatedRobot;
+
+use super::probes::{Distance, Probe, Probes};
+use crate::error::RefineError;
+use crate::problem::{Block, Factor, NoiseModel, Rows, State, Weighting};
+use crate::scene::{Frame, TouchReading};
+
+/// Settings of [`ContactPatchFactor`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct ContactPatchSettings {
+    /// Points used at most of a patch.
+    pub points: usize,
+    /// Distances of points from the surface \[m\].
+    pub position: NoiseModel,
+    /// Angles between the object's normals and those against the skin's, about each of two axes \[rad\].
+    pub normal: NoiseModel,
+}
+
+impl Default for ContactPatchSettings {
+    fn default() -> Self {
+        let degrees = |angle: f64| angle.to_radians();
+        Self {
+            points: 60,
+            position: NoiseModel::cauchy(4e-4, 2e-3, 20.0),
+            normal: NoiseModel::cauchy(degrees(6.0), degrees(15.0), 10.0),
+        }
+    }
+}
+
+impl ContactPatchSettings {
+    /// With kernels `factor` times as wide.
+    pub(crate) fn widened(self, factor: f64) -> Self {
+        let [position, normal] = [self.position, self.normal].map(|noise| noise.widened(factor));
+        Self { position, normal, ..self }
+    }
+}
+
+/// Points of patches are on the object's surface, and its normals there are opposite to the skin's ([`TouchReading::Patch`]).
+///
+/// The normal of a face is that of the whole face: between two faces it jumps, by less than what the sensor is off by if the mesh is fine
+/// where it is curved.
+pub struct ContactPatchFactor {
+    points: Probes,
+    normals: Vec<NormalProbe>,
+}
+
+/// A normal of the skin.
+struct NormalProbe {
+    link: usize,
+    /// Link frame \[m\].
+    position: Point3<f64>,
+    /// Two directions across the normal, link frame.
+    across: [Vector3<f64>; 2],
+    weighting: Weighting,
+}
+
+impl ContactPatchFactor {
+    /// Of all contact patches of `frame`.
+    ///
+    /// # Errors
+    /// If the hand is unknown.
+    pub fn new(frame: &Frame<'_>, settings: &ContactPatchSettings) -> Result<Self, RefineError> {
+        let (hand, measured) = frame.require_hand("contact-patch")?;
+        let (mut probes, mut normals) = (Vec::new(), Vec::new());
+        for reading in &measured.touch {
+            let TouchReading::Patch(patch) = reading else { continue };
+            let step = patch.points.len().div_ceil(settings.points.max(1)).max(1);
+            let used = || patch.points.iter().zip(&patch.normals).step_by(step);
+            let count = used().count();
+            let (on_surface, weighting) =
+                (settings.position.weighting(count), settings.normal.weighting(2 * count));
+            for (position, normal) in used() {
+                let (link, position) = (patch.link, *position);
+                let distance = Distance::Is(0.0);
+                probes.push(Probe { link, position, distance, weighting: on_surface });
+                let first = normal.cross(&Vector3::ith(normal.iamin(), 1.0)).normalize();
+                let across = [first, normal.cross(&first)];
+                normals.push(NormalProbe { link, position, across, weighting });
+            }
+        }
+        let (object, hand) = (Arc::clone(frame.object()), Arc::clone(hand));
+        Ok(Self { points: Probes { object, hand, probes }, normals })
+    }
+
+    /// What of the object's normal is across the skin's, both ways.
+    fn normal_rows(&self, state: &State, hand: &ArticulatedRobot, rows: &mut Rows<'_>) {
+        let object = &self.points.object;
+        let mut joints = vec![0.0; state.joints.len()];
+        for probe in &self.normals {
+            let t_cam_link = hand.posed().t_world_links()[probe.link];
+            let point = t_cam_link * probe.position;
+            let local = state.t_cam_object.inverse_transform_point(&point);
+            let (_, closest) = object.surface.signed_distance(&local);
+            let normal = state.t_cam_object * object.normals[closest.face as usize];
+            for across in &probe.across {
+                let across = t_cam_link * across;
+                rows.add(across.dot(&normal), &probe.weighting, |row| {
+                    // Turned by ω the normal becomes n + ω×n, and the skin's direction likewise.
+                    let turn = normal.cross(&across);
+                    row.block(Block::ObjectPose, &[0.0, 0.0, 0.0, turn.x, turn.y, turn.z]);
+                    row.block(Block::HandPose, &[0.0, 0.0, 0.0, -turn.x, -turn.y, -turn.z]);
+                    joints.fill(0.0);
+                    let end = point + across;
+                    let heads = hand.point_jacobian(probe.link, &end);
+                    let tails = hand.point_jacobian(probe.link, &point);
+                    for ((joint, tail), (_, head)) in tails.zip(heads) {
+                        joints[joint] += (head - tail).dot(&normal);
+                    }
+                    row.block(Block::Joints(joints.len()), &joints);
+                });
+            }
+        }
+    }
+}
+
+impl Factor for ContactPatchFactor {
+    fn name(&self) -> &'static str {
+        "contact-patch"
+    }
+
+    fn rows(&self, state: &State, rows: &mut Rows<'_>) {
+        self.points.rows(state, rows);
+        if let Some(hand) = self.points.posed(state) {
+            self.normal_rows(state, &hand, rows);
+        }
+    }
+}
