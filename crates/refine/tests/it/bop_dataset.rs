@@ -362,7 +362,7 @@ fn camera(more: &str) -> String {
 #[test]
 fn depth_of_a_camera_of_its_own_is_registered() {
     let fixture = Fixture::new();
-    // A wall one meter away, seen from 1 mm to the right by a camera of half the pixels: half a pixel of the color image.
+    // A wall one meter away, seen by a camera of half the pixels 2 mm to the right.
     let own = format!(
         r#", "depth_K": [250, 0, 0.5, 0, 250, 0.25, 0, 0, 1], "cam_R_d2c": {I}, "cam_t_d2c": [2, 0, 0]"#
     );
@@ -372,10 +372,11 @@ fn depth_of_a_camera_of_its_own_is_registered() {
     });
     let depth = fixture.open().frame(4, 0).unwrap().depth().unwrap();
     assert_eq!((depth.width(), depth.height()), (4, 3));
-    // Columns −1 and 1 of the color image are seen, shifted by one.
-    let seen: Vec<bool> = depth.pixels().iter().map(|z| *z > 0.0).collect();
-    assert!(depth.pixels().iter().all(|z| *z == 0.0 || (z - 1.0).abs() < 1e-6));
-    assert!(seen[5] && seen[6] && !seen[0], "{seen:?}");
+    // The four points are in columns 1.5 and 3.5, rows 0.5 and 2.5 of the color image; without the 2 mm, two columns to the left.
+    let seen = depth.pixels().iter().enumerate().filter(|(_, z)| **z > 0.0);
+    let seen: Vec<usize> = seen.map(|(k, _)| k).collect();
+    assert_eq!(seen, [6, 7, 10, 11]);
+    assert!(seen.iter().all(|k| (depth.pixels()[*k] - 1.0).abs() < 1e-6));
     for (own, missing) in [
         (r#", "cam_t_d2c": [0, 0, 0]"#, "0.cam_R_d2c: is missing"),
         (&format!(r#", "cam_R_d2c": {I}, "cam_t_d2c": [0, 0, 0]"#), "0.depth_K: is missing"),
