@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DMatrixView, DVector, DVectorView, SMatrix, SVector, Vector2};
 
+use super::triangular::{cholesky, solve_lower};
 use super::{Block, ImageWarp, Row};
 
 /// Gradient Jᵀr and Gauss–Newton Hessian JᵀJ of ½‖r‖², a sum of factors, by the parameters of some blocks.
@@ -124,18 +125,14 @@ impl NormalEquations {
                 }
             }
         }
-        let factor = own.cholesky()?;
-        let lower = factor.l_dirty();
+        let lower = cholesky(own)?;
         let mut coupling = part(n, 0, m, n);
         let mut pull = match known {
             true => self.gradient.rows(n, m).clone_owned(),
             false => DVector::zeros(m),
         };
-        if !(lower.solve_lower_triangular_mut(&mut coupling)
-            && lower.solve_lower_triangular_mut(&mut pull))
-        {
-            return None;
-        }
+        solve_lower(&lower, coupling.as_mut_slice());
+        solve_lower(&lower, pull.as_mut_slice());
         let rest = Self {
             blocks: self.blocks.clone(),
             dimension: n,

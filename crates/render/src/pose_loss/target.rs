@@ -87,7 +87,7 @@ impl Target {
         camera.check()?;
         let (image, mask) = (image.pixels(), mask.pixels());
         // Outside the mask's bounds, which is most of the image, all is zero.
-        let bounds = Region::around(camera.width, mask, |&m| m).ok_or(TargetError::EmptyMask)?;
+        let bounds = Region::around_mask(camera.width, mask).ok_or(TargetError::EmptyMask)?;
         let broken = |at: &usize| mask[*at] && image[*at].iter().any(|v| !v.is_finite());
         if let Some(at) = bounds.indices(camera.width).find(broken) {
             return Err(TargetError::NotFinite { x: at % camera.width, y: at / camera.width });

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use super::error::DatasetError;
 use super::json::JsonFile;
@@ -31,7 +32,7 @@ pub struct Scene {
     pub(super) camera: JsonFile,
     pub(super) bodies: JsonFile,
     pub(super) tactile: JsonFile,
-    pub(super) remaps: RemapCache,
+    pub(super) remaps: Arc<RemapCache>,
 }
 
 impl Dataset {
@@ -79,6 +80,21 @@ impl Dataset {
         })
     }
 
+    /// The same with files that are read anew, for somebody may have gone on writing them.
+    pub fn reread(&self) -> Self {
+        let again = |scene: &Scene| {
+            let new = Scene::new(scene.id, scene.dir.clone(), &scene.root);
+            (scene.id, Scene { remaps: Arc::clone(&scene.remaps), ..new })
+        };
+        Self {
+            root: self.root.clone(),
+            split_dir: self.split_dir.clone(),
+            scenes: self.scenes.values().map(again).collect(),
+            models: Models::new(self.root.join("models")),
+            camera: JsonFile::new(self.root.join("camera.json")),
+        }
+    }
+
     /// The dataset's folder.
     pub fn root(&self) -> &Path {
         &self.root
@@ -118,7 +134,7 @@ impl Scene {
             camera: JsonFile::new(dir.join("scene_camera.json")),
             bodies: JsonFile::new(dir.join("scene_bodies.json")),
             tactile: JsonFile::new(dir.join("scene_tactile.json")),
-            remaps: RemapCache::default(),
+            remaps: Arc::default(),
             dir,
         }
     }

@@ -93,7 +93,7 @@ impl Frame<'_> {
     }
 
     /// The depth image, whether or not it exists.
-    fn depth_path(&self) -> PathBuf {
+    pub(super) fn depth_path(&self) -> PathBuf {
         self.scene.dir().join("depth").join(format!("{:06}.png", self.im_id))
     }
 

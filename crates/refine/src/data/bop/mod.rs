@@ -6,6 +6,7 @@
 //! `scene_tactile.json` (taxel forces). A file is read when something of it is first asked for, so
 //! a missing or broken one disturbs only what needs it.
 
+mod arrival;
 mod atomic;
 mod dataset;
 mod error;
@@ -21,6 +22,7 @@ mod rivals;
 mod scene;
 mod visibility;
 
+pub use arrival::Stamp;
 pub use atomic::{check_writable, create_folder, write_atomically};
 pub use dataset::{Dataset, Scene};
 pub use error::DatasetError;
@@ -32,6 +34,8 @@ pub use models::{ModelInfo, Models};
 pub use models_info::write_symmetries;
 pub(crate) use models_info::{diameter, extent_to_bop};
 pub(crate) use pose::{rotation_from_row_major, rotation_to_row_major, translation_to_mm};
-pub use results::{ReadResults, ResultRow, read_results, share_image_times, write_results};
+pub use results::{
+    ReadResults, ResultRow, ResultsWriter, read_results, share_image_times, write_results,
+};
 pub use rivals::read_rivals;
 pub use scene::{Body, SceneBodies, Tactile, UNITS_PER_NEWTON};
