@@ -18,6 +18,9 @@ use prehend_refine::tracker::{TrackStatus, Tracker, TrackerSettings};
 const FRAMES: usize = 90;
 const FIRST: usize = 10;
 
+/// Color, depth and mask of the film.
+const BYTES_A_PIXEL: usize = 12 + 4 + 1;
+
 /// The system's allocator, counting while it is told to.
 struct Counting;
 
@@ -68,6 +71,7 @@ fn main() -> Result<(), RefineError> {
     for frame in &mut film.frames[1..] {
         frame.observation.mask.pixels_mut().fill(false);
     }
+    let pixels: usize = film.frames.iter().map(|f| f.observation.mask.pixels().len()).sum();
     let hand = Some(Arc::clone(&film.hand));
     let mut tracker = Tracker::new(Arc::clone(&film.object), hand, TrackerSettings::default())?;
     tracker.start_from(&film.initial);
@@ -98,7 +102,11 @@ fn main() -> Result<(), RefineError> {
         LARGE >> 10,
     );
     match peak_memory() {
-        Some(kilobytes) => println!("peak resident memory {:.0} MB", kilobytes as f64 / 1e3),
+        Some(kilobytes) => println!(
+            "peak resident memory {:.0} MB, {:.0} MB of it the film",
+            kilobytes as f64 / 1e3,
+            (pixels * BYTES_A_PIXEL) as f64 / 1e6,
+        ),
         None => println!("peak resident memory is not known on this system"),
     }
     Ok(())

@@ -14,25 +14,23 @@ pub(super) fn cholesky(mut matrix: DMatrix<f64>) -> Option<DMatrix<f64>> {
     let n = matrix.nrows();
     let all = matrix.as_mut_slice();
     for j in 0..n {
-        let (done, rest) = all.split_at_mut(j * n);
-        let own = &mut rest[j..n];
-        let mut columns = done.chunks_exact(n).map(|column| &column[j..]);
-        while let (true, Some(a)) = (columns.len() >= AT_ONCE, columns.next()) {
-            let (Some(b), Some(c), Some(d)) = (columns.next(), columns.next(), columns.next())
-            else {
-                break;
-            };
+        let (done, own) = all.split_at_mut(j * n);
+        let own = &mut own[j..n];
+        let groups = done.chunks_exact(AT_ONCE * n);
+        let rest = groups.remainder();
+        for group in groups {
+            let [a, b, c, d] = [0, 1, 2, 3].map(|k| &group[k * n + j..(k + 1) * n]);
             let factors = [-a[0], -b[0], -c[0], -d[0]];
             for ((((y, a), b), c), d) in own.iter_mut().zip(a).zip(b).zip(c).zip(d) {
-                *y = factors[0] * a + *y;
-                *y = factors[1] * b + *y;
-                *y = factors[2] * c + *y;
-                *y = factors[3] * d + *y;
+                *y += factors[0] * a;
+                *y += factors[1] * b;
+                *y += factors[2] * c;
+                *y += factors[3] * d;
             }
         }
-        for column in columns {
-            let factor = -column[0];
-            own.iter_mut().zip(column).for_each(|(y, x)| *y = factor * x + *y);
+        for column in rest.chunks_exact(n) {
+            let factor = -column[j];
+            own.iter_mut().zip(&column[j..]).for_each(|(y, x)| *y += factor * x);
         }
         // Not above zero if it is not a number.
         let root = Some(own[0]).filter(|square| *square > 0.0)?.sqrt();
@@ -60,10 +58,10 @@ pub(super) fn solve_lower(lower: &DMatrix<f64>, right: &mut [f64]) {
             let sides = a[i + 1..].iter_mut().zip(&mut b[i + 1..]);
             let sides = sides.zip(&mut c[i + 1..]).zip(&mut d[i + 1..]);
             for ((((a, b), c), d), x) in sides.zip(&column[i + 1..]) {
-                *a = found[0] * x + *a;
-                *b = found[1] * x + *b;
-                *c = found[2] * x + *c;
-                *d = found[3] * x + *d;
+                *a += found[0] * x;
+                *b += found[1] * x;
+                *c += found[2] * x;
+                *d += found[3] * x;
             }
         }
     }
@@ -73,7 +71,7 @@ pub(super) fn solve_lower(lower: &DMatrix<f64>, right: &mut [f64]) {
             side[i] /= column[i];
             let found = -side[i];
             let below = side[i + 1..].iter_mut().zip(&column[i + 1..]);
-            below.for_each(|(y, x)| *y = found * x + *y);
+            below.for_each(|(y, x)| *y += found * x);
         }
     }
 }
