@@ -1,7 +1,7 @@
 //! `prehend track --watch`: images that come one by one.
 
 use std::fs;
-use std::process::{Child, Output, Stdio};
+use std::process::{Child, Command, Output, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
@@ -135,8 +135,8 @@ fn an_interrupt_ends_it_well() {
     tell(&place, 1);
     copy_image(&place, 0);
     await_lines(&place, 2);
-    let interrupt = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]);
-    assert!({ interrupt }.status().unwrap().success());
+    let mut interrupt = Command::new("kill");
+    assert!(interrupt.args(["-INT", &child.id().to_string()]).status().unwrap().success());
     let Output { status, stdout, .. } = child.wait_with_output().unwrap();
     let out = String::from_utf8(stdout).unwrap();
     assert!(status.code() == Some(0) && out.starts_with("1 frames tracked"), "{status} {out}");
